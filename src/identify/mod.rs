@@ -1,0 +1,102 @@
+//! From a list of star positions to catalogue stars, pointing and scale.
+
+use crate::camera::CameraModel;
+use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
+
+/// One star as observed, the input of identification.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ObservedStar {
+    /// Its centroid.
+    pub position: PixelPoint,
+    /// Standard error of the centroid on one axis, in pixels.
+    pub sigma_px: f64,
+    /// Brightness in magnitudes; smaller is brighter. See [`StarField::photometry`].
+    pub mag: f64,
+}
+
+/// What the observed magnitudes mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Photometry {
+    /// −2.5 log10(flux) with an unknown zero point.
+    Instrumental,
+    /// Johnson V.
+    JohnsonV,
+}
+
+/// The stars seen in one frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StarField {
+    /// Width of the frame, in pixels.
+    pub width_px: f64,
+    /// Height of the frame, in pixels.
+    pub height_px: f64,
+    /// What the magnitudes of `stars` mean.
+    pub photometry: Photometry,
+    /// Brightest first.
+    pub stars: Vec<ObservedStar>,
+}
+
+/// What is known beforehand.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Hints {
+    /// Smallest and largest angle that a pixel at the frame's centre may span, in radians.
+    pub pixel_scale_rad: Option<(f64, f64)>,
+    /// The boresight lies within so many radians of this direction.
+    pub near: Option<(UnitVector<Icrs>, f64)>,
+}
+
+/// What came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// The stars are identified.
+    Identified(Box<Identification>),
+    /// They are not.
+    NotIdentified(Reason),
+}
+
+/// Why a field was not identified.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Reason {
+    /// Fewer stars than any identification needs.
+    TooFewStars {
+        /// Stars found.
+        found: usize,
+        /// Stars needed at the least.
+        needed: usize,
+    },
+    /// No hypothesis passed the threshold on the false-alarm probability.
+    NoMatch {
+        /// log10 of the false-alarm probability of the best hypothesis, if there was one.
+        best_log10_false_alarm: Option<f64>,
+    },
+}
+
+/// An identified field.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identification {
+    /// Which direction each pixel looks in.
+    pub camera: CameraModel,
+    /// The attitude.
+    pub icrs_to_camera: Rotation<Icrs, Camera>,
+    /// Standard errors of the attitude about the camera's x, y and z axes, in radians.
+    pub attitude_sigma_rad: [f64; 3],
+    /// Standard error of the focal length, in pixels.
+    pub focal_length_sigma_px: f64,
+    /// The stars identified, in the order of the observed stars.
+    pub matches: Vec<StarMatch>,
+    /// Root mean square of the residuals (distance between observed and predicted position), in pixels.
+    pub rms_px: f64,
+    /// log10 of the probability that noise alone gives as good an answer, all hypotheses tried counted.
+    pub log10_false_alarm: f64,
+}
+
+/// One observed star and the catalogue star that it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StarMatch {
+    /// Index into [`StarField::stars`].
+    pub observed: usize,
+    /// Index into the catalogue's stars.
+    pub catalog: usize,
+    /// Distance between the observed and the predicted position, in pixels.
+    pub residual_px: f64,
+}
