@@ -1,5 +1,8 @@
 //! From a list of star positions to catalogue stars, pointing and scale.
 
+pub mod index;
+pub mod triangle;
+
 use crate::camera::CameraModel;
 use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 
