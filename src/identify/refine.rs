@@ -2,8 +2,8 @@
 //!
 //! pair up → fit → pair up within a smaller radius → ... with as much lens distortion as the stars support
 
-use super::verify::{Hypothesis, pair_up};
-use super::{Sky, StarField, StarMatch};
+use super::verify::Hypothesis;
+use super::{Photometry, Sky, StarField, StarMatch};
 use crate::attitude::{CameraFit, MeasuredStar, fit_camera};
 use crate::camera::DistortionModel;
 
@@ -44,14 +44,13 @@ pub fn refine(
     richest: Option<DistortionModel>,
 ) -> Option<Refined> {
     let observed = &field.stars[..observed_count.min(field.stars.len())];
-    let wanted = super::verify::predicted_count(observed.len());
     let mut hypothesis = start.clone();
     let mut radius_px = radius_px;
     let mut excess_px = 0.0;
     let mut last: Option<Refined> = None;
     for _ in 0..MAX_ROUNDS {
-        let predicted = hypothesis.predict(sky, wanted);
-        let matches = pair_up(observed, &predicted, radius_px);
+        let predicted = hypothesis.predict(sky, observed, field.photometry);
+        let matches = hypothesis.pair_up(observed, &predicted, field.photometry, radius_px);
         let stars = measured(field, sky, &matches, excess_px);
         let fit = best_fit(&stars, &hypothesis, richest)?;
         excess_px = excess_sigma_px(field, &matches, &fit);
@@ -59,6 +58,7 @@ pub fn refine(
             camera: fit.camera.clone(),
             icrs_to_camera: fit.icrs_to_camera,
             parameters: fit.parameters,
+            zero_point_mag: zero_point_mag(field, sky, &matches),
         };
         let settled = last.as_ref().is_some_and(|l| same_pairs(&l.matches, &matches));
         radius_px = radius_px.min(agreement_radius_px(&fit, radius_px));
@@ -73,6 +73,19 @@ pub fn refine(
 fn same_pairs(a: &[StarMatch], b: &[StarMatch]) -> bool {
     let pair = |m: &StarMatch| (m.observed, m.catalog);
     a.iter().map(pair).eq(b.iter().map(pair))
+}
+
+/// The median difference between catalogue and observed magnitudes.
+fn zero_point_mag(field: &StarField, sky: &Sky, matches: &[StarMatch]) -> f64 {
+    match field.photometry {
+        Photometry::JohnsonV => 0.0,
+        Photometry::Instrumental => median(
+            matches
+                .iter()
+                .map(|m| f64::from(sky.stars()[m.catalog].v_mag) - field.stars[m.observed].mag)
+                .collect(),
+        ),
+    }
 }
 
 fn measured(
