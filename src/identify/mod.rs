@@ -1,5 +1,6 @@
 //! From a list of star positions to catalogue stars, pointing and scale.
 
+mod cache;
 pub mod index;
 mod refine;
 mod search;
@@ -7,6 +8,7 @@ mod sky;
 pub mod triangle;
 mod verify;
 
+pub use cache::CacheError;
 pub use search::LOG10_FALSE_ALARM_LIMIT;
 pub use sky::Sky;
 

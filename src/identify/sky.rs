@@ -1,8 +1,10 @@
 //! The catalogue made ready for identification.
 
+use super::cache::{self, CacheError};
 use super::index::TriangleIndex;
 use crate::catalog::Star;
 use crate::catalog::sky_grid::SkyGrid;
+use std::path::Path;
 
 /// Square degrees on the whole sky.
 const WHOLE_SKY_SQ_DEG: f64 = 41_252.96;
@@ -17,6 +19,35 @@ pub struct Sky<'a> {
 }
 
 impl<'a> Sky<'a> {
+    /// Takes the triangles from the cache directory, or makes them (`progress` is then called with the share
+    /// done) and puts them there. Also returns what went wrong with the cache, which is no reason to stop.
+    pub fn open(
+        stars: &'a [Star],
+        catalog_checksum: u64,
+        cache_directory: &Path,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> (Self, Vec<CacheError>) {
+        let path = cache::index_path(cache_directory, catalog_checksum);
+        let mut troubles = Vec::new();
+        let cached = cache::load(&path, catalog_checksum).unwrap_or_else(|trouble| {
+            troubles.push(trouble);
+            None
+        });
+        let sky = match cached {
+            Some(triangles) => Self {
+                stars,
+                grid: SkyGrid::new(stars),
+                triangles,
+            },
+            None => {
+                let sky = Self::build(stars, progress);
+                troubles.extend(cache::store(&path, catalog_checksum, &sky.triangles).err());
+                sky
+            }
+        };
+        (sky, troubles)
+    }
+
     /// Makes everything anew.
     pub fn build(stars: &'a [Star], progress: &(dyn Fn(f64) + Sync)) -> Self {
         let grid = SkyGrid::new(stars);
