@@ -179,14 +179,11 @@ mod tests {
     use proptest::prelude::*;
 
     fn star(index: u32, ra_rad: f64, sin_dec: f64) -> Star {
-        Star {
-            id: StarId(index),
-            direction: UnitVector::from_ra_dec(ra_rad, sin_dec.asin()),
-            pm_ra_mas_per_yr: 0.0,
-            pm_dec_mas_per_yr: 0.0,
-            v_mag: index as f32 * 0.01,
-            bv_mag: None,
-        }
+        Star::new(
+            StarId(index),
+            UnitVector::from_ra_dec(ra_rad, sin_dec.asin()),
+            index as f32 * 0.01,
+        )
     }
 
     proptest! {

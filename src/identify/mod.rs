@@ -136,7 +136,9 @@ pub fn identify(field: &StarField, hints: &Hints, sky: &Sky) -> Outcome {
         });
     }
     let mut search = search::Search::new(field, hints, sky);
-    let identified = search.run().and_then(|found| complete(field, sky, &search, &found));
+    let identified = search
+        .run()
+        .and_then(|found| complete(field, sky, &search, &found));
     match identified {
         Some(identification) => Outcome::Identified(Box::new(identification)),
         None => Outcome::NotIdentified(Reason::NoMatch {

@@ -60,7 +60,9 @@ pub fn refine(
             parameters: fit.parameters,
             zero_point_mag: zero_point_mag(field, sky, &matches),
         };
-        let settled = last.as_ref().is_some_and(|l| same_pairs(&l.matches, &matches));
+        let settled = last
+            .as_ref()
+            .is_some_and(|l| same_pairs(&l.matches, &matches));
         radius_px = radius_px.min(agreement_radius_px(&fit, radius_px));
         last = Some(with_residuals(hypothesis.clone(), fit, matches, excess_px));
         if settled {
@@ -143,7 +145,9 @@ fn median(mut values: Vec<f64>) -> f64 {
 /// The radius that holds practically all true pairs, by the typical residual of this fit.
 fn agreement_radius_px(fit: &CameraFit, before_px: f64) -> f64 {
     let sigma_px = median(distances_px(fit)) / RAYLEIGH_MEDIAN;
-    (CLIP * sigma_px * 1.5).max(MIN_RADIUS_PX).max(before_px / 4.0)
+    (CLIP * sigma_px * 1.5)
+        .max(MIN_RADIUS_PX)
+        .max(before_px / 4.0)
 }
 
 /// What must be added to the stated errors so that the residuals' median is as expected.
@@ -152,15 +156,19 @@ fn excess_sigma_px(field: &StarField, matches: &[StarMatch], fit: &CameraFit) ->
         / (2.0 * matches.len() as f64).max(1.0);
     let distances = distances_px(fit);
     let typical = |excess_px: f64| {
-        let scaled = distances.iter().zip(matches).map(|(d, m)| {
-            d / field.stars[m.observed].sigma_px.hypot(excess_px).max(1e-3)
-        });
+        let scaled = distances
+            .iter()
+            .zip(matches)
+            .map(|(d, m)| d / field.stars[m.observed].sigma_px.hypot(excess_px).max(1e-3));
         median(scaled.collect()) / (RAYLEIGH_MEDIAN * free.sqrt())
     };
     if typical(0.0) <= 1.0 {
         return 0.0;
     }
-    let (mut low, mut high) = (0.0, distances.iter().fold(1e-3, |a: f64, &b| a.max(b)) * 2.0);
+    let (mut low, mut high) = (
+        0.0,
+        distances.iter().fold(1e-3, |a: f64, &b| a.max(b)) * 2.0,
+    );
     for _ in 0..30 {
         let middle = 0.5 * (low + high);
         if typical(middle) > 1.0 {

@@ -5,8 +5,8 @@
 //! enough for that not to matter.
 
 use super::index::SizeClass;
-use super::triangle::TriangleShape;
 use super::refine::refine;
+use super::triangle::TriangleShape;
 use super::verify::{Hypothesis, TESTED_STARS};
 use super::{Hints, Photometry, Sky, StarField};
 use crate::camera::{CameraModel, DistortionModel, focal_length_px, frame_centre};
@@ -29,9 +29,18 @@ struct Pass {
 
 /// First the likely, then the lens that distorts, then the frame with many false stars.
 const PASSES: [Pass; 3] = [
-    Pass { stars: 12, tolerance: 0.0025 },
-    Pass { stars: 10, tolerance: 0.008 },
-    Pass { stars: 22, tolerance: 0.0025 },
+    Pass {
+        stars: 12,
+        tolerance: 0.0025,
+    },
+    Pass {
+        stars: 10,
+        tolerance: 0.008,
+    },
+    Pass {
+        stars: 22,
+        tolerance: 0.0025,
+    },
 ];
 
 /// The centroid errors count so many times in a triangle's tolerance.
@@ -153,7 +162,10 @@ impl<'a> Search<'a> {
         let centroid_tolerance = CENTROID_SIGMAS * std::f64::consts::SQRT_2 * sigma_px / longest_px;
         Some(Trio {
             stars,
-            reach_px: [a, b, c].iter().map(|p| p[0].hypot(p[1])).fold(0.0, f64::max),
+            reach_px: [a, b, c]
+                .iter()
+                .map(|p| p[0].hypot(p[1]))
+                .fold(0.0, f64::max),
             tolerance: distortion_tolerance.hypot(centroid_tolerance),
         })
     }
@@ -235,8 +247,9 @@ impl<'a> Search<'a> {
     ) -> Option<Found> {
         let stars = corners.map(|c| &self.sky.stars()[c as usize]);
         let sky = stars.map(|s| s.direction.as_vector());
-        let zero_points: [f64; 3] =
-            std::array::from_fn(|i| f64::from(stars[i].v_mag) - self.field.stars[trio.stars[i]].mag);
+        let zero_points: [f64; 3] = std::array::from_fn(|i| {
+            f64::from(stars[i].v_mag) - self.field.stars[trio.stars[i]].mag
+        });
         let zero_point = self.zero_point(zero_points)?;
         let chord = (sky[0] - sky[1]).norm();
         let focal_px = middle_px * longest / chord;
@@ -332,7 +345,14 @@ impl<'a> Search<'a> {
     fn decide(&mut self, start: &Hypothesis, trio: &Trio) -> Option<Found> {
         let radius_px = WITNESS_TOLERANCES * trio.tolerance * self.diagonal_px;
         let richest = Some(DistortionModel::Radial);
-        let refined = refine(self.field, TESTED_STARS, self.sky, start, radius_px, richest)?;
+        let refined = refine(
+            self.field,
+            TESTED_STARS,
+            self.sky,
+            start,
+            radius_px,
+            richest,
+        )?;
         let log10 = self.log10_false_alarm(&refined.hypothesis)?;
         self.best_log10 = Some(self.best_log10.map_or(log10, |best| best.min(log10)));
         (log10 <= LOG10_FALSE_ALARM_LIMIT).then_some(Found {
@@ -368,10 +388,7 @@ fn triple_of([a, b, c]: [&Vector3<f64>; 3]) -> f64 {
 }
 
 /// The rotation that brings A and B on the sky to where the camera saw them (TRIAD with the middle of AB first).
-fn two_star_rotation(
-    seen: &[Vector3<f64>; 3],
-    sky: [&Vector3<f64>; 3],
-) -> Option<Matrix3<f64>> {
+fn two_star_rotation(seen: &[Vector3<f64>; 3], sky: [&Vector3<f64>; 3]) -> Option<Matrix3<f64>> {
     let frame = |a: &Vector3<f64>, b: &Vector3<f64>| {
         let first = (a + b).try_normalize(1e-12)?;
         let third = a.cross(b).try_normalize(1e-15)?;

@@ -189,7 +189,10 @@ impl Hypothesis {
             .iter()
             .map(|star| {
                 let (mut alike, mut near) = (0.0f64, 0.0f64);
-                for p in predicted.iter().filter(|p| self.alike(star, p, field.photometry)) {
+                for p in predicted
+                    .iter()
+                    .filter(|p| self.alike(star, p, field.photometry))
+                {
                     alike += 1.0;
                     near += f64::from(u8::from(p.pixel.distance_to(&star.position) <= reach_px));
                 }
