@@ -42,7 +42,7 @@ impl PixelPoint {
 
     /// The distance to `other`, in pixels.
     pub fn distance_to(&self, other: &Self) -> f64 {
-        (self.x - other.x).hypot(self.y - other.y)
+        ((self.x - other.x).powi(2) + (self.y - other.y).powi(2)).sqrt()
     }
 }
 

@@ -42,8 +42,8 @@ pub struct CameraFit {
     pub parameters: usize,
 }
 
-/// Turn about three axes, and ln f.
-const POSE_PARAMETERS: usize = 4;
+/// Parameters without any distortion: turn about three axes, and ln f.
+pub const POSE_PARAMETERS: usize = 4;
 const MAX_ITERATIONS: usize = 10;
 /// A step below this is far below any centroid error.
 const CONVERGED: f64 = 1e-10;

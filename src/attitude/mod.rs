@@ -6,7 +6,7 @@
 
 mod fit;
 
-pub use fit::{CameraFit, MeasuredStar, fit_camera};
+pub use fit::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera};
 
 use crate::coords::{Camera, Icrs, Rotation, UnitVector};
 use nalgebra::{Matrix3, SVD};
