@@ -1,5 +1,7 @@
 //! The star catalogue: what is known of each star, and which stars are near a direction.
 
+pub mod sky_grid;
+
 use crate::coords::{Icrs, UnitVector};
 
 /// One catalogue star, at the catalogue's epoch J2000.

@@ -1,0 +1,260 @@
+//! Attitude, focal length and lens distortion, adjusted together to star positions in pixels.
+//!
+//! matched stars + first guess → Gauss-Newton on (turn about x, y, z; ln f; distortion) → camera, attitude, covariance
+//!
+//! In the ideal image plane, with (x, y) the tangent-plane coordinates of a star, f the focal length in
+//! pixels and (u, v) the observed offset from the centre, each star gives two equations,
+//! `f·x − u − Σ cₖ Bₖu(u, v) = 0` and the same in y; they are linear in the distortion cₖ and nearly so
+//! in the small turn ω, since `dx = −ωx·x·y + ωy·(1 + x²) − ωz·y`, `dy = −ωx·(1 + y²) + ωy·x·y + ωz·x`.
+
+use crate::camera::{CameraModel, Distortion, DistortionModel};
+use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
+use nalgebra::{DMatrix, DVector, Matrix4, Vector3};
+
+/// A star whose place on the sky is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredStar {
+    /// Its centroid.
+    pub pixel: PixelPoint,
+    /// Its catalogue direction at the time of the frame.
+    pub icrs: UnitVector<Icrs>,
+    /// Standard error of the measured position on each axis, in pixels.
+    pub sigma_px: f64,
+}
+
+/// The camera and the attitude that fit best.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraFit {
+    /// The camera.
+    pub camera: CameraModel,
+    /// The attitude.
+    pub icrs_to_camera: Rotation<Icrs, Camera>,
+    /// Covariance of the small turn about the camera's x, y, z axes in radians and of ln(focal length),
+    /// the distortion marginalised, for the standard errors as given.
+    pub covariance: Matrix4<f64>,
+    /// Observed minus predicted position of each star along the camera's axes, in pixels.
+    pub residuals_px: Vec<[f64; 2]>,
+    /// Σ (residual / σ)².
+    pub chi_sq: f64,
+    /// The same with each equation predicted by a fit without it: it rises where a model has too much freedom.
+    pub left_out_chi_sq: f64,
+    /// Free parameters.
+    pub parameters: usize,
+}
+
+/// Turn about three axes, and ln f.
+const POSE_PARAMETERS: usize = 4;
+const MAX_ITERATIONS: usize = 10;
+/// A step below this is far below any centroid error.
+const CONVERGED: f64 = 1e-10;
+
+/// Fits attitude, focal length and, with a `model`, the distortion, starting from `camera` and `icrs_to_camera`.
+///
+/// `None` where the stars do not determine the parameters (too few, or in bad places) or are not in front of the camera.
+pub fn fit_camera(
+    stars: &[MeasuredStar],
+    camera: &CameraModel,
+    icrs_to_camera: &Rotation<Icrs, Camera>,
+    model: Option<DistortionModel>,
+) -> Option<CameraFit> {
+    let parameters = POSE_PARAMETERS + model.map_or(0, DistortionModel::terms);
+    if 2 * stars.len() < parameters {
+        return None;
+    }
+    let mut adjustment = Adjustment {
+        stars,
+        camera: camera.clone(),
+        icrs_to_camera: *icrs_to_camera,
+        model,
+        design: DMatrix::zeros(2 * stars.len(), parameters),
+        rhs: DVector::zeros(2 * stars.len()),
+    };
+    for _ in 0..MAX_ITERATIONS {
+        if adjustment.step()? < CONVERGED {
+            break;
+        }
+    }
+    adjustment.finish()
+}
+
+struct Adjustment<'a> {
+    stars: &'a [MeasuredStar],
+    camera: CameraModel,
+    icrs_to_camera: Rotation<Icrs, Camera>,
+    model: Option<DistortionModel>,
+    /// Two rows a star, divided by its standard error.
+    design: DMatrix<f64>,
+    rhs: DVector<f64>,
+}
+
+impl Adjustment<'_> {
+    /// Half the diagonal: where a normalised offset is 1.
+    fn radius_px(&self) -> f64 {
+        self.camera.width_px.hypot(self.camera.height_px) / 2.0
+    }
+
+    fn linearise(&mut self) -> Option<()> {
+        let f = self.camera.focal_length_px;
+        let radius_px = self.radius_px();
+        for (index, star) in self.stars.iter().enumerate() {
+            let direction = self.icrs_to_camera.apply(&star.icrs);
+            let d = direction.as_vector();
+            if d.z <= 0.0 {
+                return None;
+            }
+            let (x, y) = (d.x / d.z, d.y / d.z);
+            let [u, v] = self.camera.offset_of(&star.pixel);
+            let weight = 1.0 / star.sigma_px;
+            let rows = [
+                [-x * y, 1.0 + x * x, -y, x, u - f * x],
+                [-(1.0 + y * y), x * y, x, y, v - f * y],
+            ];
+            for (axis, row) in rows.iter().enumerate() {
+                let r = 2 * index + axis;
+                for (column, value) in row[..POSE_PARAMETERS].iter().enumerate() {
+                    self.design[(r, column)] = weight * f * value;
+                }
+                self.rhs[r] = weight * row[POSE_PARAMETERS];
+            }
+            if let Some(model) = self.model {
+                let mut column = POSE_PARAMETERS;
+                model.for_each_term([u / radius_px, v / radius_px], |[du, dv]| {
+                    self.design[(2 * index, column)] = -weight * du;
+                    self.design[(2 * index + 1, column)] = -weight * dv;
+                    column += 1;
+                });
+            }
+        }
+        Some(())
+    }
+
+    /// One Gauss-Newton step; returns its size (radians, and relative change of the focal length).
+    fn step(&mut self) -> Option<f64> {
+        self.linearise()?;
+        let normal = self.design.tr_mul(&self.design);
+        let solution = normal.cholesky()?.solve(&self.design.tr_mul(&self.rhs));
+        let turn = Vector3::new(solution[0], solution[1], solution[2]);
+        if !(turn.norm() < 0.5 && solution[3].abs() < 0.5) {
+            return None;
+        }
+        self.icrs_to_camera = self.icrs_to_camera.then_turn(turn);
+        self.camera.focal_length_px *= solution[3].exp();
+        let radius_px = self.radius_px();
+        self.camera.distortion = self.model.map(|model| {
+            let coefficients = solution.as_slice()[POSE_PARAMETERS..].to_vec();
+            Distortion::new(model, radius_px, coefficients)
+        });
+        Some(turn.norm().max(solution[3].abs()))
+    }
+
+    fn finish(mut self) -> Option<CameraFit> {
+        self.linearise()?;
+        let parameters = self.design.ncols();
+        let inverse = self.design.tr_mul(&self.design).cholesky()?.inverse();
+        // At the solution the linear model's right-hand side is the residual plus the distortion part.
+        let mut distortion = DVector::zeros(parameters);
+        if let Some(fitted) = &self.camera.distortion {
+            distortion
+                .rows_mut(POSE_PARAMETERS, parameters - POSE_PARAMETERS)
+                .copy_from_slice(fitted.coefficients_px());
+        }
+        let weighted = &self.rhs - &self.design * distortion;
+        let leverage = (&self.design * &inverse).component_mul(&self.design);
+        let left_out_chi_sq = (0..weighted.len())
+            .map(|r| {
+                let free = (1.0 - leverage.row(r).sum()).max(1e-6);
+                (weighted[r] / free).powi(2)
+            })
+            .sum();
+        let residuals_px = self
+            .stars
+            .iter()
+            .enumerate()
+            .map(|(i, s)| [weighted[2 * i] * s.sigma_px, weighted[2 * i + 1] * s.sigma_px])
+            .collect();
+        Some(CameraFit {
+            camera: self.camera,
+            icrs_to_camera: self.icrs_to_camera,
+            covariance: inverse.fixed_view::<4, 4>(0, 0).into_owned(),
+            residuals_px,
+            chi_sq: weighted.norm_squared(),
+            left_out_chi_sq,
+            parameters,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::RAD_PER_DEG;
+
+    fn stars_of(camera: &CameraModel, attitude: &Rotation<Icrs, Camera>) -> Vec<MeasuredStar> {
+        let mut stars = Vec::new();
+        for column in 0..7 {
+            for row in 0..6 {
+                let pixel = PixelPoint::new(
+                    20.0 + 160.0 * f64::from(column) + 7.0 * f64::from(row),
+                    15.0 + 140.0 * f64::from(row) - 3.0 * f64::from(column),
+                );
+                stars.push(MeasuredStar {
+                    pixel,
+                    icrs: attitude.inverse().apply(&camera.direction_of(&pixel)),
+                    sigma_px: 0.1,
+                });
+            }
+        }
+        stars
+    }
+
+    #[test]
+    fn a_known_camera_is_found_again() {
+        for mirrored in [false, true] {
+            let centre = UnitVector::from_ra_dec(0.3, 1.5);
+            let truth = Rotation::looking_at(&centre, 2.0);
+            let mut camera = CameraModel::pinhole(1024.0, 768.0, 2000.0, mirrored);
+            let mut coefficients = vec![0.0; DistortionModel::Cubic.terms()];
+            coefficients[0] = 0.7;
+            coefficients[5] = -1.5;
+            coefficients[11] = 4.0;
+            camera.distortion =
+                Some(Distortion::new(DistortionModel::Cubic, 640.0, coefficients));
+            let stars = stars_of(&camera, &truth);
+            let start = CameraModel::pinhole(1024.0, 768.0, 2020.0, mirrored);
+            let turned = truth.then_turn(Vector3::new(0.002, -0.003, 0.001));
+            let fit = fit_camera(&stars, &start, &turned, Some(DistortionModel::Cubic)).unwrap();
+            assert!(fit.chi_sq < 1e-12, "{}", fit.chi_sq);
+            assert!((fit.camera.focal_length_px - 2000.0).abs() < 1e-6);
+            assert!((fit.icrs_to_camera.matrix() - truth.matrix()).abs().max() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn too_few_stars_give_none() {
+        let camera = CameraModel::pinhole(1000.0, 1000.0, 3000.0, false);
+        let truth = Rotation::looking_at(&UnitVector::from_ra_dec(0.0, 0.0), 10.0 * RAD_PER_DEG);
+        let stars = stars_of(&camera, &truth);
+        assert!(fit_camera(&stars[..1], &camera, &truth, None).is_none());
+        assert!(fit_camera(&stars[..2], &camera, &truth, None).is_some());
+        let cubic = Some(DistortionModel::Cubic);
+        assert!(fit_camera(&stars[..9], &camera, &truth, cubic).is_none());
+    }
+
+    #[test]
+    fn too_much_freedom_shows_in_the_left_out_residuals() {
+        let camera = CameraModel::pinhole(1024.0, 768.0, 2000.0, false);
+        let truth = Rotation::looking_at(&UnitVector::from_ra_dec(0.0, 0.5), 0.0);
+        let mut stars = stars_of(&camera, &truth);
+        for (i, star) in stars.iter_mut().enumerate() {
+            let phase = (i * i * 7 % 31) as f64;
+            star.pixel.x += 0.1 * phase.sin();
+            star.pixel.y += 0.1 * (phase * 1.7).cos();
+        }
+        let fits: Vec<CameraFit> = [None, Some(DistortionModel::Quintic)]
+            .into_iter()
+            .map(|model| fit_camera(&stars, &camera, &truth, model).unwrap())
+            .collect();
+        assert!(fits[1].chi_sq < fits[0].chi_sq);
+        assert!(fits[1].left_out_chi_sq > fits[0].left_out_chi_sq);
+    }
+}
