@@ -25,30 +25,30 @@
 use crate::camera;
 use crate::catalog::Catalog;
 use crate::coords::{Icrs, PixelPoint, UnitVector};
-use crate::detect::{self, DetectConfig, DetectError, Detection, DetectionFlags, Detections, Workspace};
-use crate::frame::{self, Frame, FrameError};
-use crate::identify::{
-    self, Hints, ObservedStar, Outcome, Photometry, StarField, TriangleIndex,
+use crate::detect::{
+    self, DetectConfig, DetectError, Detection, DetectionFlags, Detections, Workspace,
 };
+use crate::frame::{self, Frame, FrameError};
+use crate::identify::{self, Hints, ObservedStar, Outcome, Photometry, StarField, TriangleIndex};
 use crate::report::{BackgroundReport, FrameReport, TimingReport};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Why a frame could not be examined. That its stars are not identified is no error but an [`Outcome`].
+/// Why the frame in a file could not be examined. That its stars are not identified is no error but an [`Outcome`].
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// The file cannot be read or understood.
-    #[error("reading {}", path.display())]
-    Read {
+    #[error("reading {0}")]
+    Read(#[from] FrameError),
+    /// The frame is not one in which stars can be looked for.
+    #[error("detecting stars in {}", path.display())]
+    Detect {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
-        source: FrameError,
+        /// What is wrong with the frame.
+        source: DetectError,
     },
-    /// The frame is not one in which stars can be looked for.
-    #[error("detecting stars")]
-    Detect(#[from] DetectError),
 }
 
 /// What is known of the camera's scale beforehand.
@@ -80,7 +80,10 @@ impl ScaleHint {
             }
             Scale::Pixel(pixel_rad) => pixel_rad * scale,
         };
-        (pixel_rad(1.0 - self.tolerance), pixel_rad(1.0 + self.tolerance))
+        (
+            pixel_rad(1.0 - self.tolerance),
+            pixel_rad(1.0 + self.tolerance),
+        )
     }
 }
 
@@ -227,12 +230,14 @@ impl Pipeline {
         workspace: &mut Workspace,
     ) -> Result<Solution, Error> {
         let start = Instant::now();
-        let frame = frame::read(path).map_err(|source| Error::Read {
-            path: path.to_owned(),
-            source,
-        })?;
+        let frame = frame::read(path)?;
         let read_ms = milliseconds_since(start);
-        let mut solution = self.solve_frame(&frame, config, workspace)?;
+        let mut solution = self
+            .solve_frame(&frame, config, workspace)
+            .map_err(|source| Error::Detect {
+                path: path.to_owned(),
+                source,
+            })?;
         solution.timing_ms.read = read_ms;
         solution.timing_ms.total = milliseconds_since(start);
         Ok(solution)
@@ -241,13 +246,13 @@ impl Pipeline {
     /// Examines `frame`.
     ///
     /// # Errors
-    /// [`Error::Detect`] if it is unfit for detection.
+    /// [`DetectError`] if it is unfit for detection.
     pub fn solve_frame(
         &self,
         frame: &Frame,
         config: &SolveConfig,
         workspace: &mut Workspace,
-    ) -> Result<Solution, Error> {
+    ) -> Result<Solution, DetectError> {
         let start = Instant::now();
         let detections = detect::detect(frame, &config.detect, workspace)?;
         let detect_ms = milliseconds_since(start);

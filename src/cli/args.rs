@@ -28,7 +28,7 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Find and identify the stars in frames (TIFF, PNG, JPEG, FITS)
+    /// Find and identify the stars in frames (TIFF, PNG, JPEG)
     #[command(after_help = "Examples:\n  \
         starpipe process night.tif\n  \
         starpipe process --fov 11.4 --near 83.8,-1.2 --radius 10 night.tif\n  \

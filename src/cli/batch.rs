@@ -74,10 +74,16 @@ mod tests {
                 std::thread::sleep(Duration::from_micros((40 - item) * 50));
                 item * 2
             };
-            for_each_ordered(&pool(threads), &items, || (), work, |item, result| {
-                seen.push((*item, result));
-                ControlFlow::Continue(())
-            });
+            for_each_ordered(
+                &pool(threads),
+                &items,
+                || (),
+                work,
+                |item, result| {
+                    seen.push((*item, result));
+                    ControlFlow::Continue(())
+                },
+            );
             let expected: Vec<_> = items.iter().map(|i| (*i, i * 2)).collect();
             assert_eq!(seen, expected);
         }
@@ -87,22 +93,32 @@ mod tests {
     fn an_early_end_leaves_the_rest() {
         let items: Vec<usize> = (0..1000).collect();
         let mut seen = 0;
-        for_each_ordered(&pool(2), &items, || (), |item, ()| *item, |_, _| {
-            seen += 1;
-            if seen == 3 {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        });
+        for_each_ordered(
+            &pool(2),
+            &items,
+            || (),
+            |item, ()| *item,
+            |_, _| {
+                seen += 1;
+                if seen == 3 {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            },
+        );
         assert_eq!(seen, 3);
     }
 
     #[test]
     fn nothing_to_do_is_done_at_once() {
         let none: [u8; 0] = [];
-        for_each_ordered(&pool(2), &none, || (), |item, ()| *item, |_, _| {
-            ControlFlow::Continue(())
-        });
+        for_each_ordered(
+            &pool(2),
+            &none,
+            || (),
+            |item, ()| *item,
+            |_, _| ControlFlow::Continue(()),
+        );
     }
 }

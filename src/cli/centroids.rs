@@ -63,7 +63,9 @@ fn parse(input: impl io::Read, size: FrameSize) -> anyhow::Result<CentroidList> 
             continue;
         }
         let line = record.position().map_or(0, csv::Position::line);
-        let centroid = columns.centroid(&record).with_context(|| format!("line {line}"))?;
+        let centroid = columns
+            .centroid(&record)
+            .with_context(|| format!("line {line}"))?;
         inside(&centroid.position, size).with_context(|| format!("line {line}"))?;
         centroids.push(centroid);
     }
@@ -85,7 +87,9 @@ fn parse(input: impl io::Read, size: FrameSize) -> anyhow::Result<CentroidList> 
 impl Columns {
     fn find(headings: &StringRecord) -> anyhow::Result<Self> {
         if headings.iter().all(str::is_empty) {
-            bail!("the file is empty; expected a heading with the columns x, y and flux, vmag or mag");
+            bail!(
+                "the file is empty; expected a heading with the columns x, y and flux, vmag or mag"
+            );
         }
         let column = |names: &[&str]| {
             names.iter().find_map(|name| {
@@ -166,7 +170,9 @@ fn inside(position: &PixelPoint, size: FrameSize) -> anyhow::Result<()> {
     for (name, value, side) in axes {
         let limit = side.map_or(MAX_COORDINATE_PX, f64::from) - 0.5;
         if !(-0.5..=limit).contains(&value) {
-            bail!("column {name}: {value} is outside the frame, which reaches from -0.5 to {limit} px");
+            bail!(
+                "column {name}: {value} is outside the frame, which reaches from -0.5 to {limit} px"
+            );
         }
     }
     Ok(())
@@ -175,7 +181,10 @@ fn inside(position: &PixelPoint, size: FrameSize) -> anyhow::Result<()> {
 /// The sides of the frame: those known, else as far as the centroids reach.
 fn sides(centroids: &[ListedCentroid], size: FrameSize) -> (usize, usize) {
     let reach = |coordinate: fn(&PixelPoint) -> f64| {
-        let most = centroids.iter().map(|c| coordinate(&c.position)).fold(0.0, f64::max);
+        let most = centroids
+            .iter()
+            .map(|c| coordinate(&c.position))
+            .fold(0.0, f64::max);
         most.round() as usize + 1
     };
     let known = |side: Option<u32>| side.map(|side| side as usize);
@@ -241,7 +250,10 @@ mod tests {
     fn a_missing_column_is_named_along_with_those_found() {
         for (heading, expected) in [
             ("", "the file is empty"),
-            ("a,b,c\n1,2,3\n", "line 1 has the columns a, b, c; expected x or x_px"),
+            (
+                "a,b,c\n1,2,3\n",
+                "line 1 has the columns a, b, c; expected x or x_px",
+            ),
             ("x,b,c\n1,2,3\n", "expected y or y_px"),
             ("x,y,c\n1,2,3\n", "expected flux, vmag or mag"),
             ("x,y,mag\n", "no centroid under the heading"),

@@ -2,7 +2,6 @@
 
 use super::args::{CatalogArgs, CatalogCommand, ImportArgs};
 use super::{Exit, Fault};
-use anyhow::Context;
 use starpipe::catalog;
 
 /// `starpipe catalog`
@@ -13,8 +12,7 @@ pub(crate) fn catalog(arguments: CatalogArgs) -> Result<Exit, Fault> {
 }
 
 fn import(arguments: &ImportArgs) -> anyhow::Result<Exit> {
-    let (catalog, summary) = catalog::import_sky2000(&arguments.file)
-        .with_context(|| format!("reading {}", arguments.file.display()))?;
+    let (catalog, summary) = catalog::import_sky2000(&arguments.file)?;
     let _ = (catalog, summary);
     Ok(Exit::Success)
 }

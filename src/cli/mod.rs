@@ -65,10 +65,23 @@ pub(crate) fn run() -> ExitCode {
             .error(ErrorKind::ValueValidation, message)
             .exit(),
         Err(Fault::Failed(error)) => {
-            complain(format_args!("{error:#}"));
+            complain(chained(&error));
             Exit::Failure.into()
         }
     }
+}
+
+/// An error and its causes in one line. A cause that the message before it ends with is not said again.
+pub(crate) fn chained(error: &anyhow::Error) -> String {
+    let mut line = String::new();
+    for cause in error.chain() {
+        let text = cause.to_string();
+        if !line.ends_with(&text) {
+            line += if line.is_empty() { "" } else { ": " };
+            line += &text;
+        }
+    }
+    line.replace('\n', " ")
 }
 
 /// Tells of trouble, on standard error.
@@ -79,4 +92,23 @@ pub(crate) fn complain(message: impl Display) {
 /// Tells of something odd that does no harm, on standard error.
 pub(crate) fn warn(message: impl Display) {
     eprintln!("starpipe: warning: {message}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::{Context, anyhow};
+
+    #[test]
+    fn causes_are_chained_in_one_line_and_said_once() {
+        let cause = anyhow!("no such file");
+        let error = Err::<(), _>(cause)
+            .context("a.tif: no such file")
+            .context("reading a.tif: no such file\nat all")
+            .unwrap_err();
+        assert_eq!(
+            chained(&error),
+            "reading a.tif: no such file at all: a.tif: no such file"
+        );
+    }
 }

@@ -79,7 +79,9 @@ fn table(report: &FrameReport, with_header: bool) -> anyhow::Result<Vec<u8>> {
         write_table_header(&mut writer)?;
     }
     report.write_table_rows(&mut writer)?;
-    writer.into_inner().map_err(|error| error.into_error().into())
+    writer
+        .into_inner()
+        .map_err(|error| error.into_error().into())
 }
 
 /// Writes a file whole or not at all: into a temporary file beside it, which then takes its name.

@@ -19,7 +19,9 @@ impl HintArgs {
     /// What is known of the frames.
     pub(crate) fn resolve(&self) -> Result<Knowledge, Fault> {
         let fov = self.fov.map(|deg| Scale::FieldOfView(deg * RAD_PER_DEG));
-        let pixel = self.pixel_scale.map(|arcsec| Scale::Pixel(arcsec * RAD_PER_ARCSEC));
+        let pixel = self
+            .pixel_scale
+            .map(|arcsec| Scale::Pixel(arcsec * RAD_PER_ARCSEC));
         let scale = fov.or(pixel);
         if scale.is_none() && self.scale_error.is_some() {
             return Err(Fault::Usage(
@@ -99,11 +101,16 @@ fn check_file_names(inputs: &[PathBuf], directory: &Path) -> Result<(), Fault> {
             )));
         }
     }
-    let inputs_found: Vec<PathBuf> = inputs.iter().filter_map(|i| i.canonicalize().ok()).collect();
+    let inputs_found: Vec<PathBuf> = inputs
+        .iter()
+        .filter_map(|i| i.canonicalize().ok())
+        .collect();
     for input in inputs {
         for extension in ["json", "csv"] {
             let output = output_path(directory, input, extension);
-            let clash = output.canonicalize().is_ok_and(|path| inputs_found.contains(&path));
+            let clash = output
+                .canonicalize()
+                .is_ok_and(|path| inputs_found.contains(&path));
             if clash {
                 return Err(Fault::Usage(format!(
                     "the results of {} would overwrite the input {}; choose another directory for --out",

@@ -3,7 +3,7 @@
 use super::args::{IdentifyArgs, OutputArgs, ProcessArgs, ResourceArgs, SolvingArgs};
 use super::centroids::{self, FrameSize};
 use super::output::Output;
-use super::{Exit, Fault, batch, cache, complain, warn};
+use super::{Exit, Fault, batch, cache, chained, complain};
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use starpipe::catalog::Catalog;
@@ -63,9 +63,13 @@ fn solve_all(
         let solution = solve(&pipeline, input, workspace)?;
         Ok(pipeline.report(&input.display().to_string(), &solution))
     };
-    batch::for_each_ordered(&pool, inputs, Workspace::default, report, |input, result| {
-        run.take(input, result)
-    });
+    batch::for_each_ordered(
+        &pool,
+        inputs,
+        Workspace::default,
+        report,
+        |input, result| run.take(input, result),
+    );
     Ok(run.exit())
 }
 
@@ -102,7 +106,7 @@ impl Run {
         });
         printed.unwrap_or_else(|error| {
             self.failed = true;
-            self.progress.suspend(|| complain(format_args!("{error:#}")));
+            self.progress.suspend(|| complain(chained(&error)));
             ControlFlow::Continue(())
         })
     }
@@ -127,12 +131,13 @@ fn thread_pool(threads: Option<u32>) -> anyhow::Result<rayon::ThreadPool> {
 
 fn pipeline(resources: &ResourceArgs) -> anyhow::Result<Pipeline> {
     let catalog = match &resources.catalog {
-        Some(path) => {
-            Catalog::read(path).with_context(|| format!("reading {}", path.display()))?
-        }
+        Some(path) => Catalog::read(path)?,
         None => Catalog::built_in().context("reading the built-in catalogue")?,
     };
-    let index = index(&catalog, cache::directory(resources.cache_dir.clone()).as_deref())?;
+    let index = index(
+        &catalog,
+        cache::directory(resources.cache_dir.clone()).as_deref(),
+    )?;
     Ok(Pipeline::new(catalog, index))
 }
 
@@ -147,7 +152,7 @@ fn index(catalog: &Catalog, directory: Option<&Path>) -> anyhow::Result<Triangle
 
 /// A bar on standard error, which stays empty where that is no terminal.
 fn bar(length: u64, template: &str) -> ProgressBar {
-    let style = ProgressStyle::with_template(template)
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let style =
+        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new(length).with_style(style)
 }

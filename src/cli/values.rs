@@ -78,9 +78,9 @@ pub(crate) fn radius(text: &str) -> Result<f64, String> {
 
 /// Right ascension and declination in degrees, with a comma between them.
 pub(crate) fn direction(text: &str) -> Result<Direction, String> {
-    let (ra, dec) = text
-        .split_once(',')
-        .ok_or("right ascension and declination in degrees are needed, with a comma between them")?;
+    let (ra, dec) = text.split_once(',').ok_or(
+        "right ascension and declination in degrees are needed, with a comma between them",
+    )?;
     let ra_deg = within(
         ra,
         "right ascension",

@@ -2,9 +2,10 @@
 
 use super::rounding::{finite, half_turn_deg, to_decimals, to_significant, turn_deg};
 use super::{
-    AttitudeReport, AttitudeSigma, BackgroundReport, FrameReport, MagnitudeReport, MatchReport,
-    OpticsReport, SCHEMA, StarReport, Status, TimingReport,
+    AttitudeReport, AttitudeSigma, BackgroundReport, DistortionReport, FrameReport,
+    MagnitudeReport, MatchReport, OpticsReport, SCHEMA, StarReport, Status, TimingReport,
 };
+use crate::camera::Distortion;
 use crate::catalog::Catalog;
 use crate::detect::DetectionFlags;
 use crate::identify::{Identification, LOG10_FALSE_ALARM_LIMIT, Outcome, Reason, StarMatch};
@@ -87,7 +88,17 @@ fn optics(identification: &Identification) -> OpticsReport {
         focal_length_px: to_decimals(camera.focal_length_px, PIXEL_DECIMALS),
         focal_length_sigma_px: finite(identification.focal_length_sigma_px, PIXEL_DECIMALS),
         mirrored: camera.mirrored,
-        distortion: camera.distortion.clone(),
+        distortion: camera.distortion.as_ref().map(distortion),
+    }
+}
+
+fn distortion(distortion: &Distortion) -> DistortionReport {
+    let coefficients = distortion.coefficients_px().iter();
+    DistortionReport {
+        model: distortion.model().name(),
+        radius_px: to_decimals(distortion.radius_px(), PIXEL_DECIMALS),
+        largest_px: to_decimals(distortion.largest_px(), PIXEL_DECIMALS),
+        coefficients_px: coefficients.map(|c| to_decimals(*c, 6)).collect(),
     }
 }
 
@@ -117,7 +128,11 @@ fn faintest(identification: &Identification, catalog: &Catalog) -> Option<Magnit
 }
 
 fn background(measured: &BackgroundReport) -> BackgroundReport {
-    let rounded = |value: f64| value.is_finite().then(|| to_significant(value, FLUX_DIGITS));
+    let rounded = |value: f64| {
+        value
+            .is_finite()
+            .then(|| to_significant(value, FLUX_DIGITS))
+    };
     BackgroundReport {
         level: measured.level.and_then(rounded),
         noise: measured.noise.and_then(rounded),
@@ -135,8 +150,7 @@ fn timing(measured: &TimingReport) -> TimingReport {
 
 fn unidentified(source: &Source) -> StarReport {
     let measured = source.measured.as_ref();
-    let significant =
-        |value: f64, digits| value.is_finite().then(|| to_significant(value, digits));
+    let significant = |value: f64, digits| value.is_finite().then(|| to_significant(value, digits));
     StarReport {
         x: to_decimals(source.position.x, PIXEL_DECIMALS),
         y: to_decimals(source.position.y, PIXEL_DECIMALS),
@@ -214,8 +228,17 @@ mod tests {
 
     #[test]
     fn a_reason_says_what_was_found_what_was_needed_and_what_may_help() {
-        let few = reason_text(&Reason::TooFewStars { found: 1, needed: 4 }, 3);
-        assert!(few.contains("only 1 star was found and at least 4"), "{few}");
+        let few = reason_text(
+            &Reason::TooFewStars {
+                found: 1,
+                needed: 4,
+            },
+            3,
+        );
+        assert!(
+            few.contains("only 1 star was found and at least 4"),
+            "{few}"
+        );
         let none = Reason::NoMatch {
             best_log10_false_alarm: None,
         };

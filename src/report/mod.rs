@@ -15,7 +15,6 @@ mod text;
 pub use table::{TABLE_COLUMNS, write_table_header};
 pub use text::{STARS_SHOWN, TextOptions};
 
-use crate::camera::Distortion;
 use serde::Serialize;
 
 /// Version of the JSON described here.
@@ -103,7 +102,20 @@ pub struct OpticsReport {
     /// The image is a mirror image of the sky.
     pub mirrored: bool,
     /// Departure from the pinhole camera, where the stars show one.
-    pub distortion: Option<Distortion>,
+    pub distortion: Option<DistortionReport>,
+}
+
+/// Departure from the pinhole camera, as [`Distortion`](crate::camera::Distortion) defines it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DistortionReport {
+    /// Name of the [`DistortionModel`](crate::camera::DistortionModel).
+    pub model: &'static str,
+    /// Offset from the frame's centre at which a normalised offset is 1, in pixels.
+    pub radius_px: f64,
+    /// Largest displacement at that offset, in pixels.
+    pub largest_px: f64,
+    /// The coefficients in pixels, in the model's order.
+    pub coefficients_px: Vec<f64>,
 }
 
 /// How good the identification is.

@@ -142,10 +142,17 @@ fn json_is_one_line() {
 fn a_long_table_is_cut_unless_all_stars_are_wanted() {
     let mut report = identified();
     report.stars = vec![star(1.0, Some("05550020"), None); STARS_SHOWN + 5];
-    let rows = |text: &str| text.lines().filter(|line| line.contains("05550020")).count();
+    let rows = |text: &str| {
+        text.lines()
+            .filter(|line| line.contains("05550020"))
+            .count()
+    };
     let cut = report.to_text(TextOptions::default());
     assert_eq!(rows(&cut), STARS_SHOWN);
-    assert!(cut.ends_with("  and 5 fainter; --all-stars lists them\n"), "{cut}");
+    assert!(
+        cut.ends_with("  and 5 fainter; --all-stars lists them\n"),
+        "{cut}"
+    );
     let whole = report.to_text(TextOptions { all_stars: true });
     assert_eq!(rows(&whole), STARS_SHOWN + 5);
     assert!(!whole.contains("--all-stars"));

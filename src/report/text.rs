@@ -23,12 +23,19 @@ pub struct TextOptions {
 impl FrameReport {
     /// The report as text of several lines, each with its end.
     pub fn to_text(&self, options: TextOptions) -> String {
-        let mut lines = vec![format!("{}  {} × {} px", self.frame, self.width, self.height)];
+        let mut lines = vec![format!(
+            "{}  {} × {} px",
+            self.frame, self.width, self.height
+        )];
         lines.extend(self.verdict());
         lines.extend(self.attitude.iter().flat_map(attitude_lines));
         lines.extend(self.optics.iter().flat_map(optics_lines));
         lines.extend(self.matched.iter().map(residual_line));
-        lines.extend(self.magnitude.iter().map(|magnitude| self.faintest_line(magnitude)));
+        lines.extend(
+            self.magnitude
+                .iter()
+                .map(|magnitude| self.faintest_line(magnitude)),
+        );
         lines.extend(self.background_line());
         lines.push(self.timing_line());
         lines.extend(self.star_lines(options));
@@ -88,7 +95,11 @@ impl FrameReport {
         if named.is_empty() {
             return Vec::new();
         }
-        let shown = if options.all_stars { named.len() } else { STARS_SHOWN };
+        let shown = if options.all_stars {
+            named.len()
+        } else {
+            STARS_SHOWN
+        };
         let mut lines = vec![String::new()];
         lines.extend(star_table(&named[..named.len().min(shown)]));
         if named.len() > shown {
@@ -143,7 +154,11 @@ fn optics_lines(optics: &OpticsReport) -> Vec<String> {
         focal += &format!(" ± {sigma_px:.decimals$}");
     }
     let pixel_arcsec = crate::units::ARCSEC_PER_RAD / optics.focal_length_px;
-    let mirrored = if optics.mirrored { "mirrored" } else { "not mirrored" };
+    let mirrored = if optics.mirrored {
+        "mirrored"
+    } else {
+        "not mirrored"
+    };
     let mut lines = vec![labelled(
         "field",
         &format!(
@@ -151,12 +166,14 @@ fn optics_lines(optics: &OpticsReport) -> Vec<String> {
             optics.fov_x_deg, optics.fov_y_deg
         ),
     )];
-    lines.extend(
-        optics
-            .distortion
-            .as_ref()
-            .map(|distortion| labelled("distortion", &distortion.to_string())),
-    );
+    let distortion = match &optics.distortion {
+        None => "none that the stars show".to_owned(),
+        Some(lens) => format!(
+            "{}, up to {:.2} px in the corners",
+            lens.model, lens.largest_px
+        ),
+    };
+    lines.push(labelled("distortion", &distortion));
     lines
 }
 
