@@ -4,20 +4,20 @@
 //!
 //! ```no_run
 //! use starpipe::catalog::Catalog;
+//! use starpipe::detect::Workspace;
 //! use starpipe::identify::TriangleIndex;
 //! use starpipe::pipeline::{Pipeline, SolveConfig};
-//! use starpipe::detect::Workspace;
+//! use starpipe::report::FrameReport;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let catalog = Catalog::built_in()?;
 //! let index = TriangleIndex::load_or_build(&catalog, None, &mut |_| {})?;
 //! let pipeline = Pipeline::new(catalog, index);
-//! let solution = pipeline.solve_file(
-//!     "night.tif".as_ref(),
-//!     &SolveConfig::default(),
-//!     &mut Workspace::default(),
-//! )?;
-//! println!("{}", pipeline.report("night.tif", &solution).to_json_line()?);
+//! let mut workspace = Workspace::default();
+//! let solution =
+//!     pipeline.solve_file("night.tif".as_ref(), &SolveConfig::default(), &mut workspace)?;
+//! let report = FrameReport::new("night.tif", &solution, pipeline.catalog());
+//! println!("{}", report.to_json_line()?);
 //! # Ok(())
 //! # }
 //! ```
@@ -30,7 +30,6 @@ use crate::detect::{
 };
 use crate::frame::{self, Frame, FrameError};
 use crate::identify::{self, Hints, ObservedStar, Outcome, Photometry, StarField, TriangleIndex};
-use crate::report::{BackgroundReport, FrameReport, TimingReport};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -166,12 +165,34 @@ pub struct Solution {
     pub height: usize,
     /// All sources, brightest first.
     pub sources: Vec<Source>,
-    /// The sky between them.
-    pub background: BackgroundReport,
+    /// The sky between them; a list of centroids does not know it.
+    pub background: Option<Background>,
     /// Which stars they are; `observed` in its matches is an index into `sources`.
     pub outcome: Outcome,
     /// How long it took.
-    pub timing_ms: TimingReport,
+    pub timing: Timing,
+}
+
+/// The sky between the stars, in the frame's own units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Background {
+    /// Median level.
+    pub level_adu: f64,
+    /// Standard deviation of one pixel.
+    pub noise_adu: f64,
+}
+
+/// How long each stage took; 0 for a stage that was not needed.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Timing {
+    /// Reading and decoding the file.
+    pub read_ms: f64,
+    /// Finding and measuring the stars.
+    pub detect_ms: f64,
+    /// Identifying them.
+    pub identify_ms: f64,
+    /// All of it.
+    pub total_ms: f64,
 }
 
 /// A list of centroids, as `starpipe identify` takes it.
@@ -238,8 +259,8 @@ impl Pipeline {
                 path: path.to_owned(),
                 source,
             })?;
-        solution.timing_ms.read = read_ms;
-        solution.timing_ms.total = milliseconds_since(start);
+        solution.timing.read_ms = read_ms;
+        solution.timing.total_ms = milliseconds_since(start);
         Ok(solution)
     }
 
@@ -263,16 +284,16 @@ impl Pipeline {
             width: frame.width,
             height: frame.height,
             sources: detections.sources.iter().map(Source::from).collect(),
-            background: BackgroundReport {
-                level: Some(detections.background_adu),
-                noise: Some(detections.noise_adu),
-            },
+            background: Some(Background {
+                level_adu: detections.background_adu,
+                noise_adu: detections.noise_adu,
+            }),
             outcome,
-            timing_ms: TimingReport {
-                read: 0.0,
-                detect: detect_ms,
-                identify: milliseconds_since(identify_start),
-                total: milliseconds_since(start),
+            timing: Timing {
+                read_ms: 0.0,
+                detect_ms,
+                identify_ms: milliseconds_since(identify_start),
+                total_ms: milliseconds_since(start),
             },
         })
     }
@@ -305,19 +326,14 @@ impl Pipeline {
             width: list.width,
             height: list.height,
             sources: centroids.iter().map(source).collect(),
-            background: BackgroundReport::default(),
+            background: None,
             outcome,
-            timing_ms: TimingReport {
-                identify: identify_ms,
-                total: identify_ms,
-                ..TimingReport::default()
+            timing: Timing {
+                identify_ms,
+                total_ms: identify_ms,
+                ..Timing::default()
             },
         }
-    }
-
-    /// What is told of `solution`; `frame` is what to call it.
-    pub fn report(&self, frame: &str, solution: &Solution) -> FrameReport {
-        FrameReport::new(frame, solution, &self.catalog)
     }
 
     /// Identifies `field`, and numbers the matches as the sources are: `sources[i]` is the source of star i.

@@ -61,7 +61,8 @@ fn solve_all(
     let pipeline = pool.install(|| pipeline(&resources))?;
     let report = |input: &PathBuf, workspace: &mut Workspace| {
         let solution = solve(&pipeline, input, workspace)?;
-        Ok(pipeline.report(&input.display().to_string(), &solution))
+        let name = input.display().to_string();
+        Ok(FrameReport::new(&name, &solution, pipeline.catalog()))
     };
     batch::for_each_ordered(
         &pool,

@@ -76,7 +76,7 @@ mod tests {
     #[test]
     fn small_angles_take_the_unit_that_suits_them() {
         assert_eq!(small(0.0123), "0.012″");
-        assert_eq!(small(3.14), "3.1″");
+        assert_eq!(small(3.21), "3.2″");
         assert_eq!(small(144.0), "2.4′");
         assert_eq!(small(7200.0), "2.0°");
     }

@@ -9,7 +9,7 @@ use crate::camera::Distortion;
 use crate::catalog::Catalog;
 use crate::detect::DetectionFlags;
 use crate::identify::{Identification, LOG10_FALSE_ALARM_LIMIT, Outcome, Reason, StarMatch};
-use crate::pipeline::{Solution, Source};
+use crate::pipeline::{Background, Solution, Source, Timing};
 use crate::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 
 /// Decimals of a position or residual in pixels.
@@ -35,9 +35,9 @@ impl FrameReport {
             optics: None,
             matched: None,
             magnitude: None,
-            background: background(&solution.background),
+            background: background(solution.background.as_ref()),
             stars: solution.sources.iter().map(unidentified).collect(),
-            timing_ms: timing(&solution.timing_ms),
+            timing_ms: timing(&solution.timing),
         };
         match &solution.outcome {
             Outcome::NotIdentified(reason) => {
@@ -127,24 +127,24 @@ fn faintest(identification: &Identification, catalog: &Catalog) -> Option<Magnit
     })
 }
 
-fn background(measured: &BackgroundReport) -> BackgroundReport {
+fn background(measured: Option<&Background>) -> BackgroundReport {
     let rounded = |value: f64| {
         value
             .is_finite()
             .then(|| to_significant(value, FLUX_DIGITS))
     };
     BackgroundReport {
-        level: measured.level.and_then(rounded),
-        noise: measured.noise.and_then(rounded),
+        level: measured.and_then(|sky| rounded(sky.level_adu)),
+        noise: measured.and_then(|sky| rounded(sky.noise_adu)),
     }
 }
 
-fn timing(measured: &TimingReport) -> TimingReport {
+fn timing(measured: &Timing) -> TimingReport {
     TimingReport {
-        read: to_decimals(measured.read, 3),
-        detect: to_decimals(measured.detect, 3),
-        identify: to_decimals(measured.identify, 3),
-        total: to_decimals(measured.total, 3),
+        read: to_decimals(measured.read_ms, 3),
+        detect: to_decimals(measured.detect_ms, 3),
+        identify: to_decimals(measured.identify_ms, 3),
+        total: to_decimals(measured.total_ms, 3),
     }
 }
 

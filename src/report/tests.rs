@@ -61,9 +61,9 @@ fn identified() -> FrameReport {
             up_pa_deg: 12.345_678_9,
             quaternion: [0.5, -0.5, 0.5, 0.5],
             sigma_arcsec: AttitudeSigma {
-                x: 3.142,
-                y: 2.718,
-                roll: 31.42,
+                x: 3.151,
+                y: 2.345,
+                roll: 31.51,
             },
         }),
         optics: Some(OpticsReport {
