@@ -85,8 +85,14 @@ impl CameraModel {
 
     /// Whether `pixel` lies on the frame.
     pub fn contains(&self, pixel: &PixelPoint) -> bool {
-        (-0.5..self.width_px - 0.5).contains(&pixel.x)
-            && (-0.5..self.height_px - 0.5).contains(&pixel.y)
+        self.nearly_contains(pixel, 0.0)
+    }
+
+    /// Whether `pixel` lies on the frame or within `margin_px` of it.
+    pub fn nearly_contains(&self, pixel: &PixelPoint, margin_px: f64) -> bool {
+        let low = -0.5 - margin_px;
+        (low..self.width_px - 0.5 + margin_px).contains(&pixel.x)
+            && (low..self.height_px - 0.5 + margin_px).contains(&pixel.y)
     }
 
     /// Angle between the middles of the left and the right edge, in radians.

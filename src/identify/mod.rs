@@ -1,6 +1,18 @@
 //! From a list of star positions to catalogue stars, pointing and scale.
 
-use crate::camera::CameraModel;
+mod cache;
+pub mod index;
+mod refine;
+mod search;
+mod sky;
+pub mod triangle;
+mod verify;
+
+pub use cache::CacheError;
+pub use search::LOG10_FALSE_ALARM_LIMIT;
+pub use sky::Sky;
+
+use crate::camera::{CameraModel, DistortionModel};
 use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 
 /// One star as observed, the input of identification.
@@ -21,6 +33,17 @@ pub enum Photometry {
     Instrumental,
     /// Johnson V.
     JohnsonV,
+}
+
+impl Photometry {
+    /// How far an observed magnitude, brought to V by the zero point, may be from the catalogue's.
+    pub const fn tolerance_mag(self) -> f64 {
+        match self {
+            // Colour, saturation, and the tone curve of a JPEG.
+            Self::Instrumental => 2.5,
+            Self::JohnsonV => 0.5,
+        }
+    }
 }
 
 /// The stars seen in one frame.
@@ -100,3 +123,60 @@ pub struct StarMatch {
     /// Distance between the observed and the predicted position, in pixels.
     pub residual_px: f64,
 }
+
+/// Stars without which no identification is possible: a triangle and one that decides.
+pub const MIN_STARS: usize = 4;
+
+/// Identifies the stars of `field`.
+pub fn identify(field: &StarField, hints: &Hints, sky: &Sky) -> Outcome {
+    if field.stars.len() < MIN_STARS {
+        return Outcome::NotIdentified(Reason::TooFewStars {
+            found: field.stars.len(),
+            needed: MIN_STARS,
+        });
+    }
+    let mut search = search::Search::new(field, hints, sky);
+    let identified = search.run().and_then(|found| complete(field, sky, &search, &found));
+    match identified {
+        Some(identification) => Outcome::Identified(Box::new(identification)),
+        None => Outcome::NotIdentified(Reason::NoMatch {
+            best_log10_false_alarm: search.best_log10_false_alarm(),
+        }),
+    }
+}
+
+/// The final fit, with all stars and as much distortion as they support.
+fn complete(
+    field: &StarField,
+    sky: &Sky,
+    search: &search::Search,
+    found: &search::Found,
+) -> Option<Identification> {
+    let richest = Some(DistortionModel::Quintic);
+    let radius_px = FINAL_RADIUS_SHARE * field.width_px.hypot(field.height_px);
+    let refined = refine::refine(
+        field,
+        usize::MAX,
+        sky,
+        &found.hypothesis,
+        radius_px,
+        richest,
+    )?;
+    let log10_false_alarm = search
+        .log10_false_alarm(&refined.hypothesis)?
+        .min(found.log10_false_alarm);
+    let covariance = &refined.fit.covariance;
+    let sum_sq: f64 = refined.matches.iter().map(|m| m.residual_px.powi(2)).sum();
+    Some(Identification {
+        attitude_sigma_rad: std::array::from_fn(|axis| covariance[(axis, axis)].sqrt()),
+        focal_length_sigma_px: covariance[(3, 3)].sqrt() * refined.fit.camera.focal_length_px,
+        camera: refined.fit.camera,
+        icrs_to_camera: refined.fit.icrs_to_camera,
+        rms_px: (sum_sq / refined.matches.len().max(1) as f64).sqrt(),
+        matches: refined.matches,
+        log10_false_alarm,
+    })
+}
+
+/// Where the final fit starts to look for pairs, in units of the frame's diagonal.
+const FINAL_RADIUS_SHARE: f64 = 0.005;

@@ -1,0 +1,382 @@
+//! The search: triangles of bright observed stars → similar catalogue triangles → hypotheses → further stars decide.
+//!
+//! Size classes of the index stand for ranges of the focal length. Where the field is so wide that the shape
+//! of a triangle depends on the focal length (gnomonic projection), a range is cut into steps small
+//! enough for that not to matter.
+
+use super::index::SizeClass;
+use super::triangle::TriangleShape;
+use super::refine::refine;
+use super::verify::{Hypothesis, TESTED_STARS};
+use super::{Hints, Photometry, Sky, StarField};
+use crate::camera::{CameraModel, DistortionModel, focal_length_px, frame_centre};
+use crate::coords::{Rotation, UnitVector};
+use crate::units::RAD_PER_DEG;
+use nalgebra::{Matrix3, Vector3};
+
+/// Widths of field searched where nothing is known.
+const FOV_DEG: (f64, f64) = (1.5, 60.0);
+/// A little more, so that a field of just that width is not missed.
+const FOV_SLACK: f64 = 1.05;
+
+/// One sweep over the triangles of the brightest stars.
+struct Pass {
+    /// Stars that make triangles, the brightest.
+    stars: usize,
+    /// Relative error of a triangle's sides that lens distortion may make.
+    tolerance: f64,
+}
+
+/// First the likely, then the lens that distorts, then the frame with many false stars.
+const PASSES: [Pass; 3] = [
+    Pass { stars: 12, tolerance: 0.0025 },
+    Pass { stars: 10, tolerance: 0.008 },
+    Pass { stars: 22, tolerance: 0.0025 },
+];
+
+/// The centroid errors count so many times in a triangle's tolerance.
+const CENTROID_SIGMAS: f64 = 2.5;
+/// Triangles must be so large, in units of the frame's diagonal.
+const MIN_TRIANGLE_SHARE: f64 = 0.12;
+/// Further stars asked about each hypothesis, and the share of them that must agree.
+const WITNESSES: usize = 10;
+const WITNESS_SHARE: f64 = 0.25;
+/// How far a witness may stand from its catalogue star, in tolerances of the frame's diagonal.
+const WITNESS_TOLERANCES: f64 = 1.5;
+/// Hypotheses above this are not reported.
+pub const LOG10_FALSE_ALARM_LIMIT: f64 = -9.0;
+
+/// What the search found.
+pub struct Found {
+    /// The hypothesis, refined without distortion.
+    pub hypothesis: Hypothesis,
+    /// log10 of its false-alarm probability.
+    pub log10_false_alarm: f64,
+    /// Hypotheses tried up to it, itself included.
+    pub hypotheses: u64,
+}
+
+/// The search over one field.
+pub struct Search<'a> {
+    field: &'a StarField,
+    hints: &'a Hints,
+    sky: &'a Sky<'a>,
+    /// Offsets of the brightest stars from the frame's centre, in pixels.
+    offsets: Vec<[f64; 2]>,
+    /// Smallest and largest focal length, in pixels.
+    focal_px: (f64, f64),
+    diagonal_px: f64,
+    hypotheses: u64,
+    best_log10: Option<f64>,
+}
+
+/// A triangle of observed stars.
+#[derive(Clone, Copy)]
+struct Trio {
+    stars: [usize; 3],
+    /// Largest distance of a corner from the frame's centre, in pixels.
+    reach_px: f64,
+    tolerance: f64,
+}
+
+impl<'a> Search<'a> {
+    /// A search over `field`.
+    pub fn new(field: &'a StarField, hints: &'a Hints, sky: &'a Sky<'a>) -> Self {
+        let centre = frame_centre(field.width_px, field.height_px);
+        let most = PASSES.iter().map(|p| p.stars).max().unwrap_or(0);
+        let offsets = field
+            .stars
+            .iter()
+            .take(most.max(WITNESSES + 3))
+            .map(|s| [s.position.x - centre.x, s.position.y - centre.y])
+            .collect();
+        let wide = focal_length_px(field.width_px, FOV_DEG.1 * FOV_SLACK * RAD_PER_DEG);
+        let narrow = focal_length_px(field.width_px, FOV_DEG.0 / FOV_SLACK * RAD_PER_DEG);
+        let focal_px = match hints.pixel_scale_rad {
+            Some((smallest, largest)) => (1.0 / largest, 1.0 / smallest),
+            None => (wide, narrow),
+        };
+        Self {
+            field,
+            hints,
+            sky,
+            offsets,
+            focal_px,
+            diagonal_px: field.width_px.hypot(field.height_px),
+            hypotheses: 0,
+            best_log10: None,
+        }
+    }
+
+    /// The lowest false-alarm probability (log10) of the hypotheses that came as far as to have one.
+    pub fn best_log10_false_alarm(&self) -> Option<f64> {
+        self.best_log10
+    }
+
+    /// Hypotheses tried so far.
+    pub fn hypotheses(&self) -> u64 {
+        self.hypotheses
+    }
+
+    /// Goes through the triangles until a hypothesis passes.
+    pub fn run(&mut self) -> Option<Found> {
+        PASSES.iter().find_map(|pass| self.sweep(pass))
+    }
+
+    /// Triangles in the order of their faintest star, then of the second.
+    fn sweep(&mut self, pass: &Pass) -> Option<Found> {
+        let stars = pass.stars.min(self.offsets.len());
+        for faintest in 2..stars {
+            for middle in 1..faintest {
+                for brightest in 0..middle {
+                    let trio = self.trio([brightest, middle, faintest], pass.tolerance);
+                    if let Some(found) = trio.and_then(|trio| self.try_trio(&trio)) {
+                        return Some(found);
+                    }
+                }
+            }
+        }
+        None
+    }
+
+    fn trio(&self, stars: [usize; 3], distortion_tolerance: f64) -> Option<Trio> {
+        let [a, b, c] = stars.map(|s| self.offsets[s]);
+        let side = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
+        let longest_px = side(a, b).max(side(b, c)).max(side(c, a));
+        if longest_px < MIN_TRIANGLE_SHARE * self.diagonal_px {
+            return None;
+        }
+        let sigma_px = stars
+            .iter()
+            .map(|&s| self.field.stars[s].sigma_px)
+            .fold(0.0, f64::max);
+        let centroid_tolerance = CENTROID_SIGMAS * std::f64::consts::SQRT_2 * sigma_px / longest_px;
+        Some(Trio {
+            stars,
+            reach_px: [a, b, c].iter().map(|p| p[0].hypot(p[1])).fold(0.0, f64::max),
+            tolerance: distortion_tolerance.hypot(centroid_tolerance),
+        })
+    }
+
+    fn try_trio(&mut self, trio: &Trio) -> Option<Found> {
+        let sky = self.sky;
+        sky.triangles
+            .classes
+            .iter()
+            .find_map(|class| self.try_class(trio, class))
+    }
+
+    fn try_class(&mut self, trio: &Trio, class: &SizeClass) -> Option<Found> {
+        let low_px = self.focal_of_chord(trio, class.high)?.max(self.focal_px.0);
+        let high_px = self.focal_of_chord(trio, class.low)?.min(self.focal_px.1);
+        if low_px >= high_px {
+            return None;
+        }
+        // Half a step changes the shape by half the tolerance at the most.
+        let stretch = (trio.reach_px / low_px).powi(2);
+        let step = (trio.tolerance / stretch).max(1e-3);
+        let steps = ((high_px / low_px).ln() / step).ceil().max(1.0);
+        let factor = (high_px / low_px).powf(1.0 / steps);
+        (0..steps as i32).find_map(|i| {
+            let from_px = low_px * factor.powi(i);
+            self.try_focal(trio, class, (from_px, from_px * factor))
+        })
+    }
+
+    /// Unit vectors of the trio in a camera with this focal length, not mirrored.
+    fn vectors(&self, trio: &Trio, focal_px: f64) -> [Vector3<f64>; 3] {
+        trio.stars.map(|s| {
+            let [u, v] = self.offsets[s];
+            Vector3::new(u, v, focal_px).normalize()
+        })
+    }
+
+    /// The focal length at which the trio's longest side is `chord`.
+    fn focal_of_chord(&self, trio: &Trio, chord: f64) -> Option<f64> {
+        let longest = |focal_px: f64| {
+            let [a, b, c] = self.vectors(trio, focal_px);
+            (a - b).norm().max((b - c).norm()).max((c - a).norm())
+        };
+        let mut focal_px = self.diagonal_px;
+        for _ in 0..8 {
+            let ratio = longest(focal_px) / chord;
+            focal_px *= ratio;
+            if (ratio - 1.0).abs() < 1e-3 {
+                break;
+            }
+        }
+        focal_px.is_finite().then_some(focal_px)
+    }
+
+    fn try_focal(&mut self, trio: &Trio, class: &SizeClass, focal_px: (f64, f64)) -> Option<Found> {
+        let middle_px = (focal_px.0 * focal_px.1).sqrt();
+        let vectors = self.vectors(trio, middle_px);
+        let shape = TriangleShape::new([&vectors[0], &vectors[1], &vectors[2]])?;
+        let mut found = None;
+        class.for_each_similar(shape.ratios, trio.tolerance, |corners| {
+            if found.is_none() {
+                let stars = shape.order.map(|i| trio.stars[i]);
+                let ordered = Trio { stars, ..*trio };
+                let start_px = middle_px;
+                found = self.try_triangle(&ordered, corners, shape.longest, start_px, focal_px);
+            }
+        });
+        found
+    }
+
+    /// One hypothesis: these three stars are those three.
+    fn try_triangle(
+        &mut self,
+        trio: &Trio,
+        corners: &[u32; 3],
+        longest: f64,
+        middle_px: f64,
+        range_px: (f64, f64),
+    ) -> Option<Found> {
+        let stars = corners.map(|c| &self.sky.stars()[c as usize]);
+        let sky = stars.map(|s| s.direction.as_vector());
+        let zero_points: [f64; 3] =
+            std::array::from_fn(|i| f64::from(stars[i].v_mag) - self.field.stars[trio.stars[i]].mag);
+        let zero_point = self.zero_point(zero_points)?;
+        let chord = (sky[0] - sky[1]).norm();
+        let focal_px = middle_px * longest / chord;
+        let slack = 1.0 + 2.0 * trio.tolerance;
+        if focal_px < range_px.0 / slack || focal_px > range_px.1 * slack {
+            return None;
+        }
+        let mut seen = self.vectors(trio, focal_px);
+        if let Some((near, radius_rad)) = &self.hints.near {
+            let reach_rad = (self.diagonal_px / focal_px).atan() + radius_rad;
+            if near.as_vector().dot(sky[0]) < reach_rad.min(std::f64::consts::PI).cos() {
+                return None;
+            }
+        }
+        let mirrored = triple(&seen) * triple_of(sky) < 0.0;
+        if mirrored {
+            seen.iter_mut().for_each(|v| v.x = -v.x);
+        }
+        let sky_to_camera = two_star_rotation(&seen, sky)?;
+        self.hypotheses += 1;
+        if !self.witnesses_agree(trio, &sky_to_camera, focal_px, mirrored, zero_point) {
+            return None;
+        }
+        let (width_px, height_px) = (self.field.width_px, self.field.height_px);
+        let hypothesis = Hypothesis {
+            camera: CameraModel::pinhole(width_px, height_px, focal_px, mirrored),
+            icrs_to_camera: Rotation::from_matrix(sky_to_camera),
+            parameters: 4,
+            zero_point_mag: zero_point,
+        };
+        self.decide(&hypothesis, trio)
+    }
+
+    /// The median zero point of the triangle's stars, if all three agree.
+    fn zero_point(&self, of_stars: [f64; 3]) -> Option<f64> {
+        let [a, b, c] = of_stars;
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let spread = self.field.photometry.tolerance_mag();
+        let consistent = match self.field.photometry {
+            Photometry::Instrumental => high - low <= spread,
+            Photometry::JohnsonV => low >= -spread && high <= spread,
+        };
+        let zero_point = match self.field.photometry {
+            Photometry::Instrumental => a + b + c - low - high,
+            Photometry::JohnsonV => 0.0,
+        };
+        consistent.then_some(zero_point)
+    }
+
+    /// Asks the brightest other stars whether a catalogue star of about their brightness stands where they are.
+    fn witnesses_agree(
+        &self,
+        trio: &Trio,
+        sky_to_camera: &Matrix3<f64>,
+        focal_px: f64,
+        mirrored: bool,
+        zero_point: f64,
+    ) -> bool {
+        let others = (self.offsets.len() - 3).min(WITNESSES);
+        let needed = ((others as f64 * WITNESS_SHARE).ceil() as usize).max(1);
+        let radius_rad = WITNESS_TOLERANCES * trio.tolerance * self.diagonal_px / focal_px;
+        let tolerance_mag = self.field.photometry.tolerance_mag();
+        let sign = if mirrored { -1.0 } else { 1.0 };
+        let mut left = others;
+        let mut agree = 0;
+        for (index, [u, v]) in self.offsets.iter().enumerate() {
+            if trio.stars.contains(&index) {
+                continue;
+            }
+            let camera = Vector3::new(sign * u, *v, focal_px).normalize();
+            let direction = UnitVector::from_unit(sky_to_camera.tr_mul(&camera));
+            let expected_v_mag = self.field.stars[index].mag + zero_point;
+            let mut seen = false;
+            self.sky.grid.for_each_within(
+                &direction,
+                radius_rad,
+                (expected_v_mag + tolerance_mag) as f32,
+                |star| seen |= f64::from(star.v_mag) >= expected_v_mag - tolerance_mag,
+            );
+            agree += usize::from(seen);
+            left -= 1;
+            if agree >= needed {
+                return true;
+            }
+            if left == 0 || agree + left < needed {
+                return false;
+            }
+        }
+        false
+    }
+
+    /// Fits the hypothesis to all the stars that agree and computes its false-alarm probability.
+    fn decide(&mut self, start: &Hypothesis, trio: &Trio) -> Option<Found> {
+        let radius_px = WITNESS_TOLERANCES * trio.tolerance * self.diagonal_px;
+        let richest = Some(DistortionModel::Radial);
+        let refined = refine(self.field, TESTED_STARS, self.sky, start, radius_px, richest)?;
+        let log10 = self.log10_false_alarm(&refined.hypothesis)?;
+        self.best_log10 = Some(self.best_log10.map_or(log10, |best| best.min(log10)));
+        (log10 <= LOG10_FALSE_ALARM_LIMIT).then_some(Found {
+            hypothesis: refined.hypothesis,
+            log10_false_alarm: log10,
+            hypotheses: self.hypotheses,
+        })
+    }
+
+    /// log10 of the false-alarm probability of `hypothesis`, `None` where it contradicts the hints.
+    pub fn log10_false_alarm(&self, hypothesis: &Hypothesis) -> Option<f64> {
+        let focal_px = hypothesis.camera.focal_length_px;
+        let slack = 1.0 + 2.0 * PASSES[1].tolerance;
+        if focal_px < self.focal_px.0 / slack || focal_px > self.focal_px.1 * slack {
+            return None;
+        }
+        if let Some((near, radius_rad)) = &self.hints.near {
+            let (boresight, _) = hypothesis.icrs_to_camera.boresight_and_up();
+            if boresight.angle_to(near) > *radius_rad {
+                return None;
+            }
+        }
+        Some(hypothesis.log10_false_alarm(self.field, self.sky, self.hypotheses))
+    }
+}
+
+fn triple([a, b, c]: &[Vector3<f64>; 3]) -> f64 {
+    a.cross(b).dot(c)
+}
+
+fn triple_of([a, b, c]: [&Vector3<f64>; 3]) -> f64 {
+    a.cross(b).dot(c)
+}
+
+/// The rotation that brings A and B on the sky to where the camera saw them (TRIAD with the middle of AB first).
+fn two_star_rotation(
+    seen: &[Vector3<f64>; 3],
+    sky: [&Vector3<f64>; 3],
+) -> Option<Matrix3<f64>> {
+    let frame = |a: &Vector3<f64>, b: &Vector3<f64>| {
+        let first = (a + b).try_normalize(1e-12)?;
+        let third = a.cross(b).try_normalize(1e-15)?;
+        Some(Matrix3::from_columns(&[first, third.cross(&first), third]))
+    };
+    let camera = frame(&seen[0], &seen[1])?;
+    Some(camera * frame(sky[0], sky[1])?.transpose())
+}
