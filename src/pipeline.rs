@@ -5,18 +5,19 @@
 //! ```no_run
 //! use starpipe::catalog::Catalog;
 //! use starpipe::detect::Workspace;
-//! use starpipe::identify::TriangleIndex;
+//! use starpipe::identify::Sky;
 //! use starpipe::pipeline::{Pipeline, SolveConfig};
 //! use starpipe::report::FrameReport;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let catalog = Catalog::built_in()?;
-//! let index = TriangleIndex::load_or_build(&catalog, None, &mut |_| {})?;
-//! let pipeline = Pipeline::new(catalog, index);
-//! let mut workspace = Workspace::default();
+//! let catalog = Catalog::built_in();
+//! // Takes some seconds; `Sky::open` keeps what it makes for the next time.
+//! let sky = Sky::build(catalog.stars(), &|_| {});
+//! let pipeline = Pipeline::new(catalog, sky);
+//! let mut workspace = Workspace::new();
 //! let solution =
 //!     pipeline.solve_file("night.tif".as_ref(), &SolveConfig::default(), &mut workspace)?;
-//! let report = FrameReport::new("night.tif", &solution, pipeline.catalog());
+//! let report = FrameReport::new("night.tif", &solution, catalog);
 //! println!("{}", report.to_json_line()?);
 //! # Ok(())
 //! # }
@@ -29,7 +30,7 @@ use crate::detect::{
     self, DetectConfig, DetectError, Detection, DetectionFlags, Detections, Workspace,
 };
 use crate::frame::{self, Frame, FrameError};
-use crate::identify::{self, Hints, ObservedStar, Outcome, Photometry, StarField, TriangleIndex};
+use crate::identify::{self, Hints, ObservedStar, Outcome, Photometry, Sky, StarField};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -222,22 +223,21 @@ pub struct ListedCentroid {
 /// Standard error assumed on each axis of a centroid that comes without one, in pixels.
 pub const LISTED_SIGMA_PX: f64 = 0.5;
 
-/// The catalogue and its index, ready for any number of frames.
-#[derive(Debug)]
-pub struct Pipeline {
-    catalog: Catalog,
-    index: TriangleIndex,
+/// The catalogue and what is made of it for identification, ready for any number of frames.
+pub struct Pipeline<'a> {
+    catalog: &'a Catalog,
+    sky: Sky<'a>,
 }
 
-impl Pipeline {
-    /// Frames are identified with the stars of `catalog`, of which `index` must be the index.
-    pub fn new(catalog: Catalog, index: TriangleIndex) -> Self {
-        Self { catalog, index }
+impl<'a> Pipeline<'a> {
+    /// Frames are identified with the stars of `catalog`, of which `sky` must be made.
+    pub fn new(catalog: &'a Catalog, sky: Sky<'a>) -> Self {
+        Self { catalog, sky }
     }
 
     /// The catalogue.
-    pub fn catalog(&self) -> &Catalog {
-        &self.catalog
+    pub fn catalog(&self) -> &'a Catalog {
+        self.catalog
     }
 
     /// Examines the frame in the file `path`.
@@ -339,7 +339,7 @@ impl Pipeline {
     /// Identifies `field`, and numbers the matches as the sources are: `sources[i]` is the source of star i.
     fn identify(&self, field: &StarField, sources: &[usize], knowledge: &Knowledge) -> Outcome {
         let hints = knowledge.hints(field.width_px);
-        let mut outcome = identify::identify(field, &hints, &self.catalog, &self.index);
+        let mut outcome = identify::identify(field, &hints, &self.sky);
         if let Outcome::Identified(identification) = &mut outcome {
             for star_match in &mut identification.matches {
                 star_match.observed = sources[star_match.observed];

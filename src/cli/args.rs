@@ -88,7 +88,7 @@ pub(crate) struct DetectionArgs {
     /// Detection threshold in standard deviations of the background, in place of --false-alarms
     #[arg(long, value_name = "NUMBER", value_parser = values::positive, conflicts_with = "false_alarms")]
     pub(crate) sigma: Option<f64>,
-    /// False detections to accept in a million pixels of noise
+    /// False detections to accept in a million pixels of noise [default: 0.1]
     #[arg(long, value_name = "NUMBER", value_parser = values::positive)]
     pub(crate) false_alarms: Option<f64>,
     /// How to measure a star's position
@@ -99,9 +99,9 @@ pub(crate) struct DetectionArgs {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Centroid {
     /// Fit of a Gaussian spot: the most accurate
-    Gaussian,
-    /// Centre of gravity above the threshold: the fastest
-    Moment,
+    GaussianFit,
+    /// Centre of the light above a threshold: the fastest
+    GreyWeighted,
 }
 
 #[derive(Debug, Args)]

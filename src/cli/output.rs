@@ -18,7 +18,6 @@ pub(crate) struct OutputSettings {
 /// Writes reports as they come.
 pub(crate) struct Output {
     settings: OutputSettings,
-    stdout: io::BufWriter<io::Stdout>,
     reports: usize,
 }
 
@@ -31,7 +30,6 @@ impl Output {
         }
         Ok(Self {
             settings,
-            stdout: io::BufWriter::new(io::stdout()),
             reports: 0,
         })
     }
@@ -41,15 +39,7 @@ impl Output {
         let first = self.reports == 0;
         self.reports += 1;
         let text = self.rendered(report, first)?;
-        let written = self
-            .stdout
-            .write_all(text.as_bytes())
-            .and_then(|()| self.stdout.flush());
-        match written {
-            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(ControlFlow::Break(())),
-            Err(error) => Err(error).context("writing to standard output"),
-            Ok(()) => Ok(ControlFlow::Continue(())),
-        }
+        print(&text)
     }
 
     /// Writes the files that belong to `report`, if any are wanted.
@@ -70,6 +60,19 @@ impl Output {
             Format::Json => report.to_json_line()? + "\n",
             Format::Csv => String::from_utf8(table(report, first)?)?,
         })
+    }
+}
+
+/// Writes `text` to standard output, whole and at once. Breaks off where nobody reads it any longer.
+pub(crate) fn print(text: &str) -> anyhow::Result<ControlFlow<()>> {
+    let mut stdout = io::stdout().lock();
+    let written = stdout
+        .write_all(text.as_bytes())
+        .and_then(|()| stdout.flush());
+    match written {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(ControlFlow::Break(())),
+        Err(error) => Err(error).context("writing to standard output"),
+        Ok(()) => Ok(ControlFlow::Continue(())),
     }
 }
 

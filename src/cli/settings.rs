@@ -50,7 +50,7 @@ impl DetectionArgs {
     /// How to detect stars; what is not given stays as the library has it.
     pub(crate) fn resolve(&self) -> DetectConfig {
         let mut config = DetectConfig {
-            sigma: self.sigma,
+            threshold_sigma: self.sigma,
             ..DetectConfig::default()
         };
         if let Some(number) = self.false_alarms {
@@ -58,8 +58,8 @@ impl DetectionArgs {
         }
         if let Some(centroid) = self.centroid {
             config.centroid = match centroid {
-                Centroid::Gaussian => CentroidMethod::Gaussian,
-                Centroid::Moment => CentroidMethod::Moment,
+                Centroid::GaussianFit => CentroidMethod::GaussianFit,
+                Centroid::GreyWeighted => CentroidMethod::GreyWeighted,
             };
         }
         config

@@ -3,14 +3,15 @@
 use super::args::{IdentifyArgs, OutputArgs, ProcessArgs, ResourceArgs, SolvingArgs};
 use super::centroids::{self, FrameSize};
 use super::output::Output;
-use super::{Exit, Fault, batch, cache, chained, complain};
+use super::{Exit, Fault, batch, cache, chained, complain, warn};
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use starpipe::catalog::Catalog;
 use starpipe::detect::Workspace;
-use starpipe::identify::TriangleIndex;
+use starpipe::identify::Sky;
 use starpipe::pipeline::{Pipeline, Solution, SolveConfig};
 use starpipe::report::FrameReport;
+use std::borrow::Cow;
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -58,7 +59,9 @@ fn solve_all(
     } = solving;
     let mut run = Run::new(output, inputs)?;
     let pool = thread_pool(resources.threads)?;
-    let pipeline = pool.install(|| pipeline(&resources))?;
+    let catalog = catalog(resources.catalog.as_deref())?;
+    let sky = pool.install(|| sky(&catalog, &resources));
+    let pipeline = Pipeline::new(&catalog, sky);
     let report = |input: &PathBuf, workspace: &mut Workspace| {
         let solution = solve(&pipeline, input, workspace)?;
         let name = input.display().to_string();
@@ -130,25 +133,27 @@ fn thread_pool(threads: Option<u32>) -> anyhow::Result<rayon::ThreadPool> {
         .context("starting threads")
 }
 
-fn pipeline(resources: &ResourceArgs) -> anyhow::Result<Pipeline> {
-    let catalog = match &resources.catalog {
-        Some(path) => Catalog::read(path)?,
-        None => Catalog::built_in().context("reading the built-in catalogue")?,
-    };
-    let index = index(
-        &catalog,
-        cache::directory(resources.cache_dir.clone()).as_deref(),
-    )?;
-    Ok(Pipeline::new(catalog, index))
+/// The catalogue that is asked for, kept by the caller if it is not the built-in one.
+fn catalog(path: Option<&Path>) -> anyhow::Result<Cow<'static, Catalog>> {
+    Ok(match path {
+        Some(path) => Cow::Owned(Catalog::read(path)?),
+        None => Cow::Borrowed(Catalog::built_in()),
+    })
 }
 
-/// The index, from the cache where it is there and whole; a cache that cannot be used costs time, not results.
-fn index(catalog: &Catalog, directory: Option<&Path>) -> anyhow::Result<TriangleIndex> {
+/// The index comes from the cache where it is there and whole; a cache of no use costs time, not results.
+fn sky<'a>(catalog: &'a Catalog, resources: &ResourceArgs) -> Sky<'a> {
     let progress = bar(100, "indexing the catalogue {wide_bar} {percent} %");
-    let mut show = |part: f64| progress.set_position((part * 100.0) as u64);
-    let built = TriangleIndex::load_or_build(catalog, directory, &mut show);
+    let show = |part: f64| progress.set_position((part * 100.0) as u64);
+    let Some(directory) = cache::directory(resources.cache_dir.clone()) else {
+        return Sky::build(catalog.stars(), &show);
+    };
+    let (sky, troubles) = Sky::open(catalog.stars(), catalog.checksum(), &directory, &show);
     progress.finish_and_clear();
-    built.context("indexing the catalogue")
+    for trouble in troubles {
+        warn(chained(&trouble.into()));
+    }
+    sky
 }
 
 /// A bar on standard error, which stays empty where that is no terminal.

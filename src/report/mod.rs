@@ -13,7 +13,7 @@ mod table;
 mod text;
 
 pub use table::{TABLE_COLUMNS, write_table_header};
-pub use text::{STARS_SHOWN, TextOptions};
+pub use text::{STARS_SHOWN, TextOptions, counted};
 
 use serde::Serialize;
 

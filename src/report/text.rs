@@ -238,7 +238,7 @@ fn odds(log10_probability: f64) -> String {
 }
 
 /// `1 detection`, `2 detections`.
-pub(crate) fn counted(count: usize, noun: &str) -> String {
+pub fn counted(count: usize, noun: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{count} {noun}{plural}")
 }
