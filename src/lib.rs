@@ -7,4 +7,14 @@ pub mod coords;
 pub mod detect;
 pub mod frame;
 pub mod identify;
+pub mod pipeline;
+pub mod report;
 pub mod units;
+
+#[doc = include_str!("../docs/conventions.md")]
+pub mod conventions {}
+
+/// The README's code, compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;

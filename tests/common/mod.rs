@@ -1,24 +1,119 @@
-//! What the integration tests share.
+//! What several tests need.
 
-use std::path::PathBuf;
+#![allow(dead_code, reason = "each test program uses its own part of this")]
 
-/// The folder with the source catalogue and the real frames, `../shared` beside the repository.
-///
-/// `None`, with a line that says so, where it is absent: the test is to be skipped.
+use assert_cmd::Command;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+/// The real frames and lists that lie beside the repository, if they are there.
 ///
 /// # Panics
-/// If it is absent though `STARPIPE_REQUIRE_SHARED=1` demands it.
+/// If they are not, and STARPIPE_REQUIRE_SHARED=1.
 pub fn shared_dir() -> Option<PathBuf> {
-    let dir = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared"));
-    if dir.is_dir() {
-        return Some(dir);
+    let directory = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared");
+    if directory.join("frames/truth.csv").is_file() {
+        return Some(directory);
     }
-    let required = std::env::var("STARPIPE_REQUIRE_SHARED").is_ok_and(|value| value == "1");
+    let required = std::env::var_os("STARPIPE_REQUIRE_SHARED").is_some_and(|value| value == "1");
     assert!(
         !required,
         "{} is absent, and STARPIPE_REQUIRE_SHARED=1",
-        dir.display()
+        directory.display()
     );
-    println!("skipped: {} is absent", dir.display());
+    eprintln!("skipped: {} is absent", directory.display());
     None
+}
+
+/// The program, with a cache that all tests share and that is not the user's own.
+pub fn starpipe() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_starpipe"));
+    if std::env::var_os("STARPIPE_CACHE_DIR").is_none() {
+        let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache");
+        command.env("STARPIPE_CACHE_DIR", cache);
+    }
+    command
+}
+
+/// What ran, with its output as text.
+pub struct Ran {
+    pub status: i32,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+impl Ran {
+    pub fn new(command: &mut Command) -> Self {
+        let Output {
+            status,
+            stdout,
+            stderr,
+        } = command.output().expect("the program starts");
+        let text = |bytes| String::from_utf8(bytes).expect("text");
+        let ran = Self {
+            status: status.code().expect("an exit status, and not a signal"),
+            stdout: text(stdout),
+            stderr: text(stderr),
+        };
+        assert!(!ran.stderr.contains("panicked"), "{}", ran.stderr);
+        assert!(!ran.stderr.contains('\u{1b}') && !ran.stdout.contains('\u{1b}'));
+        ran
+    }
+
+    /// Standard output as JSON Lines.
+    pub fn reports(&self) -> Vec<Value> {
+        let parse = |line| serde_json::from_str(line).expect("a line of JSON");
+        self.stdout.lines().map(parse).collect()
+    }
+}
+
+/// A frame of our own making.
+pub fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("fixtures")
+        .join(name)
+}
+
+/// The number at `pointer` in `report`.
+pub fn number(report: &Value, pointer: &str) -> f64 {
+    let value = report.pointer(pointer).and_then(Value::as_f64);
+    value.unwrap_or_else(|| panic!("{} has no number at {pointer}", report["frame"]))
+}
+
+/// Where a frame points and how wide it is, in degrees.
+#[derive(Debug)]
+pub struct Truth {
+    pub ra_deg: f64,
+    pub dec_deg: f64,
+    pub up_pa_deg: f64,
+    pub fov_x_deg: f64,
+}
+
+impl Truth {
+    /// How far the centre of `report` is from the true one, in degrees.
+    pub fn centre_error_deg(&self, report: &Value) -> f64 {
+        let unit = |ra_deg: f64, dec_deg: f64| {
+            let (ra, dec) = (ra_deg.to_radians(), dec_deg.to_radians());
+            [dec.cos() * ra.cos(), dec.cos() * ra.sin(), dec.sin()]
+        };
+        let found = unit(
+            number(report, "/attitude/ra_deg"),
+            number(report, "/attitude/dec_deg"),
+        );
+        let truth = unit(self.ra_deg, self.dec_deg);
+        let chord_sq: f64 = (0..3).map(|i| (found[i] - truth[i]).powi(2)).sum();
+        2.0 * (chord_sq.sqrt() / 2.0).asin().to_degrees()
+    }
+
+    /// How far the image's up direction is from the true one, in degrees.
+    pub fn roll_error_deg(&self, report: &Value) -> f64 {
+        let difference = number(report, "/attitude/up_pa_deg") - self.up_pa_deg;
+        (difference + 180.0).rem_euclid(360.0) - 180.0
+    }
+
+    /// Relative error of the horizontal field of view.
+    pub fn fov_error(&self, report: &Value) -> f64 {
+        number(report, "/optics/fov_x_deg") / self.fov_x_deg - 1.0
+    }
 }

@@ -1,0 +1,23 @@
+#!/usr/bin/env bash
+# Draws the frames in fixtures/ again; with --check, compares them with what is there and changes nothing.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+out=fixtures
+if [ "${1:-}" = --check ]; then
+    out=$(mktemp -d)
+    trap 'rm -rf "$out"' EXIT
+fi
+
+draw() { # NAME FILE RA DEC UP FOV WIDTH HEIGHT SEED
+    local name=$1 file=$2
+    shift 2
+    mkdir -p "$out/$name"
+    cargo run --quiet --example draw_frame -- "$out/$name/$file" "$@"
+    if [ "$out" != fixtures ]; then
+        cmp "$out/$name/$file" "fixtures/$name/$file"
+    fi
+}
+
+draw orion orion.png 83.8 0.5 12.5 20 640 480 1
+draw cygnus cygnus.tif 306.0 41.0 -100 12 512 384 2

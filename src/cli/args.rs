@@ -1,0 +1,218 @@
+//! The command line as it is typed.
+
+use super::values;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// The longest side of a frame that makes sense, in pixels.
+const MAX_SIDE_PX: i64 = 1_000_000;
+
+/// Finds the stars in photographs of the night sky, says which they are and where the camera pointed.
+#[derive(Debug, Parser)]
+#[command(
+    name = "starpipe",
+    version,
+    arg_required_else_help = true,
+    max_term_width = 100,
+    after_help = "Examples:\n  \
+        starpipe process night.tif\n  \
+        starpipe process --fov 11.4 --format json *.tif > night.jsonl\n  \
+        starpipe identify --pixel-scale 10.8 centroids.csv\n\n\
+        Exit status: 0 all identified, 1 something could not be read or written,\n\
+        2 the command line is wrong, 3 some frame was not identified."
+)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Find and identify the stars in frames (TIFF, PNG, JPEG)
+    #[command(after_help = "Examples:\n  \
+        starpipe process night.tif\n  \
+        starpipe process --fov 11.4 --near 83.8,-1.2 --radius 10 night.tif\n  \
+        starpipe process --format json --out results *.tif > night.jsonl")]
+    Process(ProcessArgs),
+    /// Identify the stars in lists of centroids (CSV)
+    #[command(after_help = "Examples:\n  \
+        starpipe identify centroids.csv\n  \
+        starpipe identify --pixel-scale 10.8 --width 752 --height 480 centroids.csv\n\n\
+        The columns are x,y (or x_px,y_px) and one of vmag (Johnson V), mag (instrumental) or flux;\n\
+        others are ignored. (0, 0) is the centre of the top-left pixel, y runs down.")]
+    Identify(IdentifyArgs),
+    /// Work with star catalogues
+    Catalog(CatalogArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ProcessArgs {
+    /// Frames to process
+    #[arg(value_name = "FRAME", required = true)]
+    pub(crate) frames: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) detection: DetectionArgs,
+    #[command(flatten)]
+    pub(crate) solving: SolvingArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct IdentifyArgs {
+    /// Lists of centroids to identify
+    #[arg(value_name = "CENTROIDS.csv", required = true)]
+    pub(crate) lists: Vec<PathBuf>,
+    /// Width of the frame in pixels [default: as far as the centroids reach]
+    #[arg(long, value_name = "PIXELS", help_heading = "Frame", value_parser = clap::value_parser!(u32).range(1..=MAX_SIDE_PX))]
+    pub(crate) width: Option<u32>,
+    /// Height of the frame in pixels [default: as far as the centroids reach]
+    #[arg(long, value_name = "PIXELS", help_heading = "Frame", value_parser = clap::value_parser!(u32).range(1..=MAX_SIDE_PX))]
+    pub(crate) height: Option<u32>,
+    #[command(flatten)]
+    pub(crate) solving: SolvingArgs,
+}
+
+/// What `process` and `identify` share.
+#[derive(Debug, Args)]
+pub(crate) struct SolvingArgs {
+    #[command(flatten)]
+    pub(crate) hints: HintArgs,
+    #[command(flatten)]
+    pub(crate) output: OutputArgs,
+    #[command(flatten)]
+    pub(crate) resources: ResourceArgs,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Detection")]
+pub(crate) struct DetectionArgs {
+    /// Detection threshold in standard deviations of the background, in place of --false-alarms
+    #[arg(long, value_name = "NUMBER", value_parser = values::positive, conflicts_with = "false_alarms")]
+    pub(crate) sigma: Option<f64>,
+    /// False detections to accept in a million pixels of noise [default: 0.1]
+    #[arg(long, value_name = "NUMBER", value_parser = values::positive)]
+    pub(crate) false_alarms: Option<f64>,
+    /// How to measure a star's position
+    #[arg(long, value_name = "METHOD", value_enum)]
+    pub(crate) centroid: Option<Centroid>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Centroid {
+    /// Fit of a Gaussian spot: the most accurate
+    GaussianFit,
+    /// Centre of the light above a threshold: the fastest
+    GreyWeighted,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "What is known of the frames")]
+pub(crate) struct HintArgs {
+    /// Horizontal field of view in degrees
+    #[arg(long, value_name = "DEG", value_parser = values::field_of_view, allow_hyphen_values = true,
+          conflicts_with = "pixel_scale")]
+    pub(crate) fov: Option<f64>,
+    /// Angle of a pixel in arcseconds
+    #[arg(long, value_name = "ARCSEC", value_parser = values::pixel_scale, allow_hyphen_values = true)]
+    pub(crate) pixel_scale: Option<f64>,
+    /// How far --fov or --pixel-scale may be off, in percent [default: 10]
+    #[arg(long, value_name = "PERCENT", value_parser = values::percent, allow_hyphen_values = true)]
+    pub(crate) scale_error: Option<f64>,
+    /// Direction near which the frame's centre lies, in degrees
+    #[arg(long, value_name = "RA,DEC", value_parser = values::direction, allow_hyphen_values = true,
+          requires = "radius")]
+    pub(crate) near: Option<values::Direction>,
+    /// How far from --near the frame's centre may lie, in degrees
+    #[arg(long, value_name = "DEG", value_parser = values::radius, allow_hyphen_values = true,
+          requires = "near")]
+    pub(crate) radius: Option<f64>,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Output")]
+pub(crate) struct OutputArgs {
+    /// What to print
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub(crate) format: Format,
+    /// With --format text, list every identified star and not just the brightest
+    #[arg(long)]
+    pub(crate) all_stars: bool,
+    /// Also write FRAME.json and FRAME.csv (its stars) into this directory
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Format {
+    /// A report for people
+    Text,
+    /// One JSON object a line
+    Json,
+    /// A table of all stars
+    Csv,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Resources")]
+pub(crate) struct ResourceArgs {
+    /// Star catalogue to use in place of the built-in one
+    #[arg(long, value_name = "PATH")]
+    pub(crate) catalog: Option<PathBuf>,
+    /// Where to keep the index of the catalogue [default: $STARPIPE_CACHE_DIR, else the user's cache
+    /// directory]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) cache_dir: Option<PathBuf>,
+    /// Threads to work with [default: one for each processor]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) threads: Option<u32>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CatalogArgs {
+    #[command(subcommand)]
+    pub(crate) command: CatalogCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum CatalogCommand {
+    /// Turn a catalogue as it is distributed into the compact form that --catalog takes
+    #[command(after_help = "Example:\n  \
+        starpipe catalog import SKYMAP_SKY2000_V5R4.gz --vmag-limit 8 -o bright.cat")]
+    Import(ImportArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ImportArgs {
+    /// Catalogue to read
+    pub(crate) file: PathBuf,
+    /// File to write
+    #[arg(short, long, value_name = "OUT")]
+    pub(crate) output: PathBuf,
+    /// Leave out stars fainter than this Johnson V magnitude
+    #[arg(long, value_name = "MAG", value_parser = values::finite, allow_hyphen_values = true)]
+    pub(crate) vmag_limit: Option<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_definition_is_sound() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn every_command_shows_an_example() {
+        fn check(command: &clap::Command) {
+            let help = command.clone().render_long_help().to_string();
+            assert!(
+                command.get_subcommands().count() > 0 || help.contains("Example"),
+                "{}",
+                command.get_name()
+            );
+            command.get_subcommands().for_each(check);
+        }
+        check(&Arguments::command());
+    }
+}

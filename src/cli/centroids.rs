@@ -1,0 +1,282 @@
+//! Lists of centroids in CSV files.
+
+use anyhow::{Context, bail};
+use csv::StringRecord;
+use starpipe::coords::PixelPoint;
+use starpipe::identify::Photometry;
+use starpipe::pipeline::{CentroidList, ListedCentroid, instrumental_mag};
+use std::fs::File;
+use std::io;
+use std::path::Path;
+
+/// Sides of the frame in pixels, where they are known.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct FrameSize {
+    pub(crate) width: Option<u32>,
+    pub(crate) height: Option<u32>,
+}
+
+/// A frame wider than this is taken for a mistake in the list.
+const MAX_COORDINATE_PX: f64 = 1e6;
+
+/// Reads the list in the file `path`.
+pub(crate) fn read(path: &Path, size: FrameSize) -> anyhow::Result<CentroidList> {
+    let reading = || format!("reading {}", path.display());
+    let file = File::open(path).with_context(reading)?;
+    parse(io::BufReader::new(file), size).with_context(reading)
+}
+
+/// How a list tells brightness.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Brightness {
+    JohnsonV,
+    Mag,
+    Flux,
+}
+
+/// A column: where it is and what it is called.
+struct Column {
+    position: usize,
+    name: String,
+}
+
+struct Columns {
+    x: Column,
+    y: Column,
+    brightness: Column,
+    kind: Brightness,
+}
+
+/// Reads a list; lines are counted from 1, the heading included.
+fn parse(input: impl io::Read, size: FrameSize) -> anyhow::Result<CentroidList> {
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .flexible(true)
+        .comment(Some(b'#'))
+        .from_reader(input);
+    let columns = Columns::find(reader.headers()?)?;
+    let mut centroids = Vec::new();
+    for record in reader.records() {
+        let record = record?;
+        // A line of blanks and commas at the end of a spreadsheet's table tells nothing.
+        if record.iter().all(str::is_empty) {
+            continue;
+        }
+        let line = record.position().map_or(0, csv::Position::line);
+        let centroid = columns
+            .centroid(&record)
+            .with_context(|| format!("line {line}"))?;
+        inside(&centroid.position, size).with_context(|| format!("line {line}"))?;
+        centroids.push(centroid);
+    }
+    if centroids.is_empty() {
+        bail!("there is no centroid under the heading");
+    }
+    let (width, height) = sides(&centroids, size);
+    Ok(CentroidList {
+        width,
+        height,
+        photometry: match columns.kind {
+            Brightness::JohnsonV => Photometry::JohnsonV,
+            Brightness::Mag | Brightness::Flux => Photometry::Instrumental,
+        },
+        centroids,
+    })
+}
+
+impl Columns {
+    fn find(headings: &StringRecord) -> anyhow::Result<Self> {
+        if headings.iter().all(str::is_empty) {
+            bail!(
+                "the file is empty; expected a heading with the columns x, y and flux, vmag or mag"
+            );
+        }
+        let column = |names: &[&str]| {
+            names.iter().find_map(|name| {
+                let position = headings
+                    .iter()
+                    // A byte order mark is no part of the first heading.
+                    .position(|h| h.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name))?;
+                let name = (*name).to_owned();
+                Some(Column { position, name })
+            })
+        };
+        let found = || {
+            let named: Vec<&str> = headings.iter().collect();
+            format!("line 1 has the columns {}", named.join(", "))
+        };
+        let Some(x) = column(&["x", "x_px"]) else {
+            bail!("{}; expected x or x_px among them", found());
+        };
+        let Some(y) = column(&["y", "y_px"]) else {
+            bail!("{}; expected y or y_px among them", found());
+        };
+        let kinds = [
+            ("vmag", Brightness::JohnsonV),
+            ("mag", Brightness::Mag),
+            ("flux", Brightness::Flux),
+        ];
+        let brightness = kinds
+            .into_iter()
+            .find_map(|(name, kind)| Some((column(&[name])?, kind)));
+        let Some((brightness, kind)) = brightness else {
+            bail!("{}; expected flux, vmag or mag among them", found());
+        };
+        Ok(Self {
+            x,
+            y,
+            brightness,
+            kind,
+        })
+    }
+
+    fn centroid(&self, record: &StringRecord) -> anyhow::Result<ListedCentroid> {
+        let position = PixelPoint::new(number(record, &self.x)?, number(record, &self.y)?);
+        let value = number(record, &self.brightness)?;
+        let (mag, flux) = match self.kind {
+            Brightness::Flux if value > 0.0 => (instrumental_mag(value), Some(value)),
+            Brightness::Flux => bail!("column flux: {value} is not above 0"),
+            Brightness::JohnsonV | Brightness::Mag => (value, None),
+        };
+        Ok(ListedCentroid {
+            position,
+            mag,
+            flux,
+        })
+    }
+}
+
+fn number(record: &StringRecord, column: &Column) -> anyhow::Result<f64> {
+    let name = &column.name;
+    let Some(text) = record.get(column.position) else {
+        bail!(
+            "column {name} is missing: the line ends after {} of at least {} columns",
+            record.len(),
+            column.position + 1
+        );
+    };
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => bail!("column {name}: '{text}' is not a number"),
+    }
+}
+
+/// Refuses a position outside the frame; half a pixel around the centres of the border's pixels still is inside.
+fn inside(position: &PixelPoint, size: FrameSize) -> anyhow::Result<()> {
+    let axes = [
+        ("x", position.x, size.width),
+        ("y", position.y, size.height),
+    ];
+    for (name, value, side) in axes {
+        let limit = side.map_or(MAX_COORDINATE_PX, f64::from) - 0.5;
+        if !(-0.5..=limit).contains(&value) {
+            bail!(
+                "column {name}: {value} is outside the frame, which reaches from -0.5 to {limit} px"
+            );
+        }
+    }
+    Ok(())
+}
+
+/// The sides of the frame: those known, else as far as the centroids reach.
+fn sides(centroids: &[ListedCentroid], size: FrameSize) -> (usize, usize) {
+    let reach = |coordinate: fn(&PixelPoint) -> f64| {
+        let most = centroids
+            .iter()
+            .map(|c| coordinate(&c.position))
+            .fold(0.0, f64::max);
+        most.round() as usize + 1
+    };
+    let known = |side: Option<u32>| side.map(|side| side as usize);
+    (
+        known(size.width).unwrap_or_else(|| reach(|p| p.x)),
+        known(size.height).unwrap_or_else(|| reach(|p| p.y)),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(text: &str) -> anyhow::Result<CentroidList> {
+        parse(text.as_bytes(), FrameSize::default())
+    }
+
+    fn complaint(text: &str) -> String {
+        format!("{:#}", parsed(text).unwrap_err())
+    }
+
+    #[test]
+    fn headings_may_be_in_any_order_case_and_company() {
+        let list = parsed("id, VMAG , Y_px,note,X_PX\n7, 6.5, 20.2 ,hello, 10.6\n").unwrap();
+        assert_eq!(list.photometry, Photometry::JohnsonV);
+        assert_eq!(list.centroids[0].position, PixelPoint::new(10.6, 20.2));
+        assert_eq!(list.centroids[0].mag, 6.5);
+        assert_eq!((list.width, list.height), (12, 21));
+    }
+
+    #[test]
+    fn flux_becomes_an_instrumental_magnitude() {
+        let list = parsed("x,y,flux\n1,2,100\n").unwrap();
+        assert_eq!(list.photometry, Photometry::Instrumental);
+        assert_eq!(list.centroids[0].mag, -5.0);
+        assert_eq!(list.centroids[0].flux, Some(100.0));
+    }
+
+    #[test]
+    fn a_byte_order_mark_comments_and_blank_lines_do_no_harm() {
+        let list = parsed("\u{feff}x,y,mag\r\n# a remark\r\n1,2,3\r\n\r\n,,\r\n").unwrap();
+        assert_eq!(list.centroids.len(), 1);
+    }
+
+    #[test]
+    fn a_bad_value_is_named_by_line_and_column() {
+        for (row, expected) in [
+            ("1,NaN,3", "line 3: column y: 'NaN' is not a number"),
+            ("inf,2,3", "line 3: column x: 'inf' is not a number"),
+            ("1,2,", "line 3: column flux: '' is not a number"),
+            ("1,2,-4", "line 3: column flux: -4 is not above 0"),
+            ("1,2,0", "line 3: column flux: 0 is not above 0"),
+            ("1,2", "line 3: column flux is missing"),
+            ("-7,2,3", "line 3: column x: -7 is outside the frame"),
+            ("1,1e300,3", "line 3: column y: 1000000"),
+        ] {
+            let complaint = complaint(&format!("x,y,flux\n5,5,5\n{row}\n"));
+            assert!(complaint.starts_with(expected), "{complaint}");
+        }
+    }
+
+    #[test]
+    fn a_missing_column_is_named_along_with_those_found() {
+        for (heading, expected) in [
+            ("", "the file is empty"),
+            (
+                "a,b,c\n1,2,3\n",
+                "line 1 has the columns a, b, c; expected x or x_px",
+            ),
+            ("x,b,c\n1,2,3\n", "expected y or y_px"),
+            ("x,y,c\n1,2,3\n", "expected flux, vmag or mag"),
+            ("x,y,mag\n", "no centroid under the heading"),
+        ] {
+            let complaint = complaint(heading);
+            assert!(complaint.contains(expected), "{complaint}");
+        }
+    }
+
+    #[test]
+    fn a_position_outside_a_known_frame_is_refused() {
+        let size = FrameSize {
+            width: Some(100),
+            height: None,
+        };
+        let complaint = parse("x,y,mag\n99.4,2,3\n100,2,3\n".as_bytes(), size).unwrap_err();
+        assert!(format!("{complaint:#}").starts_with("line 3: column x: 100 is outside"));
+        let list = parse("x,y,mag\n9,2,3\n".as_bytes(), size).unwrap();
+        assert_eq!((list.width, list.height), (100, 3));
+    }
+
+    #[test]
+    fn what_is_not_text_is_refused() {
+        assert!(parse(&b"x,y,mag\n1,\xff\xfe,3\n"[..], FrameSize::default()).is_err());
+    }
+}

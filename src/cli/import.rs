@@ -1,0 +1,31 @@
+//! `catalog import`.
+
+use super::args::{CatalogArgs, CatalogCommand, ImportArgs};
+use super::output::print;
+use super::{Exit, Fault};
+use starpipe::catalog;
+use starpipe::report::counted;
+
+/// `starpipe catalog`
+pub(crate) fn catalog(arguments: CatalogArgs) -> Result<Exit, Fault> {
+    match arguments.command {
+        CatalogCommand::Import(arguments) => Ok(import(&arguments)?),
+    }
+}
+
+fn import(arguments: &ImportArgs) -> anyhow::Result<Exit> {
+    let (mut catalog, summary) = catalog::import_sky2000(&arguments.file)?;
+    if let Some(limit) = arguments.vmag_limit {
+        catalog = catalog.limited_to(limit);
+    }
+    catalog.write_compact(&arguments.output)?;
+    let told = format!(
+        "{}: {summary}\n{}: {}, {}\n",
+        arguments.file.display(),
+        arguments.output.display(),
+        counted(catalog.stars().len(), "star"),
+        catalog.title(),
+    );
+    print(&told)?;
+    Ok(Exit::Success)
+}

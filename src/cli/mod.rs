@@ -1,0 +1,114 @@
+//! From arguments to exit status: raw arguments, settings, work, printing.
+
+mod args;
+mod batch;
+mod cache;
+mod centroids;
+mod import;
+mod output;
+mod settings;
+mod solve;
+mod values;
+
+use args::{Arguments, Command};
+use clap::{CommandFactory, Parser, error::ErrorKind};
+use std::fmt::Display;
+use std::process::ExitCode;
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Exit {
+    /// All went well, and every frame was identified.
+    Success,
+    /// Something could not be read, written or understood.
+    Failure,
+    /// Everything was read, but some frame was not identified.
+    NotIdentified,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(match exit {
+            Exit::Success => 0,
+            Exit::Failure => 1,
+            // clap leaves with 2 where the command line is wrong.
+            Exit::NotIdentified => 3,
+        })
+    }
+}
+
+/// Why a command could not do its work.
+pub(crate) enum Fault {
+    /// The command line is wrong, in a way that only shows when it is read as a whole.
+    Usage(String),
+    /// Anything else.
+    Failed(anyhow::Error),
+}
+
+impl From<anyhow::Error> for Fault {
+    fn from(error: anyhow::Error) -> Self {
+        Self::Failed(error)
+    }
+}
+
+/// Does what the command line asks for.
+pub(crate) fn run() -> ExitCode {
+    let arguments = Arguments::parse();
+    let done = match arguments.command {
+        Command::Process(arguments) => solve::process(arguments),
+        Command::Identify(arguments) => solve::identify(arguments),
+        Command::Catalog(arguments) => import::catalog(arguments),
+    };
+    match done {
+        Ok(exit) => exit.into(),
+        Err(Fault::Usage(message)) => Arguments::command()
+            .error(ErrorKind::ValueValidation, message)
+            .exit(),
+        Err(Fault::Failed(error)) => {
+            complain(chained(&error));
+            Exit::Failure.into()
+        }
+    }
+}
+
+/// An error and its causes in one line. A cause that the message before it ends with is not said again.
+pub(crate) fn chained(error: &anyhow::Error) -> String {
+    let mut line = String::new();
+    for cause in error.chain() {
+        let text = cause.to_string();
+        if !line.ends_with(&text) {
+            line += if line.is_empty() { "" } else { ": " };
+            line += &text;
+        }
+    }
+    line.replace('\n', " ")
+}
+
+/// Tells of trouble, on standard error.
+pub(crate) fn complain(message: impl Display) {
+    eprintln!("starpipe: {message}");
+}
+
+/// Tells of something odd that does no harm, on standard error.
+pub(crate) fn warn(message: impl Display) {
+    eprintln!("starpipe: warning: {message}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::{Context, anyhow};
+
+    #[test]
+    fn causes_are_chained_in_one_line_and_said_once() {
+        let cause = anyhow!("no such file");
+        let error = Err::<(), _>(cause)
+            .context("a.tif: no such file")
+            .context("reading a.tif: no such file\nat all")
+            .unwrap_err();
+        assert_eq!(
+            chained(&error),
+            "reading a.tif: no such file at all: a.tif: no such file"
+        );
+    }
+}

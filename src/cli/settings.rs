@@ -1,0 +1,132 @@
+//! From raw arguments to the library's configurations.
+
+use super::Fault;
+use super::args::{Centroid, DetectionArgs, HintArgs, OutputArgs};
+use super::output::OutputSettings;
+use starpipe::coords::UnitVector;
+use starpipe::detect::{CentroidMethod, DetectConfig};
+use starpipe::pipeline::{Knowledge, Scale, ScaleHint};
+use starpipe::report::TextOptions;
+use starpipe::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
+use std::collections::HashMap;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+/// How far a scale given may be off where nothing is said of it, in percent.
+const DEFAULT_SCALE_ERROR_PERCENT: f64 = 10.0;
+
+impl HintArgs {
+    /// What is known of the frames.
+    pub(crate) fn resolve(&self) -> Result<Knowledge, Fault> {
+        let fov = self.fov.map(|deg| Scale::FieldOfView(deg * RAD_PER_DEG));
+        let pixel = self
+            .pixel_scale
+            .map(|arcsec| Scale::Pixel(arcsec * RAD_PER_ARCSEC));
+        let scale = fov.or(pixel);
+        if scale.is_none() && self.scale_error.is_some() {
+            return Err(Fault::Usage(
+                "--scale-error says how far --fov or --pixel-scale may be off; give one of these, too".into(),
+            ));
+        }
+        let tolerance = self.scale_error.unwrap_or(DEFAULT_SCALE_ERROR_PERCENT) / 100.0;
+        let near = self.near.zip(self.radius).map(|(direction, radius_deg)| {
+            let (ra_rad, dec_rad) = (
+                direction.ra_deg * RAD_PER_DEG,
+                direction.dec_deg * RAD_PER_DEG,
+            );
+            (
+                UnitVector::from_ra_dec(ra_rad, dec_rad),
+                radius_deg * RAD_PER_DEG,
+            )
+        });
+        Ok(Knowledge {
+            scale: scale.map(|scale| ScaleHint { scale, tolerance }),
+            near,
+        })
+    }
+}
+
+impl DetectionArgs {
+    /// How to detect stars; what is not given stays as the library has it.
+    pub(crate) fn resolve(&self) -> DetectConfig {
+        let mut config = DetectConfig {
+            threshold_sigma: self.sigma,
+            ..DetectConfig::default()
+        };
+        if let Some(number) = self.false_alarms {
+            config.false_alarms_per_mpx = number;
+        }
+        if let Some(centroid) = self.centroid {
+            config.centroid = match centroid {
+                Centroid::GaussianFit => CentroidMethod::GaussianFit,
+                Centroid::GreyWeighted => CentroidMethod::GreyWeighted,
+            };
+        }
+        config
+    }
+}
+
+impl OutputArgs {
+    /// Where the results of `inputs` go.
+    pub(crate) fn resolve(self, inputs: &[PathBuf]) -> Result<OutputSettings, Fault> {
+        if let Some(directory) = &self.out {
+            check_file_names(inputs, directory)?;
+        }
+        Ok(OutputSettings {
+            format: self.format,
+            text: TextOptions {
+                all_stars: self.all_stars,
+            },
+            directory: self.out,
+        })
+    }
+}
+
+/// The name under which the results of `input` are written, without its extension.
+pub(crate) fn result_stem(input: &Path) -> &OsStr {
+    input.file_stem().unwrap_or(OsStr::new("frame"))
+}
+
+/// Refuses inputs whose results would overwrite each other, or one of the inputs.
+fn check_file_names(inputs: &[PathBuf], directory: &Path) -> Result<(), Fault> {
+    let mut taken: HashMap<&OsStr, &Path> = HashMap::new();
+    for input in inputs {
+        let stem = result_stem(input);
+        if let Some(other) = taken.insert(stem, input) {
+            return Err(Fault::Usage(format!(
+                "the results of {} and {} would both be written to {}; process them into different directories",
+                other.display(),
+                input.display(),
+                output_path(directory, input, "json").display(),
+            )));
+        }
+    }
+    let inputs_found: Vec<PathBuf> = inputs
+        .iter()
+        .filter_map(|i| i.canonicalize().ok())
+        .collect();
+    for input in inputs {
+        for extension in ["json", "csv"] {
+            let output = output_path(directory, input, extension);
+            let clash = output
+                .canonicalize()
+                .is_ok_and(|path| inputs_found.contains(&path));
+            if clash {
+                return Err(Fault::Usage(format!(
+                    "the results of {} would overwrite the input {}; choose another directory for --out",
+                    input.display(),
+                    output.display(),
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The file that holds the results of `input` in one form.
+pub(crate) fn output_path(directory: &Path, input: &Path, extension: &str) -> PathBuf {
+    let mut name = result_stem(input).to_owned();
+    name.push(".");
+    name.push(extension);
+    directory.join(name)
+}

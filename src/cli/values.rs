@@ -1,0 +1,131 @@
+//! Values of options: what is out of range is refused where it is typed.
+
+use std::fmt::Display;
+
+/// A direction on the sky, in degrees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Direction {
+    pub(crate) ra_deg: f64,
+    pub(crate) dec_deg: f64,
+}
+
+/// Any number that is one.
+pub(crate) fn finite(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err(format!("'{text}' is not a number")),
+    }
+}
+
+fn within(
+    text: &str,
+    what: impl Display,
+    accepts: impl Fn(f64) -> bool,
+    limits: &str,
+) -> Result<f64, String> {
+    let value = finite(text)?;
+    if accepts(value) {
+        Ok(value)
+    } else {
+        Err(format!("{what} must be {limits}"))
+    }
+}
+
+/// A number above zero.
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
+    within(text, "the number", |v| v > 0.0, "above 0")
+}
+
+/// A horizontal field of view in degrees.
+pub(crate) fn field_of_view(text: &str) -> Result<f64, String> {
+    within(
+        text,
+        "the field of view",
+        |v| v > 0.0 && v < 180.0,
+        "above 0 and below 180 degrees",
+    )
+}
+
+/// A pixel scale in arcseconds.
+pub(crate) fn pixel_scale(text: &str) -> Result<f64, String> {
+    within(
+        text,
+        "the pixel scale",
+        |v| v > 0.0 && v <= 36_000.0,
+        "above 0 and at most 36000 arcseconds",
+    )
+}
+
+/// A relative error in percent.
+pub(crate) fn percent(text: &str) -> Result<f64, String> {
+    within(
+        text,
+        "the error of the scale",
+        |v| v > 0.0 && v < 100.0,
+        "above 0 and below 100 percent",
+    )
+}
+
+/// A radius on the sky in degrees.
+pub(crate) fn radius(text: &str) -> Result<f64, String> {
+    within(
+        text,
+        "the radius",
+        |v| v > 0.0 && v <= 180.0,
+        "above 0 and at most 180 degrees",
+    )
+}
+
+/// Right ascension and declination in degrees, with a comma between them.
+pub(crate) fn direction(text: &str) -> Result<Direction, String> {
+    let (ra, dec) = text.split_once(',').ok_or(
+        "right ascension and declination in degrees are needed, with a comma between them",
+    )?;
+    let ra_deg = within(
+        ra,
+        "right ascension",
+        |v| (0.0..=360.0).contains(&v),
+        "from 0 to 360 degrees",
+    )?;
+    let dec_deg = within(
+        dec,
+        "declination",
+        |v| (-90.0..=90.0).contains(&v),
+        "from -90 to 90 degrees",
+    )?;
+    Ok(Direction { ra_deg, dec_deg })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_is_finite() {
+        assert_eq!(finite(" -1.5 "), Ok(-1.5));
+        for text in ["NaN", "inf", "-inf", "", "ten", "1,5"] {
+            assert!(finite(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_direction_is_on_the_sky() {
+        let orion = Direction {
+            ra_deg: 83.8,
+            dec_deg: -1.2,
+        };
+        assert_eq!(direction("83.8,-1.2"), Ok(orion));
+        assert_eq!(direction("83.8, -1.2"), Ok(orion));
+        for text in ["400,0", "-1,0", "0,91", "0", "0,NaN", "1,2,3"] {
+            assert!(direction(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn ranges_leave_out_what_makes_no_sense() {
+        assert!(field_of_view("180").is_err() && field_of_view("0").is_err());
+        assert!(percent("100").is_err() && percent("10").is_ok());
+        assert!(radius("181").is_err() && radius("180").is_ok());
+        assert!(pixel_scale("-1").is_err() && positive("0").is_err());
+    }
+}

@@ -1,0 +1,423 @@
+//! The stages in order: a frame becomes detections, the detections a star field, the field an identification.
+//!
+//! [`Frame`] → [`Detections`] → [`StarField`] → [`Outcome`], kept together and timed in a [`Solution`].
+//!
+//! ```no_run
+//! use starpipe::catalog::Catalog;
+//! use starpipe::detect::Workspace;
+//! use starpipe::identify::Sky;
+//! use starpipe::pipeline::{Pipeline, SolveConfig};
+//! use starpipe::report::FrameReport;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let catalog = Catalog::built_in();
+//! // Takes some seconds; `Sky::open` keeps what it makes for the next time.
+//! let sky = Sky::build(catalog.stars(), &|_| {});
+//! let pipeline = Pipeline::new(catalog, sky);
+//! let mut workspace = Workspace::new();
+//! let solution =
+//!     pipeline.solve_file("night.tif".as_ref(), &SolveConfig::default(), &mut workspace)?;
+//! let report = FrameReport::new("night.tif", &solution, catalog);
+//! println!("{}", report.to_json_line()?);
+//! # Ok(())
+//! # }
+//! ```
+
+use crate::camera;
+use crate::catalog::Catalog;
+use crate::coords::{Icrs, PixelPoint, UnitVector};
+use crate::detect::{
+    self, DetectConfig, DetectError, Detection, DetectionFlags, Detections, Workspace,
+};
+use crate::frame::{self, Frame, FrameError};
+use crate::identify::{self, Hints, ObservedStar, Outcome, Photometry, Sky, StarField};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Why the frame in a file could not be examined. That its stars are not identified is no error but an [`Outcome`].
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The file cannot be read or understood.
+    #[error("reading {0}")]
+    Read(#[from] FrameError),
+    /// The frame is not one in which stars can be looked for.
+    #[error("detecting stars in {}", path.display())]
+    Detect {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with the frame.
+        source: DetectError,
+    },
+}
+
+/// What is known of the camera's scale beforehand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScaleHint {
+    /// The scale.
+    pub scale: Scale,
+    /// By which fraction the true scale may be larger or smaller, in (0, 1).
+    pub tolerance: f64,
+}
+
+/// A camera's scale, in one of the two ways in which people know it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Scale {
+    /// Horizontal field of view, in radians.
+    FieldOfView(f64),
+    /// Angle that a pixel at the frame's centre spans, in radians.
+    Pixel(f64),
+}
+
+impl ScaleHint {
+    /// Smallest and largest pixel scale at the centre of a frame of this width, in radians.
+    pub fn pixel_scale_rad(&self, width_px: f64) -> (f64, f64) {
+        let pixel_rad = |scale: f64| match self.scale {
+            Scale::FieldOfView(fov_rad) => {
+                // Beyond a half turn there is no pinhole camera left to speak of.
+                let fov_rad = (fov_rad * scale).min(MAX_FOV_RAD);
+                1.0 / camera::focal_length_px(width_px, fov_rad)
+            }
+            Scale::Pixel(pixel_rad) => pixel_rad * scale,
+        };
+        (
+            pixel_rad(1.0 - self.tolerance),
+            pixel_rad(1.0 + self.tolerance),
+        )
+    }
+}
+
+/// The widest field of view of a pinhole camera that still has a scale.
+const MAX_FOV_RAD: f64 = 179.0 * crate::units::RAD_PER_DEG;
+
+/// What is known of a frame beforehand; by default nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Knowledge {
+    /// The camera's scale.
+    pub scale: Option<ScaleHint>,
+    /// The boresight lies within so many radians of this direction.
+    pub near: Option<(UnitVector<Icrs>, f64)>,
+}
+
+impl Knowledge {
+    /// The same as identification takes it, for a frame of this width.
+    pub fn hints(&self, width_px: f64) -> Hints {
+        Hints {
+            pixel_scale_rad: self.scale.map(|hint| hint.pixel_scale_rad(width_px)),
+            near: self.near,
+        }
+    }
+}
+
+/// How to examine a frame.
+#[derive(Debug, Clone, Default)]
+pub struct SolveConfig {
+    /// How to find the stars.
+    pub detect: DetectConfig,
+    /// What is known beforehand.
+    pub knowledge: Knowledge,
+}
+
+/// One source: what was measured of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Source {
+    /// Its centroid.
+    pub position: PixelPoint,
+    /// What a detection in a frame tells besides; a line in a list of centroids does not.
+    pub measured: Option<Measured>,
+    /// Flux above the background, in the frame's own units, where it is known.
+    pub flux: Option<f64>,
+}
+
+/// What only a detection in a frame has.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// Standard errors of the centroid in x and y, in pixels.
+    pub sigma_px: [f64; 2],
+    /// Brightest pixel above the background, in the frame's own units.
+    pub peak: f64,
+    /// Flux over its standard error.
+    pub snr: f64,
+    /// What is unusual about it.
+    pub flags: DetectionFlags,
+}
+
+impl From<&Detection> for Source {
+    fn from(detection: &Detection) -> Self {
+        Self {
+            position: detection.position,
+            measured: Some(Measured {
+                sigma_px: [detection.sigma_x_px, detection.sigma_y_px],
+                peak: detection.peak_adu,
+                snr: detection.snr,
+                flags: detection.flags,
+            }),
+            flux: Some(detection.flux_adu),
+        }
+    }
+}
+
+/// What was found in one frame, or in one list of centroids.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// All sources, brightest first.
+    pub sources: Vec<Source>,
+    /// The sky between them; a list of centroids does not know it.
+    pub background: Option<Background>,
+    /// Which stars they are; `observed` in its matches is an index into `sources`.
+    pub outcome: Outcome,
+    /// How long it took.
+    pub timing: Timing,
+}
+
+/// The sky between the stars, in the frame's own units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Background {
+    /// Median level.
+    pub level_adu: f64,
+    /// Standard deviation of one pixel.
+    pub noise_adu: f64,
+}
+
+/// How long each stage took; 0 for a stage that was not needed.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Timing {
+    /// Reading and decoding the file.
+    pub read_ms: f64,
+    /// Finding and measuring the stars.
+    pub detect_ms: f64,
+    /// Identifying them.
+    pub identify_ms: f64,
+    /// All of it.
+    pub total_ms: f64,
+}
+
+/// A list of centroids, as `starpipe identify` takes it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CentroidList {
+    /// Columns of the frame that they come from.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// What the magnitudes are.
+    pub photometry: Photometry,
+    /// The centroids, in any order.
+    pub centroids: Vec<ListedCentroid>,
+}
+
+/// One line of a list of centroids.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ListedCentroid {
+    /// The position.
+    pub position: PixelPoint,
+    /// Brightness in magnitudes, see [`CentroidList::photometry`].
+    pub mag: f64,
+    /// Flux, where the list gives that.
+    pub flux: Option<f64>,
+}
+
+/// Standard error assumed on each axis of a centroid that comes without one, in pixels.
+pub const LISTED_SIGMA_PX: f64 = 0.5;
+
+/// The catalogue and what is made of it for identification, ready for any number of frames.
+pub struct Pipeline<'a> {
+    catalog: &'a Catalog,
+    sky: Sky<'a>,
+}
+
+impl<'a> Pipeline<'a> {
+    /// Frames are identified with the stars of `catalog`, of which `sky` must be made.
+    pub fn new(catalog: &'a Catalog, sky: Sky<'a>) -> Self {
+        Self { catalog, sky }
+    }
+
+    /// The catalogue.
+    pub fn catalog(&self) -> &'a Catalog {
+        self.catalog
+    }
+
+    /// Examines the frame in the file `path`.
+    ///
+    /// # Errors
+    /// [`Error::Read`] if there is no frame in the file, [`Error::Detect`] if it is unfit.
+    pub fn solve_file(
+        &self,
+        path: &Path,
+        config: &SolveConfig,
+        workspace: &mut Workspace,
+    ) -> Result<Solution, Error> {
+        let start = Instant::now();
+        let frame = frame::read(path)?;
+        let read_ms = milliseconds_since(start);
+        let mut solution = self
+            .solve_frame(&frame, config, workspace)
+            .map_err(|source| Error::Detect {
+                path: path.to_owned(),
+                source,
+            })?;
+        solution.timing.read_ms = read_ms;
+        solution.timing.total_ms = milliseconds_since(start);
+        Ok(solution)
+    }
+
+    /// Examines `frame`.
+    ///
+    /// # Errors
+    /// [`DetectError`] if it is unfit for detection.
+    pub fn solve_frame(
+        &self,
+        frame: &Frame,
+        config: &SolveConfig,
+        workspace: &mut Workspace,
+    ) -> Result<Solution, DetectError> {
+        let start = Instant::now();
+        let detections = detect::detect(frame, &config.detect, workspace)?;
+        let detect_ms = milliseconds_since(start);
+        let (field, kept) = star_field(frame, &detections);
+        let identify_start = Instant::now();
+        let outcome = self.identify(&field, &kept, &config.knowledge);
+        Ok(Solution {
+            width: frame.width,
+            height: frame.height,
+            sources: detections.sources.iter().map(Source::from).collect(),
+            background: Some(Background {
+                level_adu: detections.background_adu,
+                noise_adu: detections.noise_adu,
+            }),
+            outcome,
+            timing: Timing {
+                read_ms: 0.0,
+                detect_ms,
+                identify_ms: milliseconds_since(identify_start),
+                total_ms: milliseconds_since(start),
+            },
+        })
+    }
+
+    /// Identifies the stars of a list of centroids.
+    pub fn solve_centroids(&self, list: &CentroidList, knowledge: &Knowledge) -> Solution {
+        let start = Instant::now();
+        let mut centroids = list.centroids.clone();
+        centroids.sort_by(|a, b| a.mag.total_cmp(&b.mag));
+        let observed = |centroid: &ListedCentroid| ObservedStar {
+            position: centroid.position,
+            sigma_px: LISTED_SIGMA_PX,
+            mag: centroid.mag,
+        };
+        let field = StarField {
+            width_px: list.width as f64,
+            height_px: list.height as f64,
+            photometry: list.photometry,
+            stars: centroids.iter().map(observed).collect(),
+        };
+        let all: Vec<usize> = (0..centroids.len()).collect();
+        let outcome = self.identify(&field, &all, knowledge);
+        let identify_ms = milliseconds_since(start);
+        let source = |centroid: &ListedCentroid| Source {
+            position: centroid.position,
+            measured: None,
+            flux: centroid.flux,
+        };
+        Solution {
+            width: list.width,
+            height: list.height,
+            sources: centroids.iter().map(source).collect(),
+            background: None,
+            outcome,
+            timing: Timing {
+                identify_ms,
+                total_ms: identify_ms,
+                ..Timing::default()
+            },
+        }
+    }
+
+    /// Identifies `field`, and numbers the matches as the sources are: `sources[i]` is the source of star i.
+    fn identify(&self, field: &StarField, sources: &[usize], knowledge: &Knowledge) -> Outcome {
+        let hints = knowledge.hints(field.width_px);
+        let mut outcome = identify::identify(field, &hints, &self.sky);
+        if let Outcome::Identified(identification) = &mut outcome {
+            for star_match in &mut identification.matches {
+                star_match.observed = sources[star_match.observed];
+            }
+        }
+        outcome
+    }
+}
+
+/// The sources that may be stars, and the index of each among all sources.
+fn star_field(frame: &Frame, detections: &Detections) -> (StarField, Vec<usize>) {
+    let sources = &detections.sources;
+    let kept: Vec<usize> = (0..sources.len())
+        .filter(|&i| sources[i].flags.is_star_like() && sources[i].flux_adu > 0.0)
+        .collect();
+    let observed = |&i: &usize| {
+        let source = &sources[i];
+        let variance_px2 = (source.sigma_x_px.powi(2) + source.sigma_y_px.powi(2)) / 2.0;
+        ObservedStar {
+            position: source.position,
+            sigma_px: variance_px2.sqrt(),
+            mag: instrumental_mag(source.flux_adu),
+        }
+    };
+    let field = StarField {
+        width_px: frame.width as f64,
+        height_px: frame.height as f64,
+        photometry: Photometry::Instrumental,
+        stars: kept.iter().map(observed).collect(),
+    };
+    (field, kept)
+}
+
+/// −2.5 log10(`flux`), the magnitude with an unknown zero point.
+pub fn instrumental_mag(flux: f64) -> f64 {
+    -2.5 * flux.log10()
+}
+
+fn milliseconds_since(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
+
+    #[test]
+    fn a_field_of_view_and_its_pixel_scale_are_the_same_hint() {
+        let width_px = 1000.0;
+        let (low, high) = ScaleHint {
+            scale: Scale::FieldOfView(10.0 * RAD_PER_DEG),
+            tolerance: 0.1,
+        }
+        .pixel_scale_rad(width_px);
+        let expected = |fov_deg: f64| 2.0 * (fov_deg / 2.0 * RAD_PER_DEG).tan() / width_px;
+        assert!((low - expected(9.0)).abs() < 1e-12);
+        assert!((high - expected(11.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_pixel_scale_widens_by_its_tolerance() {
+        let hint = ScaleHint {
+            scale: Scale::Pixel(10.0 * RAD_PER_ARCSEC),
+            tolerance: 0.2,
+        };
+        let (low, high) = hint.pixel_scale_rad(123.0);
+        assert!((low / RAD_PER_ARCSEC - 8.0).abs() < 1e-9);
+        assert!((high / RAD_PER_ARCSEC - 12.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn no_field_of_view_is_so_wide_that_its_scale_is_not_a_number() {
+        let hint = ScaleHint {
+            scale: Scale::FieldOfView(170.0 * RAD_PER_DEG),
+            tolerance: 0.5,
+        };
+        let (low, high) = hint.pixel_scale_rad(500.0);
+        assert!(low > 0.0 && high > low && high.is_finite());
+    }
+}

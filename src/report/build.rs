@@ -1,0 +1,265 @@
+//! From what the pipeline found to what is told of it.
+
+use super::rounding::{finite, half_turn_deg, to_decimals, to_significant, turn_deg};
+use super::{
+    AttitudeReport, AttitudeSigma, BackgroundReport, DistortionReport, FrameReport,
+    MagnitudeReport, MatchReport, OpticsReport, SCHEMA, StarReport, Status, TimingReport,
+};
+use crate::camera::Distortion;
+use crate::catalog::Catalog;
+use crate::detect::DetectionFlags;
+use crate::identify::{Identification, LOG10_FALSE_ALARM_LIMIT, Outcome, Reason, StarMatch};
+use crate::pipeline::{Background, Solution, Source, Timing};
+use crate::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
+
+/// Decimals of a position or residual in pixels.
+const PIXEL_DECIMALS: i32 = 4;
+/// Decimals of a direction in degrees: 0.4 milliarcseconds.
+const DIRECTION_DECIMALS: i32 = 7;
+/// Significant digits of a flux.
+const FLUX_DIGITS: i32 = 6;
+/// Significant digits of a standard error.
+const SIGMA_DIGITS: i32 = 4;
+
+impl FrameReport {
+    /// What is told of `solution`, whose stars are those of `catalog`; `frame` is what to call it.
+    pub fn new(frame: &str, solution: &Solution, catalog: &Catalog) -> Self {
+        let mut report = Self {
+            schema: SCHEMA,
+            frame: frame.to_owned(),
+            width: solution.width,
+            height: solution.height,
+            status: Status::NotIdentified,
+            reason: None,
+            attitude: None,
+            optics: None,
+            matched: None,
+            magnitude: None,
+            background: background(solution.background.as_ref()),
+            stars: solution.sources.iter().map(unidentified).collect(),
+            timing_ms: timing(&solution.timing),
+        };
+        match &solution.outcome {
+            Outcome::NotIdentified(reason) => {
+                report.reason = Some(reason_text(reason, solution.sources.len()));
+            }
+            Outcome::Identified(identification) => report.add(identification, catalog),
+        }
+        report
+    }
+
+    fn add(&mut self, identification: &Identification, catalog: &Catalog) {
+        self.status = Status::Identified;
+        self.attitude = Some(attitude(identification));
+        self.optics = Some(optics(identification));
+        self.matched = Some(quality(identification, self.stars.len()));
+        self.magnitude = faintest(identification, catalog);
+        for star_match in &identification.matches {
+            if let Some(star) = self.stars.get_mut(star_match.observed) {
+                name(star, star_match, catalog);
+            }
+        }
+    }
+}
+
+fn attitude(identification: &Identification) -> AttitudeReport {
+    let (boresight, up_pa_rad) = identification.icrs_to_camera.boresight_and_up();
+    let (ra_rad, dec_rad) = boresight.to_ra_dec();
+    let [x, y, roll] = identification
+        .attitude_sigma_rad
+        .map(|sigma_rad| to_significant(sigma_rad * ARCSEC_PER_RAD, SIGMA_DIGITS));
+    AttitudeReport {
+        ra_deg: turn_deg(ra_rad * DEG_PER_RAD, DIRECTION_DECIMALS),
+        dec_deg: to_decimals(dec_rad * DEG_PER_RAD, DIRECTION_DECIMALS),
+        up_pa_deg: half_turn_deg(up_pa_rad * DEG_PER_RAD, DIRECTION_DECIMALS),
+        quaternion: identification
+            .icrs_to_camera
+            .to_quaternion()
+            .map(|q| to_decimals(q, 10)),
+        sigma_arcsec: AttitudeSigma { x, y, roll },
+    }
+}
+
+fn optics(identification: &Identification) -> OpticsReport {
+    let camera = &identification.camera;
+    OpticsReport {
+        fov_x_deg: to_decimals(camera.fov_x_rad() * DEG_PER_RAD, 6),
+        fov_y_deg: to_decimals(camera.fov_y_rad() * DEG_PER_RAD, 6),
+        focal_length_px: to_decimals(camera.focal_length_px, PIXEL_DECIMALS),
+        focal_length_sigma_px: finite(identification.focal_length_sigma_px, PIXEL_DECIMALS),
+        mirrored: camera.mirrored,
+        distortion: camera.distortion.as_ref().map(distortion),
+    }
+}
+
+fn distortion(distortion: &Distortion) -> DistortionReport {
+    let coefficients = distortion.coefficients_px().iter();
+    DistortionReport {
+        model: distortion.model().name(),
+        radius_px: to_decimals(distortion.radius_px(), PIXEL_DECIMALS),
+        largest_px: to_decimals(distortion.largest_px(), PIXEL_DECIMALS),
+        coefficients_px: coefficients.map(|c| to_decimals(*c, 6)).collect(),
+    }
+}
+
+fn quality(identification: &Identification, detected: usize) -> MatchReport {
+    let pixel_arcsec = ARCSEC_PER_RAD / identification.camera.focal_length_px;
+    MatchReport {
+        detected,
+        matched: identification.matches.len(),
+        rms_px: to_decimals(identification.rms_px, PIXEL_DECIMALS),
+        rms_arcsec: to_significant(identification.rms_px * pixel_arcsec, SIGMA_DIGITS),
+        log10_false_alarm: to_decimals(identification.log10_false_alarm, 2),
+    }
+}
+
+fn faintest(identification: &Identification, catalog: &Catalog) -> Option<MagnitudeReport> {
+    let v_mag = |star_match: &&StarMatch| catalog.stars()[star_match.catalog].v_mag;
+    let faintest = identification
+        .matches
+        .iter()
+        .max_by(|a, b| v_mag(a).total_cmp(&v_mag(b)))?;
+    Some(MagnitudeReport {
+        faintest_vmag: to_decimals(f64::from(v_mag(&faintest)), 3),
+        faintest_id: catalog.designation(faintest.catalog),
+        predicted_limit_vmag: None,
+        difference_mag: None,
+    })
+}
+
+fn background(measured: Option<&Background>) -> BackgroundReport {
+    let rounded = |value: f64| {
+        value
+            .is_finite()
+            .then(|| to_significant(value, FLUX_DIGITS))
+    };
+    BackgroundReport {
+        level: measured.and_then(|sky| rounded(sky.level_adu)),
+        noise: measured.and_then(|sky| rounded(sky.noise_adu)),
+    }
+}
+
+fn timing(measured: &Timing) -> TimingReport {
+    TimingReport {
+        read: to_decimals(measured.read_ms, 3),
+        detect: to_decimals(measured.detect_ms, 3),
+        identify: to_decimals(measured.identify_ms, 3),
+        total: to_decimals(measured.total_ms, 3),
+    }
+}
+
+fn unidentified(source: &Source) -> StarReport {
+    let measured = source.measured.as_ref();
+    let significant = |value: f64, digits| value.is_finite().then(|| to_significant(value, digits));
+    StarReport {
+        x: to_decimals(source.position.x, PIXEL_DECIMALS),
+        y: to_decimals(source.position.y, PIXEL_DECIMALS),
+        sigma_x: measured.and_then(|m| significant(m.sigma_px[0], SIGMA_DIGITS)),
+        sigma_y: measured.and_then(|m| significant(m.sigma_px[1], SIGMA_DIGITS)),
+        flux: source.flux.and_then(|flux| significant(flux, FLUX_DIGITS)),
+        peak: measured.and_then(|m| significant(m.peak, FLUX_DIGITS)),
+        snr: measured.and_then(|m| significant(m.snr, SIGMA_DIGITS)),
+        id: None,
+        name: None,
+        vmag: None,
+        ra_deg: None,
+        dec_deg: None,
+        residual_px: None,
+        flags: measured.map(|m| flag_names(m.flags)).unwrap_or_default(),
+    }
+}
+
+fn name(star: &mut StarReport, star_match: &StarMatch, catalog: &Catalog) {
+    let known = &catalog.stars()[star_match.catalog];
+    let (ra_rad, dec_rad) = known.direction.to_ra_dec();
+    star.id = Some(catalog.designation(star_match.catalog));
+    star.name = catalog.name_of(star_match.catalog).map(Into::into);
+    star.vmag = finite(f64::from(known.v_mag), 3);
+    star.ra_deg = Some(turn_deg(ra_rad * DEG_PER_RAD, DIRECTION_DECIMALS));
+    star.dec_deg = finite(dec_rad * DEG_PER_RAD, DIRECTION_DECIMALS);
+    star.residual_px = finite(star_match.residual_px, PIXEL_DECIMALS);
+}
+
+fn flag_names(flags: DetectionFlags) -> Vec<&'static str> {
+    [
+        (flags.saturated, "saturated"),
+        (flags.hot_pixel, "hot_pixel"),
+        (flags.trail, "trail"),
+        (flags.extended, "extended"),
+        (flags.blended, "blended"),
+        (flags.border, "border"),
+    ]
+    .into_iter()
+    .filter_map(|(set, word)| set.then_some(word))
+    .collect()
+}
+
+/// `reason` in words, with what may help.
+fn reason_text(reason: &Reason, detected: usize) -> String {
+    match *reason {
+        Reason::TooFewStars { found, needed } => {
+            let found = match found {
+                0 => "no star was found".to_owned(),
+                1 => "only 1 star was found".to_owned(),
+                _ => format!("only {found} stars were found"),
+            };
+            format!(
+                "{found} and at least {needed} are needed; a longer exposure or a lower \
+                 detection threshold shows more"
+            )
+        }
+        Reason::NoMatch {
+            best_log10_false_alarm: Some(best),
+        } if best.is_finite() => format!(
+            "no arrangement of catalogue stars matches the {detected} detections beyond chance: the \
+             best has a log10 false-alarm probability of {best:.1}, and {LOG10_FALSE_ALARM_LIMIT:.0} \
+             is needed; the field of view and the direction, where known, make it easier"
+        ),
+        Reason::NoMatch { .. } => format!(
+            "no arrangement of catalogue stars matches the {detected} detections; if this is the sky, the \
+             field of view and the direction, where known, make it easier"
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reason_says_what_was_found_what_was_needed_and_what_may_help() {
+        let few = reason_text(
+            &Reason::TooFewStars {
+                found: 1,
+                needed: 4,
+            },
+            3,
+        );
+        assert!(
+            few.contains("only 1 star was found and at least 4"),
+            "{few}"
+        );
+        let none = Reason::NoMatch {
+            best_log10_false_alarm: None,
+        };
+        assert!(reason_text(&none, 12).contains("12 detections"));
+        let near_miss = Reason::NoMatch {
+            best_log10_false_alarm: Some(-6.34),
+        };
+        assert!(reason_text(&near_miss, 12).contains("-6.3"));
+        let hopeless = Reason::NoMatch {
+            best_log10_false_alarm: Some(f64::NAN),
+        };
+        assert!(!reason_text(&hopeless, 12).contains("NaN"));
+    }
+
+    #[test]
+    fn flags_are_named_in_a_fixed_order() {
+        let flags = DetectionFlags {
+            border: true,
+            saturated: true,
+            ..DetectionFlags::default()
+        };
+        assert_eq!(flag_names(flags), ["saturated", "border"]);
+    }
+}

@@ -1,0 +1,66 @@
+//! The stars of a frame as a table.
+
+use super::{FrameReport, StarReport};
+use std::io;
+
+/// The columns, in order. `flags` are separated by blanks.
+pub const TABLE_COLUMNS: [&str; 15] = [
+    "frame",
+    "x",
+    "y",
+    "sigma_x",
+    "sigma_y",
+    "flux",
+    "peak",
+    "snr",
+    "id",
+    "name",
+    "vmag",
+    "ra_deg",
+    "dec_deg",
+    "residual_px",
+    "flags",
+];
+
+/// Writes the row of column names.
+///
+/// # Errors
+/// What the writer gives.
+pub fn write_table_header<W: io::Write>(writer: &mut csv::Writer<W>) -> csv::Result<()> {
+    writer.write_record(TABLE_COLUMNS)
+}
+
+impl FrameReport {
+    /// Writes one row a detection, brightest first, without the row of column names ([`write_table_header`]).
+    ///
+    /// # Errors
+    /// What the writer gives.
+    pub fn write_table_rows<W: io::Write>(&self, writer: &mut csv::Writer<W>) -> csv::Result<()> {
+        for star in &self.stars {
+            writer.write_record(self.row(star))?;
+        }
+        Ok(())
+    }
+
+    fn row(&self, star: &StarReport) -> [String; TABLE_COLUMNS.len()] {
+        let number = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
+        let word = |value: &Option<String>| value.clone().unwrap_or_default();
+        [
+            self.frame.clone(),
+            star.x.to_string(),
+            star.y.to_string(),
+            number(star.sigma_x),
+            number(star.sigma_y),
+            number(star.flux),
+            number(star.peak),
+            number(star.snr),
+            word(&star.id),
+            word(&star.name),
+            number(star.vmag),
+            number(star.ra_deg),
+            number(star.dec_deg),
+            number(star.residual_px),
+            star.flags.join(" "),
+        ]
+    }
+}

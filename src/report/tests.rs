@@ -1,0 +1,168 @@
+//! The three forms of a report, against their snapshots.
+
+use super::*;
+
+fn star(x: f64, id: Option<&str>, name: Option<&str>) -> StarReport {
+    StarReport {
+        x,
+        y: 56.7812,
+        sigma_x: Some(0.0123),
+        sigma_y: Some(0.0131),
+        flux: Some(123_456.0),
+        peak: Some(9_876.5),
+        snr: Some(812.4),
+        id: id.map(Into::into),
+        name: name.map(Into::into),
+        vmag: id.map(|_| 0.45),
+        ra_deg: id.map(|_| 88.792_939_2),
+        dec_deg: id.map(|_| 7.407_063_1),
+        residual_px: id.map(|_| 0.0712),
+        flags: vec!["saturated"],
+    }
+}
+
+fn unidentified() -> FrameReport {
+    FrameReport {
+        schema: SCHEMA,
+        frame: "night/a.tif".into(),
+        width: 1024,
+        height: 768,
+        status: Status::NotIdentified,
+        reason: Some(
+            "no arrangement of catalogue stars matches the 12 detections; if this is the sky, the field \
+             of view and the direction, where known, make it easier"
+                .into(),
+        ),
+        attitude: None,
+        optics: None,
+        matched: None,
+        magnitude: None,
+        background: BackgroundReport {
+            level: Some(1012.25),
+            noise: Some(12.3418),
+        },
+        stars: vec![star(12.3456, None, None)],
+        timing_ms: TimingReport {
+            read: 1.25,
+            detect: 3.5,
+            identify: 0.25,
+            total: 5.0,
+        },
+    }
+}
+
+fn identified() -> FrameReport {
+    FrameReport {
+        status: Status::Identified,
+        reason: None,
+        attitude: Some(AttitudeReport {
+            ra_deg: 83.822_083_3,
+            dec_deg: -1.212_251_2,
+            up_pa_deg: 12.345_678_9,
+            quaternion: [0.5, -0.5, 0.5, 0.5],
+            sigma_arcsec: AttitudeSigma {
+                x: 3.151,
+                y: 2.345,
+                roll: 31.51,
+            },
+        }),
+        optics: Some(OpticsReport {
+            fov_x_deg: 20.012_345,
+            fov_y_deg: 15.081_234,
+            focal_length_px: 2902.1234,
+            focal_length_sigma_px: Some(0.3123),
+            mirrored: false,
+            distortion: None,
+        }),
+        matched: Some(MatchReport {
+            detected: 3,
+            matched: 2,
+            rms_px: 0.0712,
+            rms_arcsec: 5.06,
+            log10_false_alarm: -65.21,
+        }),
+        magnitude: Some(MagnitudeReport {
+            faintest_vmag: 7.321,
+            faintest_id: "05350123".into(),
+            predicted_limit_vmag: None,
+            difference_mag: None,
+        }),
+        stars: vec![
+            star(123.4567, Some("05550020"), Some("Betelgeuse")),
+            star(12.3456, None, None),
+            star(512.0, Some("05350123"), None),
+        ],
+        ..unidentified()
+    }
+}
+
+fn table(report: &FrameReport) -> String {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    write_table_header(&mut writer).unwrap();
+    report.write_table_rows(&mut writer).unwrap();
+    String::from_utf8(writer.into_inner().unwrap()).unwrap()
+}
+
+fn pretty(report: &FrameReport) -> String {
+    serde_json::to_string_pretty(report).unwrap()
+}
+
+#[test]
+fn an_identified_frame_reads_well() {
+    insta::assert_snapshot!(identified().to_text(TextOptions::default()));
+}
+
+#[test]
+fn a_frame_that_is_not_identified_says_why() {
+    insta::assert_snapshot!(unidentified().to_text(TextOptions::default()));
+}
+
+#[test]
+fn json_has_every_field_of_the_interface() {
+    insta::assert_snapshot!(pretty(&identified()));
+}
+
+#[test]
+fn json_has_nulls_where_a_frame_is_not_identified() {
+    insta::assert_snapshot!(pretty(&unidentified()));
+}
+
+#[test]
+fn the_table_has_a_row_for_every_detection() {
+    insta::assert_snapshot!(table(&identified()));
+}
+
+#[test]
+fn json_is_one_line() {
+    let line = identified().to_json_line().unwrap();
+    assert!(!line.contains('\n') && line.starts_with("{\"schema\":1,"));
+}
+
+#[test]
+fn a_long_table_is_cut_unless_all_stars_are_wanted() {
+    let mut report = identified();
+    report.stars = vec![star(1.0, Some("05550020"), None); STARS_SHOWN + 5];
+    let rows = |text: &str| {
+        text.lines()
+            .filter(|line| line.contains("05550020"))
+            .count()
+    };
+    let cut = report.to_text(TextOptions::default());
+    assert_eq!(rows(&cut), STARS_SHOWN);
+    assert!(
+        cut.ends_with("  and 5 fainter; --all-stars lists them\n"),
+        "{cut}"
+    );
+    let whole = report.to_text(TextOptions { all_stars: true });
+    assert_eq!(rows(&whole), STARS_SHOWN + 5);
+    assert!(!whole.contains("--all-stars"));
+}
+
+#[test]
+fn text_keeps_to_a_terminals_width() {
+    for report in [identified(), unidentified()] {
+        let text = report.to_text(TextOptions::default());
+        let widest = text.lines().map(|line| line.chars().count()).max();
+        assert!(widest.is_some_and(|width| width <= 100), "{text}");
+    }
+}

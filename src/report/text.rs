@@ -1,0 +1,263 @@
+//! A frame's report for people, at most [`LINE_WIDTH`] columns wide where the names allow it.
+
+use super::rounding::decimals_for;
+use super::{
+    AttitudeReport, FrameReport, MagnitudeReport, MatchReport, OpticsReport, StarReport, angles,
+};
+
+/// Rows of the table of stars that are shown without [`TextOptions::all_stars`].
+pub const STARS_SHOWN: usize = 20;
+
+/// Columns that a line of text fills at most.
+const LINE_WIDTH: usize = 96;
+/// Columns of the labels in front of the lines.
+const LABEL_WIDTH: usize = 12;
+
+/// What to show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct TextOptions {
+    /// Every identified star, and not just the [`STARS_SHOWN`] brightest.
+    pub all_stars: bool,
+}
+
+impl FrameReport {
+    /// The report as text of several lines, each with its end.
+    pub fn to_text(&self, options: TextOptions) -> String {
+        let mut lines = vec![format!(
+            "{}  {} × {} px",
+            self.frame, self.width, self.height
+        )];
+        lines.extend(self.verdict());
+        lines.extend(self.attitude.iter().flat_map(attitude_lines));
+        lines.extend(self.optics.iter().flat_map(optics_lines));
+        lines.extend(self.matched.iter().map(residual_line));
+        lines.extend(
+            self.magnitude
+                .iter()
+                .map(|magnitude| self.faintest_line(magnitude)),
+        );
+        lines.extend(self.background_line());
+        lines.push(self.timing_line());
+        lines.extend(self.star_lines(options));
+        lines.join("\n") + "\n"
+    }
+
+    fn verdict(&self) -> Vec<String> {
+        let text = match (&self.matched, &self.reason) {
+            (Some(matched), _) => format!(
+                "identified: {} of {}; chance alone would do as well {}",
+                matched.matched,
+                counted(matched.detected, "detection"),
+                odds(matched.log10_false_alarm),
+            ),
+            (None, Some(reason)) => format!("not identified: {reason}"),
+            (None, None) => "not identified".to_owned(),
+        };
+        wrap(&text, LINE_WIDTH - 2)
+            .into_iter()
+            .map(|line| format!("  {line}"))
+            .collect()
+    }
+
+    fn faintest_line(&self, magnitude: &MagnitudeReport) -> String {
+        let text = format!(
+            "V {:.2}, star {}",
+            magnitude.faintest_vmag, magnitude.faintest_id
+        );
+        labelled("faintest", &text)
+    }
+
+    fn background_line(&self) -> Option<String> {
+        let (level, noise) = (self.background.level?, self.background.noise?);
+        let decimals = decimals_for(noise, 6);
+        let text = format!("{level:.decimals$}, noise {noise:.decimals$} in one pixel");
+        Some(labelled("background", &text))
+    }
+
+    fn timing_line(&self) -> String {
+        let timing = &self.timing_ms;
+        let stages = [
+            ("read", timing.read),
+            ("detect", timing.detect),
+            ("identify", timing.identify),
+        ];
+        let taken: Vec<String> = stages
+            .iter()
+            .filter(|(_, ms)| *ms > 0.0)
+            .map(|(stage, ms)| format!("{stage} {ms:.1}"))
+            .collect();
+        let text = format!("{:.1} ms: {}", timing.total, taken.join(", "));
+        labelled("time", &text)
+    }
+
+    fn star_lines(&self, options: TextOptions) -> Vec<String> {
+        let named: Vec<&StarReport> = self.stars.iter().filter(|s| s.id.is_some()).collect();
+        if named.is_empty() {
+            return Vec::new();
+        }
+        let shown = if options.all_stars {
+            named.len()
+        } else {
+            STARS_SHOWN
+        };
+        let mut lines = vec![String::new()];
+        lines.extend(star_table(&named[..named.len().min(shown)]));
+        if named.len() > shown {
+            lines.push(format!(
+                "  and {} fainter; --all-stars lists them",
+                named.len() - shown
+            ));
+        }
+        lines
+    }
+}
+
+fn attitude_lines(attitude: &AttitudeReport) -> Vec<String> {
+    let sigma = &attitude.sigma_arcsec;
+    let sigma_arcsec = sigma.x.max(sigma.y);
+    let sigma_deg = sigma_arcsec / 3600.0;
+    let seconds = decimals_for(sigma_arcsec, 4);
+    // One second of right ascension is up to fifteen arcseconds: it takes a digit more.
+    let ra = angles::hours(attitude.ra_deg, (seconds + 1).min(4));
+    let dec = angles::degrees(attitude.dec_deg, seconds);
+    let decimals = decimals_for(sigma_deg, 7);
+    let roll_sigma_deg = sigma.roll / 3600.0;
+    let roll_decimals = decimals_for(roll_sigma_deg, 6);
+    vec![
+        labelled(
+            "centre",
+            &format!("RA {ra}  Dec {dec}  ± {}", angles::small(sigma_arcsec)),
+        ),
+        labelled(
+            "",
+            &format!(
+                "RA {:.decimals$}°  Dec {:+.decimals$}°  ± {sigma_deg:.decimals$}°  (ICRS)",
+                attitude.ra_deg, attitude.dec_deg
+            ),
+        ),
+        labelled(
+            "roll",
+            &format!(
+                "image up at position angle {:.roll_decimals$}° ± {roll_sigma_deg:.roll_decimals$}°, \
+                 from north through east",
+                attitude.up_pa_deg
+            ),
+        ),
+    ]
+}
+
+fn optics_lines(optics: &OpticsReport) -> Vec<String> {
+    let sigma_px = optics.focal_length_sigma_px.unwrap_or(f64::NAN);
+    let decimals = decimals_for(sigma_px, 2);
+    let mut focal = format!("focal length {:.decimals$}", optics.focal_length_px);
+    if sigma_px.is_finite() {
+        focal += &format!(" ± {sigma_px:.decimals$}");
+    }
+    let pixel_arcsec = crate::units::ARCSEC_PER_RAD / optics.focal_length_px;
+    let mirrored = if optics.mirrored {
+        "mirrored"
+    } else {
+        "not mirrored"
+    };
+    let mut lines = vec![labelled(
+        "field",
+        &format!(
+            "{:.3}° × {:.3}°, {pixel_arcsec:.3}″ a pixel, {focal} px, {mirrored}",
+            optics.fov_x_deg, optics.fov_y_deg
+        ),
+    )];
+    let distortion = match &optics.distortion {
+        None => "none that the stars show".to_owned(),
+        Some(lens) => format!(
+            "{}, up to {:.2} px in the corners",
+            lens.model, lens.largest_px
+        ),
+    };
+    lines.push(labelled("distortion", &distortion));
+    lines
+}
+
+fn residual_line(matched: &MatchReport) -> String {
+    let text = format!(
+        "{:.3} px, {} root mean square",
+        matched.rms_px,
+        angles::small(matched.rms_arcsec)
+    );
+    labelled("residuals", &text)
+}
+
+/// The rows of the table under their heading.
+fn star_table(stars: &[&StarReport]) -> Vec<String> {
+    let id = |star: &StarReport| star.id.clone().unwrap_or_default();
+    let name = |star: &StarReport| star.name.clone().unwrap_or_default();
+    let width = |text: &dyn Fn(&StarReport) -> String, heading: &str| {
+        let longest = stars.iter().map(|s| text(s).chars().count()).max();
+        longest.unwrap_or(0).max(heading.len())
+    };
+    let id_width = width(&id, "star");
+    let name_width = width(&name, "");
+    let row = |id: &str, name: &str, rest: &str| {
+        let gap = if name_width > 0 { "  " } else { "" };
+        format!("  {id:<id_width$}{gap}{name:<name_width$}{rest}")
+    };
+    let heading = format!(
+        "{:>7}{:>10}{:>10}{:>9}{:>14}",
+        "V", "x", "y", "SNR", "residual (px)"
+    );
+    let mut lines = vec![row("star", "", &heading)];
+    lines.extend(stars.iter().map(|star| {
+        let rest = format!(
+            "{:>7}{:>10.2}{:>10.2}{:>9}{:>14}",
+            or_dash(star.vmag, |v| format!("{v:.2}")),
+            star.x,
+            star.y,
+            or_dash(star.snr, snr),
+            or_dash(star.residual_px, |px| format!("{px:.3}")),
+        );
+        row(&id(star), &name(star), &rest)
+    }));
+    lines
+}
+
+fn snr(value: f64) -> String {
+    let decimals = usize::from(value < 100.0);
+    format!("{value:.decimals$}")
+}
+
+fn or_dash(value: Option<f64>, print: impl Fn(f64) -> String) -> String {
+    value.map_or_else(|| "–".to_owned(), print)
+}
+
+/// How seldom something of this probability happens.
+fn odds(log10_probability: f64) -> String {
+    let power = -log10_probability;
+    if power < 1.0 {
+        return format!("with probability {:.2}", 10_f64.powf(log10_probability));
+    }
+    format!("once in 10^{power:.0} frames")
+}
+
+/// `1 detection`, `2 detections`.
+pub fn counted(count: usize, noun: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {noun}{plural}")
+}
+
+fn labelled(label: &str, text: &str) -> String {
+    format!("  {label:<LABEL_WIDTH$}{text}")
+}
+
+/// `text` cut at blanks into lines of at most `width` characters, longer words excepted.
+fn wrap(text: &str, width: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}

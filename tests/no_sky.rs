@@ -1,0 +1,140 @@
+//! What is no sky must not be identified: noise, random dots, drawings, black, white.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
+mod common;
+
+use common::{Ran, starpipe};
+use image::{GrayImage, Luma};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const SIDE: u32 = 512;
+
+fn random(seed: u64) -> ChaCha8Rng {
+    ChaCha8Rng::seed_from_u64(seed)
+}
+
+fn noise(seed: u64) -> GrayImage {
+    let mut random = random(seed);
+    let normal = Normal::new(40.0, 6.0).unwrap();
+    GrayImage::from_fn(SIDE, SIDE, |_, _| {
+        let level: f64 = normal.sample(&mut random);
+        Luma([level.round().clamp(0.0, 255.0) as u8])
+    })
+}
+
+/// Spots like stars, strewn at random over noise.
+fn random_dots(seed: u64, count: usize) -> GrayImage {
+    let mut image = noise(seed);
+    let mut random = random(seed + 1000);
+    for _ in 0..count {
+        let mut place = || random.random_range(10.0..f64::from(SIDE) - 10.0);
+        let (x, y) = (place(), place());
+        let peak = 50.0 / random.random_range(0.05..1.0_f64);
+        for row in y as u32 - 5..y as u32 + 6 {
+            for column in x as u32 - 5..x as u32 + 6 {
+                let r_sq = (f64::from(column) - x).powi(2) + (f64::from(row) - y).powi(2);
+                let pixel = &mut image.get_pixel_mut(column, row).0[0];
+                *pixel = pixel.saturating_add((peak * (-r_sq / 2.0).exp()) as u8);
+            }
+        }
+    }
+    image
+}
+
+/// A house with a lit window under a gradient, and a chequered floor.
+fn house() -> GrayImage {
+    GrayImage::from_fn(SIDE, SIDE, |x, y| {
+        let wall = (120..400).contains(&x) && (200..420).contains(&y);
+        let roof = y > 100 && y < 200 && x.abs_diff(260) < (y - 100) * 3 / 2;
+        let window = (180..240).contains(&x) && (260..320).contains(&y);
+        let floor = y >= 420;
+        Luma([match (window, wall, roof, floor) {
+            (true, ..) => 250,
+            (_, true, ..) => 120,
+            (_, _, true, _) => 60,
+            (.., true) => 40 + 150 * ((x / 32 + y / 32) % 2) as u8,
+            _ => (y / 3) as u8,
+        }])
+    })
+}
+
+/// A regular grid of dots: stars are not arranged so.
+fn grid_of_dots() -> GrayImage {
+    let mut image = noise(7);
+    for y in (32..SIDE - 32).step_by(48) {
+        for x in (32..SIDE - 32).step_by(48) {
+            for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                image.put_pixel(x + dx, y + dy, Luma([230]));
+            }
+        }
+    }
+    image
+}
+
+fn assert_none_is_identified(command: &str, inputs: &[PathBuf]) {
+    let ran = Ran::new(starpipe().args([command, "--format", "json"]).args(inputs));
+    for report in ran.reports() {
+        assert_eq!(report["status"], "not_identified", "{}", report["frame"]);
+        assert!(
+            report["reason"]
+                .as_str()
+                .is_some_and(|reason| reason.len() > 20)
+        );
+        for part in ["attitude", "optics", "match", "magnitude"] {
+            assert!(report[part].is_null());
+        }
+    }
+    assert_eq!(ran.reports().len(), inputs.len(), "{}", ran.stderr);
+    assert_eq!(ran.status, 3, "{}", ran.stderr);
+}
+
+fn saved(directory: &Path, images: Vec<GrayImage>) -> Vec<PathBuf> {
+    let save = |(number, image): (usize, GrayImage)| {
+        let path = directory.join(format!("{number}.png"));
+        image.save(&path).unwrap();
+        path
+    };
+    images.into_iter().enumerate().map(save).collect()
+}
+
+#[test]
+fn pictures_of_anything_but_the_sky_are_not_identified() {
+    let directory = tempfile::tempdir().unwrap();
+    let images = vec![
+        noise(1),
+        noise(2),
+        random_dots(3, 5),
+        random_dots(4, 30),
+        random_dots(5, 200),
+        house(),
+        grid_of_dots(),
+        GrayImage::from_pixel(SIDE, SIDE, Luma([0])),
+        GrayImage::from_pixel(SIDE, SIDE, Luma([255])),
+    ];
+    assert_none_is_identified("process", &saved(directory.path(), images));
+}
+
+#[test]
+fn lists_of_random_positions_are_not_identified() {
+    const LISTS: u64 = 60;
+    let directory = tempfile::tempdir().unwrap();
+    let list = |seed: u64| {
+        let mut random = random(seed);
+        let mut text = "x,y,mag\n".to_owned();
+        for _ in 0..random.random_range(1..80) {
+            let mut draw = |most: f64| random.random_range(0.0..most);
+            writeln!(text, "{},{},{}", draw(1024.0), draw(768.0), draw(6.0)).unwrap();
+        }
+        let path = directory.path().join(format!("{seed}.csv"));
+        fs::write(&path, text).unwrap();
+        path
+    };
+    let lists: Vec<PathBuf> = (0..LISTS).map(list).collect();
+    assert_none_is_identified("identify", &lists);
+}

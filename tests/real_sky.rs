@@ -1,0 +1,146 @@
+//! The real sky: photographs and published lists, against what others found in them.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
+mod common;
+
+use common::{Ran, Truth, fixture, number, shared_dir, starpipe};
+use std::collections::HashMap;
+use std::fs;
+use std::path::Path;
+
+/// The solutions that truth.csv holds agree among themselves to 0.02°.
+const CENTRE_TOLERANCE_DEG: f64 = 0.05;
+const FOV_TOLERANCE: f64 = 0.01;
+const ROLL_TOLERANCE_DEG: f64 = 0.5;
+
+/// A frame drawn without distortion shows where it points to a small part of a pixel (of 1.4 to 1.9′).
+const DRAWN_CENTRE_TOLERANCE_DEG: f64 = 0.003;
+const DRAWN_ROLL_TOLERANCE_DEG: f64 = 0.02;
+const DRAWN_FOV_TOLERANCE: f64 = 5e-4;
+
+/// Rows of a CSV file by column.
+fn rows(path: &Path) -> Vec<HashMap<String, String>> {
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    reader.deserialize().map(Result::unwrap).collect()
+}
+
+#[test]
+fn all_real_frames_are_identified_where_others_found_them() {
+    let Some(shared) = shared_dir() else { return };
+    let rows = rows(&shared.join("frames/truth.csv"));
+    assert_eq!(rows.len(), 11);
+    let frames = rows
+        .iter()
+        .map(|row| shared.join("frames").join(&row["file"]));
+    let ran = Ran::new(
+        starpipe()
+            .args(["process", "--format", "json"])
+            .args(frames),
+    );
+    let mut wrong = Vec::new();
+    for (row, report) in rows.iter().zip(ran.reports()) {
+        let value = |name: &str| row[name].parse::<f64>().unwrap();
+        let truth = Truth {
+            ra_deg: value("ra_deg"),
+            dec_deg: value("dec_deg"),
+            up_pa_deg: value("up_pa_deg"),
+            fov_x_deg: value("fov_x_deg"),
+        };
+        if report["status"] != "identified" {
+            wrong.push(format!("{}: {}", row["file"], report["reason"]));
+            continue;
+        }
+        let (centre_deg, fov, roll_deg) = (
+            truth.centre_error_deg(&report),
+            truth.fov_error(&report),
+            truth.roll_error_deg(&report),
+        );
+        println!(
+            "{}: centre off by {centre_deg:.4}°, field by {:.2} %, roll by {roll_deg:.3}°, {} stars of {}",
+            row["file"],
+            fov * 100.0,
+            number(&report, "/match/matched"),
+            number(&report, "/match/detected"),
+        );
+        let right = centre_deg < CENTRE_TOLERANCE_DEG
+            && fov.abs() < FOV_TOLERANCE
+            && roll_deg.abs() < ROLL_TOLERANCE_DEG
+            && report["optics"]["mirrored"] == false;
+        if !right {
+            wrong.push(format!(
+                "{}: centre {centre_deg}°, field {fov}, roll {roll_deg}°",
+                row["file"]
+            ));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+}
+
+#[test]
+fn all_stars_of_the_published_experiments_are_named_with_and_without_a_scale() {
+    let Some(shared) = shared_dir() else { return };
+    for experiment in ["experiment-1.csv", "experiment-2.csv"] {
+        let list = shared.join("seeds").join(experiment);
+        let published = rows(&list);
+        for hint in [&["--pixel-scale", "10.8"][..], &[]] {
+            let mut command = starpipe();
+            command
+                .args(["identify", "--format", "json"])
+                .args(hint)
+                .arg(&list);
+            let ran = Ran::new(&mut command);
+            assert_eq!(ran.status, 0, "{experiment} {hint:?}: {}", ran.stdout);
+            let reports = ran.reports();
+            let stars = reports[0]["stars"].as_array().unwrap();
+            for row in &published {
+                let value = |name: &str| row[name].parse::<f64>().unwrap();
+                let found = stars
+                    .iter()
+                    .find(|star| star["x"] == value("x_px") && star["y"] == value("y_px"))
+                    .unwrap();
+                let id = found["id"].as_str().map(|id| id.parse::<u32>().unwrap());
+                let expected = row["skymap_number"].parse().ok();
+                assert_eq!(id, expected, "{experiment} {hint:?}: {found}");
+            }
+        }
+    }
+}
+
+#[test]
+fn drawn_frames_point_where_they_were_drawn_to() {
+    for (folder, file) in [("orion", "orion.png"), ("cygnus", "cygnus.tif")] {
+        let provenance = fs::read_to_string(fixture(folder).join("PROVENANCE.toml")).unwrap();
+        let value = |name: &str| -> f64 {
+            let line = provenance
+                .lines()
+                .find_map(|line| line.strip_prefix(&format!("{name} = ")));
+            line.unwrap_or_else(|| panic!("{folder} has no {name}"))
+                .parse()
+                .unwrap()
+        };
+        let truth = Truth {
+            ra_deg: value("ra_deg"),
+            dec_deg: value("dec_deg"),
+            up_pa_deg: value("up_pa_deg"),
+            fov_x_deg: value("fov_x_deg"),
+        };
+        let frame = fixture(folder).join(file);
+        let ran = Ran::new(starpipe().args(["process", "--format", "json"]).arg(frame));
+        let report = &ran.reports()[0];
+        assert_eq!(ran.status, 0, "{}", report["reason"]);
+        let centre_deg = truth.centre_error_deg(report);
+        assert!(
+            centre_deg < DRAWN_CENTRE_TOLERANCE_DEG,
+            "{folder}: {centre_deg}°"
+        );
+        let roll_deg = truth.roll_error_deg(report);
+        assert!(
+            roll_deg.abs() < DRAWN_ROLL_TOLERANCE_DEG,
+            "{folder}: {roll_deg}°"
+        );
+        let fov = truth.fov_error(report);
+        assert!(fov.abs() < DRAWN_FOV_TOLERANCE, "{folder}: {fov}");
+    }
+}
