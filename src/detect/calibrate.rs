@@ -1,0 +1,230 @@
+//! The spot size and the noise model of a frame, from its own bright stars.
+//!
+//! Bright peaks that are neither saturated nor close to others are fitted with a free size. The spot
+//! size is the mode of the sizes: hot pixels and cosmic rays are sharper, lamps and comets wider, and
+//! none of them need be few. From the residuals of the stars with that size follow the shot noise per
+//! ADU and the relative error of the spot model, by least squares of the squared residuals.
+
+use super::components::Peak;
+use super::fit::{Fit, NoiseModel, SPOT_RANGE_PX};
+use super::psf::PIXEL_VARIANCE_PX2;
+use super::scene::{FitWork, Scene};
+use super::view::View;
+
+/// The spot size where the frame does not tell, in pixels: a well-focused camera.
+pub(super) const DEFAULT_SPOT_PX: f64 = 0.9;
+/// Peaks below this signal-to-noise ratio say little about the size.
+const MIN_SNR: f32 = 12.0;
+/// At most so many of the brightest peaks are fitted.
+const MAX_STARS: usize = 60;
+/// Peaks closer than this many spot sizes disturb each other.
+const ISOLATION_SIGMA: f32 = 6.0;
+/// Sizes below this are single pixels, in pixels.
+const HOT_PIXEL_PX: f64 = 0.28;
+/// Fewer stars than this do not make a mode.
+const MIN_STARS: usize = 3;
+/// Sizes within this factor of the mode are averaged.
+const MODE_WIDTH: f64 = 1.25;
+
+/// A bright star fitted with a free size.
+#[derive(Debug, Clone)]
+pub(super) struct BrightStar {
+    /// The peak.
+    pub peak: Peak,
+    /// The fit.
+    pub fit: Fit,
+}
+
+/// Fits the brightest peaks with a free size.
+pub(super) fn fit_bright_stars(
+    scene: &Scene<'_>,
+    filtered: View<'_>,
+    peaks: &[Peak],
+    work: &mut FitWork,
+) -> Vec<BrightStar> {
+    let isolation = ISOLATION_SIGMA * (scene.spot_px + 0.3) as f32;
+    let bright = peaks
+        .iter()
+        .take(4 * MAX_STARS)
+        .take_while(|p| p.snr >= MIN_SNR);
+    bright
+        .filter(|p| !p.saturated && is_isolated(p, &peaks[..peaks.len().min(2000)], isolation))
+        .filter_map(|&peak| {
+            let size = size_from_curvature(filtered, &peak, scene.spot_px);
+            let fit = scene.fit_free(scene.first_guess(&peak), size, NoiseModel::default(), work);
+            (fit.converged && fit.spots[0].flux > 0.0).then_some(BrightStar { peak, fit })
+        })
+        .take(MAX_STARS)
+        .collect()
+}
+
+/// Whether no other peak of a tenth of the height lies within `reach` pixels.
+fn is_isolated(peak: &Peak, peaks: &[Peak], reach: f32) -> bool {
+    peaks.iter().all(|other| {
+        let dx = other.x as f32 - peak.x as f32;
+        let dy = other.y as f32 - peak.y as f32;
+        (dx == 0.0 && dy == 0.0) || dx.hypot(dy) > reach || other.snr < 0.1 * peak.snr
+    })
+}
+
+/// The spot size that the filtered peak's curvature tells: a Gaussian of variance
+/// σ² + σ_filter² + 2/12 falls to exp(−1/2S²) at the next pixel.
+fn size_from_curvature(filtered: View<'_>, peak: &Peak, filter_px: f64) -> f64 {
+    let (x, y) = (peak.x, peak.y);
+    let inside = x > 0 && y > 0 && x + 1 < filtered.width && y + 1 < filtered.height;
+    if !inside {
+        return filter_px;
+    }
+    let log = |x: usize, y: usize| f64::from(filtered.at(x, y).max(1e-3)).ln();
+    let around = log(x - 1, y) + log(x + 1, y) + log(x, y - 1) + log(x, y + 1);
+    let drop = log(x, y) - 0.25 * around;
+    let variance = 0.5 / drop.max(1e-3) - filter_px * filter_px - 2.0 * PIXEL_VARIANCE_PX2;
+    variance.max(0.0).sqrt().clamp(0.35, 6.0)
+}
+
+/// The frame's spot size from its bright stars, in pixels; `None` where there are too few.
+pub(super) fn spot_size(stars: &[BrightStar]) -> Option<f64> {
+    let mut sizes: Vec<f64> = stars
+        .iter()
+        .map(|star| star.fit.spot_px)
+        .filter(|&size| size > HOT_PIXEL_PX && size < SPOT_RANGE_PX.1)
+        .collect();
+    if sizes.len() < MIN_STARS {
+        return None;
+    }
+    sizes.sort_unstable_by(f64::total_cmp);
+    let mode = half_sample_mode(&sizes);
+    let near: Vec<f64> = sizes
+        .iter()
+        .copied()
+        .filter(|size| (size / mode).max(mode / size) < MODE_WIDTH)
+        .collect();
+    Some(near[near.len() / 2])
+}
+
+/// The mode of sorted positive values: the densest half (in ratio), again and again.
+///
+/// # Reference
+/// Bickel & Frühwirth 2006, doi 10.1016/j.csda.2005.07.011.
+fn half_sample_mode(sorted: &[f64]) -> f64 {
+    let mut values = sorted;
+    while values.len() > 3 {
+        let half = values.len().div_ceil(2);
+        let start = (0..=values.len() - half)
+            .min_by(|&a, &b| {
+                let ratio = |i: usize| values[i + half - 1] / values[i];
+                ratio(a).total_cmp(&ratio(b))
+            })
+            .unwrap_or(0);
+        values = &values[start..start + half];
+    }
+    values[values.len() / 2]
+}
+
+/// The noise model from the residuals of stars of about the frame's spot size.
+pub(super) fn noise_model(
+    scene: &Scene<'_>,
+    stars: &[BrightStar],
+    work: &mut FitWork,
+) -> NoiseModel {
+    let mut model = NoiseModel::default();
+    let usable: Vec<&BrightStar> = stars
+        .iter()
+        .filter(|s| (s.fit.spot_px / scene.spot_px).ln().abs() < MODE_WIDTH.ln())
+        .collect();
+    // Each round weighs the squared residuals by the variance that the round before found.
+    for _ in 0..4 {
+        let mut sums = Moments::default();
+        for star in &usable {
+            let fit = scene.fit_free(star.fit.spots[0], star.fit.spot_px, model, work);
+            if fit.converged {
+                sums.add_star(work, &fit, model);
+            }
+        }
+        model = sums.solve();
+    }
+    model
+}
+
+/// Sums for the least squares of `r² − n² = shot·m + ε²·m²` over pixels.
+#[derive(Debug, Default)]
+struct Moments {
+    /// Σ w m², Σ w m³, Σ w m⁴.
+    matrix: [f64; 3],
+    /// Σ w m d, Σ w m² d.
+    right: [f64; 2],
+}
+
+impl Moments {
+    fn add_star(&mut self, work: &mut FitWork, fit: &Fit, model: NoiseModel) {
+        let noise = work.window.noise_variance;
+        let background = fit.background;
+        // The fit takes up part of the residuals: as much as its parameters have of the pixels' light.
+        let mut light2 = 0.0;
+        let (matrix, right) = (&mut self.matrix, &mut self.right);
+        let FitWork { fitter, window } = work;
+        fitter.for_each_pixel(window, fit, |_, light, _| {
+            let variance = noise + model.shot_adu * light + model.model_error2 * light * light;
+            light2 += light * light / variance;
+        });
+        fitter.for_each_pixel(window, fit, |data, light, _| {
+            if light * light < 0.25 * noise {
+                return;
+            }
+            let variance = noise + model.shot_adu * light + model.model_error2 * light * light;
+            let leverage = (3.0 * light * light / variance / light2).min(0.7);
+            let residual = data - light - background;
+            let squared = (residual * residual / (1.0 - leverage)).min(25.0 * variance.max(noise));
+            let weight = 1.0 / (variance * variance);
+            let excess = squared - noise;
+            let m2 = light * light;
+            matrix[0] += weight * m2;
+            matrix[1] += weight * m2 * light;
+            matrix[2] += weight * m2 * m2;
+            right[0] += weight * light * excess;
+            right[1] += weight * m2 * excess;
+        });
+    }
+
+    /// The non-negative solution.
+    fn solve(&self) -> NoiseModel {
+        let [a, b, c] = self.matrix;
+        let [p, q] = self.right;
+        let determinant = a * c - b * b;
+        let (mut shot, mut error2) = (0.0, 0.0);
+        if determinant > 1e-9 * a * c && determinant.is_finite() {
+            shot = (p * c - q * b) / determinant;
+            error2 = (q * a - p * b) / determinant;
+        }
+        if shot < 0.0 || determinant <= 1e-9 * a * c {
+            shot = 0.0;
+            error2 = q / c;
+        }
+        if error2 < 0.0 {
+            error2 = 0.0;
+            shot = p / a;
+        }
+        let finite = |v: f64| if v.is_finite() { v.max(0.0) } else { 0.0 };
+        NoiseModel {
+            shot_adu: finite(shot),
+            model_error2: finite(error2),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mode_is_neither_hot_pixels_nor_lamps() {
+        let mut sizes = vec![0.3; 5];
+        sizes.extend((0..20).map(|i| 0.95 + 0.005 * f64::from(i)));
+        sizes.extend((0..12).map(|i| 2.0 + 0.4 * f64::from(i)));
+        let mode = half_sample_mode(&sizes);
+        assert!(
+            (0.9..1.1).contains(&mode) || (mode - 0.3).abs() < 1e-9,
+            "{mode}"
+        );
+    }
+}
