@@ -14,8 +14,10 @@ const CLIP_SIGMA: f32 = 3.0;
 const CLIPPED_SHRINK: f32 = 0.986_58;
 /// Rounds of clipping; it settles in three or four.
 const MAX_CLIP_ROUNDS: usize = 8;
+/// Changes below this part of the spread end the clipping.
+const SETTLED: f32 = 4e-3;
 /// Samples that start the clipping.
-const START_SAMPLES: usize = 63;
+const START_SAMPLES: usize = 41;
 /// Every how many rows of a cell are sampled.
 const ROW_STRIDE: usize = 4;
 /// Fewer samples than this tell nothing about a cell.
@@ -30,6 +32,8 @@ pub(super) struct MeshConfig {
     pub spread_of_differences: bool,
     /// The least spread that a cell can have.
     pub spread_floor: f32,
+    /// Whether level 0 and spread 1 are a fair start, as for a filtered frame.
+    pub is_normalised: bool,
 }
 
 /// A level and a spread for each cell of a frame.
@@ -249,31 +253,34 @@ impl Scratch {
                     .extend(row[2..].iter().zip(row).map(|(b, a)| b - a));
             }
         }
-        let Some((level, spread)) = clipped_mean_and_spread(&self.values, &mut self.start, config)
-        else {
+        let start = if config.is_normalised {
+            Some((0.0, 1.0))
+        } else {
+            robust_start(&self.values, &mut self.start)
+        };
+        let measured =
+            start.and_then(|at| clipped_mean_and_spread(&self.values, at, config.spread_floor));
+        let Some((level, spread)) = measured else {
             return (f32::NAN, f32::NAN);
         };
         if self.differences.len() < MIN_CELL_SAMPLES {
             return (level, spread);
         }
         let root2 = std::f32::consts::SQRT_2;
-        match clipped_mean_and_spread(&self.differences, &mut self.start, config) {
+        let floor = config.spread_floor * root2;
+        match clipped_mean_and_spread(&self.differences, (0.0, spread * root2), floor) {
             Some((_, of_differences)) => (level, of_differences / root2),
             None => (level, spread),
         }
     }
 }
 
-/// Mean and standard deviation of `values` without outliers; `None` for too few values. NaN is left out.
-fn clipped_mean_and_spread(
-    values: &[f32],
-    start: &mut Vec<f32>,
-    config: &MeshConfig,
-) -> Option<(f32, f32)> {
+/// Median, and its distance to the lower quantile, of a few of `values`; `None` for too few.
+fn robust_start(values: &[f32], start: &mut Vec<f32>) -> Option<(f32, f32)> {
     start.clear();
-    let stride = (values.len() / START_SAMPLES).max(1);
     // An odd stride does not beat with the rows of the cell.
-    start.extend(values.iter().step_by(stride | 1).filter(|v| !v.is_nan()));
+    let stride = (values.len() / START_SAMPLES).max(1) | 1;
+    start.extend(values.iter().step_by(stride).filter(|v| !v.is_nan()));
     if start.len() < MIN_CELL_SAMPLES {
         start.clear();
         start.extend(values.iter().filter(|v| !v.is_nan()));
@@ -283,27 +290,30 @@ fn clipped_mean_and_spread(
     }
     start.sort_unstable_by(f32::total_cmp);
     let quantile = |q: f32| start[(q * (start.len() - 1) as f32).round() as usize];
-    let mut level = quantile(0.5);
+    let level = quantile(0.5);
     let below = level - quantile(0.159);
     let above = quantile(0.841) - level;
     // Clipped at zero, nothing lies below the median.
-    let mut spread = if below > 0.0 { below } else { above };
-    spread = spread.max(config.spread_floor);
-    for _ in 0..MAX_CLIP_ROUNDS {
+    Some((level, if below > 0.0 { below } else { above }))
+}
+
+/// Mean and standard deviation of `values` without outliers, from a first guess of both; `None` for
+/// too few values. NaN is left out.
+fn clipped_mean_and_spread(values: &[f32], start: (f32, f32), floor: f32) -> Option<(f32, f32)> {
+    let (mut level, mut spread) = (start.0, start.1.max(floor));
+    for round in 0..MAX_CLIP_ROUNDS {
         let [count, sum, squares] = clipped_moments(values, level, CLIP_SIGMA * spread);
         if count < MIN_CELL_SAMPLES as f32 {
-            break;
+            return (round > 0).then_some((level, spread));
         }
         let mean = sum / count;
         let variance = (squares / count - mean * mean).max(0.0);
         let new_spread = variance.sqrt() / CLIPPED_SHRINK;
-        let settled = (new_spread - spread).abs() <= 2e-3 * spread && mean.abs() <= 2e-3 * spread;
+        let settled =
+            (new_spread - spread).abs() <= SETTLED * spread && mean.abs() <= SETTLED * spread;
         level += mean;
-        if new_spread <= config.spread_floor {
-            return Some((level, config.spread_floor));
-        }
-        spread = new_spread;
-        if settled {
+        spread = new_spread.max(floor);
+        if settled || new_spread <= floor {
             break;
         }
     }
@@ -353,6 +363,7 @@ mod tests {
         cell_px: 64,
         spread_of_differences: true,
         spread_floor: 1e-6,
+        is_normalised: false,
     };
 
     fn noise_frame(side: usize, sigma: f32, level: impl Fn(usize, usize) -> f32) -> Vec<f32> {

@@ -6,7 +6,7 @@
 //! ADU and the relative error of the spot model, by least squares of the squared residuals.
 
 use super::components::Peak;
-use super::fit::{Fit, NoiseModel, SPOT_RANGE_PX};
+use super::fit::{Fit, FitConfig, NoiseModel, SPOT_RANGE_PX, window_radius};
 use super::psf::PIXEL_VARIANCE_PX2;
 use super::scene::{FitWork, Scene};
 use super::view::View;
@@ -16,21 +16,23 @@ pub(super) const DEFAULT_SPOT_PX: f64 = 0.9;
 /// Peaks below this signal-to-noise ratio say little about the size.
 const MIN_SNR: f32 = 12.0;
 /// At most so many of the brightest peaks are fitted.
-const MAX_STARS: usize = 60;
+const MAX_STARS: usize = 40;
 /// Peaks closer than this many spot sizes disturb each other.
 const ISOLATION_SIGMA: f32 = 6.0;
 /// Sizes below this are single pixels, in pixels.
 const HOT_PIXEL_PX: f64 = 0.28;
 /// Fewer stars than this do not make a mode.
 const MIN_STARS: usize = 3;
+/// Rounds of the noise model's least squares.
+const NOISE_ROUNDS: usize = 3;
+/// The spot model cannot be worse than this, as a part of the light in a pixel: what is, is no star.
+const MAX_MODEL_ERROR: f64 = 0.1;
 /// Sizes within this factor of the mode are averaged.
 const MODE_WIDTH: f64 = 1.25;
 
 /// A bright star fitted with a free size.
 #[derive(Debug, Clone)]
 pub(super) struct BrightStar {
-    /// The peak.
-    pub peak: Peak,
     /// The fit.
     pub fit: Fit,
 }
@@ -52,7 +54,7 @@ pub(super) fn fit_bright_stars(
         .filter_map(|&peak| {
             let size = size_from_curvature(filtered, &peak, scene.spot_px);
             let fit = scene.fit_free(scene.first_guess(&peak), size, NoiseModel::default(), work);
-            (fit.converged && fit.spots[0].flux > 0.0).then_some(BrightStar { peak, fit })
+            (fit.converged && fit.spots[0].flux > 0.0).then_some(BrightStar { fit })
         })
         .take(MAX_STARS)
         .collect()
@@ -133,15 +135,23 @@ pub(super) fn noise_model(
         .filter(|s| (s.fit.spot_px / scene.spot_px).ln().abs() < MODE_WIDTH.ln())
         .collect();
     // Each round weighs the squared residuals by the variance that the round before found.
-    for _ in 0..4 {
+    for _ in 0..NOISE_ROUNDS {
         let mut sums = Moments::default();
         for star in &usable {
-            let fit = scene.fit_free(star.fit.spots[0], star.fit.spot_px, model, work);
+            let radius = window_radius(star.fit.spot_px);
+            scene.cut(&star.fit.spots, radius, &mut work.window);
+            let config = FitConfig {
+                spot_px: star.fit.spot_px,
+                free_spot: true,
+                noise: model,
+            };
+            let fit = work.fitter.fit(&work.window, &star.fit.spots, &config);
             if fit.converged {
                 sums.add_star(work, &fit, model);
             }
         }
         model = sums.solve();
+        model.model_error2 = model.model_error2.min(MAX_MODEL_ERROR * MAX_MODEL_ERROR);
     }
     model
 }

@@ -90,6 +90,10 @@ pub(super) struct Fit {
     pub spot_px: f64,
     /// Its standard error where it was free, in pixels; else 0.
     pub sigma_spot_px: f64,
+    /// How much larger the spot would be if its size were free (one linear step), in pixels.
+    pub size_excess_px: f64,
+    /// Standard error of that, in pixels.
+    pub size_error_px: f64,
     /// Sum of squared deviations over the variance.
     pub chi2: f64,
     /// Pixels fitted less parameters.
@@ -156,21 +160,31 @@ impl Fitter {
         fit
     }
 
-    /// Standard errors and chi² at the solution.
+    /// Standard errors, chi² and the size's excess at the solution.
     fn finish(&mut self, window: &Window, fit: &mut Fit, config: &FitConfig) {
-        let count = parameter_count(fit.spots.len(), config);
-        let mut normal = self.linearise(window, fit, config);
+        let with_size = FitConfig {
+            free_spot: true,
+            ..*config
+        };
+        let count = parameter_count(fit.spots.len(), &with_size);
+        let mut normal = self.linearise(window, fit, &with_size);
         fit.chi2 = normal.chi2;
-        fit.degrees = normal.pixels as f64 - count as f64 + 1.0;
-        let covariance = invert_diagonal(&mut normal, count);
-        let error = |i: usize| covariance.map_or(f64::INFINITY, |diagonal| diagonal[i].sqrt());
-        for (i, spot) in fit.spots.iter_mut().enumerate() {
-            spot.sigma_x = error(3 * i);
-            spot.sigma_y = error(3 * i + 1);
-            spot.sigma_flux = error(3 * i + 2);
-        }
-        if config.free_spot {
-            fit.sigma_spot_px = error(3 * fit.spots.len() + 1);
+        fit.degrees = (normal.pixels + 2 - count) as f64;
+        let fitted = if config.free_spot { count } else { count - 1 };
+        // The size comes last: the leading block of the factor is that of a fit without it.
+        if let Some(change) = solve(&mut normal, count) {
+            fit.size_excess_px = change[count - 1];
+            fit.size_error_px = 1.0 / normal.matrix[count - 1][count - 1];
+            set_errors(fit, &inverse_diagonal(&normal.matrix, fitted));
+        } else {
+            let mut fixed = self.linearise(window, fit, config);
+            let known = fixed.pixels > 0 && factorise(&mut fixed.matrix, fitted);
+            let variances = if known {
+                inverse_diagonal(&fixed.matrix, fitted)
+            } else {
+                [f64::INFINITY; MAX_PARAMETERS]
+            };
+            set_errors(fit, &variances);
         }
     }
 
@@ -279,8 +293,28 @@ impl Fitter {
 }
 
 impl Normal {
-    /// Adds one pixel; only the lower triangle is kept.
+    /// Adds one pixel; the commonest numbers of parameters have code of their own.
     #[inline]
+    fn add_any(
+        &mut self,
+        gradient: &[f64; MAX_PARAMETERS],
+        count: usize,
+        residual: f64,
+        weight: f64,
+    ) {
+        match (
+            count,
+            gradient.first_chunk::<4>(),
+            gradient.first_chunk::<5>(),
+        ) {
+            (4, Some(four), _) => self.add(four, residual, weight),
+            (5, _, Some(five)) => self.add(five, residual, weight),
+            _ => self.add(&gradient[..count], residual, weight),
+        }
+    }
+
+    /// Adds one pixel; only the lower triangle is kept.
+    #[inline(always)]
     fn add(&mut self, gradient: &[f64], residual: f64, weight: f64) {
         for (i, &g) in gradient.iter().enumerate() {
             let weighted = g * weight;
@@ -360,12 +394,11 @@ fn solve(normal: &mut Normal, count: usize) -> Option<[f64; MAX_PARAMETERS]> {
     Some(x)
 }
 
-/// The diagonal of the inverse of the normal matrix: the variances of the parameters.
-fn invert_diagonal(normal: &mut Normal, count: usize) -> Option<[f64; MAX_PARAMETERS]> {
-    if !factorise(&mut normal.matrix, count) {
-        return None;
-    }
-    let l = &normal.matrix;
+/// The diagonal of the inverse of the matrix whose Cholesky factor is given: the variances.
+fn inverse_diagonal(
+    l: &[[f64; MAX_PARAMETERS]; MAX_PARAMETERS],
+    count: usize,
+) -> [f64; MAX_PARAMETERS] {
     let mut variances = [0.0; MAX_PARAMETERS];
     // Column by column: L⁻¹, whose squared columns sum to the diagonal of (L Lᵀ)⁻¹.
     for column in 0..count {
@@ -377,7 +410,17 @@ fn invert_diagonal(normal: &mut Normal, count: usize) -> Option<[f64; MAX_PARAME
             variances[column] += x[i] * x[i];
         }
     }
-    Some(variances)
+    variances
+}
+
+/// Standard errors from the variances of x, y, flux of each spot, the background, and the size.
+fn set_errors(fit: &mut Fit, variances: &[f64; MAX_PARAMETERS]) {
+    for (i, spot) in fit.spots.iter_mut().enumerate() {
+        spot.sigma_x = variances[3 * i].sqrt();
+        spot.sigma_y = variances[3 * i + 1].sqrt();
+        spot.sigma_flux = variances[3 * i + 2].sqrt();
+    }
+    fit.sigma_spot_px = variances[3 * fit.spots.len() + 1].sqrt();
 }
 
 /// The half side of a window for a spot, in pixels: three standard deviations.

@@ -243,6 +243,7 @@ mod tests {
             cell_px: 64,
             spread_of_differences: false,
             spread_floor: 1.0,
+            is_normalised: false,
         };
         mesh.measure(&View::new(&pixels, side, side), &config);
         pixels[y * side + x] = 1.0;

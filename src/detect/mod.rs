@@ -253,6 +253,7 @@ pub fn detect(
             cell_px: config.cell_px,
             spread_of_differences: true,
             spread_floor: noise_floor.max(least_noise(&view)),
+            is_normalised: false,
         },
     );
     let saturation_adu = frame.saturation_adu.unwrap_or(f32::INFINITY);
@@ -344,6 +345,7 @@ fn search(
             cell_px: config.cell_px,
             spread_of_differences: false,
             spread_floor: FILTERED_NOISE_FLOOR,
+            is_normalised: true,
         },
     );
     calibration.threshold = config.threshold_sigma.unwrap_or_else(|| {
