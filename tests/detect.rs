@@ -68,7 +68,11 @@ impl Sky {
             .mean
             .iter()
             .map(|&mean| {
-                let photons: f64 = if mean > 0.0 { Poisson::new(mean).unwrap().sample(&mut rng) } else { 0.0 };
+                let photons: f64 = if mean > 0.0 {
+                    Poisson::new(mean).unwrap().sample(&mut rng)
+                } else {
+                    0.0
+                };
                 let read: f64 = rng.sample(StandardNormal);
                 (photons + READ_NOISE_E * read) as f32
             })
@@ -80,7 +84,9 @@ impl Sky {
 fn white_noise(width: usize, height: usize, sigma: f32, seed: u64) -> Frame {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let normal = Normal::new(1000.0f32, sigma).unwrap();
-    let pixels = (0..width * height).map(|_| normal.sample(&mut rng)).collect();
+    let pixels = (0..width * height)
+        .map(|_| normal.sample(&mut rng))
+        .collect();
     Frame::new(width, height, pixels).unwrap()
 }
 
@@ -114,7 +120,10 @@ fn false_alarm_rate(spot: f64, wanted: f64, frames: u64) -> f64 {
     let count: usize = (0..frames)
         .map(|seed| {
             let frame = white_noise(1024, 1024, 7.0, 1000 + seed);
-            detect(&frame, &config, &mut workspace).unwrap().sources.len()
+            detect(&frame, &config, &mut workspace)
+                .unwrap()
+                .sources
+                .len()
         })
         .sum();
     count as f64 / (frames as f64 * 1.048_576)
@@ -129,12 +138,18 @@ fn the_false_alarm_rate_is_the_one_asked_for() {
     for spot in [0.7, 1.0, 1.5] {
         let rate = false_alarm_rate(spot, 10.0, 10);
         println!("spot {spot}: wanted 10, had {rate:.2} per Mpx");
-        assert!((10.0 / FALSE_ALARM_FACTOR..10.0 * FALSE_ALARM_FACTOR).contains(&rate), "{rate}");
+        assert!(
+            (10.0 / FALSE_ALARM_FACTOR..10.0 * FALSE_ALARM_FACTOR).contains(&rate),
+            "{rate}"
+        );
     }
     // 30 expected: a Poisson error of 18 %.
     let rate = false_alarm_rate(1.0, 1.0, 29);
     println!("spot 1: wanted 1, had {rate:.2} per Mpx");
-    assert!((1.0 / FALSE_ALARM_FACTOR..FALSE_ALARM_FACTOR).contains(&rate), "{rate}");
+    assert!(
+        (1.0 / FALSE_ALARM_FACTOR..FALSE_ALARM_FACTOR).contains(&rate),
+        "{rate}"
+    );
 }
 
 #[test]
@@ -156,9 +171,16 @@ fn false_alarm_rates_of_other_noise() {
         let config = config_with(spot, 10.0);
         // Narrow frames: nearly all is border.
         let count: usize = (0..600)
-            .map(|seed| found_in(&white_noise(1024, 8, 7.0, seed), &config).sources.len())
+            .map(|seed| {
+                found_in(&white_noise(1024, 8, 7.0, seed), &config)
+                    .sources
+                    .len()
+            })
             .sum();
-        println!("spot {spot}, 1024x8: wanted 10, had {:.2} per Mpx", count as f64 / (600.0 * 0.008_192));
+        println!(
+            "spot {spot}, 1024x8: wanted 10, had {:.2} per Mpx",
+            count as f64 / (600.0 * 0.008_192)
+        );
         for background in [30.0, 100.0, 1000.0] {
             let count: usize = (0..8)
                 .map(|seed| {
@@ -166,17 +188,26 @@ fn false_alarm_rates_of_other_noise() {
                     found_in(&sky.expose(seed), &config).sources.len()
                 })
                 .sum();
-            println!("spot {spot}, {background} photons: wanted 10, had {:.2} per Mpx", count as f64 / 8.4);
+            println!(
+                "spot {spot}, {background} photons: wanted 10, had {:.2} per Mpx",
+                count as f64 / 8.4
+            );
         }
         for sigma in [0.2, 0.4, 0.7, 2.0] {
             let mut count = 0;
             for seed in 0..8 {
                 let mut frame = white_noise(1024, 1024, sigma, seed);
-                frame.pixels.iter_mut().for_each(|p| *p = (*p + 0.3).round());
+                frame
+                    .pixels
+                    .iter_mut()
+                    .for_each(|p| *p = (*p + 0.3).round());
                 let frame = frame.with_levels(1.0, Some(65535.0));
                 count += found_in(&frame, &config).sources.len();
             }
-            println!("spot {spot}, noise {sigma} steps: wanted 10, had {:.2} per Mpx", count as f64 / 8.4);
+            println!(
+                "spot {spot}, noise {sigma} steps: wanted 10, had {:.2} per Mpx",
+                count as f64 / 8.4
+            );
         }
     }
 }
@@ -191,7 +222,8 @@ fn cramer_rao_px(x: f64, y: f64, flux: f64, sigma: f64) -> f64 {
                     * pixel_part(f64::from(row), y - y.round(), sigma)
             };
             let slope = flux * (light(step) - light(-step)) / (2.0 * step);
-            information += slope * slope / (BACKGROUND_E + READ_NOISE_E.powi(2) + flux * light(0.0));
+            information +=
+                slope * slope / (BACKGROUND_E + READ_NOISE_E.powi(2) + flux * light(0.0));
         }
     }
     information.powf(-0.5)
@@ -202,12 +234,17 @@ struct Accuracy {
     rms_over_bound: f64,
     pull_rms: f64,
     found: f64,
+    spot_px: f64,
 }
 
 /// The flux that gives a matched-filter signal-to-noise ratio, averaged over phases.
 fn flux_for(snr: f64, spot: f64) -> f64 {
     // Neff, phase mean (limits.md, section 2); 4π(s² + 1/12) from 0.7 px on.
-    let effective_px = if spot < 0.6 { 4.25 } else { 4.0 * std::f64::consts::PI * (spot * spot + 1.0 / 12.0) };
+    let effective_px = if spot < 0.6 {
+        4.25
+    } else {
+        4.0 * std::f64::consts::PI * (spot * spot + 1.0 / 12.0)
+    };
     snr * (BACKGROUND_E + READ_NOISE_E.powi(2)).sqrt() * effective_px.sqrt()
 }
 
@@ -216,6 +253,7 @@ fn accuracy(spot: f64, snr: f64, frames: u64, config: &DetectConfig) -> Accuracy
     const SPACING: usize = 27;
     let flux = flux_for(snr, spot);
     let (mut errors, mut bounds, mut pulls, mut count, mut stars) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    let mut spot_sum = 0.0;
     for seed in 0..frames {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut sky = Sky::flat(SIDE, SIDE, BACKGROUND_E);
@@ -228,12 +266,16 @@ fn accuracy(spot: f64, snr: f64, frames: u64, config: &DetectConfig) -> Accuracy
             truth.push((x, y));
         }
         let found = found_in(&sky.expose(seed + 77), config);
+        spot_sum += found.spot_sigma_px;
         for &(x, y) in &truth {
             stars += 1.0;
-            let Some(star) = nearest(&found, x, y, 1.5) else { continue };
+            let Some(star) = nearest(&found, x, y, 1.5) else {
+                continue;
+            };
             count += 1.0;
             errors += (star.position.x - x).powi(2) + (star.position.y - y).powi(2);
-            bounds += cramer_rao_px(x, y, flux, spot).powi(2) + cramer_rao_px(y, x, flux, spot).powi(2);
+            bounds +=
+                cramer_rao_px(x, y, flux, spot).powi(2) + cramer_rao_px(y, x, flux, spot).powi(2);
             pulls += ((star.position.x - x) / star.sigma_x_px).powi(2)
                 + ((star.position.y - y) / star.sigma_y_px).powi(2);
         }
@@ -242,6 +284,7 @@ fn accuracy(spot: f64, snr: f64, frames: u64, config: &DetectConfig) -> Accuracy
         rms_over_bound: (errors / bounds).sqrt(),
         pull_rms: (pulls / (2.0 * count)).sqrt(),
         found: count / stars,
+        spot_px: spot_sum / frames as f64,
     }
 }
 
@@ -252,18 +295,24 @@ const PULL_TOLERANCE: f64 = 0.1;
 
 #[test]
 fn the_fit_reaches_the_cramer_rao_bound_with_honest_errors() {
+    let mut failures = Vec::new();
     // 2 x 484 x 6 errors a case: the RMS is known to 0.9 %.
     for spot in [0.5, 0.7, 1.0, 1.5] {
         for snr in [12.0, 40.0, 200.0] {
             let config = DetectConfig::default();
             let a = accuracy(spot, snr, 6, &config);
             println!(
-                "spot {spot} snr {snr}: RMS/CRLB {:.3}, pulls {:.3}, found {:.3}",
-                a.rms_over_bound, a.pull_rms, a.found
+                "spot {spot} snr {snr}: RMS/CRLB {:.3}, pulls {:.3}, found {:.3}, spot {:.3}",
+                a.rms_over_bound, a.pull_rms, a.found, a.spot_px
             );
-            assert!(a.rms_over_bound < MAX_RMS_OVER_BOUND, "spot {spot} snr {snr}: {}", a.rms_over_bound);
-            assert!((a.pull_rms - 1.0).abs() < PULL_TOLERANCE, "spot {spot} snr {snr}: {}", a.pull_rms);
+            if a.rms_over_bound > MAX_RMS_OVER_BOUND || (a.pull_rms - 1.0).abs() > PULL_TOLERANCE {
+                failures.push(format!(
+                    "spot {spot} snr {snr}: {:.3} {:.3}",
+                    a.rms_over_bound, a.pull_rms
+                ));
+            }
             assert!(a.found > 0.99);
         }
     }
+    assert!(failures.is_empty(), "{failures:?}");
 }

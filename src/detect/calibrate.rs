@@ -23,12 +23,18 @@ const ISOLATION_SIGMA: f32 = 6.0;
 const HOT_PIXEL_PX: f64 = 0.28;
 /// Fewer stars than this do not make a mode.
 const MIN_STARS: usize = 3;
+/// A pixel whose noise the fit takes up beyond this part tells nothing of it.
+const MAX_LEVERAGE: f64 = 0.9;
+/// Residuals count at most this many variances; the first rounds, with a variance too low, need room.
+const MAX_SQUARED_SIGMA: f64 = 36.0;
 /// Rounds of the noise model's least squares.
 const NOISE_ROUNDS: usize = 3;
 /// The spot model cannot be worse than this, as a part of the light in a pixel: what is, is no star.
 const MAX_MODEL_ERROR: f64 = 0.1;
 /// Sizes within this factor of the mode are averaged.
 const MODE_WIDTH: f64 = 1.25;
+/// Rounds of averaging around the mode.
+const MODE_ROUNDS: usize = 4;
 
 /// A bright star fitted with a free size.
 #[derive(Debug, Clone)]
@@ -95,13 +101,17 @@ pub(super) fn spot_size(stars: &[BrightStar]) -> Option<f64> {
         return None;
     }
     sizes.sort_unstable_by(f64::total_cmp);
-    let mode = half_sample_mode(&sizes);
-    let near: Vec<f64> = sizes
-        .iter()
-        .copied()
-        .filter(|size| (size / mode).max(mode / size) < MODE_WIDTH)
-        .collect();
-    Some(near[near.len() / 2])
+    let mut center = half_sample_mode(&sizes);
+    // The mode is robust but rough: move to the mean of what lies around it.
+    for _ in 0..MODE_ROUNDS {
+        let near = |size: &&f64| (**size / center).max(center / **size) < MODE_WIDTH;
+        let (sum, count) = sizes
+            .iter()
+            .filter(near)
+            .fold((0.0, 0.0), |(s, n), size| (s + size, n + 1.0));
+        center = sum / count;
+    }
+    Some(center)
 }
 
 /// The mode of sorted positive values: the densest half (in ratio), again and again.
@@ -147,7 +157,7 @@ pub(super) fn noise_model(
             };
             let fit = work.fitter.fit(&work.window, &star.fit.spots, &config);
             if fit.converged {
-                sums.add_star(work, &fit, model);
+                sums.add_star(work, &fit, &config);
             }
         }
         model = sums.solve();
@@ -166,33 +176,25 @@ struct Moments {
 }
 
 impl Moments {
-    fn add_star(&mut self, work: &mut FitWork, fit: &Fit, model: NoiseModel) {
+    /// Adds the pixels of one star that its light stands out in.
+    fn add_star(&mut self, work: &mut FitWork, fit: &Fit, config: &FitConfig) {
         let noise = work.window.noise_variance;
-        let background = fit.background;
-        // The fit takes up part of the residuals: as much as its parameters have of the pixels' light.
-        let mut light2 = 0.0;
-        let (matrix, right) = (&mut self.matrix, &mut self.right);
+        let model = config.noise;
         let FitWork { fitter, window } = work;
-        fitter.for_each_pixel(window, fit, |_, light, _| {
-            let variance = noise + model.shot_adu * light + model.model_error2 * light * light;
-            light2 += light * light / variance;
-        });
-        fitter.for_each_pixel(window, fit, |data, light, _| {
-            if light * light < 0.25 * noise {
+        fitter.for_each_residual(window, fit, config, |residual, light, leverage| {
+            let m2 = light * light;
+            if light < 0.0 || m2 < 0.25 * noise || leverage > MAX_LEVERAGE {
                 return;
             }
-            let variance = noise + model.shot_adu * light + model.model_error2 * light * light;
-            let leverage = (3.0 * light * light / variance / light2).min(0.7);
-            let residual = data - light - background;
-            let squared = (residual * residual / (1.0 - leverage)).min(25.0 * variance.max(noise));
+            let variance = noise + model.shot_adu * light + model.model_error2 * m2;
+            let squared =
+                (residual * residual / (1.0 - leverage)).min(MAX_SQUARED_SIGMA * variance);
             let weight = 1.0 / (variance * variance);
-            let excess = squared - noise;
-            let m2 = light * light;
-            matrix[0] += weight * m2;
-            matrix[1] += weight * m2 * light;
-            matrix[2] += weight * m2 * m2;
-            right[0] += weight * light * excess;
-            right[1] += weight * m2 * excess;
+            self.matrix[0] += weight * m2;
+            self.matrix[1] += weight * m2 * light;
+            self.matrix[2] += weight * m2 * m2;
+            self.right[0] += weight * light * (squared - noise);
+            self.right[1] += weight * m2 * (squared - noise);
         });
     }
 

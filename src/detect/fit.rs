@@ -229,6 +229,33 @@ impl Fitter {
         }
     }
 
+    /// Calls `visit(residual, light, leverage)` for each pixel with a value, at the solution `fit` of a
+    /// fit with `config`; the leverage is the part of a pixel's noise that the parameters take up.
+    pub fn for_each_residual(
+        &mut self,
+        window: &Window,
+        fit: &Fit,
+        config: &FitConfig,
+        mut visit: impl FnMut(f64, f64, f64),
+    ) {
+        let mut normal = self.linearise(window, fit, config);
+        let count = parameter_count(fit.spots.len(), config);
+        if !factorise(&mut normal.matrix, count) {
+            return;
+        }
+        let factor = normal.matrix;
+        self.for_each_gradient(window, fit, config, |gradient, residual, light, weight| {
+            let mut x = [0.0; MAX_PARAMETERS];
+            let mut leverage = 0.0;
+            for i in 0..count {
+                let dot: f64 = (0..i).map(|k| factor[i][k] * x[k]).sum();
+                x[i] = (gradient[i] - dot) / factor[i][i];
+                leverage += x[i] * x[i] * weight;
+            }
+            visit(residual, light, leverage);
+        });
+    }
+
     /// Takes the light of the spots in `fit` out of the window.
     pub fn subtract(&mut self, window: &mut Window, fit: &Fit) {
         self.fill_profiles(window, fit);
@@ -239,18 +266,40 @@ impl Fitter {
         }
     }
 
+    /// The normal equations at `fit`.
     fn linearise(&mut self, window: &Window, fit: &Fit, config: &FitConfig) -> Normal {
-        self.fill_profiles(window, fit);
-        let spots = fit.spots.len();
-        let count = parameter_count(spots, config);
+        let count = parameter_count(fit.spots.len(), config);
         let mut normal = Normal {
             matrix: [[0.0; MAX_PARAMETERS]; MAX_PARAMETERS],
             right: [0.0; MAX_PARAMETERS],
             chi2: 0.0,
             pixels: 0,
         };
+        self.for_each_gradient(window, fit, config, |gradient, residual, _, weight| {
+            normal.add_any(gradient, count, residual, weight);
+        });
+        let b = 3 * fit.spots.len();
+        let weight = 1.0 / (window.background_error * window.background_error);
+        normal.matrix[b][b] += weight;
+        normal.right[b] -= weight * fit.background;
+        normal.chi2 += weight * fit.background * fit.background;
+        normal
+    }
+
+    /// Calls `visit(gradient, residual, light, weight)` for each pixel with a value.
+    #[inline]
+    fn for_each_gradient(
+        &mut self,
+        window: &Window,
+        fit: &Fit,
+        config: &FitConfig,
+        mut visit: impl FnMut(&[f64; MAX_PARAMETERS], f64, f64, f64),
+    ) {
+        self.fill_profiles(window, fit);
+        let spots = fit.spots.len();
         let mut gradient = [0.0; MAX_PARAMETERS];
         gradient[3 * spots] = 1.0;
+        let noise = config.noise;
         for row in 0..window.height {
             for column in 0..window.width {
                 let data = window.data[row * window.width + column];
@@ -274,21 +323,16 @@ impl Fitter {
                 }
                 let positive = light.max(0.0);
                 let variance = window.noise_variance
-                    + config.noise.shot_adu * positive
-                    + config.noise.model_error2 * positive * positive;
-                normal.add(
-                    &gradient[..count],
+                    + noise.shot_adu * positive
+                    + noise.model_error2 * positive * positive;
+                visit(
+                    &gradient,
                     data - light - fit.background,
+                    light,
                     1.0 / variance,
                 );
             }
         }
-        let b = 3 * spots;
-        let weight = 1.0 / (window.background_error * window.background_error);
-        normal.matrix[b][b] += weight;
-        normal.right[b] -= weight * fit.background;
-        normal.chi2 += weight * fit.background * fit.background;
-        normal
     }
 }
 
