@@ -146,9 +146,9 @@ fn sky<'a>(catalog: &'a Catalog, resources: &ResourceArgs) -> Sky<'a> {
     let progress = bar(100, "indexing the catalogue {wide_bar} {percent} %");
     let show = |part: f64| progress.set_position((part * 100.0) as u64);
     let Some(directory) = cache::directory(resources.cache_dir.clone()) else {
-        return Sky::build(catalog.stars(), &show);
+        return Sky::build(catalog, &show);
     };
-    let (sky, troubles) = Sky::open(catalog.stars(), catalog.checksum(), &directory, &show);
+    let (sky, troubles) = Sky::open(catalog, &directory, &show);
     progress.finish_and_clear();
     for trouble in troubles {
         warn(chained(&trouble.into()));

@@ -12,6 +12,9 @@ pub use cache::CacheError;
 pub use search::LOG10_FALSE_ALARM_LIMIT;
 pub use sky::Sky;
 
+use refine::{Refined, Start, refine};
+use search::{Found, Search};
+
 use crate::camera::{CameraModel, DistortionModel};
 use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 
@@ -142,12 +145,9 @@ pub fn identify(field: &StarField, hints: &Hints, sky: &Sky) -> Outcome {
             needed: MIN_STARS,
         });
     }
-    let mut search = search::Search::new(field, hints, sky);
-    let identified = search
-        .run()
-        .and_then(|found| complete(field, sky, &search, &found));
-    match identified {
-        Some(identification) => Outcome::Identified(Box::new(identification)),
+    let mut search = Search::new(field, hints, sky);
+    match search.run() {
+        Some(found) => Outcome::Identified(Box::new(complete(field, sky, &search, found))),
         None => Outcome::NotIdentified(Reason::NoMatch {
             best_log10_false_alarm: search.best_log10_false_alarm(),
         }),
@@ -155,24 +155,28 @@ pub fn identify(field: &StarField, hints: &Hints, sky: &Sky) -> Outcome {
 }
 
 /// The final fit, with all stars and as much distortion as they support.
-fn complete(
-    field: &StarField,
-    sky: &Sky,
-    search: &search::Search,
-    found: &search::Found,
-) -> Option<Identification> {
-    let richest = Some(DistortionModel::Quintic);
-    let start = refine::Start {
-        hypothesis: &found.hypothesis,
+fn complete(field: &StarField, sky: &Sky, search: &Search, found: Found) -> Identification {
+    let start = Start {
+        hypothesis: &found.refined.hypothesis,
         radius_px: FINAL_RADIUS_SHARE * field.width_px.hypot(field.height_px),
+        fewest: 0,
     };
-    let refined = refine::refine(field, usize::MAX, sky, &start, richest)?;
-    let log10_false_alarm = search
-        .log10_false_alarm(&refined.hypothesis)?
-        .min(found.log10_false_alarm);
+    let richest = Some(DistortionModel::Quintic);
+    let with_all = refine(field, usize::MAX, sky, &start, richest)
+        .map(|refined| (search.log10_false_alarm(&refined.hypothesis), refined));
+    // All the stars can only make it surer; where they do not, the search's own answer stands.
+    match with_all {
+        Some((Some(log10), refined)) if log10 <= LOG10_FALSE_ALARM_LIMIT => {
+            identification(refined, log10)
+        }
+        _ => identification(found.refined, found.log10_false_alarm),
+    }
+}
+
+fn identification(refined: Refined, log10_false_alarm: f64) -> Identification {
     let covariance = &refined.fit.covariance;
     let sum_sq: f64 = refined.matches.iter().map(|m| m.residual_px.powi(2)).sum();
-    Some(Identification {
+    Identification {
         attitude_sigma_rad: std::array::from_fn(|axis| covariance[(axis, axis)].sqrt()),
         focal_length_sigma_px: covariance[(3, 3)].sqrt() * refined.fit.camera.focal_length_px,
         camera: refined.fit.camera,
@@ -180,7 +184,7 @@ fn complete(
         rms_px: (sum_sq / refined.matches.len().max(1) as f64).sqrt(),
         matches: refined.matches,
         log10_false_alarm,
-    })
+    }
 }
 
 /// Where the final fit starts to look for pairs, in units of the frame's diagonal.

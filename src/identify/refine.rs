@@ -19,8 +19,6 @@ const EQUATIONS_PER_PARAMETER: f64 = 2.5;
 const WORTH_IT: f64 = 0.9;
 /// Rounds of pairing and fitting at the most.
 const MAX_ROUNDS: usize = 8;
-/// The share of the observed stars, or of the predicted where they are fewer, that must agree from the start.
-const MIN_AGREEING: f64 = 0.2;
 
 /// A fitted hypothesis and what agrees with it.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,8 +48,7 @@ pub fn refine(
     let hypothesis = start.hypothesis;
     let mut predicted = hypothesis.predict(sky, observed, field.photometry);
     let matches = hypothesis.pair_up(observed, &predicted, field.photometry, start.radius_px);
-    let fewest = MIN_AGREEING * observed.len().min(predicted.len()) as f64;
-    if (matches.len() as f64) < fewest {
+    if matches.len() < start.fewest {
         return None;
     }
     let mut model = hypothesis.camera.distortion.as_ref().map(|d| d.model());
@@ -87,6 +84,8 @@ pub struct Start<'a> {
     pub hypothesis: &'a Hypothesis,
     /// How far true pairs may be apart under it.
     pub radius_px: f64,
+    /// Pairs without which it is not worth a fit.
+    pub fewest: usize,
 }
 
 /// A hypothesis, and the distortion model to fit from there.

@@ -5,7 +5,7 @@
 //! enough for that not to matter.
 
 use super::index::SizeClass;
-use super::refine::{Start, refine};
+use super::refine::{Refined, Start, refine};
 use super::triangle::TriangleShape;
 use super::verify::{Hypothesis, TESTED_STARS};
 use super::{Hints, Photometry, Sky, StarField};
@@ -49,6 +49,8 @@ const CENTROID_SIGMAS: f64 = 2.0;
 const MIN_TRIANGLE_SHARE: f64 = 0.12;
 /// Share of the other stars asked that must agree with a hypothesis, at every moment of the asking.
 const WITNESS_SHARE: f64 = 0.3;
+/// Share of the tested stars that must agree before a hypothesis is worth a fit.
+const MIN_AGREEING: f64 = 0.15;
 /// How far a witness may stand from its catalogue star: in distortion tolerances of the frame's diagonal, and in
 /// centroid errors extrapolated from the triangle.
 const WITNESS_TOLERANCES: f64 = 1.5;
@@ -58,8 +60,8 @@ pub const LOG10_FALSE_ALARM_LIMIT: f64 = -9.0;
 
 /// What the search found.
 pub struct Found {
-    /// The hypothesis, refined without distortion.
-    pub hypothesis: Hypothesis,
+    /// The hypothesis, refined with the brightest stars.
+    pub refined: Refined,
     /// log10 of its false-alarm probability.
     pub log10_false_alarm: f64,
 }
@@ -340,13 +342,14 @@ impl<'a> Search<'a> {
         let start = Start {
             hypothesis,
             radius_px: trio.witness_px,
+            fewest: (MIN_AGREEING * self.field.brightest(TESTED_STARS).len() as f64) as usize,
         };
         let richest = Some(DistortionModel::Radial);
         let refined = refine(self.field, TESTED_STARS, self.sky, &start, richest)?;
         let log10 = self.log10_false_alarm(&refined.hypothesis)?;
         self.best_log10 = Some(self.best_log10.map_or(log10, |best| best.min(log10)));
         (log10 <= LOG10_FALSE_ALARM_LIMIT).then_some(Found {
-            hypothesis: refined.hypothesis,
+            refined,
             log10_false_alarm: log10,
         })
     }
