@@ -42,7 +42,7 @@ impl PixelPoint {
 
     /// The distance to `other`, in pixels.
     pub fn distance_to(&self, other: &Self) -> f64 {
-        (self.x - other.x).hypot(self.y - other.y)
+        ((self.x - other.x).powi(2) + (self.y - other.y).powi(2)).sqrt()
     }
 }
 
@@ -261,9 +261,11 @@ mod tests {
 
     #[test]
     fn attitude_round_trips_through_pointing_and_quaternion() {
-        for (ra_deg, dec_deg, up_deg) in
-            [(10.0, 20.0, 30.0), (359.0, -89.9, -170.0), (180.0, 90.0, 0.0)]
-        {
+        for (ra_deg, dec_deg, up_deg) in [
+            (10.0, 20.0, 30.0),
+            (359.0, -89.9, -170.0),
+            (180.0, 90.0, 0.0),
+        ] {
             let centre = UnitVector::from_ra_dec(ra_deg * RAD_PER_DEG, dec_deg * RAD_PER_DEG);
             let attitude = Rotation::looking_at(&centre, up_deg * RAD_PER_DEG);
             let (boresight, up_pa_rad) = attitude.boresight_and_up();

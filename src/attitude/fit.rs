@@ -42,8 +42,8 @@ pub struct CameraFit {
     pub parameters: usize,
 }
 
-/// Turn about three axes, and ln f.
-const POSE_PARAMETERS: usize = 4;
+/// Parameters without any distortion: turn about three axes, and ln f.
+pub const POSE_PARAMETERS: usize = 4;
 const MAX_ITERATIONS: usize = 10;
 /// A step below this is far below any centroid error.
 const CONVERGED: f64 = 1e-10;
@@ -170,7 +170,12 @@ impl Adjustment<'_> {
             .stars
             .iter()
             .enumerate()
-            .map(|(i, s)| [weighted[2 * i] * s.sigma_px, weighted[2 * i + 1] * s.sigma_px])
+            .map(|(i, s)| {
+                [
+                    weighted[2 * i] * s.sigma_px,
+                    weighted[2 * i + 1] * s.sigma_px,
+                ]
+            })
             .collect();
         Some(CameraFit {
             camera: self.camera,
@@ -217,8 +222,7 @@ mod tests {
             coefficients[0] = 0.7;
             coefficients[5] = -1.5;
             coefficients[11] = 4.0;
-            camera.distortion =
-                Some(Distortion::new(DistortionModel::Cubic, 640.0, coefficients));
+            camera.distortion = Some(Distortion::new(DistortionModel::Cubic, 640.0, coefficients));
             let stars = stars_of(&camera, &truth);
             let start = CameraModel::pinhole(1024.0, 768.0, 2020.0, mirrored);
             let turned = truth.then_turn(Vector3::new(0.002, -0.003, 0.001));

@@ -6,7 +6,7 @@
 
 mod fit;
 
-pub use fit::{CameraFit, MeasuredStar, fit_camera};
+pub use fit::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera};
 
 use crate::coords::{Camera, Icrs, Rotation, UnitVector};
 use nalgebra::{Matrix3, SVD};
@@ -84,8 +84,7 @@ mod tests {
             .map(|_| {
                 let (x, y) = (rng.random_range(-0.17..0.17), rng.random_range(-0.17..0.17));
                 let true_camera = UnitVector::from_vector(Vector3::new(x, y, 1.0));
-                let turn =
-                    Vector3::new(noise(rng), noise(rng), noise(rng)) * sigma_rad;
+                let turn = Vector3::new(noise(rng), noise(rng), noise(rng)) * sigma_rad;
                 let seen = true_camera.as_vector() + turn.cross(true_camera.as_vector());
                 DirectionPair {
                     icrs: attitude.inverse().apply(&true_camera),

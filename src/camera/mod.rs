@@ -170,11 +170,7 @@ mod tests {
             coefficients.iter_mut().enumerate().for_each(|(i, c)| {
                 *c = 3.0 * (i as f64 - 7.0) / 7.0;
             });
-            camera.distortion = Some(Distortion::new(
-                DistortionModel::Cubic,
-                640.0,
-                coefficients,
-            ));
+            camera.distortion = Some(Distortion::new(DistortionModel::Cubic, 640.0, coefficients));
             for pixel in [
                 PixelPoint::new(0.0, 0.0),
                 PixelPoint::new(999.0, 799.0),

@@ -20,6 +20,21 @@ pub struct GridStar {
 }
 
 impl GridStar {
+    const NOWHERE: Self = Self {
+        direction: [0.0; 3],
+        v_mag: 0.0,
+        catalog: 0,
+    };
+
+    fn new(index: usize, star: &Star) -> Self {
+        let v = star.direction.as_vector();
+        Self {
+            direction: [v.x as f32, v.y as f32, v.z as f32],
+            v_mag: star.v_mag,
+            catalog: index as u32,
+        }
+    }
+
     /// Squared length of the chord to the unit vector `direction`.
     #[inline]
     pub fn chord_sq(&self, direction: &Vector3<f64>) -> f64 {
@@ -37,6 +52,8 @@ pub struct SkyGrid {
     /// `cell_starts[c]..cell_starts[c + 1]` are the stars of cell `c`.
     cell_starts: Vec<u32>,
     stars: Vec<GridStar>,
+    /// The brightest stars of all, brightest first: wide and shallow searches go through these.
+    brightest: Vec<GridStar>,
     zone_height_rad: f64,
 }
 
@@ -48,6 +65,10 @@ struct Zone {
 
 /// Height of a zone: about three catalogue stars a cell.
 const ZONES: usize = 256;
+/// How many stars [`SkyGrid::brightest`] holds.
+const BRIGHTEST: usize = 16_384;
+/// Going to a cell costs about as much as looking at so many stars in a row.
+const STARS_PER_CELL_VISIT: f64 = 4.0;
 
 impl SkyGrid {
     /// Sorts `stars`, which stand brightest first, into cells.
@@ -73,6 +94,11 @@ impl SkyGrid {
             zones,
             cell_starts: vec![0; cells as usize + 1],
             stars: Vec::new(),
+            brightest: stars[..stars.len().min(BRIGHTEST)]
+                .iter()
+                .enumerate()
+                .map(|(index, star)| GridStar::new(index, star))
+                .collect(),
             zone_height_rad,
         };
         grid.fill(stars);
@@ -89,19 +115,9 @@ impl SkyGrid {
             self.cell_starts[cell] += self.cell_starts[cell - 1];
         }
         let mut next = self.cell_starts.clone();
-        let nowhere = GridStar {
-            direction: [0.0; 3],
-            v_mag: 0.0,
-            catalog: 0,
-        };
-        self.stars = vec![nowhere; stars.len()];
+        self.stars = vec![GridStar::NOWHERE; stars.len()];
         for (index, (star, &cell)) in stars.iter().zip(&cells).enumerate() {
-            let v = star.direction.as_vector();
-            self.stars[next[cell as usize] as usize] = GridStar {
-                direction: [v.x as f32, v.y as f32, v.z as f32],
-                v_mag: star.v_mag,
-                catalog: index as u32,
-            };
+            self.stars[next[cell as usize] as usize] = GridStar::new(index, star);
             next[cell as usize] += 1;
         }
     }
@@ -119,13 +135,38 @@ impl SkyGrid {
     }
 
     /// Calls `visit` with every star within `radius_rad` of `centre` that is not fainter than
-    /// `faintest_v_mag`; brightest first within a cell, cells in a fixed order.
+    /// `faintest_v_mag`, in an order that depends on nothing but the arguments.
     pub fn for_each_within(
         &self,
         centre: &UnitVector<Icrs>,
         radius_rad: f64,
         faintest_v_mag: f32,
         mut visit: impl FnMut(&GridStar),
+    ) {
+        let bright_enough = self
+            .brightest
+            .partition_point(|s| s.v_mag <= faintest_v_mag);
+        let all_bright_enough =
+            bright_enough < self.brightest.len() || self.brightest.len() == self.stars.len();
+        let cells = (2.0 * radius_rad / self.zone_height_rad + 1.0).powi(2);
+        if all_bright_enough && (bright_enough as f64) < STARS_PER_CELL_VISIT * cells {
+            let chord_sq = chord_sq_of_angle(radius_rad);
+            let within = |s: &&GridStar| s.chord_sq(centre.as_vector()) <= chord_sq;
+            self.brightest[..bright_enough]
+                .iter()
+                .filter(within)
+                .for_each(visit);
+        } else {
+            self.for_each_in_cells(centre, radius_rad, faintest_v_mag, &mut visit);
+        }
+    }
+
+    fn for_each_in_cells(
+        &self,
+        centre: &UnitVector<Icrs>,
+        radius_rad: f64,
+        faintest_v_mag: f32,
+        visit: &mut impl FnMut(&GridStar),
     ) {
         let (ra_rad, dec_rad) = centre.to_ra_dec();
         let chord_sq = chord_sq_of_angle(radius_rad);
@@ -179,14 +220,11 @@ mod tests {
     use proptest::prelude::*;
 
     fn star(index: u32, ra_rad: f64, sin_dec: f64) -> Star {
-        Star {
-            id: StarId(index),
-            direction: UnitVector::from_ra_dec(ra_rad, sin_dec.asin()),
-            pm_ra_mas_per_yr: 0.0,
-            pm_dec_mas_per_yr: 0.0,
-            v_mag: index as f32 * 0.01,
-            bv_mag: None,
-        }
+        Star::new(
+            StarId(index),
+            UnitVector::from_ra_dec(ra_rad, sin_dec.asin()),
+            index as f32 * 0.01,
+        )
     }
 
     proptest! {
@@ -203,18 +241,18 @@ mod tests {
                 .collect();
             let centre = UnitVector::from_ra_dec(ra_rad, dec_rad);
             let mut found = Vec::new();
-            SkyGrid::new(&stars)
-                .for_each_within(&centre, radius_rad, limit, |s| found.push(s.catalog));
+            let grid = SkyGrid::new(&stars);
+            grid.for_each_within(&centre, radius_rad, limit, |s| found.push(s.catalog));
             found.sort_unstable();
+            let mut in_cells = Vec::new();
+            let mut visit = |s: &GridStar| in_cells.push(s.catalog);
+            grid.for_each_in_cells(&centre, radius_rad, limit, &mut visit);
+            in_cells.sort_unstable();
+            prop_assert_eq!(&found, &in_cells);
             let chord_sq = chord_sq_of_angle(radius_rad);
             let expected: Vec<u32> = (0..stars.len() as u32)
                 .filter(|&i| {
-                    let v = stars[i as usize].direction.as_vector();
-                    let packed = GridStar {
-                        direction: [v.x as f32, v.y as f32, v.z as f32],
-                        v_mag: 0.0,
-                        catalog: i,
-                    };
+                    let packed = GridStar::new(i as usize, &stars[i as usize]);
                     stars[i as usize].v_mag <= limit
                         && packed.chord_sq(centre.as_vector()) <= chord_sq
                 })

@@ -1,6 +1,47 @@
 //! From a frame to its stars: positions with standard errors, fluxes and flags.
+//!
+//! [`Frame`] → [`Detections`], brightest first. Positions: (0, 0) is the centre of the first stored pixel.
+//!
+//! 1. Background and noise on a mesh of cells, robust against stars.
+//! 2. A matched filter with the frame's own spot, a pixel-integrated Gaussian. The spot's size is
+//!    measured on the bright stars; where the first guess was wrong, the frame is filtered again.
+//! 3. The noise of the filtered frame, on a mesh again: so correlated noise (JPEG, demosaicing) is
+//!    measured and not assumed. The threshold follows from the wanted number of false detections.
+//! 4. Connected regions, their peaks, and which of those are stars of their own.
+//! 5. A fit of each star, together with those that it touches; or a grey-weighted centroid.
+//! 6. Flags for what is no star, or no whole one.
+//!
+//! Caveats: one spot size for the whole frame; a frame with fewer than three bright stars gets a
+//! default one. Stars fainter than about 2 % of a bright neighbour, within some five spot sizes of
+//! it, are taken for its halo. Standard errors of stars whose light is not proportional to the
+//! grey level (JPEG's gamma) are indicative.
+//!
+//! # Reference
+//! Bertin & Arnouts 1996, doi 10.1051/aas:1996164, for the order of the steps; the README of `sep`
+//! for the matched filter.
+
+mod background;
+mod calibrate;
+mod centroid;
+mod components;
+mod fit;
+mod matched_filter;
+mod measure;
+mod psf;
+mod scene;
+mod shape;
+mod threshold;
+mod view;
 
 use crate::coords::PixelPoint;
+use crate::frame::{Frame, MIN_SIDE_PX};
+use background::{Mesh, MeshConfig};
+use components::{Search, SearchConfig};
+use fit::NoiseModel;
+use matched_filter::{Filtered, Kernel};
+use measure::Measurement;
+use scene::{FitWork, Scene};
+use view::View;
 
 /// One detected source, in the frame's own units.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,4 +97,356 @@ pub struct Detections {
     pub noise_adu: f64,
     /// Standard deviation of the Gaussian spot before pixel integration, in pixels.
     pub spot_sigma_px: f64,
+}
+
+/// How positions are measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum CentroidMethod {
+    /// Variance-weighted least-squares fit of a pixel-integrated Gaussian.
+    #[default]
+    GaussianFit,
+    /// Mean of the pixels' positions, weighted with their grey level above a threshold.
+    GreyWeighted,
+}
+
+/// Options of [`detect`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct DetectConfig {
+    /// Wanted number of false detections in a million pixels of pure noise.
+    pub false_alarms_per_mpx: f64,
+    /// Threshold in standard deviations of the filtered noise; overrides `false_alarms_per_mpx`.
+    pub threshold_sigma: Option<f64>,
+    /// Standard deviation of the spot before pixel integration, in pixels; measured where `None`.
+    pub spot_sigma_px: Option<f64>,
+    /// How positions are measured.
+    pub centroid: CentroidMethod,
+    /// Side of the cells in which background and noise are measured, in pixels.
+    pub cell_px: usize,
+    /// At most so many detections, the strongest.
+    pub max_detections: usize,
+}
+
+impl DetectConfig {
+    /// Default of [`Self::false_alarms_per_mpx`]: one in ten frames of a megapixel.
+    pub const DEFAULT_FALSE_ALARMS_PER_MPX: f64 = 0.1;
+    /// Default of [`Self::cell_px`]: well above any spot, well below a vignette.
+    pub const DEFAULT_CELL_PX: usize = 64;
+    /// Default of [`Self::max_detections`].
+    pub const DEFAULT_MAX_DETECTIONS: usize = 20_000;
+}
+
+impl Default for DetectConfig {
+    fn default() -> Self {
+        Self {
+            false_alarms_per_mpx: Self::DEFAULT_FALSE_ALARMS_PER_MPX,
+            threshold_sigma: None,
+            spot_sigma_px: None,
+            centroid: CentroidMethod::default(),
+            cell_px: Self::DEFAULT_CELL_PX,
+            max_detections: Self::DEFAULT_MAX_DETECTIONS,
+        }
+    }
+}
+
+/// Why stars could not be looked for.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DetectError {
+    /// A side is shorter than [`MIN_SIDE_PX`].
+    #[error(
+        "frame of {width} x {height} pixels is too small: expected at least {MIN_SIDE_PX} on each side"
+    )]
+    FrameTooSmall {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+    },
+    /// The frame's pixels are not `width * height`.
+    #[error("frame holds {found} pixels, expected {expected} (width times height)")]
+    WrongLength {
+        /// Width times height.
+        expected: usize,
+        /// The pixels there are.
+        found: usize,
+    },
+    /// An option has a value without meaning.
+    #[error("{name} is {found}, expected {expected}")]
+    Config {
+        /// The option.
+        name: &'static str,
+        /// Its value.
+        found: f64,
+        /// What it may be.
+        expected: &'static str,
+    },
+}
+
+/// Buffers that are reused from frame to frame; the result does not depend on what was in them.
+#[derive(Debug, Clone, Default)]
+pub struct Workspace {
+    background: Mesh,
+    filtered_mesh: Mesh,
+    filtered: Filtered,
+    search: Search,
+    fits: FitWork,
+}
+
+impl Workspace {
+    /// Empty buffers.
+    pub fn new() -> Self {
+        Self::default()
+    }
+}
+
+/// The spot must be guessed this well, as a factor; else the frame is filtered again.
+const SPOT_GUESS_TOLERANCE: f64 = 1.15;
+/// At most so many times.
+const MAX_FILTER_ROUNDS: usize = 3;
+/// The standard deviation of rounding to whole steps, over the step: 1/√12.
+const ROUNDING_NOISE: f32 = 0.288_675_13;
+/// The filtered noise cannot fall below this part of that of independent pixels: a frame that is
+/// smooth below its own rounding is not known better than that.
+const FILTERED_NOISE_FLOOR: f32 = 0.5;
+
+/// Finds the stars of `frame`, and whatever else stands out, brightest first.
+///
+/// `frame`: row-major, `height * width`, ADU. NaN pixels are masked; saturated stars are kept and
+/// flagged. A frame without light (one value everywhere) gives an empty list. The same frame gives
+/// the same result, whatever `workspace` was used for before.
+///
+/// # Errors
+/// [`DetectError::FrameTooSmall`], [`DetectError::WrongLength`] for frames of impossible size,
+/// [`DetectError::Config`] for options without meaning.
+///
+/// # Example
+/// ```
+/// use starpipe::detect::{DetectConfig, Workspace, detect};
+/// use starpipe::frame::Frame;
+///
+/// // A noisy sky with one star.
+/// let noise = |i: usize| ((i * 7919) % 101) as f32 * 0.1;
+/// let mut pixels: Vec<f32> = (0..128 * 96).map(noise).collect();
+/// for (dx, dy, light) in [(0, 0, 900.0), (1, 0, 400.0), (0, 1, 400.0), (1, 1, 180.0)] {
+///     pixels[(40 + dy) * 128 + 60 + dx] += light;
+/// }
+/// let frame = Frame::new(128, 96, pixels)?;
+/// let found = detect(&frame, &DetectConfig::default(), &mut Workspace::new()).expect("the frame is large enough");
+/// assert!((found.sources[0].position.x - 60.3).abs() < 0.3);
+/// # Ok::<(), starpipe::frame::FrameError>(())
+/// ```
+pub fn detect(
+    frame: &Frame,
+    config: &DetectConfig,
+    workspace: &mut Workspace,
+) -> Result<Detections, DetectError> {
+    check(frame, config)?;
+    let view = View::of_live_pixels(frame);
+    if view.width < MIN_SIDE_PX || view.height < MIN_SIDE_PX {
+        return Ok(empty_detections(frame, config));
+    }
+    let noise_floor = ROUNDING_NOISE * frame.step_adu;
+    workspace.background.measure(
+        &view,
+        &MeshConfig {
+            cell_px: config.cell_px,
+            spread_of_differences: true,
+            spread_floor: noise_floor.max(least_noise(&view)),
+            is_normalised: false,
+        },
+    );
+    let saturation_adu = frame.saturation_adu.unwrap_or(f32::INFINITY);
+    let calibration = search_with_own_spot(&view, saturation_adu, config, workspace);
+    let mut fits = std::mem::take(&mut workspace.fits);
+    let scene = scene_of(&view, saturation_adu, &calibration, workspace);
+    let measurement = Measurement {
+        scene,
+        noise: calibration.noise,
+        method: config.centroid,
+        regions: &workspace.search.regions,
+        threshold: calibration.threshold,
+    };
+    let mut sources = measurement.run(&workspace.search.peaks, &mut fits);
+    workspace.fits = fits;
+    sources.sort_by(|a, b| b.flux_adu.total_cmp(&a.flux_adu));
+    Ok(Detections {
+        sources,
+        background_adu: middle_of(&workspace.background.level),
+        noise_adu: middle_of(&workspace.background.spread),
+        spot_sigma_px: calibration.spot_px,
+    })
+}
+
+/// What a frame's own stars say about it, and the threshold.
+#[derive(Debug, Clone)]
+struct Calibration {
+    spot_px: f64,
+    kernel: Kernel,
+    noise: NoiseModel,
+    threshold: f64,
+}
+
+/// Filters and searches, until the filter fits the stars that it finds.
+fn search_with_own_spot(
+    view: &View<'_>,
+    saturation_adu: f32,
+    config: &DetectConfig,
+    workspace: &mut Workspace,
+) -> Calibration {
+    let mut calibration = Calibration {
+        spot_px: config.spot_sigma_px.unwrap_or(calibrate::DEFAULT_SPOT_PX),
+        kernel: Kernel::default(),
+        noise: NoiseModel::default(),
+        threshold: 0.0,
+    };
+    for round in 0..MAX_FILTER_ROUNDS {
+        search(view, saturation_adu, config, &mut calibration, workspace);
+        let mut fits = std::mem::take(&mut workspace.fits);
+        let mut scene = scene_of(view, saturation_adu, &calibration, workspace);
+        let filtered = workspace.filtered.view();
+        let stars =
+            calibrate::fit_bright_stars(&scene, filtered, &workspace.search.peaks, &mut fits);
+        let measured = match config.spot_sigma_px {
+            None => calibrate::spot_size(&stars),
+            Some(_) => None,
+        };
+        let spot_px = measured.unwrap_or(calibration.spot_px);
+        let ratio = (spot_px / calibration.spot_px).max(calibration.spot_px / spot_px);
+        let settled = ratio < SPOT_GUESS_TOLERANCE || round + 1 == MAX_FILTER_ROUNDS;
+        if settled {
+            scene.spot_px = spot_px;
+            calibration.noise = calibrate::noise_model(&scene, &stars, &mut fits);
+        }
+        calibration.spot_px = spot_px;
+        workspace.fits = fits;
+        if settled {
+            break;
+        }
+    }
+    calibration
+}
+
+/// Filters with the calibration's spot, sets the threshold, and finds regions and peaks.
+fn search(
+    view: &View<'_>,
+    saturation_adu: f32,
+    config: &DetectConfig,
+    calibration: &mut Calibration,
+    workspace: &mut Workspace,
+) {
+    let kernel = Kernel::for_spot(calibration.spot_px);
+    workspace
+        .filtered
+        .compute(view, &workspace.background, &kernel);
+    workspace.filtered_mesh.measure(
+        &workspace.filtered.view(),
+        &MeshConfig {
+            cell_px: config.cell_px,
+            spread_of_differences: false,
+            spread_floor: FILTERED_NOISE_FLOOR,
+            is_normalised: true,
+        },
+    );
+    calibration.threshold = config.threshold_sigma.unwrap_or_else(|| {
+        let u = threshold::threshold_for_rate(config.false_alarms_per_mpx, kernel.rho, kernel.rho);
+        threshold::for_estimated_noise(u, noise_degrees(view, config, calibration.spot_px))
+    });
+    let spot_width_px = (calibration.spot_px.powi(2) + psf::PIXEL_VARIANCE_PX2).sqrt();
+    workspace.search.run(
+        &workspace.filtered,
+        &workspace.filtered_mesh,
+        view,
+        &SearchConfig {
+            threshold: calibration.threshold as f32,
+            spot_width_px: spot_width_px as f32,
+            saturation_adu,
+            max_peaks: config.max_detections,
+        },
+    );
+    calibration.kernel = kernel;
+}
+
+/// The degrees of freedom of the local noise estimate: the independent samples in a cell (a value of
+/// the filtered frame has relatives in 2πs² pixels), and a gain of 5 from the median of 3x3 cells.
+fn noise_degrees(view: &View<'_>, config: &DetectConfig, spot_px: f64) -> f64 {
+    const SMOOTHING_GAIN: f64 = 5.0;
+    const EFFICIENCY: f64 = 0.8;
+    let cell = (view.width.min(config.cell_px) * view.height.min(config.cell_px)) as f64;
+    let cells = ((view.width * view.height) as f64 / cell).max(1.0);
+    let relatives = std::f64::consts::TAU * (spot_px.powi(2) + psf::PIXEL_VARIANCE_PX2);
+    (EFFICIENCY * cell / relatives.max(1.0) * SMOOTHING_GAIN.min(cells)).max(3.0)
+}
+
+fn scene_of<'a>(
+    view: &View<'a>,
+    saturation_adu: f32,
+    calibration: &Calibration,
+    workspace: &'a Workspace,
+) -> Scene<'a> {
+    Scene {
+        view: *view,
+        background: &workspace.background,
+        filtered: &workspace.filtered_mesh,
+        saturation_adu,
+        spot_px: calibration.spot_px,
+        matched_gain: calibration.kernel.sum_of_squares.sqrt(),
+    }
+}
+
+/// Refuses frames and options that make no sense.
+fn check(frame: &Frame, config: &DetectConfig) -> Result<(), DetectError> {
+    let (width, height) = (frame.width, frame.height);
+    if width < MIN_SIDE_PX || height < MIN_SIDE_PX {
+        return Err(DetectError::FrameTooSmall { width, height });
+    }
+    if frame.pixels.len() != width * height {
+        return Err(DetectError::WrongLength {
+            expected: width * height,
+            found: frame.pixels.len(),
+        });
+    }
+    let positive = [
+        ("false_alarms_per_mpx", config.false_alarms_per_mpx),
+        ("threshold_sigma", config.threshold_sigma.unwrap_or(1.0)),
+        ("spot_sigma_px", config.spot_sigma_px.unwrap_or(1.0)),
+        ("cell_px", config.cell_px as f64),
+    ];
+    for (name, found) in positive {
+        if !(found > 0.0 && found.is_finite()) {
+            return Err(DetectError::Config {
+                name,
+                found,
+                expected: "a number above 0",
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The result for a frame without light.
+fn empty_detections(frame: &Frame, config: &DetectConfig) -> Detections {
+    let level = frame.pixels.iter().copied().find(|p| !p.is_nan());
+    Detections {
+        sources: Vec::new(),
+        background_adu: f64::from(level.unwrap_or(0.0)),
+        noise_adu: f64::from(ROUNDING_NOISE * frame.step_adu),
+        spot_sigma_px: config.spot_sigma_px.unwrap_or(calibrate::DEFAULT_SPOT_PX),
+    }
+}
+
+/// A noise that is certainly below that of the frame: some of the precision of its numbers.
+fn least_noise(view: &View<'_>) -> f32 {
+    let largest = (0..view.height)
+        .step_by((view.height / 16).max(1))
+        .flat_map(|y| view.row(y))
+        .fold(0.0f32, |m, p| if p.abs() > m { p.abs() } else { m });
+    (largest * 1e-6).max(f32::MIN_POSITIVE * 1e6)
+}
+
+/// The median.
+fn middle_of(values: &[f32]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f32::total_cmp);
+    sorted.get(sorted.len() / 2).map_or(0.0, |&v| f64::from(v))
 }

@@ -170,7 +170,9 @@ pub enum FrameError {
         height: usize,
     },
     /// A side shorter than [`MIN_SIDE_PX`].
-    #[error("too small: found {width} x {height} pixels, expected at least {MIN_SIDE_PX} on each side")]
+    #[error(
+        "too small: found {width} x {height} pixels, expected at least {MIN_SIDE_PX} on each side"
+    )]
     TooSmall {
         /// Columns.
         width: usize,
@@ -239,7 +241,10 @@ fn format_of(bytes: &[u8]) -> Option<FrameFormat> {
 /// The first bytes for an error message: quoted where they are text, else in hexadecimal.
 fn first_bytes(bytes: &[u8]) -> String {
     let head = &bytes[..bytes.len().min(8)];
-    if head.iter().all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace()) {
+    if head
+        .iter()
+        .all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace())
+    {
         return format!("the text {:?}", String::from_utf8_lossy(head));
     }
     let hex: Vec<String> = head.iter().map(|b| format!("{b:02x}")).collect();
@@ -274,10 +279,13 @@ fn frame_from_integers<T: Copy + Into<u32>>(samples: &Samples<'_, T>) -> Result<
     let (width, height) = (samples.width, samples.height);
     check_size(width, height)?;
     let expected = width * height * samples.channels;
-    let values = samples.values.get(..expected).ok_or(FrameError::WrongLength {
-        expected: width * height,
-        found: samples.values.len() / samples.channels,
-    })?;
+    let values = samples
+        .values
+        .get(..expected)
+        .ok_or(FrameError::WrongLength {
+            expected: width * height,
+            found: samples.values.len() / samples.channels,
+        })?;
     let full_scale: u32 = samples.full_scale.into();
     let full = full_scale as f32;
     let level = |v: T| -> f32 { v.into() as f32 };
@@ -289,7 +297,11 @@ fn frame_from_integers<T: Copy + Into<u32>>(samples: &Samples<'_, T>) -> Result<
             .map(|c| luminance([level(c[0]), level(c[1]), level(c[2])], full))
             .collect(),
     };
-    let step = if samples.channels <= 2 { level_step(values, full_scale) } else { 1 };
+    let step = if samples.channels <= 2 {
+        level_step(values, full_scale)
+    } else {
+        1
+    };
     // Twelve bits in the upper part of sixteen saturate at 65520, not at 65535.
     let saturation = full_scale / step * step;
     Ok(Frame::new(width, height, pixels)?.with_levels(step as f32, Some(saturation as f32)))
@@ -320,7 +332,11 @@ fn level_step<T: Copy + Into<u32>>(values: &[T], full_scale: u32) -> u32 {
     }
     let step = 1 << bits.trailing_zeros();
     // All levels zero, or nothing but full scale: nothing can be told.
-    if step >= MAX_STEP.min(full_scale) { 1 } else { step }
+    if step >= MAX_STEP.min(full_scale) {
+        1
+    } else {
+        step
+    }
 }
 
 #[cfg(test)]

@@ -2,7 +2,11 @@ use super::*;
 use proptest::prelude::*;
 use std::io::Cursor;
 
-fn tiff_of<C: ::tiff::encoder::colortype::ColorType>(width: u32, height: u32, data: &[C::Inner]) -> Vec<u8>
+fn tiff_of<C: ::tiff::encoder::colortype::ColorType>(
+    width: u32,
+    height: u32,
+    data: &[C::Inner],
+) -> Vec<u8>
 where
     [C::Inner]: ::tiff::encoder::TiffValue,
 {
@@ -65,10 +69,14 @@ fn nan_pixels_of_a_float_tiff_stay_nan() {
 #[test]
 fn png_and_jpeg_are_read_in_grey_and_colour() {
     use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgba};
-    let grey16 = DynamicImage::ImageLuma16(ImageBuffer::from_fn(5, 4, |x, _| Luma([1000 * x as u16 + 7])));
+    let grey16 = DynamicImage::ImageLuma16(ImageBuffer::from_fn(5, 4, |x, _| {
+        Luma([1000 * x as u16 + 7])
+    }));
     let frame = decode(&encoded_by_image(&grey16, ImageFormat::Png)).unwrap();
     assert_eq!(frame.pixels[3], 3007.0);
-    let rgba = DynamicImage::ImageRgba8(ImageBuffer::from_fn(5, 4, |x, _| Rgba([x as u8, 20, 30, 9])));
+    let rgba = DynamicImage::ImageRgba8(ImageBuffer::from_fn(5, 4, |x, _| {
+        Rgba([x as u8, 20, 30, 9])
+    }));
     let frame = decode(&encoded_by_image(&rgba, ImageFormat::Png)).unwrap();
     assert!((frame.pixels[2] - (2.0 * 0.299 + 11.74 + 3.42)).abs() < 1e-4);
     let grey8 = DynamicImage::ImageLuma8(ImageBuffer::from_pixel(16, 8, Luma([40])));
@@ -79,10 +87,16 @@ fn png_and_jpeg_are_read_in_grey_and_colour() {
 #[test]
 fn what_is_no_image_says_what_was_found_and_expected() {
     let text = decode(b"hello, world").unwrap_err().to_string();
-    assert!(text.contains("\"hello, w\"") && text.contains("TIFF"), "{text}");
+    assert!(
+        text.contains("\"hello, w\"") && text.contains("TIFF"),
+        "{text}"
+    );
     assert!(matches!(decode(b""), Err(FrameError::Empty)));
     let missing = read("/nonexistent/a.tif").unwrap_err().to_string();
-    assert!(missing.starts_with("/nonexistent/a.tif: cannot be read"), "{missing}");
+    assert!(
+        missing.starts_with("/nonexistent/a.tif: cannot be read"),
+        "{missing}"
+    );
 }
 
 #[test]
@@ -98,22 +112,37 @@ fn a_truncated_file_of_any_kind_is_an_error() {
     for format in [image::ImageFormat::Png, image::ImageFormat::Jpeg] {
         let bytes = encoded_by_image(&grey, format);
         let error = decode(&bytes[..bytes.len() * 2 / 3]).unwrap_err();
-        assert!(matches!(error, FrameError::Truncated { .. }), "{format:?}: {error}");
+        assert!(
+            matches!(error, FrameError::Truncated { .. }),
+            "{format:?}: {error}"
+        );
     }
 }
 
 #[test]
 fn absurd_and_tiny_sizes_are_refused() {
-    assert!(matches!(check_size(1 << 20, 1 << 20), Err(FrameError::TooLarge { .. })));
-    assert!(matches!(check_size(usize::MAX, 4), Err(FrameError::TooLarge { .. })));
+    assert!(matches!(
+        check_size(1 << 20, 1 << 20),
+        Err(FrameError::TooLarge { .. })
+    ));
+    assert!(matches!(
+        check_size(usize::MAX, 4),
+        Err(FrameError::TooLarge { .. })
+    ));
     use ::tiff::encoder::colortype::Gray8;
     assert!(matches!(
         decode(&tiff_of::<Gray8>(1, 1, &[7])),
-        Err(FrameError::TooSmall { width: 1, height: 1 })
+        Err(FrameError::TooSmall {
+            width: 1,
+            height: 1
+        })
     ));
     assert!(matches!(
         Frame::new(4, 4, vec![0.0; 15]),
-        Err(FrameError::WrongLength { expected: 16, found: 15 })
+        Err(FrameError::WrongLength {
+            expected: 16,
+            found: 15
+        })
     ));
 }
 

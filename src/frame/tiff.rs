@@ -55,9 +55,12 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Frame, FrameError> {
             full_scale: u16::MAX,
         }),
         DecodingResult::F32(values) => from_floats(width, height, channels, values),
-        DecodingResult::F64(values) => {
-            from_floats(width, height, channels, values.iter().map(|&v| v as f32).collect())
-        }
+        DecodingResult::F64(values) => from_floats(
+            width,
+            height,
+            channels,
+            values.iter().map(|&v| v as f32).collect(),
+        ),
         _ => Err(unsupported(format!("{color:?}"))),
     }
 }
@@ -136,16 +139,20 @@ fn unsupported(found: String) -> FrameError {
 fn error_of(error: TiffError, found_bytes: usize) -> FrameError {
     let format = FrameFormat::Tiff;
     match error {
-        TiffError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => FrameError::Truncated {
-            format,
-            found_bytes,
-            detail: e.to_string(),
-        },
+        TiffError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
+            FrameError::Truncated {
+                format,
+                found_bytes,
+                detail: e.to_string(),
+            }
+        }
         TiffError::UnsupportedError(e) => unsupported(e.to_string()),
-        TiffError::FormatError(TiffFormatError::InvalidDimensions(width, height)) => FrameError::TooSmall {
-            width: width as usize,
-            height: height as usize,
-        },
+        TiffError::FormatError(TiffFormatError::InvalidDimensions(width, height)) => {
+            FrameError::TooSmall {
+                width: width as usize,
+                height: height as usize,
+            }
+        }
         other => FrameError::Malformed {
             format,
             detail: other.to_string(),

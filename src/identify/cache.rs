@@ -135,13 +135,12 @@ mod tests {
 
     fn small_index() -> TriangleIndex {
         let stars: Vec<Star> = (0..60u32)
-            .map(|i| Star {
-                id: StarId(i),
-                direction: UnitVector::from_ra_dec(f64::from(i * i % 97) * 0.01, f64::from(i) * 0.004),
-                pm_ra_mas_per_yr: 0.0,
-                pm_dec_mas_per_yr: 0.0,
-                v_mag: i as f32 * 0.1,
-                bv_mag: None,
+            .map(|i| {
+                Star::new(
+                    StarId(i),
+                    UnitVector::from_ra_dec(f64::from(i * i % 97) * 0.01, f64::from(i) * 0.004),
+                    i as f32 * 0.1,
+                )
             })
             .collect();
         TriangleIndex::build(&stars, &SkyGrid::new(&stars), &|_| ())

@@ -230,6 +230,9 @@ impl Cells {
         let zone = ((dec_rad + FRAC_PI_2) / self.zone_height_rad) as usize;
         let zone = zone.min(zones - 1);
         let cells = self.in_zone(zone);
-        (zone, ((ra_rad / TAU * cells as f64) as usize).min(cells - 1))
+        (
+            zone,
+            ((ra_rad / TAU * cells as f64) as usize).min(cells - 1),
+        )
     }
 }

@@ -59,6 +59,13 @@ pub struct StarField {
     pub stars: Vec<ObservedStar>,
 }
 
+impl StarField {
+    /// The `count` brightest stars, or all if there are fewer.
+    pub fn brightest(&self, count: usize) -> &[ObservedStar] {
+        &self.stars[..count.min(self.stars.len())]
+    }
+}
+
 /// What is known beforehand.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Hints {
@@ -136,7 +143,9 @@ pub fn identify(field: &StarField, hints: &Hints, sky: &Sky) -> Outcome {
         });
     }
     let mut search = search::Search::new(field, hints, sky);
-    let identified = search.run().and_then(|found| complete(field, sky, &search, &found));
+    let identified = search
+        .run()
+        .and_then(|found| complete(field, sky, &search, &found));
     match identified {
         Some(identification) => Outcome::Identified(Box::new(identification)),
         None => Outcome::NotIdentified(Reason::NoMatch {
@@ -153,15 +162,11 @@ fn complete(
     found: &search::Found,
 ) -> Option<Identification> {
     let richest = Some(DistortionModel::Quintic);
-    let radius_px = FINAL_RADIUS_SHARE * field.width_px.hypot(field.height_px);
-    let refined = refine::refine(
-        field,
-        usize::MAX,
-        sky,
-        &found.hypothesis,
-        radius_px,
-        richest,
-    )?;
+    let start = refine::Start {
+        hypothesis: &found.hypothesis,
+        radius_px: FINAL_RADIUS_SHARE * field.width_px.hypot(field.height_px),
+    };
+    let refined = refine::refine(field, usize::MAX, sky, &start, richest)?;
     let log10_false_alarm = search
         .log10_false_alarm(&refined.hypothesis)?
         .min(found.log10_false_alarm);

@@ -4,7 +4,7 @@
 
 use super::verify::Hypothesis;
 use super::{Photometry, Sky, StarField, StarMatch};
-use crate::attitude::{CameraFit, MeasuredStar, fit_camera};
+use crate::attitude::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera};
 use crate::camera::DistortionModel;
 
 /// Pairs further apart than so many times the typical distance are no pairs.
@@ -19,6 +19,8 @@ const EQUATIONS_PER_PARAMETER: f64 = 2.5;
 const WORTH_IT: f64 = 0.9;
 /// Rounds of pairing and fitting at the most.
 const MAX_ROUNDS: usize = 8;
+/// The share of the observed stars, or of the predicted where they are fewer, that must agree from the start.
+const MIN_AGREEING: f64 = 0.2;
 
 /// A fitted hypothesis and what agrees with it.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,41 +35,96 @@ pub struct Refined {
     pub excess_sigma_px: f64,
 }
 
-/// Pairs up and fits in turn, starting with pairs within `radius_px`, with distortion models up to `richest`
-/// (`None`: no distortion); `None` where too few stars agree to determine the camera.
+/// Pairs up and fits in turn the `observed_count` brightest stars, starting with pairs within `radius_px`, with
+/// distortion models up to `richest` (`None`: no distortion).
+///
+/// `None` where too few stars agree to determine the camera.
 pub fn refine(
     field: &StarField,
     observed_count: usize,
     sky: &Sky,
-    start: &Hypothesis,
-    radius_px: f64,
+    start: &Start,
     richest: Option<DistortionModel>,
 ) -> Option<Refined> {
-    let observed = &field.stars[..observed_count.min(field.stars.len())];
-    let mut hypothesis = start.clone();
-    let mut radius_px = radius_px;
-    let mut excess_px = 0.0;
-    let mut last: Option<Refined> = None;
+    let observed = field.brightest(observed_count);
+    let hypothesis = start.hypothesis;
+    let mut predicted = hypothesis.predict(sky, observed, field.photometry);
+    let matches = hypothesis.pair_up(observed, &predicted, field.photometry, start.radius_px);
+    let fewest = MIN_AGREEING * observed.len().min(predicted.len()) as f64;
+    if (matches.len() as f64) < fewest {
+        return None;
+    }
+    let mut model = hypothesis.camera.distortion.as_ref().map(|d| d.model());
+    let mut radius_px = start.radius_px;
+    let mut current = fitted(field, sky, matches, 0.0, &Guess { hypothesis, model })?;
+    let mut model_chosen = false;
     for _ in 0..MAX_ROUNDS {
-        let predicted = hypothesis.predict(sky, observed, field.photometry);
-        let matches = hypothesis.pair_up(observed, &predicted, field.photometry, radius_px);
-        let stars = measured(field, sky, &matches, excess_px);
-        let fit = best_fit(&stars, &hypothesis, richest)?;
-        excess_px = excess_sigma_px(field, &matches, &fit);
-        hypothesis = Hypothesis {
+        radius_px = agreement_radius_px(&current.fit, radius_px);
+        current.hypothesis.predict_again(sky, &mut predicted);
+        let matches = current
+            .hypothesis
+            .pair_up(observed, &predicted, field.photometry, radius_px);
+        let settled = same_pairs(&matches, &current.matches);
+        if settled && model_chosen {
+            break;
+        }
+        if settled {
+            model = choose_model(field, sky, &current, richest);
+            model_chosen = true;
+        }
+        let guess = Guess {
+            hypothesis: &current.hypothesis,
+            model,
+        };
+        current = fitted(field, sky, matches, current.excess_sigma_px, &guess)?;
+    }
+    Some(current)
+}
+
+/// Where a refinement starts.
+pub struct Start<'a> {
+    /// The hypothesis.
+    pub hypothesis: &'a Hypothesis,
+    /// How far true pairs may be apart under it.
+    pub radius_px: f64,
+}
+
+/// A hypothesis, and the distortion model to fit from there.
+struct Guess<'a> {
+    hypothesis: &'a Hypothesis,
+    model: Option<DistortionModel>,
+}
+
+fn fitted(
+    field: &StarField,
+    sky: &Sky,
+    mut matches: Vec<StarMatch>,
+    excess_sigma_px: f64,
+    guess: &Guess,
+) -> Option<Refined> {
+    let stars = measured(field, sky, &matches, excess_sigma_px);
+    let Hypothesis {
+        camera,
+        icrs_to_camera,
+        ..
+    } = guess.hypothesis;
+    let affordable = guess.model.filter(|m| is_affordable(*m, stars.len()));
+    let fit = fit_camera(&stars, camera, icrs_to_camera, affordable)?;
+    let excess_sigma_px = excess_sigma_of(field, &matches, &fit);
+    for (found, distance) in matches.iter_mut().zip(distances_px(&fit)) {
+        found.residual_px = distance;
+    }
+    Some(Refined {
+        hypothesis: Hypothesis {
             camera: fit.camera.clone(),
             icrs_to_camera: fit.icrs_to_camera,
             parameters: fit.parameters,
             zero_point_mag: zero_point_mag(field, sky, &matches),
-        };
-        let settled = last.as_ref().is_some_and(|l| same_pairs(&l.matches, &matches));
-        radius_px = radius_px.min(agreement_radius_px(&fit, radius_px));
-        last = Some(with_residuals(hypothesis.clone(), fit, matches, excess_px));
-        if settled {
-            break;
-        }
-    }
-    last
+        },
+        fit,
+        matches,
+        excess_sigma_px,
+    })
 }
 
 fn same_pairs(a: &[StarMatch], b: &[StarMatch]) -> bool {
@@ -105,31 +162,42 @@ fn measured(
     matches.iter().map(measured).collect()
 }
 
-/// The simplest fit that richer models do not clearly surpass in predicting stars left out of it.
-fn best_fit(
-    stars: &[MeasuredStar],
-    start: &Hypothesis,
+fn is_affordable(model: DistortionModel, stars: usize) -> bool {
+    2.0 * stars as f64 >= EQUATIONS_PER_PARAMETER * (model.terms() + POSE_PARAMETERS) as f64
+}
+
+/// The simplest model that richer ones do not clearly surpass in predicting stars left out of the fit.
+fn choose_model(
+    field: &StarField,
+    sky: &Sky,
+    current: &Refined,
     richest: Option<DistortionModel>,
-) -> Option<CameraFit> {
-    let fit = |model| fit_camera(stars, &start.camera, &start.icrs_to_camera, model);
-    let mut best = fit(None)?;
+) -> Option<DistortionModel> {
+    let stars = measured(field, sky, &current.matches, current.excess_sigma_px);
+    let left_out = |model| {
+        let Refined { fit, .. } = current;
+        fit_camera(&stars, &fit.camera, &fit.icrs_to_camera, model).map(|f| f.left_out_chi_sq)
+    };
+    let mut best = (None, left_out(None)?);
     for model in DistortionModel::ALL {
-        let parameters = model.terms() + best.covariance.nrows();
-        let affordable = 2.0 * stars.len() as f64 >= EQUATIONS_PER_PARAMETER * parameters as f64;
-        if Some(model) > richest || !affordable {
+        if Some(model) > richest || !is_affordable(model, stars.len()) {
             break;
         }
-        if let Some(richer) = fit(Some(model))
-            && richer.left_out_chi_sq < WORTH_IT * best.left_out_chi_sq
-        {
-            best = richer;
+        match left_out(Some(model)) {
+            Some(chi_sq) if chi_sq < WORTH_IT * best.1 => best = (Some(model), chi_sq),
+            // The quintic is not tried where the cubic is no better than what is simpler.
+            _ if model == DistortionModel::Cubic => break,
+            _ => {}
         }
     }
-    Some(best)
+    best.0
 }
 
 fn distances_px(fit: &CameraFit) -> Vec<f64> {
-    fit.residuals_px.iter().map(|[x, y]| x.hypot(*y)).collect()
+    fit.residuals_px
+        .iter()
+        .map(|[x, y]| (x * x + y * y).sqrt())
+        .collect()
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -143,24 +211,30 @@ fn median(mut values: Vec<f64>) -> f64 {
 /// The radius that holds practically all true pairs, by the typical residual of this fit.
 fn agreement_radius_px(fit: &CameraFit, before_px: f64) -> f64 {
     let sigma_px = median(distances_px(fit)) / RAYLEIGH_MEDIAN;
-    (CLIP * sigma_px * 1.5).max(MIN_RADIUS_PX).max(before_px / 4.0)
+    (CLIP * sigma_px * 1.5)
+        .max(MIN_RADIUS_PX)
+        .max(before_px / 4.0)
 }
 
 /// What must be added to the stated errors so that the residuals' median is as expected.
-fn excess_sigma_px(field: &StarField, matches: &[StarMatch], fit: &CameraFit) -> f64 {
+fn excess_sigma_of(field: &StarField, matches: &[StarMatch], fit: &CameraFit) -> f64 {
     let free = (2.0 * matches.len() as f64 - fit.parameters as f64).max(1.0)
         / (2.0 * matches.len() as f64).max(1.0);
     let distances = distances_px(fit);
     let typical = |excess_px: f64| {
-        let scaled = distances.iter().zip(matches).map(|(d, m)| {
-            d / field.stars[m.observed].sigma_px.hypot(excess_px).max(1e-3)
-        });
+        let scaled = distances
+            .iter()
+            .zip(matches)
+            .map(|(d, m)| d / field.stars[m.observed].sigma_px.hypot(excess_px).max(1e-3));
         median(scaled.collect()) / (RAYLEIGH_MEDIAN * free.sqrt())
     };
     if typical(0.0) <= 1.0 {
         return 0.0;
     }
-    let (mut low, mut high) = (0.0, distances.iter().fold(1e-3, |a: f64, &b| a.max(b)) * 2.0);
+    let (mut low, mut high) = (
+        0.0,
+        distances.iter().fold(1e-3, |a: f64, &b| a.max(b)) * 2.0,
+    );
     for _ in 0..30 {
         let middle = 0.5 * (low + high);
         if typical(middle) > 1.0 {
@@ -170,21 +244,4 @@ fn excess_sigma_px(field: &StarField, matches: &[StarMatch], fit: &CameraFit) ->
         }
     }
     high
-}
-
-fn with_residuals(
-    hypothesis: Hypothesis,
-    fit: CameraFit,
-    mut matches: Vec<StarMatch>,
-    excess_sigma_px: f64,
-) -> Refined {
-    for (found, distance) in matches.iter_mut().zip(distances_px(&fit)) {
-        found.residual_px = distance;
-    }
-    Refined {
-        hypothesis,
-        fit,
-        matches,
-        excess_sigma_px,
-    }
 }

@@ -5,8 +5,8 @@
 //! enough for that not to matter.
 
 use super::index::SizeClass;
+use super::refine::{Start, refine};
 use super::triangle::TriangleShape;
-use super::refine::refine;
 use super::verify::{Hypothesis, TESTED_STARS};
 use super::{Hints, Photometry, Sky, StarField};
 use crate::camera::{CameraModel, DistortionModel, focal_length_px, frame_centre};
@@ -29,20 +29,30 @@ struct Pass {
 
 /// First the likely, then the lens that distorts, then the frame with many false stars.
 const PASSES: [Pass; 3] = [
-    Pass { stars: 12, tolerance: 0.0025 },
-    Pass { stars: 10, tolerance: 0.008 },
-    Pass { stars: 22, tolerance: 0.0025 },
+    Pass {
+        stars: 12,
+        tolerance: 0.0025,
+    },
+    Pass {
+        stars: 10,
+        tolerance: 0.008,
+    },
+    Pass {
+        stars: 22,
+        tolerance: 0.0025,
+    },
 ];
 
 /// The centroid errors count so many times in a triangle's tolerance.
-const CENTROID_SIGMAS: f64 = 2.5;
+const CENTROID_SIGMAS: f64 = 2.0;
 /// Triangles must be so large, in units of the frame's diagonal.
 const MIN_TRIANGLE_SHARE: f64 = 0.12;
-/// Further stars asked about each hypothesis, and the share of them that must agree.
-const WITNESSES: usize = 10;
-const WITNESS_SHARE: f64 = 0.25;
-/// How far a witness may stand from its catalogue star, in tolerances of the frame's diagonal.
+/// Share of the other stars asked that must agree with a hypothesis, at every moment of the asking.
+const WITNESS_SHARE: f64 = 0.3;
+/// How far a witness may stand from its catalogue star: in distortion tolerances of the frame's diagonal, and in
+/// centroid errors extrapolated from the triangle.
 const WITNESS_TOLERANCES: f64 = 1.5;
+const WITNESS_SIGMAS: f64 = 3.5;
 /// Hypotheses above this are not reported.
 pub const LOG10_FALSE_ALARM_LIMIT: f64 = -9.0;
 
@@ -52,8 +62,6 @@ pub struct Found {
     pub hypothesis: Hypothesis,
     /// log10 of its false-alarm probability.
     pub log10_false_alarm: f64,
-    /// Hypotheses tried up to it, itself included.
-    pub hypotheses: u64,
 }
 
 /// The search over one field.
@@ -76,7 +84,10 @@ struct Trio {
     stars: [usize; 3],
     /// Largest distance of a corner from the frame's centre, in pixels.
     reach_px: f64,
+    /// How far its ratios may be from those of its catalogue triangle.
     tolerance: f64,
+    /// How far another star may be from its catalogue star.
+    witness_px: f64,
 }
 
 impl<'a> Search<'a> {
@@ -87,7 +98,7 @@ impl<'a> Search<'a> {
         let offsets = field
             .stars
             .iter()
-            .take(most.max(WITNESSES + 3))
+            .take(most)
             .map(|s| [s.position.x - centre.x, s.position.y - centre.y])
             .collect();
         let wide = focal_length_px(field.width_px, FOV_DEG.1 * FOV_SLACK * RAD_PER_DEG);
@@ -111,11 +122,6 @@ impl<'a> Search<'a> {
     /// The lowest false-alarm probability (log10) of the hypotheses that came as far as to have one.
     pub fn best_log10_false_alarm(&self) -> Option<f64> {
         self.best_log10
-    }
-
-    /// Hypotheses tried so far.
-    pub fn hypotheses(&self) -> u64 {
-        self.hypotheses
     }
 
     /// Goes through the triangles until a hypothesis passes.
@@ -150,11 +156,17 @@ impl<'a> Search<'a> {
             .iter()
             .map(|&s| self.field.stars[s].sigma_px)
             .fold(0.0, f64::max);
-        let centroid_tolerance = CENTROID_SIGMAS * std::f64::consts::SQRT_2 * sigma_px / longest_px;
+        let centroid_tolerance = CENTROID_SIGMAS * sigma_px / longest_px;
+        let leverage = 1.0 + 0.5 * self.diagonal_px / longest_px;
+        let distortion_px = WITNESS_TOLERANCES * distortion_tolerance * self.diagonal_px;
         Some(Trio {
             stars,
-            reach_px: [a, b, c].iter().map(|p| p[0].hypot(p[1])).fold(0.0, f64::max),
+            reach_px: [a, b, c]
+                .iter()
+                .map(|p| p[0].hypot(p[1]))
+                .fold(0.0, f64::max),
             tolerance: distortion_tolerance.hypot(centroid_tolerance),
+            witness_px: distortion_px.hypot(WITNESS_SIGMAS * leverage * sigma_px),
         })
     }
 
@@ -235,8 +247,9 @@ impl<'a> Search<'a> {
     ) -> Option<Found> {
         let stars = corners.map(|c| &self.sky.stars()[c as usize]);
         let sky = stars.map(|s| s.direction.as_vector());
-        let zero_points: [f64; 3] =
-            std::array::from_fn(|i| f64::from(stars[i].v_mag) - self.field.stars[trio.stars[i]].mag);
+        let zero_points: [f64; 3] = std::array::from_fn(|i| {
+            f64::from(stars[i].v_mag) - self.field.stars[trio.stars[i]].mag
+        });
         let zero_point = self.zero_point(zero_points)?;
         let chord = (sky[0] - sky[1]).norm();
         let focal_px = middle_px * longest / chord;
@@ -295,13 +308,10 @@ impl<'a> Search<'a> {
         mirrored: bool,
         zero_point: f64,
     ) -> bool {
-        let others = (self.offsets.len() - 3).min(WITNESSES);
-        let needed = ((others as f64 * WITNESS_SHARE).ceil() as usize).max(1);
-        let radius_rad = WITNESS_TOLERANCES * trio.tolerance * self.diagonal_px / focal_px;
+        let radius_rad = trio.witness_px / focal_px;
         let tolerance_mag = self.field.photometry.tolerance_mag();
         let sign = if mirrored { -1.0 } else { 1.0 };
-        let mut left = others;
-        let mut agree = 0;
+        let (mut asked, mut agree) = (0, 0);
         for (index, [u, v]) in self.offsets.iter().enumerate() {
             if trio.stars.contains(&index) {
                 continue;
@@ -316,29 +326,28 @@ impl<'a> Search<'a> {
                 (expected_v_mag + tolerance_mag) as f32,
                 |star| seen |= f64::from(star.v_mag) >= expected_v_mag - tolerance_mag,
             );
-            agree += usize::from(seen);
-            left -= 1;
-            if agree >= needed {
-                return true;
-            }
-            if left == 0 || agree + left < needed {
+            asked += 1;
+            agree += i32::from(seen);
+            if agree < (WITNESS_SHARE * f64::from(asked)) as i32 {
                 return false;
             }
         }
-        false
+        agree > 0
     }
 
     /// Fits the hypothesis to all the stars that agree and computes its false-alarm probability.
-    fn decide(&mut self, start: &Hypothesis, trio: &Trio) -> Option<Found> {
-        let radius_px = WITNESS_TOLERANCES * trio.tolerance * self.diagonal_px;
+    fn decide(&mut self, hypothesis: &Hypothesis, trio: &Trio) -> Option<Found> {
+        let start = Start {
+            hypothesis,
+            radius_px: trio.witness_px,
+        };
         let richest = Some(DistortionModel::Radial);
-        let refined = refine(self.field, TESTED_STARS, self.sky, start, radius_px, richest)?;
+        let refined = refine(self.field, TESTED_STARS, self.sky, &start, richest)?;
         let log10 = self.log10_false_alarm(&refined.hypothesis)?;
         self.best_log10 = Some(self.best_log10.map_or(log10, |best| best.min(log10)));
         (log10 <= LOG10_FALSE_ALARM_LIMIT).then_some(Found {
             hypothesis: refined.hypothesis,
             log10_false_alarm: log10,
-            hypotheses: self.hypotheses,
         })
     }
 
@@ -368,10 +377,7 @@ fn triple_of([a, b, c]: [&Vector3<f64>; 3]) -> f64 {
 }
 
 /// The rotation that brings A and B on the sky to where the camera saw them (TRIAD with the middle of AB first).
-fn two_star_rotation(
-    seen: &[Vector3<f64>; 3],
-    sky: [&Vector3<f64>; 3],
-) -> Option<Matrix3<f64>> {
+fn two_star_rotation(seen: &[Vector3<f64>; 3], sky: [&Vector3<f64>; 3]) -> Option<Matrix3<f64>> {
     let frame = |a: &Vector3<f64>, b: &Vector3<f64>| {
         let first = (a + b).try_normalize(1e-12)?;
         let third = a.cross(b).try_normalize(1e-15)?;

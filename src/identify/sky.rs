@@ -2,8 +2,8 @@
 
 use super::cache::{self, CacheError};
 use super::index::TriangleIndex;
-use crate::catalog::Star;
 use crate::catalog::sky_grid::SkyGrid;
+use crate::catalog::{Catalog, Star};
 use std::path::Path;
 
 /// Square degrees on the whole sky.
@@ -11,7 +11,7 @@ const WHOLE_SKY_SQ_DEG: f64 = 41_252.96;
 
 /// The catalogue's stars by place, and the triangles that they form.
 pub struct Sky<'a> {
-    stars: &'a [Star],
+    catalog: &'a Catalog,
     /// The stars by place.
     pub grid: SkyGrid,
     /// The triangles.
@@ -22,26 +22,25 @@ impl<'a> Sky<'a> {
     /// Takes the triangles from the cache directory, or makes them (`progress` is then called with the share
     /// done) and puts them there. Also returns what went wrong with the cache, which is no reason to stop.
     pub fn open(
-        stars: &'a [Star],
-        catalog_checksum: u64,
+        catalog: &'a Catalog,
         cache_directory: &Path,
         progress: &(dyn Fn(f64) + Sync),
     ) -> (Self, Vec<CacheError>) {
-        let path = cache::index_path(cache_directory, catalog_checksum);
+        let path = cache::index_path(cache_directory, catalog.checksum());
         let mut troubles = Vec::new();
-        let cached = cache::load(&path, catalog_checksum).unwrap_or_else(|trouble| {
+        let cached = cache::load(&path, catalog.checksum()).unwrap_or_else(|trouble| {
             troubles.push(trouble);
             None
         });
         let sky = match cached {
             Some(triangles) => Self {
-                stars,
-                grid: SkyGrid::new(stars),
+                catalog,
+                grid: SkyGrid::new(catalog.stars()),
                 triangles,
             },
             None => {
-                let sky = Self::build(stars, progress);
-                troubles.extend(cache::store(&path, catalog_checksum, &sky.triangles).err());
+                let sky = Self::build(catalog, progress);
+                troubles.extend(cache::store(&path, catalog.checksum(), &sky.triangles).err());
                 sky
             }
         };
@@ -49,11 +48,11 @@ impl<'a> Sky<'a> {
     }
 
     /// Makes everything anew.
-    pub fn build(stars: &'a [Star], progress: &(dyn Fn(f64) + Sync)) -> Self {
-        let grid = SkyGrid::new(stars);
-        let triangles = TriangleIndex::build(stars, &grid, progress);
+    pub fn build(catalog: &'a Catalog, progress: &(dyn Fn(f64) + Sync)) -> Self {
+        let grid = SkyGrid::new(catalog.stars());
+        let triangles = TriangleIndex::build(catalog.stars(), &grid, progress);
         Self {
-            stars,
+            catalog,
             grid,
             triangles,
         }
@@ -61,18 +60,23 @@ impl<'a> Sky<'a> {
 
     /// The catalogue's stars, brightest first.
     pub fn stars(&self) -> &'a [Star] {
-        self.stars
+        self.catalog.stars()
+    }
+
+    /// The catalogue.
+    pub fn catalog(&self) -> &'a Catalog {
+        self.catalog
     }
 
     /// The V magnitude of the faintest star; 0 if there is none.
     pub fn faintest_v_mag(&self) -> f64 {
-        self.stars.last().map_or(0.0, |s| f64::from(s.v_mag))
+        self.stars().last().map_or(0.0, |s| f64::from(s.v_mag))
     }
 
     /// The limiting magnitude to which there are, on average, so many stars on a square degree.
     pub fn magnitude_of_density(&self, per_sq_deg: f64) -> f64 {
         let rank = (per_sq_deg * WHOLE_SKY_SQ_DEG) as usize;
-        match self.stars.get(rank) {
+        match self.stars().get(rank) {
             Some(star) => f64::from(star.v_mag),
             None => self.faintest_v_mag(),
         }

@@ -105,6 +105,16 @@ impl Hypothesis {
         }
     }
 
+    /// The same stars where this hypothesis puts them.
+    pub fn predict_again(&self, sky: &Sky, predicted: &mut [PredictedStar]) {
+        for star in predicted {
+            let direction = &sky.stars()[star.catalog].direction;
+            if let Some(pixel) = self.camera.pixel_of(&self.icrs_to_camera.apply(direction)) {
+                star.pixel = pixel;
+            }
+        }
+    }
+
     /// The density of so many stars in the frame.
     fn per_sq_deg(&self, count: usize) -> f64 {
         count as f64 * RAD_PER_DEG.powi(2) / (self.camera.fov_x_rad() * self.camera.fov_y_rad())
@@ -154,7 +164,7 @@ impl Hypothesis {
     /// log10 of the expected number of hypotheses as good as this one among `hypotheses` that chance alone
     /// would give: the false-alarm probability where it is small.
     pub fn log10_false_alarm(&self, field: &StarField, sky: &Sky, hypotheses: u64) -> f64 {
-        let observed = &field.stars[..field.stars.len().min(TESTED_STARS)];
+        let observed = field.brightest(TESTED_STARS);
         let predicted = self.predict(sky, observed, field.photometry);
         let diagonal_px = field.width_px.hypot(field.height_px);
         let used_up = self.parameters.div_ceil(2);
@@ -189,7 +199,10 @@ impl Hypothesis {
             .iter()
             .map(|star| {
                 let (mut alike, mut near) = (0.0f64, 0.0f64);
-                for p in predicted.iter().filter(|p| self.alike(star, p, field.photometry)) {
+                for p in predicted
+                    .iter()
+                    .filter(|p| self.alike(star, p, field.photometry))
+                {
                     alike += 1.0;
                     near += f64::from(u8::from(p.pixel.distance_to(&star.position) <= reach_px));
                 }

@@ -1,0 +1,242 @@
+//! The spot size and the noise model of a frame, from its own bright stars.
+//!
+//! Bright peaks that are neither saturated nor close to others are fitted with a free size. The spot
+//! size is the mode of the sizes: hot pixels and cosmic rays are sharper, lamps and comets wider, and
+//! none of them need be few. From the residuals of the stars with that size follow the shot noise per
+//! ADU and the relative error of the spot model, by least squares of the squared residuals.
+
+use super::components::Peak;
+use super::fit::{Fit, FitConfig, NoiseModel, SPOT_RANGE_PX, window_radius};
+use super::psf::PIXEL_VARIANCE_PX2;
+use super::scene::{FitWork, Scene};
+use super::view::View;
+
+/// The spot size where the frame does not tell, in pixels: a well-focused camera.
+pub(super) const DEFAULT_SPOT_PX: f64 = 0.9;
+/// Peaks below this signal-to-noise ratio say little about the size.
+const MIN_SNR: f32 = 12.0;
+/// At most so many of the brightest peaks are fitted.
+const MAX_STARS: usize = 40;
+/// Peaks closer than this many spot sizes disturb each other.
+const ISOLATION_SIGMA: f32 = 6.0;
+/// Sizes below this are single pixels, in pixels.
+const HOT_PIXEL_PX: f64 = 0.28;
+/// Fewer stars than this do not make a mode.
+const MIN_STARS: usize = 3;
+/// A pixel whose noise the fit takes up beyond this part tells nothing of it.
+const MAX_LEVERAGE: f64 = 0.9;
+/// Residuals count at most this many variances; the first rounds, with a variance too low, need room.
+const MAX_SQUARED_SIGMA: f64 = 36.0;
+/// Rounds of the noise model's least squares.
+const NOISE_ROUNDS: usize = 3;
+/// The spot model cannot be worse than this, as a part of the light in a pixel: what is, is no star.
+const MAX_MODEL_ERROR: f64 = 0.1;
+/// Sizes within this factor of the mode are averaged.
+const MODE_WIDTH: f64 = 1.25;
+/// Rounds of averaging around the mode.
+const MODE_ROUNDS: usize = 4;
+
+/// A bright star fitted with a free size.
+#[derive(Debug, Clone)]
+pub(super) struct BrightStar {
+    /// The fit.
+    pub fit: Fit,
+}
+
+/// Fits the brightest peaks with a free size.
+pub(super) fn fit_bright_stars(
+    scene: &Scene<'_>,
+    filtered: View<'_>,
+    peaks: &[Peak],
+    work: &mut FitWork,
+) -> Vec<BrightStar> {
+    let isolation = ISOLATION_SIGMA * (scene.spot_px + 0.3) as f32;
+    let bright = peaks
+        .iter()
+        .take(4 * MAX_STARS)
+        .take_while(|p| p.snr >= MIN_SNR);
+    bright
+        .filter(|p| !p.saturated && is_isolated(p, &peaks[..peaks.len().min(2000)], isolation))
+        .filter_map(|&peak| {
+            let size = size_from_curvature(filtered, &peak, scene.spot_px);
+            let fit = scene.fit_free(scene.first_guess(&peak), size, NoiseModel::default(), work);
+            (fit.converged && fit.spots[0].flux > 0.0).then_some(BrightStar { fit })
+        })
+        .take(MAX_STARS)
+        .collect()
+}
+
+/// Whether no other peak of a tenth of the height lies within `reach` pixels.
+fn is_isolated(peak: &Peak, peaks: &[Peak], reach: f32) -> bool {
+    peaks.iter().all(|other| {
+        let dx = other.x as f32 - peak.x as f32;
+        let dy = other.y as f32 - peak.y as f32;
+        (dx == 0.0 && dy == 0.0) || dx.hypot(dy) > reach || other.snr < 0.1 * peak.snr
+    })
+}
+
+/// The spot size that the filtered peak's curvature tells: a Gaussian of variance
+/// σ² + σ_filter² + 2/12 falls to exp(−1/2S²) at the next pixel.
+fn size_from_curvature(filtered: View<'_>, peak: &Peak, filter_px: f64) -> f64 {
+    let (x, y) = (peak.x, peak.y);
+    let inside = x > 0 && y > 0 && x + 1 < filtered.width && y + 1 < filtered.height;
+    if !inside {
+        return filter_px;
+    }
+    let log = |x: usize, y: usize| f64::from(filtered.at(x, y).max(1e-3)).ln();
+    let around = log(x - 1, y) + log(x + 1, y) + log(x, y - 1) + log(x, y + 1);
+    let drop = log(x, y) - 0.25 * around;
+    let variance = 0.5 / drop.max(1e-3) - filter_px * filter_px - 2.0 * PIXEL_VARIANCE_PX2;
+    variance.max(0.0).sqrt().clamp(0.35, 6.0)
+}
+
+/// The frame's spot size from its bright stars, in pixels; `None` where there are too few.
+pub(super) fn spot_size(stars: &[BrightStar]) -> Option<f64> {
+    let mut sizes: Vec<f64> = stars
+        .iter()
+        .map(|star| star.fit.spot_px)
+        .filter(|&size| size > HOT_PIXEL_PX && size < SPOT_RANGE_PX.1)
+        .collect();
+    if sizes.len() < MIN_STARS {
+        return None;
+    }
+    sizes.sort_unstable_by(f64::total_cmp);
+    let mut center = half_sample_mode(&sizes);
+    // The mode is robust but rough: move to the mean of what lies around it.
+    for _ in 0..MODE_ROUNDS {
+        let near = |size: &&f64| (**size / center).max(center / **size) < MODE_WIDTH;
+        let (sum, count) = sizes
+            .iter()
+            .filter(near)
+            .fold((0.0, 0.0), |(s, n), size| (s + size, n + 1.0));
+        center = sum / count;
+    }
+    Some(center)
+}
+
+/// The mode of sorted positive values: the densest half (in ratio), again and again.
+///
+/// # Reference
+/// Bickel & Frühwirth 2006, doi 10.1016/j.csda.2005.07.011.
+fn half_sample_mode(sorted: &[f64]) -> f64 {
+    let mut values = sorted;
+    while values.len() > 3 {
+        let half = values.len().div_ceil(2);
+        let start = (0..=values.len() - half)
+            .min_by(|&a, &b| {
+                let ratio = |i: usize| values[i + half - 1] / values[i];
+                ratio(a).total_cmp(&ratio(b))
+            })
+            .unwrap_or(0);
+        values = &values[start..start + half];
+    }
+    values[values.len() / 2]
+}
+
+/// The noise model from the residuals of stars of about the frame's spot size.
+pub(super) fn noise_model(
+    scene: &Scene<'_>,
+    stars: &[BrightStar],
+    work: &mut FitWork,
+) -> NoiseModel {
+    let mut model = NoiseModel::default();
+    let usable: Vec<&BrightStar> = stars
+        .iter()
+        .filter(|s| (s.fit.spot_px / scene.spot_px).ln().abs() < MODE_WIDTH.ln())
+        .collect();
+    // Each round weighs the squared residuals by the variance that the round before found.
+    for _ in 0..NOISE_ROUNDS {
+        let mut sums = Moments::default();
+        for star in &usable {
+            let radius = window_radius(star.fit.spot_px);
+            scene.cut(&star.fit.spots, radius, &mut work.window);
+            let config = FitConfig {
+                spot_px: star.fit.spot_px,
+                free_spot: true,
+                noise: model,
+            };
+            let fit = work.fitter.fit(&work.window, &star.fit.spots, &config);
+            if fit.converged {
+                sums.add_star(work, &fit, &config);
+            }
+        }
+        model = sums.solve();
+        model.model_error2 = model.model_error2.min(MAX_MODEL_ERROR * MAX_MODEL_ERROR);
+    }
+    model
+}
+
+/// Sums for the least squares of `r² − n² = shot·m + ε²·m²` over pixels.
+#[derive(Debug, Default)]
+struct Moments {
+    /// Σ w m², Σ w m³, Σ w m⁴.
+    matrix: [f64; 3],
+    /// Σ w m d, Σ w m² d.
+    right: [f64; 2],
+}
+
+impl Moments {
+    /// Adds the pixels of one star that its light stands out in.
+    fn add_star(&mut self, work: &mut FitWork, fit: &Fit, config: &FitConfig) {
+        let noise = work.window.noise_variance;
+        let model = config.noise;
+        let FitWork { fitter, window } = work;
+        fitter.for_each_residual(window, fit, config, |residual, light, leverage| {
+            let m2 = light * light;
+            if light < 0.0 || m2 < 0.25 * noise || leverage > MAX_LEVERAGE {
+                return;
+            }
+            let variance = noise + model.shot_adu * light + model.model_error2 * m2;
+            let squared =
+                (residual * residual / (1.0 - leverage)).min(MAX_SQUARED_SIGMA * variance);
+            let weight = 1.0 / (variance * variance);
+            self.matrix[0] += weight * m2;
+            self.matrix[1] += weight * m2 * light;
+            self.matrix[2] += weight * m2 * m2;
+            self.right[0] += weight * light * (squared - noise);
+            self.right[1] += weight * m2 * (squared - noise);
+        });
+    }
+
+    /// The non-negative solution.
+    fn solve(&self) -> NoiseModel {
+        let [a, b, c] = self.matrix;
+        let [p, q] = self.right;
+        let determinant = a * c - b * b;
+        let (mut shot, mut error2) = (0.0, 0.0);
+        if determinant > 1e-9 * a * c && determinant.is_finite() {
+            shot = (p * c - q * b) / determinant;
+            error2 = (q * a - p * b) / determinant;
+        }
+        if shot < 0.0 || determinant <= 1e-9 * a * c {
+            shot = 0.0;
+            error2 = q / c;
+        }
+        if error2 < 0.0 {
+            error2 = 0.0;
+            shot = p / a;
+        }
+        let finite = |v: f64| if v.is_finite() { v.max(0.0) } else { 0.0 };
+        NoiseModel {
+            shot_adu: finite(shot),
+            model_error2: finite(error2),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mode_is_neither_hot_pixels_nor_lamps() {
+        let mut sizes = vec![0.3; 5];
+        sizes.extend((0..20).map(|i| 0.95 + 0.005 * f64::from(i)));
+        sizes.extend((0..12).map(|i| 2.0 + 0.4 * f64::from(i)));
+        let mode = half_sample_mode(&sizes);
+        assert!(
+            (0.9..1.1).contains(&mode) || (mode - 0.3).abs() < 1e-9,
+            "{mode}"
+        );
+    }
+}

@@ -1,0 +1,67 @@
+//! The grey-weighted centroid.
+
+use super::Detection;
+use super::fit::{Fit, NoiseModel, window_radius};
+use super::scene::{FitWork, Scene};
+use crate::coords::PixelPoint;
+
+/// Grey levels count above this many standard deviations of the background noise.
+const GREY_THRESHOLD_SIGMA: f64 = 3.0;
+
+/// Replaces position and standard errors by the grey-weighted mean: `x = Σ i g / Σ g`.
+///
+/// The window is the square of ±3 spot sizes about the pixel next to the fitted position; g is the
+/// grey level above background plus [`GREY_THRESHOLD_SIGMA`] of noise, 0 where negative. Where
+/// nothing is left of a faint star, the threshold drops to 0. Saturated pixels count as they are.
+///
+/// # Reference
+/// Wang et al. 2019, Laser & Optoelectronics Progress 56, 101101, Eq. (6). Differs from the source:
+/// the threshold, which it leaves open, is subtracted; that brings the error from some 1.4 times the
+/// Cramér-Rao bound to 1.1.
+pub(super) fn grey_weighted(
+    scene: &Scene<'_>,
+    noise: &NoiseModel,
+    fit: &Fit,
+    detection: &mut Detection,
+    work: &mut FitWork,
+) {
+    let radius = window_radius(scene.spot_px);
+    let unsaturated = Scene {
+        saturation_adu: f32::INFINITY,
+        ..*scene
+    };
+    let window = &mut work.window;
+    unsaturated.cut(&fit.spots[..1], radius, window);
+    for threshold_sigma in [GREY_THRESHOLD_SIGMA, 0.0] {
+        let threshold = threshold_sigma * window.noise_variance.sqrt();
+        let grey = |i: usize| {
+            let value = window.data[i] - threshold;
+            if value > 0.0 { value } else { 0.0 }
+        };
+        let (mut sum, mut sum_x, mut sum_y) = (0.0, 0.0, 0.0);
+        for i in 0..window.data.len() {
+            let (column, row) = ((i % window.width) as f64, (i / window.width) as f64);
+            sum += grey(i);
+            sum_x += column * grey(i);
+            sum_y += row * grey(i);
+        }
+        if sum <= 0.0 {
+            continue;
+        }
+        let (x, y) = (sum_x / sum, sum_y / sum);
+        let (mut variance_x, mut variance_y) = (0.0, 0.0);
+        for i in (0..window.data.len()).filter(|&i| grey(i) > 0.0) {
+            let (column, row) = ((i % window.width) as f64, (i / window.width) as f64);
+            let variance = window.noise_variance + noise.shot_adu * window.data[i];
+            variance_x += variance * (column - x).powi(2);
+            variance_y += variance * (row - y).powi(2);
+        }
+        detection.position = PixelPoint::new(x + window.x0 as f64, y + window.y0 as f64);
+        // A single pixel gives a position within that pixel.
+        let floor =
+            |variance: f64| (variance.sqrt() / sum).max(if variance > 0.0 { 0.0 } else { 0.29 });
+        detection.sigma_x_px = floor(variance_x);
+        detection.sigma_y_px = floor(variance_y);
+        return;
+    }
+}

@@ -1,0 +1,398 @@
+//! Connected regions above the threshold, and the peaks in them.
+//!
+//! filtered frame, its mean and noise → [`Peak`]s, strongest first, and the [`Region`]s they lie in.
+//!
+//! 1. Pixels above the threshold, in units of the local noise of the filtered frame.
+//! 2. Regions of 8-connected pixels.
+//! 3. Local maxima, each with its prominence: its height above the highest saddle towards a higher
+//!    maximum of the region.
+//! 4. Maxima that noise or the flank of a brighter star can explain are dropped.
+//!
+//! # Reference
+//! Edelsbrunner, Letscher & Zomorodian 2002, doi 10.1007/s00454-002-2885-2, for prominence as persistence.
+
+use super::background::Mesh;
+use super::matched_filter::{BLOCK_PX, Filtered};
+use super::view::View;
+use std::collections::HashMap;
+
+/// A maximum must stand this many noise standard deviations above its saddle to count by itself.
+const MIN_PROMINENCE: f32 = 3.0;
+/// And this part of its own height: shot noise and imperfect spots scale with it.
+const MIN_RELATIVE_PROMINENCE: f32 = 0.03;
+/// The same where the core is saturated: its plateau is no spot.
+const MIN_SATURATED_PROMINENCE: f32 = 0.3;
+/// Height of a real spot's wing four standard deviations out, over its peak, beyond a Gaussian.
+/// Moffat profiles with β = 2.5 to 4 have 0.5 to 2 % there.
+const WING_HEIGHT: f32 = 0.02;
+/// Wings are considered out to this many pixels.
+const WING_REACH_PX: usize = 64;
+
+/// A pixel above the threshold.
+#[derive(Debug, Clone, Copy)]
+struct Pixel {
+    x: u32,
+    y: u32,
+    /// Filtered value over its local noise.
+    snr: f32,
+}
+
+/// A local maximum of the filtered frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Peak {
+    /// Column.
+    pub x: usize,
+    /// Row.
+    pub y: usize,
+    /// Filtered value over its local noise.
+    pub snr: f32,
+    /// Height above the highest saddle towards a higher maximum of its region, in the same unit.
+    pub prominence: f32,
+    /// Index of its region.
+    pub region: usize,
+    /// Whether the spot's core reaches full scale.
+    pub saturated: bool,
+}
+
+/// A connected region above the threshold.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Region {
+    /// Number of pixels.
+    pub area_px: usize,
+    /// Number of peaks kept.
+    pub peaks: usize,
+    /// Centre, weighted with the filtered values.
+    pub x: f64,
+    /// Centre, weighted with the filtered values.
+    pub y: f64,
+    /// Standard deviation along the longer principal axis, in pixels.
+    pub major_px: f64,
+    /// Standard deviation along the shorter principal axis, in pixels.
+    pub minor_px: f64,
+}
+
+/// What the search needs to know.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SearchConfig {
+    /// Threshold in units of the local noise.
+    pub threshold: f32,
+    /// The spot's standard deviation, pixel included, in pixels.
+    pub spot_width_px: f32,
+    /// Level from which on a pixel is saturated, in ADU.
+    pub saturation_adu: f32,
+    /// The most peaks to keep.
+    pub max_peaks: usize,
+}
+
+/// Buffers of the search, and its result.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Search {
+    pixels: Vec<Pixel>,
+    /// Index in `pixels` of the first of each row, and the end.
+    row_starts: Vec<usize>,
+    parents: Vec<u32>,
+    /// Peaks, strongest first.
+    pub peaks: Vec<Peak>,
+    /// All regions.
+    pub regions: Vec<Region>,
+}
+
+impl Search {
+    /// Finds regions and peaks in `filtered`, whose mean and noise are in `mesh`.
+    pub fn run(
+        &mut self,
+        filtered: &Filtered,
+        mesh: &Mesh,
+        frame: &View<'_>,
+        config: &SearchConfig,
+    ) {
+        self.collect(filtered, mesh, config);
+        self.connect();
+        self.measure_regions_and_peaks(&filtered.view(), frame, config);
+        self.drop_unfounded_peaks(config);
+        for region in &mut self.regions {
+            region.peaks = 0;
+        }
+        for peak in &self.peaks {
+            self.regions[peak.region].peaks += 1;
+        }
+    }
+
+    /// Gathers the pixels above the threshold, row by row.
+    fn collect(&mut self, filtered: &Filtered, mesh: &Mesh, config: &SearchConfig) {
+        self.pixels.clear();
+        self.row_starts.clear();
+        let view = filtered.view();
+        let lowest = mesh
+            .level
+            .iter()
+            .zip(&mesh.spread)
+            .map(|(level, spread)| level + config.threshold * spread)
+            .fold(f32::INFINITY, f32::min);
+        // Levels are extrapolated at the borders, by at most half a step between cells.
+        let slack = mesh.level.iter().copied().fold(f32::NEG_INFINITY, f32::max)
+            - mesh.level.iter().copied().fold(f32::INFINITY, f32::min);
+        let lowest = lowest - slack;
+        for y in 0..view.height {
+            self.row_starts.push(self.pixels.len());
+            for (block, &maximum) in filtered.block_maxima(y).iter().enumerate() {
+                if maximum < lowest {
+                    continue;
+                }
+                let start = block * BLOCK_PX;
+                let values = &view.row(y)[start..(start + BLOCK_PX).min(view.width)];
+                for (i, &value) in values.iter().enumerate().filter(|(_, v)| **v >= lowest) {
+                    let x = start + i;
+                    let (level, spread) = mesh.at(x as f32, y as f32);
+                    let snr = (value - level) / spread;
+                    if snr >= config.threshold {
+                        self.pixels.push(Pixel {
+                            x: x as u32,
+                            y: y as u32,
+                            snr,
+                        });
+                    }
+                }
+            }
+        }
+        self.row_starts.push(self.pixels.len());
+    }
+
+    /// The pixels of row `y` with columns in `from..=to`, as a range of indices.
+    fn in_row(&self, y: usize, from: u32, to: u32) -> std::ops::Range<usize> {
+        let (Some(&start), Some(&end)) = (self.row_starts.get(y), self.row_starts.get(y + 1))
+        else {
+            return 0..0;
+        };
+        let row = &self.pixels[start..end];
+        let low = row.partition_point(|p| p.x < from);
+        let high = low + row[low..].iter().take_while(|p| p.x <= to).count();
+        start + low..start + high
+    }
+
+    /// The neighbours of pixel `index` that lie above the threshold.
+    fn neighbours(&self, index: usize) -> impl Iterator<Item = usize> + '_ {
+        let Pixel { x, y, .. } = self.pixels[index];
+        let rows = (y as usize).saturating_sub(1)..=y as usize + 1;
+        rows.flat_map(move |row| self.in_row(row, x.saturating_sub(1), x + 1))
+            .filter(move |&other| other != index)
+    }
+
+    /// Joins neighbouring pixels into regions.
+    fn connect(&mut self) {
+        let mut parents = std::mem::take(&mut self.parents);
+        parents.clear();
+        parents.extend(0..self.pixels.len() as u32);
+        for index in 0..self.pixels.len() {
+            for other in self.neighbours(index).take_while(|&other| other < index) {
+                join(&mut parents, index as u32, other as u32);
+            }
+        }
+        self.parents = parents;
+    }
+
+    /// Measures each region and finds its maxima.
+    fn measure_regions_and_peaks(
+        &mut self,
+        view: &View<'_>,
+        frame: &View<'_>,
+        config: &SearchConfig,
+    ) {
+        self.regions.clear();
+        self.peaks.clear();
+        let mut parents = std::mem::take(&mut self.parents);
+        let mut members: Vec<Vec<usize>> = Vec::new();
+        let mut region_of_root: HashMap<u32, usize> = HashMap::new();
+        for index in 0..self.pixels.len() {
+            let root = root_of(&mut parents, index as u32);
+            let region = *region_of_root.entry(root).or_insert(members.len());
+            if region == members.len() {
+                members.push(Vec::new());
+            }
+            members[region].push(index);
+        }
+        self.parents = parents;
+        for (region, members) in members.iter_mut().enumerate() {
+            self.regions.push(self.measure(members));
+            let first = self.peaks.len();
+            for &index in members.iter() {
+                let Pixel { x, y, snr } = self.pixels[index];
+                let (x, y) = (x as usize, y as usize);
+                if is_local_maximum(view, x, y) {
+                    self.peaks.push(Peak {
+                        x,
+                        y,
+                        snr,
+                        prominence: snr,
+                        region,
+                        saturated: is_saturated(frame, x, y, config),
+                    });
+                }
+            }
+            if self.peaks.len() - first > 1 {
+                self.find_prominences(members, first);
+            }
+        }
+    }
+
+    /// Area, centre and principal axes of a region.
+    fn measure(&self, members: &[usize]) -> Region {
+        let mut sums = [0.0f64; 6];
+        let origin = self.pixels[members[0]];
+        for &index in members {
+            let p = self.pixels[index];
+            let (x, y) = (
+                f64::from(p.x) - f64::from(origin.x),
+                f64::from(p.y) - f64::from(origin.y),
+            );
+            let w = f64::from(p.snr);
+            for (sum, term) in sums.iter_mut().zip([1.0, x, y, x * x, y * y, x * y]) {
+                *sum += w * term;
+            }
+        }
+        let [w, x, y, xx, yy, xy] = sums;
+        let (x, y) = (x / w, y / w);
+        let (xx, yy, xy) = (xx / w - x * x, yy / w - y * y, xy / w - x * y);
+        let middle = 0.5 * (xx + yy);
+        let half_range = (0.5 * (xx - yy)).hypot(xy);
+        Region {
+            area_px: members.len(),
+            peaks: 0,
+            x: x + f64::from(origin.x),
+            y: y + f64::from(origin.y),
+            // A pixel has a width of its own.
+            major_px: (middle + half_range + 1.0 / 12.0).sqrt(),
+            minor_px: (middle - half_range + 1.0 / 12.0).max(1.0 / 12.0).sqrt(),
+        }
+    }
+
+    /// Sets the prominences of the peaks from `first` on: floods the region from the top down; where
+    /// two floods meet, the lower peak has its saddle.
+    fn find_prominences(&mut self, members: &mut [usize], first: usize) {
+        members.sort_unstable_by(|&a, &b| {
+            self.pixels[b]
+                .snr
+                .total_cmp(&self.pixels[a].snr)
+                .then(a.cmp(&b))
+        });
+        let rank: HashMap<usize, u32> = members
+            .iter()
+            .enumerate()
+            .map(|(r, &index)| (index, r as u32))
+            .collect();
+        let peak_at: HashMap<(usize, usize), usize> = self.peaks[first..]
+            .iter()
+            .enumerate()
+            .map(|(i, p)| ((p.x, p.y), first + i))
+            .collect();
+        // Roots are the highest pixel of a flood, since `join` keeps the lower number: the rank.
+        let mut floods: Vec<u32> = (0..members.len() as u32).collect();
+        for (r, &index) in members.iter().enumerate() {
+            let snr = self.pixels[index].snr;
+            let higher: Vec<u32> = self
+                .neighbours(index)
+                .filter_map(|other| rank.get(&other).copied())
+                .filter(|&other| (other as usize) < r)
+                .collect();
+            for other in higher {
+                let (a, b) = (root_of(&mut floods, r as u32), root_of(&mut floods, other));
+                if a != b {
+                    let lower = self.pixels[members[a.max(b) as usize]];
+                    if let Some(&peak) = peak_at.get(&(lower.x as usize, lower.y as usize)) {
+                        self.peaks[peak].prominence = lower.snr - snr;
+                    }
+                    join(&mut floods, a, b);
+                }
+            }
+        }
+    }
+
+    /// Keeps the peaks that neither noise on a flank nor the wing of a brighter star explains.
+    fn drop_unfounded_peaks(&mut self, config: &SearchConfig) {
+        self.peaks
+            .sort_by(|a, b| b.snr.total_cmp(&a.snr).then((a.y, a.x).cmp(&(b.y, b.x))));
+        let mut kept: Vec<Peak> = Vec::new();
+        let mut grid: HashMap<(usize, usize), Vec<usize>> = HashMap::new();
+        let cell = |p: &Peak| (p.x / WING_REACH_PX, p.y / WING_REACH_PX);
+        for peak in &self.peaks {
+            let relative = if peak.saturated {
+                MIN_SATURATED_PROMINENCE
+            } else {
+                MIN_RELATIVE_PROMINENCE
+            };
+            if peak.prominence < peak.snr
+                && peak.prominence < MIN_PROMINENCE.max(relative * peak.snr)
+            {
+                continue;
+            }
+            let (cx, cy) = cell(peak);
+            let brighter = (cy.saturating_sub(1)..=cy + 1)
+                .flat_map(|gy| (cx.saturating_sub(1)..=cx + 1).map(move |gx| (gx, gy)))
+                .filter_map(|key| grid.get(&key))
+                .flatten();
+            let wings: f32 = brighter
+                .map(|&other| wing_of(&kept[other], peak, config))
+                .sum();
+            if peak.snr < config.threshold + wings {
+                continue;
+            }
+            // Only bright stars have wings that can matter.
+            if peak.snr * WING_HEIGHT > 0.1 {
+                grid.entry(cell(peak)).or_default().push(kept.len());
+            }
+            kept.push(*peak);
+            if kept.len() >= config.max_peaks {
+                break;
+            }
+        }
+        self.peaks = kept;
+    }
+}
+
+/// How high the wing of `bright` may stand at `peak`, in units of the noise.
+fn wing_of(bright: &Peak, peak: &Peak, config: &SearchConfig) -> f32 {
+    let dx = bright.x as f32 - peak.x as f32;
+    let dy = bright.y as f32 - peak.y as f32;
+    let distance = dx.hypot(dy) / (4.0 * config.spot_width_px);
+    let height = bright.snr * if bright.saturated { 3.0 } else { 1.0 };
+    WING_HEIGHT * height / (1.0 + distance.powi(3))
+}
+
+/// Whether no neighbour is higher; of equal ones the first in reading order counts.
+fn is_local_maximum(view: &View<'_>, x: usize, y: usize) -> bool {
+    let value = view.at(x, y);
+    let columns = x.saturating_sub(1)..(x + 2).min(view.width);
+    let rows = y.saturating_sub(1)..(y + 2).min(view.height);
+    rows.flat_map(|r| columns.clone().map(move |c| (r, c)))
+        .filter(|&at| at != (y, x))
+        .all(|(r, c)| {
+            let other = view.at(c, r);
+            other < value || (other == value && (r, c) > (y, x))
+        })
+}
+
+/// Whether a pixel within one pixel of (x, y) is saturated.
+fn is_saturated(frame: &View<'_>, x: usize, y: usize, config: &SearchConfig) -> bool {
+    let columns = x.saturating_sub(1)..(x + 2).min(frame.width);
+    (y.saturating_sub(1)..(y + 2).min(frame.height)).any(|r| {
+        frame.row(r)[columns.clone()]
+            .iter()
+            .any(|&p| p >= config.saturation_adu)
+    })
+}
+
+/// The representative of the set that `index` is in.
+fn root_of(parents: &mut [u32], mut index: u32) -> u32 {
+    while parents[index as usize] != index {
+        let grandparent = parents[parents[index as usize] as usize];
+        parents[index as usize] = grandparent;
+        index = grandparent;
+    }
+    index
+}
+
+/// Joins two sets; the lower number represents both.
+fn join(parents: &mut [u32], a: u32, b: u32) {
+    let (a, b) = (root_of(parents, a), root_of(parents, b));
+    parents[a.max(b) as usize] = a.min(b);
+}
