@@ -3,7 +3,7 @@
 //!
 //! `cargo run --example draw_frame -- OUT.png|OUT.tif RA DEC UP FOV WIDTH HEIGHT SEED` (angles in degrees)
 //!
-//! A `.png` has 8 bits and a short exposure, a `.tif` 16 bits and a longer one.
+//! A `.png` has 8 bits of 8 electrons each, a `.tif` 16 bits of 1 electron.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -21,18 +21,12 @@ use tiff::encoder::{Compression, DeflateLevel, Predictor, TiffEncoder, colortype
 const SPOT_SIGMA_PX: f64 = 1.0;
 /// Half the side of the square that a spot is drawn in, in pixels.
 const SPOT_REACH_PX: i64 = 8;
+/// Electrons from a star of magnitude 0.
+const ZERO_MAG_E: f64 = 250e3;
 const SKY_E: f64 = 100.0;
 const READ_NOISE_E: f64 = 5.0;
 /// The level that stands for no light, so that noise is not cut off below.
 const OFFSET_ADU: f64 = 10.0;
-
-/// How much light a frame collects, and how it is written.
-struct Exposure {
-    /// Electrons from a star of magnitude 0.
-    zero_mag_e: f64,
-    e_per_adu: f64,
-    most_adu: f64,
-}
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -51,26 +45,26 @@ fn main() -> Result<(), Box<dyn Error>> {
     let centre = UnitVector::from_ra_dec(ra_deg * RAD_PER_DEG, dec_deg * RAD_PER_DEG);
     let attitude = Rotation::looking_at(&centre, up_deg * RAD_PER_DEG);
     let is_png = Path::new(out).extension().is_some_and(|e| e == "png");
-    let (zero_mag_e, e_per_adu, most_adu) = if is_png {
-        (160e3, 8.0, 255.0)
+    let (e_per_adu, most_adu) = if is_png {
+        (8.0, 255.0)
     } else {
-        (400e3, 1.0, 65_535.0)
-    };
-    let exposure = Exposure {
-        zero_mag_e,
-        e_per_adu,
-        most_adu,
+        (1.0, 65_535.0)
     };
 
     let mut electrons = vec![SKY_E; (width * height) as usize];
-    for star in Catalog::built_in()?.stars() {
+    for star in Catalog::built_in().stars() {
         let pixel = camera.pixel_of(&attitude.apply(&star.direction));
         if let Some(pixel) = pixel.filter(|pixel| camera.contains(pixel)) {
-            let star_e = exposure.zero_mag_e * 10_f64.powf(-0.4 * f64::from(star.v_mag));
+            let star_e = ZERO_MAG_E * 10_f64.powf(-0.4 * f64::from(star.v_mag));
             add_spot(&mut electrons, width as i64, &pixel, star_e);
         }
     }
-    let pixels = expose(&electrons, &exposure, seed as u64)?;
+    let mut random = ChaCha8Rng::seed_from_u64(seed as u64);
+    let mut level = |&expected_e: &f64| -> Result<u16, Box<dyn Error>> {
+        let adu = OFFSET_ADU + caught_e(expected_e, &mut random)? / e_per_adu;
+        Ok(adu.round().clamp(0.0, most_adu) as u16)
+    };
+    let pixels: Vec<u16> = electrons.iter().map(&mut level).collect::<Result<_, _>>()?;
     let (width, height) = (width as u32, height as u32);
     if is_png {
         let bytes: Vec<u8> = pixels.iter().map(|&adu| adu as u8).collect();
@@ -115,15 +109,7 @@ fn share(offset_px: f64) -> f64 {
     (0..STEPS).map(density).sum::<f64>() / f64::from(STEPS)
 }
 
-/// From expected electrons to levels.
-fn expose(electrons: &[f64], how: &Exposure, seed: u64) -> Result<Vec<u16>, Box<dyn Error>> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let read_noise = Normal::new(0.0, READ_NOISE_E)?;
-    let level = |&expected_e: &f64| {
-        let caught_e = Poisson::new(expected_e)?.sample(&mut random);
-        let signal_e = caught_e + read_noise.sample(&mut random);
-        let adu = (OFFSET_ADU + signal_e / how.e_per_adu).round();
-        Ok(adu.clamp(0.0, how.most_adu) as u16)
-    };
-    electrons.iter().map(level).collect()
+/// Electrons that are read out where so many are expected.
+fn caught_e(expected_e: f64, random: &mut ChaCha8Rng) -> Result<f64, Box<dyn Error>> {
+    Ok(Poisson::new(expected_e)?.sample(random) + Normal::new(0.0, READ_NOISE_E)?.sample(random))
 }

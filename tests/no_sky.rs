@@ -11,6 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use std::fmt::Write;
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 const SIDE: u32 = 512;
@@ -117,24 +118,35 @@ fn pictures_of_anything_but_the_sky_are_not_identified() {
         GrayImage::from_pixel(SIDE, SIDE, Luma([0])),
         GrayImage::from_pixel(SIDE, SIDE, Luma([255])),
     ];
-    assert_none_is_identified("process", &saved(directory.path(), images));
+    assert_none_is_identified(&["process"], &saved(directory.path(), images));
 }
 
-#[test]
-fn lists_of_random_positions_are_not_identified() {
-    const LISTS: u64 = 60;
-    let directory = tempfile::tempdir().unwrap();
+/// Lists of up to `most` positions and magnitudes that mean nothing.
+fn random_lists(directory: &Path, seeds: Range<u64>, most: usize) -> Vec<PathBuf> {
     let list = |seed: u64| {
         let mut random = random(seed);
         let mut text = "x,y,mag\n".to_owned();
-        for _ in 0..random.random_range(1..80) {
+        for _ in 0..random.random_range(1..=most) {
             let mut draw = |most: f64| random.random_range(0.0..most);
             writeln!(text, "{},{},{}", draw(1024.0), draw(768.0), draw(6.0)).unwrap();
         }
-        let path = directory.path().join(format!("{seed}.csv"));
+        let path = directory.join(format!("{seed}.csv"));
         fs::write(&path, text).unwrap();
         path
     };
-    let lists: Vec<PathBuf> = (0..LISTS).map(list).collect();
-    assert_none_is_identified("identify", &lists);
+    seeds.map(list).collect()
+}
+
+#[test]
+fn random_positions_are_not_identified_with_nothing_known() {
+    let directory = tempfile::tempdir().unwrap();
+    let lists = random_lists(directory.path(), 0..20, 25);
+    assert_none_is_identified(&["identify"], &lists);
+}
+
+#[test]
+fn random_positions_are_not_identified_with_a_scale_given() {
+    let directory = tempfile::tempdir().unwrap();
+    let lists = random_lists(directory.path(), 100..140, 60);
+    assert_none_is_identified(&["identify", "--fov", "15"], &lists);
 }
