@@ -312,6 +312,7 @@ impl<'a> Pipeline<'a> {
             width_px: list.width as f64,
             height_px: list.height as f64,
             photometry: list.photometry,
+            years_since_j2000: 0.0,
             stars: centroids.iter().map(observed).collect(),
         };
         let all: Vec<usize> = (0..centroids.len()).collect();
@@ -368,6 +369,7 @@ fn star_field(frame: &Frame, detections: &Detections) -> (StarField, Vec<usize>)
         width_px: frame.width as f64,
         height_px: frame.height as f64,
         photometry: Photometry::Instrumental,
+        years_since_j2000: std::env::var("YR").map_or(0.0, |v| v.parse().unwrap_or(0.0)),
         stars: kept.iter().map(observed).collect(),
     };
     (field, kept)

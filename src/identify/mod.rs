@@ -58,6 +58,8 @@ pub struct StarField {
     pub height_px: f64,
     /// What the magnitudes of `stars` mean.
     pub photometry: Photometry,
+    /// When they were seen, in Julian years since J2000.0: the stars move.
+    pub years_since_j2000: f64,
     /// Brightest first.
     pub stars: Vec<ObservedStar>,
 }

@@ -15,8 +15,8 @@ const RAYLEIGH_MEDIAN: f64 = 1.177_41;
 const MIN_RADIUS_PX: f64 = 0.25;
 /// A distortion model is tried where there are so many equations to each parameter.
 const EQUATIONS_PER_PARAMETER: f64 = 2.5;
-/// A richer model must lower the left-out χ² to this share to be taken.
-const WORTH_IT: f64 = 0.9;
+/// How much likelier (twice the logarithm) a richer model must make the stars left out of the fit to be taken.
+const WORTH_IT: f64 = 6.0;
 /// Rounds of pairing and fitting at the most.
 const MAX_ROUNDS: usize = 8;
 
@@ -46,7 +46,7 @@ pub fn refine(
 ) -> Option<Refined> {
     let observed = field.brightest(observed_count);
     let hypothesis = start.hypothesis;
-    let mut predicted = hypothesis.predict(sky, observed, field.photometry);
+    let mut predicted = hypothesis.predict(sky, field, observed);
     let matches = hypothesis.pair_up(observed, &predicted, field.photometry, start.radius_px);
     if matches.len() < start.fewest {
         return None;
@@ -57,7 +57,7 @@ pub fn refine(
     let mut model_chosen = false;
     for _ in 0..MAX_ROUNDS {
         radius_px = agreement_radius_px(&current.fit, radius_px);
-        current.hypothesis.predict_again(sky, &mut predicted);
+        current.hypothesis.predict_again(sky, field, &mut predicted);
         let matches = current
             .hypothesis
             .pair_up(observed, &predicted, field.photometry, radius_px);
@@ -154,7 +154,7 @@ fn measured(
         let star = &field.stars[m.observed];
         MeasuredStar {
             pixel: star.position,
-            icrs: sky.stars()[m.catalog].direction,
+            icrs: sky.stars()[m.catalog].direction_at(field.years_since_j2000),
             sigma_px: star.sigma_px.hypot(excess_px).max(1e-3),
         }
     };
@@ -177,13 +177,16 @@ fn choose_model(
         let Refined { fit, .. } = current;
         fit_camera(&stars, &fit.camera, &fit.icrs_to_camera, model).map(|f| f.left_out_chi_sq)
     };
+    let equations = 2.0 * stars.len() as f64;
     let mut best = (None, left_out(None)?);
     for model in DistortionModel::ALL {
         if Some(model) > richest || !is_affordable(model, stars.len()) {
             break;
         }
         match left_out(Some(model)) {
-            Some(chi_sq) if chi_sq < WORTH_IT * best.1 => best = (Some(model), chi_sq),
+            Some(chi_sq) if equations * (best.1 / chi_sq).ln() > WORTH_IT => {
+                best = (Some(model), chi_sq);
+            }
             // The quintic is not tried where the cubic is no better than what is simpler.
             _ if model == DistortionModel::Cubic => break,
             _ => {}

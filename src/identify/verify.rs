@@ -86,15 +86,15 @@ impl Hypothesis {
     pub fn predict(
         &self,
         sky: &Sky,
+        field: &StarField,
         observed: &[ObservedStar],
-        photometry: Photometry,
     ) -> Vec<PredictedStar> {
-        let (wanted, mut limit) = match Depth::of(observed, photometry) {
+        let (wanted, mut limit) = match Depth::of(observed, field.photometry) {
             Depth::Magnitude(limit) => (0, limit),
             Depth::Count(count) => (count, sky.magnitude_of_density(self.per_sq_deg(count))),
         };
         loop {
-            let mut predicted = self.predict_to(sky, limit);
+            let mut predicted = self.predict_to(sky, limit, field.years_since_j2000);
             if predicted.len() >= wanted || limit > sky.faintest_v_mag() {
                 if wanted > 0 {
                     predicted.truncate(wanted);
@@ -106,10 +106,10 @@ impl Hypothesis {
     }
 
     /// The same stars where this hypothesis puts them.
-    pub fn predict_again(&self, sky: &Sky, predicted: &mut [PredictedStar]) {
+    pub fn predict_again(&self, sky: &Sky, field: &StarField, predicted: &mut [PredictedStar]) {
         for star in predicted {
-            let direction = &sky.stars()[star.catalog].direction;
-            if let Some(pixel) = self.camera.pixel_of(&self.icrs_to_camera.apply(direction)) {
+            let direction = sky.stars()[star.catalog].direction_at(field.years_since_j2000);
+            if let Some(pixel) = self.camera.pixel_of(&self.icrs_to_camera.apply(&direction)) {
                 star.pixel = pixel;
             }
         }
@@ -120,15 +120,15 @@ impl Hypothesis {
         count as f64 * RAD_PER_DEG.powi(2) / (self.camera.fov_x_rad() * self.camera.fov_y_rad())
     }
 
-    fn predict_to(&self, sky: &Sky, faintest_v_mag: f64) -> Vec<PredictedStar> {
+    fn predict_to(&self, sky: &Sky, faintest_v_mag: f64, years: f64) -> Vec<PredictedStar> {
         let margin_px = MARGIN * self.camera.width_px.hypot(self.camera.height_px);
         let radius_rad = self.camera.radius_rad() * (1.0 + 2.0 * MARGIN);
         let centre = self.icrs_to_camera.inverse().apply(&UnitVector::BORESIGHT);
         let mut predicted = Vec::new();
         sky.grid
             .for_each_within(&centre, radius_rad, faintest_v_mag as f32, |star| {
-                let direction = &sky.stars()[star.catalog as usize].direction;
-                let pixel = self.camera.pixel_of(&self.icrs_to_camera.apply(direction));
+                let direction = sky.stars()[star.catalog as usize].direction_at(years);
+                let pixel = self.camera.pixel_of(&self.icrs_to_camera.apply(&direction));
                 if let Some(pixel) = pixel.filter(|p| self.camera.nearly_contains(p, margin_px)) {
                     predicted.push(PredictedStar {
                         pixel,
@@ -165,7 +165,7 @@ impl Hypothesis {
     /// would give: the false-alarm probability where it is small.
     pub fn log10_false_alarm(&self, field: &StarField, sky: &Sky, hypotheses: u64) -> f64 {
         let observed = field.brightest(TESTED_STARS);
-        let predicted = self.predict(sky, observed, field.photometry);
+        let predicted = self.predict(sky, field, observed);
         let diagonal_px = field.width_px.hypot(field.height_px);
         let used_up = self.parameters.div_ceil(2);
         let best = RADII
