@@ -61,7 +61,7 @@ fn solve_all(
     let pool = thread_pool(resources.threads)?;
     let catalog = catalog(resources.catalog.as_deref())?;
     let sky = pool.install(|| sky(&catalog, &resources));
-    let pipeline = Pipeline::new(&catalog, sky);
+    let pipeline = Pipeline::new(sky);
     let report = |input: &PathBuf, workspace: &mut Workspace| {
         let solution = solve(&pipeline, input, workspace)?;
         let name = input.display().to_string();
@@ -146,9 +146,9 @@ fn sky<'a>(catalog: &'a Catalog, resources: &ResourceArgs) -> Sky<'a> {
     let progress = bar(100, "indexing the catalogue {wide_bar} {percent} %");
     let show = |part: f64| progress.set_position((part * 100.0) as u64);
     let Some(directory) = cache::directory(resources.cache_dir.clone()) else {
-        return Sky::build(catalog.stars(), &show);
+        return Sky::build(catalog, &show);
     };
-    let (sky, troubles) = Sky::open(catalog.stars(), catalog.checksum(), &directory, &show);
+    let (sky, troubles) = Sky::open(catalog, &directory, &show);
     progress.finish_and_clear();
     for trouble in troubles {
         warn(chained(&trouble.into()));
