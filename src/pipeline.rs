@@ -12,8 +12,7 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let catalog = Catalog::built_in();
 //! // Takes some seconds; `Sky::open` keeps what it makes for the next time.
-//! let sky = Sky::build(catalog.stars(), &|_| {});
-//! let pipeline = Pipeline::new(catalog, sky);
+//! let pipeline = Pipeline::new(Sky::build(catalog, &|_| {}));
 //! let mut workspace = Workspace::new();
 //! let solution =
 //!     pipeline.solve_file("night.tif".as_ref(), &SolveConfig::default(), &mut workspace)?;
@@ -223,21 +222,20 @@ pub struct ListedCentroid {
 /// Standard error assumed on each axis of a centroid that comes without one, in pixels.
 pub const LISTED_SIGMA_PX: f64 = 0.5;
 
-/// The catalogue and what is made of it for identification, ready for any number of frames.
+/// The stages, ready for any number of frames.
 pub struct Pipeline<'a> {
-    catalog: &'a Catalog,
     sky: Sky<'a>,
 }
 
 impl<'a> Pipeline<'a> {
-    /// Frames are identified with the stars of `catalog`, of which `sky` must be made.
-    pub fn new(catalog: &'a Catalog, sky: Sky<'a>) -> Self {
-        Self { catalog, sky }
+    /// Frames are identified with the stars of `sky`.
+    pub fn new(sky: Sky<'a>) -> Self {
+        Self { sky }
     }
 
     /// The catalogue.
     pub fn catalog(&self) -> &'a Catalog {
-        self.catalog
+        self.sky.catalog()
     }
 
     /// Examines the frame in the file `path`.

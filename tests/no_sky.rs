@@ -78,8 +78,13 @@ fn grid_of_dots() -> GrayImage {
     image
 }
 
-fn assert_none_is_identified(command: &str, inputs: &[PathBuf]) {
-    let ran = Ran::new(starpipe().args([command, "--format", "json"]).args(inputs));
+fn assert_none_is_identified(command: &[&str], inputs: &[PathBuf]) {
+    let ran = Ran::new(
+        starpipe()
+            .args(command)
+            .args(["--format", "json"])
+            .args(inputs),
+    );
     for report in ran.reports() {
         assert_eq!(report["status"], "not_identified", "{}", report["frame"]);
         assert!(

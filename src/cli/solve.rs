@@ -61,7 +61,7 @@ fn solve_all(
     let pool = thread_pool(resources.threads)?;
     let catalog = catalog(resources.catalog.as_deref())?;
     let sky = pool.install(|| sky(&catalog, &resources));
-    let pipeline = Pipeline::new(&catalog, sky);
+    let pipeline = Pipeline::new(sky);
     let report = |input: &PathBuf, workspace: &mut Workspace| {
         let solution = solve(&pipeline, input, workspace)?;
         let name = input.display().to_string();
