@@ -28,6 +28,7 @@ fn main() {
         let field = StarField {
             width_px: h[0].parse().unwrap(),
             height_px: h[1].parse().unwrap(),
+            years_since_j2000: 0.0,
             photometry: if h[2] == "V" {
                 Photometry::JohnsonV
             } else {

@@ -161,7 +161,7 @@ fn complete(field: &StarField, sky: &Sky, search: &Search, found: Found) -> Iden
     let start = Start {
         hypothesis: &found.refined.hypothesis,
         radius_px: FINAL_RADIUS_SHARE * field.width_px.hypot(field.height_px),
-        fewest: 0,
+        sceptical: false,
     };
     let richest = Some(DistortionModel::Quintic);
     let with_all = refine(field, usize::MAX, sky, &start, richest)

@@ -6,6 +6,7 @@ use super::verify::Hypothesis;
 use super::{Photometry, Sky, StarField, StarMatch};
 use crate::attitude::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera};
 use crate::camera::DistortionModel;
+use std::f64::consts::PI;
 
 /// Pairs further apart than so many times the typical distance are no pairs.
 const CLIP: f64 = 3.5;
@@ -17,6 +18,8 @@ const MIN_RADIUS_PX: f64 = 0.25;
 const EQUATIONS_PER_PARAMETER: f64 = 2.5;
 /// How much likelier (twice the logarithm) a richer model must make the stars left out of the fit to be taken.
 const WORTH_IT: f64 = 6.0;
+/// A sceptic wants so many standard deviations more agreement than chance makes.
+const SCEPTICAL_SIGMAS: f64 = 3.0;
 /// Rounds of pairing and fitting at the most.
 const MAX_ROUNDS: usize = 8;
 
@@ -48,8 +51,13 @@ pub fn refine(
     let hypothesis = start.hypothesis;
     let mut predicted = hypothesis.predict(sky, field, observed);
     let matches = hypothesis.pair_up(observed, &predicted, field.photometry, start.radius_px);
-    if matches.len() < start.fewest {
-        return None;
+    if start.sceptical {
+        let area_px = field.width_px * field.height_px;
+        let discs_px = predicted.len() as f64 * PI * start.radius_px.powi(2);
+        let by_chance = observed.len() as f64 * (discs_px / area_px).min(1.0);
+        if (matches.len() as f64) < by_chance + SCEPTICAL_SIGMAS * (by_chance + 0.1).sqrt() {
+            return None;
+        }
     }
     let mut model = hypothesis.camera.distortion.as_ref().map(|d| d.model());
     let mut radius_px = start.radius_px;
@@ -84,8 +92,8 @@ pub struct Start<'a> {
     pub hypothesis: &'a Hypothesis,
     /// How far true pairs may be apart under it.
     pub radius_px: f64,
-    /// Pairs without which it is not worth a fit.
-    pub fewest: usize,
+    /// Whether to give up at once where no more stars agree than chance would have agree.
+    pub sceptical: bool,
 }
 
 /// A hypothesis, and the distortion model to fit from there.

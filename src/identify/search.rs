@@ -9,8 +9,10 @@ use super::refine::{Refined, Start, refine};
 use super::triangle::TriangleShape;
 use super::verify::{Hypothesis, TESTED_STARS};
 use super::{Hints, Photometry, Sky, StarField};
+use crate::attitude::POSE_PARAMETERS;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px, frame_centre};
-use crate::coords::{Rotation, UnitVector};
+use crate::catalog::sky_grid::GridStar;
+use crate::coords::{Icrs, Rotation, UnitVector};
 use crate::units::RAD_PER_DEG;
 use nalgebra::{Matrix3, Vector3};
 
@@ -47,10 +49,14 @@ const PASSES: [Pass; 3] = [
 const CENTROID_SIGMAS: f64 = 2.0;
 /// Triangles must be so large, in units of the frame's diagonal.
 const MIN_TRIANGLE_SHARE: f64 = 0.12;
-/// Share of the other stars asked that must agree with a hypothesis, at every moment of the asking.
-const WITNESS_SHARE: f64 = 0.3;
-/// Share of the tested stars that must agree before a hypothesis is worth a fit.
-const MIN_AGREEING: f64 = 0.15;
+/// Probability that another observed star agrees with a true hypothesis: some are false, some not in the catalogue.
+const TRUE_WITNESS: f64 = 0.6;
+/// A hypothesis is dropped when the other stars make it so unlikely (log likelihood ratio), ...
+const DROP_BELOW: f64 = -3.5;
+/// ... looked into when they make it so likely, ...
+const TAKE_ABOVE: f64 = 7.0;
+/// ... and when, all of them asked, they speak for it at least so much.
+const TAKE_AT_END: f64 = 1.0;
 /// How far a witness may stand from its catalogue star: in distortion tolerances of the frame's diagonal, and in
 /// centroid errors extrapolated from the triangle.
 const WITNESS_TOLERANCES: f64 = 1.5;
@@ -90,6 +96,22 @@ struct Trio {
     tolerance: f64,
     /// How far another star may be from its catalogue star.
     witness_px: f64,
+}
+
+/// A first idea of camera and attitude.
+struct Pose {
+    sky_to_camera: Matrix3<f64>,
+    focal_px: f64,
+    mirrored: bool,
+}
+
+impl Pose {
+    /// Where the star at this offset from the frame's centre stands on the sky.
+    fn direction_of(&self, [u, v]: &[f64; 2]) -> UnitVector<Icrs> {
+        let u = if self.mirrored { -u } else { *u };
+        let camera = Vector3::new(u, *v, self.focal_px).normalize();
+        UnitVector::from_unit(self.sky_to_camera.tr_mul(&camera))
+    }
 }
 
 impl<'a> Search<'a> {
@@ -270,16 +292,20 @@ impl<'a> Search<'a> {
         if mirrored {
             seen.iter_mut().for_each(|v| v.x = -v.x);
         }
-        let sky_to_camera = two_star_rotation(&seen, sky)?;
+        let pose = Pose {
+            sky_to_camera: two_star_rotation(&seen, sky)?,
+            focal_px,
+            mirrored,
+        };
         self.hypotheses += 1;
-        if !self.witnesses_agree(trio, &sky_to_camera, focal_px, mirrored, zero_point) {
+        if !self.witnesses_agree(trio, &pose, zero_point) {
             return None;
         }
         let (width_px, height_px) = (self.field.width_px, self.field.height_px);
         let hypothesis = Hypothesis {
             camera: CameraModel::pinhole(width_px, height_px, focal_px, mirrored),
-            icrs_to_camera: Rotation::from_matrix(sky_to_camera),
-            parameters: 4,
+            icrs_to_camera: Rotation::from_matrix(pose.sky_to_camera),
+            parameters: POSE_PARAMETERS,
             zero_point_mag: zero_point,
         };
         self.decide(&hypothesis, trio)
@@ -301,40 +327,39 @@ impl<'a> Search<'a> {
         consistent.then_some(zero_point)
     }
 
-    /// Asks the brightest other stars whether a catalogue star of about their brightness stands where they are.
-    fn witnesses_agree(
-        &self,
-        trio: &Trio,
-        sky_to_camera: &Matrix3<f64>,
-        focal_px: f64,
-        mirrored: bool,
-        zero_point: f64,
-    ) -> bool {
-        let radius_rad = trio.witness_px / focal_px;
+    /// Asks the brightest other stars, one after the other, whether a catalogue star of about their
+    /// brightness stands where they are, until it is clear whether the hypothesis is worth a closer look
+    /// (Wald 1945, Ann. Math. Stat. 16, 117: the sequential probability ratio test).
+    fn witnesses_agree(&self, trio: &Trio, pose: &Pose, zero_point: f64) -> bool {
+        let radius_rad = trio.witness_px / pose.focal_px;
         let tolerance_mag = self.field.photometry.tolerance_mag();
-        let sign = if mirrored { -1.0 } else { 1.0 };
-        let (mut asked, mut agree) = (0, 0);
-        for (index, [u, v]) in self.offsets.iter().enumerate() {
+        let mut evidence = 0.0;
+        for (index, offset) in self.offsets.iter().enumerate() {
             if trio.stars.contains(&index) {
                 continue;
             }
-            let camera = Vector3::new(sign * u, *v, focal_px).normalize();
-            let direction = UnitVector::from_unit(sky_to_camera.tr_mul(&camera));
-            let expected_v_mag = self.field.stars[index].mag + zero_point;
+            let direction = pose.direction_of(offset);
+            let v_mag = self.field.stars[index].mag + zero_point;
+            let (bright, faint) = (v_mag - tolerance_mag, v_mag + tolerance_mag);
             let mut seen = false;
-            self.sky.grid.for_each_within(
-                &direction,
-                radius_rad,
-                (expected_v_mag + tolerance_mag) as f32,
-                |star| seen |= f64::from(star.v_mag) >= expected_v_mag - tolerance_mag,
-            );
-            asked += 1;
-            agree += i32::from(seen);
-            if agree < (WITNESS_SHARE * f64::from(asked)) as i32 {
-                return false;
+            let mut look = |star: &GridStar| seen |= f64::from(star.v_mag) >= bright;
+            self.sky
+                .grid
+                .for_each_within(&direction, radius_rad, faint as f32, &mut look);
+            let chance = self
+                .sky
+                .chance_within(radius_rad, bright, faint)
+                .min(TRUE_WITNESS);
+            evidence += if seen {
+                (TRUE_WITNESS / chance).ln()
+            } else {
+                ((1.0 - TRUE_WITNESS) / (1.0 - chance)).ln()
+            };
+            if !(DROP_BELOW..TAKE_ABOVE).contains(&evidence) {
+                return evidence > 0.0;
             }
         }
-        agree > 0
+        evidence > TAKE_AT_END
     }
 
     /// Fits the hypothesis to all the stars that agree and computes its false-alarm probability.
@@ -342,7 +367,7 @@ impl<'a> Search<'a> {
         let start = Start {
             hypothesis,
             radius_px: trio.witness_px,
-            fewest: (MIN_AGREEING * self.field.brightest(TESTED_STARS).len() as f64) as usize,
+            sceptical: true,
         };
         let richest = Some(DistortionModel::Radial);
         let refined = refine(self.field, TESTED_STARS, self.sky, &start, richest)?;

@@ -16,6 +16,31 @@ pub struct Sky<'a> {
     pub grid: SkyGrid,
     /// The triangles.
     pub triangles: TriangleIndex,
+    counts: MagnitudeCounts,
+}
+
+/// How many stars there are to each magnitude, in steps small enough to interpolate.
+struct MagnitudeCounts(Vec<f64>);
+
+impl MagnitudeCounts {
+    const BRIGHTEST_V_MAG: f64 = -2.0;
+    const STEPS_PER_MAG: f64 = 4.0;
+    const STEPS: usize = 80;
+
+    fn new(stars: &[Star]) -> Self {
+        let count = |step: usize| {
+            let v_mag = Self::BRIGHTEST_V_MAG + step as f64 / Self::STEPS_PER_MAG;
+            stars.partition_point(|s| f64::from(s.v_mag) < v_mag) as f64
+        };
+        Self((0..=Self::STEPS).map(count).collect())
+    }
+
+    fn brighter_than(&self, v_mag: f64) -> f64 {
+        let place = (v_mag - Self::BRIGHTEST_V_MAG) * Self::STEPS_PER_MAG;
+        let place = place.clamp(0.0, Self::STEPS as f64 - 1e-9);
+        let (step, part) = (place as usize, place.fract());
+        self.0[step] + part * (self.0[step + 1] - self.0[step])
+    }
 }
 
 impl<'a> Sky<'a> {
@@ -33,11 +58,7 @@ impl<'a> Sky<'a> {
             None
         });
         let sky = match cached {
-            Some(triangles) => Self {
-                catalog,
-                grid: SkyGrid::new(catalog.stars()),
-                triangles,
-            },
+            Some(triangles) => Self::new(catalog, SkyGrid::new(catalog.stars()), triangles),
             None => {
                 let sky = Self::build(catalog, progress);
                 troubles.extend(cache::store(&path, catalog.checksum(), &sky.triangles).err());
@@ -47,15 +68,20 @@ impl<'a> Sky<'a> {
         (sky, troubles)
     }
 
-    /// Makes everything anew.
-    pub fn build(catalog: &'a Catalog, progress: &(dyn Fn(f64) + Sync)) -> Self {
-        let grid = SkyGrid::new(catalog.stars());
-        let triangles = TriangleIndex::build(catalog.stars(), &grid, progress);
+    fn new(catalog: &'a Catalog, grid: SkyGrid, triangles: TriangleIndex) -> Self {
         Self {
             catalog,
             grid,
             triangles,
+            counts: MagnitudeCounts::new(catalog.stars()),
         }
+    }
+
+    /// Makes everything anew.
+    pub fn build(catalog: &'a Catalog, progress: &(dyn Fn(f64) + Sync)) -> Self {
+        let grid = SkyGrid::new(catalog.stars());
+        let triangles = TriangleIndex::build(catalog.stars(), &grid, progress);
+        Self::new(catalog, grid, triangles)
     }
 
     /// The catalogue's stars, brightest first.
@@ -71,6 +97,15 @@ impl<'a> Sky<'a> {
     /// The V magnitude of the faintest star; 0 if there is none.
     pub fn faintest_v_mag(&self) -> f64 {
         self.stars().last().map_or(0.0, |s| f64::from(s.v_mag))
+    }
+
+    /// The probability that one of the catalogue's stars between two magnitudes stands within `radius_rad` of a direction
+    /// taken at random.
+    pub fn chance_within(&self, radius_rad: f64, bright_v_mag: f64, faint_v_mag: f64) -> f64 {
+        let stars =
+            self.counts.brighter_than(faint_v_mag) - self.counts.brighter_than(bright_v_mag);
+        // The disc's share of the sphere.
+        (stars * radius_rad * radius_rad / 4.0).max(1e-9)
     }
 
     /// The limiting magnitude to which there are, on average, so many stars on a square degree.
