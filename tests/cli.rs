@@ -463,6 +463,31 @@ fn a_catalogue_that_cannot_be_read_ends_with_1() {
     }
 }
 
+#[test]
+fn an_imported_catalogue_serves_as_well() {
+    let directory = tempfile::tempdir().unwrap();
+    let compact = directory.path().join("bright.cat");
+    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/catalogs/sky2000-bright.csv");
+    let arguments = ["catalog", "import", source, "--vmag-limit", "6", "-o"];
+    let imported = Ran::new(starpipe().args(arguments).arg(&compact));
+    assert_eq!(imported.status, 0, "{}", imported.stderr);
+    assert!(
+        imported.stdout.contains("5008 stars"),
+        "{}",
+        imported.stdout
+    );
+    let ran = run(&[
+        "process",
+        "--format",
+        "json",
+        "--catalog",
+        text(&compact),
+        text(&orion()),
+    ]);
+    assert_eq!(ran.status, 0, "{}{}", ran.stdout, ran.stderr);
+    assert!(number(&ran.reports()[0], "/magnitude/faintest_vmag") < 6.0);
+}
+
 // ---- Lists of centroids ---------------------------------------------------------------------
 
 #[test]
