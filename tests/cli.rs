@@ -351,7 +351,13 @@ fn a_cache_that_cannot_be_written_costs_time_and_nothing_else() {
 #[test]
 fn a_damaged_cache_is_made_anew() {
     let cache = tempfile::tempdir().unwrap();
-    let process = || run(&["process", "--cache-dir", text(cache.path()), text(&orion())]);
+    // A small catalogue, since its index is made again and again.
+    let bright = concat!(env!("CARGO_MANIFEST_DIR"), "/catalogs/sky2000-bright.csv");
+    let process = || {
+        let mut command = starpipe();
+        command.args(["process", "--catalog", bright, "--cache-dir"]);
+        Ran::new(command.arg(cache.path()).arg(orion()))
+    };
     let files = || -> Vec<PathBuf> {
         let entries = fs::read_dir(cache.path()).unwrap();
         entries
@@ -461,6 +467,31 @@ fn a_catalogue_that_cannot_be_read_ends_with_1() {
             assert!(!Path::new("never-written.cat").exists());
         }
     }
+}
+
+#[test]
+fn an_imported_catalogue_serves_as_well() {
+    let directory = tempfile::tempdir().unwrap();
+    let compact = directory.path().join("bright.cat");
+    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/catalogs/sky2000-bright.csv");
+    let arguments = ["catalog", "import", source, "--vmag-limit", "6", "-o"];
+    let imported = Ran::new(starpipe().args(arguments).arg(&compact));
+    assert_eq!(imported.status, 0, "{}", imported.stderr);
+    assert!(
+        imported.stdout.contains("5008 stars"),
+        "{}",
+        imported.stdout
+    );
+    let ran = run(&[
+        "process",
+        "--format",
+        "json",
+        "--catalog",
+        text(&compact),
+        text(&orion()),
+    ]);
+    assert_eq!(ran.status, 0, "{}{}", ran.stdout, ran.stderr);
+    assert!(number(&ran.reports()[0], "/magnitude/faintest_vmag") < 6.0);
 }
 
 // ---- Lists of centroids ---------------------------------------------------------------------

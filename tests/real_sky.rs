@@ -60,12 +60,16 @@ fn all_real_frames_are_identified_where_others_found_them() {
             truth.fov_error(&report),
             truth.roll_error_deg(&report),
         );
+        // A row of the README's table.
         println!(
-            "{}: centre off by {centre_deg:.4}°, field by {:.2} %, roll by {roll_deg:.3}°, {} stars of {}",
+            "| {} | {} of {} | {:.1}″ | {:+.2} % | {:.0} | {:.0} ms |",
             row["file"],
-            fov * 100.0,
             number(&report, "/match/matched"),
             number(&report, "/match/detected"),
+            centre_deg * 3600.0,
+            fov * 100.0,
+            number(&report, "/match/log10_false_alarm"),
+            number(&report, "/timing_ms/total"),
         );
         let right = centre_deg < CENTRE_TOLERANCE_DEG
             && fov.abs() < FOV_TOLERANCE

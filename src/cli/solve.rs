@@ -151,7 +151,8 @@ fn sky<'a>(catalog: &'a Catalog, resources: &ResourceArgs) -> Sky<'a> {
     let (sky, troubles) = Sky::open(catalog, &directory, &show);
     progress.finish_and_clear();
     for trouble in troubles {
-        warn(chained(&trouble.into()));
+        let trouble = chained(&trouble.into());
+        warn(format_args!("{trouble}; the index was made anew"));
     }
     sky
 }
