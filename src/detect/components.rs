@@ -353,7 +353,7 @@ impl Search {
 fn wing_of(bright: &Peak, peak: &Peak, config: &SearchConfig) -> f32 {
     let dx = bright.x as f32 - peak.x as f32;
     let dy = bright.y as f32 - peak.y as f32;
-    let distance = dx.hypot(dy) / (4.0 * config.spot_width_px);
+    let distance = (dx * dx + dy * dy).sqrt() / (4.0 * config.spot_width_px);
     let height = bright.snr * if bright.saturated { 3.0 } else { 1.0 };
     WING_HEIGHT * height / (1.0 + distance.powi(3))
 }

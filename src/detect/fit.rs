@@ -16,8 +16,8 @@ use super::psf::{AxisProfile, MAX_WINDOW_PX};
 pub(super) const MAX_SPOTS: usize = 6;
 const MAX_PARAMETERS: usize = 3 * MAX_SPOTS + 2;
 const MAX_STEPS: usize = 15;
-/// Steps shorter than this, in px, end the fit.
-const CONVERGED_PX: f64 = 2e-4;
+/// Steps shorter than this, in px, end the fit; convergence is quadratic, so little is left after one.
+const CONVERGED_PX: f64 = 2e-3;
 /// The longest step, in px: farther, the model is not linear.
 const MAX_STEP_PX: f64 = 0.5;
 /// The range of free spot sizes, in px.

@@ -136,8 +136,14 @@ impl Filtered {
         let left: Vec<&[f32]> = (0..=radius).map(|j| shifted(radius - j)).collect();
         let right: Vec<&[f32]> = (0..=radius).map(|j| shifted(radius + j)).collect();
         symmetric_sum(&kernel.half, &left, &right, out);
-        for x in (0..view.width).filter(|&x| x < radius || x + radius >= view.width) {
-            out[x] *= kernel.border_factor(x, view.width - 1 - x);
+        let last = view.width - 1;
+        let inner = radius.min(view.width)
+            ..view
+                .width
+                .saturating_sub(radius)
+                .max(radius.min(view.width));
+        for x in (0..inner.start).chain(inner.end..view.width) {
+            out[x] *= kernel.border_factor(x, last - x);
         }
     }
 

@@ -209,7 +209,7 @@ impl Neighbours {
             .filter(|&other| {
                 let dx = peaks[other].x as f64 - peaks[index].x as f64;
                 let dy = peaks[other].y as f64 - peaks[index].y as f64;
-                dx.hypot(dy) <= self.cell_px
+                dx * dx + dy * dy <= self.cell_px * self.cell_px
             })
             .collect();
         found.sort_unstable();
