@@ -28,6 +28,13 @@ const WING_HEIGHT: f32 = 0.02;
 /// Wings are considered out to this many pixels.
 const WING_REACH_PX: usize = 64;
 
+/// A streak has at least so many maxima.
+const MIN_STREAK_PEAKS: usize = 4;
+/// A streak's longer principal axis over the shorter.
+const STREAK_ELONGATION: f64 = 4.0;
+/// A streak's longer principal axis over the spot's width.
+const STREAK_LENGTH_SIGMA: f32 = 5.0;
+
 /// A pixel above the threshold.
 #[derive(Debug, Clone, Copy)]
 struct Pixel {
@@ -71,6 +78,15 @@ pub(super) struct Region {
     pub minor_px: f64,
 }
 
+impl Region {
+    /// Whether the region is one long streak with many maxima, and not a handful of stars in a row.
+    fn is_streak(&self, config: &SearchConfig) -> bool {
+        self.peaks >= MIN_STREAK_PEAKS
+            && self.major_px > STREAK_ELONGATION * self.minor_px
+            && self.major_px > f64::from(STREAK_LENGTH_SIGMA * config.spot_width_px)
+    }
+}
+
 /// What the search needs to know.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SearchConfig {
@@ -110,6 +126,19 @@ impl Search {
         self.connect();
         self.measure_regions_and_peaks(&filtered.view(), frame, config);
         self.drop_unfounded_peaks(config);
+        self.count_peaks();
+        let before = self.peaks.len();
+        let regions = &self.regions;
+        let mut seen = std::collections::HashSet::new();
+        // Strongest first: of a streak's many maxima only the first stays.
+        self.peaks
+            .retain(|p| !regions[p.region].is_streak(config) || seen.insert(p.region));
+        if self.peaks.len() < before {
+            self.count_peaks();
+        }
+    }
+
+    fn count_peaks(&mut self) {
         for region in &mut self.regions {
             region.peaks = 0;
         }

@@ -229,6 +229,26 @@ impl Fitter {
         }
     }
 
+    /// The direction in which the light about the first spot is drawn out: a unit vector, or `None`.
+    pub fn residual_axis(&mut self, window: &Window, fit: &Fit) -> Option<(f64, f64)> {
+        let spot = fit.spots[0];
+        let (x, y) = (spot.x - window.x0 as f64, spot.y - window.y0 as f64);
+        let (mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0);
+        let noise = window.noise_variance.sqrt();
+        for (i, value) in window.data.iter().enumerate() {
+            let above = value - fit.background - noise;
+            if above > 0.0 {
+                let dx = (i % window.width) as f64 - x;
+                let dy = (i / window.width) as f64 - y;
+                xx += above * dx * dx;
+                yy += above * dy * dy;
+                xy += above * dx * dy;
+            }
+        }
+        let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
+        angle.is_finite().then(|| (angle.cos(), angle.sin()))
+    }
+
     /// Calls `visit(residual, light, leverage)` for each pixel with a value, at the solution `fit` of a
     /// fit with `config`; the leverage is the part of a pixel's noise that the parameters take up.
     pub fn for_each_residual(
