@@ -334,7 +334,7 @@ fn half_the_stars_at_the_threshold_are_found() {
     const MAX_SNR50_RATIO: f64 = 1.096;
     for (spot, simulated) in [(0.7, 4.91), (1.0, 4.69), (1.5, 4.45)] {
         let config = config_with(spot, 1.0);
-        let fraction = |snr: f64| accuracy_on_grid(spot, snr, 8, &config, 60).found;
+        let fraction = |snr: f64| accuracy_on_grid(spot, snr, 5, &config, 60).found;
         let (low, high) = (simulated - 0.4, simulated + 0.4);
         let (at_low, at_high) = (fraction(low), fraction(high));
         let snr50 = low + (0.5 - at_low) / (at_high - at_low) * (high - low);
@@ -437,23 +437,26 @@ fn a_trail_is_one_flagged_source_and_a_nebula_is_extended() {
 
 #[test]
 fn touching_stars_are_separated_and_flagged() {
+    // Eighteen pairs among eighteen single stars, which tell what a single star looks like.
     let mut sky = Sky::flat(256, 256, BACKGROUND_E);
-    for i in 0..36 {
-        let (x, y) = (
-            20.3 + 40.0 * f64::from(i % 6),
-            20.7 + 40.0 * f64::from(i / 6),
-        );
+    let places: Vec<(f64, f64)> = (0..36)
+        .map(|i| {
+            (
+                20.3 + 40.0 * f64::from(i % 6),
+                20.7 + 40.0 * f64::from(i / 6),
+            )
+        })
+        .collect();
+    for (i, &(x, y)) in places.iter().enumerate() {
         sky.add_star(x, y, 8000.0, 1.0);
-        sky.add_star(x + 2.9, y + 1.1, 5000.0, 1.0);
+        if i % 2 == 0 {
+            sky.add_star(x + 2.9, y + 1.1, 5000.0, 1.0);
+        }
     }
     let found = found_in(&sky.expose(4), &config_with(1.0, 0.1));
-    assert_eq!(found.sources.len(), 72);
-    assert!(found.sources.iter().all(|s| s.flags.blended));
-    for i in 0..36 {
-        let (x, y) = (
-            20.3 + 40.0 * f64::from(i % 6),
-            20.7 + 40.0 * f64::from(i / 6),
-        );
+    assert_eq!(found.sources.len(), 54);
+    assert_eq!(found.sources.iter().filter(|s| s.flags.blended).count(), 36);
+    for &(x, y) in places.iter().step_by(2) {
         let faint = nearest(&found, x + 2.9, y + 1.1, 0.4).expect("the fainter of the pair");
         assert!(
             (faint.flux_adu / 5000.0 - 1.0).abs() < 0.15,
