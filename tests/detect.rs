@@ -1,6 +1,11 @@
 //! Detection and centroids on simulated frames whose truth is known: false alarms, completeness,
 //! accuracy against the Cramér-Rao bound, honesty of the standard errors, flags, hostile frames.
 
+#![allow(
+    clippy::unwrap_used,
+    reason = "a simulation that cannot be set up is a failed test"
+)]
+
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -340,6 +345,46 @@ fn half_the_stars_at_the_threshold_are_found() {
         let snr50 = low + (0.5 - at_low) / (at_high - at_low) * (high - low);
         println!("spot {spot}: SNR50 {snr50:.2}, simulated matched filter {simulated}");
         assert!(snr50 / simulated < MAX_SNR50_RATIO, "{snr50}");
+    }
+}
+
+#[test]
+fn bright_stars_without_noise_are_placed_without_bias() {
+    // Limits.md, section 8, from σ = 0.5 px on.
+    const MAX_BIAS_PX: f64 = 0.002;
+    for spot in [0.5, 0.7, 1.0, 1.5] {
+        let mut rng = ChaCha8Rng::seed_from_u64(21);
+        let mut sky = Sky::flat(400, 400, BACKGROUND_E);
+        let truth: Vec<(f64, f64)> = (0..144)
+            .map(|i| {
+                let place = |n: i32| 30.0 + 30.0 * f64::from(n);
+                (
+                    place(i % 12) + rng.random_range(-0.5..0.5),
+                    place(i / 12) + rng.random_range(-0.5..0.5),
+                )
+            })
+            .collect();
+        for &(x, y) in &truth {
+            sky.add_star(x, y, 20_000.0, spot);
+        }
+        let pixels = sky
+            .mean
+            .iter()
+            .map(|&m| (m + 0.1 * rng.sample::<f64, _>(StandardNormal)) as f32);
+        let frame = Frame::new(400, 400, pixels.collect()).unwrap();
+        let found = found_in(&frame, &DetectConfig::default());
+        let worst = truth
+            .iter()
+            .map(|t| {
+                nearest(&found, t.0, t.1, 1.0)
+                    .map_or(1.0, |s| (s.position.x - t.0).hypot(s.position.y - t.1))
+            })
+            .fold(0.0, f64::max);
+        println!(
+            "spot {spot}: worst error without noise {worst:.5} px, spot found {:.4}",
+            found.spot_sigma_px
+        );
+        assert!(worst < MAX_BIAS_PX, "spot {spot}: {worst}");
     }
 }
 

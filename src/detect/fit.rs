@@ -465,13 +465,13 @@ fn inverse_diagonal(
 ) -> [f64; MAX_PARAMETERS] {
     let mut variances = [0.0; MAX_PARAMETERS];
     // Column by column: L⁻¹, whose squared columns sum to the diagonal of (L Lᵀ)⁻¹.
-    for column in 0..count {
+    for (column, variance) in variances.iter_mut().enumerate().take(count) {
         let mut x = [0.0; MAX_PARAMETERS];
         for i in column..count {
             let unit = if i == column { 1.0 } else { 0.0 };
             let dot: f64 = (column..i).map(|k| l[i][k] * x[k]).sum();
             x[i] = (unit - dot) / l[i][i];
-            variances[column] += x[i] * x[i];
+            *variance += x[i] * x[i];
         }
     }
     variances
