@@ -56,12 +56,16 @@ impl Sky {
     }
 
     fn add_star(&mut self, x: f64, y: f64, flux: f64, sigma: f64) {
-        let (cx, cy) = (x.round() as i64, y.round() as i64);
-        for row in (cy - STAMP_PX).max(0)..=(cy + STAMP_PX).min(self.height as i64 - 1) {
-            let part_y = pixel_part(row as f64, y, sigma);
-            for column in (cx - STAMP_PX).max(0)..=(cx + STAMP_PX).min(self.width as i64 - 1) {
-                self.mean[row as usize * self.width + column as usize] +=
-                    flux * part_y * pixel_part(column as f64, x, sigma);
+        let parts = |center: f64, side: usize| -> Vec<(usize, f64)> {
+            let middle = center.round() as i64;
+            let span = (middle - STAMP_PX).max(0)..=(middle + STAMP_PX).min(side as i64 - 1);
+            span.map(|i| (i as usize, pixel_part(i as f64, center, sigma)))
+                .collect()
+        };
+        let across = parts(x, self.width);
+        for (row, part_y) in parts(y, self.height) {
+            for &(column, part_x) in &across {
+                self.mean[row * self.width + column] += flux * part_y * part_x;
             }
         }
     }
@@ -220,15 +224,18 @@ fn false_alarm_rates_of_other_noise() {
 /// The Cramér-Rao bound of x for a star at this place, flux and background unknown.
 fn cramer_rao_px(x: f64, y: f64, flux: f64, sigma: f64) -> f64 {
     let (mut information, step) = (0.0, 1e-4);
-    for row in -10..=10 {
-        for column in -10..=10 {
-            let light = |dx: f64| {
-                pixel_part(f64::from(column), x - x.round() + dx, sigma)
-                    * pixel_part(f64::from(row), y - y.round(), sigma)
-            };
-            let slope = flux * (light(step) - light(-step)) / (2.0 * step);
-            information +=
-                slope * slope / (BACKGROUND_E + READ_NOISE_E.powi(2) + flux * light(0.0));
+    let parts = |center: f64| -> Vec<f64> {
+        (-10..=10)
+            .map(|i| pixel_part(f64::from(i), center, sigma))
+            .collect()
+    };
+    let (x, y) = (x - x.round(), y - y.round());
+    let (low, middle, high, down) = (parts(x - step), parts(x), parts(x + step), parts(y));
+    for row in &down {
+        for column in 0..middle.len() {
+            let slope = flux * row * (high[column] - low[column]) / (2.0 * step);
+            let light = flux * row * middle[column];
+            information += slope * slope / (BACKGROUND_E + READ_NOISE_E.powi(2) + light);
         }
     }
     information.powf(-0.5)
