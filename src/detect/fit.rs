@@ -169,7 +169,7 @@ impl Fitter {
         let count = parameter_count(fit.spots.len(), &with_size);
         let mut normal = self.linearise(window, fit, &with_size);
         fit.chi2 = normal.chi2;
-        fit.degrees = (normal.pixels + 2 - count) as f64;
+        fit.degrees = normal.pixels as f64 + 2.0 - count as f64;
         let fitted = if config.free_spot { count } else { count - 1 };
         // The size comes last: the leading block of the factor is that of a fit without it.
         if let Some(change) = solve(&mut normal, count) {
