@@ -1,6 +1,11 @@
 //! Detection and centroids on simulated frames whose truth is known: false alarms, completeness,
 //! accuracy against the Cramér-Rao bound, honesty of the standard errors, flags, hostile frames.
 
+#![allow(
+    clippy::unwrap_used,
+    reason = "a simulation that cannot be set up is a failed test"
+)]
+
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -51,12 +56,16 @@ impl Sky {
     }
 
     fn add_star(&mut self, x: f64, y: f64, flux: f64, sigma: f64) {
-        let (cx, cy) = (x.round() as i64, y.round() as i64);
-        for row in (cy - STAMP_PX).max(0)..=(cy + STAMP_PX).min(self.height as i64 - 1) {
-            let part_y = pixel_part(row as f64, y, sigma);
-            for column in (cx - STAMP_PX).max(0)..=(cx + STAMP_PX).min(self.width as i64 - 1) {
-                self.mean[row as usize * self.width + column as usize] +=
-                    flux * part_y * pixel_part(column as f64, x, sigma);
+        let parts = |center: f64, side: usize| -> Vec<(usize, f64)> {
+            let middle = center.round() as i64;
+            let span = (middle - STAMP_PX).max(0)..=(middle + STAMP_PX).min(side as i64 - 1);
+            span.map(|i| (i as usize, pixel_part(i as f64, center, sigma)))
+                .collect()
+        };
+        let across = parts(x, self.width);
+        for (row, part_y) in parts(y, self.height) {
+            for &(column, part_x) in &across {
+                self.mean[row * self.width + column] += flux * part_y * part_x;
             }
         }
     }
@@ -215,15 +224,18 @@ fn false_alarm_rates_of_other_noise() {
 /// The Cramér-Rao bound of x for a star at this place, flux and background unknown.
 fn cramer_rao_px(x: f64, y: f64, flux: f64, sigma: f64) -> f64 {
     let (mut information, step) = (0.0, 1e-4);
-    for row in -10..=10 {
-        for column in -10..=10 {
-            let light = |dx: f64| {
-                pixel_part(f64::from(column), x - x.round() + dx, sigma)
-                    * pixel_part(f64::from(row), y - y.round(), sigma)
-            };
-            let slope = flux * (light(step) - light(-step)) / (2.0 * step);
-            information +=
-                slope * slope / (BACKGROUND_E + READ_NOISE_E.powi(2) + flux * light(0.0));
+    let parts = |center: f64| -> Vec<f64> {
+        (-10..=10)
+            .map(|i| pixel_part(f64::from(i), center, sigma))
+            .collect()
+    };
+    let (x, y) = (x - x.round(), y - y.round());
+    let (low, middle, high, down) = (parts(x - step), parts(x), parts(x + step), parts(y));
+    for row in &down {
+        for column in 0..middle.len() {
+            let slope = flux * row * (high[column] - low[column]) / (2.0 * step);
+            let light = flux * row * middle[column];
+            information += slope * slope / (BACKGROUND_E + READ_NOISE_E.powi(2) + light);
         }
     }
     information.powf(-0.5)
@@ -249,8 +261,18 @@ fn flux_for(snr: f64, spot: f64) -> f64 {
 }
 
 fn accuracy(spot: f64, snr: f64, frames: u64, config: &DetectConfig) -> Accuracy {
+    accuracy_on_grid(spot, snr, frames, config, 27)
+}
+
+/// The same for stars `spacing` pixels apart.
+fn accuracy_on_grid(
+    spot: f64,
+    snr: f64,
+    frames: u64,
+    config: &DetectConfig,
+    spacing: usize,
+) -> Accuracy {
     const SIDE: usize = 640;
-    const SPACING: usize = 27;
     let flux = flux_for(snr, spot);
     let (mut errors, mut bounds, mut pulls, mut count, mut stars) = (0.0, 0.0, 0.0, 0.0, 0.0);
     let mut spot_sum = 0.0;
@@ -258,10 +280,10 @@ fn accuracy(spot: f64, snr: f64, frames: u64, config: &DetectConfig) -> Accuracy
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut sky = Sky::flat(SIDE, SIDE, BACKGROUND_E);
         let mut truth = Vec::new();
-        for i in 0..(SIDE / SPACING - 1).pow(2) {
-            let n = SIDE / SPACING - 1;
-            let x = ((i % n + 1) * SPACING) as f64 + rng.random_range(-0.5..0.5);
-            let y = ((i / n + 1) * SPACING) as f64 + rng.random_range(-0.5..0.5);
+        for i in 0..(SIDE / spacing - 1).pow(2) {
+            let n = SIDE / spacing - 1;
+            let x = ((i % n + 1) * spacing) as f64 + rng.random_range(-0.5..0.5);
+            let y = ((i / n + 1) * spacing) as f64 + rng.random_range(-0.5..0.5);
             sky.add_star(x, y, flux, spot);
             truth.push((x, y));
         }
@@ -315,4 +337,293 @@ fn the_fit_reaches_the_cramer_rao_bound_with_honest_errors() {
         }
     }
     assert!(failures.is_empty(), "{failures:?}");
+}
+
+#[test]
+fn half_the_stars_at_the_threshold_are_found() {
+    // SNR50 of the matched filter at 1 false alarm per Mpx (limits.md, section 2): 4.91, 4.69, 4.45
+    // for σ = 0.7, 1, 1.5; 0.1 mag is a factor 1.096.
+    const MAX_SNR50_RATIO: f64 = 1.096;
+    for (spot, simulated) in [(0.7, 4.91), (1.0, 4.69), (1.5, 4.45)] {
+        let config = config_with(spot, 1.0);
+        let fraction = |snr: f64| accuracy_on_grid(spot, snr, 5, &config, 60).found;
+        let (low, high) = (simulated - 0.4, simulated + 0.4);
+        let (at_low, at_high) = (fraction(low), fraction(high));
+        let snr50 = low + (0.5 - at_low) / (at_high - at_low) * (high - low);
+        println!("spot {spot}: SNR50 {snr50:.2}, simulated matched filter {simulated}");
+        assert!(snr50 / simulated < MAX_SNR50_RATIO, "{snr50}");
+    }
+}
+
+#[test]
+fn bright_stars_without_noise_are_placed_without_bias() {
+    // Limits.md, section 8, from σ = 0.5 px on.
+    const MAX_BIAS_PX: f64 = 0.002;
+    for spot in [0.5, 0.7, 1.0, 1.5] {
+        let mut rng = ChaCha8Rng::seed_from_u64(21);
+        let mut sky = Sky::flat(400, 400, BACKGROUND_E);
+        let truth: Vec<(f64, f64)> = (0..144)
+            .map(|i| {
+                let place = |n: i32| 30.0 + 30.0 * f64::from(n);
+                (
+                    place(i % 12) + rng.random_range(-0.5..0.5),
+                    place(i / 12) + rng.random_range(-0.5..0.5),
+                )
+            })
+            .collect();
+        for &(x, y) in &truth {
+            sky.add_star(x, y, 20_000.0, spot);
+        }
+        let pixels = sky
+            .mean
+            .iter()
+            .map(|&m| (m + 0.1 * rng.sample::<f64, _>(StandardNormal)) as f32);
+        let frame = Frame::new(400, 400, pixels.collect()).unwrap();
+        let found = found_in(&frame, &DetectConfig::default());
+        let worst = truth
+            .iter()
+            .map(|t| {
+                nearest(&found, t.0, t.1, 1.0)
+                    .map_or(1.0, |s| (s.position.x - t.0).hypot(s.position.y - t.1))
+            })
+            .fold(0.0, f64::max);
+        println!(
+            "spot {spot}: worst error without noise {worst:.5} px, spot found {:.4}",
+            found.spot_sigma_px
+        );
+        assert!(worst < MAX_BIAS_PX, "spot {spot}: {worst}");
+    }
+}
+
+/// A star field of 60 stars on noise, for tests of what must not disturb them.
+fn star_field(seed: u64) -> (Sky, Vec<(f64, f64)>) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut sky = Sky::flat(512, 384, BACKGROUND_E);
+    let mut truth: Vec<(f64, f64)> = Vec::new();
+    while truth.len() < 60 {
+        let (x, y) = (rng.random_range(12.0..500.0), rng.random_range(12.0..372.0));
+        if truth.iter().all(|t| (t.0 - x).hypot(t.1 - y) > 25.0) {
+            sky.add_star(x, y, 3000.0 * 1.06f64.powi(truth.len() as i32), 0.9);
+            truth.push((x, y));
+        }
+    }
+    (sky, truth)
+}
+
+fn count_found(found: &Detections, truth: &[(f64, f64)]) -> usize {
+    truth
+        .iter()
+        .filter(|t| nearest(found, t.0, t.1, 0.5).is_some_and(|s| s.flags.is_star_like()))
+        .count()
+}
+
+#[test]
+fn vignetting_glow_and_dead_borders_hide_no_stars_and_make_none() {
+    let (mut sky, truth) = star_field(3);
+    for (i, mean) in sky.mean.iter_mut().enumerate() {
+        let (x, y) = ((i % 512) as f64, (i / 512) as f64);
+        *mean += 400.0 * (1.0 - ((x - 256.0).powi(2) + (y - 192.0).powi(2)) / 1.2e5) + 0.5 * y;
+    }
+    let bare = sky.expose(1);
+    let mut padded = vec![0.0f32; 700 * 600];
+    for y in 0..384 {
+        padded[(y + 100) * 700 + 90..][..512].copy_from_slice(&bare.pixels[y * 512..][..512]);
+    }
+    let frame = Frame::new(700, 600, padded)
+        .unwrap()
+        .with_levels(1.0, Some(65535.0));
+    let found = found_in(&frame, &DetectConfig::default());
+    let shifted: Vec<_> = truth.iter().map(|t| (t.0 + 90.0, t.1 + 100.0)).collect();
+    assert_eq!(count_found(&found, &shifted), 60);
+    assert!(found.sources.len() <= 61, "{} found", found.sources.len());
+}
+
+#[test]
+fn hot_pixels_are_flagged_and_stars_are_not() {
+    let (sky, truth) = star_field(5);
+    let mut frame = sky.expose(2);
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let hot: Vec<(usize, usize)> = (0..40)
+        .map(|_| (rng.random_range(5..507), rng.random_range(5..379)))
+        .filter(|h| {
+            truth
+                .iter()
+                .all(|t| (t.0 - h.0 as f64).hypot(t.1 - h.1 as f64) > 8.0)
+        })
+        .collect();
+    for &(x, y) in &hot {
+        frame.pixels[y * 512 + x] += 600.0;
+    }
+    let found = found_in(&frame, &DetectConfig::default());
+    let flagged = hot
+        .iter()
+        .filter(|h| nearest(&found, h.0 as f64, h.1 as f64, 0.7).is_some_and(|s| s.flags.hot_pixel))
+        .count();
+    println!("{flagged} of {} hot pixels flagged", hot.len());
+    assert!(
+        flagged as f64 > 0.95 * hot.len() as f64,
+        "{flagged} of {}",
+        hot.len()
+    );
+    assert_eq!(count_found(&found, &truth), 60);
+    assert!(
+        (found.spot_sigma_px - 0.9).abs() < 0.05,
+        "{}",
+        found.spot_sigma_px
+    );
+}
+
+#[test]
+fn a_trail_is_one_flagged_source_and_a_nebula_is_extended() {
+    let (mut sky, _) = star_field(6);
+    for i in 0..240 {
+        let along = 0.5 * f64::from(i);
+        sky.add_star(200.0 + along, 150.0 + 0.3 * along, 350.0, 0.9);
+    }
+    sky.add_star(80.0, 300.0, 60_000.0, 3.5);
+    let found = found_in(&sky.expose(3), &DetectConfig::default());
+    assert!(found.sources.iter().any(|s| s.flags.trail));
+    let nebula = nearest(&found, 80.0, 300.0, 2.0).unwrap();
+    assert!(nebula.flags.extended, "{nebula:?}");
+}
+
+#[test]
+fn touching_stars_are_separated_and_flagged() {
+    // Eighteen pairs among eighteen single stars, which tell what a single star looks like.
+    let mut sky = Sky::flat(256, 256, BACKGROUND_E);
+    let places: Vec<(f64, f64)> = (0..36)
+        .map(|i| {
+            (
+                20.3 + 40.0 * f64::from(i % 6),
+                20.7 + 40.0 * f64::from(i / 6),
+            )
+        })
+        .collect();
+    for (i, &(x, y)) in places.iter().enumerate() {
+        sky.add_star(x, y, 8000.0, 1.0);
+        if i % 2 == 0 {
+            sky.add_star(x + 2.9, y + 1.1, 5000.0, 1.0);
+        }
+    }
+    let found = found_in(&sky.expose(4), &config_with(1.0, 0.1));
+    assert_eq!(found.sources.len(), 54);
+    assert_eq!(found.sources.iter().filter(|s| s.flags.blended).count(), 36);
+    for &(x, y) in places.iter().step_by(2) {
+        let faint = nearest(&found, x + 2.9, y + 1.1, 0.4).expect("the fainter of the pair");
+        assert!(
+            (faint.flux_adu / 5000.0 - 1.0).abs() < 0.15,
+            "{}",
+            faint.flux_adu
+        );
+    }
+}
+
+#[test]
+fn a_saturated_star_is_one_source_at_its_place() {
+    let mut sky = Sky::flat(200, 200, BACKGROUND_E);
+    sky.add_star(100.3, 90.8, 400_000.0, 1.3);
+    for i in 0..9 {
+        sky.add_star(20.0 + 20.1 * f64::from(i), 30.2, 4000.0, 1.3);
+    }
+    let mut frame = sky.expose(5);
+    frame.pixels.iter_mut().for_each(|p| *p = p.min(4095.0));
+    let frame = frame.with_levels(1.0, Some(4095.0));
+    let found = found_in(&frame, &DetectConfig::default());
+    let star = &found.sources[0];
+    assert!(
+        star.flags.saturated && star.flags.is_star_like(),
+        "{star:?}"
+    );
+    assert!(
+        (star.position.x - 100.3).hypot(star.position.y - 90.8) < 0.05,
+        "{star:?}"
+    );
+    assert_eq!(found.sources.len(), 10, "{:?}", found.sources);
+}
+
+#[test]
+fn frames_without_light_give_nothing() {
+    for level in [0.0, 255.0] {
+        let frame = Frame::new(64, 48, vec![level; 64 * 48])
+            .unwrap()
+            .with_levels(1.0, Some(255.0));
+        assert!(
+            found_in(&frame, &DetectConfig::default())
+                .sources
+                .is_empty()
+        );
+    }
+}
+
+#[test]
+fn the_result_does_not_depend_on_what_the_workspace_did_before() {
+    let (sky, _) = star_field(8);
+    let frame = sky.expose(6);
+    let config = DetectConfig::default();
+    let fresh = found_in(&frame, &config);
+    let mut workspace = Workspace::new();
+    detect(&white_noise(700, 300, 3.0, 1), &config, &mut workspace).unwrap();
+    assert_eq!(detect(&frame, &config, &mut workspace).unwrap(), fresh);
+}
+
+#[test]
+fn missing_pixels_disturb_nothing_but_themselves() {
+    let (sky, truth) = star_field(11);
+    let mut frame = sky.expose(7);
+    for i in (0..frame.pixels.len()).step_by(97) {
+        frame.pixels[i] = f32::NAN;
+    }
+    let found = found_in(&frame, &DetectConfig::default());
+    assert!(count_found(&found, &truth) >= 58);
+    assert!(
+        found
+            .sources
+            .iter()
+            .all(|s| s.position.x.is_finite() && s.snr.is_finite())
+    );
+}
+
+#[test]
+fn the_grey_weighted_centroid_is_near_the_bound_for_bright_stars() {
+    // Limits.md, section 8: 1.2 for a peak SNR of 10 and more.
+    const MAX_GREY_OVER_BOUND: f64 = 1.2;
+    let config = DetectConfig {
+        centroid: CentroidMethod::GreyWeighted,
+        ..DetectConfig::default()
+    };
+    let a = accuracy(1.0, 30.0, 3, &config);
+    println!(
+        "grey-weighted: RMS/CRLB {:.3}, pulls {:.3}",
+        a.rms_over_bound, a.pull_rms
+    );
+    assert!(
+        a.rms_over_bound < MAX_GREY_OVER_BOUND,
+        "{}",
+        a.rms_over_bound
+    );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(150))]
+
+    #[test]
+    fn arbitrary_small_frames_never_panic(
+        width in 3usize..40,
+        height in 3usize..40,
+        seed: u64,
+        scale in prop::sample::select(vec![0.0f32, 1e-30, 1.0, 255.0, 65535.0, 1e30]),
+        odd in prop::sample::select(vec![0usize, 1, 2, 3, 5]),
+    ) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let pixels: Vec<f32> = (0..width * height)
+            .map(|i| match (odd > 0 && i % (odd + 1) == 0, rng.random_range(0..4)) {
+                (true, 0) => f32::NAN,
+                (true, 1) => f32::INFINITY,
+                (true, 2) => scale,
+                _ => scale * rng.random::<f32>().powi(5),
+            })
+            .collect();
+        let frame = Frame { width, height, pixels, step_adu: 1.0, saturation_adu: Some(250.0) };
+        let _ = detect(&frame, &DetectConfig::default(), &mut Workspace::new());
+    }
 }

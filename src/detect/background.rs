@@ -181,33 +181,61 @@ impl Mesh {
     }
 
     /// Level and reciprocal spread along row `y`, as straight pieces between nodes.
+    ///
+    /// Differs from [`Self::at`] in that the reciprocal is interpolated, not the spread: by less than
+    /// the error of either.
     pub fn row_pieces(&self, y: usize, width: usize, pieces: &mut Vec<Piece>) {
         pieces.clear();
-        let mut start = 0;
-        for segment in 0..self.columns.saturating_sub(1).max(1) {
-            let last = segment + 2 >= self.columns;
-            let end = if last {
-                width
-            } else {
-                // The first pixel beyond the next node.
-                (((segment as f32 + 1.5) * self.cell_width_px - 0.5).ceil() as usize).min(width)
+        let (row, fy) = Self::node(y as f32, self.cell_height_px, self.rows);
+        let below = (row + 1).min(self.rows - 1);
+        let held = fy.clamp(0.0, 1.0);
+        let node = |column: usize| {
+            let (top, bottom) = (row * self.columns + column, below * self.columns + column);
+            let level = self.level[top] + fy * (self.level[bottom] - self.level[top]);
+            let spread = self.spread[top] + held * (self.spread[bottom] - self.spread[top]);
+            (level, 1.0 / spread)
+        };
+        let center = |column: usize| (column as f32 + 0.5) * self.cell_width_px - 0.5;
+        let mut push =
+            |start: usize, end: usize, origin: f32, value: (f32, f32), slope: (f32, f32)| {
+                if end > start {
+                    let offset = start as f32 - origin;
+                    pieces.push(Piece {
+                        start,
+                        end,
+                        level: value.0 + offset * slope.0,
+                        level_slope: slope.0,
+                        inverse: value.1 + offset * slope.1,
+                        inverse_slope: slope.1,
+                    });
+                }
             };
-            if end <= start {
-                continue;
+        if self.columns == 1 {
+            push(0, width, 0.0, node(0), (0.0, 0.0));
+            return;
+        }
+        let mut left = node(0);
+        let mut start = 0;
+        for column in 0..self.columns - 1 {
+            let right = node(column + 1);
+            let slope = (
+                (right.0 - left.0) / self.cell_width_px,
+                (right.1 - left.1) / self.cell_width_px,
+            );
+            let (from, to) = (center(column), center(column + 1));
+            // Beyond the outermost nodes the level goes on, the spread is held.
+            if column == 0 {
+                let end = (from.ceil().max(0.0) as usize).min(width);
+                push(0, end, from, left, (slope.0, 0.0));
+                start = end;
             }
-            let (level, spread) = self.at(start as f32, y as f32);
-            let (last_level, last_spread) = self.at((end - 1) as f32, y as f32);
-            let steps = (end - start).max(2) as f32 - 1.0;
-            let inverse = 1.0 / spread;
-            pieces.push(Piece {
-                start,
-                end,
-                level,
-                level_slope: (last_level - level) / steps,
-                inverse,
-                inverse_slope: (1.0 / last_spread - inverse) / steps,
-            });
-            start = end;
+            let end = (to.ceil() as usize).min(width);
+            push(start, end, from, left, slope);
+            start = start.max(end);
+            if column + 2 == self.columns {
+                push(start, width, to, right, (slope.0, 0.0));
+            }
+            left = right;
         }
     }
 }

@@ -16,7 +16,7 @@ pub(super) const DEFAULT_SPOT_PX: f64 = 0.9;
 /// Peaks below this signal-to-noise ratio say little about the size.
 const MIN_SNR: f32 = 12.0;
 /// At most so many of the brightest peaks are fitted.
-const MAX_STARS: usize = 40;
+const MAX_STARS: usize = 30;
 /// Peaks closer than this many spot sizes disturb each other.
 const ISOLATION_SIGMA: f32 = 6.0;
 /// Sizes below this are single pixels, in pixels.
@@ -71,7 +71,7 @@ fn is_isolated(peak: &Peak, peaks: &[Peak], reach: f32) -> bool {
     peaks.iter().all(|other| {
         let dx = other.x as f32 - peak.x as f32;
         let dy = other.y as f32 - peak.y as f32;
-        (dx == 0.0 && dy == 0.0) || dx.hypot(dy) > reach || other.snr < 0.1 * peak.snr
+        (dx == 0.0 && dy == 0.0) || dx * dx + dy * dy > reach * reach || other.snr < 0.1 * peak.snr
     })
 }
 
@@ -140,24 +140,26 @@ pub(super) fn noise_model(
     work: &mut FitWork,
 ) -> NoiseModel {
     let mut model = NoiseModel::default();
-    let usable: Vec<&BrightStar> = stars
+    let mut usable: Vec<Fit> = stars
         .iter()
-        .filter(|s| (s.fit.spot_px / scene.spot_px).ln().abs() < MODE_WIDTH.ln())
+        .map(|star| star.fit.clone())
+        .filter(|fit| (fit.spot_px / scene.spot_px).ln().abs() < MODE_WIDTH.ln())
         .collect();
     // Each round weighs the squared residuals by the variance that the round before found.
     for _ in 0..NOISE_ROUNDS {
         let mut sums = Moments::default();
-        for star in &usable {
-            let radius = window_radius(star.fit.spot_px);
-            scene.cut(&star.fit.spots, radius, &mut work.window);
+        for star in &mut usable {
+            let radius = window_radius(star.spot_px);
+            scene.cut(&star.spots, radius, &mut work.window);
             let config = FitConfig {
-                spot_px: star.fit.spot_px,
+                spot_px: star.spot_px,
                 free_spot: true,
                 noise: model,
             };
-            let fit = work.fitter.fit(&work.window, &star.fit.spots, &config);
+            let fit = work.fitter.fit(&work.window, &star.spots, &config);
             if fit.converged {
                 sums.add_star(work, &fit, &config);
+                *star = fit;
             }
         }
         model = sums.solve();

@@ -28,6 +28,24 @@ const WING_HEIGHT: f32 = 0.02;
 /// Wings are considered out to this many pixels.
 const WING_REACH_PX: usize = 64;
 
+/// A streak has at least so many maxima.
+const MIN_STREAK_PEAKS: usize = 4;
+/// A streak's longer principal axis over the shorter.
+const STREAK_ELONGATION: f64 = 4.0;
+/// A streak's longer principal axis over the spot's width.
+const STREAK_LENGTH_SIGMA: f32 = 5.0;
+
+/// Dashes of a streak lie within this many spot widths, and some pixels, of each other.
+const STREAK_LINK_SIGMA: f32 = 4.0;
+/// The pixels.
+const STREAK_LINK_PX: f32 = 5.0;
+/// So many dashes in a line are no chance.
+const MIN_STREAK_DASHES: usize = 5;
+/// The scatter of the dashes across the line, over the spot's width, at most.
+const STREAK_BREADTH_SIGMA: f64 = 1.2;
+/// The length of a dashed streak over its breadth, as standard deviations.
+const STREAK_DASHED: f64 = 8.0;
+
 /// A pixel above the threshold.
 #[derive(Debug, Clone, Copy)]
 struct Pixel {
@@ -71,6 +89,46 @@ pub(super) struct Region {
     pub minor_px: f64,
 }
 
+impl Region {
+    /// Number, centre and principal axes of points (x, y, weight).
+    fn of_points(points: impl Iterator<Item = (f64, f64, f64)>) -> Self {
+        let mut sums = [0.0f64; 6];
+        let mut origin = None;
+        let mut count = 0;
+        for (x, y, w) in points {
+            let (x0, y0) = *origin.get_or_insert((x, y));
+            let (x, y) = (x - x0, y - y0);
+            count += 1;
+            for (sum, term) in sums.iter_mut().zip([1.0, x, y, x * x, y * y, x * y]) {
+                *sum += w * term;
+            }
+        }
+        let [w, x, y, xx, yy, xy] = sums;
+        let (x0, y0) = origin.unwrap_or_default();
+        let (x, y) = (x / w, y / w);
+        let (xx, yy, xy) = (xx / w - x * x, yy / w - y * y, xy / w - x * y);
+        let middle = 0.5 * (xx + yy);
+        let half_range = (0.5 * (xx - yy)).hypot(xy);
+        // A pixel has a width of its own.
+        let own = 1.0 / 12.0;
+        Self {
+            area_px: count,
+            peaks: 0,
+            x: x + x0,
+            y: y + y0,
+            major_px: (middle + half_range + own).sqrt(),
+            minor_px: (middle - half_range + own).max(own).sqrt(),
+        }
+    }
+
+    /// Whether the region is one long streak with many maxima, and not a handful of stars in a row.
+    fn is_streak(&self, config: &SearchConfig) -> bool {
+        self.peaks >= MIN_STREAK_PEAKS
+            && self.major_px > STREAK_ELONGATION * self.minor_px
+            && self.major_px > f64::from(STREAK_LENGTH_SIGMA * config.spot_width_px)
+    }
+}
+
 /// What the search needs to know.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SearchConfig {
@@ -110,6 +168,48 @@ impl Search {
         self.connect();
         self.measure_regions_and_peaks(&filtered.view(), frame, config);
         self.drop_unfounded_peaks(config);
+        self.count_peaks();
+        let before = self.peaks.len();
+        let regions = &self.regions;
+        let mut seen = std::collections::HashSet::new();
+        // Strongest first: of a streak's many maxima only the first stays.
+        self.peaks
+            .retain(|p| !regions[p.region].is_streak(config) || seen.insert(p.region));
+        if self.peaks.len() < before {
+            self.count_peaks();
+        }
+        self.join_dashes(config);
+    }
+
+    /// Joins the dashes of faint streaks: chains of peaks in a straight line become one region with one peak.
+    fn join_dashes(&mut self, config: &SearchConfig) {
+        let link_px = STREAK_LINK_SIGMA * config.spot_width_px + STREAK_LINK_PX;
+        for chain in chains(&self.peaks, link_px) {
+            let mut streak = line_through(&chain, &self.peaks);
+            streak.area_px = chain
+                .iter()
+                .map(|&i| self.regions[self.peaks[i].region].area_px)
+                .sum();
+            let is_straight =
+                streak.minor_px < STREAK_BREADTH_SIGMA * f64::from(config.spot_width_px);
+            if chain.len() < MIN_STREAK_DASHES
+                || !is_straight
+                || streak.major_px < STREAK_DASHED * streak.minor_px
+            {
+                continue;
+            }
+            streak.peaks = 1;
+            // Peaks come strongest first.
+            self.peaks[chain[0]].region = self.regions.len();
+            for &other in &chain[1..] {
+                self.peaks[other].snr = f32::NAN;
+            }
+            self.regions.push(streak);
+        }
+        self.peaks.retain(|p| !p.snr.is_nan());
+    }
+
+    fn count_peaks(&mut self) {
         for region in &mut self.regions {
             region.peaks = 0;
         }
@@ -237,33 +337,8 @@ impl Search {
 
     /// Area, centre and principal axes of a region.
     fn measure(&self, members: &[usize]) -> Region {
-        let mut sums = [0.0f64; 6];
-        let origin = self.pixels[members[0]];
-        for &index in members {
-            let p = self.pixels[index];
-            let (x, y) = (
-                f64::from(p.x) - f64::from(origin.x),
-                f64::from(p.y) - f64::from(origin.y),
-            );
-            let w = f64::from(p.snr);
-            for (sum, term) in sums.iter_mut().zip([1.0, x, y, x * x, y * y, x * y]) {
-                *sum += w * term;
-            }
-        }
-        let [w, x, y, xx, yy, xy] = sums;
-        let (x, y) = (x / w, y / w);
-        let (xx, yy, xy) = (xx / w - x * x, yy / w - y * y, xy / w - x * y);
-        let middle = 0.5 * (xx + yy);
-        let half_range = (0.5 * (xx - yy)).hypot(xy);
-        Region {
-            area_px: members.len(),
-            peaks: 0,
-            x: x + f64::from(origin.x),
-            y: y + f64::from(origin.y),
-            // A pixel has a width of its own.
-            major_px: (middle + half_range + 1.0 / 12.0).sqrt(),
-            minor_px: (middle - half_range + 1.0 / 12.0).max(1.0 / 12.0).sqrt(),
-        }
+        let pixels = members.iter().map(|&index| &self.pixels[index]);
+        Region::of_points(pixels.map(|p| (f64::from(p.x), f64::from(p.y), f64::from(p.snr))))
     }
 
     /// Sets the prominences of the peaks from `first` on: floods the region from the top down; where
@@ -349,11 +424,44 @@ impl Search {
     }
 }
 
+/// Groups of at least two peaks, each within `link_px` of another; indices ascending.
+fn chains(peaks: &[Peak], link_px: f32) -> Vec<Vec<usize>> {
+    let cell = |v: usize| (v as f32 / link_px) as i64;
+    let mut grid: HashMap<(i64, i64), Vec<usize>> = HashMap::new();
+    let mut parents: Vec<u32> = (0..peaks.len() as u32).collect();
+    for (index, peak) in peaks.iter().enumerate() {
+        let (cx, cy) = (cell(peak.x), cell(peak.y));
+        let near = (cy - 1..=cy + 1).flat_map(|y| (cx - 1..=cx + 1).map(move |x| (x, y)));
+        for &other in near.filter_map(|key| grid.get(&key)).flatten() {
+            let dx = peaks[other].x as f32 - peak.x as f32;
+            let dy = peaks[other].y as f32 - peak.y as f32;
+            if dx * dx + dy * dy <= link_px * link_px {
+                join(&mut parents, index as u32, other as u32);
+            }
+        }
+        grid.entry((cx, cy)).or_default().push(index);
+    }
+    let mut groups: Vec<Vec<usize>> = vec![Vec::new(); peaks.len()];
+    for index in 0..peaks.len() {
+        groups[root_of(&mut parents, index as u32) as usize].push(index);
+    }
+    groups.retain(|group| group.len() > 1);
+    groups
+}
+
+/// Centre and principal axes of some peaks, all with the same weight.
+fn line_through(chain: &[usize], peaks: &[Peak]) -> Region {
+    let weighted = chain
+        .iter()
+        .map(|&i| (peaks[i].x as f64, peaks[i].y as f64, 1.0));
+    Region::of_points(weighted)
+}
+
 /// How high the wing of `bright` may stand at `peak`, in units of the noise.
 fn wing_of(bright: &Peak, peak: &Peak, config: &SearchConfig) -> f32 {
     let dx = bright.x as f32 - peak.x as f32;
     let dy = bright.y as f32 - peak.y as f32;
-    let distance = dx.hypot(dy) / (4.0 * config.spot_width_px);
+    let distance = (dx * dx + dy * dy).sqrt() / (4.0 * config.spot_width_px);
     let height = bright.snr * if bright.saturated { 3.0 } else { 1.0 };
     WING_HEIGHT * height / (1.0 + distance.powi(3))
 }

@@ -16,8 +16,8 @@ use super::psf::{AxisProfile, MAX_WINDOW_PX};
 pub(super) const MAX_SPOTS: usize = 6;
 const MAX_PARAMETERS: usize = 3 * MAX_SPOTS + 2;
 const MAX_STEPS: usize = 15;
-/// Steps shorter than this, in px, end the fit.
-const CONVERGED_PX: f64 = 2e-4;
+/// Steps shorter than this, in px, end the fit; convergence is quadratic, so little is left after one.
+const CONVERGED_PX: f64 = 2e-3;
 /// The longest step, in px: farther, the model is not linear.
 const MAX_STEP_PX: f64 = 0.5;
 /// The range of free spot sizes, in px.
@@ -169,7 +169,7 @@ impl Fitter {
         let count = parameter_count(fit.spots.len(), &with_size);
         let mut normal = self.linearise(window, fit, &with_size);
         fit.chi2 = normal.chi2;
-        fit.degrees = (normal.pixels + 2 - count) as f64;
+        fit.degrees = normal.pixels as f64 + 2.0 - count as f64;
         let fitted = if config.free_spot { count } else { count - 1 };
         // The size comes last: the leading block of the factor is that of a fit without it.
         if let Some(change) = solve(&mut normal, count) {
@@ -227,6 +227,26 @@ impl Fitter {
                 }
             }
         }
+    }
+
+    /// The direction in which the light about the first spot is drawn out: a unit vector, or `None`.
+    pub fn residual_axis(&mut self, window: &Window, fit: &Fit) -> Option<(f64, f64)> {
+        let spot = fit.spots[0];
+        let (x, y) = (spot.x - window.x0 as f64, spot.y - window.y0 as f64);
+        let (mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0);
+        let noise = window.noise_variance.sqrt();
+        for (i, value) in window.data.iter().enumerate() {
+            let above = value - fit.background - noise;
+            if above > 0.0 {
+                let dx = (i % window.width) as f64 - x;
+                let dy = (i / window.width) as f64 - y;
+                xx += above * dx * dx;
+                yy += above * dy * dy;
+                xy += above * dx * dy;
+            }
+        }
+        let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
+        angle.is_finite().then(|| (angle.cos(), angle.sin()))
     }
 
     /// Calls `visit(residual, light, leverage)` for each pixel with a value, at the solution `fit` of a
@@ -445,13 +465,13 @@ fn inverse_diagonal(
 ) -> [f64; MAX_PARAMETERS] {
     let mut variances = [0.0; MAX_PARAMETERS];
     // Column by column: L⁻¹, whose squared columns sum to the diagonal of (L Lᵀ)⁻¹.
-    for column in 0..count {
+    for (column, variance) in variances.iter_mut().enumerate().take(count) {
         let mut x = [0.0; MAX_PARAMETERS];
         for i in column..count {
             let unit = if i == column { 1.0 } else { 0.0 };
             let dot: f64 = (column..i).map(|k| l[i][k] * x[k]).sum();
             x[i] = (unit - dot) / l[i][i];
-            variances[column] += x[i] * x[i];
+            *variance += x[i] * x[i];
         }
     }
     variances

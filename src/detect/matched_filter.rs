@@ -15,6 +15,8 @@ use multiversion::multiversion;
 const LANES: usize = 32;
 /// Width of the blocks whose maxima are kept.
 pub(super) const BLOCK_PX: usize = 64;
+/// The most weights of one half of a kernel: spots up to σ = 13 px.
+const MAX_TAPS: usize = 32;
 /// The kernel ends at this many standard deviations: the rest holds under 0.1 % of ΣP².
 const KERNEL_EXTENT_SIGMA: f64 = 2.4;
 
@@ -34,7 +36,7 @@ impl Kernel {
     /// The kernel for a spot with standard deviation `sigma_px`.
     pub fn for_spot(sigma_px: f64) -> Self {
         let width_px = (sigma_px * sigma_px + PIXEL_VARIANCE_PX2).sqrt();
-        let radius = ((KERNEL_EXTENT_SIGMA * width_px).ceil() as usize).max(1);
+        let radius = ((KERNEL_EXTENT_SIGMA * width_px).ceil() as usize).clamp(1, MAX_TAPS - 1);
         let profile = centered_profile(sigma_px, radius);
         let at = |i: usize| profile.get(i).copied().unwrap_or(0.0);
         let span = -(radius as isize)..=radius as isize;
@@ -133,11 +135,18 @@ impl Filtered {
         let out = &mut self.ring[y % slots];
         let padded = &self.padded;
         let shifted = |offset: usize| &padded[offset..offset + self.stride];
-        let left: Vec<&[f32]> = (0..=radius).map(|j| shifted(radius - j)).collect();
-        let right: Vec<&[f32]> = (0..=radius).map(|j| shifted(radius + j)).collect();
+        let left: [&[f32]; MAX_TAPS] = std::array::from_fn(|j| shifted(radius.saturating_sub(j)));
+        let right: [&[f32]; MAX_TAPS] =
+            std::array::from_fn(|j| shifted((radius + j).min(2 * radius)));
         symmetric_sum(&kernel.half, &left, &right, out);
-        for x in (0..view.width).filter(|&x| x < radius || x + radius >= view.width) {
-            out[x] *= kernel.border_factor(x, view.width - 1 - x);
+        let last = view.width - 1;
+        let inner = radius.min(view.width)
+            ..view
+                .width
+                .saturating_sub(radius)
+                .max(radius.min(view.width));
+        for x in (0..inner.start).chain(inner.end..view.width) {
+            out[x] *= kernel.border_factor(x, last - x);
         }
     }
 
@@ -149,8 +158,8 @@ impl Filtered {
             Some(r) if r < self.height => self.ring[r % slots].as_slice(),
             _ => self.zeros.as_slice(),
         };
-        let above: Vec<&[f32]> = (0..=radius).map(|j| row(y.checked_sub(j))).collect();
-        let below: Vec<&[f32]> = (0..=radius).map(|j| row(Some(y + j))).collect();
+        let above: [&[f32]; MAX_TAPS] = std::array::from_fn(|j| row(y.checked_sub(j.min(radius))));
+        let below: [&[f32]; MAX_TAPS] = std::array::from_fn(|j| row(Some(y + j.min(radius))));
         let out = &mut self.values[y * self.stride..(y + 1) * self.stride];
         symmetric_sum(&kernel.half, &above, &below, out);
         if y < radius || y + radius >= self.height {

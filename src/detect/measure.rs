@@ -14,6 +14,17 @@ const TOUCHING_SIGMA: f64 = 3.5;
 /// Spots closer than this many standard deviations beyond the window still shine into it.
 const WINDOW_MARGIN_SIGMA: f64 = 3.0;
 
+/// A source is tried as a pair where it is wider than a spot by this many standard errors,
+const PAIR_EXCESS_SIGMA: f64 = 5.0;
+/// by this part of the spot,
+const PAIR_EXCESS: f64 = 0.12;
+/// and brighter than this many standard errors.
+const PAIR_SNR: f64 = 15.0;
+/// Both stars of a pair stand out by this many standard errors.
+const PAIR_MIN_FLUX_SIGMA: f64 = 5.0;
+/// Chi² over the degrees of freedom of a pair is below this.
+const PAIR_MAX_CHI2: f64 = 3.0;
+
 /// All that the measurement of a frame's peaks needs.
 pub(super) struct Measurement<'a> {
     /// The frame and its maps.
@@ -31,15 +42,16 @@ pub(super) struct Measurement<'a> {
 impl Measurement<'_> {
     /// Measures all peaks, which come strongest first; the detections come in the same order.
     pub fn run(&self, peaks: &[Peak], work: &mut FitWork) -> Vec<Detection> {
-        let near = Neighbours::new(peaks, self.reach_px());
-        // Each spot as far as it is known: fitted for those stronger than the one at hand.
-        let mut spots: Vec<Spot> = peaks.iter().map(|p| self.scene.first_guess(p)).collect();
-        (0..peaks.len())
-            .map(|index| {
-                let around: Vec<usize> = near.of(peaks, index);
-                self.measure(index, peaks, &around, &mut spots, work)
-            })
-            .collect()
+        let mut all = PeakList {
+            peaks,
+            near: Neighbours::new(peaks, self.reach_px()),
+            spots: peaks.iter().map(|p| self.scene.first_guess(p)).collect(),
+        };
+        let mut detections = Vec::with_capacity(peaks.len());
+        for index in 0..peaks.len() {
+            self.measure(index, &mut all, work, &mut detections);
+        }
+        detections
     }
 
     /// How far a spot can matter to another, in pixels.
@@ -52,56 +64,133 @@ impl Measurement<'_> {
         (self.scene.spot_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt()
     }
 
+    /// Measures one peak; adds one detection, or two where it turns out to be a close pair.
     fn measure(
         &self,
         index: usize,
-        peaks: &[Peak],
-        around: &[usize],
-        spots: &mut [Spot],
+        all: &mut PeakList<'_>,
         work: &mut FitWork,
-    ) -> Detection {
-        let peak = &peaks[index];
+        out: &mut Vec<Detection>,
+    ) {
+        let peak = &all.peaks[index];
         let region = &self.regions[peak.region];
-        let touching_px = TOUCHING_SIGMA * self.width_px();
-        let distance = |other: usize| {
-            let (a, b) = (&peaks[index], &peaks[other]);
-            (a.x as f64 - b.x as f64).hypot(a.y as f64 - b.y as f64)
-        };
-        let touching: Vec<usize> = around
-            .iter()
-            .copied()
-            .filter(|&other| distance(other) < touching_px)
-            .take(MAX_SPOTS - 1)
-            .collect();
-        let beyond: Vec<Spot> = around
-            .iter()
-            .filter(|other| !touching.contains(other) && !peaks[**other].saturated)
-            .map(|&other| spots[other])
-            .collect();
-        let mut start = vec![spots[index]];
-        start.extend(touching.iter().map(|&other| spots[other]));
-        let fit = if peak.saturated && touching.is_empty() {
+        let (touching, beyond) = all.split(index, TOUCHING_SIGMA * self.width_px());
+        let mut start = vec![all.spots[index]];
+        start.extend(touching.iter().map(|&other| all.spots[other]));
+        let is_alone = touching.is_empty();
+        let mut fit = if peak.saturated && is_alone {
             self.scene
                 .fit_free(start[0], 1.5 * self.scene.spot_px, self.noise, work)
         } else {
             self.fit_fixed(&start, &beyond, work)
         };
-        let mut detection = self.detection_of(&fit, peak, region);
-        detection.flags.blended = !touching.is_empty();
-        if fit.converged {
-            spots[index] = fit.spots[0];
-            if !peak.saturated && touching.is_empty() {
-                shape::judge(self, peak, &fit, &mut detection, work);
-            }
+        let is_plain = fit.converged && is_alone && !peak.saturated;
+        let pair = if is_plain {
+            self.as_pair(&fit, &beyond, work)
+        } else {
+            None
+        };
+        if let Some(pair) = pair {
+            let mut second = pair.clone();
+            second.spots.swap(0, 1);
+            let mut companion = self.detection_of(&second, peak, region);
+            companion.flags.blended = true;
+            self.finish(&second, &mut companion, work, out);
+            fit = pair;
+        } else if is_plain {
+            let mut detection = self.detection_of(&fit, peak, region);
+            shape::judge(self, peak, &fit, &mut detection, work);
+            all.spots[index] = fit.spots[0];
+            self.set_trail(peak, region, &mut detection);
+            self.finish(&fit, &mut detection, work, out);
+            return;
         }
+        if fit.converged {
+            all.spots[index] = fit.spots[0];
+        }
+        let mut detection = self.detection_of(&fit, peak, region);
+        detection.flags.blended = fit.spots.len() > 1;
+        self.set_trail(peak, region, &mut detection);
+        self.finish(&fit, &mut detection, work, out);
+    }
+
+    /// Flags a trail, and places it in its middle, known along it to its length.
+    fn set_trail(&self, peak: &Peak, region: &Region, detection: &mut Detection) {
         if shape::is_trail(region, peak, self.width_px(), self.threshold) {
             detection.flags.trail = true;
+            detection.position = PixelPoint::new(region.x, region.y);
+            detection.sigma_x_px = region.major_px;
+            detection.sigma_y_px = region.major_px;
         }
-        if let CentroidMethod::GreyWeighted = self.method {
-            centroid::grey_weighted(&self.scene, &self.noise, &fit, &mut detection, work);
+    }
+
+    /// The grey-weighted centroid where asked for, and the frame's coordinates.
+    fn finish(
+        &self,
+        fit: &Fit,
+        detection: &mut Detection,
+        work: &mut FitWork,
+        out: &mut Vec<Detection>,
+    ) {
+        if self.method == CentroidMethod::GreyWeighted && !detection.flags.trail {
+            centroid::grey_weighted(&self.scene, &self.noise, fit, detection, work);
         }
-        self.place(&mut detection);
-        detection
+        self.place(detection);
+        out.push(*detection);
+    }
+
+    /// A fit of two spots, where one is too wide for a star and two explain it well.
+    ///
+    /// The matched filter melts stars closer than some two spot sizes into one peak.
+    fn as_pair(&self, fit: &Fit, beyond: &[Spot], work: &mut FitWork) -> Option<Fit> {
+        let spot_px = self.scene.spot_px;
+        let is_wide = fit.size_excess_px > PAIR_EXCESS_SIGMA * fit.size_error_px
+            && fit.size_excess_px > PAIR_EXCESS * spot_px;
+        if !is_wide || fit.spots[0].flux < PAIR_SNR * fit.spots[0].sigma_flux {
+            return None;
+        }
+        let config = self.fit_config();
+        let axis = work.fitter.residual_axis(&work.window, fit)?;
+        let half_px = 1.2 * self.width_px();
+        let spot = fit.spots[0];
+        let ends = [-half_px, half_px].map(|step| Spot {
+            x: spot.x + step * axis.0,
+            y: spot.y + step * axis.1,
+            flux: 0.5 * spot.flux,
+            ..spot
+        });
+        self.scene
+            .cut(&ends, window_radius(spot_px), &mut work.window);
+        self.scene
+            .subtract(beyond, &mut work.fitter, &mut work.window);
+        let one = work.fitter.fit(&work.window, &fit.spots[..1], &config);
+        let mut two = work.fitter.fit(&work.window, &ends, &config);
+        let [a, b] = two.spots.first_chunk::<2>().copied()?;
+        let is_real = |s: Spot| s.flux > PAIR_MIN_FLUX_SIGMA * s.sigma_flux;
+        let separation_px = (a.x - b.x).hypot(a.y - b.y);
+        // What is left must be like noise: a nebula is no pair.
+        let is_good =
+            two.chi2 < PAIR_MAX_CHI2 * two.degrees.max(1.0) && one.chi2 - two.chi2 > 0.5 * one.chi2;
+        if !(two.converged
+            && is_real(a)
+            && is_real(b)
+            && is_good
+            && separation_px > self.width_px())
+        {
+            return None;
+        }
+        if b.flux > a.flux {
+            two.spots.swap(0, 1);
+        }
+        Some(two)
+    }
+
+    fn fit_config(&self) -> FitConfig {
+        FitConfig {
+            spot_px: self.scene.spot_px,
+            free_spot: false,
+            noise: self.noise,
+        }
     }
 
     /// Fits spots of the frame's size.
@@ -110,12 +199,7 @@ impl Measurement<'_> {
         self.scene.cut(start, radius, &mut work.window);
         self.scene
             .subtract(beyond, &mut work.fitter, &mut work.window);
-        let config = FitConfig {
-            spot_px: self.scene.spot_px,
-            free_spot: false,
-            noise: self.noise,
-        };
-        work.fitter.fit(&work.window, start, &config)
+        work.fitter.fit(&work.window, start, &self.fit_config())
     }
 
     /// Position, errors, flux and the flags that need no judgement; coordinates still relative to the view.
@@ -172,6 +256,38 @@ impl Measurement<'_> {
     }
 }
 
+/// All peaks, and what is known of their spots.
+struct PeakList<'a> {
+    peaks: &'a [Peak],
+    near: Neighbours,
+    /// Each spot as far as it is known: fitted for those stronger than the one at hand.
+    spots: Vec<Spot>,
+}
+
+impl PeakList<'_> {
+    /// The peaks that touch peak `index`, and the spots of the others that shine into its window.
+    fn split(&self, index: usize, touching_px: f64) -> (Vec<usize>, Vec<Spot>) {
+        let around = self.near.of(self.peaks, index);
+        let distance = |other: usize| {
+            let (a, b) = (&self.peaks[index], &self.peaks[other]);
+            (a.x as f64 - b.x as f64).hypot(a.y as f64 - b.y as f64)
+        };
+        let is_touching = |other: &usize| distance(*other) < touching_px;
+        let touching: Vec<usize> = around
+            .iter()
+            .copied()
+            .filter(is_touching)
+            .take(MAX_SPOTS - 1)
+            .collect();
+        let beyond = around
+            .iter()
+            .filter(|other| !touching.contains(other) && !self.peaks[**other].saturated)
+            .map(|&other| self.spots[other])
+            .collect();
+        (touching, beyond)
+    }
+}
+
 /// The peaks near a peak, by a grid.
 struct Neighbours {
     cell_px: f64,
@@ -209,7 +325,7 @@ impl Neighbours {
             .filter(|&other| {
                 let dx = peaks[other].x as f64 - peaks[index].x as f64;
                 let dy = peaks[other].y as f64 - peaks[index].y as f64;
-                dx.hypot(dy) <= self.cell_px
+                dx * dx + dy * dy <= self.cell_px * self.cell_px
             })
             .collect();
         found.sort_unstable();

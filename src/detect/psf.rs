@@ -56,6 +56,9 @@ impl AxisProfile {
     }
 }
 
+/// Beyond this, erf is ±1 and the exponential 0 to one part in 10¹¹.
+const ERF_RANGE: f64 = 5.0;
+
 /// `erf(x)` and `exp(−x²)`; the error of erf is below 1.5e-7.
 ///
 /// # Reference
@@ -68,6 +71,9 @@ pub(super) fn erf_and_gauss(x: f64) -> (f64, f64) {
         -1.453_152_027,
         1.061_405_429,
     ];
+    if x.abs() > ERF_RANGE {
+        return (x.signum(), 0.0);
+    }
     let gauss = (-x * x).exp();
     let t = 1.0 / (1.0 + 0.327_591_1 * x.abs());
     let polynomial = t * (A[0] + t * (A[1] + t * (A[2] + t * (A[3] + t * A[4]))));

@@ -46,7 +46,10 @@ pub(super) fn judge(
     let excess = fit.size_excess_px / fit.size_error_px;
     if excess < -SUSPICIOUS_SIGMA {
         detection.flags.hot_pixel = is_hot_pixel(measurement, peak, fit, work);
-    } else if excess > SIGNIFICANT_SIGMA && fit.size_excess_px > 0.3 * (WIDEST - 1.0) * spot_px {
+    } else if !detection.flags.border
+        && excess > SIGNIFICANT_SIGMA
+        && fit.size_excess_px > 0.3 * (WIDEST - 1.0) * spot_px
+    {
         detection.flags.extended = is_extended(measurement, peak, fit, work);
     }
 }

@@ -13,17 +13,25 @@ use super::psf::erf_and_gauss;
 use std::f64::consts::{PI, SQRT_2};
 
 /// Steps of the outer integral, which spans [`SPAN`] above u.
-const STEPS: usize = 64;
+const STEPS: usize = 24;
 const SPAN: f64 = 3.0;
 /// Thresholds are looked for in this range.
 const RANGE: (f64, f64) = (1.0, 12.0);
+/// Secant steps at most; some eight are needed.
+const MAX_SECANTS: usize = 60;
 
 /// The chance per pixel that filtered noise has a local maximum above `u` standard deviations.
 pub(super) fn false_alarm_probability(u: f64, rho_x: f64, rho_y: f64) -> f64 {
     let step = SPAN / STEPS as f64;
     let density = |z: f64| {
         let phi = (-0.5 * z * z).exp() / (2.0 * PI).sqrt();
-        phi * neighbours_lower(rho_x, z) * neighbours_lower(rho_y, z)
+        let across = neighbours_lower(rho_x, z);
+        let down = if rho_x == rho_y {
+            across
+        } else {
+            neighbours_lower(rho_y, z)
+        };
+        phi * across * down
     };
     // Simpson's rule.
     let inner: f64 = (1..STEPS)
@@ -37,7 +45,7 @@ fn neighbours_lower(rho: f64, z: f64) -> f64 {
     let h = ((1.0 - rho) / (1.0 + rho)).sqrt();
     let alpha = ((1.0 - rho * rho) / 2.0).sqrt().asin();
     let tail = 1.0 - erf_and_gauss(h * z / SQRT_2).0;
-    const PARTS: usize = 16;
+    const PARTS: usize = 8;
     let step = alpha / PARTS as f64;
     // Midpoint rule: the integrand vanishes with all its derivatives at 0.
     let both: f64 = (0..PARTS)
@@ -50,14 +58,32 @@ fn neighbours_lower(rho: f64, z: f64) -> f64 {
 /// The threshold, in standard deviations of the filtered noise, above which pure noise has
 /// `per_mpx` local maxima in a million pixels.
 pub(super) fn threshold_for_rate(per_mpx: f64, rho_x: f64, rho_y: f64) -> f64 {
-    let wanted = per_mpx * 1e-6;
+    let wanted = (per_mpx * 1e-6).ln();
+    let excess = |u: f64| {
+        false_alarm_probability(u, rho_x, rho_y)
+            .max(f64::MIN_POSITIVE)
+            .ln()
+            - wanted
+    };
+    // The rate falls about as exp(−u²/2): its logarithm over u² is nearly straight, so secants settle fast.
     let (mut low, mut high) = RANGE;
-    for _ in 0..40 {
-        let middle = 0.5 * (low + high);
-        if false_alarm_probability(middle, rho_x, rho_y) > wanted {
-            low = middle;
+    let (mut at_low, mut at_high) = (excess(low), excess(high));
+    if at_low <= 0.0 {
+        return low;
+    }
+    for _ in 0..MAX_SECANTS {
+        let fraction = at_low / (at_low - at_high);
+        let u = (low * low + fraction * (high * high - low * low)).sqrt();
+        let at_u = excess(u);
+        if at_u.abs() < 1e-4 {
+            return u;
+        }
+        if at_u > 0.0 {
+            (low, at_low) = (u, at_u);
+            at_high *= 0.5;
         } else {
-            high = middle;
+            (high, at_high) = (u, at_u);
+            at_low *= 0.5;
         }
     }
     0.5 * (low + high)
