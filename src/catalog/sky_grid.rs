@@ -53,8 +53,8 @@ pub struct SkyGrid {
     by_brightness: Vec<GridStar>,
 }
 
-/// Cells along an edge of the cube: on the sphere they are 0.9° wide and hold four catalogue stars.
-const CELLS: usize = 128;
+/// Cells along an edge of the cube: on the sphere they are 1.8° wide and hold sixteen catalogue stars.
+const CELLS: usize = 64;
 const CELL_SIZE: f64 = 2.0 / CELLS as f64;
 /// Going to a cell costs about as much as looking at so many stars in a row.
 const STARS_PER_CELL_VISIT: f64 = 4.0;
