@@ -5,6 +5,7 @@ pub mod camera;
 pub mod catalog;
 pub mod coords;
 pub mod detect;
+pub mod epoch;
 pub mod frame;
 pub mod identify;
 pub mod pipeline;

@@ -28,8 +28,10 @@ use crate::coords::{Icrs, PixelPoint, UnitVector};
 use crate::detect::{
     self, DetectConfig, DetectError, Detection, DetectionFlags, Detections, Workspace,
 };
+use crate::epoch::ObservationDate;
 use crate::frame::{self, Frame, FrameError};
 use crate::identify::{self, Hints, ObservedStar, Outcome, Photometry, Sky, StarField};
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -96,6 +98,28 @@ pub struct Knowledge {
     pub scale: Option<ScaleHint>,
     /// The boresight lies within so many radians of this direction.
     pub near: Option<(UnitVector<Icrs>, f64)>,
+    /// When the frame was taken.
+    pub date: Option<FrameDate>,
+}
+
+/// When a frame was taken, and who says so.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameDate {
+    /// The date.
+    pub date: ObservationDate,
+    /// Where it is from.
+    pub source: DateSource,
+}
+
+/// Where a frame's date is from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum DateSource {
+    /// It was given beforehand.
+    #[serde(rename = "option")]
+    Option,
+    /// From the name of the frame's file.
+    #[serde(rename = "file name")]
+    FileName,
 }
 
 impl Knowledge {
@@ -104,6 +128,26 @@ impl Knowledge {
         Hints {
             pixel_scale_rad: self.scale.map(|hint| hint.pixel_scale_rad(width_px)),
             near: self.near,
+        }
+    }
+
+    /// Julian years from J2000.0 to the frame's date; 0 where that is not known.
+    fn years_since_j2000(&self) -> f64 {
+        self.date
+            .map_or(0.0, |known| known.date.years_since_j2000())
+    }
+
+    /// The same with the date that the file's name holds, where none is given.
+    fn with_date_of(self, path: &Path) -> Self {
+        let from_name = || {
+            ObservationDate::in_file_name(path).map(|date| FrameDate {
+                date,
+                source: DateSource::FileName,
+            })
+        };
+        Self {
+            date: self.date.or_else(from_name),
+            ..self
         }
     }
 }
@@ -163,6 +207,8 @@ pub struct Solution {
     pub width: usize,
     /// Rows.
     pub height: usize,
+    /// When it was taken, where that is known; else the stars stand where they stood at J2000.0.
+    pub date: Option<FrameDate>,
     /// All sources, brightest first.
     pub sources: Vec<Source>,
     /// The sky between them; a list of centroids does not know it.
@@ -238,7 +284,7 @@ impl<'a> Pipeline<'a> {
         self.sky.catalog()
     }
 
-    /// Examines the frame in the file `path`.
+    /// Examines the frame in the file `path`. Its date is taken from the file's name where `config` does not have it.
     ///
     /// # Errors
     /// [`Error::Read`] if there is no frame in the file, [`Error::Detect`] if it is unfit.
@@ -251,8 +297,12 @@ impl<'a> Pipeline<'a> {
         let start = Instant::now();
         let frame = frame::read(path)?;
         let read_ms = milliseconds_since(start);
+        let config = SolveConfig {
+            detect: config.detect.clone(),
+            knowledge: config.knowledge.with_date_of(path),
+        };
         let mut solution = self
-            .solve_frame(&frame, config, workspace)
+            .solve_frame(&frame, &config, workspace)
             .map_err(|source| Error::Detect {
                 path: path.to_owned(),
                 source,
@@ -275,12 +325,14 @@ impl<'a> Pipeline<'a> {
         let start = Instant::now();
         let detections = detect::detect(frame, &config.detect, workspace)?;
         let detect_ms = milliseconds_since(start);
-        let (field, kept) = star_field(frame, &detections);
+        let years = config.knowledge.years_since_j2000();
+        let (field, kept) = star_field(frame, &detections, years);
         let identify_start = Instant::now();
         let outcome = self.identify(&field, &kept, &config.knowledge);
         Ok(Solution {
             width: frame.width,
             height: frame.height,
+            date: config.knowledge.date,
             sources: detections.sources.iter().map(Source::from).collect(),
             background: Some(Background {
                 level_adu: detections.background_adu,
@@ -310,7 +362,7 @@ impl<'a> Pipeline<'a> {
             width_px: list.width as f64,
             height_px: list.height as f64,
             photometry: list.photometry,
-            years_since_j2000: 0.0,
+            years_since_j2000: knowledge.years_since_j2000(),
             stars: centroids.iter().map(observed).collect(),
         };
         let all: Vec<usize> = (0..centroids.len()).collect();
@@ -324,6 +376,7 @@ impl<'a> Pipeline<'a> {
         Solution {
             width: list.width,
             height: list.height,
+            date: knowledge.date,
             sources: centroids.iter().map(source).collect(),
             background: None,
             outcome,
@@ -349,7 +402,11 @@ impl<'a> Pipeline<'a> {
 }
 
 /// The sources that may be stars, and the index of each among all sources.
-fn star_field(frame: &Frame, detections: &Detections) -> (StarField, Vec<usize>) {
+fn star_field(
+    frame: &Frame,
+    detections: &Detections,
+    years_since_j2000: f64,
+) -> (StarField, Vec<usize>) {
     let sources = &detections.sources;
     let kept: Vec<usize> = (0..sources.len())
         .filter(|&i| sources[i].flags.is_star_like() && sources[i].flux_adu > 0.0)
@@ -367,7 +424,7 @@ fn star_field(frame: &Frame, detections: &Detections) -> (StarField, Vec<usize>)
         width_px: frame.width as f64,
         height_px: frame.height as f64,
         photometry: Photometry::Instrumental,
-        years_since_j2000: std::env::var("YR").map_or(0.0, |v| v.parse().unwrap_or(0.0)),
+        years_since_j2000,
         stars: kept.iter().map(observed).collect(),
     };
     (field, kept)

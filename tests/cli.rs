@@ -108,6 +108,14 @@ fn a_wrong_command_line_ends_with_2_and_says_what_is_wrong() {
             "--false-alarms",
         ),
         (&["process", "--sigma", "0", "a.png"], "--sigma"),
+        (&["process", "--date", "yesterday", "a.png"], "ISO 8601"),
+        (&["process", "--date", "2019-02-29", "a.png"], "ISO 8601"),
+        (&["process", "--date", "", "a.png"], "ISO 8601"),
+        (
+            &["process", "--date", "0044-03-15", "a.png"],
+            "1850 to 2100",
+        ),
+        (&["identify", "--date", "2019-13-01", "a.csv"], "ISO 8601"),
         (&["process", "--threads", "0", "a.png"], "--threads"),
         (&["identify", "--width", "0", "a.csv"], "--width"),
         (&["catalog"], "Usage"),
@@ -218,6 +226,35 @@ fn hints_that_fit_help_and_hints_that_do_not_are_believed() {
     let elsewhere = ["--near", "264,0", "--radius", "5"];
     let wrong_place = Ran::new(starpipe().arg("process").args(elsewhere).arg(&frame));
     assert_eq!(wrong_place.status, 3, "{}", wrong_place.stdout);
+}
+
+#[test]
+fn the_date_is_taken_from_the_option_else_from_the_name_and_moves_the_stars() {
+    let directory = tempfile::tempdir().unwrap();
+    let dated = directory.path().join("2019-07-29T204726_orion.png");
+    fs::copy(orion(), &dated).unwrap();
+    let report = |options: &[&str], frame: &Path| {
+        let mut command = starpipe();
+        command.args(["process", "--format", "json"]).args(options);
+        Ran::new(command.arg(frame)).reports().remove(0)
+    };
+    let unknown = report(&[], &orion());
+    assert!(unknown.get("date").is_some_and(Value::is_null));
+    let from_name = report(&[], &dated);
+    assert_eq!(from_name["date"]["iso"], "2019-07-29T20:47:26Z");
+    assert_eq!(from_name["date"]["source"], "file name");
+    assert_eq!(number(&from_name, "/date/year"), 2019.5739);
+    let given = report(&["--date", "2099-12-31T01:00+02:00"], &dated);
+    assert_eq!(given["date"]["iso"], "2099-12-30T23:00:00Z");
+    assert_eq!(given["date"]["source"], "option");
+    // φ² Orionis goes 0.304″ a year to the south.
+    let dec_deg = |report: &Value| {
+        let stars = report["stars"].as_array().unwrap();
+        let star = stars.iter().find(|star| star["name"] == "40 phi2 Ori");
+        star.unwrap()["dec_deg"].as_f64().unwrap()
+    };
+    let moved_arcsec = (dec_deg(&given) - dec_deg(&unknown)) * 3600.0;
+    assert!((moved_arcsec + 30.4).abs() < 0.1, "{moved_arcsec}");
 }
 
 #[test]

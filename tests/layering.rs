@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 const MAY_USE: &[(&str, &[&str])] = &[
     ("units", &[]),
     ("coords", &["units"]),
+    ("epoch", &[]),
     ("frame", &["units", "coords"]),
     ("camera", &["units", "coords"]),
     ("catalog", &["units", "coords"]),
@@ -22,7 +23,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "pipeline",
         &[
-            "units", "coords", "frame", "camera", "catalog", "detect", "identify",
+            "units", "coords", "epoch", "frame", "camera", "catalog", "detect", "identify",
         ],
     ),
     (

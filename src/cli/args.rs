@@ -2,6 +2,7 @@
 
 use super::values;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use starpipe::epoch::ObservationDate;
 use std::path::PathBuf;
 
 /// The longest side of a frame that makes sense, in pixels.
@@ -32,6 +33,7 @@ pub(crate) enum Command {
     #[command(after_help = "Examples:\n  \
         starpipe process night.tif\n  \
         starpipe process --fov 11.4 --near 83.8,-1.2 --radius 10 night.tif\n  \
+        starpipe process --date 2019-07-29T22:47+02:00 night.tif\n  \
         starpipe process --format json --out results *.tif > night.jsonl")]
     Process(ProcessArgs),
     /// Identify the stars in lists of centroids (CSV)
@@ -125,6 +127,10 @@ pub(crate) struct HintArgs {
     #[arg(long, value_name = "DEG", value_parser = values::radius, allow_hyphen_values = true,
           requires = "near")]
     pub(crate) radius: Option<f64>,
+    /// When the frames were taken, as ISO 8601, in UTC unless it says otherwise: stars move [default: for
+    /// frames, the date in the file's name; else 2000]
+    #[arg(long, value_name = "ISO8601", allow_hyphen_values = true)]
+    pub(crate) date: Option<ObservationDate>,
 }
 
 #[derive(Debug, Args)]

@@ -5,7 +5,7 @@ use super::args::{Centroid, DetectionArgs, HintArgs, OutputArgs};
 use super::output::OutputSettings;
 use starpipe::coords::UnitVector;
 use starpipe::detect::{CentroidMethod, DetectConfig};
-use starpipe::pipeline::{Knowledge, Scale, ScaleHint};
+use starpipe::pipeline::{DateSource, FrameDate, Knowledge, Scale, ScaleHint};
 use starpipe::report::TextOptions;
 use starpipe::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
 use std::collections::HashMap;
@@ -42,6 +42,10 @@ impl HintArgs {
         Ok(Knowledge {
             scale: scale.map(|scale| ScaleHint { scale, tolerance }),
             near,
+            date: self.date.map(|date| FrameDate {
+                date,
+                source: DateSource::Option,
+            }),
         })
     }
 }

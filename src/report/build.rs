@@ -2,20 +2,22 @@
 
 use super::rounding::{finite, half_turn_deg, to_decimals, to_significant, turn_deg};
 use super::{
-    AttitudeReport, AttitudeSigma, BackgroundReport, DistortionReport, FrameReport,
+    AttitudeReport, AttitudeSigma, BackgroundReport, DateReport, DistortionReport, FrameReport,
     MagnitudeReport, MatchReport, OpticsReport, SCHEMA, StarReport, Status, TimingReport,
 };
 use crate::camera::Distortion;
 use crate::catalog::Catalog;
 use crate::detect::DetectionFlags;
 use crate::identify::{Identification, LOG10_FALSE_ALARM_LIMIT, Outcome, Reason, StarMatch};
-use crate::pipeline::{Background, Solution, Source, Timing};
+use crate::pipeline::{Background, FrameDate, Solution, Source, Timing};
 use crate::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 
 /// Decimals of a position or residual in pixels.
 const PIXEL_DECIMALS: i32 = 4;
 /// Decimals of a direction in degrees: 0.4 milliarcseconds.
 const DIRECTION_DECIMALS: i32 = 7;
+/// Decimals of a year: an hour.
+const YEAR_DECIMALS: i32 = 4;
 /// Significant digits of a flux.
 const FLUX_DIGITS: i32 = 6;
 /// Significant digits of a standard error.
@@ -29,6 +31,7 @@ impl FrameReport {
             frame: frame.to_owned(),
             width: solution.width,
             height: solution.height,
+            date: solution.date.as_ref().map(date),
             status: Status::NotIdentified,
             reason: None,
             attitude: None,
@@ -43,12 +46,16 @@ impl FrameReport {
             Outcome::NotIdentified(reason) => {
                 report.reason = Some(reason_text(reason, solution.sources.len()));
             }
-            Outcome::Identified(identification) => report.add(identification, catalog),
+            Outcome::Identified(identification) => {
+                let known = solution.date;
+                let years = known.map_or(0.0, |known| known.date.years_since_j2000());
+                report.add(identification, catalog, years);
+            }
         }
         report
     }
 
-    fn add(&mut self, identification: &Identification, catalog: &Catalog) {
+    fn add(&mut self, identification: &Identification, catalog: &Catalog, years: f64) {
         self.status = Status::Identified;
         self.attitude = Some(attitude(identification));
         self.optics = Some(optics(identification));
@@ -56,9 +63,17 @@ impl FrameReport {
         self.magnitude = faintest(identification, catalog);
         for star_match in &identification.matches {
             if let Some(star) = self.stars.get_mut(star_match.observed) {
-                name(star, star_match, catalog);
+                name(star, star_match, catalog, years);
             }
         }
+    }
+}
+
+fn date(known: &FrameDate) -> DateReport {
+    DateReport {
+        iso: known.date.to_iso(),
+        year: to_decimals(known.date.julian_epoch(), YEAR_DECIMALS),
+        source: known.source,
     }
 }
 
@@ -169,9 +184,10 @@ fn unidentified(source: &Source) -> StarReport {
     }
 }
 
-fn name(star: &mut StarReport, star_match: &StarMatch, catalog: &Catalog) {
+/// Names the star, and tells where it stood `years` after J2000.0.
+fn name(star: &mut StarReport, star_match: &StarMatch, catalog: &Catalog, years: f64) {
     let known = &catalog.stars()[star_match.catalog];
-    let (ra_rad, dec_rad) = known.direction.to_ra_dec();
+    let (ra_rad, dec_rad) = known.direction_at(years).to_ra_dec();
     star.id = Some(catalog.designation(star_match.catalog));
     star.name = catalog.name_of(star_match.catalog).map(Into::into);
     star.vmag = finite(f64::from(known.v_mag), 3);

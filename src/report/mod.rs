@@ -15,6 +15,7 @@ mod text;
 pub use table::{TABLE_COLUMNS, write_table_header};
 pub use text::{STARS_SHOWN, TextOptions, counted};
 
+use crate::pipeline::DateSource;
 use serde::Serialize;
 
 /// Version of the JSON described here.
@@ -31,6 +32,8 @@ pub struct FrameReport {
     pub width: usize,
     /// Rows.
     pub height: usize,
+    /// When it was taken, where that is known; else the stars stand where they stood at J2000.0.
+    pub date: Option<DateReport>,
     /// Whether the stars are identified.
     pub status: Status,
     /// Why they are not, and what may help.
@@ -50,6 +53,17 @@ pub struct FrameReport {
     pub stars: Vec<StarReport>,
     /// How long it took.
     pub timing_ms: TimingReport,
+}
+
+/// When the frame was taken.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DateReport {
+    /// ISO 8601, in UTC; the day alone where the time is not known.
+    pub iso: String,
+    /// The Julian epoch in years.
+    pub year: f64,
+    /// `option` or `file name`.
+    pub source: DateSource,
 }
 
 /// Whether the stars of a frame are identified.
@@ -178,9 +192,9 @@ pub struct StarReport {
     pub name: Option<String>,
     /// Its Johnson V magnitude.
     pub vmag: Option<f64>,
-    /// Its right ascension (ICRS, epoch J2000), in degrees.
+    /// Its right ascension (ICRS) at the frame's date, in degrees.
     pub ra_deg: Option<f64>,
-    /// Its declination (ICRS, epoch J2000), in degrees.
+    /// Its declination (ICRS) at the frame's date, in degrees.
     pub dec_deg: Option<f64>,
     /// Distance between observed and predicted position, in pixels.
     pub residual_px: Option<f64>,

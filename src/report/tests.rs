@@ -27,6 +27,7 @@ fn unidentified() -> FrameReport {
         frame: "night/a.tif".into(),
         width: 1024,
         height: 768,
+        date: None,
         status: Status::NotIdentified,
         reason: Some(
             "no arrangement of catalogue stars matches the 12 detections; if this is the sky, the field \
@@ -53,6 +54,11 @@ fn unidentified() -> FrameReport {
 
 fn identified() -> FrameReport {
     FrameReport {
+        date: Some(DateReport {
+            iso: "2019-07-29T20:47:26Z".into(),
+            year: 2019.5739,
+            source: DateSource::FileName,
+        }),
         status: Status::Identified,
         reason: None,
         attitude: Some(AttitudeReport {

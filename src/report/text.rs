@@ -4,6 +4,7 @@ use super::rounding::decimals_for;
 use super::{
     AttitudeReport, FrameReport, MagnitudeReport, MatchReport, OpticsReport, StarReport, angles,
 };
+use crate::pipeline::DateSource;
 
 /// Rows of the table of stars that are shown without [`TextOptions::all_stars`].
 pub const STARS_SHOWN: usize = 20;
@@ -36,6 +37,7 @@ impl FrameReport {
                 .iter()
                 .map(|magnitude| self.faintest_line(magnitude)),
         );
+        lines.push(self.date_line());
         lines.extend(self.background_line());
         lines.push(self.timing_line());
         lines.extend(self.star_lines(options));
@@ -65,6 +67,21 @@ impl FrameReport {
             magnitude.faintest_vmag, magnitude.faintest_id
         );
         labelled("faintest", &text)
+    }
+
+    fn date_line(&self) -> String {
+        let text = match &self.date {
+            Some(date) => {
+                let source = match date.source {
+                    DateSource::Option => "as given",
+                    DateSource::FileName => "from the file's name",
+                };
+                let utc = date.iso.replace('T', " ").replace('Z', " UTC");
+                format!("{utc}, {source}: stars stand where they then stood")
+            }
+            None => "unknown: stars stand where they stood in 2000; --date moves them".to_owned(),
+        };
+        labelled("date", &text)
     }
 
     fn background_line(&self) -> Option<String> {

@@ -1,0 +1,325 @@
+//! When a frame was taken: stars move, the fastest by ten arcseconds a year.
+//!
+//! Text or a file's name → [`ObservationDate`] → Julian years since J2000.0.
+//!
+//! Caveats: UTC is taken for the uniform time of the catalogue, about a minute apart, in which no star moves by a
+//! measurable angle. Years are those of [`YEARS`]: further away stars no longer move along straight lines at an even pace.
+
+use jiff::civil::{Date, DateTime, Time};
+use jiff::tz::TimeZone;
+use std::ops::RangeInclusive;
+use std::path::Path;
+use std::str::FromStr;
+
+/// The years in which a frame can have been taken: since stars were first photographed.
+pub const YEARS: RangeInclusive<i16> = 1850..=2100;
+
+/// The epoch J2000.0.
+const J2000: DateTime = jiff::civil::datetime(2000, 1, 1, 12, 0, 0, 0);
+/// What stands for a day of which the hour is not known.
+const MIDDAY: Time = jiff::civil::time(12, 0, 0, 0);
+const SECONDS_PER_JULIAN_YEAR: f64 = 365.25 * 86_400.0;
+
+/// Why a text is no date of an observation.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DateError {
+    /// It is not written as ISO 8601 wants it, or there is no such day or hour.
+    #[error(
+        "'{text}' is no date; expected ISO 8601, like 2019-07-29, 2019-07-29T20:47:26Z or 2019-07-29T22:47:26+02:00"
+    )]
+    Malformed {
+        /// What was found.
+        text: String,
+    },
+    /// Nobody photographed stars then.
+    #[error("the year {year} is not from {} to {}", YEARS.start(), YEARS.end())]
+    OutOfRange {
+        /// The year found.
+        year: i16,
+    },
+}
+
+/// When a frame was taken, in UTC: the day, and the time where it is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ObservationDate {
+    day: Date,
+    time: Option<Time>,
+}
+
+impl ObservationDate {
+    /// The date that `path`'s last component unmistakably holds, as programs that take photographs write it:
+    /// `2019-07-29T204726`, `2019-07-29_20-47-26`, `20190729_204726`, `20190729204726`, or the day alone.
+    ///
+    /// A date is no part of a longer number, and where a name holds two different days neither is taken.
+    pub fn in_file_name(path: &Path) -> Option<Self> {
+        let name = path.file_name()?.to_string_lossy();
+        let bytes = name.as_bytes();
+        let mut found = (0..bytes.len()).filter_map(|at| Self::at(bytes, at));
+        let first = found.next()?;
+        found.all(|other| other.day == first.day).then_some(first)
+    }
+
+    /// The date that begins at `start`.
+    fn at(bytes: &[u8], start: usize) -> Option<Self> {
+        if start > 0 && bytes[start - 1].is_ascii_digit() {
+            return None;
+        }
+        let mut text = Cursor { bytes, at: start };
+        let year = text.number(4)?;
+        let separator = text.any_of(b"-_.");
+        let month = text.number(2)?;
+        if separator != text.any_of(b"-_.") {
+            return None;
+        }
+        let day = Date::new(year, month as i8, text.number(2)? as i8).ok()?;
+        let time = text.clone().time();
+        // Digits behind the day are a time or make it a longer number.
+        let alone = !text.number_follows() || (separator.is_none() && time.is_some());
+        (YEARS.contains(&year) && alone).then_some(Self { day, time })
+    }
+
+    fn utc(&self) -> DateTime {
+        self.day.to_datetime(self.time.unwrap_or(MIDDAY))
+    }
+
+    /// Julian years of 365.25 days since J2000.0; a day without a time counts as its middle.
+    pub fn years_since_j2000(&self) -> f64 {
+        self.utc().duration_since(J2000).as_secs_f64() / SECONDS_PER_JULIAN_YEAR
+    }
+
+    /// The Julian epoch: 2000 and the years since.
+    pub fn julian_epoch(&self) -> f64 {
+        2000.0 + self.years_since_j2000()
+    }
+
+    /// The date as ISO 8601 writes it: `2019-07-29T20:47:26Z`, or `2019-07-29` where the time is not known.
+    pub fn to_iso(&self) -> String {
+        self.time
+            .map_or(self.day.to_string(), |_| format!("{}Z", self.utc()))
+    }
+}
+
+/// ISO 8601: a day, or a day and a time, with `Z`, an offset, or nothing for UTC.
+impl FromStr for ObservationDate {
+    type Err = DateError;
+
+    fn from_str(text: &str) -> Result<Self, DateError> {
+        let text = text.trim();
+        let malformed = || DateError::Malformed { text: text.into() };
+        // The name of a time zone in brackets would need the zone's rules.
+        if text.contains('[') {
+            return Err(malformed());
+        }
+        let with_offset = text.parse::<jiff::Timestamp>();
+        let utc = match with_offset {
+            Ok(instant) => instant.to_zoned(TimeZone::UTC).datetime(),
+            Err(_) => text.parse::<DateTime>().map_err(|_| malformed())?,
+        };
+        if !YEARS.contains(&utc.year()) {
+            return Err(DateError::OutOfRange { year: utc.year() });
+        }
+        let has_time = text.contains(['T', 't', ' ']);
+        Ok(Self {
+            day: utc.date(),
+            time: has_time.then(|| utc.time()),
+        })
+    }
+}
+
+/// A place in a file's name.
+#[derive(Clone)]
+struct Cursor<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl Cursor<'_> {
+    fn number_follows(&self) -> bool {
+        self.bytes.get(self.at).is_some_and(u8::is_ascii_digit)
+    }
+
+    /// The number that the next `digits` digits are.
+    fn number(&mut self, digits: usize) -> Option<i16> {
+        let end = self.at + digits;
+        let text = self.bytes.get(self.at..end)?;
+        // A sign is no digit, whatever the parser of numbers thinks.
+        if !text.iter().all(u8::is_ascii_digit) {
+            return None;
+        }
+        self.at = end;
+        std::str::from_utf8(text).ok()?.parse().ok()
+    }
+
+    /// The next byte, if it is one of `wanted`.
+    fn any_of(&mut self, wanted: &[u8]) -> Option<u8> {
+        let next = *self.bytes.get(self.at)?;
+        wanted.contains(&next).then(|| self.at += 1).map(|()| next)
+    }
+
+    /// Hour, minute and second, with what commonly stands before and between them.
+    fn time(mut self) -> Option<Time> {
+        self.any_of(b"T_- t");
+        let hour = self.number(2)?;
+        let separator = self.any_of(b":-_.");
+        let minute = self.number(2)?;
+        if separator != self.any_of(b":-_.") {
+            return None;
+        }
+        let second = self.number(2)?;
+        if self.number_follows() {
+            return None;
+        }
+        Time::new(hour as i8, minute as i8, second as i8, 0).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn parsed(text: &str) -> ObservationDate {
+        text.parse().unwrap()
+    }
+
+    fn named(name: &str) -> Option<String> {
+        ObservationDate::in_file_name(name.as_ref()).map(|date| date.to_iso())
+    }
+
+    #[test]
+    fn a_date_is_read_with_any_offset_and_with_none() {
+        for text in [
+            "2019-07-29T20:47:26Z",
+            "2019-07-29 20:47:26",
+            "2019-07-29T22:47:26+02:00",
+            "20190729T204726Z",
+            "2019-07-30T00:47:26+04",
+        ] {
+            assert_eq!(parsed(text).to_iso(), "2019-07-29T20:47:26Z", "{text}");
+        }
+        assert_eq!(parsed(" 2019-07-29 ").to_iso(), "2019-07-29");
+        assert_eq!(parsed("20190729").to_iso(), "2019-07-29");
+    }
+
+    #[test]
+    fn what_is_no_date_is_refused_with_what_was_expected() {
+        for text in [
+            "",
+            "today",
+            "2019",
+            "2019-13-01",
+            "2019-02-29",
+            "29.07.2019",
+            "2019-07-29T25:00:00Z",
+            "2019-07-29T20:47:26[Europe/Vienna]",
+            "2019-07-29T20:47:26+99:00",
+        ] {
+            let error = text.parse::<ObservationDate>().unwrap_err();
+            assert!(error.to_string().contains("ISO 8601"), "{text}: {error}");
+        }
+        let error = "1066-10-14".parse::<ObservationDate>().unwrap_err();
+        assert_eq!(error, DateError::OutOfRange { year: 1066 });
+        assert!("2101-01-01".parse::<ObservationDate>().is_err());
+    }
+
+    #[test]
+    fn years_are_julian_and_counted_from_noon() {
+        assert_eq!(parsed("2000-01-01T12:00:00Z").years_since_j2000(), 0.0);
+        assert_eq!(parsed("2000-01-01").years_since_j2000(), 0.0);
+        // By Julian dates: noon of that day is 2458694, J2000.0 is 2451545, and 1899-12-31 is 2415020.
+        let night = parsed("2019-07-29T20:47:26Z").julian_epoch();
+        let expected = 2000.0 + (7149.0 + 31_646.0 / 86_400.0) / 365.25;
+        assert!((night - expected).abs() < 1e-9, "{night}");
+        let b1900 = parsed("1899-12-31T12:00:00Z").years_since_j2000();
+        assert!((b1900 + 100.0).abs() < 1e-9, "{b1900}");
+    }
+
+    #[test]
+    fn timestamps_of_capture_programs_are_found_in_names() {
+        for name in [
+            "2019-07-29T204726_Alt40_Azi-135_Try1.tiff",
+            "2019-07-29T20:47:26.fits",
+            "2019-07-29T20:47:26.123Z.png",
+            "2019-07-29_20-47-26.png",
+            "2019-07-29 20.47.26.png",
+            "2019_07_29_20_47_26.jpg",
+            "20190729T204726.tif",
+            "20190729_204726.jpg",
+            "20190729-204726-1.jpg",
+            "IMG20190729204726.jpg",
+            "PXL_20190729_204726.jpg",
+            "M45_30s_2019-07-29_20-47-26_0001.png",
+        ] {
+            let found = named(name);
+            assert_eq!(found.as_deref(), Some("2019-07-29T20:47:26Z"), "{name}");
+        }
+        for name in [
+            "night/2019-07-29.png",
+            "2019-07-29_0012.png",
+            "2019-07-29-2047_8.png",
+            "2019-07-29T256199.png",
+            "20190729.png",
+            "M31_2019.07.29_dark.png",
+        ] {
+            assert_eq!(named(name).as_deref(), Some("2019-07-29"), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_number_that_only_resembles_a_date_is_none() {
+        for name in [
+            "orion.png",
+            "2019.png",
+            "2019-07.png",
+            "12019-07-29.png",
+            "2019-07-291.png",
+            "201907291.png",
+            "120190729204726.png",
+            "201907292047261.png",
+            "2019-13-01.png",
+            "2019-02-30.png",
+            "2019-07_29.png",
+            "1849-07-29.png",
+            "2101-07-29.png",
+            "20190001.png",
+            "2019-07-29_to_2019-08-01.png",
+            "2019-07-29/orion.png",
+            "",
+            "..",
+        ] {
+            assert_eq!(named(name), None, "{name}");
+        }
+    }
+
+    fn moments() -> impl Strategy<Value = ObservationDate> {
+        let day = (YEARS, 1..=12_i8, 1..=28_i8);
+        let time = proptest::option::of((0..24_i8, 0..60_i8, 0..60_i8));
+        (day, time).prop_map(|((year, month, day), time)| ObservationDate {
+            day: Date::new(year, month, day).unwrap(),
+            time: time.map(|(h, m, s)| Time::new(h, m, s, 0).unwrap()),
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_written_is_read_back(date in moments()) {
+            prop_assert_eq!(parsed(&date.to_iso()), date);
+            prop_assert_eq!(ObservationDate::in_file_name(date.to_iso().as_ref()), Some(date));
+            let plain = date.to_iso().replace([':', '-'], "").replace('T', "_");
+            prop_assert_eq!(ObservationDate::in_file_name(plain.as_ref()), Some(date));
+        }
+
+        #[test]
+        fn any_text_and_any_name_are_read_without_panic(text in "\\PC{0,40}", digits in "[-0-9T:_.é ]{0,30}") {
+            let _ = (text.parse::<ObservationDate>(), digits.parse::<ObservationDate>());
+            let _ = (named(&text), named(&digits));
+        }
+
+        #[test]
+        fn later_dates_are_more_years_away(a in moments(), b in moments()) {
+            let (years_a, years_b) = (a.years_since_j2000(), b.years_since_j2000());
+            prop_assert_eq!(a.utc().cmp(&b.utc()), years_a.total_cmp(&years_b));
+        }
+    }
+}
