@@ -45,8 +45,12 @@ pub struct CameraFit {
 /// Parameters without any distortion: turn about three axes, and ln f.
 pub const POSE_PARAMETERS: usize = 4;
 const MAX_ITERATIONS: usize = 10;
+/// A step above this (radians) leads nowhere.
+const LARGEST_STEP: f64 = 0.5;
+/// The least share of an equation that may be left to its own residual when it is left out.
+const MIN_FREEDOM: f64 = 1e-6;
 /// A step below this is far below any centroid error.
-const CONVERGED: f64 = 1e-10;
+const CONVERGED: f64 = 1e-9;
 
 /// Fits attitude, focal length and, with a `model`, the distortion, starting from `camera` and `icrs_to_camera`.
 ///
@@ -66,8 +70,7 @@ pub fn fit_camera(
         camera: camera.clone(),
         icrs_to_camera: *icrs_to_camera,
         model,
-        design: DMatrix::zeros(2 * stars.len(), parameters),
-        rhs: DVector::zeros(2 * stars.len()),
+        equations: Equations::new(parameters, 2 * stars.len()),
     };
     for _ in 0..MAX_ITERATIONS {
         if adjustment.step()? < CONVERGED {
@@ -82,9 +85,71 @@ struct Adjustment<'a> {
     camera: CameraModel,
     icrs_to_camera: Rotation<Icrs, Camera>,
     model: Option<DistortionModel>,
-    /// Two rows a star, divided by its standard error.
-    design: DMatrix<f64>,
-    rhs: DVector<f64>,
+    /// Two a star, divided by its standard error.
+    equations: Equations,
+}
+
+/// Linear equations, of which each has coefficients for about half of the parameters.
+struct Equations {
+    parameters: usize,
+    /// (parameter, coefficient) of one equation after the other.
+    terms: Vec<(usize, f64)>,
+    /// Where each equation's terms end.
+    ends: Vec<usize>,
+    rhs: Vec<f64>,
+}
+
+impl Equations {
+    fn new(parameters: usize, count: usize) -> Self {
+        Self {
+            parameters,
+            terms: Vec::with_capacity(count * parameters),
+            ends: Vec::with_capacity(count),
+            rhs: Vec::with_capacity(count),
+        }
+    }
+
+    fn clear(&mut self) {
+        self.terms.clear();
+        self.ends.clear();
+        self.rhs.clear();
+    }
+
+    fn term(&mut self, parameter: usize, coefficient: f64) {
+        if coefficient != 0.0 {
+            self.terms.push((parameter, coefficient));
+        }
+    }
+
+    fn close(&mut self, rhs: f64) {
+        self.ends.push(self.terms.len());
+        self.rhs.push(rhs);
+    }
+
+    fn iter(&self) -> impl Iterator<Item = (&[(usize, f64)], f64)> {
+        let starts = std::iter::once(0).chain(self.ends.iter().copied());
+        let ranges = starts.zip(&self.ends);
+        ranges
+            .zip(&self.rhs)
+            .map(|((start, &end), &rhs)| (&self.terms[start..end], rhs))
+    }
+
+    /// The normal equations: matrix and right-hand side.
+    fn normal(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let mut matrix = DMatrix::zeros(self.parameters, self.parameters);
+        let mut vector = DVector::zeros(self.parameters);
+        for (terms, rhs) in self.iter() {
+            for (done, &(column, a)) in terms.iter().enumerate() {
+                vector[column] += a * rhs;
+                for &(row, b) in &terms[done..] {
+                    matrix[(row, column)] += a * b;
+                }
+            }
+        }
+        // Terms come in ascending order, so that all of it is in the lower triangle.
+        matrix.fill_upper_triangle_with_lower_triangle();
+        (matrix, vector)
+    }
 }
 
 impl Adjustment<'_> {
@@ -96,7 +161,8 @@ impl Adjustment<'_> {
     fn linearise(&mut self) -> Option<()> {
         let f = self.camera.focal_length_px;
         let radius_px = self.radius_px();
-        for (index, star) in self.stars.iter().enumerate() {
+        self.equations.clear();
+        for star in self.stars {
             let direction = self.icrs_to_camera.apply(&star.icrs);
             let d = direction.as_vector();
             if d.z <= 0.0 {
@@ -106,23 +172,21 @@ impl Adjustment<'_> {
             let [u, v] = self.camera.offset_of(&star.pixel);
             let weight = 1.0 / star.sigma_px;
             let rows = [
-                [-x * y, 1.0 + x * x, -y, x, u - f * x],
-                [-(1.0 + y * y), x * y, x, y, v - f * y],
+                ([-x * y, 1.0 + x * x, -y, x], u - f * x),
+                ([-(1.0 + y * y), x * y, x, y], v - f * y),
             ];
-            for (axis, row) in rows.iter().enumerate() {
-                let r = 2 * index + axis;
-                for (column, value) in row[..POSE_PARAMETERS].iter().enumerate() {
-                    self.design[(r, column)] = weight * f * value;
+            for (axis, (pose, rhs)) in rows.into_iter().enumerate() {
+                for (parameter, value) in pose.into_iter().enumerate() {
+                    self.equations.term(parameter, weight * f * value);
                 }
-                self.rhs[r] = weight * row[POSE_PARAMETERS];
-            }
-            if let Some(model) = self.model {
-                let mut column = POSE_PARAMETERS;
-                model.for_each_term([u / radius_px, v / radius_px], |[du, dv]| {
-                    self.design[(2 * index, column)] = -weight * du;
-                    self.design[(2 * index + 1, column)] = -weight * dv;
-                    column += 1;
-                });
+                if let Some(model) = self.model {
+                    let mut parameter = POSE_PARAMETERS;
+                    model.for_each_term([u / radius_px, v / radius_px], |displacement| {
+                        self.equations.term(parameter, -weight * displacement[axis]);
+                        parameter += 1;
+                    });
+                }
+                self.equations.close(weight * rhs);
             }
         }
         Some(())
@@ -131,10 +195,11 @@ impl Adjustment<'_> {
     /// One Gauss-Newton step; returns its size (radians, and relative change of the focal length).
     fn step(&mut self) -> Option<f64> {
         self.linearise()?;
-        let normal = self.design.tr_mul(&self.design);
-        let solution = normal.cholesky()?.solve(&self.design.tr_mul(&self.rhs));
+        let (matrix, vector) = self.equations.normal();
+        let solution = matrix.cholesky()?.solve(&vector);
         let turn = Vector3::new(solution[0], solution[1], solution[2]);
-        if !(turn.norm() < 0.5 && solution[3].abs() < 0.5) {
+        let size = turn.norm().max(solution[3].abs());
+        if size.is_nan() || size > LARGEST_STEP {
             return None;
         }
         self.icrs_to_camera = self.icrs_to_camera.then_turn(turn);
@@ -144,45 +209,47 @@ impl Adjustment<'_> {
             let coefficients = solution.as_slice()[POSE_PARAMETERS..].to_vec();
             Distortion::new(model, radius_px, coefficients)
         });
-        Some(turn.norm().max(solution[3].abs()))
+        Some(size)
     }
 
     fn finish(mut self) -> Option<CameraFit> {
         self.linearise()?;
-        let parameters = self.design.ncols();
-        let inverse = self.design.tr_mul(&self.design).cholesky()?.inverse();
+        let parameters = self.equations.parameters;
+        let inverse = self.equations.normal().0.cholesky()?.inverse();
         // At the solution the linear model's right-hand side is the residual plus the distortion part.
-        let mut distortion = DVector::zeros(parameters);
-        if let Some(fitted) = &self.camera.distortion {
-            distortion
-                .rows_mut(POSE_PARAMETERS, parameters - POSE_PARAMETERS)
-                .copy_from_slice(fitted.coefficients_px());
+        let distortion = self.camera.distortion.as_ref();
+        let distortion = distortion.map_or(&[][..], Distortion::coefficients_px);
+        let (mut chi_sq, mut left_out_chi_sq) = (0.0, 0.0);
+        let mut residuals = Vec::with_capacity(2 * self.stars.len());
+        for (terms, rhs) in self.equations.iter() {
+            let of_distortion = terms.iter().map(|&(parameter, a)| {
+                let coefficient = parameter.checked_sub(POSE_PARAMETERS);
+                coefficient.map_or(0.0, |c| a * distortion[c])
+            });
+            let residual = rhs - of_distortion.sum::<f64>();
+            let leverage: f64 = terms
+                .iter()
+                .map(|&(column, a)| {
+                    let row_sum = terms.iter().map(|&(row, b)| inverse[(row, column)] * b);
+                    a * row_sum.sum::<f64>()
+                })
+                .sum();
+            chi_sq += residual * residual;
+            left_out_chi_sq += (residual / (1.0 - leverage).max(MIN_FREEDOM)).powi(2);
+            residuals.push(residual);
         }
-        let weighted = &self.rhs - &self.design * distortion;
-        let leverage = (&self.design * &inverse).component_mul(&self.design);
-        let left_out_chi_sq = (0..weighted.len())
-            .map(|r| {
-                let free = (1.0 - leverage.row(r).sum()).max(1e-6);
-                (weighted[r] / free).powi(2)
-            })
-            .sum();
         let residuals_px = self
             .stars
             .iter()
-            .enumerate()
-            .map(|(i, s)| {
-                [
-                    weighted[2 * i] * s.sigma_px,
-                    weighted[2 * i + 1] * s.sigma_px,
-                ]
-            })
+            .zip(residuals.chunks_exact(2))
+            .map(|(star, pair)| [pair[0] * star.sigma_px, pair[1] * star.sigma_px])
             .collect();
         Some(CameraFit {
             camera: self.camera,
             icrs_to_camera: self.icrs_to_camera,
             covariance: inverse.fixed_view::<4, 4>(0, 0).into_owned(),
             residuals_px,
-            chi_sq: weighted.norm_squared(),
+            chi_sq,
             left_out_chi_sq,
             parameters,
         })

@@ -57,9 +57,14 @@ impl DistortionModel {
         }
         term([u, -v]);
         term([v, u]);
-        for order in 2..=self.order() as i32 {
+        let (mut u_powers, mut v_powers) = ([1.0; MAX_ORDER + 1], [1.0; MAX_ORDER + 1]);
+        for power in 1..=self.order() {
+            u_powers[power] = u_powers[power - 1] * u;
+            v_powers[power] = v_powers[power - 1] * v;
+        }
+        for order in 2..=self.order() {
             for power in 0..=order {
-                let monomial = u.powi(order - power) * v.powi(power);
+                let monomial = u_powers[order - power] * v_powers[power];
                 term([monomial, 0.0]);
                 term([0.0, monomial]);
             }
@@ -74,6 +79,9 @@ pub struct Distortion {
     radius_px: f64,
     coefficients_px: Vec<f64>,
 }
+
+/// The highest order of any model.
+const MAX_ORDER: usize = 5;
 
 /// Steps of the fixed-point iteration that inverts the polynomial, and where it may stop.
 const INVERSION_STEPS: usize = 50;

@@ -18,6 +18,8 @@ const MIN_RADIUS_PX: f64 = 0.25;
 const EQUATIONS_PER_PARAMETER: f64 = 2.5;
 /// How much likelier (twice the logarithm) a richer model must make the stars left out of the fit to be taken.
 const WORTH_IT: f64 = 6.0;
+/// Halvings of the interval in which the excess is sought: to a ten-thousandth of the largest residual.
+const EXCESS_BISECTIONS: usize = 14;
 /// A sceptic wants so many standard deviations more agreement than chance makes.
 const SCEPTICAL_SIGMAS: f64 = 3.0;
 /// Rounds of pairing and fitting at the most.
@@ -143,12 +145,12 @@ fn same_pairs(a: &[StarMatch], b: &[StarMatch]) -> bool {
 fn zero_point_mag(field: &StarField, sky: &Sky, matches: &[StarMatch]) -> f64 {
     match field.photometry {
         Photometry::JohnsonV => 0.0,
-        Photometry::Instrumental => median(
-            matches
-                .iter()
-                .map(|m| f64::from(sky.stars()[m.catalog].v_mag) - field.stars[m.observed].mag)
-                .collect(),
-        ),
+        Photometry::Instrumental => {
+            let difference = |m: &StarMatch| {
+                f64::from(sky.stars()[m.catalog].v_mag) - field.stars[m.observed].mag
+            };
+            median(&mut matches.iter().map(difference).collect::<Vec<f64>>())
+        }
     }
 }
 
@@ -163,7 +165,7 @@ fn measured(
         MeasuredStar {
             pixel: star.position,
             icrs: sky.stars()[m.catalog].direction_at(field.years_since_j2000),
-            sigma_px: star.sigma_px.hypot(excess_px).max(1e-3),
+            sigma_px: (star.sigma_px.powi(2) + excess_px.powi(2)).sqrt().max(1e-3),
         }
     };
     matches.iter().map(measured).collect()
@@ -210,7 +212,7 @@ fn distances_px(fit: &CameraFit) -> Vec<f64> {
         .collect()
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {
         return 0.0;
     }
@@ -220,34 +222,37 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 /// The radius that holds practically all true pairs, by the typical residual of this fit.
 fn agreement_radius_px(fit: &CameraFit, before_px: f64) -> f64 {
-    let sigma_px = median(distances_px(fit)) / RAYLEIGH_MEDIAN;
+    let sigma_px = median(&mut distances_px(fit)) / RAYLEIGH_MEDIAN;
     (CLIP * sigma_px * 1.5)
         .max(MIN_RADIUS_PX)
         .max(before_px / 4.0)
 }
 
-/// What must be added to the stated errors so that the residuals' median is as expected.
+/// What must be added to the stated errors so that the residuals' median is as expected, in pixels.
 fn excess_sigma_of(field: &StarField, matches: &[StarMatch], fit: &CameraFit) -> f64 {
-    let free = (2.0 * matches.len() as f64 - fit.parameters as f64).max(1.0)
-        / (2.0 * matches.len() as f64).max(1.0);
-    let distances = distances_px(fit);
-    let typical = |excess_px: f64| {
-        let scaled = distances
-            .iter()
-            .zip(matches)
-            .map(|(d, m)| d / field.stars[m.observed].sigma_px.hypot(excess_px).max(1e-3));
-        median(scaled.collect()) / (RAYLEIGH_MEDIAN * free.sqrt())
+    let equations = 2.0 * matches.len() as f64;
+    let free = (equations - fit.parameters as f64).max(1.0) / equations.max(1.0);
+    let expected_sq = RAYLEIGH_MEDIAN.powi(2) * free;
+    let squares: Vec<(f64, f64)> = fit
+        .residuals_px
+        .iter()
+        .zip(matches)
+        .map(|([x, y], m)| (x * x + y * y, field.stars[m.observed].sigma_px.powi(2)))
+        .collect();
+    let mut scaled = Vec::with_capacity(squares.len());
+    let mut too_small = |excess_sq: f64| {
+        scaled.clear();
+        scaled.extend(squares.iter().map(|(d, s)| d / (s + excess_sq).max(1e-6)));
+        median(&mut scaled) > expected_sq
     };
-    if typical(0.0) <= 1.0 {
+    if !too_small(0.0) {
         return 0.0;
     }
-    let (mut low, mut high) = (
-        0.0,
-        distances.iter().fold(1e-3, |a: f64, &b| a.max(b)) * 2.0,
-    );
-    for _ in 0..30 {
+    let largest_sq = squares.iter().fold(1e-6, |a: f64, s| a.max(s.0));
+    let (mut low, mut high) = (0.0, largest_sq.sqrt() * 2.0);
+    for _ in 0..EXCESS_BISECTIONS {
         let middle = 0.5 * (low + high);
-        if typical(middle) > 1.0 {
+        if too_small(middle * middle) {
             low = middle;
         } else {
             high = middle;

@@ -177,6 +177,7 @@ impl Hypothesis {
         let predicted = self.predict(sky, field, observed);
         let diagonal_px = field.width_px.hypot(field.height_px);
         let used_up = TRIANGLE_STARS + (self.parameters - POSE_PARAMETERS).div_ceil(2);
+        let neighbours = self.squared_distances(field, observed, &predicted);
         let best = RADII
             .iter()
             .map(|share| {
@@ -185,43 +186,45 @@ impl Hypothesis {
                 log10_binomial_tail(
                     observed.len().saturating_sub(used_up),
                     hits.len().saturating_sub(used_up),
-                    self.mean_chance(field, observed, &predicted, radius_px),
+                    mean_chance(field, &neighbours, radius_px),
                 )
             })
             .fold(0.0, f64::min);
         (best + (search_weight(hypotheses) * RADII.len() as f64).log10()).min(0.0)
     }
 
-    /// The mean over the observed stars of the probability that chance puts a predicted star of about the same
-    /// brightness within `radius_px`.
-    fn mean_chance(
+    /// For each observed star, the squared distances in px² of the predicted stars of about its brightness.
+    fn squared_distances(
         &self,
         field: &StarField,
         observed: &[ObservedStar],
         predicted: &[PredictedStar],
-        radius_px: f64,
-    ) -> f64 {
-        let frame_px = field.width_px * field.height_px;
-        let reach_px = NEIGHBOURHOOD * radius_px;
-        let disc_px = PI * radius_px * radius_px;
-        let sum: f64 = observed
-            .iter()
-            .map(|star| {
-                let (mut alike, mut near) = (0.0f64, 0.0f64);
-                let alike_in =
-                    |p: &&PredictedStar| self.mag_difference(star, p, field.photometry).is_some();
-                for p in predicted.iter().filter(alike_in) {
-                    alike += 1.0;
-                    near += f64::from(u8::from(p.pixel.distance_to(&star.position) <= reach_px));
-                }
-                // Less the one that may be its match: what counts is how many others chance could have put there.
-                let crowd_per_px = (near - 1.0) / (PI * reach_px * reach_px);
-                let per_px = (alike / frame_px).max(crowd_per_px);
-                (per_px * disc_px).min(1.0)
-            })
-            .sum();
-        sum / observed.len().max(1) as f64
+    ) -> Vec<Vec<f64>> {
+        let of_star = |star: &ObservedStar| {
+            let alike =
+                |p: &&PredictedStar| self.mag_difference(star, p, field.photometry).is_some();
+            let squared = |p: &PredictedStar| {
+                (p.pixel.x - star.position.x).powi(2) + (p.pixel.y - star.position.y).powi(2)
+            };
+            predicted.iter().filter(alike).map(squared).collect()
+        };
+        observed.iter().map(of_star).collect()
     }
+}
+
+/// The mean over the observed stars of the probability that chance puts a predicted star of about the same
+/// brightness within `radius_px`; `neighbours` are the squared distances of such stars from each.
+fn mean_chance(field: &StarField, neighbours: &[Vec<f64>], radius_px: f64) -> f64 {
+    let frame_px = field.width_px * field.height_px;
+    let reach_sq = (NEIGHBOURHOOD * radius_px).powi(2);
+    let chance = |distances_sq: &Vec<f64>| {
+        let near = distances_sq.iter().filter(|&&d| d <= reach_sq).count() as f64;
+        // Less the one that may be its match: what counts is how many others chance could have put there.
+        let crowd_per_px = (near - 1.0) / (PI * reach_sq);
+        let per_px = (distances_sq.len() as f64 / frame_px).max(crowd_per_px);
+        (per_px * PI * radius_px * radius_px).min(1.0)
+    };
+    neighbours.iter().map(chance).sum::<f64>() / neighbours.len().max(1) as f64
 }
 
 /// Pairs what lies within `radius_px` and whose `mag_difference` is tolerable, the most alike first, each star once.
