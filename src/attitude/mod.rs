@@ -6,7 +6,7 @@
 
 mod fit;
 
-pub use fit::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera};
+pub use fit::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera, left_out_chi_sq};
 
 use crate::coords::{Camera, Icrs, Rotation, UnitVector};
 use nalgebra::{Matrix3, SVD};

@@ -4,7 +4,7 @@
 
 use super::verify::Hypothesis;
 use super::{Photometry, Sky, StarField, StarMatch};
-use crate::attitude::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera};
+use crate::attitude::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera, left_out_chi_sq};
 use crate::camera::DistortionModel;
 use std::f64::consts::PI;
 
@@ -185,7 +185,8 @@ fn choose_model(
     let stars = measured(field, sky, &current.matches, current.excess_sigma_px);
     let left_out = |model| {
         let Refined { fit, .. } = current;
-        fit_camera(&stars, &fit.camera, &fit.icrs_to_camera, model).map(|f| f.left_out_chi_sq)
+        let fit = fit_camera(&stars, &fit.camera, &fit.icrs_to_camera, model)?;
+        left_out_chi_sq(&stars, &fit)
     };
     let equations = 2.0 * stars.len() as f64;
     let mut best = (None, left_out(None)?);
