@@ -81,6 +81,7 @@ fn main() {
                 width_px: w,
                 height_px: h,
                 photometry: Photometry::Instrumental,
+                years_since_j2000: 0.0,
                 stars: v,
             };
             let t = Instant::now();

@@ -133,7 +133,8 @@ impl Distortion {
             if error[0].abs() + error[1].abs() < INVERSION_TOLERANCE_PX {
                 return Some(observed);
             }
-            if !(observed[0].abs() + observed[1].abs() < 10.0 * self.radius_px) {
+            let reach_px = observed[0].abs() + observed[1].abs();
+            if reach_px.is_nan() || reach_px > 10.0 * self.radius_px {
                 return None;
             }
         }

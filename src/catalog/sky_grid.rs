@@ -1,12 +1,14 @@
 //! Which catalogue stars lie near a direction, brightest first.
 //!
-//! The sky is cut into zones of declination and these into cells of about the same size; the stars of a
-//! cell stand together, brightest first, so that a search to a limiting magnitude stops early.
+//! The cube around the unit sphere is cut into cubic cells; the stars of a cell stand together, brightest
+//! first, so that a search to a limiting magnitude stops early. That needs no trigonometry and knows no
+//! poles. Wide and shallow searches go through the brightest stars of the whole sky instead.
 
 use super::Star;
 use crate::coords::{Icrs, UnitVector};
 use nalgebra::Vector3;
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::PI;
+use std::ops::RangeInclusive;
 
 /// One star as the grid keeps it: packed, since most of a search is waiting for memory.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,12 +22,6 @@ pub struct GridStar {
 }
 
 impl GridStar {
-    const NOWHERE: Self = Self {
-        direction: [0.0; 3],
-        v_mag: 0.0,
-        catalog: 0,
-    };
-
     fn new(index: usize, star: &Star) -> Self {
         let v = star.direction.as_vector();
         Self {
@@ -35,107 +31,87 @@ impl GridStar {
         }
     }
 
-    /// Squared length of the chord to the unit vector `direction`.
+    /// The unit vector, as accurate as it is kept.
     #[inline]
-    pub fn chord_sq(&self, direction: &Vector3<f64>) -> f64 {
-        let dx = f64::from(self.direction[0]) - direction.x;
-        let dy = f64::from(self.direction[1]) - direction.y;
-        let dz = f64::from(self.direction[2]) - direction.z;
-        dx * dx + dy * dy + dz * dz
+    pub fn vector(&self) -> Vector3<f64> {
+        Vector3::from(self.direction.map(f64::from))
+    }
+
+    #[inline]
+    fn is_within(&self, centre: &Vector3<f64>, chord_sq: f64) -> bool {
+        (self.vector() - centre).norm_squared() <= chord_sq
     }
 }
 
 /// The catalogue's stars by place.
 #[derive(Debug, Clone)]
 pub struct SkyGrid {
-    zones: Vec<Zone>,
-    /// `cell_starts[c]..cell_starts[c + 1]` are the stars of cell `c`.
+    /// `cell_starts[c]..cell_starts[c + 1]` are the stars of cell `c` in `by_cell`.
     cell_starts: Vec<u32>,
-    stars: Vec<GridStar>,
-    /// The brightest stars of all, brightest first: wide and shallow searches go through these.
-    brightest: Vec<GridStar>,
-    zone_height_rad: f64,
+    by_cell: Vec<GridStar>,
+    /// In the order of the catalogue, brightest first.
+    by_brightness: Vec<GridStar>,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Zone {
-    first_cell: u32,
-    cell_count: u32,
-}
-
-/// Height of a zone: about three catalogue stars a cell.
-const ZONES: usize = 256;
-/// How many stars [`SkyGrid::brightest`] holds.
-const BRIGHTEST: usize = 16_384;
+/// Cells along an edge of the cube: on the sphere they are 1.8° wide and hold sixteen catalogue stars.
+const CELLS: usize = 64;
+const CELL_SIZE: f64 = 2.0 / CELLS as f64;
 /// Going to a cell costs about as much as looking at so many stars in a row.
 const STARS_PER_CELL_VISIT: f64 = 4.0;
+/// How far single precision may put a star off the sphere.
+const OFF_SPHERE: f64 = 1e-6;
+
+fn cell_along(coordinate: f64) -> usize {
+    (((coordinate + 1.0) / CELL_SIZE).max(0.0) as usize).min(CELLS - 1)
+}
+
+fn cells_along(centre: f64, radius: f64) -> RangeInclusive<usize> {
+    cell_along(centre - radius)..=cell_along(centre + radius)
+}
 
 impl SkyGrid {
     /// Sorts `stars`, which stand brightest first, into cells.
     pub fn new(stars: &[Star]) -> Self {
-        let zone_height_rad = PI / ZONES as f64;
-        let mut zones = Vec::with_capacity(ZONES);
-        let mut cells = 0;
-        for zone in 0..ZONES {
-            let low = zone as f64 * zone_height_rad - FRAC_PI_2;
-            let widest = if low < 0.0 && low + zone_height_rad > 0.0 {
-                1.0
-            } else {
-                low.cos().max((low + zone_height_rad).cos())
-            };
-            let cell_count = (TAU * widest / zone_height_rad).ceil().max(1.0) as u32;
-            zones.push(Zone {
-                first_cell: cells,
-                cell_count,
-            });
-            cells += cell_count;
-        }
-        let mut grid = Self {
-            zones,
-            cell_starts: vec![0; cells as usize + 1],
-            stars: Vec::new(),
-            brightest: stars[..stars.len().min(BRIGHTEST)]
-                .iter()
-                .enumerate()
-                .map(|(index, star)| GridStar::new(index, star))
-                .collect(),
-            zone_height_rad,
-        };
-        grid.fill(stars);
-        grid
-    }
-
-    /// A counting sort by cell; stable, so that a cell's stars stay brightest first.
-    fn fill(&mut self, stars: &[Star]) {
-        let cells: Vec<u32> = stars.iter().map(|s| self.cell_of(&s.direction)).collect();
+        let packed = |(index, star)| GridStar::new(index, star);
+        let by_brightness: Vec<GridStar> = stars.iter().enumerate().map(packed).collect();
+        // A counting sort: stable, so that a cell's stars stay brightest first.
+        let cells: Vec<usize> = by_brightness.iter().map(Self::cell_of).collect();
+        let mut cell_starts = vec![0u32; CELLS.pow(3) + 1];
         for &cell in &cells {
-            self.cell_starts[cell as usize + 1] += 1;
+            cell_starts[cell + 1] += 1;
         }
-        for cell in 1..self.cell_starts.len() {
-            self.cell_starts[cell] += self.cell_starts[cell - 1];
+        for cell in 1..cell_starts.len() {
+            cell_starts[cell] += cell_starts[cell - 1];
         }
-        let mut next = self.cell_starts.clone();
-        self.stars = vec![GridStar::NOWHERE; stars.len()];
-        for (index, (star, &cell)) in stars.iter().zip(&cells).enumerate() {
-            self.stars[next[cell as usize] as usize] = GridStar::new(index, star);
-            next[cell as usize] += 1;
+        let mut by_cell = by_brightness.clone();
+        for (star, &cell) in by_brightness.iter().zip(&cells) {
+            by_cell[cell_starts[cell] as usize] = *star;
+            cell_starts[cell] += 1;
+        }
+        // Each start has moved on to the next cell's.
+        cell_starts.rotate_right(1);
+        cell_starts[0] = 0;
+        Self {
+            cell_starts,
+            by_cell,
+            by_brightness,
         }
     }
 
-    fn cell_of(&self, direction: &UnitVector<Icrs>) -> u32 {
-        let (ra_rad, dec_rad) = direction.to_ra_dec();
-        let zone = self.zones[self.zone_at(dec_rad)];
-        let cell = (ra_rad / TAU * f64::from(zone.cell_count)) as u32;
-        zone.first_cell + cell.min(zone.cell_count - 1)
+    fn cell_of(star: &GridStar) -> usize {
+        let [x, y, z] = star.direction.map(|c| cell_along(f64::from(c)));
+        (x * CELLS + y) * CELLS + z
     }
 
-    fn zone_at(&self, dec_rad: f64) -> usize {
-        let zone = (dec_rad + FRAC_PI_2) / self.zone_height_rad;
-        (zone.max(0.0) as usize).min(self.zones.len() - 1)
+    /// The star at this index of the catalogue.
+    #[inline]
+    pub fn star(&self, catalog: u32) -> &GridStar {
+        &self.by_brightness[catalog as usize]
     }
 
     /// Calls `visit` with every star within `radius_rad` of `centre` that is not fainter than
     /// `faintest_v_mag`, in an order that depends on nothing but the arguments.
+    #[inline]
     pub fn for_each_within(
         &self,
         centre: &UnitVector<Icrs>,
@@ -143,74 +119,98 @@ impl SkyGrid {
         faintest_v_mag: f32,
         mut visit: impl FnMut(&GridStar),
     ) {
-        let bright_enough = self
-            .brightest
-            .partition_point(|s| s.v_mag <= faintest_v_mag);
-        let all_bright_enough =
-            bright_enough < self.brightest.len() || self.brightest.len() == self.stars.len();
-        let cells = (2.0 * radius_rad / self.zone_height_rad + 1.0).powi(2);
-        if all_bright_enough && (bright_enough as f64) < STARS_PER_CELL_VISIT * cells {
-            let chord_sq = chord_sq_of_angle(radius_rad);
-            let within = |s: &&GridStar| s.chord_sq(centre.as_vector()) <= chord_sq;
-            self.brightest[..bright_enough]
-                .iter()
-                .filter(within)
-                .for_each(visit);
+        let chord = 2.0 * (radius_rad.clamp(0.0, PI) / 2.0).sin();
+        let cone = Cone {
+            centre: centre.as_vector(),
+            chord,
+            faintest_v_mag,
+        };
+        if chord < CELL_SIZE {
+            // The cells around a point: which of them the sphere crosses does not matter.
+            for x in cells_along(cone.centre.x, chord) {
+                for y in cells_along(cone.centre.y, chord) {
+                    self.visit_column(&cone, [x, y], cells_along(cone.centre.z, chord), &mut visit);
+                }
+            }
         } else {
-            self.for_each_in_cells(centre, radius_rad, faintest_v_mag, &mut visit);
+            self.for_each_in_wide_cone(&cone, &mut visit);
         }
     }
 
-    fn for_each_in_cells(
+    fn for_each_in_wide_cone(&self, cone: &Cone, visit: &mut impl FnMut(&GridStar)) {
+        let bright_enough = self
+            .by_brightness
+            .partition_point(|s| s.v_mag <= cone.faintest_v_mag);
+        let cells = PI * (cone.chord / CELL_SIZE + 1.0).powi(2);
+        if (bright_enough as f64) < STARS_PER_CELL_VISIT * cells {
+            self.by_brightness[..bright_enough]
+                .iter()
+                .filter(|star| star.is_within(cone.centre, cone.chord * cone.chord))
+                .for_each(visit);
+            return;
+        }
+        for x in cells_along(cone.centre.x, cone.chord) {
+            for y in cells_along(cone.centre.y, cone.chord) {
+                for z in sphere_crossings(x, y) {
+                    let wanted = cells_along(cone.centre.z, cone.chord);
+                    let first = *z.start().max(wanted.start());
+                    let last = *z.end().min(wanted.end());
+                    self.visit_column(cone, [x, y], first..=last, visit);
+                }
+            }
+        }
+    }
+
+    #[inline]
+    fn visit_column(
         &self,
-        centre: &UnitVector<Icrs>,
-        radius_rad: f64,
-        faintest_v_mag: f32,
+        cone: &Cone,
+        [x, y]: [usize; 2],
+        z: RangeInclusive<usize>,
         visit: &mut impl FnMut(&GridStar),
     ) {
-        let (ra_rad, dec_rad) = centre.to_ra_dec();
-        let chord_sq = chord_sq_of_angle(radius_rad);
-        let centre = centre.as_vector();
-        let half_width_rad = ra_half_width_rad(dec_rad, radius_rad);
-        for zone in self.zone_at(dec_rad - radius_rad)..=self.zone_at(dec_rad + radius_rad) {
-            let zone = self.zones[zone];
-            let count = f64::from(zone.cell_count);
-            let (first, cells) = if half_width_rad >= PI {
-                (0, zone.cell_count)
-            } else {
-                let first = ((ra_rad - half_width_rad) / TAU * count).floor();
-                let last = ((ra_rad + half_width_rad) / TAU * count).floor();
-                let cells = ((last - first) as u32 + 1).min(zone.cell_count);
-                (first.rem_euclid(count) as u32, cells)
-            };
-            for cell in first..first + cells {
-                let cell = (zone.first_cell + cell % zone.cell_count) as usize;
-                let range = self.cell_starts[cell] as usize..self.cell_starts[cell + 1] as usize;
-                for star in &self.stars[range] {
-                    if star.v_mag > faintest_v_mag {
-                        break;
-                    }
-                    if star.chord_sq(centre) <= chord_sq {
-                        visit(star);
-                    }
+        for z in z {
+            let cell = (x * CELLS + y) * CELLS + z;
+            let range = self.cell_starts[cell] as usize..self.cell_starts[cell + 1] as usize;
+            for star in &self.by_cell[range] {
+                if star.v_mag > cone.faintest_v_mag {
+                    break;
+                }
+                if star.is_within(cone.centre, cone.chord * cone.chord) {
+                    visit(star);
                 }
             }
         }
     }
 }
 
-/// Squared chord between two directions `angle_rad` apart (at most half a turn).
-pub fn chord_sq_of_angle(angle_rad: f64) -> f64 {
-    let chord = 2.0 * (angle_rad.clamp(0.0, PI) / 2.0).sin();
-    chord * chord
+struct Cone<'a> {
+    centre: &'a Vector3<f64>,
+    chord: f64,
+    faintest_v_mag: f32,
 }
 
-/// The largest difference in right ascension between the centre of a cone at `dec_rad` and a point in it.
-fn ra_half_width_rad(dec_rad: f64, radius_rad: f64) -> f64 {
-    if dec_rad.abs() + radius_rad >= FRAC_PI_2 {
-        return PI;
-    }
-    (radius_rad.sin() / dec_rad.cos()).clamp(-1.0, 1.0).asin()
+/// The cells of the column at (x, y) that the sphere crosses: below and above the equator, each cell once.
+fn sphere_crossings(x: usize, y: usize) -> impl Iterator<Item = RangeInclusive<usize>> {
+    let nearest_and_farthest = |cell: usize| {
+        let low = cell as f64 * CELL_SIZE - 1.0;
+        let high = low + CELL_SIZE;
+        let nearest = if low < 0.0 && high > 0.0 {
+            0.0
+        } else {
+            low.abs().min(high.abs())
+        };
+        (nearest, low.abs().max(high.abs()))
+    };
+    let ((x_near, x_far), (y_near, y_far)) = (nearest_and_farthest(x), nearest_and_farthest(y));
+    let height = |x: f64, y: f64| 1.0 - x * x - y * y;
+    let highest = (height(x_near, y_near) + OFF_SPHERE).max(0.0).sqrt() + OFF_SPHERE;
+    let lowest = (height(x_far, y_far) - OFF_SPHERE).max(0.0).sqrt() - OFF_SPHERE;
+    let above = cell_along(lowest)..=cell_along(highest);
+    let below_end = cell_along(-lowest).min(above.start().wrapping_sub(1));
+    let below = cell_along(-highest)..=below_end;
+    let crossed = height(x_near, y_near) > -OFF_SPHERE;
+    [below, above].into_iter().filter(move |_| crossed)
 }
 
 #[cfg(test)]
@@ -218,21 +218,41 @@ mod tests {
     use super::*;
     use crate::catalog::StarId;
     use proptest::prelude::*;
+    use std::f64::consts::{FRAC_PI_2, TAU};
 
     fn star(index: u32, ra_rad: f64, sin_dec: f64) -> Star {
-        Star::new(
-            StarId(index),
-            UnitVector::from_ra_dec(ra_rad, sin_dec.asin()),
-            index as f32 * 0.01,
-        )
+        let direction = UnitVector::from_ra_dec(ra_rad, sin_dec.asin());
+        Star::new(StarId(index), direction, index as f32 * 0.001)
+    }
+
+    fn expected(
+        stars: &[Star],
+        centre: &UnitVector<Icrs>,
+        radius_rad: f64,
+        limit: f32,
+    ) -> Vec<u32> {
+        let chord = 2.0 * (radius_rad / 2.0).sin();
+        (0..stars.len())
+            .map(|i| GridStar::new(i, &stars[i]))
+            .filter(|s| s.v_mag <= limit && s.is_within(centre.as_vector(), chord * chord))
+            .map(|s| s.catalog)
+            .collect()
+    }
+
+    fn found(grid: &SkyGrid, centre: &UnitVector<Icrs>, radius_rad: f64, limit: f32) -> Vec<u32> {
+        let mut found = Vec::new();
+        grid.for_each_within(centre, radius_rad, limit, |s| found.push(s.catalog));
+        found.sort_unstable();
+        found
     }
 
     proptest! {
         #[test]
         fn a_cone_holds_what_a_search_through_all_stars_finds(
-            places in prop::collection::vec((0.0..TAU, -1.0..1.0f64), 1..200),
+            places in prop::collection::vec((0.0..TAU, -1.0..1.0f64), 1..500),
             ra_rad in 0.0..TAU, dec_rad in -FRAC_PI_2..FRAC_PI_2,
-            radius_rad in 0.0..1.5f64, limit in 0.0..2.0f32,
+            radius_rad in prop_oneof![0.0..0.015f64, 0.0..0.3f64, 0.0..3.2f64],
+            limit in 0.0..0.6f32,
         ) {
             let stars: Vec<Star> = places
                 .iter()
@@ -240,24 +260,34 @@ mod tests {
                 .map(|(i, &(ra, sin_dec))| star(i as u32, ra, sin_dec))
                 .collect();
             let centre = UnitVector::from_ra_dec(ra_rad, dec_rad);
-            let mut found = Vec::new();
-            let grid = SkyGrid::new(&stars);
-            grid.for_each_within(&centre, radius_rad, limit, |s| found.push(s.catalog));
-            found.sort_unstable();
-            let mut in_cells = Vec::new();
-            let mut visit = |s: &GridStar| in_cells.push(s.catalog);
-            grid.for_each_in_cells(&centre, radius_rad, limit, &mut visit);
-            in_cells.sort_unstable();
-            prop_assert_eq!(&found, &in_cells);
-            let chord_sq = chord_sq_of_angle(radius_rad);
-            let expected: Vec<u32> = (0..stars.len() as u32)
-                .filter(|&i| {
-                    let packed = GridStar::new(i as usize, &stars[i as usize]);
-                    stars[i as usize].v_mag <= limit
-                        && packed.chord_sq(centre.as_vector()) <= chord_sq
-                })
-                .collect();
-            prop_assert_eq!(found, expected);
+            prop_assert_eq!(
+                found(&SkyGrid::new(&stars), &centre, radius_rad, limit),
+                expected(&stars, &centre, radius_rad, limit)
+            );
+        }
+    }
+
+    #[test]
+    fn cones_of_all_sizes_in_the_whole_catalogue_hold_what_they_should() {
+        let stars = crate::catalog::Catalog::built_in().stars();
+        let grid = SkyGrid::new(stars);
+        for (i, radius_deg) in [0.1, 0.8, 1.0, 3.0, 12.0, 40.0].into_iter().enumerate() {
+            for (ra_deg, dec_deg) in [
+                (0.0, 0.0),
+                (83.0, -5.0),
+                (200.0, 89.9),
+                (310.0, -90.0),
+                (45.0, 35.3),
+            ] {
+                let centre =
+                    UnitVector::from_ra_dec(f64::to_radians(ra_deg), f64::to_radians(dec_deg));
+                let limit = 9.5 - i as f32 * 0.5;
+                let radius_rad = f64::to_radians(radius_deg);
+                assert_eq!(
+                    found(&grid, &centre, radius_rad, limit),
+                    expected(stars, &centre, radius_rad, limit)
+                );
+            }
         }
     }
 }

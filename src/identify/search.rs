@@ -98,6 +98,15 @@ struct Trio {
     witness_px: f64,
 }
 
+/// A trio, its corners in the order of its shape, and the focal lengths under which it has that shape.
+struct Query {
+    trio: Trio,
+    /// Its longest side, as a chord, at the focal length `middle_px`.
+    longest: f64,
+    middle_px: f64,
+    range_px: (f64, f64),
+}
+
 /// A first idea of camera and attitude.
 struct Pose {
     sky_to_camera: Matrix3<f64>,
@@ -244,56 +253,54 @@ impl<'a> Search<'a> {
         focal_px.is_finite().then_some(focal_px)
     }
 
-    fn try_focal(&mut self, trio: &Trio, class: &SizeClass, focal_px: (f64, f64)) -> Option<Found> {
-        let middle_px = (focal_px.0 * focal_px.1).sqrt();
+    fn try_focal(&mut self, trio: &Trio, class: &SizeClass, range_px: (f64, f64)) -> Option<Found> {
+        let middle_px = (range_px.0 * range_px.1).sqrt();
         let vectors = self.vectors(trio, middle_px);
         let shape = TriangleShape::new([&vectors[0], &vectors[1], &vectors[2]])?;
+        let query = Query {
+            trio: Trio {
+                stars: shape.order.map(|i| trio.stars[i]),
+                ..*trio
+            },
+            longest: shape.longest,
+            middle_px,
+            range_px,
+        };
         let mut found = None;
         class.for_each_similar(shape.ratios, trio.tolerance, |corners| {
             if found.is_none() {
-                let stars = shape.order.map(|i| trio.stars[i]);
-                let ordered = Trio { stars, ..*trio };
-                let start_px = middle_px;
-                found = self.try_triangle(&ordered, corners, shape.longest, start_px, focal_px);
+                found = self.try_triangle(&query, corners);
             }
         });
         found
     }
 
     /// One hypothesis: these three stars are those three.
-    fn try_triangle(
-        &mut self,
-        trio: &Trio,
-        corners: &[u32; 3],
-        longest: f64,
-        middle_px: f64,
-        range_px: (f64, f64),
-    ) -> Option<Found> {
-        let stars = corners.map(|c| &self.sky.stars()[c as usize]);
-        let sky = stars.map(|s| s.direction.as_vector());
-        let zero_points: [f64; 3] = std::array::from_fn(|i| {
+    fn try_triangle(&mut self, query: &Query, corners: &[u32; 3]) -> Option<Found> {
+        let trio = &query.trio;
+        let stars = corners.map(|c| self.sky.grid.star(c));
+        let zero_point = self.zero_point(std::array::from_fn(|i| {
             f64::from(stars[i].v_mag) - self.field.stars[trio.stars[i]].mag
-        });
-        let zero_point = self.zero_point(zero_points)?;
-        let chord = (sky[0] - sky[1]).norm();
-        let focal_px = middle_px * longest / chord;
+        }))?;
+        let sky = stars.map(GridStar::vector);
+        let focal_px = query.middle_px * query.longest / (sky[0] - sky[1]).norm();
         let slack = 1.0 + 2.0 * trio.tolerance;
-        if focal_px < range_px.0 / slack || focal_px > range_px.1 * slack {
+        if focal_px < query.range_px.0 / slack || focal_px > query.range_px.1 * slack {
             return None;
         }
         let mut seen = self.vectors(trio, focal_px);
         if let Some((near, radius_rad)) = &self.hints.near {
             let reach_rad = (self.diagonal_px / focal_px).atan() + radius_rad;
-            if near.as_vector().dot(sky[0]) < reach_rad.min(std::f64::consts::PI).cos() {
+            if near.as_vector().dot(&sky[0]) < reach_rad.min(std::f64::consts::PI).cos() {
                 return None;
             }
         }
-        let mirrored = triple(&seen) * triple_of(sky) < 0.0;
+        let mirrored = triple(&seen) * triple(&sky) < 0.0;
         if mirrored {
             seen.iter_mut().for_each(|v| v.x = -v.x);
         }
         let pose = Pose {
-            sky_to_camera: two_star_rotation(&seen, sky)?,
+            sky_to_camera: two_star_rotation(&seen, &sky)?,
             focal_px,
             mirrored,
         };
@@ -400,17 +407,13 @@ fn triple([a, b, c]: &[Vector3<f64>; 3]) -> f64 {
     a.cross(b).dot(c)
 }
 
-fn triple_of([a, b, c]: [&Vector3<f64>; 3]) -> f64 {
-    a.cross(b).dot(c)
-}
-
 /// The rotation that brings A and B on the sky to where the camera saw them (TRIAD with the middle of AB first).
-fn two_star_rotation(seen: &[Vector3<f64>; 3], sky: [&Vector3<f64>; 3]) -> Option<Matrix3<f64>> {
+fn two_star_rotation(seen: &[Vector3<f64>; 3], sky: &[Vector3<f64>; 3]) -> Option<Matrix3<f64>> {
     let frame = |a: &Vector3<f64>, b: &Vector3<f64>| {
         let first = (a + b).try_normalize(1e-12)?;
         let third = a.cross(b).try_normalize(1e-15)?;
         Some(Matrix3::from_columns(&[first, third.cross(&first), third]))
     };
     let camera = frame(&seen[0], &seen[1])?;
-    Some(camera * frame(sky[0], sky[1])?.transpose())
+    Some(camera * frame(&sky[0], &sky[1])?.transpose())
 }

@@ -7,10 +7,11 @@
 //! most binomial (Hoeffding 1956: unequal probabilities make the tail thinner), and the probability of as
 //! many as were found or more, times the number of hypotheses and radii tried, bounds the number of
 //! equally good answers that chance alone would have given (an a-contrario test: Desolneux, Moisan & Morel
-//! 2000, IJCV 40, 7). Stars that the camera's parameters were fitted to count only so far as they exceed
-//! what the fit needs: two parameters use up one star.
+//! 2000, IJCV 40, 7). The three stars of the triangle that the hypothesis came from agree because it was
+//! looked for, and say nothing; every two parameters fitted beyond pointing, roll and scale use up another star.
 
 use super::{ObservedStar, Photometry, Sky, StarField, StarMatch};
+use crate::attitude::POSE_PARAMETERS;
 use crate::camera::CameraModel;
 use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::units::RAD_PER_DEG;
@@ -22,6 +23,8 @@ pub const TESTED_STARS: usize = 60;
 const PREDICTED_PER_OBSERVED: f64 = 1.5;
 /// And so many more, so that a few missing ones do no harm in sparse fields.
 const PREDICTED_EXTRA: usize = 5;
+/// Stars that agree by construction.
+const TRIANGLE_STARS: usize = 3;
 /// Radii of agreement tried, in units of the frame's diagonal.
 const RADII: [f64; 6] = [0.0008, 0.0014, 0.0025, 0.0045, 0.008, 0.014];
 /// No radius is below this many pixels.
@@ -142,7 +145,7 @@ impl Hypothesis {
     }
 
     /// Pairs observed and predicted stars of about the same brightness that lie within `radius_px` of each
-    /// other, the closest first, each star once; in the order of the observed stars.
+    /// other, the most alike in place and brightness first, each star once; in the order of the observed stars.
     pub fn pair_up(
         &self,
         observed: &[ObservedStar],
@@ -151,14 +154,20 @@ impl Hypothesis {
         radius_px: f64,
     ) -> Vec<StarMatch> {
         pair_up(observed, predicted, radius_px, |o, p| {
-            self.alike(o, p, photometry)
+            self.mag_difference(o, p, photometry)
         })
     }
 
-    /// Whether the two are of about the same brightness.
-    fn alike(&self, observed: &ObservedStar, predicted: &PredictedStar, p: Photometry) -> bool {
+    /// The difference in brightness in units of what is tolerated; `None` if it is more.
+    fn mag_difference(
+        &self,
+        observed: &ObservedStar,
+        predicted: &PredictedStar,
+        photometry: Photometry,
+    ) -> Option<f64> {
         let difference = f64::from(predicted.v_mag) - observed.mag - self.zero_point_mag;
-        difference.abs() <= p.tolerance_mag()
+        let relative = difference.abs() / photometry.tolerance_mag();
+        (relative <= 1.0).then_some(relative)
     }
 
     /// log10 of the expected number of hypotheses as good as this one among `hypotheses` that chance alone
@@ -167,7 +176,7 @@ impl Hypothesis {
         let observed = field.brightest(TESTED_STARS);
         let predicted = self.predict(sky, field, observed);
         let diagonal_px = field.width_px.hypot(field.height_px);
-        let used_up = self.parameters.div_ceil(2);
+        let used_up = TRIANGLE_STARS + (self.parameters - POSE_PARAMETERS).div_ceil(2);
         let best = RADII
             .iter()
             .map(|share| {
@@ -180,7 +189,7 @@ impl Hypothesis {
                 )
             })
             .fold(0.0, f64::min);
-        best + (hypotheses.max(1) as f64 * RADII.len() as f64).log10()
+        (best + (search_weight(hypotheses) * RADII.len() as f64).log10()).min(0.0)
     }
 
     /// The mean over the observed stars of the probability that chance puts a predicted star of about the same
@@ -199,10 +208,9 @@ impl Hypothesis {
             .iter()
             .map(|star| {
                 let (mut alike, mut near) = (0.0f64, 0.0f64);
-                for p in predicted
-                    .iter()
-                    .filter(|p| self.alike(star, p, field.photometry))
-                {
+                let alike_in =
+                    |p: &&PredictedStar| self.mag_difference(star, p, field.photometry).is_some();
+                for p in predicted.iter().filter(alike_in) {
                     alike += 1.0;
                     near += f64::from(u8::from(p.pixel.distance_to(&star.position) <= reach_px));
                 }
@@ -216,12 +224,12 @@ impl Hypothesis {
     }
 }
 
-/// Pairs what lies within `radius_px` of each other and is `alike`, the closest first, each star once.
+/// Pairs what lies within `radius_px` and whose `mag_difference` is tolerable, the most alike first, each star once.
 fn pair_up(
     observed: &[ObservedStar],
     predicted: &[PredictedStar],
     radius_px: f64,
-    alike: impl Fn(&ObservedStar, &PredictedStar) -> bool,
+    mag_difference: impl Fn(&ObservedStar, &PredictedStar) -> Option<f64>,
 ) -> Vec<StarMatch> {
     let mut by_x: Vec<usize> = (0..predicted.len()).collect();
     by_x.sort_unstable_by(|&a, &b| predicted[a].pixel.x.total_cmp(&predicted[b].pixel.x));
@@ -233,9 +241,11 @@ fn pair_up(
             if pixel.x > star.position.x + radius_px {
                 break;
             }
-            let distance = pixel.distance_to(&star.position);
-            if distance <= radius_px && alike(star, &predicted[p]) {
-                close.push((distance, o, p));
+            let apart = pixel.distance_to(&star.position) / radius_px;
+            if apart <= 1.0
+                && let Some(difference) = mag_difference(star, &predicted[p])
+            {
+                close.push((apart * apart + difference * difference, o, p));
             }
         }
     }
@@ -243,19 +253,28 @@ fn pair_up(
     let mut observed_taken = vec![false; observed.len()];
     let mut predicted_taken = vec![false; predicted.len()];
     let mut pairs = Vec::new();
-    for (distance, o, p) in close {
+    for (_, o, p) in close {
         if !observed_taken[o] && !predicted_taken[p] {
             observed_taken[o] = true;
             predicted_taken[p] = true;
             pairs.push(StarMatch {
                 observed: o,
                 catalog: predicted[p].catalog,
-                residual_px: distance,
+                residual_px: predicted[p].pixel.distance_to(&observed[o].position),
             });
         }
     }
     pairs.sort_unstable_by_key(|pair| pair.observed);
     pairs
+}
+
+/// What the chance of one hypothesis is multiplied by when it is the last of so many.
+///
+/// The weights' inverses add up to less than two however long the search goes on, so that the probability
+/// that any hypothesis at all of a search passes by chance is bounded, and not only that of one.
+fn search_weight(hypotheses: u64) -> f64 {
+    let count = hypotheses.max(1) as f64;
+    count * (1.0 + count.ln()).powi(2)
 }
 
 /// log10 of the probability of `hits` or more successes in `trials` at `chance` each.
@@ -301,6 +320,13 @@ mod tests {
     }
 
     #[test]
+    fn a_search_without_end_has_a_bounded_chance() {
+        let sum: f64 = (1..1_000_000).map(|n| 1.0 / search_weight(n)).sum();
+        assert!(sum < 2.0, "{sum}");
+        assert_eq!(search_weight(0), 1.0);
+    }
+
+    #[test]
     fn each_star_is_paired_once_with_its_closest() {
         let observed = [(10.0, 10.0), (13.0, 10.0), (50.0, 50.0)].map(|(x, y)| ObservedStar {
             position: PixelPoint::new(x, y),
@@ -312,7 +338,7 @@ mod tests {
             v_mag: 0.0,
             catalog: x as usize,
         });
-        let pairs = pair_up(&observed, &predicted, 4.0, |_, _| true);
+        let pairs = pair_up(&observed, &predicted, 4.0, |_, _| Some(0.0));
         let found: Vec<(usize, usize)> = pairs.iter().map(|p| (p.observed, p.catalog)).collect();
         assert_eq!(found, [(0, 10), (1, 12)]);
     }
