@@ -402,7 +402,7 @@ impl<'a> Pipeline<'a> {
 }
 
 /// The sources that may be stars, and the index of each among all sources.
-fn star_field(
+pub fn star_field(
     frame: &Frame,
     detections: &Detections,
     years_since_j2000: f64,

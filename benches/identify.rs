@@ -1,0 +1,95 @@
+//! Time of identification with nothing known and with the field of view known to a factor of two, and of a whole
+//! frame (detection and identification), over the real 16-bit frames in `../shared/frames` where they are; and of what a
+//! new process has to do first. One thread, buffers reused, as in a long run over many frames.
+
+use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use starpipe::catalog::Catalog;
+use starpipe::catalog::sky_grid::SkyGrid;
+use starpipe::detect::{DetectConfig, Workspace, detect};
+use starpipe::frame::{self, Frame};
+use starpipe::identify::{Hints, Outcome, Sky, StarField, identify};
+use starpipe::pipeline::{Pipeline, SolveConfig, star_field};
+use std::f64::consts::SQRT_2;
+use std::hint::black_box;
+use std::path::Path;
+
+/// The frame, its stars, and what it takes to know its scale to a factor of two in all.
+fn prepare(path: &Path, sky: &Sky) -> Option<(Frame, StarField, Hints)> {
+    let frame = frame::read(path).ok()?;
+    let detections = detect(&frame, &DetectConfig::default(), &mut Workspace::new()).ok()?;
+    let (field, _) = star_field(&frame, &detections, 0.0);
+    let Outcome::Identified(identification) = identify(&field, &Hints::default(), sky) else {
+        return None;
+    };
+    let scale_rad = 1.0 / identification.camera.focal_length_px;
+    let hints = Hints {
+        pixel_scale_rad: Some((scale_rad / SQRT_2, scale_rad * SQRT_2)),
+        near: None,
+    };
+    Some((frame, field, hints))
+}
+
+fn bench_frames(criterion: &mut Criterion, cache: &Path) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/frames");
+    let Ok(entries) = std::fs::read_dir(&folder) else {
+        eprintln!("no ../shared/frames: real frames are not benchmarked");
+        return;
+    };
+    let mut paths: Vec<_> = entries.flatten().map(|e| e.path()).collect();
+    paths.retain(|p| p.extension().is_some_and(|e| e == "tiff"));
+    paths.sort();
+    let (sky, _) = Sky::open(Catalog::built_in(), cache, &|_| ());
+    let prepared: Vec<_> = paths.iter().filter_map(|p| prepare(p, &sky)).collect();
+    for (path, (_, field, hints)) in paths.iter().zip(&prepared) {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        let mut group = criterion.benchmark_group("identify");
+        for (knowledge, hints) in [
+            ("nothing known", &Hints::default()),
+            ("factor of two", hints),
+        ] {
+            group.bench_function(format!("{name}, {knowledge}"), |bencher| {
+                bencher.iter(|| black_box(identify(black_box(field), hints, &sky)));
+            });
+        }
+    }
+    let pipeline = Pipeline::new(sky);
+    let mut workspace = Workspace::new();
+    let config = SolveConfig::default();
+    for (path, (frame, ..)) in paths.iter().zip(&prepared) {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        criterion.bench_function(&format!("whole/{name}"), |bencher| {
+            bencher.iter(|| {
+                black_box(pipeline.solve_frame(black_box(frame), &config, &mut workspace))
+            });
+        });
+    }
+}
+
+fn bench_start(criterion: &mut Criterion, cache: &Path) {
+    let catalog = Catalog::built_in();
+    let mut group = criterion.benchmark_group("start");
+    group.sample_size(20);
+    group.bench_function("catalogue", |bencher| {
+        let compact = catalog.to_compact();
+        bencher.iter(|| black_box(Catalog::from_compact(black_box(&compact))));
+    });
+    group.bench_function("grid", |bencher| {
+        bencher.iter(|| black_box(SkyGrid::new(catalog.stars())));
+    });
+    group.bench_function("grid and index from the cache", |bencher| {
+        bencher.iter_batched(
+            || (),
+            |()| black_box(Sky::open(catalog, cache, &|_| ())),
+            BatchSize::PerIteration,
+        );
+    });
+}
+
+fn benches(criterion: &mut Criterion) {
+    let cache = tempfile::tempdir().expect("a place for temporary files");
+    bench_frames(criterion, cache.path());
+    bench_start(criterion, cache.path());
+}
+
+criterion_group!(group, benches);
+criterion_main!(group);
