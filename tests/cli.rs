@@ -23,6 +23,17 @@ fn orion() -> PathBuf {
     fixture("orion/orion.png")
 }
 
+/// A complaint is one line that tells nothing twice, as careless chains of causes do.
+fn assert_one_line_that_repeats_nothing(complaint: &str) {
+    assert_eq!(complaint.lines().count(), 1, "{complaint}");
+    let mut parts: Vec<&str> = complaint.trim_end_matches('\n').split(": ").collect();
+    assert!(parts.iter().all(|part| part.trim() == *part), "{complaint}");
+    let all = parts.len();
+    parts.sort_unstable();
+    parts.dedup();
+    assert_eq!(parts.len(), all, "{complaint}");
+}
+
 /// The JSON without what differs from run to run.
 fn without_times(reports: Vec<Value>) -> Vec<Value> {
     let strip = |mut report: Value| {
@@ -367,6 +378,7 @@ fn an_output_directory_that_cannot_be_made_is_a_failure() {
     let ran = run(&["process", "--out", text(&out), text(&orion())]);
     assert_eq!(ran.status, 1);
     assert!(ran.stderr.contains(text(&out)), "{}", ran.stderr);
+    assert_one_line_that_repeats_nothing(&ran.stderr);
 }
 
 // ---- The cache ------------------------------------------------------------------------------
@@ -452,24 +464,27 @@ fn a_file_that_holds_no_frame_is_named_and_ends_with_1() {
         .unwrap();
     let pixel = directory.path().join("pixel.png");
     image::GrayImage::new(1, 1).save(&pixel).unwrap();
-    for frame in [
-        directory.path().join("missing.png"),
-        directory.path().to_owned(),
-        write("empty.png", b""),
-        write("words.tif", b"this is no picture\n"),
-        write("cut.png", &half(&png)),
-        write("cut.tif", &half(&tiff)),
-        write("cut.jpg", &half(&jpeg)),
-        write("magic-only.png", &png[..8]),
-        write("magic-only.tif", &tiff[..4]),
-        write("magic-only.jpg", &jpeg[..3]),
-        pixel,
+    for (frame, expected) in [
+        (directory.path().join("missing.png"), "cannot be read: "),
+        (directory.path().to_owned(), "cannot be read: "),
+        (write("empty.png", b""), "empty: "),
+        (
+            write("words.tif", b"this is no picture\n"),
+            "not an image: ",
+        ),
+        (write("cut.png", &half(&png)), "truncated PNG: "),
+        (write("cut.tif", &half(&tiff)), "truncated TIFF: "),
+        (write("cut.jpg", &half(&jpeg)), "truncated JPEG: "),
+        (write("magic-only.png", &png[..8]), "truncated PNG: "),
+        (write("magic-only.tif", &tiff[..4]), "truncated TIFF: "),
+        (write("magic-only.jpg", &jpeg[..3]), "damaged JPEG: "),
+        (pixel, "too small: "),
     ] {
         let ran = run(&["process", text(&frame)]);
         assert_eq!(ran.status, 1, "{}: {}", frame.display(), ran.stdout);
         assert_eq!(ran.stdout, "");
-        assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
-        let begins = format!("starpipe: reading {}", frame.display());
+        assert_one_line_that_repeats_nothing(&ran.stderr);
+        let begins = format!("starpipe: reading {}: {expected}", frame.display());
         assert!(ran.stderr.starts_with(&begins), "{}", ran.stderr);
     }
 }
@@ -501,6 +516,7 @@ fn a_catalogue_that_cannot_be_read_ends_with_1() {
             let ran = run(arguments);
             assert_eq!(ran.status, 1, "{}", ran.stdout);
             assert!(ran.stderr.contains(catalog), "{}", ran.stderr);
+            assert_one_line_that_repeats_nothing(&ran.stderr);
             assert!(!Path::new("never-written.cat").exists());
         }
     }
@@ -551,6 +567,7 @@ fn a_bad_list_is_named_with_its_line() {
         assert_eq!(ran.status, 1, "{content:?}");
         assert!(ran.stderr.contains(expected), "{content:?}: {}", ran.stderr);
         assert!(ran.stderr.contains(text(&list)), "{}", ran.stderr);
+        assert_one_line_that_repeats_nothing(&ran.stderr);
         assert_eq!(ran.stdout, "");
     }
 }

@@ -5,7 +5,7 @@
 mod common;
 
 use common::{Ran, starpipe};
-use image::{GrayImage, Luma};
+use image::{DynamicImage, GrayImage, ImageBuffer, Luma};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
@@ -78,6 +78,43 @@ fn grid_of_dots() -> GrayImage {
     image
 }
 
+/// Frames of one kind in the tests of many.
+const MANY: u64 = 100;
+
+type SensorFrame = ImageBuffer<Luma<u16>, Vec<u16>>;
+
+/// Noise as a sensor of 16 bits gives it.
+fn sensor_noise(random: &mut ChaCha8Rng) -> SensorFrame {
+    let level = log_uniform(random, 200.0, 20_000.0);
+    let normal = Normal::new(level, log_uniform(random, 2.0, 300.0)).unwrap();
+    SensorFrame::from_fn(SIDE, SIDE, |_, _| Luma([normal.sample(random) as u16]))
+}
+
+/// Noise with 5 to 500 spots of any size and brightness strewn over it.
+fn sensor_dots(random: &mut ChaCha8Rng) -> SensorFrame {
+    let mut image = sensor_noise(random);
+    let sigma_px = log_uniform(random, 0.5, 3.0);
+    for _ in 0..log_uniform(random, 5.0, 501.0) as usize {
+        let peak = log_uniform(random, 100.0, 60_000.0);
+        let mut place = || random.random_range(15.0..f64::from(SIDE) - 15.0);
+        let (x, y) = (place(), place());
+        for row in y as u32 - 14..y as u32 + 15 {
+            for column in x as u32 - 14..x as u32 + 15 {
+                let r_sq = (f64::from(column) - x).powi(2) + (f64::from(row) - y).powi(2);
+                let light = peak * (-r_sq / (2.0 * sigma_px * sigma_px)).exp();
+                let pixel = &mut image.get_pixel_mut(column, row).0[0];
+                *pixel = pixel.saturating_add(light as u16);
+            }
+        }
+    }
+    image
+}
+
+/// A number between the two, of which each power of ten is as likely as the next.
+fn log_uniform(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
+    low * (high / low).powf(random.random())
+}
+
 fn assert_none_is_identified(command: &[&str], inputs: &[PathBuf]) {
     let ran = Ran::new(
         starpipe()
@@ -85,6 +122,7 @@ fn assert_none_is_identified(command: &[&str], inputs: &[PathBuf]) {
             .args(["--format", "json"])
             .args(inputs),
     );
+    assert!(!ran.stdout.contains("\"identified\""));
     for report in ran.reports() {
         assert_eq!(report["status"], "not_identified", "{}", report["frame"]);
         assert!(
@@ -100,8 +138,8 @@ fn assert_none_is_identified(command: &[&str], inputs: &[PathBuf]) {
     assert_eq!(ran.status, 3, "{}", ran.stderr);
 }
 
-fn saved(directory: &Path, images: Vec<GrayImage>) -> Vec<PathBuf> {
-    let save = |(number, image): (usize, GrayImage)| {
+fn saved(directory: &Path, images: impl IntoIterator<Item = DynamicImage>) -> Vec<PathBuf> {
+    let save = |(number, image): (usize, DynamicImage)| {
         let path = directory.join(format!("{number}.png"));
         image.save(&path).unwrap();
         path
@@ -123,7 +161,22 @@ fn pictures_of_anything_but_the_sky_are_not_identified() {
         GrayImage::from_pixel(SIDE, SIDE, Luma([0])),
         GrayImage::from_pixel(SIDE, SIDE, Luma([255])),
     ];
+    let images = images.into_iter().map(DynamicImage::from);
     assert_none_is_identified(&["process"], &saved(directory.path(), images));
+}
+
+#[test]
+fn a_hundred_frames_of_noise_are_not_identified() {
+    let directory = tempfile::tempdir().unwrap();
+    let frames = (0..MANY).map(|seed| sensor_noise(&mut random(seed)).into());
+    assert_none_is_identified(&["process"], &saved(directory.path(), frames));
+}
+
+#[test]
+fn a_hundred_frames_of_random_dots_are_not_identified() {
+    let directory = tempfile::tempdir().unwrap();
+    let frames = (0..MANY).map(|seed| sensor_dots(&mut random(seed)).into());
+    assert_none_is_identified(&["process"], &saved(directory.path(), frames));
 }
 
 /// Lists of up to `most` positions and magnitudes that mean nothing.

@@ -76,9 +76,10 @@ pub(crate) fn chained(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for cause in error.chain() {
         let text = cause.to_string();
-        if !line.ends_with(&text) {
+        let text = text.trim();
+        if !line.ends_with(text) {
             line += if line.is_empty() { "" } else { ": " };
-            line += &text;
+            line += text;
         }
     }
     line.replace('\n', " ")

@@ -1,6 +1,6 @@
 //! From what the pipeline found to what is told of it.
 
-use super::rounding::{finite, half_turn_deg, to_decimals, to_significant, turn_deg};
+use super::rounding::{finite, half_turn_deg, significant, to_decimals, to_significant, turn_deg};
 use super::{
     AttitudeReport, AttitudeSigma, BackgroundReport, DateReport, DistortionReport, FrameReport,
     MagnitudeReport, MatchReport, OpticsReport, SCHEMA, StarReport, Status, TimingReport,
@@ -143,14 +143,9 @@ fn faintest(identification: &Identification, catalog: &Catalog) -> Option<Magnit
 }
 
 fn background(measured: Option<&Background>) -> BackgroundReport {
-    let rounded = |value: f64| {
-        value
-            .is_finite()
-            .then(|| to_significant(value, FLUX_DIGITS))
-    };
     BackgroundReport {
-        level: measured.and_then(|sky| rounded(sky.level_adu)),
-        noise: measured.and_then(|sky| rounded(sky.noise_adu)),
+        level: measured.and_then(|sky| significant(sky.level_adu, FLUX_DIGITS)),
+        noise: measured.and_then(|sky| significant(sky.noise_adu, FLUX_DIGITS)),
     }
 }
 
@@ -165,7 +160,6 @@ fn timing(measured: &Timing) -> TimingReport {
 
 fn unidentified(source: &Source) -> StarReport {
     let measured = source.measured.as_ref();
-    let significant = |value: f64, digits| value.is_finite().then(|| to_significant(value, digits));
     StarReport {
         x: to_decimals(source.position.x, PIXEL_DECIMALS),
         y: to_decimals(source.position.y, PIXEL_DECIMALS),

@@ -32,6 +32,11 @@ pub(crate) fn finite(value: f64, decimals: i32) -> Option<f64> {
     value.is_finite().then(|| to_decimals(value, decimals))
 }
 
+/// [`to_significant`], and `None` where there is no number.
+pub(crate) fn significant(value: f64, digits: i32) -> Option<f64> {
+    value.is_finite().then(|| to_significant(value, digits))
+}
+
 /// An angle in degrees to `decimals` places, in [0, 360) after rounding.
 pub(crate) fn turn_deg(angle_deg: f64, decimals: i32) -> f64 {
     let rounded = to_decimals(angle_deg.rem_euclid(360.0), decimals);
@@ -85,6 +90,7 @@ mod tests {
         assert_eq!(finite(-0.000_01, 3), Some(0.0));
         assert!(finite(-0.000_01, 3).is_some_and(f64::is_sign_positive));
         assert_eq!(finite(1e300, 10), Some(1e300));
+        assert_eq!(significant(f64::NAN, 3), None);
     }
 
     #[test]

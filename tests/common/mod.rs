@@ -86,7 +86,6 @@ pub fn number(report: &Value, pointer: &str) -> f64 {
 pub struct Truth {
     pub ra_deg: f64,
     pub dec_deg: f64,
-    pub up_pa_deg: f64,
     pub fov_x_deg: f64,
 }
 
@@ -104,12 +103,6 @@ impl Truth {
         let truth = unit(self.ra_deg, self.dec_deg);
         let chord_sq: f64 = (0..3).map(|i| (found[i] - truth[i]).powi(2)).sum();
         2.0 * (chord_sq.sqrt() / 2.0).asin().to_degrees()
-    }
-
-    /// How far the image's up direction is from the true one, in degrees.
-    pub fn roll_error_deg(&self, report: &Value) -> f64 {
-        let difference = number(report, "/attitude/up_pa_deg") - self.up_pa_deg;
-        (difference + 180.0).rem_euclid(360.0) - 180.0
     }
 
     /// Relative error of the horizontal field of view.
