@@ -28,6 +28,7 @@ mod components;
 mod fit;
 mod matched_filter;
 mod measure;
+mod normal;
 mod psf;
 mod raw_peaks;
 mod scene;
