@@ -8,6 +8,7 @@
 use super::components::Peak;
 use super::fit::{Fit, FitConfig, NoiseModel, SPOT_RANGE_PX, window_radius};
 use super::psf::PIXEL_VARIANCE_PX2;
+use super::raw_peaks::RawPeak;
 use super::scene::{FitWork, Scene};
 use super::view::View;
 
@@ -66,6 +67,35 @@ pub(super) fn fit_bright_stars(
         .collect()
 }
 
+/// Fits the brightest peaks of the unfiltered frame with a free size.
+pub(super) fn fit_raw_stars(
+    scene: &Scene<'_>,
+    peaks: &[RawPeak],
+    work: &mut FitWork,
+) -> Vec<BrightStar> {
+    let rivals = &peaks[..peaks.len().min(2000)];
+    let bright = peaks
+        .iter()
+        .take(4 * MAX_STARS)
+        .take_while(|p| p.snr >= MIN_SNR);
+    bright
+        .filter(|peak| {
+            let reach = ISOLATION_SIGMA * (peak.size_px as f32 + 0.3);
+            let is_near = |other: &RawPeak| {
+                let dx = other.x as f32 - peak.x as f32;
+                let dy = other.y as f32 - peak.y as f32;
+                (dx != 0.0 || dy != 0.0) && dx * dx + dy * dy <= reach * reach
+            };
+            !peak.saturated && !rivals.iter().any(|o| is_near(o) && o.snr >= 0.1 * peak.snr)
+        })
+        .filter_map(|peak| {
+            let fit = scene.fit_free(peak.spot(), peak.size_px, NoiseModel::default(), work);
+            (fit.converged && fit.spots[0].flux > 0.0).then_some(BrightStar { fit })
+        })
+        .take(MAX_STARS)
+        .collect()
+}
+
 /// Whether no other peak of a tenth of the height lies within `reach` pixels.
 fn is_isolated(peak: &Peak, peaks: &[Peak], reach: f32) -> bool {
     peaks.iter().all(|other| {
@@ -90,8 +120,9 @@ fn size_from_curvature(filtered: View<'_>, peak: &Peak, filter_px: f64) -> f64 {
     variance.max(0.0).sqrt().clamp(0.35, 6.0)
 }
 
-/// The frame's spot size from its bright stars, in pixels; `None` where there are too few.
-pub(super) fn spot_size(stars: &[BrightStar]) -> Option<f64> {
+/// The frame's spot size from its bright stars, in pixels, and how many of them have about that
+/// size; `None` where there are too few.
+pub(super) fn spot_size(stars: &[BrightStar]) -> Option<(f64, usize)> {
     let mut sizes: Vec<f64> = stars
         .iter()
         .map(|star| star.fit.spot_px)
@@ -102,6 +133,7 @@ pub(super) fn spot_size(stars: &[BrightStar]) -> Option<f64> {
     }
     sizes.sort_unstable_by(f64::total_cmp);
     let mut center = half_sample_mode(&sizes);
+    let mut members = 0.0;
     // The mode is robust but rough: move to the mean of what lies around it.
     for _ in 0..MODE_ROUNDS {
         let near = |size: &&f64| (**size / center).max(center / **size) < MODE_WIDTH;
@@ -110,8 +142,9 @@ pub(super) fn spot_size(stars: &[BrightStar]) -> Option<f64> {
             .filter(near)
             .fold((0.0, 0.0), |(s, n), size| (s + size, n + 1.0));
         center = sum / count;
+        members = count;
     }
-    Some(center)
+    Some((center, members as usize))
 }
 
 /// The mode of sorted positive values: the densest half (in ratio), again and again.

@@ -10,6 +10,7 @@
 //! # Reference
 //! Mighell 2005, doi 10.1111/j.1365-2966.2005.09208.x, for PSF fitting and its error budget.
 
+use super::normal::{Normal, ONE_SPOT, OneSpot};
 use super::psf::{AxisProfile, MAX_WINDOW_PX};
 
 /// The most spots fitted together.
@@ -18,6 +19,8 @@ const MAX_PARAMETERS: usize = 3 * MAX_SPOTS + 2;
 const MAX_STEPS: usize = 15;
 /// Steps shorter than this, in px, end the fit; convergence is quadratic, so little is left after one.
 const CONVERGED_PX: f64 = 2e-3;
+/// So do steps shorter than this part of the standard error: what is left after them is a fraction of it.
+const CONVERGED_SIGMA: f64 = 0.05;
 /// The longest step, in px: farther, the model is not linear.
 const MAX_STEP_PX: f64 = 0.5;
 /// The range of free spot sizes, in px.
@@ -102,14 +105,6 @@ pub(super) struct Fit {
     pub converged: bool,
 }
 
-/// One linearised step: normal matrix, right-hand side, chi².
-struct Normal {
-    matrix: [[f64; MAX_PARAMETERS]; MAX_PARAMETERS],
-    right: [f64; MAX_PARAMETERS],
-    chi2: f64,
-    pixels: usize,
-}
-
 /// Buffers of the fit.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Fitter {
@@ -124,68 +119,63 @@ impl Fitter {
     /// start, with the standard errors that they would have there.
     pub fn fit(&mut self, window: &Window, start: &[Spot], config: &FitConfig) -> Fit {
         let start = &start[..start.len().min(MAX_SPOTS)];
+        if start.len() == 1 {
+            self.fit_up_to::<ONE_SPOT>(window, start, config)
+        } else {
+            self.fit_up_to::<MAX_PARAMETERS>(window, start, config)
+        }
+    }
+
+    /// The fit with at most `N` parameters.
+    fn fit_up_to<const N: usize>(
+        &mut self,
+        window: &Window,
+        start: &[Spot],
+        config: &FitConfig,
+    ) -> Fit {
         let mut fit = Fit {
             spots: start.to_vec(),
             spot_px: config.spot_px,
             ..Fit::default()
         };
-        let reach_px = 1.0 + config.spot_px;
-        let mut settled = false;
+        let reach2 = (1.0 + config.spot_px).powi(2);
+        let all = 3 * start.len() + 2;
+        let fitted = parameter_count(start.len(), config);
         for step in 0..MAX_STEPS {
-            let mut normal = self.linearise(window, &fit, config);
-            let count = parameter_count(start.len(), config);
-            let Some(change) = solve(&mut normal, count) else {
+            let mut normal: Normal<N> = self.linearise(window, &fit, config);
+            let information = (0..start.len()).flat_map(|i| [3 * i, 3 * i + 1]);
+            let information = information.map(|i| normal.matrix[i][i]).fold(0.0, f64::max);
+            let known = normal.factorise(all);
+            if known < fitted {
                 break;
-            };
+            }
+            let change = normal.solve(fitted);
             let length = apply(&mut fit, &change, config);
             let strayed = fit.spots.iter().zip(start).any(|(now, then)| {
-                !(now.x.is_finite() && now.y.is_finite() && now.flux.is_finite())
-                    || (now.x - then.x).hypot(now.y - then.y) > reach_px
+                let distance2 = (now.x - then.x).powi(2) + (now.y - then.y).powi(2);
+                !(distance2 <= reach2 && now.flux.is_finite())
             });
             if strayed {
                 break;
             }
-            if length < CONVERGED_PX && step > 0 {
-                settled = true;
-                break;
+            let enough = (CONVERGED_SIGMA / information.sqrt()).clamp(CONVERGED_PX, 0.1);
+            if length < enough && step > 0 {
+                fit.converged = true;
+                finish(&mut fit, &normal, [fitted, known], &change);
+                return fit;
             }
         }
-        if !settled {
-            fit.spots = start.to_vec();
-            fit.background = 0.0;
-            fit.spot_px = config.spot_px;
-        }
-        fit.converged = settled;
-        self.finish(window, &mut fit, config);
-        fit
-    }
-
-    /// Standard errors, chi² and the size's excess at the solution.
-    fn finish(&mut self, window: &Window, fit: &mut Fit, config: &FitConfig) {
-        let with_size = FitConfig {
-            free_spot: true,
-            ..*config
-        };
-        let count = parameter_count(fit.spots.len(), &with_size);
-        let mut normal = self.linearise(window, fit, &with_size);
-        fit.chi2 = normal.chi2;
-        fit.degrees = normal.pixels as f64 + 2.0 - count as f64;
-        let fitted = if config.free_spot { count } else { count - 1 };
-        // The size comes last: the leading block of the factor is that of a fit without it.
-        if let Some(change) = solve(&mut normal, count) {
-            fit.size_excess_px = change[count - 1];
-            fit.size_error_px = 1.0 / normal.matrix[count - 1][count - 1];
-            set_errors(fit, &inverse_diagonal(&normal.matrix, fitted));
+        fit.spots = start.to_vec();
+        fit.background = 0.0;
+        fit.spot_px = config.spot_px;
+        let mut normal: Normal<N> = self.linearise(window, &fit, config);
+        let known = if normal.pixels > 0 {
+            normal.factorise(all)
         } else {
-            let mut fixed = self.linearise(window, fit, config);
-            let known = fixed.pixels > 0 && factorise(&mut fixed.matrix, fitted);
-            let variances = if known {
-                inverse_diagonal(&fixed.matrix, fitted)
-            } else {
-                [f64::INFINITY; MAX_PARAMETERS]
-            };
-            set_errors(fit, &variances);
-        }
+            0
+        };
+        finish(&mut fit, &normal, [fitted, known], &[0.0; N]);
+        fit
     }
 
     /// Light of all spots, without background, in the pixel at `column`, `row` of the window.
@@ -258,21 +248,13 @@ impl Fitter {
         config: &FitConfig,
         mut visit: impl FnMut(f64, f64, f64),
     ) {
-        let mut normal = self.linearise(window, fit, config);
+        let mut normal: Normal<MAX_PARAMETERS> = self.linearise(window, fit, config);
         let count = parameter_count(fit.spots.len(), config);
-        if !factorise(&mut normal.matrix, count) {
+        if normal.factorise(count) < count {
             return;
         }
-        let factor = normal.matrix;
         self.for_each_gradient(window, fit, config, |gradient, residual, light, weight| {
-            let mut x = [0.0; MAX_PARAMETERS];
-            let mut leverage = 0.0;
-            for i in 0..count {
-                let dot: f64 = (0..i).map(|k| factor[i][k] * x[k]).sum();
-                x[i] = (gradient[i] - dot) / factor[i][i];
-                leverage += x[i] * x[i] * weight;
-            }
-            visit(residual, light, leverage);
+            visit(residual, light, normal.leverage(gradient, weight, count));
         });
     }
 
@@ -286,18 +268,33 @@ impl Fitter {
         }
     }
 
-    /// The normal equations at `fit`.
-    fn linearise(&mut self, window: &Window, fit: &Fit, config: &FitConfig) -> Normal {
-        let count = parameter_count(fit.spots.len(), config);
-        let mut normal = Normal {
-            matrix: [[0.0; MAX_PARAMETERS]; MAX_PARAMETERS],
-            right: [0.0; MAX_PARAMETERS],
-            chi2: 0.0,
-            pixels: 0,
-        };
-        self.for_each_gradient(window, fit, config, |gradient, residual, _, weight| {
-            normal.add_any(gradient, count, residual, weight);
-        });
+    /// The normal equations at `fit`, with the size as the last parameter even where it is not fitted.
+    fn linearise<const N: usize>(
+        &mut self,
+        window: &Window,
+        fit: &Fit,
+        config: &FitConfig,
+    ) -> Normal<N> {
+        let count = 3 * fit.spots.len() + 2;
+        let mut normal = Normal::empty();
+        if let [spot] = fit.spots.as_slice() {
+            let one = OneSpot {
+                flux: spot.flux,
+                background: fit.background,
+                variance: [
+                    window.noise_variance,
+                    config.noise.shot_adu,
+                    config.noise.model_error2,
+                ],
+            };
+            self.fill_profiles(window, fit);
+            let axes = [&self.across[0], &self.down[0]];
+            normal.add_one_spot(&one, axes, &window.data, window.width);
+        } else {
+            self.for_each_gradient(window, fit, config, |gradient, residual, _, weight| {
+                normal.add(&gradient[..count], residual, weight);
+            });
+        }
         let b = 3 * fit.spots.len();
         let weight = 1.0 / (window.background_error * window.background_error);
         normal.matrix[b][b] += weight;
@@ -338,9 +335,7 @@ impl Fitter {
                     by_size += spot.flux
                         * (a.by_sigma[column] * d.value[row] + a.value[column] * d.by_sigma[row]);
                 }
-                if config.free_spot {
-                    gradient[3 * spots + 1] = by_size;
-                }
+                gradient[3 * spots + 1] = by_size;
                 let positive = light.max(0.0);
                 let variance = window.noise_variance
                     + noise.shot_adu * positive
@@ -356,54 +351,16 @@ impl Fitter {
     }
 }
 
-impl Normal {
-    /// Adds one pixel; the commonest numbers of parameters have code of their own.
-    #[inline]
-    fn add_any(
-        &mut self,
-        gradient: &[f64; MAX_PARAMETERS],
-        count: usize,
-        residual: f64,
-        weight: f64,
-    ) {
-        match (
-            count,
-            gradient.first_chunk::<4>(),
-            gradient.first_chunk::<5>(),
-        ) {
-            (4, Some(four), _) => self.add(four, residual, weight),
-            (5, _, Some(five)) => self.add(five, residual, weight),
-            _ => self.add(&gradient[..count], residual, weight),
-        }
-    }
-
-    /// Adds one pixel; only the lower triangle is kept.
-    #[inline(always)]
-    fn add(&mut self, gradient: &[f64], residual: f64, weight: f64) {
-        for (i, &g) in gradient.iter().enumerate() {
-            let weighted = g * weight;
-            self.right[i] += weighted * residual;
-            for (entry, &h) in self.matrix[i][..=i].iter_mut().zip(gradient) {
-                *entry += weighted * h;
-            }
-        }
-        self.chi2 += residual * residual * weight;
-        self.pixels += 1;
-    }
-}
-
 /// Three for each spot, the background, and the size where it is free.
 fn parameter_count(spots: usize, config: &FitConfig) -> usize {
     3 * spots + 1 + usize::from(config.free_spot)
 }
 
 /// Adds a step, shortened where it is too long; returns the length of the longest move in px.
-fn apply(fit: &mut Fit, change: &[f64; MAX_PARAMETERS], config: &FitConfig) -> f64 {
+fn apply(fit: &mut Fit, change: &[f64], config: &FitConfig) -> f64 {
     let spots = fit.spots.len();
-    let mut length: f64 = 0.0;
-    for i in 0..spots {
-        length = length.max(change[3 * i].hypot(change[3 * i + 1]));
-    }
+    let squares = (0..spots).map(|i| change[3 * i].powi(2) + change[3 * i + 1].powi(2));
+    let mut length = squares.fold(0.0, f64::max).sqrt();
     let factor = (MAX_STEP_PX / length).min(1.0);
     for (i, spot) in fit.spots.iter_mut().enumerate() {
         spot.x += factor * change[3 * i];
@@ -421,70 +378,37 @@ fn apply(fit: &mut Fit, change: &[f64; MAX_PARAMETERS], config: &FitConfig) -> f
     length
 }
 
-/// Cholesky factor in place of the lower triangle; false where the matrix is not positive definite.
-fn factorise(matrix: &mut [[f64; MAX_PARAMETERS]; MAX_PARAMETERS], count: usize) -> bool {
-    for i in 0..count {
-        for j in 0..=i {
-            let dot: f64 = (0..j).map(|k| matrix[i][k] * matrix[j][k]).sum();
-            let rest = matrix[i][j] - dot;
-            if i == j {
-                if !(rest > 0.0 && rest.is_finite()) {
-                    return false;
-                }
-                matrix[i][i] = rest.sqrt();
-            } else {
-                matrix[i][j] = rest / matrix[j][j];
-            }
-        }
-    }
-    true
-}
-
-/// The step that the normal equations ask for.
-fn solve(normal: &mut Normal, count: usize) -> Option<[f64; MAX_PARAMETERS]> {
-    if !factorise(&mut normal.matrix, count) {
-        return None;
-    }
-    let l = &normal.matrix;
-    let mut x = normal.right;
-    for i in 0..count {
-        let dot: f64 = (0..i).map(|k| l[i][k] * x[k]).sum();
-        x[i] = (x[i] - dot) / l[i][i];
-    }
-    for i in (0..count).rev() {
-        let dot: f64 = (i + 1..count).map(|k| l[k][i] * x[k]).sum();
-        x[i] = (x[i] - dot) / l[i][i];
-    }
-    Some(x)
-}
-
-/// The diagonal of the inverse of the matrix whose Cholesky factor is given: the variances.
-fn inverse_diagonal(
-    l: &[[f64; MAX_PARAMETERS]; MAX_PARAMETERS],
-    count: usize,
-) -> [f64; MAX_PARAMETERS] {
-    let mut variances = [0.0; MAX_PARAMETERS];
-    // Column by column: L⁻¹, whose squared columns sum to the diagonal of (L Lᵀ)⁻¹.
-    for (column, variance) in variances.iter_mut().enumerate().take(count) {
-        let mut x = [0.0; MAX_PARAMETERS];
-        for i in column..count {
-            let unit = if i == column { 1.0 } else { 0.0 };
-            let dot: f64 = (column..i).map(|k| l[i][k] * x[k]).sum();
-            x[i] = (unit - dot) / l[i][i];
-            *variance += x[i] * x[i];
-        }
-    }
-    variances
-}
-
-/// Standard errors from the variances of x, y, flux of each spot, the background, and the size.
-fn set_errors(fit: &mut Fit, variances: &[f64; MAX_PARAMETERS]) {
+/// Standard errors, chi² and the size's excess from the last linearised step.
+///
+/// Of `fitted` parameters, and the size if it was not one, the first `known` are determined.
+fn finish<const N: usize>(
+    fit: &mut Fit,
+    normal: &Normal<N>,
+    [fitted, known]: [usize; 2],
+    change: &[f64; N],
+) {
+    let spots = fit.spots.len();
+    let all = 3 * spots + 2;
+    fit.degrees = normal.pixels as f64 + 2.0 - all as f64;
+    // The step took chi² down by its product with the gradient.
+    let gain: f64 = (0..fitted).map(|i| change[i] * normal.right[i]).sum();
+    fit.chi2 = normal.chi2 - gain;
+    let variances = if known >= fitted {
+        normal.variances(fitted)
+    } else {
+        [f64::INFINITY; N]
+    };
     for (i, spot) in fit.spots.iter_mut().enumerate() {
         spot.sigma_x = variances[3 * i].sqrt();
         spot.sigma_y = variances[3 * i + 1].sqrt();
         spot.sigma_flux = variances[3 * i + 2].sqrt();
     }
-    fit.sigma_spot_px = variances[3 * fit.spots.len() + 1].sqrt();
+    fit.sigma_spot_px = variances[all - 1].sqrt();
+    // The size comes last: the leading block of the factor is that of a fit without it.
+    if known == all {
+        fit.size_excess_px = normal.solve(all)[all - 1];
+        fit.size_error_px = 1.0 / normal.matrix[all - 1][all - 1];
+    }
 }
 
 /// The half side of a window for a spot, in pixels: three standard deviations.

@@ -56,6 +56,11 @@ impl Kernel {
         }
     }
 
+    /// Signal-to-noise ratio of a star whose flux equals the noise of a pixel: √ΣP².
+    pub fn matched_gain(&self) -> f64 {
+        self.sum_of_squares.sqrt()
+    }
+
     /// Distance from the centre to the last weight, in pixels.
     pub fn radius(&self) -> usize {
         self.half.len() - 1
@@ -221,7 +226,7 @@ fn symmetric_sum(half: &[f32], left: &[&[f32]], right: &[&[f32]], out: &mut [f32
 
 /// The maximum of each block of [`BLOCK_PX`] values; the last may be shorter.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn block_maxima(row: &[f32], maxima: &mut [f32]) {
+pub(super) fn block_maxima(row: &[f32], maxima: &mut [f32]) {
     for (maximum, block) in maxima.iter_mut().zip(row.chunks(BLOCK_PX)) {
         let mut lanes = [f32::MIN; 16];
         let (chunks, rest) = block.as_chunks::<16>();

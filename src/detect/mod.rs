@@ -4,7 +4,8 @@
 //!
 //! 1. Background and noise on a mesh of cells, robust against stars.
 //! 2. A matched filter with the frame's own spot, a pixel-integrated Gaussian. The spot's size is
-//!    measured on the bright stars; where the first guess was wrong, the frame is filtered again.
+//!    measured on the bright stars that stand out in single pixels; where there are too few of them,
+//!    on those that a filter of a guessed size finds, and the frame is filtered again.
 //! 3. The noise of the filtered frame, on a mesh again: so correlated noise (JPEG, demosaicing) is
 //!    measured and not assumed. The threshold follows from the wanted number of false detections.
 //! 4. Connected regions, their peaks, and which of those are stars of their own.
@@ -27,7 +28,9 @@ mod components;
 mod fit;
 mod matched_filter;
 mod measure;
+mod normal;
 mod psf;
+mod raw_peaks;
 mod scene;
 mod shape;
 mod threshold;
@@ -202,6 +205,11 @@ impl Workspace {
 
 /// The spot must be guessed this well, as a factor; else the frame is filtered again.
 const SPOT_GUESS_TOLERANCE: f64 = 1.15;
+/// So many stars of one size, found without a filter, settle the spot; fewer may be chance.
+const ENOUGH_RAW_STARS: usize = 8;
+/// Spots below this size put so much light in one pixel that the brightest pixels are the brightest
+/// stars; wider ones are measured on what a filter finds.
+const SHARP_SPOT_PX: f64 = 0.75;
 /// At most so many times.
 const MAX_FILTER_ROUNDS: usize = 3;
 /// The standard deviation of rounding to whole steps, over the step: 1/√12.
@@ -300,6 +308,10 @@ fn search_with_own_spot(
         noise: NoiseModel::default(),
         threshold: 0.0,
     };
+    if calibrate_unfiltered(view, saturation_adu, config, &mut calibration, workspace) {
+        search(view, saturation_adu, config, &mut calibration, workspace);
+        return calibration;
+    }
     for round in 0..MAX_FILTER_ROUNDS {
         search(view, saturation_adu, config, &mut calibration, workspace);
         let mut fits = std::mem::take(&mut workspace.fits);
@@ -308,7 +320,7 @@ fn search_with_own_spot(
         let stars =
             calibrate::fit_bright_stars(&scene, filtered, &workspace.search.peaks, &mut fits);
         let measured = match config.spot_sigma_px {
-            None => calibrate::spot_size(&stars),
+            None => calibrate::spot_size(&stars).map(|(size, _)| size),
             Some(_) => None,
         };
         let spot_px = measured.unwrap_or(calibration.spot_px);
@@ -325,6 +337,37 @@ fn search_with_own_spot(
         }
     }
     calibration
+}
+
+/// Measures spot and noise model on stars that stand out without a filter; whether there are enough
+/// of them. If not, the size is still a better start than none.
+fn calibrate_unfiltered(
+    view: &View<'_>,
+    saturation_adu: f32,
+    config: &DetectConfig,
+    calibration: &mut Calibration,
+    workspace: &mut Workspace,
+) -> bool {
+    let peaks = raw_peaks::find(view, &workspace.background, saturation_adu);
+    let mut fits = std::mem::take(&mut workspace.fits);
+    let mut scene = Scene {
+        filtered: None,
+        ..scene_of(view, saturation_adu, calibration, workspace)
+    };
+    scene.matched_gain = Kernel::for_spot(calibration.spot_px).matched_gain();
+    let stars = calibrate::fit_raw_stars(&scene, &peaks, &mut fits);
+    let measured = calibrate::spot_size(&stars);
+    if let (None, Some((size, _))) = (config.spot_sigma_px, measured) {
+        calibration.spot_px = size;
+        scene.spot_px = size;
+    }
+    let is_enough =
+        measured.is_some_and(|(size, stars)| stars >= ENOUGH_RAW_STARS && size < SHARP_SPOT_PX);
+    if is_enough {
+        calibration.noise = calibrate::noise_model(&scene, &stars, &mut fits);
+    }
+    workspace.fits = fits;
+    is_enough
 }
 
 /// Filters with the calibration's spot, sets the threshold, and finds regions and peaks.
@@ -387,10 +430,10 @@ fn scene_of<'a>(
     Scene {
         view: *view,
         background: &workspace.background,
-        filtered: &workspace.filtered_mesh,
+        filtered: Some(&workspace.filtered_mesh),
         saturation_adu,
         spot_px: calibration.spot_px,
-        matched_gain: calibration.kernel.sum_of_squares.sqrt(),
+        matched_gain: calibration.kernel.matched_gain(),
     }
 }
 

@@ -18,8 +18,8 @@ pub(super) struct Scene<'a> {
     pub view: View<'a>,
     /// Background and noise of a pixel, in ADU.
     pub background: &'a Mesh,
-    /// Mean and noise of the filtered frame.
-    pub filtered: &'a Mesh,
+    /// Mean and noise of the filtered frame, once there is one.
+    pub filtered: Option<&'a Mesh>,
     /// Level from which on a pixel is saturated, in ADU.
     pub saturation_adu: f32,
     /// Standard deviation of the spot, in pixels.
@@ -34,9 +34,11 @@ impl Scene<'_> {
         f64::from(self.background.at(x as f32, y as f32).1)
     }
 
-    /// How much larger the noise is for a spot than independent pixels would make it.
+    /// How much larger the noise is for a spot than independent pixels would make it; 1 before the
+    /// frame is filtered.
     pub fn correlation_at(&self, x: f64, y: f64) -> f64 {
-        f64::from(self.filtered.at(x as f32, y as f32).1)
+        self.filtered
+            .map_or(1.0, |mesh| f64::from(mesh.at(x as f32, y as f32).1))
     }
 
     /// A first guess of a spot at a peak of the filtered frame.
