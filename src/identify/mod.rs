@@ -12,7 +12,7 @@ pub use cache::CacheError;
 pub use search::LOG10_FALSE_ALARM_LIMIT;
 pub use sky::Sky;
 
-use refine::{Refined, Start, refine};
+use refine::{Refined, Start, refine, with_all_stars};
 use search::{Found, Search};
 
 use crate::camera::{CameraModel, DistortionModel};
@@ -164,7 +164,8 @@ fn complete(field: &StarField, sky: &Sky, search: &Search, found: Found) -> Iden
         sceptical: false,
     };
     let richest = Some(DistortionModel::Quintic);
-    let with_all = refine(field, usize::MAX, sky, &start, richest)
+    let with_all = refine(field, CALIBRATION_STARS, sky, &start, richest)
+        .and_then(|settled| with_all_stars(field, sky, &settled))
         .map(|refined| (search.log10_false_alarm(&refined.hypothesis), refined));
     // All the stars can only make it surer; where they do not, the search's own answer stands.
     match with_all {
@@ -189,5 +190,7 @@ fn identification(refined: Refined, log10_false_alarm: f64) -> Identification {
     }
 }
 
+/// Stars, the brightest, that decide how much distortion there is.
+const CALIBRATION_STARS: usize = 200;
 /// Where the final fit starts to look for pairs, in units of the frame's diagonal.
 const FINAL_RADIUS_SHARE: f64 = 0.005;

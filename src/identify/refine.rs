@@ -8,8 +8,8 @@ use crate::attitude::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera, left
 use crate::camera::DistortionModel;
 use std::f64::consts::PI;
 
-/// Pairs further apart than so many times the typical distance are no pairs.
-const CLIP: f64 = 3.5;
+/// Pairs further apart than so many times the typical error on an axis are no pairs.
+const CLIP_SIGMAS: f64 = 5.0;
 /// The median distance of errors with standard deviation 1 on each axis (Rayleigh).
 const RAYLEIGH_MEDIAN: f64 = 1.177_41;
 /// No two stars are told apart by less than this.
@@ -20,6 +20,12 @@ const EQUATIONS_PER_PARAMETER: f64 = 2.5;
 const WORTH_IT: f64 = 6.0;
 /// Halvings of the interval in which the excess is sought: to a ten-thousandth of the largest residual.
 const EXCESS_BISECTIONS: usize = 14;
+/// Distance in standard errors from which on a star pulls no harder.
+const HUBER_SIGMAS: f64 = 2.5;
+/// How much further off than the bright stars faint ones may be.
+const FAINT_RADIUS: f64 = 3.0;
+/// Rounds of pairing and fitting with all the stars.
+const ALL_STARS_ROUNDS: usize = 3;
 /// A sceptic wants so many standard deviations more agreement than chance makes.
 const SCEPTICAL_SIGMAS: f64 = 3.0;
 /// Rounds of pairing and fitting at the most.
@@ -66,7 +72,7 @@ pub fn refine(
     let mut current = fitted(field, sky, matches, 0.0, &Guess { hypothesis, model })?;
     let mut model_chosen = false;
     for _ in 0..MAX_ROUNDS {
-        radius_px = agreement_radius_px(&current.fit, radius_px);
+        radius_px = next_radius_px(&current.fit, radius_px);
         current.hypothesis.predict_again(sky, field, &mut predicted);
         let matches = current
             .hypothesis
@@ -84,6 +90,34 @@ pub fn refine(
             model,
         };
         current = fitted(field, sky, matches, current.excess_sigma_px, &guess)?;
+    }
+    Some(current)
+}
+
+/// Adds the stars that were too faint for the refinement so far, and fits the same distortion model to all of them.
+///
+/// `None` where they do not determine the camera.
+pub fn with_all_stars(field: &StarField, sky: &Sky, settled: &Refined) -> Option<Refined> {
+    let model = settled
+        .hypothesis
+        .camera
+        .distortion
+        .as_ref()
+        .map(|d| d.model());
+    let mut predicted = settled.hypothesis.predict(sky, field, &field.stars);
+    let mut radius_px = FAINT_RADIUS * agreement_radius_px(&settled.fit);
+    let mut current = settled.clone();
+    for _ in 0..ALL_STARS_ROUNDS {
+        let Refined {
+            hypothesis,
+            excess_sigma_px,
+            ..
+        } = &current;
+        hypothesis.predict_again(sky, field, &mut predicted);
+        let matches = hypothesis.pair_up(&field.stars, &predicted, field.photometry, radius_px);
+        let guess = Guess { hypothesis, model };
+        current = fitted(field, sky, matches, *excess_sigma_px, &guess)?;
+        radius_px = next_radius_px(&current.fit, radius_px);
     }
     Some(current)
 }
@@ -154,6 +188,9 @@ fn zero_point_mag(field: &StarField, sky: &Sky, matches: &[StarMatch]) -> f64 {
     }
 }
 
+/// The stars as the fit takes them. The error of one that is further off than its own error and the common
+/// excess explain (an unresolved companion, say) is raised with its distance, so that it pulls no harder than one that is not
+/// (Huber 1964, Ann. Math. Stat. 35, 73).
 fn measured(
     field: &StarField,
     sky: &Sky,
@@ -162,10 +199,12 @@ fn measured(
 ) -> Vec<MeasuredStar> {
     let measured = |m: &StarMatch| {
         let star = &field.stars[m.observed];
+        let sigma_px = (star.sigma_px.powi(2) + excess_px.powi(2)).sqrt().max(1e-3);
+        let excess = m.residual_px / (HUBER_SIGMAS * sigma_px);
         MeasuredStar {
             pixel: star.position,
             icrs: sky.stars()[m.catalog].direction_at(field.years_since_j2000),
-            sigma_px: (star.sigma_px.powi(2) + excess_px.powi(2)).sqrt().max(1e-3),
+            sigma_px: sigma_px * excess.max(1.0).sqrt(),
         }
     };
     matches.iter().map(measured).collect()
@@ -222,11 +261,14 @@ fn median(values: &mut [f64]) -> f64 {
 }
 
 /// The radius that holds practically all true pairs, by the typical residual of this fit.
-fn agreement_radius_px(fit: &CameraFit, before_px: f64) -> f64 {
+fn agreement_radius_px(fit: &CameraFit) -> f64 {
     let sigma_px = median(&mut distances_px(fit)) / RAYLEIGH_MEDIAN;
-    (CLIP * sigma_px * 1.5)
-        .max(MIN_RADIUS_PX)
-        .max(before_px / 4.0)
+    (CLIP_SIGMAS * sigma_px).max(MIN_RADIUS_PX)
+}
+
+/// The same, but no larger than before and not so much smaller that a bad fit would throw good pairs away.
+fn next_radius_px(fit: &CameraFit, before_px: f64) -> f64 {
+    agreement_radius_px(fit).clamp(before_px / 4.0, before_px)
 }
 
 /// What must be added to the stated errors so that the residuals' median is as expected, in pixels.
