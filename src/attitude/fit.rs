@@ -132,13 +132,16 @@ impl Equations {
 
     /// The normal equations: matrix and right-hand side.
     fn normal(&self) -> (DMatrix<f64>, DVector<f64>) {
-        let mut matrix = DMatrix::zeros(self.parameters, self.parameters);
+        let size = self.parameters;
+        let mut matrix = DMatrix::zeros(size, size);
+        let by_column = matrix.as_mut_slice();
         let mut vector = DVector::zeros(self.parameters);
         for (terms, rhs) in self.iter() {
             for (done, &(column, a)) in terms.iter().enumerate() {
                 vector[column] += a * rhs;
+                let lower = &mut by_column[column * size..(column + 1) * size];
                 for &(row, b) in &terms[done..] {
-                    matrix[(row, column)] += a * b;
+                    lower[row] += a * b;
                 }
             }
         }

@@ -115,6 +115,9 @@ pub fn with_all_stars(field: &StarField, sky: &Sky, settled: &Refined) -> Option
         } = &current;
         hypothesis.predict_again(sky, field, &mut predicted);
         let matches = hypothesis.pair_up(&field.stars, &predicted, field.photometry, radius_px);
+        if same_pairs(&matches, &current.matches) {
+            break;
+        }
         let guess = Guess { hypothesis, model };
         current = fitted(field, sky, matches, *excess_sigma_px, &guess)?;
         radius_px = next_radius_px(&current.fit, radius_px);
