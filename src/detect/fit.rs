@@ -20,7 +20,9 @@ const MAX_STEPS: usize = 15;
 /// Steps shorter than this, in px, end the fit; convergence is quadratic, so little is left after one.
 const CONVERGED_PX: f64 = 2e-3;
 /// So do steps shorter than this part of the standard error: what is left after them is a fraction of it.
-const CONVERGED_SIGMA: f64 = 0.05;
+const CONVERGED_SIGMA: f64 = 0.03;
+/// But no longer than this, in px: sharp spots are far from linear.
+const MAX_CONVERGED_PX: f64 = 0.005;
 /// The longest step, in px: farther, the model is not linear.
 const MAX_STEP_PX: f64 = 0.5;
 /// The range of free spot sizes, in px.
@@ -158,7 +160,8 @@ impl Fitter {
             if strayed {
                 break;
             }
-            let enough = (CONVERGED_SIGMA / information.sqrt()).clamp(CONVERGED_PX, 0.1);
+            let enough =
+                (CONVERGED_SIGMA / information.sqrt()).clamp(CONVERGED_PX, MAX_CONVERGED_PX);
             if length < enough && step > 0 {
                 fit.converged = true;
                 finish(&mut fit, &normal, [fitted, known], &change);

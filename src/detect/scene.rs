@@ -46,8 +46,8 @@ impl Scene<'_> {
         let (x, y) = (peak.x as f64, peak.y as f64);
         let snr = f64::from(peak.snr) * self.correlation_at(x, y);
         Spot {
-            x,
-            y,
+            x: x + f64::from(peak.offset_px[0]),
+            y: y + f64::from(peak.offset_px[1]),
             flux: snr * self.noise_at(x, y) / self.matched_gain,
             ..Spot::default()
         }
