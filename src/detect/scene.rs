@@ -78,7 +78,8 @@ impl Scene<'_> {
         let noise = self.noise_at(cx as f64, cy as f64);
         window.noise_variance = noise * noise;
         let peak = points.iter().map(|p| p.flux).fold(0.0, f64::max) * self.matched_gain;
-        window.background_error = (BACKGROUND_ERROR * noise).hypot(HALO_ERROR * peak);
+        window.background_noise = BACKGROUND_ERROR * noise;
+        window.background_error = window.background_noise.hypot(HALO_ERROR * peak);
         self.fill(window);
     }
 
