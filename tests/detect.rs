@@ -478,7 +478,7 @@ fn a_saturated_star_is_one_source_at_its_place() {
         (star.position.x - 100.3).hypot(star.position.y - 90.8) < 0.05,
         "{star:?}"
     );
-    // A twelfth of its peak is left of it, yet its flux is that of the whole spot.
+    // About a ninth of its peak is left of it, yet its flux is that of the whole spot.
     assert!((star.flux_adu / 400_000.0 - 1.0).abs() < 0.1, "{star:?}");
     assert!(star.snr > found.sources[1].snr, "{star:?}");
     assert_eq!(found.sources.len(), 10, "{:?}", found.sources);
@@ -486,7 +486,7 @@ fn a_saturated_star_is_one_source_at_its_place() {
 
 #[test]
 fn snr_is_that_of_the_noise_however_imperfect_the_spot() {
-    // Stars of two spot sizes: no single spot fits all of them, by some 20 % of their light.
+    // Stars of two spot sizes: no single spot fits all of them.
     let mut sky = Sky::flat(400, 400, BACKGROUND_E);
     for i in 0..36u32 {
         let (x, y) = (
