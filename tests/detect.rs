@@ -161,66 +161,6 @@ fn the_false_alarm_rate_is_the_one_asked_for() {
     );
 }
 
-#[test]
-#[ignore = "minutes: the same over many more frames"]
-fn false_alarm_rates_at_length() {
-    for spot in [0.5, 0.7, 1.0, 1.5, 2.5] {
-        for (wanted, frames) in [(10.0, 60), (1.0, 200)] {
-            let rate = false_alarm_rate(spot, wanted, frames);
-            let error = (rate / (frames as f64 * 1.05)).sqrt();
-            println!("spot {spot}: wanted {wanted}, had {rate:.2} ± {error:.2} per Mpx");
-        }
-    }
-}
-
-#[test]
-#[ignore = "minutes: borders apart, and photon noise, and few grey levels"]
-fn false_alarm_rates_of_other_noise() {
-    for spot in [0.7, 1.5] {
-        let config = config_with(spot, 10.0);
-        // Narrow frames: nearly all is border.
-        let count: usize = (0..600)
-            .map(|seed| {
-                found_in(&white_noise(1024, 8, 7.0, seed), &config)
-                    .sources
-                    .len()
-            })
-            .sum();
-        println!(
-            "spot {spot}, 1024x8: wanted 10, had {:.2} per Mpx",
-            count as f64 / (600.0 * 0.008_192)
-        );
-        for background in [30.0, 100.0, 1000.0] {
-            let count: usize = (0..8)
-                .map(|seed| {
-                    let sky = Sky::flat(1024, 1024, background);
-                    found_in(&sky.expose(seed), &config).sources.len()
-                })
-                .sum();
-            println!(
-                "spot {spot}, {background} photons: wanted 10, had {:.2} per Mpx",
-                count as f64 / 8.4
-            );
-        }
-        for sigma in [0.2, 0.4, 0.7, 2.0] {
-            let mut count = 0;
-            for seed in 0..8 {
-                let mut frame = white_noise(1024, 1024, sigma, seed);
-                frame
-                    .pixels
-                    .iter_mut()
-                    .for_each(|p| *p = (*p + 0.3).round());
-                let frame = frame.with_levels(1.0, Some(65535.0));
-                count += found_in(&frame, &config).sources.len();
-            }
-            println!(
-                "spot {spot}, noise {sigma} steps: wanted 10, had {:.2} per Mpx",
-                count as f64 / 8.4
-            );
-        }
-    }
-}
-
 /// The Cramér-Rao bound of x for a star at this place, flux and background unknown.
 fn cramer_rao_px(x: f64, y: f64, flux: f64, sigma: f64) -> f64 {
     let (mut information, step) = (0.0, 1e-4);
@@ -538,7 +478,36 @@ fn a_saturated_star_is_one_source_at_its_place() {
         (star.position.x - 100.3).hypot(star.position.y - 90.8) < 0.05,
         "{star:?}"
     );
+    // About a ninth of its peak is left of it, yet its flux is that of the whole spot.
+    assert!((star.flux_adu / 400_000.0 - 1.0).abs() < 0.1, "{star:?}");
+    assert!(star.snr > found.sources[1].snr, "{star:?}");
     assert_eq!(found.sources.len(), 10, "{:?}", found.sources);
+}
+
+#[test]
+fn snr_is_that_of_the_noise_however_imperfect_the_spot() {
+    // Stars of two spot sizes: no single spot fits all of them.
+    let mut sky = Sky::flat(400, 400, BACKGROUND_E);
+    for i in 0..36u32 {
+        let (x, y) = (
+            30.3 + 60.0 * f64::from(i % 6),
+            30.6 + 60.0 * f64::from(i / 6),
+        );
+        sky.add_star(x, y, 50_000.0, if i % 2 == 0 { 0.9 } else { 1.1 });
+    }
+    let found = found_in(&sky.expose(12), &DetectConfig::default());
+    // Shot noise alone leaves √50 000 = 224; some of the misfit is taken for shot noise.
+    assert!(
+        found.sources.iter().all(|s| s.snr > 80.0 && s.snr < 230.0),
+        "{:?}",
+        found.sources
+    );
+    // The misfit is in the standard errors of the position: noise alone would leave 0.0046 px.
+    assert!(
+        found.sources.iter().all(|s| s.sigma_x_px > 0.0048),
+        "{:?}",
+        found.sources[0]
+    );
 }
 
 #[test]

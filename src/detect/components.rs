@@ -62,6 +62,8 @@ pub(super) struct Peak {
     pub x: usize,
     /// Row.
     pub y: usize,
+    /// Top of the parabola through the filtered values: columns and rows beyond the pixel's centre.
+    pub offset_px: [f32; 2],
     /// Filtered value over its local noise.
     pub snr: f32,
     /// Height above the highest saddle towards a higher maximum of its region, in the same unit.
@@ -322,6 +324,7 @@ impl Search {
                     self.peaks.push(Peak {
                         x,
                         y,
+                        offset_px: parabola_top(view, x, y),
                         snr,
                         prominence: snr,
                         region,
@@ -477,6 +480,28 @@ fn is_local_maximum(view: &View<'_>, x: usize, y: usize) -> bool {
             let other = view.at(c, r);
             other < value || (other == value && (r, c) > (y, x))
         })
+}
+
+/// Where the parabolas through a maximum and its neighbours have their tops, from its centre, in pixels.
+fn parabola_top(view: &View<'_>, x: usize, y: usize) -> [f32; 2] {
+    /// Half a pixel, less what could round to the next.
+    const FARTHEST_PX: f32 = 0.49;
+    if x == 0 || y == 0 || x + 1 >= view.width || y + 1 >= view.height {
+        return [0.0; 2];
+    }
+    let top = |before: f32, after: f32| {
+        let curvature = 2.0 * view.at(x, y) - before - after;
+        let offset = 0.5 * (after - before) / curvature;
+        if curvature > 0.0 {
+            offset.clamp(-FARTHEST_PX, FARTHEST_PX)
+        } else {
+            0.0
+        }
+    };
+    [
+        top(view.at(x - 1, y), view.at(x + 1, y)),
+        top(view.at(x, y - 1), view.at(x, y + 1)),
+    ]
 }
 
 /// Whether a pixel within one pixel of (x, y) is saturated.

@@ -20,7 +20,9 @@ const MAX_STEPS: usize = 15;
 /// Steps shorter than this, in px, end the fit; convergence is quadratic, so little is left after one.
 const CONVERGED_PX: f64 = 2e-3;
 /// So do steps shorter than this part of the standard error: what is left after them is a fraction of it.
-const CONVERGED_SIGMA: f64 = 0.05;
+const CONVERGED_SIGMA: f64 = 0.03;
+/// But no longer than this, in px: sharp spots are far from linear.
+const MAX_CONVERGED_PX: f64 = 0.005;
 /// The longest step, in px: farther, the model is not linear.
 const MAX_STEP_PX: f64 = 0.5;
 /// The range of free spot sizes, in px.
@@ -52,6 +54,8 @@ pub(super) struct Window {
     pub noise_variance: f64,
     /// Standard error of the background map, in ADU.
     pub background_error: f64,
+    /// The part of it that is noise, in ADU.
+    pub background_noise: f64,
 }
 
 /// One spot: where, and how much light.
@@ -69,6 +73,8 @@ pub(super) struct Spot {
     pub sigma_y: f64,
     /// Standard error of the flux, in ADU.
     pub sigma_flux: f64,
+    /// The part of it that is noise: without the errors of the spot model and of the halo, in ADU.
+    pub noise_flux: f64,
 }
 
 /// What is fitted, and how.
@@ -158,10 +164,12 @@ impl Fitter {
             if strayed {
                 break;
             }
-            let enough = (CONVERGED_SIGMA / information.sqrt()).clamp(CONVERGED_PX, 0.1);
+            let enough =
+                (CONVERGED_SIGMA / information.sqrt()).clamp(CONVERGED_PX, MAX_CONVERGED_PX);
             if length < enough && step > 0 {
                 fit.converged = true;
                 finish(&mut fit, &normal, [fitted, known], &change);
+                self.set_flux_noise::<N>(window, &mut fit, config);
                 return fit;
             }
         }
@@ -176,6 +184,32 @@ impl Fitter {
         };
         finish(&mut fit, &normal, [fitted, known], &[0.0; N]);
         fit
+    }
+
+    /// Standard errors of the fluxes from noise alone: the Cramér-Rao bound for a perfect spot model.
+    fn set_flux_noise<const N: usize>(
+        &mut self,
+        window: &Window,
+        fit: &mut Fit,
+        config: &FitConfig,
+    ) {
+        let noise_only = FitConfig {
+            noise: NoiseModel {
+                model_error2: 0.0,
+                ..config.noise
+            },
+            ..*config
+        };
+        let mut normal: Normal<N> = self.linearise(window, fit, &noise_only);
+        let b = 3 * fit.spots.len();
+        normal.matrix[b][b] += window.background_noise.powi(-2) - window.background_error.powi(-2);
+        // The size is held: that it is imperfectly known is no noise.
+        if normal.factorise(b + 1) == b + 1 {
+            let variances = normal.variances(b + 1);
+            for (i, spot) in fit.spots.iter_mut().enumerate() {
+                spot.noise_flux = variances[3 * i + 2].sqrt();
+            }
+        }
     }
 
     /// Light of all spots, without background, in the pixel at `column`, `row` of the window.
@@ -402,6 +436,7 @@ fn finish<const N: usize>(
         spot.sigma_x = variances[3 * i].sqrt();
         spot.sigma_y = variances[3 * i + 1].sqrt();
         spot.sigma_flux = variances[3 * i + 2].sqrt();
+        spot.noise_flux = spot.sigma_flux;
     }
     fit.sigma_spot_px = variances[all - 1].sqrt();
     // The size comes last: the leading block of the factor is that of a fit without it.
@@ -439,6 +474,7 @@ mod tests {
             data,
             noise_variance: 25.0,
             background_error: 1.0,
+            background_noise: 1.0,
             ..Window::default()
         }
     }

@@ -215,7 +215,7 @@ impl Measurement<'_> {
             .map(|(x, y)| f64::from(scene.view.at(x, y)))
             .fold(f64::NEG_INFINITY, f64::max);
         let mut flux_adu = spot.flux;
-        let mut sigma_flux = spot.sigma_flux * correlation;
+        let mut sigma_flux = spot.noise_flux * correlation;
         if !(flux_adu > 0.0 && sigma_flux.is_finite()) {
             // No fit: what the filter saw.
             flux_adu = scene.first_guess(peak).flux;

@@ -51,15 +51,17 @@ use view::View;
 pub struct Detection {
     /// The centroid.
     pub position: PixelPoint,
-    /// Standard error of the centroid in x, in pixels.
+    /// Standard error of the centroid in x, in pixels: of noise and of the imperfect spot model.
     pub sigma_x_px: f64,
     /// Standard error of the centroid in y, in pixels.
     pub sigma_y_px: f64,
-    /// Flux above the background, in ADU.
+    /// Flux above the background, in ADU: of the fitted spot, also where its core is saturated.
     pub flux_adu: f64,
     /// Brightest pixel above the background, in ADU.
     pub peak_adu: f64,
-    /// Flux over its standard error.
+    /// Flux over its noise: that of the background, and of the star's own light as far as the frame's
+    /// bright stars tell it. The spot model's error is not in it, else no star would exceed some 30;
+    /// it is in the standard errors of the centroid.
     pub snr: f64,
     /// What is unusual about it.
     pub flags: DetectionFlags,

@@ -1,5 +1,10 @@
 //! The normal equations of a weighted least-squares fit, and their solution by Cholesky's method.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "rows and columns of matrices read best as indices"
+)]
+
 use super::psf::AxisProfile;
 use multiversion::multiversion;
 
@@ -200,7 +205,7 @@ fn sum_one_spot(
                 gradient[4][lane] = spot.flux * (by_sigma[lane] * d + value[lane] * d_sigma);
                 let positive = if light > 0.0 { light } else { 0.0 };
                 let variance = constant + positive * (linear + square * positive);
-                let is_valid = pixel[lane] == pixel[lane];
+                let is_valid = !pixel[lane].is_nan();
                 let difference = pixel[lane] - light - spot.background;
                 weight[lane] = if is_valid { 1.0 / variance } else { 0.0 };
                 residual[lane] = if is_valid { difference } else { 0.0 };

@@ -53,18 +53,24 @@ fn fill(profile: &mut AxisProfile, center_px: f64, sigma_px: f64, count: usize) 
     let scale = 1.0 / (std::f64::consts::SQRT_2 * sigma_px);
     let density = 1.0 / ((2.0 * PI).sqrt() * sigma_px);
     // At each edge between pixels: half the erf, the density, and that times the distance over σ.
-    let mut half_erf = [0.0f64; EDGES];
-    let mut gauss = [0.0f64; EDGES];
-    let mut by_sigma = [0.0f64; EDGES];
+    let mut half_erf = [[0.0f64; LANES]; EDGES / LANES];
+    let mut gauss = [[0.0f64; LANES]; EDGES / LANES];
+    let mut by_sigma = [[0.0f64; LANES]; EDGES / LANES];
+    let steps: [f64; LANES] = std::array::from_fn(|lane| lane as f64);
     for group in 0..(count + 1).div_ceil(LANES) {
-        for i in group * LANES..(group + 1) * LANES {
-            let distance = i as f64 - 0.5 - center_px;
+        let first = (group * LANES) as f64 - 0.5 - center_px;
+        let (half_erf, gauss) = (&mut half_erf[group], &mut gauss[group]);
+        let by_sigma = &mut by_sigma[group];
+        for lane in 0..LANES {
+            let distance = first + steps[lane];
             let (erf, exp) = erf_and_gauss(distance * scale);
-            half_erf[i] = 0.5 * erf;
-            gauss[i] = exp * density;
-            by_sigma[i] = distance * gauss[i] / sigma_px;
+            half_erf[lane] = 0.5 * erf;
+            gauss[lane] = exp * density;
+            by_sigma[lane] = distance * exp * (density / sigma_px);
         }
     }
+    let half_erf = half_erf.as_flattened();
+    let (gauss, by_sigma) = (gauss.as_flattened(), by_sigma.as_flattened());
     for i in 0..count {
         profile.value[i] = half_erf[i + 1] - half_erf[i];
         profile.by_center[i] = gauss[i] - gauss[i + 1];

@@ -46,8 +46,8 @@ impl Scene<'_> {
         let (x, y) = (peak.x as f64, peak.y as f64);
         let snr = f64::from(peak.snr) * self.correlation_at(x, y);
         Spot {
-            x,
-            y,
+            x: x + f64::from(peak.offset_px[0]),
+            y: y + f64::from(peak.offset_px[1]),
             flux: snr * self.noise_at(x, y) / self.matched_gain,
             ..Spot::default()
         }
@@ -78,7 +78,8 @@ impl Scene<'_> {
         let noise = self.noise_at(cx as f64, cy as f64);
         window.noise_variance = noise * noise;
         let peak = points.iter().map(|p| p.flux).fold(0.0, f64::max) * self.matched_gain;
-        window.background_error = (BACKGROUND_ERROR * noise).hypot(HALO_ERROR * peak);
+        window.background_noise = BACKGROUND_ERROR * noise;
+        window.background_error = window.background_noise.hypot(HALO_ERROR * peak);
         self.fill(window);
     }
 
