@@ -225,11 +225,12 @@ fn choose_model(
     richest: Option<DistortionModel>,
 ) -> Option<DistortionModel> {
     let stars = measured(field, sky, &current.matches, current.excess_sigma_px);
-    let left_out = |model| {
-        let Refined { fit, .. } = current;
-        let fit = fit_camera(&stars, &fit.camera, &fit.icrs_to_camera, model)?;
-        left_out_chi_sq(&stars, &fit)
-    };
+    let CameraFit {
+        camera,
+        icrs_to_camera,
+        ..
+    } = &current.fit;
+    let left_out = |model| left_out_chi_sq(&stars, camera, icrs_to_camera, model);
     let equations = 2.0 * stars.len() as f64;
     let mut best = (None, left_out(None)?);
     for model in DistortionModel::ALL {
