@@ -180,14 +180,9 @@ impl<'a> Adjustment<'a> {
         }
     }
 
-    /// Half the diagonal: where a normalised offset is 1.
-    fn radius_px(&self) -> f64 {
-        self.camera.width_px.hypot(self.camera.height_px) / 2.0
-    }
-
     fn linearise(&mut self) -> Option<()> {
         let f = self.camera.focal_length_px;
-        let radius_px = self.radius_px();
+        let radius_px = self.camera.radius_px();
         self.equations.clear();
         for star in self.stars {
             let direction = self.icrs_to_camera.apply(&star.icrs);
@@ -233,7 +228,7 @@ impl<'a> Adjustment<'a> {
         }
         self.icrs_to_camera = self.icrs_to_camera.then_turn(turn);
         self.camera.focal_length_px *= solution[3].exp();
-        let radius_px = self.radius_px();
+        let radius_px = self.camera.radius_px();
         self.camera.distortion = self.model.map(|model| {
             let coefficients = solution.as_slice()[POSE_PARAMETERS..].to_vec();
             Distortion::new(model, radius_px, coefficients)

@@ -85,7 +85,7 @@ const MAX_ORDER: usize = 5;
 
 /// Steps of the fixed-point iteration that inverts the polynomial, and where it may stop.
 const INVERSION_STEPS: usize = 50;
-const INVERSION_TOLERANCE_PX: f64 = 1e-7;
+const INVERSION_TOLERANCE_PX: f64 = 1e-5;
 
 impl Distortion {
     /// A distortion with one coefficient in pixels for each term of `model`; `radius_px` is the

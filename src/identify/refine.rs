@@ -73,7 +73,7 @@ pub fn refine(
     let mut model_chosen = false;
     for _ in 0..MAX_ROUNDS {
         radius_px = next_radius_px(&current.fit, radius_px);
-        current.hypothesis.predict_again(sky, field, &mut predicted);
+        current.hypothesis.predict_again(&mut predicted);
         let matches = current
             .hypothesis
             .pair_up(observed, &predicted, field.photometry, radius_px);
@@ -113,13 +113,13 @@ pub fn with_all_stars(field: &StarField, sky: &Sky, settled: &Refined) -> Option
             excess_sigma_px,
             ..
         } = &current;
-        hypothesis.predict_again(sky, field, &mut predicted);
         let matches = hypothesis.pair_up(&field.stars, &predicted, field.photometry, radius_px);
         if same_pairs(&matches, &current.matches) {
             break;
         }
         let guess = Guess { hypothesis, model };
         current = fitted(field, sky, matches, *excess_sigma_px, &guess)?;
+        current.hypothesis.predict_again(&mut predicted);
         radius_px = next_radius_px(&current.fit, radius_px);
     }
     Some(current)

@@ -13,6 +13,7 @@
 use super::{ObservedStar, Photometry, Sky, StarField, StarMatch};
 use crate::attitude::POSE_PARAMETERS;
 use crate::camera::CameraModel;
+use crate::catalog::sky_grid::GridStar;
 use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::units::RAD_PER_DEG;
 use std::f64::consts::PI;
@@ -35,11 +36,16 @@ const NEIGHBOURHOOD: f64 = 8.0;
 /// Stars predicted so far outside the frame, in units of its diagonal, may still be seen on it.
 const MARGIN: f64 = 0.01;
 
+/// Lenses shift stars by no more than so much of the frame's half diagonal.
+const UNDISTORTED_MARGIN: f64 = 0.1;
+
 /// A catalogue star where the hypothesis puts it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PredictedStar {
     /// Its place in the frame.
     pub pixel: PixelPoint,
+    /// Its direction at the time of the frame.
+    pub direction: UnitVector<Icrs>,
     /// V magnitude.
     pub v_mag: f32,
     /// Index into the catalogue's stars.
@@ -109,10 +115,10 @@ impl Hypothesis {
     }
 
     /// The same stars where this hypothesis puts them.
-    pub fn predict_again(&self, sky: &Sky, field: &StarField, predicted: &mut [PredictedStar]) {
+    pub fn predict_again(&self, predicted: &mut [PredictedStar]) {
         for star in predicted {
-            let direction = sky.stars()[star.catalog].direction_at(field.years_since_j2000);
-            if let Some(pixel) = self.camera.pixel_of(&self.icrs_to_camera.apply(&direction)) {
+            let direction = self.icrs_to_camera.apply(&star.direction);
+            if let Some(pixel) = self.camera.pixel_of(&direction) {
                 star.pixel = pixel;
             }
         }
@@ -127,19 +133,31 @@ impl Hypothesis {
         let margin_px = MARGIN * self.camera.width_px.hypot(self.camera.height_px);
         let radius_rad = self.camera.radius_rad() * (1.0 + 2.0 * MARGIN);
         let centre = self.icrs_to_camera.inverse().apply(&UnitVector::BORESIGHT);
+        // The cone is rounder than the frame: most of what it holds beside it needs no closer look.
+        let nearly_px = margin_px + UNDISTORTED_MARGIN * self.camera.radius_px();
+        let pinhole = CameraModel {
+            distortion: None,
+            ..self.camera.clone()
+        };
         let mut predicted = Vec::new();
+        let mut look = |star: &GridStar| {
+            let direction = sky.stars()[star.catalog as usize].direction_at(years);
+            let in_camera = self.icrs_to_camera.apply(&direction);
+            let near = |p: &PixelPoint| self.camera.nearly_contains(p, nearly_px);
+            let inside = |p: &PixelPoint| self.camera.nearly_contains(p, margin_px);
+            let undistorted = pinhole.pixel_of(&in_camera).filter(near);
+            let pixel = undistorted.and_then(|_| self.camera.pixel_of(&in_camera));
+            if let Some(pixel) = pixel.filter(inside) {
+                predicted.push(PredictedStar {
+                    pixel,
+                    direction,
+                    v_mag: star.v_mag,
+                    catalog: star.catalog as usize,
+                });
+            }
+        };
         sky.grid
-            .for_each_within(&centre, radius_rad, faintest_v_mag as f32, |star| {
-                let direction = sky.stars()[star.catalog as usize].direction_at(years);
-                let pixel = self.camera.pixel_of(&self.icrs_to_camera.apply(&direction));
-                if let Some(pixel) = pixel.filter(|p| self.camera.nearly_contains(p, margin_px)) {
-                    predicted.push(PredictedStar {
-                        pixel,
-                        v_mag: star.v_mag,
-                        catalog: star.catalog as usize,
-                    });
-                }
-            });
+            .for_each_within(&centre, radius_rad, faintest_v_mag as f32, &mut look);
         predicted.sort_unstable_by_key(|star| star.catalog);
         predicted
     }
@@ -338,6 +356,7 @@ mod tests {
         });
         let predicted = [(12.5, 10.0), (10.0, 11.0), (90.0, 50.0)].map(|(x, y)| PredictedStar {
             pixel: PixelPoint::new(x, y),
+            direction: UnitVector::from_ra_dec(0.0, 0.0),
             v_mag: 0.0,
             catalog: x as usize,
         });
