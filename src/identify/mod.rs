@@ -191,6 +191,6 @@ fn identification(refined: Refined, log10_false_alarm: f64) -> Identification {
 }
 
 /// Stars, the brightest, that decide how much distortion there is.
-const CALIBRATION_STARS: usize = 200;
+const CALIBRATION_STARS: usize = 120;
 /// Where the final fit starts to look for pairs, in units of the frame's diagonal.
 const FINAL_RADIUS_SHARE: f64 = 0.005;

@@ -25,7 +25,7 @@ const HUBER_SIGMAS: f64 = 2.5;
 /// How much further off than the bright stars faint ones may be.
 const FAINT_RADIUS: f64 = 3.0;
 /// Rounds of pairing and fitting with all the stars.
-const ALL_STARS_ROUNDS: usize = 3;
+const ALL_STARS_ROUNDS: usize = 2;
 /// A sceptic wants so many standard deviations more agreement than chance makes.
 const SCEPTICAL_SIGMAS: f64 = 3.0;
 /// Rounds of pairing and fitting at the most.
