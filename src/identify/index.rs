@@ -236,3 +236,68 @@ impl Cells {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalog::Catalog;
+    use std::collections::HashSet;
+
+    #[test]
+    fn a_search_finds_what_going_through_all_triangles_finds() {
+        let stars = &Catalog::built_in().stars()[..3000];
+        let index = TriangleIndex::build(stars, &SkyGrid::new(stars), &|_| ());
+        let tolerance = 0.01;
+        let mut compared = 0;
+        for class in &index.classes {
+            for wanted in [[0.7, 0.5], [0.9, 0.35], [0.6, 0.55]] {
+                let mut found = HashSet::new();
+                class.for_each_similar(wanted, tolerance, |corners| {
+                    assert!(found.insert(*corners), "listed twice");
+                });
+                let expected: HashSet<[u32; 3]> = class
+                    .corners
+                    .iter()
+                    .filter(|corners| {
+                        let ratios = shape_of(stars, corners).ratios.map(|r| r as f32);
+                        let off = [0, 1].map(|i| ratios[i] - wanted[i] as f32);
+                        off[0] * off[0] + off[1] * off[1] <= (tolerance * tolerance) as f32
+                    })
+                    .copied()
+                    .collect();
+                compared += expected.len();
+                assert_eq!(found, expected);
+            }
+        }
+        assert!(compared > 100, "{compared}");
+    }
+
+    fn shape_of(stars: &[Star], corners: &[u32; 3]) -> TriangleShape {
+        let vectors = corners.map(|c| stars[c as usize].direction.as_vector());
+        let shape = TriangleShape::new(vectors).unwrap();
+        assert_eq!(shape.order, [0, 1, 2], "corners are listed as A, B, C");
+        shape
+    }
+
+    #[test]
+    fn the_brightest_stars_of_a_field_make_listed_triangles() {
+        let stars = &Catalog::built_in().stars()[..9000];
+        let index = TriangleIndex::build(stars, &SkyGrid::new(stars), &|_| ());
+        let listed: HashSet<[u32; 3]> = index
+            .classes
+            .iter()
+            .flat_map(|class| class.corners.iter().copied())
+            .collect();
+        let grid = SkyGrid::new(stars);
+        for (ra_rad, dec_rad) in [(0.3, 0.2), (2.0, -1.2), (4.0, 1.5), (5.5, -0.5)] {
+            let mut field = Vec::new();
+            let centre = UnitVector::from_ra_dec(ra_rad, dec_rad);
+            collect_brightest(&grid, &centre, 0.15, 6, &mut field);
+            let mut triangles = 0;
+            for_each_triangle(stars, &field, |_, corners, _| {
+                triangles += usize::from(listed.contains(&corners));
+            });
+            assert!(triangles >= 3, "{triangles} at {ra_rad}, {dec_rad}");
+        }
+    }
+}
