@@ -10,7 +10,7 @@
 //! # Reference
 //! Mighell 2005, doi 10.1111/j.1365-2966.2005.09208.x, for PSF fitting and its error budget.
 
-use super::normal::{Normal, ONE_SPOT, OneSpot};
+use super::normal::{Normal, ONE_SPOT, OneSpot, flux_variance};
 use super::psf::{AxisProfile, MAX_WINDOW_PX};
 
 /// The most spots fitted together.
@@ -19,10 +19,14 @@ const MAX_PARAMETERS: usize = 3 * MAX_SPOTS + 2;
 const MAX_STEPS: usize = 15;
 /// Steps shorter than this, in px, end the fit; convergence is quadratic, so little is left after one.
 const CONVERGED_PX: f64 = 2e-3;
-/// So do steps shorter than this part of the standard error: what is left after them is a fraction of it.
-const CONVERGED_SIGMA: f64 = 0.03;
+/// So do steps shorter than this part of the standard error: what is left after them is a fifth of it at most.
+const CONVERGED_SIGMA: f64 = 0.1;
 /// But no longer than this, in px: sharp spots are far from linear.
-const MAX_CONVERGED_PX: f64 = 0.005;
+const MAX_CONVERGED_PX: f64 = 0.02;
+/// The same where the size is free: the flux hangs on it, above all where the core is saturated.
+const MAX_CONVERGED_FREE_PX: f64 = 0.005;
+/// The first step ends the fit only if it leaves the flux within this part: the weights follow from it.
+const SETTLED_FLUX: f64 = 0.02;
 /// The longest step, in px: farther, the model is not linear.
 const MAX_STEP_PX: f64 = 0.5;
 /// The range of free spot sizes, in px.
@@ -147,6 +151,11 @@ impl Fitter {
         let reach2 = (1.0 + config.spot_px).powi(2);
         let all = 3 * start.len() + 2;
         let fitted = parameter_count(start.len(), config);
+        let longest = if config.free_spot {
+            MAX_CONVERGED_FREE_PX
+        } else {
+            MAX_CONVERGED_PX
+        };
         for step in 0..MAX_STEPS {
             let mut normal: Normal<N> = self.linearise(window, &fit, config);
             let information = (0..start.len()).flat_map(|i| [3 * i, 3 * i + 1]);
@@ -156,6 +165,8 @@ impl Fitter {
                 break;
             }
             let change = normal.solve(fitted);
+            let flux_kept = (0..start.len())
+                .all(|i| change[3 * i + 2].abs() <= SETTLED_FLUX * fit.spots[i].flux.abs());
             let length = apply(&mut fit, &change, config);
             let strayed = fit.spots.iter().zip(start).any(|(now, then)| {
                 let distance2 = (now.x - then.x).powi(2) + (now.y - then.y).powi(2);
@@ -164,12 +175,10 @@ impl Fitter {
             if strayed {
                 break;
             }
-            let enough =
-                (CONVERGED_SIGMA / information.sqrt()).clamp(CONVERGED_PX, MAX_CONVERGED_PX);
-            if length < enough && step > 0 {
+            let enough = (CONVERGED_SIGMA / information.sqrt()).clamp(CONVERGED_PX, longest);
+            if length < enough && (step > 0 || flux_kept) {
                 fit.converged = true;
                 finish(&mut fit, &normal, [fitted, known], &change);
-                self.set_flux_noise::<N>(window, &mut fit, config);
                 return fit;
             }
         }
@@ -187,12 +196,12 @@ impl Fitter {
     }
 
     /// Standard errors of the fluxes from noise alone: the Cramér-Rao bound for a perfect spot model.
-    fn set_flux_noise<const N: usize>(
-        &mut self,
-        window: &Window,
-        fit: &mut Fit,
-        config: &FitConfig,
-    ) {
+    ///
+    /// To be called with the window of the fit, right after it.
+    pub fn set_flux_noise(&mut self, window: &Window, fit: &mut Fit, config: &FitConfig) {
+        if !fit.converged {
+            return;
+        }
         let noise_only = FitConfig {
             noise: NoiseModel {
                 model_error2: 0.0,
@@ -200,7 +209,16 @@ impl Fitter {
             },
             ..*config
         };
-        let mut normal: Normal<N> = self.linearise(window, fit, &noise_only);
+        if let [spot] = fit.spots.as_mut_slice() {
+            // The profiles are those of the last step, a fraction of the standard error away.
+            let one = one_spot(spot, fit.background, window, &noise_only);
+            let axes = [&self.across[0], &self.down[0]];
+            let error2 = window.background_noise * window.background_noise;
+            let variance = flux_variance(&one, axes, &window.data, window.width, error2);
+            spot.noise_flux = variance.sqrt();
+            return;
+        }
+        let mut normal: Normal<MAX_PARAMETERS> = self.linearise(window, fit, &noise_only);
         let b = 3 * fit.spots.len();
         normal.matrix[b][b] += window.background_noise.powi(-2) - window.background_error.powi(-2);
         // The size is held: that it is imperfectly known is no noise.
@@ -280,9 +298,23 @@ impl Fitter {
         window: &Window,
         fit: &Fit,
         config: &FitConfig,
+        visit: impl FnMut(f64, f64, f64),
+    ) {
+        if fit.spots.len() == 1 {
+            self.residuals_up_to::<ONE_SPOT>(window, fit, config, visit);
+        } else {
+            self.residuals_up_to::<MAX_PARAMETERS>(window, fit, config, visit);
+        }
+    }
+
+    fn residuals_up_to<const N: usize>(
+        &mut self,
+        window: &Window,
+        fit: &Fit,
+        config: &FitConfig,
         mut visit: impl FnMut(f64, f64, f64),
     ) {
-        let mut normal: Normal<MAX_PARAMETERS> = self.linearise(window, fit, config);
+        let mut normal: Normal<N> = self.linearise(window, fit, config);
         let count = parameter_count(fit.spots.len(), config);
         if normal.factorise(count) < count {
             return;
@@ -312,15 +344,7 @@ impl Fitter {
         let count = 3 * fit.spots.len() + 2;
         let mut normal = Normal::empty();
         if let [spot] = fit.spots.as_slice() {
-            let one = OneSpot {
-                flux: spot.flux,
-                background: fit.background,
-                variance: [
-                    window.noise_variance,
-                    config.noise.shot_adu,
-                    config.noise.model_error2,
-                ],
-            };
+            let one = one_spot(spot, fit.background, window, config);
             self.fill_profiles(window, fit);
             let axes = [&self.across[0], &self.down[0]];
             normal.add_one_spot(&one, axes, &window.data, window.width);
@@ -382,6 +406,19 @@ impl Fitter {
                 );
             }
         }
+    }
+}
+
+/// A spot and what surrounds it.
+fn one_spot(spot: &Spot, background: f64, window: &Window, config: &FitConfig) -> OneSpot {
+    OneSpot {
+        flux: spot.flux,
+        background,
+        variance: [
+            window.noise_variance,
+            config.noise.shot_adu,
+            config.noise.model_error2,
+        ],
     }
 }
 

@@ -140,9 +140,12 @@ impl Filtered {
         let out = &mut self.ring[y % slots];
         let padded = &self.padded;
         let shifted = |offset: usize| &padded[offset..offset + self.stride];
-        let left: [&[f32]; MAX_TAPS] = std::array::from_fn(|j| shifted(radius.saturating_sub(j)));
-        let right: [&[f32]; MAX_TAPS] =
-            std::array::from_fn(|j| shifted((radius + j).min(2 * radius)));
+        let mut left: [&[f32]; MAX_TAPS] = [&[]; MAX_TAPS];
+        let mut right = left;
+        for j in 0..=radius {
+            left[j] = shifted(radius - j);
+            right[j] = shifted(radius + j);
+        }
         symmetric_sum(&kernel.half, &left, &right, out);
         let last = view.width - 1;
         let inner = radius.min(view.width)
@@ -163,8 +166,12 @@ impl Filtered {
             Some(r) if r < self.height => self.ring[r % slots].as_slice(),
             _ => self.zeros.as_slice(),
         };
-        let above: [&[f32]; MAX_TAPS] = std::array::from_fn(|j| row(y.checked_sub(j.min(radius))));
-        let below: [&[f32]; MAX_TAPS] = std::array::from_fn(|j| row(Some(y + j.min(radius))));
+        let mut above: [&[f32]; MAX_TAPS] = [&[]; MAX_TAPS];
+        let mut below = above;
+        for j in 0..=radius {
+            above[j] = row(y.checked_sub(j));
+            below[j] = row(Some(y + j));
+        }
         let out = &mut self.values[y * self.stride..(y + 1) * self.stride];
         symmetric_sum(&kernel.half, &above, &below, out);
         if y < radius || y + radius >= self.height {
@@ -224,23 +231,31 @@ fn symmetric_sum(half: &[f32], left: &[&[f32]], right: &[&[f32]], out: &mut [f32
     }
 }
 
-/// The maximum of each block of [`BLOCK_PX`] values; the last may be shorter.
+/// The maximum of each block of [`BLOCK_PX`] values; the last may be shorter. NaN is left out.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 pub(super) fn block_maxima(row: &[f32], maxima: &mut [f32]) {
+    const LANES: usize = 16;
+    let higher = |a: f32, b: f32| if a > b { a } else { b };
     for (maximum, block) in maxima.iter_mut().zip(row.chunks(BLOCK_PX)) {
-        let mut lanes = [f32::MIN; 16];
-        let (chunks, rest) = block.as_chunks::<16>();
+        let mut lanes = [f32::MIN; LANES];
+        let (chunks, rest) = block.as_chunks::<LANES>();
         for chunk in chunks {
-            for lane in 0..16 {
-                lanes[lane] = if chunk[lane] > lanes[lane] {
-                    chunk[lane]
-                } else {
-                    lanes[lane]
-                };
+            for lane in 0..LANES {
+                lanes[lane] = higher(chunk[lane], lanes[lane]);
             }
         }
-        let of_rest = rest.iter().copied().fold(f32::MIN, f32::max);
-        *maximum = lanes.iter().copied().fold(of_rest, f32::max);
+        for (lane, &value) in lanes.iter_mut().zip(rest) {
+            *lane = higher(value, *lane);
+        }
+        // By halves: one after the other, each would wait for the one before.
+        let mut half = LANES / 2;
+        while half > 0 {
+            for lane in 0..half {
+                lanes[lane] = higher(lanes[lane + half], lanes[lane]);
+            }
+            half /= 2;
+        }
+        *maximum = lanes[0];
     }
 }
 

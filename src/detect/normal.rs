@@ -230,12 +230,56 @@ fn sum_one_spot(
     }
     let mut entry = 0;
     for i in 0..ONE_SPOT {
-        out.right[i] += right[i].iter().sum::<f64>();
+        out.right[i] += sum_of(right[i]);
         for j in 0..=i {
-            out.matrix[i][j] += matrix[entry].iter().sum::<f64>();
+            out.matrix[i][j] += sum_of(matrix[entry]);
             entry += 1;
         }
     }
-    out.chi2 += chi2.iter().sum::<f64>();
-    out.pixels += pixels.iter().sum::<f64>() as usize;
+    out.chi2 += sum_of(chi2);
+    out.pixels += sum_of(pixels) as usize;
+}
+
+/// The variance of the flux of one spot, fitted together with a background of variance
+/// `background_error2`; the spot's place is held, on which a symmetric spot's flux does not depend.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+pub(super) fn flux_variance(
+    spot: &OneSpot,
+    axes: [&AxisProfile; 2],
+    data: &[f64],
+    width: usize,
+    background_error2: f64,
+) -> f64 {
+    let mut sums = [[0.0f64; LANES]; 3];
+    let [across, down] = axes;
+    let [constant, linear, square] = spot.variance;
+    for start in (0..width).step_by(LANES) {
+        let value = across.value[start..].first_chunk::<LANES>();
+        let value = value.copied().unwrap_or([0.0; LANES]);
+        let columns = (width - start).min(LANES);
+        for (row, pixels_of_row) in data.chunks_exact(width).enumerate() {
+            let mut pixel = [f64::NAN; LANES];
+            pixel[..columns].copy_from_slice(&pixels_of_row[start..start + columns]);
+            for lane in 0..LANES {
+                let shape = value[lane] * down.value[row];
+                let light = spot.flux * shape;
+                let positive = if light > 0.0 { light } else { 0.0 };
+                let variance = constant + positive * (linear + square * positive);
+                let is_valid = !pixel[lane].is_nan();
+                let weight = if is_valid { 1.0 / variance } else { 0.0 };
+                sums[0][lane] += weight;
+                sums[1][lane] += weight * shape;
+                sums[2][lane] += weight * shape * shape;
+            }
+        }
+    }
+    let [ones, shapes, squares] = sums.map(sum_of);
+    1.0 / (squares - shapes * shapes / (ones + 1.0 / background_error2))
+}
+
+/// The sum, by halves: one after the other, each would wait for the one before.
+#[inline(always)]
+fn sum_of(v: [f64; LANES]) -> f64 {
+    let four: [f64; 4] = std::array::from_fn(|i| v[i] + v[i + 4]);
+    (four[0] + four[2]) + (four[1] + four[3])
 }

@@ -7,7 +7,6 @@
 //! Wang et al. 2019, Laser & Optoelectronics Progress 56, 101101, Eqs. (1) and (2).
 
 use multiversion::multiversion;
-use std::f64::consts::PI;
 
 /// The variance of a pixel's own width, in px²: a spot spreads over σ² + 1/12.
 pub(super) const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
@@ -15,23 +14,26 @@ pub(super) const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
 /// The longest side of a fitting window, in pixels.
 pub(super) const MAX_WINDOW_PX: usize = 49;
 
+/// Room for a window's pixels in whole groups of either length.
+const PROFILE_PX: usize = 56;
+
 /// Light per pixel along one axis, and its derivatives.
 #[derive(Debug, Clone)]
 pub(super) struct AxisProfile {
     /// Part of the light in each pixel.
-    pub value: [f64; MAX_WINDOW_PX],
+    pub value: [f64; PROFILE_PX],
     /// Its derivative with respect to the centre, per px.
-    pub by_center: [f64; MAX_WINDOW_PX],
+    pub by_center: [f64; PROFILE_PX],
     /// Its derivative with respect to σ, per px.
-    pub by_sigma: [f64; MAX_WINDOW_PX],
+    pub by_sigma: [f64; PROFILE_PX],
 }
 
 impl Default for AxisProfile {
     fn default() -> Self {
         Self {
-            value: [0.0; MAX_WINDOW_PX],
-            by_center: [0.0; MAX_WINDOW_PX],
-            by_sigma: [0.0; MAX_WINDOW_PX],
+            value: [0.0; PROFILE_PX],
+            by_center: [0.0; PROFILE_PX],
+            by_sigma: [0.0; PROFILE_PX],
         }
     }
 }
@@ -43,38 +45,41 @@ impl AxisProfile {
     }
 }
 
-/// Edges of pixels treated together.
+/// Edges of pixels treated together: of one pixel less.
 const LANES: usize = 8;
-/// Room for the edges of all pixels, in whole groups.
-const EDGES: usize = (MAX_WINDOW_PX + 1).next_multiple_of(LANES);
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn fill(profile: &mut AxisProfile, center_px: f64, sigma_px: f64, count: usize) {
     let scale = 1.0 / (std::f64::consts::SQRT_2 * sigma_px);
-    let density = 1.0 / ((2.0 * PI).sqrt() * sigma_px);
-    // At each edge between pixels: half the erf, the density, and that times the distance over σ.
-    let mut half_erf = [[0.0f64; LANES]; EDGES / LANES];
-    let mut gauss = [[0.0f64; LANES]; EDGES / LANES];
-    let mut by_sigma = [[0.0f64; LANES]; EDGES / LANES];
-    let steps: [f64; LANES] = std::array::from_fn(|lane| lane as f64);
-    for group in 0..(count + 1).div_ceil(LANES) {
-        let first = (group * LANES) as f64 - 0.5 - center_px;
-        let (half_erf, gauss) = (&mut half_erf[group], &mut gauss[group]);
-        let by_sigma = &mut by_sigma[group];
+    let density = std::f64::consts::FRAC_2_SQRT_PI * 0.5 * scale;
+    let by_sigma_scale = density / sigma_px;
+    for start in (0..count).step_by(LANES - 1) {
+        let first = start as f64 - 0.5 - center_px;
+        // At each edge between pixels: half the erf, the density, and that times the distance over σ.
+        let mut half_erf = [0.0f64; LANES];
+        let mut gauss = [0.0f64; LANES];
+        let mut by_sigma = [0.0f64; LANES];
         for lane in 0..LANES {
-            let distance = first + steps[lane];
+            let distance = first + lane as i32 as f64;
             let (erf, exp) = erf_and_gauss(distance * scale);
             half_erf[lane] = 0.5 * erf;
             gauss[lane] = exp * density;
-            by_sigma[lane] = distance * exp * (density / sigma_px);
+            by_sigma[lane] = distance * exp * by_sigma_scale;
         }
-    }
-    let half_erf = half_erf.as_flattened();
-    let (gauss, by_sigma) = (gauss.as_flattened(), by_sigma.as_flattened());
-    for i in 0..count {
-        profile.value[i] = half_erf[i + 1] - half_erf[i];
-        profile.by_center[i] = gauss[i] - gauss[i + 1];
-        profile.by_sigma[i] = by_sigma[i] - by_sigma[i + 1];
+        // A whole group is written: the profiles have room for it.
+        let part = start..start + LANES - 1;
+        let values = profile.value[part.clone()].iter_mut();
+        for (value, edges) in values.zip(half_erf.windows(2)) {
+            *value = edges[1] - edges[0];
+        }
+        let slopes = profile.by_center[part.clone()].iter_mut();
+        for (slope, edges) in slopes.zip(gauss.windows(2)) {
+            *slope = edges[0] - edges[1];
+        }
+        let slopes = profile.by_sigma[part].iter_mut();
+        for (slope, edges) in slopes.zip(by_sigma.windows(2)) {
+            *slope = edges[0] - edges[1];
+        }
     }
 }
 
