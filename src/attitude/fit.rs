@@ -284,10 +284,11 @@ impl<'a> Adjustment<'a> {
             terms.iter().map(|&(column, a)| a * row(column)).sum()
         };
         let residuals = self.weighted_residuals();
-        let left_out = |((terms, _), residual): ((&[(usize, f64)], f64), f64)| {
-            (residual / (1.0 - leverage(terms)).max(MIN_FREEDOM)).powi(2)
-        };
-        Some(self.equations.iter().zip(residuals).map(left_out).sum())
+        let mut sum = 0.0;
+        for ((terms, _), residual) in self.equations.iter().zip(residuals) {
+            sum += (residual / (1.0 - leverage(terms)).max(MIN_FREEDOM)).powi(2);
+        }
+        Some(sum)
     }
 }
 
