@@ -61,6 +61,9 @@ const TAKE_AT_END: f64 = 1.0;
 /// centroid errors extrapolated from the triangle.
 const WITNESS_TOLERANCES: f64 = 1.5;
 const WITNESS_SIGMAS: f64 = 3.5;
+/// When to give up, so that a frame in which there is nothing to find takes well under a second. Fields
+/// that can be identified take a few thousand.
+const MAX_HYPOTHESES: u64 = 400_000;
 /// Hypotheses above this are not reported.
 pub const LOG10_FALSE_ALARM_LIMIT: f64 = -9.0;
 
@@ -168,6 +171,9 @@ impl<'a> Search<'a> {
         for faintest in 2..stars {
             for middle in 1..faintest {
                 for brightest in 0..middle {
+                    if self.hypotheses > MAX_HYPOTHESES {
+                        return None;
+                    }
                     let trio = self.trio([brightest, middle, faintest], pass.tolerance);
                     if let Some(found) = trio.and_then(|trio| self.try_trio(&trio)) {
                         return Some(found);
