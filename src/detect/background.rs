@@ -49,6 +49,8 @@ pub(super) struct Mesh {
     pub level: Vec<f32>,
     /// Row-major, `rows * columns`.
     pub spread: Vec<f32>,
+    /// The least spread that a cell could have.
+    pub spread_floor: f32,
     scratch: Scratch,
 }
 
@@ -69,6 +71,7 @@ impl Mesh {
         self.rows = cells(view.height);
         self.cell_width_px = view.width as f32 / self.columns as f32;
         self.cell_height_px = view.height as f32 / self.rows as f32;
+        self.spread_floor = config.spread_floor;
         self.level.clear();
         self.spread.clear();
         for row in 0..self.rows {

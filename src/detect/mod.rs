@@ -7,7 +7,9 @@
 //!    measured on the bright stars that stand out in single pixels; where there are too few of them,
 //!    on those that a filter of a guessed size finds, and the frame is filtered again.
 //! 3. The noise of the filtered frame, on a mesh again: so correlated noise (JPEG, demosaicing) is
-//!    measured and not assumed. The threshold follows from the wanted number of false detections.
+//!    measured and not assumed. The threshold follows from the wanted number of false detections, and
+//!    from the distribution of the pixels where it is not Gaussian: few photons, coarse steps, a
+//!    black level that cuts off half of the noise.
 //! 4. Connected regions, their peaks, and which of those are stars of their own.
 //! 5. A fit of each star, together with those that it touches; or a grey-weighted centroid.
 //! 6. Flags for what is no star, or no whole one.
@@ -28,6 +30,7 @@ mod components;
 mod fit;
 mod matched_filter;
 mod measure;
+mod noise;
 mod normal;
 mod psf;
 mod raw_peaks;
@@ -43,6 +46,7 @@ use components::{Search, SearchConfig};
 use fit::NoiseModel;
 use matched_filter::{Filtered, Kernel};
 use measure::Measurement;
+use noise::{PixelNoise, Weights};
 use scene::{FitWork, Scene};
 use view::View;
 
@@ -219,6 +223,10 @@ const ROUNDING_NOISE: f32 = 0.288_675_13;
 /// The filtered noise cannot fall below this part of that of independent pixels: a frame that is
 /// smooth below its own rounding is not known better than that.
 const FILTERED_NOISE_FLOOR: f32 = 0.5;
+/// Noise below so many times that of rounding, half a step, is a few isolated pixels.
+const COARSE: f64 = 1.75;
+/// The distribution of the noise is measured again where it raises the threshold by more than this.
+const REPEAT_AT_RAISE: f64 = 0.2;
 
 /// Finds the stars of `frame`, and whatever else stands out, brightest first.
 ///
@@ -395,7 +403,9 @@ fn search(
     );
     calibration.threshold = config.threshold_sigma.unwrap_or_else(|| {
         let u = threshold::threshold_for_rate(config.false_alarms_per_mpx, kernel.rho, kernel.rho);
-        threshold::for_estimated_noise(u, noise_degrees(view, config, calibration.spot_px))
+        let degrees = noise_degrees(view, config, calibration.spot_px);
+        let u = threshold::for_estimated_noise(u, degrees);
+        raised_for_noise(u, view, calibration.spot_px, &kernel, workspace)
     });
     let spot_width_px = (calibration.spot_px.powi(2) + psf::PIXEL_VARIANCE_PX2).sqrt();
     workspace.search.run(
@@ -410,6 +420,39 @@ fn search(
         },
     );
     calibration.kernel = kernel;
+}
+
+/// The threshold `u` for Gaussian noise, raised for noise with a longer tail.
+fn raised_for_noise(
+    u: f64,
+    view: &View<'_>,
+    spot_px: f64,
+    kernel: &Kernel,
+    workspace: &Workspace,
+) -> f64 {
+    let (background, filtered_mesh) = (&workspace.background, &workspace.filtered_mesh);
+    let floor = f64::from(FILTERED_NOISE_FLOOR);
+    let is_at_floor = middle_of(&filtered_mesh.spread) <= floor * 1.001;
+    let is_coarse = middle_of(&background.spread) < COARSE * f64::from(background.spread_floor);
+    let weights = Weights::for_spot(spot_px, kernel.radius(), view);
+    let raised = |free_of_stars: f64| {
+        let filtered = &workspace.filtered;
+        let limit = free_of_stars as f32;
+        let noise = PixelNoise::measure(view, background, filtered, filtered_mesh, limit);
+        noise.map_or(u, |n| {
+            let known_spread = is_at_floor.then_some(floor / n.sigma);
+            n.threshold(u, &weights, known_spread)
+        })
+    };
+    // Noise of about a quantisation step is a few isolated pixels: they stand out, and are the noise.
+    let free_of_stars = if is_coarse { 2.0 * u } else { u };
+    let first = raised(free_of_stars);
+    if first > free_of_stars + REPEAT_AT_RAISE {
+        // What lay between the two was noise, and was left out.
+        raised(first)
+    } else {
+        first
+    }
 }
 
 /// The degrees of freedom of the local noise estimate: the independent samples in a cell (a value of

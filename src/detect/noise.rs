@@ -1,0 +1,360 @@
+//! How far the noise of the frame's pixels is from Gaussian, and what threshold makes up for it.
+//!
+//! Photon noise is skewed, noise below a quantisation step and noise cut off at zero are both skewed
+//! and heavy-tailed. A filtered value is a sum `Σ W_p x_p` of independent pixels, so the logarithm of
+//! its moment-generating function is `Σ K(t W_p)`, with the pixels' own K measured on the frame where
+//! nothing stands out. The saddlepoint approximation turns it into a tail:
+//! `P(> K'(t)) = Φ̄(w + ln(v/w)/w)`, `w = √(2(tK' − K))`, `v = t √K''`. To leading order this is the
+//! Cornish–Fisher correction; unlike it, it stays right for strong skews and far tails.
+//!
+//! # Reference
+//! Lugannani & Rice 1980, doi 10.2307/1426607; Barndorff-Nielsen 1986, doi 10.1093/biomet/73.2.307,
+//! for the form used here.
+
+use super::background::{Mesh, Piece};
+use super::matched_filter::{BLOCK_PX, Filtered};
+use super::psf::centered_profile;
+use super::view::View;
+use multiversion::multiversion;
+
+/// Pixels whose values are looked at, about.
+const SAMPLES: usize = 20_000;
+/// Fewer tell nothing about tails.
+const MIN_SAMPLES: f64 = 2000.0;
+/// Deviations up to this many standard deviations are counted: what lies beyond is no noise.
+const CLIP_SIGMA: f32 = 10.0;
+/// Bins per standard deviation.
+const BINS_PER_SIGMA: f32 = 8.0;
+const BINS: usize = (2.0 * CLIP_SIGMA * BINS_PER_SIGMA) as usize;
+/// Rows above and below that must be free of stars as well: their wings.
+const WING_ROWS: [usize; 2] = [4, 9];
+/// The range of t, and the steps in which K is tabulated over it.
+const LEAST_T: f64 = 0.3;
+const MAX_T: f64 = 9.0;
+/// Halvings of it: to 0.002.
+const BISECTIONS: usize = 12;
+const STEPS: usize = 48;
+/// What clipping at ±3σ, until it settles, does to the mean of a nearly Gaussian sample, per skewness,
+/// and to its standard deviation, per excess kurtosis and per squared skewness (Edgeworth's series).
+const MEAN_PER_SKEWNESS: f64 = -0.041;
+const SIGMA_PER_KURTOSIS: f64 = -0.0425;
+const SIGMA_PER_SQUARED_SKEWNESS: f64 = -0.0265;
+/// Below this the series is no longer to be trusted.
+const LEAST_CLIPPED_SIGMA: f64 = 0.85;
+/// A correction below so many of its standard errors is chance.
+const SIGNIFICANT: f64 = 1.0;
+/// Pixels along the border where half of the filter is cut off, or nearly.
+const BORDER_PX: f64 = 1.0;
+/// The border's threshold is taken to be higher than the interior's by no more than this.
+const MAX_BORDER_RAISE: f64 = 2.0;
+/// The threshold is raised by no more than this part of it.
+const MAX_RAISE: f64 = 1.0;
+
+/// The distribution of the pixels of a frame where no star is, in units of their noise.
+#[derive(Debug, Clone)]
+pub(super) struct PixelNoise {
+    counts: Vec<f64>,
+    count: f64,
+    mean: f64,
+    /// Standard deviation, in units of the mesh of the unfiltered frame.
+    pub sigma: f64,
+    skewness: f64,
+    excess_kurtosis: f64,
+}
+
+/// K and its first two derivatives.
+type Cumulants = [f64; 3];
+
+impl PixelNoise {
+    /// Takes samples of `view` where the filtered frame stays below `u`; `None` where there is too
+    /// little of that.
+    pub fn measure(
+        view: &View<'_>,
+        mesh: &Mesh,
+        filtered: &Filtered,
+        filtered_mesh: &Mesh,
+        u: f32,
+    ) -> Option<Self> {
+        let mut histogram = [0u32; BINS + 1];
+        let mut bins = vec![0u16; view.width];
+        let step = (view.width * view.height / SAMPLES).max(1);
+        let mut pieces = Vec::new();
+        for y in (step / 2..view.height).step_by(step) {
+            mesh.row_pieces(y, view.width, &mut pieces);
+            let rows = [
+                filtered.block_maxima(y),
+                filtered.block_maxima(y.saturating_sub(WING_ROWS[0])),
+                filtered.block_maxima(y.saturating_sub(WING_ROWS[1])),
+                filtered.block_maxima((y + WING_ROWS[0]).min(view.height - 1)),
+                filtered.block_maxima((y + WING_ROWS[1]).min(view.height - 1)),
+            ];
+            let row = view.row(y);
+            for piece in &pieces {
+                let span = piece.start..piece.end;
+                bins_of(&row[span.clone()], piece, &mut bins[span]);
+            }
+            let mut start = 0;
+            for block in 0..rows[0].len() {
+                let end = (start + BLOCK_PX).min(view.width);
+                let (level, spread) = filtered_mesh.at((start + end) as f32 * 0.5, y as f32);
+                let highest = level + u * spread;
+                if rows.iter().all(|r| r[block] < highest) {
+                    for &bin in &bins[start..end] {
+                        histogram[usize::from(bin)] += 1;
+                    }
+                }
+                start = end;
+            }
+        }
+        Self::of_histogram(&histogram[..BINS])
+    }
+
+    fn of_histogram(histogram: &[u32]) -> Option<Self> {
+        let counts: Vec<f64> = histogram.iter().map(|&n| f64::from(n)).collect();
+        let moment = |power: i32, center: f64| -> f64 {
+            let terms = counts.iter().enumerate();
+            terms
+                .map(|(i, n)| n * (bin_center(i) - center).powi(power))
+                .sum()
+        };
+        let count = moment(0, 0.0);
+        if count < MIN_SAMPLES {
+            return None;
+        }
+        let mean = moment(1, 0.0) / count;
+        let sigma = (moment(2, mean) / count).sqrt();
+        let skewness = moment(3, mean) / (count * sigma.powi(3));
+        let excess_kurtosis = moment(4, mean) / (count * sigma.powi(4)) - 3.0;
+        (sigma > 0.0).then_some(Self {
+            counts,
+            count,
+            mean,
+            sigma,
+            skewness,
+            excess_kurtosis,
+        })
+    }
+
+    /// K of the standardised pixels, at 0, `step`, 2 `step`, …
+    fn tabulate(&self, step: f64) -> Vec<Cumulants> {
+        let mut terms: Vec<[f64; 3]> = self
+            .counts
+            .iter()
+            .enumerate()
+            .filter(|&(_, &n)| n > 0.0)
+            .map(|(i, &n)| {
+                let x = (bin_center(i) - self.mean) / self.sigma;
+                [x, n / self.count, (step * x).exp()]
+            })
+            .collect();
+        (0..=STEPS)
+            .map(|_| {
+                let [mut zeroth, mut first, mut second] = [0.0; 3];
+                for [x, part, factor] in &mut terms {
+                    zeroth += *part;
+                    first += *part * *x;
+                    second += *part * *x * *x;
+                    *part *= *factor;
+                }
+                let slope = first / zeroth;
+                [zeroth.ln(), slope, second / zeroth - slope * slope]
+            })
+            .collect()
+    }
+
+    /// The threshold that noise filtered with `kernel` exceeds as often as Gaussian noise exceeds `u`;
+    /// never below `u`. It is in units of the spread that a mesh measures on the filtered noise, or of
+    /// `known_spread` times the filtered noise.
+    pub fn threshold(&self, u: f64, kernel: &Weights, known_spread: Option<f64>) -> f64 {
+        let step = MAX_T * kernel.largest / STEPS as f64;
+        let table = self.tabulate(step);
+        // A small sample lacks the tail that the saddlepoint looks at, but has the skewness.
+        let quantile = |weights: &[(f64, f64)]| {
+            let skewness = sum(weights, 3) * self.skewness;
+            let far = exceeded(&table, step, weights, u)?;
+            Some(far.max(for_skewness(u, skewness)))
+        };
+        let (Some(inside), Some(at_border)) =
+            (quantile(&kernel.inside), quantile(&kernel.at_border))
+        else {
+            return u;
+        };
+        let (cubes, fourths) = (sum(&kernel.inside, 3), sum(&kernel.inside, 4));
+        let (mean, sigma) = match known_spread {
+            Some(spread) => (0.0, spread),
+            None => clipped(cubes * self.skewness, fourths * self.excess_kurtosis),
+        };
+        // The mesh has the mean of the interior; the fewer pixels at the border have another.
+        let shift = self.mean / self.sigma * (sum(&kernel.at_border, 1) - sum(&kernel.inside, 1));
+        let further = (at_border + shift - inside).min(MAX_BORDER_RAISE);
+        let of_border = (kernel.border_part * (u * further).exp_m1()).ln_1p() / u;
+        let raise = (inside + of_border - mean) / sigma - u;
+        // The errors of skewness and kurtosis of a Gaussian sample, by Cornish and Fisher.
+        let per_skewness = (u * u - 1.0) / 6.0;
+        let per_kurtosis = (u.powi(3) - 3.0 * u) / 24.0 - SIGMA_PER_KURTOSIS * u;
+        let of_skewness = per_skewness * cubes * (6.0 / self.count).sqrt();
+        let of_kurtosis = per_kurtosis * fourths * (24.0 / self.count).sqrt();
+        if raise > SIGNIFICANT * of_skewness.hypot(of_kurtosis) {
+            u + raise.min(MAX_RAISE * u)
+        } else {
+            u
+        }
+    }
+}
+
+/// The weights of a filter, each with how often it occurs.
+#[derive(Debug, Clone)]
+pub(super) struct Weights {
+    inside: Vec<(f64, f64)>,
+    at_border: Vec<(f64, f64)>,
+    largest: f64,
+    /// The part of the frame that counts as its border.
+    border_part: f64,
+}
+
+impl Weights {
+    /// The matched filter for a spot, out to `radius`, on the frame `view`.
+    pub fn for_spot(spot_px: f64, radius: usize, view: &View<'_>) -> Self {
+        let profile = centered_profile(spot_px, radius);
+        let axis = |sides: f64| -> Vec<(f64, f64)> {
+            let times = |i: usize| if i == 0 { 1.0 } else { sides };
+            let with_times = profile.iter().enumerate().map(|(i, &p)| (times(i), p));
+            let weights: Vec<(f64, f64)> = with_times.collect();
+            let norm = sum(&weights, 2).sqrt();
+            weights.iter().map(|&(n, w)| (n, w / norm)).collect()
+        };
+        let (whole, half) = (axis(2.0), axis(1.0));
+        let product = |a: &[(f64, f64)], b: &[(f64, f64)]| -> Vec<(f64, f64)> {
+            let row = |&(n, w): &(f64, f64)| b.iter().map(move |&(m, v)| (n * m, w * v));
+            a.iter().flat_map(row).collect()
+        };
+        let inner = |side: usize| 1.0 - 2.0 * BORDER_PX.min(0.5 * side as f64) / side as f64;
+        Self {
+            largest: half[0].1 * whole[0].1,
+            inside: product(&whole, &whole),
+            at_border: product(&half, &whole),
+            border_part: 1.0 - inner(view.width) * inner(view.height),
+        }
+    }
+}
+
+/// Σ n wᵏ.
+fn sum(weights: &[(f64, f64)], power: i32) -> f64 {
+    weights.iter().map(|(n, w)| n * w.powi(power)).sum()
+}
+
+/// Mean and standard deviation that are left of a unit normal sample with some skewness and kurtosis
+/// when it is clipped.
+fn clipped(skewness: f64, excess_kurtosis: f64) -> (f64, f64) {
+    let change =
+        SIGMA_PER_KURTOSIS * excess_kurtosis + SIGMA_PER_SQUARED_SKEWNESS * skewness.powi(2);
+    (
+        MEAN_PER_SKEWNESS * skewness,
+        (1.0 + change).max(LEAST_CLIPPED_SIGMA),
+    )
+}
+
+/// Cornish and Fisher's quantile for a skewness.
+fn for_skewness(u: f64, skewness: f64) -> f64 {
+    u + (u * u - 1.0) / 6.0 * skewness - (2.0 * u.powi(3) - 5.0 * u) / 36.0 * skewness.powi(2)
+}
+
+/// What a sum of standardised pixels with these weights exceeds as often as a Gaussian exceeds `u`;
+/// `None` where the tail ends before.
+fn exceeded(table: &[Cumulants], step: f64, weights: &[(f64, f64)], u: f64) -> Option<f64> {
+    let filtered = |t: f64| -> Cumulants {
+        let mut sum = [0.0; 3];
+        for &(times, weight) in weights {
+            let k = interpolated(table, t * weight / step, step);
+            sum[0] += times * k[0];
+            sum[1] += times * weight * k[1];
+            sum[2] += times * weight * weight * k[2];
+        }
+        sum
+    };
+    // The Gaussian quantile of the tail beyond K'(t).
+    let quantile = |t: f64| {
+        let [k, slope, curvature] = filtered(t);
+        let w = (2.0 * (t * slope - k)).max(1e-9).sqrt();
+        w + (t * curvature.max(1e-9).sqrt() / w).ln() / w
+    };
+    let (mut low, mut high) = (LEAST_T, MAX_T);
+    if quantile(high) < u {
+        return None;
+    }
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (low + high);
+        if quantile(middle) < u {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    Some(filtered(high)[1])
+}
+
+/// The bin of each pixel of a piece of a row; [`BINS`] for NaN and outliers.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn bins_of(row: &[f32], piece: &Piece, bins: &mut [u16]) {
+    let piece = *piece;
+    for (i, (bin, &pixel)) in bins.iter_mut().zip(row).enumerate() {
+        let t = i as i32 as f32;
+        let value = (pixel - (piece.level + t * piece.level_slope))
+            * (piece.inverse + t * piece.inverse_slope);
+        let place = (value + CLIP_SIGMA) * BINS_PER_SIGMA;
+        let inside = place >= 0.0 && place < BINS as f32;
+        *bin = if inside { place } else { BINS as f32 } as i32 as u16;
+    }
+}
+
+fn bin_center(i: usize) -> f64 {
+    (i as f64 + 0.5) / f64::from(BINS_PER_SIGMA) - f64::from(CLIP_SIGMA)
+}
+
+/// K at `at` steps of `step`, by cubics through values and slopes.
+fn interpolated(table: &[Cumulants], at: f64, step: f64) -> Cumulants {
+    let lower = (at as usize).min(table.len() - 2);
+    let f = at - lower as f64;
+    let (a, b) = (table[lower], table[lower + 1]);
+    let (rest, square, rest_square) = (1.0 - f, f * f, (1.0 - f).powi(2));
+    let cubic = |i: usize| {
+        rest_square * (1.0 + 2.0 * f) * a[i]
+            + square * (3.0 - 2.0 * f) * b[i]
+            + step * (f * rest_square * a[i + 1] - square * rest * b[i + 1])
+    };
+    [cubic(0), cubic(1), a[2] + f * (b[2] - a[2])]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, Exp1, StandardNormal};
+
+    fn noise_of(draw: impl Fn(&mut rand_chacha::ChaCha8Rng) -> f64) -> PixelNoise {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let mut histogram = vec![0u32; BINS];
+        for _ in 0..400_000 {
+            let bin = (draw(&mut rng) + f64::from(CLIP_SIGMA)) * f64::from(BINS_PER_SIGMA);
+            if let Some(count) = histogram.get_mut(bin as usize) {
+                *count += 1;
+            }
+        }
+        PixelNoise::of_histogram(&histogram).expect("enough samples")
+    }
+
+    #[test]
+    fn gaussian_noise_raises_nothing_and_exponential_noise_has_the_gamma_tail() {
+        let view = View::new(&[0.0; 10_000], 100, 100);
+        let gaussian = noise_of(|rng| StandardNormal.sample(rng));
+        let kernel = Weights::for_spot(1.0, 3, &view);
+        assert!(gaussian.threshold(4.5, &kernel, Some(1.0)) - 4.5 < 0.03);
+
+        // Sixteen exponential pixels of equal weight make a Gamma of shape 16: Q(16, x) = 3.4e-6,
+        // that of a Gaussian beyond 4.5, at x = 40.74.
+        let exponential = noise_of(|rng| Distribution::<f64>::sample(&Exp1, rng) - 1.0);
+        let step = MAX_T * 0.25 / STEPS as f64;
+        let at = exceeded(&exponential.tabulate(step), step, &[(16.0, 0.25)], 4.5).expect("a tail");
+        assert!((at - (40.74 - 16.0) / 4.0).abs() < 0.1, "{at}");
+    }
+}
