@@ -20,6 +20,8 @@ const TRIANGLE: usize = ONE_SPOT * (ONE_SPOT + 1) / 2;
 pub(super) struct Normal<const N: usize> {
     /// Lower triangle; after [`Self::factorise`] the Cholesky factor.
     pub matrix: [[f64; N]; N],
+    /// One over the factor's diagonal.
+    pub inverse: [f64; N],
     /// Gradient of chi², halved and negative.
     pub right: [f64; N],
     /// Sum of squared residuals over their variance.
@@ -33,6 +35,7 @@ impl<const N: usize> Normal<N> {
     pub fn empty() -> Self {
         Self {
             matrix: [[0.0; N]; N],
+            inverse: [0.0; N],
             right: [0.0; N],
             chi2: 0.0,
             pixels: 0,
@@ -89,8 +92,9 @@ impl<const N: usize> Normal<N> {
                         return i;
                     }
                     matrix[i][i] = rest.sqrt();
+                    self.inverse[i] = 1.0 / matrix[i][i];
                 } else {
-                    matrix[i][j] = rest / matrix[j][j];
+                    matrix[i][j] = rest * self.inverse[j];
                 }
             }
         }
@@ -105,15 +109,27 @@ impl<const N: usize> Normal<N> {
             for k in 0..i {
                 x[i] -= l[i][k] * x[k];
             }
-            x[i] /= l[i][i];
+            x[i] *= self.inverse[i];
         }
         for i in (0..count).rev() {
             for k in i + 1..count {
                 x[i] -= l[k][i] * x[k];
             }
-            x[i] /= l[i][i];
+            x[i] *= self.inverse[i];
         }
         x
+    }
+
+    /// The last of the steps of the first `count` parameters, after [`Self::factorise`].
+    pub fn solve_last(&self, count: usize) -> f64 {
+        let mut x = self.right;
+        for i in 0..count {
+            for k in 0..i {
+                x[i] -= self.matrix[i][k] * x[k];
+            }
+            x[i] *= self.inverse[i];
+        }
+        x[count - 1] * self.inverse[count - 1]
     }
 
     /// The variances of the first `count` parameters, after [`Self::factorise`].
@@ -128,7 +144,7 @@ impl<const N: usize> Normal<N> {
                 for k in column..i {
                     rest -= l[i][k] * x[k];
                 }
-                x[i] = rest / l[i][i];
+                x[i] = rest * self.inverse[i];
                 *variance += x[i] * x[i];
             }
         }
@@ -144,7 +160,7 @@ impl<const N: usize> Normal<N> {
             for k in 0..i {
                 rest -= self.matrix[i][k] * x[k];
             }
-            x[i] = rest / self.matrix[i][i];
+            x[i] = rest * self.inverse[i];
             leverage += x[i] * x[i] * weight;
         }
         leverage
