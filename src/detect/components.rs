@@ -240,14 +240,15 @@ impl Search {
         let lowest = lowest - slack;
         for y in 0..view.height {
             self.row_starts.push(self.pixels.len());
+            let row = view.row(y);
             for (block, &maximum) in filtered.block_maxima(y).iter().enumerate() {
                 if maximum < lowest {
                     continue;
                 }
                 let start = block * BLOCK_PX;
-                let values = &view.row(y)[start..(start + BLOCK_PX).min(view.width)];
-                for (i, &value) in values.iter().enumerate().filter(|(_, v)| **v >= lowest) {
-                    let x = start + i;
+                let end = (start + BLOCK_PX).min(view.width);
+                for x in candidates(&row[start..end], start, lowest) {
+                    let value = row[x];
                     let (level, spread) = mesh.at(x as f32, y as f32);
                     let snr = (value - level) / spread;
                     if snr >= config.threshold {
@@ -452,6 +453,19 @@ impl Search {
     }
 }
 
+/// Columns of the values that reach `lowest`; the first value is in column `start`.
+fn candidates(values: &[f32], start: usize, lowest: f32) -> impl Iterator<Item = usize> + '_ {
+    /// Values compared together: most hold none.
+    const GROUP: usize = 16;
+    let groups = values.chunks(GROUP).enumerate();
+    groups
+        .filter(move |(_, group)| group.iter().fold(false, |any, &v| any | (v >= lowest)))
+        .flat_map(move |(g, group)| {
+            let columns = (start + g * GROUP..).zip(group);
+            columns.filter_map(move |(x, &v)| (v >= lowest).then_some(x))
+        })
+}
+
 /// Groups of at least two peaks, each within `link_px` of another; indices ascending.
 fn chains(peaks: &[Peak], link_px: f32) -> Vec<Vec<usize>> {
     let mut by_row: Vec<u32> = (0..peaks.len() as u32).collect();
@@ -502,9 +516,9 @@ fn is_local_maximum(view: &View<'_>, x: usize, y: usize) -> bool {
     let columns = x.saturating_sub(1)..(x + 2).min(view.width);
     (y.saturating_sub(1)..(y + 2).min(view.height)).all(|r| {
         let row = &view.row(r)[columns.clone()];
-        row.iter().zip(columns.clone()).all(|(&other, c)| {
-            other < value || (other == value && (r, c) >= (y, x))
-        })
+        row.iter()
+            .zip(columns.clone())
+            .all(|(&other, c)| other < value || (other == value && (r, c) >= (y, x)))
     })
 }
 

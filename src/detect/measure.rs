@@ -167,8 +167,7 @@ impl Measurement<'_> {
             .subtract(beyond, &mut work.fitter, &mut work.window);
         let one = work.fitter.fit(&work.window, &fit.spots[..1], &config);
         let mut two = work.fitter.fit(&work.window, &ends, &config);
-        work.fitter
-            .set_flux_noise(&work.window, &mut two, &config);
+        work.fitter.set_flux_noise(&work.window, &mut two, &config);
         let [a, b] = two.spots.first_chunk::<2>().copied()?;
         let is_real = |s: Spot| s.flux > PAIR_MIN_FLUX_SIGMA * s.sigma_flux;
         let separation_px = (a.x - b.x).hypot(a.y - b.y);
