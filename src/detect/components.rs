@@ -14,7 +14,6 @@
 use super::background::Mesh;
 use super::matched_filter::{BLOCK_PX, Filtered};
 use super::view::View;
-use std::collections::HashMap;
 
 /// A maximum must stand this many noise standard deviations above its saddle to count by itself.
 const MIN_PROMINENCE: f32 = 3.0;
@@ -151,6 +150,10 @@ pub(super) struct Search {
     /// Index in `pixels` of the first of each row, and the end.
     row_starts: Vec<usize>,
     parents: Vec<u32>,
+    /// Rank by height of each of `pixels` within its region, where it was needed.
+    ranks: Vec<u32>,
+    /// Index of the peak at each of `pixels`; `u32::MAX` where there is none.
+    peak_at: Vec<u32>,
     /// Peaks, strongest first.
     pub peaks: Vec<Peak>,
     /// All regions.
@@ -237,14 +240,15 @@ impl Search {
         let lowest = lowest - slack;
         for y in 0..view.height {
             self.row_starts.push(self.pixels.len());
+            let row = view.row(y);
             for (block, &maximum) in filtered.block_maxima(y).iter().enumerate() {
                 if maximum < lowest {
                     continue;
                 }
                 let start = block * BLOCK_PX;
-                let values = &view.row(y)[start..(start + BLOCK_PX).min(view.width)];
-                for (i, &value) in values.iter().enumerate().filter(|(_, v)| **v >= lowest) {
-                    let x = start + i;
+                let end = (start + BLOCK_PX).min(view.width);
+                for x in candidates(&row[start..end], start, lowest) {
+                    let value = row[x];
                     let (level, spread) = mesh.at(x as f32, y as f32);
                     let snr = (value - level) / spread;
                     if snr >= config.threshold {
@@ -286,8 +290,14 @@ impl Search {
         parents.clear();
         parents.extend(0..self.pixels.len() as u32);
         for index in 0..self.pixels.len() {
-            for other in self.neighbours(index).take_while(|&other| other < index) {
-                join(&mut parents, index as u32, other as u32);
+            let Pixel { x, y, .. } = self.pixels[index];
+            if index > 0 && self.pixels[index - 1].y == y && self.pixels[index - 1].x + 1 == x {
+                join(&mut parents, index as u32, index as u32 - 1);
+            }
+            if y > 0 {
+                for other in self.in_row(y as usize - 1, x.saturating_sub(1), x + 1) {
+                    join(&mut parents, index as u32, other as u32);
+                }
             }
         }
         self.parents = parents;
@@ -302,25 +312,46 @@ impl Search {
     ) {
         self.regions.clear();
         self.peaks.clear();
+        self.ranks.resize(self.pixels.len(), 0);
+        self.peak_at.clear();
+        self.peak_at.resize(self.pixels.len(), u32::MAX);
         let mut parents = std::mem::take(&mut self.parents);
-        let mut members: Vec<Vec<usize>> = Vec::new();
-        let mut region_of_root: HashMap<u32, usize> = HashMap::new();
-        for index in 0..self.pixels.len() {
-            let root = root_of(&mut parents, index as u32);
-            let region = *region_of_root.entry(root).or_insert(members.len());
-            if region == members.len() {
-                members.push(Vec::new());
+        // The root is the first pixel of its region: regions are numbered in reading order.
+        let mut region_of = vec![0; parents.len()];
+        let mut ends: Vec<usize> = Vec::new();
+        for index in 0..parents.len() {
+            let root = root_of(&mut parents, index as u32) as usize;
+            if root == index {
+                region_of[index] = ends.len();
+                ends.push(0);
+            } else {
+                region_of[index] = region_of[root];
             }
-            members[region].push(index);
+            ends[region_of[index]] += 1;
         }
         self.parents = parents;
-        for (region, members) in members.iter_mut().enumerate() {
+        // Pixels sorted by region, by counting: where each region's next pixel goes, its end at last.
+        let mut start = 0;
+        for end in &mut ends {
+            start += std::mem::replace(end, start);
+        }
+        let mut sorted = vec![0; region_of.len()];
+        for (index, &region) in region_of.iter().enumerate() {
+            sorted[ends[region]] = index;
+            ends[region] += 1;
+        }
+        let mut rest = sorted.as_mut_slice();
+        let mut start = 0;
+        for (region, &end) in ends.iter().enumerate() {
+            let (members, others) = rest.split_at_mut(end - start);
+            (rest, start) = (others, end);
             self.regions.push(self.measure(members));
             let first = self.peaks.len();
             for &index in members.iter() {
                 let Pixel { x, y, snr } = self.pixels[index];
                 let (x, y) = (x as usize, y as usize);
                 if is_local_maximum(view, x, y) {
+                    self.peak_at[index] = self.peaks.len() as u32;
                     self.peaks.push(Peak {
                         x,
                         y,
@@ -333,7 +364,7 @@ impl Search {
                 }
             }
             if self.peaks.len() - first > 1 {
-                self.find_prominences(members, first);
+                self.find_prominences(members);
             }
         }
     }
@@ -344,45 +375,38 @@ impl Search {
         Region::of_points(pixels.map(|p| (f64::from(p.x), f64::from(p.y), f64::from(p.snr))))
     }
 
-    /// Sets the prominences of the peaks from `first` on: floods the region from the top down; where
+    /// Sets the prominences of a region's peaks: floods the region from the top down; where
     /// two floods meet, the lower peak has its saddle.
-    fn find_prominences(&mut self, members: &mut [usize], first: usize) {
+    fn find_prominences(&mut self, members: &mut [usize]) {
         members.sort_unstable_by(|&a, &b| {
             self.pixels[b]
                 .snr
                 .total_cmp(&self.pixels[a].snr)
                 .then(a.cmp(&b))
         });
-        let rank: HashMap<usize, u32> = members
-            .iter()
-            .enumerate()
-            .map(|(r, &index)| (index, r as u32))
-            .collect();
-        let peak_at: HashMap<(usize, usize), usize> = self.peaks[first..]
-            .iter()
-            .enumerate()
-            .map(|(i, p)| ((p.x, p.y), first + i))
-            .collect();
+        let mut ranks = std::mem::take(&mut self.ranks);
+        let mut peaks = std::mem::take(&mut self.peaks);
+        for (r, &index) in members.iter().enumerate() {
+            ranks[index] = r as u32;
+        }
         // Roots are the highest pixel of a flood, since `join` keeps the lower number: the rank.
         let mut floods: Vec<u32> = (0..members.len() as u32).collect();
         for (r, &index) in members.iter().enumerate() {
             let snr = self.pixels[index].snr;
-            let higher: Vec<u32> = self
-                .neighbours(index)
-                .filter_map(|other| rank.get(&other).copied())
-                .filter(|&other| (other as usize) < r)
-                .collect();
-            for other in higher {
+            let higher = self.neighbours(index).map(|other| ranks[other]);
+            for other in higher.filter(|&other| (other as usize) < r) {
                 let (a, b) = (root_of(&mut floods, r as u32), root_of(&mut floods, other));
                 if a != b {
-                    let lower = self.pixels[members[a.max(b) as usize]];
-                    if let Some(&peak) = peak_at.get(&(lower.x as usize, lower.y as usize)) {
-                        self.peaks[peak].prominence = lower.snr - snr;
+                    let lower = members[a.max(b) as usize];
+                    if let Some(peak) = peaks.get_mut(self.peak_at[lower] as usize) {
+                        peak.prominence = self.pixels[lower].snr - snr;
                     }
                     join(&mut floods, a, b);
                 }
             }
         }
+        self.peaks = peaks;
+        self.ranks = ranks;
     }
 
     /// Keeps the peaks that neither noise on a flank nor the wing of a brighter star explains.
@@ -390,8 +414,10 @@ impl Search {
         self.peaks
             .sort_by(|a, b| b.snr.total_cmp(&a.snr).then((a.y, a.x).cmp(&(b.y, b.x))));
         let mut kept: Vec<Peak> = Vec::new();
-        let mut grid: HashMap<(usize, usize), Vec<usize>> = HashMap::new();
         let cell = |p: &Peak| (p.x / WING_REACH_PX, p.y / WING_REACH_PX);
+        let cells = self.peaks.iter().map(cell);
+        let (across, down) = cells.fold((1, 1), |(w, h), (x, y)| (w.max(x + 1), h.max(y + 1)));
+        let mut grid: Vec<Vec<usize>> = vec![Vec::new(); across * down];
         for peak in &self.peaks {
             let relative = if peak.saturated {
                 MIN_SATURATED_PROMINENCE
@@ -404,9 +430,9 @@ impl Search {
                 continue;
             }
             let (cx, cy) = cell(peak);
-            let brighter = (cy.saturating_sub(1)..=cy + 1)
-                .flat_map(|gy| (cx.saturating_sub(1)..=cx + 1).map(move |gx| (gx, gy)))
-                .filter_map(|key| grid.get(&key))
+            let span = cx.saturating_sub(1)..(cx + 2).min(across);
+            let brighter = (cy.saturating_sub(1)..(cy + 2).min(down))
+                .flat_map(|gy| &grid[gy * across + span.start..gy * across + span.end])
                 .flatten();
             let wings: f32 = brighter
                 .map(|&other| wing_of(&kept[other], peak, config))
@@ -416,7 +442,7 @@ impl Search {
             }
             // Only bright stars have wings that can matter.
             if peak.snr * WING_HEIGHT > 0.1 {
-                grid.entry(cell(peak)).or_default().push(kept.len());
+                grid[cy * across + cx].push(kept.len());
             }
             kept.push(*peak);
             if kept.len() >= config.max_peaks {
@@ -427,26 +453,41 @@ impl Search {
     }
 }
 
+/// Columns of the values that reach `lowest`; the first value is in column `start`.
+fn candidates(values: &[f32], start: usize, lowest: f32) -> impl Iterator<Item = usize> + '_ {
+    /// Values compared together: most hold none.
+    const GROUP: usize = 16;
+    let groups = values.chunks(GROUP).enumerate();
+    groups
+        .filter(move |(_, group)| group.iter().fold(false, |any, &v| any | (v >= lowest)))
+        .flat_map(move |(g, group)| {
+            let columns = (start + g * GROUP..).zip(group);
+            columns.filter_map(move |(x, &v)| (v >= lowest).then_some(x))
+        })
+}
+
 /// Groups of at least two peaks, each within `link_px` of another; indices ascending.
 fn chains(peaks: &[Peak], link_px: f32) -> Vec<Vec<usize>> {
-    let cell = |v: usize| (v as f32 / link_px) as i64;
-    let mut grid: HashMap<(i64, i64), Vec<usize>> = HashMap::new();
+    let mut by_row: Vec<u32> = (0..peaks.len() as u32).collect();
+    by_row.sort_unstable_by_key(|&i| peaks[i as usize].y);
     let mut parents: Vec<u32> = (0..peaks.len() as u32).collect();
-    for (index, peak) in peaks.iter().enumerate() {
-        let (cx, cy) = (cell(peak.x), cell(peak.y));
-        let near = (cy - 1..=cy + 1).flat_map(|y| (cx - 1..=cx + 1).map(move |x| (x, y)));
-        for &other in near.filter_map(|key| grid.get(&key)).flatten() {
-            let dx = peaks[other].x as f32 - peak.x as f32;
-            let dy = peaks[other].y as f32 - peak.y as f32;
+    for (rank, &index) in by_row.iter().enumerate() {
+        let peak = &peaks[index as usize];
+        for &other in &by_row[rank + 1..] {
+            let dx = peaks[other as usize].x as f32 - peak.x as f32;
+            let dy = peaks[other as usize].y as f32 - peak.y as f32;
+            if dy > link_px {
+                break;
+            }
             if dx * dx + dy * dy <= link_px * link_px {
-                join(&mut parents, index as u32, other as u32);
+                join(&mut parents, index, other);
             }
         }
-        grid.entry((cx, cy)).or_default().push(index);
     }
     let mut groups: Vec<Vec<usize>> = vec![Vec::new(); peaks.len()];
     for index in 0..peaks.len() {
-        groups[root_of(&mut parents, index as u32) as usize].push(index);
+        let root = root_of(&mut parents, index as u32) as usize;
+        groups[root].push(index);
     }
     groups.retain(|group| group.len() > 1);
     groups
@@ -473,13 +514,12 @@ fn wing_of(bright: &Peak, peak: &Peak, config: &SearchConfig) -> f32 {
 fn is_local_maximum(view: &View<'_>, x: usize, y: usize) -> bool {
     let value = view.at(x, y);
     let columns = x.saturating_sub(1)..(x + 2).min(view.width);
-    let rows = y.saturating_sub(1)..(y + 2).min(view.height);
-    rows.flat_map(|r| columns.clone().map(move |c| (r, c)))
-        .filter(|&at| at != (y, x))
-        .all(|(r, c)| {
-            let other = view.at(c, r);
-            other < value || (other == value && (r, c) > (y, x))
-        })
+    (y.saturating_sub(1)..(y + 2).min(view.height)).all(|r| {
+        let row = &view.row(r)[columns.clone()];
+        row.iter()
+            .zip(columns.clone())
+            .all(|(&other, c)| other < value || (other == value && (r, c) >= (y, x)))
+    })
 }
 
 /// Where the parabolas through a maximum and its neighbours have their tops, from its centre, in pixels.

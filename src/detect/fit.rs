@@ -478,8 +478,8 @@ fn finish<const N: usize>(
     fit.sigma_spot_px = variances[all - 1].sqrt();
     // The size comes last: the leading block of the factor is that of a fit without it.
     if known == all {
-        fit.size_excess_px = normal.solve(all)[all - 1];
-        fit.size_error_px = 1.0 / normal.matrix[all - 1][all - 1];
+        fit.size_excess_px = normal.solve_last(all);
+        fit.size_error_px = normal.inverse[all - 1];
     }
 }
 

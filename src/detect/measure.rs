@@ -293,44 +293,81 @@ impl PeakList<'_> {
 
 /// The peaks near a peak, by a grid.
 struct Neighbours {
+    reach_px: f64,
     cell_px: f64,
-    grid: std::collections::HashMap<(i64, i64), Vec<usize>>,
+    columns: usize,
+    rows: usize,
+    /// Where in `members` each cell starts, and the end.
+    starts: Vec<u32>,
+    members: Vec<u32>,
 }
 
 impl Neighbours {
+    /// More cells along a side than this are of no use, but of peaks far apart there could be many.
+    const MAX_CELLS: f64 = 512.0;
+
     fn new(peaks: &[Peak], reach_px: f64) -> Self {
-        let mut grid: std::collections::HashMap<(i64, i64), Vec<usize>> = Default::default();
-        let cell_px = reach_px.max(1.0);
-        for (index, peak) in peaks.iter().enumerate() {
-            grid.entry(Self::cell(peak, cell_px))
-                .or_default()
-                .push(index);
+        let largest = |side: fn(&Peak) -> usize| peaks.iter().map(side).max().unwrap_or(0) as f64;
+        let (right, bottom) = (largest(|p| p.x), largest(|p| p.y));
+        let cell_px = reach_px.max(1.0).max(right.max(bottom) / Self::MAX_CELLS);
+        let (columns, rows) = (
+            (right / cell_px) as usize + 1,
+            (bottom / cell_px) as usize + 1,
+        );
+        let mut grid = Self {
+            reach_px: reach_px.max(1.0),
+            cell_px,
+            columns,
+            rows,
+            starts: vec![0; columns * rows + 1],
+            members: vec![0; peaks.len()],
+        };
+        let cell_of = |grid: &Self, peak: &Peak| {
+            let (column, row) = grid.cell(peak);
+            row * grid.columns + column
+        };
+        for peak in peaks {
+            let cell = cell_of(&grid, peak);
+            grid.starts[cell] += 1;
         }
-        Self { cell_px, grid }
+        // From counts to ends, which become starts as the cells are filled from behind.
+        let mut end = 0;
+        for start in &mut grid.starts {
+            end += *start;
+            *start = end;
+        }
+        for (index, peak) in peaks.iter().enumerate().rev() {
+            let cell = cell_of(&grid, peak);
+            grid.starts[cell] -= 1;
+            grid.members[grid.starts[cell] as usize] = index as u32;
+        }
+        grid
     }
 
-    fn cell(peak: &Peak, cell_px: f64) -> (i64, i64) {
+    fn cell(&self, peak: &Peak) -> (usize, usize) {
         (
-            (peak.x as f64 / cell_px) as i64,
-            (peak.y as f64 / cell_px) as i64,
+            (peak.x as f64 / self.cell_px) as usize,
+            (peak.y as f64 / self.cell_px) as usize,
         )
     }
 
     /// Indices of the peaks within reach of peak `index`, strongest first, itself left out.
     fn of(&self, peaks: &[Peak], index: usize) -> Vec<usize> {
-        let (cx, cy) = Self::cell(&peaks[index], self.cell_px);
-        let mut found: Vec<usize> = (cy - 1..=cy + 1)
-            .flat_map(|y| (cx - 1..=cx + 1).map(move |x| (x, y)))
-            .filter_map(|cell| self.grid.get(&cell))
-            .flatten()
-            .copied()
-            .filter(|&other| other != index)
-            .filter(|&other| {
+        let (cx, cy) = self.cell(&peaks[index]);
+        let mut found = Vec::new();
+        for row in cy.saturating_sub(1)..(cy + 2).min(self.rows) {
+            let first = row * self.columns + cx.saturating_sub(1);
+            let end = row * self.columns + (cx + 2).min(self.columns);
+            let members = self.starts[first] as usize..self.starts[end] as usize;
+            for other in self.members[members].iter().map(|&m| m as usize) {
                 let dx = peaks[other].x as f64 - peaks[index].x as f64;
                 let dy = peaks[other].y as f64 - peaks[index].y as f64;
-                dx * dx + dy * dy <= self.cell_px * self.cell_px
-            })
-            .collect();
+                let is_near = dx * dx + dy * dy <= self.reach_px * self.reach_px;
+                if is_near && other != index {
+                    found.push(other);
+                }
+            }
+        }
         found.sort_unstable();
         found
     }

@@ -20,6 +20,8 @@ const TRIANGLE: usize = ONE_SPOT * (ONE_SPOT + 1) / 2;
 pub(super) struct Normal<const N: usize> {
     /// Lower triangle; after [`Self::factorise`] the Cholesky factor.
     pub matrix: [[f64; N]; N],
+    /// One over the factor's diagonal.
+    pub inverse: [f64; N],
     /// Gradient of chi², halved and negative.
     pub right: [f64; N],
     /// Sum of squared residuals over their variance.
@@ -33,6 +35,7 @@ impl<const N: usize> Normal<N> {
     pub fn empty() -> Self {
         Self {
             matrix: [[0.0; N]; N],
+            inverse: [0.0; N],
             right: [0.0; N],
             chi2: 0.0,
             pixels: 0,
@@ -77,6 +80,16 @@ impl<const N: usize> Normal<N> {
     /// Cholesky factor in place of the lower triangle; the number of rows done before the matrix was
     /// found not to be positive definite, or `count`.
     pub fn factorise(&mut self, count: usize) -> usize {
+        // With a count known beforehand the loops need not be loops.
+        if count == ONE_SPOT {
+            self.factorise_first(ONE_SPOT)
+        } else {
+            self.factorise_first(count)
+        }
+    }
+
+    #[inline(always)]
+    fn factorise_first(&mut self, count: usize) -> usize {
         let matrix = &mut self.matrix;
         for i in 0..count {
             for j in 0..=i {
@@ -89,8 +102,9 @@ impl<const N: usize> Normal<N> {
                         return i;
                     }
                     matrix[i][i] = rest.sqrt();
+                    self.inverse[i] = 1.0 / matrix[i][i];
                 } else {
-                    matrix[i][j] = rest / matrix[j][j];
+                    matrix[i][j] = rest * self.inverse[j];
                 }
             }
         }
@@ -105,15 +119,27 @@ impl<const N: usize> Normal<N> {
             for k in 0..i {
                 x[i] -= l[i][k] * x[k];
             }
-            x[i] /= l[i][i];
+            x[i] *= self.inverse[i];
         }
         for i in (0..count).rev() {
             for k in i + 1..count {
                 x[i] -= l[k][i] * x[k];
             }
-            x[i] /= l[i][i];
+            x[i] *= self.inverse[i];
         }
         x
+    }
+
+    /// The last of the steps of the first `count` parameters, after [`Self::factorise`].
+    pub fn solve_last(&self, count: usize) -> f64 {
+        let mut x = self.right;
+        for i in 0..count {
+            for k in 0..i {
+                x[i] -= self.matrix[i][k] * x[k];
+            }
+            x[i] *= self.inverse[i];
+        }
+        x[count - 1] * self.inverse[count - 1]
     }
 
     /// The variances of the first `count` parameters, after [`Self::factorise`].
@@ -128,7 +154,7 @@ impl<const N: usize> Normal<N> {
                 for k in column..i {
                     rest -= l[i][k] * x[k];
                 }
-                x[i] = rest / l[i][i];
+                x[i] = rest * self.inverse[i];
                 *variance += x[i] * x[i];
             }
         }
@@ -144,7 +170,7 @@ impl<const N: usize> Normal<N> {
             for k in 0..i {
                 rest -= self.matrix[i][k] * x[k];
             }
-            x[i] = rest / self.matrix[i][i];
+            x[i] = rest * self.inverse[i];
             leverage += x[i] * x[i] * weight;
         }
         leverage
@@ -189,9 +215,9 @@ fn sum_one_spot(
         let by_center = profile(&across.by_center, start);
         let by_sigma = profile(&across.by_sigma, start);
         let columns = (width - start).min(LANES);
-        for (row, pixels_of_row) in data.chunks_exact(width).enumerate() {
-            let mut pixel = [f64::NAN; LANES];
-            pixel[..columns].copy_from_slice(&pixels_of_row[start..start + columns]);
+        let gap = std::array::from_fn(|lane| if lane < columns { 0.0 } else { f64::NAN });
+        for row in 0..data.len() / width {
+            let pixel = pixels_of(&data[row * width + start..], columns, &gap);
             let (d, d_center, d_sigma) = (down.value[row], down.by_center[row], down.by_sigma[row]);
             let mut gradient = [[1.0f64; LANES]; ONE_SPOT];
             let mut weight = [0.0f64; LANES];
@@ -257,9 +283,9 @@ pub(super) fn flux_variance(
         let value = across.value[start..].first_chunk::<LANES>();
         let value = value.copied().unwrap_or([0.0; LANES]);
         let columns = (width - start).min(LANES);
-        for (row, pixels_of_row) in data.chunks_exact(width).enumerate() {
-            let mut pixel = [f64::NAN; LANES];
-            pixel[..columns].copy_from_slice(&pixels_of_row[start..start + columns]);
+        let gap = std::array::from_fn(|lane| if lane < columns { 0.0 } else { f64::NAN });
+        for row in 0..data.len() / width {
+            let pixel = pixels_of(&data[row * width + start..], columns, &gap);
             for lane in 0..LANES {
                 let shape = value[lane] * down.value[row];
                 let light = spot.flux * shape;
@@ -275,6 +301,19 @@ pub(super) fn flux_variance(
     }
     let [ones, shapes, squares] = sums.map(sum_of);
     1.0 / (squares - shapes * shapes / (ones + 1.0 / background_error2))
+}
+
+/// The first `columns` of `data`, and NaN beyond: `gap` is NaN there, else 0.
+#[inline(always)]
+fn pixels_of(data: &[f64], columns: usize, gap: &[f64; LANES]) -> [f64; LANES] {
+    if let Some(pixels) = data.first_chunk::<LANES>() {
+        return std::array::from_fn(|lane| pixels[lane] + gap[lane]);
+    }
+    let mut pixels = [f64::NAN; LANES];
+    for (pixel, &value) in pixels.iter_mut().zip(&data[..columns]) {
+        *pixel = value;
+    }
+    pixels
 }
 
 /// The sum, by halves: one after the other, each would wait for the one before.
