@@ -37,6 +37,11 @@ impl CameraModel {
         }
     }
 
+    /// The model of its distortion, if it has one.
+    pub fn distortion_model(&self) -> Option<DistortionModel> {
+        self.distortion.as_ref().map(Distortion::model)
+    }
+
     /// The frame's centre, ((width − 1) / 2, (height − 1) / 2).
     pub fn centre(&self) -> PixelPoint {
         frame_centre(self.width_px, self.height_px)

@@ -83,6 +83,13 @@ pub(super) const COLUMNS: [Column; COLUMN_COUNT] = [
     Column::new("varTyp", 444, 446),
 ];
 
+impl Cell {
+    /// Where it stands in a record of SKY2000.
+    pub(super) const fn column(self) -> Column {
+        COLUMNS[self as usize]
+    }
+}
+
 /// The columns without which a table is no catalogue.
 pub(super) const REQUIRED: [Cell; 9] = [
     Cell::Id,

@@ -67,7 +67,7 @@ pub fn refine(
             return None;
         }
     }
-    let mut model = hypothesis.camera.distortion.as_ref().map(|d| d.model());
+    let mut model = hypothesis.camera.distortion_model();
     let mut radius_px = start.radius_px;
     let mut current = fitted(field, sky, matches, 0.0, &Guess { hypothesis, model })?;
     let mut model_chosen = false;
@@ -98,12 +98,7 @@ pub fn refine(
 ///
 /// `None` where they do not determine the camera.
 pub fn with_all_stars(field: &StarField, sky: &Sky, settled: &Refined) -> Option<Refined> {
-    let model = settled
-        .hypothesis
-        .camera
-        .distortion
-        .as_ref()
-        .map(|d| d.model());
+    let model = settled.hypothesis.camera.distortion_model();
     let mut predicted = settled.hypothesis.predict(sky, field, &field.stars);
     let mut radius_px = FAINT_RADIUS * agreement_radius_px(&settled.fit);
     let mut current = settled.clone();
