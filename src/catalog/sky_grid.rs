@@ -231,7 +231,8 @@ mod tests {
         radius_rad: f64,
         limit: f32,
     ) -> Vec<u32> {
-        let chord = 2.0 * (radius_rad / 2.0).sin();
+        // Half a turn is the whole sky; beyond it the chord would shrink again.
+        let chord = 2.0 * (radius_rad.min(PI) / 2.0).sin();
         (0..stars.len())
             .map(|i| GridStar::new(i, &stars[i]))
             .filter(|s| s.v_mag <= limit && s.is_within(centre.as_vector(), chord * chord))
