@@ -10,6 +10,8 @@ pub mod frame;
 pub mod identify;
 pub mod pipeline;
 pub mod report;
+pub mod robustness;
+pub mod statistics;
 pub mod units;
 
 #[doc = include_str!("../docs/conventions.md")]

@@ -11,6 +11,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("units", &[]),
     ("coords", &["units"]),
     ("epoch", &[]),
+    ("statistics", &[]),
     ("frame", &["units", "coords"]),
     ("camera", &["units", "coords"]),
     ("catalog", &["units", "coords"]),
@@ -18,7 +19,14 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("attitude", &["units", "coords", "camera"]),
     (
         "identify",
-        &["units", "coords", "camera", "catalog", "attitude"],
+        &[
+            "units",
+            "coords",
+            "camera",
+            "catalog",
+            "attitude",
+            "statistics",
+        ],
     ),
     (
         "pipeline",
@@ -30,6 +38,17 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "report",
         &[
             "units", "coords", "camera", "catalog", "detect", "identify", "pipeline",
+        ],
+    ),
+    (
+        "robustness",
+        &[
+            "units",
+            "coords",
+            "camera",
+            "statistics",
+            "identify",
+            "pipeline",
         ],
     ),
 ];

@@ -44,7 +44,7 @@ impl Photometry {
         match self {
             // Colour, saturation, and the tone curve of a JPEG.
             Self::Instrumental => 2.5,
-            Self::JohnsonV => 0.5,
+            Self::JohnsonV => 1.5,
         }
     }
 }

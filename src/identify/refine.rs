@@ -15,9 +15,9 @@ const RAYLEIGH_MEDIAN: f64 = 1.177_41;
 /// No two stars are told apart by less than this.
 const MIN_RADIUS_PX: f64 = 0.25;
 /// A distortion model is tried where there are so many equations to each parameter.
-const EQUATIONS_PER_PARAMETER: f64 = 2.5;
+const EQUATIONS_PER_PARAMETER: f64 = 4.0;
 /// How much likelier (twice the logarithm) a richer model must make the stars left out of the fit to be taken.
-const WORTH_IT: f64 = 6.0;
+const WORTH_IT: f64 = 12.0;
 /// Halvings of the interval in which the excess is sought: to a ten-thousandth of the largest residual.
 const EXCESS_BISECTIONS: usize = 14;
 /// Distance in standard errors from which on a star pulls no harder.

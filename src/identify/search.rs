@@ -27,21 +27,31 @@ struct Pass {
     stars: usize,
     /// Relative error of a triangle's sides that lens distortion may make.
     tolerance: f64,
+    /// Probability that another observed star agrees with a true hypothesis: some are false, some not in the catalogue.
+    true_witness: f64,
 }
 
-/// First the likely, then the lens that distorts, then the frame with many false stars.
-const PASSES: [Pass; 3] = [
+/// First the likely, then the lens that distorts, then the frame with many false stars, and that with more.
+const PASSES: [Pass; 4] = [
     Pass {
         stars: 12,
         tolerance: 0.0025,
+        true_witness: 0.6,
     },
     Pass {
         stars: 10,
         tolerance: 0.008,
+        true_witness: 0.6,
     },
     Pass {
         stars: 22,
         tolerance: 0.0025,
+        true_witness: 0.35,
+    },
+    Pass {
+        stars: 40,
+        tolerance: 0.0025,
+        true_witness: 0.35,
     },
 ];
 
@@ -49,8 +59,6 @@ const PASSES: [Pass; 3] = [
 const CENTROID_SIGMAS: f64 = 2.0;
 /// Triangles must be so large, in units of the frame's diagonal.
 const MIN_TRIANGLE_SHARE: f64 = 0.12;
-/// Probability that another observed star agrees with a true hypothesis: some are false, some not in the catalogue.
-const TRUE_WITNESS: f64 = 0.6;
 /// A hypothesis is dropped when the other stars make it so unlikely (log likelihood ratio), ...
 const DROP_BELOW: f64 = -3.5;
 /// ... looked into when they make it so likely, ...
@@ -63,9 +71,12 @@ const WITNESS_TOLERANCES: f64 = 1.5;
 const WITNESS_SIGMAS: f64 = 3.5;
 /// When to give up, so that a frame in which there is nothing to find takes well under a second. Fields
 /// that can be identified take a few thousand.
-const MAX_HYPOTHESES: u64 = 400_000;
+pub const MAX_HYPOTHESES: u64 = 400_000;
 /// Hypotheses above this are not reported.
-pub const LOG10_FALSE_ALARM_LIMIT: f64 = -9.0;
+pub const LOG10_FALSE_ALARM_LIMIT: f64 = -8.0;
+/// One below this ends the search. Between the two it waits for the end of its pass, in case that a better one comes: few
+/// and inexact stars may agree with a neighbour of the truth.
+const LOG10_SURE: f64 = -14.0;
 
 /// What the search found.
 pub struct Found {
@@ -87,6 +98,8 @@ pub struct Search<'a> {
     diagonal_px: f64,
     hypotheses: u64,
     best_log10: Option<f64>,
+    /// The best hypothesis that passes without being sure.
+    unsure: Option<Found>,
 }
 
 /// A triangle of observed stars.
@@ -99,6 +112,8 @@ struct Trio {
     tolerance: f64,
     /// How far another star may be from its catalogue star.
     witness_px: f64,
+    /// How likely another star is to agree, see [`Pass`].
+    true_witness: f64,
 }
 
 /// A trio, its corners in the order of its shape, and the focal lengths under which it has that shape.
@@ -152,6 +167,7 @@ impl<'a> Search<'a> {
             diagonal_px: field.width_px.hypot(field.height_px),
             hypotheses: 0,
             best_log10: None,
+            unsure: None,
         }
     }
 
@@ -162,7 +178,9 @@ impl<'a> Search<'a> {
 
     /// Goes through the triangles until a hypothesis passes.
     pub fn run(&mut self) -> Option<Found> {
-        PASSES.iter().find_map(|pass| self.sweep(pass))
+        PASSES
+            .iter()
+            .find_map(|pass| self.sweep(pass).or_else(|| self.unsure.take()))
     }
 
     /// Triangles in the order of their faintest star, then of the second.
@@ -174,7 +192,7 @@ impl<'a> Search<'a> {
                     if self.hypotheses > MAX_HYPOTHESES {
                         return None;
                     }
-                    let trio = self.trio([brightest, middle, faintest], pass.tolerance);
+                    let trio = self.trio([brightest, middle, faintest], pass);
                     if let Some(found) = trio.and_then(|trio| self.try_trio(&trio)) {
                         return Some(found);
                     }
@@ -184,7 +202,7 @@ impl<'a> Search<'a> {
         None
     }
 
-    fn trio(&self, stars: [usize; 3], distortion_tolerance: f64) -> Option<Trio> {
+    fn trio(&self, stars: [usize; 3], pass: &Pass) -> Option<Trio> {
         let [a, b, c] = stars.map(|s| self.offsets[s]);
         let side = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
         let longest_px = side(a, b).max(side(b, c)).max(side(c, a));
@@ -197,14 +215,15 @@ impl<'a> Search<'a> {
             .fold(0.0, f64::max);
         let centroid_tolerance = CENTROID_SIGMAS * sigma_px / longest_px;
         let leverage = 1.0 + 0.5 * self.diagonal_px / longest_px;
-        let distortion_px = WITNESS_TOLERANCES * distortion_tolerance * self.diagonal_px;
+        let distortion_px = WITNESS_TOLERANCES * pass.tolerance * self.diagonal_px;
         Some(Trio {
             stars,
             reach_px: [a, b, c]
                 .iter()
                 .map(|p| p[0].hypot(p[1]))
                 .fold(0.0, f64::max),
-            tolerance: distortion_tolerance.hypot(centroid_tolerance),
+            tolerance: pass.tolerance.hypot(centroid_tolerance),
+            true_witness: pass.true_witness,
             witness_px: distortion_px.hypot(WITNESS_SIGMAS * leverage * sigma_px),
         })
     }
@@ -362,11 +381,11 @@ impl<'a> Search<'a> {
             let chance = self
                 .sky
                 .chance_within(radius_rad, bright, faint)
-                .min(TRUE_WITNESS);
+                .min(trio.true_witness);
             evidence += if seen {
-                (TRUE_WITNESS / chance).ln()
+                (trio.true_witness / chance).ln()
             } else {
-                ((1.0 - TRUE_WITNESS) / (1.0 - chance)).ln()
+                ((1.0 - trio.true_witness) / (1.0 - chance)).ln()
             };
             if !(DROP_BELOW..TAKE_ABOVE).contains(&evidence) {
                 return evidence > 0.0;
@@ -375,7 +394,7 @@ impl<'a> Search<'a> {
         evidence > TAKE_AT_END
     }
 
-    /// Fits the hypothesis to all the stars that agree and computes its false-alarm probability.
+    /// Fits the hypothesis to all the stars that agree and computes its false-alarm probability. Returns it if it is sure.
     fn decide(&mut self, hypothesis: &Hypothesis, trio: &Trio) -> Option<Found> {
         let start = Start {
             hypothesis,
@@ -385,11 +404,21 @@ impl<'a> Search<'a> {
         let richest = Some(DistortionModel::Radial);
         let refined = refine(self.field, TESTED_STARS, self.sky, &start, richest)?;
         let log10 = self.log10_false_alarm(&refined.hypothesis)?;
-        self.best_log10 = Some(self.best_log10.map_or(log10, |best| best.min(log10)));
-        (log10 <= LOG10_FALSE_ALARM_LIMIT).then_some(Found {
+        let is_best = self.best_log10.is_none_or(|best| log10 < best);
+        if is_best {
+            self.best_log10 = Some(log10);
+        }
+        let found = Found {
             refined,
             log10_false_alarm: log10,
-        })
+        };
+        if log10 <= LOG10_SURE {
+            return Some(found);
+        }
+        if is_best && log10 <= LOG10_FALSE_ALARM_LIMIT {
+            self.unsure = Some(found);
+        }
+        None
     }
 
     /// log10 of the false-alarm probability of `hypothesis`, `None` where it contradicts the hints.

@@ -10,13 +10,16 @@
 //! 2000, IJCV 40, 7). The three stars of the triangle that the hypothesis came from agree because it was
 //! looked for, and say nothing; every two parameters fitted beyond pointing, roll and scale use up another star.
 
+use super::search::MAX_HYPOTHESES;
 use super::{ObservedStar, Photometry, Sky, StarField, StarMatch};
 use crate::attitude::POSE_PARAMETERS;
 use crate::camera::CameraModel;
 use crate::catalog::sky_grid::GridStar;
 use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
+use crate::statistics::log10_poisson_binomial_tail;
 use crate::units::RAD_PER_DEG;
 use std::f64::consts::PI;
+use std::ops::Range;
 
 /// Observed stars that are tested, the brightest.
 pub const TESTED_STARS: usize = 60;
@@ -26,10 +29,12 @@ const PREDICTED_PER_OBSERVED: f64 = 1.5;
 const PREDICTED_EXTRA: usize = 5;
 /// Stars that agree by construction.
 const TRIANGLE_STARS: usize = 3;
-/// Radii of agreement tried, in units of the frame's diagonal.
-const RADII: [f64; 6] = [0.0008, 0.0014, 0.0025, 0.0045, 0.008, 0.014];
-/// No radius is below this many pixels.
-const MIN_RADIUS_PX: f64 = 0.7;
+/// Radii of agreement tried: from the smallest, in pixels, by this factor, to this share of the frame's diagonal.
+const SMALLEST_RADIUS_PX: f64 = 0.2;
+const RADIUS_FACTOR: f64 = 1.5;
+const LARGEST_RADIUS_SHARE: f64 = 0.014;
+/// Differences in magnitude tried besides the largest that is tolerated at all.
+const MAG_TOLERANCES: [f64; 3] = [0.25, 0.5, 1.0];
 /// Radius of the neighbourhood whose density of predicted stars counts, in units of the radius of agreement.
 const NEIGHBOURHOOD: f64 = 8.0;
 
@@ -190,59 +195,175 @@ impl Hypothesis {
 
     /// log10 of the expected number of hypotheses as good as this one among `hypotheses` that chance alone
     /// would give: the false-alarm probability where it is small.
+    ///
+    /// Agreement is sought within several radii and several differences in magnitude, and the least likely counts: exact
+    /// positions and magnitudes say more than rough ones. That so many tests are made is paid for.
     pub fn log10_false_alarm(&self, field: &StarField, sky: &Sky, hypotheses: u64) -> f64 {
         let observed = field.brightest(TESTED_STARS);
         let predicted = self.predict(sky, field, observed);
-        let diagonal_px = field.width_px.hypot(field.height_px);
         let used_up = TRIANGLE_STARS + (self.parameters - POSE_PARAMETERS).div_ceil(2);
-        let neighbours = self.squared_distances(field, observed, &predicted);
-        let best = RADII
-            .iter()
-            .map(|share| {
-                let radius_px = (share * diagonal_px).max(MIN_RADIUS_PX);
-                let hits = self.pair_up(observed, &predicted, field.photometry, radius_px);
-                log10_binomial_tail(
-                    observed.len().saturating_sub(used_up),
-                    hits.len().saturating_sub(used_up),
-                    mean_chance(field, &neighbours, radius_px),
-                )
-            })
-            .fold(0.0, f64::min);
-        (best + (search_weight(hypotheses) * RADII.len() as f64).log10()).min(0.0)
+        let radii_px = radii_px(field);
+        let reach_px = NEIGHBOURHOOD * radii_px.last().copied().unwrap_or(0.0);
+        let largest_mag = field.photometry.tolerance_mag();
+        let mut pairs = self.near_pairs(observed, &predicted, (reach_px, largest_mag));
+        let mut best: f64 = 0.0;
+        let mut tests = 0;
+        let tried = MAG_TOLERANCES.iter().filter(|&&mag| mag < largest_mag);
+        for tolerance_mag in tried.copied().chain([largest_mag]).rev() {
+            // From the largest to the smallest: what is not alike at one is not at the next.
+            pairs.retain(|pair| pair.mag <= tolerance_mag);
+            let alike = observed
+                .iter()
+                .map(|star| self.alike(star, &predicted, tolerance_mag).len() as f64)
+                .collect();
+            let mut agreement = Agreement::new(&pairs, alike, predicted.len());
+            for &radius_px in &radii_px {
+                best = best.min(agreement.log10_chance(field, radius_px, used_up));
+                tests += 1;
+            }
+        }
+        (best + (search_weight(hypotheses) * f64::from(tests)).log10()).min(0.0)
     }
 
-    /// For each observed star, the squared distances in px² of the predicted stars of about its brightness.
-    fn squared_distances(
+    /// The part of `predicted`, the brightest first, whose stars are as bright as `star` within a tolerance.
+    fn alike(
         &self,
-        field: &StarField,
+        star: &ObservedStar,
+        predicted: &[PredictedStar],
+        tolerance_mag: f64,
+    ) -> Range<usize> {
+        let v_mag = star.mag + self.zero_point_mag;
+        let v_mag_of = |p: &PredictedStar| f64::from(p.v_mag);
+        let from = predicted.partition_point(|p| v_mag_of(p) < v_mag - tolerance_mag);
+        let to = predicted.partition_point(|p| v_mag_of(p) <= v_mag + tolerance_mag);
+        from..to
+    }
+
+    /// All pairs of an observed and a predicted star within a distance in pixels and a difference in magnitude, the closest
+    /// first.
+    fn near_pairs(
+        &self,
         observed: &[ObservedStar],
         predicted: &[PredictedStar],
-    ) -> Vec<Vec<f64>> {
-        let of_star = |star: &ObservedStar| {
-            let alike =
-                |p: &&PredictedStar| self.mag_difference(star, p, field.photometry).is_some();
-            let squared = |p: &PredictedStar| {
-                (p.pixel.x - star.position.x).powi(2) + (p.pixel.y - star.position.y).powi(2)
-            };
-            predicted.iter().filter(alike).map(squared).collect()
-        };
-        observed.iter().map(of_star).collect()
+        (reach_px, tolerance_mag): (f64, f64),
+    ) -> Vec<NearPair> {
+        let mut pairs = Vec::new();
+        for (observed, star) in observed.iter().enumerate() {
+            for index in self.alike(star, predicted, tolerance_mag) {
+                let candidate = &predicted[index];
+                let apart_px = candidate.pixel.distance_to(&star.position);
+                if apart_px <= reach_px {
+                    pairs.push(NearPair {
+                        observed,
+                        predicted: index,
+                        apart_px,
+                        mag: (f64::from(candidate.v_mag) - star.mag - self.zero_point_mag).abs(),
+                    });
+                }
+            }
+        }
+        pairs.sort_unstable_by(|a, b| {
+            let order = a.apart_px.total_cmp(&b.apart_px);
+            order.then((a.observed, a.predicted).cmp(&(b.observed, b.predicted)))
+        });
+        pairs
     }
 }
 
-/// The mean over the observed stars of the probability that chance puts a predicted star of about the same
-/// brightness within `radius_px`; `neighbours` are the squared distances of such stars from each.
-fn mean_chance(field: &StarField, neighbours: &[Vec<f64>], radius_px: f64) -> f64 {
-    let frame_px = field.width_px * field.height_px;
-    let reach_sq = (NEIGHBOURHOOD * radius_px).powi(2);
-    let chance = |distances_sq: &Vec<f64>| {
-        let near = distances_sq.iter().filter(|&&d| d <= reach_sq).count() as f64;
+/// An observed and a predicted star that are about as bright as each other.
+struct NearPair {
+    observed: usize,
+    predicted: usize,
+    /// Their distance, in pixels.
+    apart_px: f64,
+    /// The difference of their magnitudes, absolute.
+    mag: f64,
+}
+
+/// The radii of agreement that are tried in this field, smallest first.
+fn radii_px(field: &StarField) -> Vec<f64> {
+    let largest_px = LARGEST_RADIUS_SHARE * field.width_px.hypot(field.height_px);
+    std::iter::successors(Some(SMALLEST_RADIUS_PX), |radius| {
+        Some(radius * RADIUS_FACTOR)
+    })
+    .take_while(|&radius| radius <= largest_px)
+    .collect()
+}
+
+/// What agrees within a growing radius.
+struct Agreement<'a> {
+    /// The closest first.
+    pairs: &'a [NearPair],
+    /// For each observed star: the predicted stars that are alike, ...
+    alike: Vec<f64>,
+    /// ... and those of them in the neighbourhood, which are the first `near_pairs` of `pairs`.
+    near: Vec<f64>,
+    near_pairs: usize,
+    observed_taken: Vec<bool>,
+    predicted_taken: Vec<bool>,
+    /// Observed stars with a predicted star of their own within the radius, from the first `hit_pairs` of `pairs`.
+    hits: usize,
+    hit_pairs: usize,
+}
+
+impl<'a> Agreement<'a> {
+    fn new(pairs: &'a [NearPair], alike: Vec<f64>, predicted: usize) -> Self {
+        let observed = alike.len();
+        Self {
+            pairs,
+            alike,
+            near: vec![0.0; observed],
+            near_pairs: 0,
+            observed_taken: vec![false; observed],
+            predicted_taken: vec![false; predicted],
+            hits: 0,
+            hit_pairs: 0,
+        }
+    }
+
+    /// log10 of the probability that chance makes as many stars agree within `radius_px`, which must not be smaller
+    /// than before. So many stars as are `used_up` agree by construction; they count as the least likely ones.
+    fn log10_chance(&mut self, field: &StarField, radius_px: f64, used_up: usize) -> f64 {
+        self.widen(radius_px);
+        let hits = self.hits.saturating_sub(used_up);
+        if hits == 0 {
+            return 0.0;
+        }
+        let frame_px = field.width_px * field.height_px;
+        let mut chances: Vec<f64> = (0..self.alike.len())
+            .map(|observed| self.chance(observed, frame_px, radius_px))
+            .collect();
+        chances.sort_unstable_by(f64::total_cmp);
+        log10_poisson_binomial_tail(&chances[used_up..], hits)
+    }
+
+    fn widen(&mut self, radius_px: f64) {
+        let next_within = |next: usize, radius_px| {
+            let pair = self.pairs.get(next)?;
+            (pair.apart_px <= radius_px).then_some(pair)
+        };
+        while let Some(pair) = next_within(self.near_pairs, NEIGHBOURHOOD * radius_px) {
+            self.near[pair.observed] += 1.0;
+            self.near_pairs += 1;
+        }
+        while let Some(pair) = next_within(self.hit_pairs, radius_px) {
+            let (o, p) = (pair.observed, pair.predicted);
+            if !self.observed_taken[o] && !self.predicted_taken[p] {
+                self.observed_taken[o] = true;
+                self.predicted_taken[p] = true;
+                self.hits += 1;
+            }
+            self.hit_pairs += 1;
+        }
+    }
+
+    /// The probability that chance puts a predicted star that is alike within `radius_px` of an observed one.
+    fn chance(&self, observed: usize, frame_px: f64, radius_px: f64) -> f64 {
         // Less the one that may be its match: what counts is how many others chance could have put there.
-        let crowd_per_px = (near - 1.0) / (PI * reach_sq);
-        let per_px = (distances_sq.len() as f64 / frame_px).max(crowd_per_px);
-        (per_px * PI * radius_px * radius_px).min(1.0)
-    };
-    neighbours.iter().map(chance).sum::<f64>() / neighbours.len().max(1) as f64
+        let crowd = (self.near[observed] - 1.0) / NEIGHBOURHOOD.powi(2);
+        let strewn = self.alike[observed] * PI * radius_px * radius_px / frame_px;
+        strewn.max(crowd).min(1.0)
+    }
 }
 
 /// Pairs what lies within `radius_px` and whose `mag_difference` is tolerable, the most alike first, each star once.
@@ -291,37 +412,10 @@ fn pair_up(
 
 /// What the chance of one hypothesis is multiplied by when it is the last of so many.
 ///
-/// The weights' inverses add up to less than two however long the search goes on, so that the probability
+/// The weights' inverses add up to no more than one over the longest search there is, so that the probability
 /// that any hypothesis at all of a search passes by chance is bounded, and not only that of one.
 fn search_weight(hypotheses: u64) -> f64 {
-    let count = hypotheses.max(1) as f64;
-    count * (1.0 + count.ln()).powi(2)
-}
-
-/// log10 of the probability of `hits` or more successes in `trials` at `chance` each.
-pub fn log10_binomial_tail(trials: usize, hits: usize, chance: f64) -> f64 {
-    if hits == 0 || chance >= 1.0 {
-        return 0.0;
-    }
-    if hits > trials || chance <= 0.0 {
-        return f64::NEG_INFINITY;
-    }
-    let (log_p, log_q) = (chance.ln(), (-chance).ln_1p());
-    let mut log_term = hits as f64 * log_p + (trials - hits) as f64 * log_q;
-    for i in 0..hits {
-        log_term += ((trials - i) as f64).ln() - ((i + 1) as f64).ln();
-    }
-    // The terms after the first, relative to it.
-    let odds = chance / (1.0 - chance);
-    let (mut ratio, mut sum) = (1.0, 1.0);
-    for k in hits..trials {
-        ratio *= (trials - k) as f64 / (k + 1) as f64 * odds;
-        sum += ratio;
-        if ratio < 1e-12 * sum {
-            break;
-        }
-    }
-    ((log_term + sum.ln()) / std::f64::consts::LN_10).min(0.0)
+    hypotheses.max(1) as f64 * (1.0 + (MAX_HYPOTHESES as f64).ln())
 }
 
 #[cfg(test)]
@@ -329,22 +423,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_binomial_tail_is_right_where_it_can_be_summed() {
-        assert_eq!(log10_binomial_tail(10, 0, 0.3), 0.0);
-        assert!((log10_binomial_tail(1, 1, 0.01) + 2.0).abs() < 1e-12);
-        // 1 − 0.9³ for one or more of three.
-        assert!((log10_binomial_tail(3, 1, 0.1) - 0.271f64.log10()).abs() < 1e-12);
-        // Two or three of three: 3·0.1²·0.9 + 0.1³.
-        assert!((log10_binomial_tail(3, 2, 0.1) - 0.028f64.log10()).abs() < 1e-12);
-        assert!((log10_binomial_tail(60, 50, 0.01) + 89.166).abs() < 0.002);
-        assert_eq!(log10_binomial_tail(3, 4, 0.1), f64::NEG_INFINITY);
-    }
-
-    #[test]
-    fn a_search_without_end_has_a_bounded_chance() {
-        let sum: f64 = (1..1_000_000).map(|n| 1.0 / search_weight(n)).sum();
-        assert!(sum < 2.0, "{sum}");
-        assert_eq!(search_weight(0), 1.0);
+    fn a_whole_search_has_a_bounded_chance() {
+        let sum: f64 = (1..=MAX_HYPOTHESES).map(|n| 1.0 / search_weight(n)).sum();
+        assert!(sum <= 1.0, "{sum}");
     }
 
     #[test]

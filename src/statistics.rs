@@ -1,0 +1,98 @@
+//! Probabilities.
+
+/// log10 of the probability of `hits` or more successes in `trials` at `chance` each.
+pub fn log10_binomial_tail(trials: usize, hits: usize, chance: f64) -> f64 {
+    if hits == 0 || chance >= 1.0 {
+        return 0.0;
+    }
+    if hits > trials || chance <= 0.0 {
+        return f64::NEG_INFINITY;
+    }
+    let (log_p, log_q) = (chance.ln(), (-chance).ln_1p());
+    let mut log_term = hits as f64 * log_p + (trials - hits) as f64 * log_q;
+    for i in 0..hits {
+        log_term += ((trials - i) as f64).ln() - ((i + 1) as f64).ln();
+    }
+    // The terms after the first, relative to it.
+    let odds = chance / (1.0 - chance);
+    let (mut ratio, mut sum) = (1.0, 1.0);
+    for k in hits..trials {
+        ratio *= (trials - k) as f64 / (k + 1) as f64 * odds;
+        sum += ratio;
+        if ratio < 1e-12 * sum {
+            break;
+        }
+    }
+    ((log_term + sum.ln()) / std::f64::consts::LN_10).min(0.0)
+}
+
+/// What keeps products of many small chances within the range of numbers: one for each success.
+const SUCCESS_SCALE: f64 = 1e4;
+
+/// log10 of the probability of `hits` or more successes in trials with these `chances`, one each.
+pub fn log10_poisson_binomial_tail(chances: &[f64], hits: usize) -> f64 {
+    if hits == 0 {
+        return 0.0;
+    }
+    if hits > chances.len() {
+        return f64::NEG_INFINITY;
+    }
+    // The probability of each number of successes so far, scaled; the last is that of so many or more.
+    let mut scaled = vec![0.0; hits + 1];
+    scaled[0] = 1.0;
+    for (tried, chance) in chances.iter().enumerate() {
+        let success = chance * SUCCESS_SCALE;
+        let most = hits.min(tried + 1);
+        for successes in (1..=most).rev() {
+            let kept = if successes == hits { 1.0 } else { 1.0 - chance };
+            scaled[successes] = scaled[successes] * kept + scaled[successes - 1] * success;
+        }
+        scaled[0] *= 1.0 - chance;
+    }
+    (scaled[hits].log10() - hits as f64 * SUCCESS_SCALE.log10()).min(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_binomial_tail_is_right_where_it_can_be_summed() {
+        assert_eq!(log10_binomial_tail(10, 0, 0.3), 0.0);
+        assert!((log10_binomial_tail(1, 1, 0.01) + 2.0).abs() < 1e-12);
+        // 1 − 0.9³ for one or more of three.
+        assert!((log10_binomial_tail(3, 1, 0.1) - 0.271f64.log10()).abs() < 1e-12);
+        // Two or three of three: 3·0.1²·0.9 + 0.1³.
+        assert!((log10_binomial_tail(3, 2, 0.1) - 0.028f64.log10()).abs() < 1e-12);
+        assert!((log10_binomial_tail(60, 50, 0.01) + 89.166).abs() < 0.002);
+        assert_eq!(log10_binomial_tail(3, 4, 0.1), f64::NEG_INFINITY);
+    }
+
+    #[test]
+    fn trials_of_equal_chance_are_binomial() {
+        for (trials, hits, chance) in [(3, 1, 0.1), (3, 2, 0.1), (60, 50, 0.01), (57, 57, 1e-6)] {
+            let expected = log10_binomial_tail(trials, hits, chance);
+            let found = log10_poisson_binomial_tail(&vec![chance; trials], hits);
+            assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        }
+    }
+
+    #[test]
+    fn trials_of_unequal_chance_are_summed_over_all_outcomes() {
+        let chances = [0.5, 0.2, 0.01, 0.9];
+        for hits in 0..=5 {
+            let outcomes = (0..16u32).filter(|outcome| outcome.count_ones() as usize >= hits);
+            let probability = |outcome: u32| -> f64 {
+                let of_trial =
+                    |(i, p): (usize, &f64)| if outcome >> i & 1 == 1 { *p } else { 1.0 - p };
+                chances.iter().enumerate().map(of_trial).product()
+            };
+            let expected = outcomes.map(probability).sum::<f64>();
+            let found = 10f64.powf(log10_poisson_binomial_tail(&chances, hits));
+            assert!(
+                (found - expected).abs() < 1e-12,
+                "{hits}: {found} {expected}"
+            );
+        }
+    }
+}
