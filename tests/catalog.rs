@@ -46,7 +46,7 @@ fn from_degrees(ra_deg: f64, dec_deg: f64) -> UnitVector<Icrs> {
 
 fn star(catalog: &Catalog, id: u32) -> (usize, Star) {
     let index = catalog
-        .find(StarId(id))
+        .find(StarId::Skymap(id))
         .expect("the star is in the catalogue");
     (index, catalog.stars()[index])
 }
@@ -322,7 +322,7 @@ fn every_position_agrees_with_the_unit_vector_in_its_record() {
                 .replace(' ', "");
             cell.parse().ok()
         };
-        let id = StarId(number(28, 35).unwrap() as u32);
+        let id = StarId::Skymap(number(28, 35).unwrap() as u32);
         let Ok(index) = by_id.binary_search_by_key(&id, |star| star.id) else {
             continue;
         };
@@ -606,13 +606,18 @@ fn a_table_that_lacks_a_column_or_has_a_bad_row_says_which() {
 
 #[test]
 fn a_catalog_refuses_what_the_compact_form_cannot_hold() {
-    let star = |id| Star::new(StarId(id), from_degrees(10.0, 20.0), 5.0);
+    let star = |id| Star::new(StarId::Skymap(id), from_degrees(10.0, 20.0), 5.0);
     let new = |stars, names| Catalog::new("", stars, names).unwrap_err();
-    let name = |id, text: &str| (StarId(id), text.to_owned());
+    let name = |id, text: &str| (StarId::Skymap(id), text.to_owned());
 
     let error = new(vec![star(1), star(1)], vec![]);
     assert!(
-        matches!(error, CatalogError::DuplicateStar { id: StarId(1) }),
+        matches!(
+            error,
+            CatalogError::DuplicateStar {
+                id: StarId::Skymap(1)
+            }
+        ),
         "{error}"
     );
     for broken in [
@@ -670,7 +675,7 @@ fn any_star() -> impl Strategy<Value = Star> {
             pm_dec_mas_per_yr: f32::from(motion.1.max(-i16::MAX)),
             flags: StarFlags::VARIABLE.union(StarFlags::MULTIPLE),
             ..Star::new(
-                StarId(id),
+                StarId::Skymap(id),
                 from_degrees(0.0, 0.0),
                 f32::from(photometry.0) / 1000.0,
             )

@@ -21,6 +21,7 @@
 
 mod compact;
 mod error;
+mod id;
 mod import;
 mod position;
 mod record;
@@ -31,8 +32,9 @@ mod star;
 mod table;
 
 pub use error::{CatalogError, CompactFault, FaultPlace, RecordFault};
+pub use id::{HipparcosId, StarId, TychoId};
 pub use import::ImportSummary;
-pub use star::{Star, StarFlags, StarId};
+pub use star::{Star, StarFlags};
 
 use std::fs;
 use std::io::{self, Write};

@@ -185,7 +185,7 @@ pub(super) fn parse_name(cell: &[u8]) -> Option<String> {
 fn parse_id(cells: &Cells) -> Result<StarId, Rejection> {
     let expected = "a Skymap number from 1 to 99999999";
     match whole_number(cells, Cell::Id, expected)? {
-        Some(number @ 1..=99_999_999) => Ok(StarId(number)),
+        Some(number @ 1..=99_999_999) => Ok(StarId::Skymap(number)),
         _ => unreadable(Cell::Id, expected),
     }
 }
@@ -389,7 +389,7 @@ mod tests {
     #[test]
     fn a_full_record_becomes_a_star() {
         let star = parse_star(&POLARIS).unwrap();
-        assert_eq!(star.id, StarId(2_480_053));
+        assert_eq!(star.id, StarId::Skymap(2_480_053));
         let (ra_rad, dec_rad) = star.direction.to_ra_dec();
         let ra_deg = (2.0 + 31.0 / 60.0 + 49.0837 / 3600.0) * 15.0;
         let dec_deg = 89.0 + 15.0 / 60.0 + 50.794 / 3600.0;

@@ -1,24 +1,11 @@
 //! One star of the catalogue.
 
+use super::StarId;
 use crate::coords::{Icrs, UnitVector};
 use crate::units::RAD_PER_ARCSEC;
 use nalgebra::Vector3;
-use std::fmt;
 
 const RAD_PER_MAS: f64 = RAD_PER_ARCSEC / 1000.0;
-
-/// The number under which a catalogue knows a star.
-///
-/// Shown as SKY2000 and the papers write a Skymap number: eight digits, `02480053` for Polaris. It
-/// is HHMMnnnn after a right ascension, but not always the star's own: never derive a position from it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct StarId(pub u32);
-
-impl fmt::Display for StarId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:08}", self.0)
-    }
-}
 
 /// What the catalogue warns of about a star: a set of yes-or-no remarks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -75,7 +62,7 @@ impl StarFlags {
 /// One catalogue star, at the catalogue's epoch J2000.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Star {
-    /// The catalogue's own number for the star (Skymap number in SKY2000).
+    /// What the catalogue calls the star.
     pub id: StarId,
     /// Direction at epoch J2000.
     pub direction: UnitVector<Icrs>,
@@ -152,7 +139,7 @@ mod tests {
 
     fn star_at(ra_deg: f64, dec_deg: f64) -> Star {
         let direction = UnitVector::from_ra_dec(ra_deg * RAD_PER_DEG, dec_deg * RAD_PER_DEG);
-        Star::new(StarId(1), direction, 5.0)
+        Star::new(StarId::Skymap(1), direction, 5.0)
     }
 
     #[test]
@@ -177,7 +164,11 @@ mod tests {
     fn a_star_without_motion_stays_and_one_at_the_pole_moves() {
         let still = star_at(10.0, 10.0);
         assert_eq!(still.direction_at(25.0), still.direction);
-        let mut polar = Star::new(StarId(1), UnitVector::from_vector(Vector3::z()), 5.0);
+        let mut polar = Star::new(
+            StarId::Skymap(1),
+            UnitVector::from_vector(Vector3::z()),
+            5.0,
+        );
         polar.pm_dec_mas_per_yr = 1000.0;
         let moved_arcsec = polar.direction_at(5.0).angle_to(&polar.direction) * ARCSEC_PER_RAD;
         assert!((moved_arcsec - 5.0).abs() < TOLERANCE_ARCSEC);
@@ -190,11 +181,5 @@ mod tests {
         assert!(!both.contains(StarFlags::BLENDED_POSITION));
         assert_eq!(StarFlags::from_bits(both.bits()), Some(both));
         assert_eq!(StarFlags::from_bits(0x80), None);
-    }
-
-    #[test]
-    fn a_skymap_number_is_shown_with_eight_digits() {
-        assert_eq!(StarId(2_480_053).to_string(), "02480053");
-        assert_eq!(StarId(14_220_079).to_string(), "14220079");
     }
 }
