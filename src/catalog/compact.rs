@@ -37,8 +37,7 @@
 
 use super::error::{CompactFault, quoted};
 use super::position::GridPosition;
-use super::record::mag_from_mmag;
-use super::star::mmag;
+use super::star::{mag_from_mmag, mmag};
 use super::{Contents, Name, Star, StarFlags, StarId};
 use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64;

@@ -19,21 +19,25 @@
 //! Myers, Sande, Miller, Warren, Tracewell 2001, SKY2000 Catalog, Version 4 (CDS V/109); 2006,
 //! Version 5 (CDS V/145); NASA Goddard Space Flight Center, Flight Dynamics Division.
 
+mod angle;
+mod columns;
 mod compact;
 mod error;
 mod id;
 mod import;
 mod position;
 mod record;
+mod rows;
 pub mod sky2000;
 pub mod sky_grid;
 mod source;
 mod star;
 mod table;
+mod tycho2;
 
 pub use error::{CatalogError, CompactFault, FaultPlace, RecordFault};
 pub use id::{HipparcosId, StarId, TychoId};
-pub use import::ImportSummary;
+pub use import::{ImportSummary, Reading, SourceFile};
 pub use star::{Star, StarFlags};
 
 use std::fs;
@@ -105,7 +109,7 @@ impl Catalog {
     /// [`CatalogError`] if the file cannot be read, is of another kind, or is damaged. Up to 1 % of
     /// records may be unreadable; to learn of them, use [`import_sky2000`].
     pub fn read(path: &Path) -> Result<Self, CatalogError> {
-        source::read(path).map(|(catalog, _)| catalog)
+        read(path).map(|reading| reading.catalog)
     }
 
     /// The catalogue of `stars`, in any order, with `names` for some of them.
@@ -221,21 +225,28 @@ impl Catalog {
     }
 }
 
-/// Reads a source catalogue (SKY2000 records or a table, plain or gzip) and says what became of each record.
+/// The catalogue in the file or directory `path`, as [`Catalog::read`] has it, and what it was made from.
 ///
 /// # Errors
-/// [`CatalogError`] as for [`Catalog::read`]; [`CatalogError::TooManyUnreadable`] if more than 1 % of
-/// the records are unreadable; [`CatalogError::UnknownKind`] also for a compact catalogue, which
-/// holds no records.
-pub fn import_sky2000(path: &Path) -> Result<(Catalog, ImportSummary), CatalogError> {
-    match source::read(path)? {
-        (catalog, Some(summary)) => Ok((catalog, summary)),
-        (_, None) => Err(CatalogError::UnknownKind {
+/// As for [`Catalog::read`].
+pub fn read(path: &Path) -> Result<Reading, CatalogError> {
+    source::read(path)
+}
+
+/// Reads a source catalogue, one that is not compact, and says what became of each record.
+///
+/// # Errors
+/// As for [`Catalog::read`]; [`CatalogError::UnknownKind`] also for a compact catalogue, which holds no records.
+pub fn import(path: &Path) -> Result<Reading, CatalogError> {
+    let reading = read(path)?;
+    if reading.files.is_empty() {
+        return Err(CatalogError::UnknownKind {
             path: path.to_owned(),
             found: "the mark of a compact catalog, which is imported already".to_owned(),
             expected: source::KINDS_IMPORTED,
-        }),
+        });
     }
+    Ok(reading)
 }
 
 fn check_range(star: &Star) -> Result<(), CatalogError> {

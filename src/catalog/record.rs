@@ -4,7 +4,10 @@
 //! the way in. A cell may be padded with blanks before and after the number, and between its sign
 //! and its digits (`"- 0.0135"`); nothing else is let through.
 
+use super::error::{FaultPlace, RecordFault, quoted};
+use super::import::Record;
 use super::position::{GridPosition, STEPS_PER_MAS, STEPS_PER_TENTH_MS_OF_TIME};
+use super::star::mag_from_mmag;
 use super::{Star, StarFlags, StarId};
 
 /// A column of SKY2000: its label, and the bytes it takes up in a fixed-width record.
@@ -117,6 +120,26 @@ pub(super) enum Rejection {
     Unreadable { cell: Cell, expected: &'static str },
 }
 
+/// What the record on `line` is; `place_of` tells where in the line a column stands.
+pub(super) fn parse_record(
+    line: u64,
+    cells: &Cells,
+    place_of: impl Fn(Cell) -> FaultPlace,
+) -> Record {
+    match parse_star(cells) {
+        Ok(star) => Record::Star(star, parse_name(cells[Cell::Name as usize])),
+        Err(Rejection::NoPosition) => Record::NoPosition,
+        Err(Rejection::NoMagnitude) => Record::NoMagnitude,
+        Err(Rejection::Unreadable { cell, expected }) => Record::Unreadable(RecordFault {
+            line,
+            place: place_of(cell),
+            label: COLUMNS[cell as usize].label.to_owned(),
+            found: quoted(cells[cell as usize]),
+            expected,
+        }),
+    }
+}
+
 /// The star in `cells`.
 pub(super) fn parse_star(cells: &Cells) -> Result<Star, Rejection> {
     let id = parse_id(cells)?;
@@ -149,11 +172,6 @@ pub(super) fn parse_star(cells: &Cells) -> Result<Star, Rejection> {
         bv_mag: bv_mmag.map(mag_from_mmag),
         flags,
     })
-}
-
-/// A magnitude in magnitudes: the `f32` nearest to the decimal fraction, as if it had been parsed.
-pub(super) fn mag_from_mmag(mmag: i16) -> f32 {
-    f32::from(mmag) / 1000.0
 }
 
 /// The star's Bayer or Flamsteed name, as in `"1 alp UMi"`, `"25 eta Tau"`, `"tau5 Ser"`.

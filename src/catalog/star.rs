@@ -130,6 +130,16 @@ pub(super) fn mmag(mag: f32) -> i16 {
     (f64::from(mag) * 1000.0).round() as i16
 }
 
+/// A magnitude in magnitudes: the `f32` nearest to the decimal fraction, as if it had been parsed.
+pub(super) fn mag_from_mmag(mmag: i16) -> f32 {
+    f32::from(mmag) / 1000.0
+}
+
+/// A magnitude within ±32, to the thousandth that the compact form knows.
+pub(super) fn mag_on_grid(mag: f64) -> f32 {
+    mag_from_mmag((mag * 1000.0).round() as i16)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
