@@ -22,8 +22,8 @@ fn import(arguments: &ImportArgs) -> anyhow::Result<Exit> {
     catalog.write_compact(&arguments.output)?;
     let mut told = String::new();
     for file in reading.files {
-        told += &format!("{}: {}\n", file.path.display(), file.kind);
-        told += &format!("{}: {}\n", file.path.display(), file.summary);
+        let (path, kind) = (file.path.display(), &file.kind);
+        told += &format!("{path} ({kind}): {}\n", file.summary);
     }
     told += &format!(
         "{}: {}, {}\n",
