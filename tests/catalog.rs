@@ -9,7 +9,7 @@ use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 use proptest::prelude::*;
 use starpipe::catalog::{
-    Catalog, CatalogError, FaultPlace, Star, StarFlags, StarId, import_sky2000, sky2000,
+    Catalog, CatalogError, FaultPlace, ImportSummary, Star, StarFlags, StarId, sky2000,
 };
 use starpipe::coords::{Icrs, UnitVector};
 use starpipe::units::{ARCSEC_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
@@ -31,6 +31,13 @@ fn catalogs() -> PathBuf {
 
 fn sky2000_file() -> Option<PathBuf> {
     shared_dir().map(|shared| shared.join("sky2000/SKYMAP_SKY2000_V5R4.gz"))
+}
+
+/// The catalogue in a single file, and what became of its records.
+fn import(path: &Path) -> Result<(Catalog, ImportSummary), CatalogError> {
+    let mut reading = starpipe::catalog::import(path)?;
+    assert_eq!(reading.files.len(), 1);
+    Ok((reading.catalog, reading.files.remove(0).summary))
 }
 
 fn unpacked(path: &Path) -> Vec<u8> {
@@ -56,7 +63,7 @@ fn star(catalog: &Catalog, id: u32) -> (usize, Star) {
 #[test]
 fn the_built_in_catalog_is_what_the_import_of_its_source_makes() {
     let Some(source) = sky2000_file() else { return };
-    let (imported, summary) = import_sky2000(&source).unwrap();
+    let (imported, summary) = import(&source).unwrap();
     assert_eq!(summary.records, 299_460);
     assert_eq!(summary.stars, 299_458);
     assert_eq!(summary.without_magnitude, [130_228, 242_078]);
@@ -389,6 +396,14 @@ fn line_ends_the_end_of_file_mark_and_gzip_make_no_difference() {
     for content in [
         [&first[..], b"\n", &second].concat(),
         [&first[..], b"\r\n", &second, b"\r\n\x1a"].concat(),
+        // Blanks at the end of the lines cut off.
+        [
+            first.trim_ascii_end(),
+            b"\n",
+            second.trim_ascii_end(),
+            b"\n",
+        ]
+        .concat(),
         [&first[..], b"\r\n", &second, b"\r\n"].concat(),
         gzip(&[&first[..], b"\n", &second, b"\n\x1a"].concat()),
         // Two gzip members in one file, as `cat a.gz b.gz` makes it.
@@ -416,9 +431,9 @@ fn every_record_that_is_no_star_is_counted_with_its_line() {
     lines[9] = record(&[(28, "      10"), (233, "      ")]);
     lines[19] = record(&[(28, "      20"), (119, &" ".repeat(22))]);
     lines[29] = record(&[(28, "      30"), (233, " 2.o0 ")]);
-    lines[39].truncate(519);
+    lines[39].truncate(519); // Ends in a blank: not one of which the blanks were cut off.
     lines[49] = numbered(1);
-    let (catalog, summary) = import_sky2000(&written(&folder, &lines.join(&b'\n'))).unwrap();
+    let (catalog, summary) = import(&written(&folder, &lines.join(&b'\n'))).unwrap();
     assert_eq!(catalog.stars().len(), 295);
     assert_eq!((summary.records, summary.stars), (300, 295));
     assert_eq!(
@@ -431,7 +446,7 @@ fn every_record_that_is_no_star_is_counted_with_its_line() {
         [
             "line 30, byte 233 (Vmag): found \" 2.o0 \", expected magnitudes from -32 to 32, in 0.001 mag",
             "line 40, byte 520: found the end of the line after 519 bytes, expected a record of 520 bytes",
-            "line 50, byte 28 (ID): found \"       1\", expected a number that no record before has",
+            "line 50, byte 28 (ID): found 00000001, expected an identifier that no record before has",
         ]
     );
     assert_eq!(summary.unreadable[0].place, FaultPlace::Byte(233));
@@ -442,13 +457,13 @@ fn more_than_one_percent_unreadable_is_refused_with_the_first_lines() {
     let folder = tempfile::tempdir().unwrap();
     let mut lines: Vec<Vec<u8>> = (1..=99).map(numbered).collect();
     lines[50][128] = b'x';
-    let one_of_99 = import_sky2000(&written(&folder, &lines.join(&b'\n')));
+    let one_of_99 = import(&written(&folder, &lines.join(&b'\n')));
     assert!(matches!(
         one_of_99,
         Err(CatalogError::TooManyUnreadable { .. })
     ));
     lines.push(numbered(100));
-    let (_, summary) = import_sky2000(&written(&folder, &lines.join(&b'\n'))).unwrap();
+    let (_, summary) = import(&written(&folder, &lines.join(&b'\n'))).unwrap();
     assert_eq!(summary.unreadable.len(), 1, "1 of 100 is tolerated");
     for line in &mut lines[1..] {
         line.insert(200, b' ');
@@ -492,7 +507,7 @@ fn a_file_of_no_known_kind_says_what_is_read() {
         &folder,
         &Catalog::new("none", vec![], vec![]).unwrap().to_compact(),
     );
-    let error = import_sky2000(&compact).unwrap_err();
+    let error = import(&compact).unwrap_err();
     assert!(matches!(error, CatalogError::UnknownKind { .. }), "{error}");
     let error = sky2000::write_bright_csv(&compact, 6.5, &folder.path().join("out")).unwrap_err();
     assert!(error.to_string().contains("STARCAT"), "{error}");
@@ -593,7 +608,7 @@ fn a_table_that_lacks_a_column_or_has_a_bad_row_says_which() {
     }
     let text = text.replace("\n7,2,31,", "\n# a comment\n\n7,2,61,");
     let text = text.replace("\n9,2,31,", "\n9,31,");
-    let (_, summary) = import_sky2000(&written(&folder, text.as_bytes())).unwrap();
+    let (_, summary) = import(&written(&folder, text.as_bytes())).unwrap();
     let faults: Vec<String> = summary.unreadable.iter().map(ToString::to_string).collect();
     assert_eq!(
         faults,

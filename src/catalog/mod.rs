@@ -190,12 +190,17 @@ impl Catalog {
         position.ok().map(|position| &*names[position].text)
     }
 
-    /// The catalogue's own designation of the star at `index`: its Skymap number, with eight digits.
+    /// The catalogue's own designation of the star at `index`: its Skymap number, with eight digits, else
+    /// `TYC a-b-c`, `HIP n`, another number, or a name.
     ///
     /// # Panics
     /// If there is no such star.
     pub fn designation(&self, index: usize) -> String {
-        self.stars()[index].id.to_string()
+        let id = self.stars()[index].id;
+        match (id, self.name_of(index)) {
+            (StarId::Named(_), Some(name)) => name.to_owned(),
+            _ => id.to_string(),
+        }
     }
 
     /// The index of the star with the number `id`; looks through the whole catalogue.
