@@ -726,6 +726,16 @@ fn swapped_columns_and_hours_for_degrees_are_found_out() {
         let message = folder.refused(strewn(headings, 300, 15.0).join("\n"));
         assert!(message.contains("name the column ra_hours"), "{message}");
     }
+    // In sixtieths there is no doubt: a strip of the sky, 24 degrees wide.
+    let mut strip = strewn("id,ra,dec,mag", 300, 15.0);
+    for line in &mut strip[1..] {
+        let cells: Vec<&str> = line.split(',').collect();
+        let minutes = cells[1].parse::<f64>().unwrap() * 4.0;
+        let ra = format!("{:02}:{:05.2}", (minutes / 60.0) as u32, minutes % 60.0);
+        *line = [cells[0], &ra, cells[2], cells[3]].join(",");
+    }
+    let ran = folder.import(&folder.write("table", strip.join("\n")));
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
     for (headings, unit_deg) in [("id,ra_hours,dec,mag", 15.0), ("id,ra,dec,mag", 1.0)] {
         let ran = folder.import(&folder.write("table", strewn(headings, 300, unit_deg).join("\n")));
         assert_eq!(ran.status, 0, "{}", ran.stderr);

@@ -12,6 +12,7 @@ use super::star::{StarFlags, mag_on_grid};
 use super::tycho2::johnson;
 use super::{HipparcosId, MAG_LIMIT, PM_LIMIT_MAS_PER_YR, Star, StarId, TychoId};
 use std::ops::RangeInclusive;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Pairs of headings for right ascension and declination, without a unit at their end, the first wanted most.
 const POSITIONS: [(&str, &[&str]); 13] = [
@@ -232,6 +233,8 @@ pub(super) struct Columns {
     b_less_v: Option<usize>,
     motion: Option<Motion>,
     epoch: Epoch,
+    /// An angle was written in sixtieths, so its unit is beyond doubt.
+    sixtieths_seen: AtomicBool,
 }
 
 impl Columns {
@@ -281,6 +284,7 @@ impl Columns {
             b_less_v: column(headings, &B_LESS_V),
             motion: find_motion(headings),
             epoch,
+            sixtieths_seen: AtomicBool::new(false),
         })
     }
 
@@ -330,9 +334,10 @@ impl Columns {
         )
     }
 
-    /// Whether numbers without a unit of their own are taken for degrees of right ascension.
-    pub(super) fn has_decimal_degrees(&self) -> bool {
-        matches!(self.ra.unit, None | Some(Unit::Degrees))
+    /// Whether right ascensions are all decimal numbers taken for degrees.
+    pub(super) fn has_bare_numbers(&self) -> bool {
+        let decimal = !self.sixtieths_seen.load(Ordering::Relaxed);
+        decimal && matches!(self.ra.unit, None | Some(Unit::Degrees))
     }
 
     /// The star in a row's cells.
@@ -432,19 +437,21 @@ fn find_motion(headings: &[Heading]) -> Option<Motion> {
     let bare_sky2000 = column(headings, &["vder"]).is_some() && headings[ra].unit.is_empty();
     let mas = |cell: usize| {
         let unit = headings[cell].unit.replace(['.', ' '], "/");
-        match unit
+        let angle = unit
             .split_once('/')
-            .map_or(unit.as_str(), |(angle, _)| angle)
-        {
-            "arcsec" | "as" | "\"" => (1000.0, false),
-            "s" => (15_000.0, true),
-            _ => (1.0, false),
+            .map_or(unit.as_str(), |(angle, _)| angle);
+        match angle {
+            "" | "mas" => Some((1.0, false)),
+            "arcsec" | "as" | "\"" => Some((1000.0, false)),
+            "s" => Some((15_000.0, true)),
+            // Of another unit nothing is made.
+            _ => None,
         }
     };
     let ((ra_mas, ra_at_pole), (dec_mas, _)) = if bare_sky2000 {
         ((15_000.0, true), (1000.0, false))
     } else {
-        (mas(ra), mas(dec))
+        (mas(ra)?, mas(dec)?)
     };
     Some(Motion {
         ra,
@@ -598,7 +605,12 @@ impl Cells<'_> {
         let Some(text) = self.value(column.cell) else {
             return Ok(None);
         };
-        let degrees = match Angle::parse(text) {
+        let angle = Angle::parse(text);
+        if !matches!(angle, Some(Angle::Decimal(_))) {
+            let seen = &self.columns.sixtieths_seen;
+            seen.fetch_or(angle.is_some(), Ordering::Relaxed);
+        }
+        let degrees = match angle {
             Some(Angle::Decimal(value)) => column.unit.unwrap_or(Unit::Degrees).to_degrees(value),
             // A heading in degrees does not make `05:34:48` degrees: sixtieths of right ascension are hours.
             Some(Angle::Sixtieths(value)) => sixtieths_of.to_degrees(value),

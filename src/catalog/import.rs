@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 ///
 /// SKY2000 and Tycho-2 have none. One in a hundred lets a few damaged lines pass, but not a shifted or foreign format.
 const UNREADABLE_LIMIT_PERCENT: u64 = 1;
-/// So many unreadable records end the reading at once: 1 % of four times Tycho-2.
+/// So many unreadable records end the reading at once, if they are more than that share.
 const UNREADABLE_MAX: usize = 100_000;
 /// So many rows are parsed in one go.
 const ROWS_PER_TASK: usize = 1024;
@@ -163,7 +163,7 @@ impl Tally {
                 .map(|rows| Self::of_some(rows, format))
                 .collect();
             parts.into_iter().for_each(|part| tally.append(part));
-            if tally.summary.unreadable.len() > UNREADABLE_MAX {
+            if tally.summary.unreadable.len() > UNREADABLE_MAX && tally.is_unfit() {
                 break;
             }
         }
@@ -205,11 +205,16 @@ impl Tally {
         self.names.append(&mut other.names);
     }
 
+    /// Whether more records are unreadable than a file may have.
+    pub(super) fn is_unfit(&self) -> bool {
+        let unreadable = self.summary.unreadable.len() as u64;
+        unreadable * 100 > self.summary.records * UNREADABLE_LIMIT_PERCENT
+    }
+
     /// Whether the file can be what it seems to be.
     fn check(&mut self, format: &dyn Format, path: &Path) -> Result<(), CatalogError> {
-        let unreadable = self.summary.unreadable.len() as u64;
         let reason = format.judge(self);
-        if unreadable * 100 > self.summary.records * UNREADABLE_LIMIT_PERCENT {
+        if self.is_unfit() {
             return Err(CatalogError::TooManyUnreadable {
                 path: path.to_owned(),
                 records: self.summary.records,

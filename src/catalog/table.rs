@@ -57,8 +57,6 @@ const SKY2000_POSITION: [Cell; 7] = [
 /// So many stars, over such a range of declinations, cannot all have a right ascension below 24 degrees by chance.
 const HOURS_STARS: usize = 50;
 const HOURS_DEC_RANGE_DEG: f64 = 60.0;
-/// The share of unreadable records that have a declination out of range, above which columns are swapped.
-const SWAPPED_SHARE: f64 = 0.5;
 
 /// A table of which the headings are read.
 pub(super) struct Table {
@@ -241,22 +239,14 @@ impl Format for Table {
         let Roles::Any(columns) = &self.roles else {
             return None;
         };
-        let faults = &tally.summary.unreadable;
-        let beyond_pole = faults
-            .iter()
-            .filter(|fault| fault.expected == EXPECTED_DEC)
-            .count();
-        if beyond_pole as f64
-            > SWAPPED_SHARE * (tally.summary.records as f64).min(faults.len() as f64)
-            && faults.len() as u64 * 100 > tally.summary.records
-        {
+        if tally.is_unfit() && look_swapped(tally) {
             return Some(
-                "declinations beyond the poles: the columns of right ascension and declination seem to \
-                 be swapped, or their headings are"
+                "declinations beyond the poles, and no right ascension beyond them: the columns of right \
+                 ascension and declination seem to be swapped, or their headings are"
                     .to_owned(),
             );
         }
-        let in_hours = columns.has_decimal_degrees() && look_like_hours(&tally.stars);
+        let in_hours = columns.has_bare_numbers() && look_like_hours(&tally.stars);
         in_hours.then(|| {
             "all right ascensions lie between 0 and 24, while the declinations cover the sky: they are \
              hours and not degrees; name the column ra_hours (if they are degrees after all, write them \
@@ -264,6 +254,18 @@ impl Format for Table {
                 .to_owned()
         })
     }
+}
+
+/// Whether what is read as right ascension is declination, and the other way round.
+fn look_swapped(tally: &Tally) -> bool {
+    let faults = &tally.summary.unreadable;
+    let beyond_pole = faults.iter().filter(|fault| fault.expected == EXPECTED_DEC);
+    let most = beyond_pole.count() * 2 > faults.len();
+    // A quarter of a turn east or west of the equinox: as declinations are.
+    most && tally
+        .stars
+        .iter()
+        .all(|star| star.direction.as_vector().x > -1e-9)
 }
 
 /// Whether the right ascensions, read as degrees, are hours.
