@@ -9,7 +9,8 @@ use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 use proptest::prelude::*;
 use starpipe::catalog::{
-    Catalog, CatalogError, FaultPlace, ImportSummary, Star, StarFlags, StarId, sky2000,
+    Catalog, CatalogError, FaultPlace, HipparcosId, ImportSummary, Star, StarFlags, StarId,
+    TychoId, sky2000,
 };
 use starpipe::coords::{Icrs, UnitVector};
 use starpipe::units::{ARCSEC_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
@@ -677,24 +678,31 @@ fn a_catalog_refuses_what_the_compact_form_cannot_hold() {
 
 // ---- Properties
 
+fn any_id() -> impl Strategy<Value = StarId> {
+    let tycho = (1..9538_u32, 1..12_122_u32, 1..5_u32);
+    let component = prop::option::of(b'A'..=b'Z');
+    prop_oneof![
+        (1..99_999_999_u32).prop_map(StarId::Skymap),
+        tycho.prop_map(|(a, b, c)| StarId::Tycho(TychoId::new(a, b, c).unwrap())),
+        (1..120_405_u32, component)
+            .prop_map(|(n, c)| StarId::Hipparcos(HipparcosId::new(n, c).unwrap())),
+        any::<u64>().prop_map(StarId::Number),
+        any::<u32>().prop_map(StarId::Named),
+    ]
+}
+
 /// A star whose values are on the steps of the compact form.
 fn any_star() -> impl Strategy<Value = Star> {
     let place = (0.0..360.0_f64, -89.9..89.9_f64);
     let photometry = (-2000..15_000_i16, prop::option::of(-500..6000_i16));
     let motion = (any::<i16>(), any::<i16>());
-    (1..99_999_999_u32, place, photometry, motion).prop_map(|(id, place, photometry, motion)| {
-        Star {
-            direction: from_degrees(place.0, place.1),
-            bv_mag: photometry.1.map(|mmag| f32::from(mmag) / 1000.0),
-            pm_ra_mas_per_yr: f32::from(motion.0.max(-i16::MAX)),
-            pm_dec_mas_per_yr: f32::from(motion.1.max(-i16::MAX)),
-            flags: StarFlags::VARIABLE.union(StarFlags::MULTIPLE),
-            ..Star::new(
-                StarId::Skymap(id),
-                from_degrees(0.0, 0.0),
-                f32::from(photometry.0) / 1000.0,
-            )
-        }
+    (any_id(), place, photometry, motion).prop_map(|(id, place, photometry, motion)| Star {
+        direction: from_degrees(place.0, place.1),
+        bv_mag: photometry.1.map(|mmag| f32::from(mmag) / 1000.0),
+        pm_ra_mas_per_yr: f32::from(motion.0.max(-i16::MAX)),
+        pm_dec_mas_per_yr: f32::from(motion.1.max(-i16::MAX)),
+        flags: StarFlags::VARIABLE.union(StarFlags::MULTIPLE),
+        ..Star::new(id, from_degrees(0.0, 0.0), f32::from(photometry.0) / 1000.0)
     })
 }
 
@@ -705,6 +713,11 @@ proptest! {
         stars.sort_by_key(|star| star.id);
         stars.dedup_by_key(|star| star.id);
         let names: Vec<_> = stars.iter().step_by(3).map(|star| (star.id, format!("α {}", star.id))).collect();
+        // Once of all kinds, once of Skymap numbers alone, which are written in another way.
+        let skymap: Vec<Star> = stars.iter().filter(|star| matches!(star.id, StarId::Skymap(_))).copied().collect();
+        let only_skymap = Catalog::new("", skymap, vec![]).unwrap();
+        prop_assert_eq!(only_skymap.to_compact()[8], 1);
+        prop_assert_eq!(Catalog::from_compact(&only_skymap.to_compact()).unwrap().checksum(), only_skymap.checksum());
         let catalog = Catalog::new("a title", stars, names).unwrap();
         let encoded = catalog.to_compact();
         let decoded = Catalog::from_compact(&encoded).unwrap();

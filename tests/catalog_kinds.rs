@@ -576,6 +576,25 @@ fn hipparcos_and_gaia_tables_are_read_with_their_own_units_and_epochs() {
     let again = Catalog::from_compact(&reading.catalog.to_compact()).unwrap();
     assert_eq!(again.designation(1), reading.catalog.designation(1));
 
+    // VizieR's computed positions are those of J2000, whatever the epoch of the catalogue's own.
+    let computed =
+        "source_id,_RAJ2000,_DEJ2000,epoch,pmra,pmdec,mag\n1,10.0,60.0,1950.0,1000.0,0.0,9\n";
+    let found = *star(&read(&folder.write("computed", computed)).catalog, "1");
+    assert!(off_arcsec(&found, 10.0, 60.0) < 0.001);
+    // A proper motion in a unit that is not known is none.
+    let parsecs = "id,ra,dec,pmra (pc),pmdec (pc),mag\n1,10.0,60.0,1000.0,0.0,9\n";
+    let reading = read(&folder.write("parsecs", parsecs));
+    assert!(
+        reading.files[0].kind.contains("no proper motion"),
+        "{}",
+        reading.files[0].kind
+    );
+    assert!(
+        reading.catalog.stars()[0]
+            .flags
+            .contains(StarFlags::NO_PROPER_MOTION)
+    );
+
     let tycho = "TYC1\tTYC2\tTYC3\tRAmdeg\tDEmdeg\tBTmag\tVTmag\n3124\t2056\t1\t286.0069477\t40.11621858\t9.842\t7.929\n";
     let found = *star(
         &read(&folder.write("tycho", tycho)).catalog,

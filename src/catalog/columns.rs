@@ -21,7 +21,7 @@ const POSITIONS: [(&str, &[&str]); 13] = [
     ("ra_j2000", &["dec_j2000", "de_j2000"]),
     ("ra2000", &["dec2000", "de2000"]),
     ("ra_epoch2000", &["dec_epoch2000"]),
-    ("ram", &["dem"]),
+    ("ramdeg", &["demdeg"]),
     ("ra_icrs", &["de_icrs", "dec_icrs"]),
     ("raicrs", &["deicrs", "decicrs"]),
     ("ra", &["dec", "de"]),
@@ -240,7 +240,7 @@ pub(super) struct Columns {
 impl Columns {
     /// What the columns under `headings` are. `note_of` gives what the file says of the column with a heading.
     ///
-    /// Fails with what is missing; with everything that is if neither position nor magnitude is there.
+    /// Fails with what is missing.
     pub(super) fn find(
         headings: &[Heading],
         note_of: impl Fn(&str) -> Option<String>,
@@ -265,9 +265,11 @@ impl Columns {
             return Err(missing);
         };
         let note = note_of(&headings[ra.cell].text).unwrap_or_default();
+        // VizieR computes this one for J2000, whatever the epoch of the catalogue's own.
+        let computed = headings[ra.cell].label == POSITIONS[0].0;
         let epoch = match column(headings, &EPOCHS) {
-            Some(cell) => Epoch::Column(cell),
-            None => Epoch::Year(epoch_in(&note).unwrap_or(J2000_YEAR)),
+            Some(cell) if !computed => Epoch::Column(cell),
+            _ => Epoch::Year(epoch_in(&note).unwrap_or(J2000_YEAR)),
         };
         let name = column(headings, &["name", "proper"]).filter(|cell| !id.contains(cell));
         Ok(Self {

@@ -501,6 +501,34 @@ mod tests {
         expect_fault(&sealed(with(flags + 9, 0xff)), "a name in UTF-8");
     }
 
+    #[test]
+    fn identifiers_of_other_kinds_are_checked_too() {
+        let direction = UnitVector::from_ra_dec(1.0, 0.5);
+        let stars = [7, 1 << 40].map(|n| Star::new(StarId::Number(n), direction, 2.0));
+        let good = Catalog::new("", stars.to_vec(), vec![])
+            .unwrap()
+            .to_compact();
+        assert_eq!(decode(&good).unwrap().stars.len(), 2);
+        let with = |at: usize, value: u8| {
+            let mut bytes = good.clone();
+            bytes[at] = value;
+            sealed(bytes)
+        };
+        expect_fault(&with(HEADER_BYTES, 5), "identifiers of 5 bytes");
+        expect_fault(&with(HEADER_BYTES, 4), "the end of a file of");
+        expect_fault(
+            &with(HEADER_BYTES + 4, 9),
+            "an identifier of kind 9 and value 7",
+        );
+        expect_fault(
+            &with(HEADER_BYTES + 5, 0),
+            "an identifier of kind 0 and value 1099511627776",
+        );
+        for keep in 0..good.len() {
+            assert!(decode(&good[..keep]).is_err());
+        }
+    }
+
     proptest! {
         #[test]
         fn any_bytes_are_refused_without_a_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {

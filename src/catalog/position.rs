@@ -2,7 +2,7 @@
 //!
 //! SKY2000 gives right ascension in steps of 0.0001 s (1.5 mas) and declination in steps of 1 mas;
 //! half a milliarcsecond divides both, so a position goes through [`GridPosition`] without loss, and
-//! a turn (2 592 000 000 steps) still fits 32 bits. Every reader makes its directions here, so the
+//! a turn (2 592 000 000 steps) still fits 32 bits; other catalogues are rounded to it. Every reader makes its directions here, so the
 //! same star has the same direction, to the last bit, whichever file it came from.
 
 use crate::coords::{Icrs, UnitVector};

@@ -4,7 +4,8 @@
 //! of each record. A line ends with LF or CR LF; a last byte 0x1A (end of file, of old) is let pass.
 //!
 //! The reading is strict, because columns abut: a record of any other length, or one that does not
-//! begin with `SKY2000`, is unreadable, and more than 1 % of those mean another format.
+//! begin with `SKY2000`, is unreadable, and more than 1 % of those mean another format. Only blanks
+//! at a line's end may be cut off, as some tools do.
 //! A record that is whole but has no V magnitude or no position is no star, and counted apart.
 
 use super::error::{FaultPlace, RecordFault, quoted};

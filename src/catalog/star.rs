@@ -18,11 +18,12 @@ impl StarFlags {
     pub const BLENDED_POSITION: Self = Self(1);
     /// The V magnitude is that of two or more stars together (SKY2000 `f_Vmag`).
     pub const BLENDED_MAGNITUDE: Self = Self(1 << 1);
-    /// A double or multiple star with a measured separation (SKY2000 `sep`).
+    /// A double or multiple star with a measured separation (SKY2000 `sep`), or one of a pair of which
+    /// Tycho-2 has the photocentre.
     pub const MULTIPLE: Self = Self(1 << 2);
     /// A variable star, or one suspected of it (SKY2000 `varTyp` or `Vname`).
     pub const VARIABLE: Self = Self(1 << 3);
-    /// The V magnitude was derived from other magnitudes (SKY2000 `Vder`), not observed.
+    /// The V magnitude was derived from other magnitudes (SKY2000 `Vder`, Tycho-2, Gaia), not observed.
     pub const DERIVED_MAGNITUDE: Self = Self(1 << 4);
     /// The proper motion is unknown; it is given as zero.
     pub const NO_PROPER_MOTION: Self = Self(1 << 5);
