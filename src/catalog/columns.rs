@@ -240,7 +240,7 @@ pub(super) struct Columns {
 impl Columns {
     /// What the columns under `headings` are. `note_of` gives what the file says of the column with a heading.
     ///
-    /// Fails with what is missing.
+    /// Fails with what is missing, or with an empty list if the table does not seem to be one of stars.
     pub(super) fn find(
         headings: &[Heading],
         note_of: impl Fn(&str) -> Option<String>,
@@ -249,6 +249,9 @@ impl Columns {
         let magnitude = find_magnitude(headings);
         let id = find_id(headings);
         let mut missing = Vec::new();
+        if position.is_none() && magnitude.is_none() {
+            return Err(missing);
+        }
         if id.is_none() {
             missing.push("of identifiers (id, name, hip, tyc, source_id, ...)");
         }

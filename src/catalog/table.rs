@@ -134,14 +134,14 @@ impl Table {
                     .map(|(label, unit)| Heading::new(label, unit))
                     .collect();
                 let note_of = |label: &str| notes.get(label).cloned();
-                Roles::Any(Box::new(Columns::find(&headings, note_of).map_err(
-                    |lacking| match lacking.len() {
-                        // Not one of the three: no table of stars.
-                        3 => unknown_kind(path, text),
-                        2 if lacking[0].contains("ascension") => unknown_kind(path, text),
-                        _ => missing(lacking),
-                    },
-                )?))
+                let columns = Columns::find(&headings, note_of);
+                Roles::Any(Box::new(columns.map_err(|lacking| {
+                    if lacking.is_empty() {
+                        unknown_kind(path, text)
+                    } else {
+                        missing(lacking)
+                    }
+                })?))
             }
         };
         Ok(Self {
