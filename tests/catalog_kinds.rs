@@ -435,6 +435,15 @@ fn the_supplement_is_brought_to_j2000_and_read_together_with_the_main_catalogue(
     assert_eq!(star(&catalog, "HIP 12318B").v_mag, 10.511);
     assert_eq!(star(&catalog, "TYC 49-1674-1").bv_mag, Some(0.985));
 
+    // Without its blanks the supplement looks like the other one; it is read all the same.
+    fs::remove_file(folder.path().join("suppl_1.dat.gz")).unwrap();
+    fs::remove_file(folder.path().join("suppl_2.dat")).unwrap();
+    fs::remove_file(folder.path().join("out.cat")).unwrap();
+    let cut: Vec<&str> = TYCHO2_SUPPLEMENT_1.lines().map(str::trim_end).collect();
+    folder.write("suppl_1.dat", cut.join("\n"));
+    assert_eq!(read(folder.path()).catalog.stars().len(), 11);
+
+    folder.write("suppl_2.dat", TYCHO2_SUPPLEMENT_2);
     let alone = folder.import(&folder.path().join("suppl_2.dat"));
     assert_eq!(
         alone.status, 0,

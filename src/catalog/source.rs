@@ -149,17 +149,26 @@ fn read_part(path: &Path, source: Source) -> Result<Part, CatalogError> {
 /// The catalogue in a directory: all files of Tycho-2, or the one file of another kind.
 fn read_directory(path: &Path) -> Result<Reading, CatalogError> {
     let (mut tycho2, mut others, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
+    let mut has_supplement_1 = false;
     for file in files_in(path)? {
         let source = Source::open(&file)?;
         match source.kind() {
             Kind::Tycho2(Tycho2::Supplement2) => left_out.push(file),
-            Kind::Tycho2(_) => tycho2.push(file),
-            Kind::Compact | Kind::Sky2000 => others.push(file),
-            Kind::Table if Table::open(&mut Rows::new(source.reader), &file).is_ok() => {
-                others.push(file);
+            Kind::Tycho2(part) => {
+                has_supplement_1 |= part == Tycho2::Supplement1;
+                tycho2.push(file);
             }
-            Kind::Table => {}
+            Kind::Compact | Kind::Sky2000 => others.push(file),
+            Kind::Table => match Table::open(&mut Rows::new(source.reader), &file) {
+                Ok(_) => others.push(file),
+                Err(error @ CatalogError::Read { .. }) => return Err(error),
+                Err(_) => {}
+            },
         }
+    }
+    if !has_supplement_1 {
+        // Without the blanks at its line ends the first supplement is as wide as the second.
+        tycho2.append(&mut left_out);
     }
     if let ([], [only]) = (&*tycho2, &*others) {
         return read(only);

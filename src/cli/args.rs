@@ -186,10 +186,10 @@ pub(crate) enum CatalogCommand {
         starpipe catalog import SKYMAP_SKY2000_V5R4.gz --vmag-limit 8 -o bright.cat\n  \
         starpipe catalog import tycho2/ -o tycho2.cat\n  \
         starpipe catalog import hipparcos.tsv -o hipparcos.cat\n\n\
-        Kinds, plain or gzip, found out from the content: SKY2000 records; the files of Tycho-2 (tyc2.dat*,\n\
-        suppl_1.dat), one or a directory of them; tables, CSV or TSV, with a heading for each of identifier (id,\n\
-        hip, tyc, source_id, name, ...), position (ra and dec, raj2000 and dej2000, ra_hours, ... in degrees or\n\
-        as 05:34:48.0), magnitude (vmag, mag, vtmag, phot_g_mean_mag, ...) and, where there are such, proper\n\
+        Kinds, plain or gzip, found out from the content: SKY2000 records; the files of Tycho-2 (tyc2.dat*, \
+        suppl_1.dat), one or a directory of them; tables, CSV or TSV, with a heading for each of identifier (id, \
+        hip, tyc, source_id, name, ...), position (ra and dec, raj2000 and dej2000, ra_hours, ... in degrees or \
+        as 05:34:48.0), magnitude (vmag, mag, vtmag, phot_g_mean_mag, ...) and, where there are such, proper \
         motion (pmra, pmdec in mas a year) and epoch (ref_epoch).")]
     Import(ImportArgs),
 }
