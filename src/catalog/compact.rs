@@ -1,16 +1,16 @@
-//! The compact form: a whole catalogue in 21 bytes a star, decoded in milliseconds.
+//! The compact form: a whole catalogue in 21 or 22 bytes a star, decoded in milliseconds.
 //!
 //! All numbers are little-endian. In order, without gaps (n stars, m names):
 //!
 //! | Bytes | Content |
 //! |---|---|
 //! | 8 | [`MAGIC`] |
-//! | 4 | [`VERSION`], `u32` |
+//! | 4 | version, `u32`: 1 or 2 |
 //! | 4, 4 | n and m, `u32` each |
 //! | 4, 4 | bytes of the title and of all name texts, `u32` each |
 //! | 8 | epoch of the positions, Julian year, `f64` |
 //! | … | title, UTF-8 |
-//! | 4 n | number of the star, `u32` |
+//! | 4 n | Skymap number, `u32` (version 1); or identifier, see below (version 2) |
 //! | 4 n | right ascension, 0.5 mas, `u32` |
 //! | 4 n | declination, 0.5 mas, `i32` |
 //! | 2 n | proper motion in right ascension times cos(declination), mas a year, `i16` |
@@ -23,6 +23,12 @@
 //! | … | the names, UTF-8, one after the other |
 //! | 8 | XXH3-64 of everything before, `u64` |
 //!
+//! A catalogue of Skymap numbers alone is written as version 1. In version 2 there stands, in place of
+//! the numbers: how many bytes a value has, `u32`, 4 or 8; n bytes, the kind of each star's identifier
+//! (0 Skymap, 1 Tycho, 2 Hipparcos, 3 another number, 4 none but the name); n values. A Tycho value is
+//! the region, star and component in 14, 14 and 4 bits, a Hipparcos value the number and 8 bits for
+//! the component's letter.
+//!
 //! Columns rather than records: they pack better under gzip, and what is checked is checked a column
 //! at a time. Stars are ordered by (V, number), so the stars down to a magnitude are a prefix.
 //!
@@ -31,18 +37,21 @@
 
 use super::error::{CompactFault, quoted};
 use super::position::GridPosition;
-use super::record::mag_from_mmag;
-use super::star::mmag;
+use super::star::{mag_from_mmag, mmag};
 use super::{Contents, Name, Star, StarFlags, StarId};
+use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// The first bytes of every compact catalogue; not text, so that it is never taken for a table.
 pub(super) const MAGIC: [u8; 8] = *b"\x89STARCAT";
-/// The version that is written, and the only one that is read.
-const VERSION: u32 = 1;
+/// The version of catalogues in which every identifier is a Skymap number.
+const VERSION_SKYMAP: u32 = 1;
+/// The version of all others.
+const VERSION_ANY_ID: u32 = 2;
 
 const HEADER_BYTES: usize = 36;
-const BYTES_PER_STAR: u64 = 21;
+/// Without the identifier.
+const BYTES_PER_STAR: u64 = 17;
 const BYTES_PER_NAME: u64 = 5;
 const CHECKSUM_BYTES: usize = 8;
 const UNKNOWN_COLOR_MMAG: i16 = i16::MIN;
@@ -55,21 +64,22 @@ pub(super) fn encode(contents: &Contents) -> Vec<u8> {
 
     let mut out = Vec::with_capacity(HEADER_BYTES + stars.len() * 21 + text_bytes + 64);
     out.extend(MAGIC);
-    out.extend(VERSION.to_le_bytes());
+    let ids = Ids::of(stars);
+    out.extend(ids.version().to_le_bytes());
     for n in [stars.len(), names.len(), contents.title.len(), text_bytes] {
         out.extend(count(n).to_le_bytes());
     }
     out.extend(contents.epoch_year.to_le_bytes());
     out.extend(contents.title.as_bytes());
 
+    ids.encode(stars, &mut out);
     let positions: Vec<GridPosition> = stars
-        .iter()
+        .par_iter()
         .map(|star| GridPosition::nearest(&star.direction))
         .collect();
     let mut column_u32 = |values: &mut dyn Iterator<Item = u32>| {
         values.for_each(|value| out.extend(value.to_le_bytes()));
     };
-    column_u32(&mut stars.iter().map(|star| star.id.0));
     column_u32(&mut positions.iter().map(|position| position.ra_steps()));
     column_u32(
         &mut positions
@@ -133,7 +143,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Contents, CompactFault> {
     let title = input
         .text(header.title_bytes, "a title in UTF-8")?
         .to_owned();
-    let stars = decode_stars(&mut input, header.stars)?;
+    let stars = decode_stars(&mut input, &header)?;
     let names = decode_names(&mut input, &header)?;
     Ok(Contents {
         title,
@@ -143,7 +153,88 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Contents, CompactFault> {
     })
 }
 
+/// How identifiers are written.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Ids {
+    Skymap,
+    Any { value_bytes: usize },
+}
+
+impl Ids {
+    /// The shortest way for `stars`.
+    fn of(stars: &[Star]) -> Self {
+        let raw = || stars.iter().map(|star| star.id.to_raw());
+        if raw().all(|(kind, _)| kind == 0) {
+            return Self::Skymap;
+        }
+        let short = raw().all(|(_, value)| u32::try_from(value).is_ok());
+        Self::Any {
+            value_bytes: if short { 4 } else { 8 },
+        }
+    }
+
+    fn version(self) -> u32 {
+        match self {
+            Self::Skymap => VERSION_SKYMAP,
+            Self::Any { .. } => VERSION_ANY_ID,
+        }
+    }
+
+    /// The bytes of `count` identifiers.
+    fn length(self, count: usize) -> u64 {
+        match self {
+            Self::Skymap => 4 * count as u64,
+            Self::Any { value_bytes } => 4 + (1 + value_bytes as u64) * count as u64,
+        }
+    }
+
+    fn encode(self, stars: &[Star], out: &mut Vec<u8>) {
+        let mut value_bytes = 4;
+        if let Self::Any { value_bytes: bytes } = self {
+            value_bytes = bytes;
+            out.extend((bytes as u32).to_le_bytes());
+            out.extend(stars.iter().map(|star| star.id.to_raw().0));
+        }
+        for star in stars {
+            out.extend(&star.id.to_raw().1.to_le_bytes()[..value_bytes]);
+        }
+    }
+
+    fn decode(self, input: &mut Input, count: usize) -> Result<Vec<StarId>, CompactFault> {
+        let Self::Any { value_bytes } = self else {
+            let numbers = input.column::<4>(count).iter();
+            return Ok(numbers
+                .map(|&number| StarId::Skymap(u32::from_le_bytes(number)))
+                .collect());
+        };
+        input.take::<4>();
+        let kinds_at = input.at;
+        let kinds = input.column::<1>(count);
+        let values: Vec<u64> = if value_bytes == 4 {
+            let values = input.column::<4>(count).iter();
+            values.map(|&v| u64::from(u32::from_le_bytes(v))).collect()
+        } else {
+            let values = input.column::<8>(count).iter();
+            values.map(|&v| u64::from_le_bytes(v)).collect()
+        };
+        let pairs = kinds.iter().zip(values).enumerate();
+        pairs
+            .map(
+                |(i, (&[kind], value))| match StarId::from_raw(kind, value) {
+                    Some(id) => Ok(id),
+                    None => fault(
+                        kinds_at + i,
+                        format!("an identifier of kind {kind} and value {value}"),
+                        "a kind from 0 to 4, and a value that it can have",
+                    ),
+                },
+            )
+            .collect()
+    }
+}
+
 struct Header {
+    ids: Ids,
     stars: usize,
     names: usize,
     title_bytes: usize,
@@ -165,14 +256,20 @@ impl Header {
             at: MAGIC.len(),
         };
         let version = u32::from_le_bytes(input.take());
-        if version != VERSION {
-            let expected = format!("version {VERSION}");
+        if ![VERSION_SKYMAP, VERSION_ANY_ID].contains(&version) {
+            let expected = format!("version {VERSION_SKYMAP} or {VERSION_ANY_ID}");
             return fault(MAGIC.len(), format!("version {version}"), expected);
         }
         let [stars, names, title_bytes, text_bytes] =
             [(); 4].map(|()| u32::from_le_bytes(input.take()) as usize);
         let epoch_year = f64::from_le_bytes(input.take());
+        let ids = if version == VERSION_SKYMAP {
+            Ids::Skymap
+        } else {
+            Self::id_width(bytes, HEADER_BYTES + title_bytes)?
+        };
         Ok(Self {
+            ids,
             stars,
             names,
             title_bytes,
@@ -181,8 +278,21 @@ impl Header {
         })
     }
 
+    /// How many bytes an identifier's value has; the number stands at `at`.
+    fn id_width(bytes: &[u8], at: usize) -> Result<Ids, CompactFault> {
+        let Some(width) = bytes.get(at..).and_then(<[u8]>::first_chunk) else {
+            return fault(bytes.len(), "the end of the file", "a title");
+        };
+        match u32::from_le_bytes(*width) {
+            4 => Ok(Ids::Any { value_bytes: 4 }),
+            8 => Ok(Ids::Any { value_bytes: 8 }),
+            other => fault(at, format!("identifiers of {other} bytes"), "4 or 8 bytes"),
+        }
+    }
+
     fn check_length(&self, bytes: &[u8]) -> Result<(), CompactFault> {
         let expected = (HEADER_BYTES + CHECKSUM_BYTES) as u64
+            + self.ids.length(self.stars)
             + self.stars as u64 * BYTES_PER_STAR
             + self.names as u64 * BYTES_PER_NAME
             + self.title_bytes as u64
@@ -209,8 +319,9 @@ fn check_checksum(bytes: &[u8]) -> Result<(), CompactFault> {
     fault(payload.len(), found, expected)
 }
 
-fn decode_stars(input: &mut Input, count: usize) -> Result<Vec<Star>, CompactFault> {
-    let ids = input.column::<4>(count);
+fn decode_stars(input: &mut Input, header: &Header) -> Result<Vec<Star>, CompactFault> {
+    let count = header.stars;
+    let ids = header.ids.decode(input, count)?;
     let (ra_at, ras) = (input.at, input.column::<4>(count));
     let decs = input.column::<4>(count);
     let pm_ras = input.column::<2>(count);
@@ -220,15 +331,15 @@ fn decode_stars(input: &mut Input, count: usize) -> Result<Vec<Star>, CompactFau
     let (flags_at, flags) = (input.at, input.column::<1>(count));
 
     let mut stars = Vec::with_capacity(count);
-    let mut previous = (i16::MIN, 0);
+    let mut previous = None;
     for i in 0..count {
-        let id = u32::from_le_bytes(ids[i]);
+        let id = ids[i];
         let v_mmag = i16::from_le_bytes(vs[i]);
-        if i > 0 && previous >= (v_mmag, id) {
+        if previous >= Some((v_mmag, id)) {
             let expected = "stars ordered by magnitude, then number";
             return fault(v_at + 2 * i, format!("star {i} out of order"), expected);
         }
-        previous = (v_mmag, id);
+        previous = Some((v_mmag, id));
         let (ra_steps, dec_steps) = (u32::from_le_bytes(ras[i]), i32::from_le_bytes(decs[i]));
         let Some(position) = GridPosition::new(ra_steps, dec_steps) else {
             let found = format!("star {i} at ({ra_steps}, {dec_steps})");
@@ -240,7 +351,7 @@ fn decode_stars(input: &mut Input, count: usize) -> Result<Vec<Star>, CompactFau
         };
         let bv_mmag = i16::from_le_bytes(colors[i]);
         stars.push(Star {
-            id: StarId(id),
+            id,
             direction: position.direction(),
             pm_ra_mas_per_yr: f32::from(i16::from_le_bytes(pm_ras[i])),
             pm_dec_mas_per_yr: f32::from(i16::from_le_bytes(pm_decs[i])),
@@ -330,10 +441,15 @@ mod tests {
     fn small() -> Catalog {
         let star = |id: u32, v_mag: f32| {
             let direction = UnitVector::from_ra_dec(f64::from(id), 0.5);
-            Star::new(StarId(id), direction, v_mag)
+            Star::new(StarId::Skymap(id), direction, v_mag)
         };
         let stars = vec![star(3, 2.0), star(1, 4.5), star(2, 2.0), star(9, -1.44)];
-        Catalog::new("test stars", stars, vec![(StarId(2), "bet Tst".to_owned())]).unwrap()
+        Catalog::new(
+            "test stars",
+            stars,
+            vec![(StarId::Skymap(2), "bet Tst".to_owned())],
+        )
+        .unwrap()
     }
 
     /// `bytes` with a checksum that fits, to reach the checks behind it.
@@ -369,7 +485,8 @@ mod tests {
             bytes
         };
         expect_fault(&with(0, b'x'), "the mark");
-        expect_fault(&with(8, 2), "version 2");
+        expect_fault(&with(8, 3), "version 3");
+        expect_fault(&with(8, 2), "identifiers of");
         expect_fault(&with(12, 200), "200 stars");
         expect_fault(&with(40, b'x'), "checksum");
         let title = HEADER_BYTES + "test stars".len();
@@ -382,6 +499,34 @@ mod tests {
         expect_fault(&sealed(with(flags + 8, 200)), "bytes more");
         expect_fault(&sealed(with(flags + 8, 2)), "no name lays claim to");
         expect_fault(&sealed(with(flags + 9, 0xff)), "a name in UTF-8");
+    }
+
+    #[test]
+    fn identifiers_of_other_kinds_are_checked_too() {
+        let direction = UnitVector::from_ra_dec(1.0, 0.5);
+        let stars = [7, 1 << 40].map(|n| Star::new(StarId::Number(n), direction, 2.0));
+        let good = Catalog::new("", stars.to_vec(), vec![])
+            .unwrap()
+            .to_compact();
+        assert_eq!(decode(&good).unwrap().stars.len(), 2);
+        let with = |at: usize, value: u8| {
+            let mut bytes = good.clone();
+            bytes[at] = value;
+            sealed(bytes)
+        };
+        expect_fault(&with(HEADER_BYTES, 5), "identifiers of 5 bytes");
+        expect_fault(&with(HEADER_BYTES, 4), "the end of a file of");
+        expect_fault(
+            &with(HEADER_BYTES + 4, 9),
+            "an identifier of kind 9 and value 7",
+        );
+        expect_fault(
+            &with(HEADER_BYTES + 5, 0),
+            "an identifier of kind 0 and value 1099511627776",
+        );
+        for keep in 0..good.len() {
+            assert!(decode(&good[..keep]).is_err());
+        }
     }
 
     proptest! {

@@ -69,8 +69,9 @@ pub enum CatalogError {
     },
     /// So many records are unreadable that the file cannot be what it seems to be.
     #[error(
-        "{}: {} of {records} records are unreadable, at most {limit_percent} % are tolerated; the first: {}",
-        path.display(), faults.len(), first_of(faults)
+        "{}: {}{} of {records} records are unreadable, at most {limit_percent} % are tolerated; the first: {}",
+        path.display(), reason.as_ref().map_or(String::new(), |reason| format!("{reason}; ")),
+        faults.len(), first_of(faults)
     )]
     TooManyUnreadable {
         /// The file.
@@ -81,6 +82,24 @@ pub enum CatalogError {
         limit_percent: u64,
         /// Every unreadable record so far.
         faults: Vec<RecordFault>,
+        /// What is probably wrong, where that can be told.
+        reason: Option<String>,
+    },
+    /// The records can be read one by one, but together they cannot be right.
+    #[error("{}: {reason}", path.display())]
+    Doubtful {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and what to do.
+        reason: String,
+    },
+    /// A directory holds no catalogue, or more than one.
+    #[error("{}: {found}; expected a directory with the files of Tycho-2 or one other catalog", path.display())]
+    Directory {
+        /// The directory.
+        path: PathBuf,
+        /// What is in it.
+        found: String,
     },
     /// No record has both a position and a magnitude.
     #[error("{}: no star with a position and a magnitude among {records} records", path.display())]
@@ -164,7 +183,7 @@ pub struct RecordFault {
     /// Where in the line.
     pub place: FaultPlace,
     /// The label of the column at fault; empty if the line as a whole is.
-    pub label: &'static str,
+    pub label: String,
     /// What stands there.
     pub found: String,
     /// What should stand there.

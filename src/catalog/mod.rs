@@ -1,38 +1,64 @@
 //! The star catalogue: what is known of each star, and which stars are near a direction.
 //!
-//! A catalogue file (compact, SKY2000 records, a table with SKY2000's column labels) → [`Catalog`].
+//! A catalogue of any kind (below) → [`Catalog`].
 //!
 //! Conventions: positions are ICRS at epoch J2000.0; proper motions are in milliarcseconds a year,
 //! that in right ascension along the circle (times cos(declination)); magnitudes are Johnson V.
-//! Stars are ordered brightest first, ties by number, so the stars down to a magnitude are a prefix.
+//! Stars are ordered brightest first, ties by identifier, so the stars down to a magnitude are a prefix.
 //!
 //! 1. [`Catalog::built_in`] decodes SKY2000 from inside the program: nothing to install.
-//! 2. [`Catalog::read`] takes any file, whose kind is found from its content, not its name.
-//! 3. [`import_sky2000`] reads a source file and tells what became of each record.
+//! 2. [`Catalog::read`] takes any file or directory, whose kind is found from its content, not its name.
+//! 3. [`read`] and [`import()`] tell besides what became of each record.
 //! 4. [`Catalog::write_compact`] and [`sky2000::write_bright_csv`] write what others then read.
+//!
+//! # Kinds
+//! All may be packed with gzip.
+//!
+//! - The compact form: what is read fastest.
+//! - SKY2000, version 4 or 5, in fixed-width records of 520 bytes.
+//! - Tycho-2 as the CDS distributes it, `tyc2.dat` (whole or in parts) and the supplements: one file, or a directory, of
+//!   which all parts and supplement 1 are read together. Supplement 2, of stars that are probably none, is
+//!   read only if it is asked for by name.
+//! - A table with SKY2000's column labels, as [`sky2000::write_bright_csv`] or VizieR write it.
+//! - Any other table with a line of headings, columns in any order, separated by commas, semicolons, bars or tabs: an identifier
+//!   (`id`, `hip`, `tyc`, `source_id`, `name`, …), a position (`ra` and `dec`, `raj2000` and `dej2000`, …; degrees, hours where the
+//!   heading or a line of units says so, or text like `05:34:48.0`, `05 34 48.0`, `05h34m48.0s`), a magnitude (Johnson V
+//!   before VT before any other) and, where there are such, proper motion (`pmra`, `pmdec`) and epoch
+//!   (`ref_epoch`, `epoch`, or what VizieR's comments say). [`SourceFile::kind`] tells which column was taken for what.
+//! - A directory with one file of any other kind.
+//!
+//! A record that is whole but has no position or no magnitude is no star; one that cannot be read, or repeats an identifier, is
+//! unreadable. Both are counted, and a file of which more than 1 % is unreadable is refused.
 //!
 //! Caveats: SKY2000 is complete to V ≈ 8.5 for all purposes, to 9 for most, and half complete at
 //! V = 10. Its Skymap number is an opaque key, which in one star of a hundred disagrees with the position.
-//! A star's V may be that of a pair ([`StarFlags::BLENDED_MAGNITUDE`]).
+//! A star's V may be that of a pair ([`StarFlags::BLENDED_MAGNITUDE`]). Magnitudes of other systems
+//! than Johnson's are near V, not V ([`StarFlags::DERIVED_MAGNITUDE`]).
 //!
 //! # Reference
 //! Myers, Sande, Miller, Warren, Tracewell 2001, SKY2000 Catalog, Version 4 (CDS V/109); 2006,
 //! Version 5 (CDS V/145); NASA Goddard Space Flight Center, Flight Dynamics Division.
 
+mod angle;
+mod columns;
 mod compact;
 mod error;
+mod id;
 mod import;
 mod position;
 mod record;
+mod rows;
 pub mod sky2000;
 pub mod sky_grid;
 mod source;
 mod star;
 mod table;
+mod tycho2;
 
 pub use error::{CatalogError, CompactFault, FaultPlace, RecordFault};
-pub use import::ImportSummary;
-pub use star::{Star, StarFlags, StarId};
+pub use id::{HipparcosId, StarId, TychoId};
+pub use import::{ImportSummary, Reading, SourceFile};
+pub use star::{Star, StarFlags};
 
 use std::fs;
 use std::io::{self, Write};
@@ -92,18 +118,13 @@ impl Catalog {
         })
     }
 
-    /// The catalogue in the file `path`, plain or compressed with gzip, whose kind is found from its content:
-    ///
-    /// - a compact catalogue, as [`Catalog::write_compact`] writes it;
-    /// - SKY2000, version 4 or 5, in fixed-width records of 520 bytes;
-    /// - a table with SKY2000's labels as headings, as [`sky2000::write_bright_csv`] or VizieR write
-    ///   it: separated by commas, semicolons, bars or tabs, columns in any order.
+    /// The catalogue in the file or directory `path`, whose [kind](self#kinds) is found from its content.
     ///
     /// # Errors
-    /// [`CatalogError`] if the file cannot be read, is of another kind, or is damaged. Up to 1 % of
-    /// records may be unreadable; to learn of them, use [`import_sky2000`].
+    /// [`CatalogError`] if it cannot be read, is of another kind, or is damaged. Up to 1 % of
+    /// records may be unreadable; to learn of them, use [`read`].
     pub fn read(path: &Path) -> Result<Self, CatalogError> {
-        source::read(path).map(|(catalog, _)| catalog)
+        read(path).map(|reading| reading.catalog)
     }
 
     /// The catalogue of `stars`, in any order, with `names` for some of them.
@@ -184,12 +205,17 @@ impl Catalog {
         position.ok().map(|position| &*names[position].text)
     }
 
-    /// The catalogue's own designation of the star at `index`: its Skymap number, with eight digits.
+    /// The catalogue's own designation of the star at `index`: its Skymap number, with eight digits, else
+    /// `TYC a-b-c`, `HIP n`, another number, or a name.
     ///
     /// # Panics
     /// If there is no such star.
     pub fn designation(&self, index: usize) -> String {
-        self.stars()[index].id.to_string()
+        let id = self.stars()[index].id;
+        match (id, self.name_of(index)) {
+            (StarId::Named(_), Some(name)) => name.to_owned(),
+            _ => id.to_string(),
+        }
     }
 
     /// The index of the star with the number `id`; looks through the whole catalogue.
@@ -219,21 +245,28 @@ impl Catalog {
     }
 }
 
-/// Reads a source catalogue (SKY2000 records or a table, plain or gzip) and says what became of each record.
+/// The catalogue in the file or directory `path`, as [`Catalog::read`] has it, and what it was made from.
 ///
 /// # Errors
-/// [`CatalogError`] as for [`Catalog::read`]; [`CatalogError::TooManyUnreadable`] if more than 1 % of
-/// the records are unreadable; [`CatalogError::UnknownKind`] also for a compact catalogue, which
-/// holds no records.
-pub fn import_sky2000(path: &Path) -> Result<(Catalog, ImportSummary), CatalogError> {
-    match source::read(path)? {
-        (catalog, Some(summary)) => Ok((catalog, summary)),
-        (_, None) => Err(CatalogError::UnknownKind {
+/// As for [`Catalog::read`].
+pub fn read(path: &Path) -> Result<Reading, CatalogError> {
+    source::read(path)
+}
+
+/// Reads a source catalogue, one that is not compact, and says what became of each record.
+///
+/// # Errors
+/// As for [`Catalog::read`]; [`CatalogError::UnknownKind`] also for a compact catalogue, which holds no records.
+pub fn import(path: &Path) -> Result<Reading, CatalogError> {
+    let reading = read(path)?;
+    if reading.files.is_empty() {
+        return Err(CatalogError::UnknownKind {
             path: path.to_owned(),
             found: "the mark of a compact catalog, which is imported already".to_owned(),
             expected: source::KINDS_IMPORTED,
-        }),
+        });
     }
+    Ok(reading)
 }
 
 fn check_range(star: &Star) -> Result<(), CatalogError> {

@@ -2,7 +2,7 @@
 //!
 //! SKY2000 gives right ascension in steps of 0.0001 s (1.5 mas) and declination in steps of 1 mas;
 //! half a milliarcsecond divides both, so a position goes through [`GridPosition`] without loss, and
-//! a turn (2 592 000 000 steps) still fits 32 bits. Every reader makes its directions here, so the
+//! a turn (2 592 000 000 steps) still fits 32 bits; other catalogues are rounded to it. Every reader makes its directions here, so the
 //! same star has the same direction, to the last bit, whichever file it came from.
 
 use crate::coords::{Icrs, UnitVector};
@@ -17,6 +17,7 @@ pub(super) const STEPS_PER_TENTH_MS_OF_TIME: u32 = 3;
 /// Steps in 1 mas.
 pub(super) const STEPS_PER_MAS: u32 = 2;
 
+const STEPS_PER_DEG: f64 = STEPS_PER_TURN as f64 / 360.0;
 const RAD_PER_STEP: f64 = TAU / STEPS_PER_TURN as f64;
 
 /// Right ascension in [0, `STEPS_PER_TURN`) and declination within ±`STEPS_PER_QUARTER`, both in half milliarcseconds.
@@ -33,6 +34,16 @@ impl GridPosition {
         valid.then_some(Self {
             ra_steps,
             dec_steps,
+        })
+    }
+
+    /// The position nearest to a right ascension and a declination in degrees, or `None` if that is beyond a pole.
+    pub(super) fn from_degrees(ra_deg: f64, dec_deg: f64) -> Option<Self> {
+        let ra_steps = (ra_deg.rem_euclid(360.0) * STEPS_PER_DEG).round() as u32 % STEPS_PER_TURN;
+        let within = dec_deg.abs() <= 90.0;
+        within.then_some(Self {
+            ra_steps,
+            dec_steps: (dec_deg * STEPS_PER_DEG).round() as i32,
         })
     }
 

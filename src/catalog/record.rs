@@ -4,7 +4,10 @@
 //! the way in. A cell may be padded with blanks before and after the number, and between its sign
 //! and its digits (`"- 0.0135"`); nothing else is let through.
 
+use super::error::{FaultPlace, RecordFault, quoted};
+use super::import::Record;
 use super::position::{GridPosition, STEPS_PER_MAS, STEPS_PER_TENTH_MS_OF_TIME};
+use super::star::mag_from_mmag;
 use super::{Star, StarFlags, StarId};
 
 /// A column of SKY2000: its label, and the bytes it takes up in a fixed-width record.
@@ -117,6 +120,26 @@ pub(super) enum Rejection {
     Unreadable { cell: Cell, expected: &'static str },
 }
 
+/// What the record on `line` is; `place_of` tells where in the line a column stands.
+pub(super) fn parse_record(
+    line: u64,
+    cells: &Cells,
+    place_of: impl Fn(Cell) -> FaultPlace,
+) -> Record {
+    match parse_star(cells) {
+        Ok(star) => Record::Star(star, parse_name(cells[Cell::Name as usize])),
+        Err(Rejection::NoPosition) => Record::NoPosition,
+        Err(Rejection::NoMagnitude) => Record::NoMagnitude,
+        Err(Rejection::Unreadable { cell, expected }) => Record::Unreadable(RecordFault {
+            line,
+            place: place_of(cell),
+            label: COLUMNS[cell as usize].label.to_owned(),
+            found: quoted(cells[cell as usize]),
+            expected,
+        }),
+    }
+}
+
 /// The star in `cells`.
 pub(super) fn parse_star(cells: &Cells) -> Result<Star, Rejection> {
     let id = parse_id(cells)?;
@@ -151,11 +174,6 @@ pub(super) fn parse_star(cells: &Cells) -> Result<Star, Rejection> {
     })
 }
 
-/// A magnitude in magnitudes: the `f32` nearest to the decimal fraction, as if it had been parsed.
-pub(super) fn mag_from_mmag(mmag: i16) -> f32 {
-    f32::from(mmag) / 1000.0
-}
-
 /// The star's Bayer or Flamsteed name, as in `"1 alp UMi"`, `"25 eta Tau"`, `"tau5 Ser"`.
 ///
 /// SKY2000's ten bytes are a Flamsteed number (3), a Greek letter (3), its superscript (1) and a
@@ -185,7 +203,7 @@ pub(super) fn parse_name(cell: &[u8]) -> Option<String> {
 fn parse_id(cells: &Cells) -> Result<StarId, Rejection> {
     let expected = "a Skymap number from 1 to 99999999";
     match whole_number(cells, Cell::Id, expected)? {
-        Some(number @ 1..=99_999_999) => Ok(StarId(number)),
+        Some(number @ 1..=99_999_999) => Ok(StarId::Skymap(number)),
         _ => unreadable(Cell::Id, expected),
     }
 }
@@ -389,7 +407,7 @@ mod tests {
     #[test]
     fn a_full_record_becomes_a_star() {
         let star = parse_star(&POLARIS).unwrap();
-        assert_eq!(star.id, StarId(2_480_053));
+        assert_eq!(star.id, StarId::Skymap(2_480_053));
         let (ra_rad, dec_rad) = star.direction.to_ra_dec();
         let ra_deg = (2.0 + 31.0 / 60.0 + 49.0837 / 3600.0) * 15.0;
         let dec_deg = 89.0 + 15.0 / 60.0 + 50.794 / 3600.0;

@@ -4,15 +4,18 @@
 //! of each record. A line ends with LF or CR LF; a last byte 0x1A (end of file, of old) is let pass.
 //!
 //! The reading is strict, because columns abut: a record of any other length, or one that does not
-//! begin with `SKY2000`, is unreadable, and more than 1 % of those mean another format.
+//! begin with `SKY2000`, is unreadable, and more than 1 % of those mean another format. Only blanks
+//! at a line's end may be cut off, as some tools do.
 //! A record that is whole but has no V magnitude or no position is no star, and counted apart.
 
 use super::error::{FaultPlace, RecordFault, quoted};
-use super::import::Importer;
-use super::record::{COLUMN_COUNT, COLUMNS, Cell, Cells, Column};
-use super::source::{Lines, Source};
-use super::{CatalogError, ImportSummary, Star, write_whole};
-use std::io::{self, BufRead};
+use super::import::{Format, Record, Tally};
+use super::record::{self, COLUMN_COUNT, COLUMNS, Cell, Cells, Column};
+use super::rows::{Row, Rows};
+use super::source::Source;
+use super::{CatalogError, ImportSummary, write_whole};
+use std::borrow::Cow;
+use std::io::{self, Read};
 use std::path::Path;
 
 /// The length of a record without its line end, in bytes.
@@ -21,6 +24,8 @@ pub const RECORD_BYTES: usize = 520;
 /// What the file, and every record (as far as its seventh byte), begins with.
 const MARK: &[u8] = b"SKY2000 J";
 const MARK_BYTES: usize = 7;
+/// A record without its blanks at the end goes at least as far: to the end of B−V.
+const ESSENTIAL_BYTES: usize = 264;
 
 /// The columns of the bright CSV, in the order of the source.
 const BRIGHT_COLUMNS: [Column; 26] = [
@@ -74,7 +79,7 @@ pub fn write_bright_csv(
     if !is_fixed_width(&opened.head) {
         return Err(CatalogError::UnknownKind {
             path: source.to_owned(),
-            found: quoted(&opened.head),
+            found: quoted(&opened.head[..opened.head.len().min(MARK.len())]),
             expected: "SKY2000 records of 520 bytes, plain or gzip",
         });
     }
@@ -87,16 +92,28 @@ pub fn write_bright_csv(
     let labels = BRIGHT_COLUMNS.map(|column| column.label);
     rows.write_record(labels).map_err(write_error)?;
 
-    let mut importer = Importer::new(source);
-    read_records(opened.reader, &mut importer, |star, record| {
-        if !star.is_brighter_than(v_mag_limit) {
-            return Ok(());
-        }
-        row_count += 1;
-        let values = BRIGHT_COLUMNS.map(|column| unpadded(column.cut(record)));
-        rows.write_record(&values).map_err(write_error)
+    let mut content = Vec::new();
+    let mut reader = opened.reader;
+    let read = reader.read_to_end(&mut content);
+    read.map_err(|error| CatalogError::Read {
+        path: source.to_owned(),
+        lines_read: 0,
+        source: error,
     })?;
-    let (_, summary) = importer.finish()?;
+    let tally = Tally::of(&mut Rows::new(&content[..]), &FixedWidth, source)?;
+    let mut lines = Rows::new(&content[..]);
+    while let Ok(Some(row)) = lines.next() {
+        if let Record::Star(star, _) = FixedWidth.parse(row)
+            && star.is_brighter_than(v_mag_limit)
+            && let Ok(record) = whole_record(row.bytes)
+        {
+            row_count += 1;
+            let values = BRIGHT_COLUMNS.map(|column| unpadded(column.cut(&record)));
+            rows.write_record(&values).map_err(write_error)?;
+        }
+    }
+    let mut summary = tally.summary;
+    summary.stars = tally.stars.len() as u64;
     let bytes = rows.into_inner().map_err(|error| CatalogError::Write {
         path: out.to_owned(),
         source: io::Error::other(error.to_string()),
@@ -110,35 +127,38 @@ pub(super) fn is_fixed_width(head: &[u8]) -> bool {
     head.starts_with(MARK)
 }
 
-/// Gives every record to `importer`, and those that are stars to `also`, with the bytes they come from.
-pub(super) fn read_records(
-    reader: impl BufRead,
-    importer: &mut Importer,
-    mut also: impl FnMut(&Star, &[u8]) -> Result<(), CatalogError>,
-) -> Result<(), CatalogError> {
-    let mut lines = Lines::new(reader);
-    let place_of = |cell: Cell| FaultPlace::Byte(COLUMNS[cell as usize].first_byte);
-    loop {
-        let lines_read = lines.read();
-        let (line, record) = match lines.next() {
-            Ok(Some(numbered)) => numbered,
-            Ok(None) => return Ok(()),
-            Err(source) => return Err(importer.read_error(lines_read, source)),
-        };
-        if let Err((place, found, expected)) = check_record(record) {
-            importer.refuse(RecordFault {
-                line,
-                place: FaultPlace::Byte(place),
-                label: "",
+/// SKY2000's fixed-width records.
+pub(super) struct FixedWidth;
+
+impl Format for FixedWidth {
+    fn catalog(&self) -> Option<&'static str> {
+        Some("SKY2000 Master Catalog")
+    }
+
+    fn kind(&self) -> String {
+        "SKY2000 records".to_owned()
+    }
+
+    fn id_place(&self) -> (FaultPlace, String) {
+        (byte_of(Cell::Id), Cell::Id.column().label.to_owned())
+    }
+
+    fn parse(&self, row: Row) -> Record {
+        match whole_record(row.bytes) {
+            Ok(record) => record::parse_record(row.line, &cut(&record), byte_of),
+            Err((byte, found, expected)) => Record::Unreadable(RecordFault {
+                line: row.line,
+                place: FaultPlace::Byte(byte),
+                label: String::new(),
                 found,
                 expected,
-            })?;
-            continue;
-        }
-        if let Some(star) = importer.take(line, &cut(record), place_of)? {
-            also(star, record)?;
+            }),
         }
     }
+}
+
+fn byte_of(cell: Cell) -> FaultPlace {
+    FaultPlace::Byte(cell.column().first_byte)
 }
 
 /// The cells of a record of full length.
@@ -150,24 +170,34 @@ fn cut(record: &[u8]) -> Cells<'_> {
     cells
 }
 
-/// Whether the line can be a record; else the byte at fault, what is found, and what is expected.
-fn check_record(record: &[u8]) -> Result<(), (usize, String, &'static str)> {
-    if record.len() < RECORD_BYTES {
-        let found = format!("the end of the line after {} bytes", record.len());
-        return Err((record.len() + 1, found, "a record of 520 bytes"));
-    }
-    if record.len() > RECORD_BYTES {
-        let found = quoted(&record[RECORD_BYTES..]);
+/// The record of full length on a line; else the byte at fault, what is found, and what is expected.
+fn whole_record(line: &[u8]) -> Result<Cow<'_, [u8]>, (usize, String, &'static str)> {
+    if line.len() > RECORD_BYTES {
+        let found = quoted(&line[RECORD_BYTES..]);
         return Err((
             RECORD_BYTES + 1,
             found,
             "the end of the line after 520 bytes",
         ));
     }
-    if record[..MARK_BYTES] != MARK[..MARK_BYTES] {
-        return Err((1, quoted(&record[..MARK_BYTES]), "\"SKY2000\""));
+    if !line.starts_with(&MARK[..MARK_BYTES]) {
+        return Err((
+            1,
+            quoted(&line[..line.len().min(MARK_BYTES)]),
+            "\"SKY2000\"",
+        ));
     }
-    Ok(())
+    if line.len() == RECORD_BYTES {
+        return Ok(Cow::Borrowed(line));
+    }
+    // Some tools cut off the blanks at a line's end, and then all of them.
+    if line.len() < ESSENTIAL_BYTES || line.ends_with(b" ") {
+        let found = format!("the end of the line after {} bytes", line.len());
+        return Err((line.len() + 1, found, "a record of 520 bytes"));
+    }
+    let mut record = line.to_vec();
+    record.resize(RECORD_BYTES, b' ');
+    Ok(Cow::Owned(record))
 }
 
 /// A value without the blanks around it, and without those between a sign and its digits.

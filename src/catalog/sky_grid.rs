@@ -222,7 +222,7 @@ mod tests {
 
     fn star(index: u32, ra_rad: f64, sin_dec: f64) -> Star {
         let direction = UnitVector::from_ra_dec(ra_rad, sin_dec.asin());
-        Star::new(StarId(index), direction, index as f32 * 0.001)
+        Star::new(StarId::Skymap(index), direction, index as f32 * 0.001)
     }
 
     fn expected(

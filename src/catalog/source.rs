@@ -1,28 +1,32 @@
-//! Opens a catalogue file and finds out from its content what it is.
+//! Opens a catalogue, a file or a directory, and finds out from its content what it is.
 
 use super::compact;
 use super::error::quoted;
-use super::import::Importer;
-use super::{Catalog, CatalogError, ImportSummary, sky2000, table};
+use super::import::{Format, ImportSummary, Part, Reading, SourceFile, Tally, combine};
+use super::rows::Rows;
+use super::sky2000::FixedWidth;
+use super::table::Table;
+use super::tycho2::Tycho2;
+use super::{Catalog, CatalogError, sky2000};
 use flate2::bufread::MultiGzDecoder;
-use std::fs::File;
+use rayon::prelude::*;
+use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Cursor, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What can be imported, for messages.
-pub(super) const KINDS_IMPORTED: &str = "SKY2000 records of 520 bytes, or a table with SKY2000's \
-     column labels (ID, RAh, RAm, RAs, DE-, DEd, DEm, DEs, Vmag) as headings, plain or gzip";
+pub(super) const KINDS_IMPORTED: &str = "SKY2000 records of 520 bytes, the files of Tycho-2, or a table with headings \
+     for identifiers, right ascension, declination and magnitude, plain or gzip";
 /// What can be read, for messages.
-pub(super) const KINDS_READ: &str = "a compact catalog of starpipe, SKY2000 records of 520 bytes, \
-     or a table with SKY2000's column labels (ID, RAh, RAm, RAs, DE-, DEd, DEm, DEs, Vmag) as \
-     headings, plain or gzip";
+const KINDS_READ: &str = "a compact catalog of starpipe, SKY2000 records of 520 bytes, the files of Tycho-2, or a \
+     table with headings for identifiers, right ascension, declination and magnitude, plain or gzip";
 
 const GZIP_MARK: [u8; 2] = [0x1f, 0x8b];
-/// No line is read beyond so many bytes, whatever the file is.
-const LINE_BYTES_MAX: u64 = 4096;
-const END_OF_FILE_MARK: u8 = 0x1a;
-/// As many bytes as tell the kinds apart.
-const HEAD_BYTES: u64 = 16;
+/// As many bytes as tell the kinds apart: more than a record of Tycho-2 has.
+const HEAD_BYTES: u64 = 256;
+const BUFFER_BYTES: usize = 1 << 16;
+/// As much of a content of no known kind is shown.
+const SHOWN_BYTES: usize = 16;
 
 /// A file, decompressed if need be, and how it begins.
 pub(super) struct Source {
@@ -32,6 +36,15 @@ pub(super) struct Source {
     pub(super) reader: Box<dyn BufRead>,
 }
 
+/// What a file is, as far as its first bytes tell.
+enum Kind {
+    Compact,
+    Sky2000,
+    Tycho2(Tycho2),
+    /// Or nothing at all.
+    Table,
+}
+
 impl Source {
     /// Opens the file `path`.
     pub(super) fn open(path: &Path) -> Result<Self, CatalogError> {
@@ -39,13 +52,8 @@ impl Source {
             path: path.to_owned(),
             source,
         })?;
-        Self::from_reader(Box::new(BufReader::with_capacity(1 << 16, file))).map_err(|source| {
-            CatalogError::Read {
-                path: path.to_owned(),
-                lines_read: 0,
-                source,
-            }
-        })
+        let reader = Box::new(BufReader::with_capacity(BUFFER_BYTES, file));
+        Self::from_reader(reader).map_err(|source| read_error(path, source))
     }
 
     fn from_reader(reader: Box<dyn BufRead>) -> io::Result<Self> {
@@ -54,7 +62,7 @@ impl Source {
             return Ok(plain);
         }
         let unpacked = MultiGzDecoder::new(plain.reader);
-        Self::peek(Box::new(BufReader::with_capacity(1 << 16, unpacked)))
+        Self::peek(Box::new(BufReader::with_capacity(BUFFER_BYTES, unpacked)))
     }
 
     fn peek(mut reader: Box<dyn BufRead>) -> io::Result<Self> {
@@ -64,97 +72,174 @@ impl Source {
         Ok(Self { head, reader })
     }
 
-    /// The error for content that is of no known kind.
-    pub(super) fn unknown_kind(path: &Path, head: &[u8]) -> CatalogError {
-        CatalogError::UnknownKind {
-            path: path.to_owned(),
-            found: if head.is_empty() {
-                "nothing: it is empty".to_owned()
-            } else {
-                quoted(head)
-            },
-            expected: KINDS_READ,
+    fn kind(&self) -> Kind {
+        if self.head.starts_with(&compact::MAGIC) {
+            Kind::Compact
+        } else if sky2000::is_fixed_width(&self.head) {
+            Kind::Sky2000
+        } else {
+            Tycho2::of(&self.head).map_or(Kind::Table, Kind::Tycho2)
         }
     }
 }
 
-/// The catalogue in a file of any kind, and what became of its records, if it has any.
-pub(super) fn read(path: &Path) -> Result<(Catalog, Option<ImportSummary>), CatalogError> {
+fn read_error(path: &Path, source: io::Error) -> CatalogError {
+    CatalogError::Read {
+        path: path.to_owned(),
+        lines_read: 0,
+        source,
+    }
+}
+
+/// The error for content that is of no known kind.
+pub(super) fn unknown_kind(path: &Path, head: &[u8]) -> CatalogError {
+    CatalogError::UnknownKind {
+        path: path.to_owned(),
+        found: if head.is_empty() {
+            "nothing: it is empty".to_owned()
+        } else {
+            quoted(&head[..head.len().min(SHOWN_BYTES)])
+        },
+        expected: KINDS_READ,
+    }
+}
+
+/// The catalogue in a file of any kind, or in a directory.
+pub(super) fn read(path: &Path) -> Result<Reading, CatalogError> {
+    if path.is_dir() {
+        return read_directory(path);
+    }
     let source = Source::open(path)?;
-    if source.head.starts_with(&compact::MAGIC) {
-        return Ok((read_compact(path, source)?, None));
+    if let Kind::Compact = source.kind() {
+        let catalog = read_compact(path, source)?;
+        let files = Vec::new();
+        return Ok(Reading { catalog, files });
     }
-    let mut importer = Importer::new(path);
-    if sky2000::is_fixed_width(&source.head) {
-        sky2000::read_records(source.reader, &mut importer, |_, _| Ok(()))?;
-    } else {
-        table::read_rows(source.reader, &mut importer)?;
-    }
-    let (catalog, summary) = importer.finish()?;
-    Ok((catalog, Some(summary)))
+    let part = read_part(path, source)?;
+    combine(path, title(path, &*part.format), vec![part])
 }
 
 fn read_compact(path: &Path, mut source: Source) -> Result<Catalog, CatalogError> {
     let mut bytes = Vec::new();
     let read = source.reader.read_to_end(&mut bytes);
-    read.map_err(|source| CatalogError::Read {
-        path: path.to_owned(),
-        lines_read: 0,
-        source,
-    })?;
+    read.map_err(|source| read_error(path, source))?;
     Catalog::from_compact(&bytes).map_err(|fault| CatalogError::Compact {
         path: path.to_owned(),
         fault,
     })
 }
 
-/// The lines of a file, one at a time, without their ends.
-pub(super) struct Lines<R> {
-    reader: R,
-    buffer: Vec<u8>,
-    /// The number of the line last read, from 1.
-    number: u64,
+/// Reads the records of a file that is not compact.
+fn read_part(path: &Path, source: Source) -> Result<Part, CatalogError> {
+    let kind = source.kind();
+    let mut rows = Rows::new(source.reader);
+    let format: Box<dyn Format + Send> = match kind {
+        Kind::Sky2000 => Box::new(FixedWidth),
+        Kind::Tycho2(file) => Box::new(file),
+        Kind::Compact | Kind::Table => Box::new(Table::open(&mut rows, path)?),
+    };
+    let tally = Tally::of(&mut rows, &*format, path)?;
+    Ok(Part {
+        path: path.to_owned(),
+        format,
+        tally,
+    })
 }
 
-impl<R: BufRead> Lines<R> {
-    pub(super) fn new(reader: R) -> Self {
-        Self {
-            reader,
-            buffer: Vec::new(),
-            number: 0,
+/// The catalogue in a directory: all files of Tycho-2, or the one file of another kind.
+fn read_directory(path: &Path) -> Result<Reading, CatalogError> {
+    let (mut tycho2, mut others, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
+    let mut has_supplement_1 = false;
+    for file in files_in(path)? {
+        let source = Source::open(&file)?;
+        match source.kind() {
+            Kind::Tycho2(Tycho2::Supplement2) => left_out.push(file),
+            Kind::Tycho2(part) => {
+                has_supplement_1 |= part == Tycho2::Supplement1;
+                tycho2.push(file);
+            }
+            Kind::Compact | Kind::Sky2000 => others.push(file),
+            Kind::Table => match Table::open(&mut Rows::new(source.reader), &file) {
+                Ok(_) => others.push(file),
+                Err(error @ CatalogError::Read { .. }) => return Err(error),
+                Err(_) => {}
+            },
         }
     }
-
-    /// How many lines were read so far.
-    pub(super) fn read(&self) -> u64 {
-        self.number
+    if !has_supplement_1 {
+        // Without the blanks at its line ends the first supplement is as wide as the second.
+        tycho2.append(&mut left_out);
     }
-
-    /// The next line and its number; `None` at the end.
-    pub(super) fn next(&mut self) -> io::Result<Option<(u64, &[u8])>> {
-        let found = self.advance()?;
-        Ok(found.then(|| (self.number, self.current())))
+    if let ([], [only]) = (&*tycho2, &*others) {
+        return read(only);
     }
-
-    /// The line last read, cut after [`LINE_BYTES_MAX`].
-    pub(super) fn current(&self) -> &[u8] {
-        let line = self.buffer.strip_suffix(b"\n").unwrap_or(&self.buffer);
-        line.strip_suffix(b"\r").unwrap_or(line)
+    if tycho2.is_empty() || !others.is_empty() {
+        return Err(CatalogError::Directory {
+            path: path.to_owned(),
+            found: mixture(&tycho2, &others),
+        });
     }
+    // Collected before the first error is looked for, so that it is the same on any number of threads.
+    let parts: Vec<Result<Part, CatalogError>> = tycho2
+        .par_iter()
+        .map(|file| read_part(file, Source::open(file)?))
+        .collect();
+    let parts: Vec<Part> = parts.into_iter().collect::<Result<_, _>>()?;
+    let mut reading = combine(path, title(path, &*parts[0].format), parts)?;
+    let left_out = left_out.into_iter().map(|path| SourceFile {
+        path,
+        kind: format!(
+            "{}, left out: its stars are probably none",
+            Tycho2::Supplement2.kind()
+        ),
+        summary: ImportSummary::default(),
+    });
+    reading.files.extend(left_out);
+    Ok(reading)
+}
 
-    /// Reads the next line; false at the end, or at a mark of it that is the last byte.
-    pub(super) fn advance(&mut self) -> io::Result<bool> {
-        self.buffer.clear();
-        let mut limited = self.reader.by_ref().take(LINE_BYTES_MAX);
-        limited.read_until(b'\n', &mut self.buffer)?;
-        let ended = self.buffer.last() == Some(&b'\n');
-        if !ended && self.buffer.len() as u64 == LINE_BYTES_MAX {
-            self.reader.skip_until(b'\n')?;
-        }
-        if self.buffer.is_empty() || (!ended && self.buffer == [END_OF_FILE_MARK]) {
-            return Ok(false);
-        }
-        self.number += 1;
-        Ok(true)
+/// The files in a directory that are not hidden, by name.
+fn files_in(path: &Path) -> Result<Vec<PathBuf>, CatalogError> {
+    let list = || -> io::Result<Vec<PathBuf>> {
+        let paths = fs::read_dir(path)?.map(|entry| Ok(entry?.path()));
+        let mut files = paths.collect::<io::Result<Vec<PathBuf>>>()?;
+        let is_hidden = |file: &Path| {
+            let name = file.file_name();
+            name.is_some_and(|name| name.as_encoded_bytes().starts_with(b"."))
+        };
+        files.retain(|file| file.is_file() && !is_hidden(file));
+        files.sort();
+        Ok(files)
+    };
+    list().map_err(|source| CatalogError::Open {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// What is wrong with a directory of these files of Tycho-2 and these catalogues of other kinds.
+fn mixture(tycho2: &[PathBuf], others: &[PathBuf]) -> String {
+    if others.is_empty() {
+        return "no catalog is in it".to_owned();
+    }
+    let names: Vec<String> = tycho2
+        .iter()
+        .take(1)
+        .chain(others.iter().take(3))
+        .filter_map(|file| Some(file.file_name()?.to_string_lossy().into_owned()))
+        .collect();
+    format!("more than one catalog is in it ({}, ...)", names.join(", "))
+}
+
+/// The file's name tells which version of the catalogue it is; nothing inside it does.
+fn title(path: &Path, format: &dyn Format) -> String {
+    // `.` has a name only in full.
+    let full = path.canonicalize().unwrap_or_default();
+    let name = path.file_name().or(full.file_name()).unwrap_or_default();
+    let name = name.to_string_lossy();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    match format.catalog() {
+        Some(catalog) => format!("{catalog} ({name})"),
+        None => name.to_owned(),
     }
 }

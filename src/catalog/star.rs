@@ -1,24 +1,11 @@
 //! One star of the catalogue.
 
+use super::StarId;
 use crate::coords::{Icrs, UnitVector};
 use crate::units::RAD_PER_ARCSEC;
 use nalgebra::Vector3;
-use std::fmt;
 
 const RAD_PER_MAS: f64 = RAD_PER_ARCSEC / 1000.0;
-
-/// The number under which a catalogue knows a star.
-///
-/// Shown as SKY2000 and the papers write a Skymap number: eight digits, `02480053` for Polaris. It
-/// is HHMMnnnn after a right ascension, but not always the star's own: never derive a position from it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct StarId(pub u32);
-
-impl fmt::Display for StarId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:08}", self.0)
-    }
-}
 
 /// What the catalogue warns of about a star: a set of yes-or-no remarks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -31,11 +18,12 @@ impl StarFlags {
     pub const BLENDED_POSITION: Self = Self(1);
     /// The V magnitude is that of two or more stars together (SKY2000 `f_Vmag`).
     pub const BLENDED_MAGNITUDE: Self = Self(1 << 1);
-    /// A double or multiple star with a measured separation (SKY2000 `sep`).
+    /// A double or multiple star with a measured separation (SKY2000 `sep`), or one of a pair of which
+    /// Tycho-2 has the photocentre.
     pub const MULTIPLE: Self = Self(1 << 2);
     /// A variable star, or one suspected of it (SKY2000 `varTyp` or `Vname`).
     pub const VARIABLE: Self = Self(1 << 3);
-    /// The V magnitude was derived from other magnitudes (SKY2000 `Vder`), not observed.
+    /// The V magnitude was derived from other magnitudes (SKY2000 `Vder`, Tycho-2, Gaia), not observed.
     pub const DERIVED_MAGNITUDE: Self = Self(1 << 4);
     /// The proper motion is unknown; it is given as zero.
     pub const NO_PROPER_MOTION: Self = Self(1 << 5);
@@ -75,7 +63,7 @@ impl StarFlags {
 /// One catalogue star, at the catalogue's epoch J2000.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Star {
-    /// The catalogue's own number for the star (Skymap number in SKY2000).
+    /// What the catalogue calls the star.
     pub id: StarId,
     /// Direction at epoch J2000.
     pub direction: UnitVector<Icrs>,
@@ -143,6 +131,16 @@ pub(super) fn mmag(mag: f32) -> i16 {
     (f64::from(mag) * 1000.0).round() as i16
 }
 
+/// A magnitude in magnitudes: the `f32` nearest to the decimal fraction, as if it had been parsed.
+pub(super) fn mag_from_mmag(mmag: i16) -> f32 {
+    f32::from(mmag) / 1000.0
+}
+
+/// A magnitude within ±32, to the thousandth that the compact form knows.
+pub(super) fn mag_on_grid(mag: f64) -> f32 {
+    mag_from_mmag((mag * 1000.0).round() as i16)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -152,7 +150,7 @@ mod tests {
 
     fn star_at(ra_deg: f64, dec_deg: f64) -> Star {
         let direction = UnitVector::from_ra_dec(ra_deg * RAD_PER_DEG, dec_deg * RAD_PER_DEG);
-        Star::new(StarId(1), direction, 5.0)
+        Star::new(StarId::Skymap(1), direction, 5.0)
     }
 
     #[test]
@@ -177,7 +175,11 @@ mod tests {
     fn a_star_without_motion_stays_and_one_at_the_pole_moves() {
         let still = star_at(10.0, 10.0);
         assert_eq!(still.direction_at(25.0), still.direction);
-        let mut polar = Star::new(StarId(1), UnitVector::from_vector(Vector3::z()), 5.0);
+        let mut polar = Star::new(
+            StarId::Skymap(1),
+            UnitVector::from_vector(Vector3::z()),
+            5.0,
+        );
         polar.pm_dec_mas_per_yr = 1000.0;
         let moved_arcsec = polar.direction_at(5.0).angle_to(&polar.direction) * ARCSEC_PER_RAD;
         assert!((moved_arcsec - 5.0).abs() < TOLERANCE_ARCSEC);
@@ -190,11 +192,5 @@ mod tests {
         assert!(!both.contains(StarFlags::BLENDED_POSITION));
         assert_eq!(StarFlags::from_bits(both.bits()), Some(both));
         assert_eq!(StarFlags::from_bits(0x80), None);
-    }
-
-    #[test]
-    fn a_skymap_number_is_shown_with_eight_digits() {
-        assert_eq!(StarId(2_480_053).to_string(), "02480053");
-        assert_eq!(StarId(14_220_079).to_string(), "14220079");
     }
 }

@@ -160,7 +160,8 @@ pub(crate) enum Format {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Resources")]
 pub(crate) struct ResourceArgs {
-    /// Star catalogue to use in place of the built-in one
+    /// Star catalogue to use in place of the built-in one: SKY2000, Tycho-2 (a directory of its files), a table
+    /// (CSV, TSV, from VizieR), or what `starpipe catalog import` makes of one, which loads fastest
     #[arg(long, value_name = "PATH")]
     pub(crate) catalog: Option<PathBuf>,
     /// Where to keep the index of the catalogue [default: $STARPIPE_CACHE_DIR, else the user's cache
@@ -181,14 +182,21 @@ pub(crate) struct CatalogArgs {
 #[derive(Debug, Subcommand)]
 pub(crate) enum CatalogCommand {
     /// Turn a catalogue as it is distributed into the compact form that --catalog takes
-    #[command(after_help = "Example:\n  \
-        starpipe catalog import SKYMAP_SKY2000_V5R4.gz --vmag-limit 8 -o bright.cat")]
+    #[command(after_help = "Examples:\n  \
+        starpipe catalog import SKYMAP_SKY2000_V5R4.gz --vmag-limit 8 -o bright.cat\n  \
+        starpipe catalog import tycho2/ -o tycho2.cat\n  \
+        starpipe catalog import hipparcos.tsv -o hipparcos.cat\n\n\
+        Kinds, plain or gzip, found out from the content: SKY2000 records; the files of Tycho-2 (tyc2.dat*, \
+        suppl_1.dat), one or a directory of them; tables, CSV or TSV, with a heading for each of identifier (id, \
+        hip, tyc, source_id, name, ...), position (ra and dec, raj2000 and dej2000, ra_hours, ... in degrees or \
+        as 05:34:48.0), magnitude (vmag, mag, vtmag, phot_g_mean_mag, ...) and, where there are such, proper \
+        motion (pmra, pmdec in mas a year) and epoch (ref_epoch).")]
     Import(ImportArgs),
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct ImportArgs {
-    /// Catalogue to read
+    /// Catalogue to read, a file or a directory
     pub(crate) file: PathBuf,
     /// File to write
     #[arg(short, long, value_name = "OUT")]

@@ -14,14 +14,19 @@ pub(crate) fn catalog(arguments: CatalogArgs) -> Result<Exit, Fault> {
 }
 
 fn import(arguments: &ImportArgs) -> anyhow::Result<Exit> {
-    let (mut catalog, summary) = catalog::import_sky2000(&arguments.file)?;
+    let reading = catalog::import(&arguments.file)?;
+    let mut catalog = reading.catalog;
     if let Some(limit) = arguments.vmag_limit {
         catalog = catalog.limited_to(limit);
     }
     catalog.write_compact(&arguments.output)?;
-    let told = format!(
-        "{}: {summary}\n{}: {}, {}\n",
-        arguments.file.display(),
+    let mut told = String::new();
+    for file in reading.files {
+        let (path, kind) = (file.path.display(), &file.kind);
+        told += &format!("{path} ({kind}): {}\n", file.summary);
+    }
+    told += &format!(
+        "{}: {}, {}\n",
         arguments.output.display(),
         counted(catalog.stars().len(), "star"),
         catalog.title(),

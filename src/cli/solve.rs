@@ -6,7 +6,7 @@ use super::output::Output;
 use super::{Exit, Fault, batch, cache, chained, complain, warn};
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
-use starpipe::catalog::Catalog;
+use starpipe::catalog::{self, Catalog};
 use starpipe::detect::Workspace;
 use starpipe::identify::Sky;
 use starpipe::pipeline::{Pipeline, Solution, SolveConfig};
@@ -59,7 +59,7 @@ fn solve_all(
     } = solving;
     let mut run = Run::new(output, inputs)?;
     let pool = thread_pool(resources.threads)?;
-    let catalog = catalog(resources.catalog.as_deref())?;
+    let catalog = pool.install(|| read_catalog(resources.catalog.as_deref()))?;
     let sky = pool.install(|| sky(&catalog, &resources));
     let pipeline = Pipeline::new(sky);
     let report = |input: &PathBuf, workspace: &mut Workspace| {
@@ -134,9 +134,20 @@ fn thread_pool(threads: Option<u32>) -> anyhow::Result<rayon::ThreadPool> {
 }
 
 /// The catalogue that is asked for, kept by the caller if it is not the built-in one.
-fn catalog(path: Option<&Path>) -> anyhow::Result<Cow<'static, Catalog>> {
+fn read_catalog(path: Option<&Path>) -> anyhow::Result<Cow<'static, Catalog>> {
     Ok(match path {
-        Some(path) => Cow::Owned(Catalog::read(path)?),
+        Some(path) => {
+            let reading = catalog::read(path)?;
+            for file in &reading.files {
+                if let Some(reasons) = file.summary.left_out() {
+                    let (path, records) = (file.path.display(), file.summary.records);
+                    warn(format_args!(
+                        "{path}: not every one of {records} records is a star: {reasons}"
+                    ));
+                }
+            }
+            Cow::Owned(reading.catalog)
+        }
         None => Cow::Borrowed(Catalog::built_in()),
     })
 }

@@ -137,7 +137,7 @@ mod tests {
         let stars: Vec<Star> = (0..60u32)
             .map(|i| {
                 Star::new(
-                    StarId(i),
+                    StarId::Skymap(i),
                     UnitVector::from_ra_dec(f64::from(i * i % 97) * 0.01, f64::from(i) * 0.004),
                     i as f32 * 0.1,
                 )

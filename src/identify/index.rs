@@ -26,6 +26,10 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 /// Longest sides, as angles, of the smallest and the largest triangles listed: what fields 1.5° to 60° wide hold.
 const SMALLEST_DEG: f64 = 0.4;
 const LARGEST_DEG: f64 = 45.0;
+/// Classes below the smallest are listed for as long as so many stars lie around a cell on average, and down to
+/// 0.2°: what fields from 0.75° hold.
+const STARS_AROUND_NARROW_CELL: f64 = 8.0;
+const NARROW_CLASSES_MAX: i32 = 2;
 /// The longest sides in one class differ by no more than this factor.
 const CLASS_FACTOR: f64 = std::f64::consts::SQRT_2;
 /// Cells are so much of the class's smallest longest side in height.
@@ -72,7 +76,7 @@ pub struct TriangleIndex {
 impl TriangleIndex {
     /// Lists the triangles of `stars`, which stand brightest first; `progress` is called with the share done.
     pub fn build(stars: &[Star], grid: &SkyGrid, progress: &(dyn Fn(f64) + Sync)) -> Self {
-        let limits = class_limits_rad();
+        let limits = class_limits_rad(stars.len());
         let classes = limits
             .iter()
             .enumerate()
@@ -100,16 +104,21 @@ fn chord(angle_rad: f64) -> f64 {
     2.0 * (angle_rad / 2.0).sin()
 }
 
-/// Smallest and largest longest side of each class, in radians.
-fn class_limits_rad() -> Vec<(f64, f64)> {
+/// Smallest and largest longest side of each class, in radians, for a catalogue of so many stars.
+fn class_limits_rad(stars: usize) -> Vec<(f64, f64)> {
     let octaves = (LARGEST_DEG / SMALLEST_DEG).ln() / CLASS_FACTOR.ln();
     let count = octaves.ceil() as i32;
-    (0..count)
-        .map(|class| {
-            let low_rad = SMALLEST_DEG * RAD_PER_DEG * CLASS_FACTOR.powi(class);
-            (low_rad, low_rad * CLASS_FACTOR)
-        })
-        .collect()
+    let limits = |class: i32| {
+        let low_rad = SMALLEST_DEG * RAD_PER_DEG * CLASS_FACTOR.powi(class);
+        (low_rad, low_rad * CLASS_FACTOR)
+    };
+    let is_dense = |class: &i32| {
+        // The share of the sphere around a cell.
+        let radius_rad = limits(*class).1 * CELL_RADIUS;
+        stars as f64 * radius_rad * radius_rad / 4.0 >= STARS_AROUND_NARROW_CELL
+    };
+    let narrowest = (-NARROW_CLASSES_MAX..0).find(is_dense).unwrap_or(0);
+    (narrowest..count).map(limits).collect()
 }
 
 /// How many of the brightest stars around a cell make triangles, by the smallest longest side of the class in
@@ -270,6 +279,20 @@ mod tests {
             }
         }
         assert!(compared > 100, "{compared}");
+    }
+
+    #[test]
+    fn a_dense_catalogue_has_narrower_classes() {
+        let smallest_deg = |stars: usize| class_limits_rad(stars)[0].0 / RAD_PER_DEG;
+        assert_eq!(smallest_deg(0), SMALLEST_DEG);
+        assert_eq!(
+            smallest_deg(Catalog::built_in().stars().len()),
+            SMALLEST_DEG
+        );
+        assert!((smallest_deg(2_557_501) - 0.2).abs() < 1e-9);
+        let limits = class_limits_rad(2_557_501);
+        let adjoin = |pair: &[(f64, f64)]| (pair[0].1 / pair[1].0 - 1.0).abs() < 1e-12;
+        assert!(limits.windows(2).all(adjoin));
     }
 
     fn shape_of(stars: &[Star], corners: &[u32; 3]) -> TriangleShape {

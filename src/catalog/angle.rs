@@ -1,0 +1,163 @@
+//! Angles as people write them: decimal, or in sixtieths.
+
+/// What a text says: a number, and in which form it stood.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Angle {
+    /// A decimal number of some unit.
+    Decimal(f64),
+    /// Sixtieths of whatever the first number counts (`05:34:48.0`, `-00 24 00`).
+    Sixtieths(f64),
+    /// Sixtieths of hours (`05h34m48.0s`), in hours.
+    Hours(f64),
+    /// Sixtieths of degrees (`-00d24m00s`, `-00°24′00″`), in degrees.
+    Degrees(f64),
+}
+
+/// The marks that may stand behind the first, second and third number.
+const MARKS: [&[char]; 3] = [
+    &['h', 'd', '°', 'H', 'D'],
+    &['m', '\'', '′', 'M'],
+    &['s', '"', '″', 'S'],
+];
+
+impl Angle {
+    /// The angle in `text`; `None` if it is not one, or has sixtieths of sixty and more.
+    pub(super) fn parse(text: &str) -> Option<Self> {
+        let text = text.trim();
+        if let Some(number) = decimal(text) {
+            return Some(Self::Decimal(number));
+        }
+        let (negative, mut rest) = match text.strip_prefix(['-', '−']) {
+            Some(rest) => (true, rest.trim_start()),
+            None => (false, text.strip_prefix('+').unwrap_or(text).trim_start()),
+        };
+        let mut value = 0.0;
+        let mut unit = None;
+        let mut whole = true;
+        for (marks, seconds) in MARKS.into_iter().zip([3600.0, 60.0, 1.0]) {
+            let end = rest.find(|c: char| !(c.is_ascii_digit() || c == '.'));
+            let (number, behind) = rest.split_at(end.unwrap_or(rest.len()));
+            let part = decimal(number)?;
+            // Only the last number has decimals, and only the first may reach sixty.
+            if !whole || (seconds < 3600.0 && part >= 60.0) {
+                return None;
+            }
+            whole = !number.contains('.');
+            value += part * seconds;
+            let behind = behind.trim_start();
+            let mark = behind.chars().next().filter(|c| marks.contains(c));
+            if seconds == 3600.0 {
+                unit = mark;
+            }
+            rest = match (mark, behind.strip_prefix(':')) {
+                (Some(mark), _) => behind[mark.len_utf8()..].trim_start(),
+                (None, Some(behind)) if seconds > 1.0 && !behind.is_empty() => behind.trim_start(),
+                (None, _) => behind,
+            };
+            if rest.is_empty() {
+                break;
+            }
+        }
+        if !rest.is_empty() {
+            return None;
+        }
+        let value = if negative { -value } else { value } / 3600.0;
+        Some(match unit {
+            None => Self::Sixtieths(value),
+            Some('h' | 'H') => Self::Hours(value),
+            Some(_) => Self::Degrees(value),
+        })
+    }
+}
+
+/// A finite number of digits, without the words that `parse` would let pass.
+pub(super) fn decimal(text: &str) -> Option<f64> {
+    let plain = text
+        .bytes()
+        .all(|byte| byte.is_ascii_digit() || b"+-.eE".contains(&byte));
+    let number: f64 = plain.then(|| text.parse().ok())??;
+    number.is_finite().then_some(number)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn every_common_way_of_writing_is_read() {
+        let hours = 5.0 + 34.0 / 60.0 + 48.0 / 3600.0;
+        for text in [
+            "05:34:48.0",
+            "05 34 48.0",
+            " 5 34 48",
+            "5:34:48.",
+            "+05 34 48",
+            "5 : 34 : 48",
+        ] {
+            assert_eq!(Angle::parse(text), Some(Angle::Sixtieths(hours)), "{text}");
+        }
+        for text in ["05h34m48.0s", "5h 34m 48s", "5H34M48S", "5h34m48"] {
+            assert_eq!(Angle::parse(text), Some(Angle::Hours(hours)), "{text}");
+        }
+        for text in ["-00 24 00.0", "-0:24", "−00:24:00", "- 0 24 0"] {
+            assert_eq!(Angle::parse(text), Some(Angle::Sixtieths(-0.4)), "{text}");
+        }
+        for text in ["-00°24′00″", "-0d24m", "-00d 24' 00\""] {
+            assert_eq!(Angle::parse(text), Some(Angle::Degrees(-0.4)), "{text}");
+        }
+        assert_eq!(Angle::parse("8.37e1"), Some(Angle::Decimal(83.7)));
+        assert_eq!(Angle::parse("-0.4"), Some(Angle::Decimal(-0.4)));
+    }
+
+    #[test]
+    fn what_is_no_angle_is_refused() {
+        for text in [
+            "",
+            "-",
+            "x",
+            "nan",
+            "inf",
+            "5:60:00",
+            "5 34 60",
+            "5:34.5:10",
+            "5 -34 10",
+            "5:34:",
+            "5h34s",
+            "1 2 3 4",
+            "5:34:48x",
+            "5m",
+            "0x10",
+            "5::34",
+            "1.2.3",
+        ] {
+            assert_eq!(Angle::parse(text), None, "{text}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_written_in_sixtieths_is_read_back(steps in 0..359_u64 * 3_600_000, south in any::<bool>()) {
+            let (whole, minutes, ms) = (steps / 3_600_000, steps / 60_000 % 60, steps % 60_000);
+            let sign = if south { "-" } else { "" };
+            let seconds = format!("{:02}.{:03}", ms / 1000, ms % 1000);
+            let expected = if south { -1.0 } else { 1.0 } * steps as f64 / 3_600_000.0;
+            for (text, form) in [
+                (format!("{sign}{whole:02}:{minutes:02}:{seconds}"), Angle::Sixtieths as fn(f64) -> Angle),
+                (format!("{sign}{whole} {minutes} {seconds}"), Angle::Sixtieths),
+                (format!("{sign}{whole}h{minutes}m{seconds}s"), Angle::Hours),
+                (format!("{sign}{whole}°{minutes}′{seconds}″"), Angle::Degrees),
+            ] {
+                let found = Angle::parse(&text).unwrap();
+                let (Angle::Decimal(value) | Angle::Sixtieths(value) | Angle::Hours(value) | Angle::Degrees(value)) = found;
+                prop_assert!((value - expected).abs() < 1e-12, "{}", text);
+                prop_assert_eq!(form(value), found);
+            }
+        }
+
+        #[test]
+        fn any_text_is_read_without_panic(text in "\\PC{0,20}", close in "[-+0-9:hdms°'\". ]{0,16}") {
+            let _ = (Angle::parse(&text), Angle::parse(&close));
+        }
+    }
+}

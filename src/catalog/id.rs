@@ -1,0 +1,210 @@
+//! What a catalogue calls a star.
+
+use std::fmt;
+
+/// What a catalogue calls a star: no two stars of a catalogue have the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum StarId {
+    /// SKY2000's Skymap number.
+    ///
+    /// Shown as SKY2000 and the papers write it: eight digits, `02480053` for Polaris. It is HHMMnnnn
+    /// after a right ascension, but not always the star's own: never derive a position from it.
+    Skymap(u32),
+    /// The number in Tycho-1 and Tycho-2, as in `TYC 3124-2056-1`.
+    Tycho(TychoId),
+    /// The number in Hipparcos, as in `HIP 11767` or, of a component of a double star, `HIP 12318B`.
+    Hipparcos(HipparcosId),
+    /// Another catalogue's number, as in Gaia's `source_id`.
+    Number(u64),
+    /// A star that only has a name (see [`Catalog::name_of`](super::Catalog::name_of)); the number
+    /// does no more than tell it from others.
+    Named(u32),
+}
+
+impl fmt::Display for StarId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Skymap(number) => write!(f, "{number:08}"),
+            Self::Tycho(id) => write!(f, "{id}"),
+            Self::Hipparcos(id) => write!(f, "{id}"),
+            Self::Number(number) => write!(f, "{number}"),
+            Self::Named(number) => write!(f, "named star {number}"),
+        }
+    }
+}
+
+impl StarId {
+    /// What kind of identifier it is, and its value, as the compact form has them.
+    pub(super) const fn to_raw(self) -> (u8, u64) {
+        match self {
+            Self::Skymap(number) => (0, number as u64),
+            Self::Tycho(TychoId(packed)) => (1, packed as u64),
+            Self::Hipparcos(HipparcosId(packed)) => (2, packed as u64),
+            Self::Number(number) => (3, number),
+            Self::Named(number) => (4, number as u64),
+        }
+    }
+
+    /// The identifier in the compact form; `None` for what [`to_raw`](Self::to_raw) does not give.
+    pub(super) fn from_raw(kind: u8, value: u64) -> Option<Self> {
+        let small = || u32::try_from(value).ok();
+        match kind {
+            0 => small().map(Self::Skymap),
+            1 => small().map(|packed| Self::Tycho(TychoId(packed))),
+            2 => small().map(|packed| Self::Hipparcos(HipparcosId(packed))),
+            3 => Some(Self::Number(value)),
+            4 => small().map(Self::Named),
+            _ => None,
+        }
+    }
+
+    /// The identifier that `text` is in words: `TYC 1-13-1`, `HIP 11767`, `HIP 12318B`.
+    pub(super) fn in_words(text: &str) -> Option<Self> {
+        let (catalog, number) = text.split_at_checked(3)?;
+        let number = number.trim_start();
+        if catalog.eq_ignore_ascii_case("TYC") {
+            TychoId::parse(number).map(Self::Tycho)
+        } else if catalog.eq_ignore_ascii_case("HIP") {
+            HipparcosId::parse(number).map(Self::Hipparcos)
+        } else {
+            None
+        }
+    }
+}
+
+/// A number of Tycho-1 and Tycho-2: a region of the Guide Star Catalog, a star in it, a component.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct TychoId(u32);
+
+impl TychoId {
+    const REGION_BITS: u32 = 14;
+    const STAR_BITS: u32 = 14;
+    const COMPONENT_BITS: u32 = 4;
+
+    /// The star `TYC region-star-component`; `None` for numbers that no Tycho catalogue has
+    /// (0, or above 16383 in the first two, 15 in the last).
+    pub fn new(region: u32, star: u32, component: u32) -> Option<Self> {
+        let fits = |value: u32, bits: u32| value > 0 && value < 1 << bits;
+        let valid = fits(region, Self::REGION_BITS)
+            && fits(star, Self::STAR_BITS)
+            && fits(component, Self::COMPONENT_BITS);
+        valid.then_some(Self(
+            (region << (Self::STAR_BITS + Self::COMPONENT_BITS))
+                | (star << Self::COMPONENT_BITS)
+                | component,
+        ))
+    }
+
+    /// Three numbers with hyphens or blanks between them.
+    pub(super) fn parse(text: &str) -> Option<Self> {
+        let mut parts = text
+            .split(['-', ' '])
+            .filter(|part| !part.is_empty())
+            .map(|part| whole_number(part.as_bytes()));
+        let mut next = || u32::try_from(parts.next()??).ok();
+        let (region, star, component) = (next()?, next()?, next()?);
+        parts.next().is_none().then_some(())?;
+        Self::new(region, star, component)
+    }
+}
+
+impl fmt::Display for TychoId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let region = self.0 >> (Self::STAR_BITS + Self::COMPONENT_BITS);
+        let star = (self.0 >> Self::COMPONENT_BITS) & ((1 << Self::STAR_BITS) - 1);
+        let component = self.0 & ((1 << Self::COMPONENT_BITS) - 1);
+        write!(f, "TYC {region}-{star}-{component}")
+    }
+}
+
+/// A number of the Hipparcos Catalogue, and a component of that star if it is a double one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct HipparcosId(u32);
+
+impl HipparcosId {
+    /// `HIP number`, or its component with a capital letter; `None` for a number above 16,777,215 or another letter.
+    pub fn new(number: u32, component: Option<u8>) -> Option<Self> {
+        let valid = number < 1 << 24 && component.is_none_or(|letter| letter.is_ascii_uppercase());
+        valid.then_some(Self((number << 8) | u32::from(component.unwrap_or(0))))
+    }
+
+    /// A number, with or without a letter behind it.
+    pub(super) fn parse(text: &str) -> Option<Self> {
+        let bytes = text.as_bytes();
+        let (digits, component) = match bytes {
+            [digits @ .., letter] if letter.is_ascii_uppercase() => (digits, Some(*letter)),
+            _ => (bytes, None),
+        };
+        let number = whole_number(digits.trim_ascii_end())?;
+        Self::new(u32::try_from(number).ok()?, component)
+    }
+}
+
+impl fmt::Display for HipparcosId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "HIP {}", self.0 >> 8)?;
+        match self.0 as u8 {
+            0 => Ok(()),
+            letter => write!(f, "{}", char::from(letter)),
+        }
+    }
+}
+
+/// The number that `digits`, and nothing but digits, stand for.
+pub(super) fn whole_number(digits: &[u8]) -> Option<u64> {
+    let digits = str::from_utf8(digits).ok()?;
+    // `parse` would let a sign pass.
+    let plain = digits.bytes().all(|byte| byte.is_ascii_digit());
+    plain.then(|| digits.parse().ok()).flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_skymap_number_is_shown_with_eight_digits() {
+        assert_eq!(StarId::Skymap(2_480_053).to_string(), "02480053");
+        assert_eq!(StarId::Skymap(14_220_079).to_string(), "14220079");
+    }
+
+    #[test]
+    fn identifiers_in_words_are_read_as_they_are_written() {
+        for text in ["TYC 1-13-1", "TYC 9537-12121-4", "HIP 11767", "HIP 12318B"] {
+            assert_eq!(StarId::in_words(text).unwrap().to_string(), text);
+        }
+        let padded = StarId::in_words("TYC 0001 00013 1").unwrap();
+        assert_eq!(padded.to_string(), "TYC 1-13-1");
+        for text in [
+            "",
+            "TYC",
+            "TYC 1-13",
+            "TYC 1-13-1-1",
+            "TYC 0-13-1",
+            "TYC 1-13-16",
+            "TYC 20000-1-1",
+            "HIP",
+            "HIP -3",
+            "HIP x",
+            "HIP 3b",
+            "HIP 99999999",
+            "HD 1",
+            "ÄÖÜ",
+        ] {
+            assert_eq!(StarId::in_words(text), None, "{text}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn identifiers_go_through_the_compact_form(kind in 0..6_u8, value in any::<u64>(), small in any::<u32>()) {
+            for value in [value, u64::from(small)] {
+                if let Some(id) = StarId::from_raw(kind, value) {
+                    prop_assert_eq!(id.to_raw(), (kind, value));
+                }
+            }
+        }
+    }
+}
