@@ -11,7 +11,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("units", &[]),
     ("coords", &["units"]),
     ("epoch", &[]),
-    ("frame", &["units", "coords"]),
+    ("frame", &["units", "coords", "epoch"]),
     ("camera", &["units", "coords"]),
     ("catalog", &["units", "coords"]),
     ("detect", &["units", "coords", "frame"]),
