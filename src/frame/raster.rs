@@ -217,7 +217,7 @@ fn error_of(error: ImageError, format: FrameFormat, found_bytes: usize) -> Frame
             "more bytes",
             "no more",
             "not enough bytes",
-            "too short",
+            "not enough data",
         ]
         .iter()
         .any(|words| detail.to_lowercase().contains(words)) =>
