@@ -15,10 +15,12 @@ use std::io::{Cursor, ErrorKind};
 /// As [`super::decode`].
 pub(super) fn decode_png(bytes: &[u8]) -> Result<Frame, FrameError> {
     let format = FrameFormat::Png;
-    // The size stands at bytes 16-23; looked at first, so that the decoder allocates nothing for absurd ones.
-    if let Some(Ok(size)) = bytes.get(16..24).map(<[u8; 8]>::try_from) {
-        let side = |b: &[u8]| b.iter().fold(0usize, |n, &byte| n << 8 | usize::from(byte));
-        check_size(side(&size[..4]), side(&size[4..]))?;
+    // Looked at first, so that the decoder allocates nothing for absurd sizes.
+    if let (Some(width), Some(height)) = (word(bytes, 16), word(bytes, 20)) {
+        check_size(
+            u32::from_be_bytes(width) as usize,
+            u32::from_be_bytes(height) as usize,
+        )?;
     }
     let decoder = PngDecoder::with_limits(Cursor::new(bytes), limits())
         .map_err(|e| error_of(e, format, bytes.len()))?;
@@ -55,7 +57,18 @@ pub(super) fn decode_jpeg(bytes: &[u8]) -> Result<Frame, FrameError> {
 /// # Errors
 /// As [`super::decode`].
 pub(super) fn decode_bmp(bytes: &[u8]) -> Result<Frame, FrameError> {
+    /// The least that a header is long if its sides have four bytes each.
+    const LONG_HEADER: u32 = 16;
     let format = FrameFormat::Bmp;
+    // The decoder has limits of its own; a size beyond ours is told as in any other format.
+    if let (Some(header), Some(width), Some(height)) =
+        (word(bytes, 14), word(bytes, 18), word(bytes, 22))
+        && u32::from_le_bytes(header) >= LONG_HEADER
+    {
+        // Rows run upward, or downward where the height is negative.
+        let side = |word| i32::from_le_bytes(word).unsigned_abs() as usize;
+        check_size(side(width), side(height))?;
+    }
     let decoder =
         BmpDecoder::new(Cursor::new(bytes)).map_err(|e| error_of(e, format, bytes.len()))?;
     decode_with(decoder, format, bytes.len())
@@ -91,6 +104,11 @@ pub(super) fn decode_pnm(bytes: &[u8]) -> Result<Frame, FrameError> {
             format!("levels up to {maxval} without a TUPLTYPE"),
         )),
     }
+}
+
+/// The four bytes at `at`.
+fn word(bytes: &[u8], at: usize) -> Option<[u8; 4]> {
+    bytes.get(at..)?.first_chunk().copied()
 }
 
 /// Whether an end-of-image marker follows the last start of a scan; scan data cannot contain either.
