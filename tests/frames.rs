@@ -235,6 +235,45 @@ fn a_jpeg_loses_little() {
     }
 }
 
+#[test]
+fn files_of_other_programs_are_read_to_the_last_bit() {
+    let level = |x: usize, y: usize| match (x, y) {
+        (20, 10) => 65535.0,
+        _ => (1000 + 7 * x + 13 * y) as f32,
+    };
+    // Which row of the levels is the first in the file.
+    let from_top = |y: usize| y;
+    let from_bottom = |y: usize| 23 - y;
+    for (name, row) in [
+        ("astropy.fits.gz", from_top as fn(usize) -> usize),
+        ("imagemagick.fits", from_bottom),
+        ("cfitsio.fits.gz", from_bottom),
+    ] {
+        let frame = frame::read(fixture("formats").join(name)).unwrap();
+        assert_eq!((frame.width, frame.height), (32, 24));
+        for (i, pixel) in frame.pixels.iter().enumerate() {
+            let (x, y) = (i % 32, i / 32);
+            assert_eq!(*pixel, level(x, row(y)), "{name}: ({x}, {y})");
+        }
+        let levels = (frame.step_adu, frame.saturation_adu);
+        assert_eq!(levels, (1.0, Some(65535.0)), "{name}");
+    }
+    let metadata = frame::read(fixture("formats/astropy.fits.gz"))
+        .unwrap()
+        .metadata;
+    assert_eq!(metadata.date.unwrap().to_iso(), "2019-07-29T20:47:26.123Z");
+    assert_eq!(metadata.exposure_s, Some(0.5));
+    assert_eq!(
+        (metadata.focal_length_mm, metadata.pixel_size_um),
+        (Some(35.0), Some(4.65))
+    );
+    let packed = frame::read(fixture("formats/fpack.fits.fz")).unwrap_err();
+    assert!(
+        packed.to_string().contains("unpack it with funpack"),
+        "{packed}"
+    );
+}
+
 // ---- What a header tells --------------------------------------------------------------------
 
 /// The fixture of Orion as FITS with these keywords.

@@ -52,26 +52,31 @@ pub(super) fn frame_from_integers<T: Copy + Into<i64>>(
     Ok(Frame::new(width, height, pixels)?.with_levels(step as f32, Some(saturation as f32)))
 }
 
-/// The frame of float samples, which have neither steps nor a full scale.
-pub(super) fn frame_from_floats(samples: &Samples<'_, f32>) -> Result<Frame, FrameError> {
-    let values = samples.values;
-    let pixels = match samples.channels {
-        1 => values.to_vec(),
+/// The frame of float samples, `height * width * channels` of them, which have neither steps nor a full scale.
+pub(super) fn frame_from_floats(
+    (width, height): (usize, usize),
+    channels: usize,
+    values: Vec<f32>,
+) -> Result<Frame, FrameError> {
+    let pixels = match channels {
+        1 => values,
         2 => values.chunks_exact(2).map(|c| c[0]).collect(),
         channels => values
             .chunks_exact(channels)
             .map(|c| luminance([c[0], c[1], c[2]], f32::INFINITY))
             .collect(),
     };
-    Frame::new(samples.width, samples.height, pixels)
+    Frame::new(width, height, pixels)
 }
 
 /// Samples that come as one plane after another, pixel by pixel.
 pub(super) fn interleaved<T: Copy>(planes: &[T], channels: usize) -> Vec<T> {
-    let pixels = planes.len() / channels;
-    (0..pixels)
-        .flat_map(|pixel| (0..channels).map(move |channel| planes[channel * pixels + pixel]))
-        .collect()
+    let mut values = planes.to_vec();
+    for (channel, plane) in planes.chunks_exact(planes.len() / channels).enumerate() {
+        let places = values.iter_mut().skip(channel).step_by(channels);
+        places.zip(plane).for_each(|(value, level)| *value = *level);
+    }
+    values
 }
 
 /// The luminance of one pixel; `full` where a channel is saturated.

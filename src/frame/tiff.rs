@@ -117,20 +117,18 @@ impl Layout {
         values: Vec<T>,
         full_scale: T,
     ) -> Result<Frame, FrameError> {
-        frame_from_integers(&self.samples(&self.by_pixel(values)), full_scale)
+        let samples = Samples {
+            width: self.width,
+            height: self.height,
+            values: &self.by_pixel(values),
+            channels: self.channels,
+        };
+        frame_from_integers(&samples, full_scale)
     }
 
     fn floats(&self, values: Vec<f32>) -> Result<Frame, FrameError> {
-        frame_from_floats(&self.samples(&self.by_pixel(values)))
-    }
-
-    fn samples<'a, T>(&self, values: &'a [T]) -> Samples<'a, T> {
-        Samples {
-            width: self.width,
-            height: self.height,
-            values,
-            channels: self.channels,
-        }
+        let size = (self.width, self.height);
+        frame_from_floats(size, self.channels, self.by_pixel(values))
     }
 
     fn by_pixel<T: Copy>(&self, values: Vec<T>) -> Vec<T> {

@@ -326,7 +326,13 @@ impl Image {
         full_scale: T,
     ) -> Result<Frame, FrameError> {
         let values = self.by_pixel(data.as_chunks().0.iter().map(|b| level(*b)).collect());
-        let frame = frame_from_integers(&self.samples(&values), full_scale)?;
+        let samples = Samples {
+            width: self.width,
+            height: self.height,
+            values: &values,
+            channels: self.channels,
+        };
+        let frame = frame_from_integers(&samples, full_scale)?;
         let Some(blank) = self.blank else {
             return Ok(frame);
         };
@@ -362,22 +368,13 @@ impl Image {
     ) -> Result<Frame, FrameError> {
         let level = |bytes: &[u8; N]| (self.zero + self.scale * value(*bytes)) as f32;
         let values = self.by_pixel(data.as_chunks().0.iter().map(level).collect());
-        frame_from_floats(&self.samples(&values))
+        frame_from_floats((self.width, self.height), self.channels, values)
     }
 
     fn by_pixel<T: Copy>(&self, values: Vec<T>) -> Vec<T> {
         match self.channels {
             1 => values,
             channels => interleaved(&values, channels),
-        }
-    }
-
-    fn samples<'a, T>(&self, values: &'a [T]) -> Samples<'a, T> {
-        Samples {
-            width: self.width,
-            height: self.height,
-            values,
-            channels: self.channels,
         }
     }
 }
