@@ -7,15 +7,12 @@
 
 use super::metadata::{EXPOSURE, FOCAL_LENGTH, FrameMetadata, PIXEL_SIZE, Quantity};
 use crate::epoch::ObservationDate;
-use exif::{Field, In, Tag, Value};
+use exif::{Field, In, Reader, Tag, Value};
 
 /// What the Exif attributes in `bytes`, laid out as a TIFF file, say of a frame `width` pixels wide. Attributes that
 /// cannot be understood are no reason to refuse an image.
 pub(super) fn metadata(bytes: &[u8], width: usize) -> FrameMetadata {
-    let Ok((fields, _)) = exif::parse_exif(bytes) else {
-        return FrameMetadata::default();
-    };
-    let attributes = Attributes(&fields);
+    let attributes = Attributes(fields(bytes));
     let mut metadata = FrameMetadata::default();
     metadata.exposure_s = attributes.number(&mut metadata, &EXPOSURE, Tag::ExposureTime);
     metadata.focal_length_mm = attributes.number(&mut metadata, &FOCAL_LENGTH, Tag::FocalLength);
@@ -27,9 +24,20 @@ pub(super) fn metadata(bytes: &[u8], width: usize) -> FrameMetadata {
     metadata
 }
 
-struct Attributes<'a>(&'a [Field]);
+/// All attributes that can be read; many a camera's Exif breaks the rules somewhere.
+fn fields(bytes: &[u8]) -> Vec<Field> {
+    if let Ok((fields, _)) = exif::parse_exif(bytes) {
+        return fields;
+    }
+    let mut lenient = Reader::new();
+    let read = lenient.continue_on_error(true).read_raw(bytes.to_vec());
+    let exif = read.or_else(|error| error.distill_partial_result(|_| ()));
+    exif.map_or(Vec::new(), |exif| exif.fields().cloned().collect())
+}
 
-impl Attributes<'_> {
+struct Attributes(Vec<Field>);
+
+impl Attributes {
     fn value(&self, tag: Tag) -> Option<&Value> {
         let field = self
             .0
@@ -53,6 +61,9 @@ impl Attributes<'_> {
     fn raw_number(&self, tag: Tag) -> Option<f64> {
         match self.value(tag)? {
             Value::Rational(numbers) => Some(numbers.first()?.to_f64()),
+            Value::SRational(numbers) => Some(numbers.first()?.to_f64()),
+            Value::Float(numbers) => numbers.first().map(|number| f64::from(*number)),
+            Value::Double(numbers) => numbers.first().copied(),
             other => other.get_uint(0).map(f64::from),
         }
     }
@@ -155,6 +166,57 @@ mod tests {
         // 5 µm as taken, at half the width.
         assert_eq!(metadata.pixel_size_um, Some(10.0));
         assert!(metadata.ignored.is_empty(), "{:?}", metadata.ignored);
+    }
+
+    #[test]
+    fn jpeg_png_and_tiff_carry_it() {
+        use image::{ExtendedColorType, ImageEncoder, codecs};
+        let exif = written(&[field(Tag::ExposureTime, ratio(1, 4))]);
+        let mut jpeg = Vec::new();
+        let mut encoder = codecs::jpeg::JpegEncoder::new(&mut jpeg);
+        encoder.set_exif_metadata(exif.clone()).unwrap();
+        let grey = ExtendedColorType::L8;
+        encoder.write_image(&[7; 64], 8, 8, grey).unwrap();
+        let mut png = Vec::new();
+        let mut encoder = codecs::png::PngEncoder::new(&mut png);
+        encoder.set_exif_metadata(exif).unwrap();
+        encoder.write_image(&[7; 64], 8, 8, grey).unwrap();
+        let mut tiff = Cursor::new(Vec::new());
+        let mut encoder = tiff::encoder::TiffEncoder::new(&mut tiff).unwrap();
+        let mut directory = encoder.extra_directory().unwrap();
+        let exposure = tiff::encoder::Rational { n: 1, d: 4 };
+        let tag = tiff::tags::Tag::Unknown(Tag::ExposureTime.number());
+        directory.write_tag(tag, exposure).unwrap();
+        let offset = directory.finish_with_offsets().unwrap();
+        let mut image = encoder
+            .new_image::<tiff::encoder::colortype::Gray8>(8, 8)
+            .unwrap();
+        let pointer = tiff::tags::Tag::ExifDirectory;
+        image
+            .encoder()
+            .write_tag(pointer, offset.pointer.0 as u32)
+            .unwrap();
+        image.write_data(&[7; 64]).unwrap();
+        for file in [jpeg, png, tiff.into_inner()] {
+            let frame = crate::frame::decode(&file).unwrap();
+            assert_eq!(frame.metadata.exposure_s, Some(0.25));
+        }
+    }
+
+    #[test]
+    fn what_can_be_read_of_damaged_attributes_is() {
+        let mut bytes = written(&[
+            field(Tag::ExposureTime, ratio(1, 4)),
+            field(Tag::FocalLength, ratio(350, 10)),
+        ]);
+        let entry = Tag::FocalLength.number().to_be_bytes();
+        let at = bytes.windows(2).position(|w| w == entry).unwrap();
+        bytes[at + 8] = 0xff;
+        let metadata = metadata(&bytes, 10);
+        assert_eq!(
+            (metadata.exposure_s, metadata.focal_length_mm),
+            (Some(0.25), None)
+        );
     }
 
     #[test]
