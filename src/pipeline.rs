@@ -31,7 +31,8 @@ use crate::detect::{
 use crate::epoch::ObservationDate;
 use crate::frame::{self, Frame, FrameError, FrameMetadata};
 use crate::identify::{
-    self, Hints, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Outcome, Photometry, Sky, StarField,
+    self, Hints, Identification, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Outcome, Photometry, Sky,
+    StarField,
 };
 use crate::units::ARCSEC_PER_RAD;
 use serde::Serialize;
@@ -445,7 +446,7 @@ impl<'a> Pipeline<'a> {
         }
     }
 
-    /// Identifies `field` with the scale of its header or else without; then says so.
+    /// Identifies `field` with the scale of its header, else without; tells where that scale is not the true one.
     fn identify_with(
         &self,
         hint: &ScaleHint,
@@ -462,13 +463,10 @@ impl<'a> Pipeline<'a> {
             return (first, None);
         }
         let second = at_second_attempt(self.identify(field, sources, knowledge)).unwrap_or(first);
-        let note = matches!(second, Outcome::Identified(_)).then(|| {
-            let [low, high] =
-                <[f64; 2]>::from(hint.pixel_scale_rad(field.width_px)).map(|s| s * ARCSEC_PER_RAD);
-            format!(
-                "the header's focal length and pixel size are not this frame's: they mean {low:.1}″ to {high:.1}″ a pixel"
-            )
-        });
+        let note = match &second {
+            Outcome::Identified(found) => contradiction(hint, found, field.width_px),
+            Outcome::NotIdentified(_) => None,
+        };
         (second, note)
     }
 
@@ -494,6 +492,19 @@ fn header_scale(metadata: &FrameMetadata) -> Option<ScaleHint> {
     Some(ScaleHint {
         scale: Scale::Pixel(metadata.pixel_scale_rad()?),
         tolerance: HEADER_SCALE_TOLERANCE,
+    })
+}
+
+/// What to say of a `hint` from the header that is not the scale `found`.
+fn contradiction(hint: &ScaleHint, found: &Identification, width_px: f64) -> Option<String> {
+    let [low, high, true_scale] = {
+        let (low_rad, high_rad) = hint.pixel_scale_rad(width_px);
+        [low_rad, high_rad, 1.0 / found.camera.focal_length_px].map(|rad| rad * ARCSEC_PER_RAD)
+    };
+    (!(low..=high).contains(&true_scale)).then(|| {
+        format!(
+            "the header's focal length and pixel size are not this frame's: they mean {low:.1}″ to {high:.1}″ a pixel"
+        )
     })
 }
 
