@@ -1,14 +1,12 @@
 //! The frames in a directory.
 
-use super::{FrameError, FrameFormat, format_of, gzip};
+use super::{FrameError, FrameFormat, format_inside, format_of};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 /// What has to be read of a file to tell whether it is a frame; a gzip file can hold a long name before its data.
 const HEAD_BYTES: u64 = 4096;
-/// What has to be unpacked of a compressed one.
-const SIGNATURE_BYTES: usize = 16;
 
 /// The files in `directory` that begin like an image, in the order of their names; directories in it are left out.
 ///
@@ -45,10 +43,7 @@ fn begins_like_a_frame(path: &Path) -> io::Result<bool> {
     let mut head = Vec::new();
     File::open(path)?.take(HEAD_BYTES).read_to_end(&mut head)?;
     Ok(match format_of(&head) {
-        Some(FrameFormat::Gzip) => {
-            let inside = gzip::unpack_beginning(&head, SIGNATURE_BYTES);
-            format_of(&inside).is_some_and(|format| format != FrameFormat::Gzip)
-        }
+        Some(FrameFormat::Gzip) => format_inside(&head).0.is_some(),
         format => format.is_some(),
     })
 }

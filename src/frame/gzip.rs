@@ -1,17 +1,23 @@
 //! Files compressed with gzip.
 
-use super::{FrameError, FrameFormat, MAX_PIXELS};
+use super::{FrameError, FrameFormat, MAX_PIXELS, first_bytes, format_inside};
 use flate2::read::MultiGzDecoder;
 use std::io::{ErrorKind, Read};
 
 /// The most bytes that may be in one: the largest frame in 64-bit floats, and some headers.
 const MAX_UNPACKED_BYTES: u64 = MAX_PIXELS as u64 * 8 + (1 << 24);
 
-/// What is in the file `bytes`.
+/// The image file in the file `bytes`.
 /// # Errors
+/// [`FrameError::UnknownFormat`] if what is inside does not begin like one, before much of it is unpacked;
 /// [`FrameError::Truncated`], [`FrameError::Malformed`].
 pub(super) fn unpack(bytes: &[u8]) -> Result<Vec<u8>, FrameError> {
     let format = FrameFormat::Gzip;
+    let (known, inside) = format_inside(bytes);
+    if known.is_none() && !inside.is_empty() {
+        let found = format!("{} inside gzip", first_bytes(&inside));
+        return Err(FrameError::UnknownFormat { found });
+    }
     let mut unpacked = Vec::new();
     let mut reader = MultiGzDecoder::new(bytes).take(MAX_UNPACKED_BYTES);
     reader.read_to_end(&mut unpacked).map_err(|e| {

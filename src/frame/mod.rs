@@ -152,6 +152,14 @@ pub fn decode_page(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame, Fr
     }
 }
 
+/// The format of what is inside the gzip file that begins with `head`, which is not gzip again; and its first bytes.
+fn format_inside(head: &[u8]) -> (Option<FrameFormat>, Vec<u8>) {
+    const SIGNATURE_BYTES: usize = 16;
+    let inside = gzip::unpack_beginning(head, SIGNATURE_BYTES);
+    let format = format_of(&inside).filter(|format| *format != FrameFormat::Gzip);
+    (format, inside)
+}
+
 /// Decodes one image that is not packed, or no longer.
 fn decode_image(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
     let only_page = |read: fn(&[u8]) -> Result<Frame, FrameError>| match page {
