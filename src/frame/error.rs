@@ -4,12 +4,8 @@ use super::{MAX_PIXELS, MIN_SIDE_PX};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-/// What a file may be, as error messages say it.
-macro_rules! formats {
-    () => {
-        "FITS, TIFF, PNG, JPEG, BMP or PGM"
-    };
-}
+/// What a file may be.
+const FORMATS: &str = "FITS, TIFF, PNG, JPEG, BMP or PGM";
 
 /// The kinds of file that can be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,10 +56,10 @@ pub enum FrameError {
     #[error("cannot be read: {0}")]
     Io(#[from] std::io::Error),
     /// There are no bytes.
-    #[error("empty: found 0 bytes, expected an image ({})", formats!())]
+    #[error("empty: found 0 bytes, expected an image ({FORMATS})")]
     Empty,
     /// The first bytes are of no known image format.
-    #[error("not an image: found {found} at byte 0, expected {}", formats!())]
+    #[error("not an image: found {found} at byte 0, expected {FORMATS}")]
     UnknownFormat {
         /// The first bytes, as text where they are text.
         found: String,
@@ -134,7 +130,7 @@ pub enum FrameError {
         pages: usize,
     },
     /// No file in a directory begins like an image.
-    #[error("a directory without frames: found {} in it, expected {}", files_found(*files), formats!())]
+    #[error("a directory without frames: found {} in it, expected {FORMATS}", files_found(*files))]
     NoFrames {
         /// The files there are.
         files: usize,

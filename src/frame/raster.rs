@@ -143,7 +143,7 @@ fn decode_with(
 }
 
 /// Bits of a sample.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 enum Depth {
     Eight,
     Sixteen,

@@ -24,7 +24,11 @@ const BLOCK_BYTES: usize = 2880;
 /// As [`super::decode_page`].
 pub(super) fn decode(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
     let mut pages = 0;
-    let mut units = Units { bytes, next: 0 };
+    let mut units = Units {
+        bytes,
+        next: 0,
+        end: 0,
+    };
     let mut tables = 0;
     // Keywords of the whole file stand in the first header.
     let mut primary = None;
@@ -69,11 +73,18 @@ fn truncated(found_bytes: usize, detail: String) -> FrameError {
 /// The header-data units of a file, one after the other.
 struct Units<'a> {
     bytes: &'a [u8],
+    /// Where the next one begins.
     next: usize,
+    /// Where the data of the last one end; there may be padding behind them.
+    end: usize,
 }
 
 impl<'a> Units<'a> {
     fn next(&mut self) -> Result<Option<Unit<'a>>, FrameError> {
+        if self.end > self.bytes.len() {
+            let detail = format!("the data before the next header end at byte {}", self.end);
+            return Err(truncated(self.bytes.len(), detail));
+        }
         let at = self.next;
         let rest = self.bytes.get(at..).unwrap_or_default();
         // Whatever follows the last extension and is none itself has no meaning.
@@ -82,12 +93,13 @@ impl<'a> Units<'a> {
         }
         let (header, data) = Header::parse(self.bytes, at)?;
         let unit = Unit::new(header, data)?;
-        let length = unit
+        let end = unit
             .data_bytes()
-            .and_then(|length| length.checked_next_multiple_of(BLOCK_BYTES));
-        self.next = length
-            .and_then(|length| data.checked_add(length))
-            .unwrap_or(usize::MAX);
+            .and_then(|length| data.checked_add(length));
+        self.end = end.unwrap_or(usize::MAX);
+        // Headers begin with a block, and so do data.
+        let next = self.end.checked_next_multiple_of(BLOCK_BYTES);
+        self.next = next.unwrap_or(usize::MAX);
         Ok(Some(unit))
     }
 }
@@ -236,7 +248,7 @@ struct Image {
     stored: Stored,
     scale: f64,
     zero: f64,
-    /// The stored integer that stands for no value.
+    /// The stored integer that stands for no value; floats have NaN for that.
     blank: Option<i64>,
 }
 
@@ -275,7 +287,11 @@ impl Image {
             stored: unit.stored,
             scale,
             zero: unit.header.factor("BZERO", 0.0)?,
-            blank: unit.header.optional("BLANK", "an integer")?,
+            blank: if unit.stored.is_float() {
+                None
+            } else {
+                unit.header.optional("BLANK", "an integer")?
+            },
         })
     }
 

@@ -294,6 +294,11 @@ fn a_truncated_image_says_how_many_bytes_are_there_and_needed() {
     assert!(decode(&bytes[..22_880], None).is_ok());
     assert!(complaint(&bytes[..22_879], None).contains("truncated"));
     assert!(complaint(&bytes[..300], None).contains("has no END"));
+    let cut_in_table = [empty_primary(&[]), table(&[])].concat();
+    assert_eq!(
+        complaint(&cut_in_table[..9000], None),
+        "truncated FITS: found 9000 bytes, expected more (the data before the next header end at byte 10772)"
+    );
 }
 
 #[test]
@@ -308,7 +313,7 @@ fn sizes_beyond_all_numbers_are_refused() {
             assert!(decode(&image(-64, &axes, &[], &[]), page).is_err());
         }
     }
-    // A table that claims to be endless hides what follows it.
+    // A table that claims to be endless leaves nothing behind it.
     let mut endless = table(&["NAXIS2  = 9"]);
     let at = endless.windows(6).position(|w| w == b"PCOUNT").unwrap();
     endless[at + 10..at + 29].copy_from_slice(b"9223372036854775807");
@@ -318,7 +323,7 @@ fn sizes_beyond_all_numbers_are_refused() {
         extension(&image(8, &[3, 3], &[], &[1; 9])),
     ]
     .concat();
-    assert!(complaint(&file, None).contains("no image"));
+    assert!(complaint(&file, None).contains("truncated"));
 }
 
 fn metadata_of(more: &[&str]) -> crate::frame::FrameMetadata {
