@@ -4,6 +4,8 @@ use super::{Frame, FrameError, LUMINANCE_WEIGHTS, check_size};
 
 /// The largest unit of levels looked for where a file holds fewer bits than its words: 2¹².
 const MAX_STEP: i64 = 1 << 12;
+/// How many values are looked at for a smaller unit before it is asked whether there can be one.
+const LOOKED_AT_TOGETHER: usize = 1024;
 
 /// Samples of one frame as a reader decoded them.
 pub(super) struct Samples<'a, T> {
@@ -17,7 +19,7 @@ pub(super) struct Samples<'a, T> {
 
 /// The frame of integer samples, of which `full_scale` is the largest of the format, in ADU: luminance,
 /// saturation, and the unit that the levels come in.
-pub(super) fn frame_from_integers<T: Copy + Into<i64>>(
+pub(super) fn frame_from_integers<T: Copy + PartialEq + Into<i64>>(
     samples: &Samples<'_, T>,
     full_scale: T,
 ) -> Result<Frame, FrameError> {
@@ -31,9 +33,8 @@ pub(super) fn frame_from_integers<T: Copy + Into<i64>>(
             expected: width * height,
             found: samples.values.len() / samples.channels,
         })?;
-    let full_scale: i64 = full_scale.into();
-    let full = full_scale as f32;
     let level = |v: T| -> f32 { v.into() as f32 };
+    let full = level(full_scale);
     let pixels = match samples.channels {
         1 => values.iter().map(|&v| level(v)).collect(),
         2 => values.chunks_exact(2).map(|c| level(c[0])).collect(),
@@ -48,7 +49,7 @@ pub(super) fn frame_from_integers<T: Copy + Into<i64>>(
         1
     };
     // Twelve bits in the upper part of sixteen saturate at 65520, not at 65535.
-    let saturation = full_scale / step * step;
+    let saturation = full_scale.into() / step * step;
     Ok(Frame::new(width, height, pixels)?.with_levels(step as f32, Some(saturation as f32)))
 }
 
@@ -91,20 +92,20 @@ fn luminance(rgb: [f32; 3], full: f32) -> f32 {
 }
 
 /// The largest power of two that divides all levels below full scale: 16 where twelve bits are stored in sixteen.
-fn level_step<T: Copy + Into<i64>>(values: &[T], full_scale: i64) -> i64 {
+fn level_step<T: Copy + PartialEq + Into<i64>>(values: &[T], full_scale: T) -> i64 {
     let mut bits = MAX_STEP;
-    for &value in values {
-        let value: i64 = value.into();
-        if value < full_scale {
-            bits |= value;
-        }
+    // The compiler works on many values at once where it need not look at the result after each.
+    for chunk in values.chunks(LOOKED_AT_TOGETHER) {
+        bits |= chunk.iter().fold(0, |bits, &value| {
+            bits | if value == full_scale { 0 } else { value.into() }
+        });
         if bits & 1 == 1 {
             return 1;
         }
     }
     let step = 1 << bits.trailing_zeros();
     // All levels zero, or nothing but full scale: nothing can be told.
-    if step >= MAX_STEP.min(full_scale) {
+    if step >= MAX_STEP.min(full_scale.into()) {
         1
     } else {
         step

@@ -187,7 +187,7 @@ impl Decoded {
         pairs.map(|p| u16::from_ne_bytes([p[0], p[1]])).collect()
     }
 
-    fn integers<T: Copy + Into<i64>>(
+    fn integers<T: Copy + PartialEq + Into<i64>>(
         &self,
         values: &[T],
         full_scale: T,

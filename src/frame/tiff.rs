@@ -112,7 +112,7 @@ impl Layout {
         }
     }
 
-    fn integers<T: Copy + Into<i64>>(
+    fn integers<T: Copy + PartialEq + Into<i64>>(
         &self,
         values: Vec<T>,
         full_scale: T,

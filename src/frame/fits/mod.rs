@@ -335,7 +335,7 @@ impl Image {
     }
 
     /// Integers as they are, of which `full_scale` is the largest.
-    fn integers<const N: usize, T: Copy + Into<i64>>(
+    fn integers<const N: usize, T: Copy + PartialEq + Into<i64>>(
         &self,
         data: &[u8],
         level: impl Fn([u8; N]) -> T,
