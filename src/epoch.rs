@@ -5,6 +5,7 @@
 //! Caveats: UTC is taken for the uniform time of the catalogue, about a minute apart, in which no star moves by a
 //! measurable angle. Years are those of [`YEARS`]: further away stars no longer move along straight lines at an even pace.
 
+use jiff::SignedDuration;
 use jiff::civil::{Date, DateTime, Time};
 use jiff::tz::TimeZone;
 use std::ops::RangeInclusive;
@@ -77,6 +78,20 @@ impl ObservationDate {
         // Digits behind the day are a time or make it a longer number.
         let alone = !text.number_follows() || (separator.is_none() && time.is_some());
         (YEARS.contains(&year) && alone).then_some(Self { day, time })
+    }
+
+    /// The date that a Modified Julian Date stands for: days since 1858-11-17 00:00 UTC.
+    ///
+    /// None where it is not within [`YEARS`].
+    pub fn from_modified_julian_date(days: f64) -> Option<Self> {
+        const MJD_ZERO: DateTime = jiff::civil::datetime(1858, 11, 17, 0, 0, 0, 0);
+        const SECONDS_PER_DAY: f64 = 86_400.0;
+        let since = SignedDuration::try_from_secs_f64((days * SECONDS_PER_DAY).round()).ok()?;
+        let utc = MJD_ZERO.checked_add(since).ok()?;
+        YEARS.contains(&utc.year()).then_some(Self {
+            day: utc.date(),
+            time: Some(utc.time()),
+        })
     }
 
     fn utc(&self) -> DateTime {
@@ -233,6 +248,19 @@ mod tests {
         assert!((night - expected).abs() < 1e-9, "{night}");
         let b1900 = parsed("1899-12-31T12:00:00Z").years_since_j2000();
         assert!((b1900 + 100.0).abs() < 1e-9, "{b1900}");
+    }
+
+    #[test]
+    fn a_modified_julian_date_is_a_moment() {
+        let iso = |days| ObservationDate::from_modified_julian_date(days).map(|date| date.to_iso());
+        assert_eq!(iso(51_544.5).as_deref(), Some("2000-01-01T12:00:00Z"));
+        assert_eq!(
+            iso(58_693.866_273_148).as_deref(),
+            Some("2019-07-29T20:47:26Z")
+        );
+        for days in [f64::NAN, f64::INFINITY, -1e5, 1e9, 1e300] {
+            assert_eq!(iso(days), None, "{days}");
+        }
     }
 
     #[test]

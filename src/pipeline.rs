@@ -29,9 +29,14 @@ use crate::detect::{
     self, DetectConfig, DetectError, Detection, DetectionFlags, Detections, Workspace,
 };
 use crate::epoch::ObservationDate;
-use crate::frame::{self, Frame, FrameError};
-use crate::identify::{self, Hints, ObservedStar, Outcome, Photometry, Sky, StarField};
+use crate::frame::{self, Frame, FrameError, FrameMetadata};
+use crate::identify::{
+    self, Hints, Identification, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Outcome, Photometry, Sky,
+    StarField,
+};
+use crate::units::ARCSEC_PER_RAD;
 use serde::Serialize;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -117,6 +122,9 @@ pub enum DateSource {
     /// It was given beforehand.
     #[serde(rename = "option")]
     Option,
+    /// From the header of the frame's file.
+    #[serde(rename = "file header")]
+    FileHeader,
     /// From the name of the frame's file.
     #[serde(rename = "file name")]
     FileName,
@@ -137,16 +145,11 @@ impl Knowledge {
             .map_or(0.0, |known| known.date.years_since_j2000())
     }
 
-    /// The same with the date that the file's name holds, where none is given.
-    fn with_date_of(self, path: &Path) -> Self {
-        let from_name = || {
-            ObservationDate::in_file_name(path).map(|date| FrameDate {
-                date,
-                source: DateSource::FileName,
-            })
-        };
+    /// The same with `date`, where none is known.
+    fn or_date(self, date: Option<ObservationDate>, source: DateSource) -> Self {
+        let other = date.map(|date| FrameDate { date, source });
         Self {
-            date: self.date.or_else(from_name),
+            date: self.date.or(other),
             ..self
         }
     }
@@ -159,6 +162,8 @@ pub struct SolveConfig {
     pub detect: DetectConfig,
     /// What is known beforehand.
     pub knowledge: Knowledge,
+    /// Which image of a file with several, counted from 1; the first where nothing is said.
+    pub page: Option<NonZeroUsize>,
 }
 
 /// One source: what was measured of it.
@@ -209,6 +214,10 @@ pub struct Solution {
     pub height: usize,
     /// When it was taken, where that is known; else the stars stand where they stood at J2000.0.
     pub date: Option<FrameDate>,
+    /// How long it was exposed, in seconds, where its file says so.
+    pub exposure_s: Option<f64>,
+    /// What the file's header says and turned out wrong, or cannot be true: a sentence each.
+    pub notes: Vec<String>,
     /// All sources, brightest first.
     pub sources: Vec<Source>,
     /// The sky between them; a list of centroids does not know it.
@@ -289,7 +298,8 @@ impl<'a> Pipeline<'a> {
         self.sky.catalog()
     }
 
-    /// Examines the frame in the file `path`. Its date is taken from the file's name where `config` does not have it.
+    /// Examines the frame in the file `path`. Where `config` has no date, it is that of the file's header, else of its
+    /// name; where it has no scale, see [`Pipeline::solve_frame`].
     ///
     /// # Errors
     /// [`Error::Read`] if there is no frame in the file, [`Error::Detect`] if it is unfit.
@@ -299,17 +309,50 @@ impl<'a> Pipeline<'a> {
         config: &SolveConfig,
         workspace: &mut Workspace,
     ) -> Result<Solution, Error> {
+        self.solve_read(path, config, workspace, || {
+            frame::read_page(path, config.page)
+        })
+    }
+
+    /// Examines the frame in a file of which the content is `bytes`, and the name, real or not, `name`.
+    ///
+    /// # Errors
+    /// As [`Pipeline::solve_file`].
+    pub fn solve_bytes(
+        &self,
+        name: &Path,
+        bytes: &[u8],
+        config: &SolveConfig,
+        workspace: &mut Workspace,
+    ) -> Result<Solution, Error> {
+        self.solve_read(name, config, workspace, || {
+            frame::decode_page(bytes, config.page).map_err(|error| error.in_file(name))
+        })
+    }
+
+    fn solve_read(
+        &self,
+        name: &Path,
+        config: &SolveConfig,
+        workspace: &mut Workspace,
+        read: impl FnOnce() -> Result<Frame, FrameError>,
+    ) -> Result<Solution, Error> {
         let start = Instant::now();
-        let frame = frame::read(path)?;
+        let frame = read()?;
         let read_ms = milliseconds_since(start);
+        let in_name = ObservationDate::in_file_name(name);
         let config = SolveConfig {
             detect: config.detect.clone(),
-            knowledge: config.knowledge.with_date_of(path),
+            knowledge: config
+                .knowledge
+                .or_date(frame.metadata.date, DateSource::FileHeader)
+                .or_date(in_name, DateSource::FileName),
+            page: config.page,
         };
         let mut solution = self
             .solve_frame(&frame, &config, workspace)
             .map_err(|source| Error::Detect {
-                path: path.to_owned(),
+                path: name.to_owned(),
                 source,
             })?;
         solution.timing.read_ms = read_ms;
@@ -317,7 +360,8 @@ impl<'a> Pipeline<'a> {
         Ok(solution)
     }
 
-    /// Examines `frame`.
+    /// Examines `frame`. Where `config` has no date, it is that of the frame's header. Where it has no scale, that of the
+    /// header is tried first; it can be wrong, and so it is done without where that leads nowhere.
     ///
     /// # Errors
     /// [`DetectError`] if it is unfit for detection.
@@ -330,14 +374,26 @@ impl<'a> Pipeline<'a> {
         let start = Instant::now();
         let detections = detect::detect(frame, &config.detect, workspace)?;
         let detect_ms = milliseconds_since(start);
-        let years = config.knowledge.years_since_j2000();
-        let (field, kept) = star_field(frame, &detections, years);
+        let knowledge = config
+            .knowledge
+            .or_date(frame.metadata.date, DateSource::FileHeader);
+        let (field, kept) = star_field(frame, &detections, knowledge.years_since_j2000());
         let identify_start = Instant::now();
-        let outcome = self.identify(&field, &kept, &config.knowledge);
+        let mut notes = frame.metadata.ignored.clone();
+        let outcome = match (knowledge.scale, header_scale(&frame.metadata)) {
+            (None, Some(hint)) => {
+                let (outcome, note) = self.identify_with(&hint, &field, &kept, &knowledge);
+                notes.extend(note);
+                outcome
+            }
+            _ => self.identify(&field, &kept, &knowledge),
+        };
         Ok(Solution {
             width: frame.width,
             height: frame.height,
-            date: config.knowledge.date,
+            date: knowledge.date,
+            exposure_s: frame.metadata.exposure_s,
+            notes,
             sources: detections.sources.iter().map(Source::from).collect(),
             background: Some(Background {
                 level_adu: detections.background_adu,
@@ -382,6 +438,8 @@ impl<'a> Pipeline<'a> {
             width: list.width,
             height: list.height,
             date: knowledge.date,
+            exposure_s: None,
+            notes: Vec::new(),
             sources: centroids.iter().map(source).collect(),
             background: None,
             outcome,
@@ -391,6 +449,30 @@ impl<'a> Pipeline<'a> {
                 ..Timing::default()
             },
         }
+    }
+
+    /// Identifies `field` with the scale of its header, else without; tells where that scale is not the true one.
+    fn identify_with(
+        &self,
+        hint: &ScaleHint,
+        field: &StarField,
+        sources: &[usize],
+        knowledge: &Knowledge,
+    ) -> (Outcome, Option<String>) {
+        let believing = Knowledge {
+            scale: Some(*hint),
+            ..*knowledge
+        };
+        let first = self.identify(field, sources, &believing);
+        if matches!(first, Outcome::Identified(_)) {
+            return (first, None);
+        }
+        let second = at_second_attempt(self.identify(field, sources, knowledge)).unwrap_or(first);
+        let note = match &second {
+            Outcome::Identified(found) => contradiction(hint, found, field.width_px),
+            Outcome::NotIdentified(_) => None,
+        };
+        (second, note)
     }
 
     /// Identifies `field`, and numbers the matches as the sources are: `sources[i]` is the source of star i.
@@ -403,6 +485,44 @@ impl<'a> Pipeline<'a> {
             }
         }
         outcome
+    }
+}
+
+/// How far the scale that a file's header gives may be off: focal lengths are nominal. A reducer or
+/// a binning that the header does not know is off by more.
+const HEADER_SCALE_TOLERANCE: f64 = 0.2;
+
+/// The scale that a file's header gives.
+fn header_scale(metadata: &FrameMetadata) -> Option<ScaleHint> {
+    Some(ScaleHint {
+        scale: Scale::Pixel(metadata.pixel_scale_rad()?),
+        tolerance: HEADER_SCALE_TOLERANCE,
+    })
+}
+
+/// What to say of a `hint` from the header that is not the scale `found`.
+fn contradiction(hint: &ScaleHint, found: &Identification, width_px: f64) -> Option<String> {
+    let [low, high, true_scale] = {
+        let (low_rad, high_rad) = hint.pixel_scale_rad(width_px);
+        [low_rad, high_rad, 1.0 / found.camera.focal_length_px].map(|rad| rad * ARCSEC_PER_RAD)
+    };
+    (!(low..=high).contains(&true_scale)).then(|| {
+        format!(
+            "the header's focal length and pixel size are not this frame's: they mean {low:.1}″ to {high:.1}″ a pixel"
+        )
+    })
+}
+
+/// What is left of an identification found at the second attempt: chance had twice the opportunity, at most, since all
+/// that the first attempt can have tried is tried again.
+fn at_second_attempt(outcome: Outcome) -> Option<Outcome> {
+    match outcome {
+        Outcome::Identified(mut identification) => {
+            identification.log10_false_alarm += std::f64::consts::LOG10_2;
+            let sure = identification.log10_false_alarm <= LOG10_FALSE_ALARM_LIMIT;
+            sure.then_some(Outcome::Identified(identification))
+        }
+        not_identified => Some(not_identified),
     }
 }
 

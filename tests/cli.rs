@@ -454,6 +454,8 @@ fn a_file_that_holds_no_frame_is_named_and_ends_with_1() {
         fs::write(&path, content).unwrap();
         path
     };
+    let empty = directory.path().join("empty");
+    fs::create_dir(&empty).unwrap();
     let half = |bytes: &[u8]| bytes[..bytes.len() / 2].to_vec();
     let png = fs::read(orion()).unwrap();
     let tiff = fs::read(fixture("cygnus/cygnus.tif")).unwrap();
@@ -466,7 +468,7 @@ fn a_file_that_holds_no_frame_is_named_and_ends_with_1() {
     image::GrayImage::new(1, 1).save(&pixel).unwrap();
     for (frame, expected) in [
         (directory.path().join("missing.png"), "cannot be read: "),
-        (directory.path().to_owned(), "cannot be read: "),
+        (empty, "a directory without frames: "),
         (write("empty.png", b""), "empty: "),
         (
             write("words.tif", b"this is no picture\n"),
@@ -477,7 +479,7 @@ fn a_file_that_holds_no_frame_is_named_and_ends_with_1() {
         (write("cut.jpg", &half(&jpeg)), "truncated JPEG: "),
         (write("magic-only.png", &png[..8]), "truncated PNG: "),
         (write("magic-only.tif", &tiff[..4]), "truncated TIFF: "),
-        (write("magic-only.jpg", &jpeg[..3]), "damaged JPEG: "),
+        (write("magic-only.jpg", &jpeg[..3]), "truncated JPEG: "),
         (pixel, "too small: "),
     ] {
         let ran = run(&["process", text(&frame)]);

@@ -11,7 +11,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal, Poisson, StandardNormal};
 use starpipe::detect::{CentroidMethod, DetectConfig, Detection, Detections, Workspace, detect};
-use starpipe::frame::Frame;
+use starpipe::frame::{Frame, FrameMetadata};
 
 /// Background of the simulated frames, in electrons per pixel.
 const BACKGROUND_E: f64 = 100.0;
@@ -592,7 +592,7 @@ proptest! {
                 _ => scale * rng.random::<f32>().powi(5),
             })
             .collect();
-        let frame = Frame { width, height, pixels, step_adu: 1.0, saturation_adu: Some(250.0) };
+        let frame = Frame { width, height, pixels, step_adu: 1.0, saturation_adu: Some(250.0), metadata: FrameMetadata::default() };
         let _ = detect(&frame, &DetectConfig::default(), &mut Workspace::new());
     }
 }

@@ -12,7 +12,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("coords", &["units"]),
     ("epoch", &[]),
     ("statistics", &[]),
-    ("frame", &["units", "coords"]),
+    ("frame", &["units", "coords", "epoch"]),
     ("camera", &["units", "coords"]),
     ("catalog", &["units", "coords"]),
     ("detect", &["units", "coords", "frame"]),

@@ -3,6 +3,7 @@
 use super::values;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use starpipe::epoch::ObservationDate;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 /// The longest side of a frame that makes sense, in pixels.
@@ -29,12 +30,16 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Find and identify the stars in frames (TIFF, PNG, JPEG)
+    /// Find and identify the stars in frames (FITS, TIFF, PNG, JPEG, BMP, PGM)
     #[command(after_help = "Examples:\n  \
         starpipe process night.tif\n  \
         starpipe process --fov 11.4 --near 83.8,-1.2 --radius 10 night.tif\n  \
         starpipe process --date 2019-07-29T22:47+02:00 night.tif\n  \
-        starpipe process --format json --out results *.tif > night.jsonl")]
+        starpipe process --format json --out results night/ > night.jsonl\n  \
+        starpipe process --page 2 night.fits\n  \
+        funpack -S night.fits.fz | starpipe process -\n\n\
+        The kind of a file is told from its content; any may be compressed with gzip. A date, an exposure,\n\
+        a pixel size and a focal length in FITS keywords or Exif are used where no option says otherwise.")]
     Process(ProcessArgs),
     /// Identify the stars in lists of centroids (CSV)
     #[command(after_help = "Examples:\n  \
@@ -49,9 +54,12 @@ pub(crate) enum Command {
 
 #[derive(Debug, Args)]
 pub(crate) struct ProcessArgs {
-    /// Frames to process
+    /// Frames to process; a directory stands for the frames in it, - for standard input
     #[arg(value_name = "FRAME", required = true)]
     pub(crate) frames: Vec<PathBuf>,
+    /// Which image of a file with several, from 1: a TIFF's page, a FITS image or plane [default: the first]
+    #[arg(long, value_name = "NUMBER", help_heading = "Frame")]
+    pub(crate) page: Option<NonZeroUsize>,
     #[command(flatten)]
     pub(crate) detection: DetectionArgs,
     #[command(flatten)]
@@ -60,7 +68,7 @@ pub(crate) struct ProcessArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct IdentifyArgs {
-    /// Lists of centroids to identify
+    /// Lists of centroids to identify; - for standard input
     #[arg(value_name = "CENTROIDS.csv", required = true)]
     pub(crate) lists: Vec<PathBuf>,
     /// Width of the frame in pixels [default: as far as the centroids reach]
@@ -128,7 +136,7 @@ pub(crate) struct HintArgs {
           requires = "near")]
     pub(crate) radius: Option<f64>,
     /// When the frames were taken, as ISO 8601, in UTC unless it says otherwise: stars move [default: for
-    /// frames, the date in the file's name; else 2000]
+    /// frames, the date in the file's header, else in its name; else 2000]
     #[arg(long, value_name = "ISO8601", allow_hyphen_values = true)]
     pub(crate) date: Option<ObservationDate>,
 }

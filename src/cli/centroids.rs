@@ -1,5 +1,6 @@
 //! Lists of centroids in CSV files.
 
+use super::input::is_stdin;
 use anyhow::{Context, bail};
 use csv::StringRecord;
 use starpipe::coords::PixelPoint;
@@ -19,9 +20,12 @@ pub(crate) struct FrameSize {
 /// A frame wider than this is taken for a mistake in the list.
 const MAX_COORDINATE_PX: f64 = 1e6;
 
-/// Reads the list in the file `path`.
+/// Reads the list in the file `path`, `-` for standard input.
 pub(crate) fn read(path: &Path, size: FrameSize) -> anyhow::Result<CentroidList> {
     let reading = || format!("reading {}", path.display());
+    if is_stdin(path) {
+        return parse(io::stdin().lock(), size).with_context(reading);
+    }
     let file = File::open(path).with_context(reading)?;
     parse(io::BufReader::new(file), size).with_context(reading)
 }

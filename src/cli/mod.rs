@@ -5,6 +5,7 @@ mod batch;
 mod cache;
 mod centroids;
 mod import;
+mod input;
 mod output;
 mod settings;
 mod solve;
@@ -65,16 +66,16 @@ pub(crate) fn run() -> ExitCode {
             .error(ErrorKind::ValueValidation, message)
             .exit(),
         Err(Fault::Failed(error)) => {
-            complain(chained(&error));
+            complain(chained(error.as_ref()));
             Exit::Failure.into()
         }
     }
 }
 
 /// An error and its causes in one line. A cause that the message before it ends with is not said again.
-pub(crate) fn chained(error: &anyhow::Error) -> String {
+pub(crate) fn chained(error: &(dyn std::error::Error + 'static)) -> String {
     let mut line = String::new();
-    for cause in error.chain() {
+    for cause in std::iter::successors(Some(error), |error| error.source()) {
         let text = cause.to_string();
         let text = text.trim();
         if !line.ends_with(text) {
@@ -108,7 +109,7 @@ mod tests {
             .context("reading a.tif: no such file\nat all")
             .unwrap_err();
         assert_eq!(
-            chained(&error),
+            chained(error.as_ref()),
             "reading a.tif: no such file at all: a.tif: no such file"
         );
     }

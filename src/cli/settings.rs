@@ -2,6 +2,7 @@
 
 use super::Fault;
 use super::args::{Centroid, DetectionArgs, HintArgs, OutputArgs};
+use super::input::is_stdin;
 use super::output::OutputSettings;
 use starpipe::coords::UnitVector;
 use starpipe::detect::{CentroidMethod, DetectConfig};
@@ -88,6 +89,9 @@ impl OutputArgs {
 
 /// The name under which the results of `input` are written, without its extension.
 pub(crate) fn result_stem(input: &Path) -> &OsStr {
+    if is_stdin(input) {
+        return OsStr::new("stdin");
+    }
     input.file_stem().unwrap_or(OsStr::new("frame"))
 }
 

@@ -2,6 +2,7 @@
 
 use super::args::{IdentifyArgs, OutputArgs, ProcessArgs, ResourceArgs, SolvingArgs};
 use super::centroids::{self, FrameSize};
+use super::input::{self, is_stdin, read_stdin};
 use super::output::Output;
 use super::{Exit, Fault, batch, cache, chained, complain, warn};
 use anyhow::Context;
@@ -20,15 +21,30 @@ use std::path::{Path, PathBuf};
 pub(crate) fn process(arguments: ProcessArgs) -> Result<Exit, Fault> {
     let ProcessArgs {
         frames,
+        page,
         detection,
         solving,
     } = arguments;
     let config = SolveConfig {
         detect: detection.resolve(),
         knowledge: solving.hints.resolve()?,
+        page,
     };
-    solve_all(&frames, solving, |pipeline, path, workspace| {
+    input::check(&frames)?;
+    let (frames, troubles) = input::frames(frames);
+    for trouble in &troubles {
+        complain(chained(trouble));
+    }
+    let exit = solve_all(&frames, solving, |pipeline, path, workspace| {
+        if is_stdin(path) {
+            return Ok(pipeline.solve_bytes(path, &read_stdin()?, &config, workspace)?);
+        }
         Ok(pipeline.solve_file(path, &config, workspace)?)
+    })?;
+    Ok(if troubles.is_empty() {
+        exit
+    } else {
+        Exit::Failure
     })
 }
 
@@ -40,6 +56,7 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Exit, Fault> {
         height,
         solving,
     } = arguments;
+    input::check(&lists)?;
     let knowledge = solving.hints.resolve()?;
     let size = FrameSize { width, height };
     solve_all(&lists, solving, |pipeline, path, _| {
@@ -58,6 +75,9 @@ fn solve_all(
         output, resources, ..
     } = solving;
     let mut run = Run::new(output, inputs)?;
+    if inputs.is_empty() {
+        return Ok(run.exit());
+    }
     let pool = thread_pool(resources.threads)?;
     let catalog = pool.install(|| read_catalog(resources.catalog.as_deref()))?;
     let sky = pool.install(|| sky(&catalog, &resources));
@@ -110,7 +130,7 @@ impl Run {
         });
         printed.unwrap_or_else(|error| {
             self.failed = true;
-            self.progress.suspend(|| complain(chained(&error)));
+            self.progress.suspend(|| complain(chained(error.as_ref())));
             ControlFlow::Continue(())
         })
     }
@@ -162,7 +182,7 @@ fn sky<'a>(catalog: &'a Catalog, resources: &ResourceArgs) -> Sky<'a> {
     let (sky, troubles) = Sky::open(catalog, &directory, &show);
     progress.finish_and_clear();
     for trouble in troubles {
-        let trouble = chained(&trouble.into());
+        let trouble = chained(&trouble);
         warn(format_args!("{trouble}; the index was made anew"));
     }
     sky

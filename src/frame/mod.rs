@@ -1,21 +1,44 @@
 //! The image as the detector gave it, and the files that hold one.
 //!
 //! file or bytes → [`Frame`]: grey levels as `f32` at the file's full depth, row-major, (0, 0) the
-//! centre of the first stored pixel, no flip.
+//! centre of the first stored pixel, no flip; and what the file says of how it was taken ([`FrameMetadata`]).
 //!
-//! 1. The kind of file is told from its first bytes, never from its name.
+//! 1. The kind of file is told from its first bytes, never from its name. One compressed with gzip is
+//!    what is inside.
 //! 2. The size in the header is checked against [`MAX_PIXELS`] before anything is allocated.
 //! 3. Colour becomes luminance with the weights of ITU-R BT.601 ([`LUMINANCE_WEIGHTS`]): they undo
 //!    JPEG's own colour transform, so that a colour JPEG gives back the luma that it stores.
 //! 4. A colour pixel is saturated where any of its channels is; it then takes the full scale as its
 //!    value, since its luminance is not known.
+//! 5. Infinities become NaN, a pixel without a value.
 //!
-//! Caveats: transparency is ignored; JPEG's gamma is not undone, so fluxes from JPEG are not linear.
+//! Of a file with several images the first is read, or the one asked for. Pages, counted from 1, are the
+//! images of a TIFF file in its own order; in FITS each header-data unit with an image of two axes, and each
+//! plane of a cube, unless it has three: these are red, green and blue.
+//!
+//! A FITS image is not flipped either: its first row is y = 0, though programs for display put it at the
+//! bottom, whatever `ROWORDER` says. So x and y are those of FITS less 1, and a frame that such a program
+//! shows upright counts as mirrored.
+//!
+//! Caveats: transparency is ignored; JPEG's gamma is not undone, so fluxes from JPEG are not linear. Integers
+//! and floats of more than 24 bits are rounded to 24.
 
+mod directory;
+mod error;
+mod exif;
+mod fits;
+mod gzip;
+mod levels;
+mod metadata;
 mod raster;
 mod tiff;
 
-use std::path::{Path, PathBuf};
+pub use directory::files_in;
+pub use error::{FrameError, FrameFormat};
+pub use metadata::FrameMetadata;
+
+use std::num::NonZeroUsize;
+use std::path::Path;
 
 /// The most pixels that a frame may have; beyond it, reading refuses before it allocates.
 pub const MAX_PIXELS: usize = 200_000_000;
@@ -25,9 +48,6 @@ pub const MIN_SIDE_PX: usize = 3;
 
 /// The parts of red, green and blue in luminance: ITU-R BT.601, as in JPEG.
 pub const LUMINANCE_WEIGHTS: [f32; 3] = [0.299, 0.587, 0.114];
-
-/// The largest unit of levels looked for where a file holds fewer bits than its words: 2¹².
-const MAX_STEP: u32 = 1 << 12;
 
 /// One image of light intensities.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +63,8 @@ pub struct Frame {
     pub step_adu: f32,
     /// The level from which on a pixel is saturated, in ADU, where the format has one.
     pub saturation_adu: Option<f32>,
+    /// What the file says of how it was taken.
+    pub metadata: FrameMetadata,
 }
 
 impl Frame {
@@ -76,6 +98,7 @@ impl Frame {
             pixels,
             step_adu: 0.0,
             saturation_adu: None,
+            metadata: FrameMetadata::default(),
         })
     }
 
@@ -86,137 +109,72 @@ impl Frame {
         self.saturation_adu = saturation_adu;
         self
     }
-}
 
-/// The kinds of file that can be read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FrameFormat {
-    /// Tagged Image File Format, also BigTIFF.
-    Tiff,
-    /// Portable Network Graphics.
-    Png,
-    /// JPEG (JFIF or Exif).
-    Jpeg,
-}
-
-impl std::fmt::Display for FrameFormat {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Tiff => "TIFF",
-            Self::Png => "PNG",
-            Self::Jpeg => "JPEG",
-        })
+    /// The same frame with what the file says of it.
+    fn with_metadata(mut self, metadata: FrameMetadata) -> Self {
+        self.metadata = metadata;
+        self
     }
 }
 
-/// Why a frame could not be read.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum FrameError {
-    /// Something is wrong with a file.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: Box<FrameError>,
-    },
-    /// The file cannot be opened or read.
-    #[error("cannot be read: {0}")]
-    Io(#[from] std::io::Error),
-    /// There are no bytes.
-    #[error("empty: found 0 bytes, expected an image (TIFF, PNG or JPEG)")]
-    Empty,
-    /// The first bytes are of no known image format.
-    #[error("not an image: found {found} at byte 0, expected TIFF, PNG or JPEG")]
-    UnknownFormat {
-        /// The first bytes, as text where they are text.
-        found: String,
-    },
-    /// The data end before the image does.
-    #[error("truncated {format}: found {found_bytes} bytes, expected more ({detail})")]
-    Truncated {
-        /// The kind of file.
-        format: FrameFormat,
-        /// The bytes there are.
-        found_bytes: usize,
-        /// What was being read.
-        detail: String,
-    },
-    /// The data break the format's rules.
-    #[error("damaged {format}: {detail}")]
-    Malformed {
-        /// The kind of file.
-        format: FrameFormat,
-        /// What was found, and where.
-        detail: String,
-    },
-    /// A valid file of a kind that is not supported.
-    #[error("unsupported {format}: found {found}, expected {expected}")]
-    Unsupported {
-        /// The kind of file.
-        format: FrameFormat,
-        /// What the file holds.
-        found: String,
-        /// What is supported.
-        expected: &'static str,
-    },
-    /// More pixels than [`MAX_PIXELS`].
-    #[error("too large: found {width} x {height} pixels, expected at most {MAX_PIXELS} in all")]
-    TooLarge {
-        /// Columns.
-        width: usize,
-        /// Rows.
-        height: usize,
-    },
-    /// A side shorter than [`MIN_SIDE_PX`].
-    #[error(
-        "too small: found {width} x {height} pixels, expected at least {MIN_SIDE_PX} on each side"
-    )]
-    TooSmall {
-        /// Columns.
-        width: usize,
-        /// Rows.
-        height: usize,
-    },
-    /// The number of pixels is not width times height.
-    #[error("found {found} pixels, expected {expected} (width times height)")]
-    WrongLength {
-        /// Width times height.
-        expected: usize,
-        /// The pixels there are.
-        found: usize,
-    },
-    /// No pixel has a value.
-    #[error("no pixel has a value: found only NaN, expected numbers")]
-    NoValues,
+/// Reads the first image in the file `path`, whatever its name ends in.
+/// # Errors
+/// As [`read_page`].
+pub fn read(path: impl AsRef<Path>) -> Result<Frame, FrameError> {
+    read_page(path, None)
 }
 
-/// Reads the image in the file `path`, whatever its name ends in.
+/// Reads one image of the file `path`: `page`, counted from 1, else the first.
 /// # Errors
 /// [`FrameError::File`] with the path, around what is wrong.
-pub fn read(path: impl AsRef<Path>) -> Result<Frame, FrameError> {
+pub fn read_page(path: impl AsRef<Path>, page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
     let path = path.as_ref();
-    let in_file = |source: FrameError| FrameError::File {
-        path: path.to_path_buf(),
-        source: Box::new(source),
-    };
-    let bytes = std::fs::read(path).map_err(|e| in_file(e.into()))?;
-    decode(&bytes).map_err(in_file)
+    std::fs::read(path)
+        .map_err(FrameError::from)
+        .and_then(|bytes| decode_page(&bytes, page))
+        .map_err(|error| error.in_file(path))
 }
 
-/// Decodes the image in `bytes`; the format is told from the first of them.
+/// Decodes the first image in `bytes`; the format is told from the first of them.
+/// # Errors
+/// As [`decode_page`].
+pub fn decode(bytes: &[u8]) -> Result<Frame, FrameError> {
+    decode_page(bytes, None)
+}
+
+/// Decodes one image in `bytes`: `page`, counted from 1, else the first.
 /// # Errors
 /// [`FrameError`], never [`FrameError::File`].
-pub fn decode(bytes: &[u8]) -> Result<Frame, FrameError> {
-    if bytes.is_empty() {
-        return Err(FrameError::Empty);
-    }
+pub fn decode_page(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
     match format_of(bytes) {
-        Some(FrameFormat::Tiff) => tiff::decode(bytes),
-        Some(FrameFormat::Png) => raster::decode_png(bytes),
-        Some(FrameFormat::Jpeg) => raster::decode_jpeg(bytes),
-        None => Err(FrameError::UnknownFormat {
+        Some(FrameFormat::Gzip) => decode_image(&gzip::unpack(bytes)?, page),
+        _ => decode_image(bytes, page),
+    }
+}
+
+/// The format of what is inside the gzip file that begins with `head`, which is not gzip again; and its first bytes.
+fn format_inside(head: &[u8]) -> (Option<FrameFormat>, Vec<u8>) {
+    const SIGNATURE_BYTES: usize = 16;
+    let inside = gzip::unpack_beginning(head, SIGNATURE_BYTES);
+    let format = format_of(&inside).filter(|format| *format != FrameFormat::Gzip);
+    (format, inside)
+}
+
+/// Decodes one image that is not packed, or no longer.
+fn decode_image(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
+    let only_page = |read: fn(&[u8]) -> Result<Frame, FrameError>| match page {
+        Some(page) if page.get() > 1 => Err(FrameError::NoSuchPage { page, pages: 1 }),
+        _ => read(bytes),
+    };
+    match format_of(bytes) {
+        Some(FrameFormat::Fits) => fits::decode(bytes, page),
+        Some(FrameFormat::Tiff) => tiff::decode(bytes, page),
+        Some(FrameFormat::Png) => only_page(raster::decode_png),
+        Some(FrameFormat::Jpeg) => only_page(raster::decode_jpeg),
+        Some(FrameFormat::Bmp) => only_page(raster::decode_bmp),
+        Some(FrameFormat::Pnm) => only_page(raster::decode_pnm),
+        Some(FrameFormat::Gzip) | None if bytes.is_empty() => Err(FrameError::Empty),
+        Some(FrameFormat::Gzip) | None => Err(FrameError::UnknownFormat {
             found: first_bytes(bytes),
         }),
     }
@@ -224,18 +182,25 @@ pub fn decode(bytes: &[u8]) -> Result<Frame, FrameError> {
 
 /// The format whose signature `bytes` begin with.
 fn format_of(bytes: &[u8]) -> Option<FrameFormat> {
-    const SIGNATURES: [(&[u8], FrameFormat); 6] = [
+    const SIGNATURES: [(&[u8], FrameFormat); 8] = [
+        (b"SIMPLE  =", FrameFormat::Fits),
         (b"II*\0", FrameFormat::Tiff),
         (b"MM\0*", FrameFormat::Tiff),
         (b"II+\0", FrameFormat::Tiff),
         (b"MM\0+", FrameFormat::Tiff),
         (b"\x89PNG\r\n\x1a\n", FrameFormat::Png),
         (b"\xff\xd8\xff", FrameFormat::Jpeg),
+        (b"\x1f\x8b", FrameFormat::Gzip),
     ];
-    SIGNATURES
-        .iter()
-        .find(|(signature, _)| bytes.starts_with(signature))
-        .map(|&(_, format)| format)
+    match bytes {
+        [b'P', b'1'..=b'7', space, ..] if space.is_ascii_whitespace() => Some(FrameFormat::Pnm),
+        // Two letters are little: the four bytes after the file's size, which have no use, are zero, too.
+        [b'B', b'M', _, _, _, _, 0, 0, 0, 0, ..] => Some(FrameFormat::Bmp),
+        _ => SIGNATURES
+            .iter()
+            .find(|(signature, _)| bytes.starts_with(signature))
+            .map(|&(_, format)| format),
+    }
 }
 
 /// The first bytes for an error message: quoted where they are text, else in hexadecimal.
@@ -259,83 +224,6 @@ fn check_size(width: usize, height: usize) -> Result<(), FrameError> {
     match width.checked_mul(height) {
         Some(count) if count <= MAX_PIXELS => Ok(()),
         _ => Err(FrameError::TooLarge { width, height }),
-    }
-}
-
-/// Samples of one frame as a reader decoded them.
-struct Samples<'a, T> {
-    width: usize,
-    height: usize,
-    /// Interleaved, `height * width * channels`.
-    values: &'a [T],
-    /// 1 grey, 2 grey and alpha, 3 colour, 4 colour and alpha.
-    channels: usize,
-    /// The largest level of the format, in ADU.
-    full_scale: T,
-}
-
-/// The frame of integer samples: luminance, saturation, and the unit that the levels come in.
-fn frame_from_integers<T: Copy + Into<u32>>(samples: &Samples<'_, T>) -> Result<Frame, FrameError> {
-    let (width, height) = (samples.width, samples.height);
-    check_size(width, height)?;
-    let expected = width * height * samples.channels;
-    let values = samples
-        .values
-        .get(..expected)
-        .ok_or(FrameError::WrongLength {
-            expected: width * height,
-            found: samples.values.len() / samples.channels,
-        })?;
-    let full_scale: u32 = samples.full_scale.into();
-    let full = full_scale as f32;
-    let level = |v: T| -> f32 { v.into() as f32 };
-    let pixels = match samples.channels {
-        1 => values.iter().map(|&v| level(v)).collect(),
-        2 => values.chunks_exact(2).map(|c| level(c[0])).collect(),
-        channels => values
-            .chunks_exact(channels)
-            .map(|c| luminance([level(c[0]), level(c[1]), level(c[2])], full))
-            .collect(),
-    };
-    let step = if samples.channels <= 2 {
-        level_step(values, full_scale)
-    } else {
-        1
-    };
-    // Twelve bits in the upper part of sixteen saturate at 65520, not at 65535.
-    let saturation = full_scale / step * step;
-    Ok(Frame::new(width, height, pixels)?.with_levels(step as f32, Some(saturation as f32)))
-}
-
-/// The luminance of one pixel; `full` where a channel is saturated.
-fn luminance(rgb: [f32; 3], full: f32) -> f32 {
-    if rgb.iter().any(|&channel| channel >= full) {
-        return full;
-    }
-    if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
-        return rgb[0];
-    }
-    rgb.iter().zip(LUMINANCE_WEIGHTS).map(|(c, w)| c * w).sum()
-}
-
-/// The largest power of two that divides all levels below full scale: 16 where twelve bits are stored in sixteen.
-fn level_step<T: Copy + Into<u32>>(values: &[T], full_scale: u32) -> u32 {
-    let mut bits = MAX_STEP;
-    for &value in values {
-        let value: u32 = value.into();
-        if value < full_scale {
-            bits |= value;
-        }
-        if bits & 1 == 1 {
-            return 1;
-        }
-    }
-    let step = 1 << bits.trailing_zeros();
-    // All levels zero, or nothing but full scale: nothing can be told.
-    if step >= MAX_STEP.min(full_scale) {
-        1
-    } else {
-        step
     }
 }
 

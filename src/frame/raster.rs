@@ -1,8 +1,11 @@
-//! PNG and JPEG, decoded by the `image` crate to 8 or 16 bits a sample.
+//! PNG, JPEG, BMP and PNM, decoded by the `image` crate to 8 or 16 bits a sample.
 
-use super::{Frame, FrameError, FrameFormat, MAX_PIXELS, Samples, check_size, frame_from_integers};
+use super::levels::{Samples, frame_from_integers};
+use super::{Frame, FrameError, FrameFormat, MAX_PIXELS, check_size, exif};
+use image::codecs::bmp::BmpDecoder;
 use image::codecs::jpeg::JpegDecoder;
 use image::codecs::png::PngDecoder;
+use image::codecs::pnm::PnmDecoder;
 use image::error::{ImageError, UnsupportedErrorKind};
 use image::{ColorType, DynamicImage, ExtendedColorType, ImageDecoder, Limits};
 use std::io::{Cursor, ErrorKind};
@@ -12,10 +15,12 @@ use std::io::{Cursor, ErrorKind};
 /// As [`super::decode`].
 pub(super) fn decode_png(bytes: &[u8]) -> Result<Frame, FrameError> {
     let format = FrameFormat::Png;
-    // The size stands at bytes 16-23; looked at first, so that the decoder allocates nothing for absurd ones.
-    if let Some(Ok(size)) = bytes.get(16..24).map(<[u8; 8]>::try_from) {
-        let side = |b: &[u8]| b.iter().fold(0usize, |n, &byte| n << 8 | usize::from(byte));
-        check_size(side(&size[..4]), side(&size[4..]))?;
+    // Looked at first, so that the decoder allocates nothing for absurd sizes.
+    if let (Some(width), Some(height)) = (word(bytes, 16), word(bytes, 20)) {
+        check_size(
+            u32::from_be_bytes(width) as usize,
+            u32::from_be_bytes(height) as usize,
+        )?;
     }
     let decoder = PngDecoder::with_limits(Cursor::new(bytes), limits())
         .map_err(|e| error_of(e, format, bytes.len()))?;
@@ -48,6 +53,64 @@ pub(super) fn decode_jpeg(bytes: &[u8]) -> Result<Frame, FrameError> {
     decode_with(decoder, format, bytes.len())
 }
 
+/// Decodes a Windows bitmap.
+/// # Errors
+/// As [`super::decode`].
+pub(super) fn decode_bmp(bytes: &[u8]) -> Result<Frame, FrameError> {
+    /// The least that a header is long if its sides have four bytes each.
+    const LONG_HEADER: u32 = 16;
+    let format = FrameFormat::Bmp;
+    // The decoder has limits of its own; a size beyond ours is told as in any other format.
+    if let (Some(header), Some(width), Some(height)) =
+        (word(bytes, 14), word(bytes, 18), word(bytes, 22))
+        && u32::from_le_bytes(header) >= LONG_HEADER
+    {
+        // Rows run upward, or downward where the height is negative.
+        let side = |word| i32::from_le_bytes(word).unsigned_abs() as usize;
+        check_size(side(width), side(height))?;
+    }
+    let decoder =
+        BmpDecoder::new(Cursor::new(bytes)).map_err(|e| error_of(e, format, bytes.len()))?;
+    decode_with(decoder, format, bytes.len())
+}
+
+/// Decodes a portable anymap: PBM, PGM, PPM (plain or binary) or PAM, with levels as they are in the file.
+/// # Errors
+/// As [`super::decode`].
+pub(super) fn decode_pnm(bytes: &[u8]) -> Result<Frame, FrameError> {
+    let format = FrameFormat::Pnm;
+    let decoder =
+        PnmDecoder::new(Cursor::new(bytes)).map_err(|e| error_of(e, format, bytes.len()))?;
+    let maxval = decoder.header().maximal_sample();
+    let decoded = Decoded::new(decoder, format, bytes.len())?;
+    // The decoder spreads the levels up to `maxval` over all of 8 or 16 bits, and rounds.
+    let level = |spread: u16, full: u16| {
+        let level = f64::from(spread) * f64::from(maxval) / f64::from(full);
+        level.round() as u16
+    };
+    match (decoded.depth, u16::try_from(maxval)) {
+        (Depth::Eight, Ok(maxval @ 0..=0xff)) => {
+            let spread = decoded.image.as_bytes().iter();
+            let levels: Vec<u16> = spread.map(|&v| level(u16::from(v), 0xff)).collect();
+            decoded.integers(&levels, maxval)
+        }
+        (Depth::Sixteen, Ok(maxval)) => {
+            let spread = decoded.words();
+            let levels: Vec<u16> = spread.iter().map(|&v| level(v, u16::MAX)).collect();
+            decoded.integers(&levels, maxval)
+        }
+        _ => Err(unsupported(
+            format,
+            format!("levels up to {maxval} without a TUPLTYPE"),
+        )),
+    }
+}
+
+/// The four bytes at `at`.
+fn word(bytes: &[u8], at: usize) -> Option<[u8; 4]> {
+    bytes.get(at..)?.first_chunk().copied()
+}
+
 /// Whether an end-of-image marker follows the last start of a scan; scan data cannot contain either.
 fn has_jpeg_end(bytes: &[u8]) -> bool {
     let last = |marker: u8| bytes.windows(2).rposition(|pair| pair == [0xff, marker]);
@@ -63,48 +126,87 @@ fn limits() -> Limits {
     limits
 }
 
-/// Checks the size, decodes, and makes luminance of it.
+/// Checks the size, decodes, and makes luminance of it; adds what Exif says.
 fn decode_with(
-    decoder: impl ImageDecoder,
+    mut decoder: impl ImageDecoder,
     format: FrameFormat,
     found_bytes: usize,
 ) -> Result<Frame, FrameError> {
-    let (width, height) = decoder.dimensions();
-    check_size(width as usize, height as usize)?;
-    let color = decoder.color_type();
-    let image =
-        DynamicImage::from_decoder(decoder).map_err(|e| error_of(e, format, found_bytes))?;
-    let (width, height) = (width as usize, height as usize);
-    let channels = usize::from(color.channel_count());
-    match color {
-        ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => {
-            frame_from_integers(&Samples {
-                width,
-                height,
-                values: image.as_bytes(),
-                channels,
-                full_scale: u8::MAX,
-            })
-        }
-        ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
-            let values: Vec<u16> = image
-                .as_bytes()
-                .chunks_exact(2)
-                .map(|pair| u16::from_ne_bytes([pair[0], pair[1]]))
-                .collect();
-            frame_from_integers(&Samples {
-                width,
-                height,
-                values: &values,
-                channels,
-                full_scale: u16::MAX,
-            })
-        }
-        other => Err(FrameError::Unsupported {
-            format,
-            found: format!("{other:?}"),
-            expected: "8 or 16 bits a sample",
-        }),
+    let exif = decoder.exif_metadata().ok().flatten();
+    let decoded = Decoded::new(decoder, format, found_bytes)?;
+    let frame = match decoded.depth {
+        Depth::Eight => decoded.integers(decoded.image.as_bytes(), u8::MAX),
+        Depth::Sixteen => decoded.integers(&decoded.words(), u16::MAX),
+    }?;
+    let metadata = exif.map(|exif| exif::metadata(&exif, frame.width));
+    Ok(frame.with_metadata(metadata.unwrap_or_default()))
+}
+
+/// Bits of a sample.
+#[derive(Clone, Copy)]
+enum Depth {
+    Eight,
+    Sixteen,
+}
+
+/// What a decoder made of a file.
+struct Decoded {
+    image: DynamicImage,
+    channels: usize,
+    depth: Depth,
+}
+
+impl Decoded {
+    fn new(
+        decoder: impl ImageDecoder,
+        format: FrameFormat,
+        found_bytes: usize,
+    ) -> Result<Self, FrameError> {
+        let (width, height) = decoder.dimensions();
+        check_size(width as usize, height as usize)?;
+        let color = decoder.color_type();
+        let depth = match color {
+            ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => Depth::Eight,
+            ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
+                Depth::Sixteen
+            }
+            other => return Err(unsupported(format, format!("{other:?}"))),
+        };
+        let image =
+            DynamicImage::from_decoder(decoder).map_err(|e| error_of(e, format, found_bytes))?;
+        Ok(Self {
+            image,
+            channels: usize::from(color.channel_count()),
+            depth,
+        })
+    }
+
+    /// The samples of an image of 16 bits.
+    fn words(&self) -> Vec<u16> {
+        let pairs = self.image.as_bytes().chunks_exact(2);
+        pairs.map(|p| u16::from_ne_bytes([p[0], p[1]])).collect()
+    }
+
+    fn integers<T: Copy + PartialEq + Into<i64>>(
+        &self,
+        values: &[T],
+        full_scale: T,
+    ) -> Result<Frame, FrameError> {
+        let samples = Samples {
+            width: self.image.width() as usize,
+            height: self.image.height() as usize,
+            values,
+            channels: self.channels,
+        };
+        frame_from_integers(&samples, full_scale)
+    }
+}
+
+fn unsupported(format: FrameFormat, found: String) -> FrameError {
+    FrameError::Unsupported {
+        format,
+        found,
+        expected: "8 or 16 bits a sample, grey or colour",
     }
 }
 
@@ -118,18 +220,25 @@ fn error_of(error: ImageError, format: FrameFormat, found_bytes: usize) -> Frame
     };
     match error {
         ImageError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => truncated(detail),
-        ImageError::Unsupported(e) => FrameError::Unsupported {
+        ImageError::Unsupported(e) => unsupported(
             format,
-            found: match e.kind() {
+            match e.kind() {
                 UnsupportedErrorKind::Color(color) => format!("{color:?}"),
                 _ => detail,
             },
-            expected: "8 or 16 bits a sample, grey or colour",
-        },
+        ),
         // The decoders below word the end of the data in their own ways.
-        _ if ["end of file", "eof", "exhausted", "more bytes", "no more"]
-            .iter()
-            .any(|words| detail.to_lowercase().contains(words)) =>
+        _ if [
+            "end of file",
+            "eof",
+            "exhausted",
+            "more bytes",
+            "no more",
+            "not enough bytes",
+            "not enough data",
+        ]
+        .iter()
+        .any(|words| detail.to_lowercase().contains(words)) =>
         {
             truncated(detail)
         }

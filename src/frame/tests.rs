@@ -1,6 +1,6 @@
 use super::*;
 use proptest::prelude::*;
-use std::io::Cursor;
+use std::io::{Cursor, Write};
 
 fn tiff_of<C: ::tiff::encoder::colortype::ColorType>(
     width: u32,
@@ -147,7 +147,7 @@ fn absurd_and_tiny_sizes_are_refused() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(300))]
+    #![proptest_config(ProptestConfig::with_cases(1000))]
 
     #[test]
     fn arbitrary_bytes_never_panic(kind in 0usize..7, tail in proptest::collection::vec(any::<u8>(), 0..400)) {
@@ -158,17 +158,288 @@ proptest! {
     }
 
     #[test]
-    fn damaged_files_never_panic(position in 0usize..700, value: u8, kind in 0usize..3) {
-        use image::{DynamicImage, ImageBuffer, ImageFormat, Luma};
-        let grey = DynamicImage::ImageLuma8(ImageBuffer::from_fn(24, 16, |x, y| Luma([(x * y) as u8])));
-        let data: Vec<u8> = (0..24 * 16).map(|i| i as u8).collect();
-        let mut bytes = match kind {
-            0 => tiff_of::<::tiff::encoder::colortype::Gray8>(24, 16, &data),
-            1 => encoded_by_image(&grey, ImageFormat::Png),
-            _ => encoded_by_image(&grey, ImageFormat::Jpeg),
-        };
-        let position = position % bytes.len();
-        bytes[position] = value;
-        let _ = decode(&bytes);
+    fn damaged_files_never_panic(
+        kind in 0..SAMPLES,
+        changes in proptest::collection::vec((any::<u16>(), any::<u8>()), 0..6),
+        early in any::<bool>(),
+        length in any::<u16>(),
+        page in 0_usize..4,
+    ) {
+        let mut bytes = sample(kind);
+        let all = bytes.len();
+        for (at, value) in changes {
+            // Headers are small, and where most can go wrong.
+            let range = if early { all.min(200) } else { all };
+            bytes[usize::from(at) % range] = value;
+        }
+        if length % 3 == 0 {
+            bytes.truncate(usize::from(length) % all);
+        }
+        let _ = decode_page(&bytes, NonZeroUsize::new(page));
     }
+}
+
+/// How many kinds of small files [`sample`] makes.
+const SAMPLES: usize = 19;
+
+/// A small valid file of one of many kinds.
+fn sample(kind: usize) -> Vec<u8> {
+    use ::tiff::encoder::colortype::{Gray16, Gray32Float, GrayI16, RGB8};
+    use ::tiff::encoder::{Compression, TiffEncoder};
+    use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgb};
+    let bytes: Vec<u8> = (0..24 * 16).map(|i| i as u8).collect();
+    let words: Vec<u16> = (0..24 * 16).map(|i| i * 150).collect();
+    let grey = || DynamicImage::ImageLuma8(ImageBuffer::from_raw(24, 16, bytes.clone()).unwrap());
+    let grey16: ImageBuffer<Luma<u16>, _> = ImageBuffer::from_raw(24, 16, words.clone()).unwrap();
+    let colour = DynamicImage::ImageRgb8(ImageBuffer::from_fn(24, 16, |x, y| {
+        Rgb([x as u8, y as u8, 7])
+    }));
+    let compressed = |compression| {
+        let mut out = Cursor::new(Vec::new());
+        let encoder = TiffEncoder::new(&mut out).unwrap();
+        let mut encoder = encoder.with_compression(compression);
+        encoder.write_image::<Gray16>(24, 16, &words).unwrap();
+        encoder.write_image::<Gray16>(24, 16, &words).unwrap();
+        out.into_inner()
+    };
+    let fits = |bitpix: i32, data: Vec<u8>| {
+        let cards = [
+            "SIMPLE  = T".to_owned(),
+            format!("BITPIX  = {bitpix}"),
+            "NAXIS   = 2".to_owned(),
+            "NAXIS1  = 24".to_owned(),
+            "NAXIS2  = 16".to_owned(),
+            "END".to_owned(),
+        ];
+        let mut fits: Vec<u8> = cards
+            .iter()
+            .flat_map(|card| format!("{card:<80}").into_bytes())
+            .collect();
+        fits.resize(2880, b' ');
+        fits.extend(data);
+        fits
+    };
+    match kind {
+        0 => tiff_of::<::tiff::encoder::colortype::Gray8>(24, 16, &bytes),
+        1 => compressed(Compression::Uncompressed),
+        2 => compressed(Compression::Lzw),
+        3 => compressed(Compression::Deflate(Default::default())),
+        4 => compressed(Compression::Packbits),
+        5 => tiff_of::<Gray32Float>(24, 16, &[1.5; 24 * 16]),
+        6 => tiff_of::<GrayI16>(24, 16, &[-5; 24 * 16]),
+        7 => tiff_of::<RGB8>(8, 16, &bytes),
+        8 => encoded_by_image(&grey(), ImageFormat::Png),
+        9 => encoded_by_image(&grey16.into(), ImageFormat::Png),
+        10 => encoded_by_image(&grey(), ImageFormat::Jpeg),
+        11 => encoded_by_image(&colour, ImageFormat::Jpeg),
+        12 => encoded_by_image(&grey(), ImageFormat::Bmp),
+        13 => encoded_by_image(&colour, ImageFormat::Bmp),
+        14 => encoded_by_image(&grey(), ImageFormat::Pnm),
+        15 => b"P2\n# a remark\n3 3\n4095\n0 1 2 3 4 5 6 7 4095\n".to_vec(),
+        16 => [b"P6 8 16 255\n", &bytes[..]].concat(),
+        17 => fits(8, bytes),
+        _ => zipped(&fits(-32, [0x3f_u8, 0x80, 0, 0].repeat(24 * 16))),
+    }
+}
+
+fn zipped(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+#[test]
+fn every_sample_is_valid() {
+    for kind in 0..SAMPLES {
+        let read = decode(&sample(kind));
+        assert!(read.is_ok(), "{kind}: {}", read.unwrap_err());
+    }
+}
+
+#[test]
+fn plain_and_binary_grey_maps_keep_the_levels_of_their_own_depth() {
+    let levels: Vec<u16> = (0..4096).collect();
+    let text: Vec<String> = levels.iter().map(u16::to_string).collect();
+    let plain = format!("P2 64 64 4095\n{}", text.join(" ")).into_bytes();
+    let words: Vec<u8> = levels.iter().flat_map(|v| v.to_be_bytes()).collect();
+    let binary = [b"P5 64 64 4095\n", &words[..]].concat();
+    for bytes in [plain, binary] {
+        let frame = decode(&bytes).unwrap();
+        let expected: Vec<f32> = levels.iter().map(|v| f32::from(*v)).collect();
+        assert_eq!(frame.pixels, expected);
+        assert_eq!((frame.step_adu, frame.saturation_adu), (1.0, Some(4095.0)));
+    }
+    let bits = decode(b"P1 3 3 1 0 1 0 1 0 1 0 1\n").unwrap();
+    assert_eq!(bits.pixels[..3], [0.0, 1.0, 0.0], "1 is black");
+    // Without its type the decoder would take such levels for bytes.
+    let untyped = b"P7\nWIDTH 3\nHEIGHT 3\nDEPTH 1\nMAXVAL 65535\nENDHDR\n012345678012345678";
+    assert!(matches!(
+        decode(untyped),
+        Err(FrameError::Unsupported { .. })
+    ));
+}
+
+#[test]
+fn tiffs_of_any_integer_and_float_are_read() {
+    use ::tiff::encoder::colortype::*;
+    let read = |bytes: Vec<u8>| {
+        let frame = decode(&bytes).unwrap();
+        (frame.pixels[4], frame.step_adu, frame.saturation_adu)
+    };
+    let mut values = [1_i8; 9];
+    values[4] = -7;
+    assert_eq!(
+        read(tiff_of::<GrayI8>(3, 3, &values)),
+        (-7.0, 1.0, Some(127.0))
+    );
+    let words = values.map(i16::from);
+    assert_eq!(
+        read(tiff_of::<GrayI16>(3, 3, &words)),
+        (-7.0, 1.0, Some(32767.0))
+    );
+    let longs = values.map(i32::from);
+    assert_eq!(
+        read(tiff_of::<GrayI32>(3, 3, &longs)),
+        (-7.0, 1.0, Some(2147483648.0))
+    );
+    let unsigned = values.map(|v| u32::from(v.unsigned_abs()));
+    assert_eq!(
+        read(tiff_of::<Gray32>(3, 3, &unsigned)),
+        (7.0, 1.0, Some(4294967296.0))
+    );
+    assert_eq!(
+        read(tiff_of::<Gray64>(3, 3, &unsigned.map(u64::from))),
+        (7.0, 1.0, None)
+    );
+    assert_eq!(
+        read(tiff_of::<Gray64Float>(3, 3, &values.map(f64::from))),
+        (-7.0, 0.0, None)
+    );
+    assert_eq!(
+        read(tiff_of::<RGB32Float>(
+            3,
+            3,
+            &[[3.0_f32; 27], [2.0; 27]].concat()[..27]
+        )),
+        (3.0, 0.0, None)
+    );
+}
+
+/// A TIFF by hand, for what the encoder does not write: little-endian, one strip a plane.
+fn tiff_by_hand(tags: &[(u16, u32)], planes: &[&[u8]]) -> Vec<u8> {
+    let entries = tags.len() + 2;
+    let after = 8 + 2 + 12 * entries as u32 + 4;
+    let count = planes.len() as u32;
+    let data = after + 8 * count;
+    let mut places = vec![data];
+    planes
+        .iter()
+        .for_each(|plane| places.push(places[places.len() - 1] + plane.len() as u32));
+    let lengths: Vec<u32> = planes.iter().map(|plane| plane.len() as u32).collect();
+    let offset_or = |at: u32, only: u32| if count == 1 { only } else { at };
+    let mut all: Vec<(u16, u32, u32)> = tags.iter().map(|&(tag, value)| (tag, 1, value)).collect();
+    all.push((273, count, offset_or(after, data)));
+    all.push((279, count, offset_or(after + 4 * count, lengths[0])));
+    all.sort_unstable();
+    let mut bytes = b"II*\0\x08\0\0\0".to_vec();
+    bytes.extend((entries as u16).to_le_bytes());
+    for (tag, count, value) in all {
+        bytes.extend(tag.to_le_bytes());
+        // Places are LONG, the others SHORT.
+        let kind: u16 = if [273, 279].contains(&tag) { 4 } else { 3 };
+        bytes.extend(kind.to_le_bytes());
+        bytes.extend(count.to_le_bytes());
+        bytes.extend(value.to_le_bytes());
+    }
+    bytes.extend([0; 4]);
+    for number in places[..planes.len()].iter().chain(&lengths) {
+        bytes.extend(number.to_le_bytes());
+    }
+    planes.iter().for_each(|plane| bytes.extend(*plane));
+    bytes
+}
+
+#[test]
+fn tiffs_of_few_bits_white_as_zero_and_planes_apart_are_read() {
+    const SIZE: [(u16, u32); 2] = [(256, 5), (257, 3)];
+    let tags = |more: &[(u16, u32)]| [&SIZE, more].concat();
+    // Rows of five samples begin with a byte of their own.
+    let bits = tiff_by_hand(&tags(&[(258, 1), (262, 1)]), &[&[0b1010_1000, 0, 0xff]]);
+    let frame = decode(&bits).unwrap();
+    assert_eq!(frame.pixels[..6], [1.0, 0.0, 1.0, 0.0, 1.0, 0.0]);
+    assert_eq!((frame.step_adu, frame.saturation_adu), (1.0, Some(1.0)));
+    let nibbles = tiff_by_hand(
+        &tags(&[(258, 4), (262, 1)]),
+        &[&[0x12, 0x34, 0x50, 0x67, 0x89, 0xa0, 0xbc, 0xde, 0xf0]],
+    );
+    let expected: Vec<f32> = (1..16).map(|v| v as f32).collect();
+    assert_eq!(decode(&nibbles).unwrap().pixels, expected);
+    let white_is_zero = tiff_by_hand(&tags(&[(258, 8), (262, 0)]), &[&[250; 15]]);
+    assert_eq!(decode(&white_is_zero).unwrap().pixels[0], 5.0);
+    let planes = tiff_by_hand(
+        &tags(&[(258, 8), (262, 2), (277, 3), (284, 2)]),
+        &[&[100; 15], &[50; 15], &[20; 15]],
+    );
+    let luminance = decode(&planes).unwrap().pixels[14];
+    assert!(
+        (luminance - (29.9 + 29.35 + 2.28)).abs() < 1e-4,
+        "{luminance}"
+    );
+    let grey_and_alpha = tiff_by_hand(
+        &tags(&[(258, 8), (262, 1), (277, 2), (338, 2)]),
+        &[&[7, 255].repeat(15)],
+    );
+    assert_eq!(decode(&grey_and_alpha).unwrap().pixels, [7.0; 15]);
+}
+
+#[test]
+fn pages_of_a_tiff_are_counted_from_1() {
+    use ::tiff::encoder::colortype::Gray8;
+    let mut out = Cursor::new(Vec::new());
+    let mut encoder = ::tiff::encoder::TiffEncoder::new_big(&mut out).unwrap();
+    for level in 1..=3 {
+        encoder.write_image::<Gray8>(3, 3, &[level; 9]).unwrap();
+    }
+    let bytes = out.into_inner();
+    let page = |number| decode_page(&bytes, NonZeroUsize::new(number));
+    assert_eq!(page(0).unwrap().pixels[0], 1.0);
+    assert_eq!(
+        [1, 2, 3].map(|n| page(n).unwrap().pixels[0]),
+        [1.0, 2.0, 3.0]
+    );
+    assert_eq!(
+        page(5).unwrap_err().to_string(),
+        "no page 5: found 3 pages, expected at least 5"
+    );
+    let png = sample(8);
+    let error = decode_page(&png, NonZeroUsize::new(2)).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "no page 2: found 1 page, expected at least 2"
+    );
+}
+
+#[test]
+fn gzip_is_unpacked_once_and_must_be_whole() {
+    let packed = zipped(&sample(1));
+    assert_eq!(decode(&packed).unwrap(), decode(&sample(1)).unwrap());
+    let error = decode(&packed[..packed.len() - 9]).unwrap_err();
+    assert!(error.to_string().starts_with("truncated gzip: "), "{error}");
+    let error = decode(&zipped(&packed)).unwrap_err().to_string();
+    assert!(
+        error.starts_with("not an image: found the bytes 1f 8b") && error.contains("inside gzip"),
+        "{error}"
+    );
+    assert!(matches!(decode(&zipped(b"")), Err(FrameError::Empty)));
+}
+
+#[test]
+fn infinities_have_no_value_and_alone_make_no_frame() {
+    use ::tiff::encoder::colortype::Gray32Float;
+    let mut data = [1.5_f32; 9];
+    data[..2].copy_from_slice(&[f32::INFINITY, f32::NEG_INFINITY]);
+    let frame = decode(&tiff_of::<Gray32Float>(3, 3, &data)).unwrap();
+    assert!(frame.pixels[0].is_nan() && frame.pixels[1].is_nan());
+    let error = decode(&tiff_of::<Gray32Float>(3, 3, &[f32::INFINITY; 9])).unwrap_err();
+    assert!(matches!(error, FrameError::NoValues), "{error}");
 }

@@ -1,23 +1,27 @@
-//! TIFF: 8 and 16 bit integers, 32 and 64 bit floats; grey, colour or palette, with or without alpha.
+//! TIFF: integers of 1 to 64 bits with and without sign, floats of 16 to 64 bits; grey or colour, with or without alpha;
+//! in strips or tiles, interleaved or plane by plane, as the `tiff` crate decodes them.
 
-use super::{Frame, FrameError, FrameFormat, MAX_PIXELS, Samples, check_size, frame_from_integers};
+use super::levels::{Samples, frame_from_floats, frame_from_integers, interleaved};
+use super::{Frame, FrameError, FrameFormat, MAX_PIXELS, check_size, exif};
 use std::io::Cursor;
-use tiff::ColorType;
+use std::num::NonZeroUsize;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
-use tiff::tags::Tag;
-use tiff::{TiffError, TiffFormatError};
+use tiff::{ColorType, TiffError, TiffFormatError};
 
 /// The most bytes of one decoded sample array: four 16-bit channels of the largest frame.
 const MAX_DECODED_BYTES: usize = MAX_PIXELS * 8;
 
-const SUPPORTED: &str = "8 or 16 bit integers or 32 or 64 bit floats; grey, colour or palette";
+const SUPPORTED: &str = "grey or colour of 1 to 64 bits a sample; not packed, or with LZW, deflate, PackBits, JPEG or fax";
 
-/// Decodes the first image of a TIFF file.
+/// Decodes one image of a TIFF file: `page`, counted from 1, else the first.
 /// # Errors
-/// As [`super::decode`].
-pub(super) fn decode(bytes: &[u8]) -> Result<Frame, FrameError> {
+/// As [`super::decode_page`].
+pub(super) fn decode(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
     let fail = |e: TiffError| error_of(e, bytes.len());
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(fail)?;
+    if let Some(page) = page {
+        seek(&mut decoder, page, bytes.len())?;
+    }
     let (width, height) = decoder.dimensions().map_err(fail)?;
     let (width, height) = (width as usize, height as usize);
     check_size(width, height)?;
@@ -26,105 +30,129 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Frame, FrameError> {
     limits.intermediate_buffer_size = MAX_DECODED_BYTES;
     decoder = decoder.with_limits(limits);
     let color = decoder.colortype().map_err(fail)?;
-    let channels = channels_of(color)?;
-    let planes = decoder.image_buffer_layout().map_err(fail)?.planes;
-    if planes > 1 {
-        return Err(unsupported(format!("{planes} separate colour planes")));
-    }
-    let palette = match color {
-        ColorType::Palette(_) => Some(decoder.get_tag_u16_vec(Tag::ColorMap).map_err(fail)?),
-        _ => None,
+    let layout = Layout {
+        width,
+        height,
+        bits: color.bit_depth(),
+        channels: channels_of(color)?,
+        planes: decoder.image_buffer_layout().map_err(fail)?.planes,
     };
-    let samples = decoder.read_image().map_err(fail)?;
-    if let Some(map) = palette {
-        return from_palette(width, height, &samples, &map);
-    }
-    match samples {
-        DecodingResult::U8(values) if color.bit_depth() == 8 => frame_from_integers(&Samples {
-            width,
-            height,
-            values: &values,
-            channels,
-            full_scale: u8::MAX,
-        }),
-        DecodingResult::U16(values) if color.bit_depth() == 16 => frame_from_integers(&Samples {
-            width,
-            height,
-            values: &values,
-            channels,
-            full_scale: u16::MAX,
-        }),
-        DecodingResult::F32(values) => from_floats(width, height, channels, values),
-        DecodingResult::F64(values) => from_floats(
-            width,
-            height,
-            channels,
-            values.iter().map(|&v| v as f32).collect(),
-        ),
-        _ => Err(unsupported(format!("{color:?}"))),
+    let mut samples = DecodingResult::U8(Vec::new());
+    decoder.read_image_to_buffer(&mut samples).map_err(fail)?;
+    Ok(layout
+        .frame(samples)?
+        .with_metadata(exif::metadata(bytes, width)))
+}
+
+/// Goes to the image `page`, counted from 1.
+fn seek(
+    decoder: &mut Decoder<Cursor<&[u8]>>,
+    page: NonZeroUsize,
+    found_bytes: usize,
+) -> Result<(), FrameError> {
+    let absent = |e: &TiffError| {
+        matches!(
+            e,
+            TiffError::FormatError(TiffFormatError::ImageFileDirectoryNotFound)
+        )
+    };
+    match decoder.seek_to_image(page.get() - 1) {
+        Err(e) if absent(&e) => {
+            let exists =
+                |index: &usize| !matches!(decoder.seek_to_image(*index), Err(e) if absent(&e));
+            let pages = (0..page.get()).take_while(exists).count();
+            Err(FrameError::NoSuchPage { page, pages })
+        }
+        other => other.map_err(|e| error_of(e, found_bytes)),
     }
 }
 
 /// The number of samples that make a pixel.
 fn channels_of(color: ColorType) -> Result<usize, FrameError> {
     match color {
-        ColorType::Gray(_) | ColorType::Palette(_) => Ok(1),
-        ColorType::GrayA(_) => Ok(2),
+        ColorType::Gray(_) => Ok(1),
+        // This is how the decoder calls grey with something more, which is transparency.
+        ColorType::GrayA(_) | ColorType::Multiband { num_samples: 2, .. } => Ok(2),
         ColorType::RGB(_) => Ok(3),
         ColorType::RGBA(_) => Ok(4),
         other => Err(unsupported(format!("{other:?}"))),
     }
 }
 
-/// The frame of float samples, which have neither steps nor a full scale.
-fn from_floats(
+/// How decoded samples make an image.
+struct Layout {
     width: usize,
     height: usize,
+    bits: u8,
     channels: usize,
-    values: Vec<f32>,
-) -> Result<Frame, FrameError> {
-    let pixels = match channels {
-        1 => values,
-        2 => values.chunks_exact(2).map(|c| c[0]).collect(),
-        _ => values
-            .chunks_exact(channels)
-            .map(|c| super::luminance([c[0], c[1], c[2]], f32::INFINITY))
-            .collect(),
-    };
-    Frame::new(width, height, pixels)
+    /// 1 where the channels of a pixel follow each other, else one for each channel.
+    planes: usize,
 }
 
-/// The frame of an indexed image: `map` holds all reds, then all greens, then all blues, 16 bits each.
-fn from_palette(
-    width: usize,
-    height: usize,
-    samples: &DecodingResult,
-    map: &[u16],
-) -> Result<Frame, FrameError> {
-    let DecodingResult::U8(indices) = samples else {
-        return Err(unsupported("a palette of more than 8 bits".to_string()));
-    };
-    let colors = map.len() / 3;
-    if indices.len() < width * height || indices.iter().any(|&i| usize::from(i) >= colors) {
-        return Err(FrameError::Malformed {
-            format: FrameFormat::Tiff,
-            detail: format!("found a colour index beyond the palette's {colors} entries"),
-        });
+impl Layout {
+    fn frame(&self, samples: DecodingResult) -> Result<Frame, FrameError> {
+        // What has more than 24 bits is rounded, integer or not.
+        let rounded = |values: Vec<f32>| Ok(self.floats(values)?.with_levels(1.0, None));
+        match samples {
+            DecodingResult::U8(packed) if self.bits < 8 => {
+                let full_scale = u8::MAX >> (8 - self.bits);
+                self.integers(self.unpacked(&packed), full_scale)
+            }
+            DecodingResult::U8(values) => self.integers(values, u8::MAX),
+            DecodingResult::U16(values) => self.integers(values, u16::MAX),
+            DecodingResult::U32(values) => self.integers(values, u32::MAX),
+            DecodingResult::U64(values) => rounded(values.iter().map(|v| *v as f32).collect()),
+            DecodingResult::I8(values) => self.integers(values, i8::MAX),
+            DecodingResult::I16(values) => self.integers(values, i16::MAX),
+            DecodingResult::I32(values) => self.integers(values, i32::MAX),
+            DecodingResult::I64(values) => rounded(values.iter().map(|v| *v as f32).collect()),
+            DecodingResult::F16(values) => self.floats(values.iter().map(|v| v.to_f32()).collect()),
+            DecodingResult::F32(values) => self.floats(values),
+            DecodingResult::F64(values) => self.floats(values.iter().map(|v| *v as f32).collect()),
+        }
     }
-    let values: Vec<u16> = indices
-        .iter()
-        .flat_map(|&i| {
-            let i = usize::from(i);
-            [map[i], map[colors + i], map[2 * colors + i]]
-        })
-        .collect();
-    frame_from_integers(&Samples {
-        width,
-        height,
-        values: &values,
-        channels: 3,
-        full_scale: u16::MAX,
-    })
+
+    fn integers<T: Copy + PartialEq + Into<i64>>(
+        &self,
+        values: Vec<T>,
+        full_scale: T,
+    ) -> Result<Frame, FrameError> {
+        let samples = Samples {
+            width: self.width,
+            height: self.height,
+            values: &self.by_pixel(values),
+            channels: self.channels,
+        };
+        frame_from_integers(&samples, full_scale)
+    }
+
+    fn floats(&self, values: Vec<f32>) -> Result<Frame, FrameError> {
+        let size = (self.width, self.height);
+        frame_from_floats(size, self.channels, self.by_pixel(values))
+    }
+
+    fn by_pixel<T: Copy>(&self, values: Vec<T>) -> Vec<T> {
+        let wanted = self.width * self.height * self.channels;
+        match values.get(..wanted) {
+            Some(planes) if self.planes > 1 => interleaved(planes, self.channels),
+            _ => values,
+        }
+    }
+
+    /// Samples of less than a byte, of which each row begins with a new byte and the highest bits come first.
+    fn unpacked(&self, packed: &[u8]) -> Vec<u8> {
+        let bits = usize::from(self.bits);
+        let row_samples = self.width * self.channels;
+        let row_bytes = (row_samples * bits).div_ceil(8);
+        let sample = |row: &[u8], i: usize| {
+            let bit = i * bits;
+            row[bit / 8] << (bit % 8) >> (8 - bits)
+        };
+        packed
+            .chunks_exact(row_bytes)
+            .flat_map(|row| (0..row_samples).map(move |i| sample(row, i)))
+            .collect()
+    }
 }
 
 fn unsupported(found: String) -> FrameError {
@@ -146,7 +174,9 @@ fn error_of(error: TiffError, found_bytes: usize) -> FrameError {
                 detail: e.to_string(),
             }
         }
-        TiffError::UnsupportedError(e) => unsupported(e.to_string()),
+        TiffError::UnsupportedError(e) => {
+            unsupported(e.to_string().trim_end_matches(" is unsupported").to_owned())
+        }
         TiffError::FormatError(TiffFormatError::InvalidDimensions(width, height)) => {
             FrameError::TooSmall {
                 width: width as usize,

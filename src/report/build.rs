@@ -32,6 +32,10 @@ impl FrameReport {
             width: solution.width,
             height: solution.height,
             date: solution.date.as_ref().map(date),
+            exposure_s: solution
+                .exposure_s
+                .and_then(|s| significant(s, FLUX_DIGITS)),
+            notes: solution.notes.clone(),
             status: Status::NotIdentified,
             reason: None,
             attitude: None,

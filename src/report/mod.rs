@@ -34,6 +34,10 @@ pub struct FrameReport {
     pub height: usize,
     /// When it was taken, where that is known; else the stars stand where they stood at J2000.0.
     pub date: Option<DateReport>,
+    /// How long it was exposed, in seconds, where its file says so.
+    pub exposure_s: Option<f64>,
+    /// What the file's header says and turned out wrong, or cannot be true: a sentence each.
+    pub notes: Vec<String>,
     /// Whether the stars are identified.
     pub status: Status,
     /// Why they are not, and what may help.
@@ -62,7 +66,7 @@ pub struct DateReport {
     pub iso: String,
     /// The Julian epoch in years.
     pub year: f64,
-    /// `option` or `file name`.
+    /// `option`, `file header` or `file name`.
     pub source: DateSource,
 }
 

@@ -28,6 +28,8 @@ fn unidentified() -> FrameReport {
         width: 1024,
         height: 768,
         date: None,
+        exposure_s: None,
+        notes: Vec::new(),
         status: Status::NotIdentified,
         reason: Some(
             "no arrangement of catalogue stars matches the 12 detections; if this is the sky, the field \
@@ -59,6 +61,10 @@ fn identified() -> FrameReport {
             year: 2019.5739,
             source: DateSource::FileName,
         }),
+        exposure_s: Some(0.5),
+        notes: vec![
+            "FOCALLEN is ignored: found 0, expected a focal length from 1 to 100000 mm".into(),
+        ],
         status: Status::Identified,
         reason: None,
         attitude: Some(AttitudeReport {

@@ -38,6 +38,7 @@ impl FrameReport {
                 .map(|magnitude| self.faintest_line(magnitude)),
         );
         lines.push(self.date_line());
+        lines.extend(self.notes.iter().map(|note| labelled("note", note)));
         lines.extend(self.background_line());
         lines.push(self.timing_line());
         lines.extend(self.star_lines(options));
@@ -74,6 +75,7 @@ impl FrameReport {
             Some(date) => {
                 let source = match date.source {
                     DateSource::Option => "as given",
+                    DateSource::FileHeader => "from the file's header",
                     DateSource::FileName => "from the file's name",
                 };
                 let utc = date.iso.replace('T', " ").replace('Z', " UTC");

@@ -1,0 +1,241 @@
+//! Exif, which cameras write into TIFF, JPEG and PNG.
+//!
+//! Taken are `DateTimeOriginal`, `ExposureTime`, `FocalLength` and `FocalPlaneXResolution`. TIFF's own `DateTime`
+//! is not: it is when the file was made or changed.
+//!
+//! Caveat: without `OffsetTimeOriginal` the clock's time zone is not known, and only the day is taken.
+
+use super::metadata::{EXPOSURE, FOCAL_LENGTH, FrameMetadata, PIXEL_SIZE, Quantity};
+use crate::epoch::ObservationDate;
+use exif::{Field, In, Reader, Tag, Value};
+
+/// What the Exif attributes in `bytes`, laid out as a TIFF file, say of a frame `width` pixels wide. Attributes that
+/// cannot be understood are no reason to refuse an image.
+pub(super) fn metadata(bytes: &[u8], width: usize) -> FrameMetadata {
+    let attributes = Attributes(fields(bytes));
+    let mut metadata = FrameMetadata::default();
+    metadata.exposure_s = attributes.number(&mut metadata, &EXPOSURE, Tag::ExposureTime);
+    metadata.focal_length_mm = attributes.number(&mut metadata, &FOCAL_LENGTH, Tag::FocalLength);
+    metadata.pixel_size_um = attributes.pixel_size_um(&mut metadata, width);
+    if let Some(day) = attributes.text(Tag::DateTimeOriginal) {
+        let date = attributes.date(&day);
+        metadata.date = metadata.sensible_date("DateTimeOriginal", &day, date);
+    }
+    metadata
+}
+
+/// All attributes that can be read; many a camera's Exif breaks the rules somewhere.
+fn fields(bytes: &[u8]) -> Vec<Field> {
+    if let Ok((fields, _)) = exif::parse_exif(bytes) {
+        return fields;
+    }
+    let mut lenient = Reader::new();
+    let read = lenient.continue_on_error(true).read_raw(bytes.to_vec());
+    let exif = read.or_else(|error| error.distill_partial_result(|_| ()));
+    exif.map_or(Vec::new(), |exif| exif.fields().cloned().collect())
+}
+
+struct Attributes(Vec<Field>);
+
+impl Attributes {
+    fn value(&self, tag: Tag) -> Option<&Value> {
+        let field = self
+            .0
+            .iter()
+            .find(|field| field.tag == tag && field.ifd_num == In::PRIMARY)?;
+        Some(&field.value)
+    }
+
+    fn text(&self, tag: Tag) -> Option<String> {
+        match self.value(tag)? {
+            Value::Ascii(lines) => {
+                let text = String::from_utf8_lossy(lines.first()?);
+                let text = text.trim_matches(['\0', ' ']).to_owned();
+                // Cameras without a clock write blanks between the colons.
+                text.contains(|c: char| c.is_ascii_digit()).then_some(text)
+            }
+            _ => None,
+        }
+    }
+
+    fn raw_number(&self, tag: Tag) -> Option<f64> {
+        match self.value(tag)? {
+            Value::Rational(numbers) => Some(numbers.first()?.to_f64()),
+            Value::SRational(numbers) => Some(numbers.first()?.to_f64()),
+            Value::Float(numbers) => numbers.first().map(|number| f64::from(*number)),
+            Value::Double(numbers) => numbers.first().copied(),
+            other => other.get_uint(0).map(f64::from),
+        }
+    }
+
+    fn number(&self, metadata: &mut FrameMetadata, quantity: &Quantity, tag: Tag) -> Option<f64> {
+        let number = self.raw_number(tag)?;
+        metadata.sensible(
+            quantity,
+            &tag.to_string(),
+            &number.to_string(),
+            Some(number),
+        )
+    }
+
+    /// From pixels for a unit of length on the detector; where the image was made smaller since, pixels are larger.
+    fn pixel_size_um(&self, metadata: &mut FrameMetadata, width: usize) -> Option<f64> {
+        let per_unit = self.raw_number(Tag::FocalPlaneXResolution)?;
+        let unit_um = match self
+            .value(Tag::FocalPlaneResolutionUnit)
+            .and_then(|unit| unit.get_uint(0))
+        {
+            Some(3) => 10_000.0,
+            Some(4) => 1000.0,
+            Some(5) => 1.0,
+            // Inches, also where nothing is said.
+            _ => 25_400.0,
+        };
+        let taken_width = self
+            .raw_number(Tag::PixelXDimension)
+            .filter(|taken| *taken > 0.0);
+        let size_um = unit_um / per_unit * taken_width.map_or(1.0, |taken| taken / width as f64);
+        metadata.sensible(
+            &PIXEL_SIZE,
+            &Tag::FocalPlaneXResolution.to_string(),
+            &format!("{per_unit} pixels on {unit_um} µm"),
+            Some(size_um),
+        )
+    }
+
+    /// `day` is as Exif writes it, `2019:07:29 20:47:26`.
+    fn date(&self, day: &str) -> Option<ObservationDate> {
+        let (day, time) = day.split_once(' ').unwrap_or((day, ""));
+        let day = day.replace(':', "-");
+        let fraction = self
+            .text(Tag::SubSecTimeOriginal)
+            .map_or(String::new(), |digits| format!(".{digits}"));
+        self.text(Tag::OffsetTimeOriginal)
+            .and_then(|offset| format!("{day}T{time}{fraction}{offset}").parse().ok())
+            .or_else(|| day.parse().ok())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use exif::Rational;
+    use exif::experimental::Writer;
+    use std::io::Cursor;
+
+    fn field(tag: Tag, value: Value) -> Field {
+        Field {
+            tag,
+            ifd_num: In::PRIMARY,
+            value,
+        }
+    }
+
+    fn ascii(text: &str) -> Value {
+        Value::Ascii(vec![text.as_bytes().to_vec()])
+    }
+
+    fn ratio(num: u32, denom: u32) -> Value {
+        Value::Rational(vec![Rational { num, denom }])
+    }
+
+    fn written(fields: &[Field]) -> Vec<u8> {
+        let mut writer = Writer::new();
+        fields.iter().for_each(|field| writer.push_field(field));
+        let mut out = Cursor::new(Vec::new());
+        writer.write(&mut out, false).unwrap();
+        out.into_inner()
+    }
+
+    #[test]
+    fn a_camera_s_attributes_are_read() {
+        let bytes = written(&[
+            field(Tag::DateTimeOriginal, ascii("2019:07:29 22:47:26")),
+            field(Tag::OffsetTimeOriginal, ascii("+02:00")),
+            field(Tag::SubSecTimeOriginal, ascii("25")),
+            field(Tag::ExposureTime, ratio(1, 4)),
+            field(Tag::FocalLength, ratio(350, 10)),
+            field(Tag::FocalPlaneXResolution, ratio(2000, 1)),
+            field(Tag::FocalPlaneResolutionUnit, Value::Short(vec![3])),
+            field(Tag::PixelXDimension, Value::Long(vec![6000])),
+        ]);
+        let metadata = metadata(&bytes, 3000);
+        assert_eq!(metadata.date.unwrap().to_iso(), "2019-07-29T20:47:26.25Z");
+        assert_eq!(metadata.exposure_s, Some(0.25));
+        assert_eq!(metadata.focal_length_mm, Some(35.0));
+        // 5 µm as taken, at half the width.
+        assert_eq!(metadata.pixel_size_um, Some(10.0));
+        assert!(metadata.ignored.is_empty(), "{:?}", metadata.ignored);
+    }
+
+    #[test]
+    fn jpeg_png_and_tiff_carry_it() {
+        use image::{ExtendedColorType, ImageEncoder, codecs};
+        let exif = written(&[field(Tag::ExposureTime, ratio(1, 4))]);
+        let mut jpeg = Vec::new();
+        let mut encoder = codecs::jpeg::JpegEncoder::new(&mut jpeg);
+        encoder.set_exif_metadata(exif.clone()).unwrap();
+        let grey = ExtendedColorType::L8;
+        encoder.write_image(&[7; 64], 8, 8, grey).unwrap();
+        let mut png = Vec::new();
+        let mut encoder = codecs::png::PngEncoder::new(&mut png);
+        encoder.set_exif_metadata(exif).unwrap();
+        encoder.write_image(&[7; 64], 8, 8, grey).unwrap();
+        let mut tiff = Cursor::new(Vec::new());
+        let mut encoder = tiff::encoder::TiffEncoder::new(&mut tiff).unwrap();
+        let mut directory = encoder.extra_directory().unwrap();
+        let exposure = tiff::encoder::Rational { n: 1, d: 4 };
+        let tag = tiff::tags::Tag::Unknown(Tag::ExposureTime.number());
+        directory.write_tag(tag, exposure).unwrap();
+        let offset = directory.finish_with_offsets().unwrap();
+        let mut image = encoder
+            .new_image::<tiff::encoder::colortype::Gray8>(8, 8)
+            .unwrap();
+        let pointer = tiff::tags::Tag::ExifDirectory;
+        image
+            .encoder()
+            .write_tag(pointer, offset.pointer.0 as u32)
+            .unwrap();
+        image.write_data(&[7; 64]).unwrap();
+        for file in [jpeg, png, tiff.into_inner()] {
+            let frame = crate::frame::decode(&file).unwrap();
+            assert_eq!(frame.metadata.exposure_s, Some(0.25));
+        }
+    }
+
+    #[test]
+    fn what_can_be_read_of_damaged_attributes_is() {
+        let mut bytes = written(&[
+            field(Tag::ExposureTime, ratio(1, 4)),
+            field(Tag::FocalLength, ratio(350, 10)),
+        ]);
+        let entry = Tag::FocalLength.number().to_be_bytes();
+        let at = bytes.windows(2).position(|w| w == entry).unwrap();
+        bytes[at + 8] = 0xff;
+        let metadata = metadata(&bytes, 10);
+        assert_eq!(
+            (metadata.exposure_s, metadata.focal_length_mm),
+            (Some(0.25), None)
+        );
+    }
+
+    #[test]
+    fn without_a_time_zone_only_the_day_is_known() {
+        let bytes = written(&[field(Tag::DateTimeOriginal, ascii("2019:07:29 22:47:26"))]);
+        assert_eq!(metadata(&bytes, 10).date.unwrap().to_iso(), "2019-07-29");
+    }
+
+    #[test]
+    fn what_cannot_be_is_noted_and_a_clock_never_set_is_not() {
+        let bytes = written(&[
+            field(Tag::DateTimeOriginal, ascii("0000:00:00 00:00:00")),
+            field(Tag::FocalLength, ratio(0, 1)),
+            field(Tag::ExposureTime, ratio(1, 0)),
+        ]);
+        let noted = metadata(&bytes, 10);
+        assert_eq!(noted.ignored.len(), 3, "{:?}", noted.ignored);
+        assert_eq!((noted.date, noted.focal_length_mm), (None, None));
+        let blank = written(&[field(Tag::DateTimeOriginal, ascii("    :  :     :  :  "))]);
+        assert_eq!(metadata(&blank, 10), FrameMetadata::default());
+    }
+}

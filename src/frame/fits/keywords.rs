@@ -1,0 +1,101 @@
+//! What a FITS header says of how the image was taken, in the keywords that programs really write.
+//!
+//! - Date: DATE-OBS, with the time in TIME-OBS, UT, UTC or UTSTART where it has none; else DATE-AVG, DATE-BEG,
+//!   DATE-END, MJD-OBS, MJD-AVG or MJD-BEG. Which moment of the exposure it is makes no difference to where stars are.
+//! - Exposure: EXPTIME, EXPOSURE or EXP_TIME, in seconds.
+//! - Pixels: XPIXSZ, which contains the binning; else PIXSIZE1 or PIXSIZE, which do not and are multiplied by
+//!   XBINNING; in micrometres.
+//! - Focal length: FOCALLEN, FOCAL or FOCLEN, in millimetres.
+//!
+//! Where the mount believed it pointed (OBJCTRA, RA, CRVAL1) is not used.
+
+use super::header::Header;
+use crate::epoch::ObservationDate;
+use crate::frame::metadata::{EXPOSURE, FOCAL_LENGTH, FrameMetadata, PIXEL_SIZE, Quantity};
+
+/// What `headers` say; of a keyword in several the first counts.
+pub(super) fn metadata<'a>(headers: impl Iterator<Item = &'a Header<'a>>) -> FrameMetadata {
+    let keywords = Keywords(headers.collect());
+    let mut metadata = FrameMetadata::default();
+    metadata.exposure_s = keywords.number(
+        &mut metadata,
+        &EXPOSURE,
+        &["EXPTIME", "EXPOSURE", "EXP_TIME"],
+    );
+    metadata.focal_length_mm = keywords.number(
+        &mut metadata,
+        &FOCAL_LENGTH,
+        &["FOCALLEN", "FOCAL", "FOCLEN"],
+    );
+    metadata.pixel_size_um = keywords.pixel_size_um(&mut metadata);
+    metadata.date = keywords.date(&mut metadata);
+    metadata
+}
+
+struct Keywords<'a>(Vec<&'a Header<'a>>);
+
+impl Keywords<'_> {
+    fn text(&self, keyword: &str) -> Option<String> {
+        let found = self.0.iter().find_map(|header| header.text(keyword));
+        found.map(|text| text.into_owned())
+    }
+
+    /// The first of `keywords` that makes sense.
+    fn number(
+        &self,
+        metadata: &mut FrameMetadata,
+        quantity: &Quantity,
+        keywords: &[&str],
+    ) -> Option<f64> {
+        keywords.iter().find_map(|keyword| {
+            let text = self.text(keyword)?;
+            let value = self.0.iter().find_map(|header| header.number(keyword));
+            metadata.sensible(quantity, keyword, &text, value)
+        })
+    }
+
+    fn pixel_size_um(&self, metadata: &mut FrameMetadata) -> Option<f64> {
+        let as_stored = self.number(metadata, &PIXEL_SIZE, &["XPIXSZ"]);
+        as_stored.or_else(|| {
+            let unbinned = self.number(metadata, &PIXEL_SIZE, &["PIXSIZE1", "PIXSIZE"])?;
+            let binning = self.0.iter().find_map(|header| header.number("XBINNING"));
+            Some(unbinned * binning.filter(|b| (1.0..=64.0).contains(b)).unwrap_or(1.0))
+        })
+    }
+
+    fn date(&self, metadata: &mut FrameMetadata) -> Option<ObservationDate> {
+        let calendar = ["DATE-OBS", "DATE-AVG", "DATE-BEG", "DATE-END"];
+        let from_calendar = calendar.iter().find_map(|keyword| {
+            let text = self.text(keyword)?;
+            let date = self.calendar_date(&text);
+            metadata.sensible_date(keyword, &text, date)
+        });
+        from_calendar.or_else(|| {
+            ["MJD-OBS", "MJD-AVG", "MJD-BEG"]
+                .iter()
+                .find_map(|keyword| {
+                    let text = self.text(keyword)?;
+                    let days = self.0.iter().find_map(|header| header.number(keyword));
+                    let date = days.and_then(ObservationDate::from_modified_julian_date);
+                    metadata.sensible_date(keyword, &text, date)
+                })
+        })
+    }
+
+    /// `text` is ISO 8601, or a day as FITS wrote it until 1999: DD/MM/YY.
+    fn calendar_date(&self, text: &str) -> Option<ObservationDate> {
+        let day = match text.split('/').collect::<Vec<_>>()[..] {
+            [day, month, year] if year.len() == 2 => format!("19{year}-{month}-{day}"),
+            _ => text.to_owned(),
+        };
+        if day.contains('T') {
+            return day.parse().ok();
+        }
+        let times = ["TIME-OBS", "UT", "UTC", "UTSTART"];
+        let with_time = times.iter().find_map(|keyword| {
+            let time = self.text(keyword)?;
+            format!("{day}T{time}").parse().ok()
+        });
+        with_time.or_else(|| day.parse().ok())
+    }
+}

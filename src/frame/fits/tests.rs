@@ -1,0 +1,425 @@
+use super::*;
+use proptest::prelude::*;
+
+/// A header-data unit of these cards and data, padded as the standard wants it.
+fn unit(cards: &[&str], data: &[u8]) -> Vec<u8> {
+    let mut text: String = cards.iter().map(|card| format!("{card:<80}")).collect();
+    text += &format!("{:<80}", "END");
+    let mut bytes = text.into_bytes();
+    bytes.resize(bytes.len().next_multiple_of(BLOCK_BYTES), b' ');
+    bytes.extend(data);
+    bytes.resize(bytes.len().next_multiple_of(BLOCK_BYTES), 0);
+    bytes
+}
+
+/// The primary image of this size and kind, with more cards.
+fn image(bitpix: i32, axes: &[usize], more: &[&str], data: &[u8]) -> Vec<u8> {
+    let mut cards = vec![
+        "SIMPLE  = T".to_owned(),
+        format!("BITPIX  = {bitpix}"),
+        format!("NAXIS   = {}", axes.len()),
+    ];
+    for (number, length) in axes.iter().enumerate() {
+        cards.push(format!("NAXIS{:<3}= {length}", number + 1));
+    }
+    cards.extend(more.iter().map(|card| (*card).to_owned()));
+    let cards: Vec<&str> = cards.iter().map(String::as_str).collect();
+    unit(&cards, data)
+}
+
+fn extension(bytes: &[u8]) -> Vec<u8> {
+    let text = format!("{:<80}", "XTENSION= 'IMAGE   '");
+    [text.as_bytes(), &bytes[80..]].concat()
+}
+
+fn table(more: &[&str]) -> Vec<u8> {
+    let cards = [
+        "XTENSION= 'BINTABLE'",
+        "BITPIX  = 8",
+        "NAXIS   = 2",
+        "NAXIS1  = 4",
+        "NAXIS2  = 3",
+        "PCOUNT  = 5000",
+        "GCOUNT  = 1",
+    ];
+    unit(&[&cards, more].concat(), &[7; 5012])
+}
+
+fn empty_primary(more: &[&str]) -> Vec<u8> {
+    image(8, &[], more, &[])
+}
+
+fn words(values: &[i16]) -> Vec<u8> {
+    values.iter().flat_map(|v| v.to_be_bytes()).collect()
+}
+
+fn page(number: usize) -> Option<NonZeroUsize> {
+    NonZeroUsize::new(number)
+}
+
+fn complaint(bytes: &[u8], page: Option<NonZeroUsize>) -> String {
+    decode(bytes, page).unwrap_err().to_string()
+}
+
+#[test]
+fn unsigned_16_bit_integers_are_exact() {
+    let stored = [-32768, -32767, -1, 0, 1, 2, 3, 32766, 32767];
+    let bytes = image(
+        16,
+        &[3, 3],
+        &["BZERO   = 32768", "BSCALE  = 1"],
+        &words(&stored),
+    );
+    let frame = decode(&bytes, None).unwrap();
+    assert_eq!(
+        frame.pixels,
+        [
+            0.0, 1.0, 32767.0, 32768.0, 32769.0, 32770.0, 32771.0, 65534.0, 65535.0
+        ]
+    );
+    assert_eq!((frame.step_adu, frame.saturation_adu), (1.0, Some(65535.0)));
+}
+
+#[test]
+fn every_bitpix_is_read() {
+    let values = [1_i64, 2, 3, 4, 5, 6, 7, 8, 100];
+    let expected: Vec<f32> = values.iter().map(|v| *v as f32).collect();
+    let data = |f: &dyn Fn(i64) -> Vec<u8>| values.iter().flat_map(|v| f(*v)).collect::<Vec<_>>();
+    for (bitpix, data, step, saturation) in [
+        (8, data(&|v| vec![v as u8]), 1.0, Some(255.0)),
+        (
+            16,
+            data(&|v| (v as i16).to_be_bytes().into()),
+            1.0,
+            Some(32767.0),
+        ),
+        (
+            32,
+            data(&|v| (v as i32).to_be_bytes().into()),
+            1.0,
+            Some(2147483648.0),
+        ),
+        (64, data(&|v| v.to_be_bytes().into()), 1.0, None),
+        (-32, data(&|v| (v as f32).to_be_bytes().into()), 0.0, None),
+        (-64, data(&|v| (v as f64).to_be_bytes().into()), 0.0, None),
+    ] {
+        let frame = decode(&image(bitpix, &[3, 3], &[], &data), None).unwrap();
+        assert_eq!(frame.pixels, expected, "BITPIX {bitpix}");
+        assert_eq!((frame.step_adu, frame.saturation_adu), (step, saturation));
+    }
+}
+
+#[test]
+fn the_unsigned_and_signed_likes_of_bzero_keep_their_full_scale() {
+    let bytes = [0x80_u8, 0, 0x7f, 0xff].repeat(9);
+    let zero = ["BZERO   = 2147483648.0"];
+    let frame = decode(&image(32, &[3, 3], &zero, &bytes), None).unwrap();
+    assert_eq!(frame.pixels[0], 32767.0);
+    assert_eq!(frame.saturation_adu, Some(4294967296.0));
+    let data: Vec<u8> = (28..37).collect();
+    let frame = decode(&image(8, &[3, 3], &["BZERO   = -128"], &data), None).unwrap();
+    assert_eq!(
+        (frame.pixels[0], frame.saturation_adu),
+        (-100.0, Some(127.0))
+    );
+}
+
+#[test]
+fn scaled_integers_have_a_step_and_no_saturation() {
+    let bytes = image(
+        16,
+        &[3, 3],
+        &["BZERO   = 100.5", "BSCALE  = -0.25"],
+        &words(&[4; 9]),
+    );
+    let frame = decode(&bytes, None).unwrap();
+    assert_eq!(frame.pixels[0], 99.5);
+    assert_eq!((frame.step_adu, frame.saturation_adu), (0.25, None));
+}
+
+#[test]
+fn blank_nan_and_infinity_are_no_values() {
+    let mut stored = [5; 9];
+    stored[4] = -7;
+    for more in [
+        &["BLANK   = -7"][..],
+        &["BLANK   = -7", "BZERO   = 32768"],
+        &["BLANK   = -7", "BSCALE  = 2"],
+    ] {
+        let frame = decode(&image(16, &[3, 3], more, &words(&stored)), None).unwrap();
+        let without: Vec<usize> = (0..9).filter(|i| frame.pixels[*i].is_nan()).collect();
+        assert_eq!(without, [4], "{more:?}");
+    }
+    let all_blank = image(16, &[3, 3], &["BLANK   = 5"], &words(&[5; 9]));
+    assert!(matches!(
+        decode(&all_blank, None),
+        Err(FrameError::NoValues)
+    ));
+    let mut floats = [1.0_f32; 9];
+    floats[..3].copy_from_slice(&[f32::NAN, f32::INFINITY, f32::NEG_INFINITY]);
+    let data: Vec<u8> = floats.iter().flat_map(|v| v.to_be_bytes()).collect();
+    let frame = decode(&image(-32, &[3, 3], &[], &data), None).unwrap();
+    assert!(frame.pixels[..3].iter().all(|p| p.is_nan()) && frame.pixels[3] == 1.0);
+}
+
+#[test]
+fn rows_stay_in_the_order_in_which_they_are_stored() {
+    let data: Vec<u8> = (0..12).collect();
+    let more = ["ROWORDER= 'BOTTOM-UP'"];
+    let frame = decode(&image(8, &[4, 3], &more, &data), None).unwrap();
+    assert_eq!((frame.width, frame.height), (4, 3));
+    assert_eq!(frame.pixels[4], 4.0);
+}
+
+#[test]
+fn pages_are_images_of_two_axes_and_planes_of_cubes() {
+    let plane = |value: u8| vec![value; 9];
+    let file = [
+        empty_primary(&["EXPTIME = 7.5"]),
+        table(&[]),
+        extension(&image(8, &[3, 3], &["EXPTIME = 2"], &plane(1))),
+        extension(&image(8, &[9], &[], &plane(9))),
+        extension(&image(8, &[3, 3, 2], &[], &[plane(2), plane(3)].concat())),
+        extension(&image(
+            8,
+            &[3, 3, 3],
+            &[],
+            &[plane(100), plane(50), plane(20)].concat(),
+        )),
+    ]
+    .concat();
+    let first = |page| decode(&file, page).unwrap().pixels[0];
+    assert_eq!(first(None), 1.0);
+    assert_eq!([1, 2, 3].map(|n| first(page(n))), [1.0, 2.0, 3.0]);
+    assert!((first(page(4)) - (29.9 + 29.35 + 2.28)).abs() < 1e-4);
+    assert_eq!(
+        complaint(&file, page(5)),
+        "no page 5: found 4 pages, expected at least 5"
+    );
+    let exposure = |n| decode(&file, page(n)).unwrap().metadata.exposure_s;
+    assert_eq!([1, 2].map(exposure), [Some(2.0), Some(7.5)]);
+}
+
+#[test]
+fn a_cube_is_refused_unless_a_plane_is_chosen() {
+    let cube = image(8, &[3, 3, 5], &[], &[6; 45]);
+    assert!(complaint(&cube, None).contains("a cube of 5 planes"));
+    assert_eq!(decode(&cube, page(5)).unwrap().pixels[0], 6.0);
+    let one = image(8, &[3, 3, 1, 1], &[], &[6; 9]);
+    assert_eq!(decode(&one, None).unwrap().pixels.len(), 9);
+}
+
+#[test]
+fn files_without_an_image_say_what_they_hold() {
+    let tables = [empty_primary(&[]), table(&[])].concat();
+    assert!(
+        complaint(&tables, None).contains("found no image in it, and 1 table, expected an image")
+    );
+    let compressed = [empty_primary(&[]), table(&["ZIMAGE  = T"])].concat();
+    assert!(complaint(&compressed, None).contains("unpack it with funpack"));
+}
+
+#[test]
+fn damage_is_named_with_its_place() {
+    let bad = |card: &str, instead: &str| {
+        let bytes = image(16, &[3, 3], &["BSCALE  = 1"], &words(&[1; 9]));
+        let text: String = bytes.iter().map(|b| char::from(*b)).collect();
+        let changed = text.replacen(&format!("{card:<80}"), &format!("{instead:<80}"), 1);
+        assert_ne!(text, changed);
+        complaint(&changed.chars().map(|c| c as u8).collect::<Vec<_>>(), None)
+    };
+    for (card, instead, expected) in [
+        (
+            "BITPIX  = 16",
+            "BITPIX  = 17",
+            "keyword BITPIX at byte 80: found 17, expected 8, 16",
+        ),
+        ("NAXIS1  = 3", "COMMENT", "has no NAXIS1, expected"),
+        (
+            "NAXIS1  = 3",
+            "NAXIS1  = -3",
+            "keyword NAXIS1 at byte 240: found -3",
+        ),
+        (
+            "NAXIS   = 2",
+            "NAXIS   = -2",
+            "keyword NAXIS at byte 160: found -2",
+        ),
+        (
+            "NAXIS   = 2",
+            "NAXIS   = 2.5",
+            "keyword NAXIS at byte 160: found 2.5",
+        ),
+        (
+            "BSCALE  = 1",
+            "BSCALE  = NaN",
+            "keyword BSCALE at byte 400: found NaN",
+        ),
+        (
+            "BSCALE  = 1",
+            "BSCALE  = 0",
+            "keyword BSCALE at byte 400: found 0",
+        ),
+        (
+            "BSCALE  = 1",
+            "BZERO   = 'x'",
+            "keyword BZERO at byte 400: found x",
+        ),
+        (
+            "BSCALE  = 1",
+            "BLANK   = 1.5",
+            "keyword BLANK at byte 400: found 1.5",
+        ),
+        (
+            "NAXIS1  = 3",
+            "NAXIS1  = 1000000000",
+            "too large: found 1000000000 x 3",
+        ),
+        ("NAXIS1  = 3", "NAXIS1  = 2", "too small: found 2 x 3"),
+        ("NAXIS1  = 3", "NAXIS1  = 9000", "found 5760 bytes"),
+    ] {
+        let found = bad(card, instead);
+        assert!(found.contains(expected), "{instead}: {found}");
+    }
+}
+
+#[test]
+fn a_truncated_image_says_how_many_bytes_are_there_and_needed() {
+    let bytes = image(16, &[100, 100], &[], &words(&[1; 10_000]));
+    assert_eq!(
+        complaint(&bytes[..9999], None),
+        "truncated FITS: found 9999 bytes, expected more (the image of 100 x 100 pixels ends at byte 22880)"
+    );
+    // The padding behind the last pixel is not needed.
+    assert!(decode(&bytes[..22_880], None).is_ok());
+    assert!(complaint(&bytes[..22_879], None).contains("truncated"));
+    assert!(complaint(&bytes[..300], None).contains("has no END"));
+    let cut_in_table = [empty_primary(&[]), table(&[])].concat();
+    assert_eq!(
+        complaint(&cut_in_table[..9000], None),
+        "truncated FITS: found 9000 bytes, expected more (the data before the next header end at byte 10772)"
+    );
+}
+
+#[test]
+fn sizes_beyond_all_numbers_are_refused() {
+    let huge = usize::MAX / 2;
+    for axes in [
+        vec![huge, huge],
+        vec![huge, huge, huge],
+        vec![3, 3, huge, huge],
+    ] {
+        for page in [None, page(1), page(huge)] {
+            assert!(decode(&image(-64, &axes, &[], &[]), page).is_err());
+        }
+    }
+    // A table that claims to be endless leaves nothing behind it.
+    let mut endless = table(&["NAXIS2  = 9"]);
+    let at = endless.windows(6).position(|w| w == b"PCOUNT").unwrap();
+    endless[at + 10..at + 29].copy_from_slice(b"9223372036854775807");
+    let file = [
+        empty_primary(&[]),
+        endless,
+        extension(&image(8, &[3, 3], &[], &[1; 9])),
+    ]
+    .concat();
+    assert!(complaint(&file, None).contains("truncated"));
+}
+
+fn metadata_of(more: &[&str]) -> crate::frame::FrameMetadata {
+    decode(&image(8, &[3, 3], more, &[1; 9]), None)
+        .unwrap()
+        .metadata
+}
+
+#[test]
+fn a_camera_s_keywords_are_read() {
+    let metadata = metadata_of(&[
+        "DATE-OBS= '2019-07-29T20:47:26.5' / UTC",
+        "EXPTIME =                  2.5",
+        "XPIXSZ  =                  9.3 / binned",
+        "XBINNING=                    2",
+        "FOCALLEN=                 35.0",
+    ]);
+    assert_eq!(metadata.date.unwrap().to_iso(), "2019-07-29T20:47:26.5Z");
+    assert_eq!(metadata.exposure_s, Some(2.5));
+    assert_eq!(metadata.pixel_size_um, Some(9.3));
+    assert_eq!(metadata.focal_length_mm, Some(35.0));
+    assert!(metadata.ignored.is_empty());
+    let unbinned = metadata_of(&["PIXSIZE1= 4.65", "XBINNING= 2", "EXPOSURE= '3'"]);
+    assert_eq!(unbinned.pixel_size_um, Some(9.3));
+    assert_eq!(unbinned.exposure_s, Some(3.0));
+}
+
+#[test]
+fn dates_are_read_as_programs_have_written_them() {
+    for (cards, expected) in [
+        (&["DATE-OBS= '2019-07-29'"][..], "2019-07-29"),
+        (
+            &["DATE-OBS= '2019-07-29'", "TIME-OBS= '20:47:26'"],
+            "2019-07-29T20:47:26Z",
+        ),
+        (
+            &["UT      = '20:47:26'", "DATE-OBS= '29/07/94'"],
+            "1994-07-29T20:47:26Z",
+        ),
+        (&["DATE-OBS= '29/07/94'", "UT = 3"], "1994-07-29"),
+        (
+            &["DATE-BEG= '2019-07-29T20:47:26Z'"],
+            "2019-07-29T20:47:26Z",
+        ),
+        (&["MJD-OBS = 51544.5"], "2000-01-01T12:00:00Z"),
+    ] {
+        assert_eq!(
+            metadata_of(cards).date.unwrap().to_iso(),
+            expected,
+            "{cards:?}"
+        );
+    }
+}
+
+#[test]
+fn absurd_keywords_are_noted_and_the_next_is_taken() {
+    let metadata = metadata_of(&[
+        "DATE-OBS= '0000-00-00T00:00:00'",
+        "MJD-OBS = 51544.5",
+        "EXPTIME = -1",
+        "EXPOSURE= 2",
+        "FOCALLEN= 0",
+        "XPIXSZ  = NaN",
+    ]);
+    assert_eq!(metadata.date.unwrap().to_iso(), "2000-01-01T12:00:00Z");
+    assert_eq!(metadata.exposure_s, Some(2.0));
+    assert_eq!(
+        (metadata.focal_length_mm, metadata.pixel_size_um),
+        (None, None)
+    );
+    let named: Vec<_> = metadata
+        .ignored
+        .iter()
+        .map(|n| n.split(' ').next().unwrap())
+        .collect();
+    assert_eq!(named, ["EXPTIME", "FOCALLEN", "XPIXSZ", "DATE-OBS"]);
+    let none = metadata_of(&["MJD-OBS = 1E300", "DATE-OBS= 'tonight'"]);
+    assert_eq!((none.date, none.ignored.len()), (None, 2));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1000))]
+
+    #[test]
+    fn a_damaged_header_never_panics(
+        changes in proptest::collection::vec((0_usize..1200, "[0-9A-Z=' /.\\-]"), 1..6),
+        length in 0_usize..9000,
+        page in 0_usize..5,
+    ) {
+        let cards = ["BZERO   = 32768", "BLANK   = -7", "DATE-OBS= '2019-07-29'", "EXPTIME = 2.5", "XPIXSZ  = 9.3"];
+        let mut bytes = image(16, &[3, 3, 4], &cards, &words(&[1; 36]));
+        bytes.extend(table(&[]));
+        for (at, text) in changes {
+            bytes[at] = text.as_bytes()[0];
+        }
+        bytes.truncate(length);
+        let _ = decode(&bytes, NonZeroUsize::new(page));
+    }
+}

@@ -1,0 +1,113 @@
+//! From the samples that a reader decoded to a frame: luminance, saturation, and the unit that the levels come in.
+
+use super::{Frame, FrameError, LUMINANCE_WEIGHTS, check_size};
+
+/// The largest unit of levels looked for where a file holds fewer bits than its words: 2¹².
+const MAX_STEP: i64 = 1 << 12;
+/// How many values are looked at for a smaller unit before it is asked whether there can be one.
+const LOOKED_AT_TOGETHER: usize = 1024;
+
+/// Samples of one frame as a reader decoded them.
+pub(super) struct Samples<'a, T> {
+    pub width: usize,
+    pub height: usize,
+    /// Interleaved, `height * width * channels`.
+    pub values: &'a [T],
+    /// 1 grey, 2 grey and alpha, 3 colour, 4 colour and alpha.
+    pub channels: usize,
+}
+
+/// The frame of integer samples, of which `full_scale` is the largest of the format, in ADU: luminance,
+/// saturation, and the unit that the levels come in.
+pub(super) fn frame_from_integers<T: Copy + PartialEq + Into<i64>>(
+    samples: &Samples<'_, T>,
+    full_scale: T,
+) -> Result<Frame, FrameError> {
+    let (width, height) = (samples.width, samples.height);
+    check_size(width, height)?;
+    let expected = width * height * samples.channels;
+    let values = samples
+        .values
+        .get(..expected)
+        .ok_or(FrameError::WrongLength {
+            expected: width * height,
+            found: samples.values.len() / samples.channels,
+        })?;
+    let level = |v: T| -> f32 { v.into() as f32 };
+    let full = level(full_scale);
+    let pixels = match samples.channels {
+        1 => values.iter().map(|&v| level(v)).collect(),
+        2 => values.chunks_exact(2).map(|c| level(c[0])).collect(),
+        channels => values
+            .chunks_exact(channels)
+            .map(|c| luminance([level(c[0]), level(c[1]), level(c[2])], full))
+            .collect(),
+    };
+    let step = if samples.channels <= 2 {
+        level_step(values, full_scale)
+    } else {
+        1
+    };
+    // Twelve bits in the upper part of sixteen saturate at 65520, not at 65535.
+    let saturation = full_scale.into() / step * step;
+    Ok(Frame::new(width, height, pixels)?.with_levels(step as f32, Some(saturation as f32)))
+}
+
+/// The frame of float samples, `height * width * channels` of them, which have neither steps nor a full scale.
+pub(super) fn frame_from_floats(
+    (width, height): (usize, usize),
+    channels: usize,
+    values: Vec<f32>,
+) -> Result<Frame, FrameError> {
+    let pixels = match channels {
+        1 => values,
+        2 => values.chunks_exact(2).map(|c| c[0]).collect(),
+        channels => values
+            .chunks_exact(channels)
+            .map(|c| luminance([c[0], c[1], c[2]], f32::INFINITY))
+            .collect(),
+    };
+    Frame::new(width, height, pixels)
+}
+
+/// Samples that come as one plane after another, pixel by pixel.
+pub(super) fn interleaved<T: Copy>(planes: &[T], channels: usize) -> Vec<T> {
+    let mut values = planes.to_vec();
+    for (channel, plane) in planes.chunks_exact(planes.len() / channels).enumerate() {
+        let places = values.iter_mut().skip(channel).step_by(channels);
+        places.zip(plane).for_each(|(value, level)| *value = *level);
+    }
+    values
+}
+
+/// The luminance of one pixel; `full` where a channel is saturated.
+fn luminance(rgb: [f32; 3], full: f32) -> f32 {
+    if rgb.iter().any(|&channel| channel >= full) {
+        return full;
+    }
+    if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
+        return rgb[0];
+    }
+    rgb.iter().zip(LUMINANCE_WEIGHTS).map(|(c, w)| c * w).sum()
+}
+
+/// The largest power of two that divides all levels below full scale: 16 where twelve bits are stored in sixteen.
+fn level_step<T: Copy + PartialEq + Into<i64>>(values: &[T], full_scale: T) -> i64 {
+    let mut bits = MAX_STEP;
+    // The compiler works on many values at once where it need not look at the result after each.
+    for chunk in values.chunks(LOOKED_AT_TOGETHER) {
+        bits |= chunk.iter().fold(0, |bits, &value| {
+            bits | if value == full_scale { 0 } else { value.into() }
+        });
+        if bits & 1 == 1 {
+            return 1;
+        }
+    }
+    let step = 1 << bits.trailing_zeros();
+    // All levels zero, or nothing but full scale: nothing can be told.
+    if step >= MAX_STEP.min(full_scale.into()) {
+        1
+    } else {
+        step
+    }
+}

@@ -1,0 +1,130 @@
+//! What a file says of how its frame was taken.
+
+use crate::epoch::ObservationDate;
+use std::ops::RangeInclusive;
+
+/// What a file says of how its frame was taken; nothing of it is checked against the image.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FrameMetadata {
+    /// When.
+    pub date: Option<ObservationDate>,
+    /// How long it was exposed, in seconds.
+    pub exposure_s: Option<f64>,
+    /// Distance between neighbouring pixels on the detector as they are in the file, binned or not, in micrometres.
+    pub pixel_size_um: Option<f64>,
+    /// Focal length of the optics, in millimetres.
+    pub focal_length_mm: Option<f64>,
+    /// What the file says and cannot be true: for each, what was found and what was expected. None of it is used.
+    pub ignored: Vec<String>,
+}
+
+/// A number that a header may give, and within which limits it makes sense.
+pub(super) struct Quantity {
+    name: &'static str,
+    unit: &'static str,
+    limits: RangeInclusive<f64>,
+}
+
+pub(super) const EXPOSURE: Quantity = Quantity {
+    name: "an exposure",
+    unit: "s",
+    limits: 1e-6..=1e6,
+};
+
+pub(super) const PIXEL_SIZE: Quantity = Quantity {
+    name: "a pixel",
+    unit: "µm",
+    limits: 0.1..=200.0,
+};
+
+pub(super) const FOCAL_LENGTH: Quantity = Quantity {
+    name: "a focal length",
+    unit: "mm",
+    limits: 1.0..=100_000.0,
+};
+
+impl FrameMetadata {
+    /// The angle that a pixel at the frame's centre spans, in radians, where focal length and pixel size tell.
+    pub fn pixel_scale_rad(&self) -> Option<f64> {
+        const UM_PER_MM: f64 = 1000.0;
+        let focal_length_um = self.focal_length_mm? * UM_PER_MM;
+        Some(self.pixel_size_um? / focal_length_um)
+    }
+
+    /// `value` if it makes sense for `quantity`; else it is noted with the `keyword` and the `text` that it comes from.
+    pub(super) fn sensible(
+        &mut self,
+        quantity: &Quantity,
+        keyword: &str,
+        text: &str,
+        value: Option<f64>,
+    ) -> Option<f64> {
+        let sensible = value.filter(|value| quantity.limits.contains(value));
+        if sensible.is_none() {
+            let (low, high) = (quantity.limits.start(), quantity.limits.end());
+            let Quantity { name, unit, .. } = quantity;
+            self.ignore(
+                keyword,
+                text,
+                &format!("{name} from {low} to {high} {unit}"),
+            );
+        }
+        sensible
+    }
+
+    /// `date` if it is one; else it is noted.
+    pub(super) fn sensible_date(
+        &mut self,
+        keyword: &str,
+        text: &str,
+        date: Option<ObservationDate>,
+    ) -> Option<ObservationDate> {
+        if date.is_none() {
+            let years = crate::epoch::YEARS;
+            let expected = format!("a date from {} to {}", years.start(), years.end());
+            self.ignore(keyword, text, &expected);
+        }
+        date
+    }
+
+    fn ignore(&mut self, keyword: &str, text: &str, expected: &str) {
+        self.ignored.push(format!(
+            "{keyword} is ignored: found {text}, expected {expected}"
+        ));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pixel_of_4_65_um_behind_35_mm_spans_27_arcseconds() {
+        let metadata = FrameMetadata {
+            pixel_size_um: Some(4.65),
+            focal_length_mm: Some(35.0),
+            ..FrameMetadata::default()
+        };
+        let arcsec = metadata.pixel_scale_rad().unwrap() * crate::units::ARCSEC_PER_RAD;
+        assert!((arcsec - 27.404).abs() < 1e-3, "{arcsec}");
+        assert_eq!(FrameMetadata::default().pixel_scale_rad(), None);
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_noted_and_not_taken() {
+        let mut metadata = FrameMetadata::default();
+        for (text, value) in [("0", Some(0.0)), ("NaN", Some(f64::NAN)), ("long", None)] {
+            assert_eq!(metadata.sensible(&EXPOSURE, "EXPTIME", text, value), None);
+        }
+        assert_eq!(
+            metadata.ignored[0],
+            "EXPTIME is ignored: found 0, expected an exposure from 0.000001 to 1000000 s"
+        );
+        assert_eq!(metadata.ignored.len(), 3);
+        assert_eq!(
+            metadata.sensible(&EXPOSURE, "EXPTIME", "2", Some(2.0)),
+            Some(2.0)
+        );
+        assert_eq!(metadata.ignored.len(), 3);
+    }
+}
