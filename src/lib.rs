@@ -11,6 +11,7 @@ pub mod identify;
 pub mod pipeline;
 pub mod report;
 pub mod units;
+pub mod wcs;
 
 #[doc = include_str!("../docs/conventions.md")]
 pub mod conventions {}

@@ -32,6 +32,10 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "units", "coords", "camera", "catalog", "detect", "identify", "pipeline",
         ],
     ),
+    (
+        "wcs",
+        &["units", "coords", "camera", "identify", "pipeline"],
+    ),
 ];
 
 fn source() -> PathBuf {
