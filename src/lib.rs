@@ -5,9 +5,12 @@ pub mod camera;
 pub mod catalog;
 pub mod coords;
 pub mod detect;
+pub mod diagnosis;
 pub mod epoch;
 pub mod frame;
 pub mod identify;
+#[cfg(feature = "overlay")]
+pub mod overlay;
 pub mod pipeline;
 pub mod report;
 pub mod units;

@@ -28,6 +28,7 @@ use crate::coords::{Icrs, PixelPoint, UnitVector};
 use crate::detect::{
     self, DetectConfig, DetectError, Detection, DetectionFlags, Detections, Workspace,
 };
+use crate::diagnosis::{self, Examined};
 use crate::epoch::ObservationDate;
 use crate::frame::{self, Frame, FrameError};
 use crate::identify::{self, Hints, ObservedStar, Outcome, Photometry, Sky, StarField};
@@ -294,6 +295,20 @@ impl<'a> Pipeline<'a> {
         config: &SolveConfig,
         workspace: &mut Workspace,
     ) -> Result<Solution, Error> {
+        self.solve_file_and_keep(path, config, workspace)
+            .map(|(solution, _)| solution)
+    }
+
+    /// The same as [`Self::solve_file`], with the frame itself for who wants to draw on it.
+    ///
+    /// # Errors
+    /// As [`Self::solve_file`].
+    pub fn solve_file_and_keep(
+        &self,
+        path: &Path,
+        config: &SolveConfig,
+        workspace: &mut Workspace,
+    ) -> Result<(Solution, Frame), Error> {
         let start = Instant::now();
         let frame = frame::read(path)?;
         let read_ms = milliseconds_since(start);
@@ -309,7 +324,7 @@ impl<'a> Pipeline<'a> {
             })?;
         solution.timing.read_ms = read_ms;
         solution.timing.total_ms = milliseconds_since(start);
-        Ok(solution)
+        Ok((solution, frame))
     }
 
     /// Examines `frame`.
@@ -328,7 +343,8 @@ impl<'a> Pipeline<'a> {
         let years = config.knowledge.years_since_j2000();
         let (field, kept) = star_field(frame, &detections, years);
         let identify_start = Instant::now();
-        let outcome = self.identify(&field, &kept, &config.knowledge);
+        let image = Some((frame, &detections));
+        let outcome = self.identify(&field, &kept, &config.knowledge, image);
         Ok(Solution {
             width: frame.width,
             height: frame.height,
@@ -366,7 +382,7 @@ impl<'a> Pipeline<'a> {
             stars: centroids.iter().map(observed).collect(),
         };
         let all: Vec<usize> = (0..centroids.len()).collect();
-        let outcome = self.identify(&field, &all, knowledge);
+        let outcome = self.identify(&field, &all, knowledge, None);
         let identify_ms = milliseconds_since(start);
         let source = |centroid: &ListedCentroid| Source {
             position: centroid.position,
@@ -389,15 +405,31 @@ impl<'a> Pipeline<'a> {
     }
 
     /// Identifies `field`, and numbers the matches as the sources are: `sources[i]` is the source of star i.
-    fn identify(&self, field: &StarField, sources: &[usize], knowledge: &Knowledge) -> Outcome {
+    /// Where that fails, looks for the reason, also in `image` where there is one.
+    fn identify(
+        &self,
+        field: &StarField,
+        sources: &[usize],
+        knowledge: &Knowledge,
+        image: Option<(&Frame, &Detections)>,
+    ) -> Outcome {
         let hints = knowledge.hints(field.width_px);
-        let mut outcome = identify::identify(field, &hints, &self.sky);
-        if let Outcome::Identified(identification) = &mut outcome {
-            for star_match in &mut identification.matches {
-                star_match.observed = sources[star_match.observed];
+        match identify::identify(field, &hints, &self.sky) {
+            Outcome::Identified(mut identification) => {
+                for star_match in &mut identification.matches {
+                    star_match.observed = sources[star_match.observed];
+                }
+                Outcome::Identified(identification)
+            }
+            Outcome::NotIdentified(reason) => {
+                let examined = Examined {
+                    image,
+                    field,
+                    hints: &hints,
+                };
+                Outcome::NotIdentified(diagnosis::explain(&examined, &self.sky, reason))
             }
         }
-        outcome
     }
 }
 

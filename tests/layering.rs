@@ -21,15 +21,34 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &["units", "coords", "camera", "catalog", "attitude"],
     ),
     (
+        "diagnosis",
+        &["units", "coords", "camera", "frame", "detect", "identify"],
+    ),
+    (
         "pipeline",
         &[
-            "units", "coords", "epoch", "frame", "camera", "catalog", "detect", "identify",
+            "units",
+            "coords",
+            "epoch",
+            "frame",
+            "camera",
+            "catalog",
+            "detect",
+            "identify",
+            "diagnosis",
         ],
     ),
     (
         "report",
         &[
             "units", "coords", "camera", "catalog", "detect", "identify", "pipeline",
+        ],
+    ),
+    (
+        "overlay",
+        &[
+            "units", "coords", "camera", "catalog", "detect", "frame", "identify", "pipeline",
+            "report",
         ],
     ),
     (

@@ -142,7 +142,8 @@ pub(crate) struct OutputArgs {
     /// With --format text, list every identified star and not just the brightest
     #[arg(long)]
     pub(crate) all_stars: bool,
-    /// Also write FRAME.json and FRAME.csv (its stars) into this directory
+    /// Also write, into this directory, FRAME.json, FRAME.csv (its stars), FRAME.wcs (a FITS header, where
+    /// it is identified) and, of frames, FRAME.png (the stars ringed and named)
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }
