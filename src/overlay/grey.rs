@@ -172,6 +172,9 @@ fn enlarge(levels: &[u8], width: usize, factor: usize) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
 
     fn frame(width: usize, height: usize) -> Frame {
         let noise = |i: usize| 50.0 + ((i * 7919) % 101) as f32 * 0.1;
@@ -204,9 +207,10 @@ mod tests {
     #[test]
     fn stars_are_white_the_sky_is_dark_and_a_gradient_does_not_show() {
         let (width, height) = (900, 700);
-        let noise = |i: usize| ((i * 7919) % 101) as f32 * 0.1;
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut noise = || -> f32 { random.sample::<f32, _>(StandardNormal) * 2.9 };
         let mut pixels: Vec<f32> = (0..width * height)
-            .map(|i| noise(i) + 0.1 * (i % width) as f32)
+            .map(|i| noise() + 0.05 * (i % width) as f32)
             .collect();
         for dy in 0..30 {
             for dx in 0..30 {
@@ -216,7 +220,7 @@ mod tests {
         pixels[5] = f32::NAN;
         let frame = Frame::new(width, height, pixels).unwrap();
         let sky = Background {
-            level_adu: 230.0,
+            level_adu: 22.0,
             noise_adu: 2.9,
         };
         let grey = Grey::of(&frame, Some(&sky));

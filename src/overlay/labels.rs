@@ -15,11 +15,16 @@ const KEPT_FREE: usize = 250;
 /// One name on such an area at the most, in square units: more cannot be taken in.
 const AREA_A_LABEL: f32 = 9000.0;
 
+/// Where there is no room beside the ring, names go so much further away, with a line to the ring.
+const FURTHER: f32 = 16.0;
+
 /// A name and where its baseline begins, in pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Label {
     pub(super) text: String,
     pub(super) at: [f32; 2],
+    /// From the ring to a name that is not beside it.
+    pub(super) line: Option<[[f32; 2]; 2]>,
 }
 
 /// Left, top, right and bottom.
@@ -31,6 +36,14 @@ impl Mark {
         let dx = self.x - self.x.clamp(*left, *right);
         let dy = self.y - self.y.clamp(*top, *bottom);
         dx.hypot(dy) < self.radius
+    }
+
+    /// From the ring to the nearest point of the rectangle.
+    fn line_to(&self, [left, top, right, bottom]: &Rectangle) -> [[f32; 2]; 2] {
+        let (x, y) = (self.x.clamp(*left, *right), self.y.clamp(*top, *bottom));
+        let share = self.radius / (x - self.x).hypot(y - self.y).max(self.radius);
+        let from = [self.x + share * (x - self.x), self.y + share * (y - self.y)];
+        [from, [x, y]]
     }
 }
 
@@ -67,15 +80,19 @@ pub(super) fn place(marks: &[Mark], image: [f32; 2], unit: f32) -> Vec<Label> {
             others.filter(|mark| mark.is_under(rectangle)).count()
         };
         let size = [text_width(text, SIZE * unit), CAPITALS * SIZE * unit];
-        let free = places(&marks[index], size, unit)
-            .into_iter()
-            .filter(is_free);
-        if let Some(rectangle) = free.min_by_key(crossed) {
+        let mark = &marks[index];
+        let find = |gap: f32| {
+            let places = places(mark, size, gap * unit, unit).into_iter();
+            places.filter(is_free).min_by_key(crossed)
+        };
+        let beside = find(GAP);
+        if let Some(rectangle) = beside.or_else(|| find(FURTHER)) {
             taken.push(rectangle);
             let margin = MARGIN * unit;
             labels.push(Label {
                 text: text.to_owned(),
                 at: [rectangle[0] + margin, rectangle[3] - margin],
+                line: beside.is_none().then(|| mark.line_to(&rectangle)),
             });
         }
     }
@@ -83,8 +100,8 @@ pub(super) fn place(marks: &[Mark], image: [f32; 2], unit: f32) -> Vec<Label> {
 }
 
 /// Places round a ring, the best first: beside it, at its corners, above and below.
-fn places(mark: &Mark, [width, height]: [f32; 2], unit: f32) -> [Rectangle; 8] {
-    let away = mark.radius + GAP * unit;
+fn places(mark: &Mark, [width, height]: [f32; 2], gap: f32, unit: f32) -> [Rectangle; 8] {
+    let away = mark.radius + gap;
     let corner = away * std::f32::consts::FRAC_1_SQRT_2;
     let margin = MARGIN * unit;
     // Where the middle of the name is: offset of the ring's side, then half the name's own size.

@@ -92,13 +92,12 @@ pub fn draw(title: &str, frame: &Frame, solution: &Solution, catalog: &Catalog) 
         canvas.ring([mark.x, mark.y], mark.radius, mark.kind.stroke(), colour);
     }
     let image = [grey.width as f32, grey.height as f32];
+    let letters = Kind::Identified.colour().lighter();
     for label in labels::place(&marks, image, unit) {
-        canvas.text(
-            &label.text,
-            label.at,
-            labels::SIZE,
-            Kind::Identified.colour().lighter(),
-        );
+        for line in label.line {
+            canvas.line(&line, 0.8, letters);
+        }
+        canvas.text(&label.text, label.at, labels::SIZE, letters);
     }
     legend::draw(&mut canvas, &grey, title, solution, &marks);
     canvas.into_image()
