@@ -34,7 +34,8 @@ pub(crate) enum Command {
         starpipe process night.tif\n  \
         starpipe process --fov 11.4 --near 83.8,-1.2 --radius 10 night.tif\n  \
         starpipe process --date 2019-07-29T22:47+02:00 night.tif\n  \
-        starpipe process --format json --out results *.tif > night.jsonl")]
+        starpipe process --format json --out results *.tif > night.jsonl\n\n\
+        --out results makes results/night.json, night.csv, night.wcs and night.png of night.tif.")]
     Process(ProcessArgs),
     /// Identify the stars in lists of centroids (CSV)
     #[command(after_help = "Examples:\n  \

@@ -10,8 +10,9 @@ const CAPITALS: f32 = 0.74;
 /// Between a ring and its name, and round every name.
 const GAP: f32 = 3.0;
 const MARGIN: f32 = 2.0;
-/// Rings of so many of the brightest detections are kept free.
+/// Rings of so many of the brightest detections are kept free, and of no more than this part of all.
 const KEPT_FREE: usize = 250;
+const KEPT_FREE_SHARE: f32 = 0.4;
 /// One name on such an area at the most, in square units: more cannot be taken in.
 const AREA_A_LABEL: f32 = 9000.0;
 
@@ -60,7 +61,7 @@ pub(super) fn place(marks: &[Mark], image: [f32; 2], unit: f32) -> Vec<Label> {
         .collect();
     named.sort_by(|a, b| a.2.total_cmp(&b.2));
     let most = (image[0] * image[1] / (AREA_A_LABEL * unit * unit)).ceil() as usize;
-    let kept_free = marks.len().min(KEPT_FREE);
+    let kept_free = ((marks.len() as f32 * KEPT_FREE_SHARE) as usize).min(KEPT_FREE);
     let mut taken: Vec<Rectangle> = Vec::new();
     let mut labels = Vec::new();
     for (index, text, _) in named {

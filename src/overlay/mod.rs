@@ -94,7 +94,7 @@ pub fn draw(title: &str, frame: &Frame, solution: &Solution, catalog: &Catalog) 
     let image = [grey.width as f32, grey.height as f32];
     let letters = Kind::Identified.colour().lighter();
     for label in labels::place(&marks, image, unit) {
-        for line in label.line {
+        if let Some(line) = label.line {
             canvas.line(&line, 0.8, letters);
         }
         canvas.text(&label.text, label.at, labels::SIZE, letters);
