@@ -158,7 +158,9 @@ fn write_whole(files: &[(PathBuf, Vec<u8>)]) -> anyhow::Result<()> {
         written.push((path, file));
     }
     for (path, file) in written {
-        file.persist(path).with_context(|| writing(path))?;
+        // The error would keep the temporary file as long as it lives.
+        let persisted = file.persist(path).map_err(|refused| refused.error);
+        persisted.with_context(|| writing(path))?;
     }
     Ok(())
 }
