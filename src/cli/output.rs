@@ -102,11 +102,15 @@ impl ResultFiles {
             let picture = overlay::draw(&title, frame, &solved.solution, catalog);
             files.push((path("png"), overlay::to_png(&picture)?));
         }
-        match wcs::header(&report.frame, &solved.solution) {
-            Some(header) => files.push((path("wcs"), header)),
-            None => remove_stale(&path("wcs"))?,
+        let header = wcs::header(&report.frame, &solved.solution);
+        let has_header = header.is_some();
+        files.extend(header.map(|header| (path("wcs"), header)));
+        write_whole(&files)?;
+        if has_header {
+            Ok(())
+        } else {
+            remove_stale(&path("wcs"))
         }
-        write_whole(&files)
     }
 }
 
