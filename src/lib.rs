@@ -5,14 +5,18 @@ pub mod camera;
 pub mod catalog;
 pub mod coords;
 pub mod detect;
+pub mod diagnosis;
 pub mod epoch;
 pub mod frame;
 pub mod identify;
+#[cfg(feature = "overlay")]
+pub mod overlay;
 pub mod pipeline;
 pub mod report;
 pub mod robustness;
 pub mod statistics;
 pub mod units;
+pub mod wcs;
 
 #[doc = include_str!("../docs/conventions.md")]
 pub mod conventions {}

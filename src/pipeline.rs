@@ -28,6 +28,7 @@ use crate::coords::{Icrs, PixelPoint, UnitVector};
 use crate::detect::{
     self, DetectConfig, DetectError, Detection, DetectionFlags, Detections, Workspace,
 };
+use crate::diagnosis::{self, Examined};
 use crate::epoch::ObservationDate;
 use crate::frame::{self, Frame, FrameError, FrameMetadata};
 use crate::identify::{
@@ -263,6 +264,25 @@ pub struct CentroidList {
     pub centroids: Vec<ListedCentroid>,
 }
 
+impl CentroidList {
+    /// The list as identification takes it, which must stand in the order of brightness, seen so many Julian years after
+    /// J2000.0.
+    pub fn star_field(&self, years_since_j2000: f64) -> StarField {
+        let observed = |centroid: &ListedCentroid| ObservedStar {
+            position: centroid.position,
+            sigma_px: LISTED_SIGMA_PX,
+            mag: centroid.mag,
+        };
+        StarField {
+            width_px: self.width as f64,
+            height_px: self.height as f64,
+            photometry: self.photometry,
+            years_since_j2000,
+            stars: self.centroids.iter().map(observed).collect(),
+        }
+    }
+}
+
 /// One line of a list of centroids.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ListedCentroid {
@@ -309,34 +329,23 @@ impl<'a> Pipeline<'a> {
         config: &SolveConfig,
         workspace: &mut Workspace,
     ) -> Result<Solution, Error> {
-        self.solve_read(path, config, workspace, || {
-            frame::read_page(path, config.page)
-        })
+        let read = || frame::read_page(path, config.page);
+        self.solve_read(path, config, workspace, read)
+            .map(|(solution, _)| solution)
     }
 
-    /// Examines the frame in a file of which the content is `bytes`, and the name, real or not, `name`.
+    /// Examines the frame that `read` gives, as [`Self::solve_file`] does, and returns it with what was found. `name` is the
+    /// file's, or stands for one.
     ///
     /// # Errors
-    /// As [`Pipeline::solve_file`].
-    pub fn solve_bytes(
-        &self,
-        name: &Path,
-        bytes: &[u8],
-        config: &SolveConfig,
-        workspace: &mut Workspace,
-    ) -> Result<Solution, Error> {
-        self.solve_read(name, config, workspace, || {
-            frame::decode_page(bytes, config.page).map_err(|error| error.in_file(name))
-        })
-    }
-
-    fn solve_read(
+    /// As [`Self::solve_file`].
+    pub fn solve_read(
         &self,
         name: &Path,
         config: &SolveConfig,
         workspace: &mut Workspace,
         read: impl FnOnce() -> Result<Frame, FrameError>,
-    ) -> Result<Solution, Error> {
+    ) -> Result<(Solution, Frame), Error> {
         let start = Instant::now();
         let frame = read()?;
         let read_ms = milliseconds_since(start);
@@ -357,7 +366,7 @@ impl<'a> Pipeline<'a> {
             })?;
         solution.timing.read_ms = read_ms;
         solution.timing.total_ms = milliseconds_since(start);
-        Ok(solution)
+        Ok((solution, frame))
     }
 
     /// Examines `frame`. Where `config` has no date, it is that of the frame's header. Where it has no scale, that of the
@@ -388,6 +397,7 @@ impl<'a> Pipeline<'a> {
             }
             _ => self.identify(&field, &kept, &knowledge),
         };
+        let outcome = self.explained(outcome, &field, &knowledge, Some((frame, &detections)));
         Ok(Solution {
             width: frame.width,
             height: frame.height,
@@ -412,22 +422,12 @@ impl<'a> Pipeline<'a> {
     /// Identifies the stars of a list of centroids.
     pub fn solve_centroids(&self, list: &CentroidList, knowledge: &Knowledge) -> Solution {
         let start = Instant::now();
-        let mut centroids = list.centroids.clone();
-        centroids.sort_by(|a, b| a.mag.total_cmp(&b.mag));
-        let observed = |centroid: &ListedCentroid| ObservedStar {
-            position: centroid.position,
-            sigma_px: LISTED_SIGMA_PX,
-            mag: centroid.mag,
-        };
-        let field = StarField {
-            width_px: list.width as f64,
-            height_px: list.height as f64,
-            photometry: list.photometry,
-            years_since_j2000: knowledge.years_since_j2000(),
-            stars: centroids.iter().map(observed).collect(),
-        };
-        let all: Vec<usize> = (0..centroids.len()).collect();
+        let mut list = list.clone();
+        list.centroids.sort_by(|a, b| a.mag.total_cmp(&b.mag));
+        let field = list.star_field(knowledge.years_since_j2000());
+        let all: Vec<usize> = (0..list.centroids.len()).collect();
         let outcome = self.identify(&field, &all, knowledge);
+        let outcome = self.explained(outcome, &field, knowledge, None);
         let identify_ms = milliseconds_since(start);
         let source = |centroid: &ListedCentroid| Source {
             position: centroid.position,
@@ -440,7 +440,7 @@ impl<'a> Pipeline<'a> {
             date: knowledge.date,
             exposure_s: None,
             notes: Vec::new(),
-            sources: centroids.iter().map(source).collect(),
+            sources: list.centroids.iter().map(source).collect(),
             background: None,
             outcome,
             timing: Timing {
@@ -485,6 +485,26 @@ impl<'a> Pipeline<'a> {
             }
         }
         outcome
+    }
+
+    /// The same outcome; where the field is not identified, with a reason that says more, also from `image` where there
+    /// is one.
+    fn explained(
+        &self,
+        outcome: Outcome,
+        field: &StarField,
+        knowledge: &Knowledge,
+        image: Option<(&Frame, &Detections)>,
+    ) -> Outcome {
+        let Outcome::NotIdentified(reason) = outcome else {
+            return outcome;
+        };
+        let examined = Examined {
+            image,
+            field,
+            hints: &knowledge.hints(field.width_px),
+        };
+        Outcome::NotIdentified(diagnosis::explain(&examined, &self.sky, reason))
     }
 }
 

@@ -339,7 +339,16 @@ fn out_holds_the_json_and_the_stars_of_each_frame() {
     names.sort();
     assert_eq!(
         names,
-        ["cygnus.csv", "cygnus.json", "orion.csv", "orion.json"]
+        [
+            "cygnus.csv",
+            "cygnus.json",
+            "cygnus.png",
+            "cygnus.wcs",
+            "orion.csv",
+            "orion.json",
+            "orion.png",
+            "orion.wcs"
+        ]
     );
     let line = ran.stdout.lines().next().unwrap();
     assert_eq!(

@@ -29,9 +29,21 @@ const MAY_USE: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "diagnosis",
+        &["units", "coords", "camera", "frame", "detect", "identify"],
+    ),
+    (
         "pipeline",
         &[
-            "units", "coords", "epoch", "frame", "camera", "catalog", "detect", "identify",
+            "units",
+            "coords",
+            "epoch",
+            "frame",
+            "camera",
+            "catalog",
+            "detect",
+            "identify",
+            "diagnosis",
         ],
     ),
     (
@@ -50,6 +62,17 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "identify",
             "pipeline",
         ],
+    ),
+    (
+        "overlay",
+        &[
+            "units", "coords", "camera", "catalog", "detect", "frame", "identify", "pipeline",
+            "report",
+        ],
+    ),
+    (
+        "wcs",
+        &["units", "coords", "camera", "identify", "pipeline"],
     ),
 ];
 

@@ -130,6 +130,14 @@ fn assert_none_is_identified(command: &[&str], inputs: &[PathBuf]) {
                 .as_str()
                 .is_some_and(|reason| reason.len() > 20)
         );
+        let code = report["reason_code"].as_str().unwrap();
+        let strange = ["trails", "double_exposure", "hints_exclude"];
+        assert!(
+            !strange.contains(&code),
+            "{}: {}",
+            report["frame"],
+            report["reason"]
+        );
         for part in ["attitude", "optics", "match", "magnitude"] {
             assert!(report[part].is_null());
         }

@@ -117,6 +117,30 @@ impl Distortion {
         &self.coefficients_px
     }
 
+    /// Its polynomial term by term: the powers of u/R and of v/R, and the displacement along u and v in pixels.
+    /// Terms of the same powers may occur more than once.
+    pub fn monomials(&self) -> Vec<(usize, usize, [f64; 2])> {
+        let c = &self.coefficients_px;
+        if self.model == DistortionModel::Radial {
+            // r² u and r² v, written out.
+            return vec![
+                (3, 0, [c[0], 0.0]),
+                (1, 2, [c[0], 0.0]),
+                (2, 1, [0.0, c[0]]),
+                (0, 3, [0.0, c[0]]),
+            ];
+        }
+        let mut monomials = vec![(1, 0, [c[0], c[1]]), (0, 1, [c[1], -c[0]])];
+        let powers = (2..=self.model.order()).flat_map(|n| (0..=n).map(move |q| (n - q, q)));
+        let pairs = c[2..].chunks_exact(2);
+        monomials.extend(
+            powers
+                .zip(pairs)
+                .map(|((p, q), pair)| (p, q, [pair[0], pair[1]])),
+        );
+        monomials
+    }
+
     /// From the observed offset to the ideal one, in pixels.
     pub fn remove(&self, observed: [f64; 2]) -> [f64; 2] {
         let normalised = [observed[0] / self.radius_px, observed[1] / self.radius_px];

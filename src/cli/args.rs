@@ -39,7 +39,8 @@ pub(crate) enum Command {
         starpipe process --page 2 night.fits\n  \
         funpack -S night.fits.fz | starpipe process -\n\n\
         The kind of a file is told from its content; any may be compressed with gzip. A date, an exposure,\n\
-        a pixel size and a focal length in FITS keywords or Exif are used where no option says otherwise.")]
+        a pixel size and a focal length in FITS keywords or Exif are used where no option says otherwise.\n\n\
+        --out results makes results/night.json, night.csv, night.wcs and night.png of night.tif.")]
     Process(ProcessArgs),
     /// Identify the stars in lists of centroids (CSV)
     #[command(after_help = "Examples:\n  \
@@ -150,7 +151,8 @@ pub(crate) struct OutputArgs {
     /// With --format text, list every identified star and not just the brightest
     #[arg(long)]
     pub(crate) all_stars: bool,
-    /// Also write FRAME.json and FRAME.csv (its stars) into this directory
+    /// Also write, into this directory, FRAME.json, FRAME.csv (its stars), FRAME.wcs (a FITS header, where
+    /// it is identified) and, of frames, FRAME.png (the stars ringed and named)
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }

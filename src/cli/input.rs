@@ -1,10 +1,10 @@
 //! What inputs may be named: files, directories of frames, and `-` for standard input.
 
 use super::Fault;
-use anyhow::Context;
-use starpipe::frame;
+use starpipe::frame::{self, Frame, FrameError};
 use starpipe::pipeline::Error;
 use std::io::{self, Read};
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 /// Whether `input` stands for standard input.
@@ -12,14 +12,16 @@ pub(crate) fn is_stdin(input: &Path) -> bool {
     input.as_os_str() == "-"
 }
 
-/// All of standard input.
-pub(crate) fn read_stdin() -> anyhow::Result<Vec<u8>> {
+/// The frame in the file `input`, or in standard input.
+pub(crate) fn read_frame(input: &Path, page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
+    if !is_stdin(input) {
+        return frame::read_page(input, page);
+    }
     let mut bytes = Vec::new();
-    io::stdin()
-        .lock()
-        .read_to_end(&mut bytes)
-        .context("reading -")?;
-    Ok(bytes)
+    let read = io::stdin().lock().read_to_end(&mut bytes);
+    read.map_err(FrameError::from)
+        .and_then(|_| frame::decode_page(&bytes, page))
+        .map_err(|error| error.in_file(input))
 }
 
 /// Refuses to read standard input twice.

@@ -3,7 +3,11 @@
 use super::args::Format;
 use super::settings::output_path;
 use anyhow::Context;
+use starpipe::catalog::Catalog;
+use starpipe::frame::Frame;
+use starpipe::pipeline::Solution;
 use starpipe::report::{FrameReport, TextOptions, write_table_header};
+use starpipe::{overlay, wcs};
 use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -15,23 +19,20 @@ pub(crate) struct OutputSettings {
     pub(crate) directory: Option<PathBuf>,
 }
 
-/// Writes reports as they come.
-pub(crate) struct Output {
-    settings: OutputSettings,
+/// Prints reports as they come.
+pub(crate) struct Printer {
+    format: Format,
+    text: TextOptions,
     reports: usize,
 }
 
-impl Output {
-    /// Makes the directory for results, if one is wanted.
-    pub(crate) fn new(settings: OutputSettings) -> anyhow::Result<Self> {
-        if let Some(directory) = &settings.directory {
-            std::fs::create_dir_all(directory)
-                .with_context(|| format!("making the directory {}", directory.display()))?;
-        }
-        Ok(Self {
-            settings,
+impl Printer {
+    pub(crate) fn new(settings: &OutputSettings) -> Self {
+        Self {
+            format: settings.format,
+            text: settings.text,
             reports: 0,
-        })
+        }
     }
 
     /// Prints `report`. Ends it where nobody listens any longer.
@@ -42,24 +43,83 @@ impl Output {
         print(&text)
     }
 
-    /// Writes the files that belong to `report`, if any are wanted.
-    pub(crate) fn save(&self, input: &Path, report: &FrameReport) -> anyhow::Result<()> {
-        let Some(directory) = &self.settings.directory else {
-            return Ok(());
-        };
-        let json = report.to_json_line()? + "\n";
-        write_whole(&output_path(directory, input, "json"), json.as_bytes())?;
-        let table = table(report, true)?;
-        write_whole(&output_path(directory, input, "csv"), &table)
-    }
-
     fn rendered(&self, report: &FrameReport, first: bool) -> anyhow::Result<String> {
-        Ok(match self.settings.format {
-            Format::Text if first => report.to_text(self.settings.text),
-            Format::Text => format!("\n{}", report.to_text(self.settings.text)),
+        Ok(match self.format {
+            Format::Text if first => report.to_text(self.text),
+            Format::Text => format!("\n{}", report.to_text(self.text)),
             Format::Json => report.to_json_line()? + "\n",
             Format::Csv => String::from_utf8(table(report, first)?)?,
         })
+    }
+}
+
+/// One input, worked on: what the files of results are made from.
+pub(crate) struct Solved {
+    pub(crate) solution: Solution,
+    /// The frame itself, where there is one to draw on.
+    pub(crate) frame: Option<Frame>,
+}
+
+/// The directory for files of results, where one is wanted.
+pub(crate) struct ResultFiles {
+    directory: Option<PathBuf>,
+}
+
+impl ResultFiles {
+    /// Makes the directory, if one is wanted.
+    pub(crate) fn new(settings: OutputSettings) -> anyhow::Result<Self> {
+        if let Some(directory) = &settings.directory {
+            std::fs::create_dir_all(directory)
+                .with_context(|| format!("making the directory {}", directory.display()))?;
+        }
+        Ok(Self {
+            directory: settings.directory,
+        })
+    }
+
+    /// Writes the files that belong to `input`: all of them, or none where there is no room for one.
+    ///
+    /// A header of world coordinates that an earlier run left is taken away where this one has none to give.
+    pub(crate) fn save(
+        &self,
+        input: &Path,
+        solved: &Solved,
+        report: &FrameReport,
+        catalog: &Catalog,
+    ) -> anyhow::Result<()> {
+        let Some(directory) = &self.directory else {
+            return Ok(());
+        };
+        let path = |extension: &str| output_path(directory, input, extension);
+        let json = report.to_json_line()? + "\n";
+        let mut files = vec![
+            (path("json"), json.into_bytes()),
+            (path("csv"), table(report, true)?),
+        ];
+        if let Some(frame) = &solved.frame {
+            let title = input.file_name().unwrap_or(input.as_os_str());
+            let title = title.to_string_lossy();
+            let picture = overlay::draw(&title, frame, &solved.solution, catalog);
+            files.push((path("png"), overlay::to_png(&picture)?));
+        }
+        let header = wcs::header(&report.frame, &solved.solution);
+        let has_header = header.is_some();
+        files.extend(header.map(|header| (path("wcs"), header)));
+        write_whole(&files)?;
+        if has_header {
+            Ok(())
+        } else {
+            remove_stale(&path("wcs"))
+        }
+    }
+}
+
+fn remove_stale(path: &Path) -> anyhow::Result<()> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(error).with_context(|| format!("removing {}, which is out of date", path.display()))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -87,19 +147,26 @@ fn table(report: &FrameReport, with_header: bool) -> anyhow::Result<Vec<u8>> {
         .map_err(|error| error.into_error().into())
 }
 
-/// Writes a file whole or not at all: into a temporary file beside it, which then takes its name.
-pub(crate) fn write_whole(path: &Path, content: &[u8]) -> anyhow::Result<()> {
-    let write = || -> io::Result<()> {
-        let directory = match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        let mut file = new_file_in(directory)?;
+/// Writes files whole or not at all: into temporary files beside them, which take their names once all are written.
+fn write_whole(files: &[(PathBuf, Vec<u8>)]) -> anyhow::Result<()> {
+    let writing = |path: &Path| format!("writing {}", path.display());
+    let write = |path: &Path, content: &[u8]| {
+        let parent = path.parent().filter(|parent| *parent != Path::new(""));
+        let mut file = new_file_in(parent.unwrap_or(Path::new(".")))?;
         file.write_all(content)?;
-        file.persist(path)?;
-        Ok(())
+        io::Result::Ok(file)
     };
-    write().with_context(|| format!("writing {}", path.display()))
+    let mut written = Vec::new();
+    for (path, content) in files {
+        let file = write(path, content).with_context(|| writing(path))?;
+        written.push((path, file));
+    }
+    for (path, file) in written {
+        // The error would keep the temporary file as long as it lives.
+        let persisted = file.persist(path).map_err(|refused| refused.error);
+        persisted.with_context(|| writing(path))?;
+    }
+    Ok(())
 }
 
 /// A temporary file with the permissions of any other new file, and not those of a secret.
@@ -122,18 +189,33 @@ mod tests {
     fn a_file_is_replaced_whole_and_nothing_is_left_beside_it() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("a.json");
-        write_whole(&path, b"one, and long").unwrap();
-        write_whole(&path, b"two").unwrap();
-        assert_eq!(std::fs::read(&path).unwrap(), b"two");
+        for content in [&b"one, and long"[..], b"two"] {
+            write_whole(&[(path.clone(), content.to_vec())]).unwrap();
+            assert_eq!(std::fs::read(&path).unwrap(), content);
+        }
         assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 1);
     }
 
     #[test]
-    fn a_file_that_cannot_be_written_leaves_nothing_behind() {
+    fn a_file_that_cannot_be_written_leaves_nothing_behind_nor_those_before_it() {
+        let directory = tempfile::tempdir().unwrap();
+        let there = directory.path().join("a.json");
+        let elsewhere = directory.path().join("not/there/a.csv");
+        let files = [(there, b"one".to_vec()), (elsewhere, b"two".to_vec())];
+        let error = write_whole(&files).unwrap_err();
+        assert!(
+            format!("{error:#}").contains("not/there/a.csv"),
+            "{error:#}"
+        );
+        assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn a_name_that_is_taken_by_a_directory_is_no_file_to_write() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("taken");
         std::fs::create_dir(&path).unwrap();
-        let error = write_whole(&path, b"one").unwrap_err();
+        let error = write_whole(&[(path, b"one".to_vec())]).unwrap_err();
         assert!(format!("{error:#}").contains("taken"), "{error:#}");
         assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 1);
     }

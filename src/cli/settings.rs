@@ -71,11 +71,19 @@ impl DetectionArgs {
     }
 }
 
+/// Extensions of the files that `--out` makes of a frame, and of a list of centroids.
+pub(crate) const FRAME_RESULTS: &[&str] = &["json", "csv", "png", "wcs"];
+pub(crate) const LIST_RESULTS: &[&str] = &["json", "csv", "wcs"];
+
 impl OutputArgs {
-    /// Where the results of `inputs` go.
-    pub(crate) fn resolve(self, inputs: &[PathBuf]) -> Result<OutputSettings, Fault> {
+    /// Where the results of `inputs` go; `extensions` are those of the files made of each.
+    pub(crate) fn resolve(
+        self,
+        inputs: &[PathBuf],
+        extensions: &[&str],
+    ) -> Result<OutputSettings, Fault> {
         if let Some(directory) = &self.out {
-            check_file_names(inputs, directory)?;
+            check_file_names(inputs, directory, extensions)?;
         }
         Ok(OutputSettings {
             format: self.format,
@@ -96,7 +104,11 @@ pub(crate) fn result_stem(input: &Path) -> &OsStr {
 }
 
 /// Refuses inputs whose results would overwrite each other, or one of the inputs.
-fn check_file_names(inputs: &[PathBuf], directory: &Path) -> Result<(), Fault> {
+fn check_file_names(
+    inputs: &[PathBuf],
+    directory: &Path,
+    extensions: &[&str],
+) -> Result<(), Fault> {
     let mut taken: HashMap<&OsStr, &Path> = HashMap::new();
     for input in inputs {
         let stem = result_stem(input);
@@ -114,7 +126,7 @@ fn check_file_names(inputs: &[PathBuf], directory: &Path) -> Result<(), Fault> {
         .filter_map(|i| i.canonicalize().ok())
         .collect();
     for input in inputs {
-        for extension in ["json", "csv"] {
+        for extension in extensions {
             let output = output_path(directory, input, extension);
             let clash = output
                 .canonicalize()

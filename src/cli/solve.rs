@@ -1,19 +1,19 @@
 //! `process` and `identify`.
 
-use super::args::{IdentifyArgs, OutputArgs, ProcessArgs, ResourceArgs, SolvingArgs};
+use super::args::{IdentifyArgs, ProcessArgs, ResourceArgs, SolvingArgs};
 use super::centroids::{self, FrameSize};
-use super::input::{self, is_stdin, read_stdin};
-use super::output::Output;
+use super::input;
+use super::output::{OutputSettings, Printer, ResultFiles, Solved};
+use super::settings::{FRAME_RESULTS, LIST_RESULTS};
 use super::{Exit, Fault, batch, cache, chained, complain, warn};
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use starpipe::catalog::{self, Catalog};
 use starpipe::detect::Workspace;
 use starpipe::identify::Sky;
-use starpipe::pipeline::{Pipeline, Solution, SolveConfig};
+use starpipe::pipeline::{Pipeline, SolveConfig};
 use starpipe::report::FrameReport;
 use std::borrow::Cow;
-use std::io::IsTerminal;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -35,12 +35,20 @@ pub(crate) fn process(arguments: ProcessArgs) -> Result<Exit, Fault> {
     for trouble in &troubles {
         complain(chained(trouble));
     }
-    let exit = solve_all(&frames, solving, |pipeline, path, workspace| {
-        if is_stdin(path) {
-            return Ok(pipeline.solve_bytes(path, &read_stdin()?, &config, workspace)?);
-        }
-        Ok(pipeline.solve_file(path, &config, workspace)?)
-    })?;
+    let (settings, resources) = solving.resolve(&frames, FRAME_RESULTS)?;
+    // Frames are large: one is kept only where it is drawn.
+    let keep = settings.directory.is_some();
+    let exit = solve_all(
+        &frames,
+        settings,
+        &resources,
+        |pipeline, path, workspace| {
+            let read = || input::read_frame(path, page);
+            let (solution, frame) = pipeline.solve_read(path, &config, workspace, read)?;
+            let frame = keep.then_some(frame);
+            Ok(Solved { solution, frame })
+        },
+    )?;
     Ok(if troubles.is_empty() {
         exit
     } else {
@@ -59,80 +67,110 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Exit, Fault> {
     input::check(&lists)?;
     let knowledge = solving.hints.resolve()?;
     let size = FrameSize { width, height };
-    solve_all(&lists, solving, |pipeline, path, _| {
+    let (settings, resources) = solving.resolve(&lists, LIST_RESULTS)?;
+    solve_all(&lists, settings, &resources, |pipeline, path, _| {
         let list = centroids::read(path, size)?;
-        Ok(pipeline.solve_centroids(&list, &knowledge))
+        let solution = pipeline.solve_centroids(&list, &knowledge);
+        Ok(Solved {
+            solution,
+            frame: None,
+        })
     })
 }
 
-/// Solves every input and prints its report; one that cannot be read does not disturb the others.
+impl SolvingArgs {
+    fn resolve(
+        self,
+        inputs: &[PathBuf],
+        extensions: &[&str],
+    ) -> Result<(OutputSettings, ResourceArgs), Fault> {
+        Ok((self.output.resolve(inputs, extensions)?, self.resources))
+    }
+}
+
+/// Solves every input, prints its report, and writes its files; one that cannot be read does not disturb the others.
 fn solve_all(
     inputs: &[PathBuf],
-    solving: SolvingArgs,
-    solve: impl Fn(&Pipeline, &Path, &mut Workspace) -> anyhow::Result<Solution> + Sync,
+    settings: OutputSettings,
+    resources: &ResourceArgs,
+    solve: impl Fn(&Pipeline, &Path, &mut Workspace) -> anyhow::Result<Solved> + Sync,
 ) -> Result<Exit, Fault> {
-    let SolvingArgs {
-        output, resources, ..
-    } = solving;
-    let mut run = Run::new(output, inputs)?;
+    let mut run = Run::new(&settings, inputs);
+    let files = ResultFiles::new(settings)?;
     if inputs.is_empty() {
         return Ok(run.exit());
     }
     let pool = thread_pool(resources.threads)?;
     let catalog = pool.install(|| read_catalog(resources.catalog.as_deref()))?;
-    let sky = pool.install(|| sky(&catalog, &resources));
+    let sky = pool.install(|| sky(&catalog, resources));
     let pipeline = Pipeline::new(sky);
+    // The threads that solve also draw and write: the one that prints waits for nothing else.
     let report = |input: &PathBuf, workspace: &mut Workspace| {
-        let solution = solve(&pipeline, input, workspace)?;
+        let solved = solve(&pipeline, input, workspace)?;
         let name = input.display().to_string();
-        Ok(FrameReport::new(&name, &solution, pipeline.catalog()))
+        let report = FrameReport::new(&name, &solved.solution, pipeline.catalog());
+        let saved = files.save(input, &solved, &report, pipeline.catalog());
+        Ok(Answer { report, saved })
     };
-    batch::for_each_ordered(
-        &pool,
-        inputs,
-        Workspace::default,
-        report,
-        |input, result| run.take(input, result),
-    );
+    batch::for_each_ordered(&pool, inputs, Workspace::default, report, |_, result| {
+        run.take(result)
+    });
     Ok(run.exit())
+}
+
+/// What is told of an input, and whether it is in its files as well.
+struct Answer {
+    report: FrameReport,
+    saved: anyhow::Result<()>,
 }
 
 /// What has become of the inputs so far.
 struct Run {
-    output: Output,
+    printer: Printer,
     progress: ProgressBar,
     failed: bool,
     unidentified: bool,
 }
 
 impl Run {
-    fn new(output: OutputArgs, inputs: &[PathBuf]) -> Result<Self, Fault> {
-        // Between results on the same terminal a bar would only be in the way.
-        let progress = if inputs.len() > 1 && !std::io::stdout().is_terminal() {
+    fn new(settings: &OutputSettings, inputs: &[PathBuf]) -> Self {
+        let progress = if inputs.len() > 1 {
             bar(inputs.len() as u64, "frames {wide_bar} {pos}/{len} {eta}")
         } else {
             ProgressBar::hidden()
         };
-        Ok(Self {
-            output: Output::new(output.resolve(inputs)?)?,
+        Self {
+            printer: Printer::new(settings),
             progress,
             failed: false,
             unidentified: false,
+        }
+    }
+
+    fn take(&mut self, result: anyhow::Result<Answer>) -> ControlFlow<()> {
+        self.progress.inc(1);
+        let answer = match result {
+            Ok(answer) => answer,
+            Err(error) => {
+                self.complain(&error);
+                return ControlFlow::Continue(());
+            }
+        };
+        self.unidentified |= !answer.report.is_identified();
+        if let Err(error) = answer.saved {
+            self.complain(&error);
+        }
+        // The bar steps aside: results may go to the same terminal.
+        let printed = self.progress.suspend(|| self.printer.print(&answer.report));
+        printed.unwrap_or_else(|error| {
+            self.complain(&error);
+            ControlFlow::Continue(())
         })
     }
 
-    fn take(&mut self, input: &Path, result: anyhow::Result<FrameReport>) -> ControlFlow<()> {
-        self.progress.inc(1);
-        let printed = result.and_then(|report| {
-            self.unidentified |= !report.is_identified();
-            self.output.save(input, &report)?;
-            self.output.print(&report)
-        });
-        printed.unwrap_or_else(|error| {
-            self.failed = true;
-            self.progress.suspend(|| complain(chained(error.as_ref())));
-            ControlFlow::Continue(())
-        })
+    fn complain(&mut self, error: &anyhow::Error) {
+        self.failed = true;
+        self.progress.suspend(|| complain(chained(error.as_ref())));
     }
 
     fn exit(self) -> Exit {

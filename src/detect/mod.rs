@@ -24,6 +24,7 @@
 //! for the matched filter.
 
 mod background;
+mod background_map;
 mod calibrate;
 mod centroid;
 mod components;
@@ -38,6 +39,8 @@ mod scene;
 mod shape;
 mod threshold;
 mod view;
+
+pub use background_map::BackgroundMap;
 
 use crate::coords::PixelPoint;
 use crate::frame::{Frame, MIN_SIDE_PX};

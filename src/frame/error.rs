@@ -139,7 +139,7 @@ pub enum FrameError {
 
 impl FrameError {
     /// The same, with the file in which it is.
-    pub(crate) fn in_file(self, path: &Path) -> Self {
+    pub fn in_file(self, path: &Path) -> Self {
         Self::File {
             path: path.to_path_buf(),
             source: Box::new(self),

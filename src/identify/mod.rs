@@ -9,7 +9,7 @@ pub mod triangle;
 mod verify;
 
 pub use cache::CacheError;
-pub use search::LOG10_FALSE_ALARM_LIMIT;
+pub use search::{FOV_DEG, LOG10_FALSE_ALARM_LIMIT};
 pub use sky::Sky;
 
 use refine::{Refined, Start, refine, with_all_stars};
@@ -89,8 +89,9 @@ pub enum Outcome {
     NotIdentified(Reason),
 }
 
-/// Why a field was not identified.
+/// Why a field was not identified. Identification itself gives the first two; `diagnosis` looks further.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Reason {
     /// Fewer stars than any identification needs.
     TooFewStars {
@@ -104,6 +105,72 @@ pub enum Reason {
         /// log10 of the false-alarm probability of the best hypothesis, if there was one.
         best_log10_false_alarm: Option<f64>,
     },
+    /// All pixels of the frame have one value.
+    NoVariation {
+        /// That value, in the frame's own units.
+        level_adu: f64,
+    },
+    /// A large part of the frame is at full scale.
+    Saturated {
+        /// That part, in [0, 1].
+        share: f64,
+        /// The level, in the frame's own units.
+        level_adu: f64,
+    },
+    /// The stars are trails: the camera moved, or they did.
+    Trails {
+        /// Detections that are trails.
+        trails: usize,
+        /// Their angle to the image's x axis, in radians, in (−π/2, π/2]; above 0 they rise to the right.
+        angle_rad: f64,
+        /// Their median length, in pixels.
+        length_px: f64,
+    },
+    /// The same pattern of stars is there twice.
+    DoubleExposure {
+        /// Pairs of stars with this offset.
+        pairs: usize,
+        /// The offset along x and y, in pixels.
+        offset_px: [f64; 2],
+    },
+    /// The scale asked for is outside what can be identified.
+    ScaleOutOfRange {
+        /// Horizontal field of view asked for, from and to, in radians.
+        fov_x_rad: (f64, f64),
+    },
+    /// Without the hints the stars are identified.
+    HintsExclude(Box<Excluded>),
+}
+
+/// A solution that the hints do not allow.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Excluded {
+    /// Its horizontal field of view, in radians.
+    pub fov_x_rad: f64,
+    /// Where it points.
+    pub boresight: UnitVector<Icrs>,
+    /// Stars identified.
+    pub stars: usize,
+    /// The field of view that the hints allow, from and to, in radians, where it is not among them.
+    pub allowed_fov_x_rad: Option<(f64, f64)>,
+    /// How far it is from the direction hinted at, and how far it may be, in radians, where it is too far.
+    pub distance_rad: Option<(f64, f64)>,
+}
+
+impl Reason {
+    /// A word for it, for programs.
+    pub const fn code(&self) -> &'static str {
+        match self {
+            Self::TooFewStars { .. } => "too_few_stars",
+            Self::NoMatch { .. } => "no_match",
+            Self::NoVariation { .. } => "no_variation",
+            Self::Saturated { .. } => "saturated",
+            Self::Trails { .. } => "trails",
+            Self::DoubleExposure { .. } => "double_exposure",
+            Self::ScaleOutOfRange { .. } => "scale_out_of_range",
+            Self::HintsExclude(_) => "hints_exclude",
+        }
+    }
 }
 
 /// An identified field.

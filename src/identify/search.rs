@@ -16,8 +16,8 @@ use crate::coords::{Icrs, Rotation, UnitVector};
 use crate::units::RAD_PER_DEG;
 use nalgebra::{Matrix3, Vector3};
 
-/// Widths of field searched where nothing is known.
-const FOV_DEG: (f64, f64) = (1.5, 60.0);
+/// Horizontal fields of view, in degrees, that are searched where nothing is known.
+pub const FOV_DEG: (f64, f64) = (1.5, 60.0);
 /// A little more, so that a field of just that width is not missed.
 const FOV_SLACK: f64 = 1.05;
 

@@ -1,5 +1,6 @@
 //! From what the pipeline found to what is told of it.
 
+use super::reason;
 use super::rounding::{finite, half_turn_deg, significant, to_decimals, to_significant, turn_deg};
 use super::{
     AttitudeReport, AttitudeSigma, BackgroundReport, DateReport, DistortionReport, FrameReport,
@@ -8,7 +9,7 @@ use super::{
 use crate::camera::Distortion;
 use crate::catalog::Catalog;
 use crate::detect::DetectionFlags;
-use crate::identify::{Identification, LOG10_FALSE_ALARM_LIMIT, Outcome, Reason, StarMatch};
+use crate::identify::{Identification, Outcome, StarMatch};
 use crate::pipeline::{Background, FrameDate, Solution, Source, Timing};
 use crate::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 
@@ -38,6 +39,7 @@ impl FrameReport {
             notes: solution.notes.clone(),
             status: Status::NotIdentified,
             reason: None,
+            reason_code: None,
             attitude: None,
             optics: None,
             matched: None,
@@ -48,7 +50,8 @@ impl FrameReport {
         };
         match &solution.outcome {
             Outcome::NotIdentified(reason) => {
-                report.reason = Some(reason_text(reason, solution.sources.len()));
+                report.reason = Some(reason::text(reason, solution));
+                report.reason_code = Some(reason.code());
             }
             Outcome::Identified(identification) => {
                 let known = solution.date;
@@ -208,64 +211,9 @@ fn flag_names(flags: DetectionFlags) -> Vec<&'static str> {
     .collect()
 }
 
-/// `reason` in words, with what may help.
-fn reason_text(reason: &Reason, detected: usize) -> String {
-    match *reason {
-        Reason::TooFewStars { found, needed } => {
-            let found = match found {
-                0 => "no star was found".to_owned(),
-                1 => "only 1 star was found".to_owned(),
-                _ => format!("only {found} stars were found"),
-            };
-            format!(
-                "{found} and at least {needed} are needed; a longer exposure or a lower \
-                 detection threshold shows more"
-            )
-        }
-        Reason::NoMatch {
-            best_log10_false_alarm: Some(best),
-        } if best.is_finite() => format!(
-            "no arrangement of catalogue stars matches the {detected} detections beyond chance: the \
-             best has a log10 false-alarm probability of {best:.1}, and {LOG10_FALSE_ALARM_LIMIT:.0} \
-             is needed; the field of view and the direction, where known, make it easier"
-        ),
-        Reason::NoMatch { .. } => format!(
-            "no arrangement of catalogue stars matches the {detected} detections; if this is the sky, the \
-             field of view and the direction, where known, make it easier"
-        ),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_reason_says_what_was_found_what_was_needed_and_what_may_help() {
-        let few = reason_text(
-            &Reason::TooFewStars {
-                found: 1,
-                needed: 4,
-            },
-            3,
-        );
-        assert!(
-            few.contains("only 1 star was found and at least 4"),
-            "{few}"
-        );
-        let none = Reason::NoMatch {
-            best_log10_false_alarm: None,
-        };
-        assert!(reason_text(&none, 12).contains("12 detections"));
-        let near_miss = Reason::NoMatch {
-            best_log10_false_alarm: Some(-6.34),
-        };
-        assert!(reason_text(&near_miss, 12).contains("-6.3"));
-        let hopeless = Reason::NoMatch {
-            best_log10_false_alarm: Some(f64::NAN),
-        };
-        assert!(!reason_text(&hopeless, 12).contains("NaN"));
-    }
 
     #[test]
     fn flags_are_named_in_a_fixed_order() {

@@ -8,10 +8,13 @@
 
 mod angles;
 mod build;
+mod reason;
 mod rounding;
 mod table;
 mod text;
 
+#[cfg(feature = "overlay")]
+pub(crate) use angles::{degrees, hours};
 pub use table::{TABLE_COLUMNS, write_table_header};
 pub use text::{STARS_SHOWN, TextOptions, counted};
 
@@ -42,6 +45,8 @@ pub struct FrameReport {
     pub status: Status,
     /// Why they are not, and what may help.
     pub reason: Option<String>,
+    /// The same as a word for programs, see [`Reason::code`](crate::identify::Reason::code).
+    pub reason_code: Option<&'static str>,
     /// Where the camera points.
     pub attitude: Option<AttitudeReport>,
     /// What the camera turned out to be.

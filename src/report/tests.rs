@@ -36,6 +36,7 @@ fn unidentified() -> FrameReport {
              of view and the direction, where known, make it easier"
                 .into(),
         ),
+        reason_code: Some("no_match"),
         attitude: None,
         optics: None,
         matched: None,
@@ -67,6 +68,7 @@ fn identified() -> FrameReport {
         ],
         status: Status::Identified,
         reason: None,
+        reason_code: None,
         attitude: Some(AttitudeReport {
             ra_deg: 83.822_083_3,
             dec_deg: -1.212_251_2,

@@ -1,0 +1,112 @@
+#!/usr/bin/env python3
+"""Holds the FITS headers that `starpipe process --out DIR` writes against astropy's reading of them.
+
+    python3 scripts/check-wcs.py DIR
+
+For every DIR/*.wcs: the directions of the identified stars in the .csv beside it go through the header's
+inverse (AP, BP) and through astropy's own inversion of A, B, and come out where the star was seen, less the
+residual that the .csv has; the frame's corners and a grid over it go to the sky and back; the centre and the
+position angle of up are those in the .json. Prints the greatest differences in pixels for each frame, and ends with 1
+where one reaches TOLERANCE_PX.
+"""
+
+import csv
+import json
+import pathlib
+import sys
+import warnings
+
+import numpy as np
+from astropy.io import fits
+from astropy.wcs import WCS
+
+TOLERANCE_PX = 0.1
+ANGLE_TOLERANCE_DEG = 1e-5
+
+
+def stars(path):
+    """Pixel positions (0-based), directions and residuals of the identified stars."""
+    with open(path, newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["id"]]
+    column = lambda name: np.array([float(row[name]) for row in rows])
+    return column("x"), column("y"), column("ra_deg"), column("dec_deg"), column("residual_px")
+
+
+def by_header_inverse(wcs, ra, dec):
+    """Pixels (0-based) of directions through AP and BP."""
+    ideal = np.array(wcs.wcs_world2pix(ra, dec, 1))
+    if wcs.sip is None:
+        return ideal - 1
+    u, v = ideal - np.array(wcs.sip.crpix)[:, None]
+    shift = [np.polynomial.polynomial.polyval2d(u, v, terms) for terms in (wcs.sip.ap, wcs.sip.bp)]
+    return ideal + shift - 1
+
+
+def largest(x, y, x_there, y_there):
+    return float(np.max(np.hypot(x - x_there, y - y_there)))
+
+
+def angles(wcs, report):
+    """How far, in degrees, the centre and image-up are from what the report says."""
+    centre_x, centre_y = (report["width"] - 1) / 2, (report["height"] - 1) / 2
+    to_unit = lambda ra, dec: np.array(
+        [np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)]
+    )
+    at = lambda x, y: to_unit(*np.radians(wcs.all_pix2world(x, y, 0)))
+    attitude = report["attitude"]
+    ra, dec = np.radians([attitude["ra_deg"], attitude["dec_deg"]])
+    centre = to_unit(ra, dec)
+    off = np.degrees(np.linalg.norm(at(centre_x, centre_y) - centre))
+    east = np.array([-np.sin(ra), np.cos(ra), 0])
+    north = np.cross(centre, east)
+    up = at(centre_x, centre_y - 1e-3) - at(centre_x, centre_y + 1e-3)
+    angle = np.degrees(np.arctan2(up @ east, up @ north)) - attitude["up_pa_deg"]
+    # The report's angle is that of the camera's axes; a sheared image has columns that lean against them.
+    lens = report["optics"]["distortion"]
+    if lens and lens["model"] != "radial":
+        stretch, shear = np.array(lens["coefficients_px"][:2]) / lens["radius_px"]
+        angle += np.degrees(np.arctan2(-shear, 1 - stretch))
+    return off, abs((angle + 180) % 360 - 180)
+
+
+def check(path):
+    header = fits.getheader(path)
+    wcs = WCS(header)
+    report = json.loads(path.with_suffix(".json").read_text())
+    x, y, ra, dec, residual = stars(path.with_suffix(".csv"))
+
+    # The star's residual is the distance from where the header must put it to where it was seen.
+    exact = wcs.all_world2pix(ra, dec, 0, tolerance=1e-7, maxiter=100)
+    residuals = float(np.max(np.abs(np.hypot(exact[0] - x, exact[1] - y) - residual)))
+    inverse = largest(*by_header_inverse(wcs, ra, dec), *exact)
+
+    width, height = report["width"], report["height"]
+    gx, gy = np.meshgrid(np.linspace(-0.5, width - 0.5, 33), np.linspace(-0.5, height - 0.5, 33))
+    gx, gy = gx.ravel(), gy.ravel()
+    sky = wcs.all_pix2world(gx, gy, 0)
+    grid = largest(*by_header_inverse(wcs, *sky), gx, gy)
+    off, turn = angles(wcs, report)
+    ok = max(residuals, inverse, grid) < TOLERANCE_PX and max(off, turn) < ANGLE_TOLERANCE_DEG
+    print(
+        f"{path.name:45} {header['CTYPE1']:13} stars {len(x):5}  residuals {residuals:.5f} px  "
+        f"AP/BP at stars {inverse:.5f} px  grid and back {grid:.5f} px  "
+        f"centre {off * 3600:.4f}\"  up {turn * 3600:.4f}\"  {'ok' if ok else 'WRONG'}"
+    )
+    return ok
+
+
+def main():
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    paths = sorted(pathlib.Path(sys.argv[1]).glob("*.wcs"))
+    if not paths:
+        sys.exit(f"{sys.argv[1]}: no .wcs files")
+    warnings.simplefilter("error")
+    # There is no image in the file, as in those of astrometry.net; and astropy tells of what it adds.
+    warnings.filterwarnings("ignore", message="'datfix' made the change 'Set MJD-OBS")
+    warnings.filterwarnings("ignore", message="The WCS transformation has more axes")
+    results = [check(path) for path in paths]
+    sys.exit(0 if all(results) else 1)
+
+
+main()

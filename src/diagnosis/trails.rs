@@ -1,0 +1,195 @@
+//! Stars drawn out into trails, all in one direction: by a camera that moved, or a sky that did.
+
+use crate::detect::{BackgroundMap, Detection, Detections};
+use crate::frame::Frame;
+use crate::identify::Reason;
+use std::collections::HashSet;
+
+/// The brightest detections that are looked at.
+const LOOKED_AT: usize = 80;
+/// A source's area is what is above this part of its peak, and above so many standard deviations of the noise.
+const PEAK_SHARE: f32 = 0.25;
+const NOISE_SIGMA: f32 = 4.0;
+/// Areas larger than this are no stars, however they are drawn out.
+const LARGEST_PX: usize = 6000;
+/// Smaller areas have no direction to speak of.
+const SMALLEST_PX: usize = 6;
+/// A trail is this many times as long as broad, and at least this long.
+const ELONGATION: f64 = 2.0;
+const SHORTEST_PX: f64 = 6.0;
+/// So many trails, ...
+const FEWEST: usize = 5;
+/// ... this part of all sources looked at, ...
+const MOST_OF_ALL: f64 = 0.6;
+/// ... and this mean length of unit vectors along twice their angles: 1 where all are parallel.
+const ALIGNMENT: f64 = 0.9;
+/// Side of the cells of the background.
+const CELL_PX: usize = 64;
+
+/// A source's area as a bar.
+struct Bar {
+    angle_rad: f64,
+    length_px: f64,
+    breadth_px: f64,
+}
+
+impl Bar {
+    fn is_trail(&self) -> bool {
+        self.length_px > SHORTEST_PX && self.length_px > ELONGATION * self.breadth_px
+    }
+}
+
+/// Whether most of the frame's sources are trails in one direction.
+pub(super) fn explain(frame: &Frame, detections: &Detections) -> Option<Reason> {
+    if detections.sources.len() < FEWEST {
+        return None;
+    }
+    let above = above_background(frame);
+    let areas = areas(frame, &above, detections);
+    let bars: Vec<Bar> = areas
+        .iter()
+        .filter_map(|area| bar(area, frame.width))
+        .collect();
+    let trails: Vec<&Bar> = bars.iter().filter(|bar| bar.is_trail()).collect();
+    let count = trails.len();
+    if count < FEWEST || (count as f64) < MOST_OF_ALL * areas.len() as f64 {
+        return None;
+    }
+    // An angle and the one opposite are the same direction: twice the angle tells no difference.
+    let sum = trails.iter().fold([0.0, 0.0], |[x, y], bar| {
+        let (sin, cos) = (2.0 * bar.angle_rad).sin_cos();
+        [x + cos, y + sin]
+    });
+    if sum[0].hypot(sum[1]) < ALIGNMENT * count as f64 {
+        return None;
+    }
+    let mut lengths: Vec<f64> = trails.iter().map(|bar| bar.length_px).collect();
+    lengths.sort_by(f64::total_cmp);
+    Some(Reason::Trails {
+        trails: count,
+        angle_rad: sum[1].atan2(sum[0]) / 2.0,
+        length_px: lengths[count / 2],
+    })
+}
+
+fn above_background(frame: &Frame) -> Vec<f32> {
+    let background = BackgroundMap::measure(frame, CELL_PX);
+    let mut above = frame.pixels.clone();
+    let mut levels = vec![0.0; frame.width];
+    for (y, row) in above.chunks_mut(frame.width).enumerate() {
+        background.row(y, &mut levels);
+        row.iter_mut()
+            .zip(&levels)
+            .for_each(|(pixel, level)| *pixel -= level);
+    }
+    above
+}
+
+/// The areas of the brightest sources, as indices of pixels; an area with several sources counts once.
+fn areas(frame: &Frame, above: &[f32], detections: &Detections) -> Vec<Vec<usize>> {
+    let noise = detections.noise_adu as f32;
+    let mut taken = HashSet::new();
+    let mut areas = Vec::new();
+    for source in detections.sources.iter().take(LOOKED_AT) {
+        let Some(start) = brightest_near(frame, above, source) else {
+            continue;
+        };
+        if taken.contains(&start) {
+            continue;
+        }
+        let threshold = (PEAK_SHARE * above[start]).max(NOISE_SIGMA * noise);
+        let area = connected(frame, above, start, threshold);
+        taken.extend(area.iter().copied());
+        if area.len() >= SMALLEST_PX {
+            areas.push(area);
+        }
+    }
+    areas
+}
+
+/// The brightest pixel of the nine round a source's position.
+fn brightest_near(frame: &Frame, above: &[f32], source: &Detection) -> Option<usize> {
+    let (x, y) = (source.position.x.round(), source.position.y.round());
+    let around = |at: f64, count: usize| {
+        let last = count as f64 - 1.0;
+        (at - 1.0).clamp(0.0, last) as usize..=(at + 1.0).clamp(0.0, last) as usize
+    };
+    around(y, frame.height)
+        .flat_map(|row| around(x, frame.width).map(move |column| row * frame.width + column))
+        .filter(|&i| above[i] > 0.0)
+        .max_by(|&i, &j| above[i].total_cmp(&above[j]))
+}
+
+/// The pixels above `threshold` that hang together with `start`; it ends above [`LARGEST_PX`].
+fn connected(frame: &Frame, above: &[f32], start: usize, threshold: f32) -> Vec<usize> {
+    let mut seen = HashSet::from([start]);
+    let mut area = Vec::new();
+    let mut next = vec![start];
+    while let Some(i) = next.pop() {
+        area.push(i);
+        if area.len() > LARGEST_PX {
+            break;
+        }
+        let (x, y) = (i % frame.width, i / frame.width);
+        for row in y.saturating_sub(1)..=(y + 1).min(frame.height - 1) {
+            for column in x.saturating_sub(1)..=(x + 1).min(frame.width - 1) {
+                let neighbour = row * frame.width + column;
+                if above[neighbour] > threshold && seen.insert(neighbour) {
+                    next.push(neighbour);
+                }
+            }
+        }
+    }
+    area
+}
+
+/// The bar with the second moments of the area; `None` for one that is too large to be a star's.
+fn bar(area: &[usize], width: usize) -> Option<Bar> {
+    if area.len() > LARGEST_PX {
+        return None;
+    }
+    let count = area.len() as f64;
+    let place = |i: &usize| [(i % width) as f64, (i / width) as f64];
+    let sum = area
+        .iter()
+        .map(place)
+        .fold([0.0, 0.0], |[x, y], p| [x + p[0], y + p[1]]);
+    let mean = [sum[0] / count, sum[1] / count];
+    // A pixel has an extent of its own.
+    let (mut xx, mut yy, mut xy) = (count / 12.0, count / 12.0, 0.0);
+    for [x, y] in area.iter().map(place) {
+        let (dx, dy) = (x - mean[0], y - mean[1]);
+        (xx, yy, xy) = (xx + dx * dx, yy + dy * dy, xy + dx * dy);
+    }
+    let (middle, half) = ((xx + yy) / 2.0, ((xx - yy) / 2.0).hypot(xy));
+    // A bar of length l has the variance l²/12 along it.
+    let extent = |moment: f64| (12.0 * moment.max(0.0) / count).sqrt();
+    Some(Bar {
+        // y runs down; angles are as people see them.
+        angle_rad: -(2.0 * xy).atan2(xx - yy) / 2.0,
+        length_px: extent(middle + half),
+        breadth_px: extent(middle - half),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bar_has_its_length_breadth_and_direction() {
+        let width = 100;
+        let area: Vec<usize> = (0..20)
+            .flat_map(|x| [(50, x), (51, x)])
+            .map(|(y, x)| y * width + x)
+            .collect();
+        let flat = bar(&area, width).unwrap();
+        assert!((flat.length_px - 20.0).abs() < 1e-9 && (flat.breadth_px - 2.0).abs() < 1e-9);
+        assert!(flat.angle_rad.abs() < 1e-12 && flat.is_trail());
+        let rising: Vec<usize> = (0..20).map(|i| (60 - i) * width + i).collect();
+        let rising = bar(&rising, width).unwrap();
+        assert!((rising.angle_rad - std::f64::consts::FRAC_PI_4).abs() < 1e-9);
+        let square: Vec<usize> = (0..25).map(|i| (i / 5) * width + i % 5).collect();
+        assert!(!bar(&square, width).unwrap().is_trail());
+    }
+}

@@ -1,0 +1,218 @@
+//! Where names go: the brightest stars first, each where it hides neither another name nor a bright star.
+
+use super::Mark;
+use super::canvas::text_width;
+
+/// Size of the letters, in units of strokes.
+pub(super) const SIZE: f32 = 12.5;
+/// Height of capitals and digits, over the size.
+const CAPITALS: f32 = 0.74;
+/// Between a ring and its name, and round every name.
+const GAP: f32 = 3.0;
+const MARGIN: f32 = 2.0;
+/// Rings of so many of the brightest detections are kept free, and of no more than this part of all.
+const KEPT_FREE: usize = 250;
+const KEPT_FREE_SHARE: f32 = 0.4;
+/// One name on such an area at the most, in square units: more cannot be taken in.
+const AREA_A_LABEL: f32 = 9000.0;
+
+/// Where there is no room beside the ring, names go so much further away, with a line to the ring.
+const FURTHER: f32 = 16.0;
+
+/// A name and where its baseline begins, in pixels.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Label {
+    pub(super) text: String,
+    pub(super) at: [f32; 2],
+    /// From the ring to a name that is not beside it.
+    pub(super) line: Option<[[f32; 2]; 2]>,
+}
+
+/// Left, top, right and bottom.
+type Rectangle = [f32; 4];
+
+impl Mark {
+    /// Whether the rectangle hides a part of the ring or of what is in it.
+    fn is_under(&self, [left, top, right, bottom]: &Rectangle) -> bool {
+        let dx = self.x - self.x.clamp(*left, *right);
+        let dy = self.y - self.y.clamp(*top, *bottom);
+        dx.hypot(dy) < self.radius
+    }
+
+    /// From the ring to the nearest point of the rectangle.
+    fn line_to(&self, [left, top, right, bottom]: &Rectangle) -> [[f32; 2]; 2] {
+        let (x, y) = (self.x.clamp(*left, *right), self.y.clamp(*top, *bottom));
+        let share = self.radius / (x - self.x).hypot(y - self.y).max(self.radius);
+        let from = [self.x + share * (x - self.x), self.y + share * (y - self.y)];
+        [from, [x, y]]
+    }
+}
+
+/// Finds places for the names of `marks`, which come brightest first, on a picture of `image` pixels.
+pub(super) fn place(marks: &[Mark], image: [f32; 2], unit: f32) -> Vec<Label> {
+    let mut named: Vec<(usize, &str, f32)> = marks
+        .iter()
+        .enumerate()
+        .filter_map(|(i, mark)| {
+            mark.label
+                .as_ref()
+                .map(|(text, v_mag)| (i, &**text, *v_mag))
+        })
+        .collect();
+    named.sort_by(|a, b| a.2.total_cmp(&b.2));
+    let most = (image[0] * image[1] / (AREA_A_LABEL * unit * unit)).ceil() as usize;
+    let kept_free = ((marks.len() as f32 * KEPT_FREE_SHARE) as usize).min(KEPT_FREE);
+    let mut taken: Vec<Rectangle> = Vec::new();
+    let mut labels = Vec::new();
+    for (index, text, _) in named {
+        if labels.len() == most {
+            break;
+        }
+        let is_free = |rectangle: &Rectangle| {
+            lies_within(rectangle, image)
+                && !taken.iter().any(|other| overlap(rectangle, other))
+                && !marks[..kept_free]
+                    .iter()
+                    .any(|mark| mark.is_under(rectangle))
+        };
+        // Rings of faint stars may be crossed, but rather fewer of them.
+        let crossed = |rectangle: &Rectangle| {
+            let others = marks[kept_free..].iter();
+            others.filter(|mark| mark.is_under(rectangle)).count()
+        };
+        let size = [text_width(text, SIZE * unit), CAPITALS * SIZE * unit];
+        let mark = &marks[index];
+        let find = |gap: f32| {
+            let places = places(mark, size, gap * unit, unit).into_iter();
+            places.filter(is_free).min_by_key(crossed)
+        };
+        let beside = find(GAP);
+        if let Some(rectangle) = beside.or_else(|| find(FURTHER)) {
+            taken.push(rectangle);
+            let margin = MARGIN * unit;
+            labels.push(Label {
+                text: text.to_owned(),
+                at: [rectangle[0] + margin, rectangle[3] - margin],
+                line: beside.is_none().then(|| mark.line_to(&rectangle)),
+            });
+        }
+    }
+    labels
+}
+
+/// Places round a ring, the best first: beside it, at its corners, above and below.
+fn places(mark: &Mark, [width, height]: [f32; 2], gap: f32, unit: f32) -> [Rectangle; 8] {
+    let away = mark.radius + gap;
+    let corner = away * std::f32::consts::FRAC_1_SQRT_2;
+    let margin = MARGIN * unit;
+    // Where the middle of the name is: offset of the ring's side, then half the name's own size.
+    [
+        (away, 0.0, 1.0, 0.0),
+        (-away, 0.0, -1.0, 0.0),
+        (corner, -corner, 1.0, -1.0),
+        (corner, corner, 1.0, 1.0),
+        (-corner, -corner, -1.0, -1.0),
+        (-corner, corner, -1.0, 1.0),
+        (0.0, -away, 0.0, -1.0),
+        (0.0, away, 0.0, 1.0),
+    ]
+    .map(|(dx, dy, right, down)| {
+        let x = mark.x + dx + right * width / 2.0;
+        let y = mark.y + dy + down * height / 2.0;
+        [
+            x - width / 2.0 - margin,
+            y - height / 2.0 - margin,
+            x + width / 2.0 + margin,
+            y + height / 2.0 + margin,
+        ]
+    })
+}
+
+fn lies_within(rectangle: &Rectangle, [width, height]: [f32; 2]) -> bool {
+    let [left, top, right, bottom] = *rectangle;
+    left >= 0.0 && top >= 0.0 && right <= width && bottom <= height
+}
+
+fn overlap(a: &Rectangle, b: &Rectangle) -> bool {
+    a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Kind;
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    const IMAGE: [f32; 2] = [800.0, 600.0];
+
+    fn mark(x: f32, y: f32, v_mag: f32) -> Mark {
+        Mark {
+            x,
+            y,
+            radius: 6.0,
+            kind: Kind::Identified,
+            label: Some((format!("05140095 {v_mag:.1}"), v_mag)),
+        }
+    }
+
+    fn rectangle(label: &Label) -> Rectangle {
+        let [x, y] = label.at;
+        [x, y - CAPITALS * SIZE, x + text_width(&label.text, SIZE), y]
+    }
+
+    #[test]
+    fn names_in_a_crowd_hide_neither_each_other_nor_bright_stars() {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let marks: Vec<Mark> = (0..1500)
+            .map(|i| {
+                let (x, y) = (
+                    random.random_range(0.0..800.0),
+                    random.random_range(0.0..600.0),
+                );
+                mark(x, y, i as f32 * 0.01)
+            })
+            .collect();
+        let labels = place(&marks, IMAGE, 1.0);
+        assert!(labels.len() > 15, "{}", labels.len());
+        assert!(labels.len() <= 54);
+        for (i, label) in labels.iter().enumerate() {
+            let own = rectangle(label);
+            assert!(lies_within(&own, IMAGE));
+            assert!(
+                labels[..i]
+                    .iter()
+                    .all(|other| !overlap(&own, &rectangle(other)))
+            );
+            let hidden = marks[..KEPT_FREE].iter().filter(|m| m.is_under(&own));
+            assert_eq!(hidden.count(), 0, "{label:?}");
+        }
+    }
+
+    #[test]
+    fn a_name_at_the_border_turns_inward() {
+        for (x, y) in [
+            (2.0, 2.0),
+            (798.0, 2.0),
+            (2.0, 598.0),
+            (798.0, 598.0),
+            (400.0, 598.0),
+        ] {
+            let labels = place(&[mark(x, y, 1.0)], IMAGE, 1.0);
+            assert_eq!(labels.len(), 1, "({x}, {y})");
+            assert!(lies_within(&rectangle(&labels[0]), IMAGE));
+        }
+    }
+
+    #[test]
+    fn the_brightest_star_has_the_first_choice() {
+        let crowded = [
+            mark(100.0, 100.0, 5.0),
+            mark(101.0, 100.0, 1.0),
+            mark(102.0, 100.0, 3.0),
+        ];
+        let labels = place(&crowded, IMAGE, 1.0);
+        assert_eq!(labels[0].text, "05140095 1.0");
+        assert_eq!(place(&[mark(5.0, 5.0, 1.0)], [20.0, 20.0], 1.0), []);
+    }
+}

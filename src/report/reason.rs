@@ -1,0 +1,217 @@
+//! Why a frame was not identified, in words, with what may help.
+
+use super::rounding::decimals_for;
+use crate::identify::{Excluded, FOV_DEG, LOG10_FALSE_ALARM_LIMIT, Reason};
+use crate::pipeline::Solution;
+use crate::units::DEG_PER_RAD;
+
+/// `reason` in words.
+pub(super) fn text(reason: &Reason, solution: &Solution) -> String {
+    match reason {
+        Reason::TooFewStars { found, needed } => too_few(*found, *needed, solution),
+        Reason::NoMatch {
+            best_log10_false_alarm,
+        } => no_match(*best_log10_false_alarm, solution),
+        Reason::NoVariation { level_adu } => format!(
+            "the frame is empty: every pixel has the value {level_adu}; was the lens covered?"
+        ),
+        Reason::Saturated { share, level_adu } => format!(
+            "{:.0} % of the pixels are at full scale, {level_adu}; a shorter exposure or less light beside \
+             the stars is needed",
+            share * 100.0
+        ),
+        Reason::Trails {
+            trails,
+            angle_rad,
+            length_px,
+        } => trails_text(*trails, *angle_rad, *length_px),
+        Reason::DoubleExposure { pairs, offset_px } => format!(
+            "the same stars are there twice, as in a double exposure: {pairs} pairs of detections have the \
+             offset ({:+.1}, {:+.1}) px; expose once",
+            offset_px[0], offset_px[1]
+        ),
+        Reason::ScaleOutOfRange { fov_x_rad } => format!(
+            "the field of view asked for (--fov or --pixel-scale), {} wide, is outside what can be \
+             identified: {}° to {}°",
+            range(*fov_x_rad),
+            FOV_DEG.0,
+            FOV_DEG.1
+        ),
+        Reason::HintsExclude(excluded) => excluded_text(excluded),
+    }
+}
+
+fn too_few(found: usize, needed: usize, solution: &Solution) -> String {
+    let others = solution.sources.len().saturating_sub(found);
+    let found = match found {
+        0 => "no star was found".to_owned(),
+        1 => "only 1 star was found".to_owned(),
+        _ => format!("only {found} stars were found"),
+    };
+    let others = match others {
+        0 => String::new(),
+        1 => " (and 1 detection that has not the shape of a star)".to_owned(),
+        _ => format!(" (and {others} detections that have not the shape of a star)"),
+    };
+    let help = match solution.background {
+        Some(_) => "; a longer exposure or a lower detection threshold (--sigma) shows more",
+        None => "",
+    };
+    format!("{found}{others} and at least {needed} are needed{help}")
+}
+
+fn no_match(best_log10: Option<f64>, solution: &Solution) -> String {
+    let stars = solution
+        .sources
+        .iter()
+        .filter(|source| source.measured.is_none_or(|m| m.flags.is_star_like()))
+        .count();
+    let tried = match solution.sources.len() {
+        all if all == stars => format!("the {all} detections"),
+        all => format!("the {stars} detections of {all} that have the shape of a star"),
+    };
+    match best_log10.filter(|best| best.is_finite()) {
+        Some(best) => format!(
+            "no arrangement of catalogue stars matches {tried} beyond chance: the best has a log10 \
+             false-alarm probability of {best:.1}, and {LOG10_FALSE_ALARM_LIMIT:.0} is needed; the field of \
+             view and the direction, where known, make it easier"
+        ),
+        None => format!(
+            "no arrangement of catalogue stars matches {tried}; if this is the sky, the field of view and \
+             the direction, where known, make it easier"
+        ),
+    }
+}
+
+fn trails_text(trails: usize, angle_rad: f64, length_px: f64) -> String {
+    let angle_deg = (angle_rad * DEG_PER_RAD).round();
+    let direction = match angle_deg.abs() as u32 {
+        0 => "level".to_owned(),
+        90 => "upright".to_owned(),
+        angle if angle_deg > 0.0 => format!("at {angle}°, rising to the right"),
+        angle => format!("at {angle}°, falling to the right"),
+    };
+    format!(
+        "the stars are trails: {trails} of them are about {length_px:.0} px long and lie {direction}; a \
+         shorter exposure, a steadier mount or tracking is needed"
+    )
+}
+
+fn excluded_text(excluded: &Excluded) -> String {
+    let (ra_rad, dec_rad) = excluded.boresight.to_ra_dec();
+    let mut text = format!(
+        "the stars match ({} of them) in a field {} wide around RA {:.2}°, Dec {:+.2}°",
+        excluded.stars,
+        degrees(excluded.fov_x_rad),
+        ra_rad * DEG_PER_RAD,
+        dec_rad * DEG_PER_RAD,
+    );
+    let mut joint = ", which";
+    if let Some(allowed) = excluded.allowed_fov_x_rad {
+        let allowed = range(allowed);
+        text +=
+            &format!("{joint} the scale given (--fov or --pixel-scale), {allowed} wide, excludes");
+        joint = ", and which";
+    }
+    if let Some((distance_rad, radius_rad)) = excluded.distance_rad {
+        text += &format!(
+            "{joint} is {} from --near, beyond the --radius of {}",
+            degrees(distance_rad),
+            degrees(radius_rad)
+        );
+        joint = ", and";
+    }
+    if joint == ", which" {
+        text += ", but only without the hints";
+    }
+    text
+}
+
+/// An angle with three digits.
+fn degrees(angle_rad: f64) -> String {
+    let angle_deg = angle_rad * DEG_PER_RAD;
+    let decimals = decimals_for(angle_deg / 10.0, 4);
+    format!("{angle_deg:.decimals$}°")
+}
+
+fn range((low_rad, high_rad): (f64, f64)) -> String {
+    format!("{} to {}", degrees(low_rad), degrees(high_rad))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coords::{PixelPoint, UnitVector};
+    use crate::identify::Outcome;
+    use crate::pipeline::{Source, Timing};
+    use crate::units::RAD_PER_DEG;
+
+    fn said(reason: Reason, detections: usize) -> String {
+        let source = Source {
+            position: PixelPoint::new(1.0, 2.0),
+            measured: None,
+            flux: None,
+        };
+        let solution = Solution {
+            width: 100,
+            height: 100,
+            date: None,
+            sources: vec![source; detections],
+            exposure_s: None,
+            notes: Vec::new(),
+            background: None,
+            outcome: Outcome::NotIdentified(reason.clone()),
+            timing: Timing::default(),
+        };
+        text(&reason, &solution)
+    }
+
+    #[test]
+    fn a_reason_says_what_was_found_what_was_needed_and_what_may_help() {
+        let few = Reason::TooFewStars {
+            found: 1,
+            needed: 4,
+        };
+        assert_eq!(
+            said(few, 3),
+            "only 1 star was found (and 2 detections that have not the shape of a star) and at least 4 are needed"
+        );
+        let no_match = |best_log10_false_alarm| Reason::NoMatch {
+            best_log10_false_alarm,
+        };
+        assert!(said(no_match(None), 12).contains("12 detections"));
+        assert!(said(no_match(Some(-6.34)), 12).contains("-6.3"));
+        assert!(!said(no_match(Some(f64::NAN)), 12).contains("NaN"));
+    }
+
+    #[test]
+    fn a_solution_that_hints_exclude_is_told_with_what_excludes_it() {
+        let excluded = Excluded {
+            fov_x_rad: 11.427 * RAD_PER_DEG,
+            boresight: UnitVector::from_ra_dec(10.0 * RAD_PER_DEG, -5.0 * RAD_PER_DEG),
+            stars: 40,
+            allowed_fov_x_rad: Some((18.0 * RAD_PER_DEG, 22.0 * RAD_PER_DEG)),
+            distance_rad: Some((23.0 * RAD_PER_DEG, 5.0 * RAD_PER_DEG)),
+        };
+        assert_eq!(
+            said(Reason::HintsExclude(Box::new(excluded)), 50),
+            "the stars match (40 of them) in a field 11.4° wide around RA 10.00°, Dec -5.00°, which the scale \
+             given (--fov or --pixel-scale), 18.0° to 22.0° wide, excludes, and which is 23.0° from --near, \
+             beyond the --radius of 5.00°"
+        );
+    }
+
+    #[test]
+    fn the_direction_of_trails_is_told_as_it_is_seen() {
+        for (angle_deg, expected) in [
+            (0.3_f64, "lie level"),
+            (90.0, "lie upright"),
+            (-89.9, "lie upright"),
+            (35.0, "at 35°, rising to the right"),
+            (-35.0, "at 35°, falling to the right"),
+        ] {
+            let text = trails_text(12, angle_deg * RAD_PER_DEG, 23.4);
+            assert!(text.contains(expected) && text.contains("23 px"), "{text}");
+        }
+    }
+}
