@@ -211,6 +211,18 @@ fn hints_that_are_right_help_and_hints_that_are_wrong_are_believed() {
     }
 }
 
+/// Nothing is similar to a triangle of which nothing is known, and not everything.
+#[test]
+fn centroids_without_any_certainty_are_not_searched_for_ever() {
+    let mut rng = ChaCha8Rng::seed_from_u64(16);
+    let mut stars = Truth::random(&mut rng, 10.0).observe(&mut rng);
+    for star in &mut stars.stars {
+        star.sigma_px = 1e12;
+    }
+    let outcome = identify(&stars, &Hints::default(), sky());
+    assert!(matches!(outcome, Outcome::NotIdentified(_)), "{outcome:?}");
+}
+
 #[test]
 fn three_stars_are_too_few() {
     let stars = [(100.0, 100.0), (500.0, 300.0), (900.0, 700.0)].map(|(x, y)| observed(x, y, 3.0));

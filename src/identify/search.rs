@@ -72,6 +72,10 @@ const WITNESS_SIGMAS: f64 = 3.5;
 /// When to give up, so that a frame in which there is nothing to find takes well under a second. Fields
 /// that can be identified take a few thousand.
 pub const MAX_HYPOTHESES: u64 = 400_000;
+/// The same for catalogue triangles of the right shape, of which most are out at once: their size or brightness is not right.
+const MAX_CANDIDATES: u64 = 20_000_000;
+/// A triangle whose ratios are less certain than this is like so many others that it tells nothing.
+const MAX_TOLERANCE: f64 = 0.03;
 /// Hypotheses above this are not reported.
 pub const LOG10_FALSE_ALARM_LIMIT: f64 = -8.0;
 /// One below this ends the search. Between the two it waits for the end of its pass, in case that a better one comes: few
@@ -97,6 +101,7 @@ pub struct Search<'a> {
     focal_px: (f64, f64),
     diagonal_px: f64,
     hypotheses: u64,
+    candidates: u64,
     best_log10: Option<f64>,
     /// The best hypothesis that passes without being sure.
     unsure: Option<Found>,
@@ -166,6 +171,7 @@ impl<'a> Search<'a> {
             focal_px,
             diagonal_px: field.width_px.hypot(field.height_px),
             hypotheses: 0,
+            candidates: 0,
             best_log10: None,
             unsure: None,
         }
@@ -189,7 +195,7 @@ impl<'a> Search<'a> {
         for faintest in 2..stars {
             for middle in 1..faintest {
                 for brightest in 0..middle {
-                    if self.hypotheses > MAX_HYPOTHESES {
+                    if self.is_exhausted() {
                         return None;
                     }
                     let trio = self.trio([brightest, middle, faintest], pass);
@@ -200,6 +206,10 @@ impl<'a> Search<'a> {
             }
         }
         None
+    }
+
+    fn is_exhausted(&self) -> bool {
+        self.hypotheses > MAX_HYPOTHESES || self.candidates > MAX_CANDIDATES
     }
 
     fn trio(&self, stars: [usize; 3], pass: &Pass) -> Option<Trio> {
@@ -214,6 +224,10 @@ impl<'a> Search<'a> {
             .map(|&s| self.field.stars[s].sigma_px)
             .fold(0.0, f64::max);
         let centroid_tolerance = CENTROID_SIGMAS * sigma_px / longest_px;
+        let tolerance = pass.tolerance.hypot(centroid_tolerance);
+        if tolerance > MAX_TOLERANCE {
+            return None;
+        }
         let leverage = 1.0 + 0.5 * self.diagonal_px / longest_px;
         let distortion_px = WITNESS_TOLERANCES * pass.tolerance * self.diagonal_px;
         Some(Trio {
@@ -222,7 +236,7 @@ impl<'a> Search<'a> {
                 .iter()
                 .map(|p| p[0].hypot(p[1]))
                 .fold(0.0, f64::max),
-            tolerance: pass.tolerance.hypot(centroid_tolerance),
+            tolerance,
             true_witness: pass.true_witness,
             witness_px: distortion_px.hypot(WITNESS_SIGMAS * leverage * sigma_px),
         })
@@ -293,7 +307,8 @@ impl<'a> Search<'a> {
         };
         let mut found = None;
         class.for_each_similar(shape.ratios, trio.tolerance, |corners| {
-            if found.is_none() {
+            self.candidates += 1;
+            if found.is_none() && !self.is_exhausted() {
                 found = self.try_triangle(&query, corners);
             }
         });
