@@ -7,6 +7,8 @@ mod centroids;
 mod import;
 mod input;
 mod output;
+mod resources;
+mod robustness;
 mod settings;
 mod solve;
 mod values;
@@ -59,6 +61,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Process(arguments) => solve::process(arguments),
         Command::Identify(arguments) => solve::identify(arguments),
         Command::Catalog(arguments) => import::catalog(arguments),
+        Command::Robustness(arguments) => robustness::robustness(&arguments),
     };
     match done {
         Ok(exit) => exit.into(),

@@ -148,7 +148,7 @@ fn table(report: &FrameReport, with_header: bool) -> anyhow::Result<Vec<u8>> {
 }
 
 /// Writes files whole or not at all: into temporary files beside them, which take their names once all are written.
-fn write_whole(files: &[(PathBuf, Vec<u8>)]) -> anyhow::Result<()> {
+pub(crate) fn write_whole(files: &[(PathBuf, Vec<u8>)]) -> anyhow::Result<()> {
     let writing = |path: &Path| format!("writing {}", path.display());
     let write = |path: &Path, content: &[u8]| {
         let parent = path.parent().filter(|parent| *parent != Path::new(""));

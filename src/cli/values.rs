@@ -1,6 +1,8 @@
 //! Values of options: what is out of range is refused where it is typed.
 
+use starpipe::robustness::Parameter;
 use std::fmt::Display;
+use std::str::FromStr;
 
 /// A direction on the sky, in degrees.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +36,76 @@ fn within(
 /// A number above zero.
 pub(crate) fn positive(text: &str) -> Result<f64, String> {
     within(text, "the number", |v| v > 0.0, "above 0")
+}
+
+/// A number that is zero or above it.
+pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
+    within(text, "the number", |v| v >= 0.0, "0 or above")
+}
+
+/// A mean number of stars.
+pub(crate) fn star_count(text: &str) -> Result<f64, String> {
+    let limits = "above 0 and at most 10000";
+    within(text, "the number of stars", |v| v > 0.0 && v <= 1e4, limits)
+}
+
+/// A part of something, in percent.
+pub(crate) fn part(text: &str) -> Result<f64, String> {
+    let limits = "0 to 100 percent";
+    within(text, "the part", |v| (0.0..=100.0).contains(&v), limits)
+}
+
+/// A multiple of something, in percent.
+pub(crate) fn multiple(text: &str) -> Result<f64, String> {
+    let limits = "0 to 10000 percent";
+    within(text, "the multiple", |v| (0.0..=1e4).contains(&v), limits)
+}
+
+/// Values of one parameter, evenly spaced.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Sweep {
+    pub(crate) parameter: Parameter,
+    pub(crate) values: Vec<f64>,
+}
+
+/// More values than this are a mistake.
+const SWEEP_VALUES_MAX: usize = 1000;
+
+impl FromStr for Sweep {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let form = || format!("'{text}' is not of the form NAME=FROM:TO:COUNT");
+        let (name, range) = text.split_once('=').ok_or_else(form)?;
+        let known = Parameter::ALL.iter().find(|known| known.name() == name);
+        let parameter = *known.ok_or_else(|| {
+            let names = Parameter::ALL.map(Parameter::name).join(", ");
+            format!("'{name}' is not one of {names}")
+        })?;
+        let check = match parameter {
+            Parameter::FieldOfView => field_of_view,
+            Parameter::Stars => star_count,
+            Parameter::CentroidError | Parameter::MagError => not_negative,
+            Parameter::Missing => part,
+            Parameter::FalseStars => multiple,
+        };
+        let parts: Vec<&str> = range.split(':').collect();
+        let [from, to, count] = parts[..] else {
+            return Err(form());
+        };
+        let (from, to) = (check(from)?, check(to)?);
+        let count = count.trim().parse::<usize>().map_err(|_| form())?;
+        if !(1..=SWEEP_VALUES_MAX).contains(&count) {
+            return Err(format!("the count must be 1 to {SWEEP_VALUES_MAX}"));
+        }
+        let step = (to - from) / (count.max(2) - 1) as f64;
+        // Decimal fractions are to look like themselves.
+        let value = |i: usize| ((from + i as f64 * step) * 1e9).round() / 1e9;
+        Ok(Self {
+            parameter,
+            values: (0..count).map(value).collect(),
+        })
+    }
 }
 
 /// A horizontal field of view in degrees.

@@ -21,10 +21,7 @@ mod trails;
 use crate::camera::focal_length_px;
 use crate::detect::Detections;
 use crate::frame::Frame;
-use crate::identify::{
-    Excluded, FOV_DEG, Hints, Identification, Outcome, Reason, Sky, StarField, identify,
-};
-use crate::units::RAD_PER_DEG;
+use crate::identify::{Excluded, Hints, Identification, Outcome, Reason, Sky, StarField, identify};
 
 /// What there is to look at.
 #[derive(Debug, Clone, Copy)]
@@ -44,7 +41,7 @@ pub fn explain(examined: &Examined, sky: &Sky, found: Reason) -> Reason {
     image
         .and_then(|(frame, _)| levels::explain(frame))
         .or_else(|| has_stars.then(|| excluded(examined, sky)).flatten())
-        .or_else(|| out_of_range(examined))
+        .or_else(|| out_of_range(examined, sky))
         .or_else(|| image.and_then(|(frame, detections)| trails::explain(frame, detections)))
         .or_else(|| doubles::explain(examined.field))
         .unwrap_or(found)
@@ -85,12 +82,14 @@ fn fields_of_view((low, high): (f64, f64), width_px: f64) -> (f64, f64) {
     (fov_rad(low), fov_rad(high))
 }
 
-fn out_of_range(examined: &Examined) -> Option<Reason> {
+fn out_of_range(examined: &Examined, sky: &Sky) -> Option<Reason> {
     let scale = examined.hints.pixel_scale_rad?;
     let width_px = examined.field.width_px;
-    let pixel_rad = |fov_deg: f64| 1.0 / focal_length_px(width_px, fov_deg * RAD_PER_DEG);
-    let (narrowest, widest) = (pixel_rad(FOV_DEG.0), pixel_rad(FOV_DEG.1));
+    let searched_rad = sky.fov_range_rad();
+    let pixel_rad = |fov_rad: f64| 1.0 / focal_length_px(width_px, fov_rad);
+    let (narrowest, widest) = (pixel_rad(searched_rad.0), pixel_rad(searched_rad.1));
     (scale.1 < narrowest || scale.0 > widest).then(|| Reason::ScaleOutOfRange {
         fov_x_rad: fields_of_view(scale, width_px),
+        searched_rad,
     })
 }

@@ -9,7 +9,7 @@ pub mod triangle;
 mod verify;
 
 pub use cache::CacheError;
-pub use search::{FOV_DEG, LOG10_FALSE_ALARM_LIMIT};
+pub use search::LOG10_FALSE_ALARM_LIMIT;
 pub use sky::Sky;
 
 use refine::{Refined, Start, refine, with_all_stars};
@@ -137,6 +137,8 @@ pub enum Reason {
     ScaleOutOfRange {
         /// Horizontal field of view asked for, from and to, in radians.
         fov_x_rad: (f64, f64),
+        /// The horizontal fields of view that the catalogue allows, in radians.
+        searched_rad: (f64, f64),
     },
     /// Without the hints the stars are identified.
     HintsExclude(Box<Excluded>),

@@ -13,12 +13,9 @@ use crate::attitude::POSE_PARAMETERS;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px, frame_centre};
 use crate::catalog::sky_grid::GridStar;
 use crate::coords::{Icrs, Rotation, UnitVector};
-use crate::units::RAD_PER_DEG;
 use nalgebra::{Matrix3, Vector3};
 
-/// Horizontal fields of view, in degrees, that are searched where nothing is known.
-pub const FOV_DEG: (f64, f64) = (1.5, 60.0);
-/// A little more, so that a field of just that width is not missed.
+/// A little more than the fields of view that the sky allows, so that a field of just that width is not missed.
 const FOV_SLACK: f64 = 1.05;
 
 /// One sweep over the triangles of the brightest stars.
@@ -157,8 +154,9 @@ impl<'a> Search<'a> {
             .take(most)
             .map(|s| [s.position.x - centre.x, s.position.y - centre.y])
             .collect();
-        let wide = focal_length_px(field.width_px, FOV_DEG.1 * FOV_SLACK * RAD_PER_DEG);
-        let narrow = focal_length_px(field.width_px, FOV_DEG.0 / FOV_SLACK * RAD_PER_DEG);
+        let (narrowest_rad, widest_rad) = sky.fov_range_rad();
+        let wide = focal_length_px(field.width_px, widest_rad * FOV_SLACK);
+        let narrow = focal_length_px(field.width_px, narrowest_rad / FOV_SLACK);
         let focal_px = match hints.pixel_scale_rad {
             Some((smallest, largest)) => (1.0 / largest, 1.0 / smallest),
             None => (wide, narrow),

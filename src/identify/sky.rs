@@ -4,8 +4,13 @@ use super::cache::{self, CacheError};
 use super::index::TriangleIndex;
 use crate::catalog::sky_grid::SkyGrid;
 use crate::catalog::{Catalog, Star};
+use crate::units::RAD_PER_DEG;
 use std::path::Path;
 
+/// A field is at least so many times as wide as the smallest triangles listed: else it holds too few of them.
+const FIELD_TO_SMALLEST: f64 = 3.75;
+/// Wider fields are no pinhole camera's.
+const WIDEST_FOV_DEG: f64 = 60.0;
 /// Square degrees on the whole sky.
 const WHOLE_SKY_SQ_DEG: f64 = 41_252.96;
 
@@ -82,6 +87,16 @@ impl<'a> Sky<'a> {
         let grid = SkyGrid::new(catalog.stars());
         let triangles = TriangleIndex::build(catalog.stars(), &grid, progress);
         Self::new(catalog, grid, triangles)
+    }
+
+    /// The narrowest and the widest horizontal field of view in which the triangles listed are found, in radians.
+    pub fn fov_range_rad(&self) -> (f64, f64) {
+        let smallest = self
+            .triangles
+            .classes
+            .first()
+            .map_or(f64::INFINITY, |c| c.low);
+        (FIELD_TO_SMALLEST * smallest, WIDEST_FOV_DEG * RAD_PER_DEG)
     }
 
     /// The catalogue's stars, brightest first.

@@ -1,7 +1,7 @@
 //! Why a frame was not identified, in words, with what may help.
 
 use super::rounding::decimals_for;
-use crate::identify::{Excluded, FOV_DEG, LOG10_FALSE_ALARM_LIMIT, Reason};
+use crate::identify::{Excluded, LOG10_FALSE_ALARM_LIMIT, Reason};
 use crate::pipeline::Solution;
 use crate::units::DEG_PER_RAD;
 
@@ -30,12 +30,14 @@ pub(super) fn text(reason: &Reason, solution: &Solution) -> String {
              offset ({:+.1}, {:+.1}) px; expose once",
             offset_px[0], offset_px[1]
         ),
-        Reason::ScaleOutOfRange { fov_x_rad } => format!(
+        Reason::ScaleOutOfRange {
+            fov_x_rad,
+            searched_rad,
+        } => format!(
             "the field of view asked for (--fov or --pixel-scale), {} wide, is outside what can be \
-             identified: {}° to {}°",
+             identified with this catalogue: {}",
             range(*fov_x_rad),
-            FOV_DEG.0,
-            FOV_DEG.1
+            range(*searched_rad),
         ),
         Reason::HintsExclude(excluded) => excluded_text(excluded),
     }

@@ -20,10 +20,12 @@
 
 mod interval;
 mod observation;
+mod table;
 mod tally;
 
 pub use interval::{CONFIDENCE, Interval};
 pub use observation::Observation;
+pub use table::{Case, Parameter, Row, STANDARD_FOV_DEG, VARIED_FOV_DEG, standard_cases};
 pub use tally::{Answer, Tally, Verdict};
 
 use crate::identify::{Photometry, Sky, identify};
@@ -32,6 +34,7 @@ use crate::units::RAD_PER_DEG;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use serde::Serialize;
 use std::time::Instant;
 
 /// What is drawn, and what the identification is told of it.
@@ -49,7 +52,7 @@ pub struct Protocol {
     pub centroid_sigma_px: f64,
     /// Standard deviation of a magnitude.
     pub mag_sigma: f64,
-    /// The part of the stars that is missing, in [0, 1).
+    /// The part of the stars that is missing, in [0, 1].
     pub missing: f64,
     /// False stars, as a part of the true stars before some are taken away.
     pub false_stars: f64,
@@ -62,7 +65,8 @@ pub struct Protocol {
 }
 
 /// Which frames are mirrored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Mirrored {
     /// None.
     Never,
