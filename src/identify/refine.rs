@@ -18,6 +18,8 @@ const MIN_RADIUS_PX: f64 = 0.25;
 const EQUATIONS_PER_PARAMETER: f64 = 4.0;
 /// How much likelier (twice the logarithm) a richer model must make the stars left out of the fit to be taken.
 const WORTH_IT: f64 = 12.0;
+/// With few equations chance does more, as the tails of the F distribution are heavier than those of χ².
+const TAIL_EQUATIONS: f64 = 8.0;
 /// Halvings of the interval in which the excess is sought: to a ten-thousandth of the largest residual.
 const EXCESS_BISECTIONS: usize = 14;
 /// Distance in standard errors from which on a star pulls no harder.
@@ -227,13 +229,14 @@ fn choose_model(
     } = &current.fit;
     let left_out = |model| left_out_chi_sq(&stars, camera, icrs_to_camera, model);
     let equations = 2.0 * stars.len() as f64;
+    let worth_it = WORTH_IT * equations / (equations - TAIL_EQUATIONS).max(1.0);
     let mut best = (None, left_out(None)?);
     for model in DistortionModel::ALL {
         if Some(model) > richest || !is_affordable(model, stars.len()) {
             break;
         }
         match left_out(Some(model)) {
-            Some(chi_sq) if equations * (best.1 / chi_sq).ln() > WORTH_IT => {
+            Some(chi_sq) if equations * (best.1 / chi_sq).ln() > worth_it => {
                 best = (Some(model), chi_sq);
             }
             // The quintic is not tried where the cubic is no better than what is simpler.
