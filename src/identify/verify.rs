@@ -218,7 +218,8 @@ impl Hypothesis {
                 .collect();
             let mut agreement = Agreement::new(&pairs, alike, predicted.len());
             for &radius_px in &radii_px {
-                best = best.min(agreement.log10_chance(field, radius_px, used_up));
+                let log10 = agreement.log10_chance(field, radius_px, (used_up, best));
+                best = best.min(log10);
                 tests += 1;
             }
         }
@@ -322,8 +323,14 @@ impl<'a> Agreement<'a> {
     }
 
     /// log10 of the probability that chance makes as many stars agree within `radius_px`, which must not be smaller
-    /// than before. So many stars as are `used_up` agree by construction; they count as the least likely ones.
-    fn log10_chance(&mut self, field: &StarField, radius_px: f64, used_up: usize) -> f64 {
+    /// than before. So many stars as are `used_up` agree by construction; they count as the least likely ones. 0 where
+    /// there is nothing to gain on `best`.
+    fn log10_chance(
+        &mut self,
+        field: &StarField,
+        radius_px: f64,
+        (used_up, best): (usize, f64),
+    ) -> f64 {
         self.widen(radius_px);
         let hits = self.hits.saturating_sub(used_up);
         if hits == 0 {
@@ -334,6 +341,11 @@ impl<'a> Agreement<'a> {
             .map(|observed| self.chance(observed, frame_px, radius_px))
             .collect();
         chances.sort_unstable_by(f64::total_cmp);
+        // That just the likeliest agree is one of the ways in which so many do.
+        let likeliest = &chances[chances.len() - hits..];
+        if likeliest.iter().map(|chance| chance.log10()).sum::<f64>() >= best {
+            return 0.0;
+        }
         log10_poisson_binomial_tail(&chances[used_up..], hits)
     }
 

@@ -7,7 +7,8 @@ use starpipe::robustness::{Parameter, Row};
 use std::fmt::Display;
 
 const WIDTH_PX: u32 = 900;
-const PANEL_HEIGHT_PX: u32 = 340;
+const PANEL_HEIGHT_PX: u32 = 300;
+const PANELS_ABREAST: usize = 2;
 const ROW_HEIGHT_PX: u32 = 34;
 /// Above and below the rows of the table.
 const FRAME_HEIGHT_PX: u32 = 110;
@@ -24,10 +25,12 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 /// What drawing may fail with, in words.
 pub(super) fn svg(rows: &[SweptRow]) -> anyhow::Result<String> {
     let swept = parameters(rows);
+    let columns = swept.len().clamp(1, PANELS_ABREAST);
+    let lines = swept.len().div_ceil(columns);
     let height_px = if swept.is_empty() {
         FRAME_HEIGHT_PX + ROW_HEIGHT_PX * rows.len() as u32
     } else {
-        PANEL_HEIGHT_PX * swept.len() as u32
+        PANEL_HEIGHT_PX * lines as u32
     };
     let mut drawing = String::new();
     {
@@ -36,7 +39,7 @@ pub(super) fn svg(rows: &[SweptRow]) -> anyhow::Result<String> {
         if swept.is_empty() {
             draw_table(&area, rows)?;
         }
-        for (panel, parameter) in area.split_evenly((swept.len().max(1), 1)).iter().zip(swept) {
+        for (panel, parameter) in area.split_evenly((lines, columns)).iter().zip(swept) {
             draw_sweep(panel, parameter, rows)?;
         }
         area.present().map_err(said)?;
@@ -80,7 +83,7 @@ fn draw_sweep(area: &Area, parameter: Parameter, rows: &[SweptRow]) -> anyhow::R
         .x_desc(parameter.title())
         .y_desc("% of the trials")
         .label_style((FONT, 15))
-        .light_line_style(WHITE)
+        .max_light_lines(1)
         .draw()
         .map_err(said)?;
     let share = |count: usize, row: &Row| 100.0 * count as f64 / row.counted.max(1) as f64;
