@@ -232,7 +232,7 @@ fn complaints_of_odd_names_are_one_line_each() {
 #[test]
 fn a_pipe_is_read_like_a_file_and_what_never_ends_is_left() {
     let mut shell = Command::new("bash");
-    let script = "\"$0\" process --format json <(cat \"$1\") && \"$0\" process /dev/zero";
+    let script = "\"$0\" process --format json <(cat \"$1\") && \"$0\" process /dev/zero; \"$0\" identify /dev/zero";
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache");
     shell
         .args(["-c", script, env!("CARGO_BIN_EXE_starpipe")])
@@ -249,7 +249,10 @@ fn a_pipe_is_read_like_a_file_and_what_never_ends_is_left() {
     assert!(stdout.contains("\"status\":\"identified\""), "{stderr}");
     assert_eq!(ran.status.code(), Some(1));
     assert!(
-        stderr.starts_with("starpipe: reading /dev/zero: not an image: found the bytes 00 00"),
+        stderr.starts_with("starpipe: reading /dev/zero: not an image: found the bytes 00 00")
+            && stderr.contains(
+                "starpipe: reading /dev/zero: too large: found more than 268435456 bytes"
+            ),
         "{stderr}"
     );
 }

@@ -7,7 +7,7 @@ use starpipe::coords::PixelPoint;
 use starpipe::identify::Photometry;
 use starpipe::pipeline::{CentroidList, ListedCentroid, instrumental_mag};
 use std::fs::File;
-use std::io;
+use std::io::{self, Read};
 use std::path::Path;
 
 /// Sides of the frame in pixels, where they are known.
@@ -19,17 +19,31 @@ pub(crate) struct FrameSize {
 
 /// A frame wider than this is taken for a mistake in the list.
 const MAX_COORDINATE_PX: f64 = 1e6;
+/// No list is longer: some millions of centroids.
+const MAX_BYTES: u64 = 1 << 28;
 /// The centre of a star that is cut by the border may lie so far outside the frame, in pixels.
 const BORDER_PX: f64 = 5.0;
 
 /// Reads the list in the file `path`, `-` for standard input.
 pub(crate) fn read(path: &Path, size: FrameSize) -> anyhow::Result<CentroidList> {
     let reading = || format!("reading {}", path.display());
-    if is_stdin(path) {
-        return parse(io::stdin().lock(), size).with_context(reading);
+    let stream: Box<dyn Read> = if is_stdin(path) {
+        Box::new(io::stdin().lock())
+    } else {
+        Box::new(File::open(path).with_context(reading)?)
+    };
+    let list = limited(stream, MAX_BYTES).and_then(|bytes| parse(&bytes[..], size));
+    list.with_context(reading)
+}
+
+/// All bytes of `stream`, which may have no end, where they are not more than `limit`.
+fn limited(stream: impl Read, limit: u64) -> anyhow::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    stream.take(limit + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit {
+        bail!("too large: found more than {limit} bytes, expected at most so many");
     }
-    let file = File::open(path).with_context(reading)?;
-    parse(io::BufReader::new(file), size).with_context(reading)
+    Ok(bytes)
 }
 
 /// How a list tells brightness.
@@ -54,7 +68,7 @@ struct Columns {
 }
 
 /// Reads a list; lines are counted from 1, the heading included.
-fn parse(input: impl io::Read, size: FrameSize) -> anyhow::Result<CentroidList> {
+fn parse(input: impl Read, size: FrameSize) -> anyhow::Result<CentroidList> {
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .flexible(true)
@@ -317,6 +331,16 @@ mod tests {
         let list = parsed("x,y,mag\n-1.2,2,3\n9,-5.5,3\n").unwrap();
         assert_eq!(list.centroids.len(), 2);
         assert_eq!((list.width, list.height), (10, 3));
+    }
+
+    #[test]
+    fn a_stream_without_an_end_is_refused() {
+        let complaint = limited(io::repeat(b'1'), 1000).unwrap_err().to_string();
+        assert!(complaint.starts_with("too large: found more than 1000 bytes"));
+        assert_eq!(
+            limited(io::repeat(b'1').take(1000), 1000).unwrap().len(),
+            1000
+        );
     }
 
     #[test]
