@@ -504,10 +504,7 @@ fn a_file_of_no_known_kind_says_what_is_read() {
             "{message}"
         );
     }
-    let compact = written(
-        &folder,
-        &Catalog::new("none", vec![], vec![]).unwrap().to_compact(),
-    );
+    let compact = written(&folder, &Catalog::built_in().limited_to(0.0).to_compact());
     let error = import(&compact).unwrap_err();
     assert!(matches!(error, CatalogError::UnknownKind { .. }), "{error}");
     let error = sky2000::write_bright_csv(&compact, 6.5, &folder.path().join("out")).unwrap_err();

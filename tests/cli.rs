@@ -119,6 +119,11 @@ fn a_wrong_command_line_ends_with_2_and_says_what_is_wrong() {
             "--false-alarms",
         ),
         (&["process", "--sigma", "0", "a.png"], "--sigma"),
+        (&["process", "--sigma", "-3", "a.png"], "above 0"),
+        (
+            &["process", "--out", "o", "a.tif", "b/a.tif"],
+            "Usage: starpipe process [OPTIONS]",
+        ),
         (&["process", "--date", "yesterday", "a.png"], "ISO 8601"),
         (&["process", "--date", "2019-02-29", "a.png"], "ISO 8601"),
         (&["process", "--date", "", "a.png"], "ISO 8601"),
@@ -571,6 +576,14 @@ fn a_bad_list_is_named_with_its_line() {
         ("x,y,flux\n1,2,-3\n", "line 2: column flux"),
         ("x,y,flux\n1,NaN,3\n", "line 2: column y"),
         ("x,y,flux\n1,2\n", "line 2: column flux is missing"),
+        (
+            "x;y;flux\n1;2;3\n",
+            "the single column x;y;flux; expected x or x_px among them, with commas",
+        ),
+        (
+            "x,y,flux\n1,-7,3\n",
+            "line 2: column y: -7 is more than 5 px outside",
+        ),
     ] {
         let list = directory.path().join("list.csv");
         fs::write(&list, content).unwrap();

@@ -347,6 +347,10 @@ fn resolve_names(
 /// Writes `bytes` into a temporary file beside `path`, and then gives it that name.
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), CatalogError> {
     let write = || -> io::Result<()> {
+        // The new name would take the place of a device, a pipe, or the name of standard output.
+        if fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+            return Err(io::Error::other("it exists and is no regular file"));
+        }
         let folder = match path.parent() {
             Some(folder) if folder != Path::new("") => folder,
             _ => Path::new("."),
@@ -360,7 +364,7 @@ fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), CatalogError> {
         let mut file = builder.tempfile_in(folder)?;
         file.write_all(bytes)?;
         file.as_file().sync_all()?;
-        file.persist(path)?;
+        file.persist(path).map_err(|refused| refused.error)?;
         Ok(())
     };
     write().map_err(|source| CatalogError::Write {

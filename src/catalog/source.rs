@@ -123,10 +123,15 @@ fn read_compact(path: &Path, mut source: Source) -> Result<Catalog, CatalogError
     let mut bytes = Vec::new();
     let read = source.reader.read_to_end(&mut bytes);
     read.map_err(|source| read_error(path, source))?;
-    Catalog::from_compact(&bytes).map_err(|fault| CatalogError::Compact {
+    let catalog = Catalog::from_compact(&bytes).map_err(|fault| CatalogError::Compact {
         path: path.to_owned(),
         fault,
-    })
+    })?;
+    if catalog.stars().is_empty() {
+        let (path, records) = (path.to_owned(), 0);
+        return Err(CatalogError::NoStars { path, records });
+    }
+    Ok(catalog)
 }
 
 /// Reads the records of a file that is not compact.

@@ -40,7 +40,8 @@ pub(crate) enum Command {
         funpack -S night.fits.fz | starpipe process -\n\n\
         The kind of a file is told from its content; any may be compressed with gzip. A date, an exposure,\n\
         a pixel size and a focal length in FITS keywords or Exif are used where no option says otherwise.\n\n\
-        --out results makes results/night.json, night.csv, night.wcs and night.png of night.tif.")]
+        --out results makes results/night.json, night.csv, night.wcs and night.png of night.tif, and overwrites\n\
+        nothing but such results. Those among the frames of a directory are left out.")]
     Process(ProcessArgs),
     /// Identify the stars in lists of centroids (CSV)
     #[command(after_help = "Examples:\n  \
@@ -106,10 +107,11 @@ pub(crate) struct SolvingArgs {
 #[command(next_help_heading = "Detection")]
 pub(crate) struct DetectionArgs {
     /// Detection threshold in standard deviations of the background, in place of --false-alarms
-    #[arg(long, value_name = "NUMBER", value_parser = values::positive, conflicts_with = "false_alarms")]
+    #[arg(long, value_name = "NUMBER", value_parser = values::positive, allow_hyphen_values = true,
+          conflicts_with = "false_alarms")]
     pub(crate) sigma: Option<f64>,
     /// False detections to accept in a million pixels of noise [default: 0.1]
-    #[arg(long, value_name = "NUMBER", value_parser = values::positive)]
+    #[arg(long, value_name = "NUMBER", value_parser = values::positive, allow_hyphen_values = true)]
     pub(crate) false_alarms: Option<f64>,
     /// How to measure a star's position
     #[arg(long, value_name = "METHOD", value_enum)]

@@ -1,13 +1,13 @@
 //! Lists of centroids in CSV files.
 
 use super::input::is_stdin;
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use csv::StringRecord;
 use starpipe::coords::PixelPoint;
 use starpipe::identify::Photometry;
 use starpipe::pipeline::{CentroidList, ListedCentroid, instrumental_mag};
 use std::fs::File;
-use std::io;
+use std::io::{self, Read};
 use std::path::Path;
 
 /// Sides of the frame in pixels, where they are known.
@@ -19,15 +19,31 @@ pub(crate) struct FrameSize {
 
 /// A frame wider than this is taken for a mistake in the list.
 const MAX_COORDINATE_PX: f64 = 1e6;
+/// No list is longer: some millions of centroids.
+const MAX_BYTES: u64 = 1 << 28;
+/// The centre of a star that is cut by the border may lie so far outside the frame, in pixels.
+const BORDER_PX: f64 = 5.0;
 
 /// Reads the list in the file `path`, `-` for standard input.
 pub(crate) fn read(path: &Path, size: FrameSize) -> anyhow::Result<CentroidList> {
     let reading = || format!("reading {}", path.display());
-    if is_stdin(path) {
-        return parse(io::stdin().lock(), size).with_context(reading);
+    let stream: Box<dyn Read> = if is_stdin(path) {
+        Box::new(io::stdin().lock())
+    } else {
+        Box::new(File::open(path).with_context(reading)?)
+    };
+    let list = limited(stream, MAX_BYTES).and_then(|bytes| parse(&bytes[..], size));
+    list.with_context(reading)
+}
+
+/// All bytes of `stream`, which may have no end, where they are not more than `limit`.
+fn limited(stream: impl Read, limit: u64) -> anyhow::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    stream.take(limit + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit {
+        bail!("too large: found more than {limit} bytes, expected at most so many");
     }
-    let file = File::open(path).with_context(reading)?;
-    parse(io::BufReader::new(file), size).with_context(reading)
+    Ok(bytes)
 }
 
 /// How a list tells brightness.
@@ -52,16 +68,16 @@ struct Columns {
 }
 
 /// Reads a list; lines are counted from 1, the heading included.
-fn parse(input: impl io::Read, size: FrameSize) -> anyhow::Result<CentroidList> {
+fn parse(input: impl Read, size: FrameSize) -> anyhow::Result<CentroidList> {
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .flexible(true)
         .comment(Some(b'#'))
         .from_reader(input);
-    let columns = Columns::find(reader.headers()?)?;
+    let columns = Columns::find(reader.headers().map_err(not_a_table)?)?;
     let mut centroids = Vec::new();
     for record in reader.records() {
-        let record = record?;
+        let record = record.map_err(not_a_table)?;
         // A line of blanks and commas at the end of a spreadsheet's table tells nothing.
         if record.iter().all(str::is_empty) {
             continue;
@@ -88,6 +104,18 @@ fn parse(input: impl io::Read, size: FrameSize) -> anyhow::Result<CentroidList> 
     })
 }
 
+/// What keeps a file from being a table, and where.
+fn not_a_table(error: csv::Error) -> anyhow::Error {
+    let line = error.position().map_or(1, csv::Position::line);
+    match error.kind() {
+        csv::ErrorKind::Utf8 { err, .. } => anyhow!(
+            "line {line}: found bytes that are no text in UTF-8 in its column {}, expected a CSV table",
+            err.field() + 1
+        ),
+        _ => error.into(),
+    }
+}
+
 impl Columns {
     fn find(headings: &StringRecord) -> anyhow::Result<Self> {
         if headings.iter().all(str::is_empty) {
@@ -107,13 +135,24 @@ impl Columns {
         };
         let found = || {
             let named: Vec<&str> = headings.iter().collect();
-            format!("line 1 has the columns {}", named.join(", "))
+            let columns = if named.len() == 1 {
+                "the single column"
+            } else {
+                "the columns"
+            };
+            format!("line 1 has {columns} {}", named.join(", "))
         };
         let Some(x) = column(&["x", "x_px"]) else {
-            bail!("{}; expected x or x_px among them", found());
+            bail!(
+                "{}; expected x or x_px among them, with commas between",
+                found()
+            );
         };
         let Some(y) = column(&["y", "y_px"]) else {
-            bail!("{}; expected y or y_px among them", found());
+            bail!(
+                "{}; expected y or y_px among them, with commas between",
+                found()
+            );
         };
         let kinds = [
             ("vmag", Brightness::JohnsonV),
@@ -124,7 +163,10 @@ impl Columns {
             .into_iter()
             .find_map(|(name, kind)| Some((column(&[name])?, kind)));
         let Some((brightness, kind)) = brightness else {
-            bail!("{}; expected flux, vmag or mag among them", found());
+            bail!(
+                "{}; expected flux, vmag or mag among them, with commas between",
+                found()
+            );
         };
         Ok(Self {
             x,
@@ -165,7 +207,7 @@ fn number(record: &StringRecord, column: &Column) -> anyhow::Result<f64> {
     }
 }
 
-/// Refuses a position outside the frame; half a pixel around the centres of the border's pixels still is inside.
+/// Refuses a position outside the frame, which reaches half a pixel beyond the centres of the border's pixels.
 fn inside(position: &PixelPoint, size: FrameSize) -> anyhow::Result<()> {
     let axes = [
         ("x", position.x, size.width),
@@ -173,9 +215,9 @@ fn inside(position: &PixelPoint, size: FrameSize) -> anyhow::Result<()> {
     ];
     for (name, value, side) in axes {
         let limit = side.map_or(MAX_COORDINATE_PX, f64::from) - 0.5;
-        if !(-0.5..=limit).contains(&value) {
+        if !(-0.5 - BORDER_PX..=limit + BORDER_PX).contains(&value) {
             bail!(
-                "column {name}: {value} is outside the frame, which reaches from -0.5 to {limit} px"
+                "column {name}: {value} is more than {BORDER_PX} px outside the frame, which reaches from -0.5 to {limit} px"
             );
         }
     }
@@ -242,7 +284,10 @@ mod tests {
             ("1,2,-4", "line 3: column flux: -4 is not above 0"),
             ("1,2,0", "line 3: column flux: 0 is not above 0"),
             ("1,2", "line 3: column flux is missing"),
-            ("-7,2,3", "line 3: column x: -7 is outside the frame"),
+            (
+                "-7,2,3",
+                "line 3: column x: -7 is more than 5 px outside the frame",
+            ),
             ("1,1e300,3", "line 3: column y: 1000000"),
         ] {
             let complaint = complaint(&format!("x,y,flux\n5,5,5\n{row}\n"));
@@ -273,14 +318,42 @@ mod tests {
             width: Some(100),
             height: None,
         };
-        let complaint = parse("x,y,mag\n99.4,2,3\n100,2,3\n".as_bytes(), size).unwrap_err();
-        assert!(format!("{complaint:#}").starts_with("line 3: column x: 100 is outside"));
+        let complaint = parse("x,y,mag\n99.4,2,3\n105,2,3\n".as_bytes(), size).unwrap_err();
+        assert!(
+            format!("{complaint:#}").starts_with("line 3: column x: 105 is more than 5 px outside")
+        );
         let list = parse("x,y,mag\n9,2,3\n".as_bytes(), size).unwrap();
         assert_eq!((list.width, list.height), (100, 3));
     }
 
     #[test]
+    fn a_star_on_the_border_may_have_its_centre_outside() {
+        let list = parsed("x,y,mag\n-1.2,2,3\n9,-5.5,3\n").unwrap();
+        assert_eq!(list.centroids.len(), 2);
+        assert_eq!((list.width, list.height), (10, 3));
+    }
+
+    #[test]
+    fn a_stream_without_an_end_is_refused() {
+        let complaint = limited(io::repeat(b'1'), 1000).unwrap_err().to_string();
+        assert!(complaint.starts_with("too large: found more than 1000 bytes"));
+        assert_eq!(
+            limited(io::repeat(b'1').take(1000), 1000).unwrap().len(),
+            1000
+        );
+    }
+
+    #[test]
     fn what_is_not_text_is_refused() {
-        assert!(parse(&b"x,y,mag\n1,\xff\xfe,3\n"[..], FrameSize::default()).is_err());
+        for (text, expected) in [
+            (
+                &b"x,y,mag\n1,\xff\xfe,3\n"[..],
+                "line 2: found bytes that are no text in UTF-8 in its column 2",
+            ),
+            (b"\x89PNG\r\n\x1a\n", "line 1: found bytes that are no text"),
+        ] {
+            let complaint = parse(text, FrameSize::default()).unwrap_err().to_string();
+            assert!(complaint.starts_with(expected), "{complaint}");
+        }
     }
 }

@@ -3,7 +3,7 @@
 use super::Fault;
 use starpipe::frame::{self, Frame, FrameError};
 use starpipe::pipeline::Error;
-use std::io::{self, Read};
+use std::io;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -17,11 +17,7 @@ pub(crate) fn read_frame(input: &Path, page: Option<NonZeroUsize>) -> Result<Fra
     if !is_stdin(input) {
         return frame::read_page(input, page);
     }
-    let mut bytes = Vec::new();
-    let read = io::stdin().lock().read_to_end(&mut bytes);
-    read.map_err(FrameError::from)
-        .and_then(|_| frame::decode_page(&bytes, page))
-        .map_err(|error| error.in_file(input))
+    frame::read_stream(io::stdin().lock(), page).map_err(|error| error.in_file(input))
 }
 
 /// Refuses to read standard input twice.

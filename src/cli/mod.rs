@@ -7,6 +7,7 @@ mod centroids;
 mod import;
 mod input;
 mod output;
+mod overwrite;
 mod resources;
 mod robustness;
 mod settings;
@@ -14,8 +15,10 @@ mod solve;
 mod values;
 
 use args::{Arguments, Command};
-use clap::{CommandFactory, Parser, error::ErrorKind};
+use clap::{ArgMatches, CommandFactory, FromArgMatches, error::ErrorKind};
+use starpipe::report::printable;
 use std::fmt::Display;
+use std::io::{self, Write};
 use std::process::ExitCode;
 
 /// How a run ended.
@@ -56,7 +59,8 @@ impl From<anyhow::Error> for Fault {
 
 /// Does what the command line asks for.
 pub(crate) fn run() -> ExitCode {
-    let arguments = Arguments::parse();
+    let matches = Arguments::command().get_matches();
+    let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let done = match arguments.command {
         Command::Process(arguments) => solve::process(arguments),
         Command::Identify(arguments) => solve::identify(arguments),
@@ -65,14 +69,27 @@ pub(crate) fn run() -> ExitCode {
     };
     match done {
         Ok(exit) => exit.into(),
-        Err(Fault::Usage(message)) => Arguments::command()
-            .error(ErrorKind::ValueValidation, message)
+        Err(Fault::Usage(message)) => command_of(&matches)
+            .error(ErrorKind::ValueValidation, printable(&message))
             .exit(),
         Err(Fault::Failed(error)) => {
             complain(chained(error.as_ref()));
             Exit::Failure.into()
         }
     }
+}
+
+/// The command that was typed, for its usage to be shown.
+fn command_of(mut matches: &ArgMatches) -> clap::Command {
+    let mut command = Arguments::command();
+    command.build();
+    while let Some((name, below)) = matches.subcommand() {
+        if let Some(found) = command.find_subcommand(name) {
+            command = found.clone();
+        }
+        matches = below;
+    }
+    command
 }
 
 /// An error and its causes in one line. A cause that the message before it ends with is not said again.
@@ -91,12 +108,14 @@ pub(crate) fn chained(error: &(dyn std::error::Error + 'static)) -> String {
 
 /// Tells of trouble, on standard error.
 pub(crate) fn complain(message: impl Display) {
-    eprintln!("starpipe: {message}");
+    let line = printable(&format!("starpipe: {message}"));
+    // Where standard error cannot be written nobody can be told; the exit status still does.
+    let _ = writeln!(io::stderr(), "{line}");
 }
 
 /// Tells of something odd that does no harm, on standard error.
 pub(crate) fn warn(message: impl Display) {
-    eprintln!("starpipe: warning: {message}");
+    complain(format_args!("warning: {message}"));
 }
 
 #[cfg(test)]

@@ -47,7 +47,7 @@ pub(crate) fn sky<'a>(catalog: &'a Catalog, resources: &ResourceArgs) -> Sky<'a>
     progress.finish_and_clear();
     for trouble in troubles {
         let trouble = chained(&trouble);
-        warn(format_args!("{trouble}; the index was made anew"));
+        warn(format_args!("{trouble}; this costs time and nothing else"));
     }
     sky
 }

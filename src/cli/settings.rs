@@ -4,12 +4,12 @@ use super::Fault;
 use super::args::{Centroid, DetectionArgs, HintArgs, OutputArgs};
 use super::input::is_stdin;
 use super::output::OutputSettings;
+use super::overwrite;
 use starpipe::coords::UnitVector;
 use starpipe::detect::{CentroidMethod, DetectConfig};
 use starpipe::pipeline::{DateSource, FrameDate, Knowledge, Scale, ScaleHint};
 use starpipe::report::TextOptions;
 use starpipe::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
-use std::collections::HashMap;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
@@ -83,7 +83,7 @@ impl OutputArgs {
         extensions: &[&str],
     ) -> Result<OutputSettings, Fault> {
         if let Some(directory) = &self.out {
-            check_file_names(inputs, directory, extensions)?;
+            overwrite::check(inputs, directory, extensions)?;
         }
         Ok(OutputSettings {
             format: self.format,
@@ -101,46 +101,6 @@ pub(crate) fn result_stem(input: &Path) -> &OsStr {
         return OsStr::new("stdin");
     }
     input.file_stem().unwrap_or(OsStr::new("frame"))
-}
-
-/// Refuses inputs whose results would overwrite each other, or one of the inputs.
-fn check_file_names(
-    inputs: &[PathBuf],
-    directory: &Path,
-    extensions: &[&str],
-) -> Result<(), Fault> {
-    let mut taken: HashMap<&OsStr, &Path> = HashMap::new();
-    for input in inputs {
-        let stem = result_stem(input);
-        if let Some(other) = taken.insert(stem, input) {
-            return Err(Fault::Usage(format!(
-                "the results of {} and {} would both be written to {}; process them into different directories",
-                other.display(),
-                input.display(),
-                output_path(directory, input, "json").display(),
-            )));
-        }
-    }
-    let inputs_found: Vec<PathBuf> = inputs
-        .iter()
-        .filter_map(|i| i.canonicalize().ok())
-        .collect();
-    for input in inputs {
-        for extension in extensions {
-            let output = output_path(directory, input, extension);
-            let clash = output
-                .canonicalize()
-                .is_ok_and(|path| inputs_found.contains(&path));
-            if clash {
-                return Err(Fault::Usage(format!(
-                    "the results of {} would overwrite the input {}; choose another directory for --out",
-                    input.display(),
-                    output.display(),
-                )));
-            }
-        }
-    }
-    Ok(())
 }
 
 /// The file that holds the results of `input` in one form.

@@ -1,14 +1,16 @@
 //! The frames in a directory.
 
-use super::{FrameError, FrameFormat, format_inside, format_of};
+use super::{FrameError, FrameFormat, HEAD_BYTES, format_inside, format_of};
+use memchr::memmem;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// What has to be read of a file to tell whether it is a frame; a gzip file can hold a long name before its data.
-const HEAD_BYTES: u64 = 4096;
+/// The text in a PNG file, keyword and value, by which an overlay is known.
+pub(crate) const OVERLAY_TEXT: (&str, &str) = ("Software", "starpipe overlay");
 
-/// The files in `directory` that begin like an image, in the order of their names; directories in it are left out.
+/// The files in `directory` that begin like an image, in the order of their names; directories in it are left out,
+/// and so is what was made of frames: overlays ([`is_overlay`]), and headers without an image (`.wcs`).
 ///
 /// A file of which not even the beginning can be read counts as a frame, so that this is told when it is read.
 /// # Errors
@@ -39,10 +41,21 @@ fn all_files_in(directory: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
+/// Whether the file that begins with `head` is a picture of a frame with its stars marked, as starpipe draws them.
+pub fn is_overlay(head: &[u8]) -> bool {
+    let (keyword, text) = OVERLAY_TEXT;
+    let chunk = [b"tEXt", keyword.as_bytes(), b"\0", text.as_bytes()].concat();
+    format_of(head) == Some(FrameFormat::Png) && memmem::find(head, &chunk).is_some()
+}
+
 fn begins_like_a_frame(path: &Path) -> io::Result<bool> {
+    if path.extension().is_some_and(|extension| extension == "wcs") {
+        return Ok(false);
+    }
     let mut head = Vec::new();
     File::open(path)?.take(HEAD_BYTES).read_to_end(&mut head)?;
     Ok(match format_of(&head) {
+        Some(FrameFormat::Png) => !is_overlay(&head),
         Some(FrameFormat::Gzip) => format_inside(&head).0.is_some(),
         format => format.is_some(),
     })

@@ -100,6 +100,12 @@ pub enum FrameError {
         /// Rows.
         height: usize,
     },
+    /// More bytes than the largest frame has.
+    #[error("too large: found more than {limit} bytes, expected at most so many")]
+    TooManyBytes {
+        /// The most bytes of a file.
+        limit: u64,
+    },
     /// A side shorter than [`MIN_SIDE_PX`].
     #[error(
         "too small: found {width} x {height} pixels, expected at least {MIN_SIDE_PX} on each side"

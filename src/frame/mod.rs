@@ -33,15 +33,24 @@ mod metadata;
 mod raster;
 mod tiff;
 
-pub use directory::files_in;
+#[cfg(feature = "overlay")]
+pub(crate) use directory::OVERLAY_TEXT;
+pub use directory::{files_in, is_overlay};
 pub use error::{FrameError, FrameFormat};
 pub use metadata::FrameMetadata;
 
+use std::io::{self, Read};
 use std::num::NonZeroUsize;
 use std::path::Path;
 
 /// The most pixels that a frame may have; beyond it, reading refuses before it allocates.
 pub const MAX_PIXELS: usize = 200_000_000;
+
+/// The most bytes of a file: the largest frame in three colours of 64 bits, and some headers.
+const MAX_FILE_BYTES: u64 = MAX_PIXELS as u64 * 24 + (1 << 24);
+
+/// What has to be read of a file to tell whether it is a frame; a gzip file can hold a long name before its data.
+const HEAD_BYTES: u64 = 4096;
 
 /// The shortest side that a frame may have, in pixels: no star can be told from its background on less.
 pub const MIN_SIDE_PX: usize = 3;
@@ -129,10 +138,52 @@ pub fn read(path: impl AsRef<Path>) -> Result<Frame, FrameError> {
 /// [`FrameError::File`] with the path, around what is wrong.
 pub fn read_page(path: impl AsRef<Path>, page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
     let path = path.as_ref();
-    std::fs::read(path)
+    std::fs::File::open(path)
         .map_err(FrameError::from)
-        .and_then(|bytes| decode_page(&bytes, page))
+        .and_then(|file| {
+            let length = file.metadata().map_or(0, |metadata| metadata.len());
+            decode_page(&read_limited(file, length, MAX_FILE_BYTES)?, page)
+        })
         .map_err(|error| error.in_file(path))
+}
+
+/// Reads one image from `stream` to its end: `page`, counted from 1, else the first.
+///
+/// What does not begin like an image is not read further: it may have no end.
+/// # Errors
+/// As [`decode_page`]; [`FrameError::Io`], [`FrameError::TooManyBytes`].
+pub fn read_stream(stream: impl Read, page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
+    decode_page(&read_limited(stream, 0, MAX_FILE_BYTES)?, page)
+}
+
+/// All bytes of `stream`, in which `expected` are to be expected, at most `limit`.
+fn read_limited(mut stream: impl Read, expected: u64, limit: u64) -> Result<Vec<u8>, FrameError> {
+    let mut bytes = Vec::new();
+    stream.by_ref().take(HEAD_BYTES).read_to_end(&mut bytes)?;
+    if format_of(&bytes).is_none() {
+        return Err(no_image(&bytes));
+    }
+    if expected > limit {
+        return Err(FrameError::TooManyBytes { limit });
+    }
+    let room = bytes.try_reserve(expected as usize);
+    room.map_err(|_| io::Error::from(io::ErrorKind::OutOfMemory))?;
+    let rest = (limit + 1).saturating_sub(bytes.len() as u64);
+    stream.take(rest).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit {
+        return Err(FrameError::TooManyBytes { limit });
+    }
+    Ok(bytes)
+}
+
+/// Why `bytes`, which do not begin like an image, are none.
+fn no_image(bytes: &[u8]) -> FrameError {
+    if bytes.is_empty() {
+        return FrameError::Empty;
+    }
+    FrameError::UnknownFormat {
+        found: first_bytes(bytes),
+    }
 }
 
 /// Decodes the first image in `bytes`; the format is told from the first of them.
@@ -173,10 +224,7 @@ fn decode_image(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame, Frame
         Some(FrameFormat::Jpeg) => only_page(raster::decode_jpeg),
         Some(FrameFormat::Bmp) => only_page(raster::decode_bmp),
         Some(FrameFormat::Pnm) => only_page(raster::decode_pnm),
-        Some(FrameFormat::Gzip) | None if bytes.is_empty() => Err(FrameError::Empty),
-        Some(FrameFormat::Gzip) | None => Err(FrameError::UnknownFormat {
-            found: first_bytes(bytes),
-        }),
+        Some(FrameFormat::Gzip) | None => Err(no_image(bytes)),
     }
 }
 

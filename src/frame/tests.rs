@@ -443,3 +443,21 @@ fn infinities_have_no_value_and_alone_make_no_frame() {
     let error = decode(&tiff_of::<Gray32Float>(3, 3, &[f32::INFINITY; 9])).unwrap_err();
     assert!(matches!(error, FrameError::NoValues), "{error}");
 }
+
+#[test]
+fn a_stream_without_an_end_is_left_where_it_is_no_image_or_too_long() {
+    let zeros = read_stream(std::io::repeat(0), None).unwrap_err();
+    assert!(matches!(zeros, FrameError::UnknownFormat { .. }), "{zeros}");
+    let nothing = read_stream(std::io::empty(), None).unwrap_err();
+    assert!(matches!(nothing, FrameError::Empty), "{nothing}");
+    let endless = || (&b"P5 3 3 255\n"[..]).chain(std::io::repeat(7));
+    let error = read_limited(endless(), 0, 10_000).unwrap_err();
+    assert!(
+        matches!(error, FrameError::TooManyBytes { limit: 10_000 }),
+        "{error}"
+    );
+    for length in [20, 4096, 5000, 10_000] {
+        let bytes = read_limited(endless().take(length), 99, 10_000).unwrap();
+        assert_eq!(bytes.len() as u64, length);
+    }
+}

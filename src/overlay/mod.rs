@@ -23,13 +23,12 @@ mod names;
 use crate::camera::CameraModel;
 use crate::catalog::Catalog;
 use crate::coords::PixelPoint;
-use crate::frame::Frame;
+use crate::frame::{Frame, OVERLAY_TEXT};
 use crate::identify::{Identification, Outcome};
 use crate::pipeline::{Solution, Source};
 use canvas::{Canvas, Colour};
 use grey::Grey;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder, ImageError, RgbImage};
+use image::RgbImage;
 
 /// What a detection turned out to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,17 +102,22 @@ pub fn draw(title: &str, frame: &Frame, solution: &Solution, catalog: &Catalog) 
     canvas.into_image()
 }
 
-/// The picture as the bytes of a PNG file, compressed fast and not small.
+/// The picture as the bytes of a PNG file, compressed fast and not small, which says that it is no frame
+/// ([`is_overlay`](crate::frame::is_overlay)).
 ///
 /// # Errors
-/// [`ImageError`] if the picture cannot be encoded, which the pictures made here give no occasion for.
-pub fn to_png(picture: &RgbImage) -> Result<Vec<u8>, ImageError> {
+/// [`png::EncodingError`] if the picture cannot be encoded, which the pictures made here give no occasion for.
+pub fn to_png(picture: &RgbImage) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
-    // Noise has no gradients that a filter could use; greys repeat themselves without one.
-    let encoder =
-        PngEncoder::new_with_quality(&mut bytes, CompressionType::Level(1), FilterType::NoFilter);
     let (width, height) = picture.dimensions();
-    encoder.write_image(picture, width, height, ExtendedColorType::Rgb8)?;
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    // Noise has no gradients that a filter could use; greys repeat themselves without one.
+    encoder.set_filter(png::Filter::NoFilter);
+    encoder.set_deflate_compression(png::DeflateCompression::Level(1));
+    let (keyword, text) = OVERLAY_TEXT;
+    encoder.add_text_chunk(keyword.to_owned(), text.to_owned())?;
+    encoder.write_header()?.write_image_data(picture)?;
     Ok(bytes)
 }
 

@@ -16,7 +16,7 @@ mod text;
 #[cfg(feature = "overlay")]
 pub(crate) use angles::{degrees, hours};
 pub use table::{TABLE_COLUMNS, write_table_header};
-pub use text::{STARS_SHOWN, TextOptions, counted};
+pub use text::{STARS_SHOWN, TextOptions, counted, printable};
 
 use crate::pipeline::DateSource;
 use serde::Serialize;

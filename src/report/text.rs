@@ -42,7 +42,7 @@ impl FrameReport {
         lines.extend(self.background_line());
         lines.push(self.timing_line());
         lines.extend(self.star_lines(options));
-        lines.join("\n") + "\n"
+        lines.iter().map(|line| printable(line) + "\n").collect()
     }
 
     fn verdict(&self) -> Vec<String> {
@@ -254,6 +254,20 @@ fn odds(log10_probability: f64) -> String {
         return format!("with probability {:.2}", 10_f64.powf(log10_probability));
     }
     format!("once in 10^{power:.0} frames")
+}
+
+/// `text` with its control characters written out, as `\n` and `\u{1b}`: names of files and headers may hold
+/// commands to a terminal.
+pub fn printable(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for character in text.chars() {
+        if character.is_control() {
+            shown.extend(character.escape_default());
+        } else {
+            shown.push(character);
+        }
+    }
+    shown
 }
 
 /// `1 detection`, `2 detections`.

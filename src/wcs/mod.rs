@@ -20,8 +20,12 @@ use crate::identify::{Identification, Outcome};
 use crate::pipeline::Solution;
 use crate::units::DEG_PER_RAD;
 use card::Header;
+use memchr::memmem;
 use nalgebra::Matrix2;
 use sip::{Polynomial, Sip};
+
+/// The beginning of the history that each header has.
+const SOLVED_BY: &str = "Solved by starpipe";
 
 /// The header of the frame called `frame`; `None` where its stars are not identified.
 pub fn header(frame: &str, solution: &Solution) -> Option<Vec<u8>> {
@@ -50,6 +54,11 @@ pub fn header(frame: &str, solution: &Solution) -> Option<Vec<u8>> {
     }
     add_history(&mut header, frame, solution, identification);
     Some(header.finish())
+}
+
+/// Whether `file` is a header made by [`header`].
+pub fn is_header(file: &[u8]) -> bool {
+    file.starts_with(b"SIMPLE  =") && memmem::find(file, SOLVED_BY.as_bytes()).is_some()
 }
 
 /// Pixel offsets from the centre to degrees towards east and north.
@@ -143,7 +152,7 @@ fn add_history(
         .map(|sigma_rad| sigma_rad * crate::units::ARCSEC_PER_RAD);
     let matched = identification.matches.len();
     let lines = [
-        format!("Solved by starpipe {}", env!("CARGO_PKG_VERSION")),
+        format!("{SOLVED_BY} {}", env!("CARGO_PKG_VERSION")),
         format!("Image: {frame}"),
         format!(
             "Field {:.4} x {:.4} deg, focal length {:.3} +- {:.3} px{}",

@@ -1,0 +1,84 @@
+//! What `--out` may write over: results of an earlier run, and nothing else.
+
+use super::Fault;
+use super::settings::{output_path, result_stem};
+use starpipe::frame;
+use std::collections::{HashMap, HashSet};
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+/// As much of a file tells whether it is a result: the longest header has fewer bytes.
+const HEAD_BYTES: u64 = 1 << 16;
+
+/// Refuses inputs whose results would overwrite each other, one of the inputs, or a file that is no result.
+pub(crate) fn check(
+    inputs: &[PathBuf],
+    directory: &Path,
+    extensions: &[&str],
+) -> Result<(), Fault> {
+    check_each_other(inputs, directory)?;
+    let inputs_found: HashSet<PathBuf> = inputs
+        .iter()
+        .filter_map(|i| i.canonicalize().ok())
+        .collect();
+    for input in inputs {
+        for extension in extensions {
+            let output = output_path(directory, input, extension);
+            let Ok(there) = output.canonicalize() else {
+                continue;
+            };
+            let what = if inputs_found.contains(&there) {
+                "the input"
+            } else if is_result(&there, extension) {
+                continue;
+            } else {
+                "a file that starpipe did not write:"
+            };
+            return Err(Fault::Usage(format!(
+                "the results of {} would overwrite {what} {}; choose another directory for --out",
+                input.display(),
+                output.display(),
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn check_each_other(inputs: &[PathBuf], directory: &Path) -> Result<(), Fault> {
+    let mut taken: HashMap<&OsStr, &Path> = HashMap::new();
+    for input in inputs {
+        if let Some(other) = taken.insert(result_stem(input), input) {
+            return Err(Fault::Usage(format!(
+                "the results of {} and {} would both be written to {}; process them into different directories",
+                other.display(),
+                input.display(),
+                output_path(directory, input, "json").display(),
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Whether `path` is a result of this form, or empty. Anything but a regular file is not, and one that cannot be read.
+fn is_result(path: &Path, extension: &str) -> bool {
+    let head = || -> io::Result<Vec<u8>> {
+        let mut head = Vec::new();
+        File::open(path)?.take(HEAD_BYTES).read_to_end(&mut head)?;
+        Ok(head)
+    };
+    if !fs::metadata(path).is_ok_and(|found| found.is_file()) {
+        return false;
+    }
+    head().is_ok_and(|head| head.is_empty() || begins_like_a_result(&head, extension))
+}
+
+fn begins_like_a_result(head: &[u8], extension: &str) -> bool {
+    match extension {
+        "json" => head.starts_with(b"{\"schema\":"),
+        "csv" => head.starts_with(b"frame,x,y,"),
+        "png" => frame::is_overlay(head),
+        _ => starpipe::wcs::is_header(head),
+    }
+}

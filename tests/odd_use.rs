@@ -1,0 +1,343 @@
+//! What nobody means to do and somebody does: odd names, odd files, results among the frames.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
+mod common;
+
+use common::{Ran, fixture, starpipe};
+use serde_json::Value;
+use std::ffi::OsString;
+use std::fs;
+use std::io::Write;
+use std::os::unix::ffi::OsStringExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+fn orion() -> PathBuf {
+    fixture("orion/orion.png")
+}
+
+fn process(arguments: &[&Path]) -> Ran {
+    Ran::new(
+        starpipe()
+            .args(["process", "--format", "json"])
+            .args(arguments),
+    )
+}
+
+fn names(directory: &Path) -> Vec<String> {
+    let entries = fs::read_dir(directory).unwrap();
+    let mut names: Vec<_> = entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+fn frames(ran: &Ran) -> Vec<String> {
+    let frame = |report: &Value| report["frame"].as_str().unwrap().to_owned();
+    ran.reports().iter().map(frame).collect()
+}
+
+// ---- Results among the frames ---------------------------------------------------------------
+
+#[test]
+fn a_directory_may_hold_its_own_results() {
+    let directory = tempfile::tempdir().unwrap();
+    let place = directory.path();
+    fs::copy(fixture("cygnus/cygnus.tif"), place.join("a.tif")).unwrap();
+    fs::copy(orion(), place.join("b.fits")).unwrap();
+    let run = || process(&[place, Path::new("--out"), place]);
+    let (first, written) = (run(), names(place));
+    assert_eq!((first.status, first.stderr.as_str()), (0, ""));
+    assert_eq!(written.len(), 2 + 2 * 4);
+    // Overlays and headers are no frames, and results of an earlier run may be written over.
+    let again = run();
+    assert_eq!((again.status, again.stderr.as_str()), (0, ""));
+    assert_eq!(frames(&again), frames(&first));
+    assert_eq!(names(place), written);
+    // One that is asked for by its name is taken for a frame all the same.
+    let asked = process(&[&place.join("a.png")]);
+    assert_eq!(asked.reports().len(), 1);
+}
+
+#[test]
+fn a_frame_of_png_is_never_written_over_by_its_overlay() {
+    let directory = tempfile::tempdir().unwrap();
+    let place = directory.path();
+    fs::copy(orion(), place.join("a.png")).unwrap();
+    let ran = process(&[place, Path::new("--out"), place]);
+    assert_eq!(ran.status, 2, "{}", ran.stderr);
+    assert_eq!(names(place), ["a.png"]);
+}
+
+#[test]
+fn only_results_are_written_over() {
+    for extension in ["json", "csv", "png", "wcs"] {
+        let directory = tempfile::tempdir().unwrap();
+        let out = directory.path();
+        let other = out.join("orion").with_extension(extension);
+        let contents: [&[u8]; 2] = [b"mine", &fs::read(orion()).unwrap()];
+        for content in contents {
+            fs::write(&other, content).unwrap();
+            let ran = process(&[&orion(), Path::new("--out"), out]);
+            assert_eq!((ran.status, ran.stdout.as_str()), (2, ""), "{extension}");
+            assert!(
+                ran.stderr.contains(&format!(
+                    "would overwrite a file that starpipe did not write: {}",
+                    other.display()
+                )),
+                "{}",
+                ran.stderr
+            );
+            assert_eq!(fs::read(&other).unwrap(), content);
+            assert_eq!(names(out).len(), 1);
+        }
+        // An empty file holds nothing to lose.
+        fs::write(&other, "").unwrap();
+        let ran = process(&[&orion(), Path::new("--out"), out]);
+        assert_eq!((ran.status, ran.stderr.as_str()), (0, ""), "{extension}");
+    }
+}
+
+#[test]
+fn a_link_to_a_device_is_not_written_over() {
+    let directory = tempfile::tempdir().unwrap();
+    let link = directory.path().join("orion.csv");
+    std::os::unix::fs::symlink("/dev/null", &link).unwrap();
+    let ran = process(&[&orion(), Path::new("--out"), directory.path()]);
+    assert_eq!(ran.status, 2, "{}", ran.stderr);
+    assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+}
+
+#[test]
+fn an_imported_catalogue_takes_the_place_of_no_input_and_of_no_device() {
+    let directory = tempfile::tempdir().unwrap();
+    let source = directory.path().join("bright.csv");
+    let bright = concat!(env!("CARGO_MANIFEST_DIR"), "/catalogs/sky2000-bright.csv");
+    fs::copy(bright, &source).unwrap();
+    let import = |output: &Path| {
+        let mut command = starpipe();
+        command.args(["catalog", "import"]).arg(&source).arg("-o");
+        Ran::new(command.arg(output))
+    };
+    let itself = import(&source);
+    assert_eq!(itself.status, 2, "{}", itself.stderr);
+    assert!(itself.stderr.contains("would overwrite the input"));
+    assert_eq!(fs::read(&source).unwrap(), fs::read(bright).unwrap());
+    // A link, so that a failure would replace that and not the device.
+    let link = directory.path().join("link");
+    std::os::unix::fs::symlink("/dev/null", &link).unwrap();
+    let device = import(&link);
+    assert_eq!((device.status, device.stdout.as_str()), (1, ""));
+    assert!(
+        device
+            .stderr
+            .ends_with("link: it exists and is no regular file\n"),
+        "{}",
+        device.stderr
+    );
+    assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+}
+
+#[test]
+fn a_catalogue_without_stars_is_neither_made_nor_used() {
+    let directory = tempfile::tempdir().unwrap();
+    let output = directory.path().join("none.cat");
+    let bright = concat!(env!("CARGO_MANIFEST_DIR"), "/catalogs/sky2000-bright.csv");
+    let mut command = starpipe();
+    command.args(["catalog", "import", bright, "--vmag-limit", "-5", "-o"]);
+    let ran = Ran::new(command.arg(&output));
+    assert_eq!((ran.status, ran.stdout.as_str()), (1, ""));
+    assert!(
+        ran.stderr
+            .ends_with("no star is brighter than V -5 (--vmag-limit)\n"),
+        "{}",
+        ran.stderr
+    );
+    assert!(!output.exists());
+    starpipe::catalog::Catalog::built_in()
+        .limited_to(-5.0)
+        .write_compact(&output)
+        .unwrap();
+    let ran = process(&[Path::new("--catalog"), &output, &orion()]);
+    assert_eq!(ran.status, 1, "{}", ran.stdout);
+    assert!(ran.stderr.contains("none.cat: no star"), "{}", ran.stderr);
+}
+
+// ---- Names ----------------------------------------------------------------------------------
+
+/// A line's end, quotes, a comma, a command to a terminal, and what is no UTF-8.
+fn odd_names() -> [OsString; 4] {
+    [
+        "two\nlines.png".into(),
+        "a \"quote\", and 'more'.png".into(),
+        "clear\u{1b}[2J\u{9b}31m.png".into(),
+        OsString::from_vec(b"not\xff\xfetext.png".to_vec()),
+    ]
+}
+
+#[test]
+fn odd_names_break_no_line_and_reach_no_terminal() {
+    let directory = tempfile::tempdir().unwrap();
+    let paths = odd_names().map(|name| directory.path().join(name));
+    for path in &paths {
+        fs::copy(orion(), path).unwrap();
+    }
+    let shown = paths.each_ref().map(|path| path.display().to_string());
+    let paths = paths.each_ref().map(PathBuf::as_path);
+    let out = directory.path().join("out");
+    let options = [Path::new("--out"), &out];
+    let json = process(&[&paths[..], &options].concat());
+    assert_eq!((json.status, json.stderr.as_str()), (0, ""));
+    assert_eq!(frames(&json), shown);
+    assert_eq!(fs::read_dir(&out).unwrap().count(), 4 * 4);
+
+    let of = |format: &str, paths: &[&Path]| {
+        let mut command = starpipe();
+        command.args(["process", "--format", format]);
+        Ran::new(command.args(paths)).stdout
+    };
+    // A table is for programs, and has names as they are.
+    let table = of("csv", &paths[..2]);
+    let mut reader = csv::Reader::from_reader(table.as_bytes());
+    let mut named: Vec<String> = reader
+        .records()
+        .map(|row| row.unwrap()[0].to_owned())
+        .collect();
+    named.dedup();
+    assert_eq!(named, shown[..2]);
+
+    let text = of("text", &paths);
+    assert!(!text.contains(|c: char| c.is_control() && c != '\n'));
+    assert!(text.contains("two\\nlines.png  640 × 480 px\n"), "{text}");
+    assert!(
+        text.contains("clear\\u{1b}[2J\\u{9b}31m.png  640"),
+        "{text}"
+    );
+}
+
+#[test]
+fn complaints_of_odd_names_are_one_line_each() {
+    let missing = odd_names();
+    let ran = process(&missing.each_ref().map(Path::new));
+    assert_eq!((ran.status, ran.stdout.as_str()), (1, ""));
+    assert_eq!(ran.stderr.lines().count(), missing.len(), "{}", ran.stderr);
+    assert!(!ran.stderr.contains(|c: char| c.is_control() && c != '\n'));
+}
+
+// ---- Streams --------------------------------------------------------------------------------
+
+#[test]
+fn a_pipe_is_read_like_a_file_and_what_never_ends_is_left() {
+    let mut shell = Command::new("bash");
+    let script = "\"$0\" process --format json <(cat \"$1\") && \"$0\" process /dev/zero; \"$0\" identify /dev/zero";
+    let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache");
+    shell
+        .args(["-c", script, env!("CARGO_BIN_EXE_starpipe")])
+        .arg(orion())
+        .env("STARPIPE_CACHE_DIR", cache);
+    let Ok(ran) = shell.output() else {
+        eprintln!("skipped: no bash");
+        return;
+    };
+    let (stdout, stderr) = (
+        String::from_utf8(ran.stdout).unwrap(),
+        String::from_utf8(ran.stderr).unwrap(),
+    );
+    assert!(stdout.contains("\"status\":\"identified\""), "{stderr}");
+    assert_eq!(ran.status.code(), Some(1));
+    assert!(
+        stderr.starts_with("starpipe: reading /dev/zero: not an image: found the bytes 00 00")
+            && stderr.contains(
+                "starpipe: reading /dev/zero: too large: found more than 268435456 bytes"
+            ),
+        "{stderr}"
+    );
+}
+
+#[test]
+fn a_file_that_is_too_long_is_refused_before_it_is_read() {
+    let mut file = tempfile::NamedTempFile::new().unwrap();
+    file.write_all(b"P5 3 3 255\n").unwrap();
+    // No disk holds so much, but a file with a hole does.
+    if file.as_file().set_len(1 << 40).is_err() {
+        eprintln!("skipped: no file of 1 TiB can be made here");
+        return;
+    }
+    let ran = process(&[file.path()]);
+    assert_eq!((ran.status, ran.stdout.as_str()), (1, ""));
+    assert!(
+        ran.stderr
+            .contains("too large: found more than 4816777216 bytes"),
+        "{}",
+        ran.stderr
+    );
+}
+
+#[test]
+fn trouble_that_cannot_be_told_is_in_the_exit_status() {
+    let Ok(full) = fs::OpenOptions::new().write(true).open("/dev/full") else {
+        eprintln!("skipped: no /dev/full");
+        return;
+    };
+    let status = Command::new(env!("CARGO_BIN_EXE_starpipe"))
+        .args(["process", "missing.png"])
+        .env(
+            "STARPIPE_CACHE_DIR",
+            Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache"),
+        )
+        .stderr(Stdio::from(full))
+        .status()
+        .unwrap();
+    assert_eq!(status.code(), Some(1));
+}
+
+#[test]
+fn a_full_standard_output_is_a_failure() {
+    let Ok(full) = fs::OpenOptions::new().write(true).open("/dev/full") else {
+        eprintln!("skipped: no /dev/full");
+        return;
+    };
+    let ran = Command::new(env!("CARGO_BIN_EXE_starpipe"))
+        .arg("process")
+        .arg(orion())
+        .env(
+            "STARPIPE_CACHE_DIR",
+            Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache"),
+        )
+        .stdout(Stdio::from(full))
+        .output()
+        .unwrap();
+    assert_eq!(ran.status.code(), Some(1));
+    let stderr = String::from_utf8(ran.stderr).unwrap();
+    assert!(stderr.contains("writing to standard output"), "{stderr}");
+}
+
+// ---- The cache ------------------------------------------------------------------------------
+
+#[test]
+fn several_at_once_share_an_empty_cache() {
+    let cache = tempfile::tempdir().unwrap();
+    let bright = concat!(env!("CARGO_MANIFEST_DIR"), "/catalogs/sky2000-bright.csv");
+    let start = || {
+        Command::new(env!("CARGO_BIN_EXE_starpipe"))
+            .args(["process", "--format", "csv", "--catalog", bright])
+            .arg("--cache-dir")
+            .arg(cache.path())
+            .arg(orion())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
+    };
+    let running = [start(), start(), start()];
+    let ended = running.map(|child| child.wait_with_output().unwrap());
+    for output in &ended {
+        assert_eq!(output.status.code(), Some(0));
+        assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+        assert_eq!(output.stdout, ended[0].stdout);
+    }
+    assert_eq!(names(cache.path()).len(), 1, "one index, and no rest");
+}
