@@ -272,6 +272,7 @@ impl CentroidList {
             position: centroid.position,
             sigma_px: LISTED_SIGMA_PX,
             mag: centroid.mag,
+            is_saturated: false,
         };
         StarField {
             width_px: self.width as f64,
@@ -563,6 +564,7 @@ pub fn star_field(
             position: source.position,
             sigma_px: variance_px2.sqrt(),
             mag: instrumental_mag(source.flux_adu),
+            is_saturated: source.flags.saturated,
         }
     };
     let field = StarField {

@@ -10,7 +10,8 @@ use starpipe::camera::{CameraModel, Distortion, DistortionModel, focal_length_px
 use starpipe::catalog::Catalog;
 use starpipe::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use starpipe::identify::{
-    Hints, Identification, ObservedStar, Outcome, Photometry, Reason, Sky, StarField, identify,
+    Hints, Identification, ObservedStar, Outcome, Photometry, Reason, Sky, StarField, StarMatch,
+    identify,
 };
 use std::f64::consts::{PI, TAU};
 use std::sync::OnceLock;
@@ -100,6 +101,7 @@ fn observed(x: f64, y: f64, mag: f64) -> ObservedStar {
         sigma_px: CENTROID_SIGMA_PX,
         // The zero point is none of identification's business.
         mag: mag - 20.0,
+        is_saturated: false,
     }
 }
 
@@ -208,6 +210,28 @@ fn hints_that_are_right_help_and_hints_that_are_wrong_are_believed() {
             identify(&stars, &wrong, sky()),
             Outcome::NotIdentified(_)
         ));
+    }
+}
+
+#[test]
+fn a_saturated_star_may_be_brighter_than_it_seems() {
+    let mut rng = ChaCha8Rng::seed_from_u64(17);
+    let complete = Truth::random(&mut rng, 12.0).observe(&mut rng);
+    let name_at = |stars: &StarField, place: PixelPoint| {
+        let Outcome::Identified(found) = identify(stars, &Hints::default(), sky()) else {
+            panic!("not identified");
+        };
+        let at_place = |m: &&StarMatch| stars.stars[m.observed].position == place;
+        found.matches.iter().find(at_place).map(|m| m.catalog)
+    };
+    let place = complete.stars[0].position;
+    let name = name_at(&complete, place);
+    assert!(name.is_some());
+    for (is_saturated, expected) in [(false, None), (true, name)] {
+        let mut stars = complete.stars.clone();
+        stars[0].mag += 4.0;
+        stars[0].is_saturated = is_saturated;
+        assert_eq!(name_at(&field(stars), place), expected);
     }
 }
 

@@ -151,6 +151,10 @@ fn table(report: &FrameReport, with_header: bool) -> anyhow::Result<Vec<u8>> {
 pub(crate) fn write_whole(files: &[(PathBuf, Vec<u8>)]) -> anyhow::Result<()> {
     let writing = |path: &Path| format!("writing {}", path.display());
     let write = |path: &Path, content: &[u8]| {
+        // The new name would take the place of a device or a pipe.
+        if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+            return Err(io::Error::other("it exists and is no regular file"));
+        }
         let parent = path.parent().filter(|parent| *parent != Path::new(""));
         let mut file = new_file_in(parent.unwrap_or(Path::new(".")))?;
         file.write_all(content)?;

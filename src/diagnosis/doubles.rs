@@ -127,6 +127,7 @@ mod tests {
             position: PixelPoint::new(x, y),
             sigma_px: 0.1,
             mag,
+            is_saturated: false,
         };
         let mut stars: Vec<ObservedStar> = positions.into_iter().map(star).collect();
         stars.sort_by(|a, b| a.mag.total_cmp(&b.mag));

@@ -27,6 +27,8 @@ pub struct ObservedStar {
     pub sigma_px: f64,
     /// Brightness in magnitudes; smaller is brighter. See [`StarField::photometry`].
     pub mag: f64,
+    /// Whether the detector was saturated: the star may be brighter than `mag`, by any amount.
+    pub is_saturated: bool,
 }
 
 /// What the observed magnitudes mean.

@@ -181,7 +181,8 @@ impl Hypothesis {
         })
     }
 
-    /// The difference in brightness in units of what is tolerated; `None` if it is more.
+    /// The difference in brightness in units of what is tolerated; `None` if it is more. No star is too bright for a
+    /// saturated one.
     fn mag_difference(
         &self,
         observed: &ObservedStar,
@@ -189,6 +190,9 @@ impl Hypothesis {
         photometry: Photometry,
     ) -> Option<f64> {
         let difference = f64::from(predicted.v_mag) - observed.mag - self.zero_point_mag;
+        if observed.is_saturated && difference < 0.0 {
+            return Some(0.0);
+        }
         let relative = difference.abs() / photometry.tolerance_mag();
         (relative <= 1.0).then_some(relative)
     }
@@ -446,6 +450,7 @@ mod tests {
             position: PixelPoint::new(x, y),
             sigma_px: 0.1,
             mag: 0.0,
+            is_saturated: false,
         });
         let predicted = [(12.5, 10.0), (10.0, 11.0), (90.0, 50.0)].map(|(x, y)| PredictedStar {
             pixel: PixelPoint::new(x, y),
