@@ -3,9 +3,11 @@
 use super::centroid;
 use super::components::{Peak, Region};
 use super::fit::{Fit, FitConfig, MAX_SPOTS, NoiseModel, Spot, window_radius};
+use super::plateau::Plateau;
 use super::psf::PIXEL_VARIANCE_PX2;
 use super::scene::{FitWork, Scene};
 use super::shape;
+use super::view::View;
 use super::{CentroidMethod, Detection, DetectionFlags};
 use crate::coords::PixelPoint;
 
@@ -84,6 +86,8 @@ impl Measurement<'_> {
         } else {
             self.fit_fixed(&start, &beyond, work)
         };
+        // A fit that does not know the place to within the spot's width has found nothing.
+        fit.converged &= is_placed(&fit.spots[0], fit.spot_px);
         let FitWork { fitter, window } = work;
         fitter.set_flux_noise(window, &mut fit, &self.fit_config());
         let is_plain = fit.converged && is_alone && !peak.saturated;
@@ -134,7 +138,9 @@ impl Measurement<'_> {
         work: &mut FitWork,
         out: &mut Vec<Detection>,
     ) {
-        if self.method == CentroidMethod::GreyWeighted && !detection.flags.trail {
+        let is_by_area = detection.flags.saturated && !fit.converged;
+        let is_grey = self.method == CentroidMethod::GreyWeighted;
+        if is_grey && !detection.flags.trail && !is_by_area {
             centroid::grey_weighted(&self.scene, &self.noise, fit, detection, work);
         }
         self.place(detection);
@@ -207,31 +213,15 @@ impl Measurement<'_> {
 
     /// Position, errors, flux and the flags that need no judgement; coordinates still relative to the view.
     fn detection_of(&self, fit: &Fit, peak: &Peak, region: &Region) -> Detection {
-        let spot = fit.spots[0];
         let scene = &self.scene;
-        let correlation = scene.correlation_at(spot.x, spot.y);
+        let mut spot = self.best_estimate(fit, peak, region);
+        hold_inside(&mut spot, scene.view.width, scene.view.height);
         let level = f64::from(scene.background.at(peak.x as f32, peak.y as f32).0);
-        let brightest = (peak.y.saturating_sub(1)..(peak.y + 2).min(scene.view.height))
-            .flat_map(|y| {
-                (peak.x.saturating_sub(1)..(peak.x + 2).min(scene.view.width)).map(move |x| (x, y))
-            })
-            .map(|(x, y)| f64::from(scene.view.at(x, y)))
-            .fold(f64::NEG_INFINITY, f64::max);
-        let mut flux_adu = spot.flux;
-        let mut sigma_flux = spot.noise_flux * correlation;
-        if !(flux_adu > 0.0 && sigma_flux.is_finite()) {
-            // No fit: what the filter saw.
-            flux_adu = scene.first_guess(peak).flux;
-            sigma_flux = flux_adu / f64::from(peak.snr);
-        }
-        let finite = |sigma: f64| {
-            let fallback = (region.area_px as f64).sqrt().max(1.0);
-            if sigma.is_finite() {
-                sigma * correlation
-            } else {
-                fallback
-            }
-        };
+        // Where all pixels next to the peak are missing, others made it.
+        let brightest = [1, window_radius(scene.spot_px)]
+            .map(|reach| brightest_within(reach, peak, &scene.view))
+            .into_iter()
+            .find(|level| level.is_finite());
         let margin = 2.0 * self.width_px();
         let border = spot.x < margin
             || spot.y < margin
@@ -239,11 +229,11 @@ impl Measurement<'_> {
             || spot.y > scene.view.height as f64 - 1.0 - margin;
         Detection {
             position: PixelPoint::new(spot.x, spot.y),
-            sigma_x_px: finite(spot.sigma_x),
-            sigma_y_px: finite(spot.sigma_y),
-            flux_adu,
-            peak_adu: brightest - level,
-            snr: flux_adu / sigma_flux,
+            sigma_x_px: spot.sigma_x,
+            sigma_y_px: spot.sigma_y,
+            flux_adu: spot.flux,
+            peak_adu: brightest.map_or(0.0, |value| value - level),
+            snr: spot.flux / spot.noise_flux,
             flags: DetectionFlags {
                 saturated: peak.saturated,
                 border,
@@ -252,11 +242,91 @@ impl Measurement<'_> {
         }
     }
 
+    /// What is known of a source, with the correlation of the noise in its errors: by the fit; where the
+    /// pixels do not tell its place to within the spot's own width, by its saturated area or the filter.
+    fn best_estimate(&self, fit: &Fit, peak: &Peak, region: &Region) -> Spot {
+        let spot = fit.spots[0];
+        let correlation = self.scene.correlation_at(spot.x, spot.y);
+        let guess = self.scene.first_guess(peak);
+        let guess = Spot {
+            sigma_x: region.major_px.max(self.width_px()),
+            sigma_y: region.major_px.max(self.width_px()),
+            noise_flux: guess.flux / f64::from(peak.snr),
+            ..guess
+        };
+        let mut fitted = Spot {
+            sigma_x: spot.sigma_x * correlation,
+            sigma_y: spot.sigma_y * correlation,
+            noise_flux: spot.noise_flux * correlation,
+            ..spot
+        };
+        if !is_placed(&spot, fit.spot_px) || (peak.saturated && !fit.converged) {
+            return self.by_area(peak, correlation, guess);
+        }
+        let has_flux = spot.flux > 0.0 && fitted.noise_flux > 0.0 && fitted.noise_flux.is_finite();
+        if !has_flux {
+            (fitted.flux, fitted.noise_flux) = (guess.flux, guess.noise_flux);
+        }
+        fitted
+    }
+
+    /// The place of a saturated area, with its light or that of `guess`, whichever is more; `guess`
+    /// where nothing is saturated.
+    fn by_area(&self, peak: &Peak, correlation: f64, guess: Spot) -> Spot {
+        let area = if peak.saturated {
+            Plateau::about(&self.scene, peak)
+        } else {
+            None
+        };
+        let Some(area) = area else {
+            return guess;
+        };
+        let mut spot = Spot {
+            x: area.x,
+            y: area.y,
+            sigma_x: area.sigma_x,
+            sigma_y: area.sigma_y,
+            ..guess
+        };
+        if area.flux > guess.flux {
+            let noise = self.scene.noise_at(area.x, area.y);
+            let variance = area.area_px * noise * noise + self.noise.shot_adu * area.flux;
+            spot.flux = area.flux;
+            spot.noise_flux = variance.sqrt() * correlation;
+        }
+        spot
+    }
+
     /// From the view's coordinates to the frame's.
     fn place(&self, detection: &mut Detection) {
         detection.position.x += self.scene.view.x0 as f64;
         detection.position.y += self.scene.view.y0 as f64;
     }
+}
+
+/// Whether a spot's standard errors, which may be infinite or NaN, are within its own width.
+fn is_placed(spot: &Spot, spot_px: f64) -> bool {
+    let width_px = (spot_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt();
+    spot.sigma_x <= width_px && spot.sigma_y <= width_px
+}
+
+/// Moves a spot beyond the border to the border, and counts the way as an error: nothing is seen there.
+fn hold_inside(spot: &mut Spot, width: usize, height: usize) {
+    let hold = |at: &mut f64, sigma: &mut f64, side: usize| {
+        let inside = at.clamp(-0.5, side as f64 - 0.5);
+        *sigma = sigma.hypot(*at - inside);
+        *at = inside;
+    };
+    hold(&mut spot.x, &mut spot.sigma_x, width);
+    hold(&mut spot.y, &mut spot.sigma_y, height);
+}
+
+/// The highest value within so many columns and rows of a peak; negative infinity where there is none.
+fn brightest_within(reach: usize, peak: &Peak, view: &View<'_>) -> f64 {
+    let columns = peak.x.saturating_sub(reach)..(peak.x + reach + 1).min(view.width);
+    let rows = peak.y.saturating_sub(reach)..(peak.y + reach + 1).min(view.height);
+    rows.flat_map(|y| &view.row(y)[columns.clone()])
+        .fold(f64::NEG_INFINITY, |highest, &p| highest.max(f64::from(p)))
 }
 
 /// All peaks, and what is known of their spots.
