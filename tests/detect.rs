@@ -458,6 +458,78 @@ fn touching_stars_are_separated_and_flagged() {
     }
 }
 
+/// Pairs among single stars: the mean error of the brighter towards the fainter in pixels, and the
+/// shares of the brighter found and blended, and of detections in all over stars.
+fn pairs(spot: f64, separation: f64, ratio: f64) -> [f64; 4] {
+    let mut sky = Sky::flat(512, 512, BACKGROUND_E);
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut truth = Vec::new();
+    for i in 0..100u32 {
+        let mut place = |n: u32| 25.0 + 50.0 * f64::from(n) + rng.random_range(-0.5..0.5);
+        let (x, y) = (place(i % 10), place(i / 10));
+        let angle: f64 = rng.random_range(0.0..std::f64::consts::TAU);
+        sky.add_star(x, y, 20_000.0 + 10.0 * f64::from(i), spot);
+        if i % 3 == 0 {
+            let (dx, dy) = (angle.cos(), angle.sin());
+            sky.add_star(
+                x + separation * dx,
+                y + separation * dy,
+                20_000.0 / ratio,
+                spot,
+            );
+            truth.push((x, y, dx, dy));
+        }
+    }
+    let found = found_in(&sky.expose(3), &DetectConfig::default());
+    let (mut bias, mut count, mut blended) = (0.0, 0.0, 0.0);
+    for &(x, y, dx, dy) in &truth {
+        if let Some(star) = nearest(&found, x, y, 1.0) {
+            bias += (star.position.x - x) * dx + (star.position.y - y) * dy;
+            count += 1.0;
+            blended += if star.flags.blended { 1.0 } else { 0.0 };
+        }
+    }
+    let stars = (100 + truth.len()) as f64;
+    let pairs = truth.len() as f64;
+    [
+        bias / count,
+        count / pairs,
+        blended / pairs,
+        found.sources.len() as f64 / stars,
+    ]
+}
+
+#[test]
+fn a_neighbour_four_spot_sizes_away_moves_no_star() {
+    const MAX_BIAS_PX: f64 = 0.03;
+    let mut failures = Vec::new();
+    for spot in [1.0, 1.5] {
+        for (sigmas, ratio) in [4.0, 5.0, 6.0, 8.0]
+            .into_iter()
+            .flat_map(|s| [1.0, 2.0, 4.4].map(|r| (s, r)))
+        {
+            let [bias, found, blended, sources] = pairs(spot, sigmas * spot, ratio);
+            let name = format!("spot {spot}, {sigmas} sizes apart, ratio {ratio}");
+            println!(
+                "{name}: bias {bias:+.4} px, found {found:.2}, blended {blended:.2}, sources over stars {sources:.2}"
+            );
+            let is_flagged = if sigmas < 4.5 {
+                blended > 0.95
+            } else {
+                sigmas < 7.0 || blended < 0.05
+            };
+            if !(bias.abs() < MAX_BIAS_PX
+                && found > 0.99
+                && is_flagged
+                && (sources - 1.0).abs() < 0.02)
+            {
+                failures.push(name);
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
 #[test]
 fn a_saturated_star_is_one_source_at_its_place() {
     let mut sky = Sky::flat(200, 200, BACKGROUND_E);

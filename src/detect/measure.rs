@@ -12,7 +12,7 @@ use super::{CentroidMethod, Detection, DetectionFlags};
 use crate::coords::PixelPoint;
 
 /// Spots closer than this many of their standard deviations touch, and are fitted together.
-const TOUCHING_SIGMA: f64 = 3.5;
+const TOUCHING_SIGMA: f64 = 5.0;
 /// Spots closer than this many standard deviations beyond the window still shine into it.
 const WINDOW_MARGIN_SIGMA: f64 = 3.0;
 
@@ -22,6 +22,11 @@ const PAIR_EXCESS_SIGMA: f64 = 5.0;
 const PAIR_EXCESS: f64 = 0.12;
 /// and brighter than this many standard errors.
 const PAIR_SNR: f64 = 15.0;
+/// A single spot fits badly where its chi² over the degrees of freedom is above this: it is tried as a pair, too.
+const PAIR_MIN_CHI2: f64 = 1.5;
+/// So is one whose area above the threshold is longer than broad by this factor: the fit's window ends
+/// before a neighbour four spot sizes away.
+const PAIR_ELONGATION: f64 = 1.25;
 /// Both stars of a pair stand out by this many standard errors.
 const PAIR_MIN_FLUX_SIGMA: f64 = 5.0;
 /// Chi² over the degrees of freedom of a pair is below this.
@@ -48,6 +53,7 @@ impl Measurement<'_> {
             peaks,
             near: Neighbours::new(peaks, self.reach_px()),
             spots: peaks.iter().map(|p| self.scene.first_guess(p)).collect(),
+            is_known: peaks.iter().map(|p| !p.saturated).collect(),
         };
         let mut detections = Vec::with_capacity(peaks.len());
         for index in 0..peaks.len() {
@@ -81,8 +87,12 @@ impl Measurement<'_> {
         start.extend(touching.iter().map(|&other| all.spots[other]));
         let is_alone = touching.is_empty();
         let mut fit = if peak.saturated && is_alone {
-            self.scene
-                .fit_free(start[0], 1.5 * self.scene.spot_px, self.noise, work)
+            self.scene.fit_free(
+                start[0],
+                &beyond,
+                (1.5 * self.scene.spot_px, self.noise),
+                work,
+            )
         } else {
             self.fit_fixed(&start, &beyond, work)
         };
@@ -90,8 +100,8 @@ impl Measurement<'_> {
         fit.converged &= is_placed(&fit.spots[0], fit.spot_px);
         let FitWork { fitter, window } = work;
         fitter.set_flux_noise(window, &mut fit, &self.fit_config());
-        let is_plain = fit.converged && is_alone && !peak.saturated;
-        let pair = if is_plain {
+        let is_single = fit.converged && is_alone;
+        let pair = if is_single && self.may_be_pair(&fit, peak, region) {
             self.as_pair(&fit, &beyond, work)
         } else {
             None
@@ -99,11 +109,15 @@ impl Measurement<'_> {
         if let Some(pair) = pair {
             let mut second = pair.clone();
             second.spots.swap(0, 1);
-            let mut companion = self.detection_of(&second, peak, region);
-            companion.flags.blended = true;
-            self.finish(&second, &mut companion, work, out);
+            let spot = second.spots[0];
+            if !all.has_other_at(index, spot, TOUCHING_SIGMA * self.width_px()) {
+                let mut companion =
+                    self.detection_of(&second, &self.peak_under(spot, peak), region);
+                companion.flags.blended = true;
+                self.finish(&second, &mut companion, work, out);
+            }
             fit = pair;
-        } else if is_plain {
+        } else if is_single && !peak.saturated {
             let mut detection = self.detection_of(&fit, peak, region);
             shape::judge(self, peak, &fit, &mut detection, work);
             all.spots[index] = fit.spots[0];
@@ -113,6 +127,7 @@ impl Measurement<'_> {
         }
         if fit.converged {
             all.spots[index] = fit.spots[0];
+            all.is_known[index] = true;
         }
         let mut detection = self.detection_of(&fit, peak, region);
         detection.flags.blended = fit.spots.len() > 1;
@@ -147,45 +162,116 @@ impl Measurement<'_> {
         out.push(*detection);
     }
 
-    /// A fit of two spots, where one is too wide for a star and two explain it well.
-    ///
-    /// The matched filter melts stars closer than some two spot sizes into one peak.
-    fn as_pair(&self, fit: &Fit, beyond: &[Spot], work: &mut FitWork) -> Option<Fit> {
-        let spot_px = self.scene.spot_px;
+    /// The peak that a spot would have made had the filter not melted it into `peak`.
+    fn peak_under(&self, spot: Spot, peak: &Peak) -> Peak {
+        let view = &self.scene.view;
+        let pixel = |at: f64, side: usize| (at.round().max(0.0) as usize).min(side - 1);
+        let under = Peak {
+            x: pixel(spot.x, view.width),
+            y: pixel(spot.y, view.height),
+            offset_px: [0.0; 2],
+            ..*peak
+        };
+        let saturated = brightest_within(1, &under, view) >= f64::from(self.scene.saturation_adu);
+        Peak { saturated, ..under }
+    }
+
+    /// Whether a bright source is too wide for a star, fits badly, or stands out over a drawn-out area.
+    fn may_be_pair(&self, fit: &Fit, peak: &Peak, region: &Region) -> bool {
         let is_wide = fit.size_excess_px > PAIR_EXCESS_SIGMA * fit.size_error_px
-            && fit.size_excess_px > PAIR_EXCESS * spot_px;
-        if !is_wide || fit.spots[0].flux < PAIR_SNR * fit.spots[0].sigma_flux {
-            return None;
+            && fit.size_excess_px > PAIR_EXCESS * self.scene.spot_px;
+        let is_sharp = fit.size_excess_px < 0.0 && !peak.saturated;
+        let is_bad = fit.chi2 > PAIR_MIN_CHI2 * fit.degrees.max(1.0) && !is_sharp;
+        let is_drawn_out = region.peaks == 1 && region.major_px > PAIR_ELONGATION * region.minor_px;
+        let is_bright = fit.spots[0].flux >= PAIR_SNR * fit.spots[0].sigma_flux;
+        is_bright && (is_wide || is_bad || is_drawn_out)
+    }
+
+    /// A fit of two spots, where two explain the source well and one does not.
+    ///
+    /// The matched filter melts stars closer than some two spot sizes into one peak, and makes a
+    /// shoulder of a fainter one up to four spot sizes away. The fit's window is left in `work` where
+    /// there is no pair.
+    fn as_pair(&self, fit: &Fit, beyond: &[Spot], work: &mut FitWork) -> Option<Fit> {
+        let window = work.window.clone();
+        let drawn_out = self.ends_of(fit, work)?;
+        let pair = self
+            .fit_pair(fit, &drawn_out, beyond, work)
+            .or_else(|| self.fit_pair(fit, &self.with_remainder(fit, beyond, work)?, beyond, work));
+        if pair.is_none() {
+            work.window = window;
         }
-        let config = self.fit_config();
+        pair
+    }
+
+    /// Two spots at the ends of a drawn-out one.
+    fn ends_of(&self, fit: &Fit, work: &mut FitWork) -> Option<[Spot; 2]> {
         let axis = work.fitter.residual_axis(&work.window, fit)?;
         let half_px = 1.2 * self.width_px();
         let spot = fit.spots[0];
-        let ends = [-half_px, half_px].map(|step| Spot {
+        Some([-half_px, half_px].map(|step| Spot {
             x: spot.x + step * axis.0,
             y: spot.y + step * axis.1,
             flux: 0.5 * spot.flux,
             ..spot
-        });
-        self.scene
-            .cut(&ends, window_radius(spot_px), &mut work.window);
-        self.scene
-            .subtract(beyond, &mut work.fitter, &mut work.window);
-        let one = work.fitter.fit(&work.window, &fit.spots[..1], &config);
-        let mut two = work.fitter.fit(&work.window, &ends, &config);
+        }))
+    }
+
+    /// The spot, and another where most light is left without it.
+    fn with_remainder(&self, fit: &Fit, beyond: &[Spot], work: &mut FitWork) -> Option<[Spot; 2]> {
+        /// Light of a spot over that in its 3x3 brightest pixels, about.
+        const LIGHT_IN_ALL: f64 = 1.5;
+        let radius = window_radius(self.scene.spot_px) + self.width_px().ceil() as usize;
+        let FitWork { fitter, window } = work;
+        self.scene.cut(&fit.spots[..1], radius, window);
+        self.scene.subtract(beyond, fitter, window);
+        fitter.subtract(window, fit);
+        let (mut most, mut place) = (0.0, None);
+        for row in 1..window.height.saturating_sub(1) {
+            for column in 1..window.width.saturating_sub(1) {
+                let light: f64 = (row - 1..row + 2)
+                    .flat_map(|r| &window.data[r * window.width + column - 1..][..3])
+                    .sum();
+                // NaN, where a pixel is left out, is not more.
+                if light > most {
+                    (most, place) = (light, Some((window.x0 + column, window.y0 + row)));
+                }
+            }
+        }
+        let (x, y) = place?;
+        let remainder = Spot {
+            x: x as f64,
+            y: y as f64,
+            flux: LIGHT_IN_ALL * most,
+            ..Spot::default()
+        };
+        Some([fit.spots[0], remainder])
+    }
+
+    /// A fit of two spots from `start` that is much better than one spot, and good.
+    fn fit_pair(
+        &self,
+        fit: &Fit,
+        start: &[Spot; 2],
+        beyond: &[Spot],
+        work: &mut FitWork,
+    ) -> Option<Fit> {
+        let config = self.fit_config();
+        let mut two = self.fit_fixed(start, beyond, work);
+        if !two.converged {
+            return None;
+        }
         work.fitter.set_flux_noise(&work.window, &mut two, &config);
+        let one = work.fitter.fit(&work.window, &fit.spots[..1], &config);
         let [a, b] = two.spots.first_chunk::<2>().copied()?;
-        let is_real = |s: Spot| s.flux > PAIR_MIN_FLUX_SIGMA * s.sigma_flux;
+        let is_real = |s: Spot| {
+            s.flux > PAIR_MIN_FLUX_SIGMA * s.sigma_flux && is_placed(&s, self.scene.spot_px)
+        };
         let separation_px = (a.x - b.x).hypot(a.y - b.y);
         // What is left must be like noise: a nebula is no pair.
         let is_good =
             two.chi2 < PAIR_MAX_CHI2 * two.degrees.max(1.0) && one.chi2 - two.chi2 > 0.5 * one.chi2;
-        if !(two.converged
-            && is_real(a)
-            && is_real(b)
-            && is_good
-            && separation_px > self.width_px())
-        {
+        if !(is_real(a) && is_real(b) && is_good && separation_px > self.width_px()) {
             return None;
         }
         if b.flux > a.flux {
@@ -335,6 +421,8 @@ struct PeakList<'a> {
     near: Neighbours,
     /// Each spot as far as it is known: fitted for those stronger than the one at hand.
     spots: Vec<Spot>,
+    /// Whether that is any good: the filter does not know the light of a saturated one.
+    is_known: Vec<bool>,
 }
 
 impl PeakList<'_> {
@@ -354,10 +442,20 @@ impl PeakList<'_> {
             .collect();
         let beyond = around
             .iter()
-            .filter(|other| !touching.contains(other) && !self.peaks[**other].saturated)
+            .filter(|other| !touching.contains(other) && self.is_known[**other])
             .map(|&other| self.spots[other])
             .collect();
         (touching, beyond)
+    }
+
+    /// Whether a peak other than `index` is within `reach_px` of a spot, and nearer to it than `index`.
+    fn has_other_at(&self, index: usize, spot: Spot, reach_px: f64) -> bool {
+        let distance = |peak: &Peak| (peak.x as f64 - spot.x).hypot(peak.y as f64 - spot.y);
+        let nearest_px = distance(&self.peaks[index]).min(reach_px);
+        let others = self.near.of(self.peaks, index);
+        others
+            .iter()
+            .any(|&other| distance(&self.peaks[other]) < nearest_px)
     }
 }
 
