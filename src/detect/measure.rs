@@ -106,11 +106,16 @@ impl Measurement<'_> {
         } else {
             None
         };
-        if let Some(pair) = pair {
+        if let Some(mut pair) = pair {
+            // Of two spots, one may be that of another peak, which has its own turn.
+            let is_others = |spot| all.has_other_at(index, spot, TOUCHING_SIGMA * self.width_px());
+            if is_others(pair.spots[0]) {
+                pair.spots.swap(0, 1);
+            }
             let mut second = pair.clone();
             second.spots.swap(0, 1);
             let spot = second.spots[0];
-            if !all.has_other_at(index, spot, TOUCHING_SIGMA * self.width_px()) {
+            if !is_others(spot) {
                 let mut companion =
                     self.detection_of(&second, &self.peak_under(spot, peak), region);
                 companion.flags.blended = true;
