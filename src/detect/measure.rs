@@ -12,7 +12,7 @@ use super::{CentroidMethod, Detection, DetectionFlags};
 use crate::coords::PixelPoint;
 
 /// Spots closer than this many of their standard deviations touch, and are fitted together.
-const TOUCHING_SIGMA: f64 = 5.0;
+const TOUCHING_SIGMA: f64 = 4.6;
 /// Spots closer than this many standard deviations beyond the window still shine into it.
 const WINDOW_MARGIN_SIGMA: f64 = 3.0;
 
@@ -23,10 +23,10 @@ const PAIR_EXCESS: f64 = 0.12;
 /// and brighter than this many standard errors.
 const PAIR_SNR: f64 = 15.0;
 /// A single spot fits badly where its chi² over the degrees of freedom is above this: it is tried as a pair, too.
-const PAIR_MIN_CHI2: f64 = 1.5;
+const PAIR_MIN_CHI2: f64 = 2.0;
 /// So is one whose area above the threshold is longer than broad by this factor: the fit's window ends
 /// before a neighbour four spot sizes away.
-const PAIR_ELONGATION: f64 = 1.25;
+const PAIR_ELONGATION: f64 = 1.35;
 /// Both stars of a pair stand out by this many standard errors.
 const PAIR_MIN_FLUX_SIGMA: f64 = 5.0;
 /// Chi² over the degrees of freedom of a pair is below this.
