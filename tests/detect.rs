@@ -458,6 +458,78 @@ fn touching_stars_are_separated_and_flagged() {
     }
 }
 
+/// Pairs among single stars: the mean error of the brighter towards the fainter in pixels, and the
+/// shares of the brighter found and blended, and of detections in all over stars.
+fn pairs(spot: f64, separation: f64, ratio: f64) -> [f64; 4] {
+    let mut sky = Sky::flat(512, 512, BACKGROUND_E);
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut truth = Vec::new();
+    for i in 0..100u32 {
+        let mut place = |n: u32| 25.0 + 50.0 * f64::from(n) + rng.random_range(-0.5..0.5);
+        let (x, y) = (place(i % 10), place(i / 10));
+        let angle: f64 = rng.random_range(0.0..std::f64::consts::TAU);
+        sky.add_star(x, y, 20_000.0 + 10.0 * f64::from(i), spot);
+        if i % 3 == 0 {
+            let (dx, dy) = (angle.cos(), angle.sin());
+            sky.add_star(
+                x + separation * dx,
+                y + separation * dy,
+                20_000.0 / ratio,
+                spot,
+            );
+            truth.push((x, y, dx, dy));
+        }
+    }
+    let found = found_in(&sky.expose(3), &DetectConfig::default());
+    let (mut bias, mut count, mut blended) = (0.0, 0.0, 0.0);
+    for &(x, y, dx, dy) in &truth {
+        if let Some(star) = nearest(&found, x, y, 1.0) {
+            bias += (star.position.x - x) * dx + (star.position.y - y) * dy;
+            count += 1.0;
+            blended += if star.flags.blended { 1.0 } else { 0.0 };
+        }
+    }
+    let stars = (100 + truth.len()) as f64;
+    let pairs = truth.len() as f64;
+    [
+        bias / count,
+        count / pairs,
+        blended / pairs,
+        found.sources.len() as f64 / stars,
+    ]
+}
+
+#[test]
+fn a_neighbour_four_spot_sizes_away_moves_no_star() {
+    const MAX_BIAS_PX: f64 = 0.03;
+    let mut failures = Vec::new();
+    for spot in [1.0, 1.5] {
+        for (sigmas, ratio) in [4.0, 5.0, 6.0, 8.0]
+            .into_iter()
+            .flat_map(|s| [1.0, 2.0, 4.4].map(|r| (s, r)))
+        {
+            let [bias, found, blended, sources] = pairs(spot, sigmas * spot, ratio);
+            let name = format!("spot {spot}, {sigmas} sizes apart, ratio {ratio}");
+            println!(
+                "{name}: bias {bias:+.4} px, found {found:.2}, blended {blended:.2}, sources over stars {sources:.2}"
+            );
+            let is_flagged = if sigmas < 4.5 {
+                blended > 0.95
+            } else {
+                sigmas < 7.0 || blended < 0.05
+            };
+            if !(bias.abs() < MAX_BIAS_PX
+                && found > 0.99
+                && is_flagged
+                && (sources - 1.0).abs() < 0.02)
+            {
+                failures.push(name);
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
 #[test]
 fn a_saturated_star_is_one_source_at_its_place() {
     let mut sky = Sky::flat(200, 200, BACKGROUND_E);
@@ -482,6 +554,71 @@ fn a_saturated_star_is_one_source_at_its_place() {
     assert!((star.flux_adu / 400_000.0 - 1.0).abs() < 0.1, "{star:?}");
     assert!(star.snr > found.sources[1].snr, "{star:?}");
     assert_eq!(found.sources.len(), 10, "{:?}", found.sources);
+}
+
+/// What holds for every detection, whatever the frame.
+fn check_is_sound(s: &Detection, width: usize, height: usize) -> Result<(), String> {
+    let is_inside = |at: f64, side: usize| (-0.5..=side as f64 - 0.5).contains(&at);
+    let is_sigma = |sigma: f64| sigma > 0.0 && sigma <= width.max(height) as f64;
+    let is_sound = is_inside(s.position.x, width)
+        && is_inside(s.position.y, height)
+        && is_sigma(s.sigma_x_px)
+        && is_sigma(s.sigma_y_px)
+        && s.flux_adu > 0.0
+        && s.flux_adu.is_finite()
+        && s.peak_adu.is_finite()
+        && s.snr > 0.0
+        && s.snr.is_finite();
+    if is_sound {
+        Ok(())
+    } else {
+        Err(format!("{s:?}"))
+    }
+}
+
+/// A frame of 0 with discs of full scale in it: (x, y, radius).
+fn discs(side: usize, discs: &[(f64, f64, f64)]) -> Frame {
+    let mut pixels = vec![0.0f32; side * side];
+    for (i, pixel) in pixels.iter_mut().enumerate() {
+        let (x, y) = ((i % side) as f64, (i / side) as f64);
+        let is_lit = |d: &&(f64, f64, f64)| (x - d.0).hypot(y - d.1) <= d.2;
+        if discs.iter().any(|d| is_lit(&d)) {
+            *pixel = 255.0;
+        }
+    }
+    Frame::new(side, side, pixels)
+        .unwrap()
+        .with_levels(1.0, Some(255.0))
+}
+
+#[test]
+fn a_source_that_is_all_saturated_is_placed_by_its_area() {
+    // From one pixel to a disc that fills the window of any spot.
+    for radius in [0.6, 1.0, 1.5, 2.3, 4.2, 8.1] {
+        let centres: Vec<(f64, f64, f64)> = (0..16)
+            .map(|i| (f64::from(i % 4), f64::from(i / 4)))
+            .map(|(x, y)| (30.0 + 60.1 * x, 32.0 + 59.9 * y, radius))
+            .collect();
+        let found = found_in(&discs(256, &centres), &DetectConfig::default());
+        for &(x, y, _) in &centres {
+            let star = nearest(&found, x, y, 1.0);
+            let star = star.unwrap_or_else(|| panic!("radius {radius}: nothing at ({x}, {y})"));
+            check_is_sound(star, 256, 256).unwrap();
+            assert!(star.flags.saturated, "{star:?}");
+            let error_px = (star.position.x - x).hypot(star.position.y - y);
+            assert!(
+                error_px < 0.5,
+                "radius {radius}: off by {error_px}: {star:?}"
+            );
+            let sigmas = star.sigma_x_px.max(star.sigma_y_px);
+            assert!(
+                sigmas < 1.0 && error_px < 3.5 * sigmas,
+                "radius {radius}: {star:?}"
+            );
+            // The light that is left is a lower limit of what there was.
+            assert!(star.flux_adu >= 254.0, "radius {radius}: {star:?}");
+        }
+    }
 }
 
 #[test]
@@ -594,6 +731,153 @@ proptest! {
             .collect();
         let frame = Frame { width, height, pixels, step_adu: 1.0, saturation_adu: Some(250.0), metadata: FrameMetadata::default() };
         let _ = detect(&frame, &DetectConfig::default(), &mut Workspace::new());
+    }
+}
+
+/// Something bright in a frame: what a lamp, a hot column, a dead area or a star leave.
+#[derive(Debug, Clone)]
+enum Mark {
+    Disc {
+        x: f64,
+        y: f64,
+        radius: f64,
+        level: f32,
+    },
+    Line {
+        x: f64,
+        y: f64,
+        dx: f64,
+        dy: f64,
+        level: f32,
+    },
+    Block {
+        x: usize,
+        y: usize,
+        side: usize,
+        level: f32,
+    },
+    Star {
+        x: f64,
+        y: f64,
+        flux: f64,
+        sigma: f64,
+    },
+}
+
+fn mark() -> impl Strategy<Value = Mark> {
+    let place = -3.0..75.0f64;
+    let level = prop::sample::select(vec![255.0f32, 300.0, 254.0, 90.0, -40.0, f32::NAN]);
+    let levels = level.clone();
+    prop_oneof![
+        (place.clone(), place.clone(), 0.3..9.0f64, level.clone()).prop_map(
+            |(x, y, radius, level)| Mark::Disc {
+                x,
+                y,
+                radius,
+                level
+            }
+        ),
+        (
+            place.clone(),
+            place.clone(),
+            -1.0..1.0f64,
+            -1.0..1.0f64,
+            level
+        )
+            .prop_map(|(x, y, dx, dy, level)| Mark::Line {
+                x,
+                y,
+                dx,
+                dy,
+                level
+            }),
+        (0usize..70, 0usize..70, 1usize..20, levels).prop_map(|(x, y, side, level)| Mark::Block {
+            x,
+            y,
+            side,
+            level
+        }),
+        (place.clone(), place, 50.0..50_000.0f64, 0.4..2.5f64)
+            .prop_map(|(x, y, flux, sigma)| Mark::Star { x, y, flux, sigma }),
+    ]
+}
+
+/// Draws `marks` over noise of standard deviation `noise`, in whole steps, cut off at full scale.
+fn marked_frame(marks: &[Mark], (width, height): (usize, usize), noise: f32, seed: u64) -> Frame {
+    let mut sky = Sky::flat(width, height, 0.0);
+    for mark in marks {
+        if let &Mark::Star { x, y, flux, sigma } = mark {
+            sky.add_star(x, y, flux, sigma);
+        }
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut pixels: Vec<f32> = sky
+        .mean
+        .iter()
+        .map(|&m| {
+            (m as f32 + gaussian(10.0, noise, &mut rng))
+                .round()
+                .clamp(0.0, 255.0)
+        })
+        .collect();
+    for (i, pixel) in pixels.iter_mut().enumerate() {
+        let (column, row) = (i % width, i / width);
+        let (px, py) = (column as f64, row as f64);
+        for mark in marks {
+            let (is_in, level) = match *mark {
+                Mark::Disc {
+                    x,
+                    y,
+                    radius,
+                    level,
+                } => ((px - x).hypot(py - y) <= radius, level),
+                Mark::Line {
+                    x,
+                    y,
+                    dx,
+                    dy,
+                    level,
+                } => {
+                    let across = (px - x) * dy - (py - y) * dx;
+                    (across.abs() <= 0.5 * dx.hypot(dy), level)
+                }
+                Mark::Block { x, y, side, level } => (
+                    (x..x + side).contains(&column) && (y..y + side).contains(&row),
+                    level,
+                ),
+                Mark::Star { .. } => (false, 0.0),
+            };
+            if is_in {
+                *pixel = level;
+            }
+        }
+    }
+    // One value at least, else there is no frame.
+    pixels[0] = 10.0;
+    Frame::new(width, height, pixels)
+        .unwrap()
+        .with_levels(1.0, Some(255.0))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(600))]
+
+    #[test]
+    fn every_detection_is_sound_in_whatever_frame(
+        marks in prop::collection::vec(mark(), 0..8),
+        size in (8usize..72, 8usize..72),
+        noise in prop::sample::select(vec![0.0f32, 0.3, 2.0, 8.0]),
+        is_grey in any::<bool>(),
+        seed: u64,
+    ) {
+        let frame = marked_frame(&marks, size, noise, seed);
+        let centroid = if is_grey { CentroidMethod::GreyWeighted } else { CentroidMethod::GaussianFit };
+        let config = DetectConfig { centroid, ..DetectConfig::default() };
+        for source in found_in(&frame, &config).sources {
+            if let Err(unsound) = check_is_sound(&source, size.0, size.1) {
+                prop_assert!(false, "{}", unsound);
+            }
+        }
     }
 }
 

@@ -3,7 +3,8 @@
 //! The same code maps the background and noise of the frame and, after filtering, the mean and the
 //! noise of the filtered frame. Per cell: a mean and standard deviation clipped at [`CLIP_SIGMA`],
 //! started from the median and the lower quantile of a few samples (stars are above, not below).
-//! Spreads are smoothed by a median of 3x3 cells; levels are replaced by it only where they stick out.
+//! Spreads are smoothed by a median of 3x3 cells; levels are replaced by it only where they stick out
+//! (beyond the border they go on as a plane does).
 
 use super::view::View;
 use multiversion::multiversion;
@@ -140,7 +141,7 @@ impl Mesh {
             around.extend(self.neighbours(i).map(|j| spread[j]));
             self.spread[i] = median(&mut around);
             around.clear();
-            around.extend(self.neighbours(i).map(|j| level[j]));
+            self.levels_around(&level, i, &mut around);
             let middle = median(&mut around);
             for value in &mut around {
                 *value = (*value - middle).abs();
@@ -152,6 +153,24 @@ impl Mesh {
             }
         }
         self.scratch.copy = around;
+    }
+
+    /// Adds to `around` the nine levels about cell `index`; those beyond the border go on as straight
+    /// as the two before them, so that a gradient lies about a border cell as about any other.
+    fn levels_around(&self, level: &[f32], index: usize, around: &mut Vec<f32>) {
+        let (row, column) = (index / self.columns, index % self.columns);
+        // Along one side: the cell next to the border, and as far behind it as the wanted one is beyond.
+        let mirror = |at: isize, count: usize| {
+            let inside = at.clamp(0, count as isize - 1);
+            let behind = (2 * inside - at).clamp(0, count as isize - 1);
+            (inside as usize, behind as usize)
+        };
+        let steps = (0..9).map(|i| (i / 3 - 1, i % 3 - 1));
+        around.extend(steps.map(|(down, across)| {
+            let (r, r_behind) = mirror(row as isize + down, self.rows);
+            let (c, c_behind) = mirror(column as isize + across, self.columns);
+            2.0 * level[r * self.columns + c] - level[r_behind * self.columns + c_behind]
+        }));
     }
 
     /// The position of `at` among `count` nodes `cell_px` apart: lower node and fraction, which is
@@ -426,6 +445,53 @@ mod tests {
                 (spread / 5.0 - 1.0).abs() < 0.05,
                 "spread {spread} at {x},{y}"
             );
+        }
+    }
+
+    #[test]
+    fn a_steep_gradient_is_followed_up_to_the_corners() {
+        const NOISE: f32 = 2.9;
+        let (width, height) = (640, 480);
+        for (across, down) in [
+            (0.3, 0.0),
+            (-0.3, 0.0),
+            (0.0, 0.3),
+            (0.2, -0.2),
+            (-0.2, -0.2),
+        ] {
+            let truth = |x: usize, y: usize| 1000.0 + across * x as f32 + down * y as f32;
+            let square = noise_frame(width, NOISE, truth);
+            let mut mesh = Mesh::default();
+            mesh.measure(
+                &View::new(&square[..width * height], width, height),
+                &CONFIG,
+            );
+            for (x, y) in [0, 320, width - 1]
+                .iter()
+                .flat_map(|&x| [0, 240, height - 1].map(|y| (x, y)))
+            {
+                let (level, _) = mesh.at(x as f32, y as f32);
+                assert!(
+                    (level - truth(x, y)).abs() < 0.25 * NOISE,
+                    "gradient {across}, {down}: {level} at ({x}, {y}), expected {}",
+                    truth(x, y)
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_cell_full_of_light_takes_the_level_around_it_also_in_a_corner() {
+        for (x0, y0) in [(0, 0), (320, 320), (256, 0), (128, 128)] {
+            let is_lit = |x: usize, y: usize| x / 64 == x0 / 64 && y / 64 == y0 / 64;
+            let truth = |x: usize, y: usize| 100.0 + 0.1 * x as f32 + 0.05 * y as f32;
+            let lit = |x, y| truth(x, y) + if is_lit(x, y) { 80.0 } else { 0.0 };
+            let pixels = noise_frame(384, 3.0, lit);
+            let mut mesh = Mesh::default();
+            mesh.measure(&View::new(&pixels, 384, 384), &CONFIG);
+            let (x, y) = (x0 + 32, y0 + 32);
+            let (level, _) = mesh.at(x as f32, y as f32);
+            assert!((level - truth(x, y)).abs() < 15.0, "({x}, {y}): {level}");
         }
     }
 

@@ -60,7 +60,12 @@ pub(super) fn fit_bright_stars(
         .filter(|p| !p.saturated && is_isolated(p, &peaks[..peaks.len().min(2000)], isolation))
         .filter_map(|&peak| {
             let size = size_from_curvature(filtered, &peak, scene.spot_px);
-            let fit = scene.fit_free(scene.first_guess(&peak), size, NoiseModel::default(), work);
+            let fit = scene.fit_free(
+                scene.first_guess(&peak),
+                &[],
+                (size, NoiseModel::default()),
+                work,
+            );
             (fit.converged && fit.spots[0].flux > 0.0).then_some(BrightStar { fit })
         })
         .take(MAX_STARS)
@@ -89,7 +94,12 @@ pub(super) fn fit_raw_stars(
             !peak.saturated && !rivals.iter().any(|o| is_near(o) && o.snr >= 0.1 * peak.snr)
         })
         .filter_map(|peak| {
-            let fit = scene.fit_free(peak.spot(), peak.size_px, NoiseModel::default(), work);
+            let fit = scene.fit_free(
+                peak.spot(),
+                &[],
+                (peak.size_px, NoiseModel::default()),
+                work,
+            );
             (fit.converged && fit.spots[0].flux > 0.0).then_some(BrightStar { fit })
         })
         .take(MAX_STARS)

@@ -16,6 +16,8 @@ use super::psf::{AxisProfile, MAX_WINDOW_PX};
 /// The most spots fitted together.
 pub(super) const MAX_SPOTS: usize = 6;
 const MAX_PARAMETERS: usize = 3 * MAX_SPOTS + 2;
+/// Parameters of two spots, by far the most frequent group.
+const TWO_SPOTS: usize = 3 * 2 + 2;
 const MAX_STEPS: usize = 15;
 /// Steps shorter than this, in px, end the fit; convergence is quadratic, so little is left after one.
 const CONVERGED_PX: f64 = 2e-3;
@@ -129,10 +131,10 @@ impl Fitter {
     /// start, with the standard errors that they would have there.
     pub fn fit(&mut self, window: &Window, start: &[Spot], config: &FitConfig) -> Fit {
         let start = &start[..start.len().min(MAX_SPOTS)];
-        if start.len() == 1 {
-            self.fit_up_to::<ONE_SPOT>(window, start, config)
-        } else {
-            self.fit_up_to::<MAX_PARAMETERS>(window, start, config)
+        match start.len() {
+            1 => self.fit_up_to::<ONE_SPOT>(window, start, config),
+            2 => self.fit_up_to::<TWO_SPOTS>(window, start, config),
+            _ => self.fit_up_to::<MAX_PARAMETERS>(window, start, config),
         }
     }
 
@@ -350,7 +352,12 @@ impl Fitter {
             normal.add_one_spot(&one, axes, &window.data, window.width);
         } else {
             self.for_each_gradient(window, fit, config, |gradient, residual, _, weight| {
-                normal.add(&gradient[..count], residual, weight);
+                // With a count known beforehand the loops need not be loops.
+                if count == N {
+                    normal.add(&gradient[..N], residual, weight);
+                } else {
+                    normal.add(&gradient[..count], residual, weight);
+                }
             });
         }
         let b = 3 * fit.spots.len();

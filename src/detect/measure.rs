@@ -3,14 +3,16 @@
 use super::centroid;
 use super::components::{Peak, Region};
 use super::fit::{Fit, FitConfig, MAX_SPOTS, NoiseModel, Spot, window_radius};
+use super::plateau::Plateau;
 use super::psf::PIXEL_VARIANCE_PX2;
 use super::scene::{FitWork, Scene};
 use super::shape;
+use super::view::View;
 use super::{CentroidMethod, Detection, DetectionFlags};
 use crate::coords::PixelPoint;
 
 /// Spots closer than this many of their standard deviations touch, and are fitted together.
-const TOUCHING_SIGMA: f64 = 3.5;
+const TOUCHING_SIGMA: f64 = 4.6;
 /// Spots closer than this many standard deviations beyond the window still shine into it.
 const WINDOW_MARGIN_SIGMA: f64 = 3.0;
 
@@ -20,6 +22,11 @@ const PAIR_EXCESS_SIGMA: f64 = 5.0;
 const PAIR_EXCESS: f64 = 0.12;
 /// and brighter than this many standard errors.
 const PAIR_SNR: f64 = 15.0;
+/// A single spot fits badly where its chi² over the degrees of freedom is above this: it is tried as a pair, too.
+const PAIR_MIN_CHI2: f64 = 2.0;
+/// So is one whose area above the threshold is longer than broad by this factor: the fit's window ends
+/// before a neighbour four spot sizes away.
+const PAIR_ELONGATION: f64 = 1.35;
 /// Both stars of a pair stand out by this many standard errors.
 const PAIR_MIN_FLUX_SIGMA: f64 = 5.0;
 /// Chi² over the degrees of freedom of a pair is below this.
@@ -46,6 +53,7 @@ impl Measurement<'_> {
             peaks,
             near: Neighbours::new(peaks, self.reach_px()),
             spots: peaks.iter().map(|p| self.scene.first_guess(p)).collect(),
+            is_known: peaks.iter().map(|p| !p.saturated).collect(),
         };
         let mut detections = Vec::with_capacity(peaks.len());
         for index in 0..peaks.len() {
@@ -79,27 +87,42 @@ impl Measurement<'_> {
         start.extend(touching.iter().map(|&other| all.spots[other]));
         let is_alone = touching.is_empty();
         let mut fit = if peak.saturated && is_alone {
-            self.scene
-                .fit_free(start[0], 1.5 * self.scene.spot_px, self.noise, work)
+            self.scene.fit_free(
+                start[0],
+                &beyond,
+                (1.5 * self.scene.spot_px, self.noise),
+                work,
+            )
         } else {
             self.fit_fixed(&start, &beyond, work)
         };
+        // A fit that does not know the place to within the spot's width has found nothing.
+        fit.converged &= is_placed(&fit.spots[0], fit.spot_px);
         let FitWork { fitter, window } = work;
         fitter.set_flux_noise(window, &mut fit, &self.fit_config());
-        let is_plain = fit.converged && is_alone && !peak.saturated;
-        let pair = if is_plain {
+        let is_single = fit.converged && is_alone;
+        let pair = if is_single && self.may_be_pair(&fit, peak, region) {
             self.as_pair(&fit, &beyond, work)
         } else {
             None
         };
-        if let Some(pair) = pair {
+        if let Some(mut pair) = pair {
+            // Of two spots, one may be that of another peak, which has its own turn.
+            let is_others = |spot| all.has_other_at(index, spot, TOUCHING_SIGMA * self.width_px());
+            if is_others(pair.spots[0]) {
+                pair.spots.swap(0, 1);
+            }
             let mut second = pair.clone();
             second.spots.swap(0, 1);
-            let mut companion = self.detection_of(&second, peak, region);
-            companion.flags.blended = true;
-            self.finish(&second, &mut companion, work, out);
+            let spot = second.spots[0];
+            if !is_others(spot) {
+                let mut companion =
+                    self.detection_of(&second, &self.peak_under(spot, peak), region);
+                companion.flags.blended = true;
+                self.finish(&second, &mut companion, work, out);
+            }
             fit = pair;
-        } else if is_plain {
+        } else if is_single && !peak.saturated {
             let mut detection = self.detection_of(&fit, peak, region);
             shape::judge(self, peak, &fit, &mut detection, work);
             all.spots[index] = fit.spots[0];
@@ -109,6 +132,7 @@ impl Measurement<'_> {
         }
         if fit.converged {
             all.spots[index] = fit.spots[0];
+            all.is_known[index] = true;
         }
         let mut detection = self.detection_of(&fit, peak, region);
         detection.flags.blended = fit.spots.len() > 1;
@@ -134,52 +158,125 @@ impl Measurement<'_> {
         work: &mut FitWork,
         out: &mut Vec<Detection>,
     ) {
-        if self.method == CentroidMethod::GreyWeighted && !detection.flags.trail {
+        let is_by_area = detection.flags.saturated && !fit.converged;
+        let is_grey = self.method == CentroidMethod::GreyWeighted;
+        if is_grey && !detection.flags.trail && !is_by_area {
             centroid::grey_weighted(&self.scene, &self.noise, fit, detection, work);
         }
         self.place(detection);
         out.push(*detection);
     }
 
-    /// A fit of two spots, where one is too wide for a star and two explain it well.
-    ///
-    /// The matched filter melts stars closer than some two spot sizes into one peak.
-    fn as_pair(&self, fit: &Fit, beyond: &[Spot], work: &mut FitWork) -> Option<Fit> {
-        let spot_px = self.scene.spot_px;
+    /// The peak that a spot would have made had the filter not melted it into `peak`.
+    fn peak_under(&self, spot: Spot, peak: &Peak) -> Peak {
+        let view = &self.scene.view;
+        let pixel = |at: f64, side: usize| (at.round().max(0.0) as usize).min(side - 1);
+        let under = Peak {
+            x: pixel(spot.x, view.width),
+            y: pixel(spot.y, view.height),
+            offset_px: [0.0; 2],
+            ..*peak
+        };
+        let saturated = brightest_within(1, &under, view) >= f64::from(self.scene.saturation_adu);
+        Peak { saturated, ..under }
+    }
+
+    /// Whether a bright source is too wide for a star, fits badly, or stands out over a drawn-out area.
+    fn may_be_pair(&self, fit: &Fit, peak: &Peak, region: &Region) -> bool {
         let is_wide = fit.size_excess_px > PAIR_EXCESS_SIGMA * fit.size_error_px
-            && fit.size_excess_px > PAIR_EXCESS * spot_px;
-        if !is_wide || fit.spots[0].flux < PAIR_SNR * fit.spots[0].sigma_flux {
-            return None;
+            && fit.size_excess_px > PAIR_EXCESS * self.scene.spot_px;
+        let is_sharp = fit.size_excess_px < 0.0 && !peak.saturated;
+        let is_bad = fit.chi2 > PAIR_MIN_CHI2 * fit.degrees.max(1.0) && !is_sharp;
+        let is_drawn_out = region.peaks == 1 && region.major_px > PAIR_ELONGATION * region.minor_px;
+        let is_bright = fit.spots[0].flux >= PAIR_SNR * fit.spots[0].sigma_flux;
+        is_bright && (is_wide || is_bad || is_drawn_out)
+    }
+
+    /// A fit of two spots, where two explain the source well and one does not.
+    ///
+    /// The matched filter melts stars closer than some two spot sizes into one peak, and makes a
+    /// shoulder of a fainter one up to four spot sizes away. The fit's window is left in `work` where
+    /// there is no pair.
+    fn as_pair(&self, fit: &Fit, beyond: &[Spot], work: &mut FitWork) -> Option<Fit> {
+        let window = work.window.clone();
+        let drawn_out = self.ends_of(fit, work)?;
+        let pair = self
+            .fit_pair(fit, &drawn_out, beyond, work)
+            .or_else(|| self.fit_pair(fit, &self.with_remainder(fit, beyond, work)?, beyond, work));
+        if pair.is_none() {
+            work.window = window;
         }
-        let config = self.fit_config();
+        pair
+    }
+
+    /// Two spots at the ends of a drawn-out one.
+    fn ends_of(&self, fit: &Fit, work: &mut FitWork) -> Option<[Spot; 2]> {
         let axis = work.fitter.residual_axis(&work.window, fit)?;
         let half_px = 1.2 * self.width_px();
         let spot = fit.spots[0];
-        let ends = [-half_px, half_px].map(|step| Spot {
+        Some([-half_px, half_px].map(|step| Spot {
             x: spot.x + step * axis.0,
             y: spot.y + step * axis.1,
             flux: 0.5 * spot.flux,
             ..spot
-        });
-        self.scene
-            .cut(&ends, window_radius(spot_px), &mut work.window);
-        self.scene
-            .subtract(beyond, &mut work.fitter, &mut work.window);
-        let one = work.fitter.fit(&work.window, &fit.spots[..1], &config);
-        let mut two = work.fitter.fit(&work.window, &ends, &config);
+        }))
+    }
+
+    /// The spot, and another where most light is left without it.
+    fn with_remainder(&self, fit: &Fit, beyond: &[Spot], work: &mut FitWork) -> Option<[Spot; 2]> {
+        /// Light of a spot over that in its 3x3 brightest pixels, about.
+        const LIGHT_IN_ALL: f64 = 1.5;
+        let radius = window_radius(self.scene.spot_px) + self.width_px().ceil() as usize;
+        let FitWork { fitter, window } = work;
+        self.scene.cut(&fit.spots[..1], radius, window);
+        self.scene.subtract(beyond, fitter, window);
+        fitter.subtract(window, fit);
+        let (mut most, mut place) = (0.0, None);
+        for row in 1..window.height.saturating_sub(1) {
+            for column in 1..window.width.saturating_sub(1) {
+                let light: f64 = (row - 1..row + 2)
+                    .flat_map(|r| &window.data[r * window.width + column - 1..][..3])
+                    .sum();
+                // NaN, where a pixel is left out, is not more.
+                if light > most {
+                    (most, place) = (light, Some((window.x0 + column, window.y0 + row)));
+                }
+            }
+        }
+        let (x, y) = place?;
+        let remainder = Spot {
+            x: x as f64,
+            y: y as f64,
+            flux: LIGHT_IN_ALL * most,
+            ..Spot::default()
+        };
+        Some([fit.spots[0], remainder])
+    }
+
+    /// A fit of two spots from `start` that is much better than one spot, and good.
+    fn fit_pair(
+        &self,
+        fit: &Fit,
+        start: &[Spot; 2],
+        beyond: &[Spot],
+        work: &mut FitWork,
+    ) -> Option<Fit> {
+        let config = self.fit_config();
+        let mut two = self.fit_fixed(start, beyond, work);
+        if !two.converged {
+            return None;
+        }
         work.fitter.set_flux_noise(&work.window, &mut two, &config);
+        let one = work.fitter.fit(&work.window, &fit.spots[..1], &config);
         let [a, b] = two.spots.first_chunk::<2>().copied()?;
-        let is_real = |s: Spot| s.flux > PAIR_MIN_FLUX_SIGMA * s.sigma_flux;
+        let is_real = |s: Spot| {
+            s.flux > PAIR_MIN_FLUX_SIGMA * s.sigma_flux && is_placed(&s, self.scene.spot_px)
+        };
         let separation_px = (a.x - b.x).hypot(a.y - b.y);
         // What is left must be like noise: a nebula is no pair.
         let is_good =
             two.chi2 < PAIR_MAX_CHI2 * two.degrees.max(1.0) && one.chi2 - two.chi2 > 0.5 * one.chi2;
-        if !(two.converged
-            && is_real(a)
-            && is_real(b)
-            && is_good
-            && separation_px > self.width_px())
-        {
+        if !(is_real(a) && is_real(b) && is_good && separation_px > self.width_px()) {
             return None;
         }
         if b.flux > a.flux {
@@ -207,31 +304,15 @@ impl Measurement<'_> {
 
     /// Position, errors, flux and the flags that need no judgement; coordinates still relative to the view.
     fn detection_of(&self, fit: &Fit, peak: &Peak, region: &Region) -> Detection {
-        let spot = fit.spots[0];
         let scene = &self.scene;
-        let correlation = scene.correlation_at(spot.x, spot.y);
+        let mut spot = self.best_estimate(fit, peak, region);
+        hold_inside(&mut spot, scene.view.width, scene.view.height);
         let level = f64::from(scene.background.at(peak.x as f32, peak.y as f32).0);
-        let brightest = (peak.y.saturating_sub(1)..(peak.y + 2).min(scene.view.height))
-            .flat_map(|y| {
-                (peak.x.saturating_sub(1)..(peak.x + 2).min(scene.view.width)).map(move |x| (x, y))
-            })
-            .map(|(x, y)| f64::from(scene.view.at(x, y)))
-            .fold(f64::NEG_INFINITY, f64::max);
-        let mut flux_adu = spot.flux;
-        let mut sigma_flux = spot.noise_flux * correlation;
-        if !(flux_adu > 0.0 && sigma_flux.is_finite()) {
-            // No fit: what the filter saw.
-            flux_adu = scene.first_guess(peak).flux;
-            sigma_flux = flux_adu / f64::from(peak.snr);
-        }
-        let finite = |sigma: f64| {
-            let fallback = (region.area_px as f64).sqrt().max(1.0);
-            if sigma.is_finite() {
-                sigma * correlation
-            } else {
-                fallback
-            }
-        };
+        // Where all pixels next to the peak are missing, others made it.
+        let brightest = [1, window_radius(scene.spot_px)]
+            .map(|reach| brightest_within(reach, peak, &scene.view))
+            .into_iter()
+            .find(|level| level.is_finite());
         let margin = 2.0 * self.width_px();
         let border = spot.x < margin
             || spot.y < margin
@@ -239,17 +320,72 @@ impl Measurement<'_> {
             || spot.y > scene.view.height as f64 - 1.0 - margin;
         Detection {
             position: PixelPoint::new(spot.x, spot.y),
-            sigma_x_px: finite(spot.sigma_x),
-            sigma_y_px: finite(spot.sigma_y),
-            flux_adu,
-            peak_adu: brightest - level,
-            snr: flux_adu / sigma_flux,
+            sigma_x_px: spot.sigma_x,
+            sigma_y_px: spot.sigma_y,
+            flux_adu: spot.flux,
+            peak_adu: brightest.map_or(0.0, |value| value - level),
+            snr: spot.flux / spot.noise_flux,
             flags: DetectionFlags {
                 saturated: peak.saturated,
                 border,
                 ..DetectionFlags::default()
             },
         }
+    }
+
+    /// What is known of a source, with the correlation of the noise in its errors: by the fit; where the
+    /// pixels do not tell its place to within the spot's own width, by its saturated area or the filter.
+    fn best_estimate(&self, fit: &Fit, peak: &Peak, region: &Region) -> Spot {
+        let spot = fit.spots[0];
+        let correlation = self.scene.correlation_at(spot.x, spot.y);
+        let guess = self.scene.first_guess(peak);
+        let guess = Spot {
+            sigma_x: region.major_px.max(self.width_px()),
+            sigma_y: region.major_px.max(self.width_px()),
+            noise_flux: guess.flux / f64::from(peak.snr),
+            ..guess
+        };
+        let mut fitted = Spot {
+            sigma_x: spot.sigma_x * correlation,
+            sigma_y: spot.sigma_y * correlation,
+            noise_flux: spot.noise_flux * correlation,
+            ..spot
+        };
+        if !is_placed(&spot, fit.spot_px) || (peak.saturated && !fit.converged) {
+            return self.by_area(peak, correlation, guess);
+        }
+        let has_flux = spot.flux > 0.0 && fitted.noise_flux > 0.0 && fitted.noise_flux.is_finite();
+        if !has_flux {
+            (fitted.flux, fitted.noise_flux) = (guess.flux, guess.noise_flux);
+        }
+        fitted
+    }
+
+    /// The place of a saturated area, with its light or that of `guess`, whichever is more; `guess`
+    /// where nothing is saturated.
+    fn by_area(&self, peak: &Peak, correlation: f64, guess: Spot) -> Spot {
+        let area = if peak.saturated {
+            Plateau::about(&self.scene, peak)
+        } else {
+            None
+        };
+        let Some(area) = area else {
+            return guess;
+        };
+        let mut spot = Spot {
+            x: area.x,
+            y: area.y,
+            sigma_x: area.sigma_x,
+            sigma_y: area.sigma_y,
+            ..guess
+        };
+        if area.flux > guess.flux {
+            let noise = self.scene.noise_at(area.x, area.y);
+            let variance = area.area_px * noise * noise + self.noise.shot_adu * area.flux;
+            spot.flux = area.flux;
+            spot.noise_flux = variance.sqrt() * correlation;
+        }
+        spot
     }
 
     /// From the view's coordinates to the frame's.
@@ -259,12 +395,39 @@ impl Measurement<'_> {
     }
 }
 
+/// Whether a spot's standard errors, which may be infinite or NaN, are within its own width.
+fn is_placed(spot: &Spot, spot_px: f64) -> bool {
+    let width_px = (spot_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt();
+    spot.sigma_x <= width_px && spot.sigma_y <= width_px
+}
+
+/// Moves a spot beyond the border to the border, and counts the way as an error: nothing is seen there.
+fn hold_inside(spot: &mut Spot, width: usize, height: usize) {
+    let hold = |at: &mut f64, sigma: &mut f64, side: usize| {
+        let inside = at.clamp(-0.5, side as f64 - 0.5);
+        *sigma = sigma.hypot(*at - inside);
+        *at = inside;
+    };
+    hold(&mut spot.x, &mut spot.sigma_x, width);
+    hold(&mut spot.y, &mut spot.sigma_y, height);
+}
+
+/// The highest value within so many columns and rows of a peak; negative infinity where there is none.
+fn brightest_within(reach: usize, peak: &Peak, view: &View<'_>) -> f64 {
+    let columns = peak.x.saturating_sub(reach)..(peak.x + reach + 1).min(view.width);
+    let rows = peak.y.saturating_sub(reach)..(peak.y + reach + 1).min(view.height);
+    rows.flat_map(|y| &view.row(y)[columns.clone()])
+        .fold(f64::NEG_INFINITY, |highest, &p| highest.max(f64::from(p)))
+}
+
 /// All peaks, and what is known of their spots.
 struct PeakList<'a> {
     peaks: &'a [Peak],
     near: Neighbours,
     /// Each spot as far as it is known: fitted for those stronger than the one at hand.
     spots: Vec<Spot>,
+    /// Whether that is any good: the filter does not know the light of a saturated one.
+    is_known: Vec<bool>,
 }
 
 impl PeakList<'_> {
@@ -284,10 +447,20 @@ impl PeakList<'_> {
             .collect();
         let beyond = around
             .iter()
-            .filter(|other| !touching.contains(other) && !self.peaks[**other].saturated)
+            .filter(|other| !touching.contains(other) && self.is_known[**other])
             .map(|&other| self.spots[other])
             .collect();
         (touching, beyond)
+    }
+
+    /// Whether a peak other than `index` is within `reach_px` of a spot, and nearer to it than `index`.
+    fn has_other_at(&self, index: usize, spot: Spot, reach_px: f64) -> bool {
+        let distance = |peak: &Peak| (peak.x as f64 - spot.x).hypot(peak.y as f64 - spot.y);
+        let nearest_px = distance(&self.peaks[index]).min(reach_px);
+        let others = self.near.of(self.peaks, index);
+        others
+            .iter()
+            .any(|&other| distance(&self.peaks[other]) < nearest_px)
     }
 }
 

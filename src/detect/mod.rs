@@ -33,6 +33,7 @@ mod matched_filter;
 mod measure;
 mod noise;
 mod normal;
+mod plateau;
 mod psf;
 mod raw_peaks;
 mod scene;

@@ -118,12 +118,13 @@ impl Scene<'_> {
         }
     }
 
-    /// Fits one spot of free size at a peak, in a window that follows the size.
+    /// Fits one spot of free size, which is `spot_px` at first, in a window that follows the size; the
+    /// light of the spots `beyond` is taken out of it.
     pub fn fit_free(
         &self,
         start: Spot,
-        spot_px: f64,
-        noise: NoiseModel,
+        beyond: &[Spot],
+        (spot_px, noise): (f64, NoiseModel),
         work: &mut FitWork,
     ) -> Fit {
         let mut config = FitConfig {
@@ -135,6 +136,7 @@ impl Scene<'_> {
         let mut fit = Fit::default();
         for _ in 0..3 {
             self.cut(&[start], radius, &mut work.window);
+            self.subtract(beyond, &mut work.fitter, &mut work.window);
             fit = work.fitter.fit(&work.window, &[start], &config);
             let wanted = window_radius(fit.spot_px);
             if !fit.converged || wanted <= radius {

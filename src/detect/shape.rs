@@ -94,9 +94,10 @@ fn is_hot_pixel(measurement: &Measurement<'_>, peak: &Peak, fit: &Fit, work: &mu
 /// Whether a spot well wider than the frame's explains the source much better.
 fn is_extended(measurement: &Measurement<'_>, peak: &Peak, fit: &Fit, work: &mut FitWork) -> bool {
     let spot_px = measurement.scene.spot_px;
-    let free = measurement
-        .scene
-        .fit_free(fit.spots[0], spot_px, NoiseModel::default(), work);
+    let free =
+        measurement
+            .scene
+            .fit_free(fit.spots[0], &[], (spot_px, NoiseModel::default()), work);
     if !free.converged || free.spot_px < WIDEST * spot_px {
         return false;
     }

@@ -1,0 +1,73 @@
+//! The saturated area of a source: what is left to place it by where hardly any other pixel has its light.
+
+use super::components::Peak;
+use super::psf::{MAX_WINDOW_PX, PIXEL_VARIANCE_PX2};
+use super::scene::Scene;
+
+/// The area is followed so far from the peak, in columns and rows: beyond, it is no star's.
+const REACH_PX: usize = (MAX_WINDOW_PX - 1) / 2;
+
+/// 8-connected saturated pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Plateau {
+    /// Centre of the area, in pixels.
+    pub x: f64,
+    /// Centre of the area, in pixels.
+    pub y: f64,
+    /// Standard error of x, in pixels.
+    pub sigma_x: f64,
+    /// Standard error of y, in pixels.
+    pub sigma_y: f64,
+    /// Number of pixels.
+    pub area_px: f64,
+    /// What the pixels hold above the background, in ADU: less than the light that fell on them.
+    pub flux: f64,
+}
+
+impl Plateau {
+    /// The area that has a pixel within one pixel of `peak`; `None` where there is none.
+    pub fn about(scene: &Scene<'_>, peak: &Peak) -> Option<Self> {
+        let (left, top) = (
+            peak.x.saturating_sub(REACH_PX),
+            peak.y.saturating_sub(REACH_PX),
+        );
+        let mut is_seen = [[false; MAX_WINDOW_PX]; MAX_WINDOW_PX];
+        let mut is_new = |x: usize, y: usize| {
+            let is_near = x.abs_diff(peak.x) <= REACH_PX && y.abs_diff(peak.y) <= REACH_PX;
+            is_near && !std::mem::replace(&mut is_seen[y - top][x - left], true)
+        };
+        let around = |x: usize, y: usize| {
+            let columns = x.saturating_sub(1)..(x + 2).min(scene.view.width);
+            let rows = y.saturating_sub(1)..(y + 2).min(scene.view.height);
+            rows.flat_map(move |row| columns.clone().map(move |column| (column, row)))
+                .filter(|&(x, y)| scene.view.at(x, y) >= scene.saturation_adu)
+        };
+        let mut open: Vec<(usize, usize)> = Vec::new();
+        open.extend(around(peak.x, peak.y).filter(|&(x, y)| is_new(x, y)));
+        let mut sums = [0.0; 6];
+        while let Some((column, row)) = open.pop() {
+            open.extend(around(column, row).filter(|&(x, y)| is_new(x, y)));
+            let level = f64::from(scene.background.at(column as f32, row as f32).0);
+            let light = f64::from(scene.view.at(column, row)) - level;
+            let (x, y) = (column as f64 - peak.x as f64, row as f64 - peak.y as f64);
+            for (sum, term) in sums.iter_mut().zip([1.0, x, y, x * x, y * y, light]) {
+                *sum += term;
+            }
+        }
+        let [area_px, x, y, xx, yy, flux] = sums;
+        if area_px == 0.0 {
+            return None;
+        }
+        let (x, y) = (x / area_px, y / area_px);
+        // Each pixel is a sample of the spread-out light; and none is placed better than in a pixel.
+        let sigma = |variance: f64| (variance / area_px).max(PIXEL_VARIANCE_PX2).sqrt();
+        Some(Self {
+            x: x + peak.x as f64,
+            y: y + peak.y as f64,
+            sigma_x: sigma(xx / area_px - x * x),
+            sigma_y: sigma(yy / area_px - y * y),
+            area_px,
+            flux,
+        })
+    }
+}
