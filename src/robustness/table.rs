@@ -206,7 +206,7 @@ pub struct Row {
     pub named: usize,
     /// Those of them that are another star, or none.
     pub misnamed: usize,
-    /// Median time of an identification, in milliseconds.
+    /// Median time of an identification over all trials, in milliseconds.
     pub median_ms: f64,
     /// Time that 99 of 100 did not exceed, in milliseconds.
     pub p99_ms: f64,
@@ -244,8 +244,8 @@ impl Row {
             wrong_high_percent: percent(all.interval(Answer::Wrong).high),
             named,
             misnamed,
-            median_ms: milliseconds(counted.time_quantile_ms(0.5)),
-            p99_ms: milliseconds(counted.time_quantile_ms(0.99)),
+            median_ms: milliseconds(all.time_quantile_ms(0.5)),
+            p99_ms: milliseconds(all.time_quantile_ms(0.99)),
         }
     }
 }
