@@ -2,13 +2,14 @@
 //!
 //! hypothesis (camera, attitude) → catalogue stars in the frame → nearest observed star of each → false-alarm probability
 //!
-//! Were the hypothesis wrong, each observed star would lie within r of a predicted one with the probability
-//! p = ρπr², ρ being the density of predicted stars around it. The number of stars that do so is then at
-//! most binomial (Hoeffding 1956: unequal probabilities make the tail thinner), and the probability of as
-//! many as were found or more, times the number of hypotheses and radii tried, bounds the number of
+//! Were the hypothesis wrong, each observed star would lie within r of a predicted one of about its brightness with the
+//! probability p = ρπr², ρ being the density of such stars around it. The number of stars that do so is then
+//! Poisson-binomial, each star having a chance of its own, and the probability of as many as were found or
+//! more, times the number of hypotheses, radii and differences in magnitude tried, bounds the number of
 //! equally good answers that chance alone would have given (an a-contrario test: Desolneux, Moisan & Morel
 //! 2000, IJCV 40, 7). The three stars of the triangle that the hypothesis came from agree because it was
-//! looked for, and say nothing; every two parameters fitted beyond pointing, roll and scale use up another star.
+//! looked for, and say nothing; every two parameters fitted beyond pointing, roll and scale use up another star. The stars used
+//! up are taken to be those least likely to agree by chance, which makes the most of the others' chances.
 
 use super::search::MAX_HYPOTHESES;
 use super::{ObservedStar, Photometry, Sky, StarField, StarMatch};
