@@ -309,11 +309,6 @@ impl<'a> Pipeline<'a> {
         Self { sky }
     }
 
-    /// The sky that frames are identified with.
-    pub fn sky(&self) -> &Sky<'a> {
-        &self.sky
-    }
-
     /// The catalogue.
     pub fn catalog(&self) -> &'a Catalog {
         self.sky.catalog()

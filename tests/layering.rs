@@ -11,10 +11,11 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("units", &[]),
     ("coords", &["units"]),
     ("epoch", &[]),
+    ("files", &[]),
     ("statistics", &[]),
     ("frame", &["units", "coords", "epoch"]),
     ("camera", &["units", "coords"]),
-    ("catalog", &["units", "coords"]),
+    ("catalog", &["units", "coords", "files"]),
     ("detect", &["units", "coords", "frame"]),
     ("attitude", &["units", "coords", "camera"]),
     (

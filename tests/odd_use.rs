@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{Ran, fixture, starpipe};
+use common::{Ran, fixture, names, starpipe};
 use serde_json::Value;
 use std::ffi::OsString;
 use std::fs;
@@ -24,15 +24,6 @@ fn process(arguments: &[&Path]) -> Ran {
             .args(["process", "--format", "json"])
             .args(arguments),
     )
-}
-
-fn names(directory: &Path) -> Vec<String> {
-    let entries = fs::read_dir(directory).unwrap();
-    let mut names: Vec<_> = entries
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.sort();
-    names
 }
 
 fn frames(ran: &Ran) -> Vec<String> {

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{Ran, fixture, number, shared_dir, starpipe};
+use common::{Ran, fixture, names, number, shared_dir, starpipe};
 use image::{GrayImage, Luma};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,15 +18,6 @@ fn process(out: &Path, frame: &Path) -> Ran {
     let mut command = starpipe();
     command.args(["process", "--format", "json", "--out"]);
     Ran::new(command.args([out, frame]))
-}
-
-fn names(directory: &Path) -> Vec<String> {
-    let entries = fs::read_dir(directory).unwrap();
-    let mut names: Vec<_> = entries
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.sort();
-    names
 }
 
 /// A file system in memory of so many bytes, taken away at the end.

@@ -60,7 +60,7 @@ pub use id::{HipparcosId, StarId, TychoId};
 pub use import::{ImportSummary, Reading, SourceFile};
 pub use star::{Star, StarFlags};
 
-use std::fs;
+use crate::files;
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -347,21 +347,7 @@ fn resolve_names(
 /// Writes `bytes` into a temporary file beside `path`, and then gives it that name.
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), CatalogError> {
     let write = || -> io::Result<()> {
-        // The new name would take the place of a device, a pipe, or the name of standard output.
-        if fs::metadata(path).is_ok_and(|found| !found.is_file()) {
-            return Err(io::Error::other("it exists and is no regular file"));
-        }
-        let folder = match path.parent() {
-            Some(folder) if folder != Path::new("") => folder,
-            _ => Path::new("."),
-        };
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".starpipe-catalog-");
-        // Temporary files are private by default; this one is to stay, as any other file would be.
-        #[cfg(unix)]
-        builder
-            .permissions(<fs::Permissions as std::os::unix::fs::PermissionsExt>::from_mode(0o666));
-        let mut file = builder.tempfile_in(folder)?;
+        let mut file = files::beside(path)?;
         file.write_all(bytes)?;
         file.as_file().sync_all()?;
         file.persist(path).map_err(|refused| refused.error)?;

@@ -7,7 +7,7 @@ use starpipe::catalog::Catalog;
 use starpipe::frame::Frame;
 use starpipe::pipeline::Solution;
 use starpipe::report::{FrameReport, TextOptions, write_table_header};
-use starpipe::{overlay, wcs};
+use starpipe::{files, overlay, wcs};
 use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -151,12 +151,7 @@ fn table(report: &FrameReport, with_header: bool) -> anyhow::Result<Vec<u8>> {
 pub(crate) fn write_whole(files: &[(PathBuf, Vec<u8>)]) -> anyhow::Result<()> {
     let writing = |path: &Path| format!("writing {}", path.display());
     let write = |path: &Path, content: &[u8]| {
-        // The new name would take the place of a device or a pipe.
-        if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
-            return Err(io::Error::other("it exists and is no regular file"));
-        }
-        let parent = path.parent().filter(|parent| *parent != Path::new(""));
-        let mut file = new_file_in(parent.unwrap_or(Path::new(".")))?;
+        let mut file = files::beside(path)?;
         file.write_all(content)?;
         io::Result::Ok(file)
     };
@@ -171,18 +166,6 @@ pub(crate) fn write_whole(files: &[(PathBuf, Vec<u8>)]) -> anyhow::Result<()> {
         persisted.with_context(|| writing(path))?;
     }
     Ok(())
-}
-
-/// A temporary file with the permissions of any other new file, and not those of a secret.
-fn new_file_in(directory: &Path) -> io::Result<tempfile::NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // The process's umask takes away from this what the user wants taken away.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(directory)
 }
 
 #[cfg(test)]
