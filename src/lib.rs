@@ -10,11 +10,14 @@ pub mod epoch;
 pub mod files;
 pub mod frame;
 pub mod identify;
+pub mod observer;
 #[cfg(feature = "overlay")]
 pub mod overlay;
 pub mod pipeline;
 pub mod report;
 pub mod robustness;
+pub mod sensitivity;
+pub mod sensor;
 pub mod statistics;
 pub mod units;
 pub mod wcs;

@@ -13,11 +13,17 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("epoch", &[]),
     ("files", &[]),
     ("statistics", &[]),
+    ("observer", &["units", "coords", "epoch"]),
+    ("sensor", &[]),
     ("frame", &["units", "coords", "epoch"]),
     ("camera", &["units", "coords"]),
     ("catalog", &["units", "coords", "files"]),
     ("detect", &["units", "coords", "frame"]),
     ("attitude", &["units", "coords", "camera"]),
+    (
+        "sensitivity",
+        &["units", "observer", "sensor", "detect", "statistics"],
+    ),
     (
         "identify",
         &[

@@ -1,0 +1,3 @@
+//! Where in the observer's sky a direction stands.
+
+pub mod airmass;

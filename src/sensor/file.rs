@@ -1,0 +1,470 @@
+//! `camera.toml`: read strictly, with errors that name line and key.
+
+use super::keys::{KEYS, Key, Limits, nearest_name};
+use super::{Response, ResponseError, Sensor};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read as _;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+
+/// Why a file describes no camera.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SensorError {
+    /// It cannot be read.
+    #[error("{}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// It is larger than such a file can be.
+    #[error("{}: larger than {limit} bytes, which no camera's description is", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// The most bytes.
+        limit: u64,
+    },
+    /// It is no TOML.
+    #[error("{}, line {line}: {message}", path.display())]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: usize,
+        /// What the parser says.
+        message: String,
+    },
+    /// A key that has no meaning.
+    #[error("{}, line {line}: unknown key '{key}'{}", path.display(), meant(.nearest.as_deref()))]
+    UnknownKey {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: usize,
+        /// The key.
+        key: String,
+        /// The key that may have been meant.
+        nearest: Option<String>,
+    },
+    /// A value that makes no sense.
+    #[error("{}, line {line}: {key} is {found}, expected {expected}", path.display())]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: usize,
+        /// The key.
+        key: String,
+        /// The value.
+        found: String,
+        /// What it may be.
+        expected: String,
+    },
+    /// A key that is needed.
+    #[error("{}: {key} is missing: {about}", path.display())]
+    Missing {
+        /// The file.
+        path: PathBuf,
+        /// The key.
+        key: &'static str,
+        /// What it is.
+        about: &'static str,
+    },
+    /// The table of a transmission or an efficiency.
+    #[error("{}, line {line}: {key}", path.display())]
+    Response {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: usize,
+        /// The key.
+        key: String,
+        /// What is wrong with the table.
+        source: Box<ResponseError>,
+    },
+    /// Values that contradict each other.
+    #[error("{}: {what}", path.display())]
+    Contradiction {
+        /// The file.
+        path: PathBuf,
+        /// Which do, and how.
+        what: String,
+    },
+}
+
+fn meant(nearest: Option<&str>) -> String {
+    nearest.map_or_else(String::new, |name| format!("; did you mean '{name}'?"))
+}
+
+/// The most bytes of a camera's description.
+const MAX_BYTES: u64 = 1 << 20;
+/// What a file need not say, and what then holds.
+const DEFAULTS: &[(&str, f64)] = &[
+    ("bias_adu", 0.0),
+    ("band_from_nm", 400.0),
+    ("band_to_nm", 900.0),
+];
+/// What a file need not say, and what then follows from the others.
+const OPTIONAL: &[&str] = &["peak_share"];
+
+type Table = BTreeMap<Spanned<String>, Spanned<toml::Value>>;
+
+impl Sensor {
+    /// Reads a `camera.toml`. Names of tables in it are relative to its directory.
+    ///
+    /// # Errors
+    /// [`SensorError`] with the file, the line and the key.
+    pub fn read(path: &Path) -> Result<Self, SensorError> {
+        let failed = |source| SensorError::Read {
+            path: path.to_owned(),
+            source,
+        };
+        let file = File::open(path).map_err(failed)?;
+        let mut text = String::new();
+        file.take(MAX_BYTES + 1)
+            .read_to_string(&mut text)
+            .map_err(failed)?;
+        if text.len() as u64 > MAX_BYTES {
+            return Err(SensorError::TooLarge {
+                path: path.to_owned(),
+                limit: MAX_BYTES,
+            });
+        }
+        Self::parse(path, &text)
+    }
+
+    /// Parses the text of such a file; `path` stands for its name.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self, SensorError> {
+        let table: Table = toml::from_str(text).map_err(|error| SensorError::Syntax {
+            path: path.to_owned(),
+            line: line_of(text, error.span()),
+            message: error.message().trim().to_owned(),
+        })?;
+        Reading { path, text, table }.sensor()
+    }
+
+    /// What contradicts what, where something does.
+    pub fn contradiction(&self) -> Option<String> {
+        let (from, to) = (self.band_from_nm, self.band_to_nm);
+        if from >= to {
+            return Some(format!(
+                "the band runs backwards: band_from_nm is {from}, band_to_nm {to}"
+            ));
+        }
+        let curves = [
+            ("lens_transmission", &self.lens_transmission),
+            ("quantum_efficiency", &self.quantum_efficiency),
+        ];
+        for (name, curve) in curves {
+            let Some((first, last)) = curve.range_nm() else {
+                continue;
+            };
+            if first > from || last < to {
+                return Some(format!(
+                    "{name} is known from {first} to {last} nm, which does not cover the band from {from} to {to} nm \
+                     (band_from_nm, band_to_nm)"
+                ));
+            }
+        }
+        (self.bias_adu >= self.full_scale_adu()).then(|| {
+            let (bias, bits) = (self.bias_adu, self.bits);
+            format!("bias_adu is {bias}, beyond the full scale of {bits} bits")
+        })
+    }
+}
+
+/// A file while it is read.
+struct Reading<'a> {
+    path: &'a Path,
+    text: &'a str,
+    table: Table,
+}
+
+impl Reading<'_> {
+    fn sensor(&self) -> Result<Sensor, SensorError> {
+        self.check_names()?;
+        let mut sensor = Sensor {
+            name: self.name()?,
+            width_px: 0,
+            height_px: 0,
+            pitch_x_um: 0.0,
+            pitch_y_um: 0.0,
+            focal_length_mm: 0.0,
+            aperture_mm: 0.0,
+            lens_transmission: self.response("lens_transmission")?,
+            quantum_efficiency: self.response("quantum_efficiency")?,
+            band_from_nm: 0.0,
+            band_to_nm: 0.0,
+            read_noise_e: 0.0,
+            dark_current_e_s: 0.0,
+            full_well_e: 0.0,
+            gain_e_per_adu: 0.0,
+            bits: 0,
+            bias_adu: 0.0,
+            spot_sigma_px: 0.0,
+            peak_share: None,
+        };
+        for key in KEYS.iter().filter(|key| !is_response(key.name)) {
+            if let Some(value) = self.number(key)? {
+                (key.set)(&mut sensor, value);
+            }
+        }
+        match sensor.contradiction() {
+            None => Ok(sensor),
+            Some(what) => Err(SensorError::Contradiction {
+                path: self.path.to_owned(),
+                what,
+            }),
+        }
+    }
+
+    fn check_names(&self) -> Result<(), SensorError> {
+        let names = || std::iter::once("name").chain(KEYS.iter().map(|key| key.name));
+        for key in self.table.keys() {
+            let name = key.get_ref().as_str();
+            if !names().any(|known| known == name) {
+                return Err(SensorError::UnknownKey {
+                    path: self.path.to_owned(),
+                    line: line_of(self.text, Some(key.span())),
+                    key: name.to_owned(),
+                    nearest: nearest_name(name, names()).map(Into::into),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn get(&self, name: &str) -> Option<&Spanned<toml::Value>> {
+        let found = self.table.iter().find(|(key, _)| key.get_ref() == name);
+        found.map(|(_, value)| value)
+    }
+
+    fn wrong(&self, key: &str, value: &Spanned<toml::Value>, expected: String) -> SensorError {
+        let found = self.text.get(value.span()).unwrap_or_default();
+        let mut found: String = found.chars().take(40).collect();
+        if found.is_empty() {
+            found = "empty".to_owned();
+        }
+        SensorError::Value {
+            path: self.path.to_owned(),
+            line: line_of(self.text, Some(value.span())),
+            key: key.to_owned(),
+            found,
+            expected,
+        }
+    }
+
+    fn name(&self) -> Result<String, SensorError> {
+        match self.get("name") {
+            None => Ok(self.path.file_stem().map_or_else(
+                || "camera".to_owned(),
+                |stem| stem.to_string_lossy().into_owned(),
+            )),
+            Some(value) => match value.get_ref() {
+                toml::Value::String(name) => Ok(name.clone()),
+                _ => Err(self.wrong("name", value, "a text in quotes".to_owned())),
+            },
+        }
+    }
+
+    /// The value of a key; none where it is to follow from the others.
+    fn number(&self, key: &Key<Sensor>) -> Result<Option<f64>, SensorError> {
+        let Some(value) = self.get(key.name) else {
+            let default = DEFAULTS.iter().find(|(name, _)| *name == key.name);
+            return match default {
+                Some((_, value)) => Ok(Some(*value)),
+                None if OPTIONAL.contains(&key.name) => Ok(None),
+                None => Err(self.missing(key.name)),
+            };
+        };
+        as_number(value.get_ref())
+            .filter(|number| key.limits.accept(*number))
+            .map(Some)
+            .ok_or_else(|| self.wrong(key.name, value, key.limits.to_string()))
+    }
+
+    fn missing(&self, name: &str) -> SensorError {
+        let key = KEYS.iter().find(|key| key.name == name);
+        SensorError::Missing {
+            path: self.path.to_owned(),
+            key: key.map_or("a key", |key| key.name),
+            about: key.map_or("", |key| key.about),
+        }
+    }
+
+    fn response(&self, name: &str) -> Result<Response, SensorError> {
+        let value = self.get(name).ok_or_else(|| self.missing(name))?;
+        let line = line_of(self.text, Some(value.span()));
+        let table = |source| SensorError::Response {
+            path: self.path.to_owned(),
+            line,
+            key: name.to_owned(),
+            source: Box::new(source),
+        };
+        match value.get_ref() {
+            toml::Value::String(file) => {
+                let directory = self.path.parent().unwrap_or(Path::new(""));
+                Response::read(&directory.join(file)).map_err(table)
+            }
+            toml::Value::Array(points) => {
+                let text = csv_of(points).ok_or_else(|| {
+                    let expected = "pairs of wavelength in nm and value";
+                    self.wrong(name, value, expected.to_owned())
+                })?;
+                Response::parse(self.path, &text).map_err(table)
+            }
+            other => as_number(other)
+                .filter(|number| Limits::Share.accept(*number))
+                .map(Response::Constant)
+                .ok_or_else(|| {
+                    let expected = "a number above 0 and at most 1, or the name of a CSV file";
+                    self.wrong(name, value, expected.to_owned())
+                }),
+        }
+    }
+}
+
+fn is_response(name: &str) -> bool {
+    ["lens_transmission", "quantum_efficiency"].contains(&name)
+}
+
+fn as_number(value: &toml::Value) -> Option<f64> {
+    value
+        .as_float()
+        .or_else(|| value.as_integer().map(|whole| whole as f64))
+}
+
+/// Points in the file itself, as a table's text would have them.
+fn csv_of(points: &[toml::Value]) -> Option<String> {
+    let mut text = "wavelength_nm,value\n".to_owned();
+    for point in points {
+        let [nm, value] = point.as_array()?.as_slice() else {
+            return None;
+        };
+        text += &format!("{},{}\n", as_number(nm)?, as_number(value)?);
+    }
+    Some(text)
+}
+
+/// The line, counted from 1, in which a part of the text begins.
+fn line_of(text: &str, span: Option<Range<usize>>) -> usize {
+    let end = span.map_or(0, |span| span.start).min(text.len());
+    text.as_bytes()[..end]
+        .iter()
+        .filter(|b| **b == b'\n')
+        .count()
+        + 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Preset, template};
+    use super::*;
+
+    fn parsed(text: &str) -> Result<Sensor, SensorError> {
+        Sensor::parse("camera.toml".as_ref(), text)
+    }
+
+    fn with(key: &str, line: &str) -> String {
+        let text = template(Preset::Experiment1);
+        let kept = text.lines().map(|old| match old.split(" = ").next() {
+            Some(name) if name == key => line,
+            _ => old,
+        });
+        kept.collect::<Vec<_>>().join("\n")
+    }
+
+    #[test]
+    fn a_template_is_read_back_as_it_was() {
+        for preset in Preset::ALL {
+            assert_eq!(parsed(&template(preset)).unwrap(), preset.sensor());
+        }
+    }
+
+    #[test]
+    fn an_error_names_line_key_value_and_what_was_expected() {
+        for (key, line, expected) in [
+            (
+                "aperture_mm",
+                "aperture_mm = -5",
+                "aperture_mm is -5, expected a number above 0",
+            ),
+            (
+                "aperture_mm",
+                "",
+                "aperture_mm is missing: diameter of the entrance pupil, in mm",
+            ),
+            (
+                "aperture_mm",
+                "apertur_mm = 5",
+                "unknown key 'apertur_mm'; did you mean 'aperture_mm'?",
+            ),
+            (
+                "bits",
+                "bits = 12.5",
+                "bits is 12.5, expected a whole number from 1 to 32",
+            ),
+            (
+                "read_noise_e",
+                "read_noise_e = nan",
+                "read_noise_e is nan, expected a number from 0 up",
+            ),
+            (
+                "read_noise_e",
+                "read_noise_e = \"five\"",
+                "is \"five\", expected",
+            ),
+            (
+                "lens_transmission",
+                "lens_transmission = 1.5",
+                "lens_transmission is 1.5, expected",
+            ),
+            (
+                "lens_transmission",
+                "lens_transmission = [[400, 0.5], [390, 0.6]]",
+                "wavelengths must rise",
+            ),
+            (
+                "lens_transmission",
+                "lens_transmission = [[400, 0.5], [500, 0.6]]",
+                "does not cover the band",
+            ),
+            (
+                "lens_transmission",
+                "lens_transmission = [1, 2]",
+                "expected pairs of wavelength",
+            ),
+            (
+                "band_from_nm",
+                "band_from_nm = 2000",
+                "the band runs backwards",
+            ),
+            (
+                "bias_adu",
+                "bias_adu = 1e6",
+                "beyond the full scale of 12 bits",
+            ),
+            ("name", "name = 5", "name is 5, expected a text in quotes"),
+        ] {
+            let error = parsed(&with(key, line)).unwrap_err();
+            let error = format!(
+                "{error}: {:?}",
+                std::error::Error::source(&error).map(ToString::to_string)
+            );
+            assert!(
+                error.starts_with("camera.toml") && error.contains(expected),
+                "{error}"
+            );
+        }
+        let error = parsed("a = [").unwrap_err().to_string();
+        assert!(error.starts_with("camera.toml, line 1: "), "{error}");
+    }
+}
