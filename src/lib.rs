@@ -10,6 +10,7 @@ pub mod epoch;
 pub mod files;
 pub mod frame;
 pub mod identify;
+pub mod observer;
 #[cfg(feature = "overlay")]
 pub mod overlay;
 pub mod pipeline;

@@ -105,6 +105,12 @@ fn a_wrong_command_line_ends_with_2_and_says_what_is_wrong() {
             &["process", "--near", "10,20", "--radius", "0", "a.png"],
             "radius",
         ),
+        (&["process", "--site", "91,0", "a.png"], "latitude"),
+        (&["process", "--site", "-50,361", "a.png"], "longitude"),
+        (&["process", "--site", "50,0,1e6", "a.png"], "height"),
+        (&["process", "--site", "NaN,0", "a.png"], "NaN"),
+        (&["process", "--site", "50", "a.png"], "comma"),
+        (&["identify", "--site", "50;10", "a.csv"], "comma"),
         (&["process", "--scale-error", "5", "a.png"], "--scale-error"),
         (&["process", "--fov", "NaN", "a.png"], "NaN"),
         (&["process", "--fov", "-10", "a.png"], "field of view"),
@@ -221,6 +227,37 @@ fn json_has_the_fields_of_schema_1() {
         .map(|star| star["flux"].as_f64().unwrap())
         .collect();
     assert!(fluxes.is_sorted_by(|a, b| a >= b), "brightest first");
+}
+
+#[test]
+fn with_site_and_time_the_frame_has_a_zenith_distance() {
+    let report = |arguments: &[&str]| {
+        let frame = orion();
+        let mut command = starpipe();
+        command
+            .args(["process", "--format", "json"])
+            .args(arguments);
+        Ran::new(command.arg(&frame)).reports().remove(0)
+    };
+    let winter = "2020-01-15T22:00:00Z";
+    let seen = report(&["--site", "50,10,300", "--date", winter]);
+    // Orion is south of the zenith by about the site's latitude then.
+    let zenith_distance_deg = number(&seen, "/observation/zenith_distance_deg");
+    assert!((zenith_distance_deg - 51.0).abs() < 3.0, "{seen}");
+    assert!((number(&seen, "/observation/azimuth_deg") - 180.0).abs() < 20.0);
+    assert!((number(&seen, "/observation/airmass") - 1.59).abs() < 0.1);
+    assert_eq!(seen["observation"]["site"]["height_m"], 300.0);
+    for unknown in [
+        &["--site", "50,10"][..],
+        &["--site", "50,10", "--date", "2020-01-15"],
+        &["--date", winter],
+    ] {
+        assert_eq!(report(unknown)["observation"], Value::Null, "{unknown:?}");
+    }
+    let summer = report(&["--site", "50,10", "--date", "2020-07-15T22:00:00Z"]);
+    assert_eq!(summer["observation"]["airmass"], Value::Null);
+    let note = summer["notes"][0].as_str().unwrap();
+    assert!(note.contains("below the horizon"), "{note}");
 }
 
 #[test]

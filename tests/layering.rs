@@ -13,6 +13,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("epoch", &[]),
     ("files", &[]),
     ("statistics", &[]),
+    ("observer", &["units", "coords", "epoch"]),
     ("frame", &["units", "coords", "epoch"]),
     ("camera", &["units", "coords"]),
     ("catalog", &["units", "coords", "files"]),
@@ -45,12 +46,13 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "detect",
             "identify",
             "diagnosis",
+            "observer",
         ],
     ),
     (
         "report",
         &[
-            "units", "coords", "camera", "catalog", "detect", "identify", "pipeline",
+            "units", "coords", "camera", "catalog", "detect", "identify", "observer", "pipeline",
         ],
     ),
     (
