@@ -105,12 +105,6 @@ fn a_wrong_command_line_ends_with_2_and_says_what_is_wrong() {
             &["process", "--near", "10,20", "--radius", "0", "a.png"],
             "radius",
         ),
-        (&["process", "--site", "91,0", "a.png"], "latitude"),
-        (&["process", "--site", "-50,361", "a.png"], "longitude"),
-        (&["process", "--site", "50,0,1e6", "a.png"], "height"),
-        (&["process", "--site", "NaN,0", "a.png"], "NaN"),
-        (&["process", "--site", "50", "a.png"], "comma"),
-        (&["identify", "--site", "50;10", "a.csv"], "comma"),
         (&["process", "--scale-error", "5", "a.png"], "--scale-error"),
         (&["process", "--fov", "NaN", "a.png"], "NaN"),
         (&["process", "--fov", "-10", "a.png"], "field of view"),
@@ -227,6 +221,24 @@ fn json_has_the_fields_of_schema_1() {
         .map(|star| star["flux"].as_f64().unwrap())
         .collect();
     assert!(fluxes.is_sorted_by(|a, b| a >= b), "brightest first");
+}
+
+#[test]
+fn a_site_that_is_not_on_the_earth_is_refused() {
+    for (site, expected) in [
+        ("91,0", "latitude"),
+        ("-50,361", "longitude"),
+        ("50,0,1e6", "height"),
+        ("NaN,0", "NaN"),
+        ("50", "comma"),
+        ("50;10", "comma"),
+    ] {
+        for command in ["process", "identify"] {
+            let ran = run(&[command, "--site", site, "a.png"]);
+            assert_eq!((ran.status, ran.stdout.as_str()), (2, ""), "{site}");
+            assert!(ran.stderr.contains(expected), "{site}: {}", ran.stderr);
+        }
+    }
 }
 
 #[test]
