@@ -14,6 +14,7 @@ pub mod observer;
 #[cfg(feature = "overlay")]
 pub mod overlay;
 pub mod pipeline;
+pub mod prediction;
 pub mod report;
 pub mod robustness;
 pub mod sensitivity;

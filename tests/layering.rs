@@ -35,6 +35,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "statistics",
         ],
     ),
+    ("prediction", &["units", "sensor", "sensitivity"]),
     (
         "diagnosis",
         &["units", "coords", "camera", "frame", "detect", "identify"],

@@ -52,6 +52,14 @@ const TRIALS: usize = 8192;
 const SEED: u64 = 1;
 
 impl Detector {
+    /// The detector that goes by `rule`.
+    pub fn new(rule: Rule, scenario: &Scenario, budget: &Budget) -> Self {
+        match rule {
+            Rule::PeakPixel => Self::peak_pixel(scenario, budget),
+            Rule::MatchedFilter => Self::matched_filter(scenario, budget),
+        }
+    }
+
     /// The paper's rule.
     pub fn peak_pixel(scenario: &Scenario, budget: &Budget) -> Self {
         let threshold_e = budget.star_e;
