@@ -3,6 +3,7 @@
 pub mod attitude;
 pub mod camera;
 pub mod catalog;
+pub mod comparison;
 pub mod coords;
 pub mod detect;
 pub mod diagnosis;
@@ -14,7 +15,6 @@ pub mod observer;
 #[cfg(feature = "overlay")]
 pub mod overlay;
 pub mod pipeline;
-pub mod prediction;
 pub mod report;
 pub mod robustness;
 pub mod sensitivity;

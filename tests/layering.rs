@@ -35,7 +35,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "statistics",
         ],
     ),
-    ("prediction", &["units", "sensor", "sensitivity"]),
+    ("comparison", &["units", "sensor", "sensitivity"]),
     (
         "diagnosis",
         &["units", "coords", "camera", "frame", "detect", "identify"],

@@ -1,6 +1,6 @@
 //! What a camera should have seen in a frame, beside what it saw.
 //!
-//! ([`Description`], [`Seen`]) → [`Prediction`]
+//! ([`Description`], [`Seen`]) → [`Comparison`]
 //!
 //! 1. The sky comes from the frame itself: its level above the bias, in the camera's electrons.
 //! 2. With it, the sensitivity model gives the limits and the zero point that the camera should have.
@@ -68,7 +68,7 @@ pub struct Seen<'a> {
 
 /// What the camera should have seen.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Prediction {
+pub struct Comparison {
     /// Camera, conditions as far as they are known, and reading.
     pub scenario: Scenario,
     /// Whether the zenith distance is known and not just taken for 0.
@@ -99,7 +99,7 @@ pub struct Prediction {
 const NO_SKY_MAG: f64 = 35.0;
 
 /// What `description` predicts of a frame that shows `seen`; `None` where the exposure is not known.
-pub fn predict(description: &Description, seen: &Seen) -> Option<Prediction> {
+pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
     let exposure_s = description.exposure_s.or(seen.exposure_s)?;
     let mut scenario = Scenario::new(description.sensor.clone());
     scenario.reading = Reading::Physical;
@@ -129,7 +129,7 @@ pub fn predict(description: &Description, seen: &Seen) -> Option<Prediction> {
             sigma,
         })
     };
-    let prediction = Prediction {
+    let comparison = Comparison {
         zenith_is_known: known_zenith_deg.is_some(),
         peak_limit_vmag: peak.vmag_at(0.5),
         limit_vmag,
@@ -148,10 +148,10 @@ pub fn predict(description: &Description, seen: &Seen) -> Option<Prediction> {
         budget,
         scenario,
     };
-    let contradictions = contradictions(description, seen, &prediction);
-    Some(Prediction {
+    let contradictions = contradictions(description, seen, &comparison);
+    Some(Comparison {
         contradictions,
-        ..prediction
+        ..comparison
     })
 }
 
@@ -183,7 +183,7 @@ const ZERO_POINT_TOLERANCE_MAG: f64 = 0.5;
 /// Zenith distances this far apart, beyond the field itself, are not of one frame, in degrees.
 const ZENITH_TOLERANCE_DEG: f64 = 1.0;
 
-fn contradictions(description: &Description, seen: &Seen, found: &Prediction) -> Vec<String> {
+fn contradictions(description: &Description, seen: &Seen, found: &Comparison) -> Vec<String> {
     let sensor = &description.sensor;
     let mut told = Vec::new();
     let [width, height] = seen.size_px;
@@ -288,7 +288,7 @@ mod tests {
 
     #[test]
     fn the_sky_is_read_back_from_the_level_and_from_the_noise() {
-        let by_level = predict(&description(), &seen(16.0)).unwrap();
+        let by_level = compare(&description(), &seen(16.0)).unwrap();
         assert!((by_level.budget.sky_mag_arcsec2 - 16.0).abs() < 1e-6);
         assert!(
             by_level.contradictions.is_empty(),
@@ -297,7 +297,7 @@ mod tests {
         );
         let mut frame = seen(14.0);
         frame.level_adu = 0.0;
-        let by_noise = predict(&description(), &frame).unwrap();
+        let by_noise = compare(&description(), &frame).unwrap();
         assert!((by_noise.budget.sky_mag_arcsec2 - 14.0).abs() < 1e-6);
     }
 
@@ -305,23 +305,23 @@ mod tests {
     fn without_an_exposure_there_is_no_prediction() {
         let mut frame = seen(18.0);
         frame.exposure_s = None;
-        assert_eq!(predict(&description(), &frame), None);
+        assert_eq!(compare(&description(), &frame), None);
         let mut stated = description();
         stated.exposure_s = Some(0.04);
-        assert!(predict(&stated, &frame).is_some());
+        assert!(compare(&stated, &frame).is_some());
     }
 
     #[test]
     fn differences_are_of_like_with_like() {
         let mut frame = seen(18.0);
-        let plain = predict(&description(), &frame).unwrap();
+        let plain = compare(&description(), &frame).unwrap();
         let field: Vec<f64> = (0..60).map(|i| 6.0 + 0.1 * f64::from(i)).collect();
         let at = |value| Some(Measured { value, sigma: 0.04 });
         frame.field_vmag = &field;
         frame.limit_vmag = at(plain.limit_vmag + 0.1);
         frame.zero_point_vmag = at(plain.zero_point_vmag - 0.2);
         frame.faintest_vmag = Some(plain.limit_vmag + 0.3);
-        let held = predict(&description(), &frame).unwrap();
+        let held = compare(&description(), &frame).unwrap();
         let value = |measured: Option<Measured>| measured.unwrap().value;
         assert!((value(held.limit_difference_mag) - 0.1).abs() < 1e-9);
         assert!((value(held.zero_point_difference_mag) + 0.2).abs() < 1e-9);
@@ -335,7 +335,7 @@ mod tests {
             exposure_s: Some(0.04),
             ..description()
         };
-        let held = predict(&stated, &frame).unwrap();
+        let held = compare(&stated, &frame).unwrap();
         assert!(value(held.zero_point_difference_mag).abs() < 1e-9);
     }
 
@@ -344,7 +344,7 @@ mod tests {
         let told = |change: &dyn Fn(&mut Description, &mut Seen)| {
             let (mut stated, mut frame) = (description(), seen(16.0));
             change(&mut stated, &mut frame);
-            predict(&stated, &frame).unwrap().contradictions.join("; ")
+            compare(&stated, &frame).unwrap().contradictions.join("; ")
         };
         assert_eq!(told(&|_, _| ()), "");
         assert!(
@@ -355,7 +355,7 @@ mod tests {
             told(&|_, f| f.spot_sigma_px = Some(3.0)).contains("3.00 px, the camera's 1.16 px")
         );
         assert!(told(&|_, f| f.noise_adu *= 2.0).contains("the background's noise is"));
-        let zero = predict(&description(), &seen(16.0))
+        let zero = compare(&description(), &seen(16.0))
             .unwrap()
             .zero_point_vmag;
         let off = told(&|_, f| {
