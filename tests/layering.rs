@@ -35,6 +35,18 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &["units", "coords", "camera", "frame", "detect", "identify"],
     ),
     (
+        "photometry",
+        &[
+            "units",
+            "coords",
+            "camera",
+            "catalog",
+            "detect",
+            "identify",
+            "statistics",
+        ],
+    ),
+    (
         "pipeline",
         &[
             "units",
@@ -47,12 +59,21 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "identify",
             "diagnosis",
             "observer",
+            "photometry",
         ],
     ),
     (
         "report",
         &[
-            "units", "coords", "camera", "catalog", "detect", "identify", "observer", "pipeline",
+            "units",
+            "coords",
+            "camera",
+            "catalog",
+            "detect",
+            "identify",
+            "observer",
+            "photometry",
+            "pipeline",
         ],
     ),
     (
