@@ -14,6 +14,7 @@ pub mod identify;
 pub mod observer;
 #[cfg(feature = "overlay")]
 pub mod overlay;
+pub mod photometry;
 pub mod pipeline;
 pub mod report;
 pub mod robustness;

@@ -41,6 +41,18 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &["units", "coords", "camera", "frame", "detect", "identify"],
     ),
     (
+        "photometry",
+        &[
+            "units",
+            "coords",
+            "camera",
+            "catalog",
+            "detect",
+            "identify",
+            "statistics",
+        ],
+    ),
+    (
         "pipeline",
         &[
             "units",
@@ -53,12 +65,21 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "identify",
             "diagnosis",
             "observer",
+            "photometry",
         ],
     ),
     (
         "report",
         &[
-            "units", "coords", "camera", "catalog", "detect", "identify", "observer", "pipeline",
+            "units",
+            "coords",
+            "camera",
+            "catalog",
+            "detect",
+            "identify",
+            "observer",
+            "photometry",
+            "pipeline",
         ],
     ),
     (
