@@ -232,7 +232,7 @@ pub struct Solution {
     pub observation: Option<Observation>,
     /// How long it was exposed, in seconds, where its file says so.
     pub exposure_s: Option<f64>,
-    /// What the file's header says and turned out wrong, or cannot be true: a sentence each.
+    /// What is wrong or cannot be true in the file's header or in what was given, and what is odd about the frame: a sentence each.
     pub notes: Vec<String>,
     /// All sources, brightest first.
     pub sources: Vec<Source>,

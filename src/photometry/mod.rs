@@ -3,8 +3,8 @@
 //! ([`MeasuredFrame`], [`Sky`]) → [`FramePhotometry`]
 //!
 //! 1. The catalogue's stars in the frame, at its date, down to well below the faintest detection; each claims its detection.
-//! 2. Bright, single, constant stars that are not saturated give the [zero point](zero_point).
-//! 3. All single stars, detected or not, give the [completeness](completeness), and that the limiting magnitude: the one at which
+//! 2. Bright, single, constant stars that are not saturated give the zero point ([`zero_point`]).
+//! 3. All single stars, detected or not, give the completeness ([`completeness`]), and that the limiting magnitude: the one at which
 //!    half of the stars are detected. The faintest star detected is none: it is the luckiest one.
 //!
 //! Caveats: a catalogue that is not complete is no harm, as its stars are what is counted, unless it lacks red stars or close pairs more
@@ -24,8 +24,7 @@ use completeness::{Completeness, Trial};
 use zero_point::{MeasuredStar, ZeroPoint};
 
 /// The zero point is from stars brighter than the limit by so many widths of the fall, of which 98 % or more are
-/// detected. To choose
-/// them by their measured flux instead, or of those hardly detected, would be to choose those that noise and colour make bright.
+/// detected. To choose them by their flux would be to choose those that noise and colour make bright.
 const COMPLETE_WIDTHS: f64 = 2.0;
 /// Where there is no limit, a star of such a signal-to-noise ratio is no matter of luck.
 const SURE_SNR: f64 = 10.0;
