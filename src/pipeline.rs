@@ -256,7 +256,7 @@ pub struct Solution {
     pub observation: Option<Observation>,
     /// How long it was exposed, in seconds, where that is known.
     pub exposure_s: Option<f64>,
-    /// What is said of the frame, by its header or beforehand, and turned out wrong, or cannot be true: a sentence each.
+    /// What is wrong or cannot be true in the file's header or in what was given, and what is odd about the frame: a sentence each.
     pub notes: Vec<String>,
     /// All sources, brightest first.
     pub sources: Vec<Source>,

@@ -42,27 +42,25 @@ pub(super) struct Association {
     pub chance: f64,
 }
 
-/// Detections or stars by place.
-struct ByX<'a, P: Fn(usize) -> PixelPoint> {
-    order: Vec<usize>,
-    place: &'a P,
-}
+/// Numbered places, by x.
+struct ByX(Vec<(PixelPoint, usize)>);
 
-impl<'a, P: Fn(usize) -> PixelPoint> ByX<'a, P> {
-    fn new(mut order: Vec<usize>, place: &'a P) -> Self {
-        order.sort_unstable_by(|&a, &b| place(a).x.total_cmp(&place(b).x).then(a.cmp(&b)));
-        Self { order, place }
+impl ByX {
+    fn new(places: impl Iterator<Item = (PixelPoint, usize)>) -> Self {
+        let mut places: Vec<_> = places.collect();
+        places.sort_unstable_by(|a, b| a.0.x.total_cmp(&b.0.x).then(a.1.cmp(&b.1)));
+        Self(places)
     }
 
     /// Those within `radius_px` of `centre`, with their distances.
     fn within(&self, centre: PixelPoint, radius_px: f64) -> impl Iterator<Item = (usize, f64)> {
-        let x = |&i: &usize| (self.place)(i).x;
-        let first = self.order.partition_point(|i| x(i) < centre.x - radius_px);
-        let near_in_x = self.order[first..]
+        let first = self
+            .0
+            .partition_point(|(place, _)| place.x < centre.x - radius_px);
+        self.0[first..]
             .iter()
-            .take_while(move |i| x(i) <= centre.x + radius_px);
-        near_in_x
-            .map(move |&i| (i, (self.place)(i).distance_to(&centre)))
+            .take_while(move |(place, _)| place.x <= centre.x + radius_px)
+            .map(move |(place, number)| (*number, place.distance_to(&centre)))
             .filter(move |(_, distance_px)| *distance_px <= radius_px)
     }
 }
@@ -79,14 +77,13 @@ pub(super) fn associate(frame: &MeasuredFrame, predicted: &[PredictedStar]) -> A
     let reach_px = |detection: &Detection| {
         reach_px(detection, frame.identification).min(REACH_SHARE * apart_px)
     };
-    let place = |i: usize| sources[i].position;
-    let star_like: Vec<usize> = (0..sources.len())
-        .filter(|&i| sources[i].flags.is_star_like() && sources[i].flux_adu > 0.0)
-        .collect();
-    let detections = ByX::new(star_like, &place);
+    let star_like = sources
+        .iter()
+        .zip(0..)
+        .filter(|(source, _)| source.flags.is_star_like() && source.flux_adu > 0.0);
+    let detections = ByX::new(star_like.map(|(source, i)| (source.position, i)));
+    let neighbours = ByX::new(predicted.iter().map(|star| star.pixel).zip(0..));
     let camera = &frame.identification.camera;
-    let pixel = |i: usize| predicted[i].pixel;
-    let neighbours = ByX::new((0..predicted.len()).collect(), &pixel);
     let mut claimed = vec![false; sources.len()];
     let mut stars = Vec::with_capacity(predicted.len());
     for (index, star) in predicted.iter().enumerate() {
@@ -111,8 +108,10 @@ pub(super) fn associate(frame: &MeasuredFrame, predicted: &[PredictedStar]) -> A
             is_clear: is_alone && camera.nearly_contains(&star.pixel, -apart_px),
         });
     }
-    let unclaimed = detections.order.iter().filter(|&&i| !claimed[i]);
-    let reach_area_px: f64 = unclaimed.map(|&i| PI * reach_px(&sources[i]).powi(2)).sum();
+    let unclaimed = detections.0.iter().filter(|(_, i)| !claimed[*i]);
+    let reach_area_px: f64 = unclaimed
+        .map(|&(_, i)| PI * reach_px(&sources[i]).powi(2))
+        .sum();
     Association {
         stars,
         chance: reach_area_px / (camera.width_px * camera.height_px),
@@ -125,4 +124,123 @@ fn reach_px(detection: &Detection, identification: &Identification) -> f64 {
     let model_px = identification.rms_px / SQRT_2;
     // A standard error that is no number leaves the least reach.
     REACH_PX.max(REACH_SIGMAS * sigma_px.hypot(model_px))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::CameraModel;
+    use crate::coords::{Rotation, UnitVector};
+    use crate::detect::{DetectionFlags, Detections};
+
+    const SIDE_PX: f64 = 400.0;
+
+    fn detection(x: f64, y: f64, flags: DetectionFlags) -> Detection {
+        Detection {
+            position: PixelPoint::new(x, y),
+            sigma_x_px: 0.1,
+            sigma_y_px: 0.1,
+            flux_adu: 100.0,
+            peak_adu: 10.0,
+            snr: 10.0,
+            flags,
+        }
+    }
+
+    fn star(x: f64, y: f64, v_mag: f32) -> PredictedStar {
+        PredictedStar {
+            pixel: PixelPoint::new(x, y),
+            direction: UnitVector::from_ra_dec(0.0, 0.0),
+            v_mag,
+            catalog: (v_mag * 10.0) as usize,
+        }
+    }
+
+    /// Stars of growing magnitudes, and detections, in a frame with spots of 1 px.
+    fn associated(stars: &[PredictedStar], sources: Vec<Detection>) -> Association {
+        let centre = UnitVector::from_ra_dec(0.0, 0.0);
+        let identification = Identification {
+            camera: CameraModel::pinhole(SIDE_PX, SIDE_PX, 2000.0, false),
+            icrs_to_camera: Rotation::looking_at(&centre, 0.0),
+            attitude_sigma_rad: [0.0; 3],
+            focal_length_sigma_px: 0.0,
+            matches: Vec::new(),
+            rms_px: 0.2,
+            log10_false_alarm: -50.0,
+        };
+        let detections = Detections {
+            sources,
+            background_adu: 0.0,
+            noise_adu: 1.0,
+            spot_sigma_px: 1.0,
+        };
+        let frame = MeasuredFrame {
+            detections: &detections,
+            identification: &identification,
+            years_since_j2000: 0.0,
+            exposure_s: None,
+        };
+        associate(&frame, stars)
+    }
+
+    const PLAIN: DetectionFlags = DetectionFlags {
+        saturated: false,
+        hot_pixel: false,
+        trail: false,
+        extended: false,
+        blended: false,
+        border: false,
+    };
+
+    #[test]
+    fn each_star_claims_the_nearest_detection_within_reach() {
+        let sources = vec![
+            detection(100.5, 100.0, PLAIN),
+            detection(101.2, 100.0, PLAIN),
+            detection(201.6, 100.0, PLAIN),
+        ];
+        let found = associated(&[star(100.0, 100.0, 5.0), star(200.0, 100.0, 6.0)], sources);
+        assert_eq!(found.stars[0].detection, Some(0));
+        assert_eq!(found.stars[1].detection, None);
+        assert!(found.stars.iter().all(|star| star.is_clear));
+    }
+
+    #[test]
+    fn the_brighter_of_two_stars_has_the_first_claim_and_hides_the_other() {
+        let sources = vec![detection(100.7, 100.0, PLAIN)];
+        let stars = [star(100.0, 100.0, 5.0), star(101.0, 100.0, 7.0)];
+        let found = associated(&stars, sources);
+        assert_eq!(found.stars[0].detection, Some(0));
+        assert_eq!(found.stars[1].detection, None);
+        // A companion of two magnitudes less does not hide the brighter one.
+        assert!(found.stars[0].is_clear && !found.stars[1].is_clear);
+    }
+
+    #[test]
+    fn stars_near_the_border_are_not_clear_and_those_beyond_it_are_left_out() {
+        let stars = [
+            star(2.0, 200.0, 5.0),
+            star(-2.0, 100.0, 6.0),
+            star(200.0, 397.0, 7.0),
+        ];
+        let found = associated(&stars, Vec::new());
+        assert_eq!(found.stars.len(), 2);
+        assert!(found.stars.iter().all(|star| !star.is_clear));
+    }
+
+    #[test]
+    fn what_is_no_star_is_not_claimed_and_what_is_unclaimed_may_be_met_by_chance() {
+        let trail = DetectionFlags {
+            trail: true,
+            ..PLAIN
+        };
+        let sources = vec![
+            detection(100.0, 100.0, trail),
+            detection(300.0, 300.0, PLAIN),
+        ];
+        let found = associated(&[star(100.0, 100.0, 5.0)], sources);
+        assert_eq!(found.stars[0].detection, None);
+        let expected = PI * REACH_PX.powi(2) / SIDE_PX.powi(2);
+        assert!((found.chance / expected - 1.0).abs() < 1e-9);
+    }
 }

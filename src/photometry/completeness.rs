@@ -38,10 +38,10 @@ const SIGMA_MAX_MAG: f64 = 0.5;
 /// Width of the steps in which the curve is told, in magnitudes.
 pub const BIN_MAG: f64 = 0.5;
 const MAX_ROUNDS: usize = 60;
-/// Settled where a step is below this part of the standard errors (squared).
-const SETTLED: f64 = 1e-6;
+/// Settled where a step is below a hundredth of the standard errors (squared).
+const SETTLED: f64 = 1e-4;
 /// Stars further from the limit than so many widths are all alike.
-const FAR_WIDTHS: f64 = 6.0;
+const FAR_WIDTHS: f64 = 5.0;
 
 /// A catalogue star: was it detected?
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,8 +3,8 @@
 //! ([`MeasuredFrame`], [`Sky`]) → [`FramePhotometry`]
 //!
 //! 1. The catalogue's stars in the frame, at its date, down to well below the faintest detection; each claims its detection.
-//! 2. Bright, single, constant stars that are not saturated give the [zero point](zero_point).
-//! 3. All single stars, detected or not, give the [completeness](completeness), and that the limiting magnitude: the one at which
+//! 2. Bright, single, constant stars that are not saturated give the zero point ([`zero_point`]).
+//! 3. All single stars, detected or not, give the completeness ([`completeness`]), and that the limiting magnitude: the one at which
 //!    half of the stars are detected. The faintest star detected is none: it is the luckiest one.
 //!
 //! Caveats: a catalogue that is not complete is no harm, as its stars are what is counted, unless it lacks red stars or close pairs more
@@ -23,9 +23,9 @@ use association::{Association, FrameStar, associate};
 use completeness::{Completeness, Trial};
 use zero_point::{MeasuredStar, ZeroPoint};
 
-/// The zero point is from stars brighter than the limit by so many widths of the fall, of which 99.4 % are detected. To choose
-/// them by their measured flux instead, or of those hardly detected, would be to choose those that noise and colour make bright.
-const COMPLETE_WIDTHS: f64 = 2.5;
+/// The zero point is from stars brighter than the limit by so many widths of the fall, of which 98 % or more are
+/// detected. To choose them by their flux would be to choose those that noise and colour make bright.
+const COMPLETE_WIDTHS: f64 = 2.0;
 /// Where there is no limit, a star of such a signal-to-noise ratio is no matter of luck.
 const SURE_SNR: f64 = 10.0;
 /// How much further than the faintest star detected the catalogue's stars are looked at, in magnitudes.
@@ -153,4 +153,19 @@ fn is_constant_and_single(star: &Star) -> bool {
         StarFlags::BLENDED_POSITION,
     ];
     !unfit.into_iter().any(|flag| star.flags.contains(flag))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sky_is_as_bright_as_the_star_whose_light_one_square_arcsecond_has() {
+        // 100 ADU in 4 square arcseconds are 25 in one: 3.4949 mag brighter than 1 ADU.
+        let found = sky_mag_arcsec2(20.0, 100.0, 4.0).unwrap();
+        assert!((found - 16.505_15).abs() < 1e-4, "{found}");
+        assert_eq!(sky_mag_arcsec2(20.0, 0.0, 4.0), None);
+        assert_eq!(sky_mag_arcsec2(20.0, -1.0, 4.0), None);
+        assert_eq!(sky_mag_arcsec2(20.0, f64::NAN, 4.0), None);
+    }
 }

@@ -25,8 +25,11 @@ pub const REFERENCE_BV_MAG: f64 = 0.6;
 pub const FEWEST_STARS: usize = 5;
 /// Fewer stars make no further term.
 const FEWEST_FOR_TERMS: usize = 15;
-/// A further term is kept where chance alone makes so large a one in one frame of a thousand: standard deviations of a normal deviate.
-const WORTH_IT_SIGMAS: f64 = 3.290_5;
+/// A colour term is kept where chance alone makes so large a one in one frame of a hundred (standard deviations of a normal deviate): one
+/// too many costs little precision, and one missing makes the zero points of frames with other stars differ.
+const COLOR_SIGMAS: f64 = 2.575_8;
+/// A slope is kept in one frame of a thousand: it says that something is wrong.
+const SLOPE_SIGMAS: f64 = 3.290_5;
 /// A colour term is looked for where this part of the stars, or more, have a colour.
 const COLORED_SHARE: f64 = 0.5;
 /// Distance in standard deviations from which on a star does not count: 95 % efficient where there are no outliers.
@@ -35,6 +38,9 @@ const BIWEIGHT_SIGMAS: f64 = 4.685;
 const LEAST_SCATTER_MAG: f64 = 0.003;
 /// From the median of absolute deviations to the standard deviation of a normal distribution.
 const SIGMA_PER_MAD: f64 = 1.482_6;
+/// The scatter of few stars is known roughly, and the standard errors are raised by this over the degrees of freedom less 2: so
+/// they are right for drawn stars, from 8 to 200; for 6 they are a fifth too small.
+const FEW_STARS: f64 = 1.5;
 /// No star takes more of its own residual than all but this.
 const LEAST_FREEDOM: f64 = 0.1;
 const MAX_ROUNDS: usize = 30;
@@ -178,7 +184,11 @@ impl Relation {
     fn needs_last_term(&self) -> bool {
         let last = self.estimate(self.terms.len());
         let degrees_of_freedom = self.stars as f64 - self.coefficients.len() as f64;
-        last.value.abs() > student_quantile(WORTH_IT_SIGMAS, degrees_of_freedom) * last.sigma
+        let sigmas = match self.terms.last() {
+            Some(Term::Slope) => SLOPE_SIGMAS,
+            _ => COLOR_SIGMAS,
+        };
+        last.value.abs() > student_quantile(sigmas, degrees_of_freedom) * last.sigma
     }
 
     /// Instrumental magnitudes to one of V; the slope is the last term.
@@ -265,7 +275,9 @@ impl Weighing {
         let leverages = columns * &bread;
         let own = |row: usize| self.weights[row] * leverages.row(row).dot(&columns.row(row));
         let pulls = scaled(&|row| self.pulls[row] / (1.0 - own(row)).max(LEAST_FREEDOM));
-        Some(&bread * (pulls.transpose() * &pulls) * &bread)
+        let free = (columns.nrows() - columns.ncols()) as f64;
+        let rough_scale = 1.0 + FEW_STARS / (free - 2.0).max(1.0);
+        Some(&bread * (pulls.transpose() * &pulls) * &bread * rough_scale.powi(2))
     }
 }
 
@@ -361,10 +373,8 @@ mod tests {
                 .collect();
             let (mean, spread) = mean_and_spread(&pulls);
             println!("{count} stars: pulls {mean:+.3} ± {spread:.3}");
-            // Student's distribution is wider, with few stars.
-            let expected = 1.0 + 1.5 / (count as f64 - 3.0);
             assert!(
-                mean.abs() < 0.12 && (spread / expected - 1.0).abs() < 0.12,
+                mean.abs() < 0.12 && (spread - 1.0).abs() < 0.12,
                 "{mean} {spread}"
             );
         }
@@ -398,7 +408,9 @@ mod tests {
                 .count();
             let sloping = found.iter().filter(|zero| zero.is_nonlinear).count();
             println!("{count} stars: {colored} color terms, {sloping} slopes in {FRAMES} frames");
-            assert!(colored.max(sloping) as f64 <= 0.006 * FRAMES as f64);
+            // The median absolute deviation of few stars is a rough scale, which raises the rates.
+            assert!(colored as f64 <= 0.025 * FRAMES as f64, "{colored}");
+            assert!(sloping as f64 <= 0.006 * FRAMES as f64, "{sloping}");
         }
     }
 
@@ -465,9 +477,15 @@ mod tests {
 
     #[test]
     fn quantiles_of_student_are_those_of_the_tables() {
-        // Two-sided 0.1 %.
-        for (degrees_of_freedom, expected) in [(10.0, 4.587), (20.0, 3.850), (60.0, 3.460)] {
-            let found = student_quantile(WORTH_IT_SIGMAS, degrees_of_freedom);
+        // Two-sided 0.1 %, and 1 %.
+        for (degrees_of_freedom, sigmas, expected) in [
+            (10.0, SLOPE_SIGMAS, 4.587),
+            (20.0, SLOPE_SIGMAS, 3.850),
+            (60.0, SLOPE_SIGMAS, 3.460),
+            (10.0, COLOR_SIGMAS, 3.169),
+            (30.0, COLOR_SIGMAS, 2.750),
+        ] {
+            let found = student_quantile(sigmas, degrees_of_freedom);
             assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
         }
     }

@@ -43,7 +43,7 @@ pub struct FrameReport {
     pub observation: Option<ObservationReport>,
     /// How long it was exposed, in seconds, where that is known.
     pub exposure_s: Option<f64>,
-    /// What is said of the frame, by its header or beforehand, and turned out wrong, or cannot be true: a sentence each.
+    /// What is wrong or cannot be true in the file's header or in what was given, and what is odd about the frame: a sentence each.
     pub notes: Vec<String>,
     /// Whether the stars are identified.
     pub status: Status,
