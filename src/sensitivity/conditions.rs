@@ -214,16 +214,32 @@ impl Scenario {
                 });
             }
         }
-        match self.sensor.contradiction() {
+        match self
+            .sensor
+            .contradiction()
+            .or_else(|| self.beyond_the_papers_table())
+        {
             Some(what) => Err(ScenarioError::Contradiction(what)),
             None => Ok(()),
         }
+    }
+
+    /// The paper's reading reckons with the wavelengths of its table 1, whatever the camera's band.
+    fn beyond_the_papers_table(&self) -> Option<String> {
+        let uncovered = match self.reading {
+            Reading::Paper => self
+                .sensor
+                .uncovered(light::PAPER_BAND_NM.0, light::PAPER_BAND_NM.1),
+            Reading::Physical => None,
+        };
+        uncovered.map(|uncovered| format!("{uncovered} of the paper's reading"))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sensor::Response;
 
     #[test]
     fn a_hundredth_of_a_lux_is_a_sky_of_18_8() {
@@ -234,6 +250,21 @@ mod tests {
         assert!((back.illuminance_lx() - 0.01).abs() < 1e-12);
         let same = SkyBrightness::LuminanceCdM2(back.luminance_cd_m2());
         assert!((same.mag_arcsec2() - sky.mag_arcsec2()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_papers_reading_wants_curves_over_its_own_band() {
+        let mut scenario = Scenario::of(Preset::Experiment1);
+        scenario.sensor.quantum_efficiency = Response::Table(vec![(400.0, 0.5), (800.0, 0.5)]);
+        scenario.sensor.band_from_nm = 450.0;
+        let error = scenario.check().unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "quantum_efficiency is known from 400 to 800 nm, which does not cover the band from 360 to 780 nm of the \
+             paper's reading"
+        );
+        scenario.reading = Reading::Physical;
+        assert_eq!(scenario.check(), Ok(()));
     }
 
     #[test]
