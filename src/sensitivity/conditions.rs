@@ -162,6 +162,21 @@ pub enum ScenarioError {
     /// Values that contradict each other.
     #[error("{0}")]
     Contradiction(String),
+    /// Values of which no number follows.
+    #[error(
+        "there is no limiting magnitude: with {star_photons_s_m2:e} photons of a star of V = 0 below the air per second and \
+         m², {background_e:e} electrons of the sky and a noise of {noise_e:e} electrons it would be {limit_vmag}"
+    )]
+    NoLimit {
+        /// The limit that would be.
+        limit_vmag: f64,
+        /// Photons of a star of V = 0 below the air.
+        star_photons_s_m2: f64,
+        /// Electrons of the sky in a pixel.
+        background_e: f64,
+        /// Noise of the brightest pixel, in electrons.
+        noise_e: f64,
+    },
 }
 
 impl Scenario {
@@ -174,7 +189,8 @@ impl Scenario {
         }
     }
 
-    /// The scenario of a preset: the paper's experiments as the paper has them, other cameras under the default conditions.
+    /// The scenario of a preset: the paper's experiments as the paper has them, other cameras under the default conditions but
+    /// for the exposure.
     pub fn of(preset: Preset) -> Self {
         let paper = |exposure_s, zenith_distance_deg| Self {
             sensor: preset.sensor(),
@@ -186,9 +202,17 @@ impl Scenario {
             },
             reading: Reading::Paper,
         };
+        let other = |exposure_s| {
+            let mut scenario = Self::new(preset.sensor());
+            scenario.conditions.exposure_s = exposure_s;
+            scenario
+        };
         match preset {
             Preset::Experiment1 => paper(0.04, 0.0),
             Preset::Experiment2 => paper(0.1, 45.0),
+            Preset::NanosatTracker => other(0.1),
+            Preset::Imx174 => other(0.2),
+            Preset::Asi183 => other(0.5),
         }
     }
 

@@ -6,6 +6,9 @@
 //! 2. The star's electrons on its brightest pixel, and those of the sky, for a star of magnitude 0.
 //! 3. The noise, and the signal that stands above it by the wanted ratio: the limiting magnitude of the peak-pixel rule.
 //!
+//! [`Prediction`] is what is told of a scenario, [`Sweep`] and [`curves`] follow its limit over one parameter, and [`Figure`]
+//! has those of the paper.
+//!
 //! There are two readings. [`Reading::Paper`] is the paper's equations (1) to (12) as its authors used them.
 //! [`Reading::Physical`] is the same budget with the physics put right.
 //!
@@ -14,10 +17,16 @@
 
 mod budget;
 mod conditions;
+mod figures;
 mod light;
 mod parameters;
+mod prediction;
+mod sweep;
 
 pub use budget::{Band, Budget};
 pub use conditions::{Conditions, Extinction, Reading, Scenario, ScenarioError, SkyBrightness};
+pub use figures::Figure;
 pub use light::{ILLUMINANCE_OF_MAG_0_LX, LUMINANCE_OF_MAG_0_CD_M2};
 pub use parameters::{CONDITION_KEYS, Parameter, UnknownParameter};
+pub use prediction::Prediction;
+pub use sweep::{Curve, Series, Spacing, Sweep, SweepError, curves};
