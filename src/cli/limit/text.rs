@@ -1,0 +1,300 @@
+//! Predictions for people: the budget, quantity by quantity with the paper's symbols, or a sweep as a table.
+
+use super::Row;
+use starpipe::report::printable;
+use starpipe::sensitivity::{Parameter, Prediction, Reading};
+use std::fmt::Write as _;
+
+/// A quantity: symbol, words, value, unit.
+type Line<'a> = (&'a str, &'a str, f64, &'a str);
+
+pub(super) fn rendered(rows: &[Row]) -> String {
+    let Some(first) = rows.first() else {
+        return String::new();
+    };
+    match first.swept {
+        None => budget(first),
+        Some(_) => heading(first) + &sweeps(rows),
+    }
+}
+
+fn heading(row: &Row) -> String {
+    let reading = match row.prediction.reading {
+        Reading::Paper => "the paper's reading",
+        Reading::Physical => "physical reading",
+    };
+    let preset = row.preset.map_or(String::new(), |name| format!("{name}: "));
+    printable(&format!("{preset}{}, {reading}", row.prediction.camera)) + "\n"
+}
+
+fn budget(row: &Row) -> String {
+    let prediction = &row.prediction;
+    let mut text = heading(row);
+    let _ = writeln!(
+        text,
+        "  limit  V {:.2}: its brightest pixel has {} times the noise",
+        prediction.limit_vmag,
+        number(prediction.snr),
+    );
+    let (given, reckoned) = (given(prediction), reckoned(prediction));
+    for (title, lines) in given.into_iter().chain(reckoned) {
+        let _ = writeln!(text, "\n  {title}");
+        for (symbol, words, value, unit) in lines {
+            let line = format!("    {symbol:<5} {words:<55} {:>13} {unit}", number(value));
+            let _ = writeln!(text, "{}", line.trim_end());
+        }
+    }
+    text
+}
+
+/// What is given.
+fn given(prediction: &Prediction) -> [(&'static str, Vec<Line<'static>>); 3] {
+    let given = |name: &str| {
+        let found = prediction
+            .parameters
+            .iter()
+            .find(|(known, _)| *known == name);
+        found.map_or(f64::NAN, |(_, value)| *value)
+    };
+    let line = |symbol, words, name, unit| (symbol, words, given(name), unit);
+    [
+        (
+            "camera",
+            vec![
+                line("D", "aperture", "aperture_mm", "mm"),
+                line("f", "focal length", "focal_length_mm", "mm"),
+                line(
+                    "K",
+                    "transmission of the lens, at most",
+                    "lens_transmission",
+                    "",
+                ),
+                line("Q", "quantum efficiency, at most", "quantum_efficiency", ""),
+                line("", "pixel area", "pixel_area_um2", "µm²"),
+                line("", "spot, standard deviation", "spot_sigma_px", "px"),
+                line("n_D²", "dark current", "dark_current_e_s", "e/s"),
+            ],
+        ),
+        (
+            "conditions",
+            vec![
+                line("T", "exposure", "exposure_s", "s"),
+                line("Z", "zenith distance", "zenith_distance_deg", "°"),
+                line(
+                    "τ",
+                    "transmission of one airmass at 555 nm",
+                    "zenith_transmission",
+                    "",
+                ),
+                line("E_B", "illuminance by the sky", "sky_illuminance_lx", "lx"),
+                line("", "the same as luminance", "sky_luminance_cd_m2", "cd/m²"),
+                line(
+                    "",
+                    "the same in V magnitudes",
+                    "sky_mag_arcsec2",
+                    "mag/arcsec²",
+                ),
+                line("R_SN", "signal over noise that is wanted", "snr", ""),
+            ],
+        ),
+        (
+            "not in the paper",
+            vec![
+                line(
+                    "",
+                    "colour temperature of the star",
+                    "star_temperature_k",
+                    "K",
+                ),
+                line("", "electrons in a grey level", "gain_e_per_adu", "e/ADU"),
+            ],
+        ),
+    ]
+}
+
+/// What follows.
+fn reckoned(prediction: &Prediction) -> [(&'static str, Vec<Line<'static>>); 4] {
+    let budget = &prediction.budget;
+    [
+        (
+            "on the way",
+            vec![
+                ("X", "airmass", budget.airmass, ""),
+                (
+                    "",
+                    "part of a star's electrons that the air leaves",
+                    budget.atmosphere_transmission,
+                    "",
+                ),
+                (
+                    "A",
+                    "area of the entrance pupil",
+                    budget.aperture_area_m2,
+                    "m²",
+                ),
+                (
+                    "A_P",
+                    "solid angle of a pixel",
+                    budget.pixel_solid_angle_sr,
+                    "sr",
+                ),
+                (
+                    "",
+                    "the same in square arcseconds",
+                    budget.pixel_area_arcsec2,
+                    "arcsec²",
+                ),
+                (
+                    "μ",
+                    "part of a star's light on its brightest pixel",
+                    budget.peak_share,
+                    "",
+                ),
+                (
+                    "Φ₀",
+                    "photons of V = 0 above the air",
+                    budget.mag_0_photons_s_m2,
+                    "/ s m²",
+                ),
+                (
+                    "",
+                    "electrons of V = 0 on all its pixels",
+                    budget.mag_0_e_s,
+                    "e/s",
+                ),
+                ("M_B", "magnitude as bright as the sky", budget.sky_mag, ""),
+            ],
+        ),
+        (
+            "noise of the brightest pixel",
+            vec![
+                ("B", "electrons of the sky", budget.background_e, "e"),
+                ("n_B", "their shot noise", budget.sky_noise_e, "e"),
+                ("", "electrons of the dark current", budget.dark_e, "e"),
+                ("", "noise of reading", budget.read_noise_e, "e"),
+                (
+                    "",
+                    "noise of rounding to grey levels",
+                    budget.quantisation_noise_e,
+                    "e",
+                ),
+                (
+                    "N_C",
+                    "noise of the sensor: dark current, reading, rounding",
+                    budget.sensor_noise_e,
+                    "e",
+                ),
+                (
+                    "",
+                    "noise of sky and sensor",
+                    budget.background_noise_e,
+                    "e",
+                ),
+                ("n_S", "shot noise of the star", budget.star_noise_e, "e"),
+                ("N", "all noise", budget.noise_e, "e"),
+            ],
+        ),
+        (
+            "the faintest star",
+            vec![
+                (
+                    "S",
+                    "its electrons on its brightest pixel",
+                    budget.star_e,
+                    "e",
+                ),
+                ("M_V", "its magnitude", budget.limit_vmag, ""),
+                (
+                    "E",
+                    "its illuminance above the air",
+                    budget.star_illuminance_lx,
+                    "lx",
+                ),
+                (
+                    "E'",
+                    "its illuminance below the air",
+                    budget.star_illuminance_ground_lx,
+                    "lx",
+                ),
+                (
+                    "φ_S",
+                    "its photons below the air",
+                    budget.star_photons_s_m2,
+                    "/ s m²",
+                ),
+            ],
+        ),
+        (
+            "spectrum",
+            vec![("", "parts of the spectrum", budget.bands.len() as f64, "")],
+        ),
+    ]
+}
+
+/// One table for each parameter that is swept.
+fn sweeps(rows: &[Row]) -> String {
+    let mut text = String::new();
+    for rows in rows.chunk_by(|a, b| parameter(a) == parameter(b)) {
+        let name = parameter(&rows[0]);
+        let _ = writeln!(
+            text,
+            "\n  {name:>26}  {:>7}  {:>10}  {:>12}  {:>10}  {:>8}",
+            "limit", "star e", "background e", "noise e", "airmass"
+        );
+        for row in rows {
+            let prediction = &row.prediction;
+            let _ = writeln!(
+                text,
+                "  {:>26}  {:>7.3}  {:>10}  {:>12}  {:>10}  {:>8}",
+                number(row.swept.map_or(f64::NAN, |swept| swept.value)),
+                prediction.limit_vmag,
+                number(prediction.star_e),
+                number(prediction.background_e),
+                number(prediction.noise_e),
+                number(prediction.airmass),
+            );
+        }
+    }
+    text
+}
+
+fn parameter(row: &Row) -> &'static str {
+    row.swept.map_or("", |swept| swept.parameter)
+}
+
+/// A number of any size to five digits.
+fn number(value: f64) -> String {
+    let size = value.abs();
+    if value != 0.0 && !(1e-3..1e6).contains(&size) {
+        return format!("{value:.4e}");
+    }
+    let decimals = (4.0 - size.max(1e-3).log10().floor()).max(0.0) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_has_five_digits() {
+        for (value, expected) in [
+            (0.0, "0"),
+            (0.1, "0.1"),
+            (8.150_432, "8.1504"),
+            (336.810_9, "336.81"),
+            (21_000.0, "21000"),
+            (999_999.9, "1000000"),
+            (2.788_281e-9, "2.7883e-9"),
+            (5e10, "5.0000e10"),
+            (-12.345_678, "-12.346"),
+        ] {
+            assert_eq!(number(value), expected);
+        }
+    }
+}
