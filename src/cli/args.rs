@@ -4,7 +4,7 @@ use super::limit::ParameterArgs;
 use super::plot::PlotFile;
 use super::values;
 use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use starpipe::epoch::ObservationDate;
 use starpipe::sensor::Preset;
 use std::num::NonZeroUsize;
@@ -190,7 +190,7 @@ pub(crate) enum Format {
     Text,
     /// One JSON object a line
     Json,
-    /// A table of all stars
+    /// A table
     Csv,
 }
 
@@ -271,12 +271,12 @@ pub(crate) struct RobustnessArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(group = ArgGroup::new("scenario").args(["camera", "preset", "figures"]).required(true).multiple(true))]
 pub(crate) struct LimitArgs {
     /// Camera to predict the limit of, as `starpipe camera new` writes one
-    #[arg(long, value_name = "camera.toml", conflicts_with = "preset",
-          required_unless_present_any = ["preset", "figures"])]
+    #[arg(long, value_name = "camera.toml", conflicts_with = "preset")]
     pub(crate) camera: Option<PathBuf>,
-    /// A camera, and conditions, that are built in
+    /// A camera that is built in, and its conditions
     #[arg(long, value_name = "NAME", value_parser = preset())]
     pub(crate) preset: Option<Preset>,
     /// Which equations [default: as the paper has them for its experiments, else physical]

@@ -1,8 +1,10 @@
 //! The limiting magnitude over one parameter or several: a panel for each.
 
+use super::text::number;
 use crate::cli::plot::{Area, BLUE, FONT, Figure, ORANGE, said};
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 use starpipe::sensitivity::{Budget, Curve, Scenario, Spacing, Sweep};
 use std::ops::Range;
 
@@ -14,6 +16,10 @@ const FIGURES_ABREAST: usize = 3;
 const MARGIN_PX: u32 = 10;
 const LETTERS_PX: u32 = 15;
 const TITLE_PX: u32 = 18;
+/// Above a panel: its title and what its curves are.
+const HEAD_PX: u32 = 48;
+/// Below the axis of x, and left of that of y.
+const AXIS_PX: (u32, u32) = (44, 56);
 const COLOURS: [RGBColor; 2] = [BLUE, ORANGE];
 /// Magnitudes above and below the curves.
 const ROOM_MAG: f64 = 0.04;
@@ -58,6 +64,8 @@ impl Panel {
     }
 
     fn draw<B: DrawingBackend>(&self, area: &Area<B>) -> anyhow::Result<()> {
+        let (head, body) = area.split_vertically(HEAD_PX);
+        self.draw_head(&head)?;
         let within = |of: fn((f64, f64)) -> f64| -> Range<f64> {
             let values = || self.points().map(of);
             values().fold(f64::INFINITY, f64::min)..values().fold(f64::NEG_INFINITY, f64::max)
@@ -67,9 +75,28 @@ impl Panel {
         let room = ((y.end - y.start) * ROOM_MAG).max(0.01);
         let y = y.start - room..y.end + room;
         match self.spacing {
-            Spacing::Linear => self.draw_over(area, x, y),
-            Spacing::Log => self.draw_over(area, x.log_scale(), y),
+            Spacing::Linear => self.draw_over(&body, x, y),
+            Spacing::Log => self.draw_over(&body, x.log_scale(), y),
         }
+    }
+
+    /// The title, and below it what the curves are: above the panel they hide nothing.
+    fn draw_head<B: DrawingBackend>(&self, area: &Area<B>) -> anyhow::Result<()> {
+        let width = area.dim_in_pixel().0 as i32;
+        let left = (MARGIN_PX + AXIS_PX.1) as i32;
+        if let Some(title) = &self.title {
+            let place = ((width + left) / 2, HEAD_PX as i32 / 4);
+            draw_words(area, title, (TITLE_PX, HPos::Center), place)?;
+        }
+        let step = (width - left) / self.curves.len().max(1) as i32;
+        let y = HEAD_PX as i32 * 3 / 4;
+        for (place, (curve, colour)) in self.curves.iter().zip(COLOURS).enumerate() {
+            let x = left + place as i32 * step;
+            let stroke = PathElement::new([(x, y), (x + 20, y)], colour.stroke_width(2));
+            area.draw(&stroke).map_err(said)?;
+            draw_words(area, &curve.label, (LETTERS_PX, HPos::Left), (x + 28, y))?;
+        }
+        Ok(())
     }
 
     fn draw_over<B: DrawingBackend, X>(
@@ -85,16 +112,17 @@ impl Panel {
         let mut builder = ChartBuilder::on(area);
         builder
             .margin(MARGIN_PX)
-            .x_label_area_size(44)
-            .y_label_area_size(56);
-        if let Some(title) = &self.title {
-            builder.caption(title, (FONT, TITLE_PX));
-        }
+            .margin_top(2)
+            // The last number of the axis is as wide.
+            .margin_right(2 * MARGIN_PX)
+            .x_label_area_size(AXIS_PX.0)
+            .y_label_area_size(AXIS_PX.1);
         let mut chart = builder.build_cartesian_2d(x, y).map_err(said)?;
         chart
             .configure_mesh()
             .x_desc(&self.axis)
             .y_desc("limiting magnitude (V)")
+            .x_label_formatter(&|value| number(*value))
             .x_labels(8)
             .y_labels(8)
             .label_style((FONT, LETTERS_PX))
@@ -102,36 +130,28 @@ impl Panel {
             .draw()
             .map_err(said)?;
         for (curve, colour) in self.curves.iter().zip(COLOURS) {
-            let style = colour.stroke_width(2);
+            let points = curve.points.iter().copied();
             chart
-                .draw_series(LineSeries::new(curve.points.iter().copied(), style))
-                .map_err(said)?
-                .label(&curve.label)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], style));
+                .draw_series(LineSeries::new(points, colour.stroke_width(2)))
+                .map_err(said)?;
         }
         let here = self.here.map(|point| Circle::new(point, 4, BLACK.filled()));
         chart.draw_series(here).map_err(said)?;
-        chart
-            .configure_series_labels()
-            .position(self.free_corner())
-            .background_style(WHITE.mix(0.8))
-            .label_font((FONT, LETTERS_PX))
-            .draw()
-            .map_err(said)
+        Ok(())
     }
+}
 
-    /// Below a curve that rises there is room on the right, below one that falls on the left.
-    fn free_corner(&self) -> SeriesLabelPosition {
-        let rises = self.curves.iter().all(|curve| match &curve.points[..] {
-            [(_, first), .., (_, last)] => last >= first,
-            _ => true,
-        });
-        if rises {
-            SeriesLabelPosition::LowerRight
-        } else {
-            SeriesLabelPosition::LowerLeft
-        }
-    }
+fn draw_words<B: DrawingBackend>(
+    area: &Area<B>,
+    words: &str,
+    (size_px, side): (u32, HPos),
+    place: (i32, i32),
+) -> anyhow::Result<()> {
+    let style = (FONT, size_px)
+        .into_text_style(area)
+        .color(&BLACK)
+        .pos(Pos::new(side, VPos::Center));
+    area.draw_text(words, &style, place).map_err(said)
 }
 
 /// Panels side by side.
@@ -139,7 +159,7 @@ pub(super) struct Sheet {
     panels: Vec<Panel>,
     abreast: usize,
     panel_px: (u32, u32),
-    /// Words in the place after the last panel.
+    /// Lines in the place after the last panel.
     words: Vec<String>,
 }
 
@@ -168,12 +188,12 @@ impl Sheet {
     }
 
     /// The paper's figures, all of them.
-    pub(super) fn of_figures(panels: Vec<Panel>) -> Self {
+    pub(super) fn of_figures(panels: Vec<Panel>, words: Vec<String>) -> Self {
         Self {
             panels,
             abreast: FIGURES_ABREAST,
             panel_px: PANEL_PX,
-            words: Vec::new(),
+            words,
         }
     }
 
@@ -192,6 +212,14 @@ impl Figure for Sheet {
         let places = area.split_evenly((self.lines(), self.abreast));
         for (place, panel) in places.iter().zip(&self.panels) {
             panel.draw(place)?;
+        }
+        let Some(rest) = places.get(self.panels.len()) else {
+            return Ok(());
+        };
+        for (line, words) in self.words.iter().enumerate() {
+            let y = HEAD_PX as i32 + line as i32 * (LETTERS_PX as i32 + 8);
+            let x = AXIS_PX.1 as i32;
+            draw_words(rest, words, (LETTERS_PX, HPos::Left), (x, y))?;
         }
         Ok(())
     }

@@ -86,8 +86,13 @@ struct Swept {
 
 fn rows(arguments: &LimitArgs, scenario: &Scenario) -> Result<Vec<Row>, Fault> {
     let preset = arguments.preset.map(Preset::name);
-    let row = |scenario: &Scenario, swept| {
-        let prediction = Prediction::new(scenario).map_err(|error| usage(&error))?;
+    let row = |scenario: &Scenario, swept: Option<Swept>| {
+        let prediction = Prediction::new(scenario).map_err(|error| match swept {
+            Some(Swept { parameter, value }) => {
+                Fault::Usage(format!("{parameter} of {value}: {error}"))
+            }
+            None => usage(&error),
+        })?;
         Ok::<_, Fault>(Row {
             prediction,
             preset,
@@ -151,7 +156,8 @@ fn papers_figures(directory: &Path, scenario: &Scenario) -> Result<Exit, Fault> 
     for (figure, panel) in Figure::ALL.iter().zip(&panels) {
         files.push(file(&figure.file_stem(), &Sheet::of_one(panel.clone()))?);
     }
-    files.push(file("figures", &Sheet::of_figures(panels))?);
+    let sheet = Sheet::of_figures(panels, text::caption(scenario));
+    files.push(file("figures", &sheet)?);
     write_whole(&files)?;
     let paths = files
         .iter()

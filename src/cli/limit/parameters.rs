@@ -1,7 +1,8 @@
 //! An option for every parameter of a scenario, made from the table of parameters.
 
+use super::text::number;
 use clap::{Arg, ArgMatches, Command, Error, FromArgMatches};
-use starpipe::sensitivity::{Parameter, Scenario};
+use starpipe::sensitivity::{Conditions, Parameter, Scenario};
 use starpipe::sensor::{Response, ResponseError};
 use std::path::PathBuf;
 
@@ -91,6 +92,13 @@ fn option(parameter: Parameter) -> Arg {
     let others = others.flat_map(|same| same.iter().filter(|other| **other != name));
     let mut about = parameter.about().to_owned();
     about[..1].make_ascii_uppercase();
+    let default = match parameter {
+        Parameter::Sensor(_) => None,
+        Parameter::Conditions(key) => (key.get)(&Conditions::default()),
+    };
+    let default = default.map_or_else(String::new, |value| {
+        format!(" [default with --camera: {}]", number(value))
+    });
     Arg::new(name)
         .long(name.replace('_', "-"))
         .value_name(if is_curve(name) {
@@ -98,7 +106,7 @@ fn option(parameter: Parameter) -> Arg {
         } else {
             "NUMBER"
         })
-        .help(format!("{about}: {}", parameter.limits()))
+        .help(format!("{about}: {}{default}", parameter.limits()))
         .help_heading(match parameter {
             Parameter::Sensor(_) => "Camera",
             Parameter::Conditions(_) => "Conditions",

@@ -2,7 +2,7 @@
 
 use super::Row;
 use starpipe::report::printable;
-use starpipe::sensitivity::{Parameter, Prediction, Reading};
+use starpipe::sensitivity::{Budget, Prediction, Reading, Scenario};
 use std::fmt::Write as _;
 
 /// A quantity: symbol, words, value, unit.
@@ -19,12 +19,31 @@ pub(super) fn rendered(rows: &[Row]) -> String {
 }
 
 fn heading(row: &Row) -> String {
-    let reading = match row.prediction.reading {
-        Reading::Paper => "the paper's reading",
-        Reading::Physical => "physical reading",
-    };
+    let reading = words_of(row.prediction.reading);
     let preset = row.preset.map_or(String::new(), |name| format!("{name}: "));
     printable(&format!("{preset}{}, {reading}", row.prediction.camera)) + "\n"
+}
+
+fn words_of(reading: Reading) -> &'static str {
+    match reading {
+        Reading::Paper => "the paper's reading",
+        Reading::Physical => "physical reading",
+    }
+}
+
+/// What the figures are of, in lines.
+pub(super) fn caption(scenario: &Scenario) -> Vec<String> {
+    let limit_vmag = Budget::new(scenario).limit_vmag;
+    vec![
+        scenario.sensor.name.clone(),
+        words_of(scenario.reading).to_owned(),
+        format!(
+            "dot: exposure {} s, aperture {} mm,",
+            number(scenario.conditions.exposure_s),
+            number(scenario.sensor.aperture_mm),
+        ),
+        format!("limit V {limit_vmag:.2}"),
+    ]
 }
 
 fn budget(row: &Row) -> String {
@@ -48,7 +67,7 @@ fn budget(row: &Row) -> String {
 }
 
 /// What is given.
-fn given(prediction: &Prediction) -> [(&'static str, Vec<Line<'static>>); 3] {
+fn given(prediction: &Prediction) -> [(&'static str, Vec<Line<'static>>); 2] {
     let given = |name: &str| {
         let found = prediction
             .parameters
@@ -72,7 +91,7 @@ fn given(prediction: &Prediction) -> [(&'static str, Vec<Line<'static>>); 3] {
                 line("Q", "quantum efficiency, at most", "quantum_efficiency", ""),
                 line("", "pixel area", "pixel_area_um2", "µm²"),
                 line("", "spot, standard deviation", "spot_sigma_px", "px"),
-                line("n_D²", "dark current", "dark_current_e_s", "e/s"),
+                line("", "dark current", "dark_current_e_s", "e/s"),
             ],
         ),
         (
@@ -97,23 +116,11 @@ fn given(prediction: &Prediction) -> [(&'static str, Vec<Line<'static>>); 3] {
                 line("R_SN", "signal over noise that is wanted", "snr", ""),
             ],
         ),
-        (
-            "not in the paper",
-            vec![
-                line(
-                    "",
-                    "colour temperature of the star",
-                    "star_temperature_k",
-                    "K",
-                ),
-                line("", "electrons in a grey level", "gain_e_per_adu", "e/ADU"),
-            ],
-        ),
     ]
 }
 
 /// What follows.
-fn reckoned(prediction: &Prediction) -> [(&'static str, Vec<Line<'static>>); 4] {
+fn reckoned(prediction: &Prediction) -> [(&'static str, Vec<Line<'static>>); 3] {
     let budget = &prediction.budget;
     [
         (
@@ -224,10 +231,6 @@ fn reckoned(prediction: &Prediction) -> [(&'static str, Vec<Line<'static>>); 4] 
                 ),
             ],
         ),
-        (
-            "spectrum",
-            vec![("", "parts of the spectrum", budget.bands.len() as f64, "")],
-        ),
     ]
 }
 
@@ -263,15 +266,23 @@ fn parameter(row: &Row) -> &'static str {
 }
 
 /// A number of any size to five digits.
-fn number(value: f64) -> String {
+pub(super) fn number(value: f64) -> String {
     let size = value.abs();
     if value != 0.0 && !(1e-3..1e6).contains(&size) {
-        return format!("{value:.4e}");
+        let text = format!("{value:.4e}");
+        return match text.split_once('e') {
+            Some((digits, exponent)) => format!("{}e{exponent}", trimmed(digits)),
+            None => text,
+        };
     }
     let decimals = (4.0 - size.max(1e-3).log10().floor()).max(0.0) as usize;
-    let text = format!("{value:.decimals$}");
+    trimmed(&format!("{value:.decimals$}")).to_owned()
+}
+
+/// A decimal fraction without zeros at its end.
+fn trimmed(text: &str) -> &str {
     if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        text.trim_end_matches('0').trim_end_matches('.')
     } else {
         text
     }
@@ -291,7 +302,7 @@ mod tests {
             (21_000.0, "21000"),
             (999_999.9, "1000000"),
             (2.788_281e-9, "2.7883e-9"),
-            (5e10, "5.0000e10"),
+            (5e10, "5e10"),
             (-12.345_678, "-12.346"),
         ] {
             assert_eq!(number(value), expected);
