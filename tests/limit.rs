@@ -47,6 +47,67 @@ fn the_papers_experiments_have_the_papers_limits() {
     assert!((second - 9.01).abs() < 0.03, "{second}");
 }
 
+#[test]
+fn the_readings_differ_by_what_the_documentation_says() {
+    let at = |preset: &str, options: &[&str]| {
+        number(
+            &predicted(&[&["--preset", preset], options].concat()),
+            "/limit_vmag",
+        )
+    };
+    // The zenith distances at which Kasten & Young's airmass is 1 and √2.
+    for (preset, zenith_distance_deg, air, expected) in [
+        (
+            "experiment-1",
+            "1.392",
+            0.725_426_27,
+            [8.150, 8.158, 8.156, 7.765, 7.765, 7.765],
+        ),
+        (
+            "experiment-2",
+            "45.066",
+            0.635_285_47,
+            [8.989, 9.004, 9.000, 8.613, 8.614, 8.613],
+        ),
+    ] {
+        let hemisphere = 0.01 / std::f64::consts::PI;
+        let (lower, brighter) = (hemisphere.to_string(), (hemisphere / air).to_string());
+        let exact = ["--reading", "physical", "--gain-e-per-adu", "1e-9"];
+        let found = [
+            at(preset, &[]),
+            at(preset, &["--sky-illuminance-lx", &lower]),
+            at(preset, &["--sky-illuminance-lx", &brighter]),
+            at(
+                preset,
+                &[&exact[..], &["--zenith-distance-deg", zenith_distance_deg]].concat(),
+            ),
+            at(preset, &exact),
+            at(preset, &["--reading", "physical"]),
+        ];
+        for (found, expected) in found.iter().zip(expected) {
+            assert!(
+                (found - expected).abs() < 6e-4,
+                "{preset}: {found} for {expected}"
+            );
+        }
+    }
+    for (temperature_k, expected) in [("3500", 8.08), ("10000", 7.71)] {
+        let options = [
+            "--reading",
+            "physical",
+            "--star-temperature-k",
+            temperature_k,
+        ];
+        assert!((at("experiment-1", &options) - expected).abs() < 0.006);
+    }
+    // The noise that would meet the paper's limits in the physical reading.
+    let options = ["--reading", "physical", "--read-noise-e", "35.7"];
+    for (preset, expected) in [("experiment-1", 8.15), ("experiment-2", 8.99)] {
+        let found = at(preset, &options);
+        assert!((found - expected).abs() < 0.005, "{preset}: {found}");
+    }
+}
+
 /// Every number to six digits: machines differ in the last ones.
 fn rounded(value: &mut Value) {
     match value {
@@ -101,6 +162,15 @@ fn the_same_is_printed_every_time() {
     }
 }
 
+/// What docs/sensitivity.md says of the presets.
+const LIMITS: [(&str, f64); 5] = [
+    ("experiment-1", 8.15),
+    ("experiment-2", 8.99),
+    ("nanosat-tracker", 6.20),
+    ("imx174-35mm", 9.52),
+    ("asi183mm-135mm", 12.34),
+];
+
 #[test]
 fn every_preset_is_predicted_and_its_description_says_the_same() {
     let directory = tempfile::tempdir().unwrap();
@@ -122,6 +192,9 @@ fn every_preset_is_predicted_and_its_description_says_the_same() {
         ];
         let sky = ["--sky-mag-arcsec2", "20"];
         let of = |camera: &[&str]| predicted(&[camera, &at, &sky].concat());
+        let (_, expected) = LIMITS.iter().find(|(known, _)| *known == name).unwrap();
+        let as_it_is = number(&predicted(&["--preset", name]), "/limit_vmag");
+        assert!((as_it_is - expected).abs() < 0.005, "{name}: {as_it_is}");
         let (built_in, read) = (of(&["--preset", name]), of(&["--camera", path]));
         assert_eq!(built_in["budget"], read["budget"], "{name}");
         assert_eq!(
@@ -393,117 +466,109 @@ fn the_papers_figures_are_eleven_and_a_sheet() {
     assert_ne!(sheet(&figures), sheet(&other));
 }
 
+/// Asserts that a command line is refused with these words, and that nothing is printed.
+fn is_refused(options: &[&str], expected: &str) {
+    let ran = limit(options);
+    let found = (ran.status, ran.stdout.as_str());
+    assert_eq!(found, (2, ""), "{options:?} {}", ran.stderr);
+    assert!(ran.stderr.contains(expected), "{options:?} {}", ran.stderr);
+}
+
 #[test]
-fn a_wrong_command_line_is_refused_and_nothing_is_printed() {
-    let sweep = |what: &'static str| vec!["--preset", "experiment-1", "--sweep", what];
-    let option =
-        |name: &'static str, value: &'static str| vec!["--preset", "experiment-1", name, value];
-    for (options, expected) in [
-        (vec![], "--camera <camera.toml>|--preset <NAME>"),
+fn an_option_that_makes_no_sense_is_refused() {
+    for (option, value, expected) in [
+        ("--camera", "a.toml", "cannot be used with"),
+        ("--aperture-mm", "-5", "expected a number above 0"),
+        ("--aperture-mm", "nan", "expected a number above 0"),
+        ("--aperture-mm", "big", "expected a number above 0"),
+        ("--exposure-s", "0", "expected a number above 0"),
+        ("--quantum-efficiency", "1.5", "above 0 and at most 1"),
+        ("--zenith-distance-deg", "90", "from 0 to below 90"),
         (
-            vec!["--preset", "experiment-1", "--camera", "a.toml"],
-            "cannot be used with",
-        ),
-        (
-            vec!["--preset", "experiment-3"],
-            "possible values: experiment-1",
-        ),
-        (option("--aperture-mm", "-5"), "expected a number above 0"),
-        (option("--aperture-mm", "nan"), "expected a number above 0"),
-        (option("--aperture-mm", "big"), "expected a number above 0"),
-        (option("--exposure-s", "0"), "expected a number above 0"),
-        (
-            option("--quantum-efficiency", "1.5"),
-            "above 0 and at most 1",
-        ),
-        (option("--zenith-distance-deg", "90"), "from 0 to below 90"),
-        (
-            option("--zenith-distance-deg", "89.99999"),
+            "--zenith-distance-deg",
+            "89.99999",
             "there is no limiting magnitude",
         ),
         (
-            option("--sky-luminance-cd-m2", "1e308"),
+            "--sky-luminance-cd-m2",
+            "1e308",
             "sky_illuminance_lx is inf",
         ),
-        (option("--apertur-mm", "5"), "'--aperture-mm'"),
+        ("--apertur-mm", "5", "'--aperture-mm'"),
         (
-            option("--band-to-nm", "900"),
+            "--band-to-nm",
+            "900",
             "360 to 780 nm, which does not cover the band",
         ),
-        (option("--band-to-nm", "300"), "the band runs backwards"),
-        (option("--band-to-nm", "1e300"), "to below 10000"),
+        ("--band-to-nm", "300", "the band runs backwards"),
+        ("--band-to-nm", "1e300", "to below 10000"),
+        ("--plot", "a.svg", "--sweep"),
+    ] {
+        is_refused(&["--preset", "experiment-1", option, value], expected);
+    }
+    is_refused(&[], "--camera <camera.toml>|--preset <NAME>");
+    is_refused(
+        &["--preset", "experiment-3"],
+        "possible values: experiment-1",
+    );
+}
+
+#[test]
+fn options_that_say_the_same_exclude_each_other() {
+    for [one, other] in [
+        ["--sky-mag-arcsec2=20", "--sky-illuminance-lx=0.01"],
+        ["--sky-luminance-cd-m2=1", "--sky-illuminance-lx=0.01"],
+        ["--sky-luminance-cd-m2=1", "--sky-mag-arcsec2=20"],
+        [
+            "--zenith-transmission=0.5",
+            "--extinction-mag-per-airmass=0.1",
+        ],
+        ["--pixel-area-um2=20", "--pitch-y-um=4"],
+    ] {
+        is_refused(
+            &["--preset", "experiment-1", one, other],
+            "cannot be used with",
+        );
+    }
+}
+
+#[test]
+fn a_sweep_that_makes_no_sense_is_refused_before_anything_is_printed() {
+    for (sweep, expected) in [
+        ("aperture_mm=200:5:10", "the sweep runs from 200 to 5"),
+        ("aperture_mm=5:200:1", "a sweep of 1 values"),
+        ("aperture_mm=5:200:1001", "expected 2 to 1000"),
         (
-            sweep("aperture_mm=200:5:10"),
-            "the sweep runs from 200 to 5",
-        ),
-        (sweep("aperture_mm=5:200:1"), "a sweep of 1 values"),
-        (sweep("aperture_mm=5:200:1001"), "expected 2 to 1000"),
-        (
-            sweep("aperture_mm=5:200:99999999999999999999"),
+            "aperture_mm=5:200:99999999999999999999",
             "is not a whole number",
         ),
-        (sweep("apertur=5:200:10"), "did you mean 'aperture_mm'?"),
-        (sweep("aperture_mm=5:200"), "NAME=FROM:TO:COUNT"),
-        (sweep("aperture_mm=5:200:4:lin"), "NAME=FROM:TO:COUNT"),
-        (sweep("aperture_mm=-5:200:10"), "aperture_mm would be -5"),
-        (sweep("aperture_mm=5:inf:10"), "'inf' is not a number"),
+        ("apertur=5:200:10", "did you mean 'aperture_mm'?"),
+        ("aperture_mm=5:200", "NAME=FROM:TO:COUNT"),
+        ("aperture_mm=5:200:4:lin", "NAME=FROM:TO:COUNT"),
+        ("aperture_mm=-5:200:10", "aperture_mm would be -5"),
+        ("aperture_mm=5:inf:10", "'inf' is not a number"),
         (
-            sweep("zenith_distance_deg=0:90:10"),
+            "zenith_distance_deg=0:90:10",
             "zenith_distance_deg would be 90",
         ),
         (
-            sweep("zenith_distance_deg=0:89.9999:3"),
+            "zenith_distance_deg=0:89.9999:3",
             "zenith_distance_deg of 89.9999: there is no",
         ),
+        ("dark_current_e_s=0:10:3:log", "logarithmic steps from 0"),
         (
-            sweep("dark_current_e_s=0:10:3:log"),
-            "logarithmic steps from 0",
-        ),
-        (
-            sweep("band_to_nm=700:900:3"),
+            "band_to_nm=700:900:3",
             "does not cover the band from 360 to 800 nm",
         ),
-        (
-            vec![
-                "--preset",
-                "experiment-1",
-                "--sky-mag-arcsec2",
-                "20",
-                "--sky-illuminance-lx",
-                "0.01",
-            ],
-            "cannot be used with",
-        ),
-        (
-            vec![
-                "--preset",
-                "experiment-1",
-                "--zenith-transmission",
-                "0.5",
-                "--extinction-mag-per-airmass",
-                "0.1",
-            ],
-            "cannot be used with",
-        ),
-        (option("--plot", "a.svg"), "--sweep"),
-        (
-            [sweep("aperture_mm=5:200:3"), vec!["--plot", "a.pdf"]].concat(),
-            ".svg or .png",
-        ),
-        (
-            [sweep("aperture_mm=5:200:3"), vec!["--figures", "a"]].concat(),
-            "cannot be used with",
-        ),
     ] {
-        let ran = limit(&options);
-        assert_eq!(
-            (ran.status, ran.stdout.as_str()),
-            (2, ""),
-            "{options:?} {}",
-            ran.stderr
-        );
-        assert!(ran.stderr.contains(expected), "{options:?} {}", ran.stderr);
+        is_refused(&["--preset", "experiment-1", "--sweep", sweep], expected);
     }
+    let sweep = ["--preset", "experiment-1", "--sweep", "aperture_mm=5:200:3"];
+    is_refused(&[&sweep[..], &["--plot", "a.pdf"]].concat(), ".svg or .png");
+    is_refused(
+        &[&sweep[..], &["--figures", "a"]].concat(),
+        "cannot be used with",
+    );
 }
 
 #[test]

@@ -4,6 +4,7 @@ use super::budget::Budget;
 use super::conditions::{Scenario, ScenarioError};
 use super::parameters::{Parameter, UnknownParameter};
 use crate::sensor::Limits;
+use std::cmp::Ordering;
 
 /// How values lie between the first and the last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -110,8 +111,8 @@ impl Sweep {
         if !(2..=Self::MAX_VALUES).contains(&count) {
             return Err(SweepError::Count { count });
         }
-        // Written so that NaN does not rise either.
-        if !(from < to) {
+        // NaN does not rise either.
+        if from.partial_cmp(&to) != Some(Ordering::Less) {
             return Err(SweepError::Backwards { from, to });
         }
         if spacing == Spacing::Log && from <= 0.0 {

@@ -6,7 +6,7 @@ use starpipe::sensitivity::{Budget, Prediction, Reading, Scenario};
 use std::fmt::Write as _;
 
 /// A quantity: symbol, words, value, unit.
-type Line<'a> = (&'a str, &'a str, f64, &'a str);
+type Line = (&'static str, &'static str, f64, &'static str);
 
 pub(super) fn rendered(rows: &[Row]) -> String {
     let Some(first) = rows.first() else {
@@ -55,8 +55,13 @@ fn budget(row: &Row) -> String {
         prediction.limit_vmag,
         number(prediction.snr),
     );
-    let (given, reckoned) = (given(prediction), reckoned(prediction));
-    for (title, lines) in given.into_iter().chain(reckoned) {
+    for (title, lines) in [
+        ("camera", camera(prediction)),
+        ("conditions", conditions(prediction)),
+        ("on the way", on_the_way(&prediction.budget)),
+        ("noise of the brightest pixel", noise(&prediction.budget)),
+        ("the faintest star", faintest(&prediction.budget)),
+    ] {
         let _ = writeln!(text, "\n  {title}");
         for (symbol, words, value, unit) in lines {
             let line = format!("    {symbol:<5} {words:<55} {:>13} {unit}", number(value));
@@ -66,170 +71,164 @@ fn budget(row: &Row) -> String {
     text
 }
 
-/// What is given.
-fn given(prediction: &Prediction) -> [(&'static str, Vec<Line<'static>>); 2] {
-    let given = |name: &str| {
+fn given(
+    prediction: &Prediction,
+    lines: &[(&'static str, &'static str, &str, &'static str)],
+) -> Vec<Line> {
+    let value = |name: &str| {
         let found = prediction
             .parameters
             .iter()
             .find(|(known, _)| *known == name);
         found.map_or(f64::NAN, |(_, value)| *value)
     };
-    let line = |symbol, words, name, unit| (symbol, words, given(name), unit);
-    [
+    let line =
+        |(symbol, words, name, unit): &(_, _, &str, _)| (*symbol, *words, value(name), *unit);
+    lines.iter().map(line).collect()
+}
+
+fn camera(prediction: &Prediction) -> Vec<Line> {
+    given(
+        prediction,
+        &[
+            ("D", "aperture", "aperture_mm", "mm"),
+            ("f", "focal length", "focal_length_mm", "mm"),
+            (
+                "K",
+                "transmission of the lens, at most",
+                "lens_transmission",
+                "",
+            ),
+            ("Q", "quantum efficiency, at most", "quantum_efficiency", ""),
+            ("", "pixel area", "pixel_area_um2", "µm²"),
+            ("", "spot, standard deviation", "spot_sigma_px", "px"),
+            ("", "dark current", "dark_current_e_s", "e/s"),
+        ],
+    )
+}
+
+fn conditions(prediction: &Prediction) -> Vec<Line> {
+    given(
+        prediction,
+        &[
+            ("T", "exposure", "exposure_s", "s"),
+            ("Z", "zenith distance", "zenith_distance_deg", "°"),
+            (
+                "τ",
+                "transmission of one airmass at 555 nm",
+                "zenith_transmission",
+                "",
+            ),
+            ("E_B", "illuminance by the sky", "sky_illuminance_lx", "lx"),
+            ("", "the same as luminance", "sky_luminance_cd_m2", "cd/m²"),
+            (
+                "",
+                "the same in V magnitudes",
+                "sky_mag_arcsec2",
+                "mag/arcsec²",
+            ),
+            ("R_SN", "signal over noise that is wanted", "snr", ""),
+        ],
+    )
+}
+
+fn on_the_way(budget: &Budget) -> Vec<Line> {
+    let through_air = budget.atmosphere_transmission;
+    vec![
+        ("X", "airmass", budget.airmass, ""),
         (
-            "camera",
-            vec![
-                line("D", "aperture", "aperture_mm", "mm"),
-                line("f", "focal length", "focal_length_mm", "mm"),
-                line(
-                    "K",
-                    "transmission of the lens, at most",
-                    "lens_transmission",
-                    "",
-                ),
-                line("Q", "quantum efficiency, at most", "quantum_efficiency", ""),
-                line("", "pixel area", "pixel_area_um2", "µm²"),
-                line("", "spot, standard deviation", "spot_sigma_px", "px"),
-                line("", "dark current", "dark_current_e_s", "e/s"),
-            ],
+            "",
+            "part of a star's electrons that the air leaves",
+            through_air,
+            "",
         ),
         (
-            "conditions",
-            vec![
-                line("T", "exposure", "exposure_s", "s"),
-                line("Z", "zenith distance", "zenith_distance_deg", "°"),
-                line(
-                    "τ",
-                    "transmission of one airmass at 555 nm",
-                    "zenith_transmission",
-                    "",
-                ),
-                line("E_B", "illuminance by the sky", "sky_illuminance_lx", "lx"),
-                line("", "the same as luminance", "sky_luminance_cd_m2", "cd/m²"),
-                line(
-                    "",
-                    "the same in V magnitudes",
-                    "sky_mag_arcsec2",
-                    "mag/arcsec²",
-                ),
-                line("R_SN", "signal over noise that is wanted", "snr", ""),
-            ],
+            "A",
+            "area of the entrance pupil",
+            budget.aperture_area_m2,
+            "m²",
         ),
+        (
+            "A_P",
+            "solid angle of a pixel",
+            budget.pixel_solid_angle_sr,
+            "sr",
+        ),
+        (
+            "",
+            "the same in square arcseconds",
+            budget.pixel_area_arcsec2,
+            "arcsec²",
+        ),
+        (
+            "μ",
+            "part of a star's light on its brightest pixel",
+            budget.peak_share,
+            "",
+        ),
+        (
+            "Φ₀",
+            "photons of V = 0 above the air",
+            budget.mag_0_photons_s_m2,
+            "/ s m²",
+        ),
+        (
+            "",
+            "electrons of V = 0 on all its pixels",
+            budget.mag_0_e_s,
+            "e/s",
+        ),
+        ("M_B", "magnitude as bright as the sky", budget.sky_mag, ""),
     ]
 }
 
-/// What follows.
-fn reckoned(prediction: &Prediction) -> [(&'static str, Vec<Line<'static>>); 3] {
-    let budget = &prediction.budget;
-    [
+fn noise(budget: &Budget) -> Vec<Line> {
+    let of_sensor = "noise of the sensor: dark current, reading, rounding";
+    vec![
+        ("B", "electrons of the sky", budget.background_e, "e"),
+        ("n_B", "their shot noise", budget.sky_noise_e, "e"),
+        ("", "electrons of the dark current", budget.dark_e, "e"),
+        ("", "noise of reading", budget.read_noise_e, "e"),
         (
-            "on the way",
-            vec![
-                ("X", "airmass", budget.airmass, ""),
-                (
-                    "",
-                    "part of a star's electrons that the air leaves",
-                    budget.atmosphere_transmission,
-                    "",
-                ),
-                (
-                    "A",
-                    "area of the entrance pupil",
-                    budget.aperture_area_m2,
-                    "m²",
-                ),
-                (
-                    "A_P",
-                    "solid angle of a pixel",
-                    budget.pixel_solid_angle_sr,
-                    "sr",
-                ),
-                (
-                    "",
-                    "the same in square arcseconds",
-                    budget.pixel_area_arcsec2,
-                    "arcsec²",
-                ),
-                (
-                    "μ",
-                    "part of a star's light on its brightest pixel",
-                    budget.peak_share,
-                    "",
-                ),
-                (
-                    "Φ₀",
-                    "photons of V = 0 above the air",
-                    budget.mag_0_photons_s_m2,
-                    "/ s m²",
-                ),
-                (
-                    "",
-                    "electrons of V = 0 on all its pixels",
-                    budget.mag_0_e_s,
-                    "e/s",
-                ),
-                ("M_B", "magnitude as bright as the sky", budget.sky_mag, ""),
-            ],
+            "",
+            "noise of rounding to grey levels",
+            budget.quantisation_noise_e,
+            "e",
         ),
+        ("N_C", of_sensor, budget.sensor_noise_e, "e"),
         (
-            "noise of the brightest pixel",
-            vec![
-                ("B", "electrons of the sky", budget.background_e, "e"),
-                ("n_B", "their shot noise", budget.sky_noise_e, "e"),
-                ("", "electrons of the dark current", budget.dark_e, "e"),
-                ("", "noise of reading", budget.read_noise_e, "e"),
-                (
-                    "",
-                    "noise of rounding to grey levels",
-                    budget.quantisation_noise_e,
-                    "e",
-                ),
-                (
-                    "N_C",
-                    "noise of the sensor: dark current, reading, rounding",
-                    budget.sensor_noise_e,
-                    "e",
-                ),
-                (
-                    "",
-                    "noise of sky and sensor",
-                    budget.background_noise_e,
-                    "e",
-                ),
-                ("n_S", "shot noise of the star", budget.star_noise_e, "e"),
-                ("N", "all noise", budget.noise_e, "e"),
-            ],
+            "",
+            "noise of sky and sensor",
+            budget.background_noise_e,
+            "e",
         ),
+        ("n_S", "shot noise of the star", budget.star_noise_e, "e"),
+        ("N", "all noise", budget.noise_e, "e"),
+    ]
+}
+
+fn faintest(budget: &Budget) -> Vec<Line> {
+    let below = budget.star_illuminance_ground_lx;
+    vec![
         (
-            "the faintest star",
-            vec![
-                (
-                    "S",
-                    "its electrons on its brightest pixel",
-                    budget.star_e,
-                    "e",
-                ),
-                ("M_V", "its magnitude", budget.limit_vmag, ""),
-                (
-                    "E",
-                    "its illuminance above the air",
-                    budget.star_illuminance_lx,
-                    "lx",
-                ),
-                (
-                    "E'",
-                    "its illuminance below the air",
-                    budget.star_illuminance_ground_lx,
-                    "lx",
-                ),
-                (
-                    "φ_S",
-                    "its photons below the air",
-                    budget.star_photons_s_m2,
-                    "/ s m²",
-                ),
-            ],
+            "S",
+            "its electrons on its brightest pixel",
+            budget.star_e,
+            "e",
+        ),
+        ("M_V", "its magnitude", budget.limit_vmag, ""),
+        (
+            "E",
+            "its illuminance above the air",
+            budget.star_illuminance_lx,
+            "lx",
+        ),
+        ("E'", "its illuminance below the air", below, "lx"),
+        (
+            "φ_S",
+            "its photons below the air",
+            budget.star_photons_s_m2,
+            "/ s m²",
         ),
     ]
 }

@@ -1,5 +1,8 @@
 //! Figures for people, as SVG or PNG.
 
+mod finer;
+
+use finer::Finer;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::register_font;
@@ -76,12 +79,10 @@ pub(crate) fn rendered(figure: &impl Figure, form: Form) -> anyhow::Result<Vec<u
             Ok(drawing.into_bytes())
         }
         Form::Png => {
-            let mut pixels = vec![0; width as usize * height as usize * 3];
-            draw(
-                figure,
-                BitMapBackend::with_buffer(&mut pixels, (width, height)),
-            )?;
-            png(&pixels, (width, height))
+            let size = (width * finer::FACTOR, height * finer::FACTOR);
+            let mut pixels = vec![0; size.0 as usize * size.1 as usize * 3];
+            draw(figure, Finer(BitMapBackend::with_buffer(&mut pixels, size)))?;
+            png(&pixels, size)
         }
     }
 }
