@@ -1,9 +1,13 @@
 //! The command line as it is typed.
 
+use super::limit::ParameterArgs;
+use super::plot::PlotFile;
 use super::values;
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use starpipe::epoch::ObservationDate;
 use starpipe::observer::Site;
+use starpipe::sensor::Preset;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -62,6 +66,18 @@ pub(crate) enum Command {
         and false stars, and identified as `starpipe identify` does. Without --sweep the table is the standard\n\
         one: five fields of view, then one thing worse at a time in a field of 10 degrees.")]
     Robustness(RobustnessArgs),
+    /// Predict the faintest star that a camera detects
+    #[command(after_help = "Examples:\n  \
+        starpipe limit --preset experiment-1\n  \
+        starpipe limit --camera camera.toml --exposure-s 0.2 --sky-mag-arcsec2 20 --format json\n  \
+        starpipe limit --preset experiment-1 --sweep aperture_mm=5:200:40 --plot aperture.svg --format csv\n  \
+        starpipe limit --preset imx174-35mm --sweep exposure_s=0.01:10:31:log\n  \
+        starpipe limit --figures figures\n\n\
+        The rule is that of the paper: the star's brightest pixel stands --snr times its noise above the sky. Every number\n\
+        of the camera and of the conditions has an option; docs/sensitivity.md has the equations.")]
+    Limit(Box<LimitArgs>),
+    /// Work with descriptions of cameras
+    Camera(CameraArgs),
 }
 
 #[derive(Debug, Args)]
@@ -194,7 +210,7 @@ pub(crate) enum Format {
     Text,
     /// One JSON object a line
     Json,
-    /// A table of all stars
+    /// A table
     Csv,
 }
 
@@ -268,10 +284,95 @@ pub(crate) struct RobustnessArgs {
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub(crate) format: Format,
     /// Also draw the rates into this file
-    #[arg(long, value_name = "FILE.svg")]
-    pub(crate) plot: Option<PathBuf>,
+    #[arg(long, value_name = "FILE.svg|png", value_parser = plot_file())]
+    pub(crate) plot: Option<PlotFile>,
     #[command(flatten)]
     pub(crate) resources: ResourceArgs,
+}
+
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("scenario").args(["camera", "preset", "figures"]).required(true).multiple(true))]
+pub(crate) struct LimitArgs {
+    /// Camera to predict the limit of, as `starpipe camera new` writes one
+    #[arg(long, value_name = "camera.toml", conflicts_with = "preset")]
+    pub(crate) camera: Option<PathBuf>,
+    /// A camera that is built in, and its conditions
+    #[arg(long, value_name = "NAME", value_parser = preset())]
+    pub(crate) preset: Option<Preset>,
+    /// Which equations [default: as the paper has them for its experiments, else physical]
+    #[arg(long, value_enum)]
+    pub(crate) reading: Option<ReadingArg>,
+    /// Repeat the prediction over one parameter, named as its option with _ or - (may be repeated); :log makes even ratios
+    /// of the steps
+    #[arg(
+        long,
+        value_name = "NAME=FROM:TO:COUNT[:log]",
+        allow_hyphen_values = true
+    )]
+    pub(crate) sweep: Vec<values::LimitSweep>,
+    /// What to print
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub(crate) format: Format,
+    /// Also draw the sweeps into this file, a panel for each, with a second curve for 12.5 times the exposure (over the
+    /// exposure: for half the aperture)
+    #[arg(long, value_name = "FILE.svg|png", value_parser = plot_file(), requires = "sweep")]
+    pub(crate) plot: Option<PlotFile>,
+    /// Draw the eleven figures of the paper into this directory, for exposures of 0.04 s and 0.5 s [default camera:
+    /// experiment-1]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["sweep", "plot", "format"])]
+    pub(crate) figures: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) parameters: ParameterArgs,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ReadingArg {
+    /// Equations (1) to (12) of Tong, Li & Wang 2014 as their authors used them
+    Paper,
+    /// The same budget with the physics put right
+    Physical,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CameraArgs {
+    #[command(subcommand)]
+    pub(crate) command: CameraCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum CameraCommand {
+    /// Write the description of a camera, with a comment at each key, to be changed
+    #[command(after_help = "Examples:\n  \
+        starpipe camera new -o camera.toml\n  \
+        starpipe camera new --preset imx174-35mm > camera.toml")]
+    New(CameraNewArgs),
+    /// List the cameras that are built in
+    #[command(after_help = "Example:\n  starpipe camera list")]
+    List,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CameraNewArgs {
+    /// The camera whose values to write
+    #[arg(long, value_name = "NAME", value_parser = preset(), default_value = "experiment-1")]
+    pub(crate) preset: Preset,
+    /// File to write [default: standard output]
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// Overwrite the file
+    #[arg(long, requires = "output")]
+    pub(crate) force: bool,
+}
+
+/// A preset by its name.
+fn preset() -> impl TypedValueParser<Value = Preset> {
+    let names = Preset::ALL.map(|preset| PossibleValue::new(preset.name()).help(preset.about()));
+    PossibleValuesParser::new(names).try_map(|name| Preset::named(&name).ok_or("no such preset"))
+}
+
+/// A file for a figure, of a kind that can be drawn.
+fn plot_file() -> impl TypedValueParser<Value = PlotFile> {
+    PathBufValueParser::new().try_map(PlotFile::new)
 }
 
 #[derive(Debug, Args)]

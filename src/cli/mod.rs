@@ -3,11 +3,14 @@
 mod args;
 mod batch;
 mod cache;
+mod camera;
 mod centroids;
 mod import;
 mod input;
+mod limit;
 mod output;
 mod overwrite;
+mod plot;
 mod resources;
 mod robustness;
 mod settings;
@@ -66,6 +69,8 @@ pub(crate) fn run() -> ExitCode {
         Command::Identify(arguments) => solve::identify(arguments),
         Command::Catalog(arguments) => import::catalog(arguments),
         Command::Robustness(arguments) => robustness::robustness(&arguments),
+        Command::Limit(arguments) => limit::limit(&arguments),
+        Command::Camera(arguments) => camera::camera(&arguments),
     };
     match done {
         Ok(exit) => exit.into(),

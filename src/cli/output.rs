@@ -3,6 +3,7 @@
 use super::args::Format;
 use super::settings::output_path;
 use anyhow::Context;
+use serde::Serialize;
 use starpipe::catalog::Catalog;
 use starpipe::frame::Frame;
 use starpipe::pipeline::Solution;
@@ -134,6 +135,28 @@ pub(crate) fn print(text: &str) -> anyhow::Result<ControlFlow<()>> {
         Err(error) => Err(error).context("writing to standard output"),
         Ok(()) => Ok(ControlFlow::Continue(())),
     }
+}
+
+/// Rows as JSON Lines.
+pub(crate) fn json_lines<R: Serialize>(rows: impl Iterator<Item = R>) -> anyhow::Result<String> {
+    let mut lines = String::new();
+    for row in rows {
+        lines += &serde_json::to_string(&row)?;
+        lines.push('\n');
+    }
+    Ok(lines)
+}
+
+/// Rows as a CSV table with a heading.
+pub(crate) fn csv_table<R: Serialize>(rows: impl Iterator<Item = R>) -> anyhow::Result<String> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        writer.serialize(row)?;
+    }
+    let bytes = writer
+        .into_inner()
+        .map_err(csv::IntoInnerError::into_error)?;
+    Ok(String::from_utf8(bytes)?)
 }
 
 fn table(report: &FrameReport, with_header: bool) -> anyhow::Result<Vec<u8>> {

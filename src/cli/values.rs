@@ -1,6 +1,7 @@
 //! Values of options: what is out of range is refused where it is typed.
 
 use starpipe::robustness::Parameter;
+use starpipe::sensitivity::{self, Spacing};
 use std::fmt::Display;
 use std::str::FromStr;
 
@@ -75,8 +76,7 @@ impl FromStr for Sweep {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let form = || format!("'{text}' is not of the form NAME=FROM:TO:COUNT");
-        let (name, range) = text.split_once('=').ok_or_else(form)?;
+        let (name, range) = named_range(text, "NAME=FROM:TO:COUNT")?;
         let known = Parameter::ALL.iter().find(|known| known.name() == name);
         let parameter = *known.ok_or_else(|| {
             let names = Parameter::ALL.map(Parameter::name).join(", ");
@@ -89,23 +89,57 @@ impl FromStr for Sweep {
             Parameter::Missing => part,
             Parameter::FalseStars => multiple,
         };
-        let parts: Vec<&str> = range.split(':').collect();
-        let [from, to, count] = parts[..] else {
-            return Err(form());
+        let [from, to, count] = range[..] else {
+            return Err(not_of_form(text, "NAME=FROM:TO:COUNT"));
         };
-        let (from, to) = (check(from)?, check(to)?);
-        let count = count.trim().parse::<usize>().map_err(|_| form())?;
+        let (from, to, count) = (check(from)?, check(to)?, whole(count)?);
         if !(1..=SWEEP_VALUES_MAX).contains(&count) {
             return Err(format!("the count must be 1 to {SWEEP_VALUES_MAX}"));
         }
-        let step = (to - from) / (count.max(2) - 1) as f64;
-        // Decimal fractions are to look like themselves.
-        let value = |i: usize| ((from + i as f64 * step) * 1e9).round() / 1e9;
         Ok(Self {
             parameter,
-            values: (0..count).map(value).collect(),
+            values: Spacing::Linear.values(from, to, count),
         })
     }
+}
+
+/// A sweep of the sensitivity.
+#[derive(Debug, Clone)]
+pub(crate) struct LimitSweep(pub(crate) sensitivity::Sweep);
+
+impl FromStr for LimitSweep {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        const FORM: &str = "NAME=FROM:TO:COUNT or NAME=FROM:TO:COUNT:log";
+        let (name, range) = named_range(text, FORM)?;
+        let (from, to, count, spacing) = match range[..] {
+            [from, to, count] => (from, to, count, Spacing::Linear),
+            [from, to, count, "log"] => (from, to, count, Spacing::Log),
+            _ => return Err(not_of_form(text, FORM)),
+        };
+        let ends = (finite(from)?, finite(to)?);
+        sensitivity::Sweep::new(&name.replace('-', "_"), ends, whole(count)?, spacing)
+            .map(Self)
+            .map_err(|error| error.to_string())
+    }
+}
+
+/// The name and the parts of NAME=PART:PART:...
+fn named_range<'a>(text: &'a str, form: &str) -> Result<(&'a str, Vec<&'a str>), String> {
+    let (name, range) = text
+        .split_once('=')
+        .ok_or_else(|| not_of_form(text, form))?;
+    Ok((name, range.split(':').collect()))
+}
+
+fn not_of_form(text: &str, form: &str) -> String {
+    format!("'{text}' is not of the form {form}")
+}
+
+fn whole(text: &str) -> Result<usize, String> {
+    let count = text.trim().parse();
+    count.map_err(|_| format!("'{text}' is not a whole number"))
 }
 
 /// A horizontal field of view in degrees.

@@ -7,7 +7,7 @@ use tiny_skia::{FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, S
 use ttf_parser::{Face, OutlineBuilder};
 
 /// Letters, Latin and Greek: assets/README.md says where they are from.
-static FONT: &[u8] = include_bytes!("../../assets/DejaVuSans-subset.ttf");
+pub static FONT: &[u8] = include_bytes!("../../assets/DejaVuSans-subset.ttf");
 
 /// Breadth of the dark border round letters, in units of strokes.
 const HALO: f32 = 3.0;

@@ -26,6 +26,7 @@ use crate::coords::PixelPoint;
 use crate::frame::{Frame, OVERLAY_TEXT};
 use crate::identify::{Identification, Outcome};
 use crate::pipeline::{Solution, Source};
+pub use canvas::FONT;
 use canvas::{Canvas, Colour};
 use grey::Grey;
 use image::RgbImage;

@@ -1,6 +1,6 @@
 //! From a scenario to its limiting magnitude, with all that lies between.
 
-use super::conditions::{Conditions, Reading, Scenario};
+use super::conditions::{Conditions, Reading, Scenario, ScenarioError};
 use super::light::{
     self, ILLUMINANCE_OF_MAG_0_LX, PAPER_MAG_RATIO, PAPER_PHOTONS_OF_MAG_0, SKY_TEMPERATURE_K,
 };
@@ -160,6 +160,30 @@ impl Budget {
             snr: star_e / noise_e,
             bands: light.bands,
         }
+    }
+
+    /// The budget of a scenario that may make no sense.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] where it makes none, or its limit is no finite number.
+    pub fn checked(scenario: &Scenario) -> Result<Self, ScenarioError> {
+        scenario.check()?;
+        let budget = Self::new(scenario);
+        let numbers = [
+            budget.limit_vmag,
+            budget.background_e,
+            budget.noise_e,
+            budget.snr,
+        ];
+        if numbers.iter().all(|number| number.is_finite()) {
+            return Ok(budget);
+        }
+        Err(ScenarioError::NoLimit {
+            limit_vmag: budget.limit_vmag,
+            star_photons_s_m2: budget.mag_0_photons_s_m2 * budget.atmosphere_transmission,
+            background_e: budget.background_e,
+            noise_e: budget.noise_e,
+        })
     }
 
     /// V magnitude of a star that leaves so many electrons on all its pixels during an exposure.

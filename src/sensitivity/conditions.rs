@@ -162,6 +162,21 @@ pub enum ScenarioError {
     /// Values that contradict each other.
     #[error("{0}")]
     Contradiction(String),
+    /// Values of which no number follows.
+    #[error(
+        "there is no limiting magnitude: with {star_photons_s_m2:e} photons of a star of V = 0 below the air per second and \
+         m², {background_e:e} electrons of the sky and a noise of {noise_e:e} electrons it would be {limit_vmag}"
+    )]
+    NoLimit {
+        /// The limit that would be.
+        limit_vmag: f64,
+        /// Photons of a star of V = 0 below the air.
+        star_photons_s_m2: f64,
+        /// Electrons of the sky in a pixel.
+        background_e: f64,
+        /// Noise of the brightest pixel, in electrons.
+        noise_e: f64,
+    },
 }
 
 impl Scenario {
@@ -174,7 +189,8 @@ impl Scenario {
         }
     }
 
-    /// The scenario of a preset: the paper's experiments as the paper has them, other cameras under the default conditions.
+    /// The scenario of a preset: the paper's experiments as the paper has them, other cameras under the default conditions but
+    /// for the exposure.
     pub fn of(preset: Preset) -> Self {
         let paper = |exposure_s, zenith_distance_deg| Self {
             sensor: preset.sensor(),
@@ -186,9 +202,17 @@ impl Scenario {
             },
             reading: Reading::Paper,
         };
+        let other = |exposure_s| {
+            let mut scenario = Self::new(preset.sensor());
+            scenario.conditions.exposure_s = exposure_s;
+            scenario
+        };
         match preset {
             Preset::Experiment1 => paper(0.04, 0.0),
             Preset::Experiment2 => paper(0.1, 45.0),
+            Preset::NanosatTracker => other(0.1),
+            Preset::Imx174 => other(0.2),
+            Preset::Asi183 => other(0.5),
         }
     }
 
@@ -214,16 +238,32 @@ impl Scenario {
                 });
             }
         }
-        match self.sensor.contradiction() {
+        match self
+            .sensor
+            .contradiction()
+            .or_else(|| self.beyond_the_papers_table())
+        {
             Some(what) => Err(ScenarioError::Contradiction(what)),
             None => Ok(()),
         }
+    }
+
+    /// The paper's reading reckons with the wavelengths of its table 1, whatever the camera's band.
+    fn beyond_the_papers_table(&self) -> Option<String> {
+        let uncovered = match self.reading {
+            Reading::Paper => self
+                .sensor
+                .uncovered(light::PAPER_BAND_NM.0, light::PAPER_BAND_NM.1),
+            Reading::Physical => None,
+        };
+        uncovered.map(|uncovered| format!("{uncovered} of the paper's reading"))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sensor::Response;
 
     #[test]
     fn a_hundredth_of_a_lux_is_a_sky_of_18_8() {
@@ -234,6 +274,21 @@ mod tests {
         assert!((back.illuminance_lx() - 0.01).abs() < 1e-12);
         let same = SkyBrightness::LuminanceCdM2(back.luminance_cd_m2());
         assert!((same.mag_arcsec2() - sky.mag_arcsec2()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_papers_reading_wants_curves_over_its_own_band() {
+        let mut scenario = Scenario::of(Preset::Experiment1);
+        scenario.sensor.quantum_efficiency = Response::Table(vec![(400.0, 0.5), (800.0, 0.5)]);
+        scenario.sensor.band_from_nm = 450.0;
+        let error = scenario.check().unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "quantum_efficiency is known from 400 to 800 nm, which does not cover the band from 360 to 780 nm of the \
+             paper's reading"
+        );
+        scenario.reading = Reading::Physical;
+        assert_eq!(scenario.check(), Ok(()));
     }
 
     #[test]

@@ -8,6 +8,8 @@ pub const ILLUMINANCE_OF_MAG_0_LX: f64 = 2.65e-6;
 /// Photons of a star of V = 0 above the atmosphere in the paper's band, per second and m² (eq. 4).
 #[doc(alias = "Phi_0")]
 pub(super) const PAPER_PHOTONS_OF_MAG_0: f64 = 5e10;
+/// First and last wavelength of the paper's table 1, in nm.
+pub(super) const PAPER_BAND_NM: (f64, f64) = (360.0, 780.0);
 /// The paper's ratio of brightness between magnitudes (eqs. 1, 5).
 pub(super) const PAPER_MAG_RATIO: f64 = 2.512;
 /// Luminance of a sky of one star of V = 0 in each square arcsecond, in cd/m².
@@ -63,6 +65,7 @@ mod tests {
     fn table_1_has_43_bands_and_its_sum() {
         let table = luminous_efficiency();
         assert_eq!(table.len(), 43);
+        assert_eq!((table[0].0, table[42].0), PAPER_BAND_NM);
         let sum: f64 = table.iter().map(|(_, s)| s).sum();
         assert!((sum - 11.6018).abs() < 1e-4, "{sum}");
     }

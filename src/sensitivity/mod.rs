@@ -8,6 +8,9 @@
 //! 4. [`Detector`]: what a detector makes of it, the peak-pixel rule and the matched filter as built: completeness.
 //! 5. [`Faintest`]: the faintest star to be expected among so many.
 //!
+//! [`Prediction`] is what is told of a scenario, [`Sweep`] and [`curves`] follow its limit over one parameter, and [`Figure`]
+//! has those of the paper.
+//!
 //! There are two readings. [`Reading::Paper`] is the paper's equations (1) to (12) as its authors used them.
 //! [`Reading::Physical`] is the same budget with the physics put right.
 //!
@@ -18,12 +21,18 @@ mod budget;
 mod completeness;
 mod conditions;
 mod faintest;
+mod figures;
 mod light;
 mod parameters;
+mod prediction;
+mod sweep;
 
 pub use budget::{Band, Budget};
 pub use completeness::{Detector, Rule};
 pub use conditions::{Conditions, Extinction, Reading, Scenario, ScenarioError, SkyBrightness};
 pub use faintest::Faintest;
+pub use figures::Figure;
 pub use light::{ILLUMINANCE_OF_MAG_0_LX, LUMINANCE_OF_MAG_0_CD_M2};
 pub use parameters::{CONDITION_KEYS, Parameter, UnknownParameter};
+pub use prediction::Prediction;
+pub use sweep::{Curve, Series, Spacing, Sweep, SweepError, curves};

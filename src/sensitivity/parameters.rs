@@ -105,6 +105,27 @@ const PIXEL_AREA: Key<Sensor> = Key {
     },
 };
 
+/// How names end, and the unit that stands for. An ending comes before those that it ends in itself.
+const UNITS: &[(&str, &str)] = &[
+    ("_mag_per_airmass", "mag / airmass"),
+    ("_mag_arcsec2", "V mag / square arcsec"),
+    ("_e_per_adu", "e / ADU"),
+    ("_per_mpx", "per million pixels"),
+    ("_cd_m2", "cd/m²"),
+    ("_um2", "µm²"),
+    ("_e_s", "e/s"),
+    ("_deg", "°"),
+    ("_adu", "ADU"),
+    ("_mm", "mm"),
+    ("_um", "µm"),
+    ("_nm", "nm"),
+    ("_px", "px"),
+    ("_lx", "lx"),
+    ("_e", "e"),
+    ("_s", "s"),
+    ("_k", "K"),
+];
+
 /// A parameter of a [`Scenario`].
 #[derive(Debug, Clone, Copy)]
 pub enum Parameter {
@@ -158,6 +179,32 @@ impl Parameter {
             Self::Sensor(key) => key.about,
             Self::Conditions(key) => key.about,
         }
+    }
+
+    /// The unit of its values, as people write it; empty where it is a pure number.
+    pub fn unit(self) -> &'static str {
+        self.ending().map_or("", |(_, unit)| unit)
+    }
+
+    /// Its name without the unit, in words: `focal length`.
+    pub fn quantity(self) -> String {
+        let ending = self.ending().map_or("", |(ending, _)| ending);
+        let name = self.name();
+        name.strip_suffix(ending).unwrap_or(name).replace('_', " ")
+    }
+
+    /// What an axis of it is called: `focal length (mm)`.
+    pub fn title(self) -> String {
+        match self.unit() {
+            "" => self.quantity(),
+            unit => format!("{} ({unit})", self.quantity()),
+        }
+    }
+
+    fn ending(self) -> Option<&'static (&'static str, &'static str)> {
+        UNITS
+            .iter()
+            .find(|(ending, _)| self.name().ends_with(ending))
     }
 
     /// What values make sense.
@@ -220,6 +267,21 @@ mod tests {
             error.to_string(),
             "'aperture' is no parameter; did you mean 'aperture_mm'?"
         );
+    }
+
+    #[test]
+    fn a_title_has_the_unit_that_the_name_ends_in() {
+        for (name, title) in [
+            ("aperture_mm", "aperture (mm)"),
+            ("dark_current_e_s", "dark current (e/s)"),
+            ("gain_e_per_adu", "gain (e / ADU)"),
+            ("sky_mag_arcsec2", "sky (V mag / square arcsec)"),
+            ("pixel_area_um2", "pixel area (µm²)"),
+            ("quantum_efficiency", "quantum efficiency"),
+            ("snr", "snr"),
+        ] {
+            assert_eq!(Parameter::named(name).unwrap().title(), title);
+        }
     }
 
     #[test]

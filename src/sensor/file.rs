@@ -159,24 +159,30 @@ impl Sensor {
                 "the band runs backwards: band_from_nm is {from}, band_to_nm {to}"
             ));
         }
-        let curves = [
-            ("lens_transmission", &self.lens_transmission),
-            ("quantum_efficiency", &self.quantum_efficiency),
-        ];
-        for (name, curve) in curves {
-            let Some((first, last)) = curve.range_nm() else {
-                continue;
-            };
-            if first > from || last < to {
-                return Some(format!(
-                    "{name} is known from {first} to {last} nm, which does not cover the band from {from} to {to} nm \
-                     (band_from_nm, band_to_nm)"
-                ));
-            }
+        if let Some(uncovered) = self.uncovered(from, to) {
+            return Some(format!("{uncovered} (band_from_nm, band_to_nm)"));
         }
         (self.bias_adu >= self.full_scale_adu()).then(|| {
             let (bias, bits) = (self.bias_adu, self.bits);
             format!("bias_adu is {bias}, beyond the full scale of {bits} bits")
+        })
+    }
+}
+
+impl Sensor {
+    /// Which curve is not known all the way between two wavelengths in nm, where one is not.
+    pub fn uncovered(&self, from_nm: f64, to_nm: f64) -> Option<String> {
+        let curves = [
+            ("lens_transmission", &self.lens_transmission),
+            ("quantum_efficiency", &self.quantum_efficiency),
+        ];
+        curves.into_iter().find_map(|(name, curve)| {
+            let (first, last) = curve.range_nm()?;
+            (first > from_nm || last < to_nm).then(|| {
+                format!(
+                    "{name} is known from {first} to {last} nm, which does not cover the band from {from_nm} to {to_nm} nm"
+                )
+            })
         })
     }
 }

@@ -94,6 +94,8 @@ pub fn nearest_name<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Opt
 
 /// The longest side of a detector that makes sense, in pixels.
 const MAX_SIDE_PX: f64 = 100_000.0;
+/// Wavelengths of which a detector may make anything, in nm.
+const WAVELENGTHS_NM: Limits = Limits::FromToBelow(100.0, 10_000.0);
 
 macro_rules! key {
     ($name:ident, $limits:expr, $about:literal) => {
@@ -108,7 +110,8 @@ macro_rules! key {
 }
 
 /// The numbers of a camera. The two that may be curves, [`Sensor::lens_transmission`] and [`Sensor::quantum_efficiency`],
-/// are their largest values here; a curve that is given another one keeps its form.
+/// are their largest values here; a curve that is given another one keeps its form. Of `spot_sigma_px` and `peak_share` the
+/// last one given decides what falls on the brightest pixel.
 pub const KEYS: &[Key<Sensor>] = &[
     key!(
         width_px,
@@ -152,12 +155,12 @@ pub const KEYS: &[Key<Sensor>] = &[
     },
     key!(
         band_from_nm,
-        Limits::Positive,
+        WAVELENGTHS_NM,
         "shortest wavelength that is detected, in nm"
     ),
     key!(
         band_to_nm,
-        Limits::Positive,
+        WAVELENGTHS_NM,
         "longest wavelength that is detected, in nm"
     ),
     key!(
@@ -182,11 +185,17 @@ pub const KEYS: &[Key<Sensor>] = &[
     ),
     key!(bits, Limits::Whole(1.0, 32.0), "bits of the grey level"),
     key!(bias_adu, Limits::NotNegative, "grey level without light"),
-    key!(
-        spot_sigma_px,
-        Limits::Positive,
-        "standard deviation of a star's spot, in pixels"
-    ),
+    Key {
+        name: "spot_sigma_px",
+        about: "standard deviation of a star's spot, in pixels",
+        limits: Limits::Positive,
+        get: |sensor| Some(sensor.spot_sigma_px),
+        set: |sensor, sigma_px| {
+            sensor.spot_sigma_px = sigma_px;
+            // A share that was stated is that of another spot.
+            sensor.peak_share = None;
+        },
+    },
     Key {
         name: "peak_share",
         about: "part of a star's light on its brightest pixel (else from spot_sigma_px)",
@@ -247,6 +256,26 @@ mod tests {
         assert_eq!(nearest("read-noise"), Some("read_noise_e"));
         assert_eq!(nearest("focal_lenght_mm"), Some("focal_length_mm"));
         assert_eq!(nearest("zzz"), None);
+    }
+
+    #[test]
+    fn another_spot_has_another_share_on_its_brightest_pixel() {
+        let mut sensor = Preset::Experiment1.sensor();
+        let set =
+            |sensor: &mut Sensor, name, value| (Key::find(KEYS, name).unwrap().set)(sensor, value);
+        set(&mut sensor, "spot_sigma_px", 0.5);
+        // erf(1/√2)² = 0.682689².
+        assert!((sensor.peak_share() - 0.466_065).abs() < 1e-6);
+        set(&mut sensor, "peak_share", 0.25);
+        assert_eq!((sensor.spot_sigma_px, sensor.peak_share()), (0.5, 0.25));
+    }
+
+    #[test]
+    fn a_band_without_an_end_is_outside_the_limits() {
+        for name in ["band_from_nm", "band_to_nm"] {
+            let limits = Key::find(KEYS, name).unwrap().limits;
+            assert!(limits.accept(400.0) && !limits.accept(1e300), "{name}");
+        }
     }
 
     #[test]

@@ -1,10 +1,9 @@
 //! The rates as a figure: one panel for each parameter that is swept, or the standard table row by row.
 
 use super::SweptRow;
-use plotters::coord::Shift;
+use crate::cli::plot::{Area, BLUE as RIGHT, FONT, Figure, ORANGE as WRONG, said};
 use plotters::prelude::*;
 use starpipe::robustness::{Parameter, Row};
-use std::fmt::Display;
 
 const WIDTH_PX: u32 = 900;
 const PANEL_HEIGHT_PX: u32 = 300;
@@ -13,43 +12,42 @@ const ROW_HEIGHT_PX: u32 = 34;
 /// Above and below the rows of the table.
 const FRAME_HEIGHT_PX: u32 = 110;
 const MARGIN_PX: u32 = 12;
-const FONT: &str = "sans-serif";
-const RIGHT: RGBColor = RGBColor(0, 114, 178);
-const WRONG: RGBColor = RGBColor(213, 94, 0);
 const NO_ANSWER: RGBColor = RGBColor(120, 120, 120);
 
 /// A line of a panel: its name, its colour, and what it counts.
 type Series = (&'static str, RGBColor, fn(&Row) -> usize);
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// What drawing may fail with, in words.
-pub(super) fn svg(rows: &[SweptRow]) -> anyhow::Result<String> {
-    let swept = parameters(rows);
-    let columns = swept.len().clamp(1, PANELS_ABREAST);
-    let lines = swept.len().div_ceil(columns);
-    let height_px = if swept.is_empty() {
-        FRAME_HEIGHT_PX + ROW_HEIGHT_PX * rows.len() as u32
-    } else {
-        PANEL_HEIGHT_PX * lines as u32
-    };
-    let mut drawing = String::new();
-    {
-        let area = SVGBackend::with_string(&mut drawing, (WIDTH_PX, height_px)).into_drawing_area();
-        area.fill(&WHITE).map_err(said)?;
-        if swept.is_empty() {
-            draw_table(&area, rows)?;
-        }
-        for (panel, parameter) in area.split_evenly((lines, columns)).iter().zip(swept) {
-            draw_sweep(panel, parameter, rows)?;
-        }
-        area.present().map_err(said)?;
+/// The rates of these rows.
+pub(super) struct Rates<'a>(pub(super) &'a [SweptRow]);
+
+impl Rates<'_> {
+    /// Lines and columns of panels.
+    fn panels(&self) -> (usize, usize) {
+        let swept = parameters(self.0).len();
+        let columns = swept.clamp(1, PANELS_ABREAST);
+        (swept.div_ceil(columns), columns)
     }
-    Ok(drawing)
 }
 
-/// The backend's errors borrow the drawing; their words do not.
-fn said(error: impl Display) -> anyhow::Error {
-    anyhow::anyhow!("{error}")
+impl Figure for Rates<'_> {
+    fn size_px(&self) -> (u32, u32) {
+        let height_px = match self.panels() {
+            (0, _) => FRAME_HEIGHT_PX + ROW_HEIGHT_PX * self.0.len() as u32,
+            (lines, _) => PANEL_HEIGHT_PX * lines as u32,
+        };
+        (WIDTH_PX, height_px)
+    }
+
+    fn draw<B: DrawingBackend>(&self, area: &Area<B>) -> anyhow::Result<()> {
+        let swept = parameters(self.0);
+        if swept.is_empty() {
+            return draw_table(area, self.0);
+        }
+        for (panel, parameter) in area.split_evenly(self.panels()).iter().zip(swept) {
+            draw_sweep(panel, parameter, self.0)?;
+        }
+        Ok(())
+    }
 }
 
 /// The parameters that are swept, each once, in their order.
@@ -63,7 +61,11 @@ fn parameters(rows: &[SweptRow]) -> Vec<Parameter> {
     parameters
 }
 
-fn draw_sweep(area: &Area, parameter: Parameter, rows: &[SweptRow]) -> anyhow::Result<()> {
+fn draw_sweep<B: DrawingBackend>(
+    area: &Area<B>,
+    parameter: Parameter,
+    rows: &[SweptRow],
+) -> anyhow::Result<()> {
     let of_parameter = |row: &SweptRow| row.swept.filter(|(swept, _)| *swept == parameter);
     let mut points: Vec<(f64, &Row)> = rows
         .iter()
@@ -120,7 +122,7 @@ fn draw_sweep(area: &Area, parameter: Parameter, rows: &[SweptRow]) -> anyhow::R
 }
 
 /// Each row of the table at its height, the first at the top: the rate of right answers and its interval.
-fn draw_table(area: &Area, rows: &[SweptRow]) -> anyhow::Result<()> {
+fn draw_table<B: DrawingBackend>(area: &Area<B>, rows: &[SweptRow]) -> anyhow::Result<()> {
     let counted: Vec<&Row> = rows
         .iter()
         .map(|swept| &swept.row)

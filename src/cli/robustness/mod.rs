@@ -3,10 +3,11 @@
 mod figure;
 
 use super::args::{Format, MirroredArg, ProtocolArgs, RobustnessArgs};
-use super::output::{print, write_whole};
+use super::output::{csv_table, json_lines, print, write_whole};
 use super::resources::{bar, read_catalog, sky, thread_pool};
 use super::{Exit, Fault};
 use anyhow::Context;
+use figure::Rates;
 use starpipe::identify::Photometry;
 use starpipe::robustness::{Case, Mirrored, Parameter, Protocol, Row, run, standard_cases};
 use std::fmt::Write as _;
@@ -14,9 +15,9 @@ use std::fmt::Write as _;
 /// `starpipe robustness`
 pub(crate) fn robustness(arguments: &RobustnessArgs) -> Result<Exit, Fault> {
     let rows = rows(arguments)?;
-    if let Some(path) = &arguments.plot {
-        let figure = figure::svg(&rows).context("drawing the figure")?;
-        write_whole(&[(path.clone(), figure.into_bytes())])?;
+    if let Some(plot) = &arguments.plot {
+        let file = plot.with(&Rates(&rows)).context("drawing the figure")?;
+        write_whole(&[file])?;
     }
     // Nobody left to read it: nothing is lost.
     let _ = print(&rendered(arguments, &rows)?)?;
@@ -106,24 +107,8 @@ fn rows(arguments: &RobustnessArgs) -> Result<Vec<SweptRow>, Fault> {
 fn rendered(arguments: &RobustnessArgs, rows: &[SweptRow]) -> anyhow::Result<String> {
     match arguments.format {
         Format::Text => Ok(text(arguments, rows)),
-        Format::Json => {
-            let mut lines = String::new();
-            for swept in rows {
-                lines += &serde_json::to_string(&swept.row)?;
-                lines.push('\n');
-            }
-            Ok(lines)
-        }
-        Format::Csv => {
-            let mut writer = csv::Writer::from_writer(Vec::new());
-            for swept in rows {
-                writer.serialize(&swept.row)?;
-            }
-            let bytes = writer
-                .into_inner()
-                .map_err(csv::IntoInnerError::into_error)?;
-            Ok(String::from_utf8(bytes)?)
-        }
+        Format::Json => json_lines(rows.iter().map(|swept| &swept.row)),
+        Format::Csv => csv_table(rows.iter().map(|swept| &swept.row)),
     }
 }
 

@@ -1,0 +1,220 @@
+//! `limit`: a scenario, its prediction, sweeps over its parameters, and their figures.
+
+mod figure;
+mod parameters;
+mod text;
+
+pub(crate) use parameters::ParameterArgs;
+
+use super::args::{Format, LimitArgs, ReadingArg};
+use super::output::{csv_table, json_lines, print, write_whole};
+use super::plot::{self, Form};
+use super::{Exit, Fault, warn};
+use anyhow::{Context, anyhow};
+use figure::{Panel, Sheet};
+use serde::Serialize;
+use starpipe::sensitivity::{
+    Figure, Prediction, Reading, Scenario, ScenarioError, Series, Sweep, curves,
+};
+use starpipe::sensor::{Preset, Sensor};
+use std::path::{Path, PathBuf};
+
+/// `starpipe limit`
+pub(crate) fn limit(arguments: &LimitArgs) -> Result<Exit, Fault> {
+    let scenario = scenario(arguments)?;
+    if let Some(directory) = &arguments.figures {
+        return papers_figures(directory, &scenario);
+    }
+    let rows = rows(arguments, &scenario)?;
+    if let Some(plot) = &arguments.plot {
+        let panels = arguments
+            .sweep
+            .iter()
+            .map(|sweep| panel(&sweep.0, &scenario));
+        let sheet = Sheet::of_sweeps(panels.collect::<Result<_, _>>()?);
+        let file = plot.with(&sheet).context("drawing the figure")?;
+        write_whole(&[file])?;
+    }
+    // Nobody left to read it: nothing is lost.
+    let _ = print(&rendered(arguments.format, &rows)?)?;
+    Ok(Exit::Success)
+}
+
+/// The scenario that is asked for, in which every value makes sense.
+fn scenario(arguments: &LimitArgs) -> Result<Scenario, Fault> {
+    let mut scenario = match &arguments.camera {
+        Some(path) => Scenario::new(Sensor::read(path).map_err(anyhow::Error::from)?),
+        None => Scenario::of(arguments.preset.unwrap_or(Preset::Experiment1)),
+    };
+    match arguments.reading {
+        None => (),
+        Some(ReadingArg::Paper) => scenario.reading = Reading::Paper,
+        Some(ReadingArg::Physical) => scenario.reading = Reading::Physical,
+    }
+    let parameters = &arguments.parameters;
+    parameters
+        .apply(&mut scenario)
+        .map_err(anyhow::Error::from)?;
+    scenario
+        .check()
+        .map_err(|error| match parameters.files().next() {
+            // A curve that goes with nothing else is a fault of its file.
+            Some(path) => anyhow!(error).context(path.display().to_string()).into(),
+            None => usage(&error),
+        })?;
+    Ok(scenario)
+}
+
+fn usage(error: &ScenarioError) -> Fault {
+    Fault::Usage(error.to_string())
+}
+
+/// A prediction, and for which value of which parameter it is.
+#[derive(Serialize)]
+struct Row {
+    #[serde(flatten)]
+    prediction: Prediction,
+    preset: Option<&'static str>,
+    swept: Option<Swept>,
+}
+
+#[derive(Serialize, Clone, Copy)]
+struct Swept {
+    parameter: &'static str,
+    value: f64,
+}
+
+fn rows(arguments: &LimitArgs, scenario: &Scenario) -> Result<Vec<Row>, Fault> {
+    let preset = arguments.preset.map(Preset::name);
+    let row = |scenario: &Scenario, swept: Option<Swept>| {
+        let prediction = Prediction::new(scenario).map_err(|error| match swept {
+            Some(Swept { parameter, value }) => {
+                Fault::Usage(format!("{parameter} of {value}: {error}"))
+            }
+            None => usage(&error),
+        })?;
+        Ok::<_, Fault>(Row {
+            prediction,
+            preset,
+            swept,
+        })
+    };
+    if arguments.sweep.is_empty() {
+        return Ok(vec![row(scenario, None)?]);
+    }
+    let mut rows = Vec::new();
+    for sweep in arguments.sweep.iter().map(|sweep| &sweep.0) {
+        let parameter = sweep.parameter.name();
+        let before = rows.len();
+        let scenarios = sweep.scenarios(scenario).map_err(|error| usage(&error))?;
+        for (scenario, &value) in scenarios.iter().zip(&sweep.values) {
+            rows.push(row(scenario, Some(Swept { parameter, value }))?);
+        }
+        warn_if_flat(parameter, &rows[before..]);
+    }
+    Ok(rows)
+}
+
+/// Some parameters count in one reading only, or not for the brightest pixel.
+fn warn_if_flat(parameter: &str, rows: &[Row]) {
+    let limit = |row: &Row| row.prediction.limit_vmag;
+    if rows
+        .windows(2)
+        .all(|pair| limit(&pair[0]) == limit(&pair[1]))
+    {
+        warn(format_args!(
+            "{parameter} changes nothing: the limit is the same at each of its values"
+        ));
+    }
+}
+
+/// A panel with the curves of a sweep.
+fn panel(sweep: &Sweep, scenario: &Scenario) -> Result<Panel, Fault> {
+    let series = Series::around(scenario, sweep.parameter);
+    let curves = curves(scenario, sweep, &series).map_err(|error| usage(&error))?;
+    Ok(Panel::new(None, sweep, curves, scenario))
+}
+
+/// The eleven figures, and a sheet of all of them.
+fn papers_figures(directory: &Path, scenario: &Scenario) -> Result<Exit, Fault> {
+    let mut panels = Vec::new();
+    for figure in Figure::ALL {
+        let sweep = figure.sweep().map_err(anyhow::Error::from)?;
+        let curves = figure
+            .curves(scenario, &sweep)
+            .map_err(|error| usage(&error))?;
+        let title = format!("{}  {}", figure.id, figure.title);
+        panels.push(Panel::new(Some(title), &sweep, curves, scenario));
+    }
+    std::fs::create_dir_all(directory)
+        .with_context(|| format!("making the directory {}", directory.display()))?;
+    let file = |stem: &str, sheet: &Sheet| -> anyhow::Result<(PathBuf, Vec<u8>)> {
+        let drawing = plot::rendered(sheet, Form::Svg).context("drawing the figure")?;
+        Ok((directory.join(format!("{stem}.svg")), drawing))
+    };
+    let mut files = Vec::new();
+    for (figure, panel) in Figure::ALL.iter().zip(&panels) {
+        files.push(file(&figure.file_stem(), &Sheet::of_one(panel.clone()))?);
+    }
+    let sheet = Sheet::of_figures(panels, text::caption(scenario));
+    files.push(file("figures", &sheet)?);
+    write_whole(&files)?;
+    let paths = files
+        .iter()
+        .map(|(path, _)| format!("{}\n", path.display()));
+    let _ = print(&paths.collect::<String>())?;
+    Ok(Exit::Success)
+}
+
+/// A row of the table for programs.
+#[derive(Serialize)]
+struct TableRow<'a> {
+    parameter: Option<&'a str>,
+    value: Option<f64>,
+    limit_vmag: f64,
+    star_e: f64,
+    background_e: f64,
+    noise_e: f64,
+    snr: f64,
+    airmass: f64,
+    dark_e: f64,
+    sensor_noise_e: f64,
+    background_noise_e: f64,
+    atmosphere_transmission: f64,
+    sky_mag_arcsec2: f64,
+    pixel_area_arcsec2: f64,
+    peak_share: f64,
+    mag_0_e_s: f64,
+}
+
+impl<'a> TableRow<'a> {
+    fn new(row: &'a Row) -> Self {
+        let budget = &row.prediction.budget;
+        Self {
+            parameter: row.swept.as_ref().map(|swept| swept.parameter),
+            value: row.swept.map(|swept| swept.value),
+            limit_vmag: budget.limit_vmag,
+            star_e: budget.star_e,
+            background_e: budget.background_e,
+            noise_e: budget.noise_e,
+            snr: budget.snr,
+            airmass: budget.airmass,
+            dark_e: budget.dark_e,
+            sensor_noise_e: budget.sensor_noise_e,
+            background_noise_e: budget.background_noise_e,
+            atmosphere_transmission: budget.atmosphere_transmission,
+            sky_mag_arcsec2: budget.sky_mag_arcsec2,
+            pixel_area_arcsec2: budget.pixel_area_arcsec2,
+            peak_share: budget.peak_share,
+            mag_0_e_s: budget.mag_0_e_s,
+        }
+    }
+}
+
+fn rendered(format: Format, rows: &[Row]) -> anyhow::Result<String> {
+    match format {
+        Format::Text => Ok(text::rendered(rows)),
+        Format::Json => json_lines(rows.iter()),
+        Format::Csv => csv_table(rows.iter().map(TableRow::new)),
+    }
+}

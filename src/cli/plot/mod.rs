@@ -1,0 +1,109 @@
+//! Figures for people, as SVG or PNG.
+
+mod finer;
+
+use finer::Finer;
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::register_font;
+use starpipe::overlay;
+use std::fmt::Display;
+use std::path::PathBuf;
+
+/// The family of all letters.
+pub(crate) const FONT: &str = "sans-serif";
+/// Two colours that everybody can tell apart.
+pub(crate) const BLUE: RGBColor = RGBColor(0, 114, 178);
+pub(crate) const ORANGE: RGBColor = RGBColor(213, 94, 0);
+
+/// Where a figure goes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct PlotFile {
+    pub(crate) path: PathBuf,
+    form: Form,
+}
+
+/// What a figure is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Form {
+    Svg,
+    Png,
+}
+
+impl PlotFile {
+    /// The form is told from the name.
+    pub(crate) fn new(path: PathBuf) -> Result<Self, String> {
+        let extension = path
+            .extension()
+            .and_then(|e| e.to_str())
+            .unwrap_or_default();
+        let form = match extension.to_ascii_lowercase().as_str() {
+            "svg" => Form::Svg,
+            "png" => Form::Png,
+            _ => return Err("figures are .svg or .png".to_owned()),
+        };
+        Ok(Self { path, form })
+    }
+
+    /// The file with the figure in it, to be written.
+    pub(crate) fn with(&self, figure: &impl Figure) -> anyhow::Result<(PathBuf, Vec<u8>)> {
+        Ok((self.path.clone(), rendered(figure, self.form)?))
+    }
+}
+
+/// Part of a figure to draw on.
+pub(crate) type Area<B> = DrawingArea<B, Shift>;
+
+/// Something to be drawn.
+pub(crate) trait Figure {
+    /// Width and height.
+    fn size_px(&self) -> (u32, u32);
+
+    /// Draws it on white.
+    fn draw<B: DrawingBackend>(&self, area: &Area<B>) -> anyhow::Result<()>;
+}
+
+/// The figure as the content of a file.
+pub(crate) fn rendered(figure: &impl Figure, form: Form) -> anyhow::Result<Vec<u8>> {
+    // Without it there would be no letters: the system's fonts are not looked for.
+    register_font(FONT, FontStyle::Normal, overlay::FONT)
+        .map_err(|_| anyhow::anyhow!("the built-in font is no font"))?;
+    let (width, height) = figure.size_px();
+    match form {
+        Form::Svg => {
+            let mut drawing = String::new();
+            draw(
+                figure,
+                SVGBackend::with_string(&mut drawing, (width, height)),
+            )?;
+            Ok(drawing.into_bytes())
+        }
+        Form::Png => {
+            let size = (width * finer::FACTOR, height * finer::FACTOR);
+            let mut pixels = vec![0; size.0 as usize * size.1 as usize * 3];
+            draw(figure, Finer(BitMapBackend::with_buffer(&mut pixels, size)))?;
+            png(&pixels, size)
+        }
+    }
+}
+
+/// Red, green and blue of each pixel as the content of a PNG file.
+fn png(pixels: &[u8], (width, height): (u32, u32)) -> anyhow::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.write_header()?.write_image_data(pixels)?;
+    Ok(bytes)
+}
+
+fn draw<B: DrawingBackend>(figure: &impl Figure, backend: B) -> anyhow::Result<()> {
+    let area = backend.into_drawing_area();
+    area.fill(&WHITE).map_err(said)?;
+    figure.draw(&area)?;
+    area.present().map_err(said)
+}
+
+/// The backend's errors borrow the drawing; their words do not.
+pub(crate) fn said(error: impl Display) -> anyhow::Error {
+    anyhow::anyhow!("{error}")
+}
