@@ -18,6 +18,7 @@ pub mod report;
 pub mod robustness;
 pub mod sensitivity;
 pub mod sensor;
+pub mod simulate;
 pub mod statistics;
 pub mod units;
 pub mod wcs;

@@ -25,6 +25,18 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &["units", "observer", "sensor", "detect", "statistics"],
     ),
     (
+        "simulate",
+        &[
+            "units",
+            "coords",
+            "frame",
+            "camera",
+            "catalog",
+            "sensor",
+            "sensitivity",
+        ],
+    ),
+    (
         "identify",
         &[
             "units",
