@@ -98,6 +98,11 @@ impl ObservationDate {
         self.day.to_datetime(self.time.unwrap_or(MIDDAY))
     }
 
+    /// Whether the time of day is known.
+    pub fn has_time(&self) -> bool {
+        self.time.is_some()
+    }
+
     /// Julian years of 365.25 days since J2000.0; a day without a time counts as its middle.
     pub fn years_since_j2000(&self) -> f64 {
         self.utc().duration_since(J2000).as_secs_f64() / SECONDS_PER_JULIAN_YEAR

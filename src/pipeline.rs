@@ -35,7 +35,8 @@ use crate::identify::{
     self, Hints, Identification, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Outcome, Photometry, Sky,
     StarField,
 };
-use crate::units::ARCSEC_PER_RAD;
+use crate::observer::{Observation, Site};
+use crate::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use serde::Serialize;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -106,6 +107,8 @@ pub struct Knowledge {
     pub near: Option<(UnitVector<Icrs>, f64)>,
     /// When the frame was taken.
     pub date: Option<FrameDate>,
+    /// Where it was taken.
+    pub site: Option<Site>,
 }
 
 /// When a frame was taken, and who says so.
@@ -144,6 +147,15 @@ impl Knowledge {
     fn years_since_j2000(&self) -> f64 {
         self.date
             .map_or(0.0, |known| known.date.years_since_j2000())
+    }
+
+    /// Where in the sky the centre of an identified frame stood, where that is known.
+    fn observation(&self, outcome: &Outcome) -> Option<Observation> {
+        let Outcome::Identified(found) = outcome else {
+            return None;
+        };
+        let (boresight, _) = found.icrs_to_camera.boresight_and_up();
+        Observation::new(self.site?, &self.date?.date, &boresight)
     }
 
     /// The same with `date`, where none is known.
@@ -215,6 +227,8 @@ pub struct Solution {
     pub height: usize,
     /// When it was taken, where that is known; else the stars stand where they stood at J2000.0.
     pub date: Option<FrameDate>,
+    /// Where in the sky the frame's centre stood, where it is identified, and site and time of day are known.
+    pub observation: Option<Observation>,
     /// How long it was exposed, in seconds, where its file says so.
     pub exposure_s: Option<f64>,
     /// What the file's header says and turned out wrong, or cannot be true: a sentence each.
@@ -394,10 +408,13 @@ impl<'a> Pipeline<'a> {
             _ => self.identify(&field, &kept, &knowledge),
         };
         let outcome = self.explained(outcome, &field, &knowledge, Some((frame, &detections)));
+        let observation = knowledge.observation(&outcome);
+        notes.extend(observation.as_ref().and_then(below_horizon));
         Ok(Solution {
             width: frame.width,
             height: frame.height,
             date: knowledge.date,
+            observation,
             exposure_s: frame.metadata.exposure_s,
             notes,
             sources: detections.sources.iter().map(Source::from).collect(),
@@ -424,6 +441,7 @@ impl<'a> Pipeline<'a> {
         let all: Vec<usize> = (0..list.centroids.len()).collect();
         let outcome = self.identify(&field, &all, knowledge);
         let outcome = self.explained(outcome, &field, knowledge, None);
+        let observation = knowledge.observation(&outcome);
         let identify_ms = milliseconds_since(start);
         let source = |centroid: &ListedCentroid| Source {
             position: centroid.position,
@@ -434,8 +452,13 @@ impl<'a> Pipeline<'a> {
             width: list.width,
             height: list.height,
             date: knowledge.date,
+            notes: observation
+                .as_ref()
+                .and_then(below_horizon)
+                .into_iter()
+                .collect(),
+            observation,
             exposure_s: None,
-            notes: Vec::new(),
             sources: list.centroids.iter().map(source).collect(),
             background: None,
             outcome,
@@ -525,6 +548,16 @@ fn contradiction(hint: &ScaleHint, found: &Identification, width_px: f64) -> Opt
     (!(low..=high).contains(&true_scale)).then(|| {
         format!(
             "the header's focal length and pixel size are not this frame's: they mean {low:.1}″ to {high:.1}″ a pixel"
+        )
+    })
+}
+
+/// What to say of a frame of what cannot have been seen.
+fn below_horizon(observation: &Observation) -> Option<String> {
+    let depth_deg = observation.zenith_distance_rad * DEG_PER_RAD - 90.0;
+    observation.apparent.is_none().then(|| {
+        format!(
+            "the site, the date and the attitude contradict each other: the frame's centre stands {depth_deg:.1}° below the horizon"
         )
     })
 }

@@ -1,5 +1,10 @@
 //! Probabilities.
 
+/// The probability that a standard normal number lies above `z`.
+pub fn normal_tail(z: f64) -> f64 {
+    0.5 * libm::erfc(z * std::f64::consts::FRAC_1_SQRT_2)
+}
+
 /// log10 of the probability of `hits` or more successes in `trials` at `chance` each.
 pub fn log10_binomial_tail(trials: usize, hits: usize, chance: f64) -> f64 {
     if hits == 0 || chance >= 1.0 {

@@ -224,6 +224,55 @@ fn json_has_the_fields_of_schema_1() {
 }
 
 #[test]
+fn a_site_that_is_not_on_the_earth_is_refused() {
+    for (site, expected) in [
+        ("91,0", "latitude"),
+        ("-50,361", "longitude"),
+        ("50,0,1e6", "height"),
+        ("NaN,0", "NaN"),
+        ("50", "comma"),
+        ("50;10", "comma"),
+    ] {
+        for command in ["process", "identify"] {
+            let ran = run(&[command, "--site", site, "a.png"]);
+            assert_eq!((ran.status, ran.stdout.as_str()), (2, ""), "{site}");
+            assert!(ran.stderr.contains(expected), "{site}: {}", ran.stderr);
+        }
+    }
+}
+
+#[test]
+fn with_site_and_time_the_frame_has_a_zenith_distance() {
+    let report = |arguments: &[&str]| {
+        let frame = orion();
+        let mut command = starpipe();
+        command
+            .args(["process", "--format", "json"])
+            .args(arguments);
+        Ran::new(command.arg(&frame)).reports().remove(0)
+    };
+    let winter = "2020-01-15T22:00:00Z";
+    let seen = report(&["--site", "50,10,300", "--date", winter]);
+    // Orion is south of the zenith by about the site's latitude then.
+    let zenith_distance_deg = number(&seen, "/observation/zenith_distance_deg");
+    assert!((zenith_distance_deg - 51.0).abs() < 3.0, "{seen}");
+    assert!((number(&seen, "/observation/azimuth_deg") - 180.0).abs() < 20.0);
+    assert!((number(&seen, "/observation/airmass") - 1.59).abs() < 0.1);
+    assert_eq!(seen["observation"]["site"]["height_m"], 300.0);
+    for unknown in [
+        &["--site", "50,10"][..],
+        &["--site", "50,10", "--date", "2020-01-15"],
+        &["--date", winter],
+    ] {
+        assert_eq!(report(unknown)["observation"], Value::Null, "{unknown:?}");
+    }
+    let summer = report(&["--site", "50,10", "--date", "2020-07-15T22:00:00Z"]);
+    assert_eq!(summer["observation"]["airmass"], Value::Null);
+    let note = summer["notes"][0].as_str().unwrap();
+    assert!(note.contains("below the horizon"), "{note}");
+}
+
+#[test]
 fn hints_that_fit_help_and_hints_that_do_not_are_believed() {
     let frame = orion();
     let fits = run(&[

@@ -63,12 +63,13 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "detect",
             "identify",
             "diagnosis",
+            "observer",
         ],
     ),
     (
         "report",
         &[
-            "units", "coords", "camera", "catalog", "detect", "identify", "pipeline",
+            "units", "coords", "camera", "catalog", "detect", "identify", "observer", "pipeline",
         ],
     ),
     (

@@ -3,6 +3,7 @@
 use super::values;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use starpipe::epoch::ObservationDate;
+use starpipe::observer::Site;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -34,7 +35,7 @@ pub(crate) enum Command {
     #[command(after_help = "Examples:\n  \
         starpipe process night.tif\n  \
         starpipe process --fov 11.4 --near 83.8,-1.2 --radius 10 night.tif\n  \
-        starpipe process --date 2019-07-29T22:47+02:00 night.tif\n  \
+        starpipe process --date 2019-07-29T22:47+02:00 --site 52.22,4.42 night.tif\n  \
         starpipe process --format json --out results night/ > night.jsonl\n  \
         starpipe process --page 2 night.fits\n  \
         funpack -S night.fits.fz | starpipe process -\n\n\
@@ -151,6 +152,10 @@ pub(crate) struct HintArgs {
     /// frames, the date in the file's header, else in its name; else 2000]
     #[arg(long, value_name = "ISO8601", allow_hyphen_values = true)]
     pub(crate) date: Option<ObservationDate>,
+    /// Where they were taken: latitude and longitude (north and east positive) in degrees, and height in metres; with
+    /// the time, that gives zenith distance and airmass
+    #[arg(long, value_name = "LAT,LON[,HEIGHT_M]", allow_hyphen_values = true)]
+    pub(crate) site: Option<Site>,
 }
 
 #[derive(Debug, Args)]

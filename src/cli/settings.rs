@@ -47,6 +47,7 @@ impl HintArgs {
                 date,
                 source: DateSource::Option,
             }),
+            site: self.site,
         })
     }
 }

@@ -61,6 +61,11 @@ impl Kernel {
         self.sum_of_squares.sqrt()
     }
 
+    /// The weights at distances 0, 1, … pixels.
+    pub fn half(&self) -> &[f32] {
+        &self.half
+    }
+
     /// Distance from the centre to the last weight, in pixels.
     pub fn radius(&self) -> usize {
         self.half.len() - 1

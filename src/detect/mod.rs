@@ -28,6 +28,7 @@ mod background_map;
 mod calibrate;
 mod centroid;
 mod components;
+mod expected;
 mod fit;
 mod matched_filter;
 mod measure;
@@ -42,6 +43,7 @@ mod threshold;
 mod view;
 
 pub use background_map::BackgroundMap;
+pub use expected::FilterModel;
 
 use crate::coords::PixelPoint;
 use crate::frame::{Frame, MIN_SIDE_PX};
@@ -406,9 +408,8 @@ fn search(
         },
     );
     calibration.threshold = config.threshold_sigma.unwrap_or_else(|| {
-        let u = threshold::threshold_for_rate(config.false_alarms_per_mpx, kernel.rho, kernel.rho);
-        let degrees = noise_degrees(view, config, calibration.spot_px);
-        let u = threshold::for_estimated_noise(u, degrees);
+        let size = (view.width, view.height);
+        let u = gaussian_threshold(config, size, calibration.spot_px, &kernel);
         raised_for_noise(u, view, calibration.spot_px, &kernel, workspace)
     });
     let spot_width_px = (calibration.spot_px.powi(2) + psf::PIXEL_VARIANCE_PX2).sqrt();
@@ -482,13 +483,24 @@ fn is_cut_off(view: &View<'_>, background: &Mesh) -> bool {
 /// One pixel in so many at the lowest value is a sign that the noise is cut off there.
 const LEAST_CUT_OFF: usize = 50;
 
+/// The threshold in Gaussian noise that is measured on the frame itself, in standard deviations.
+fn gaussian_threshold(
+    config: &DetectConfig,
+    size: (usize, usize),
+    spot_px: f64,
+    kernel: &Kernel,
+) -> f64 {
+    let u = threshold::threshold_for_rate(config.false_alarms_per_mpx, kernel.rho, kernel.rho);
+    threshold::for_estimated_noise(u, noise_degrees(size, config, spot_px))
+}
+
 /// The degrees of freedom of the local noise estimate: the independent samples in a cell (a value of
 /// the filtered frame has relatives in 2πs² pixels), and a gain of 5 from the median of 3x3 cells.
-fn noise_degrees(view: &View<'_>, config: &DetectConfig, spot_px: f64) -> f64 {
+fn noise_degrees((width, height): (usize, usize), config: &DetectConfig, spot_px: f64) -> f64 {
     const SMOOTHING_GAIN: f64 = 5.0;
     const EFFICIENCY: f64 = 0.8;
-    let cell = (view.width.min(config.cell_px) * view.height.min(config.cell_px)) as f64;
-    let cells = ((view.width * view.height) as f64 / cell).max(1.0);
+    let cell = (width.min(config.cell_px) * height.min(config.cell_px)) as f64;
+    let cells = ((width * height) as f64 / cell).max(1.0);
     let relatives = std::f64::consts::TAU * (spot_px.powi(2) + psf::PIXEL_VARIANCE_PX2);
     (EFFICIENCY * cell / relatives.max(1.0) * SMOOTHING_GAIN.min(cells)).max(3.0)
 }

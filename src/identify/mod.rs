@@ -2,6 +2,7 @@
 
 mod cache;
 pub mod index;
+mod predict;
 mod refine;
 mod search;
 mod sky;
@@ -9,6 +10,7 @@ pub mod triangle;
 mod verify;
 
 pub use cache::CacheError;
+pub use predict::{PredictedStar, View};
 pub use search::LOG10_FALSE_ALARM_LIMIT;
 pub use sky::Sky;
 

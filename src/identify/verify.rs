@@ -11,12 +11,12 @@
 //! looked for, and say nothing; every two parameters fitted beyond pointing, roll and scale use up another star. The stars used
 //! up are taken to be those least likely to agree by chance, which makes the most of the others' chances.
 
+use super::predict::{PredictedStar, View};
 use super::search::MAX_HYPOTHESES;
 use super::{ObservedStar, Photometry, Sky, StarField, StarMatch};
 use crate::attitude::POSE_PARAMETERS;
 use crate::camera::CameraModel;
-use crate::catalog::sky_grid::GridStar;
-use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
+use crate::coords::{Camera, Icrs, Rotation};
 use crate::statistics::log10_poisson_binomial_tail;
 use crate::units::RAD_PER_DEG;
 use std::f64::consts::PI;
@@ -38,25 +38,6 @@ const LARGEST_RADIUS_SHARE: f64 = 0.014;
 const MAG_TOLERANCES: [f64; 3] = [0.25, 0.5, 1.0];
 /// Radius of the neighbourhood whose density of predicted stars counts, in units of the radius of agreement.
 const NEIGHBOURHOOD: f64 = 8.0;
-
-/// Stars predicted so far outside the frame, in units of its diagonal, may still be seen on it.
-const MARGIN: f64 = 0.01;
-
-/// Lenses shift stars by no more than so much of the frame's half diagonal.
-const UNDISTORTED_MARGIN: f64 = 0.1;
-
-/// A catalogue star where the hypothesis puts it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PredictedStar {
-    /// Its place in the frame.
-    pub pixel: PixelPoint,
-    /// Its direction at the time of the frame.
-    pub direction: UnitVector<Icrs>,
-    /// V magnitude.
-    pub v_mag: f32,
-    /// Index into the catalogue's stars.
-    pub catalog: usize,
-}
 
 /// Where the camera is supposed to look.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,7 +90,12 @@ impl Hypothesis {
             Depth::Count(count) => (count, sky.magnitude_of_density(self.per_sq_deg(count))),
         };
         loop {
-            let mut predicted = self.predict_to(sky, limit, field.years_since_j2000);
+            let view = View {
+                camera: &self.camera,
+                icrs_to_camera: &self.icrs_to_camera,
+                years_since_j2000: field.years_since_j2000,
+            };
+            let mut predicted = view.stars_to(sky, limit);
             if predicted.len() >= wanted || limit > sky.faintest_v_mag() {
                 if wanted > 0 {
                     predicted.truncate(wanted);
@@ -133,39 +119,6 @@ impl Hypothesis {
     /// The density of so many stars in the frame.
     fn per_sq_deg(&self, count: usize) -> f64 {
         count as f64 * RAD_PER_DEG.powi(2) / (self.camera.fov_x_rad() * self.camera.fov_y_rad())
-    }
-
-    fn predict_to(&self, sky: &Sky, faintest_v_mag: f64, years: f64) -> Vec<PredictedStar> {
-        let margin_px = MARGIN * self.camera.width_px.hypot(self.camera.height_px);
-        let radius_rad = self.camera.radius_rad() * (1.0 + 2.0 * MARGIN);
-        let centre = self.icrs_to_camera.inverse().apply(&UnitVector::BORESIGHT);
-        // The cone is rounder than the frame: most of what it holds beside it needs no closer look.
-        let nearly_px = margin_px + UNDISTORTED_MARGIN * self.camera.radius_px();
-        let pinhole = CameraModel {
-            distortion: None,
-            ..self.camera.clone()
-        };
-        let mut predicted = Vec::new();
-        let mut look = |star: &GridStar| {
-            let direction = sky.stars()[star.catalog as usize].direction_at(years);
-            let in_camera = self.icrs_to_camera.apply(&direction);
-            let near = |p: &PixelPoint| self.camera.nearly_contains(p, nearly_px);
-            let inside = |p: &PixelPoint| self.camera.nearly_contains(p, margin_px);
-            let undistorted = pinhole.pixel_of(&in_camera).filter(near);
-            let pixel = undistorted.and_then(|_| self.camera.pixel_of(&in_camera));
-            if let Some(pixel) = pixel.filter(inside) {
-                predicted.push(PredictedStar {
-                    pixel,
-                    direction,
-                    v_mag: star.v_mag,
-                    catalog: star.catalog as usize,
-                });
-            }
-        };
-        sky.grid
-            .for_each_within(&centre, radius_rad, faintest_v_mag as f32, &mut look);
-        predicted.sort_unstable_by_key(|star| star.catalog);
-        predicted
     }
 
     /// Pairs observed and predicted stars of about the same brightness that lie within `radius_px` of each
@@ -438,6 +391,7 @@ fn search_weight(hypotheses: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::coords::{PixelPoint, UnitVector};
 
     #[test]
     fn a_whole_search_has_a_bounded_chance() {

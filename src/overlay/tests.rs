@@ -43,6 +43,7 @@ fn solution(width: usize, height: usize, outcome: Outcome) -> Solution {
             source(500.0, 400.0, star),
             source(700.0, 100.0, hot),
         ],
+        observation: None,
         exposure_s: None,
         notes: Vec::new(),
         background: Some(Background {

@@ -4,12 +4,14 @@ use super::reason;
 use super::rounding::{finite, half_turn_deg, significant, to_decimals, to_significant, turn_deg};
 use super::{
     AttitudeReport, AttitudeSigma, BackgroundReport, DateReport, DistortionReport, FrameReport,
-    MagnitudeReport, MatchReport, OpticsReport, SCHEMA, StarReport, Status, TimingReport,
+    MagnitudeReport, MatchReport, ObservationReport, OpticsReport, SCHEMA, SiteReport, StarReport,
+    Status, TimingReport,
 };
 use crate::camera::Distortion;
 use crate::catalog::Catalog;
 use crate::detect::DetectionFlags;
 use crate::identify::{Identification, Outcome, StarMatch};
+use crate::observer::Observation;
 use crate::pipeline::{Background, FrameDate, Solution, Source, Timing};
 use crate::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 
@@ -17,6 +19,8 @@ use crate::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 const PIXEL_DECIMALS: i32 = 4;
 /// Decimals of a direction in degrees: 0.4 milliarcseconds.
 const DIRECTION_DECIMALS: i32 = 7;
+/// Decimals of an angle in the observer's sky, in degrees: 0.4″, and what is left out is more.
+const HORIZON_DECIMALS: i32 = 4;
 /// Decimals of a year: an hour.
 const YEAR_DECIMALS: i32 = 4;
 /// Significant digits of a flux.
@@ -33,6 +37,7 @@ impl FrameReport {
             width: solution.width,
             height: solution.height,
             date: solution.date.as_ref().map(date),
+            observation: solution.observation.as_ref().map(observation),
             exposure_s: solution
                 .exposure_s
                 .and_then(|s| significant(s, FLUX_DIGITS)),
@@ -81,6 +86,22 @@ fn date(known: &FrameDate) -> DateReport {
         iso: known.date.to_iso(),
         year: to_decimals(known.date.julian_epoch(), YEAR_DECIMALS),
         source: known.source,
+    }
+}
+
+fn observation(seen: &Observation) -> ObservationReport {
+    let deg = |angle_rad: f64| to_decimals(angle_rad * DEG_PER_RAD, HORIZON_DECIMALS);
+    let site = &seen.site;
+    ObservationReport {
+        site: SiteReport {
+            lat_deg: to_decimals(site.lat_deg(), DIRECTION_DECIMALS),
+            lon_deg: to_decimals(site.lon_deg(), DIRECTION_DECIMALS),
+            height_m: to_decimals(site.height_m(), 2),
+        },
+        zenith_distance_deg: deg(seen.zenith_distance_rad),
+        apparent_zenith_distance_deg: seen.apparent.map(|a| deg(a.zenith_distance_rad)),
+        azimuth_deg: turn_deg(seen.azimuth_rad * DEG_PER_RAD, HORIZON_DECIMALS),
+        airmass: seen.apparent.map(|a| to_decimals(a.airmass, 4)),
     }
 }
 

@@ -37,6 +37,8 @@ pub struct FrameReport {
     pub height: usize,
     /// When it was taken, where that is known; else the stars stand where they stood at J2000.0.
     pub date: Option<DateReport>,
+    /// Where in the sky the frame's centre stood, where it is identified, and site and time of day are known.
+    pub observation: Option<ObservationReport>,
     /// How long it was exposed, in seconds, where its file says so.
     pub exposure_s: Option<f64>,
     /// What the file's header says and turned out wrong, or cannot be true: a sentence each.
@@ -73,6 +75,32 @@ pub struct DateReport {
     pub year: f64,
     /// `option`, `file header` or `file name`.
     pub source: DateSource,
+}
+
+/// Where in the sky the frame's centre stood.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ObservationReport {
+    /// The site.
+    pub site: SiteReport,
+    /// True zenith distance, without refraction, in degrees.
+    pub zenith_distance_deg: f64,
+    /// Zenith distance with refraction, in degrees; none below the horizon.
+    pub apparent_zenith_distance_deg: Option<f64>,
+    /// Azimuth from north through east, in degrees, in [0, 360).
+    pub azimuth_deg: f64,
+    /// Air in the line of sight, in units of that to the zenith; none below the horizon.
+    pub airmass: Option<f64>,
+}
+
+/// A place on the Earth.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SiteReport {
+    /// Geodetic latitude in degrees, north positive.
+    pub lat_deg: f64,
+    /// Longitude in degrees, east positive.
+    pub lon_deg: f64,
+    /// Height in metres.
+    pub height_m: f64,
 }
 
 /// Whether the stars of a frame are identified.

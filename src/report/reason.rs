@@ -159,6 +159,7 @@ mod tests {
             height: 100,
             date: None,
             sources: vec![source; detections],
+            observation: None,
             exposure_s: None,
             notes: Vec::new(),
             background: None,

@@ -28,6 +28,7 @@ fn unidentified() -> FrameReport {
         width: 1024,
         height: 768,
         date: None,
+        observation: None,
         exposure_s: None,
         notes: Vec::new(),
         status: Status::NotIdentified,
@@ -61,6 +62,17 @@ fn identified() -> FrameReport {
             iso: "2019-07-29T20:47:26Z".into(),
             year: 2019.5739,
             source: DateSource::FileName,
+        }),
+        observation: Some(ObservationReport {
+            site: SiteReport {
+                lat_deg: 52.22,
+                lon_deg: 4.42,
+                height_m: 3.0,
+            },
+            zenith_distance_deg: 50.1234,
+            apparent_zenith_distance_deg: Some(50.1035),
+            azimuth_deg: 225.1,
+            airmass: Some(1.5553),
         }),
         exposure_s: Some(0.5),
         notes: vec![

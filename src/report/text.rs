@@ -2,7 +2,8 @@
 
 use super::rounding::decimals_for;
 use super::{
-    AttitudeReport, FrameReport, MagnitudeReport, MatchReport, OpticsReport, StarReport, angles,
+    AttitudeReport, FrameReport, MagnitudeReport, MatchReport, ObservationReport, OpticsReport,
+    StarReport, angles,
 };
 use crate::pipeline::DateSource;
 
@@ -38,6 +39,7 @@ impl FrameReport {
                 .map(|magnitude| self.faintest_line(magnitude)),
         );
         lines.push(self.date_line());
+        lines.extend(self.observation.iter().map(observation_line));
         lines.extend(self.notes.iter().map(|note| labelled("note", note)));
         lines.extend(self.background_line());
         lines.push(self.timing_line());
@@ -129,6 +131,20 @@ impl FrameReport {
         }
         lines
     }
+}
+
+fn observation_line(seen: &ObservationReport) -> String {
+    let azimuth_deg = seen.azimuth_deg;
+    let text = match (seen.apparent_zenith_distance_deg, seen.airmass) {
+        (Some(apparent_deg), Some(airmass)) => format!(
+            "{apparent_deg:.2}° from the zenith, azimuth {azimuth_deg:.2}°, airmass {airmass:.3}"
+        ),
+        _ => format!(
+            "{:.2}° from the zenith, azimuth {azimuth_deg:.2}°",
+            seen.zenith_distance_deg
+        ),
+    };
+    labelled("sky", &text)
 }
 
 fn attitude_lines(attitude: &AttitudeReport) -> Vec<String> {

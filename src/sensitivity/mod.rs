@@ -5,6 +5,8 @@
 //! 1. [`Atmosphere`](Conditions): what is left of the light at each wavelength and zenith distance.
 //! 2. The star's electrons on its brightest pixel, and those of the sky, for a star of magnitude 0.
 //! 3. The noise, and the signal that stands above it by the wanted ratio: the limiting magnitude of the peak-pixel rule.
+//! 4. [`Detector`]: what a detector makes of it, the peak-pixel rule and the matched filter as built: completeness.
+//! 5. [`Faintest`]: the faintest star to be expected among so many.
 //!
 //! There are two readings. [`Reading::Paper`] is the paper's equations (1) to (12) as its authors used them.
 //! [`Reading::Physical`] is the same budget with the physics put right.
@@ -13,11 +15,15 @@
 //! Tong, Li & Wang 2014, Acta Optica Sinica 34, 1004003, doi 10.3788/AOS201434.1004003.
 
 mod budget;
+mod completeness;
 mod conditions;
+mod faintest;
 mod light;
 mod parameters;
 
 pub use budget::{Band, Budget};
+pub use completeness::{Detector, Rule};
 pub use conditions::{Conditions, Extinction, Reading, Scenario, ScenarioError, SkyBrightness};
+pub use faintest::Faintest;
 pub use light::{ILLUMINANCE_OF_MAG_0_LX, LUMINANCE_OF_MAG_0_CD_M2};
 pub use parameters::{CONDITION_KEYS, Parameter, UnknownParameter};

@@ -93,6 +93,7 @@ fn solution(camera: CameraModel, attitude: Rotation<Icrs, Camera>) -> Solution {
         height: camera.height_px as usize,
         date: None,
         sources: Vec::new(),
+        observation: None,
         exposure_s: None,
         notes: Vec::new(),
         background: None,
