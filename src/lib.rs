@@ -7,6 +7,7 @@ pub mod coords;
 pub mod detect;
 pub mod diagnosis;
 pub mod epoch;
+pub mod experiment;
 pub mod files;
 pub mod frame;
 pub mod identify;

@@ -84,6 +84,24 @@ const MAY_USE: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "experiment",
+        &[
+            "units",
+            "coords",
+            "epoch",
+            "observer",
+            "sensor",
+            "frame",
+            "catalog",
+            "detect",
+            "sensitivity",
+            "simulate",
+            "identify",
+            "pipeline",
+            "report",
+        ],
+    ),
+    (
         "overlay",
         &[
             "units", "coords", "camera", "catalog", "detect", "frame", "identify", "pipeline",

@@ -4,6 +4,7 @@ mod args;
 mod batch;
 mod cache;
 mod centroids;
+mod experiment;
 mod import;
 mod input;
 mod output;
@@ -66,6 +67,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Identify(arguments) => solve::identify(arguments),
         Command::Catalog(arguments) => import::catalog(arguments),
         Command::Robustness(arguments) => robustness::robustness(&arguments),
+        Command::Experiment(arguments) => experiment::experiment(&arguments),
     };
     match done {
         Ok(exit) => exit.into(),

@@ -13,8 +13,8 @@ mod rounding;
 mod table;
 mod text;
 
-#[cfg(feature = "overlay")]
 pub(crate) use angles::{degrees, hours};
+pub(crate) use rounding::to_decimals;
 pub use table::{TABLE_COLUMNS, write_table_header};
 pub use text::{STARS_SHOWN, TextOptions, counted, printable};
 
