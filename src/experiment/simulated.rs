@@ -169,12 +169,9 @@ impl<'a> Light<'a> {
             let exponent: f64 = terms.map(|(d, variance)| d * d / variance).sum();
             star.electrons * (-0.5 * exponent).exp()
         };
-        let all: f64 = self.truth.stars.iter().map(light).sum();
-        let owner = self
-            .truth
-            .stars
-            .iter()
-            .find(|star| 2.0 * light(star) > all)?;
+        let stars = || self.truth.stars.iter().chain(&self.truth.beyond);
+        let all: f64 = stars().map(light).sum();
+        let owner = stars().find(|star| 2.0 * light(star) > all)?;
         (owner.position.distance_to(place) < AT_PLACE_PX).then_some(owner)
     }
 }

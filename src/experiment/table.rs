@@ -60,7 +60,7 @@ pub struct FieldReport {
     pub log10_false_alarm: f64,
 }
 
-/// The list that the paper's table is. Its magnitudes are used as brightness only: their zero point counts as unknown.
+/// The list that the paper's table is.
 pub(super) fn centroids(published: &Published, scenario: &Scenario) -> CentroidList {
     let listed = published.stars.iter().map(|star| ListedCentroid {
         position: star.position(),
@@ -70,7 +70,7 @@ pub(super) fn centroids(published: &Published, scenario: &Scenario) -> CentroidL
     CentroidList {
         width: scenario.sensor.width_px,
         height: scenario.sensor.height_px,
-        photometry: Photometry::Instrumental,
+        photometry: Photometry::JohnsonV,
         centroids: listed.collect(),
     }
 }

@@ -25,7 +25,7 @@ impl ExperimentReport {
 
 fn limit_text(limit: &LimitReport) -> String {
     format!(
-        "\nThe limit, in V\n  {:.2}  by the paper's equations; the paper prints {:.2}, and its faintest star has {:.2}\n           {:.2}  of this detector, whose filter adds up the light of a spot: it finds half of such stars\n",
+        "\nThe limit, in V\n  {:.2}  by the paper's equations; the paper prints {:.2}, and its faintest star has {:.2}\n  {:.2}  of this detector, whose filter adds up the light of a spot: it finds half of such stars\n",
         limit.limit_vmag,
         limit.paper_limit_vmag,
         limit.paper_faintest_vmag,
@@ -35,7 +35,7 @@ fn limit_text(limit: &LimitReport) -> String {
 
 fn table_text(table: &TableReport) -> String {
     let mut text = format!(
-        "\nThe paper's stars, from its centroids and their order of brightness: {} of {} are the paper's\n           {:<10} {:<14} {:>5} {:>8} {:>8} {:>9}\n",
+        "\nThe paper's stars, from its centroids and magnitudes: {} of {} are the paper's\n  {:<10} {:<14} {:>5} {:>8} {:>8} {:>9}\n",
         table.right,
         table.stars.len(),
         "paper",
@@ -120,7 +120,7 @@ fn simulated_text(simulated: &SimulatedReport, limit: &LimitReport) -> String {
     let expected = simulated.expected.map_or(f64::NAN, |e| e.stars_found);
     let _ = writeln!(
         text,
-        "  stars named           {:.1} a frame, {:.1} expected; {} on all frames at the light of another star or of none,\n                                 on {} frames the faintest among them",
+        "  stars named           {:.1} a frame, {:.1} expected; {} on all frames at the light of another star or of none,\n                        on {} frames the faintest among them",
         simulated.stars_named, expected, simulated.named_wrongly, simulated.faintest_wrong
     );
     let _ = writeln!(

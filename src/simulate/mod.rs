@@ -42,6 +42,8 @@ pub struct View {
 pub struct Truth {
     /// The stars whose place is on the frame, in the order of the catalogue.
     pub stars: Vec<TrueStar>,
+    /// Those just beyond its border that send light into it, in the same order.
+    pub beyond: Vec<TrueStar>,
 }
 
 /// A star that is on a frame.
@@ -81,14 +83,15 @@ pub fn frame_of_sky(
     seed: u64,
 ) -> Result<(Frame, Truth), FrameError> {
     let spot = Spot::of(scenario);
-    let mut seen = stars_near(scenario, view, stars, spot.reach_px());
+    let seen = stars_near(scenario, view, stars, spot.reach_px());
     let sources: Vec<_> = seen
         .iter()
         .map(|star| (star.position, star.electrons))
         .collect();
     let frame = expose(scenario, &sources, seed)?;
-    seen.retain(|star| view.camera.contains(&star.position));
-    Ok((frame, Truth { stars: seen }))
+    let on_frame = |star: &TrueStar| view.camera.contains(&star.position);
+    let (stars, beyond) = seen.into_iter().partition(on_frame);
+    Ok((frame, Truth { stars, beyond }))
 }
 
 /// A frame of stars at these places, of these V magnitudes.
@@ -190,7 +193,7 @@ mod tests {
         };
         let stars = [star_at(-1.5, 300.0), star_at(100.25, 200.75)];
         let (frame, truth) = frame_of_sky(&scenario, &view, &stars, 7).unwrap();
-        assert_eq!(truth.stars.len(), 1);
+        assert_eq!((truth.stars.len(), truth.beyond.len()), (1, 1));
         let found = &truth.stars[0];
         assert_eq!((found.catalog, found.v_mag), (1, 2.0));
         assert!(found.position.distance_to(&PixelPoint::new(100.25, 200.75)) < 1e-6);
