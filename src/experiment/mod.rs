@@ -25,8 +25,8 @@ mod table;
 mod text;
 
 pub use published::{Published, PublishedStar};
-pub use summary::{CompletenessBin, Deviation, ExpectedFaintest, SimulatedReport};
-pub use table::{TableReport, TableStar};
+pub use summary::{CompletenessBin, ExpectedFaintest, FoundFaintest, SimulatedReport};
+pub use table::{FieldReport, TableReport, TableStar};
 
 use crate::detect::{DetectError, Workspace};
 use crate::frame::{Frame, FrameError};

@@ -52,9 +52,7 @@ pub(super) struct StarTrial {
 /// What was identified in a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Identified {
-    /// Stars named.
-    pub stars: usize,
-    /// Of them, those that are named at the light of another star, or of none.
+    /// Stars named at the light of another star, or of none.
     pub wrong: usize,
     /// V of the faintest star named.
     pub faintest_vmag: f64,
@@ -190,7 +188,6 @@ fn identified(
     // The catalogue is in the order of magnitude.
     let faintest = found.matches.iter().max_by_key(|m| m.catalog)?;
     Some(Identified {
-        stars: found.matches.len(),
         wrong: found.matches.iter().filter(|m| is_wrong(m)).count(),
         faintest_vmag: f64::from(stars[faintest.catalog].v_mag),
         faintest_is_wrong: is_wrong(faintest),

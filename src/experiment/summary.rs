@@ -17,10 +17,10 @@ pub struct SimulatedReport {
     /// Frames identified.
     pub frames_identified: usize,
     /// The faintest star named, over the frames; none where no frame was identified.
-    pub faintest: Option<Deviation>,
+    pub faintest: Option<FoundFaintest>,
     /// What is to be expected of it, given the stars on the frames and the detector's completeness.
     pub expected: Option<ExpectedFaintest>,
-    /// Stars named on a frame, on average.
+    /// Stars named on a frame, on average over those that are identified.
     pub stars_named: f64,
     /// Stars named on all frames where the light is another star's, or no star's.
     pub named_wrongly: usize,
@@ -30,16 +30,16 @@ pub struct SimulatedReport {
     pub completeness: Vec<CompletenessBin>,
 }
 
-/// A quantity over the frames.
+/// The faintest star named, over the frames.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Deviation {
-    /// Mean.
+pub struct FoundFaintest {
+    /// Mean of its V magnitude.
     pub mean_vmag: f64,
     /// Standard deviation of one frame.
     pub sigma_mag: f64,
-    /// The brightest.
+    /// On the frame on which it is brightest.
     pub least_vmag: f64,
-    /// The faintest.
+    /// On the frame on which it is faintest.
     pub most_vmag: f64,
     /// Mean less what is expected.
     pub difference_mag: Option<f64>,
@@ -83,13 +83,14 @@ impl SimulatedReport {
             .collect();
         let faintest: Vec<f64> = identified.iter().map(|i| i.faintest_vmag).collect();
         let expected = ExpectedFaintest::over(trials);
-        let named = identified.iter().map(|i| i.stars).sum::<usize>();
+        let stars = trials.iter().flat_map(|trial| &trial.stars);
+        let named = stars.filter(|star| star.identified).count();
         Self {
             frames: trials.len(),
             seed,
             shift_px: SHIFT_PX,
             frames_identified: identified.len(),
-            faintest: Deviation::of(&faintest, expected.as_ref()),
+            faintest: FoundFaintest::of(&faintest, expected.as_ref()),
             expected,
             stars_named: to_decimals(named as f64 / identified.len().max(1) as f64, 2),
             named_wrongly: identified.iter().map(|i| i.wrong).sum(),
@@ -99,7 +100,7 @@ impl SimulatedReport {
     }
 }
 
-impl Deviation {
+impl FoundFaintest {
     fn of(vmags: &[f64], expected: Option<&ExpectedFaintest>) -> Option<Self> {
         let count = vmags.len() as f64;
         let mean = vmags.iter().sum::<f64>() / count;

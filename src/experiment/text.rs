@@ -24,26 +24,33 @@ impl ExperimentReport {
 }
 
 fn limit_text(limit: &LimitReport) -> String {
-    format!(
-        "\nThe limit, in V\n  {:.2}  by the paper's equations; the paper prints {:.2}, and its faintest star has {:.2}\n  {:.2}  of this detector, whose filter adds up the light of a spot: it finds half of such stars\n",
+    let (found, printed, faintest) = (
         limit.limit_vmag,
         limit.paper_limit_vmag,
         limit.paper_faintest_vmag,
-        limit.detector_limit_vmag
+    );
+    format!(
+        "\nThe limit\n{}{}",
+        format_args!(
+            "  V {found:.2} by the paper's equations; the paper prints {printed:.2}, and its faintest star has {faintest:.2}\n"
+        ),
+        format_args!(
+            "  V {:.2} of this detector, which finds half of such stars: its filter adds up the light of a spot\n",
+            limit.detector_limit_vmag
+        )
     )
 }
 
 fn table_text(table: &TableReport) -> String {
     let mut text = format!(
-        "\nThe paper's stars, from its centroids and magnitudes: {} of {} are the paper's\n  {:<10} {:<14} {:>5} {:>8} {:>8} {:>9}\n",
+        "\nThe paper's stars, from its centroids and magnitudes: {} of {} are the paper's\n",
         table.right,
-        table.stars.len(),
-        "paper",
-        "found",
-        "V",
-        "x",
-        "y",
-        "residual"
+        table.stars.len()
+    );
+    let _ = writeln!(
+        text,
+        "  {:<10} {:<14} {:>5} {:>8} {:>8} {:>9}",
+        "paper", "found", "V", "x", "y", "residual"
     );
     for star in &table.stars {
         let residual = star
@@ -94,39 +101,51 @@ fn simulated_text(simulated: &SimulatedReport, limit: &LimitReport) -> String {
         "\n{} frames simulated with that camera, sky and pointing, moved by up to ±{} px: {} identified\n",
         simulated.frames, simulated.shift_px, simulated.frames_identified
     );
+    let mut line = |label: &str, value: String| {
+        let _ = writeln!(text, "  {label:<20} {value}");
+    };
     if let Some(faintest) = &simulated.faintest {
-        let _ = writeln!(
-            text,
-            "  faintest star named   V {:.2}, scatter {:.2}, from {:.2} to {:.2}",
-            faintest.mean_vmag, faintest.sigma_mag, faintest.least_vmag, faintest.most_vmag
-        );
+        let (mean, sigma) = (faintest.mean_vmag, faintest.sigma_mag);
+        let (least, most) = (faintest.least_vmag, faintest.most_vmag);
+        let found = format!("V {mean:.2}, scatter {sigma:.2}, from {least:.2} to {most:.2}");
+        line("faintest star named", found);
     }
     if let Some(expected) = &simulated.expected {
-        let _ = writeln!(
-            text,
-            "  expected of it        V {:.2}, scatter {:.2}: noise lifts some stars above the limit of V {:.2}",
-            expected.mean_vmag, expected.sigma_mag, limit.detector_limit_vmag
+        let (mean, sigma) = (expected.mean_vmag, expected.sigma_mag);
+        let limit = limit.detector_limit_vmag;
+        let why = format!("from the limit of V {limit:.2} and the stars there are");
+        line(
+            "expected of it",
+            format!("V {mean:.2}, scatter {sigma:.2}, {why}"),
+        );
+        let named = simulated.stars_named;
+        let found = expected.stars_found;
+        line(
+            "stars named",
+            format!("{named:.1} a frame, {found:.1} expected"),
         );
     }
-    if let Some(faintest) = &simulated.faintest
-        && let (Some(difference), Some(sigma)) =
-            (faintest.difference_mag, faintest.difference_sigma_mag)
-    {
-        let _ = writeln!(
-            text,
-            "  difference            {difference:+.3} ± {sigma:.3} mag"
-        );
+    let difference = simulated
+        .faintest
+        .and_then(|f| f.difference_mag.zip(f.difference_sigma_mag));
+    if let Some((difference, sigma)) = difference {
+        line("difference", format!("{difference:+.3} ± {sigma:.3} mag"));
     }
-    let expected = simulated.expected.map_or(f64::NAN, |e| e.stars_found);
-    let _ = writeln!(
-        text,
-        "  stars named           {:.1} a frame, {:.1} expected; {} on all frames at the light of another star or of none,\n                        on {} frames the faintest among them",
-        simulated.stars_named, expected, simulated.named_wrongly, simulated.faintest_wrong
-    );
-    let _ = writeln!(
-        text,
-        "\n  {:<14} {:>8} {:>9} {:>9} {:>9}",
-        "V", "stars", "detected", "expected", "named"
+    let (wrong, faintest) = (simulated.named_wrongly, simulated.faintest_wrong);
+    let wrongly = match wrong {
+        0 => "none at the light of another star, or of none".to_owned(),
+        _ => format!("{wrong} on all frames; on {faintest} of these it is the faintest"),
+    };
+    line("named wrongly", wrongly);
+    text += &completeness_text(simulated);
+    text
+}
+
+/// What part of the stars is found, by magnitude.
+fn completeness_text(simulated: &SimulatedReport) -> String {
+    let mut text = format!(
+        "\n  {:<14} {:>8} {:>9} {:>9} {:>9}\n",
+        "V", "stars", "found", "expected", "named"
     );
     for bin in &simulated.completeness {
         let _ = writeln!(
