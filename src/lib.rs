@@ -3,6 +3,7 @@
 pub mod attitude;
 pub mod camera;
 pub mod catalog;
+pub mod comparison;
 pub mod coords;
 pub mod detect;
 pub mod diagnosis;
@@ -14,6 +15,7 @@ pub mod identify;
 pub mod observer;
 #[cfg(feature = "overlay")]
 pub mod overlay;
+pub mod photometry;
 pub mod pipeline;
 pub mod report;
 pub mod robustness;

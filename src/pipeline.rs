@@ -36,6 +36,7 @@ use crate::identify::{
     StarField,
 };
 use crate::observer::{Observation, Site};
+use crate::photometry::{self, FramePhotometry, MeasuredFrame};
 use crate::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use serde::Serialize;
 use std::num::NonZeroUsize;
@@ -239,6 +240,8 @@ pub struct Solution {
     pub background: Option<Background>,
     /// Which stars they are; `observed` in its matches is an index into `sources`.
     pub outcome: Outcome,
+    /// How bright its stars are, and how faint it goes; of identified frames, and not of lists of centroids.
+    pub photometry: Option<FramePhotometry>,
     /// How long it took.
     pub timing: Timing,
 }
@@ -261,6 +264,8 @@ pub struct Timing {
     pub detect_ms: f64,
     /// Identifying them.
     pub identify_ms: f64,
+    /// Zero point and completeness.
+    pub photometry_ms: f64,
     /// All of it.
     pub total_ms: f64,
 }
@@ -408,8 +413,13 @@ impl<'a> Pipeline<'a> {
             _ => self.identify(&field, &kept, &knowledge),
         };
         let outcome = self.explained(outcome, &field, &knowledge, Some((frame, &detections)));
+        let identify_ms = milliseconds_since(identify_start);
+        let photometry_start = Instant::now();
+        let photometry = self.photometry(frame, &detections, &outcome, &knowledge);
+        let photometry_ms = milliseconds_since(photometry_start);
         let observation = knowledge.observation(&outcome);
         notes.extend(observation.as_ref().and_then(below_horizon));
+        notes.extend(photometry.as_ref().and_then(not_linear));
         Ok(Solution {
             width: frame.width,
             height: frame.height,
@@ -423,10 +433,12 @@ impl<'a> Pipeline<'a> {
                 noise_adu: detections.noise_adu,
             }),
             outcome,
+            photometry,
             timing: Timing {
                 read_ms: 0.0,
                 detect_ms,
-                identify_ms: milliseconds_since(identify_start),
+                identify_ms,
+                photometry_ms,
                 total_ms: milliseconds_since(start),
             },
         })
@@ -462,12 +474,33 @@ impl<'a> Pipeline<'a> {
             sources: list.centroids.iter().map(source).collect(),
             background: None,
             outcome,
+            photometry: None,
             timing: Timing {
                 identify_ms,
                 total_ms: identify_ms,
                 ..Timing::default()
             },
         }
+    }
+
+    /// The photometry of an identified frame.
+    fn photometry(
+        &self,
+        frame: &Frame,
+        detections: &Detections,
+        outcome: &Outcome,
+        knowledge: &Knowledge,
+    ) -> Option<FramePhotometry> {
+        let Outcome::Identified(identification) = outcome else {
+            return None;
+        };
+        let measured = MeasuredFrame {
+            detections,
+            identification,
+            years_since_j2000: knowledge.years_since_j2000(),
+            exposure_s: frame.metadata.exposure_s,
+        };
+        Some(photometry::measure(&measured, &self.sky))
     }
 
     /// Identifies `field` with the scale of its header, else without; tells where that scale is not the true one.
@@ -560,6 +593,15 @@ fn below_horizon(observation: &Observation) -> Option<String> {
             "the site, the date and the attitude contradict each other: the frame's centre stands {depth_deg:.1}° below the horizon"
         )
     })
+}
+
+/// What to say of a frame whose grey levels do not follow the light.
+fn not_linear(photometry: &FramePhotometry) -> Option<String> {
+    let zero_point = photometry.zero_point.filter(|zero| zero.is_nonlinear)?;
+    Some(format!(
+        "the grey levels are not proportional to light: a magnitude is {:.2} ± {:.2} in this frame, and its zero point holds near V {:.1} only",
+        zero_point.linearity?.value, zero_point.linearity?.sigma, zero_point.mean_v_mag
+    ))
 }
 
 /// What is left of an identification found at the second attempt: chance had twice the opportunity, at most, since all

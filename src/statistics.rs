@@ -1,4 +1,25 @@
-//! Probabilities.
+//! Probabilities, and the middle of what was measured.
+
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
+
+/// The probability that a normal deviate is below `z` standard deviations.
+pub fn normal_cdf(z: f64) -> f64 {
+    0.5 * libm::erfc(-z * FRAC_1_SQRT_2)
+}
+
+/// The density of the normal distribution at `z` standard deviations.
+pub fn normal_density(z: f64) -> f64 {
+    (-0.5 * z * z).exp() / (2.0 * PI).sqrt()
+}
+
+/// The median of `values`, the upper of the two in the middle where their number is even; 0 where there are none. Changes their order.
+pub fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
 
 /// The probability that a standard normal number lies above `z`.
 pub fn normal_tail(z: f64) -> f64 {

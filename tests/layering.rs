@@ -47,9 +47,22 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "statistics",
         ],
     ),
+    ("comparison", &["units", "sensor", "sensitivity"]),
     (
         "diagnosis",
         &["units", "coords", "camera", "frame", "detect", "identify"],
+    ),
+    (
+        "photometry",
+        &[
+            "units",
+            "coords",
+            "camera",
+            "catalog",
+            "detect",
+            "identify",
+            "statistics",
+        ],
     ),
     (
         "pipeline",
@@ -64,12 +77,21 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "identify",
             "diagnosis",
             "observer",
+            "photometry",
         ],
     ),
     (
         "report",
         &[
-            "units", "coords", "camera", "catalog", "detect", "identify", "observer", "pipeline",
+            "units",
+            "coords",
+            "camera",
+            "catalog",
+            "detect",
+            "identify",
+            "observer",
+            "photometry",
+            "pipeline",
         ],
     ),
     (

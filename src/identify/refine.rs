@@ -6,6 +6,7 @@ use super::verify::{Hypothesis, Radius};
 use super::{Photometry, Sky, StarField, StarMatch};
 use crate::attitude::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera, left_out_chi_sq};
 use crate::camera::DistortionModel;
+use crate::statistics::median;
 use std::f64::consts::PI;
 
 /// Pairs further apart than so many times the typical error on an axis are no pairs.
@@ -265,14 +266,6 @@ fn distances_px(fit: &CameraFit) -> Vec<f64> {
         .iter()
         .map(|[x, y]| (x * x + y * y).sqrt())
         .collect()
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// What the stated errors must be multiplied by to be those that the residuals show: at most 1, as the excess is one of them.

@@ -44,6 +44,7 @@ fn solution(width: usize, height: usize, outcome: Outcome) -> Solution {
             source(700.0, 100.0, hot),
         ],
         observation: None,
+        photometry: None,
         exposure_s: None,
         notes: Vec::new(),
         background: Some(Background {

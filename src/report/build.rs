@@ -3,15 +3,17 @@
 use super::reason;
 use super::rounding::{finite, half_turn_deg, significant, to_decimals, to_significant, turn_deg};
 use super::{
-    AttitudeReport, AttitudeSigma, BackgroundReport, DateReport, DistortionReport, FrameReport,
-    MagnitudeReport, MatchReport, ObservationReport, OpticsReport, SCHEMA, SiteReport, StarReport,
-    Status, TimingReport,
+    AttitudeReport, AttitudeSigma, BackgroundReport, CompletenessReport, DateReport,
+    DistortionReport, FrameReport, MagnitudeReport, MatchReport, ObservationReport, OpticsReport,
+    PhotometryReport, SCHEMA, SiteReport, StarReport, Status, TimingReport,
 };
 use crate::camera::Distortion;
 use crate::catalog::Catalog;
 use crate::detect::DetectionFlags;
 use crate::identify::{Identification, Outcome, StarMatch};
 use crate::observer::Observation;
+use crate::photometry::FramePhotometry;
+use crate::photometry::completeness::Bin;
 use crate::pipeline::{Background, FrameDate, Solution, Source, Timing};
 use crate::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 
@@ -23,6 +25,8 @@ const DIRECTION_DECIMALS: i32 = 7;
 const HORIZON_DECIMALS: i32 = 4;
 /// Decimals of a year: an hour.
 const YEAR_DECIMALS: i32 = 4;
+/// Decimals of a magnitude.
+const MAG_DECIMALS: i32 = 4;
 /// Significant digits of a flux.
 const FLUX_DIGITS: i32 = 6;
 /// Significant digits of a standard error.
@@ -49,6 +53,7 @@ impl FrameReport {
             optics: None,
             matched: None,
             magnitude: None,
+            photometry: solution.photometry.as_ref().map(photometry),
             background: background(solution.background.as_ref()),
             stars: solution.sources.iter().map(unidentified).collect(),
             timing_ms: timing(&solution.timing),
@@ -170,6 +175,39 @@ fn faintest(identification: &Identification, catalog: &Catalog) -> Option<Magnit
     })
 }
 
+fn photometry(measured: &FramePhotometry) -> PhotometryReport {
+    let zero_point = measured.zero_point.as_ref();
+    let color = zero_point.and_then(|zero| zero.color_term);
+    let linearity = zero_point.and_then(|zero| zero.linearity);
+    let limit = measured.completeness.limit;
+    let fitted = limit.as_ref().ok();
+    let mag = |value: f64| finite(value, MAG_DECIMALS);
+    let step = |bin: &Bin| CompletenessReport {
+        vmag: to_decimals(bin.v_mag, MAG_DECIMALS),
+        stars: bin.stars,
+        detected: bin.detected,
+    };
+    PhotometryReport {
+        zero_point_vmag: zero_point.and_then(|zero| mag(zero.v_mag)),
+        zero_point_sigma_mag: zero_point.and_then(|zero| mag(zero.sigma_mag)),
+        flux_unit: measured.exposure_s.map_or("ADU", |_| "ADU/s"),
+        scatter_mag: zero_point.and_then(|zero| mag(zero.scatter_mag)),
+        zero_point_stars: zero_point.map_or(0, |zero| zero.stars),
+        zero_point_mean_vmag: zero_point.and_then(|zero| mag(zero.mean_v_mag)),
+        zero_point_bv_mag: zero_point.and_then(|zero| zero.bv_mag).and_then(mag),
+        color_term: color.and_then(|term| mag(term.value)),
+        color_term_sigma: color.and_then(|term| mag(term.sigma)),
+        linearity: linearity.and_then(|slope| mag(slope.value)),
+        linearity_sigma: linearity.and_then(|slope| mag(slope.sigma)),
+        limit50_vmag: fitted.and_then(|limit| mag(limit.v_mag)),
+        limit50_sigma_mag: fitted.and_then(|limit| mag(limit.sigma_mag)),
+        limit50_width_mag: fitted.and_then(|limit| mag(limit.width_mag)),
+        lost_share: fitted.and_then(|limit| mag(limit.lost)),
+        limit50_reason: limit.err().map(|reason| reason.to_string()),
+        completeness: measured.completeness.bins.iter().map(step).collect(),
+    }
+}
+
 fn background(measured: Option<&Background>) -> BackgroundReport {
     BackgroundReport {
         level: measured.and_then(|sky| significant(sky.level_adu, FLUX_DIGITS)),
@@ -182,6 +220,7 @@ fn timing(measured: &Timing) -> TimingReport {
         read: to_decimals(measured.read_ms, 3),
         detect: to_decimals(measured.detect_ms, 3),
         identify: to_decimals(measured.identify_ms, 3),
+        photometry: to_decimals(measured.photometry_ms, 3),
         total: to_decimals(measured.total_ms, 3),
     }
 }

@@ -58,6 +58,8 @@ pub struct FrameReport {
     pub matched: Option<MatchReport>,
     /// How faint the frame goes.
     pub magnitude: Option<MagnitudeReport>,
+    /// How bright its stars are, and how faint it goes; none of lists of centroids.
+    pub photometry: Option<PhotometryReport>,
     /// The sky between the stars.
     pub background: BackgroundReport,
     /// Every detection, brightest first.
@@ -197,6 +199,56 @@ pub struct MagnitudeReport {
     pub difference_mag: Option<f64>,
 }
 
+/// How bright a frame's stars are, and how faint it goes, see [`photometry`](crate::photometry).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PhotometryReport {
+    /// V magnitude of a star whose flux is 1 in `flux_unit`; none where too few stars tell.
+    pub zero_point_vmag: Option<f64>,
+    /// Its standard error.
+    pub zero_point_sigma_mag: Option<f64>,
+    /// `ADU/s` where the exposure is known, else `ADU`.
+    pub flux_unit: &'static str,
+    /// Standard deviation of a star about zero point and colour term, robust.
+    pub scatter_mag: Option<f64>,
+    /// Stars of the zero point.
+    pub zero_point_stars: usize,
+    /// Their mean V magnitude.
+    pub zero_point_mean_vmag: Option<f64>,
+    /// B−V of the star for which the zero point holds.
+    pub zero_point_bv_mag: Option<f64>,
+    /// Magnitudes that V − instrumental magnitude grows by to one magnitude of B−V, where stars show that it does.
+    pub color_term: Option<f64>,
+    /// Its standard error.
+    pub color_term_sigma: Option<f64>,
+    /// Instrumental magnitudes to one magnitude of V: 1 where the grey level is proportional to light.
+    pub linearity: Option<f64>,
+    /// Its standard error.
+    pub linearity_sigma: Option<f64>,
+    /// V magnitude at which half of the catalogue's stars are detected.
+    pub limit50_vmag: Option<f64>,
+    /// Its standard error.
+    pub limit50_sigma_mag: Option<f64>,
+    /// Standard deviation of the fall of completeness.
+    pub limit50_width_mag: Option<f64>,
+    /// The part of much brighter stars that is not detected.
+    pub lost_share: Option<f64>,
+    /// Why there is no limit.
+    pub limit50_reason: Option<String>,
+    /// The completeness, in steps of half a magnitude.
+    pub completeness: Vec<CompletenessReport>,
+}
+
+/// One step of the completeness.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CompletenessReport {
+    /// V magnitude of its middle.
+    pub vmag: f64,
+    /// Single stars of the catalogue in the frame.
+    pub stars: usize,
+    /// Those of them that were detected.
+    pub detected: usize,
+}
+
 /// The sky between the stars, in the frame's own units.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct BackgroundReport {
@@ -248,6 +300,8 @@ pub struct TimingReport {
     pub detect: f64,
     /// Identifying them.
     pub identify: f64,
+    /// Zero point and completeness.
+    pub photometry: f64,
     /// All of it.
     pub total: f64,
 }

@@ -160,6 +160,7 @@ mod tests {
             date: None,
             sources: vec![source; detections],
             observation: None,
+            photometry: None,
             exposure_s: None,
             notes: Vec::new(),
             background: None,

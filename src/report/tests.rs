@@ -42,6 +42,7 @@ fn unidentified() -> FrameReport {
         optics: None,
         matched: None,
         magnitude: None,
+        photometry: None,
         background: BackgroundReport {
             level: Some(1012.25),
             noise: Some(12.3418),
@@ -51,8 +52,35 @@ fn unidentified() -> FrameReport {
             read: 1.25,
             detect: 3.5,
             identify: 0.25,
+            photometry: 0.125,
             total: 5.0,
         },
+    }
+}
+
+fn photometry() -> PhotometryReport {
+    PhotometryReport {
+        zero_point_vmag: Some(16.5253),
+        zero_point_sigma_mag: Some(0.0303),
+        flux_unit: "ADU/s",
+        scatter_mag: Some(0.1542),
+        zero_point_stars: 38,
+        zero_point_mean_vmag: Some(6.91),
+        zero_point_bv_mag: Some(0.6),
+        color_term: Some(0.2456),
+        color_term_sigma: Some(0.0609),
+        linearity: Some(1.045),
+        linearity_sigma: Some(0.0632),
+        limit50_vmag: Some(8.4989),
+        limit50_sigma_mag: Some(0.0407),
+        limit50_width_mag: Some(0.3044),
+        lost_share: Some(0.006),
+        limit50_reason: None,
+        completeness: vec![CompletenessReport {
+            vmag: 8.25,
+            stars: 48,
+            detected: 35,
+        }],
     }
 }
 
@@ -113,6 +141,7 @@ fn identified() -> FrameReport {
             predicted_limit_vmag: None,
             difference_mag: None,
         }),
+        photometry: Some(photometry()),
         stars: vec![
             star(123.4567, Some("05550020"), Some("Betelgeuse")),
             star(12.3456, None, None),

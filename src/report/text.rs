@@ -3,7 +3,7 @@
 use super::rounding::decimals_for;
 use super::{
     AttitudeReport, FrameReport, MagnitudeReport, MatchReport, ObservationReport, OpticsReport,
-    StarReport, angles,
+    PhotometryReport, StarReport, angles,
 };
 use crate::pipeline::DateSource;
 
@@ -38,6 +38,7 @@ impl FrameReport {
                 .iter()
                 .map(|magnitude| self.faintest_line(magnitude)),
         );
+        lines.extend(self.photometry.iter().flat_map(photometry_lines));
         lines.push(self.date_line());
         lines.extend(self.observation.iter().map(observation_line));
         lines.extend(self.notes.iter().map(|note| labelled("note", note)));
@@ -101,6 +102,7 @@ impl FrameReport {
             ("read", timing.read),
             ("detect", timing.detect),
             ("identify", timing.identify),
+            ("photometry", timing.photometry),
         ];
         let taken: Vec<String> = stages
             .iter()
@@ -210,6 +212,34 @@ fn optics_lines(optics: &OpticsReport) -> Vec<String> {
     };
     lines.push(labelled("distortion", &distortion));
     lines
+}
+
+fn photometry_lines(photometry: &PhotometryReport) -> Vec<String> {
+    let pair = |value: Option<f64>, sigma: Option<f64>| value.zip(sigma);
+    let limit = pair(photometry.limit50_vmag, photometry.limit50_sigma_mag);
+    let limit_text = match (limit, &photometry.limit50_reason) {
+        (Some((vmag, sigma)), _) => {
+            format!("V {vmag:.2} ± {sigma:.2}, where half of the catalogue's stars are detected")
+        }
+        (None, reason) => reason.clone().unwrap_or_default(),
+    };
+    let zero_point = pair(photometry.zero_point_vmag, photometry.zero_point_sigma_mag);
+    let mut text = match zero_point {
+        Some((vmag, sigma)) => format!(
+            "V {vmag:.3} ± {sigma:.3} is 1 {}; {} scatter by {:.2}",
+            photometry.flux_unit,
+            counted(photometry.zero_point_stars, "star"),
+            photometry.scatter_mag.unwrap_or(f64::NAN),
+        ),
+        None => "too few stars to tell".to_owned(),
+    };
+    if let Some((term, sigma)) = pair(photometry.color_term, photometry.color_term_sigma) {
+        text += &format!("; {term:+.2} ± {sigma:.2} (B−V − 0.6)");
+    }
+    vec![
+        labelled("limit", &limit_text),
+        labelled("zero point", &text),
+    ]
 }
 
 fn residual_line(matched: &MatchReport) -> String {

@@ -94,6 +94,7 @@ fn solution(camera: CameraModel, attitude: Rotation<Icrs, Camera>) -> Solution {
         date: None,
         sources: Vec::new(),
         observation: None,
+        photometry: None,
         exposure_s: None,
         notes: Vec::new(),
         background: None,

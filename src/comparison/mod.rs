@@ -1,0 +1,375 @@
+//! What a camera should have seen in a frame, beside what it saw.
+//!
+//! ([`Description`], [`Seen`]) → [`Comparison`]
+//!
+//! 1. The sky comes from the frame itself: its level above the bias, in the camera's electrons.
+//! 2. With it, the sensitivity model gives the limits and the zero point that the camera should have.
+//! 3. The detector's completeness and the stars in the field give the faintest star to be expected: that is what the
+//!    faintest star found is held against. The fitted limit is held against the predicted one.
+//! 4. Where the frame contradicts its description, a sentence says so.
+//!
+//! Caveats: the sky's brightness, where it is not that of the whole spectrum of moonlight, shifts the predicted limit by
+//! less than its own error; a bias that is not the camera's shows as noise that does not fit.
+
+use crate::sensitivity::{
+    Budget, Detector, Extinction, Faintest, Reading, Rule, Scenario, SkyBrightness,
+};
+use crate::sensor::Sensor;
+use crate::units::ARCSEC_PER_RAD;
+
+/// What is stated of the frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Description {
+    /// The camera.
+    pub sensor: Sensor,
+    /// Exposure, in seconds; else that of the frame's file.
+    pub exposure_s: Option<f64>,
+    /// Zenith distance of the frame's centre, in degrees; else that of site and date, else 0.
+    pub zenith_distance_deg: Option<f64>,
+    /// What the air takes away; else the model's own.
+    pub extinction: Option<Extinction>,
+}
+
+/// A number and its standard error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// The number.
+    pub value: f64,
+    /// Its standard error.
+    pub sigma: f64,
+}
+
+/// What the frame shows; what is not known is `None`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Seen<'a> {
+    /// Columns and rows.
+    pub size_px: [usize; 2],
+    /// Exposure, in seconds, by the frame's file.
+    pub exposure_s: Option<f64>,
+    /// Median level of the background, in ADU.
+    pub level_adu: f64,
+    /// Standard deviation of one pixel, in ADU.
+    pub noise_adu: f64,
+    /// Standard deviation of a star's spot, in pixels, where stars tell it.
+    pub spot_sigma_px: Option<f64>,
+    /// The angle that a pixel spans, in radians.
+    pub pixel_scale_rad: Option<f64>,
+    /// Apparent zenith distance of the centre by site, date and attitude, in degrees; above 90 below the horizon.
+    pub zenith_distance_deg: Option<f64>,
+    /// V magnitude of a star that gives one ADU a second, or one ADU where no exposure is known.
+    pub zero_point_vmag: Option<Measured>,
+    /// V magnitude at which half of the stars are found.
+    pub limit_vmag: Option<Measured>,
+    /// V magnitude of the faintest star identified.
+    pub faintest_vmag: Option<f64>,
+    /// V magnitudes of the catalogue's stars in the field.
+    pub field_vmag: &'a [f64],
+}
+
+/// What the camera should have seen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comparison {
+    /// Camera, conditions as far as they are known, and reading.
+    pub scenario: Scenario,
+    /// Whether the zenith distance is known and not just taken for 0.
+    pub zenith_is_known: bool,
+    /// From the star to the limit of the brightest pixel.
+    pub budget: Budget,
+    /// V magnitude at which half of the stars have a brightest pixel above the wanted signal-to-noise ratio.
+    pub peak_limit_vmag: f64,
+    /// V magnitude at which half of the stars are found by the detector as built.
+    pub limit_vmag: f64,
+    /// V magnitude at which nine in ten are found.
+    pub limit90_vmag: f64,
+    /// The faintest star to be expected among those in the field.
+    pub faintest: Option<Faintest>,
+    /// V magnitude of a star that should give one ADU a second.
+    pub zero_point_vmag: f64,
+    /// Zero point measured minus predicted: above 0 the camera is more sensitive than described.
+    pub zero_point_difference_mag: Option<Measured>,
+    /// The fitted limit minus the predicted one.
+    pub limit_difference_mag: Option<Measured>,
+    /// The faintest star found minus the one to be expected; the error is the spread of that.
+    pub faintest_difference_mag: Option<Measured>,
+    /// Where the frame contradicts its description: a sentence each.
+    pub contradictions: Vec<String>,
+}
+
+/// A sky that gives no light to speak of, in mag/arcsec².
+const NO_SKY_MAG: f64 = 35.0;
+
+/// What `description` predicts of a frame that shows `seen`; `None` where the exposure is not known.
+pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
+    let exposure_s = description.exposure_s.or(seen.exposure_s)?;
+    let mut scenario = Scenario::new(description.sensor.clone());
+    scenario.reading = Reading::Physical;
+    let conditions = &mut scenario.conditions;
+    conditions.exposure_s = exposure_s;
+    let known_zenith_deg = seen.zenith_distance_deg.or(description.zenith_distance_deg);
+    conditions.zenith_distance_deg = known_zenith_deg.filter(|z| *z < 90.0).unwrap_or(0.0);
+    conditions.extinction = description.extinction.unwrap_or(conditions.extinction);
+    scenario.conditions.sky = SkyBrightness::MagArcsec2(sky_mag_arcsec2(&scenario, seen));
+    let [width_px, height_px] = seen.size_px;
+    (scenario.sensor.width_px, scenario.sensor.height_px) = (width_px, height_px);
+    let budget = Budget::new(&scenario);
+    let detector = Detector::new(Rule::MatchedFilter, &scenario, &budget);
+    let peak = Detector::new(Rule::PeakPixel, &scenario, &budget);
+    let gain_e_per_adu = scenario.sensor.gain_e_per_adu;
+    let zero_point_vmag = budget.vmag_of(gain_e_per_adu, 1.0);
+    let limit_vmag = detector.vmag_at(0.5);
+    let faintest = Faintest::among(seen.field_vmag.iter().copied(), &detector);
+    // Without an exposure the measured one is of one ADU and not of one a second.
+    let to_second = match seen.exposure_s {
+        Some(_) => 0.0,
+        None => -2.5 * exposure_s.log10(),
+    };
+    let minus = |measured: Option<Measured>, predicted: f64| {
+        measured.map(|Measured { value, sigma }| Measured {
+            value: value - predicted,
+            sigma,
+        })
+    };
+    let comparison = Comparison {
+        zenith_is_known: known_zenith_deg.is_some(),
+        peak_limit_vmag: peak.vmag_at(0.5),
+        limit_vmag,
+        limit90_vmag: detector.vmag_at(0.9),
+        zero_point_vmag,
+        zero_point_difference_mag: minus(seen.zero_point_vmag, zero_point_vmag - to_second),
+        limit_difference_mag: minus(seen.limit_vmag, limit_vmag),
+        faintest_difference_mag: faintest.and_then(|faintest| {
+            Some(Measured {
+                value: seen.faintest_vmag? - faintest.mean_vmag,
+                sigma: faintest.sigma_mag,
+            })
+        }),
+        faintest,
+        contradictions: Vec::new(),
+        budget,
+        scenario,
+    };
+    let contradictions = contradictions(description, seen, &comparison);
+    Some(Comparison {
+        contradictions,
+        ..comparison
+    })
+}
+
+/// The sky's brightness by the frame's level, else by its noise.
+fn sky_mag_arcsec2(scenario: &Scenario, seen: &Seen) -> f64 {
+    let sensor = &scenario.sensor;
+    let mut standard = scenario.clone();
+    standard.conditions.sky = SkyBrightness::MagArcsec2(0.0);
+    let of_mag_0 = Budget::new(&standard);
+    let by_level_e = (seen.level_adu - sensor.bias_adu) * sensor.gain_e_per_adu - of_mag_0.dark_e;
+    let noise_e = seen.noise_adu * sensor.gain_e_per_adu;
+    let by_noise_e = noise_e.powi(2) - of_mag_0.sensor_noise_e.powi(2);
+    [by_level_e, by_noise_e]
+        .into_iter()
+        .find(|sky_e| *sky_e > 0.0)
+        .map_or(NO_SKY_MAG, |sky_e| {
+            2.5 * (of_mag_0.background_e / sky_e).log10()
+        })
+}
+
+/// A scale off by more than this part is another lens, or binned pixels.
+const SCALE_TOLERANCE: f64 = 0.05;
+/// Noise off by more than this factor is another gain or another bias.
+const NOISE_TOLERANCE: f64 = 1.5;
+/// A spot off by more than this factor is another focus.
+const SPOT_TOLERANCE: f64 = 1.5;
+/// A zero point off by more than this has a reason.
+const ZERO_POINT_TOLERANCE_MAG: f64 = 0.5;
+/// Zenith distances this far apart, beyond the field itself, are not of one frame, in degrees.
+const ZENITH_TOLERANCE_DEG: f64 = 1.0;
+
+fn contradictions(description: &Description, seen: &Seen, found: &Comparison) -> Vec<String> {
+    let sensor = &description.sensor;
+    let mut told = Vec::new();
+    let [width, height] = seen.size_px;
+    if [width, height] != [sensor.width_px, sensor.height_px] {
+        told.push(format!(
+            "the frame has {width} × {height} pixels, the camera {} × {}",
+            sensor.width_px, sensor.height_px
+        ));
+    }
+    if let Some(scale_rad) = seen.pixel_scale_rad
+        && is_off(scale_rad, sensor.pixel_scale_rad(), 1.0 + SCALE_TOLERANCE)
+    {
+        let [is, stated] = [scale_rad, sensor.pixel_scale_rad()].map(|rad| rad * ARCSEC_PER_RAD);
+        told.push(format!(
+            "a pixel spans {is:.2}″, by the camera's focal length and pitch {stated:.2}″"
+        ));
+    }
+    if let Some(spot_px) = seen.spot_sigma_px
+        && is_off(spot_px, sensor.spot_sigma_px, SPOT_TOLERANCE)
+    {
+        told.push(format!(
+            "the stars' spots have a standard deviation of {spot_px:.2} px, the camera's {:.2} px",
+            sensor.spot_sigma_px
+        ));
+    }
+    let noise_e = seen.noise_adu * sensor.gain_e_per_adu;
+    if is_off(noise_e, found.budget.background_noise_e, NOISE_TOLERANCE) {
+        told.push(format!(
+            "the background's noise is {noise_e:.1} electrons, that of its level by the camera's gain, bias and read noise {:.1}",
+            found.budget.background_noise_e
+        ));
+    }
+    told.extend(found.zero_point_difference_mag.and_then(odd_zero_point));
+    told.extend(odd_zenith(description, seen));
+    told
+}
+
+fn is_off(found: f64, stated: f64, factor: f64) -> bool {
+    found > stated * factor || found < stated / factor
+}
+
+fn odd_zero_point(difference: Measured) -> Option<String> {
+    let Measured { value, sigma } = difference;
+    let is_odd = value.abs() > ZERO_POINT_TOLERANCE_MAG.max(5.0 * sigma);
+    let way = if value < 0.0 {
+        "less light arrives than the camera should see: haze, a stop, dew, another exposure or gain"
+    } else {
+        "more light arrives than the camera should see: another aperture, exposure or gain"
+    };
+    is_odd.then(|| format!("the zero point is {value:+.2} mag off the camera's; {way}"))
+}
+
+fn odd_zenith(description: &Description, seen: &Seen) -> Option<String> {
+    let (stated_deg, true_deg) = (description.zenith_distance_deg?, seen.zenith_distance_deg?);
+    let half_px = seen.size_px[0].max(seen.size_px[1]) as f64 / 2.0;
+    let half_field_deg = seen
+        .pixel_scale_rad
+        .map_or(0.0, |rad| (half_px * rad).to_degrees());
+    let apart_deg = (stated_deg - true_deg).abs();
+    (apart_deg > ZENITH_TOLERANCE_DEG + half_field_deg).then(|| {
+        format!(
+            "the zenith distance is stated as {stated_deg:.1}°, by site, date and attitude it is {true_deg:.1}°"
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sensor::Preset;
+
+    fn description() -> Description {
+        Description {
+            sensor: Preset::Experiment1.sensor(),
+            exposure_s: None,
+            zenith_distance_deg: None,
+            extinction: None,
+        }
+    }
+
+    /// A frame such as the camera takes under a sky of this brightness in 0.04 s.
+    fn seen(sky_mag_arcsec2: f64) -> Seen<'static> {
+        let mut scenario = Scenario::new(description().sensor);
+        scenario.conditions.exposure_s = 0.04;
+        scenario.conditions.sky = SkyBrightness::MagArcsec2(sky_mag_arcsec2);
+        let budget = Budget::new(&scenario);
+        let sensor = &scenario.sensor;
+        Seen {
+            size_px: [752, 582],
+            exposure_s: Some(0.04),
+            level_adu: sensor.bias_adu + budget.background_e / sensor.gain_e_per_adu,
+            noise_adu: budget.background_noise_e / sensor.gain_e_per_adu,
+            spot_sigma_px: Some(1.2),
+            pixel_scale_rad: Some(sensor.pixel_scale_rad()),
+            zenith_distance_deg: None,
+            zero_point_vmag: None,
+            limit_vmag: None,
+            faintest_vmag: None,
+            field_vmag: &[],
+        }
+    }
+
+    #[test]
+    fn the_sky_is_read_back_from_the_level_and_from_the_noise() {
+        let by_level = compare(&description(), &seen(16.0)).unwrap();
+        assert!((by_level.budget.sky_mag_arcsec2 - 16.0).abs() < 1e-6);
+        assert!(
+            by_level.contradictions.is_empty(),
+            "{:?}",
+            by_level.contradictions
+        );
+        let mut frame = seen(14.0);
+        frame.level_adu = 0.0;
+        let by_noise = compare(&description(), &frame).unwrap();
+        assert!((by_noise.budget.sky_mag_arcsec2 - 14.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn without_an_exposure_there_is_no_prediction() {
+        let mut frame = seen(18.0);
+        frame.exposure_s = None;
+        assert_eq!(compare(&description(), &frame), None);
+        let mut stated = description();
+        stated.exposure_s = Some(0.04);
+        assert!(compare(&stated, &frame).is_some());
+    }
+
+    #[test]
+    fn differences_are_of_like_with_like() {
+        let mut frame = seen(18.0);
+        let plain = compare(&description(), &frame).unwrap();
+        let field: Vec<f64> = (0..60).map(|i| 6.0 + 0.1 * f64::from(i)).collect();
+        let at = |value| Some(Measured { value, sigma: 0.04 });
+        frame.field_vmag = &field;
+        frame.limit_vmag = at(plain.limit_vmag + 0.1);
+        frame.zero_point_vmag = at(plain.zero_point_vmag - 0.2);
+        frame.faintest_vmag = Some(plain.limit_vmag + 0.3);
+        let held = compare(&description(), &frame).unwrap();
+        let value = |measured: Option<Measured>| measured.unwrap().value;
+        assert!((value(held.limit_difference_mag) - 0.1).abs() < 1e-9);
+        assert!((value(held.zero_point_difference_mag) + 0.2).abs() < 1e-9);
+        let expected = held.faintest.unwrap().mean_vmag;
+        let difference = frame.faintest_vmag.unwrap() - expected;
+        assert!((value(held.faintest_difference_mag) - difference).abs() < 1e-9);
+        // The measured zero point of one ADU in 0.04 s is that of one a second, 3.49 mag brighter.
+        frame.exposure_s = None;
+        frame.zero_point_vmag = at(plain.zero_point_vmag + 2.5 * 0.04f64.log10());
+        let stated = Description {
+            exposure_s: Some(0.04),
+            ..description()
+        };
+        let held = compare(&stated, &frame).unwrap();
+        assert!(value(held.zero_point_difference_mag).abs() < 1e-9);
+    }
+
+    #[test]
+    fn each_contradiction_has_its_sentence() {
+        let told = |change: &dyn Fn(&mut Description, &mut Seen)| {
+            let (mut stated, mut frame) = (description(), seen(16.0));
+            change(&mut stated, &mut frame);
+            compare(&stated, &frame).unwrap().contradictions.join("; ")
+        };
+        assert_eq!(told(&|_, _| ()), "");
+        assert!(
+            told(&|_, f| f.size_px = [100, 90]).contains("100 × 90 pixels, the camera 752 × 582")
+        );
+        assert!(told(&|_, f| f.pixel_scale_rad = Some(1e-4)).contains("a pixel spans 20.63″"));
+        assert!(
+            told(&|_, f| f.spot_sigma_px = Some(3.0)).contains("3.00 px, the camera's 1.16 px")
+        );
+        assert!(told(&|_, f| f.noise_adu *= 2.0).contains("the background's noise is"));
+        let zero = compare(&description(), &seen(16.0))
+            .unwrap()
+            .zero_point_vmag;
+        let off = told(&|_, f| {
+            let value = zero - 1.0;
+            f.zero_point_vmag = Some(Measured { value, sigma: 0.02 });
+        });
+        assert!(off.contains("zero point is -1.00 mag off"), "{off}");
+        let off = told(&|d, f| {
+            d.zenith_distance_deg = Some(0.0);
+            f.zenith_distance_deg = Some(56.0);
+        });
+        assert!(
+            off.contains("stated as 0.0°, by site, date and attitude it is 56.0°"),
+            "{off}"
+        );
+    }
+}

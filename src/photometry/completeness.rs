@@ -1,0 +1,486 @@
+//! Which part of the stars of each magnitude is detected, and the magnitude at which half of them are.
+//!
+//! (magnitude, detected or not) of single stars → [`Completeness`]
+//!
+//! The model: a star of magnitude m is detected with the probability
+//!
+//! ```text
+//! C(m) = c + (1 − c − λ) Φ((m₅₀ − m) / w)
+//! ```
+//!
+//! m₅₀ and the width w are wanted; λ is the part of bright stars that is lost for other reasons (doubles, clouds, trees, errors of
+//! the catalogue), without which one bright star lost would make w several magnitudes; c is the probability of an unrelated
+//! detection at a star's place, and known. Half of what is not lost is detected at m₅₀. The likelihood of all
+//! stars, one by one, is maximised (Fisher scoring), and the standard errors are those of its information matrix.
+//!
+//! Few stars do not determine w and λ, and weak priors do: ln w is normal about [`TYPICAL_WIDTH_MAG`], which is noise at
+//! the threshold of detection (1.0857 / SNR) and a little colour and vignetting, with a factor of e either way;
+//! λ has a beta distribution as if a quarter of a star of ten had been lost before. Where bright stars are few (80 in all, or a
+//! wide fall) m₅₀ is off by up to 0.3 of its standard error for that.
+//!
+//! # Reference
+//! Probit regression with a guessing and a lapse rate: Wichmann & Hill 2001, Percept. Psychophys. 63, 1293.
+
+use crate::statistics::{normal_cdf, normal_density};
+use nalgebra::{Matrix3, Vector3};
+
+/// Where the prior of the width has its middle, in magnitudes.
+pub const TYPICAL_WIDTH_MAG: f64 = 0.3;
+/// Standard deviation of the prior of ln w.
+const LN_WIDTH_SIGMA: f64 = 1.0;
+/// The prior of λ: so many stars lost, and so many not.
+const PRIOR_LOST: f64 = 0.25;
+const PRIOR_KEPT: f64 = 9.75;
+/// At least so many stars, half of them or more detected, are brighter than the limit, and so many fainter.
+const FEWEST_EITHER_SIDE: usize = 4;
+/// A standard error above this is no measurement, in magnitudes.
+const SIGMA_MAX_MAG: f64 = 0.5;
+/// Width of the steps in which the curve is told, in magnitudes.
+pub const BIN_MAG: f64 = 0.5;
+const MAX_ROUNDS: usize = 60;
+/// Settled where a step is below this part of the standard errors (squared).
+const SETTLED: f64 = 1e-6;
+/// Stars further from the limit than so many widths are all alike.
+const FAR_WIDTHS: f64 = 6.0;
+
+/// A catalogue star: was it detected?
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trial {
+    /// V magnitude.
+    pub v_mag: f64,
+    /// Whether it was.
+    pub detected: bool,
+}
+
+/// The curve, and the limiting magnitude fitted to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Completeness {
+    /// The curve, in steps of [`BIN_MAG`] without gaps, brightest first.
+    pub bins: Vec<Bin>,
+    /// The limit, or why there is none.
+    pub limit: Result<Limit, NoLimit>,
+}
+
+/// One step of the curve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bin {
+    /// V magnitude of its middle.
+    pub v_mag: f64,
+    /// Stars in the catalogue.
+    pub stars: usize,
+    /// Those of them that were detected.
+    pub detected: usize,
+}
+
+/// Where completeness falls.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limit {
+    /// V magnitude m₅₀ at which half of the stars that are not lost otherwise are detected.
+    pub v_mag: f64,
+    /// Its standard error, in magnitudes.
+    pub sigma_mag: f64,
+    /// Standard deviation w of the fall, in magnitudes.
+    pub width_mag: f64,
+    /// The part λ of bright stars that is not detected.
+    pub lost: f64,
+}
+
+/// Why no limit can be given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoLimit {
+    /// Completeness does not fall before the catalogue ends.
+    #[error(
+        "the catalogue ends before completeness falls: too few of its stars are too faint for the frame"
+    )]
+    CatalogEnds,
+    /// Hardly any star is bright enough.
+    #[error("too few of the catalogue's stars are bright enough for the frame")]
+    TooFewDetected,
+    /// There is no clear fall.
+    #[error("too few stars to tell where completeness falls")]
+    Uncertain,
+}
+
+/// The completeness that `trials`, in any order, show; `chance` is c, the probability that a star not seen has an unrelated detection
+/// at its place.
+pub fn measure(trials: &[Trial], chance: f64) -> Completeness {
+    let mut trials = trials.to_vec();
+    trials.sort_unstable_by(|a, b| {
+        let order = a.v_mag.total_cmp(&b.v_mag);
+        order.then(b.detected.cmp(&a.detected))
+    });
+    Completeness {
+        bins: bins(&trials),
+        limit: limit(&trials, chance),
+    }
+}
+
+/// The curve of `trials`, brightest first.
+fn bins(trials: &[Trial]) -> Vec<Bin> {
+    let step = |trial: &Trial| (trial.v_mag / BIN_MAG).floor();
+    let (Some(first), Some(last)) = (trials.first().map(step), trials.last().map(step)) else {
+        return Vec::new();
+    };
+    let bin = |offset: usize| {
+        let place = first + offset as f64;
+        let in_it = trials.iter().filter(|trial| step(trial) == place);
+        Bin {
+            v_mag: (place + 0.5) * BIN_MAG,
+            stars: in_it.clone().count(),
+            detected: in_it.filter(|trial| trial.detected).count(),
+        }
+    };
+    (0..=(last - first) as usize).map(bin).collect()
+}
+
+fn limit(trials: &[Trial], chance: f64) -> Result<Limit, NoLimit> {
+    let detected = trials.iter().filter(|trial| trial.detected).count();
+    if detected < FEWEST_EITHER_SIDE {
+        return Err(NoLimit::TooFewDetected);
+    }
+    if trials.len() - detected < FEWEST_EITHER_SIDE {
+        return Err(NoLimit::CatalogEnds);
+    }
+    let fit = Curve::fit(trials, chance).ok_or(NoLimit::Uncertain)?;
+    let sigma_mag = fit.sigma_mag.ok_or(NoLimit::Uncertain)?;
+    let brighter = trials.partition_point(|trial| trial.v_mag < fit.curve.v_mag);
+    let seen = trials[..brighter].iter().filter(|t| t.detected).count();
+    let not_seen = trials[brighter..].iter().filter(|t| !t.detected).count();
+    match (seen, not_seen) {
+        (_, fainter) if fainter < FEWEST_EITHER_SIDE => Err(NoLimit::CatalogEnds),
+        (brighter, _) if brighter < FEWEST_EITHER_SIDE => Err(NoLimit::TooFewDetected),
+        _ if sigma_mag > SIGMA_MAX_MAG => Err(NoLimit::Uncertain),
+        _ => Ok(Limit {
+            v_mag: fit.curve.v_mag,
+            sigma_mag,
+            width_mag: fit.curve.ln_width.exp(),
+            lost: fit.curve.lost(),
+        }),
+    }
+}
+
+/// The curve's parameters, as they are fitted: without bounds.
+#[derive(Debug, Clone, Copy)]
+struct Curve {
+    v_mag: f64,
+    ln_width: f64,
+    logit_lost: f64,
+    chance: f64,
+}
+
+/// A curve fitted, and the standard error of its m₅₀.
+struct Fitted {
+    curve: Curve,
+    sigma_mag: Option<f64>,
+}
+
+/// The logarithm of the posterior probability, its gradient, and the expected information.
+struct Likelihood {
+    log: f64,
+    gradient: Vector3<f64>,
+    information: Matrix3<f64>,
+}
+
+impl Curve {
+    fn fit(trials: &[Trial], chance: f64) -> Option<Fitted> {
+        let lost = PRIOR_LOST / (PRIOR_LOST + PRIOR_KEPT);
+        let mut curve = Self {
+            v_mag: best_step(trials)?,
+            ln_width: TYPICAL_WIDTH_MAG.ln(),
+            logit_lost: (lost / (1.0 - lost)).ln(),
+            chance: chance.clamp(1e-6, 0.25),
+        };
+        let mut current = curve.likelihood(trials);
+        let mut damping = 1e-3;
+        for _ in 0..MAX_ROUNDS {
+            let mut damped = current.information;
+            for axis in 0..3 {
+                damped[(axis, axis)] *= 1.0 + damping;
+            }
+            let step = damped.cholesky()?.solve(&current.gradient);
+            if step.dot(&current.gradient) < SETTLED {
+                break;
+            }
+            let next = curve.moved(&step);
+            let there = next.likelihood(trials);
+            if there.log > current.log {
+                (curve, current) = (next, there);
+                damping *= 0.2;
+            } else {
+                damping = damping.max(1e-3) * 5.0;
+            }
+        }
+        let covariance = current.information.try_inverse();
+        Some(Fitted {
+            curve,
+            sigma_mag: covariance
+                .map(|c| c[(0, 0)].sqrt())
+                .filter(|sigma| sigma.is_finite()),
+        })
+    }
+
+    fn moved(&self, step: &Vector3<f64>) -> Self {
+        Self {
+            v_mag: self.v_mag + step[0],
+            ln_width: (self.ln_width + step[1]).clamp(-5.0, 3.0),
+            logit_lost: (self.logit_lost + step[2]).clamp(-20.0, 20.0),
+            chance: self.chance,
+        }
+    }
+
+    fn lost(&self) -> f64 {
+        1.0 / (1.0 + (-self.logit_lost).exp())
+    }
+
+    /// Of `trials`, brightest first.
+    fn likelihood(&self, trials: &[Trial]) -> Likelihood {
+        let (width, lost) = (self.ln_width.exp(), self.lost());
+        let from_middle = (self.ln_width - TYPICAL_WIDTH_MAG.ln()) / LN_WIDTH_SIGMA;
+        let mut sum = Likelihood {
+            log: -0.5 * from_middle.powi(2)
+                + PRIOR_LOST * lost.ln()
+                + PRIOR_KEPT * (1.0 - lost).ln(),
+            gradient: Vector3::new(
+                0.0,
+                -from_middle / LN_WIDTH_SIGMA,
+                PRIOR_LOST - (PRIOR_LOST + PRIOR_KEPT) * lost,
+            ),
+            information: Matrix3::from_diagonal(&Vector3::new(
+                0.0,
+                LN_WIDTH_SIGMA.powi(-2),
+                (PRIOR_LOST + PRIOR_KEPT) * lost * (1.0 - lost),
+            )),
+        };
+        let full = 1.0 - self.chance - lost;
+        let mut add = |z: f64, detected: bool, count: usize| {
+            let (above, density) = (normal_cdf(z), normal_density(z));
+            let p = (self.chance + full * above).clamp(1e-12, 1.0 - 1e-12);
+            let change = Vector3::new(
+                full * density / width,
+                -full * density * z,
+                -above * lost * (1.0 - lost),
+            );
+            let (log, slope) = if detected {
+                (p.ln(), 1.0 / p)
+            } else {
+                ((1.0 - p).ln(), -1.0 / (1.0 - p))
+            };
+            let count = count as f64;
+            sum.log += count * log;
+            sum.gradient += change * (count * slope);
+            sum.information += change * change.transpose() * (count / (p * (1.0 - p)));
+        };
+        let brighter_than = |v_mag: f64| trials.partition_point(|trial| trial.v_mag < v_mag);
+        let near = brighter_than(self.v_mag - FAR_WIDTHS * width)
+            ..brighter_than(self.v_mag + FAR_WIDTHS * width);
+        for (z, far) in [
+            (FAR_WIDTHS, &trials[..near.start]),
+            (-FAR_WIDTHS, &trials[near.end..]),
+        ] {
+            let detected = far.iter().filter(|trial| trial.detected).count();
+            add(z, true, detected);
+            add(z, false, far.len() - detected);
+        }
+        for trial in &trials[near] {
+            add((self.v_mag - trial.v_mag) / width, trial.detected, 1);
+        }
+        sum
+    }
+}
+
+/// The magnitude that best parts stars detected from stars not detected, of `trials`, brightest first.
+fn best_step(trials: &[Trial]) -> Option<f64> {
+    // Misplaced, if the step is before the first: all that are detected.
+    let mut misplaced = trials.iter().filter(|trial| trial.detected).count();
+    let mut best = (misplaced, trials.first()?.v_mag);
+    for (i, trial) in trials.iter().enumerate() {
+        if trial.detected {
+            misplaced -= 1;
+        } else {
+            misplaced += 1;
+        }
+        if misplaced < best.0 {
+            let next = trials.get(i + 1).map_or(trial.v_mag, |next| next.v_mag);
+            best = (misplaced, 0.5 * (trial.v_mag + next));
+        }
+    }
+    Some(best.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// How stars are drawn.
+    #[derive(Debug, Clone, Copy)]
+    struct Sky {
+        stars: usize,
+        limit: f64,
+        width: f64,
+        lost: f64,
+        chance: f64,
+    }
+
+    const TYPICAL: Sky = Sky {
+        stars: 300,
+        limit: 8.5,
+        width: 0.35,
+        lost: 0.02,
+        chance: 0.003,
+    };
+
+    impl Sky {
+        fn with(mut self, change: impl Fn(&mut Self)) -> Self {
+            change(&mut self);
+            self
+        }
+
+        /// Stars from 5.5 to 10 mag, three times as many to each fainter magnitude.
+        fn draw(&self, seed: u64) -> Vec<Trial> {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let faintest = 3_f64.powf(4.5);
+            let mut trial = || {
+                let v_mag = 5.5 + random.random_range(1.0..faintest).ln() / 3_f64.ln();
+                let above = normal_cdf((self.limit - v_mag) / self.width);
+                let seen = random.random_bool((1.0 - self.lost) * above);
+                Trial {
+                    v_mag,
+                    detected: seen || random.random_bool(self.chance),
+                }
+            };
+            (0..self.stars).map(|_| trial()).collect()
+        }
+
+        /// Mean and standard deviation of (found − true) / standard error.
+        fn pulls(&self) -> (f64, f64) {
+            const FRAMES: u64 = 600;
+            let pulls: Vec<f64> = (0..FRAMES)
+                .filter_map(|seed| measure(&self.draw(seed), self.chance).limit.ok())
+                .map(|limit| (limit.v_mag - self.limit) / limit.sigma_mag)
+                .collect();
+            assert!(pulls.len() as f64 > 0.97 * FRAMES as f64, "{}", pulls.len());
+            let count = pulls.len() as f64;
+            let mean = pulls.iter().sum::<f64>() / count;
+            let variance = pulls.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / count;
+            (mean, variance.sqrt())
+        }
+    }
+
+    #[test]
+    fn the_limit_is_found_within_its_standard_error() {
+        // 600 frames show a mean to 0.04 and a standard deviation to 0.03.
+        let well_determined = [
+            TYPICAL,
+            TYPICAL.with(|sky| sky.stars = 1500),
+            TYPICAL.with(|sky| sky.width = 0.15),
+            TYPICAL.with(|sky| sky.chance = 0.05),
+        ];
+        // Few stars are bright enough to tell losses from the fall: what the priors say shows.
+        let hardly = [
+            TYPICAL.with(|sky| sky.stars = 80),
+            TYPICAL.with(|sky| sky.width = 0.7),
+            TYPICAL.with(|sky| sky.lost = 0.15),
+        ];
+        for (skies, mean_tolerance, spread_tolerance) in
+            [(&well_determined[..], 0.15, 0.1), (&hardly[..], 0.5, 0.25)]
+        {
+            for sky in skies {
+                let (mean, spread) = sky.pulls();
+                println!("{sky:?}: pulls {mean:+.3} ± {spread:.3}");
+                assert!(mean.abs() < mean_tolerance, "{sky:?}: {mean}");
+                assert!((spread - 1.0).abs() < spread_tolerance, "{sky:?}: {spread}");
+            }
+        }
+    }
+
+    #[test]
+    fn width_and_lost_stars_are_found_as_well() {
+        let sky = TYPICAL.with(|sky| (sky.stars, sky.lost) = (20_000, 0.1));
+        let limit = measure(&sky.draw(1), sky.chance).limit.unwrap();
+        assert!((limit.width_mag / sky.width - 1.0).abs() < 0.1, "{limit:?}");
+        assert!((limit.lost - sky.lost).abs() < 0.02, "{limit:?}");
+    }
+
+    #[test]
+    fn one_bright_star_that_is_lost_moves_nothing() {
+        let mut trials = TYPICAL.draw(7);
+        let before = measure(&trials, TYPICAL.chance).limit.unwrap();
+        trials.push(Trial {
+            v_mag: 3.0,
+            detected: false,
+        });
+        let after = measure(&trials, TYPICAL.chance).limit.unwrap();
+        assert!((after.v_mag - before.v_mag).abs() < before.sigma_mag);
+        assert!(after.width_mag < 1.1 * before.width_mag);
+    }
+
+    #[test]
+    fn a_faint_star_at_the_place_of_another_detection_moves_nothing() {
+        let mut trials = TYPICAL.draw(8);
+        let before = measure(&trials, TYPICAL.chance).limit.unwrap();
+        trials.push(Trial {
+            v_mag: 12.0,
+            detected: true,
+        });
+        let after = measure(&trials, TYPICAL.chance).limit.unwrap();
+        assert!((after.v_mag - before.v_mag).abs() < 0.3 * before.sigma_mag);
+    }
+
+    #[test]
+    fn a_sharp_edge_is_found_between_the_stars_on_either_side() {
+        let trials: Vec<Trial> = (0..40)
+            .map(|i| Trial {
+                v_mag: 6.0 + 0.1 * f64::from(i),
+                detected: i < 20,
+            })
+            .collect();
+        let limit = measure(&trials, 0.0).limit.unwrap();
+        assert!((limit.v_mag - 7.95).abs() < 0.1, "{limit:?}");
+        assert!((0.02..0.3).contains(&limit.sigma_mag), "{limit:?}");
+    }
+
+    #[test]
+    fn there_is_no_limit_where_completeness_does_not_fall_or_nothing_is_seen() {
+        let all = |detected| -> Vec<Trial> {
+            let trials = TYPICAL.draw(3).into_iter();
+            trials.map(|trial| Trial { detected, ..trial }).collect()
+        };
+        assert_eq!(measure(&all(true), 0.0).limit, Err(NoLimit::CatalogEnds));
+        assert_eq!(
+            measure(&all(false), 0.0).limit,
+            Err(NoLimit::TooFewDetected)
+        );
+        assert_eq!(measure(&[], 0.0).limit, Err(NoLimit::TooFewDetected));
+        // A tenth is lost, at any magnitude.
+        let mut some = all(true);
+        some.iter_mut()
+            .step_by(10)
+            .for_each(|trial| trial.detected = false);
+        assert_eq!(measure(&some, 0.0).limit, Err(NoLimit::CatalogEnds));
+    }
+
+    #[test]
+    fn the_curve_holds_every_star_once_and_has_no_gap() {
+        let mut trials = TYPICAL.draw(4);
+        trials.push(Trial {
+            v_mag: 2.5,
+            detected: true,
+        });
+        let bins = measure(&trials, 0.0).bins;
+        assert_eq!(bins[0].v_mag, 2.75);
+        assert!(
+            bins.windows(2)
+                .all(|pair| pair[1].v_mag - pair[0].v_mag == BIN_MAG)
+        );
+        assert_eq!(
+            bins.iter().map(|bin| bin.stars).sum::<usize>(),
+            trials.len()
+        );
+        let detected = trials.iter().filter(|trial| trial.detected).count();
+        assert_eq!(bins.iter().map(|bin| bin.detected).sum::<usize>(), detected);
+        assert!(measure(&[], 0.0).bins.is_empty());
+    }
+}

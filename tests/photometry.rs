@@ -1,0 +1,187 @@
+//! Zero point and completeness of drawn frames, whose truth is known, and of the real sky.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
+mod common;
+
+use common::{Ran, fixture, number, shared_dir, starpipe};
+use serde_json::Value;
+use std::path::PathBuf;
+
+/// `examples/draw_frame.rs`: electrons from a star of magnitude 0.
+const DRAWN_ZERO_MAG_E: f64 = 250e3;
+
+fn processed(arguments: &[&str], frames: &[PathBuf]) -> Vec<Value> {
+    let mut command = starpipe();
+    command.args(["process", "--format", "json"]);
+    let ran = Ran::new(command.args(arguments).args(frames));
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    ran.reports()
+}
+
+/// The curve's part fainter, or brighter, than a magnitude: the share detected.
+fn share(report: &Value, wanted: impl Fn(f64) -> bool) -> f64 {
+    let bins = report["photometry"]["completeness"].as_array().unwrap();
+    let of = |what: &str| -> f64 {
+        let wanted = bins
+            .iter()
+            .filter(|bin| wanted(bin["vmag"].as_f64().unwrap()));
+        wanted.map(|bin| bin[what].as_f64().unwrap()).sum()
+    };
+    of("detected") / of("stars")
+}
+
+#[test]
+fn drawn_frames_have_the_zero_point_they_were_drawn_with() {
+    for (file, electrons_per_adu) in [("cygnus/cygnus.tif", 1.0), ("orion/orion.png", 8.0)] {
+        let report = &processed(&[], &[fixture(file)])[0];
+        let expected = 2.5 * (DRAWN_ZERO_MAG_E / electrons_per_adu).log10();
+        let found = number(report, "/photometry/zero_point_vmag");
+        let sigma = number(report, "/photometry/zero_point_sigma_mag");
+        println!("{file}: zero point {found} ± {sigma}, drawn with {expected:.4}");
+        // A hundredth of a magnitude is what the spot's tails and the background are worth.
+        assert!(
+            (found - expected).abs() < 3.0 * sigma + 0.01,
+            "{file}: {found} {expected}"
+        );
+        assert!(sigma < 0.02, "{file}: {sigma}");
+        let photometry = &report["photometry"];
+        assert_eq!(photometry["flux_unit"], "ADU");
+        assert!(photometry["color_term"].is_null(), "{photometry}");
+        assert!((number(report, "/photometry/linearity") - 1.0).abs() < 0.05);
+    }
+}
+
+#[test]
+fn the_limit_of_a_drawn_frame_is_that_of_its_noise() {
+    let report = &processed(&["--sigma", "6"], &[fixture("cygnus/cygnus.tif")])[0];
+    // A star is detected where the matched filter's signal exceeds 6 standard deviations of sky and read noise; half of those
+    // that are just so bright. The effective area of the spot of 1 px, integrated over pixels, is 4π(σ² + 1/12).
+    let noise_e = f64::sqrt(100.0 + 25.0 + 1.0 / 12.0);
+    let effective_px = 4.0 * std::f64::consts::PI * (1.0 + 1.0 / 12.0);
+    let faintest_e = 6.0 * noise_e * effective_px.sqrt();
+    // Its signal is sought at whole pixels, 1/6 px² from the spot's centre on average.
+    let off_centre = (1.0 / 6.0) / (4.0 * (1.0 + 1.0 / 12.0));
+    let expected = 2.5 * (DRAWN_ZERO_MAG_E / faintest_e).log10() - 1.0857 * off_centre;
+    let found = number(report, "/photometry/limit50_vmag");
+    let sigma = number(report, "/photometry/limit50_sigma_mag");
+    println!("limit {found} ± {sigma}, by its noise {expected:.3}");
+    assert!(
+        (found - expected).abs() < 3.0 * sigma + 0.03,
+        "{found} {sigma} {expected}"
+    );
+    // The faintest star detected is a lucky one.
+    assert!(number(report, "/magnitude/faintest_vmag") > found);
+    assert!(share(report, |vmag| vmag < found - 1.0) > 0.95);
+    assert!(share(report, |vmag| vmag > found + 1.0) < 0.05);
+}
+
+#[test]
+fn lists_of_centroids_have_no_photometry() {
+    let directory = tempfile::tempdir().unwrap();
+    let report = &processed(&[], &[fixture("orion/orion.png")])[0];
+    let mut list = String::from("x,y,flux\n");
+    for star in report["stars"].as_array().unwrap() {
+        list += &format!("{},{},{}\n", star["x"], star["y"], star["flux"]);
+    }
+    let path = directory.path().join("orion.csv");
+    std::fs::write(&path, list).unwrap();
+    let mut command = starpipe();
+    let ran = Ran::new(command.args(["identify", "--format", "json"]).arg(path));
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    assert_eq!(ran.reports()[0]["photometry"], Value::Null);
+}
+
+/// Where the frames of [`one_night`] were taken, as far as is known: within some kilometres, seconds of arc in airmass.
+const NIGHT_SITE: &str = "52.22,4.42";
+/// Zero points of the same night differ by no more than this, once the air is accounted for.
+const SAME_SKY_MAG: f64 = 0.05;
+/// Stars of SKY2000 scatter so much about a zero point with a colour term, at most; photon noise of the faint ones is most of it.
+const SCATTER_MAX_MAG: f64 = 0.2;
+
+/// Four 16-bit frames of one camera and one night, at two altitudes.
+fn one_night() -> Option<Vec<Value>> {
+    let frames = shared_dir()?.join("frames");
+    let frames = [
+        "Alt40_Azi-135",
+        "Alt40_Azi135",
+        "Alt60_Azi-135",
+        "Alt60_Azi135",
+    ]
+    .map(|name| frames.join(format!("2019-07-29T204726_{name}_Try1.tiff")));
+    Some(processed(&["--site", NIGHT_SITE], &frames))
+}
+
+/// Slope and intercept of the straight line through `points`.
+fn line(points: &[[f64; 2]]) -> (f64, f64) {
+    let count = points.len() as f64;
+    let mean = |axis: usize| points.iter().map(|p| p[axis]).sum::<f64>() / count;
+    let (x, y) = (mean(0), mean(1));
+    let (above, below) = points.iter().fold((0.0, 0.0), |(above, below), p| {
+        (above + (p[0] - x) * (p[1] - y), below + (p[0] - x).powi(2))
+    });
+    let slope = above / below;
+    (slope, y - slope * x)
+}
+
+#[test]
+fn zero_points_of_one_night_differ_by_the_air_alone() {
+    let Some(reports) = one_night() else { return };
+    let point = |report: &Value| {
+        let airmass = number(report, "/observation/airmass");
+        [airmass, number(report, "/photometry/zero_point_vmag")]
+    };
+    let points: Vec<[f64; 2]> = reports.iter().map(point).collect();
+    let (slope, intercept) = line(&points);
+    println!(
+        "extinction {:.3} mag an airmass, zero point above the air {intercept:.3}",
+        -slope
+    );
+    // From the clearest mountain to thick haze.
+    assert!((0.1..0.8).contains(&-slope), "{slope}");
+    for (report, [airmass, zero_point]) in reports.iter().zip(points) {
+        let off = zero_point - (intercept + slope * airmass);
+        let scatter = number(report, "/photometry/scatter_mag");
+        println!(
+            "airmass {airmass:.3}: zero point {zero_point:.3}, off by {off:+.3}, scatter {scatter:.3}"
+        );
+        assert!(off.abs() < SAME_SKY_MAG, "{off}");
+        assert!(scatter < SCATTER_MAX_MAG, "{scatter}");
+        assert_eq!(report["photometry"]["zero_point_bv_mag"], 0.6);
+    }
+}
+
+#[test]
+fn every_frame_of_one_night_has_a_limit_that_the_air_explains() {
+    let Some(reports) = one_night() else { return };
+    let limits: Vec<[f64; 2]> = reports
+        .iter()
+        .map(|report| {
+            let sigma = number(report, "/photometry/limit50_sigma_mag");
+            let limit = number(report, "/photometry/limit50_vmag");
+            println!("limit {limit:.3} ± {sigma:.3}");
+            assert!(sigma < 0.1, "{sigma}");
+            assert!(number(report, "/magnitude/faintest_vmag") > limit);
+            assert!(share(report, |vmag| vmag < limit - 1.0) > 0.97);
+            assert!(share(report, |vmag| vmag > limit + 1.0) < 0.03);
+            [number(report, "/observation/airmass"), limit]
+        })
+        .collect();
+    // At the same altitude the same limit, whatever stars there are; higher up a fainter one.
+    for pair in limits.chunks(2) {
+        assert!((pair[0][1] - pair[1][1]).abs() < 0.15, "{pair:?}");
+    }
+    assert!(limits[2][1] > limits[0][1] && limits[3][1] > limits[1][1]);
+}
+
+#[test]
+fn a_photograph_with_a_tone_curve_says_so() {
+    let Some(shared) = shared_dir() else { return };
+    let report = &processed(&[], &[shared.join("frames/hale_bopp.jpg")])[0];
+    // The curve of sRGB is a power of about 1 / 2.2.
+    let linearity = number(report, "/photometry/linearity");
+    assert!((0.4..0.6).contains(&linearity), "{linearity}");
+    let notes = report["notes"].as_array().unwrap();
+    let told = |note: &Value| note.as_str().unwrap().contains("not proportional to light");
+    assert!(notes.iter().any(told), "{notes:?}");
+}
