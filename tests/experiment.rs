@@ -18,7 +18,7 @@ fn experiment(arguments: &[&str]) -> Ran {
 
 #[test]
 fn the_limits_and_all_stars_are_the_papers_and_the_frames_are_as_faint_as_expected() {
-    for (which, limit, stars) in [("1", 8.15, 7), ("2", 9.0, 9)] {
+    for (which, limit, stars, as_bright) in [("1", 8.15, 7, 7), ("2", 9.0, 9, 17)] {
         let ran = experiment(&[which, "--trials", "12", "--format", "json"]);
         assert_eq!(ran.status, 0, "{}", ran.stderr);
         let [report] = &ran.reports()[..] else {
@@ -27,6 +27,7 @@ fn the_limits_and_all_stars_are_the_papers_and_the_frames_are_as_faint_as_expect
         assert!((number(report, "/limit/limit_vmag") - limit).abs() < 0.02);
         assert_eq!(report["table"]["right"], stars);
         assert_eq!(report["table"]["stars"].as_array().unwrap().len(), stars);
+        assert_eq!(report["table"]["field"]["stars_as_bright"], as_bright);
         let stated = number(report, "/table/stated_zenith_distance_deg");
         let true_deg = number(report, "/table/zenith_distance_deg");
         assert!((true_deg - stated).abs() > 30.0, "{true_deg}");

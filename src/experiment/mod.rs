@@ -34,7 +34,7 @@ use crate::identify::Outcome;
 use crate::pipeline::{DateSource, FrameDate, Knowledge, Pipeline, Solution, SolveConfig};
 use crate::report::to_decimals;
 use crate::sensitivity::{Budget, Detector, Scenario};
-use crate::simulate::View;
+use crate::simulate::Pointing;
 use serde::Serialize;
 use simulated::Protocol;
 
@@ -169,8 +169,8 @@ pub fn run(
     };
     let protocol = Protocol {
         scenario: &scenario,
-        detector: &detector,
-        view: &View {
+        detectors: [&detector, &Detector::peak_pixel(&scenario, &budget)],
+        pointing: &Pointing {
             camera: found.camera.clone(),
             icrs_to_camera: found.icrs_to_camera,
             years_since_j2000: published.date.years_since_j2000(),

@@ -8,7 +8,7 @@ use crate::frame::Frame;
 use crate::identify::{Identification, Outcome, StarMatch};
 use crate::pipeline::{Pipeline, Solution, SolveConfig, Source};
 use crate::sensitivity::{Detector, Faintest, Scenario};
-use crate::simulate::{TrueStar, Truth, View, frame_of_sky};
+use crate::simulate::{Pointing, TrueStar, Truth, frame_of_sky};
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -22,8 +22,9 @@ const AT_PLACE_PX: f64 = 2.0;
 /// What is simulated, again and again.
 pub(super) struct Protocol<'a> {
     pub scenario: &'a Scenario,
-    pub detector: &'a Detector,
-    pub view: &'a View,
+    /// The detector as built, and the paper's rule of the brightest pixel.
+    pub detectors: [&'a Detector; 2],
+    pub pointing: &'a Pointing,
     pub config: &'a SolveConfig,
     pub seed: u64,
 }
@@ -33,8 +34,8 @@ pub(super) struct Protocol<'a> {
 pub(super) struct Trial {
     /// The catalogue's stars on it, faint ones without a chance included.
     pub stars: Vec<StarTrial>,
-    /// What is to be expected of the faintest.
-    pub expected: Option<Faintest>,
+    /// What is to be expected of the faintest: of the detector as built, and by the paper's rule.
+    pub expected: [Option<Faintest>; 2],
     /// What was identified; none where the frame was not.
     pub identified: Option<Identified>,
 }
@@ -88,11 +89,16 @@ impl Protocol<'_> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         random.set_stream(number);
         let shift_px = [0, 1].map(|_| random.random_range(-SHIFT_PX..SHIFT_PX));
-        let view = View {
-            icrs_to_camera: shifted(self.view, shift_px),
-            ..self.view.clone()
+        let pointing = Pointing {
+            icrs_to_camera: shifted(self.pointing, shift_px),
+            ..self.pointing.clone()
         };
-        Ok(frame_of_sky(self.scenario, &view, stars, random.random())?)
+        Ok(frame_of_sky(
+            self.scenario,
+            &pointing,
+            stars,
+            random.random(),
+        )?)
     }
 
     pub(super) fn solve(
@@ -126,19 +132,23 @@ impl Protocol<'_> {
             detected: owners.contains(&star.catalog),
             identified: named(star.catalog),
         });
+        let v_mags = || truth.stars.iter().map(|star| star.v_mag);
         Trial {
             stars: trials.collect(),
-            expected: Faintest::among(truth.stars.iter().map(|s| s.v_mag), self.detector),
+            expected: self
+                .detectors
+                .map(|detector| Faintest::among(v_mags(), detector)),
             identified: found.and_then(|found| identified(found, solution, &light, stars)),
         }
     }
 }
 
 /// The attitude with which every star falls so many pixels further along x and y, near the frame's centre.
-fn shifted(view: &View, [dx, dy]: [f64; 2]) -> Rotation<Icrs, Camera> {
-    let radian = |px: f64| px / view.camera.focal_length_px;
-    let dx = if view.camera.mirrored { -dx } else { dx };
-    view.icrs_to_camera
+fn shifted(pointing: &Pointing, [dx, dy]: [f64; 2]) -> Rotation<Icrs, Camera> {
+    let radian = |px: f64| px / pointing.camera.focal_length_px;
+    let dx = if pointing.camera.mirrored { -dx } else { dx };
+    pointing
+        .icrs_to_camera
         .then_turn(Vector3::new(-radian(dy), radian(dx), 0.0))
 }
 

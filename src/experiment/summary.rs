@@ -20,6 +20,8 @@ pub struct SimulatedReport {
     pub faintest: Option<FoundFaintest>,
     /// What is to be expected of it, given the stars on the frames and the detector's completeness.
     pub expected: Option<ExpectedFaintest>,
+    /// The same by the paper's rule: the brightest pixel stands above the noise by the wanted ratio.
+    pub expected_by_brightest_pixel: Option<ExpectedFaintest>,
     /// Stars named on a frame, on average over those that are identified.
     pub stars_named: f64,
     /// Stars named on all frames where the light is another star's, or no star's.
@@ -82,7 +84,8 @@ impl SimulatedReport {
             .filter_map(|t| t.identified.as_ref())
             .collect();
         let faintest: Vec<f64> = identified.iter().map(|i| i.faintest_vmag).collect();
-        let expected = ExpectedFaintest::over(trials);
+        let [expected, by_brightest_pixel] =
+            [0, 1].map(|rule| ExpectedFaintest::over(trials, rule));
         let stars = trials.iter().flat_map(|trial| &trial.stars);
         let named = stars.filter(|star| star.identified).count();
         Self {
@@ -92,6 +95,7 @@ impl SimulatedReport {
             frames_identified: identified.len(),
             faintest: FoundFaintest::of(&faintest, expected.as_ref()),
             expected,
+            expected_by_brightest_pixel: by_brightest_pixel,
             stars_named: to_decimals(named as f64 / identified.len().max(1) as f64, 2),
             named_wrongly: identified.iter().map(|i| i.wrong).sum(),
             faintest_wrong: identified.iter().filter(|i| i.faintest_is_wrong).count(),
@@ -125,8 +129,8 @@ impl FoundFaintest {
 }
 
 impl ExpectedFaintest {
-    fn over(trials: &[Trial]) -> Option<Self> {
-        let all: Vec<Faintest> = trials.iter().filter_map(|t| t.expected).collect();
+    fn over(trials: &[Trial], rule: usize) -> Option<Self> {
+        let all: Vec<Faintest> = trials.iter().filter_map(|t| t.expected[rule]).collect();
         let mean = |value: fn(&Faintest) -> f64| {
             to_decimals(all.iter().map(value).sum::<f64>() / all.len() as f64, 3)
         };

@@ -17,7 +17,7 @@ impl ExperimentReport {
         text += &limit_text(&self.limit);
         text += &table_text(&self.table);
         if let Some(simulated) = &self.simulated {
-            text += &simulated_text(simulated, &self.limit);
+            text += &simulated_text(simulated, &self.limit, self.table.stars.len());
         }
         text
     }
@@ -81,22 +81,50 @@ fn table_text(table: &TableReport) -> String {
             );
         }
     }
-    if let Some(found_deg) = table.zenith_distance_deg {
-        let stated_deg = table.stated_zenith_distance_deg;
-        let verdict = if (found_deg - stated_deg).abs() > CONTRADICTION_DEG {
-            ": they contradict each other"
-        } else {
-            ""
-        };
-        let _ = writeln!(
-            text,
-            "  zenith distance {stated_deg}° as stated, {found_deg:.1}° from site, time and centre{verdict}"
-        );
-    }
+    text += &unlisted_text(table);
+    text += &zenith_text(table);
     text
 }
 
-fn simulated_text(simulated: &SimulatedReport, limit: &LimitReport) -> String {
+/// Whether the zenith distance can be as the paper has it.
+fn zenith_text(table: &TableReport) -> String {
+    let Some(found_deg) = table.zenith_distance_deg else {
+        return String::new();
+    };
+    let stated_deg = table.stated_zenith_distance_deg;
+    let both = format!(
+        "  zenith distance {stated_deg}° as stated, {found_deg:.1}° from site, time and centre"
+    );
+    let limit = match table.limit_there_vmag {
+        Some(v_mag) => format!("; there, the limit is V {v_mag:.2}"),
+        None => String::new(),
+    };
+    if (found_deg - stated_deg).abs() > CONTRADICTION_DEG {
+        format!("{both}: they contradict each other{limit}\n")
+    } else {
+        format!("{both}\n")
+    }
+}
+
+/// What the paper could have listed and did not.
+fn unlisted_text(table: &TableReport) -> String {
+    let Some(field) = &table.field else {
+        return String::new();
+    };
+    let v_mags = table.stars.iter().map(|star| star.vmag);
+    let faintest = v_mags.fold(f64::NEG_INFINITY, f64::max);
+    let (all, listed) = (field.stars_as_bright, table.stars.len());
+    match field.brightest_unlisted_vmag {
+        None => format!(
+            "  all {all} stars to V {faintest:.2} in the rectangle that they span are listed\n"
+        ),
+        Some(missing) => format!(
+            "  of the {all} stars to V {faintest:.2} in the rectangle that they span {listed} are listed; those missing begin at V {missing:.2}\n"
+        ),
+    }
+}
+
+fn simulated_text(simulated: &SimulatedReport, limit: &LimitReport, paper_stars: usize) -> String {
     let mut text = format!(
         "\n{} frames simulated with that camera, sky and pointing, moved by up to ±{} px: {} identified\n",
         simulated.frames, simulated.shift_px, simulated.frames_identified
@@ -130,6 +158,14 @@ fn simulated_text(simulated: &SimulatedReport, limit: &LimitReport) -> String {
         .and_then(|f| f.difference_mag.zip(f.difference_sigma_mag));
     if let Some((difference, sigma)) = difference {
         line("difference", format!("{difference:+.3} ± {sigma:.3} mag"));
+    }
+    if let Some(expected) = &simulated.expected_by_brightest_pixel {
+        let (mean, sigma, found) = (expected.mean_vmag, expected.sigma_mag, expected.stars_found);
+        let paper = limit.paper_faintest_vmag;
+        let value = format!(
+            "V {mean:.2}, scatter {sigma:.2}, {found:.1} stars; the paper has {paper:.2}, and {paper_stars} stars"
+        );
+        line("by the paper's rule", value);
     }
     let (wrong, faintest) = (simulated.named_wrongly, simulated.faintest_wrong);
     let wrongly = match wrong {

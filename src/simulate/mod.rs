@@ -1,8 +1,8 @@
 //! Frames with truth: what a camera would make of known stars.
 //!
-//! [`Scenario`], [`View`], catalogue stars, seed → [`Frame`], [`Truth`]
+//! [`Scenario`], [`Pointing`], catalogue stars, seed → [`Frame`], [`Truth`]
 //!
-//! 1. Each star's place on the detector, at the date of the view, and its expected electrons by the scenario's [`Budget`].
+//! 1. Each star's place on the detector, at the date, and its expected electrons by the scenario's [`Budget`].
 //! 2. Its spot: a Gaussian, smeared along the rows by the motion during the exposure, integrated over each pixel.
 //! 3. Sky and dark current, the same in every pixel.
 //! 4. What is read out: Poisson charge that a full pixel clips, the noise of reading, gain, bias, whole grey levels of
@@ -26,9 +26,9 @@ use crate::sensor::Sensor;
 use readout::Readout;
 use spot::Spot;
 
-/// Where a camera looks, and when.
+/// Where a camera points, and when.
 #[derive(Debug, Clone, PartialEq)]
-pub struct View {
+pub struct Pointing {
     /// Which direction each pixel looks in; its size is the sensor's.
     pub camera: CameraModel,
     /// The attitude.
@@ -70,7 +70,7 @@ pub fn square_pixel_camera(sensor: &Sensor) -> CameraModel {
     CameraModel::pinhole(width_px, height_px, focal_length_px, false)
 }
 
-/// A frame of the catalogue's `stars`, seen in a `view`, and the stars that are on it.
+/// A frame of the catalogue's `stars`, seen from a `pointing`, and the stars that are on it.
 ///
 /// All stars are drawn, however faint: the catalogue should go deeper than the camera.
 ///
@@ -78,18 +78,18 @@ pub fn square_pixel_camera(sensor: &Sensor) -> CameraModel {
 /// [`FrameError::TooSmall`], [`FrameError::TooLarge`] for a detector that no frame can be of.
 pub fn frame_of_sky(
     scenario: &Scenario,
-    view: &View,
+    pointing: &Pointing,
     stars: &[Star],
     seed: u64,
 ) -> Result<(Frame, Truth), FrameError> {
     let spot = Spot::of(scenario);
-    let seen = stars_near(scenario, view, stars, spot.reach_px());
+    let seen = stars_near(scenario, pointing, stars, spot.reach_px());
     let sources: Vec<_> = seen
         .iter()
         .map(|star| (star.position, star.electrons))
         .collect();
     let frame = expose(scenario, &sources, seed)?;
-    let on_frame = |star: &TrueStar| view.camera.contains(&star.position);
+    let on_frame = |star: &TrueStar| pointing.camera.contains(&star.position);
     let (stars, beyond) = seen.into_iter().partition(on_frame);
     Ok((frame, Truth { stars, beyond }))
 }
@@ -112,17 +112,25 @@ pub fn star_field(
 }
 
 /// The stars on the frame, and those so near to it that their light reaches it.
-fn stars_near(scenario: &Scenario, view: &View, stars: &[Star], reach_px: f64) -> Vec<TrueStar> {
+fn stars_near(
+    scenario: &Scenario,
+    pointing: &Pointing,
+    stars: &[Star],
+    reach_px: f64,
+) -> Vec<TrueStar> {
     let budget = Budget::new(scenario);
-    let camera = &view.camera;
-    let boresight = view.icrs_to_camera.inverse().apply(&UnitVector::BORESIGHT);
+    let camera = &pointing.camera;
+    let boresight = pointing
+        .icrs_to_camera
+        .inverse()
+        .apply(&UnitVector::BORESIGHT);
     // Room for the light that reaches in from outside, and for a star's own motion.
     let margin_rad = 2.0 * reach_px / camera.focal_length_px + PROPER_MOTION_ROOM_RAD;
     let least_cosine = (camera.radius_rad() + margin_rad).cos();
     let near = |star: &Star| star.direction.dot(&boresight) > least_cosine;
     let seen = |(catalog, star): (usize, &Star)| {
-        let direction = star.direction_at(view.years_since_j2000);
-        let position = camera.pixel_of(&view.icrs_to_camera.apply(&direction))?;
+        let direction = star.direction_at(pointing.years_since_j2000);
+        let position = camera.pixel_of(&pointing.icrs_to_camera.apply(&direction))?;
         let v_mag = f64::from(star.v_mag);
         camera
             .nearly_contains(&position, reach_px)
@@ -181,18 +189,18 @@ mod tests {
         scenario.sensor.read_noise_e = 0.0;
         let camera = square_pixel_camera(&scenario.sensor);
         let boresight = UnitVector::from_ra_dec(1.0, 0.3);
-        let view = View {
+        let pointing = Pointing {
             icrs_to_camera: Rotation::looking_at(&boresight, 40.0 * RAD_PER_DEG),
             years_since_j2000: 0.0,
             camera,
         };
         let star_at = |x: f64, y: f64| {
-            let direction = view.camera.direction_of(&PixelPoint::new(x, y));
-            let on_sky = view.icrs_to_camera.inverse().apply(&direction);
+            let direction = pointing.camera.direction_of(&PixelPoint::new(x, y));
+            let on_sky = pointing.icrs_to_camera.inverse().apply(&direction);
             Star::new(StarId::Number(1), on_sky, 2.0)
         };
         let stars = [star_at(-1.5, 300.0), star_at(100.25, 200.75)];
-        let (frame, truth) = frame_of_sky(&scenario, &view, &stars, 7).unwrap();
+        let (frame, truth) = frame_of_sky(&scenario, &pointing, &stars, 7).unwrap();
         assert_eq!((truth.stars.len(), truth.beyond.len()), (1, 1));
         let found = &truth.stars[0];
         assert_eq!((found.catalog, found.v_mag), (1, 2.0));
