@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use starpipe::coords::PixelPoint;
 use starpipe::detect::{DetectConfig, Detection, Workspace, detect};
 use starpipe::frame::Frame;
-use starpipe::sensitivity::{Budget, Detector, Extinction, Scenario, SkyBrightness};
+use starpipe::sensitivity::{Budget, Detector, Extinction, Rule, Scenario, SkyBrightness};
 use starpipe::sensor::{Preset, Response, Sensor};
 use starpipe::simulate::star_field;
 
@@ -32,9 +32,18 @@ const MATCH_PX: f64 = 2.0;
 struct Trial {
     v_mag: f64,
     /// Something at its place that may be a star.
-    star_like: bool,
+    detected: bool,
     /// A pixel that stands out by the wanted ratio of signal to noise.
     peak: bool,
+}
+
+impl Trial {
+    fn is_found(&self, rule: Rule) -> bool {
+        match rule {
+            Rule::MatchedFilter => self.detected,
+            Rule::PeakPixel => self.peak,
+        }
+    }
 }
 
 /// Frames of isolated stars, and what is found of them.
@@ -53,7 +62,7 @@ fn trials(scenario: &Scenario, frames: u64) -> Vec<Trial> {
             let mut near = found.sources.iter().filter(near);
             Trial {
                 v_mag: *v_mag,
-                star_like: near.any(|source| source.flags.is_star_like()),
+                detected: near.any(|source| source.flags.is_star_like()),
                 peak: peak_stands_out(scenario, &budget, &frame, position),
             }
         }));
@@ -129,7 +138,7 @@ struct Curve {
 
 /// The probability of finding a star is Φ(a + b · flux): Gaussian noise upon a flux that meets a threshold. By maximum
 /// likelihood, with Fisher's scoring.
-fn fit(trials: &[Trial], limit_v_mag: f64, found: fn(&Trial) -> bool) -> Option<Curve> {
+fn fit(trials: &[Trial], limit_v_mag: f64, rule: Rule) -> Option<Curve> {
     const ROUNDS: usize = 100;
     let [mut a, mut b] = [-4.0, 4.0];
     let mut information = [[0.0; 2]; 2];
@@ -141,7 +150,7 @@ fn fit(trials: &[Trial], limit_v_mag: f64, found: fn(&Trial) -> bool) -> Option<
             let z = (a + b * flux).clamp(-7.0, 7.0);
             let (above, below) = (cumulative(z), cumulative(-z));
             let density = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
-            let gain = if found(trial) {
+            let gain = if trial.is_found(rule) {
                 density / above
             } else {
                 -density / below
@@ -297,20 +306,14 @@ fn as_many_stars_are_found_as_the_model_says() {
     {
         let budget = Budget::new(&scenario);
         let trials = trials(&scenario, FRAMES);
-        let rules: [(Detector, fn(&Trial) -> bool); 2] = [
-            (Detector::matched_filter(&scenario, &budget), |t| {
-                t.star_like
-            }),
-            (Detector::peak_pixel(&scenario, &budget), |t| t.peak),
-        ];
-        for (model, found) in rules {
-            let measured = fit(&trials, budget.limit_vmag, found).unwrap();
+        for rule in [Rule::MatchedFilter, Rule::PeakPixel] {
+            let model = Detector::new(rule, &scenario, &budget);
+            let measured = fit(&trials, budget.limit_vmag, rule).unwrap();
             let difference = model.vmag_at(0.5) - measured.v_mag_50;
             let tolerance = MODEL_TOLERANCE_MAG + 3.0 * measured.sigma_v_mag_50;
             assert!(
                 difference.abs() < tolerance,
-                "{name}: {:?} {difference}",
-                model.rule
+                "{name}: {rule:?} {difference}"
             );
         }
     }
@@ -338,13 +341,11 @@ fn table_of_completeness() {
         let budget = Budget::new(&scenario);
         let limit_v_mag = budget.limit_vmag;
         let trials = trials(&scenario, FRAMES);
-        let detector = fit(&trials, limit_v_mag, |t| t.star_like);
-        let peak = fit(&trials, limit_v_mag, |t| t.peak);
+        let [detector, peak] = [Rule::MatchedFilter, Rule::PeakPixel].map(|rule| {
+            let model = Detector::new(rule, &scenario, &budget);
+            described(&model, fit(&trials, limit_v_mag, rule))
+        });
         let count = trials.len();
-        println!(
-            "{name:<28} {limit_v_mag:6.3} {count:6}  {}  {}",
-            described(&Detector::matched_filter(&scenario, &budget), detector),
-            described(&Detector::peak_pixel(&scenario, &budget), peak),
-        );
+        println!("{name:<28} {limit_v_mag:6.3} {count:6}  {detector}  {peak}");
     }
 }
