@@ -22,8 +22,11 @@
 //! # }
 //! ```
 
+mod described;
+
 use crate::camera;
 use crate::catalog::Catalog;
+use crate::comparison::{Comparison, Description};
 use crate::coords::{Icrs, PixelPoint, UnitVector};
 use crate::detect::{
     self, DetectConfig, DetectError, Detection, DetectionFlags, Detections, Workspace,
@@ -32,12 +35,13 @@ use crate::diagnosis::{self, Examined};
 use crate::epoch::ObservationDate;
 use crate::frame::{self, Frame, FrameError, FrameMetadata};
 use crate::identify::{
-    self, Hints, Identification, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Outcome, Photometry, Sky,
-    StarField,
+    self, Hints, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Outcome, Photometry, Sky, StarField,
 };
 use crate::observer::{Observation, Site};
 use crate::photometry::{self, FramePhotometry, MeasuredFrame};
+use crate::sensor::Sensor;
 use crate::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
+use described::Found;
 use serde::Serialize;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -79,6 +83,14 @@ pub enum Scale {
 }
 
 impl ScaleHint {
+    /// The scale of a camera as it is described.
+    pub fn of_camera(sensor: &Sensor) -> Self {
+        Self {
+            scale: Scale::Pixel(sensor.pixel_scale_rad()),
+            tolerance: DESCRIBED_SCALE_TOLERANCE,
+        }
+    }
+
     /// Smallest and largest pixel scale at the centre of a frame of this width, in radians.
     pub fn pixel_scale_rad(&self, width_px: f64) -> (f64, f64) {
         let pixel_rad = |scale: f64| match self.scale {
@@ -110,6 +122,8 @@ pub struct Knowledge {
     pub date: Option<FrameDate>,
     /// Where it was taken.
     pub site: Option<Site>,
+    /// How long it was exposed, in seconds.
+    pub exposure_s: Option<f64>,
 }
 
 /// When a frame was taken, and who says so.
@@ -136,6 +150,14 @@ pub enum DateSource {
 }
 
 impl Knowledge {
+    /// The same with an exposure, where none is known.
+    fn or_exposure(self, exposure_s: Option<f64>) -> Self {
+        Self {
+            exposure_s: self.exposure_s.or(exposure_s),
+            ..self
+        }
+    }
+
     /// The same as identification takes it, for a frame of this width.
     pub fn hints(&self, width_px: f64) -> Hints {
         Hints {
@@ -176,6 +198,8 @@ pub struct SolveConfig {
     pub detect: DetectConfig,
     /// What is known beforehand.
     pub knowledge: Knowledge,
+    /// The camera and what it looked through, as they are said to be.
+    pub description: Option<Description>,
     /// Which image of a file with several, counted from 1; the first where nothing is said.
     pub page: Option<NonZeroUsize>,
 }
@@ -230,9 +254,9 @@ pub struct Solution {
     pub date: Option<FrameDate>,
     /// Where in the sky the frame's centre stood, where it is identified, and site and time of day are known.
     pub observation: Option<Observation>,
-    /// How long it was exposed, in seconds, where its file says so.
+    /// How long it was exposed, in seconds, where that is known.
     pub exposure_s: Option<f64>,
-    /// What the file's header says and turned out wrong, or cannot be true: a sentence each.
+    /// What is said of the frame, by its header or beforehand, and turned out wrong, or cannot be true: a sentence each.
     pub notes: Vec<String>,
     /// All sources, brightest first.
     pub sources: Vec<Source>,
@@ -242,6 +266,10 @@ pub struct Solution {
     pub outcome: Outcome,
     /// How bright its stars are, and how faint it goes; of identified frames, and not of lists of centroids.
     pub photometry: Option<FramePhotometry>,
+    /// What the camera should have seen, where that is described and the exposure known.
+    pub comparison: Option<Comparison>,
+    /// Electrons for a step of the grey level, where the camera is described.
+    pub gain_e_per_adu: Option<f64>,
     /// How long it took.
     pub timing: Timing,
 }
@@ -264,7 +292,7 @@ pub struct Timing {
     pub detect_ms: f64,
     /// Identifying them.
     pub identify_ms: f64,
-    /// Zero point and completeness.
+    /// Zero point, completeness, and what they should be.
     pub photometry_ms: f64,
     /// All of it.
     pub total_ms: f64,
@@ -371,7 +399,7 @@ impl<'a> Pipeline<'a> {
                 .knowledge
                 .or_date(frame.metadata.date, DateSource::FileHeader)
                 .or_date(in_name, DateSource::FileName),
-            page: config.page,
+            ..config.clone()
         };
         let mut solution = self
             .solve_frame(&frame, &config, workspace)
@@ -384,8 +412,9 @@ impl<'a> Pipeline<'a> {
         Ok((solution, frame))
     }
 
-    /// Examines `frame`. Where `config` has no date, it is that of the frame's header. Where it has no scale, that of the
-    /// header is tried first; it can be wrong, and so it is done without where that leads nowhere.
+    /// Examines `frame`. Where `config` has no date or exposure, it is that of the frame's header. Where it has no scale, that of
+    /// the camera's description, or else of the header, is tried first; it can be wrong, and so it is done without where that
+    /// leads nowhere.
     ///
     /// # Errors
     /// [`DetectError`] if it is unfit for detection.
@@ -400,14 +429,23 @@ impl<'a> Pipeline<'a> {
         let detect_ms = milliseconds_since(start);
         let knowledge = config
             .knowledge
-            .or_date(frame.metadata.date, DateSource::FileHeader);
+            .or_date(frame.metadata.date, DateSource::FileHeader)
+            .or_exposure(frame.metadata.exposure_s);
         let (field, kept) = star_field(frame, &detections, knowledge.years_since_j2000());
         let identify_start = Instant::now();
         let mut notes = frame.metadata.ignored.clone();
-        let outcome = match (knowledge.scale, header_scale(&frame.metadata)) {
+        let description = config.description.as_ref();
+        let described = description.map(|stated| ScaleHint::of_camera(&stated.sensor));
+        let in_header = header_scale(&frame.metadata).filter(|_| described.is_none());
+        let outcome = match (knowledge.scale, described.or(in_header)) {
             (None, Some(hint)) => {
-                let (outcome, note) = self.identify_with(&hint, &field, &kept, &knowledge);
-                notes.extend(note);
+                let (outcome, is_wrong) = self.identify_with(&hint, &field, &kept, &knowledge);
+                // What is wrong with a description is told below.
+                notes.extend(
+                    in_header
+                        .filter(|_| is_wrong)
+                        .map(|hint| wrong_header(&hint, &field)),
+                );
                 outcome
             }
             _ => self.identify(&field, &kept, &knowledge),
@@ -415,25 +453,40 @@ impl<'a> Pipeline<'a> {
         let outcome = self.explained(outcome, &field, &knowledge, Some((frame, &detections)));
         let identify_ms = milliseconds_since(identify_start);
         let photometry_start = Instant::now();
-        let photometry = self.photometry(frame, &detections, &outcome, &knowledge);
-        let photometry_ms = milliseconds_since(photometry_start);
+        let photometry = self.photometry(&detections, &outcome, &knowledge);
         let observation = knowledge.observation(&outcome);
         notes.extend(observation.as_ref().and_then(below_horizon));
+        let background = Background {
+            level_adu: detections.background_adu,
+            noise_adu: detections.noise_adu,
+        };
+        let found = Found {
+            size_px: [frame.width, frame.height],
+            background: &background,
+            spot_sigma_px: detections.spot_sigma_px,
+            outcome: &outcome,
+            photometry: photometry.as_ref(),
+            observation: observation.as_ref(),
+            catalog: self.catalog(),
+        };
+        let comparison = description.and_then(|stated| found.against(stated, &knowledge));
+        let contradictions = comparison.iter().flat_map(|held| &held.contradictions);
+        notes.extend(contradictions.cloned());
+        let photometry_ms = milliseconds_since(photometry_start);
         notes.extend(photometry.as_ref().and_then(not_linear));
         Ok(Solution {
             width: frame.width,
             height: frame.height,
             date: knowledge.date,
             observation,
-            exposure_s: frame.metadata.exposure_s,
+            exposure_s: knowledge.exposure_s,
             notes,
             sources: detections.sources.iter().map(Source::from).collect(),
-            background: Some(Background {
-                level_adu: detections.background_adu,
-                noise_adu: detections.noise_adu,
-            }),
+            background: Some(background),
             outcome,
             photometry,
+            comparison,
+            gain_e_per_adu: description.map(|stated| stated.sensor.gain_e_per_adu),
             timing: Timing {
                 read_ms: 0.0,
                 detect_ms,
@@ -470,11 +523,13 @@ impl<'a> Pipeline<'a> {
                 .into_iter()
                 .collect(),
             observation,
-            exposure_s: None,
+            exposure_s: knowledge.exposure_s,
             sources: list.centroids.iter().map(source).collect(),
             background: None,
             outcome,
             photometry: None,
+            comparison: None,
+            gain_e_per_adu: None,
             timing: Timing {
                 identify_ms,
                 total_ms: identify_ms,
@@ -486,7 +541,6 @@ impl<'a> Pipeline<'a> {
     /// The photometry of an identified frame.
     fn photometry(
         &self,
-        frame: &Frame,
         detections: &Detections,
         outcome: &Outcome,
         knowledge: &Knowledge,
@@ -498,33 +552,36 @@ impl<'a> Pipeline<'a> {
             detections,
             identification,
             years_since_j2000: knowledge.years_since_j2000(),
-            exposure_s: frame.metadata.exposure_s,
+            exposure_s: knowledge.exposure_s,
         };
         Some(photometry::measure(&measured, &self.sky))
     }
 
-    /// Identifies `field` with the scale of its header, else without; tells where that scale is not the true one.
+    /// Identifies `field` with a scale that is only stated, else without; tells whether that scale is not the true one.
     fn identify_with(
         &self,
         hint: &ScaleHint,
         field: &StarField,
         sources: &[usize],
         knowledge: &Knowledge,
-    ) -> (Outcome, Option<String>) {
+    ) -> (Outcome, bool) {
         let believing = Knowledge {
             scale: Some(*hint),
             ..*knowledge
         };
         let first = self.identify(field, sources, &believing);
         if matches!(first, Outcome::Identified(_)) {
-            return (first, None);
+            return (first, false);
         }
         let second = at_second_attempt(self.identify(field, sources, knowledge)).unwrap_or(first);
-        let note = match &second {
-            Outcome::Identified(found) => contradiction(hint, found, field.width_px),
-            Outcome::NotIdentified(_) => None,
+        let is_wrong = match &second {
+            Outcome::Identified(found) => {
+                let (low_rad, high_rad) = hint.pixel_scale_rad(field.width_px);
+                !(low_rad..=high_rad).contains(&(1.0 / found.camera.focal_length_px))
+            }
+            Outcome::NotIdentified(_) => false,
         };
-        (second, note)
+        (second, is_wrong)
     }
 
     /// Identifies `field`, and numbers the matches as the sources are: `sources[i]` is the source of star i.
@@ -560,29 +617,25 @@ impl<'a> Pipeline<'a> {
     }
 }
 
-/// How far the scale that a file's header gives may be off: focal lengths are nominal. A reducer or
-/// a binning that the header does not know is off by more.
-const HEADER_SCALE_TOLERANCE: f64 = 0.2;
+/// How far the scale that a file's header or a camera's description gives may be off: focal lengths are nominal. A reducer or
+/// a binning that it does not know is off by more.
+const DESCRIBED_SCALE_TOLERANCE: f64 = 0.2;
 
 /// The scale that a file's header gives.
 fn header_scale(metadata: &FrameMetadata) -> Option<ScaleHint> {
     Some(ScaleHint {
         scale: Scale::Pixel(metadata.pixel_scale_rad()?),
-        tolerance: HEADER_SCALE_TOLERANCE,
+        tolerance: DESCRIBED_SCALE_TOLERANCE,
     })
 }
 
-/// What to say of a `hint` from the header that is not the scale `found`.
-fn contradiction(hint: &ScaleHint, found: &Identification, width_px: f64) -> Option<String> {
-    let [low, high, true_scale] = {
-        let (low_rad, high_rad) = hint.pixel_scale_rad(width_px);
-        [low_rad, high_rad, 1.0 / found.camera.focal_length_px].map(|rad| rad * ARCSEC_PER_RAD)
-    };
-    (!(low..=high).contains(&true_scale)).then(|| {
-        format!(
-            "the header's focal length and pixel size are not this frame's: they mean {low:.1}″ to {high:.1}″ a pixel"
-        )
-    })
+/// What to say of a `hint` from the header that is not the scale of `field`.
+fn wrong_header(hint: &ScaleHint, field: &StarField) -> String {
+    let (low_rad, high_rad) = hint.pixel_scale_rad(field.width_px);
+    let [low, high] = [low_rad, high_rad].map(|rad| rad * ARCSEC_PER_RAD);
+    format!(
+        "the header's focal length and pixel size are not this frame's: they mean {low:.1}″ to {high:.1}″ a pixel"
+    )
 }
 
 /// What to say of a frame of what cannot have been seen.

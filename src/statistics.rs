@@ -2,6 +2,15 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
+/// A number and its standard error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// The number.
+    pub value: f64,
+    /// Its standard error.
+    pub sigma: f64,
+}
+
 /// The probability that a normal deviate is below `z` standard deviations.
 pub fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z * FRAC_1_SQRT_2)
@@ -19,11 +28,6 @@ pub fn median(values: &mut [f64]) -> f64 {
     }
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
-/// The probability that a standard normal number lies above `z`.
-pub fn normal_tail(z: f64) -> f64 {
-    0.5 * libm::erfc(z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
 /// log10 of the probability of `hits` or more successes in `trials` at `chance` each.

@@ -193,6 +193,21 @@ pub(crate) struct HintArgs {
     /// the time, that gives zenith distance and airmass
     #[arg(long, value_name = "LAT,LON[,HEIGHT_M]", allow_hyphen_values = true)]
     pub(crate) site: Option<Site>,
+    /// How long the frames were exposed, in seconds [default: for frames, the exposure in the file's header]
+    #[arg(long, value_name = "SECONDS", value_parser = values::positive, allow_hyphen_values = true)]
+    pub(crate) exposure: Option<f64>,
+    /// Description of the camera, see `starpipe camera new`: gives the scale, and with the exposure the limiting
+    /// magnitude to hold a frame against
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) camera: Option<PathBuf>,
+    /// With --camera, zenith distance of the frames' centres in degrees [default: by --site and the date, else 0]
+    #[arg(long, value_name = "DEG", value_parser = values::zenith_distance, allow_hyphen_values = true,
+          requires = "camera")]
+    pub(crate) zenith_distance: Option<f64>,
+    /// With --camera, extinction in magnitudes for each airmass [default: of a clear night at sea level]
+    #[arg(long, value_name = "MAG", value_parser = values::not_negative, allow_hyphen_values = true,
+          requires = "camera")]
+    pub(crate) extinction: Option<f64>,
 }
 
 #[derive(Debug, Args)]

@@ -5,10 +5,13 @@ use super::args::{Centroid, DetectionArgs, HintArgs, OutputArgs};
 use super::input::is_stdin;
 use super::output::OutputSettings;
 use super::overwrite;
+use starpipe::comparison::Description;
 use starpipe::coords::UnitVector;
 use starpipe::detect::{CentroidMethod, DetectConfig};
 use starpipe::pipeline::{DateSource, FrameDate, Knowledge, Scale, ScaleHint};
 use starpipe::report::TextOptions;
+use starpipe::sensitivity::Extinction;
+use starpipe::sensor::Sensor;
 use starpipe::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -48,7 +51,31 @@ impl HintArgs {
                 source: DateSource::Option,
             }),
             site: self.site,
+            exposure_s: self.exposure,
         })
+    }
+
+    /// The same, with the scale of the camera where no other is given.
+    pub(crate) fn resolve_with_camera(&self) -> Result<Knowledge, Fault> {
+        let camera = self.description()?;
+        let described = camera.map(|stated| ScaleHint::of_camera(&stated.sensor));
+        let knowledge = self.resolve()?;
+        Ok(Knowledge {
+            scale: knowledge.scale.or(described),
+            ..knowledge
+        })
+    }
+
+    /// The camera, and what it looked through.
+    pub(crate) fn description(&self) -> anyhow::Result<Option<Description>> {
+        let Some(path) = &self.camera else {
+            return Ok(None);
+        };
+        Ok(Some(Description {
+            sensor: Sensor::read(path)?,
+            zenith_distance_deg: self.zenith_distance,
+            extinction: self.extinction.map(Extinction::MagPerAirmass),
+        }))
     }
 }
 

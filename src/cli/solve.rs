@@ -25,6 +25,7 @@ pub(crate) fn process(arguments: ProcessArgs) -> Result<Exit, Fault> {
     let config = SolveConfig {
         detect: detection.resolve(),
         knowledge: solving.hints.resolve()?,
+        description: solving.hints.description()?,
         page,
     };
     input::check(&frames)?;
@@ -62,7 +63,7 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Exit, Fault> {
         solving,
     } = arguments;
     input::check(&lists)?;
-    let knowledge = solving.hints.resolve()?;
+    let knowledge = solving.hints.resolve_with_camera()?;
     let size = FrameSize { width, height };
     let (settings, resources) = solving.resolve(&lists, LIST_RESULTS)?;
     solve_all(&lists, settings, &resources, |pipeline, path, _| {

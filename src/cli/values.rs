@@ -118,6 +118,17 @@ pub(crate) fn field_of_view(text: &str) -> Result<f64, String> {
     )
 }
 
+/// A zenith distance in degrees.
+pub(crate) fn zenith_distance(text: &str) -> Result<f64, String> {
+    let limits = "from 0 to below 90 degrees";
+    within(
+        text,
+        "the zenith distance",
+        |v| (0.0..90.0).contains(&v),
+        limits,
+    )
+}
+
 /// A pixel scale in arcseconds.
 pub(crate) fn pixel_scale(text: &str) -> Result<f64, String> {
     within(

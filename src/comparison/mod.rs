@@ -15,6 +15,7 @@ use crate::sensitivity::{
     Budget, Detector, Extinction, Faintest, Reading, Rule, Scenario, SkyBrightness,
 };
 use crate::sensor::Sensor;
+use crate::statistics::Estimate;
 use crate::units::ARCSEC_PER_RAD;
 
 /// What is stated of the frame.
@@ -22,21 +23,10 @@ use crate::units::ARCSEC_PER_RAD;
 pub struct Description {
     /// The camera.
     pub sensor: Sensor,
-    /// Exposure, in seconds; else that of the frame's file.
-    pub exposure_s: Option<f64>,
     /// Zenith distance of the frame's centre, in degrees; else that of site and date, else 0.
     pub zenith_distance_deg: Option<f64>,
     /// What the air takes away; else the model's own.
     pub extinction: Option<Extinction>,
-}
-
-/// A number and its standard error.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Measured {
-    /// The number.
-    pub value: f64,
-    /// Its standard error.
-    pub sigma: f64,
 }
 
 /// What the frame shows; what is not known is `None`.
@@ -44,7 +34,7 @@ pub struct Measured {
 pub struct Seen<'a> {
     /// Columns and rows.
     pub size_px: [usize; 2],
-    /// Exposure, in seconds, by the frame's file.
+    /// Exposure, in seconds.
     pub exposure_s: Option<f64>,
     /// Median level of the background, in ADU.
     pub level_adu: f64,
@@ -56,10 +46,10 @@ pub struct Seen<'a> {
     pub pixel_scale_rad: Option<f64>,
     /// Apparent zenith distance of the centre by site, date and attitude, in degrees; above 90 below the horizon.
     pub zenith_distance_deg: Option<f64>,
-    /// V magnitude of a star that gives one ADU a second, or one ADU where no exposure is known.
-    pub zero_point_vmag: Option<Measured>,
+    /// V magnitude of a star that gives one ADU a second.
+    pub zero_point_vmag: Option<Estimate>,
     /// V magnitude at which half of the stars are found.
-    pub limit_vmag: Option<Measured>,
+    pub limit_vmag: Option<Estimate>,
     /// V magnitude of the faintest star identified.
     pub faintest_vmag: Option<f64>,
     /// V magnitudes of the catalogue's stars in the field.
@@ -83,14 +73,18 @@ pub struct Comparison {
     pub limit90_vmag: f64,
     /// The faintest star to be expected among those in the field.
     pub faintest: Option<Faintest>,
+    /// V magnitude of the sky in a square arcsecond, as seen from the ground, with the camera's throughput.
+    pub sky_camera_mag_arcsec2: Option<f64>,
+    /// The same with the measured zero point, and the error of that.
+    pub sky_mag_arcsec2: Option<Estimate>,
     /// V magnitude of a star that should give one ADU a second.
     pub zero_point_vmag: f64,
     /// Zero point measured minus predicted: above 0 the camera is more sensitive than described.
-    pub zero_point_difference_mag: Option<Measured>,
+    pub zero_point_difference_mag: Option<Estimate>,
     /// The fitted limit minus the predicted one.
-    pub limit_difference_mag: Option<Measured>,
+    pub limit_difference_mag: Option<Estimate>,
     /// The faintest star found minus the one to be expected; the error is the spread of that.
-    pub faintest_difference_mag: Option<Measured>,
+    pub faintest_difference_mag: Option<Estimate>,
     /// Where the frame contradicts its description: a sentence each.
     pub contradictions: Vec<String>,
 }
@@ -100,7 +94,7 @@ const NO_SKY_MAG: f64 = 35.0;
 
 /// What `description` predicts of a frame that shows `seen`; `None` where the exposure is not known.
 pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
-    let exposure_s = description.exposure_s.or(seen.exposure_s)?;
+    let exposure_s = seen.exposure_s?;
     let mut scenario = Scenario::new(description.sensor.clone());
     scenario.reading = Reading::Physical;
     let conditions = &mut scenario.conditions;
@@ -118,27 +112,33 @@ pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
     let zero_point_vmag = budget.vmag_of(gain_e_per_adu, 1.0);
     let limit_vmag = detector.vmag_at(0.5);
     let faintest = Faintest::among(seen.field_vmag.iter().copied(), &detector);
-    // Without an exposure the measured one is of one ADU and not of one a second.
-    let to_second = match seen.exposure_s {
-        Some(_) => 0.0,
-        None => -2.5 * exposure_s.log10(),
-    };
-    let minus = |measured: Option<Measured>, predicted: f64| {
-        measured.map(|Measured { value, sigma }| Measured {
+    let minus = |measured: Option<Estimate>, predicted: f64| {
+        measured.map(|Estimate { value, sigma }| Estimate {
             value: value - predicted,
             sigma,
         })
     };
+    let sky = scenario.conditions.sky.mag_arcsec2();
+    let sky_camera_mag_arcsec2 = (sky < NO_SKY_MAG).then_some(sky);
+    let zero_point_difference_mag = minus(seen.zero_point_vmag, zero_point_vmag);
     let comparison = Comparison {
         zenith_is_known: known_zenith_deg.is_some(),
         peak_limit_vmag: peak.vmag_at(0.5),
         limit_vmag,
         limit90_vmag: detector.vmag_at(0.9),
         zero_point_vmag,
-        zero_point_difference_mag: minus(seen.zero_point_vmag, zero_point_vmag - to_second),
+        sky_camera_mag_arcsec2,
+        // The zero point's difference is the camera's in throughput, and the sky's light goes through it as the stars' does.
+        sky_mag_arcsec2: zero_point_difference_mag.and_then(|off| {
+            Some(Estimate {
+                value: sky_camera_mag_arcsec2? + off.value,
+                ..off
+            })
+        }),
+        zero_point_difference_mag,
         limit_difference_mag: minus(seen.limit_vmag, limit_vmag),
         faintest_difference_mag: faintest.and_then(|faintest| {
-            Some(Measured {
+            Some(Estimate {
                 value: seen.faintest_vmag? - faintest.mean_vmag,
                 sigma: faintest.sigma_mag,
             })
@@ -225,8 +225,8 @@ fn is_off(found: f64, stated: f64, factor: f64) -> bool {
     found > stated * factor || found < stated / factor
 }
 
-fn odd_zero_point(difference: Measured) -> Option<String> {
-    let Measured { value, sigma } = difference;
+fn odd_zero_point(difference: Estimate) -> Option<String> {
+    let Estimate { value, sigma } = difference;
     let is_odd = value.abs() > ZERO_POINT_TOLERANCE_MAG.max(5.0 * sigma);
     let way = if value < 0.0 {
         "less light arrives than the camera should see: haze, a stop, dew, another exposure or gain"
@@ -258,7 +258,6 @@ mod tests {
     fn description() -> Description {
         Description {
             sensor: Preset::Experiment1.sensor(),
-            exposure_s: None,
             zenith_distance_deg: None,
             extinction: None,
         }
@@ -306,9 +305,6 @@ mod tests {
         let mut frame = seen(18.0);
         frame.exposure_s = None;
         assert_eq!(compare(&description(), &frame), None);
-        let mut stated = description();
-        stated.exposure_s = Some(0.04);
-        assert!(compare(&stated, &frame).is_some());
     }
 
     #[test]
@@ -316,27 +312,18 @@ mod tests {
         let mut frame = seen(18.0);
         let plain = compare(&description(), &frame).unwrap();
         let field: Vec<f64> = (0..60).map(|i| 6.0 + 0.1 * f64::from(i)).collect();
-        let at = |value| Some(Measured { value, sigma: 0.04 });
+        let at = |value| Some(Estimate { value, sigma: 0.04 });
         frame.field_vmag = &field;
         frame.limit_vmag = at(plain.limit_vmag + 0.1);
         frame.zero_point_vmag = at(plain.zero_point_vmag - 0.2);
         frame.faintest_vmag = Some(plain.limit_vmag + 0.3);
         let held = compare(&description(), &frame).unwrap();
-        let value = |measured: Option<Measured>| measured.unwrap().value;
+        let value = |measured: Option<Estimate>| measured.unwrap().value;
         assert!((value(held.limit_difference_mag) - 0.1).abs() < 1e-9);
         assert!((value(held.zero_point_difference_mag) + 0.2).abs() < 1e-9);
         let expected = held.faintest.unwrap().mean_vmag;
         let difference = frame.faintest_vmag.unwrap() - expected;
         assert!((value(held.faintest_difference_mag) - difference).abs() < 1e-9);
-        // The measured zero point of one ADU in 0.04 s is that of one a second, 3.49 mag brighter.
-        frame.exposure_s = None;
-        frame.zero_point_vmag = at(plain.zero_point_vmag + 2.5 * 0.04f64.log10());
-        let stated = Description {
-            exposure_s: Some(0.04),
-            ..description()
-        };
-        let held = compare(&stated, &frame).unwrap();
-        assert!(value(held.zero_point_difference_mag).abs() < 1e-9);
     }
 
     #[test]
@@ -360,7 +347,7 @@ mod tests {
             .zero_point_vmag;
         let off = told(&|_, f| {
             let value = zero - 1.0;
-            f.zero_point_vmag = Some(Measured { value, sigma: 0.02 });
+            f.zero_point_vmag = Some(Estimate { value, sigma: 0.02 });
         });
         assert!(off.contains("zero point is -1.00 mag off"), "{off}");
         let off = told(&|d, f| {

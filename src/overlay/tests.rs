@@ -45,6 +45,8 @@ fn solution(width: usize, height: usize, outcome: Outcome) -> Solution {
         ],
         observation: None,
         photometry: None,
+        comparison: None,
+        gain_e_per_adu: None,
         exposure_s: None,
         notes: Vec::new(),
         background: Some(Background {

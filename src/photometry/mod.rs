@@ -56,6 +56,8 @@ pub struct FramePhotometry {
     pub exposure_s: Option<f64>,
     /// Which part of the stars is detected.
     pub completeness: Completeness,
+    /// V magnitudes of the catalogue's stars in the frame, to well below the faintest detection.
+    pub field_v_mag: Vec<f64>,
 }
 
 /// The brightness of the sky in V magnitudes on a square arcsecond. `zero_point_vmag`: V magnitude of a star that gives 1 ADU (or 1 ADU a
@@ -105,6 +107,7 @@ pub fn measure(frame: &MeasuredFrame, sky: &Sky) -> FramePhotometry {
         })
         .collect();
     FramePhotometry {
+        field_v_mag: stars.iter().map(|star| star.v_mag).collect(),
         zero_point: zero_point::measure(&measured),
         exposure_s: frame.exposure_s,
         completeness,

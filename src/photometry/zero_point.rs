@@ -16,7 +16,7 @@
 //!
 //! The stars must have been chosen by V, not by their flux: else those are preferred that noise and colour make bright.
 
-use crate::statistics::median;
+use crate::statistics::{Estimate, median};
 use nalgebra::{DMatrix, DVector};
 
 /// The B−V of the stars whose zero point is given, where there is a colour term: the Sun's, nearly, and that of many field stars.
@@ -76,15 +76,6 @@ pub struct ZeroPoint {
     pub mean_v_mag: f64,
     /// Whether [`Self::linearity`] clearly is not 1.
     pub is_nonlinear: bool,
-}
-
-/// A number and its standard error.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
-    /// The number.
-    pub value: f64,
-    /// Its standard error.
-    pub sigma: f64,
 }
 
 /// A term that the relation may have besides the zero point.

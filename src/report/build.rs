@@ -54,6 +54,7 @@ impl FrameReport {
             matched: None,
             magnitude: None,
             photometry: solution.photometry.as_ref().map(photometry),
+            prediction: None,
             background: background(solution.background.as_ref()),
             stars: solution.sources.iter().map(unidentified).collect(),
             timing_ms: timing(&solution.timing),
@@ -67,6 +68,14 @@ impl FrameReport {
                 let known = solution.date;
                 let years = known.map_or(0.0, |known| known.date.years_since_j2000());
                 report.add(identification, catalog, years);
+            }
+        }
+        if let Some(compared) = &solution.comparison {
+            report.add_comparison(compared);
+        }
+        if let Some(gain_e_per_adu) = solution.gain_e_per_adu {
+            for star in &mut report.stars {
+                star.add_electrons(gain_e_per_adu);
             }
         }
         report
@@ -172,6 +181,11 @@ fn faintest(identification: &Identification, catalog: &Catalog) -> Option<Magnit
         faintest_id: catalog.designation(faintest.catalog),
         predicted_limit_vmag: None,
         difference_mag: None,
+        expected_faintest_vmag: None,
+        expected_faintest_sigma_mag: None,
+        faintest_difference_mag: None,
+        limit_difference_mag: None,
+        limit_difference_sigma_mag: None,
     })
 }
 
@@ -234,6 +248,8 @@ fn unidentified(source: &Source) -> StarReport {
         sigma_y: measured.and_then(|m| significant(m.sigma_px[1], SIGMA_DIGITS)),
         flux: source.flux.and_then(|flux| significant(flux, FLUX_DIGITS)),
         peak: measured.and_then(|m| significant(m.peak, FLUX_DIGITS)),
+        flux_e: None,
+        peak_e: None,
         snr: measured.and_then(|m| significant(m.snr, SIGMA_DIGITS)),
         id: None,
         name: None,

@@ -8,12 +8,14 @@
 
 mod angles;
 mod build;
+mod compared;
 mod reason;
 mod rounding;
 mod table;
 mod text;
 
 pub(crate) use angles::{degrees, hours};
+pub use compared::PredictionReport;
 pub(crate) use rounding::to_decimals;
 pub use table::{TABLE_COLUMNS, write_table_header};
 pub use text::{STARS_SHOWN, TextOptions, counted, printable};
@@ -39,9 +41,9 @@ pub struct FrameReport {
     pub date: Option<DateReport>,
     /// Where in the sky the frame's centre stood, where it is identified, and site and time of day are known.
     pub observation: Option<ObservationReport>,
-    /// How long it was exposed, in seconds, where its file says so.
+    /// How long it was exposed, in seconds, where that is known.
     pub exposure_s: Option<f64>,
-    /// What the file's header says and turned out wrong, or cannot be true: a sentence each.
+    /// What is said of the frame, by its header or beforehand, and turned out wrong, or cannot be true: a sentence each.
     pub notes: Vec<String>,
     /// Whether the stars are identified.
     pub status: Status,
@@ -60,6 +62,8 @@ pub struct FrameReport {
     pub magnitude: Option<MagnitudeReport>,
     /// How bright its stars are, and how faint it goes; none of lists of centroids.
     pub photometry: Option<PhotometryReport>,
+    /// What the camera should have seen, where it is described and the exposure known.
+    pub prediction: Option<PredictionReport>,
     /// The sky between the stars.
     pub background: BackgroundReport,
     /// Every detection, brightest first.
@@ -193,10 +197,20 @@ pub struct MagnitudeReport {
     pub faintest_vmag: f64,
     /// Its catalogue number.
     pub faintest_id: String,
-    /// Johnson V that the camera should reach, where a camera is given.
+    /// Johnson V at which the camera should find half of the stars, where a camera is given.
     pub predicted_limit_vmag: Option<f64>,
-    /// Faintest star minus prediction.
+    /// Faintest star minus that limit: not of like with like, for the faintest of many stars lies beyond it.
     pub difference_mag: Option<f64>,
+    /// Johnson V of the faintest star that the camera should find among those of the field.
+    pub expected_faintest_vmag: Option<f64>,
+    /// The spread of that.
+    pub expected_faintest_sigma_mag: Option<f64>,
+    /// Faintest star found minus that; its standard error is the spread.
+    pub faintest_difference_mag: Option<f64>,
+    /// The measured magnitude at which half of the stars are found minus the predicted one.
+    pub limit_difference_mag: Option<f64>,
+    /// Its standard error: that of the measurement.
+    pub limit_difference_sigma_mag: Option<f64>,
 }
 
 /// How bright a frame's stars are, and how faint it goes, see [`photometry`](crate::photometry).
@@ -273,6 +287,12 @@ pub struct StarReport {
     pub flux: Option<f64>,
     /// Brightest pixel above the background, in the frame's own units.
     pub peak: Option<f64>,
+    /// The flux in electrons, where a camera is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flux_e: Option<f64>,
+    /// The brightest pixel in electrons, where a camera is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_e: Option<f64>,
     /// Flux over its standard error.
     pub snr: Option<f64>,
     /// The catalogue's own number for the star.

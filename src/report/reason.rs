@@ -161,6 +161,8 @@ mod tests {
             sources: vec![source; detections],
             observation: None,
             photometry: None,
+            comparison: None,
+            gain_e_per_adu: None,
             exposure_s: None,
             notes: Vec::new(),
             background: None,

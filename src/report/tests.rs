@@ -10,6 +10,8 @@ fn star(x: f64, id: Option<&str>, name: Option<&str>) -> StarReport {
         sigma_y: Some(0.0131),
         flux: Some(123_456.0),
         peak: Some(9_876.5),
+        flux_e: None,
+        peak_e: None,
         snr: Some(812.4),
         id: id.map(Into::into),
         name: name.map(Into::into),
@@ -43,6 +45,7 @@ fn unidentified() -> FrameReport {
         matched: None,
         magnitude: None,
         photometry: None,
+        prediction: None,
         background: BackgroundReport {
             level: Some(1012.25),
             noise: Some(12.3418),
@@ -55,6 +58,29 @@ fn unidentified() -> FrameReport {
             photometry: 0.125,
             total: 5.0,
         },
+    }
+}
+
+fn prediction() -> PredictionReport {
+    PredictionReport {
+        camera: "a camera".into(),
+        exposure_s: 0.5,
+        zenith_distance_deg: 50.1035,
+        zenith_distance_known: true,
+        airmass: 1.5553,
+        limit50_vmag: Some(7.0),
+        limit90_vmag: Some(6.74),
+        peak_limit50_vmag: Some(6.1),
+        stars_expected: Some(41.2),
+        zero_point_vmag: Some(16.6),
+        zero_point_difference_mag: Some(-0.075),
+        zero_point_difference_sigma_mag: Some(0.03),
+        sky_camera_mag_arcsec2: Some(20.1),
+        sky_mag_arcsec2: Some(20.025),
+        sky_sigma_mag: Some(0.03),
+        background_e: Some(120.5),
+        background_noise_e: Some(12.2),
+        sensor_noise_e: Some(5.1),
     }
 }
 
@@ -138,10 +164,16 @@ fn identified() -> FrameReport {
         magnitude: Some(MagnitudeReport {
             faintest_vmag: 7.321,
             faintest_id: "05350123".into(),
-            predicted_limit_vmag: None,
-            difference_mag: None,
+            predicted_limit_vmag: Some(7.0),
+            difference_mag: Some(0.321),
+            expected_faintest_vmag: Some(7.412),
+            expected_faintest_sigma_mag: Some(0.21),
+            faintest_difference_mag: Some(-0.091),
+            limit_difference_mag: Some(0.052),
+            limit_difference_sigma_mag: Some(0.041),
         }),
         photometry: Some(photometry()),
+        prediction: Some(prediction()),
         stars: vec![
             star(123.4567, Some("05550020"), Some("Betelgeuse")),
             star(12.3456, None, None),

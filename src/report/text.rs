@@ -39,6 +39,9 @@ impl FrameReport {
                 .map(|magnitude| self.faintest_line(magnitude)),
         );
         lines.extend(self.photometry.iter().flat_map(photometry_lines));
+        let magnitude = self.magnitude.as_ref();
+        let predicted = self.prediction.iter();
+        lines.extend(predicted.flat_map(|prediction| prediction.lines(magnitude)));
         lines.push(self.date_line());
         lines.extend(self.observation.iter().map(observation_line));
         lines.extend(self.notes.iter().map(|note| labelled("note", note)));
@@ -322,7 +325,7 @@ pub fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{plural}")
 }
 
-fn labelled(label: &str, text: &str) -> String {
+pub(super) fn labelled(label: &str, text: &str) -> String {
     format!("  {label:<LABEL_WIDTH$}{text}")
 }
 

@@ -16,7 +16,7 @@
 use super::budget::Budget;
 use super::conditions::Scenario;
 use crate::detect::{DetectConfig, FilterModel};
-use crate::statistics::normal_tail;
+use crate::statistics::normal_cdf;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -76,7 +76,7 @@ impl Detector {
         Self {
             rule: Rule::PeakPixel,
             threshold_sigma,
-            false_alarms_per_mpx: 1e6 * normal_tail(threshold_sigma),
+            false_alarms_per_mpx: 1e6 * normal_cdf(-threshold_sigma),
             critical_vmag: critical_vmag(&filter, &spot, scenario, budget),
         }
     }
@@ -402,7 +402,7 @@ mod tests {
         let filter = Detector::matched_filter(&scenario, &budget);
         assert!(filter.vmag_at(0.5) > peak.vmag_at(0.5) + 0.5);
         // Threshold and false alarms of the peak rule are one number.
-        let again = 1e6 * normal_tail(peak.threshold_sigma);
+        let again = 1e6 * normal_cdf(-peak.threshold_sigma);
         assert_eq!(peak.false_alarms_per_mpx, again);
     }
 

@@ -80,9 +80,9 @@ impl Sensor {
         self.pitch_x_um * self.pitch_y_um / (focal_um * focal_um)
     }
 
-    /// The angle that a pixel spans along x at the centre of the field, in radians.
+    /// The angle that a pixel spans at the centre of the field, in radians: the geometric mean of both sides.
     pub fn pixel_scale_rad(&self) -> f64 {
-        self.pitch_x_um / (self.focal_length_mm * 1e3)
+        self.pixel_solid_angle_sr().sqrt()
     }
 
     /// The part of a star's light on its brightest pixel: as stated, else that of a spot centred on a pixel.

@@ -95,6 +95,8 @@ fn solution(camera: CameraModel, attitude: Rotation<Icrs, Camera>) -> Solution {
         sources: Vec::new(),
         observation: None,
         photometry: None,
+        comparison: None,
+        gain_e_per_adu: None,
         exposure_s: None,
         notes: Vec::new(),
         background: None,

@@ -1,0 +1,67 @@
+//! A frame that is found, against the camera that it is said to be of.
+
+use super::{Background, Knowledge};
+use crate::catalog::Catalog;
+use crate::comparison::{self, Comparison, Description, Seen};
+use crate::identify::Outcome;
+use crate::observer::Observation;
+use crate::photometry::FramePhotometry;
+use crate::statistics::Estimate;
+use crate::units::DEG_PER_RAD;
+
+/// What was found of a frame.
+pub(super) struct Found<'a> {
+    pub size_px: [usize; 2],
+    pub background: &'a Background,
+    pub spot_sigma_px: f64,
+    pub outcome: &'a Outcome,
+    pub photometry: Option<&'a FramePhotometry>,
+    pub observation: Option<&'a Observation>,
+    pub catalog: &'a Catalog,
+}
+
+impl Found<'_> {
+    /// Holds it against `description`; nothing comes of it where the exposure is not known.
+    pub(super) fn against(
+        &self,
+        description: &Description,
+        knowledge: &Knowledge,
+    ) -> Option<Comparison> {
+        let photometry = self.photometry;
+        let zero_point = photometry.and_then(|measured| measured.zero_point.as_ref());
+        let limit = photometry.and_then(|measured| measured.completeness.limit.as_ref().ok());
+        let identification = match self.outcome {
+            Outcome::Identified(found) => Some(found),
+            Outcome::NotIdentified(_) => None,
+        };
+        let v_mag = |catalog: usize| f64::from(self.catalog.stars()[catalog].v_mag);
+        let matched = identification.map(|found| found.matches.iter().map(|m| v_mag(m.catalog)));
+        let zenith_deg = self.observation.map(|seen| {
+            let apparent = seen.apparent.as_ref();
+            let zenith_rad = apparent.map_or(seen.zenith_distance_rad, |a| a.zenith_distance_rad);
+            zenith_rad * DEG_PER_RAD
+        });
+        comparison::compare(
+            description,
+            &Seen {
+                size_px: self.size_px,
+                exposure_s: knowledge.exposure_s,
+                level_adu: self.background.level_adu,
+                noise_adu: self.background.noise_adu,
+                spot_sigma_px: identification.map(|_| self.spot_sigma_px),
+                pixel_scale_rad: identification.map(|found| 1.0 / found.camera.focal_length_px),
+                zenith_distance_deg: zenith_deg,
+                zero_point_vmag: zero_point.map(|zero| Estimate {
+                    value: zero.v_mag,
+                    sigma: zero.sigma_mag,
+                }),
+                limit_vmag: limit.map(|limit| Estimate {
+                    value: limit.v_mag,
+                    sigma: limit.sigma_mag,
+                }),
+                faintest_vmag: matched.and_then(|matched| matched.reduce(f64::max)),
+                field_vmag: photometry.map_or(&[], |measured| &measured.field_v_mag),
+            },
+        )
+    }
+}
