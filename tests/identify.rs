@@ -47,8 +47,8 @@ impl Truth {
         }
     }
 
-    /// The stars to a magnitude that leaves about 25, as a camera would see them.
-    fn observe(&self, rng: &mut ChaCha8Rng) -> StarField {
+    /// The magnitude to which there are about 25 stars in the field, and the places of these stars and of those a little fainter.
+    fn places(&self) -> (f64, Vec<(PixelPoint, f64)>) {
         let fov = self.camera.fov_x_rad() * self.camera.fov_y_rad();
         let limit_mag = sky()
             .magnitude_of_density(25.0 * 1f64.to_radians().powi(2) / fov)
@@ -63,6 +63,12 @@ impl Truth {
                 let pixel = self.camera.pixel_of(&self.attitude.apply(&direction));
                 places.extend(pixel.map(|p| (p, f64::from(star.v_mag))));
             });
+        (limit_mag, places)
+    }
+
+    /// The stars to a magnitude that leaves about 25, as a camera would see them.
+    fn observe(&self, rng: &mut ChaCha8Rng) -> StarField {
+        let (limit_mag, places) = self.places();
         let mut stars: Vec<ObservedStar> = Vec::new();
         for (pixel, v_mag) in places {
             let noise: [f64; 3] = std::array::from_fn(|_| rng.sample(StandardNormal));
@@ -233,6 +239,50 @@ fn a_saturated_star_may_be_brighter_than_it_seems() {
         stars[0].is_saturated = is_saturated;
         assert_eq!(name_at(&field(stars), place), expected);
     }
+}
+
+#[test]
+fn faint_stars_are_named_though_their_places_are_rough() {
+    const FIELDS: usize = 20;
+    // Bright stars are many, and faint ones as rough as at a ratio of signal to noise of five.
+    const FAINT_MAG: f64 = 0.4;
+    const BRIGHT_SIGMA_PX: f64 = 0.03;
+    const FAINT_SIGMA_PX: f64 = 0.3;
+    let mut rng = ChaCha8Rng::seed_from_u64(18);
+    let (mut faint, mut named) = (0, 0);
+    for _ in 0..FIELDS {
+        let truth = Truth::random(&mut rng, 15.0);
+        let (limit_mag, places) = truth.places();
+        let mut star = |(pixel, v_mag): (PixelPoint, f64)| {
+            let is_bright = v_mag < limit_mag - FAINT_MAG;
+            let sigma_px = if is_bright {
+                BRIGHT_SIGMA_PX
+            } else {
+                FAINT_SIGMA_PX
+            };
+            let [dx, dy]: [f64; 2] =
+                std::array::from_fn(|_| sigma_px * rng.sample::<f64, _>(StandardNormal));
+            let star = observed(pixel.x + dx, pixel.y + dy, v_mag);
+            (v_mag < limit_mag && truth.camera.contains(&pixel))
+                .then_some(ObservedStar { sigma_px, ..star })
+        };
+        let stars = field(places.into_iter().filter_map(&mut star).collect());
+        let Outcome::Identified(found) = identify(&stars, &Hints::default(), sky()) else {
+            continue;
+        };
+        let is_faint = |i: usize| stars.stars[i].sigma_px == FAINT_SIGMA_PX;
+        faint += (0..stars.stars.len()).filter(|i| is_faint(*i)).count();
+        named += found
+            .matches
+            .iter()
+            .filter(|m| is_faint(m.observed))
+            .count();
+    }
+    // A close pair may be named in the wrong order; beyond three standard errors lies one star in ninety.
+    assert!(
+        named as f64 > 0.97 * faint as f64 && faint > 100,
+        "{named} of {faint}"
+    );
 }
 
 /// Nothing is similar to a triangle of which nothing is known, and not everything.

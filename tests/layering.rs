@@ -25,6 +25,18 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &["units", "observer", "sensor", "detect", "statistics"],
     ),
     (
+        "simulate",
+        &[
+            "units",
+            "coords",
+            "frame",
+            "camera",
+            "catalog",
+            "sensor",
+            "sensitivity",
+        ],
+    ),
+    (
         "identify",
         &[
             "units",
@@ -99,6 +111,24 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "statistics",
             "identify",
             "pipeline",
+        ],
+    ),
+    (
+        "experiment",
+        &[
+            "units",
+            "coords",
+            "epoch",
+            "observer",
+            "sensor",
+            "frame",
+            "catalog",
+            "detect",
+            "sensitivity",
+            "simulate",
+            "identify",
+            "pipeline",
+            "report",
         ],
     ),
     (

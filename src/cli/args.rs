@@ -78,6 +78,43 @@ pub(crate) enum Command {
     Limit(Box<LimitArgs>),
     /// Work with descriptions of cameras
     Camera(CameraArgs),
+    /// Do an experiment of the sensitivity paper again: its limit, its stars, and frames like its own
+    #[command(after_help = "Examples:\n  \
+        starpipe experiment 1\n  \
+        starpipe experiment 2 --trials 200 --format json > experiment-2.json\n  \
+        starpipe experiment 1 --out results\n\n\
+        The paper is Tong, Li & Wang, Acta Optica Sinica 34, 1004003 (2014). The frames are simulated with its\n\
+        camera and sky at the pointing of its table of stars, and identified with nothing known.")]
+    Experiment(ExperimentArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ExperimentArgs {
+    /// Which of the paper's two
+    #[arg(value_name = "1|2", value_parser = clap::value_parser!(u8).range(1..=2))]
+    pub(crate) number: u8,
+    /// Frames to simulate
+    #[arg(long, value_name = "NUMBER", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    pub(crate) trials: u64,
+    /// Seed of the random numbers
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// What to print
+    #[arg(long, value_enum, default_value_t = ExperimentFormat::Text)]
+    pub(crate) format: ExperimentFormat,
+    /// Also write, into this directory, the first frame simulated as experiment-1.png or -2.png, its stars ringed and named
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) resources: ResourceArgs,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ExperimentFormat {
+    /// A page for people
+    Text,
+    /// One JSON object
+    Json,
 }
 
 #[derive(Debug, Args)]

@@ -5,6 +5,7 @@ mod batch;
 mod cache;
 mod camera;
 mod centroids;
+mod experiment;
 mod import;
 mod input;
 mod limit;
@@ -71,6 +72,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Robustness(arguments) => robustness::robustness(&arguments),
         Command::Limit(arguments) => limit::limit(&arguments),
         Command::Camera(arguments) => camera::camera(&arguments),
+        Command::Experiment(arguments) => experiment::experiment(&arguments),
     };
     match done {
         Ok(exit) => exit.into(),

@@ -265,7 +265,7 @@ fn first_bytes(bytes: &[u8]) -> String {
 }
 
 /// Refuses sizes that are too small or too large, before anything is allocated.
-fn check_size(width: usize, height: usize) -> Result<(), FrameError> {
+pub(crate) fn check_size(width: usize, height: usize) -> Result<(), FrameError> {
     if width < MIN_SIDE_PX || height < MIN_SIDE_PX {
         return Err(FrameError::TooSmall { width, height });
     }

@@ -2,7 +2,7 @@
 //!
 //! pair up → fit → pair up within a smaller radius → ... with as much lens distortion as the stars support
 
-use super::verify::Hypothesis;
+use super::verify::{Hypothesis, Radius};
 use super::{Photometry, Sky, StarField, StarMatch};
 use crate::attitude::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera, left_out_chi_sq};
 use crate::camera::DistortionModel;
@@ -27,6 +27,8 @@ const EXCESS_BISECTIONS: usize = 14;
 const HUBER_SIGMAS: f64 = 2.5;
 /// How much further off than the bright stars faint ones may be.
 const FAINT_RADIUS: f64 = 3.0;
+/// Farther off than so many times the typical star no star is looked for, however large its error.
+const ROUGH_RADIUS: f64 = 5.0;
 /// Rounds of pairing and fitting with all the stars.
 const ALL_STARS_ROUNDS: usize = 2;
 /// A sceptic wants so many standard deviations more agreement than chance makes.
@@ -61,7 +63,8 @@ pub fn refine(
     let observed = field.brightest(observed_count);
     let hypothesis = start.hypothesis;
     let mut predicted = hypothesis.predict(sky, field, observed);
-    let matches = hypothesis.pair_up(observed, &predicted, field.photometry, start.radius_px);
+    let radius = Radius::common(start.radius_px);
+    let matches = hypothesis.pair_up(observed, &predicted, field.photometry, &radius);
     if start.sceptical {
         let area_px = field.width_px * field.height_px;
         let discs_px = predicted.len() as f64 * PI * start.radius_px.powi(2);
@@ -77,9 +80,12 @@ pub fn refine(
     for _ in 0..MAX_ROUNDS {
         radius_px = next_radius_px(&current.fit, radius_px);
         current.hypothesis.predict_again(&mut predicted);
-        let matches = current
-            .hypothesis
-            .pair_up(observed, &predicted, field.photometry, radius_px);
+        let matches = current.hypothesis.pair_up(
+            observed,
+            &predicted,
+            field.photometry,
+            &Radius::common(radius_px),
+        );
         let settled = same_pairs(&matches, &current.matches);
         if settled && model_chosen {
             break;
@@ -97,7 +103,8 @@ pub fn refine(
     Some(current)
 }
 
-/// Adds the stars that were too faint for the refinement so far, and fits the same distortion model to all of them.
+/// Adds the stars that were too faint for the refinement so far, and fits the same distortion model to all of them. Each is
+/// looked for as far off as its own error allows: that of the faintest is many times the typical one.
 ///
 /// `None` where they do not determine the camera.
 pub fn with_all_stars(field: &StarField, sky: &Sky, settled: &Refined) -> Option<Refined> {
@@ -111,7 +118,13 @@ pub fn with_all_stars(field: &StarField, sky: &Sky, settled: &Refined) -> Option
             excess_sigma_px,
             ..
         } = &current;
-        let matches = hypothesis.pair_up(&field.stars, &predicted, field.photometry, radius_px);
+        let radius = Radius {
+            common_px: radius_px,
+            sigmas: CLIP_SIGMAS * error_scale(field, &current),
+            excess_sigma_px: *excess_sigma_px,
+            at_most: ROUGH_RADIUS,
+        };
+        let matches = hypothesis.pair_up(&field.stars, &predicted, field.photometry, &radius);
         if same_pairs(&matches, &current.matches) {
             break;
         }
@@ -253,6 +266,18 @@ fn distances_px(fit: &CameraFit) -> Vec<f64> {
         .iter()
         .map(|[x, y]| (x * x + y * y).sqrt())
         .collect()
+}
+
+/// What the stated errors must be multiplied by to be those that the residuals show: at most 1, as the excess is one of them.
+fn error_scale(field: &StarField, current: &Refined) -> f64 {
+    let relative = |m: &StarMatch| {
+        let sigma_px = field.stars[m.observed]
+            .sigma_px
+            .hypot(current.excess_sigma_px);
+        m.residual_px / sigma_px.max(1e-3)
+    };
+    let mut relative: Vec<f64> = current.matches.iter().map(relative).collect();
+    (median(&mut relative) / RAYLEIGH_MEDIAN).min(1.0)
 }
 
 /// The radius that holds practically all true pairs, by the typical residual of this fit.

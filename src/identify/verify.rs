@@ -77,6 +77,39 @@ impl Depth {
     }
 }
 
+/// How far apart a pair may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Radius {
+    /// Any pair, in pixels.
+    pub common_px: f64,
+    /// Pairs of a star with a large error: so many times that error ...
+    pub sigmas: f64,
+    /// ... together with this one, in pixels, ...
+    pub excess_sigma_px: f64,
+    /// ... but no more than so many times the common radius.
+    pub at_most: f64,
+}
+
+impl Radius {
+    /// The same for all stars.
+    pub fn common(radius_px: f64) -> Self {
+        Self {
+            common_px: radius_px,
+            sigmas: 0.0,
+            excess_sigma_px: 0.0,
+            at_most: 1.0,
+        }
+    }
+
+    /// That of one star, in pixels.
+    fn of(&self, star: &ObservedStar) -> f64 {
+        let own_px = self.sigmas * star.sigma_px.hypot(self.excess_sigma_px);
+        own_px
+            .min(self.at_most * self.common_px)
+            .max(self.common_px)
+    }
+}
+
 impl Hypothesis {
     /// The catalogue stars in the frame to the depth that `observed` asks for, brightest first.
     pub fn predict(
@@ -128,9 +161,9 @@ impl Hypothesis {
         observed: &[ObservedStar],
         predicted: &[PredictedStar],
         photometry: Photometry,
-        radius_px: f64,
+        radius: &Radius,
     ) -> Vec<StarMatch> {
-        pair_up(observed, predicted, radius_px, |o, p| {
+        pair_up(observed, predicted, radius, |o, p| {
             self.mag_difference(o, p, photometry)
         })
     }
@@ -340,23 +373,26 @@ impl<'a> Agreement<'a> {
 fn pair_up(
     observed: &[ObservedStar],
     predicted: &[PredictedStar],
-    radius_px: f64,
+    radius: &Radius,
     mag_difference: impl Fn(&ObservedStar, &PredictedStar) -> Option<f64>,
 ) -> Vec<StarMatch> {
     let mut by_x: Vec<usize> = (0..predicted.len()).collect();
     by_x.sort_unstable_by(|&a, &b| predicted[a].pixel.x.total_cmp(&predicted[b].pixel.x));
     let mut close: Vec<(f64, usize, usize)> = Vec::new();
     for (o, star) in observed.iter().enumerate() {
+        let radius_px = radius.of(star);
         let first = by_x.partition_point(|&p| predicted[p].pixel.x < star.position.x - radius_px);
         for &p in &by_x[first..] {
             let pixel = &predicted[p].pixel;
             if pixel.x > star.position.x + radius_px {
                 break;
             }
-            let apart = pixel.distance_to(&star.position) / radius_px;
-            if apart <= 1.0
+            let distance_px = pixel.distance_to(&star.position);
+            if distance_px <= radius_px
                 && let Some(difference) = mag_difference(star, &predicted[p])
             {
+                // Nearness counts in pixels: a star of which little is known takes none from one of which much is.
+                let apart = distance_px / radius.common_px;
                 close.push((apart * apart + difference * difference, o, p));
             }
         }
@@ -413,7 +449,9 @@ mod tests {
             v_mag: 0.0,
             catalog: x as usize,
         });
-        let pairs = pair_up(&observed, &predicted, 4.0, |_, _| Some(0.0));
+        let pairs = pair_up(&observed, &predicted, &Radius::common(4.0), |_, _| {
+            Some(0.0)
+        });
         let found: Vec<(usize, usize)> = pairs.iter().map(|p| (p.observed, p.catalog)).collect();
         assert_eq!(found, [(0, 10), (1, 12)]);
     }

@@ -14,9 +14,9 @@ mod rounding;
 mod table;
 mod text;
 
-#[cfg(feature = "overlay")]
 pub(crate) use angles::{degrees, hours};
 pub use compared::PredictionReport;
+pub(crate) use rounding::to_decimals;
 pub use table::{TABLE_COLUMNS, write_table_header};
 pub use text::{STARS_SHOWN, TextOptions, counted, printable};
 
