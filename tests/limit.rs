@@ -565,6 +565,11 @@ fn a_sweep_that_makes_no_sense_is_refused_before_anything_is_printed() {
     }
     let sweep = ["--preset", "experiment-1", "--sweep", "aperture_mm=5:200:3"];
     is_refused(&[&sweep[..], &["--plot", "a.pdf"]].concat(), ".svg or .png");
+    let many = ["--sweep=aperture_mm=5:200:3"; 65];
+    is_refused(
+        &[&sweep[..2], &many].concat(),
+        "given 65 times, expected at most 64",
+    );
     is_refused(
         &[&sweep[..], &["--figures", "a"]].concat(),
         "cannot be used with",
@@ -577,6 +582,7 @@ fn a_description_that_is_wrong_is_refused_with_its_line() {
     let place = directory.path();
     fs::write(place.join("short.csv"), "nm,qe\n400,0.5\n700,0.5\n").unwrap();
     fs::write(place.join("unsorted.csv"), "nm,qe\n400,0.5\n390,0.5\n").unwrap();
+    fs::write(place.join("dark.csv"), "nm,qe\n350,0\n800,0\n").unwrap();
     for (key, line, expected) in [
         (
             "aperture_mm",
@@ -593,6 +599,11 @@ fn a_description_that_is_wrong_is_refused_with_its_line() {
             "lens_transmission",
             "lens_transmission = \"short.csv\"",
             "known from 400 to 700 nm, which does not cover the band from 360 to 780 nm",
+        ),
+        (
+            "lens_transmission",
+            "lens_transmission = \"dark.csv\"",
+            "lens_transmission is 0, expected a number above 0 and at most 1",
         ),
         (
             "lens_transmission",

@@ -224,6 +224,7 @@ fn what_makes_no_sense_is_refused() {
         ("--sweep", "stars=1:2", "NAME=FROM:TO:COUNT"),
         ("--sweep", "missing=0:120:3", "0 to 100 percent"),
         ("--sweep", "fov=5:20:0", "1 to 1000"),
+        ("--plot", "a.pdf", ".svg or .png"),
         ("--missing", "101", "0 to 100 percent"),
         ("--stars", "0", "above 0"),
         ("--trials", "0", "0"),

@@ -167,9 +167,7 @@ impl Sensor {
             format!("bias_adu is {bias}, beyond the full scale of {bits} bits")
         })
     }
-}
 
-impl Sensor {
     /// Which curve is not known all the way between two wavelengths in nm, where one is not.
     pub fn uncovered(&self, from_nm: f64, to_nm: f64) -> Option<String> {
         let curves = [

@@ -19,8 +19,17 @@ use starpipe::sensitivity::{
 use starpipe::sensor::{Preset, Sensor};
 use std::path::{Path, PathBuf};
 
+/// More sweeps than this in one run are a mistake, and their figure would be of no use.
+const MAX_SWEEPS: usize = 64;
+
 /// `starpipe limit`
 pub(crate) fn limit(arguments: &LimitArgs) -> Result<Exit, Fault> {
+    let sweeps = arguments.sweep.len();
+    if sweeps > MAX_SWEEPS {
+        return Err(Fault::Usage(format!(
+            "--sweep is given {sweeps} times, expected at most {MAX_SWEEPS}"
+        )));
+    }
     let scenario = scenario(arguments)?;
     if let Some(directory) = &arguments.figures {
         return papers_figures(directory, &scenario);
@@ -43,7 +52,7 @@ pub(crate) fn limit(arguments: &LimitArgs) -> Result<Exit, Fault> {
 /// The scenario that is asked for, in which every value makes sense.
 fn scenario(arguments: &LimitArgs) -> Result<Scenario, Fault> {
     let mut scenario = match &arguments.camera {
-        Some(path) => Scenario::new(Sensor::read(path).map_err(anyhow::Error::from)?),
+        Some(path) => described(path)?,
         None => Scenario::of(arguments.preset.unwrap_or(Preset::Experiment1)),
     };
     match arguments.reading {
@@ -62,6 +71,16 @@ fn scenario(arguments: &LimitArgs) -> Result<Scenario, Fault> {
             Some(path) => anyhow!(error).context(path.display().to_string()).into(),
             None => usage(&error),
         })?;
+    Ok(scenario)
+}
+
+/// The camera in a file under the default conditions.
+fn described(path: &Path) -> anyhow::Result<Scenario> {
+    let scenario = Scenario::new(Sensor::read(path)?);
+    // What a file says is a fault of the file, not of the options.
+    scenario
+        .check()
+        .with_context(|| path.display().to_string())?;
     Ok(scenario)
 }
 

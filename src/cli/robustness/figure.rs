@@ -133,6 +133,8 @@ fn draw_table<B: DrawingBackend>(area: &Area<B>, rows: &[SweptRow]) -> anyhow::R
     let last = counted.len() as f64;
     let mut chart = ChartBuilder::on(area)
         .margin(MARGIN_PX)
+        // The last number of the axis is as wide.
+        .margin_right(2 * MARGIN_PX)
         .x_label_area_size(44)
         .y_label_area_size(230)
         .build_cartesian_2d(lowest..100.05, last..0.0)
