@@ -34,5 +34,5 @@ pub use faintest::Faintest;
 pub use figures::Figure;
 pub use light::{ILLUMINANCE_OF_MAG_0_LX, LUMINANCE_OF_MAG_0_CD_M2};
 pub use parameters::{CONDITION_KEYS, Parameter, UnknownParameter};
-pub use prediction::Prediction;
+pub use prediction::{Completeness, DetectorReport, Prediction};
 pub use sweep::{Curve, Series, Spacing, Sweep, SweepError, curves};

@@ -74,7 +74,7 @@ pub const CONDITION_KEYS: &[Key<Conditions>] = &[
     ),
     key!(
         motion_px,
-        Limits::NotNegative,
+        Limits::FromToBelow(0.0, 100.0),
         "how far a star moves during the exposure, in pixels"
     ),
     key!(

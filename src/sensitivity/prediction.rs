@@ -1,6 +1,7 @@
 //! What is told of a scenario: its limit, the parameters it follows from, and all that lies between.
 
 use super::budget::Budget;
+use super::completeness::{Detector, Rule};
 use super::conditions::{Reading, Scenario, ScenarioError};
 use super::parameters::Parameter;
 use serde::{Serialize, Serializer};
@@ -27,8 +28,68 @@ pub struct Prediction {
     pub reading: Reading,
     /// What the camera is called.
     pub camera: String,
+    /// What the matched filter of [`detect`](crate::detect::detect) finds.
+    pub detector: DetectorReport,
+    /// What the rule of the brightest pixel finds.
+    pub peak_pixel: DetectorReport,
     /// All that lies between.
     pub budget: Budget,
+}
+
+/// What a detector finds: three views of one threshold.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DetectorReport {
+    /// What a star must do to be found.
+    pub rule: Rule,
+    /// V magnitude at which half of the stars are found.
+    pub limit50_vmag: f64,
+    /// V magnitude at which nine in ten are found.
+    pub limit90_vmag: f64,
+    /// The threshold, in standard deviations of the (filtered) noise without a star.
+    pub threshold_sigma: f64,
+    /// False detections in a million pixels without a star.
+    pub false_alarms_per_mpx: f64,
+    /// The part of the stars that is found, by V magnitude.
+    pub completeness: Vec<Completeness>,
+}
+
+/// A point of a curve of completeness.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Completeness {
+    /// V magnitude of the stars.
+    pub vmag: f64,
+    /// The part of them that is found.
+    pub part: f64,
+}
+
+/// The curve of completeness spans so many magnitudes on either side of the limit, ...
+const CURVE_REACH_MAG: f64 = 1.2;
+/// ... in steps of this size.
+const CURVE_STEP_MAG: f64 = 0.1;
+
+impl DetectorReport {
+    fn new(rule: Rule, scenario: &Scenario, budget: &Budget) -> Self {
+        let detector = Detector::new(rule, scenario, budget);
+        let limit50_vmag = detector.vmag_at(0.5);
+        let middle = (limit50_vmag / CURVE_STEP_MAG).round();
+        let steps = (CURVE_REACH_MAG / CURVE_STEP_MAG).round() as i32;
+        let point = |step: i32| {
+            // Divided, and not multiplied, so that 8.3 is 8.3.
+            let vmag = (middle + f64::from(step)) / (1.0 / CURVE_STEP_MAG).round();
+            Completeness {
+                vmag,
+                part: detector.probability(vmag),
+            }
+        };
+        Self {
+            rule,
+            limit50_vmag,
+            limit90_vmag: detector.vmag_at(0.9),
+            threshold_sigma: detector.threshold_sigma,
+            false_alarms_per_mpx: detector.false_alarms_per_mpx,
+            completeness: (-steps..=steps).map(point).collect(),
+        }
+    }
 }
 
 fn as_map<S: Serializer>(
@@ -58,6 +119,8 @@ impl Prediction {
             parameters,
             reading: scenario.reading,
             camera: scenario.sensor.name.clone(),
+            detector: DetectorReport::new(Rule::MatchedFilter, scenario, &budget),
+            peak_pixel: DetectorReport::new(Rule::PeakPixel, scenario, &budget),
             budget,
         })
     }

@@ -94,6 +94,8 @@ pub fn nearest_name<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Opt
 
 /// The longest side of a detector that makes sense, in pixels.
 const MAX_SIDE_PX: f64 = 100_000.0;
+/// Standard deviations of spots that make sense, in pixels: a wider one is no star.
+const SPOTS_PX: Limits = Limits::FromToBelow(0.05, 20.0);
 /// Wavelengths of which a detector may make anything, in nm.
 const WAVELENGTHS_NM: Limits = Limits::FromToBelow(100.0, 10_000.0);
 
@@ -188,7 +190,7 @@ pub const KEYS: &[Key<Sensor>] = &[
     Key {
         name: "spot_sigma_px",
         about: "standard deviation of a star's spot, in pixels",
-        limits: Limits::Positive,
+        limits: SPOTS_PX,
         get: |sensor| Some(sensor.spot_sigma_px),
         set: |sensor, sigma_px| {
             sensor.spot_sigma_px = sigma_px;

@@ -13,8 +13,10 @@ use super::{Exit, Fault, warn};
 use anyhow::{Context, anyhow};
 use figure::{Panel, Sheet};
 use serde::Serialize;
+use starpipe::catalog::Catalog;
 use starpipe::sensitivity::{
-    Figure, Prediction, Reading, Scenario, ScenarioError, Series, Sweep, curves,
+    Detector, Faintest, Figure, Prediction, Reading, Rule, Scenario, ScenarioError, Series, Sweep,
+    curves,
 };
 use starpipe::sensor::{Preset, Sensor};
 use std::path::{Path, PathBuf};
@@ -93,6 +95,8 @@ fn usage(error: &ScenarioError) -> Fault {
 struct Row {
     #[serde(flatten)]
     prediction: Prediction,
+    /// The faintest star to be expected among those of the catalogue, on average over the sky.
+    faintest: Option<Faintest>,
     preset: Option<&'static str>,
     swept: Option<Swept>,
 }
@@ -113,6 +117,11 @@ fn rows(arguments: &LimitArgs, scenario: &Scenario) -> Result<Vec<Row>, Fault> {
             None => usage(&error),
         })?;
         Ok::<_, Fault>(Row {
+            // For its own sake only: in a sweep it would cost more than all the rest.
+            faintest: match swept {
+                None => faintest(scenario, &prediction),
+                Some(_) => None,
+            },
             prediction,
             preset,
             swept,
@@ -132,6 +141,20 @@ fn rows(arguments: &LimitArgs, scenario: &Scenario) -> Result<Vec<Row>, Fault> {
         warn_if_flat(parameter, &rows[before..]);
     }
     Ok(rows)
+}
+
+/// The faintest star to be expected in a field, with as many stars as the built-in catalogue has in one on average.
+fn faintest(scenario: &Scenario, prediction: &Prediction) -> Option<Faintest> {
+    let sensor = &scenario.sensor;
+    let field_sr = sensor.pixel_solid_angle_sr() * (sensor.width_px * sensor.height_px) as f64;
+    let part_of_sky = (field_sr / (4.0 * std::f64::consts::PI)).min(1.0);
+    let detector = Detector::new(Rule::MatchedFilter, scenario, &prediction.budget);
+    let stars = Catalog::built_in().stars().iter();
+    Faintest::in_part_of_sky(
+        stars.map(|star| f64::from(star.v_mag)),
+        part_of_sky,
+        &detector,
+    )
 }
 
 /// Some parameters count in one reading only, or not for the brightest pixel.
@@ -196,6 +219,9 @@ struct TableRow<'a> {
     noise_e: f64,
     snr: f64,
     airmass: f64,
+    detector_limit50_vmag: f64,
+    detector_limit90_vmag: f64,
+    peak_limit50_vmag: f64,
     dark_e: f64,
     sensor_noise_e: f64,
     background_noise_e: f64,
@@ -218,6 +244,9 @@ impl<'a> TableRow<'a> {
             noise_e: budget.noise_e,
             snr: budget.snr,
             airmass: budget.airmass,
+            detector_limit50_vmag: row.prediction.detector.limit50_vmag,
+            detector_limit90_vmag: row.prediction.detector.limit90_vmag,
+            peak_limit50_vmag: row.prediction.peak_pixel.limit50_vmag,
             dark_e: budget.dark_e,
             sensor_noise_e: budget.sensor_noise_e,
             background_noise_e: budget.background_noise_e,

@@ -2,7 +2,7 @@
 
 use super::Row;
 use starpipe::report::printable;
-use starpipe::sensitivity::{Budget, Prediction, Reading, Scenario};
+use starpipe::sensitivity::{Budget, DetectorReport, Prediction, Reading, Scenario};
 use std::fmt::Write as _;
 
 /// A quantity: symbol, words, value, unit.
@@ -67,6 +67,49 @@ fn budget(row: &Row) -> String {
             let line = format!("    {symbol:<5} {words:<55} {:>13} {unit}", number(value));
             let _ = writeln!(text, "{}", line.trim_end());
         }
+    }
+    text + &detectors(row)
+}
+
+/// What is found of the stars, by both rules.
+fn detectors(row: &Row) -> String {
+    let prediction = &row.prediction;
+    let (peak, filter) = (&prediction.peak_pixel, &prediction.detector);
+    let mut text = format!(
+        "\n  {:<37} {:>20} {:>20}\n",
+        "what is found", "brightest pixel", "starpipe's filter"
+    );
+    let lines: [(&str, fn(&DetectorReport) -> String); 4] = [
+        ("half of the stars at V", |d| {
+            format!("{:.2}", d.limit50_vmag)
+        }),
+        ("nine in ten at V", |d| format!("{:.2}", d.limit90_vmag)),
+        ("threshold, in standard deviations", |d| {
+            number(d.threshold_sigma)
+        }),
+        ("false detections in a million pixels", |d| {
+            number(d.false_alarms_per_mpx)
+        }),
+    ];
+    for (words, value) in lines {
+        let _ = writeln!(
+            text,
+            "    {words:<36} {:>19} {:>20}",
+            value(peak),
+            value(filter)
+        );
+    }
+    if let Some(faintest) = &row.faintest {
+        let expected = format!("{:.2} ± {:.2}", faintest.mean_vmag, faintest.sigma_mag);
+        let found = number((faintest.stars_found * 10.0).round() / 10.0);
+        let _ = writeln!(
+            text,
+            "    {:<36} {:>40}\n    {:<36} {:>40}",
+            "catalogue's stars found in the field",
+            found,
+            "faintest of them to be expected at V",
+            expected
+        );
     }
     text
 }
@@ -240,16 +283,17 @@ fn sweeps(rows: &[Row]) -> String {
         let name = parameter(&rows[0]);
         let _ = writeln!(
             text,
-            "\n  {name:>26}  {:>7}  {:>10}  {:>12}  {:>10}  {:>8}",
-            "limit", "star e", "background e", "noise e", "airmass"
+            "\n  {name:>26}  {:>7}  {:>7}  {:>10}  {:>12}  {:>10}  {:>8}",
+            "limit", "filter", "star e", "background e", "noise e", "airmass"
         );
         for row in rows {
             let prediction = &row.prediction;
             let _ = writeln!(
                 text,
-                "  {:>26}  {:>7.3}  {:>10}  {:>12}  {:>10}  {:>8}",
+                "  {:>26}  {:>7.3}  {:>7.3}  {:>10}  {:>12}  {:>10}  {:>8}",
                 number(row.swept.map_or(f64::NAN, |swept| swept.value)),
                 prediction.limit_vmag,
+                prediction.detector.limit50_vmag,
                 number(prediction.star_e),
                 number(prediction.background_e),
                 number(prediction.noise_e),
