@@ -83,8 +83,9 @@ pub(crate) enum Command {
         starpipe experiment 1\n  \
         starpipe experiment 2 --trials 200 --format json > experiment-2.json\n  \
         starpipe experiment 1 --out results\n\n\
-        The paper is Tong, Li & Wang, Acta Optica Sinica 34, 1004003 (2014). The frames are simulated with its\n\
-        camera and sky at the pointing of its table of stars, and identified with nothing known.")]
+        The paper is Tong, Li & Wang, Acta Optica Sinica 34, 1004003 (2014). The frames are simulated \
+        with its camera and sky at the pointing of its table of stars, and identified with nothing \
+        known. The stars have numbers of SKY2000: with another --catalog they are found under other numbers.")]
     Experiment(ExperimentArgs),
 }
 
@@ -94,7 +95,7 @@ pub(crate) struct ExperimentArgs {
     #[arg(value_name = "1|2", value_parser = clap::value_parser!(u8).range(1..=2))]
     pub(crate) number: u8,
     /// Frames to simulate
-    #[arg(long, value_name = "NUMBER", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    #[arg(long, value_name = "NUMBER", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     pub(crate) trials: u64,
     /// Seed of the random numbers
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]

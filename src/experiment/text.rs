@@ -24,21 +24,18 @@ impl ExperimentReport {
 }
 
 fn limit_text(limit: &LimitReport) -> String {
-    let (found, printed, faintest) = (
-        limit.limit_vmag,
-        limit.paper_limit_vmag,
-        limit.paper_faintest_vmag,
+    let mut text = "\nThe limit\n".to_owned();
+    let _ = writeln!(
+        text,
+        "  V {:.2} by the paper's equations; the paper prints {:.2}, and its faintest star has {:.2}",
+        limit.limit_vmag, limit.paper_limit_vmag, limit.paper_faintest_vmag
     );
-    format!(
-        "\nThe limit\n{}{}",
-        format_args!(
-            "  V {found:.2} by the paper's equations; the paper prints {printed:.2}, and its faintest star has {faintest:.2}\n"
-        ),
-        format_args!(
-            "  V {:.2} of this detector, which finds half of such stars: its filter adds up the light of a spot\n",
-            limit.detector_limit_vmag
-        )
-    )
+    let _ = writeln!(
+        text,
+        "  V {:.2} of this detector, which finds half of such stars: its filter adds up the light of a spot",
+        limit.detector_limit_vmag
+    );
+    text
 }
 
 fn table_text(table: &TableReport) -> String {
