@@ -109,7 +109,7 @@ pub fn refine(
 /// `None` where they do not determine the camera.
 pub fn with_all_stars(field: &StarField, sky: &Sky, settled: &Refined) -> Option<Refined> {
     let model = settled.hypothesis.camera.distortion_model();
-    let mut predicted = settled.hypothesis.predict(sky, field, &field.stars);
+    let mut predicted = settled.hypothesis.predict_all(sky, field);
     let mut radius_px = FAINT_RADIUS * agreement_radius_px(&settled.fit);
     let mut current = settled.clone();
     for _ in 0..ALL_STARS_ROUNDS {

@@ -28,6 +28,10 @@ pub const TESTED_STARS: usize = 60;
 const PREDICTED_PER_OBSERVED: f64 = 1.5;
 /// And so many more, so that a few missing ones do no harm in sparse fields.
 const PREDICTED_EXTRA: usize = 5;
+/// Where it is known: the star that this part of the others are brighter than, so that a few odd ones do not count, ...
+const FAINT_SHARE: f64 = 0.95;
+/// ... and stars fainter than that by so much, for their colour and for luck at the threshold.
+const FAINT_ROOM_MAG: f64 = 1.0;
 /// Stars that agree by construction.
 const TRIANGLE_STARS: usize = 3;
 /// Radii of agreement tried: from the smallest, in pixels, by this factor, to this share of the frame's diagonal.
@@ -123,12 +127,7 @@ impl Hypothesis {
             Depth::Count(count) => (count, sky.magnitude_of_density(self.per_sq_deg(count))),
         };
         loop {
-            let view = View {
-                camera: &self.camera,
-                icrs_to_camera: &self.icrs_to_camera,
-                years_since_j2000: field.years_since_j2000,
-            };
-            let mut predicted = view.stars_to(sky, limit);
+            let mut predicted = self.view(field).stars_to(sky, limit);
             if predicted.len() >= wanted || limit > sky.faintest_v_mag() {
                 if wanted > 0 {
                     predicted.truncate(wanted);
@@ -136,6 +135,32 @@ impl Hypothesis {
                 return predicted;
             }
             limit += 0.7;
+        }
+    }
+
+    /// The catalogue stars in the frame that may be any of its stars, once the zero point is known: to what the faint ones of
+    /// these have, and the depth that their number asks for at least.
+    pub fn predict_all(&self, sky: &Sky, field: &StarField) -> Vec<PredictedStar> {
+        let by_count = self.predict(sky, field, &field.stars);
+        let faint = (field.stars.len() as f64 * FAINT_SHARE) as usize;
+        let limit = field
+            .stars
+            .get(faint)
+            .map(|star| star.mag + self.zero_point_mag + FAINT_ROOM_MAG);
+        let reached = by_count.last().map(|star| f64::from(star.v_mag));
+        match limit {
+            Some(limit) if reached.is_some_and(|reached| reached < limit) => {
+                self.view(field).stars_to(sky, limit)
+            }
+            _ => by_count,
+        }
+    }
+
+    fn view(&self, field: &StarField) -> View<'_> {
+        View {
+            camera: &self.camera,
+            icrs_to_camera: &self.icrs_to_camera,
+            years_since_j2000: field.years_since_j2000,
         }
     }
 

@@ -79,25 +79,23 @@ fn detectors(row: &Row) -> String {
         "\n  {:<37} {:>20} {:>20}\n",
         "what is found", "brightest pixel", "starpipe's filter"
     );
-    let lines: [(&str, fn(&DetectorReport) -> String); 4] = [
-        ("half of the stars at V", |d| {
-            format!("{:.2}", d.limit50_vmag)
-        }),
-        ("nine in ten at V", |d| format!("{:.2}", d.limit90_vmag)),
-        ("threshold, in standard deviations", |d| {
-            number(d.threshold_sigma)
-        }),
-        ("false detections in a million pixels", |d| {
-            number(d.false_alarms_per_mpx)
-        }),
+    let v_mag = |v_mag: f64| format!("{v_mag:.2}");
+    let lines = |d: &DetectorReport| {
+        [
+            v_mag(d.limit50_vmag),
+            v_mag(d.limit90_vmag),
+            number(d.threshold_sigma),
+            number(d.false_alarms_per_mpx),
+        ]
+    };
+    let words = [
+        "half of the stars at V",
+        "nine in ten at V",
+        "threshold, in standard deviations",
+        "false detections in a million pixels",
     ];
-    for (words, value) in lines {
-        let _ = writeln!(
-            text,
-            "    {words:<36} {:>19} {:>20}",
-            value(peak),
-            value(filter)
-        );
+    for ((words, peak), filter) in words.iter().zip(lines(peak)).zip(lines(filter)) {
+        let _ = writeln!(text, "    {words:<36} {peak:>19} {filter:>20}");
     }
     if let Some(faintest) = &row.faintest {
         let expected = format!("{:.2} ± {:.2}", faintest.mean_vmag, faintest.sigma_mag);

@@ -1,0 +1,268 @@
+//! Frames of a camera that is described: what they should show, beside what they show.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
+mod common;
+
+use common::{Ran, number, starpipe};
+use image::{ImageBuffer, Luma};
+use serde_json::Value;
+use starpipe::catalog::Catalog;
+use starpipe::coords::{Rotation, UnitVector};
+use starpipe::sensitivity::{Scenario, SkyBrightness};
+use starpipe::sensor::{Preset, template};
+use starpipe::simulate::{Pointing, frame_of_sky, square_pixel_camera};
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// A zero point from some hundred stars is this good, besides its own error.
+const ZERO_POINT_TOLERANCE_MAG: f64 = 0.03;
+/// The level is a median of whole grey levels.
+const SKY_TOLERANCE_MAG: f64 = 0.05;
+/// The detector's model is this good, besides the error of the measurement: stars that touch are lost to it.
+const LIMIT_TOLERANCE_MAG: f64 = 0.05;
+
+const CAMERA: Preset = Preset::Imx174;
+const SKY_MAG_ARCSEC2: f64 = 18.5;
+const EXPOSURE_S: &str = "0.05";
+
+/// A directory with a frame of that camera, of Cygnus near the zenith, and with its description.
+struct Night {
+    directory: TempDir,
+    frame: PathBuf,
+}
+
+impl Night {
+    fn new() -> Self {
+        let mut scenario = Scenario::of(CAMERA);
+        scenario.conditions.exposure_s = EXPOSURE_S.parse().unwrap();
+        scenario.conditions.sky = SkyBrightness::MagArcsec2(SKY_MAG_ARCSEC2);
+        let boresight = UnitVector::from_ra_dec(300f64.to_radians(), 35f64.to_radians());
+        let pointing = Pointing {
+            camera: square_pixel_camera(&scenario.sensor),
+            icrs_to_camera: Rotation::looking_at(&boresight, 0.3),
+            years_since_j2000: 0.0,
+        };
+        let stars = Catalog::built_in().stars();
+        let (frame, _) = frame_of_sky(&scenario, &pointing, stars, 5).unwrap();
+        let levels = frame.pixels.iter().map(|level| *level as u16).collect();
+        let picture: ImageBuffer<Luma<u16>, Vec<u16>> =
+            ImageBuffer::from_raw(frame.width as u32, frame.height as u32, levels).unwrap();
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("cygnus.png");
+        picture.save(&path).unwrap();
+        let night = Self {
+            directory,
+            frame: path,
+        };
+        night.describe(|text| text);
+        night
+    }
+
+    fn camera(&self) -> PathBuf {
+        self.directory.path().join("camera.toml")
+    }
+
+    /// Writes the camera's description with a change.
+    fn describe(&self, change: impl Fn(String) -> String) {
+        fs::write(self.camera(), change(template(CAMERA))).unwrap();
+    }
+
+    fn process(&self, arguments: &[&str]) -> Ran {
+        let mut command = starpipe();
+        command.arg("process").arg(&self.frame);
+        Ran::new(command.arg("--camera").arg(self.camera()).args(arguments))
+    }
+
+    fn report(&self, arguments: &[&str]) -> Value {
+        let ran = self.process(&[&["--format", "json"], arguments].concat());
+        assert_eq!(ran.status, 0, "{}", ran.stderr);
+        ran.reports().remove(0)
+    }
+}
+
+/// `text` with another value for a key.
+fn with(text: &str, key: &str, value: &str) -> String {
+    let is_key = |line: &str| line.split(" = ").next() == Some(key);
+    let line = |line: &str| match is_key(line) {
+        true => format!("{key} = {value}\n"),
+        false => format!("{line}\n"),
+    };
+    assert!(text.lines().any(is_key), "{key}");
+    text.lines().map(line).collect()
+}
+
+fn notes(report: &Value) -> String {
+    let notes = report["notes"].as_array().unwrap().iter();
+    notes
+        .map(|note| note.as_str().unwrap().to_owned() + "\n")
+        .collect()
+}
+
+#[test]
+fn a_frame_shows_what_its_camera_should_see() {
+    let night = Night::new();
+    let report = night.report(&["--exposure", EXPOSURE_S]);
+    assert_eq!(notes(&report), "");
+    let prediction = |key: &str| number(&report, &format!("/prediction/{key}"));
+    let zero = prediction("zero_point_difference_mag").abs();
+    let zero_sigma = prediction("zero_point_difference_sigma_mag");
+    assert!(zero < ZERO_POINT_TOLERANCE_MAG + 3.0 * zero_sigma, "{zero}");
+    let sky = prediction("sky_camera_mag_arcsec2") - SKY_MAG_ARCSEC2;
+    assert!(sky.abs() < SKY_TOLERANCE_MAG, "{sky}");
+    let sky = prediction("sky_mag_arcsec2") - SKY_MAG_ARCSEC2;
+    assert!(
+        sky.abs() < SKY_TOLERANCE_MAG + zero + 3.0 * zero_sigma,
+        "{sky}"
+    );
+    let magnitude = |key: &str| number(&report, &format!("/magnitude/{key}"));
+    let limit = magnitude("limit_difference_mag").abs();
+    let sigma = magnitude("limit_difference_sigma_mag");
+    assert!(
+        limit < LIMIT_TOLERANCE_MAG + 3.0 * sigma,
+        "{limit} ± {sigma}"
+    );
+    let faintest = magnitude("faintest_difference_mag").abs();
+    let spread = magnitude("expected_faintest_sigma_mag");
+    assert!(faintest < 3.5 * spread, "{faintest} ± {spread}");
+    let difference = magnitude("faintest_vmag") - magnitude("predicted_limit_vmag");
+    assert!((magnitude("difference_mag") - difference).abs() < 2e-3);
+    let gain = 8.0;
+    let [star, ..] = &report["stars"].as_array().unwrap()[..] else {
+        panic!("stars");
+    };
+    for key in ["flux", "peak"] {
+        let electrons = star[format!("{key}_e")].as_f64().unwrap();
+        let levels = star[key].as_f64().unwrap();
+        assert!((electrons / levels - gain).abs() < 0.1, "{key}");
+    }
+}
+
+#[test]
+fn without_an_exposure_nothing_is_predicted_and_without_a_camera_neither() {
+    let night = Night::new();
+    let report = night.report(&[]);
+    assert_eq!(report["prediction"], Value::Null);
+    assert_eq!(report["magnitude"]["predicted_limit_vmag"], Value::Null);
+    assert!(report["stars"][0]["flux_e"].is_number());
+    let ran = Ran::new(
+        starpipe()
+            .args(["process", "--format", "json", "--exposure", EXPOSURE_S])
+            .arg(&night.frame),
+    );
+    let report = &ran.reports()[0];
+    assert_eq!(report["prediction"], Value::Null);
+    assert_eq!(report["photometry"]["flux_unit"], "ADU/s");
+    assert_eq!(report["stars"][0].get("flux_e"), None);
+}
+
+#[test]
+fn a_frame_that_contradicts_its_description_says_so() {
+    let night = Night::new();
+    let exposed = ["--exposure", EXPOSURE_S];
+    for (key, value, note) in [
+        (
+            "aperture_mm",
+            "50",
+            "mag off the camera's; less light arrives",
+        ),
+        (
+            "aperture_mm",
+            "12",
+            "mag off the camera's; more light arrives",
+        ),
+        (
+            "focal_length_mm",
+            "50",
+            "by the camera's focal length and pitch",
+        ),
+        (
+            "width_px",
+            "1000",
+            "the frame has 1936 × 1216 pixels, the camera 1000 × 1216",
+        ),
+        ("read_noise_e", "60", "the background's noise is"),
+        ("spot_sigma_px", "1.5", "the camera's 1.50 px"),
+    ] {
+        night.describe(|text| with(&text, key, value));
+        let told = notes(&night.report(&exposed));
+        assert!(told.contains(note), "{key}: {told}");
+    }
+    night.describe(|text| text);
+    // Cygnus at 35° of declination, seen from the north pole, stands 55° from the zenith at any time.
+    let told = notes(
+        &night.report(
+            &[
+                &exposed[..],
+                &[
+                    "--site",
+                    "90,0",
+                    "--date",
+                    "2019-07-29T20:47:26Z",
+                    "--zenith-distance",
+                    "10",
+                ],
+            ]
+            .concat(),
+        ),
+    );
+    assert!(
+        told.contains("stated as 10.0°, by site, date and attitude it is 5"),
+        "{told}"
+    );
+}
+
+#[test]
+fn the_scale_of_the_camera_is_a_hint_that_may_be_wrong() {
+    let night = Night::new();
+    night.describe(|text| with(&text, "focal_length_mm", "120"));
+    let report = night.report(&[]);
+    assert_eq!(report["status"], "identified");
+    let fov = number(&report, "/optics/fov_x_deg");
+    assert!((fov - 18.4).abs() < 0.2, "{fov}");
+}
+
+#[test]
+fn the_text_holds_one_against_the_other() {
+    let night = Night::new();
+    let ran = night.process(&["--exposure", EXPOSURE_S]);
+    for part in [
+        "camera      IMX174, 35 mm",
+        "predicted   limit V ",
+        "measured minus predicted ",
+        "found minus expected ",
+        "in a square arcsecond",
+    ] {
+        assert!(ran.stdout.contains(part), "{part}: {}", ran.stdout);
+    }
+}
+
+#[test]
+fn a_wrong_description_or_option_is_refused() {
+    let night = Night::new();
+    night.describe(|text| with(&text, "aperture_mm", "-5"));
+    let ran = night.process(&[]);
+    assert_eq!(ran.status, 1);
+    let expected = "aperture_mm is -5, expected a number above 0";
+    assert!(ran.stderr.contains(expected), "{}", ran.stderr);
+    assert!(ran.stdout.is_empty());
+    for arguments in [
+        &["--exposure", "0"][..],
+        &["--exposure", "NaN"],
+        &["--camera", "x.toml", "--zenith-distance", "90"],
+        &["--camera", "x.toml", "--extinction", "-1"],
+        &["--zenith-distance", "10"],
+    ] {
+        let ran = Ran::new(starpipe().args(["process", "a.png"]).args(arguments));
+        assert_eq!(ran.status, 2, "{arguments:?}");
+    }
+    let absent = Path::new("no-such-camera.toml");
+    let ran = Ran::new(
+        starpipe()
+            .args(["process", "a.png", "--camera"])
+            .arg(absent),
+    );
+    assert_eq!(ran.status, 1);
+    assert!(ran.stderr.contains("no-such-camera.toml"), "{}", ran.stderr);
+}
