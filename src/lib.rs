@@ -1,5 +1,6 @@
 //! From a photograph of the night sky to the stars in it, where the camera pointed, and how sure that is.
 
+pub mod angle;
 pub mod attitude;
 pub mod camera;
 pub mod catalog;

@@ -150,6 +150,14 @@ pub enum DateSource {
 }
 
 impl Knowledge {
+    /// The same with a site, where none is known.
+    fn or_site(self, site: Option<Site>) -> Self {
+        Self {
+            site: self.site.or(site),
+            ..self
+        }
+    }
+
     /// The same with an exposure, where none is known.
     fn or_exposure(self, exposure_s: Option<f64>) -> Self {
         Self {
@@ -430,7 +438,8 @@ impl<'a> Pipeline<'a> {
         let knowledge = config
             .knowledge
             .or_date(frame.metadata.date, DateSource::FileHeader)
-            .or_exposure(frame.metadata.exposure_s);
+            .or_exposure(frame.metadata.exposure_s)
+            .or_site(frame.metadata.site);
         let (field, kept) = star_field(frame, &detections, knowledge.years_since_j2000());
         let identify_start = Instant::now();
         let mut notes = frame.metadata.ignored.clone();

@@ -9,15 +9,16 @@ use std::path::{Path, PathBuf};
 /// Each module, and the modules of the crate that it may use.
 const MAY_USE: &[(&str, &[&str])] = &[
     ("units", &[]),
+    ("angle", &[]),
     ("coords", &["units"]),
     ("epoch", &[]),
     ("files", &[]),
     ("statistics", &[]),
     ("observer", &["units", "coords", "epoch"]),
     ("sensor", &[]),
-    ("frame", &["units", "coords", "epoch"]),
+    ("frame", &["units", "coords", "epoch", "angle", "observer"]),
     ("camera", &["units", "coords"]),
-    ("catalog", &["units", "coords", "files"]),
+    ("catalog", &["units", "coords", "files", "angle"]),
     ("detect", &["units", "coords", "frame"]),
     ("attitude", &["units", "coords", "camera"]),
     (

@@ -3,7 +3,6 @@
 //! Headings → [`Columns`] → with a row's cells, a star at J2000. Headings are compared without regard to case,
 //! and a unit in brackets behind a heading, or in a line of its own under the headings, is heeded.
 
-use super::angle::{Angle, decimal};
 use super::error::{FaultPlace, RecordFault, quoted};
 use super::id::whole_number;
 use super::import::Record;
@@ -11,6 +10,7 @@ use super::position::GridPosition;
 use super::star::{StarFlags, mag_on_grid};
 use super::tycho2::johnson;
 use super::{HipparcosId, MAG_LIMIT, PM_LIMIT_MAS_PER_YR, Star, StarId, TychoId};
+use crate::angle::{Angle, decimal};
 use std::ops::RangeInclusive;
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -15,7 +15,6 @@
 //! # Reference
 //! Høg et al. 2000, A&A 355, L27 (CDS I/259, whose description gives layout and magnitudes).
 
-use super::angle::decimal;
 use super::error::{FaultPlace, RecordFault, quoted};
 use super::id::whole_number;
 use super::import::{Format, Record};
@@ -23,6 +22,7 @@ use super::position::GridPosition;
 use super::rows::Row;
 use super::star::{StarFlags, mag_on_grid};
 use super::{HipparcosId, MAG_LIMIT, PM_LIMIT_MAS_PER_YR, Star, StarId, TychoId};
+use crate::angle::decimal;
 
 /// V less VT, in units of BT − VT.
 const V_PER_COLOR: f64 = -0.090;

@@ -1,12 +1,13 @@
 //! Exif, which cameras write into TIFF, JPEG and PNG.
 //!
-//! Taken are `DateTimeOriginal`, `ExposureTime`, `FocalLength` and `FocalPlaneXResolution`. TIFF's own `DateTime`
+//! Taken are `DateTimeOriginal`, `ExposureTime`, `FocalLength`, `FocalPlaneXResolution` and the place by GPS. TIFF's own `DateTime`
 //! is not: it is when the file was made or changed.
 //!
 //! Caveat: without `OffsetTimeOriginal` the clock's time zone is not known, and only the day is taken.
 
 use super::metadata::{EXPOSURE, FOCAL_LENGTH, FrameMetadata, PIXEL_SIZE, Quantity};
 use crate::epoch::ObservationDate;
+use crate::observer::Site;
 use exif::{Field, In, Reader, Tag, Value};
 
 /// What the Exif attributes in `bytes`, laid out as a TIFF file, say of a frame `width` pixels wide. Attributes that
@@ -17,6 +18,7 @@ pub(super) fn metadata(bytes: &[u8], width: usize) -> FrameMetadata {
     metadata.exposure_s = attributes.number(&mut metadata, &EXPOSURE, Tag::ExposureTime);
     metadata.focal_length_mm = attributes.number(&mut metadata, &FOCAL_LENGTH, Tag::FocalLength);
     metadata.pixel_size_um = attributes.pixel_size_um(&mut metadata, width);
+    metadata.site = attributes.site(&mut metadata);
     if let Some(day) = attributes.text(Tag::DateTimeOriginal) {
         let date = attributes.date(&day);
         metadata.date = metadata.sensible_date("DateTimeOriginal", &day, date);
@@ -103,6 +105,37 @@ impl Attributes {
         )
     }
 
+    /// Degrees, minutes and seconds, each a ratio, and a letter for the hemisphere.
+    fn site(&self, metadata: &mut FrameMetadata) -> Option<Site> {
+        let angle = |tag: Tag, letter: Tag, negative: u8| -> Option<f64> {
+            let Value::Rational(parts) = self.value(tag)? else {
+                return None;
+            };
+            let sixtieths = [1.0, 60.0, 3600.0];
+            let parts = parts
+                .iter()
+                .zip(sixtieths)
+                .map(|(part, n)| part.to_f64() / n);
+            let degrees: f64 = parts.sum();
+            let is_negative = match self.value(letter)? {
+                Value::Ascii(lines) => lines.first()?.first()?.eq_ignore_ascii_case(&negative),
+                _ => return None,
+            };
+            Some(if is_negative { -degrees } else { degrees })
+        };
+        let lat_deg = angle(Tag::GPSLatitude, Tag::GPSLatitudeRef, b'S')?;
+        let lon_deg = angle(Tag::GPSLongitude, Tag::GPSLongitudeRef, b'W')?;
+        let is_below = self.value(Tag::GPSAltitudeRef).and_then(|v| v.get_uint(0)) == Some(1);
+        let height_m = self.raw_number(Tag::GPSAltitude).unwrap_or(0.0);
+        let height_m = if is_below { -height_m } else { height_m };
+        let text = format!("{lat_deg}, {lon_deg}");
+        metadata.sensible_site(
+            "GPSLatitude, GPSLongitude",
+            &text,
+            Some((lat_deg, lon_deg, height_m)),
+        )
+    }
+
     /// `day` is as Exif writes it, `2019:07:29 20:47:26`.
     fn date(&self, day: &str) -> Option<ObservationDate> {
         let (day, time) = day.split_once(' ').unwrap_or((day, ""));
@@ -166,6 +199,30 @@ mod tests {
         // 5 µm as taken, at half the width.
         assert_eq!(metadata.pixel_size_um, Some(10.0));
         assert!(metadata.ignored.is_empty(), "{:?}", metadata.ignored);
+    }
+
+    #[test]
+    fn a_place_by_gps_is_read_and_one_without_a_fix_is_noted() {
+        let three = |parts: [(u32, u32); 3]| {
+            let ratio = |(num, denom)| Rational { num, denom };
+            Value::Rational(parts.map(ratio).to_vec())
+        };
+        let place = |latitude| {
+            let bytes = written(&[
+                field(Tag::GPSLatitudeRef, ascii("S")),
+                field(Tag::GPSLatitude, latitude),
+                field(Tag::GPSLongitudeRef, ascii("W")),
+                field(Tag::GPSLongitude, three([(70, 1), (44, 1), (120, 10)])),
+                field(Tag::GPSAltitude, ratio(2700, 1)),
+            ]);
+            metadata(&bytes, 10)
+        };
+        let site = place(three([(30, 1), (14, 1), (27, 1)])).site.unwrap();
+        assert!((site.lat_deg() + 30.0 + 14.0 / 60.0 + 27.0 / 3600.0).abs() < 1e-9);
+        assert!((site.lon_deg() + 70.0 + 44.0 / 60.0 + 12.0 / 3600.0).abs() < 1e-9);
+        assert_eq!(site.height_m(), 2700.0);
+        let lost = place(three([(0, 0), (0, 0), (0, 0)]));
+        assert_eq!((lost.site, lost.ignored.len()), (None, 1));
     }
 
     #[test]

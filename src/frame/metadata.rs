@@ -1,6 +1,7 @@
 //! What a file says of how its frame was taken.
 
 use crate::epoch::ObservationDate;
+use crate::observer::Site;
 use std::ops::RangeInclusive;
 
 /// What a file says of how its frame was taken; nothing of it is checked against the image.
@@ -14,6 +15,10 @@ pub struct FrameMetadata {
     pub pixel_size_um: Option<f64>,
     /// Focal length of the optics, in millimetres.
     pub focal_length_mm: Option<f64>,
+    /// Where.
+    pub site: Option<Site>,
+    /// Zenith distance of where the mount believed it pointed, in degrees.
+    pub zenith_distance_deg: Option<f64>,
     /// What the file says and cannot be true: for each, what was found and what was expected. None of it is used.
     pub ignored: Vec<String>,
 }
@@ -41,6 +46,12 @@ pub(super) const FOCAL_LENGTH: Quantity = Quantity {
     name: "a focal length",
     unit: "mm",
     limits: 1.0..=100_000.0,
+};
+
+pub(super) const ALTITUDE: Quantity = Quantity {
+    name: "an altitude",
+    unit: "degrees",
+    limits: 0.0..=90.0,
 };
 
 impl FrameMetadata {
@@ -85,6 +96,25 @@ impl FrameMetadata {
             self.ignore(keyword, text, &expected);
         }
         date
+    }
+
+    /// The site at a latitude and a longitude in degrees, and a height in metres; noted with the `keywords` and the `text` that
+    /// it comes from where there is none.
+    pub(super) fn sensible_site(
+        &mut self,
+        keywords: &str,
+        text: &str,
+        place: Option<(f64, f64, f64)>,
+    ) -> Option<Site> {
+        let site = place.and_then(|(lat, lon, height)| Site::new(lat, lon, height).ok());
+        if site.is_none() {
+            self.ignore(
+                keywords,
+                text,
+                "a latitude from -90 to 90 and a longitude from -180 to 360 degrees",
+            );
+        }
+        site
     }
 
     fn ignore(&mut self, keyword: &str, text: &str, expected: &str) {

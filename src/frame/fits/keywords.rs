@@ -6,12 +6,19 @@
 //! - Pixels: XPIXSZ, which contains the binning; else PIXSIZE1 or PIXSIZE, which do not and are multiplied by
 //!   XBINNING; in micrometres.
 //! - Focal length: FOCALLEN, FOCAL or FOCLEN, in millimetres.
+//! - Site: SITELAT and SITELONG (height SITEELEV), LAT-OBS and LONG-OBS (ALT-OBS), or OBSGEO-B and OBSGEO-L (OBSGEO-H); degrees,
+//!   decimal or in sixtieths, north and east positive; metres.
+//! - Zenith distance: CENTALT or OBJCTALT, the altitude in degrees.
 //!
 //! Where the mount believed it pointed (OBJCTRA, RA, CRVAL1) is not used.
 
 use super::header::Header;
+use crate::angle::Angle;
 use crate::epoch::ObservationDate;
-use crate::frame::metadata::{EXPOSURE, FOCAL_LENGTH, FrameMetadata, PIXEL_SIZE, Quantity};
+use crate::frame::metadata::{
+    ALTITUDE, EXPOSURE, FOCAL_LENGTH, FrameMetadata, PIXEL_SIZE, Quantity,
+};
+use crate::observer::Site;
 
 /// What `headers` say; of a keyword in several the first counts.
 pub(super) fn metadata<'a>(headers: impl Iterator<Item = &'a Header<'a>>) -> FrameMetadata {
@@ -29,6 +36,9 @@ pub(super) fn metadata<'a>(headers: impl Iterator<Item = &'a Header<'a>>) -> Fra
     );
     metadata.pixel_size_um = keywords.pixel_size_um(&mut metadata);
     metadata.date = keywords.date(&mut metadata);
+    metadata.site = keywords.site(&mut metadata);
+    let altitude_deg = keywords.number(&mut metadata, &ALTITUDE, &["CENTALT", "OBJCTALT"]);
+    metadata.zenith_distance_deg = altitude_deg.map(|altitude| 90.0 - altitude);
     metadata
 }
 
@@ -60,6 +70,24 @@ impl Keywords<'_> {
             let unbinned = self.number(metadata, &PIXEL_SIZE, &["PIXSIZE1", "PIXSIZE"])?;
             let binning = self.0.iter().find_map(|header| header.number("XBINNING"));
             Some(unbinned * binning.filter(|b| (1.0..=64.0).contains(b)).unwrap_or(1.0))
+        })
+    }
+
+    fn site(&self, metadata: &mut FrameMetadata) -> Option<Site> {
+        [
+            ("SITELAT", "SITELONG", "SITEELEV"),
+            ("LAT-OBS", "LONG-OBS", "ALT-OBS"),
+            ("OBSGEO-B", "OBSGEO-L", "OBSGEO-H"),
+        ]
+        .into_iter()
+        .find_map(|(lat, lon, height)| {
+            let texts = self.text(lat).zip(self.text(lon))?;
+            let degrees = |text: &str| Angle::parse(text)?.in_degrees();
+            let height_m = self.0.iter().find_map(|header| header.number(height));
+            let place = degrees(&texts.0).zip(degrees(&texts.1));
+            let place = place.map(|(lat_deg, lon_deg)| (lat_deg, lon_deg, height_m.unwrap_or(0.0)));
+            let (keywords, text) = (format!("{lat}, {lon}"), format!("{}, {}", texts.0, texts.1));
+            metadata.sensible_site(&keywords, &text, place)
         })
     }
 

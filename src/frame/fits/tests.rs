@@ -379,6 +379,43 @@ fn dates_are_read_as_programs_have_written_them() {
 }
 
 #[test]
+fn the_site_is_read_in_all_its_keywords() {
+    for cards in [
+        &[
+            "SITELAT = '+52 13 12'",
+            "SITELONG= '04 25 12'",
+            "SITEELEV= 3",
+        ][..],
+        &["LAT-OBS = 52.22", "LONG-OBS= 4.42", "ALT-OBS = 3.0"],
+        &["OBSGEO-B= 52.22", "OBSGEO-L= 4.42", "OBSGEO-H= 3.0"],
+        &[
+            "SITELAT = '52:13:12'",
+            "SITELONG= '364:25:12'",
+            "LAT-OBS = 52.22",
+            "LONG-OBS= 4.42",
+            "ALT-OBS = 3",
+        ],
+    ] {
+        let site = metadata_of(cards).site.unwrap();
+        let [lat, lon] = [site.lat_deg() - 52.22, site.lon_deg() - 4.42];
+        assert!(lat.abs() < 1e-9 && lon.abs() < 1e-9, "{cards:?}");
+        assert_eq!(site.height_m(), 3.0);
+    }
+    let south_west = metadata_of(&["SITELAT = '-30 14 27'", "SITELONG= '-70 44 12.0'"]);
+    assert!(
+        south_west
+            .site
+            .is_some_and(|s| s.lat_deg() < -30.2 && s.lon_deg() < -70.7)
+    );
+    let wrong = metadata_of(&["SITELAT = 'here'", "SITELONG= '4'", "CENTALT = '-5'"]);
+    assert_eq!((wrong.site, wrong.zenith_distance_deg), (None, None));
+    assert!(wrong.ignored[0].starts_with("SITELAT, SITELONG is ignored: found here, 4"));
+    assert_eq!(wrong.ignored.len(), 2);
+    let altitude = metadata_of(&["OBJCTALT= '61.2'"]).zenith_distance_deg;
+    assert!((altitude.unwrap() - 28.8).abs() < 1e-9);
+}
+
+#[test]
 fn absurd_keywords_are_noted_and_the_next_is_taken() {
     let metadata = metadata_of(&[
         "DATE-OBS= '0000-00-00T00:00:00'",

@@ -2,7 +2,7 @@
 
 /// What a text says: a number, and in which form it stood.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Angle {
+pub enum Angle {
     /// A decimal number of some unit.
     Decimal(f64),
     /// Sixtieths of whatever the first number counts (`05:34:48.0`, `-00 24 00`).
@@ -21,8 +21,16 @@ const MARKS: [&[char]; 3] = [
 ];
 
 impl Angle {
+    /// The value in degrees, where a number without a unit counts degrees; `None` for hours.
+    pub fn in_degrees(self) -> Option<f64> {
+        match self {
+            Self::Decimal(value) | Self::Sixtieths(value) | Self::Degrees(value) => Some(value),
+            Self::Hours(_) => None,
+        }
+    }
+
     /// The angle in `text`; `None` if it is not one, or has sixtieths of sixty and more.
-    pub(super) fn parse(text: &str) -> Option<Self> {
+    pub fn parse(text: &str) -> Option<Self> {
         let text = text.trim();
         if let Some(number) = decimal(text) {
             return Some(Self::Decimal(number));
@@ -71,7 +79,7 @@ impl Angle {
 }
 
 /// A finite number of digits, without the words that `parse` would let pass.
-pub(super) fn decimal(text: &str) -> Option<f64> {
+pub fn decimal(text: &str) -> Option<f64> {
     let plain = text
         .bytes()
         .all(|byte| byte.is_ascii_digit() || b"+-.eE".contains(&byte));
