@@ -266,3 +266,27 @@ fn a_wrong_description_or_option_is_refused() {
     assert_eq!(ran.status, 1);
     assert!(ran.stderr.contains("no-such-camera.toml"), "{}", ran.stderr);
 }
+
+#[test]
+fn the_drawing_of_the_readme_has_the_zero_point_and_the_sky_that_it_was_drawn_with() {
+    let frame = common::fixture("cygnus/cygnus.tif");
+    let camera = common::fixture("cygnus/camera.toml");
+    let ran = Ran::new(
+        starpipe()
+            .args(["process", "--format", "json", "--exposure", "1"])
+            .args(["--extinction", "0", "--camera"])
+            .args([&camera, &frame]),
+    );
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    let report = &ran.reports()[0];
+    assert_eq!(notes(report), "");
+    // 250,000 electrons of V = 0; a sky of 100.
+    let drawn = 2.5 * 250e3f64.log10();
+    let predicted = number(report, "/prediction/zero_point_vmag");
+    assert!((predicted - drawn).abs() < 0.002, "{predicted}");
+    let off = number(report, "/prediction/zero_point_difference_mag").abs();
+    let sigma = number(report, "/prediction/zero_point_difference_sigma_mag");
+    assert!(off < ZERO_POINT_TOLERANCE_MAG + 3.0 * sigma, "{off}");
+    let sky = number(report, "/prediction/background_e");
+    assert!((sky - 100.0).abs() < 1.5, "{sky}");
+}
