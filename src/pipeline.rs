@@ -467,7 +467,7 @@ impl<'a> Pipeline<'a> {
             outcome: &outcome,
             photometry: photometry.as_ref(),
             observation: observation.as_ref(),
-            catalog: self.catalog(),
+            sky: &self.sky,
         };
         let comparison = description.and_then(|stated| found.against(stated, &knowledge));
         let contradictions = comparison.iter().flat_map(|held| &held.contradictions);

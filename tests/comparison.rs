@@ -140,6 +140,15 @@ fn a_frame_shows_what_its_camera_should_see() {
 }
 
 #[test]
+fn the_faintest_star_to_be_expected_is_sought_as_deep_as_the_camera_should_see() {
+    let night = Night::new();
+    // Such a lens would show three magnitudes more: what the frame shows must not bound what is expected.
+    night.describe(|text| with(&text, "aperture_mm", "100"));
+    let report = night.report(&["--exposure", EXPOSURE_S]);
+    assert!(number(&report, "/magnitude/faintest_difference_mag") < -1.5);
+}
+
+#[test]
 fn without_an_exposure_nothing_is_predicted_and_without_a_camera_neither() {
     let night = Night::new();
     let report = night.report(&[]);

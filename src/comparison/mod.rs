@@ -52,7 +52,7 @@ pub struct Seen<'a> {
     pub limit_vmag: Option<Estimate>,
     /// V magnitude of the faintest star identified.
     pub faintest_vmag: Option<f64>,
-    /// V magnitudes of the catalogue's stars in the field.
+    /// V magnitudes of the catalogue's stars in the field, to its end: what the frame shows does not bound what it should.
     pub field_vmag: &'a [f64],
 }
 

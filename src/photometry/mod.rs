@@ -56,18 +56,6 @@ pub struct FramePhotometry {
     pub exposure_s: Option<f64>,
     /// Which part of the stars is detected.
     pub completeness: Completeness,
-    /// V magnitudes of the catalogue's stars in the frame, to well below the faintest detection.
-    pub field_v_mag: Vec<f64>,
-}
-
-/// The brightness of the sky in V magnitudes on a square arcsecond. `zero_point_vmag`: V magnitude of a star that gives 1 ADU (or 1 ADU a
-/// second); `level_adu`: the sky's level above the bias and the dark current in one pixel, in ADU (or ADU a second);
-/// `pixel_arcsec2`: the area that a pixel sees.
-///
-/// `None` where the level is not above the bias.
-pub fn sky_mag_arcsec2(zero_point_vmag: f64, level_adu: f64, pixel_arcsec2: f64) -> Option<f64> {
-    let per_arcsec2 = level_adu / pixel_arcsec2;
-    (per_arcsec2 > 0.0).then(|| zero_point_vmag - 2.5 * per_arcsec2.log10())
 }
 
 /// The photometry of `frame` with the stars of `sky`.
@@ -107,7 +95,6 @@ pub fn measure(frame: &MeasuredFrame, sky: &Sky) -> FramePhotometry {
         })
         .collect();
     FramePhotometry {
-        field_v_mag: stars.iter().map(|star| star.v_mag).collect(),
         zero_point: zero_point::measure(&measured),
         exposure_s: frame.exposure_s,
         completeness,
@@ -153,19 +140,4 @@ fn is_constant_and_single(star: &Star) -> bool {
         StarFlags::BLENDED_POSITION,
     ];
     !unfit.into_iter().any(|flag| star.flags.contains(flag))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_sky_is_as_bright_as_the_star_whose_light_one_square_arcsecond_has() {
-        // 100 ADU in 4 square arcseconds are 25 in one: 3.4949 mag brighter than 1 ADU.
-        let found = sky_mag_arcsec2(20.0, 100.0, 4.0).unwrap();
-        assert!((found - 16.505_15).abs() < 1e-4, "{found}");
-        assert_eq!(sky_mag_arcsec2(20.0, 0.0, 4.0), None);
-        assert_eq!(sky_mag_arcsec2(20.0, -1.0, 4.0), None);
-        assert_eq!(sky_mag_arcsec2(20.0, f64::NAN, 4.0), None);
-    }
 }
