@@ -461,6 +461,7 @@ impl<'a> Pipeline<'a> {
             noise_adu: detections.noise_adu,
         };
         let found = Found {
+            detect: &config.detect,
             size_px: [frame.width, frame.height],
             background: &background,
             spot_sigma_px: detections.spot_sigma_px,

@@ -49,7 +49,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ),
     (
         "comparison",
-        &["units", "statistics", "sensor", "sensitivity"],
+        &["units", "statistics", "sensor", "detect", "sensitivity"],
     ),
     (
         "diagnosis",

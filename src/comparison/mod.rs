@@ -11,6 +11,7 @@
 //! Caveats: the sky's brightness, where it is not that of the whole spectrum of moonlight, shifts the predicted limit by
 //! less than its own error; a bias that is not the camera's shows as noise that does not fit.
 
+use crate::detect::DetectConfig;
 use crate::sensitivity::{
     Budget, Detector, Extinction, Faintest, Reading, Rule, Scenario, SkyBrightness,
 };
@@ -32,6 +33,8 @@ pub struct Description {
 /// What the frame shows; what is not known is `None`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen<'a> {
+    /// How stars were detected.
+    pub detect: DetectConfig,
     /// Columns and rows.
     pub size_px: [usize; 2],
     /// Exposure, in seconds.
@@ -106,7 +109,7 @@ pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
     let [width_px, height_px] = seen.size_px;
     (scenario.sensor.width_px, scenario.sensor.height_px) = (width_px, height_px);
     let budget = Budget::new(&scenario);
-    let detector = Detector::new(Rule::MatchedFilter, &scenario, &budget);
+    let detector = Detector::matched_filter(&seen.detect, &scenario, &budget);
     let peak = Detector::new(Rule::PeakPixel, &scenario, &budget);
     let gain_e_per_adu = scenario.sensor.gain_e_per_adu;
     let zero_point_vmag = budget.vmag_of(gain_e_per_adu, 1.0);
@@ -271,6 +274,7 @@ mod tests {
         let budget = Budget::new(&scenario);
         let sensor = &scenario.sensor;
         Seen {
+            detect: DetectConfig::default(),
             size_px: [752, 582],
             exposure_s: Some(0.04),
             level_adu: sensor.bias_adu + budget.background_e / sensor.gain_e_per_adu,

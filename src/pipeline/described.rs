@@ -2,6 +2,7 @@
 
 use super::{Background, Knowledge};
 use crate::comparison::{self, Comparison, Description, Seen};
+use crate::detect::DetectConfig;
 use crate::identify::{Identification, Outcome, Sky, View};
 use crate::observer::Observation;
 use crate::photometry::FramePhotometry;
@@ -10,6 +11,7 @@ use crate::units::DEG_PER_RAD;
 
 /// What was found of a frame.
 pub(super) struct Found<'a> {
+    pub detect: &'a DetectConfig,
     pub size_px: [usize; 2],
     pub background: &'a Background,
     pub spot_sigma_px: f64,
@@ -45,6 +47,7 @@ impl Found<'_> {
         comparison::compare(
             description,
             &Seen {
+                detect: self.detect.clone(),
                 size_px: self.size_px,
                 exposure_s: knowledge.exposure_s,
                 level_adu: self.background.level_adu,
