@@ -102,8 +102,9 @@ pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
     scenario.reading = Reading::Physical;
     let conditions = &mut scenario.conditions;
     conditions.exposure_s = exposure_s;
-    let known_zenith_deg = seen.zenith_distance_deg.or(description.zenith_distance_deg);
-    conditions.zenith_distance_deg = known_zenith_deg.filter(|z| *z < 90.0).unwrap_or(0.0);
+    let by_site_deg = seen.zenith_distance_deg.filter(|z| *z < 90.0);
+    let known_zenith_deg = description.zenith_distance_deg.or(by_site_deg);
+    conditions.zenith_distance_deg = known_zenith_deg.unwrap_or(0.0);
     conditions.extinction = description.extinction.unwrap_or(conditions.extinction);
     scenario.conditions.sky = SkyBrightness::MagArcsec2(sky_mag_arcsec2(&scenario, seen));
     let [width_px, height_px] = seen.size_px;
@@ -328,6 +329,24 @@ mod tests {
         let expected = held.faintest.unwrap().mean_vmag;
         let difference = frame.faintest_vmag.unwrap() - expected;
         assert!((value(held.faintest_difference_mag) - difference).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_zenith_distance_that_is_stated_counts_before_one_that_follows_and_none_is_below_the_horizon()
+     {
+        let reckoned = |stated: Option<f64>, by_site: Option<f64>| {
+            let (mut description, mut frame) = (description(), seen(16.0));
+            description.zenith_distance_deg = stated;
+            frame.zenith_distance_deg = by_site;
+            let held = compare(&description, &frame).unwrap();
+            let conditions = &held.scenario.conditions;
+            held.zenith_is_known
+                .then_some(conditions.zenith_distance_deg)
+        };
+        assert_eq!(reckoned(Some(30.0), Some(60.0)), Some(30.0));
+        assert_eq!(reckoned(None, Some(60.0)), Some(60.0));
+        assert_eq!(reckoned(None, Some(95.0)), None);
+        assert_eq!(reckoned(None, None), None);
     }
 
     #[test]
