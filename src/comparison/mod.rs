@@ -8,12 +8,13 @@
 //!    faintest star found is held against. The fitted limit is held against the predicted one.
 //! 4. Where the frame contradicts its description, a sentence says so.
 //!
-//! Caveats: the sky's brightness, where it is not that of the whole spectrum of moonlight, shifts the predicted limit by
-//! less than its own error; a bias that is not the camera's shows as noise that does not fit.
+//! Caveats: limits are those of stars of 5800 K, B−V 0.64; the zero point is that of stars of the colour that the measured one
+//! holds for. The sky's brightness, where it is not that of the whole spectrum of moonlight, shifts the predicted limit by less
+//! than its own error; a bias that is not the camera's shows as noise that does not fit.
 
 use crate::detect::DetectConfig;
 use crate::sensitivity::{
-    Budget, Detector, Extinction, Faintest, Reading, Rule, Scenario, SkyBrightness,
+    Budget, Detector, Extinction, Faintest, Rule, Scenario, SkyBrightness, temperature_k_of,
 };
 use crate::sensor::Sensor;
 use crate::statistics::Estimate;
@@ -51,6 +52,8 @@ pub struct Seen<'a> {
     pub zenith_distance_deg: Option<f64>,
     /// V magnitude of a star that gives one ADU a second.
     pub zero_point_vmag: Option<Estimate>,
+    /// B−V of the stars for which that holds, where known.
+    pub zero_point_bv_mag: Option<f64>,
     /// V magnitude at which half of the stars are found.
     pub limit_vmag: Option<Estimate>,
     /// V magnitude of the faintest star identified.
@@ -80,7 +83,7 @@ pub struct Comparison {
     pub sky_camera_mag_arcsec2: Option<f64>,
     /// The same with the measured zero point, and the error of that.
     pub sky_mag_arcsec2: Option<Estimate>,
-    /// V magnitude of a star that should give one ADU a second.
+    /// V magnitude of a star that should give one ADU a second, of the colour for which the measured zero point holds.
     pub zero_point_vmag: f64,
     /// Zero point measured minus predicted: above 0 the camera is more sensitive than described.
     pub zero_point_difference_mag: Option<Estimate>,
@@ -99,7 +102,6 @@ const NO_SKY_MAG: f64 = 35.0;
 pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
     let exposure_s = seen.exposure_s?;
     let mut scenario = Scenario::new(description.sensor.clone());
-    scenario.reading = Reading::Physical;
     let conditions = &mut scenario.conditions;
     conditions.exposure_s = exposure_s;
     let by_site_deg = seen.zenith_distance_deg.filter(|z| *z < 90.0);
@@ -112,8 +114,7 @@ pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
     let budget = Budget::new(&scenario);
     let detector = Detector::matched_filter(&seen.detect, &scenario, &budget);
     let peak = Detector::new(Rule::PeakPixel, &scenario, &budget);
-    let gain_e_per_adu = scenario.sensor.gain_e_per_adu;
-    let zero_point_vmag = budget.vmag_of(gain_e_per_adu, 1.0);
+    let zero_point_vmag = zero_point_vmag(&scenario, seen.zero_point_bv_mag);
     let limit_vmag = detector.vmag_at(0.5);
     let faintest = Faintest::among(seen.field_vmag.iter().copied(), &detector);
     let minus = |measured: Option<Estimate>, predicted: f64| {
@@ -157,6 +158,15 @@ pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
         contradictions,
         ..comparison
     })
+}
+
+/// V magnitude of a star of this B−V that gives one ADU a second: without a filter that depends on the colour.
+fn zero_point_vmag(scenario: &Scenario, bv_mag: Option<f64>) -> f64 {
+    let mut of_color = scenario.clone();
+    if let Some(bv_mag) = bv_mag {
+        of_color.conditions.star_temperature_k = temperature_k_of(bv_mag);
+    }
+    Budget::new(&of_color).vmag_of(scenario.sensor.gain_e_per_adu, 1.0)
 }
 
 /// The sky's brightness by the frame's level, else by its noise.
@@ -284,6 +294,7 @@ mod tests {
             pixel_scale_rad: Some(sensor.pixel_scale_rad()),
             zenith_distance_deg: None,
             zero_point_vmag: None,
+            zero_point_bv_mag: None,
             limit_vmag: None,
             faintest_vmag: None,
             field_vmag: &[],
@@ -329,6 +340,18 @@ mod tests {
         let expected = held.faintest.unwrap().mean_vmag;
         let difference = frame.faintest_vmag.unwrap() - expected;
         assert!((value(held.faintest_difference_mag) - difference).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_zero_point_is_that_of_stars_of_the_same_color() {
+        let zero_point = |bv_mag| {
+            let mut frame = seen(16.0);
+            frame.zero_point_bv_mag = bv_mag;
+            compare(&description(), &frame).unwrap().zero_point_vmag
+        };
+        // A black body of 5800 K has B−V 0.64. Red stars give more electrons than blue ones of the same V.
+        assert!((zero_point(None) - zero_point(Some(0.643))).abs() < 1e-3);
+        assert!(zero_point(Some(1.4)) > zero_point(Some(0.6)) + 0.1);
     }
 
     #[test]

@@ -59,6 +59,7 @@ impl Found<'_> {
                     value: zero.v_mag,
                     sigma: zero.sigma_mag,
                 }),
+                zero_point_bv_mag: zero_point.and_then(|zero| zero.bv_mag),
                 limit_vmag: limit.map(|limit| Estimate {
                     value: limit.v_mag,
                     sigma: limit.sigma_mag,

@@ -33,7 +33,7 @@ pub struct PredictionReport {
     pub peak_limit50_vmag: Option<f64>,
     /// Stars of the catalogue in the field that should be found.
     pub stars_expected: Option<f64>,
-    /// V magnitude of a star that should give one ADU a second.
+    /// V magnitude of a star that should give one ADU a second, of the B−V for which the measured zero point holds.
     pub zero_point_vmag: Option<f64>,
     /// The measured zero point minus that.
     pub zero_point_difference_mag: Option<f64>,

@@ -32,7 +32,7 @@ pub use completeness::{Detector, Rule};
 pub use conditions::{Conditions, Extinction, Reading, Scenario, ScenarioError, SkyBrightness};
 pub use faintest::Faintest;
 pub use figures::Figure;
-pub use light::{ILLUMINANCE_OF_MAG_0_LX, LUMINANCE_OF_MAG_0_CD_M2};
+pub use light::temperature_k_of;
 pub use parameters::{CONDITION_KEYS, Parameter, UnknownParameter};
 pub use prediction::{Completeness, DetectorReport, Prediction};
 pub use sweep::{Curve, Series, Spacing, Sweep, SweepError, curves};
