@@ -34,6 +34,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "catalog",
             "sensor",
             "sensitivity",
+            "statistics",
         ],
     ),
     (

@@ -34,5 +34,5 @@ pub use faintest::Faintest;
 pub use figures::Figure;
 pub use light::temperature_k_of;
 pub use parameters::{CONDITION_KEYS, Parameter, UnknownParameter};
-pub use prediction::{Completeness, DetectorReport, Prediction};
+pub use prediction::{CompletenessPoint, DetectorReport, Prediction};
 pub use sweep::{Curve, Series, Spacing, Sweep, SweepError, curves};
