@@ -111,6 +111,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "camera",
             "statistics",
             "identify",
+            "photometry",
             "pipeline",
         ],
     ),

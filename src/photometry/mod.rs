@@ -80,6 +80,7 @@ pub fn measure(frame: &MeasuredFrame, sky: &Sky) -> FramePhotometry {
         Ok(limit) => star.v_mag < limit.v_mag - COMPLETE_WIDTHS * limit.width_mag,
         Err(_) => snr >= SURE_SNR,
     };
+    let exposure_s = frame.exposure_s.unwrap_or(1.0);
     let measured: Vec<MeasuredStar> = stars
         .iter()
         .filter_map(|star| {
@@ -89,7 +90,7 @@ pub fn measure(frame: &MeasuredFrame, sky: &Sky) -> FramePhotometry {
             (star.is_clear && wanted && is_constant_and_single(known)).then(|| MeasuredStar {
                 v_mag: star.v_mag,
                 bv_mag: known.bv_mag.map(f64::from),
-                instrumental_mag: instrumental_mag(detection, frame.exposure_s),
+                instrumental_mag: instrumental_mag(detection.flux_adu / exposure_s),
                 sigma_mag: MAG_PER_RELATIVE / detection.snr,
             })
         })
@@ -101,9 +102,9 @@ pub fn measure(frame: &MeasuredFrame, sky: &Sky) -> FramePhotometry {
     }
 }
 
-/// −2.5 log10 of the flux, a second where the exposure is known.
-fn instrumental_mag(detection: &Detection, exposure_s: Option<f64>) -> f64 {
-    -2.5 * (detection.flux_adu / exposure_s.unwrap_or(1.0)).log10()
+/// −2.5 log10(`flux`), the magnitude with an unknown zero point.
+pub fn instrumental_mag(flux: f64) -> f64 {
+    -2.5 * flux.log10()
 }
 
 /// The V magnitude down to which the catalogue's stars are looked at: none much fainter can be detected.
@@ -111,7 +112,7 @@ fn depth_v_mag(frame: &MeasuredFrame, sky: &Sky) -> f64 {
     let sources = &frame.detections.sources;
     let matches = &frame.identification.matches;
     let v_mag = |catalog: usize| f64::from(sky.stars()[catalog].v_mag);
-    let mag = |source: &Detection| instrumental_mag(source, None);
+    let mag = |source: &Detection| instrumental_mag(source.flux_adu);
     let mut offsets: Vec<f64> = matches
         .iter()
         .map(|m| v_mag(m.catalog) - mag(&sources[m.observed]))
