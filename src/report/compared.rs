@@ -1,6 +1,7 @@
 //! What the camera should have seen, beside what it saw.
 
-use super::rounding::{finite, significant};
+use super::build::{AIRMASS_DECIMALS, HORIZON_DECIMALS};
+use super::rounding::{finite, significant, to_decimals};
 use super::text::labelled;
 use super::{FrameReport, MagnitudeReport, StarReport};
 use crate::comparison::Comparison;
@@ -69,9 +70,12 @@ impl PredictionReport {
         Self {
             camera: scenario.sensor.name.clone(),
             exposure_s: scenario.conditions.exposure_s,
-            zenith_distance_deg: scenario.conditions.zenith_distance_deg,
+            zenith_distance_deg: to_decimals(
+                scenario.conditions.zenith_distance_deg,
+                HORIZON_DECIMALS,
+            ),
             zenith_distance_known: compared.zenith_is_known,
-            airmass: budget.airmass,
+            airmass: to_decimals(budget.airmass, AIRMASS_DECIMALS),
             limit50_vmag: mag(compared.limit_vmag),
             limit90_vmag: mag(compared.limit90_vmag),
             peak_limit50_vmag: mag(compared.peak_limit_vmag),
