@@ -38,7 +38,7 @@ use crate::identify::{
     self, Hints, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Outcome, Photometry, Sky, StarField,
 };
 use crate::observer::{Observation, Site};
-use crate::photometry::{self, FramePhotometry, MeasuredFrame};
+use crate::photometry::{self, FramePhotometry, MeasuredFrame, instrumental_mag};
 use crate::sensor::Sensor;
 use crate::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use described::Found;
@@ -470,13 +470,14 @@ impl<'a> Pipeline<'a> {
             noise_adu: detections.noise_adu,
         };
         let found = Found {
+            detect: &config.detect,
             size_px: [frame.width, frame.height],
             background: &background,
             spot_sigma_px: detections.spot_sigma_px,
             outcome: &outcome,
             photometry: photometry.as_ref(),
             observation: observation.as_ref(),
-            catalog: self.catalog(),
+            sky: &self.sky,
         };
         let comparison = description.and_then(|stated| found.against(stated, &knowledge));
         let contradictions = comparison.iter().flat_map(|held| &held.contradictions);
@@ -707,11 +708,6 @@ pub fn star_field(
         stars: kept.iter().map(observed).collect(),
     };
     (field, kept)
-}
-
-/// −2.5 log10(`flux`), the magnitude with an unknown zero point.
-pub fn instrumental_mag(flux: f64) -> f64 {
-    -2.5 * flux.log10()
 }
 
 fn milliseconds_since(start: Instant) -> f64 {

@@ -117,12 +117,7 @@ fn a_frame_shows_what_its_camera_should_see() {
         "{sky}"
     );
     let magnitude = |key: &str| number(&report, &format!("/magnitude/{key}"));
-    let limit = magnitude("limit_difference_mag").abs();
-    let sigma = magnitude("limit_difference_sigma_mag");
-    assert!(
-        limit < LIMIT_TOLERANCE_MAG + 3.0 * sigma,
-        "{limit} ± {sigma}"
-    );
+    assert_limit_as_predicted(&report);
     let faintest = magnitude("faintest_difference_mag").abs();
     let spread = magnitude("expected_faintest_sigma_mag");
     assert!(faintest < 3.5 * spread, "{faintest} ± {spread}");
@@ -137,6 +132,34 @@ fn a_frame_shows_what_its_camera_should_see() {
         let levels = star[key].as_f64().unwrap();
         assert!((electrons / levels - gain).abs() < 0.1, "{key}");
     }
+}
+
+fn assert_limit_as_predicted(report: &Value) {
+    let magnitude = |key: &str| number(report, &format!("/magnitude/{key}"));
+    let limit = magnitude("limit_difference_mag").abs();
+    let sigma = magnitude("limit_difference_sigma_mag");
+    assert!(
+        limit < LIMIT_TOLERANCE_MAG + 3.0 * sigma,
+        "{limit} ± {sigma}"
+    );
+}
+
+#[test]
+fn the_limit_predicted_is_that_of_the_threshold_asked_for() {
+    let night = Night::new();
+    for threshold in [["--sigma", "10"], ["--false-alarms", "100"]] {
+        let arguments = [&["--exposure", EXPOSURE_S][..], &threshold].concat();
+        assert_limit_as_predicted(&night.report(&arguments));
+    }
+}
+
+#[test]
+fn the_faintest_star_to_be_expected_is_sought_as_deep_as_the_camera_should_see() {
+    let night = Night::new();
+    // Such a lens would show three magnitudes more: what the frame shows must not bound what is expected.
+    night.describe(|text| with(&text, "aperture_mm", "100"));
+    let report = night.report(&["--exposure", EXPOSURE_S]);
+    assert!(number(&report, "/magnitude/faintest_difference_mag") < -1.5);
 }
 
 #[test]

@@ -35,6 +35,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "catalog",
             "sensor",
             "sensitivity",
+            "statistics",
         ],
     ),
     (
@@ -50,7 +51,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ),
     (
         "comparison",
-        &["units", "statistics", "sensor", "sensitivity"],
+        &["units", "statistics", "sensor", "detect", "sensitivity"],
     ),
     (
         "diagnosis",
@@ -111,6 +112,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "camera",
             "statistics",
             "identify",
+            "photometry",
             "pipeline",
         ],
     ),

@@ -8,11 +8,13 @@
 //!    faintest star found is held against. The fitted limit is held against the predicted one.
 //! 4. Where the frame contradicts its description, a sentence says so.
 //!
-//! Caveats: the sky's brightness, where it is not that of the whole spectrum of moonlight, shifts the predicted limit by
-//! less than its own error; a bias that is not the camera's shows as noise that does not fit.
+//! Caveats: limits are those of stars of 5800 K, B−V 0.64; the zero point is that of stars of the colour that the measured one
+//! holds for. The sky's brightness, where it is not that of the whole spectrum of moonlight, shifts the predicted limit by less
+//! than its own error; a bias that is not the camera's shows as noise that does not fit.
 
+use crate::detect::DetectConfig;
 use crate::sensitivity::{
-    Budget, Detector, Extinction, Faintest, Reading, Rule, Scenario, SkyBrightness,
+    Budget, Detector, Extinction, Faintest, Rule, Scenario, SkyBrightness, temperature_k_of,
 };
 use crate::sensor::Sensor;
 use crate::statistics::Estimate;
@@ -32,6 +34,8 @@ pub struct Description {
 /// What the frame shows; what is not known is `None`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen<'a> {
+    /// How stars were detected.
+    pub detect: DetectConfig,
     /// Columns and rows.
     pub size_px: [usize; 2],
     /// Exposure, in seconds.
@@ -48,11 +52,13 @@ pub struct Seen<'a> {
     pub zenith_distance_deg: Option<f64>,
     /// V magnitude of a star that gives one ADU a second.
     pub zero_point_vmag: Option<Estimate>,
+    /// B−V of the stars for which that holds, where known.
+    pub zero_point_bv_mag: Option<f64>,
     /// V magnitude at which half of the stars are found.
     pub limit_vmag: Option<Estimate>,
     /// V magnitude of the faintest star identified.
     pub faintest_vmag: Option<f64>,
-    /// V magnitudes of the catalogue's stars in the field.
+    /// V magnitudes of the catalogue's stars in the field, to its end: what the frame shows does not bound what it should.
     pub field_vmag: &'a [f64],
 }
 
@@ -77,7 +83,7 @@ pub struct Comparison {
     pub sky_camera_mag_arcsec2: Option<f64>,
     /// The same with the measured zero point, and the error of that.
     pub sky_mag_arcsec2: Option<Estimate>,
-    /// V magnitude of a star that should give one ADU a second.
+    /// V magnitude of a star that should give one ADU a second, of the colour for which the measured zero point holds.
     pub zero_point_vmag: f64,
     /// Zero point measured minus predicted: above 0 the camera is more sensitive than described.
     pub zero_point_difference_mag: Option<Estimate>,
@@ -96,20 +102,19 @@ const NO_SKY_MAG: f64 = 35.0;
 pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
     let exposure_s = seen.exposure_s?;
     let mut scenario = Scenario::new(description.sensor.clone());
-    scenario.reading = Reading::Physical;
     let conditions = &mut scenario.conditions;
     conditions.exposure_s = exposure_s;
-    let known_zenith_deg = seen.zenith_distance_deg.or(description.zenith_distance_deg);
-    conditions.zenith_distance_deg = known_zenith_deg.filter(|z| *z < 90.0).unwrap_or(0.0);
+    let by_site_deg = seen.zenith_distance_deg.filter(|z| *z < 90.0);
+    let known_zenith_deg = description.zenith_distance_deg.or(by_site_deg);
+    conditions.zenith_distance_deg = known_zenith_deg.unwrap_or(0.0);
     conditions.extinction = description.extinction.unwrap_or(conditions.extinction);
     scenario.conditions.sky = SkyBrightness::MagArcsec2(sky_mag_arcsec2(&scenario, seen));
     let [width_px, height_px] = seen.size_px;
     (scenario.sensor.width_px, scenario.sensor.height_px) = (width_px, height_px);
     let budget = Budget::new(&scenario);
-    let detector = Detector::new(Rule::MatchedFilter, &scenario, &budget);
+    let detector = Detector::matched_filter(&seen.detect, &scenario, &budget);
     let peak = Detector::new(Rule::PeakPixel, &scenario, &budget);
-    let gain_e_per_adu = scenario.sensor.gain_e_per_adu;
-    let zero_point_vmag = budget.vmag_of(gain_e_per_adu, 1.0);
+    let zero_point_vmag = zero_point_vmag(&scenario, seen.zero_point_bv_mag);
     let limit_vmag = detector.vmag_at(0.5);
     let faintest = Faintest::among(seen.field_vmag.iter().copied(), &detector);
     let minus = |measured: Option<Estimate>, predicted: f64| {
@@ -153,6 +158,15 @@ pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
         contradictions,
         ..comparison
     })
+}
+
+/// V magnitude of a star of this B−V that gives one ADU a second: without a filter that depends on the colour.
+fn zero_point_vmag(scenario: &Scenario, bv_mag: Option<f64>) -> f64 {
+    let mut of_color = scenario.clone();
+    if let Some(bv_mag) = bv_mag {
+        of_color.conditions.star_temperature_k = temperature_k_of(bv_mag);
+    }
+    Budget::new(&of_color).vmag_of(scenario.sensor.gain_e_per_adu, 1.0)
 }
 
 /// The sky's brightness by the frame's level, else by its noise.
@@ -271,6 +285,7 @@ mod tests {
         let budget = Budget::new(&scenario);
         let sensor = &scenario.sensor;
         Seen {
+            detect: DetectConfig::default(),
             size_px: [752, 582],
             exposure_s: Some(0.04),
             level_adu: sensor.bias_adu + budget.background_e / sensor.gain_e_per_adu,
@@ -279,6 +294,7 @@ mod tests {
             pixel_scale_rad: Some(sensor.pixel_scale_rad()),
             zenith_distance_deg: None,
             zero_point_vmag: None,
+            zero_point_bv_mag: None,
             limit_vmag: None,
             faintest_vmag: None,
             field_vmag: &[],
@@ -324,6 +340,36 @@ mod tests {
         let expected = held.faintest.unwrap().mean_vmag;
         let difference = frame.faintest_vmag.unwrap() - expected;
         assert!((value(held.faintest_difference_mag) - difference).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_zero_point_is_that_of_stars_of_the_same_color() {
+        let zero_point = |bv_mag| {
+            let mut frame = seen(16.0);
+            frame.zero_point_bv_mag = bv_mag;
+            compare(&description(), &frame).unwrap().zero_point_vmag
+        };
+        // A black body of 5800 K has B−V 0.64. Red stars give more electrons than blue ones of the same V.
+        assert!((zero_point(None) - zero_point(Some(0.643))).abs() < 1e-3);
+        assert!(zero_point(Some(1.4)) > zero_point(Some(0.6)) + 0.1);
+    }
+
+    #[test]
+    fn a_zenith_distance_that_is_stated_counts_before_one_that_follows_and_none_is_below_the_horizon()
+     {
+        let reckoned = |stated: Option<f64>, by_site: Option<f64>| {
+            let (mut description, mut frame) = (description(), seen(16.0));
+            description.zenith_distance_deg = stated;
+            frame.zenith_distance_deg = by_site;
+            let held = compare(&description, &frame).unwrap();
+            let conditions = &held.scenario.conditions;
+            held.zenith_is_known
+                .then_some(conditions.zenith_distance_deg)
+        };
+        assert_eq!(reckoned(Some(30.0), Some(60.0)), Some(30.0));
+        assert_eq!(reckoned(None, Some(60.0)), Some(60.0));
+        assert_eq!(reckoned(None, Some(95.0)), None);
+        assert_eq!(reckoned(None, None), None);
     }
 
     #[test]

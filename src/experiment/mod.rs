@@ -33,7 +33,7 @@ use crate::frame::{Frame, FrameError};
 use crate::identify::Outcome;
 use crate::pipeline::{DateSource, FrameDate, Knowledge, Pipeline, Solution, SolveConfig};
 use crate::report::to_decimals;
-use crate::sensitivity::{Budget, Detector, Scenario};
+use crate::sensitivity::{Budget, Detector, Rule, Scenario};
 use crate::simulate::Pointing;
 use serde::Serialize;
 use simulated::Protocol;
@@ -135,7 +135,7 @@ pub fn run(
 ) -> Result<Run, ExperimentError> {
     let scenario = Scenario::of(published.preset);
     let budget = Budget::new(&scenario);
-    let detector = Detector::matched_filter(&scenario, &budget);
+    let detector = Detector::new(Rule::MatchedFilter, &scenario, &budget);
     let knowledge = Knowledge {
         date: Some(FrameDate {
             date: published.date,
@@ -169,7 +169,10 @@ pub fn run(
     };
     let protocol = Protocol {
         scenario: &scenario,
-        detectors: [&detector, &Detector::peak_pixel(&scenario, &budget)],
+        detectors: [
+            &detector,
+            &Detector::new(Rule::PeakPixel, &scenario, &budget),
+        ],
         pointing: &Pointing {
             camera: found.camera.clone(),
             icrs_to_camera: found.icrs_to_camera,

@@ -161,7 +161,7 @@ struct Light<'a> {
 impl<'a> Light<'a> {
     fn of(scenario: &Scenario, truth: &'a Truth) -> Self {
         const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
-        let variance_px2 = scenario.spot_sigma_px().powi(2) + PIXEL_VARIANCE_PX2;
+        let variance_px2 = scenario.sensor.spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2;
         let smear_px2 = scenario.conditions.motion_px.powi(2) / 12.0;
         Self {
             truth,

@@ -56,18 +56,6 @@ pub struct FramePhotometry {
     pub exposure_s: Option<f64>,
     /// Which part of the stars is detected.
     pub completeness: Completeness,
-    /// V magnitudes of the catalogue's stars in the frame, to well below the faintest detection.
-    pub field_v_mag: Vec<f64>,
-}
-
-/// The brightness of the sky in V magnitudes on a square arcsecond. `zero_point_vmag`: V magnitude of a star that gives 1 ADU (or 1 ADU a
-/// second); `level_adu`: the sky's level above the bias and the dark current in one pixel, in ADU (or ADU a second);
-/// `pixel_arcsec2`: the area that a pixel sees.
-///
-/// `None` where the level is not above the bias.
-pub fn sky_mag_arcsec2(zero_point_vmag: f64, level_adu: f64, pixel_arcsec2: f64) -> Option<f64> {
-    let per_arcsec2 = level_adu / pixel_arcsec2;
-    (per_arcsec2 > 0.0).then(|| zero_point_vmag - 2.5 * per_arcsec2.log10())
 }
 
 /// The photometry of `frame` with the stars of `sky`.
@@ -92,6 +80,7 @@ pub fn measure(frame: &MeasuredFrame, sky: &Sky) -> FramePhotometry {
         Ok(limit) => star.v_mag < limit.v_mag - COMPLETE_WIDTHS * limit.width_mag,
         Err(_) => snr >= SURE_SNR,
     };
+    let exposure_s = frame.exposure_s.unwrap_or(1.0);
     let measured: Vec<MeasuredStar> = stars
         .iter()
         .filter_map(|star| {
@@ -101,22 +90,21 @@ pub fn measure(frame: &MeasuredFrame, sky: &Sky) -> FramePhotometry {
             (star.is_clear && wanted && is_constant_and_single(known)).then(|| MeasuredStar {
                 v_mag: star.v_mag,
                 bv_mag: known.bv_mag.map(f64::from),
-                instrumental_mag: instrumental_mag(detection, frame.exposure_s),
+                instrumental_mag: instrumental_mag(detection.flux_adu / exposure_s),
                 sigma_mag: MAG_PER_RELATIVE / detection.snr,
             })
         })
         .collect();
     FramePhotometry {
-        field_v_mag: stars.iter().map(|star| star.v_mag).collect(),
         zero_point: zero_point::measure(&measured),
         exposure_s: frame.exposure_s,
         completeness,
     }
 }
 
-/// −2.5 log10 of the flux, a second where the exposure is known.
-fn instrumental_mag(detection: &Detection, exposure_s: Option<f64>) -> f64 {
-    -2.5 * (detection.flux_adu / exposure_s.unwrap_or(1.0)).log10()
+/// −2.5 log10(`flux`), the magnitude with an unknown zero point.
+pub fn instrumental_mag(flux: f64) -> f64 {
+    -2.5 * flux.log10()
 }
 
 /// The V magnitude down to which the catalogue's stars are looked at: none much fainter can be detected.
@@ -124,7 +112,7 @@ fn depth_v_mag(frame: &MeasuredFrame, sky: &Sky) -> f64 {
     let sources = &frame.detections.sources;
     let matches = &frame.identification.matches;
     let v_mag = |catalog: usize| f64::from(sky.stars()[catalog].v_mag);
-    let mag = |source: &Detection| instrumental_mag(source, None);
+    let mag = |source: &Detection| instrumental_mag(source.flux_adu);
     let mut offsets: Vec<f64> = matches
         .iter()
         .map(|m| v_mag(m.catalog) - mag(&sources[m.observed]))
@@ -153,19 +141,4 @@ fn is_constant_and_single(star: &Star) -> bool {
         StarFlags::BLENDED_POSITION,
     ];
     !unfit.into_iter().any(|flag| star.flags.contains(flag))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_sky_is_as_bright_as_the_star_whose_light_one_square_arcsecond_has() {
-        // 100 ADU in 4 square arcseconds are 25 in one: 3.4949 mag brighter than 1 ADU.
-        let found = sky_mag_arcsec2(20.0, 100.0, 4.0).unwrap();
-        assert!((found - 16.505_15).abs() < 1e-4, "{found}");
-        assert_eq!(sky_mag_arcsec2(20.0, 0.0, 4.0), None);
-        assert_eq!(sky_mag_arcsec2(20.0, -1.0, 4.0), None);
-        assert_eq!(sky_mag_arcsec2(20.0, f64::NAN, 4.0), None);
-    }
 }

@@ -1,9 +1,9 @@
 //! A frame that is found, against the camera that it is said to be of.
 
 use super::{Background, Knowledge};
-use crate::catalog::Catalog;
 use crate::comparison::{self, Comparison, Description, Seen};
-use crate::identify::Outcome;
+use crate::detect::DetectConfig;
+use crate::identify::{Identification, Outcome, Sky, View};
 use crate::observer::Observation;
 use crate::photometry::FramePhotometry;
 use crate::statistics::Estimate;
@@ -11,13 +11,14 @@ use crate::units::DEG_PER_RAD;
 
 /// What was found of a frame.
 pub(super) struct Found<'a> {
+    pub detect: &'a DetectConfig,
     pub size_px: [usize; 2],
     pub background: &'a Background,
     pub spot_sigma_px: f64,
     pub outcome: &'a Outcome,
     pub photometry: Option<&'a FramePhotometry>,
     pub observation: Option<&'a Observation>,
-    pub catalog: &'a Catalog,
+    pub sky: &'a Sky<'a>,
 }
 
 impl Found<'_> {
@@ -34,16 +35,19 @@ impl Found<'_> {
             Outcome::Identified(found) => Some(found),
             Outcome::NotIdentified(_) => None,
         };
-        let v_mag = |catalog: usize| f64::from(self.catalog.stars()[catalog].v_mag);
+        let v_mag = |catalog: usize| f64::from(self.sky.stars()[catalog].v_mag);
         let matched = identification.map(|found| found.matches.iter().map(|m| v_mag(m.catalog)));
         let zenith_deg = self.observation.map(|seen| {
             let apparent = seen.apparent.as_ref();
             let zenith_rad = apparent.map_or(seen.zenith_distance_rad, |a| a.zenith_distance_rad);
             zenith_rad * DEG_PER_RAD
         });
+        let field_vmag =
+            identification.map_or(Vec::new(), |found| self.field_vmag(found, knowledge));
         comparison::compare(
             description,
             &Seen {
+                detect: self.detect.clone(),
                 size_px: self.size_px,
                 exposure_s: knowledge.exposure_s,
                 level_adu: self.background.level_adu,
@@ -55,13 +59,28 @@ impl Found<'_> {
                     value: zero.v_mag,
                     sigma: zero.sigma_mag,
                 }),
+                zero_point_bv_mag: zero_point.and_then(|zero| zero.bv_mag),
                 limit_vmag: limit.map(|limit| Estimate {
                     value: limit.v_mag,
                     sigma: limit.sigma_mag,
                 }),
                 faintest_vmag: matched.and_then(|matched| matched.reduce(f64::max)),
-                field_vmag: photometry.map_or(&[], |measured| &measured.field_v_mag),
+                field_vmag: &field_vmag,
             },
         )
+    }
+
+    /// The V magnitudes of all of the catalogue's stars in the frame.
+    fn field_vmag(&self, found: &Identification, knowledge: &Knowledge) -> Vec<f64> {
+        let view = View {
+            camera: &found.camera,
+            icrs_to_camera: &found.icrs_to_camera,
+            years_since_j2000: knowledge.years_since_j2000(),
+        };
+        let stars = view.stars_to(self.sky, self.sky.faintest_v_mag());
+        let inside = stars
+            .iter()
+            .filter(|star| found.camera.contains(&star.pixel));
+        inside.map(|star| f64::from(star.v_mag)).collect()
     }
 }

@@ -22,7 +22,9 @@ const PIXEL_DECIMALS: i32 = 4;
 /// Decimals of a direction in degrees: 0.4 milliarcseconds.
 const DIRECTION_DECIMALS: i32 = 7;
 /// Decimals of an angle in the observer's sky, in degrees: 0.4″, and what is left out is more.
-const HORIZON_DECIMALS: i32 = 4;
+pub(super) const HORIZON_DECIMALS: i32 = 4;
+/// Decimals of an airmass.
+pub(super) const AIRMASS_DECIMALS: i32 = 4;
 /// Decimals of a year: an hour.
 const YEAR_DECIMALS: i32 = 4;
 /// Decimals of a magnitude.
@@ -115,7 +117,9 @@ fn observation(seen: &Observation) -> ObservationReport {
         zenith_distance_deg: deg(seen.zenith_distance_rad),
         apparent_zenith_distance_deg: seen.apparent.map(|a| deg(a.zenith_distance_rad)),
         azimuth_deg: turn_deg(seen.azimuth_rad * DEG_PER_RAD, HORIZON_DECIMALS),
-        airmass: seen.apparent.map(|a| to_decimals(a.airmass, 4)),
+        airmass: seen
+            .apparent
+            .map(|a| to_decimals(a.airmass, AIRMASS_DECIMALS)),
     }
 }
 

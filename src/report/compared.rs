@@ -1,6 +1,7 @@
 //! What the camera should have seen, beside what it saw.
 
-use super::rounding::{finite, significant};
+use super::build::{AIRMASS_DECIMALS, HORIZON_DECIMALS};
+use super::rounding::{finite, significant, to_decimals};
 use super::text::labelled;
 use super::{FrameReport, MagnitudeReport, StarReport};
 use crate::comparison::Comparison;
@@ -33,7 +34,7 @@ pub struct PredictionReport {
     pub peak_limit50_vmag: Option<f64>,
     /// Stars of the catalogue in the field that should be found.
     pub stars_expected: Option<f64>,
-    /// V magnitude of a star that should give one ADU a second.
+    /// V magnitude of a star that should give one ADU a second, of the B−V for which the measured zero point holds.
     pub zero_point_vmag: Option<f64>,
     /// The measured zero point minus that.
     pub zero_point_difference_mag: Option<f64>,
@@ -69,9 +70,12 @@ impl PredictionReport {
         Self {
             camera: scenario.sensor.name.clone(),
             exposure_s: scenario.conditions.exposure_s,
-            zenith_distance_deg: scenario.conditions.zenith_distance_deg,
+            zenith_distance_deg: to_decimals(
+                scenario.conditions.zenith_distance_deg,
+                HORIZON_DECIMALS,
+            ),
             zenith_distance_known: compared.zenith_is_known,
-            airmass: budget.airmass,
+            airmass: to_decimals(budget.airmass, AIRMASS_DECIMALS),
             limit50_vmag: mag(compared.limit_vmag),
             limit90_vmag: mag(compared.limit90_vmag),
             peak_limit50_vmag: mag(compared.peak_limit_vmag),

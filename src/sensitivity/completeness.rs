@@ -40,7 +40,8 @@ pub struct Detector {
     pub rule: Rule,
     /// The threshold, in standard deviations of the (filtered) noise without a star.
     pub threshold_sigma: f64,
-    /// False detections in a million pixels without a star.
+    /// False detections in a million pixels without a star; of a matched filter those asked for, which a threshold that is given
+    /// overrides.
     pub false_alarms_per_mpx: f64,
     /// The magnitudes at which each trial's star is just found, faintest first.
     critical_vmag: Vec<f64>,
@@ -53,16 +54,20 @@ const SIGNS: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]
 const SEED: u64 = 1;
 
 impl Detector {
-    /// The detector that goes by `rule`.
+    /// The detector that goes by `rule`, with the false alarms and the signal-to-noise ratio of the scenario.
     pub fn new(rule: Rule, scenario: &Scenario, budget: &Budget) -> Self {
+        let config = DetectConfig {
+            false_alarms_per_mpx: scenario.conditions.false_alarms_per_mpx,
+            ..DetectConfig::default()
+        };
         match rule {
             Rule::PeakPixel => Self::peak_pixel(scenario, budget),
-            Rule::MatchedFilter => Self::matched_filter(scenario, budget),
+            Rule::MatchedFilter => Self::matched_filter(&config, scenario, budget),
         }
     }
 
     /// The paper's rule.
-    pub fn peak_pixel(scenario: &Scenario, budget: &Budget) -> Self {
+    fn peak_pixel(scenario: &Scenario, budget: &Budget) -> Self {
         let threshold_e = budget.star_e;
         let spot = Spot::of(scenario);
         let filter = Filter {
@@ -81,15 +86,11 @@ impl Detector {
         }
     }
 
-    /// The detector as built.
-    pub fn matched_filter(scenario: &Scenario, budget: &Budget) -> Self {
+    /// The detector as built, with the threshold of `config`; the spot is the scenario's.
+    pub fn matched_filter(config: &DetectConfig, scenario: &Scenario, budget: &Budget) -> Self {
         let spot = Spot::of(scenario);
-        let config = DetectConfig {
-            false_alarms_per_mpx: scenario.conditions.false_alarms_per_mpx,
-            ..DetectConfig::default()
-        };
         let size = (scenario.sensor.width_px, scenario.sensor.height_px);
-        let model = FilterModel::new(&config, size, spot.round_sigma_px());
+        let model = FilterModel::new(config, size, spot.round_sigma_px());
         let filter = Filter {
             half_kernel: model.half_kernel,
             threshold_e: model.threshold_sigma * budget.background_noise_e,
@@ -185,6 +186,20 @@ struct Filter {
     noise_e: f64,
     /// How far from the star the largest answer is looked for.
     reach_px: usize,
+}
+
+impl Filter {
+    /// Its answer at `middle` along one axis of `values`.
+    fn at(&self, middle: usize, values: impl Fn(usize) -> f64) -> f64 {
+        let weighted = |(distance, weight): (usize, &f64)| {
+            let both = match distance {
+                0 => values(middle),
+                _ => values(middle - distance) + values(middle + distance),
+            };
+            weight * both
+        };
+        self.half_kernel.iter().enumerate().map(weighted).sum()
+    }
 }
 
 /// The magnitude at which the star of each trial is just found, faintest first.
@@ -291,40 +306,16 @@ impl<'a> Trial<'a> {
 
     /// The filter's answer at `at` pixels from the middle of `values`, which is its element `half`.
     fn filtered(&self, values: &[f64], half: usize, at: isize) -> f64 {
-        let middle = half.wrapping_add_signed(at);
-        let weighted = |(distance, weight): (usize, &f64)| {
-            let both = match distance {
-                0 => values[middle],
-                _ => values[middle - distance] + values[middle + distance],
-            };
-            weight * both
-        };
         self.filter
-            .half_kernel
-            .iter()
-            .enumerate()
-            .map(weighted)
-            .sum()
+            .at(half.wrapping_add_signed(at), |place| values[place])
     }
 
     /// Filters the rows along y.
     fn column_sum(&self, kind: usize, column: usize, row: isize) -> f64 {
         let width = 2 * self.reach[0] + 1;
         let middle = self.half[1].wrapping_add_signed(row);
-        let at = |row: usize| self.rows[kind][row * width + column];
-        let weighted = |(distance, weight): (usize, &f64)| {
-            let both = match distance {
-                0 => at(middle),
-                _ => at(middle - distance) + at(middle + distance),
-            };
-            weight * both
-        };
         self.filter
-            .half_kernel
-            .iter()
-            .enumerate()
-            .map(weighted)
-            .sum()
+            .at(middle, |row| self.rows[kind][row * width + column])
     }
 }
 
@@ -366,8 +357,8 @@ mod tests {
         let scenario = scenario(&[]);
         let budget = Budget::new(&scenario);
         for detector in [
-            Detector::peak_pixel(&scenario, &budget),
-            Detector::matched_filter(&scenario, &budget),
+            Detector::new(Rule::PeakPixel, &scenario, &budget),
+            Detector::new(Rule::MatchedFilter, &scenario, &budget),
         ] {
             let limit = detector.vmag_at(0.5);
             assert!((detector.probability(limit) - 0.5).abs() < 1e-3);
@@ -385,7 +376,7 @@ mod tests {
         // SNR = F √ΣP² / n at the threshold u; the largest of several pixels is some 0.05 to 0.1 mag better.
         let scenario = scenario(&[("spot_sigma_px", 1.5), ("sky_mag_arcsec2", 14.0)]);
         let budget = Budget::new(&scenario);
-        let detector = Detector::matched_filter(&scenario, &budget);
+        let detector = Detector::new(Rule::MatchedFilter, &scenario, &budget);
         // ΣP² ≈ 1/(4π(σ² + 1/12)), see Mortensen et al. 2010.
         let neff = 4.0 * std::f64::consts::PI * (1.5f64.powi(2) + 1.0 / 12.0);
         let flux_e = detector.threshold_sigma * budget.background_noise_e * neff.sqrt();
@@ -398,8 +389,8 @@ mod tests {
     fn the_filter_sees_fainter_stars_than_the_brightest_pixel() {
         let scenario = scenario(&[]);
         let budget = Budget::new(&scenario);
-        let peak = Detector::peak_pixel(&scenario, &budget);
-        let filter = Detector::matched_filter(&scenario, &budget);
+        let peak = Detector::new(Rule::PeakPixel, &scenario, &budget);
+        let filter = Detector::new(Rule::MatchedFilter, &scenario, &budget);
         assert!(filter.vmag_at(0.5) > peak.vmag_at(0.5) + 0.5);
         // Threshold and false alarms of the peak rule are one number.
         let again = 1e6 * normal_cdf(-peak.threshold_sigma);
@@ -411,7 +402,7 @@ mod tests {
         let limit = |smear: f64| {
             let scenario = scenario(&[("motion_px", smear)]);
             let budget = Budget::new(&scenario);
-            Detector::matched_filter(&scenario, &budget).vmag_at(0.5)
+            Detector::new(Rule::MatchedFilter, &scenario, &budget).vmag_at(0.5)
         };
         let [still, short, long] = [0.0, 1.0, 6.0].map(limit);
         assert!(still - short < 0.1 && still > short, "{still} {short}");

@@ -216,11 +216,6 @@ impl Scenario {
         }
     }
 
-    /// Standard deviation of a spot without smear, in pixels.
-    pub fn spot_sigma_px(&self) -> f64 {
-        self.sensor.spot_sigma_px
-    }
-
     /// Checks every parameter against its limits, and the camera's against each other.
     ///
     /// # Errors

@@ -71,14 +71,14 @@ impl Faintest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sensitivity::{Budget, Scenario};
+    use crate::sensitivity::{Budget, Rule, Scenario};
     use crate::sensor::Preset;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
     fn detector() -> Detector {
         let scenario = Scenario::of(Preset::Experiment1);
-        Detector::matched_filter(&scenario, &Budget::new(&scenario))
+        Detector::new(Rule::MatchedFilter, &scenario, &Budget::new(&scenario))
     }
 
     /// So many stars brighter than the limit, ten times as many for two magnitudes.

@@ -4,7 +4,7 @@ use crate::sensor::Response;
 
 /// Illuminance of a star of V = 0 above the atmosphere, in lx.
 #[doc(alias = "E_0")]
-pub const ILLUMINANCE_OF_MAG_0_LX: f64 = 2.65e-6;
+pub(super) const ILLUMINANCE_OF_MAG_0_LX: f64 = 2.65e-6;
 /// Photons of a star of V = 0 above the atmosphere in the paper's band, per second and m² (eq. 4).
 #[doc(alias = "Phi_0")]
 pub(super) const PAPER_PHOTONS_OF_MAG_0: f64 = 5e10;
@@ -13,7 +13,7 @@ pub(super) const PAPER_BAND_NM: (f64, f64) = (360.0, 780.0);
 /// The paper's ratio of brightness between magnitudes (eqs. 1, 5).
 pub(super) const PAPER_MAG_RATIO: f64 = 2.512;
 /// Luminance of a sky of one star of V = 0 in each square arcsecond, in cd/m².
-pub const LUMINANCE_OF_MAG_0_CD_M2: f64 = 10.8e4;
+const LUMINANCE_OF_MAG_0_CD_M2: f64 = 10.8e4;
 
 /// Photons of a star of V = 0 above the atmosphere at [`FLUX_NM`], per second, m² and nm: 1005 per second, cm² and Å.
 ///
@@ -42,6 +42,16 @@ pub(super) fn photons_of_mag_0(wavelength_nm: f64, temperature_k: f64) -> f64 {
         nm.powi(-4) / exponent.exp_m1()
     };
     PHOTONS_OF_MAG_0 * photons(wavelength_nm) / photons(FLUX_NM)
+}
+
+/// The temperature in kelvin of the black body that has this B−V, in magnitudes; beyond the colours that stars have, that of the
+/// last of them.
+///
+/// # Reference
+/// Ballesteros 2012, EPL 97, 34008, eq. 14: within 2 % of stars' effective temperatures.
+pub fn temperature_k_of(bv_mag: f64) -> f64 {
+    let scaled = 0.92 * bv_mag.clamp(-0.35, 2.0);
+    4600.0 * (1.0 / (scaled + 1.7) + 1.0 / (scaled + 0.62))
 }
 
 /// The sensitivity of the eye by wavelength.
@@ -85,6 +95,24 @@ mod tests {
         }
         // An energy of 3.63e-9 erg at 550 nm, hc/λ = 3.6117e-12 erg: 1005 photons.
         assert!((3.63e-9 / 3.6117e-12 - 1005.0f64).abs() < 1.0);
+    }
+
+    #[test]
+    fn the_sun_is_as_hot_as_its_colour_says_and_no_colour_is_beyond_the_formula() {
+        // Effective temperatures: the Sun (B−V 0.65), Vega (0.00) and a K5 dwarf (1.15).
+        for (bv_mag, expected_k, tolerance_k) in [
+            (0.65, 5772.0, 60.0),
+            (0.0, 10_000.0, 400.0),
+            (1.15, 4440.0, 150.0),
+        ] {
+            let found_k = temperature_k_of(bv_mag);
+            assert!(
+                (found_k - expected_k).abs() < tolerance_k,
+                "{bv_mag}: {found_k}"
+            );
+        }
+        let ends = [-9.0, 9.0].map(temperature_k_of);
+        assert!(ends[0] < 25_000.0 && ends[1] > 3000.0, "{ends:?}");
     }
 
     #[test]

@@ -50,12 +50,12 @@ pub struct DetectorReport {
     /// False detections in a million pixels without a star.
     pub false_alarms_per_mpx: f64,
     /// The part of the stars that is found, by V magnitude.
-    pub completeness: Vec<Completeness>,
+    pub completeness: Vec<CompletenessPoint>,
 }
 
 /// A point of a curve of completeness.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Completeness {
+pub struct CompletenessPoint {
     /// V magnitude of the stars.
     pub vmag: f64,
     /// The part of them that is found.
@@ -76,7 +76,7 @@ impl DetectorReport {
         let point = |step: i32| {
             // Divided, and not multiplied, so that 8.3 is 8.3.
             let vmag = (middle + f64::from(step)) / (1.0 / CURVE_STEP_MAG).round();
-            Completeness {
+            CompletenessPoint {
                 vmag,
                 part: detector.probability(vmag),
             }

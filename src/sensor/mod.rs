@@ -101,11 +101,6 @@ impl Sensor {
     pub fn full_scale_adu(&self) -> f64 {
         2f64.powi(self.bits as i32) - 1.0
     }
-
-    /// The grey level at which a pixel is saturated: it is full, or the scale ends.
-    pub fn saturation_adu(&self) -> f64 {
-        (self.bias_adu + self.full_well_e / self.gain_e_per_adu).min(self.full_scale_adu())
-    }
 }
 
 #[cfg(test)]
@@ -126,17 +121,5 @@ mod tests {
         let sensor = Preset::Experiment1.sensor();
         assert!((sensor.pixel_solid_angle_sr() / 2.788_28e-9 - 1.0).abs() < 1e-5);
         assert!((sensor.aperture_area_m2() / 7.853_98e-3 - 1.0).abs() < 1e-6);
-    }
-
-    #[test]
-    fn a_pixel_saturates_where_it_is_full_or_the_scale_ends() {
-        let mut sensor = Preset::Experiment1.sensor();
-        sensor.bits = 12;
-        sensor.bias_adu = 100.0;
-        sensor.gain_e_per_adu = 10.0;
-        sensor.full_well_e = 20_000.0;
-        assert_eq!(sensor.saturation_adu(), 2100.0);
-        sensor.full_well_e = 100_000.0;
-        assert_eq!(sensor.saturation_adu(), 4095.0);
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::coords::PixelPoint;
 use crate::sensitivity::Scenario;
-use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
+use crate::statistics::{normal_cdf, normal_density};
 use std::ops::Range;
 
 /// Beyond so many standard deviations there is less than 10⁻¹⁴ of the light.
@@ -23,7 +23,7 @@ pub(super) struct Spot {
 impl Spot {
     pub(super) fn of(scenario: &Scenario) -> Self {
         Self {
-            sigma_px: scenario.spot_sigma_px(),
+            sigma_px: scenario.sensor.spot_sigma_px,
             smear_px: scenario.conditions.motion_px,
             columns: Vec::new(),
         }
@@ -76,7 +76,7 @@ fn share(offset_px: f64, sigma_px: f64, smear_px: f64) -> f64 {
     };
     let smear = smear_px / sigma_px;
     if smear < LEAST_SMEAR {
-        return between(&cumulative);
+        return between(&normal_cdf);
     }
     let smeared = |z: f64| {
         (integrated_cumulative(z + smear / 2.0) - integrated_cumulative(z - smear / 2.0)) / smear
@@ -84,15 +84,9 @@ fn share(offset_px: f64, sigma_px: f64, smear_px: f64) -> f64 {
     between(&smeared)
 }
 
-/// Φ(z), the part of a normal distribution below z.
-fn cumulative(z: f64) -> f64 {
-    0.5 * libm::erfc(-z * FRAC_1_SQRT_2)
-}
-
 /// The integral of Φ from −∞ to z: z Φ(z) + φ(z).
 fn integrated_cumulative(z: f64) -> f64 {
-    let density = (-0.5 * z * z).exp() / (SQRT_2 * PI.sqrt());
-    z * cumulative(z) + density
+    z * normal_cdf(z) + normal_density(z)
 }
 
 #[cfg(test)]
