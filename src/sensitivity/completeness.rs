@@ -83,13 +83,18 @@ impl Detector {
 
     /// The detector as built.
     pub fn matched_filter(scenario: &Scenario, budget: &Budget) -> Self {
-        let spot = Spot::of(scenario);
         let config = DetectConfig {
             false_alarms_per_mpx: scenario.conditions.false_alarms_per_mpx,
             ..DetectConfig::default()
         };
+        Self::as_configured(&config, scenario, budget)
+    }
+
+    /// The detector with the threshold that follows from `config`.
+    pub fn as_configured(config: &DetectConfig, scenario: &Scenario, budget: &Budget) -> Self {
+        let spot = Spot::of(scenario);
         let size = (scenario.sensor.width_px, scenario.sensor.height_px);
-        let model = FilterModel::new(&config, size, spot.round_sigma_px());
+        let model = FilterModel::new(config, size, spot.round_sigma_px());
         let filter = Filter {
             half_kernel: model.half_kernel,
             threshold_e: model.threshold_sigma * budget.background_noise_e,
@@ -111,6 +116,7 @@ impl Detector {
         // The trials whose limit is at least as faint; between two of them a straight line.
         let found = trials.partition_point(|limit| *limit >= v_mag);
         let between = match (found.checked_sub(1).map(|i| trials[i]), trials.get(found)) {
+            (Some(fainter), Some(_)) if fainter.is_infinite() => 1.0,
             (Some(fainter), Some(brighter)) if fainter > *brighter => {
                 (fainter - v_mag) / (fainter - brighter)
             }
@@ -120,7 +126,8 @@ impl Detector {
         (count / trials.len() as f64).clamp(0.0, 1.0)
     }
 
-    /// The V magnitude at which a star is found with this probability: 0.5 for the limit.
+    /// The V magnitude at which a star is found with this probability: 0.5 for the limit. Not finite where the noise alone
+    /// is found more often.
     pub fn vmag_at(&self, probability: f64) -> f64 {
         let last = self.critical_vmag.len() - 1;
         let place = probability * self.critical_vmag.len() as f64 - 0.5;

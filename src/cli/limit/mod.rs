@@ -159,13 +159,16 @@ fn faintest(scenario: &Scenario, prediction: &Prediction) -> Option<Faintest> {
 
 /// Some parameters count in one reading only, or not for the brightest pixel.
 fn warn_if_flat(parameter: &str, rows: &[Row]) {
-    let limit = |row: &Row| row.prediction.limit_vmag;
+    let limits = |row: &Row| {
+        let prediction = &row.prediction;
+        (prediction.limit_vmag, prediction.detector.limit50_vmag)
+    };
     if rows
         .windows(2)
-        .all(|pair| limit(&pair[0]) == limit(&pair[1]))
+        .all(|pair| limits(&pair[0]) == limits(&pair[1]))
     {
         warn(format_args!(
-            "{parameter} changes nothing: the limit is the same at each of its values"
+            "{parameter} changes nothing: the limits are the same at each of its values"
         ));
     }
 }
@@ -219,9 +222,9 @@ struct TableRow<'a> {
     noise_e: f64,
     snr: f64,
     airmass: f64,
-    detector_limit50_vmag: f64,
-    detector_limit90_vmag: f64,
-    peak_limit50_vmag: f64,
+    detector_limit50_vmag: Option<f64>,
+    detector_limit90_vmag: Option<f64>,
+    peak_limit50_vmag: Option<f64>,
     dark_e: f64,
     sensor_noise_e: f64,
     background_noise_e: f64,
