@@ -11,8 +11,9 @@
 //! Caveats: the sky's brightness, where it is not that of the whole spectrum of moonlight, shifts the predicted limit by
 //! less than its own error; a bias that is not the camera's shows as noise that does not fit.
 
+use crate::detect::DetectConfig;
 use crate::sensitivity::{
-    Budget, Detector, Extinction, Faintest, Reading, Rule, Scenario, SkyBrightness,
+    Budget, Detector, Extinction, Faintest, Reading, Scenario, SkyBrightness,
 };
 use crate::sensor::Sensor;
 use crate::statistics::Estimate;
@@ -34,6 +35,8 @@ pub struct Description {
 pub struct Seen<'a> {
     /// Columns and rows.
     pub size_px: [usize; 2],
+    /// How its stars were detected.
+    pub detect: &'a DetectConfig,
     /// Exposure, in seconds.
     pub exposure_s: Option<f64>,
     /// Median level of the background, in ADU.
@@ -99,15 +102,17 @@ pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
     scenario.reading = Reading::Physical;
     let conditions = &mut scenario.conditions;
     conditions.exposure_s = exposure_s;
-    let known_zenith_deg = seen.zenith_distance_deg.or(description.zenith_distance_deg);
-    conditions.zenith_distance_deg = known_zenith_deg.filter(|z| *z < 90.0).unwrap_or(0.0);
+    let known_zenith_deg = seen.zenith_distance_deg.filter(|z| *z < 90.0);
+    let known_zenith_deg = known_zenith_deg.or(description.zenith_distance_deg);
+    conditions.zenith_distance_deg = known_zenith_deg.unwrap_or(0.0);
+    conditions.false_alarms_per_mpx = seen.detect.false_alarms_per_mpx;
     conditions.extinction = description.extinction.unwrap_or(conditions.extinction);
     scenario.conditions.sky = SkyBrightness::MagArcsec2(sky_mag_arcsec2(&scenario, seen));
     let [width_px, height_px] = seen.size_px;
     (scenario.sensor.width_px, scenario.sensor.height_px) = (width_px, height_px);
     let budget = Budget::new(&scenario);
-    let detector = Detector::new(Rule::MatchedFilter, &scenario, &budget);
-    let peak = Detector::new(Rule::PeakPixel, &scenario, &budget);
+    let detector = Detector::as_configured(seen.detect, &scenario, &budget);
+    let peak = Detector::peak_pixel(&scenario, &budget);
     let gain_e_per_adu = scenario.sensor.gain_e_per_adu;
     let zero_point_vmag = budget.vmag_of(gain_e_per_adu, 1.0);
     let limit_vmag = detector.vmag_at(0.5);
@@ -209,6 +214,12 @@ fn contradictions(description: &Description, seen: &Seen, found: &Comparison) ->
             sensor.spot_sigma_px
         ));
     }
+    if seen.level_adu < sensor.bias_adu - seen.noise_adu {
+        told.push(format!(
+            "the background's level is {:.1}, below the camera's bias of {}",
+            seen.level_adu, sensor.bias_adu
+        ));
+    }
     let noise_e = seen.noise_adu * sensor.gain_e_per_adu;
     if is_off(noise_e, found.budget.background_noise_e, NOISE_TOLERANCE) {
         told.push(format!(
@@ -254,6 +265,7 @@ fn odd_zenith(description: &Description, seen: &Seen) -> Option<String> {
 mod tests {
     use super::*;
     use crate::sensor::Preset;
+    use std::sync::LazyLock;
 
     fn description() -> Description {
         Description {
@@ -265,6 +277,7 @@ mod tests {
 
     /// A frame such as the camera takes under a sky of this brightness in 0.04 s.
     fn seen(sky_mag_arcsec2: f64) -> Seen<'static> {
+        static DETECT: LazyLock<DetectConfig> = LazyLock::new(DetectConfig::default);
         let mut scenario = Scenario::new(description().sensor);
         scenario.conditions.exposure_s = 0.04;
         scenario.conditions.sky = SkyBrightness::MagArcsec2(sky_mag_arcsec2);
@@ -272,6 +285,7 @@ mod tests {
         let sensor = &scenario.sensor;
         Seen {
             size_px: [752, 582],
+            detect: &DETECT,
             exposure_s: Some(0.04),
             level_adu: sensor.bias_adu + budget.background_e / sensor.gain_e_per_adu,
             noise_adu: budget.background_noise_e / sensor.gain_e_per_adu,
@@ -340,6 +354,10 @@ mod tests {
         assert!(told(&|_, f| f.pixel_scale_rad = Some(1e-4)).contains("a pixel spans 20.63″"));
         assert!(
             told(&|_, f| f.spot_sigma_px = Some(3.0)).contains("3.00 px, the camera's 1.16 px")
+        );
+        assert!(
+            told(&|_, f| f.level_adu = 100.0)
+                .contains("level is 100.0, below the camera's bias of 128")
         );
         assert!(told(&|_, f| f.noise_adu *= 2.0).contains("the background's noise is"));
         let zero = compare(&description(), &seen(16.0))

@@ -3,6 +3,7 @@
 use super::{Background, Knowledge};
 use crate::catalog::Catalog;
 use crate::comparison::{self, Comparison, Description, Seen};
+use crate::detect::DetectConfig;
 use crate::identify::Outcome;
 use crate::observer::Observation;
 use crate::photometry::FramePhotometry;
@@ -17,7 +18,22 @@ pub(super) struct Found<'a> {
     pub outcome: &'a Outcome,
     pub photometry: Option<&'a FramePhotometry>,
     pub observation: Option<&'a Observation>,
+    pub detect: &'a DetectConfig,
     pub catalog: &'a Catalog,
+}
+
+/// What to say of a frame beside its camera: contradictions, or why it was not held against it.
+pub(super) fn notes(
+    description: Option<&Description>,
+    comparison: Option<&Comparison>,
+) -> Vec<String> {
+    match (description, comparison) {
+        (_, Some(held)) => held.contradictions.clone(),
+        (Some(_), None) => {
+            vec!["the exposure is not known, and so nothing is predicted of the camera".to_owned()]
+        }
+        (None, None) => Vec::new(),
+    }
 }
 
 impl Found<'_> {
@@ -45,6 +61,7 @@ impl Found<'_> {
             description,
             &Seen {
                 size_px: self.size_px,
+                detect: self.detect,
                 exposure_s: knowledge.exposure_s,
                 level_adu: self.background.level_adu,
                 noise_adu: self.background.noise_adu,
