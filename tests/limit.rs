@@ -476,6 +476,21 @@ fn a_plot_is_an_svg_or_a_png() {
 }
 
 #[test]
+fn a_plot_over_an_input_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("qe.svg");
+    let table = "wavelength_nm,qe\n350,0.3\n800,0.3\n";
+    fs::write(&path, table).unwrap();
+    let name = path.to_str().unwrap();
+    let sweep = ["--sweep", "aperture_mm=5:200:3", "--plot", name];
+    let curve = ["--preset", "experiment-1", "--quantum-efficiency", name];
+    is_refused(&[&curve[..], &sweep].concat(), "would overwrite the input");
+    let camera = ["--camera", name];
+    is_refused(&[&camera[..], &sweep].concat(), "would overwrite the input");
+    assert_eq!(fs::read_to_string(&path).unwrap(), table);
+}
+
+#[test]
 fn the_papers_figures_are_eleven_and_a_sheet() {
     let directory = tempfile::tempdir().unwrap();
     let figures = directory.path().join("new/figures");

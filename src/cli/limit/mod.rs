@@ -32,6 +32,7 @@ pub(crate) fn limit(arguments: &LimitArgs) -> Result<Exit, Fault> {
             "--sweep is given {sweeps} times, expected at most {MAX_SWEEPS}"
         )));
     }
+    check_plot(arguments)?;
     let scenario = scenario(arguments)?;
     if let Some(directory) = &arguments.figures {
         return papers_figures(directory, &scenario);
@@ -52,6 +53,21 @@ pub(crate) fn limit(arguments: &LimitArgs) -> Result<Exit, Fault> {
 }
 
 /// The scenario that is asked for, in which every value makes sense.
+/// Refuses to draw over a file that is read.
+fn check_plot(arguments: &LimitArgs) -> Result<(), Fault> {
+    let Some(Ok(plot)) = arguments.plot.as_ref().map(|p| p.path.canonicalize()) else {
+        return Ok(());
+    };
+    let mut read = arguments.camera.iter().chain(arguments.parameters.files());
+    match read.find(|path| path.canonicalize().is_ok_and(|path| path == plot)) {
+        Some(path) => Err(Fault::Usage(format!(
+            "--plot would overwrite the input {}",
+            path.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
 fn scenario(arguments: &LimitArgs) -> Result<Scenario, Fault> {
     let mut scenario = match &arguments.camera {
         Some(path) => described(path)?,
