@@ -288,6 +288,7 @@ fn a_wrong_description_or_option_is_refused() {
         &["--exposure", "NaN"],
         &["--camera", "x.toml", "--zenith-distance", "90"],
         &["--camera", "x.toml", "--extinction", "-1"],
+        &["--camera", "x.toml", "--extinction", "1e300"],
         &["--zenith-distance", "10"],
     ] {
         let ran = Ran::new(starpipe().args(["process", "a.png"]).args(arguments));
