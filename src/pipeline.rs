@@ -189,6 +189,21 @@ impl Knowledge {
         Observation::new(self.site?, &self.date?.date, &boresight)
     }
 
+    /// What is odd about the site and the date of a frame, or is lacking for an observation.
+    fn odd_observation(
+        &self,
+        outcome: &Outcome,
+        observation: Option<&Observation>,
+    ) -> Option<String> {
+        match (outcome, observation) {
+            (_, Some(observation)) => below_horizon(observation),
+            (Outcome::Identified(_), None) if self.site.is_some() => Some(
+                "the time of day is not known, and so the site gives no zenith distance".to_owned(),
+            ),
+            _ => None,
+        }
+    }
+
     /// The same with `date`, where none is known.
     fn or_date(self, date: Option<ObservationDate>, source: DateSource) -> Self {
         let other = date.map(|date| FrameDate { date, source });
@@ -464,7 +479,7 @@ impl<'a> Pipeline<'a> {
         let photometry_start = Instant::now();
         let photometry = self.photometry(&detections, &outcome, &knowledge);
         let observation = knowledge.observation(&outcome);
-        notes.extend(observation.as_ref().and_then(below_horizon));
+        notes.extend(knowledge.odd_observation(&outcome, observation.as_ref()));
         let background = Background {
             level_adu: detections.background_adu,
             noise_adu: detections.noise_adu,
@@ -480,8 +495,7 @@ impl<'a> Pipeline<'a> {
             sky: &self.sky,
         };
         let comparison = description.and_then(|stated| found.against(stated, &knowledge));
-        let contradictions = comparison.iter().flat_map(|held| &held.contradictions);
-        notes.extend(contradictions.cloned());
+        notes.extend(described::notes(description, comparison.as_ref()));
         let photometry_ms = milliseconds_since(photometry_start);
         notes.extend(photometry.as_ref().and_then(not_linear));
         Ok(Solution {
@@ -527,9 +541,8 @@ impl<'a> Pipeline<'a> {
             width: list.width,
             height: list.height,
             date: knowledge.date,
-            notes: observation
-                .as_ref()
-                .and_then(below_horizon)
+            notes: knowledge
+                .odd_observation(&outcome, observation.as_ref())
                 .into_iter()
                 .collect(),
             observation,

@@ -167,6 +167,7 @@ fn without_an_exposure_nothing_is_predicted_and_without_a_camera_neither() {
     let night = Night::new();
     let report = night.report(&[]);
     assert_eq!(report["prediction"], Value::Null);
+    assert!(notes(&report).contains("the exposure is not known"));
     assert_eq!(report["magnitude"]["predicted_limit_vmag"], Value::Null);
     assert!(report["stars"][0]["flux_e"].is_number());
     let ran = Ran::new(
@@ -262,6 +263,41 @@ fn the_text_holds_one_against_the_other() {
 }
 
 #[test]
+fn the_limit_predicted_is_that_of_the_threshold_given() {
+    let night = Night::new();
+    for arguments in [&["--sigma", "20"][..], &["--false-alarms", "1e-9"]] {
+        let report = night.report(&[&["--exposure", EXPOSURE_S], arguments].concat());
+        let measured = number(&report, "/photometry/limit50_vmag");
+        let predicted = number(&report, "/prediction/limit50_vmag");
+        let sigma = number(&report, "/photometry/limit50_sigma_mag");
+        let off = (measured - predicted).abs();
+        assert!(
+            off < 3.0 * sigma + LIMIT_TOLERANCE_MAG,
+            "{arguments:?} {measured} {predicted}"
+        );
+    }
+}
+
+#[test]
+fn a_site_without_the_time_is_told_of() {
+    let night = Night::new();
+    let site = ["--exposure", EXPOSURE_S, "--site", "52.22,4.42"];
+    for date in [&["--date", "2019-07-29"][..], &[]] {
+        let report = night.report(&[&site[..], date].concat());
+        assert_eq!(report["observation"], Value::Null);
+        assert!(notes(&report).contains("the time of day is not known"));
+    }
+    let below = [
+        &site[..2],
+        &["--site=-80,4.42", "--date", "2019-07-29T00:00"],
+    ]
+    .concat();
+    let report = night.report(&below);
+    assert!(notes(&report).contains("below the horizon"));
+    assert_eq!(report["prediction"]["zenith_distance_known"], false);
+}
+
+#[test]
 fn a_wrong_description_or_option_is_refused() {
     let night = Night::new();
     night.describe(|text| with(&text, "aperture_mm", "-5"));
@@ -275,6 +311,7 @@ fn a_wrong_description_or_option_is_refused() {
         &["--exposure", "NaN"],
         &["--camera", "x.toml", "--zenith-distance", "90"],
         &["--camera", "x.toml", "--extinction", "-1"],
+        &["--camera", "x.toml", "--extinction", "1e300"],
         &["--zenith-distance", "10"],
     ] {
         let ran = Ran::new(starpipe().args(["process", "a.png"]).args(arguments));

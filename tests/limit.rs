@@ -359,6 +359,51 @@ fn a_parameter_that_changes_nothing_is_told_of() {
     );
     let physical = limit(&[&options[..], &["--reading", "physical"]].concat());
     assert_eq!(physical.stderr, "");
+    // Of no matter to the brightest pixel, but to the detector.
+    for sweep in ["false_alarms_per_mpx=0.1:10:2:log", "motion_px=0:5:2"] {
+        let ran = limit(&["--preset", "experiment-1", "--sweep", sweep]);
+        assert_eq!(ran.stderr, "", "{sweep}");
+    }
+}
+
+#[test]
+fn a_rule_that_the_noise_passes_has_no_limit() {
+    for (options, rule, other) in [
+        (["--snr", "0.5"], "peak_pixel", "detector"),
+        (["--snr", "1"], "peak_pixel", "detector"),
+        (["--false-alarms-per-mpx", "1e5"], "detector", "peak_pixel"),
+    ] {
+        let options = [&["--preset", "experiment-1"], &options[..]].concat();
+        let report = predicted(&options);
+        assert_eq!(report[rule]["limit50_vmag"], Value::Null, "{options:?}");
+        assert!(report[other]["limit50_vmag"].is_number(), "{options:?}");
+        for point in report[rule]["completeness"].as_array().unwrap() {
+            let part = point["part"].as_f64().unwrap();
+            assert!((0.0..=1.0).contains(&part) && point["vmag"].is_number());
+        }
+        let text = limit(&options).stdout;
+        assert!(
+            text.contains(" none ") || text.contains(" none\n"),
+            "{text}"
+        );
+        let table = limit(&[&options[..], &["--format", "csv"]].concat()).stdout;
+        assert!(!table.contains("inf") && !table.contains("NaN"), "{table}");
+    }
+}
+
+#[test]
+fn a_table_of_endless_or_far_too_many_bytes_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("qe.csv");
+    fs::write(&path, vec![b'7'; 3 << 20]).unwrap();
+    let path = path.to_str().unwrap();
+    let ran = limit(&["--preset", "experiment-1", "--quantum-efficiency", path]);
+    assert_eq!((ran.status, ran.stdout.as_str()), (1, ""));
+    assert!(
+        ran.stderr.contains("larger than 1048576 bytes"),
+        "{}",
+        ran.stderr
+    );
 }
 
 #[test]
@@ -428,6 +473,21 @@ fn a_plot_is_an_svg_or_a_png() {
         );
     }
     assert_eq!(names(directory.path()), ["a.png", "a.svg", "b.SVG"]);
+}
+
+#[test]
+fn a_plot_over_an_input_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("qe.svg");
+    let table = "wavelength_nm,qe\n350,0.3\n800,0.3\n";
+    fs::write(&path, table).unwrap();
+    let name = path.to_str().unwrap();
+    let sweep = ["--sweep", "aperture_mm=5:200:3", "--plot", name];
+    let curve = ["--preset", "experiment-1", "--quantum-efficiency", name];
+    is_refused(&[&curve[..], &sweep].concat(), "would overwrite the input");
+    let camera = ["--camera", name];
+    is_refused(&[&camera[..], &sweep].concat(), "would overwrite the input");
+    assert_eq!(fs::read_to_string(&path).unwrap(), table);
 }
 
 #[test]

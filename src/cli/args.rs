@@ -45,8 +45,8 @@ pub(crate) enum Command {
         funpack -S night.fits.fz | starpipe process -\n\n\
         The kind of a file is told from its content; any may be compressed with gzip. A date, an exposure,\n\
         a pixel size and a focal length in FITS keywords or Exif are used where no option says otherwise.\n\n\
-        --out results makes results/night.json, night.csv, night.wcs and night.png of night.tif, and overwrites\n\
-        nothing but such results. Those among the frames of a directory are left out.")]
+        --out results makes results/night.json, night.csv, night.wcs and night.png of night.tif, and\n\
+        overwrites nothing but such results. Those among the frames of a directory are left out.")]
     Process(ProcessArgs),
     /// Identify the stars in lists of centroids (CSV)
     #[command(after_help = "Examples:\n  \
@@ -73,8 +73,9 @@ pub(crate) enum Command {
         starpipe limit --preset experiment-1 --sweep aperture_mm=5:200:40 --plot aperture.svg --format csv\n  \
         starpipe limit --preset imx174-35mm --sweep exposure_s=0.01:10:31:log\n  \
         starpipe limit --figures figures\n\n\
-        The rule is that of the paper: the star's brightest pixel stands --snr times its noise above the sky. Every number\n\
-        of the camera and of the conditions has an option; docs/sensitivity.md has the equations.")]
+        The rule is that of the paper: the star's brightest pixel stands --snr times its noise above the\n\
+        sky. Every number of the camera and of the conditions has an option; docs/sensitivity.md has the\n\
+        equations.")]
     Limit(Box<LimitArgs>),
     /// Work with descriptions of cameras
     Camera(CameraArgs),
@@ -222,7 +223,7 @@ pub(crate) struct HintArgs {
           requires = "camera")]
     pub(crate) zenith_distance: Option<f64>,
     /// With --camera, extinction in magnitudes for each airmass [default: of a clear night at sea level]
-    #[arg(long, value_name = "MAG", value_parser = values::not_negative, allow_hyphen_values = true,
+    #[arg(long, value_name = "MAG", value_parser = values::extinction, allow_hyphen_values = true,
           requires = "camera")]
     pub(crate) extinction: Option<f64>,
 }

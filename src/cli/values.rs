@@ -163,6 +163,17 @@ pub(crate) fn zenith_distance(text: &str) -> Result<f64, String> {
     )
 }
 
+/// Extinction in magnitudes for each airmass.
+pub(crate) fn extinction(text: &str) -> Result<f64, String> {
+    let limits = "from 0 to 10 magnitudes";
+    within(
+        text,
+        "the extinction",
+        |v| (0.0..=10.0).contains(&v),
+        limits,
+    )
+}
+
 /// A pixel scale in arcseconds.
 pub(crate) fn pixel_scale(text: &str) -> Result<f64, String> {
     within(

@@ -223,6 +223,12 @@ fn contradictions(description: &Description, seen: &Seen, found: &Comparison) ->
             sensor.spot_sigma_px
         ));
     }
+    if seen.level_adu < sensor.bias_adu - seen.noise_adu {
+        told.push(format!(
+            "the background's level is {:.1}, below the camera's bias of {}",
+            seen.level_adu, sensor.bias_adu
+        ));
+    }
     let noise_e = seen.noise_adu * sensor.gain_e_per_adu;
     if is_off(noise_e, found.budget.background_noise_e, NOISE_TOLERANCE) {
         told.push(format!(
@@ -386,6 +392,10 @@ mod tests {
         assert!(told(&|_, f| f.pixel_scale_rad = Some(1e-4)).contains("a pixel spans 20.63″"));
         assert!(
             told(&|_, f| f.spot_sigma_px = Some(3.0)).contains("3.00 px, the camera's 1.16 px")
+        );
+        assert!(
+            told(&|_, f| f.level_adu = 100.0)
+                .contains("level is 100.0, below the camera's bias of 128")
         );
         assert!(told(&|_, f| f.noise_adu *= 2.0).contains("the background's noise is"));
         let zero = compare(&description(), &seen(16.0))

@@ -21,6 +21,20 @@ pub(super) struct Found<'a> {
     pub sky: &'a Sky<'a>,
 }
 
+/// What to say of a frame beside its camera: contradictions, or why it was not held against it.
+pub(super) fn notes(
+    description: Option<&Description>,
+    comparison: Option<&Comparison>,
+) -> Vec<String> {
+    match (description, comparison) {
+        (_, Some(held)) => held.contradictions.clone(),
+        (Some(_), None) => {
+            vec!["the exposure is not known, and so nothing is predicted of the camera".to_owned()]
+        }
+        (None, None) => Vec::new(),
+    }
+}
+
 impl Found<'_> {
     /// Holds it against `description`; nothing comes of it where the exposure is not known.
     pub(super) fn against(

@@ -112,6 +112,7 @@ impl Detector {
         // The trials whose limit is at least as faint; between two of them a straight line.
         let found = trials.partition_point(|limit| *limit >= v_mag);
         let between = match (found.checked_sub(1).map(|i| trials[i]), trials.get(found)) {
+            (Some(fainter), Some(_)) if fainter.is_infinite() => 1.0,
             (Some(fainter), Some(brighter)) if fainter > *brighter => {
                 (fainter - v_mag) / (fainter - brighter)
             }
@@ -121,7 +122,8 @@ impl Detector {
         (count / trials.len() as f64).clamp(0.0, 1.0)
     }
 
-    /// The V magnitude at which a star is found with this probability: 0.5 for the limit.
+    /// The V magnitude at which a star is found with this probability: 0.5 for the limit. Not finite where the noise alone
+    /// is found more often.
     pub fn vmag_at(&self, probability: f64) -> f64 {
         let last = self.critical_vmag.len() - 1;
         let place = probability * self.critical_vmag.len() as f64 - 0.5;

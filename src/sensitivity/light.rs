@@ -60,7 +60,7 @@ pub fn temperature_k_of(bv_mag: f64) -> f64 {
 /// Tong, Li & Wang 2014, table 1.
 #[doc(alias = "S_e")]
 pub(super) fn luminous_efficiency() -> Vec<(f64, f64)> {
-    let table = include_str!("luminous-efficiency.csv");
+    let table = include_bytes!("luminous-efficiency.csv");
     match Response::parse("luminous-efficiency.csv".as_ref(), table) {
         Ok(Response::Table(points)) => points,
         _ => Vec::new(),

@@ -41,15 +41,15 @@ pub struct Prediction {
 pub struct DetectorReport {
     /// What a star must do to be found.
     pub rule: Rule,
-    /// V magnitude at which half of the stars are found.
-    pub limit50_vmag: f64,
-    /// V magnitude at which nine in ten are found.
-    pub limit90_vmag: f64,
+    /// V magnitude at which half of the stars are found; none where the noise alone is found more often.
+    pub limit50_vmag: Option<f64>,
+    /// V magnitude at which nine in ten are found; none as well.
+    pub limit90_vmag: Option<f64>,
     /// The threshold, in standard deviations of the (filtered) noise without a star.
     pub threshold_sigma: f64,
     /// False detections in a million pixels without a star.
     pub false_alarms_per_mpx: f64,
-    /// The part of the stars that is found, by V magnitude.
+    /// The part of the stars that is found, by V magnitude, around the first of these limits that there is.
     pub completeness: Vec<CompletenessPoint>,
 }
 
@@ -70,10 +70,11 @@ const CURVE_STEP_MAG: f64 = 0.1;
 impl DetectorReport {
     fn new(rule: Rule, scenario: &Scenario, budget: &Budget) -> Self {
         let detector = Detector::new(rule, scenario, budget);
-        let limit50_vmag = detector.vmag_at(0.5);
-        let middle = (limit50_vmag / CURVE_STEP_MAG).round();
+        let vmag_at = |part| Some(detector.vmag_at(part)).filter(|vmag| vmag.is_finite());
+        let (limit50_vmag, limit90_vmag) = (vmag_at(0.5), vmag_at(0.9));
         let steps = (CURVE_REACH_MAG / CURVE_STEP_MAG).round() as i32;
-        let point = |step: i32| {
+        let point = |around: f64, step: i32| {
+            let middle = (around / CURVE_STEP_MAG).round();
             // Divided, and not multiplied, so that 8.3 is 8.3.
             let vmag = (middle + f64::from(step)) / (1.0 / CURVE_STEP_MAG).round();
             CompletenessPoint {
@@ -81,13 +82,18 @@ impl DetectorReport {
                 part: detector.probability(vmag),
             }
         };
+        let curve = |around| (-steps..=steps).map(move |step| point(around, step));
         Self {
             rule,
             limit50_vmag,
-            limit90_vmag: detector.vmag_at(0.9),
+            limit90_vmag,
             threshold_sigma: detector.threshold_sigma,
             false_alarms_per_mpx: detector.false_alarms_per_mpx,
-            completeness: (-steps..=steps).map(point).collect(),
+            completeness: limit50_vmag
+                .or(limit90_vmag)
+                .into_iter()
+                .flat_map(curve)
+                .collect(),
         }
     }
 }

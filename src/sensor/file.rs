@@ -323,7 +323,7 @@ impl Reading<'_> {
                     let expected = "pairs of wavelength in nm and value";
                     self.wrong(name, value, expected.to_owned())
                 })?;
-                Response::parse(self.path, &text).map_err(table)
+                Response::parse(self.path, text.as_bytes()).map_err(table)
             }
             other => as_number(other)
                 .filter(|number| Limits::Share.accept(*number))

@@ -89,7 +89,7 @@ with that peak share, full well is 52 dB above the noise; bits, gain and bias ar
 
 /// Section 2.2 of the paper.
 fn papers_camera() -> Sensor {
-    let qe = include_str!("quantum-efficiency.csv");
+    let qe = include_bytes!("quantum-efficiency.csv");
     let quantum_efficiency = Response::parse("quantum-efficiency.csv".as_ref(), qe);
     Sensor {
         name: "Tong, Li & Wang 2014".to_owned(),

@@ -1,6 +1,11 @@
 //! A transmission or an efficiency, by wavelength.
 
+use std::fs::File;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
+
+/// The most bytes of a table.
+const MAX_BYTES: u64 = 1 << 20;
 
 /// A number between 0 and 1 at each wavelength.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,8 +25,16 @@ pub enum ResponseError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system or the CSV reader says.
-        source: csv::Error,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Far more bytes than a table has.
+    #[error("{}: larger than {limit} bytes, which no table of wavelengths and values is", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// The most it may have.
+        limit: u64,
     },
     /// A row is not two numbers.
     #[error("{}, line {line}: '{found}' where {expected} was expected", path.display())]
@@ -102,7 +115,7 @@ impl Response {
         }
     }
 
-    /// Reads a CSV file: a heading, then wavelength in nm and value in each row.
+    /// Reads a CSV file: wavelength in nm and value in each row, below a heading or without one.
     ///
     /// # Errors
     /// [`ResponseError`] with the file and the line.
@@ -111,48 +124,54 @@ impl Response {
             path: path.to_owned(),
             source,
         };
-        let mut reader = csv::ReaderBuilder::new()
-            .flexible(true)
-            .comment(Some(b'#'))
-            .trim(csv::Trim::All)
-            .from_path(path)
+        let mut bytes = Vec::new();
+        let file = File::open(path).map_err(read)?;
+        file.take(MAX_BYTES + 1)
+            .read_to_end(&mut bytes)
             .map_err(read)?;
-        Self::from_rows(path, reader.records(), read)
+        if bytes.len() as u64 > MAX_BYTES {
+            return Err(ResponseError::TooLarge {
+                path: path.to_owned(),
+                limit: MAX_BYTES,
+            });
+        }
+        Self::parse(path, &bytes)
     }
 
-    /// Parses the text of such a file; `path` stands for its name in errors.
+    /// Parses the content of such a file; `path` stands for its name in errors.
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub fn parse(path: &Path, text: &str) -> Result<Self, ResponseError> {
-        let read = |source| ResponseError::Read {
-            path: path.to_owned(),
-            source,
-        };
-        let mut reader = csv::Reader::from_reader(text.as_bytes());
-        Self::from_rows(path, reader.records(), read)
-    }
-
-    fn from_rows(
-        path: &Path,
-        rows: impl Iterator<Item = csv::Result<csv::StringRecord>>,
-        read: impl Fn(csv::Error) -> ResponseError,
-    ) -> Result<Self, ResponseError> {
+    pub fn parse(path: &Path, content: &[u8]) -> Result<Self, ResponseError> {
+        let mut reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .from_reader(content);
         let mut points: Vec<(f64, f64)> = Vec::new();
-        for row in rows {
-            let row = row.map_err(&read)?;
+        for (i, row) in reader.byte_records().enumerate() {
+            let row = row.map_err(|error| ResponseError::Read {
+                path: path.to_owned(),
+                source: error.into(),
+            })?;
+            let cell = |column| String::from_utf8_lossy(row.get(column).unwrap_or_default());
+            if i == 0 && cell(0).parse::<f64>().is_err() {
+                // The heading.
+                continue;
+            }
             let line = row.position().map_or(0, csv::Position::line);
             let number = |column: usize, expected, accepts: fn(f64) -> bool| {
-                let found = row.get(column).unwrap_or_default();
+                let found = cell(column);
                 let value = found.parse::<f64>().ok();
                 value.filter(|v| accepts(*v)).ok_or(ResponseError::Value {
                     path: path.to_owned(),
                     line,
-                    found: found.to_owned(),
+                    found: found.chars().take(40).collect(),
                     expected,
                 })
             };
-            let nm = number(0, "a wavelength in nanometres", |nm| {
+            let nm = number(0, "a wavelength in nanometres, before a comma,", |nm| {
                 nm > 0.0 && nm.is_finite()
             })?;
             let value = number(1, "a value from 0 to 1", |v| (0.0..=1.0).contains(&v))?;
@@ -181,7 +200,7 @@ mod tests {
     use super::*;
 
     fn parsed(text: &str) -> Result<Response, ResponseError> {
-        Response::parse("qe.csv".as_ref(), text)
+        Response::parse("qe.csv".as_ref(), text.as_bytes())
     }
 
     #[test]
@@ -202,6 +221,30 @@ mod tests {
     }
 
     #[test]
+    fn no_row_is_lost_where_there_is_no_heading() {
+        let rows = "400,0.2\n500,0.6\n";
+        let expected = Response::Table(vec![(400.0, 0.2), (500.0, 0.6)]);
+        for head in [
+            "",
+            "\u{feff}",
+            "# a comment\n",
+            "nm,qe\n",
+            "\u{feff}nm,qe\r\n",
+        ] {
+            assert_eq!(
+                parsed(&format!("{head}{rows}")).unwrap(),
+                expected,
+                "{head:?}"
+            );
+        }
+        let latin1 = [b"Wellenl\xe4nge,QE\n", rows.as_bytes()].concat();
+        assert_eq!(
+            Response::parse("qe.csv".as_ref(), &latin1).unwrap(),
+            expected
+        );
+    }
+
+    #[test]
     fn what_is_no_table_is_refused_with_its_line() {
         for (text, expected) in [
             (
@@ -218,6 +261,10 @@ mod tests {
                 "line 2: '-5' where a wavelength",
             ),
             ("nm,qe\n400,0.2\n", "1 rows of wavelength and value"),
+            (
+                "nm;qe\n400;0.2\n500;0.3\n",
+                "line 2: '400;0.2' where a wavelength in nanometres, before a comma, was",
+            ),
         ] {
             let error = parsed(text).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");

@@ -32,6 +32,7 @@ pub(crate) fn limit(arguments: &LimitArgs) -> Result<Exit, Fault> {
             "--sweep is given {sweeps} times, expected at most {MAX_SWEEPS}"
         )));
     }
+    check_plot(arguments)?;
     let scenario = scenario(arguments)?;
     if let Some(directory) = &arguments.figures {
         return papers_figures(directory, &scenario);
@@ -52,6 +53,21 @@ pub(crate) fn limit(arguments: &LimitArgs) -> Result<Exit, Fault> {
 }
 
 /// The scenario that is asked for, in which every value makes sense.
+/// Refuses to draw over a file that is read.
+fn check_plot(arguments: &LimitArgs) -> Result<(), Fault> {
+    let Some(Ok(plot)) = arguments.plot.as_ref().map(|p| p.path.canonicalize()) else {
+        return Ok(());
+    };
+    let mut read = arguments.camera.iter().chain(arguments.parameters.files());
+    match read.find(|path| path.canonicalize().is_ok_and(|path| path == plot)) {
+        Some(path) => Err(Fault::Usage(format!(
+            "--plot would overwrite the input {}",
+            path.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
 fn scenario(arguments: &LimitArgs) -> Result<Scenario, Fault> {
     let mut scenario = match &arguments.camera {
         Some(path) => described(path)?,
@@ -159,13 +175,16 @@ fn faintest(scenario: &Scenario, prediction: &Prediction) -> Option<Faintest> {
 
 /// Some parameters count in one reading only, or not for the brightest pixel.
 fn warn_if_flat(parameter: &str, rows: &[Row]) {
-    let limit = |row: &Row| row.prediction.limit_vmag;
+    let limits = |row: &Row| {
+        let prediction = &row.prediction;
+        (prediction.limit_vmag, prediction.detector.limit50_vmag)
+    };
     if rows
         .windows(2)
-        .all(|pair| limit(&pair[0]) == limit(&pair[1]))
+        .all(|pair| limits(&pair[0]) == limits(&pair[1]))
     {
         warn(format_args!(
-            "{parameter} changes nothing: the limit is the same at each of its values"
+            "{parameter} changes nothing: the limits are the same at each of its values"
         ));
     }
 }
@@ -219,9 +238,9 @@ struct TableRow<'a> {
     noise_e: f64,
     snr: f64,
     airmass: f64,
-    detector_limit50_vmag: f64,
-    detector_limit90_vmag: f64,
-    peak_limit50_vmag: f64,
+    detector_limit50_vmag: Option<f64>,
+    detector_limit90_vmag: Option<f64>,
+    peak_limit50_vmag: Option<f64>,
     dark_e: f64,
     sensor_noise_e: f64,
     background_noise_e: f64,

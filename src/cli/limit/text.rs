@@ -79,7 +79,7 @@ fn detectors(row: &Row) -> String {
         "\n  {:<37} {:>20} {:>20}\n",
         "what is found", "brightest pixel", "starpipe's filter"
     );
-    let v_mag = |v_mag: f64| format!("{v_mag:.2}");
+    let v_mag = |v_mag: Option<f64>| v_mag.map_or("none".to_owned(), |v_mag| format!("{v_mag:.2}"));
     let lines = |d: &DetectorReport| {
         [
             v_mag(d.limit50_vmag),
@@ -286,12 +286,13 @@ fn sweeps(rows: &[Row]) -> String {
         );
         for row in rows {
             let prediction = &row.prediction;
+            let filter = prediction.detector.limit50_vmag;
             let _ = writeln!(
                 text,
-                "  {:>26}  {:>7.3}  {:>7.3}  {:>10}  {:>12}  {:>10}  {:>8}",
+                "  {:>26}  {:>7.3}  {:>7}  {:>10}  {:>12}  {:>10}  {:>8}",
                 number(row.swept.map_or(f64::NAN, |swept| swept.value)),
                 prediction.limit_vmag,
-                prediction.detector.limit50_vmag,
+                filter.map_or("none".to_owned(), |limit| format!("{limit:.3}")),
                 number(prediction.star_e),
                 number(prediction.background_e),
                 number(prediction.noise_e),
