@@ -130,6 +130,8 @@ pub(crate) struct ProcessArgs {
     #[command(flatten)]
     pub(crate) detection: DetectionArgs,
     #[command(flatten)]
+    pub(crate) light: LightArgs,
+    #[command(flatten)]
     pub(crate) solving: SolvingArgs,
 }
 
@@ -211,18 +213,26 @@ pub(crate) struct HintArgs {
     /// the time, that gives zenith distance and airmass
     #[arg(long, value_name = "LAT,LON[,HEIGHT_M]", allow_hyphen_values = true)]
     pub(crate) site: Option<Site>,
-    /// How long the frames were exposed, in seconds [default: for frames, the exposure in the file's header]
-    #[arg(long, value_name = "SECONDS", value_parser = values::positive, allow_hyphen_values = true)]
-    pub(crate) exposure: Option<f64>,
-    /// Description of the camera, see `starpipe camera new`: gives the scale, and with the exposure the limiting
-    /// magnitude to hold a frame against
+    /// Description of the camera, see `starpipe camera new`: gives the scale where no option does and, of frames whose
+    /// exposure is known, what they should show
     #[arg(long, value_name = "FILE.toml")]
     pub(crate) camera: Option<PathBuf>,
-    /// With --camera, zenith distance of the frames' centres in degrees [default: by --site and the date, else 0]
+}
+
+/// What is known of the light in a frame; lists of centroids have none.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "What is known of the frames")]
+pub(crate) struct LightArgs {
+    /// How long the frames were exposed, in seconds [default: the exposure in the file's header]
+    #[arg(long, value_name = "SECONDS", value_parser = values::exposure, allow_hyphen_values = true)]
+    pub(crate) exposure: Option<f64>,
+    /// With --camera, zenith distance of the frames' centres in degrees [default: by the header, else by --site and
+    /// the date, else 0]
     #[arg(long, value_name = "DEG", value_parser = values::zenith_distance, allow_hyphen_values = true,
           requires = "camera")]
     pub(crate) zenith_distance: Option<f64>,
-    /// With --camera, extinction in magnitudes for each airmass [default: of a clear night at sea level]
+    /// With --camera, extinction in magnitudes for each airmass [default: the law of the sensitivity paper, 0.35
+    /// in V]
     #[arg(long, value_name = "MAG", value_parser = values::extinction, allow_hyphen_values = true,
           requires = "camera")]
     pub(crate) extinction: Option<f64>,

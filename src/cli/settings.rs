@@ -1,7 +1,7 @@
 //! From raw arguments to the library's configurations.
 
 use super::Fault;
-use super::args::{Centroid, DetectionArgs, HintArgs, OutputArgs};
+use super::args::{Centroid, DetectionArgs, HintArgs, LightArgs, OutputArgs};
 use super::input::is_stdin;
 use super::output::OutputSettings;
 use super::overwrite;
@@ -51,31 +51,37 @@ impl HintArgs {
                 source: DateSource::Option,
             }),
             site: self.site,
-            exposure_s: self.exposure,
+            exposure_s: None,
         })
     }
 
     /// The same, with the scale of the camera where no other is given.
     pub(crate) fn resolve_with_camera(&self) -> Result<Knowledge, Fault> {
-        let camera = self.description()?;
-        let described = camera.map(|stated| ScaleHint::of_camera(&stated.sensor));
+        let sensor = self.sensor()?;
         let knowledge = self.resolve()?;
         Ok(Knowledge {
-            scale: knowledge.scale.or(described),
+            scale: knowledge
+                .scale
+                .or(sensor.as_ref().map(ScaleHint::of_camera)),
             ..knowledge
         })
     }
 
-    /// The camera, and what it looked through.
-    pub(crate) fn description(&self) -> anyhow::Result<Option<Description>> {
-        let Some(path) = &self.camera else {
-            return Ok(None);
-        };
-        Ok(Some(Description {
-            sensor: Sensor::read(path)?,
+    /// The camera, where it is described.
+    pub(crate) fn sensor(&self) -> anyhow::Result<Option<Sensor>> {
+        let read = |path: &PathBuf| Ok(Sensor::read(path)?);
+        self.camera.as_ref().map(read).transpose()
+    }
+}
+
+impl LightArgs {
+    /// The camera `sensor`, and what it looked through.
+    pub(crate) fn description(&self, sensor: Sensor) -> Description {
+        Description {
+            sensor,
             zenith_distance_deg: self.zenith_distance,
             extinction: self.extinction.map(Extinction::MagPerAirmass),
-        }))
+        }
     }
 }
 

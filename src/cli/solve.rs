@@ -9,7 +9,7 @@ use super::settings::{FRAME_RESULTS, LIST_RESULTS};
 use super::{Exit, Fault, batch, chained, complain};
 use indicatif::ProgressBar;
 use starpipe::detect::Workspace;
-use starpipe::pipeline::{Pipeline, SolveConfig};
+use starpipe::pipeline::{Knowledge, Pipeline, SolveConfig};
 use starpipe::report::FrameReport;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -20,12 +20,17 @@ pub(crate) fn process(arguments: ProcessArgs) -> Result<Exit, Fault> {
         frames,
         page,
         detection,
+        light,
         solving,
     } = arguments;
+    let sensor = solving.hints.sensor()?;
     let config = SolveConfig {
         detect: detection.resolve(),
-        knowledge: solving.hints.resolve()?,
-        description: solving.hints.description()?,
+        knowledge: Knowledge {
+            exposure_s: light.exposure,
+            ..solving.hints.resolve()?
+        },
+        description: sensor.map(|sensor| light.description(sensor)),
         page,
     };
     input::check(&frames)?;

@@ -152,6 +152,12 @@ pub(crate) fn field_of_view(text: &str) -> Result<f64, String> {
     )
 }
 
+/// An exposure in seconds.
+pub(crate) fn exposure(text: &str) -> Result<f64, String> {
+    let limits = "from 0.000001 to 1000000 s";
+    within(text, "the exposure", |v| (1e-6..=1e6).contains(&v), limits)
+}
+
 /// A zenith distance in degrees.
 pub(crate) fn zenith_distance(text: &str) -> Result<f64, String> {
     let limits = "from 0 to below 90 degrees";
