@@ -340,10 +340,10 @@ fn the_drawing_of_the_readme_has_the_zero_point_and_the_sky_that_it_was_drawn_wi
     assert_eq!(ran.status, 0, "{}", ran.stderr);
     let report = &ran.reports()[0];
     assert_eq!(notes(report), "");
-    // 250,000 electrons of V = 0; a sky of 100.
+    // 250,000 electrons of V = 0, whatever the colour, which costs the prediction some thousandths; a sky of 100.
     let drawn = 2.5 * 250e3f64.log10();
     let predicted = number(report, "/prediction/zero_point_vmag");
-    assert!((predicted - drawn).abs() < 0.002, "{predicted}");
+    assert!((predicted - drawn).abs() < 0.01, "{predicted}");
     let off = number(report, "/prediction/zero_point_difference_mag").abs();
     let sigma = number(report, "/prediction/zero_point_difference_sigma_mag");
     assert!(off < ZERO_POINT_TOLERANCE_MAG + 3.0 * sigma, "{off}");
