@@ -3,8 +3,8 @@
 use super::{FrameReport, StarReport};
 use std::io;
 
-/// The columns, in order. `flags` are separated by blanks.
-pub const TABLE_COLUMNS: [&str; 15] = [
+/// The columns, in order. `flags` are separated by blanks; the light in electrons is there where a camera is given.
+pub const TABLE_COLUMNS: [&str; 17] = [
     "frame",
     "x",
     "y",
@@ -20,6 +20,8 @@ pub const TABLE_COLUMNS: [&str; 15] = [
     "dec_deg",
     "residual_px",
     "flags",
+    "flux_e",
+    "peak_e",
 ];
 
 /// Writes the row of column names.
@@ -61,6 +63,8 @@ impl FrameReport {
             number(star.dec_deg),
             number(star.residual_px),
             star.flags.join(" "),
+            number(star.flux_e),
+            number(star.peak_e),
         ]
     }
 }

@@ -12,6 +12,7 @@ use super::plot::{self, Form};
 use super::{Exit, Fault, warn};
 use anyhow::{Context, anyhow};
 use figure::{Panel, Sheet};
+use rayon::prelude::*;
 use serde::Serialize;
 use starpipe::catalog::Catalog;
 use starpipe::sensitivity::{
@@ -151,8 +152,13 @@ fn rows(arguments: &LimitArgs, scenario: &Scenario) -> Result<Vec<Row>, Fault> {
         let parameter = sweep.parameter.name();
         let before = rows.len();
         let scenarios = sweep.scenarios(scenario).map_err(|error| usage(&error))?;
-        for (scenario, &value) in scenarios.iter().zip(&sweep.values) {
-            rows.push(row(scenario, Some(Swept { parameter, value }))?);
+        let swept: Vec<_> = scenarios
+            .par_iter()
+            .zip(&sweep.values)
+            .map(|(scenario, &value)| row(scenario, Some(Swept { parameter, value })))
+            .collect();
+        for row in swept {
+            rows.push(row?);
         }
         warn_if_flat(parameter, &rows[before..]);
     }
