@@ -458,13 +458,7 @@ impl<'a> Pipeline<'a> {
         let (field, kept) = star_field(frame, &detections, knowledge.years_since_j2000());
         let identify_start = Instant::now();
         let mut notes = frame.metadata.ignored.clone();
-        let description = config.description.clone().map(|stated| Description {
-            zenith_distance_deg: stated
-                .zenith_distance_deg
-                .or(frame.metadata.zenith_distance_deg),
-            ..stated
-        });
-        let description = description.as_ref();
+        let description = config.description.as_ref();
         let described = description.map(|stated| ScaleHint::of_camera(&stated.sensor));
         let in_header = header_scale(&frame.metadata).filter(|_| described.is_none());
         let outcome = match (knowledge.scale, described.or(in_header)) {
@@ -498,6 +492,7 @@ impl<'a> Pipeline<'a> {
             outcome: &outcome,
             photometry: photometry.as_ref(),
             observation: observation.as_ref(),
+            header_zenith_distance_deg: frame.metadata.zenith_distance_deg,
             sky: &self.sky,
         };
         let comparison = description.and_then(|stated| found.against(stated, &knowledge));

@@ -226,8 +226,8 @@ pub(crate) struct LightArgs {
     /// How long the frames were exposed, in seconds [default: the exposure in the file's header]
     #[arg(long, value_name = "SECONDS", value_parser = values::exposure, allow_hyphen_values = true)]
     pub(crate) exposure: Option<f64>,
-    /// With --camera, zenith distance of the frames' centres in degrees [default: by the header, else by --site and
-    /// the date, else 0]
+    /// With --camera, zenith distance of the frames' centres in degrees [default: by --site and the date, else by
+    /// the header, else 0]
     #[arg(long, value_name = "DEG", value_parser = values::zenith_distance, allow_hyphen_values = true,
           requires = "camera")]
     pub(crate) zenith_distance: Option<f64>,

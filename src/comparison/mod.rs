@@ -25,7 +25,7 @@ use crate::units::ARCSEC_PER_RAD;
 pub struct Description {
     /// The camera.
     pub sensor: Sensor,
-    /// Zenith distance of the frame's centre, in degrees; else that of site and date, else 0.
+    /// Zenith distance of the frame's centre, in degrees; else that of site and date, else that of the header, else 0.
     pub zenith_distance_deg: Option<f64>,
     /// What the air takes away; else the model's own.
     pub extinction: Option<Extinction>,
@@ -50,6 +50,8 @@ pub struct Seen<'a> {
     pub pixel_scale_rad: Option<f64>,
     /// Apparent zenith distance of the centre by site, date and attitude, in degrees; above 90 below the horizon.
     pub zenith_distance_deg: Option<f64>,
+    /// Zenith distance of the centre by the file's header, in degrees: where the mount believed it pointed.
+    pub header_zenith_distance_deg: Option<f64>,
     /// V magnitude of a star that gives one ADU a second.
     pub zero_point_vmag: Option<Estimate>,
     /// B−V of the stars for which that holds, where known.
@@ -105,8 +107,12 @@ pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
     let conditions = &mut scenario.conditions;
     conditions.exposure_s = exposure_s;
     let by_site_deg = seen.zenith_distance_deg.filter(|z| *z < 90.0);
-    let known_zenith_deg = description.zenith_distance_deg.or(by_site_deg);
-    conditions.zenith_distance_deg = known_zenith_deg.unwrap_or(0.0);
+    let stated_deg = description.zenith_distance_deg;
+    let known_zenith_deg = stated_deg
+        .or(by_site_deg)
+        .or(seen.header_zenith_distance_deg);
+    // Of the horizon itself there is no limit.
+    conditions.zenith_distance_deg = known_zenith_deg.filter(|z| *z < 90.0).unwrap_or(0.0);
     conditions.extinction = description.extinction.unwrap_or(conditions.extinction);
     scenario.conditions.sky = SkyBrightness::MagArcsec2(sky_mag_arcsec2(&scenario, seen));
     let [width_px, height_px] = seen.size_px;
@@ -257,7 +263,9 @@ fn odd_zero_point(difference: Estimate) -> Option<String> {
 }
 
 fn odd_zenith(description: &Description, seen: &Seen) -> Option<String> {
-    let (stated_deg, true_deg) = (description.zenith_distance_deg?, seen.zenith_distance_deg?);
+    let stated_deg = description.zenith_distance_deg;
+    let stated_deg = stated_deg.or(seen.header_zenith_distance_deg)?;
+    let true_deg = seen.zenith_distance_deg?;
     let half_px = seen.size_px[0].max(seen.size_px[1]) as f64 / 2.0;
     let half_field_deg = seen
         .pixel_scale_rad
@@ -299,6 +307,7 @@ mod tests {
             spot_sigma_px: Some(1.2),
             pixel_scale_rad: Some(sensor.pixel_scale_rad()),
             zenith_distance_deg: None,
+            header_zenith_distance_deg: None,
             zero_point_vmag: None,
             zero_point_bv_mag: None,
             limit_vmag: None,
@@ -414,5 +423,28 @@ mod tests {
             off.contains("stated as 0.0°, by site, date and attitude it is 56.0°"),
             "{off}"
         );
+        let off = told(&|_, f| {
+            f.header_zenith_distance_deg = Some(20.0);
+            f.zenith_distance_deg = Some(56.0);
+        });
+        assert!(off.contains("stated as 20.0°"), "{off}");
+    }
+
+    #[test]
+    fn the_zenith_distance_is_as_stated_else_by_the_site_else_by_the_header() {
+        let mut frame = seen(18.0);
+        let mut stated = description();
+        let reckoned = |stated: &Description, frame: &Seen| {
+            let found = compare(stated, frame).unwrap();
+            let zenith_deg = found.scenario.conditions.zenith_distance_deg;
+            (zenith_deg, found.zenith_is_known)
+        };
+        assert_eq!(reckoned(&stated, &frame), (0.0, false));
+        frame.header_zenith_distance_deg = Some(20.0);
+        assert_eq!(reckoned(&stated, &frame), (20.0, true));
+        frame.zenith_distance_deg = Some(30.0);
+        assert_eq!(reckoned(&stated, &frame), (30.0, true));
+        stated.zenith_distance_deg = Some(40.0);
+        assert_eq!(reckoned(&stated, &frame), (40.0, true));
     }
 }

@@ -18,6 +18,7 @@ pub(super) struct Found<'a> {
     pub outcome: &'a Outcome,
     pub photometry: Option<&'a FramePhotometry>,
     pub observation: Option<&'a Observation>,
+    pub header_zenith_distance_deg: Option<f64>,
     pub sky: &'a Sky<'a>,
 }
 
@@ -69,6 +70,7 @@ impl Found<'_> {
                 spot_sigma_px: identification.map(|_| self.spot_sigma_px),
                 pixel_scale_rad: identification.map(|found| 1.0 / found.camera.focal_length_px),
                 zenith_distance_deg: zenith_deg,
+                header_zenith_distance_deg: self.header_zenith_distance_deg,
                 zero_point_vmag: zero_point.map(|zero| Estimate {
                     value: zero.v_mag,
                     sigma: zero.sigma_mag,

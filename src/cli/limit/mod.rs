@@ -53,7 +53,6 @@ pub(crate) fn limit(arguments: &LimitArgs) -> Result<Exit, Fault> {
     Ok(Exit::Success)
 }
 
-/// The scenario that is asked for, in which every value makes sense.
 /// Refuses to draw over a file that is read.
 fn check_plot(arguments: &LimitArgs) -> Result<(), Fault> {
     let Some(Ok(plot)) = arguments.plot.as_ref().map(|p| p.path.canonicalize()) else {
@@ -69,6 +68,7 @@ fn check_plot(arguments: &LimitArgs) -> Result<(), Fault> {
     }
 }
 
+/// The scenario that is asked for, in which every value makes sense.
 fn scenario(arguments: &LimitArgs) -> Result<Scenario, Fault> {
     let mut scenario = match &arguments.camera {
         Some(path) => described(path)?,
