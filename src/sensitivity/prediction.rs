@@ -68,8 +68,7 @@ const CURVE_REACH_MAG: f64 = 1.2;
 const CURVE_STEP_MAG: f64 = 0.1;
 
 impl DetectorReport {
-    fn new(rule: Rule, scenario: &Scenario, budget: &Budget) -> Self {
-        let detector = Detector::new(rule, scenario, budget);
+    fn new(detector: &Detector) -> Self {
         let vmag_at = |part| Some(detector.vmag_at(part)).filter(|vmag| vmag.is_finite());
         let (limit50_vmag, limit90_vmag) = (vmag_at(0.5), vmag_at(0.9));
         let steps = (CURVE_REACH_MAG / CURVE_STEP_MAG).round() as i32;
@@ -84,7 +83,7 @@ impl DetectorReport {
         };
         let curve = |around| (-steps..=steps).map(move |step| point(around, step));
         Self {
-            rule,
+            rule: detector.rule,
             limit50_vmag,
             limit90_vmag,
             threshold_sigma: detector.threshold_sigma,
@@ -111,11 +110,21 @@ impl Prediction {
     /// # Errors
     /// [`ScenarioError`] where the scenario makes no sense or has no limit.
     pub fn new(scenario: &Scenario) -> Result<Self, ScenarioError> {
+        Self::with_detector(scenario).map(|(prediction, _)| prediction)
+    }
+
+    /// The same, and the matched filter that it tells of.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_detector(scenario: &Scenario) -> Result<(Self, Detector), ScenarioError> {
         let budget = Budget::checked(scenario)?;
+        let detector = Detector::new(Rule::MatchedFilter, scenario, &budget);
+        let peak_pixel = Detector::new(Rule::PeakPixel, scenario, &budget);
         let parameters = Parameter::all()
             .filter_map(|parameter| Some((parameter.name(), parameter.get(scenario)?)))
             .collect();
-        Ok(Self {
+        let prediction = Self {
             limit_vmag: budget.limit_vmag,
             star_e: budget.star_e,
             background_e: budget.background_e,
@@ -125,10 +134,11 @@ impl Prediction {
             parameters,
             reading: scenario.reading,
             camera: scenario.sensor.name.clone(),
-            detector: DetectorReport::new(Rule::MatchedFilter, scenario, &budget),
-            peak_pixel: DetectorReport::new(Rule::PeakPixel, scenario, &budget),
+            detector: DetectorReport::new(&detector),
+            peak_pixel: DetectorReport::new(&peak_pixel),
             budget,
-        })
+        };
+        Ok((prediction, detector))
     }
 }
 

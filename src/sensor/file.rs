@@ -1,6 +1,6 @@
 //! `camera.toml`: read strictly, with errors that name line and key.
 
-use super::keys::{KEYS, Key, Limits, nearest_name};
+use super::keys::{KEYS, Key, Limits, is_curve, nearest_name};
 use super::{Response, ResponseError, Sensor};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -216,7 +216,7 @@ impl Reading<'_> {
             spot_sigma_px: 0.0,
             peak_share: None,
         };
-        for key in KEYS.iter().filter(|key| !is_response(key.name)) {
+        for key in KEYS.iter().filter(|key| !is_curve(key.name)) {
             if let Some(value) = self.number(key)? {
                 (key.set)(&mut sensor, value);
             }
@@ -334,10 +334,6 @@ impl Reading<'_> {
                 }),
         }
     }
-}
-
-fn is_response(name: &str) -> bool {
-    ["lens_transmission", "quantum_efficiency"].contains(&name)
 }
 
 fn as_number(value: &toml::Value) -> Option<f64> {

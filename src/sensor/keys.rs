@@ -92,6 +92,11 @@ pub fn nearest_name<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Opt
         .map(|(_, known)| known)
 }
 
+/// Whether the number called `name` may be a curve by wavelength, and is then its largest value.
+pub fn is_curve(name: &str) -> bool {
+    ["lens_transmission", "quantum_efficiency"].contains(&name)
+}
+
 /// The longest side of a detector that makes sense, in pixels.
 const MAX_SIDE_PX: f64 = 100_000.0;
 /// Standard deviations of spots that make sense, in pixels: a wider one is no star.

@@ -15,7 +15,7 @@ mod preset;
 mod response;
 
 pub use file::SensorError;
-pub use keys::{KEYS, Key, Limits, nearest_name, template};
+pub use keys::{KEYS, Key, Limits, is_curve, nearest_name, template};
 pub use preset::Preset;
 pub use response::{Response, ResponseError};
 

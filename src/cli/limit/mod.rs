@@ -16,8 +16,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use starpipe::catalog::Catalog;
 use starpipe::sensitivity::{
-    Detector, Faintest, Figure, Prediction, Reading, Rule, Scenario, ScenarioError, Series, Sweep,
-    curves,
+    Detector, Faintest, Figure, Prediction, Reading, Scenario, ScenarioError, Series, Sweep, curves,
 };
 use starpipe::sensor::{Preset, Sensor};
 use std::path::{Path, PathBuf};
@@ -127,16 +126,17 @@ struct Swept {
 fn rows(arguments: &LimitArgs, scenario: &Scenario) -> Result<Vec<Row>, Fault> {
     let preset = arguments.preset.map(Preset::name);
     let row = |scenario: &Scenario, swept: Option<Swept>| {
-        let prediction = Prediction::new(scenario).map_err(|error| match swept {
-            Some(Swept { parameter, value }) => {
-                Fault::Usage(format!("{parameter} of {value}: {error}"))
-            }
-            None => usage(&error),
-        })?;
+        let (prediction, detector) =
+            Prediction::with_detector(scenario).map_err(|error| match swept {
+                Some(Swept { parameter, value }) => {
+                    Fault::Usage(format!("{parameter} of {value}: {error}"))
+                }
+                None => usage(&error),
+            })?;
         Ok::<_, Fault>(Row {
             // For its own sake only: in a sweep it would cost more than all the rest.
             faintest: match swept {
-                None => faintest(scenario, &prediction),
+                None => faintest(&scenario.sensor, &detector),
                 Some(_) => None,
             },
             prediction,
@@ -166,16 +166,14 @@ fn rows(arguments: &LimitArgs, scenario: &Scenario) -> Result<Vec<Row>, Fault> {
 }
 
 /// The faintest star to be expected in a field, with as many stars as the built-in catalogue has in one on average.
-fn faintest(scenario: &Scenario, prediction: &Prediction) -> Option<Faintest> {
-    let sensor = &scenario.sensor;
+fn faintest(sensor: &Sensor, detector: &Detector) -> Option<Faintest> {
     let field_sr = sensor.pixel_solid_angle_sr() * (sensor.width_px * sensor.height_px) as f64;
     let part_of_sky = (field_sr / (4.0 * std::f64::consts::PI)).min(1.0);
-    let detector = Detector::new(Rule::MatchedFilter, scenario, &prediction.budget);
     let stars = Catalog::built_in().stars().iter();
     Faintest::in_part_of_sky(
         stars.map(|star| f64::from(star.v_mag)),
         part_of_sky,
-        &detector,
+        detector,
     )
 }
 

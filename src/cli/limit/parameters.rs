@@ -3,7 +3,7 @@
 use super::text::number;
 use clap::{Arg, ArgMatches, Command, Error, FromArgMatches};
 use starpipe::sensitivity::{Conditions, Parameter, Scenario};
-use starpipe::sensor::{Response, ResponseError};
+use starpipe::sensor::{Response, ResponseError, is_curve};
 use std::path::PathBuf;
 
 /// Parameters that say the same: at most one of each is given.
@@ -114,10 +114,6 @@ fn option(parameter: Parameter) -> Arg {
         .allow_hyphen_values(true)
         .conflicts_with_all(others.copied())
         .value_parser(move |text: &str| given(parameter, text))
-}
-
-fn is_curve(name: &str) -> bool {
-    ["lens_transmission", "quantum_efficiency"].contains(&name)
 }
 
 fn given(parameter: Parameter, text: &str) -> Result<Given, String> {
