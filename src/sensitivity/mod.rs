@@ -7,6 +7,7 @@
 //! 3. The noise, and the signal that stands above it by the wanted ratio: the limiting magnitude of the peak-pixel rule.
 //! 4. [`Detector`]: what a detector makes of it, the peak-pixel rule and the matched filter as built: completeness.
 //! 5. [`Faintest`]: the faintest star to be expected among so many.
+//! 6. [`CramerRao`]: how well a star's place and light can be known at best.
 //!
 //! [`Prediction`] is what is told of a scenario, [`Sweep`] and [`curves`] follow its limit over one parameter, and [`Figure`]
 //! has those of the paper.
@@ -20,6 +21,7 @@
 mod budget;
 mod completeness;
 mod conditions;
+mod cramer_rao;
 mod faintest;
 mod figures;
 mod light;
@@ -30,6 +32,7 @@ mod sweep;
 pub use budget::{Band, Budget};
 pub use completeness::{Detector, Rule};
 pub use conditions::{Conditions, Extinction, Reading, Scenario, ScenarioError, SkyBrightness};
+pub use cramer_rao::CramerRao;
 pub use faintest::Faintest;
 pub use figures::Figure;
 pub use light::temperature_k_of;
