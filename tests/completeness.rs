@@ -11,7 +11,7 @@ use starpipe::coords::PixelPoint;
 use starpipe::detect::{DetectConfig, Detection, Workspace, detect};
 use starpipe::frame::Frame;
 use starpipe::sensitivity::{Budget, Detector, Extinction, Rule, Scenario, SkyBrightness};
-use starpipe::sensor::{Preset, Response, Sensor};
+use starpipe::sensor::{Imperfections, Preset, Response, Sensor};
 use starpipe::simulate::star_field;
 
 /// Side of the frames, in pixels.
@@ -224,6 +224,7 @@ fn camera(
         bias_adu: 100.0,
         spot_sigma_px,
         peak_share: None,
+        imperfections: Imperfections::default(),
     }
 }
 

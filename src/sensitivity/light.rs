@@ -44,13 +44,16 @@ pub(super) fn photons_of_mag_0(wavelength_nm: f64, temperature_k: f64) -> f64 {
     PHOTONS_OF_MAG_0 * photons(wavelength_nm) / photons(FLUX_NM)
 }
 
+/// The colours B−V that stars have, in magnitudes.
+pub(super) const BV_RANGE_MAG: (f64, f64) = (-0.35, 2.0);
+
 /// The temperature in kelvin of the black body that has this B−V, in magnitudes; beyond the colours that stars have, that of the
 /// last of them.
 ///
 /// # Reference
 /// Ballesteros 2012, EPL 97, 34008, eq. 14: within 2 % of stars' effective temperatures.
 pub fn temperature_k_of(bv_mag: f64) -> f64 {
-    let scaled = 0.92 * bv_mag.clamp(-0.35, 2.0);
+    let scaled = 0.92 * bv_mag.clamp(BV_RANGE_MAG.0, BV_RANGE_MAG.1);
     4600.0 * (1.0 / (scaled + 1.7) + 1.0 / (scaled + 0.62))
 }
 

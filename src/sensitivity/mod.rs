@@ -7,7 +7,8 @@
 //! 3. The noise, and the signal that stands above it by the wanted ratio: the limiting magnitude of the peak-pixel rule.
 //! 4. [`Detector`]: what a detector makes of it, the peak-pixel rule and the matched filter as built: completeness.
 //! 5. [`Faintest`]: the faintest star to be expected among so many.
-//! 6. [`CramerRao`]: how well a star's place and light can be known at best.
+//! 6. [`StarLight`]: the electrons of stars of all colours.
+//! 7. [`CramerRao`]: how well a star's place and light can be known at best.
 //!
 //! [`Prediction`] is what is told of a scenario, [`Sweep`] and [`curves`] follow its limit over one parameter, and [`Figure`]
 //! has those of the paper.
@@ -27,6 +28,7 @@ mod figures;
 mod light;
 mod parameters;
 mod prediction;
+mod star_light;
 mod sweep;
 
 pub use budget::{Band, Budget};
@@ -38,4 +40,5 @@ pub use figures::Figure;
 pub use light::temperature_k_of;
 pub use parameters::{CONDITION_KEYS, Parameter, UnknownParameter};
 pub use prediction::{CompletenessPoint, DetectorReport, Prediction};
+pub use star_light::StarLight;
 pub use sweep::{Curve, Series, Spacing, Sweep, SweepError, curves};

@@ -1,7 +1,7 @@
 //! `camera.toml`: read strictly, with errors that name line and key.
 
 use super::keys::{KEYS, Key, Limits, is_curve, nearest_name};
-use super::{Response, ResponseError, Sensor};
+use super::{IMPERFECTION_KEYS, Imperfections, Response, ResponseError, Sensor, SpotForm};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read as _;
@@ -109,8 +109,10 @@ const DEFAULTS: &[(&str, f64)] = &[
     ("band_from_nm", 400.0),
     ("band_to_nm", 900.0),
 ];
-/// What a file need not say, and what then follows from the others.
-const OPTIONAL: &[&str] = &["peak_share"];
+/// Whether a file need not say it, and it then follows from the others, or is none.
+fn is_optional(name: &str) -> bool {
+    name == "peak_share" || IMPERFECTION_KEYS.iter().any(|key| key.name == name)
+}
 
 type Table = BTreeMap<Spanned<String>, Spanned<toml::Value>>;
 
@@ -215,8 +217,14 @@ impl Reading<'_> {
             bias_adu: 0.0,
             spot_sigma_px: 0.0,
             peak_share: None,
+            imperfections: Imperfections {
+                spot_form: self.spot_form()?,
+                mirrored: self.mirrored()?,
+                ..Imperfections::default()
+            },
         };
-        for key in KEYS.iter().filter(|key| !is_curve(key.name)) {
+        let keys = KEYS.iter().chain(IMPERFECTION_KEYS);
+        for key in keys.filter(|key| !is_curve(key.name)) {
             if let Some(value) = self.number(key)? {
                 (key.set)(&mut sensor, value);
             }
@@ -231,7 +239,12 @@ impl Reading<'_> {
     }
 
     fn check_names(&self) -> Result<(), SensorError> {
-        let names = || std::iter::once("name").chain(KEYS.iter().map(|key| key.name));
+        let numbers = || KEYS.iter().chain(IMPERFECTION_KEYS).map(|key| key.name);
+        let names = || {
+            ["name", "spot_form", "mirrored"]
+                .into_iter()
+                .chain(numbers())
+        };
         for key in self.table.keys() {
             let name = key.get_ref().as_str();
             if !names().any(|known| known == name) {
@@ -279,13 +292,32 @@ impl Reading<'_> {
         }
     }
 
+    fn spot_form(&self) -> Result<SpotForm, SensorError> {
+        let Some(value) = self.get("spot_form") else {
+            return Ok(SpotForm::default());
+        };
+        let form = value.get_ref().as_str().and_then(SpotForm::named);
+        form.ok_or_else(|| {
+            let names = SpotForm::ALL.map(|form| format!("\"{}\"", form.name()));
+            self.wrong("spot_form", value, format!("one of {}", names.join(", ")))
+        })
+    }
+
+    fn mirrored(&self) -> Result<bool, SensorError> {
+        let Some(value) = self.get("mirrored") else {
+            return Ok(false);
+        };
+        let mirrored = value.get_ref().as_bool();
+        mirrored.ok_or_else(|| self.wrong("mirrored", value, "true or false".to_owned()))
+    }
+
     /// The value of a key; none where it is to follow from the others.
     fn number(&self, key: &Key<Sensor>) -> Result<Option<f64>, SensorError> {
         let Some(value) = self.get(key.name) else {
             let default = DEFAULTS.iter().find(|(name, _)| *name == key.name);
             return match default {
                 Some((_, value)) => Ok(Some(*value)),
-                None if OPTIONAL.contains(&key.name) => Ok(None),
+                None if is_optional(key.name) => Ok(None),
                 None => Err(self.missing(key.name)),
             };
         };

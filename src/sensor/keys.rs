@@ -1,6 +1,6 @@
 //! The numbers of a camera by name: one table for the file, the options and the sweeps.
 
-use super::{Preset, Response, Sensor};
+use super::{IMPERFECTION_KEYS, Preset, Response, Sensor, SpotForm};
 use std::fmt;
 use std::fmt::Write as _;
 
@@ -15,6 +15,8 @@ pub enum Limits {
     Share,
     /// A whole number from one to the other.
     Whole(f64, f64),
+    /// From the first to the second.
+    FromTo(f64, f64),
     /// From the first to below the second.
     FromToBelow(f64, f64),
     /// Any number.
@@ -30,6 +32,7 @@ impl Limits {
                 Self::NotNegative => value >= 0.0,
                 Self::Share => value > 0.0 && value <= 1.0,
                 Self::Whole(from, to) => (from..=to).contains(&value) && value.fract() == 0.0,
+                Self::FromTo(from, to) => (from..=to).contains(&value),
                 Self::FromToBelow(from, to) => (from..to).contains(&value),
                 Self::Finite => true,
             }
@@ -43,6 +46,7 @@ impl fmt::Display for Limits {
             Self::NotNegative => write!(f, "a number from 0 up"),
             Self::Share => write!(f, "a number above 0 and at most 1"),
             Self::Whole(from, to) => write!(f, "a whole number from {from} to {to}"),
+            Self::FromTo(from, to) => write!(f, "a number from {from} to {to}"),
             Self::FromToBelow(from, to) => write!(f, "a number from {from} to below {to}"),
             Self::Finite => write!(f, "a number"),
         }
@@ -231,6 +235,26 @@ pub fn template(preset: Preset) -> String {
             _ => (key.get)(&sensor).map_or_else(String::new, |value| value.to_string()),
         };
         let _ = writeln!(text, "\n# {}\n{} = {value}", key.about, key.name);
+    }
+    text + &imperfections(&sensor)
+}
+
+/// What a file need not say: as comments, with what then holds.
+fn imperfections(sensor: &Sensor) -> String {
+    let mut text =
+        "\n# Of the rest, which simulated frames show, each may be left out:\n".to_owned();
+    let forms = SpotForm::ALL.map(|form| format!("{:?}", form.name()));
+    let imperfections = &sensor.imperfections;
+    let _ = writeln!(
+        text,
+        "\n# form of a star's spot: {}\n# spot_form = {:?}\n\n# whether the image is reversed left to right\n# mirrored = {}",
+        forms.join(", "),
+        imperfections.spot_form.name(),
+        imperfections.mirrored
+    );
+    for key in IMPERFECTION_KEYS {
+        let value = (key.get)(sensor).map_or_else(String::new, |value| value.to_string());
+        let _ = writeln!(text, "\n# {}\n# {} = {value}", key.about, key.name);
     }
     text
 }

@@ -6,15 +6,19 @@
 //! one with comments. A transmission or an efficiency is a number, or a CSV file of two columns, wavelength in
 //! nanometres and value, which [`Response`] interpolates.
 //!
-//! Caveats: one spot for the whole field, of Gaussian form; no vignetting, no stray light; the response of all pixels is
-//! the same.
+//! What the limit does not depend on, and a simulated frame shows (vignetting, distortion, pixels that differ) is in
+//! [`Imperfections`].
+//!
+//! Caveats: one spot for the whole field; no stray light.
 
 mod file;
+mod imperfections;
 mod keys;
 mod preset;
 mod response;
 
 pub use file::SensorError;
+pub use imperfections::{IMPERFECTION_KEYS, Imperfections, SpotForm};
 pub use keys::{KEYS, Key, Limits, is_curve, nearest_name, template};
 pub use preset::Preset;
 pub use response::{Response, ResponseError};
@@ -63,6 +67,8 @@ pub struct Sensor {
     /// The part of a star's light on its brightest pixel, where that is stated and not to follow from
     /// [`Self::spot_sigma_px`].
     pub peak_share: Option<f64>,
+    /// What its limit does not depend on, and a simulated frame shows.
+    pub imperfections: Imperfections,
 }
 
 impl Sensor {

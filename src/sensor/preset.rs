@@ -1,6 +1,6 @@
 //! Cameras that are ready.
 
-use super::{Response, Sensor};
+use super::{Imperfections, Response, Sensor};
 
 /// A camera whose description is built in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,6 +112,7 @@ fn papers_camera() -> Sensor {
         bias_adu: 128.0,
         spot_sigma_px: 1.16,
         peak_share: Some(1.0 / 9.0),
+        imperfections: Imperfections::default(),
     }
 }
 
@@ -158,6 +159,7 @@ fn nanosat_tracker() -> Sensor {
         bias_adu: 42.0,
         spot_sigma_px: 1.5,
         peak_share: None,
+        imperfections: Imperfections::default(),
     }
 }
 
@@ -206,6 +208,7 @@ fn imx174() -> Sensor {
         bias_adu: 10.0,
         spot_sigma_px: 0.7,
         peak_share: None,
+        imperfections: Imperfections::default(),
     }
 }
 
@@ -263,6 +266,7 @@ fn asi183() -> Sensor {
         bias_adu: 10.0,
         spot_sigma_px: 1.2,
         peak_share: None,
+        imperfections: Imperfections::default(),
     }
 }
 
