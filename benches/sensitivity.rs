@@ -11,7 +11,7 @@ use starpipe::catalog::Catalog;
 use starpipe::coords::{Rotation, UnitVector};
 use starpipe::sensitivity::{Budget, Detector, Rule, Scenario};
 use starpipe::sensor::Preset;
-use starpipe::simulate::{Pointing, frame_of_sky, square_pixel_camera};
+use starpipe::simulate::{Pointing, Scene, Simulator};
 use std::hint::black_box;
 
 fn prediction(criterion: &mut Criterion) {
@@ -32,13 +32,20 @@ fn simulation(criterion: &mut Criterion) {
     let scenario = Scenario::of(Preset::Experiment2);
     let boresight = UnitVector::from_ra_dec(296.8f64.to_radians(), 41.4f64.to_radians());
     let pointing = Pointing {
-        camera: square_pixel_camera(&scenario.sensor),
         icrs_to_camera: Rotation::looking_at(&boresight, 0.0),
         years_since_j2000: 0.0,
     };
     let stars = Catalog::built_in().stars();
-    criterion.bench_function("frame_of_sky/752x582", |b| {
-        b.iter(|| frame_of_sky(&scenario, &pointing, stars, black_box(1)).unwrap());
+    let simulator = Simulator::new(&scenario, &Scene::default(), stars).unwrap();
+    criterion.bench_function("simulate/752x582", |b| {
+        b.iter(|| simulator.frame(&pointing, black_box(1)).unwrap());
+    });
+    let mut patterned = scenario.clone();
+    patterned.sensor.imperfections.response_sigma = 0.01;
+    patterned.sensor.imperfections.vignetting = 0.3;
+    let simulator = Simulator::new(&patterned, &Scene::default(), stars).unwrap();
+    criterion.bench_function("simulate/752x582_uneven", |b| {
+        b.iter(|| simulator.frame(&pointing, black_box(1)).unwrap());
     });
 }
 

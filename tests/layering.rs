@@ -30,6 +30,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &[
             "units",
             "coords",
+            "observer",
             "frame",
             "camera",
             "catalog",
@@ -51,7 +52,14 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ),
     (
         "comparison",
-        &["units", "statistics", "sensor", "detect", "sensitivity"],
+        &[
+            "units",
+            "statistics",
+            "sensor",
+            "detect",
+            "photometry",
+            "sensitivity",
+        ],
     ),
     (
         "diagnosis",
@@ -125,6 +133,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "observer",
             "sensor",
             "frame",
+            "camera",
             "catalog",
             "detect",
             "sensitivity",

@@ -13,8 +13,9 @@
 //! than its own error; a bias that is not the camera's shows as noise that does not fit.
 
 use crate::detect::DetectConfig;
+use crate::photometry::zero_point::REFERENCE_BV_MAG;
 use crate::sensitivity::{
-    Budget, Detector, Extinction, Faintest, Rule, Scenario, SkyBrightness, temperature_k_of,
+    Budget, Detector, Extinction, Faintest, Rule, Scenario, SkyBrightness, StarLight,
 };
 use crate::sensor::Sensor;
 use crate::statistics::Estimate;
@@ -54,8 +55,10 @@ pub struct Seen<'a> {
     pub header_zenith_distance_deg: Option<f64>,
     /// V magnitude of a star that gives one ADU a second.
     pub zero_point_vmag: Option<Estimate>,
-    /// B−V of the stars for which that holds, where known.
-    pub zero_point_bv_mag: Option<f64>,
+    /// B−V of the stars that it is from, where known.
+    pub zero_point_colors_mag: &'a [f64],
+    /// Whether it is that of [`REFERENCE_BV_MAG`], with a term linear in the colour, and not that of all those stars.
+    pub has_color_term: bool,
     /// V magnitude at which half of the stars are found.
     pub limit_vmag: Option<Estimate>,
     /// V magnitude of the faintest star identified.
@@ -120,7 +123,7 @@ pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
     let budget = Budget::new(&scenario);
     let detector = Detector::matched_filter(&seen.detect, &scenario, &budget);
     let peak = Detector::new(Rule::PeakPixel, &scenario, &budget);
-    let zero_point_vmag = zero_point_vmag(&scenario, seen.zero_point_bv_mag);
+    let zero_point_vmag = zero_point_vmag(&scenario, seen);
     let limit_vmag = detector.vmag_at(0.5);
     let faintest = Faintest::among(seen.field_vmag.iter().copied(), &detector);
     let minus = |measured: Option<Estimate>, predicted: f64| {
@@ -166,13 +169,27 @@ pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
     })
 }
 
-/// V magnitude of a star of this B−V that gives one ADU a second: without a filter that depends on the colour.
-fn zero_point_vmag(scenario: &Scenario, bv_mag: Option<f64>) -> f64 {
-    let mut of_color = scenario.clone();
-    if let Some(bv_mag) = bv_mag {
-        of_color.conditions.star_temperature_k = temperature_k_of(bv_mag);
+/// V magnitude that stars of the colours seen, treated as the frame's are, would give for one ADU a second.
+fn zero_point_vmag(scenario: &Scenario, seen: &Seen) -> f64 {
+    let gain_e_per_adu = scenario.sensor.gain_e_per_adu;
+    let light = StarLight::new(scenario);
+    let of_a_second = light.budget().vmag_of(gain_e_per_adu, 1.0);
+    let zero_point = |bv_mag: &f64| of_a_second + light.color_effect_mag(*bv_mag);
+    let colors = seen.zero_point_colors_mag;
+    let mean = |value: &dyn Fn(&f64) -> f64| {
+        colors.iter().map(value).sum::<f64>() / colors.len().max(1) as f64
+    };
+    if colors.is_empty() {
+        return of_a_second;
     }
-    Budget::new(&of_color).vmag_of(scenario.sensor.gain_e_per_adu, 1.0)
+    let (mean_bv_mag, mean_vmag) = (mean(&|bv| *bv), mean(&zero_point));
+    if !seen.has_color_term {
+        return mean_vmag;
+    }
+    let off = |bv: &f64| bv - mean_bv_mag;
+    let spread = mean(&|bv| off(bv).powi(2));
+    let slope = mean(&|bv| off(bv) * zero_point(bv)) / spread.max(f64::MIN_POSITIVE);
+    mean_vmag + slope * (REFERENCE_BV_MAG - mean_bv_mag)
 }
 
 /// The sky's brightness by the frame's level, else by its noise.
@@ -309,7 +326,8 @@ mod tests {
             zenith_distance_deg: None,
             header_zenith_distance_deg: None,
             zero_point_vmag: None,
-            zero_point_bv_mag: None,
+            zero_point_colors_mag: &[],
+            has_color_term: false,
             limit_vmag: None,
             faintest_vmag: None,
             field_vmag: &[],
@@ -359,14 +377,20 @@ mod tests {
 
     #[test]
     fn the_zero_point_is_that_of_stars_of_the_same_color() {
-        let zero_point = |bv_mag| {
+        let zero_point = |colors: &[f64], has_color_term| {
             let mut frame = seen(16.0);
-            frame.zero_point_bv_mag = bv_mag;
+            frame.zero_point_colors_mag = colors;
+            frame.has_color_term = has_color_term;
             compare(&description(), &frame).unwrap().zero_point_vmag
         };
+        let mean = |colors: &[f64]| zero_point(colors, false);
         // A black body of 5800 K has B−V 0.64. Red stars give more electrons than blue ones of the same V.
-        assert!((zero_point(None) - zero_point(Some(0.643))).abs() < 1e-3);
-        assert!(zero_point(Some(1.4)) > zero_point(Some(0.6)) + 0.1);
+        assert!((mean(&[]) - mean(&[0.643])).abs() < 1e-3);
+        assert!(mean(&[1.4]) > mean(&[0.6]) + 0.1);
+        // A straight line through a curve that bends upward at both ends is above it in the middle.
+        let line = zero_point(&[0.0, 0.6, 1.2], true);
+        assert!((line - mean(&[0.0, 0.6, 1.2])).abs() < 1e-9 && line > mean(&[0.6]) + 0.005);
+        assert!((zero_point(&[0.6; 9], true) - mean(&[0.6])).abs() < 1e-9);
     }
 
     #[test]

@@ -34,7 +34,7 @@ use crate::identify::Outcome;
 use crate::pipeline::{DateSource, FrameDate, Knowledge, Pipeline, Solution, SolveConfig};
 use crate::report::to_decimals;
 use crate::sensitivity::{Budget, Detector, Rule, Scenario};
-use crate::simulate::Pointing;
+use crate::simulate::{Pointing, Scene, Simulator};
 use serde::Serialize;
 use simulated::Protocol;
 
@@ -167,14 +167,16 @@ pub fn run(
             first: None,
         });
     };
+    let stars = pipeline.catalog().stars();
+    let simulator = Simulator::new(&scenario, &Scene::default(), stars)?;
     let protocol = Protocol {
         scenario: &scenario,
+        simulator: &simulator.with_camera(found.camera.clone()),
         detectors: [
             &detector,
             &Detector::new(Rule::PeakPixel, &scenario, &budget),
         ],
         pointing: &Pointing {
-            camera: found.camera.clone(),
             icrs_to_camera: found.icrs_to_camera,
             years_since_j2000: published.date.years_since_j2000(),
         },
@@ -186,7 +188,7 @@ pub fn run(
     };
     let simulated = protocol.run(pipeline, trials.count, done)?;
     report.simulated = Some(SimulatedReport::new(&simulated, &detector, trials.seed));
-    let (frame, _) = protocol.frame(pipeline.catalog().stars(), 0)?;
+    let (frame, _) = protocol.frame(0)?;
     let solution = protocol.solve(pipeline, &frame, &mut Workspace::new())?;
     Ok(Run {
         report,

@@ -1,6 +1,7 @@
 //! Frames simulated with the experiment's camera, sky and pointing, and what the pipeline finds in them.
 
 use super::ExperimentError;
+use crate::camera::CameraModel;
 use crate::catalog::Star;
 use crate::coords::{Camera, Icrs, PixelPoint, Rotation};
 use crate::detect::Workspace;
@@ -8,7 +9,7 @@ use crate::frame::Frame;
 use crate::identify::{Identification, Outcome, StarMatch};
 use crate::pipeline::{Pipeline, Solution, SolveConfig, Source};
 use crate::sensitivity::{Detector, Faintest, Scenario};
-use crate::simulate::{Pointing, TrueStar, Truth, frame_of_sky};
+use crate::simulate::{Pointing, Simulator, TrueStar, Truth};
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -22,6 +23,7 @@ const AT_PLACE_PX: f64 = 2.0;
 /// What is simulated, again and again.
 pub(super) struct Protocol<'a> {
     pub scenario: &'a Scenario,
+    pub simulator: &'a Simulator<'a>,
     /// The detector as built, and the paper's rule of the brightest pixel.
     pub detectors: [&'a Detector; 2],
     pub pointing: &'a Pointing,
@@ -72,7 +74,7 @@ impl Protocol<'_> {
         (0..trials)
             .into_par_iter()
             .map_init(Workspace::new, |workspace, number| {
-                let (frame, truth) = self.frame(pipeline.catalog().stars(), number)?;
+                let (frame, truth) = self.frame(number)?;
                 let solution = self.solve(pipeline, &frame, workspace)?;
                 done();
                 Ok(self.judged(&truth, &solution, pipeline.catalog().stars()))
@@ -81,24 +83,15 @@ impl Protocol<'_> {
     }
 
     /// The frame of one trial; its random numbers depend on the seed and its own number only.
-    pub(super) fn frame(
-        &self,
-        stars: &[Star],
-        number: u64,
-    ) -> Result<(Frame, Truth), ExperimentError> {
+    pub(super) fn frame(&self, number: u64) -> Result<(Frame, Truth), ExperimentError> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         random.set_stream(number);
         let shift_px = [0, 1].map(|_| random.random_range(-SHIFT_PX..SHIFT_PX));
         let pointing = Pointing {
-            icrs_to_camera: shifted(self.pointing, shift_px),
+            icrs_to_camera: shifted(self.pointing, self.simulator.camera(), shift_px),
             ..self.pointing.clone()
         };
-        Ok(frame_of_sky(
-            self.scenario,
-            &pointing,
-            stars,
-            random.random(),
-        )?)
+        Ok(self.simulator.frame(&pointing, random.random())?)
     }
 
     pub(super) fn solve(
@@ -118,7 +111,7 @@ impl Protocol<'_> {
             .iter()
             .filter(star_like)
             .filter_map(|source| light.owner(&source.position))
-            .map(|star| star.catalog)
+            .filter_map(|star| star.catalog)
             .collect();
         let found = match &solution.outcome {
             Outcome::Identified(found) => Some(&**found),
@@ -129,8 +122,8 @@ impl Protocol<'_> {
         };
         let trials = truth.stars.iter().map(|star| StarTrial {
             v_mag: star.v_mag,
-            detected: owners.contains(&star.catalog),
-            identified: named(star.catalog),
+            detected: star.catalog.is_some_and(|star| owners.contains(&star)),
+            identified: star.catalog.is_some_and(named),
         });
         let v_mags = || truth.stars.iter().map(|star| star.v_mag);
         Trial {
@@ -144,9 +137,13 @@ impl Protocol<'_> {
 }
 
 /// The attitude with which every star falls so many pixels further along x and y, near the frame's centre.
-fn shifted(pointing: &Pointing, [dx, dy]: [f64; 2]) -> Rotation<Icrs, Camera> {
-    let radian = |px: f64| px / pointing.camera.focal_length_px;
-    let dx = if pointing.camera.mirrored { -dx } else { dx };
+fn shifted(
+    pointing: &Pointing,
+    camera: &CameraModel,
+    [dx, dy]: [f64; 2],
+) -> Rotation<Icrs, Camera> {
+    let radian = |px: f64| px / camera.focal_length_px;
+    let dx = if camera.mirrored { -dx } else { dx };
     pointing
         .icrs_to_camera
         .then_turn(Vector3::new(-radian(dy), radian(dx), 0.0))
@@ -193,7 +190,7 @@ fn identified(
 ) -> Option<Identified> {
     let is_wrong = |m: &StarMatch| {
         let owner = light.owner(&solution.sources[m.observed].position);
-        owner.is_none_or(|star| star.catalog != m.catalog)
+        owner.is_none_or(|star| star.catalog != Some(m.catalog))
     };
     // The catalogue is in the order of magnitude.
     let faintest = found.matches.iter().max_by_key(|m| m.catalog)?;

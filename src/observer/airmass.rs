@@ -21,6 +21,15 @@ pub fn airmass_plane_parallel(zenith_distance_rad: f64) -> f64 {
     1.0 / zenith_distance_rad.cos()
 }
 
+/// The airmass for light scattered in the air: 1 at the zenith, 5 at the horizon.
+///
+/// # Reference
+/// Krisciunas & Schaefer 1991, PASP 103, 1033, eq. (3).
+pub fn airmass_krisciunas_schaefer(zenith_distance_rad: f64) -> f64 {
+    let sine = zenith_distance_rad.sin();
+    (1.0 - 0.96 * sine * sine).sqrt().recip()
+}
+
 /// The part of the sea level's pressure that is left at a height in metres: the 1976 US Standard Atmosphere's troposphere
 /// continued, 0 where that ends.
 ///
@@ -59,6 +68,14 @@ mod tests {
 
     /// The paper's formula stays so close to the paper's tables.
     const TABLE_TOLERANCE: f64 = 2e-3;
+
+    #[test]
+    fn scattered_light_comes_through_less_air() {
+        assert_eq!(airmass_krisciunas_schaefer(0.0), 1.0);
+        // (1 − 0.96 · 0.75)^−½ at 60°.
+        assert!((airmass_krisciunas_schaefer(60f64.to_radians()) - 1.889_82).abs() < 1e-5);
+        assert!((airmass_krisciunas_schaefer(FRAC_PI_2) - 5.0).abs() < 1e-9);
+    }
 
     #[test]
     fn the_airmass_is_that_of_the_published_tables() {

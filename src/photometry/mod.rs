@@ -52,6 +52,8 @@ pub struct FramePhotometry {
     /// V magnitude of a star that gives 1 ADU, or 1 ADU a second where the exposure is known; `None` where too few stars
     /// tell.
     pub zero_point: Option<ZeroPoint>,
+    /// B−V of the stars that it is from, where known.
+    pub zero_point_colors_mag: Vec<f64>,
     /// The exposure that fluxes were divided by, in seconds.
     pub exposure_s: Option<f64>,
     /// Which part of the stars is detected.
@@ -97,6 +99,7 @@ pub fn measure(frame: &MeasuredFrame, sky: &Sky) -> FramePhotometry {
         .collect();
     FramePhotometry {
         zero_point: zero_point::measure(&measured),
+        zero_point_colors_mag: measured.iter().filter_map(|star| star.bv_mag).collect(),
         exposure_s: frame.exposure_s,
         completeness,
     }

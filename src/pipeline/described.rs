@@ -75,7 +75,9 @@ impl Found<'_> {
                     value: zero.v_mag,
                     sigma: zero.sigma_mag,
                 }),
-                zero_point_bv_mag: zero_point.and_then(|zero| zero.bv_mag),
+                zero_point_colors_mag: photometry
+                    .map_or(&[], |measured| &measured.zero_point_colors_mag),
+                has_color_term: zero_point.is_some_and(|zero| zero.color_term.is_some()),
                 limit_vmag: limit.map(|limit| Estimate {
                     value: limit.v_mag,
                     sigma: limit.sigma_mag,

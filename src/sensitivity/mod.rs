@@ -33,7 +33,9 @@ mod sweep;
 
 pub use budget::{Band, Budget};
 pub use completeness::{Detector, Rule};
-pub use conditions::{Conditions, Extinction, Reading, Scenario, ScenarioError, SkyBrightness};
+pub use conditions::{
+    Conditions, Extinction, REFERENCE_NM, Reading, Scenario, ScenarioError, SkyBrightness,
+};
 pub use cramer_rao::CramerRao;
 pub use faintest::Faintest;
 pub use figures::Figure;

@@ -51,6 +51,12 @@ impl StarLight {
         of_scenario * bv_mag.map_or(1.0, |bv_mag| self.relative(bv_mag))
     }
 
+    /// How much fainter in V than a star of the scenario's temperature one of this B−V may be to leave as many electrons, in
+    /// magnitudes.
+    pub fn color_effect_mag(&self, bv_mag: f64) -> f64 {
+        2.5 * self.relative(bv_mag).log10()
+    }
+
     /// The V magnitude at which a star of the scenario's temperature leaves so many electrons.
     pub fn vmag_of(&self, electrons: f64) -> f64 {
         self.budget.vmag_of(electrons, self.exposure_s)

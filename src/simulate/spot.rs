@@ -1,64 +1,90 @@
 //! The light of a star on its pixels.
 
+use super::canvas::Canvas;
 use crate::coords::PixelPoint;
-use crate::sensitivity::Scenario;
+use crate::sensor::SpotForm;
 use crate::statistics::{normal_cdf, normal_density};
+use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Beyond so many standard deviations there is less than 10⁻¹⁴ of the light.
+/// Beyond so many standard deviations a Gaussian has less than 10⁻¹⁴ of its light.
 const REACH_SIGMAS: f64 = 8.0;
-/// A smear shorter than this, in standard deviations, changes no pixel by 10⁻⁷ of its light, and is none.
-const LEAST_SMEAR: f64 = 1e-3;
+/// The radius of an even disc whose standard deviation along an axis is 1.
+const DISC_RADIUS: f64 = 2.0;
 
-/// A Gaussian, smeared evenly along the rows, integrated over the pixels.
+/// A star's spot, in the form that the camera gives it.
 #[derive(Debug, Clone)]
 pub(super) struct Spot {
+    form: SpotForm,
     sigma_px: f64,
-    /// Along x.
-    smear_px: f64,
-    /// Room for the parts of the light in the columns of one star.
+    /// Room for the parts of the light in the columns and the rows of one star.
     columns: Vec<f64>,
+    rows: Vec<f64>,
 }
 
 impl Spot {
-    pub(super) fn of(scenario: &Scenario) -> Self {
+    pub(super) fn new(form: SpotForm, sigma_px: f64) -> Self {
         Self {
-            sigma_px: scenario.sensor.spot_sigma_px,
-            smear_px: scenario.conditions.motion_px,
+            form,
+            sigma_px,
             columns: Vec::new(),
+            rows: Vec::new(),
         }
     }
 
-    /// How far from its middle a star's light reaches, in pixels.
-    pub(super) fn reach_px(&self) -> f64 {
-        REACH_SIGMAS * self.sigma_px + self.smear_px / 2.0
+    /// Its standard deviation on each axis, in pixels.
+    pub(super) fn sigma_px(&self) -> f64 {
+        self.sigma_px
     }
 
-    /// Adds the light of a star at `position` to `expected_e`: row-major, `width` to a row.
-    pub(super) fn add(
-        &mut self,
-        expected_e: &mut [f64],
-        width: usize,
-        position: &PixelPoint,
-        electrons: f64,
-    ) {
-        let reach_y_px = REACH_SIGMAS * self.sigma_px;
-        let columns = pixels_within(position.x, self.reach_px(), width);
-        let rows = pixels_within(position.y, reach_y_px, expected_e.len() / width);
-        let mut shares = std::mem::take(&mut self.columns);
-        shares.clear();
-        shares.extend(columns.clone().map(|x| {
-            let offset_px = x as f64 - position.x;
-            share(offset_px, self.sigma_px, self.smear_px)
-        }));
-        for y in rows {
-            let row_e = electrons * share(y as f64 - position.y, self.sigma_px, 0.0);
-            let row = &mut expected_e[y * width..][columns.clone()];
-            for (pixel, share) in row.iter_mut().zip(&shares) {
+    /// How far from its middle its light reaches, in pixels.
+    pub(super) fn reach_px(&self) -> f64 {
+        let sigmas = match self.form {
+            SpotForm::Gaussian | SpotForm::SampledGaussian => REACH_SIGMAS,
+            SpotForm::Disc => DISC_RADIUS,
+        };
+        sigmas * self.sigma_px
+    }
+
+    /// Adds so many electrons of a star at `position` to those that are expected in each pixel.
+    pub(super) fn add(&mut self, canvas: &mut Canvas, position: &PixelPoint, electrons: f64) {
+        let columns = pixels_within(position.x, self.reach_px(), canvas.width());
+        let rows = pixels_within(position.y, self.reach_px(), canvas.height());
+        if columns.is_empty() || rows.is_empty() {
+            return;
+        }
+        if self.form == SpotForm::Disc {
+            let radius_px = self.reach_px();
+            for y in rows {
+                let y_px = y as f64 - position.y;
+                let pixels = &mut canvas.row_mut(y)[columns.clone()];
+                for (x, pixel) in columns.clone().zip(pixels) {
+                    *pixel += electrons * disc_share(x as f64 - position.x, y_px, radius_px);
+                }
+            }
+            return;
+        }
+        profile(
+            self.form,
+            self.sigma_px,
+            columns.clone(),
+            position.x,
+            &mut self.columns,
+        );
+        profile(
+            self.form,
+            self.sigma_px,
+            rows.clone(),
+            position.y,
+            &mut self.rows,
+        );
+        for (y, share) in rows.zip(&self.rows) {
+            let row_e = electrons * share;
+            let pixels = &mut canvas.row_mut(y)[columns.clone()];
+            for (pixel, share) in pixels.iter_mut().zip(&self.columns) {
                 *pixel += row_e * share;
             }
         }
-        self.columns = shares;
     }
 }
 
@@ -69,43 +95,73 @@ fn pixels_within(at: f64, reach_px: f64, side: usize) -> Range<usize> {
     first..bound((at + reach_px).round() + 1.0).max(first)
 }
 
-/// The part of the light, along one axis, in a pixel whose centre is `offset_px` from the spot's.
-fn share(offset_px: f64, sigma_px: f64, smear_px: f64) -> f64 {
-    let between = |integral: &dyn Fn(f64) -> f64| {
-        integral((offset_px + 0.5) / sigma_px) - integral((offset_px - 0.5) / sigma_px)
-    };
-    let smear = smear_px / sigma_px;
-    if smear < LEAST_SMEAR {
-        return between(&normal_cdf);
+/// The parts of the light, along one axis, in `pixels`, of a Gaussian whose middle is `at`.
+fn profile(form: SpotForm, sigma_px: f64, pixels: Range<usize>, at: f64, into: &mut Vec<f64>) {
+    into.clear();
+    if form == SpotForm::SampledGaussian {
+        let density = |x: usize| normal_density((x as f64 - at) / sigma_px) / sigma_px;
+        return into.extend(pixels.map(density));
     }
-    let smeared = |z: f64| {
-        (integrated_cumulative(z + smear / 2.0) - integrated_cumulative(z - smear / 2.0)) / smear
-    };
-    between(&smeared)
+    let before = |x: usize| normal_cdf((x as f64 - 0.5 - at) / sigma_px);
+    let mut low = before(pixels.start);
+    into.extend(pixels.map(|x| {
+        let high = before(x + 1);
+        // The difference of what is left beyond is exact where both are near 1.
+        let share = if low < 0.5 {
+            high - low
+        } else {
+            let beyond = |x: usize| normal_cdf(-(x as f64 - 0.5 - at) / sigma_px);
+            beyond(x) - beyond(x + 1)
+        };
+        low = high;
+        share
+    }));
 }
 
-/// The integral of Φ from −∞ to z: z Φ(z) + φ(z).
-fn integrated_cumulative(z: f64) -> f64 {
-    z * normal_cdf(z) + normal_density(z)
+/// The part of an even disc in a pixel whose middle is at (x, y) from the disc's.
+fn disc_share(x_px: f64, y_px: f64, radius_px: f64) -> f64 {
+    let [left, right] = [-0.5, 0.5].map(|half| (x_px + half) / radius_px);
+    let [top, bottom] = [-0.5, 0.5].map(|half| (y_px + half) / radius_px);
+    let area = disc_before(right, bottom) - disc_before(left, bottom) - disc_before(right, top)
+        + disc_before(left, top);
+    (area / PI).max(0.0)
+}
+
+/// The area of the unit disc where X ≤ x and Y ≤ y.
+fn disc_before(x: f64, y: f64) -> f64 {
+    let (x, y) = (x.clamp(-1.0, 1.0), y.clamp(-1.0, 1.0));
+    // The integral of √(1 − X²).
+    let half_disc = |x: f64| 0.5 * (x * (1.0 - x * x).max(0.0).sqrt() + libm::asin(x));
+    // Where the line Y = y leaves the disc.
+    let chord = (1.0 - y * y).max(0.0).sqrt();
+    let crossed = if x > -chord {
+        let end = x.min(chord);
+        y * (end + chord) + half_disc(end) - half_disc(-chord)
+    } else {
+        0.0
+    };
+    if y < 0.0 {
+        return crossed;
+    }
+    let whole = |from: f64, to: f64| 2.0 * (half_disc(to) - half_disc(from));
+    let left = whole(-1.0, x.min(-chord));
+    let right = if x > chord { whole(chord, x) } else { 0.0 };
+    left + crossed + right
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// The pixels of a spot on an empty frame.
-    fn drawn(sigma_px: f64, smear_px: f64, at: (f64, f64)) -> Vec<f64> {
-        let mut spot = Spot {
-            sigma_px,
-            smear_px,
-            columns: Vec::new(),
-        };
-        let mut pixels = vec![0.0; SIDE * SIDE];
-        spot.add(&mut pixels, SIDE, &PixelPoint::new(at.0, at.1), 1.0);
-        pixels
-    }
-
     const SIDE: usize = 64;
+
+    /// The pixels of a spot on an empty frame.
+    fn drawn(form: SpotForm, sigma_px: f64, at: (f64, f64)) -> Vec<f64> {
+        let mut canvas = Canvas::new(SIDE, SIDE, 0.0);
+        let position = PixelPoint::new(at.0, at.1);
+        Spot::new(form, sigma_px).add(&mut canvas, &position, 1.0);
+        canvas.into_pixels()
+    }
 
     /// Mean and variance along x and y of light that adds up to 1.
     fn moments(pixels: &[f64]) -> [(f64, f64); 2] {
@@ -122,65 +178,97 @@ mod tests {
 
     #[test]
     fn no_light_is_lost_and_its_middle_and_width_are_those_asked_for() {
-        for (sigma, smear) in [
-            (0.7, 0.0),
-            (1.16, 0.0),
-            (1.16, 0.01),
-            (1.0, 2.0),
-            (1.5, 7.3),
+        for (form, sigma) in [
+            (SpotForm::Gaussian, 0.7),
+            (SpotForm::Gaussian, 1.16),
+            (SpotForm::Gaussian, 1.5),
+            (SpotForm::Disc, 0.9),
+            (SpotForm::Disc, 3.2),
         ] {
-            let pixels = drawn(sigma, smear, (31.3, 30.8));
-            assert!((pixels.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            let pixels = drawn(form, sigma, (31.3, 30.8));
+            assert!((pixels.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{form:?}");
             let [(x, var_x), (y, var_y)] = moments(&pixels);
-            assert!(
-                (x - 31.3).abs() < 1e-3 && (y - 30.8).abs() < 1e-3,
-                "{x} {y}"
-            );
-            // A pixel adds 1/12, as a smear adds its length squared over 12; below σ = 1 the sampling shows.
-            let expected_y = sigma * sigma + 1.0 / 12.0;
-            let expected_x = expected_y + smear * smear / 12.0;
-            assert!(
-                (var_x - expected_x).abs() < 5e-3,
-                "{sigma} {smear}: {var_x}"
-            );
-            assert!(
-                (var_y - expected_y).abs() < 5e-3,
-                "{sigma} {smear}: {var_y}"
-            );
+            // What the sampling by pixels shows of spots that are not much wider: of those with sharp edges the most.
+            let tolerance_px = if form == SpotForm::Disc { 0.02 } else { 1e-3 };
+            assert!((x - 31.3).abs() < tolerance_px, "{form:?} {x}");
+            assert!((y - 30.8).abs() < tolerance_px, "{form:?} {y}");
+            // A pixel adds 1/12.
+            let expected = sigma * sigma + 1.0 / 12.0;
+            for variance in [var_x, var_y] {
+                assert!(
+                    (variance / expected - 1.0).abs() < 0.02,
+                    "{form:?} {variance}"
+                );
+            }
         }
     }
 
     #[test]
-    fn a_smear_is_the_mean_of_spots_along_the_way() {
-        let (sigma, smear) = (0.9, 3.0);
-        let steps = 20_000;
-        for offset in [0.0, 0.4, 1.7, -2.6] {
-            let at = |step: i32| (f64::from(step) + 0.5) / f64::from(steps) - 0.5;
-            let shares = (0..steps).map(|step| share(offset - smear * at(step), sigma, 0.0));
-            let mean = shares.sum::<f64>() / f64::from(steps);
-            assert!((share(offset, sigma, smear) - mean).abs() < 1e-8);
+    fn a_pixel_of_the_integrated_spot_is_its_integral_to_the_twelfth_digit() {
+        // Simpson's rule in both directions over each pixel: nothing of the error function in it.
+        let (sigma, at) = (0.83, (20.37, 19.71));
+        let pixels = drawn(SpotForm::Gaussian, sigma, at);
+        const STEPS: i32 = 2000;
+        let simpson = |middle: f64, pixel: f64| {
+            let value = |step: i32| {
+                let x = pixel - 0.5 + f64::from(step) / f64::from(STEPS);
+                let weight = match step {
+                    0 | STEPS => 1.0,
+                    odd if odd % 2 == 1 => 4.0,
+                    _ => 2.0,
+                };
+                weight * (-0.5 * ((x - middle) / sigma).powi(2)).exp()
+            };
+            let sum: f64 = (0..=STEPS).map(value).sum();
+            sum / (3.0 * f64::from(STEPS)) / (sigma * (2.0 * PI).sqrt())
+        };
+        for y in 14..27 {
+            for x in 14..27 {
+                let expected = simpson(at.0, x as f64) * simpson(at.1, y as f64);
+                let found = pixels[y * SIDE + x];
+                assert!(
+                    (found - expected).abs() < 1e-12,
+                    "{x} {y}: {found} {expected}"
+                );
+            }
         }
+    }
+
+    #[test]
+    fn the_sampled_spot_is_the_density_in_the_middle_of_each_pixel() {
+        let pixels = drawn(SpotForm::SampledGaussian, 0.5, (20.25, 20.0));
+        let expected = |x: f64, y: f64| (-2.0 * (x * x + y * y)).exp() * 2.0 / PI;
+        for (x, y) in [(20, 20), (21, 20), (19, 22)] {
+            let density = expected(x as f64 - 20.25, y as f64 - 20.0);
+            assert!((pixels[y * SIDE + x] - density).abs() < 1e-14);
+        }
+        // Its light depends on where in the pixel it is.
+        let centred = drawn(SpotForm::SampledGaussian, 0.3, (20.0, 20.0));
+        assert!(centred.iter().sum::<f64>() > 1.5);
+    }
+
+    #[test]
+    fn a_disc_is_even_inside_and_nothing_outside() {
+        let pixels = drawn(SpotForm::Disc, 4.0, (30.2, 31.7));
+        let inside = 1.0 / (PI * 64.0);
+        assert!((pixels[31 * SIDE + 33] - inside).abs() < 1e-14);
+        assert_eq!(pixels[31 * SIDE + 40], 0.0);
+        // Smaller than a pixel: all in one.
+        let small = drawn(SpotForm::Disc, 0.1, (10.1, 9.9));
+        assert!((small[10 * SIDE + 10] - 1.0).abs() < 1e-12);
     }
 
     #[test]
     fn a_ninth_of_the_light_is_on_the_middle_pixel_at_sigma_1_16() {
-        let share = drawn(1.16, 0.0, (30.0, 30.0))[30 * SIDE + 30];
+        let share = drawn(SpotForm::Gaussian, 1.16, (30.0, 30.0))[30 * SIDE + 30];
         assert!((share * 9.0 - 1.0).abs() < 0.01, "{share}");
     }
 
     #[test]
     fn light_beyond_the_edge_is_left_out() {
-        let half = drawn(1.0, 0.0, (-0.5, 20.0)).iter().sum::<f64>();
-        assert!((half - 0.5).abs() < 1e-12);
-        assert!(
-            drawn(1.0, 2.0, (-40.0, 20.0))
-                .iter()
-                .all(|light| *light == 0.0)
-        );
-        assert!(
-            drawn(1.0, 2.0, (20.0, 1e9))
-                .iter()
-                .all(|light| *light == 0.0)
-        );
+        let sum = |at| drawn(SpotForm::Gaussian, 1.0, at).iter().sum::<f64>();
+        assert!((sum((-0.5, 20.0)) - 0.5).abs() < 1e-12);
+        assert_eq!(sum((-40.0, 20.0)), 0.0);
+        assert_eq!(sum((20.0, 1e9)), 0.0);
     }
 }
