@@ -152,7 +152,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ),
     (
         "wcs",
-        &["units", "coords", "camera", "identify", "pipeline"],
+        &["units", "coords", "frame", "camera", "identify", "pipeline"],
     ),
 ];
 
