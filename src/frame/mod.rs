@@ -32,6 +32,7 @@ mod levels;
 mod metadata;
 mod raster;
 mod tiff;
+mod tiff_write;
 
 #[cfg(feature = "overlay")]
 pub(crate) use directory::OVERLAY_TEXT;
@@ -39,6 +40,7 @@ pub use directory::{files_in, is_overlay};
 pub use error::{FrameError, FrameFormat};
 pub use fits::{FitsHeader, FitsSamples, FitsWriteError, write_fits};
 pub use metadata::FrameMetadata;
+pub use tiff_write::{TiffOptions, TiffSamples, write_tiff};
 
 use std::io::{self, Read};
 use std::num::NonZeroUsize;
@@ -121,7 +123,8 @@ impl Frame {
     }
 
     /// The same frame with what the file says of it.
-    fn with_metadata(mut self, metadata: FrameMetadata) -> Self {
+    #[must_use]
+    pub fn with_metadata(mut self, metadata: FrameMetadata) -> Self {
         self.metadata = metadata;
         self
     }

@@ -23,6 +23,7 @@ mod pattern;
 mod poisson;
 mod readout;
 mod scene;
+mod setup;
 mod sky;
 mod spot;
 mod stars;
@@ -30,6 +31,7 @@ mod strays;
 mod truth;
 
 pub use scene::{SCENE_KEYS, Scene};
+pub use setup::{Parameter, Setup};
 pub use strays::{CosmicRay, Trail};
 pub use truth::{TrueStar, Truth};
 
