@@ -117,6 +117,27 @@ const MAY_USE: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "validation",
+        &[
+            "units",
+            "coords",
+            "camera",
+            "sensor",
+            "frame",
+            "catalog",
+            "comparison",
+            "detect",
+            "sensitivity",
+            "simulate",
+            "statistics",
+            "identify",
+            "photometry",
+            "pipeline",
+            "report",
+            "robustness",
+        ],
+    ),
+    (
         "experiment",
         &[
             "units",
@@ -132,6 +153,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "identify",
             "pipeline",
             "report",
+            "validation",
         ],
     ),
     (

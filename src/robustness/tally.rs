@@ -4,13 +4,15 @@ use super::{Interval, Observation};
 use crate::camera::CameraModel;
 use crate::coords::{Camera, Icrs, PixelPoint, Rotation};
 use crate::identify::{Identification, Outcome, StarMatch};
+use serde::{Deserialize, Serialize};
 
 /// An answer is right if the centre and the corners of the frame point where they do, to this share of the
 /// frame's width. A wrong identification is off by more than its width nearly always.
 const RIGHT_WITHIN: f64 = 0.01;
 
 /// What the answer to a trial was.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Answer {
     /// Identified, and rightly.
     Right,
