@@ -16,6 +16,7 @@ mod resources;
 mod robustness;
 mod settings;
 mod solve;
+mod validate;
 mod values;
 
 use args::{Arguments, Command};
@@ -73,6 +74,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Limit(arguments) => limit::limit(&arguments),
         Command::Camera(arguments) => camera::camera(&arguments),
         Command::Experiment(arguments) => experiment::experiment(&arguments),
+        Command::Validate(arguments) => validate::validate(&arguments),
     };
     match done {
         Ok(exit) => exit.into(),

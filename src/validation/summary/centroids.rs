@@ -15,6 +15,11 @@ const BINS: usize = 19;
 /// filter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CentroidSummary {
+    /// Root mean square of the errors on either axis, each in units of its Cramér-Rao bound, of stars that are detected with a
+    /// probability of 99 % or more.
+    pub ratio: Option<f64>,
+    /// Standard error of that, of Gaussian errors.
+    pub ratio_sigma: Option<f64>,
     /// Bins without a star are left out.
     pub bins: Vec<CentroidBin>,
 }
@@ -60,11 +65,16 @@ struct Sums {
 }
 
 #[derive(Default)]
-pub(super) struct Centroids([Sums; BINS]);
+pub(super) struct Centroids {
+    bins: [Sums; BINS],
+    sure: usize,
+    /// Sum of the squares of errors in units of their bounds.
+    in_bounds: f64,
+}
 
 impl Centroids {
     /// Takes in a star with its errors in x, y and light.
-    pub(super) fn add(&mut self, row: &StarRecord, errors: [Option<f64>; 3]) {
+    pub(super) fn add(&mut self, row: &StarRecord, errors: [Option<f64>; 3], is_sure: bool) {
         let ([Some(dx), Some(dy), Some(flux_error_e)], Some(snr)) = (errors, row.snr) else {
             return;
         };
@@ -73,7 +83,11 @@ impl Centroids {
             return;
         }
         let squared = |value: Option<f64>| value.map_or(f64::NAN, |value| value * value);
-        let sums = &mut self.0[bin as usize];
+        if is_sure && let (Some(bound_x), Some(bound_y)) = (row.bound_x_px, row.bound_y_px) {
+            self.sure += 1;
+            self.in_bounds += (dx / bound_x).powi(2) + (dy / bound_y).powi(2);
+        }
+        let sums = &mut self.bins[bin as usize];
         sums.stars += 1;
         sums.snr += snr;
         sums.errors_px2 += dx * dx + dy * dy;
@@ -85,8 +99,16 @@ impl Centroids {
     }
 
     pub(super) fn finish(self) -> CentroidSummary {
-        let bins = self.0.iter().enumerate().filter(|(_, sums)| sums.stars > 0);
+        let bins = self
+            .bins
+            .iter()
+            .enumerate()
+            .filter(|(_, sums)| sums.stars > 0);
+        let stars = self.sure as f64;
+        let ratio = (self.sure > 0).then(|| (self.in_bounds / (2.0 * stars)).sqrt());
         CentroidSummary {
+            ratio: ratio.map(|ratio| to_significant(ratio, 5)),
+            ratio_sigma: ratio.map(|ratio| to_significant(ratio / (4.0 * stars).sqrt(), 3)),
             bins: bins.map(|(bin, sums)| sums.bin(bin)).collect(),
         }
     }

@@ -277,7 +277,7 @@ impl Accumulator {
             minus(row.y_px, row.true_y_px),
             minus(row.flux_e, row.true_flux_e),
         ];
-        self.centroids.add(row, errors);
+        self.centroids.add(row, errors, is_sure);
         if is_sure {
             let sigmas = [row.sigma_x_px, row.sigma_y_px, row.sigma_flux_e];
             for (pull, (error, sigma)) in self.pulls.iter_mut().zip(errors.into_iter().zip(sigmas))
