@@ -114,7 +114,7 @@ mod tests {
         assert_eq!(owner(0.0, 30.0), Some(truth.beyond[0].position));
         // Three pixels off there is light of it, but no place.
         assert_eq!(owner(83.0, 20.0), None);
-        let near = light.stars_near(&PixelPoint::new(80.0, 21.0), 1.05);
-        assert_eq!(near.count(), 1);
+        let place = PixelPoint::new(80.0, 21.0);
+        assert_eq!(light.stars_near(&place, 1.05).count(), 1);
     }
 }

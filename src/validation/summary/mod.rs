@@ -111,6 +111,10 @@ pub struct AttitudeSummary {
     pub boresight_arcsec: Quantiles,
     /// How far the frame is turned about the boresight.
     pub roll_arcsec: Quantiles,
+    /// The same in steps of one percent, from the least to the largest.
+    pub boresight_percentiles_arcsec: Vec<f64>,
+    /// And of the roll.
+    pub roll_percentiles_arcsec: Vec<f64>,
     /// Root mean square of the turns about x, y and the boresight.
     pub rms_arcsec: [f64; 3],
     /// Mean of the squared error in units of its stated covariance: 3 where that is true.
@@ -139,17 +143,25 @@ pub struct Quantiles {
 impl Quantiles {
     /// Of `sorted` values, of which there is at least one.
     fn of(sorted: &[f64]) -> Option<Self> {
-        let at = |part: f64| sorted.get((part * (sorted.len() - 1) as f64).round() as usize);
-        let value = |part: f64| at(part).map(|value| to_significant(*value, 6));
-        (!sorted.is_empty()).then_some(())?;
-        Some(Self {
-            p50: value(0.5)?,
-            p68: value(0.683)?,
-            p95: value(0.95)?,
-            p99: value(0.99)?,
-            max: value(1.0)?,
+        (!sorted.is_empty()).then(|| Self {
+            p50: quantile(sorted, 0.5),
+            p68: quantile(sorted, 0.683),
+            p95: quantile(sorted, 0.95),
+            p99: quantile(sorted, 0.99),
+            max: quantile(sorted, 1.0),
         })
     }
+}
+
+/// What this part of `sorted` values, of which there is at least one, lies below.
+fn quantile(sorted: &[f64], part: f64) -> f64 {
+    let place = part * (sorted.len() - 1) as f64;
+    to_significant(sorted[place.round() as usize], 6)
+}
+
+fn percentiles(sorted: &[f64]) -> Vec<f64> {
+    let percentile = |percent: u32| quantile(sorted, f64::from(percent) / 100.0);
+    (0..=100).map(percentile).collect()
 }
 
 /// Takes rows in, one by one.
@@ -353,6 +365,8 @@ impl Accumulator {
             frames,
             boresight_arcsec: Quantiles::of(&self.boresight_arcsec)?,
             roll_arcsec: Quantiles::of(&self.roll_arcsec)?,
+            boresight_percentiles_arcsec: percentiles(&self.boresight_arcsec),
+            roll_percentiles_arcsec: percentiles(&self.roll_arcsec),
             rms_arcsec: self
                 .squares_arcsec2
                 .map(|sum| to_significant(mean(sum).sqrt(), 6)),
