@@ -25,6 +25,7 @@ pub mod sensor;
 pub mod simulate;
 pub mod statistics;
 pub mod units;
+pub mod validation;
 pub mod wcs;
 
 #[doc = include_str!("../docs/conventions.md")]

@@ -30,6 +30,12 @@ pub fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
+/// With more hits than this the terms of a factorial are not added up one by one.
+const MANY_HITS: usize = 1000;
+
+/// With more trials than this what is likely is reckoned from what is not.
+const MANY_TRIALS: usize = 10_000;
+
 /// log10 of the probability of `hits` or more successes in `trials` at `chance` each.
 pub fn log10_binomial_tail(trials: usize, hits: usize, chance: f64) -> f64 {
     if hits == 0 || chance >= 1.0 {
@@ -38,10 +44,20 @@ pub fn log10_binomial_tail(trials: usize, hits: usize, chance: f64) -> f64 {
     if hits > trials || chance <= 0.0 {
         return f64::NEG_INFINITY;
     }
+    if trials > MANY_TRIALS && (hits as f64) < trials as f64 * chance {
+        // Below the mean the terms rise, and there may be as many as trials: those of too few hits are fewer.
+        let too_few = log10_binomial_tail(trials, trials - hits + 1, 1.0 - chance);
+        return (-10f64.powf(too_few)).ln_1p() / std::f64::consts::LN_10;
+    }
     let (log_p, log_q) = (chance.ln(), (-chance).ln_1p());
     let mut log_term = hits as f64 * log_p + (trials - hits) as f64 * log_q;
-    for i in 0..hits {
-        log_term += ((trials - i) as f64).ln() - ((i + 1) as f64).ln();
+    if hits > MANY_HITS {
+        let log_factorial = |n: usize| libm::lgamma(n as f64 + 1.0);
+        log_term += log_factorial(trials) - log_factorial(hits) - log_factorial(trials - hits);
+    } else {
+        for i in 0..hits {
+            log_term += ((trials - i) as f64).ln() - ((i + 1) as f64).ln();
+        }
     }
     // The terms after the first, relative to it.
     let odds = chance / (1.0 - chance);
@@ -96,6 +112,22 @@ mod tests {
         assert!((log10_binomial_tail(3, 2, 0.1) - 0.028f64.log10()).abs() < 1e-12);
         assert!((log10_binomial_tail(60, 50, 0.01) + 89.166).abs() < 0.002);
         assert_eq!(log10_binomial_tail(3, 4, 0.1), f64::NEG_INFINITY);
+        // Either way to reckon with factorials: one hit more is a little less likely.
+        let at = |hits| log10_binomial_tail(20_000, hits, 0.05);
+        let steps = [999, 1000, 1001].map(|hits| at(hits) - at(hits + 1));
+        assert!(
+            (steps[1] - 0.5 * (steps[0] + steps[2])).abs() < 1e-7,
+            "{steps:?}"
+        );
+        // Either way to reckon with a number of hits below the mean.
+        let step = at(998) - at(999);
+        assert!((step - (at(999) - at(1000))).abs() < 1e-4, "{step}");
+        assert!(
+            (log10_binomial_tail(10_001, 1, 2e-4) - log10_binomial_tail(10_000, 1, 2e-4)).abs()
+                < 1e-4
+        );
+        // The middle of a binomial distribution of 10⁸.
+        assert!((log10_binomial_tail(100_000_000, 50_000_000, 0.5) - 0.5f64.log10()).abs() < 1e-4);
     }
 
     #[test]

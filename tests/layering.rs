@@ -125,6 +125,27 @@ const MAY_USE: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "validation",
+        &[
+            "units",
+            "coords",
+            "camera",
+            "sensor",
+            "frame",
+            "catalog",
+            "comparison",
+            "detect",
+            "sensitivity",
+            "simulate",
+            "statistics",
+            "identify",
+            "photometry",
+            "pipeline",
+            "report",
+            "robustness",
+        ],
+    ),
+    (
         "experiment",
         &[
             "units",
@@ -141,6 +162,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "identify",
             "pipeline",
             "report",
+            "validation",
         ],
     ),
     (

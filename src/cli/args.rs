@@ -2,6 +2,8 @@
 
 use super::limit::ParameterArgs;
 use super::plot::PlotFile;
+use super::setup::SetupArgs;
+use super::validate::FigureForm;
 use super::values;
 use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
@@ -88,6 +90,53 @@ pub(crate) enum Command {
         with its camera and sky at the pointing of its table of stars, and identified with nothing \
         known. The stars have numbers of SKY2000: with another --catalog they are found under other numbers.")]
     Experiment(ExperimentArgs),
+    /// Put thousands of simulated frames through the pipeline, and hold what it finds against the truth and against theory
+    #[command(after_help = "Examples:\n  \
+        starpipe validate --camera camera.toml --frames 1000 --seed 1 --out validation\n  \
+        starpipe validate --preset nanosat-tracker --exposure-s 0.2 --scale-unknown --out validation\n  \
+        starpipe validate --camera camera.toml --frames 500 --sweep read_noise_e=1:30:7:log --out study\n  \
+        starpipe validate --camera camera.toml --sweep fov_deg=4:32:8 --out study\n\n\
+        Frames are made and worked on in memory, at attitudes that are uniform over all rotations. DIR gets frames.csv and\n\
+        stars.csv, a row for each frame and each star, the same as Parquet in frames.parquet/ and stars.parquet/, what\n\
+        they say together as summary.json and summary.txt, and figures. A study has all that for each value in\n\
+        DIR/NAME=VALUE/, and a row for each in study.csv and study.json.\n\n\
+        A run may be ended at any time, with Ctrl-C as well: the same command goes on where it stopped, one with more\n\
+        --frames makes it longer, and what comes of it is the same to the last byte on any number of threads.")]
+    Validate(Box<ValidateArgs>),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ValidateArgs {
+    /// Frames, of each value of a study
+    #[arg(long, value_name = "NUMBER", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    pub(crate) frames: u64,
+    /// Seed of the random numbers
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Directory for the results; one that holds the beginning of the same run is gone on with
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Keep the camera's description from the pipeline: it knows nothing, not even the scale
+    #[arg(long)]
+    pub(crate) scale_unknown: bool,
+    /// Do it for values of one parameter, named as its option with _ or -, or fov_deg (may be repeated); :log makes even
+    /// ratios of the steps
+    #[arg(
+        long,
+        value_name = "NAME=FROM:TO:COUNT[:log]",
+        allow_hyphen_values = true
+    )]
+    pub(crate) sweep: Vec<values::StudySweep>,
+    /// What figures are drawn as
+    #[arg(long, value_enum, default_value_t = FigureForm::Svg)]
+    pub(crate) figures: FigureForm,
+    /// What to print
+    #[arg(long, value_enum, default_value_t = PageFormat::Text)]
+    pub(crate) format: PageFormat,
+    #[command(flatten)]
+    pub(crate) setup: SetupArgs,
+    #[command(flatten)]
+    pub(crate) resources: ResourceArgs,
 }
 
 #[derive(Debug, Args)]
@@ -102,8 +151,8 @@ pub(crate) struct ExperimentArgs {
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub(crate) seed: u64,
     /// What to print
-    #[arg(long, value_enum, default_value_t = ExperimentFormat::Text)]
-    pub(crate) format: ExperimentFormat,
+    #[arg(long, value_enum, default_value_t = PageFormat::Text)]
+    pub(crate) format: PageFormat,
     /// Also write, into this directory, the first frame simulated as experiment-1.png or -2.png, its stars ringed and named
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
@@ -112,7 +161,7 @@ pub(crate) struct ExperimentArgs {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum ExperimentFormat {
+pub(crate) enum PageFormat {
     /// A page for people
     Text,
     /// One JSON object
@@ -414,7 +463,7 @@ pub(crate) struct CameraNewArgs {
 }
 
 /// A preset by its name.
-fn preset() -> impl TypedValueParser<Value = Preset> {
+pub(crate) fn preset() -> impl TypedValueParser<Value = Preset> {
     let names = Preset::ALL.map(|preset| PossibleValue::new(preset.name()).help(preset.about()));
     PossibleValuesParser::new(names).try_map(|name| Preset::named(&name).ok_or("no such preset"))
 }

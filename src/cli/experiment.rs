@@ -1,6 +1,6 @@
 //! `experiment`: the paper's experiments, done again.
 
-use super::args::{ExperimentArgs, ExperimentFormat};
+use super::args::{ExperimentArgs, PageFormat};
 use super::output::{print, write_whole};
 use super::resources::{bar, read_catalog, sky, thread_pool};
 use super::settings::output_path;
@@ -37,8 +37,8 @@ pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Exit, Fault> {
         save(&done, &pipeline, directory, &name)?;
     }
     let text = match arguments.format {
-        ExperimentFormat::Text => done.report.to_text(),
-        ExperimentFormat::Json => done.report.to_json_line().context("writing JSON")? + "\n",
+        PageFormat::Text => done.report.to_text(),
+        PageFormat::Json => done.report.to_json_line().context("writing JSON")? + "\n",
     };
     // Nobody left to read it: nothing is lost.
     let _ = print(&text)?;

@@ -15,7 +15,9 @@ mod plot;
 mod resources;
 mod robustness;
 mod settings;
+mod setup;
 mod solve;
+mod validate;
 mod values;
 
 use args::{Arguments, Command};
@@ -73,6 +75,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Limit(arguments) => limit::limit(&arguments),
         Command::Camera(arguments) => camera::camera(&arguments),
         Command::Experiment(arguments) => experiment::experiment(&arguments),
+        Command::Validate(arguments) => validate::validate(&arguments),
     };
     match done {
         Ok(exit) => exit.into(),

@@ -1,7 +1,10 @@
 //! Values of options: what is out of range is refused where it is typed.
 
+use starpipe::camera::focal_length_px;
 use starpipe::robustness::Parameter;
 use starpipe::sensitivity::{self, Spacing};
+use starpipe::simulate;
+use starpipe::units::RAD_PER_DEG;
 use std::fmt::Display;
 use std::str::FromStr;
 
@@ -111,6 +114,28 @@ impl FromStr for LimitSweep {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        let Steps {
+            name,
+            ends,
+            count,
+            spacing,
+        } = Steps::of(text)?;
+        sensitivity::Sweep::new(&name, ends, count, spacing)
+            .map(Self)
+            .map_err(|error| error.to_string())
+    }
+}
+
+/// The parts of NAME=FROM:TO:COUNT[:log].
+struct Steps {
+    name: String,
+    ends: (f64, f64),
+    count: usize,
+    spacing: Spacing,
+}
+
+impl Steps {
+    fn of(text: &str) -> Result<Self, String> {
         const FORM: &str = "NAME=FROM:TO:COUNT or NAME=FROM:TO:COUNT:log";
         let (name, range) = named_range(text, FORM)?;
         let (from, to, count, spacing) = match range[..] {
@@ -118,10 +143,97 @@ impl FromStr for LimitSweep {
             [from, to, count, "log"] => (from, to, count, Spacing::Log),
             _ => return Err(not_of_form(text, FORM)),
         };
-        let ends = (finite(from)?, finite(to)?);
-        sensitivity::Sweep::new(&name.replace('-', "_"), ends, whole(count)?, spacing)
-            .map(Self)
-            .map_err(|error| error.to_string())
+        Ok(Self {
+            name: name.replace('-', "_"),
+            ends: (finite(from)?, finite(to)?),
+            count: whole(count)?,
+            spacing,
+        })
+    }
+}
+
+/// What a study is over.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Studied {
+    /// A parameter of the camera, of the conditions, or of the scene.
+    Parameter(simulate::Parameter),
+    /// The horizontal field of view, in degrees: the focal length follows it, pixels and spot stay as they are.
+    FieldOfView,
+}
+
+impl Studied {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Parameter(parameter) => parameter.name(),
+            Self::FieldOfView => FIELD_OF_VIEW,
+        }
+    }
+
+    /// What an axis of it is called.
+    pub(crate) fn title(self) -> String {
+        match self {
+            Self::Parameter(parameter) => parameter.title(),
+            Self::FieldOfView => "horizontal field of view (°)".to_owned(),
+        }
+    }
+
+    pub(crate) fn set(self, setup: &mut simulate::Setup, value: f64) {
+        match self {
+            Self::Parameter(parameter) => parameter.set(setup, value),
+            Self::FieldOfView => {
+                let sensor = &mut setup.scenario.sensor;
+                let pitch_um = (sensor.pitch_x_um * sensor.pitch_y_um).sqrt();
+                let focal_px = focal_length_px(sensor.width_px as f64, value * RAD_PER_DEG);
+                sensor.focal_length_mm = focal_px * pitch_um * 1e-3;
+            }
+        }
+    }
+}
+
+const FIELD_OF_VIEW: &str = "fov_deg";
+
+/// A sweep of a study.
+#[derive(Debug, Clone)]
+pub(crate) struct StudySweep {
+    pub(crate) studied: Studied,
+    pub(crate) values: Vec<f64>,
+    pub(crate) spacing: Spacing,
+}
+
+impl FromStr for StudySweep {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let Steps {
+            name,
+            ends,
+            count,
+            spacing,
+        } = Steps::of(text)?;
+        let values = spacing
+            .checked_values(ends, count)
+            .map_err(|error| error.to_string())?;
+        let studied = if name == FIELD_OF_VIEW {
+            Studied::FieldOfView
+        } else {
+            let found = simulate::Parameter::named(&name);
+            Studied::Parameter(found.map_err(|error| error.to_string())?)
+        };
+        for &value in &values {
+            match studied {
+                Studied::FieldOfView => drop(field_of_view(&value.to_string())?),
+                Studied::Parameter(parameter) if !parameter.limits().accept(value) => {
+                    let expected = parameter.limits();
+                    return Err(format!("{name} would be {value}, expected {expected}"));
+                }
+                Studied::Parameter(_) => (),
+            }
+        }
+        Ok(Self {
+            studied,
+            values,
+            spacing,
+        })
     }
 }
 
@@ -252,6 +364,32 @@ mod tests {
         assert_eq!(direction("83.8, -1.2"), Ok(orion));
         for text in ["400,0", "-1,0", "0,91", "0", "0,NaN", "1,2,3"] {
             assert!(direction(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_study_may_be_over_the_field_of_view() {
+        let sweep: StudySweep = "fov-deg=5:20:4".parse().unwrap();
+        assert_eq!(sweep.values, [5.0, 10.0, 15.0, 20.0]);
+        let mut setup = simulate::Setup {
+            scenario: sensitivity::Scenario::of(starpipe::sensor::Preset::NanosatTracker),
+            scene: simulate::Scene::default(),
+        };
+        sweep.studied.set(&mut setup, 10.0);
+        let scenario = setup.scenario;
+        let half_width_um = 0.5 * scenario.sensor.width_px as f64 * scenario.sensor.pitch_x_um;
+        let half_rad = (half_width_um * 1e-3 / scenario.sensor.focal_length_mm).atan();
+        assert!((2.0 * half_rad.to_degrees() - 10.0).abs() < 1e-9);
+        for (text, expected) in [
+            ("fov_deg=20:5:4", "expected a rising one"),
+            ("fov_deg=5:180:4", "below 180 degrees"),
+            ("fov_deg=0:20:4", "above 0, ..."),
+            ("apertur=5:20:4", "did you mean 'aperture_mm'?"),
+            ("aperture_mm=5:20", "is not of the form NAME=FROM:TO:COUNT"),
+        ] {
+            let error = text.parse::<StudySweep>().unwrap_err();
+            let expected = expected.trim_end_matches(", ...");
+            assert!(error.contains(expected), "{error}");
         }
     }
 

@@ -3,13 +3,14 @@
 use super::ExperimentError;
 use crate::camera::CameraModel;
 use crate::catalog::Star;
-use crate::coords::{Camera, Icrs, PixelPoint, Rotation};
+use crate::coords::{Camera, Icrs, Rotation};
 use crate::detect::Workspace;
 use crate::frame::Frame;
 use crate::identify::{Identification, Outcome, StarMatch};
 use crate::pipeline::{Pipeline, Solution, SolveConfig, Source};
 use crate::sensitivity::{Detector, Faintest, Scenario};
-use crate::simulate::{Pointing, Simulator, TrueStar, Truth};
+use crate::simulate::{Pointing, Simulator, Truth};
+use crate::validation::Light;
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -17,8 +18,6 @@ use rayon::prelude::*;
 
 /// The pointing of a trial is moved by up to so many pixels along each axis.
 pub(super) const SHIFT_PX: f64 = 0.5;
-/// A detection at a star's place is no farther from it than so many pixels.
-const AT_PLACE_PX: f64 = 2.0;
 
 /// What is simulated, again and again.
 pub(super) struct Protocol<'a> {
@@ -147,38 +146,6 @@ fn shifted(
     pointing
         .icrs_to_camera
         .then_turn(Vector3::new(-radian(dy), radian(dx), 0.0))
-}
-
-/// Where each star's light is.
-struct Light<'a> {
-    truth: &'a Truth,
-    variance_px2: [f64; 2],
-}
-
-impl<'a> Light<'a> {
-    fn of(scenario: &Scenario, truth: &'a Truth) -> Self {
-        const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
-        let variance_px2 = scenario.sensor.spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2;
-        let smear_px2 = scenario.conditions.motion_px.powi(2) / 12.0;
-        Self {
-            truth,
-            variance_px2: [variance_px2 + smear_px2, variance_px2],
-        }
-    }
-
-    /// The star at this place to which more than half of the light of stars there is due.
-    fn owner(&self, place: &PixelPoint) -> Option<&'a TrueStar> {
-        let light = |star: &TrueStar| {
-            let offset = [star.position.x - place.x, star.position.y - place.y];
-            let terms = offset.iter().zip(self.variance_px2);
-            let exponent: f64 = terms.map(|(d, variance)| d * d / variance).sum();
-            star.electrons * (-0.5 * exponent).exp()
-        };
-        let stars = || self.truth.stars.iter().chain(&self.truth.beyond);
-        let all: f64 = stars().map(light).sum();
-        let owner = stars().find(|star| 2.0 * light(star) > all)?;
-        (owner.position.distance_to(place) < AT_PLACE_PX).then_some(owner)
-    }
 }
 
 /// What was named, rightly and wrongly.

@@ -162,7 +162,7 @@ mod tests {
         let identification = Identification {
             camera: CameraModel::pinhole(SIDE_PX, SIDE_PX, 2000.0, false),
             icrs_to_camera: Rotation::looking_at(&centre, 0.0),
-            attitude_sigma_rad: [0.0; 3],
+            attitude_covariance_rad2: nalgebra::Matrix3::zeros(),
             focal_length_sigma_px: 0.0,
             matches: Vec::new(),
             rms_px: 0.2,

@@ -16,7 +16,7 @@ mod text;
 
 pub(crate) use angles::{degrees, hours};
 pub use compared::PredictionReport;
-pub(crate) use rounding::to_decimals;
+pub(crate) use rounding::{to_decimals, to_significant};
 pub use table::{TABLE_COLUMNS, write_table_header};
 pub use text::{STARS_SHOWN, TextOptions, counted, printable};
 

@@ -24,7 +24,7 @@ mod table;
 mod tally;
 
 pub use interval::{CONFIDENCE, Interval};
-pub use observation::Observation;
+pub use observation::{Observation, random_rotation};
 pub use table::{Case, Parameter, Row, STANDARD_FOV_DEG, VARIED_FOV_DEG, standard_cases};
 pub use tally::{Answer, Tally, Verdict};
 

@@ -151,7 +151,7 @@ fn limiting_v_mag(protocol: &Protocol, camera: &CameraModel, sky: &Sky) -> f64 {
 }
 
 /// A rotation taken from all with the same probability: a direction in four dimensions (Shoemake 1992).
-fn random_rotation(rng: &mut ChaCha8Rng) -> Rotation<Icrs, Camera> {
+pub fn random_rotation(rng: &mut ChaCha8Rng) -> Rotation<Icrs, Camera> {
     Rotation::from_quaternion(std::array::from_fn(|_| normal(rng)))
 }
 

@@ -1,15 +1,18 @@
 //! From answers to rates.
 
 use super::{Interval, Observation};
-use crate::coords::PixelPoint;
+use crate::camera::CameraModel;
+use crate::coords::{Camera, Icrs, PixelPoint, Rotation};
 use crate::identify::{Identification, Outcome, StarMatch};
+use serde::{Deserialize, Serialize};
 
 /// An answer is right if the centre and the corners of the frame point where they do, to this share of the
 /// frame's width. A wrong identification is off by more than its width nearly always.
 const RIGHT_WITHIN: f64 = 0.01;
 
 /// What the answer to a trial was.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Answer {
     /// Identified, and rightly.
     Right,
@@ -17,6 +20,33 @@ pub enum Answer {
     Wrong,
     /// Not identified.
     None,
+}
+
+impl Answer {
+    /// The answer that `found` is, where the frame is truly that of `camera` in this attitude.
+    pub fn of(
+        found: &Identification,
+        camera: &CameraModel,
+        icrs_to_camera: &Rotation<Icrs, Camera>,
+    ) -> Self {
+        let (right, bottom) = (camera.width_px - 1.0, camera.height_px - 1.0);
+        let corners = [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)];
+        let tolerance_rad = RIGHT_WITHIN * camera.fov_x_rad();
+        let is_right = |pixel: PixelPoint| {
+            let true_direction = icrs_to_camera.inverse().apply(&camera.direction_of(&pixel));
+            let direction = found
+                .icrs_to_camera
+                .inverse()
+                .apply(&found.camera.direction_of(&pixel));
+            direction.angle_to(&true_direction) <= tolerance_rad
+        };
+        let corners = corners.map(|(x, y)| PixelPoint::new(x, y));
+        if is_right(camera.centre()) && corners.into_iter().all(is_right) {
+            Self::Right
+        } else {
+            Self::Wrong
+        }
+    }
 }
 
 /// What came of one trial.
@@ -42,7 +72,8 @@ impl Verdict {
             Outcome::Identified(found) => {
                 let is_wrong = |m: &&StarMatch| observation.catalog[m.observed] != Some(m.catalog);
                 let misnamed = found.matches.iter().filter(is_wrong).count();
-                (answer(observation, found), found.matches.len(), misnamed)
+                let answer = Answer::of(found, &observation.camera, &observation.icrs_to_camera);
+                (answer, found.matches.len(), misnamed)
             }
         };
         Self {
@@ -52,30 +83,6 @@ impl Verdict {
             misnamed,
             time_ms,
         }
-    }
-}
-
-fn answer(observation: &Observation, found: &Identification) -> Answer {
-    let truth = &observation.camera;
-    let (right, bottom) = (truth.width_px - 1.0, truth.height_px - 1.0);
-    let corners = [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)];
-    let tolerance_rad = RIGHT_WITHIN * truth.fov_x_rad();
-    let is_right = |pixel: PixelPoint| {
-        let true_direction = observation
-            .icrs_to_camera
-            .inverse()
-            .apply(&truth.direction_of(&pixel));
-        let direction = found
-            .icrs_to_camera
-            .inverse()
-            .apply(&found.camera.direction_of(&pixel));
-        direction.angle_to(&true_direction) <= tolerance_rad
-    };
-    let corners = corners.map(|(x, y)| PixelPoint::new(x, y));
-    if is_right(truth.centre()) && corners.into_iter().all(is_right) {
-        Answer::Right
-    } else {
-        Answer::Wrong
     }
 }
 

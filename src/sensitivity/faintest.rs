@@ -20,8 +20,14 @@ pub struct Faintest {
 impl Faintest {
     /// Of the stars with these V magnitudes, each once; none where there is hardly a star to be found.
     pub fn among(v_mags: impl IntoIterator<Item = f64>, detector: &Detector) -> Option<Self> {
-        let found = |v_mag| (v_mag, detector.probability(v_mag), 1.0);
-        Self::from_chances(v_mags.into_iter().map(found).collect(), |chance, _| chance)
+        let found = |v_mag| (v_mag, detector.probability(v_mag));
+        Self::of(v_mags.into_iter().map(found))
+    }
+
+    /// Of stars with these V magnitudes and probabilities to be found, each once; none where there is hardly a star to be found.
+    pub fn of(stars: impl IntoIterator<Item = (f64, f64)>) -> Option<Self> {
+        let found = |(v_mag, probability)| (v_mag, probability, 1.0);
+        Self::from_chances(stars.into_iter().map(found).collect(), |chance, _| chance)
     }
 
     /// In a field that holds a `part` of a sky with stars of these V magnitudes, anywhere.

@@ -40,7 +40,7 @@ pub use cramer_rao::CramerRao;
 pub use faintest::Faintest;
 pub use figures::Figure;
 pub use light::temperature_k_of;
-pub use parameters::{CONDITION_KEYS, Parameter, UnknownParameter};
+pub use parameters::{CONDITION_KEYS, Parameter, UnknownParameter, title_of};
 pub use prediction::{CompletenessPoint, DetectorReport, Prediction};
 pub use star_light::StarLight;
 pub use sweep::{Curve, Series, Spacing, Sweep, SweepError, curves};

@@ -111,6 +111,10 @@ const UNITS: &[(&str, &str)] = &[
     ("_mag_arcsec2", "V mag / square arcsec"),
     ("_e_per_adu", "e / ADU"),
     ("_per_mpx", "per million pixels"),
+    ("_cm2_s", "per cm² and s"),
+    ("_deg_s", "°/s"),
+    ("_e_um", "e/µm"),
+    ("_vmag", "V mag"),
     ("_cd_m2", "cd/m²"),
     ("_um2", "µm²"),
     ("_e_s", "e/s"),
@@ -125,6 +129,27 @@ const UNITS: &[(&str, &str)] = &[
     ("_s", "s"),
     ("_k", "K"),
 ];
+
+/// What an axis of the parameter called `name` is called: `focal length (mm)`.
+pub fn title_of(name: &str) -> String {
+    match unit_of(name) {
+        "" => quantity_of(name),
+        unit => format!("{} ({unit})", quantity_of(name)),
+    }
+}
+
+fn ending_of(name: &str) -> Option<&'static (&'static str, &'static str)> {
+    UNITS.iter().find(|(ending, _)| name.ends_with(ending))
+}
+
+fn unit_of(name: &str) -> &'static str {
+    ending_of(name).map_or("", |(_, unit)| unit)
+}
+
+fn quantity_of(name: &str) -> String {
+    let ending = ending_of(name).map_or("", |(ending, _)| ending);
+    name.strip_suffix(ending).unwrap_or(name).replace('_', " ")
+}
 
 /// A parameter of a [`Scenario`].
 #[derive(Debug, Clone, Copy)]
@@ -145,6 +170,16 @@ pub struct UnknownParameter {
     pub nearest: Option<&'static str>,
 }
 
+impl UnknownParameter {
+    /// What `name` is, and what of `names` it may have been meant to be.
+    pub fn among(name: &str, names: impl Iterator<Item = &'static str>) -> Self {
+        Self {
+            name: name.to_owned(),
+            nearest: nearest_name(name, names),
+        }
+    }
+}
+
 impl Parameter {
     /// All of them, the camera's first.
     pub fn all() -> impl Iterator<Item = Self> {
@@ -157,12 +192,8 @@ impl Parameter {
     /// # Errors
     /// [`UnknownParameter`] with the nearest name there is.
     pub fn named(name: &str) -> Result<Self, UnknownParameter> {
-        Self::all()
-            .find(|parameter| parameter.name() == name)
-            .ok_or_else(|| UnknownParameter {
-                name: name.to_owned(),
-                nearest: nearest_name(name, Self::all().map(Self::name)),
-            })
+        let found = Self::all().find(|parameter| parameter.name() == name);
+        found.ok_or_else(|| UnknownParameter::among(name, Self::all().map(Self::name)))
     }
 
     /// Its name, which ends in its unit.
@@ -183,28 +214,17 @@ impl Parameter {
 
     /// The unit of its values, as people write it; empty where it is a pure number.
     pub fn unit(self) -> &'static str {
-        self.ending().map_or("", |(_, unit)| unit)
+        unit_of(self.name())
     }
 
     /// Its name without the unit, in words: `focal length`.
     pub fn quantity(self) -> String {
-        let ending = self.ending().map_or("", |(ending, _)| ending);
-        let name = self.name();
-        name.strip_suffix(ending).unwrap_or(name).replace('_', " ")
+        quantity_of(self.name())
     }
 
     /// What an axis of it is called: `focal length (mm)`.
     pub fn title(self) -> String {
-        match self.unit() {
-            "" => self.quantity(),
-            unit => format!("{} ({unit})", self.quantity()),
-        }
-    }
-
-    fn ending(self) -> Option<&'static (&'static str, &'static str)> {
-        UNITS
-            .iter()
-            .find(|(ending, _)| self.name().ends_with(ending))
+        title_of(self.name())
     }
 
     /// What values make sense.

@@ -36,6 +36,30 @@ impl Spacing {
     }
 }
 
+impl Spacing {
+    /// [`Self::values`] of a sweep that is one.
+    ///
+    /// # Errors
+    /// [`SweepError::Count`], [`SweepError::Backwards`], [`SweepError::LogOfNothing`].
+    pub fn checked_values(
+        self,
+        (from, to): (f64, f64),
+        count: usize,
+    ) -> Result<Vec<f64>, SweepError> {
+        if !(2..=Sweep::MAX_VALUES).contains(&count) {
+            return Err(SweepError::Count { count });
+        }
+        // NaN does not rise either.
+        if from.partial_cmp(&to) != Some(Ordering::Less) {
+            return Err(SweepError::Backwards { from, to });
+        }
+        if self == Self::Log && from <= 0.0 {
+            return Err(SweepError::LogOfNothing { from });
+        }
+        Ok(self.values(from, to, count))
+    }
+}
+
 /// `value` to the twelfth digit of `size`.
 fn rounded_as(value: f64, size: f64) -> f64 {
     let decimals = (11.0 - size.log10().floor()).max(0.0) as usize;
@@ -108,17 +132,7 @@ impl Sweep {
         spacing: Spacing,
     ) -> Result<Self, SweepError> {
         let parameter = Parameter::named(name)?;
-        if !(2..=Self::MAX_VALUES).contains(&count) {
-            return Err(SweepError::Count { count });
-        }
-        // NaN does not rise either.
-        if from.partial_cmp(&to) != Some(Ordering::Less) {
-            return Err(SweepError::Backwards { from, to });
-        }
-        if spacing == Spacing::Log && from <= 0.0 {
-            return Err(SweepError::LogOfNothing { from });
-        }
-        let values = spacing.values(from, to, count);
+        let values = spacing.checked_values((from, to), count)?;
         let limits = parameter.limits();
         match values.iter().find(|value| !limits.accept(**value)) {
             Some(&found) => Err(SweepError::Value {

@@ -39,7 +39,7 @@ use crate::camera::{CameraModel, Distortion, DistortionModel};
 use crate::catalog::Star;
 use crate::coords::{Camera, Icrs, PixelPoint, Rotation};
 use crate::frame::{self, Frame, FrameError};
-use crate::sensitivity::{Scenario, StarLight};
+use crate::sensitivity::{Scenario, SkyBrightness, StarLight};
 use crate::sensor::Sensor;
 use canvas::Canvas;
 use motion::Motion;
@@ -155,6 +155,28 @@ impl<'a> Simulator<'a> {
         &self.camera
     }
 
+    /// The even scenario that is most like what is simulated: with the mean brightness of its sky and the typical motion of its
+    /// stars. The sensitivity model's predictions are for that.
+    pub fn evened(&self) -> Scenario {
+        let mut evened = self.scenario.clone();
+        let conditions = &mut evened.conditions;
+        let turn_rad = self.scene.typical_rate_rad_s() * conditions.exposure_s;
+        let motion_px = turn_rad * self.camera.focal_length_px;
+        conditions.motion_px = conditions.motion_px.hypot(motion_px);
+        let none = Scene {
+            sky_gradient: 0.0,
+            cloud_mag: 0.0,
+            cloud_light: 0.0,
+            ..self.scene
+        };
+        let mut random = random(0, Stream::Scene);
+        let mut canvas = self.canvas();
+        Sky::new(&self.scenario, &none, &self.camera, &mut random).expose(&mut canvas, 1.0);
+        let sky_mag = conditions.sky.mag_arcsec2() - 2.5 * mean(canvas.pixels()).log10();
+        conditions.sky = SkyBrightness::MagArcsec2(sky_mag);
+        evened
+    }
+
     /// The light of its stars.
     pub fn light(&self) -> &StarLight {
         &self.light
@@ -180,14 +202,15 @@ impl<'a> Simulator<'a> {
         seed: u64,
     ) -> Result<(Frame, Truth), FrameError> {
         self.exposed(seed, |starlight, _, _| {
-            let star = |&(position, v_mag): &(PixelPoint, f64)| TrueStar {
+            let star = |(number, &(position, v_mag)): (usize, &(PixelPoint, f64))| TrueStar {
+                number,
                 catalog: None,
                 position,
                 v_mag,
                 electrons: self.light.electrons(v_mag, None)
                     * starlight.sky.transmission(&position),
             };
-            stars.iter().map(star).collect()
+            stars.iter().enumerate().map(star).collect()
         })
     }
 
@@ -268,6 +291,7 @@ impl<'a> Simulator<'a> {
             cosmic_rays,
             background_e,
             angular_rate_rad_s,
+            motion_px: motion.of_centre_px(),
         };
         Ok((frame, truth))
     }

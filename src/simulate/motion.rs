@@ -46,6 +46,13 @@ impl<'a> Motion<'a> {
             .fold(0.0, f64::max)
     }
 
+    /// How far the star that is in the middle of the frame moves along x and y, in pixels.
+    pub(super) fn of_centre_px(&self) -> [f64; 2] {
+        let centre = self.camera.centre();
+        let [from, to] = [-0.5, 0.5].map(|time| self.at(&centre, time).unwrap_or(centre));
+        [to.x - from.x, to.y - from.y]
+    }
+
     /// Calls `put` with points of the way of the star that is at `middle` in the middle of the exposure, and the part of its
     /// light for each.
     pub(super) fn along(

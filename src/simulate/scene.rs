@@ -95,6 +95,20 @@ impl Default for Scene {
 }
 
 impl Scene {
+    /// How fast the boresight typically moves, in radians a second.
+    pub(super) fn typical_rate_rad_s(&self) -> f64 {
+        // The mean over directions of a sine, and over phases of a cosine.
+        const SINE: f64 = std::f64::consts::FRAC_PI_4;
+        const COSINE: f64 = std::f64::consts::FRAC_2_PI;
+        let swing_deg_s = COSINE * std::f64::consts::TAU * self.swing_deg / self.swing_period_s;
+        let tumble_deg_s = SINE * self.tumble_deg_s;
+        let steady_deg_s = self.rate_x_deg_s.hypot(self.rate_y_deg_s);
+        steady_deg_s
+            .hypot(swing_deg_s)
+            .hypot(tumble_deg_s)
+            .to_radians()
+    }
+
     /// The camera's angular velocity about its own axes in one frame, in radians a second.
     pub(super) fn angular_rate_rad_s(&self, random: &mut ChaCha8Rng) -> Vector3<f64> {
         let steady = Vector3::new(self.rate_x_deg_s, self.rate_y_deg_s, self.rate_z_deg_s);

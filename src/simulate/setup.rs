@@ -1,7 +1,7 @@
 //! All numbers of a simulation by name.
 
 use super::scene::{SCENE_KEYS, Scene};
-use crate::sensitivity::{self, Scenario};
+use crate::sensitivity::{self, Scenario, UnknownParameter, title_of};
 use crate::sensor::{IMPERFECTION_KEYS, Key, Limits, Sensor};
 
 /// What is simulated.
@@ -36,6 +36,20 @@ impl Parameter {
     pub fn beyond_scenario() -> impl Iterator<Item = Self> {
         let imperfections = IMPERFECTION_KEYS.iter().map(Self::Imperfection);
         imperfections.chain(SCENE_KEYS.iter().map(Self::Scene))
+    }
+
+    /// The parameter called `name`.
+    ///
+    /// # Errors
+    /// [`UnknownParameter`] with the nearest name there is.
+    pub fn named(name: &str) -> Result<Self, UnknownParameter> {
+        let found = Self::all().find(|parameter| parameter.name() == name);
+        found.ok_or_else(|| UnknownParameter::among(name, Self::all().map(Self::name)))
+    }
+
+    /// What an axis of it is called.
+    pub fn title(self) -> String {
+        title_of(self.name())
     }
 
     /// Its name, which ends in its unit.

@@ -35,6 +35,9 @@ impl Starlight<'_> {
     ) -> Vec<TrueStar> {
         let mut all = self.of_catalog(pointing, stars, reach_px, random);
         all.extend(self.false_ones(random));
+        for (number, star) in all.iter_mut().enumerate() {
+            star.number = number;
+        }
         all
     }
 
@@ -71,6 +74,7 @@ impl Starlight<'_> {
             let bv_mag = star.bv_mag.map(f64::from);
             let electrons = self.light.electrons(v_mag, bv_mag) * self.sky.transmission(&position);
             (!is_missing && !is_too_faint).then_some(TrueStar {
+                number: 0,
                 catalog: Some(catalog),
                 position,
                 v_mag,
@@ -92,6 +96,7 @@ impl Starlight<'_> {
             let brighter = libm::log10(1.0 - random.random::<f64>()) / COUNTS;
             let v_mag = faintest + brighter;
             TrueStar {
+                number: 0,
                 catalog: None,
                 position,
                 v_mag,

@@ -20,11 +20,15 @@ pub struct Truth {
     pub background_e: f64,
     /// The camera's angular velocity about its own axes, in radians a second.
     pub angular_rate_rad_s: Vector3<f64>,
+    /// How far a star in the middle of the frame moves along x and y during the exposure, in pixels.
+    pub motion_px: [f64; 2],
 }
 
 /// A star that is on a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrueStar {
+    /// Counts the stars of a frame: no two have the same.
+    pub number: usize,
     /// Its index among the catalogue's stars; a false star has none.
     pub catalog: Option<usize>,
     /// Where it stands; in the middle of its way where it moves.

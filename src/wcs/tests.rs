@@ -103,7 +103,9 @@ fn solution(camera: CameraModel, attitude: Rotation<Icrs, Camera>) -> Solution {
         outcome: Outcome::Identified(Box::new(Identification {
             camera,
             icrs_to_camera: attitude,
-            attitude_sigma_rad: [1e-5, 2e-5, 3e-5],
+            attitude_covariance_rad2: nalgebra::Matrix3::from_diagonal(&nalgebra::Vector3::new(
+                1e-10, 4e-10, 9e-10,
+            )),
             focal_length_sigma_px: 0.1,
             matches: Vec::new(),
             rms_px: 0.1,

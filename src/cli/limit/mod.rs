@@ -5,6 +5,7 @@ mod parameters;
 mod text;
 
 pub(crate) use parameters::ParameterArgs;
+pub(crate) use text::number;
 
 use super::args::{Format, LimitArgs, ReadingArg};
 use super::output::{csv_table, json_lines, print, write_whole};
@@ -33,7 +34,12 @@ pub(crate) fn limit(arguments: &LimitArgs) -> Result<Exit, Fault> {
         )));
     }
     check_plot(arguments)?;
-    let scenario = scenario(arguments)?;
+    let scenario = scenario_of(
+        arguments.camera.as_deref(),
+        arguments.preset,
+        arguments.reading,
+        &arguments.parameters,
+    )?;
     if let Some(directory) = &arguments.figures {
         return papers_figures(directory, &scenario);
     }
@@ -68,17 +74,21 @@ fn check_plot(arguments: &LimitArgs) -> Result<(), Fault> {
 }
 
 /// The scenario that is asked for, in which every value makes sense.
-fn scenario(arguments: &LimitArgs) -> Result<Scenario, Fault> {
-    let mut scenario = match &arguments.camera {
+pub(crate) fn scenario_of(
+    camera: Option<&Path>,
+    preset: Option<Preset>,
+    reading: Option<ReadingArg>,
+    parameters: &ParameterArgs,
+) -> Result<Scenario, Fault> {
+    let mut scenario = match camera {
         Some(path) => described(path)?,
-        None => Scenario::of(arguments.preset.unwrap_or(Preset::Experiment1)),
+        None => Scenario::of(preset.unwrap_or(Preset::Experiment1)),
     };
-    match arguments.reading {
+    match reading {
         None => (),
         Some(ReadingArg::Paper) => scenario.reading = Reading::Paper,
         Some(ReadingArg::Physical) => scenario.reading = Reading::Physical,
     }
-    let parameters = &arguments.parameters;
     parameters
         .apply(&mut scenario)
         .map_err(anyhow::Error::from)?;

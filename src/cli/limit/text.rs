@@ -308,7 +308,7 @@ fn parameter(row: &Row) -> &'static str {
 }
 
 /// A number of any size to five digits.
-pub(super) fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     let size = value.abs();
     if value != 0.0 && !(1e-3..1e6).contains(&size) {
         let text = format!("{value:.4e}");

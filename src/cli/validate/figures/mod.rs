@@ -1,0 +1,376 @@
+//! The figures of a run and of a study.
+
+mod panel;
+
+use super::study::StudyRow;
+use crate::cli::plot::{BLUE, Form, ORANGE, rendered};
+use anyhow::Context;
+use clap::ValueEnum;
+use panel::{Axis, Dot, Layer, Marks, Panel, Sheet};
+use plotters::style::RGBColor;
+use starpipe::statistics::normal_density;
+use starpipe::validation::{
+    AttitudeSummary, CentroidSummary, CompletenessSummary, DifferenceSummary, Histogram,
+    IdentificationSummary, Pull, PullSummary, Summary,
+};
+
+/// The colours of what is told beside the middle.
+const PALE_BLUE: RGBColor = RGBColor(120, 180, 220);
+const PALE_ORANGE: RGBColor = RGBColor(240, 170, 110);
+
+/// What figures are drawn as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FigureForm {
+    /// Lines and letters
+    Svg,
+    /// Pixels
+    Png,
+    /// Not at all
+    None,
+}
+
+/// Names and contents of files.
+type Files = Vec<(String, Vec<u8>)>;
+
+/// The figures of a run.
+pub(super) fn of_run(summary: &Summary, form: FigureForm) -> anyhow::Result<Files> {
+    let mut sheets = vec![
+        ("identification", identification(&summary.identification)),
+        ("completeness", completeness(&summary.completeness)),
+        ("centroids", centroids(&summary.centroids)),
+        ("pulls", pulls(&summary.pulls)),
+        ("faintest", faintest(&summary.faintest)),
+    ];
+    sheets.extend(summary.attitude.as_ref().map(|a| ("attitude", attitude(a))));
+    drawn(sheets, form)
+}
+
+/// The figures of a study, one for each parameter.
+pub(super) fn of_study(rows: &[StudyRow], form: FigureForm) -> anyhow::Result<Files> {
+    let parameters = rows.chunk_by(|a, b| a.parameter == b.parameter);
+    drawn(
+        parameters
+            .map(|rows| (rows[0].parameter, study(rows)))
+            .collect(),
+        form,
+    )
+}
+
+fn drawn(sheets: Vec<(&str, Sheet)>, form: FigureForm) -> anyhow::Result<Files> {
+    let (form, extension) = match form {
+        FigureForm::Svg => (Form::Svg, "svg"),
+        FigureForm::Png => (Form::Png, "png"),
+        FigureForm::None => return Ok(Files::new()),
+    };
+    let file = |(name, sheet): (&str, Sheet)| {
+        let drawing = rendered(&sheet, form).with_context(|| format!("drawing {name}"))?;
+        Ok((format!("{name}.{extension}"), drawing))
+    };
+    sheets.into_iter().map(file).collect()
+}
+
+fn alone(panel: Panel) -> Sheet {
+    Sheet {
+        panels: vec![panel],
+        abreast: 1,
+    }
+}
+
+fn identification(found: &IdentificationSummary) -> Sheet {
+    let dots: Vec<Dot> = found
+        .by_stars
+        .iter()
+        .map(|bin| {
+            let middle = ((bin.from_stars.max(1) * bin.to_stars.max(1)) as f64).sqrt();
+            let interval = [bin.right_low_percent, bin.right_high_percent];
+            (middle, bin.right_percent, interval)
+        })
+        .collect();
+    let lowest = lowest_percent(&dots);
+    let all = &found.all;
+    alone(Panel {
+        title: format!(
+            "Identified rightly: {} of {} frames; {} not, {} wrongly",
+            all.right, all.frames, all.none, all.wrong
+        ),
+        x: Axis::log("stars brighter than the predicted limit", true),
+        y: Axis::of("% of the frames").within(lowest, 100.5),
+        layers: vec![Layer::new(
+            "with 95 % intervals (Clopper-Pearson)",
+            BLUE,
+            Marks::Dots(dots),
+        )],
+    })
+}
+
+/// Where an axis of rates begins.
+fn lowest_percent(rates: &[Dot]) -> f64 {
+    let lowest = rates.iter().map(|rate| rate.2[0]);
+    lowest.fold(90.0, f64::min).floor()
+}
+
+fn completeness(found: &CompletenessSummary) -> Sheet {
+    // The first bin is of all brighter stars.
+    let bins = found.bins.get(1..).unwrap_or_default();
+    let dots = bins.iter().map(|bin| {
+        (
+            bin.vmag,
+            100.0 * bin.measured,
+            [100.0 * bin.low, 100.0 * bin.high],
+        )
+    });
+    let line = bins.iter().map(|bin| (bin.vmag, 100.0 * bin.predicted));
+    let title = match (found.measured_limit_vmag, found.difference_mag) {
+        (Some(limit), Some(difference)) => {
+            format!("Half of the stars are found at V {limit:.2}: {difference:+.3} mag off")
+        }
+        _ => "Completeness".to_owned(),
+    };
+    alone(Panel {
+        title,
+        x: Axis::of("V"),
+        y: Axis::of("% of isolated stars found").within(0.0, 103.0),
+        layers: vec![
+            Layer::guide(Marks::Levels(vec![50.0])),
+            Layer::new("predicted", ORANGE, Marks::Line(line.collect())),
+            Layer::new(
+                "found, with 95 % intervals",
+                BLUE,
+                Marks::Dots(dots.collect()),
+            ),
+        ],
+    })
+}
+
+fn centroids(found: &CentroidSummary) -> Sheet {
+    let bins = &found.bins;
+    // The standard error of a root mean square of 2n values is its 1/√(4n).
+    let part = |stars: usize| 1.0 / (4.0 * stars as f64).sqrt();
+    let errors = bins.iter().map(|bin| {
+        let room = bin.rms_px * part(bin.stars);
+        (bin.snr, bin.rms_px, [bin.rms_px - room, bin.rms_px + room])
+    });
+    let bound = bins.iter().filter_map(|bin| Some((bin.snr, bin.bound_px?)));
+    let ratios: Vec<_> = bins
+        .iter()
+        .filter_map(|bin| {
+            let (ratio, sigma) = (bin.ratio?, bin.ratio_sigma?);
+            Some((bin.snr, ratio, [ratio - sigma, ratio + sigma]))
+        })
+        .collect();
+    let snr = || Axis::log("signal-to-noise ratio of the matched filter", true);
+    Sheet {
+        panels: vec![
+            Panel {
+                title: "Error of a centroid on one axis".to_owned(),
+                x: snr(),
+                y: Axis::log("root mean square (px)", true),
+                layers: vec![
+                    Layer::new("Cramér-Rao bound", ORANGE, Marks::Line(bound.collect())),
+                    Layer::new("measured", BLUE, Marks::Dots(errors.collect())),
+                ],
+            },
+            Panel {
+                title: "The same in units of the bound".to_owned(),
+                x: snr(),
+                y: Axis::of("measured / bound"),
+                layers: vec![
+                    Layer::guide(Marks::Levels(vec![1.0])),
+                    Layer::new("± standard error", BLUE, Marks::Dots(ratios)),
+                ],
+            },
+        ],
+        abreast: 2,
+    }
+}
+
+/// The bars of a histogram, as high as a density is.
+fn densities(histogram: &Histogram, count: usize) -> Vec<([f64; 2], f64)> {
+    let Histogram { from, step, counts } = histogram;
+    let bar = |(bin, values): (usize, &usize)| {
+        let low = from + step * bin as f64;
+        let density = *values as f64 / (count.max(1) as f64 * step);
+        ([low, low + step], density)
+    };
+    counts.iter().enumerate().map(bar).collect()
+}
+
+fn normal_curve(reach: f64, sd: f64) -> Vec<(f64, f64)> {
+    let at = |i: i32| {
+        let x = reach * f64::from(i) / 100.0;
+        (x, normal_density(x / sd) / sd)
+    };
+    (-100..=100).map(at).collect()
+}
+
+fn pulls(found: &PullSummary) -> Sheet {
+    let panel = |(name, pull): (&str, &Pull)| Panel {
+        title: format!(
+            "{name}: mean {:+.3}, standard deviation {:.3}",
+            pull.mean, pull.sd
+        ),
+        x: Axis::of("error / stated standard error").within(-5.0, 5.0),
+        y: Axis {
+            from: Some(0.0),
+            ..Axis::of("density")
+        },
+        layers: vec![
+            Layer::new(
+                format!("{} values", pull.count),
+                BLUE,
+                Marks::Bars(densities(&pull.histogram, pull.count)),
+            ),
+            Layer::new(
+                "standard normal",
+                ORANGE,
+                Marks::Line(normal_curve(5.0, 1.0)),
+            ),
+        ],
+    };
+    let panels = [
+        ("Star's x", &found.x),
+        ("Star's y", &found.y),
+        ("Star's light", &found.flux),
+        ("Turn about x", &found.attitude_x),
+        ("Turn about y", &found.attitude_y),
+        ("Roll", &found.roll),
+    ];
+    Sheet {
+        panels: panels.into_iter().map(panel).collect(),
+        abreast: 3,
+    }
+}
+
+fn faintest(found: &DifferenceSummary) -> Sheet {
+    let mut layers = vec![Layer::new(
+        format!("{} frames", found.count),
+        BLUE,
+        Marks::Bars(densities(&found.histogram, found.count)),
+    )];
+    if let Some(sd) = found.expected_sd.filter(|sd| *sd > 0.0) {
+        let curve = normal_curve(1.5, sd);
+        let label = format!("expected, as if normal: scatter {sd:.2}");
+        layers.push(Layer::new(label, ORANGE, Marks::Line(curve)));
+    }
+    alone(Panel {
+        title: format!(
+            "Faintest star minus expected: mean {:+.3} ± {:.3}, scatter {:.2} mag",
+            found.mean, found.mean_sigma, found.sd
+        ),
+        x: Axis::of("faintest star named minus the faintest expected (mag)").within(-1.5, 1.5),
+        y: Axis {
+            from: Some(0.0),
+            ..Axis::of("density (1 / mag)")
+        },
+        layers,
+    })
+}
+
+fn attitude(found: &AttitudeSummary) -> Sheet {
+    let below = |values: &[f64]| {
+        let point = |(percent, value): (usize, &f64)| (*value, percent as f64);
+        let points = values.iter().enumerate().map(point);
+        // On a logarithmic axis there is no place for an error of nothing.
+        Marks::Line(points.filter(|(value, _)| *value > 0.0).skip(1).collect())
+    };
+    let (boresight, roll) = (&found.boresight_arcsec, &found.roll_arcsec);
+    alone(Panel {
+        title: format!("Errors of the attitude, of {} frames", found.frames),
+        x: Axis::log("arcseconds", true),
+        y: Axis::of("% of the frames are off by less").within(0.0, 102.0),
+        layers: vec![
+            Layer::new(
+                format!("boresight: half below {:.2}″", boresight.p50),
+                BLUE,
+                below(&found.boresight_percentiles_arcsec),
+            ),
+            Layer::new(
+                format!("roll: half below {:.1}″", roll.p50),
+                ORANGE,
+                below(&found.roll_percentiles_arcsec),
+            ),
+        ],
+    })
+}
+
+/// A number of a row and its standard error.
+type Measured = fn(&StudyRow) -> (Option<f64>, Option<f64>);
+
+/// The rows of one parameter.
+fn study(rows: &[StudyRow]) -> Sheet {
+    let panel = |title: &str, y: Axis, layers: Vec<Layer>| Panel {
+        title: title.to_owned(),
+        x: Axis::log(rows[0].title.clone(), rows[0].is_log),
+        y,
+        layers,
+    };
+    let line = |of: fn(&StudyRow) -> Option<f64>| {
+        let points = rows.iter().filter_map(|row| Some((row.value, of(row)?)));
+        Marks::Line(points.collect())
+    };
+    let measured = |label: &str, of: Measured| {
+        let dots = rows.iter().filter_map(|row| {
+            let (Some(value), Some(sigma)) = of(row) else {
+                return None;
+            };
+            Some((row.value, value, [value - sigma, value + sigma]))
+        });
+        Layer::new(label, BLUE, Marks::Dots(dots.collect()))
+    };
+    let rates: Vec<Dot> = rows
+        .iter()
+        .map(|row| {
+            let ends = [row.right_low_percent, row.right_high_percent];
+            (row.value, row.right_percent, ends)
+        })
+        .collect();
+    let rate = Axis::of("% of the frames").within(lowest_percent(&rates), 100.5);
+    let errors = vec![
+        Layer::new(
+            "boresight, 50 %",
+            BLUE,
+            line(|row| row.boresight_p50_arcsec),
+        ),
+        Layer::new("95 %", PALE_BLUE, line(|row| row.boresight_p95_arcsec)),
+        Layer::new("roll, 50 %", ORANGE, line(|row| row.roll_p50_arcsec)),
+        Layer::new("95 %", PALE_ORANGE, line(|row| row.roll_p95_arcsec)),
+    ];
+    let limits = vec![
+        Layer::new(
+            "predicted",
+            ORANGE,
+            line(|row| Some(row.predicted_limit_vmag)),
+        ),
+        measured("measured", |row| {
+            (row.measured_limit_vmag, row.measured_limit_sigma_mag)
+        }),
+    ];
+    let ratios = vec![
+        Layer::guide(Marks::Levels(vec![1.0])),
+        measured("± standard error", |row| {
+            (row.centroid_ratio, row.centroid_ratio_sigma)
+        }),
+    ];
+    let in_bounds = Axis::of("root mean square / bound");
+    Sheet {
+        panels: vec![
+            panel(
+                "Identified rightly",
+                rate,
+                vec![Layer::new("with 95 % intervals", BLUE, Marks::Dots(rates))],
+            ),
+            panel("Half of the stars are found at", Axis::of("V"), limits),
+            panel(
+                "Errors of centroids in units of the bound",
+                in_bounds,
+                ratios,
+            ),
+            panel(
+                "Errors of the attitude",
+                Axis::log("arcseconds", true),
+                errors,
+            ),
+        ],
+        abreast: 2,
+    }
+}

@@ -1,0 +1,79 @@
+//! `validate`: frames simulated and processed, run by run; studies over a parameter.
+
+mod columns;
+mod figures;
+mod identity;
+mod parquet;
+mod run;
+mod study;
+mod tables;
+
+pub(crate) use figures::FigureForm;
+
+use super::args::{PageFormat, ValidateArgs};
+use super::output::{json_lines, print};
+use super::resources::{bar, read_catalog, sky, thread_pool};
+use super::{Exit, Fault, complain};
+use indicatif::ProgressBar;
+use starpipe::pipeline::Pipeline;
+use starpipe::validation::Protocol;
+use std::fmt::Display;
+
+/// What the runs of one command have in common.
+struct Shared<'a> {
+    pipeline: &'a Pipeline<'a>,
+    pool: &'a rayon::ThreadPool,
+    /// Frames of each run.
+    frames: u64,
+    figures: FigureForm,
+    /// Of the frames of all runs.
+    progress: ProgressBar,
+}
+
+impl Shared<'_> {
+    /// Says something on standard error, above the bar where there is one.
+    fn tell(&self, message: impl Display) {
+        self.progress.suspend(|| complain(message));
+    }
+}
+
+/// `starpipe validate`
+pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Exit, Fault> {
+    let protocol = Protocol {
+        setup: arguments.setup.setup()?,
+        scale_known: !arguments.scale_unknown,
+        seed: arguments.seed,
+    };
+    let studies = study::protocols(&arguments.sweep, &protocol)?;
+    let pool = thread_pool(arguments.resources.threads)?;
+    let catalog = pool.install(|| read_catalog(arguments.resources.catalog.as_deref()))?;
+    let pipeline = Pipeline::new(pool.install(|| sky(&catalog, &arguments.resources)));
+    let runs = studies.len().max(1) as u64;
+    let shared = Shared {
+        pipeline: &pipeline,
+        pool: &pool,
+        frames: arguments.frames,
+        figures: arguments.figures,
+        progress: bar(
+            arguments.frames * runs,
+            "frames {wide_bar} {pos}/{len} {per_sec} {eta}",
+        ),
+    };
+    let text = if studies.is_empty() {
+        let summary = run::run(&arguments.out, &protocol, &shared)?;
+        match arguments.format {
+            PageFormat::Text => summary.to_text(),
+            PageFormat::Json => json_lines(std::iter::once(&summary))?,
+        }
+    } else {
+        let rows = study::run(&arguments.out, &studies, &shared)?;
+        match arguments.format {
+            PageFormat::Text => study::text(&rows),
+            PageFormat::Json => json_lines(rows.iter())?,
+        }
+    };
+    shared.progress.finish_and_clear();
+    // Nobody left to read it: nothing is lost.
+    let _ = print(&text)?;
+    Ok(Exit::Success)
+}

@@ -1,0 +1,237 @@
+//! A summary for people.
+
+use super::summary::{
+    AttitudeSummary, DifferenceSummary, IdentificationBin, Pull, Quantiles, Summary,
+};
+use std::fmt::Write as _;
+
+impl Summary {
+    /// The summary as text of several lines, each with its end.
+    pub fn to_text(&self) -> String {
+        let facts = &self.facts;
+        let mut text = format!(
+            "{} frames at random attitudes: {}, {} × {} px, seed {}, {}\n",
+            self.frames,
+            facts.camera,
+            facts.width_px,
+            facts.height_px,
+            facts.seed,
+            match facts.scale_known {
+                true => "scale known from the camera's description",
+                false => "scale unknown",
+            }
+        );
+        text += &self.identification_text();
+        text += &self.detection_text();
+        text += &self.completeness_text();
+        text += &self.centroids_text();
+        text += &self.pulls_text();
+        if let Some(attitude) = &self.attitude {
+            text += &attitude_text(attitude);
+        }
+        text + &self.differences_text()
+    }
+
+    fn identification_text(&self) -> String {
+        let all = &self.identification.all;
+        let mut text = format!(
+            "\nIdentification\n  right {} of {}: {:.2} % (95 %: {:.2} to {:.2} %); none {}, wrong {} (95 %: below {:.2} %)\n",
+            all.right,
+            all.frames,
+            all.right_percent,
+            all.right_low_percent,
+            all.right_high_percent,
+            all.none,
+            all.wrong,
+            all.wrong_high_percent + 0.005,
+        );
+        let _ = writeln!(
+            text,
+            "  {:<22} {:>8} {:>8} {:>6} {:>6} {:>9} {:>19}",
+            "stars above the limit", "frames", "right", "none", "wrong", "right", "95 %"
+        );
+        for bin in &self.identification.by_stars {
+            text += &identification_line(bin);
+        }
+        text
+    }
+
+    fn detection_text(&self) -> String {
+        let d = &self.detection;
+        let per_frame = |count: u64| count as f64 / self.frames.max(1) as f64;
+        format!(
+            "\nDetection\n  a frame has {:.1} detections, {:.1} of them named; named wrongly {} of {}\n  \
+             false: {} on all frames, {} in a million pixels (95 %: {} to {}), asked for {}\n  \
+             blends {}, taken for no stars {}\n",
+            per_frame(d.detected),
+            per_frame(d.named),
+            d.misnamed,
+            d.named,
+            d.false_detections,
+            d.false_per_mpx,
+            d.false_low_per_mpx,
+            d.false_high_per_mpx,
+            self.facts.false_alarms_per_mpx,
+            d.blends,
+            d.rejected,
+        )
+    }
+
+    fn completeness_text(&self) -> String {
+        let c = &self.completeness;
+        let mut text = format!(
+            "\nCompleteness of isolated stars\n  half of them are to be found at V {:.3}",
+            c.predicted_limit_vmag
+        );
+        if let (Some(limit), Some(sigma), Some(difference)) = (
+            c.measured_limit_vmag,
+            c.measured_limit_sigma_mag,
+            c.difference_mag,
+        ) {
+            let _ = write!(
+                text,
+                ", are found at V {limit:.3} ± {sigma:.3}: {difference:+.3} mag"
+            );
+        }
+        let _ = writeln!(
+            text,
+            "\n  {:>7} {:>9} {:>9} {:>10} {:>17} {:>10}",
+            "V", "stars", "found", "measured", "95 %", "predicted"
+        );
+        for bin in &c.bins {
+            let interval = format!("{:.3} to {:.3}", bin.low, bin.high);
+            let _ = writeln!(
+                text,
+                "  {:>7.2} {:>9} {:>9} {:>10.4} {interval:>17} {:>10.4}",
+                bin.vmag, bin.stars, bin.detected, bin.measured, bin.predicted
+            );
+        }
+        text
+    }
+
+    fn centroids_text(&self) -> String {
+        let mut text = format!(
+            "\nCentroids of isolated stars that are not saturated, errors on one axis\n  {:>15} {:>9} {:>10} {:>10} {:>15} {:>10} {:>8} {:>10}\n",
+            "SNR", "stars", "rms px", "bound px", "ratio", "stated px", "light", "its ratio"
+        );
+        for bin in &self.centroids.bins {
+            let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".to_owned());
+            let bound = or_dash(bin.bound_px.map(|px| format!("{px:.5}")));
+            let ratio = bin.ratio.zip(bin.ratio_sigma);
+            let ratio = or_dash(ratio.map(|(ratio, sigma)| format!("{ratio:.3} ± {sigma:.3}")));
+            let flux = or_dash(bin.flux_ratio.map(|ratio| format!("{ratio:.3}")));
+            let _ = writeln!(
+                text,
+                "  {:>15} {:>9} {:>10.5} {bound:>10} {ratio:>15} {:>10.5} {:>8.4} {flux:>10}",
+                format!("{:.1} to {:.1}", bin.from_snr, bin.to_snr),
+                bin.stars,
+                bin.rms_px,
+                bin.stated_px,
+                bin.flux_part,
+            );
+        }
+        text
+    }
+
+    fn pulls_text(&self) -> String {
+        let mut text = format!(
+            "\nPulls: errors in units of their stated standard errors\n  {:<14} {:>9} {:>9} {:>8} {:>9} {:>9} {:>9}\n  {:<14} {:>9} {:>9} {:>8} {:>9} {:>9} {:>9}\n",
+            "",
+            "values",
+            "mean",
+            "sd",
+            "beyond 2",
+            "beyond 3",
+            "beyond 5",
+            "where true",
+            "",
+            "0",
+            "1",
+            "4.55 %",
+            "0.27 %",
+            "0.00 %"
+        );
+        let p = &self.pulls;
+        let lines: [(&str, &Pull); 7] = [
+            ("star's x", &p.x),
+            ("star's y", &p.y),
+            ("star's light", &p.flux),
+            ("turn about x", &p.attitude_x),
+            ("turn about y", &p.attitude_y),
+            ("roll", &p.roll),
+            ("focal length", &p.focal_length),
+        ];
+        for (name, pull) in lines {
+            let _ = writeln!(
+                text,
+                "  {name:<14} {:>9} {:>9.3} {:>8.3} {:>7.2} % {:>7.2} % {:>7.2} %",
+                pull.count,
+                pull.mean,
+                pull.sd,
+                pull.beyond_2_percent,
+                pull.beyond_3_percent,
+                pull.beyond_5_percent
+            );
+        }
+        text
+    }
+
+    fn differences_text(&self) -> String {
+        let mut text = "\nMeasured minus expected, on frames\n".to_owned();
+        let mut line = |name: &str, unit: &str, of: &DifferenceSummary| {
+            let expected = of
+                .expected_sd
+                .map_or(String::new(), |sd| format!(", {sd:.3} expected"));
+            let _ = writeln!(
+                text,
+                "  {name:<24} {:+.4} ± {:.4}{unit}, scatter {:.4}{expected}; {} frames",
+                of.mean, of.mean_sigma, of.sd, of.count
+            );
+        };
+        line("faintest star named", " mag", &self.faintest);
+        line("limit by the frame alone", " mag", &self.frame_limit);
+        line("background", " ADU", &self.background);
+        line("noise, over the true one", "", &self.noise_ratio);
+        text
+    }
+}
+
+fn identification_line(bin: &IdentificationBin) -> String {
+    let stars = match bin.from_stars == bin.to_stars {
+        true => bin.from_stars.to_string(),
+        false => format!("{} to {}", bin.from_stars, bin.to_stars),
+    };
+    let interval = format!(
+        "{:.2} to {:.2} %",
+        bin.right_low_percent, bin.right_high_percent
+    );
+    format!(
+        "  {stars:<22} {:>8} {:>8} {:>6} {:>6} {:>7.2} % {interval:>19}\n",
+        bin.frames, bin.right, bin.none, bin.wrong, bin.right_percent
+    )
+}
+
+fn attitude_text(attitude: &AttitudeSummary) -> String {
+    let mut text = format!(
+        "\nAttitude, of {} frames\n  {:<18} {:>9} {:>9} {:>9} {:>9} {:>9}\n",
+        attitude.frames, "arcseconds", "50 %", "68.3 %", "95 %", "99 %", "all"
+    );
+    let mut line = |name: &str, q: &Quantiles| {
+        let _ = writeln!(
+            text,
+            "  {name:<18} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>9.3}",
+            q.p50, q.p68, q.p95, q.p99, q.max
+        );
+    };
+    line("boresight off by", &attitude.boresight_arcsec);
+    line("roll off by", &attitude.roll_arcsec);
+    let [x, y, roll] = attitude.rms_arcsec;
+    let _ = writeln!(
+        text,
+        "  root mean square: about x {x:.3}, about y {y:.3}, roll {roll:.3}\n  \
+         mean of the squared error in units of its covariance {:.3}, where that is true 3 ± {:.3}\n  \
+         residuals {:.4} px root mean square",
+        attitude.nees_mean, attitude.nees_sigma, attitude.rms_px
+    );
+    text
+}
