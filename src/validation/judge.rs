@@ -12,11 +12,13 @@ use crate::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
-/// Other stars' light further away than so many standard deviations of a spot, and so many pixels, does not matter.
+/// Other stars that may be detected do not matter further away than so many standard deviations of a spot, and so many pixels.
 const ALONE_SIGMAS: f64 = 8.0;
 const ALONE_PX: f64 = 2.0;
-/// Nor does that of a star with less than this part of the error of a star's own light.
-const ALONE_PART: f64 = 0.1;
+/// A star so much fainter than the predicted limit may still be detected.
+const MAY_BE_DETECTED_MAG: f64 = 0.5;
+/// Light of others that is less than this part of the error of a star's own light does not matter.
+const ALONE_PART: f64 = 0.05;
 /// A star is whole on the frame so many standard deviations of its spot, and a pixel, from the border.
 const WHOLE_SIGMAS: f64 = 4.0;
 /// A detection is false where within so many standard deviations of a spot, and a pixel, there is no star.
@@ -164,15 +166,24 @@ impl<'a> Judge<'a> {
         let camera = self.validator.simulator.camera();
         let sigma_px = self.light.sigma_px();
         let whole_px = WHOLE_SIGMAS * sigma_px + 1.0;
-        let least_e = ALONE_PART * own_error_e.unwrap_or_else(|| star.electrons.sqrt());
-        let mut near = self
+        if !camera.nearly_contains(&star.position, -whole_px) {
+            return false;
+        }
+        let bright_vmag = self.validator.limit_vmag() + MAY_BE_DETECTED_MAG;
+        let others = self
             .light
-            .stars_near(&star.position, ALONE_SIGMAS * sigma_px + ALONE_PX);
-        let matters = |other: &TrueStar| {
-            let is_other = other.number != star.number;
-            is_other && other.electrons > least_e
-        };
-        camera.nearly_contains(&star.position, -whole_px) && !near.any(matters)
+            .stars_near(&star.position, ALONE_SIGMAS * sigma_px + ALONE_PX)
+            .filter(|other| other.number != star.number);
+        let mut light_e = 0.0;
+        for other in others {
+            if other.v_mag <= bright_vmag {
+                return false;
+            }
+            // What a filter of the spot's own form makes of it at the star's place.
+            let off = other.position.distance_to(&star.position) / sigma_px;
+            light_e += other.electrons * (-0.25 * off * off).exp();
+        }
+        light_e < ALONE_PART * own_error_e.unwrap_or_else(|| star.electrons.sqrt())
     }
 
     /// The row of what was detected and is no star.

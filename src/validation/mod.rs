@@ -12,7 +12,7 @@
 //!    against the faintest to be expected of the very stars on the frame.
 //!
 //! Caveats: those of [`crate::simulate`]; the stars are those of the catalogue that they are identified with. Stars are *isolated*
-//! where they are whole on the frame and no other star of the catalogue has light near them that matters; what is said of
+//! where they are whole on the frame, no other star that may be detected is near, and the light of the others there does not matter; what is said of
 //! centroids, pulls and completeness is of these.
 //!
 //! # Reference

@@ -80,22 +80,24 @@ impl Summary {
     fn completeness_text(&self) -> String {
         let c = &self.completeness;
         let mut text = format!(
-            "\nCompleteness of isolated stars\n  half of them are to be found at V {:.3}",
+            "\nCompleteness of isolated stars\n  half of such stars should be found at V {:.3}\n",
             c.predicted_limit_vmag
         );
-        if let (Some(limit), Some(sigma), Some(difference)) = (
+        if let (Some(limit), Some(sigma), Some(predicted), Some(difference)) = (
             c.measured_limit_vmag,
             c.measured_limit_sigma_mag,
+            c.predicted_fit_vmag,
             c.difference_mag,
         ) {
-            let _ = write!(
+            let _ = writeln!(
                 text,
-                ", are found at V {limit:.3} ± {sigma:.3}: {difference:+.3} mag"
+                "  fitted to those found: V {limit:.3} ± {sigma:.3}; to their predicted probabilities: V {predicted:.3}; \
+                 difference {difference:+.3} mag"
             );
         }
         let _ = writeln!(
             text,
-            "\n  {:>7} {:>9} {:>9} {:>10} {:>17} {:>10}",
+            "  {:>7} {:>9} {:>9} {:>10} {:>17} {:>10}",
             "V", "stars", "found", "measured", "95 %", "predicted"
         );
         for bin in &c.bins {

@@ -136,7 +136,9 @@ impl StudyRow {
             false_per_mpx: detection.false_per_mpx,
             false_low_per_mpx: detection.false_low_per_mpx,
             false_high_per_mpx: detection.false_high_per_mpx,
-            predicted_limit_vmag: completeness.predicted_limit_vmag,
+            predicted_limit_vmag: completeness
+                .predicted_fit_vmag
+                .unwrap_or(completeness.predicted_limit_vmag),
             measured_limit_vmag: completeness.measured_limit_vmag,
             measured_limit_sigma_mag: completeness.measured_limit_sigma_mag,
             limit_difference_mag: completeness.difference_mag,

@@ -253,6 +253,8 @@ impl<R: Row> Table<R> {
             .with_context(|| self.reading())?;
         let reader = csv::ReaderBuilder::new()
             .has_headers(false)
+            // How many fields a row has is checked, and told of with its line.
+            .flexible(true)
             .from_reader(BufReader::new(file).take(to - from));
         Ok(Rows {
             path: self.path.clone(),
@@ -365,6 +367,7 @@ impl<R> Rows<R> {
         });
         match field {
             Some((name, found)) => anyhow!("{name} is {found:?}: {}", err.kind()),
+            // Of words it is not told in which field they are; they are told themselves.
             None => anyhow!("{}", err.kind()),
         }
     }

@@ -18,13 +18,15 @@ const FAINTER_MAG: f64 = super::super::BEYOND_LIMIT_MAG;
 /// predicted, so that where that is no such integral it does not matter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CompletenessSummary {
-    /// V magnitude at which half of the stars should be found.
+    /// V magnitude at which half of the stars should be found, by the model itself.
     pub predicted_limit_vmag: f64,
-    /// V magnitude at which half of them are: none where too few stars tell.
+    /// The same by a fit to the stars' predicted probabilities.
+    pub predicted_fit_vmag: Option<f64>,
+    /// V magnitude at which half of them are found, by the same fit: none where too few stars tell.
     pub measured_limit_vmag: Option<f64>,
     /// Its standard error.
     pub measured_limit_sigma_mag: Option<f64>,
-    /// The measured limit minus the predicted one, each fitted.
+    /// The measured limit minus the predicted one, both fitted.
     pub difference_mag: Option<f64>,
     /// Bright ones first; those without a star are left out.
     pub bins: Vec<CompletenessBin>,
@@ -102,6 +104,7 @@ impl Completeness {
         let difference = measured.zip(predicted);
         CompletenessSummary {
             predicted_limit_vmag: to_decimals(self.limit_vmag, 4),
+            predicted_fit_vmag: predicted.map(|p| to_decimals(p.value, 4)),
             measured_limit_vmag: measured.map(|m| to_decimals(m.value, 4)),
             measured_limit_sigma_mag: measured.map(|m| to_decimals(m.sigma, 4)),
             difference_mag: difference.map(|(m, p)| to_decimals(m.value - p.value, 4)),

@@ -81,7 +81,7 @@ fn identification(found: &IdentificationSummary) -> Sheet {
         .by_stars
         .iter()
         .map(|bin| {
-            let middle = ((bin.from_stars.max(1) * bin.to_stars.max(1)) as f64).sqrt();
+            let middle = 0.5 * (bin.from_stars + bin.to_stars) as f64;
             let interval = [bin.right_low_percent, bin.right_high_percent];
             (middle, bin.right_percent, interval)
         })
@@ -93,7 +93,10 @@ fn identification(found: &IdentificationSummary) -> Sheet {
             "Identified rightly: {} of {} frames; {} not, {} wrongly",
             all.right, all.frames, all.none, all.wrong
         ),
-        x: Axis::log("stars brighter than the predicted limit", true),
+        x: Axis {
+            from: Some(0.0),
+            ..Axis::of("stars brighter than the predicted limit")
+        },
         y: Axis::of("% of the frames").within(lowest, 100.5),
         layers: vec![Layer::new(
             "with 95 % intervals (Clopper-Pearson)",
@@ -122,7 +125,7 @@ fn completeness(found: &CompletenessSummary) -> Sheet {
     let line = bins.iter().map(|bin| (bin.vmag, 100.0 * bin.predicted));
     let title = match (found.measured_limit_vmag, found.difference_mag) {
         (Some(limit), Some(difference)) => {
-            format!("Half of the stars are found at V {limit:.2}: {difference:+.3} mag off")
+            format!("Half are found at V {limit:.2}, {difference:+.3} mag from the prediction")
         }
         _ => "Completeness".to_owned(),
     };
