@@ -16,6 +16,7 @@ mod resources;
 mod robustness;
 mod settings;
 mod setup;
+mod simulate;
 mod solve;
 mod validate;
 mod values;
@@ -75,6 +76,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Limit(arguments) => limit::limit(&arguments),
         Command::Camera(arguments) => camera::camera(&arguments),
         Command::Experiment(arguments) => experiment::experiment(&arguments),
+        Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments),
     };
     match done {

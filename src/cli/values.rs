@@ -47,6 +47,24 @@ pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
     within(text, "the number", |v| v >= 0.0, "0 or above")
 }
 
+/// A right ascension in degrees.
+pub(crate) fn right_ascension(text: &str) -> Result<f64, String> {
+    let limits = "from 0 to 360 degrees";
+    let accepts = |v| (0.0..=360.0).contains(&v);
+    within(text, "the right ascension", accepts, limits)
+}
+
+/// A declination in degrees.
+pub(crate) fn declination(text: &str) -> Result<f64, String> {
+    let limits = "from -90 to 90 degrees";
+    within(
+        text,
+        "the declination",
+        |v| (-90.0..=90.0).contains(&v),
+        limits,
+    )
+}
+
 /// A mean number of stars.
 pub(crate) fn star_count(text: &str) -> Result<f64, String> {
     let limits = "above 0 and at most 10000";

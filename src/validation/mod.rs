@@ -110,6 +110,14 @@ struct Simulated {
     seed: u64,
 }
 
+/// The seed of the random numbers in the pixels of the frame with this number, and its attitude, in a run with this `seed`.
+pub fn draw(seed: u64, number: u64) -> (u64, Rotation<Icrs, Camera>) {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(number);
+    let icrs_to_camera = random_rotation(&mut random);
+    (random.random(), icrs_to_camera)
+}
+
 impl<'a> Validator<'a> {
     /// Makes ready what all frames have in common.
     ///
@@ -157,10 +165,7 @@ impl<'a> Validator<'a> {
 
     /// The seed of the random numbers in the pixels of the frame with this number, and its attitude.
     pub fn draw(&self, number: u64) -> (u64, Rotation<Icrs, Camera>) {
-        let mut random = ChaCha8Rng::seed_from_u64(self.protocol.seed);
-        random.set_stream(number);
-        let icrs_to_camera = random_rotation(&mut random);
-        (random.random(), icrs_to_camera)
+        draw(self.protocol.seed, number)
     }
 
     /// Simulates the frame with this number, examines it, and holds what comes of it against the truth.

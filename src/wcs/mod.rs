@@ -15,6 +15,7 @@
 mod sip;
 
 use crate::camera::CameraModel;
+use crate::coords::{Camera, Icrs, Rotation};
 use crate::frame::FitsHeader;
 use crate::identify::{Identification, Outcome};
 use crate::pipeline::Solution;
@@ -31,25 +32,22 @@ pub fn header(frame: &str, solution: &Solution) -> Option<Vec<u8>> {
     let Outcome::Identified(identification) = &solution.outcome else {
         return None;
     };
-    let camera = &identification.camera;
-    let sip = camera
-        .distortion
-        .as_ref()
-        .map(|distortion| Sip::new(distortion, camera));
     let mut header = FitsHeader::default();
     header.logical("SIMPLE", true, "FITS header without data");
     header.integer("BITPIX", 8, "");
     header.integer("NAXIS", 0, "the image is in the file named below");
     header.integer("IMAGEW", solution.width as i64, "columns of the image");
     header.integer("IMAGEH", solution.height as i64, "rows of the image");
-    add_projection(&mut header, identification, sip.as_ref());
+    add_projection(
+        &mut header,
+        &identification.camera,
+        &identification.icrs_to_camera,
+    );
+    add_errors(&mut header, identification);
     if let Some(known) = &solution.date {
         let utc = known.date.to_iso();
         header.text("DATE-OBS", utc.trim_end_matches('Z'), "UTC");
         header.text("TIMESYS", "UTC", "");
-    }
-    if let Some(sip) = &sip {
-        add_sip(&mut header, sip);
     }
     add_history(&mut header, frame, solution, identification);
     Some(header.to_bytes())
@@ -60,15 +58,22 @@ pub fn is_header(file: &[u8]) -> bool {
     file.starts_with(b"SIMPLE  =") && memmem::find(file, SOLVED_BY.as_bytes()).is_some()
 }
 
-/// Pixel offsets from the centre to degrees towards east and north.
-fn add_projection(header: &mut FitsHeader, identification: &Identification, sip: Option<&Sip>) {
-    let camera = &identification.camera;
-    let (boresight, _) = identification.icrs_to_camera.boresight_and_up();
+/// Adds what leads from pixels to the sky, of a `camera` of this attitude.
+pub fn add_projection(
+    header: &mut FitsHeader,
+    camera: &CameraModel,
+    icrs_to_camera: &Rotation<Icrs, Camera>,
+) {
+    let distortion = camera.distortion.as_ref();
+    let sip = distortion.map(|distortion| Sip::new(distortion, camera));
+    let (boresight, _) = icrs_to_camera.boresight_and_up();
     let (ra_rad, dec_rad) = boresight.to_ra_dec();
-    let (east, north) = sky_axes(identification);
+    let (east, north) = sky_axes(icrs_to_camera);
     let pinhole =
         Matrix2::from_rows(&[east, north]) * mirror(camera) / camera.focal_length_px * DEG_PER_RAD;
-    let linear = sip.map_or_else(Matrix2::identity, |sip| sip.linear);
+    let linear = sip
+        .as_ref()
+        .map_or_else(Matrix2::identity, |sip| sip.linear);
     let cd = pinhole * linear;
     let centre = camera.centre();
     let projection = if sip.is_some() {
@@ -92,6 +97,13 @@ fn add_projection(header: &mut FitsHeader, identification: &Identification, sip:
     header.real("LONPOLE", 180.0, "");
     header.text("RADESYS", "ICRS", "");
     header.real("EQUINOX", 2000.0, "");
+    if let Some(sip) = &sip {
+        add_sip(header, sip);
+    }
+}
+
+fn add_errors(header: &mut FitsHeader, identification: &Identification) {
+    let (east, north) = sky_axes(&identification.icrs_to_camera);
     let [sigma_x, sigma_y, _] = identification.attitude_sigma_rad();
     // A turn about x moves the boresight along y, and the other way round.
     for (keyword, axis) in [("CRDER1", east), ("CRDER2", north)] {
@@ -106,12 +118,12 @@ fn add_projection(header: &mut FitsHeader, identification: &Identification, sip:
 
 /// How far east and north lies what lies one unit along the camera's x and y.
 fn sky_axes(
-    identification: &Identification,
+    icrs_to_camera: &Rotation<Icrs, Camera>,
 ) -> (nalgebra::RowVector2<f64>, nalgebra::RowVector2<f64>) {
-    let (boresight, _) = identification.icrs_to_camera.boresight_and_up();
+    let (boresight, _) = icrs_to_camera.boresight_and_up();
     let (east, north) = boresight.east_north();
     let along = |axis: nalgebra::Vector3<f64>| {
-        let in_camera = identification.icrs_to_camera.matrix() * axis;
+        let in_camera = icrs_to_camera.matrix() * axis;
         nalgebra::RowVector2::new(in_camera.x, in_camera.y)
     };
     (along(east), along(north))

@@ -99,21 +99,25 @@ fn option(parameter: Parameter) -> Arg {
     let default = default.map_or_else(String::new, |value| {
         format!(" [default with --camera: {}]", number(value))
     });
-    Arg::new(name)
-        .long(name.replace('_', "-"))
-        .value_name(if is_curve(name) {
-            "NUMBER|FILE.csv"
-        } else {
-            "NUMBER"
-        })
-        .help(format!("{about}: {}{default}", parameter.limits()))
-        .help_heading(match parameter {
-            Parameter::Sensor(_) => "Camera",
-            Parameter::Conditions(_) => "Conditions",
-        })
-        .allow_hyphen_values(true)
-        .conflicts_with_all(others.copied())
-        .value_parser(move |text: &str| given(parameter, text))
+    let arg = Arg::new(name).long(name.replace('_', "-"));
+    // As `process` has it.
+    let arg = match name {
+        "exposure_s" => arg.visible_alias("exposure"),
+        _ => arg,
+    };
+    arg.value_name(if is_curve(name) {
+        "NUMBER|FILE.csv"
+    } else {
+        "NUMBER"
+    })
+    .help(format!("{about}: {}{default}", parameter.limits()))
+    .help_heading(match parameter {
+        Parameter::Sensor(_) => "Camera",
+        Parameter::Conditions(_) => "Conditions",
+    })
+    .allow_hyphen_values(true)
+    .conflicts_with_all(others.copied())
+    .value_parser(move |text: &str| given(parameter, text))
 }
 
 fn given(parameter: Parameter, text: &str) -> Result<Given, String> {
