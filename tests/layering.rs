@@ -143,7 +143,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ),
     (
         "wcs",
-        &["units", "coords", "camera", "identify", "pipeline"],
+        &["units", "coords", "frame", "camera", "identify", "pipeline"],
     ),
 ];
 

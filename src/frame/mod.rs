@@ -37,6 +37,7 @@ mod tiff;
 pub(crate) use directory::OVERLAY_TEXT;
 pub use directory::{files_in, is_overlay};
 pub use error::{FrameError, FrameFormat};
+pub use fits::{FitsHeader, FitsSamples, FitsWriteError, write_fits};
 pub use metadata::FrameMetadata;
 
 use std::io::{self, Read};

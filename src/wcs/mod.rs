@@ -12,14 +12,13 @@
 //! Calabretta & Greisen 2002, A&A 395, 1077 (`TAN`); Shupe et al. 2005, ASP Conf. 347, 491 (SIP);
 //! FITS Standard 4.0 (2018), sect. 4 (cards) and 8 (world coordinates).
 
-mod card;
 mod sip;
 
 use crate::camera::CameraModel;
+use crate::frame::FitsHeader;
 use crate::identify::{Identification, Outcome};
 use crate::pipeline::Solution;
 use crate::units::DEG_PER_RAD;
-use card::Header;
 use memchr::memmem;
 use nalgebra::Matrix2;
 use sip::{Polynomial, Sip};
@@ -37,7 +36,7 @@ pub fn header(frame: &str, solution: &Solution) -> Option<Vec<u8>> {
         .distortion
         .as_ref()
         .map(|distortion| Sip::new(distortion, camera));
-    let mut header = Header::default();
+    let mut header = FitsHeader::default();
     header.logical("SIMPLE", true, "FITS header without data");
     header.integer("BITPIX", 8, "");
     header.integer("NAXIS", 0, "the image is in the file named below");
@@ -53,7 +52,7 @@ pub fn header(frame: &str, solution: &Solution) -> Option<Vec<u8>> {
         add_sip(&mut header, sip);
     }
     add_history(&mut header, frame, solution, identification);
-    Some(header.finish())
+    Some(header.to_bytes())
 }
 
 /// Whether `file` is a header made by [`header`].
@@ -62,7 +61,7 @@ pub fn is_header(file: &[u8]) -> bool {
 }
 
 /// Pixel offsets from the centre to degrees towards east and north.
-fn add_projection(header: &mut Header, identification: &Identification, sip: Option<&Sip>) {
+fn add_projection(header: &mut FitsHeader, identification: &Identification, sip: Option<&Sip>) {
     let camera = &identification.camera;
     let (boresight, _) = identification.icrs_to_camera.boresight_and_up();
     let (ra_rad, dec_rad) = boresight.to_ra_dec();
@@ -124,7 +123,7 @@ fn mirror(camera: &CameraModel) -> Matrix2<f64> {
     Matrix2::new(x, 0.0, 0.0, 1.0)
 }
 
-fn add_sip(header: &mut Header, sip: &Sip) {
+fn add_sip(header: &mut FitsHeader, sip: &Sip) {
     let mut add = |name: &str, polynomial: &Polynomial, comment: &str| {
         let order = polynomial.order as i64;
         header.integer(&format!("{name}_ORDER"), order, comment);
@@ -141,7 +140,7 @@ fn add_sip(header: &mut Header, sip: &Sip) {
 }
 
 fn add_history(
-    header: &mut Header,
+    header: &mut FitsHeader,
     frame: &str,
     solution: &Solution,
     identification: &Identification,

@@ -9,8 +9,13 @@
 //!
 //! Reference: FITS Standard 4.0 (2018), sections 3 to 5 and 7.1.
 
+mod cards;
 mod header;
 mod keywords;
+mod write;
+
+pub use cards::FitsHeader;
+pub use write::{FitsSamples, FitsWriteError, write_fits};
 
 use super::levels::{Samples, frame_from_floats, frame_from_integers, interleaved};
 use super::{Frame, FrameError, FrameFormat, check_size};
