@@ -17,6 +17,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("observer", &["units", "coords", "epoch"]),
     ("sensor", &[]),
     ("frame", &["units", "coords", "epoch", "angle", "observer"]),
+    ("calibration", &["frame", "statistics"]),
     ("camera", &["units", "coords"]),
     ("catalog", &["units", "coords", "files", "angle"]),
     ("detect", &["units", "coords", "frame"]),
@@ -78,6 +79,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "frame",
             "camera",
             "catalog",
+            "calibration",
             "comparison",
             "detect",
             "identify",
@@ -93,6 +95,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &[
             "units",
             "coords",
+            "calibration",
             "camera",
             "catalog",
             "detect",
@@ -104,6 +107,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "statistics",
         ],
     ),
+    ("darks", &["statistics", "frame", "report"]),
+    ("flats", &["darks", "frame", "report"]),
     (
         "robustness",
         &[
