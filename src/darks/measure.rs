@@ -2,7 +2,7 @@
 
 use super::current::frame_to_frame_adu;
 use super::hot::Evidence;
-use super::robust::typical_variance;
+use super::robust::{Typical, typical_variance};
 use super::{
     DarkCurrent, DarkStack, DarksError, FrameStatistics, HOT_SIGMA, HotPixel, Pattern,
     is_same_exposure, pooled_variances, suspicion,
@@ -309,18 +309,19 @@ fn seconds(group: &ExposureGroup) -> f64 {
 fn read_noise(
     groups: &[ExposureGroup],
     current: Option<&DarkCurrent>,
-    gain: Option<f64>,
+    gain_e_per_adu: Option<f64>,
 ) -> Option<f64> {
-    let (exposure_s, noise) = groups
+    let shortest = groups
         .iter()
-        .find_map(|g| Some((g.exposure_s, g.temporal_noise_adu?)))?;
-    let shot_variance = match (current, gain, exposure_s) {
-        (Some(current), Some(gain), Some(exposure_s)) => {
-            current.median_adu_s.max(0.0) * exposure_s / gain
-        }
+        .find(|group| group.temporal_noise_adu.is_some())?;
+    let variance = shortest.temporal_noise_adu?.powi(2);
+    // The mean current of the pixels whose variances were averaged, and not that of the median one.
+    let ordinary = current.and_then(|current| Typical::of(&current.of_pixels_adu_s, 0.0));
+    let shot_variance = match (ordinary, gain_e_per_adu, shortest.exposure_s) {
+        (Some(current), Some(gain), Some(exposure_s)) => current.level.max(0.0) * exposure_s / gain,
         _ => 0.0,
     };
-    Some((noise * noise - shot_variance).max(0.0).sqrt())
+    Some((variance - shot_variance).max(0.0).sqrt())
 }
 
 fn missing(
