@@ -496,6 +496,12 @@ fn calibrated_frames_have_their_stars_and_no_hot_pixels() {
         calibrated["notes"]
     );
     assert_eq!(raw["calibration"], Value::Null);
+    let noted = night.process(&["--dark", &dark, "--exposure", "5"]);
+    let note = noted.reports()[0]["notes"].to_string();
+    assert!(
+        note.contains("was exposed for 1 s and the frame for 5 s"),
+        "{note}"
+    );
 
     let clean_path = night.path("clean.fits");
     write(Path::new(&clean_path), &night.clean, Some(1.0));
