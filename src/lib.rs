@@ -2,15 +2,18 @@
 
 pub mod angle;
 pub mod attitude;
+pub mod calibration;
 pub mod camera;
 pub mod catalog;
 pub mod comparison;
 pub mod coords;
+pub mod darks;
 pub mod detect;
 pub mod diagnosis;
 pub mod epoch;
 pub mod experiment;
 pub mod files;
+pub mod flats;
 pub mod frame;
 pub mod identify;
 pub mod observer;

@@ -25,6 +25,7 @@
 mod described;
 mod knowledge;
 
+use crate::calibration::{Applied, Calibration, CalibrationError};
 use crate::catalog::Catalog;
 use crate::comparison::{Comparison, Description};
 use crate::coords::PixelPoint;
@@ -44,6 +45,7 @@ pub use knowledge::{DateSource, FrameDate, Knowledge, Scale, ScaleHint};
 use knowledge::{header_scale, wrong_header};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Why the frame in a file could not be examined. That its stars are not identified is no error but an [`Outcome`].
@@ -61,6 +63,14 @@ pub enum Error {
         /// What is wrong with the frame.
         source: DetectError,
     },
+    /// The frame is not one that can be calibrated as is asked for.
+    #[error("calibrating {}", path.display())]
+    Calibrate {
+        /// The file.
+        path: PathBuf,
+        /// What does not fit.
+        source: CalibrationError,
+    },
 }
 
 /// How to examine a frame.
@@ -74,6 +84,8 @@ pub struct SolveConfig {
     pub description: Option<Description>,
     /// Which image of a file with several, counted from 1; the first where nothing is said.
     pub page: Option<NonZeroUsize>,
+    /// What is taken out of a frame that is read from a file before stars are looked for.
+    pub calibration: Option<Arc<Calibration>>,
 }
 
 /// One source: what was measured of it.
@@ -142,6 +154,8 @@ pub struct Solution {
     pub comparison: Option<Comparison>,
     /// Electrons for a step of the grey level, where the camera is described.
     pub gain_e_per_adu: Option<f64>,
+    /// What was taken out of the frame before, where anything was.
+    pub calibration: Option<Applied>,
     /// How long it took.
     pub timing: Timing,
 }
@@ -262,8 +276,16 @@ impl<'a> Pipeline<'a> {
         read: impl FnOnce() -> Result<Frame, FrameError>,
     ) -> Result<(Solution, Frame), Error> {
         let start = Instant::now();
-        let frame = read()?;
+        let mut frame = read()?;
         let read_ms = milliseconds_since(start);
+        let calibration = config.calibration.as_deref();
+        if let Some(calibration) = calibration {
+            let applied = calibration.apply(&mut frame);
+            applied.map_err(|source| Error::Calibrate {
+                path: name.to_owned(),
+                source,
+            })?;
+        }
         let in_name = ObservationDate::in_file_name(name);
         let config = SolveConfig {
             detect: config.detect.clone(),
@@ -279,6 +301,9 @@ impl<'a> Pipeline<'a> {
                 path: name.to_owned(),
                 source,
             })?;
+        solution.calibration = calibration.map(Calibration::applied);
+        let note = calibration.and_then(|calibration| calibration.note(solution.exposure_s));
+        solution.notes.extend(note);
         solution.timing.read_ms = read_ms;
         solution.timing.total_ms = milliseconds_since(start);
         Ok((solution, frame))
@@ -361,6 +386,7 @@ impl<'a> Pipeline<'a> {
             photometry,
             comparison,
             gain_e_per_adu: description.map(|stated| stated.sensor.gain_e_per_adu),
+            calibration: None,
             timing: Timing {
                 read_ms: 0.0,
                 detect_ms,
@@ -403,6 +429,7 @@ impl<'a> Pipeline<'a> {
             photometry: None,
             comparison: None,
             gain_e_per_adu: None,
+            calibration: None,
             timing: Timing {
                 identify_ms,
                 total_ms: identify_ms,

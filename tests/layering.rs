@@ -17,6 +17,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("observer", &["units", "coords", "epoch"]),
     ("sensor", &[]),
     ("frame", &["units", "coords", "epoch", "angle", "observer"]),
+    ("calibration", &["frame", "statistics"]),
     ("camera", &["units", "coords"]),
     ("catalog", &["units", "coords", "files", "angle"]),
     ("detect", &["units", "coords", "frame"]),
@@ -86,6 +87,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "frame",
             "camera",
             "catalog",
+            "calibration",
             "comparison",
             "detect",
             "identify",
@@ -101,6 +103,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &[
             "units",
             "coords",
+            "calibration",
             "camera",
             "catalog",
             "detect",
@@ -112,6 +115,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "statistics",
         ],
     ),
+    ("darks", &["statistics", "frame", "report"]),
+    ("flats", &["darks", "frame", "report"]),
     (
         "robustness",
         &[

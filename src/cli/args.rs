@@ -45,6 +45,7 @@ pub(crate) enum Command {
         starpipe process --date 2019-07-29T22:47+02:00 --site 52.22,4.42 night.tif\n  \
         starpipe process --format json --out results night/ > night.jsonl\n  \
         starpipe process --page 2 night.fits\n  \
+        starpipe process --dark master-dark.fits --flat master-flat.fits --hot-pixels hot-pixels.csv night.fits\n  \
         funpack -S night.fits.fz | starpipe process -\n\n\
         The kind of a file is told from its content; any may be compressed with gzip. A date, an exposure,\n\
         a pixel size and a focal length in FITS keywords or Exif are used where no option says otherwise.\n\n\
@@ -115,6 +116,23 @@ pub(crate) enum Command {
         A run may be ended at any time, with Ctrl-C as well: the same command goes on where it stopped, one with more\n\
         --frames makes it longer, and what comes of it is the same to the last byte on any number of threads.")]
     Validate(Box<ValidateArgs>),
+    /// Measure noise, pattern, dark current and hot pixels on frames taken without light
+    #[command(after_help = "Examples:\n  \
+        starpipe darks darks/\n  \
+        starpipe darks --camera camera.toml --out calibration darks/\n  \
+        starpipe darks --exposure 0.1:short/ --exposure 10:long/ --format json short/ long/\n\n\
+        --out writes master-dark.fits (of several exposures master-dark-0.1s.fits and so on), noise.fits and \
+        hot-pixels.csv, which `starpipe process` takes as --dark and --hot-pixels. Exposures come from the files' headers \
+        unless --exposure says otherwise; with two of them there is a dark current.")]
+    Darks(DarksArgs),
+    /// Make a master flat of evenly lit frames, and measure gain and response
+    #[command(after_help = "Examples:\n  \
+        starpipe flats --dark master-dark.fits --out calibration flats/\n  \
+        starpipe flats --camera camera.toml --format json dim-1.fits dim-2.fits bright-1.fits bright-2.fits\n\n\
+        --out writes master-flat.fits, with a mean of 1, which `starpipe process` takes as --flat. The first and the second frame \
+        are a pair of the same light, and so on: from the noise of such pairs follows the gain, from pairs of different \
+        light without knowing the read noise.")]
+    Flats(FlatsArgs),
 }
 
 #[derive(Debug, Args)]
@@ -209,6 +227,63 @@ pub(crate) struct ValidateArgs {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct FlatsArgs {
+    /// Evenly lit frames; a directory stands for the frames in it, - for standard input
+    #[arg(value_name = "FRAME", required = true)]
+    pub(crate) frames: Vec<PathBuf>,
+    /// Which image of a file with several, from 1 [default: the first]
+    #[arg(long, value_name = "NUMBER")]
+    pub(crate) page: Option<NonZeroUsize>,
+    /// Frame taken without light, or the mean of many, see `starpipe darks`
+    #[arg(long, value_name = "FILE")]
+    pub(crate) dark: Option<PathBuf>,
+    /// Description of the camera, see `starpipe camera new`: its bias where there is no --dark, and its read noise
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) camera: Option<PathBuf>,
+    /// What to print: csv has a row for each frame
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub(crate) format: Format,
+    /// Also write master-flat.fits into this directory
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Threads to work with [default: one for each processor]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) threads: Option<u32>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DarksArgs {
+    /// Frames taken without light; a directory stands for the frames in it, - for standard input
+    #[arg(value_name = "FRAME", required = true)]
+    pub(crate) frames: Vec<PathBuf>,
+    /// Which image of a file with several, from 1 [default: the first]
+    #[arg(long, value_name = "NUMBER")]
+    pub(crate) page: Option<NonZeroUsize>,
+    /// How long frames were exposed, in seconds: those of a file or directory, else all (may be repeated) [default: the
+    /// exposure in the file's header]
+    #[arg(long, value_name = "SECONDS[:PATH]", allow_hyphen_values = true)]
+    pub(crate) exposure: Vec<values::ExposureOf>,
+    /// Bits of a grey level [default: those of --camera, else of the file's format]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=32))]
+    pub(crate) bits: Option<u32>,
+    /// Description of the camera, see `starpipe camera new`: its gain makes electrons of grey levels
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) camera: Option<PathBuf>,
+    /// Robust standard deviations from which on a pixel is hot
+    #[arg(long, value_name = "NUMBER", value_parser = values::positive, default_value_t = starpipe::darks::HOT_SIGMA)]
+    pub(crate) hot_sigma: f64,
+    /// What to print: csv has a row for each frame
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub(crate) format: Format,
+    /// Also write the master dark, the noise of each pixel and the hot pixels into this directory
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Threads to work with [default: one for each processor]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) threads: Option<u32>,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct ExperimentArgs {
     /// Which of the paper's two
     #[arg(value_name = "1|2", value_parser = clap::value_parser!(u8).range(1..=2))]
@@ -246,6 +321,8 @@ pub(crate) struct ProcessArgs {
     #[arg(long, value_name = "NUMBER", help_heading = "Frame")]
     pub(crate) page: Option<NonZeroUsize>,
     #[command(flatten)]
+    pub(crate) calibration: CalibrationArgs,
+    #[command(flatten)]
     pub(crate) detection: DetectionArgs,
     #[command(flatten)]
     pub(crate) light: LightArgs,
@@ -277,6 +354,20 @@ pub(crate) struct SolvingArgs {
     pub(crate) output: OutputArgs,
     #[command(flatten)]
     pub(crate) resources: ResourceArgs,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Calibration")]
+pub(crate) struct CalibrationArgs {
+    /// Frame taken without light, or the mean of many: its pattern is subtracted, see `starpipe darks`
+    #[arg(long, value_name = "FILE")]
+    pub(crate) dark: Option<PathBuf>,
+    /// Mean of evenly lit frames: what is above the dark level is divided by it, see `starpipe flats`
+    #[arg(long, value_name = "FILE")]
+    pub(crate) flat: Option<PathBuf>,
+    /// Pixels not to be believed: a table with the columns x,y, see `starpipe darks`
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) hot_pixels: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -5,7 +5,9 @@ mod batch;
 mod cache;
 mod camera;
 mod centroids;
+mod darks;
 mod experiment;
+mod flats;
 mod import;
 mod input;
 mod limit;
@@ -75,6 +77,8 @@ pub(crate) fn run() -> ExitCode {
         Command::Robustness(arguments) => robustness::robustness(&arguments),
         Command::Limit(arguments) => limit::limit(&arguments),
         Command::Camera(arguments) => camera::camera(&arguments),
+        Command::Darks(arguments) => darks::darks(arguments),
+        Command::Flats(arguments) => flats::flats(arguments),
         Command::Experiment(arguments) => experiment::experiment(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments),

@@ -46,6 +46,32 @@ pub(crate) fn check(
     Ok(())
 }
 
+/// Refuses to write `results` over one of the inputs, or over a file that is no result.
+pub(crate) fn check_results(inputs: &[PathBuf], results: &[PathBuf]) -> Result<(), Fault> {
+    let inputs_found: HashSet<PathBuf> = inputs
+        .iter()
+        .filter_map(|i| i.canonicalize().ok())
+        .collect();
+    for output in results {
+        let Ok(there) = output.canonicalize() else {
+            continue;
+        };
+        let extension = output.extension().and_then(OsStr::to_str);
+        let what = if inputs_found.contains(&there) {
+            "the input"
+        } else if is_result(&there, extension.unwrap_or_default()) {
+            continue;
+        } else {
+            "a file that starpipe did not write:"
+        };
+        return Err(Fault::Usage(format!(
+            "the results would overwrite {what} {}; choose another directory for --out",
+            output.display(),
+        )));
+    }
+    Ok(())
+}
+
 fn check_each_other(inputs: &[PathBuf], directory: &Path) -> Result<(), Fault> {
     let mut taken: HashMap<&OsStr, &Path> = HashMap::new();
     for input in inputs {
@@ -77,7 +103,8 @@ fn is_result(path: &Path, extension: &str) -> bool {
 fn begins_like_a_result(head: &[u8], extension: &str) -> bool {
     match extension {
         "json" => head.starts_with(b"{\"schema\":"),
-        "csv" => head.starts_with(b"frame,x,y,"),
+        "csv" => head.starts_with(b"frame,x,y,") || head.starts_with(b"x,y,level_adu,"),
+        "fits" => frame::is_calibration_frame(head),
         "png" => frame::is_overlay(head),
         _ => starpipe::wcs::is_header(head),
     }

@@ -1,13 +1,16 @@
 //! From raw arguments to the library's configurations.
 
 use super::Fault;
-use super::args::{Centroid, DetectionArgs, HintArgs, LightArgs, OutputArgs};
+use super::args::{CalibrationArgs, Centroid, DetectionArgs, HintArgs, LightArgs, OutputArgs};
 use super::input::is_stdin;
 use super::output::OutputSettings;
 use super::overwrite;
+use anyhow::Context;
+use starpipe::calibration::{Calibration, Master, read_hot_pixels};
 use starpipe::comparison::Description;
 use starpipe::coords::UnitVector;
 use starpipe::detect::{CentroidMethod, DetectConfig};
+use starpipe::frame;
 use starpipe::pipeline::{DateSource, FrameDate, Knowledge, Scale, ScaleHint};
 use starpipe::report::TextOptions;
 use starpipe::sensitivity::Extinction;
@@ -83,6 +86,33 @@ impl LightArgs {
             extinction: self.extinction.map(Extinction::MagPerAirmass),
         }
     }
+}
+
+impl CalibrationArgs {
+    /// What is to be taken out of frames, where anything is.
+    pub(crate) fn resolve(&self, sensor: Option<&Sensor>) -> anyhow::Result<Option<Calibration>> {
+        if self.dark.is_none() && self.flat.is_none() && self.hot_pixels.is_none() {
+            return Ok(None);
+        }
+        let master = |path: &Option<PathBuf>| path.as_deref().map(read_master).transpose();
+        let list = self.hot_pixels.as_deref().map(read_hot_pixels).transpose();
+        let bias_adu = sensor.map_or(0.0, |sensor| sensor.bias_adu);
+        let calibration = Calibration::new(
+            master(&self.dark)?,
+            master(&self.flat)?,
+            list.context("reading the hot pixels")?,
+            bias_adu,
+        );
+        Ok(Some(calibration?))
+    }
+}
+
+/// A master frame of any kind of file.
+pub(crate) fn read_master(path: &Path) -> anyhow::Result<Master> {
+    Ok(Master {
+        name: path.display().to_string(),
+        frame: frame::read(path).context("reading")?,
+    })
 }
 
 impl DetectionArgs {

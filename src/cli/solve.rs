@@ -13,12 +13,14 @@ use starpipe::pipeline::{Knowledge, Pipeline, SolveConfig};
 use starpipe::report::FrameReport;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// `starpipe process`
 pub(crate) fn process(arguments: ProcessArgs) -> Result<Exit, Fault> {
     let ProcessArgs {
         frames,
         page,
+        calibration,
         detection,
         light,
         solving,
@@ -30,6 +32,7 @@ pub(crate) fn process(arguments: ProcessArgs) -> Result<Exit, Fault> {
             exposure_s: light.exposure,
             ..solving.hints.resolve()?
         },
+        calibration: calibration.resolve(sensor.as_ref())?.map(Arc::new),
         description: sensor.map(|sensor| light.description(sensor)),
         page,
     };

@@ -6,6 +6,7 @@ use starpipe::sensitivity::{self, Spacing};
 use starpipe::simulate;
 use starpipe::units::RAD_PER_DEG;
 use std::fmt::Display;
+use std::path::PathBuf;
 use std::str::FromStr;
 
 /// A direction on the sky, in degrees.
@@ -286,6 +287,29 @@ pub(crate) fn field_of_view(text: &str) -> Result<f64, String> {
 pub(crate) fn exposure(text: &str) -> Result<f64, String> {
     let limits = "from 0.000001 to 1000000 s";
     within(text, "the exposure", |v| (1e-6..=1e6).contains(&v), limits)
+}
+
+/// An exposure, and the file or directory whose frames have it; else all.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ExposureOf {
+    pub(crate) exposure_s: f64,
+    pub(crate) path: Option<PathBuf>,
+}
+
+impl FromStr for ExposureOf {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (seconds, path) = match text.split_once(':') {
+            Some((_, "")) => return Err(not_of_form(text, "SECONDS or SECONDS:PATH")),
+            Some((seconds, path)) => (seconds, Some(PathBuf::from(path))),
+            None => (text, None),
+        };
+        Ok(Self {
+            exposure_s: exposure(seconds)?,
+            path,
+        })
+    }
 }
 
 /// A zenith distance in degrees.

@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 pub(crate) const OVERLAY_TEXT: (&str, &str) = ("Software", "starpipe overlay");
 
 /// The files in `directory` that begin like an image, in the order of their names; directories in it are left out,
-/// and so is what was made of frames: overlays ([`is_overlay`]), and headers without an image (`.wcs`).
+/// and so is what was made of frames: overlays ([`is_overlay`]), masters ([`is_calibration_frame`]), and headers without an
+/// image (`.wcs`).
 ///
 /// A file of which not even the beginning can be read counts as a frame, so that this is told when it is read.
 /// # Errors
@@ -48,6 +49,15 @@ pub fn is_overlay(head: &[u8]) -> bool {
     format_of(head) == Some(FrameFormat::Png) && memmem::find(head, &chunk).is_some()
 }
 
+/// What the keyword CREATOR of a master frame begins with, by which it is known.
+pub const CALIBRATION_CREATOR: &str = "starpipe calibration";
+
+/// Whether the file that begins with `head` is a master dark, a master flat or a map of noise, as starpipe writes them.
+pub fn is_calibration_frame(head: &[u8]) -> bool {
+    let card = format!("CREATOR = '{CALIBRATION_CREATOR}");
+    format_of(head) == Some(FrameFormat::Fits) && memmem::find(head, card.as_bytes()).is_some()
+}
+
 fn begins_like_a_frame(path: &Path) -> io::Result<bool> {
     if path.extension().is_some_and(|extension| extension == "wcs") {
         return Ok(false);
@@ -56,6 +66,7 @@ fn begins_like_a_frame(path: &Path) -> io::Result<bool> {
     File::open(path)?.take(HEAD_BYTES).read_to_end(&mut head)?;
     Ok(match format_of(&head) {
         Some(FrameFormat::Png) => !is_overlay(&head),
+        Some(FrameFormat::Fits) => !is_calibration_frame(&head),
         Some(FrameFormat::Gzip) => format_inside(&head).0.is_some(),
         format => format.is_some(),
     })

@@ -36,7 +36,7 @@ mod tiff_write;
 
 #[cfg(feature = "overlay")]
 pub(crate) use directory::OVERLAY_TEXT;
-pub use directory::{files_in, is_overlay};
+pub use directory::{CALIBRATION_CREATOR, files_in, is_calibration_frame, is_overlay};
 pub use error::{FrameError, FrameFormat};
 pub use fits::{FitsHeader, FitsSamples, FitsWriteError, write_fits};
 pub use metadata::FrameMetadata;

@@ -47,6 +47,7 @@ fn solution(width: usize, height: usize, outcome: Outcome) -> Solution {
         photometry: None,
         comparison: None,
         gain_e_per_adu: None,
+        calibration: None,
         exposure_s: None,
         notes: Vec::new(),
         background: Some(Background {

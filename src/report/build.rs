@@ -3,10 +3,11 @@
 use super::reason;
 use super::rounding::{finite, half_turn_deg, significant, to_decimals, to_significant, turn_deg};
 use super::{
-    AttitudeReport, AttitudeSigma, BackgroundReport, CompletenessReport, DateReport,
-    DistortionReport, FrameReport, MagnitudeReport, MatchReport, ObservationReport, OpticsReport,
-    PhotometryReport, SCHEMA, SiteReport, StarReport, Status, TimingReport,
+    AttitudeReport, AttitudeSigma, BackgroundReport, CalibrationReport, CompletenessReport,
+    DateReport, DistortionReport, FrameReport, MagnitudeReport, MatchReport, ObservationReport,
+    OpticsReport, PhotometryReport, SCHEMA, SiteReport, StarReport, Status, TimingReport,
 };
+use crate::calibration::Applied;
 use crate::camera::Distortion;
 use crate::catalog::Catalog;
 use crate::detect::DetectionFlags;
@@ -57,6 +58,7 @@ impl FrameReport {
             magnitude: None,
             photometry: solution.photometry.as_ref().map(photometry),
             prediction: None,
+            calibration: solution.calibration.as_ref().map(calibration),
             background: background(solution.background.as_ref()),
             stars: solution.sources.iter().map(unidentified).collect(),
             timing_ms: timing(&solution.timing),
@@ -94,6 +96,14 @@ impl FrameReport {
                 name(star, star_match, catalog, years);
             }
         }
+    }
+}
+
+fn calibration(applied: &Applied) -> CalibrationReport {
+    CalibrationReport {
+        dark: applied.dark.clone(),
+        flat: applied.flat.clone(),
+        hot_pixels: applied.hot_pixels.clone(),
     }
 }
 

@@ -64,12 +64,25 @@ pub struct FrameReport {
     pub photometry: Option<PhotometryReport>,
     /// What the camera should have seen, where it is described and the exposure known.
     pub prediction: Option<PredictionReport>,
+    /// What was taken out of the frame before stars were looked for, where anything was.
+    pub calibration: Option<CalibrationReport>,
     /// The sky between the stars.
     pub background: BackgroundReport,
     /// Every detection, brightest first.
     pub stars: Vec<StarReport>,
     /// How long it took.
     pub timing_ms: TimingReport,
+}
+
+/// What was taken out of a frame: the files.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CalibrationReport {
+    /// The dark whose pattern was subtracted.
+    pub dark: Option<String>,
+    /// The flat by which the rest was divided.
+    pub flat: Option<String>,
+    /// The list of pixels that became pixels without a value.
+    pub hot_pixels: Option<String>,
 }
 
 /// When the frame was taken.

@@ -163,6 +163,7 @@ mod tests {
             photometry: None,
             comparison: None,
             gain_e_per_adu: None,
+            calibration: None,
             exposure_s: None,
             notes: Vec::new(),
             background: None,

@@ -46,6 +46,7 @@ fn unidentified() -> FrameReport {
         magnitude: None,
         photometry: None,
         prediction: None,
+        calibration: None,
         background: BackgroundReport {
             level: Some(1012.25),
             noise: Some(12.3418),
@@ -129,6 +130,11 @@ fn identified() -> FrameReport {
             airmass: Some(1.5553),
         }),
         exposure_s: Some(0.5),
+        calibration: Some(CalibrationReport {
+            dark: Some("master-dark.fits".to_owned()),
+            flat: None,
+            hot_pixels: Some("hot-pixels.csv".to_owned()),
+        }),
         notes: vec![
             "FOCALLEN is ignored: found 0, expected a focal length from 1 to 100000 mm".into(),
         ],

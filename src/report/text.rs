@@ -2,8 +2,8 @@
 
 use super::rounding::decimals_for;
 use super::{
-    AttitudeReport, FrameReport, MagnitudeReport, MatchReport, ObservationReport, OpticsReport,
-    PhotometryReport, StarReport, angles,
+    AttitudeReport, CalibrationReport, FrameReport, MagnitudeReport, MatchReport,
+    ObservationReport, OpticsReport, PhotometryReport, StarReport, angles,
 };
 use crate::pipeline::DateSource;
 
@@ -44,6 +44,7 @@ impl FrameReport {
         lines.extend(predicted.flat_map(|prediction| prediction.lines(magnitude)));
         lines.push(self.date_line());
         lines.extend(self.observation.iter().map(observation_line));
+        lines.extend(self.calibration.iter().map(calibration_line));
         lines.extend(self.notes.iter().map(|note| labelled("note", note)));
         lines.extend(self.background_line());
         lines.push(self.timing_line());
@@ -323,6 +324,19 @@ pub fn printable(text: &str) -> String {
 pub fn counted(count: usize, noun: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{count} {noun}{plural}")
+}
+
+fn calibration_line(applied: &CalibrationReport) -> String {
+    let parts = [
+        ("dark", &applied.dark),
+        ("flat", &applied.flat),
+        ("hot pixels", &applied.hot_pixels),
+    ];
+    let said = parts.into_iter().filter_map(|(what, file)| {
+        let file = file.as_ref()?;
+        Some(format!("{what} {file}"))
+    });
+    labelled("calibrated", &said.collect::<Vec<_>>().join(", "))
 }
 
 pub(super) fn labelled(label: &str, text: &str) -> String {

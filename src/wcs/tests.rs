@@ -97,6 +97,7 @@ fn solution(camera: CameraModel, attitude: Rotation<Icrs, Camera>) -> Solution {
         photometry: None,
         comparison: None,
         gain_e_per_adu: None,
+        calibration: None,
         exposure_s: None,
         notes: Vec::new(),
         background: None,

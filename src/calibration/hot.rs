@@ -1,0 +1,102 @@
+//! Lists of hot pixels, as `starpipe darks` writes them.
+
+use super::{CalibrationError, check_bad};
+use crate::frame::Frame;
+use std::path::{Path, PathBuf};
+
+/// What a coordinate must be.
+const COORDINATE: &str = "a whole number from 0";
+
+/// Pixels that are not to be believed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HotPixelList {
+    path: PathBuf,
+    /// Line, column, row.
+    pixels: Vec<(u64, usize, usize)>,
+}
+
+/// Reads a list of hot pixels: CSV with the columns `x` and `y`, whole numbers with (0, 0) for the top-left pixel; others are
+/// ignored.
+/// # Errors
+/// [`CalibrationError::List`], [`CalibrationError::Malformed`].
+pub fn read_hot_pixels(path: &Path) -> Result<HotPixelList, CalibrationError> {
+    let unreadable = |source| CalibrationError::List {
+        path: path.to_owned(),
+        source,
+    };
+    let malformed = |line, found: &str, expected| CalibrationError::Malformed {
+        path: path.to_owned(),
+        line,
+        found: found.to_owned(),
+        expected,
+    };
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_path(path)
+        .map_err(unreadable)?;
+    let headings = reader.headers().map_err(unreadable)?.clone();
+    let column = |name: &str| {
+        headings
+            .iter()
+            .position(|h| h.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name))
+    };
+    let (Some(of_x), Some(of_y)) = (column("x"), column("y")) else {
+        let found: Vec<_> = headings.iter().take(8).collect();
+        return Err(malformed(
+            1,
+            &format!("the headings {found:?}"),
+            "x and y among them",
+        ));
+    };
+    let mut pixels = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(unreadable)?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let coordinate = |column: usize| {
+            let text = record.get(column).unwrap_or_default();
+            text.parse::<usize>()
+                .map_err(|_| malformed(line, &format!("{text:?}"), COORDINATE))
+        };
+        pixels.push((line, coordinate(of_x)?, coordinate(of_y)?));
+    }
+    Ok(HotPixelList {
+        path: path.to_owned(),
+        pixels,
+    })
+}
+
+impl HotPixelList {
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Column and row of each pixel.
+    pub fn pixels(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.pixels.iter().map(|&(_, x, y)| (x, y))
+    }
+
+    /// Whether all of them are on `frame`, and few enough.
+    pub(super) fn check(&self, frame: &Frame) -> Result<(), CalibrationError> {
+        for &(line, x, y) in &self.pixels {
+            if x >= frame.width || y >= frame.height {
+                return Err(CalibrationError::Outside {
+                    path: self.path.clone(),
+                    line,
+                    x,
+                    y,
+                    width: frame.width,
+                    height: frame.height,
+                });
+            }
+        }
+        let name = self.path.display().to_string();
+        check_bad(
+            "the list of hot pixels",
+            &name,
+            self.pixels.len(),
+            frame,
+            "in it",
+        )
+    }
+}

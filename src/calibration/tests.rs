@@ -1,0 +1,117 @@
+use super::*;
+
+fn frame(pixels: &[f32]) -> Frame {
+    Frame::new(3, pixels.len() / 3, pixels.to_vec()).unwrap()
+}
+
+fn master(pixels: &[f32]) -> Option<Master> {
+    Some(Master {
+        name: "master.fits".to_owned(),
+        frame: frame(pixels),
+    })
+}
+
+const DARK: [f32; 12] = [
+    10.0, 11.0, 9.0, 10.0, 14.0, 10.0, 10.0, 10.0, 10.0, 10.0, 10.0, 10.0,
+];
+
+#[test]
+fn the_pattern_goes_and_the_level_stays() {
+    let calibration = Calibration::new(master(&DARK), None, None, 0.0).unwrap();
+    let mut sky = frame(&DARK.map(|p| p + 100.0));
+    calibration.apply(&mut sky).unwrap();
+    assert_eq!(sky.pixels, [110.0; 12]);
+}
+
+#[test]
+fn a_flat_divides_about_the_dark_level() {
+    // Twice as high as it should be: its mean does not matter.
+    let mut response = [2.0; 12];
+    (response[0], response[1]) = (1.0, 3.0);
+    let calibration = Calibration::new(master(&DARK), master(&response), None, 0.0).unwrap();
+    let mut sky = frame(&DARK);
+    for (pixel, response) in sky.pixels.iter_mut().zip(response) {
+        *pixel += 50.0 * response;
+    }
+    calibration.apply(&mut sky).unwrap();
+    assert!(
+        sky.pixels.iter().all(|p| (p - 110.0).abs() < 1e-4),
+        "{:?}",
+        sky.pixels
+    );
+    let calibration = Calibration::new(None, master(&response), None, 10.0).unwrap();
+    let mut dark = frame(&[10.0; 12]);
+    calibration.apply(&mut dark).unwrap();
+    assert_eq!(dark.pixels, [10.0; 12]);
+}
+
+#[test]
+fn what_was_saturated_stays_so_and_nothing_else_becomes_so() {
+    let mut response = [1.0; 12];
+    (response[0], response[1]) = (0.5, 1.5);
+    let calibration = Calibration::new(None, master(&response), None, 0.0).unwrap();
+    let mut sky = frame(&[
+        250.0, 255.0, 255.0, 20.0, 20.0, 20.0, 20.0, 20.0, 20.0, 20.0, 20.0, 20.0,
+    ])
+    .with_levels(1.0, Some(255.0));
+    calibration.apply(&mut sky).unwrap();
+    let full = sky.saturation_adu.unwrap();
+    let saturated: Vec<bool> = sky.pixels.iter().map(|p| *p >= full).collect();
+    assert_eq!(saturated[..4], [false, true, true, false]);
+    assert!((sky.pixels[0] - 500.0).abs() < 1e-3 && full > sky.pixels[0]);
+}
+
+#[test]
+fn pixels_of_no_use_have_no_value_and_too_many_are_refused() {
+    let mut response = [1.0; 12];
+    response[4] = 0.0;
+    let calibration = Calibration::new(None, master(&response), None, 0.0).unwrap();
+    let mut sky = frame(&[20.0; 12]);
+    calibration.apply(&mut sky).unwrap();
+    assert!(sky.pixels[4].is_nan() && sky.pixels.iter().filter(|p| p.is_nan()).count() == 1);
+    response[5] = -1.0;
+    let refused = Calibration::new(None, master(&response), None, 0.0).unwrap_err();
+    assert_eq!(
+        refused.to_string(),
+        "the flat master.fits: found 2 of 12 pixels without a response (0, negative or no value), expected at most 10 %"
+    );
+    assert!(Calibration::new(None, master(&[0.0; 12]), None, 0.0).is_err());
+    assert!(Calibration::new(None, master(&[-1.0; 12]), None, 0.0).is_err());
+    let mut dark = DARK;
+    dark[..2].fill(f32::NAN);
+    assert!(Calibration::new(master(&dark), None, None, 0.0).is_err());
+}
+
+#[test]
+fn sizes_that_differ_are_refused_and_the_frame_is_left_alone() {
+    let calibration = Calibration::new(master(&DARK), None, None, 0.0).unwrap();
+    let mut other = frame(&[1.0; 9]);
+    let refused = calibration.apply(&mut other).unwrap_err().to_string();
+    assert_eq!(
+        refused,
+        "the dark master.fits has 3 x 4 pixels: expected 3 x 3, as the frame"
+    );
+    assert_eq!(other.pixels, [1.0; 9]);
+    let refused = Calibration::new(master(&DARK), master(&[1.0; 9]), None, 0.0).unwrap_err();
+    assert_eq!(
+        refused.to_string(),
+        "the flat master.fits has 3 x 3 pixels: expected 3 x 4, as the dark master.fits"
+    );
+}
+
+#[test]
+fn a_dark_of_another_exposure_gets_a_note() {
+    let mut dark = master(&DARK).unwrap();
+    dark.frame.metadata.exposure_s = Some(10.0);
+    let calibration = Calibration::new(Some(dark), None, None, 0.0).unwrap();
+    assert_eq!(
+        (calibration.note(Some(10.001)), calibration.note(None)),
+        (None, None)
+    );
+    assert!(
+        calibration
+            .note(Some(1.0))
+            .unwrap()
+            .starts_with("the dark master.fits was exposed for 10 s and the frame for 1 s")
+    );
+}

@@ -1,0 +1,111 @@
+//! What is the same on every frame: the spread of the pixels' means over the detector, its columns and its rows.
+
+use super::robust::{Typical, mean_and_sigma};
+
+/// The spread of the pixels' means, as standard deviations in ADU. Pixels that stand out are left out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pattern {
+    /// Of all means: pattern, and the noise that is left in a mean.
+    pub spatial_adu: f64,
+    /// Of the pattern alone, columns and rows included; none where one frame does not tell it from noise.
+    pub fixed_adu: Option<f64>,
+    /// Of the columns.
+    pub column_adu: f64,
+    /// Of the rows.
+    pub row_adu: f64,
+}
+
+impl Pattern {
+    /// The pattern in `means`, row-major with rows of `width`, in which a noise of variance `noise_left` is left; `step` is
+    /// that between grey levels.
+    ///
+    /// The variance is that of pixels, columns and rows: s² = sₚ² + s_c² + s_r². The mean of a column varies by
+    /// s_c² + sₚ²/height, that of a row by s_r² + sₚ²/width.
+    ///
+    /// Differs from the source: robust, and without its filter, so that a glow or a gradient counts as columns and rows.
+    /// # Reference
+    /// EMVA Standard 1288, release 4.0 (2021), sect. 8.2.
+    pub(super) fn of(
+        means: &[f32],
+        width: usize,
+        noise_left: Option<f64>,
+        step: f64,
+    ) -> Option<Self> {
+        let floor = step / 2.0;
+        let typical = Typical::of(means, floor)?;
+        let height = means.len() / width;
+        let mut columns = vec![(0.0, 0_u32); width];
+        let mut rows = vec![(0.0, 0_u32); height];
+        for (y, row) in means.chunks(width).enumerate() {
+            for (x, &mean) in row.iter().enumerate() {
+                let off = f64::from(mean) - typical.level;
+                if typical.holds(f64::from(mean), floor) {
+                    for (sum, count) in [&mut columns[x], &mut rows[y]] {
+                        *sum += off;
+                        *count += 1;
+                    }
+                }
+            }
+        }
+        let variance = |lines: &[(f64, u32)]| {
+            let known = lines.iter().filter(|(_, count)| *count > 0);
+            let spread = mean_and_sigma(known.map(|(sum, count)| sum / f64::from(*count))).spread;
+            spread * spread
+        };
+        let (of_columns, of_rows) = (variance(&columns), variance(&rows));
+        let all = typical.spread * typical.spread;
+        let (in_column, in_row) = (1.0 / height as f64, 1.0 / width as f64);
+        let of_pixels = ((all - of_columns - of_rows) / (1.0 - in_column - in_row)).max(0.0);
+        let root = |variance: f64| variance.max(0.0).sqrt();
+        Some(Self {
+            spatial_adu: typical.spread,
+            fixed_adu: noise_left.map(|noise| root(all - noise)),
+            column_adu: root(of_columns - of_pixels * in_column),
+            row_adu: root(of_rows - of_pixels * in_row),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    #[test]
+    fn columns_rows_and_pixels_are_told_apart() {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut normal = |sigma: f64| -> f64 {
+            sigma * Distribution::<f64>::sample(&StandardNormal, &mut random)
+        };
+        let (width, height) = (400, 300);
+        let columns: Vec<f64> = (0..width).map(|_| normal(2.0)).collect();
+        let rows: Vec<f64> = (0..height).map(|_| normal(1.0)).collect();
+        let mut means: Vec<f32> = (0..width * height)
+            .map(|i| (100.0 + columns[i % width] + rows[i / width] + normal(3.0)) as f32)
+            .collect();
+        means[7] = 4000.0;
+        means[8] = f32::NAN;
+        let found = Pattern::of(&means, width, Some(1.0), 1.0).unwrap();
+        // Of n columns the spread is known to 1/√(2n).
+        assert!(
+            (found.column_adu - 2.0).abs() < 5.0 * 2.0 / 800f64.sqrt(),
+            "{found:?}"
+        );
+        assert!(
+            (found.row_adu - 1.0).abs() < 5.0 / 600f64.sqrt(),
+            "{found:?}"
+        );
+        assert!(
+            (found.fixed_adu.unwrap() - 13f64.sqrt()).abs() < 0.15,
+            "{found:?}"
+        );
+        let flat: Vec<f32> = (0..width * height).map(|_| normal(3.0) as f32).collect();
+        let found = Pattern::of(&flat, width, Some(9.0), 1.0).unwrap();
+        assert!(
+            found.column_adu < 0.1 && found.row_adu < 0.1 && found.fixed_adu.unwrap() < 0.4,
+            "{found:?}"
+        );
+    }
+}
