@@ -28,6 +28,7 @@ fn frame(number: u64, status: Answer, errors: [f64; 3]) -> FrameRecord {
         rejected: 1,
         named: 10,
         misnamed: number,
+        misnamed_companions: number / 2,
         false_detections: 1,
         blends: 2,
         star_rows: 0,
@@ -113,6 +114,7 @@ fn frames_are_counted_by_answer_and_by_stars() {
         (48, 40, 6)
     );
     assert_eq!((detection.rejected, detection.blends), (4, 8));
+    assert_eq!(detection.misnamed_companions, 2);
     // Four on four frames of half a million pixels; an exact interval of 4 is 1.09 to 10.24.
     assert_eq!(detection.false_per_mpx, 2.0);
     assert!((detection.false_low_per_mpx - 1.09 / 2.0).abs() < 0.005);
