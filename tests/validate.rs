@@ -251,7 +251,7 @@ fn a_table_that_was_changed_is_told_of_with_its_place() {
             with_line(5, &bad_word),
             "line 5: unknown variant `rihgt`, expected one of `right`",
         ),
-        (with_line(5, "3,1"), "line 5: 2 fields, expected 35"),
+        (with_line(5, "3,1"), "line 5: 2 fields, expected 36"),
         (with_line(5, rows[5]), "line 5: frame 4 with the seed"),
         (
             with_line(1, "a,b"),

@@ -6,7 +6,7 @@ use crate::identify::{Identification, Outcome};
 use crate::pipeline::{Solution, Source};
 use crate::report::{to_decimals, to_significant};
 use crate::robustness::Answer;
-use crate::sensitivity::Faintest;
+use crate::sensitivity::{CramerRao, Faintest};
 use crate::simulate::TrueStar;
 use crate::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use nalgebra::Vector3;
@@ -125,7 +125,7 @@ impl<'a> Judge<'a> {
     fn star_row(&self, star: &TrueStar, source: Option<usize>) -> StarRecord {
         let catalog = self.validator.pipeline.catalog();
         let theory = self.validator.spots.theory(&star.position, star.electrons);
-        let bound = |of: fn(&crate::sensitivity::CramerRao) -> f64| {
+        let bound = |of: fn(&CramerRao) -> f64| {
             let bound = theory.bound.as_ref().map(of);
             bound.filter(|b| b.is_finite()).map(significant)
         };
@@ -147,7 +147,7 @@ impl<'a> Judge<'a> {
             bound_x_px: bound(|b| b.sigma_x_px),
             bound_y_px: bound(|b| b.sigma_y_px),
             bound_flux_e,
-            ..self.other_row(Kind::Star, usize::MAX)
+            ..self.empty_row(Kind::Star)
         };
         match source {
             Some(source) => self.with_source(row, source, Some(star)),
@@ -188,7 +188,11 @@ impl<'a> Judge<'a> {
 
     /// The row of what was detected and is no star.
     fn other_row(&self, kind: Kind, source: usize) -> StarRecord {
-        let empty = StarRecord {
+        self.with_source(self.empty_row(kind), source, None)
+    }
+
+    fn empty_row(&self, kind: Kind) -> StarRecord {
+        StarRecord {
             frame: self.number,
             kind,
             id: None,
@@ -212,10 +216,6 @@ impl<'a> Judge<'a> {
             flux_e: None,
             sigma_flux_e: None,
             named: Named::No,
-        };
-        match self.solution.sources.get(source) {
-            Some(_) => self.with_source(empty, source, None),
-            None => empty,
         }
     }
 
@@ -276,6 +276,7 @@ impl<'a> Judge<'a> {
             .names
             .values()
             .map(|star| f64::from(stars[*star].v_mag));
+        let [misnamed, misnamed_companions] = self.misnamed();
         let photometry = solution.photometry.as_ref();
         let limit = photometry.and_then(|p| p.completeness.limit.as_ref().ok());
         let background = solution.background.as_ref();
@@ -294,7 +295,8 @@ impl<'a> Judge<'a> {
             detected: verdicts.detected,
             rejected: solution.sources.len() as u64 - verdicts.detected,
             named: self.names.len() as u64,
-            misnamed: self.misnamed(),
+            misnamed,
+            misnamed_companions,
             false_detections: count(Kind::False) as u64,
             blends: count(Kind::Blend) as u64,
             star_rows: star_rows as u64,
@@ -334,13 +336,18 @@ impl<'a> Judge<'a> {
         })
     }
 
-    /// Sources named as what they are not.
-    fn misnamed(&self) -> u64 {
-        let is_wrong = |(source, star): &(&usize, &usize)| {
-            let owner = self.light.owner(&self.solution.sources[**source].position);
-            owner.is_none_or(|owner| owner.catalog != Some(**star))
-        };
-        self.names.iter().filter(is_wrong).count() as u64
+    /// Sources named as what they are not; and those of them that have the name of a star that stands there as well.
+    fn misnamed(&self) -> [u64; 2] {
+        let (mut wrong, mut companions) = (0, 0);
+        for (source, star) in &self.names {
+            let place = &self.solution.sources[*source].position;
+            let is_it = |other: &TrueStar| other.catalog == Some(*star);
+            if !self.light.owner(place).is_some_and(is_it) {
+                wrong += 1;
+                companions += u64::from(self.light.stars_at(place).any(is_it));
+            }
+        }
+        [wrong, companions]
     }
 
     /// How far off a right answer is.

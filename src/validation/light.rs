@@ -46,8 +46,12 @@ impl<'a> Light<'a> {
         let stars = self.within_rows(place, self.reach_px());
         let all: f64 = stars.iter().map(|star| light(star)).sum();
         let owner = stars.iter().find(|star| 2.0 * light(star) > all)?;
-        let at_place_px = AT_PLACE_PX.max(AT_PLACE_SIGMAS * self.sigma_px());
-        (owner.position.distance_to(place) < at_place_px).then_some(owner)
+        (owner.position.distance_to(place) < self.at_place_px()).then_some(owner)
+    }
+
+    /// The stars at this place: so near that a detection there may be of any of them.
+    pub fn stars_at(&self, place: &PixelPoint) -> impl Iterator<Item = &'a TrueStar> {
+        self.stars_near(place, self.at_place_px())
     }
 
     /// The stars within `radius_px` of this place.
@@ -65,6 +69,10 @@ impl<'a> Light<'a> {
     /// The standard deviation of the light in a spot, along the axis on which it is wider.
     pub fn sigma_px(&self) -> f64 {
         self.variance_px2[0].max(self.variance_px2[1]).sqrt()
+    }
+
+    fn at_place_px(&self) -> f64 {
+        AT_PLACE_PX.max(AT_PLACE_SIGMAS * self.sigma_px())
     }
 
     fn reach_px(&self) -> f64 {

@@ -32,6 +32,9 @@ pub struct FrameRecord {
     pub named: u64,
     /// Those of them that are another star, or none.
     pub misnamed: u64,
+    /// Those of these that have the name of a star that stands there as well: of the fainter one of a pair, or of one of
+    /// several, that the frame does not resolve.
+    pub misnamed_companions: u64,
     /// Detections that may be stars to which no star's light belongs.
     pub false_detections: u64,
     /// Detections that may be stars with the light of several, none of which has more than half of it.

@@ -60,13 +60,14 @@ impl Summary {
         let d = &self.detection;
         let per_frame = |count: u64| count as f64 / self.frames.max(1) as f64;
         format!(
-            "\nDetection\n  a frame has {:.1} detections, {:.1} of them named; named wrongly {} of {}\n  \
+            "\nDetection\n  a frame has {:.1} detections, {:.1} of them named; named wrongly {} of {}, {} of these as a star that stands there as well\n  \
              false: {} on all frames, {} in a million pixels (95 %: {} to {}), asked for {}\n  \
              blends {}, taken for no stars {}\n",
             per_frame(d.detected),
             per_frame(d.named),
             d.misnamed,
             d.named,
+            d.misnamed_companions,
             d.false_detections,
             d.false_per_mpx,
             d.false_low_per_mpx,
@@ -193,7 +194,12 @@ impl Summary {
         line("faintest star named", " mag", &self.faintest);
         line("limit by the frame alone", " mag", &self.frame_limit);
         line("background", " ADU", &self.background);
-        line("noise, over the true one", "", &self.noise_ratio);
+        let noise = &self.noise_ratio;
+        let _ = writeln!(
+            text,
+            "  noise, over the true one {:.4} ± {:.4}, scatter {:.4}; {} frames",
+            noise.mean, noise.mean_sigma, noise.sd, noise.count
+        );
         text
     }
 }

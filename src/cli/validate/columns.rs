@@ -111,7 +111,7 @@ macro_rules! row {
 
 row!(FrameRecord, "frames":
     frame seed ra_deg dec_deg up_pa_deg status reason stars_above_limit detected rejected named misnamed
-    false_detections blends star_rows error_x_arcsec error_y_arcsec error_roll_arcsec sigma_x_arcsec sigma_y_arcsec
+    misnamed_companions false_detections blends star_rows error_x_arcsec error_y_arcsec error_roll_arcsec sigma_x_arcsec sigma_y_arcsec
     sigma_roll_arcsec nees focal_error_px focal_sigma_px rms_px faintest_vmag expected_faintest_vmag
     expected_faintest_sigma_mag predicted_limit_vmag measured_limit_vmag measured_limit_sigma_mag background_adu
     true_background_adu noise_adu true_noise_adu);
@@ -139,6 +139,7 @@ pub(super) mod tests {
             rejected: 0,
             named: 39,
             misnamed: 0,
+            misnamed_companions: 0,
             false_detections: 1,
             blends: 0,
             star_rows: 1,

@@ -92,6 +92,8 @@ pub struct DetectionSummary {
     pub named: u64,
     /// Those of them that are another star, or none.
     pub misnamed: u64,
+    /// Those of these that have the name of a star that stands there as well.
+    pub misnamed_companions: u64,
     /// Those that may be stars to which no star's light belongs.
     pub false_detections: u64,
     /// The same in a million pixels.
@@ -168,7 +170,7 @@ fn percentiles(sorted: &[f64]) -> Vec<f64> {
 pub struct Accumulator {
     facts: RunFacts,
     frames: usize,
-    counts: [u64; 6],
+    counts: [u64; 7],
     identification: Identifications,
     completeness: Completeness,
     centroids: Centroids,
@@ -193,7 +195,7 @@ impl Accumulator {
         Self {
             facts,
             frames: 0,
-            counts: [0; 6],
+            counts: [0; 7],
             identification: Identifications::default(),
             completeness: Completeness::around(limit_vmag),
             centroids: Centroids::default(),
@@ -220,6 +222,7 @@ impl Accumulator {
             row.blends,
             row.named,
             row.misnamed,
+            row.misnamed_companions,
             row.false_detections,
         ];
         for (sum, count) in self.counts.iter_mut().zip(counts) {
@@ -338,6 +341,7 @@ impl Accumulator {
             blends,
             named,
             misnamed,
+            misnamed_companions,
             false_detections,
         ] = self.counts;
         let pixels = self.frames * self.facts.width_px * self.facts.height_px;
@@ -349,6 +353,7 @@ impl Accumulator {
             blends,
             named,
             misnamed,
+            misnamed_companions,
             false_detections,
             false_per_mpx: per_mpx(false_detections as f64 / pixels.max(1) as f64),
             false_low_per_mpx: per_mpx(interval.low),

@@ -329,13 +329,9 @@ fn study(rows: &[StudyRow]) -> Sheet {
         .collect();
     let rate = Axis::of("% of the frames").within(lowest_percent(&rates), 100.5);
     let errors = vec![
-        Layer::new(
-            "boresight, 50 %",
-            BLUE,
-            line(|row| row.boresight_p50_arcsec),
-        ),
+        Layer::new("boresight 50 %", BLUE, line(|row| row.boresight_p50_arcsec)),
         Layer::new("95 %", PALE_BLUE, line(|row| row.boresight_p95_arcsec)),
-        Layer::new("roll, 50 %", ORANGE, line(|row| row.roll_p50_arcsec)),
+        Layer::new("roll 50 %", ORANGE, line(|row| row.roll_p50_arcsec)),
         Layer::new("95 %", PALE_ORANGE, line(|row| row.roll_p95_arcsec)),
     ];
     let limits = vec![

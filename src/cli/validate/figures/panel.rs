@@ -178,7 +178,7 @@ impl Panel {
             draw_words(area, label, LETTERS_PX, (x + 24, y))?;
             let style = (FONT, LETTERS_PX).into_text_style(area);
             let (width, _) = area.estimate_text_size(label, &style).map_err(said)?;
-            x += 24 + width as i32 + 18;
+            x += 24 + width as i32 + 12;
         }
         Ok(())
     }
