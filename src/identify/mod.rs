@@ -19,6 +19,7 @@ use search::{Found, Search};
 
 use crate::camera::{CameraModel, DistortionModel};
 use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
+use nalgebra::Matrix3;
 
 /// One star as observed, the input of identification.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -186,8 +187,8 @@ pub struct Identification {
     pub camera: CameraModel,
     /// The attitude.
     pub icrs_to_camera: Rotation<Icrs, Camera>,
-    /// Standard errors of the attitude about the camera's x, y and z axes, in radians.
-    pub attitude_sigma_rad: [f64; 3],
+    /// Covariance of the small turn about the camera's x, y and z axes by which the attitude may be off, in rad².
+    pub attitude_covariance_rad2: Matrix3<f64>,
     /// Standard error of the focal length, in pixels.
     pub focal_length_sigma_px: f64,
     /// The stars identified, in the order of the observed stars.
@@ -196,6 +197,16 @@ pub struct Identification {
     pub rms_px: f64,
     /// log10 of the probability that noise alone gives as good an answer, all hypotheses tried counted.
     pub log10_false_alarm: f64,
+}
+
+impl Identification {
+    /// Standard errors of the attitude about the camera's x, y and z axes, in radians.
+    pub fn attitude_sigma_rad(&self) -> [f64; 3] {
+        self.attitude_covariance_rad2
+            .diagonal()
+            .map(f64::sqrt)
+            .into()
+    }
 }
 
 /// One observed star and the catalogue star that it is.
@@ -253,7 +264,7 @@ fn identification(refined: Refined, log10_false_alarm: f64) -> Identification {
     let covariance = &refined.fit.covariance;
     let sum_sq: f64 = refined.matches.iter().map(|m| m.residual_px.powi(2)).sum();
     Identification {
-        attitude_sigma_rad: std::array::from_fn(|axis| covariance[(axis, axis)].sqrt()),
+        attitude_covariance_rad2: covariance.fixed_view::<3, 3>(0, 0).into_owned(),
         focal_length_sigma_px: covariance[(3, 3)].sqrt() * refined.fit.camera.focal_length_px,
         camera: refined.fit.camera,
         icrs_to_camera: refined.fit.icrs_to_camera,

@@ -127,7 +127,7 @@ fn attitude(identification: &Identification) -> AttitudeReport {
     let (boresight, up_pa_rad) = identification.icrs_to_camera.boresight_and_up();
     let (ra_rad, dec_rad) = boresight.to_ra_dec();
     let [x, y, roll] = identification
-        .attitude_sigma_rad
+        .attitude_sigma_rad()
         .map(|sigma_rad| to_significant(sigma_rad * ARCSEC_PER_RAD, SIGMA_DIGITS));
     AttitudeReport {
         ra_deg: turn_deg(ra_rad * DEG_PER_RAD, DIRECTION_DECIMALS),

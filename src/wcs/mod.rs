@@ -93,7 +93,7 @@ fn add_projection(header: &mut Header, identification: &Identification, sip: Opt
     header.real("LONPOLE", 180.0, "");
     header.text("RADESYS", "ICRS", "");
     header.real("EQUINOX", 2000.0, "");
-    let [sigma_x, sigma_y, _] = identification.attitude_sigma_rad;
+    let [sigma_x, sigma_y, _] = identification.attitude_sigma_rad();
     // A turn about x moves the boresight along y, and the other way round.
     for (keyword, axis) in [("CRDER1", east), ("CRDER2", north)] {
         let sigma_rad = (axis[0] * sigma_y).hypot(axis[1] * sigma_x);
@@ -148,7 +148,7 @@ fn add_history(
 ) {
     let camera = &identification.camera;
     let sigma = identification
-        .attitude_sigma_rad
+        .attitude_sigma_rad()
         .map(|sigma_rad| sigma_rad * crate::units::ARCSEC_PER_RAD);
     let matched = identification.matches.len();
     let lines = [
