@@ -21,6 +21,10 @@ const EQUATIONS_PER_PARAMETER: f64 = 4.0;
 const WORTH_IT: f64 = 12.0;
 /// With few equations chance does more, as the tails of the F distribution are heavier than those of χ².
 const TAIL_EQUATIONS: f64 = 8.0;
+/// Residuals exceed the stated errors where their median does so by this many of its standard errors.
+const EXCESS_SIGMAS: f64 = 2.0;
+/// The relative standard error of the median of n squared distances, times √n: they are distributed exponentially.
+const MEDIAN_ERROR: f64 = 1.0 / std::f64::consts::LN_2;
 /// Halvings of the interval in which the excess is sought: to a ten-thousandth of the largest residual.
 const EXCESS_BISECTIONS: usize = 14;
 /// Distance in standard errors from which on a star pulls no harder.
@@ -291,7 +295,8 @@ fn next_radius_px(fit: &CameraFit, before_px: f64) -> f64 {
     agreement_radius_px(fit).clamp(before_px / 4.0, before_px)
 }
 
-/// What must be added to the stated errors so that the residuals' median is as expected, in pixels.
+/// What must be added to the stated errors so that the residuals' median is as expected, in pixels; nothing where chance
+/// explains that they are larger.
 fn excess_sigma_of(field: &StarField, matches: &[StarMatch], fit: &CameraFit) -> f64 {
     let equations = 2.0 * matches.len() as f64;
     let free = (equations - fit.parameters as f64).max(1.0) / equations.max(1.0);
@@ -303,19 +308,20 @@ fn excess_sigma_of(field: &StarField, matches: &[StarMatch], fit: &CameraFit) ->
         .map(|([x, y], m)| (x * x + y * y, field.stars[m.observed].sigma_px.powi(2)))
         .collect();
     let mut scaled = Vec::with_capacity(squares.len());
-    let mut too_small = |excess_sq: f64| {
+    let mut median_sq = |excess_sq: f64| {
         scaled.clear();
         scaled.extend(squares.iter().map(|(d, s)| d / (s + excess_sq).max(1e-6)));
-        median(&mut scaled) > expected_sq
+        median(&mut scaled)
     };
-    if !too_small(0.0) {
+    let chance = EXCESS_SIGMAS * MEDIAN_ERROR / (matches.len().max(1) as f64).sqrt();
+    if median_sq(0.0) <= expected_sq * (1.0 + chance) {
         return 0.0;
     }
     let largest_sq = squares.iter().fold(1e-6, |a: f64, s| a.max(s.0));
     let (mut low, mut high) = (0.0, largest_sq.sqrt() * 2.0);
     for _ in 0..EXCESS_BISECTIONS {
         let middle = 0.5 * (low + high);
-        if too_small(middle * middle) {
+        if median_sq(middle * middle) > expected_sq {
             low = middle;
         } else {
             high = middle;
