@@ -2,10 +2,12 @@
 //!
 //! pair up → fit → pair up within a smaller radius → ... with as much lens distortion as the stars support
 
+use super::blends::directions_of_light;
 use super::verify::{Hypothesis, Radius};
 use super::{Photometry, Sky, StarField, StarMatch};
 use crate::attitude::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera, left_out_chi_sq};
 use crate::camera::DistortionModel;
+use crate::coords::{Icrs, UnitVector};
 use crate::statistics::median;
 use std::f64::consts::PI;
 
@@ -33,6 +35,8 @@ const HUBER_SIGMAS: f64 = 2.5;
 const FAINT_RADIUS: f64 = 3.0;
 /// Farther off than so many times the typical star no star is looked for, however large its error.
 const ROUGH_RADIUS: f64 = 5.0;
+/// Rounds of fitting to blends: in the first the weights are still those of stars by themselves.
+const BLEND_ROUNDS: usize = 2;
 /// Rounds of pairing and fitting with all the stars.
 const ALL_STARS_ROUNDS: usize = 2;
 /// A sceptic wants so many standard deviations more agreement than chance makes.
@@ -140,6 +144,32 @@ pub fn with_all_stars(field: &StarField, sky: &Sky, settled: &Refined) -> Option
     Some(current)
 }
 
+/// Fits the same stars again, each where its light is seen together with that of those which the camera does not tell from it.
+///
+/// `None` where they do not determine the camera.
+pub fn with_blends(field: &StarField, sky: &Sky, settled: Refined) -> Option<Refined> {
+    let Some(directions) = directions_of_light(field, sky, &settled.hypothesis, &settled.matches)
+    else {
+        return Some(settled);
+    };
+    let model = settled.hypothesis.camera.distortion_model();
+    let mut current = settled;
+    for _ in 0..BLEND_ROUNDS {
+        let Refined {
+            hypothesis,
+            matches,
+            excess_sigma_px,
+            ..
+        } = current;
+        let guess = Guess {
+            hypothesis: &hypothesis,
+            model,
+        };
+        current = fitted_to(field, sky, matches, (&directions, excess_sigma_px), &guess)?;
+    }
+    Some(current)
+}
+
 /// Where a refinement starts.
 pub struct Start<'a> {
     /// The hypothesis.
@@ -159,11 +189,33 @@ struct Guess<'a> {
 fn fitted(
     field: &StarField,
     sky: &Sky,
-    mut matches: Vec<StarMatch>,
+    matches: Vec<StarMatch>,
     excess_sigma_px: f64,
     guess: &Guess,
 ) -> Option<Refined> {
-    let stars = measured(field, sky, &matches, excess_sigma_px);
+    let directions = catalog_directions(field, sky, &matches);
+    fitted_to(field, sky, matches, (&directions, excess_sigma_px), guess)
+}
+
+/// The directions of the stars themselves.
+fn catalog_directions(
+    field: &StarField,
+    sky: &Sky,
+    matches: &[StarMatch],
+) -> Vec<UnitVector<Icrs>> {
+    let direction = |m: &StarMatch| sky.stars()[m.catalog].direction_at(field.years_since_j2000);
+    matches.iter().map(direction).collect()
+}
+
+/// The fit to stars whose light comes from these directions.
+fn fitted_to(
+    field: &StarField,
+    sky: &Sky,
+    mut matches: Vec<StarMatch>,
+    (directions, excess_sigma_px): (&[UnitVector<Icrs>], f64),
+    guess: &Guess,
+) -> Option<Refined> {
+    let stars = measured(field, &matches, directions, excess_sigma_px);
     let Hypothesis {
         camera,
         icrs_to_camera,
@@ -211,21 +263,21 @@ fn zero_point_mag(field: &StarField, sky: &Sky, matches: &[StarMatch]) -> f64 {
 /// (Huber 1964, Ann. Math. Stat. 35, 73).
 fn measured(
     field: &StarField,
-    sky: &Sky,
     matches: &[StarMatch],
+    directions: &[UnitVector<Icrs>],
     excess_px: f64,
 ) -> Vec<MeasuredStar> {
-    let measured = |m: &StarMatch| {
+    let measured = |(m, icrs): (&StarMatch, &UnitVector<Icrs>)| {
         let star = &field.stars[m.observed];
         let sigma_px = (star.sigma_px.powi(2) + excess_px.powi(2)).sqrt().max(1e-3);
         let excess = m.residual_px / (HUBER_SIGMAS * sigma_px);
         MeasuredStar {
             pixel: star.position,
-            icrs: sky.stars()[m.catalog].direction_at(field.years_since_j2000),
+            icrs: *icrs,
             sigma_px: sigma_px * excess.max(1.0).sqrt(),
         }
     };
-    matches.iter().map(measured).collect()
+    matches.iter().zip(directions).map(measured).collect()
 }
 
 fn is_affordable(model: DistortionModel, stars: usize) -> bool {
@@ -239,7 +291,13 @@ fn choose_model(
     current: &Refined,
     richest: Option<DistortionModel>,
 ) -> Option<DistortionModel> {
-    let stars = measured(field, sky, &current.matches, current.excess_sigma_px);
+    let directions = catalog_directions(field, sky, &current.matches);
+    let stars = measured(
+        field,
+        &current.matches,
+        &directions,
+        current.excess_sigma_px,
+    );
     let CameraFit {
         camera,
         icrs_to_camera,
