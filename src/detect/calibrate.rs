@@ -31,10 +31,8 @@ const SIGNIFICANT_SIGMA: f64 = 2.0;
 const MAX_SQUARED_SIGMA: f64 = 4.0;
 /// The mean of squared standard Gaussians that are cut off there.
 const CUT_OFF_MEAN: f64 = 0.920_5;
-/// The first round, with a variance too low, needs room.
-const FIRST_MAX_SQUARED_SIGMA: f64 = 36.0;
 /// Rounds of the noise model's least squares.
-const NOISE_ROUNDS: usize = 4;
+const NOISE_ROUNDS: usize = 3;
 /// The spot model cannot be worse than this, as a part of the light in a pixel: what is, is no star.
 const MAX_MODEL_ERROR: f64 = 0.1;
 /// Light beside a star is another's from this many standard deviations of the noise on.
@@ -211,15 +209,21 @@ pub(super) struct StarModel {
 
 /// The noise model from the residuals of stars of about the frame's spot size, and that size by the weights that follow.
 pub(super) fn star_model(scene: &Scene<'_>, stars: &[BrightStar], work: &mut FitWork) -> StarModel {
-    let mut model = NoiseModel::default();
     let mut usable: Vec<Fit> = stars
         .iter()
         .map(|star| star.fit.clone())
         .filter(|fit| (fit.spot_px / scene.spot_px).ln().abs() < MODE_WIDTH.ln())
         .collect();
+    // A start from too little noise would let the brightest pixel decide, which a fit then follows wherever it is.
+    let brightest = usable.first().map(|fit| fit.spots[0]);
+    let mut model = NoiseModel {
+        shot_adu: brightest.map_or(0.0, |spot| scene.noise_at(spot.x, spot.y)),
+        model_error2: 0.0,
+    };
+    let mut shot_sigma_adu = f64::INFINITY;
     // Each round weighs the squared residuals by the variance that the round before found.
-    for round in 0..NOISE_ROUNDS {
-        let mut sums = Moments::of_round(round);
+    for _ in 0..NOISE_ROUNDS {
+        let mut sums = Moments::default();
         for star in &mut usable {
             let radius = window_radius(star.spot_px);
             scene.cut(&star.spots, radius, &mut work.window);
@@ -235,7 +239,12 @@ pub(super) fn star_model(scene: &Scene<'_>, stars: &[BrightStar], work: &mut Fit
             }
         }
         model = sums.solve();
+        shot_sigma_adu = sums.shot_sigma_adu();
         model.model_error2 = model.model_error2.min(MAX_MODEL_ERROR * MAX_MODEL_ERROR);
+    }
+    // A noise known from few pixels gives errors distributed as Student's t, whose variance is 1 + 2/ν; ν is 2 (s/σ)².
+    if shot_sigma_adu.is_finite() {
+        model.shot_adu += shot_sigma_adu.powi(2) / model.shot_adu.max(shot_sigma_adu);
     }
     StarModel {
         spot_px: weighted_size(&usable).unwrap_or(scene.spot_px),
@@ -273,10 +282,8 @@ fn weighted_size(stars: &[Fit]) -> Option<f64> {
 ///
 /// # Reference
 /// Davidian & Carroll 1987, J. Am. Stat. Assoc. 82, 1079, doi 10.1080/01621459.1987.10478543: pseudo-likelihood, corrected for leverage.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Moments {
-    /// Squared residuals are cut off at so many variances, and divided by what that leaves of their mean.
-    cut_off: [f64; 2],
     /// Σ w m², Σ w m³, Σ w m⁴.
     matrix: [f64; 3],
     /// Σ w m d, Σ w m² d.
@@ -284,24 +291,10 @@ struct Moments {
 }
 
 impl Moments {
-    fn of_round(round: usize) -> Self {
-        let is_first = round == 0;
-        Self {
-            cut_off: if is_first {
-                [FIRST_MAX_SQUARED_SIGMA, 1.0]
-            } else {
-                [MAX_SQUARED_SIGMA, CUT_OFF_MEAN]
-            },
-            matrix: [0.0; 3],
-            right: [0.0; 2],
-        }
-    }
-
     /// Adds the pixels of one star that its light stands out in.
     fn add_star(&mut self, work: &mut FitWork, fit: &Fit, config: &FitConfig) {
         let noise = work.window.noise_variance;
         let model = config.noise;
-        let [most, share] = self.cut_off;
         let FitWork { fitter, window } = work;
         fitter.for_each_residual(window, fit, config, |residual, light, leverage| {
             let m2 = light * light;
@@ -310,8 +303,8 @@ impl Moments {
             }
             let variance = noise + model.shot_adu * light + model.model_error2 * m2;
             let free = (1.0 - leverage).max(0.0);
-            let squared = (residual * residual).min(most * free * variance);
-            let above_noise = squared / share - free * noise;
+            let squared = (residual * residual).min(MAX_SQUARED_SIGMA * free * variance);
+            let above_noise = squared / CUT_OFF_MEAN - free * noise;
             let weight = 1.0 / (variance * variance);
             self.matrix[0] += free * weight * m2;
             self.matrix[1] += free * weight * m2 * light;
@@ -319,6 +312,12 @@ impl Moments {
             self.right[0] += weight * light * above_noise;
             self.right[1] += weight * m2 * above_noise;
         });
+    }
+
+    /// Standard error of the shot noise per ADU, no error of the spot model assumed. The matrix is twice the information: the
+    /// square of a Gaussian has twice its squared variance.
+    fn shot_sigma_adu(&self) -> f64 {
+        (2.0 / self.matrix[0]).sqrt()
     }
 
     /// The non-negative solution, without an error of the spot model that chance explains.
@@ -336,7 +335,6 @@ impl Moments {
         }
         let shot = (p * c - q * b) / determinant;
         let error2 = (q * a - p * b) / determinant;
-        // The matrix is twice the information: the square of a Gaussian has twice its squared variance.
         let chance = SIGNIFICANT_SIGMA * (2.0 * a / determinant).sqrt();
         if error2 < chance {
             noise_model(p / a, 0.0)
