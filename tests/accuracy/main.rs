@@ -8,5 +8,6 @@
 mod attitude;
 mod centroids;
 mod detection;
+mod exchange;
 mod stars;
 mod tally;

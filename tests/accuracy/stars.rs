@@ -76,6 +76,11 @@ impl Field {
         self.budget.background_noise_e
     }
 
+    /// Electrons of the sky in a pixel.
+    pub fn background_e(&self) -> f64 {
+        self.budget.background_e
+    }
+
     /// Electrons of a star that the matched filter sees with this ratio of signal to noise, on average over its places in a pixel.
     pub fn flux_e(&self, snr: f64) -> f64 {
         snr * self.noise_e() * equivalent_area_px(self.scenario.sensor.spot_sigma_px).sqrt()

@@ -26,11 +26,6 @@ impl Rms {
         (self.sum_sq / self.count).sqrt()
     }
 
-    /// The mean of the squares.
-    pub fn mean_sq(&self) -> f64 {
-        self.sum_sq / self.count
-    }
-
     /// Standard error over value.
     pub fn relative_error(&self) -> f64 {
         1.0 / (2.0 * self.count).sqrt()
