@@ -10,6 +10,7 @@ Prints the RMS error over the Cramer-Rao bound by spot size and ratio of signal 
 stars are found at one false detection a megapixel. Thresholds of the peers are tuned to that rate on frames of noise.
 """
 import csv, json, math, subprocess, sys
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -91,7 +92,7 @@ def matched(stars, places):
 def main(directory, program):
     directory = Path(directory)
     peers = {"sep, winpos": with_sep, "tetra3rs": with_tetra3rs, "tetra3rs, single pass": with_tetra3rs_fast}
-    print("sep", sep.__version__, "tetra3rs", tetra3rs.version() if callable(tetra3rs.version) else tetra3rs.version)
+    print("sep", sep.__version__, "tetra3rs", version("tetra3rs"))
     for spot in SPOTS:
         noise = [pixels(path) for path in sorted(directory.glob(f"noise-{spot}-*.tiff"))]
         thresholds = {name: tuned(detector, noise) for name, detector in peers.items()}

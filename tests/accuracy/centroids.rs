@@ -28,7 +28,7 @@ pub fn bound(field: &Field, star: &Star) -> CramerRao {
         spot_sigma_px,
         offset_px(star),
         star.flux_e,
-        field.noise_e().powi(2),
+        field.pixel_noise_e().powi(2),
     )
 }
 
@@ -57,7 +57,7 @@ impl Measured {
             sensor.spot_sigma_px,
             offset,
             star.flux_e,
-            field.noise_e().powi(2),
+            field.pixel_noise_e().powi(2),
         );
         let errors = [
             found.position.x - star.place.x,

@@ -117,7 +117,7 @@ fn ideal_filter(field: &Field, frame: &Frame) -> Vec<f64> {
     let data: Vec<f64> = frame
         .pixels
         .iter()
-        .map(|p| (f64::from(*p) - level_e) / field.noise_e())
+        .map(|p| (f64::from(*p) - level_e) / field.pixel_noise_e())
         .collect();
     let at = |data: &[f64], x: isize, y: isize| {
         let inside = |v: isize| (0..SIDE_PX as isize).contains(&v);

@@ -72,7 +72,7 @@ impl Field {
     }
 
     /// The noise of a pixel without a star, in electrons.
-    pub fn noise_e(&self) -> f64 {
+    pub fn pixel_noise_e(&self) -> f64 {
         self.budget.background_noise_e
     }
 
@@ -83,7 +83,7 @@ impl Field {
 
     /// Electrons of a star that the matched filter sees with this ratio of signal to noise, on average over its places in a pixel.
     pub fn flux_e(&self, snr: f64) -> f64 {
-        snr * self.noise_e() * equivalent_area_px(self.scenario.sensor.spot_sigma_px).sqrt()
+        snr * self.pixel_noise_e() * equivalent_area_px(self.scenario.sensor.spot_sigma_px).sqrt()
     }
 
     /// Places in the cells of a grid, anywhere within a pixel, in random order.
