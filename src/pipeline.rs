@@ -212,6 +212,7 @@ impl CentroidList {
             height_px: self.height as f64,
             photometry: self.photometry,
             years_since_j2000,
+            spot_sigma_px: None,
             stars: self.centroids.iter().map(observed).collect(),
         }
     }
@@ -564,6 +565,7 @@ pub fn star_field(
         height_px: frame.height as f64,
         photometry: Photometry::Instrumental,
         years_since_j2000,
+        spot_sigma_px: Some(detections.spot_sigma_px),
         stars: kept.iter().map(observed).collect(),
     };
     (field, kept)

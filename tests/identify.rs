@@ -118,6 +118,7 @@ fn field(mut stars: Vec<ObservedStar>) -> StarField {
         height_px: HEIGHT_PX,
         photometry: Photometry::Instrumental,
         years_since_j2000: 0.0,
+        spot_sigma_px: None,
         stars,
     }
 }

@@ -24,14 +24,19 @@ const ISOLATION_SIGMA: f32 = 6.0;
 const HOT_PIXEL_PX: f64 = 0.28;
 /// Fewer stars than this do not make a mode.
 const MIN_STARS: usize = 3;
-/// A pixel whose noise the fit takes up beyond this part tells nothing of it.
-const MAX_LEVERAGE: f64 = 0.9;
-/// Residuals count at most this many variances; the first rounds, with a variance too low, need room.
-const MAX_SQUARED_SIGMA: f64 = 36.0;
+/// An error of the spot model counts from this many standard errors on: what is below is chance.
+const SIGNIFICANT_SIGMA: f64 = 2.0;
+/// Squared residuals count at most this many variances: those of close neighbours, which no star's noise explains, would grow with
+/// the variance that they make.
+const MAX_SQUARED_SIGMA: f64 = 4.0;
+/// The mean of squared standard Gaussians that are cut off there.
+const CUT_OFF_MEAN: f64 = 0.920_5;
 /// Rounds of the noise model's least squares.
 const NOISE_ROUNDS: usize = 3;
 /// The spot model cannot be worse than this, as a part of the light in a pixel: what is, is no star.
 const MAX_MODEL_ERROR: f64 = 0.1;
+/// Light beside a star is another's from this many standard deviations of the noise on.
+const NEIGHBOUR_SIGMA: f64 = 5.0;
 /// Sizes within this factor of the mode are averaged.
 const MODE_WIDTH: f64 = 1.25;
 /// Rounds of averaging around the mode.
@@ -66,7 +71,8 @@ pub(super) fn fit_bright_stars(
                 (size, NoiseModel::default()),
                 work,
             );
-            (fit.converged && fit.spots[0].flux > 0.0).then_some(BrightStar { fit })
+            let is_star = fit.converged && fit.spots[0].flux > 0.0 && is_alone(&fit, work);
+            is_star.then_some(BrightStar { fit })
         })
         .take(MAX_STARS)
         .collect()
@@ -100,7 +106,8 @@ pub(super) fn fit_raw_stars(
                 (peak.size_px, NoiseModel::default()),
                 work,
             );
-            (fit.converged && fit.spots[0].flux > 0.0).then_some(BrightStar { fit })
+            let is_star = fit.converged && fit.spots[0].flux > 0.0 && is_alone(&fit, work);
+            is_star.then_some(BrightStar { fit })
         })
         .take(MAX_STARS)
         .collect()
@@ -113,6 +120,21 @@ fn is_isolated(peak: &Peak, peaks: &[Peak], reach: f32) -> bool {
         let dy = other.y as f32 - peak.y as f32;
         (dx == 0.0 && dy == 0.0) || dx * dx + dy * dy > reach * reach || other.snr < 0.1 * peak.snr
     })
+}
+
+/// Whether no light in the fit's window, which is still in `work`, is another star's: more than the spot's imperfection and
+/// noise, where there should be next to none.
+fn is_alone(fit: &Fit, work: &mut FitWork) -> bool {
+    let FitWork { fitter, window } = work;
+    let (mut peak, mut beside) = (0.0f64, Vec::new());
+    fitter.for_each_pixel(window, fit, |data, light, _| {
+        peak = peak.max(light);
+        beside.push((light, data - light - fit.background));
+    });
+    let faint = MAX_MODEL_ERROR * peak;
+    let most = faint + NEIGHBOUR_SIGMA * window.noise_variance.sqrt();
+    let is_others = |&(light, residual): &(f64, f64)| light < faint && residual > most;
+    !beside.iter().any(is_others)
 }
 
 /// The spot size that the filtered peak's curvature tells: a Gaussian of variance
@@ -176,18 +198,29 @@ fn half_sample_mode(sorted: &[f64]) -> f64 {
     values[values.len() / 2]
 }
 
-/// The noise model from the residuals of stars of about the frame's spot size.
-pub(super) fn noise_model(
-    scene: &Scene<'_>,
-    stars: &[BrightStar],
-    work: &mut FitWork,
-) -> NoiseModel {
-    let mut model = NoiseModel::default();
+/// What bright stars of about the frame's spot size tell of all stars.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct StarModel {
+    /// Standard deviation of the spot, in pixels.
+    pub spot_px: f64,
+    /// How the noise grows with light.
+    pub noise: NoiseModel,
+}
+
+/// The noise model from the residuals of stars of about the frame's spot size, and that size by the weights that follow.
+pub(super) fn star_model(scene: &Scene<'_>, stars: &[BrightStar], work: &mut FitWork) -> StarModel {
     let mut usable: Vec<Fit> = stars
         .iter()
         .map(|star| star.fit.clone())
         .filter(|fit| (fit.spot_px / scene.spot_px).ln().abs() < MODE_WIDTH.ln())
         .collect();
+    // A start from too little noise would let the brightest pixel decide, which a fit then follows wherever it is.
+    let brightest = usable.first().map(|fit| fit.spots[0]);
+    let mut model = NoiseModel {
+        shot_adu: brightest.map_or(0.0, |spot| scene.noise_at(spot.x, spot.y)),
+        model_error2: 0.0,
+    };
+    let mut shot_sigma_adu = f64::INFINITY;
     // Each round weighs the squared residuals by the variance that the round before found.
     for _ in 0..NOISE_ROUNDS {
         let mut sums = Moments::default();
@@ -206,12 +239,49 @@ pub(super) fn noise_model(
             }
         }
         model = sums.solve();
+        shot_sigma_adu = sums.shot_sigma_adu();
         model.model_error2 = model.model_error2.min(MAX_MODEL_ERROR * MAX_MODEL_ERROR);
     }
-    model
+    // A noise known from few pixels gives errors distributed as Student's t, whose variance is 1 + 2/ν; ν is 2 (s/σ)².
+    if shot_sigma_adu.is_finite() {
+        model.shot_adu += shot_sigma_adu.powi(2) / model.shot_adu.max(shot_sigma_adu);
+    }
+    StarModel {
+        spot_px: weighted_size(&usable).unwrap_or(scene.spot_px),
+        noise: model,
+    }
 }
 
-/// Sums for the least squares of `r² − n² = shot·m + ε²·m²` over pixels.
+/// The mean of the stars' sizes, weighted with their errors and with what they scatter beyond these, in pixels.
+///
+/// # Reference
+/// DerSimonian & Laird 1986, Control. Clin. Trials 7, 177, doi 10.1016/0197-2456(86)90046-2, for the scatter.
+fn weighted_size(stars: &[Fit]) -> Option<f64> {
+    let is_known = |fit: &&Fit| fit.sigma_spot_px > 0.0 && fit.sigma_spot_px.is_finite();
+    let sizes = || {
+        let known = stars.iter().filter(is_known);
+        known.map(|fit| (fit.spot_px, fit.sigma_spot_px.powi(2)))
+    };
+    let mean = |beyond: f64| {
+        let weight = |variance: f64| 1.0 / (variance + beyond);
+        let [sum, squares, sizes] = sizes().fold([0.0; 3], |[s, q, m], (size, variance)| {
+            let w = weight(variance);
+            [s + w, q + w * w, m + w * size]
+        });
+        (sizes / sum, sum, squares)
+    };
+    let (first, sum, squares) = mean(0.0);
+    let chi2: f64 = sizes().map(|(size, v)| (size - first).powi(2) / v).sum();
+    let beyond = (chi2 - (sizes().count() as f64 - 1.0)) / (sum - squares / sum);
+    let (size, _, _) = mean(beyond.max(0.0));
+    size.is_finite().then_some(size)
+}
+
+/// Sums for `Σ [r² − (1 − h) v] ∂v / v² = 0` over pixels, with `v = n² + shot·m + ε²·m²` and the leverage h: what
+/// is left of a pixel's variance is the part that the star's own parameters have not taken up.
+///
+/// # Reference
+/// Davidian & Carroll 1987, J. Am. Stat. Assoc. 82, 1079, doi 10.1080/01621459.1987.10478543: pseudo-likelihood, corrected for leverage.
 #[derive(Debug, Default)]
 struct Moments {
     /// Σ w m², Σ w m³, Σ w m⁴.
@@ -228,43 +298,50 @@ impl Moments {
         let FitWork { fitter, window } = work;
         fitter.for_each_residual(window, fit, config, |residual, light, leverage| {
             let m2 = light * light;
-            if light < 0.0 || m2 < 0.25 * noise || leverage > MAX_LEVERAGE {
+            if light < 0.0 || m2 < 0.25 * noise {
                 return;
             }
             let variance = noise + model.shot_adu * light + model.model_error2 * m2;
-            let squared =
-                (residual * residual / (1.0 - leverage)).min(MAX_SQUARED_SIGMA * variance);
+            let free = (1.0 - leverage).max(0.0);
+            let squared = (residual * residual).min(MAX_SQUARED_SIGMA * free * variance);
+            let above_noise = squared / CUT_OFF_MEAN - free * noise;
             let weight = 1.0 / (variance * variance);
-            self.matrix[0] += weight * m2;
-            self.matrix[1] += weight * m2 * light;
-            self.matrix[2] += weight * m2 * m2;
-            self.right[0] += weight * light * (squared - noise);
-            self.right[1] += weight * m2 * (squared - noise);
+            self.matrix[0] += free * weight * m2;
+            self.matrix[1] += free * weight * m2 * light;
+            self.matrix[2] += free * weight * m2 * m2;
+            self.right[0] += weight * light * above_noise;
+            self.right[1] += weight * m2 * above_noise;
         });
     }
 
-    /// The non-negative solution.
+    /// Standard error of the shot noise per ADU, no error of the spot model assumed. The matrix is twice the information: the
+    /// square of a Gaussian has twice its squared variance.
+    fn shot_sigma_adu(&self) -> f64 {
+        (2.0 / self.matrix[0]).sqrt()
+    }
+
+    /// The non-negative solution, without an error of the spot model that chance explains.
     fn solve(&self) -> NoiseModel {
         let [a, b, c] = self.matrix;
         let [p, q] = self.right;
-        let determinant = a * c - b * b;
-        let (mut shot, mut error2) = (0.0, 0.0);
-        if determinant > 1e-9 * a * c && determinant.is_finite() {
-            shot = (p * c - q * b) / determinant;
-            error2 = (q * a - p * b) / determinant;
-        }
-        if shot < 0.0 || determinant <= 1e-9 * a * c {
-            shot = 0.0;
-            error2 = q / c;
-        }
-        if error2 < 0.0 {
-            error2 = 0.0;
-            shot = p / a;
-        }
         let finite = |v: f64| if v.is_finite() { v.max(0.0) } else { 0.0 };
-        NoiseModel {
+        let noise_model = |shot: f64, error2: f64| NoiseModel {
             shot_adu: finite(shot),
             model_error2: finite(error2),
+        };
+        let determinant = a * c - b * b;
+        if determinant <= 1e-9 * a * c || !determinant.is_finite() {
+            return noise_model(0.0, q / c);
+        }
+        let shot = (p * c - q * b) / determinant;
+        let error2 = (q * a - p * b) / determinant;
+        let chance = SIGNIFICANT_SIGMA * (2.0 * a / determinant).sqrt();
+        if error2 < chance {
+            noise_model(p / a, 0.0)
+        } else if shot < 0.0 {
+            noise_model(0.0, q / c)
+        } else {
+            noise_model(shot, error2)
         }
     }
 }

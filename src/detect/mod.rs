@@ -311,6 +311,14 @@ struct Calibration {
     threshold: f64,
 }
 
+impl Calibration {
+    /// Takes over what the stars tell; a size that is given stands.
+    fn adopt(&mut self, model: &calibrate::StarModel, config: &DetectConfig) {
+        self.noise = model.noise;
+        self.spot_px = config.spot_sigma_px.unwrap_or(model.spot_px);
+    }
+}
+
 /// Filters and searches, until the filter fits the stars that it finds.
 fn search_with_own_spot(
     view: &View<'_>,
@@ -342,11 +350,12 @@ fn search_with_own_spot(
         let spot_px = measured.unwrap_or(calibration.spot_px);
         let ratio = (spot_px / calibration.spot_px).max(calibration.spot_px / spot_px);
         let settled = ratio < SPOT_GUESS_TOLERANCE || round + 1 == MAX_FILTER_ROUNDS;
+        calibration.spot_px = spot_px;
         if settled {
             scene.spot_px = spot_px;
-            calibration.noise = calibrate::noise_model(&scene, &stars, &mut fits);
+            let model = calibrate::star_model(&scene, &stars, &mut fits);
+            calibration.adopt(&model, config);
         }
-        calibration.spot_px = spot_px;
         workspace.fits = fits;
         if settled {
             break;
@@ -380,7 +389,8 @@ fn calibrate_unfiltered(
     let is_enough =
         measured.is_some_and(|(size, stars)| stars >= ENOUGH_RAW_STARS && size < SHARP_SPOT_PX);
     if is_enough {
-        calibration.noise = calibrate::noise_model(&scene, &stars, &mut fits);
+        let model = calibrate::star_model(&scene, &stars, &mut fits);
+        calibration.adopt(&model, config);
     }
     workspace.fits = fits;
     is_enough

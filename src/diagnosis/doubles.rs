@@ -136,6 +136,7 @@ mod tests {
             height_px: 500.0,
             photometry: Photometry::Instrumental,
             years_since_j2000: 0.0,
+            spot_sigma_px: None,
             stars,
         }
     }

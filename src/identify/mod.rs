@@ -1,5 +1,6 @@
 //! From a list of star positions to catalogue stars, pointing and scale.
 
+mod blends;
 mod cache;
 pub mod index;
 mod predict;
@@ -14,7 +15,7 @@ pub use predict::{PredictedStar, View};
 pub use search::LOG10_FALSE_ALARM_LIMIT;
 pub use sky::Sky;
 
-use refine::{Refined, Start, refine, with_all_stars};
+use refine::{Refined, Start, refine, with_all_stars, with_blends};
 use search::{Found, Search};
 
 use crate::camera::{CameraModel, DistortionModel};
@@ -65,6 +66,9 @@ pub struct StarField {
     pub photometry: Photometry,
     /// When they were seen, in Julian years since J2000.0: the stars move.
     pub years_since_j2000: f64,
+    /// Standard deviation of a star's spot before pixel integration, in pixels; without it every star of the catalogue is taken to be
+    /// seen by itself.
+    pub spot_sigma_px: Option<f64>,
     /// Brightest first.
     pub stars: Vec<ObservedStar>,
 }
@@ -202,7 +206,10 @@ pub struct Identification {
 impl Identification {
     /// Standard errors of the attitude about the camera's x, y and z axes, in radians.
     pub fn attitude_sigma_rad(&self) -> [f64; 3] {
-        std::array::from_fn(|axis| self.attitude_covariance_rad2[(axis, axis)].sqrt())
+        self.attitude_covariance_rad2
+            .diagonal()
+            .map(f64::sqrt)
+            .into()
     }
 }
 
@@ -213,7 +220,8 @@ pub struct StarMatch {
     pub observed: usize,
     /// Index into the catalogue's stars.
     pub catalog: usize,
-    /// Distance between the observed and the predicted position, in pixels.
+    /// Distance between the observed position and that predicted for the star, or for the light of all stars that the camera
+    /// does not tell from it, in pixels.
     pub residual_px: f64,
 }
 
@@ -247,6 +255,7 @@ fn complete(field: &StarField, sky: &Sky, search: &Search, found: Found) -> Iden
     let richest = Some(DistortionModel::Quintic);
     let with_all = refine(field, CALIBRATION_STARS, sky, &start, richest)
         .and_then(|settled| with_all_stars(field, sky, &settled))
+        .and_then(|settled| with_blends(field, sky, settled))
         .map(|refined| (search.log10_false_alarm(&refined.hypothesis), refined));
     // All the stars can only make it surer; where they do not, the search's own answer stands.
     match with_all {

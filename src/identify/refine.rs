@@ -2,10 +2,12 @@
 //!
 //! pair up → fit → pair up within a smaller radius → ... with as much lens distortion as the stars support
 
+use super::blends::directions_of_light;
 use super::verify::{Hypothesis, Radius};
 use super::{Photometry, Sky, StarField, StarMatch};
 use crate::attitude::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera, left_out_chi_sq};
 use crate::camera::DistortionModel;
+use crate::coords::{Icrs, UnitVector};
 use crate::statistics::median;
 use std::f64::consts::PI;
 
@@ -21,6 +23,10 @@ const EQUATIONS_PER_PARAMETER: f64 = 4.0;
 const WORTH_IT: f64 = 12.0;
 /// With few equations chance does more, as the tails of the F distribution are heavier than those of χ².
 const TAIL_EQUATIONS: f64 = 8.0;
+/// Residuals exceed the stated errors where their median does so by this many of its standard errors.
+const EXCESS_SIGMAS: f64 = 2.0;
+/// The relative standard error of the median of n squared distances, times √n: they are distributed exponentially.
+const MEDIAN_ERROR: f64 = 1.0 / std::f64::consts::LN_2;
 /// Halvings of the interval in which the excess is sought: to a ten-thousandth of the largest residual.
 const EXCESS_BISECTIONS: usize = 14;
 /// Distance in standard errors from which on a star pulls no harder.
@@ -29,6 +35,8 @@ const HUBER_SIGMAS: f64 = 2.5;
 const FAINT_RADIUS: f64 = 3.0;
 /// Farther off than so many times the typical star no star is looked for, however large its error.
 const ROUGH_RADIUS: f64 = 5.0;
+/// Rounds of fitting to blends: in the first the weights are still those of stars by themselves.
+const BLEND_ROUNDS: usize = 2;
 /// Rounds of pairing and fitting with all the stars.
 const ALL_STARS_ROUNDS: usize = 2;
 /// A sceptic wants so many standard deviations more agreement than chance makes.
@@ -136,6 +144,32 @@ pub fn with_all_stars(field: &StarField, sky: &Sky, settled: &Refined) -> Option
     Some(current)
 }
 
+/// Fits the same stars again, each where its light is seen together with that of those which the camera does not tell from it.
+///
+/// `None` where they do not determine the camera.
+pub fn with_blends(field: &StarField, sky: &Sky, settled: Refined) -> Option<Refined> {
+    let Some(directions) = directions_of_light(field, sky, &settled.hypothesis, &settled.matches)
+    else {
+        return Some(settled);
+    };
+    let model = settled.hypothesis.camera.distortion_model();
+    let mut current = settled;
+    for _ in 0..BLEND_ROUNDS {
+        let Refined {
+            hypothesis,
+            matches,
+            excess_sigma_px,
+            ..
+        } = current;
+        let guess = Guess {
+            hypothesis: &hypothesis,
+            model,
+        };
+        current = fitted_to(field, sky, matches, (&directions, excess_sigma_px), &guess)?;
+    }
+    Some(current)
+}
+
 /// Where a refinement starts.
 pub struct Start<'a> {
     /// The hypothesis.
@@ -155,11 +189,33 @@ struct Guess<'a> {
 fn fitted(
     field: &StarField,
     sky: &Sky,
-    mut matches: Vec<StarMatch>,
+    matches: Vec<StarMatch>,
     excess_sigma_px: f64,
     guess: &Guess,
 ) -> Option<Refined> {
-    let stars = measured(field, sky, &matches, excess_sigma_px);
+    let directions = catalog_directions(field, sky, &matches);
+    fitted_to(field, sky, matches, (&directions, excess_sigma_px), guess)
+}
+
+/// The directions of the stars themselves.
+fn catalog_directions(
+    field: &StarField,
+    sky: &Sky,
+    matches: &[StarMatch],
+) -> Vec<UnitVector<Icrs>> {
+    let direction = |m: &StarMatch| sky.stars()[m.catalog].direction_at(field.years_since_j2000);
+    matches.iter().map(direction).collect()
+}
+
+/// The fit to stars whose light comes from these directions.
+fn fitted_to(
+    field: &StarField,
+    sky: &Sky,
+    mut matches: Vec<StarMatch>,
+    (directions, excess_sigma_px): (&[UnitVector<Icrs>], f64),
+    guess: &Guess,
+) -> Option<Refined> {
+    let stars = measured(field, &matches, directions, excess_sigma_px);
     let Hypothesis {
         camera,
         icrs_to_camera,
@@ -207,21 +263,21 @@ fn zero_point_mag(field: &StarField, sky: &Sky, matches: &[StarMatch]) -> f64 {
 /// (Huber 1964, Ann. Math. Stat. 35, 73).
 fn measured(
     field: &StarField,
-    sky: &Sky,
     matches: &[StarMatch],
+    directions: &[UnitVector<Icrs>],
     excess_px: f64,
 ) -> Vec<MeasuredStar> {
-    let measured = |m: &StarMatch| {
+    let measured = |(m, icrs): (&StarMatch, &UnitVector<Icrs>)| {
         let star = &field.stars[m.observed];
         let sigma_px = (star.sigma_px.powi(2) + excess_px.powi(2)).sqrt().max(1e-3);
         let excess = m.residual_px / (HUBER_SIGMAS * sigma_px);
         MeasuredStar {
             pixel: star.position,
-            icrs: sky.stars()[m.catalog].direction_at(field.years_since_j2000),
+            icrs: *icrs,
             sigma_px: sigma_px * excess.max(1.0).sqrt(),
         }
     };
-    matches.iter().map(measured).collect()
+    matches.iter().zip(directions).map(measured).collect()
 }
 
 fn is_affordable(model: DistortionModel, stars: usize) -> bool {
@@ -235,7 +291,13 @@ fn choose_model(
     current: &Refined,
     richest: Option<DistortionModel>,
 ) -> Option<DistortionModel> {
-    let stars = measured(field, sky, &current.matches, current.excess_sigma_px);
+    let directions = catalog_directions(field, sky, &current.matches);
+    let stars = measured(
+        field,
+        &current.matches,
+        &directions,
+        current.excess_sigma_px,
+    );
     let CameraFit {
         camera,
         icrs_to_camera,
@@ -291,7 +353,8 @@ fn next_radius_px(fit: &CameraFit, before_px: f64) -> f64 {
     agreement_radius_px(fit).clamp(before_px / 4.0, before_px)
 }
 
-/// What must be added to the stated errors so that the residuals' median is as expected, in pixels.
+/// What must be added to the stated errors so that the residuals' median is as expected, in pixels; nothing where chance
+/// explains that they are larger.
 fn excess_sigma_of(field: &StarField, matches: &[StarMatch], fit: &CameraFit) -> f64 {
     let equations = 2.0 * matches.len() as f64;
     let free = (equations - fit.parameters as f64).max(1.0) / equations.max(1.0);
@@ -303,19 +366,20 @@ fn excess_sigma_of(field: &StarField, matches: &[StarMatch], fit: &CameraFit) ->
         .map(|([x, y], m)| (x * x + y * y, field.stars[m.observed].sigma_px.powi(2)))
         .collect();
     let mut scaled = Vec::with_capacity(squares.len());
-    let mut too_small = |excess_sq: f64| {
+    let mut median_sq = |excess_sq: f64| {
         scaled.clear();
         scaled.extend(squares.iter().map(|(d, s)| d / (s + excess_sq).max(1e-6)));
-        median(&mut scaled) > expected_sq
+        median(&mut scaled)
     };
-    if !too_small(0.0) {
+    let chance = EXCESS_SIGMAS * MEDIAN_ERROR / (matches.len().max(1) as f64).sqrt();
+    if median_sq(0.0) <= expected_sq * (1.0 + chance) {
         return 0.0;
     }
     let largest_sq = squares.iter().fold(1e-6, |a: f64, s| a.max(s.0));
     let (mut low, mut high) = (0.0, largest_sq.sqrt() * 2.0);
     for _ in 0..EXCESS_BISECTIONS {
         let middle = 0.5 * (low + high);
-        if too_small(middle * middle) {
+        if median_sq(middle * middle) > expected_sq {
             low = middle;
         } else {
             high = middle;

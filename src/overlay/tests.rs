@@ -6,6 +6,7 @@ use crate::detect::DetectionFlags;
 use crate::identify::{Reason, StarMatch};
 use crate::pipeline::{Background, Measured, Timing};
 use crate::units::RAD_PER_DEG;
+use nalgebra::Matrix3;
 
 const WIDTH: usize = 900;
 const HEIGHT: usize = 700;
@@ -65,7 +66,7 @@ fn identified(up_deg: f64, mirrored: bool) -> Outcome {
     Outcome::Identified(Box::new(Identification {
         camera: CameraModel::pinhole(WIDTH as f64, HEIGHT as f64, 3000.0, mirrored),
         icrs_to_camera: Rotation::looking_at(&boresight, up_deg * RAD_PER_DEG),
-        attitude_covariance_rad2: nalgebra::Matrix3::identity() * 1e-10,
+        attitude_covariance_rad2: Matrix3::identity() * 1e-10,
         focal_length_sigma_px: 0.1,
         matches: vec![StarMatch {
             observed: 0,

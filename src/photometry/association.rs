@@ -132,6 +132,7 @@ mod tests {
     use crate::camera::CameraModel;
     use crate::coords::{Rotation, UnitVector};
     use crate::detect::{DetectionFlags, Detections};
+    use nalgebra::Matrix3;
 
     const SIDE_PX: f64 = 400.0;
 
@@ -162,7 +163,7 @@ mod tests {
         let identification = Identification {
             camera: CameraModel::pinhole(SIDE_PX, SIDE_PX, 2000.0, false),
             icrs_to_camera: Rotation::looking_at(&centre, 0.0),
-            attitude_covariance_rad2: nalgebra::Matrix3::zeros(),
+            attitude_covariance_rad2: Matrix3::zeros(),
             focal_length_sigma_px: 0.0,
             matches: Vec::new(),
             rms_px: 0.2,

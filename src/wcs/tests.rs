@@ -6,6 +6,7 @@ use crate::camera::{Distortion, DistortionModel};
 use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::pipeline::Timing;
 use crate::units::RAD_PER_DEG;
+use nalgebra::Matrix3;
 use proptest::prelude::*;
 use std::collections::HashMap;
 
@@ -104,9 +105,7 @@ fn solution(camera: CameraModel, attitude: Rotation<Icrs, Camera>) -> Solution {
         outcome: Outcome::Identified(Box::new(Identification {
             camera,
             icrs_to_camera: attitude,
-            attitude_covariance_rad2: nalgebra::Matrix3::from_diagonal(&nalgebra::Vector3::new(
-                1e-10, 4e-10, 9e-10,
-            )),
+            attitude_covariance_rad2: Matrix3::from_diagonal(&[1e-10, 4e-10, 9e-10].into()),
             focal_length_sigma_px: 0.1,
             matches: Vec::new(),
             rms_px: 0.1,

@@ -1,0 +1,280 @@
+//! Attitudes of frames of the sky, and what is stated of their errors.
+
+use crate::stars::{equivalent_area_px, sensor};
+use crate::tally::Spread;
+use nalgebra::Vector3;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use starpipe::catalog::Catalog;
+use starpipe::coords::{Rotation, UnitVector};
+use starpipe::detect::Workspace;
+use starpipe::identify::{Outcome, Sky};
+use starpipe::pipeline::{Pipeline, SolveConfig};
+use starpipe::sensitivity::{Budget, Scenario, SkyBrightness};
+use starpipe::simulate::{Pointing, Scene, Simulator, TrueStar, Truth};
+use starpipe::statistics::median;
+use std::f64::consts::{PI, TAU};
+
+/// The threshold of the detector in standard deviations, about.
+const THRESHOLD: f64 = 5.2;
+
+/// A camera with a field of so many degrees, an aperture that shows stars of `limit_vmag`, under a sky.
+struct Kind {
+    name: &'static str,
+    side_px: usize,
+    fov_deg: f64,
+    spot_sigma_px: f64,
+    limit_vmag: f64,
+    sky_mag_arcsec2: f64,
+    exposure_s: f64,
+}
+
+impl Kind {
+    fn scenario(&self) -> Scenario {
+        let mut sensor = sensor(self.side_px, self.spot_sigma_px);
+        sensor.read_noise_e = 7.0;
+        sensor.gain_e_per_adu = 2.0;
+        sensor.bits = 12;
+        sensor.full_well_e = 10_000.0;
+        let half_rad = self.fov_deg.to_radians() / 2.0;
+        sensor.focal_length_mm =
+            self.side_px as f64 / 2.0 / half_rad.tan() * sensor.pitch_x_um / 1e3;
+        let mut scenario = Scenario::new(sensor);
+        scenario.conditions.exposure_s = self.exposure_s;
+        scenario.conditions.sky = SkyBrightness::MagArcsec2(self.sky_mag_arcsec2);
+        let (mut low, mut high) = (0.1, 1e4);
+        for _ in 0..60 {
+            scenario.sensor.aperture_mm = f64::sqrt(low * high);
+            let budget = Budget::new(&scenario);
+            let faintest_e = THRESHOLD
+                * budget.background_noise_e
+                * equivalent_area_px(self.spot_sigma_px).sqrt();
+            if budget.vmag_of(faintest_e, self.exposure_s) > self.limit_vmag {
+                high = scenario.sensor.aperture_mm;
+            } else {
+                low = scenario.sensor.aperture_mm;
+            }
+        }
+        scenario
+    }
+}
+
+/// Errors of centroids fainter than this are those of stars that noise has made brighter.
+const LEAST_SNR: f64 = 10.0;
+
+/// Whether no other star has moved the light of this one.
+fn is_isolated(star: &TrueStar, truth: &Truth) -> bool {
+    const REACH_PX: f64 = 6.0;
+    const LEAST_SHARE: f64 = 0.005;
+    let disturbs = |other: &TrueStar| {
+        other.number != star.number
+            && other.position.distance_to(&star.position) < REACH_PX
+            && other.electrons > LEAST_SHARE * star.electrons
+    };
+    !truth.stars.iter().chain(&truth.beyond).any(disturbs)
+}
+
+/// What came of one frame.
+struct Trial {
+    /// Error over stated error about x, y and the boresight.
+    pulls: [f64; 3],
+    nees: f64,
+    matches: usize,
+    distorted: bool,
+    sigma_arcsec: [f64; 3],
+    centroid_pulls: Vec<[f64; 3]>,
+}
+
+fn trial(
+    pipeline: &Pipeline,
+    scenario: &Scenario,
+    workspace: &mut Workspace,
+    seed: u64,
+) -> Option<Trial> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let boresight = UnitVector::from_ra_dec(
+        random.random_range(0.0..TAU),
+        random.random_range(-1.0..1.0f64).asin(),
+    );
+    let pointing = Pointing {
+        icrs_to_camera: Rotation::looking_at(&boresight, random.random_range(-PI..PI)),
+        years_since_j2000: 0.0,
+    };
+    let stars = pipeline.catalog().stars();
+    let simulator = Simulator::new(scenario, &Scene::default(), stars).unwrap();
+    let (frame, truth) = simulator.frame(&pointing, random.random()).unwrap();
+    let solution = pipeline
+        .solve_frame(&frame, &SolveConfig::default(), workspace)
+        .unwrap();
+    let Outcome::Identified(found) = &solution.outcome else {
+        return None;
+    };
+    let error = found.icrs_to_camera.matrix() * pointing.icrs_to_camera.matrix().transpose();
+    let turn = Vector3::new(error[(2, 1)], error[(0, 2)], error[(1, 0)]);
+    let sigma_rad = found.attitude_sigma_rad();
+    let gain = scenario.sensor.gain_e_per_adu;
+    let of_star = |m: &starpipe::identify::StarMatch| {
+        let source = &solution.sources[m.observed];
+        let measured = source.measured?;
+        let star = truth.stars.iter().find(|star| star.catalog == Some(m.catalog))?;
+        let flux = source.flux?;
+        let is_measured = measured.snr >= LEAST_SNR && !measured.flags.saturated;
+        if !is_measured || !is_isolated(star, &truth) {
+            return None;
+        }
+        Some([
+            (source.position.x - star.position.x) / measured.sigma_px[0],
+            (source.position.y - star.position.y) / measured.sigma_px[1],
+            (flux - star.electrons / gain) / (flux / measured.snr),
+        ])
+    };
+    Some(Trial {
+        pulls: std::array::from_fn(|axis| turn[axis] / sigma_rad[axis]),
+        nees: turn.dot(&(found.attitude_covariance_rad2.try_inverse().unwrap() * turn)),
+        matches: found.matches.len(),
+        distorted: found.camera.distortion.is_some(),
+        sigma_arcsec: sigma_rad.map(|s| s.to_degrees() * 3600.0),
+        centroid_pulls: found.matches.iter().filter_map(of_star).collect(),
+    })
+}
+
+fn kinds() -> Vec<Kind> {
+    let common = Kind {
+        name: "12 deg, 0.8 px, V 7",
+        side_px: 1024,
+        fov_deg: 12.0,
+        spot_sigma_px: 0.8,
+        limit_vmag: 7.0,
+        sky_mag_arcsec2: 21.0,
+        exposure_s: 0.1,
+    };
+    vec![
+        Kind { ..common },
+        Kind {
+            name: "12 deg, 0.5 px",
+            spot_sigma_px: 0.5,
+            ..common
+        },
+        Kind {
+            name: "12 deg, 1.5 px",
+            spot_sigma_px: 1.5,
+            ..common
+        },
+        Kind {
+            name: "20 deg, V 6",
+            fov_deg: 20.0,
+            limit_vmag: 6.0,
+            ..common
+        },
+        Kind {
+            name: "8 deg, V 8, 1 s",
+            fov_deg: 8.0,
+            limit_vmag: 8.0,
+            exposure_s: 1.0,
+            ..common
+        },
+        Kind {
+            name: "12 deg, sky 17, 1 s",
+            sky_mag_arcsec2: 17.0,
+            exposure_s: 1.0,
+            ..common
+        },
+    ]
+}
+
+fn with_pipeline<T>(run: impl FnOnce(&Pipeline) -> T) -> T {
+    let cache = std::env::var_os("STARPIPE_CACHE_DIR").map_or_else(
+        || std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache"),
+        Into::into,
+    );
+    let (sky, _) = Sky::open(Catalog::built_in(), &cache, &|_| {});
+    run(&Pipeline::new(sky))
+}
+
+/// What is made of many frames.
+#[derive(Default)]
+struct Summary {
+    nees: Spread,
+    pulls: [Spread; 3],
+    centroids: [Spread; 3],
+    matches: Spread,
+    distorted: usize,
+    sigma_arcsec: [Vec<f64>; 3],
+}
+
+fn summary(pipeline: &Pipeline, kind: &Kind, frames: u64) -> Summary {
+    let scenario = kind.scenario();
+    let run = |workspace: &mut Workspace, seed| trial(pipeline, &scenario, workspace, seed);
+    let trials: Vec<_> = (0..frames)
+        .into_par_iter()
+        .map_init(Workspace::new, run)
+        .collect();
+    let mut summary = Summary::default();
+    for trial in trials.into_iter().flatten() {
+        summary.nees.add(trial.nees);
+        summary.matches.add(trial.matches as f64);
+        summary.distorted += usize::from(trial.distorted);
+        for axis in 0..3 {
+            summary.pulls[axis].add(trial.pulls[axis]);
+            summary.sigma_arcsec[axis].push(trial.sigma_arcsec[axis]);
+            trial
+                .centroid_pulls
+                .iter()
+                .for_each(|pulls| summary.centroids[axis].add(pulls[axis]));
+        }
+    }
+    summary
+}
+
+#[test]
+#[ignore = "a quarter of an hour of frames; prints the table"]
+fn table_of_attitudes() {
+    const FRAMES: u64 = 5000;
+    println!(
+        "frames  identified  stars  distorted  NEES ±  pulls x, y, roll ±  median sigma arcsec  pulls of centroids x, y and of flux"
+    );
+    with_pipeline(|pipeline| {
+        for kind in kinds() {
+            let mut s = summary(pipeline, &kind, FRAMES);
+            let [x, y, roll] = s.pulls.map(|pull| pull.sigma());
+            let [sx, sy, sr] = s.sigma_arcsec.each_mut().map(|all| median(all));
+            let [cx, cy, cf] = s.centroids.map(|pull| pull.sigma());
+            println!(
+                "{:<20} {FRAMES} {} {:.0} {}  {:.3} ± {:.3}  {x:.3} {y:.3} {roll:.3} ± {:.3}  {sx:.2} {sy:.2} {sr:.2}  {cx:.3} {cy:.3} {cf:.3}",
+                kind.name,
+                s.nees.count,
+                s.matches.mean(),
+                s.distorted,
+                s.nees.mean(),
+                s.nees.mean_error(),
+                s.pulls[0].sigma_error()
+            );
+        }
+    });
+}
+
+#[test]
+fn attitudes_are_as_good_as_they_say() {
+    const FRAMES: u64 = 120;
+    const NEES: f64 = 3.0;
+    const NEES_TOLERANCE: f64 = 0.1;
+    const PULL_TOLERANCE: f64 = 0.05;
+    /// The seeds are fixed: what holds now holds then.
+    const SIGMAS: f64 = 3.0;
+    with_pipeline(|pipeline| {
+        let s = summary(pipeline, &kinds()[0], FRAMES);
+        assert_eq!(s.nees.count, FRAMES as f64);
+        // NEES is distributed as χ² with three degrees of freedom, whose variance is six.
+        let tolerance = NEES_TOLERANCE + SIGMAS * (6.0 / FRAMES as f64).sqrt();
+        assert!(
+            (s.nees.mean() - NEES).abs() < tolerance,
+            "{}",
+            s.nees.mean()
+        );
+        for pull in s.pulls.iter().chain(&s.centroids) {
+            let tolerance = PULL_TOLERANCE + SIGMAS * pull.sigma_error();
+            assert!((pull.sigma() - 1.0).abs() < tolerance, "{pull:?}");
+        }
+    });
+}
