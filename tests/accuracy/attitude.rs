@@ -117,7 +117,10 @@ fn trial(
     let of_star = |m: &starpipe::identify::StarMatch| {
         let source = &solution.sources[m.observed];
         let measured = source.measured?;
-        let star = truth.stars.iter().find(|star| star.catalog == Some(m.catalog))?;
+        let star = truth
+            .stars
+            .iter()
+            .find(|star| star.catalog == Some(m.catalog))?;
         let flux = source.flux?;
         let is_measured = measured.snr >= LEAST_SNR && !measured.flags.saturated;
         if !is_measured || !is_isolated(star, &truth) {

@@ -50,7 +50,7 @@ pub struct RunFacts {
 /// What many frames say together.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// [`SCHEMA`].
+    /// Version of the fields described here.
     pub schema: u32,
     /// What was simulated.
     #[serde(flatten)]
