@@ -1,10 +1,10 @@
 //! The limiting magnitude over one parameter or several: a panel for each.
 
 use super::text::number;
-use crate::cli::plot::{Area, BLUE, FONT, Figure, ORANGE, said};
+use crate::cli::plot::{Area, BLUE, FONT, Figure, ORANGE, draw_words, said};
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::text_anchor::HPos;
 use starpipe::sensitivity::{Budget, Curve, Scenario, Spacing, Sweep};
 use std::ops::Range;
 
@@ -139,19 +139,6 @@ impl Panel {
         chart.draw_series(here).map_err(said)?;
         Ok(())
     }
-}
-
-fn draw_words<B: DrawingBackend>(
-    area: &Area<B>,
-    words: &str,
-    (size_px, side): (u32, HPos),
-    place: (i32, i32),
-) -> anyhow::Result<()> {
-    let style = (FONT, size_px)
-        .into_text_style(area)
-        .color(&BLACK)
-        .pos(Pos::new(side, VPos::Center));
-    area.draw_text(words, &style, place).map_err(said)
 }
 
 /// Panels side by side.

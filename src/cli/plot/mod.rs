@@ -6,6 +6,7 @@ use finer::Finer;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::register_font;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 use starpipe::overlay;
 use std::fmt::Display;
 use std::path::PathBuf;
@@ -101,6 +102,20 @@ fn draw<B: DrawingBackend>(figure: &impl Figure, backend: B) -> anyhow::Result<(
     area.fill(&WHITE).map_err(said)?;
     figure.draw(&area)?;
     area.present().map_err(said)
+}
+
+/// Draws words of so many pixels, with this side of their middle at `place`.
+pub(crate) fn draw_words<B: DrawingBackend>(
+    area: &Area<B>,
+    words: &str,
+    (size_px, side): (u32, HPos),
+    place: (i32, i32),
+) -> anyhow::Result<()> {
+    let style = (FONT, size_px)
+        .into_text_style(area)
+        .color(&BLACK)
+        .pos(Pos::new(side, VPos::Center));
+    area.draw_text(words, &style, place).map_err(said)
 }
 
 /// The backend's errors borrow the drawing; their words do not.

@@ -1,10 +1,10 @@
 //! A panel with dots, lines and bars over two axes, and sheets of such panels.
 
 use crate::cli::limit::number;
-use crate::cli::plot::{Area, FONT, Figure, said};
+use crate::cli::plot::{Area, FONT, Figure, draw_words, said};
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::text_anchor::HPos;
 
 const PANEL_PX: (u32, u32) = (440, 330);
 /// A panel that stands alone.
@@ -155,7 +155,7 @@ impl Panel {
     /// The title, and below it what the marks are: above the panel they hide nothing.
     fn draw_head<B: DrawingBackend>(&self, area: &Area<B>) -> anyhow::Result<()> {
         let left = (MARGIN_PX + AXIS_PX.1) as i32;
-        draw_words(area, &self.title, TITLE_PX, (left, 14))?;
+        draw_words(area, &self.title, (TITLE_PX, HPos::Left), (left, 14))?;
         let y = 38;
         let mut x = left;
         for layer in &self.layers {
@@ -175,7 +175,7 @@ impl Panel {
                 )),
             }
             .map_err(said)?;
-            draw_words(area, label, LETTERS_PX, (x + 24, y))?;
+            draw_words(area, label, (LETTERS_PX, HPos::Left), (x + 24, y))?;
             let style = (FONT, LETTERS_PX).into_text_style(area);
             let (width, _) = area.estimate_text_size(label, &style).map_err(said)?;
             x += 24 + width as i32 + 12;
@@ -252,19 +252,6 @@ impl Panel {
         }
         Ok(())
     }
-}
-
-fn draw_words<B: DrawingBackend>(
-    area: &Area<B>,
-    words: &str,
-    size_px: u32,
-    place: (i32, i32),
-) -> anyhow::Result<()> {
-    let style = (FONT, size_px)
-        .into_text_style(area)
-        .color(&BLACK)
-        .pos(Pos::new(HPos::Left, VPos::Center));
-    area.draw_text(words, &style, place).map_err(said)
 }
 
 /// Panels side by side, so many abreast.
