@@ -220,7 +220,6 @@ pub(super) fn star_model(scene: &Scene<'_>, stars: &[BrightStar], work: &mut Fit
         shot_adu: brightest.map_or(0.0, |spot| scene.noise_at(spot.x, spot.y)),
         model_error2: 0.0,
     };
-    let mut shot_sigma_adu = f64::INFINITY;
     // Each round weighs the squared residuals by the variance that the round before found.
     for _ in 0..NOISE_ROUNDS {
         let mut sums = Moments::default();
@@ -239,12 +238,7 @@ pub(super) fn star_model(scene: &Scene<'_>, stars: &[BrightStar], work: &mut Fit
             }
         }
         model = sums.solve();
-        shot_sigma_adu = sums.shot_sigma_adu();
         model.model_error2 = model.model_error2.min(MAX_MODEL_ERROR * MAX_MODEL_ERROR);
-    }
-    // A noise known from few pixels gives errors distributed as Student's t, whose variance is 1 + 2/ν; ν is 2 (s/σ)².
-    if shot_sigma_adu.is_finite() {
-        model.shot_adu += shot_sigma_adu.powi(2) / model.shot_adu.max(shot_sigma_adu);
     }
     StarModel {
         spot_px: weighted_size(&usable).unwrap_or(scene.spot_px),
@@ -312,12 +306,6 @@ impl Moments {
             self.right[0] += weight * light * above_noise;
             self.right[1] += weight * m2 * above_noise;
         });
-    }
-
-    /// Standard error of the shot noise per ADU, no error of the spot model assumed. The matrix is twice the information: the
-    /// square of a Gaussian has twice its squared variance.
-    fn shot_sigma_adu(&self) -> f64 {
-        (2.0 / self.matrix[0]).sqrt()
     }
 
     /// The non-negative solution, without an error of the spot model that chance explains.

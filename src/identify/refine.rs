@@ -354,16 +354,20 @@ fn next_radius_px(fit: &CameraFit, before_px: f64) -> f64 {
 }
 
 /// What must be added to the stated errors so that the residuals' median is as expected, in pixels; nothing where chance
-/// explains that they are larger.
+/// explains that they are larger. The better measured half of the stars tells: what is to be added shows in them, and the faintest
+/// were found where noise made them bright, and moved them.
 fn excess_sigma_of(field: &StarField, matches: &[StarMatch], fit: &CameraFit) -> f64 {
     let equations = 2.0 * matches.len() as f64;
     let free = (equations - fit.parameters as f64).max(1.0) / equations.max(1.0);
     let expected_sq = RAYLEIGH_MEDIAN.powi(2) * free;
+    let stated_sq = |m: &StarMatch| field.stars[m.observed].sigma_px.powi(2);
+    let worst_sq = median(&mut matches.iter().map(stated_sq).collect::<Vec<f64>>());
     let squares: Vec<(f64, f64)> = fit
         .residuals_px
         .iter()
         .zip(matches)
-        .map(|([x, y], m)| (x * x + y * y, field.stars[m.observed].sigma_px.powi(2)))
+        .map(|([x, y], m)| (x * x + y * y, stated_sq(m)))
+        .filter(|(_, stated_sq)| *stated_sq <= worst_sq)
         .collect();
     let mut scaled = Vec::with_capacity(squares.len());
     let mut median_sq = |excess_sq: f64| {
@@ -371,7 +375,7 @@ fn excess_sigma_of(field: &StarField, matches: &[StarMatch], fit: &CameraFit) ->
         scaled.extend(squares.iter().map(|(d, s)| d / (s + excess_sq).max(1e-6)));
         median(&mut scaled)
     };
-    let chance = EXCESS_SIGMAS * MEDIAN_ERROR / (matches.len().max(1) as f64).sqrt();
+    let chance = EXCESS_SIGMAS * MEDIAN_ERROR / (squares.len().max(1) as f64).sqrt();
     if median_sq(0.0) <= expected_sq * (1.0 + chance) {
         return 0.0;
     }
