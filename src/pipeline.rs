@@ -323,7 +323,14 @@ impl<'a> Pipeline<'a> {
         workspace: &mut Workspace,
     ) -> Result<Solution, DetectError> {
         let start = Instant::now();
-        let detections = detect::detect(frame, &config.detect, workspace)?;
+        let description = config.description.as_ref();
+        let detect_config = DetectConfig {
+            saturation_adu: description
+                .and_then(|stated| described::saturation_adu(stated, frame))
+                .or(config.detect.saturation_adu),
+            ..config.detect.clone()
+        };
+        let detections = detect::detect(frame, &detect_config, workspace)?;
         let detect_ms = milliseconds_since(start);
         let knowledge = config
             .knowledge
@@ -333,7 +340,6 @@ impl<'a> Pipeline<'a> {
         let (field, kept) = star_field(frame, &detections, knowledge.years_since_j2000());
         let identify_start = Instant::now();
         let mut notes = frame.metadata.ignored.clone();
-        let description = config.description.as_ref();
         let described = description.map(|stated| ScaleHint::of_camera(&stated.sensor));
         let in_header = header_scale(&frame.metadata).filter(|_| described.is_none());
         let outcome = match (knowledge.scale, described.or(in_header)) {

@@ -140,6 +140,8 @@ pub struct DetectConfig {
     pub cell_px: usize,
     /// At most so many detections, the strongest.
     pub max_detections: usize,
+    /// The level from which on a pixel is saturated, in ADU, where that is below what the frame's format says.
+    pub saturation_adu: Option<f64>,
 }
 
 impl DetectConfig {
@@ -160,6 +162,7 @@ impl Default for DetectConfig {
             centroid: CentroidMethod::default(),
             cell_px: Self::DEFAULT_CELL_PX,
             max_detections: Self::DEFAULT_MAX_DETECTIONS,
+            saturation_adu: None,
         }
     }
 }
@@ -280,7 +283,13 @@ pub fn detect(
             is_normalised: false,
         },
     );
-    let saturation_adu = frame.saturation_adu.unwrap_or(f32::INFINITY);
+    let stated_adu = config
+        .saturation_adu
+        .map_or(f32::INFINITY, |adu| adu as f32);
+    let saturation_adu = frame
+        .saturation_adu
+        .unwrap_or(f32::INFINITY)
+        .min(stated_adu);
     let calibration = search_with_own_spot(&view, saturation_adu, config, workspace);
     let mut fits = std::mem::take(&mut workspace.fits);
     let scene = scene_of(&view, saturation_adu, &calibration, workspace);

@@ -3,6 +3,7 @@
 use super::{Background, Knowledge};
 use crate::comparison::{self, Comparison, Description, Seen};
 use crate::detect::DetectConfig;
+use crate::frame::Frame;
 use crate::identify::{Identification, Outcome, Sky, View};
 use crate::observer::Observation;
 use crate::photometry::FramePhotometry;
@@ -20,6 +21,15 @@ pub(super) struct Found<'a> {
     pub observation: Option<&'a Observation>,
     pub header_zenith_distance_deg: Option<f64>,
     pub sky: &'a Sky<'a>,
+}
+
+/// The level from which on the camera's pixels are full, where the frame's levels can be the camera's: files may hold those of
+/// few bits multiplied.
+pub(super) fn saturation_adu(description: &Description, frame: &Frame) -> Option<f64> {
+    let sensor = &description.sensor;
+    let full_scale_adu = sensor.full_scale_adu() as f32;
+    let is_beyond = |pixel: &f32| *pixel > full_scale_adu;
+    (!frame.pixels.iter().any(is_beyond)).then(|| sensor.saturation_adu())
 }
 
 /// What to say of a frame beside its camera: contradictions, or why it was not held against it.
@@ -100,5 +110,26 @@ impl Found<'_> {
             .iter()
             .filter(|star| found.camera.contains(&star.pixel));
         inside.map(|star| f64::from(star.v_mag)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sensor::Preset;
+
+    #[test]
+    fn a_cameras_full_pixel_counts_where_the_levels_are_its_own() {
+        let description = Description {
+            sensor: Preset::Experiment1.sensor(),
+            zenith_distance_deg: None,
+            extinction: None,
+        };
+        let frame = |highest: f32| Frame::new(3, 3, vec![highest; 9]).unwrap();
+        let full_adu = description.sensor.saturation_adu();
+        assert!(full_adu < 4095.0);
+        assert_eq!(saturation_adu(&description, &frame(4095.0)), Some(full_adu));
+        // Twelve bits at the upper end of sixteen.
+        assert_eq!(saturation_adu(&description, &frame(4096.0)), None);
     }
 }

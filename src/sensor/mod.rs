@@ -103,6 +103,15 @@ impl Sensor {
         self.gain_e_per_adu / 12f64.sqrt()
     }
 
+    /// The grey level from which on a pixel is taken to be saturated: full, or at the end of the scale.
+    pub fn saturation_adu(&self) -> f64 {
+        // The level of a full pixel varies with the noise of reading.
+        const FULL_WELL_SIGMAS: f64 = 4.0;
+        let surely_full_e = self.full_well_e - FULL_WELL_SIGMAS * self.read_noise_e;
+        let full_adu = self.bias_adu + surely_full_e / self.gain_e_per_adu;
+        full_adu.floor().min(self.full_scale_adu())
+    }
+
     /// The largest grey level.
     pub fn full_scale_adu(&self) -> f64 {
         2f64.powi(self.bits as i32) - 1.0

@@ -333,7 +333,7 @@ impl<'a> Simulator<'a> {
         let readout = Readout::of(sensor);
         let pixels = readout.grey_levels(canvas.pixels_mut(), &self.pattern, &mut random);
         let frame = Frame::new(sensor.width_px, sensor.height_px, pixels)?;
-        Ok(frame.with_levels(1.0, Some(readout.saturation_adu() as f32)))
+        Ok(frame.with_levels(1.0, Some(sensor.saturation_adu() as f32)))
     }
 
     /// From light to charge: the pixels' response, and their dark current.

@@ -6,10 +6,6 @@ use crate::sensor::Sensor;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// The level of a full pixel varies with the noise of reading: so many standard deviations below its mean a pixel counts as
-/// saturated.
-const FULL_WELL_SIGMAS: f64 = 4.0;
-
 /// Makes whole electrons of expected ones. `even` is the distribution of the mean that most pixels have.
 pub(super) fn collect(electrons: &mut [f64], even: Option<&PoissonTable>, random: &mut ChaCha8Rng) {
     for pixel in electrons {
@@ -43,13 +39,6 @@ impl Readout {
             full_scale_adu: sensor.full_scale_adu(),
             blooming: sensor.imperfections.blooming,
         }
-    }
-
-    /// The grey level from which on a pixel is taken to be saturated.
-    pub(super) fn saturation_adu(&self) -> f64 {
-        let surely_full_e = self.full_well_e - FULL_WELL_SIGMAS * self.read_noise_e;
-        let full_adu = self.bias_adu + surely_full_e / self.gain_e_per_adu;
-        full_adu.floor().min(self.full_scale_adu)
     }
 
     /// The grey levels of pixels that have collected so many electrons.
@@ -122,7 +111,7 @@ mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let mut collected = electrons.to_vec();
         let levels = readout.grey_levels(&mut collected, &Pattern::default(), &mut random);
-        (readout.saturation_adu() as f32, levels)
+        (sensor.saturation_adu() as f32, levels)
     }
 
     #[test]
