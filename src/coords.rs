@@ -4,6 +4,8 @@
 //! the north pole; [`Camera`] has x along image x (right), y along image y (down), z out along the
 //! boresight. Angles are radians. Pixels: x right, y down, the **centre** of the top-left pixel is (0, 0).
 //!
+//! The trigonometry is that of [`libm`], which is the same on every machine: simulated frames and their headers depend on it.
+//!
 //! A direction carries its system in its type, so that mixing two of them does not compile:
 //!
 //! ```compile_fail
@@ -98,30 +100,30 @@ impl<S> UnitVector<S> {
     /// The angle to `other` in radians, accurate for small and for large angles.
     pub fn angle_to(&self, other: &Self) -> f64 {
         let sine = self.vector.cross(&other.vector).norm();
-        sine.atan2(self.dot(other))
+        libm::atan2(sine, self.dot(other))
     }
 }
 
 impl UnitVector<Icrs> {
     /// The direction at right ascension `ra_rad` and declination `dec_rad`.
     pub fn from_ra_dec(ra_rad: f64, dec_rad: f64) -> Self {
-        let (sin_ra, cos_ra) = ra_rad.sin_cos();
-        let (sin_dec, cos_dec) = dec_rad.sin_cos();
+        let (sin_ra, cos_ra) = libm::sincos(ra_rad);
+        let (sin_dec, cos_dec) = libm::sincos(dec_rad);
         Self::from_unit(Vector3::new(cos_dec * cos_ra, cos_dec * sin_ra, sin_dec))
     }
 
     /// Right ascension in [0, 2π) and declination, in radians.
     pub fn to_ra_dec(&self) -> (f64, f64) {
         let v = &self.vector;
-        let ra_rad = v.y.atan2(v.x).rem_euclid(std::f64::consts::TAU);
-        (ra_rad, v.z.atan2(v.x.hypot(v.y)))
+        let ra_rad = libm::atan2(v.y, v.x).rem_euclid(std::f64::consts::TAU);
+        (ra_rad, libm::atan2(v.z, libm::hypot(v.x, v.y)))
     }
 
     /// The unit tangents towards east and north at this direction (towards RA 90° at the poles).
     pub fn east_north(&self) -> (Vector3<f64>, Vector3<f64>) {
         let (ra_rad, dec_rad) = self.to_ra_dec();
-        let (sin_ra, cos_ra) = ra_rad.sin_cos();
-        let (sin_dec, cos_dec) = dec_rad.sin_cos();
+        let (sin_ra, cos_ra) = libm::sincos(ra_rad);
+        let (sin_dec, cos_dec) = libm::sincos(dec_rad);
         (
             Vector3::new(-sin_ra, cos_ra, 0.0),
             Vector3::new(-sin_dec * cos_ra, -sin_dec * sin_ra, cos_dec),
@@ -223,7 +225,7 @@ impl Rotation<Icrs, Camera> {
     /// angle `up_pa_rad`, from north through east.
     pub fn looking_at(boresight: &UnitVector<Icrs>, up_pa_rad: f64) -> Self {
         let (east, north) = boresight.east_north();
-        let (sin_pa, cos_pa) = up_pa_rad.sin_cos();
+        let (sin_pa, cos_pa) = libm::sincos(up_pa_rad);
         let down = -(north * cos_pa + east * sin_pa);
         let right = down.cross(boresight.as_vector());
         Self::from_matrix(Matrix3::from_rows(&[
@@ -238,7 +240,7 @@ impl Rotation<Icrs, Camera> {
         let boresight = self.inverse().apply(&UnitVector::BORESIGHT);
         let (east, north) = boresight.east_north();
         let up = -self.matrix().row(1).transpose();
-        (boresight, up.dot(&east).atan2(up.dot(&north)))
+        (boresight, libm::atan2(up.dot(&east), up.dot(&north)))
     }
 }
 

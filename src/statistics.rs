@@ -18,7 +18,7 @@ pub fn normal_cdf(z: f64) -> f64 {
 
 /// The density of the normal distribution at `z` standard deviations.
 pub fn normal_density(z: f64) -> f64 {
-    (-0.5 * z * z).exp() / (2.0 * PI).sqrt()
+    libm::exp(-0.5 * z * z) / (2.0 * PI).sqrt()
 }
 
 /// The median of `values`, the upper of the two in the middle where their number is even; 0 where there are none. Changes their order.

@@ -49,7 +49,7 @@ impl CameraModel {
 
     /// Half the diagonal of the frame, in pixels.
     pub fn radius_px(&self) -> f64 {
-        self.width_px.hypot(self.height_px) / 2.0
+        libm::hypot(self.width_px, self.height_px) / 2.0
     }
 
     /// The pixel's offset from the centre along the camera's x and y axes, as observed, in pixels.

@@ -145,7 +145,7 @@ pub(crate) struct SimulateArgs {
     #[arg(long, value_name = "DEG", value_parser = values::declination, allow_hyphen_values = true, requires = "ra")]
     pub(crate) dec: Option<f64>,
     /// Position angle of the image's up direction there, from north through east, in degrees
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = values::finite, allow_hyphen_values = true)]
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = values::finite, allow_hyphen_values = true, requires = "ra")]
     pub(crate) roll: f64,
     /// Point anywhere, in each frame somewhere else
     #[arg(long)]

@@ -3,7 +3,9 @@
 use super::Fault;
 use super::args::{ReadingArg, preset};
 use super::limit::{ParameterArgs, number, scenario_of};
+use anyhow::anyhow;
 use clap::{Arg, ArgAction, ArgGroup, ArgMatches, Args, Command, Error, FromArgMatches};
+use starpipe::sensitivity::ScenarioError;
 use starpipe::sensor::{Preset, SpotForm};
 use starpipe::simulate::{Parameter, Scene, Setup};
 use std::path::PathBuf;
@@ -37,7 +39,20 @@ impl SetupArgs {
             scene: Scene::default(),
         };
         self.scene.apply(&mut setup);
+        setup.check().map_err(|error| self.at_fault(error))?;
         Ok(setup)
+    }
+}
+
+impl SetupArgs {
+    /// What a file says is a fault of the file, where no option was given besides.
+    fn at_fault(&self, error: ScenarioError) -> Fault {
+        match &self.camera {
+            Some(path) if self.parameters.is_empty() && self.scene.is_empty() => {
+                anyhow!(error).context(path.display().to_string()).into()
+            }
+            _ => Fault::Usage(error.to_string()),
+        }
     }
 }
 
@@ -50,6 +65,10 @@ pub(crate) struct SceneArgs {
 }
 
 impl SceneArgs {
+    fn is_empty(&self) -> bool {
+        self.numbers.is_empty()
+    }
+
     fn apply(&self, setup: &mut Setup) {
         for (parameter, value) in &self.numbers {
             parameter.set(setup, *value);

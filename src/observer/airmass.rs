@@ -12,13 +12,14 @@ use std::f64::consts::FRAC_PI_2;
 /// within 0.3 % above an altitude of 5°.
 pub fn airmass_kasten_young(apparent_zenith_distance_rad: f64) -> f64 {
     let zenith_distance_rad = apparent_zenith_distance_rad.clamp(0.0, FRAC_PI_2);
-    let altitude_term = (96.079_95 - zenith_distance_rad * DEG_PER_RAD).powf(-1.6364);
-    1.0 / (zenith_distance_rad.cos() + 0.505_72 * altitude_term)
+    let altitude_deg = 96.079_95 - zenith_distance_rad * DEG_PER_RAD;
+    let altitude_term = libm::pow(altitude_deg, -1.6364);
+    1.0 / (libm::cos(zenith_distance_rad) + 0.505_72 * altitude_term)
 }
 
 /// The airmass sec z of plane layers: within 1 % to 70° from the zenith, and infinite towards the horizon.
 pub fn airmass_plane_parallel(zenith_distance_rad: f64) -> f64 {
-    1.0 / zenith_distance_rad.cos()
+    1.0 / libm::cos(zenith_distance_rad)
 }
 
 /// The airmass for light scattered in the air: 1 at the zenith, 5 at the horizon.
@@ -26,7 +27,7 @@ pub fn airmass_plane_parallel(zenith_distance_rad: f64) -> f64 {
 /// # Reference
 /// Krisciunas & Schaefer 1991, PASP 103, 1033, eq. (3).
 pub fn airmass_krisciunas_schaefer(zenith_distance_rad: f64) -> f64 {
-    let sine = zenith_distance_rad.sin();
+    let sine = libm::sin(zenith_distance_rad);
     (1.0 - 0.96 * sine * sine).sqrt().recip()
 }
 

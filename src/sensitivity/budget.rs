@@ -145,7 +145,7 @@ impl Budget {
             sky_mag: sky_mag(conditions),
             limit_vmag,
             star_illuminance_lx,
-            star_illuminance_ground_lx: star_illuminance_lx * at_555.powf(light.airmass),
+            star_illuminance_ground_lx: star_illuminance_lx * libm::pow(at_555, light.airmass),
             star_photons_s_m2: light.star_photons_ground_s_m2 / ratio,
             star_e,
             background_e,
@@ -194,8 +194,8 @@ impl Budget {
     /// Electrons on all pixels of a star of this V magnitude during an exposure.
     pub fn electrons_of(&self, v_mag: f64, exposure_s: f64) -> f64 {
         let ratio = match self.reading {
-            Reading::Paper => PAPER_MAG_RATIO.powf(v_mag),
-            Reading::Physical => 10f64.powf(0.4 * v_mag),
+            Reading::Paper => libm::pow(PAPER_MAG_RATIO, v_mag),
+            Reading::Physical => libm::pow(10.0, 0.4 * v_mag),
         };
         self.mag_0_e_s * exposure_s / ratio
     }
@@ -204,8 +204,8 @@ impl Budget {
 /// The magnitude of a star whose light is a `ratio`-th of that of magnitude 0.
 fn magnitude(reading: Reading, ratio: f64) -> f64 {
     match reading {
-        Reading::Paper => ratio.log10() / PAPER_MAG_RATIO.log10(),
-        Reading::Physical => 2.5 * ratio.log10(),
+        Reading::Paper => libm::log10(ratio) / libm::log10(PAPER_MAG_RATIO),
+        Reading::Physical => 2.5 * libm::log10(ratio),
     }
 }
 
@@ -284,11 +284,12 @@ fn paper_bands(scenario: &Scenario, airmass: f64) -> Vec<Band> {
     let (sensor, conditions) = (&scenario.sensor, &scenario.conditions);
     let table = light::luminous_efficiency();
     let sum: f64 = table.iter().map(|(_, efficiency)| efficiency).sum();
-    let sky_over_star = sensor.pixel_solid_angle_sr() * PAPER_MAG_RATIO.powf(-sky_mag(conditions));
+    let sky_over_star =
+        sensor.pixel_solid_angle_sr() * libm::pow(PAPER_MAG_RATIO, -sky_mag(conditions));
     let band = |(wavelength_nm, efficiency): (f64, f64)| {
         let star_photons_s_m2 = PAPER_PHOTONS_OF_MAG_0 * efficiency / sum;
         let zenith = conditions.extinction.zenith_transmission(wavelength_nm);
-        let atmosphere_transmission = zenith.powf(airmass);
+        let atmosphere_transmission = libm::pow(zenith, airmass);
         Band {
             wavelength_nm,
             star_photons_s_m2,
@@ -311,7 +312,7 @@ fn physical_bands(scenario: &Scenario, airmass: f64) -> Vec<Band> {
     let count = (width_nm / BAND_NM).ceil().max(1.0);
     let step_nm = width_nm / count;
     let pixel_arcsec2 = sensor.pixel_solid_angle_sr() * ARCSEC_PER_RAD * ARCSEC_PER_RAD;
-    let sky_over_star = pixel_arcsec2 * 10f64.powf(-0.4 * conditions.sky.mag_arcsec2());
+    let sky_over_star = pixel_arcsec2 * libm::pow(10.0, -0.4 * conditions.sky.mag_arcsec2());
     let band = |i: usize| {
         let wavelength_nm = sensor.band_from_nm + (i as f64 + 0.5) * step_nm;
         let photons =
@@ -321,7 +322,7 @@ fn physical_bands(scenario: &Scenario, airmass: f64) -> Vec<Band> {
             wavelength_nm,
             star_photons_s_m2: photons(conditions.star_temperature_k),
             sky_photons_s_m2: photons(SKY_TEMPERATURE_K) * sky_over_star,
-            atmosphere_transmission: zenith.powf(airmass),
+            atmosphere_transmission: libm::pow(zenith, airmass),
             lens_transmission: sensor.lens_transmission.at(wavelength_nm),
             quantum_efficiency: sensor.quantum_efficiency.at(wavelength_nm),
         }

@@ -68,15 +68,15 @@ impl Extinction {
     #[doc(alias = "tau_lambda")]
     pub fn zenith_transmission(self, wavelength_nm: f64) -> f64 {
         match self {
-            Self::Law(factor) => (-factor * law_optical_depth(wavelength_nm)).exp(),
-            Self::MagPerAirmass(mag) => 10f64.powf(-0.4 * mag),
+            Self::Law(factor) => libm::exp(-factor * law_optical_depth(wavelength_nm)),
+            Self::MagPerAirmass(mag) => libm::pow(10.0, -0.4 * mag),
         }
     }
 
     /// The paper's law with its optical depth multiplied so that this part of the light of 555 nm comes
     /// through one airmass.
     pub fn law_through(zenith_transmission: f64) -> Self {
-        Self::Law(-zenith_transmission.ln() / law_optical_depth(REFERENCE_NM))
+        Self::Law(-libm::log(zenith_transmission) / law_optical_depth(REFERENCE_NM))
     }
 }
 

@@ -1,4 +1,7 @@
 //! Photons and lux of a star and of the sky.
+//!
+//! The functions of the mathematical library are those of [`libm`], here and wherever simulated frames depend on them: the same on
+//! every machine.
 
 use crate::sensor::Response;
 
@@ -25,12 +28,12 @@ pub(super) const SKY_TEMPERATURE_K: f64 = 5800.0;
 
 /// V magnitudes in a square arcsecond of a luminance in cd/m².
 pub(super) fn mag_arcsec2(luminance_cd_m2: f64) -> f64 {
-    -2.5 * (luminance_cd_m2 / LUMINANCE_OF_MAG_0_CD_M2).log10()
+    -2.5 * libm::log10(luminance_cd_m2 / LUMINANCE_OF_MAG_0_CD_M2)
 }
 
 /// Luminance in cd/m² of a sky of so many V magnitudes in a square arcsecond.
 pub(super) fn luminance_cd_m2(mag_arcsec2: f64) -> f64 {
-    LUMINANCE_OF_MAG_0_CD_M2 * 10f64.powf(-0.4 * mag_arcsec2)
+    LUMINANCE_OF_MAG_0_CD_M2 * libm::pow(10.0, -0.4 * mag_arcsec2)
 }
 
 /// Photons per second, m² and nm at a wavelength in nm, of a black body of V = 0 above the atmosphere.
@@ -39,7 +42,7 @@ pub(super) fn photons_of_mag_0(wavelength_nm: f64, temperature_k: f64) -> f64 {
     const SECOND_RADIATION_CONSTANT: f64 = 1.438_776_877e7;
     let photons = |nm: f64| {
         let exponent = SECOND_RADIATION_CONSTANT / (nm * temperature_k);
-        nm.powi(-4) / exponent.exp_m1()
+        nm.powi(-4) / libm::expm1(exponent)
     };
     PHOTONS_OF_MAG_0 * photons(wavelength_nm) / photons(FLUX_NM)
 }

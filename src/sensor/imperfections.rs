@@ -181,7 +181,7 @@ pub const IMPERFECTION_KEYS: &[Key<Sensor>] = &[
     ),
     key!(
         depth_um,
-        Limits::Positive,
+        Limits::FromTo(0.1, 1000.0),
         "depth in which charge is collected, in µm: for cosmic rays"
     ),
     key!(

@@ -120,7 +120,7 @@ pub struct Simulator<'a> {
 }
 
 impl<'a> Simulator<'a> {
-    /// A simulator of `scenario`, which [`Scenario::check`] has found sound, with the catalogue's `stars`.
+    /// A simulator of `scenario` and `scene`, which [`Setup::check`] has found sound, with the catalogue's `stars`.
     ///
     /// All stars are drawn, however faint: the catalogue should go deeper than the camera.
     ///
@@ -278,7 +278,7 @@ impl<'a> Simulator<'a> {
         }
         let trails = strays::trails(scene, &self.camera, exposure_s, &mut random);
         for trail in &trails {
-            self.draw_trail(trail, &mut canvas, &mut spot);
+            self.draw_trail(trail, &sky, &mut canvas, &mut spot);
         }
         let cosmic_rays = strays::cosmic_rays(scene, sensor, &self.camera, exposure_s, &mut random);
         let frame = self.read_out(canvas, &cosmic_rays, seed)?;
@@ -296,7 +296,7 @@ impl<'a> Simulator<'a> {
         Ok((frame, truth))
     }
 
-    fn draw_trail(&self, trail: &Trail, canvas: &mut Canvas, spot: &mut Spot) {
+    fn draw_trail(&self, trail: &Trail, sky: &Sky, canvas: &mut Canvas, spot: &mut Spot) {
         /// Spots so close, in standard deviations, are one even trail.
         const STEP_SIGMAS: f64 = 0.25;
         let electrons = self.light.electrons(self.scene.trail_vmag, None);
@@ -305,7 +305,8 @@ impl<'a> Simulator<'a> {
             .max(1.0);
         for step in 0..steps as usize {
             let place = trail.at((step as f64 + 0.5) / steps);
-            spot.add(canvas, &place, electrons / steps);
+            let part_e = sky.transmission(&place) * electrons / steps;
+            spot.add(canvas, &place, part_e);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use crate::camera::CameraModel;
 use crate::coords::{PixelPoint, UnitVector};
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::Vector3;
 
 /// A star's light is put down at points of its way, six in each part of it that is no longer than so many standard deviations of
 /// the spot: to 10⁻⁹ of its light.
@@ -20,8 +20,9 @@ const LEAST_SIGMAS: f64 = 1e-3;
 #[derive(Debug, Clone)]
 pub(super) struct Motion<'a> {
     camera: &'a CameraModel,
-    /// The camera's turn about its own axes during the exposure, in radians.
-    turn_rad: Vector3<f64>,
+    /// About which of its own axes the camera turns, and by how much during the exposure, in radians.
+    axis: Vector3<f64>,
+    angle_rad: f64,
     /// How far all stars move along the rows besides, in pixels.
     along_x_px: f64,
 }
@@ -30,7 +31,8 @@ impl<'a> Motion<'a> {
     pub(super) fn new(camera: &'a CameraModel, turn_rad: Vector3<f64>, along_x_px: f64) -> Self {
         Self {
             camera,
-            turn_rad,
+            axis: turn_rad.try_normalize(0.0).unwrap_or_else(Vector3::z),
+            angle_rad: turn_rad.norm(),
             along_x_px,
         }
     }
@@ -81,7 +83,7 @@ impl<'a> Motion<'a> {
 
     /// The length of the way through `middle`, in pixels, by that of two chords.
     fn length_px(&self, middle: &PixelPoint) -> f64 {
-        if self.turn_rad == Vector3::zeros() {
+        if self.angle_rad == 0.0 {
             return self.along_x_px.abs();
         }
         let half = |time| {
@@ -94,14 +96,20 @@ impl<'a> Motion<'a> {
     /// Where the star is at `time`, from −½ to ½ of the exposure.
     fn at(&self, middle: &PixelPoint, time: f64) -> Option<PixelPoint> {
         let mut place = *middle;
-        if self.turn_rad != Vector3::zeros() {
-            // The camera turns one way, the stars the other.
-            let turn = Rotation3::from_scaled_axis(-time * self.turn_rad);
-            let direction = turn * self.camera.direction_of(middle).as_vector();
+        if self.angle_rad != 0.0 {
+            let direction = self.turned(self.camera.direction_of(middle).as_vector(), time);
             place = self.camera.pixel_of(&UnitVector::from_unit(direction))?;
         }
         place.x += time * self.along_x_px;
         Some(place)
+    }
+
+    /// The direction in the camera at `time` of what is in `direction` in the middle: by Rodrigues' formula.
+    fn turned(&self, direction: &Vector3<f64>, time: f64) -> Vector3<f64> {
+        // The camera turns one way, the stars the other.
+        let (sin, cos) = libm::sincos(-time * self.angle_rad);
+        let along_axis = self.axis * (self.axis.dot(direction) * (1.0 - cos));
+        direction * cos + self.axis.cross(direction) * sin + along_axis
     }
 }
 

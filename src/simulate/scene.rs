@@ -109,13 +109,20 @@ impl Scene {
             .to_radians()
     }
 
+    /// The fastest that the camera may turn in any frame, in degrees a second.
+    pub(super) fn largest_rate_deg_s(&self) -> f64 {
+        let steady = Vector3::new(self.rate_x_deg_s, self.rate_y_deg_s, self.rate_z_deg_s);
+        let swing_deg_s = std::f64::consts::TAU * self.swing_deg / self.swing_period_s;
+        steady.norm() + self.tumble_deg_s.abs() + swing_deg_s
+    }
+
     /// The camera's angular velocity about its own axes in one frame, in radians a second.
     pub(super) fn angular_rate_rad_s(&self, random: &mut ChaCha8Rng) -> Vector3<f64> {
         let steady = Vector3::new(self.rate_x_deg_s, self.rate_y_deg_s, self.rate_z_deg_s);
         let axis = Vector3::from(UnitSphere.sample(random));
         let phase = random.random_range(0.0..std::f64::consts::TAU);
         let swing_deg_s =
-            std::f64::consts::TAU * self.swing_deg / self.swing_period_s * phase.cos();
+            std::f64::consts::TAU * self.swing_deg / self.swing_period_s * libm::cos(phase);
         let rate_deg_s = steady + self.tumble_deg_s * axis + swing_deg_s * Vector3::y();
         rate_deg_s.map(f64::to_radians)
     }

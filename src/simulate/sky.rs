@@ -10,8 +10,10 @@ use nalgebra::Vector3;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Moonlight and clouds are reckoned at points so many pixels apart; between them they are interpolated.
+/// Moonlight is reckoned at points so many pixels apart, clouds at points so many times nearer than their size, but no farther;
+/// between them both are interpolated.
 const GRID_PX: usize = 16;
+const GRIDS_IN_A_CLOUD: f64 = 32.0;
 /// Waves of which clouds are made up.
 const WAVES: usize = 16;
 
@@ -23,7 +25,6 @@ pub(super) struct Sky<'a> {
     slope: [f64; 2],
     clouds: Option<Clouds>,
     moonlight: Option<Moonlight>,
-    cloud_light: f64,
 }
 
 impl<'a> Sky<'a> {
@@ -45,8 +46,7 @@ impl<'a> Sky<'a> {
             vignetting: scenario.sensor.imperfections.vignetting,
             slope: [steepness * sin, -steepness * cos],
             clouds: (scene.cloud_mag > 0.0 || scene.cloud_light > 0.0).then_some(clouds),
-            moonlight: Moonlight::new(scenario, scene),
-            cloud_light: scene.cloud_light,
+            moonlight: Moonlight::new(scenario, scene, camera),
         }
     }
 
@@ -65,30 +65,29 @@ impl<'a> Sky<'a> {
         if is_even && self.clouds.is_none() && self.moonlight.is_none() {
             return canvas.pixels_mut().fill(sky_e);
         }
-        let grid = Grid::of(canvas, |place| self.slowly_varying(place));
+        let moon = self
+            .moonlight
+            .as_ref()
+            .map(|moon| Grid::of(canvas, GRID_PX, |place| moon.at(self.camera, place)));
+        let clouds = self.clouds.as_ref().filter(|clouds| clouds.light > 0.0);
+        let clouds = clouds.map(|clouds| {
+            let grid = Grid::of(canvas, clouds.grid_px(), |place| clouds.height(place));
+            (clouds.light, grid)
+        });
         let centre = self.camera.centre();
         for (y, row) in canvas.rows_mut() {
             let gradient_y = 1.0 + self.slope[1] * (y as f64 - centre.y);
             for (x, pixel) in row.iter_mut().enumerate() {
                 let place = PixelPoint::new(x as f64, y as f64);
                 let gradient = gradient_y + self.slope[0] * (place.x - centre.x);
-                let sky = gradient.max(0.0) * grid.at(x, y);
+                let moon = moon.as_ref().map_or(0.0, |grid| grid.at(x, y));
+                let cloud = clouds.as_ref().map_or(0.0, |(light, grid)| {
+                    light * Clouds::thickness_of(grid.at(x, y))
+                });
+                let sky = gradient.max(0.0) * (1.0 + moon + cloud);
                 *pixel = sky_e * sky * self.lens(&place);
             }
         }
-    }
-
-    /// Brightness without gradient and lens.
-    fn slowly_varying(&self, place: &PixelPoint) -> f64 {
-        let moon = self
-            .moonlight
-            .as_ref()
-            .map_or(0.0, |moon| moon.at(self.camera, place));
-        let cloud = self
-            .clouds
-            .as_ref()
-            .map_or(0.0, |clouds| clouds.thickness(place));
-        1.0 + moon + self.cloud_light * cloud
     }
 
     /// What the lens lets through, relative to the centre.
@@ -101,26 +100,29 @@ impl<'a> Sky<'a> {
 
 /// Values at points of the frame, and between them.
 struct Grid {
+    step_px: usize,
     columns: usize,
     values: Vec<f64>,
 }
 
 impl Grid {
-    fn of(canvas: &Canvas, value: impl Fn(&PixelPoint) -> f64) -> Self {
-        let [columns, rows] = [canvas.width(), canvas.height()].map(|side| side / GRID_PX + 2);
+    fn of(canvas: &Canvas, step_px: usize, value: impl Fn(&PixelPoint) -> f64) -> Self {
+        let [columns, rows] = [canvas.width(), canvas.height()].map(|side| side / step_px + 2);
         let places = (0..columns * rows).map(|i| {
-            let at = |step: usize| (step * GRID_PX) as f64;
+            let at = |step: usize| (step * step_px) as f64;
             PixelPoint::new(at(i % columns), at(i / columns))
         });
         Self {
+            step_px,
             columns,
             values: places.map(|place| value(&place)).collect(),
         }
     }
 
     fn at(&self, x: usize, y: usize) -> f64 {
-        let part = |i: usize| (i % GRID_PX) as f64 / GRID_PX as f64;
-        let first = y / GRID_PX * self.columns + x / GRID_PX;
+        let step = self.step_px;
+        let part = |i: usize| (i % step) as f64 / step as f64;
+        let first = y / step * self.columns + x / step;
         let along = |at: usize| self.values[at] + part(x) * (self.values[at + 1] - self.values[at]);
         let (above, below) = (along(first), along(first + self.columns));
         above + part(y) * (below - above)
@@ -130,6 +132,9 @@ impl Grid {
 /// Clouds: a random field made up of waves.
 struct Clouds {
     extinction_mag: f64,
+    /// How much the thickest adds to the clear sky.
+    light: f64,
+    size_px: f64,
     /// Wave number along x and y in 1/px, and phase.
     waves: [[f64; 3]; WAVES],
 }
@@ -146,20 +151,35 @@ impl Clouds {
         };
         Self {
             extinction_mag: scene.cloud_mag,
+            light: scene.cloud_light,
+            size_px: scene.cloud_size_px,
             waves: std::array::from_fn(|_| wave()),
         }
     }
 
-    /// From 0 where there is none to 1 where it is thickest.
-    fn thickness(&self, place: &PixelPoint) -> f64 {
+    /// How far points may be apart between which their height is interpolated.
+    fn grid_px(&self) -> usize {
+        ((self.size_px / GRIDS_IN_A_CLOUD) as usize).clamp(1, GRID_PX)
+    }
+
+    /// The field: a cloud is where it is above 0.
+    fn height(&self, place: &PixelPoint) -> f64 {
         let wave = |[a, b, phase]: [f64; 3]| libm::cos(a * place.x + b * place.y + phase);
         let sum: f64 = self.waves.map(wave).iter().sum();
         // A sum of so many cosines has a variance of half their number: half of the sky is free, a sixth all covered.
-        (sum / (WAVES as f64 / 2.0).sqrt()).clamp(0.0, 1.0)
+        sum / (WAVES as f64 / 2.0).sqrt()
+    }
+
+    /// From 0 where there is none to 1 where it is thickest.
+    fn thickness_of(height: f64) -> f64 {
+        height.clamp(0.0, 1.0)
     }
 
     fn transmission(&self, place: &PixelPoint) -> f64 {
-        libm::pow(10.0, -0.4 * self.extinction_mag * self.thickness(place))
+        libm::pow(
+            10.0,
+            -0.4 * self.extinction_mag * Self::thickness_of(self.height(place)),
+        )
     }
 }
 
@@ -175,9 +195,11 @@ impl Moonlight {
     /// # Reference
     /// Krisciunas & Schaefer 1991, PASP 103, 1033, eqs. (3), (15), (20), (21); brightness in nanolamberts by their eq. (1). Extinction
     /// is that of the scenario at 555 nm, and the air the same all over the frame.
-    fn new(scenario: &Scenario, scene: &Scene) -> Option<Self> {
+    fn new(scenario: &Scenario, scene: &Scene, camera: &CameraModel) -> Option<Self> {
         let distance_rad = scene.moon_distance_deg?.to_radians();
         let (sin_way, cos_way) = libm::sincos(scene.moon_direction_deg.to_radians());
+        // The direction is that in the image, which a mirror reverses.
+        let sin_way = if camera.mirrored { -sin_way } else { sin_way };
         let (sin, cos) = libm::sincos(distance_rad);
         let conditions = &scenario.conditions;
         let transmission = conditions.extinction.zenith_transmission(REFERENCE_NM);
@@ -271,6 +293,49 @@ mod tests {
         assert!((change_mag + 2.925).abs() < 0.01, "{change_mag}");
         // It brightens towards the Moon, which is up.
         assert!(pixels[200] > pixels[299 * 400 + 200]);
+    }
+
+    #[test]
+    fn the_moon_is_where_it_is_in_the_image_in_a_mirror_as_well() {
+        let scenario = Scenario::of(Preset::NanosatTracker);
+        let scene = Scene {
+            moon_distance_deg: Some(40.0),
+            moon_direction_deg: 90.0,
+            ..Scene::default()
+        };
+        for mirrored in [false, true] {
+            let camera = CameraModel::pinhole(400.0, 300.0, 1000.0, mirrored);
+            let mut canvas = Canvas::new(400, 300, 0.0);
+            let mut random = ChaCha8Rng::seed_from_u64(1);
+            Sky::new(&scenario, &scene, &camera, &mut random).expose(&mut canvas, 100.0);
+            let row = canvas.row_mut(150);
+            assert!(row[399] > 1.05 * row[0], "{} {}", row[0], row[399]);
+        }
+    }
+
+    #[test]
+    fn small_clouds_light_the_sky_where_they_dim_the_stars() {
+        let scenario = Scenario::of(Preset::NanosatTracker);
+        let camera = camera();
+        for cloud_size_px in [3.0, 20.0, 150.0, 1000.0] {
+            let scene = Scene {
+                cloud_mag: 1.0,
+                cloud_light: 1.0,
+                cloud_size_px,
+                ..Scene::default()
+            };
+            let mut random = ChaCha8Rng::seed_from_u64(2);
+            let sky = Sky::new(&scenario, &scene, &camera, &mut random);
+            let mut canvas = Canvas::new(400, 300, 0.0);
+            sky.expose(&mut canvas, 1.0);
+            let off = |i: usize| {
+                let place = PixelPoint::new((i % 400) as f64, (i / 400) as f64);
+                let thickness = -2.5 * sky.transmission(&place).log10();
+                (canvas.pixels()[i] - 1.0 - thickness).abs()
+            };
+            let most = (0..120_000).step_by(7).map(off).fold(0.0, f64::max);
+            assert!(most < 0.01, "{cloud_size_px}: {most}");
+        }
     }
 
     #[test]

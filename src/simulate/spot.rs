@@ -235,6 +235,48 @@ mod tests {
     }
 
     #[test]
+    fn pixels_are_those_reckoned_to_twenty_digits() {
+        use SpotForm::{Disc, Gaussian, SampledGaussian};
+        // By mpmath 1.3 with 40 digits: Gauss-Legendre quadrature of the density over the pixel, of the disc's chords between the
+        // places where its edge crosses the pixel's sides.
+        #[rustfmt::skip]
+        #[expect(clippy::excessive_precision, reason = "as they were reckoned")]
+        let expected = [
+            (Gaussian, 0.3, (20.0, 20.0), (20, 20), 0.81797426199018009441),
+            (Gaussian, 0.3, (20.4, 19.7), (21, 19), 0.093238461835950870812),
+            (Gaussian, 0.7, (20.25, 20.5), (20, 21), 0.21066766941046535962),
+            (Gaussian, 0.7, (19.9, 20.1), (23, 17), 1.0353863102747089507e-8),
+            (Gaussian, 1.16, (20.123, 19.877), (20, 20), 0.11009089206531478308),
+            (Gaussian, 1.5, (20.5, 20.5), (24, 16), 0.000064352133200481938877),
+            (Gaussian, 3.2, (20.01, 20.99), (26, 19), 0.0022386401125279849683),
+            (Gaussian, 5.0, (20.3, 20.7), (12, 26), 0.00091807434988918578866),
+            (SampledGaussian, 0.3, (20.0, 20.0), (20, 20), 1.7683882565766149728),
+            (SampledGaussian, 0.3, (20.4, 19.7), (21, 19), 0.015730501510788826778),
+            (SampledGaussian, 0.7, (20.25, 20.5), (20, 21), 0.23612245543819085562),
+            (SampledGaussian, 0.7, (19.9, 20.1), (23, 17), 9.8658456046008851930e-10),
+            (SampledGaussian, 1.16, (20.123, 19.877), (20, 20), 0.11695566025642592339),
+            (SampledGaussian, 1.5, (20.5, 20.5), (24, 16), 0.000051649527794653768694),
+            (SampledGaussian, 3.2, (20.01, 20.99), (26, 19), 0.0022216592515863197181),
+            (SampledGaussian, 5.0, (20.3, 20.7), (12, 26), 0.00091521377025879859677),
+            (Disc, 0.3, (20.0, 20.0), (20, 20), 0.84079003836418743852),
+            (Disc, 0.3, (20.4, 19.7), (21, 19), 0.11077458090866429701),
+            (Disc, 0.7, (20.25, 20.5), (20, 21), 0.16240300315499526119),
+            (Disc, 0.7, (19.9, 20.1), (23, 17), 0.0),
+            (Disc, 1.16, (20.123, 19.877), (20, 20), 0.059139024632838643618),
+            (Disc, 1.5, (20.5, 20.5), (24, 16), 0.0),
+            (Disc, 3.2, (20.01, 20.99), (26, 19), 0.0045474121921354675421),
+            (Disc, 5.0, (20.3, 20.7), (12, 26), 0.0021426487366337305602),
+        ];
+        for (form, sigma_px, at, (x, y), share) in expected {
+            let found = drawn(form, sigma_px, at)[y * SIDE + x];
+            assert!(
+                (found - share).abs() < 1e-12,
+                "{form:?} {sigma_px} {at:?} {x} {y}: {found} {share}"
+            );
+        }
+    }
+
+    #[test]
     fn the_sampled_spot_is_the_density_in_the_middle_of_each_pixel() {
         let pixels = drawn(SpotForm::SampledGaussian, 0.5, (20.25, 20.0));
         let expected = |x: f64, y: f64| (-2.0 * (x * x + y * y)).exp() * 2.0 / PI;

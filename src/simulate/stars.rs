@@ -12,6 +12,7 @@ use crate::sensitivity::StarLight;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use std::f64::consts::PI;
 
 /// How far a star may move between J2000.0 and any date that is asked for: Barnard's Star in 200 years.
 const PROPER_MOTION_ROOM_RAD: f64 = 0.01;
@@ -54,7 +55,7 @@ impl Starlight<'_> {
             .apply(&UnitVector::BORESIGHT);
         // Room for the light that reaches in from outside, and for a star's own motion.
         let margin_rad = 2.0 * reach_px / self.camera.focal_length_px + PROPER_MOTION_ROOM_RAD;
-        let least_cosine = (self.camera.radius_rad() + margin_rad).cos();
+        let least_cosine = libm::cos((self.camera.radius_rad() + margin_rad).min(PI));
         let is_near = |star: &Star| star.direction.dot(&boresight) > least_cosine;
         let near = stars.iter().enumerate().filter(|(_, star)| is_near(star));
         near.filter_map(|(catalog, star)| {

@@ -82,6 +82,14 @@ pub struct CosmicRay {
     pub electrons: f64,
 }
 
+/// How many cosmic rays hit the detector during an exposure, on average.
+pub(super) fn mean_cosmic_rays(scene: &Scene, sensor: &Sensor, exposure_s: f64) -> f64 {
+    const CM2_PER_UM2: f64 = 1e-8;
+    let pixels = sensor.width_px as f64 * sensor.height_px as f64;
+    let area_cm2 = pixels * sensor.pitch_x_um * sensor.pitch_y_um * CM2_PER_UM2;
+    scene.cosmic_rays_cm2_s * area_cm2 * exposure_s
+}
+
 /// The cosmic rays that hit the detector during an exposure, from all directions of a half space.
 pub(super) fn cosmic_rays(
     scene: &Scene,
@@ -90,10 +98,7 @@ pub(super) fn cosmic_rays(
     exposure_s: f64,
     random: &mut ChaCha8Rng,
 ) -> Vec<CosmicRay> {
-    const CM2_PER_UM2: f64 = 1e-8;
-    let pixels = (sensor.width_px * sensor.height_px) as f64;
-    let area_cm2 = pixels * sensor.pitch_x_um * sensor.pitch_y_um * CM2_PER_UM2;
-    let mean = scene.cosmic_rays_cm2_s * area_cm2 * exposure_s;
+    let mean = mean_cosmic_rays(scene, sensor, exposure_s);
     let count = poisson(mean, random) as usize;
     let depth_um = sensor.imperfections.depth_um;
     let mut ray = |_| {

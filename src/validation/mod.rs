@@ -125,7 +125,7 @@ impl<'a> Validator<'a> {
     /// [`ValidationError::Scenario`], [`ValidationError::NoLimit`] where nothing can be predicted.
     pub fn new(pipeline: &'a Pipeline<'a>, protocol: &Protocol) -> Result<Self, ValidationError> {
         let Setup { scenario, scene } = &protocol.setup;
-        Budget::checked(scenario)?;
+        protocol.setup.check()?;
         let simulator = Simulator::new(scenario, scene, pipeline.catalog().stars())?;
         let scenario = &simulator.evened();
         let budget = Budget::checked(scenario)?;

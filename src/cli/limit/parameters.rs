@@ -49,6 +49,11 @@ impl ParameterArgs {
         Ok(())
     }
 
+    /// Whether nothing was given.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
     /// The files among what was given.
     pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.0.iter().filter_map(|(_, given)| match given {

@@ -1,7 +1,7 @@
 //! Where simulated frames are written, and as what.
 
 use super::header::Description;
-use super::{Job, named};
+use super::{Job, Subject, named};
 use crate::cli::Fault;
 use crate::cli::args::SimulateArgs;
 use crate::cli::output::csv_table;
@@ -48,6 +48,7 @@ pub(super) struct Place {
     out: PathBuf,
     is_file: bool,
     stem: &'static str,
+    has_truth: bool,
     kind: ImageKind,
     compressed: bool,
     bits: u32,
@@ -58,7 +59,7 @@ pub(super) struct Place {
 impl Place {
     pub(super) fn of(
         arguments: &SimulateArgs,
-        stem: &'static str,
+        subject: &Subject,
         sensor: &Sensor,
     ) -> Result<Self, Fault> {
         let named_kind = ImageKind::of_name(&arguments.out).filter(|_| !arguments.out.is_dir());
@@ -77,11 +78,18 @@ impl Place {
                 arguments.out.display()
             )));
         }
+        let kind = named_kind.or(arguments.image).unwrap_or(ImageKind::Tiff);
+        if arguments.compress && kind == ImageKind::Fits {
+            return Err(Fault::Usage(
+                "--compress is for TIFF files, and the frames are written as FITS".into(),
+            ));
+        }
         Ok(Self {
             out: arguments.out.clone(),
             is_file: named_kind.is_some(),
-            stem,
-            kind: named_kind.or(arguments.image).unwrap_or(ImageKind::Tiff),
+            stem: subject.stem(),
+            has_truth: subject.has_truth(),
+            kind,
             compressed: arguments.compress,
             bits: sensor.bits,
             numbers: arguments.first..arguments.first + arguments.count,
@@ -95,7 +103,10 @@ impl Place {
             std::fs::create_dir_all(&self.out)
                 .with_context(|| format!("making the directory {}", self.out.display()))?;
         }
-        let both = |image: PathBuf| [image.with_extension("csv"), image];
+        let both = |image: PathBuf| {
+            let table = self.has_truth.then(|| image.with_extension("csv"));
+            table.into_iter().chain([image])
+        };
         let mut files = self.numbers.clone().map(|i| self.image(i)).flat_map(both);
         match files.find(|path| !self.may_overwrite && path.exists()) {
             Some(path) => Err(Fault::Usage(format!(

@@ -21,7 +21,7 @@ use starpipe::epoch::ObservationDate;
 use starpipe::frame::{Frame, FrameMetadata};
 use starpipe::identify::Photometry;
 use starpipe::sensitivity::{Budget, Detector, Rule};
-use starpipe::simulate::{Pointing, Setup, Simulator, Truth};
+use starpipe::simulate::{Pointing, Scene, Setup, Simulator, Truth};
 use starpipe::units::DEG_PER_RAD;
 use starpipe::validation::draw;
 use std::ops::ControlFlow;
@@ -42,6 +42,13 @@ enum Subject {
 
 impl Subject {
     fn of(arguments: &SimulateArgs, setup: &Setup) -> Result<Self, Fault> {
+        let is_unlit = arguments.dark || arguments.flat.is_some();
+        if is_unlit && setup.scene != Scene::default() {
+            return Err(Fault::Usage(
+                "dark frames and flats are of no sky: expected none of the options of the scene"
+                    .into(),
+            ));
+        }
         if let Some(path) = &arguments.stars {
             let list = star_list(path, setup)?;
             return Ok(Self::Stars(list));
@@ -57,6 +64,11 @@ impl Subject {
             Rotation::looking_at(&boresight, arguments.roll.to_radians())
         });
         Ok(Self::Sky(fixed))
+    }
+
+    /// Whether a table tells what is on its frames.
+    const fn has_truth(&self) -> bool {
+        matches!(self, Self::Sky(_) | Self::Stars(_))
     }
 
     /// What the names of its files begin with.
@@ -140,7 +152,7 @@ struct ToldAttitude {
 pub(crate) fn simulate(arguments: &SimulateArgs) -> Result<Exit, Fault> {
     let setup = arguments.setup.setup()?;
     let subject = Subject::of(arguments, &setup)?;
-    let place = Place::of(arguments, subject.stem(), &setup.scenario.sensor)?;
+    let place = Place::of(arguments, &subject, &setup.scenario.sensor)?;
     let pool = thread_pool(arguments.resources.threads)?;
     let catalog = pool.install(|| read_catalog(arguments.resources.catalog.as_deref()))?;
     let simulator = Simulator::new(&setup.scenario, &setup.scene, catalog.stars())
