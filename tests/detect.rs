@@ -912,7 +912,7 @@ fn gaussian(level: f32, sigma: f32, rng: &mut ChaCha8Rng) -> f32 {
 }
 
 #[test]
-fn quantised_and_clipped_noise_raise_no_more_false_alarms() {
+fn skewed_quantised_and_clipped_noise_raise_no_more_false_alarms() {
     const WANTED: f64 = 10.0;
     let whole = (1024, 1024);
     let mut failures = Vec::new();
@@ -922,6 +922,14 @@ fn quantised_and_clipped_noise_raise_no_more_false_alarms() {
             failures.push(format!("{name}, spot {spot}: {rate:.1}"));
         }
     };
+    for mean in [30.0, 100.0] {
+        let photons = Poisson::new(mean).unwrap();
+        let noise = |rng: &mut ChaCha8Rng| photons.sample(rng) as f32;
+        for spot in [0.5, 0.7] {
+            let rate = false_alarm_rate_of(noise, whole, spot, WANTED, 10);
+            check(&format!("{mean} photons"), spot, rate);
+        }
+    }
     for spot in [0.7, 1.5] {
         for sigma in [0.2, 0.4] {
             let noise = |rng: &mut ChaCha8Rng| gaussian(20.0, sigma, rng).round();

@@ -1,9 +1,10 @@
 //! What detection will do in a frame that is only described: for those who predict it.
 
 use super::matched_filter::Kernel;
+use super::noise::{Weights, threshold_for_photons};
 use super::{DetectConfig, gaussian_threshold};
 
-/// The matched filter and the threshold of [`detect`](super::detect) in a frame with Gaussian noise.
+/// The matched filter and the threshold of [`detect`](super::detect) in a frame with photon and Gaussian noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FilterModel {
     /// The weights along either axis at distances 0, 1, … pixels; the sum of their squares, both sides counted, is 1. So
@@ -14,12 +15,20 @@ pub struct FilterModel {
 }
 
 impl FilterModel {
-    /// For frames of this size in pixels whose spots have this standard deviation.
-    pub fn new(config: &DetectConfig, size_px: (usize, usize), spot_sigma_px: f64) -> Self {
+    /// For frames of this size in pixels, spots of this standard deviation, and pixels whose noise has this skewness: of λ
+    /// photoelectrons and noise of n electrons in all, λ/n³.
+    pub fn new(
+        config: &DetectConfig,
+        size_px: (usize, usize),
+        spot_sigma_px: f64,
+        skewness: f64,
+    ) -> Self {
         let kernel = Kernel::for_spot(spot_sigma_px);
-        let threshold_sigma = config
-            .threshold_sigma
-            .unwrap_or_else(|| gaussian_threshold(config, size_px, spot_sigma_px, &kernel));
+        let threshold_sigma = config.threshold_sigma.unwrap_or_else(|| {
+            let u = gaussian_threshold(config, size_px, spot_sigma_px, &kernel);
+            let weights = Weights::for_spot(spot_sigma_px, kernel.radius(), size_px);
+            threshold_for_photons(u, skewness, &weights)
+        });
         Self {
             half_kernel: kernel.half().iter().map(|&w| f64::from(w)).collect(),
             threshold_sigma,

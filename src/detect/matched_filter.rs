@@ -200,7 +200,7 @@ impl Filtered {
 
 /// `target = (row − level) / spread`, 0 where the pixel has no value.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn normalise(row: &[f32], piece: &Piece, target: &mut [f32]) {
+pub(super) fn normalise(row: &[f32], piece: &Piece, target: &mut [f32]) {
     let piece = *piece;
     for (i, (out, &pixel)) in target.iter_mut().zip(row).enumerate() {
         let t = i as i32 as f32;

@@ -52,7 +52,7 @@ use components::{Search, SearchConfig};
 use fit::NoiseModel;
 use matched_filter::{Filtered, Kernel};
 use measure::Measurement;
-use noise::{PixelNoise, Weights};
+use noise::{PixelNoise, StarFree, Weights};
 use scene::{FitWork, Scene};
 use view::View;
 
@@ -446,10 +446,7 @@ fn search(
     calibration.kernel = kernel;
 }
 
-/// The threshold `u` for Gaussian noise, raised for coarse or cut-off noise, which has a longer tail.
-///
-/// Other noise is left alone: in real frames its longer tail is mostly that of stars too faint to be
-/// detected, and a threshold raised for these would lose a third of the stars that can be.
+/// The threshold `u` for Gaussian noise, raised for the noise that the frame has, whose tail is longer.
 fn raised_for_noise(
     u: f64,
     view: &View<'_>,
@@ -458,20 +455,42 @@ fn raised_for_noise(
     workspace: &Workspace,
 ) -> f64 {
     let (background, filtered_mesh) = (&workspace.background, &workspace.filtered_mesh);
+    let weights = Weights::for_spot(spot_px, kernel.radius(), (view.width, view.height));
+    let is_coarse = middle_of(&background.spread) < COARSE * f64::from(background.spread_floor);
+    if is_coarse || is_cut_off(view, background) {
+        return raised_for_steps(u, view, &weights, is_coarse, workspace);
+    }
+    // The tail itself is mostly that of stars too faint to be detected: a threshold raised for these would lose a third of the
+    // stars that can be. The skewness can be told apart from theirs.
+    let star_free = StarFree {
+        filtered_mesh,
+        limit: u as f32,
+    };
+    let filtered = &workspace.filtered;
+    let skewness = noise::photon_skewness(view, background, filtered, &star_free, spot_px);
+    skewness.map_or(u, |s| noise::threshold_for_photons(u, s, &weights))
+}
+
+/// The threshold `u` raised for noise that is coarse or cut off, whose whole distribution is that of the pixels.
+fn raised_for_steps(
+    u: f64,
+    view: &View<'_>,
+    weights: &Weights,
+    is_coarse: bool,
+    workspace: &Workspace,
+) -> f64 {
+    let (background, filtered_mesh) = (&workspace.background, &workspace.filtered_mesh);
     let floor = f64::from(FILTERED_NOISE_FLOOR);
     let is_at_floor = middle_of(&filtered_mesh.spread) <= floor * 1.001;
-    let is_coarse = middle_of(&background.spread) < COARSE * f64::from(background.spread_floor);
-    if !(is_coarse || is_cut_off(view, background)) {
-        return u;
-    }
-    let weights = Weights::for_spot(spot_px, kernel.radius(), view);
     let raised = |free_of_stars: f64| {
-        let filtered = &workspace.filtered;
-        let limit = free_of_stars as f32;
-        let noise = PixelNoise::measure(view, background, filtered, filtered_mesh, limit);
+        let star_free = StarFree {
+            filtered_mesh,
+            limit: free_of_stars as f32,
+        };
+        let noise = PixelNoise::measure(view, background, &workspace.filtered, &star_free);
         noise.map_or(u, |n| {
             let known_spread = is_at_floor.then_some(floor / n.sigma);
-            n.threshold(u, &weights, known_spread)
+            n.threshold(u, weights, known_spread)
         })
     };
     // Noise of about a quantisation step is a few isolated pixels: they stand out, and are the noise.

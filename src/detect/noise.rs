@@ -2,8 +2,9 @@
 //!
 //! Photon noise is skewed, noise below a quantisation step and noise cut off at zero are both skewed
 //! and heavy-tailed. A filtered value is a sum `Σ W_p x_p` of independent pixels, so the logarithm of
-//! its moment-generating function is `Σ K(t W_p)`, with the pixels' own K measured on the frame where
-//! nothing stands out. The saddlepoint approximation turns it into a tail:
+//! its moment-generating function is `Σ K(t W_p)`, with the pixels' own K. Of coarse and cut-off noise it is measured
+//! on the frame where nothing stands out; photons have that of the Poisson distribution, with a skewness that is
+//! measured there and told apart from that of faint stars. The saddlepoint approximation turns it into a tail:
 //! `P(> K'(t)) = Φ̄(w + ln(v/w)/w)`, `w = √(2(tK' − K))`, `v = t √K''`. To leading order this is the
 //! Cornish–Fisher correction; unlike it, it stays right for strong skews and far tails.
 //!
@@ -12,10 +13,11 @@
 //! for the form used here.
 
 use super::background::{Mesh, Piece};
-use super::matched_filter::{BLOCK_PX, Filtered};
-use super::psf::centered_profile;
+use super::matched_filter::{BLOCK_PX, Filtered, normalise};
+use super::psf::{AxisProfile, MAX_WINDOW_PX, centered_profile};
 use super::view::View;
 use multiversion::multiversion;
+use std::ops::Range;
 
 /// Pixels whose values are looked at, about.
 const SAMPLES: usize = 20_000;
@@ -45,8 +47,16 @@ const LEAST_CLIPPED_SIGMA: f64 = 0.85;
 const SIGNIFICANT: f64 = 1.0;
 /// Pixels along the border where half of the filter is cut off, or nearly.
 const BORDER_PX: f64 = 1.0;
+/// A pixel further off than this many standard deviations is a hot one or a star's, and no photon noise.
+const PHOTON_CLIP_SIGMA: f32 = 6.0;
+/// Pixels whose third moments are looked at, about: their standard errors are then some 0.01.
+const PHOTON_SAMPLES: usize = 100_000;
+/// Noise of neighbours that is correlated more than this is no longer that of photons counted; faint stars make 0.02.
+const MAX_CORRELATION: f64 = 0.1;
 /// The border's threshold is taken to be higher than the interior's by no more than this.
 const MAX_BORDER_RAISE: f64 = 2.0;
+/// A skewness below this raises no threshold by a hundredth of the noise.
+const LEAST_SKEWNESS: f64 = 1e-3;
 /// The threshold is raised by no more than this part of it.
 const MAX_RAISE: f64 = 1.0;
 
@@ -72,8 +82,7 @@ impl PixelNoise {
         view: &View<'_>,
         mesh: &Mesh,
         filtered: &Filtered,
-        filtered_mesh: &Mesh,
-        u: f32,
+        star_free: &StarFree<'_>,
     ) -> Option<Self> {
         let mut histogram = [0u32; BINS + 1];
         let mut bins = vec![0u16; view.width];
@@ -81,30 +90,16 @@ impl PixelNoise {
         let mut pieces = Vec::new();
         for y in (step / 2..view.height).step_by(step) {
             mesh.row_pieces(y, view.width, &mut pieces);
-            let rows = [
-                filtered.block_maxima(y),
-                filtered.block_maxima(y.saturating_sub(WING_ROWS[0])),
-                filtered.block_maxima(y.saturating_sub(WING_ROWS[1])),
-                filtered.block_maxima((y + WING_ROWS[0]).min(view.height - 1)),
-                filtered.block_maxima((y + WING_ROWS[1]).min(view.height - 1)),
-            ];
             let row = view.row(y);
             for piece in &pieces {
                 let span = piece.start..piece.end;
                 bins_of(&row[span.clone()], piece, &mut bins[span]);
             }
-            let mut start = 0;
-            for block in 0..rows[0].len() {
-                let end = (start + BLOCK_PX).min(view.width);
-                let (level, spread) = filtered_mesh.at((start + end) as f32 * 0.5, y as f32);
-                let highest = level + u * spread;
-                if rows.iter().all(|r| r[block] < highest) {
-                    for &bin in &bins[start..end] {
-                        histogram[usize::from(bin)] += 1;
-                    }
+            star_free.blocks(filtered, y, view, |span| {
+                for &bin in &bins[span] {
+                    histogram[usize::from(bin)] += 1;
                 }
-                start = end;
-            }
+            });
         }
         Self::of_histogram(&histogram[..BINS])
     }
@@ -174,11 +169,6 @@ impl PixelNoise {
             let far = exceeded(&table, step, weights, u)?;
             Some(far.max(for_skewness(u, skewness)))
         };
-        let (Some(inside), Some(at_border)) =
-            (quantile(&kernel.inside), quantile(&kernel.at_border))
-        else {
-            return u;
-        };
         let (cubes, fourths) = (sum(&kernel.inside, 3), sum(&kernel.inside, 4));
         let (mean, sigma) = match known_spread {
             Some(spread) => (0.0, spread),
@@ -186,9 +176,10 @@ impl PixelNoise {
         };
         // The mesh has the mean of the interior; the fewer pixels at the border have another.
         let shift = self.mean / self.sigma * (sum(&kernel.at_border, 1) - sum(&kernel.inside, 1));
-        let further = (at_border + shift - inside).min(MAX_BORDER_RAISE);
-        let of_border = (kernel.border_part * (u * further).exp_m1()).ln_1p() / u;
-        let raise = (inside + of_border - mean) / sigma - u;
+        let Some(of_frame) = kernel.quantile_of_frame(u, shift, quantile) else {
+            return u;
+        };
+        let raise = (of_frame - mean) / sigma - u;
         // The errors of skewness and kurtosis of a Gaussian sample, by Cornish and Fisher.
         let per_skewness = (u * u - 1.0) / 6.0;
         let per_kurtosis = (u.powi(3) - 3.0 * u) / 24.0 - SIGMA_PER_KURTOSIS * u;
@@ -198,6 +189,162 @@ impl PixelNoise {
             u + raise.min(MAX_RAISE * u)
         } else {
             u
+        }
+    }
+}
+
+/// The threshold that photon noise of pixels with this skewness, filtered with `kernel`, exceeds as often as Gaussian noise
+/// exceeds `u`, in units of the spread that a mesh measures on the filtered noise; never below `u`.
+///
+/// Poisson noise of standard deviation 1 and skewness s has `K(t) = (exp(st) − 1 − st)/s²`.
+pub(super) fn threshold_for_photons(u: f64, skewness: f64, kernel: &Weights) -> f64 {
+    if skewness <= LEAST_SKEWNESS {
+        return u;
+    }
+    let step = MAX_T * kernel.largest / STEPS as f64;
+    let at = |i: usize| {
+        let st = skewness * step * i as f64;
+        let above = st.exp_m1();
+        [
+            (above - st) / (skewness * skewness),
+            above / skewness,
+            above + 1.0,
+        ]
+    };
+    let table: Vec<Cumulants> = (0..=STEPS).map(at).collect();
+    let (cubes, fourths) = (sum(&kernel.inside, 3), sum(&kernel.inside, 4));
+    let (mean, sigma) = clipped(cubes * skewness, fourths * skewness * skewness);
+    let quantile = |weights: &[(f64, f64)]| exceeded(&table, step, weights, u);
+    let of_frame = kernel.quantile_of_frame(u, 0.0, quantile);
+    of_frame.map_or(u, |of_frame| {
+        (((of_frame - mean) / sigma).min(u + MAX_RAISE * u)).max(u)
+    })
+}
+
+/// The skewness of the pixels' own noise, apart from that of stars too faint to be seen; `None` where too little is free of
+/// the stars that are, and where the noise of neighbours goes together: JPEG's, or that of colours interpolated.
+///
+/// Stars skew the pixels, too, but neighbours together: for noise that is independent from pixel to pixel the cumulant
+/// `κ(z, z, z')` of neighbours is 0, for stars it is that of the spot, `ΣP²P'` to `ΣP³` of their own `κ(z, z, z)`.
+pub(super) fn photon_skewness(
+    view: &View<'_>,
+    mesh: &Mesh,
+    filtered: &Filtered,
+    star_free: &StarFree<'_>,
+    spot_px: f64,
+) -> Option<f64> {
+    let mut sums = [0.0f64; MOMENTS];
+    let mut standardised = vec![0.0; view.width];
+    let mut pieces = Vec::new();
+    let step = (view.width * view.height / PHOTON_SAMPLES).max(1);
+    for y in (step / 2..view.height).step_by(step) {
+        mesh.row_pieces(y, view.width, &mut pieces);
+        let row = view.row(y);
+        for piece in &pieces {
+            let span = piece.start..piece.end;
+            normalise(&row[span.clone()], piece, &mut standardised[span]);
+        }
+        star_free.blocks(filtered, y, view, |span| {
+            let of_block = moments(&standardised[span]);
+            for (sum, part) in sums.iter_mut().zip(of_block) {
+                *sum += f64::from(part);
+            }
+        });
+    }
+    let [count, ..] = sums;
+    if count < MIN_SAMPLES {
+        return None;
+    }
+    let [_, mean, square, cube, product, mixed] = sums.map(|sum| sum / count);
+    let variance = square - mean * mean;
+    let own = cube - 3.0 * mean * square + 2.0 * mean.powi(3);
+    let of_neighbours = mixed - mean * square - 2.0 * mean * product + 2.0 * mean.powi(3);
+    let skewness = (own - own_per_mixed(spot_px) * of_neighbours) / variance.powf(1.5);
+    let is_independent = product - mean * mean < MAX_CORRELATION * variance;
+    (is_independent && skewness.is_finite()).then_some(skewness)
+}
+
+/// Number of pairs, and of their first pixels z and second ones z' the sums of z, z², z³, zz', and of z²z' and zz'² half each.
+const MOMENTS: usize = 6;
+
+/// The moments of the pairs of neighbours in a row; pixels far off count as background.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn moments(row: &[f32]) -> [f32; MOMENTS] {
+    const LANES: usize = 16;
+    let mut sums = [[0.0f32; LANES]; MOMENTS];
+    let kept = |z: f32| if z.abs() <= PHOTON_CLIP_SIGMA { z } else { 0.0 };
+    let pairs = row.len().saturating_sub(1) / LANES * LANES;
+    for start in (0..pairs).step_by(LANES) {
+        let (Some(first), Some(second)) = (
+            row[start..].first_chunk::<LANES>(),
+            row[start + 1..].first_chunk::<LANES>(),
+        ) else {
+            continue;
+        };
+        for lane in 0..LANES {
+            let (a, b) = (kept(first[lane]), kept(second[lane]));
+            let (square, product) = (a * a, a * b);
+            sums[1][lane] += a;
+            sums[2][lane] += square;
+            sums[3][lane] += square * a;
+            sums[4][lane] += product;
+            sums[5][lane] += 0.5 * product * (a + b);
+        }
+    }
+    let mut total = sums.map(|lanes| lanes.iter().sum());
+    total[0] = pairs as f32;
+    total
+}
+
+/// `ΣP³ / ΣP²P'` of a spot along a row, each on average over its places within a pixel.
+fn own_per_mixed(spot_px: f64) -> f64 {
+    const PLACES: usize = 8;
+    let radius = ((4.0 * spot_px).ceil() as usize + 1).min(MAX_WINDOW_PX / 2);
+    let mut profile = AxisProfile::default();
+    let [mut own, mut mixed] = [0.0; 2];
+    for place in 0..PLACES {
+        let center = radius as f64 + (place as f64 + 0.5) / PLACES as f64 - 0.5;
+        profile.fill(center, spot_px, 2 * radius + 1);
+        for pair in profile.value[..2 * radius + 1].windows(2) {
+            own += pair[0].powi(3);
+            mixed += 0.5 * pair[0] * pair[1] * (pair[0] + pair[1]);
+        }
+    }
+    own / mixed
+}
+
+/// Where nothing stands out of the filtered frame.
+pub(super) struct StarFree<'a> {
+    /// The mesh of the filtered frame.
+    pub filtered_mesh: &'a Mesh,
+    /// What stands out, in standard deviations of the filtered noise.
+    pub limit: f32,
+}
+
+impl StarFree<'_> {
+    /// The blocks of columns of row `y` that hold no star nor its wings.
+    fn blocks(
+        &self,
+        filtered: &Filtered,
+        y: usize,
+        view: &View<'_>,
+        mut each: impl FnMut(Range<usize>),
+    ) {
+        let rows = [
+            filtered.block_maxima(y),
+            filtered.block_maxima(y.saturating_sub(WING_ROWS[0])),
+            filtered.block_maxima(y.saturating_sub(WING_ROWS[1])),
+            filtered.block_maxima((y + WING_ROWS[0]).min(view.height - 1)),
+            filtered.block_maxima((y + WING_ROWS[1]).min(view.height - 1)),
+        ];
+        for block in 0..rows[0].len() {
+            let start = block * BLOCK_PX;
+            let end = (start + BLOCK_PX).min(view.width);
+            let (level, spread) = self.filtered_mesh.at((start + end) as f32 * 0.5, y as f32);
+            let highest = level + self.limit * spread;
+            if rows.iter().all(|r| r[block] < highest) {
+                each(start..end);
+            }
         }
     }
 }
@@ -213,8 +360,8 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    /// The matched filter for a spot, out to `radius`, on the frame `view`.
-    pub fn for_spot(spot_px: f64, radius: usize, view: &View<'_>) -> Self {
+    /// The matched filter for a spot, out to `radius`, on a frame of `width` times `height` pixels.
+    pub fn for_spot(spot_px: f64, radius: usize, (width, height): (usize, usize)) -> Self {
         let profile = centered_profile(spot_px, radius);
         let axis = |sides: f64| -> Vec<(f64, f64)> {
             let times = |i: usize| if i == 0 { 1.0 } else { sides };
@@ -233,8 +380,23 @@ impl Weights {
             largest: half[0].1 * whole[0].1,
             inside: product(&whole, &whole),
             at_border: product(&half, &whole),
-            border_part: 1.0 - inner(view.width) * inner(view.height),
+            border_part: 1.0 - inner(width) * inner(height),
         }
+    }
+}
+
+impl Weights {
+    /// What the filtered noise of the frame, interior and border, exceeds as often as Gaussian noise exceeds `u`, by the
+    /// quantiles for either weights; `shift` is what the mean at the border is off.
+    fn quantile_of_frame(
+        &self,
+        u: f64,
+        shift: f64,
+        quantile: impl Fn(&[(f64, f64)]) -> Option<f64>,
+    ) -> Option<f64> {
+        let (inside, at_border) = (quantile(&self.inside)?, quantile(&self.at_border)?);
+        let further = (at_border + shift - inside).min(MAX_BORDER_RAISE);
+        Some(inside + (self.border_part * (u * further).exp_m1()).ln_1p() / u)
     }
 }
 
@@ -345,9 +507,8 @@ mod tests {
 
     #[test]
     fn gaussian_noise_raises_nothing_and_exponential_noise_has_the_gamma_tail() {
-        let view = View::new(&[0.0; 10_000], 100, 100);
         let gaussian = noise_of(|rng| StandardNormal.sample(rng));
-        let kernel = Weights::for_spot(1.0, 3, &view);
+        let kernel = Weights::for_spot(1.0, 3, (100, 100));
         assert!(gaussian.threshold(4.5, &kernel, Some(1.0)) - 4.5 < 0.03);
 
         // Sixteen exponential pixels of equal weight make a Gamma of shape 16: Q(16, x) = 3.4e-6,
@@ -356,5 +517,41 @@ mod tests {
         let step = MAX_T * 0.25 / STEPS as f64;
         let at = exceeded(&exponential.tabulate(step), step, &[(16.0, 0.25)], 4.5).expect("a tail");
         assert!((at - (40.74 - 16.0) / 4.0).abs() < 0.1, "{at}");
+    }
+    #[test]
+    fn photons_have_the_tail_of_the_poisson_distribution() {
+        // 16 pixels of 25 photons each: 400 together, and P(> 497.7) is that of a Gaussian beyond 4.5.
+        let kernel = Weights {
+            inside: vec![(16.0, 0.25)],
+            at_border: vec![(16.0, 0.25)],
+            largest: 0.25,
+            border_part: 0.0,
+        };
+        let skewness = 1.0 / 25f64.sqrt();
+        let (mean, sigma) = clipped(skewness / 4.0, (skewness / 4.0).powi(2));
+        let at = threshold_for_photons(4.5, skewness, &kernel) * sigma + mean;
+        let tail = poisson_tail(400.0, 400.0 + 20.0 * at);
+        let wanted = 3.398e-6;
+        assert!((tail / wanted - 1.0).abs() < 0.1, "{at}: {tail}");
+        assert_eq!(threshold_for_photons(4.5, 0.0, &kernel), 4.5);
+    }
+
+    /// The chance of more than `beyond` photons, the steps smoothed to half a photon.
+    fn poisson_tail(mean: f64, beyond: f64) -> f64 {
+        let log_chance = |n: f64| n * mean.ln() - mean - libm::lgamma(n + 1.0);
+        let first = (beyond + 0.5).floor();
+        let whole: f64 = (1..400)
+            .map(|i| log_chance(first + f64::from(i)).exp())
+            .sum();
+        whole + (first + 0.5 - beyond) * log_chance(first).exp()
+    }
+
+    #[test]
+    fn stars_skew_neighbours_as_their_own_pixels() {
+        // A spot of one pixel has no neighbours; a wide one has equal ones.
+        assert!(own_per_mixed(0.2) > 5.0);
+        assert!((own_per_mixed(4.0) - 1.0).abs() < 0.05);
+        let row: Vec<f32> = (0..33).map(|i| if i == 8 { 2.0 } else { 1.0 }).collect();
+        assert_eq!(moments(&row), [32.0, 33.0, 35.0, 39.0, 34.0, 36.0]);
     }
 }

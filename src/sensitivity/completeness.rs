@@ -10,7 +10,7 @@
 //! its median is the limit. It counts what the textbook formula `Φ(SNR − u)` leaves out: that the spot is not centred on a pixel,
 //! that the noise lifts one of several pixels, and the star's own photons.
 //!
-//! Caveats: Gaussian noise, as many stars as one likes without touching each other, and spots of the size that the
+//! Caveats: Gaussian noise but for the threshold, which knows that photons are skewed, as many stars as one likes without touching each other, and spots of the size that the
 //! filter expects; a smeared spot is searched with the round one that fits it best.
 
 use super::budget::Budget;
@@ -92,7 +92,9 @@ impl Detector {
     pub fn matched_filter(config: &DetectConfig, scenario: &Scenario, budget: &Budget) -> Self {
         let spot = Spot::of(scenario);
         let size = (scenario.sensor.width_px, scenario.sensor.height_px);
-        let model = FilterModel::new(config, size, spot.round_sigma_px());
+        let electrons = budget.background_e + budget.dark_e;
+        let skewness = electrons / budget.background_noise_e.powi(3);
+        let model = FilterModel::new(config, size, spot.round_sigma_px(), skewness);
         let filter = Filter {
             half_kernel: model.half_kernel,
             threshold_e: model.threshold_sigma * budget.background_noise_e,
