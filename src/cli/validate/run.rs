@@ -20,7 +20,7 @@ const PORTION: u64 = super::parquet::FRAMES_PER_PART;
 /// What an earlier, shorter run may have left, and what says that a run has ended.
 const RESULTS: [&str; 2] = ["summary.json", "summary.txt"];
 
-/// How long the frames of this session took. It differs from run to run, and is kept apart from what does not.
+/// How long the frames of this start took. It differs from run to run, and is kept apart from what does not.
 #[derive(Debug, Default, Serialize)]
 struct Timing {
     frames: u64,
