@@ -383,9 +383,7 @@ impl Weights {
             border_part: 1.0 - inner(width) * inner(height),
         }
     }
-}
 
-impl Weights {
     /// What the filtered noise of the frame, interior and border, exceeds as often as Gaussian noise exceeds `u`, by the
     /// quantiles for either weights; `shift` is what the mean at the border is off.
     fn quantile_of_frame(

@@ -1,19 +1,7 @@
 //! The parameters of a scenario by name: the camera's and the conditions' in one list.
 
 use super::conditions::{Conditions, Extinction, Scenario, SkyBrightness};
-use crate::sensor::{KEYS, Key, Limits, Sensor, nearest_name};
-
-macro_rules! key {
-    ($name:ident, $limits:expr, $about:literal) => {
-        Key {
-            name: stringify!($name),
-            about: $about,
-            limits: $limits,
-            get: |conditions| Some(conditions.$name),
-            set: |conditions, value| conditions.$name = value,
-        }
-    };
-}
+use crate::sensor::{KEYS, Key, Limits, Sensor, key, nearest_name};
 
 /// The numbers of [`Conditions`]. Of those that say the same thing in other units the last one given holds.
 pub const CONDITION_KEYS: &[Key<Conditions>] = &[

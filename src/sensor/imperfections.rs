@@ -1,7 +1,7 @@
 //! What a real camera does besides: what makes one pixel differ from another, and the light of a star spread otherwise.
 
 use super::Sensor;
-use super::keys::{Key, Limits};
+use super::keys::{Key, Limits, key};
 
 /// How the light of a star is spread over the pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -104,18 +104,6 @@ impl Default for Imperfections {
     }
 }
 
-macro_rules! key {
-    ($name:ident, $limits:expr, $about:literal) => {
-        Key {
-            name: stringify!($name),
-            about: $about,
-            limits: $limits,
-            get: |sensor| Some(sensor.imperfections.$name),
-            set: |sensor, value| sensor.imperfections.$name = value,
-        }
-    };
-}
-
 /// Parts of a whole, 0 and 1 included.
 const PART: Limits = Limits::FromTo(0.0, 1.0);
 /// Displacements that a lens with one image may have, in pixels.
@@ -123,69 +111,56 @@ const DISPLACEMENT_PX: Limits = Limits::FromTo(-1000.0, 1000.0);
 
 /// The numbers of [`Imperfections`] by name. None has to be given.
 pub const IMPERFECTION_KEYS: &[Key<Sensor>] = &[
-    key!(vignetting, PART, "part of the light lost in the corners"),
-    key!(
-        distortion_px,
+    key!(vignetting in imperfections, PART, "part of the light lost in the corners"),
+    key!(distortion_px in imperfections,
         DISPLACEMENT_PX,
         "radial distortion: how far a star in the corner is moved outward, in pixels"
     ),
-    key!(
-        decentring_x_px,
+    key!(decentring_x_px in imperfections,
         DISPLACEMENT_PX,
         "decentred lens, along x: displacement at the corner's distance, in pixels"
     ),
-    key!(
-        decentring_y_px,
+    key!(decentring_y_px in imperfections,
         DISPLACEMENT_PX,
         "decentred lens, along y: displacement at the corner's distance, in pixels"
     ),
-    key!(
-        response_sigma,
+    key!(response_sigma in imperfections,
         PART,
         "standard deviation of the pixels' response to light, relative to its mean"
     ),
-    key!(
-        dark_current_sigma,
+    key!(dark_current_sigma in imperfections,
         Limits::FromTo(0.0, 10.0),
         "standard deviation of the pixels' dark current, relative to its mean"
     ),
-    key!(
-        hot_pixels_per_mpx,
+    key!(hot_pixels_per_mpx in imperfections,
         Limits::FromTo(0.0, 1e6),
         "hot pixels in a million"
     ),
-    key!(
-        hot_pixel_e_s,
+    key!(hot_pixel_e_s in imperfections,
         Limits::NotNegative,
         "mean dark current of a hot pixel, in electrons a second"
     ),
-    key!(
-        dead_pixels_per_mpx,
+    key!(dead_pixels_per_mpx in imperfections,
         Limits::FromTo(0.0, 1e6),
         "pixels in a million that see no light"
     ),
-    key!(
-        offset_sigma_adu,
+    key!(offset_sigma_adu in imperfections,
         Limits::NotNegative,
         "standard deviation of the pixels' bias, in grey levels"
     ),
-    key!(
-        column_sigma_adu,
+    key!(column_sigma_adu in imperfections,
         Limits::NotNegative,
         "standard deviation of the columns' bias, in grey levels"
     ),
-    key!(
-        blooming,
+    key!(blooming in imperfections,
         PART,
         "part of the charge beyond a full pixel that flows along its column"
     ),
-    key!(
-        depth_um,
+    key!(depth_um in imperfections,
         Limits::FromTo(0.1, 1000.0),
         "depth in which charge is collected, in µm: for cosmic rays"
     ),
-    key!(
-        pattern_seed,
+    key!(pattern_seed in imperfections,
         Limits::Whole(0.0, 9_007_199_254_740_991.0),
         "seed of what is the same in every frame of the camera"
     ),

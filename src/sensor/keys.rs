@@ -108,17 +108,19 @@ const SPOTS_PX: Limits = Limits::FromToBelow(0.05, 20.0);
 /// Wavelengths of which a detector may make anything, in nm.
 const WAVELENGTHS_NM: Limits = Limits::FromToBelow(100.0, 10_000.0);
 
+/// The key of the number that a field is, of the whole itself or of what stands in another field of it.
 macro_rules! key {
-    ($name:ident, $limits:expr, $about:literal) => {
-        Key {
+    ($name:ident $(in $within:ident)?, $limits:expr, $about:literal) => {
+        $crate::sensor::Key {
             name: stringify!($name),
             about: $about,
             limits: $limits,
-            get: |sensor| Some(sensor.$name as f64),
-            set: |sensor, value| sensor.$name = value as _,
+            get: |whole| Some(whole$(.$within)?.$name as f64),
+            set: |whole, value| whole$(.$within)?.$name = value as _,
         }
     };
 }
+pub(crate) use key;
 
 /// The numbers of a camera. The two that may be curves, [`Sensor::lens_transmission`] and [`Sensor::quantum_efficiency`],
 /// are their largest values here; a curve that is given another one keeps its form. Of `spot_sigma_px` and `peak_share` the

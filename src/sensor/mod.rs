@@ -19,6 +19,7 @@ mod response;
 
 pub use file::SensorError;
 pub use imperfections::{IMPERFECTION_KEYS, Imperfections, SpotForm};
+pub(crate) use keys::key;
 pub use keys::{KEYS, Key, Limits, is_curve, nearest_name, template};
 pub use preset::Preset;
 pub use response::{Response, ResponseError};

@@ -1,6 +1,6 @@
 //! What happens while a frame is exposed: how the camera turns, and what is in the sky besides stars.
 
-use crate::sensor::{Key, Limits};
+use crate::sensor::{Key, Limits, key};
 use nalgebra::Vector3;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -126,18 +126,6 @@ impl Scene {
         let rate_deg_s = steady + self.tumble_deg_s * axis + swing_deg_s * Vector3::y();
         rate_deg_s.map(f64::to_radians)
     }
-}
-
-macro_rules! key {
-    ($name:ident, $limits:expr, $about:literal) => {
-        Key {
-            name: stringify!($name),
-            about: $about,
-            limits: $limits,
-            get: |scene| Some(scene.$name),
-            set: |scene, value| scene.$name = value,
-        }
-    };
 }
 
 macro_rules! optional_key {
