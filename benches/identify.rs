@@ -1,14 +1,14 @@
-//! Time of identification with nothing known and with the field of view known to a factor of two, and of a whole
+//! Time of identification with nothing known and with the field of view known to a factor of two, of reading, and of a whole
 //! frame (detection and identification), over the real 16-bit frames in `../shared/frames` where they are; and of what a
 //! new process has to do first. One thread, buffers reused, as in a long run over many frames.
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use starpipe::catalog::Catalog;
 use starpipe::catalog::sky_grid::SkyGrid;
-use starpipe::detect::{DetectConfig, Workspace, detect};
+use starpipe::detect::{self, DetectConfig, detect};
 use starpipe::frame::{self, Frame};
-use starpipe::identify::{Hints, Outcome, Sky, StarField, identify};
-use starpipe::pipeline::{Pipeline, SolveConfig, star_field};
+use starpipe::identify::{self, Hints, Outcome, Sky, StarField, identify};
+use starpipe::pipeline::{Pipeline, SolveConfig, Workspace, star_field};
 use std::f64::consts::SQRT_2;
 use std::hint::black_box;
 use std::path::Path;
@@ -16,7 +16,12 @@ use std::path::Path;
 /// The frame, its stars, and what it takes to know its scale to a factor of two in all.
 fn prepare(path: &Path, sky: &Sky) -> Option<(Frame, StarField, Hints)> {
     let frame = frame::read(path).ok()?;
-    let detections = detect(&frame, &DetectConfig::default(), &mut Workspace::new()).ok()?;
+    let detections = detect(
+        &frame,
+        &DetectConfig::default(),
+        &mut detect::Workspace::new(),
+    )
+    .ok()?;
     let (field, _) = star_field(&frame, &detections, 0.0);
     let Outcome::Identified(identification) = identify(&field, &Hints::default(), sky) else {
         return None;
@@ -47,10 +52,25 @@ fn bench_frames(criterion: &mut Criterion, cache: &Path) {
             ("nothing known", &Hints::default()),
             ("factor of two", hints),
         ] {
+            let mut workspace = identify::Workspace::new();
             group.bench_function(format!("{name}, {knowledge}"), |bencher| {
-                bencher.iter(|| black_box(identify(black_box(field), hints, &sky)));
+                bencher.iter(|| {
+                    let found = workspace.identify(black_box(field), hints, &sky);
+                    black_box(found.is_ok())
+                });
             });
         }
+    }
+    let mut buffers = frame::Buffers::new();
+    for path in &paths {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        criterion.bench_function(&format!("read/{name}"), |bencher| {
+            bencher.iter(|| {
+                if let Ok(frame) = frame::read_page_with(black_box(path), None, &mut buffers) {
+                    buffers.recycle(black_box(frame));
+                }
+            });
+        });
     }
     let pipeline = Pipeline::new(sky);
     let mut workspace = Workspace::new();

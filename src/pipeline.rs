@@ -4,9 +4,8 @@
 //!
 //! ```no_run
 //! use starpipe::catalog::Catalog;
-//! use starpipe::detect::Workspace;
 //! use starpipe::identify::Sky;
-//! use starpipe::pipeline::{Pipeline, SolveConfig};
+//! use starpipe::pipeline::{Pipeline, SolveConfig, Workspace};
 //! use starpipe::report::FrameReport;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -29,9 +28,7 @@ use crate::calibration::{Applied, Calibration, CalibrationError};
 use crate::catalog::Catalog;
 use crate::comparison::{Comparison, Description};
 use crate::coords::PixelPoint;
-use crate::detect::{
-    self, DetectConfig, DetectError, Detection, DetectionFlags, Detections, Workspace,
-};
+use crate::detect::{self, DetectConfig, DetectError, Detection, DetectionFlags, Detections};
 use crate::diagnosis::{self, Examined};
 use crate::epoch::ObservationDate;
 use crate::frame::{self, Frame, FrameError};
@@ -232,6 +229,24 @@ pub struct ListedCentroid {
 /// Standard error assumed on each axis of a centroid that comes without one, in pixels.
 pub const LISTED_SIGMA_PX: f64 = 0.5;
 
+/// What the stages work with, kept from frame to frame. One for each thread.
+#[derive(Default)]
+pub struct Workspace {
+    /// For reading.
+    pub frames: frame::Buffers,
+    /// For detection.
+    pub detect: detect::Workspace,
+    /// For identification.
+    pub identify: identify::Workspace,
+}
+
+impl Workspace {
+    /// An empty one.
+    pub fn new() -> Self {
+        Self::default()
+    }
+}
+
 /// The stages, ready for any number of frames.
 pub struct Pipeline<'a> {
     sky: Sky<'a>,
@@ -241,6 +256,11 @@ impl<'a> Pipeline<'a> {
     /// Frames are identified with the stars of `sky`.
     pub fn new(sky: Sky<'a>) -> Self {
         Self { sky }
+    }
+
+    /// The stars that frames are identified with.
+    pub fn sky(&self) -> &Sky<'a> {
+        &self.sky
     }
 
     /// The catalogue.
@@ -259,13 +279,14 @@ impl<'a> Pipeline<'a> {
         config: &SolveConfig,
         workspace: &mut Workspace,
     ) -> Result<Solution, Error> {
-        let read = || frame::read_page(path, config.page);
-        self.solve_read(path, config, workspace, read)
-            .map(|(solution, _)| solution)
+        let read = |buffers: &mut frame::Buffers| frame::read_page_with(path, config.page, buffers);
+        let (solution, frame) = self.solve_read(path, config, workspace, read)?;
+        workspace.frames.recycle(frame);
+        Ok(solution)
     }
 
-    /// Examines the frame that `read` gives, as [`Self::solve_file`] does, and returns it with what was found. `name` is the
-    /// file's, or stands for one.
+    /// Examines the frame that `read` gives, as [`Self::solve_file`] does, and returns it with what was found: best to be given
+    /// back to the workspace once it is not needed ([`frame::Buffers::recycle`]). `name` is the file's, or stands for one.
     ///
     /// # Errors
     /// As [`Self::solve_file`].
@@ -274,10 +295,10 @@ impl<'a> Pipeline<'a> {
         name: &Path,
         config: &SolveConfig,
         workspace: &mut Workspace,
-        read: impl FnOnce() -> Result<Frame, FrameError>,
+        read: impl FnOnce(&mut frame::Buffers) -> Result<Frame, FrameError>,
     ) -> Result<(Solution, Frame), Error> {
         let start = Instant::now();
-        let mut frame = read()?;
+        let mut frame = read(&mut workspace.frames)?;
         let read_ms = milliseconds_since(start);
         let calibration = config.calibration.as_deref();
         if let Some(calibration) = calibration {
@@ -330,7 +351,7 @@ impl<'a> Pipeline<'a> {
                 .or(config.detect.saturation_adu),
             ..config.detect.clone()
         };
-        let detections = detect::detect(frame, &detect_config, workspace)?;
+        let detections = detect::detect(frame, &detect_config, &mut workspace.detect)?;
         let detect_ms = milliseconds_since(start);
         let knowledge = config
             .knowledge
@@ -344,7 +365,8 @@ impl<'a> Pipeline<'a> {
         let in_header = header_scale(&frame.metadata).filter(|_| described.is_none());
         let outcome = match (knowledge.scale, described.or(in_header)) {
             (None, Some(hint)) => {
-                let (outcome, is_wrong) = self.identify_with(&hint, &field, &kept, &knowledge);
+                let (outcome, is_wrong) =
+                    self.identify_with(&hint, (&field, &kept), &knowledge, workspace);
                 // What is wrong with a description is told below.
                 notes.extend(
                     in_header
@@ -353,7 +375,7 @@ impl<'a> Pipeline<'a> {
                 );
                 outcome
             }
-            _ => self.identify(&field, &kept, &knowledge),
+            _ => self.identify((&field, &kept), &knowledge, workspace),
         };
         let outcome = self.explained(outcome, &field, &knowledge, Some((frame, &detections)));
         let identify_ms = milliseconds_since(identify_start);
@@ -411,7 +433,7 @@ impl<'a> Pipeline<'a> {
         list.centroids.sort_by(|a, b| a.mag.total_cmp(&b.mag));
         let field = list.star_field(knowledge.years_since_j2000());
         let all: Vec<usize> = (0..list.centroids.len()).collect();
-        let outcome = self.identify(&field, &all, knowledge);
+        let outcome = self.identify((&field, &all), knowledge, &mut Workspace::new());
         let outcome = self.explained(outcome, &field, knowledge, None);
         let observation = knowledge.observation(&outcome);
         let identify_ms = milliseconds_since(start);
@@ -468,19 +490,20 @@ impl<'a> Pipeline<'a> {
     fn identify_with(
         &self,
         hint: &ScaleHint,
-        field: &StarField,
-        sources: &[usize],
+        (field, sources): (&StarField, &[usize]),
         knowledge: &Knowledge,
+        workspace: &mut Workspace,
     ) -> (Outcome, bool) {
         let believing = Knowledge {
             scale: Some(*hint),
             ..*knowledge
         };
-        let first = self.identify(field, sources, &believing);
+        let first = self.identify((field, sources), &believing, workspace);
         if matches!(first, Outcome::Identified(_)) {
             return (first, false);
         }
-        let second = at_second_attempt(self.identify(field, sources, knowledge)).unwrap_or(first);
+        let second = self.identify((field, sources), knowledge, workspace);
+        let second = at_second_attempt(second).unwrap_or(first);
         let is_wrong = match &second {
             Outcome::Identified(found) => {
                 let (low_rad, high_rad) = hint.pixel_scale_rad(field.width_px);
@@ -492,15 +515,23 @@ impl<'a> Pipeline<'a> {
     }
 
     /// Identifies `field`, and numbers the matches as the sources are: `sources[i]` is the source of star i.
-    fn identify(&self, field: &StarField, sources: &[usize], knowledge: &Knowledge) -> Outcome {
+    fn identify(
+        &self,
+        (field, sources): (&StarField, &[usize]),
+        knowledge: &Knowledge,
+        workspace: &mut Workspace,
+    ) -> Outcome {
         let hints = knowledge.hints(field.width_px);
-        let mut outcome = identify::identify(field, &hints, &self.sky);
-        if let Outcome::Identified(identification) = &mut outcome {
-            for star_match in &mut identification.matches {
-                star_match.observed = sources[star_match.observed];
+        match workspace.identify.identify(field, &hints, &self.sky) {
+            Ok(found) => {
+                let mut identification = Box::new(found.clone());
+                for star_match in &mut identification.matches {
+                    star_match.observed = sources[star_match.observed];
+                }
+                Outcome::Identified(identification)
             }
+            Err(reason) => Outcome::NotIdentified(reason),
         }
-        outcome
     }
 
     /// The same outcome; where the field is not identified, with a reason that says more, also from `image` where there

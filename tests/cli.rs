@@ -481,13 +481,19 @@ fn a_damaged_cache_is_made_anew() {
     assert_eq!((first.status, first.stderr.as_str()), (0, ""));
     assert!(!files().is_empty(), "something is kept");
     type Damage = fn(Vec<u8>) -> Vec<u8>;
-    let damages: [(&str, Damage); 4] = [
+    let damages: [(&str, Damage); 5] = [
         ("emptied", |_| Vec::new()),
         ("cut", |bytes| bytes[..bytes.len() / 2].to_vec()),
         ("garbage", |bytes| vec![0xa5; bytes.len()]),
-        ("one byte changed", |mut bytes| {
+        ("one byte of the table changed", |mut bytes| {
+            bytes[1000] ^= 0x40;
+            bytes
+        }),
+        // What is not needed is not read, and so not missed.
+        ("every triangle changed", |mut bytes| {
             let middle = bytes.len() / 2;
-            bytes[middle] ^= 0x40;
+            let triangles = bytes[middle..].iter_mut().step_by(16);
+            triangles.for_each(|byte| *byte ^= 0x40);
             bytes
         }),
     ];

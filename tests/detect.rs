@@ -673,6 +673,24 @@ fn the_result_does_not_depend_on_what_the_workspace_did_before() {
 }
 
 #[test]
+fn the_result_is_the_same_on_any_number_of_threads() {
+    let (sky, _) = star_field(8);
+    let frame = sky.expose(6);
+    let config = DetectConfig::default();
+    let alone = found_in(&frame, &config);
+    assert!(alone.sources.len() > 50);
+    for threads in [2, 3, 7, 100] {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        let mut workspace = Workspace::new().on_threads(threads.try_into().unwrap());
+        let found = pool.install(|| detect(&frame, &config, &mut workspace).unwrap());
+        assert_eq!(found, alone, "{threads} threads");
+    }
+}
+
+#[test]
 fn missing_pixels_disturb_nothing_but_themselves() {
     let (sky, truth) = star_field(11);
     let mut frame = sky.expose(7);

@@ -156,8 +156,9 @@ fn a_lens_that_distorts_by_two_percent_is_found_out() {
     for fov_deg in [10.0, 25.0] {
         let mut truth = Truth::random(&mut rng, fov_deg);
         let radius_px = truth.camera.radius_px();
-        let barrel = vec![0.02 * radius_px];
-        truth.camera.distortion = Some(Distortion::new(DistortionModel::Radial, radius_px, barrel));
+        let barrel = [0.02 * radius_px];
+        truth.camera.distortion =
+            Some(Distortion::new(DistortionModel::Radial, radius_px, &barrel));
         let Outcome::Identified(found) =
             identify(&truth.observe(&mut rng), &Hints::default(), sky())
         else {

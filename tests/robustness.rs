@@ -76,7 +76,7 @@ fn errors_missing_and_false_stars_are_as_many_as_asked_for() {
     const TRIALS: u64 = 300;
     for seed in 0..TRIALS {
         let drawn = draw(&protocol, seed);
-        let exact = drawn.camera.clone();
+        let exact = drawn.camera;
         kept += drawn.true_stars() as f64;
         strewn += (drawn.list.centroids.len() - drawn.true_stars()) as f64;
         for (centroid, catalog) in drawn.list.centroids.iter().zip(&drawn.catalog) {

@@ -7,6 +7,8 @@
 //! the displacement in pixels that its term makes at a corner. A turn, a shift and a change of scale are
 //! no part of it: they belong to the attitude and the focal length.
 
+use multiversion::multiversion;
+
 /// How much freedom a distortion has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum DistortionModel {
@@ -48,40 +50,85 @@ impl DistortionModel {
             Self::Quintic => 5,
         }
     }
+}
 
-    /// Calls `term` with each basis function's displacement (along u, along v) at the normalised offset.
-    pub fn for_each_term(self, [u, v]: [f64; 2], mut term: impl FnMut([f64; 2])) {
-        if self == Self::Radial {
-            let r_sq = u * u + v * v;
-            return term([u * r_sq, v * r_sq]);
-        }
-        term([u, -v]);
-        term([v, u]);
-        let (mut u_powers, mut v_powers) = ([1.0; MAX_ORDER + 1], [1.0; MAX_ORDER + 1]);
-        for power in 1..=self.order() {
-            u_powers[power] = u_powers[power - 1] * u;
-            v_powers[power] = v_powers[power - 1] * v;
-        }
-        for order in 2..=self.order() {
-            for power in 0..=order {
-                let monomial = u_powers[order - power] * v_powers[power];
-                term([monomial, 0.0]);
-                term([0.0, monomial]);
-            }
+/// Monomials of second and third order, and up to fifth.
+pub(crate) const CUBIC_MONOMIALS: usize = 7;
+pub(crate) const QUINTIC_MONOMIALS: usize = 18;
+
+/// The first `K` monomials of second and higher order, order by order, powers of u falling.
+#[inline]
+pub(crate) fn monomials<const K: usize>([u, v]: [f64; 2]) -> [f64; K] {
+    let (mut u_powers, mut v_powers) = ([1.0; MAX_ORDER + 1], [1.0; MAX_ORDER + 1]);
+    for power in 1..=MAX_ORDER {
+        u_powers[power] = u_powers[power - 1] * u;
+        v_powers[power] = v_powers[power - 1] * v;
+    }
+    let powers = const { powers::<K>() };
+    powers.map(|[of_u, of_v]| u_powers[of_u] * v_powers[of_v])
+}
+
+/// The powers of u and v in the first `K` monomials.
+const fn powers<const K: usize>() -> [[usize; 2]; K] {
+    let mut powers = [[0; 2]; K];
+    let (mut order, mut of_v, mut next) = (2, 0, 0);
+    while next < K {
+        powers[next] = [order - of_v, of_v];
+        next += 1;
+        of_v += 1;
+        if of_v > order {
+            (order, of_v) = (order + 1, 0);
         }
     }
+    powers
+}
+
+/// How many offsets are worked on at once.
+pub(super) const LANES: usize = 8;
+
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn apply_to_lanes(
+    distortion: &Distortion,
+    ideal: &[[f64; LANES]; 2],
+) -> ([[f64; LANES]; 2], [bool; LANES]) {
+    let mut observed = *ideal;
+    let (mut found, mut lost) = ([false; LANES], [false; LANES]);
+    for _ in 0..INVERSION_STEPS {
+        let there = distortion.remove_from_lanes(&observed);
+        let mut is_open = false;
+        for lane in 0..LANES {
+            let error = [0, 1].map(|axis| ideal[axis][lane] - there[axis][lane]);
+            let is_done = found[lane] | lost[lane];
+            for axis in 0..2 {
+                let next = observed[axis][lane] + error[axis];
+                observed[axis][lane] = if is_done { observed[axis][lane] } else { next };
+            }
+            let is_exact = error[0].abs() + error[1].abs() < INVERSION_TOLERANCE_PX;
+            let reach_px = observed[0][lane].abs() + observed[1][lane].abs();
+            let is_near = reach_px <= 10.0 * distortion.radius_px;
+            found[lane] |= !is_done & is_exact;
+            lost[lane] |= !is_done & !is_exact & !is_near;
+            is_open |= !(found[lane] | lost[lane]);
+        }
+        if !is_open {
+            break;
+        }
+    }
+    (observed, found)
 }
 
 /// The departure of a lens from the pinhole camera.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distortion {
     model: DistortionModel,
     radius_px: f64,
-    coefficients_px: Vec<f64>,
+    /// As many as the model has terms, then zeros.
+    coefficients_px: [f64; MAX_TERMS],
 }
 
-/// The highest order of any model.
+/// The highest order of any model, and the most terms.
 const MAX_ORDER: usize = 5;
+const MAX_TERMS: usize = DistortionModel::Quintic.terms();
 
 /// Steps of the fixed-point iteration that inverts the polynomial, and where it may stop.
 const INVERSION_STEPS: usize = 50;
@@ -93,12 +140,14 @@ impl Distortion {
     ///
     /// # Panics
     /// If there are not as many coefficients as the model has terms.
-    pub fn new(model: DistortionModel, radius_px: f64, coefficients_px: Vec<f64>) -> Self {
+    pub fn new(model: DistortionModel, radius_px: f64, coefficients_px: &[f64]) -> Self {
         assert_eq!(coefficients_px.len(), model.terms(), "one per term");
+        let mut padded = [0.0; MAX_TERMS];
+        padded[..model.terms()].copy_from_slice(coefficients_px);
         Self {
             model,
             radius_px,
-            coefficients_px,
+            coefficients_px: padded,
         }
     }
 
@@ -112,15 +161,16 @@ impl Distortion {
         self.radius_px
     }
 
-    /// The coefficients in pixels, in the order of [`DistortionModel::for_each_term`].
+    /// The coefficients in pixels, one for each term: of a radial model (u r², v r²); else (u, −v) and
+    /// (v, u), then for each monomial of second and higher order, powers of u falling, one along u and one along v.
     pub fn coefficients_px(&self) -> &[f64] {
-        &self.coefficients_px
+        &self.coefficients_px[..self.model.terms()]
     }
 
     /// Its polynomial term by term: the powers of u/R and of v/R, and the displacement along u and v in pixels.
     /// Terms of the same powers may occur more than once.
     pub fn monomials(&self) -> Vec<(usize, usize, [f64; 2])> {
-        let c = &self.coefficients_px;
+        let c = self.coefficients_px();
         if self.model == DistortionModel::Radial {
             // r² u and r² v, written out.
             return vec![
@@ -131,27 +181,42 @@ impl Distortion {
             ];
         }
         let mut monomials = vec![(1, 0, [c[0], c[1]]), (0, 1, [c[1], -c[0]])];
-        let powers = (2..=self.model.order()).flat_map(|n| (0..=n).map(move |q| (n - q, q)));
-        let pairs = c[2..].chunks_exact(2);
+        let powers = const { powers::<QUINTIC_MONOMIALS>() };
+        let pairs = c[2..].as_chunks().0;
         monomials.extend(
             powers
+                .iter()
                 .zip(pairs)
-                .map(|((p, q), pair)| (p, q, [pair[0], pair[1]])),
+                .map(|([p, q], pair)| (*p, *q, *pair)),
         );
         monomials
     }
 
     /// From the observed offset to the ideal one, in pixels.
+    #[inline]
     pub fn remove(&self, observed: [f64; 2]) -> [f64; 2] {
-        let normalised = [observed[0] / self.radius_px, observed[1] / self.radius_px];
-        let mut ideal = observed;
-        let mut coefficients = self.coefficients_px.iter();
-        self.model.for_each_term(normalised, |[du, dv]| {
-            let c = coefficients.next().expect("one coefficient per term");
-            ideal[0] += c * du;
-            ideal[1] += c * dv;
-        });
-        ideal
+        let [u, v] = [observed[0] / self.radius_px, observed[1] / self.radius_px];
+        match self.model {
+            DistortionModel::Radial => {
+                let [c, r_sq] = [self.coefficients_px[0], u * u + v * v];
+                [observed[0] + c * (u * r_sq), observed[1] + c * (v * r_sq)]
+            }
+            DistortionModel::Cubic => self.polynomial::<CUBIC_MONOMIALS>([u, v], observed),
+            DistortionModel::Quintic => self.polynomial::<QUINTIC_MONOMIALS>([u, v], observed),
+        }
+    }
+
+    /// The offset `observed` with the displacement that a model with `K` monomials makes at the normalised offset.
+    #[inline]
+    fn polynomial<const K: usize>(&self, [u, v]: [f64; 2], observed: [f64; 2]) -> [f64; 2] {
+        let c = &self.coefficients_px;
+        let mut along_u = observed[0] + c[0] * u + c[1] * v;
+        let mut along_v = observed[1] - c[0] * v + c[1] * u;
+        for (monomial, [of_u, of_v]) in monomials::<K>([u, v]).iter().zip(c[2..].as_chunks().0) {
+            along_u += of_u * monomial;
+            along_v += of_v * monomial;
+        }
+        [along_u, along_v]
     }
 
     /// From the ideal offset to the observed one, in pixels; `None` where the polynomial cannot be
@@ -171,6 +236,66 @@ impl Distortion {
             }
         }
         None
+    }
+
+    /// [`Self::apply`] for several offsets at once, in vector registers, to the last bit; `None` turns into false.
+    pub(super) fn apply_to_lanes(
+        &self,
+        ideal: &[[f64; LANES]; 2],
+    ) -> ([[f64; LANES]; 2], [bool; LANES]) {
+        apply_to_lanes(self, ideal)
+    }
+
+    #[inline(always)]
+    fn remove_from_lanes(&self, observed: &[[f64; LANES]; 2]) -> [[f64; LANES]; 2] {
+        match self.model {
+            DistortionModel::Radial => self.radial_lanes(observed),
+            DistortionModel::Cubic => self.polynomial_lanes::<CUBIC_MONOMIALS>(observed),
+            DistortionModel::Quintic => self.polynomial_lanes::<QUINTIC_MONOMIALS>(observed),
+        }
+    }
+
+    #[inline(always)]
+    fn radial_lanes(&self, observed: &[[f64; LANES]; 2]) -> [[f64; LANES]; 2] {
+        let mut ideal = *observed;
+        for lane in 0..LANES {
+            let [u, v] = [0, 1].map(|axis| observed[axis][lane] / self.radius_px);
+            let [c, r_sq] = [self.coefficients_px[0], u * u + v * v];
+            ideal[0][lane] = observed[0][lane] + c * (u * r_sq);
+            ideal[1][lane] = observed[1][lane] + c * (v * r_sq);
+        }
+        ideal
+    }
+
+    #[inline(always)]
+    fn polynomial_lanes<const K: usize>(&self, observed: &[[f64; LANES]; 2]) -> [[f64; LANES]; 2] {
+        let c = &self.coefficients_px;
+        let (mut u_powers, mut v_powers) =
+            ([[1.0; LANES]; MAX_ORDER + 1], [[1.0; LANES]; MAX_ORDER + 1]);
+        let mut ideal = *observed;
+        for lane in 0..LANES {
+            let [u, v] = [0, 1].map(|axis| observed[axis][lane] / self.radius_px);
+            (u_powers[1][lane], v_powers[1][lane]) = (u, v);
+            ideal[0][lane] = observed[0][lane] + c[0] * u + c[1] * v;
+            ideal[1][lane] = observed[1][lane] - c[0] * v + c[1] * u;
+        }
+        for power in 2..=MAX_ORDER {
+            for lane in 0..LANES {
+                u_powers[power][lane] = u_powers[power - 1][lane] * u_powers[1][lane];
+                v_powers[power][lane] = v_powers[power - 1][lane] * v_powers[1][lane];
+            }
+        }
+        for ([of_u, of_v], pair) in const { powers::<K>() }
+            .iter()
+            .zip(c[2..].as_chunks::<2>().0)
+        {
+            for lane in 0..LANES {
+                let monomial = u_powers[*of_u][lane] * v_powers[*of_v][lane];
+                ideal[0][lane] += pair[0] * monomial;
+                ideal[1][lane] += pair[1] * monomial;
+            }
+        }
+        ideal
     }
 
     /// The largest displacement within the normalising radius, on a ring at it, in pixels.

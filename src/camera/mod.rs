@@ -5,13 +5,15 @@
 
 mod distortion;
 
+pub(crate) const LANES: usize = distortion::LANES;
+pub(crate) use distortion::{CUBIC_MONOMIALS, QUINTIC_MONOMIALS, monomials};
 pub use distortion::{Distortion, DistortionModel};
 
 use crate::coords::{Camera, PixelPoint, UnitVector};
 use nalgebra::Vector3;
 
 /// A camera: a pinhole whose axis goes through the frame's centre, a lens distortion, and perhaps a mirror.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraModel {
     /// Columns of the frame.
     pub width_px: f64,
@@ -91,6 +93,34 @@ impl CameraModel {
         let centre = self.centre();
         let u = if self.mirrored { -u } else { u };
         Some(PixelPoint::new(centre.x + u, centre.y + v))
+    }
+
+    /// [`Self::pixel_of`] for the first [`LANES`] of `directions`: many are worked out in less time so.
+    pub(crate) fn pixels_of(
+        &self,
+        directions: &[UnitVector<Camera>],
+    ) -> [Option<PixelPoint>; LANES] {
+        let mut ideal = [[0.0; LANES]; 2];
+        let mut is_before = [false; LANES];
+        for (lane, direction) in directions.iter().take(LANES).enumerate() {
+            let d = direction.as_vector();
+            is_before[lane] = d.z > 0.0;
+            if is_before[lane] {
+                ideal[0][lane] = self.focal_length_px * d.x / d.z;
+                ideal[1][lane] = self.focal_length_px * d.y / d.z;
+            }
+        }
+        let (offsets, found) = match &self.distortion {
+            Some(distortion) => distortion.apply_to_lanes(&ideal),
+            None => (ideal, [true; LANES]),
+        };
+        let centre = self.centre();
+        std::array::from_fn(|lane| {
+            let [u, v] = [offsets[0][lane], offsets[1][lane]];
+            let u = if self.mirrored { -u } else { u };
+            let is_there = is_before[lane] && found[lane];
+            is_there.then(|| PixelPoint::new(centre.x + u, centre.y + v))
+        })
     }
 
     /// Whether `pixel` lies on the frame.
@@ -180,13 +210,21 @@ mod tests {
             coefficients.iter_mut().enumerate().for_each(|(i, c)| {
                 *c = 3.0 * (i as f64 - 7.0) / 7.0;
             });
-            camera.distortion = Some(Distortion::new(DistortionModel::Cubic, 640.0, coefficients));
+            camera.distortion = Some(Distortion::new(
+                DistortionModel::Cubic,
+                640.0,
+                &coefficients,
+            ));
             for pixel in [
                 PixelPoint::new(0.0, 0.0),
                 PixelPoint::new(999.0, 799.0),
                 PixelPoint::new(321.5, 700.25),
             ] {
-                let back = camera.pixel_of(&camera.direction_of(&pixel)).unwrap();
+                let direction = camera.direction_of(&pixel);
+                let back = camera.pixel_of(&direction).unwrap();
+                let behind = UnitVector::from_unit(-direction.as_vector());
+                let many = camera.pixels_of(&[behind, direction, direction]);
+                assert_eq!(many[..4], [None, Some(back), Some(back), None]);
                 assert!(back.distance_to(&pixel) < 1e-5, "{pixel:?} {back:?}");
             }
         }

@@ -7,6 +7,7 @@
 use super::Star;
 use crate::coords::{Icrs, UnitVector};
 use nalgebra::Vector3;
+use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
@@ -37,8 +38,9 @@ impl GridStar {
         Vector3::from(self.direction.map(f64::from))
     }
 
+    /// Whether it stands within a chord, of which this is the square, of `centre`, a unit vector.
     #[inline]
-    fn is_within(&self, centre: &Vector3<f64>, chord_sq: f64) -> bool {
+    pub fn is_within(&self, centre: &Vector3<f64>, chord_sq: f64) -> bool {
         (self.vector() - centre).norm_squared() <= chord_sq
     }
 }
@@ -61,6 +63,12 @@ const STARS_PER_CELL_VISIT: f64 = 4.0;
 /// How far single precision may put a star off the sphere.
 const OFF_SPHERE: f64 = 1e-6;
 
+/// The chord of an angle, which counts as half a turn beyond that.
+#[inline]
+pub fn chord_of(angle_rad: f64) -> f64 {
+    2.0 * (angle_rad.clamp(0.0, PI) / 2.0).sin()
+}
+
 fn cell_along(coordinate: f64) -> usize {
     (((coordinate + 1.0) / CELL_SIZE).max(0.0) as usize).min(CELLS - 1)
 }
@@ -73,20 +81,22 @@ impl SkyGrid {
     /// Sorts `stars`, which stand brightest first, into cells.
     pub fn new(stars: &[Star]) -> Self {
         let packed = |(index, star)| GridStar::new(index, star);
-        let by_brightness: Vec<GridStar> = stars.iter().enumerate().map(packed).collect();
+        let by_brightness: Vec<GridStar> = stars.par_iter().enumerate().map(packed).collect();
         // A counting sort: stable, so that a cell's stars stay brightest first.
-        let cells: Vec<usize> = by_brightness.iter().map(Self::cell_of).collect();
+        let cell_of = |star: &GridStar| Self::cell_of(star) as u32;
+        let cells: Vec<u32> = by_brightness.par_iter().map(cell_of).collect();
         let mut cell_starts = vec![0u32; CELLS.pow(3) + 1];
         for &cell in &cells {
-            cell_starts[cell + 1] += 1;
+            cell_starts[cell as usize + 1] += 1;
         }
         for cell in 1..cell_starts.len() {
             cell_starts[cell] += cell_starts[cell - 1];
         }
         let mut by_cell = by_brightness.clone();
         for (star, &cell) in by_brightness.iter().zip(&cells) {
-            by_cell[cell_starts[cell] as usize] = *star;
-            cell_starts[cell] += 1;
+            let place = &mut cell_starts[cell as usize];
+            by_cell[*place as usize] = *star;
+            *place += 1;
         }
         // Each start has moved on to the next cell's.
         cell_starts.rotate_right(1);
@@ -119,7 +129,7 @@ impl SkyGrid {
         faintest_v_mag: f32,
         mut visit: impl FnMut(&GridStar),
     ) {
-        let chord = 2.0 * (radius_rad.clamp(0.0, PI) / 2.0).sin();
+        let chord = chord_of(radius_rad);
         let cone = Cone {
             centre: centre.as_vector(),
             chord,
@@ -135,6 +145,43 @@ impl SkyGrid {
         } else {
             self.for_each_in_wide_cone(&cone, &mut visit);
         }
+    }
+
+    /// Whether there is a star within `chord` of `centre` with a V magnitude in `magnitudes`: fast where the chord is short.
+    #[inline]
+    pub fn is_any_within(
+        &self,
+        centre: &UnitVector<Icrs>,
+        chord: f64,
+        magnitudes: RangeInclusive<f32>,
+    ) -> bool {
+        let cone = Cone {
+            centre: centre.as_vector(),
+            chord,
+            faintest_v_mag: *magnitudes.end(),
+        };
+        let is_wanted = |star: &GridStar| {
+            star.v_mag >= *magnitudes.start() && star.is_within(cone.centre, chord * chord)
+        };
+        let bright_enough = |star: &&GridStar| star.v_mag <= cone.faintest_v_mag;
+        let z_cells = cells_along(cone.centre.z, chord);
+        for x in cells_along(cone.centre.x, chord) {
+            for y in cells_along(cone.centre.y, chord) {
+                for z in z_cells.clone() {
+                    let stars = self.in_cell((x * CELLS + y) * CELLS + z);
+                    if stars.iter().take_while(bright_enough).any(is_wanted) {
+                        return true;
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    /// The stars of a cell, brightest first.
+    #[inline]
+    fn in_cell(&self, cell: usize) -> &[GridStar] {
+        &self.by_cell[self.cell_starts[cell] as usize..self.cell_starts[cell + 1] as usize]
     }
 
     fn for_each_in_wide_cone(&self, cone: &Cone, visit: &mut impl FnMut(&GridStar)) {
@@ -171,8 +218,7 @@ impl SkyGrid {
     ) {
         for z in z {
             let cell = (x * CELLS + y) * CELLS + z;
-            let range = self.cell_starts[cell] as usize..self.cell_starts[cell + 1] as usize;
-            for star in &self.by_cell[range] {
+            for star in self.in_cell(cell) {
                 if star.v_mag > cone.faintest_v_mag {
                     break;
                 }

@@ -9,6 +9,7 @@ use anyhow::Context;
 use starpipe::darks::{
     DarkConfig, DarkStack, Darks, FrameStatistics, FullScaleSource, HotPixelRow,
 };
+use starpipe::frame::Buffers;
 use starpipe::frame::{CALIBRATION_CREATOR, FitsHeader, FitsSamples, Frame, write_fits};
 use starpipe::sensor::Sensor;
 use std::ops::ControlFlow;
@@ -26,7 +27,8 @@ pub(crate) fn darks(arguments: DarksArgs) -> Result<Exit, Fault> {
     let pool = thread_pool(arguments.threads)?;
     let mut stack = DarkStack::new();
     let read = |path: &PathBuf| -> anyhow::Result<_> {
-        let frame = input::read_frame(path, arguments.page).context("reading")?;
+        let frame =
+            input::read_frame(path, arguments.page, &mut Buffers::new()).context("reading")?;
         let name = path.display().to_string();
         let exposure_s = exposure_of(path, &arguments.exposure);
         let statistics = FrameStatistics::of(&name, &frame, exposure_s);

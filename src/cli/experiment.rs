@@ -2,7 +2,7 @@
 
 use super::args::{ExperimentArgs, PageFormat};
 use super::output::{print, write_whole};
-use super::resources::{bar, read_catalog, sky, thread_pool};
+use super::resources::{bar, read_catalog, sky, thread_pool, warn_of};
 use super::settings::output_path;
 use super::{Exit, Fault, overwrite};
 use anyhow::Context;
@@ -32,6 +32,7 @@ pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Exit, Fault> {
     let progress = bar(trials.count, "frames {wide_bar} {pos}/{len} {eta}");
     let done = pool.install(|| run(&published, &pipeline, trials, &|| progress.inc(1)));
     progress.finish_and_clear();
+    warn_of(pipeline.sky().take_troubles());
     let done = done.map_err(anyhow::Error::from)?;
     if let Some(directory) = &arguments.out {
         save(&done, &pipeline, directory, &name)?;

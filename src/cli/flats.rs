@@ -8,6 +8,7 @@ use super::settings::read_master;
 use super::{Exit, Fault, chained, complain, input, overwrite, warn};
 use anyhow::Context;
 use starpipe::flats::{FlatConfig, FlatStack, Flats};
+use starpipe::frame::Buffers;
 use starpipe::sensor::Sensor;
 use std::path::PathBuf;
 
@@ -29,7 +30,8 @@ pub(crate) fn flats(arguments: FlatsArgs) -> Result<Exit, Fault> {
     let pool = thread_pool(arguments.threads)?;
     let mut stack = FlatStack::new(config(&arguments)?);
     let read = |path: &PathBuf| -> anyhow::Result<_> {
-        let frame = input::read_frame(path, arguments.page).context("reading")?;
+        let frame =
+            input::read_frame(path, arguments.page, &mut Buffers::new()).context("reading")?;
         Ok((path.display().to_string(), frame))
     };
     let unread = for_each_frame(&pool, &frames, read, |(name, frame)| {

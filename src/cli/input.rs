@@ -1,7 +1,7 @@
 //! What inputs may be named: files, directories of frames, and `-` for standard input.
 
 use super::Fault;
-use starpipe::frame::{self, Frame, FrameError};
+use starpipe::frame::{self, Buffers, Frame, FrameError};
 use starpipe::pipeline::Error;
 use std::io;
 use std::num::NonZeroUsize;
@@ -13,9 +13,13 @@ pub(crate) fn is_stdin(input: &Path) -> bool {
 }
 
 /// The frame in the file `input`, or in standard input.
-pub(crate) fn read_frame(input: &Path, page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
+pub(crate) fn read_frame(
+    input: &Path,
+    page: Option<NonZeroUsize>,
+    buffers: &mut Buffers,
+) -> Result<Frame, FrameError> {
     if !is_stdin(input) {
-        return frame::read_page(input, page);
+        return frame::read_page_with(input, page, buffers);
     }
     frame::read_stream(io::stdin().lock(), page).map_err(|error| error.in_file(input))
 }

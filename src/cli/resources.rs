@@ -5,7 +5,7 @@ use super::{cache, chained, warn};
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use starpipe::catalog::{self, Catalog};
-use starpipe::identify::Sky;
+use starpipe::identify::{CacheError, Sky};
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -45,11 +45,16 @@ pub(crate) fn sky<'a>(catalog: &'a Catalog, resources: &ResourceArgs) -> Sky<'a>
     };
     let (sky, troubles) = Sky::open(catalog, &directory, &show);
     progress.finish_and_clear();
+    warn_of(troubles);
+    sky
+}
+
+/// Tells of a cache that is of no use.
+pub(crate) fn warn_of(troubles: Vec<CacheError>) {
     for trouble in troubles {
         let trouble = chained(&trouble);
         warn(format_args!("{trouble}; this costs time and nothing else"));
     }
-    sky
 }
 
 /// A bar on standard error, which stays empty where that is no terminal.

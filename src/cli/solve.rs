@@ -4,13 +4,14 @@ use super::args::{IdentifyArgs, ProcessArgs, ResourceArgs, SolvingArgs};
 use super::centroids::{self, FrameSize};
 use super::input;
 use super::output::{OutputSettings, Printer, ResultFiles, Solved};
-use super::resources::{bar, read_catalog, sky, thread_pool};
+use super::resources::{bar, read_catalog, sky, thread_pool, warn_of};
 use super::settings::{FRAME_RESULTS, LIST_RESULTS};
 use super::{Exit, Fault, batch, chained, complain};
 use indicatif::ProgressBar;
-use starpipe::detect::Workspace;
-use starpipe::pipeline::{Knowledge, Pipeline, SolveConfig};
+use starpipe::frame::Buffers;
+use starpipe::pipeline::{Knowledge, Pipeline, SolveConfig, Workspace};
 use starpipe::report::FrameReport;
+use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -49,9 +50,14 @@ pub(crate) fn process(arguments: ProcessArgs) -> Result<Exit, Fault> {
         settings,
         &resources,
         |pipeline, path, workspace| {
-            let read = || input::read_frame(path, page);
+            let read = |buffers: &mut Buffers| input::read_frame(path, page, buffers);
             let (solution, frame) = pipeline.solve_read(path, &config, workspace, read)?;
-            let frame = keep.then_some(frame);
+            let frame = if keep {
+                Some(frame)
+            } else {
+                workspace.frames.recycle(frame);
+                None
+            };
             Ok(Solved { solution, frame })
         },
     )?;
@@ -118,10 +124,24 @@ fn solve_all(
         let saved = files.save(input, &solved, &report, pipeline.catalog());
         Ok(Answer { report, saved })
     };
-    batch::for_each_ordered(&pool, inputs, Workspace::default, report, |_, result| {
+    // An input that is alone has all threads for itself.
+    let threads = match inputs.len() {
+        1 => NonZeroUsize::new(pool.current_num_threads()),
+        _ => None,
+    };
+    let workspace = || {
+        let mut workspace = Workspace::new();
+        if let Some(threads) = threads {
+            workspace.detect = workspace.detect.on_threads(threads);
+        }
+        workspace
+    };
+    batch::for_each_ordered(&pool, inputs, workspace, report, |_, result| {
         run.take(result)
     });
-    Ok(run.exit())
+    let exit = run.exit();
+    warn_of(pipeline.sky().take_troubles());
+    Ok(exit)
 }
 
 /// What is told of an input, and whether it is in its files as well.

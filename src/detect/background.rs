@@ -5,22 +5,30 @@
 //! started from the median and the lower quantile of a few samples (stars are above, not below).
 //! Spreads are smoothed by a median of 3x3 cells; levels are replaced by it only where they stick out
 //! (beyond the border they go on as a plane does).
+//!
+//! A row of cells is measured at a time, from its own rows of pixels alone, so that rows of cells can be
+//! shared among threads.
 
+use super::medians::{self, LANES, Lanes};
 use super::view::View;
 use multiversion::multiversion;
+use std::ops::Range;
 
 /// Deviations beyond this many standard deviations are not counted: keeps 99.7 % of the noise.
 const CLIP_SIGMA: f32 = 3.0;
 /// The standard deviation of a Gaussian clipped at ±3σ, over σ.
 const CLIPPED_SHRINK: f32 = 0.986_58;
-/// Rounds of clipping; it settles in three or four.
+/// The part of a wrong spread that is left by a round of clipping at it, for a Gaussian: d ln s/d ln k of the standard
+/// deviation s clipped at ±kσ, at k = 3. So a round is carried on to where many would lead.
+const LEFT_BY_ROUND: f32 = 0.11;
+/// Rounds of clipping; it settles in two or three.
 const MAX_CLIP_ROUNDS: usize = 8;
 /// Changes below this part of the spread end the clipping.
-const SETTLED: f32 = 4e-3;
-/// Samples that start the clipping.
-const START_SAMPLES: usize = 41;
+const SETTLED: f32 = 1.2e-2;
 /// Every how many rows of a cell are sampled.
 const ROW_STRIDE: usize = 4;
+/// Cells with fewer pixels than this are sampled in full.
+const SMALL_CELL_PX: usize = 1024;
 /// Fewer samples than this tell nothing about a cell.
 const MIN_CELL_SAMPLES: usize = 12;
 
@@ -37,67 +45,126 @@ pub(super) struct MeshConfig {
     pub is_normalised: bool,
 }
 
-/// A level and a spread for each cell of a frame.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Mesh {
+/// How a frame is divided into cells.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Grid {
     /// Cells across.
     pub columns: usize,
     /// Cells down.
     pub rows: usize,
+    width_px: usize,
+    height_px: usize,
+}
+
+impl Grid {
+    /// Cells of about `cell_px` pixels a side in a frame of `width` times `height` pixels.
+    pub fn new((width_px, height_px): (usize, usize), cell_px: usize) -> Self {
+        let cells = |side: usize| ((side as f32 / cell_px as f32).round() as usize).max(1);
+        Self {
+            columns: cells(width_px),
+            rows: cells(height_px),
+            width_px,
+            height_px,
+        }
+    }
+
+    /// The columns of pixels in a column of cells.
+    fn columns_of(&self, column: usize) -> Range<usize> {
+        column * self.width_px / self.columns..(column + 1) * self.width_px / self.columns
+    }
+
+    /// The rows of pixels in a row of cells.
+    pub fn rows_of(&self, row: usize) -> Range<usize> {
+        row * self.height_px / self.rows..(row + 1) * self.height_px / self.rows
+    }
+
+    /// Every how many rows a cell is sampled.
+    fn row_stride(&self) -> usize {
+        let cell_px = (self.width_px / self.columns) * (self.height_px / self.rows);
+        if cell_px >= SMALL_CELL_PX {
+            ROW_STRIDE
+        } else {
+            1
+        }
+    }
+}
+
+/// A level and a spread for each cell of a frame.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Mesh {
+    /// The cells.
+    pub grid: Grid,
     cell_width_px: f32,
-    cell_height_px: f32,
+    /// Columns and rows of cells in a pixel.
+    columns_per_px: f32,
+    rows_per_px: f32,
     /// Row-major, `rows * columns`.
     pub level: Vec<f32>,
     /// Row-major, `rows * columns`.
     pub spread: Vec<f32>,
+    /// One over the spread.
+    inverse: Vec<f32>,
     /// The least spread that a cell could have.
     pub spread_floor: f32,
-    scratch: Scratch,
-}
-
-/// Buffers for one cell and one mesh.
-#[derive(Debug, Clone, Default)]
-struct Scratch {
-    values: Vec<f32>,
-    differences: Vec<f32>,
-    start: Vec<f32>,
-    copy: Vec<f32>,
+    /// Where along a row the straight pieces between nodes begin, and the last one ends.
+    edges: Vec<usize>,
+    /// The level as measured, with a border of one cell in which it goes on as a plane does.
+    padded_level: Vec<f32>,
+    measured_spread: Vec<f32>,
 }
 
 impl Mesh {
     /// Measures `view` cell by cell.
     pub fn measure(&mut self, view: &View<'_>, config: &MeshConfig) {
-        let cells = |side: usize| ((side as f32 / config.cell_px as f32).round() as usize).max(1);
-        self.columns = cells(view.width);
-        self.rows = cells(view.height);
-        self.cell_width_px = view.width as f32 / self.columns as f32;
-        self.cell_height_px = view.height as f32 / self.rows as f32;
+        self.prepare((view.width, view.height), config);
+        let grid = self.grid;
+        let mut scratch = CellScratch::default();
+        let levels = self.level.chunks_mut(grid.columns);
+        let spreads = self.spread.chunks_mut(grid.columns);
+        for (row, (level, spread)) in levels.zip(spreads).enumerate() {
+            let pixels = grid.rows_of(row).map(|y| view.row(y));
+            scratch.measure_row(&grid, pixels, config, (level, spread));
+        }
+        self.finish();
+    }
+
+    /// Makes room for the cells of a frame of `size` pixels across and down.
+    pub fn prepare(&mut self, size: (usize, usize), config: &MeshConfig) {
+        let grid = Grid::new(size, config.cell_px);
+        self.grid = grid;
+        self.cell_width_px = grid.width_px as f32 / grid.columns as f32;
+        self.columns_per_px = grid.columns as f32 / grid.width_px as f32;
+        self.rows_per_px = grid.rows as f32 / grid.height_px as f32;
         self.spread_floor = config.spread_floor;
-        self.level.clear();
-        self.spread.clear();
-        for row in 0..self.rows {
-            for column in 0..self.columns {
-                let cell = self.cell_bounds(view, column, row);
-                let (level, spread) = self.scratch.measure_cell(view, cell, config);
-                self.level.push(level);
-                self.spread.push(spread);
+        for map in [&mut self.level, &mut self.spread] {
+            map.clear();
+            map.resize(grid.columns * grid.rows, f32::NAN);
+        }
+        self.edges.clear();
+        self.edges.push(0);
+        if grid.columns > 1 {
+            for column in 0..grid.columns {
+                let before = self.center(column).ceil().max(0.0) as usize;
+                self.edges.push(before.min(grid.width_px));
             }
         }
+        self.edges.push(grid.width_px);
+    }
+
+    /// What is to be done once all rows of cells are measured.
+    pub fn finish(&mut self) {
         self.fill_gaps();
         self.smooth();
         for spread in &mut self.spread {
-            *spread = spread.max(config.spread_floor);
+            *spread = spread.max(self.spread_floor);
         }
+        self.inverse.clear();
+        self.inverse.extend(self.spread.iter().map(|s| 1.0 / s));
     }
 
-    /// First and last-but-one column and row of a cell: (x0, x1, y0, y1).
-    fn cell_bounds(&self, view: &View<'_>, column: usize, row: usize) -> [usize; 4] {
-        [
-            column * view.width / self.columns,
-            (column + 1) * view.width / self.columns,
-            row * view.height / self.rows,
-            (row + 1) * view.height / self.rows,
-        ]
+    /// The column of pixels of the nodes in a column of cells.
+    fn center(&self, column: usize) -> f32 {
+        (column as f32 + 0.5) * self.cell_width_px - 0.5
     }
 
     /// Gives cells without a value the mean of their neighbours that have one, until all have.
@@ -108,16 +175,19 @@ impl Mesh {
             return;
         }
         while self.level.iter().any(|v| v.is_nan()) {
-            let known = self.level.clone();
-            for i in 0..known.len() {
-                if known[i].is_nan() {
-                    let valid: Vec<usize> =
-                        self.neighbours(i).filter(|&j| !known[j].is_nan()).collect();
-                    let count = valid.len() as f32;
-                    if !valid.is_empty() {
-                        self.level[i] = valid.iter().map(|&j| known[j]).sum::<f32>() / count;
-                        self.spread[i] = valid.iter().map(|&j| self.spread[j]).sum::<f32>() / count;
-                    }
+            self.padded_level.clone_from(&self.level);
+            self.measured_spread.clone_from(&self.spread);
+            for i in (0..self.level.len()).filter(|&i| self.padded_level[i].is_nan()) {
+                let known = |j: &usize| !self.padded_level[*j].is_nan();
+                let [mut count, mut level, mut spread] = [0.0; 3];
+                for j in self.neighbours(i).filter(known) {
+                    count += 1.0;
+                    level += self.padded_level[j];
+                    spread += self.measured_spread[j];
+                }
+                if count > 0.0 {
+                    self.level[i] = level / count;
+                    self.spread[i] = spread / count;
                 }
             }
         }
@@ -125,73 +195,87 @@ impl Mesh {
 
     /// The indices of the 3x3 cells around cell `index`, itself among them.
     fn neighbours(&self, index: usize) -> impl Iterator<Item = usize> + use<> {
-        let (row, column, columns) = (index / self.columns, index % self.columns, self.columns);
-        let rows = row.saturating_sub(1)..(row + 2).min(self.rows);
-        let span = column.saturating_sub(1)..(column + 2).min(self.columns);
+        let columns = self.grid.columns;
+        let (row, column) = (index / columns, index % columns);
+        let rows = row.saturating_sub(1)..(row + 2).min(self.grid.rows);
+        let span = column.saturating_sub(1)..(column + 2).min(columns);
         rows.flat_map(move |r| span.clone().map(move |c| r * columns + c))
     }
 
     /// Median of 3x3 for all spreads, and for the levels that stick out from their neighbours.
     fn smooth(&mut self) {
-        let level = self.level.clone();
-        let spread = self.spread.clone();
-        let mut around = std::mem::take(&mut self.scratch.copy);
-        for i in 0..level.len() {
-            around.clear();
-            around.extend(self.neighbours(i).map(|j| spread[j]));
-            self.spread[i] = median(&mut around);
-            around.clear();
-            self.levels_around(&level, i, &mut around);
-            let middle = median(&mut around);
-            for value in &mut around {
-                *value = (*value - middle).abs();
+        let Grid { columns, rows, .. } = self.grid;
+        self.measured_spread.clone_from(&self.spread);
+        self.pad_levels();
+        let stride = columns + 2;
+        for row in 0..rows {
+            let cells = row * columns..(row + 1) * columns;
+            if row > 0 && row + 1 < rows && columns > 2 {
+                let around = [cells.start - columns, cells.start, cells.start + columns]
+                    .map(|start| &self.measured_spread[start..start + columns]);
+                medians::of_squares(around, &mut self.spread[cells.start + 1..cells.end - 1]);
+                self.smooth_border_spread(cells.start);
+                self.smooth_border_spread(cells.end - 1);
+            } else {
+                cells.clone().for_each(|i| self.smooth_border_spread(i));
             }
-            // A plane has the same deviations as its own gradient: only what exceeds them sticks out.
-            let allowed = 3.0 * 1.4826 * median(&mut around) + 0.5 * self.spread[i];
-            if (level[i] - middle).abs() > allowed {
-                self.level[i] = middle;
-            }
+            let around =
+                [row, row + 1, row + 2].map(|r| &self.padded_level[r * stride..(r + 1) * stride]);
+            medians::replace_outliers(around, &self.spread[cells.clone()], &mut self.level[cells]);
         }
-        self.scratch.copy = around;
     }
 
-    /// Adds to `around` the nine levels about cell `index`; those beyond the border go on as straight
-    /// as the two before them, so that a gradient lies about a border cell as about any other.
-    fn levels_around(&self, level: &[f32], index: usize, around: &mut Vec<f32>) {
-        let (row, column) = (index / self.columns, index % self.columns);
+    /// Median of the spreads about a cell at the border: of the fewer that there are, the lower of two middle ones.
+    fn smooth_border_spread(&mut self, index: usize) {
+        let mut around = [f32::INFINITY; 9];
+        let mut count = 0;
+        for (value, other) in around.iter_mut().zip(self.neighbours(index)) {
+            *value = self.measured_spread[other];
+            count += 1;
+        }
+        around.sort_unstable_by(f32::total_cmp);
+        self.spread[index] = around[(count - 1) / 2];
+    }
+
+    /// Copies the levels into a border of one cell, where they go on as straight as the two before them, so
+    /// that a gradient lies about a border cell as about any other.
+    fn pad_levels(&mut self) {
+        let Grid { columns, rows, .. } = self.grid;
+        let stride = columns + 2;
         // Along one side: the cell next to the border, and as far behind it as the wanted one is beyond.
-        let mirror = |at: isize, count: usize| {
-            let inside = at.clamp(0, count as isize - 1);
-            let behind = (2 * inside - at).clamp(0, count as isize - 1);
-            (inside as usize, behind as usize)
+        let mirror = |at: usize, count: usize| {
+            let inside = at.clamp(1, count) - 1;
+            let behind = (2 * inside + 1).saturating_sub(at).min(count - 1);
+            (inside, behind)
         };
-        let steps = (0..9).map(|i| (i / 3 - 1, i % 3 - 1));
-        around.extend(steps.map(|(down, across)| {
-            let (r, r_behind) = mirror(row as isize + down, self.rows);
-            let (c, c_behind) = mirror(column as isize + across, self.columns);
-            2.0 * level[r * self.columns + c] - level[r_behind * self.columns + c_behind]
-        }));
+        self.padded_level.resize(stride * (rows + 2), 0.0);
+        for (i, value) in self.padded_level.iter_mut().enumerate() {
+            let (r, r_behind) = mirror(i / stride, rows);
+            let (c, c_behind) = mirror(i % stride, columns);
+            let level = |r: usize, c: usize| self.level[r * columns + c];
+            *value = 2.0 * level(r, c) - level(r_behind, c_behind);
+        }
     }
 
-    /// The position of `at` among `count` nodes `cell_px` apart: lower node and fraction, which is
+    /// The position of `at` among `count` nodes, of which there are `per_px` in a pixel: lower node and fraction, which is
     /// below 0 or above 1 outside the outermost nodes.
-    fn node(at: f32, cell_px: f32, count: usize) -> (usize, f32) {
+    fn node(at: f32, per_px: f32, count: usize) -> (usize, f32) {
         if count == 1 {
             return (0, 0.0);
         }
-        let position = (at + 0.5) / cell_px - 0.5;
+        let position = (at + 0.5) * per_px - 0.5;
         let lower = (position.max(0.0) as usize).min(count - 2);
         (lower, position - lower as f32)
     }
 
     /// Level (extrapolated linearly beyond the outermost nodes) and spread (held there) at column `x`, row `y`.
     pub fn at(&self, x: f32, y: f32) -> (f32, f32) {
-        let (row, fy) = Self::node(y, self.cell_height_px, self.rows);
-        let (column, fx) = Self::node(x, self.cell_width_px, self.columns);
-        let right = (column + 1).min(self.columns - 1);
-        let below = (row + 1).min(self.rows - 1);
+        let (row, fy) = Self::node(y, self.rows_per_px, self.grid.rows);
+        let (column, fx) = Self::node(x, self.columns_per_px, self.grid.columns);
+        let right = (column + 1).min(self.grid.columns - 1);
+        let below = (row + 1).min(self.grid.rows - 1);
         let blend = |map: &[f32], fx: f32, fy: f32| {
-            let value = |r: usize, c: usize| map[r * self.columns + c];
+            let value = |r: usize, c: usize| map[r * self.grid.columns + c];
             let top = value(row, column) + fx * (value(row, right) - value(row, column));
             let bottom = value(below, column) + fx * (value(below, right) - value(below, column));
             top + fy * (bottom - top)
@@ -206,59 +290,86 @@ impl Mesh {
     ///
     /// Differs from [`Self::at`] in that the reciprocal is interpolated, not the spread: by less than
     /// the error of either.
-    pub fn row_pieces(&self, y: usize, width: usize, pieces: &mut Vec<Piece>) {
+    pub fn row_pieces(&self, y: usize, pieces: &mut Vec<Piece>) {
         pieces.clear();
-        let (row, fy) = Self::node(y as f32, self.cell_height_px, self.rows);
-        let below = (row + 1).min(self.rows - 1);
+        let Grid { columns, rows, .. } = self.grid;
+        let (row, fy) = Self::node(y as f32, self.rows_per_px, rows);
+        let below = (row + 1).min(rows - 1);
         let held = fy.clamp(0.0, 1.0);
-        let node = |column: usize| {
-            let (top, bottom) = (row * self.columns + column, below * self.columns + column);
-            let level = self.level[top] + fy * (self.level[bottom] - self.level[top]);
-            let spread = self.spread[top] + held * (self.spread[bottom] - self.spread[top]);
-            (level, 1.0 / spread)
-        };
-        let center = |column: usize| (column as f32 + 0.5) * self.cell_width_px - 0.5;
-        let mut push =
-            |start: usize, end: usize, origin: f32, value: (f32, f32), slope: (f32, f32)| {
-                if end > start {
-                    let offset = start as f32 - origin;
-                    pieces.push(Piece {
-                        start,
-                        end,
-                        level: value.0 + offset * slope.0,
-                        level_slope: slope.0,
-                        inverse: value.1 + offset * slope.1,
-                        inverse_slope: slope.1,
-                    });
-                }
+        let per_px = self.columns_per_px;
+        let node = |c: usize| {
+            let between = |map: &[f32], f: f32| {
+                let (top, bottom) = (map[row * columns + c], map[below * columns + c]);
+                top + f * (bottom - top)
             };
-        if self.columns == 1 {
-            push(0, width, 0.0, node(0), (0.0, 0.0));
-            return;
-        }
+            (between(&self.level, fy), between(&self.inverse, held))
+        };
         let mut left = node(0);
-        let mut start = 0;
-        for column in 0..self.columns - 1 {
-            let right = node(column + 1);
-            let slope = (
-                (right.0 - left.0) / self.cell_width_px,
-                (right.1 - left.1) / self.cell_width_px,
-            );
-            let (from, to) = (center(column), center(column + 1));
+        let mut slope = (0.0, 0.0);
+        for (p, edge) in self.edges.windows(2).enumerate() {
             // Beyond the outermost nodes the level goes on, the spread is held.
-            if column == 0 {
-                let end = (from.ceil().max(0.0) as usize).min(width);
-                push(0, end, from, left, (slope.0, 0.0));
-                start = end;
+            let (origin, at_origin) = (p.saturating_sub(1), left);
+            if p < columns && columns > 1 {
+                let right = node(p.max(1));
+                slope = ((right.0 - left.0) * per_px, (right.1 - left.1) * per_px);
+                if p > 0 {
+                    left = right;
+                }
             }
-            let end = (to.ceil() as usize).min(width);
-            push(start, end, from, left, slope);
-            start = start.max(end);
-            if column + 2 == self.columns {
-                push(start, width, to, right, (slope.0, 0.0));
-            }
-            left = right;
+            let is_outside = p == 0 || p == columns;
+            let slope = (slope.0, if is_outside { 0.0 } else { slope.1 });
+            let offset = edge[0] as f32 - self.center(origin);
+            pieces.push(Piece {
+                start: edge[0],
+                end: edge[1],
+                level: at_origin.0 + offset * slope.0,
+                level_slope: slope.0,
+                inverse: at_origin.1 + offset * slope.1,
+                inverse_slope: slope.1,
+            });
         }
+    }
+
+    /// What `level + sigmas·spread` is nowhere below in a row of cells.
+    pub fn lowest_about_row(&self, row: usize, sigmas: f32) -> f32 {
+        let columns = self.grid.columns;
+        let nodes = row.saturating_sub(1) * columns..(row + 2).min(self.grid.rows) * columns;
+        let (levels, spreads) = (&self.level[nodes.clone()], &self.spread[nodes]);
+        let values = levels.iter().zip(spreads).map(|(l, s)| l + sigmas * s);
+        let lowest = values.fold(f32::INFINITY, f32::min);
+        // Levels are extrapolated at the borders, by at most half a step between cells.
+        let (least, most) = levels
+            .iter()
+            .fold((f32::INFINITY, f32::NEG_INFINITY), |(least, most), &l| {
+                (least.min(l), most.max(l))
+            });
+        lowest - (most - least)
+    }
+
+    /// Level and spread at the nodes of row `y`: what is between two columns of cells lies straight between them.
+    pub fn across_row(&self, y: usize, nodes: &mut Vec<[f32; 2]>) {
+        let (row, fy) = Self::node(y as f32, self.rows_per_px, self.grid.rows);
+        let below = (row + 1).min(self.grid.rows - 1);
+        let held = fy.clamp(0.0, 1.0);
+        let columns = self.grid.columns;
+        nodes.clear();
+        nodes.extend((0..columns).map(|c| {
+            let (top, bottom) = (row * columns + c, below * columns + c);
+            [
+                self.level[top] + fy * (self.level[bottom] - self.level[top]),
+                self.spread[top] + held * (self.spread[bottom] - self.spread[top]),
+            ]
+        }));
+    }
+
+    /// Level and spread at column `x` of the row whose nodes are given: the same as [`Self::at`].
+    pub fn at_column(&self, nodes: &[[f32; 2]], x: f32) -> (f32, f32) {
+        let (column, fx) = Self::node(x, self.columns_per_px, nodes.len());
+        let (a, b) = (nodes[column], nodes[(column + 1).min(nodes.len() - 1)]);
+        (
+            a[0] + fx * (b[0] - a[0]),
+            a[1] + fx.clamp(0.0, 1.0) * (b[1] - a[1]),
+        )
     }
 }
 
@@ -279,35 +390,61 @@ pub(super) struct Piece {
     pub inverse_slope: f32,
 }
 
-impl Scratch {
-    /// Level and spread of one cell; NaN where it has too few values.
-    fn measure_cell(
+/// Buffers for the cells of one row.
+#[derive(Debug, Clone, Default)]
+pub(super) struct CellScratch {
+    values: Vec<f32>,
+    differences: Vec<f32>,
+    start: Vec<f32>,
+}
+
+impl CellScratch {
+    /// Levels and spreads of a row of cells, whose rows of pixels are `rows`; NaN where a cell has too few values.
+    pub fn measure_row<'a>(
         &mut self,
-        view: &View<'_>,
-        [x0, x1, y0, y1]: [usize; 4],
+        grid: &Grid,
+        rows: impl Iterator<Item = &'a [f32]> + Clone,
         config: &MeshConfig,
-    ) -> (f32, f32) {
-        self.values.clear();
-        self.differences.clear();
-        // Small cells are sampled in full.
-        let stride = if (x1 - x0) * (y1 - y0) >= 1024 {
-            ROW_STRIDE
-        } else {
-            1
-        };
-        for y in (y0..y1).step_by(stride) {
-            let row = &view.row(y)[x0..x1];
-            self.values.extend_from_slice(row);
-            if config.spread_of_differences && row.len() > 2 {
-                self.differences
-                    .extend(row[2..].iter().zip(row).map(|(b, a)| b - a));
+        (level, spread): (&mut [f32], &mut [f32]),
+    ) {
+        let rows = rows.step_by(grid.row_stride());
+        for first in (0..grid.columns).step_by(LANES) {
+            let cells = first..(first + LANES).min(grid.columns);
+            let mut starts = [None; LANES];
+            if config.is_normalised {
+                starts.fill(Some((0.0, 1.0)));
+            } else {
+                rough_starts(grid, cells.clone(), rows.clone(), &mut starts);
+            }
+            for (cell, start) in cells.zip(starts) {
+                self.gather(grid.columns_of(cell), rows.clone(), config);
+                let start = start.or_else(|| robust_start(&self.values, &mut self.start));
+                (level[cell], spread[cell]) = self.measure_cell(start, config);
             }
         }
-        let start = if config.is_normalised {
-            Some((0.0, 1.0))
-        } else {
-            robust_start(&self.values, &mut self.start)
-        };
+    }
+
+    /// Copies the pixels of a cell, and their differences where these are wanted.
+    fn gather<'a>(
+        &mut self,
+        columns: Range<usize>,
+        rows: impl Iterator<Item = &'a [f32]>,
+        config: &MeshConfig,
+    ) {
+        self.values.clear();
+        self.differences.clear();
+        for row in rows {
+            let row = &row[columns.clone()];
+            self.values.extend_from_slice(row);
+            if config.spread_of_differences && row.len() > 2 {
+                let pairs = row[2..].iter().zip(row);
+                self.differences.extend(pairs.map(|(b, a)| b - a));
+            }
+        }
+    }
+
+    /// Level and spread of the cell that is gathered; NaN where it has too few values.
+    fn measure_cell(&self, start: Option<(f32, f32)>, config: &MeshConfig) -> (f32, f32) {
         let measured =
             start.and_then(|at| clipped_mean_and_spread(&self.values, at, config.spread_floor));
         let Some((level, spread)) = measured else {
@@ -325,30 +462,64 @@ impl Scratch {
     }
 }
 
-/// Median, and its distance to the lower quantile, of a few of `values`; `None` for too few.
-fn robust_start(values: &[f32], start: &mut Vec<f32>) -> Option<(f32, f32)> {
-    start.clear();
-    // An odd stride does not beat with the rows of the cell.
-    let stride = (values.len() / START_SAMPLES).max(1) | 1;
-    start.extend(values.iter().step_by(stride).filter(|v| !v.is_nan()));
-    if start.len() < MIN_CELL_SAMPLES {
-        start.clear();
-        start.extend(values.iter().filter(|v| !v.is_nan()));
-        if start.len() < MIN_CELL_SAMPLES {
-            return None;
+/// Median, and its distance to the lower quantile, of a few pixels of up to [`LANES`] cells, sorted side by side;
+/// `None` for those with a pixel without a value.
+fn rough_starts<'a>(
+    grid: &Grid,
+    cells: Range<usize>,
+    rows: impl Iterator<Item = &'a [f32]> + Clone,
+    starts: &mut [Option<(f32, f32)>; LANES],
+) {
+    const SAMPLES: usize = medians::SORTED;
+    /// The golden ratio: its multiples spread evenly over the columns.
+    const STEP: f32 = 0.618_034;
+    let mut samples: [Lanes; SAMPLES] = [[0.0; LANES]; SAMPLES];
+    let width = grid.width_px / grid.columns;
+    for (i, (sample, row)) in samples.iter_mut().zip(rows.cycle()).enumerate() {
+        let offset = ((i as f32 * STEP).fract() * width as f32) as usize;
+        for (value, cell) in sample.iter_mut().zip(cells.clone()) {
+            *value = row[grid.columns_of(cell).start + offset];
         }
     }
-    start.sort_unstable_by(f32::total_cmp);
-    let quantile = |q: f32| start[(q * (start.len() - 1) as f32).round() as usize];
+    let mut checks = [0.0f32; LANES];
+    for sample in &samples {
+        for lane in 0..LANES {
+            checks[lane] += sample[lane];
+        }
+    }
+    medians::sort_lanes(&mut samples);
+    for lane in 0..cells.len() {
+        let quantile = |q: f32| samples[(q * (SAMPLES - 1) as f32).round() as usize][lane];
+        let is_known = !checks[lane].is_nan();
+        starts[lane] = is_known.then(|| start_from(quantile));
+    }
+}
+
+/// Level and spread by quantiles.
+fn start_from(quantile: impl Fn(f32) -> f32) -> (f32, f32) {
     let level = quantile(0.5);
     let below = level - quantile(0.159);
     let above = quantile(0.841) - level;
     // Clipped at zero, nothing lies below the median.
-    Some((level, if below > 0.0 { below } else { above }))
+    (level, if below > 0.0 { below } else { above })
+}
+
+/// Median, and its distance to the lower quantile, of `values`; `None` for too few.
+fn robust_start(values: &[f32], start: &mut Vec<f32>) -> Option<(f32, f32)> {
+    start.clear();
+    start.extend(values.iter().filter(|v| !v.is_nan()));
+    if start.len() < MIN_CELL_SAMPLES {
+        return None;
+    }
+    start.sort_unstable_by(f32::total_cmp);
+    Some(start_from(|q| {
+        start[(q * (start.len() - 1) as f32).round() as usize]
+    }))
 }
 
 /// Mean and standard deviation of `values` without outliers, from a first guess of both; `None` for
 /// too few values. NaN is left out.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn clipped_mean_and_spread(values: &[f32], start: (f32, f32), floor: f32) -> Option<(f32, f32)> {
     let (mut level, mut spread) = (start.0, start.1.max(floor));
     for round in 0..MAX_CLIP_ROUNDS {
@@ -358,7 +529,8 @@ fn clipped_mean_and_spread(values: &[f32], start: (f32, f32), floor: f32) -> Opt
         }
         let mean = sum / count;
         let variance = (squares / count - mean * mean).max(0.0);
-        let new_spread = variance.sqrt() / CLIPPED_SHRINK;
+        let clipped = variance.sqrt() / CLIPPED_SHRINK;
+        let new_spread = (spread + (clipped - spread) / (1.0 - LEFT_BY_ROUND)).max(0.0);
         let settled =
             (new_spread - spread).abs() <= SETTLED * spread && mean.abs() <= SETTLED * spread;
         level += mean;
@@ -371,7 +543,7 @@ fn clipped_mean_and_spread(values: &[f32], start: (f32, f32), floor: f32) -> Opt
 }
 
 /// Number, sum and sum of squares of `value - center` where it is at most `half_width` in size.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+#[inline(always)]
 fn clipped_moments(values: &[f32], center: f32, half_width: f32) -> [f32; 3] {
     const LANES: usize = 32;
     let mut count = [0.0f32; LANES];
@@ -394,13 +566,11 @@ fn clipped_moments(values: &[f32], center: f32, half_width: f32) -> [f32; 3] {
     for (lane, &value) in rest.iter().enumerate() {
         add(lane, value);
     }
-    [count, sum, squares].map(|lanes| lanes.iter().sum())
-}
-
-/// The middle value; the lower of the two for an even number. `values` must not be empty.
-fn median(values: &mut [f32]) -> f32 {
-    let middle = (values.len() - 1) / 2;
-    *values.select_nth_unstable_by(middle, f32::total_cmp).1
+    [
+        medians::sum_of(count),
+        medians::sum_of(sum),
+        medians::sum_of(squares),
+    ]
 }
 
 #[cfg(test)]
@@ -502,7 +672,7 @@ mod tests {
         mesh.measure(&View::new(&pixels, 200, 200), &CONFIG);
         let mut pieces = Vec::new();
         for y in [0, 63, 199] {
-            mesh.row_pieces(y, 200, &mut pieces);
+            mesh.row_pieces(y, &mut pieces);
             assert_eq!(pieces.last().unwrap().end, 200);
             for piece in &pieces {
                 for x in piece.start..piece.end {

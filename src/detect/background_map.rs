@@ -46,7 +46,7 @@ impl BackgroundMap {
         }
         let mut pieces: Vec<Piece> = Vec::new();
         let y = y.saturating_sub(y0).min(height - 1);
-        self.mesh.row_pieces(y, width, &mut pieces);
+        self.mesh.row_pieces(y, &mut pieces);
         for piece in &pieces {
             for x in piece.start..piece.end {
                 let level = piece.level + (x - piece.start) as f32 * piece.level_slope;

@@ -10,7 +10,7 @@ use super::fit::{Fit, FitConfig, NoiseModel, SPOT_RANGE_PX, window_radius};
 use super::psf::PIXEL_VARIANCE_PX2;
 use super::raw_peaks::RawPeak;
 use super::scene::{FitWork, Scene};
-use super::view::View;
+use arrayvec::ArrayVec;
 
 /// The spot size where the frame does not tell, in pixels: a well-focused camera.
 pub(super) const DEFAULT_SPOT_PX: f64 = 0.9;
@@ -42,20 +42,15 @@ const MODE_WIDTH: f64 = 1.25;
 /// Rounds of averaging around the mode.
 const MODE_ROUNDS: usize = 4;
 
-/// A bright star fitted with a free size.
-#[derive(Debug, Clone)]
-pub(super) struct BrightStar {
-    /// The fit.
-    pub fit: Fit,
-}
+/// Bright stars, each fitted with a free size.
+pub(super) type BrightStars = ArrayVec<Fit, MAX_STARS>;
 
 /// Fits the brightest peaks with a free size.
 pub(super) fn fit_bright_stars(
     scene: &Scene<'_>,
-    filtered: View<'_>,
     peaks: &[Peak],
     work: &mut FitWork,
-) -> Vec<BrightStar> {
+) -> BrightStars {
     let isolation = ISOLATION_SIGMA * (scene.spot_px + 0.3) as f32;
     let bright = peaks
         .iter()
@@ -64,7 +59,7 @@ pub(super) fn fit_bright_stars(
     bright
         .filter(|p| !p.saturated && is_isolated(p, &peaks[..peaks.len().min(2000)], isolation))
         .filter_map(|&peak| {
-            let size = size_from_curvature(filtered, &peak, scene.spot_px);
+            let size = size_from_curvature(&peak, scene.spot_px);
             let fit = scene.fit_free(
                 scene.first_guess(&peak),
                 &[],
@@ -72,7 +67,7 @@ pub(super) fn fit_bright_stars(
                 work,
             );
             let is_star = fit.converged && fit.spots[0].flux > 0.0 && is_alone(&fit, work);
-            is_star.then_some(BrightStar { fit })
+            is_star.then_some(fit)
         })
         .take(MAX_STARS)
         .collect()
@@ -83,31 +78,28 @@ pub(super) fn fit_raw_stars(
     scene: &Scene<'_>,
     peaks: &[RawPeak],
     work: &mut FitWork,
-) -> Vec<BrightStar> {
+) -> BrightStars {
     let rivals = &peaks[..peaks.len().min(2000)];
     let bright = peaks
         .iter()
         .take(4 * MAX_STARS)
         .take_while(|p| p.snr >= MIN_SNR);
     bright
-        .filter(|peak| {
-            let reach = ISOLATION_SIGMA * (peak.size_px as f32 + 0.3);
+        .filter(|peak| !peak.saturated)
+        .map(|peak| (peak, peak.size_px(&scene.view)))
+        .filter(|(peak, size_px)| {
+            let reach = ISOLATION_SIGMA * (*size_px as f32 + 0.3);
             let is_near = |other: &RawPeak| {
                 let dx = other.x as f32 - peak.x as f32;
                 let dy = other.y as f32 - peak.y as f32;
                 (dx != 0.0 || dy != 0.0) && dx * dx + dy * dy <= reach * reach
             };
-            !peak.saturated && !rivals.iter().any(|o| is_near(o) && o.snr >= 0.1 * peak.snr)
+            !rivals.iter().any(|o| is_near(o) && o.snr >= 0.1 * peak.snr)
         })
-        .filter_map(|peak| {
-            let fit = scene.fit_free(
-                peak.spot(),
-                &[],
-                (peak.size_px, NoiseModel::default()),
-                work,
-            );
+        .filter_map(|(peak, size_px)| {
+            let fit = scene.fit_free(peak.spot(), &[], (size_px, NoiseModel::default()), work);
             let is_star = fit.converged && fit.spots[0].flux > 0.0 && is_alone(&fit, work);
-            is_star.then_some(BrightStar { fit })
+            is_star.then_some(fit)
         })
         .take(MAX_STARS)
         .collect()
@@ -125,8 +117,14 @@ fn is_isolated(peak: &Peak, peaks: &[Peak], reach: f32) -> bool {
 /// Whether no light in the fit's window, which is still in `work`, is another star's: more than the spot's imperfection and
 /// noise, where there should be next to none.
 fn is_alone(fit: &Fit, work: &mut FitWork) -> bool {
-    let FitWork { fitter, window } = work;
-    let (mut peak, mut beside) = (0.0f64, Vec::new());
+    let FitWork {
+        fitter,
+        window,
+        residuals: beside,
+        ..
+    } = work;
+    let mut peak = 0.0f64;
+    beside.clear();
     fitter.for_each_pixel(window, fit, |data, light, _| {
         peak = peak.max(light);
         beside.push((light, data - light - fit.background));
@@ -139,25 +137,22 @@ fn is_alone(fit: &Fit, work: &mut FitWork) -> bool {
 
 /// The spot size that the filtered peak's curvature tells: a Gaussian of variance
 /// σ² + σ_filter² + 2/12 falls to exp(−1/2S²) at the next pixel.
-fn size_from_curvature(filtered: View<'_>, peak: &Peak, filter_px: f64) -> f64 {
-    let (x, y) = (peak.x, peak.y);
-    let inside = x > 0 && y > 0 && x + 1 < filtered.width && y + 1 < filtered.height;
-    if !inside {
+fn size_from_curvature(peak: &Peak, filter_px: f64) -> f64 {
+    let Some((value, around)) = peak.values else {
         return filter_px;
-    }
-    let log = |x: usize, y: usize| f64::from(filtered.at(x, y).max(1e-3)).ln();
-    let around = log(x - 1, y) + log(x + 1, y) + log(x, y - 1) + log(x, y + 1);
-    let drop = log(x, y) - 0.25 * around;
+    };
+    let log = |value: f32| f64::from(value.max(1e-3)).ln();
+    let drop = log(value) - 0.25 * around.into_iter().map(log).sum::<f64>();
     let variance = 0.5 / drop.max(1e-3) - filter_px * filter_px - 2.0 * PIXEL_VARIANCE_PX2;
     variance.max(0.0).sqrt().clamp(0.35, 6.0)
 }
 
 /// The frame's spot size from its bright stars, in pixels, and how many of them have about that
 /// size; `None` where there are too few.
-pub(super) fn spot_size(stars: &[BrightStar]) -> Option<(f64, usize)> {
-    let mut sizes: Vec<f64> = stars
+pub(super) fn spot_size(stars: &BrightStars) -> Option<(f64, usize)> {
+    let mut sizes: ArrayVec<f64, MAX_STARS> = stars
         .iter()
-        .map(|star| star.fit.spot_px)
+        .map(|star| star.spot_px)
         .filter(|&size| size > HOT_PIXEL_PX && size < SPOT_RANGE_PX.1)
         .collect();
     if sizes.len() < MIN_STARS {
@@ -208,12 +203,12 @@ pub(super) struct StarModel {
 }
 
 /// The noise model from the residuals of stars of about the frame's spot size, and that size by the weights that follow.
-pub(super) fn star_model(scene: &Scene<'_>, stars: &[BrightStar], work: &mut FitWork) -> StarModel {
-    let mut usable: Vec<Fit> = stars
-        .iter()
-        .map(|star| star.fit.clone())
-        .filter(|fit| (fit.spot_px / scene.spot_px).ln().abs() < MODE_WIDTH.ln())
-        .collect();
+pub(super) fn star_model(
+    scene: &Scene<'_>,
+    mut usable: BrightStars,
+    work: &mut FitWork,
+) -> StarModel {
+    usable.retain(|fit| (fit.spot_px / scene.spot_px).ln().abs() < MODE_WIDTH.ln());
     // A start from too little noise would let the brightest pixel decide, which a fit then follows wherever it is.
     let brightest = usable.first().map(|fit| fit.spots[0]);
     let mut model = NoiseModel {
@@ -289,14 +284,14 @@ impl Moments {
     fn add_star(&mut self, work: &mut FitWork, fit: &Fit, config: &FitConfig) {
         let noise = work.window.noise_variance;
         let model = config.noise;
-        let FitWork { fitter, window } = work;
+        let FitWork { fitter, window, .. } = work;
         fitter.for_each_residual(window, fit, config, |residual, light, leverage| {
             let m2 = light * light;
             if light < 0.0 || m2 < 0.25 * noise {
                 return;
             }
             let variance = noise + model.shot_adu * light + model.model_error2 * m2;
-            let free = (1.0 - leverage).max(0.0);
+            let free = (1.0 - leverage()).max(0.0);
             let squared = (residual * residual).min(MAX_SQUARED_SIGMA * free * variance);
             let above_noise = squared / CUT_OFF_MEAN - free * noise;
             let weight = 1.0 / (variance * variance);

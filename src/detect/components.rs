@@ -1,8 +1,9 @@
 //! Connected regions above the threshold, and the peaks in them.
 //!
-//! filtered frame, its mean and noise → [`Peak`]s, strongest first, and the [`Region`]s they lie in.
+//! filtered bands, their mean and noise → [`Peak`]s, strongest first, and the [`Region`]s they lie in.
 //!
-//! 1. Pixels above the threshold, in units of the local noise of the filtered frame.
+//! 1. Pixels above the threshold, in units of the local noise of the filtered frame, out of the [`Candidates`]
+//!    of each band: those above a lower one, for while the bands are made the noise is not yet known everywhere.
 //! 2. Regions of 8-connected pixels.
 //! 3. Local maxima, each with its prominence: its height above the highest saddle towards a higher
 //!    maximum of the region.
@@ -12,8 +13,10 @@
 //! Edelsbrunner, Letscher & Zomorodian 2002, doi 10.1007/s00454-002-2885-2, for prominence as persistence.
 
 use super::background::Mesh;
-use super::matched_filter::{BLOCK_PX, Filtered};
+use super::blocks::columns_from;
+use super::matched_filter::Band;
 use super::view::View;
+use std::ops::Range;
 
 /// A maximum must stand this many noise standard deviations above its saddle to count by itself.
 const MIN_PROMINENCE: f32 = 3.0;
@@ -39,11 +42,99 @@ const STREAK_LINK_SIGMA: f32 = 4.0;
 /// The pixels.
 const STREAK_LINK_PX: f32 = 5.0;
 /// So many dashes in a line are no chance.
-const MIN_STREAK_DASHES: usize = 5;
+const MIN_STREAK_DASHES: u32 = 5;
 /// The scatter of the dashes across the line, over the spot's width, at most.
 const STREAK_BREADTH_SIGMA: f64 = 1.2;
 /// The length of a dashed streak over its breadth, as standard deviations.
 const STREAK_DASHED: f64 = 8.0;
+
+/// What a row of cells holds that may lie above the threshold.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Candidates {
+    /// All pixels of the filtered frame from `cut` on, in reading order.
+    pixels: Vec<Candidate>,
+    /// The local maxima among them, in reading order.
+    tops: Vec<Top>,
+    /// In units of the background noise.
+    cut: f32,
+}
+
+/// A pixel of the filtered frame.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    x: u32,
+    y: u32,
+    value: f32,
+}
+
+/// A local maximum of the filtered frame.
+#[derive(Debug, Clone, Copy)]
+struct Top {
+    /// Its index among the pixels.
+    pixel: u32,
+    /// The values to the left, to the right, above and below; `None` at the border.
+    around: Option<[f32; 4]>,
+}
+
+impl Candidates {
+    /// Gathers the pixels from `cut` on in `rows` of `band`, which has a row more on either side within the frame.
+    pub fn gather(&mut self, band: &Band, rows: Range<usize>, cut: f32) {
+        self.pixels.clear();
+        self.tops.clear();
+        self.cut = cut;
+        for y in rows {
+            let maxima = band.block_maxima(y..y + 1).iter().enumerate();
+            let around = [y.checked_sub(1).and_then(|y| band.row(y)), band.row(y + 1)];
+            for (block, _) in maxima.filter(|&(_, &maximum)| maximum >= cut) {
+                let Some(row) = band.row(y) else { continue };
+                for x in columns_from(row, block, cut) {
+                    if is_local_maximum(row, around, x) {
+                        self.tops.push(Top {
+                            pixel: self.pixels.len() as u32,
+                            around: next_to(row, around, x),
+                        });
+                    }
+                    self.pixels.push(Candidate {
+                        x: x as u32,
+                        y: y as u32,
+                        value: row[x],
+                    });
+                }
+            }
+        }
+    }
+
+    /// Whether all pixels from `lowest` on are among them.
+    pub fn reach_down_to(&self, lowest: f32) -> bool {
+        self.cut <= lowest
+    }
+}
+
+/// Whether no neighbour in the row or in those above and below is higher; of equal ones the first in reading order counts.
+fn is_local_maximum(row: &[f32], [above, below]: [Option<&[f32]>; 2], x: usize) -> bool {
+    let value = row[x];
+    let columns = x.saturating_sub(1)..(x + 2).min(row.len());
+    let all_low = |row: Option<&[f32]>, is_low: fn(f32, f32) -> bool| {
+        row.is_none_or(|row| row[columns.clone()].iter().all(|&v| is_low(v, value)))
+    };
+    let is_lower: fn(f32, f32) -> bool = |v, value| v < value;
+    let is_no_higher: fn(f32, f32) -> bool = |v, value| v <= value;
+    (x == 0 || row[x - 1] < value)
+        && (x + 1 == row.len() || row[x + 1] <= value)
+        && all_low(above, is_lower)
+        && all_low(below, is_no_higher)
+}
+
+/// The values to the left, to the right, above and below; `None` at the border.
+fn next_to(row: &[f32], [above, below]: [Option<&[f32]>; 2], x: usize) -> Option<[f32; 4]> {
+    let inside = x > 0 && x + 1 < row.len();
+    inside.then_some([
+        row[x.max(1) - 1],
+        row[(x + 1).min(row.len() - 1)],
+        above?[x],
+        below?[x],
+    ])
+}
 
 /// A pixel above the threshold.
 #[derive(Debug, Clone, Copy)]
@@ -52,6 +143,20 @@ struct Pixel {
     y: u32,
     /// Filtered value over its local noise.
     snr: f32,
+}
+
+/// Neighbouring pixels of a row.
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    y: u32,
+    /// Column of the first.
+    start: u32,
+    /// Column after the last.
+    end: u32,
+    /// Index of the first among the pixels.
+    pixel: u32,
+    /// Index of its region.
+    region: u32,
 }
 
 /// A local maximum of the filtered frame.
@@ -63,6 +168,8 @@ pub(super) struct Peak {
     pub y: usize,
     /// Top of the parabola through the filtered values: columns and rows beyond the pixel's centre.
     pub offset_px: [f32; 2],
+    /// The filtered value, and those to the left, to the right, above and below; `None` at the border.
+    pub values: Option<(f32, [f32; 4])>,
     /// Filtered value over its local noise.
     pub snr: f32,
     /// Height above the highest saddle towards a higher maximum of its region, in the same unit.
@@ -80,6 +187,8 @@ pub(super) struct Region {
     pub area_px: usize,
     /// Number of peaks kept.
     pub peaks: usize,
+    /// Whether one of its peaks stands for a streak.
+    stands_for_streak: bool,
     /// Centre, weighted with the filtered values.
     pub x: f64,
     /// Centre, weighted with the filtered values.
@@ -115,6 +224,7 @@ impl Region {
         Self {
             area_px: count,
             peaks: 0,
+            stands_for_streak: false,
             x: x + x0,
             y: y + y0,
             major_px: (middle + half_range + own).sqrt(),
@@ -149,37 +259,56 @@ pub(super) struct Search {
     pixels: Vec<Pixel>,
     /// Index in `pixels` of the first of each row, and the end.
     row_starts: Vec<usize>,
+    runs: Vec<Run>,
     parents: Vec<u32>,
+    /// Where the runs of each region start in `by_region`, and the end.
+    region_starts: Vec<u32>,
+    /// The runs, region by region.
+    by_region: Vec<u32>,
+    /// The pixels of one region, and their floods.
+    members: Vec<u32>,
+    floods: Vec<u32>,
     /// Rank by height of each of `pixels` within its region, where it was needed.
     ranks: Vec<u32>,
-    /// Index of the peak at each of `pixels`; `u32::MAX` where there is none.
-    peak_at: Vec<u32>,
+    /// The pixel and the run of each peak while they are in reading order.
+    peak_pixels: Vec<[u32; 2]>,
+    kept: Vec<Peak>,
+    /// The last of the kept peaks in each cell of a grid, and for each the one before it there.
+    last_in_cell: Vec<u32>,
+    before_in_cell: Vec<u32>,
+    by_row: Vec<u32>,
+    nodes: Vec<[f32; 2]>,
     /// Peaks, strongest first.
     pub peaks: Vec<Peak>,
     /// All regions.
     pub regions: Vec<Region>,
 }
 
+/// No index.
+const NONE: u32 = u32::MAX;
+
 impl Search {
-    /// Finds regions and peaks in `filtered`, whose mean and noise are in `mesh`.
+    /// Finds regions and peaks in the candidates of all bands of the filtered frame, whose mean and noise are in `mesh`.
     pub fn run(
         &mut self,
-        filtered: &Filtered,
+        bands: &[Candidates],
         mesh: &Mesh,
         frame: &View<'_>,
         config: &SearchConfig,
     ) {
-        self.collect(filtered, mesh, config);
+        self.collect(bands, mesh, frame, config);
         self.connect();
-        self.measure_regions_and_peaks(&filtered.view(), frame, config);
+        self.measure_regions();
+        self.find_all_prominences();
         self.drop_unfounded_peaks(config);
         self.count_peaks();
         let before = self.peaks.len();
-        let regions = &self.regions;
-        let mut seen = std::collections::HashSet::new();
+        let regions = &mut self.regions;
         // Strongest first: of a streak's many maxima only the first stays.
-        self.peaks
-            .retain(|p| !regions[p.region].is_streak(config) || seen.insert(p.region));
+        self.peaks.retain(|p| {
+            let region = &mut regions[p.region];
+            !region.is_streak(config) || !std::mem::replace(&mut region.stands_for_streak, true)
+        });
         if self.peaks.len() < before {
             self.count_peaks();
         }
@@ -189,29 +318,69 @@ impl Search {
     /// Joins the dashes of faint streaks: chains of peaks in a straight line become one region with one peak.
     fn join_dashes(&mut self, config: &SearchConfig) {
         let link_px = STREAK_LINK_SIGMA * config.spot_width_px + STREAK_LINK_PX;
-        for chain in chains(&self.peaks, link_px) {
-            let mut streak = line_through(&chain, &self.peaks);
+        self.link_peaks(link_px);
+        for chain in self
+            .by_row
+            .chunk_by(|&a, &b| self.parents[a as usize] == self.parents[b as usize])
+        {
+            let mut streak = line_through(chain, &self.peaks);
             streak.area_px = chain
                 .iter()
-                .map(|&i| self.regions[self.peaks[i].region].area_px)
+                .map(|&i| self.regions[self.peaks[i as usize].region].area_px)
                 .sum();
             let is_straight =
                 streak.minor_px < STREAK_BREADTH_SIGMA * f64::from(config.spot_width_px);
-            if chain.len() < MIN_STREAK_DASHES
-                || !is_straight
-                || streak.major_px < STREAK_DASHED * streak.minor_px
-            {
+            if !is_straight || streak.major_px < STREAK_DASHED * streak.minor_px {
                 continue;
             }
             streak.peaks = 1;
             // Peaks come strongest first.
-            self.peaks[chain[0]].region = self.regions.len();
+            self.peaks[chain[0] as usize].region = self.regions.len();
             for &other in &chain[1..] {
-                self.peaks[other].snr = f32::NAN;
+                self.peaks[other as usize].snr = f32::NAN;
             }
             self.regions.push(streak);
         }
         self.peaks.retain(|p| !p.snr.is_nan());
+    }
+
+    /// Groups of at least [`MIN_STREAK_DASHES`] peaks, each within `link_px` of another: in `by_row` one group after the
+    /// other, indices ascending, and in `parents` the group of each.
+    fn link_peaks(&mut self, link_px: f32) {
+        let Self {
+            peaks,
+            by_row,
+            parents,
+            ..
+        } = self;
+        by_row.clear();
+        by_row.extend(0..peaks.len() as u32);
+        by_row.sort_unstable_by_key(|&i| (peaks[i as usize].y, i));
+        parents.clear();
+        parents.extend(0..peaks.len() as u32);
+        for (rank, &index) in by_row.iter().enumerate() {
+            let peak = &peaks[index as usize];
+            for &other in &by_row[rank + 1..] {
+                let dx = peaks[other as usize].x as f32 - peak.x as f32;
+                let dy = peaks[other as usize].y as f32 - peak.y as f32;
+                if dy > link_px {
+                    break;
+                }
+                if dx * dx + dy * dy <= link_px * link_px {
+                    join(parents, index, other);
+                }
+            }
+        }
+        let sizes = &mut self.ranks;
+        sizes.clear();
+        sizes.resize(peaks.len(), 0);
+        for index in 0..peaks.len() as u32 {
+            let root = root_of(parents, index);
+            parents[index as usize] = root;
+            sizes[root as usize] += 1;
+        }
+        by_row.retain(|&i| sizes[parents[i as usize] as usize] >= MIN_STREAK_DASHES);
+        by_row.sort_unstable_by_key(|&i| (parents[i as usize], i));
     }
 
     fn count_peaks(&mut self) {
@@ -223,49 +392,85 @@ impl Search {
         }
     }
 
-    /// Gathers the pixels above the threshold, row by row.
-    fn collect(&mut self, filtered: &Filtered, mesh: &Mesh, config: &SearchConfig) {
+    /// Gathers the pixels above the threshold, in runs, and the maxima among them.
+    fn collect(
+        &mut self,
+        bands: &[Candidates],
+        mesh: &Mesh,
+        frame: &View<'_>,
+        config: &SearchConfig,
+    ) {
         self.pixels.clear();
         self.row_starts.clear();
-        let view = filtered.view();
-        let lowest = mesh
-            .level
-            .iter()
-            .zip(&mesh.spread)
-            .map(|(level, spread)| level + config.threshold * spread)
-            .fold(f32::INFINITY, f32::min);
-        // Levels are extrapolated at the borders, by at most half a step between cells.
-        let slack = mesh.level.iter().copied().fold(f32::NEG_INFINITY, f32::max)
-            - mesh.level.iter().copied().fold(f32::INFINITY, f32::min);
-        let lowest = lowest - slack;
-        for y in 0..view.height {
-            self.row_starts.push(self.pixels.len());
-            let row = view.row(y);
-            for (block, &maximum) in filtered.block_maxima(y).iter().enumerate() {
-                if maximum < lowest {
-                    continue;
+        self.runs.clear();
+        self.peaks.clear();
+        self.peak_pixels.clear();
+        for band in bands {
+            let mut tops = band.tops.iter().peekable();
+            for (index, candidate) in (0..).zip(&band.pixels) {
+                let top = tops.next_if(|top| top.pixel == index);
+                let Candidate { x, y, value } = *candidate;
+                if self.row_starts.len() <= y as usize {
+                    self.row_starts.resize(y as usize + 1, self.pixels.len());
+                    mesh.across_row(y as usize, &mut self.nodes);
                 }
-                let start = block * BLOCK_PX;
-                let end = (start + BLOCK_PX).min(view.width);
-                for x in candidates(&row[start..end], start, lowest) {
-                    let value = row[x];
-                    let (level, spread) = mesh.at(x as f32, y as f32);
-                    let snr = (value - level) / spread;
-                    if snr >= config.threshold {
-                        self.pixels.push(Pixel {
-                            x: x as u32,
-                            y: y as u32,
-                            snr,
-                        });
+                let (level, spread) = mesh.at_column(&self.nodes, x as f32);
+                let snr = (value - level) / spread;
+                if snr >= config.threshold {
+                    self.add_pixel(Pixel { x, y, snr });
+                    if let Some(top) = top {
+                        self.add_peak(
+                            value,
+                            top,
+                            is_saturated(frame, x as usize, y as usize, config),
+                        );
                     }
                 }
             }
         }
-        self.row_starts.push(self.pixels.len());
+        self.row_starts.resize(frame.height + 1, self.pixels.len());
+    }
+
+    /// Adds a pixel, to the run of the one before it if it is next to that.
+    fn add_pixel(&mut self, pixel: Pixel) {
+        let Pixel { x, y, .. } = pixel;
+        match self.runs.last_mut() {
+            Some(run) if run.y == y && run.end == x => run.end = x + 1,
+            _ => self.runs.push(Run {
+                y,
+                start: x,
+                end: x + 1,
+                pixel: self.pixels.len() as u32,
+                region: NONE,
+            }),
+        }
+        self.pixels.push(pixel);
+    }
+
+    /// Adds the last pixel as a peak; its region is not known yet.
+    fn add_peak(&mut self, value: f32, top: &Top, saturated: bool) {
+        let Some(&Pixel { x, y, snr }) = self.pixels.last() else {
+            return;
+        };
+        let last = |count: usize| count as u32 - 1;
+        self.peak_pixels
+            .push([last(self.pixels.len()), last(self.runs.len())]);
+        self.peaks.push(Peak {
+            x: x as usize,
+            y: y as usize,
+            offset_px: top
+                .around
+                .map_or([0.0; 2], |around| parabola_top(value, around)),
+            values: top.around.map(|around| (value, around)),
+            snr,
+            prominence: snr,
+            region: 0,
+            saturated,
+        });
     }
 
     /// The pixels of row `y` with columns in `from..=to`, as a range of indices.
-    fn in_row(&self, y: usize, from: u32, to: u32) -> std::ops::Range<usize> {
+    fn in_row(&self, y: usize, from: u32, to: u32) -> Range<usize> {
         let (Some(&start), Some(&end)) = (self.row_starts.get(y), self.row_starts.get(y + 1))
         else {
             return 0..0;
@@ -284,140 +489,150 @@ impl Search {
             .filter(move |&other| other != index)
     }
 
-    /// Joins neighbouring pixels into regions.
+    /// Joins touching runs into regions, which are numbered in reading order; sorts the runs by region.
     fn connect(&mut self) {
-        let mut parents = std::mem::take(&mut self.parents);
+        let Self { runs, parents, .. } = self;
         parents.clear();
-        parents.extend(0..self.pixels.len() as u32);
-        for index in 0..self.pixels.len() {
-            let Pixel { x, y, .. } = self.pixels[index];
-            if index > 0 && self.pixels[index - 1].y == y && self.pixels[index - 1].x + 1 == x {
-                join(&mut parents, index as u32, index as u32 - 1);
+        parents.extend(0..runs.len() as u32);
+        // The first run that may still touch one of this row or a later one.
+        let mut above = 0;
+        for index in 0..runs.len() {
+            let run = runs[index];
+            while runs[above].y + 1 < run.y
+                || (runs[above].y < run.y && runs[above].end < run.start)
+            {
+                above += 1;
             }
-            if y > 0 {
-                for other in self.in_row(y as usize - 1, x.saturating_sub(1), x + 1) {
-                    join(&mut parents, index as u32, other as u32);
-                }
+            let touching =
+                (above..index).take_while(|&i| runs[i].y < run.y && runs[i].start <= run.end);
+            for other in touching {
+                join(parents, index as u32, other as u32);
             }
         }
-        self.parents = parents;
-    }
-
-    /// Measures each region and finds its maxima.
-    fn measure_regions_and_peaks(
-        &mut self,
-        view: &View<'_>,
-        frame: &View<'_>,
-        config: &SearchConfig,
-    ) {
-        self.regions.clear();
-        self.peaks.clear();
-        self.ranks.resize(self.pixels.len(), 0);
-        self.peak_at.clear();
-        self.peak_at.resize(self.pixels.len(), u32::MAX);
-        let mut parents = std::mem::take(&mut self.parents);
-        // The root is the first pixel of its region: regions are numbered in reading order.
-        let mut region_of = vec![0; parents.len()];
-        let mut ends: Vec<usize> = Vec::new();
-        for index in 0..parents.len() {
-            let root = root_of(&mut parents, index as u32) as usize;
+        let starts = &mut self.region_starts;
+        starts.clear();
+        for index in 0..runs.len() {
+            // The root is the first run of its region.
+            let root = root_of(parents, index as u32) as usize;
             if root == index {
-                region_of[index] = ends.len();
-                ends.push(0);
+                runs[index].region = starts.len() as u32;
+                starts.push(0);
             } else {
-                region_of[index] = region_of[root];
+                runs[index].region = runs[root].region;
             }
-            ends[region_of[index]] += 1;
+            starts[runs[index].region as usize] += 1;
         }
-        self.parents = parents;
-        // Pixels sorted by region, by counting: where each region's next pixel goes, its end at last.
-        let mut start = 0;
-        for end in &mut ends {
-            start += std::mem::replace(end, start);
+        // From counts to ends, which become starts as the runs are put in place from behind.
+        let mut end = 0;
+        for start in starts.iter_mut() {
+            end += *start;
+            *start = end;
         }
-        let mut sorted = vec![0; region_of.len()];
-        for (index, &region) in region_of.iter().enumerate() {
-            sorted[ends[region]] = index;
-            ends[region] += 1;
+        self.by_region.resize(runs.len(), 0);
+        for (index, run) in runs.iter().enumerate().rev() {
+            let start = &mut starts[run.region as usize];
+            *start -= 1;
+            self.by_region[*start as usize] = index as u32;
         }
-        let mut rest = sorted.as_mut_slice();
-        let mut start = 0;
-        for (region, &end) in ends.iter().enumerate() {
-            let (members, others) = rest.split_at_mut(end - start);
-            (rest, start) = (others, end);
-            self.regions.push(self.measure(members));
-            let first = self.peaks.len();
-            for &index in members.iter() {
-                let Pixel { x, y, snr } = self.pixels[index];
-                let (x, y) = (x as usize, y as usize);
-                if is_local_maximum(view, x, y) {
-                    self.peak_at[index] = self.peaks.len() as u32;
-                    self.peaks.push(Peak {
-                        x,
-                        y,
-                        offset_px: parabola_top(view, x, y),
-                        snr,
-                        prominence: snr,
-                        region,
-                        saturated: is_saturated(frame, x, y, config),
-                    });
-                }
-            }
-            if self.peaks.len() - first > 1 {
-                self.find_prominences(members);
-            }
+        starts.push(runs.len() as u32);
+    }
+
+    /// Measures each region, and tells the peaks which they lie in.
+    fn measure_regions(&mut self) {
+        let Self {
+            runs,
+            pixels,
+            regions,
+            ..
+        } = self;
+        regions.clear();
+        for span in self.region_starts.windows(2) {
+            let of_region = &self.by_region[span[0] as usize..span[1] as usize];
+            let pixels = of_region
+                .iter()
+                .flat_map(|&run| pixels_of(&runs[run as usize], pixels));
+            regions.push(Region::of_points(
+                pixels.map(|p| (f64::from(p.x), f64::from(p.y), f64::from(p.snr))),
+            ));
+        }
+        for (peak, [_, run]) in self.peaks.iter_mut().zip(&self.peak_pixels) {
+            peak.region = runs[*run as usize].region as usize;
+            regions[peak.region].peaks += 1;
         }
     }
 
-    /// Area, centre and principal axes of a region.
-    fn measure(&self, members: &[usize]) -> Region {
-        let pixels = members.iter().map(|&index| &self.pixels[index]);
-        Region::of_points(pixels.map(|p| (f64::from(p.x), f64::from(p.y), f64::from(p.snr))))
+    /// Sets the prominences where a region has several peaks.
+    fn find_all_prominences(&mut self) {
+        self.ranks
+            .resize(self.pixels.len().max(self.ranks.len()), 0);
+        let mut members = std::mem::take(&mut self.members);
+        for region in 0..self.regions.len() {
+            if self.regions[region].peaks < 2 {
+                continue;
+            }
+            members.clear();
+            let runs = self.region_starts[region] as usize..self.region_starts[region + 1] as usize;
+            for &run in &self.by_region[runs] {
+                let run = &self.runs[run as usize];
+                members.extend(run.pixel..run.pixel + (run.end - run.start));
+            }
+            self.find_prominences(&mut members);
+        }
+        self.members = members;
     }
 
     /// Sets the prominences of a region's peaks: floods the region from the top down; where
     /// two floods meet, the lower peak has its saddle.
-    fn find_prominences(&mut self, members: &mut [usize]) {
+    fn find_prominences(&mut self, members: &mut [u32]) {
         members.sort_unstable_by(|&a, &b| {
-            self.pixels[b]
-                .snr
-                .total_cmp(&self.pixels[a].snr)
-                .then(a.cmp(&b))
+            let height = |index: u32| self.pixels[index as usize].snr;
+            height(b).total_cmp(&height(a)).then(a.cmp(&b))
         });
         let mut ranks = std::mem::take(&mut self.ranks);
+        let mut floods = std::mem::take(&mut self.floods);
         let mut peaks = std::mem::take(&mut self.peaks);
         for (r, &index) in members.iter().enumerate() {
-            ranks[index] = r as u32;
+            ranks[index as usize] = r as u32;
         }
         // Roots are the highest pixel of a flood, since `join` keeps the lower number: the rank.
-        let mut floods: Vec<u32> = (0..members.len() as u32).collect();
+        floods.clear();
+        floods.extend(0..members.len() as u32);
         for (r, &index) in members.iter().enumerate() {
-            let snr = self.pixels[index].snr;
-            let higher = self.neighbours(index).map(|other| ranks[other]);
-            for other in higher.filter(|&other| (other as usize) < r) {
+            let snr = self.pixels[index as usize].snr;
+            for other in self.neighbours(index as usize) {
+                let other = ranks[other];
+                if other as usize >= r {
+                    continue;
+                }
                 let (a, b) = (root_of(&mut floods, r as u32), root_of(&mut floods, other));
                 if a != b {
                     let lower = members[a.max(b) as usize];
-                    if let Some(peak) = peaks.get_mut(self.peak_at[lower] as usize) {
-                        peak.prominence = self.pixels[lower].snr - snr;
+                    let peak = self
+                        .peak_pixels
+                        .binary_search_by_key(&lower, |&[pixel, _]| pixel);
+                    if let Ok(peak) = peak {
+                        peaks[peak].prominence = self.pixels[lower as usize].snr - snr;
                     }
                     join(&mut floods, a, b);
                 }
             }
         }
         self.peaks = peaks;
+        self.floods = floods;
         self.ranks = ranks;
     }
 
     /// Keeps the peaks that neither noise on a flank nor the wing of a brighter star explains.
     fn drop_unfounded_peaks(&mut self, config: &SearchConfig) {
         self.peaks
-            .sort_by(|a, b| b.snr.total_cmp(&a.snr).then((a.y, a.x).cmp(&(b.y, b.x))));
-        let mut kept: Vec<Peak> = Vec::new();
+            .sort_unstable_by(|a, b| b.snr.total_cmp(&a.snr).then((a.y, a.x).cmp(&(b.y, b.x))));
         let cell = |p: &Peak| (p.x / WING_REACH_PX, p.y / WING_REACH_PX);
         let cells = self.peaks.iter().map(cell);
         let (across, down) = cells.fold((1, 1), |(w, h), (x, y)| (w.max(x + 1), h.max(y + 1)));
-        let mut grid: Vec<Vec<usize>> = vec![Vec::new(); across * down];
+        self.kept.clear();
+        self.before_in_cell.clear();
+        self.last_in_cell.clear();
+        self.last_in_cell.resize(across * down, NONE);
         for peak in &self.peaks {
             let relative = if peak.saturated {
                 MIN_SATURATED_PROMINENCE
@@ -430,75 +645,44 @@ impl Search {
                 continue;
             }
             let (cx, cy) = cell(peak);
-            let span = cx.saturating_sub(1)..(cx + 2).min(across);
-            let brighter = (cy.saturating_sub(1)..(cy + 2).min(down))
-                .flat_map(|gy| &grid[gy * across + span.start..gy * across + span.end])
-                .flatten();
-            let wings: f32 = brighter
-                .map(|&other| wing_of(&kept[other], peak, config))
-                .sum();
+            let mut wings = 0.0;
+            for gy in cy.saturating_sub(1)..(cy + 2).min(down) {
+                for gx in cx.saturating_sub(1)..(cx + 2).min(across) {
+                    let mut other = self.last_in_cell[gy * across + gx];
+                    while let Some(brighter) = self.kept.get(other as usize) {
+                        wings += wing_of(brighter, peak, config);
+                        other = self.before_in_cell[other as usize];
+                    }
+                }
+            }
             if peak.snr < config.threshold + wings {
                 continue;
             }
             // Only bright stars have wings that can matter.
+            let mut before = NONE;
             if peak.snr * WING_HEIGHT > 0.1 {
-                grid[cy * across + cx].push(kept.len());
+                let last = &mut self.last_in_cell[cy * across + cx];
+                before = std::mem::replace(last, self.kept.len() as u32);
             }
-            kept.push(*peak);
-            if kept.len() >= config.max_peaks {
+            self.before_in_cell.push(before);
+            self.kept.push(*peak);
+            if self.kept.len() >= config.max_peaks {
                 break;
             }
         }
-        self.peaks = kept;
+        self.peaks.clone_from(&self.kept);
     }
 }
 
-/// Columns of the values that reach `lowest`; the first value is in column `start`.
-fn candidates(values: &[f32], start: usize, lowest: f32) -> impl Iterator<Item = usize> + '_ {
-    /// Values compared together: most hold none.
-    const GROUP: usize = 16;
-    let groups = values.chunks(GROUP).enumerate();
-    groups
-        .filter(move |(_, group)| group.iter().fold(false, |any, &v| any | (v >= lowest)))
-        .flat_map(move |(g, group)| {
-            let columns = (start + g * GROUP..).zip(group);
-            columns.filter_map(move |(x, &v)| (v >= lowest).then_some(x))
-        })
-}
-
-/// Groups of at least two peaks, each within `link_px` of another; indices ascending.
-fn chains(peaks: &[Peak], link_px: f32) -> Vec<Vec<usize>> {
-    let mut by_row: Vec<u32> = (0..peaks.len() as u32).collect();
-    by_row.sort_unstable_by_key(|&i| peaks[i as usize].y);
-    let mut parents: Vec<u32> = (0..peaks.len() as u32).collect();
-    for (rank, &index) in by_row.iter().enumerate() {
-        let peak = &peaks[index as usize];
-        for &other in &by_row[rank + 1..] {
-            let dx = peaks[other as usize].x as f32 - peak.x as f32;
-            let dy = peaks[other as usize].y as f32 - peak.y as f32;
-            if dy > link_px {
-                break;
-            }
-            if dx * dx + dy * dy <= link_px * link_px {
-                join(&mut parents, index, other);
-            }
-        }
-    }
-    let mut groups: Vec<Vec<usize>> = vec![Vec::new(); peaks.len()];
-    for index in 0..peaks.len() {
-        let root = root_of(&mut parents, index as u32) as usize;
-        groups[root].push(index);
-    }
-    groups.retain(|group| group.len() > 1);
-    groups
+/// The pixels of a run.
+fn pixels_of<'a>(run: &Run, pixels: &'a [Pixel]) -> &'a [Pixel] {
+    &pixels[run.pixel as usize..][..(run.end - run.start) as usize]
 }
 
 /// Centre and principal axes of some peaks, all with the same weight.
-fn line_through(chain: &[usize], peaks: &[Peak]) -> Region {
-    let weighted = chain
-        .iter()
-        .map(|&i| (peaks[i].x as f64, peaks[i].y as f64, 1.0));
-    Region::of_points(weighted)
+fn line_through(chain: &[u32], peaks: &[Peak]) -> Region {
+    let members = chain.iter().map(|&i| &peaks[i as usize]);
+    Region::of_points(members.map(|p| (p.x as f64, p.y as f64, 1.0)))
 }
 
 /// How high the wing of `bright` may stand at `peak`, in units of the noise.
@@ -510,27 +694,12 @@ fn wing_of(bright: &Peak, peak: &Peak, config: &SearchConfig) -> f32 {
     WING_HEIGHT * height / (1.0 + distance.powi(3))
 }
 
-/// Whether no neighbour is higher; of equal ones the first in reading order counts.
-fn is_local_maximum(view: &View<'_>, x: usize, y: usize) -> bool {
-    let value = view.at(x, y);
-    let columns = x.saturating_sub(1)..(x + 2).min(view.width);
-    (y.saturating_sub(1)..(y + 2).min(view.height)).all(|r| {
-        let row = &view.row(r)[columns.clone()];
-        row.iter()
-            .zip(columns.clone())
-            .all(|(&other, c)| other < value || (other == value && (r, c) >= (y, x)))
-    })
-}
-
-/// Where the parabolas through a maximum and its neighbours have their tops, from its centre, in pixels.
-fn parabola_top(view: &View<'_>, x: usize, y: usize) -> [f32; 2] {
+/// Where the parabolas through a maximum and the values next to it have their tops, from its centre, in pixels.
+fn parabola_top(value: f32, [left, right, above, below]: [f32; 4]) -> [f32; 2] {
     /// Half a pixel, less what could round to the next.
     const FARTHEST_PX: f32 = 0.49;
-    if x == 0 || y == 0 || x + 1 >= view.width || y + 1 >= view.height {
-        return [0.0; 2];
-    }
     let top = |before: f32, after: f32| {
-        let curvature = 2.0 * view.at(x, y) - before - after;
+        let curvature = 2.0 * value - before - after;
         let offset = 0.5 * (after - before) / curvature;
         if curvature > 0.0 {
             offset.clamp(-FARTHEST_PX, FARTHEST_PX)
@@ -538,10 +707,7 @@ fn parabola_top(view: &View<'_>, x: usize, y: usize) -> [f32; 2] {
             0.0
         }
     };
-    [
-        top(view.at(x - 1, y), view.at(x + 1, y)),
-        top(view.at(x, y - 1), view.at(x, y + 1)),
-    ]
+    [top(left, right), top(above, below)]
 }
 
 /// Whether a pixel within one pixel of (x, y) is saturated.

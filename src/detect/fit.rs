@@ -12,6 +12,7 @@
 
 use super::normal::{Normal, ONE_SPOT, OneSpot, flux_variance};
 use super::psf::{AxisProfile, MAX_WINDOW_PX};
+use arrayvec::ArrayVec;
 
 /// The most spots fitted together.
 pub(super) const MAX_SPOTS: usize = 6;
@@ -64,6 +65,15 @@ pub(super) struct Window {
     pub background_noise: f64,
 }
 
+impl Window {
+    /// Becomes a copy of another, in the room that there is.
+    pub fn copy_from(&mut self, other: &Self) {
+        let mut data = std::mem::take(&mut self.data);
+        data.clone_from(&other.data);
+        *self = Self { data, ..*other };
+    }
+}
+
 /// One spot: where, and how much light.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Spot {
@@ -83,6 +93,9 @@ pub(super) struct Spot {
     pub noise_flux: f64,
 }
 
+/// Spots that are fitted together.
+pub(super) type Spots = ArrayVec<Spot, MAX_SPOTS>;
+
 /// What is fitted, and how.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct FitConfig {
@@ -98,7 +111,7 @@ pub(super) struct FitConfig {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Fit {
     /// In the order given.
-    pub spots: Vec<Spot>,
+    pub spots: Spots,
     /// Background above the map, in ADU.
     pub background: f64,
     /// Standard deviation of the spot, in pixels.
@@ -146,7 +159,7 @@ impl Fitter {
         config: &FitConfig,
     ) -> Fit {
         let mut fit = Fit {
-            spots: start.to_vec(),
+            spots: start.iter().copied().collect(),
             spot_px: config.spot_px,
             ..Fit::default()
         };
@@ -159,7 +172,10 @@ impl Fitter {
             MAX_CONVERGED_PX
         };
         for step in 0..MAX_STEPS {
-            let mut normal: Normal<N> = self.linearise(window, &fit, config);
+            // The first step is hardly ever the last: what the size would be is not asked yet.
+            let is_rough = step == 0 && start.len() == 1 && !config.free_spot;
+            let all = if is_rough { fitted } else { all };
+            let mut normal: Normal<N> = self.linearise_with(window, &fit, config, is_rough);
             let information = (0..start.len()).flat_map(|i| [3 * i, 3 * i + 1]);
             let information = information.map(|i| normal.matrix[i][i]).fold(0.0, f64::max);
             let known = normal.factorise(all);
@@ -178,13 +194,13 @@ impl Fitter {
                 break;
             }
             let enough = (CONVERGED_SIGMA / information.sqrt()).clamp(CONVERGED_PX, longest);
-            if length < enough && (step > 0 || flux_kept) {
+            if length < enough && (step > 0 || flux_kept) && !is_rough {
                 fit.converged = true;
                 finish(&mut fit, &normal, [fitted, known], &change);
                 return fit;
             }
         }
-        fit.spots = start.to_vec();
+        fit.spots = start.iter().copied().collect();
         fit.background = 0.0;
         fit.spot_px = config.spot_px;
         let mut normal: Normal<N> = self.linearise(window, &fit, config);
@@ -220,7 +236,21 @@ impl Fitter {
             spot.noise_flux = variance.sqrt();
             return;
         }
-        let mut normal: Normal<MAX_PARAMETERS> = self.linearise(window, fit, &noise_only);
+        if fit.spots.len() == 2 {
+            self.set_flux_noise_up_to::<TWO_SPOTS>(window, fit, &noise_only);
+        } else {
+            self.set_flux_noise_up_to::<MAX_PARAMETERS>(window, fit, &noise_only);
+        }
+    }
+
+    /// The same for several spots with at most `N` parameters.
+    fn set_flux_noise_up_to<const N: usize>(
+        &mut self,
+        window: &Window,
+        fit: &mut Fit,
+        noise_only: &FitConfig,
+    ) {
+        let mut normal: Normal<N> = self.linearise(window, fit, noise_only);
         let b = 3 * fit.spots.len();
         normal.matrix[b][b] += window.background_noise.powi(-2) - window.background_error.powi(-2);
         // The size is held: that it is imperfectly known is no noise.
@@ -294,13 +324,13 @@ impl Fitter {
     }
 
     /// Calls `visit(residual, light, leverage)` for each pixel with a value, at the solution `fit` of a
-    /// fit with `config`; the leverage is the part of a pixel's noise that the parameters take up.
+    /// fit with `config`; the leverage, to be called for, is the part of a pixel's noise that the parameters take up.
     pub fn for_each_residual(
         &mut self,
         window: &Window,
         fit: &Fit,
         config: &FitConfig,
-        visit: impl FnMut(f64, f64, f64),
+        visit: impl FnMut(f64, f64, &dyn Fn() -> f64),
     ) {
         if fit.spots.len() == 1 {
             self.residuals_up_to::<ONE_SPOT>(window, fit, config, visit);
@@ -314,7 +344,7 @@ impl Fitter {
         window: &Window,
         fit: &Fit,
         config: &FitConfig,
-        mut visit: impl FnMut(f64, f64, f64),
+        mut visit: impl FnMut(f64, f64, &dyn Fn() -> f64),
     ) {
         let mut normal: Normal<N> = self.linearise(window, fit, config);
         let count = parameter_count(fit.spots.len(), config);
@@ -322,7 +352,9 @@ impl Fitter {
             return;
         }
         self.for_each_gradient(window, fit, config, |gradient, residual, light, weight| {
-            visit(residual, light, normal.leverage(gradient, weight, count));
+            visit(residual, light, &|| {
+                normal.leverage(gradient, weight, count)
+            });
         });
     }
 
@@ -343,13 +375,24 @@ impl Fitter {
         fit: &Fit,
         config: &FitConfig,
     ) -> Normal<N> {
+        self.linearise_with(window, fit, config, false)
+    }
+
+    /// The same; a single spot without its size where that `is_held`.
+    fn linearise_with<const N: usize>(
+        &mut self,
+        window: &Window,
+        fit: &Fit,
+        config: &FitConfig,
+        is_held: bool,
+    ) -> Normal<N> {
         let count = 3 * fit.spots.len() + 2;
         let mut normal = Normal::empty();
         if let [spot] = fit.spots.as_slice() {
             let one = one_spot(spot, fit.background, window, config);
             self.fill_profiles(window, fit);
             let axes = [&self.across[0], &self.down[0]];
-            normal.add_one_spot(&one, axes, &window.data, window.width);
+            normal.add_one_spot(&one, axes, (&window.data, window.width), is_held);
         } else {
             self.for_each_gradient(window, fit, config, |gradient, residual, _, weight| {
                 // With a count known beforehand the loops need not be loops.

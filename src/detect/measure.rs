@@ -2,7 +2,7 @@
 
 use super::centroid;
 use super::components::{Peak, Region};
-use super::fit::{Fit, FitConfig, MAX_SPOTS, NoiseModel, Spot, window_radius};
+use super::fit::{Fit, FitConfig, MAX_SPOTS, NoiseModel, Spot, Spots, window_radius};
 use super::plateau::Plateau;
 use super::psf::PIXEL_VARIANCE_PX2;
 use super::scene::{FitWork, Scene};
@@ -48,18 +48,23 @@ pub(super) struct Measurement<'a> {
 
 impl Measurement<'_> {
     /// Measures all peaks, which come strongest first; the detections come in the same order.
-    pub fn run(&self, peaks: &[Peak], work: &mut FitWork) -> Vec<Detection> {
-        let mut all = PeakList {
-            peaks,
-            near: Neighbours::new(peaks, self.reach_px()),
-            spots: peaks.iter().map(|p| self.scene.first_guess(p)).collect(),
-            is_known: peaks.iter().map(|p| !p.saturated).collect(),
-        };
-        let mut detections = Vec::with_capacity(peaks.len());
+    pub fn run(
+        &self,
+        peaks: &[Peak],
+        work: &mut FitWork,
+        known: &mut KnownSpots,
+        detections: &mut Vec<Detection>,
+    ) {
+        known.near.sort(peaks, self.reach_px());
+        known.spots.clear();
+        let guesses = peaks.iter().map(|p| self.scene.first_guess(p));
+        known.spots.extend(guesses);
+        known.is_known.clear();
+        known.is_known.extend(peaks.iter().map(|p| !p.saturated));
+        let mut all = PeakList { peaks, known };
         for index in 0..peaks.len() {
-            self.measure(index, &mut all, work, &mut detections);
+            self.measure(index, &mut all, work, detections);
         }
-        detections
     }
 
     /// How far a spot can matter to another, in pixels.
@@ -80,12 +85,12 @@ impl Measurement<'_> {
         work: &mut FitWork,
         out: &mut Vec<Detection>,
     ) {
-        let peak = &all.peaks[index];
+        let peaks = all.peaks;
+        let peak = &peaks[index];
         let region = &self.regions[peak.region];
-        let (touching, beyond) = all.split(index, TOUCHING_SIGMA * self.width_px());
-        let mut start = vec![all.spots[index]];
-        start.extend(touching.iter().map(|&other| all.spots[other]));
-        let is_alone = touching.is_empty();
+        let mut beyond = std::mem::take(&mut work.beyond);
+        let start = all.split(index, TOUCHING_SIGMA * self.width_px(), &mut beyond);
+        let is_alone = start.len() == 1;
         let mut fit = if peak.saturated && is_alone {
             self.scene.fit_free(
                 start[0],
@@ -98,7 +103,7 @@ impl Measurement<'_> {
         };
         // A fit that does not know the place to within the spot's width has found nothing.
         fit.converged &= is_placed(&fit.spots[0], fit.spot_px);
-        let FitWork { fitter, window } = work;
+        let FitWork { fitter, window, .. } = work;
         fitter.set_flux_noise(window, &mut fit, &self.fit_config());
         let is_single = fit.converged && is_alone;
         let pair = if is_single && self.may_be_pair(&fit, peak, region) {
@@ -106,9 +111,11 @@ impl Measurement<'_> {
         } else {
             None
         };
+        work.beyond = beyond;
         if let Some(mut pair) = pair {
             // Of two spots, one may be that of another peak, which has its own turn.
-            let is_others = |spot| all.has_other_at(index, spot, TOUCHING_SIGMA * self.width_px());
+            let mut is_others =
+                |spot| all.has_other_at(index, spot, TOUCHING_SIGMA * self.width_px());
             if is_others(pair.spots[0]) {
                 pair.spots.swap(0, 1);
             }
@@ -125,14 +132,14 @@ impl Measurement<'_> {
         } else if is_single && !peak.saturated {
             let mut detection = self.detection_of(&fit, peak, region);
             shape::judge(self, peak, &fit, &mut detection, work);
-            all.spots[index] = fit.spots[0];
+            all.known.spots[index] = fit.spots[0];
             self.set_trail(peak, region, &mut detection);
             self.finish(&fit, &mut detection, work, out);
             return;
         }
         if fit.converged {
-            all.spots[index] = fit.spots[0];
-            all.is_known[index] = true;
+            all.known.spots[index] = fit.spots[0];
+            all.known.is_known[index] = true;
         }
         let mut detection = self.detection_of(&fit, peak, region);
         detection.flags.blended = fit.spots.len() > 1;
@@ -198,13 +205,18 @@ impl Measurement<'_> {
     /// shoulder of a fainter one up to four spot sizes away. The fit's window is left in `work` where
     /// there is no pair.
     fn as_pair(&self, fit: &Fit, beyond: &[Spot], work: &mut FitWork) -> Option<Fit> {
-        let window = work.window.clone();
+        let FitWork {
+            window,
+            kept_window,
+            ..
+        } = work;
+        kept_window.copy_from(window);
         let drawn_out = self.ends_of(fit, work)?;
         let pair = self
             .fit_pair(fit, &drawn_out, beyond, work)
             .or_else(|| self.fit_pair(fit, &self.with_remainder(fit, beyond, work)?, beyond, work));
         if pair.is_none() {
-            work.window = window;
+            work.window.copy_from(&work.kept_window);
         }
         pair
     }
@@ -227,7 +239,7 @@ impl Measurement<'_> {
         /// Light of a spot over that in its 3x3 brightest pixels, about.
         const LIGHT_IN_ALL: f64 = 1.5;
         let radius = window_radius(self.scene.spot_px) + self.width_px().ceil() as usize;
-        let FitWork { fitter, window } = work;
+        let FitWork { fitter, window, .. } = work;
         self.scene.cut(&fit.spots[..1], radius, window);
         self.scene.subtract(beyond, fitter, window);
         fitter.subtract(window, fit);
@@ -420,9 +432,9 @@ fn brightest_within(reach: usize, peak: &Peak, view: &View<'_>) -> f64 {
         .fold(f64::NEG_INFINITY, |highest, &p| highest.max(f64::from(p)))
 }
 
-/// All peaks, and what is known of their spots.
-struct PeakList<'a> {
-    peaks: &'a [Peak],
+/// What is known of the spots of all peaks.
+#[derive(Debug, Clone, Default)]
+pub(super) struct KnownSpots {
     near: Neighbours,
     /// Each spot as far as it is known: fitted for those stronger than the one at hand.
     spots: Vec<Spot>,
@@ -430,41 +442,50 @@ struct PeakList<'a> {
     is_known: Vec<bool>,
 }
 
+/// All peaks, and what is known of their spots.
+struct PeakList<'a> {
+    peaks: &'a [Peak],
+    known: &'a mut KnownSpots,
+}
+
 impl PeakList<'_> {
-    /// The peaks that touch peak `index`, and the spots of the others that shine into its window.
-    fn split(&self, index: usize, touching_px: f64) -> (Vec<usize>, Vec<Spot>) {
-        let around = self.near.of(self.peaks, index);
-        let distance = |other: usize| {
+    /// The spots of peak `index` and of those that touch it; those of the others that shine into its window go to `beyond`.
+    fn split(&mut self, index: usize, touching_px: f64, beyond: &mut Vec<Spot>) -> Spots {
+        let KnownSpots {
+            near,
+            spots,
+            is_known,
+        } = &mut *self.known;
+        near.find(self.peaks, index);
+        let mut start = Spots::new();
+        start.push(spots[index]);
+        beyond.clear();
+        for other in near.found.iter().map(|&found| found as usize) {
             let (a, b) = (&self.peaks[index], &self.peaks[other]);
-            (a.x as f64 - b.x as f64).hypot(a.y as f64 - b.y as f64)
-        };
-        let is_touching = |other: &usize| distance(*other) < touching_px;
-        let touching: Vec<usize> = around
-            .iter()
-            .copied()
-            .filter(is_touching)
-            .take(MAX_SPOTS - 1)
-            .collect();
-        let beyond = around
-            .iter()
-            .filter(|other| !touching.contains(other) && self.is_known[**other])
-            .map(|&other| self.spots[other])
-            .collect();
-        (touching, beyond)
+            let (dx, dy) = (a.x as f64 - b.x as f64, a.y as f64 - b.y as f64);
+            let is_touching = dx * dx + dy * dy < touching_px * touching_px;
+            if is_touching && start.len() < MAX_SPOTS {
+                start.push(spots[other]);
+            } else if is_known[other] {
+                beyond.push(spots[other]);
+            }
+        }
+        start
     }
 
     /// Whether a peak other than `index` is within `reach_px` of a spot, and nearer to it than `index`.
-    fn has_other_at(&self, index: usize, spot: Spot, reach_px: f64) -> bool {
+    fn has_other_at(&mut self, index: usize, spot: Spot, reach_px: f64) -> bool {
         let distance = |peak: &Peak| (peak.x as f64 - spot.x).hypot(peak.y as f64 - spot.y);
         let nearest_px = distance(&self.peaks[index]).min(reach_px);
-        let others = self.near.of(self.peaks, index);
-        others
-            .iter()
-            .any(|&other| distance(&self.peaks[other]) < nearest_px)
+        let near = &mut self.known.near;
+        near.find(self.peaks, index);
+        let mut others = near.found.iter().map(|&other| &self.peaks[other as usize]);
+        others.any(|other| distance(other) < nearest_px)
     }
 }
 
 /// The peaks near a peak, by a grid.
+#[derive(Debug, Clone, Default)]
 struct Neighbours {
     reach_px: f64,
     cell_px: f64,
@@ -473,48 +494,44 @@ struct Neighbours {
     /// Where in `members` each cell starts, and the end.
     starts: Vec<u32>,
     members: Vec<u32>,
+    /// The peaks within reach of the one last looked at, strongest first, itself left out.
+    found: Vec<u32>,
 }
 
 impl Neighbours {
     /// More cells along a side than this are of no use, but of peaks far apart there could be many.
     const MAX_CELLS: f64 = 512.0;
 
-    fn new(peaks: &[Peak], reach_px: f64) -> Self {
+    /// Sorts the peaks into cells.
+    fn sort(&mut self, peaks: &[Peak], reach_px: f64) {
         let largest = |side: fn(&Peak) -> usize| peaks.iter().map(side).max().unwrap_or(0) as f64;
         let (right, bottom) = (largest(|p| p.x), largest(|p| p.y));
-        let cell_px = reach_px.max(1.0).max(right.max(bottom) / Self::MAX_CELLS);
-        let (columns, rows) = (
-            (right / cell_px) as usize + 1,
-            (bottom / cell_px) as usize + 1,
-        );
-        let mut grid = Self {
-            reach_px: reach_px.max(1.0),
-            cell_px,
-            columns,
-            rows,
-            starts: vec![0; columns * rows + 1],
-            members: vec![0; peaks.len()],
-        };
+        self.reach_px = reach_px.max(1.0);
+        self.cell_px = self.reach_px.max(right.max(bottom) / Self::MAX_CELLS);
+        self.columns = (right / self.cell_px) as usize + 1;
+        self.rows = (bottom / self.cell_px) as usize + 1;
+        self.starts.clear();
+        self.starts.resize(self.columns * self.rows + 1, 0);
+        self.members.resize(peaks.len(), 0);
         let cell_of = |grid: &Self, peak: &Peak| {
             let (column, row) = grid.cell(peak);
             row * grid.columns + column
         };
         for peak in peaks {
-            let cell = cell_of(&grid, peak);
-            grid.starts[cell] += 1;
+            let cell = cell_of(self, peak);
+            self.starts[cell] += 1;
         }
         // From counts to ends, which become starts as the cells are filled from behind.
         let mut end = 0;
-        for start in &mut grid.starts {
+        for start in &mut self.starts {
             end += *start;
             *start = end;
         }
         for (index, peak) in peaks.iter().enumerate().rev() {
-            let cell = cell_of(&grid, peak);
-            grid.starts[cell] -= 1;
-            grid.members[grid.starts[cell] as usize] = index as u32;
+            let cell = cell_of(self, peak);
+            self.starts[cell] -= 1;
+            self.members[self.starts[cell] as usize] = index as u32;
         }
-        grid
     }
 
     fn cell(&self, peak: &Peak) -> (usize, usize) {
@@ -524,24 +541,23 @@ impl Neighbours {
         )
     }
 
-    /// Indices of the peaks within reach of peak `index`, strongest first, itself left out.
-    fn of(&self, peaks: &[Peak], index: usize) -> Vec<usize> {
+    /// Finds the peaks within reach of peak `index`.
+    fn find(&mut self, peaks: &[Peak], index: usize) {
         let (cx, cy) = self.cell(&peaks[index]);
-        let mut found = Vec::new();
+        self.found.clear();
         for row in cy.saturating_sub(1)..(cy + 2).min(self.rows) {
             let first = row * self.columns + cx.saturating_sub(1);
             let end = row * self.columns + (cx + 2).min(self.columns);
             let members = self.starts[first] as usize..self.starts[end] as usize;
-            for other in self.members[members].iter().map(|&m| m as usize) {
-                let dx = peaks[other].x as f64 - peaks[index].x as f64;
-                let dy = peaks[other].y as f64 - peaks[index].y as f64;
+            for &other in &self.members[members] {
+                let (a, b) = (&peaks[other as usize], &peaks[index]);
+                let (dx, dy) = (a.x as f64 - b.x as f64, a.y as f64 - b.y as f64);
                 let is_near = dx * dx + dy * dy <= self.reach_px * self.reach_px;
-                if is_near && other != index {
-                    found.push(other);
+                if is_near && other as usize != index {
+                    self.found.push(other);
                 }
             }
         }
-        found.sort_unstable();
-        found
+        self.found.sort_unstable();
     }
 }

@@ -14,6 +14,9 @@
 //! 5. A fit of each star, together with those that it touches; or a grey-weighted centroid.
 //! 6. Flags for what is no star, or no whole one.
 //!
+//! Steps 1 to 3 go over the pixels in rows of cells, each by itself, so that threads can share them
+//! ([`Workspace::on_threads`]) and the filtered frame need never be whole in memory.
+//!
 //! Caveats: one spot size for the whole frame; a frame with fewer than three bright stars gets a
 //! default one. Stars fainter than about 2 % of a bright neighbour, within some five spot sizes of
 //! it, are taken for its halo. Standard errors of stars whose light is not proportional to the
@@ -25,6 +28,7 @@
 
 mod background;
 mod background_map;
+mod blocks;
 mod calibrate;
 mod centroid;
 mod components;
@@ -32,6 +36,7 @@ mod expected;
 mod fit;
 mod matched_filter;
 mod measure;
+mod medians;
 mod noise;
 mod normal;
 mod plateau;
@@ -39,6 +44,7 @@ mod psf;
 mod raw_peaks;
 mod scene;
 mod shape;
+mod strips;
 mod threshold;
 mod view;
 
@@ -47,13 +53,18 @@ pub use expected::FilterModel;
 
 use crate::coords::PixelPoint;
 use crate::frame::{Frame, MIN_SIDE_PX};
-use background::{Mesh, MeshConfig};
-use components::{Search, SearchConfig};
+use background::{CellScratch, Mesh, MeshConfig};
+use blocks::BlockMaxima;
+use components::{Candidates, Search, SearchConfig};
 use fit::NoiseModel;
-use matched_filter::{Filtered, Kernel};
-use measure::Measurement;
-use noise::{PixelNoise, StarFree, Weights};
+use matched_filter::{Band, Kernel};
+use measure::{KnownSpots, Measurement};
+use noise::{NoiseWork, PixelNoise, StarFree, Weights};
+use raw_peaks::RawPeaks;
 use scene::{FitWork, Scene};
+use std::num::NonZeroUsize;
+use std::ops::Range;
+use strips::Strips;
 use view::View;
 
 /// One detected source, in the frame's own units.
@@ -102,7 +113,7 @@ impl DetectionFlags {
 }
 
 /// All sources of a frame.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Detections {
     /// Brightest first.
     pub sources: Vec<Detection>,
@@ -205,16 +216,40 @@ pub enum DetectError {
 #[derive(Debug, Clone, Default)]
 pub struct Workspace {
     background: Mesh,
+    raw_peaks: RawPeaks,
     filtered_mesh: Mesh,
-    filtered: Filtered,
+    filtered_maxima: BlockMaxima,
+    /// For each row of cells.
+    candidates: Vec<Candidates>,
+    nothing: Vec<()>,
+    /// One for each thread.
+    workers: Vec<Worker>,
+    noise: NoiseWork,
     search: Search,
     fits: FitWork,
+    known_spots: KnownSpots,
+    sorted: Vec<f32>,
+}
+
+/// The buffers of one thread.
+#[derive(Debug, Clone, Default)]
+struct Worker {
+    cells: CellScratch,
+    band: Band,
 }
 
 impl Workspace {
-    /// Empty buffers.
+    /// Empty buffers, for one thread.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// The same, with the passes over the pixels shared among so many threads of the rayon pool that [`detect`] is called in.
+    /// The result is the same for any number; one is best where other frames keep the other threads busy.
+    #[must_use]
+    pub fn on_threads(mut self, threads: NonZeroUsize) -> Self {
+        self.workers.resize_with(threads.get(), Worker::default);
+        self
     }
 }
 
@@ -268,21 +303,29 @@ pub fn detect(
     config: &DetectConfig,
     workspace: &mut Workspace,
 ) -> Result<Detections, DetectError> {
+    let mut found = Detections::default();
+    detect_into(frame, config, workspace, &mut found)?;
+    Ok(found)
+}
+
+/// The same as [`detect`], into `found`: frame after frame of the same kind, nothing is allocated.
+///
+/// # Errors
+/// As [`detect`]; `found` is left as it was.
+pub fn detect_into(
+    frame: &Frame,
+    config: &DetectConfig,
+    workspace: &mut Workspace,
+    found: &mut Detections,
+) -> Result<(), DetectError> {
     check(frame, config)?;
+    found.sources.clear();
     let view = View::of_live_pixels(frame);
     if view.width < MIN_SIDE_PX || view.height < MIN_SIDE_PX {
-        return Ok(empty_detections(frame, config));
+        describe_darkness(frame, config, found);
+        return Ok(());
     }
-    let noise_floor = ROUNDING_NOISE * frame.step_adu;
-    workspace.background.measure(
-        &view,
-        &MeshConfig {
-            cell_px: config.cell_px,
-            spread_of_differences: true,
-            spread_floor: noise_floor.max(least_noise(&view)),
-            is_normalised: false,
-        },
-    );
+    measure_background(&view, frame.step_adu, config, workspace);
     let stated_adu = config
         .saturation_adu
         .map_or(f32::INFINITY, |adu| adu as f32);
@@ -292,23 +335,65 @@ pub fn detect(
         .min(stated_adu);
     let calibration = search_with_own_spot(&view, saturation_adu, config, workspace);
     let mut fits = std::mem::take(&mut workspace.fits);
-    let scene = scene_of(&view, saturation_adu, &calibration, workspace);
+    let mut known_spots = std::mem::take(&mut workspace.known_spots);
     let measurement = Measurement {
-        scene,
+        scene: scene_of(&view, saturation_adu, &calibration, workspace),
         noise: calibration.noise,
         method: config.centroid,
         regions: &workspace.search.regions,
         threshold: calibration.threshold,
     };
-    let mut sources = measurement.run(&workspace.search.peaks, &mut fits);
+    let peaks = &workspace.search.peaks;
+    measurement.run(peaks, &mut fits, &mut known_spots, &mut found.sources);
     workspace.fits = fits;
-    sources.sort_by(|a, b| b.flux_adu.total_cmp(&a.flux_adu));
-    Ok(Detections {
-        sources,
-        background_adu: middle_of(&workspace.background.level),
-        noise_adu: middle_of(&workspace.background.spread),
-        spot_sigma_px: calibration.spot_px,
-    })
+    workspace.known_spots = known_spots;
+    found.sources.sort_unstable_by(|a, b| {
+        let place = |d: &Detection| (d.position.y, d.position.x);
+        let ((ay, ax), (by, bx)) = (place(a), place(b));
+        let by_place = || ay.total_cmp(&by).then(ax.total_cmp(&bx));
+        b.flux_adu.total_cmp(&a.flux_adu).then_with(by_place)
+    });
+    let sorted = &mut workspace.sorted;
+    found.background_adu = middle_of(&workspace.background.level, sorted);
+    found.noise_adu = middle_of(&workspace.background.spread, sorted);
+    found.spot_sigma_px = calibration.spot_px;
+    Ok(())
+}
+
+/// Measures background and noise.
+fn measure_background(
+    view: &View<'_>,
+    step_adu: f32,
+    config: &DetectConfig,
+    workspace: &mut Workspace,
+) {
+    let mesh_config = MeshConfig {
+        cell_px: config.cell_px,
+        spread_of_differences: true,
+        spread_floor: (ROUNDING_NOISE * step_adu).max(least_noise(view)),
+        is_normalised: false,
+    };
+    let size = (view.width, view.height);
+    let Workspace {
+        background,
+        nothing,
+        workers,
+        ..
+    } = workspace;
+    background.prepare(size, &mesh_config);
+    if workers.is_empty() {
+        workers.push(Worker::default());
+    }
+    let grid = background.grid;
+    nothing.resize(grid.rows, ());
+    let mut no_maxima = BlockMaxima::default();
+    let strips = Strips::of(background, &mut no_maxima, nothing);
+    strips.share(workers, &|worker, strip| {
+        let rows = strip.rows.map(|y| view.row(y));
+        let cells = (strip.level, strip.spread);
+        worker.cells.measure_row(&grid, rows, &mesh_config, cells);
+    });
+    background.finish();
 }
 
 /// What a frame's own stars say about it, and the threshold.
@@ -349,9 +434,7 @@ fn search_with_own_spot(
         search(view, saturation_adu, config, &mut calibration, workspace);
         let mut fits = std::mem::take(&mut workspace.fits);
         let mut scene = scene_of(view, saturation_adu, &calibration, workspace);
-        let filtered = workspace.filtered.view();
-        let stars =
-            calibrate::fit_bright_stars(&scene, filtered, &workspace.search.peaks, &mut fits);
+        let stars = calibrate::fit_bright_stars(&scene, &workspace.search.peaks, &mut fits);
         let measured = match config.spot_sigma_px {
             None => calibrate::spot_size(&stars).map(|(size, _)| size),
             Some(_) => None,
@@ -362,7 +445,7 @@ fn search_with_own_spot(
         calibration.spot_px = spot_px;
         if settled {
             scene.spot_px = spot_px;
-            let model = calibrate::star_model(&scene, &stars, &mut fits);
+            let model = calibrate::star_model(&scene, stars, &mut fits);
             calibration.adopt(&model, config);
         }
         workspace.fits = fits;
@@ -382,14 +465,15 @@ fn calibrate_unfiltered(
     calibration: &mut Calibration,
     workspace: &mut Workspace,
 ) -> bool {
-    let peaks = raw_peaks::find(view, &workspace.background, saturation_adu);
+    let background = &workspace.background;
+    workspace.raw_peaks.find(view, background, saturation_adu);
     let mut fits = std::mem::take(&mut workspace.fits);
     let mut scene = Scene {
         filtered: None,
         ..scene_of(view, saturation_adu, calibration, workspace)
     };
     scene.matched_gain = Kernel::for_spot(calibration.spot_px).matched_gain();
-    let stars = calibrate::fit_raw_stars(&scene, &peaks, &mut fits);
+    let stars = calibrate::fit_raw_stars(&scene, &workspace.raw_peaks.peaks, &mut fits);
     let measured = calibrate::spot_size(&stars);
     if let (None, Some((size, _))) = (config.spot_sigma_px, measured) {
         calibration.spot_px = size;
@@ -398,7 +482,7 @@ fn calibrate_unfiltered(
     let is_enough =
         measured.is_some_and(|(size, stars)| stars >= ENOUGH_RAW_STARS && size < SHARP_SPOT_PX);
     if is_enough {
-        let model = calibrate::star_model(&scene, &stars, &mut fits);
+        let model = calibrate::star_model(&scene, stars, &mut fits);
         calibration.adopt(&model, config);
     }
     workspace.fits = fits;
@@ -414,30 +498,23 @@ fn search(
     workspace: &mut Workspace,
 ) {
     let kernel = Kernel::for_spot(calibration.spot_px);
-    workspace
-        .filtered
-        .compute(view, &workspace.background, &kernel);
-    workspace.filtered_mesh.measure(
-        &workspace.filtered.view(),
-        &MeshConfig {
-            cell_px: config.cell_px,
-            spread_of_differences: false,
-            spread_floor: FILTERED_NOISE_FLOOR,
-            is_normalised: true,
-        },
-    );
-    calibration.threshold = config.threshold_sigma.unwrap_or_else(|| {
-        let size = (view.width, view.height);
-        let u = gaussian_threshold(config, size, calibration.spot_px, &kernel);
-        raised_for_noise(u, view, calibration.spot_px, &kernel, workspace)
-    });
+    let size = (view.width, view.height);
+    let least = config
+        .threshold_sigma
+        .unwrap_or_else(|| gaussian_threshold(config, size, calibration.spot_px, &kernel));
+    filter(view, config.cell_px, &kernel, least, workspace);
+    calibration.threshold = config
+        .threshold_sigma
+        .unwrap_or_else(|| raised_for_noise(least, view, calibration.spot_px, &kernel, workspace));
+    let threshold = calibration.threshold as f32;
+    gather_missed(view, &kernel, threshold, workspace);
     let spot_width_px = (calibration.spot_px.powi(2) + psf::PIXEL_VARIANCE_PX2).sqrt();
     workspace.search.run(
-        &workspace.filtered,
+        &workspace.candidates,
         &workspace.filtered_mesh,
         view,
         &SearchConfig {
-            threshold: calibration.threshold as f32,
+            threshold,
             spot_width_px: spot_width_px as f32,
             saturation_adu,
             max_peaks: config.max_detections,
@@ -446,28 +523,123 @@ fn search(
     calibration.kernel = kernel;
 }
 
+/// Candidates are gathered from this part of the threshold on that their own row of cells would have: that of
+/// the mesh, which is smoothed, will hardly be lower.
+const CANDIDATE_MARGIN: f32 = 0.85;
+
+/// Filters the frame band by band, measures mean and noise of the filtered frame, and gathers the candidates that may
+/// lie above the threshold of `least` standard deviations.
+fn filter(view: &View<'_>, cell_px: usize, kernel: &Kernel, least: f64, workspace: &mut Workspace) {
+    let mesh_config = MeshConfig {
+        cell_px,
+        spread_of_differences: false,
+        spread_floor: FILTERED_NOISE_FLOOR,
+        is_normalised: true,
+    };
+    let size = (view.width, view.height);
+    let Workspace {
+        background,
+        filtered_mesh,
+        filtered_maxima,
+        candidates,
+        workers,
+        ..
+    } = workspace;
+    filtered_mesh.prepare(size, &mesh_config);
+    filtered_maxima.prepare(size);
+    let grid = filtered_mesh.grid;
+    candidates.resize_with(grid.rows, Candidates::default);
+    for worker in workers.iter_mut() {
+        worker.band.prepare(view.width, kernel);
+    }
+    let background = &*background;
+    Strips::of(filtered_mesh, filtered_maxima, candidates).share(workers, &|worker, strip| {
+        let Worker { cells, band } = worker;
+        let rows = strip.rows;
+        band.filter(
+            view,
+            background,
+            kernel,
+            with_neighbours(&rows, view.height),
+        );
+        strip
+            .maxima
+            .copy_from_slice(band.block_maxima(rows.clone()));
+        let filtered = rows.clone().filter_map(|y| band.row(y));
+        cells.measure_row(&grid, filtered, &mesh_config, (strip.level, strip.spread));
+        let least = least as f32;
+        let of_cells = strip.level.iter().zip(strip.spread.iter());
+        let thresholds =
+            of_cells.map(|(level, spread)| level + least * spread.max(FILTERED_NOISE_FLOOR));
+        // A cell without a value is left out: it will have that of its neighbours.
+        let lowest = thresholds.fold(f32::INFINITY, f32::min);
+        let cut = if lowest.is_finite() {
+            lowest
+        } else {
+            least * FILTERED_NOISE_FLOOR
+        };
+        strip.other.gather(band, rows, CANDIDATE_MARGIN * cut);
+    });
+    filtered_mesh.finish();
+}
+
+/// Gathers the candidates again where the threshold turned out lower than what they were gathered from.
+fn gather_missed(view: &View<'_>, kernel: &Kernel, threshold: f32, workspace: &mut Workspace) {
+    let Workspace {
+        background,
+        filtered_mesh,
+        candidates,
+        workers,
+        ..
+    } = workspace;
+    let Some(Worker { band, .. }) = workers.first_mut() else {
+        return;
+    };
+    for (row, found) in candidates.iter_mut().enumerate() {
+        let lowest = filtered_mesh.lowest_about_row(row, threshold);
+        if !found.reach_down_to(lowest) {
+            let rows = filtered_mesh.grid.rows_of(row);
+            band.filter(
+                view,
+                background,
+                kernel,
+                with_neighbours(&rows, view.height),
+            );
+            found.gather(band, rows, lowest);
+        }
+    }
+}
+
+/// The rows, and one on either side within the frame.
+fn with_neighbours(rows: &Range<usize>, height: usize) -> Range<usize> {
+    rows.start.saturating_sub(1)..(rows.end + 1).min(height)
+}
+
 /// The threshold `u` for Gaussian noise, raised for the noise that the frame has, whose tail is longer.
 fn raised_for_noise(
     u: f64,
     view: &View<'_>,
     spot_px: f64,
     kernel: &Kernel,
-    workspace: &Workspace,
+    workspace: &mut Workspace,
 ) -> f64 {
-    let (background, filtered_mesh) = (&workspace.background, &workspace.filtered_mesh);
     let weights = Weights::for_spot(spot_px, kernel.radius(), (view.width, view.height));
-    let is_coarse = middle_of(&background.spread) < COARSE * f64::from(background.spread_floor);
-    if is_coarse || is_cut_off(view, background) {
+    let background = &workspace.background;
+    let level = middle_of(&background.level, &mut workspace.sorted);
+    let spread = middle_of(&background.spread, &mut workspace.sorted);
+    let is_coarse = spread < COARSE * f64::from(background.spread_floor);
+    if is_coarse || is_cut_off(view, level, spread) {
         return raised_for_steps(u, view, &weights, is_coarse, workspace);
     }
     // The tail itself is mostly that of stars too faint to be detected: a threshold raised for these would lose a third of the
     // stars that can be. The skewness can be told apart from theirs.
     let star_free = StarFree {
-        filtered_mesh,
+        maxima: &workspace.filtered_maxima,
+        filtered_mesh: &workspace.filtered_mesh,
         limit: u as f32,
     };
-    let filtered = &workspace.filtered;
-    let skewness = noise::photon_skewness(view, background, filtered, &star_free, spot_px);
+    let work = &mut workspace.noise;
+    let skewness = noise::photon_skewness(view, background, &star_free, spot_px, work);
     skewness.map_or(u, |s| noise::threshold_for_photons(u, s, &weights))
 }
 
@@ -477,17 +649,25 @@ fn raised_for_steps(
     view: &View<'_>,
     weights: &Weights,
     is_coarse: bool,
-    workspace: &Workspace,
+    workspace: &mut Workspace,
 ) -> f64 {
-    let (background, filtered_mesh) = (&workspace.background, &workspace.filtered_mesh);
+    let Workspace {
+        background,
+        filtered_mesh,
+        filtered_maxima,
+        noise,
+        sorted,
+        ..
+    } = workspace;
     let floor = f64::from(FILTERED_NOISE_FLOOR);
-    let is_at_floor = middle_of(&filtered_mesh.spread) <= floor * 1.001;
-    let raised = |free_of_stars: f64| {
+    let is_at_floor = middle_of(&filtered_mesh.spread, sorted) <= floor * 1.001;
+    let mut raised = |free_of_stars: f64| {
         let star_free = StarFree {
+            maxima: filtered_maxima,
             filtered_mesh,
             limit: free_of_stars as f32,
         };
-        let noise = PixelNoise::measure(view, background, &workspace.filtered, &star_free);
+        let noise = PixelNoise::measure(view, background, &star_free, noise);
         noise.map_or(u, |n| {
             let known_spread = is_at_floor.then_some(floor / n.sigma);
             n.threshold(u, weights, known_spread)
@@ -505,13 +685,11 @@ fn raised_for_steps(
 }
 
 /// Whether the lowest value of the frame cuts into its noise: many pixels have just that value.
-fn is_cut_off(view: &View<'_>, background: &Mesh) -> bool {
+fn is_cut_off(view: &View<'_>, level: f64, spread: f64) -> bool {
     const EVERY: usize = 16;
     const SIGMAS: f32 = 2.5;
     let rows = || (0..view.height).step_by(EVERY).map(|y| view.row(y));
     let lowest = rows().flatten().copied().fold(f32::INFINITY, f32::min);
-    let level = middle_of(&background.level);
-    let spread = middle_of(&background.spread);
     let near = level - f64::from(lowest) < f64::from(SIGMAS) * spread;
     let total = view.width * view.height.div_ceil(EVERY);
     let at_lowest = rows().flatten().filter(|&&v| v == lowest).count();
@@ -590,14 +768,11 @@ fn check(frame: &Frame, config: &DetectConfig) -> Result<(), DetectError> {
 }
 
 /// The result for a frame without light.
-fn empty_detections(frame: &Frame, config: &DetectConfig) -> Detections {
+fn describe_darkness(frame: &Frame, config: &DetectConfig, found: &mut Detections) {
     let level = frame.pixels.iter().copied().find(|p| !p.is_nan());
-    Detections {
-        sources: Vec::new(),
-        background_adu: f64::from(level.unwrap_or(0.0)),
-        noise_adu: f64::from(ROUNDING_NOISE * frame.step_adu),
-        spot_sigma_px: config.spot_sigma_px.unwrap_or(calibrate::DEFAULT_SPOT_PX),
-    }
+    found.background_adu = f64::from(level.unwrap_or(0.0));
+    found.noise_adu = f64::from(ROUNDING_NOISE * frame.step_adu);
+    found.spot_sigma_px = config.spot_sigma_px.unwrap_or(calibrate::DEFAULT_SPOT_PX);
 }
 
 /// A noise that is certainly below that of the frame: some of the precision of its numbers.
@@ -609,9 +784,13 @@ fn least_noise(view: &View<'_>) -> f32 {
     (largest * 1e-6).max(f32::MIN_POSITIVE * 1e6)
 }
 
-/// The median.
-fn middle_of(values: &[f32]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_unstable_by(f32::total_cmp);
-    sorted.get(sorted.len() / 2).map_or(0.0, |&v| f64::from(v))
+/// The median; `sorted` is a buffer.
+fn middle_of(values: &[f32], sorted: &mut Vec<f32>) -> f64 {
+    sorted.clear();
+    sorted.extend_from_slice(values);
+    let middle = sorted.len() / 2;
+    if values.is_empty() {
+        return 0.0;
+    }
+    f64::from(*sorted.select_nth_unstable_by(middle, f32::total_cmp).1)
 }

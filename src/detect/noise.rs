@@ -13,9 +13,11 @@
 //! for the form used here.
 
 use super::background::{Mesh, Piece};
-use super::matched_filter::{BLOCK_PX, Filtered, normalise};
+use super::blocks::{BLOCK_PX, BlockMaxima};
+use super::matched_filter::{MAX_TAPS, normalise};
 use super::psf::{AxisProfile, MAX_WINDOW_PX, centered_profile};
 use super::view::View;
+use arrayvec::ArrayVec;
 use multiversion::multiversion;
 use std::ops::Range;
 
@@ -63,7 +65,7 @@ const MAX_RAISE: f64 = 1.0;
 /// The distribution of the pixels of a frame where no star is, in units of their noise.
 #[derive(Debug, Clone)]
 pub(super) struct PixelNoise {
-    counts: Vec<f64>,
+    counts: [f64; BINS],
     count: f64,
     mean: f64,
     /// Standard deviation, in units of the mesh of the unfiltered frame.
@@ -72,8 +74,19 @@ pub(super) struct PixelNoise {
     excess_kurtosis: f64,
 }
 
+/// Buffers for rows of pixels.
+#[derive(Debug, Clone, Default)]
+pub(super) struct NoiseWork {
+    bins: Vec<u16>,
+    standardised: Vec<f32>,
+    pieces: Vec<Piece>,
+    nodes: Vec<[f32; 2]>,
+}
+
 /// K and its first two derivatives.
 type Cumulants = [f64; 3];
+/// K in equal steps from 0 on.
+type Table = [Cumulants; STEPS + 1];
 
 impl PixelNoise {
     /// Takes samples of `view` where the filtered frame stays below `u`; `None` where there is too
@@ -81,21 +94,26 @@ impl PixelNoise {
     pub fn measure(
         view: &View<'_>,
         mesh: &Mesh,
-        filtered: &Filtered,
         star_free: &StarFree<'_>,
+        work: &mut NoiseWork,
     ) -> Option<Self> {
         let mut histogram = [0u32; BINS + 1];
-        let mut bins = vec![0u16; view.width];
+        let NoiseWork {
+            bins,
+            pieces,
+            nodes,
+            ..
+        } = work;
+        bins.resize(view.width, 0);
         let step = (view.width * view.height / SAMPLES).max(1);
-        let mut pieces = Vec::new();
         for y in (step / 2..view.height).step_by(step) {
-            mesh.row_pieces(y, view.width, &mut pieces);
+            mesh.row_pieces(y, pieces);
             let row = view.row(y);
-            for piece in &pieces {
+            for piece in pieces.iter() {
                 let span = piece.start..piece.end;
                 bins_of(&row[span.clone()], piece, &mut bins[span]);
             }
-            star_free.blocks(filtered, y, view, |span| {
+            star_free.blocks(y, view, nodes, |span| {
                 for &bin in &bins[span] {
                     histogram[usize::from(bin)] += 1;
                 }
@@ -105,7 +123,10 @@ impl PixelNoise {
     }
 
     fn of_histogram(histogram: &[u32]) -> Option<Self> {
-        let counts: Vec<f64> = histogram.iter().map(|&n| f64::from(n)).collect();
+        let mut counts = [0.0; BINS];
+        for (count, &n) in counts.iter_mut().zip(histogram) {
+            *count = f64::from(n);
+        }
         let moment = |power: i32, center: f64| -> f64 {
             let terms = counts.iter().enumerate();
             terms
@@ -131,30 +152,25 @@ impl PixelNoise {
     }
 
     /// K of the standardised pixels, at 0, `step`, 2 `step`, …
-    fn tabulate(&self, step: f64) -> Vec<Cumulants> {
-        let mut terms: Vec<[f64; 3]> = self
-            .counts
-            .iter()
-            .enumerate()
-            .filter(|&(_, &n)| n > 0.0)
-            .map(|(i, &n)| {
+    fn tabulate(&self, step: f64) -> Table {
+        let mut terms = [[0.0; 3]; BINS];
+        for (i, (term, &n)) in terms.iter_mut().zip(&self.counts).enumerate() {
+            if n > 0.0 {
                 let x = (bin_center(i) - self.mean) / self.sigma;
-                [x, n / self.count, (step * x).exp()]
-            })
-            .collect();
-        (0..=STEPS)
-            .map(|_| {
-                let [mut zeroth, mut first, mut second] = [0.0; 3];
-                for [x, part, factor] in &mut terms {
-                    zeroth += *part;
-                    first += *part * *x;
-                    second += *part * *x * *x;
-                    *part *= *factor;
-                }
-                let slope = first / zeroth;
-                [zeroth.ln(), slope, second / zeroth - slope * slope]
-            })
-            .collect()
+                *term = [x, n / self.count, (step * x).exp()];
+            }
+        }
+        std::array::from_fn(|_| {
+            let [mut zeroth, mut first, mut second] = [0.0; 3];
+            for [x, part, factor] in &mut terms {
+                zeroth += *part;
+                first += *part * *x;
+                second += *part * *x * *x;
+                *part *= *factor;
+            }
+            let slope = first / zeroth;
+            [zeroth.ln(), slope, second / zeroth - slope * slope]
+        })
     }
 
     /// The threshold that noise filtered with `kernel` exceeds as often as Gaussian noise exceeds `u`;
@@ -211,7 +227,7 @@ pub(super) fn threshold_for_photons(u: f64, skewness: f64, kernel: &Weights) -> 
             above + 1.0,
         ]
     };
-    let table: Vec<Cumulants> = (0..=STEPS).map(at).collect();
+    let table: Table = std::array::from_fn(at);
     let (cubes, fourths) = (sum(&kernel.inside, 3), sum(&kernel.inside, 4));
     let (mean, sigma) = clipped(cubes * skewness, fourths * skewness * skewness);
     let quantile = |weights: &[(f64, f64)]| exceeded(&table, step, weights, u);
@@ -229,22 +245,23 @@ pub(super) fn threshold_for_photons(u: f64, skewness: f64, kernel: &Weights) -> 
 pub(super) fn photon_skewness(
     view: &View<'_>,
     mesh: &Mesh,
-    filtered: &Filtered,
     star_free: &StarFree<'_>,
     spot_px: f64,
+    work: &mut NoiseWork,
 ) -> Option<f64> {
     let mut sums = [0.0f64; MOMENTS];
-    let mut standardised = vec![0.0; view.width];
-    let mut pieces = Vec::new();
+    let NoiseWork {
+        standardised,
+        pieces,
+        nodes,
+        ..
+    } = work;
+    standardised.resize(view.width, 0.0);
     let step = (view.width * view.height / PHOTON_SAMPLES).max(1);
     for y in (step / 2..view.height).step_by(step) {
-        mesh.row_pieces(y, view.width, &mut pieces);
-        let row = view.row(y);
-        for piece in &pieces {
-            let span = piece.start..piece.end;
-            normalise(&row[span.clone()], piece, &mut standardised[span]);
-        }
-        star_free.blocks(filtered, y, view, |span| {
+        mesh.row_pieces(y, pieces);
+        normalise(view.row(y), pieces, standardised);
+        star_free.blocks(y, view, nodes, |span| {
             let of_block = moments(&standardised[span]);
             for (sum, part) in sums.iter_mut().zip(of_block) {
                 *sum += f64::from(part);
@@ -315,6 +332,8 @@ fn own_per_mixed(spot_px: f64) -> f64 {
 
 /// Where nothing stands out of the filtered frame.
 pub(super) struct StarFree<'a> {
+    /// The maxima of the filtered frame.
+    pub maxima: &'a BlockMaxima,
     /// The mesh of the filtered frame.
     pub filtered_mesh: &'a Mesh,
     /// What stands out, in standard deviations of the filtered noise.
@@ -325,22 +344,25 @@ impl StarFree<'_> {
     /// The blocks of columns of row `y` that hold no star nor its wings.
     fn blocks(
         &self,
-        filtered: &Filtered,
         y: usize,
         view: &View<'_>,
+        nodes: &mut Vec<[f32; 2]>,
         mut each: impl FnMut(Range<usize>),
     ) {
         let rows = [
-            filtered.block_maxima(y),
-            filtered.block_maxima(y.saturating_sub(WING_ROWS[0])),
-            filtered.block_maxima(y.saturating_sub(WING_ROWS[1])),
-            filtered.block_maxima((y + WING_ROWS[0]).min(view.height - 1)),
-            filtered.block_maxima((y + WING_ROWS[1]).min(view.height - 1)),
-        ];
+            y,
+            y.saturating_sub(WING_ROWS[0]),
+            y.saturating_sub(WING_ROWS[1]),
+            (y + WING_ROWS[0]).min(view.height - 1),
+            (y + WING_ROWS[1]).min(view.height - 1),
+        ]
+        .map(|row| self.maxima.row(row));
+        self.filtered_mesh.across_row(y, nodes);
         for block in 0..rows[0].len() {
             let start = block * BLOCK_PX;
             let end = (start + BLOCK_PX).min(view.width);
-            let (level, spread) = self.filtered_mesh.at((start + end) as f32 * 0.5, y as f32);
+            let middle = (start + end) as f32 * 0.5;
+            let (level, spread) = self.filtered_mesh.at_column(nodes, middle);
             let highest = level + self.limit * spread;
             if rows.iter().all(|r| r[block] < highest) {
                 each(start..end);
@@ -349,11 +371,14 @@ impl StarFree<'_> {
     }
 }
 
-/// The weights of a filter, each with how often it occurs.
+/// Weights, each with how often it occurs.
+type Weighted = ArrayVec<(f64, f64), { MAX_TAPS * MAX_TAPS }>;
+
+/// The weights of a filter.
 #[derive(Debug, Clone)]
 pub(super) struct Weights {
-    inside: Vec<(f64, f64)>,
-    at_border: Vec<(f64, f64)>,
+    inside: Weighted,
+    at_border: Weighted,
     largest: f64,
     /// The part of the frame that counts as its border.
     border_part: f64,
@@ -363,15 +388,15 @@ impl Weights {
     /// The matched filter for a spot, out to `radius`, on a frame of `width` times `height` pixels.
     pub fn for_spot(spot_px: f64, radius: usize, (width, height): (usize, usize)) -> Self {
         let profile = centered_profile(spot_px, radius);
-        let axis = |sides: f64| -> Vec<(f64, f64)> {
+        let axis = |sides: f64| -> ArrayVec<(f64, f64), MAX_TAPS> {
             let times = |i: usize| if i == 0 { 1.0 } else { sides };
             let with_times = profile.iter().enumerate().map(|(i, &p)| (times(i), p));
-            let weights: Vec<(f64, f64)> = with_times.collect();
+            let weights: ArrayVec<(f64, f64), MAX_TAPS> = with_times.collect();
             let norm = sum(&weights, 2).sqrt();
             weights.iter().map(|&(n, w)| (n, w / norm)).collect()
         };
         let (whole, half) = (axis(2.0), axis(1.0));
-        let product = |a: &[(f64, f64)], b: &[(f64, f64)]| -> Vec<(f64, f64)> {
+        let product = |a: &[(f64, f64)], b: &[(f64, f64)]| -> Weighted {
             let row = |&(n, w): &(f64, f64)| b.iter().map(move |&(m, v)| (n * m, w * v));
             a.iter().flat_map(row).collect()
         };
@@ -442,6 +467,7 @@ fn exceeded(table: &[Cumulants], step: f64, weights: &[(f64, f64)], u: f64) -> O
     if quantile(high) < u {
         return None;
     }
+    // Coarse noise has no quantile to speak of at small t: halvings do not look there.
     for _ in 0..BISECTIONS {
         let middle = 0.5 * (low + high);
         if quantile(middle) < u {
@@ -520,8 +546,8 @@ mod tests {
     fn photons_have_the_tail_of_the_poisson_distribution() {
         // 16 pixels of 25 photons each: 400 together, and P(> 497.7) is that of a Gaussian beyond 4.5.
         let kernel = Weights {
-            inside: vec![(16.0, 0.25)],
-            at_border: vec![(16.0, 0.25)],
+            inside: [(16.0, 0.25)].into_iter().collect(),
+            at_border: [(16.0, 0.25)].into_iter().collect(),
             largest: 0.25,
             border_part: 0.0,
         };

@@ -12,6 +12,8 @@ use multiversion::multiversion;
 const LANES: usize = 8;
 /// Parameters of one spot: x, y, flux, background, size.
 pub(super) const ONE_SPOT: usize = 5;
+/// The same with the size held.
+const PLACED_SPOT: usize = ONE_SPOT - 1;
 /// Entries of the lower triangle for one spot.
 const TRIANGLE: usize = ONE_SPOT * (ONE_SPOT + 1) / 2;
 
@@ -56,19 +58,24 @@ impl<const N: usize> Normal<N> {
         self.pixels += 1;
     }
 
-    /// Adds the pixels of a window in which there is one spot, whose light along x and y is in `axes`.
+    /// Adds the pixels of a window, row-major and of some width, in which there is one spot, whose light along x and y is
+    /// in `axes`; without its size where that `is_held`.
     pub fn add_one_spot(
         &mut self,
         spot: &OneSpot,
         axes: [&AxisProfile; 2],
-        data: &[f64],
-        width: usize,
+        (data, width): (&[f64], usize),
+        is_held: bool,
     ) {
         if width == 0 {
             return;
         }
         let mut sums = Normal::empty();
-        sum_one_spot(spot, axes, data, width, &mut sums);
+        if is_held {
+            sum_placed_spot(spot, axes, data, width, &mut sums);
+        } else {
+            sum_one_spot(spot, axes, data, width, &mut sums);
+        }
         for (i, row) in sums.matrix.iter().enumerate() {
             self.matrix[i][..ONE_SPOT].copy_from_slice(row);
         }
@@ -83,6 +90,8 @@ impl<const N: usize> Normal<N> {
         // With a count known beforehand the loops need not be loops.
         if count == ONE_SPOT {
             self.factorise_first(ONE_SPOT)
+        } else if count == PLACED_SPOT {
+            self.factorise_first(PLACED_SPOT)
         } else {
             self.factorise_first(count)
         }
@@ -198,6 +207,30 @@ fn sum_one_spot(
     width: usize,
     out: &mut Normal<ONE_SPOT>,
 ) {
+    sum_parameters::<ONE_SPOT>(spot, axes, data, width, out);
+}
+
+/// The same without the size.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn sum_placed_spot(
+    spot: &OneSpot,
+    axes: [&AxisProfile; 2],
+    data: &[f64],
+    width: usize,
+    out: &mut Normal<ONE_SPOT>,
+) {
+    sum_parameters::<PLACED_SPOT>(spot, axes, data, width, out);
+}
+
+/// The sums for the first `P` parameters of one spot.
+#[inline(always)]
+fn sum_parameters<const P: usize>(
+    spot: &OneSpot,
+    axes: [&AxisProfile; 2],
+    data: &[f64],
+    width: usize,
+    out: &mut Normal<ONE_SPOT>,
+) {
     let mut matrix = [[0.0f64; LANES]; TRIANGLE];
     let mut right = [[0.0f64; LANES]; ONE_SPOT];
     let mut chi2 = [0.0f64; LANES];
@@ -239,7 +272,7 @@ fn sum_one_spot(
                 chi2[lane] += residual[lane] * residual[lane] * weight[lane];
             }
             let mut entry = 0;
-            for i in 0..ONE_SPOT {
+            for i in 0..P {
                 let mut weighted = [0.0f64; LANES];
                 for lane in 0..LANES {
                     weighted[lane] = gradient[i][lane] * weight[lane];
@@ -255,7 +288,7 @@ fn sum_one_spot(
         }
     }
     let mut entry = 0;
-    for i in 0..ONE_SPOT {
+    for i in 0..P {
         out.right[i] += sum_of(right[i]);
         for j in 0..=i {
             out.matrix[i][j] += sum_of(matrix[entry]);

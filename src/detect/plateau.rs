@@ -3,6 +3,7 @@
 use super::components::Peak;
 use super::psf::{MAX_WINDOW_PX, PIXEL_VARIANCE_PX2};
 use super::scene::Scene;
+use arrayvec::ArrayVec;
 
 /// The area is followed so far from the peak, in columns and rows: beyond, it is no star's.
 const REACH_PX: usize = (MAX_WINDOW_PX - 1) / 2;
@@ -42,8 +43,11 @@ impl Plateau {
             rows.flat_map(move |row| columns.clone().map(move |column| (column, row)))
                 .filter(|&(x, y)| scene.view.at(x, y) >= scene.saturation_adu)
         };
-        let mut open: Vec<(usize, usize)> = Vec::new();
-        open.extend(around(peak.x, peak.y).filter(|&(x, y)| is_new(x, y)));
+        // Each pixel is new once: there is room for all.
+        let mut open: ArrayVec<(usize, usize), { MAX_WINDOW_PX * MAX_WINDOW_PX }> =
+            around(peak.x, peak.y)
+                .filter(|&(x, y)| is_new(x, y))
+                .collect();
         let mut sums = [0.0; 6];
         while let Some((column, row)) = open.pop() {
             open.extend(around(column, row).filter(|&(x, y)| is_new(x, y)));

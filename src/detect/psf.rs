@@ -6,6 +6,8 @@
 //! # Reference
 //! Wang et al. 2019, Laser & Optoelectronics Progress 56, 101101, Eqs. (1) and (2).
 
+use super::matched_filter::MAX_TAPS;
+use arrayvec::ArrayVec;
 use multiversion::multiversion;
 
 /// The variance of a pixel's own width, in px²: a spot spreads over σ² + 1/12.
@@ -110,9 +112,12 @@ pub(super) fn erf_and_gauss(x: f64) -> (f64, f64) {
     ((1.0 - polynomial * gauss).copysign(x), gauss)
 }
 
-/// `exp(x)` for −700 < x ≤ 0, to 1e-10 of its value: 2ⁿ times the series of what is left.
+/// What [`exp_of_negative`] is good down to.
+pub(super) const LEAST_EXPONENT: f64 = -700.0;
+
+/// `exp(x)` for −700 ≤ x ≤ 0, to 1e-10 of its value: 2ⁿ times the series of what is left.
 #[inline(always)]
-fn exp_of_negative(x: f64) -> f64 {
+pub(super) fn exp_of_negative(x: f64) -> f64 {
     /// Added to a number, it leaves the nearest integer in the lowest bits of the sum.
     const ROUNDER: f64 = 6_755_399_441_055_744.0;
     const EXPONENT_BITS: u32 = 52;
@@ -142,10 +147,12 @@ fn exp_of_negative(x: f64) -> f64 {
 }
 
 /// The spot's profile centred on a pixel: parts of the light at distances 0, 1, … `radius` pixels.
-pub(super) fn centered_profile(sigma_px: f64, radius: usize) -> Vec<f64> {
+///
+/// At most [`MAX_TAPS`] of them.
+pub(super) fn centered_profile(sigma_px: f64, radius: usize) -> ArrayVec<f64, MAX_TAPS> {
     let scale = 1.0 / (std::f64::consts::SQRT_2 * sigma_px);
     let edge = |distance: f64| erf_and_gauss(distance * scale).0;
-    (0..=radius)
+    (0..=radius.min(MAX_TAPS - 1))
         .map(|i| 0.5 * (edge(i as f64 + 0.5) - edge(i as f64 - 0.5)))
         .collect()
 }

@@ -3,10 +3,11 @@
 //! A star bright enough for that stands out in a single pixel, unless it is far out of focus.
 
 use super::background::Mesh;
+use super::blocks::{BLOCK_PX, block_maxima, columns_from};
 use super::fit::Spot;
-use super::matched_filter::{BLOCK_PX, block_maxima};
 use super::psf::PIXEL_VARIANCE_PX2;
 use super::view::View;
+use std::cmp::Ordering;
 
 /// A pixel is looked at from this many standard deviations of the background noise on.
 const MIN_PIXEL_SIGMA: f32 = 6.0;
@@ -14,8 +15,12 @@ const MIN_PIXEL_SIGMA: f32 = 6.0;
 const PEAK_REACH_PX: usize = 3;
 /// Rows that share the levels which their blocks of columns are compared with.
 const BAND_PX: usize = 32;
-/// At most so many candidates: a frame with more is no night sky.
+/// At most about so many candidates: a frame with more is no night sky.
 const MAX_CANDIDATES: usize = 5000;
+/// Large frames are looked at in rounds of so many pixels, each spread over the whole frame,
+const ROUND_PX: usize = 4_000_000;
+/// until there are so many peaks: only the brightest few are fitted.
+const ENOUGH_PEAKS: usize = 600;
 
 /// A local maximum of the frame.
 #[derive(Debug, Clone, Copy)]
@@ -28,8 +33,8 @@ pub(super) struct RawPeak {
     pub snr: f32,
     /// Light in those pixels, in ADU.
     pub light_adu: f64,
-    /// The spot size that its curvature tells, in pixels.
-    pub size_px: f64,
+    /// Background, in ADU.
+    level_adu: f32,
     /// Whether one of those pixels is saturated.
     pub saturated: bool,
 }
@@ -44,32 +49,77 @@ impl RawPeak {
             ..Spot::default()
         }
     }
+
+    /// The spot size that its curvature tells, in pixels.
+    pub fn size_px(&self, view: &View<'_>) -> f64 {
+        // A Gaussian of variance σ² + 1/12 falls to exp(−1/2S²) at the next pixel.
+        let above = |x: usize, y: usize| f64::from(view.at(x, y) - self.level_adu);
+        let (x, y) = (self.x, self.y);
+        let top = above(x, y);
+        let log = |x, y| above(x, y).max(1e-3 * top).ln();
+        let drop =
+            top.ln() - 0.25 * (log(x - 1, y) + log(x + 1, y) + log(x, y - 1) + log(x, y + 1));
+        let variance = 0.5 / drop.max(1e-3) - PIXEL_VARIANCE_PX2;
+        variance.max(0.0).sqrt().clamp(0.35, 4.0)
+    }
 }
 
-/// The peaks that stand out in single pixels, strongest first; those at the very border are left out.
-pub(super) fn find(view: &View<'_>, background: &Mesh, saturation_adu: f32) -> Vec<RawPeak> {
-    let mut peaks = Vec::new();
-    let mut maxima = vec![0.0; view.width.div_ceil(BLOCK_PX)];
-    let mut levels = Vec::new();
-    for y in 1..view.height - 1 {
-        if levels.is_empty() || y % BAND_PX == 0 {
-            band_levels(view, background, y, &mut levels);
-        }
-        let row = view.row(y);
-        block_maxima(row, &mut maxima);
-        for block in (0..maxima.len()).filter(|&b| maxima[b] >= levels[b]) {
-            let start = (block * BLOCK_PX).max(1);
-            let end = ((block + 1) * BLOCK_PX).min(view.width - 1);
-            for x in (start..end).filter(|&x| row[x] >= levels[block]) {
-                peaks.extend(peak_at(view, background, x, y, saturation_adu));
+/// Buffers, and the peaks found.
+#[derive(Debug, Clone, Default)]
+pub(super) struct RawPeaks {
+    levels: Vec<f32>,
+    maxima: Vec<f32>,
+    /// Strongest first.
+    pub peaks: Vec<RawPeak>,
+}
+
+impl RawPeaks {
+    /// Finds peaks that stand out in single pixels; those at the very border are left out.
+    pub fn find(&mut self, view: &View<'_>, background: &Mesh, saturation_adu: f32) {
+        self.peaks.clear();
+        let bands = view.height.div_ceil(BAND_PX);
+        let rounds = (view.width * view.height / ROUND_PX).max(1);
+        for round in 0..rounds {
+            for band in (round..bands).step_by(rounds) {
+                if self.peaks.len() < MAX_CANDIDATES {
+                    self.find_in_band(view, background, band * BAND_PX, saturation_adu);
+                }
+            }
+            if self.peaks.len() >= ENOUGH_PEAKS {
+                break;
             }
         }
-        if peaks.len() >= MAX_CANDIDATES {
-            break;
+        self.peaks
+            .sort_unstable_by(|a, b| b.snr.total_cmp(&a.snr).then((a.y, a.x).cmp(&(b.y, b.x))));
+    }
+
+    /// Finds the peaks in the band from row `top` on.
+    fn find_in_band(
+        &mut self,
+        view: &View<'_>,
+        background: &Mesh,
+        top: usize,
+        saturation_adu: f32,
+    ) {
+        let Self {
+            levels,
+            maxima,
+            peaks,
+        } = self;
+        band_levels(view, background, top, levels);
+        maxima.resize(levels.len(), 0.0);
+        for y in top.max(1)..(top + BAND_PX).min(view.height - 1) {
+            let row = view.row(y);
+            block_maxima(row, maxima);
+            let blocks = maxima.iter().zip(levels.iter()).enumerate();
+            for (block, (_, &level)) in blocks.filter(|(_, (maximum, level))| maximum >= level) {
+                let columns = columns_from(row, block, level);
+                for x in columns.filter(|&x| x > 0 && x + 1 < view.width) {
+                    peaks.extend(peak_at(view, background, x, y, saturation_adu));
+                }
+            }
         }
     }
-    peaks.sort_by(|a, b| b.snr.total_cmp(&a.snr).then((a.y, a.x).cmp(&(b.y, b.x))));
-    peaks
 }
 
 /// For each block of columns the level that no pixel of interest in the band from row `y` on is below.
@@ -100,19 +150,14 @@ fn peak_at(
     saturation_adu: f32,
 ) -> Option<RawPeak> {
     let value = view.at(x, y);
-    let (level, spread) = background.at(x as f32, y as f32);
-    if value < level + MIN_PIXEL_SIGMA * spread {
+    // Most pixels of a star are no peak: that is seen at once.
+    let next_to = [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)];
+    if next_to.iter().any(|&(x, y)| view.at(x, y) > value) {
         return None;
     }
-    let columns = x.saturating_sub(PEAK_REACH_PX)..(x + PEAK_REACH_PX + 1).min(view.width);
-    for row in y.saturating_sub(PEAK_REACH_PX)..(y + PEAK_REACH_PX + 1).min(view.height) {
-        for column in columns.clone() {
-            let other = view.at(column, row);
-            // Of equal ones, the first in reading order counts.
-            if other > value || (other == value && (row, column) < (y, x)) {
-                return None;
-            }
-        }
+    let (level, spread) = background.at(x as f32, y as f32);
+    if value < level + MIN_PIXEL_SIGMA * spread || !is_highest(view, x, y) {
+        return None;
     }
     let above = |dx: usize, dy: usize| f64::from(view.at(x + dx - 1, y + dy - 1) - level);
     let mut light_adu = 0.0;
@@ -122,16 +167,32 @@ fn peak_at(
         light_adu += if light.is_nan() { 0.0 } else { light };
         saturated |= view.at(x + dx - 1, y + dy - 1) >= saturation_adu;
     }
-    // A Gaussian of variance σ² + 1/12 falls to exp(−1/2S²) at the next pixel.
-    let log = |dx, dy| above(dx, dy).max(1e-3 * above(1, 1)).ln();
-    let drop = log(1, 1) - 0.25 * (log(0, 1) + log(2, 1) + log(1, 0) + log(1, 2));
-    let variance = 0.5 / drop.max(1e-3) - PIXEL_VARIANCE_PX2;
     Some(RawPeak {
         x,
         y,
         snr: light_adu as f32 / (3.0 * spread),
         light_adu,
-        size_px: variance.max(0.0).sqrt().clamp(0.35, 4.0),
+        level_adu: level,
         saturated,
+    })
+}
+
+/// Whether no pixel within reach is higher; of equal ones, the first in reading order counts.
+fn is_highest(view: &View<'_>, x: usize, y: usize) -> bool {
+    let value = view.at(x, y);
+    let columns = x.saturating_sub(PEAK_REACH_PX)..(x + PEAK_REACH_PX + 1).min(view.width);
+    let rows = y.saturating_sub(PEAK_REACH_PX)..(y + PEAK_REACH_PX + 1).min(view.height);
+    rows.into_iter().all(|row| {
+        let here = view.row(row);
+        let is_lower = |v: &f32| *v < value || v.is_nan();
+        let is_no_higher = |v: &f32| *v <= value || v.is_nan();
+        match row.cmp(&y) {
+            Ordering::Less => here[columns.clone()].iter().all(is_lower),
+            Ordering::Greater => here[columns.clone()].iter().all(is_no_higher),
+            Ordering::Equal => {
+                here[columns.start..x].iter().all(is_lower)
+                    && here[x..columns.end].iter().all(is_no_higher)
+            }
+        }
     })
 }

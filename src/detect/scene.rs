@@ -2,7 +2,7 @@
 
 use super::background::Mesh;
 use super::components::Peak;
-use super::fit::{Fit, FitConfig, Fitter, NoiseModel, Spot, Window, window_radius};
+use super::fit::{Fit, FitConfig, Fitter, NoiseModel, Spot, Spots, Window, window_radius};
 use super::psf::MAX_WINDOW_PX;
 use super::view::View;
 
@@ -110,7 +110,7 @@ impl Scene<'_> {
     pub fn subtract(&self, spots: &[Spot], fitter: &mut Fitter, window: &mut Window) {
         for &spot in spots {
             let fit = Fit {
-                spots: vec![spot],
+                spots: Spots::from_iter([spot]),
                 spot_px: self.spot_px,
                 ..Fit::default()
             };
@@ -156,4 +156,10 @@ pub(super) struct FitWork {
     pub fitter: Fitter,
     /// The pixels.
     pub window: Window,
+    /// Those of a fit that is tried in another window.
+    pub kept_window: Window,
+    /// The spots that shine into the window and are not fitted.
+    pub beyond: Vec<Spot>,
+    /// Light and residual of the pixels of a window.
+    pub residuals: Vec<(f64, f64)>,
 }

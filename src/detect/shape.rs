@@ -69,7 +69,7 @@ fn is_hot_pixel(measurement: &Measurement<'_>, peak: &Peak, fit: &Fit, work: &mu
         free_spot: false,
         noise: NoiseModel::default(),
     };
-    let FitWork { fitter, window } = work;
+    let FitWork { fitter, window, .. } = work;
     let star = fitter.fit(window, &fit.spots[..1], &config);
     let mut brightest = (0.0, 0.0);
     fitter.for_each_pixel(window, &star, |data, light, _| {

@@ -9,7 +9,7 @@
 //! Taylor, Worsley & Gosselin 2007, "Maxima of discretely sampled random fields", Biometrika 94, 1,
 //! doi 10.1093/biomet/asm004, for a field whose correlation is Gaussian in shape.
 
-use super::psf::erf_and_gauss;
+use super::psf::{LEAST_EXPONENT, erf_and_gauss, exp_of_negative};
 use std::f64::consts::{PI, SQRT_2};
 
 /// Steps of the outer integral, which spans [`SPAN`] above u.
@@ -20,18 +20,56 @@ const RANGE: (f64, f64) = (1.0, 12.0);
 /// Secant steps at most; some eight are needed.
 const MAX_SECANTS: usize = 60;
 
+/// Parts of the inner integral.
+const PARTS: usize = 8;
+
+/// The chance that both neighbours on an axis lie lower, for one correlation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Lower {
+    h: f64,
+    step: f64,
+    /// `½h²/sin²θ` in the middle of each part of the range of θ.
+    exponents: [f64; PARTS],
+}
+
+impl Lower {
+    fn new(rho: f64) -> Self {
+        let h = ((1.0 - rho) / (1.0 + rho)).sqrt();
+        let alpha = ((1.0 - rho * rho) / 2.0).sqrt().asin();
+        // Midpoint rule: the integrand vanishes with all its derivatives at 0.
+        let step = alpha / PARTS as f64;
+        let exponent = |i: usize| 0.5 * (h / ((i as f64 + 0.5) * step).sin()).powi(2);
+        Self {
+            h,
+            step,
+            exponents: std::array::from_fn(exponent),
+        }
+    }
+
+    /// Q(ρ, z): the chance that both neighbours on one axis lie below z at a pixel whose value is z.
+    fn chance(&self, z: f64) -> f64 {
+        let tail = 1.0 - erf_and_gauss(self.h * z / SQRT_2).0;
+        let both: f64 = self
+            .exponents
+            .iter()
+            .map(|exponent| exp_of_negative((-exponent * z * z).max(LEAST_EXPONENT)) * self.step)
+            .sum();
+        (1.0 - tail + both / PI).max(0.0)
+    }
+}
+
 /// The chance per pixel that filtered noise has a local maximum above `u` standard deviations.
-pub(super) fn false_alarm_probability(u: f64, rho_x: f64, rho_y: f64) -> f64 {
+fn false_alarm_probability(u: f64, across: &Lower, down: &Lower) -> f64 {
     let step = SPAN / STEPS as f64;
     let density = |z: f64| {
-        let phi = (-0.5 * z * z).exp() / (2.0 * PI).sqrt();
-        let across = neighbours_lower(rho_x, z);
-        let down = if rho_x == rho_y {
-            across
+        let phi = exp_of_negative(-0.5 * z * z) / (2.0 * PI).sqrt();
+        let of_row = across.chance(z);
+        let of_column = if across == down {
+            of_row
         } else {
-            neighbours_lower(rho_y, z)
+            down.chance(z)
         };
-        phi * across * down
+        phi * of_row * of_column
     };
     // Simpson's rule.
     let inner: f64 = (1..STEPS)
@@ -40,27 +78,13 @@ pub(super) fn false_alarm_probability(u: f64, rho_x: f64, rho_y: f64) -> f64 {
     (density(u) + inner + density(u + SPAN)) * step / 3.0
 }
 
-/// Q(ρ, z): the chance that both neighbours on one axis lie below z at a pixel whose value is z.
-fn neighbours_lower(rho: f64, z: f64) -> f64 {
-    let h = ((1.0 - rho) / (1.0 + rho)).sqrt();
-    let alpha = ((1.0 - rho * rho) / 2.0).sqrt().asin();
-    let tail = 1.0 - erf_and_gauss(h * z / SQRT_2).0;
-    const PARTS: usize = 8;
-    let step = alpha / PARTS as f64;
-    // Midpoint rule: the integrand vanishes with all its derivatives at 0.
-    let both: f64 = (0..PARTS)
-        .map(|i| ((i as f64 + 0.5) * step).sin())
-        .map(|sine| (-0.5 * (h * z / sine).powi(2)).exp() * step)
-        .sum();
-    (1.0 - tail + both / PI).max(0.0)
-}
-
 /// The threshold, in standard deviations of the filtered noise, above which pure noise has
 /// `per_mpx` local maxima in a million pixels.
 pub(super) fn threshold_for_rate(per_mpx: f64, rho_x: f64, rho_y: f64) -> f64 {
     let wanted = (per_mpx * 1e-6).ln();
+    let (across, down) = (Lower::new(rho_x), Lower::new(rho_y));
     let excess = |u: f64| {
-        false_alarm_probability(u, rho_x, rho_y)
+        false_alarm_probability(u, &across, &down)
             .max(f64::MIN_POSITIVE)
             .ln()
             - wanted
@@ -101,19 +125,23 @@ pub(super) fn for_estimated_noise(u: f64, degrees: f64) -> f64 {
 mod tests {
     use super::*;
 
+    fn rate_above(u: f64, rho: f64) -> f64 {
+        false_alarm_probability(u, &Lower::new(rho), &Lower::new(rho))
+    }
+
     #[test]
     fn independent_pixels_have_the_textbook_rate() {
         // Four independent neighbours all lower, far in the tail: Φ̄(u).
         let tail = 0.5 * (1.0 - erf_and_gauss(4.0 / SQRT_2).0);
-        let rate = false_alarm_probability(4.0, 0.0, 0.0);
+        let rate = rate_above(4.0, 0.0);
         assert!((rate / tail - 1.0).abs() < 0.01, "{rate} vs {tail}");
     }
 
     #[test]
     fn full_correlation_leaves_no_maxima_and_thresholds_invert_rates() {
-        assert!(neighbours_lower(0.999_999, 3.0) < 0.01);
+        assert!(Lower::new(0.999_999).chance(3.0) < 0.01);
         let u = threshold_for_rate(1.0, 0.78, 0.78);
-        assert!((false_alarm_probability(u, 0.78, 0.78) * 1e6 - 1.0).abs() < 1e-3);
+        assert!((rate_above(u, 0.78) * 1e6 - 1.0).abs() < 1e-3);
         // Simulated for a spot of σ = 1 px at one per megapixel: 4.71 (80 Mpx, ±0.05).
         assert!((u - 4.71).abs() < 0.08, "{u}");
         assert!(for_estimated_noise(5.0, 1e9) - 5.0 < 1e-6);

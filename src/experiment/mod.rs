@@ -28,10 +28,12 @@ pub use published::{Published, PublishedStar};
 pub use summary::{CompletenessBin, ExpectedFaintest, FoundFaintest, SimulatedReport};
 pub use table::{FieldReport, TableReport, TableStar};
 
-use crate::detect::{DetectError, Workspace};
+use crate::detect::DetectError;
 use crate::frame::{Frame, FrameError};
 use crate::identify::Outcome;
-use crate::pipeline::{DateSource, FrameDate, Knowledge, Pipeline, Solution, SolveConfig};
+use crate::pipeline::{
+    DateSource, FrameDate, Knowledge, Pipeline, Solution, SolveConfig, Workspace,
+};
 use crate::report::to_decimals;
 use crate::sensitivity::{Budget, Detector, Rule, Scenario};
 use crate::simulate::{Pointing, Scene, Simulator};
@@ -171,7 +173,7 @@ pub fn run(
     let simulator = Simulator::new(&scenario, &Scene::default(), stars)?;
     let protocol = Protocol {
         scenario: &scenario,
-        simulator: &simulator.with_camera(found.camera.clone()),
+        simulator: &simulator.with_camera(found.camera),
         detectors: [
             &detector,
             &Detector::new(Rule::PeakPixel, &scenario, &budget),

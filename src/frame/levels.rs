@@ -19,7 +19,7 @@ pub(super) struct Samples<'a, T> {
 
 /// The frame of integer samples, of which `full_scale` is the largest of the format, in ADU: luminance,
 /// saturation, and the unit that the levels come in.
-pub(super) fn frame_from_integers<T: Copy + PartialEq + Into<i64>>(
+pub(super) fn frame_from_integers<T: Copy + Into<i64>>(
     samples: &Samples<'_, T>,
     full_scale: T,
 ) -> Result<Frame, FrameError> {
@@ -44,13 +44,42 @@ pub(super) fn frame_from_integers<T: Copy + PartialEq + Into<i64>>(
             .collect(),
     };
     let step = if samples.channels <= 2 {
-        level_step(values, full_scale)
+        level_step(values, |&v| v.into(), full_scale.into())
     } else {
         1
     };
+    let frame = Frame::of_numbers(width, height, pixels);
+    Ok(with_step(frame, step, full_scale.into()))
+}
+
+/// The frame of `words` of 16 bits, `height * width` of them, which `level` reads; its pixels lie in `room`.
+pub(super) fn frame_from_words(
+    (width, height): (usize, usize),
+    words: &[[u8; 2]],
+    level: impl Fn([u8; 2]) -> u16,
+    mut room: Vec<f32>,
+) -> Result<Frame, FrameError> {
+    check_size(width, height)?;
+    let expected = width * height;
+    let words = words.get(..expected).ok_or(FrameError::WrongLength {
+        expected,
+        found: words.len(),
+    })?;
+    room.clear();
+    room.extend(words.iter().map(|&word| f32::from(level(word))));
+    let full_scale = i64::from(u16::MAX);
+    let step = level_step(words, |&word| level(word).into(), full_scale);
+    Ok(with_step(
+        Frame::of_numbers(width, height, room),
+        step,
+        full_scale,
+    ))
+}
+
+fn with_step(frame: Frame, step: i64, full_scale: i64) -> Frame {
     // Twelve bits in the upper part of sixteen saturate at 65520, not at 65535.
-    let saturation = full_scale.into() / step * step;
-    Ok(Frame::new(width, height, pixels)?.with_levels(step as f32, Some(saturation as f32)))
+    let saturation = full_scale / step * step;
+    frame.with_levels(step as f32, Some(saturation as f32))
 }
 
 /// The frame of float samples, `height * width * channels` of them, which have neither steps nor a full scale.
@@ -92,12 +121,12 @@ fn luminance(rgb: [f32; 3], full: f32) -> f32 {
 }
 
 /// The largest power of two that divides all levels below full scale: 16 where twelve bits are stored in sixteen.
-fn level_step<T: Copy + PartialEq + Into<i64>>(values: &[T], full_scale: T) -> i64 {
+fn level_step<S>(samples: &[S], level: impl Fn(&S) -> i64, full_scale: i64) -> i64 {
     let mut bits = MAX_STEP;
     // The compiler works on many values at once where it need not look at the result after each.
-    for chunk in values.chunks(LOOKED_AT_TOGETHER) {
-        bits |= chunk.iter().fold(0, |bits, &value| {
-            bits | if value == full_scale { 0 } else { value.into() }
+    for chunk in samples.chunks(LOOKED_AT_TOGETHER) {
+        bits |= chunk.iter().map(&level).fold(0, |bits, value| {
+            bits | if value == full_scale { 0 } else { value }
         });
         if bits & 1 == 1 {
             return 1;
@@ -105,7 +134,7 @@ fn level_step<T: Copy + PartialEq + Into<i64>>(values: &[T], full_scale: T) -> i
     }
     let step = 1 << bits.trailing_zeros();
     // All levels zero, or nothing but full scale: nothing can be told.
-    if step >= MAX_STEP.min(full_scale.into()) {
+    if step >= MAX_STEP.min(full_scale) {
         1
     } else {
         step

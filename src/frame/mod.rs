@@ -104,14 +104,19 @@ impl Frame {
         if !any_value {
             return Err(FrameError::NoValues);
         }
-        Ok(Self {
+        Ok(Self::of_numbers(width, height, pixels))
+    }
+
+    /// A frame of pixels of which none is infinite and not all are NaN, `height * width` of them.
+    fn of_numbers(width: usize, height: usize, pixels: Vec<f32>) -> Self {
+        Self {
             width,
             height,
             pixels,
             step_adu: 0.0,
             saturation_adu: None,
             metadata: FrameMetadata::default(),
-        })
+        }
     }
 
     /// The same frame with the format's level difference and full scale, in ADU.
@@ -130,6 +135,28 @@ impl Frame {
     }
 }
 
+/// Room that reading takes, kept from frame to frame. Most of the time of reading is else the system's, which has to find
+/// and clear that memory anew for each.
+#[derive(Debug, Default)]
+pub struct Buffers {
+    /// The file.
+    bytes: Vec<u8>,
+    /// Of a frame that is no longer needed.
+    pixels: Vec<f32>,
+}
+
+impl Buffers {
+    /// None yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Takes back the pixels of a frame that is no longer needed.
+    pub fn recycle(&mut self, frame: Frame) {
+        self.pixels = frame.pixels;
+    }
+}
+
 /// Reads the first image in the file `path`, whatever its name ends in.
 /// # Errors
 /// As [`read_page`].
@@ -141,12 +168,25 @@ pub fn read(path: impl AsRef<Path>) -> Result<Frame, FrameError> {
 /// # Errors
 /// [`FrameError::File`] with the path, around what is wrong.
 pub fn read_page(path: impl AsRef<Path>, page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
+    read_page_with(path, page, &mut Buffers::new())
+}
+
+/// The same, with room kept from the last frame.
+/// # Errors
+/// As [`read_page`].
+pub fn read_page_with(
+    path: impl AsRef<Path>,
+    page: Option<NonZeroUsize>,
+    buffers: &mut Buffers,
+) -> Result<Frame, FrameError> {
     let path = path.as_ref();
+    let Buffers { bytes, pixels } = buffers;
     std::fs::File::open(path)
         .map_err(FrameError::from)
         .and_then(|file| {
             let length = file.metadata().map_or(0, |metadata| metadata.len());
-            decode_page(&read_limited(file, length, MAX_FILE_BYTES)?, page)
+            read_limited(file, length, MAX_FILE_BYTES, bytes)?;
+            decode_with(bytes, page, pixels)
         })
         .map_err(|error| error.in_file(path))
 }
@@ -157,15 +197,22 @@ pub fn read_page(path: impl AsRef<Path>, page: Option<NonZeroUsize>) -> Result<F
 /// # Errors
 /// As [`decode_page`]; [`FrameError::Io`], [`FrameError::TooManyBytes`].
 pub fn read_stream(stream: impl Read, page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
-    decode_page(&read_limited(stream, 0, MAX_FILE_BYTES)?, page)
+    let mut bytes = Vec::new();
+    read_limited(stream, 0, MAX_FILE_BYTES, &mut bytes)?;
+    decode_page(&bytes, page)
 }
 
-/// All bytes of `stream`, in which `expected` are to be expected, at most `limit`.
-fn read_limited(mut stream: impl Read, expected: u64, limit: u64) -> Result<Vec<u8>, FrameError> {
-    let mut bytes = Vec::new();
-    stream.by_ref().take(HEAD_BYTES).read_to_end(&mut bytes)?;
-    if format_of(&bytes).is_none() {
-        return Err(no_image(&bytes));
+/// Makes `bytes` all those of `stream`, in which `expected` are to be expected, at most `limit`.
+fn read_limited(
+    mut stream: impl Read,
+    expected: u64,
+    limit: u64,
+    bytes: &mut Vec<u8>,
+) -> Result<(), FrameError> {
+    bytes.clear();
+    stream.by_ref().take(HEAD_BYTES).read_to_end(bytes)?;
+    if format_of(bytes).is_none() {
+        return Err(no_image(bytes));
     }
     if expected > limit {
         return Err(FrameError::TooManyBytes { limit });
@@ -173,11 +220,11 @@ fn read_limited(mut stream: impl Read, expected: u64, limit: u64) -> Result<Vec<
     let room = bytes.try_reserve(expected as usize);
     room.map_err(|_| io::Error::from(io::ErrorKind::OutOfMemory))?;
     let rest = (limit + 1).saturating_sub(bytes.len() as u64);
-    stream.take(rest).read_to_end(&mut bytes)?;
+    stream.take(rest).read_to_end(bytes)?;
     if bytes.len() as u64 > limit {
         return Err(FrameError::TooManyBytes { limit });
     }
-    Ok(bytes)
+    Ok(())
 }
 
 /// Why `bytes`, which do not begin like an image, are none.
@@ -201,9 +248,17 @@ pub fn decode(bytes: &[u8]) -> Result<Frame, FrameError> {
 /// # Errors
 /// [`FrameError`], never [`FrameError::File`].
 pub fn decode_page(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
+    decode_with(bytes, page, &mut Vec::new())
+}
+
+fn decode_with(
+    bytes: &[u8],
+    page: Option<NonZeroUsize>,
+    room: &mut Vec<f32>,
+) -> Result<Frame, FrameError> {
     match format_of(bytes) {
-        Some(FrameFormat::Gzip) => decode_image(&gzip::unpack(bytes)?, page),
-        _ => decode_image(bytes, page),
+        Some(FrameFormat::Gzip) => decode_image(&gzip::unpack(bytes)?, page, room),
+        _ => decode_image(bytes, page, room),
     }
 }
 
@@ -216,14 +271,18 @@ fn format_inside(head: &[u8]) -> (Option<FrameFormat>, Vec<u8>) {
 }
 
 /// Decodes one image that is not packed, or no longer.
-fn decode_image(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
+fn decode_image(
+    bytes: &[u8],
+    page: Option<NonZeroUsize>,
+    room: &mut Vec<f32>,
+) -> Result<Frame, FrameError> {
     let only_page = |read: fn(&[u8]) -> Result<Frame, FrameError>| match page {
         Some(page) if page.get() > 1 => Err(FrameError::NoSuchPage { page, pages: 1 }),
         _ => read(bytes),
     };
     match format_of(bytes) {
         Some(FrameFormat::Fits) => fits::decode(bytes, page),
-        Some(FrameFormat::Tiff) => tiff::decode(bytes, page),
+        Some(FrameFormat::Tiff) => tiff::decode(bytes, page, room),
         Some(FrameFormat::Png) => only_page(raster::decode_png),
         Some(FrameFormat::Jpeg) => only_page(raster::decode_jpeg),
         Some(FrameFormat::Bmp) => only_page(raster::decode_bmp),

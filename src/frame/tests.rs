@@ -451,13 +451,64 @@ fn a_stream_without_an_end_is_left_where_it_is_no_image_or_too_long() {
     let nothing = read_stream(std::io::empty(), None).unwrap_err();
     assert!(matches!(nothing, FrameError::Empty), "{nothing}");
     let endless = || (&b"P5 3 3 255\n"[..]).chain(std::io::repeat(7));
-    let error = read_limited(endless(), 0, 10_000).unwrap_err();
+    let error = read_limited(endless(), 0, 10_000, &mut Vec::new()).unwrap_err();
     assert!(
         matches!(error, FrameError::TooManyBytes { limit: 10_000 }),
         "{error}"
     );
     for length in [20, 4096, 5000, 10_000] {
-        let bytes = read_limited(endless().take(length), 99, 10_000).unwrap();
+        let mut bytes = Vec::new();
+        read_limited(endless().take(length), 99, 10_000, &mut bytes).unwrap();
         assert_eq!(bytes.len() as u64, length);
     }
+}
+
+#[test]
+fn words_in_one_piece_and_words_in_pieces_are_read_alike() {
+    const TAGS: [(u16, u32); 5] = [(256, 5), (257, 3), (258, 16), (262, 1), (278, 1)];
+    let levels: [u16; 15] = std::array::from_fn(|i| 4000 * i as u16 + 1);
+    let expected: Vec<f32> = levels.map(f32::from).into();
+    let bytes: Vec<u8> = levels
+        .iter()
+        .flat_map(|level| level.to_le_bytes())
+        .collect();
+    let strips: Vec<&[u8]> = bytes.chunks(10).collect();
+    let whole = tiff_by_hand(&TAGS, &strips);
+    assert_eq!(decode(&whole).unwrap().pixels, expected);
+    assert_eq!(decode(&whole).unwrap().saturation_adu, Some(65535.0));
+    // The last two strips change places, in the file and in the table.
+    let mut pieces = tiff_by_hand(&TAGS, &[strips[0], strips[2], strips[1]]);
+    let table = pieces.len() - 30 - 24;
+    let (left, right) = pieces[table + 4..table + 12].split_at_mut(4);
+    left.swap_with_slice(right);
+    assert_eq!(decode(&pieces).unwrap().pixels, expected);
+    // Where white is 0, levels are turned round.
+    let white_is_zero = TAGS.map(|(tag, value)| (tag, if tag == 262 { 0 } else { value }));
+    let turned = decode(&tiff_by_hand(&white_is_zero, &strips)).unwrap();
+    assert_eq!(turned.pixels[1], 65535.0 - expected[1]);
+    assert!(decode(&whole[..whole.len() - 1]).is_err(), "cut short");
+}
+
+#[test]
+fn words_of_either_order_are_read_alike() {
+    let levels: [u16; 9] = std::array::from_fn(|i| 300 * i as u16 + 7);
+    let mut bytes = b"MM\0*\0\0\0\x08\0\x06".to_vec();
+    for (tag, value) in [
+        (256u16, 3u16),
+        (257, 3),
+        (258, 16),
+        (262, 1),
+        (273, 86),
+        (279, 18),
+    ] {
+        bytes.extend(
+            [tag, 3, 0, 1, value, 0]
+                .iter()
+                .flat_map(|word| word.to_be_bytes()),
+        );
+    }
+    bytes.extend([0; 4]);
+    assert_eq!(bytes.len(), 86);
+    bytes.extend(levels.iter().flat_map(|level| level.to_be_bytes()));
+    assert_eq!(decode(&bytes).unwrap().pixels, levels.map(f32::from));
 }

@@ -1,11 +1,14 @@
 //! TIFF: integers of 1 to 64 bits with and without sign, floats of 16 to 64 bits; grey or colour, with or without alpha;
 //! in strips or tiles, interleaved or plane by plane, as the `tiff` crate decodes them.
 
-use super::levels::{Samples, frame_from_floats, frame_from_integers, interleaved};
+use super::levels::{
+    Samples, frame_from_floats, frame_from_integers, frame_from_words, interleaved,
+};
 use super::{Frame, FrameError, FrameFormat, MAX_PIXELS, check_size, exif};
 use std::io::Cursor;
 use std::num::NonZeroUsize;
-use tiff::decoder::{Decoder, DecodingResult, Limits};
+use tiff::decoder::{BufferLayoutPreference, Decoder, DecodingResult, Limits};
+use tiff::tags::{ByteOrder, SampleFormat, Tag};
 use tiff::{ColorType, TiffError, TiffFormatError};
 
 /// The most bytes of one decoded sample array: four 16-bit channels of the largest frame.
@@ -16,7 +19,11 @@ const SUPPORTED: &str = "grey or colour of 1 to 64 bits a sample; not packed, or
 /// Decodes one image of a TIFF file: `page`, counted from 1, else the first.
 /// # Errors
 /// As [`super::decode_page`].
-pub(super) fn decode(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
+pub(super) fn decode(
+    bytes: &[u8],
+    page: Option<NonZeroUsize>,
+    room: &mut Vec<f32>,
+) -> Result<Frame, FrameError> {
     let fail = |e: TiffError| error_of(e, bytes.len());
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(fail)?;
     if let Some(page) = page {
@@ -30,18 +37,67 @@ pub(super) fn decode(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame, 
     limits.intermediate_buffer_size = MAX_DECODED_BYTES;
     decoder = decoder.with_limits(limits);
     let color = decoder.colortype().map_err(fail)?;
+    let stored = decoder.image_buffer_layout().map_err(fail)?;
     let layout = Layout {
         width,
         height,
         bits: color.bit_depth(),
         channels: channels_of(color)?,
-        planes: decoder.image_buffer_layout().map_err(fail)?.planes,
+        planes: stored.planes,
     };
-    let mut samples = DecodingResult::U8(Vec::new());
-    decoder.read_image_to_buffer(&mut samples).map_err(fail)?;
-    Ok(layout
-        .frame(samples)?
-        .with_metadata(exif::metadata(bytes, width)))
+    let words = if layout.is_grey_words(&stored) {
+        plain_words(&mut decoder, bytes)
+    } else {
+        None
+    };
+    let frame = if let Some(words) = words {
+        let pixels = std::mem::take(room);
+        match decoder.byte_order() {
+            ByteOrder::LittleEndian => {
+                frame_from_words((width, height), words, u16::from_le_bytes, pixels)
+            }
+            ByteOrder::BigEndian => {
+                frame_from_words((width, height), words, u16::from_be_bytes, pixels)
+            }
+        }
+    } else {
+        let mut samples = DecodingResult::U8(Vec::new());
+        decoder.read_image_to_buffer(&mut samples).map_err(fail)?;
+        layout.frame(samples)
+    };
+    Ok(frame?.with_metadata(exif::metadata(bytes, width)))
+}
+
+/// The samples of 16 bits as they stand in the file, where they do so in one piece and mean what they say: not packed, 0 is black.
+fn plain_words<'a>(decoder: &mut Decoder<Cursor<&[u8]>>, bytes: &'a [u8]) -> Option<&'a [[u8; 2]]> {
+    const NOT_PACKED: u16 = 1;
+    const BLACK_IS_ZERO: u16 = 1;
+    // Each with the value that it has where it is not given.
+    let plain = [
+        (Tag::Compression, 1, NOT_PACKED),
+        (Tag::PhotometricInterpretation, 0, BLACK_IS_ZERO),
+        (Tag::Predictor, 1, 1),
+        (Tag::FillOrder, 1, 1),
+    ];
+    for (tag, default, wanted) in plain {
+        let found: Option<u16> = decoder.find_tag_unsigned(tag).ok()?;
+        if found.unwrap_or(default) != wanted {
+            return None;
+        }
+    }
+    let offsets = decoder.get_tag_u64_vec(Tag::StripOffsets).ok()?;
+    let counts = decoder.get_tag_u64_vec(Tag::StripByteCounts).ok()?;
+    let mut end = *offsets.first()?;
+    for (offset, count) in offsets.iter().zip(&counts) {
+        if *offset != end {
+            return None;
+        }
+        end = end.checked_add(*count)?;
+    }
+    let range = usize::try_from(offsets[0]).ok()?..usize::try_from(end).ok()?;
+    let (width, height) = decoder.dimensions().ok()?;
+    let words = bytes.get(range)?.as_chunks().0;
+    (words.len() == width as usize * height as usize).then_some(words)
 }
 
 /// Goes to the image `page`, counted from 1.
@@ -90,6 +146,12 @@ struct Layout {
 }
 
 impl Layout {
+    /// Whether it is what most cameras write: grey, 16 bits without sign.
+    fn is_grey_words(&self, stored: &BufferLayoutPreference) -> bool {
+        let is_unsigned = stored.sample_format == SampleFormat::Uint;
+        self.bits == 16 && is_unsigned && self.channels == 1 && self.planes == 1
+    }
+
     fn frame(&self, samples: DecodingResult) -> Result<Frame, FrameError> {
         // What has more than 24 bits is rounded, integer or not.
         let rounded = |values: Vec<f32>| Ok(self.floats(values)?.with_levels(1.0, None));
@@ -112,7 +174,7 @@ impl Layout {
         }
     }
 
-    fn integers<T: Copy + PartialEq + Into<i64>>(
+    fn integers<T: Copy + Into<i64>>(
         &self,
         values: Vec<T>,
         full_scale: T,

@@ -12,8 +12,7 @@
 //! # Reference
 //! Comaniciu & Meer 2002, IEEE Trans. Pattern Anal. Mach. Intell. 24, 603, doi 10.1109/34.1000236, for the mean shift.
 
-use super::verify::Hypothesis;
-use super::{Sky, StarField, StarMatch};
+use super::verify::{Hypothesis, Pair, Scene};
 use crate::catalog::sky_grid::GridStar;
 use crate::coords::{Icrs, PixelPoint, UnitVector};
 
@@ -28,75 +27,82 @@ const CONVERGED_PX: f64 = 1e-4;
 /// ... or after so many.
 const MAX_STEPS: usize = 50;
 
-/// The direction in which the light of each match is seen; `None` where all of them stand alone, or the spot is not known.
-///
-/// A star that another detection is matched with is no part of a blend: each was measured by itself.
-pub fn directions_of_light(
-    field: &StarField,
-    sky: &Sky,
-    hypothesis: &Hypothesis,
-    matches: &[StarMatch],
-) -> Option<Vec<UnitVector<Icrs>>> {
-    let variance_px2 = field.spot_sigma_px?.powi(2) + PIXEL_VARIANCE_PX2;
-    let mut taken: Vec<usize> = matches.iter().map(|m| m.catalog).collect();
-    taken.sort_unstable();
-    let blends = Blends {
-        field,
-        sky,
-        hypothesis,
-        variance_px2,
-        taken,
-    };
-    let mut is_any = false;
-    let directions = matches.iter().map(|m| {
-        let blended = blends.direction_of(m.catalog);
-        is_any |= blended.is_some();
-        blended.unwrap_or_else(|| sky.stars()[m.catalog].direction_at(field.years_since_j2000))
-    });
-    let directions = directions.collect();
-    is_any.then_some(directions)
+/// Finds stars that are seen together; keeps its buffers.
+#[derive(Debug, Default)]
+pub struct Blends {
+    /// Catalogue stars that are matched, in order.
+    taken: Vec<usize>,
+    lights: Vec<(PixelPoint, f64)>,
 }
 
-struct Blends<'a> {
-    field: &'a StarField,
-    sky: &'a Sky<'a>,
+/// What the camera sees.
+struct Seen<'a> {
+    scene: Scene<'a>,
     hypothesis: &'a Hypothesis,
     /// Of a spot with the pixels' width.
     variance_px2: f64,
-    /// Stars that are matched, in order.
-    taken: Vec<usize>,
 }
 
-impl Blends<'_> {
+impl Blends {
+    /// Gives each pair the direction in which its light is seen. Returns whether that is another one for any of them: not where
+    /// all stand alone, or the spot is not known.
+    ///
+    /// A star that another detection is matched with is no part of a blend: each was measured by itself.
+    pub fn redirect(&mut self, scene: Scene, hypothesis: &Hypothesis, pairs: &mut [Pair]) -> bool {
+        let Some(spot_sigma_px) = scene.field.spot_sigma_px else {
+            return false;
+        };
+        let seen = Seen {
+            scene,
+            hypothesis,
+            variance_px2: spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2,
+        };
+        self.taken.clear();
+        self.taken.extend(pairs.iter().map(|pair| pair.catalog));
+        self.taken.sort_unstable();
+        let mut is_any = false;
+        for pair in pairs {
+            if let Some(direction) = self.direction_of(&seen, pair.catalog) {
+                pair.direction = direction;
+                is_any = true;
+            }
+        }
+        is_any
+    }
+
     /// Where the light of a star is seen; `None` where it stands alone.
-    fn direction_of(&self, catalog: usize) -> Option<UnitVector<Icrs>> {
-        let star = &self.sky.stars()[catalog];
-        let camera = &self.hypothesis.camera;
-        let reach_rad = REACH_SIGMAS * self.variance_px2.sqrt() / camera.focal_length_px;
-        let mut lights = Vec::new();
-        let mut look = |near: &GridStar| {
+    fn direction_of(&mut self, seen: &Seen, catalog: usize) -> Option<UnitVector<Icrs>> {
+        let sky = seen.scene.sky;
+        let star = &sky.stars()[catalog];
+        let camera = &seen.hypothesis.camera;
+        let reach_rad = REACH_SIGMAS * seen.variance_px2.sqrt() / camera.focal_length_px;
+        let Self { taken, lights } = self;
+        lights.clear();
+        let look = |near: &GridStar| {
             let index = near.catalog as usize;
-            if index != catalog && self.taken.binary_search(&index).is_err() {
-                lights.extend(self.light_of(index, star.v_mag));
+            if index != catalog && taken.binary_search(&index).is_err() {
+                lights.extend(seen.light_of(index, star.v_mag));
             }
         };
         let faintest_v_mag = star.v_mag + FAINTER_MAG;
-        let grid = &self.sky.grid;
-        grid.for_each_within(&star.direction, reach_rad, faintest_v_mag, &mut look);
+        sky.grid
+            .for_each_within(&star.direction, reach_rad, faintest_v_mag, look);
         if lights.is_empty() {
             return None;
         }
-        let own = self.light_of(catalog, star.v_mag)?;
+        let own = seen.light_of(catalog, star.v_mag)?;
         lights.push(own);
-        let pixel = mode_next_to(own.0, &lights, self.variance_px2);
-        let to_icrs = self.hypothesis.icrs_to_camera.inverse();
+        let pixel = mode_next_to(own.0, lights, seen.variance_px2);
+        let to_icrs = seen.hypothesis.icrs_to_camera.inverse();
         Some(to_icrs.apply(&camera.direction_of(&pixel)))
     }
+}
 
+impl Seen<'_> {
     /// A star's place in the frame, and its light in units of that of a star of `unit_v_mag`.
     fn light_of(&self, catalog: usize, unit_v_mag: f32) -> Option<(PixelPoint, f64)> {
-        let star = &self.sky.stars()[catalog];
-        let direction = star.direction_at(self.field.years_since_j2000);
+        let star = &self.scene.sky.stars()[catalog];
+        let direction = star.direction_at(self.scene.field.years_since_j2000);
         let in_camera = self.hypothesis.icrs_to_camera.apply(&direction);
         let pixel = self.hypothesis.camera.pixel_of(&in_camera)?;
         Some((pixel, 10f64.powf(0.4 * f64::from(unit_v_mag - star.v_mag))))

@@ -1,24 +1,36 @@
-//! The triangle index on disk, so that it is made once for each catalogue.
+//! The triangle index on disk, so that it is made once for each catalogue, and read only where it is needed.
 //!
-//! A header of 128 bytes (magic, format version, checksum of the catalogue, length and checksum of what
-//! follows), then the index in rkyv's archive format. A file is written beside its place and renamed, and one that is
-//! not exactly what was written is made anew.
+//! All numbers are little-endian. In order, without gaps:
+//!
+//! | Bytes | Content |
+//! |---|---|
+//! | 16 | magic |
+//! | 8, 8 | format version, checksum of the catalogue, `u64` each |
+//! | 8, 8 | bytes and XXH3-64 of the table that follows, `u64` each |
+//! | … | the table: for each size class, its smallest and largest longest side as chords, `f64` each; for each of its chunks the XXH3-64 of their triangles, `u64` each; where its cells begin, `u32` each, and its number of triangles, `u32` |
+//! | … | the triangles, class by class and chunk by chunk: their corners, three `u32`, and their ratios, two `u16` |
+//!
+//! A file is written beside its place and renamed. The table is read and checked at once; a chunk of triangles, when it is
+//! first needed. A file that is not exactly what was written is taken away.
 
 use super::index::TriangleIndex;
-use rkyv::rancor;
-use rkyv::util::AlignedVec;
+use super::table::{CELLS, CHUNKS, SizeClass, Triangle};
 use std::fs::File;
-use std::io::{self, Read, Write};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use xxhash_rust::xxh3::xxh3_64;
 
 const MAGIC: [u8; 16] = *b"starpipe index\r\n";
 /// To be raised whenever the same catalogue makes another index, or its layout changes.
-const FORMAT_VERSION: u64 = 1;
-/// The archive wants its trees on cache lines; so long a header keeps them there.
-const HEADER_BYTES: usize = 128;
-/// No index is larger: guards against a damaged length.
-const MAX_BYTES: u64 = 1 << 30;
+const FORMAT_VERSION: u64 = 2;
+const HEADER_BYTES: usize = 48;
+const TRIANGLE_BYTES: usize = 16;
+/// Of one class in the table.
+const CLASS_BYTES: usize = 16 + 8 * CHUNKS + 4 * (CELLS + 1);
+/// No index has more: guards against a damaged length.
+const MAX_CLASSES: usize = 64;
 
 /// Why an index could not be taken from the cache or put there.
 #[derive(Debug, thiserror::Error)]
@@ -51,14 +63,100 @@ pub fn index_path(directory: &Path, catalog_checksum: u64) -> PathBuf {
     ))
 }
 
-fn header(catalog_checksum: u64, payload: &[u8]) -> [u8; HEADER_BYTES] {
+/// An index on disk, of which chunks can be read.
+#[derive(Debug)]
+pub struct IndexFile {
+    path: PathBuf,
+    file: Mutex<File>,
+    classes: Vec<ClassPlace>,
+}
+
+/// Where the triangles of a class begin, and the checksums of its chunks.
+#[derive(Debug)]
+struct ClassPlace {
+    start: u64,
+    checksums: Vec<u64>,
+}
+
+impl IndexFile {
+    /// Reads a chunk of a class, `range` of the class's triangles.
+    ///
+    /// # Errors
+    /// [`CacheError::Io`] if it cannot be read, [`CacheError::Damaged`] if it is not what [`store`] wrote. Then the file is
+    /// taken away.
+    pub fn chunk(
+        &self,
+        class: usize,
+        chunk: usize,
+        range: Range<u32>,
+    ) -> Result<Box<[Triangle]>, CacheError> {
+        let place = &self.classes[class];
+        let mut bytes = vec![0; range.len() * TRIANGLE_BYTES];
+        let start = place.start + u64::from(range.start) * TRIANGLE_BYTES as u64;
+        self.read_at(start, &mut bytes)
+            .map_err(|source| self.given_up(io_error("reading", &self.path)(source)))?;
+        if xxh3_64(&bytes) != place.checksums[chunk] {
+            let what = format!("the checksum of chunk {chunk} of class {class} is wrong");
+            return Err(self.given_up(damaged(&self.path)(what)));
+        }
+        Ok(bytes.as_chunks().0.iter().map(triangle).collect())
+    }
+
+    fn read_at(&self, start: u64, bytes: &mut [u8]) -> io::Result<()> {
+        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        file.seek(SeekFrom::Start(start))?;
+        file.read_exact(bytes)
+    }
+
+    /// The same error; the next run makes the file anew.
+    fn given_up(&self, error: CacheError) -> CacheError {
+        // What cannot be taken away is told of again in the next run.
+        let _ = std::fs::remove_file(&self.path);
+        error
+    }
+}
+
+fn io_error(action: &'static str, path: &Path) -> impl Fn(io::Error) -> CacheError {
+    move |source| CacheError::Io {
+        action,
+        path: path.to_owned(),
+        source,
+    }
+}
+
+fn damaged(path: &Path) -> impl Fn(String) -> CacheError {
+    move |what| CacheError::Damaged {
+        path: path.to_owned(),
+        what,
+    }
+}
+
+fn triangle(bytes: &[u8; TRIANGLE_BYTES]) -> Triangle {
+    let corner = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|i| bytes[at + i]));
+    let ratio = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+    Triangle {
+        corners: [corner(0), corner(4), corner(8)],
+        ratios: [ratio(12), ratio(14)],
+    }
+}
+
+fn bytes_of(triangles: &[Triangle]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(triangles.len() * TRIANGLE_BYTES);
+    for triangle in triangles {
+        bytes.extend(triangle.corners.iter().flat_map(|c| c.to_le_bytes()));
+        bytes.extend(triangle.ratios.iter().flat_map(|r| r.to_le_bytes()));
+    }
+    bytes
+}
+
+fn header(catalog_checksum: u64, table: &[u8]) -> [u8; HEADER_BYTES] {
     let mut header = [0; HEADER_BYTES];
     header[..16].copy_from_slice(&MAGIC);
     let fields = [
         FORMAT_VERSION,
         catalog_checksum,
-        payload.len() as u64,
-        xxh3_64(payload),
+        table.len() as u64,
+        xxh3_64(table),
     ];
     for (slot, field) in header[16..].chunks_exact_mut(8).zip(fields) {
         slot.copy_from_slice(&field.to_le_bytes());
@@ -66,74 +164,115 @@ fn header(catalog_checksum: u64, payload: &[u8]) -> [u8; HEADER_BYTES] {
     header
 }
 
-/// Reads the index at `path`; `Ok(None)` if there is no such file.
+/// Opens the index at `path`; `Ok(None)` if there is no such file.
 ///
 /// # Errors
 /// [`CacheError::Io`] if it cannot be read, [`CacheError::Damaged`] if it is not what [`store`] wrote for this catalogue.
 pub fn load(path: &Path, catalog_checksum: u64) -> Result<Option<TriangleIndex>, CacheError> {
-    let io_error = |source| CacheError::Io {
-        action: "reading",
-        path: path.to_owned(),
-        source,
-    };
-    let damaged = |what: String| CacheError::Damaged {
-        path: path.to_owned(),
-        what,
-    };
-    let file = match File::open(path) {
+    let (io_error, damaged) = (io_error("reading", path), damaged(path));
+    let mut file = match File::open(path) {
         Ok(file) => file,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(io_error(error)),
     };
-    let length = file.metadata().map_err(io_error)?.len();
-    if length > MAX_BYTES {
-        return Err(damaged(format!("{length} bytes long")));
+    let length = file.metadata().map_err(&io_error)?.len();
+    let mut found = [0; HEADER_BYTES];
+    let mut table = Vec::new();
+    if length >= HEADER_BYTES as u64 {
+        file.read_exact(&mut found).map_err(&io_error)?;
+        let stated = u64::from_le_bytes([32, 33, 34, 35, 36, 37, 38, 39].map(|i| found[i]));
+        let most = (MAX_CLASSES * CLASS_BYTES) as u64;
+        let room = stated.min(most);
+        (&file)
+            .take(room)
+            .read_to_end(&mut table)
+            .map_err(&io_error)?;
     }
-    let mut bytes = AlignedVec::<HEADER_BYTES>::with_capacity(length as usize);
-    bytes
-        .extend_from_reader(&mut file.take(MAX_BYTES))
-        .map_err(io_error)?;
-    let Some((found, payload)) = bytes.split_at_checked(HEADER_BYTES) else {
-        return Err(damaged(format!("only {} bytes long", bytes.len())));
+    if found != header(catalog_checksum, &table) {
+        return Err(damaged("the checksum of its table is wrong".into()));
+    }
+    let (classes, places) = classes_of(&table);
+    let triangles: u64 = classes.iter().map(|class| class.len() as u64).sum();
+    let expected = (HEADER_BYTES + table.len()) as u64 + triangles * TRIANGLE_BYTES as u64;
+    if length != expected {
+        return Err(damaged(format!("{length} bytes long, expected {expected}")));
+    }
+    let file = IndexFile {
+        path: path.to_owned(),
+        file: Mutex::new(file),
+        classes: places,
     };
-    if found != header(catalog_checksum, payload) {
-        return Err(damaged("its checksum is wrong".into()));
-    }
-    rkyv::from_bytes::<TriangleIndex, rancor::Error>(payload)
-        .map(Some)
-        .map_err(|error| damaged(error.to_string()))
+    Ok(Some(TriangleIndex::new(classes, Some(file))))
 }
 
-/// Writes the index to `path`, whole or not at all, making the directory if need be.
+/// The classes in a table, and where their triangles are.
+fn classes_of(table: &[u8]) -> (Vec<SizeClass>, Vec<ClassPlace>) {
+    let mut start = (HEADER_BYTES + table.len()) as u64;
+    let class = |bytes: &[u8]| {
+        let (words, starts) = bytes.split_at(16 + 8 * CHUNKS);
+        let words = words.as_chunks().0;
+        let [low, high] = [words[0], words[1]].map(f64::from_le_bytes);
+        let starts = starts.as_chunks().0.iter();
+        let starts = starts.map(|start| u32::from_le_bytes(*start)).collect();
+        let class = SizeClass::not_read((low, high), starts);
+        let checksums = words[2..].iter().map(|sum| u64::from_le_bytes(*sum));
+        let place = ClassPlace {
+            start,
+            checksums: checksums.collect(),
+        };
+        start += class.len() as u64 * TRIANGLE_BYTES as u64;
+        (class, place)
+    };
+    table.chunks_exact(CLASS_BYTES).map(class).unzip()
+}
+
+/// Writes the index to `path`, whole or not at all, making the directory if need be. All its chunks must be there.
 ///
 /// # Errors
 /// [`CacheError::Io`] if it cannot be written.
 pub fn store(path: &Path, catalog_checksum: u64, index: &TriangleIndex) -> Result<(), CacheError> {
-    let io_error = |source| CacheError::Io {
-        action: "writing",
-        path: path.to_owned(),
-        source,
-    };
-    let payload = rkyv::to_bytes::<rancor::Error>(index)
-        .map_err(|error| io_error(io::Error::other(error)))?;
+    let io_error = io_error("writing", path);
     let directory = path.parent().unwrap_or(Path::new("."));
-    std::fs::create_dir_all(directory).map_err(io_error)?;
-    let mut file = tempfile::NamedTempFile::new_in(directory).map_err(io_error)?;
-    file.write_all(&header(catalog_checksum, &payload))
-        .and_then(|()| file.write_all(&payload))
-        .map_err(io_error)?;
+    std::fs::create_dir_all(directory).map_err(&io_error)?;
+    let file = tempfile::NamedTempFile::new_in(directory).map_err(&io_error)?;
+    let mut out = io::BufWriter::new(file.as_file());
+    let (mut table, mut triangles) = (Vec::new(), Vec::new());
+    for class in &index.classes {
+        let bytes = class
+            .chunks
+            .iter()
+            .map(|chunk| bytes_of(chunk.get().map_or(&[], |chunk| chunk)));
+        let chunks: Vec<Vec<u8>> = bytes.collect();
+        table.extend(class.low.to_le_bytes());
+        table.extend(class.high.to_le_bytes());
+        table.extend(chunks.iter().flat_map(|chunk| xxh3_64(chunk).to_le_bytes()));
+        table.extend(
+            class
+                .cell_starts
+                .iter()
+                .flat_map(|start| start.to_le_bytes()),
+        );
+        triangles.extend(chunks);
+    }
+    out.write_all(&header(catalog_checksum, &table))
+        .and_then(|()| out.write_all(&table))
+        .and_then(|()| triangles.iter().try_for_each(|chunk| out.write_all(chunk)))
+        .and_then(|()| out.flush())
+        .map_err(&io_error)?;
+    drop(out);
     file.persist(path).map_err(|error| io_error(error.error))?;
     Ok(())
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::index::Source;
     use super::*;
     use crate::catalog::sky_grid::SkyGrid;
     use crate::catalog::{Star, StarId};
     use crate::coords::UnitVector;
 
-    fn small_index() -> TriangleIndex {
+    fn small_index() -> (Vec<Star>, SkyGrid, TriangleIndex) {
         let stars: Vec<Star> = (0..60u32)
             .map(|i| {
                 Star::new(
@@ -143,11 +282,20 @@ mod tests {
                 )
             })
             .collect();
-        TriangleIndex::build(&stars, &SkyGrid::new(&stars), &|_| ())
+        let grid = SkyGrid::new(&stars);
+        let index = TriangleIndex::build(source(&stars, &grid), &|_| ());
+        (stars, grid, index)
     }
 
-    fn corners(index: &TriangleIndex) -> Vec<&[[u32; 3]]> {
-        index.classes.iter().map(|c| c.corners.as_slice()).collect()
+    fn source<'a>(stars: &'a [Star], grid: &'a SkyGrid) -> Source<'a> {
+        Source { stars, grid }
+    }
+
+    /// All chunks, which are read on the way, and what went wrong then.
+    fn chunks(index: &TriangleIndex, source: Source) -> (Vec<Vec<Triangle>>, usize) {
+        let places = (0..index.classes.len()).flat_map(|c| (0..CHUNKS).map(move |i| (c, i)));
+        let chunks = places.map(|(class, chunk)| index.chunk(source, class, chunk).to_vec());
+        (chunks.collect(), index.take_troubles().len())
     }
 
     #[test]
@@ -155,23 +303,40 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = index_path(&directory.path().join("new"), 7);
         assert!(load(&path, 7).unwrap().is_none());
-        let index = small_index();
+        let (stars, grid, index) = small_index();
+        let source = source(&stars, &grid);
         assert!(!index.is_empty());
         store(&path, 7, &index).unwrap();
         let loaded = load(&path, 7).unwrap().unwrap();
-        assert_eq!(corners(&loaded), corners(&index));
+        assert_eq!(loaded.len(), index.len());
+        let (expected, _) = chunks(&index, source);
+        assert_eq!(chunks(&loaded, source), (expected.clone(), 0));
         assert!(load(&path, 8).is_err(), "another catalogue's index");
 
         let good = std::fs::read(&path).unwrap();
-        for position in [0, 20, 30, 45, 127, 128, good.len() / 2, good.len() - 1] {
+        let table_end = good.len() - index.len() * TRIANGLE_BYTES;
+        for position in [0, 20, 30, 45, 47, 48, 60, table_end / 2, table_end - 1] {
             let mut bad = good.clone();
             bad[position] ^= 0x10;
             std::fs::write(&path, &bad).unwrap();
             assert!(load(&path, 7).is_err(), "byte {position} flipped");
         }
-        for length in [0, 5, 128, good.len() - 1] {
+        for length in [0, 5, 48, table_end, good.len() - 1] {
             std::fs::write(&path, &good[..length]).unwrap();
             assert!(load(&path, 7).is_err(), "cut to {length} bytes");
+        }
+        // Damage to a chunk shows when that is read; it is made good, and the file is gone.
+        for position in [table_end, (table_end + good.len()) / 2, good.len() - 1] {
+            let mut bad = good.clone();
+            bad[position] ^= 0x10;
+            std::fs::write(&path, &bad).unwrap();
+            let loaded = load(&path, 7).unwrap().unwrap();
+            assert_eq!(
+                chunks(&loaded, source),
+                (expected.clone(), 1),
+                "byte {position}"
+            );
+            assert!(!path.exists());
         }
     }
 }

@@ -7,6 +7,7 @@ mod predict;
 mod refine;
 mod search;
 mod sky;
+mod table;
 pub mod triangle;
 mod verify;
 
@@ -15,8 +16,9 @@ pub use predict::{PredictedStar, View};
 pub use search::LOG10_FALSE_ALARM_LIMIT;
 pub use sky::Sky;
 
-use refine::{Refined, Start, refine, with_all_stars, with_blends};
-use search::{Found, Search};
+use refine::{Refined, Start};
+use search::{Buffers, Found, Search};
+use verify::{Pair, Scene};
 
 use crate::camera::{CameraModel, DistortionModel};
 use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
@@ -228,54 +230,96 @@ pub struct StarMatch {
 /// Stars without which no identification is possible: a triangle and one that decides.
 pub const MIN_STARS: usize = 4;
 
-/// Identifies the stars of `field`.
+/// Identifies the stars of `field`. For many fields, [`Workspace::identify`] does the same without allocating.
 pub fn identify(field: &StarField, hints: &Hints, sky: &Sky) -> Outcome {
-    if field.stars.len() < MIN_STARS {
-        return Outcome::NotIdentified(Reason::TooFewStars {
-            found: field.stars.len(),
-            needed: MIN_STARS,
-        });
-    }
-    let mut search = Search::new(field, hints, sky);
-    match search.run() {
-        Some(found) => Outcome::Identified(Box::new(complete(field, sky, &search, found))),
-        None => Outcome::NotIdentified(Reason::NoMatch {
-            best_log10_false_alarm: search.best_log10_false_alarm(),
-        }),
+    match Workspace::new().identify(field, hints, sky) {
+        Ok(found) => Outcome::Identified(Box::new(found.clone())),
+        Err(reason) => Outcome::NotIdentified(reason),
     }
 }
 
-/// The final fit, with all stars and as much distortion as they support.
-fn complete(field: &StarField, sky: &Sky, search: &Search, found: Found) -> Identification {
+/// What identification works with, kept from field to field: once it has seen the largest, nothing is allocated.
+#[derive(Debug, Default)]
+pub struct Workspace {
+    buffers: Buffers,
+    answer: Option<Identification>,
+}
+
+impl Workspace {
+    /// An empty one.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Identifies the stars of `field`. The answer lies in the workspace.
+    ///
+    /// # Errors
+    /// The [`Reason`] why they are not identified.
+    pub fn identify(
+        &mut self,
+        field: &StarField,
+        hints: &Hints,
+        sky: &Sky,
+    ) -> Result<&Identification, Reason> {
+        if field.stars.len() < MIN_STARS {
+            return Err(Reason::TooFewStars {
+                found: field.stars.len(),
+                needed: MIN_STARS,
+            });
+        }
+        let scene = Scene { field, sky };
+        let mut search = Search::new(scene, hints, &mut self.buffers);
+        let Some(found) = search.run() else {
+            return Err(Reason::NoMatch {
+                best_log10_false_alarm: search.best_log10_false_alarm(),
+            });
+        };
+        let completed = complete(scene, &mut search, &found);
+        let (refined, log10, pairs) = match completed {
+            Some((refined, log10)) => (refined, log10, &self.buffers.refiner.pairs),
+            None => (found.refined, found.log10_false_alarm, &self.buffers.found),
+        };
+        let mut matches = self.answer.take().map_or_else(Vec::new, |old| old.matches);
+        matches.clear();
+        matches.extend(pairs.iter().map(Pair::star_match));
+        Ok(self.answer.insert(identification(&refined, log10, matches)))
+    }
+}
+
+/// The final fit, with all stars and as much distortion as they support. `None` where the search's own answer stands: all the
+/// stars can only make it surer.
+fn complete(scene: Scene, search: &mut Search, found: &Found) -> Option<(Refined, f64)> {
+    let field = scene.field;
+    let hypothesis = found.refined.hypothesis();
     let start = Start {
-        hypothesis: &found.refined.hypothesis,
+        hypothesis: &hypothesis,
         radius_px: FINAL_RADIUS_SHARE * field.width_px.hypot(field.height_px),
         sceptical: false,
+        stars: CALIBRATION_STARS,
+        richest: DistortionModel::Quintic,
     };
-    let richest = Some(DistortionModel::Quintic);
-    let with_all = refine(field, CALIBRATION_STARS, sky, &start, richest)
-        .and_then(|settled| with_all_stars(field, sky, &settled))
-        .and_then(|settled| with_blends(field, sky, settled))
-        .map(|refined| (search.log10_false_alarm(&refined.hypothesis), refined));
-    // All the stars can only make it surer; where they do not, the search's own answer stands.
-    match with_all {
-        Some((Some(log10), refined)) if log10 <= LOG10_FALSE_ALARM_LIMIT => {
-            identification(refined, log10)
-        }
-        _ => identification(found.refined, found.log10_false_alarm),
-    }
+    let refiner = search.refiner();
+    let settled = refiner.refine(scene, &start)?;
+    let settled = refiner.with_all_stars(scene, &settled)?;
+    let refined = refiner.with_blends(scene, settled)?;
+    let log10 = search.log10_false_alarm(&refined.hypothesis())?;
+    (log10 <= LOG10_FALSE_ALARM_LIMIT).then_some((refined, log10))
 }
 
-fn identification(refined: Refined, log10_false_alarm: f64) -> Identification {
+fn identification(
+    refined: &Refined,
+    log10_false_alarm: f64,
+    matches: Vec<StarMatch>,
+) -> Identification {
     let covariance = &refined.fit.covariance;
-    let sum_sq: f64 = refined.matches.iter().map(|m| m.residual_px.powi(2)).sum();
+    let sum_sq: f64 = matches.iter().map(|m| m.residual_px.powi(2)).sum();
     Identification {
         attitude_covariance_rad2: covariance.fixed_view::<3, 3>(0, 0).into_owned(),
         focal_length_sigma_px: covariance[(3, 3)].sqrt() * refined.fit.camera.focal_length_px,
         camera: refined.fit.camera,
         icrs_to_camera: refined.fit.icrs_to_camera,
-        rms_px: (sum_sq / refined.matches.len().max(1) as f64).sqrt(),
-        matches: refined.matches,
+        rms_px: (sum_sq / matches.len().max(1) as f64).sqrt(),
+        matches,
         log10_false_alarm,
     }
 }

@@ -1,14 +1,18 @@
 //! Where the catalogue's stars fall in a frame.
 
 use super::Sky;
-use crate::camera::CameraModel;
-use crate::catalog::sky_grid::GridStar;
+use crate::camera::{CameraModel, LANES};
+use crate::catalog::sky_grid::{GridStar, chord_of};
 use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 
 /// Stars predicted so far outside the frame, in units of its diagonal, may still be seen on it.
 const MARGIN: f64 = 0.01;
 /// Lenses shift stars by no more than so much of the frame's half diagonal.
 const UNDISTORTED_MARGIN: f64 = 0.1;
+/// So much further than a view asks for, in units of its radius, stars are gathered: the next view is a little off.
+const GATHERED_MARGIN: f64 = 0.04;
+/// How much deeper to look where the stars are too few, in magnitudes.
+const DEEPER_MAG: f64 = 0.7;
 
 /// A catalogue star where camera and attitude put it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,38 +38,165 @@ pub struct View<'a> {
     pub years_since_j2000: f64,
 }
 
+/// Catalogue stars around a direction, at a time: a field's are predicted many times, and looked up once.
+#[derive(Debug, Default)]
+pub struct Surroundings {
+    /// Brightest first, with their directions at that time.
+    stars: Vec<(GridStar, UnitVector<Icrs>)>,
+    found: Vec<GridStar>,
+    around: Option<Gathered>,
+}
+
+/// What was gathered.
+#[derive(Debug, Clone, Copy)]
+struct Gathered {
+    centre: UnitVector<Icrs>,
+    radius_rad: f64,
+    faintest_v_mag: f64,
+    years_since_j2000: f64,
+}
+
 impl View<'_> {
     /// The catalogue stars in the frame, or within 1 % of its diagonal of it, down to a V magnitude, brightest first.
     pub fn stars_to(&self, sky: &Sky, faintest_v_mag: f64) -> Vec<PredictedStar> {
-        let margin_px = MARGIN * self.camera.width_px.hypot(self.camera.height_px);
-        let radius_rad = self.camera.radius_rad() * (1.0 + 2.0 * MARGIN);
-        let centre = self.icrs_to_camera.inverse().apply(&UnitVector::BORESIGHT);
-        // The cone is rounder than the frame: most of what it holds beside it needs no closer look.
-        let nearly_px = margin_px + UNDISTORTED_MARGIN * self.camera.radius_px();
-        let pinhole = CameraModel {
-            distortion: None,
-            ..self.camera.clone()
-        };
         let mut predicted = Vec::new();
-        let mut look = |star: &GridStar| {
-            let direction = sky.stars()[star.catalog as usize].direction_at(self.years_since_j2000);
-            let in_camera = self.icrs_to_camera.apply(&direction);
-            let near = |p: &PixelPoint| self.camera.nearly_contains(p, nearly_px);
-            let inside = |p: &PixelPoint| self.camera.nearly_contains(p, margin_px);
-            let undistorted = pinhole.pixel_of(&in_camera).filter(near);
-            let pixel = undistorted.and_then(|_| self.camera.pixel_of(&in_camera));
-            if let Some(pixel) = pixel.filter(inside) {
-                predicted.push(PredictedStar {
-                    pixel,
-                    direction,
-                    v_mag: star.v_mag,
-                    catalog: star.catalog as usize,
-                });
-            }
-        };
-        sky.grid
-            .for_each_within(&centre, radius_rad, faintest_v_mag as f32, &mut look);
-        predicted.sort_unstable_by_key(|star| star.catalog);
+        Surroundings::default().stars_to(self, sky, faintest_v_mag, &mut predicted);
         predicted
+    }
+
+    /// The largest angle from the boresight at which there are stars of the frame.
+    fn reach_rad(&self) -> f64 {
+        self.camera.radius_rad() * (1.0 + 2.0 * MARGIN)
+    }
+
+    fn boresight(&self) -> UnitVector<Icrs> {
+        self.icrs_to_camera.inverse().apply(&UnitVector::BORESIGHT)
+    }
+}
+
+impl Surroundings {
+    /// Makes `predicted` the stars of [`View::stars_to`].
+    pub fn stars_to(
+        &mut self,
+        view: &View,
+        sky: &Sky,
+        faintest_v_mag: f64,
+        predicted: &mut Vec<PredictedStar>,
+    ) {
+        self.gather(view, sky, faintest_v_mag);
+        let bright_enough = self
+            .stars
+            .partition_point(|(star, _)| star.v_mag <= faintest_v_mag as f32);
+        project(view, &self.stars[..bright_enough], usize::MAX, predicted);
+    }
+
+    /// Makes `predicted` the `count` brightest stars of [`View::stars_to`], or all of the catalogue's there are; most
+    /// likely they are brighter than `likely_v_mag`.
+    pub fn brightest(
+        &mut self,
+        view: &View,
+        sky: &Sky,
+        (count, likely_v_mag): (usize, f64),
+        predicted: &mut Vec<PredictedStar>,
+    ) {
+        let mut limit = likely_v_mag;
+        loop {
+            let gathered_to = self.gather(view, sky, limit);
+            project(view, &self.stars, count, predicted);
+            if predicted.len() >= count || gathered_to > sky.faintest_v_mag() {
+                return;
+            }
+            limit = gathered_to + DEEPER_MAG;
+        }
+    }
+
+    /// Sees to it that all stars of `view` to a V magnitude are here; returns to which they are.
+    fn gather(&mut self, view: &View, sky: &Sky, faintest_v_mag: f64) -> f64 {
+        let (centre, reach_rad) = (view.boresight(), view.reach_rad());
+        let years_since_j2000 = view.years_since_j2000;
+        if let Some(around) = &self.around
+            && around.faintest_v_mag >= faintest_v_mag
+            && around.years_since_j2000 == years_since_j2000
+            && around.centre.angle_to(&centre) + reach_rad <= around.radius_rad
+        {
+            return around.faintest_v_mag;
+        }
+        let radius_rad = reach_rad * (1.0 + GATHERED_MARGIN);
+        let found = &mut self.found;
+        found.clear();
+        let limit = faintest_v_mag as f32;
+        sky.grid
+            .for_each_within(&centre, radius_rad, limit, |star| found.push(*star));
+        found.sort_unstable_by_key(|star| star.catalog);
+        self.stars.clear();
+        self.stars.extend(found.iter().map(|star| {
+            let known = &sky.stars()[star.catalog as usize];
+            (*star, known.direction_at(years_since_j2000))
+        }));
+        self.around = Some(Gathered {
+            centre,
+            radius_rad,
+            faintest_v_mag,
+            years_since_j2000,
+        });
+        faintest_v_mag
+    }
+
+    /// To be called where another catalogue may be next.
+    pub fn forget(&mut self) {
+        self.around = None;
+    }
+}
+
+/// Makes `predicted` the first `count` of `stars` that are in the frame or nearly so.
+fn project(
+    view: &View,
+    stars: &[(GridStar, UnitVector<Icrs>)],
+    count: usize,
+    predicted: &mut Vec<PredictedStar>,
+) {
+    let camera = view.camera;
+    let margin_px = MARGIN * camera.width_px.hypot(camera.height_px);
+    // The cone is rounder than the frame: most of what it holds beside it needs no closer look.
+    let nearly_px = margin_px + UNDISTORTED_MARGIN * camera.radius_px();
+    let pinhole = CameraModel {
+        distortion: None,
+        ..*camera
+    };
+    let (boresight, chord) = (view.boresight(), chord_of(view.reach_rad()));
+    let is_near = |direction: &UnitVector<Camera>| {
+        let pixel = pinhole.pixel_of(direction);
+        pixel.is_some_and(|pixel| camera.nearly_contains(&pixel, nearly_px))
+    };
+    let mut near = stars
+        .iter()
+        .map(|(star, direction)| (star, direction, view.icrs_to_camera.apply(direction)))
+        .filter(|(.., in_camera)| is_near(in_camera))
+        .filter(|(star, ..)| star.is_within(boresight.as_vector(), chord * chord));
+    predicted.clear();
+    loop {
+        let mut lanes = [None; LANES];
+        let mut in_camera = [UnitVector::BORESIGHT; LANES];
+        for ((lane, direction), found) in lanes.iter_mut().zip(&mut in_camera).zip(&mut near) {
+            *lane = Some((found.0, found.1));
+            *direction = found.2;
+        }
+        for (lane, pixel) in lanes.iter().zip(camera.pixels_of(&in_camera)) {
+            let Some((star, direction)) = lane else {
+                return;
+            };
+            let Some(pixel) = pixel.filter(|p| camera.nearly_contains(p, margin_px)) else {
+                continue;
+            };
+            if predicted.len() == count {
+                return;
+            }
+            predicted.push(PredictedStar {
+                pixel,
+                direction: **direction,
+                v_mag: star.v_mag,
+                catalog: star.catalog as usize,
+            });
+        }
     }
 }

@@ -2,12 +2,12 @@
 //!
 //! pair up → fit → pair up within a smaller radius → ... with as much lens distortion as the stars support
 
-use super::blends::directions_of_light;
-use super::verify::{Hypothesis, Radius};
-use super::{Photometry, Sky, StarField, StarMatch};
+use super::blends::Blends;
+use super::predict::{PredictedStar, Surroundings};
+use super::verify::{Hypothesis, Pair, Pairing, Radius, Scene};
+use super::{ObservedStar, Photometry};
 use crate::attitude::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera, left_out_chi_sq};
 use crate::camera::DistortionModel;
-use crate::coords::{Icrs, UnitVector};
 use crate::statistics::median;
 use std::f64::consts::PI;
 
@@ -44,133 +44,31 @@ const SCEPTICAL_SIGMAS: f64 = 3.0;
 /// Rounds of pairing and fitting at the most.
 const MAX_ROUNDS: usize = 8;
 
-/// A fitted hypothesis and what agrees with it.
-#[derive(Debug, Clone, PartialEq)]
+/// A fitted hypothesis.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Refined {
-    /// Camera and attitude.
-    pub hypothesis: Hypothesis,
-    /// The fit behind them.
+    /// The fit.
     pub fit: CameraFit,
-    /// The stars that agree.
-    pub matches: Vec<StarMatch>,
+    /// What must be added to the observed magnitudes to make them V.
+    pub zero_point_mag: f64,
     /// Standard deviation on each axis, in pixels, that must be added to the stated centroid errors to explain the residuals.
     pub excess_sigma_px: f64,
 }
 
-/// Pairs up and fits in turn the `observed_count` brightest stars, starting with pairs within `radius_px`, with
-/// distortion models up to `richest` (`None`: no distortion).
-///
-/// `None` where too few stars agree to determine the camera.
-pub fn refine(
-    field: &StarField,
-    observed_count: usize,
-    sky: &Sky,
-    start: &Start,
-    richest: Option<DistortionModel>,
-) -> Option<Refined> {
-    let observed = field.brightest(observed_count);
-    let hypothesis = start.hypothesis;
-    let mut predicted = hypothesis.predict(sky, field, observed);
-    let radius = Radius::common(start.radius_px);
-    let matches = hypothesis.pair_up(observed, &predicted, field.photometry, &radius);
-    if start.sceptical {
-        let area_px = field.width_px * field.height_px;
-        let discs_px = predicted.len() as f64 * PI * start.radius_px.powi(2);
-        let by_chance = observed.len() as f64 * (discs_px / area_px).min(1.0);
-        if (matches.len() as f64) < by_chance + SCEPTICAL_SIGMAS * (by_chance + 0.1).sqrt() {
-            return None;
+impl Refined {
+    /// Camera and attitude.
+    pub fn hypothesis(&self) -> Hypothesis {
+        Hypothesis {
+            camera: self.fit.camera,
+            icrs_to_camera: self.fit.icrs_to_camera,
+            parameters: self.fit.parameters,
+            zero_point_mag: self.zero_point_mag,
         }
     }
-    let mut model = hypothesis.camera.distortion_model();
-    let mut radius_px = start.radius_px;
-    let mut current = fitted(field, sky, matches, 0.0, &Guess { hypothesis, model })?;
-    let mut model_chosen = false;
-    for _ in 0..MAX_ROUNDS {
-        radius_px = next_radius_px(&current.fit, radius_px);
-        current.hypothesis.predict_again(&mut predicted);
-        let matches = current.hypothesis.pair_up(
-            observed,
-            &predicted,
-            field.photometry,
-            &Radius::common(radius_px),
-        );
-        let settled = same_pairs(&matches, &current.matches);
-        if settled && model_chosen {
-            break;
-        }
-        if settled {
-            model = choose_model(field, sky, &current, richest);
-            model_chosen = true;
-        }
-        let guess = Guess {
-            hypothesis: &current.hypothesis,
-            model,
-        };
-        current = fitted(field, sky, matches, current.excess_sigma_px, &guess)?;
-    }
-    Some(current)
-}
-
-/// Adds the stars that were too faint for the refinement so far, and fits the same distortion model to all of them. Each is
-/// looked for as far off as its own error allows: that of the faintest is many times the typical one.
-///
-/// `None` where they do not determine the camera.
-pub fn with_all_stars(field: &StarField, sky: &Sky, settled: &Refined) -> Option<Refined> {
-    let model = settled.hypothesis.camera.distortion_model();
-    let mut predicted = settled.hypothesis.predict_all(sky, field);
-    let mut radius_px = FAINT_RADIUS * agreement_radius_px(&settled.fit);
-    let mut current = settled.clone();
-    for _ in 0..ALL_STARS_ROUNDS {
-        let Refined {
-            hypothesis,
-            excess_sigma_px,
-            ..
-        } = &current;
-        let radius = Radius {
-            common_px: radius_px,
-            sigmas: CLIP_SIGMAS * error_scale(field, &current),
-            excess_sigma_px: *excess_sigma_px,
-            at_most: ROUGH_RADIUS,
-        };
-        let matches = hypothesis.pair_up(&field.stars, &predicted, field.photometry, &radius);
-        if same_pairs(&matches, &current.matches) {
-            break;
-        }
-        let guess = Guess { hypothesis, model };
-        current = fitted(field, sky, matches, *excess_sigma_px, &guess)?;
-        current.hypothesis.predict_again(&mut predicted);
-        radius_px = next_radius_px(&current.fit, radius_px);
-    }
-    Some(current)
-}
-
-/// Fits the same stars again, each where its light is seen together with that of those which the camera does not tell from it.
-///
-/// `None` where they do not determine the camera.
-pub fn with_blends(field: &StarField, sky: &Sky, settled: Refined) -> Option<Refined> {
-    let Some(directions) = directions_of_light(field, sky, &settled.hypothesis, &settled.matches)
-    else {
-        return Some(settled);
-    };
-    let model = settled.hypothesis.camera.distortion_model();
-    let mut current = settled;
-    for _ in 0..BLEND_ROUNDS {
-        let Refined {
-            hypothesis,
-            matches,
-            excess_sigma_px,
-            ..
-        } = current;
-        let guess = Guess {
-            hypothesis: &hypothesis,
-            model,
-        };
-        current = fitted_to(field, sky, matches, (&directions, excess_sigma_px), &guess)?;
-    }
-    Some(current)
 }
 
 /// Where a refinement starts.
+#[derive(Clone, Copy)]
 pub struct Start<'a> {
     /// The hypothesis.
     pub hypothesis: &'a Hypothesis,
@@ -178,216 +76,350 @@ pub struct Start<'a> {
     pub radius_px: f64,
     /// Whether to give up at once where no more stars agree than chance would have agree.
     pub sceptical: bool,
+    /// How many stars to take, the brightest, ...
+    pub stars: usize,
+    /// ... and the richest model of distortion to try.
+    pub richest: DistortionModel,
 }
 
 /// A hypothesis, and the distortion model to fit from there.
+#[derive(Clone, Copy)]
 struct Guess<'a> {
     hypothesis: &'a Hypothesis,
     model: Option<DistortionModel>,
-}
-
-fn fitted(
-    field: &StarField,
-    sky: &Sky,
-    matches: Vec<StarMatch>,
     excess_sigma_px: f64,
-    guess: &Guess,
-) -> Option<Refined> {
-    let directions = catalog_directions(field, sky, &matches);
-    fitted_to(field, sky, matches, (&directions, excess_sigma_px), guess)
 }
 
-/// The directions of the stars themselves.
-fn catalog_directions(
-    field: &StarField,
-    sky: &Sky,
-    matches: &[StarMatch],
-) -> Vec<UnitVector<Icrs>> {
-    let direction = |m: &StarMatch| sky.stars()[m.catalog].direction_at(field.years_since_j2000);
-    matches.iter().map(direction).collect()
+/// Refines hypotheses; keeps its buffers.
+#[derive(Debug, Default)]
+pub struct Refiner {
+    /// Catalogue stars of the field.
+    pub around: Surroundings,
+    /// The stars that agreed with what was refined last.
+    pub pairs: Vec<Pair>,
+    before: Vec<Pair>,
+    predicted: Vec<PredictedStar>,
+    pairing: Pairing,
+    blends: Blends,
+    stars: Vec<MeasuredStar>,
+    residuals_px: Vec<[f64; 2]>,
+    scratch: Scratch,
 }
 
-/// The fit to stars whose light comes from these directions.
-fn fitted_to(
-    field: &StarField,
-    sky: &Sky,
-    mut matches: Vec<StarMatch>,
-    (directions, excess_sigma_px): (&[UnitVector<Icrs>], f64),
-    guess: &Guess,
-) -> Option<Refined> {
-    let stars = measured(field, &matches, directions, excess_sigma_px);
-    let Hypothesis {
-        camera,
-        icrs_to_camera,
-        ..
-    } = guess.hypothesis;
-    let affordable = guess.model.filter(|m| is_affordable(*m, stars.len()));
-    let fit = fit_camera(&stars, camera, icrs_to_camera, affordable)?;
-    let excess_sigma_px = excess_sigma_of(field, &matches, &fit);
-    for (found, distance) in matches.iter_mut().zip(distances_px(&fit)) {
-        found.residual_px = distance;
+/// Room for medians.
+#[derive(Debug, Default)]
+struct Scratch {
+    values: Vec<f64>,
+    squares: Vec<(f64, f64)>,
+}
+
+impl Scratch {
+    fn median(&mut self, values: impl Iterator<Item = f64>) -> f64 {
+        self.values.clear();
+        self.values.extend(values);
+        median(&mut self.values)
     }
-    Some(Refined {
-        hypothesis: Hypothesis {
-            camera: fit.camera.clone(),
-            icrs_to_camera: fit.icrs_to_camera,
-            parameters: fit.parameters,
-            zero_point_mag: zero_point_mag(field, sky, &matches),
-        },
-        fit,
-        matches,
-        excess_sigma_px,
-    })
 }
 
-fn same_pairs(a: &[StarMatch], b: &[StarMatch]) -> bool {
-    let pair = |m: &StarMatch| (m.observed, m.catalog);
-    a.iter().map(pair).eq(b.iter().map(pair))
-}
+impl Refiner {
+    /// Pairs up and fits in turn, from `start`; [`Self::pairs`] are the stars that agree.
+    ///
+    /// `None` where too few stars agree to determine the camera.
+    pub fn refine(&mut self, scene: Scene, start: &Start) -> Option<Refined> {
+        let field = scene.field;
+        let observed = field.brightest(start.stars);
+        let hypothesis = start.hypothesis;
+        hypothesis.predict(scene, observed, &mut self.around, &mut self.predicted);
+        let mut radius_px = start.radius_px;
+        self.pair_up(scene, hypothesis, observed, &Radius::common(radius_px));
+        if start.sceptical && !self.is_remarkable(scene, observed.len(), radius_px) {
+            return None;
+        }
+        let mut model = hypothesis.camera.distortion_model();
+        let mut current = self.fitted(
+            scene,
+            &Guess {
+                hypothesis,
+                model,
+                excess_sigma_px: 0.0,
+            },
+        )?;
+        let mut model_chosen = false;
+        for _ in 0..MAX_ROUNDS {
+            radius_px = self.next_radius_px(radius_px);
+            let hypothesis = current.hypothesis();
+            hypothesis.predict_again(&mut self.predicted);
+            std::mem::swap(&mut self.pairs, &mut self.before);
+            self.pair_up(scene, &hypothesis, observed, &Radius::common(radius_px));
+            let settled = self.are_pairs_the_same();
+            if settled && model_chosen {
+                std::mem::swap(&mut self.pairs, &mut self.before);
+                break;
+            }
+            if settled {
+                model = self.choose_model(scene, &current, start.richest);
+                model_chosen = true;
+            }
+            current = self.fitted(
+                scene,
+                &Guess {
+                    hypothesis: &hypothesis,
+                    model,
+                    excess_sigma_px: current.excess_sigma_px,
+                },
+            )?;
+        }
+        Some(current)
+    }
 
-/// The median difference between catalogue and observed magnitudes.
-fn zero_point_mag(field: &StarField, sky: &Sky, matches: &[StarMatch]) -> f64 {
-    match field.photometry {
-        Photometry::JohnsonV => 0.0,
-        Photometry::Instrumental => {
-            let difference = |m: &StarMatch| {
-                f64::from(sky.stars()[m.catalog].v_mag) - field.stars[m.observed].mag
+    /// Adds the stars that were too faint for the refinement so far, and fits the same distortion model to all of them. Each is
+    /// looked for as far off as its own error allows: that of the faintest is many times the typical one.
+    ///
+    /// `None` where they do not determine the camera.
+    pub fn with_all_stars(&mut self, scene: Scene, settled: &Refined) -> Option<Refined> {
+        let hypothesis = settled.hypothesis();
+        let model = hypothesis.camera.distortion_model();
+        hypothesis.predict_all(scene, &mut self.around, &mut self.predicted);
+        let mut radius_px = FAINT_RADIUS * self.agreement_radius_px();
+        let mut current = *settled;
+        for _ in 0..ALL_STARS_ROUNDS {
+            let hypothesis = current.hypothesis();
+            let radius = Radius {
+                common_px: radius_px,
+                sigmas: CLIP_SIGMAS * self.error_scale(scene, current.excess_sigma_px),
+                excess_sigma_px: current.excess_sigma_px,
+                at_most: ROUGH_RADIUS,
             };
-            median(&mut matches.iter().map(difference).collect::<Vec<f64>>())
+            std::mem::swap(&mut self.pairs, &mut self.before);
+            self.pair_up(scene, &hypothesis, &scene.field.stars, &radius);
+            if self.are_pairs_the_same() {
+                std::mem::swap(&mut self.pairs, &mut self.before);
+                break;
+            }
+            let guess = Guess {
+                hypothesis: &hypothesis,
+                model,
+                excess_sigma_px: current.excess_sigma_px,
+            };
+            current = self.fitted(scene, &guess)?;
+            current.hypothesis().predict_again(&mut self.predicted);
+            radius_px = self.next_radius_px(radius_px);
+        }
+        Some(current)
+    }
+
+    /// Fits the same stars again, each where its light is seen together with that of those which the camera does not tell from it.
+    ///
+    /// `None` where they do not determine the camera.
+    pub fn with_blends(&mut self, scene: Scene, settled: Refined) -> Option<Refined> {
+        let hypothesis = settled.hypothesis();
+        if !self.blends.redirect(scene, &hypothesis, &mut self.pairs) {
+            return Some(settled);
+        }
+        let model = hypothesis.camera.distortion_model();
+        let mut current = settled;
+        for _ in 0..BLEND_ROUNDS {
+            let guess = Guess {
+                hypothesis: &current.hypothesis(),
+                model,
+                excess_sigma_px: current.excess_sigma_px,
+            };
+            current = self.fitted(scene, &guess)?;
+        }
+        Some(current)
+    }
+
+    fn pair_up(
+        &mut self,
+        scene: Scene,
+        hypothesis: &Hypothesis,
+        observed: &[ObservedStar],
+        radius: &Radius,
+    ) {
+        let photometry = scene.field.photometry;
+        self.pairing.pair_up(
+            (observed, &self.predicted),
+            radius,
+            |o, p| hypothesis.mag_difference(o, p, photometry),
+            &mut self.pairs,
+        );
+    }
+
+    /// Whether more stars agree within `radius_px` than chance would have agree.
+    fn is_remarkable(&self, scene: Scene, observed: usize, radius_px: f64) -> bool {
+        let area_px = scene.field.width_px * scene.field.height_px;
+        let discs_px = self.predicted.len() as f64 * PI * radius_px.powi(2);
+        let by_chance = observed as f64 * (discs_px / area_px).min(1.0);
+        let wanted = by_chance + SCEPTICAL_SIGMAS * (by_chance + 0.1).sqrt();
+        self.pairs.len() as f64 >= wanted
+    }
+
+    fn are_pairs_the_same(&self) -> bool {
+        let stars = |pair: &Pair| (pair.observed, pair.catalog);
+        self.pairs
+            .iter()
+            .map(stars)
+            .eq(self.before.iter().map(stars))
+    }
+
+    /// The fit to the pairs, from `guess`.
+    fn fitted(&mut self, scene: Scene, guess: &Guess) -> Option<Refined> {
+        self.measure(scene, guess.excess_sigma_px);
+        let Hypothesis {
+            camera,
+            icrs_to_camera,
+            ..
+        } = guess.hypothesis;
+        let affordable = guess.model.filter(|m| is_affordable(*m, self.stars.len()));
+        let residuals_px = &mut self.residuals_px;
+        let fit = fit_camera(
+            &self.stars,
+            camera,
+            icrs_to_camera,
+            affordable,
+            residuals_px,
+        )?;
+        let excess_sigma_px = self.excess_sigma_of(scene, fit.parameters);
+        for (pair, [x, y]) in self.pairs.iter_mut().zip(&self.residuals_px) {
+            pair.residual_px = (x * x + y * y).sqrt();
+        }
+        Some(Refined {
+            fit,
+            zero_point_mag: self.zero_point_mag(scene),
+            excess_sigma_px,
+        })
+    }
+
+    /// The median difference between catalogue and observed magnitudes.
+    fn zero_point_mag(&mut self, scene: Scene) -> f64 {
+        let observed = &scene.field.stars;
+        match scene.field.photometry {
+            Photometry::JohnsonV => 0.0,
+            Photometry::Instrumental => self.scratch.median(
+                self.pairs
+                    .iter()
+                    .map(|pair| f64::from(pair.v_mag) - observed[pair.observed].mag),
+            ),
         }
     }
-}
 
-/// The stars as the fit takes them. The error of one that is further off than its own error and the common
-/// excess explain (an unresolved companion, say) is raised with its distance, so that it pulls no harder than one that is not
-/// (Huber 1964, Ann. Math. Stat. 35, 73).
-fn measured(
-    field: &StarField,
-    matches: &[StarMatch],
-    directions: &[UnitVector<Icrs>],
-    excess_px: f64,
-) -> Vec<MeasuredStar> {
-    let measured = |(m, icrs): (&StarMatch, &UnitVector<Icrs>)| {
-        let star = &field.stars[m.observed];
-        let sigma_px = (star.sigma_px.powi(2) + excess_px.powi(2)).sqrt().max(1e-3);
-        let excess = m.residual_px / (HUBER_SIGMAS * sigma_px);
-        MeasuredStar {
-            pixel: star.position,
-            icrs: *icrs,
-            sigma_px: sigma_px * excess.max(1.0).sqrt(),
+    /// The stars as the fit takes them. The error of one that is further off than its own error and the common
+    /// excess explain (an unresolved companion, say) is raised with its distance, so that it pulls no harder than one that is not
+    /// (Huber 1964, Ann. Math. Stat. 35, 73).
+    fn measure(&mut self, scene: Scene, excess_px: f64) {
+        let measured = |pair: &Pair| {
+            let star = &scene.field.stars[pair.observed];
+            let sigma_px = (star.sigma_px.powi(2) + excess_px.powi(2)).sqrt().max(1e-3);
+            let excess = pair.residual_px / (HUBER_SIGMAS * sigma_px);
+            MeasuredStar {
+                pixel: star.position,
+                icrs: pair.direction,
+                sigma_px: sigma_px * excess.max(1.0).sqrt(),
+            }
+        };
+        self.stars.clear();
+        self.stars.extend(self.pairs.iter().map(measured));
+    }
+
+    /// The simplest model that richer ones do not clearly surpass in predicting stars left out of the fit.
+    fn choose_model(
+        &mut self,
+        scene: Scene,
+        current: &Refined,
+        richest: DistortionModel,
+    ) -> Option<DistortionModel> {
+        // The pairs are the same, with the residuals of the fit.
+        std::mem::swap(&mut self.pairs, &mut self.before);
+        self.measure(scene, current.excess_sigma_px);
+        std::mem::swap(&mut self.pairs, &mut self.before);
+        let CameraFit {
+            camera,
+            icrs_to_camera,
+            ..
+        } = &current.fit;
+        let left_out = |model| left_out_chi_sq(&self.stars, camera, icrs_to_camera, model);
+        let equations = 2.0 * self.stars.len() as f64;
+        let worth_it = WORTH_IT * equations / (equations - TAIL_EQUATIONS).max(1.0);
+        let mut best = (None, left_out(None)?);
+        for model in DistortionModel::ALL {
+            if model > richest || !is_affordable(model, self.stars.len()) {
+                break;
+            }
+            match left_out(Some(model)) {
+                Some(chi_sq) if equations * (best.1 / chi_sq).ln() > worth_it => {
+                    best = (Some(model), chi_sq);
+                }
+                // The quintic is not tried where the cubic is no better than what is simpler.
+                _ if model == DistortionModel::Cubic => break,
+                _ => {}
+            }
         }
-    };
-    matches.iter().zip(directions).map(measured).collect()
+        best.0
+    }
+
+    /// What the stated errors must be multiplied by to be those that the residuals show: at most 1, as the excess is one of them.
+    fn error_scale(&mut self, scene: Scene, excess_sigma_px: f64) -> f64 {
+        let relative = |pair: &Pair| {
+            let sigma_px = scene.field.stars[pair.observed].sigma_px;
+            pair.residual_px / sigma_px.hypot(excess_sigma_px).max(1e-3)
+        };
+        let median = self.scratch.median(self.pairs.iter().map(relative));
+        (median / RAYLEIGH_MEDIAN).min(1.0)
+    }
+
+    /// The radius that holds practically all true pairs, by the typical residual of the last fit.
+    fn agreement_radius_px(&mut self) -> f64 {
+        let distances_px = self.pairs.iter().map(|pair| pair.residual_px);
+        let sigma_px = self.scratch.median(distances_px) / RAYLEIGH_MEDIAN;
+        (CLIP_SIGMAS * sigma_px).max(MIN_RADIUS_PX)
+    }
+
+    /// The same, but no larger than before and not so much smaller that a bad fit would throw good pairs away.
+    fn next_radius_px(&mut self, before_px: f64) -> f64 {
+        self.agreement_radius_px().clamp(before_px / 4.0, before_px)
+    }
+
+    /// What must be added to the stated errors so that the residuals' median is as expected, in pixels; nothing where chance
+    /// explains that they are larger. The better measured half of the stars tells: what is to be added shows in them, and the
+    /// faintest were found where noise made them bright, and moved them.
+    fn excess_sigma_of(&mut self, scene: Scene, parameters: usize) -> f64 {
+        let equations = 2.0 * self.pairs.len() as f64;
+        let free = (equations - parameters as f64).max(1.0) / equations.max(1.0);
+        let expected_sq = RAYLEIGH_MEDIAN.powi(2) * free;
+        let stated_sq = |pair: &Pair| scene.field.stars[pair.observed].sigma_px.powi(2);
+        let worst_sq = self.scratch.median(self.pairs.iter().map(stated_sq));
+        let residuals = self.residuals_px.iter().zip(&self.pairs);
+        let squares = &mut self.scratch.squares;
+        squares.clear();
+        squares.extend(
+            residuals
+                .map(|([x, y], pair)| (x * x + y * y, stated_sq(pair)))
+                .filter(|(_, stated_sq)| *stated_sq <= worst_sq),
+        );
+        // Whether the median of the squares, in units of what is stated and added, is above a limit.
+        let is_median_above = |excess_sq: f64, limit: f64| {
+            let is_below = |&(d, s): &(f64, f64)| d / (s + excess_sq).max(1e-6) <= limit;
+            let below = squares.iter().map(|pair| usize::from(is_below(pair)));
+            below.sum::<usize>() <= squares.len() / 2
+        };
+        let chance = EXCESS_SIGMAS * MEDIAN_ERROR / (squares.len().max(1) as f64).sqrt();
+        if !is_median_above(0.0, expected_sq * (1.0 + chance)) {
+            return 0.0;
+        }
+        let largest_sq = squares.iter().fold(1e-6, |a: f64, s| a.max(s.0));
+        let (mut low, mut high) = (0.0, largest_sq.sqrt() * 2.0);
+        for _ in 0..EXCESS_BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if is_median_above(middle * middle, expected_sq) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        high
+    }
 }
 
 fn is_affordable(model: DistortionModel, stars: usize) -> bool {
     2.0 * stars as f64 >= EQUATIONS_PER_PARAMETER * (model.terms() + POSE_PARAMETERS) as f64
-}
-
-/// The simplest model that richer ones do not clearly surpass in predicting stars left out of the fit.
-fn choose_model(
-    field: &StarField,
-    sky: &Sky,
-    current: &Refined,
-    richest: Option<DistortionModel>,
-) -> Option<DistortionModel> {
-    let directions = catalog_directions(field, sky, &current.matches);
-    let stars = measured(
-        field,
-        &current.matches,
-        &directions,
-        current.excess_sigma_px,
-    );
-    let CameraFit {
-        camera,
-        icrs_to_camera,
-        ..
-    } = &current.fit;
-    let left_out = |model| left_out_chi_sq(&stars, camera, icrs_to_camera, model);
-    let equations = 2.0 * stars.len() as f64;
-    let worth_it = WORTH_IT * equations / (equations - TAIL_EQUATIONS).max(1.0);
-    let mut best = (None, left_out(None)?);
-    for model in DistortionModel::ALL {
-        if Some(model) > richest || !is_affordable(model, stars.len()) {
-            break;
-        }
-        match left_out(Some(model)) {
-            Some(chi_sq) if equations * (best.1 / chi_sq).ln() > worth_it => {
-                best = (Some(model), chi_sq);
-            }
-            // The quintic is not tried where the cubic is no better than what is simpler.
-            _ if model == DistortionModel::Cubic => break,
-            _ => {}
-        }
-    }
-    best.0
-}
-
-fn distances_px(fit: &CameraFit) -> Vec<f64> {
-    fit.residuals_px
-        .iter()
-        .map(|[x, y]| (x * x + y * y).sqrt())
-        .collect()
-}
-
-/// What the stated errors must be multiplied by to be those that the residuals show: at most 1, as the excess is one of them.
-fn error_scale(field: &StarField, current: &Refined) -> f64 {
-    let relative = |m: &StarMatch| {
-        let sigma_px = field.stars[m.observed]
-            .sigma_px
-            .hypot(current.excess_sigma_px);
-        m.residual_px / sigma_px.max(1e-3)
-    };
-    let mut relative: Vec<f64> = current.matches.iter().map(relative).collect();
-    (median(&mut relative) / RAYLEIGH_MEDIAN).min(1.0)
-}
-
-/// The radius that holds practically all true pairs, by the typical residual of this fit.
-fn agreement_radius_px(fit: &CameraFit) -> f64 {
-    let sigma_px = median(&mut distances_px(fit)) / RAYLEIGH_MEDIAN;
-    (CLIP_SIGMAS * sigma_px).max(MIN_RADIUS_PX)
-}
-
-/// The same, but no larger than before and not so much smaller that a bad fit would throw good pairs away.
-fn next_radius_px(fit: &CameraFit, before_px: f64) -> f64 {
-    agreement_radius_px(fit).clamp(before_px / 4.0, before_px)
-}
-
-/// What must be added to the stated errors so that the residuals' median is as expected, in pixels; nothing where chance
-/// explains that they are larger. The better measured half of the stars tells: what is to be added shows in them, and the faintest
-/// were found where noise made them bright, and moved them.
-fn excess_sigma_of(field: &StarField, matches: &[StarMatch], fit: &CameraFit) -> f64 {
-    let equations = 2.0 * matches.len() as f64;
-    let free = (equations - fit.parameters as f64).max(1.0) / equations.max(1.0);
-    let expected_sq = RAYLEIGH_MEDIAN.powi(2) * free;
-    let stated_sq = |m: &StarMatch| field.stars[m.observed].sigma_px.powi(2);
-    let worst_sq = median(&mut matches.iter().map(stated_sq).collect::<Vec<f64>>());
-    let squares: Vec<(f64, f64)> = fit
-        .residuals_px
-        .iter()
-        .zip(matches)
-        .map(|([x, y], m)| (x * x + y * y, stated_sq(m)))
-        .filter(|(_, stated_sq)| *stated_sq <= worst_sq)
-        .collect();
-    let mut scaled = Vec::with_capacity(squares.len());
-    let mut median_sq = |excess_sq: f64| {
-        scaled.clear();
-        scaled.extend(squares.iter().map(|(d, s)| d / (s + excess_sq).max(1e-6)));
-        median(&mut scaled)
-    };
-    let chance = EXCESS_SIGMAS * MEDIAN_ERROR / (squares.len().max(1) as f64).sqrt();
-    if median_sq(0.0) <= expected_sq * (1.0 + chance) {
-        return 0.0;
-    }
-    let largest_sq = squares.iter().fold(1e-6, |a: f64, s| a.max(s.0));
-    let (mut low, mut high) = (0.0, largest_sq.sqrt() * 2.0);
-    for _ in 0..EXCESS_BISECTIONS {
-        let middle = 0.5 * (low + high);
-        if median_sq(middle * middle) > expected_sq {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    high
 }

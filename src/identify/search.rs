@@ -4,14 +4,13 @@
 //! of a triangle depends on the focal length (gnomonic projection), a range is cut into steps small
 //! enough for that not to matter.
 
-use super::index::SizeClass;
-use super::refine::{Refined, Start, refine};
+use super::refine::{Refined, Refiner, Start};
 use super::triangle::TriangleShape;
-use super::verify::{Hypothesis, TESTED_STARS};
+use super::verify::{FalseAlarm, Hypothesis, Pair, Scene, TESTED_STARS};
 use super::{Hints, Photometry, Sky, StarField};
 use crate::attitude::POSE_PARAMETERS;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px, frame_centre};
-use crate::catalog::sky_grid::GridStar;
+use crate::catalog::sky_grid::{GridStar, chord_of};
 use crate::coords::{Icrs, Rotation, UnitVector};
 use nalgebra::{Matrix3, Vector3};
 
@@ -80,6 +79,7 @@ pub const LOG10_FALSE_ALARM_LIMIT: f64 = -8.0;
 const LOG10_SURE: f64 = -14.0;
 
 /// What the search found.
+#[derive(Debug, Clone, Copy)]
 pub struct Found {
     /// The hypothesis, refined with the brightest stars.
     pub refined: Refined,
@@ -87,13 +87,24 @@ pub struct Found {
     pub log10_false_alarm: f64,
 }
 
+/// What a search works with, kept from field to field.
+#[derive(Debug, Default)]
+pub struct Buffers {
+    /// Offsets of the brightest stars from the frame's centre, in pixels.
+    offsets: Vec<[f64; 2]>,
+    /// Refines hypotheses.
+    pub refiner: Refiner,
+    false_alarm: FalseAlarm,
+    /// The stars of the hypothesis that passes.
+    pub found: Vec<Pair>,
+}
+
 /// The search over one field.
 pub struct Search<'a> {
     field: &'a StarField,
     hints: &'a Hints,
     sky: &'a Sky<'a>,
-    /// Offsets of the brightest stars from the frame's centre, in pixels.
-    offsets: Vec<[f64; 2]>,
+    buffers: &'a mut Buffers,
     /// Smallest and largest focal length, in pixels.
     focal_px: (f64, f64),
     diagonal_px: f64,
@@ -145,15 +156,16 @@ impl Pose {
 
 impl<'a> Search<'a> {
     /// A search over `field`.
-    pub fn new(field: &'a StarField, hints: &'a Hints, sky: &'a Sky<'a>) -> Self {
+    pub fn new(scene: Scene<'a>, hints: &'a Hints, buffers: &'a mut Buffers) -> Self {
+        let Scene { field, sky } = scene;
         let centre = frame_centre(field.width_px, field.height_px);
         let most = PASSES.iter().map(|p| p.stars).max().unwrap_or(0);
-        let offsets = field
-            .stars
-            .iter()
-            .take(most)
-            .map(|s| [s.position.x - centre.x, s.position.y - centre.y])
-            .collect();
+        let seen = field.brightest(most).iter();
+        buffers.offsets.clear();
+        buffers
+            .offsets
+            .extend(seen.map(|s| [s.position.x - centre.x, s.position.y - centre.y]));
+        buffers.refiner.around.forget();
         let (narrowest_rad, widest_rad) = sky.fov_range_rad();
         let wide = focal_length_px(field.width_px, widest_rad * FOV_SLACK);
         let narrow = focal_length_px(field.width_px, narrowest_rad / FOV_SLACK);
@@ -165,7 +177,7 @@ impl<'a> Search<'a> {
             field,
             hints,
             sky,
-            offsets,
+            buffers,
             focal_px,
             diagonal_px: field.width_px.hypot(field.height_px),
             hypotheses: 0,
@@ -173,6 +185,11 @@ impl<'a> Search<'a> {
             best_log10: None,
             unsure: None,
         }
+    }
+
+    /// What refines hypotheses, and the stars that agreed with the last.
+    pub fn refiner(&mut self) -> &mut Refiner {
+        &mut self.buffers.refiner
     }
 
     /// The lowest false-alarm probability (log10) of the hypotheses that came as far as to have one.
@@ -189,7 +206,7 @@ impl<'a> Search<'a> {
 
     /// Triangles in the order of their faintest star, then of the second.
     fn sweep(&mut self, pass: &Pass) -> Option<Found> {
-        let stars = pass.stars.min(self.offsets.len());
+        let stars = pass.stars.min(self.buffers.offsets.len());
         for faintest in 2..stars {
             for middle in 1..faintest {
                 for brightest in 0..middle {
@@ -211,7 +228,7 @@ impl<'a> Search<'a> {
     }
 
     fn trio(&self, stars: [usize; 3], pass: &Pass) -> Option<Trio> {
-        let [a, b, c] = stars.map(|s| self.offsets[s]);
+        let [a, b, c] = stars.map(|s| self.buffers.offsets[s]);
         let side = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
         let longest_px = side(a, b).max(side(b, c)).max(side(c, a));
         if longest_px < MIN_TRIANGLE_SHARE * self.diagonal_px {
@@ -241,14 +258,11 @@ impl<'a> Search<'a> {
     }
 
     fn try_trio(&mut self, trio: &Trio) -> Option<Found> {
-        let sky = self.sky;
-        sky.triangles
-            .classes
-            .iter()
-            .find_map(|class| self.try_class(trio, class))
+        (0..self.sky.triangles.classes.len()).find_map(|class| self.try_class(trio, class))
     }
 
-    fn try_class(&mut self, trio: &Trio, class: &SizeClass) -> Option<Found> {
+    fn try_class(&mut self, trio: &Trio, number: usize) -> Option<Found> {
+        let class = &self.sky.triangles.classes[number];
         let low_px = self.focal_of_chord(trio, class.high)?.max(self.focal_px.0);
         let high_px = self.focal_of_chord(trio, class.low)?.min(self.focal_px.1);
         if low_px >= high_px {
@@ -261,14 +275,14 @@ impl<'a> Search<'a> {
         let factor = (high_px / low_px).powf(1.0 / steps);
         (0..steps as i32).find_map(|i| {
             let from_px = low_px * factor.powi(i);
-            self.try_focal(trio, class, (from_px, from_px * factor))
+            self.try_focal(trio, number, (from_px, from_px * factor))
         })
     }
 
     /// Unit vectors of the trio in a camera with this focal length, not mirrored.
     fn vectors(&self, trio: &Trio, focal_px: f64) -> [Vector3<f64>; 3] {
         trio.stars.map(|s| {
-            let [u, v] = self.offsets[s];
+            let [u, v] = self.buffers.offsets[s];
             Vector3::new(u, v, focal_px).normalize()
         })
     }
@@ -290,7 +304,7 @@ impl<'a> Search<'a> {
         focal_px.is_finite().then_some(focal_px)
     }
 
-    fn try_focal(&mut self, trio: &Trio, class: &SizeClass, range_px: (f64, f64)) -> Option<Found> {
+    fn try_focal(&mut self, trio: &Trio, class: usize, range_px: (f64, f64)) -> Option<Found> {
         let middle_px = (range_px.0 * range_px.1).sqrt();
         let vectors = self.vectors(trio, middle_px);
         let shape = TriangleShape::new([&vectors[0], &vectors[1], &vectors[2]])?;
@@ -304,7 +318,8 @@ impl<'a> Search<'a> {
             range_px,
         };
         let mut found = None;
-        class.for_each_similar(shape.ratios, trio.tolerance, |corners| {
+        let sky = self.sky;
+        sky.for_each_similar((class, shape.ratios, trio.tolerance), |corners| {
             self.candidates += 1;
             if found.is_none() && !self.is_exhausted() {
                 found = self.try_triangle(&query, corners);
@@ -377,20 +392,18 @@ impl<'a> Search<'a> {
     /// (Wald 1945, Ann. Math. Stat. 16, 117: the sequential probability ratio test).
     fn witnesses_agree(&self, trio: &Trio, pose: &Pose, zero_point: f64) -> bool {
         let radius_rad = trio.witness_px / pose.focal_px;
+        let chord = chord_of(radius_rad);
         let tolerance_mag = self.field.photometry.tolerance_mag();
         let mut evidence = 0.0;
-        for (index, offset) in self.offsets.iter().enumerate() {
+        for (index, offset) in self.buffers.offsets.iter().enumerate() {
             if trio.stars.contains(&index) {
                 continue;
             }
             let direction = pose.direction_of(offset);
             let v_mag = self.field.stars[index].mag + zero_point;
             let (bright, faint) = (v_mag - tolerance_mag, v_mag + tolerance_mag);
-            let mut seen = false;
-            let mut look = |star: &GridStar| seen |= f64::from(star.v_mag) >= bright;
-            self.sky
-                .grid
-                .for_each_within(&direction, radius_rad, faint as f32, &mut look);
+            let magnitudes = bright as f32..=faint as f32;
+            let seen = self.sky.grid.is_any_within(&direction, chord, magnitudes);
             let chance = self
                 .sky
                 .chance_within(radius_rad, bright, faint)
@@ -413,10 +426,11 @@ impl<'a> Search<'a> {
             hypothesis,
             radius_px: trio.witness_px,
             sceptical: true,
+            stars: TESTED_STARS,
+            richest: DistortionModel::Radial,
         };
-        let richest = Some(DistortionModel::Radial);
-        let refined = refine(self.field, TESTED_STARS, self.sky, &start, richest)?;
-        let log10 = self.log10_false_alarm(&refined.hypothesis)?;
+        let refined = self.buffers.refiner.refine(self.scene(), &start)?;
+        let log10 = self.log10_false_alarm(&refined.hypothesis())?;
         let is_best = self.best_log10.is_none_or(|best| log10 < best);
         if is_best {
             self.best_log10 = Some(log10);
@@ -425,17 +439,30 @@ impl<'a> Search<'a> {
             refined,
             log10_false_alarm: log10,
         };
-        if log10 <= LOG10_SURE {
+        let is_sure = log10 <= LOG10_SURE;
+        let passes = is_best && log10 <= LOG10_FALSE_ALARM_LIMIT;
+        if is_sure || passes {
+            let Buffers { refiner, found, .. } = self.buffers;
+            std::mem::swap(&mut refiner.pairs, found);
+        }
+        if is_sure {
             return Some(found);
         }
-        if is_best && log10 <= LOG10_FALSE_ALARM_LIMIT {
+        if passes {
             self.unsure = Some(found);
         }
         None
     }
 
+    fn scene(&self) -> Scene<'a> {
+        Scene {
+            field: self.field,
+            sky: self.sky,
+        }
+    }
+
     /// log10 of the false-alarm probability of `hypothesis`, `None` where it contradicts the hints.
-    pub fn log10_false_alarm(&self, hypothesis: &Hypothesis) -> Option<f64> {
+    pub fn log10_false_alarm(&mut self, hypothesis: &Hypothesis) -> Option<f64> {
         let focal_px = hypothesis.camera.focal_length_px;
         let slack = 1.0 + 2.0 * PASSES[1].tolerance;
         if focal_px < self.focal_px.0 / slack || focal_px > self.focal_px.1 * slack {
@@ -447,7 +474,13 @@ impl<'a> Search<'a> {
                 return None;
             }
         }
-        Some(hypothesis.log10_false_alarm(self.field, self.sky, self.hypotheses))
+        let (scene, hypotheses) = (self.scene(), self.hypotheses);
+        let Buffers {
+            refiner,
+            false_alarm,
+            ..
+        } = self.buffers;
+        Some(false_alarm.log10(hypothesis, scene, &mut refiner.around, hypotheses))
     }
 }
 

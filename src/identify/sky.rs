@@ -1,7 +1,7 @@
 //! The catalogue made ready for identification.
 
 use super::cache::{self, CacheError};
-use super::index::TriangleIndex;
+use super::index::{Source, TriangleIndex};
 use crate::catalog::sky_grid::SkyGrid;
 use crate::catalog::{Catalog, Star};
 use crate::units::RAD_PER_DEG;
@@ -85,8 +85,33 @@ impl<'a> Sky<'a> {
     /// Makes everything anew.
     pub fn build(catalog: &'a Catalog, progress: &(dyn Fn(f64) + Sync)) -> Self {
         let grid = SkyGrid::new(catalog.stars());
-        let triangles = TriangleIndex::build(catalog.stars(), &grid, progress);
+        let source = Source {
+            stars: catalog.stars(),
+            grid: &grid,
+        };
+        let triangles = TriangleIndex::build(source, progress);
         Self::new(catalog, grid, triangles)
+    }
+
+    /// Calls `visit` with the corners of every triangle of a size class whose ratios lie within a tolerance of those given, in
+    /// an order that depends on nothing but the arguments.
+    #[inline]
+    pub(super) fn for_each_similar(
+        &self,
+        similar: (usize, [f64; 2], f64),
+        visit: impl FnMut(&[u32; 3]),
+    ) {
+        let source = Source {
+            stars: self.stars(),
+            grid: &self.grid,
+        };
+        self.triangles.for_each_similar(source, similar, visit);
+    }
+
+    /// What went wrong with the cache since [`Self::open`], or since it was last asked: no reason to stop, since what could not be read was
+    /// made anew.
+    pub fn take_troubles(&self) -> Vec<CacheError> {
+        self.triangles.take_troubles()
     }
 
     /// The narrowest and the widest horizontal field of view in which the triangles listed are found, in radians.

@@ -31,7 +31,12 @@ impl TriangleShape {
     #[inline]
     pub fn new(points: [&Vector3<f64>; 3]) -> Option<Self> {
         let side = |a: usize, b: usize| (points[a] - points[b]).norm_squared();
-        let opposite = [side(1, 2), side(2, 0), side(0, 1)];
+        Self::of_sides([side(1, 2), side(2, 0), side(0, 1)])
+    }
+
+    /// The shape of the triangle with these sides, squared, each opposite to the point with its number.
+    #[inline]
+    pub fn of_sides(opposite: [f64; 3]) -> Option<Self> {
         // C faces the longest side, B the shortest.
         let c = index_of_largest(opposite);
         let (p, q) = ((c + 1) % 3, (c + 2) % 3);

@@ -11,15 +11,15 @@
 //! looked for, and say nothing; every two parameters fitted beyond pointing, roll and scale use up another star. The stars used
 //! up are taken to be those least likely to agree by chance, which makes the most of the others' chances.
 
-use super::predict::{PredictedStar, View};
+use super::predict::{PredictedStar, Surroundings, View};
 use super::search::MAX_HYPOTHESES;
 use super::{ObservedStar, Photometry, Sky, StarField, StarMatch};
 use crate::attitude::POSE_PARAMETERS;
-use crate::camera::CameraModel;
-use crate::coords::{Camera, Icrs, Rotation};
+use crate::camera::{CameraModel, LANES};
+use crate::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::statistics::log10_poisson_binomial_tail;
 use crate::units::RAD_PER_DEG;
-use std::f64::consts::PI;
+use std::f64::consts::{LN_10, PI};
 use std::ops::Range;
 
 /// Observed stars that are tested, the brightest.
@@ -42,9 +42,11 @@ const LARGEST_RADIUS_SHARE: f64 = 0.014;
 const MAG_TOLERANCES: [f64; 3] = [0.25, 0.5, 1.0];
 /// Radius of the neighbourhood whose density of predicted stars counts, in units of the radius of agreement.
 const NEIGHBOURHOOD: f64 = 8.0;
+/// Strips that a frame's predicted stars are sorted into.
+const STRIPS: usize = 64;
 
 /// Where the camera is supposed to look.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hypothesis {
     /// The camera.
     pub camera: CameraModel,
@@ -56,29 +58,39 @@ pub struct Hypothesis {
     pub zero_point_mag: f64,
 }
 
-/// How deep to predict.
+/// An observed star and the catalogue star that it is taken for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Depth {
-    /// So many of the brightest stars in the frame.
-    Count(usize),
-    /// All stars in the frame to this V magnitude.
-    Magnitude(f64),
+pub struct Pair {
+    /// Index into [`StarField::stars`].
+    pub observed: usize,
+    /// Index into the catalogue's stars.
+    pub catalog: usize,
+    /// V magnitude of the catalogue.
+    pub v_mag: f32,
+    /// Where its light comes from, at the time of the frame.
+    pub direction: UnitVector<Icrs>,
+    /// Distance between the observed and the predicted place, in pixels.
+    pub residual_px: f64,
 }
 
-impl Depth {
-    /// The depth that the observed stars, brightest first, ask for.
-    pub fn of(observed: &[ObservedStar], photometry: Photometry) -> Self {
-        match photometry {
-            Photometry::JohnsonV => {
-                let faintest = observed.iter().map(|s| s.mag).fold(f64::MIN, f64::max);
-                Self::Magnitude(faintest + photometry.tolerance_mag())
-            }
-            Photometry::Instrumental => {
-                let count = observed.len() as f64 * PREDICTED_PER_OBSERVED;
-                Self::Count(count.ceil() as usize + PREDICTED_EXTRA)
-            }
+impl Pair {
+    /// The same, without what only the fit needs.
+    pub fn star_match(&self) -> StarMatch {
+        StarMatch {
+            observed: self.observed,
+            catalog: self.catalog,
+            residual_px: self.residual_px,
         }
     }
+}
+
+/// What is seen of which sky.
+#[derive(Clone, Copy)]
+pub struct Scene<'a> {
+    /// The stars seen.
+    pub field: &'a StarField,
+    /// The catalogue.
+    pub sky: &'a Sky<'a>,
 }
 
 /// How far apart a pair may be.
@@ -115,44 +127,50 @@ impl Radius {
 }
 
 impl Hypothesis {
-    /// The catalogue stars in the frame to the depth that `observed` asks for, brightest first.
+    /// Makes `predicted` the catalogue stars in the frame to the depth that `observed` asks for, brightest first.
     pub fn predict(
         &self,
-        sky: &Sky,
-        field: &StarField,
+        scene: Scene,
         observed: &[ObservedStar],
-    ) -> Vec<PredictedStar> {
-        let (wanted, mut limit) = match Depth::of(observed, field.photometry) {
-            Depth::Magnitude(limit) => (0, limit),
-            Depth::Count(count) => (count, sky.magnitude_of_density(self.per_sq_deg(count))),
-        };
-        loop {
-            let mut predicted = self.view(field).stars_to(sky, limit);
-            if predicted.len() >= wanted || limit > sky.faintest_v_mag() {
-                if wanted > 0 {
-                    predicted.truncate(wanted);
-                }
-                return predicted;
+        around: &mut Surroundings,
+        predicted: &mut Vec<PredictedStar>,
+    ) {
+        let Scene { field, sky } = scene;
+        match field.photometry {
+            Photometry::JohnsonV => {
+                let faintest = observed.iter().map(|s| s.mag).fold(f64::MIN, f64::max);
+                let limit = faintest + field.photometry.tolerance_mag();
+                around.stars_to(&self.view(field), sky, limit, predicted);
             }
-            limit += 0.7;
+            Photometry::Instrumental => {
+                let count = observed.len() as f64 * PREDICTED_PER_OBSERVED;
+                let count = count.ceil() as usize + PREDICTED_EXTRA;
+                let likely = sky.magnitude_of_density(self.per_sq_deg(count));
+                around.brightest(&self.view(field), sky, (count, likely), predicted);
+            }
         }
     }
 
-    /// The catalogue stars in the frame that may be any of its stars, once the zero point is known: to what the faint ones of
-    /// these have, and the depth that their number asks for at least.
-    pub fn predict_all(&self, sky: &Sky, field: &StarField) -> Vec<PredictedStar> {
-        let by_count = self.predict(sky, field, &field.stars);
+    /// Makes `predicted` the catalogue stars in the frame that may be any of its stars, once the zero point is known: to what the
+    /// faint ones of these have, and the depth that their number asks for at least.
+    pub fn predict_all(
+        &self,
+        scene: Scene,
+        around: &mut Surroundings,
+        predicted: &mut Vec<PredictedStar>,
+    ) {
+        let Scene { field, sky } = scene;
+        self.predict(scene, &field.stars, around, predicted);
         let faint = (field.stars.len() as f64 * FAINT_SHARE) as usize;
         let limit = field
             .stars
             .get(faint)
             .map(|star| star.mag + self.zero_point_mag + FAINT_ROOM_MAG);
-        let reached = by_count.last().map(|star| f64::from(star.v_mag));
-        match limit {
-            Some(limit) if reached.is_some_and(|reached| reached < limit) => {
-                self.view(field).stars_to(sky, limit)
-            }
-            _ => by_count,
+        let reached = predicted.last().map(|star| f64::from(star.v_mag));
+        if let Some(limit) = limit
+            && reached.is_some_and(|reached| reached < limit)
+        {
+            around.stars_to(&self.view(field), sky, limit, predicted);
         }
     }
 
@@ -166,10 +184,13 @@ impl Hypothesis {
 
     /// The same stars where this hypothesis puts them.
     pub fn predict_again(&self, predicted: &mut [PredictedStar]) {
-        for star in predicted {
-            let direction = self.icrs_to_camera.apply(&star.direction);
-            if let Some(pixel) = self.camera.pixel_of(&direction) {
-                star.pixel = pixel;
+        for stars in predicted.chunks_mut(LANES) {
+            let mut directions = [UnitVector::BORESIGHT; LANES];
+            for (direction, star) in directions.iter_mut().zip(&*stars) {
+                *direction = self.icrs_to_camera.apply(&star.direction);
+            }
+            for (star, pixel) in stars.iter_mut().zip(self.camera.pixels_of(&directions)) {
+                star.pixel = pixel.unwrap_or(star.pixel);
             }
         }
     }
@@ -179,23 +200,9 @@ impl Hypothesis {
         count as f64 * RAD_PER_DEG.powi(2) / (self.camera.fov_x_rad() * self.camera.fov_y_rad())
     }
 
-    /// Pairs observed and predicted stars of about the same brightness that lie within `radius_px` of each
-    /// other, the most alike in place and brightness first, each star once; in the order of the observed stars.
-    pub fn pair_up(
-        &self,
-        observed: &[ObservedStar],
-        predicted: &[PredictedStar],
-        photometry: Photometry,
-        radius: &Radius,
-    ) -> Vec<StarMatch> {
-        pair_up(observed, predicted, radius, |o, p| {
-            self.mag_difference(o, p, photometry)
-        })
-    }
-
     /// The difference in brightness in units of what is tolerated; `None` if it is more. No star is too bright for a
     /// saturated one.
-    fn mag_difference(
+    pub fn mag_difference(
         &self,
         observed: &ObservedStar,
         predicted: &PredictedStar,
@@ -207,39 +214,6 @@ impl Hypothesis {
         }
         let relative = difference.abs() / photometry.tolerance_mag();
         (relative <= 1.0).then_some(relative)
-    }
-
-    /// log10 of the expected number of hypotheses as good as this one among `hypotheses` that chance alone
-    /// would give: the false-alarm probability where it is small.
-    ///
-    /// Agreement is sought within several radii and several differences in magnitude, and the least likely counts: exact
-    /// positions and magnitudes say more than rough ones. That so many tests are made is paid for.
-    pub fn log10_false_alarm(&self, field: &StarField, sky: &Sky, hypotheses: u64) -> f64 {
-        let observed = field.brightest(TESTED_STARS);
-        let predicted = self.predict(sky, field, observed);
-        let used_up = TRIANGLE_STARS + (self.parameters - POSE_PARAMETERS).div_ceil(2);
-        let radii_px = radii_px(field);
-        let reach_px = NEIGHBOURHOOD * radii_px.last().copied().unwrap_or(0.0);
-        let largest_mag = field.photometry.tolerance_mag();
-        let mut pairs = self.near_pairs(observed, &predicted, (reach_px, largest_mag));
-        let mut best: f64 = 0.0;
-        let mut tests = 0;
-        let tried = MAG_TOLERANCES.iter().filter(|&&mag| mag < largest_mag);
-        for tolerance_mag in tried.copied().chain([largest_mag]).rev() {
-            // From the largest to the smallest: what is not alike at one is not at the next.
-            pairs.retain(|pair| pair.mag <= tolerance_mag);
-            let alike = observed
-                .iter()
-                .map(|star| self.alike(star, &predicted, tolerance_mag).len() as f64)
-                .collect();
-            let mut agreement = Agreement::new(&pairs, alike, predicted.len());
-            for &radius_px in &radii_px {
-                let log10 = agreement.log10_chance(field, radius_px, (used_up, best));
-                best = best.min(log10);
-                tests += 1;
-            }
-        }
-        (best + (search_weight(hypotheses) * f64::from(tests)).log10()).min(0.0)
     }
 
     /// The part of `predicted`, the brightest first, whose stars are as bright as `star` within a tolerance.
@@ -255,190 +229,468 @@ impl Hypothesis {
         let to = predicted.partition_point(|p| v_mag_of(p) <= v_mag + tolerance_mag);
         from..to
     }
+}
 
-    /// All pairs of an observed and a predicted star within a distance in pixels and a difference in magnitude, the closest
-    /// first.
-    fn near_pairs(
-        &self,
-        observed: &[ObservedStar],
-        predicted: &[PredictedStar],
-        (reach_px, tolerance_mag): (f64, f64),
-    ) -> Vec<NearPair> {
-        let mut pairs = Vec::new();
-        for (observed, star) in observed.iter().enumerate() {
-            for index in self.alike(star, predicted, tolerance_mag) {
-                let candidate = &predicted[index];
-                let apart_px = candidate.pixel.distance_to(&star.position);
-                if apart_px <= reach_px {
-                    pairs.push(NearPair {
-                        observed,
-                        predicted: index,
-                        apart_px,
-                        mag: (f64::from(candidate.v_mag) - star.mag - self.zero_point_mag).abs(),
+/// Pairs up observed and predicted stars; keeps its buffers.
+#[derive(Debug, Default)]
+pub struct Pairing {
+    /// The predicted stars strip by strip along x, and where each strip begins.
+    by_strip: Vec<usize>,
+    starts: Vec<usize>,
+    close: Vec<Close>,
+    of_observed: Vec<Claim>,
+    of_predicted: Vec<u32>,
+}
+
+/// A pair that may be one.
+#[derive(Debug, Clone, Copy)]
+struct Close {
+    /// How unlike they are in place and brightness.
+    apart: f64,
+    observed: usize,
+    predicted: usize,
+}
+
+/// What an observed star may be paired with.
+#[derive(Debug, Clone, Copy, Default)]
+struct Claim {
+    candidates: u32,
+    predicted: Option<usize>,
+}
+
+impl Pairing {
+    /// Makes `pairs` what lies within `radius` and whose `mag_difference` is tolerable, the most alike in place and
+    /// brightness first, each star once; in the order of the observed stars.
+    pub fn pair_up(
+        &mut self,
+        (observed, predicted): (&[ObservedStar], &[PredictedStar]),
+        radius: &Radius,
+        mag_difference: impl Fn(&ObservedStar, &PredictedStar) -> Option<f64>,
+        pairs: &mut Vec<Pair>,
+    ) {
+        self.find_close((observed, predicted), radius, mag_difference);
+        self.settle();
+        pairs.clear();
+        let claims = observed.iter().zip(&self.of_observed).enumerate();
+        pairs.extend(claims.filter_map(|(index, (star, claim))| {
+            let found = &predicted[claim.predicted?];
+            Some(Pair {
+                observed: index,
+                catalog: found.catalog,
+                v_mag: found.v_mag,
+                direction: found.direction,
+                residual_px: found.pixel.distance_to(&star.position),
+            })
+        }));
+    }
+
+    /// Finds all pairs that may be.
+    fn find_close(
+        &mut self,
+        (observed, predicted): (&[ObservedStar], &[PredictedStar]),
+        radius: &Radius,
+        mag_difference: impl Fn(&ObservedStar, &PredictedStar) -> Option<f64>,
+    ) {
+        let strips = Strips::over(predicted);
+        self.sort_into(&strips, predicted);
+        self.close.clear();
+        self.of_observed.clear();
+        self.of_observed.resize(observed.len(), Claim::default());
+        self.of_predicted.clear();
+        self.of_predicted.resize(predicted.len(), 0);
+        for (o, star) in observed.iter().enumerate() {
+            let radius_px = radius.of(star);
+            let x = star.position.x;
+            let (first, last) = (strips.of(x - radius_px), strips.of(x + radius_px));
+            for &p in &self.by_strip[self.starts[first]..self.starts[last + 1]] {
+                let candidate = &predicted[p];
+                let distance_px = candidate.pixel.distance_to(&star.position);
+                if distance_px <= radius_px
+                    && let Some(difference) = mag_difference(star, candidate)
+                {
+                    // Nearness counts in pixels: a star of which little is known takes none from one of which much is.
+                    let apart = distance_px / radius.common_px;
+                    self.close.push(Close {
+                        apart: apart * apart + difference * difference,
+                        observed: o,
+                        predicted: p,
                     });
+                    self.of_observed[o].candidates += 1;
+                    self.of_predicted[p] += 1;
                 }
             }
         }
-        pairs.sort_unstable_by(|a, b| {
-            let order = a.apart_px.total_cmp(&b.apart_px);
+    }
+
+    /// A counting sort by strips.
+    fn sort_into(&mut self, strips: &Strips, predicted: &[PredictedStar]) {
+        self.starts.clear();
+        self.starts.resize(STRIPS + 1, 0);
+        for star in predicted {
+            self.starts[strips.of(star.pixel.x)] += 1;
+        }
+        let mut end = 0;
+        for start in &mut self.starts {
+            end += *start;
+            *start = end;
+        }
+        self.by_strip.clear();
+        self.by_strip.resize(predicted.len(), 0);
+        for (p, star) in predicted.iter().enumerate() {
+            let start = &mut self.starts[strips.of(star.pixel.x)];
+            *start -= 1;
+            self.by_strip[*start] = p;
+        }
+    }
+
+    /// Pairs those that have no other choice, and then the others, the most alike first.
+    fn settle(&mut self) {
+        let Self {
+            close,
+            of_observed,
+            of_predicted,
+            ..
+        } = self;
+        close.retain(|pair| {
+            let alone =
+                of_observed[pair.observed].candidates == 1 && of_predicted[pair.predicted] == 1;
+            if alone {
+                of_observed[pair.observed].predicted = Some(pair.predicted);
+            }
+            !alone
+        });
+        close.sort_unstable_by(|a, b| {
+            let order = a.apart.total_cmp(&b.apart);
             order.then((a.observed, a.predicted).cmp(&(b.observed, b.predicted)))
         });
-        pairs
+        for pair in close {
+            let (claim, claimed) = (
+                &mut of_observed[pair.observed].predicted,
+                &mut of_predicted[pair.predicted],
+            );
+            if claim.is_none() && *claimed > 0 {
+                *claim = Some(pair.predicted);
+                *claimed = 0;
+            }
+        }
+    }
+}
+
+/// Strips of equal width between the first and the last of some stars along x.
+struct Strips {
+    from_px: f64,
+    per_px: f64,
+}
+
+impl Strips {
+    fn over(predicted: &[PredictedStar]) -> Self {
+        let x = || predicted.iter().map(|star| star.pixel.x);
+        let (low, high) = (x().fold(f64::MAX, f64::min), x().fold(f64::MIN, f64::max));
+        Self {
+            from_px: low,
+            per_px: STRIPS as f64 / (high - low).max(1.0),
+        }
+    }
+
+    fn of(&self, x: f64) -> usize {
+        (((x - self.from_px) * self.per_px).max(0.0) as usize).min(STRIPS - 1)
     }
 }
 
 /// An observed and a predicted star that are about as bright as each other.
+#[derive(Debug, Clone, Copy)]
 struct NearPair {
     observed: usize,
     predicted: usize,
     /// Their distance, in pixels.
     apart_px: f64,
+    /// The smallest radius of agreement in whose neighbourhood it is.
+    radius: usize,
     /// The difference of their magnitudes, absolute.
     mag: f64,
 }
 
-/// The radii of agreement that are tried in this field, smallest first.
-fn radii_px(field: &StarField) -> Vec<f64> {
-    let largest_px = LARGEST_RADIUS_SHARE * field.width_px.hypot(field.height_px);
-    std::iter::successors(Some(SMALLEST_RADIUS_PX), |radius| {
-        Some(radius * RADIUS_FACTOR)
-    })
-    .take_while(|&radius| radius <= largest_px)
-    .collect()
-}
-
-/// What agrees within a growing radius.
-struct Agreement<'a> {
-    /// The closest first.
-    pairs: &'a [NearPair],
-    /// For each observed star: the predicted stars that are alike, ...
-    alike: Vec<f64>,
-    /// ... and those of them in the neighbourhood, which are the first `near_pairs` of `pairs`.
+/// How likely it is that chance does as well as a hypothesis; keeps its buffers.
+#[derive(Debug, Default)]
+pub struct FalseAlarm {
+    predicted: Vec<PredictedStar>,
+    /// Radii of agreement, smallest first.
+    radii_px: Vec<f64>,
+    /// All pairs in the neighbourhood of the largest.
+    pairs: Vec<NearPair>,
+    /// Those within it, the closest first.
+    close: Vec<NearPair>,
+    /// For each observed star the predicted stars that are alike, and the logarithm of their number, ...
+    alike: Vec<(f64, f64)>,
+    /// ... and those of them in the neighbourhood, radius by radius.
     near: Vec<f64>,
-    near_pairs: usize,
     observed_taken: Vec<bool>,
     predicted_taken: Vec<bool>,
-    /// Observed stars with a predicted star of their own within the radius, from the first `hit_pairs` of `pairs`.
+    tests: Vec<Test>,
+    /// One for each observed star in each test.
+    chances: Vec<f64>,
+    tail: Vec<f64>,
+}
+
+/// Agreement within one radius and one difference in magnitude.
+#[derive(Debug, Clone, Copy)]
+struct Test {
+    /// Observed stars with a predicted star of their own, less those that agree by construction.
     hits: usize,
-    hit_pairs: usize,
+    /// The natural logarithm of the probability of as many by chance is no less.
+    at_least_ln: f64,
+    /// Where its chances begin, and how many of them, the least likely, are used up.
+    chances: usize,
+    used_up: usize,
 }
 
-impl<'a> Agreement<'a> {
-    fn new(pairs: &'a [NearPair], alike: Vec<f64>, predicted: usize) -> Self {
-        let observed = alike.len();
-        Self {
-            pairs,
-            alike,
-            near: vec![0.0; observed],
-            near_pairs: 0,
-            observed_taken: vec![false; observed],
-            predicted_taken: vec![false; predicted],
-            hits: 0,
-            hit_pairs: 0,
-        }
-    }
+/// What a test is of.
+struct Tested<'a> {
+    field: &'a StarField,
+    tolerance_mag: f64,
+    used_up: usize,
+}
 
-    /// log10 of the probability that chance makes as many stars agree within `radius_px`, which must not be smaller
-    /// than before. So many stars as are `used_up` agree by construction; they count as the least likely ones. 0 where
-    /// there is nothing to gain on `best`.
-    fn log10_chance(
+impl FalseAlarm {
+    /// log10 of the expected number of hypotheses as good as this one among `hypotheses` that chance alone
+    /// would give: the false-alarm probability where it is small.
+    ///
+    /// Agreement is sought within several radii and several differences in magnitude, and the least likely counts: exact
+    /// positions and magnitudes say more than rough ones. That so many tests are made is paid for.
+    pub fn log10(
         &mut self,
-        field: &StarField,
-        radius_px: f64,
-        (used_up, best): (usize, f64),
+        hypothesis: &Hypothesis,
+        scene: Scene,
+        around: &mut Surroundings,
+        hypotheses: u64,
     ) -> f64 {
-        self.widen(radius_px);
-        let hits = self.hits.saturating_sub(used_up);
-        if hits == 0 {
-            return 0.0;
+        let field = scene.field;
+        let observed = field.brightest(TESTED_STARS);
+        hypothesis.predict(scene, observed, around, &mut self.predicted);
+        self.set_radii(field);
+        self.tests.clear();
+        self.chances.clear();
+        let largest_mag = field.photometry.tolerance_mag();
+        self.find_pairs(hypothesis, observed, largest_mag);
+        let tried = MAG_TOLERANCES.iter().filter(|&&mag| mag < largest_mag);
+        let mut tests = 0;
+        for tolerance_mag in tried.copied().chain([largest_mag]) {
+            let tested = Tested {
+                field,
+                tolerance_mag,
+                used_up: TRIANGLE_STARS + (hypothesis.parameters - POSE_PARAMETERS).div_ceil(2),
+            };
+            self.add_tests(hypothesis, observed, &tested);
+            tests += self.radii_px.len();
         }
-        let frame_px = field.width_px * field.height_px;
-        let mut chances: Vec<f64> = (0..self.alike.len())
-            .map(|observed| self.chance(observed, frame_px, radius_px))
-            .collect();
-        chances.sort_unstable_by(f64::total_cmp);
-        // That just the likeliest agree is one of the ways in which so many do.
-        let likeliest = &chances[chances.len() - hits..];
-        if likeliest.iter().map(|chance| chance.log10()).sum::<f64>() >= best {
-            return 0.0;
-        }
-        log10_poisson_binomial_tail(&chances[used_up..], hits)
+        let best = self.least_likely(observed.len());
+        (best + (search_weight(hypotheses) * tests as f64).log10()).min(0.0)
     }
 
-    fn widen(&mut self, radius_px: f64) {
-        let next_within = |next: usize, radius_px| {
-            let pair = self.pairs.get(next)?;
-            (pair.apart_px <= radius_px).then_some(pair)
-        };
-        while let Some(pair) = next_within(self.near_pairs, NEIGHBOURHOOD * radius_px) {
-            self.near[pair.observed] += 1.0;
-            self.near_pairs += 1;
-        }
-        while let Some(pair) = next_within(self.hit_pairs, radius_px) {
-            let (o, p) = (pair.observed, pair.predicted);
-            if !self.observed_taken[o] && !self.predicted_taken[p] {
-                self.observed_taken[o] = true;
-                self.predicted_taken[p] = true;
-                self.hits += 1;
+    fn set_radii(&mut self, field: &StarField) {
+        let largest_px = LARGEST_RADIUS_SHARE * field.width_px.hypot(field.height_px);
+        // There is one in the smallest frame.
+        let largest_px = largest_px.max(SMALLEST_RADIUS_PX);
+        let radii = std::iter::successors(Some(SMALLEST_RADIUS_PX), |radius| {
+            Some(radius * RADIUS_FACTOR)
+        });
+        self.radii_px.clear();
+        self.radii_px
+            .extend(radii.take_while(|&radius| radius <= largest_px));
+    }
+
+    /// All pairs within the neighbourhood of the largest radius whose magnitudes differ by no more than is tolerated.
+    fn find_pairs(&mut self, hypothesis: &Hypothesis, observed: &[ObservedStar], largest_mag: f64) {
+        let largest_px = self.radii_px.last().copied().unwrap_or(0.0);
+        let radii_px = &self.radii_px;
+        let near_px = |radius: usize| NEIGHBOURHOOD * radii_px[radius];
+        self.pairs.clear();
+        for (index, star) in observed.iter().enumerate() {
+            let alike = hypothesis.alike(star, &self.predicted, largest_mag);
+            for (candidate, predicted) in self.predicted[alike.clone()].iter().zip(alike) {
+                let apart_px = candidate.pixel.distance_to(&star.position);
+                if apart_px > NEIGHBOURHOOD * largest_px {
+                    continue;
+                }
+                let mut radius = radii_px.len() - 1;
+                while radius > 0 && apart_px <= near_px(radius - 1) {
+                    radius -= 1;
+                }
+                let mag = f64::from(candidate.v_mag) - star.mag - hypothesis.zero_point_mag;
+                self.pairs.push(NearPair {
+                    observed: index,
+                    predicted,
+                    apart_px,
+                    radius,
+                    mag: mag.abs(),
+                });
             }
-            self.hit_pairs += 1;
+        }
+        self.close.clear();
+        let close = self.pairs.iter().filter(|pair| pair.apart_px <= largest_px);
+        self.close.extend(close);
+        self.close.sort_unstable_by(|a, b| {
+            let order = a.apart_px.total_cmp(&b.apart_px);
+            order.then((a.observed, a.predicted).cmp(&(b.observed, b.predicted)))
+        });
+    }
+
+    /// One test for each radius at which more stars agree than do so by construction.
+    fn add_tests(&mut self, hypothesis: &Hypothesis, observed: &[ObservedStar], tested: &Tested) {
+        self.count_alike(hypothesis, observed, tested.tolerance_mag);
+        self.count_near(observed.len(), tested.tolerance_mag);
+        let mut hits = Hits::new(self, observed.len());
+        for radius in 0..self.radii_px.len() {
+            let agreeing = hits.within(self.radii_px[radius], tested.tolerance_mag, &self.close);
+            if agreeing > tested.used_up {
+                let test = self.test(radius, agreeing - tested.used_up, tested);
+                self.tests.push(test);
+            }
+        }
+        (self.observed_taken, self.predicted_taken) = (hits.observed_taken, hits.predicted_taken);
+    }
+
+    fn count_alike(
+        &mut self,
+        hypothesis: &Hypothesis,
+        observed: &[ObservedStar],
+        tolerance_mag: f64,
+    ) {
+        let predicted = &self.predicted;
+        self.alike.clear();
+        self.alike.extend(observed.iter().map(|star| {
+            let alike = hypothesis.alike(star, predicted, tolerance_mag).len() as f64;
+            (alike, alike.ln())
+        }));
+    }
+
+    fn count_near(&mut self, observed: usize, tolerance_mag: f64) {
+        let radii = self.radii_px.len();
+        self.near.clear();
+        self.near.resize(observed * radii, 0.0);
+        for pair in self.pairs.iter().filter(|pair| pair.mag <= tolerance_mag) {
+            self.near[pair.observed * radii + pair.radius] += 1.0;
+        }
+        for of_star in self.near.chunks_exact_mut(radii) {
+            for radius in 1..radii {
+                of_star[radius] += of_star[radius - 1];
+            }
         }
     }
 
-    /// The probability that chance puts a predicted star that is alike within `radius_px` of an observed one.
-    fn chance(&self, observed: usize, frame_px: f64, radius_px: f64) -> f64 {
-        // Less the one that may be its match: what counts is how many others chance could have put there.
-        let crowd = (self.near[observed] - 1.0) / NEIGHBOURHOOD.powi(2);
-        let strewn = self.alike[observed] * PI * radius_px * radius_px / frame_px;
-        strewn.max(crowd).min(1.0)
+    /// The test of so many `hits` within one radius: the chance of each observed star, and what they amount to at the least.
+    ///
+    /// The probability P of just as many hits is the product of all 1 − p, times the sum over all subsets of the
+    /// product of their p / (1 − p). The sum is no less than if all p were their geometric mean (Maclaurin's inequality), and
+    /// ln(1 − p) no less than −p − p² for p below 0.68.
+    fn test(&mut self, radius: usize, hits: usize, tested: &Tested) -> Test {
+        let (radius_px, radii) = (self.radii_px[radius], self.radii_px.len());
+        let frame_px = tested.field.width_px * tested.field.height_px;
+        let ln_disc = (PI * radius_px * radius_px / frame_px).ln();
+        let chances = self.chances.len();
+        let (mut ln_sum, mut lost, mut possible, mut largest) = (0.0, 0.0, 0, 0.0_f64);
+        for (of_star, &(alike, ln_alike)) in self.near.chunks_exact(radii).zip(&self.alike) {
+            // Less the one that may be its match: what counts is how many others chance could have put there.
+            let crowd = (of_star[radius] - 1.0) / NEIGHBOURHOOD.powi(2);
+            let strewn = alike * PI * radius_px * radius_px / frame_px;
+            let chance = strewn.max(crowd).min(1.0);
+            self.chances.push(chance);
+            if chance > 0.0 {
+                ln_sum += if crowd > strewn {
+                    crowd.ln()
+                } else {
+                    ln_alike + ln_disc
+                };
+                lost += chance + chance * chance;
+                largest = largest.max(chance);
+                possible += 1;
+            }
+        }
+        let counted = possible.min(self.alike.len() - tested.used_up);
+        let at_least_ln = if largest < 0.68 && hits <= counted {
+            ln_binomial(counted, hits) + hits as f64 * ln_sum / possible as f64 - lost
+        } else {
+            f64::NEG_INFINITY
+        };
+        Test {
+            hits,
+            at_least_ln,
+            chances,
+            used_up: tested.used_up,
+        }
     }
-}
 
-/// Pairs what lies within `radius_px` and whose `mag_difference` is tolerable, the most alike first, each star once.
-fn pair_up(
-    observed: &[ObservedStar],
-    predicted: &[PredictedStar],
-    radius: &Radius,
-    mag_difference: impl Fn(&ObservedStar, &PredictedStar) -> Option<f64>,
-) -> Vec<StarMatch> {
-    let mut by_x: Vec<usize> = (0..predicted.len()).collect();
-    by_x.sort_unstable_by(|&a, &b| predicted[a].pixel.x.total_cmp(&predicted[b].pixel.x));
-    let mut close: Vec<(f64, usize, usize)> = Vec::new();
-    for (o, star) in observed.iter().enumerate() {
-        let radius_px = radius.of(star);
-        let first = by_x.partition_point(|&p| predicted[p].pixel.x < star.position.x - radius_px);
-        for &p in &by_x[first..] {
-            let pixel = &predicted[p].pixel;
-            if pixel.x > star.position.x + radius_px {
+    /// log10 of the lowest probability of any test. Those that cannot be lower are left out.
+    fn least_likely(&mut self, observed: usize) -> f64 {
+        self.tests
+            .sort_unstable_by(|a, b| a.at_least_ln.total_cmp(&b.at_least_ln));
+        let mut best: f64 = 0.0;
+        for test in &self.tests {
+            if test.at_least_ln >= best * LN_10 {
                 break;
             }
-            let distance_px = pixel.distance_to(&star.position);
-            if distance_px <= radius_px
-                && let Some(difference) = mag_difference(star, &predicted[p])
-            {
-                // Nearness counts in pixels: a star of which little is known takes none from one of which much is.
-                let apart = distance_px / radius.common_px;
-                close.push((apart * apart + difference * difference, o, p));
+            let chances = &mut self.chances[test.chances..test.chances + observed];
+            // Those that agree by construction count as the least likely ones.
+            chances.sort_unstable_by(f64::total_cmp);
+            let counted = &chances[test.used_up..];
+            best = best.min(log10_poisson_binomial_tail(
+                counted,
+                test.hits,
+                &mut self.tail,
+            ));
+        }
+        best
+    }
+}
+
+/// Observed stars with a predicted star of their own within a growing radius.
+struct Hits {
+    observed_taken: Vec<bool>,
+    predicted_taken: Vec<bool>,
+    count: usize,
+    /// Pairs looked at.
+    done: usize,
+}
+
+impl Hits {
+    /// None yet, in the buffers of `from`.
+    fn new(from: &mut FalseAlarm, observed: usize) -> Self {
+        let cleared = |mut taken: Vec<bool>, count: usize| {
+            taken.clear();
+            taken.resize(count, false);
+            taken
+        };
+        Self {
+            observed_taken: cleared(std::mem::take(&mut from.observed_taken), observed),
+            predicted_taken: cleared(
+                std::mem::take(&mut from.predicted_taken),
+                from.predicted.len(),
+            ),
+            count: 0,
+            done: 0,
+        }
+    }
+
+    /// How many there are within `radius_px`, which must not be smaller than before; `pairs` are the closest first.
+    fn within(&mut self, radius_px: f64, tolerance_mag: f64, pairs: &[NearPair]) -> usize {
+        while let Some(pair) = pairs.get(self.done).filter(|p| p.apart_px <= radius_px) {
+            let (o, p) = (pair.observed, pair.predicted);
+            let is_alike = pair.mag <= tolerance_mag;
+            if is_alike && !self.observed_taken[o] && !self.predicted_taken[p] {
+                self.observed_taken[o] = true;
+                self.predicted_taken[p] = true;
+                self.count += 1;
             }
+            self.done += 1;
         }
+        self.count
     }
-    close.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-    let mut observed_taken = vec![false; observed.len()];
-    let mut predicted_taken = vec![false; predicted.len()];
-    let mut pairs = Vec::new();
-    for (_, o, p) in close {
-        if !observed_taken[o] && !predicted_taken[p] {
-            observed_taken[o] = true;
-            predicted_taken[p] = true;
-            pairs.push(StarMatch {
-                observed: o,
-                catalog: predicted[p].catalog,
-                residual_px: predicted[p].pixel.distance_to(&observed[o].position),
-            });
-        }
-    }
-    pairs.sort_unstable_by_key(|pair| pair.observed);
-    pairs
+}
+
+/// ln of the number of ways to choose `some` of `all`.
+fn ln_binomial(all: usize, some: usize) -> f64 {
+    let ln_factorial = |n: usize| libm::lgamma(n as f64 + 1.0);
+    ln_factorial(all) - ln_factorial(some) - ln_factorial(all - some)
 }
 
 /// What the chance of one hypothesis is multiplied by when it is the last of so many.
@@ -474,9 +726,9 @@ mod tests {
             v_mag: 0.0,
             catalog: x as usize,
         });
-        let pairs = pair_up(&observed, &predicted, &Radius::common(4.0), |_, _| {
-            Some(0.0)
-        });
+        let mut pairs = Vec::new();
+        let stars = (&observed[..], &predicted[..]);
+        Pairing::default().pair_up(stars, &Radius::common(4.0), |_, _| Some(0.0), &mut pairs);
         let found: Vec<(usize, usize)> = pairs.iter().map(|p| (p.observed, p.catalog)).collect();
         assert_eq!(found, [(0, 10), (1, 12)]);
     }

@@ -42,24 +42,68 @@ pub(super) struct Association {
     pub chance: f64,
 }
 
-/// Numbered places, by x.
-struct ByX(Vec<(PixelPoint, usize)>);
+/// Numbered places, by the square of the frame that they lie in.
+struct Places {
+    columns: usize,
+    rows: usize,
+    /// `starts[s]..starts[s + 1]` of `places` are those in square `s`.
+    starts: Vec<u32>,
+    places: Vec<(PixelPoint, usize)>,
+}
 
-impl ByX {
-    fn new(places: impl Iterator<Item = (PixelPoint, usize)>) -> Self {
-        let mut places: Vec<_> = places.collect();
-        places.sort_unstable_by(|a, b| a.0.x.total_cmp(&b.0.x).then(a.1.cmp(&b.1)));
-        Self(places)
+/// Side of a square, in pixels: a few times a typical radius.
+const SQUARE_PX: f64 = 16.0;
+
+impl Places {
+    /// Those of a frame of this size; what lies beside it counts to the squares at its border.
+    fn new((width_px, height_px): (f64, f64), places: &[(PixelPoint, usize)]) -> Self {
+        let count = |extent_px: f64| (extent_px / SQUARE_PX).ceil().max(1.0) as usize;
+        let mut sorted = Self {
+            columns: count(width_px),
+            rows: count(height_px),
+            starts: Vec::new(),
+            places: places.to_vec(),
+        };
+        sorted.starts.resize(sorted.columns * sorted.rows + 1, 0);
+        for (place, _) in places {
+            let square = sorted.square_of(*place);
+            sorted.starts[square] += 1;
+        }
+        let mut end = 0;
+        for start in &mut sorted.starts {
+            end += *start;
+            *start = end;
+        }
+        // From the last, so that those of a square stay in their order.
+        for numbered in places.iter().rev() {
+            let square = sorted.square_of(numbered.0);
+            sorted.starts[square] -= 1;
+            sorted.places[sorted.starts[square] as usize] = *numbered;
+        }
+        sorted
+    }
+
+    fn square_of(&self, place: PixelPoint) -> usize {
+        let [column, row] = self.column_and_row(place.x, place.y);
+        row * self.columns + column
+    }
+
+    fn column_and_row(&self, x: f64, y: f64) -> [usize; 2] {
+        let along =
+            |at_px: f64, count: usize| ((at_px / SQUARE_PX).max(0.0) as usize).min(count - 1);
+        [along(x, self.columns), along(y, self.rows)]
     }
 
     /// Those within `radius_px` of `centre`, with their distances.
     fn within(&self, centre: PixelPoint, radius_px: f64) -> impl Iterator<Item = (usize, f64)> {
-        let first = self
-            .0
-            .partition_point(|(place, _)| place.x < centre.x - radius_px);
-        self.0[first..]
-            .iter()
-            .take_while(move |(place, _)| place.x <= centre.x + radius_px)
+        let [left, top] = self.column_and_row(centre.x - radius_px, centre.y - radius_px);
+        let [right, bottom] = self.column_and_row(centre.x + radius_px, centre.y + radius_px);
+        (top..=bottom)
+            .flat_map(move |row| {
+                let first = row * self.columns;
+                let range = self.starts[first + left]..self.starts[first + right + 1];
+                &self.places[range.start as usize..range.end as usize]
+            })
             .map(move |(place, number)| (*number, place.distance_to(&centre)))
             .filter(move |(_, distance_px)| *distance_px <= radius_px)
     }
@@ -81,9 +125,11 @@ pub(super) fn associate(frame: &MeasuredFrame, predicted: &[PredictedStar]) -> A
         .iter()
         .zip(0..)
         .filter(|(source, _)| source.flags.is_star_like() && source.flux_adu > 0.0);
-    let detections = ByX::new(star_like.map(|(source, i)| (source.position, i)));
-    let neighbours = ByX::new(predicted.iter().map(|star| star.pixel).zip(0..));
+    let star_like: Vec<_> = star_like.map(|(source, i)| (source.position, i)).collect();
+    let all: Vec<_> = predicted.iter().map(|star| star.pixel).zip(0..).collect();
     let camera = &frame.identification.camera;
+    let size_px = (camera.width_px, camera.height_px);
+    let (detections, neighbours) = (Places::new(size_px, &star_like), Places::new(size_px, &all));
     let mut claimed = vec![false; sources.len()];
     let mut stars = Vec::with_capacity(predicted.len());
     for (index, star) in predicted.iter().enumerate() {
@@ -108,7 +154,7 @@ pub(super) fn associate(frame: &MeasuredFrame, predicted: &[PredictedStar]) -> A
             is_clear: is_alone && camera.nearly_contains(&star.pixel, -apart_px),
         });
     }
-    let unclaimed = detections.0.iter().filter(|(_, i)| !claimed[*i]);
+    let unclaimed = star_like.iter().filter(|(_, i)| !claimed[*i]);
     let reach_area_px: f64 = unclaimed
         .map(|&(_, i)| PI * reach_px(&sources[i]).powi(2))
         .sum();

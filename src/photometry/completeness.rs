@@ -21,7 +21,7 @@
 //! # Reference
 //! Probit regression with a guessing and a lapse rate: Wichmann & Hill 2001, Percept. Psychophys. 63, 1293.
 
-use crate::statistics::{normal_cdf, normal_density};
+use crate::statistics::normal_cdf_and_density;
 use nalgebra::{Matrix3, Vector3};
 
 /// Where the prior of the width has its middle, in magnitudes.
@@ -124,11 +124,13 @@ fn bins(trials: &[Trial]) -> Vec<Bin> {
     };
     let bin = |offset: usize| {
         let place = first + offset as f64;
-        let in_it = trials.iter().filter(|trial| step(trial) == place);
+        let from = trials.partition_point(|trial| step(trial) < place);
+        let to = trials.partition_point(|trial| step(trial) <= place);
+        let in_it = &trials[from..to];
         Bin {
             v_mag: (place + 0.5) * BIN_MAG,
-            stars: in_it.clone().count(),
-            detected: in_it.filter(|trial| trial.detected).count(),
+            stars: in_it.len(),
+            detected: in_it.iter().filter(|trial| trial.detected).count(),
         }
     };
     (0..=(last - first) as usize).map(bin).collect()
@@ -254,7 +256,7 @@ impl Curve {
         };
         let full = 1.0 - self.chance - lost;
         let mut add = |z: f64, detected: bool, count: usize| {
-            let (above, density) = (normal_cdf(z), normal_density(z));
+            let (above, density) = normal_cdf_and_density(z);
             let p = (self.chance + full * above).clamp(1e-12, 1.0 - 1e-12);
             let change = Vector3::new(
                 full * density / width,
@@ -311,6 +313,7 @@ fn best_step(trials: &[Trial]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::statistics::normal_cdf;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 

@@ -145,19 +145,19 @@ impl Relation {
         );
         let mut coefficients = DVector::zeros(parameters);
         coefficients[0] = median(&mut offsets.iter().copied().collect::<Vec<f64>>());
-        let mut weighing = Weighing::new(stars, &(&offsets - &columns * &coefficients), parameters);
+        let mut weighing = Weighing::new(stars, parameters);
+        let mut residuals = &offsets - &columns * &coefficients;
+        weighing.weigh(stars, &residuals);
         for _ in 0..MAX_ROUNDS {
-            let weighted = DMatrix::from_fn(stars.len(), parameters, |row, column| {
-                weighing.weights[row] * columns[(row, column)]
-            });
-            let normal = weighted.transpose() * &columns;
+            let (normal, vector) = weighing.normal(&columns, &offsets);
             let before = coefficients;
-            coefficients = normal.cholesky()?.solve(&(weighted.transpose() * &offsets));
+            coefficients = normal.cholesky()?.solve(&vector);
             if (&coefficients - before).amax() < SETTLED_MAG {
                 break;
             }
-            let residuals = &offsets - &columns * &coefficients;
-            weighing = Weighing::new(stars, &residuals, parameters);
+            residuals.copy_from(&offsets);
+            residuals.gemv(-1.0, &columns, &coefficients, 1.0);
+            weighing.weigh(stars, &residuals);
         }
         Some(Self {
             terms: terms.to_vec(),
@@ -226,7 +226,12 @@ impl Relation {
 
 /// How much each star counts, from the residuals so far.
 struct Weighing {
+    /// The median variance of the fluxes' noise.
+    typical: f64,
+    /// What a scatter found must be multiplied by, as parameters were fitted.
+    used_up: f64,
     scatter_mag: f64,
+    absolute: Vec<f64>,
     /// 1 / σ², less for outliers.
     weights: Vec<f64>,
     /// Weight times residual, and its derivative.
@@ -235,30 +240,59 @@ struct Weighing {
 }
 
 impl Weighing {
-    fn new(stars: &[MeasuredStar], residuals: &DVector<f64>, parameters: usize) -> Self {
+    fn new(stars: &[MeasuredStar], parameters: usize) -> Self {
         let count = stars.len() as f64;
-        let used_up = count / (count - parameters as f64);
-        let mut absolute: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
-        let scatter_mag = SIGMA_PER_MAD * median(&mut absolute) * used_up.sqrt();
         let mut variances: Vec<f64> = stars.iter().map(|star| star.sigma_mag.powi(2)).collect();
-        let typical = median(&mut variances);
-        let besides = (scatter_mag.powi(2) - typical).max(LEAST_SCATTER_MAG.powi(2));
-        let mut weighing = Self {
-            scatter_mag,
-            weights: Vec::with_capacity(stars.len()),
-            pulls: Vec::with_capacity(stars.len()),
-            curvatures: Vec::with_capacity(stars.len()),
-        };
+        let room = || Vec::with_capacity(stars.len());
+        Self {
+            typical: median(&mut variances),
+            used_up: (count / (count - parameters as f64)).sqrt(),
+            scatter_mag: 0.0,
+            absolute: room(),
+            weights: room(),
+            pulls: room(),
+            curvatures: room(),
+        }
+    }
+
+    /// Weighs the stars by their `residuals`.
+    fn weigh(&mut self, stars: &[MeasuredStar], residuals: &DVector<f64>) {
+        self.absolute.clear();
+        self.absolute.extend(residuals.iter().map(|r| r.abs()));
+        self.scatter_mag = SIGMA_PER_MAD * median(&mut self.absolute) * self.used_up;
+        let besides = (self.scatter_mag.powi(2) - self.typical).max(LEAST_SCATTER_MAG.powi(2));
+        self.weights.clear();
+        self.pulls.clear();
+        self.curvatures.clear();
         for (star, residual) in stars.iter().zip(residuals.iter()) {
             let variance = star.sigma_mag.powi(2) + besides;
             let off_sq = (residual.powi(2) / (BIWEIGHT_SIGMAS.powi(2) * variance)).min(1.0);
             let weight = (1.0 - off_sq).powi(2) / variance;
-            weighing.weights.push(weight);
-            weighing.pulls.push(weight * residual);
+            self.weights.push(weight);
+            self.pulls.push(weight * residual);
             let curvature = (1.0 - off_sq) * (1.0 - 5.0 * off_sq) / variance;
-            weighing.curvatures.push(curvature);
+            self.curvatures.push(curvature);
         }
-        weighing
+    }
+
+    /// The normal equations: matrix and right-hand side.
+    fn normal(
+        &self,
+        columns: &DMatrix<f64>,
+        offsets: &DVector<f64>,
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        let count = columns.ncols();
+        let (mut matrix, mut vector) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        for (row, weight) in self.weights.iter().enumerate() {
+            for i in 0..count {
+                let weighted = weight * columns[(row, i)];
+                vector[i] += weighted * offsets[row];
+                for j in 0..count {
+                    matrix[(i, j)] += weighted * columns[(row, j)];
+                }
+            }
+        }
+        (matrix, vector)
     }
 
     /// The covariance of the coefficients, from the residuals themselves; each is raised by what its own star took of it.

@@ -95,12 +95,12 @@ pub fn camera_of(sensor: &Sensor) -> CameraModel {
         let third = 1.0 / 3.0;
         let second = [x, y * third, 2.0 * third * y, 2.0 * third * x, x * third, y];
         let cubic = [radial, 0.0, 0.0, radial, radial, 0.0, 0.0, radial];
-        let terms = [0.0; 2].into_iter().chain(second).chain(cubic).collect();
-        let distortion = Distortion::new(DistortionModel::Cubic, camera.radius_px(), terms);
+        let terms: Vec<f64> = [0.0; 2].into_iter().chain(second).chain(cubic).collect();
+        let distortion = Distortion::new(DistortionModel::Cubic, camera.radius_px(), &terms);
         camera.distortion = Some(distortion);
     } else if radial != 0.0 {
         let radius_px = camera.radius_px();
-        let distortion = Distortion::new(DistortionModel::Radial, radius_px, vec![radial]);
+        let distortion = Distortion::new(DistortionModel::Radial, radius_px, &[radial]);
         camera.distortion = Some(distortion);
     }
     camera

@@ -35,9 +35,9 @@ pub use summary::{
 
 use crate::comparison::Description;
 use crate::coords::{Camera, Icrs, Rotation};
-use crate::detect::{DetectConfig, DetectError, Workspace};
+use crate::detect::{DetectConfig, DetectError};
 use crate::frame::{Frame, FrameError};
-use crate::pipeline::{Pipeline, Solution, SolveConfig};
+use crate::pipeline::{Pipeline, Solution, SolveConfig, Workspace};
 use crate::robustness::random_rotation;
 use crate::sensitivity::{Budget, Detector, Rule, ScenarioError};
 use crate::simulate::{Pointing, Setup, Simulator, Truth};

@@ -4,7 +4,7 @@ mod figure;
 
 use super::args::{Format, MirroredArg, ProtocolArgs, RobustnessArgs};
 use super::output::{csv_table, json_lines, print, write_whole};
-use super::resources::{bar, read_catalog, sky, thread_pool};
+use super::resources::{bar, read_catalog, sky, thread_pool, warn_of};
 use super::{Exit, Fault};
 use anyhow::Context;
 use figure::Rates;
@@ -101,6 +101,7 @@ fn rows(arguments: &RobustnessArgs) -> Result<Vec<SweptRow>, Fault> {
     };
     let rows = cases.into_iter().map(row).collect();
     progress.finish_and_clear();
+    warn_of(sky.take_troubles());
     Ok(rows)
 }
 

@@ -8,7 +8,7 @@ use crate::cli::batch::for_each_ordered;
 use crate::cli::output::write_whole;
 use anyhow::Context;
 use serde::Serialize;
-use starpipe::detect::Workspace;
+use starpipe::pipeline::Workspace;
 use starpipe::validation::{Accumulator, Protocol, RunFacts, Summary, ValidationError, Validator};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

@@ -1,0 +1,120 @@
+//! starpipe's side of `scripts/bench-peers`: orders come line by line as JSON, and each is answered with a line.
+//!
+//! usage: `bench_worker FROM:TO`, the range of horizontal fields in degrees.
+
+use serde_json::{Value, json};
+use starpipe::catalog::Catalog;
+use starpipe::detect::{self, DetectConfig, Detections, detect_into};
+use starpipe::frame::{self, Frame};
+use starpipe::identify::{self, Hints, Identification, Sky};
+use starpipe::pipeline::star_field;
+use std::error::Error;
+use std::io::{BufRead, Write};
+use std::path::Path;
+use std::time::Instant;
+
+const ARCSEC_PER_RAD: f64 = 206_264.806;
+
+/// What is timed, and the room it works in.
+struct Bench<'a> {
+    sky: Sky<'a>,
+    fields_deg: (f64, f64),
+    frame: Frame,
+    detect: detect::Workspace,
+    identify: identify::Workspace,
+    /// Of the frame that is loaded.
+    known: Detections,
+    found: Detections,
+}
+
+impl Bench<'_> {
+    fn load(&mut self, path: &str) -> Result<Value, Box<dyn Error>> {
+        self.frame = frame::read(Path::new(path))?;
+        self.extract()?;
+        self.known = self.found.clone();
+        Ok(json!({}))
+    }
+
+    fn extract(&mut self) -> Result<f64, Box<dyn Error>> {
+        let start = Instant::now();
+        let config = DetectConfig::default();
+        detect_into(&self.frame, &config, &mut self.detect, &mut self.found)?;
+        Ok(milliseconds(start))
+    }
+
+    fn hints(&self, is_known: bool) -> Hints {
+        let half_width = 0.5 * self.frame.width as f64;
+        let scale_rad = |fov_deg: f64| (0.5 * fov_deg.to_radians()).tan() / half_width;
+        let (from, to) = self.fields_deg;
+        Hints {
+            pixel_scale_rad: is_known.then(|| (scale_rad(from), scale_rad(to))),
+            near: None,
+        }
+    }
+
+    /// Identifies the stars of the frame that is loaded, or of what was just found.
+    fn solve(&mut self, is_known: bool, is_fresh: bool) -> (f64, Option<&Identification>) {
+        let hints = self.hints(is_known);
+        let start = Instant::now();
+        let detections = if is_fresh { &self.found } else { &self.known };
+        let (field, _) = star_field(&self.frame, detections, 0.0);
+        let answer = self.identify.identify(&field, &hints, &self.sky);
+        (milliseconds(start), answer.ok())
+    }
+
+    fn answer(&mut self, order: &Value) -> Result<Value, Box<dyn Error>> {
+        let is_known = order["known"] == true;
+        match order["do"].as_str().unwrap_or_default() {
+            "load" => self.load(order["path"].as_str().unwrap_or_default()),
+            "extract" => {
+                let ms = self.extract()?;
+                Ok(json!({"ms": ms, "found": self.found.sources.len()}))
+            }
+            "solve" => {
+                let (ms, found) = self.solve(is_known, false);
+                Ok(told(ms, found))
+            }
+            "whole" => {
+                let extract_ms = self.extract()?;
+                let (ms, found) = self.solve(is_known, true);
+                Ok(told(extract_ms + ms, found))
+            }
+            other => Err(format!("no such order: {other:?}").into()),
+        }
+    }
+}
+
+fn told(ms: f64, found: Option<&Identification>) -> Value {
+    let arcsec =
+        |found: &Identification| found.rms_px / found.camera.focal_length_px * ARCSEC_PER_RAD;
+    json!({
+        "ms": ms,
+        "solved": found.is_some(),
+        "matches": found.map(|found| found.matches.len()),
+        "rms_arcsec": found.map(arcsec),
+    })
+}
+
+fn milliseconds(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let range = std::env::args().nth(1).unwrap_or_default();
+    let (from, to) = range.split_once(':').ok_or("usage: bench_worker FROM:TO")?;
+    let mut bench = Bench {
+        sky: Sky::build(Catalog::built_in(), &|_| {}),
+        fields_deg: (from.parse()?, to.parse()?),
+        frame: Frame::new(3, 3, vec![0.0; 9])?,
+        detect: detect::Workspace::new(),
+        identify: identify::Workspace::new(),
+        known: Detections::default(),
+        found: Detections::default(),
+    };
+    for line in std::io::stdin().lock().lines() {
+        let answer = bench.answer(&serde_json::from_str(&line?)?)?;
+        println!("{answer}");
+        std::io::stdout().flush()?;
+    }
+    Ok(())
+}

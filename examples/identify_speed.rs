@@ -1,0 +1,159 @@
+//! How long identification takes, over simulated fields of 2° to 40° and over frames named on the command line:
+//! `cargo run --release --example identify_speed -- [FIELDS] [FRAME ...]`
+//!
+//! Each field is identified with nothing known, and with its scale known to a factor of two; the least time of several
+//! counts, so that other work on the machine does not: of five, or as many as the variable REPEATS says.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use starpipe::camera::CameraModel;
+use starpipe::catalog::Catalog;
+use starpipe::detect::{self, DetectConfig, detect};
+use starpipe::identify::{Hints, Identification, Sky, StarField, Workspace};
+use starpipe::pipeline::star_field;
+use starpipe::robustness::{Answer, Observation, Protocol};
+use std::error::Error;
+use std::f64::consts::SQRT_2;
+use std::time::Instant;
+
+const FIELDS: u64 = 500;
+const FOV_DEG: (f64, f64) = (2.0, 40.0);
+/// Where the environment does not say how often each field is identified.
+const REPEATS: usize = 5;
+
+/// Milliseconds of each field, and what became of them.
+struct Times {
+    workspace: Workspace,
+    repeats: usize,
+    least_ms: Vec<f64>,
+    right: usize,
+    wrong: usize,
+}
+
+impl Times {
+    fn new() -> Self {
+        let asked = std::env::var("REPEATS").ok();
+        Self {
+            workspace: Workspace::new(),
+            repeats: asked.and_then(|text| text.parse().ok()).unwrap_or(REPEATS),
+            least_ms: Vec::new(),
+            right: 0,
+            wrong: 0,
+        }
+    }
+
+    fn add(&mut self, field: &StarField, hints: &Hints, sky: &Sky) -> Option<Identification> {
+        let mut least_ms = f64::MAX;
+        let mut found = None;
+        for _ in 0..self.repeats.max(1) {
+            let start = Instant::now();
+            let answer = self.workspace.identify(field, hints, sky);
+            least_ms = least_ms.min(start.elapsed().as_secs_f64() * 1e3);
+            found = answer.ok().cloned();
+        }
+        self.least_ms.push(least_ms);
+        found
+    }
+
+    fn judge(&mut self, answer: Answer) {
+        self.right += usize::from(answer == Answer::Right);
+        self.wrong += usize::from(answer == Answer::Wrong);
+    }
+
+    fn print(mut self, name: &str) {
+        self.least_ms.sort_by(f64::total_cmp);
+        let count = self.least_ms.len();
+        let at = |share: f64| self.least_ms[(share * (count - 1) as f64).round() as usize];
+        println!(
+            "{name:16} {count:4} fields: {:4} right, {} wrong; median {:7.3} ms, 90 % {:7.3}, 99 % {:7.3}, worst {:7.3}",
+            self.right,
+            self.wrong,
+            at(0.5),
+            at(0.9),
+            at(0.99),
+            at(1.0)
+        );
+    }
+}
+
+/// What it takes to know the scale of `camera` to a factor of two in all.
+fn factor_of_two(camera: &CameraModel) -> Hints {
+    let scale_rad = 1.0 / camera.focal_length_px;
+    Hints {
+        pixel_scale_rad: Some((scale_rad / SQRT_2, scale_rad * SQRT_2)),
+        near: None,
+    }
+}
+
+/// Fields of view spread evenly over the logarithm.
+fn simulated(fields: u64, sky: &Sky) {
+    if fields == 0 {
+        return;
+    }
+    let (mut nothing, mut factor) = (Times::new(), Times::new());
+    for number in 0..fields {
+        let place = (number as f64 + 0.5) / fields as f64;
+        let fov_deg = FOV_DEG.0 * (FOV_DEG.1 / FOV_DEG.0).powf(place);
+        let protocol = Protocol {
+            fov_deg,
+            ..Protocol::default()
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(number);
+        let drawn = Observation::draw(&protocol, sky, &mut random);
+        let field = drawn.list.star_field(0.0);
+        for (times, hints) in [
+            (&mut nothing, Hints::default()),
+            (&mut factor, factor_of_two(&drawn.camera)),
+        ] {
+            if let Some(found) = times.add(&field, &hints, sky) {
+                times.judge(Answer::of(&found, &drawn.camera, &drawn.icrs_to_camera));
+            }
+        }
+    }
+    nothing.print("nothing known");
+    factor.print("factor of two");
+}
+
+/// What is found with nothing known has to be found again; it also tells the scale.
+fn real(frames: &[String], sky: &Sky) -> Result<(), Box<dyn Error>> {
+    for path in frames {
+        let frame = starpipe::frame::read(path)?;
+        let detections = detect(
+            &frame,
+            &DetectConfig::default(),
+            &mut detect::Workspace::new(),
+        )?;
+        let (field, _) = star_field(&frame, &detections, 0.0);
+        let mut nothing = Times::new();
+        let found = nothing.add(&field, &Hints::default(), sky);
+        println!("{path}: {} stars", field.stars.len());
+        if let Some(found) = found {
+            let truth = (&found.camera, &found.icrs_to_camera);
+            nothing.judge(Answer::of(&found, truth.0, truth.1));
+            let mut factor = Times::new();
+            let hints = factor_of_two(&found.camera);
+            if let Some(again) = factor.add(&field, &hints, sky) {
+                factor.judge(Answer::of(&again, truth.0, truth.1));
+            }
+            nothing.print("nothing known");
+            factor.print("factor of two");
+        } else {
+            nothing.print("nothing known");
+        }
+    }
+    Ok(())
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments: Vec<String> = std::env::args().skip(1).collect();
+    let fields = match arguments.first().map(|first| first.parse()) {
+        Some(Ok(fields)) => {
+            arguments.remove(0);
+            fields
+        }
+        _ => FIELDS,
+    };
+    let sky = Sky::build(Catalog::built_in(), &|_| {});
+    simulated(fields, &sky);
+    real(&arguments, &sky)
+}

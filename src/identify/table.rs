@@ -1,0 +1,162 @@
+//! Triangles of about one size, by their shape.
+//!
+//! The plane of the two ratios is cut into rows and columns. The triangles of a cell stand together, and the cells of a row:
+//! what is like a given shape lies in a few stretches. A chunk, which is a part of a row, is made or read when it is first looked at.
+
+use std::ops::RangeInclusive;
+use std::sync::OnceLock;
+
+/// Rows, over the middle side's ratio from [`LEAST_MIDDLE_RATIO`] to 1, and columns, over the shortest side's from 0 to 1.
+const ROWS: usize = 128;
+const COLUMNS: usize = 256;
+/// Neighbouring cells of a row that make a chunk.
+const CELLS_PER_CHUNK: usize = 32;
+pub const CELLS: usize = ROWS * COLUMNS;
+pub const CHUNKS: usize = CELLS / CELLS_PER_CHUNK;
+/// No middle side is less than half of the longest.
+const LEAST_MIDDLE_RATIO: f64 = 0.5;
+/// Ratios are kept in steps of this: a hundredth of the least tolerance.
+const RATIO_STEP: f64 = 1.0 / 65536.0;
+
+/// One triangle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Triangle {
+    /// Corners A, B, C, as indices into the catalogue's stars.
+    pub corners: [u32; 3],
+    /// Middle and shortest side over the longest, in [`RATIO_STEP`].
+    pub ratios: [u16; 2],
+}
+
+impl Triangle {
+    /// Of these corners, with these ratios.
+    pub fn new(corners: [u32; 3], ratios: [f64; 2]) -> Self {
+        Self {
+            corners,
+            ratios: ratios.map(steps),
+        }
+    }
+
+    fn cell(&self) -> usize {
+        let [middle, shortest] = self.ratios.map(ratio);
+        row_of(middle) * COLUMNS + column_of(shortest)
+    }
+}
+
+fn steps(ratio: f64) -> u16 {
+    (ratio / RATIO_STEP).round() as u16
+}
+
+fn ratio(steps: u16) -> f64 {
+    f64::from(steps) * RATIO_STEP
+}
+
+fn row_of(middle: f64) -> usize {
+    let place = (middle - LEAST_MIDDLE_RATIO) / (1.0 - LEAST_MIDDLE_RATIO);
+    ((place.max(0.0) * ROWS as f64) as usize).min(ROWS - 1)
+}
+
+fn column_of(shortest: f64) -> usize {
+    ((shortest.max(0.0) * COLUMNS as f64) as usize).min(COLUMNS - 1)
+}
+
+/// The triangles whose longest sides are alike.
+#[derive(Debug)]
+pub struct SizeClass {
+    /// Smallest longest side, as a chord.
+    pub low: f64,
+    /// Largest longest side, as a chord.
+    pub high: f64,
+    /// `cell_starts[c]..cell_starts[c + 1]` are the triangles of cell `c`, row after row.
+    pub cell_starts: Vec<u32>,
+    /// The triangles of each chunk, once they are needed.
+    pub chunks: Vec<OnceLock<Box<[Triangle]>>>,
+}
+
+impl SizeClass {
+    /// The class of `triangles`, whose longest sides are from `low` to `high`, as chords.
+    pub fn new((low, high): (f64, f64), triangles: &[Triangle]) -> Self {
+        let mut cell_starts = vec![0u32; CELLS + 1];
+        for triangle in triangles {
+            cell_starts[triangle.cell() + 1] += 1;
+        }
+        for cell in 1..cell_starts.len() {
+            cell_starts[cell] += cell_starts[cell - 1];
+        }
+        // A counting sort: stable, and so the same on any number of threads.
+        let mut next = cell_starts.clone();
+        let mut sorted = triangles.to_vec();
+        for triangle in triangles {
+            let place = &mut next[triangle.cell()];
+            sorted[*place as usize] = *triangle;
+            *place += 1;
+        }
+        let class = Self::not_read((low, high), cell_starts);
+        for (chunk, slot) in class.chunks.iter().enumerate() {
+            let range = class.range(chunk);
+            let _ = slot.set(sorted[range.start as usize..range.end as usize].into());
+        }
+        class
+    }
+
+    /// A class of which no chunk is there yet.
+    pub fn not_read((low, high): (f64, f64), cell_starts: Vec<u32>) -> Self {
+        Self {
+            low,
+            high,
+            cell_starts,
+            chunks: (0..CHUNKS).map(|_| OnceLock::new()).collect(),
+        }
+    }
+
+    /// Number of triangles.
+    pub fn len(&self) -> usize {
+        self.cell_starts.last().map_or(0, |end| *end as usize)
+    }
+
+    /// Which of the class's triangles are those of a chunk.
+    pub fn range(&self, chunk: usize) -> std::ops::Range<u32> {
+        let [from, to] = [chunk, chunk + 1].map(|chunk| self.cell_starts[chunk * CELLS_PER_CHUNK]);
+        from..to
+    }
+
+    /// Calls `visit` with the corners of every triangle whose ratios lie within `tolerance` of `ratios`, in an order that depends on
+    /// nothing but the arguments; `chunk` gives the triangles of a chunk.
+    #[inline]
+    pub fn for_each_similar<'a>(
+        &self,
+        ratios: [f64; 2],
+        tolerance: f64,
+        chunk: impl Fn(usize) -> &'a [Triangle],
+        mut visit: impl FnMut(&[u32; 3]),
+    ) {
+        let [middle, shortest] = ratios;
+        let columns = span(column_of, shortest, tolerance);
+        let within = tolerance / RATIO_STEP;
+        let wanted = ratios.map(|ratio| (ratio / RATIO_STEP) as f32);
+        let within_sq = (within * within) as f32;
+        for row in span(row_of, middle, tolerance) {
+            let [first, last] = [columns.start(), columns.end()].map(|c| row * COLUMNS + c);
+            for number in first / CELLS_PER_CHUNK..=last / CELLS_PER_CHUNK {
+                let cells = number * CELLS_PER_CHUNK..(number + 1) * CELLS_PER_CHUNK;
+                let [before, from, to] =
+                    [cells.start, first.max(cells.start), cells.end.min(last + 1)]
+                        .map(|cell| self.cell_starts[cell] as usize);
+                if from == to {
+                    continue;
+                }
+                for triangle in &chunk(number)[from - before..to - before] {
+                    let off = [0, 1].map(|i| f32::from(triangle.ratios[i]) - wanted[i]);
+                    if off[0] * off[0] + off[1] * off[1] <= within_sq {
+                        visit(&triangle.corners);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Half a step more: ratios are rounded.
+fn span(of: fn(f64) -> usize, centre: f64, tolerance: f64) -> RangeInclusive<usize> {
+    let reach = tolerance + RATIO_STEP;
+    of(centre - reach)..=of(centre + reach)
+}

@@ -1,0 +1,114 @@
+//! Identification allocates nothing once its workspace has seen a field: counted by an allocator that counts.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+#![allow(
+    unsafe_code,
+    reason = "an allocator is unsafe to write; this one hands everything on to the system's"
+)]
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use starpipe::catalog::Catalog;
+use starpipe::identify::{Hints, Reason, Sky, StarField, Workspace};
+use starpipe::robustness::{Observation, Protocol};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+struct Counting;
+
+thread_local! {
+    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+}
+
+fn count() {
+    // The thread may be at its end.
+    let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
+}
+
+// SAFETY: every call goes to the system's allocator as it is; counting allocates nothing.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: the caller keeps to the contract of `alloc`, which is the system allocator's.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        // SAFETY: as above.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations(work: impl FnOnce()) -> usize {
+    let before = ALLOCATIONS.with(Cell::get);
+    work();
+    ALLOCATIONS.with(Cell::get) - before
+}
+
+/// Fields of several widths; the last is none at all.
+fn fields(sky: &Sky) -> Vec<StarField> {
+    let draw = |(seed, fov_deg): (u64, f64)| {
+        let protocol = Protocol {
+            fov_deg,
+            mean_stars: 60.0,
+            ..Protocol::default()
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut field = Observation::draw(&protocol, sky, &mut random)
+            .list
+            .star_field(0.0);
+        // Where the spot is known, blends are looked for.
+        field.spot_sigma_px = Some(1.5);
+        field
+    };
+    let mut fields: Vec<StarField> = (1..).zip([4.0, 10.0, 20.0, 35.0]).map(draw).collect();
+    let mut strewn = fields[0].clone();
+    for (number, star) in strewn.stars.iter_mut().enumerate() {
+        star.position.x = (number * 379 % 1021) as f64;
+        star.position.y = (number * 733 % 1019) as f64;
+    }
+    fields.push(strewn);
+    fields
+}
+
+#[test]
+fn the_counter_counts() {
+    assert_eq!(allocations(|| drop(std::hint::black_box(Box::new(7)))), 1);
+    assert_eq!(allocations(|| ()), 0);
+}
+
+#[test]
+fn a_field_in_steady_state_allocates_nothing() {
+    let sky = Sky::build(Catalog::built_in(), &|_| ());
+    let fields = fields(&sky);
+    let mut workspace = Workspace::new();
+    let mut run = |field: &StarField| match workspace.identify(field, &Hints::default(), &sky) {
+        Ok(found) => Some(found.matches.len()),
+        Err(reason) => {
+            assert!(matches!(reason, Reason::NoMatch { .. }), "{reason:?}");
+            None
+        }
+    };
+    let first: Vec<_> = fields.iter().map(&mut run).collect();
+    assert!(
+        first[..4]
+            .iter()
+            .all(|found| found.is_some_and(|stars| stars > 20))
+    );
+    assert_eq!(first[4], None);
+    for (field, expected) in fields.iter().zip(first) {
+        let mut found = None;
+        let count = allocations(|| found = run(field));
+        assert_eq!(found, expected);
+        assert_eq!(count, 0);
+    }
+}
