@@ -8,6 +8,7 @@ pub mod catalog;
 pub mod comparison;
 pub mod coords;
 pub mod darks;
+pub mod defocus;
 pub mod detect;
 pub mod diagnosis;
 pub mod epoch;

@@ -118,6 +118,18 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("darks", &["statistics", "frame", "report"]),
     ("flats", &["darks", "frame", "report"]),
     (
+        "defocus",
+        &[
+            "coords",
+            "frame",
+            "sensor",
+            "detect",
+            "sensitivity",
+            "simulate",
+            "statistics",
+        ],
+    ),
+    (
         "robustness",
         &[
             "units",

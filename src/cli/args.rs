@@ -1,10 +1,11 @@
 //! The command line as it is typed.
 
+use super::defocus::DefocusArgs;
 use super::limit::ParameterArgs;
+use super::plot::FigureForm;
 use super::plot::PlotFile;
 use super::setup::SetupArgs;
 use super::simulate::ImageKind;
-use super::validate::FigureForm;
 use super::values;
 use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
@@ -116,6 +117,18 @@ pub(crate) enum Command {
         A run may be ended at any time, with Ctrl-C as well: the same command goes on where it stopped, one with more\n\
         --frames makes it longer, and what comes of it is the same to the last byte on any number of threads.")]
     Validate(Box<ValidateArgs>),
+    /// Find the spot radius with the best centroids, and how far to defocus for it
+    #[command(after_help = "Examples:\n  \
+        starpipe defocus --camera camera.toml --vmag 6 --required-error 0.05 --darks 'darks/*.tif'\n  \
+        starpipe defocus --preset nanosat-tracker --vmag 4,5,6 --centroid grey-weighted --out defocus\n  \
+        starpipe defocus --normalisation peak --trials 1000 --out defocus\n\n\
+        The radius is the standard deviation of the spot, the error the root mean square of the distance between \
+        centroid and truth. With --normalisation peak it is the experiment of Wang et al., Laser & Optoelectronics Progress \
+        56, 101101 (2019), where all spots have the same brightest pixel; with energy a star has the light it has. The \
+        two have different answers.\n\n\
+        Exit status: 0 done, 1 something could not be read or written, 2 the command line is wrong,\n\
+        3 no radius meets a required error.")]
+    Defocus(Box<DefocusArgs>),
     /// Measure noise, pattern, dark current and hot pixels on frames taken without light
     #[command(after_help = "Examples:\n  \
         starpipe darks darks/\n  \

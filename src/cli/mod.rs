@@ -6,6 +6,7 @@ mod cache;
 mod camera;
 mod centroids;
 mod darks;
+mod defocus;
 mod experiment;
 mod flats;
 mod import;
@@ -39,6 +40,8 @@ pub(crate) enum Exit {
     Failure,
     /// Everything was read, but some frame was not identified.
     NotIdentified,
+    /// All was done, but there is nothing that meets what is required.
+    Unmet,
 }
 
 impl From<Exit> for ExitCode {
@@ -47,7 +50,7 @@ impl From<Exit> for ExitCode {
             Exit::Success => 0,
             Exit::Failure => 1,
             // clap leaves with 2 where the command line is wrong.
-            Exit::NotIdentified => 3,
+            Exit::NotIdentified | Exit::Unmet => 3,
         })
     }
 }
@@ -77,6 +80,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Robustness(arguments) => robustness::robustness(&arguments),
         Command::Limit(arguments) => limit::limit(&arguments),
         Command::Camera(arguments) => camera::camera(&arguments),
+        Command::Defocus(arguments) => defocus::defocus(&arguments),
         Command::Darks(arguments) => darks::darks(arguments),
         Command::Flats(arguments) => flats::flats(arguments),
         Command::Experiment(arguments) => experiment::experiment(&arguments),

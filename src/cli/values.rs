@@ -48,6 +48,16 @@ pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
     within(text, "the number", |v| v >= 0.0, "0 or above")
 }
 
+/// A number above zero, one at most.
+pub(crate) fn share(text: &str) -> Result<f64, String> {
+    within(
+        text,
+        "the part",
+        |v| v > 0.0 && v <= 1.0,
+        "above 0 and at most 1",
+    )
+}
+
 /// A right ascension in degrees.
 pub(crate) fn right_ascension(text: &str) -> Result<f64, String> {
     let limits = "from 0 to 360 degrees";
@@ -133,42 +143,57 @@ impl FromStr for LimitSweep {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        let (name, steps) = named_steps(text)?;
         let Steps {
-            name,
             ends,
             count,
             spacing,
-        } = Steps::of(text)?;
+        } = steps;
         sensitivity::Sweep::new(&name, ends, count, spacing)
             .map(Self)
             .map_err(|error| error.to_string())
     }
 }
 
-/// The parts of NAME=FROM:TO:COUNT[:log].
-struct Steps {
-    name: String,
-    ends: (f64, f64),
-    count: usize,
-    spacing: Spacing,
+/// FROM:TO:COUNT[:log].
+pub(crate) struct Steps {
+    pub(crate) ends: (f64, f64),
+    pub(crate) count: usize,
+    pub(crate) spacing: Spacing,
 }
 
 impl Steps {
-    fn of(text: &str) -> Result<Self, String> {
-        const FORM: &str = "NAME=FROM:TO:COUNT or NAME=FROM:TO:COUNT:log";
-        let (name, range) = named_range(text, FORM)?;
-        let (from, to, count, spacing) = match range[..] {
+    /// Of `range`, which is `text` or the end of it; `form` is what that should look like.
+    fn of(range: &str, text: &str, form: &str) -> Result<Self, String> {
+        let parts: Vec<&str> = range.split(':').collect();
+        let (from, to, count, spacing) = match parts[..] {
             [from, to, count] => (from, to, count, Spacing::Linear),
             [from, to, count, "log"] => (from, to, count, Spacing::Log),
-            _ => return Err(not_of_form(text, FORM)),
+            _ => return Err(not_of_form(text, form)),
         };
         Ok(Self {
-            name: name.replace('-', "_"),
             ends: (finite(from)?, finite(to)?),
             count: whole(count)?,
             spacing,
         })
     }
+}
+
+impl FromStr for Steps {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::of(text, text, "FROM:TO:COUNT or FROM:TO:COUNT:log")
+    }
+}
+
+/// The parts of NAME=FROM:TO:COUNT[:log].
+fn named_steps(text: &str) -> Result<(String, Steps), String> {
+    const FORM: &str = "NAME=FROM:TO:COUNT or NAME=FROM:TO:COUNT:log";
+    let (name, range) = text
+        .split_once('=')
+        .ok_or_else(|| not_of_form(text, FORM))?;
+    Ok((name.replace('-', "_"), Steps::of(range, text, FORM)?))
 }
 
 /// What a study is over.
@@ -223,12 +248,12 @@ impl FromStr for StudySweep {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        let (name, steps) = named_steps(text)?;
         let Steps {
-            name,
             ends,
             count,
             spacing,
-        } = Steps::of(text)?;
+        } = steps;
         let values = spacing
             .checked_values(ends, count)
             .map_err(|error| error.to_string())?;

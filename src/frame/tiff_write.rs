@@ -25,6 +25,7 @@ pub struct TiffOptions<'a> {
     /// Whether to compress them: deflate after differences along the rows.
     pub compressed: bool,
     /// Lines of text for the attribute `ImageDescription`.
+    /// Characters that TIFF's text cannot have become question marks.
     pub description: &'a str,
 }
 
@@ -121,7 +122,9 @@ where
     let mut image = encoder.new_image::<C>(side(frame.width)?, side(frame.height)?)?;
     let directory = image.encoder();
     if !options.description.is_empty() {
-        directory.write_tag(Tag::ImageDescription, options.description)?;
+        let is_text = |c: char| if c.is_ascii() && c != '\0' { c } else { '?' };
+        let ascii: String = options.description.chars().map(is_text).collect();
+        directory.write_tag(Tag::ImageDescription, ascii.as_str())?;
     }
     directory.write_tag(Tag::Software, "starpipe")?;
     directory.write_tag(Tag::ExifDirectory, exif)?;
@@ -172,7 +175,8 @@ mod tests {
                 let options = TiffOptions {
                     samples,
                     compressed,
-                    description: "two\nlines",
+                    // TIFF's text is ASCII.
+                    description: "two\nlines of 12° each",
                 };
                 write_tiff(&mut file, &frame, &options).unwrap();
                 let back = decode(file.get_ref()).unwrap();

@@ -1,8 +1,12 @@
 //! Figures for people, as SVG or PNG.
 
 mod finer;
+pub(crate) mod panel;
 
+use anyhow::Context;
+use clap::ValueEnum;
 use finer::Finer;
+use panel::Sheet;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::register_font;
@@ -29,6 +33,17 @@ pub(crate) struct PlotFile {
 pub(crate) enum Form {
     Svg,
     Png,
+}
+
+/// What figures are drawn as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FigureForm {
+    /// Lines and letters
+    Svg,
+    /// Pixels
+    Png,
+    /// Not at all
+    None,
 }
 
 impl PlotFile {
@@ -86,6 +101,23 @@ pub(crate) fn rendered(figure: &impl Figure, form: Form) -> anyhow::Result<Vec<u
             png(&pixels, size)
         }
     }
+}
+
+/// Names and contents of the files of sheets.
+pub(crate) fn drawn(
+    sheets: Vec<(&str, Sheet)>,
+    form: FigureForm,
+) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
+    let (form, extension) = match form {
+        FigureForm::Svg => (Form::Svg, "svg"),
+        FigureForm::Png => (Form::Png, "png"),
+        FigureForm::None => return Ok(Vec::new()),
+    };
+    let file = |(name, sheet): (&str, Sheet)| {
+        let drawing = rendered(&sheet, form).with_context(|| format!("drawing {name}"))?;
+        Ok((format!("{name}.{extension}"), drawing))
+    };
+    sheets.into_iter().map(file).collect()
 }
 
 /// Red, green and blue of each pixel as the content of a PNG file.

@@ -8,11 +8,10 @@ mod run;
 mod study;
 mod tables;
 
-pub(crate) use figures::FigureForm;
-
 use super::args::{PageFormat, ValidateArgs};
 use super::output::{json_lines, print};
-use super::resources::{bar, read_catalog, sky, thread_pool};
+use super::plot::FigureForm;
+use super::resources::{bar, read_catalog, sky, thread_pool, warn_of};
 use super::{Exit, Fault, complain};
 use indicatif::ProgressBar;
 use starpipe::pipeline::Pipeline;
@@ -73,6 +72,7 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Exit, Fault> {
         }
     };
     shared.progress.finish_and_clear();
+    warn_of(pipeline.sky().take_troubles());
     // Nobody left to read it: nothing is lost.
     let _ = print(&text)?;
     Ok(Exit::Success)

@@ -1,11 +1,12 @@
 //! One run: its frames, as many as are not there yet, and what they say together.
 
-use super::figures::{self, FigureForm};
+use super::figures;
 use super::tables::{Lines, Tables};
 use super::{Shared, identity};
 use crate::cli::Fault;
 use crate::cli::batch::for_each_ordered;
 use crate::cli::output::write_whole;
+use crate::cli::plot::FigureForm;
 use anyhow::Context;
 use serde::Serialize;
 use starpipe::pipeline::Workspace;

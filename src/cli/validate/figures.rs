@@ -1,12 +1,8 @@
 //! The figures of a run and of a study.
 
-mod panel;
-
 use super::study::StudyRow;
-use crate::cli::plot::{BLUE, Form, ORANGE, rendered};
-use anyhow::Context;
-use clap::ValueEnum;
-use panel::{Axis, Dot, Layer, Marks, Panel, Sheet};
+use crate::cli::plot::panel::{Axis, Dot, Layer, Marks, Panel, Sheet};
+use crate::cli::plot::{BLUE, FigureForm, ORANGE, drawn};
 use plotters::style::RGBColor;
 use starpipe::statistics::normal_density;
 use starpipe::validation::{
@@ -18,22 +14,11 @@ use starpipe::validation::{
 const PALE_BLUE: RGBColor = RGBColor(120, 180, 220);
 const PALE_ORANGE: RGBColor = RGBColor(240, 170, 110);
 
-/// What figures are drawn as.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum FigureForm {
-    /// Lines and letters
-    Svg,
-    /// Pixels
-    Png,
-    /// Not at all
-    None,
-}
-
-/// Names and contents of files.
-type Files = Vec<(String, Vec<u8>)>;
-
 /// The figures of a run.
-pub(super) fn of_run(summary: &Summary, form: FigureForm) -> anyhow::Result<Files> {
+pub(super) fn of_run(
+    summary: &Summary,
+    form: FigureForm,
+) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
     let mut sheets = vec![
         ("identification", identification(&summary.identification)),
         ("completeness", completeness(&summary.completeness)),
@@ -46,7 +31,10 @@ pub(super) fn of_run(summary: &Summary, form: FigureForm) -> anyhow::Result<File
 }
 
 /// The figures of a study, one for each parameter.
-pub(super) fn of_study(rows: &[StudyRow], form: FigureForm) -> anyhow::Result<Files> {
+pub(super) fn of_study(
+    rows: &[StudyRow],
+    form: FigureForm,
+) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
     let parameters = rows.chunk_by(|a, b| a.parameter == b.parameter);
     drawn(
         parameters
@@ -54,26 +42,6 @@ pub(super) fn of_study(rows: &[StudyRow], form: FigureForm) -> anyhow::Result<Fi
             .collect(),
         form,
     )
-}
-
-fn drawn(sheets: Vec<(&str, Sheet)>, form: FigureForm) -> anyhow::Result<Files> {
-    let (form, extension) = match form {
-        FigureForm::Svg => (Form::Svg, "svg"),
-        FigureForm::Png => (Form::Png, "png"),
-        FigureForm::None => return Ok(Files::new()),
-    };
-    let file = |(name, sheet): (&str, Sheet)| {
-        let drawing = rendered(&sheet, form).with_context(|| format!("drawing {name}"))?;
-        Ok((format!("{name}.{extension}"), drawing))
-    };
-    sheets.into_iter().map(file).collect()
-}
-
-fn alone(panel: Panel) -> Sheet {
-    Sheet {
-        panels: vec![panel],
-        abreast: 1,
-    }
 }
 
 fn identification(found: &IdentificationSummary) -> Sheet {
@@ -88,7 +56,7 @@ fn identification(found: &IdentificationSummary) -> Sheet {
         .collect();
     let lowest = lowest_percent(&dots);
     let all = &found.all;
-    alone(Panel {
+    Sheet::of_one(Panel {
         title: format!(
             "Identified rightly: {} of {} frames; {} not, {} wrongly",
             all.right, all.frames, all.none, all.wrong
@@ -129,7 +97,7 @@ fn completeness(found: &CompletenessSummary) -> Sheet {
         }
         _ => "Completeness".to_owned(),
     };
-    alone(Panel {
+    Sheet::of_one(Panel {
         title,
         x: Axis::of("V"),
         y: Axis::of("% of isolated stars found").within(0.0, 103.0),
@@ -255,7 +223,7 @@ fn faintest(found: &DifferenceSummary) -> Sheet {
         let label = format!("expected, as if normal: scatter {sd:.2}");
         layers.push(Layer::new(label, ORANGE, Marks::Line(curve)));
     }
-    alone(Panel {
+    Sheet::of_one(Panel {
         title: format!(
             "Faintest star minus expected: mean {:+.3} ± {:.3}, scatter {:.2} mag",
             found.mean, found.mean_sigma, found.sd
@@ -277,7 +245,7 @@ fn attitude(found: &AttitudeSummary) -> Sheet {
         Marks::Line(points.filter(|(value, _)| *value > 0.0).skip(1).collect())
     };
     let (boresight, roll) = (&found.boresight_arcsec, &found.roll_arcsec);
-    alone(Panel {
+    Sheet::of_one(Panel {
         title: format!("Errors of the attitude, of {} frames", found.frames),
         x: Axis::log("arcseconds", true),
         y: Axis::of("% of the frames are off by less").within(0.0, 102.0),

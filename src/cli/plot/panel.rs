@@ -1,10 +1,13 @@
 //! A panel with dots, lines and bars over two axes, and sheets of such panels.
 
+use super::{Area, FONT, Figure, draw_words, said};
 use crate::cli::limit::number;
-use crate::cli::plot::{Area, FONT, Figure, draw_words, said};
+use plotters::coord::combinators::{BindKeyPoints, LogCoord, WithKeyPoints};
+use plotters::coord::ranged1d::Ranged;
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
-use plotters::style::text_anchor::HPos;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use std::ops::Range;
 
 const PANEL_PX: (u32, u32) = (440, 330);
 /// A panel that stands alone.
@@ -20,7 +23,7 @@ const AXIS_PX: (u32, u32) = (44, 66);
 const ROOM: f64 = 0.04;
 
 /// What is drawn in a panel.
-pub(super) struct Layer {
+pub(crate) struct Layer {
     /// What it is; layers without a label are not told of.
     pub label: Option<String>,
     pub colour: RGBColor,
@@ -28,20 +31,33 @@ pub(super) struct Layer {
 }
 
 /// x and y, and the ends of an interval of y.
-pub(super) type Dot = (f64, f64, [f64; 2]);
+pub(crate) type Dot = (f64, f64, [f64; 2]);
 
 /// Marks at (x, y).
-pub(super) enum Marks {
+pub(crate) enum Marks {
     Line(Vec<(f64, f64)>),
     Dots(Vec<Dot>),
     /// From x to x, and how high.
     Bars(Vec<([f64; 2], f64)>),
     /// A line from side to side at each y.
     Levels(Vec<f64>),
+    /// Several lines of one kind.
+    Lines(Vec<Vec<(f64, f64)>>),
+    /// Filled with colours of their own, from left to right and then upwards.
+    Cells(Vec<Cell>),
+    /// Words around a place.
+    Words(Vec<(f64, f64, String)>),
+}
+
+/// A rectangle from x to x and from y to y.
+pub(crate) struct Cell {
+    pub x: [f64; 2],
+    pub y: [f64; 2],
+    pub colour: RGBColor,
 }
 
 impl Layer {
-    pub(super) fn new(label: impl Into<String>, colour: RGBColor, marks: Marks) -> Self {
+    pub(crate) fn new(label: impl Into<String>, colour: RGBColor, marks: Marks) -> Self {
         Self {
             label: Some(label.into()),
             colour,
@@ -49,13 +65,18 @@ impl Layer {
         }
     }
 
-    /// A grey line that tells how it should be.
-    pub(super) fn guide(marks: Marks) -> Self {
+    /// Marks that need no words.
+    pub(crate) fn unnamed(colour: RGBColor, marks: Marks) -> Self {
         Self {
             label: None,
-            colour: RGBColor(130, 130, 130),
+            colour,
             marks,
         }
+    }
+
+    /// A grey line that tells how it should be.
+    pub(crate) fn guide(marks: Marks) -> Self {
+        Self::unnamed(RGBColor(130, 130, 130), marks)
     }
 
     fn points(&self) -> Vec<(f64, f64)> {
@@ -70,6 +91,12 @@ impl Layer {
                 let corners = |&([from, to], y): &([f64; 2], f64)| [(from, 0.0), (to, y)];
                 bars.iter().flat_map(corners).collect()
             }
+            Marks::Lines(lines) => lines.concat(),
+            Marks::Cells(cells) => {
+                let corners = |cell: &Cell| [(cell.x[0], cell.y[0]), (cell.x[1], cell.y[1])];
+                cells.iter().flat_map(corners).collect()
+            }
+            Marks::Words(words) => words.iter().map(|(x, y, _)| (*x, *y)).collect(),
             Marks::Levels(_) => Vec::new(),
         }
     }
@@ -77,7 +104,7 @@ impl Layer {
 
 /// An axis; it reaches over all marks unless it is bounded.
 #[derive(Default)]
-pub(super) struct Axis {
+pub(crate) struct Axis {
     pub words: String,
     pub is_log: bool,
     pub from: Option<f64>,
@@ -85,21 +112,21 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    pub(super) fn of(words: impl Into<String>) -> Self {
+    pub(crate) fn of(words: impl Into<String>) -> Self {
         Self {
             words: words.into(),
             ..Self::default()
         }
     }
 
-    pub(super) fn log(words: impl Into<String>, is_log: bool) -> Self {
+    pub(crate) fn log(words: impl Into<String>, is_log: bool) -> Self {
         Self {
             is_log,
             ..Self::of(words)
         }
     }
 
-    pub(super) fn within(self, from: f64, to: f64) -> Self {
+    pub(crate) fn within(self, from: f64, to: f64) -> Self {
         Self {
             from: Some(from),
             to: Some(to),
@@ -128,7 +155,7 @@ impl Axis {
 }
 
 /// Layers over two axes.
-pub(super) struct Panel {
+pub(crate) struct Panel {
     pub title: String,
     pub x: Axis,
     pub y: Axis,
@@ -146,9 +173,9 @@ impl Panel {
         let (x, y) = (x[0]..x[1], y[0]..y[1]);
         match (self.x.is_log, self.y.is_log) {
             (false, false) => self.draw_over(&body, (x, y), ends),
-            (true, false) => self.draw_over(&body, (x.log_scale(), y), ends),
-            (false, true) => self.draw_over(&body, (x, y.log_scale()), ends),
-            (true, true) => self.draw_over(&body, (x.log_scale(), y.log_scale()), ends),
+            (true, false) => self.draw_over(&body, (by_ratios(x), y), ends),
+            (false, true) => self.draw_over(&body, (x, by_ratios(y)), ends),
+            (true, true) => self.draw_over(&body, (by_ratios(x), by_ratios(y)), ends),
         }
     }
 
@@ -241,6 +268,15 @@ impl Panel {
                     });
                     chart.draw_series(bars).map(drop)
                 }
+                Marks::Lines(lines) => {
+                    for line in lines {
+                        let line = LineSeries::new(line.iter().copied(), stroke);
+                        chart.draw_series(line).map_err(said)?;
+                    }
+                    Ok(())
+                }
+                Marks::Cells(cells) => draw_cells(&mut chart, cells, ends),
+                Marks::Words(words) => draw_around(&mut chart, area, words, *colour)?,
                 Marks::Levels(places) => {
                     let lines = places
                         .iter()
@@ -254,13 +290,98 @@ impl Panel {
     }
 }
 
+/// Fills rectangles.
+fn draw_cells<B: DrawingBackend, X: Ranged<ValueType = f64>, Y: Ranged<ValueType = f64>>(
+    chart: &mut ChartContext<'_, B, Cartesian2d<X, Y>>,
+    cells: &[Cell],
+    (across, up): ([f64; 2], [f64; 2]),
+) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+    // Over the seams to those that follow: the ground would show through.
+    let seam = |[from, to]: [f64; 2]| 0.003 * (to - from);
+    let seams = (seam(across), seam(up));
+    let cells = cells.iter().map(|cell| {
+        let right = (cell.x[1] + seams.0).min(across[1]);
+        let end = (right, (cell.y[1] + seams.1).min(up[1]));
+        Rectangle::new([(cell.x[0], cell.y[0]), end], cell.colour.filled())
+    });
+    chart.draw_series(cells).map(drop)
+}
+
+/// Draws words around places, on a bright ground: what is below may have any colour.
+fn draw_around<B: DrawingBackend, X: Ranged<ValueType = f64>, Y: Ranged<ValueType = f64>>(
+    chart: &mut ChartContext<'_, B, Cartesian2d<X, Y>>,
+    area: &Area<B>,
+    words: &[(f64, f64, String)],
+    colour: RGBColor,
+) -> anyhow::Result<Result<(), DrawingAreaErrorKind<B::ErrorType>>> {
+    let style = (FONT, LETTERS_PX)
+        .into_text_style(area)
+        .color(&colour)
+        .pos(Pos::new(HPos::Center, VPos::Center));
+    let mut placed = Vec::new();
+    for (x, y, words) in words {
+        let (width, height) = area.estimate_text_size(words, &style).map_err(said)?;
+        let half = (width as i32 / 2 + 2, height as i32 / 2);
+        let corners = [(-half.0, -half.1), (half.0, half.1)];
+        let ground = Rectangle::new(corners, WHITE.mix(0.8).filled());
+        let words = Text::new(words.clone(), (0, 0), style.clone());
+        placed.push(EmptyElement::at((*x, *y)) + ground + words);
+    }
+    Ok(chart.draw_series(placed).map(drop))
+}
+
+/// A logarithmic axis with round numbers beside it, whatever its range.
+fn by_ratios(range: Range<f64>) -> WithKeyPoints<LogCoord<f64>> {
+    let points = round_numbers(range.start, range.end);
+    let minor = decades(range.start, range.end);
+    let minor = minor.flat_map(|decade| (2..10).map(move |i| decade * f64::from(i)));
+    let minor: Vec<f64> = minor.filter(|value| range.contains(value)).collect();
+    range
+        .log_scale()
+        .with_key_points(points)
+        .with_light_points(minor)
+}
+
+/// Powers of ten, the first below `from`.
+fn decades(from: f64, to: f64) -> impl Iterator<Item = f64> {
+    let (first, last) = (from.log10().floor() as i32, to.log10().ceil() as i32);
+    (first..=last).map(|power| 10f64.powi(power))
+}
+
+/// Numbers to be written beside a logarithmic axis: of each decade as few as leave three on the axis.
+fn round_numbers(from: f64, to: f64) -> Vec<f64> {
+    const ENOUGH: usize = 3;
+    let mantissas: [&[f64]; 4] = [
+        &[1.0],
+        &[1.0, 3.0],
+        &[1.0, 2.0, 5.0],
+        &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0],
+    ];
+    let of = |mantissas: &[f64]| -> Vec<f64> {
+        let all = decades(from, to).flat_map(|decade| mantissas.iter().map(move |m| m * decade));
+        all.filter(|value| (from..=to).contains(value)).collect()
+    };
+    let enough = mantissas.iter().map(|mantissas| of(mantissas));
+    enough
+        .reduce(|points, more| if points.len() < ENOUGH { more } else { points })
+        .unwrap_or_default()
+}
+
 /// Panels side by side, so many abreast.
-pub(super) struct Sheet {
+pub(crate) struct Sheet {
     pub panels: Vec<Panel>,
     pub abreast: usize,
 }
 
 impl Sheet {
+    /// A panel that stands alone.
+    pub(crate) fn of_one(panel: Panel) -> Self {
+        Self {
+            panels: vec![panel],
+            abreast: 1,
+        }
+    }
+
     fn lines(&self) -> usize {
         self.panels.len().div_ceil(self.abreast)
     }

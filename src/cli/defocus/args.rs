@@ -1,0 +1,141 @@
+//! The options of `defocus`.
+
+use crate::cli::args::{Format, ReadingArg, preset};
+use crate::cli::limit::ParameterArgs;
+use crate::cli::plot::FigureForm;
+use crate::cli::values::{self, Steps};
+use clap::{Args, ValueEnum};
+use starpipe::defocus::Centroiding;
+use starpipe::sensor::Preset;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+pub(crate) struct DefocusArgs {
+    /// What all spots have in common [default: energy with a camera, else peak]
+    #[arg(long, value_enum)]
+    pub(super) normalisation: Option<Normalisation>,
+    /// Camera, as `starpipe camera new` writes one
+    #[arg(long, value_name = "camera.toml", conflicts_with = "preset")]
+    pub(super) camera: Option<PathBuf>,
+    /// A camera that is built in, and its conditions
+    #[arg(long, value_name = "NAME", value_parser = preset())]
+    pub(super) preset: Option<Preset>,
+    /// Which equations [default: as the paper has them for its experiments, else physical]
+    #[arg(long, value_enum)]
+    pub(super) reading: Option<ReadingArg>,
+    /// Johnson V of the star, or several with commas; energy only [default: 1.5 brighter than the camera's limit]
+    #[arg(long, value_name = "V[,V...]", value_delimiter = ',', value_parser = values::finite, allow_hyphen_values = true)]
+    pub(super) vmag: Vec<f64>,
+    /// Say which radius is the smallest whose error is at most so many pixels, or several with commas
+    #[arg(long, value_name = "PX[,PX...]", value_delimiter = ',', value_parser = values::positive, allow_hyphen_values = true)]
+    pub(super) required_error: Vec<f64>,
+    /// Take the noise from frames taken without light: files, directories, or patterns such as 'darks/*.tif'
+    #[arg(long, value_name = "FRAME", num_args = 1..)]
+    pub(super) darks: Vec<PathBuf>,
+    /// Noise for which radii are told, as a part of full scale; peak only [default: that of --darks, else the paper's 9.32e-4]
+    #[arg(long, value_name = "NUMBER", value_parser = values::positive, allow_hyphen_values = true, conflicts_with = "darks")]
+    pub(super) at_noise: Option<f64>,
+    /// Radii: standard deviations of the spot, in pixels [default: 0.4:2.4:200 for peak, 0.2:2.4:45 for energy]
+    #[arg(long, value_name = "FROM:TO:COUNT[:log]", value_parser = radii, allow_hyphen_values = true)]
+    pub(super) radius_px: Option<Range>,
+    /// Noises as parts of full scale; peak only [default: 2e-4:20e-4:100]
+    #[arg(long, value_name = "FROM:TO:COUNT[:log]", value_parser = range, allow_hyphen_values = true)]
+    pub(super) noise_relative: Option<Range>,
+    /// Noises of a pixel in the dark, in electrons; energy only [default: nine from a quarter to four times the camera's]
+    #[arg(long, value_name = "FROM:TO:COUNT[:log]", value_parser = range, allow_hyphen_values = true, conflicts_with = "noise_relative")]
+    pub(super) noise_e: Option<Range>,
+    /// Stars at each point of the grid [default: 20 for peak, as the paper has it, 400 for energy]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(super) trials: Option<u32>,
+    /// Seed of the random numbers
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Brightest pixel of a spot centred on it, as a part of full scale; peak only [default: 0.675]
+    #[arg(long, value_name = "PART", value_parser = values::share, allow_hyphen_values = true)]
+    pub(super) peak: Option<f64>,
+    /// Pixels from the middle of a fixed window to its edge
+    #[arg(long, value_name = "PX", default_value_t = 7, value_parser = clap::value_parser!(u8).range(1..=15))]
+    pub(super) half_window_px: u8,
+    /// How to measure a star's place [default: fixed-window for peak, gaussian-fit for energy]
+    #[arg(long, value_enum, value_name = "METHOD")]
+    pub(super) centroid: Option<CentroidingArg>,
+    /// Standard deviation of the lens's spot in focus, in pixels: it counts besides the geometric blur
+    #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = values::not_negative, allow_hyphen_values = true)]
+    pub(super) focused_px: f64,
+    /// What to print: csv has a row for each point of the grid
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub(super) format: Format,
+    /// Also write grid.csv, curve.csv, defocus.json, defocus.txt and figures into this directory
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: Option<PathBuf>,
+    /// What figures are drawn as
+    #[arg(long, value_enum, default_value_t = FigureForm::Svg, requires = "out")]
+    pub(super) figures: FigureForm,
+    /// Threads to work with [default: one for each processor]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(super) threads: Option<u32>,
+    #[command(flatten)]
+    pub(super) parameters: ParameterArgs,
+}
+
+/// What all spots have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Normalisation {
+    /// The brightest pixel, as in the paper: a wider spot has more light
+    Peak,
+    /// The light, as of a real star
+    Energy,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum CentroidingArg {
+    /// Fit of a Gaussian spot
+    GaussianFit,
+    /// Centre of the light above a threshold
+    GreyWeighted,
+    /// The paper's: centre of the light in a fixed window, without a threshold
+    FixedWindow,
+}
+
+impl From<CentroidingArg> for Centroiding {
+    fn from(argument: CentroidingArg) -> Self {
+        match argument {
+            CentroidingArg::GaussianFit => Self::GaussianFit,
+            CentroidingArg::GreyWeighted => Self::GreyWeighted,
+            CentroidingArg::FixedWindow => Self::FixedWindow,
+        }
+    }
+}
+
+/// Values of an axis, above 0.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Range(pub(super) Vec<f64>);
+
+/// Spots that make sense: a narrower one is a point, and a wider one does not fit into a window.
+const RADII_PX: std::ops::RangeInclusive<f64> = 0.1..=5.0;
+
+fn radii(text: &str) -> Result<Range, String> {
+    let range = range(text)?;
+    match range.0.iter().find(|radius| !RADII_PX.contains(radius)) {
+        Some(radius) => Err(format!(
+            "found a radius of {radius} px, expected 0.1 to 5 px"
+        )),
+        None => Ok(range),
+    }
+}
+
+fn range(text: &str) -> Result<Range, String> {
+    let Steps {
+        ends,
+        count,
+        spacing,
+    } = text.parse()?;
+    if ends.0 <= 0.0 {
+        return Err(format!(
+            "found {} at its beginning, expected a number above 0",
+            ends.0
+        ));
+    }
+    let values = spacing.checked_values(ends, count);
+    values.map(Range).map_err(|error| error.to_string())
+}
