@@ -1,16 +1,20 @@
-//! Short blocks of columns and their maxima: most hold nothing of interest, and need no second look.
+//! Short blocks of columns: most hold nothing of interest, and need no second look.
 
 use multiversion::multiversion;
+use std::ops::Range;
 
-/// Width of the blocks whose maxima are kept.
+/// Width of the blocks.
 pub(super) const BLOCK_PX: usize = 64;
 
-/// The maxima of all blocks of a frame.
+/// The maximum of a block without anything of interest.
+pub(super) const NOTHING: f32 = f32::MIN;
+
+/// The maxima of those blocks of a frame that hold something of interest.
 #[derive(Debug, Clone, Default)]
 pub(super) struct BlockMaxima {
     /// Blocks in a row.
     pub per_row: usize,
-    /// Row by row.
+    /// Row by row; [`NOTHING`] for the others.
     pub values: Vec<f32>,
 }
 
@@ -18,7 +22,13 @@ impl BlockMaxima {
     /// Makes room for a frame of `width` times `height` pixels.
     pub fn prepare(&mut self, (width, height): (usize, usize)) {
         self.per_row = width.div_ceil(BLOCK_PX);
-        self.values.resize(self.per_row * height, 0.0);
+        self.values.clear();
+        self.values.resize(self.per_row * height, NOTHING);
+    }
+
+    /// The maxima of the blocks in `rows`, row by row.
+    pub fn rows_mut(&mut self, rows: Range<usize>) -> &mut [f32] {
+        &mut self.values[rows.start * self.per_row..rows.end * self.per_row]
     }
 
     /// The maxima of the blocks in row `y`.
@@ -42,30 +52,18 @@ pub(super) fn columns_from(row: &[f32], block: usize, lowest: f32) -> impl Itera
         })
 }
 
-/// The maximum of each block of [`BLOCK_PX`] values; the last may be shorter. NaN is left out.
+/// Finds the blocks of `row` with a value that reaches the level of its block; NaN reaches none.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(super) fn block_maxima(row: &[f32], maxima: &mut [f32]) {
-    const LANES: usize = 16;
-    let higher = |a: f32, b: f32| if a > b { a } else { b };
-    for (maximum, block) in maxima.iter_mut().zip(row.chunks(BLOCK_PX)) {
-        let mut lanes = [f32::MIN; LANES];
-        let (chunks, rest) = block.as_chunks::<LANES>();
-        for chunk in chunks {
-            for lane in 0..LANES {
-                lanes[lane] = higher(chunk[lane], lanes[lane]);
-            }
+pub(super) fn find_reaching(row: &[f32], levels: &[f32], found: &mut Vec<usize>) {
+    found.clear();
+    let (blocks, rest) = row.as_chunks::<BLOCK_PX>();
+    for (block, (values, &level)) in blocks.iter().zip(levels).enumerate() {
+        if values.iter().fold(false, |any, &v| any | (v >= level)) {
+            found.push(block);
         }
-        for (lane, &value) in lanes.iter_mut().zip(rest) {
-            *lane = higher(value, *lane);
-        }
-        // By halves: one after the other, each would wait for the one before.
-        let mut half = LANES / 2;
-        while half > 0 {
-            for lane in 0..half {
-                lanes[lane] = higher(lanes[lane + half], lanes[lane]);
-            }
-            half /= 2;
-        }
-        *maximum = lanes[0];
+    }
+    let is_reached = |level: &f32| rest.iter().any(|v| v >= level);
+    if levels.get(blocks.len()).is_some_and(is_reached) {
+        found.push(blocks.len());
     }
 }

@@ -13,7 +13,7 @@
 //! Edelsbrunner, Letscher & Zomorodian 2002, doi 10.1007/s00454-002-2885-2, for prominence as persistence.
 
 use super::background::Mesh;
-use super::blocks::columns_from;
+use super::blocks::{columns_from, find_reaching};
 use super::matched_filter::Band;
 use super::view::View;
 use std::ops::Range;
@@ -57,6 +57,9 @@ pub(super) struct Candidates {
     tops: Vec<Top>,
     /// In units of the background noise.
     cut: f32,
+    /// The cut for each block of columns, and the blocks of a row that reach it.
+    levels: Vec<f32>,
+    blocks: Vec<usize>,
 }
 
 /// A pixel of the filtered frame.
@@ -77,17 +80,22 @@ struct Top {
 }
 
 impl Candidates {
-    /// Gathers the pixels from `cut` on in `rows` of `band`, which has a row more on either side within the frame.
-    pub fn gather(&mut self, band: &Band, rows: Range<usize>, cut: f32) {
+    /// Gathers the pixels from `cut` on in `rows` of `band`, which has a row more on either side within the frame; and
+    /// the `maxima` of the blocks that hold any, row by row.
+    pub fn gather(&mut self, band: &Band, rows: Range<usize>, cut: f32, maxima: &mut [f32]) {
         self.pixels.clear();
         self.tops.clear();
         self.cut = cut;
-        for y in rows {
-            let maxima = band.block_maxima(y..y + 1).iter().enumerate();
+        let blocks_per_row = maxima.len() / rows.len().max(1);
+        self.levels.clear();
+        self.levels.resize(blocks_per_row, cut);
+        for (y, maxima) in rows.zip(maxima.chunks_mut(blocks_per_row)) {
+            let Some(row) = band.row(y) else { continue };
             let around = [y.checked_sub(1).and_then(|y| band.row(y)), band.row(y + 1)];
-            for (block, _) in maxima.filter(|&(_, &maximum)| maximum >= cut) {
-                let Some(row) = band.row(y) else { continue };
+            find_reaching(row, &self.levels, &mut self.blocks);
+            for &block in &self.blocks {
                 for x in columns_from(row, block, cut) {
+                    maxima[block] = maxima[block].max(row[x]);
                     if is_local_maximum(row, around, x) {
                         self.tops.push(Top {
                             pixel: self.pixels.len() as u32,

@@ -8,7 +8,6 @@
 //! The filtered frame is never whole in memory: it is made and looked at in bands of rows that stay in cache.
 
 use super::background::{Mesh, Piece};
-use super::blocks::{BLOCK_PX, block_maxima};
 use super::psf::{PIXEL_VARIANCE_PX2, centered_profile};
 use super::view::View;
 use arrayvec::ArrayVec;
@@ -88,7 +87,7 @@ impl Kernel {
 /// A band of rows of the filtered frame, in units of the noise, and the buffers to make it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Band {
-    /// The width in whole blocks.
+    /// The width in whole vectors.
     whole_width: usize,
     /// Columns between rows: more than that, for rows a power of two apart would compete for the same places in the cache.
     stride: usize,
@@ -96,8 +95,6 @@ pub(super) struct Band {
     /// Rows of the frame that the band holds.
     rows: Range<usize>,
     values: Vec<f32>,
-    maxima: Vec<f32>,
-    blocks: usize,
     /// A row less the background and over the noise, with the kernel's reach on either side.
     padded: Vec<f32>,
     /// Rows filtered along x: that of row y is at y modulo their number.
@@ -113,8 +110,7 @@ impl Band {
     pub fn prepare(&mut self, width: usize, kernel: &Kernel) {
         let radius = kernel.radius();
         self.width = width;
-        self.blocks = width.div_ceil(BLOCK_PX);
-        self.whole_width = self.blocks * BLOCK_PX;
+        self.whole_width = width.next_multiple_of(LANES);
         self.stride = self.whole_width + ROW_GAP_PX;
         for (buffer, size) in [
             (&mut self.padded, self.whole_width + 2 * radius),
@@ -136,7 +132,6 @@ impl Band {
         let radius = kernel.radius();
         self.rows = rows.clone();
         self.values.resize(rows.len() * self.stride, 0.0);
-        self.maxima.resize(rows.len() * self.blocks, 0.0);
         let first = rows.start.saturating_sub(radius);
         for y in first..rows.end + radius {
             if y < view.height {
@@ -184,9 +179,7 @@ impl Band {
         };
         let i = y - self.rows.start;
         let out = &mut self.values[i * self.stride..][..self.whole_width];
-        let maxima = &mut self.maxima[i * self.blocks..(i + 1) * self.blocks];
         sum_along_columns(&kernel.half, &pairs, factor, out);
-        block_maxima(out, maxima);
     }
 
     /// Row `y` of the filtered frame, if the band holds it.
@@ -195,12 +188,6 @@ impl Band {
             let start = (y - self.rows.start) * self.stride;
             &self.values[start..start + self.width]
         })
-    }
-
-    /// The maxima of the blocks of `rows`, row by row; that of a block cut off by the border is at least 0.
-    pub fn block_maxima(&self, rows: Range<usize>) -> &[f32] {
-        let first = rows.start - self.rows.start;
-        &self.maxima[first * self.blocks..(first + rows.len()) * self.blocks]
     }
 }
 
@@ -262,8 +249,7 @@ fn sum_along_row_of<const N: usize>(half: &[f32], padded: &[f32], out: &mut [f32
     }
 }
 
-/// `out = factor·(half[0]·pairs[0][0] + Σ half[j]·(pairs[j][0] + pairs[j][1]))`, rows as long as `out`; and the
-/// maxima of its blocks.
+/// `out = factor·(half[0]·pairs[0][0] + Σ half[j]·(pairs[j][0] + pairs[j][1]))`, rows as long as `out`.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn sum_along_columns(half: &[f32], pairs: &[[&[f32]; 2]], factor: f32, out: &mut [f32]) {
     with_known_length!(half.len(), sum_along_columns_of(half, pairs, factor, out), 2 3 4 5 6 7);
@@ -351,7 +337,6 @@ mod tests {
             let profile = centered_profile(sigma, 2);
             let expected = profile[1] * profile[2] / kernel.sum_of_squares.sqrt();
             assert!((f64::from(at(21, 19)) - expected).abs() < 1e-6 || kernel.radius() < 2);
-            assert_eq!(at(20, 17), filtered.block_maxima(17..18)[0]);
         }
     }
 

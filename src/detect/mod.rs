@@ -562,9 +562,6 @@ fn filter(view: &View<'_>, cell_px: usize, kernel: &Kernel, least: f64, workspac
             kernel,
             with_neighbours(&rows, view.height),
         );
-        strip
-            .maxima
-            .copy_from_slice(band.block_maxima(rows.clone()));
         let filtered = rows.clone().filter_map(|y| band.row(y));
         cells.measure_row(&grid, filtered, &mesh_config, (strip.level, strip.spread));
         let least = least as f32;
@@ -578,7 +575,8 @@ fn filter(view: &View<'_>, cell_px: usize, kernel: &Kernel, least: f64, workspac
         } else {
             least * FILTERED_NOISE_FLOOR
         };
-        strip.other.gather(band, rows, CANDIDATE_MARGIN * cut);
+        let cut = CANDIDATE_MARGIN * cut;
+        strip.other.gather(band, rows, cut, strip.maxima);
     });
     filtered_mesh.finish();
 }
@@ -589,6 +587,7 @@ fn gather_missed(view: &View<'_>, kernel: &Kernel, threshold: f32, workspace: &m
         background,
         filtered_mesh,
         candidates,
+        filtered_maxima,
         workers,
         ..
     } = workspace;
@@ -605,7 +604,8 @@ fn gather_missed(view: &View<'_>, kernel: &Kernel, threshold: f32, workspace: &m
                 kernel,
                 with_neighbours(&rows, view.height),
             );
-            found.gather(band, rows, lowest);
+            let maxima = filtered_maxima.rows_mut(rows.clone());
+            found.gather(band, rows, lowest, maxima);
         }
     }
 }

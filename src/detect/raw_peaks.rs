@@ -3,7 +3,7 @@
 //! A star bright enough for that stands out in a single pixel, unless it is far out of focus.
 
 use super::background::Mesh;
-use super::blocks::{BLOCK_PX, block_maxima, columns_from};
+use super::blocks::{BLOCK_PX, columns_from, find_reaching};
 use super::fit::Spot;
 use super::psf::PIXEL_VARIANCE_PX2;
 use super::view::View;
@@ -68,7 +68,7 @@ impl RawPeak {
 #[derive(Debug, Clone, Default)]
 pub(super) struct RawPeaks {
     levels: Vec<f32>,
-    maxima: Vec<f32>,
+    blocks: Vec<usize>,
     /// Strongest first.
     pub peaks: Vec<RawPeak>,
 }
@@ -103,17 +103,15 @@ impl RawPeaks {
     ) {
         let Self {
             levels,
-            maxima,
+            blocks,
             peaks,
         } = self;
         band_levels(view, background, top, levels);
-        maxima.resize(levels.len(), 0.0);
         for y in top.max(1)..(top + BAND_PX).min(view.height - 1) {
             let row = view.row(y);
-            block_maxima(row, maxima);
-            let blocks = maxima.iter().zip(levels.iter()).enumerate();
-            for (block, (_, &level)) in blocks.filter(|(_, (maximum, level))| maximum >= level) {
-                let columns = columns_from(row, block, level);
+            find_reaching(row, levels, blocks);
+            for &block in blocks.iter() {
+                let columns = columns_from(row, block, levels[block]);
                 for x in columns.filter(|&x| x > 0 && x + 1 < view.width) {
                     peaks.extend(peak_at(view, background, x, y, saturation_adu));
                 }
