@@ -60,7 +60,7 @@ use fit::NoiseModel;
 use matched_filter::{Band, Kernel};
 use measure::{KnownSpots, Measurement};
 use noise::{NoiseWork, PixelNoise, StarFree, Weights};
-use raw_peaks::RawPeaks;
+use raw_peaks::{RawPeak, RawPeaks};
 use scene::{FitWork, Scene};
 use std::num::NonZeroUsize;
 use std::ops::Range;
@@ -216,7 +216,7 @@ pub enum DetectError {
 #[derive(Debug, Clone, Default)]
 pub struct Workspace {
     background: Mesh,
-    raw_peaks: RawPeaks,
+    raw_peaks: Vec<RawPeak>,
     filtered_mesh: Mesh,
     filtered_maxima: BlockMaxima,
     /// For each row of cells.
@@ -235,6 +235,7 @@ pub struct Workspace {
 #[derive(Debug, Clone, Default)]
 struct Worker {
     cells: CellScratch,
+    raw_peaks: RawPeaks,
     band: Band,
 }
 
@@ -465,15 +466,20 @@ fn calibrate_unfiltered(
     calibration: &mut Calibration,
     workspace: &mut Workspace,
 ) -> bool {
-    let background = &workspace.background;
-    workspace.raw_peaks.find(view, background, saturation_adu);
+    let Workspace {
+        background,
+        workers,
+        raw_peaks,
+        ..
+    } = &mut *workspace;
+    raw_peaks::find(view, background, saturation_adu, workers, raw_peaks);
     let mut fits = std::mem::take(&mut workspace.fits);
     let mut scene = Scene {
         filtered: None,
         ..scene_of(view, saturation_adu, calibration, workspace)
     };
     scene.matched_gain = Kernel::for_spot(calibration.spot_px).matched_gain();
-    let stars = calibrate::fit_raw_stars(&scene, &workspace.raw_peaks.peaks, &mut fits);
+    let stars = calibrate::fit_raw_stars(&scene, &workspace.raw_peaks, &mut fits);
     let measured = calibrate::spot_size(&stars);
     if let (None, Some((size, _))) = (config.spot_sigma_px, measured) {
         calibration.spot_px = size;
@@ -554,7 +560,7 @@ fn filter(view: &View<'_>, cell_px: usize, kernel: &Kernel, least: f64, workspac
     }
     let background = &*background;
     Strips::of(filtered_mesh, filtered_maxima, candidates).share(workers, &|worker, strip| {
-        let Worker { cells, band } = worker;
+        let Worker { cells, band, .. } = worker;
         let rows = strip.rows;
         band.filter(
             view,

@@ -2,10 +2,12 @@
 //!
 //! A star bright enough for that stands out in a single pixel, unless it is far out of focus.
 
+use super::Worker;
 use super::background::Mesh;
 use super::blocks::{BLOCK_PX, columns_from, find_reaching};
 use super::fit::Spot;
 use super::psf::PIXEL_VARIANCE_PX2;
+use super::strips::on_each;
 use super::view::View;
 use std::cmp::Ordering;
 
@@ -15,8 +17,6 @@ const MIN_PIXEL_SIGMA: f32 = 6.0;
 const PEAK_REACH_PX: usize = 3;
 /// Rows that share the levels which their blocks of columns are compared with.
 const BAND_PX: usize = 32;
-/// At most about so many candidates: a frame with more is no night sky.
-const MAX_CANDIDATES: usize = 5000;
 /// Large frames are looked at in rounds of so many pixels, each spread over the whole frame,
 const ROUND_PX: usize = 4_000_000;
 /// until there are so many peaks: only the brightest few are fitted.
@@ -64,35 +64,46 @@ impl RawPeak {
     }
 }
 
-/// Buffers, and the peaks found.
+/// The peaks that one thread finds, and its buffers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct RawPeaks {
     levels: Vec<f32>,
     blocks: Vec<usize>,
-    /// Strongest first.
-    pub peaks: Vec<RawPeak>,
+    found: Vec<RawPeak>,
+}
+
+/// Finds peaks that stand out in single pixels, strongest first; those at the very border are left out.
+pub(super) fn find(
+    view: &View<'_>,
+    background: &Mesh,
+    saturation_adu: f32,
+    workers: &mut [Worker],
+    peaks: &mut Vec<RawPeak>,
+) {
+    peaks.clear();
+    let bands = view.height.div_ceil(BAND_PX);
+    let rounds = (view.width * view.height / ROUND_PX).max(1);
+    let threads = workers.len();
+    for round in 0..rounds {
+        on_each(workers, &|worker, thread| {
+            let of_thread = (round..bands).step_by(rounds).skip(thread);
+            worker.raw_peaks.found.clear();
+            for band in of_thread.step_by(threads) {
+                let buffers = &mut worker.raw_peaks;
+                buffers.find_in_band(view, background, band * BAND_PX, saturation_adu);
+            }
+        });
+        for worker in workers.iter_mut() {
+            peaks.append(&mut worker.raw_peaks.found);
+        }
+        if peaks.len() >= ENOUGH_PEAKS {
+            break;
+        }
+    }
+    peaks.sort_unstable_by(|a, b| b.snr.total_cmp(&a.snr).then((a.y, a.x).cmp(&(b.y, b.x))));
 }
 
 impl RawPeaks {
-    /// Finds peaks that stand out in single pixels; those at the very border are left out.
-    pub fn find(&mut self, view: &View<'_>, background: &Mesh, saturation_adu: f32) {
-        self.peaks.clear();
-        let bands = view.height.div_ceil(BAND_PX);
-        let rounds = (view.width * view.height / ROUND_PX).max(1);
-        for round in 0..rounds {
-            for band in (round..bands).step_by(rounds) {
-                if self.peaks.len() < MAX_CANDIDATES {
-                    self.find_in_band(view, background, band * BAND_PX, saturation_adu);
-                }
-            }
-            if self.peaks.len() >= ENOUGH_PEAKS {
-                break;
-            }
-        }
-        self.peaks
-            .sort_unstable_by(|a, b| b.snr.total_cmp(&a.snr).then((a.y, a.x).cmp(&(b.y, b.x))));
-    }
-
     /// Finds the peaks in the band from row `top` on.
     fn find_in_band(
         &mut self,
@@ -104,7 +115,7 @@ impl RawPeaks {
         let Self {
             levels,
             blocks,
-            peaks,
+            found,
         } = self;
         band_levels(view, background, top, levels);
         for y in top.max(1)..(top + BAND_PX).min(view.height - 1) {
@@ -113,7 +124,7 @@ impl RawPeaks {
             for &block in blocks.iter() {
                 let columns = columns_from(row, block, levels[block]);
                 for x in columns.filter(|&x| x > 0 && x + 1 < view.width) {
-                    peaks.extend(peak_at(view, background, x, y, saturation_adu));
+                    found.extend(peak_at(view, background, x, y, saturation_adu));
                 }
             }
         }

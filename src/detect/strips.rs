@@ -112,3 +112,21 @@ impl<'a, T: Send> Strips<'a, T> {
         }
     }
 }
+
+/// Does `work` with each of the workers, on a thread of its own; it is told which of them it is.
+pub(super) fn on_each<W: Send>(workers: &mut [W], work: &(impl Fn(&mut W, usize) + Sync)) {
+    fn from<W: Send>(first: usize, workers: &mut [W], work: &(impl Fn(&mut W, usize) + Sync)) {
+        if let [worker] = workers {
+            return work(worker, first);
+        }
+        let half = workers.len() / 2;
+        let (some, others) = workers.split_at_mut(half);
+        rayon::join(
+            || from(first, some, work),
+            || from(first + half, others, work),
+        );
+    }
+    if !workers.is_empty() {
+        from(0, workers, work);
+    }
+}
