@@ -1,6 +1,7 @@
 //! From the samples that a reader decoded to a frame: luminance, saturation, and the unit that the levels come in.
 
 use super::{Frame, FrameError, LUMINANCE_WEIGHTS, check_size};
+use multiversion::multiversion;
 
 /// The largest unit of levels looked for where a file holds fewer bits than its words: 2¹².
 const MAX_STEP: i64 = 1 << 12;
@@ -52,11 +53,11 @@ pub(super) fn frame_from_integers<T: Copy + Into<i64>>(
     Ok(with_step(frame, step, full_scale.into()))
 }
 
-/// The frame of `words` of 16 bits, `height * width` of them, which `level` reads; its pixels lie in `room`.
+/// The frame of `words` of 16 bits, `height * width` of them; its pixels lie in `room`.
 pub(super) fn frame_from_words(
     (width, height): (usize, usize),
     words: &[[u8; 2]],
-    level: impl Fn([u8; 2]) -> u16,
+    is_big_endian: bool,
     mut room: Vec<f32>,
 ) -> Result<Frame, FrameError> {
     check_size(width, height)?;
@@ -65,15 +66,28 @@ pub(super) fn frame_from_words(
         expected,
         found: words.len(),
     })?;
-    room.clear();
-    room.extend(words.iter().map(|&word| f32::from(level(word))));
-    let full_scale = i64::from(u16::MAX);
-    let step = level_step(words, |&word| level(word).into(), full_scale);
-    Ok(with_step(
-        Frame::of_numbers(width, height, room),
-        step,
-        full_scale,
-    ))
+    // What is overwritten need not be cleared.
+    room.resize(expected, 0.0);
+    let bits = numbers_of(words, is_big_endian, &mut room);
+    let step = step_of(bits.into(), u16::MAX.into());
+    let frame = Frame::of_numbers(width, height, room);
+    Ok(with_step(frame, step, u16::MAX.into()))
+}
+
+/// Writes the numbers of `words` into `pixels`; the bits that occur in those below full scale.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn numbers_of(words: &[[u8; 2]], is_big_endian: bool, pixels: &mut [f32]) -> u16 {
+    let mut bits = 0;
+    for (pixel, &word) in pixels.iter_mut().zip(words) {
+        let value = if is_big_endian {
+            u16::from_be_bytes(word)
+        } else {
+            u16::from_le_bytes(word)
+        };
+        bits |= if value == u16::MAX { 0 } else { value };
+        *pixel = f32::from(value);
+    }
+    bits
 }
 
 fn with_step(frame: Frame, step: i64, full_scale: i64) -> Frame {
@@ -132,7 +146,12 @@ fn level_step<S>(samples: &[S], level: impl Fn(&S) -> i64, full_scale: i64) -> i
             return 1;
         }
     }
-    let step = 1 << bits.trailing_zeros();
+    step_of(bits, full_scale)
+}
+
+/// The unit of levels in which these bits occur, of a format with this full scale.
+fn step_of(bits: i64, full_scale: i64) -> i64 {
+    let step = 1 << (bits | MAX_STEP).trailing_zeros();
     // All levels zero, or nothing but full scale: nothing can be told.
     if step >= MAX_STEP.min(full_scale) {
         1

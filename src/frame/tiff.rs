@@ -52,14 +52,8 @@ pub(super) fn decode(
     };
     let frame = if let Some(words) = words {
         let pixels = std::mem::take(room);
-        match decoder.byte_order() {
-            ByteOrder::LittleEndian => {
-                frame_from_words((width, height), words, u16::from_le_bytes, pixels)
-            }
-            ByteOrder::BigEndian => {
-                frame_from_words((width, height), words, u16::from_be_bytes, pixels)
-            }
-        }
+        let is_big_endian = decoder.byte_order() == ByteOrder::BigEndian;
+        frame_from_words((width, height), words, is_big_endian, pixels)
     } else {
         let mut samples = DecodingResult::U8(Vec::new());
         decoder.read_image_to_buffer(&mut samples).map_err(fail)?;
