@@ -108,6 +108,8 @@ pub(super) struct Mesh {
     pub spread_floor: f32,
     /// Where along a row the straight pieces between nodes begin, and the last one ends.
     edges: Vec<usize>,
+    /// How far behind its node each of them begins, in columns.
+    offsets: Vec<f32>,
     /// The level as measured, with a border of one cell in which it goes on as a plane does.
     padded_level: Vec<f32>,
     measured_spread: Vec<f32>,
@@ -149,6 +151,11 @@ impl Mesh {
             }
         }
         self.edges.push(grid.width_px);
+        self.offsets.clear();
+        for (piece, &edge) in self.edges[..self.edges.len() - 1].iter().enumerate() {
+            let node = self.center(piece.saturating_sub(1));
+            self.offsets.push(edge as f32 - node);
+        }
     }
 
     /// What is to be done once all rows of cells are measured.
@@ -290,44 +297,51 @@ impl Mesh {
     ///
     /// Differs from [`Self::at`] in that the reciprocal is interpolated, not the spread: by less than
     /// the error of either.
-    pub fn row_pieces(&self, y: usize, pieces: &mut Vec<Piece>) {
-        pieces.clear();
+    pub fn row_pieces<'a>(&'a self, y: usize, pieces: &mut Vec<Piece>) {
         let Grid { columns, rows, .. } = self.grid;
         let (row, fy) = Self::node(y as f32, self.rows_per_px, rows);
         let below = (row + 1).min(rows - 1);
         let held = fy.clamp(0.0, 1.0);
-        let per_px = self.columns_per_px;
-        let node = |c: usize| {
-            let between = |map: &[f32], f: f32| {
-                let (top, bottom) = (map[row * columns + c], map[below * columns + c]);
-                top + f * (bottom - top)
-            };
-            (between(&self.level, fy), between(&self.inverse, held))
-        };
-        let mut left = node(0);
-        let mut slope = (0.0, 0.0);
-        for (p, edge) in self.edges.windows(2).enumerate() {
-            // Beyond the outermost nodes the level goes on, the spread is held.
-            let (origin, at_origin) = (p.saturating_sub(1), left);
-            if p < columns && columns > 1 {
-                let right = node(p.max(1));
-                slope = ((right.0 - left.0) * per_px, (right.1 - left.1) * per_px);
-                if p > 0 {
-                    left = right;
-                }
-            }
-            let is_outside = p == 0 || p == columns;
-            let slope = (slope.0, if is_outside { 0.0 } else { slope.1 });
-            let offset = edge[0] as f32 - self.center(origin);
-            pieces.push(Piece {
-                start: edge[0],
-                end: edge[1],
-                level: at_origin.0 + offset * slope.0,
-                level_slope: slope.0,
-                inverse: at_origin.1 + offset * slope.1,
-                inverse_slope: slope.1,
-            });
+        let nodes_of = |map: &'a [f32], row: usize| &map[row * columns..(row + 1) * columns];
+        pieces.clear();
+        pieces.push(Piece::default());
+        // First each piece has the values of the node before it.
+        let levels = nodes_of(&self.level, row)
+            .iter()
+            .zip(nodes_of(&self.level, below));
+        let inverses = nodes_of(&self.inverse, row)
+            .iter()
+            .zip(nodes_of(&self.inverse, below));
+        pieces.extend(
+            levels
+                .zip(inverses)
+                .map(|((top, bottom), (itop, ibottom))| Piece {
+                    level: top + fy * (bottom - top),
+                    inverse: itop + held * (ibottom - itop),
+                    ..Piece::default()
+                }),
+        );
+        for p in 1..columns {
+            let next = pieces[p + 1];
+            let piece = &mut pieces[p];
+            piece.level_slope = (next.level - piece.level) * self.columns_per_px;
+            piece.inverse_slope = (next.inverse - piece.inverse) * self.columns_per_px;
         }
+        // Beyond the outermost nodes the level goes on, the spread is held.
+        pieces[0] = Piece {
+            inverse_slope: 0.0,
+            ..pieces[1]
+        };
+        pieces[columns].level_slope = pieces[columns - 1].level_slope;
+        for (piece, (edge, offset)) in pieces
+            .iter_mut()
+            .zip(self.edges.windows(2).zip(&self.offsets))
+        {
+            (piece.start, piece.end) = (edge[0], edge[1]);
+            piece.level += offset * piece.level_slope;
+            piece.inverse += offset * piece.inverse_slope;
+        }
+        pieces.truncate(self.offsets.len());
     }
 
     /// What `level + sigmas·spread` is nowhere below in a row of cells.
@@ -374,7 +388,7 @@ impl Mesh {
 }
 
 /// A straight piece of level and reciprocal spread along a row.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Piece {
     /// First column.
     pub start: usize,

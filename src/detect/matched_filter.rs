@@ -169,9 +169,8 @@ impl Band {
             }
             _ => self.zeros.as_slice(),
         };
-        let pairs: ArrayVec<[&[f32]; 2], MAX_TAPS> = (0..=radius)
-            .map(|j| [row(y.checked_sub(j)), row(Some(y + j))])
-            .collect();
+        let mut pairs: ArrayVec<[&[f32]; 2], MAX_TAPS> = ArrayVec::new();
+        pairs.extend((0..=radius).map(|j| [row(y.checked_sub(j)), row(Some(y + j))]));
         let factor = if y < radius || y + radius >= height {
             kernel.border_factor(y, height - 1 - y)
         } else {
