@@ -7,10 +7,12 @@
 
 use super::components::Peak;
 use super::fit::{Fit, FitConfig, NoiseModel, SPOT_RANGE_PX, window_radius};
-use super::psf::PIXEL_VARIANCE_PX2;
+use super::normal::{Factor, ONE_SPOT, Pixels, SpotLight, linearise, sum_of};
+use super::psf::{LANES, PIXEL_VARIANCE_PX2};
 use super::raw_peaks::RawPeak;
 use super::scene::{FitWork, Scene};
 use arrayvec::ArrayVec;
+use multiversion::multiversion;
 
 /// The spot size where the frame does not tell, in pixels: a well-focused camera.
 pub(super) const DEFAULT_SPOT_PX: f64 = 0.9;
@@ -28,9 +30,9 @@ const MIN_STARS: usize = 3;
 const SIGNIFICANT_SIGMA: f64 = 2.0;
 /// Squared residuals count at most this many variances: those of close neighbours, which no star's noise explains, would grow with
 /// the variance that they make.
-const MAX_SQUARED_SIGMA: f64 = 4.0;
+const MAX_SQUARED_SIGMA: f32 = 4.0;
 /// The mean of squared standard Gaussians that are cut off there.
-const CUT_OFF_MEAN: f64 = 0.920_5;
+const CUT_OFF_MEAN: f32 = 0.920_5;
 /// Rounds of the noise model's least squares.
 const NOISE_ROUNDS: usize = 3;
 /// The spot model cannot be worse than this, as a part of the light in a pixel: what is, is no star.
@@ -117,22 +119,13 @@ fn is_isolated(peak: &Peak, peaks: &[Peak], reach: f32) -> bool {
 /// Whether no light in the fit's window, which is still in `work`, is another star's: more than the spot's imperfection and
 /// noise, where there should be next to none.
 fn is_alone(fit: &Fit, work: &mut FitWork) -> bool {
-    let FitWork {
-        fitter,
-        window,
-        residuals: beside,
-        ..
-    } = work;
-    let mut peak = 0.0f64;
-    beside.clear();
-    fitter.for_each_pixel(window, fit, |data, light, _| {
-        peak = peak.max(light);
-        beside.push((light, data - light - fit.background));
-    });
+    let mut pixels = work.fitter.compare(&work.window, fit);
+    let peak = pixels
+        .clone()
+        .fold(0.0f64, |peak, (_, light)| peak.max(light));
     let faint = MAX_MODEL_ERROR * peak;
-    let most = faint + NEIGHBOUR_SIGMA * window.noise_variance.sqrt();
-    let is_others = |&(light, residual): &(f64, f64)| light < faint && residual > most;
-    !beside.iter().any(is_others)
+    let most = faint + NEIGHBOUR_SIGMA;
+    !pixels.any(|(above, light)| light < faint && above - light > most)
 }
 
 /// The spot size that the filtered peak's curvature tells: a Gaussian of variance
@@ -282,25 +275,17 @@ struct Moments {
 impl Moments {
     /// Adds the pixels of one star that its light stands out in.
     fn add_star(&mut self, work: &mut FitWork, fit: &Fit, config: &FitConfig) {
-        let noise = work.window.noise_variance;
-        let model = config.noise;
         let FitWork { fitter, window, .. } = work;
-        fitter.for_each_residual(window, fit, config, |residual, light, leverage| {
-            let m2 = light * light;
-            if light < 0.0 || m2 < 0.25 * noise {
-                return;
-            }
-            let variance = noise + model.shot_adu * light + model.model_error2 * m2;
-            let free = (1.0 - leverage()).max(0.0);
-            let squared = (residual * residual).min(MAX_SQUARED_SIGMA * free * variance);
-            let above_noise = squared / CUT_OFF_MEAN - free * noise;
-            let weight = 1.0 / (variance * variance);
-            self.matrix[0] += free * weight * m2;
-            self.matrix[1] += free * weight * m2 * light;
-            self.matrix[2] += free * weight * m2 * m2;
-            self.right[0] += weight * light * above_noise;
-            self.right[1] += weight * m2 * above_noise;
-        });
+        let Some((factor, spot, pixels)) = fitter.factorised(window, fit, config) else {
+            return;
+        };
+        let per_noise = pixels.per_noise;
+        let [a, b, c, p, q] = sums_of(&factor, &spot, &pixels);
+        self.matrix[0] += a * per_noise * per_noise;
+        self.matrix[1] += b * per_noise;
+        self.matrix[2] += c;
+        self.right[0] += p * per_noise;
+        self.right[1] += q;
     }
 
     /// The non-negative solution, without an error of the spot model that chance explains.
@@ -327,6 +312,39 @@ impl Moments {
             noise_model(shot, error2)
         }
     }
+}
+
+/// The sums of [`Moments`] over the pixels of one star, in units of the noise.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn sums_of(factor: &Factor<ONE_SPOT>, spot: &SpotLight, pixels: &Pixels) -> [f64; 5] {
+    let mut sums = [[0.0f32; LANES]; 5];
+    for group in 0..pixels.groups {
+        for (row, data) in pixels.column_of_groups(group).enumerate() {
+            let lights = [spot.in_group(group, row)];
+            for lane in 0..LANES {
+                let (light, gradient) = linearise(&lights, 1, lane);
+                let m2 = light * light;
+                let variance = pixels.variance(light);
+                let stands_out = light >= 0.0 && m2 >= 0.25 && !data[lane].is_nan();
+                let residual = data[lane] - light - pixels.background;
+                let free = (1.0 - factor.leverage(&gradient) / variance).max(0.0);
+                let squared = (residual * residual).min(MAX_SQUARED_SIGMA * free * variance);
+                let above_noise = squared / CUT_OFF_MEAN - free;
+                let weight = 1.0 / (variance * variance);
+                let terms = [
+                    free * m2,
+                    free * m2 * light,
+                    free * m2 * m2,
+                    light * above_noise,
+                    m2 * above_noise,
+                ];
+                for (sum, term) in sums.iter_mut().zip(terms) {
+                    sum[lane] += if stands_out { weight * term } else { 0.0 };
+                }
+            }
+        }
+    }
+    sums.map(sum_of)
 }
 
 #[cfg(test)]

@@ -33,26 +33,27 @@ pub(super) fn grey_weighted(
     let window = &mut work.window;
     unsaturated.cut(&fit.spots[..1], radius, window);
     for threshold_sigma in [GREY_THRESHOLD_SIGMA, 0.0] {
-        let threshold = threshold_sigma * window.noise_variance.sqrt();
-        let grey = |i: usize| {
-            let value = window.data[i] - threshold;
-            if value > 0.0 { value } else { 0.0 }
+        let threshold = threshold_sigma * window.noise_adu;
+        let bright = || {
+            let grey = window
+                .pixels_adu()
+                .map(|(x, y, value)| (x, y, value, value - threshold));
+            // NaN, where a pixel is left out, is not above.
+            grey.filter(|&(.., grey)| grey > 0.0)
         };
         let (mut sum, mut sum_x, mut sum_y) = (0.0, 0.0, 0.0);
-        for i in 0..window.data.len() {
-            let (column, row) = ((i % window.width) as f64, (i / window.width) as f64);
-            sum += grey(i);
-            sum_x += column * grey(i);
-            sum_y += row * grey(i);
+        for (column, row, _, grey) in bright() {
+            sum += grey;
+            sum_x += column * grey;
+            sum_y += row * grey;
         }
         if sum <= 0.0 {
             continue;
         }
         let (x, y) = (sum_x / sum, sum_y / sum);
         let (mut variance_x, mut variance_y) = (0.0, 0.0);
-        for i in (0..window.data.len()).filter(|&i| grey(i) > 0.0) {
-            let (column, row) = ((i % window.width) as f64, (i / window.width) as f64);
-            let variance = window.noise_variance + noise.shot_adu * window.data[i];
+        for (column, row, value, _) in bright() {
+            let variance = window.noise_adu.powi(2) + noise.shot_adu * value;
             variance_x += variance * (column - x).powi(2);
             variance_y += variance * (row - y).powi(2);
         }

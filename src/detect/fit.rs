@@ -10,15 +10,16 @@
 //! # Reference
 //! Mighell 2005, doi 10.1111/j.1365-2966.2005.09208.x, for PSF fitting and its error budget.
 
-use super::normal::{Normal, ONE_SPOT, OneSpot, flux_variance};
-use super::psf::{AxisProfile, MAX_WINDOW_PX};
+use super::normal::{
+    Factor, Normal, ONE_SPOT, Pixels, SpotLight, TWO_SPOTS, add_light, add_pixels, flux_variance,
+};
+use super::psf::{AxisProfile, LANES, Lanes, MAX_WINDOW_PX};
 use arrayvec::ArrayVec;
 
 /// The most spots fitted together.
 pub(super) const MAX_SPOTS: usize = 6;
-const MAX_PARAMETERS: usize = 3 * MAX_SPOTS + 2;
-/// Parameters of two spots, by far the most frequent group.
-const TWO_SPOTS: usize = 3 * 2 + 2;
+/// Their parameters, the background and the size.
+pub(super) const MAX_PARAMETERS: usize = 3 * MAX_SPOTS + 2;
 const MAX_STEPS: usize = 15;
 /// Steps shorter than this, in px, end the fit; convergence is quadratic, so little is left after one.
 const CONVERGED_PX: f64 = 2e-3;
@@ -55,10 +56,10 @@ pub(super) struct Window {
     pub width: usize,
     /// Rows, at most [`MAX_WINDOW_PX`].
     pub height: usize,
-    /// Row-major, above the background map, in ADU; NaN is left out.
-    pub data: Vec<f64>,
-    /// Variance of the background noise, in ADU².
-    pub noise_variance: f64,
+    /// The rows, each in whole groups: above the background map, in units of the noise; NaN is left out, and beyond the end.
+    pub data: Vec<Lanes>,
+    /// Standard deviation of the background noise, in ADU.
+    pub noise_adu: f64,
     /// Standard error of the background map, in ADU.
     pub background_error: f64,
     /// The part of it that is noise, in ADU.
@@ -66,6 +67,26 @@ pub(super) struct Window {
 }
 
 impl Window {
+    /// Groups of pixels in a row.
+    pub fn groups(&self) -> usize {
+        self.width.div_ceil(LANES)
+    }
+
+    /// The pixel in a column and a row of the window, in units of the noise.
+    pub fn at(&self, column: usize, row: usize) -> f64 {
+        f64::from(self.data[row * self.groups() + column / LANES][column % LANES])
+    }
+
+    /// Column, row and value in ADU of all pixels.
+    pub fn pixels_adu(&self) -> impl Iterator<Item = (f64, f64, f64)> {
+        let pixels =
+            (0..self.height).flat_map(|row| (0..self.width).map(move |column| (column, row)));
+        pixels.map(|(column, row)| {
+            let value = self.noise_adu * self.at(column, row);
+            (column as f64, row as f64, value)
+        })
+    }
+
     /// Becomes a copy of another, in the room that there is.
     pub fn copy_from(&mut self, other: &Self) {
         let mut data = std::mem::take(&mut self.data);
@@ -133,8 +154,9 @@ pub(super) struct Fit {
 /// Buffers of the fit.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Fitter {
-    across: Vec<AxisProfile>,
-    down: Vec<AxisProfile>,
+    /// Of each spot, along x and y.
+    profiles: Vec<[AxisProfile; 2]>,
+    light: Vec<Lanes>,
 }
 
 impl Fitter {
@@ -175,7 +197,7 @@ impl Fitter {
             // The first step is hardly ever the last: what the size would be is not asked yet.
             let is_rough = step == 0 && start.len() == 1 && !config.free_spot;
             let all = if is_rough { fitted } else { all };
-            let mut normal: Normal<N> = self.linearise_with(window, &fit, config, is_rough);
+            let mut normal: Normal<N> = self.linearise(window, &fit, config);
             let information = (0..start.len()).flat_map(|i| [3 * i, 3 * i + 1]);
             let information = information.map(|i| normal.matrix[i][i]).fold(0.0, f64::max);
             let known = normal.factorise(all);
@@ -227,13 +249,12 @@ impl Fitter {
             },
             ..*config
         };
-        if let [spot] = fit.spots.as_mut_slice() {
+        if let [spot] = fit.spots.as_slice() {
             // The profiles are those of the last step, a fraction of the standard error away.
-            let one = one_spot(spot, fit.background, window, &noise_only);
-            let axes = [&self.across[0], &self.down[0]];
+            let light = self.light_of(0, spot, window);
+            let pixels = pixels_of(window, fit, &noise_only);
             let error2 = window.background_noise * window.background_noise;
-            let variance = flux_variance(&one, axes, &window.data, window.width, error2);
-            spot.noise_flux = variance.sqrt();
+            fit.spots[0].noise_flux = flux_variance(&light, &pixels, error2).sqrt();
             return;
         }
         if fit.spots.len() == 2 {
@@ -262,45 +283,45 @@ impl Fitter {
         }
     }
 
-    /// Light of all spots, without background, in the pixel at `column`, `row` of the window.
-    fn light(&self, fit: &Fit, column: usize, row: usize) -> f64 {
-        fit.spots
-            .iter()
-            .enumerate()
-            .map(|(i, spot)| spot.flux * self.across[i].value[column] * self.down[i].value[row])
-            .sum()
-    }
-
     /// The spots' profiles along both sides of the window.
-    fn fill_profiles(&mut self, window: &Window, fit: &Fit) {
-        self.across
-            .resize_with(fit.spots.len().max(self.across.len()), Default::default);
-        self.down
-            .resize_with(fit.spots.len().max(self.down.len()), Default::default);
-        for (i, spot) in fit.spots.iter().enumerate() {
-            self.across[i].fill(spot.x - window.x0 as f64, fit.spot_px, window.width);
-            self.down[i].fill(spot.y - window.y0 as f64, fit.spot_px, window.height);
+    fn fill_profiles(&mut self, window: &Window, spots: &[Spot], spot_px: f64) {
+        if self.profiles.len() < spots.len() {
+            self.profiles.resize_with(spots.len(), Default::default);
+        }
+        for (spot, [across, down]) in spots.iter().zip(&mut self.profiles) {
+            across.fill(spot.x - window.x0 as f64, spot_px, window.width);
+            down.fill(spot.y - window.y0 as f64, spot_px, window.height);
         }
     }
 
-    /// Calls `visit(data, light, column, row)` for each pixel with a value.
-    pub fn for_each_pixel(
+    /// The light of the spot whose profiles are number `index`.
+    fn light_of(&self, index: usize, spot: &Spot, window: &Window) -> SpotLight<'_> {
+        SpotLight {
+            flux: (spot.flux / window.noise_adu) as f32,
+            axes: &self.profiles[index],
+        }
+    }
+
+    /// Value above the fitted background, and fitted light, of each pixel with a value, in units of the noise.
+    pub fn compare(
         &mut self,
         window: &Window,
         fit: &Fit,
-        mut visit: impl FnMut(f64, f64, f64),
-    ) {
-        self.fill_profiles(window, fit);
-        for row in 0..window.height {
-            for column in 0..window.width {
-                let data = window.data[row * window.width + column];
-                if !data.is_nan() {
-                    let light = self.light(fit, column, row);
-                    let shape = self.across[0].value[column] * self.down[0].value[row];
-                    visit(data, light, shape);
-                }
-            }
+    ) -> impl Iterator<Item = (f64, f64)> + Clone {
+        let mut light = std::mem::take(&mut self.light);
+        light.clear();
+        light.resize(window.data.len(), [0.0; LANES]);
+        self.fill_profiles(window, &fit.spots, fit.spot_px);
+        for (i, spot) in fit.spots.iter().enumerate() {
+            let of_spot = self.light_of(i, spot, window);
+            add_light(&of_spot, 1.0, window.groups(), &mut light);
         }
+        self.light = light;
+        let background = fit.background / window.noise_adu;
+        let pixels = window.data.as_flattened().iter();
+        let both = pixels.zip(self.light.as_flattened());
+        both.filter(|(data, _)| !data.is_nan())
+            .map(move |(&data, &light)| (f64::from(data) - background, f64::from(light)))
     }
 
     /// The direction in which the light about the first spot is drawn out: a unit vector, or `None`.
@@ -308,12 +329,10 @@ impl Fitter {
         let spot = fit.spots[0];
         let (x, y) = (spot.x - window.x0 as f64, spot.y - window.y0 as f64);
         let (mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0);
-        let noise = window.noise_variance.sqrt();
-        for (i, value) in window.data.iter().enumerate() {
-            let above = value - fit.background - noise;
+        for (column, row, value) in window.pixels_adu() {
+            let above = value - fit.background - window.noise_adu;
             if above > 0.0 {
-                let dx = (i % window.width) as f64 - x;
-                let dy = (i / window.width) as f64 - y;
+                let (dx, dy) = (column - x, row - y);
                 xx += above * dx * dx;
                 yy += above * dy * dy;
                 xy += above * dx * dy;
@@ -323,48 +342,35 @@ impl Fitter {
         angle.is_finite().then(|| (angle.cos(), angle.sin()))
     }
 
-    /// Calls `visit(residual, light, leverage)` for each pixel with a value, at the solution `fit` of a
-    /// fit with `config`; the leverage, to be called for, is the part of a pixel's noise that the parameters take up.
-    pub fn for_each_residual(
-        &mut self,
-        window: &Window,
+    /// The normal equations of one spot at `fit`, factorised, and what they are of; `None` where they have no solution.
+    pub fn factorised<'a>(
+        &'a mut self,
+        window: &'a Window,
         fit: &Fit,
         config: &FitConfig,
-        visit: impl FnMut(f64, f64, &dyn Fn() -> f64),
-    ) {
-        if fit.spots.len() == 1 {
-            self.residuals_up_to::<ONE_SPOT>(window, fit, config, visit);
-        } else {
-            self.residuals_up_to::<MAX_PARAMETERS>(window, fit, config, visit);
-        }
+    ) -> Option<(Factor<ONE_SPOT>, SpotLight<'a>, Pixels<'a>)> {
+        let [spot] = fit.spots.as_slice() else {
+            return None;
+        };
+        let mut normal: Normal<ONE_SPOT> = self.linearise(window, fit, config);
+        let is_solvable = normal.factorise(ONE_SPOT) == ONE_SPOT;
+        is_solvable.then(|| {
+            let pixels = pixels_of(window, fit, config);
+            (
+                normal.factor(&pixels),
+                self.light_of(0, spot, window),
+                pixels,
+            )
+        })
     }
 
-    fn residuals_up_to<const N: usize>(
-        &mut self,
-        window: &Window,
-        fit: &Fit,
-        config: &FitConfig,
-        mut visit: impl FnMut(f64, f64, &dyn Fn() -> f64),
-    ) {
-        let mut normal: Normal<N> = self.linearise(window, fit, config);
-        let count = parameter_count(fit.spots.len(), config);
-        if normal.factorise(count) < count {
-            return;
-        }
-        self.for_each_gradient(window, fit, config, |gradient, residual, light, weight| {
-            visit(residual, light, &|| {
-                normal.leverage(gradient, weight, count)
-            });
-        });
-    }
-
-    /// Takes the light of the spots in `fit` out of the window.
-    pub fn subtract(&mut self, window: &mut Window, fit: &Fit) {
-        self.fill_profiles(window, fit);
-        for row in 0..window.height {
-            for column in 0..window.width {
-                window.data[row * window.width + column] -= self.light(fit, column, row);
-            }
+    /// Takes the light of spots of this size out of the window.
+    pub fn subtract(&mut self, window: &mut Window, spots: &[Spot], spot_px: f64) {
+        let groups = window.groups();
+        for spot in spots {
+            self.fill_profiles(window, &[*spot], spot_px);
+            let light = self.light_of(0, spot, window);
+            add_light(&light, -1.0, groups, &mut window.data);
         }
     }
 
@@ -375,34 +381,13 @@ impl Fitter {
         fit: &Fit,
         config: &FitConfig,
     ) -> Normal<N> {
-        self.linearise_with(window, fit, config, false)
-    }
-
-    /// The same; a single spot without its size where that `is_held`.
-    fn linearise_with<const N: usize>(
-        &mut self,
-        window: &Window,
-        fit: &Fit,
-        config: &FitConfig,
-        is_held: bool,
-    ) -> Normal<N> {
-        let count = 3 * fit.spots.len() + 2;
         let mut normal = Normal::empty();
-        if let [spot] = fit.spots.as_slice() {
-            let one = one_spot(spot, fit.background, window, config);
-            self.fill_profiles(window, fit);
-            let axes = [&self.across[0], &self.down[0]];
-            normal.add_one_spot(&one, axes, (&window.data, window.width), is_held);
-        } else {
-            self.for_each_gradient(window, fit, config, |gradient, residual, _, weight| {
-                // With a count known beforehand the loops need not be loops.
-                if count == N {
-                    normal.add(&gradient[..N], residual, weight);
-                } else {
-                    normal.add(&gradient[..count], residual, weight);
-                }
-            });
-        }
+        self.fill_profiles(window, &fit.spots, fit.spot_px);
+        let spots = fit.spots.iter().enumerate();
+        let lights: ArrayVec<_, MAX_SPOTS> = spots
+            .map(|(i, spot)| self.light_of(i, spot, window))
+            .collect();
+        add_pixels(&mut normal, &lights, &pixels_of(window, fit, config));
         let b = 3 * fit.spots.len();
         let weight = 1.0 / (window.background_error * window.background_error);
         normal.matrix[b][b] += weight;
@@ -410,64 +395,19 @@ impl Fitter {
         normal.chi2 += weight * fit.background * fit.background;
         normal
     }
-
-    /// Calls `visit(gradient, residual, light, weight)` for each pixel with a value.
-    #[inline]
-    fn for_each_gradient(
-        &mut self,
-        window: &Window,
-        fit: &Fit,
-        config: &FitConfig,
-        mut visit: impl FnMut(&[f64; MAX_PARAMETERS], f64, f64, f64),
-    ) {
-        self.fill_profiles(window, fit);
-        let spots = fit.spots.len();
-        let mut gradient = [0.0; MAX_PARAMETERS];
-        gradient[3 * spots] = 1.0;
-        let noise = config.noise;
-        for row in 0..window.height {
-            for column in 0..window.width {
-                let data = window.data[row * window.width + column];
-                if data.is_nan() {
-                    continue;
-                }
-                let mut light = 0.0;
-                let mut by_size = 0.0;
-                for (i, spot) in fit.spots.iter().enumerate() {
-                    let (a, d) = (&self.across[i], &self.down[i]);
-                    let shape = a.value[column] * d.value[row];
-                    light += spot.flux * shape;
-                    gradient[3 * i] = spot.flux * a.by_center[column] * d.value[row];
-                    gradient[3 * i + 1] = spot.flux * a.value[column] * d.by_center[row];
-                    gradient[3 * i + 2] = shape;
-                    by_size += spot.flux
-                        * (a.by_sigma[column] * d.value[row] + a.value[column] * d.by_sigma[row]);
-                }
-                gradient[3 * spots + 1] = by_size;
-                let positive = light.max(0.0);
-                let variance = window.noise_variance
-                    + noise.shot_adu * positive
-                    + noise.model_error2 * positive * positive;
-                visit(
-                    &gradient,
-                    data - light - fit.background,
-                    light,
-                    1.0 / variance,
-                );
-            }
-        }
-    }
 }
 
-/// A spot and what surrounds it.
-fn one_spot(spot: &Spot, background: f64, window: &Window, config: &FitConfig) -> OneSpot {
-    OneSpot {
-        flux: spot.flux,
-        background,
+/// The pixels of a window, and what the fit adds to the light in them.
+fn pixels_of<'a>(window: &'a Window, fit: &Fit, config: &FitConfig) -> Pixels<'a> {
+    let per_noise = 1.0 / window.noise_adu;
+    Pixels {
+        data: &window.data,
+        groups: window.groups(),
+        per_noise,
+        background: (fit.background * per_noise) as f32,
         variance: [
-            window.noise_variance,
-            config.noise.shot_adu,
-            config.noise.model_error2,
+            (config.noise.shot_adu * per_noise) as f32,
+            config.noise.model_error2 as f32,
         ],
     }
 }
@@ -529,7 +469,7 @@ fn finish<const N: usize>(
     // The size comes last: the leading block of the factor is that of a fit without it.
     if known == all {
         fit.size_excess_px = normal.solve_last(all);
-        fit.size_error_px = normal.inverse[all - 1];
+        fit.size_error_px = normal.inverse[all - 1].sqrt();
     }
 }
 
@@ -544,26 +484,23 @@ mod tests {
     use super::*;
 
     fn window_with(spots: &[Spot], sigma: f64, side: usize) -> Window {
-        let mut data = vec![0.0; side * side];
-        let (mut across, mut down) = (AxisProfile::default(), AxisProfile::default());
-        for spot in spots {
-            across.fill(spot.x, sigma, side);
-            down.fill(spot.y, sigma, side);
-            for y in 0..side {
-                for x in 0..side {
-                    data[y * side + x] += spot.flux * across.value[x] * down.value[y];
-                }
-            }
-        }
-        Window {
+        let in_row = |i: usize| if i < side { 0.0 } else { f32::NAN };
+        let mut window = Window {
             width: side,
             height: side,
-            data,
-            noise_variance: 25.0,
+            data: vec![std::array::from_fn(in_row); side],
+            noise_adu: 5.0,
             background_error: 1.0,
             background_noise: 1.0,
             ..Window::default()
-        }
+        };
+        let negative = spots.iter().map(|spot| Spot {
+            flux: -spot.flux,
+            ..*spot
+        });
+        let negative: Spots = negative.collect();
+        Fitter::default().subtract(&mut window, &negative, sigma);
+        window
     }
 
     fn spot(x: f64, y: f64, flux: f64) -> Spot {
@@ -619,7 +556,7 @@ mod tests {
     #[test]
     fn without_data_there_is_no_result_and_no_panic() {
         let mut window = window_with(&[], 0.9, 9);
-        window.data.fill(f64::NAN);
+        window.data.fill([f32::NAN; LANES]);
         let fit = Fitter::default().fit(&window, &[spot(4.0, 4.0, 1.0)], &CONFIG);
         assert!(!fit.converged && fit.spots[0].sigma_x.is_infinite());
     }

@@ -242,12 +242,13 @@ impl Measurement<'_> {
         let FitWork { fitter, window, .. } = work;
         self.scene.cut(&fit.spots[..1], radius, window);
         self.scene.subtract(beyond, fitter, window);
-        fitter.subtract(window, fit);
+        fitter.subtract(window, &fit.spots, fit.spot_px);
         let (mut most, mut place) = (0.0, None);
         for row in 1..window.height.saturating_sub(1) {
             for column in 1..window.width.saturating_sub(1) {
                 let light: f64 = (row - 1..row + 2)
-                    .flat_map(|r| &window.data[r * window.width + column - 1..][..3])
+                    .flat_map(|r| (column - 1..column + 2).map(move |c| (c, r)))
+                    .map(|(c, r)| window.at(c, r))
                     .sum();
                 // NaN, where a pixel is left out, is not more.
                 if light > most {
@@ -259,7 +260,7 @@ impl Measurement<'_> {
         let remainder = Spot {
             x: x as f64,
             y: y as f64,
-            flux: LIGHT_IN_ALL * most,
+            flux: LIGHT_IN_ALL * most * window.noise_adu,
             ..Spot::default()
         };
         Some([fit.spots[0], remainder])
@@ -275,22 +276,22 @@ impl Measurement<'_> {
     ) -> Option<Fit> {
         let config = self.fit_config();
         let mut two = self.fit_fixed(start, beyond, work);
-        if !two.converged {
-            return None;
-        }
-        work.fitter.set_flux_noise(&work.window, &mut two, &config);
-        let one = work.fitter.fit(&work.window, &fit.spots[..1], &config);
         let [a, b] = two.spots.first_chunk::<2>().copied()?;
         let is_real = |s: Spot| {
             s.flux > PAIR_MIN_FLUX_SIGMA * s.sigma_flux && is_placed(&s, self.scene.spot_px)
         };
         let separation_px = (a.x - b.x).hypot(a.y - b.y);
         // What is left must be like noise: a nebula is no pair.
-        let is_good =
-            two.chi2 < PAIR_MAX_CHI2 * two.degrees.max(1.0) && one.chi2 - two.chi2 > 0.5 * one.chi2;
-        if !(is_real(a) && is_real(b) && is_good && separation_px > self.width_px()) {
+        let is_good = two.chi2 < PAIR_MAX_CHI2 * two.degrees.max(1.0);
+        let is_apart = separation_px > self.width_px();
+        if !(two.converged && is_real(a) && is_real(b) && is_good && is_apart) {
             return None;
         }
+        let one = work.fitter.fit(&work.window, &fit.spots[..1], &config);
+        if one.chi2 - two.chi2 <= 0.5 * one.chi2 {
+            return None;
+        }
+        work.fitter.set_flux_noise(&work.window, &mut two, &config);
         if b.flux > a.flux {
             two.spots.swap(0, 1);
         }
@@ -322,8 +323,8 @@ impl Measurement<'_> {
         let level = f64::from(scene.background.at(peak.x as f32, peak.y as f32).0);
         // Where all pixels next to the peak are missing, others made it.
         let brightest = [1, window_radius(scene.spot_px)]
-            .map(|reach| brightest_within(reach, peak, &scene.view))
             .into_iter()
+            .map(|reach| brightest_within(reach, peak, &scene.view))
             .find(|level| level.is_finite());
         let margin = 2.0 * self.width_px();
         let border = spot.x < margin
@@ -350,12 +351,14 @@ impl Measurement<'_> {
     fn best_estimate(&self, fit: &Fit, peak: &Peak, region: &Region) -> Spot {
         let spot = fit.spots[0];
         let correlation = self.scene.correlation_at(spot.x, spot.y);
-        let guess = self.scene.first_guess(peak);
-        let guess = Spot {
-            sigma_x: region.major_px.max(self.width_px()),
-            sigma_y: region.major_px.max(self.width_px()),
-            noise_flux: guess.flux / f64::from(peak.snr),
-            ..guess
+        let by_filter = || {
+            let guess = self.scene.first_guess(peak);
+            Spot {
+                sigma_x: region.major_px.max(self.width_px()),
+                sigma_y: region.major_px.max(self.width_px()),
+                noise_flux: guess.flux / f64::from(peak.snr),
+                ..guess
+            }
         };
         let mut fitted = Spot {
             sigma_x: spot.sigma_x * correlation,
@@ -364,10 +367,11 @@ impl Measurement<'_> {
             ..spot
         };
         if !is_placed(&spot, fit.spot_px) || (peak.saturated && !fit.converged) {
-            return self.by_area(peak, correlation, guess);
+            return self.by_area(peak, correlation, by_filter());
         }
         let has_flux = spot.flux > 0.0 && fitted.noise_flux > 0.0 && fitted.noise_flux.is_finite();
         if !has_flux {
+            let guess = by_filter();
             (fitted.flux, fitted.noise_flux) = (guess.flux, guess.noise_flux);
         }
         fitted
@@ -417,8 +421,10 @@ fn is_placed(spot: &Spot, spot_px: f64) -> bool {
 fn hold_inside(spot: &mut Spot, width: usize, height: usize) {
     let hold = |at: &mut f64, sigma: &mut f64, side: usize| {
         let inside = at.clamp(-0.5, side as f64 - 0.5);
-        *sigma = sigma.hypot(*at - inside);
-        *at = inside;
+        if *at != inside {
+            *sigma = sigma.hypot(*at - inside);
+            *at = inside;
+        }
     };
     hold(&mut spot.x, &mut spot.sigma_x, width);
     hold(&mut spot.y, &mut spot.sigma_y, height);

@@ -322,9 +322,10 @@ fn own_per_mixed(spot_px: f64) -> f64 {
     for place in 0..PLACES {
         let center = radius as f64 + (place as f64 + 0.5) / PLACES as f64 - 0.5;
         profile.fill(center, spot_px, 2 * radius + 1);
-        for pair in profile.value[..2 * radius + 1].windows(2) {
-            own += pair[0].powi(3);
-            mixed += 0.5 * pair[0] * pair[1] * (pair[0] + pair[1]);
+        for pair in profile.values()[..2 * radius + 1].windows(2) {
+            let [first, second] = [pair[0], pair[1]].map(f64::from);
+            own += first.powi(3);
+            mixed += 0.5 * first * second * (first + second);
         }
     }
     own / mixed

@@ -1,28 +1,25 @@
-//! The normal equations of a weighted least-squares fit, and their solution by Cholesky's method.
+//! The normal equations of a weighted least-squares fit, and their solution by Cholesky's method without roots: A = L D Lᵀ.
 
 #![allow(
     clippy::needless_range_loop,
     reason = "rows and columns of matrices read best as indices"
 )]
 
-use super::psf::AxisProfile;
+use super::fit::{MAX_PARAMETERS, MAX_SPOTS};
+use super::psf::{AxisProfile, LANES, Lanes, ProfilePart};
 use multiversion::multiversion;
 
-/// Pixels of a row treated together.
-const LANES: usize = 8;
 /// Parameters of one spot: x, y, flux, background, size.
 pub(super) const ONE_SPOT: usize = 5;
-/// The same with the size held.
-const PLACED_SPOT: usize = ONE_SPOT - 1;
-/// Entries of the lower triangle for one spot.
-const TRIANGLE: usize = ONE_SPOT * (ONE_SPOT + 1) / 2;
+/// Parameters of two spots, by far the most frequent group.
+pub(super) const TWO_SPOTS: usize = 3 * 2 + 2;
 
 /// One linearised step for up to `N` parameters: normal matrix, right-hand side, chi².
 #[derive(Debug, Clone)]
 pub(super) struct Normal<const N: usize> {
-    /// Lower triangle; after [`Self::factorise`] the Cholesky factor.
+    /// Lower triangle; after [`Self::factorise`] that of the factor L below its diagonal of ones.
     pub matrix: [[f64; N]; N],
-    /// One over the factor's diagonal.
+    /// One over the diagonal D.
     pub inverse: [f64; N],
     /// Gradient of chi², halved and negative.
     pub right: [f64; N],
@@ -44,56 +41,14 @@ impl<const N: usize> Normal<N> {
         }
     }
 
-    /// Adds one pixel; only the lower triangle is kept.
-    #[inline(always)]
-    pub fn add(&mut self, gradient: &[f64], residual: f64, weight: f64) {
-        for (i, &g) in gradient.iter().enumerate() {
-            let weighted = g * weight;
-            self.right[i] += weighted * residual;
-            for (entry, &h) in self.matrix[i][..=i].iter_mut().zip(gradient) {
-                *entry += weighted * h;
-            }
-        }
-        self.chi2 += residual * residual * weight;
-        self.pixels += 1;
-    }
-
-    /// Adds the pixels of a window, row-major and of some width, in which there is one spot, whose light along x and y is
-    /// in `axes`; without its size where that `is_held`.
-    pub fn add_one_spot(
-        &mut self,
-        spot: &OneSpot,
-        axes: [&AxisProfile; 2],
-        (data, width): (&[f64], usize),
-        is_held: bool,
-    ) {
-        if width == 0 {
-            return;
-        }
-        let mut sums = Normal::empty();
-        if is_held {
-            sum_placed_spot(spot, axes, data, width, &mut sums);
-        } else {
-            sum_one_spot(spot, axes, data, width, &mut sums);
-        }
-        for (i, row) in sums.matrix.iter().enumerate() {
-            self.matrix[i][..ONE_SPOT].copy_from_slice(row);
-        }
-        self.right[..ONE_SPOT].copy_from_slice(&sums.right);
-        self.chi2 += sums.chi2;
-        self.pixels += sums.pixels;
-    }
-
-    /// Cholesky factor in place of the lower triangle; the number of rows done before the matrix was
+    /// The factor in place of the lower triangle; the number of rows done before the matrix was
     /// found not to be positive definite, or `count`.
     pub fn factorise(&mut self, count: usize) -> usize {
         // With a count known beforehand the loops need not be loops.
-        if count == ONE_SPOT {
-            self.factorise_first(ONE_SPOT)
-        } else if count == PLACED_SPOT {
-            self.factorise_first(PLACED_SPOT)
-        } else {
-            self.factorise_first(count)
+        match N - count {
+            0 => self.factorise_first(N),
+            1 => self.factorise_first(N - 1),
+            _ => self.factorise_first(count),
         }
     }
 
@@ -101,231 +56,303 @@ impl<const N: usize> Normal<N> {
     fn factorise_first(&mut self, count: usize) -> usize {
         let matrix = &mut self.matrix;
         for i in 0..count {
-            for j in 0..=i {
-                let mut rest = matrix[i][j];
+            let mut diagonal = matrix[i][i];
+            for j in 0..i {
+                // The row times D, as it is until its turn to be divided.
                 for k in 0..j {
-                    rest -= matrix[i][k] * matrix[j][k];
-                }
-                if i == j {
-                    if !(rest > 0.0 && rest.is_finite()) {
-                        return i;
-                    }
-                    matrix[i][i] = rest.sqrt();
-                    self.inverse[i] = 1.0 / matrix[i][i];
-                } else {
-                    matrix[i][j] = rest * self.inverse[j];
+                    matrix[i][j] -= matrix[i][k] * matrix[j][k];
                 }
             }
+            for j in 0..i {
+                let times_d = matrix[i][j];
+                matrix[i][j] *= self.inverse[j];
+                diagonal -= times_d * matrix[i][j];
+            }
+            if !(diagonal > 0.0 && diagonal.is_finite()) {
+                return i;
+            }
+            self.inverse[i] = 1.0 / diagonal;
         }
         count
     }
 
     /// The step of the first `count` parameters, after [`Self::factorise`].
     pub fn solve(&self, count: usize) -> [f64; N] {
-        let l = &self.matrix;
-        let mut x = self.right;
-        for i in 0..count {
-            for k in 0..i {
-                x[i] -= l[i][k] * x[k];
-            }
-            x[i] *= self.inverse[i];
+        match N - count {
+            0 => self.solve_first(N),
+            1 => self.solve_first(N - 1),
+            _ => self.solve_first(count),
         }
+    }
+
+    #[inline(always)]
+    fn solve_first(&self, count: usize) -> [f64; N] {
+        let mut x = self.forward(self.right, 0, count);
         for i in (0..count).rev() {
-            for k in i + 1..count {
-                x[i] -= l[k][i] * x[k];
-            }
             x[i] *= self.inverse[i];
+            for k in i + 1..count {
+                x[i] -= self.matrix[k][i] * x[k];
+            }
         }
         x
     }
 
     /// The last of the steps of the first `count` parameters, after [`Self::factorise`].
     pub fn solve_last(&self, count: usize) -> f64 {
-        let mut x = self.right;
-        for i in 0..count {
-            for k in 0..i {
-                x[i] -= self.matrix[i][k] * x[k];
-            }
-            x[i] *= self.inverse[i];
-        }
-        x[count - 1] * self.inverse[count - 1]
+        self.forward(self.right, 0, count)[count - 1] * self.inverse[count - 1]
     }
 
     /// The variances of the first `count` parameters, after [`Self::factorise`].
     pub fn variances(&self, count: usize) -> [f64; N] {
-        let l = &self.matrix;
         let mut variances = [0.0; N];
-        // Column by column: L⁻¹, whose squared columns sum to the diagonal of (L Lᵀ)⁻¹.
+        // Column by column: L⁻¹, whose squared columns over D sum to the diagonal of (L D Lᵀ)⁻¹.
         for (column, variance) in variances.iter_mut().enumerate().take(count) {
-            let mut x = [0.0; N];
+            let mut unit = [0.0; N];
+            unit[column] = 1.0;
+            let x = self.forward(unit, column, count);
             for i in column..count {
-                let mut rest = if i == column { 1.0 } else { 0.0 };
-                for k in column..i {
-                    rest -= l[i][k] * x[k];
-                }
-                x[i] = rest * self.inverse[i];
-                *variance += x[i] * x[i];
+                *variance += x[i] * x[i] * self.inverse[i];
             }
         }
         variances
     }
 
-    /// Part of a pixel's noise that the first `count` parameters take up, after [`Self::factorise`].
-    pub fn leverage(&self, gradient: &[f64], weight: f64, count: usize) -> f64 {
-        let mut x = [0.0; N];
-        let mut leverage = 0.0;
-        for i in 0..count {
-            let mut rest = gradient[i];
-            for k in 0..i {
-                rest -= self.matrix[i][k] * x[k];
+    /// L⁻¹ x, for an x that is 0 before `first`.
+    #[inline(always)]
+    fn forward(&self, mut x: [f64; N], first: usize, count: usize) -> [f64; N] {
+        for i in first..count {
+            for k in first..i {
+                x[i] -= self.matrix[i][k] * x[k];
             }
-            x[i] = rest * self.inverse[i];
-            leverage += x[i] * x[i] * weight;
+        }
+        x
+    }
+
+    /// The factor of the equations of one spot, after [`Self::factorise`], for gradients in units of the noise.
+    pub fn factor(&self, pixels: &Pixels<'_>) -> Factor<N> {
+        let mut factor = Factor {
+            lower: [[0.0; N]; N],
+            inverse: [0.0; N],
+        };
+        for i in 0..N {
+            let unit = pixels.unit(i, 1);
+            factor.inverse[i] = (self.inverse[i] * unit * unit) as f32;
+            for k in 0..i {
+                factor.lower[i][k] = (self.matrix[i][k] * pixels.unit(k, 1) / unit) as f32;
+            }
+        }
+        factor
+    }
+}
+
+/// The factors L and D of normal equations, in single precision.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Factor<const N: usize> {
+    /// L below its diagonal.
+    lower: [[f32; N]; N],
+    /// One over D.
+    inverse: [f32; N],
+}
+
+impl<const N: usize> Factor<N> {
+    /// Part of a pixel's noise that the parameters take up, over the pixel's weight.
+    #[inline(always)]
+    pub fn leverage(&self, gradient: &[f32; N]) -> f32 {
+        let mut x = *gradient;
+        let mut leverage = 0.0;
+        for i in 0..N {
+            for k in 0..i {
+                x[i] -= self.lower[i][k] * x[k];
+            }
+            leverage += x[i] * x[i] * self.inverse[i];
         }
         leverage
     }
 }
 
-/// A spot and what surrounds it, where the equations are linearised.
+/// Pixels of a window, and what is added to the light in them, in units of the noise of the background: so single
+/// precision does, whatever the units of the frame are.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct OneSpot {
-    /// Light, in ADU.
-    pub flux: f64,
-    /// Background above the map, in ADU.
-    pub background: f64,
-    /// Variance of a pixel without light, per ADU of light, and per squared ADU of light.
-    pub variance: [f64; 3],
+pub(super) struct Pixels<'a> {
+    /// Row after row, each in so many whole groups; NaN is left out.
+    pub data: &'a [Lanes],
+    /// Groups in a row.
+    pub groups: usize,
+    /// One over the unit, in ADU⁻¹.
+    pub per_noise: f64,
+    /// Background above the map.
+    pub background: f32,
+    /// Variance of a pixel per light, and per squared light.
+    pub variance: [f32; 2],
 }
 
-/// The sums over `data`, row-major, `width` columns, for a spot whose light along x and y is in
-/// `axes`: the same as adding pixel by pixel.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn sum_one_spot(
-    spot: &OneSpot,
-    axes: [&AxisProfile; 2],
-    data: &[f64],
-    width: usize,
-    out: &mut Normal<ONE_SPOT>,
-) {
-    sum_parameters::<ONE_SPOT>(spot, axes, data, width, out);
+impl Pixels<'_> {
+    /// All rows of one group of columns.
+    #[inline(always)]
+    pub fn column_of_groups(&self, group: usize) -> impl Iterator<Item = Lanes> {
+        self.data.iter().skip(group).step_by(self.groups).copied()
+    }
+
+    /// The variance of a pixel with some light.
+    #[inline(always)]
+    pub fn variance(&self, light: f32) -> f32 {
+        let [linear, square] = self.variance;
+        let positive = if light > 0.0 { light } else { 0.0 };
+        1.0 + positive * (linear + square * positive)
+    }
+
+    /// What a parameter's derivatives are multiplied with: those of light are per noise.
+    #[inline(always)]
+    pub fn unit(&self, parameter: usize, spots: usize) -> f64 {
+        let is_light = if parameter < 3 * spots {
+            parameter % 3 == 2
+        } else {
+            parameter == 3 * spots
+        };
+        if is_light { self.per_noise } else { 1.0 }
+    }
 }
 
-/// The same without the size.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn sum_placed_spot(
-    spot: &OneSpot,
-    axes: [&AxisProfile; 2],
-    data: &[f64],
-    width: usize,
-    out: &mut Normal<ONE_SPOT>,
-) {
-    sum_parameters::<PLACED_SPOT>(spot, axes, data, width, out);
+/// A spot's light along both sides of a window.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SpotLight<'a> {
+    /// Light, in units of the noise.
+    pub flux: f32,
+    /// Where it falls along x and y.
+    pub axes: &'a [AxisProfile; 2],
 }
 
-/// The sums for the first `P` parameters of one spot.
+/// A spot's light in a group of pixels of a row.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct GroupLight {
+    flux: f32,
+    across: ProfilePart<Lanes>,
+    down: ProfilePart<f32>,
+}
+
+impl SpotLight<'_> {
+    /// The light in a group of columns of a row.
+    #[inline(always)]
+    pub fn in_group(&self, group: usize, row: usize) -> GroupLight {
+        let [across, down] = self.axes;
+        GroupLight {
+            flux: self.flux,
+            across: across.group(group),
+            down: down.pixel(row),
+        }
+    }
+}
+
+/// The light in a pixel, and how the model changes there with the parameters of the first `count` spots, in units of the
+/// noise.
 #[inline(always)]
-fn sum_parameters<const P: usize>(
-    spot: &OneSpot,
-    axes: [&AxisProfile; 2],
-    data: &[f64],
-    width: usize,
-    out: &mut Normal<ONE_SPOT>,
-) {
-    let mut matrix = [[0.0f64; LANES]; TRIANGLE];
-    let mut right = [[0.0f64; LANES]; ONE_SPOT];
-    let mut chi2 = [0.0f64; LANES];
-    let mut pixels = [0.0f64; LANES];
-    let [across, down] = axes;
-    let [constant, linear, square] = spot.variance;
-    let profile = |values: &[f64], start: usize| -> [f64; LANES] {
-        values[start..]
-            .first_chunk()
-            .copied()
-            .unwrap_or([0.0; LANES])
-    };
-    for start in (0..width).step_by(LANES) {
-        let value = profile(&across.value, start);
-        let by_center = profile(&across.by_center, start);
-        let by_sigma = profile(&across.by_sigma, start);
-        let columns = (width - start).min(LANES);
-        let gap = std::array::from_fn(|lane| if lane < columns { 0.0 } else { f64::NAN });
-        for row in 0..data.len() / width {
-            let pixel = pixels_of(&data[row * width + start..], columns, &gap);
-            let (d, d_center, d_sigma) = (down.value[row], down.by_center[row], down.by_sigma[row]);
-            let mut gradient = [[1.0f64; LANES]; ONE_SPOT];
-            let mut weight = [0.0f64; LANES];
-            let mut residual = [0.0f64; LANES];
-            for lane in 0..LANES {
-                let shape = value[lane] * d;
-                let light = spot.flux * shape;
-                gradient[0][lane] = spot.flux * by_center[lane] * d;
-                gradient[1][lane] = spot.flux * value[lane] * d_center;
-                gradient[2][lane] = shape;
-                gradient[4][lane] = spot.flux * (by_sigma[lane] * d + value[lane] * d_sigma);
-                let positive = if light > 0.0 { light } else { 0.0 };
-                let variance = constant + positive * (linear + square * positive);
-                let is_valid = !pixel[lane].is_nan();
-                let difference = pixel[lane] - light - spot.background;
-                weight[lane] = if is_valid { 1.0 / variance } else { 0.0 };
-                residual[lane] = if is_valid { difference } else { 0.0 };
-                pixels[lane] += if is_valid { 1.0 } else { 0.0 };
-                chi2[lane] += residual[lane] * residual[lane] * weight[lane];
-            }
-            let mut entry = 0;
-            for i in 0..P {
-                let mut weighted = [0.0f64; LANES];
-                for lane in 0..LANES {
-                    weighted[lane] = gradient[i][lane] * weight[lane];
-                    right[i][lane] += weighted[lane] * residual[lane];
-                }
-                for j in 0..=i {
-                    for lane in 0..LANES {
-                        matrix[entry][lane] += weighted[lane] * gradient[j][lane];
-                    }
-                    entry += 1;
-                }
-            }
-        }
+pub(super) fn linearise<const S: usize, const N: usize>(
+    spots: &[GroupLight; S],
+    count: usize,
+    lane: usize,
+) -> (f32, [f32; N]) {
+    let background = 3 * count;
+    let mut light = 0.0;
+    let mut gradient = [0.0; N];
+    gradient[background] = 1.0;
+    for (i, spot) in spots.iter().enumerate().take(count) {
+        let (a, d) = (&spot.across, &spot.down);
+        let shape = a.value[lane] * d.value;
+        light += spot.flux * shape;
+        gradient[3 * i] = spot.flux * a.by_center[lane] * d.value;
+        gradient[3 * i + 1] = spot.flux * a.value[lane] * d.by_center;
+        gradient[3 * i + 2] = shape;
+        gradient[background + 1] +=
+            spot.flux * (a.by_sigma[lane] * d.value + a.value[lane] * d.by_sigma);
     }
-    let mut entry = 0;
-    for i in 0..P {
-        out.right[i] += sum_of(right[i]);
-        for j in 0..=i {
-            out.matrix[i][j] += sum_of(matrix[entry]);
-            entry += 1;
-        }
-    }
-    out.chi2 += sum_of(chi2);
-    out.pixels += sum_of(pixels) as usize;
+    (light, gradient)
 }
 
-/// The variance of the flux of one spot, fitted together with a background of variance
+/// Adds the pixels of a window, in which the light is that of `spots`.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+pub(super) fn add_pixels<const N: usize>(
+    normal: &mut Normal<N>,
+    spots: &[SpotLight],
+    pixels: &Pixels,
+) {
+    // With a count known beforehand the loops need not be loops.
+    match (N, spots) {
+        (ONE_SPOT, &[spot]) => add_up(normal, &[spot], 1, pixels),
+        (TWO_SPOTS, &[first, second]) => add_up(normal, &[first, second], 2, pixels),
+        (MAX_PARAMETERS, &[first, ..]) => {
+            let mut several = [first; MAX_SPOTS];
+            for (spot, from) in several.iter_mut().zip(spots) {
+                *spot = *from;
+            }
+            add_up(normal, &several, spots.len().min(MAX_SPOTS), pixels);
+        }
+        _ => {}
+    }
+}
+
+/// The same for the first `count` spots.
+#[inline(always)]
+fn add_up<const S: usize, const N: usize>(
+    normal: &mut Normal<N>,
+    spots: &[SpotLight<'_>; S],
+    count: usize,
+    pixels: &Pixels<'_>,
+) {
+    let parameters = 3 * count + 2;
+    let mut matrix = [[[0.0f32; LANES]; N]; N];
+    let mut right = [[0.0f32; LANES]; N];
+    let [mut chi2, mut valid] = [[0.0f32; LANES]; 2];
+    for group in 0..pixels.groups {
+        for (row, data) in pixels.column_of_groups(group).enumerate() {
+            let lights = spots.map(|spot| spot.in_group(group, row));
+            for lane in 0..LANES {
+                let (light, gradient) = linearise::<S, N>(&lights, count, lane);
+                let is_valid = !data[lane].is_nan();
+                let weight = 1.0 / pixels.variance(light);
+                let weight = if is_valid { weight } else { 0.0 };
+                let residual = data[lane] - light - pixels.background;
+                let residual = if is_valid { residual } else { 0.0 };
+                valid[lane] += if is_valid { 1.0 } else { 0.0 };
+                chi2[lane] += residual * residual * weight;
+                for i in 0..parameters {
+                    let weighted = gradient[i] * weight;
+                    right[i][lane] += weighted * residual;
+                    for j in 0..i + 1 {
+                        matrix[i][j][lane] += weighted * gradient[j];
+                    }
+                }
+            }
+        }
+    }
+    for i in 0..N {
+        let unit = pixels.unit(i, count);
+        normal.right[i] += sum_of(right[i]) * unit;
+        for j in 0..i + 1 {
+            normal.matrix[i][j] += sum_of(matrix[i][j]) * unit * pixels.unit(j, count);
+        }
+    }
+    normal.chi2 += sum_of(chi2);
+    normal.pixels += sum_of(valid) as usize;
+}
+
+/// The variance of the flux of one spot, in ADU², fitted together with a background of variance
 /// `background_error2`; the spot's place is held, on which a symmetric spot's flux does not depend.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(super) fn flux_variance(
-    spot: &OneSpot,
-    axes: [&AxisProfile; 2],
-    data: &[f64],
-    width: usize,
-    background_error2: f64,
-) -> f64 {
-    let mut sums = [[0.0f64; LANES]; 3];
-    let [across, down] = axes;
-    let [constant, linear, square] = spot.variance;
-    for start in (0..width).step_by(LANES) {
-        let value = across.value[start..].first_chunk::<LANES>();
-        let value = value.copied().unwrap_or([0.0; LANES]);
-        let columns = (width - start).min(LANES);
-        let gap = std::array::from_fn(|lane| if lane < columns { 0.0 } else { f64::NAN });
-        for row in 0..data.len() / width {
-            let pixel = pixels_of(&data[row * width + start..], columns, &gap);
+pub(super) fn flux_variance(spot: &SpotLight, pixels: &Pixels, background_error2: f64) -> f64 {
+    let mut sums = [[0.0f32; LANES]; 3];
+    let [across, down] = spot.axes;
+    for group in 0..pixels.groups {
+        let value = across.group(group).value;
+        for (row, data) in pixels.column_of_groups(group).enumerate() {
+            let down = down.pixel(row).value;
             for lane in 0..LANES {
-                let shape = value[lane] * down.value[row];
-                let light = spot.flux * shape;
-                let positive = if light > 0.0 { light } else { 0.0 };
-                let variance = constant + positive * (linear + square * positive);
-                let is_valid = !pixel[lane].is_nan();
-                let weight = if is_valid { 1.0 / variance } else { 0.0 };
+                let shape = value[lane] * down;
+                let variance = pixels.variance(spot.flux * shape);
+                let weight = if data[lane].is_nan() {
+                    0.0
+                } else {
+                    1.0 / variance
+                };
                 sums[0][lane] += weight;
                 sums[1][lane] += weight * shape;
                 sums[2][lane] += weight * shape * shape;
@@ -333,25 +360,29 @@ pub(super) fn flux_variance(
         }
     }
     let [ones, shapes, squares] = sums.map(sum_of);
-    1.0 / (squares - shapes * shapes / (ones + 1.0 / background_error2))
+    let per_noise2 = pixels.per_noise * pixels.per_noise;
+    1.0 / (per_noise2
+        * (squares - shapes * shapes / (ones + 1.0 / (per_noise2 * background_error2))))
 }
 
-/// The first `columns` of `data`, and NaN beyond: `gap` is NaN there, else 0.
-#[inline(always)]
-fn pixels_of(data: &[f64], columns: usize, gap: &[f64; LANES]) -> [f64; LANES] {
-    if let Some(pixels) = data.first_chunk::<LANES>() {
-        return std::array::from_fn(|lane| pixels[lane] + gap[lane]);
+/// Adds `sign` times the light of a spot to a window's pixels.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+pub(super) fn add_light(spot: &SpotLight, sign: f32, groups: usize, data: &mut [Lanes]) {
+    let [across, down] = spot.axes;
+    for group in 0..groups {
+        let value = across.group(group).value;
+        for (row, pixels) in data.iter_mut().skip(group).step_by(groups).enumerate() {
+            let light = sign * spot.flux * down.pixel(row).value;
+            for lane in 0..LANES {
+                pixels[lane] += value[lane] * light;
+            }
+        }
     }
-    let mut pixels = [f64::NAN; LANES];
-    for (pixel, &value) in pixels.iter_mut().zip(&data[..columns]) {
-        *pixel = value;
-    }
-    pixels
 }
 
 /// The sum, by halves: one after the other, each would wait for the one before.
 #[inline(always)]
-fn sum_of(v: [f64; LANES]) -> f64 {
-    let four: [f64; 4] = std::array::from_fn(|i| v[i] + v[i + 4]);
-    (four[0] + four[2]) + (four[1] + four[3])
+pub(super) fn sum_of(v: Lanes) -> f64 {
+    let four: [f32; 4] = std::array::from_fn(|i| v[i] + v[i + 4]);
+    f64::from((four[0] + four[2]) + (four[1] + four[3]))
 }

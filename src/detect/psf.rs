@@ -16,28 +16,33 @@ pub(super) const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
 /// The longest side of a fitting window, in pixels.
 pub(super) const MAX_WINDOW_PX: usize = 49;
 
-/// Room for a window's pixels in whole groups of either length.
-const PROFILE_PX: usize = 56;
+/// Pixels of a row treated together.
+pub(super) const LANES: usize = 8;
+/// Values of such pixels.
+pub(super) type Lanes = [f32; LANES];
+/// Groups that make up the longest side.
+const GROUPS: usize = MAX_WINDOW_PX.div_ceil(LANES);
 
 /// Light per pixel along one axis, and its derivatives.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct AxisProfile {
     /// Part of the light in each pixel.
-    pub value: [f64; PROFILE_PX],
+    value: [Lanes; GROUPS],
     /// Its derivative with respect to the centre, per px.
-    pub by_center: [f64; PROFILE_PX],
+    by_center: [Lanes; GROUPS],
     /// Its derivative with respect to σ, per px.
-    pub by_sigma: [f64; PROFILE_PX],
+    by_sigma: [Lanes; GROUPS],
 }
 
-impl Default for AxisProfile {
-    fn default() -> Self {
-        Self {
-            value: [0.0; PROFILE_PX],
-            by_center: [0.0; PROFILE_PX],
-            by_sigma: [0.0; PROFILE_PX],
-        }
-    }
+/// The same in some of the pixels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ProfilePart<T> {
+    /// Part of the light in a pixel.
+    pub value: T,
+    /// Its derivative with respect to the centre, per px.
+    pub by_center: T,
+    /// Its derivative with respect to σ, per px.
+    pub by_sigma: T,
 }
 
 impl AxisProfile {
@@ -45,42 +50,67 @@ impl AxisProfile {
     pub fn fill(&mut self, center_px: f64, sigma_px: f64, count: usize) {
         fill(self, center_px, sigma_px, count.min(MAX_WINDOW_PX));
     }
+
+    /// The light in the pixels, of which the first `count` were filled.
+    pub fn values(&self) -> &[f32] {
+        self.value.as_flattened()
+    }
+
+    /// All of a group of pixels.
+    #[inline(always)]
+    pub fn group(&self, group: usize) -> ProfilePart<Lanes> {
+        ProfilePart {
+            value: self.value[group],
+            by_center: self.by_center[group],
+            by_sigma: self.by_sigma[group],
+        }
+    }
+
+    /// All of one pixel.
+    #[inline(always)]
+    pub fn pixel(&self, pixel: usize) -> ProfilePart<f32> {
+        ProfilePart {
+            value: self.value.as_flattened()[pixel],
+            by_center: self.by_center.as_flattened()[pixel],
+            by_sigma: self.by_sigma.as_flattened()[pixel],
+        }
+    }
 }
 
 /// Edges of pixels treated together: of one pixel less.
-const LANES: usize = 8;
+const EDGES: usize = 8;
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn fill(profile: &mut AxisProfile, center_px: f64, sigma_px: f64, count: usize) {
     let scale = 1.0 / (std::f64::consts::SQRT_2 * sigma_px);
     let density = std::f64::consts::FRAC_2_SQRT_PI * 0.5 * scale;
     let by_sigma_scale = density / sigma_px;
-    for start in (0..count).step_by(LANES - 1) {
+    let values = profile.value.as_flattened_mut();
+    let by_center = profile.by_center.as_flattened_mut();
+    let by_size = profile.by_sigma.as_flattened_mut();
+    for start in (0..count).step_by(EDGES - 1) {
         let first = start as f64 - 0.5 - center_px;
         // At each edge between pixels: half the erf, the density, and that times the distance over σ.
-        let mut half_erf = [0.0f64; LANES];
-        let mut gauss = [0.0f64; LANES];
-        let mut by_sigma = [0.0f64; LANES];
-        for lane in 0..LANES {
-            let distance = first + lane as i32 as f64;
+        let mut half_erf = [0.0f64; EDGES];
+        let mut gauss = [0.0f64; EDGES];
+        let mut by_sigma = [0.0f64; EDGES];
+        for edge in 0..EDGES {
+            let distance = first + edge as i32 as f64;
             let (erf, exp) = erf_and_gauss(distance * scale);
-            half_erf[lane] = 0.5 * erf;
-            gauss[lane] = exp * density;
-            by_sigma[lane] = distance * exp * by_sigma_scale;
+            half_erf[edge] = 0.5 * erf;
+            gauss[edge] = exp * density;
+            by_sigma[edge] = distance * exp * by_sigma_scale;
         }
         // A whole group is written: the profiles have room for it.
-        let part = start..start + LANES - 1;
-        let values = profile.value[part.clone()].iter_mut();
-        for (value, edges) in values.zip(half_erf.windows(2)) {
-            *value = edges[1] - edges[0];
+        let part = start..start + EDGES - 1;
+        for (value, edges) in values[part.clone()].iter_mut().zip(half_erf.windows(2)) {
+            *value = (edges[1] - edges[0]) as f32;
         }
-        let slopes = profile.by_center[part.clone()].iter_mut();
-        for (slope, edges) in slopes.zip(gauss.windows(2)) {
-            *slope = edges[0] - edges[1];
+        for (slope, edges) in by_center[part.clone()].iter_mut().zip(gauss.windows(2)) {
+            *slope = (edges[0] - edges[1]) as f32;
         }
-        let slopes = profile.by_sigma[part].iter_mut();
-        for (slope, edges) in slopes.zip(by_sigma.windows(2)) {
-            *slope = edges[0] - edges[1];
+        for (slope, edges) in by_size[part].iter_mut().zip(by_sigma.windows(2)) {
+            *slope = (edges[0] - edges[1]) as f32;
         }
     }
 }
@@ -166,13 +196,9 @@ mod tests {
         for sigma in [0.3, 0.5, 1.0, 2.0] {
             let mut profile = AxisProfile::default();
             profile.fill(12.3, sigma, 25);
-            let sum: f64 = profile.value.iter().sum();
-            let mean: f64 = profile
-                .value
-                .iter()
-                .enumerate()
-                .map(|(i, v)| i as f64 * v)
-                .sum();
+            let values = || profile.values()[..25].iter().copied().map(f64::from);
+            let sum: f64 = values().sum();
+            let mean: f64 = values().enumerate().map(|(i, v)| i as f64 * v).sum();
             assert!((sum - 1.0).abs() < 1e-6, "{sum}");
             // Below σ = 0.5 the mean of the pixels is not that of the spot: undersampling.
             assert!(
@@ -192,18 +218,21 @@ mod tests {
 
     #[test]
     fn derivatives_agree_with_differences() {
-        let (mut low, mut high, mut mid) = Default::default();
+        let mut low = AxisProfile::default();
+        let (mut high, mut mid) = (low.clone(), low.clone());
         let fill = |p: &mut AxisProfile, c, s| p.fill(c, s, 9);
         fill(&mut mid, 4.2, 0.8);
         fill(&mut low, 4.2 - 1e-3, 0.8);
         fill(&mut high, 4.2 + 1e-3, 0.8);
+        let slope = |i| (high.pixel(i).value - low.pixel(i).value) / 2e-3;
         for i in 0..9 {
-            assert!(((high.value[i] - low.value[i]) / 2e-3 - mid.by_center[i]).abs() < 2e-4);
+            assert!((slope(i) - mid.pixel(i).by_center).abs() < 2e-4);
         }
         fill(&mut low, 4.2, 0.8 - 1e-3);
         fill(&mut high, 4.2, 0.8 + 1e-3);
+        let slope = |i| (high.pixel(i).value - low.pixel(i).value) / 2e-3;
         for i in 0..9 {
-            assert!(((high.value[i] - low.value[i]) / 2e-3 - mid.by_sigma[i]).abs() < 2e-4);
+            assert!((slope(i) - mid.pixel(i).by_sigma).abs() < 2e-4);
         }
     }
 }

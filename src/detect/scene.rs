@@ -2,9 +2,10 @@
 
 use super::background::Mesh;
 use super::components::Peak;
-use super::fit::{Fit, FitConfig, Fitter, NoiseModel, Spot, Spots, Window, window_radius};
-use super::psf::MAX_WINDOW_PX;
+use super::fit::{Fit, FitConfig, Fitter, NoiseModel, Spot, Window, window_radius};
+use super::psf::{LANES, MAX_WINDOW_PX};
 use super::view::View;
+use multiversion::multiversion;
 
 /// Standard error of the background map over the noise of a pixel: what the map's cells leave.
 const BACKGROUND_ERROR: f64 = 0.15;
@@ -76,46 +77,30 @@ impl Scene<'_> {
         window.height = y1.saturating_sub(y0).min(MAX_WINDOW_PX);
         let (cx, cy) = (x0 + window.width / 2, y0 + window.height / 2);
         let noise = self.noise_at(cx as f64, cy as f64);
-        window.noise_variance = noise * noise;
+        window.noise_adu = noise;
         let peak = points.iter().map(|p| p.flux).fold(0.0, f64::max) * self.matched_gain;
         window.background_noise = BACKGROUND_ERROR * noise;
-        window.background_error = window.background_noise.hypot(HALO_ERROR * peak);
+        let halo_error = HALO_ERROR * peak;
+        window.background_error = (window.background_noise.powi(2) + halo_error.powi(2)).sqrt();
         self.fill(window);
     }
 
     /// Copies the window's pixels, less a plane through the background map.
     fn fill(&self, window: &mut Window) {
-        let level = |x: usize, y: usize| f64::from(self.background.at(x as f32, y as f32).0);
+        let level = |x: usize, y: usize| self.background.at(x as f32, y as f32).0;
         let (x0, y0) = (window.x0, window.y0);
         let corner = level(x0, y0);
-        let across = (level(x0 + window.width, y0) - corner) / window.width.max(1) as f64;
-        let down = (level(x0, y0 + window.height) - corner) / window.height.max(1) as f64;
-        window.data.clear();
-        for row in 0..window.height {
-            let pixels = &self.view.row(y0 + row)[x0..x0 + window.width];
-            let start = corner + row as f64 * down;
-            window
-                .data
-                .extend(pixels.iter().enumerate().map(|(column, &p)| {
-                    if p >= self.saturation_adu {
-                        f64::NAN
-                    } else {
-                        f64::from(p) - (start + column as f64 * across)
-                    }
-                }));
-        }
+        let plane = Plane {
+            corner,
+            across: (level(x0 + window.width, y0) - corner) / window.width.max(1) as f32,
+            down: (level(x0, y0 + window.height) - corner) / window.height.max(1) as f32,
+        };
+        copy_above(&self.view, plane, self.saturation_adu, window);
     }
 
     /// Takes the light of `spots` out of the window.
     pub fn subtract(&self, spots: &[Spot], fitter: &mut Fitter, window: &mut Window) {
-        for &spot in spots {
-            let fit = Fit {
-                spots: Spots::from_iter([spot]),
-                spot_px: self.spot_px,
-                ..Fit::default()
-            };
-            fitter.subtract(window, &fit);
-        }
+        fitter.subtract(window, spots, self.spot_px);
     }
 
     /// Fits one spot of free size, which is `spot_px` at first, in a window that follows the size; the
@@ -149,6 +134,48 @@ impl Scene<'_> {
     }
 }
 
+/// The background in a window.
+#[derive(Debug, Clone, Copy)]
+struct Plane {
+    /// Its level in the first pixel, in ADU.
+    corner: f32,
+    /// How it rises from column to column.
+    across: f32,
+    /// How it rises from row to row.
+    down: f32,
+}
+
+/// Copies the pixels of a window, those that are saturated left out, in units of the noise above the background.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn copy_above(view: &View, plane: Plane, saturation_adu: f32, window: &mut Window) {
+    let groups = window.groups();
+    window.data.resize(groups * window.height, [0.0; LANES]);
+    let per_noise = (1.0 / window.noise_adu) as f32;
+    for group in 0..groups {
+        let first = group * LANES;
+        let columns = (window.width - first).min(LANES);
+        for row in 0..window.height {
+            let pixels = &view.row(window.y0 + row)[window.x0 + first..];
+            let pixels = pixels.first_chunk().copied().unwrap_or_else(|| {
+                let mut part = [f32::NAN; LANES];
+                part[..columns].copy_from_slice(&pixels[..columns]);
+                part
+            });
+            let start = plane.corner + row as f32 * plane.down + first as f32 * plane.across;
+            let above = &mut window.data[row * groups + group];
+            for lane in 0..LANES {
+                let is_used = lane < columns && pixels[lane] < saturation_adu;
+                let level = start + lane as i32 as f32 * plane.across;
+                above[lane] = if is_used {
+                    (pixels[lane] - level) * per_noise
+                } else {
+                    f32::NAN
+                };
+            }
+        }
+    }
+}
+
 /// Buffers of the fits.
 #[derive(Debug, Clone, Default)]
 pub(super) struct FitWork {
@@ -160,6 +187,4 @@ pub(super) struct FitWork {
     pub kept_window: Window,
     /// The spots that shine into the window and are not fitted.
     pub beyond: Vec<Spot>,
-    /// Light and residual of the pixels of a window.
-    pub residuals: Vec<(f64, f64)>,
 }

@@ -71,22 +71,18 @@ fn is_hot_pixel(measurement: &Measurement<'_>, peak: &Peak, fit: &Fit, work: &mu
     };
     let FitWork { fitter, window, .. } = work;
     let star = fitter.fit(window, &fit.spots[..1], &config);
-    let mut brightest = (0.0, 0.0);
-    fitter.for_each_pixel(window, &star, |data, light, _| {
-        let above = data - star.background;
-        if above > brightest.0 {
-            brightest = (above, light);
-        }
-    });
+    let pixels = fitter.compare(window, &star);
+    let brightest = pixels
+        .clone()
+        .fold(0.0f64, |most, (above, _)| most.max(above));
     let (mut difference, mut distance2) = (0.0, 0.0);
-    fitter.for_each_pixel(window, &star, |data, light, _| {
-        let above = data - star.background;
-        let single = if above == brightest.0 { above } else { 0.0 };
+    for (above, light) in pixels {
+        let single = if above == brightest { above } else { 0.0 };
         difference += (above - light).powi(2) - (above - single).powi(2);
         distance2 += (light - single).powi(2);
-    });
-    let scale = window.noise_variance * measurement.scene.correlation_at(spot.x, spot.y).powi(2);
-    let (difference, distance2) = (difference / scale, distance2 / scale);
+    }
+    let correlation2 = measurement.scene.correlation_at(spot.x, spot.y).powi(2);
+    let (difference, distance2) = (difference / correlation2, distance2 / correlation2);
     let unlike_a_star = difference + distance2 > STAR_LOST_SIGMA * 2.0 * distance2.sqrt();
     difference > imperfection(measurement, peak, &spot) && unlike_a_star
 }

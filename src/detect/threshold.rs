@@ -10,6 +10,7 @@
 //! doi 10.1093/biomet/asm004, for a field whose correlation is Gaussian in shape.
 
 use super::psf::{LEAST_EXPONENT, erf_and_gauss, exp_of_negative};
+use multiversion::multiversion;
 use std::f64::consts::{PI, SQRT_2};
 
 /// Steps of the outer integral, which spans [`SPAN`] above u.
@@ -47,18 +48,20 @@ impl Lower {
     }
 
     /// Q(ρ, z): the chance that both neighbours on one axis lie below z at a pixel whose value is z.
+    #[inline(always)]
     fn chance(&self, z: f64) -> f64 {
         let tail = 1.0 - erf_and_gauss(self.h * z / SQRT_2).0;
-        let both: f64 = self
-            .exponents
-            .iter()
-            .map(|exponent| exp_of_negative((-exponent * z * z).max(LEAST_EXPONENT)) * self.step)
-            .sum();
+        let mut parts = [0.0; PARTS];
+        for (part, exponent) in parts.iter_mut().zip(&self.exponents) {
+            *part = exp_of_negative((-exponent * z * z).max(LEAST_EXPONENT)) * self.step;
+        }
+        let both: f64 = parts.iter().sum();
         (1.0 - tail + both / PI).max(0.0)
     }
 }
 
 /// The chance per pixel that filtered noise has a local maximum above `u` standard deviations.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn false_alarm_probability(u: f64, across: &Lower, down: &Lower) -> f64 {
     let step = SPAN / STEPS as f64;
     let density = |z: f64| {
