@@ -7,8 +7,9 @@ use super::plateau::Plateau;
 use super::psf::PIXEL_VARIANCE_PX2;
 use super::scene::{FitWork, Scene};
 use super::shape;
+use super::strips::on_each;
 use super::view::View;
-use super::{CentroidMethod, Detection, DetectionFlags};
+use super::{CentroidMethod, Detection, DetectionFlags, Worker};
 use crate::coords::PixelPoint;
 
 /// Spots closer than this many of their standard deviations touch, and are fitted together.
@@ -47,23 +48,49 @@ pub(super) struct Measurement<'a> {
 }
 
 impl Measurement<'_> {
-    /// Measures all peaks, which come strongest first; the detections come in the same order.
+    /// Measures all peaks, which come strongest first.
     pub fn run(
         &self,
         peaks: &[Peak],
-        work: &mut FitWork,
+        workers: &mut [Worker],
         known: &mut KnownSpots,
         detections: &mut Vec<Detection>,
     ) {
-        known.near.sort(peaks, self.reach_px());
-        known.spots.clear();
-        let guesses = peaks.iter().map(|p| self.scene.first_guess(p));
-        known.spots.extend(guesses);
-        known.is_known.clear();
-        known.is_known.extend(peaks.iter().map(|p| !p.saturated));
-        let mut all = PeakList { peaks, known };
-        for index in 0..peaks.len() {
-            self.measure(index, &mut all, work, detections);
+        known.begin(peaks, self);
+        let threads = workers.len();
+        // What is alone can be measured in any order.
+        let KnownSpots { spots, alone, .. } = &*known;
+        on_each(workers, &|worker, thread| {
+            worker.found.clear();
+            for index in alone
+                .iter()
+                .map(|&i| i as usize)
+                .skip(thread)
+                .step_by(threads)
+            {
+                let place = Place {
+                    peaks,
+                    index,
+                    near: &[],
+                    start: Spots::from_iter([spots[index]]),
+                    beyond: &[],
+                };
+                self.measure(&place, &mut worker.fits, &mut worker.found);
+            }
+        });
+        for worker in workers.iter_mut() {
+            detections.append(&mut worker.found);
+        }
+        let Some(Worker { fits, .. }) = workers.first_mut() else {
+            return;
+        };
+        for i in 0..known.close.len() {
+            let index = known.close[i] as usize;
+            let place = known.place_of(index, peaks, TOUCHING_SIGMA * self.width_px());
+            if let Some(spot) = self.measure(&place, fits, detections) {
+                known.spots[index] = spot;
+                known.is_known[index] = true;
+            }
         }
     }
 
@@ -77,29 +104,22 @@ impl Measurement<'_> {
         (self.scene.spot_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt()
     }
 
-    /// Measures one peak; adds one detection, or two where it turns out to be a close pair.
+    /// Measures one peak; adds one detection, or two where it turns out to be a close pair. Its spot, if that is found.
     fn measure(
         &self,
-        index: usize,
-        all: &mut PeakList<'_>,
+        place: &Place<'_>,
         work: &mut FitWork,
         out: &mut Vec<Detection>,
-    ) {
-        let peaks = all.peaks;
-        let peak = &peaks[index];
+    ) -> Option<Spot> {
+        let Place { start, beyond, .. } = place;
+        let peak = &place.peaks[place.index];
         let region = &self.regions[peak.region];
-        let mut beyond = std::mem::take(&mut work.beyond);
-        let start = all.split(index, TOUCHING_SIGMA * self.width_px(), &mut beyond);
         let is_alone = start.len() == 1;
         let mut fit = if peak.saturated && is_alone {
-            self.scene.fit_free(
-                start[0],
-                &beyond,
-                (1.5 * self.scene.spot_px, self.noise),
-                work,
-            )
+            let size = (1.5 * self.scene.spot_px, self.noise);
+            self.scene.fit_free(start[0], beyond, size, work)
         } else {
-            self.fit_fixed(&start, &beyond, work)
+            self.fit_fixed(start, beyond, work)
         };
         // A fit that does not know the place to within the spot's width has found nothing.
         fit.converged &= is_placed(&fit.spots[0], fit.spot_px);
@@ -107,15 +127,14 @@ impl Measurement<'_> {
         fitter.set_flux_noise(window, &mut fit, &self.fit_config());
         let is_single = fit.converged && is_alone;
         let pair = if is_single && self.may_be_pair(&fit, peak, region) {
-            self.as_pair(&fit, &beyond, work)
+            self.as_pair(&fit, beyond, work)
         } else {
             None
         };
-        work.beyond = beyond;
+        let is_star = pair.is_none() && is_single && !peak.saturated;
         if let Some(mut pair) = pair {
             // Of two spots, one may be that of another peak, which has its own turn.
-            let mut is_others =
-                |spot| all.has_other_at(index, spot, TOUCHING_SIGMA * self.width_px());
+            let is_others = |spot| place.has_other_at(spot, TOUCHING_SIGMA * self.width_px());
             if is_others(pair.spots[0]) {
                 pair.spots.swap(0, 1);
             }
@@ -129,22 +148,15 @@ impl Measurement<'_> {
                 self.finish(&second, &mut companion, work, out);
             }
             fit = pair;
-        } else if is_single && !peak.saturated {
-            let mut detection = self.detection_of(&fit, peak, region);
-            shape::judge(self, peak, &fit, &mut detection, work);
-            all.known.spots[index] = fit.spots[0];
-            self.set_trail(peak, region, &mut detection);
-            self.finish(&fit, &mut detection, work, out);
-            return;
-        }
-        if fit.converged {
-            all.known.spots[index] = fit.spots[0];
-            all.known.is_known[index] = true;
         }
         let mut detection = self.detection_of(&fit, peak, region);
+        if is_star {
+            shape::judge(self, peak, &fit, &mut detection, work);
+        }
         detection.flags.blended = fit.spots.len() > 1;
         self.set_trail(peak, region, &mut detection);
         self.finish(&fit, &mut detection, work, out);
+        fit.converged.then(|| fit.spots[0])
     }
 
     /// Flags a trail, and places it in its middle, known along it to its length.
@@ -446,46 +458,77 @@ pub(super) struct KnownSpots {
     spots: Vec<Spot>,
     /// Whether that is any good: the filter does not know the light of a saturated one.
     is_known: Vec<bool>,
+    /// Peaks without others within reach, and those with.
+    alone: Vec<u32>,
+    close: Vec<u32>,
+    /// The spots that shine into the window of the one at hand and are not fitted.
+    beyond: Vec<Spot>,
 }
 
-/// All peaks, and what is known of their spots.
-struct PeakList<'a> {
-    peaks: &'a [Peak],
-    known: &'a mut KnownSpots,
-}
+impl KnownSpots {
+    /// Sorts the peaks, of whose spots only the filter's guess is known.
+    fn begin(&mut self, peaks: &[Peak], measurement: &Measurement<'_>) {
+        self.near.sort(peaks, measurement.reach_px());
+        self.spots.clear();
+        let guesses = peaks.iter().map(|p| measurement.scene.first_guess(p));
+        self.spots.extend(guesses);
+        self.is_known.clear();
+        self.is_known.extend(peaks.iter().map(|p| !p.saturated));
+        self.alone.clear();
+        self.close.clear();
+        for index in 0..peaks.len() {
+            self.near.find(peaks, index);
+            if self.near.found.is_empty() {
+                self.alone.push(index as u32);
+            } else {
+                self.close.push(index as u32);
+            }
+        }
+    }
 
-impl PeakList<'_> {
-    /// The spots of peak `index` and of those that touch it; those of the others that shine into its window go to `beyond`.
-    fn split(&mut self, index: usize, touching_px: f64, beyond: &mut Vec<Spot>) -> Spots {
-        let KnownSpots {
-            near,
-            spots,
-            is_known,
-        } = &mut *self.known;
-        near.find(self.peaks, index);
-        let mut start = Spots::new();
-        start.push(spots[index]);
-        beyond.clear();
-        for other in near.found.iter().map(|&found| found as usize) {
-            let (a, b) = (&self.peaks[index], &self.peaks[other]);
+    /// Peak `index`, with the spots of those that touch it, and of the others that shine into its window.
+    fn place_of<'a>(&'a mut self, index: usize, peaks: &'a [Peak], touching_px: f64) -> Place<'a> {
+        self.near.find(peaks, index);
+        let mut start = Spots::from_iter([self.spots[index]]);
+        self.beyond.clear();
+        for other in self.near.found.iter().map(|&found| found as usize) {
+            let (a, b) = (&peaks[index], &peaks[other]);
             let (dx, dy) = (a.x as f64 - b.x as f64, a.y as f64 - b.y as f64);
             let is_touching = dx * dx + dy * dy < touching_px * touching_px;
             if is_touching && start.len() < MAX_SPOTS {
-                start.push(spots[other]);
-            } else if is_known[other] {
-                beyond.push(spots[other]);
+                start.push(self.spots[other]);
+            } else if self.is_known[other] {
+                self.beyond.push(self.spots[other]);
             }
         }
-        start
+        Place {
+            peaks,
+            index,
+            near: &self.near.found,
+            start,
+            beyond: &self.beyond,
+        }
     }
+}
 
-    /// Whether a peak other than `index` is within `reach_px` of a spot, and nearer to it than `index`.
-    fn has_other_at(&mut self, index: usize, spot: Spot, reach_px: f64) -> bool {
+/// A peak, and what is around it.
+struct Place<'a> {
+    peaks: &'a [Peak],
+    index: usize,
+    /// The peaks within reach.
+    near: &'a [u32],
+    /// Its own spot, and those that touch it.
+    start: Spots,
+    /// Those of the others that shine into its window.
+    beyond: &'a [Spot],
+}
+
+impl Place<'_> {
+    /// Whether another peak is within `reach_px` of a spot, and nearer to it than this one.
+    fn has_other_at(&self, spot: Spot, reach_px: f64) -> bool {
         let distance = |peak: &Peak| (peak.x as f64 - spot.x).hypot(peak.y as f64 - spot.y);
-        let nearest_px = distance(&self.peaks[index]).min(reach_px);
-        let near = &mut self.known.near;
-        near.find(self.peaks, index);
-        let mut others = near.found.iter().map(|&other| &self.peaks[other as usize]);
+        let nearest_px = distance(&self.peaks[self.index]).min(reach_px);
+        let mut others = self.near.iter().map(|&other| &self.peaks[other as usize]);
         others.any(|other| distance(other) < nearest_px)
     }
 }

@@ -237,6 +237,8 @@ struct Worker {
     cells: CellScratch,
     raw_peaks: RawPeaks,
     band: Band,
+    fits: FitWork,
+    found: Vec<Detection>,
 }
 
 impl Workspace {
@@ -335,7 +337,7 @@ pub fn detect_into(
         .unwrap_or(f32::INFINITY)
         .min(stated_adu);
     let calibration = search_with_own_spot(&view, saturation_adu, config, workspace);
-    let mut fits = std::mem::take(&mut workspace.fits);
+    let mut workers = std::mem::take(&mut workspace.workers);
     let mut known_spots = std::mem::take(&mut workspace.known_spots);
     let measurement = Measurement {
         scene: scene_of(&view, saturation_adu, &calibration, workspace),
@@ -345,8 +347,8 @@ pub fn detect_into(
         threshold: calibration.threshold,
     };
     let peaks = &workspace.search.peaks;
-    measurement.run(peaks, &mut fits, &mut known_spots, &mut found.sources);
-    workspace.fits = fits;
+    measurement.run(peaks, &mut workers, &mut known_spots, &mut found.sources);
+    workspace.workers = workers;
     workspace.known_spots = known_spots;
     found.sources.sort_unstable_by(|a, b| {
         let place = |d: &Detection| (d.position.y, d.position.x);

@@ -185,6 +185,4 @@ pub(super) struct FitWork {
     pub window: Window,
     /// Those of a fit that is tried in another window.
     pub kept_window: Window,
-    /// The spots that shine into the window and are not fitted.
-    pub beyond: Vec<Spot>,
 }
