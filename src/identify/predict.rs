@@ -38,12 +38,11 @@ pub struct View<'a> {
     pub years_since_j2000: f64,
 }
 
-/// Catalogue stars around a direction, at a time: a field's are predicted many times, and looked up once.
+/// Catalogue stars around a direction: a field's are predicted many times, and looked up once.
 #[derive(Debug, Default)]
 pub struct Surroundings {
-    /// Brightest first, with their directions at that time.
-    stars: Vec<(GridStar, UnitVector<Icrs>)>,
-    found: Vec<GridStar>,
+    /// Brightest first.
+    stars: Vec<GridStar>,
     around: Option<Gathered>,
 }
 
@@ -53,7 +52,6 @@ struct Gathered {
     centre: UnitVector<Icrs>,
     radius_rad: f64,
     faintest_v_mag: f64,
-    years_since_j2000: f64,
 }
 
 impl View<'_> {
@@ -86,8 +84,9 @@ impl Surroundings {
         self.gather(view, sky, faintest_v_mag);
         let bright_enough = self
             .stars
-            .partition_point(|(star, _)| star.v_mag <= faintest_v_mag as f32);
-        project(view, &self.stars[..bright_enough], usize::MAX, predicted);
+            .partition_point(|star| star.v_mag <= faintest_v_mag as f32);
+        let stars = &self.stars[..bright_enough];
+        project(view, (sky, stars), usize::MAX, predicted);
     }
 
     /// Makes `predicted` the `count` brightest stars of [`View::stars_to`], or all of the catalogue's there are; most
@@ -102,7 +101,7 @@ impl Surroundings {
         let mut limit = likely_v_mag;
         loop {
             let gathered_to = self.gather(view, sky, limit);
-            project(view, &self.stars, count, predicted);
+            project(view, (sky, &self.stars), count, predicted);
             if predicted.len() >= count || gathered_to > sky.faintest_v_mag() {
                 return;
             }
@@ -113,31 +112,33 @@ impl Surroundings {
     /// Sees to it that all stars of `view` to a V magnitude are here; returns to which they are.
     fn gather(&mut self, view: &View, sky: &Sky, faintest_v_mag: f64) -> f64 {
         let (centre, reach_rad) = (view.boresight(), view.reach_rad());
-        let years_since_j2000 = view.years_since_j2000;
-        if let Some(around) = &self.around
-            && around.faintest_v_mag >= faintest_v_mag
-            && around.years_since_j2000 == years_since_j2000
-            && around.centre.angle_to(&centre) + reach_rad <= around.radius_rad
-        {
+        let covers =
+            |around: &Gathered| around.centre.angle_to(&centre) + reach_rad <= around.radius_rad;
+        let around = self.around.filter(covers).unwrap_or_else(|| {
+            self.stars.clear();
+            Gathered {
+                centre,
+                radius_rad: reach_rad * (1.0 + GATHERED_MARGIN),
+                faintest_v_mag: f64::NEG_INFINITY,
+            }
+        });
+        if around.faintest_v_mag >= faintest_v_mag {
             return around.faintest_v_mag;
         }
-        let radius_rad = reach_rad * (1.0 + GATHERED_MARGIN);
-        let found = &mut self.found;
-        found.clear();
-        let limit = faintest_v_mag as f32;
+        let (known, known_to) = (self.stars.len(), around.faintest_v_mag as f32);
+        let Gathered {
+            centre, radius_rad, ..
+        } = around;
         sky.grid
-            .for_each_within(&centre, radius_rad, limit, |star| found.push(*star));
-        found.sort_unstable_by_key(|star| star.catalog);
-        self.stars.clear();
-        self.stars.extend(found.iter().map(|star| {
-            let known = &sky.stars()[star.catalog as usize];
-            (*star, known.direction_at(years_since_j2000))
-        }));
+            .for_each_within(&centre, radius_rad, faintest_v_mag as f32, |star| {
+                if star.v_mag > known_to {
+                    self.stars.push(*star);
+                }
+            });
+        self.stars[known..].sort_unstable_by_key(|star| star.catalog);
         self.around = Some(Gathered {
-            centre,
-            radius_rad,
             faintest_v_mag,
-            years_since_j2000,
+            ..around
         });
         faintest_v_mag
     }
@@ -151,7 +152,7 @@ impl Surroundings {
 /// Makes `predicted` the first `count` of `stars` that are in the frame or nearly so.
 fn project(
     view: &View,
-    stars: &[(GridStar, UnitVector<Icrs>)],
+    (sky, stars): (&Sky, &[GridStar]),
     count: usize,
     predicted: &mut Vec<PredictedStar>,
 ) {
@@ -159,27 +160,26 @@ fn project(
     let margin_px = MARGIN * camera.width_px.hypot(camera.height_px);
     // The cone is rounder than the frame: most of what it holds beside it needs no closer look.
     let nearly_px = margin_px + UNDISTORTED_MARGIN * camera.radius_px();
-    let pinhole = CameraModel {
-        distortion: None,
-        ..*camera
-    };
+    let reach = [camera.width_px, camera.height_px]
+        .map(|extent_px| (0.5 * extent_px + nearly_px) / camera.focal_length_px);
     let (boresight, chord) = (view.boresight(), chord_of(view.reach_rad()));
-    let is_near = |direction: &UnitVector<Camera>| {
-        let pixel = pinhole.pixel_of(direction);
-        pixel.is_some_and(|pixel| camera.nearly_contains(&pixel, nearly_px))
+    let is_near = |star: &&GridStar| {
+        let d = view.icrs_to_camera.matrix() * star.vector();
+        d.z > 0.0 && d.x.abs() <= reach[0] * d.z && d.y.abs() <= reach[1] * d.z
     };
     let mut near = stars
         .iter()
-        .map(|(star, direction)| (star, direction, view.icrs_to_camera.apply(direction)))
-        .filter(|(.., in_camera)| is_near(in_camera))
-        .filter(|(star, ..)| star.is_within(boresight.as_vector(), chord * chord));
+        .filter(is_near)
+        .filter(|star| star.is_within(boresight.as_vector(), chord * chord));
     predicted.clear();
     loop {
         let mut lanes = [None; LANES];
         let mut in_camera = [UnitVector::BORESIGHT; LANES];
-        for ((lane, direction), found) in lanes.iter_mut().zip(&mut in_camera).zip(&mut near) {
-            *lane = Some((found.0, found.1));
-            *direction = found.2;
+        for ((lane, in_camera), star) in lanes.iter_mut().zip(&mut in_camera).zip(&mut near) {
+            let known = &sky.stars()[star.catalog as usize];
+            let direction = known.direction_at(view.years_since_j2000);
+            *in_camera = view.icrs_to_camera.apply(&direction);
+            *lane = Some((star, direction));
         }
         for (lane, pixel) in lanes.iter().zip(camera.pixels_of(&in_camera)) {
             let Some((star, direction)) = lane else {
@@ -193,7 +193,7 @@ fn project(
             }
             predicted.push(PredictedStar {
                 pixel,
-                direction: **direction,
+                direction: *direction,
                 v_mag: star.v_mag,
                 catalog: star.catalog as usize,
             });
