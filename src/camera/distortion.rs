@@ -71,15 +71,6 @@ pub(crate) fn monomials<const K: usize>([u, v]: [f64; 2]) -> [f64; K] {
 /// [`monomials`] for several offsets at once.
 #[inline(always)]
 pub(crate) fn monomials_in_lanes<const K: usize>([u, v]: [&[f64; LANES]; 2]) -> [[f64; LANES]; K] {
-    let powers_of = |offsets: &[f64; LANES]| {
-        let mut powers = [[1.0; LANES]; MAX_ORDER + 1];
-        for power in 1..=MAX_ORDER {
-            for lane in 0..LANES {
-                powers[power][lane] = powers[power - 1][lane] * offsets[lane];
-            }
-        }
-        powers
-    };
     let (u_powers, v_powers) = (powers_of(u), powers_of(v));
     let mut monomials = [[0.0; LANES]; K];
     for (monomial, [of_u, of_v]) in monomials.iter_mut().zip(const { powers::<K>() }) {
@@ -88,6 +79,17 @@ pub(crate) fn monomials_in_lanes<const K: usize>([u, v]: [&[f64; LANES]; 2]) -> 
         }
     }
     monomials
+}
+
+#[inline(always)]
+fn powers_of(offsets: &[f64; LANES]) -> [[f64; LANES]; MAX_ORDER + 1] {
+    let mut powers = [[1.0; LANES]; MAX_ORDER + 1];
+    for power in 1..=MAX_ORDER {
+        for lane in 0..LANES {
+            powers[power][lane] = powers[power - 1][lane] * offsets[lane];
+        }
+    }
+    powers
 }
 
 /// The powers of u and v in the first `K` monomials.

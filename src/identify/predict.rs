@@ -38,6 +38,15 @@ pub struct View<'a> {
     pub years_since_j2000: f64,
 }
 
+/// So many stars, and all that are so bright.
+#[derive(Debug, Clone, Copy)]
+pub struct Depth {
+    /// How many.
+    pub count: usize,
+    /// Down to which V magnitude.
+    pub v_mag: f64,
+}
+
 /// Catalogue stars around a direction: a field's are predicted many times, and looked up once.
 #[derive(Debug, Default)]
 pub struct Surroundings {
@@ -85,24 +94,27 @@ impl Surroundings {
         let bright_enough = self
             .stars
             .partition_point(|star| star.v_mag <= faintest_v_mag as f32);
-        let stars = &self.stars[..bright_enough];
-        project(view, (sky, stars), usize::MAX, predicted);
+        let all = Depth {
+            count: usize::MAX,
+            v_mag: faintest_v_mag,
+        };
+        project(view, (sky, &self.stars[..bright_enough]), &all, predicted);
     }
 
-    /// Makes `predicted` the `count` brightest stars of [`View::stars_to`], or all of the catalogue's there are; most
-    /// likely they are brighter than `likely_v_mag`.
-    pub fn brightest(
+    /// Makes `predicted` the brightest stars of [`View::stars_to`] to the depth `least`, or all of the catalogue's there are;
+    /// most likely the count is brighter than `likely_v_mag`.
+    pub fn stars_at_least(
         &mut self,
         view: &View,
         sky: &Sky,
-        (count, likely_v_mag): (usize, f64),
+        (least, likely_v_mag): (Depth, f64),
         predicted: &mut Vec<PredictedStar>,
     ) {
-        let mut limit = likely_v_mag;
+        let mut limit = likely_v_mag.max(least.v_mag);
         loop {
             let gathered_to = self.gather(view, sky, limit);
-            project(view, (sky, &self.stars), count, predicted);
-            if predicted.len() >= count || gathered_to > sky.faintest_v_mag() {
+            project(view, (sky, &self.stars), &least, predicted);
+            if predicted.len() >= least.count || gathered_to > sky.faintest_v_mag() {
                 return;
             }
             limit = gathered_to + DEEPER_MAG;
@@ -149,11 +161,11 @@ impl Surroundings {
     }
 }
 
-/// Makes `predicted` the first `count` of `stars` that are in the frame or nearly so.
+/// Makes `predicted` those of `stars`, brightest first, that are in the frame or nearly so, until there are so many that are so faint.
 fn project(
     view: &View,
     (sky, stars): (&Sky, &[GridStar]),
-    count: usize,
+    least: &Depth,
     predicted: &mut Vec<PredictedStar>,
 ) {
     let camera = view.camera;
@@ -188,7 +200,7 @@ fn project(
             let Some(pixel) = pixel.filter(|p| camera.nearly_contains(p, margin_px)) else {
                 continue;
             };
-            if predicted.len() == count {
+            if predicted.len() >= least.count && f64::from(star.v_mag) > least.v_mag {
                 return;
             }
             predicted.push(PredictedStar {

@@ -11,7 +11,7 @@
 //! looked for, and say nothing; every two parameters fitted beyond pointing, roll and scale use up another star. The stars used
 //! up are taken to be those least likely to agree by chance, which makes the most of the others' chances.
 
-use super::predict::{PredictedStar, Surroundings, View};
+use super::predict::{Depth, PredictedStar, Surroundings, View};
 use super::search::MAX_HYPOTHESES;
 use super::{ObservedStar, Photometry, Sky, StarField, StarMatch};
 use crate::attitude::POSE_PARAMETERS;
@@ -135,20 +135,7 @@ impl Hypothesis {
         around: &mut Surroundings,
         predicted: &mut Vec<PredictedStar>,
     ) {
-        let Scene { field, sky } = scene;
-        match field.photometry {
-            Photometry::JohnsonV => {
-                let faintest = observed.iter().map(|s| s.mag).fold(f64::MIN, f64::max);
-                let limit = faintest + field.photometry.tolerance_mag();
-                around.stars_to(&self.view(field), sky, limit, predicted);
-            }
-            Photometry::Instrumental => {
-                let count = observed.len() as f64 * PREDICTED_PER_OBSERVED;
-                let count = count.ceil() as usize + PREDICTED_EXTRA;
-                let likely = sky.magnitude_of_density(self.per_sq_deg(count));
-                around.brightest(&self.view(field), sky, (count, likely), predicted);
-            }
-        }
+        self.predict_to(scene, observed, f64::NEG_INFINITY, (around, predicted));
     }
 
     /// Makes `predicted` the catalogue stars in the frame that may be any of its stars, once the zero point is known: to what the
@@ -159,18 +146,40 @@ impl Hypothesis {
         around: &mut Surroundings,
         predicted: &mut Vec<PredictedStar>,
     ) {
+        let observed = &scene.field.stars;
+        let faint = (observed.len() as f64 * FAINT_SHARE) as usize;
+        let limit = observed.get(faint).map_or(f64::NEG_INFINITY, |star| {
+            star.mag + self.zero_point_mag + FAINT_ROOM_MAG
+        });
+        self.predict_to(scene, observed, limit, (around, predicted));
+    }
+
+    /// As [`Self::predict`], and to `limit_v_mag` at least.
+    fn predict_to(
+        &self,
+        scene: Scene,
+        observed: &[ObservedStar],
+        limit_v_mag: f64,
+        (around, predicted): (&mut Surroundings, &mut Vec<PredictedStar>),
+    ) {
         let Scene { field, sky } = scene;
-        self.predict(scene, &field.stars, around, predicted);
-        let faint = (field.stars.len() as f64 * FAINT_SHARE) as usize;
-        let limit = field
-            .stars
-            .get(faint)
-            .map(|star| star.mag + self.zero_point_mag + FAINT_ROOM_MAG);
-        let reached = predicted.last().map(|star| f64::from(star.v_mag));
-        if let Some(limit) = limit
-            && reached.is_some_and(|reached| reached < limit)
-        {
-            around.stars_to(&self.view(field), sky, limit, predicted);
+        let view = self.view(field);
+        match field.photometry {
+            Photometry::JohnsonV => {
+                let faintest = observed.iter().map(|s| s.mag).fold(f64::MIN, f64::max);
+                let limit = faintest + field.photometry.tolerance_mag();
+                around.stars_to(&view, sky, limit.max(limit_v_mag), predicted);
+            }
+            Photometry::Instrumental => {
+                let count = observed.len() as f64 * PREDICTED_PER_OBSERVED;
+                let count = count.ceil() as usize + PREDICTED_EXTRA;
+                let likely = sky.magnitude_of_density(self.per_sq_deg(count));
+                let least = Depth {
+                    count,
+                    v_mag: limit_v_mag,
+                };
+                around.stars_at_least(&view, sky, (least, likely), predicted);
+            }
         }
     }
 
