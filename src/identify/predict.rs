@@ -186,15 +186,22 @@ fn project(
     predicted.clear();
     loop {
         let mut lanes = [None; LANES];
-        let mut in_camera = [UnitVector::BORESIGHT; LANES];
-        for ((lane, in_camera), star) in lanes.iter_mut().zip(&mut in_camera).zip(&mut near) {
-            let known = &sky.stars()[star.catalog as usize];
-            let direction = known.direction_at(view.years_since_j2000);
-            *in_camera = view.icrs_to_camera.apply(&direction);
-            *lane = Some((star, direction));
+        for (lane, star) in lanes.iter_mut().zip(&mut near) {
+            *lane = Some(star);
         }
-        for (lane, pixel) in lanes.iter().zip(camera.pixels_of(&in_camera)) {
-            let Some((star, direction)) = lane else {
+        // One after the other without any decision: the memory of all is waited for at once.
+        let directions = lanes.map(|lane| {
+            lane.map_or(boresight, |star: &GridStar| {
+                sky.stars()[star.catalog as usize].direction_at(view.years_since_j2000)
+            })
+        });
+        let in_camera = directions.map(|direction| view.icrs_to_camera.apply(&direction));
+        for ((lane, direction), pixel) in lanes
+            .iter()
+            .zip(directions)
+            .zip(camera.pixels_of(&in_camera))
+        {
+            let Some(star) = lane else {
                 return;
             };
             let Some(pixel) = pixel.filter(|p| camera.nearly_contains(p, margin_px)) else {
@@ -205,7 +212,7 @@ fn project(
             }
             predicted.push(PredictedStar {
                 pixel,
-                direction: *direction,
+                direction,
                 v_mag: star.v_mag,
                 catalog: star.catalog as usize,
             });

@@ -518,12 +518,16 @@ impl FalseAlarm {
         let largest_px = self.radii_px.last().copied().unwrap_or(0.0);
         let radii_px = &self.radii_px;
         let near_px = |radius: usize| NEIGHBOURHOOD * radii_px[radius];
+        let reach_px = NEIGHBOURHOOD * largest_px;
         self.pairs.clear();
         for (index, star) in observed.iter().enumerate() {
             let alike = hypothesis.alike(star, &self.predicted, largest_mag);
             for (candidate, predicted) in self.predicted[alike.clone()].iter().zip(alike) {
+                if (candidate.pixel.x - star.position.x).abs() > reach_px {
+                    continue;
+                }
                 let apart_px = candidate.pixel.distance_to(&star.position);
-                if apart_px > near_px(radii_px.len() - 1) {
+                if apart_px > reach_px {
                     continue;
                 }
                 let mut radius = radii_px.len() - 1;
