@@ -158,8 +158,8 @@ impl<const P: usize, const K: usize> Sums<P, K> {
                 add_products(&mut self.vector[i], &common[i], rhs);
             }
             for (k, monomial) in rows.monomials.iter().enumerate() {
-                for j in 0..P {
-                    add_products(&mut self.coupling[axis][k][j], monomial, &common[j]);
+                for (sums, common) in self.coupling[axis][k].iter_mut().zip(common) {
+                    add_products(sums, monomial, common);
                 }
                 add_products(&mut self.vectors[axis][k], monomial, rhs);
             }
@@ -383,33 +383,26 @@ impl<'a, const P: usize, const K: usize> Adjustment<'a, P, K> {
     fn leverages(&self, rows: &Rows<P, K>, reduced: &Reduced<P, K>) -> [Lanes; 2] {
         let mut of_monomials = [[0.0; LANES]; K];
         let mut shared = [0.0; LANES];
-        for i in 0..K {
-            for j in 0..=i {
-                add_scaled(
-                    &mut of_monomials[i],
-                    self.inverse_root[(i, j)],
-                    &rows.monomials[j],
-                );
+        for (i, of_monomial) in of_monomials.iter_mut().enumerate() {
+            for (j, monomial) in rows.monomials[..=i].iter().enumerate() {
+                add_scaled(of_monomial, self.inverse_root[(i, j)], monomial);
             }
-            add_products(&mut shared, &of_monomials[i].clone(), &of_monomials[i]);
+            add_products(&mut shared, of_monomial, of_monomial);
         }
         let root = reduced.root.l_dirty();
         [0, 1].map(|axis: usize| {
             let (mut rest, mut leverage) = (rows.common[axis], shared);
             for i in 0..P {
-                for k in 0..K {
-                    add_scaled(
-                        &mut rest[i],
-                        -reduced.coupling[axis][(k, i)],
-                        &of_monomials[k],
-                    );
+                let (above, below) = rest.split_at_mut(i);
+                let this = &mut below[0];
+                for (k, of_monomial) in of_monomials.iter().enumerate() {
+                    add_scaled(this, -reduced.coupling[axis][(k, i)], of_monomial);
                 }
-                for j in 0..i {
-                    let above = rest[j];
-                    add_scaled(&mut rest[i], -root[(i, j)], &above);
+                for (j, above) in above.iter().enumerate() {
+                    add_scaled(this, -root[(i, j)], above);
                 }
-                rest[i] = rest[i].map(|value| value / root[(i, i)]);
-                add_products(&mut leverage, &rest[i].clone(), &rest[i]);
+                *this = this.map(|value| value / root[(i, i)]);
+                add_products(&mut leverage, this, this);
             }
             leverage
         })
