@@ -33,12 +33,14 @@ pub fn normal_cdf_and_density(z: f64) -> (f64, f64) {
         let z = entries.map(|entry| entry as f64 / TABLE_STEPS - TABLE_END);
         z.map(|z| (normal_cdf(z), normal_density(z))).collect()
     });
-    let place = ((z + TABLE_END) * TABLE_STEPS).round();
-    let Some((cdf, density)) = TABLE.get(place as usize).filter(|_| place >= 0.0) else {
+    // What is no number is beyond the table as well.
+    let is_within = z.abs() <= TABLE_END;
+    let place = ((z + TABLE_END) * TABLE_STEPS + 0.5) as usize;
+    let Some((cdf, density)) = TABLE.get(place).filter(|_| is_within) else {
         return (normal_cdf(z), normal_density(z));
     };
     // Taylor's series about the nearest entry, whose terms are Hermite's polynomials.
-    let z0 = place / TABLE_STEPS - TABLE_END;
+    let z0 = place as f64 / TABLE_STEPS - TABLE_END;
     let d = z - z0;
     let z0_sq = z0 * z0;
     let he = [
@@ -57,6 +59,37 @@ pub fn normal_cdf_and_density(z: f64) -> (f64, f64) {
         in_cdf -= he * power;
     }
     (cdf + density * in_cdf, density * in_density)
+}
+
+/// The logarithm of a product of many numbers from 1e-100 to 1: it is the logarithm that takes time, and few are needed.
+#[derive(Debug, Clone, Copy)]
+pub struct LnProduct {
+    ln: f64,
+    /// What is not in `ln` yet.
+    factor: f64,
+}
+
+impl LnProduct {
+    /// Of no numbers.
+    pub const ONE: Self = Self {
+        ln: 0.0,
+        factor: 1.0,
+    };
+
+    /// One number more.
+    #[inline]
+    pub fn multiply(&mut self, number: f64) {
+        self.factor *= number;
+        if self.factor < 1e-200 {
+            self.ln += self.factor.ln();
+            self.factor = 1.0;
+        }
+    }
+
+    /// The logarithm.
+    pub fn ln(&self) -> f64 {
+        self.ln + self.factor.ln()
+    }
 }
 
 /// The median of `values`, the upper of the two in the middle where their number is even; 0 where there are none. Changes their order.
@@ -156,6 +189,15 @@ mod tests {
         }
         assert!(normal_cdf_and_density(f64::NAN).0.is_nan());
         assert_eq!(normal_cdf_and_density(f64::INFINITY).0, 1.0);
+    }
+
+    #[test]
+    fn the_logarithm_of_a_product_is_the_sum_of_logarithms() {
+        let numbers = || (1..2000).map(|i| 10f64.powf(-f64::from(i) / 20.0));
+        let mut product = LnProduct::ONE;
+        numbers().for_each(|number| product.multiply(number));
+        let sum: f64 = numbers().map(f64::ln).sum();
+        assert!((product.ln() / sum - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -8,9 +8,11 @@
 //! in the small turn ω, since `dx = −ωx·x·y + ωy·(1 + x²) − ωz·y`, `dy = −ωx·(1 + y²) + ωy·x·y + ωz·x`.
 
 use crate::camera::{
-    CUBIC_MONOMIALS, CameraModel, Distortion, DistortionModel, QUINTIC_MONOMIALS, monomials,
+    CUBIC_MONOMIALS, CameraModel, Distortion, DistortionModel, LANES, QUINTIC_MONOMIALS,
+    monomials_in_lanes,
 };
 use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
+use multiversion::multiversion;
 use nalgebra::{Cholesky, Const, Matrix4, SMatrix, SVector, Vector3};
 
 /// A star whose place on the sky is known.
@@ -122,13 +124,58 @@ struct Adjustment<'a, const P: usize, const K: usize> {
     inverse_root: SMatrix<f64, K, K>,
 }
 
-/// The two equations of one star, divided by its standard error, without what the monomials add.
+/// A number for each of several stars, which are worked on at once.
+type Lanes = [f64; LANES];
+
+/// The two equations of several stars, divided by their standard errors, without what the monomials add.
 struct Rows<const P: usize, const K: usize> {
     /// Along x and y.
-    common: [SVector<f64, P>; 2],
+    common: [[Lanes; P]; 2],
     /// The coefficients of the monomials, the same along x and y.
-    monomials: SVector<f64, K>,
-    rhs: [f64; 2],
+    monomials: [Lanes; K],
+    rhs: [Lanes; 2],
+}
+
+/// What the normal equations are made of, summed over the stars of each lane.
+struct Sums<const P: usize, const K: usize> {
+    /// A, of which the part above the diagonal is left out, and what it is multiplied with.
+    block: [[Lanes; P]; P],
+    vector: [Lanes; P],
+    /// Bᵀ along x and y, and the same for the monomials.
+    coupling: [[[Lanes; P]; K]; 2],
+    vectors: [[Lanes; K]; 2],
+}
+
+impl<const P: usize, const K: usize> Sums<P, K> {
+    #[inline(always)]
+    fn add(&mut self, rows: &Rows<P, K>) {
+        for axis in 0..2 {
+            let (common, rhs) = (&rows.common[axis], &rows.rhs[axis]);
+            for i in 0..P {
+                for j in 0..=i {
+                    add_products(&mut self.block[i][j], &common[i], &common[j]);
+                }
+                add_products(&mut self.vector[i], &common[i], rhs);
+            }
+            for (k, monomial) in rows.monomials.iter().enumerate() {
+                for (sums, common) in self.coupling[axis][k].iter_mut().zip(common) {
+                    add_products(sums, monomial, common);
+                }
+                add_products(&mut self.vectors[axis][k], monomial, rhs);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn add_products(sums: &mut Lanes, a: &Lanes, b: &Lanes) {
+    for lane in 0..LANES {
+        sums[lane] += a[lane] * b[lane];
+    }
+}
+
+fn total(lanes: &Lanes) -> f64 {
+    lanes.iter().sum()
 }
 
 /// The normal equations, solved in part.
@@ -157,11 +204,8 @@ impl<'a, const P: usize, const K: usize> Adjustment<'a, P, K> {
             inverse_root: SMatrix::identity(),
         };
         if K > 0 {
-            let mut shared = SMatrix::<f64, K, K>::zeros();
-            for star in stars {
-                let monomials = adjustment.weighted_monomials(star);
-                shared.syger(1.0, &monomials, &monomials, 1.0);
-            }
+            let shared = shared_sums(&adjustment);
+            let shared = SMatrix::<f64, K, K>::from_fn(|i, j| total(&shared[i.max(j)][i.min(j)]));
             let root = shared.cholesky()?;
             root.l_dirty()
                 .solve_lower_triangular_mut(&mut adjustment.inverse_root);
@@ -173,68 +217,89 @@ impl<'a, const P: usize, const K: usize> Adjustment<'a, P, K> {
         P + 2 * K
     }
 
-    fn normalised(&self, star: &MeasuredStar) -> [f64; 2] {
-        let [u, v] = self.camera.offset_of(&star.pixel);
-        [u / self.radius_px, v / self.radius_px]
+    /// Offsets from the centre along u and v in units of the radius, and 1 / σ, which is 0 where there is no star.
+    #[inline(always)]
+    fn offsets_and_weights(&self, stars: &[MeasuredStar]) -> ([Lanes; 2], Lanes) {
+        let (mut offsets, mut weights) = ([[0.0; LANES]; 2], [0.0; LANES]);
+        for (lane, star) in stars.iter().enumerate().take(LANES) {
+            let [u, v] = self.camera.offset_of(&star.pixel);
+            offsets[0][lane] = u / self.radius_px;
+            offsets[1][lane] = v / self.radius_px;
+            weights[lane] = 1.0 / star.sigma_px;
+        }
+        (offsets, weights)
     }
 
-    fn weighted_monomials(&self, star: &MeasuredStar) -> SVector<f64, K> {
-        SVector::from(monomials::<K>(self.normalised(star))) * (-1.0 / star.sigma_px)
+    #[inline(always)]
+    fn weighted_monomials(&self, [u, v]: [&Lanes; 2], weights: &Lanes) -> [Lanes; K] {
+        let mut monomials = monomials_in_lanes::<K>([u, v]);
+        for monomial in &mut monomials {
+            for lane in 0..LANES {
+                monomial[lane] *= -weights[lane];
+            }
+        }
+        monomials
     }
 
     /// Tangent-plane coordinates of a star, `None` behind the camera.
+    #[inline(always)]
     fn tangent(&self, star: &MeasuredStar) -> Option<[f64; 2]> {
         let direction = self.icrs_to_camera.apply(&star.icrs);
         let d = direction.as_vector();
         (d.z > 0.0).then(|| [d.x / d.z, d.y / d.z])
     }
 
-    fn rows(&self, star: &MeasuredStar) -> Option<Rows<P, K>> {
+    /// The equations of [`LANES`] stars, or fewer. `None` if one is behind the camera.
+    #[inline(always)]
+    fn rows(&self, stars: &[MeasuredStar]) -> Option<Rows<P, K>> {
         let f = self.camera.focal_length_px;
-        let [x, y] = self.tangent(star)?;
-        let offset = self.camera.offset_of(&star.pixel);
-        let [u, v] = self.normalised(star);
-        let weight = 1.0 / star.sigma_px;
-        let pose = [[-x * y, 1.0 + x * x, -y, x], [-(1.0 + y * y), x * y, x, y]];
-        let r_sq = u * u + v * v;
-        // The terms of the distortion that are no monomials along one axis.
-        let terms = match self.model {
-            None => [[0.0; 2]; 2],
-            Some(DistortionModel::Radial) => [[u * r_sq, 0.0], [v * r_sq, 0.0]],
-            Some(_) => [[u, v], [-v, u]],
-        };
-        let common = |axis: usize| {
-            SVector::from_fn(
-                |parameter: usize, _| match parameter.checked_sub(POSE_PARAMETERS) {
-                    None => weight * f * pose[axis][parameter],
-                    Some(term) => -weight * terms[axis][term],
-                },
-            )
-        };
+        let ([u, v], weights) = self.offsets_and_weights(stars);
+        let [mut x, mut y] = [[0.0; LANES]; 2];
+        for (lane, star) in stars.iter().enumerate().take(LANES) {
+            [x[lane], y[lane]] = self.tangent(star)?;
+        }
+        let mut common = [[[0.0; LANES]; P]; 2];
+        let mut rhs = [[0.0; LANES]; 2];
+        for lane in 0..LANES {
+            let ([x, y], [u, v], weight) = ([x[lane], y[lane]], [u[lane], v[lane]], weights[lane]);
+            let pose = [[-x * y, 1.0 + x * x, -y, x], [-(1.0 + y * y), x * y, x, y]];
+            // The terms of the distortion that are no monomials along one axis.
+            let r_sq = u * u + v * v;
+            let terms = match self.model {
+                None => [[0.0; 2]; 2],
+                Some(DistortionModel::Radial) => [[u * r_sq, 0.0], [v * r_sq, 0.0]],
+                Some(_) => [[u, v], [-v, u]],
+            };
+            for axis in 0..2 {
+                for parameter in 0..P {
+                    common[axis][parameter][lane] = match parameter.checked_sub(POSE_PARAMETERS) {
+                        None => weight * f * pose[axis][parameter],
+                        Some(term) => -weight * terms[axis][term],
+                    };
+                }
+                let offset = [u, v][axis] * self.radius_px;
+                rhs[axis][lane] = weight * (offset - f * [x, y][axis]);
+            }
+        }
         Some(Rows {
-            common: [common(0), common(1)],
-            monomials: self.weighted_monomials(star),
-            rhs: [weight * (offset[0] - f * x), weight * (offset[1] - f * y)],
+            common,
+            monomials: self.weighted_monomials([&u, &v], &weights),
+            rhs,
         })
     }
 
     /// One Gauss-Newton step; returns its size (radians, and relative change of the focal length) and the normal equations
     /// that it was made with.
     fn step(&mut self) -> Option<(f64, Reduced<P, K>)> {
-        let mut block = SMatrix::<f64, P, P>::zeros();
-        let mut vector = SVector::<f64, P>::zeros();
-        let mut coupling = [SMatrix::<f64, K, P>::zeros(); 2];
-        let mut vectors = [SVector::<f64, K>::zeros(); 2];
-        for star in self.stars {
-            let rows = self.rows(star)?;
-            for axis in 0..2 {
-                let (common, rhs) = (&rows.common[axis], rows.rhs[axis]);
-                block.ger(1.0, common, common, 1.0);
-                vector.axpy(rhs, common, 1.0);
-                coupling[axis].ger(1.0, &rows.monomials, common, 1.0);
-                vectors[axis].axpy(rhs, &rows.monomials, 1.0);
-            }
-        }
+        let sums = sums(self)?;
+        let mut block =
+            SMatrix::<f64, P, P>::from_fn(|i, j| total(&sums.block[i.max(j)][i.min(j)]));
+        let mut vector = SVector::<f64, P>::from_fn(|i, _| total(&sums.vector[i]));
+        let mut coupling = [0, 1].map(|axis: usize| {
+            SMatrix::<f64, K, P>::from_fn(|k, j| total(&sums.coupling[axis][k][j]))
+        });
+        let mut vectors = [0, 1]
+            .map(|axis: usize| SVector::<f64, K>::from_fn(|k, _| total(&sums.vectors[axis][k])));
         for axis in 0..2 {
             coupling[axis] = self.inverse_root * coupling[axis];
             vectors[axis] = self.inverse_root * vectors[axis];
@@ -310,21 +375,96 @@ impl<'a, const P: usize, const K: usize> Adjustment<'a, P, K> {
 
     fn left_out_chi_sq(mut self) -> Option<f64> {
         let (_, reduced) = self.step()?;
-        let mut sum = 0.0;
-        for star in self.stars {
-            let rows = self.rows(star)?;
-            let residual_px = self.residual_px(star)?;
-            let of_monomials = self.inverse_root * rows.monomials;
-            for (axis, residual_px) in residual_px.into_iter().enumerate() {
-                let mut rest = rows.common[axis] - reduced.coupling[axis].tr_mul(&of_monomials);
-                reduced.root.l_dirty().solve_lower_triangular_mut(&mut rest);
-                let leverage = of_monomials.norm_squared() + rest.norm_squared();
-                let residual = residual_px / star.sigma_px;
-                sum += (residual / (1.0 - leverage).max(MIN_FREEDOM)).powi(2);
+        left_out_sum(&self, &reduced)
+    }
+
+    /// The share of each equation of some stars that it is fitted itself, along x and y.
+    #[inline(always)]
+    fn leverages(&self, rows: &Rows<P, K>, reduced: &Reduced<P, K>) -> [Lanes; 2] {
+        let mut of_monomials = [[0.0; LANES]; K];
+        let mut shared = [0.0; LANES];
+        for (i, of_monomial) in of_monomials.iter_mut().enumerate() {
+            for (j, monomial) in rows.monomials[..=i].iter().enumerate() {
+                add_scaled(of_monomial, self.inverse_root[(i, j)], monomial);
+            }
+            add_products(&mut shared, of_monomial, of_monomial);
+        }
+        let root = reduced.root.l_dirty();
+        [0, 1].map(|axis: usize| {
+            let (mut rest, mut leverage) = (rows.common[axis], shared);
+            for i in 0..P {
+                let (above, below) = rest.split_at_mut(i);
+                let this = &mut below[0];
+                for (k, of_monomial) in of_monomials.iter().enumerate() {
+                    add_scaled(this, -reduced.coupling[axis][(k, i)], of_monomial);
+                }
+                for (j, above) in above.iter().enumerate() {
+                    add_scaled(this, -root[(i, j)], above);
+                }
+                *this = this.map(|value| value / root[(i, i)]);
+                add_products(&mut leverage, this, this);
+            }
+            leverage
+        })
+    }
+}
+
+#[inline(always)]
+fn add_scaled(sums: &mut Lanes, factor: f64, values: &Lanes) {
+    for lane in 0..LANES {
+        sums[lane] += factor * values[lane];
+    }
+}
+
+/// C, of which the part above the diagonal is left out, summed over the stars of each lane.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn shared_sums<const P: usize, const K: usize>(adjustment: &Adjustment<P, K>) -> [[Lanes; K]; K] {
+    let mut sums = [[[0.0; LANES]; K]; K];
+    for stars in adjustment.stars.chunks(LANES) {
+        let ([u, v], weights) = adjustment.offsets_and_weights(stars);
+        let monomials = adjustment.weighted_monomials([&u, &v], &weights);
+        for i in 0..K {
+            for j in 0..=i {
+                add_products(&mut sums[i][j], &monomials[i], &monomials[j]);
             }
         }
-        Some(sum)
     }
+    sums
+}
+
+/// The sums of the normal equations; `None` if a star is behind the camera.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn sums<const P: usize, const K: usize>(adjustment: &Adjustment<P, K>) -> Option<Sums<P, K>> {
+    let mut sums = Sums {
+        block: [[[0.0; LANES]; P]; P],
+        vector: [[0.0; LANES]; P],
+        coupling: [[[[0.0; LANES]; P]; K]; 2],
+        vectors: [[[0.0; LANES]; K]; 2],
+    };
+    for stars in adjustment.stars.chunks(LANES) {
+        sums.add(&adjustment.rows(stars)?);
+    }
+    Some(sums)
+}
+
+/// Σ (residual / σ)² over all equations, each residual as if its equation had been left out of the fit.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn left_out_sum<const P: usize, const K: usize>(
+    adjustment: &Adjustment<P, K>,
+    reduced: &Reduced<P, K>,
+) -> Option<f64> {
+    let mut sum = 0.0;
+    for stars in adjustment.stars.chunks(LANES) {
+        let leverages = adjustment.leverages(&adjustment.rows(stars)?, reduced);
+        for (lane, star) in stars.iter().enumerate() {
+            let residual_px = adjustment.residual_px(star)?;
+            for axis in 0..2 {
+                let freedom = (1.0 - leverages[axis][lane]).max(MIN_FREEDOM);
+                sum += (residual_px[axis] / star.sigma_px / freedom).powi(2);
+            }
+        }
+    }
+    Some(sum)
 }
 
 #[cfg(test)]

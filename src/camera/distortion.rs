@@ -68,6 +68,30 @@ pub(crate) fn monomials<const K: usize>([u, v]: [f64; 2]) -> [f64; K] {
     powers.map(|[of_u, of_v]| u_powers[of_u] * v_powers[of_v])
 }
 
+/// [`monomials`] for several offsets at once.
+#[inline(always)]
+pub(crate) fn monomials_in_lanes<const K: usize>([u, v]: [&[f64; LANES]; 2]) -> [[f64; LANES]; K] {
+    let (u_powers, v_powers) = (powers_of(u), powers_of(v));
+    let mut monomials = [[0.0; LANES]; K];
+    for (monomial, [of_u, of_v]) in monomials.iter_mut().zip(const { powers::<K>() }) {
+        for lane in 0..LANES {
+            monomial[lane] = u_powers[of_u][lane] * v_powers[of_v][lane];
+        }
+    }
+    monomials
+}
+
+#[inline(always)]
+fn powers_of(offsets: &[f64; LANES]) -> [[f64; LANES]; MAX_ORDER + 1] {
+    let mut powers = [[1.0; LANES]; MAX_ORDER + 1];
+    for power in 1..=MAX_ORDER {
+        for lane in 0..LANES {
+            powers[power][lane] = powers[power - 1][lane] * offsets[lane];
+        }
+    }
+    powers
+}
+
 /// The powers of u and v in the first `K` monomials.
 const fn powers<const K: usize>() -> [[usize; 2]; K] {
     let mut powers = [[0; 2]; K];
@@ -270,29 +294,17 @@ impl Distortion {
     #[inline(always)]
     fn polynomial_lanes<const K: usize>(&self, observed: &[[f64; LANES]; 2]) -> [[f64; LANES]; 2] {
         let c = &self.coefficients_px;
-        let (mut u_powers, mut v_powers) =
-            ([[1.0; LANES]; MAX_ORDER + 1], [[1.0; LANES]; MAX_ORDER + 1]);
+        let [u, v] = observed.map(|offsets| offsets.map(|offset| offset / self.radius_px));
         let mut ideal = *observed;
         for lane in 0..LANES {
-            let [u, v] = [0, 1].map(|axis| observed[axis][lane] / self.radius_px);
-            (u_powers[1][lane], v_powers[1][lane]) = (u, v);
-            ideal[0][lane] = observed[0][lane] + c[0] * u + c[1] * v;
-            ideal[1][lane] = observed[1][lane] - c[0] * v + c[1] * u;
+            ideal[0][lane] = observed[0][lane] + c[0] * u[lane] + c[1] * v[lane];
+            ideal[1][lane] = observed[1][lane] - c[0] * v[lane] + c[1] * u[lane];
         }
-        for power in 2..=MAX_ORDER {
+        let monomials = monomials_in_lanes::<K>([&u, &v]);
+        for (monomial, pair) in monomials.iter().zip(c[2..].as_chunks::<2>().0) {
             for lane in 0..LANES {
-                u_powers[power][lane] = u_powers[power - 1][lane] * u_powers[1][lane];
-                v_powers[power][lane] = v_powers[power - 1][lane] * v_powers[1][lane];
-            }
-        }
-        for ([of_u, of_v], pair) in const { powers::<K>() }
-            .iter()
-            .zip(c[2..].as_chunks::<2>().0)
-        {
-            for lane in 0..LANES {
-                let monomial = u_powers[*of_u][lane] * v_powers[*of_v][lane];
-                ideal[0][lane] += pair[0] * monomial;
-                ideal[1][lane] += pair[1] * monomial;
+                ideal[0][lane] += pair[0] * monomial[lane];
+                ideal[1][lane] += pair[1] * monomial[lane];
             }
         }
         ideal

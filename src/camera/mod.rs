@@ -6,7 +6,7 @@
 mod distortion;
 
 pub(crate) const LANES: usize = distortion::LANES;
-pub(crate) use distortion::{CUBIC_MONOMIALS, QUINTIC_MONOMIALS, monomials};
+pub(crate) use distortion::{CUBIC_MONOMIALS, QUINTIC_MONOMIALS, monomials_in_lanes};
 pub use distortion::{Distortion, DistortionModel};
 
 use crate::coords::{Camera, PixelPoint, UnitVector};

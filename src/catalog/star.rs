@@ -114,7 +114,7 @@ impl Star {
         }
         // As `east_north`, without the trip through the angles: this runs over whole catalogues.
         let position = self.direction.as_vector();
-        let from_axis = libm::hypot(position.x, position.y);
+        let from_axis = (position.x * position.x + position.y * position.y).sqrt();
         let (sin_ra, cos_ra) = if from_axis > 0.0 {
             (position.y / from_axis, position.x / from_axis)
         } else {

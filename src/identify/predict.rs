@@ -38,12 +38,20 @@ pub struct View<'a> {
     pub years_since_j2000: f64,
 }
 
-/// Catalogue stars around a direction, at a time: a field's are predicted many times, and looked up once.
+/// So many stars, and all that are so bright.
+#[derive(Debug, Clone, Copy)]
+pub struct Depth {
+    /// How many.
+    pub count: usize,
+    /// Down to which V magnitude.
+    pub v_mag: f64,
+}
+
+/// Catalogue stars around a direction: a field's are predicted many times, and looked up once.
 #[derive(Debug, Default)]
 pub struct Surroundings {
-    /// Brightest first, with their directions at that time.
-    stars: Vec<(GridStar, UnitVector<Icrs>)>,
-    found: Vec<GridStar>,
+    /// Brightest first.
+    stars: Vec<GridStar>,
     around: Option<Gathered>,
 }
 
@@ -53,7 +61,6 @@ struct Gathered {
     centre: UnitVector<Icrs>,
     radius_rad: f64,
     faintest_v_mag: f64,
-    years_since_j2000: f64,
 }
 
 impl View<'_> {
@@ -86,24 +93,28 @@ impl Surroundings {
         self.gather(view, sky, faintest_v_mag);
         let bright_enough = self
             .stars
-            .partition_point(|(star, _)| star.v_mag <= faintest_v_mag as f32);
-        project(view, &self.stars[..bright_enough], usize::MAX, predicted);
+            .partition_point(|star| star.v_mag <= faintest_v_mag as f32);
+        let all = Depth {
+            count: usize::MAX,
+            v_mag: faintest_v_mag,
+        };
+        project(view, (sky, &self.stars[..bright_enough]), &all, predicted);
     }
 
-    /// Makes `predicted` the `count` brightest stars of [`View::stars_to`], or all of the catalogue's there are; most
-    /// likely they are brighter than `likely_v_mag`.
-    pub fn brightest(
+    /// Makes `predicted` the brightest stars of [`View::stars_to`] to the depth `least`, or all of the catalogue's there are;
+    /// most likely the count is brighter than `likely_v_mag`.
+    pub fn stars_at_least(
         &mut self,
         view: &View,
         sky: &Sky,
-        (count, likely_v_mag): (usize, f64),
+        (least, likely_v_mag): (Depth, f64),
         predicted: &mut Vec<PredictedStar>,
     ) {
-        let mut limit = likely_v_mag;
+        let mut limit = likely_v_mag.max(least.v_mag);
         loop {
             let gathered_to = self.gather(view, sky, limit);
-            project(view, &self.stars, count, predicted);
-            if predicted.len() >= count || gathered_to > sky.faintest_v_mag() {
+            project(view, (sky, &self.stars), &least, predicted);
+            if predicted.len() >= least.count || gathered_to > sky.faintest_v_mag() {
                 return;
             }
             limit = gathered_to + DEEPER_MAG;
@@ -113,31 +124,33 @@ impl Surroundings {
     /// Sees to it that all stars of `view` to a V magnitude are here; returns to which they are.
     fn gather(&mut self, view: &View, sky: &Sky, faintest_v_mag: f64) -> f64 {
         let (centre, reach_rad) = (view.boresight(), view.reach_rad());
-        let years_since_j2000 = view.years_since_j2000;
-        if let Some(around) = &self.around
-            && around.faintest_v_mag >= faintest_v_mag
-            && around.years_since_j2000 == years_since_j2000
-            && around.centre.angle_to(&centre) + reach_rad <= around.radius_rad
-        {
+        let covers =
+            |around: &Gathered| around.centre.angle_to(&centre) + reach_rad <= around.radius_rad;
+        let around = self.around.filter(covers).unwrap_or_else(|| {
+            self.stars.clear();
+            Gathered {
+                centre,
+                radius_rad: reach_rad * (1.0 + GATHERED_MARGIN),
+                faintest_v_mag: f64::NEG_INFINITY,
+            }
+        });
+        if around.faintest_v_mag >= faintest_v_mag {
             return around.faintest_v_mag;
         }
-        let radius_rad = reach_rad * (1.0 + GATHERED_MARGIN);
-        let found = &mut self.found;
-        found.clear();
-        let limit = faintest_v_mag as f32;
+        let (known, known_to) = (self.stars.len(), around.faintest_v_mag as f32);
+        let Gathered {
+            centre, radius_rad, ..
+        } = around;
         sky.grid
-            .for_each_within(&centre, radius_rad, limit, |star| found.push(*star));
-        found.sort_unstable_by_key(|star| star.catalog);
-        self.stars.clear();
-        self.stars.extend(found.iter().map(|star| {
-            let known = &sky.stars()[star.catalog as usize];
-            (*star, known.direction_at(years_since_j2000))
-        }));
+            .for_each_within(&centre, radius_rad, faintest_v_mag as f32, |star| {
+                if star.v_mag > known_to {
+                    self.stars.push(*star);
+                }
+            });
+        self.stars[known..].sort_unstable_by_key(|star| star.catalog);
         self.around = Some(Gathered {
-            centre,
-            radius_rad,
             faintest_v_mag,
-            years_since_j2000,
+            ..around
         });
         faintest_v_mag
     }
@@ -148,52 +161,58 @@ impl Surroundings {
     }
 }
 
-/// Makes `predicted` the first `count` of `stars` that are in the frame or nearly so.
+/// Makes `predicted` those of `stars`, brightest first, that are in the frame or nearly so, until there are so many that are so faint.
 fn project(
     view: &View,
-    stars: &[(GridStar, UnitVector<Icrs>)],
-    count: usize,
+    (sky, stars): (&Sky, &[GridStar]),
+    least: &Depth,
     predicted: &mut Vec<PredictedStar>,
 ) {
     let camera = view.camera;
     let margin_px = MARGIN * camera.width_px.hypot(camera.height_px);
     // The cone is rounder than the frame: most of what it holds beside it needs no closer look.
     let nearly_px = margin_px + UNDISTORTED_MARGIN * camera.radius_px();
-    let pinhole = CameraModel {
-        distortion: None,
-        ..*camera
-    };
+    let reach = [camera.width_px, camera.height_px]
+        .map(|extent_px| (0.5 * extent_px + nearly_px) / camera.focal_length_px);
     let (boresight, chord) = (view.boresight(), chord_of(view.reach_rad()));
-    let is_near = |direction: &UnitVector<Camera>| {
-        let pixel = pinhole.pixel_of(direction);
-        pixel.is_some_and(|pixel| camera.nearly_contains(&pixel, nearly_px))
+    let is_near = |star: &&GridStar| {
+        let d = view.icrs_to_camera.matrix() * star.vector();
+        d.z > 0.0 && d.x.abs() <= reach[0] * d.z && d.y.abs() <= reach[1] * d.z
     };
     let mut near = stars
         .iter()
-        .map(|(star, direction)| (star, direction, view.icrs_to_camera.apply(direction)))
-        .filter(|(.., in_camera)| is_near(in_camera))
-        .filter(|(star, ..)| star.is_within(boresight.as_vector(), chord * chord));
+        .filter(is_near)
+        .filter(|star| star.is_within(boresight.as_vector(), chord * chord));
     predicted.clear();
     loop {
         let mut lanes = [None; LANES];
-        let mut in_camera = [UnitVector::BORESIGHT; LANES];
-        for ((lane, direction), found) in lanes.iter_mut().zip(&mut in_camera).zip(&mut near) {
-            *lane = Some((found.0, found.1));
-            *direction = found.2;
+        for (lane, star) in lanes.iter_mut().zip(&mut near) {
+            *lane = Some(star);
         }
-        for (lane, pixel) in lanes.iter().zip(camera.pixels_of(&in_camera)) {
-            let Some((star, direction)) = lane else {
+        // One after the other without any decision: the memory of all is waited for at once.
+        let directions = lanes.map(|lane| {
+            lane.map_or(boresight, |star: &GridStar| {
+                sky.stars()[star.catalog as usize].direction_at(view.years_since_j2000)
+            })
+        });
+        let in_camera = directions.map(|direction| view.icrs_to_camera.apply(&direction));
+        for ((lane, direction), pixel) in lanes
+            .iter()
+            .zip(directions)
+            .zip(camera.pixels_of(&in_camera))
+        {
+            let Some(star) = lane else {
                 return;
             };
             let Some(pixel) = pixel.filter(|p| camera.nearly_contains(p, margin_px)) else {
                 continue;
             };
-            if predicted.len() == count {
+            if predicted.len() >= least.count && f64::from(star.v_mag) > least.v_mag {
                 return;
             }
             predicted.push(PredictedStar {
                 pixel,
-                direction: **direction,
+                direction,
                 v_mag: star.v_mag,
                 catalog: star.catalog as usize,
             });

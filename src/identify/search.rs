@@ -19,8 +19,10 @@ const FOV_SLACK: f64 = 1.05;
 
 /// One sweep over the triangles of the brightest stars.
 struct Pass {
-    /// Stars that make triangles, the brightest.
+    /// Stars that make triangles, the brightest, ...
     stars: usize,
+    /// ... and the first that is the faintest of one: triangles of brighter stars were tried in the pass before.
+    from: usize,
     /// Relative error of a triangle's sides that lens distortion may make.
     tolerance: f64,
     /// Probability that another observed star agrees with a true hypothesis: some are false, some not in the catalogue.
@@ -31,21 +33,25 @@ struct Pass {
 const PASSES: [Pass; 4] = [
     Pass {
         stars: 12,
+        from: 2,
         tolerance: 0.0025,
         true_witness: 0.6,
     },
     Pass {
         stars: 10,
+        from: 2,
         tolerance: 0.008,
         true_witness: 0.6,
     },
     Pass {
         stars: 22,
+        from: 2,
         tolerance: 0.0025,
         true_witness: 0.35,
     },
     Pass {
         stars: 40,
+        from: 22,
         tolerance: 0.0025,
         true_witness: 0.35,
     },
@@ -55,12 +61,12 @@ const PASSES: [Pass; 4] = [
 const CENTROID_SIGMAS: f64 = 2.0;
 /// Triangles must be so large, in units of the frame's diagonal.
 const MIN_TRIANGLE_SHARE: f64 = 0.12;
-/// A hypothesis is dropped when the other stars make it so unlikely (log likelihood ratio), ...
-const DROP_BELOW: f64 = -3.5;
-/// ... looked into when they make it so likely, ...
-const TAKE_ABOVE: f64 = 7.0;
-/// ... and when, all of them asked, they speak for it at least so much.
-const TAKE_AT_END: f64 = 1.0;
+/// A hypothesis is dropped when the other stars make it so unlikely (likelihood ratio: e to the −3.5), ...
+const DROP_BELOW: f64 = 0.030_197_383_422_318_5;
+/// ... looked into when they make it so likely (e to the 7), ...
+const TAKE_ABOVE: f64 = 1_096.633_158_428_458_6;
+/// ... and when, all of them asked, they speak for it at least so much (e).
+const TAKE_AT_END: f64 = std::f64::consts::E;
 /// How far a witness may stand from its catalogue star: in distortion tolerances of the frame's diagonal, and in
 /// centroid errors extrapolated from the triangle.
 const WITNESS_TOLERANCES: f64 = 1.5;
@@ -207,7 +213,7 @@ impl<'a> Search<'a> {
     /// Triangles in the order of their faintest star, then of the second.
     fn sweep(&mut self, pass: &Pass) -> Option<Found> {
         let stars = pass.stars.min(self.buffers.offsets.len());
-        for faintest in 2..stars {
+        for faintest in pass.from..stars {
             for middle in 1..faintest {
                 for brightest in 0..middle {
                     if self.is_exhausted() {
@@ -394,7 +400,7 @@ impl<'a> Search<'a> {
         let radius_rad = trio.witness_px / pose.focal_px;
         let chord = chord_of(radius_rad);
         let tolerance_mag = self.field.photometry.tolerance_mag();
-        let mut evidence = 0.0;
+        let mut ratio = 1.0;
         for (index, offset) in self.buffers.offsets.iter().enumerate() {
             if trio.stars.contains(&index) {
                 continue;
@@ -408,16 +414,16 @@ impl<'a> Search<'a> {
                 .sky
                 .chance_within(radius_rad, bright, faint)
                 .min(trio.true_witness);
-            evidence += if seen {
-                (trio.true_witness / chance).ln()
+            ratio *= if seen {
+                trio.true_witness / chance
             } else {
-                ((1.0 - trio.true_witness) / (1.0 - chance)).ln()
+                (1.0 - trio.true_witness) / (1.0 - chance)
             };
-            if !(DROP_BELOW..TAKE_ABOVE).contains(&evidence) {
-                return evidence > 0.0;
+            if !(DROP_BELOW..TAKE_ABOVE).contains(&ratio) {
+                return ratio > 1.0;
             }
         }
-        evidence > TAKE_AT_END
+        ratio > TAKE_AT_END
     }
 
     /// Fits the hypothesis to all the stars that agree and computes its false-alarm probability. Returns it if it is sure.

@@ -43,8 +43,8 @@ impl MagnitudeCounts {
     fn brighter_than(&self, v_mag: f64) -> f64 {
         let place = (v_mag - Self::BRIGHTEST_V_MAG) * Self::STEPS_PER_MAG;
         let place = place.clamp(0.0, Self::STEPS as f64 - 1e-9);
-        let (step, part) = (place as usize, place.fract());
-        self.0[step] + part * (self.0[step + 1] - self.0[step])
+        let step = place as usize;
+        self.0[step] + (place - step as f64) * (self.0[step + 1] - self.0[step])
     }
 }
 

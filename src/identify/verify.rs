@@ -11,13 +11,13 @@
 //! looked for, and say nothing; every two parameters fitted beyond pointing, roll and scale use up another star. The stars used
 //! up are taken to be those least likely to agree by chance, which makes the most of the others' chances.
 
-use super::predict::{PredictedStar, Surroundings, View};
+use super::predict::{Depth, PredictedStar, Surroundings, View};
 use super::search::MAX_HYPOTHESES;
 use super::{ObservedStar, Photometry, Sky, StarField, StarMatch};
 use crate::attitude::POSE_PARAMETERS;
 use crate::camera::{CameraModel, LANES};
-use crate::coords::{Camera, Icrs, Rotation, UnitVector};
-use crate::statistics::log10_poisson_binomial_tail;
+use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
+use crate::statistics::{LnProduct, log10_poisson_binomial_tail};
 use crate::units::RAD_PER_DEG;
 use std::f64::consts::{LN_10, PI};
 use std::ops::Range;
@@ -43,7 +43,7 @@ const MAG_TOLERANCES: [f64; 3] = [0.25, 0.5, 1.0];
 /// Radius of the neighbourhood whose density of predicted stars counts, in units of the radius of agreement.
 const NEIGHBOURHOOD: f64 = 8.0;
 /// Strips that a frame's predicted stars are sorted into.
-const STRIPS: usize = 64;
+const STRIPS: usize = 512;
 
 /// Where the camera is supposed to look.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -135,20 +135,7 @@ impl Hypothesis {
         around: &mut Surroundings,
         predicted: &mut Vec<PredictedStar>,
     ) {
-        let Scene { field, sky } = scene;
-        match field.photometry {
-            Photometry::JohnsonV => {
-                let faintest = observed.iter().map(|s| s.mag).fold(f64::MIN, f64::max);
-                let limit = faintest + field.photometry.tolerance_mag();
-                around.stars_to(&self.view(field), sky, limit, predicted);
-            }
-            Photometry::Instrumental => {
-                let count = observed.len() as f64 * PREDICTED_PER_OBSERVED;
-                let count = count.ceil() as usize + PREDICTED_EXTRA;
-                let likely = sky.magnitude_of_density(self.per_sq_deg(count));
-                around.brightest(&self.view(field), sky, (count, likely), predicted);
-            }
-        }
+        self.predict_to(scene, observed, f64::NEG_INFINITY, (around, predicted));
     }
 
     /// Makes `predicted` the catalogue stars in the frame that may be any of its stars, once the zero point is known: to what the
@@ -159,18 +146,40 @@ impl Hypothesis {
         around: &mut Surroundings,
         predicted: &mut Vec<PredictedStar>,
     ) {
+        let observed = &scene.field.stars;
+        let faint = (observed.len() as f64 * FAINT_SHARE) as usize;
+        let limit = observed.get(faint).map_or(f64::NEG_INFINITY, |star| {
+            star.mag + self.zero_point_mag + FAINT_ROOM_MAG
+        });
+        self.predict_to(scene, observed, limit, (around, predicted));
+    }
+
+    /// As [`Self::predict`], and to `limit_v_mag` at least.
+    fn predict_to(
+        &self,
+        scene: Scene,
+        observed: &[ObservedStar],
+        limit_v_mag: f64,
+        (around, predicted): (&mut Surroundings, &mut Vec<PredictedStar>),
+    ) {
         let Scene { field, sky } = scene;
-        self.predict(scene, &field.stars, around, predicted);
-        let faint = (field.stars.len() as f64 * FAINT_SHARE) as usize;
-        let limit = field
-            .stars
-            .get(faint)
-            .map(|star| star.mag + self.zero_point_mag + FAINT_ROOM_MAG);
-        let reached = predicted.last().map(|star| f64::from(star.v_mag));
-        if let Some(limit) = limit
-            && reached.is_some_and(|reached| reached < limit)
-        {
-            around.stars_to(&self.view(field), sky, limit, predicted);
+        let view = self.view(field);
+        match field.photometry {
+            Photometry::JohnsonV => {
+                let faintest = observed.iter().map(|s| s.mag).fold(f64::MIN, f64::max);
+                let limit = faintest + field.photometry.tolerance_mag();
+                around.stars_to(&view, sky, limit.max(limit_v_mag), predicted);
+            }
+            Photometry::Instrumental => {
+                let count = observed.len() as f64 * PREDICTED_PER_OBSERVED;
+                let count = count.ceil() as usize + PREDICTED_EXTRA;
+                let likely = sky.magnitude_of_density(self.per_sq_deg(count));
+                let least = Depth {
+                    count,
+                    v_mag: limit_v_mag,
+                };
+                around.stars_at_least(&view, sky, (least, likely), predicted);
+            }
         }
     }
 
@@ -235,7 +244,7 @@ impl Hypothesis {
 #[derive(Debug, Default)]
 pub struct Pairing {
     /// The predicted stars strip by strip along x, and where each strip begins.
-    by_strip: Vec<usize>,
+    by_strip: Vec<(PixelPoint, usize)>,
     starts: Vec<usize>,
     close: Vec<Close>,
     of_observed: Vec<Claim>,
@@ -302,11 +311,10 @@ impl Pairing {
             let radius_px = radius.of(star);
             let x = star.position.x;
             let (first, last) = (strips.of(x - radius_px), strips.of(x + radius_px));
-            for &p in &self.by_strip[self.starts[first]..self.starts[last + 1]] {
-                let candidate = &predicted[p];
-                let distance_px = candidate.pixel.distance_to(&star.position);
+            for &(pixel, p) in &self.by_strip[self.starts[first]..self.starts[last + 1]] {
+                let distance_px = pixel.distance_to(&star.position);
                 if distance_px <= radius_px
-                    && let Some(difference) = mag_difference(star, candidate)
+                    && let Some(difference) = mag_difference(star, &predicted[p])
                 {
                     // Nearness counts in pixels: a star of which little is known takes none from one of which much is.
                     let apart = distance_px / radius.common_px;
@@ -335,11 +343,12 @@ impl Pairing {
             *start = end;
         }
         self.by_strip.clear();
-        self.by_strip.resize(predicted.len(), 0);
+        self.by_strip
+            .resize(predicted.len(), (PixelPoint::new(0.0, 0.0), 0));
         for (p, star) in predicted.iter().enumerate() {
             let start = &mut self.starts[strips.of(star.pixel.x)];
             *start -= 1;
-            self.by_strip[*start] = p;
+            self.by_strip[*start] = (star.pixel, p);
         }
     }
 
@@ -420,12 +429,14 @@ pub struct FalseAlarm {
     pairs: Vec<NearPair>,
     /// Those within it, the closest first.
     close: Vec<NearPair>,
-    /// For each observed star the predicted stars that are alike, and the logarithm of their number, ...
-    alike: Vec<(f64, f64)>,
+    /// For each observed star the number of predicted stars that are alike, ...
+    alike: Vec<f64>,
     /// ... and those of them in the neighbourhood, radius by radius.
     near: Vec<f64>,
     observed_taken: Vec<bool>,
     predicted_taken: Vec<bool>,
+    /// For each radius the most stars that agree within it or a smaller one, with the differences in magnitude tried so far.
+    most: Vec<usize>,
     tests: Vec<Test>,
     /// One for each observed star in each test.
     chances: Vec<f64>,
@@ -472,13 +483,16 @@ impl FalseAlarm {
         self.chances.clear();
         let largest_mag = field.photometry.tolerance_mag();
         self.find_pairs(hypothesis, observed, largest_mag);
+        let used_up = TRIANGLE_STARS + (hypothesis.parameters - POSE_PARAMETERS).div_ceil(2);
+        self.most.clear();
+        self.most.resize(self.radii_px.len(), used_up);
         let tried = MAG_TOLERANCES.iter().filter(|&&mag| mag < largest_mag);
         let mut tests = 0;
         for tolerance_mag in tried.copied().chain([largest_mag]) {
             let tested = Tested {
                 field,
                 tolerance_mag,
-                used_up: TRIANGLE_STARS + (hypothesis.parameters - POSE_PARAMETERS).div_ceil(2),
+                used_up,
             };
             self.add_tests(hypothesis, observed, &tested);
             tests += self.radii_px.len();
@@ -504,12 +518,16 @@ impl FalseAlarm {
         let largest_px = self.radii_px.last().copied().unwrap_or(0.0);
         let radii_px = &self.radii_px;
         let near_px = |radius: usize| NEIGHBOURHOOD * radii_px[radius];
+        let reach_px = NEIGHBOURHOOD * largest_px;
         self.pairs.clear();
         for (index, star) in observed.iter().enumerate() {
             let alike = hypothesis.alike(star, &self.predicted, largest_mag);
             for (candidate, predicted) in self.predicted[alike.clone()].iter().zip(alike) {
+                if (candidate.pixel.x - star.position.x).abs() > reach_px {
+                    continue;
+                }
                 let apart_px = candidate.pixel.distance_to(&star.position);
-                if apart_px > NEIGHBOURHOOD * largest_px {
+                if apart_px > reach_px {
                     continue;
                 }
                 let mut radius = radii_px.len() - 1;
@@ -535,17 +553,22 @@ impl FalseAlarm {
         });
     }
 
-    /// One test for each radius at which more stars agree than do so by construction.
+    /// One test for each radius at which more stars agree than do so by construction, and than agree within a smaller radius
+    /// or a smaller difference in magnitude: as many in more room are no less likely.
     fn add_tests(&mut self, hypothesis: &Hypothesis, observed: &[ObservedStar], tested: &Tested) {
         self.count_alike(hypothesis, observed, tested.tolerance_mag);
         self.count_near(observed.len(), tested.tolerance_mag);
         let mut hits = Hits::new(self, observed.len());
+        let mut most = 0;
         for radius in 0..self.radii_px.len() {
             let agreeing = hits.within(self.radii_px[radius], tested.tolerance_mag, &self.close);
-            if agreeing > tested.used_up {
+            most = most.max(self.most[radius]);
+            if agreeing > most {
+                most = agreeing;
                 let test = self.test(radius, agreeing - tested.used_up, tested);
                 self.tests.push(test);
             }
+            self.most[radius] = most;
         }
         (self.observed_taken, self.predicted_taken) = (hits.observed_taken, hits.predicted_taken);
     }
@@ -558,10 +581,8 @@ impl FalseAlarm {
     ) {
         let predicted = &self.predicted;
         self.alike.clear();
-        self.alike.extend(observed.iter().map(|star| {
-            let alike = hypothesis.alike(star, predicted, tolerance_mag).len() as f64;
-            (alike, alike.ln())
-        }));
+        let alike = |star| hypothesis.alike(star, predicted, tolerance_mag).len() as f64;
+        self.alike.extend(observed.iter().map(alike));
     }
 
     fn count_near(&mut self, observed: usize, tolerance_mag: f64) {
@@ -586,21 +607,16 @@ impl FalseAlarm {
     fn test(&mut self, radius: usize, hits: usize, tested: &Tested) -> Test {
         let (radius_px, radii) = (self.radii_px[radius], self.radii_px.len());
         let frame_px = tested.field.width_px * tested.field.height_px;
-        let ln_disc = (PI * radius_px * radius_px / frame_px).ln();
         let chances = self.chances.len();
-        let (mut ln_sum, mut lost, mut possible, mut largest) = (0.0, 0.0, 0, 0.0_f64);
-        for (of_star, &(alike, ln_alike)) in self.near.chunks_exact(radii).zip(&self.alike) {
+        let (mut product, mut lost, mut possible, mut largest) = (LnProduct::ONE, 0.0, 0, 0.0_f64);
+        for (of_star, &alike) in self.near.chunks_exact(radii).zip(&self.alike) {
             // Less the one that may be its match: what counts is how many others chance could have put there.
             let crowd = (of_star[radius] - 1.0) / NEIGHBOURHOOD.powi(2);
             let strewn = alike * PI * radius_px * radius_px / frame_px;
             let chance = strewn.max(crowd).min(1.0);
             self.chances.push(chance);
             if chance > 0.0 {
-                ln_sum += if crowd > strewn {
-                    crowd.ln()
-                } else {
-                    ln_alike + ln_disc
-                };
+                product.multiply(chance);
                 lost += chance + chance * chance;
                 largest = largest.max(chance);
                 possible += 1;
@@ -608,7 +624,7 @@ impl FalseAlarm {
         }
         let counted = possible.min(self.alike.len() - tested.used_up);
         let at_least_ln = if largest < 0.68 && hits <= counted {
-            ln_binomial(counted, hits) + hits as f64 * ln_sum / possible as f64 - lost
+            ln_binomial(counted, hits) + hits as f64 * product.ln() / possible as f64 - lost
         } else {
             f64::NEG_INFINITY
         };
@@ -704,7 +720,6 @@ fn search_weight(hypotheses: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coords::{PixelPoint, UnitVector};
 
     #[test]
     fn a_whole_search_has_a_bounded_chance() {

@@ -21,7 +21,7 @@
 //! # Reference
 //! Probit regression with a guessing and a lapse rate: Wichmann & Hill 2001, Percept. Psychophys. 63, 1293.
 
-use crate::statistics::normal_cdf_and_density;
+use crate::statistics::{LnProduct, normal_cdf_and_density};
 use nalgebra::{Matrix3, Vector3};
 
 /// Where the prior of the width has its middle, in magnitudes.
@@ -255,6 +255,7 @@ impl Curve {
             )),
         };
         let full = 1.0 - self.chance - lost;
+        // Adds so many stars to all but the logarithm, and returns the probability of what became of each.
         let mut add = |z: f64, detected: bool, count: usize| {
             let (above, density) = normal_cdf_and_density(z);
             let p = (self.chance + full * above).clamp(1e-12, 1.0 - 1e-12);
@@ -263,30 +264,31 @@ impl Curve {
                 -full * density * z,
                 -above * lost * (1.0 - lost),
             );
-            let (log, slope) = if detected {
-                (p.ln(), 1.0 / p)
-            } else {
-                ((1.0 - p).ln(), -1.0 / (1.0 - p))
-            };
+            let (probability, sign) = if detected { (p, 1.0) } else { (1.0 - p, -1.0) };
             let count = count as f64;
-            sum.log += count * log;
-            sum.gradient += change * (count * slope);
+            sum.gradient += change * (count * sign / probability);
             sum.information += change * change.transpose() * (count / (p * (1.0 - p)));
+            probability
         };
         let brighter_than = |v_mag: f64| trials.partition_point(|trial| trial.v_mag < v_mag);
         let near = brighter_than(self.v_mag - FAR_WIDTHS * width)
             ..brighter_than(self.v_mag + FAR_WIDTHS * width);
+        let mut log = 0.0;
         for (z, far) in [
             (FAR_WIDTHS, &trials[..near.start]),
             (-FAR_WIDTHS, &trials[near.end..]),
         ] {
             let detected = far.iter().filter(|trial| trial.detected).count();
-            add(z, true, detected);
-            add(z, false, far.len() - detected);
+            for (is_detected, count) in [(true, detected), (false, far.len() - detected)] {
+                log += count as f64 * add(z, is_detected, count).ln();
+            }
         }
+        let mut product = LnProduct::ONE;
         for trial in &trials[near] {
-            add((self.v_mag - trial.v_mag) / width, trial.detected, 1);
+            let z = (self.v_mag - trial.v_mag) / width;
+            product.multiply(add(z, trial.detected, 1));
         }
+        sum.log += log + product.ln();
         sum
     }
 }
