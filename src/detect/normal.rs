@@ -386,3 +386,88 @@ pub(super) fn sum_of(v: Lanes) -> f64 {
     let four: [f32; 4] = std::array::from_fn(|i| v[i] + v[i + 4]);
     f64::from((four[0] + four[2]) + (four[1] + four[3]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The sums for one spot pixel by pixel, in double precision.
+    fn plain_sums(spot: &SpotLight<'_>, pixels: &Pixels<'_>) -> Normal<ONE_SPOT> {
+        let mut normal = Normal::empty();
+        let [across, down] = spot.axes;
+        for (i, data) in pixels.data.as_flattened().iter().enumerate() {
+            let width = pixels.groups * LANES;
+            let (a, d) = (across.pixel(i % width), down.pixel(i / width));
+            let [value, by_center, by_sigma] = [a.value, a.by_center, a.by_sigma].map(f64::from);
+            let [d_value, d_center, d_sigma] = [d.value, d.by_center, d.by_sigma].map(f64::from);
+            let flux = f64::from(spot.flux);
+            let light = flux * value * d_value;
+            let gradient = [
+                flux * by_center * d_value,
+                flux * value * d_center,
+                value * d_value,
+                1.0,
+                flux * (by_sigma * d_value + value * d_sigma),
+            ];
+            let [linear, square] = pixels.variance.map(f64::from);
+            let weight = 1.0 / (1.0 + light * (linear + square * light));
+            let residual = f64::from(*data) - light - f64::from(pixels.background);
+            if data.is_nan() {
+                continue;
+            }
+            normal.chi2 += residual * residual * weight;
+            normal.pixels += 1;
+            for i in 0..ONE_SPOT {
+                let unit = pixels.unit(i, 1);
+                normal.right[i] += gradient[i] * residual * weight * unit;
+                for j in 0..=i {
+                    let units = unit * pixels.unit(j, 1);
+                    normal.matrix[i][j] += gradient[i] * gradient[j] * weight * units;
+                }
+            }
+        }
+        normal
+    }
+
+    #[test]
+    fn sums_in_single_precision_are_those_in_double() {
+        let (width, height, groups) = (11, 9, 2);
+        for flux in [0.0, 30.0, 1e3, 1e6] {
+            let mut axes = [AxisProfile::default(), AxisProfile::default()];
+            axes[0].fill(5.3, 0.9, width);
+            axes[1].fill(4.1, 0.9, height);
+            let spot = SpotLight { flux, axes: &axes };
+            let noise = |i: usize| ((i * 7919) % 101) as f32 * 0.03 - 1.5;
+            let mut data = vec![[f32::NAN; LANES]; groups * height];
+            for (i, pixel) in data.as_flattened_mut().iter_mut().enumerate() {
+                let (column, row) = (i % (groups * LANES), i / (groups * LANES));
+                if column < width && (column, row) != (6, 4) {
+                    let light = axes[0].pixel(column).value * axes[1].pixel(row).value * flux;
+                    *pixel = noise(i) * (1.0 + 0.01 * light).sqrt() + light;
+                }
+            }
+            let pixels = Pixels {
+                data: &data,
+                groups,
+                per_noise: 0.2,
+                background: 0.1,
+                variance: [0.01, 1e-6],
+            };
+            let mut found: Normal<ONE_SPOT> = Normal::empty();
+            add_pixels(&mut found, &[spot], &pixels);
+            let expected = plain_sums(&spot, &pixels);
+            assert_eq!(found.pixels, width * height - 1);
+            assert!((found.chi2 / expected.chi2 - 1.0).abs() < 1e-3);
+            for i in 0..ONE_SPOT {
+                let scale = |j: usize| expected.matrix[j][j].sqrt();
+                for j in 0..=i {
+                    let off = found.matrix[i][j] - expected.matrix[i][j];
+                    assert!(off.abs() <= 2e-6 * scale(i) * scale(j), "{flux}: {i}, {j}");
+                }
+                // A step that is off by this part of its standard error.
+                let off = (found.right[i] - expected.right[i]) / scale(i).max(f64::MIN_POSITIVE);
+                assert!(off.abs() < 1e-3, "{flux}: {i}: {off}");
+            }
+        }
+    }
+}
