@@ -71,8 +71,8 @@ const TAKE_AT_END: f64 = std::f64::consts::E;
 /// centroid errors extrapolated from the triangle.
 const WITNESS_TOLERANCES: f64 = 1.5;
 const WITNESS_SIGMAS: f64 = 3.5;
-/// When to give up, so that a frame in which there is nothing to find takes well under a second. Fields
-/// that can be identified take a few thousand.
+/// When to give up, so that a frame in which there is nothing to find takes well under a second. Most fields that can be
+/// identified take a few, those with as many false sources as stars and half of the catalogue's missing up to all of these.
 pub const MAX_HYPOTHESES: u64 = 400_000;
 /// The same for catalogue triangles of the right shape, of which most are out at once: their size or brightness is not right.
 const MAX_CANDIDATES: u64 = 20_000_000;
