@@ -7,7 +7,7 @@ use std::ops::Range;
 pub(super) const BLOCK_PX: usize = 64;
 
 /// The maximum of a block without anything of interest.
-pub(super) const NOTHING: f32 = f32::MIN;
+const NOTHING: f32 = f32::MIN;
 
 /// The maxima of those blocks of a frame that hold something of interest.
 #[derive(Debug, Clone, Default)]

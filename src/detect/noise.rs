@@ -333,7 +333,7 @@ fn own_per_mixed(spot_px: f64) -> f64 {
 
 /// Where nothing stands out of the filtered frame.
 pub(super) struct StarFree<'a> {
-    /// The maxima of the filtered frame.
+    /// The maxima of the filtered frame where it may stand out.
     pub maxima: &'a BlockMaxima,
     /// The mesh of the filtered frame.
     pub filtered_mesh: &'a Mesh,
