@@ -1,7 +1,9 @@
 //! The limiting magnitude over one parameter or several: a panel for each.
 
 use super::text::number;
-use crate::cli::plot::{Area, BLUE, FONT, Figure, ORANGE, draw_words, said};
+use crate::cli::plot::{
+    Area, BLUE, FONT, Figure, LETTERS_PX, MARGIN_PX, ORANGE, chart_on, draw_words, said,
+};
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
@@ -13,8 +15,6 @@ const PANEL_PX: (u32, u32) = (440, 310);
 const ALONE_PX: (u32, u32) = (640, 440);
 const SWEEPS_ABREAST: usize = 2;
 const FIGURES_ABREAST: usize = 3;
-const MARGIN_PX: u32 = 10;
-const LETTERS_PX: u32 = 15;
 const TITLE_PX: u32 = 18;
 /// Above a panel: its title and what its curves are.
 const HEAD_PX: u32 = 48;
@@ -109,14 +109,7 @@ impl Panel {
         X: AsRangedCoord<Value = f64>,
         X::CoordDescType: ValueFormatter<f64>,
     {
-        let mut builder = ChartBuilder::on(area);
-        builder
-            .margin(MARGIN_PX)
-            .margin_top(2)
-            // The last number of the axis is as wide.
-            .margin_right(2 * MARGIN_PX)
-            .x_label_area_size(AXIS_PX.0)
-            .y_label_area_size(AXIS_PX.1);
+        let mut builder = chart_on(area, AXIS_PX);
         let mut chart = builder.build_cartesian_2d(x, y).map_err(said)?;
         chart
             .configure_mesh()

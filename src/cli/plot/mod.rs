@@ -70,6 +70,26 @@ impl PlotFile {
 /// Part of a figure to draw on.
 pub(crate) type Area<B> = DrawingArea<B, Shift>;
 
+/// About a chart.
+pub(crate) const MARGIN_PX: u32 = 10;
+pub(crate) const LETTERS_PX: u32 = 15;
+
+/// A chart with a margin, and with so much room below the axis of x and left of that of y.
+pub(crate) fn chart_on<'a, 'b, B: DrawingBackend>(
+    area: &'a Area<B>,
+    axis_px: (u32, u32),
+) -> ChartBuilder<'a, 'b, B> {
+    let mut builder = ChartBuilder::on(area);
+    builder
+        .margin(MARGIN_PX)
+        .margin_top(2)
+        // The last number of the axis is as wide.
+        .margin_right(2 * MARGIN_PX)
+        .x_label_area_size(axis_px.0)
+        .y_label_area_size(axis_px.1);
+    builder
+}
+
 /// Something to be drawn.
 pub(crate) trait Figure {
     /// Width and height.

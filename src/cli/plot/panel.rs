@@ -1,6 +1,6 @@
 //! A panel with dots, lines and bars over two axes, and sheets of such panels.
 
-use super::{Area, FONT, Figure, draw_words, said};
+use super::{Area, FONT, Figure, LETTERS_PX, MARGIN_PX, chart_on, draw_words, said};
 use crate::cli::limit::number;
 use plotters::coord::combinators::{BindKeyPoints, LogCoord, WithKeyPoints};
 use plotters::coord::ranged1d::Ranged;
@@ -12,8 +12,6 @@ use std::ops::Range;
 const PANEL_PX: (u32, u32) = (440, 330);
 /// A panel that stands alone.
 const ALONE_PX: (u32, u32) = (640, 440);
-const MARGIN_PX: u32 = 10;
-const LETTERS_PX: u32 = 15;
 const TITLE_PX: u32 = 17;
 /// Above a panel: its title and what its marks are.
 const HEAD_PX: u32 = 50;
@@ -222,14 +220,7 @@ impl Panel {
         Y: AsRangedCoord<Value = f64>,
         Y::CoordDescType: ValueFormatter<f64>,
     {
-        let mut builder = ChartBuilder::on(area);
-        builder
-            .margin(MARGIN_PX)
-            .margin_top(2)
-            // The last number of the axis is as wide.
-            .margin_right(2 * MARGIN_PX)
-            .x_label_area_size(AXIS_PX.0)
-            .y_label_area_size(AXIS_PX.1);
+        let mut builder = chart_on(area, AXIS_PX);
         let mut chart = builder.build_cartesian_2d(x, y).map_err(said)?;
         chart
             .configure_mesh()
