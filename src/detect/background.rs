@@ -21,10 +21,12 @@ const CLIPPED_SHRINK: f32 = 0.986_58;
 /// The part of a wrong spread that is left by a round of clipping at it, for a Gaussian: d ln s/d ln k of the standard
 /// deviation s clipped at ±kσ, at k = 3. So a round is carried on to where many would lead.
 const LEFT_BY_ROUND: f32 = 0.11;
-/// Rounds of clipping; it settles in two or three.
+/// Rounds of clipping; it settles in one or two.
 const MAX_CLIP_ROUNDS: usize = 8;
-/// Changes below this part of the spread end the clipping.
-const SETTLED: f32 = 1.2e-2;
+/// A change of the level below this part of the spread ends the clipping: a 37th of it would be left to the next round.
+const SETTLED_LEVEL: f32 = 0.15;
+/// So does a change of the spread below this part of it: what is left is of second order, well below the error of a thousand pixels.
+const SETTLED_SPREAD: f32 = 0.05;
 /// Every how many rows of a cell are sampled.
 const ROW_STRIDE: usize = 4;
 /// Cells with fewer pixels than this are sampled in full.
@@ -545,8 +547,8 @@ fn clipped_mean_and_spread(values: &[f32], start: (f32, f32), floor: f32) -> Opt
         let variance = (squares / count - mean * mean).max(0.0);
         let clipped = variance.sqrt() / CLIPPED_SHRINK;
         let new_spread = (spread + (clipped - spread) / (1.0 - LEFT_BY_ROUND)).max(0.0);
-        let settled =
-            (new_spread - spread).abs() <= SETTLED * spread && mean.abs() <= SETTLED * spread;
+        let settled = (new_spread - spread).abs() <= SETTLED_SPREAD * spread
+            && mean.abs() <= SETTLED_LEVEL * spread;
         level += mean;
         spread = new_spread.max(floor);
         if settled || new_spread <= floor {

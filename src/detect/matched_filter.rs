@@ -7,6 +7,7 @@
 //!
 //! The filtered frame is never whole in memory: it is made and looked at in bands of rows that stay in cache.
 
+use super::aligned::{Aligned, LINE};
 use super::background::{Mesh, Piece};
 use super::psf::{PIXEL_VARIANCE_PX2, centered_profile};
 use super::view::View;
@@ -16,8 +17,8 @@ use std::ops::Range;
 
 /// Pixels treated together.
 const LANES: usize = 32;
-/// Room between rows.
-const ROW_GAP_PX: usize = 80;
+/// Room between rows, in whole lines of the cache.
+const ROW_GAP_PX: usize = 5 * LINE;
 /// The most weights of one half of a kernel: spots up to σ = 13 px.
 pub(super) const MAX_TAPS: usize = 32;
 /// The kernel ends at this many standard deviations: the rest holds under 0.1 % of ΣP².
@@ -94,12 +95,15 @@ pub(super) struct Band {
     width: usize,
     /// Rows of the frame that the band holds.
     rows: Range<usize>,
-    values: Vec<f32>,
-    /// A row less the background and over the noise, with the kernel's reach on either side.
-    padded: Vec<f32>,
+    values: Aligned,
+    /// A row less the background and over the noise, from `lead` on; at least the kernel's reach on either side is 0.
+    padded: Aligned,
+    lead: usize,
     /// Rows filtered along x: that of row y is at y modulo their number.
-    ring: Vec<f32>,
-    zeros: Vec<f32>,
+    ring: Aligned,
+    /// The row of the frame after the last one in the ring.
+    next_row: usize,
+    zeros: Aligned,
     /// Columns whose values are scaled, for the filter is cut off there.
     at_border: Vec<(usize, f32)>,
     pieces: Vec<Piece>,
@@ -109,16 +113,18 @@ impl Band {
     /// Makes room for bands of a frame of `width` columns.
     pub fn prepare(&mut self, width: usize, kernel: &Kernel) {
         let radius = kernel.radius();
+        self.rows = 0..0;
         self.width = width;
         self.whole_width = width.next_multiple_of(LANES);
         self.stride = self.whole_width + ROW_GAP_PX;
+        self.lead = radius.next_multiple_of(LINE);
         for (buffer, size) in [
-            (&mut self.padded, self.whole_width + 2 * radius),
+            (&mut self.padded, self.whole_width + 2 * self.lead),
             (&mut self.zeros, self.whole_width),
             (&mut self.ring, (2 * radius + 1) * self.stride),
         ] {
-            buffer.clear();
-            buffer.resize(size, 0.0);
+            buffer.grow(size);
+            buffer.fill(0.0);
         }
         let inner = radius.min(width)..width.saturating_sub(radius).max(radius.min(width));
         self.at_border.clear();
@@ -127,19 +133,28 @@ impl Band {
             .extend(outer.map(|x| (x, kernel.border_factor(x, width - 1 - x))));
     }
 
-    /// Filters `rows` of `view`, less the background and over the noise in `mesh`, with `kernel`.
+    /// Filters `rows` of `view`, less the background and over the noise in `mesh`, with `kernel`. Where they begin among
+    /// those that the band holds, it goes on from these.
     pub fn filter(&mut self, view: &View<'_>, mesh: &Mesh, kernel: &Kernel, rows: Range<usize>) {
         let radius = kernel.radius();
+        let goes_on = self.rows.contains(&rows.start) && rows.end >= self.rows.end;
+        let held = if goes_on {
+            let first = (rows.start - self.rows.start) * self.stride;
+            let end = self.rows.len() * self.stride;
+            self.values.copy_within(first..end, 0);
+            self.rows.end
+        } else {
+            self.next_row = rows.start.saturating_sub(radius);
+            rows.start
+        };
         self.rows = rows.clone();
-        self.values.resize(rows.len() * self.stride, 0.0);
-        let first = rows.start.saturating_sub(radius);
-        for y in first..rows.end + radius {
-            if y < view.height {
-                self.filter_along_row(view, mesh, kernel, y);
+        self.values.grow(rows.len() * self.stride);
+        for y in held..rows.end {
+            while self.next_row < (y + radius + 1).min(view.height) {
+                self.filter_along_row(view, mesh, kernel, self.next_row);
+                self.next_row += 1;
             }
-            if y >= rows.start + radius {
-                self.filter_along_columns(kernel, y - radius, view.height);
-            }
+            self.filter_along_columns(kernel, y, view.height);
         }
     }
 
@@ -147,11 +162,11 @@ impl Band {
     fn filter_along_row(&mut self, view: &View<'_>, mesh: &Mesh, kernel: &Kernel, y: usize) {
         let radius = kernel.radius();
         mesh.row_pieces(y, &mut self.pieces);
-        let target = &mut self.padded[radius..radius + self.width];
+        let target = &mut self.padded[self.lead..self.lead + self.width];
         normalise(view.row(y), &self.pieces, target);
         let slot = y % (2 * radius + 1);
         let out = &mut self.ring[slot * self.stride..][..self.whole_width];
-        sum_along_row(&kernel.half, &self.padded, out);
+        sum_along_row(&kernel.half, &self.padded[self.lead - radius..], out);
         for &(x, factor) in &self.at_border {
             out[x] *= factor;
         }
@@ -167,7 +182,7 @@ impl Band {
                 let slot = r % slots;
                 &self.ring[slot * self.stride..][..self.whole_width]
             }
-            _ => self.zeros.as_slice(),
+            _ => &self.zeros[..self.whole_width],
         };
         let mut pairs: ArrayVec<[&[f32]; 2], MAX_TAPS> = ArrayVec::new();
         pairs.extend((0..=radius).map(|j| [row(y.checked_sub(j)), row(Some(y + j))]));

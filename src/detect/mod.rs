@@ -26,6 +26,7 @@
 //! Bertin & Arnouts 1996, doi 10.1051/aas:1996164, for the order of the steps; the README of `sep`
 //! for the matched filter.
 
+mod aligned;
 mod background;
 mod background_map;
 mod blocks;
@@ -697,11 +698,26 @@ fn is_cut_off(view: &View<'_>, level: f64, spread: f64) -> bool {
     const EVERY: usize = 16;
     const SIGMAS: f32 = 2.5;
     let rows = || (0..view.height).step_by(EVERY).map(|y| view.row(y));
-    let lowest = rows().flatten().copied().fold(f32::INFINITY, f32::min);
+    let least = |a: f32, b: f32| if b < a { b } else { a };
+    let lowest = rows().fold(f32::INFINITY, |m, row| fold_row(m, row, least));
     let near = level - f64::from(lowest) < f64::from(SIGMAS) * spread;
     let total = view.width * view.height.div_ceil(EVERY);
-    let at_lowest = rows().flatten().filter(|&&v| v == lowest).count();
+    let count = |row: &[f32]| row.iter().map(|&v| u32::from(v == lowest)).sum::<u32>();
+    let at_lowest = rows().map(|row| count(row) as usize).sum::<usize>();
     near && at_lowest * LEAST_CUT_OFF > total
+}
+
+/// Folds a row into `start` in any order: one value after the other, each would wait for the one before.
+fn fold_row(start: f32, row: &[f32], fold: impl Fn(f32, f32) -> f32) -> f32 {
+    const LANES: usize = 32;
+    let (chunks, rest) = row.as_chunks::<LANES>();
+    let mut lanes = [start; LANES];
+    for chunk in chunks {
+        for (lane, &value) in lanes.iter_mut().zip(chunk) {
+            *lane = fold(*lane, value);
+        }
+    }
+    lanes.iter().chain(rest).copied().fold(start, fold)
 }
 
 /// One pixel in so many at the lowest value is a sign that the noise is cut off there.
@@ -785,10 +801,9 @@ fn describe_darkness(frame: &Frame, config: &DetectConfig, found: &mut Detection
 
 /// A noise that is certainly below that of the frame: some of the precision of its numbers.
 fn least_noise(view: &View<'_>) -> f32 {
-    let largest = (0..view.height)
-        .step_by((view.height / 16).max(1))
-        .flat_map(|y| view.row(y))
-        .fold(0.0f32, |m, p| if p.abs() > m { p.abs() } else { m });
+    let rows = (0..view.height).step_by((view.height / 16).max(1));
+    let larger = |m: f32, p: f32| if p.abs() > m { p.abs() } else { m };
+    let largest = rows.fold(0.0, |m, y| fold_row(m, view.row(y), larger));
     (largest * 1e-6).max(f32::MIN_POSITIVE * 1e6)
 }
 

@@ -15,6 +15,7 @@
 use super::background::{Mesh, Piece};
 use super::blocks::{BLOCK_PX, BlockMaxima};
 use super::matched_filter::{MAX_TAPS, normalise};
+use super::medians::sum_of;
 use super::psf::{AxisProfile, MAX_WINDOW_PX, centered_profile};
 use super::view::View;
 use arrayvec::ArrayVec;
@@ -52,7 +53,7 @@ const BORDER_PX: f64 = 1.0;
 /// A pixel further off than this many standard deviations is a hot one or a star's, and no photon noise.
 const PHOTON_CLIP_SIGMA: f32 = 6.0;
 /// Pixels whose third moments are looked at, about: their standard errors are then some 0.01.
-const PHOTON_SAMPLES: usize = 100_000;
+const PHOTON_SAMPLES: usize = 75_000;
 /// Noise of neighbours that is correlated more than this is no longer that of photons counted; faint stars make 0.02.
 const MAX_CORRELATION: f64 = 0.1;
 /// The border's threshold is taken to be higher than the interior's by no more than this.
@@ -113,7 +114,7 @@ impl PixelNoise {
                 let span = piece.start..piece.end;
                 bins_of(&row[span.clone()], piece, &mut bins[span]);
             }
-            star_free.blocks(y, view, nodes, |span| {
+            star_free.spans(y, view, nodes, |span| {
                 for &bin in &bins[span] {
                     histogram[usize::from(bin)] += 1;
                 }
@@ -261,9 +262,9 @@ pub(super) fn photon_skewness(
     for y in (step / 2..view.height).step_by(step) {
         mesh.row_pieces(y, pieces);
         normalise(view.row(y), pieces, standardised);
-        star_free.blocks(y, view, nodes, |span| {
-            let of_block = moments(&standardised[span]);
-            for (sum, part) in sums.iter_mut().zip(of_block) {
+        star_free.spans(y, view, nodes, |span| {
+            let of_span = moments(&standardised[span]);
+            for (sum, part) in sums.iter_mut().zip(of_span) {
                 *sum += f64::from(part);
             }
         });
@@ -308,7 +309,7 @@ fn moments(row: &[f32]) -> [f32; MOMENTS] {
             sums[5][lane] += 0.5 * product * (a + b);
         }
     }
-    let mut total = sums.map(|lanes| lanes.iter().sum());
+    let mut total = sums.map(sum_of);
     total[0] = pairs as f32;
     total
 }
@@ -342,8 +343,8 @@ pub(super) struct StarFree<'a> {
 }
 
 impl StarFree<'_> {
-    /// The blocks of columns of row `y` that hold no star nor its wings.
-    fn blocks(
+    /// The columns of row `y` without stars and their wings, as spans of whole blocks.
+    fn spans(
         &self,
         y: usize,
         view: &View<'_>,
@@ -359,6 +360,7 @@ impl StarFree<'_> {
         ]
         .map(|row| self.maxima.row(row));
         self.filtered_mesh.across_row(y, nodes);
+        let mut free = 0..0;
         for block in 0..rows[0].len() {
             let start = block * BLOCK_PX;
             let end = (start + BLOCK_PX).min(view.width);
@@ -366,8 +368,16 @@ impl StarFree<'_> {
             let (level, spread) = self.filtered_mesh.at_column(nodes, middle);
             let highest = level + self.limit * spread;
             if rows.iter().all(|r| r[block] < highest) {
-                each(start..end);
+                free.end = end;
+            } else {
+                if !free.is_empty() {
+                    each(free);
+                }
+                free = end..end;
             }
+        }
+        if !free.is_empty() {
+            each(free);
         }
     }
 }

@@ -18,8 +18,12 @@ const STEPS: usize = 24;
 const SPAN: f64 = 3.0;
 /// Thresholds are looked for in this range.
 const RANGE: (f64, f64) = (1.0, 12.0);
-/// Secant steps at most; some eight are needed.
+/// Secant steps at most; some three are needed.
 const MAX_SECANTS: usize = 60;
+/// They end where the logarithm of the rate is this close.
+const SETTLED: f64 = 1e-4;
+/// It falls at least so much with u².
+const LEAST_SLOPE: f64 = -0.1;
 
 /// Parts of the inner integral.
 const PARTS: usize = 8;
@@ -92,28 +96,21 @@ pub(super) fn threshold_for_rate(per_mpx: f64, rho_x: f64, rho_y: f64) -> f64 {
             .ln()
             - wanted
     };
-    // The rate falls about as exp(−u²/2): its logarithm over u² is nearly straight, so secants settle fast.
-    let (mut low, mut high) = RANGE;
-    let (mut at_low, mut at_high) = (excess(low), excess(high));
-    if at_low <= 0.0 {
-        return low;
-    }
+    // The rate falls about as exp(−u²/2): its logarithm over u² is nearly straight, and secants settle fast.
+    let within = |square: f64| square.clamp(RANGE.0 * RANGE.0, RANGE.1 * RANGE.1);
+    let mut square = within(-2.0 * wanted);
+    let mut slope = -0.5;
+    let mut at = excess(square.sqrt());
     for _ in 0..MAX_SECANTS {
-        let fraction = at_low / (at_low - at_high);
-        let u = (low * low + fraction * (high * high - low * low)).sqrt();
-        let at_u = excess(u);
-        if at_u.abs() < 1e-4 {
-            return u;
+        let next = within(square - at / slope);
+        if at.abs() < SETTLED || next == square {
+            break;
         }
-        if at_u > 0.0 {
-            (low, at_low) = (u, at_u);
-            at_high *= 0.5;
-        } else {
-            (high, at_high) = (u, at_u);
-            at_low *= 0.5;
-        }
+        let at_next = excess(next.sqrt());
+        slope = ((at_next - at) / (next - square)).min(LEAST_SLOPE);
+        (square, at) = (next, at_next);
     }
-    0.5 * (low + high)
+    square.sqrt()
 }
 
 /// The threshold raised for a noise that is itself estimated, with `degrees` of freedom: the same
@@ -138,6 +135,16 @@ mod tests {
         let tail = 0.5 * (1.0 - erf_and_gauss(4.0 / SQRT_2).0);
         let rate = rate_above(4.0, 0.0);
         assert!((rate / tail - 1.0).abs() < 0.01, "{rate} vs {tail}");
+    }
+
+    #[test]
+    fn thresholds_invert_rates_from_many_false_alarms_to_hardly_any() {
+        for (per_mpx, rho) in [(1e5, 0.0), (1e4, 0.5), (10.0, 0.2), (0.1, 0.78), (1e-6, 0.95)] {
+            let u = threshold_for_rate(per_mpx, rho, rho);
+            let found = rate_above(u, rho) * 1e6;
+            assert!((found / per_mpx - 1.0).abs() < 1e-3, "{per_mpx}: {found} at {u}");
+        }
+        assert_eq!(threshold_for_rate(1e6, 0.5, 0.5), RANGE.0);
     }
 
     #[test]
