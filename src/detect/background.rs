@@ -363,18 +363,19 @@ impl Mesh {
     }
 
     /// Level and spread at the nodes of row `y`: what is between two columns of cells lies straight between them.
-    pub fn across_row(&self, y: usize, nodes: &mut Vec<[f32; 2]>) {
+    pub fn across_row<'a>(&'a self, y: usize, nodes: &mut Vec<[f32; 2]>) {
         let (row, fy) = Self::node(y as f32, self.rows_per_px, self.grid.rows);
         let below = (row + 1).min(self.grid.rows - 1);
         let held = fy.clamp(0.0, 1.0);
         let columns = self.grid.columns;
+        let pairs = |map: &'a [f32]| {
+            let of_row = |row: usize| &map[row * columns..(row + 1) * columns];
+            of_row(row).iter().zip(of_row(below))
+        };
+        let both = pairs(&self.level).zip(pairs(&self.spread));
         nodes.clear();
-        nodes.extend((0..columns).map(|c| {
-            let (top, bottom) = (row * columns + c, below * columns + c);
-            [
-                self.level[top] + fy * (self.level[bottom] - self.level[top]),
-                self.spread[top] + held * (self.spread[bottom] - self.spread[top]),
-            ]
+        nodes.extend(both.map(|((top, bottom), (stop, sbottom))| {
+            [top + fy * (bottom - top), stop + held * (sbottom - stop)]
         }));
     }
 

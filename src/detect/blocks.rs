@@ -37,33 +37,75 @@ impl BlockMaxima {
     }
 }
 
-/// Columns of the values of `block` in `row` that reach `lowest`.
-pub(super) fn columns_from(row: &[f32], block: usize, lowest: f32) -> impl Iterator<Item = usize> {
-    /// Values compared together: most hold none.
-    const GROUP: usize = 16;
-    let start = block * BLOCK_PX;
-    let values = &row[start..(start + BLOCK_PX).min(row.len())];
-    let groups = values.chunks(GROUP).enumerate();
-    groups
-        .filter(move |(_, group)| group.iter().fold(false, |any, &v| any | (v >= lowest)))
-        .flat_map(move |(g, group)| {
-            let columns = (start + g * GROUP..).zip(group);
-            columns.filter_map(move |(x, &v)| (v >= lowest).then_some(x))
-        })
+/// A block of a row with values that reach some level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Reached {
+    /// Its number in the row.
+    pub block: usize,
+    /// A bit for each of its columns, the first one lowest.
+    bits: u64,
 }
 
-/// Finds the blocks of `row` with a value that reaches the level of its block; NaN reaches none.
+impl Reached {
+    /// The columns of the row whose values reach the level.
+    pub fn columns(&self) -> impl Iterator<Item = usize> + use<> {
+        let Self { block, mut bits } = *self;
+        std::iter::from_fn(move || {
+            let column = block * BLOCK_PX + bits.trailing_zeros() as usize;
+            (bits != 0).then(|| {
+                bits &= bits - 1;
+                column
+            })
+        })
+    }
+}
+
+/// Finds the blocks of `row` with values that reach the level of their block; NaN reaches none.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(super) fn find_reaching(row: &[f32], levels: &[f32], found: &mut Vec<usize>) {
+pub(super) fn find_reaching(row: &[f32], levels: &[f32], found: &mut Vec<Reached>) {
     found.clear();
     let (blocks, rest) = row.as_chunks::<BLOCK_PX>();
     for (block, (values, &level)) in blocks.iter().zip(levels).enumerate() {
         if values.iter().fold(false, |any, &v| any | (v >= level)) {
-            found.push(block);
+            let bits = bits_of(values, level);
+            found.push(Reached { block, bits });
         }
     }
-    let is_reached = |level: &f32| rest.iter().any(|v| v >= level);
-    if levels.get(blocks.len()).is_some_and(is_reached) {
-        found.push(blocks.len());
+    if let Some(&level) = levels.get(blocks.len()) {
+        let bits = bits_of(rest, level);
+        if bits != 0 {
+            let block = blocks.len();
+            found.push(Reached { block, bits });
+        }
+    }
+}
+
+/// A bit for each value, at most 64, that reaches the level.
+#[inline(always)]
+fn bits_of(values: &[f32], level: f32) -> u64 {
+    let bits = values.iter().enumerate();
+    bits.fold(0, |bits, (i, &v)| bits | (u64::from(v >= level) << i))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_are_found_with_the_columns_that_reach_their_level() {
+        let mut row = vec![0.0; 2 * BLOCK_PX + 10];
+        let high = [0, 63, 64 + 20, 128 + 9];
+        for x in high {
+            row[x] = 5.0;
+        }
+        (row[3], row[100]) = (f32::NAN, 4.0);
+        let mut found = Vec::new();
+        find_reaching(&row, &[5.0; 3], &mut found);
+        let columns: Vec<usize> = found.iter().flat_map(Reached::columns).collect();
+        assert_eq!(columns, high);
+        assert_eq!(found.iter().map(|f| f.block).collect::<Vec<_>>(), [0, 1, 2]);
+        find_reaching(&row, &[6.0, 3.0, f32::NAN], &mut found);
+        let columns: Vec<usize> = found.iter().flat_map(Reached::columns).collect();
+        assert_eq!(columns, [64 + 20, 100]);
     }
 }

@@ -13,7 +13,7 @@
 //! Edelsbrunner, Letscher & Zomorodian 2002, doi 10.1007/s00454-002-2885-2, for prominence as persistence.
 
 use super::background::Mesh;
-use super::blocks::{columns_from, find_reaching};
+use super::blocks::{Reached, find_reaching};
 use super::matched_filter::Band;
 use super::view::View;
 use std::ops::Range;
@@ -59,7 +59,7 @@ pub(super) struct Candidates {
     cut: f32,
     /// The cut for each block of columns, and the blocks of a row that reach it.
     levels: Vec<f32>,
-    blocks: Vec<usize>,
+    blocks: Vec<Reached>,
 }
 
 /// A pixel of the filtered frame.
@@ -93,9 +93,10 @@ impl Candidates {
             let Some(row) = band.row(y) else { continue };
             let around = [y.checked_sub(1).and_then(|y| band.row(y)), band.row(y + 1)];
             find_reaching(row, &self.levels, &mut self.blocks);
-            for &block in &self.blocks {
-                for x in columns_from(row, block, cut) {
-                    maxima[block] = maxima[block].max(row[x]);
+            for block in &self.blocks {
+                let highest = &mut maxima[block.block];
+                for x in block.columns() {
+                    *highest = highest.max(row[x]);
                     if is_local_maximum(row, around, x) {
                         self.tops.push(Top {
                             pixel: self.pixels.len() as u32,
@@ -122,15 +123,13 @@ impl Candidates {
 fn is_local_maximum(row: &[f32], [above, below]: [Option<&[f32]>; 2], x: usize) -> bool {
     let value = row[x];
     let columns = x.saturating_sub(1)..(x + 2).min(row.len());
-    let all_low = |row: Option<&[f32]>, is_low: fn(f32, f32) -> bool| {
-        row.is_none_or(|row| row[columns.clone()].iter().all(|&v| is_low(v, value)))
-    };
-    let is_lower: fn(f32, f32) -> bool = |v, value| v < value;
-    let is_no_higher: fn(f32, f32) -> bool = |v, value| v <= value;
-    (x == 0 || row[x - 1] < value)
-        && (x + 1 == row.len() || row[x + 1] <= value)
-        && all_low(above, is_lower)
-        && all_low(below, is_no_higher)
+    // All of them are looked at: a branch for each would cost more.
+    let are_lower = |values: &[f32]| values.iter().fold(true, |all, v| all & (*v < value));
+    let are_no_higher = |values: &[f32]| values.iter().fold(true, |all, v| all & (*v <= value));
+    are_lower(&row[columns.start..x])
+        & are_no_higher(&row[x..columns.end])
+        & above.is_none_or(|row| are_lower(&row[columns.clone()]))
+        & below.is_none_or(|row| are_no_higher(&row[columns.clone()]))
 }
 
 /// The values to the left, to the right, above and below; `None` at the border.
@@ -280,9 +279,12 @@ pub(super) struct Search {
     ranks: Vec<u32>,
     /// The pixel and the run of each peak while they are in reading order.
     peak_pixels: Vec<[u32; 2]>,
+    /// The peaks' heights, inverted, and their indices: strongest first.
+    by_height: Vec<u64>,
     kept: Vec<Peak>,
-    /// The last of the kept peaks in each cell of a grid, and for each the one before it there.
+    /// The last of the kept peaks in each cell of a grid, and for each the one before it there; and how high they are together.
     last_in_cell: Vec<u32>,
+    height_in_cell: Vec<f32>,
     before_in_cell: Vec<u32>,
     by_row: Vec<u32>,
     nodes: Vec<[f32; 2]>,
@@ -632,8 +634,12 @@ impl Search {
 
     /// Keeps the peaks that neither noise on a flank nor the wing of a brighter star explains.
     fn drop_unfounded_peaks(&mut self, config: &SearchConfig) {
-        self.peaks
-            .sort_unstable_by(|a, b| b.snr.total_cmp(&a.snr).then((a.y, a.x).cmp(&(b.y, b.x))));
+        // Of equal ones the first in reading order, in which they are, comes first.
+        let keys = (0u64..).zip(&self.peaks);
+        self.by_height.clear();
+        self.by_height
+            .extend(keys.map(|(index, p)| u64::from(!p.snr.to_bits()) << 32 | index));
+        self.by_height.sort_unstable();
         let cell = |p: &Peak| (p.x / WING_REACH_PX, p.y / WING_REACH_PX);
         let cells = self.peaks.iter().map(cell);
         let (across, down) = cells.fold((1, 1), |(w, h), (x, y)| (w.max(x + 1), h.max(y + 1)));
@@ -641,7 +647,10 @@ impl Search {
         self.before_in_cell.clear();
         self.last_in_cell.clear();
         self.last_in_cell.resize(across * down, NONE);
-        for peak in &self.peaks {
+        self.height_in_cell.clear();
+        self.height_in_cell.resize(across * down, 0.0);
+        for &key in &self.by_height {
+            let peak = &self.peaks[key as u32 as usize];
             let relative = if peak.saturated {
                 MIN_SATURATED_PROMINENCE
             } else {
@@ -653,24 +662,31 @@ impl Search {
                 continue;
             }
             let (cx, cy) = cell(peak);
-            let mut wings = 0.0;
-            for gy in cy.saturating_sub(1)..(cy + 2).min(down) {
-                for gx in cx.saturating_sub(1)..(cx + 2).min(across) {
-                    let mut other = self.last_in_cell[gy * across + gx];
+            let near = (cy.saturating_sub(1)..(cy + 2).min(down)).flat_map(|gy| {
+                let columns = cx.saturating_sub(1)..(cx + 2).min(across);
+                columns.map(move |gx| gy * across + gx)
+            });
+            // Most stand out of all wings, wherever these come from.
+            let heights: f32 = near.clone().map(|cell| self.height_in_cell[cell]).sum();
+            if peak.snr < config.threshold + WING_HEIGHT * heights {
+                let mut wings = 0.0;
+                for cell in near {
+                    let mut other = self.last_in_cell[cell];
                     while let Some(brighter) = self.kept.get(other as usize) {
                         wings += wing_of(brighter, peak, config);
                         other = self.before_in_cell[other as usize];
                     }
                 }
-            }
-            if peak.snr < config.threshold + wings {
-                continue;
+                if peak.snr < config.threshold + wings {
+                    continue;
+                }
             }
             // Only bright stars have wings that can matter.
             let mut before = NONE;
             if peak.snr * WING_HEIGHT > 0.1 {
-                let last = &mut self.last_in_cell[cy * across + cx];
-                before = std::mem::replace(last, self.kept.len() as u32);
+                let own = cy * across + cx;
+                before = std::mem::replace(&mut self.last_in_cell[own], self.kept.len() as u32);
+                self.height_in_cell[own] += height_of(peak);
             }
             self.before_in_cell.push(before);
             self.kept.push(*peak);
@@ -678,7 +694,7 @@ impl Search {
                 break;
             }
         }
-        self.peaks.clone_from(&self.kept);
+        std::mem::swap(&mut self.peaks, &mut self.kept);
     }
 }
 
@@ -698,8 +714,12 @@ fn wing_of(bright: &Peak, peak: &Peak, config: &SearchConfig) -> f32 {
     let dx = bright.x as f32 - peak.x as f32;
     let dy = bright.y as f32 - peak.y as f32;
     let distance = (dx * dx + dy * dy).sqrt() / (4.0 * config.spot_width_px);
-    let height = bright.snr * if bright.saturated { 3.0 } else { 1.0 };
-    WING_HEIGHT * height / (1.0 + distance.powi(3))
+    WING_HEIGHT * height_of(bright) / (1.0 + distance.powi(3))
+}
+
+/// How high a peak may be, in units of the noise, whose saturated core tells less.
+fn height_of(peak: &Peak) -> f32 {
+    peak.snr * if peak.saturated { 3.0 } else { 1.0 }
 }
 
 /// Where the parabolas through a maximum and the values next to it have their tops, from its centre, in pixels.

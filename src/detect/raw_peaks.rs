@@ -4,7 +4,7 @@
 
 use super::Worker;
 use super::background::Mesh;
-use super::blocks::{BLOCK_PX, columns_from, find_reaching};
+use super::blocks::{BLOCK_PX, Reached, find_reaching};
 use super::fit::Spot;
 use super::psf::PIXEL_VARIANCE_PX2;
 use super::strips::on_each;
@@ -68,7 +68,7 @@ impl RawPeak {
 #[derive(Debug, Clone, Default)]
 pub(super) struct RawPeaks {
     levels: Vec<f32>,
-    blocks: Vec<usize>,
+    blocks: Vec<Reached>,
     found: Vec<RawPeak>,
 }
 
@@ -121,9 +121,8 @@ impl RawPeaks {
         for y in top.max(1)..(top + BAND_PX).min(view.height - 1) {
             let row = view.row(y);
             find_reaching(row, levels, blocks);
-            for &block in blocks.iter() {
-                let columns = columns_from(row, block, levels[block]);
-                for x in columns.filter(|&x| x > 0 && x + 1 < view.width) {
+            for block in blocks.iter() {
+                for x in block.columns().filter(|&x| x > 0 && x + 1 < view.width) {
                     found.extend(peak_at(view, background, x, y, saturation_adu));
                 }
             }

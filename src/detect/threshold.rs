@@ -139,10 +139,19 @@ mod tests {
 
     #[test]
     fn thresholds_invert_rates_from_many_false_alarms_to_hardly_any() {
-        for (per_mpx, rho) in [(1e5, 0.0), (1e4, 0.5), (10.0, 0.2), (0.1, 0.78), (1e-6, 0.95)] {
+        for (per_mpx, rho) in [
+            (1e5, 0.0),
+            (1e4, 0.5),
+            (10.0, 0.2),
+            (0.1, 0.78),
+            (1e-6, 0.95),
+        ] {
             let u = threshold_for_rate(per_mpx, rho, rho);
             let found = rate_above(u, rho) * 1e6;
-            assert!((found / per_mpx - 1.0).abs() < 1e-3, "{per_mpx}: {found} at {u}");
+            assert!(
+                (found / per_mpx - 1.0).abs() < 1e-3,
+                "{per_mpx}: {found} at {u}"
+            );
         }
         assert_eq!(threshold_for_rate(1e6, 0.5, 0.5), RANGE.0);
     }
