@@ -69,22 +69,41 @@ fn is_hot_pixel(measurement: &Measurement<'_>, peak: &Peak, fit: &Fit, work: &mu
         free_spot: false,
         noise: NoiseModel::default(),
     };
-    let FitWork { fitter, window, .. } = work;
-    let star = fitter.fit(window, &fit.spots[..1], &config);
-    let pixels = fitter.compare(window, &star);
-    let brightest = pixels
-        .clone()
-        .fold(0.0f64, |most, (above, _)| most.max(above));
-    let (mut difference, mut distance2) = (0.0, 0.0);
-    for (above, light) in pixels {
-        let single = if above == brightest { above } else { 0.0 };
-        difference += (above - light).powi(2) - (above - single).powi(2);
-        distance2 += (light - single).powi(2);
-    }
     let correlation2 = measurement.scene.correlation_at(spot.x, spot.y).powi(2);
-    let (difference, distance2) = (difference / correlation2, distance2 / correlation2);
-    let unlike_a_star = difference + distance2 > STAR_LOST_SIGMA * 2.0 * distance2.sqrt();
-    difference > imperfection(measurement, peak, &spot) && unlike_a_star
+    let allowed = imperfection(measurement, peak, &spot);
+    let is_single = |star: &Fit, work: &mut FitWork| {
+        let [difference, distance2] = against_one_pixel(star, work).map(|v| v / correlation2);
+        let unlike_a_star = difference + distance2 > STAR_LOST_SIGMA * 2.0 * distance2.sqrt();
+        difference > allowed && unlike_a_star
+    };
+    // Where even a sharp star that is not fitted is better than a single pixel, one that is fitted is.
+    let unfitted = Fit {
+        spot_px: config.spot_px,
+        ..fit.clone()
+    };
+    is_single(&unfitted, work) && {
+        let star = work.fitter.fit(&work.window, &fit.spots[..1], &config);
+        is_single(&star, work)
+    }
+}
+
+/// What chi² of a star is above that of all its light in one pixel, and the squared distance of the two models.
+fn against_one_pixel(star: &Fit, work: &mut FitWork) -> [f64; 2] {
+    let FitWork { fitter, window, .. } = work;
+    let (mut difference, mut distance2) = (0.0, 0.0);
+    let mut brightest = (0.0, 0.0);
+    for (above, light) in fitter.compare(window, star) {
+        difference += light * (light - 2.0 * above);
+        distance2 += light * light;
+        if above > brightest.0 {
+            brightest = (above, light);
+        }
+    }
+    let (above, light) = brightest;
+    [
+        difference + above * above,
+        distance2 + above * (above - 2.0 * light),
+    ]
 }
 
 /// Whether a spot well wider than the frame's explains the source much better.
