@@ -71,9 +71,14 @@ const TAKE_AT_END: f64 = std::f64::consts::E;
 /// centroid errors extrapolated from the triangle.
 const WITNESS_TOLERANCES: f64 = 1.5;
 const WITNESS_SIGMAS: f64 = 3.5;
-/// When to give up, so that a frame in which there is nothing to find takes well under a second. Most fields that can be
+/// When to give up at last, so that a frame in which there is nothing to find takes well under a second. Most fields that can be
 /// identified take a few, those with as many false sources as stars and half of the catalogue's missing up to all of these.
 pub const MAX_HYPOTHESES: u64 = 400_000;
+/// Few stars have few triangles, of which each pass tries the same again: what so many hypotheses of each triangle have not
+/// found will hardly be found.
+const HYPOTHESES_OF_TRIANGLE: u64 = 250;
+/// But so many are always tried.
+const LEAST_HYPOTHESES: u64 = 30_000;
 /// The same for catalogue triangles of the right shape, of which most are out at once: their size or brightness is not right.
 const MAX_CANDIDATES: u64 = 20_000_000;
 /// A triangle whose ratios are less certain than this is like so many others that it tells nothing.
@@ -115,6 +120,7 @@ pub struct Search<'a> {
     focal_px: (f64, f64),
     diagonal_px: f64,
     hypotheses: u64,
+    most_hypotheses: u64,
     candidates: u64,
     best_log10: Option<f64>,
     /// The best hypothesis that passes without being sure.
@@ -179,6 +185,10 @@ impl<'a> Search<'a> {
             Some((smallest, largest)) => (1.0 / largest, 1.0 / smallest),
             None => (wide, narrow),
         };
+        let stars = buffers.offsets.len() as u64;
+        let triangles = stars * stars.saturating_sub(1) * stars.saturating_sub(2) / 6;
+        let most_hypotheses =
+            (HYPOTHESES_OF_TRIANGLE * triangles).clamp(LEAST_HYPOTHESES, MAX_HYPOTHESES);
         Self {
             field,
             hints,
@@ -187,6 +197,7 @@ impl<'a> Search<'a> {
             focal_px,
             diagonal_px: field.width_px.hypot(field.height_px),
             hypotheses: 0,
+            most_hypotheses,
             candidates: 0,
             best_log10: None,
             unsure: None,
@@ -230,7 +241,7 @@ impl<'a> Search<'a> {
     }
 
     fn is_exhausted(&self) -> bool {
-        self.hypotheses > MAX_HYPOTHESES || self.candidates > MAX_CANDIDATES
+        self.hypotheses > self.most_hypotheses || self.candidates > MAX_CANDIDATES
     }
 
     fn trio(&self, stars: [usize; 3], pass: &Pass) -> Option<Trio> {
