@@ -6,13 +6,14 @@
 //! ADU and the relative error of the spot model, by least squares of the squared residuals.
 
 use super::components::Peak;
-use super::fit::{Fit, FitConfig, NoiseModel, SPOT_RANGE_PX, window_radius};
+use super::fit::{Fit, FitConfig, NoiseModel, SPOT_RANGE_PX};
 use super::normal::{Factor, ONE_SPOT, Pixels, SpotLight, linearise, sum_of};
 use super::psf::{LANES, PIXEL_VARIANCE_PX2};
 use super::raw_peaks::RawPeak;
 use super::scene::{FitWork, Scene};
 use arrayvec::ArrayVec;
 use multiversion::multiversion;
+use std::mem;
 
 /// The spot size where the frame does not tell, in pixels: a well-focused camera.
 pub(super) const DEFAULT_SPOT_PX: f64 = 0.9;
@@ -211,20 +212,23 @@ pub(super) fn star_model(
     // Each round weighs the squared residuals by the variance that the round before found.
     for _ in 0..NOISE_ROUNDS {
         let mut sums = Moments::default();
-        for star in &mut usable {
-            let radius = window_radius(star.spot_px);
-            scene.cut(&star.spots, radius, &mut work.window);
-            let config = FitConfig {
-                spot_px: star.spot_px,
-                free_spot: true,
-                noise: model,
-            };
-            let fit = work.fitter.fit(&work.window, &star.spots, &config);
-            if fit.converged {
+        let config = FitConfig {
+            spot_px: usable.iter().map(|s| s.spot_px).fold(0.0, f64::max),
+            free_spot: true,
+            noise: model,
+        };
+        let mut side_by_side = mem::take(&mut work.side_by_side);
+        let of_star = |(i, star): (usize, &Fit)| (i, star.spots[0], star.spot_px);
+        let starts: ArrayVec<_, MAX_STARS> = usable.iter().enumerate().map(of_star).collect();
+        let starts = starts.into_iter();
+        side_by_side.fit(scene, starts, &config, |i, fit, window| {
+            if let Some(fit) = fit {
+                mem::swap(&mut work.window, window);
                 sums.add_star(work, &fit, &config);
-                *star = fit;
+                usable[i] = fit;
             }
-        }
+        });
+        work.side_by_side = side_by_side;
         model = sums.solve();
         model.model_error2 = model.model_error2.min(MAX_MODEL_ERROR * MAX_MODEL_ERROR);
     }

@@ -20,7 +20,7 @@ use arrayvec::ArrayVec;
 pub(super) const MAX_SPOTS: usize = 6;
 /// Their parameters, the background and the size.
 pub(super) const MAX_PARAMETERS: usize = 3 * MAX_SPOTS + 2;
-const MAX_STEPS: usize = 15;
+pub(super) const MAX_STEPS: usize = 15;
 /// Steps shorter than this, in px, end the fit; convergence is quadratic, so little is left after one.
 const CONVERGED_PX: f64 = 2e-3;
 /// So do steps shorter than this part of the standard error: what is left after them is a fifth of it at most.
@@ -185,43 +185,16 @@ impl Fitter {
             spot_px: config.spot_px,
             ..Fit::default()
         };
-        let reach2 = (1.0 + config.spot_px).powi(2);
-        let all = 3 * start.len() + 2;
-        let fitted = parameter_count(start.len(), config);
-        let longest = if config.free_spot {
-            MAX_CONVERGED_FREE_PX
-        } else {
-            MAX_CONVERGED_PX
-        };
         for step in 0..MAX_STEPS {
-            // The first step is hardly ever the last: what the size would be is not asked yet.
-            let is_rough = step == 0 && start.len() == 1 && !config.free_spot;
-            let all = if is_rough { fitted } else { all };
             let mut normal: Normal<N> = self.linearise(window, &fit, config);
-            let information = (0..start.len()).flat_map(|i| [3 * i, 3 * i + 1]);
-            let information = information.map(|i| normal.matrix[i][i]).fold(0.0, f64::max);
-            let known = normal.factorise(all);
-            if known < fitted {
-                break;
-            }
-            let change = normal.solve(fitted);
-            let flux_kept = (0..start.len())
-                .all(|i| change[3 * i + 2].abs() <= SETTLED_FLUX * fit.spots[i].flux.abs());
-            let length = apply(&mut fit, &change, config);
-            let strayed = fit.spots.iter().zip(start).any(|(now, then)| {
-                let distance2 = (now.x - then.x).powi(2) + (now.y - then.y).powi(2);
-                !(distance2 <= reach2 && now.flux.is_finite())
-            });
-            if strayed {
-                break;
-            }
-            let enough = (CONVERGED_SIGMA / information.sqrt()).clamp(CONVERGED_PX, longest);
-            if length < enough && (step > 0 || flux_kept) && !is_rough {
-                fit.converged = true;
-                finish(&mut fit, &normal, [fitted, known], &change);
-                return fit;
+            match advance(&mut fit, start, &mut normal, step, config) {
+                Progress::Goes => {}
+                Progress::Settled => return fit,
+                Progress::Lost => break,
             }
         }
+        let all = 3 * start.len() + 2;
+        let fitted = parameter_count(start.len(), config);
         fit.spots = start.iter().copied().collect();
         fit.background = 0.0;
         fit.spot_px = config.spot_px;
@@ -388,17 +361,26 @@ impl Fitter {
             .map(|(i, spot)| self.light_of(i, spot, window))
             .collect();
         add_pixels(&mut normal, &lights, &pixels_of(window, fit, config));
-        let b = 3 * fit.spots.len();
-        let weight = 1.0 / (window.background_error * window.background_error);
-        normal.matrix[b][b] += weight;
-        normal.right[b] -= weight * fit.background;
-        normal.chi2 += weight * fit.background * fit.background;
+        add_background_map(&mut normal, window, fit);
         normal
     }
 }
 
+/// Adds what the map knows of the background.
+pub(super) fn add_background_map<const N: usize>(
+    normal: &mut Normal<N>,
+    window: &Window,
+    fit: &Fit,
+) {
+    let b = 3 * fit.spots.len();
+    let weight = 1.0 / (window.background_error * window.background_error);
+    normal.matrix[b][b] += weight;
+    normal.right[b] -= weight * fit.background;
+    normal.chi2 += weight * fit.background * fit.background;
+}
+
 /// The pixels of a window, and what the fit adds to the light in them.
-fn pixels_of<'a>(window: &'a Window, fit: &Fit, config: &FitConfig) -> Pixels<'a> {
+pub(super) fn pixels_of<'a>(window: &'a Window, fit: &Fit, config: &FitConfig) -> Pixels<'a> {
     let per_noise = 1.0 / window.noise_adu;
     Pixels {
         data: &window.data,
@@ -415,6 +397,65 @@ fn pixels_of<'a>(window: &'a Window, fit: &Fit, config: &FitConfig) -> Pixels<'a
 /// Three for each spot, the background, and the size where it is free.
 fn parameter_count(spots: usize, config: &FitConfig) -> usize {
     3 * spots + 1 + usize::from(config.free_spot)
+}
+
+/// What became of a fit with a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Progress {
+    /// There is more to do.
+    Goes,
+    /// The step was small: the fit has its result.
+    Settled,
+    /// The equations have no solution, or lead away from the start.
+    Lost,
+}
+
+/// Takes the step number `step` from the equations at `fit`; where it is the last, with the standard errors.
+pub(super) fn advance<const N: usize>(
+    fit: &mut Fit,
+    start: &[Spot],
+    normal: &mut Normal<N>,
+    step: usize,
+    config: &FitConfig,
+) -> Progress {
+    let fitted = parameter_count(start.len(), config);
+    // The first step is hardly ever the last: what the size would be is not asked yet.
+    let is_rough = step == 0 && start.len() == 1 && !config.free_spot;
+    let all = if is_rough {
+        fitted
+    } else {
+        3 * start.len() + 2
+    };
+    let information = (0..start.len()).flat_map(|i| [3 * i, 3 * i + 1]);
+    let information = information.map(|i| normal.matrix[i][i]).fold(0.0, f64::max);
+    let known = normal.factorise(all);
+    if known < fitted {
+        return Progress::Lost;
+    }
+    let change = normal.solve(fitted);
+    let flux_kept =
+        (0..start.len()).all(|i| change[3 * i + 2].abs() <= SETTLED_FLUX * fit.spots[i].flux.abs());
+    let length = apply(fit, &change, config);
+    let reach2 = (1.0 + config.spot_px).powi(2);
+    let strayed = fit.spots.iter().zip(start).any(|(now, then)| {
+        let distance2 = (now.x - then.x).powi(2) + (now.y - then.y).powi(2);
+        !(distance2 <= reach2 && now.flux.is_finite())
+    });
+    if strayed {
+        return Progress::Lost;
+    }
+    let longest = if config.free_spot {
+        MAX_CONVERGED_FREE_PX
+    } else {
+        MAX_CONVERGED_PX
+    };
+    let enough = (CONVERGED_SIGMA / information.sqrt()).clamp(CONVERGED_PX, longest);
+    if length < enough && (step > 0 || flux_kept) && !is_rough {
+        fit.converged = true;
+        finish(fit, normal, [fitted, known], &change);
+        return Progress::Settled;
+    }
+    Progress::Goes
 }
 
 /// Adds a step, shortened where it is too long; returns the length of the longest move in px.

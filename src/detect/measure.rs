@@ -11,6 +11,7 @@ use super::strips::on_each;
 use super::view::View;
 use super::{CentroidMethod, Detection, DetectionFlags, Worker};
 use crate::coords::PixelPoint;
+use std::mem;
 
 /// Spots closer than this many of their standard deviations touch, and are fitted together.
 const TOUCHING_SIGMA: f64 = 4.6;
@@ -61,22 +62,9 @@ impl Measurement<'_> {
         // What is alone can be measured in any order.
         let KnownSpots { spots, alone, .. } = &*known;
         on_each(workers, &|worker, thread| {
-            worker.found.clear();
-            for index in alone
-                .iter()
-                .map(|&i| i as usize)
-                .skip(thread)
-                .step_by(threads)
-            {
-                let place = Place {
-                    peaks,
-                    index,
-                    near: &[],
-                    start: Spots::from_iter([spots[index]]),
-                    beyond: &[],
-                };
-                self.measure(&place, &mut worker.fits, &mut worker.found);
-            }
+            let of_thread = alone.iter().skip(thread).step_by(threads);
+            let indices = of_thread.map(|&index| index as usize);
+            self.measure_alone(peaks, indices, spots, worker);
         });
         for worker in workers.iter_mut() {
             detections.append(&mut worker.found);
@@ -87,11 +75,43 @@ impl Measurement<'_> {
         for i in 0..known.close.len() {
             let index = known.close[i] as usize;
             let place = known.place_of(index, peaks, TOUCHING_SIGMA * self.width_px());
-            if let Some(spot) = self.measure(&place, fits, detections) {
+            if let Some(spot) = self.measure(&place, None, fits, detections) {
                 known.spots[index] = spot;
                 known.is_known[index] = true;
             }
         }
+    }
+
+    /// Measures peaks that stand alone.
+    fn measure_alone(
+        &self,
+        peaks: &[Peak],
+        indices: impl Iterator<Item = usize> + Clone,
+        spots: &[Spot],
+        Worker { fits, found, .. }: &mut Worker,
+    ) {
+        found.clear();
+        let place_of = |index: usize| Place {
+            peaks,
+            index,
+            near: &[],
+            start: Spots::from_iter([spots[index]]),
+            beyond: &[],
+        };
+        let spot_px = self.scene.spot_px;
+        let saturated = indices.clone().filter(|&i| peaks[i].saturated);
+        let others = indices.filter(|&i| !peaks[i].saturated);
+        for index in saturated {
+            self.measure(&place_of(index), None, fits, found);
+        }
+        let mut side_by_side = mem::take(&mut fits.side_by_side);
+        let starts = others.map(|index| (index, spots[index], spot_px));
+        let config = self.fit_config();
+        side_by_side.fit(&self.scene, starts, &config, |index, fit, window| {
+            mem::swap(&mut fits.window, window);
+            self.measure(&place_of(index), fit, fits, found);
+        });
+        fits.side_by_side = side_by_side;
     }
 
     /// How far a spot can matter to another, in pixels.
@@ -104,10 +124,12 @@ impl Measurement<'_> {
         (self.scene.spot_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt()
     }
 
-    /// Measures one peak; adds one detection, or two where it turns out to be a close pair. Its spot, if that is found.
+    /// Measures one peak, which may be fitted, its window in `work`; adds one detection, or two where it turns out to be a close
+    /// pair. Its spot, if that is found.
     fn measure(
         &self,
         place: &Place<'_>,
+        fitted: Option<Fit>,
         work: &mut FitWork,
         out: &mut Vec<Detection>,
     ) -> Option<Spot> {
@@ -115,16 +137,12 @@ impl Measurement<'_> {
         let peak = &place.peaks[place.index];
         let region = &self.regions[peak.region];
         let is_alone = start.len() == 1;
-        let mut fit = if peak.saturated && is_alone {
-            let size = (1.5 * self.scene.spot_px, self.noise);
-            self.scene.fit_free(start[0], beyond, size, work)
-        } else {
-            self.fit_fixed(start, beyond, work)
+        let mut fit = match fitted {
+            Some(fit) => fit,
+            None => self.fit_spots(start, peak, beyond, work),
         };
         // A fit that does not know the place to within the spot's width has found nothing.
         fit.converged &= is_placed(&fit.spots[0], fit.spot_px);
-        let FitWork { fitter, window, .. } = work;
-        fitter.set_flux_noise(window, &mut fit, &self.fit_config());
         let is_single = fit.converged && is_alone;
         let pair = if is_single && self.may_be_pair(&fit, peak, region) {
             self.as_pair(&fit, beyond, work)
@@ -157,6 +175,21 @@ impl Measurement<'_> {
         self.set_trail(peak, region, &mut detection);
         self.finish(&fit, &mut detection, work, out);
         fit.converged.then(|| fit.spots[0])
+    }
+
+    /// Fits the spots at a peak; a saturated one that is alone with a size of its own.
+    fn fit_spots(&self, start: &Spots, peak: &Peak, beyond: &[Spot], work: &mut FitWork) -> Fit {
+        let mut fit = if peak.saturated && start.len() == 1 {
+            let size = (1.5 * self.scene.spot_px, self.noise);
+            self.scene.fit_free(start[0], beyond, size, work)
+        } else {
+            self.fit_fixed(start, beyond, work)
+        };
+        let FitWork { fitter, window, .. } = work;
+        if is_placed(&fit.spots[0], fit.spot_px) {
+            fitter.set_flux_noise(window, &mut fit, &self.fit_config());
+        }
+        fit
     }
 
     /// Flags a trail, and places it in its middle, known along it to its length.

@@ -45,6 +45,7 @@ mod psf;
 mod raw_peaks;
 mod scene;
 mod shape;
+mod side_by_side;
 mod strips;
 mod threshold;
 mod view;

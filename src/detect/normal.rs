@@ -196,9 +196,7 @@ impl Pixels<'_> {
     /// The variance of a pixel with some light.
     #[inline(always)]
     pub fn variance(&self, light: f32) -> f32 {
-        let [linear, square] = self.variance;
-        let positive = if light > 0.0 { light } else { 0.0 };
-        1.0 + positive * (linear + square * positive)
+        variance_of(light, self.variance)
     }
 
     /// What a parameter's derivatives are multiplied with: those of light are per noise.
@@ -211,6 +209,13 @@ impl Pixels<'_> {
         };
         if is_light { self.per_noise } else { 1.0 }
     }
+}
+
+/// The variance of a pixel with some light, which has a part for light and one for its square.
+#[inline(always)]
+pub(super) fn variance_of(light: f32, [linear, square]: [f32; 2]) -> f32 {
+    let positive = if light > 0.0 { light } else { 0.0 };
+    1.0 + positive * (linear + square * positive)
 }
 
 /// A spot's light along both sides of a window.
@@ -256,16 +261,30 @@ pub(super) fn linearise<const S: usize, const N: usize>(
     let mut gradient = [0.0; N];
     gradient[background] = 1.0;
     for (i, spot) in spots.iter().enumerate().take(count) {
-        let (a, d) = (&spot.across, &spot.down);
-        let shape = a.value[lane] * d.value;
+        let [shape, by_x, by_y, by_size] =
+            spot_gradient(spot.flux, &spot.across.lane(lane), &spot.down);
         light += spot.flux * shape;
-        gradient[3 * i] = spot.flux * a.by_center[lane] * d.value;
-        gradient[3 * i + 1] = spot.flux * a.value[lane] * d.by_center;
+        gradient[3 * i] = by_x;
+        gradient[3 * i + 1] = by_y;
         gradient[3 * i + 2] = shape;
-        gradient[background + 1] +=
-            spot.flux * (a.by_sigma[lane] * d.value + a.value[lane] * d.by_sigma);
+        gradient[background + 1] += by_size;
     }
     (light, gradient)
+}
+
+/// The light of a spot in a pixel, as part of all; and how the light there changes with x, y and size.
+#[inline(always)]
+pub(super) fn spot_gradient(
+    flux: f32,
+    across: &ProfilePart<f32>,
+    down: &ProfilePart<f32>,
+) -> [f32; 4] {
+    [
+        across.value * down.value,
+        flux * across.by_center * down.value,
+        flux * across.value * down.by_center,
+        flux * (across.by_sigma * down.value + across.value * down.by_sigma),
+    ]
 }
 
 /// Adds the pixels of a window, in which the light is that of `spots`.
@@ -359,10 +378,18 @@ pub(super) fn flux_variance(spot: &SpotLight, pixels: &Pixels, background_error2
             }
         }
     }
-    let [ones, shapes, squares] = sums.map(sum_of);
-    let per_noise2 = pixels.per_noise * pixels.per_noise;
-    1.0 / (per_noise2
-        * (squares - shapes * shapes / (ones + 1.0 / (per_noise2 * background_error2))))
+    flux_variance_of(sums.map(sum_of), pixels.per_noise, background_error2)
+}
+
+/// The same from the sums of weights, and of these times the light, as part of all, and its square.
+pub(super) fn flux_variance_of(
+    [ones, shapes, squares]: [f64; 3],
+    per_noise: f64,
+    background_error2: f64,
+) -> f64 {
+    let per_noise2 = per_noise * per_noise;
+    let own = squares - shapes * shapes / (ones + 1.0 / (per_noise2 * background_error2));
+    1.0 / (per_noise2 * own)
 }
 
 /// Adds `sign` times the light of a spot to a window's pixels.

@@ -35,7 +35,7 @@ pub(super) struct AxisProfile {
 }
 
 /// The same in some of the pixels.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct ProfilePart<T> {
     /// Part of the light in a pixel.
     pub value: T,
@@ -43,6 +43,18 @@ pub(super) struct ProfilePart<T> {
     pub by_center: T,
     /// Its derivative with respect to σ, per px.
     pub by_sigma: T,
+}
+
+impl<const N: usize> ProfilePart<[f32; N]> {
+    /// All in one of them.
+    #[inline(always)]
+    pub fn lane(&self, lane: usize) -> ProfilePart<f32> {
+        ProfilePart {
+            value: self.value[lane],
+            by_center: self.by_center[lane],
+            by_sigma: self.by_sigma[lane],
+        }
+    }
 }
 
 impl AxisProfile {
@@ -80,37 +92,67 @@ impl AxisProfile {
 /// Edges of pixels treated together: of one pixel less.
 const EDGES: usize = 8;
 
+/// The light before a place along an axis, in parts of all, and how it changes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cumulative {
+    scale: f64,
+    density: f64,
+    by_sigma: f64,
+}
+
+impl Cumulative {
+    /// That of a spot with `sigma_px`.
+    pub fn of_spot(sigma_px: f64) -> Self {
+        let scale = 1.0 / (std::f64::consts::SQRT_2 * sigma_px);
+        let density = std::f64::consts::FRAC_2_SQRT_PI * 0.5 * scale;
+        Self {
+            scale,
+            density,
+            by_sigma: density / sigma_px,
+        }
+    }
+
+    /// At a place so far from the centre, in pixels: the light, less the half; its derivatives with respect to the centre
+    /// and to σ, per px.
+    #[inline(always)]
+    pub fn at(&self, distance_px: f64) -> [f64; 3] {
+        let (erf, exp) = erf_and_gauss(distance_px * self.scale);
+        [
+            0.5 * erf,
+            -exp * self.density,
+            -distance_px * exp * self.by_sigma,
+        ]
+    }
+}
+
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn fill(profile: &mut AxisProfile, center_px: f64, sigma_px: f64, count: usize) {
-    let scale = 1.0 / (std::f64::consts::SQRT_2 * sigma_px);
-    let density = std::f64::consts::FRAC_2_SQRT_PI * 0.5 * scale;
-    let by_sigma_scale = density / sigma_px;
-    let values = profile.value.as_flattened_mut();
-    let by_center = profile.by_center.as_flattened_mut();
-    let by_size = profile.by_sigma.as_flattened_mut();
+    let cumulative = Cumulative::of_spot(sigma_px);
+    let results = [
+        &mut profile.value,
+        &mut profile.by_center,
+        &mut profile.by_sigma,
+    ]
+    .map(|part| part.as_flattened_mut());
+    let [values, by_center, by_sigma] = results;
     for start in (0..count).step_by(EDGES - 1) {
         let first = start as f64 - 0.5 - center_px;
-        // At each edge between pixels: half the erf, the density, and that times the distance over σ.
-        let mut half_erf = [0.0f64; EDGES];
-        let mut gauss = [0.0f64; EDGES];
-        let mut by_sigma = [0.0f64; EDGES];
+        let mut edges = [[0.0f64; EDGES]; 3];
         for edge in 0..EDGES {
-            let distance = first + edge as i32 as f64;
-            let (erf, exp) = erf_and_gauss(distance * scale);
-            half_erf[edge] = 0.5 * erf;
-            gauss[edge] = exp * density;
-            by_sigma[edge] = distance * exp * by_sigma_scale;
+            let at = cumulative.at(first + edge as i32 as f64);
+            for (edges, at) in edges.iter_mut().zip(at) {
+                edges[edge] = at;
+            }
         }
         // A whole group is written: the profiles have room for it.
         let part = start..start + EDGES - 1;
-        for (value, edges) in values[part.clone()].iter_mut().zip(half_erf.windows(2)) {
-            *value = (edges[1] - edges[0]) as f32;
-        }
-        for (slope, edges) in by_center[part.clone()].iter_mut().zip(gauss.windows(2)) {
-            *slope = (edges[0] - edges[1]) as f32;
-        }
-        for (slope, edges) in by_size[part].iter_mut().zip(by_sigma.windows(2)) {
-            *slope = (edges[0] - edges[1]) as f32;
+        for (result, edges) in [&mut *values, &mut *by_center, &mut *by_sigma]
+            .into_iter()
+            .zip(&edges)
+        {
+            for (pixel, edge) in result[part.clone()].iter_mut().zip(edges.windows(2)) {
+                *pixel = (edge[1] - edge[0]) as f32;
+            }
         }
     }
 }

@@ -4,6 +4,7 @@ use super::background::Mesh;
 use super::components::Peak;
 use super::fit::{Fit, FitConfig, Fitter, NoiseModel, Spot, Window, window_radius};
 use super::psf::{LANES, MAX_WINDOW_PX};
+use super::side_by_side::SideBySide;
 use super::view::View;
 use multiversion::multiversion;
 
@@ -185,4 +186,6 @@ pub(super) struct FitWork {
     pub window: Window,
     /// Those of a fit that is tried in another window.
     pub kept_window: Window,
+    /// For many stars at once.
+    pub side_by_side: SideBySide,
 }
