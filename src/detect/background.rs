@@ -31,6 +31,10 @@ const SETTLED_SPREAD: f32 = 0.05;
 const ROW_STRIDE: usize = 4;
 /// Cells with fewer pixels than this are sampled in full.
 const SMALL_CELL_PX: usize = 1024;
+/// The pixels whose differences are measured are so many columns apart.
+const DIFFERENCE_PX: usize = 2;
+/// Values summed side by side.
+const MOMENT_LANES: usize = 32;
 /// Fewer samples than this tell nothing about a cell.
 const MIN_CELL_SAMPLES: usize = 12;
 
@@ -104,14 +108,14 @@ pub(super) struct Mesh {
     pub level: Vec<f32>,
     /// Row-major, `rows * columns`.
     pub spread: Vec<f32>,
-    /// One over the spread.
-    inverse: Vec<f32>,
     /// The least spread that a cell could have.
     pub spread_floor: f32,
     /// Where along a row the straight pieces between nodes begin, and the last one ends.
     edges: Vec<usize>,
     /// How far behind its node each of them begins, in columns.
     offsets: Vec<f32>,
+    /// The pieces along each row of nodes.
+    pieces: Vec<Piece>,
     /// The level as measured, with a border of one cell in which it goes on as a plane does.
     padded_level: Vec<f32>,
     measured_spread: Vec<f32>,
@@ -126,7 +130,7 @@ impl Mesh {
         let levels = self.level.chunks_mut(grid.columns);
         let spreads = self.spread.chunks_mut(grid.columns);
         for (row, (level, spread)) in levels.zip(spreads).enumerate() {
-            let pixels = grid.rows_of(row).map(|y| view.row(y));
+            let pixels = view.rows(grid.rows_of(row));
             scratch.measure_row(&grid, pixels, config, (level, spread));
         }
         self.finish();
@@ -167,8 +171,7 @@ impl Mesh {
         for spread in &mut self.spread {
             *spread = spread.max(self.spread_floor);
         }
-        self.inverse.clear();
-        self.inverse.extend(self.spread.iter().map(|s| 1.0 / s));
+        self.set_pieces();
     }
 
     /// The column of pixels of the nodes in a column of cells.
@@ -299,51 +302,50 @@ impl Mesh {
     ///
     /// Differs from [`Self::at`] in that the reciprocal is interpolated, not the spread: by less than
     /// the error of either.
-    pub fn row_pieces<'a>(&'a self, y: usize, pieces: &mut Vec<Piece>) {
-        let Grid { columns, rows, .. } = self.grid;
-        let (row, fy) = Self::node(y as f32, self.rows_per_px, rows);
-        let below = (row + 1).min(rows - 1);
+    pub fn row_pieces(&self, y: usize, pieces: &mut Vec<Piece>) {
+        let (row, fy) = Self::node(y as f32, self.rows_per_px, self.grid.rows);
+        let below = (row + 1).min(self.grid.rows - 1);
         let held = fy.clamp(0.0, 1.0);
-        let nodes_of = |map: &'a [f32], row: usize| &map[row * columns..(row + 1) * columns];
+        let in_row = self.offsets.len();
+        let of_nodes = |row: usize| &self.pieces[row * in_row..(row + 1) * in_row];
         pieces.clear();
-        pieces.push(Piece::default());
-        // First each piece has the values of the node before it.
-        let levels = nodes_of(&self.level, row)
-            .iter()
-            .zip(nodes_of(&self.level, below));
-        let inverses = nodes_of(&self.inverse, row)
-            .iter()
-            .zip(nodes_of(&self.inverse, below));
-        pieces.extend(
-            levels
-                .zip(inverses)
-                .map(|((top, bottom), (itop, ibottom))| Piece {
-                    level: top + fy * (bottom - top),
-                    inverse: itop + held * (ibottom - itop),
-                    ..Piece::default()
-                }),
-        );
-        for p in 1..columns {
-            let next = pieces[p + 1];
-            let piece = &mut pieces[p];
-            piece.level_slope = (next.level - piece.level) * self.columns_per_px;
-            piece.inverse_slope = (next.inverse - piece.inverse) * self.columns_per_px;
+        let pairs = of_nodes(row).iter().zip(of_nodes(below));
+        pieces.extend(pairs.map(|(top, bottom)| Piece {
+            level: top.level + fy * (bottom.level - top.level),
+            level_slope: top.level_slope + fy * (bottom.level_slope - top.level_slope),
+            inverse: top.inverse + held * (bottom.inverse - top.inverse),
+            inverse_slope: top.inverse_slope + held * (bottom.inverse_slope - top.inverse_slope),
+            ..*top
+        }));
+    }
+
+    /// The pieces along each row of nodes.
+    fn set_pieces(&mut self) {
+        let columns = self.grid.columns;
+        self.pieces.clear();
+        for row in 0..self.grid.rows {
+            let nodes = row * columns..(row + 1) * columns;
+            let (level, spread) = (&self.level[nodes.clone()], &self.spread[nodes]);
+            let spans = self.edges.windows(2).zip(&self.offsets);
+            for (piece, (edge, offset)) in spans.enumerate() {
+                // Beyond the outermost nodes the level goes on, the spread is held.
+                let before = piece.saturating_sub(1);
+                let after = piece.min(columns - 1);
+                let left = before.min(columns.saturating_sub(2));
+                let right = (left + 1).min(columns - 1);
+                let level_slope = (level[right] - level[left]) * self.columns_per_px;
+                let inverse = 1.0 / spread[before];
+                let inverse_slope = (1.0 / spread[after] - inverse) * self.columns_per_px;
+                self.pieces.push(Piece {
+                    start: edge[0],
+                    end: edge[1],
+                    level: level[before] + offset * level_slope,
+                    level_slope,
+                    inverse: inverse + offset * inverse_slope,
+                    inverse_slope,
+                });
+            }
         }
-        // Beyond the outermost nodes the level goes on, the spread is held.
-        pieces[0] = Piece {
-            inverse_slope: 0.0,
-            ..pieces[1]
-        };
-        pieces[columns].level_slope = pieces[columns - 1].level_slope;
-        for (piece, (edge, offset)) in pieces
-            .iter_mut()
-            .zip(self.edges.windows(2).zip(&self.offsets))
-        {
-            (piece.start, piece.end) = (edge[0], edge[1]);
-            piece.level += offset * piece.level_slope;
-            piece.inverse += offset * piece.inverse_slope;
-        }
-        pieces.truncate(self.offsets.len());
     }
 
     /// What `level + sigmas·spread` is nowhere below in a row of cells.
@@ -407,20 +409,59 @@ pub(super) struct Piece {
     pub inverse_slope: f32,
 }
 
+/// Rows of pixels, `stride` apart in memory.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rows<'a> {
+    /// From the first pixel of the first row on.
+    pub values: &'a [f32],
+    pub stride: usize,
+    pub width: usize,
+    pub height: usize,
+}
+
+impl<'a> Rows<'a> {
+    fn row(&self, y: usize) -> &'a [f32] {
+        &self.values[y * self.stride..][..self.width]
+    }
+
+    /// Every `step`th of them.
+    fn step_by(self, step: usize) -> Self {
+        Self {
+            stride: step * self.stride,
+            height: self.height.div_ceil(step),
+            ..self
+        }
+    }
+
+    /// Some of their columns.
+    fn columns(self, columns: Range<usize>) -> Self {
+        Self {
+            values: &self.values[columns.start.min(self.values.len())..],
+            width: columns.len(),
+            ..self
+        }
+    }
+}
+
+/// What is measured in a cell: its pixels, or the differences of those two columns apart.
+#[derive(Debug, Clone, Copy)]
+struct Samples<'a> {
+    rows: Rows<'a>,
+    are_differences: bool,
+}
+
 /// Buffers for the cells of one row.
 #[derive(Debug, Clone, Default)]
 pub(super) struct CellScratch {
-    values: Vec<f32>,
-    differences: Vec<f32>,
     start: Vec<f32>,
 }
 
 impl CellScratch {
     /// Levels and spreads of a row of cells, whose rows of pixels are `rows`; NaN where a cell has too few values.
-    pub fn measure_row<'a>(
+    pub fn measure_row(
         &mut self,
         grid: &Grid,
-        rows: impl Iterator<Item = &'a [f32]> + Clone,
+        rows: Rows<'_>,
         config: &MeshConfig,
         (level, spread): (&mut [f32], &mut [f32]),
     ) {
@@ -431,60 +472,57 @@ impl CellScratch {
             if config.is_normalised {
                 starts.fill(Some((0.0, 1.0)));
             } else {
-                rough_starts(grid, cells.clone(), rows.clone(), &mut starts);
+                rough_starts(grid, cells.clone(), &rows, &mut starts);
             }
             for (cell, start) in cells.zip(starts) {
-                self.gather(grid.columns_of(cell), rows.clone(), config);
-                let start = start.or_else(|| robust_start(&self.values, &mut self.start));
-                (level[cell], spread[cell]) = self.measure_cell(start, config);
+                let columns = grid.columns_of(cell);
+                let start =
+                    start.or_else(|| robust_start(&rows.columns(columns.clone()), &mut self.start));
+                (level[cell], spread[cell]) = measure_cell(&rows, columns, start, config);
             }
         }
     }
+}
 
-    /// Copies the pixels of a cell, and their differences where these are wanted.
-    fn gather<'a>(
-        &mut self,
-        columns: Range<usize>,
-        rows: impl Iterator<Item = &'a [f32]>,
-        config: &MeshConfig,
-    ) {
-        self.values.clear();
-        self.differences.clear();
-        for row in rows {
-            let row = &row[columns.clone()];
-            self.values.extend_from_slice(row);
-            if config.spread_of_differences && row.len() > 2 {
-                let pairs = row[2..].iter().zip(row);
-                self.differences.extend(pairs.map(|(b, a)| b - a));
-            }
-        }
+/// Level and spread of a cell; NaN where it has too few values.
+fn measure_cell(
+    rows: &Rows<'_>,
+    columns: Range<usize>,
+    start: Option<(f32, f32)>,
+    config: &MeshConfig,
+) -> (f32, f32) {
+    let pixels = Samples {
+        rows: rows.columns(columns.clone()),
+        are_differences: false,
+    };
+    let measured = start.and_then(|at| clipped_mean_and_spread(&pixels, at, config.spread_floor));
+    let Some((level, spread)) = measured else {
+        return (f32::NAN, f32::NAN);
+    };
+    // The last differences of a cell reach into the next.
+    let reach = columns.start..(columns.end + DIFFERENCE_PX).min(rows.width);
+    let differences = Samples {
+        rows: rows.columns(reach.clone()),
+        are_differences: true,
+    };
+    let count = reach.len().saturating_sub(DIFFERENCE_PX) * rows.height;
+    if !config.spread_of_differences || count < MIN_CELL_SAMPLES {
+        return (level, spread);
     }
-
-    /// Level and spread of the cell that is gathered; NaN where it has too few values.
-    fn measure_cell(&self, start: Option<(f32, f32)>, config: &MeshConfig) -> (f32, f32) {
-        let measured =
-            start.and_then(|at| clipped_mean_and_spread(&self.values, at, config.spread_floor));
-        let Some((level, spread)) = measured else {
-            return (f32::NAN, f32::NAN);
-        };
-        if self.differences.len() < MIN_CELL_SAMPLES {
-            return (level, spread);
-        }
-        let root2 = std::f32::consts::SQRT_2;
-        let floor = config.spread_floor * root2;
-        match clipped_mean_and_spread(&self.differences, (0.0, spread * root2), floor) {
-            Some((_, of_differences)) => (level, of_differences / root2),
-            None => (level, spread),
-        }
+    let root2 = std::f32::consts::SQRT_2;
+    let floor = config.spread_floor * root2;
+    match clipped_mean_and_spread(&differences, (0.0, spread * root2), floor) {
+        Some((_, of_differences)) => (level, of_differences / root2),
+        None => (level, spread),
     }
 }
 
 /// Median, and its distance to the lower quantile, of a few pixels of up to [`LANES`] cells, sorted side by side;
 /// `None` for those with a pixel without a value.
-fn rough_starts<'a>(
+fn rough_starts(
     grid: &Grid,
     cells: Range<usize>,
-    rows: impl Iterator<Item = &'a [f32]> + Clone,
+    rows: &Rows<'_>,
     starts: &mut [Option<(f32, f32)>; LANES],
 ) {
     const SAMPLES: usize = medians::SORTED;
@@ -492,7 +530,8 @@ fn rough_starts<'a>(
     const STEP: f32 = 0.618_034;
     let mut samples: [Lanes; SAMPLES] = [[0.0; LANES]; SAMPLES];
     let width = grid.width_px / grid.columns;
-    for (i, (sample, row)) in samples.iter_mut().zip(rows.cycle()).enumerate() {
+    for (i, sample) in samples.iter_mut().enumerate() {
+        let row = rows.row(i % rows.height);
         let offset = ((i as f32 * STEP).fract() * width as f32) as usize;
         for (value, cell) in sample.iter_mut().zip(cells.clone()) {
             *value = row[grid.columns_of(cell).start + offset];
@@ -521,10 +560,11 @@ fn start_from(quantile: impl Fn(f32) -> f32) -> (f32, f32) {
     (level, if below > 0.0 { below } else { above })
 }
 
-/// Median, and its distance to the lower quantile, of `values`; `None` for too few.
-fn robust_start(values: &[f32], start: &mut Vec<f32>) -> Option<(f32, f32)> {
+/// Median, and its distance to the lower quantile, of all pixels in `rows`; `None` for too few.
+fn robust_start(rows: &Rows<'_>, start: &mut Vec<f32>) -> Option<(f32, f32)> {
     start.clear();
-    start.extend(values.iter().filter(|v| !v.is_nan()));
+    let values = (0..rows.height).flat_map(|y| rows.row(y));
+    start.extend(values.filter(|v| !v.is_nan()));
     if start.len() < MIN_CELL_SAMPLES {
         return None;
     }
@@ -534,13 +574,13 @@ fn robust_start(values: &[f32], start: &mut Vec<f32>) -> Option<(f32, f32)> {
     }))
 }
 
-/// Mean and standard deviation of `values` without outliers, from a first guess of both; `None` for
+/// Mean and standard deviation of samples without outliers, from a first guess of both; `None` for
 /// too few values. NaN is left out.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn clipped_mean_and_spread(values: &[f32], start: (f32, f32), floor: f32) -> Option<(f32, f32)> {
+fn clipped_mean_and_spread(samples: &Samples, start: (f32, f32), floor: f32) -> Option<(f32, f32)> {
     let (mut level, mut spread) = (start.0, start.1.max(floor));
     for round in 0..MAX_CLIP_ROUNDS {
-        let [count, sum, squares] = clipped_moments(values, level, CLIP_SIGMA * spread);
+        let [count, sum, squares] = clipped_moments(samples, level, CLIP_SIGMA * spread);
         if count < MIN_CELL_SAMPLES as f32 {
             return (round > 0).then_some((level, spread));
         }
@@ -561,12 +601,8 @@ fn clipped_mean_and_spread(values: &[f32], start: (f32, f32), floor: f32) -> Opt
 
 /// Number, sum and sum of squares of `value - center` where it is at most `half_width` in size.
 #[inline(always)]
-fn clipped_moments(values: &[f32], center: f32, half_width: f32) -> [f32; 3] {
-    const LANES: usize = 32;
-    let mut count = [0.0f32; LANES];
-    let mut sum = [0.0f32; LANES];
-    let mut squares = [0.0f32; LANES];
-    let (chunks, rest) = values.as_chunks::<LANES>();
+fn clipped_moments(samples: &Samples<'_>, center: f32, half_width: f32) -> [f32; 3] {
+    let [mut count, mut sum, mut squares] = [[0.0f32; MOMENT_LANES]; 3];
     let mut add = |lane: usize, value: f32| {
         let deviation = value - center;
         let inside = deviation.abs() <= half_width;
@@ -575,19 +611,37 @@ fn clipped_moments(values: &[f32], center: f32, half_width: f32) -> [f32; 3] {
         sum[lane] += kept;
         squares[lane] += kept * kept;
     };
-    for chunk in chunks {
-        for (lane, &value) in chunk.iter().enumerate() {
-            add(lane, value);
+    let Samples {
+        rows,
+        are_differences,
+    } = *samples;
+    for y in 0..rows.height {
+        let row = rows.row(y);
+        if are_differences {
+            let (first, second) = (&row[..row.len() - DIFFERENCE_PX], &row[DIFFERENCE_PX..]);
+            let (chunks, rest) = first.as_chunks::<MOMENT_LANES>();
+            let (later_chunks, later_rest) = second.as_chunks::<MOMENT_LANES>();
+            for (chunk, later) in chunks.iter().zip(later_chunks) {
+                for lane in 0..MOMENT_LANES {
+                    add(lane, later[lane] - chunk[lane]);
+                }
+            }
+            for (lane, (value, later)) in rest.iter().zip(later_rest).enumerate() {
+                add(lane, later - value);
+            }
+        } else {
+            let (chunks, rest) = row.as_chunks::<MOMENT_LANES>();
+            for chunk in chunks {
+                for lane in 0..MOMENT_LANES {
+                    add(lane, chunk[lane]);
+                }
+            }
+            for (lane, value) in rest.iter().enumerate() {
+                add(lane, *value);
+            }
         }
     }
-    for (lane, &value) in rest.iter().enumerate() {
-        add(lane, value);
-    }
-    [
-        medians::sum_of(count),
-        medians::sum_of(sum),
-        medians::sum_of(squares),
-    ]
+    [count, sum, squares].map(medians::sum_of)
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@
 //! The filtered frame is never whole in memory: it is made and looked at in bands of rows that stay in cache.
 
 use super::aligned::{Aligned, LINE};
-use super::background::{Mesh, Piece};
+use super::background::{Mesh, Piece, Rows};
 use super::psf::{PIXEL_VARIANCE_PX2, centered_profile};
 use super::view::View;
 use arrayvec::ArrayVec;
@@ -194,6 +194,16 @@ impl Band {
         let i = y - self.rows.start;
         let out = &mut self.values[i * self.stride..][..self.whole_width];
         sum_along_columns(&kernel.half, &pairs, factor, out);
+    }
+
+    /// Some of the rows of the filtered frame that the band holds.
+    pub fn rows(&self, rows: Range<usize>) -> Rows<'_> {
+        Rows {
+            values: &self.values[rows.start.saturating_sub(self.rows.start) * self.stride..],
+            stride: self.stride,
+            width: self.width,
+            height: rows.len(),
+        }
     }
 
     /// Row `y` of the filtered frame, if the band holds it.

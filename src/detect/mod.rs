@@ -394,7 +394,7 @@ fn measure_background(
     let mut no_maxima = BlockMaxima::default();
     let strips = Strips::of(background, &mut no_maxima, nothing);
     strips.share(workers, &|worker, strip| {
-        let rows = strip.rows.map(|y| view.row(y));
+        let rows = view.rows(strip.rows);
         let cells = (strip.level, strip.spread);
         worker.cells.measure_row(&grid, rows, &mesh_config, cells);
     });
@@ -572,7 +572,7 @@ fn filter(view: &View<'_>, cell_px: usize, kernel: &Kernel, least: f64, workspac
             kernel,
             with_neighbours(&rows, view.height),
         );
-        let filtered = rows.clone().filter_map(|y| band.row(y));
+        let filtered = band.rows(rows.clone());
         cells.measure_row(&grid, filtered, &mesh_config, (strip.level, strip.spread));
         let least = least as f32;
         let of_cells = strip.level.iter().zip(strip.spread.iter());

@@ -1,6 +1,8 @@
 //! The part of a frame that holds light: its pixels without the dead borders.
 
+use super::background::Rows;
 use crate::frame::Frame;
+use std::ops::Range;
 
 /// A rectangle of an image; all coordinates inside `detect` are relative to it.
 #[derive(Debug, Clone, Copy)]
@@ -66,6 +68,16 @@ impl<'a> View<'a> {
     pub fn row(&self, y: usize) -> &'a [f32] {
         let start = (self.y0 + y) * self.stride + self.x0;
         &self.pixels[start..start + self.width]
+    }
+
+    /// Some of the rows.
+    pub fn rows(&self, rows: Range<usize>) -> Rows<'a> {
+        Rows {
+            values: &self.pixels[(self.y0 + rows.start) * self.stride + self.x0..],
+            stride: self.stride,
+            width: self.width,
+            height: rows.len(),
+        }
     }
 
     /// The pixel in column `x`, row `y`.
