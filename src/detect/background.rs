@@ -85,7 +85,7 @@ impl Grid {
     }
 
     /// Every how many rows a cell is sampled.
-    fn row_stride(&self) -> usize {
+    pub fn row_stride(&self) -> usize {
         let cell_px = (self.width_px / self.columns) * (self.height_px / self.rows);
         if cell_px >= SMALL_CELL_PX {
             ROW_STRIDE
@@ -130,7 +130,7 @@ impl Mesh {
         let levels = self.level.chunks_mut(grid.columns);
         let spreads = self.spread.chunks_mut(grid.columns);
         for (row, (level, spread)) in levels.zip(spreads).enumerate() {
-            let pixels = view.rows(grid.rows_of(row));
+            let pixels = view.rows(grid.rows_of(row)).step_by(grid.row_stride());
             scratch.measure_row(&grid, pixels, config, (level, spread));
         }
         self.finish();
@@ -420,12 +420,13 @@ pub(super) struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    fn row(&self, y: usize) -> &'a [f32] {
+    /// One of them.
+    pub fn row(&self, y: usize) -> &'a [f32] {
         &self.values[y * self.stride..][..self.width]
     }
 
     /// Every `step`th of them.
-    fn step_by(self, step: usize) -> Self {
+    pub fn step_by(self, step: usize) -> Self {
         Self {
             stride: step * self.stride,
             height: self.height.div_ceil(step),
@@ -457,7 +458,7 @@ pub(super) struct CellScratch {
 }
 
 impl CellScratch {
-    /// Levels and spreads of a row of cells, whose rows of pixels are `rows`; NaN where a cell has too few values.
+    /// Levels and spreads of a row of cells, of whose rows of pixels `rows` are looked at; NaN where a cell has too few values.
     pub fn measure_row(
         &mut self,
         grid: &Grid,
@@ -465,7 +466,6 @@ impl CellScratch {
         config: &MeshConfig,
         (level, spread): (&mut [f32], &mut [f32]),
     ) {
-        let rows = rows.step_by(grid.row_stride());
         for first in (0..grid.columns).step_by(LANES) {
             let cells = first..(first + LANES).min(grid.columns);
             let mut starts = [None; LANES];

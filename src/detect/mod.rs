@@ -61,6 +61,7 @@ use components::{Candidates, Search, SearchConfig};
 use fit::NoiseModel;
 use matched_filter::{Band, Kernel};
 use measure::{KnownSpots, Measurement};
+use multiversion::multiversion;
 use noise::{NoiseWork, PixelNoise, StarFree, Weights};
 use raw_peaks::{RawPeak, RawPeaks};
 use scene::{FitWork, Scene};
@@ -223,7 +224,8 @@ pub struct Workspace {
     filtered_maxima: BlockMaxima,
     /// For each row of cells.
     candidates: Vec<Candidates>,
-    nothing: Vec<()>,
+    /// The lowest of the pixels looked at in each row of cells, in ADU.
+    lowest: Vec<f32>,
     /// One for each thread.
     workers: Vec<Worker>,
     noise: NoiseWork,
@@ -381,7 +383,7 @@ fn measure_background(
     let size = (view.width, view.height);
     let Workspace {
         background,
-        nothing,
+        lowest,
         workers,
         ..
     } = workspace;
@@ -390,11 +392,13 @@ fn measure_background(
         workers.push(Worker::default());
     }
     let grid = background.grid;
-    nothing.resize(grid.rows, ());
+    lowest.resize(grid.rows, 0.0);
     let mut no_maxima = BlockMaxima::default();
-    let strips = Strips::of(background, &mut no_maxima, nothing);
+    let strips = Strips::of(background, &mut no_maxima, lowest);
     strips.share(workers, &|worker, strip| {
-        let rows = view.rows(strip.rows);
+        let rows = view.rows(strip.rows).step_by(grid.row_stride());
+        // This also brings the rows from the memory in one go, and not cell by cell.
+        *strip.other = (0..rows.height).fold(f32::INFINITY, |m, y| lowest_of(m, rows.row(y)));
         let cells = (strip.level, strip.spread);
         worker.cells.measure_row(&grid, rows, &mesh_config, cells);
     });
@@ -572,7 +576,7 @@ fn filter(view: &View<'_>, cell_px: usize, kernel: &Kernel, least: f64, workspac
             kernel,
             with_neighbours(&rows, view.height),
         );
-        let filtered = band.rows(rows.clone());
+        let filtered = band.rows(rows.clone()).step_by(grid.row_stride());
         cells.measure_row(&grid, filtered, &mesh_config, (strip.level, strip.spread));
         let least = least as f32;
         let of_cells = strip.level.iter().zip(strip.spread.iter());
@@ -638,7 +642,8 @@ fn raised_for_noise(
     let level = middle_of(&background.level, &mut workspace.sorted);
     let spread = middle_of(&background.spread, &mut workspace.sorted);
     let is_coarse = spread < COARSE * f64::from(background.spread_floor);
-    if is_coarse || is_cut_off(view, level, spread) {
+    let lowest = workspace.lowest.iter().copied().fold(f32::INFINITY, lesser);
+    if is_coarse || is_cut_off(view, lowest, level, spread) {
         return raised_for_steps(u, view, &weights, is_coarse, workspace);
     }
     // The tail itself is mostly that of stars too faint to be detected: a threshold raised for these would lose a third of the
@@ -695,20 +700,33 @@ fn raised_for_steps(
 }
 
 /// Whether the lowest value of the frame cuts into its noise: many pixels have just that value.
-fn is_cut_off(view: &View<'_>, level: f64, spread: f64) -> bool {
+fn is_cut_off(view: &View<'_>, lowest: f32, level: f64, spread: f64) -> bool {
     const EVERY: usize = 16;
     const SIGMAS: f32 = 2.5;
-    let rows = || (0..view.height).step_by(EVERY).map(|y| view.row(y));
-    let least = |a: f32, b: f32| if b < a { b } else { a };
-    let lowest = rows().fold(f32::INFINITY, |m, row| fold_row(m, row, least));
-    let near = level - f64::from(lowest) < f64::from(SIGMAS) * spread;
-    let total = view.width * view.height.div_ceil(EVERY);
+    if level - f64::from(lowest) >= f64::from(SIGMAS) * spread {
+        return false;
+    }
+    let rows = (0..view.height).step_by(EVERY).map(|y| view.row(y));
     let count = |row: &[f32]| row.iter().map(|&v| u32::from(v == lowest)).sum::<u32>();
-    let at_lowest = rows().map(|row| count(row) as usize).sum::<usize>();
-    near && at_lowest * LEAST_CUT_OFF > total
+    let at_lowest: usize = rows.map(|row| count(row) as usize).sum();
+    let total = view.width * view.height.div_ceil(EVERY);
+    at_lowest * LEAST_CUT_OFF > total
+}
+
+/// The lesser of two values, that which is none left out.
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if b < a { b } else { a }
+}
+
+/// The lowest of a row and a value, NaN left out.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn lowest_of(value: f32, row: &[f32]) -> f32 {
+    fold_row(value, row, lesser)
 }
 
 /// Folds a row into `start` in any order: one value after the other, each would wait for the one before.
+#[inline(always)]
 fn fold_row(start: f32, row: &[f32], fold: impl Fn(f32, f32) -> f32) -> f32 {
     const LANES: usize = 32;
     let (chunks, rest) = row.as_chunks::<LANES>();
