@@ -24,9 +24,11 @@ const LEFT_BY_ROUND: f32 = 0.11;
 /// Rounds of clipping; it settles in one or two.
 const MAX_CLIP_ROUNDS: usize = 8;
 /// A change of the level below this part of the spread ends the clipping: a 37th of it would be left to the next round.
-const SETTLED_LEVEL: f32 = 0.15;
+const SETTLED_LEVEL: f32 = 0.25;
 /// So does a change of the spread below this part of it: what is left is of second order, well below the error of a thousand pixels.
 const SETTLED_SPREAD: f32 = 0.05;
+/// The same where the spread is only a start for that of differences.
+const SETTLED_START: f32 = 0.2;
 /// Every how many rows of a cell are sampled.
 const ROW_STRIDE: usize = 4;
 /// Cells with fewer pixels than this are sampled in full.
@@ -495,7 +497,13 @@ fn measure_cell(
         rows: rows.columns(columns.clone()),
         are_differences: false,
     };
-    let measured = start.and_then(|at| clipped_mean_and_spread(&pixels, at, config.spread_floor));
+    let settled = if config.spread_of_differences {
+        SETTLED_START
+    } else {
+        SETTLED_SPREAD
+    };
+    let limits = [config.spread_floor, settled];
+    let measured = start.and_then(|at| clipped_mean_and_spread(&pixels, at, limits));
     let Some((level, spread)) = measured else {
         return (f32::NAN, f32::NAN);
     };
@@ -510,8 +518,8 @@ fn measure_cell(
         return (level, spread);
     }
     let root2 = std::f32::consts::SQRT_2;
-    let floor = config.spread_floor * root2;
-    match clipped_mean_and_spread(&differences, (0.0, spread * root2), floor) {
+    let limits = [config.spread_floor * root2, SETTLED_SPREAD];
+    match clipped_mean_and_spread(&differences, (0.0, spread * root2), limits) {
         Some((_, of_differences)) => (level, of_differences / root2),
         None => (level, spread),
     }
@@ -575,9 +583,13 @@ fn robust_start(rows: &Rows<'_>, start: &mut Vec<f32>) -> Option<(f32, f32)> {
 }
 
 /// Mean and standard deviation of samples without outliers, from a first guess of both; `None` for
-/// too few values. NaN is left out.
+/// too few values. NaN is left out. The spread is not below `floor`, and done with where it changes by less than `settled`.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn clipped_mean_and_spread(samples: &Samples, start: (f32, f32), floor: f32) -> Option<(f32, f32)> {
+fn clipped_mean_and_spread(
+    samples: &Samples,
+    start: (f32, f32),
+    [floor, settled]: [f32; 2],
+) -> Option<(f32, f32)> {
     let (mut level, mut spread) = (start.0, start.1.max(floor));
     for round in 0..MAX_CLIP_ROUNDS {
         let [count, sum, squares] = clipped_moments(samples, level, CLIP_SIGMA * spread);
@@ -588,11 +600,11 @@ fn clipped_mean_and_spread(samples: &Samples, start: (f32, f32), floor: f32) -> 
         let variance = (squares / count - mean * mean).max(0.0);
         let clipped = variance.sqrt() / CLIPPED_SHRINK;
         let new_spread = (spread + (clipped - spread) / (1.0 - LEFT_BY_ROUND)).max(0.0);
-        let settled = (new_spread - spread).abs() <= SETTLED_SPREAD * spread
+        let is_settled = (new_spread - spread).abs() <= settled * spread
             && mean.abs() <= SETTLED_LEVEL * spread;
         level += mean;
         spread = new_spread.max(floor);
-        if settled || new_spread <= floor {
+        if is_settled || new_spread <= floor {
             break;
         }
     }
