@@ -600,8 +600,8 @@ fn clipped_mean_and_spread(
         let variance = (squares / count - mean * mean).max(0.0);
         let clipped = variance.sqrt() / CLIPPED_SHRINK;
         let new_spread = (spread + (clipped - spread) / (1.0 - LEFT_BY_ROUND)).max(0.0);
-        let is_settled = (new_spread - spread).abs() <= settled * spread
-            && mean.abs() <= SETTLED_LEVEL * spread;
+        let is_settled =
+            (new_spread - spread).abs() <= settled * spread && mean.abs() <= SETTLED_LEVEL * spread;
         level += mean;
         spread = new_spread.max(floor);
         if is_settled || new_spread <= floor {

@@ -223,7 +223,7 @@ pub(super) fn star_model(
         let starts = starts.into_iter();
         side_by_side.fit(scene, starts, &config, |i, fit, window| {
             if let Some(fit) = fit {
-                mem::swap(&mut work.window, window);
+                work.window.copy_from(window);
                 sums.add_star(work, &fit, &config);
                 usable[i] = fit;
             }

@@ -108,7 +108,7 @@ impl Measurement<'_> {
         let starts = others.map(|index| (index, spots[index], spot_px));
         let config = self.fit_config();
         side_by_side.fit(&self.scene, starts, &config, |index, fit, window| {
-            mem::swap(&mut fits.window, window);
+            fits.window.copy_from(window);
             self.measure(&place_of(index), fit, fits, found);
         });
         fits.side_by_side = side_by_side;

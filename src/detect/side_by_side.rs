@@ -65,7 +65,7 @@ struct Sums {
 
 impl SideBySide {
     /// Fits one spot at each start, none of which is larger than that in `config`; `each` is told the star's number, the fit
-    /// if it succeeds, and its window, which it may keep in exchange for another.
+    /// if it succeeds, and its window.
     ///
     /// A lane whose star is done takes the next; what it finds does not depend on the others.
     pub fn fit(
@@ -73,7 +73,7 @@ impl SideBySide {
         scene: &Scene<'_>,
         mut starts: impl Iterator<Item = Start>,
         config: &FitConfig,
-        mut each: impl FnMut(usize, Option<Fit>, &mut Window),
+        mut each: impl FnMut(usize, Option<Fit>, &Window),
     ) {
         self.side = 2 * window_radius(config.spot_px) + 1;
         self.data.clear();
@@ -100,7 +100,7 @@ impl SideBySide {
                     });
                     continue;
                 }
-                let window = &mut self.windows[lane];
+                let window = &self.windows[lane];
                 fit.spots[0].noise_flux = flux_noise(lane, &sums, window);
                 let found = (progress == Progress::Settled).then(|| fit.clone());
                 each(number, found, window);
