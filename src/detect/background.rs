@@ -21,14 +21,16 @@ const CLIPPED_SHRINK: f32 = 0.986_58;
 /// The part of a wrong spread that is left by a round of clipping at it, for a Gaussian: d ln s/d ln k of the standard
 /// deviation s clipped at ±kσ, at k = 3. So a round is carried on to where many would lead.
 const LEFT_BY_ROUND: f32 = 0.11;
-/// Rounds of clipping; it settles in one or two.
+/// Rounds of clipping; it settles in one to three.
 const MAX_CLIP_ROUNDS: usize = 8;
-/// A change of the level below this part of the spread ends the clipping: a 37th of it would be left to the next round.
-const SETTLED_LEVEL: f32 = 0.25;
-/// So does a change of the spread below this part of it: what is left is of second order, well below the error of a thousand pixels.
-const SETTLED_SPREAD: f32 = 0.05;
-/// The same where the spread is only a start for that of differences.
-const SETTLED_START: f32 = 0.2;
+/// Changes of level and spread below these parts of the spread end the clipping of a filtered frame, whose mean is wanted
+/// well below its noise.
+const SETTLED_FILTERED: [f32; 2] = [1.2e-2, 1.2e-2];
+/// The same for pixels, where a 37th of a wrong level would be left to the next round, and the spread is only a start for
+/// that of differences.
+const SETTLED_PIXELS: [f32; 2] = [0.1, 0.2];
+/// The same for differences, whose mean is 0; of a wrong spread, what is left is of second order.
+const SETTLED_DIFFERENCES: [f32; 2] = [1.0, 0.05];
 /// Every how many rows of a cell are sampled.
 const ROW_STRIDE: usize = 4;
 /// Cells with fewer pixels than this are sampled in full.
@@ -498,12 +500,12 @@ fn measure_cell(
         are_differences: false,
     };
     let settled = if config.spread_of_differences {
-        SETTLED_START
+        SETTLED_PIXELS
     } else {
-        SETTLED_SPREAD
+        SETTLED_FILTERED
     };
-    let limits = [config.spread_floor, settled];
-    let measured = start.and_then(|at| clipped_mean_and_spread(&pixels, at, limits));
+    let floor = config.spread_floor;
+    let measured = start.and_then(|at| clipped_mean_and_spread(&pixels, at, floor, settled));
     let Some((level, spread)) = measured else {
         return (f32::NAN, f32::NAN);
     };
@@ -518,8 +520,8 @@ fn measure_cell(
         return (level, spread);
     }
     let root2 = std::f32::consts::SQRT_2;
-    let limits = [config.spread_floor * root2, SETTLED_SPREAD];
-    match clipped_mean_and_spread(&differences, (0.0, spread * root2), limits) {
+    let start = (0.0, spread * root2);
+    match clipped_mean_and_spread(&differences, start, floor * root2, SETTLED_DIFFERENCES) {
         Some((_, of_differences)) => (level, of_differences / root2),
         None => (level, spread),
     }
@@ -583,12 +585,14 @@ fn robust_start(rows: &Rows<'_>, start: &mut Vec<f32>) -> Option<(f32, f32)> {
 }
 
 /// Mean and standard deviation of samples without outliers, from a first guess of both; `None` for
-/// too few values. NaN is left out. The spread is not below `floor`, and done with where it changes by less than `settled`.
+/// too few values. NaN is left out. The spread is not below `floor`; both are done with where they change by less than
+/// `settled` of it.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn clipped_mean_and_spread(
     samples: &Samples,
     start: (f32, f32),
-    [floor, settled]: [f32; 2],
+    floor: f32,
+    [settled_level, settled_spread]: [f32; 2],
 ) -> Option<(f32, f32)> {
     let (mut level, mut spread) = (start.0, start.1.max(floor));
     for round in 0..MAX_CLIP_ROUNDS {
@@ -600,8 +604,8 @@ fn clipped_mean_and_spread(
         let variance = (squares / count - mean * mean).max(0.0);
         let clipped = variance.sqrt() / CLIPPED_SHRINK;
         let new_spread = (spread + (clipped - spread) / (1.0 - LEFT_BY_ROUND)).max(0.0);
-        let is_settled =
-            (new_spread - spread).abs() <= settled * spread && mean.abs() <= SETTLED_LEVEL * spread;
+        let is_settled = (new_spread - spread).abs() <= settled_spread * spread
+            && mean.abs() <= settled_level * spread;
         level += mean;
         spread = new_spread.max(floor);
         if is_settled || new_spread <= floor {
