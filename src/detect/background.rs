@@ -418,8 +418,11 @@ pub(super) struct Piece {
 pub(super) struct Rows<'a> {
     /// From the first pixel of the first row on.
     pub values: &'a [f32],
+    /// Pixels from the start of a row to that of the next.
     pub stride: usize,
+    /// Columns.
     pub width: usize,
+    /// Rows.
     pub height: usize,
 }
 
@@ -648,8 +651,8 @@ fn clipped_moments(samples: &Samples<'_>, center: f32, half_width: f32) -> [f32;
         } else {
             let (chunks, rest) = row.as_chunks::<MOMENT_LANES>();
             for chunk in chunks {
-                for lane in 0..MOMENT_LANES {
-                    add(lane, chunk[lane]);
+                for (lane, value) in chunk.iter().enumerate() {
+                    add(lane, *value);
                 }
             }
             for (lane, value) in rest.iter().enumerate() {
