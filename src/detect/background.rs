@@ -10,7 +10,7 @@
 //! shared among threads.
 
 use super::medians::{self, LANES, Lanes};
-use super::view::View;
+use super::view::{Rows, View};
 use multiversion::multiversion;
 use std::ops::Range;
 
@@ -411,44 +411,6 @@ pub(super) struct Piece {
     pub inverse: f32,
     /// One over the spread, per column.
     pub inverse_slope: f32,
-}
-
-/// Rows of pixels, `stride` apart in memory.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Rows<'a> {
-    /// From the first pixel of the first row on.
-    pub values: &'a [f32],
-    /// Pixels from the start of a row to that of the next.
-    pub stride: usize,
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-}
-
-impl<'a> Rows<'a> {
-    /// One of them.
-    pub fn row(&self, y: usize) -> &'a [f32] {
-        &self.values[y * self.stride..][..self.width]
-    }
-
-    /// Every `step`th of them.
-    pub fn step_by(self, step: usize) -> Self {
-        Self {
-            stride: step * self.stride,
-            height: self.height.div_ceil(step),
-            ..self
-        }
-    }
-
-    /// Some of their columns.
-    fn columns(self, columns: Range<usize>) -> Self {
-        Self {
-            values: &self.values[columns.start.min(self.values.len())..],
-            width: columns.len(),
-            ..self
-        }
-    }
 }
 
 /// What is measured in a cell: its pixels, or the differences of those two columns apart.

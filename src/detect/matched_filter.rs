@@ -8,9 +8,9 @@
 //! The filtered frame is never whole in memory: it is made and looked at in bands of rows that stay in cache.
 
 use super::aligned::{Aligned, LINE};
-use super::background::{Mesh, Piece, Rows};
+use super::background::{Mesh, Piece};
 use super::psf::{PIXEL_VARIANCE_PX2, centered_profile};
-use super::view::View;
+use super::view::{Rows, View};
 use arrayvec::ArrayVec;
 use multiversion::multiversion;
 use std::ops::Range;

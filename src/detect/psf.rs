@@ -128,13 +128,12 @@ impl Cumulative {
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn fill(profile: &mut AxisProfile, center_px: f64, sigma_px: f64, count: usize) {
     let cumulative = Cumulative::of_spot(sigma_px);
-    let results = [
+    let mut results = [
         &mut profile.value,
         &mut profile.by_center,
         &mut profile.by_sigma,
     ]
     .map(|part| part.as_flattened_mut());
-    let [values, by_center, by_sigma] = results;
     for start in (0..count).step_by(EDGES - 1) {
         let first = start as f64 - 0.5 - center_px;
         let mut edges = [[0.0f64; EDGES]; 3];
@@ -146,10 +145,7 @@ fn fill(profile: &mut AxisProfile, center_px: f64, sigma_px: f64, count: usize) 
         }
         // A whole group is written: the profiles have room for it.
         let part = start..start + EDGES - 1;
-        for (result, edges) in [&mut *values, &mut *by_center, &mut *by_sigma]
-            .into_iter()
-            .zip(&edges)
-        {
+        for (result, edges) in results.iter_mut().zip(&edges) {
             for (pixel, edge) in result[part.clone()].iter_mut().zip(edges.windows(2)) {
                 *pixel = (edge[1] - edge[0]) as f32;
             }

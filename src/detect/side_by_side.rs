@@ -1,7 +1,7 @@
 //! Fits of single spots side by side, a lane of a vector for each.
 //!
-//! The fit is that of [`Fitter`](super::fit::Fitter), step by step; only the sums over the pixels are those of many stars at once. The windows
-//! of spots are small: their rows fill no vector, and sums across one take as long as the pixels do.
+//! The fit is that of [`Fitter`](super::fit::Fitter), step by step; only the sums over the pixels are those of many stars
+//! at once. The windows of spots are small: their rows fill no vector, and sums across one take as long as the pixels do.
 
 use super::fit::{
     Fit, FitConfig, MAX_STEPS, Progress, Spot, Window, add_background_map, advance, pixels_of,
@@ -48,7 +48,7 @@ struct Model {
     flux: Stars,
     background: Stars,
     /// Variance of a pixel per light, and per squared light.
-    variance: [[f32; STARS]; 2],
+    variance: [Stars; 2],
 }
 
 /// Sums over the pixels of each star.
@@ -195,7 +195,8 @@ impl SideBySide {
     }
 }
 
-/// The standard error of the flux before the last step from noise alone, in ADU, see [`Fitter::set_flux_noise`](super::fit::Fitter::set_flux_noise).
+/// The standard error of the flux before the last step from noise alone, in ADU, see
+/// [`Fitter::set_flux_noise`](super::fit::Fitter::set_flux_noise).
 fn flux_noise(lane: usize, sums: &Sums, window: &Window) -> f64 {
     let sums = sums.shapes.map(|sum| f64::from(sum[lane]));
     let error2 = window.background_noise * window.background_noise;

@@ -1,6 +1,5 @@
 //! The part of a frame that holds light: its pixels without the dead borders.
 
-use super::background::Rows;
 use crate::frame::Frame;
 use std::ops::Range;
 
@@ -84,5 +83,43 @@ impl<'a> View<'a> {
     #[inline]
     pub fn at(&self, x: usize, y: usize) -> f32 {
         self.row(y)[x]
+    }
+}
+
+/// Rows of pixels, `stride` apart in memory.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rows<'a> {
+    /// From the first pixel of the first row on.
+    pub values: &'a [f32],
+    /// Pixels from the start of a row to that of the next.
+    pub stride: usize,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+impl<'a> Rows<'a> {
+    /// One of them.
+    pub fn row(&self, y: usize) -> &'a [f32] {
+        &self.values[y * self.stride..][..self.width]
+    }
+
+    /// Every `step`th of them.
+    pub fn step_by(self, step: usize) -> Self {
+        Self {
+            stride: step * self.stride,
+            height: self.height.div_ceil(step),
+            ..self
+        }
+    }
+
+    /// Some of their columns.
+    pub fn columns(self, columns: Range<usize>) -> Self {
+        Self {
+            values: &self.values[columns.start.min(self.values.len())..],
+            width: columns.len(),
+            ..self
+        }
     }
 }
