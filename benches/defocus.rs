@@ -9,9 +9,9 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use starpipe::defocus::{Centroiding, EnergyStudy, PeakStudy};
-use starpipe::sensitivity::Scenario;
-use starpipe::sensor::Preset;
+use starpipe::camera::data_sheet::Preset;
+use starpipe::model::defocus::{Centroiding, EnergyStudy, PeakStudy};
+use starpipe::model::sensitivity::Scenario;
 use std::hint::black_box;
 
 fn points(criterion: &mut Criterion) {

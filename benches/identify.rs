@@ -3,12 +3,12 @@
 //! new process has to do first. One thread, buffers reused, as in a long run over many frames.
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
-use starpipe::catalog::Catalog;
-use starpipe::catalog::sky_grid::SkyGrid;
 use starpipe::detect::{self, DetectConfig, detect};
 use starpipe::frame::{self, Frame};
 use starpipe::identify::{self, Hints, Outcome, Sky, StarField, identify};
 use starpipe::pipeline::{Pipeline, SolveConfig, Workspace, star_field};
+use starpipe::sky::catalog::Catalog;
+use starpipe::sky::catalog::sky_grid::SkyGrid;
 use std::f64::consts::SQRT_2;
 use std::hint::black_box;
 use std::path::Path;

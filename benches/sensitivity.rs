@@ -7,11 +7,11 @@
 #![allow(missing_docs, reason = "criterion makes public functions")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use starpipe::catalog::Catalog;
-use starpipe::coords::{Rotation, UnitVector};
-use starpipe::sensitivity::{Budget, Detector, Rule, Scenario};
-use starpipe::sensor::Preset;
-use starpipe::simulate::{Pointing, Scene, Simulator};
+use starpipe::base::coords::{Rotation, UnitVector};
+use starpipe::camera::data_sheet::Preset;
+use starpipe::model::sensitivity::{Budget, Detector, Rule, Scenario};
+use starpipe::model::simulate::{Pointing, Scene, Simulator};
+use starpipe::sky::catalog::Catalog;
 use std::hint::black_box;
 
 fn prediction(criterion: &mut Criterion) {

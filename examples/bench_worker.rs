@@ -3,11 +3,11 @@
 //! usage: `bench_worker FROM:TO`, the range of horizontal fields in degrees.
 
 use serde_json::{Value, json};
-use starpipe::catalog::Catalog;
 use starpipe::detect::{self, DetectConfig, Detections, detect_into};
 use starpipe::frame::{self, Frame};
 use starpipe::identify::{self, Hints, Identification, Sky};
 use starpipe::pipeline::star_field;
+use starpipe::sky::catalog::Catalog;
 use std::error::Error;
 use std::io::{BufRead, Write};
 use std::path::Path;

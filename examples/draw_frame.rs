@@ -8,10 +8,10 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal, Poisson};
+use starpipe::base::coords::{PixelPoint, Rotation, UnitVector};
+use starpipe::base::units::RAD_PER_DEG;
 use starpipe::camera::{CameraModel, focal_length_px};
-use starpipe::catalog::Catalog;
-use starpipe::coords::{PixelPoint, Rotation, UnitVector};
-use starpipe::units::RAD_PER_DEG;
+use starpipe::sky::catalog::Catalog;
 use std::error::Error;
 use std::fs::File;
 use std::path::Path;

@@ -7,11 +7,11 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use starpipe::camera::CameraModel;
-use starpipe::catalog::Catalog;
 use starpipe::detect::{self, DetectConfig, detect};
 use starpipe::identify::{Hints, Identification, Sky, StarField, Workspace};
 use starpipe::pipeline::star_field;
-use starpipe::robustness::{Answer, Observation, Protocol};
+use starpipe::sky::catalog::Catalog;
+use starpipe::study::robustness::{Answer, Observation, Protocol};
 use std::error::Error;
 use std::f64::consts::SQRT_2;
 use std::time::Instant;

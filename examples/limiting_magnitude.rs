@@ -1,7 +1,7 @@
 //! How faint a star sensor sees, and which of its parts is worth improving: `cargo run --example limiting_magnitude`
 
-use starpipe::sensitivity::{Budget, Detector, Parameter, Rule, Scenario};
-use starpipe::sensor::Preset;
+use starpipe::camera::data_sheet::Preset;
+use starpipe::model::sensitivity::{Budget, Detector, Parameter, Rule, Scenario};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut scenario = Scenario::of(Preset::NanosatTracker);

@@ -8,9 +8,9 @@
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use starpipe::catalog::Catalog;
 use starpipe::identify::{Hints, Reason, Sky, StarField, Workspace};
-use starpipe::robustness::{Observation, Protocol};
+use starpipe::sky::catalog::Catalog;
+use starpipe::study::robustness::{Observation, Protocol};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 

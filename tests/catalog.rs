@@ -8,12 +8,12 @@ use flate2::Compression;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 use proptest::prelude::*;
-use starpipe::catalog::{
+use starpipe::base::coords::{Icrs, UnitVector};
+use starpipe::base::units::{ARCSEC_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
+use starpipe::sky::catalog::{
     Catalog, CatalogError, FaultPlace, HipparcosId, ImportSummary, Star, StarFlags, StarId,
     TychoId, sky2000,
 };
-use starpipe::coords::{Icrs, UnitVector};
-use starpipe::units::{ARCSEC_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
 use std::collections::HashMap;
 use std::fs;
 use std::io::{Read, Write};
@@ -36,7 +36,7 @@ fn sky2000_file() -> Option<PathBuf> {
 
 /// The catalogue in a single file, and what became of its records.
 fn import(path: &Path) -> Result<(Catalog, ImportSummary), CatalogError> {
-    let mut reading = starpipe::catalog::import(path)?;
+    let mut reading = starpipe::sky::catalog::import(path)?;
     assert_eq!(reading.files.len(), 1);
     Ok((reading.catalog, reading.files.remove(0).summary))
 }

@@ -7,9 +7,9 @@ use common::{Ran, Truth, fixture, number, shared_dir, starpipe};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use proptest::prelude::*;
-use starpipe::catalog::{Catalog, Reading, Star, StarFlags, StarId, TychoId};
-use starpipe::coords::UnitVector;
-use starpipe::units::{ARCSEC_PER_RAD, RAD_PER_DEG};
+use starpipe::base::coords::UnitVector;
+use starpipe::base::units::{ARCSEC_PER_RAD, RAD_PER_DEG};
+use starpipe::sky::catalog::{Catalog, Reading, Star, StarFlags, StarId, TychoId};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -61,7 +61,7 @@ impl Folder {
 }
 
 fn read(path: &Path) -> Reading {
-    starpipe::catalog::read(path).unwrap()
+    starpipe::sky::catalog::read(path).unwrap()
 }
 
 fn gzip(bytes: &[u8]) -> Vec<u8> {
@@ -524,7 +524,7 @@ fn the_whole_of_tycho_2_becomes_stars() {
     let Some(_) = shared_dir() else { return };
     // Nearly all of SKY2000's bright stars stand there, at the same place and about as bright.
     let bright: Vec<&Star> = Catalog::built_in().stars()[..15_424].iter().collect();
-    let grid = starpipe::catalog::sky_grid::SkyGrid::new(reading.catalog.stars());
+    let grid = starpipe::sky::catalog::sky_grid::SkyGrid::new(reading.catalog.stars());
     let has_twin = |star: &&&Star| {
         let mut twin = false;
         grid.for_each_within(
@@ -856,14 +856,14 @@ proptest! {
             // What tells the kind stays.
             content[16..][at.index(source.len() - 16)] = byte;
         }
-        let _ = starpipe::catalog::read(&folder.write("tyc2.dat", content));
+        let _ = starpipe::sky::catalog::read(&folder.write("tyc2.dat", content));
     }
 
     #[test]
     fn any_cells_under_headings_are_refused_or_read_but_never_a_panic(content in "[-+0-9a-z:,.\"\n ]{0,120}") {
         let folder = Folder::new();
         let table = folder.write("table", format!("id,ra,dec,mag,pmra,pmdec,epoch\n{content}"));
-        let _ = starpipe::catalog::read(&table);
+        let _ = starpipe::sky::catalog::read(&table);
     }
 
     #[test]

@@ -7,12 +7,12 @@
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use starpipe::coords::PixelPoint;
+use starpipe::base::coords::PixelPoint;
+use starpipe::camera::data_sheet::{Imperfections, Preset, Response, Sensor};
 use starpipe::detect::{DetectConfig, Detection, Workspace, detect};
 use starpipe::frame::Frame;
-use starpipe::sensitivity::{Budget, Detector, Extinction, Rule, Scenario, SkyBrightness};
-use starpipe::sensor::{Imperfections, Preset, Response, Sensor};
-use starpipe::simulate::star_field;
+use starpipe::model::sensitivity::{Budget, Detector, Extinction, Rule, Scenario, SkyBrightness};
+use starpipe::model::simulate::star_field;
 
 /// Side of the frames, in pixels.
 const SIDE_PX: usize = 1024;

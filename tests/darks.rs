@@ -10,10 +10,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde_json::Value;
 use starpipe::calibration::{Calibration, Master};
+use starpipe::camera::data_sheet::Preset;
 use starpipe::frame::{self, FitsHeader, FitsSamples, Frame, write_fits};
-use starpipe::sensitivity::{Scenario, SkyBrightness};
-use starpipe::sensor::Preset;
-use starpipe::simulate::star_field;
+use starpipe::model::sensitivity::{Scenario, SkyBrightness};
+use starpipe::model::simulate::star_field;
 use std::collections::{HashMap, HashSet};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -341,7 +341,7 @@ fn what_is_no_dark_is_named() {
     let stars: Vec<_> = (0..30)
         .map(|i| {
             (
-                starpipe::coords::PixelPoint::new(
+                starpipe::base::coords::PixelPoint::new(
                     20.0 + 9.3 * f64::from(i),
                     30.0 + 6.1 * f64::from(i),
                 ),

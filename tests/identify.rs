@@ -6,13 +6,13 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use starpipe::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use starpipe::camera::{CameraModel, Distortion, DistortionModel, focal_length_px};
-use starpipe::catalog::Catalog;
-use starpipe::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use starpipe::identify::{
     Hints, Identification, ObservedStar, Outcome, Photometry, Reason, Sky, StarField, StarMatch,
     identify,
 };
+use starpipe::sky::catalog::Catalog;
 use std::f64::consts::{PI, TAU};
 use std::sync::OnceLock;
 

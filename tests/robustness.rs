@@ -10,9 +10,9 @@ use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
-use starpipe::catalog::Catalog;
 use starpipe::identify::{Hints, Outcome, Sky, identify};
-use starpipe::robustness::{Answer, Mirrored, Observation, Protocol, Verdict};
+use starpipe::sky::catalog::Catalog;
+use starpipe::study::robustness::{Answer, Mirrored, Observation, Protocol, Verdict};
 use std::sync::OnceLock;
 
 fn sky() -> &'static Sky<'static> {

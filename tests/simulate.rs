@@ -2,11 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
-use starpipe::coords::PixelPoint;
+use starpipe::base::coords::PixelPoint;
+use starpipe::camera::data_sheet::Preset;
 use starpipe::frame::Frame;
-use starpipe::sensitivity::{Budget, Scenario};
-use starpipe::sensor::Preset;
-use starpipe::simulate::star_field;
+use starpipe::model::sensitivity::{Budget, Scenario};
+use starpipe::model::simulate::star_field;
 
 /// Measured means and variances may be off by so many of their standard errors.
 const SIGMAS: f64 = 4.5;

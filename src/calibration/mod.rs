@@ -11,12 +11,14 @@
 //!
 //! Caveats: the dark is not scaled to another exposure; its dark current is then too large or too small, and a note says so.
 
+pub mod darks;
+pub mod flats;
 mod hot;
 
 pub use hot::{HotPixelList, read_hot_pixels};
 
+use crate::base::statistics::median;
 use crate::frame::Frame;
-use crate::statistics::median;
 use std::path::PathBuf;
 
 /// With more than this part of its pixels of no use, a flat or a list of hot pixels is a mistake.

@@ -9,9 +9,9 @@ use super::simulate::ImageKind;
 use super::values;
 use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
-use starpipe::epoch::ObservationDate;
-use starpipe::observer::Site;
-use starpipe::sensor::Preset;
+use starpipe::base::epoch::ObservationDate;
+use starpipe::camera::data_sheet::Preset;
+use starpipe::sky::observer::Site;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -283,7 +283,7 @@ pub(crate) struct DarksArgs {
     #[arg(long, value_name = "FILE.toml")]
     pub(crate) camera: Option<PathBuf>,
     /// Robust standard deviations from which on a pixel is hot
-    #[arg(long, value_name = "NUMBER", value_parser = values::positive, default_value_t = starpipe::darks::HOT_SIGMA)]
+    #[arg(long, value_name = "NUMBER", value_parser = values::positive, default_value_t = starpipe::calibration::darks::HOT_SIGMA)]
     pub(crate) hot_sigma: f64,
     /// What to print: csv has a row for each frame
     #[arg(long, value_enum, default_value_t = Format::Text)]

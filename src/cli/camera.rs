@@ -3,7 +3,7 @@
 use super::args::{CameraArgs, CameraCommand, CameraNewArgs};
 use super::output::{print, write_whole};
 use super::{Exit, Fault};
-use starpipe::sensor::{Preset, template};
+use starpipe::camera::data_sheet::{Preset, template};
 use std::fmt::Write as _;
 
 /// `starpipe camera`

@@ -3,7 +3,7 @@
 use super::input::is_stdin;
 use anyhow::{Context, anyhow, bail};
 use csv::StringRecord;
-use starpipe::coords::PixelPoint;
+use starpipe::base::coords::PixelPoint;
 use starpipe::identify::Photometry;
 use starpipe::photometry::instrumental_mag;
 use starpipe::pipeline::{CentroidList, ListedCentroid};

@@ -6,12 +6,12 @@ use super::resources::{bar, thread_pool};
 use super::values::ExposureOf;
 use super::{Exit, Fault, batch, chained, complain, input, overwrite, warn};
 use anyhow::Context;
-use starpipe::darks::{
+use starpipe::calibration::darks::{
     DarkConfig, DarkStack, Darks, FrameStatistics, FullScaleSource, HotPixelRow,
 };
+use starpipe::camera::data_sheet::Sensor;
 use starpipe::frame::Buffers;
 use starpipe::frame::{CALIBRATION_CREATOR, FitsHeader, FitsSamples, Frame, write_fits};
-use starpipe::sensor::Sensor;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 

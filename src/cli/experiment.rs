@@ -6,9 +6,9 @@ use super::resources::{bar, read_catalog, sky, thread_pool, warn_of};
 use super::settings::output_path;
 use super::{Exit, Fault, overwrite};
 use anyhow::Context;
-use starpipe::experiment::{Published, Run, Trials, run};
-use starpipe::overlay;
 use starpipe::pipeline::Pipeline;
+use starpipe::report::overlay;
+use starpipe::study::experiment::{Published, Run, Trials, run};
 use std::path::{Path, PathBuf};
 
 /// `starpipe experiment`

@@ -7,9 +7,9 @@ use super::resources::thread_pool;
 use super::settings::read_master;
 use super::{Exit, Fault, chained, complain, input, overwrite, warn};
 use anyhow::Context;
-use starpipe::flats::{FlatConfig, FlatStack, Flats};
+use starpipe::calibration::flats::{FlatConfig, FlatStack, Flats};
+use starpipe::camera::data_sheet::Sensor;
 use starpipe::frame::Buffers;
-use starpipe::sensor::Sensor;
 use std::path::PathBuf;
 
 /// `starpipe flats`

@@ -4,8 +4,8 @@ use super::args::{CatalogArgs, CatalogCommand, ImportArgs};
 use super::output::print;
 use super::{Exit, Fault};
 use anyhow::anyhow;
-use starpipe::catalog::{self, SourceFile};
-use starpipe::report::counted;
+use starpipe::base::format::counted;
+use starpipe::sky::catalog::{self, SourceFile};
 use std::path::Path;
 
 /// `starpipe catalog`

@@ -26,7 +26,7 @@ mod values;
 
 use args::{Arguments, Command};
 use clap::{ArgMatches, CommandFactory, FromArgMatches, error::ErrorKind};
-use starpipe::report::printable;
+use starpipe::base::format::printable;
 use std::fmt::Display;
 use std::io::{self, Write};
 use std::process::ExitCode;

@@ -106,6 +106,6 @@ fn begins_like_a_result(head: &[u8], extension: &str) -> bool {
         "csv" => head.starts_with(b"frame,x,y,") || head.starts_with(b"x,y,level_adu,"),
         "fits" => frame::is_calibration_frame(head),
         "png" => frame::is_overlay(head),
-        _ => starpipe::wcs::is_header(head),
+        _ => starpipe::report::wcs::is_header(head),
     }
 }

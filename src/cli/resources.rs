@@ -4,8 +4,8 @@ use super::args::ResourceArgs;
 use super::{cache, chained, warn};
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
-use starpipe::catalog::{self, Catalog};
 use starpipe::identify::{CacheError, Sky};
+use starpipe::sky::catalog::{self, Catalog};
 use std::borrow::Cow;
 use std::path::Path;
 

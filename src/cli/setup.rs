@@ -5,9 +5,9 @@ use super::args::{ReadingArg, preset};
 use super::limit::{ParameterArgs, number, scenario_of};
 use anyhow::anyhow;
 use clap::{Arg, ArgAction, ArgGroup, ArgMatches, Args, Command, Error, FromArgMatches};
-use starpipe::sensitivity::ScenarioError;
-use starpipe::sensor::{Preset, SpotForm};
-use starpipe::simulate::{Parameter, Scene, Setup};
+use starpipe::camera::data_sheet::{Preset, SpotForm};
+use starpipe::model::sensitivity::ScenarioError;
+use starpipe::model::simulate::{Parameter, Scene, Setup};
 use std::path::PathBuf;
 
 /// What is simulated.

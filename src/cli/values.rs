@@ -1,10 +1,10 @@
 //! Values of options: what is out of range is refused where it is typed.
 
+use starpipe::base::units::RAD_PER_DEG;
 use starpipe::camera::focal_length_px;
-use starpipe::robustness::Parameter;
-use starpipe::sensitivity::{self, Spacing};
-use starpipe::simulate;
-use starpipe::units::RAD_PER_DEG;
+use starpipe::model::sensitivity::{self, Spacing};
+use starpipe::model::simulate;
+use starpipe::study::robustness::Parameter;
 use std::fmt::Display;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -439,7 +439,9 @@ mod tests {
         let sweep: StudySweep = "fov-deg=5:20:4".parse().unwrap();
         assert_eq!(sweep.values, [5.0, 10.0, 15.0, 20.0]);
         let mut setup = simulate::Setup {
-            scenario: sensitivity::Scenario::of(starpipe::sensor::Preset::NanosatTracker),
+            scenario: sensitivity::Scenario::of(
+                starpipe::camera::data_sheet::Preset::NanosatTracker,
+            ),
             scene: simulate::Scene::default(),
         };
         sweep.studied.set(&mut setup, 10.0);

@@ -3,7 +3,7 @@
 use super::Detection;
 use super::fit::{Fit, NoiseModel, window_radius};
 use super::scene::{FitWork, Scene};
-use crate::coords::PixelPoint;
+use crate::base::coords::PixelPoint;
 
 /// Grey levels count above this many standard deviations of the background noise.
 const GREY_THRESHOLD_SIGMA: f64 = 3.0;

@@ -10,7 +10,7 @@ use super::shape;
 use super::strips::on_each;
 use super::view::View;
 use super::{CentroidMethod, Detection, DetectionFlags, Worker};
-use crate::coords::PixelPoint;
+use crate::base::coords::PixelPoint;
 use std::mem;
 
 /// Spots closer than this many of their standard deviations touch, and are fitted together.

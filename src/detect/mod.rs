@@ -53,7 +53,7 @@ mod view;
 pub use background_map::BackgroundMap;
 pub use expected::FilterModel;
 
-use crate::coords::PixelPoint;
+use crate::base::coords::PixelPoint;
 use crate::frame::{Frame, MIN_SIDE_PX};
 use background::{CellScratch, Mesh, MeshConfig};
 use blocks::BlockMaxima;

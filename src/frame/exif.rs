@@ -6,8 +6,8 @@
 //! Caveat: without `OffsetTimeOriginal` the clock's time zone is not known, and only the day is taken.
 
 use super::metadata::{EXPOSURE, FOCAL_LENGTH, FrameMetadata, PIXEL_SIZE, Quantity};
-use crate::epoch::ObservationDate;
-use crate::observer::Site;
+use crate::base::epoch::ObservationDate;
+use crate::sky::observer::Site;
 use exif::{Field, In, Reader, Tag, Value};
 
 /// What the Exif attributes in `bytes`, laid out as a TIFF file, say of a frame `width` pixels wide. Attributes that

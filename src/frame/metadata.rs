@@ -1,7 +1,7 @@
 //! What a file says of how its frame was taken.
 
-use crate::epoch::ObservationDate;
-use crate::observer::Site;
+use crate::base::epoch::ObservationDate;
+use crate::sky::observer::Site;
 use std::ops::RangeInclusive;
 
 /// What a file says of how its frame was taken; nothing of it is checked against the image.
@@ -91,7 +91,7 @@ impl FrameMetadata {
         date: Option<ObservationDate>,
     ) -> Option<ObservationDate> {
         if date.is_none() {
-            let years = crate::epoch::YEARS;
+            let years = crate::base::epoch::YEARS;
             let expected = format!("a date from {} to {}", years.start(), years.end());
             self.ignore(keyword, text, &expected);
         }
@@ -135,7 +135,7 @@ mod tests {
             focal_length_mm: Some(35.0),
             ..FrameMetadata::default()
         };
-        let arcsec = metadata.pixel_scale_rad().unwrap() * crate::units::ARCSEC_PER_RAD;
+        let arcsec = metadata.pixel_scale_rad().unwrap() * crate::base::units::ARCSEC_PER_RAD;
         assert!((arcsec - 27.404).abs() < 1e-3, "{arcsec}");
         assert_eq!(FrameMetadata::default().pixel_scale_rad(), None);
     }

@@ -13,8 +13,8 @@
 //! Comaniciu & Meer 2002, IEEE Trans. Pattern Anal. Mach. Intell. 24, 603, doi 10.1109/34.1000236, for the mean shift.
 
 use super::verify::{Hypothesis, Pair, Scene};
-use crate::catalog::sky_grid::GridStar;
-use crate::coords::{Icrs, PixelPoint, UnitVector};
+use crate::base::coords::{Icrs, PixelPoint, UnitVector};
+use crate::sky::catalog::sky_grid::GridStar;
 
 /// Stars so much fainter than another move it by less than a hundredth of the spot.
 const FAINTER_MAG: f32 = 4.5;

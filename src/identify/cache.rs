@@ -268,9 +268,9 @@ pub fn store(path: &Path, catalog_checksum: u64, index: &TriangleIndex) -> Resul
 mod tests {
     use super::super::index::Source;
     use super::*;
-    use crate::catalog::sky_grid::SkyGrid;
-    use crate::catalog::{Star, StarId};
-    use crate::coords::UnitVector;
+    use crate::base::coords::UnitVector;
+    use crate::sky::catalog::sky_grid::SkyGrid;
+    use crate::sky::catalog::{Star, StarId};
 
     fn small_index() -> (Vec<Star>, SkyGrid, TriangleIndex) {
         let stars: Vec<Star> = (0..60u32)

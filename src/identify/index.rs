@@ -15,10 +15,10 @@
 use super::cache::{CacheError, IndexFile};
 use super::table::{SizeClass, Triangle};
 use super::triangle::TriangleShape;
-use crate::catalog::Star;
-use crate::catalog::sky_grid::{GridStar, SkyGrid};
-use crate::coords::{Icrs, UnitVector};
-use crate::units::RAD_PER_DEG;
+use crate::base::coords::{Icrs, UnitVector};
+use crate::base::units::RAD_PER_DEG;
+use crate::sky::catalog::Star;
+use crate::sky::catalog::sky_grid::{GridStar, SkyGrid};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -319,7 +319,7 @@ impl Cells {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::catalog::Catalog;
+    use crate::sky::catalog::Catalog;
     use std::collections::HashSet;
 
     fn index_of(stars: &[Star]) -> (SkyGrid, TriangleIndex) {

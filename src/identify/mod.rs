@@ -1,7 +1,9 @@
 //! From a list of star positions to catalogue stars, pointing and scale.
 
+pub mod attitude;
 mod blends;
 mod cache;
+pub mod diagnosis;
 pub mod index;
 mod predict;
 mod refine;
@@ -20,8 +22,8 @@ use refine::{Refined, Start};
 use search::{Buffers, Found, Search};
 use verify::{Pair, Scene};
 
+use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::camera::{CameraModel, DistortionModel};
-use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use nalgebra::Matrix3;
 
 /// One star as observed, the input of identification.

@@ -1,9 +1,9 @@
 //! Where the catalogue's stars fall in a frame.
 
 use super::Sky;
+use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::camera::{CameraModel, LANES};
-use crate::catalog::sky_grid::{GridStar, chord_of};
-use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
+use crate::sky::catalog::sky_grid::{GridStar, chord_of};
 
 /// Stars predicted so far outside the frame, in units of its diagonal, may still be seen on it.
 const MARGIN: f64 = 0.01;

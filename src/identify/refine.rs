@@ -6,9 +6,11 @@ use super::blends::Blends;
 use super::predict::{PredictedStar, Surroundings};
 use super::verify::{Hypothesis, Pair, Pairing, Radius, Scene};
 use super::{ObservedStar, Photometry};
-use crate::attitude::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera, left_out_chi_sq};
+use crate::base::statistics::median;
 use crate::camera::DistortionModel;
-use crate::statistics::median;
+use crate::identify::attitude::{
+    CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera, left_out_chi_sq,
+};
 use std::f64::consts::PI;
 
 /// Pairs further apart than so many times the typical error on an axis are no pairs.

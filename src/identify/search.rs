@@ -8,10 +8,10 @@ use super::refine::{Refined, Refiner, Start};
 use super::triangle::TriangleShape;
 use super::verify::{FalseAlarm, Hypothesis, Pair, Scene, TESTED_STARS};
 use super::{Hints, Photometry, Sky, StarField};
-use crate::attitude::POSE_PARAMETERS;
+use crate::base::coords::{Icrs, Rotation, UnitVector};
 use crate::camera::{CameraModel, DistortionModel, focal_length_px, frame_centre};
-use crate::catalog::sky_grid::{GridStar, chord_of};
-use crate::coords::{Icrs, Rotation, UnitVector};
+use crate::identify::attitude::POSE_PARAMETERS;
+use crate::sky::catalog::sky_grid::{GridStar, chord_of};
 use nalgebra::{Matrix3, Vector3};
 
 /// A little more than the fields of view that the sky allows, so that a field of just that width is not missed.

@@ -2,9 +2,9 @@
 
 use super::cache::{self, CacheError};
 use super::index::{Source, TriangleIndex};
-use crate::catalog::sky_grid::SkyGrid;
-use crate::catalog::{Catalog, Star};
-use crate::units::RAD_PER_DEG;
+use crate::base::units::RAD_PER_DEG;
+use crate::sky::catalog::sky_grid::SkyGrid;
+use crate::sky::catalog::{Catalog, Star};
 use std::path::Path;
 
 /// A field is at least so many times as wide as the smallest triangles listed: else it holds too few of them.

@@ -14,11 +14,11 @@
 use super::predict::{Depth, PredictedStar, Surroundings, View};
 use super::search::MAX_HYPOTHESES;
 use super::{ObservedStar, Photometry, Sky, StarField, StarMatch};
-use crate::attitude::POSE_PARAMETERS;
+use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
+use crate::base::statistics::{LnProduct, log10_poisson_binomial_tail};
+use crate::base::units::RAD_PER_DEG;
 use crate::camera::{CameraModel, LANES};
-use crate::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
-use crate::statistics::{LnProduct, log10_poisson_binomial_tail};
-use crate::units::RAD_PER_DEG;
+use crate::identify::attitude::POSE_PARAMETERS;
 use std::f64::consts::{LN_10, PI};
 use std::ops::Range;
 

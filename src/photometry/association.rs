@@ -3,7 +3,7 @@
 //! Each star, brightest first, claims the nearest detection that may be a star, lies within reach, and is not claimed yet.
 
 use super::MeasuredFrame;
-use crate::coords::PixelPoint;
+use crate::base::coords::PixelPoint;
 use crate::detect::Detection;
 use crate::identify::{Identification, PredictedStar};
 use std::f64::consts::{PI, SQRT_2};
@@ -175,8 +175,8 @@ fn reach_px(detection: &Detection, identification: &Identification) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::coords::{Rotation, UnitVector};
     use crate::camera::CameraModel;
-    use crate::coords::{Rotation, UnitVector};
     use crate::detect::{DetectionFlags, Detections};
     use nalgebra::Matrix3;
 

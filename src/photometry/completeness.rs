@@ -21,7 +21,7 @@
 //! # Reference
 //! Probit regression with a guessing and a lapse rate: Wichmann & Hill 2001, Percept. Psychophys. 63, 1293.
 
-use crate::statistics::{LnProduct, normal_cdf_and_density};
+use crate::base::statistics::{LnProduct, normal_cdf_and_density};
 use nalgebra::{Matrix3, Vector3};
 
 /// Where the prior of the width has its middle, in magnitudes.
@@ -315,7 +315,7 @@ fn best_step(trials: &[Trial]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::statistics::normal_cdf;
+    use crate::base::statistics::normal_cdf;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 

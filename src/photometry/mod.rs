@@ -12,13 +12,14 @@
 //! levels are not proportional to light: then the zero point holds for stars of middling brightness only.
 
 mod association;
+pub mod comparison;
 pub mod completeness;
 pub mod zero_point;
 
-use crate::catalog::{Star, StarFlags};
+use crate::base::statistics::median;
 use crate::detect::{Detection, Detections};
 use crate::identify::{Identification, Sky, View};
-use crate::statistics::median;
+use crate::sky::catalog::{Star, StarFlags};
 use association::{Association, FrameStar, associate};
 use completeness::{Completeness, Trial};
 use zero_point::{MeasuredStar, ZeroPoint};

@@ -16,7 +16,7 @@
 //!
 //! The stars must have been chosen by V, not by their flux: else those are preferred that noise and colour make bright.
 
-use crate::statistics::{Estimate, median};
+use crate::base::statistics::{Estimate, median};
 use nalgebra::{DMatrix, DVector};
 
 /// The B−V of the stars whose zero point is given, where there is a colour term: the Sun's, nearly, and that of many field stars.

@@ -1,14 +1,14 @@
 //! A frame that is found, against the camera that it is said to be of.
 
 use super::{Background, Knowledge};
-use crate::comparison::{self, Comparison, Description, Seen};
+use crate::base::statistics::Estimate;
+use crate::base::units::DEG_PER_RAD;
 use crate::detect::DetectConfig;
 use crate::frame::Frame;
 use crate::identify::{Identification, Outcome, Sky, View};
-use crate::observer::Observation;
 use crate::photometry::FramePhotometry;
-use crate::statistics::Estimate;
-use crate::units::DEG_PER_RAD;
+use crate::photometry::comparison::{self, Comparison, Description, Seen};
+use crate::sky::observer::Observation;
 
 /// What was found of a frame.
 pub(super) struct Found<'a> {
@@ -116,7 +116,7 @@ impl Found<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sensor::Preset;
+    use crate::camera::data_sheet::Preset;
 
     #[test]
     fn a_cameras_full_pixel_counts_where_the_levels_are_its_own() {

@@ -1,13 +1,13 @@
 //! What is known of a frame beforehand: by options, by its file's header, by its name.
 
+use crate::base::coords::{Icrs, UnitVector};
+use crate::base::epoch::ObservationDate;
+use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD, RAD_PER_DEG};
 use crate::camera;
-use crate::coords::{Icrs, UnitVector};
-use crate::epoch::ObservationDate;
+use crate::camera::data_sheet::Sensor;
 use crate::frame::FrameMetadata;
 use crate::identify::{Hints, Outcome, StarField};
-use crate::observer::{Observation, Site};
-use crate::sensor::Sensor;
-use crate::units::{ARCSEC_PER_RAD, DEG_PER_RAD, RAD_PER_DEG};
+use crate::sky::observer::{Observation, Site};
 use serde::Serialize;
 
 /// What is known of the camera's scale beforehand.
@@ -194,7 +194,7 @@ fn below_horizon(observation: &Observation) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::RAD_PER_ARCSEC;
+    use crate::base::units::RAD_PER_ARCSEC;
 
     #[test]
     fn a_field_of_view_and_its_pixel_scale_are_the_same_hint() {

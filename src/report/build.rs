@@ -1,22 +1,24 @@
 //! From what the pipeline found to what is told of it.
 
 use super::reason;
-use super::rounding::{finite, half_turn_deg, significant, to_decimals, to_significant, turn_deg};
 use super::{
     AttitudeReport, AttitudeSigma, BackgroundReport, CalibrationReport, CompletenessReport,
     DateReport, DistortionReport, FrameReport, MagnitudeReport, MatchReport, ObservationReport,
     OpticsReport, PhotometryReport, SCHEMA, SiteReport, StarReport, Status, TimingReport,
 };
+use crate::base::format::{
+    finite, half_turn_deg, significant, to_decimals, to_significant, turn_deg,
+};
+use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::Applied;
 use crate::camera::Distortion;
-use crate::catalog::Catalog;
 use crate::detect::DetectionFlags;
 use crate::identify::{Identification, Outcome, StarMatch};
-use crate::observer::Observation;
 use crate::photometry::FramePhotometry;
 use crate::photometry::completeness::Bin;
 use crate::pipeline::{Background, FrameDate, Solution, Source, Timing};
-use crate::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
+use crate::sky::catalog::Catalog;
+use crate::sky::observer::Observation;
 
 /// Decimals of a position or residual in pixels.
 const PIXEL_DECIMALS: i32 = 4;

@@ -1,11 +1,11 @@
 //! What the camera should have seen, beside what it saw.
 
 use super::build::{AIRMASS_DECIMALS, HORIZON_DECIMALS};
-use super::rounding::{finite, significant, to_decimals};
 use super::text::labelled;
 use super::{FrameReport, MagnitudeReport, StarReport};
-use crate::comparison::Comparison;
-use crate::statistics::Estimate;
+use crate::base::format::{finite, significant, to_decimals};
+use crate::base::statistics::Estimate;
+use crate::photometry::comparison::Comparison;
 use serde::Serialize;
 
 /// Decimals of a magnitude.

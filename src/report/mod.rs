@@ -6,19 +6,18 @@
 //! finite is left out (`null` in JSON, an empty field in CSV). Fields may be added to the schema; none is
 //! renamed or dropped without a new [`SCHEMA`].
 
-mod angles;
 mod build;
 mod compared;
+#[cfg(feature = "overlay")]
+pub mod overlay;
 mod reason;
-mod rounding;
 mod table;
 mod text;
+pub mod wcs;
 
-pub(crate) use angles::{degrees, hours};
 pub use compared::PredictionReport;
-pub(crate) use rounding::{to_decimals, to_significant};
 pub use table::{TABLE_COLUMNS, write_table_header};
-pub use text::{STARS_SHOWN, TextOptions, counted, printable};
+pub use text::{STARS_SHOWN, TextOptions};
 
 use crate::pipeline::DateSource;
 use serde::Serialize;

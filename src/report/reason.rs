@@ -1,9 +1,9 @@
 //! Why a frame was not identified, in words, with what may help.
 
-use super::rounding::decimals_for;
+use crate::base::format::decimals_for;
+use crate::base::units::DEG_PER_RAD;
 use crate::identify::{Excluded, LOG10_FALSE_ALARM_LIMIT, Reason};
 use crate::pipeline::Solution;
-use crate::units::DEG_PER_RAD;
 
 /// `reason` in words.
 pub(super) fn text(reason: &Reason, solution: &Solution) -> String {
@@ -143,10 +143,10 @@ fn range((low_rad, high_rad): (f64, f64)) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coords::{PixelPoint, UnitVector};
+    use crate::base::coords::{PixelPoint, UnitVector};
+    use crate::base::units::RAD_PER_DEG;
     use crate::identify::Outcome;
     use crate::pipeline::{Source, Timing};
-    use crate::units::RAD_PER_DEG;
 
     fn said(reason: Reason, detections: usize) -> String {
         let source = Source {

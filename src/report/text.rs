@@ -1,10 +1,10 @@
 //! A frame's report for people, at most [`LINE_WIDTH`] columns wide where the names allow it.
 
-use super::rounding::decimals_for;
 use super::{
     AttitudeReport, CalibrationReport, FrameReport, MagnitudeReport, MatchReport,
-    ObservationReport, OpticsReport, PhotometryReport, StarReport, angles,
+    ObservationReport, OpticsReport, PhotometryReport, StarReport,
 };
+use crate::base::format::{self, counted, decimals_for, printable};
 use crate::pipeline::DateSource;
 
 /// Rows of the table of stars that are shown without [`TextOptions::all_stars`].
@@ -159,15 +159,15 @@ fn attitude_lines(attitude: &AttitudeReport) -> Vec<String> {
     let sigma_deg = sigma_arcsec / 3600.0;
     let seconds = decimals_for(sigma_arcsec, 4);
     // One second of right ascension is up to fifteen arcseconds: it takes a digit more.
-    let ra = angles::hours(attitude.ra_deg, (seconds + 1).min(4));
-    let dec = angles::degrees(attitude.dec_deg, seconds);
+    let ra = format::hours(attitude.ra_deg, (seconds + 1).min(4));
+    let dec = format::degrees(attitude.dec_deg, seconds);
     let decimals = decimals_for(sigma_deg, 7);
     let roll_sigma_deg = sigma.roll / 3600.0;
     let roll_decimals = decimals_for(roll_sigma_deg, 6);
     vec![
         labelled(
             "centre",
-            &format!("RA {ra}  Dec {dec}  ± {}", angles::small(sigma_arcsec)),
+            &format!("RA {ra}  Dec {dec}  ± {}", format::small(sigma_arcsec)),
         ),
         labelled(
             "",
@@ -194,7 +194,7 @@ fn optics_lines(optics: &OpticsReport) -> Vec<String> {
     if sigma_px.is_finite() {
         focal += &format!(" ± {sigma_px:.decimals$}");
     }
-    let pixel_arcsec = crate::units::ARCSEC_PER_RAD / optics.focal_length_px;
+    let pixel_arcsec = crate::base::units::ARCSEC_PER_RAD / optics.focal_length_px;
     let mirrored = if optics.mirrored {
         "mirrored"
     } else {
@@ -250,7 +250,7 @@ fn residual_line(matched: &MatchReport) -> String {
     let text = format!(
         "{:.3} px, {} root mean square",
         matched.rms_px,
-        angles::small(matched.rms_arcsec)
+        format::small(matched.rms_arcsec)
     );
     labelled("residuals", &text)
 }
@@ -304,26 +304,6 @@ fn odds(log10_probability: f64) -> String {
         return format!("with probability {:.2}", 10_f64.powf(log10_probability));
     }
     format!("once in 10^{power:.0} frames")
-}
-
-/// `text` with its control characters written out, as `\n` and `\u{1b}`: names of files and headers may hold
-/// commands to a terminal.
-pub fn printable(text: &str) -> String {
-    let mut shown = String::with_capacity(text.len());
-    for character in text.chars() {
-        if character.is_control() {
-            shown.extend(character.escape_default());
-        } else {
-            shown.push(character);
-        }
-    }
-    shown
-}
-
-/// `1 detection`, `2 detections`.
-pub fn counted(count: usize, noun: &str) -> String {
-    let plural = if count == 1 { "" } else { "s" };
-    format!("{count} {noun}{plural}")
 }
 
 fn calibration_line(applied: &CalibrationReport) -> String {

@@ -6,13 +6,13 @@ use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use starpipe::catalog::Catalog;
-use starpipe::coords::{Rotation, UnitVector};
+use starpipe::base::coords::{Rotation, UnitVector};
+use starpipe::base::statistics::median;
 use starpipe::identify::{Outcome, Sky};
+use starpipe::model::sensitivity::{Budget, Scenario, SkyBrightness};
+use starpipe::model::simulate::{Pointing, Scene, Simulator, TrueStar, Truth};
 use starpipe::pipeline::{Pipeline, SolveConfig, Workspace};
-use starpipe::sensitivity::{Budget, Scenario, SkyBrightness};
-use starpipe::simulate::{Pointing, Scene, Simulator, TrueStar, Truth};
-use starpipe::statistics::median;
+use starpipe::sky::catalog::Catalog;
 use std::f64::consts::{PI, TAU};
 
 /// The threshold of the detector in standard deviations, about.

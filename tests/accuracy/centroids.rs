@@ -4,7 +4,7 @@ use crate::stars::{Field, Star, found_at, sensor};
 use crate::tally::{Rms, Spread};
 use rayon::prelude::*;
 use starpipe::detect::{CentroidMethod, DetectConfig, Detections, Workspace, detect};
-use starpipe::sensitivity::CramerRao;
+use starpipe::model::sensitivity::CramerRao;
 
 /// Ratios of signal to noise of the stars, of the matched filter.
 pub const CLASSES: [(f64, f64); 6] = [

@@ -3,10 +3,10 @@
 
 use crate::stars::{Field, Star, found_at, sensor};
 use rayon::prelude::*;
-use starpipe::coords::PixelPoint;
+use starpipe::base::coords::PixelPoint;
+use starpipe::base::statistics::normal_cdf;
 use starpipe::detect::{DetectConfig, Workspace, detect};
 use starpipe::frame::Frame;
-use starpipe::statistics::normal_cdf;
 
 pub const SIDE_PX: usize = 1024;
 /// Wanted false detections in a million pixels.

@@ -2,13 +2,13 @@
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use starpipe::coords::PixelPoint;
+use starpipe::base::coords::PixelPoint;
+use starpipe::base::statistics::normal_cdf;
+use starpipe::camera::data_sheet::{Imperfections, Response, Sensor};
 use starpipe::detect::{Detection, Detections};
 use starpipe::frame::Frame;
-use starpipe::sensitivity::{Budget, Extinction, Scenario, SkyBrightness};
-use starpipe::sensor::{Imperfections, Response, Sensor};
-use starpipe::simulate::star_field;
-use starpipe::statistics::normal_cdf;
+use starpipe::model::sensitivity::{Budget, Extinction, Scenario, SkyBrightness};
+use starpipe::model::simulate::star_field;
 
 /// How far apart the stars stand: of a cell of the background's mesh they are a small part.
 const SPACING_PX: f64 = 64.0;

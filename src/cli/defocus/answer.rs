@@ -3,7 +3,7 @@
 use super::noise::Noise;
 use super::study::{Plan, Row, Star, Study, Theory};
 use serde::Serialize;
-use starpipe::defocus::{
+use starpipe::model::defocus::{
     Centroiding, ErrorCurve, ErrorGrid, Expected, IsoLine, Lens, Optimum, PAPER_RESIDUAL_PX,
     Parabola, PeakStudy, Surface,
 };

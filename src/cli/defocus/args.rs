@@ -5,8 +5,8 @@ use crate::cli::limit::ParameterArgs;
 use crate::cli::plot::FigureForm;
 use crate::cli::values::{self, Steps};
 use clap::{Args, ValueEnum};
-use starpipe::defocus::Centroiding;
-use starpipe::sensor::Preset;
+use starpipe::camera::data_sheet::Preset;
+use starpipe::model::defocus::Centroiding;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]

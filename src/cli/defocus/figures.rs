@@ -6,7 +6,7 @@ use crate::cli::limit::number;
 use crate::cli::plot::panel::{Axis, Cell, Dot, Layer, Marks, Panel, Sheet};
 use crate::cli::plot::{BLUE, FigureForm, ORANGE, drawn};
 use plotters::style::RGBColor;
-use starpipe::defocus::{IsoLine, Surface};
+use starpipe::model::defocus::{IsoLine, Surface};
 
 const WHITE: RGBColor = RGBColor(255, 255, 255);
 const BLACK: RGBColor = RGBColor(0, 0, 0);

@@ -15,7 +15,7 @@ use super::resources::thread_pool;
 use super::{Exit, Fault, warn};
 use answer::{Answer, grid_rows};
 use anyhow::Context;
-use starpipe::defocus::Lens;
+use starpipe::model::defocus::Lens;
 use std::path::{Path, PathBuf};
 use study::{Plan, Study};
 

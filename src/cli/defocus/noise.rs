@@ -5,13 +5,13 @@ use crate::cli::darks::for_each_frame;
 use crate::cli::{Fault, chained, complain, input, warn};
 use anyhow::{Context, anyhow, bail};
 use serde::Serialize;
-use starpipe::darks::{
+use starpipe::calibration::darks::{
     DarkConfig, DarkStack, Darks, ExposureGroup, FrameStatistics, FullScaleSource,
 };
-use starpipe::defocus::PAPER_RELATIVE_NOISE;
+use starpipe::camera::data_sheet::Sensor;
 use starpipe::frame::Buffers;
-use starpipe::sensitivity::{Budget, Scenario};
-use starpipe::sensor::Sensor;
+use starpipe::model::defocus::PAPER_RELATIVE_NOISE;
+use starpipe::model::sensitivity::{Budget, Scenario};
 use std::path::PathBuf;
 
 /// Exposures that differ by more than this part of them give other dark currents.

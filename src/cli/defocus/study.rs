@@ -8,11 +8,11 @@ use crate::cli::{Fault, warn};
 use anyhow::anyhow;
 use indicatif::ProgressBar;
 use rayon::prelude::*;
-use starpipe::defocus::{
+use starpipe::model::defocus::{
     Centroiding, EnergyStudy, ErrorCurve, ErrorGrid, ErrorPoint, Expected, Grid, IsoLine, Lens,
     PeakStudy, Reach, Surface, SurfaceError,
 };
-use starpipe::sensitivity::{Budget, Detector, Rule, Scenario, Spacing};
+use starpipe::model::sensitivity::{Budget, Detector, Rule, Scenario, Spacing};
 
 /// The numbers that a designer is told rest on so many trials at least.
 const LEAST_TRIALS: usize = 1000;

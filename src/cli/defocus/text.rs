@@ -2,7 +2,7 @@
 
 use super::answer::{Answer, Best, CurveRow, Radius, Required, StarAnswer};
 use crate::cli::limit::number;
-use starpipe::defocus::{Centroiding, IsoLine, Lens, Surface};
+use starpipe::model::defocus::{Centroiding, IsoLine, Lens, Surface};
 use std::fmt::Write as _;
 
 /// Radii that the table has, where the grid reaches them.

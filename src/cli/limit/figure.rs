@@ -7,7 +7,7 @@ use crate::cli::plot::{
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
-use starpipe::sensitivity::{Budget, Curve, Scenario, Spacing, Sweep};
+use starpipe::model::sensitivity::{Budget, Curve, Scenario, Spacing, Sweep};
 use std::ops::Range;
 
 const PANEL_PX: (u32, u32) = (440, 310);

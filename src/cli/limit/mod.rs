@@ -15,11 +15,11 @@ use anyhow::{Context, anyhow};
 use figure::{Panel, Sheet};
 use rayon::prelude::*;
 use serde::Serialize;
-use starpipe::catalog::Catalog;
-use starpipe::sensitivity::{
+use starpipe::camera::data_sheet::{Preset, Sensor};
+use starpipe::model::sensitivity::{
     Detector, Faintest, Figure, Prediction, Reading, Scenario, ScenarioError, Series, Sweep, curves,
 };
-use starpipe::sensor::{Preset, Sensor};
+use starpipe::sky::catalog::Catalog;
 use std::path::{Path, PathBuf};
 
 /// More sweeps than this in one run are a mistake, and their figure would be of no use.

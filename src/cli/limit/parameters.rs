@@ -2,8 +2,8 @@
 
 use super::text::number;
 use clap::{Arg, ArgMatches, Command, Error, FromArgMatches};
-use starpipe::sensitivity::{Conditions, Parameter, Scenario};
-use starpipe::sensor::{Response, ResponseError, is_curve};
+use starpipe::camera::data_sheet::{Response, ResponseError, is_curve};
+use starpipe::model::sensitivity::{Conditions, Parameter, Scenario};
 use std::path::PathBuf;
 
 /// Parameters that say the same: at most one of each is given.

@@ -1,8 +1,8 @@
 //! Predictions for people: the budget, quantity by quantity with the paper's symbols, or a sweep as a table.
 
 use super::Row;
-use starpipe::report::printable;
-use starpipe::sensitivity::{Budget, DetectorReport, Prediction, Reading, Scenario};
+use starpipe::base::format::printable;
+use starpipe::model::sensitivity::{Budget, DetectorReport, Prediction, Reading, Scenario};
 use std::fmt::Write as _;
 
 /// A quantity: symbol, words, value, unit.

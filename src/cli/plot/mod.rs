@@ -11,7 +11,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::register_font;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use starpipe::overlay;
+use starpipe::report::overlay;
 use std::fmt::Display;
 use std::path::PathBuf;
 

@@ -3,7 +3,7 @@
 use super::SweptRow;
 use crate::cli::plot::{Area, BLUE as RIGHT, FONT, Figure, ORANGE as WRONG, said};
 use plotters::prelude::*;
-use starpipe::robustness::{Parameter, Row};
+use starpipe::study::robustness::{Parameter, Row};
 
 const WIDTH_PX: u32 = 900;
 const PANEL_HEIGHT_PX: u32 = 300;

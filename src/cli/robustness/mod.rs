@@ -9,7 +9,7 @@ use super::{Exit, Fault};
 use anyhow::Context;
 use figure::Rates;
 use starpipe::identify::Photometry;
-use starpipe::robustness::{Case, Mirrored, Parameter, Protocol, Row, run, standard_cases};
+use starpipe::study::robustness::{Case, Mirrored, Parameter, Protocol, Row, run, standard_cases};
 use std::fmt::Write as _;
 
 /// `starpipe robustness`

@@ -8,11 +8,11 @@ use crate::cli::output::csv_table;
 use anyhow::Context;
 use clap::ValueEnum;
 use serde::Serialize;
-use starpipe::coords::{Camera, Icrs, PixelPoint, Rotation};
+use starpipe::base::coords::{Camera, Icrs, PixelPoint, Rotation};
+use starpipe::base::units::DEG_PER_RAD;
+use starpipe::camera::data_sheet::Sensor;
 use starpipe::frame::{FitsSamples, Frame, TiffOptions, TiffSamples, write_fits, write_tiff};
-use starpipe::sensor::Sensor;
-use starpipe::simulate::{TrueStar, Truth};
-use starpipe::units::DEG_PER_RAD;
+use starpipe::model::simulate::{TrueStar, Truth};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 

@@ -2,9 +2,9 @@
 
 use super::{Job, Made, Subject};
 use starpipe::frame::FitsHeader;
-use starpipe::sensitivity::Reading;
-use starpipe::simulate::Parameter;
-use starpipe::wcs;
+use starpipe::model::sensitivity::Reading;
+use starpipe::model::simulate::Parameter;
+use starpipe::report::wcs;
 use std::fmt::Write as _;
 
 /// What is known of a frame.

@@ -15,15 +15,15 @@ use files::Place;
 use header::Description;
 use indicatif::ProgressBar;
 use serde::Serialize;
-use starpipe::catalog::Catalog;
-use starpipe::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
-use starpipe::epoch::ObservationDate;
+use starpipe::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
+use starpipe::base::epoch::ObservationDate;
+use starpipe::base::units::DEG_PER_RAD;
 use starpipe::frame::{Frame, FrameMetadata};
 use starpipe::identify::Photometry;
-use starpipe::sensitivity::{Budget, Detector, Rule};
-use starpipe::simulate::{Pointing, Scene, Setup, Simulator, Truth};
-use starpipe::units::DEG_PER_RAD;
-use starpipe::validation::draw;
+use starpipe::model::sensitivity::{Budget, Detector, Rule};
+use starpipe::model::simulate::{Pointing, Scene, Setup, Simulator, Truth};
+use starpipe::sky::catalog::Catalog;
+use starpipe::study::validation::draw;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -292,8 +292,9 @@ impl Job<'_> {
         let truth = made.truth.as_ref();
         let camera = self.simulator.camera();
         let light = self.simulator.light();
-        let is_bright =
-            |star: &&starpipe::simulate::TrueStar| light.vmag_of(star.electrons) <= self.limit_vmag;
+        let is_bright = |star: &&starpipe::model::simulate::TrueStar| {
+            light.vmag_of(star.electrons) <= self.limit_vmag
+        };
         Told {
             frame: path.display().to_string(),
             truth: truth_path,

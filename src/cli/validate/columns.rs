@@ -1,7 +1,7 @@
 //! The columns of the tables: their names, in order, and what is in them.
 
-use starpipe::robustness::Answer;
-use starpipe::validation::{FrameRecord, Kind, Named, StarRecord};
+use starpipe::study::robustness::Answer;
+use starpipe::study::validation::{FrameRecord, Kind, Named, StarRecord};
 
 /// What is in a field of a row.
 #[derive(Debug, Clone, PartialEq)]

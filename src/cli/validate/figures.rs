@@ -4,8 +4,8 @@ use super::study::StudyRow;
 use crate::cli::plot::panel::{Axis, Dot, Layer, Marks, Panel, Sheet};
 use crate::cli::plot::{BLUE, FigureForm, ORANGE, drawn};
 use plotters::style::RGBColor;
-use starpipe::statistics::normal_density;
-use starpipe::validation::{
+use starpipe::base::statistics::normal_density;
+use starpipe::study::validation::{
     AttitudeSummary, CentroidSummary, CompletenessSummary, DifferenceSummary, Histogram,
     IdentificationSummary, Pull, PullSummary, Summary,
 };

@@ -5,11 +5,11 @@ use crate::cli::output::write_whole;
 use anyhow::Context;
 use serde::Serialize;
 use serde_json::{Map, Value};
-use starpipe::catalog::Catalog;
-use starpipe::sensitivity::Reading;
-use starpipe::sensor::Response;
-use starpipe::simulate::Parameter;
-use starpipe::validation::Protocol;
+use starpipe::camera::data_sheet::Response;
+use starpipe::model::sensitivity::Reading;
+use starpipe::model::simulate::Parameter;
+use starpipe::sky::catalog::Catalog;
+use starpipe::study::validation::Protocol;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -145,9 +145,9 @@ fn compare(name: &str, found: &Value, wanted: &Value, into: &mut Vec<String>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use starpipe::sensitivity::Scenario;
-    use starpipe::sensor::Preset;
-    use starpipe::simulate::{Scene, Setup};
+    use starpipe::camera::data_sheet::Preset;
+    use starpipe::model::sensitivity::Scenario;
+    use starpipe::model::simulate::{Scene, Setup};
 
     #[test]
     fn a_directory_is_of_one_run() {

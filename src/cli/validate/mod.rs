@@ -15,7 +15,7 @@ use super::resources::{bar, read_catalog, sky, thread_pool, warn_of};
 use super::{Exit, Fault, complain};
 use indicatif::ProgressBar;
 use starpipe::pipeline::Pipeline;
-use starpipe::validation::Protocol;
+use starpipe::study::validation::Protocol;
 use std::fmt::Display;
 
 /// What the runs of one command have in common.

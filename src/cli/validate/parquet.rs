@@ -189,7 +189,7 @@ mod tests {
     use super::*;
     use parquet::file::reader::{FileReader, SerializedFileReader};
     use parquet::record::RowAccessor;
-    use starpipe::validation::{FrameRecord, StarRecord};
+    use starpipe::study::validation::{FrameRecord, StarRecord};
 
     #[test]
     fn what_is_written_is_read_again_and_nothing_is_left_beside_it() {

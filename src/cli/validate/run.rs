@@ -10,7 +10,9 @@ use crate::cli::plot::FigureForm;
 use anyhow::Context;
 use serde::Serialize;
 use starpipe::pipeline::Workspace;
-use starpipe::validation::{Accumulator, Protocol, RunFacts, Summary, ValidationError, Validator};
+use starpipe::study::validation::{
+    Accumulator, Protocol, RunFacts, Summary, ValidationError, Validator,
+};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;

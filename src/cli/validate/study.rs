@@ -8,8 +8,8 @@ use crate::cli::output::{csv_table, write_whole};
 use crate::cli::values::{Studied, StudySweep};
 use anyhow::Context;
 use serde::Serialize;
-use starpipe::sensitivity::Spacing;
-use starpipe::validation::{Protocol, Summary};
+use starpipe::model::sensitivity::Spacing;
+use starpipe::study::validation::{Protocol, Summary};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 

@@ -5,7 +5,7 @@ use super::columns::Row;
 use super::parquet::{self, FRAMES_PER_PART};
 use anyhow::{Context, anyhow, bail};
 use serde::Serialize;
-use starpipe::validation::{FrameRecord, StarRecord};
+use starpipe::study::validation::{FrameRecord, StarRecord};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{BufReader, Read, Seek, SeekFrom, Take, Write};
 use std::marker::PhantomData;

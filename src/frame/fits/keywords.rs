@@ -13,12 +13,12 @@
 //! Where the mount believed it pointed (OBJCTRA, RA, CRVAL1) is not used.
 
 use super::header::Header;
-use crate::angle::Angle;
-use crate::epoch::ObservationDate;
+use crate::base::angle::Angle;
+use crate::base::epoch::ObservationDate;
 use crate::frame::metadata::{
     ALTITUDE, EXPOSURE, FOCAL_LENGTH, FrameMetadata, PIXEL_SIZE, Quantity,
 };
-use crate::observer::Site;
+use crate::sky::observer::Site;
 
 /// What `headers` say; of a keyword in several the first counts.
 pub(super) fn metadata<'a>(headers: impl Iterator<Item = &'a Header<'a>>) -> FrameMetadata {

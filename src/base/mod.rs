@@ -1,0 +1,9 @@
+//! What numbers mean: units, angles, directions, dates, statistics, and how numbers are written.
+
+pub mod angle;
+pub mod coords;
+pub mod epoch;
+pub mod files;
+pub mod format;
+pub mod statistics;
+pub mod units;

@@ -1,0 +1,136 @@
+//! The report for people.
+
+use super::report::{DarkCurrentReport, DarksReport, PatternReport};
+use crate::base::format::counted;
+use std::fmt::Write as _;
+
+impl DarksReport {
+    /// A page for people.
+    pub fn to_text(&self) -> String {
+        let mut text = format!(
+            "{}, {} × {} px\n",
+            counted(self.frames, "dark frame"),
+            self.width,
+            self.height
+        );
+        let mut line = |label: &str, value: String| {
+            let _ = writeln!(text, "  {label:<15}{value}");
+        };
+        line(
+            "mean",
+            with(self.mean_adu, "ADU", self.relative_mean.map(relative)),
+        );
+        line(
+            "deviation",
+            with(self.sigma_adu, "ADU", self.relative_sigma.map(relative)),
+        );
+        if let (Some(full), Some(source)) = (self.full_scale_adu, &self.full_scale_source) {
+            line(
+                "full scale",
+                format!("{full} levels, by {}", said_by(source)),
+            );
+        }
+        if let Some(noise) = self.read_noise_adu {
+            line(
+                "read noise",
+                with(noise, "ADU", self.read_noise_e.map(electrons)),
+            );
+        }
+        for exposure in &self.exposures {
+            let label = exposure
+                .exposure_s
+                .map_or("exposure ?".to_owned(), |s| format!("at {s} s"));
+            let mut value = format!(
+                "{}, level {:.3} ADU",
+                counted(exposure.frames, "frame"),
+                exposure.level_adu
+            );
+            if let Some(noise) = exposure.temporal_noise_adu {
+                let _ = write!(
+                    value,
+                    ", noise {}",
+                    with(noise, "ADU", exposure.temporal_noise_e.map(electrons))
+                );
+            }
+            if let Some(drift) = exposure.frame_to_frame_adu {
+                let _ = write!(value, ", from frame to frame {drift:.3} ADU");
+            }
+            line(&label, value);
+        }
+        if let Some(pattern) = &self.pattern {
+            line("pattern", pattern_text(pattern));
+        }
+        if let Some(current) = &self.dark_current {
+            line("dark current", current_text(current));
+            line(
+                "bias",
+                plus_minus(current.bias_adu, current.bias_sigma_adu, "ADU"),
+            );
+        }
+        let hot = &self.hot_pixels;
+        line(
+            "hot pixels",
+            format!(
+                "{} ({:.4} %) beyond {} deviations: {} by level, {} by dark current, {} by noise",
+                hot.count,
+                hot.share * 100.0,
+                hot.hot_sigma,
+                hot.by_level,
+                hot.by_dark_current,
+                hot.by_noise
+            ),
+        );
+        for (what, reason) in &self.missing {
+            line("not known", format!("{}: {reason}", what.replace('_', " ")));
+        }
+        text
+    }
+}
+
+fn said_by(source: &str) -> &str {
+    match source {
+        "option" => "--bits",
+        "camera" => "the camera's description",
+        _ => "the file's format, which may have more bits than the detector",
+    }
+}
+
+fn relative(part: f64) -> String {
+    format!("{part:.4e} of full scale")
+}
+
+fn electrons(value: f64) -> String {
+    format!("{value:.3} e")
+}
+
+fn with(value: f64, unit: &str, besides: Option<String>) -> String {
+    let besides = besides.map_or(String::new(), |text| format!(" ({text})"));
+    format!("{value:.3} {unit}{besides}")
+}
+
+fn plus_minus(value: f64, sigma: Option<f64>, unit: &str) -> String {
+    let sigma = sigma.map_or(String::new(), |sigma| format!(" ± {sigma:.3}"));
+    format!("{value:.3}{sigma} {unit}")
+}
+
+fn pattern_text(pattern: &PatternReport) -> String {
+    let fixed = match pattern.fixed_pattern_adu {
+        Some(fixed) => with(fixed, "ADU", pattern.fixed_pattern_e.map(electrons)),
+        None => format!("with noise {:.3} ADU", pattern.spatial_adu),
+    };
+    format!(
+        "{fixed}; of columns {:.3}, of rows {:.3} ADU",
+        pattern.column_adu, pattern.row_adu
+    )
+}
+
+fn current_text(current: &DarkCurrentReport) -> String {
+    let in_electrons = current.median_e_s.map_or(String::new(), |value| {
+        format!(" ({})", plus_minus(value, current.median_sigma_e_s, "e/s"))
+    });
+    format!(
+        "{}{in_electrons} in the median, {} on average",
+        plus_minus(current.median_adu_s, current.median_sigma_adu_s, "ADU/s"),
+        plus_minus(current.mean_adu_s, current.mean_sigma_adu_s, "ADU/s")
+    )
+}

@@ -1,0 +1,80 @@
+//! How far out of focus a lens makes a spot.
+
+use crate::camera::data_sheet::Sensor;
+use serde::Serialize;
+
+/// Standard deviation along one axis of a cone of light cut at a distance of one f-number: of an even disc of diameter 1, a
+/// quarter.
+const DISC_SIGMA: f64 = 0.25;
+/// Standard deviation of the Gaussian that is most like the core of Airy's pattern, over wavelength times f-number.
+///
+/// # Reference
+/// Zhang, Zerubia & Olivo-Marin 2007, Applied Optics 46, 1819: 0.21 λ/NA, with 1/NA = 2 N.
+const AIRY_SIGMA: f64 = 0.42;
+
+/// A lens and its pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Lens {
+    /// Focal length over aperture.
+    pub f_number: f64,
+    /// Side of a pixel, in µm: the geometric mean of both.
+    pub pitch_um: f64,
+    /// The middle of the band, in nm.
+    pub wavelength_nm: f64,
+    /// Standard deviation of the spot in focus, in pixels.
+    pub focused_px: f64,
+}
+
+impl Lens {
+    /// The lens of a camera, the spot of which in focus has this standard deviation in pixels.
+    pub fn of(sensor: &Sensor, focused_px: f64) -> Self {
+        Self {
+            f_number: sensor.focal_length_mm / sensor.aperture_mm,
+            pitch_um: (sensor.pitch_x_um * sensor.pitch_y_um).sqrt(),
+            wavelength_nm: 0.5 * (sensor.band_from_nm + sensor.band_to_nm),
+            focused_px,
+        }
+    }
+
+    /// A radius in µm.
+    pub fn spot_um(&self, spot_px: f64) -> f64 {
+        spot_px * self.pitch_um
+    }
+
+    /// The distance from the focus that makes a spot of this radius, in µm; none for one that is sharper than in focus.
+    ///
+    /// Geometric blur: an even disc of the diameter distance over f-number, whose variance adds to that of the spot in focus.
+    pub fn distance_um(&self, spot_px: f64) -> Option<f64> {
+        let blur2 = spot_px * spot_px - self.focused_px * self.focused_px;
+        (blur2 >= 0.0).then(|| blur2.sqrt() * self.pitch_um * self.f_number / DISC_SIGMA)
+    }
+
+    /// The radius of a perfect lens's spot in focus, by diffraction, in pixels.
+    pub fn diffraction_px(&self) -> f64 {
+        AIRY_SIGMA * self.wavelength_nm * 1e-3 * self.f_number / self.pitch_um
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_disc_has_the_standard_deviation_of_the_spot_asked_for() {
+        let lens = Lens {
+            f_number: 1.5,
+            pitch_um: 5.0,
+            wavelength_nm: 600.0,
+            focused_px: 0.0,
+        };
+        // 60 µm at f/1.5: a disc of 40 µm across, radius 20 µm, standard deviation 10 µm: 2 px.
+        assert_eq!(lens.distance_um(2.0), Some(60.0));
+        let blurred = Lens {
+            focused_px: 1.2,
+            ..lens
+        };
+        assert!((blurred.distance_um(2.0).unwrap() - 48.0).abs() < 1e-12);
+        assert_eq!(blurred.distance_um(1.0), None);
+        assert!((lens.diffraction_px() - 0.0756).abs() < 1e-12);
+    }
+}

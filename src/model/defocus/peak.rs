@@ -1,0 +1,269 @@
+//! The paper's experiment: spots of one peak, and the grey-weighted mean of a fixed window.
+//!
+//! The mean is of all pixels of the window, without a threshold: `x = Σ i g / Σ g` (eq. 6). Its error is known in closed
+//! form ([`PeakStudy::expected`]): the bias of the sampled spot and of the window's edge, and the noise of the pixels.
+
+use super::ErrorPoint;
+use crate::base::statistics::normal_cdf;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde::Serialize;
+use std::f64::consts::{PI, SQRT_2};
+
+/// The paper's experiment.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PeakStudy {
+    /// Grey level of the brightest pixel of a spot centred on it, as a part of full scale.
+    pub peak: f64,
+    /// Pixels from the middle of the window to its edge.
+    pub half_window_px: usize,
+    /// Stars at each point of the grid.
+    pub trials: usize,
+}
+
+impl Default for PeakStudy {
+    /// The paper's window and trials. It does not state the peak; its surface is that of 0.65 to 0.70.
+    fn default() -> Self {
+        Self {
+            peak: 0.675,
+            half_window_px: 7,
+            trials: 20,
+        }
+    }
+}
+
+/// What the error should be.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Expected {
+    /// Root mean square of the distance, in pixels.
+    pub rms_px: f64,
+    /// The part of it without any noise: what sampling by pixels and the edge of the window do, in pixels.
+    pub bias_px: f64,
+}
+
+impl PeakStudy {
+    /// The light of a spot, in parts of full scale, of which the peak has its part: A of eq. (2).
+    pub fn energy(&self, spot_px: f64) -> f64 {
+        self.peak / libm::erf(0.5 / (SQRT_2 * spot_px)).powi(2)
+    }
+
+    fn window_px(&self) -> usize {
+        2 * self.half_window_px + 1
+    }
+
+    /// The error at a radius in pixels and a noise in parts of full scale, by trials.
+    pub fn measure(&self, spot_px: f64, noise: f64, random: &mut ChaCha8Rng) -> ErrorPoint {
+        let energy = self.energy(spot_px);
+        let half = self.half_window_px as f64;
+        let mut shares = [(); 2].map(|()| Vec::with_capacity(self.window_px()));
+        let trial = |_| {
+            let truth = [(); 2].map(|()| random.random::<f64>() - 0.5);
+            for (axis, shares) in shares.iter_mut().enumerate() {
+                self.shares(spot_px, truth[axis], shares);
+            }
+            let [columns, rows] = &shares;
+            let (mut sum, mut sum_x, mut sum_y) = (0.0, 0.0, 0.0);
+            for (y, row) in rows.iter().enumerate() {
+                let mut of_row = 0.0;
+                for (x, column) in columns.iter().enumerate() {
+                    let random: f64 = StandardNormal.sample(random);
+                    let grey = energy * row * column + noise * random;
+                    of_row += grey;
+                    sum_x += (x as f64 - half) * grey;
+                }
+                sum += of_row;
+                sum_y += (y as f64 - half) * of_row;
+            }
+            (sum_x / sum - truth[0]).powi(2) + (sum_y / sum - truth[1]).powi(2)
+        };
+        let squares: Vec<f64> = (0..self.trials).map(trial).collect();
+        ErrorPoint::of_squares(self.trials, &squares)
+    }
+
+    /// Parts of the light of a spot, whose middle is `at` from that of the window, in its columns or rows.
+    fn shares(&self, spot_px: f64, at: f64, into: &mut Vec<f64>) {
+        let edge = |pixel: usize| (pixel as f64 - self.half_window_px as f64 - 0.5 - at) / spot_px;
+        let mut before = normal_cdf(edge(0));
+        into.clear();
+        into.extend((0..self.window_px()).map(|pixel| {
+            let after = normal_cdf(edge(pixel + 1));
+            let share = after - before;
+            before = after;
+            share
+        }));
+    }
+
+    /// The error in closed form, see [`SpotInWindow::expected`].
+    pub fn expected(&self, spot_px: f64, noise: f64) -> Expected {
+        self.spot(spot_px).expected(noise)
+    }
+
+    /// A spot of this radius in pixels in the window, for any number of noises.
+    pub fn spot(&self, spot_px: f64) -> SpotInWindow {
+        let place = |i: usize| (i as f64 + 0.5) / PLACES as f64 - 0.5;
+        SpotInWindow {
+            energy: self.energy(spot_px),
+            half_window_px: self.half_window_px,
+            axis: (0..PLACES).map(|i| self.sums(spot_px, place(i))).collect(),
+        }
+    }
+
+    fn sums(&self, spot_px: f64, truth: f64) -> AxisSums {
+        let mut shares = Vec::new();
+        self.shares(spot_px, truth, &mut shares);
+        let sum: f64 = shares.iter().sum();
+        let places = shares
+            .iter()
+            .enumerate()
+            .map(|(i, share)| (i as f64 - self.half_window_px as f64) * share);
+        AxisSums {
+            truth,
+            sum,
+            mean: places.sum::<f64>() / sum,
+        }
+    }
+}
+
+/// Places along either axis over which the mean is taken.
+const PLACES: usize = 24;
+
+/// What the closed form needs of a spot, whatever the noise.
+#[derive(Debug, Clone)]
+pub struct SpotInWindow {
+    energy: f64,
+    half_window_px: usize,
+    /// At [`PLACES`] within a pixel.
+    axis: Vec<AxisSums>,
+}
+
+impl SpotInWindow {
+    /// The error in closed form, averaged over places in the pixel; exact but for the fourth power of the noise in the window over
+    /// the light in it.
+    ///
+    /// With window W of n² pixels, light G in it, its mean place x̄, noise σ, and `a = Σ (i − x̄) ν / G`, `e = Σ ν / G` of
+    /// the noise ν: `x − x₀ = x̄ − x₀ + a / (1 + e)`, of which the variances of a and e and their covariance follow.
+    pub fn expected(&self, noise: f64) -> Expected {
+        let half = self.half_window_px as f64;
+        let n = 2.0 * half + 1.0;
+        // Σ i² over the window's columns.
+        let squares = half * (half + 1.0) * n / 3.0;
+        let (mut of_bias, mut of_all) = (0.0, 0.0);
+        for along in &self.axis {
+            for across in &self.axis {
+                let light = self.energy * along.sum * across.sum;
+                let relative2 = (noise / light).powi(2);
+                let var_a = relative2 * n * (squares + n * along.mean.powi(2));
+                let var_e = relative2 * n * n;
+                let covariance = -relative2 * n * n * along.mean;
+                let bias = along.mean - along.truth;
+                of_bias += bias * bias;
+                of_all += bias * bias - 2.0 * bias * covariance
+                    + var_a
+                    + 3.0 * (var_a * var_e + 2.0 * covariance * covariance);
+            }
+        }
+        // Both axes are alike.
+        let root = |sum: f64| (2.0 * sum / (PLACES * PLACES) as f64).sqrt();
+        Expected {
+            rms_px: root(of_all),
+            bias_px: root(of_bias),
+        }
+    }
+}
+
+/// A spot along one axis of the window.
+#[derive(Debug, Clone, Copy)]
+struct AxisSums {
+    truth: f64,
+    sum: f64,
+    mean: f64,
+}
+
+/// How far the mean place of a pixel-integrated Gaussian is from its true one, `at_px` from the middle of a pixel, in a
+/// window without end.
+///
+/// By Poisson's summation: `Σ_k (−1)^k / (π k) exp(−2 π² σ² k²) sin(2 π k x)`, of which the first term is nearly all from
+/// σ = 0.3 px on.
+#[doc(alias = "S-curve")]
+pub fn sampling_bias_px(spot_px: f64, at_px: f64) -> f64 {
+    /// From here on terms are nothing for spots of a tenth of a pixel.
+    const TERMS: i32 = 12;
+    let term = |k: i32| {
+        let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+        let k = f64::from(k);
+        let decay = libm::exp(-2.0 * (PI * spot_px * k).powi(2));
+        sign / (PI * k) * decay * libm::sin(2.0 * PI * k * at_px)
+    };
+    (1..=TERMS).map(term).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+
+    #[test]
+    fn a_centred_spot_has_its_peak_in_the_middle() {
+        let study = PeakStudy::default();
+        for spot_px in [0.4, 1.0, 2.4] {
+            let mut shares = Vec::new();
+            study.shares(spot_px, 0.0, &mut shares);
+            let peak = study.energy(spot_px) * shares[7] * shares[7];
+            assert!((peak - 0.675).abs() < 1e-12, "{spot_px}: {peak}");
+        }
+    }
+
+    #[test]
+    fn the_bias_in_a_wide_window_is_that_of_the_series() {
+        let study = PeakStudy {
+            half_window_px: 20,
+            ..PeakStudy::default()
+        };
+        for spot_px in [0.1, 0.25, 0.4, 0.7] {
+            for at in [-0.5, -0.37, -0.1, 0.0, 0.2, 0.25, 0.44] {
+                let found = study.sums(spot_px, at).mean - at;
+                let series = sampling_bias_px(spot_px, at);
+                assert!(
+                    (found - series).abs() < 1e-12,
+                    "{spot_px} {at}: {found} {series}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn errors_scatter_about_the_closed_form_as_chance_has_it() {
+        let study = PeakStudy {
+            trials: 4000,
+            ..PeakStudy::default()
+        };
+        // Where sampling, noise and the window's edge decide.
+        for (number, (spot_px, noise)) in [
+            (0.4, 1e-6),
+            (0.4, 2e-3),
+            (1.0, 1e-3),
+            (2.4, 2e-4),
+            (2.4, 2e-3),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let mut random = ChaCha8Rng::seed_from_u64(number as u64);
+            let found = study.measure(spot_px, noise, &mut random);
+            let expected = study.expected(spot_px, noise).rms_px;
+            let off = (found.rms_px - expected) / found.rms_sigma_px;
+            assert!(off.abs() < 4.0, "{spot_px} {noise}: {found:?} {expected}");
+        }
+    }
+
+    #[test]
+    fn without_noise_only_the_bias_is_left() {
+        let study = PeakStudy::default();
+        let expected = study.expected(0.4, 1e-12);
+        assert!((expected.rms_px / expected.bias_px - 1.0).abs() < 1e-9);
+        // Root mean square of the first sine, of two axes: √2 / (√2 π) exp(−2 π² σ²).
+        let first = (-2.0 * (PI * 0.4).powi(2)).exp() / PI;
+        assert!((expected.bias_px / first - 1.0).abs() < 1e-3);
+    }
+}

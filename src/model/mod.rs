@@ -1,0 +1,5 @@
+//! What should be seen: the sensitivity model, the choice of defocus, and simulated frames.
+
+pub mod defocus;
+pub mod sensitivity;
+pub mod simulate;

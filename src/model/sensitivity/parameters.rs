@@ -1,0 +1,306 @@
+//! The parameters of a scenario by name: the camera's and the conditions' in one list.
+
+use super::conditions::{Conditions, Extinction, Scenario, SkyBrightness};
+use crate::camera::data_sheet::{KEYS, Key, Limits, Sensor, key, nearest_name};
+
+/// The numbers of [`Conditions`]. Of those that say the same thing in other units the last one given holds.
+pub const CONDITION_KEYS: &[Key<Conditions>] = &[
+    key!(exposure_s, Limits::Positive, "exposure, in seconds"),
+    key!(
+        zenith_distance_deg,
+        Limits::FromToBelow(0.0, 90.0),
+        "zenith distance, in degrees"
+    ),
+    Key {
+        name: "sky_mag_arcsec2",
+        about: "brightness of the sky, in V magnitudes in a square arcsecond",
+        limits: Limits::Finite,
+        get: |conditions| Some(conditions.sky.mag_arcsec2()),
+        set: |conditions, mag| conditions.sky = SkyBrightness::MagArcsec2(mag),
+    },
+    Key {
+        name: "sky_luminance_cd_m2",
+        about: "the same as a luminance, in cd/m²",
+        limits: Limits::Positive,
+        get: |conditions| Some(conditions.sky.luminance_cd_m2()),
+        set: |conditions, luminance| conditions.sky = SkyBrightness::LuminanceCdM2(luminance),
+    },
+    Key {
+        name: "sky_illuminance_lx",
+        about: "the same as the illuminance of level ground, in lx",
+        limits: Limits::Positive,
+        get: |conditions| Some(conditions.sky.illuminance_lx()),
+        set: |conditions, illuminance| conditions.sky = SkyBrightness::IlluminanceLx(illuminance),
+    },
+    Key {
+        name: "zenith_transmission",
+        about: "part of the light of 555 nm that comes through one airmass, by the law of eq. (3)",
+        limits: Limits::Share,
+        get: |conditions| {
+            Some(
+                conditions
+                    .extinction
+                    .zenith_transmission(super::conditions::REFERENCE_NM),
+            )
+        },
+        set: |conditions, part| conditions.extinction = Extinction::law_through(part),
+    },
+    Key {
+        name: "extinction_mag_per_airmass",
+        about: "extinction, in magnitudes for each airmass, the same at every wavelength",
+        limits: Limits::NotNegative,
+        get: |conditions| match conditions.extinction {
+            Extinction::MagPerAirmass(mag) => Some(mag),
+            Extinction::Law(_) => None,
+        },
+        set: |conditions, mag| conditions.extinction = Extinction::MagPerAirmass(mag),
+    },
+    key!(
+        star_temperature_k,
+        Limits::Positive,
+        "colour temperature of the star, in kelvin (physical reading)"
+    ),
+    key!(
+        motion_px,
+        Limits::FromToBelow(0.0, 100.0),
+        "how far a star moves during the exposure, in pixels"
+    ),
+    key!(
+        snr,
+        Limits::Positive,
+        "signal over noise in the brightest pixel that counts as a detection"
+    ),
+    key!(
+        false_alarms_per_mpx,
+        Limits::Positive,
+        "false detections in a million pixels that the detector accepts"
+    ),
+];
+
+/// One more number of a camera, for sweeps: pixels of another size under the same spot.
+const PIXEL_AREA: Key<Sensor> = Key {
+    name: "pixel_area_um2",
+    about: "area of a pixel, in µm²; its form and the spot's size in µm stay",
+    limits: Limits::Positive,
+    get: |sensor| Some(sensor.pitch_x_um * sensor.pitch_y_um),
+    set: |sensor, area_um2| {
+        let factor = area_um2 / (sensor.pitch_x_um * sensor.pitch_y_um);
+        sensor.pitch_x_um *= factor.sqrt();
+        sensor.pitch_y_um *= factor.sqrt();
+        sensor.spot_sigma_px /= factor.sqrt();
+        // μ is the pixel's part of the spot's area, and at most all of it.
+        sensor.peak_share = sensor.peak_share.map(|share| (share * factor).min(1.0));
+    },
+};
+
+/// How names end, and the unit that stands for. An ending comes before those that it ends in itself.
+const UNITS: &[(&str, &str)] = &[
+    ("_mag_per_airmass", "mag / airmass"),
+    ("_mag_arcsec2", "V mag / square arcsec"),
+    ("_e_per_adu", "e / ADU"),
+    ("_per_mpx", "per million pixels"),
+    ("_cm2_s", "per cm² and s"),
+    ("_deg_s", "°/s"),
+    ("_e_um", "e/µm"),
+    ("_vmag", "V mag"),
+    ("_cd_m2", "cd/m²"),
+    ("_um2", "µm²"),
+    ("_e_s", "e/s"),
+    ("_deg", "°"),
+    ("_adu", "ADU"),
+    ("_mm", "mm"),
+    ("_um", "µm"),
+    ("_nm", "nm"),
+    ("_px", "px"),
+    ("_lx", "lx"),
+    ("_e", "e"),
+    ("_s", "s"),
+    ("_k", "K"),
+];
+
+/// What an axis of the parameter called `name` is called: `focal length (mm)`.
+pub fn title_of(name: &str) -> String {
+    match unit_of(name) {
+        "" => quantity_of(name),
+        unit => format!("{} ({unit})", quantity_of(name)),
+    }
+}
+
+fn ending_of(name: &str) -> Option<&'static (&'static str, &'static str)> {
+    UNITS.iter().find(|(ending, _)| name.ends_with(ending))
+}
+
+fn unit_of(name: &str) -> &'static str {
+    ending_of(name).map_or("", |(_, unit)| unit)
+}
+
+fn quantity_of(name: &str) -> String {
+    let ending = ending_of(name).map_or("", |(ending, _)| ending);
+    name.strip_suffix(ending).unwrap_or(name).replace('_', " ")
+}
+
+/// A parameter of a [`Scenario`].
+#[derive(Debug, Clone, Copy)]
+pub enum Parameter {
+    /// One of the camera.
+    Sensor(&'static Key<Sensor>),
+    /// One of the conditions.
+    Conditions(&'static Key<Conditions>),
+}
+
+/// A name that no parameter has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("'{name}' is no parameter{}", match .nearest { Some(known) => format!("; did you mean '{known}'?"), None => String::new() })]
+pub struct UnknownParameter {
+    /// The name.
+    pub name: String,
+    /// The one that may have been meant.
+    pub nearest: Option<&'static str>,
+}
+
+impl UnknownParameter {
+    /// What `name` is, and what of `names` it may have been meant to be.
+    pub fn among(name: &str, names: impl Iterator<Item = &'static str>) -> Self {
+        Self {
+            name: name.to_owned(),
+            nearest: nearest_name(name, names),
+        }
+    }
+}
+
+impl Parameter {
+    /// All of them, the camera's first.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let sensor = KEYS.iter().chain([&PIXEL_AREA]).map(Self::Sensor);
+        sensor.chain(CONDITION_KEYS.iter().map(Self::Conditions))
+    }
+
+    /// The parameter called `name`.
+    ///
+    /// # Errors
+    /// [`UnknownParameter`] with the nearest name there is.
+    pub fn named(name: &str) -> Result<Self, UnknownParameter> {
+        let found = Self::all().find(|parameter| parameter.name() == name);
+        found.ok_or_else(|| UnknownParameter::among(name, Self::all().map(Self::name)))
+    }
+
+    /// Its name, which ends in its unit.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sensor(key) => key.name,
+            Self::Conditions(key) => key.name,
+        }
+    }
+
+    /// What it is, in a line.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Sensor(key) => key.about,
+            Self::Conditions(key) => key.about,
+        }
+    }
+
+    /// The unit of its values, as people write it; empty where it is a pure number.
+    pub fn unit(self) -> &'static str {
+        unit_of(self.name())
+    }
+
+    /// Its name without the unit, in words: `focal length`.
+    pub fn quantity(self) -> String {
+        quantity_of(self.name())
+    }
+
+    /// What an axis of it is called: `focal length (mm)`.
+    pub fn title(self) -> String {
+        title_of(self.name())
+    }
+
+    /// What values make sense.
+    pub fn limits(self) -> Limits {
+        match self {
+            Self::Sensor(key) => key.limits,
+            Self::Conditions(key) => key.limits,
+        }
+    }
+
+    /// Its value, where it has one.
+    pub fn get(self, scenario: &Scenario) -> Option<f64> {
+        match self {
+            Self::Sensor(key) => (key.get)(&scenario.sensor),
+            Self::Conditions(key) => (key.get)(&scenario.conditions),
+        }
+    }
+
+    /// Gives it a value within the limits.
+    pub fn set(self, scenario: &mut Scenario, value: f64) {
+        match self {
+            Self::Sensor(key) => (key.set)(&mut scenario.sensor, value),
+            Self::Conditions(key) => (key.set)(&mut scenario.conditions, value),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::data_sheet::Preset;
+
+    #[test]
+    fn every_parameter_takes_the_value_that_it_has() {
+        for parameter in Parameter::all() {
+            let mut scenario = Scenario::of(Preset::Experiment2);
+            let Some(value) = parameter.get(&scenario) else {
+                continue;
+            };
+            parameter.set(&mut scenario, value);
+            let again = parameter.get(&scenario).unwrap();
+            assert!(
+                (again - value).abs() <= 1e-9 * value.abs(),
+                "{}",
+                parameter.name()
+            );
+            assert!(parameter.limits().accept(value), "{}", parameter.name());
+        }
+    }
+
+    #[test]
+    fn names_are_unique_and_an_unknown_one_meets_its_neighbour() {
+        let mut names: Vec<_> = Parameter::all().map(Parameter::name).collect();
+        names.sort_unstable();
+        let count = names.len();
+        names.dedup();
+        assert_eq!(names.len(), count);
+        let error = Parameter::named("aperture").unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "'aperture' is no parameter; did you mean 'aperture_mm'?"
+        );
+    }
+
+    #[test]
+    fn a_title_has_the_unit_that_the_name_ends_in() {
+        for (name, title) in [
+            ("aperture_mm", "aperture (mm)"),
+            ("dark_current_e_s", "dark current (e/s)"),
+            ("gain_e_per_adu", "gain (e / ADU)"),
+            ("sky_mag_arcsec2", "sky (V mag / square arcsec)"),
+            ("pixel_area_um2", "pixel area (µm²)"),
+            ("quantum_efficiency", "quantum efficiency"),
+            ("snr", "snr"),
+        ] {
+            assert_eq!(Parameter::named(name).unwrap().title(), title);
+        }
+    }
+
+    #[test]
+    fn a_larger_pixel_holds_more_of_the_same_spot() {
+        let mut scenario = Scenario::of(Preset::Experiment1);
+        let area = Parameter::named("pixel_area_um2").unwrap();
+        area.set(&mut scenario, 4.0 * 8.6 * 8.3);
+        let sensor = &scenario.sensor;
+        assert!(
+            (sensor.pitch_x_um - 17.2).abs() < 1e-9 && (sensor.spot_sigma_px - 0.58).abs() < 1e-9
+        );
+        assert!((sensor.peak_share() - 4.0 / 9.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,179 @@
+//! What is told of a scenario: its limit, the parameters it follows from, and all that lies between.
+
+use super::budget::Budget;
+use super::completeness::{Detector, Rule};
+use super::conditions::{Reading, Scenario, ScenarioError};
+use super::parameters::Parameter;
+use serde::{Serialize, Serializer};
+
+/// The limit of a scenario with everything it follows from. The first fields are those that other programs build on.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Prediction {
+    /// Johnson V of the faintest star with the wanted ratio of signal to noise in its brightest pixel.
+    pub limit_vmag: f64,
+    /// That star's electrons on its brightest pixel.
+    pub star_e: f64,
+    /// Electrons of the sky in a pixel.
+    pub background_e: f64,
+    /// All noise of the brightest pixel, in electrons.
+    pub noise_e: f64,
+    /// Signal over noise in the brightest pixel.
+    pub snr: f64,
+    /// Thickness of the air in units of that at the zenith.
+    pub airmass: f64,
+    /// Every parameter that has a value, by name.
+    #[serde(serialize_with = "as_map")]
+    pub parameters: Vec<(&'static str, f64)>,
+    /// Which equations.
+    pub reading: Reading,
+    /// What the camera is called.
+    pub camera: String,
+    /// What the matched filter of [`detect`](crate::detect::detect) finds.
+    pub detector: DetectorReport,
+    /// What the rule of the brightest pixel finds.
+    pub peak_pixel: DetectorReport,
+    /// All that lies between.
+    pub budget: Budget,
+}
+
+/// What a detector finds: three views of one threshold.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DetectorReport {
+    /// What a star must do to be found.
+    pub rule: Rule,
+    /// V magnitude at which half of the stars are found; none where the noise alone is found more often.
+    pub limit50_vmag: Option<f64>,
+    /// V magnitude at which nine in ten are found; none as well.
+    pub limit90_vmag: Option<f64>,
+    /// The threshold, in standard deviations of the (filtered) noise without a star.
+    pub threshold_sigma: f64,
+    /// False detections in a million pixels without a star.
+    pub false_alarms_per_mpx: f64,
+    /// The part of the stars that is found, by V magnitude, around the first of these limits that there is.
+    pub completeness: Vec<CompletenessPoint>,
+}
+
+/// A point of a curve of completeness.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CompletenessPoint {
+    /// V magnitude of the stars.
+    pub vmag: f64,
+    /// The part of them that is found.
+    pub part: f64,
+}
+
+/// The curve of completeness spans so many magnitudes on either side of the limit, ...
+const CURVE_REACH_MAG: f64 = 1.2;
+/// ... in steps of this size.
+const CURVE_STEP_MAG: f64 = 0.1;
+
+impl DetectorReport {
+    fn new(detector: &Detector) -> Self {
+        let vmag_at = |part| Some(detector.vmag_at(part)).filter(|vmag| vmag.is_finite());
+        let (limit50_vmag, limit90_vmag) = (vmag_at(0.5), vmag_at(0.9));
+        let steps = (CURVE_REACH_MAG / CURVE_STEP_MAG).round() as i32;
+        let point = |around: f64, step: i32| {
+            let middle = (around / CURVE_STEP_MAG).round();
+            // Divided, and not multiplied, so that 8.3 is 8.3.
+            let vmag = (middle + f64::from(step)) / (1.0 / CURVE_STEP_MAG).round();
+            CompletenessPoint {
+                vmag,
+                part: detector.probability(vmag),
+            }
+        };
+        let curve = |around| (-steps..=steps).map(move |step| point(around, step));
+        Self {
+            rule: detector.rule,
+            limit50_vmag,
+            limit90_vmag,
+            threshold_sigma: detector.threshold_sigma,
+            false_alarms_per_mpx: detector.false_alarms_per_mpx,
+            completeness: limit50_vmag
+                .or(limit90_vmag)
+                .into_iter()
+                .flat_map(curve)
+                .collect(),
+        }
+    }
+}
+
+fn as_map<S: Serializer>(
+    parameters: &[(&'static str, f64)],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(parameters.iter().copied())
+}
+
+impl Prediction {
+    /// The prediction for a scenario.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] where the scenario makes no sense or has no limit.
+    pub fn new(scenario: &Scenario) -> Result<Self, ScenarioError> {
+        Self::with_detector(scenario).map(|(prediction, _)| prediction)
+    }
+
+    /// The same, and the matched filter that it tells of.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_detector(scenario: &Scenario) -> Result<(Self, Detector), ScenarioError> {
+        let budget = Budget::checked(scenario)?;
+        let detector = Detector::new(Rule::MatchedFilter, scenario, &budget);
+        let peak_pixel = Detector::new(Rule::PeakPixel, scenario, &budget);
+        let parameters = Parameter::all()
+            .filter_map(|parameter| Some((parameter.name(), parameter.get(scenario)?)))
+            .collect();
+        let prediction = Self {
+            limit_vmag: budget.limit_vmag,
+            star_e: budget.star_e,
+            background_e: budget.background_e,
+            noise_e: budget.noise_e,
+            snr: budget.snr,
+            airmass: budget.airmass,
+            parameters,
+            reading: scenario.reading,
+            camera: scenario.sensor.name.clone(),
+            detector: DetectorReport::new(&detector),
+            peak_pixel: DetectorReport::new(&peak_pixel),
+            budget,
+        };
+        Ok((prediction, detector))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::data_sheet::Preset;
+    use crate::model::sensitivity::SkyBrightness;
+
+    #[test]
+    fn parameters_are_an_object_in_the_order_of_their_table() {
+        let prediction = Prediction::new(&Scenario::of(Preset::Experiment1)).unwrap();
+        let json = serde_json::to_string(&prediction).unwrap();
+        assert!(
+            json.contains("\"parameters\":{\"width_px\":752.0,\"height_px\":582.0,"),
+            "{json}"
+        );
+        assert!(json.contains("\"reading\":\"paper\""), "{json}");
+        assert!(
+            json.contains("\"zenith_transmission\"") && !json.contains("extinction_mag"),
+            "{json}"
+        );
+    }
+
+    #[test]
+    fn where_no_light_arrives_there_is_no_limit() {
+        let mut scenario = Scenario::of(Preset::Experiment1);
+        scenario.conditions.zenith_distance_deg = 89.999_999;
+        let error = Prediction::new(&scenario).unwrap_err().to_string();
+        assert!(
+            error.starts_with("there is no limiting magnitude"),
+            "{error}"
+        );
+        let mut scenario = Scenario::of(Preset::Experiment1);
+        scenario.conditions.sky = SkyBrightness::LuminanceCdM2(1e308);
+        assert!(Prediction::new(&scenario).is_err());
+    }
+}

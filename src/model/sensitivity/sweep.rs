@@ -1,0 +1,341 @@
+//! One parameter after its other values, all else as it is.
+
+use super::budget::Budget;
+use super::conditions::{Scenario, ScenarioError};
+use super::parameters::{Parameter, UnknownParameter};
+use crate::camera::data_sheet::Limits;
+use std::cmp::Ordering;
+
+/// How values lie between the first and the last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Spacing {
+    /// The same difference from each to the next.
+    Linear,
+    /// The same ratio.
+    Log,
+}
+
+impl Spacing {
+    /// `count` values from `from` to `to`, both among them; in logarithmic spacing both are above 0. Decimal fractions look
+    /// like themselves: 12 digits are kept.
+    pub fn values(self, from: f64, to: f64, count: usize) -> Vec<f64> {
+        let last = count.max(2) - 1;
+        let value = |i: usize| {
+            let part = i as f64 / last as f64;
+            match self {
+                _ if i == 0 => from,
+                _ if i == last => to,
+                Self::Linear => rounded_as(from + part * (to - from), from.abs().max(to.abs())),
+                Self::Log => {
+                    let value = from * (to / from).powf(part);
+                    rounded_as(value, value)
+                }
+            }
+        };
+        (0..count).map(value).collect()
+    }
+}
+
+impl Spacing {
+    /// [`Self::values`] of a sweep that is one.
+    ///
+    /// # Errors
+    /// [`SweepError::Count`], [`SweepError::Backwards`], [`SweepError::LogOfNothing`].
+    pub fn checked_values(
+        self,
+        (from, to): (f64, f64),
+        count: usize,
+    ) -> Result<Vec<f64>, SweepError> {
+        if !(2..=Sweep::MAX_VALUES).contains(&count) {
+            return Err(SweepError::Count { count });
+        }
+        // NaN does not rise either.
+        if from.partial_cmp(&to) != Some(Ordering::Less) {
+            return Err(SweepError::Backwards { from, to });
+        }
+        if self == Self::Log && from <= 0.0 {
+            return Err(SweepError::LogOfNothing { from });
+        }
+        Ok(self.values(from, to, count))
+    }
+}
+
+/// `value` to the twelfth digit of `size`.
+fn rounded_as(value: f64, size: f64) -> f64 {
+    let decimals = (11.0 - size.log10().floor()).max(0.0) as usize;
+    // Through decimal digits: a product with a power of ten is not exact.
+    format!("{value:.decimals$}").parse().unwrap_or(value)
+}
+
+/// Values of one parameter.
+#[derive(Debug, Clone)]
+pub struct Sweep {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// Its values, rising.
+    pub values: Vec<f64>,
+    /// How they lie.
+    pub spacing: Spacing,
+}
+
+/// Why something is no sweep.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SweepError {
+    /// No parameter has the name.
+    #[error(transparent)]
+    Unknown(#[from] UnknownParameter),
+    /// It has no value, or one, or too many.
+    #[error("a sweep of {count} values, expected 2 to {}", Sweep::MAX_VALUES)]
+    Count {
+        /// The values it would have.
+        count: usize,
+    },
+    /// It does not rise.
+    #[error("the sweep runs from {from} to {to}, expected a rising one")]
+    Backwards {
+        /// The first value.
+        from: f64,
+        /// The last value.
+        to: f64,
+    },
+    /// It has a value that the parameter cannot have.
+    #[error("{name} would be {found}, expected {expected}")]
+    Value {
+        /// The parameter.
+        name: &'static str,
+        /// The value.
+        found: f64,
+        /// What it may be.
+        expected: Limits,
+    },
+    /// Ratios need values above 0.
+    #[error("logarithmic steps from {from}, expected a start above 0")]
+    LogOfNothing {
+        /// The first value.
+        from: f64,
+    },
+}
+
+impl Sweep {
+    /// More values than this are a mistake.
+    pub const MAX_VALUES: usize = 1000;
+
+    /// `count` values of the parameter called `name`.
+    ///
+    /// # Errors
+    /// [`SweepError`]: an unknown name, a value outside the parameter's limits, a sweep that does not rise or is no sweep.
+    pub fn new(
+        name: &str,
+        (from, to): (f64, f64),
+        count: usize,
+        spacing: Spacing,
+    ) -> Result<Self, SweepError> {
+        let parameter = Parameter::named(name)?;
+        let values = spacing.checked_values((from, to), count)?;
+        let limits = parameter.limits();
+        match values.iter().find(|value| !limits.accept(**value)) {
+            Some(&found) => Err(SweepError::Value {
+                name: parameter.name(),
+                found,
+                expected: limits,
+            }),
+            None => Ok(Self {
+                parameter,
+                values,
+                spacing,
+            }),
+        }
+    }
+
+    /// `base` with each of the values, every one checked.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] where a value contradicts what else is known.
+    pub fn scenarios(&self, base: &Scenario) -> Result<Vec<Scenario>, ScenarioError> {
+        let scenario = |value: &f64| {
+            let mut scenario = base.clone();
+            self.parameter.set(&mut scenario, *value);
+            scenario.check()?;
+            Ok(scenario)
+        };
+        self.values.iter().map(scenario).collect()
+    }
+}
+
+/// What tells the curves of a figure apart: a parameter, and its value for each curve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Series {
+    /// The name of the parameter.
+    pub parameter: &'static str,
+    /// Its value for either curve.
+    pub values: [f64; 2],
+}
+
+impl Series {
+    /// The two exposures of the paper's figures.
+    pub const PAPER_EXPOSURES: Self = Self {
+        parameter: "exposure_s",
+        values: [0.04, 0.5],
+    };
+    /// The two apertures of the paper's figure over the exposure.
+    pub const PAPER_APERTURES: Self = Self {
+        parameter: "aperture_mm",
+        values: [100.0, 50.0],
+    };
+
+    /// As the paper chose them for its camera: the scenario's exposure and one 12.5 times as long; over the exposure, the
+    /// scenario's aperture and half of it.
+    pub fn around(base: &Scenario, swept: Parameter) -> Self {
+        if swept.name() == "exposure_s" {
+            let aperture_mm = base.sensor.aperture_mm;
+            return Self {
+                parameter: "aperture_mm",
+                values: [aperture_mm, aperture_mm / 2.0],
+            };
+        }
+        let exposure_s = base.conditions.exposure_s;
+        Self {
+            parameter: "exposure_s",
+            values: [exposure_s, exposure_s * 12.5],
+        }
+    }
+}
+
+/// A line of a figure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// What tells it apart: `exposure 0.04 s`.
+    pub label: String,
+    /// Value of the parameter, and limiting magnitude.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// The limiting magnitude over `sweep`, once for each value of `series`.
+///
+/// # Errors
+/// [`ScenarioError`] where a value contradicts what else is known, or there is no limit.
+pub fn curves(
+    base: &Scenario,
+    sweep: &Sweep,
+    series: &Series,
+) -> Result<Vec<Curve>, ScenarioError> {
+    let Ok(apart) = Parameter::named(series.parameter) else {
+        return Ok(Vec::new());
+    };
+    let curve = |value: &f64| {
+        let mut base = base.clone();
+        apart.set(&mut base, *value);
+        let limit = |scenario: &Scenario| Ok(Budget::checked(scenario)?.limit_vmag);
+        let scenarios = sweep.scenarios(&base)?;
+        let limits: Result<Vec<f64>, ScenarioError> = scenarios.iter().map(limit).collect();
+        Ok(Curve {
+            label: format!("{} {value} {}", apart.quantity(), apart.unit()),
+            points: sweep.values.iter().copied().zip(limits?).collect(),
+        })
+    };
+    series.values.iter().map(curve).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::data_sheet::Preset;
+    use proptest::prelude::*;
+
+    fn sweep(name: &str, from: f64, to: f64, count: usize) -> Result<Sweep, SweepError> {
+        Sweep::new(name, (from, to), count, Spacing::Linear)
+    }
+
+    #[test]
+    fn values_look_like_themselves() {
+        let values = Spacing::Linear.values(0.0, 1.0, 11);
+        assert_eq!(values[3].to_string(), "0.3");
+        assert_eq!(Spacing::Linear.values(-0.3, 0.3, 3), [-0.3, 0.0, 0.3]);
+        assert_eq!(Spacing::Log.values(1e-4, 0.1, 4), [1e-4, 1e-3, 1e-2, 0.1]);
+        assert_eq!(Spacing::Linear.values(5.0, 9.0, 1), [5.0]);
+        assert_eq!(Spacing::Linear.values(3e20, 4e20, 3), [3e20, 3.5e20, 4e20]);
+    }
+
+    #[test]
+    fn what_is_no_sweep_is_refused() {
+        for (found, expected) in [
+            (
+                sweep("apertur", 5.0, 200.0, 40),
+                "'apertur' is no parameter; did you mean 'aperture_mm'?",
+            ),
+            (
+                sweep("aperture_mm", 200.0, 5.0, 40),
+                "from 200 to 5, expected a rising one",
+            ),
+            (
+                sweep("aperture_mm", 5.0, f64::NAN, 40),
+                "to NaN, expected a rising one",
+            ),
+            (
+                sweep("aperture_mm", 5.0, 200.0, 1),
+                "a sweep of 1 values, expected 2 to 1000",
+            ),
+            (
+                sweep("aperture_mm", 5.0, 200.0, 1001),
+                "a sweep of 1001 values",
+            ),
+            (
+                sweep("aperture_mm", -5.0, 200.0, 3),
+                "aperture_mm would be -5, expected a number above 0",
+            ),
+            (
+                sweep("zenith_distance_deg", 0.0, 90.0, 10),
+                "would be 90, expected a number from 0 to below 90",
+            ),
+            (sweep("bits", 8.0, 9.0, 3), "bits would be 8.5"),
+            (
+                Sweep::new("dark_current_e_s", (0.0, 9.0), 3, Spacing::Log),
+                "logarithmic steps from 0",
+            ),
+        ] {
+            let error = found.unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_contradiction_on_the_way_is_found() {
+        let base = Scenario::of(Preset::Experiment1);
+        let found = sweep("band_to_nm", 700.0, 900.0, 3).unwrap();
+        let error = found.scenarios(&base).unwrap_err().to_string();
+        assert!(
+            error.contains("360 to 780 nm, which does not cover"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_curve_is_the_limit_at_each_value() {
+        let base = Scenario::of(Preset::Experiment1);
+        let swept = sweep("focal_length_mm", 80.0, 160.0, 3).unwrap();
+        let found = curves(&base, &swept, &Series::around(&base, swept.parameter)).unwrap();
+        assert_eq!(found[0].label, "exposure 0.04 s");
+        assert_eq!(found[1].label, "exposure 0.5 s");
+        assert_eq!(found[0].points[2], (160.0, Budget::new(&base).limit_vmag));
+        assert!(found[1].points[2].1 > 10.7);
+        let exposure = Parameter::named("exposure_s").unwrap();
+        let series = Series::around(&base, exposure);
+        assert_eq!(
+            (series.parameter, series.values),
+            ("aperture_mm", [100.0, 50.0])
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn values_rise_from_end_to_end(from in 1e-6..1e6f64, ratio in 1.01..1e6f64, count in 2..50usize) {
+            for spacing in [Spacing::Linear, Spacing::Log] {
+                let values = spacing.values(from, from * ratio, count);
+                prop_assert_eq!(values.len(), count);
+                prop_assert_eq!((values[0], values[count - 1]), (from, from * ratio));
+                prop_assert!(values.is_sorted());
+            }
+        }
+    }
+}

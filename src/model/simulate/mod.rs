@@ -1,0 +1,380 @@
+//! Frames with truth: what a camera would make of known stars.
+//!
+//! [`Simulator`] of a [`Scenario`], a [`Scene`] and catalogue stars; [`Pointing`], seed → [`Frame`], [`Truth`]
+//!
+//! 1. Each star's place on the detector, at the date, through the lens with its distortion; its expected electrons by the
+//!    sensitivity model ([`StarLight`]: magnitude and colour), less what clouds and vignetting take.
+//! 2. The sky in each pixel: even, with a gradient, moonlight, clouds.
+//! 3. Each star's spot, integrated over each pixel, along its way while the camera turns; trails of satellites likewise.
+//! 4. The response of each pixel, and its dark current.
+//! 5. Whole electrons (Poisson), cosmic rays, and what flows out of a full pixel.
+//! 6. What is read out: noise of reading, gain, bias, whole grey levels of so many bits.
+//!
+//! The random numbers depend on the seed alone, those of the detector's pattern on the camera's own: the same frame on any
+//! number of threads. Where a function of the mathematical library decides, it is that of [`libm`], which is the same on
+//! every machine.
+//!
+//! Caveats: one spot for the whole field. Pixels are square ([`camera_of`]). A sky, a star and an angular rate do not vary
+//! during the exposure. Charge flows along columns only.
+
+mod canvas;
+mod motion;
+mod pattern;
+mod poisson;
+mod readout;
+mod scene;
+mod setup;
+mod sky;
+mod spot;
+mod stars;
+mod strays;
+mod truth;
+
+pub use scene::{SCENE_KEYS, Scene};
+pub use setup::{Parameter, Setup};
+pub use strays::{CosmicRay, Trail};
+pub use truth::{TrueStar, Truth};
+
+use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation};
+use crate::camera::data_sheet::Sensor;
+use crate::camera::{CameraModel, Distortion, DistortionModel};
+use crate::frame::{self, Frame, FrameError};
+use crate::model::sensitivity::{Scenario, SkyBrightness, StarLight};
+use crate::sky::catalog::Star;
+use canvas::Canvas;
+use motion::Motion;
+use pattern::Pattern;
+use poisson::PoissonTable;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use readout::{Readout, collect};
+use sky::Sky;
+use spot::Spot;
+use stars::Starlight;
+
+/// Where a camera points, and when.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pointing {
+    /// The attitude, in the middle of the exposure.
+    pub icrs_to_camera: Rotation<Icrs, Camera>,
+    /// When, in Julian years since J2000.0: the stars move.
+    pub years_since_j2000: f64,
+}
+
+/// Streams of random numbers of one frame: what happens in the scene does not change the noise.
+#[derive(Clone, Copy)]
+enum Stream {
+    Noise,
+    Scene,
+}
+
+fn random(seed: u64, stream: Stream) -> ChaCha8Rng {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(stream as u64);
+    random
+}
+
+/// The camera with the sensor's pixels, made square: of the same area; and its lens's distortion.
+///
+/// A camera model has one scale for both axes. Where a pitch differs from the other by percents, the true image could not be
+/// identified as one of square pixels; what is simulated can.
+pub fn camera_of(sensor: &Sensor) -> CameraModel {
+    let made = &sensor.imperfections;
+    let pitch_um = (sensor.pitch_x_um * sensor.pitch_y_um).sqrt();
+    let focal_length_px = sensor.focal_length_mm * 1e3 / pitch_um;
+    let (width_px, height_px) = (sensor.width_px as f64, sensor.height_px as f64);
+    let mut camera = CameraModel::pinhole(width_px, height_px, focal_length_px, made.mirrored);
+    // The model leads from what is observed to the pinhole's image: the other way.
+    let [radial, x, y] = [
+        -made.distortion_px,
+        -made.decentring_x_px,
+        -made.decentring_y_px,
+    ];
+    if x != 0.0 || y != 0.0 {
+        // Conrady 1919: u and v of x (3u² + v², 2uv) + y (2uv, u² + 3v²), in thirds; then r² (u, v).
+        let third = 1.0 / 3.0;
+        let second = [x, y * third, 2.0 * third * y, 2.0 * third * x, x * third, y];
+        let cubic = [radial, 0.0, 0.0, radial, radial, 0.0, 0.0, radial];
+        let terms: Vec<f64> = [0.0; 2].into_iter().chain(second).chain(cubic).collect();
+        let distortion = Distortion::new(DistortionModel::Cubic, camera.radius_px(), &terms);
+        camera.distortion = Some(distortion);
+    } else if radial != 0.0 {
+        let radius_px = camera.radius_px();
+        let distortion = Distortion::new(DistortionModel::Radial, radius_px, &[radial]);
+        camera.distortion = Some(distortion);
+    }
+    camera
+}
+
+/// A camera under a sky, ready for any number of frames.
+#[derive(Debug, Clone)]
+pub struct Simulator<'a> {
+    scenario: Scenario,
+    scene: Scene,
+    stars: &'a [Star],
+    camera: CameraModel,
+    light: StarLight,
+    pattern: Pattern,
+    /// Of the mean that most pixels have, where there is one.
+    even: Option<PoissonTable>,
+}
+
+impl<'a> Simulator<'a> {
+    /// A simulator of `scenario` and `scene`, which [`Setup::check`] has found sound, with the catalogue's `stars`.
+    ///
+    /// All stars are drawn, however faint: the catalogue should go deeper than the camera.
+    ///
+    /// # Errors
+    /// [`FrameError::TooSmall`], [`FrameError::TooLarge`] for a detector that no frame can be of.
+    pub fn new(scenario: &Scenario, scene: &Scene, stars: &'a [Star]) -> Result<Self, FrameError> {
+        let sensor = &scenario.sensor;
+        frame::check_size(sensor.width_px, sensor.height_px)?;
+        let light = StarLight::new(scenario);
+        let budget = light.budget();
+        Ok(Self {
+            scenario: scenario.clone(),
+            scene: *scene,
+            stars,
+            camera: camera_of(sensor),
+            pattern: Pattern::of(sensor),
+            even: PoissonTable::new(budget.background_e + budget.dark_e),
+            light,
+        })
+    }
+
+    /// The same with another camera than that of the sensor's data: one that was fitted to a real frame. Its size is the
+    /// sensor's.
+    #[must_use]
+    pub fn with_camera(mut self, camera: CameraModel) -> Self {
+        self.camera = camera;
+        self
+    }
+
+    /// The camera: which direction each pixel looks in.
+    pub fn camera(&self) -> &CameraModel {
+        &self.camera
+    }
+
+    /// The even scenario that is most like what is simulated: with the mean brightness of its sky and the typical motion of its
+    /// stars. The sensitivity model's predictions are for that.
+    pub fn evened(&self) -> Scenario {
+        let mut evened = self.scenario.clone();
+        let conditions = &mut evened.conditions;
+        let turn_rad = self.scene.typical_rate_rad_s() * conditions.exposure_s;
+        let motion_px = turn_rad * self.camera.focal_length_px;
+        conditions.motion_px = conditions.motion_px.hypot(motion_px);
+        let none = Scene {
+            sky_gradient: 0.0,
+            cloud_mag: 0.0,
+            cloud_light: 0.0,
+            ..self.scene
+        };
+        let mut random = random(0, Stream::Scene);
+        let mut canvas = self.canvas();
+        Sky::new(&self.scenario, &none, &self.camera, &mut random).expose(&mut canvas, 1.0);
+        let sky_mag = conditions.sky.mag_arcsec2() - 2.5 * mean(canvas.pixels()).log10();
+        conditions.sky = SkyBrightness::MagArcsec2(sky_mag);
+        evened
+    }
+
+    /// The light of its stars.
+    pub fn light(&self) -> &StarLight {
+        &self.light
+    }
+
+    /// A frame of the sky, seen from a `pointing`, and what is truly on it.
+    ///
+    /// # Errors
+    /// None for a simulator that could be made.
+    pub fn frame(&self, pointing: &Pointing, seed: u64) -> Result<(Frame, Truth), FrameError> {
+        self.exposed(seed, |starlight, reach_px, random| {
+            starlight.on_frame(pointing, self.stars, reach_px, random)
+        })
+    }
+
+    /// A frame of stars at these places, of these V magnitudes and of the scenario's temperature, in place of the catalogue's.
+    ///
+    /// # Errors
+    /// As [`Self::frame`].
+    pub fn star_field(
+        &self,
+        stars: &[(PixelPoint, f64)],
+        seed: u64,
+    ) -> Result<(Frame, Truth), FrameError> {
+        self.exposed(seed, |starlight, _, _| {
+            let star = |(number, &(position, v_mag)): (usize, &(PixelPoint, f64))| TrueStar {
+                number,
+                catalog: None,
+                position,
+                v_mag,
+                electrons: self.light.electrons(v_mag, None)
+                    * starlight.sky.transmission(&position),
+            };
+            stars.iter().enumerate().map(star).collect()
+        })
+    }
+
+    /// A frame without any light: the shutter is closed.
+    ///
+    /// # Errors
+    /// As [`Self::frame`].
+    pub fn dark(&self, seed: u64) -> Result<Frame, FrameError> {
+        self.evenly_lit(0.0, seed)
+    }
+
+    /// A frame of an even light that leaves so many electrons in a pixel in the middle: a flat field.
+    ///
+    /// # Errors
+    /// As [`Self::frame`].
+    pub fn evenly_lit(&self, electrons: f64, seed: u64) -> Result<Frame, FrameError> {
+        let none = Scene::default();
+        let sky = Sky::new(
+            &self.scenario,
+            &none,
+            &self.camera,
+            &mut random(seed, Stream::Scene),
+        );
+        let mut canvas = self.canvas();
+        sky.expose(&mut canvas, electrons);
+        self.read_out(canvas, &[], seed)
+    }
+
+    fn canvas(&self) -> Canvas {
+        let sensor = &self.scenario.sensor;
+        Canvas::new(sensor.width_px, sensor.height_px, 0.0)
+    }
+
+    /// A frame of the stars that `seen` gives, the light of which reaches so many pixels beyond their places.
+    fn exposed(
+        &self,
+        seed: u64,
+        seen: impl FnOnce(&Starlight, f64, &mut ChaCha8Rng) -> Vec<TrueStar>,
+    ) -> Result<(Frame, Truth), FrameError> {
+        let (sensor, scene) = (&self.scenario.sensor, &self.scene);
+        let conditions = &self.scenario.conditions;
+        let exposure_s = conditions.exposure_s;
+        let budget = self.light.budget();
+        let mut random = random(seed, Stream::Scene);
+        let angular_rate_rad_s = scene.angular_rate_rad_s(&mut random);
+        let turn_rad = angular_rate_rad_s * exposure_s;
+        let motion = Motion::new(&self.camera, turn_rad, conditions.motion_px);
+        let sky = Sky::new(&self.scenario, scene, &self.camera, &mut random);
+        let mut canvas = self.canvas();
+        sky.expose(&mut canvas, budget.background_e);
+        let background_e = mean(canvas.pixels()) + budget.dark_e;
+        let mut spot = Spot::new(sensor.imperfections.spot_form, sensor.spot_sigma_px);
+        let starlight = Starlight {
+            camera: &self.camera,
+            scene,
+            light: &self.light,
+            sky: &sky,
+        };
+        let reach_px = spot.reach_px() + motion.longest_px() / 2.0;
+        let stars = seen(&starlight, reach_px, &mut random);
+        for star in &stars {
+            motion.along(&star.position, spot.sigma_px(), |place, part| {
+                spot.add(&mut canvas, place, star.electrons * part);
+            });
+        }
+        let trails = strays::trails(scene, &self.camera, exposure_s, &mut random);
+        for trail in &trails {
+            self.draw_trail(trail, &sky, &mut canvas, &mut spot);
+        }
+        let cosmic_rays = strays::cosmic_rays(scene, sensor, &self.camera, exposure_s, &mut random);
+        let frame = self.read_out(canvas, &cosmic_rays, seed)?;
+        let on_frame = |star: &TrueStar| self.camera.contains(&star.position);
+        let (stars, beyond) = stars.into_iter().partition(on_frame);
+        let truth = Truth {
+            stars,
+            beyond,
+            trails,
+            cosmic_rays,
+            background_e,
+            angular_rate_rad_s,
+            motion_px: motion.of_centre_px(),
+        };
+        Ok((frame, truth))
+    }
+
+    fn draw_trail(&self, trail: &Trail, sky: &Sky, canvas: &mut Canvas, spot: &mut Spot) {
+        /// Spots so close, in standard deviations, are one even trail.
+        const STEP_SIGMAS: f64 = 0.25;
+        let electrons = self.light.electrons(self.scene.trail_vmag, None);
+        let steps = (trail.length_px() / (STEP_SIGMAS * spot.sigma_px()))
+            .ceil()
+            .max(1.0);
+        for step in 0..steps as usize {
+            let place = trail.at((step as f64 + 0.5) / steps);
+            let part_e = sky.transmission(&place) * electrons / steps;
+            spot.add(canvas, &place, part_e);
+        }
+    }
+
+    /// The frame of pixels in which so many electrons of light are expected.
+    fn read_out(
+        &self,
+        mut canvas: Canvas,
+        cosmic_rays: &[CosmicRay],
+        seed: u64,
+    ) -> Result<Frame, FrameError> {
+        let sensor = &self.scenario.sensor;
+        self.convert(canvas.pixels_mut());
+        let mut random = random(seed, Stream::Noise);
+        collect(canvas.pixels_mut(), self.even.as_ref(), &mut random);
+        for ray in cosmic_rays {
+            ray.along(|x, y, electrons| {
+                let on_frame =
+                    |at: i64, side: usize| usize::try_from(at).ok().filter(|at| *at < side);
+                if let Some((x, y)) = on_frame(x, canvas.width()).zip(on_frame(y, canvas.height()))
+                {
+                    canvas.row_mut(y)[x] += electrons;
+                }
+            });
+        }
+        let readout = Readout::of(sensor);
+        let pixels = readout.grey_levels(canvas.pixels_mut(), &self.pattern, &mut random);
+        let frame = Frame::new(sensor.width_px, sensor.height_px, pixels)?;
+        Ok(frame.with_levels(1.0, Some(sensor.saturation_adu() as f32)))
+    }
+
+    /// From light to charge: the pixels' response, and their dark current.
+    fn convert(&self, pixels: &mut [f64]) {
+        if let Some(response) = &self.pattern.response {
+            for (pixel, response) in pixels.iter_mut().zip(response) {
+                *pixel *= f64::from(*response);
+            }
+        }
+        let exposure_s = self.scenario.conditions.exposure_s;
+        match &self.pattern.dark_current_e_s {
+            Some(dark) => {
+                for (pixel, dark_e_s) in pixels.iter_mut().zip(dark) {
+                    *pixel += f64::from(*dark_e_s) * exposure_s;
+                }
+            }
+            None => {
+                let dark_e = self.light.budget().dark_e;
+                pixels.iter_mut().for_each(|pixel| *pixel += dark_e);
+            }
+        }
+    }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// A frame of stars at these places, of these V magnitudes, and nothing else.
+///
+/// # Errors
+/// As [`Simulator::new`].
+pub fn star_field(
+    scenario: &Scenario,
+    stars: &[(PixelPoint, f64)],
+    seed: u64,
+) -> Result<Frame, FrameError> {
+    let simulator = Simulator::new(scenario, &Scene::default(), &[])?;
+    Ok(simulator.star_field(stars, seed)?.0)
+}
+
+#[cfg(test)]
+mod tests;

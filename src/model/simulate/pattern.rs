@@ -1,0 +1,182 @@
+//! What differs from pixel to pixel, and is the same in every frame of a camera.
+
+use crate::camera::data_sheet::Sensor;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// The pattern of a detector; a part that does not vary is not there. Row-major.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Pattern {
+    /// Response to light, relative to its mean.
+    pub(super) response: Option<Vec<f32>>,
+    /// Dark current, in electrons a second.
+    pub(super) dark_current_e_s: Option<Vec<f32>>,
+    /// What the bias differs by, in grey levels.
+    pub(super) offset_adu: Option<Vec<f32>>,
+}
+
+/// Streams of random numbers: one part of a pattern does not depend on whether there is another.
+#[derive(Clone, Copy)]
+enum Stream {
+    Response,
+    Dead,
+    DarkCurrent,
+    Hot,
+    Offset,
+    Column,
+}
+
+impl Pattern {
+    pub(super) fn of(sensor: &Sensor) -> Self {
+        let made = &sensor.imperfections;
+        let has_response = made.response_sigma > 0.0 || made.dead_pixels_per_mpx > 0.0;
+        let has_dark = made.dark_current_sigma > 0.0 && sensor.dark_current_e_s > 0.0;
+        let has_hot = made.hot_pixels_per_mpx > 0.0 && made.hot_pixel_e_s > 0.0;
+        let has_offset = made.offset_sigma_adu > 0.0 || made.column_sigma_adu > 0.0;
+        Self {
+            response: has_response.then(|| response(sensor)),
+            dark_current_e_s: (has_dark || has_hot).then(|| dark_current(sensor)),
+            offset_adu: has_offset.then(|| offset(sensor)),
+        }
+    }
+}
+
+fn random(sensor: &Sensor, stream: Stream) -> ChaCha8Rng {
+    let mut random = ChaCha8Rng::seed_from_u64(sensor.imperfections.pattern_seed as u64);
+    random.set_stream(stream as u64);
+    random
+}
+
+fn normal(random: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(random)
+}
+
+fn pixels(sensor: &Sensor) -> usize {
+    sensor.width_px * sensor.height_px
+}
+
+/// Whether each pixel is one of so many in a million.
+fn chosen(sensor: &Sensor, per_mpx: f64, stream: Stream) -> impl Iterator<Item = bool> {
+    let mut random = random(sensor, stream);
+    std::iter::repeat_with(move || random.random::<f64>() * 1e6 < per_mpx)
+}
+
+fn response(sensor: &Sensor) -> Vec<f32> {
+    let made = &sensor.imperfections;
+    let mut random = random(sensor, Stream::Response);
+    let dead = chosen(sensor, made.dead_pixels_per_mpx, Stream::Dead);
+    dead.take(pixels(sensor))
+        .map(|is_dead| {
+            let response = (1.0 + made.response_sigma * normal(&mut random)).max(0.0);
+            if is_dead { 0.0 } else { response as f32 }
+        })
+        .collect()
+}
+
+fn dark_current(sensor: &Sensor) -> Vec<f32> {
+    let made = &sensor.imperfections;
+    let mut random_current = random(sensor, Stream::DarkCurrent);
+    let mut random_hot = random(sensor, Stream::Hot);
+    // Of a log-normal distribution of mean 1 and this standard deviation.
+    let log_variance = libm::log1p(made.dark_current_sigma.powi(2));
+    (0..pixels(sensor))
+        .map(|_| {
+            let spread = log_variance.sqrt() * normal(&mut random_current) - 0.5 * log_variance;
+            let current_e_s = sensor.dark_current_e_s * libm::exp(spread);
+            let is_hot = random_hot.random::<f64>() * 1e6 < made.hot_pixels_per_mpx;
+            let hot_e_s = if is_hot {
+                -made.hot_pixel_e_s * libm::log1p(-random_hot.random::<f64>())
+            } else {
+                0.0
+            };
+            (current_e_s + hot_e_s) as f32
+        })
+        .collect()
+}
+
+fn offset(sensor: &Sensor) -> Vec<f32> {
+    let made = &sensor.imperfections;
+    let mut random_column = random(sensor, Stream::Column);
+    let mut column = || made.column_sigma_adu * normal(&mut random_column);
+    let columns: Vec<f64> = (0..sensor.width_px).map(|_| column()).collect();
+    let mut random_pixel = random(sensor, Stream::Offset);
+    let mut offset = |i: usize| {
+        let own = made.offset_sigma_adu * normal(&mut random_pixel);
+        (columns[i % sensor.width_px] + own) as f32
+    };
+    (0..pixels(sensor)).map(&mut offset).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::data_sheet::Preset;
+
+    fn sensor() -> Sensor {
+        let mut sensor = Preset::NanosatTracker.sensor();
+        (sensor.width_px, sensor.height_px) = (500, 400);
+        sensor.dark_current_e_s = 20.0;
+        sensor
+    }
+
+    fn moments(values: &[f32]) -> (f64, f64) {
+        let count = values.len() as f64;
+        let mean = values.iter().map(|v| f64::from(*v)).sum::<f64>() / count;
+        let squares = values.iter().map(|v| (f64::from(*v) - mean).powi(2));
+        (mean, (squares.sum::<f64>() / count).sqrt())
+    }
+
+    #[test]
+    fn a_perfect_detector_has_none() {
+        let pattern = Pattern::of(&sensor());
+        assert!(pattern.response.is_none() && pattern.dark_current_e_s.is_none());
+        assert!(pattern.offset_adu.is_none());
+    }
+
+    #[test]
+    fn each_part_has_the_spread_that_is_asked_for() {
+        let mut sensor = sensor();
+        sensor.imperfections.response_sigma = 0.02;
+        sensor.imperfections.dark_current_sigma = 0.3;
+        sensor.imperfections.offset_sigma_adu = 2.0;
+        sensor.imperfections.column_sigma_adu = 1.0;
+        let pattern = Pattern::of(&sensor);
+        let (mean, sigma) = moments(&pattern.response.unwrap());
+        assert!(
+            (mean - 1.0).abs() < 3e-4 && (sigma - 0.02).abs() < 2e-4,
+            "{mean} {sigma}"
+        );
+        let (mean, sigma) = moments(&pattern.dark_current_e_s.unwrap());
+        assert!(
+            (mean - 20.0).abs() < 0.08 && (sigma - 6.0).abs() < 0.1,
+            "{mean} {sigma}"
+        );
+        let offset = pattern.offset_adu.unwrap();
+        let (_, sigma) = moments(&offset);
+        assert!((sigma - 5f64.sqrt()).abs() < 0.1, "{sigma}");
+        // A column's own part is common to its pixels.
+        let column: Vec<f32> = offset.iter().step_by(500).copied().collect();
+        assert!((moments(&column).1 - 2.0).abs() < 0.4);
+    }
+
+    #[test]
+    fn hot_and_dead_pixels_are_as_many_as_they_should_be() {
+        let mut sensor = sensor();
+        sensor.imperfections.hot_pixels_per_mpx = 5000.0;
+        sensor.imperfections.dead_pixels_per_mpx = 1000.0;
+        let pattern = Pattern::of(&sensor);
+        let dark = pattern.dark_current_e_s.unwrap();
+        let hot: Vec<f32> = dark.iter().copied().filter(|e| *e > 20.001).collect();
+        // 1000 and 200 in 0.2 million; five standard errors.
+        assert!((hot.len() as f64 - 1000.0).abs() < 160.0, "{}", hot.len());
+        assert!((moments(&hot).0 - 1020.0).abs() < 160.0);
+        let dead = pattern
+            .response
+            .unwrap()
+            .iter()
+            .filter(|r| **r == 0.0)
+            .count();
+        assert!((dead as f64 - 200.0).abs() < 71.0, "{dead}");
+    }
+}

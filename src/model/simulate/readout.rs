@@ -1,0 +1,154 @@
+//! From expected electrons to grey levels.
+
+use super::pattern::Pattern;
+use super::poisson::{PoissonTable, poisson};
+use crate::camera::data_sheet::Sensor;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Makes whole electrons of expected ones. `even` is the distribution of the mean that most pixels have.
+pub(super) fn collect(electrons: &mut [f64], even: Option<&PoissonTable>, random: &mut ChaCha8Rng) {
+    for pixel in electrons {
+        *pixel = match even {
+            Some(table) if table.mean() == *pixel => table.sample(random),
+            _ => poisson(*pixel, random),
+        };
+    }
+}
+
+/// What becomes of the charge in a pixel.
+#[derive(Debug, Clone)]
+pub(super) struct Readout {
+    width: usize,
+    full_well_e: f64,
+    read_noise_e: f64,
+    gain_e_per_adu: f64,
+    bias_adu: f64,
+    full_scale_adu: f64,
+    blooming: f64,
+}
+
+impl Readout {
+    pub(super) fn of(sensor: &Sensor) -> Self {
+        Self {
+            width: sensor.width_px,
+            full_well_e: sensor.full_well_e,
+            read_noise_e: sensor.read_noise_e,
+            gain_e_per_adu: sensor.gain_e_per_adu,
+            bias_adu: sensor.bias_adu,
+            full_scale_adu: sensor.full_scale_adu(),
+            blooming: sensor.imperfections.blooming,
+        }
+    }
+
+    /// The grey levels of pixels that have collected so many electrons.
+    pub(super) fn grey_levels(
+        &self,
+        collected_e: &mut [f64],
+        pattern: &Pattern,
+        random: &mut ChaCha8Rng,
+    ) -> Vec<f32> {
+        self.bloom(collected_e);
+        let mut level = |(i, &charge_e): (usize, &f64)| {
+            let noise: f64 = StandardNormal.sample(random);
+            let read_e = charge_e.min(self.full_well_e) + self.read_noise_e * noise;
+            let offset = pattern
+                .offset_adu
+                .as_ref()
+                .map_or(0.0, |offset| f64::from(offset[i]));
+            let level_adu = self.bias_adu + offset + read_e / self.gain_e_per_adu;
+            level_adu.round().clamp(0.0, self.full_scale_adu) as f32
+        };
+        collected_e.iter().enumerate().map(&mut level).collect()
+    }
+
+    /// Lets the charge of pixels that are more than full flow up and down their columns, to the pixels that have room.
+    fn bloom(&self, collected_e: &mut [f64]) {
+        if self.blooming == 0.0 {
+            return;
+        }
+        for at in 0..collected_e.len() {
+            let excess_e = (collected_e[at] - self.full_well_e) * self.blooming;
+            if excess_e > 0.0 {
+                collected_e[at] = self.full_well_e;
+                self.flow(collected_e, excess_e / 2.0, at, |at| {
+                    at.checked_sub(self.width)
+                });
+                self.flow(collected_e, excess_e / 2.0, at, |at| Some(at + self.width));
+            }
+        }
+    }
+
+    /// Puts `excess_e` into the pixels that `next` leads to, until it is used up or there are no more.
+    fn flow(
+        &self,
+        collected_e: &mut [f64],
+        mut excess_e: f64,
+        from: usize,
+        next: impl Fn(usize) -> Option<usize>,
+    ) {
+        let mut at = from;
+        while let Some(pixel) = next(at).and_then(|there| collected_e.get_mut(there)) {
+            let room_e = (self.full_well_e - *pixel).max(0.0);
+            *pixel += room_e.min(excess_e);
+            excess_e -= room_e;
+            if excess_e <= 0.0 {
+                return;
+            }
+            at = next(at).unwrap_or(at);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::data_sheet::Preset;
+    use rand::SeedableRng;
+
+    fn levels(sensor: &Sensor, electrons: &[f64]) -> (f32, Vec<f32>) {
+        let readout = Readout::of(sensor);
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut collected = electrons.to_vec();
+        let levels = readout.grey_levels(&mut collected, &Pattern::default(), &mut random);
+        (sensor.saturation_adu() as f32, levels)
+    }
+
+    #[test]
+    fn a_full_pixel_and_the_end_of_the_scale_saturate() {
+        let mut sensor = Preset::Experiment1.sensor();
+        let (saturation, full) = levels(&sensor, &[1e6; 10_000]);
+        let below = full.iter().filter(|level| **level < saturation).count();
+        assert!(below < 5 && saturation < 4095.0, "{below}");
+        sensor.full_well_e = 1e7;
+        let (saturation, clipped) = levels(&sensor, &[1e6; 10_000]);
+        assert_eq!(saturation, 4095.0);
+        assert!(clipped.iter().all(|level| *level == 4095.0));
+    }
+
+    #[test]
+    fn what_does_not_fit_flows_along_the_column_and_none_is_lost() {
+        let mut sensor = Preset::Experiment1.sensor();
+        (sensor.width_px, sensor.height_px) = (5, 9);
+        sensor.full_well_e = 100.0;
+        sensor.imperfections.blooming = 1.0;
+        let mut electrons = vec![10.0; 45];
+        electrons[4 * 5 + 2] = 400.0;
+        electrons[5 * 5 + 2] = 130.0;
+        let before: f64 = electrons.iter().sum();
+        Readout::of(&sensor).bloom(&mut electrons);
+        assert!((electrons.iter().sum::<f64>() - before).abs() < 1e-9);
+        let column: Vec<f64> = (0..9).map(|y| electrons[y * 5 + 2]).collect();
+        assert_eq!(column[4], 100.0);
+        assert!(
+            column.iter().all(|e| *e <= 100.0) && column[2] > 60.0,
+            "{column:?}"
+        );
+        assert!((0..45).filter(|i| i % 5 != 2).all(|i| electrons[i] == 10.0));
+        // A drain takes it.
+        sensor.imperfections.blooming = 0.0;
+        let mut drained = vec![400.0; 45];
+        Readout::of(&sensor).bloom(&mut drained);
+        assert!(drained.iter().all(|e| *e == 400.0));
+    }
+}

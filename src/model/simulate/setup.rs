@@ -1,0 +1,251 @@
+//! All numbers of a simulation by name.
+
+use super::camera_of;
+use super::scene::{SCENE_KEYS, Scene};
+use super::strays::mean_cosmic_rays;
+use crate::camera::data_sheet::{IMPERFECTION_KEYS, Key, Limits, Sensor};
+use crate::model::sensitivity::{
+    self, Budget, Scenario, ScenarioError, UnknownParameter, title_of,
+};
+
+/// What is simulated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setup {
+    /// Camera, sky and exposure.
+    pub scenario: Scenario,
+    /// What happens meanwhile.
+    pub scene: Scene,
+}
+
+/// The farthest a camera or a satellite may turn during an exposure, in degrees: beyond, its trail is no picture of anything.
+const MOST_TURN_DEG: f64 = 90.0;
+/// The most cosmic rays on a frame.
+const MOST_COSMIC_RAYS: f64 = 1e6;
+/// The steepest distortion, in pixels a pixel. At 1 the image folds; up to this it can be inverted within a few steps.
+const MOST_STEEPNESS: f64 = 0.6;
+
+impl Setup {
+    /// Checks the scenario, and that a frame of the scene can be made.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] with what makes no sense: a value out of its limits, a lens that folds its image, a turn beyond a quarter
+    /// of a circle, cosmic rays without number.
+    pub fn check(&self) -> Result<(), ScenarioError> {
+        Budget::checked(&self.scenario)?;
+        let faults = [self.folded_image(), self.far_turn(), self.many_rays()];
+        match faults.into_iter().flatten().next() {
+            Some(what) => Err(ScenarioError::Contradiction(what)),
+            None => Ok(()),
+        }
+    }
+
+    /// The displacements of r³ and of Conrady's second order are steepest at the corner: three times the one, twice the other.
+    fn folded_image(&self) -> Option<String> {
+        let made = &self.scenario.sensor.imperfections;
+        let decentring_px = made.decentring_x_px.hypot(made.decentring_y_px);
+        let found_px = 3.0 * made.distortion_px.abs() + 2.0 * decentring_px;
+        let most_px = MOST_STEEPNESS * camera_of(&self.scenario.sensor).radius_px();
+        (found_px > most_px).then(|| {
+            format!(
+                "the image folds: three times distortion_px and twice the decentring are {found_px} pixels, expected at most \
+                 {most_px:.1} on this detector"
+            )
+        })
+    }
+
+    fn far_turn(&self) -> Option<String> {
+        let exposure_s = self.scenario.conditions.exposure_s;
+        let camera_deg = self.scene.largest_rate_deg_s() * exposure_s;
+        let trail_deg = self.scene.trail_rate_deg_s * exposure_s;
+        let has_trails = self.scene.trails > 0.0;
+        let fault = |what: &str, found_deg: f64| {
+            format!(
+                "{what} turns by up to {found_deg}° during the exposure of {exposure_s} s, expected at most {MOST_TURN_DEG}°"
+            )
+        };
+        if camera_deg > MOST_TURN_DEG {
+            return Some(fault("the camera", camera_deg));
+        }
+        (has_trails && trail_deg > MOST_TURN_DEG).then(|| fault("a satellite", trail_deg))
+    }
+
+    fn many_rays(&self) -> Option<String> {
+        let Scenario {
+            sensor, conditions, ..
+        } = &self.scenario;
+        let mean = mean_cosmic_rays(&self.scene, sensor, conditions.exposure_s);
+        (mean > MOST_COSMIC_RAYS).then(|| {
+            format!("cosmic_rays_cm2_s leaves {mean} cosmic rays on a frame, expected at most {MOST_COSMIC_RAYS}")
+        })
+    }
+}
+
+/// A parameter of a [`Setup`].
+#[derive(Debug, Clone, Copy)]
+pub enum Parameter {
+    /// One on which the limit depends.
+    Scenario(sensitivity::Parameter),
+    /// An imperfection of the camera.
+    Imperfection(&'static Key<Sensor>),
+    /// One of the scene.
+    Scene(&'static Key<Scene>),
+}
+
+impl Parameter {
+    /// All of them.
+    pub fn all() -> impl Iterator<Item = Self> {
+        sensitivity::Parameter::all()
+            .map(Self::Scenario)
+            .chain(Self::beyond_scenario())
+    }
+
+    /// Those that are none of the scenario.
+    pub fn beyond_scenario() -> impl Iterator<Item = Self> {
+        let imperfections = IMPERFECTION_KEYS.iter().map(Self::Imperfection);
+        imperfections.chain(SCENE_KEYS.iter().map(Self::Scene))
+    }
+
+    /// The parameter called `name`.
+    ///
+    /// # Errors
+    /// [`UnknownParameter`] with the nearest name there is.
+    pub fn named(name: &str) -> Result<Self, UnknownParameter> {
+        let found = Self::all().find(|parameter| parameter.name() == name);
+        found.ok_or_else(|| UnknownParameter::among(name, Self::all().map(Self::name)))
+    }
+
+    /// What an axis of it is called.
+    pub fn title(self) -> String {
+        title_of(self.name())
+    }
+
+    /// Its name, which ends in its unit.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scenario(parameter) => parameter.name(),
+            Self::Imperfection(key) => key.name,
+            Self::Scene(key) => key.name,
+        }
+    }
+
+    /// What it is, in a line.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Scenario(parameter) => parameter.about(),
+            Self::Imperfection(key) => key.about,
+            Self::Scene(key) => key.about,
+        }
+    }
+
+    /// What values make sense.
+    pub fn limits(self) -> Limits {
+        match self {
+            Self::Scenario(parameter) => parameter.limits(),
+            Self::Imperfection(key) => key.limits,
+            Self::Scene(key) => key.limits,
+        }
+    }
+
+    /// Its value, where it has one.
+    pub fn get(self, setup: &Setup) -> Option<f64> {
+        match self {
+            Self::Scenario(parameter) => parameter.get(&setup.scenario),
+            Self::Imperfection(key) => (key.get)(&setup.scenario.sensor),
+            Self::Scene(key) => (key.get)(&setup.scene),
+        }
+    }
+
+    /// Gives it a value within the limits.
+    pub fn set(self, setup: &mut Setup, value: f64) {
+        match self {
+            Self::Scenario(parameter) => parameter.set(&mut setup.scenario, value),
+            Self::Imperfection(key) => (key.set)(&mut setup.scenario.sensor, value),
+            Self::Scene(key) => (key.set)(&mut setup.scene, value),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::data_sheet::Preset;
+
+    #[test]
+    fn what_no_frame_can_be_made_of_is_refused() {
+        let refused = |change: fn(&mut Setup)| {
+            let mut setup = Setup {
+                scenario: Scenario::of(Preset::NanosatTracker),
+                scene: Scene::default(),
+            };
+            assert_eq!(setup.check(), Ok(()));
+            change(&mut setup);
+            setup.check().map_err(|error| error.to_string())
+        };
+        let says = |change, what: &str| {
+            let message = refused(change).unwrap_err();
+            assert!(message.contains(what), "{message}");
+        };
+        says(|s| s.scene.rate_x_deg_s = 1000.0, "turns by up to 100°");
+        says(|s| s.scene.tumble_deg_s = -1000.0, "turns by up to 100°");
+        says(|s| s.scene.swing_deg = 180.0 * 1e9, "the camera turns");
+        says(
+            |s| (s.scene.trails, s.scene.trail_rate_deg_s) = (1.0, 1e12),
+            "a satellite turns",
+        );
+        assert_eq!(refused(|s| s.scene.trail_rate_deg_s = 1e12), Ok(()));
+        says(|s| s.scene.cosmic_rays_cm2_s = 1e9, "cosmic rays");
+        let sensor = |s: &mut Setup, px| s.scenario.sensor.imperfections.distortion_px = px;
+        // Half the diagonal is 1620 px: 324 px are the most.
+        says(
+            |s| s.scenario.sensor.imperfections.distortion_px = -325.0,
+            "folds",
+        );
+        says(
+            |s| s.scenario.sensor.imperfections.decentring_y_px = 487.0,
+            "folds",
+        );
+        let mut most = Setup {
+            scenario: Scenario::of(Preset::NanosatTracker),
+            scene: Scene::default(),
+        };
+        for px in [-323.0, 323.0] {
+            sensor(&mut most, px);
+            assert_eq!(most.check(), Ok(()));
+            // All of the image can be found.
+            let camera = camera_of(&most.scenario.sensor);
+            for i in 0..2592 {
+                let there =
+                    crate::base::coords::PixelPoint::new(f64::from(i), 1943.0 - f64::from(i) * 0.7);
+                let back = camera.pixel_of(&camera.direction_of(&there)).unwrap();
+                assert!(back.distance_to(&there) < 1e-4, "{there:?} {back:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_parameter_takes_the_value_that_it_has_and_no_two_have_one_name() {
+        let mut setup = Setup {
+            scenario: Scenario::of(Preset::Experiment2),
+            scene: Scene::default(),
+        };
+        let mut names = Vec::new();
+        for parameter in Parameter::all() {
+            names.push(parameter.name());
+            let Some(value) = parameter.get(&setup) else {
+                continue;
+            };
+            assert!(parameter.limits().accept(value), "{}", parameter.name());
+            parameter.set(&mut setup, value);
+            let again = parameter.get(&setup).unwrap();
+            assert!(
+                (again - value).abs() <= 1e-9 * value.abs(),
+                "{}",
+                parameter.name()
+            );
+        }
+        let count = names.len();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), count);
+    }
+}

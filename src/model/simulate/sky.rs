@@ -1,0 +1,382 @@
+//! The light of the sky in each pixel, and what clouds leave of the stars'.
+
+use super::canvas::Canvas;
+use super::scene::Scene;
+use crate::base::coords::{Camera, PixelPoint, UnitVector};
+use crate::camera::CameraModel;
+use crate::model::sensitivity::{REFERENCE_NM, Scenario};
+use crate::sky::observer::airmass::airmass_krisciunas_schaefer;
+use nalgebra::Vector3;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+/// Moonlight is reckoned at points so many pixels apart, clouds at points so many times nearer than their size, but no farther;
+/// between them both are interpolated.
+const GRID_PX: usize = 16;
+const GRIDS_IN_A_CLOUD: f64 = 32.0;
+/// Waves of which clouds are made up.
+const WAVES: usize = 16;
+
+/// The sky of one frame, relative to the even one of the scenario.
+pub(super) struct Sky<'a> {
+    camera: &'a CameraModel,
+    vignetting: f64,
+    /// Change of the brightness for a pixel along x and along y.
+    slope: [f64; 2],
+    clouds: Option<Clouds>,
+    moonlight: Option<Moonlight>,
+}
+
+impl<'a> Sky<'a> {
+    pub(super) fn new(
+        scenario: &Scenario,
+        scene: &Scene,
+        camera: &'a CameraModel,
+        random: &mut ChaCha8Rng,
+    ) -> Self {
+        let (sin, cos) = libm::sincos(scene.sky_gradient_deg.to_radians());
+        // The border in that direction is where the gradient is reached.
+        let [half_x, half_y] = [camera.width_px / 2.0, camera.height_px / 2.0];
+        let to_border_px = half_x * sin.abs() + half_y * cos.abs();
+        let steepness = scene.sky_gradient / to_border_px;
+        // The random numbers are drawn whether they are needed or not: what follows does not depend on it.
+        let clouds = Clouds::new(scene, random);
+        Self {
+            camera,
+            vignetting: scenario.sensor.imperfections.vignetting,
+            slope: [steepness * sin, -steepness * cos],
+            clouds: (scene.cloud_mag > 0.0 || scene.cloud_light > 0.0).then_some(clouds),
+            moonlight: Moonlight::new(scenario, scene, camera),
+        }
+    }
+
+    /// The part of a star's light that clouds and lens leave at `place`.
+    pub(super) fn transmission(&self, place: &PixelPoint) -> f64 {
+        let clouds = self
+            .clouds
+            .as_ref()
+            .map_or(1.0, |clouds| clouds.transmission(place));
+        clouds * self.lens(place)
+    }
+
+    /// Fills `canvas` with `sky_e` electrons, as they are distributed.
+    pub(super) fn expose(&self, canvas: &mut Canvas, sky_e: f64) {
+        let is_even = self.vignetting == 0.0 && self.slope == [0.0; 2];
+        if is_even && self.clouds.is_none() && self.moonlight.is_none() {
+            return canvas.pixels_mut().fill(sky_e);
+        }
+        let moon = self
+            .moonlight
+            .as_ref()
+            .map(|moon| Grid::of(canvas, GRID_PX, |place| moon.at(self.camera, place)));
+        let clouds = self.clouds.as_ref().filter(|clouds| clouds.light > 0.0);
+        let clouds = clouds.map(|clouds| {
+            let grid = Grid::of(canvas, clouds.grid_px(), |place| clouds.height(place));
+            (clouds.light, grid)
+        });
+        let centre = self.camera.centre();
+        for (y, row) in canvas.rows_mut() {
+            let gradient_y = 1.0 + self.slope[1] * (y as f64 - centre.y);
+            for (x, pixel) in row.iter_mut().enumerate() {
+                let place = PixelPoint::new(x as f64, y as f64);
+                let gradient = gradient_y + self.slope[0] * (place.x - centre.x);
+                let moon = moon.as_ref().map_or(0.0, |grid| grid.at(x, y));
+                let cloud = clouds.as_ref().map_or(0.0, |(light, grid)| {
+                    light * Clouds::thickness_of(grid.at(x, y))
+                });
+                let sky = gradient.max(0.0) * (1.0 + moon + cloud);
+                *pixel = sky_e * sky * self.lens(&place);
+            }
+        }
+    }
+
+    /// What the lens lets through, relative to the centre.
+    fn lens(&self, place: &PixelPoint) -> f64 {
+        let [u, v] = self.camera.offset_of(place);
+        let radius_px = self.camera.radius_px();
+        (1.0 - self.vignetting * (u * u + v * v) / (radius_px * radius_px)).max(0.0)
+    }
+}
+
+/// Values at points of the frame, and between them.
+struct Grid {
+    step_px: usize,
+    columns: usize,
+    values: Vec<f64>,
+}
+
+impl Grid {
+    fn of(canvas: &Canvas, step_px: usize, value: impl Fn(&PixelPoint) -> f64) -> Self {
+        let [columns, rows] = [canvas.width(), canvas.height()].map(|side| side / step_px + 2);
+        let places = (0..columns * rows).map(|i| {
+            let at = |step: usize| (step * step_px) as f64;
+            PixelPoint::new(at(i % columns), at(i / columns))
+        });
+        Self {
+            step_px,
+            columns,
+            values: places.map(|place| value(&place)).collect(),
+        }
+    }
+
+    fn at(&self, x: usize, y: usize) -> f64 {
+        let step = self.step_px;
+        let part = |i: usize| (i % step) as f64 / step as f64;
+        let first = y / step * self.columns + x / step;
+        let along = |at: usize| self.values[at] + part(x) * (self.values[at + 1] - self.values[at]);
+        let (above, below) = (along(first), along(first + self.columns));
+        above + part(y) * (below - above)
+    }
+}
+
+/// Clouds: a random field made up of waves.
+struct Clouds {
+    extinction_mag: f64,
+    /// How much the thickest adds to the clear sky.
+    light: f64,
+    size_px: f64,
+    /// Wave number along x and y in 1/px, and phase.
+    waves: [[f64; 3]; WAVES],
+}
+
+impl Clouds {
+    fn new(scene: &Scene, random: &mut ChaCha8Rng) -> Self {
+        let mut wave = || {
+            let angle = random.random_range(0.0..std::f64::consts::TAU);
+            let length_px = scene.cloud_size_px * random.random_range(1.0..3.0);
+            let number = std::f64::consts::TAU / length_px;
+            let phase = random.random_range(0.0..std::f64::consts::TAU);
+            let (sin, cos) = libm::sincos(angle);
+            [number * cos, number * sin, phase]
+        };
+        Self {
+            extinction_mag: scene.cloud_mag,
+            light: scene.cloud_light,
+            size_px: scene.cloud_size_px,
+            waves: std::array::from_fn(|_| wave()),
+        }
+    }
+
+    /// How far points may be apart between which their height is interpolated.
+    fn grid_px(&self) -> usize {
+        ((self.size_px / GRIDS_IN_A_CLOUD) as usize).clamp(1, GRID_PX)
+    }
+
+    /// The field: a cloud is where it is above 0.
+    fn height(&self, place: &PixelPoint) -> f64 {
+        let wave = |[a, b, phase]: [f64; 3]| libm::cos(a * place.x + b * place.y + phase);
+        let sum: f64 = self.waves.map(wave).iter().sum();
+        // A sum of so many cosines has a variance of half their number: half of the sky is free, a sixth all covered.
+        sum / (WAVES as f64 / 2.0).sqrt()
+    }
+
+    /// From 0 where there is none to 1 where it is thickest.
+    fn thickness_of(height: f64) -> f64 {
+        height.clamp(0.0, 1.0)
+    }
+
+    fn transmission(&self, place: &PixelPoint) -> f64 {
+        libm::pow(
+            10.0,
+            -0.4 * self.extinction_mag * Self::thickness_of(self.height(place)),
+        )
+    }
+}
+
+/// Moonlight scattered by the air.
+struct Moonlight {
+    /// In camera axes.
+    direction: UnitVector<Camera>,
+    /// Its brightness for a scattering function of 1, relative to the sky's own.
+    strength: f64,
+}
+
+impl Moonlight {
+    /// # Reference
+    /// Krisciunas & Schaefer 1991, PASP 103, 1033, eqs. (3), (15), (20), (21); brightness in nanolamberts by their eq. (1). Extinction
+    /// is that of the scenario at 555 nm, and the air the same all over the frame.
+    fn new(scenario: &Scenario, scene: &Scene, camera: &CameraModel) -> Option<Self> {
+        let distance_rad = scene.moon_distance_deg?.to_radians();
+        let (sin_way, cos_way) = libm::sincos(scene.moon_direction_deg.to_radians());
+        // The direction is that in the image, which a mirror reverses.
+        let sin_way = if camera.mirrored { -sin_way } else { sin_way };
+        let (sin, cos) = libm::sincos(distance_rad);
+        let conditions = &scenario.conditions;
+        let transmission = conditions.extinction.zenith_transmission(REFERENCE_NM);
+        let through = |zenith_distance_deg: f64| {
+            let airmass = airmass_krisciunas_schaefer(zenith_distance_deg.to_radians());
+            libm::pow(transmission, airmass)
+        };
+        let phase = scene.moon_phase_deg;
+        let moon_mag = 3.84 + 0.026 * phase + 4e-9 * phase.powi(4);
+        let moon = libm::pow(10.0, -0.4 * moon_mag) * through(scene.moon_zenith_distance_deg);
+        let scattered = moon * (1.0 - through(conditions.zenith_distance_deg));
+        let sky = 34.08 * libm::exp(20.7233 - 0.92104 * conditions.sky.mag_arcsec2());
+        Some(Self {
+            direction: UnitVector::from_unit(Vector3::new(sin * sin_way, -sin * cos_way, cos)),
+            strength: scattered / sky,
+        })
+    }
+
+    /// Its brightness at `place`, relative to the sky's own.
+    fn at(&self, camera: &CameraModel, place: &PixelPoint) -> f64 {
+        let angle_rad = camera.direction_of(place).angle_to(&self.direction);
+        let cosine = libm::cos(angle_rad);
+        let rayleigh = libm::pow(10.0, 5.36) * (1.06 + cosine * cosine);
+        let mie = libm::pow(10.0, 6.15 - angle_rad.to_degrees() / 40.0);
+        self.strength * (rayleigh + mie)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::data_sheet::Preset;
+    use crate::model::sensitivity::{Extinction, SkyBrightness};
+    use rand::SeedableRng;
+
+    fn camera() -> CameraModel {
+        CameraModel::pinhole(400.0, 300.0, 1000.0, false)
+    }
+
+    fn sky(scenario: &Scenario, scene: &Scene) -> Vec<f64> {
+        let camera = camera();
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut canvas = Canvas::new(400, 300, 0.0);
+        Sky::new(scenario, scene, &camera, &mut random).expose(&mut canvas, 100.0);
+        canvas.into_pixels()
+    }
+
+    #[test]
+    fn a_gradient_is_reached_at_the_border_it_points_to() {
+        let scenario = Scenario::of(Preset::NanosatTracker);
+        let scene = Scene {
+            sky_gradient: 0.5,
+            ..Scene::default()
+        };
+        let pixels = sky(&scenario, &scene);
+        // Up: half of a pixel's step is missing at the first row.
+        assert!((pixels[200] - 150.0).abs() < 0.5 && (pixels[299 * 400] - 50.0).abs() < 0.5);
+        let right = Scene {
+            sky_gradient_deg: 90.0,
+            ..scene
+        };
+        let pixels = sky(&scenario, &right);
+        assert!((pixels[399] - 150.0).abs() < 0.5 && (pixels[150 * 400] - 50.0).abs() < 0.5);
+    }
+
+    #[test]
+    fn corners_lose_the_light_that_vignetting_says() {
+        let mut scenario = Scenario::of(Preset::NanosatTracker);
+        scenario.sensor.imperfections.vignetting = 0.4;
+        let pixels = sky(&scenario, &Scene::default());
+        assert!((pixels[0] - 60.0).abs() < 0.4, "{}", pixels[0]);
+        assert!((pixels[150 * 400 + 200] - 100.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_full_moon_is_as_bright_as_the_formula_says() {
+        let mut scenario = Scenario::of(Preset::NanosatTracker);
+        scenario.conditions.sky = SkyBrightness::MagArcsec2(21.587);
+        scenario.conditions.extinction = Extinction::MagPerAirmass(0.172);
+        scenario.conditions.zenith_distance_deg = 0.0;
+        let scene = Scene {
+            moon_distance_deg: Some(60.0),
+            moon_zenith_distance_deg: 60.0,
+            ..Scene::default()
+        };
+        let pixels = sky(&scenario, &scene);
+        let change_mag = -2.5 * (pixels[150 * 400 + 200] / 100.0).log10();
+        // f(60°) = 10^5.36 (1.06 + 0.25) + 10^(6.15 − 1.5) = 300107 + 44668 = 344775; I* = 10^(−1.536) = 0.029107;
+        // X(60°) = (1 − 0.96 · 0.75)^−½ = 1.88982: 10^(−0.4 · 0.172 · 1.88982) = 0.74127; 1 − 10^(−0.0688) = 0.14649;
+        // B = 1089.8 nL; B0 = 34.08 exp(20.7233 − 0.92104 · 21.587) = 79.0 nL: −2.5 log10(1 + 13.795) = −2.925.
+        assert!((change_mag + 2.925).abs() < 0.01, "{change_mag}");
+        // It brightens towards the Moon, which is up.
+        assert!(pixels[200] > pixels[299 * 400 + 200]);
+    }
+
+    #[test]
+    fn the_moon_is_where_it_is_in_the_image_in_a_mirror_as_well() {
+        let scenario = Scenario::of(Preset::NanosatTracker);
+        let scene = Scene {
+            moon_distance_deg: Some(40.0),
+            moon_direction_deg: 90.0,
+            ..Scene::default()
+        };
+        for mirrored in [false, true] {
+            let camera = CameraModel::pinhole(400.0, 300.0, 1000.0, mirrored);
+            let mut canvas = Canvas::new(400, 300, 0.0);
+            let mut random = ChaCha8Rng::seed_from_u64(1);
+            Sky::new(&scenario, &scene, &camera, &mut random).expose(&mut canvas, 100.0);
+            let row = canvas.row_mut(150);
+            assert!(row[399] > 1.05 * row[0], "{} {}", row[0], row[399]);
+        }
+    }
+
+    #[test]
+    fn small_clouds_light_the_sky_where_they_dim_the_stars() {
+        let scenario = Scenario::of(Preset::NanosatTracker);
+        let camera = camera();
+        for cloud_size_px in [3.0, 20.0, 150.0, 1000.0] {
+            let scene = Scene {
+                cloud_mag: 1.0,
+                cloud_light: 1.0,
+                cloud_size_px,
+                ..Scene::default()
+            };
+            let mut random = ChaCha8Rng::seed_from_u64(2);
+            let sky = Sky::new(&scenario, &scene, &camera, &mut random);
+            let mut canvas = Canvas::new(400, 300, 0.0);
+            sky.expose(&mut canvas, 1.0);
+            let off = |i: usize| {
+                let place = PixelPoint::new((i % 400) as f64, (i / 400) as f64);
+                let thickness = -2.5 * sky.transmission(&place).log10();
+                (canvas.pixels()[i] - 1.0 - thickness).abs()
+            };
+            let most = (0..120_000).step_by(7).map(off).fold(0.0, f64::max);
+            assert!(most < 0.01, "{cloud_size_px}: {most}");
+        }
+    }
+
+    #[test]
+    fn in_space_the_moon_lights_no_sky() {
+        let mut scenario = Scenario::of(Preset::NanosatTracker);
+        scenario.conditions.extinction = Extinction::MagPerAirmass(0.0);
+        let scene = Scene {
+            moon_distance_deg: Some(30.0),
+            ..Scene::default()
+        };
+        assert!(
+            sky(&scenario, &scene)
+                .iter()
+                .all(|e| (e - 100.0).abs() < 1e-9)
+        );
+    }
+
+    #[test]
+    fn clouds_take_light_of_stars_and_add_their_own() {
+        let scenario = Scenario::of(Preset::NanosatTracker);
+        let scene = Scene {
+            cloud_mag: 2.0,
+            cloud_size_px: 60.0,
+            cloud_light: 1.0,
+            ..Scene::default()
+        };
+        let camera = camera();
+        let sky = Sky::new(
+            &scenario,
+            &scene,
+            &camera,
+            &mut ChaCha8Rng::seed_from_u64(1),
+        );
+        let places = (0..300).map(|i| PixelPoint::new(f64::from(i), f64::from(i)));
+        let left: Vec<f64> = places.map(|place| sky.transmission(&place)).collect();
+        let least = left.iter().copied().fold(1.0, f64::min);
+        assert!((least - 10f64.powf(-0.8)).abs() < 0.05, "{least}");
+        assert!(left.contains(&1.0));
+        let mut canvas = Canvas::new(400, 300, 0.0);
+        sky.expose(&mut canvas, 100.0);
+        let most = canvas.pixels().iter().copied().fold(0.0, f64::max);
+        assert!((most - 200.0).abs() < 2.0, "{most}");
+    }
+}

@@ -1,0 +1,109 @@
+//! The stars on a frame: where they stand and how bright they are.
+
+use super::scene::Scene;
+use super::sky::Sky;
+use super::strays::place;
+use super::truth::TrueStar;
+use super::{Pointing, poisson::poisson};
+use crate::base::coords::UnitVector;
+use crate::camera::CameraModel;
+use crate::model::sensitivity::StarLight;
+use crate::sky::catalog::Star;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::f64::consts::PI;
+
+/// How far a star may move between J2000.0 and any date that is asked for: Barnard's Star in 200 years.
+const PROPER_MOTION_ROOM_RAD: f64 = 0.01;
+
+/// What stars are drawn with.
+pub(super) struct Starlight<'a> {
+    pub(super) camera: &'a CameraModel,
+    pub(super) scene: &'a Scene,
+    pub(super) light: &'a StarLight,
+    pub(super) sky: &'a Sky<'a>,
+}
+
+impl Starlight<'_> {
+    /// The catalogue's stars whose light falls on the frame, and false ones after them.
+    pub(super) fn on_frame(
+        &self,
+        pointing: &Pointing,
+        stars: &[Star],
+        reach_px: f64,
+        random: &mut ChaCha8Rng,
+    ) -> Vec<TrueStar> {
+        let mut all = self.of_catalog(pointing, stars, reach_px, random);
+        all.extend(self.false_ones(random));
+        for (number, star) in all.iter_mut().enumerate() {
+            star.number = number;
+        }
+        all
+    }
+
+    fn of_catalog(
+        &self,
+        pointing: &Pointing,
+        stars: &[Star],
+        reach_px: f64,
+        random: &mut ChaCha8Rng,
+    ) -> Vec<TrueStar> {
+        let boresight = pointing
+            .icrs_to_camera
+            .inverse()
+            .apply(&UnitVector::BORESIGHT);
+        // Room for the light that reaches in from outside, and for a star's own motion.
+        let margin_rad = 2.0 * reach_px / self.camera.focal_length_px + PROPER_MOTION_ROOM_RAD;
+        let least_cosine = libm::cos((self.camera.radius_rad() + margin_rad).min(PI));
+        let is_near = |star: &Star| star.direction.dot(&boresight) > least_cosine;
+        let near = stars.iter().enumerate().filter(|(_, star)| is_near(star));
+        near.filter_map(|(catalog, star)| {
+            let direction = star.direction_at(pointing.years_since_j2000);
+            let direction = pointing.icrs_to_camera.apply(&direction);
+            let position = self.camera.pixel_of(&direction)?;
+            if !self.camera.nearly_contains(&position, reach_px) {
+                return None;
+            }
+            let is_missing = random.random::<f64>() < self.scene.missing;
+            let deviate: f64 = StandardNormal.sample(random);
+            let v_mag = f64::from(star.v_mag) + self.scene.vmag_sigma * deviate;
+            let is_too_faint = self
+                .scene
+                .faintest_vmag
+                .is_some_and(|faintest| v_mag > faintest);
+            let bv_mag = star.bv_mag.map(f64::from);
+            let electrons = self.light.electrons(v_mag, bv_mag) * self.sky.transmission(&position);
+            (!is_missing && !is_too_faint).then_some(TrueStar {
+                number: 0,
+                catalog: Some(catalog),
+                position,
+                v_mag,
+                electrons,
+            })
+        })
+        .collect()
+    }
+
+    /// Stars of no catalogue, anywhere, as many of each magnitude as there are in the sky.
+    fn false_ones(&self, random: &mut ChaCha8Rng) -> Vec<TrueStar> {
+        /// Star counts grow by this power of ten with each magnitude.
+        const COUNTS: f64 = 0.5;
+        let limit = self.light.budget().limit_vmag;
+        let faintest = self.scene.false_star_vmag.unwrap_or(limit);
+        let count = poisson(self.scene.false_stars, random) as usize;
+        let mut star = |_| {
+            let position = place(self.camera, random);
+            let brighter = libm::log10(1.0 - random.random::<f64>()) / COUNTS;
+            let v_mag = faintest + brighter;
+            TrueStar {
+                number: 0,
+                catalog: None,
+                position,
+                v_mag,
+                electrons: self.light.electrons(v_mag, None) * self.sky.transmission(&position),
+            }
+        };
+        (0..count).map(&mut star).collect()
+    }
+}

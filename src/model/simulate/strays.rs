@@ -1,0 +1,184 @@
+//! Light and charge that comes from no star: trails of satellites, and cosmic rays.
+
+use super::poisson::poisson;
+use super::scene::Scene;
+use crate::base::coords::PixelPoint;
+use crate::camera::CameraModel;
+use crate::camera::data_sheet::Sensor;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::f64::consts::TAU;
+
+/// The longest way of a particle, in depths of the layer: that of one almost in its plane.
+const LONGEST_WAY: f64 = 100.0;
+/// Standard deviation of the logarithm of what a particle leaves on a micrometre.
+const CHARGE_SPREAD: f64 = 0.3;
+/// A way is followed in steps of this, in pixels.
+const STEP_PX: f64 = 0.25;
+
+/// The trail of a satellite.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trail {
+    /// Where it begins.
+    pub from: PixelPoint,
+    /// Where it ends.
+    pub to: PixelPoint,
+}
+
+impl Trail {
+    /// Its length, in pixels.
+    pub fn length_px(&self) -> f64 {
+        self.from.distance_to(&self.to)
+    }
+
+    /// The point at this part of its length.
+    pub fn at(&self, part: f64) -> PixelPoint {
+        let along = |from: f64, to: f64| from + part * (to - from);
+        PixelPoint::new(along(self.from.x, self.to.x), along(self.from.y, self.to.y))
+    }
+}
+
+/// The trails on a frame: each through a place on it that it has in the middle of the exposure.
+pub(super) fn trails(
+    scene: &Scene,
+    camera: &CameraModel,
+    exposure_s: f64,
+    random: &mut ChaCha8Rng,
+) -> Vec<Trail> {
+    let length_px = camera.focal_length_px * (scene.trail_rate_deg_s * exposure_s).to_radians();
+    let count = poisson(scene.trails, random) as usize;
+    let mut trail = |_| {
+        let middle = place(camera, random);
+        let (sin, cos) = libm::sincos(random.random_range(0.0..TAU));
+        let end = |part: f64| {
+            PixelPoint::new(
+                middle.x + part * length_px * cos,
+                middle.y + part * length_px * sin,
+            )
+        };
+        Trail {
+            from: end(-0.5),
+            to: end(0.5),
+        }
+    };
+    (0..count).map(&mut trail).collect()
+}
+
+/// A place anywhere on the frame.
+pub(super) fn place(camera: &CameraModel, random: &mut ChaCha8Rng) -> PixelPoint {
+    let mut along = |side: f64| random.random_range(-0.5..side - 0.5);
+    PixelPoint::new(along(camera.width_px), along(camera.height_px))
+}
+
+/// The way of a cosmic ray through the detector.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CosmicRay {
+    /// Where it enters.
+    pub from: PixelPoint,
+    /// Where it leaves.
+    pub to: PixelPoint,
+    /// The charge on its way.
+    pub electrons: f64,
+}
+
+/// How many cosmic rays hit the detector during an exposure, on average.
+pub(super) fn mean_cosmic_rays(scene: &Scene, sensor: &Sensor, exposure_s: f64) -> f64 {
+    const CM2_PER_UM2: f64 = 1e-8;
+    let pixels = sensor.width_px as f64 * sensor.height_px as f64;
+    let area_cm2 = pixels * sensor.pitch_x_um * sensor.pitch_y_um * CM2_PER_UM2;
+    scene.cosmic_rays_cm2_s * area_cm2 * exposure_s
+}
+
+/// The cosmic rays that hit the detector during an exposure, from all directions of a half space.
+pub(super) fn cosmic_rays(
+    scene: &Scene,
+    sensor: &Sensor,
+    camera: &CameraModel,
+    exposure_s: f64,
+    random: &mut ChaCha8Rng,
+) -> Vec<CosmicRay> {
+    let mean = mean_cosmic_rays(scene, sensor, exposure_s);
+    let count = poisson(mean, random) as usize;
+    let depth_um = sensor.imperfections.depth_um;
+    let mut ray = |_| {
+        let from = place(camera, random);
+        // As many cross the plane under an angle as see it: the square of the cosine is even.
+        let cosine: f64 = random.random::<f64>().sqrt();
+        let way_um = depth_um * (1.0 / cosine).min(LONGEST_WAY);
+        let along_um = (way_um * way_um - depth_um * depth_um).max(0.0).sqrt();
+        let (sin, cos) = libm::sincos(random.random_range(0.0..TAU));
+        let deviate: f64 = StandardNormal.sample(random);
+        let spread = libm::exp(CHARGE_SPREAD * deviate - 0.5 * CHARGE_SPREAD * CHARGE_SPREAD);
+        CosmicRay {
+            from,
+            to: PixelPoint::new(
+                from.x + along_um * cos / sensor.pitch_x_um,
+                from.y + along_um * sin / sensor.pitch_y_um,
+            ),
+            electrons: (scene.cosmic_ray_e_um * way_um * spread).round(),
+        }
+    };
+    (0..count).map(&mut ray).collect()
+}
+
+impl CosmicRay {
+    /// Calls `put` with the column and row of pixels on its way, in steps, and the charge of each step.
+    pub(super) fn along(&self, mut put: impl FnMut(i64, i64, f64)) {
+        let trail = Trail {
+            from: self.from,
+            to: self.to,
+        };
+        let steps = (trail.length_px() / STEP_PX).ceil().max(1.0);
+        for step in 0..steps as usize {
+            let point = trail.at((step as f64 + 0.5) / steps);
+            put(
+                point.x.round() as i64,
+                point.y.round() as i64,
+                self.electrons / steps,
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::data_sheet::Preset;
+    use crate::model::simulate::camera_of;
+    use rand::SeedableRng;
+
+    #[test]
+    fn as_many_rays_hit_as_the_rate_says_and_leave_their_charge() {
+        let sensor = Preset::Imx174.sensor();
+        let camera = camera_of(&sensor);
+        let scene = Scene {
+            cosmic_rays_cm2_s: 100.0,
+            ..Scene::default()
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(2);
+        let rays = cosmic_rays(&scene, &sensor, &camera, 10.0, &mut random);
+        // 1936 · 1216 pixels of 5.86 µm: 0.808 cm², 808 rays; five standard errors.
+        assert!((rays.len() as f64 - 808.0).abs() < 143.0, "{}", rays.len());
+        let mean_e = rays.iter().map(|ray| ray.electrons).sum::<f64>() / rays.len() as f64;
+        // The mean of 1/cos is 2, over a layer of 10 µm: 1600 electrons; its spread is wide.
+        assert!((1400.0..1900.0).contains(&mean_e), "{mean_e}");
+        let mut sum = 0.0;
+        rays[0].along(|_, _, electrons| sum += electrons);
+        assert!((sum - rays[0].electrons).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_trail_is_as_long_as_the_satellite_moves() {
+        let sensor = Preset::Imx174.sensor();
+        let camera = camera_of(&sensor);
+        let scene = Scene {
+            trails: 5.0,
+            ..Scene::default()
+        };
+        let trails = trails(&scene, &camera, 0.2, &mut ChaCha8Rng::seed_from_u64(3));
+        assert!((1..15).contains(&trails.len()));
+        // 0.1° at 35 mm and 5.86 µm: 10.4 px.
+        assert!(trails.iter().all(|t| (t.length_px() - 10.42).abs() < 0.01));
+    }
+}

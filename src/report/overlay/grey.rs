@@ -1,0 +1,238 @@
+//! The frame's levels as greys.
+
+use super::scaled;
+use crate::base::coords::PixelPoint;
+use crate::detect::BackgroundMap;
+use crate::frame::Frame;
+use crate::pipeline::Background;
+
+/// Frames with a longer side below this are enlarged, by the smallest whole factor that brings it there.
+const ENLARGE_BELOW_PX: usize = 800;
+/// Frames with a longer side above this are reduced, by the smallest whole factor that brings it below.
+const REDUCE_ABOVE_PX: usize = 2500;
+/// Letters and strokes grow with pictures that have a longer side above this.
+const LARGE_PICTURE_PX: f32 = 1300.0;
+
+/// Cells of the background across the longer side: wide enough to leave the glow round bright stars.
+const CELLS: usize = 16;
+const MIN_CELL_PX: usize = 64;
+
+/// Black is so many standard deviations of the noise below the background.
+const BLACK_SIGMA: f32 = 1.5;
+/// Up to so many standard deviations above black the grey grows in proportion, then with the logarithm.
+const LINEAR_SIGMA: f32 = 4.0;
+/// White is the level that this part of the pixels exceeds, ...
+const WHITE_SHARE: f32 = 5e-4;
+/// ... but no less than so many standard deviations.
+const LEAST_WHITE_SIGMA: f32 = 40.0;
+/// Steps of the table from level to grey.
+const STEPS: usize = 4096;
+
+/// The frame as a picture without colour.
+pub(super) struct Grey {
+    /// Columns of the picture.
+    pub(super) width: usize,
+    /// Rows.
+    pub(super) height: usize,
+    /// Row-major, `height * width`; 0 is black.
+    pub(super) levels: Vec<u8>,
+    enlarged: usize,
+    reduced: usize,
+}
+
+impl Grey {
+    /// `frame` without its background, enlarged or reduced to a size that can be looked at.
+    pub(super) fn of(frame: &Frame, background: Option<&Background>) -> Self {
+        let longer = frame.width.max(frame.height);
+        let enlarged = if longer < ENLARGE_BELOW_PX {
+            ENLARGE_BELOW_PX.div_ceil(longer)
+        } else {
+            1
+        };
+        let reduced = longer.div_ceil(REDUCE_ABOVE_PX).max(1);
+        let (width, height) = (
+            frame.width.div_ceil(reduced),
+            frame.height.div_ceil(reduced),
+        );
+        let light = light(frame, reduced, [width, height]);
+        // The mean of n² pixels has an n-th of the noise of one.
+        let noise = background.map_or(0.0, |sky| sky.noise_adu as f32) / reduced as f32;
+        let small = greys(&light, noise);
+        let levels = if enlarged > 1 {
+            enlarge(&small, width, enlarged)
+        } else {
+            small
+        };
+        Self {
+            width: width * enlarged,
+            height: height * enlarged,
+            levels,
+            enlarged,
+            reduced,
+        }
+    }
+
+    /// Pixels of the picture in a pixel of the frame, on one axis.
+    pub(super) fn scale(&self) -> f32 {
+        self.enlarged as f32 / self.reduced as f32
+    }
+
+    /// How much larger letters and strokes are than on a picture of ordinary size.
+    pub(super) fn stroke_unit(&self) -> f32 {
+        (self.width.max(self.height) as f32 / LARGE_PICTURE_PX).max(1.0)
+    }
+
+    /// Where in the picture a position in the frame is.
+    pub(super) fn place_of(&self, position: &PixelPoint) -> [f32; 2] {
+        scaled(position, self.scale())
+    }
+}
+
+/// What is above the background: means over squares of `side` pixels, NaN where there is no value.
+fn light(frame: &Frame, side: usize, [width, height]: [usize; 2]) -> Vec<f32> {
+    let cell_px = (frame.width.max(frame.height) / CELLS).max(MIN_CELL_PX);
+    let background = BackgroundMap::measure(frame, cell_px);
+    let mut levels = vec![0.0; frame.width];
+    let mut light = Vec::with_capacity(width * height);
+    for rows in 0..height {
+        let mut sums = vec![(0.0_f32, 0_u32); width];
+        for y in rows * side..((rows + 1) * side).min(frame.height) {
+            background.row(y, &mut levels);
+            let row = &frame.pixels[y * frame.width..(y + 1) * frame.width];
+            for (x, (pixel, level)) in row.iter().zip(&levels).enumerate() {
+                if !pixel.is_nan() {
+                    let sum = &mut sums[x / side];
+                    *sum = (sum.0 + pixel - level, sum.1 + 1);
+                }
+            }
+        }
+        light.extend(sums.iter().map(|(sum, count)| sum / *count as f32));
+    }
+    light
+}
+
+/// From light to grey: asinh between a little below the background and the level of bright stars.
+///
+/// # Reference
+/// Lupton, Gunn & Szalay 1999, AJ 118, 1406, for asinh.
+fn greys(light: &[f32], noise: f32) -> Vec<u8> {
+    let bright = level_exceeded_by(light, WHITE_SHARE);
+    let brightest = light.iter().copied().fold(0.0, f32::max);
+    // A drawing has no noise: its own range then sets the scale.
+    let noise = noise.max(brightest * 1e-3).max(f32::MIN_POSITIVE * 1e6);
+    let white = (bright.max(LEAST_WHITE_SIGMA * noise)).min(brightest.max(noise));
+    let black = -BLACK_SIGMA * noise;
+    let stretch = |above: f32| (above / (LINEAR_SIGMA * noise)).asinh();
+    let most = stretch(white - black);
+    // The table is fine where the curve is steep: its steps are even in the root of the level.
+    let table: Vec<u8> = (0..STEPS)
+        .map(|step| {
+            let above = (step as f32 / (STEPS - 1) as f32).powi(2) * (white - black);
+            (stretch(above) / most * 255.0).round() as u8
+        })
+        .collect();
+    let grey = |level: &f32| {
+        let share = (level - black) / (white - black);
+        if share > 0.0 {
+            table[(share.min(1.0).sqrt() * (STEPS - 1) as f32) as usize]
+        } else {
+            // Also what has no value.
+            0
+        }
+    };
+    light.iter().map(grey).collect()
+}
+
+/// The level that a part of all values exceeds.
+fn level_exceeded_by(values: &[f32], share: f32) -> f32 {
+    let mut finite: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    if finite.is_empty() {
+        return 0.0;
+    }
+    let above = (finite.len() as f32 * share) as usize;
+    let place = finite.len() - 1 - above.min(finite.len() - 1);
+    *finite.select_nth_unstable_by(place, f32::total_cmp).1
+}
+
+/// Every pixel as a square of `factor` pixels a side.
+fn enlarge(levels: &[u8], width: usize, factor: usize) -> Vec<u8> {
+    let mut enlarged = Vec::with_capacity(levels.len() * factor * factor);
+    for row in levels.chunks(width) {
+        let wide: Vec<u8> = row
+            .iter()
+            .flat_map(|&level| std::iter::repeat_n(level, factor))
+            .collect();
+        for _ in 0..factor {
+            enlarged.extend_from_slice(&wide);
+        }
+    }
+    enlarged
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    fn frame(width: usize, height: usize) -> Frame {
+        let noise = |i: usize| 50.0 + ((i * 7919) % 101) as f32 * 0.1;
+        Frame::new(width, height, (0..width * height).map(noise).collect()).unwrap()
+    }
+
+    #[test]
+    fn small_frames_are_enlarged_and_large_ones_reduced_by_whole_factors() {
+        for (size, picture, scale) in [
+            ((640, 480), (1280, 960), 2.0),
+            ((1024, 768), (1024, 768), 1.0),
+            ((300, 799), (600, 1598), 2.0),
+            ((3, 3), (801, 801), 267.0),
+            ((2600, 100), (1300, 50), 0.5),
+            ((5001, 3), (1667, 1), 1.0 / 3.0),
+        ] {
+            let grey = Grey::of(&frame(size.0, size.1), None);
+            assert_eq!((grey.width, grey.height), picture, "{size:?}");
+            assert_eq!(grey.levels.len(), grey.width * grey.height);
+            assert_eq!(grey.scale(), scale, "{size:?}");
+        }
+    }
+
+    #[test]
+    fn the_centre_of_the_first_pixel_is_the_middle_of_its_square() {
+        let grey = Grey::of(&frame(400, 400), None);
+        assert_eq!(grey.place_of(&PixelPoint::new(0.0, 399.0)), [1.0, 799.0]);
+    }
+
+    #[test]
+    fn stars_are_white_the_sky_is_dark_and_a_gradient_does_not_show() {
+        let (width, height) = (900, 700);
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut noise = || -> f32 { random.sample::<f32, _>(StandardNormal) * 2.9 };
+        let mut pixels: Vec<f32> = (0..width * height)
+            .map(|i| noise() + 0.05 * (i % width) as f32)
+            .collect();
+        for dy in 0..30 {
+            for dx in 0..30 {
+                pixels[(300 + dy) * width + 400 + dx] = 5000.0;
+            }
+        }
+        pixels[5] = f32::NAN;
+        let frame = Frame::new(width, height, pixels).unwrap();
+        let sky = Background {
+            level_adu: 22.0,
+            noise_adu: 2.9,
+        };
+        let grey = Grey::of(&frame, Some(&sky));
+        assert_eq!(grey.levels[315 * width + 415], 255);
+        assert_eq!(grey.levels[5], 0);
+        let mean = |from: usize| {
+            let column = |x: usize| (0..200).map(move |y| x + y * width);
+            let places = (from..from + 100).flat_map(column);
+            places.map(|i| f32::from(grey.levels[i])).sum::<f32>() / 20_000.0
+        };
+        let (left, right) = (mean(0), mean(width - 100));
+        assert!((10.0..60.0).contains(&left), "{left}");
+        assert!((left - right).abs() < 8.0, "{left} {right}");
+    }
+}

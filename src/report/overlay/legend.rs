@@ -1,0 +1,243 @@
+//! The strip below the frame: what it is, how large, and how it lies.
+
+use super::canvas::{Canvas, Colour, text_width};
+use super::grey::Grey;
+use super::{Kind, Mark, identification, length_px, north_and_east};
+use crate::base::format::{counted, degrees, hours};
+use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
+use crate::identify::Identification;
+use crate::pipeline::Solution;
+
+/// Everything here is in units of strokes.
+const HEIGHT: f32 = 76.0;
+/// The strip needs this much, also below a narrow frame.
+const LEAST_WIDTH: f32 = 460.0;
+const LETTERS: f32 = 13.0;
+const PADDING: f32 = 10.0;
+const LINE: f32 = 20.0;
+/// Side of the square with the arrows, and their length.
+const COMPASS: f32 = 72.0;
+const ARROW: f32 = 20.0;
+/// The scale bar is at most so long, and no longer than this part of the frame.
+const BAR: f32 = 150.0;
+const BAR_SHARE: f32 = 0.3;
+/// Between the text and the scale bar.
+const GAP: f32 = 24.0;
+
+/// Lengths for the scale bar, in arcseconds, and what they are called.
+const LENGTHS: [(f64, &str); 20] = [
+    (36_000.0 * 2.0, "20°"),
+    (36_000.0, "10°"),
+    (18_000.0, "5°"),
+    (7_200.0, "2°"),
+    (3_600.0, "1°"),
+    (1_800.0, "30′"),
+    (1_200.0, "20′"),
+    (600.0, "10′"),
+    (300.0, "5′"),
+    (120.0, "2′"),
+    (60.0, "1′"),
+    (30.0, "30″"),
+    (20.0, "20″"),
+    (10.0, "10″"),
+    (5.0, "5″"),
+    (2.0, "2″"),
+    (1.0, "1″"),
+    (0.5, "0.5″"),
+    (0.2, "0.2″"),
+    (0.1, "0.1″"),
+];
+
+/// Size in pixels of the whole picture: the frame and the strip.
+pub(super) fn size(grey: &Grey, unit: f32) -> [usize; 2] {
+    [
+        grey.width.max((LEAST_WIDTH * unit) as usize),
+        grey.height + (HEIGHT * unit) as usize,
+    ]
+}
+
+/// Draws the strip.
+pub(super) fn draw(
+    canvas: &mut Canvas,
+    grey: &Grey,
+    title: &str,
+    solution: &Solution,
+    marks: &[Mark],
+) {
+    let top = grey.height as f32;
+    let mut right = canvas.width() - PADDING * canvas.unit;
+    if let Some(found) = identification(solution) {
+        right -= COMPASS * canvas.unit;
+        let centre = [
+            right + COMPASS * canvas.unit / 2.0,
+            top + HEIGHT * canvas.unit / 2.0,
+        ];
+        draw_compass(canvas, centre, found);
+        right = draw_scale(canvas, grey, [right, top], found) - GAP * canvas.unit;
+    }
+    let left = PADDING * canvas.unit;
+    let lines = [title.to_owned(), place_line(solution)];
+    for (number, (line, colour)) in lines.iter().zip([Colour::WHITE, Colour::DIM]).enumerate() {
+        let at = [left, baseline(canvas, top, number)];
+        let text = shortened(line, (right - left) / canvas.unit);
+        canvas.text(&text, at, LETTERS, colour);
+    }
+    draw_counts(canvas, [left, baseline(canvas, top, 2)], right, marks);
+}
+
+fn baseline(canvas: &Canvas, top: f32, line: usize) -> f32 {
+    top + (PADDING + LETTERS + LINE * line as f32) * canvas.unit
+}
+
+/// Where the frame is and how wide, or that this is not known.
+fn place_line(solution: &Solution) -> String {
+    let Some(found) = identification(solution) else {
+        return "not identified".to_owned();
+    };
+    let (boresight, _) = found.icrs_to_camera.boresight_and_up();
+    let (ra_rad, dec_rad) = boresight.to_ra_dec();
+    format!(
+        "RA {}  Dec {} · {:.2}° × {:.2}°",
+        hours(ra_rad * DEG_PER_RAD, 1),
+        degrees(dec_rad * DEG_PER_RAD, 0),
+        found.camera.fov_x_rad() * DEG_PER_RAD,
+        found.camera.fov_y_rad() * DEG_PER_RAD,
+    )
+}
+
+/// How many detections there are of each kind, each in the colour of its rings.
+fn draw_counts(canvas: &mut Canvas, [left, y]: [f32; 2], right: f32, marks: &[Mark]) {
+    let count = |kind: Kind| marks.iter().filter(|mark| mark.kind == kind).count();
+    let kinds = [
+        (Kind::Identified, "identified"),
+        (Kind::Unidentified, "not identified"),
+        (Kind::NotAStar, "not a star"),
+    ];
+    let mut x = left;
+    if marks.is_empty() {
+        canvas.text(&counted(0, "detection"), [left, y], LETTERS, Colour::DIM);
+    }
+    for (kind, word) in kinds.into_iter().filter(|(kind, _)| count(*kind) > 0) {
+        let text = format!("{} {word}", count(kind));
+        let ring = 4.5 * canvas.unit;
+        let width = 3.5 * ring + text_width(&text, LETTERS * canvas.unit);
+        if x + width > right {
+            break;
+        }
+        canvas.ring([x + ring, y - ring], ring, kind.stroke(), kind.colour());
+        canvas.text(&text, [x + 3.0 * ring, y], LETTERS, kind.colour());
+        x += width + 12.0 * canvas.unit;
+    }
+}
+
+/// A bar of a round length, ending at the right; returns where it begins.
+fn draw_scale(
+    canvas: &mut Canvas,
+    grey: &Grey,
+    [right, top]: [f32; 2],
+    found: &Identification,
+) -> f32 {
+    let most = (BAR * canvas.unit).min(BAR_SHARE * canvas.width());
+    let pixels =
+        |arcsec: f64| length_px(&found.camera, arcsec / 3600.0 * RAD_PER_DEG) as f32 * grey.scale();
+    let fits = |(arcsec, _): &&(f64, &str)| pixels(*arcsec) <= most;
+    let Some((arcsec, name)) = LENGTHS.iter().find(fits) else {
+        return right;
+    };
+    let left = right - pixels(*arcsec);
+    let (y, tick) = (top + HEIGHT * 0.62 * canvas.unit, 4.0 * canvas.unit);
+    canvas.line(
+        &[
+            [left, y - tick],
+            [left, y + tick],
+            [left, y],
+            [right, y],
+            [right, y - tick],
+            [right, y + tick],
+        ],
+        1.5,
+        Colour::WHITE,
+    );
+    let width = text_width(name, LETTERS * canvas.unit);
+    let at = [(left + right - width) / 2.0, y - 8.0 * canvas.unit];
+    canvas.text(name, at, LETTERS, Colour::WHITE);
+    left.min(at[0])
+}
+
+/// Arrows to the north, which is the longer one, and to the east.
+fn draw_compass(canvas: &mut Canvas, centre: [f32; 2], found: &Identification) {
+    let arrows = north_and_east(found)
+        .into_iter()
+        .zip([("N", 1.0, Colour::WHITE), ("E", 0.75, Colour::DIM)]);
+    for ([dx, dy], (letter, length, colour)) in arrows {
+        let reach = |far: f32, aside: f32| {
+            let (far, aside) = (far * canvas.unit, aside * canvas.unit);
+            [
+                centre[0] + far * dx - aside * dy,
+                centre[1] + far * dy + aside * dx,
+            ]
+        };
+        let tip = length * ARROW;
+        let arrow = [reach(0.0, 0.0), reach(tip, 0.0)];
+        let head = [
+            reach(tip - 6.0, 3.5),
+            reach(tip, 0.0),
+            reach(tip - 6.0, -3.5),
+        ];
+        let middle = reach(tip + 8.0, 0.0);
+        canvas.line(&arrow, 1.5, colour);
+        canvas.line(&head, 1.5, colour);
+        let size = LETTERS - 2.0;
+        let at = [
+            middle[0] - text_width(letter, size * canvas.unit) / 2.0,
+            middle[1] + 0.36 * size * canvas.unit,
+        ];
+        canvas.text(letter, at, size, colour);
+    }
+}
+
+/// The text, or as much of it as goes into this width, in units.
+fn shortened(text: &str, width: f32) -> String {
+    if text_width(text, LETTERS) <= width {
+        return text.to_owned();
+    }
+    let mut kept: String = text.to_owned();
+    while kept.pop().is_some() {
+        let cut = format!("{}…", kept.trim_end());
+        if text_width(&cut, LETTERS) <= width {
+            return cut;
+        }
+    }
+    String::new()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_name_is_cut_and_a_short_one_is_not() {
+        assert_eq!(shortened("a.png", 200.0), "a.png");
+        let cut = shortened(&"long ".repeat(40), 200.0);
+        assert!(
+            cut.ends_with('…') && text_width(&cut, LETTERS) <= 200.0,
+            "{cut}"
+        );
+        assert_eq!(shortened("anything", 1.0), "");
+    }
+
+    #[test]
+    fn bars_are_listed_longest_first_by_their_true_lengths() {
+        assert!(LENGTHS.is_sorted_by(|a, b| a.0 > b.0));
+        for (arcsec, name) in LENGTHS {
+            let unit = name.chars().last().unwrap();
+            let number: f64 = name.trim_end_matches(unit).parse().unwrap();
+            let in_unit = match unit {
+                '°' => 3600.0,
+                '′' => 60.0,
+                _ => 1.0,
+            };
+            assert_eq!(number * in_unit, arcsec, "{name}");
+        }
+    }
+}

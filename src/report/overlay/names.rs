@@ -1,0 +1,101 @@
+//! What is written beside a star.
+
+use crate::sky::catalog::Catalog;
+
+/// SKY2000's abbreviations of the Greek letters.
+const GREEK: [(&str, char); 24] = [
+    ("alp", 'α'),
+    ("bet", 'β'),
+    ("gam", 'γ'),
+    ("del", 'δ'),
+    ("eps", 'ε'),
+    ("zet", 'ζ'),
+    ("eta", 'η'),
+    ("the", 'θ'),
+    ("iot", 'ι'),
+    ("kap", 'κ'),
+    ("lam", 'λ'),
+    ("mu", 'μ'),
+    ("nu", 'ν'),
+    ("xi", 'ξ'),
+    ("omi", 'ο'),
+    ("pi", 'π'),
+    ("rho", 'ρ'),
+    ("sig", 'σ'),
+    ("tau", 'τ'),
+    ("ups", 'υ'),
+    ("phi", 'φ'),
+    ("chi", 'χ'),
+    ("psi", 'ψ'),
+    ("ome", 'ω'),
+];
+
+const SUPERSCRIPTS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+
+/// The star's name, else its number, and its V magnitude: `α CMa −1.4`.
+pub(super) fn label(catalog: &Catalog, star: usize) -> String {
+    let name = match catalog.name_of(star) {
+        Some(name) => short(name),
+        None => catalog.designation(star),
+    };
+    let v_mag = format!("{:.1}", catalog.stars()[star].v_mag);
+    let v_mag = if v_mag == "-0.0" { "0.0" } else { &v_mag };
+    format!("{name} {}", v_mag.replace('-', "−"))
+}
+
+/// The Bayer letter in Greek, else the Flamsteed number, and the constellation: `9 alp CMa` is `α CMa`.
+fn short(name: &str) -> String {
+    let words: Vec<&str> = name.split_whitespace().collect();
+    let greek = |word: &str| {
+        let letters = word.trim_end_matches(|c: char| c.is_ascii_digit());
+        let (_, letter) = GREEK.iter().find(|(latin, _)| *latin == letters)?;
+        let raised = word[letters.len()..].chars().filter_map(|c| c.to_digit(10));
+        let mut text = letter.to_string();
+        text.extend(raised.map(|digit| SUPERSCRIPTS[digit as usize]));
+        Some(text)
+    };
+    let bayer = words.iter().rev().skip(1).find_map(|word| greek(word));
+    match (bayer, words.last()) {
+        (Some(letter), Some(constellation)) => format!("{letter} {constellation}"),
+        _ => name.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bayer_letters_are_greek_and_go_before_flamsteed_numbers() {
+        for (name, expected) in [
+            ("9 alp CMa", "α CMa"),
+            ("40 phi2 Ori", "φ² Ori"),
+            ("tau5 Ser", "τ⁵ Ser"),
+            ("the Oct", "θ Oct"),
+            ("24 Tau", "24 Tau"),
+            ("50 mu Cet", "μ Cet"),
+            ("strange", "strange"),
+        ] {
+            assert_eq!(short(name), expected);
+        }
+    }
+
+    #[test]
+    fn the_brightest_star_is_called_by_its_name_and_the_faintest_by_its_number() {
+        let catalog = Catalog::built_in();
+        assert_eq!(label(catalog, 0), "α CMa −1.4");
+        let last = catalog.stars().len() - 1;
+        assert!(label(catalog, last).starts_with(&catalog.designation(last)));
+    }
+
+    #[test]
+    fn every_letter_of_the_catalogue_is_known() {
+        let catalog = Catalog::built_in();
+        let names = (0..catalog.stars().len()).filter_map(|i| catalog.name_of(i));
+        for name in names {
+            let short = short(name);
+            let flamsteed = short.starts_with(|c: char| c.is_ascii_digit());
+            assert!(flamsteed || !short.is_ascii(), "{name}");
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! Pictures of drawn frames, looked at where something must be.
+
+use super::*;
+use crate::base::coords::{PixelPoint, Rotation, UnitVector};
+use crate::base::units::RAD_PER_DEG;
+use crate::detect::DetectionFlags;
+use crate::identify::{Reason, StarMatch};
+use crate::pipeline::{Background, Measured, Timing};
+use nalgebra::Matrix3;
+
+const WIDTH: usize = 900;
+const HEIGHT: usize = 700;
+
+fn frame(width: usize, height: usize) -> Frame {
+    let noise = |i: usize| 50.0 + ((i * 7919) % 101) as f32 * 0.1;
+    Frame::new(width, height, (0..width * height).map(noise).collect()).unwrap()
+}
+
+fn source(x: f64, y: f64, flags: DetectionFlags) -> Source {
+    Source {
+        position: PixelPoint::new(x, y),
+        measured: Some(Measured {
+            sigma_px: [0.1, 0.1],
+            peak: 100.0,
+            snr: 20.0,
+            flags,
+        }),
+        flux: Some(1000.0),
+    }
+}
+
+fn solution(width: usize, height: usize, outcome: Outcome) -> Solution {
+    let hot = DetectionFlags {
+        hot_pixel: true,
+        ..DetectionFlags::default()
+    };
+    let star = DetectionFlags::default();
+    Solution {
+        width,
+        height,
+        date: None,
+        sources: vec![
+            source(200.0, 300.0, star),
+            source(500.0, 400.0, star),
+            source(700.0, 100.0, hot),
+        ],
+        observation: None,
+        photometry: None,
+        comparison: None,
+        gain_e_per_adu: None,
+        calibration: None,
+        exposure_s: None,
+        notes: Vec::new(),
+        background: Some(Background {
+            level_adu: 55.0,
+            noise_adu: 2.9,
+        }),
+        outcome,
+        timing: Timing::default(),
+    }
+}
+
+/// Looks north-east-wise at RA 80°, Dec 30° with image-up at the position angle `up_deg`; the first source is Sirius.
+fn identified(up_deg: f64, mirrored: bool) -> Outcome {
+    let boresight = UnitVector::from_ra_dec(80.0 * RAD_PER_DEG, 30.0 * RAD_PER_DEG);
+    Outcome::Identified(Box::new(Identification {
+        camera: CameraModel::pinhole(WIDTH as f64, HEIGHT as f64, 3000.0, mirrored),
+        icrs_to_camera: Rotation::looking_at(&boresight, up_deg * RAD_PER_DEG),
+        attitude_covariance_rad2: Matrix3::identity() * 1e-10,
+        focal_length_sigma_px: 0.1,
+        matches: vec![StarMatch {
+            observed: 0,
+            catalog: 0,
+            residual_px: 0.1,
+        }],
+        rms_px: 0.1,
+        log10_false_alarm: -30.0,
+    }))
+}
+
+fn not_identified() -> Outcome {
+    Outcome::NotIdentified(Reason::TooFewStars {
+        found: 2,
+        needed: 4,
+    })
+}
+
+/// Pixels of just this colour within a square round (x, y).
+fn count(picture: &RgbImage, colour: Colour, [x, y]: [u32; 2], reach: u32) -> usize {
+    let columns = x - reach..=x + reach;
+    let rows = y - reach..=y + reach;
+    rows.flat_map(|row| columns.clone().map(move |column| (column, row)))
+        .filter(|&(column, row)| {
+            let found = picture.get_pixel(column, row).0;
+            (0..3).all(|i| found[i].abs_diff(colour.0[i]) < 30)
+        })
+        .count()
+}
+
+#[test]
+fn every_detection_has_a_ring_of_the_colour_of_its_kind() {
+    let frame = frame(WIDTH, HEIGHT);
+    let solution = solution(WIDTH, HEIGHT, identified(0.0, false));
+    let picture = draw("a.tif", &frame, &solution, Catalog::built_in());
+    for (kind, place) in [
+        (Kind::Identified, [200, 300]),
+        (Kind::Unidentified, [500, 400]),
+        (Kind::NotAStar, [700, 100]),
+    ] {
+        for other in [Kind::Identified, Kind::Unidentified, Kind::NotAStar] {
+            let drawn = count(&picture, other.colour(), place, 8);
+            // A thin ring mixes its colour with the sky's.
+            assert_eq!(drawn >= 3, other == kind, "{other:?} at {place:?}: {drawn}");
+        }
+    }
+    // Sirius is named to the right of its ring.
+    let letters = Kind::Identified.colour().lighter();
+    assert!(count(&picture, letters, [250, 300], 30) > 15);
+}
+
+#[test]
+fn a_frame_that_is_not_identified_is_drawn_as_well() {
+    let frame = frame(WIDTH, HEIGHT);
+    let solution = solution(WIDTH, HEIGHT, not_identified());
+    let picture = draw("a.tif", &frame, &solution, Catalog::built_in());
+    assert!(count(&picture, Kind::Unidentified.colour(), [200, 300], 8) > 3);
+    assert_eq!(count(&picture, Kind::Identified.colour(), [200, 300], 8), 0);
+}
+
+#[test]
+fn frames_of_any_size_are_drawn() {
+    for (width, height) in [(3, 3), (50, 1000), (1000, 4), (2600, 30), (9000, 3)] {
+        for outcome in [not_identified(), identified(10.0, false)] {
+            let solution = solution(width, height, outcome);
+            let title = "a long name of a file, ".repeat(9);
+            let picture = draw(
+                &title,
+                &frame(width, height),
+                &solution,
+                Catalog::built_in(),
+            );
+            assert!(picture.width() >= 460 && picture.height() > 76);
+        }
+    }
+    let nothing = Solution {
+        sources: Vec::new(),
+        ..solution(100, 100, not_identified())
+    };
+    let black = Frame::new(100, 100, vec![0.0; 10_000]).unwrap();
+    draw("black", &black, &nothing, Catalog::built_in());
+}
+
+#[test]
+fn north_and_east_are_where_the_camera_sees_them() {
+    let close =
+        |found: [f32; 2], expected: [f32; 2]| (0..2).all(|i| (found[i] - expected[i]).abs() < 1e-6);
+    let (up, right, left) = ([0.0, -1.0], [1.0, 0.0], [-1.0, 0.0]);
+    for (up_deg, mirrored, north, east) in [
+        (0.0, false, up, left),
+        (0.0, true, up, right),
+        // East is up.
+        (90.0, false, right, up),
+        (90.0, true, left, up),
+    ] {
+        let solution = solution(WIDTH, HEIGHT, identified(up_deg, mirrored));
+        let [n, e] = north_and_east(identification(&solution).unwrap());
+        assert!(
+            close(n, north) && close(e, east),
+            "{up_deg} {mirrored}: {n:?} {e:?}"
+        );
+    }
+}
+
+#[test]
+fn a_picture_is_the_same_after_it_was_a_file() {
+    let solution = solution(WIDTH, HEIGHT, identified(0.0, false));
+    let picture = draw(
+        "a.tif",
+        &frame(WIDTH, HEIGHT),
+        &solution,
+        Catalog::built_in(),
+    );
+    let png = to_png(&picture).unwrap();
+    assert_eq!(image::load_from_memory(&png).unwrap().to_rgb8(), picture);
+}

@@ -1,0 +1,193 @@
+//! The identified frame's coordinates as a FITS header: for every program that reads WCS.
+//!
+//! [`Solution`] → a primary header without data, as astrometry.net writes its `.wcs` files: cards of 80
+//! characters, filled up to blocks of 2880 bytes.
+//!
+//! Conventions: those of FITS. The centre of the first pixel is (1, 1); `CRPIX` is the frame's centre, `CRVAL`
+//! the boresight, `CD` in degrees a pixel. A mirrored frame has a `CD` matrix of the other sign. A distortion
+//! is written in SIP form: `A`, `B` from what is observed to what a pinhole would show, exactly; `AP`, `BP`
+//! back, fitted over the frame, with their largest error beside them.
+//!
+//! # Reference
+//! Calabretta & Greisen 2002, A&A 395, 1077 (`TAN`); Shupe et al. 2005, ASP Conf. 347, 491 (SIP);
+//! FITS Standard 4.0 (2018), sect. 4 (cards) and 8 (world coordinates).
+
+mod sip;
+
+use crate::base::coords::{Camera, Icrs, Rotation};
+use crate::base::units::DEG_PER_RAD;
+use crate::camera::CameraModel;
+use crate::frame::FitsHeader;
+use crate::identify::{Identification, Outcome};
+use crate::pipeline::Solution;
+use memchr::memmem;
+use nalgebra::Matrix2;
+use sip::{Polynomial, Sip};
+
+/// The beginning of the history that each header has.
+const SOLVED_BY: &str = "Solved by starpipe";
+
+/// The header of the frame called `frame`; `None` where its stars are not identified.
+pub fn header(frame: &str, solution: &Solution) -> Option<Vec<u8>> {
+    let Outcome::Identified(identification) = &solution.outcome else {
+        return None;
+    };
+    let mut header = FitsHeader::default();
+    header.logical("SIMPLE", true, "FITS header without data");
+    header.integer("BITPIX", 8, "");
+    header.integer("NAXIS", 0, "the image is in the file named below");
+    header.integer("IMAGEW", solution.width as i64, "columns of the image");
+    header.integer("IMAGEH", solution.height as i64, "rows of the image");
+    add_projection(
+        &mut header,
+        &identification.camera,
+        &identification.icrs_to_camera,
+    );
+    add_errors(&mut header, identification);
+    if let Some(known) = &solution.date {
+        let utc = known.date.to_iso();
+        header.text("DATE-OBS", utc.trim_end_matches('Z'), "UTC");
+        header.text("TIMESYS", "UTC", "");
+    }
+    add_history(&mut header, frame, solution, identification);
+    Some(header.to_bytes())
+}
+
+/// Whether `file` is a header made by [`header`].
+pub fn is_header(file: &[u8]) -> bool {
+    file.starts_with(b"SIMPLE  =") && memmem::find(file, SOLVED_BY.as_bytes()).is_some()
+}
+
+/// Adds what leads from pixels to the sky, of a `camera` of this attitude.
+pub fn add_projection(
+    header: &mut FitsHeader,
+    camera: &CameraModel,
+    icrs_to_camera: &Rotation<Icrs, Camera>,
+) {
+    let distortion = camera.distortion.as_ref();
+    let sip = distortion.map(|distortion| Sip::new(distortion, camera));
+    let (boresight, _) = icrs_to_camera.boresight_and_up();
+    let (ra_rad, dec_rad) = boresight.to_ra_dec();
+    let (east, north) = sky_axes(icrs_to_camera);
+    let pinhole =
+        Matrix2::from_rows(&[east, north]) * mirror(camera) / camera.focal_length_px * DEG_PER_RAD;
+    let linear = sip
+        .as_ref()
+        .map_or_else(Matrix2::identity, |sip| sip.linear);
+    let cd = pinhole * linear;
+    let centre = camera.centre();
+    let projection = if sip.is_some() {
+        ["RA---TAN-SIP", "DEC--TAN-SIP"]
+    } else {
+        ["RA---TAN", "DEC--TAN"]
+    };
+    header.integer("WCSAXES", 2, "");
+    header.text("CTYPE1", projection[0], "gnomonic projection");
+    header.text("CTYPE2", projection[1], "");
+    header.text("CUNIT1", "deg", "");
+    header.text("CUNIT2", "deg", "");
+    header.real("CRVAL1", ra_rad * DEG_PER_RAD, "RA of the centre");
+    header.real("CRVAL2", dec_rad * DEG_PER_RAD, "Dec of the centre");
+    header.real("CRPIX1", centre.x + 1.0, "first pixel is 1");
+    header.real("CRPIX2", centre.y + 1.0, "first pixel is 1");
+    for (row, column) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        let keyword = format!("CD{}_{}", row + 1, column + 1);
+        header.real(&keyword, cd[(row, column)], "degrees a pixel");
+    }
+    header.real("LONPOLE", 180.0, "");
+    header.text("RADESYS", "ICRS", "");
+    header.real("EQUINOX", 2000.0, "");
+    if let Some(sip) = &sip {
+        add_sip(header, sip);
+    }
+}
+
+fn add_errors(header: &mut FitsHeader, identification: &Identification) {
+    let (east, north) = sky_axes(&identification.icrs_to_camera);
+    let [sigma_x, sigma_y, _] = identification.attitude_sigma_rad();
+    // A turn about x moves the boresight along y, and the other way round.
+    for (keyword, axis) in [("CRDER1", east), ("CRDER2", north)] {
+        let sigma_rad = (axis[0] * sigma_y).hypot(axis[1] * sigma_x);
+        header.real(
+            keyword,
+            sigma_rad * DEG_PER_RAD,
+            "standard error of the centre",
+        );
+    }
+}
+
+/// How far east and north lies what lies one unit along the camera's x and y.
+fn sky_axes(
+    icrs_to_camera: &Rotation<Icrs, Camera>,
+) -> (nalgebra::RowVector2<f64>, nalgebra::RowVector2<f64>) {
+    let (boresight, _) = icrs_to_camera.boresight_and_up();
+    let (east, north) = boresight.east_north();
+    let along = |axis: nalgebra::Vector3<f64>| {
+        let in_camera = icrs_to_camera.matrix() * axis;
+        nalgebra::RowVector2::new(in_camera.x, in_camera.y)
+    };
+    (along(east), along(north))
+}
+
+/// From offsets in the file to offsets along the camera's axes.
+fn mirror(camera: &CameraModel) -> Matrix2<f64> {
+    let x = if camera.mirrored { -1.0 } else { 1.0 };
+    Matrix2::new(x, 0.0, 0.0, 1.0)
+}
+
+fn add_sip(header: &mut FitsHeader, sip: &Sip) {
+    let mut add = |name: &str, polynomial: &Polynomial, comment: &str| {
+        let order = polynomial.order as i64;
+        header.integer(&format!("{name}_ORDER"), order, comment);
+        for (p, q, value) in polynomial.terms() {
+            if value != 0.0 {
+                header.real(&format!("{name}_{p}_{q}"), value, "");
+            }
+        }
+    };
+    add("A", &sip.forward[0], "observed to ideal, along x");
+    add("B", &sip.forward[1], "observed to ideal, along y");
+    add("AP", &sip.inverse[0], "ideal to observed, along x");
+    add("BP", &sip.inverse[1], "ideal to observed, along y");
+}
+
+fn add_history(
+    header: &mut FitsHeader,
+    frame: &str,
+    solution: &Solution,
+    identification: &Identification,
+) {
+    let camera = &identification.camera;
+    let sigma = identification
+        .attitude_sigma_rad()
+        .map(|sigma_rad| sigma_rad * crate::base::units::ARCSEC_PER_RAD);
+    let matched = identification.matches.len();
+    let lines = [
+        format!("{SOLVED_BY} {}", env!("CARGO_PKG_VERSION")),
+        format!("Image: {frame}"),
+        format!(
+            "Field {:.4} x {:.4} deg, focal length {:.3} +- {:.3} px{}",
+            camera.fov_x_rad() * DEG_PER_RAD,
+            camera.fov_y_rad() * DEG_PER_RAD,
+            camera.focal_length_px,
+            identification.focal_length_sigma_px,
+            if camera.mirrored { ", mirrored" } else { "" },
+        ),
+        format!(
+            "{matched} of {} detections matched, rms {:.4} px, log10 false alarm {:.1}",
+            solution.sources.len(),
+            identification.rms_px,
+            identification.log10_false_alarm,
+        ),
+        format!(
+            "Standard errors: about x {:.3}, about y {:.3}, roll {:.3} arcsec",
+            sigma[0], sigma[1], sigma[2]
+        ),
+    ];
+    for line in lines {
+        header.history(&line);
+    }
+}
+
+#[cfg(test)]
+mod tests;

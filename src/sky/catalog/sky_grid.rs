@@ -1,0 +1,340 @@
+//! Which catalogue stars lie near a direction, brightest first.
+//!
+//! The cube around the unit sphere is cut into cubic cells; the stars of a cell stand together, brightest
+//! first, so that a search to a limiting magnitude stops early. That needs no trigonometry and knows no
+//! poles. Wide and shallow searches go through the brightest stars of the whole sky instead.
+
+use super::Star;
+use crate::base::coords::{Icrs, UnitVector};
+use nalgebra::Vector3;
+use rayon::prelude::*;
+use std::f64::consts::PI;
+use std::ops::RangeInclusive;
+
+/// One star as the grid keeps it: packed, since most of a search is waiting for memory.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GridStar {
+    /// Components of the ICRS unit vector (single precision: 0.01 arcsec).
+    pub direction: [f32; 3],
+    /// V magnitude.
+    pub v_mag: f32,
+    /// Index into the catalogue's stars.
+    pub catalog: u32,
+}
+
+impl GridStar {
+    fn new(index: usize, star: &Star) -> Self {
+        let v = star.direction.as_vector();
+        Self {
+            direction: [v.x as f32, v.y as f32, v.z as f32],
+            v_mag: star.v_mag,
+            catalog: index as u32,
+        }
+    }
+
+    /// The unit vector, as accurate as it is kept.
+    #[inline]
+    pub fn vector(&self) -> Vector3<f64> {
+        Vector3::from(self.direction.map(f64::from))
+    }
+
+    /// Whether it stands within a chord, of which this is the square, of `centre`, a unit vector.
+    #[inline]
+    pub fn is_within(&self, centre: &Vector3<f64>, chord_sq: f64) -> bool {
+        (self.vector() - centre).norm_squared() <= chord_sq
+    }
+}
+
+/// The catalogue's stars by place.
+#[derive(Debug, Clone)]
+pub struct SkyGrid {
+    /// `cell_starts[c]..cell_starts[c + 1]` are the stars of cell `c` in `by_cell`.
+    cell_starts: Vec<u32>,
+    by_cell: Vec<GridStar>,
+    /// In the order of the catalogue, brightest first.
+    by_brightness: Vec<GridStar>,
+}
+
+/// Cells along an edge of the cube: on the sphere they are 1.8° wide and hold sixteen catalogue stars.
+const CELLS: usize = 64;
+const CELL_SIZE: f64 = 2.0 / CELLS as f64;
+/// Going to a cell costs about as much as looking at so many stars in a row.
+const STARS_PER_CELL_VISIT: f64 = 4.0;
+/// How far single precision may put a star off the sphere.
+const OFF_SPHERE: f64 = 1e-6;
+
+/// The chord of an angle, which counts as half a turn beyond that.
+#[inline]
+pub fn chord_of(angle_rad: f64) -> f64 {
+    2.0 * (angle_rad.clamp(0.0, PI) / 2.0).sin()
+}
+
+fn cell_along(coordinate: f64) -> usize {
+    (((coordinate + 1.0) / CELL_SIZE).max(0.0) as usize).min(CELLS - 1)
+}
+
+fn cells_along(centre: f64, radius: f64) -> RangeInclusive<usize> {
+    cell_along(centre - radius)..=cell_along(centre + radius)
+}
+
+impl SkyGrid {
+    /// Sorts `stars`, which stand brightest first, into cells.
+    pub fn new(stars: &[Star]) -> Self {
+        let packed = |(index, star)| GridStar::new(index, star);
+        let by_brightness: Vec<GridStar> = stars.par_iter().enumerate().map(packed).collect();
+        // A counting sort: stable, so that a cell's stars stay brightest first.
+        let cell_of = |star: &GridStar| Self::cell_of(star) as u32;
+        let cells: Vec<u32> = by_brightness.par_iter().map(cell_of).collect();
+        let mut cell_starts = vec![0u32; CELLS.pow(3) + 1];
+        for &cell in &cells {
+            cell_starts[cell as usize + 1] += 1;
+        }
+        for cell in 1..cell_starts.len() {
+            cell_starts[cell] += cell_starts[cell - 1];
+        }
+        let mut by_cell = by_brightness.clone();
+        for (star, &cell) in by_brightness.iter().zip(&cells) {
+            let place = &mut cell_starts[cell as usize];
+            by_cell[*place as usize] = *star;
+            *place += 1;
+        }
+        // Each start has moved on to the next cell's.
+        cell_starts.rotate_right(1);
+        cell_starts[0] = 0;
+        Self {
+            cell_starts,
+            by_cell,
+            by_brightness,
+        }
+    }
+
+    fn cell_of(star: &GridStar) -> usize {
+        let [x, y, z] = star.direction.map(|c| cell_along(f64::from(c)));
+        (x * CELLS + y) * CELLS + z
+    }
+
+    /// The star at this index of the catalogue.
+    #[inline]
+    pub fn star(&self, catalog: u32) -> &GridStar {
+        &self.by_brightness[catalog as usize]
+    }
+
+    /// Calls `visit` with every star within `radius_rad` of `centre` that is not fainter than
+    /// `faintest_v_mag`, in an order that depends on nothing but the arguments.
+    #[inline]
+    pub fn for_each_within(
+        &self,
+        centre: &UnitVector<Icrs>,
+        radius_rad: f64,
+        faintest_v_mag: f32,
+        mut visit: impl FnMut(&GridStar),
+    ) {
+        let chord = chord_of(radius_rad);
+        let cone = Cone {
+            centre: centre.as_vector(),
+            chord,
+            faintest_v_mag,
+        };
+        if chord < CELL_SIZE {
+            // The cells around a point: which of them the sphere crosses does not matter.
+            for x in cells_along(cone.centre.x, chord) {
+                for y in cells_along(cone.centre.y, chord) {
+                    self.visit_column(&cone, [x, y], cells_along(cone.centre.z, chord), &mut visit);
+                }
+            }
+        } else {
+            self.for_each_in_wide_cone(&cone, &mut visit);
+        }
+    }
+
+    /// Whether there is a star within `chord` of `centre` with a V magnitude in `magnitudes`: fast where the chord is short.
+    #[inline]
+    pub fn is_any_within(
+        &self,
+        centre: &UnitVector<Icrs>,
+        chord: f64,
+        magnitudes: RangeInclusive<f32>,
+    ) -> bool {
+        let cone = Cone {
+            centre: centre.as_vector(),
+            chord,
+            faintest_v_mag: *magnitudes.end(),
+        };
+        let is_wanted = |star: &GridStar| {
+            star.v_mag >= *magnitudes.start() && star.is_within(cone.centre, chord * chord)
+        };
+        let bright_enough = |star: &&GridStar| star.v_mag <= cone.faintest_v_mag;
+        let z_cells = cells_along(cone.centre.z, chord);
+        for x in cells_along(cone.centre.x, chord) {
+            for y in cells_along(cone.centre.y, chord) {
+                for z in z_cells.clone() {
+                    let stars = self.in_cell((x * CELLS + y) * CELLS + z);
+                    if stars.iter().take_while(bright_enough).any(is_wanted) {
+                        return true;
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    /// The stars of a cell, brightest first.
+    #[inline]
+    fn in_cell(&self, cell: usize) -> &[GridStar] {
+        &self.by_cell[self.cell_starts[cell] as usize..self.cell_starts[cell + 1] as usize]
+    }
+
+    fn for_each_in_wide_cone(&self, cone: &Cone, visit: &mut impl FnMut(&GridStar)) {
+        let bright_enough = self
+            .by_brightness
+            .partition_point(|s| s.v_mag <= cone.faintest_v_mag);
+        let cells = PI * (cone.chord / CELL_SIZE + 1.0).powi(2);
+        if (bright_enough as f64) < STARS_PER_CELL_VISIT * cells {
+            self.by_brightness[..bright_enough]
+                .iter()
+                .filter(|star| star.is_within(cone.centre, cone.chord * cone.chord))
+                .for_each(visit);
+            return;
+        }
+        for x in cells_along(cone.centre.x, cone.chord) {
+            for y in cells_along(cone.centre.y, cone.chord) {
+                for z in sphere_crossings(x, y) {
+                    let wanted = cells_along(cone.centre.z, cone.chord);
+                    let first = *z.start().max(wanted.start());
+                    let last = *z.end().min(wanted.end());
+                    self.visit_column(cone, [x, y], first..=last, visit);
+                }
+            }
+        }
+    }
+
+    #[inline]
+    fn visit_column(
+        &self,
+        cone: &Cone,
+        [x, y]: [usize; 2],
+        z: RangeInclusive<usize>,
+        visit: &mut impl FnMut(&GridStar),
+    ) {
+        for z in z {
+            let cell = (x * CELLS + y) * CELLS + z;
+            for star in self.in_cell(cell) {
+                if star.v_mag > cone.faintest_v_mag {
+                    break;
+                }
+                if star.is_within(cone.centre, cone.chord * cone.chord) {
+                    visit(star);
+                }
+            }
+        }
+    }
+}
+
+struct Cone<'a> {
+    centre: &'a Vector3<f64>,
+    chord: f64,
+    faintest_v_mag: f32,
+}
+
+/// The cells of the column at (x, y) that the sphere crosses: below and above the equator, each cell once.
+fn sphere_crossings(x: usize, y: usize) -> impl Iterator<Item = RangeInclusive<usize>> {
+    let nearest_and_farthest = |cell: usize| {
+        let low = cell as f64 * CELL_SIZE - 1.0;
+        let high = low + CELL_SIZE;
+        let nearest = if low < 0.0 && high > 0.0 {
+            0.0
+        } else {
+            low.abs().min(high.abs())
+        };
+        (nearest, low.abs().max(high.abs()))
+    };
+    let ((x_near, x_far), (y_near, y_far)) = (nearest_and_farthest(x), nearest_and_farthest(y));
+    let height = |x: f64, y: f64| 1.0 - x * x - y * y;
+    let highest = (height(x_near, y_near) + OFF_SPHERE).max(0.0).sqrt() + OFF_SPHERE;
+    let lowest = (height(x_far, y_far) - OFF_SPHERE).max(0.0).sqrt() - OFF_SPHERE;
+    let above = cell_along(lowest)..=cell_along(highest);
+    let below_end = cell_along(-lowest).min(above.start().wrapping_sub(1));
+    let below = cell_along(-highest)..=below_end;
+    let crossed = height(x_near, y_near) > -OFF_SPHERE;
+    [below, above].into_iter().filter(move |_| crossed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sky::catalog::StarId;
+    use proptest::prelude::*;
+    use std::f64::consts::{FRAC_PI_2, TAU};
+
+    fn star(index: u32, ra_rad: f64, sin_dec: f64) -> Star {
+        let direction = UnitVector::from_ra_dec(ra_rad, sin_dec.asin());
+        Star::new(StarId::Skymap(index), direction, index as f32 * 0.001)
+    }
+
+    fn expected(
+        stars: &[Star],
+        centre: &UnitVector<Icrs>,
+        radius_rad: f64,
+        limit: f32,
+    ) -> Vec<u32> {
+        // Half a turn is the whole sky; beyond it the chord would shrink again.
+        let chord = 2.0 * (radius_rad.min(PI) / 2.0).sin();
+        (0..stars.len())
+            .map(|i| GridStar::new(i, &stars[i]))
+            .filter(|s| s.v_mag <= limit && s.is_within(centre.as_vector(), chord * chord))
+            .map(|s| s.catalog)
+            .collect()
+    }
+
+    fn found(grid: &SkyGrid, centre: &UnitVector<Icrs>, radius_rad: f64, limit: f32) -> Vec<u32> {
+        let mut found = Vec::new();
+        grid.for_each_within(centre, radius_rad, limit, |s| found.push(s.catalog));
+        found.sort_unstable();
+        found
+    }
+
+    proptest! {
+        #[test]
+        fn a_cone_holds_what_a_search_through_all_stars_finds(
+            places in prop::collection::vec((0.0..TAU, -1.0..1.0f64), 1..500),
+            ra_rad in 0.0..TAU, dec_rad in -FRAC_PI_2..FRAC_PI_2,
+            radius_rad in prop_oneof![0.0..0.015f64, 0.0..0.3f64, 0.0..3.2f64],
+            limit in 0.0..0.6f32,
+        ) {
+            let stars: Vec<Star> = places
+                .iter()
+                .enumerate()
+                .map(|(i, &(ra, sin_dec))| star(i as u32, ra, sin_dec))
+                .collect();
+            let centre = UnitVector::from_ra_dec(ra_rad, dec_rad);
+            prop_assert_eq!(
+                found(&SkyGrid::new(&stars), &centre, radius_rad, limit),
+                expected(&stars, &centre, radius_rad, limit)
+            );
+        }
+    }
+
+    #[test]
+    fn cones_of_all_sizes_in_the_whole_catalogue_hold_what_they_should() {
+        let stars = crate::sky::catalog::Catalog::built_in().stars();
+        let grid = SkyGrid::new(stars);
+        for (i, radius_deg) in [0.1, 0.8, 1.0, 3.0, 12.0, 40.0].into_iter().enumerate() {
+            for (ra_deg, dec_deg) in [
+                (0.0, 0.0),
+                (83.0, -5.0),
+                (200.0, 89.9),
+                (310.0, -90.0),
+                (45.0, 35.3),
+            ] {
+                let centre =
+                    UnitVector::from_ra_dec(f64::to_radians(ra_deg), f64::to_radians(dec_deg));
+                let limit = 9.5 - i as f32 * 0.5;
+                let radius_rad = f64::to_radians(radius_deg);
+                assert_eq!(
+                    found(&grid, &centre, radius_rad, limit),
+                    expected(stars, &centre, radius_rad, limit)
+                );
+            }
+        }
+    }
+}

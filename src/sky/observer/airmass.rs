@@ -1,0 +1,125 @@
+//! How much air starlight comes through, in units of that at the zenith, and how far it bends the light.
+//!
+//! Caveats: a mean atmosphere; real refraction differs by some per cent, near the horizon by minutes of arc.
+
+use crate::base::units::{DEG_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
+use std::f64::consts::FRAC_PI_2;
+
+/// The airmass at this apparent zenith distance, in radians, from 0 to π/2: 0.9997 at the zenith, 38 at the horizon, finite everywhere.
+///
+/// # Reference
+/// Kasten & Young 1989, Appl. Opt. 28, 4735, doi 10.1364/AO.28.004735, eq. 3. Agrees with Pickering 2002 (DIO 12, 1, p. 20)
+/// within 0.3 % above an altitude of 5°.
+pub fn airmass_kasten_young(apparent_zenith_distance_rad: f64) -> f64 {
+    let zenith_distance_rad = apparent_zenith_distance_rad.clamp(0.0, FRAC_PI_2);
+    let altitude_deg = 96.079_95 - zenith_distance_rad * DEG_PER_RAD;
+    let altitude_term = libm::pow(altitude_deg, -1.6364);
+    1.0 / (libm::cos(zenith_distance_rad) + 0.505_72 * altitude_term)
+}
+
+/// The airmass sec z of plane layers: within 1 % to 70° from the zenith, and infinite towards the horizon.
+pub fn airmass_plane_parallel(zenith_distance_rad: f64) -> f64 {
+    1.0 / libm::cos(zenith_distance_rad)
+}
+
+/// The airmass for light scattered in the air: 1 at the zenith, 5 at the horizon.
+///
+/// # Reference
+/// Krisciunas & Schaefer 1991, PASP 103, 1033, eq. (3).
+pub fn airmass_krisciunas_schaefer(zenith_distance_rad: f64) -> f64 {
+    let sine = libm::sin(zenith_distance_rad);
+    (1.0 - 0.96 * sine * sine).sqrt().recip()
+}
+
+/// The part of the sea level's pressure that is left at a height in metres: the 1976 US Standard Atmosphere's troposphere
+/// continued, 0 where that ends.
+///
+/// # Reference
+/// U.S. Standard Atmosphere, 1976 (NOAA-S/T 76-1562), eq. 33a.
+fn relative_pressure(height_m: f64) -> f64 {
+    (1.0 - 2.255_77e-5 * height_m).max(0.0).powf(5.255_88)
+}
+
+/// How far refraction lifts what stands at this true altitude, in radians, seen from a height in metres; at 10 °C.
+///
+/// # Reference
+/// Sæmundsson 1986, Sky & Telescope 72, 70, as in Meeus 1998, Astronomical Algorithms, eq. 16.4. Within 0.1′ of tables.
+pub(super) fn refraction_rad(true_altitude_rad: f64, height_m: f64) -> f64 {
+    /// Below this the formula is not made for; nothing there is above the horizon.
+    const LOWEST_DEG: f64 = -2.0;
+    /// The formula's own air, in parts of the sea level's pressure.
+    const PRESSURE: f64 = 1010.0 / 1013.25;
+    const ARCMIN_RAD: f64 = 60.0 * RAD_PER_ARCSEC;
+    let altitude_deg = (true_altitude_rad * DEG_PER_RAD).max(LOWEST_DEG);
+    let bent_deg = altitude_deg + 10.3 / (altitude_deg + 5.11);
+    let arcmin = 1.02 / (bent_deg * RAD_PER_DEG).tan();
+    // At the zenith the formula is off by 0.1″ the other way.
+    arcmin.max(0.0) * ARCMIN_RAD * relative_pressure(height_m) / PRESSURE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pickering 2002, by apparent altitude in degrees.
+    fn pickering(altitude_deg: f64) -> f64 {
+        let bent_deg = altitude_deg + 244.0 / (165.0 + 47.0 * altitude_deg.powf(1.1));
+        1.0 / (bent_deg * RAD_PER_DEG).sin()
+    }
+
+    /// The paper's formula stays so close to the paper's tables.
+    const TABLE_TOLERANCE: f64 = 2e-3;
+
+    #[test]
+    fn scattered_light_comes_through_less_air() {
+        assert_eq!(airmass_krisciunas_schaefer(0.0), 1.0);
+        // (1 − 0.96 · 0.75)^−½ at 60°.
+        assert!((airmass_krisciunas_schaefer(60f64.to_radians()) - 1.889_82).abs() < 1e-5);
+        assert!((airmass_krisciunas_schaefer(FRAC_PI_2) - 5.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_airmass_is_that_of_the_published_tables() {
+        // Kasten & Young 1989, table 2.
+        for (altitude_deg, expected) in [
+            (90.0, 1.0),
+            (60.0, 1.1539),
+            (30.0, 1.9939),
+            (10.0, 5.5841),
+            (5.0, 10.3164),
+            (0.0, 37.9196),
+        ] {
+            let found = airmass_kasten_young((90.0 - altitude_deg) * RAD_PER_DEG);
+            assert!(
+                (found / expected - 1.0).abs() < TABLE_TOLERANCE,
+                "{altitude_deg}: {found}"
+            );
+        }
+    }
+
+    #[test]
+    fn two_formulas_agree_above_five_degrees() {
+        for altitude_deg in 5..=90 {
+            let altitude_deg = f64::from(altitude_deg);
+            let found = airmass_kasten_young((90.0 - altitude_deg) * RAD_PER_DEG);
+            let ratio = found / pickering(altitude_deg);
+            assert!((ratio - 1.0).abs() < 3e-3, "{altitude_deg}: {ratio}");
+        }
+        let plane = airmass_plane_parallel(60.0 * RAD_PER_DEG);
+        assert!((plane - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn refraction_is_that_of_the_tables_and_less_in_thin_air() {
+        // True altitude and refraction in minutes of arc: Meeus 1998, chapter 16.
+        for (altitude_deg, expected_arcmin) in [(0.5541, 24.618), (90.0, 0.0), (45.0, 1.0)] {
+            let found = refraction_rad(altitude_deg * RAD_PER_DEG, 0.0) / (60.0 * RAD_PER_ARCSEC);
+            assert!(
+                (found - expected_arcmin).abs() < 0.12,
+                "{altitude_deg}: {found}"
+            );
+        }
+        let at = |height_m| refraction_rad(0.3, height_m);
+        assert!(at(3000.0) < 0.72 * at(0.0) && at(60_000.0) == 0.0);
+    }
+}

@@ -1,0 +1,122 @@
+//! From the stars' axes to the Earth's: precession, nutation, aberration and the Earth's rotation.
+//!
+//! Caveats: UT1 is taken for UTC, from which it differs by less than 0.9 s, 13″ along the parallel. The frame bias (0.02″), the
+//! motion of the poles (0.3″), diurnal aberration (0.3″) and the lesser terms of nutation (0.5″) are left out.
+
+use crate::base::coords::{Icrs, UnitVector};
+use crate::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use std::f64::consts::TAU;
+
+const DAYS_PER_JULIAN_YEAR: f64 = 365.25;
+
+/// The direction in which a star of ICRS direction `icrs` is seen `years` Julian years after J2000.0, along the Earth's own axes:
+/// x to longitude 0 on the equator, y to 90° east, z to the north pole.
+pub(super) fn terrestrial(icrs: &UnitVector<Icrs>, years: f64) -> Vector3<f64> {
+    let date = Date::new(years);
+    let seen = date.to_true_equator() * icrs.as_vector() + date.aberration();
+    about_z(date.sidereal_time_rad()) * seen.normalize()
+}
+
+/// A date, in Julian centuries since J2000.0, with what follows from it.
+struct Date {
+    centuries: f64,
+    /// Nutation in longitude and in obliquity, in radians.
+    nutation_rad: [f64; 2],
+    mean_obliquity_rad: f64,
+}
+
+/// c0 + c1 t + c2 t² + ...
+fn polynomial(t: f64, coefficients: &[f64]) -> f64 {
+    coefficients.iter().rev().fold(0.0, |sum, c| sum * t + c)
+}
+
+/// Turns the axes by `angle_rad` about x or z: what is not turned appears turned the other way.
+fn about_x(angle_rad: f64) -> Matrix3<f64> {
+    *Rotation3::from_axis_angle(&Vector3::x_axis(), -angle_rad).matrix()
+}
+
+fn about_z(angle_rad: f64) -> Matrix3<f64> {
+    *Rotation3::from_axis_angle(&Vector3::z_axis(), -angle_rad).matrix()
+}
+
+impl Date {
+    fn new(years: f64) -> Self {
+        let t = years / 100.0;
+        let deg = |c: [f64; 2]| polynomial(t, &c) * RAD_PER_DEG;
+        let node = deg([125.044_52, -1_934.136_261]);
+        let sun = deg([280.4665, 36_000.769_8]);
+        let moon = deg([218.3165, 481_267.881_3]);
+        // Meeus 1998, Astronomical Algorithms, chapter 22: within 0.5″ and 0.1″.
+        let longitude_arcsec =
+            -17.20 * node.sin() - 1.32 * (2.0 * sun).sin() - 0.23 * (2.0 * moon).sin()
+                + 0.21 * (2.0 * node).sin();
+        let obliquity_arcsec =
+            9.20 * node.cos() + 0.57 * (2.0 * sun).cos() + 0.10 * (2.0 * moon).cos()
+                - 0.09 * (2.0 * node).cos();
+        Self {
+            centuries: t,
+            nutation_rad: [longitude_arcsec, obliquity_arcsec].map(|a| a * RAD_PER_ARCSEC),
+            mean_obliquity_rad: polynomial(t, &[84_381.406, -46.836_769, -0.000_183_1])
+                * RAD_PER_ARCSEC,
+        }
+    }
+
+    /// Precession (IAU 2006) and nutation: from ICRS to the true equator and equinox of the date.
+    ///
+    /// # Reference
+    /// Capitaine, Wallace & Chapront 2003, A&A 412, 567, eq. 37 (ψ_A), 39 (ω_A and χ_A), with their ε₀; the rotations are eq. 38.
+    fn to_true_equator(&self) -> Matrix3<f64> {
+        const OBLIQUITY_J2000_ARCSEC: f64 = 84_381.406;
+        let arcsec = |c: &[f64]| polynomial(self.centuries, c) * RAD_PER_ARCSEC;
+        let psi = arcsec(&[0.0, 5_038.481_507, -1.079_006_9, -0.001_140_45]);
+        let omega = arcsec(&[
+            OBLIQUITY_J2000_ARCSEC,
+            -0.025_754,
+            0.051_262_3,
+            -0.007_725_03,
+        ]);
+        let chi = arcsec(&[0.0, 10.556_403, -2.381_429_2, -0.001_211_97]);
+        let obliquity_j2000 = OBLIQUITY_J2000_ARCSEC * RAD_PER_ARCSEC;
+        let precession = about_z(chi) * about_x(-omega) * about_z(-psi) * about_x(obliquity_j2000);
+        let [longitude, obliquity] = self.nutation_rad;
+        let nutation = about_x(-(self.mean_obliquity_rad + obliquity))
+            * about_z(-longitude)
+            * about_x(self.mean_obliquity_rad);
+        nutation * precession
+    }
+
+    /// The Earth's velocity over that of light, along the axes of the true equator and equinox of the date.
+    ///
+    /// # Reference
+    /// Meeus 1998, chapters 23 (the constant) and 25 (the Sun's longitude, the Earth's eccentricity and perihelion).
+    fn aberration(&self) -> Vector3<f64> {
+        const CONSTANT_RAD: f64 = 20.495_52 * RAD_PER_ARCSEC;
+        let t = self.centuries;
+        let anomaly = polynomial(t, &[357.529_11, 35_999.050_29]) * RAD_PER_DEG;
+        let centre_deg = 1.9146 * anomaly.sin() + 0.02 * (2.0 * anomaly).sin();
+        let sun = (polynomial(t, &[280.466_46, 36_000.769_83]) + centre_deg) * RAD_PER_DEG;
+        let eccentricity = 0.016_708_634 - 0.000_042_037 * t;
+        let perihelion = polynomial(t, &[102.937_35, 1.719_46]) * RAD_PER_DEG;
+        let ecliptic = Vector3::new(
+            sun.sin() - eccentricity * perihelion.sin(),
+            -sun.cos() + eccentricity * perihelion.cos(),
+            0.0,
+        );
+        about_x(-self.mean_obliquity_rad) * ecliptic * CONSTANT_RAD
+    }
+
+    /// Greenwich apparent sidereal time.
+    ///
+    /// # Reference
+    /// IERS Conventions 2010, eq. 5.15 (Earth rotation angle) and 5.32 (IAU 2006 sidereal time).
+    fn sidereal_time_rad(&self) -> f64 {
+        let days = self.centuries * 100.0 * DAYS_PER_JULIAN_YEAR;
+        // Whole turns are taken away before they cost digits; at J2000.0, noon, half a day has passed.
+        let turns = 0.779_057_273_264 + 0.002_737_811_911_354_48 * days + days.rem_euclid(1.0);
+        let precession_arcsec =
+            polynomial(self.centuries, &[0.014_506, 4_612.156_534, 1.391_581_7]);
+        let equinoxes_rad = self.nutation_rad[0] * self.mean_obliquity_rad.cos();
+        turns.rem_euclid(1.0) * TAU + precession_arcsec * RAD_PER_ARCSEC + equinoxes_rad
+    }
+}

@@ -1,0 +1,189 @@
+//! The paper's stars, identified from its centroids.
+
+use super::{Published, PublishedStar};
+use crate::base::coords::PixelPoint;
+use crate::base::format::to_decimals;
+use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
+use crate::identify::{Identification, Outcome, Photometry};
+use crate::model::sensitivity::{Budget, Scenario};
+use crate::pipeline::{CentroidList, ListedCentroid, Solution};
+use crate::sky::catalog::{Catalog, StarId};
+use serde::Serialize;
+
+/// The paper's table, and what became of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TableReport {
+    /// Stars that have the paper's number.
+    pub right: usize,
+    /// The stars in the paper's order.
+    pub stars: Vec<TableStar>,
+    /// Where the frame's centre is, and how good the identification; none where there is none.
+    pub field: Option<FieldReport>,
+    /// Zenith distance of the centre as the paper states it, in degrees.
+    pub stated_zenith_distance_deg: f64,
+    /// The same, without refraction, from site, time and the centre found.
+    pub zenith_distance_deg: Option<f64>,
+    /// The limit by the paper's equations at that zenith distance, in V, where it is above the horizon.
+    pub limit_there_vmag: Option<f64>,
+}
+
+/// A star of the paper's table.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TableStar {
+    /// The paper's number for it, of SKY2000.
+    pub paper_id: String,
+    /// The number of the catalogue's star found for its centroid.
+    pub found_id: Option<String>,
+    /// V magnitude, from the paper.
+    pub vmag: f64,
+    /// Column of its centroid, in pixels.
+    pub x_px: f64,
+    /// Row of its centroid, in pixels.
+    pub y_px: f64,
+    /// Distance between the centroid and the star's predicted place, in pixels.
+    pub residual_px: Option<f64>,
+}
+
+/// Where the paper's camera pointed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FieldReport {
+    /// Right ascension of the frame's centre, in degrees.
+    pub ra_deg: f64,
+    /// Its declination, in degrees.
+    pub dec_deg: f64,
+    /// Position angle of image-up there, from north through east, in degrees.
+    pub up_pa_deg: f64,
+    /// Angle that a pixel spans at the centre.
+    pub pixel_scale_arcsec: f64,
+    /// Whether the image is reversed left to right.
+    pub mirrored: bool,
+    /// Root mean square of the residuals, in pixels.
+    pub rms_px: f64,
+    /// log10 of the probability that chance does as well.
+    pub log10_false_alarm: f64,
+    /// Catalogue stars, as bright as the paper's faintest or brighter, in the rectangle that its centroids span.
+    pub stars_as_bright: usize,
+    /// V magnitude of the brightest of them that the paper does not list.
+    pub brightest_unlisted_vmag: Option<f64>,
+}
+
+/// The list that the paper's table is.
+pub(super) fn centroids(published: &Published, scenario: &Scenario) -> CentroidList {
+    let listed = published.stars.iter().map(|star| ListedCentroid {
+        position: star.position(),
+        mag: star.vmag,
+        flux: None,
+    });
+    CentroidList {
+        width: scenario.sensor.width_px,
+        height: scenario.sensor.height_px,
+        photometry: Photometry::JohnsonV,
+        centroids: listed.collect(),
+    }
+}
+
+impl TableReport {
+    pub(super) fn new(
+        published: &Published,
+        scenario: &Scenario,
+        solution: &Solution,
+        catalog: &Catalog,
+    ) -> Self {
+        let found = match &solution.outcome {
+            Outcome::Identified(found) => Some(&**found),
+            Outcome::NotIdentified(_) => None,
+        };
+        let named = |position| {
+            let is_it = |observed: usize| solution.sources[observed].position == position;
+            found.and_then(|found| found.matches.iter().find(|m| is_it(m.observed)))
+        };
+        let mut right = 0;
+        let stars = published.stars.iter().map(|star| {
+            let named = named(star.position());
+            let found_id = named.map(|m| catalog.stars()[m.catalog].id);
+            right += usize::from(found_id == Some(StarId::Skymap(star.skymap_number)));
+            TableStar {
+                paper_id: StarId::Skymap(star.skymap_number).to_string(),
+                found_id: named.map(|m| catalog.designation(m.catalog)),
+                vmag: star.vmag,
+                x_px: star.x_px,
+                y_px: star.y_px,
+                residual_px: named.map(|m| to_decimals(m.residual_px, 3)),
+            }
+        });
+        let stars = stars.collect();
+        let zenith_distance_deg = solution
+            .observation
+            .map(|seen| seen.zenith_distance_rad * DEG_PER_RAD);
+        Self {
+            right,
+            stars,
+            field: found.map(|found| FieldReport::new(published, found, catalog)),
+            stated_zenith_distance_deg: scenario.conditions.zenith_distance_deg,
+            zenith_distance_deg: zenith_distance_deg.map(|deg| to_decimals(deg, 3)),
+            limit_there_vmag: zenith_distance_deg.and_then(|deg| limit_at(scenario, deg)),
+        }
+    }
+}
+
+impl FieldReport {
+    fn new(published: &Published, found: &Identification, catalog: &Catalog) -> Self {
+        let among = stars_among(published, found, catalog);
+        let is_listed = |star: &usize| found.matches.iter().any(|m| m.catalog == *star);
+        let unlisted = among.iter().find(|star| !is_listed(star));
+        let (boresight, up_pa_rad) = found.icrs_to_camera.boresight_and_up();
+        let (ra_rad, dec_rad) = boresight.to_ra_dec();
+        let degrees = |rad: f64| to_decimals(rad * DEG_PER_RAD, 5);
+        Self {
+            ra_deg: degrees(ra_rad),
+            dec_deg: degrees(dec_rad),
+            up_pa_deg: degrees(up_pa_rad),
+            pixel_scale_arcsec: to_decimals(ARCSEC_PER_RAD / found.camera.focal_length_px, 4),
+            mirrored: found.camera.mirrored,
+            rms_px: to_decimals(found.rms_px, 3),
+            log10_false_alarm: to_decimals(found.log10_false_alarm, 1),
+            stars_as_bright: among.len(),
+            brightest_unlisted_vmag: unlisted.map(|star| v_mag(catalog, *star)),
+        }
+    }
+}
+
+/// The limit of `scenario` at another zenith distance; none below the horizon.
+fn limit_at(scenario: &Scenario, zenith_distance_deg: f64) -> Option<f64> {
+    let mut there = scenario.clone();
+    there.conditions.zenith_distance_deg = zenith_distance_deg;
+    there.check().ok()?;
+    Some(to_decimals(Budget::new(&there).limit_vmag, 3))
+}
+
+fn v_mag(catalog: &Catalog, star: usize) -> f64 {
+    to_decimals(f64::from(catalog.stars()[star].v_mag), 3)
+}
+
+/// The catalogue's stars that stand among the paper's centroids and are not fainter than the faintest, brightest first.
+///
+/// How far the paper's frame reached beyond its centroids is not known.
+fn stars_among(published: &Published, found: &Identification, catalog: &Catalog) -> Vec<usize> {
+    let positions = || published.stars.iter().map(PublishedStar::position);
+    let bounds = |axis: fn(PixelPoint) -> f64| {
+        let values = || positions().map(axis);
+        let least = values().fold(f64::INFINITY, f64::min);
+        least - BORDER_PX..=values().fold(f64::NEG_INFINITY, f64::max) + BORDER_PX
+    };
+    let (columns, rows) = (bounds(|p| p.x), bounds(|p| p.y));
+    let years = published.date.years_since_j2000();
+    let is_among = |star: &usize| {
+        let direction = catalog.stars()[*star].direction_at(years);
+        let place = found
+            .camera
+            .pixel_of(&found.icrs_to_camera.apply(&direction));
+        place.is_some_and(|p| columns.contains(&p.x) && rows.contains(&p.y))
+    };
+    let as_bright = catalog.brighter_than(published.faintest_vmag + HALF_A_DIGIT_MAG);
+    (0..as_bright).filter(is_among).collect()
+}
+
+/// The paper's own stars at the edge of the rectangle are within it in spite of their residuals.
+const BORDER_PX: f64 = 2.0;
+/// The paper's magnitudes have two decimals.
+const HALF_A_DIGIT_MAG: f64 = 0.005;

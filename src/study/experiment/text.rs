@@ -1,0 +1,195 @@
+//! An experiment for people: one page.
+
+use super::{ExperimentReport, LimitReport, SimulatedReport, TableReport};
+use crate::base::format::{degrees, hours};
+use std::fmt::Write as _;
+
+/// Zenith distances that differ by more than this, in degrees, are not those of one direction.
+const CONTRADICTION_DEG: f64 = 1.0;
+
+impl ExperimentReport {
+    /// The report as text of several lines, each with its end.
+    pub fn to_text(&self) -> String {
+        let mut text = format!(
+            "Experiment {} of Tong, Li & Wang, Acta Optica Sinica 34, 1004003 (2014)\n  {}, {:.3}° N {:.3}° E, {} s\n",
+            self.experiment, self.date, self.site_lat_deg, self.site_lon_deg, self.exposure_s
+        );
+        text += &limit_text(&self.limit);
+        text += &table_text(&self.table);
+        if let Some(simulated) = &self.simulated {
+            text += &simulated_text(simulated, &self.limit, self.table.stars.len());
+        }
+        text
+    }
+}
+
+fn limit_text(limit: &LimitReport) -> String {
+    let mut text = "\nThe limit\n".to_owned();
+    let _ = writeln!(
+        text,
+        "  V {:.2} by the paper's equations; the paper prints {:.2}, and its faintest star has {:.2}",
+        limit.limit_vmag, limit.paper_limit_vmag, limit.paper_faintest_vmag
+    );
+    let _ = writeln!(
+        text,
+        "  V {:.2} of this detector, which finds half of such stars: its filter adds up the light of a spot",
+        limit.detector_limit_vmag
+    );
+    text
+}
+
+fn table_text(table: &TableReport) -> String {
+    let mut text = format!(
+        "\nThe paper's stars, from its centroids and magnitudes: {} of {} are the paper's\n",
+        table.right,
+        table.stars.len()
+    );
+    let _ = writeln!(
+        text,
+        "  {:<10} {:<14} {:>5} {:>8} {:>8} {:>9}",
+        "paper", "found", "V", "x", "y", "residual"
+    );
+    for star in &table.stars {
+        let residual = star
+            .residual_px
+            .map_or("–".to_owned(), |px| format!("{px:.2} px"));
+        let _ = writeln!(
+            text,
+            "  {:<10} {:<14} {:>5.2} {:>8.2} {:>8.2} {residual:>9}",
+            star.paper_id,
+            star.found_id.as_deref().unwrap_or("–"),
+            star.vmag,
+            star.x_px,
+            star.y_px
+        );
+    }
+    match &table.field {
+        None => text += "  not identified\n",
+        Some(field) => {
+            let _ = writeln!(
+                text,
+                "  centre {} {}, up at {:.1}°, {:.2}″ a pixel, rms {:.2} px = {:.1}″",
+                hours(field.ra_deg, 0),
+                degrees(field.dec_deg, 0),
+                field.up_pa_deg,
+                field.pixel_scale_arcsec,
+                field.rms_px,
+                field.rms_px * field.pixel_scale_arcsec
+            );
+        }
+    }
+    text += &unlisted_text(table);
+    text += &zenith_text(table);
+    text
+}
+
+/// Whether the zenith distance can be as the paper has it.
+fn zenith_text(table: &TableReport) -> String {
+    let Some(found_deg) = table.zenith_distance_deg else {
+        return String::new();
+    };
+    let stated_deg = table.stated_zenith_distance_deg;
+    let both = format!(
+        "  zenith distance {stated_deg}° as stated, {found_deg:.1}° from site, time and centre"
+    );
+    let limit = match table.limit_there_vmag {
+        Some(v_mag) => format!("; there, the limit is V {v_mag:.2}"),
+        None => String::new(),
+    };
+    if (found_deg - stated_deg).abs() > CONTRADICTION_DEG {
+        format!("{both}: they contradict each other{limit}\n")
+    } else {
+        format!("{both}\n")
+    }
+}
+
+/// What the paper could have listed and did not.
+fn unlisted_text(table: &TableReport) -> String {
+    let Some(field) = &table.field else {
+        return String::new();
+    };
+    let v_mags = table.stars.iter().map(|star| star.vmag);
+    let faintest = v_mags.fold(f64::NEG_INFINITY, f64::max);
+    let (all, listed) = (field.stars_as_bright, table.stars.len());
+    match field.brightest_unlisted_vmag {
+        None => format!(
+            "  all {all} stars to V {faintest:.2} in the rectangle that they span are listed\n"
+        ),
+        Some(missing) => format!(
+            "  of the {all} stars to V {faintest:.2} in the rectangle that they span {listed} are listed; those missing begin at V {missing:.2}\n"
+        ),
+    }
+}
+
+fn simulated_text(simulated: &SimulatedReport, limit: &LimitReport, paper_stars: usize) -> String {
+    let mut text = format!(
+        "\n{} frames simulated with that camera, sky and pointing, moved by up to ±{} px: {} identified\n",
+        simulated.frames, simulated.shift_px, simulated.frames_identified
+    );
+    let mut line = |label: &str, value: String| {
+        let _ = writeln!(text, "  {label:<20} {value}");
+    };
+    if let Some(faintest) = &simulated.faintest {
+        let (mean, sigma) = (faintest.mean_vmag, faintest.sigma_mag);
+        let (least, most) = (faintest.least_vmag, faintest.most_vmag);
+        let found = format!("V {mean:.2}, scatter {sigma:.2}, from {least:.2} to {most:.2}");
+        line("faintest star named", found);
+    }
+    if let Some(expected) = &simulated.expected {
+        let (mean, sigma) = (expected.mean_vmag, expected.sigma_mag);
+        let limit = limit.detector_limit_vmag;
+        let why = format!("from the limit of V {limit:.2} and the stars there are");
+        line(
+            "expected of it",
+            format!("V {mean:.2}, scatter {sigma:.2}, {why}"),
+        );
+        let named = simulated.stars_named;
+        let found = expected.stars_found;
+        line(
+            "stars named",
+            format!("{named:.1} a frame, {found:.1} expected"),
+        );
+    }
+    let difference = simulated
+        .faintest
+        .and_then(|f| f.difference_mag.zip(f.difference_sigma_mag));
+    if let Some((difference, sigma)) = difference {
+        line("difference", format!("{difference:+.3} ± {sigma:.3} mag"));
+    }
+    if let Some(expected) = &simulated.expected_by_brightest_pixel {
+        let (mean, sigma, found) = (expected.mean_vmag, expected.sigma_mag, expected.stars_found);
+        let paper = limit.paper_faintest_vmag;
+        let value = format!(
+            "V {mean:.2}, scatter {sigma:.2}, {found:.1} stars; the paper has {paper:.2}, and {paper_stars} stars"
+        );
+        line("by the paper's rule", value);
+    }
+    let (wrong, faintest) = (simulated.named_wrongly, simulated.faintest_wrong);
+    let wrongly = match wrong {
+        0 => "none at the light of another star, or of none".to_owned(),
+        _ => format!("{wrong} on all frames; on {faintest} of these it is the faintest"),
+    };
+    line("named wrongly", wrongly);
+    text += &completeness_text(simulated);
+    text
+}
+
+/// What part of the stars is found, by magnitude.
+fn completeness_text(simulated: &SimulatedReport) -> String {
+    let mut text = format!(
+        "\n  {:<14} {:>8} {:>9} {:>9} {:>9}\n",
+        "V", "stars", "found", "expected", "named"
+    );
+    for bin in &simulated.completeness {
+        let _ = writeln!(
+            text,
+            "  {:<14} {:>8} {:>9} {:>9.1} {:>9}",
+            format!("{:.2} to {:.2}", bin.from_vmag, bin.to_vmag),
+            bin.stars,
+            bin.detected,
+            bin.expected,
+            bin.named
+        );
+    }
+    text
+}

@@ -1,0 +1,5 @@
+//! Is it good enough: validation over simulated frames, robustness of identification, and the paper's experiments.
+
+pub mod experiment;
+pub mod robustness;
+pub mod validation;

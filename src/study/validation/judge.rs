@@ -1,0 +1,392 @@
+//! One frame: what was found in it, beside what is there.
+
+use super::record::{FrameRecord, Kind, Named, StarRecord};
+use super::{BEYOND_LIMIT_MAG, Light, Simulated, Validator};
+use crate::base::format::{to_decimals, to_significant};
+use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
+use crate::identify::{Identification, Outcome};
+use crate::model::sensitivity::{CramerRao, Faintest};
+use crate::model::simulate::TrueStar;
+use crate::pipeline::{Solution, Source};
+use crate::study::robustness::Answer;
+use nalgebra::Vector3;
+use std::collections::HashMap;
+
+/// Other stars that may be detected do not matter further away than so many standard deviations of a spot, and so many pixels.
+const ALONE_SIGMAS: f64 = 8.0;
+const ALONE_PX: f64 = 2.0;
+/// A star so much fainter than the predicted limit may still be detected.
+const MAY_BE_DETECTED_MAG: f64 = 0.5;
+/// Light of others that is less than this part of the error of a star's own light does not matter.
+const ALONE_PART: f64 = 0.05;
+/// A star is whole on the frame so many standard deviations of its spot, and a pixel, from the border.
+const WHOLE_SIGMAS: f64 = 4.0;
+/// A detection is false where within so many standard deviations of a spot, and a pixel, there is no star.
+const DARK_SIGMAS: f64 = 3.0;
+
+/// Digits that are kept of what is measured.
+const DIGITS: i32 = 7;
+
+pub(super) struct Judge<'a> {
+    validator: &'a Validator<'a>,
+    number: u64,
+    simulated: &'a Simulated,
+    solution: &'a Solution,
+    light: Light<'a>,
+    found: Option<&'a Identification>,
+    /// The catalogue's star that each source was named, by source.
+    names: HashMap<usize, usize>,
+    /// Stars fainter than this are left out.
+    faintest_vmag: f64,
+}
+
+/// What the detections are.
+#[derive(Default)]
+struct Verdicts {
+    /// The sources that are stars: the nearest one to each, by the star's number.
+    of_star: HashMap<usize, usize>,
+    /// The others that may be stars.
+    others: Vec<(Kind, usize)>,
+    detected: u64,
+}
+
+impl<'a> Judge<'a> {
+    pub(super) fn new(
+        validator: &'a Validator<'a>,
+        number: u64,
+        simulated: &'a Simulated,
+        solution: &'a Solution,
+    ) -> Self {
+        let found = match &solution.outcome {
+            Outcome::Identified(found) => Some(&**found),
+            Outcome::NotIdentified(_) => None,
+        };
+        let matches = found.map_or(&[][..], |found| &found.matches);
+        Self {
+            validator,
+            number,
+            simulated,
+            solution,
+            light: Light::of(&validator.protocol.setup.scenario, &simulated.truth),
+            found,
+            names: matches.iter().map(|m| (m.observed, m.catalog)).collect(),
+            faintest_vmag: validator.limit_vmag() + BEYOND_LIMIT_MAG,
+        }
+    }
+
+    pub(super) fn records(&self) -> (FrameRecord, Vec<StarRecord>) {
+        let verdicts = self.verdicts();
+        let truth = &self.simulated.truth;
+        let counted = truth.stars.iter().filter(|star| self.counts(star));
+        let mut rows: Vec<StarRecord> = counted
+            .map(|star| self.star_row(star, verdicts.of_star.get(&star.number).copied()))
+            .collect();
+        let other = |&(kind, source): &(Kind, usize)| self.other_row(kind, source);
+        rows.extend(verdicts.others.iter().map(other));
+        let frame = self.frame_row(&verdicts, rows.len());
+        (frame, rows)
+    }
+
+    fn counts(&self, star: &TrueStar) -> bool {
+        star.v_mag <= self.faintest_vmag
+    }
+
+    fn verdicts(&self) -> Verdicts {
+        let mut verdicts = Verdicts::default();
+        let dark_px = DARK_SIGMAS * self.light.sigma_px() + 1.0;
+        for (index, source) in self.solution.sources.iter().enumerate() {
+            if !is_star_like(source) {
+                continue;
+            }
+            verdicts.detected += 1;
+            let place = &source.position;
+            let owner = self.light.owner(place).filter(|star| self.counts(star));
+            let Some(star) = owner else {
+                let mut near = self.light.stars_near(place, dark_px);
+                let kind = match near.any(|star| self.counts(star)) {
+                    true => Kind::Blend,
+                    false => Kind::False,
+                };
+                verdicts.others.push((kind, index));
+                continue;
+            };
+            let distance = |source: usize| {
+                let found = &self.solution.sources[source].position;
+                found.distance_to(&star.position)
+            };
+            let nearest = verdicts.of_star.entry(star.number).or_insert(index);
+            if distance(index) < distance(*nearest) {
+                *nearest = index;
+            }
+        }
+        verdicts
+    }
+
+    fn star_row(&self, star: &TrueStar, source: Option<usize>) -> StarRecord {
+        let catalog = self.validator.pipeline.catalog();
+        let theory = self.validator.spots.theory(&star.position, star.electrons);
+        let bound = |of: fn(&CramerRao) -> f64| {
+            let bound = theory.bound.as_ref().map(of);
+            bound.filter(|b| b.is_finite()).map(significant)
+        };
+        let bound_flux_e = bound(|b| b.sigma_flux_e);
+        let bv_mag = star.catalog.and_then(|known| catalog.stars()[known].bv_mag);
+        let row = StarRecord {
+            frame: self.number,
+            kind: Kind::Star,
+            id: star.catalog.map(|known| catalog.designation(known)),
+            vmag: Some(to_decimals(star.v_mag, 3)),
+            bv_mag: bv_mag.map(|bv| to_decimals(f64::from(bv), 3)),
+            true_x_px: Some(to_decimals(star.position.x, 5)),
+            true_y_px: Some(to_decimals(star.position.y, 5)),
+            true_flux_e: Some(significant(star.electrons)),
+            isolated: Some(self.is_alone(star, bound_flux_e)),
+            saturated: Some(theory.saturated),
+            probability: Some(to_decimals(self.probability(star), 5)),
+            snr: Some(significant(theory.snr)),
+            bound_x_px: bound(|b| b.sigma_x_px),
+            bound_y_px: bound(|b| b.sigma_y_px),
+            bound_flux_e,
+            ..self.empty_row(Kind::Star)
+        };
+        match source {
+            Some(source) => self.with_source(row, source, Some(star)),
+            None => row,
+        }
+    }
+
+    /// The probability that it is found, by the light that it has on this frame.
+    fn probability(&self, star: &TrueStar) -> f64 {
+        let v_mag = self.validator.simulator.light().vmag_of(star.electrons);
+        self.validator.detector.probability(v_mag)
+    }
+
+    /// Whether it is whole on the frame, and what light of others is near it does not matter.
+    fn is_alone(&self, star: &TrueStar, own_error_e: Option<f64>) -> bool {
+        let camera = self.validator.simulator.camera();
+        let sigma_px = self.light.sigma_px();
+        let whole_px = WHOLE_SIGMAS * sigma_px + 1.0;
+        if !camera.nearly_contains(&star.position, -whole_px) {
+            return false;
+        }
+        let bright_vmag = self.validator.limit_vmag() + MAY_BE_DETECTED_MAG;
+        let others = self
+            .light
+            .stars_near(&star.position, ALONE_SIGMAS * sigma_px + ALONE_PX)
+            .filter(|other| other.number != star.number);
+        let mut light_e = 0.0;
+        for other in others {
+            if other.v_mag <= bright_vmag {
+                return false;
+            }
+            // What a filter of the spot's own form makes of it at the star's place.
+            let off = other.position.distance_to(&star.position) / sigma_px;
+            light_e += other.electrons * (-0.25 * off * off).exp();
+        }
+        light_e < ALONE_PART * own_error_e.unwrap_or_else(|| star.electrons.sqrt())
+    }
+
+    /// The row of what was detected and is no star.
+    fn other_row(&self, kind: Kind, source: usize) -> StarRecord {
+        self.with_source(self.empty_row(kind), source, None)
+    }
+
+    fn empty_row(&self, kind: Kind) -> StarRecord {
+        StarRecord {
+            frame: self.number,
+            kind,
+            id: None,
+            vmag: None,
+            bv_mag: None,
+            true_x_px: None,
+            true_y_px: None,
+            true_flux_e: None,
+            isolated: None,
+            saturated: None,
+            probability: None,
+            snr: None,
+            bound_x_px: None,
+            bound_y_px: None,
+            bound_flux_e: None,
+            detected: false,
+            x_px: None,
+            y_px: None,
+            sigma_x_px: None,
+            sigma_y_px: None,
+            flux_e: None,
+            sigma_flux_e: None,
+            named: Named::No,
+        }
+    }
+
+    /// `row` with what was measured of a source; `star` is what it should be named.
+    fn with_source(&self, row: StarRecord, source: usize, star: Option<&TrueStar>) -> StarRecord {
+        let found = &self.solution.sources[source];
+        let sigma = |axis: usize| found.measured.map(|m| significant(m.sigma_px[axis]));
+        let gain = self.validator.protocol.setup.scenario.sensor.gain_e_per_adu;
+        let flux_e = found.flux.map(|flux| flux * gain);
+        let snr = found.measured.map(|m| m.snr);
+        let sigma_flux_e = flux_e.zip(snr).map(|(flux_e, snr)| flux_e / snr);
+        StarRecord {
+            detected: star.is_some(),
+            x_px: Some(to_decimals(found.position.x, 5)),
+            y_px: Some(to_decimals(found.position.y, 5)),
+            sigma_x_px: sigma(0),
+            sigma_y_px: sigma(1),
+            flux_e: flux_e.map(significant),
+            sigma_flux_e: sigma_flux_e.map(significant),
+            named: match self.names.get(&source) {
+                None => Named::No,
+                Some(name) if star.is_some_and(|star| star.catalog == Some(*name)) => Named::Right,
+                Some(_) => Named::Wrong,
+            },
+            ..row
+        }
+    }
+
+    fn frame_row(&self, verdicts: &Verdicts, star_rows: usize) -> FrameRecord {
+        let Self {
+            validator,
+            simulated,
+            solution,
+            ..
+        } = self;
+        let (boresight, up_pa_rad) = simulated.icrs_to_camera.boresight_and_up();
+        let (ra_rad, dec_rad) = boresight.to_ra_dec();
+        let degrees = |rad: f64| to_decimals(rad * DEG_PER_RAD, 7);
+        let limit_vmag = validator.limit_vmag();
+        let truth = &simulated.truth;
+        let v_mags = || truth.stars.iter().map(|star| star.v_mag);
+        // Only the catalogue's stars can be named.
+        let known = truth.stars.iter().filter(|star| star.catalog.is_some());
+        let expected = Faintest::of(known.map(|star| (star.v_mag, self.probability(star))));
+        let count = |of: Kind| {
+            verdicts
+                .others
+                .iter()
+                .filter(|(kind, _)| *kind == of)
+                .count()
+        };
+        let attitude = self.attitude();
+        let errors = |of: fn(&AttitudeError) -> f64| attitude.as_ref().map(of).map(significant);
+        let sensor = &validator.protocol.setup.scenario.sensor;
+        let budget = &validator.budget;
+        let stars = validator.pipeline.catalog().stars();
+        let named = self
+            .names
+            .values()
+            .map(|star| f64::from(stars[*star].v_mag));
+        let [misnamed, misnamed_companions] = self.misnamed();
+        let photometry = solution.photometry.as_ref();
+        let limit = photometry.and_then(|p| p.completeness.limit.as_ref().ok());
+        let background = solution.background.as_ref();
+        FrameRecord {
+            frame: self.number,
+            seed: simulated.seed,
+            ra_deg: degrees(ra_rad),
+            dec_deg: degrees(dec_rad),
+            up_pa_deg: degrees(up_pa_rad),
+            status: self.answer(),
+            reason: match &solution.outcome {
+                Outcome::Identified(_) => None,
+                Outcome::NotIdentified(reason) => Some(reason.code().to_owned()),
+            },
+            stars_above_limit: v_mags().filter(|v_mag| *v_mag < limit_vmag).count() as u64,
+            detected: verdicts.detected,
+            rejected: solution.sources.len() as u64 - verdicts.detected,
+            named: self.names.len() as u64,
+            misnamed,
+            misnamed_companions,
+            false_detections: count(Kind::False) as u64,
+            blends: count(Kind::Blend) as u64,
+            star_rows: star_rows as u64,
+            error_x_arcsec: errors(|a| a.error_arcsec.x),
+            error_y_arcsec: errors(|a| a.error_arcsec.y),
+            error_roll_arcsec: errors(|a| a.error_arcsec.z),
+            sigma_x_arcsec: errors(|a| a.sigma_arcsec[0]),
+            sigma_y_arcsec: errors(|a| a.sigma_arcsec[1]),
+            sigma_roll_arcsec: errors(|a| a.sigma_arcsec[2]),
+            nees: attitude.as_ref().and_then(|a| a.nees).map(significant),
+            focal_error_px: errors(|a| a.focal_error_px),
+            focal_sigma_px: errors(|a| a.focal_sigma_px),
+            rms_px: errors(|a| a.rms_px),
+            faintest_vmag: named.reduce(f64::max).map(|v_mag| to_decimals(v_mag, 3)),
+            expected_faintest_vmag: expected.map(|e| to_decimals(e.mean_vmag, 4)),
+            expected_faintest_sigma_mag: expected.map(|e| to_decimals(e.sigma_mag, 4)),
+            predicted_limit_vmag: to_decimals(limit_vmag, 4),
+            measured_limit_vmag: limit.map(|limit| to_decimals(limit.v_mag, 4)),
+            measured_limit_sigma_mag: limit.map(|limit| to_decimals(limit.sigma_mag, 4)),
+            background_adu: background.map(|b| significant(b.level_adu)),
+            true_background_adu: significant(
+                sensor.bias_adu + truth.background_e / sensor.gain_e_per_adu,
+            ),
+            noise_adu: background.map(|b| significant(b.noise_adu)),
+            true_noise_adu: significant(budget.background_noise_e / sensor.gain_e_per_adu),
+        }
+    }
+
+    fn answer(&self) -> Answer {
+        let truth = self.simulated;
+        self.found.map_or(Answer::None, |found| {
+            Answer::of(
+                found,
+                self.validator.simulator.camera(),
+                &truth.icrs_to_camera,
+            )
+        })
+    }
+
+    /// Sources named as what they are not; and those of them that have the name of a star that stands there as well.
+    fn misnamed(&self) -> [u64; 2] {
+        let (mut wrong, mut companions) = (0, 0);
+        for (source, star) in &self.names {
+            let place = &self.solution.sources[*source].position;
+            let is_it = |other: &TrueStar| other.catalog == Some(*star);
+            if !self.light.owner(place).is_some_and(is_it) {
+                wrong += 1;
+                companions += u64::from(self.light.stars_at(place).any(is_it));
+            }
+        }
+        [wrong, companions]
+    }
+
+    /// How far off a right answer is.
+    fn attitude(&self) -> Option<AttitudeError> {
+        let found = self.found.filter(|_| self.answer() == Answer::Right)?;
+        let truth = &self.simulated.icrs_to_camera;
+        let turn = found.icrs_to_camera.matrix() * truth.matrix().transpose();
+        let half = (turn - turn.transpose()) * 0.5;
+        let error_rad = Vector3::new(half[(2, 1)], half[(0, 2)], half[(1, 0)]);
+        let nees = found
+            .attitude_covariance_rad2
+            .cholesky()
+            .map(|factor| error_rad.dot(&factor.solve(&error_rad)));
+        let camera = self.validator.simulator.camera();
+        Some(AttitudeError {
+            error_arcsec: error_rad * ARCSEC_PER_RAD,
+            sigma_arcsec: found.attitude_sigma_rad().map(|rad| rad * ARCSEC_PER_RAD),
+            nees,
+            focal_error_px: found.camera.focal_length_px - camera.focal_length_px,
+            focal_sigma_px: found.focal_length_sigma_px,
+            rms_px: found.rms_px,
+        })
+    }
+}
+
+/// How far a right answer is off, and how far by its own account.
+struct AttitudeError {
+    error_arcsec: Vector3<f64>,
+    sigma_arcsec: [f64; 3],
+    nees: Option<f64>,
+    focal_error_px: f64,
+    focal_sigma_px: f64,
+    rms_px: f64,
+}
+
+fn is_star_like(source: &Source) -> bool {
+    source.measured.is_some_and(|m| m.flags.is_star_like())
+}
+
+fn significant(value: f64) -> f64 {
+    to_significant(value, DIGITS)
+}

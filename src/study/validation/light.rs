@@ -1,0 +1,132 @@
+//! Whose light a detection is.
+
+use crate::base::coords::PixelPoint;
+use crate::model::sensitivity::Scenario;
+use crate::model::simulate::{TrueStar, Truth};
+
+/// A detection at a star's place is no farther from it than so many pixels, ...
+const AT_PLACE_PX: f64 = 2.0;
+/// ... or, of wide spots, than so many of their standard deviations.
+const AT_PLACE_SIGMAS: f64 = 1.5;
+/// Beyond so many standard deviations a spot has no light.
+const REACH_SIGMAS: f64 = 8.0;
+/// The variance of the places in a pixel.
+const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
+
+/// Where each star's light is.
+pub struct Light<'a> {
+    /// In the order of their rows.
+    stars: Vec<&'a TrueStar>,
+    variance_px2: [f64; 2],
+}
+
+impl<'a> Light<'a> {
+    /// The light of the stars on a frame, and of those beyond its border.
+    pub fn of(scenario: &Scenario, truth: &'a Truth) -> Self {
+        let variance_px2 = scenario.sensor.spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2;
+        let smear_px2 = truth
+            .motion_px
+            .map(|motion_px| motion_px * motion_px / 12.0);
+        let mut stars: Vec<_> = truth.stars.iter().chain(&truth.beyond).collect();
+        stars.sort_by(|a, b| a.position.y.total_cmp(&b.position.y));
+        Self {
+            stars,
+            variance_px2: smear_px2.map(|smear_px2| variance_px2 + smear_px2),
+        }
+    }
+
+    /// The star at this place to which more than half of the light of stars there is due.
+    pub fn owner(&self, place: &PixelPoint) -> Option<&'a TrueStar> {
+        let light = |star: &TrueStar| {
+            let offset = [star.position.x - place.x, star.position.y - place.y];
+            let terms = offset.iter().zip(self.variance_px2);
+            let exponent: f64 = terms.map(|(d, variance)| d * d / variance).sum();
+            star.electrons * (-0.5 * exponent).exp()
+        };
+        let stars = self.within_rows(place, self.reach_px());
+        let all: f64 = stars.iter().map(|star| light(star)).sum();
+        let owner = stars.iter().find(|star| 2.0 * light(star) > all)?;
+        (owner.position.distance_to(place) < self.at_place_px()).then_some(owner)
+    }
+
+    /// The stars at this place: so near that a detection there may be of any of them.
+    pub fn stars_at(&self, place: &PixelPoint) -> impl Iterator<Item = &'a TrueStar> {
+        self.stars_near(place, self.at_place_px())
+    }
+
+    /// The stars within `radius_px` of this place.
+    pub fn stars_near(
+        &self,
+        place: &PixelPoint,
+        radius_px: f64,
+    ) -> impl Iterator<Item = &'a TrueStar> {
+        self.within_rows(place, radius_px)
+            .iter()
+            .copied()
+            .filter(move |star| star.position.distance_to(place) <= radius_px)
+    }
+
+    /// The standard deviation of the light in a spot, along the axis on which it is wider.
+    pub fn sigma_px(&self) -> f64 {
+        self.variance_px2[0].max(self.variance_px2[1]).sqrt()
+    }
+
+    fn at_place_px(&self) -> f64 {
+        AT_PLACE_PX.max(AT_PLACE_SIGMAS * self.sigma_px())
+    }
+
+    fn reach_px(&self) -> f64 {
+        REACH_SIGMAS * self.variance_px2[1].sqrt()
+    }
+
+    fn within_rows(&self, place: &PixelPoint, radius_px: f64) -> &[&'a TrueStar] {
+        let before = |y: f64| self.stars.partition_point(|star| star.position.y < y);
+        &self.stars[before(place.y - radius_px)..before(place.y + radius_px)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::data_sheet::Preset;
+
+    fn star(x: f64, y: f64, electrons: f64) -> TrueStar {
+        TrueStar {
+            number: (x * 1e3 + y) as usize,
+            catalog: None,
+            position: PixelPoint::new(x, y),
+            v_mag: 5.0,
+            electrons,
+        }
+    }
+
+    #[test]
+    fn light_is_owned_by_whom_more_than_half_of_it_is_due() {
+        let scenario = Scenario::of(Preset::Experiment1);
+        let truth = Truth {
+            stars: vec![
+                star(50.0, 50.0, 100.0),
+                star(51.0, 50.0, 100.0),
+                star(80.0, 20.0, 1e6),
+                star(80.5, 20.0, 10.0),
+            ],
+            beyond: vec![star(-1.0, 30.0, 500.0)],
+            ..Truth::default()
+        };
+        let light = Light::of(&scenario, &truth);
+        let owner = |x, y| {
+            light
+                .owner(&PixelPoint::new(x, y))
+                .map(|star| star.position)
+        };
+        assert_eq!(owner(50.5, 50.0), None);
+        assert_eq!(owner(49.9, 50.0), Some(truth.stars[0].position));
+        // A faint star in the light of a bright one owns nothing, not even its own place.
+        assert_eq!(owner(80.5, 20.0), Some(truth.stars[2].position));
+        assert_eq!(owner(0.0, 30.0), Some(truth.beyond[0].position));
+        // Three pixels off there is light of it, but no place.
+        assert_eq!(owner(83.0, 20.0), None);
+        let place = PixelPoint::new(80.0, 21.0);
+        assert_eq!(light.stars_near(&place, 1.05).count(), 1);
+    }
+}

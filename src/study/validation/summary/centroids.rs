@@ -1,0 +1,141 @@
+//! Errors of places and light, against the least that they can be.
+
+use crate::base::format::{to_decimals, to_significant};
+use crate::study::validation::StarRecord;
+use serde::Serialize;
+
+/// The signal-to-noise ratio at which the first bin begins, ...
+const FIRST_SNR: f64 = 4.0;
+/// ... how many bins there are to a factor of two, ...
+const BINS_PER_OCTAVE: f64 = 2.0;
+/// ... and how many in all: to 2900.
+const BINS: usize = 19;
+
+/// How well places and light are measured, of isolated stars that are not saturated, by the signal-to-noise ratio of the matched
+/// filter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CentroidSummary {
+    /// Root mean square of the errors on either axis, each in units of its Cramér-Rao bound, of stars that are detected with a
+    /// probability of 99 % or more.
+    pub ratio: Option<f64>,
+    /// Standard error of that, of Gaussian errors.
+    pub ratio_sigma: Option<f64>,
+    /// Bins without a star are left out.
+    pub bins: Vec<CentroidBin>,
+}
+
+/// Stars of about one signal-to-noise ratio. Errors of places are on one axis.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CentroidBin {
+    /// Signal-to-noise ratio from.
+    pub from_snr: f64,
+    /// To below.
+    pub to_snr: f64,
+    /// Its mean.
+    pub snr: f64,
+    /// Stars detected.
+    pub stars: usize,
+    /// Root mean square of the errors of columns and rows.
+    pub rms_px: f64,
+    /// Root mean square of their Cramér-Rao bounds; none of smeared spots.
+    pub bound_px: Option<f64>,
+    /// The former over the latter.
+    pub ratio: Option<f64>,
+    /// Standard error of that, of Gaussian errors.
+    pub ratio_sigma: Option<f64>,
+    /// Root mean square of the stated standard errors.
+    pub stated_px: f64,
+    /// Mean of the light found over the true.
+    pub flux_part: f64,
+    /// Root mean square of the errors of the light over that of their bounds.
+    pub flux_ratio: Option<f64>,
+}
+
+/// Sums of one bin.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    stars: usize,
+    snr: f64,
+    errors_px2: f64,
+    bounds_px2: f64,
+    stated_px2: f64,
+    flux_part: f64,
+    flux_errors_e2: f64,
+    flux_bounds_e2: f64,
+}
+
+#[derive(Default)]
+pub(super) struct Centroids {
+    bins: [Sums; BINS],
+    sure: usize,
+    /// Sum of the squares of errors in units of their bounds.
+    in_bounds: f64,
+}
+
+impl Centroids {
+    /// Takes in a star with its errors in x, y and light.
+    pub(super) fn add(&mut self, row: &StarRecord, errors: [Option<f64>; 3], is_sure: bool) {
+        let ([Some(dx), Some(dy), Some(flux_error_e)], Some(snr)) = (errors, row.snr) else {
+            return;
+        };
+        let bin = ((snr / FIRST_SNR).log2() * BINS_PER_OCTAVE).floor();
+        if !(0.0..BINS as f64).contains(&bin) {
+            return;
+        }
+        let squared = |value: Option<f64>| value.map_or(f64::NAN, |value| value * value);
+        if is_sure && let (Some(bound_x), Some(bound_y)) = (row.bound_x_px, row.bound_y_px) {
+            self.sure += 1;
+            self.in_bounds += (dx / bound_x).powi(2) + (dy / bound_y).powi(2);
+        }
+        let sums = &mut self.bins[bin as usize];
+        sums.stars += 1;
+        sums.snr += snr;
+        sums.errors_px2 += dx * dx + dy * dy;
+        sums.bounds_px2 += squared(row.bound_x_px) + squared(row.bound_y_px);
+        sums.stated_px2 += squared(row.sigma_x_px) + squared(row.sigma_y_px);
+        sums.flux_part += 1.0 + flux_error_e / row.true_flux_e.unwrap_or(f64::NAN);
+        sums.flux_errors_e2 += flux_error_e * flux_error_e;
+        sums.flux_bounds_e2 += squared(row.bound_flux_e);
+    }
+
+    pub(super) fn finish(self) -> CentroidSummary {
+        let bins = self
+            .bins
+            .iter()
+            .enumerate()
+            .filter(|(_, sums)| sums.stars > 0);
+        let stars = self.sure as f64;
+        let ratio = (self.sure > 0).then(|| (self.in_bounds / (2.0 * stars)).sqrt());
+        CentroidSummary {
+            ratio: ratio.map(|ratio| to_significant(ratio, 5)),
+            ratio_sigma: ratio.map(|ratio| to_significant(ratio / (4.0 * stars).sqrt(), 3)),
+            bins: bins.map(|(bin, sums)| sums.bin(bin)).collect(),
+        }
+    }
+}
+
+impl Sums {
+    fn bin(&self, bin: usize) -> CentroidBin {
+        let stars = self.stars as f64;
+        let edge = |bin: usize| {
+            let snr = FIRST_SNR * (bin as f64 / BINS_PER_OCTAVE).exp2();
+            to_significant(snr, 4)
+        };
+        let on_axis = |sum: f64| (sum / (2.0 * stars)).sqrt();
+        let finite = |value: f64, digits| value.is_finite().then(|| to_significant(value, digits));
+        let ratio = (self.errors_px2 / self.bounds_px2).sqrt();
+        CentroidBin {
+            from_snr: edge(bin),
+            to_snr: edge(bin + 1),
+            snr: to_significant(self.snr / stars, 5),
+            stars: self.stars,
+            rms_px: to_significant(on_axis(self.errors_px2), 5),
+            bound_px: finite(on_axis(self.bounds_px2), 5),
+            ratio: finite(ratio, 5),
+            ratio_sigma: finite(ratio / (4.0 * stars).sqrt(), 3),
+            stated_px: to_significant(on_axis(self.stated_px2), 5),
+            flux_part: to_decimals(self.flux_part / stars, 5),
+            flux_ratio: finite((self.flux_errors_e2 / self.flux_bounds_e2).sqrt(), 5),
+        }
+    }
+}

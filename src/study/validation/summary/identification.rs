@@ -1,0 +1,98 @@
+//! How often frames are identified, and rightly.
+
+use crate::base::format::to_decimals;
+use crate::study::robustness::{Answer, Interval};
+use serde::Serialize;
+
+/// Stars brighter than the limit at which a bin begins.
+const FROM_STARS: [u64; 11] = [0, 4, 6, 8, 10, 15, 20, 30, 50, 100, 200];
+
+/// How many frames were identified, and rightly. Rates are in percent, their intervals of 95 % (Clopper & Pearson).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct IdentificationSummary {
+    /// All frames.
+    #[serde(flatten)]
+    pub all: IdentificationBin,
+    /// By stars brighter than the predicted limit; bins without a frame are left out.
+    pub by_stars: Vec<IdentificationBin>,
+}
+
+/// Frames with so many stars.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct IdentificationBin {
+    /// Stars brighter than the predicted limit, from.
+    pub from_stars: u64,
+    /// To, with it.
+    pub to_stars: u64,
+    /// Frames.
+    pub frames: usize,
+    /// Identified rightly.
+    pub right: usize,
+    /// Identified as what they are not.
+    pub wrong: usize,
+    /// Not identified.
+    pub none: usize,
+    /// Rate of right answers.
+    pub right_percent: f64,
+    /// Its interval's lower end.
+    pub right_low_percent: f64,
+    /// And upper end.
+    pub right_high_percent: f64,
+    /// The upper end of the interval of the rate of wrong answers.
+    pub wrong_high_percent: f64,
+}
+
+impl IdentificationBin {
+    fn new([from_stars, to_stars]: [u64; 2], [right, wrong, none]: [usize; 3]) -> Self {
+        let frames = right + wrong + none;
+        let percent = |part: f64| to_decimals(100.0 * part, 4);
+        let interval = Interval::of(right, frames);
+        Self {
+            from_stars,
+            to_stars,
+            frames,
+            right,
+            wrong,
+            none,
+            right_percent: percent(right as f64 / frames.max(1) as f64),
+            right_low_percent: percent(interval.low),
+            right_high_percent: percent(interval.high),
+            wrong_high_percent: percent(Interval::of(wrong, frames).high),
+        }
+    }
+}
+
+/// Answers, counted.
+#[derive(Default)]
+pub(super) struct Identifications {
+    counts: [[usize; 3]; FROM_STARS.len()],
+    most_stars: u64,
+}
+
+impl Identifications {
+    pub(super) fn add(&mut self, stars: u64, answer: Answer) {
+        let bin = FROM_STARS.partition_point(|from| *from <= stars) - 1;
+        let which = match answer {
+            Answer::Right => 0,
+            Answer::Wrong => 1,
+            Answer::None => 2,
+        };
+        self.counts[bin][which] += 1;
+        self.most_stars = self.most_stars.max(stars);
+    }
+
+    pub(super) fn finish(self) -> IdentificationSummary {
+        let all = (0..3).map(|which| self.counts.iter().map(|bin| bin[which]).sum());
+        let all: Vec<usize> = all.collect();
+        let bin = |(bin, counts): (usize, &[usize; 3])| {
+            let next = FROM_STARS.get(bin + 1).map(|from| from - 1);
+            let to_stars = next.unwrap_or(self.most_stars);
+            IdentificationBin::new([FROM_STARS[bin], to_stars], *counts)
+        };
+        let bins = self.counts.iter().enumerate().map(bin);
+        IdentificationSummary {
+            all: IdentificationBin::new([0, self.most_stars], [all[0], all[1], all[2]]),
+            by_stars: bins.filter(|bin| bin.frames > 0).collect(),
+        }
+    }
+}

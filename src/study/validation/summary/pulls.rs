@@ -1,0 +1,168 @@
+//! Means, scatter and tails of many values.
+
+use crate::base::format::{to_decimals, to_significant};
+use serde::Serialize;
+
+/// Errors in units of their stated standard errors. Where these are true, a pull has a mean of 0, a standard deviation of 1 and
+/// 4.55 % beyond 2.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PullSummary {
+    /// Of the columns of isolated stars that are not saturated and are detected with a probability of 99 % or more.
+    pub x: Pull,
+    /// Of their rows.
+    pub y: Pull,
+    /// Of their light.
+    pub flux: Pull,
+    /// Of the attitude's turn about x.
+    pub attitude_x: Pull,
+    /// About y.
+    pub attitude_y: Pull,
+    /// About the boresight.
+    pub roll: Pull,
+    /// Of the focal length.
+    pub focal_length: Pull,
+}
+
+/// One of them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Pull {
+    /// Values.
+    pub count: usize,
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation about it.
+    pub sd: f64,
+    /// Part of the values further from 0 than 2, in percent.
+    pub beyond_2_percent: f64,
+    /// Than 3.
+    pub beyond_3_percent: f64,
+    /// Than 5.
+    pub beyond_5_percent: f64,
+    /// How often each value is.
+    pub histogram: Histogram,
+}
+
+/// How often values are.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Histogram {
+    /// Where the first bin begins; what is below is counted in none.
+    pub from: f64,
+    /// Width of a bin.
+    pub step: f64,
+    /// Values in each.
+    pub counts: Vec<usize>,
+}
+
+/// Differences of what was measured to what was expected.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DifferenceSummary {
+    /// Frames that have it.
+    pub count: usize,
+    /// Mean.
+    pub mean: f64,
+    /// Standard error of the mean, from the scatter.
+    pub mean_sigma: f64,
+    /// Standard deviation of one.
+    pub sd: f64,
+    /// The standard deviation to be expected, where it is known.
+    pub expected_sd: Option<f64>,
+    /// How often each value is.
+    pub histogram: Histogram,
+}
+
+/// Values, counted.
+pub(super) struct Tally {
+    count: usize,
+    mean: f64,
+    /// Sum of the squares of the differences to the mean.
+    squares: f64,
+    beyond: [usize; 3],
+    step: f64,
+    /// From minus the reach to it.
+    counts: Vec<usize>,
+}
+
+const TAILS: [f64; 3] = [2.0, 3.0, 5.0];
+
+impl Tally {
+    /// With a histogram from −`reach` to `reach`.
+    pub(super) fn new(step: f64, reach: f64) -> Self {
+        let bins = (2.0 * reach / step).round() as usize;
+        Self {
+            count: 0,
+            mean: 0.0,
+            squares: 0.0,
+            beyond: [0; 3],
+            step,
+            counts: vec![0; bins],
+        }
+    }
+
+    /// Welford 1962, Technometrics 4, 419.
+    pub(super) fn add(&mut self, value: f64) {
+        if !value.is_finite() {
+            return;
+        }
+        self.count += 1;
+        let off = value - self.mean;
+        self.mean += off / self.count as f64;
+        self.squares += off * (value - self.mean);
+        for (count, tail) in self.beyond.iter_mut().zip(TAILS) {
+            *count += usize::from(value.abs() > tail);
+        }
+        let bin = (value / self.step).floor() + (self.counts.len() / 2) as f64;
+        if bin >= 0.0
+            && let Some(count) = self.counts.get_mut(bin as usize)
+        {
+            *count += 1;
+        }
+    }
+
+    pub(super) fn add_pull(&mut self, error: Option<f64>, sigma: Option<f64>) {
+        if let (Some(error), Some(sigma)) = (error, sigma) {
+            self.add(error / sigma);
+        }
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
+    fn sd(&self) -> f64 {
+        (self.squares / self.count.saturating_sub(1).max(1) as f64).sqrt()
+    }
+
+    fn histogram(&self) -> Histogram {
+        Histogram {
+            from: to_decimals(-self.step * (self.counts.len() / 2) as f64, 6),
+            step: self.step,
+            counts: self.counts.clone(),
+        }
+    }
+
+    pub(super) fn pull(self) -> Pull {
+        let percent =
+            |count: usize| to_decimals(100.0 * count as f64 / self.count.max(1) as f64, 4);
+        Pull {
+            count: self.count,
+            mean: to_decimals(self.mean, 4),
+            sd: to_decimals(self.sd(), 4),
+            beyond_2_percent: percent(self.beyond[0]),
+            beyond_3_percent: percent(self.beyond[1]),
+            beyond_5_percent: percent(self.beyond[2]),
+            histogram: self.histogram(),
+        }
+    }
+
+    pub(super) fn difference(self, expected_sd: Option<f64>) -> DifferenceSummary {
+        let of_mean = self.sd() / (self.count.max(1) as f64).sqrt();
+        DifferenceSummary {
+            count: self.count,
+            mean: to_significant(self.mean, 5),
+            mean_sigma: to_significant(of_mean, 3),
+            sd: to_significant(self.sd(), 5),
+            expected_sd: expected_sd.map(|sd| to_significant(sd, 5)),
+            histogram: self.histogram(),
+        }
+    }
+}

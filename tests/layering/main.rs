@@ -1,0 +1,177 @@
+//! The structure of `src`: rooms in one order, no circle between files, and a command line that sees the public library only.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
+mod source;
+
+use source::{Crate, ModulePath};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// The rooms from the ground up, and for each the rooms below that it uses.
+const ROOMS: &[(&str, &[&str])] = &[
+    ("base", &[]),
+    ("sky", &["base"]),
+    ("frame", &["base", "sky"]),
+    ("camera", &["base"]),
+    ("calibration", &["base", "frame"]),
+    ("detect", &["base", "frame"]),
+    ("identify", &["base", "sky", "frame", "camera", "detect"]),
+    ("model", &["base", "sky", "frame", "camera", "detect"]),
+    (
+        "photometry",
+        &["base", "sky", "camera", "detect", "identify", "model"],
+    ),
+    (
+        "pipeline",
+        &[
+            "base",
+            "sky",
+            "frame",
+            "camera",
+            "calibration",
+            "detect",
+            "identify",
+            "photometry",
+        ],
+    ),
+    (
+        "report",
+        &[
+            "base",
+            "sky",
+            "frame",
+            "camera",
+            "calibration",
+            "detect",
+            "identify",
+            "photometry",
+            "pipeline",
+        ],
+    ),
+    (
+        "study",
+        &[
+            "base",
+            "sky",
+            "frame",
+            "camera",
+            "detect",
+            "identify",
+            "model",
+            "photometry",
+            "pipeline",
+        ],
+    ),
+];
+
+fn src() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+fn room(module: &ModulePath) -> &str {
+    module.first().map_or("lib", String::as_str)
+}
+
+/// Which rooms of the library each room uses, by what its files use.
+fn uses_of_rooms(library: &Crate) -> BTreeMap<String, BTreeSet<String>> {
+    let mut rooms: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for (user, used) in library.uses() {
+        let others = used.iter().map(|used| room(used).to_owned());
+        let others = others.filter(|used| used != room(user));
+        rooms
+            .entry(room(user).to_owned())
+            .or_default()
+            .extend(others);
+    }
+    rooms
+}
+
+#[test]
+fn the_rooms_are_those_of_the_table() {
+    let library = Crate::read(&src());
+    let outside = ["lib", "main", "cli"];
+    let found: BTreeSet<&str> = library.files().map(|(module, _)| room(module)).collect();
+    let found: Vec<_> = found
+        .iter()
+        .filter(|room| !outside.contains(room))
+        .collect();
+    let mut known: Vec<_> = ROOMS.iter().map(|(room, _)| room).collect();
+    known.sort();
+    assert_eq!(found, known);
+}
+
+#[test]
+fn a_room_may_use_rooms_below_it_only() {
+    for (place, (room, used)) in ROOMS.iter().enumerate() {
+        let below: Vec<_> = ROOMS[..place].iter().map(|(room, _)| room).collect();
+        assert!(used.iter().all(|used| below.contains(&used)), "{room}");
+    }
+}
+
+#[test]
+fn every_room_uses_what_the_table_says_and_no_more() {
+    let uses = uses_of_rooms(&Crate::read(&src()));
+    for (room, allowed) in ROOMS {
+        let allowed: BTreeSet<_> = allowed.iter().map(|&used| used.to_owned()).collect();
+        let found = &uses[*room];
+        let breaches: Vec<_> = found.difference(&allowed).collect();
+        let unused: Vec<_> = allowed.difference(found).collect();
+        assert!(breaches.is_empty(), "{room} uses {breaches:?}");
+        assert!(unused.is_empty(), "{room} does not use {unused:?}");
+    }
+}
+
+#[test]
+fn no_files_use_each_other_in_a_circle() {
+    let library = Crate::read(&src());
+    let uses = library.uses();
+    let circles = circles(&uses);
+    let shown: Vec<String> = circles
+        .iter()
+        .map(|circle| {
+            let names: Vec<_> = circle.iter().map(|module| module.join("::")).collect();
+            names.join(" ")
+        })
+        .collect();
+    println!("{} circles: {shown:#?}", shown.len());
+    assert!(shown.len() <= 19);
+}
+
+/// The sets of modules of which each is reached from each other.
+fn circles<'a>(
+    uses: &BTreeMap<&'a ModulePath, BTreeSet<&'a ModulePath>>,
+) -> Vec<BTreeSet<&'a ModulePath>> {
+    let reached = |start: &'a ModulePath| {
+        let mut reached = BTreeSet::new();
+        let mut open: Vec<&ModulePath> = uses[start].iter().copied().collect();
+        while let Some(module) = open.pop() {
+            if reached.insert(module) {
+                open.extend(&uses[module]);
+            }
+        }
+        reached
+    };
+    let reached: BTreeMap<_, _> = uses
+        .keys()
+        .map(|&module| (module, reached(module)))
+        .collect();
+    let circle = |module: &&'a ModulePath| -> BTreeSet<&'a ModulePath> {
+        let others = reached[*module].iter().copied();
+        others
+            .filter(|other| reached[*other].contains(*module))
+            .collect()
+    };
+    let found: BTreeSet<_> = uses.keys().map(circle).filter(|c| !c.is_empty()).collect();
+    found.into_iter().collect()
+}
+
+#[test]
+fn the_command_line_uses_the_public_library_only() {
+    for file in source::rust_files(&src().join("cli")) {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let inside = text.matches("crate::").count();
+        let own = text.matches("crate::cli").count() + text.matches("$crate::").count();
+        assert_eq!(inside, own, "{}", file.display());
+    }
+}
