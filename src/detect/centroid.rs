@@ -1,6 +1,6 @@
 //! The grey-weighted centroid.
 
-use super::Detection;
+use super::detection::Detection;
 use super::fit::{Fit, NoiseModel, window_radius};
 use super::scene::{FitWork, Scene};
 use crate::base::coords::PixelPoint;

@@ -1,7 +1,10 @@
 //! From peaks to detections: groups of touching spots, centroids by the chosen method, flags.
 
+use super::Worker;
 use super::centroid;
 use super::components::{Peak, Region};
+use super::config::CentroidMethod;
+use super::detection::{Detection, DetectionFlags};
 use super::fit::{Fit, FitConfig, MAX_SPOTS, NoiseModel, Spot, Spots, window_radius};
 use super::plateau::Plateau;
 use super::psf::PIXEL_VARIANCE_PX2;
@@ -9,7 +12,6 @@ use super::scene::{FitWork, Scene};
 use super::shape;
 use super::strips::on_each;
 use super::view::View;
-use super::{CentroidMethod, Detection, DetectionFlags, Worker};
 use crate::base::coords::PixelPoint;
 use std::mem;
 

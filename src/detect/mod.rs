@@ -33,6 +33,9 @@ mod blocks;
 mod calibrate;
 mod centroid;
 mod components;
+mod config;
+mod detection;
+mod error;
 mod expected;
 mod fit;
 mod matched_filter;
@@ -51,9 +54,11 @@ mod threshold;
 mod view;
 
 pub use background_map::BackgroundMap;
+pub use config::{CentroidMethod, DetectConfig};
+pub use detection::{Detection, DetectionFlags, Detections};
+pub use error::DetectError;
 pub use expected::FilterModel;
 
-use crate::base::coords::PixelPoint;
 use crate::frame::{Frame, MIN_SIDE_PX};
 use background::{CellScratch, Mesh, MeshConfig};
 use blocks::BlockMaxima;
@@ -70,149 +75,34 @@ use std::ops::Range;
 use strips::Strips;
 use view::View;
 
-/// One detected source, in the frame's own units.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Detection {
-    /// The centroid.
-    pub position: PixelPoint,
-    /// Standard error of the centroid in x, in pixels: of noise and of the imperfect spot model.
-    pub sigma_x_px: f64,
-    /// Standard error of the centroid in y, in pixels.
-    pub sigma_y_px: f64,
-    /// Flux above the background, in ADU: of the fitted spot, also where its core is saturated.
-    pub flux_adu: f64,
-    /// Brightest pixel above the background, in ADU.
-    pub peak_adu: f64,
-    /// Flux over its noise: that of the background, and of the star's own light as far as the frame's
-    /// bright stars tell it. The spot model's error is not in it, else no star would exceed some 30;
-    /// it is in the standard errors of the centroid.
-    pub snr: f64,
-    /// What is unusual about it.
-    pub flags: DetectionFlags,
-}
-
-/// What is unusual about a detection.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct DetectionFlags {
-    /// The core reaches the detector's full scale.
-    pub saturated: bool,
-    /// Sharper than any spot of this camera: a hot pixel or a cosmic ray.
-    pub hot_pixel: bool,
-    /// Elongated well beyond the spot: a satellite, an aircraft, a streak.
-    pub trail: bool,
-    /// Wider than a spot: a galaxy, a comet, a lamp, an edge of the landscape.
-    pub extended: bool,
-    /// Touches another detection, and was fitted together with it.
-    pub blended: bool,
-    /// Cut by the frame's border.
-    pub border: bool,
-}
-
-impl DetectionFlags {
-    /// Whether the source may be a star at the position given.
-    pub fn is_star_like(&self) -> bool {
-        !(self.hot_pixel || self.trail || self.extended)
+/// Refuses frames and options that make no sense.
+fn check(frame: &Frame, config: &DetectConfig) -> Result<(), DetectError> {
+    let (width, height) = (frame.width, frame.height);
+    if width < MIN_SIDE_PX || height < MIN_SIDE_PX {
+        return Err(DetectError::FrameTooSmall { width, height });
     }
-}
-
-/// All sources of a frame.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Detections {
-    /// Brightest first.
-    pub sources: Vec<Detection>,
-    /// Median background, in ADU.
-    pub background_adu: f64,
-    /// Median standard deviation of a pixel's background, in ADU.
-    pub noise_adu: f64,
-    /// Standard deviation of the Gaussian spot before pixel integration, in pixels.
-    pub spot_sigma_px: f64,
-}
-
-/// How positions are measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub enum CentroidMethod {
-    /// Variance-weighted least-squares fit of a pixel-integrated Gaussian.
-    #[default]
-    GaussianFit,
-    /// Mean of the pixels' positions, weighted with their grey level above a threshold.
-    GreyWeighted,
-}
-
-/// Options of [`detect`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct DetectConfig {
-    /// Wanted number of false detections in a million pixels of pure noise.
-    pub false_alarms_per_mpx: f64,
-    /// Threshold in standard deviations of the filtered noise; overrides `false_alarms_per_mpx`.
-    pub threshold_sigma: Option<f64>,
-    /// Standard deviation of the spot before pixel integration, in pixels; measured where `None`.
-    pub spot_sigma_px: Option<f64>,
-    /// How positions are measured.
-    pub centroid: CentroidMethod,
-    /// Side of the cells in which background and noise are measured, in pixels.
-    pub cell_px: usize,
-    /// At most so many detections, the strongest.
-    pub max_detections: usize,
-    /// The level from which on a pixel is saturated, in ADU, where that is below what the frame's format says.
-    pub saturation_adu: Option<f64>,
-}
-
-impl DetectConfig {
-    /// Default of [`Self::false_alarms_per_mpx`]: one in ten frames of a megapixel.
-    pub const DEFAULT_FALSE_ALARMS_PER_MPX: f64 = 0.1;
-    /// Default of [`Self::cell_px`]: well above any spot, well below a vignette.
-    pub const DEFAULT_CELL_PX: usize = 64;
-    /// Default of [`Self::max_detections`].
-    pub const DEFAULT_MAX_DETECTIONS: usize = 20_000;
-}
-
-impl Default for DetectConfig {
-    fn default() -> Self {
-        Self {
-            false_alarms_per_mpx: Self::DEFAULT_FALSE_ALARMS_PER_MPX,
-            threshold_sigma: None,
-            spot_sigma_px: None,
-            centroid: CentroidMethod::default(),
-            cell_px: Self::DEFAULT_CELL_PX,
-            max_detections: Self::DEFAULT_MAX_DETECTIONS,
-            saturation_adu: None,
+    if frame.pixels.len() != width * height {
+        return Err(DetectError::WrongLength {
+            expected: width * height,
+            found: frame.pixels.len(),
+        });
+    }
+    let positive = [
+        ("false_alarms_per_mpx", config.false_alarms_per_mpx),
+        ("threshold_sigma", config.threshold_sigma.unwrap_or(1.0)),
+        ("spot_sigma_px", config.spot_sigma_px.unwrap_or(1.0)),
+        ("cell_px", config.cell_px as f64),
+    ];
+    for (name, found) in positive {
+        if !(found > 0.0 && found.is_finite()) {
+            return Err(DetectError::Config {
+                name,
+                found,
+                expected: "a number above 0",
+            });
         }
     }
-}
-
-/// Why stars could not be looked for.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum DetectError {
-    /// A side is shorter than [`MIN_SIDE_PX`].
-    #[error(
-        "frame of {width} x {height} pixels is too small: expected at least {MIN_SIDE_PX} on each side"
-    )]
-    FrameTooSmall {
-        /// Columns.
-        width: usize,
-        /// Rows.
-        height: usize,
-    },
-    /// The frame's pixels are not `width * height`.
-    #[error("frame holds {found} pixels, expected {expected} (width times height)")]
-    WrongLength {
-        /// Width times height.
-        expected: usize,
-        /// The pixels there are.
-        found: usize,
-    },
-    /// An option has a value without meaning.
-    #[error("{name} is {found}, expected {expected}")]
-    Config {
-        /// The option.
-        name: &'static str,
-        /// Its value.
-        found: f64,
-        /// What it may be.
-        expected: &'static str,
-    },
+    Ok(())
 }
 
 /// Buffers that are reused from frame to frame; the result does not depend on what was in them.
@@ -778,36 +668,6 @@ fn scene_of<'a>(
         spot_px: calibration.spot_px,
         matched_gain: calibration.kernel.matched_gain(),
     }
-}
-
-/// Refuses frames and options that make no sense.
-fn check(frame: &Frame, config: &DetectConfig) -> Result<(), DetectError> {
-    let (width, height) = (frame.width, frame.height);
-    if width < MIN_SIDE_PX || height < MIN_SIDE_PX {
-        return Err(DetectError::FrameTooSmall { width, height });
-    }
-    if frame.pixels.len() != width * height {
-        return Err(DetectError::WrongLength {
-            expected: width * height,
-            found: frame.pixels.len(),
-        });
-    }
-    let positive = [
-        ("false_alarms_per_mpx", config.false_alarms_per_mpx),
-        ("threshold_sigma", config.threshold_sigma.unwrap_or(1.0)),
-        ("spot_sigma_px", config.spot_sigma_px.unwrap_or(1.0)),
-        ("cell_px", config.cell_px as f64),
-    ];
-    for (name, found) in positive {
-        if !(found > 0.0 && found.is_finite()) {
-            return Err(DetectError::Config {
-                name,
-                found,
-                expected: "a number above 0",
-            });
-        }
-    }
-    Ok(())
 }
 
 /// The result for a frame without light.

@@ -9,8 +9,8 @@
 //! noise; for a hot pixel the mean is +d². A source is flagged where a single pixel fits better
 //! (D > 0) and a star would have a D that high in under one of 150 cases.
 
-use super::Detection;
 use super::components::{Peak, Region};
+use super::detection::Detection;
 use super::fit::{Fit, FitConfig, NoiseModel, Spot};
 use super::measure::Measurement;
 use super::scene::FitWork;

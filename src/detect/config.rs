@@ -1,0 +1,54 @@
+//! Options of detection.
+
+/// How positions are measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum CentroidMethod {
+    /// Variance-weighted least-squares fit of a pixel-integrated Gaussian.
+    #[default]
+    GaussianFit,
+    /// Mean of the pixels' positions, weighted with their grey level above a threshold.
+    GreyWeighted,
+}
+
+/// Options of [`detect`](super::detect).
+#[derive(Debug, Clone, PartialEq)]
+pub struct DetectConfig {
+    /// Wanted number of false detections in a million pixels of pure noise.
+    pub false_alarms_per_mpx: f64,
+    /// Threshold in standard deviations of the filtered noise; overrides `false_alarms_per_mpx`.
+    pub threshold_sigma: Option<f64>,
+    /// Standard deviation of the spot before pixel integration, in pixels; measured where `None`.
+    pub spot_sigma_px: Option<f64>,
+    /// How positions are measured.
+    pub centroid: CentroidMethod,
+    /// Side of the cells in which background and noise are measured, in pixels.
+    pub cell_px: usize,
+    /// At most so many detections, the strongest.
+    pub max_detections: usize,
+    /// The level from which on a pixel is saturated, in ADU, where that is below what the frame's format says.
+    pub saturation_adu: Option<f64>,
+}
+
+impl DetectConfig {
+    /// Default of [`Self::false_alarms_per_mpx`]: one in ten frames of a megapixel.
+    pub const DEFAULT_FALSE_ALARMS_PER_MPX: f64 = 0.1;
+    /// Default of [`Self::cell_px`]: well above any spot, well below a vignette.
+    pub const DEFAULT_CELL_PX: usize = 64;
+    /// Default of [`Self::max_detections`].
+    pub const DEFAULT_MAX_DETECTIONS: usize = 20_000;
+}
+
+impl Default for DetectConfig {
+    fn default() -> Self {
+        Self {
+            false_alarms_per_mpx: Self::DEFAULT_FALSE_ALARMS_PER_MPX,
+            threshold_sigma: None,
+            spot_sigma_px: None,
+            centroid: CentroidMethod::default(),
+            cell_px: Self::DEFAULT_CELL_PX,
+            max_detections: Self::DEFAULT_MAX_DETECTIONS,
+            saturation_adu: None,
+        }
+    }
+}

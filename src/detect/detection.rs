@@ -1,0 +1,61 @@
+//! The sources of a frame, as detection reports them.
+
+use crate::base::coords::PixelPoint;
+
+/// One detected source, in the frame's own units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Detection {
+    /// The centroid.
+    pub position: PixelPoint,
+    /// Standard error of the centroid in x, in pixels: of noise and of the imperfect spot model.
+    pub sigma_x_px: f64,
+    /// Standard error of the centroid in y, in pixels.
+    pub sigma_y_px: f64,
+    /// Flux above the background, in ADU: of the fitted spot, also where its core is saturated.
+    pub flux_adu: f64,
+    /// Brightest pixel above the background, in ADU.
+    pub peak_adu: f64,
+    /// Flux over its noise: that of the background, and of the star's own light as far as the frame's
+    /// bright stars tell it. The spot model's error is not in it, else no star would exceed some 30;
+    /// it is in the standard errors of the centroid.
+    pub snr: f64,
+    /// What is unusual about it.
+    pub flags: DetectionFlags,
+}
+
+/// What is unusual about a detection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct DetectionFlags {
+    /// The core reaches the detector's full scale.
+    pub saturated: bool,
+    /// Sharper than any spot of this camera: a hot pixel or a cosmic ray.
+    pub hot_pixel: bool,
+    /// Elongated well beyond the spot: a satellite, an aircraft, a streak.
+    pub trail: bool,
+    /// Wider than a spot: a galaxy, a comet, a lamp, an edge of the landscape.
+    pub extended: bool,
+    /// Touches another detection, and was fitted together with it.
+    pub blended: bool,
+    /// Cut by the frame's border.
+    pub border: bool,
+}
+
+impl DetectionFlags {
+    /// Whether the source may be a star at the position given.
+    pub fn is_star_like(&self) -> bool {
+        !(self.hot_pixel || self.trail || self.extended)
+    }
+}
+
+/// All sources of a frame.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Detections {
+    /// Brightest first.
+    pub sources: Vec<Detection>,
+    /// Median background, in ADU.
+    pub background_adu: f64,
+    /// Median standard deviation of a pixel's background, in ADU.
+    pub noise_adu: f64,
+    /// Standard deviation of the Gaussian spot before pixel integration, in pixels.
+    pub spot_sigma_px: f64,
+}
