@@ -1,4 +1,4 @@
-"""The peers' side of bench-peers: orders come line by line as JSON, and each is answered with a line.
+"""The peers' side of bench-peers: reads orders as lines of JSON, answers each with a line.
 
 usage: bench_peers_worker.py FROM:TO CACHE_DIR
 """
@@ -12,7 +12,7 @@ import numpy
 from PIL import Image
 
 FROM, TO = (float(degrees) for degrees in sys.argv[1].split(":"))
-# The solvers are given no more than so many of the brightest.
+# The solvers are given at most this many stars, the brightest.
 MOST = 60
 TETRA3RS_SIGMA = 5.0
 SEP_SIGMA = 1.5

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Holds frames of `starpipe simulate` against an independent reckoning of what must be on them.
+"""Compares frames of `starpipe simulate` with an independent computation.
 
     python3 scripts/check-simulator.py target/release/starpipe ../shared/sky2000/SKYMAP_SKY2000_V5R4.gz [CHECK...]
 
-Takes the program and the SKY2000 catalogue; needs numpy and astropy. Star positions come from the catalogue's
-own columns, proper motion from astropy, projection, photometry, rotation and moonlight from the published
-equations, written down here a second time; pixels are read back from the FITS files. Prints every figure beside what is expected
-and ends with 1 where one is off by more than its tolerance. CHECK names those wanted: positions flux dark flat pattern
-smear strays sky full.
+Takes the program and the SKY2000 catalogue; needs numpy and astropy. Star positions come from the
+catalogue's columns, proper motion from astropy; projection, photometry, rotation and moonlight from
+the published equations, implemented here a second time. Pixels are read from the FITS files. Prints
+every value beside the expected one, and exits with 1 if one is off by more than its tolerance.
+CHECK selects checks: positions flux dark flat pattern smear strays sky full.
 """
 
 import csv
@@ -28,12 +28,12 @@ from astropy.wcs import WCS
 
 POSITION_TOLERANCE_PX = 0.01
 FLUX_TOLERANCE = 1e-3
-# Means, variances and counts may be off by so many of their standard errors.
+# Tolerance of means, variances and counts, in standard errors.
 SIGMAS = 4.5
 
 
 class Checks:
-    """Runs the program, and counts what is wrong."""
+    """Runs the program, and records whether a check failed."""
 
     def __init__(self, program, catalog, directory):
         self.program, self.catalog, self.directory = program, catalog, pathlib.Path(directory)
@@ -61,7 +61,7 @@ class Checks:
         return path, tomllib.loads(path.read_text())
 
     def frames(self, camera, *options, count=1):
-        """Pixels and headers of the frames made, and the rows of their tables."""
+        """Pixels and headers of the simulated frames, and the rows of their tables."""
         self.runs += 1
         out = self.directory / f"run-{self.runs}"
         command = [self.program, "simulate", "--camera", camera, "--catalog", self.catalog]
@@ -82,7 +82,7 @@ class Checks:
         return self.frames(camera, *options)[0]
 
     def star(self, number):
-        """Right ascension, declination (degrees), proper motions (mas a year, on the sky), V and B-V of a Skymap number."""
+        """RA, Dec (degrees), proper motions (mas a year, on the sky), V and B-V of a Skymap number."""
         if not self.stars:
             for line in gzip.open(self.catalog, "rt", encoding="latin-1"):
                 if line[27:35].strip():
@@ -97,11 +97,11 @@ class Checks:
         return ra, dec, pm_ra, 1e3 * value(158, 165), value(233, 238), value(259, 264)
 
 
-# --- where stars stand ----------------------------------------------------------------------------------------------
+# --- star positions -------------------------------------------------------------------------------
 
 
 def matrix(ra_deg, dec_deg, roll_deg):
-    """The rows are the camera's axes in ICRS: x right, y down, z out; up has the position angle `roll_deg`."""
+    """Rows: camera axes in ICRS, x right, y down, z out; up has the position angle `roll_deg`."""
     ra, dec, roll = np.radians([ra_deg, dec_deg, roll_deg])
     east = np.array([-np.sin(ra), np.cos(ra), 0])
     north = np.array([-np.sin(dec) * np.cos(ra), -np.sin(dec) * np.sin(ra), np.cos(dec)])
@@ -125,7 +125,7 @@ class Lens:
         self.mirrored = toml.get("mirrored", False)
 
     def ideal(self, observed):
-        """Observed offsets to those of a pinhole: r (1 - d r^2) - (r^2 P + 2 (P.r) r), P a third of the decentring."""
+        """From observed to ideal: r (1 - d r^2) - (r^2 P + 2 (P.r) r), P a third of the decentring."""
         r = observed / self.radius
         square = np.sum(r * r, axis=-1, keepdims=True)
         third = self.decentring / 3
@@ -133,7 +133,7 @@ class Lens:
         return observed - self.distortion * square * r - (square * third + 2 * along * r)
 
     def pixels(self, directions):
-        """Pixels of unit vectors in camera axes; the polynomial is inverted by Newton's method."""
+        """Pixels of unit vectors in camera axes; inverts the polynomial by Newton's method."""
         ideal = self.focal_px * directions[..., :2] / directions[..., 2:]
         observed = ideal.copy()
         for _ in range(30):
@@ -195,21 +195,21 @@ def positions(checks):
         print(f"positions: {name}, {len(rows)} stars")
         here = Lens(toml).pixels(unit(star_ra, star_dec) @ matrix(ra, dec, roll).T)
         off = np.max(np.hypot(*(here - seen).T))
-        checks.hold("farthest from the second projection (px)", off, 0, POSITION_TOLERANCE_PX)
+        checks.hold("largest distance from the second projection (px)", off, 0, POSITION_TOLERANCE_PX)
         wcs = WCS(header)
         by_wcs = np.array(wcs.all_world2pix(star_ra, star_dec, 0, tolerance=1e-8, maxiter=200)).T
         off = np.max(np.hypot(*(by_wcs - seen).T))
-        checks.hold("farthest from astropy's reading of the header (px)", off, 0, POSITION_TOLERANCE_PX)
+        checks.hold("largest distance from astropy with the header (px)", off, 0, POSITION_TOLERANCE_PX)
         sky_ra, sky_dec = np.array([[float(row["ra_deg"]), float(row["dec_deg"])] for row in rows]).T
         off = np.max(np.linalg.norm(unit(sky_ra, sky_dec) - unit(star_ra, star_dec), axis=1))
-        checks.hold("farthest of the table's directions (arcsec)", np.degrees(off) * 3600, 0, 0.01)
+        checks.hold("largest error of the table's directions (arcsec)", np.degrees(off) * 3600, 0, 0.01)
 
 
-# --- how bright they are --------------------------------------------------------------------------------------------
+# --- flux -----------------------------------------------------------------------------------------
 
 
 def photons(nm, temperature_k):
-    """Photons of a black body of V = 0, per second, m^2 and nm; 1005 per second, cm^2 and angstrom at 550 nm."""
+    """Photons / (s m^2 nm) of a black body of V = 0; 1005 / (s cm^2 angstrom) at 550 nm."""
     planck = lambda nm: nm**-4.0 / np.expm1(1.438776877e7 / (nm * temperature_k))
     return 1005e5 * planck(nm) / planck(550.0)
 
@@ -232,7 +232,7 @@ def kasten_young(z_deg):
     return 1 / (np.cos(np.radians(z_deg)) + 0.50572 * (96.07995 - z_deg) ** -1.6364)
 
 
-# Without noise of its own: what is left is that of the photons.
+# A detector without noise: only photon noise is left.
 CLEAN = {
     "width_px": 400,
     "height_px": 300,
@@ -260,7 +260,7 @@ def flux(checks):
         lens = Lens(toml)
         print(f"flux: zenith distance {z_deg}°, {' '.join(map(str, options)) or 'the law of extinction'}, vignetting {vignetting}")
         for name, ra, dec in pointings:
-            # Away from the centre, so that vignetting counts.
+            # Away from the centre, so that vignetting matters.
             turn = ["--ra", ra, "--dec", dec + (0.7 if vignetting else 0.0), "--roll", 30]
             deep = [*turn, *DARK_SKY, *options, "--exposure-s", 1000, "--zenith-distance-deg", z_deg]
             pixels, header, rows = checks.frame(camera, *deep, "--faintest-vmag", 1.5)
@@ -287,7 +287,7 @@ def flux(checks):
     checks.hold("light over that expected", pixels.mean() * header["EGAIN"] / expected, 1.0, FLUX_TOLERANCE)
 
 
-# --- noise and pattern ----------------------------------------------------------------------------------------------
+# --- noise and pattern ----------------------------------------------------------------------------
 
 
 def moments(checks, what, values, mean, variance):
@@ -351,7 +351,7 @@ def pattern(checks):
     camera, _ = checks.camera(**size, dark_current_e_s=rate, dark_current_sigma=0.4)
     print("pattern: dark current of pixels 40 %")
     currents = stack(checks, camera, "--dark", "--exposure-s", exposure)
-    # A log-normal distribution has a kurtosis of its own.
+    # Kurtosis of a log-normal distribution.
     w = 1 + 0.4**2
     kurtosis = w**4 + 2 * w**3 + 3 * w**2 - 3
     mean = currents.mean(axis=0)
@@ -370,11 +370,11 @@ def pattern(checks):
     checks.hold("their mean current (e/s)", hot.mean(), 840, SIGMAS * 800 / np.sqrt(hot.size))
 
 
-# --- what moves -----------------------------------------------------------------------------------------------------
+# --- motion ---------------------------------------------------------------------------------------
 
 
 def trail_of(pixels, empty):
-    """Middle and covariance of the light of a star."""
+    """Centroid and covariance of the light of a star."""
     light = pixels - empty
     y, x = np.mgrid[: light.shape[0], : light.shape[1]]
     total = light.sum()
@@ -400,7 +400,7 @@ def smear(checks):
         pixels, _, rows = checks.frame(camera, *options, "--faintest-vmag", 1)
         empty, _, _ = checks.frame(camera, *options, "--faintest-vmag", -5)
         star = next(row for row in rows if row["kind"] == "star")
-        # The camera's axes after a time t: turned about themselves by the rate; what is seen turns the other way.
+        # The camera turns about its own axes at the rate; directions turn the other way.
         direction = unit(*checks.star(star["id"])[:2]) @ matrix(ra, dec, roll).T
         path = []
         turn = -np.radians(rates)
@@ -446,7 +446,7 @@ def noise_of_smear(checks):
     checks.hold("variance (e^2)", fluxes.var(ddof=1), variance, SIGMAS * variance * np.sqrt(2 / 400))
 
 
-# --- what is no star ------------------------------------------------------------------------------------------------
+# --- trails and cosmic rays -----------------------------------------------------------------------
 
 
 def strays(checks):
@@ -463,7 +463,7 @@ def strays(checks):
         inside += len(trails)
         ends = [[float(t[key]) for key in ("x", "y", "x_end", "y_end")] for t in trails]
         lengths += [np.hypot(e[2] - e[0], e[3] - e[1]) for e in ends]
-        # Those that are all on the frame leave all their light.
+        # Trails that are entirely on the frame leave all their light.
         whole = lambda e: all(15 < e[i] < lens.size[i % 2] - 15 for i in range(4))
         if trails and all(map(whole, ends)):
             lights.append(pixels.sum() * header["EGAIN"] / len(trails))
@@ -498,14 +498,15 @@ def strays(checks):
     mean = 2000 * area * exposure * 60
     print(f"strays: cosmic rays, {len(rays)} on 60 frames")
     checks.hold("their number", len(rays), mean, SIGMAS * np.sqrt(mean))
-    # Mean way of 1/cos, at most 100, over a flux that goes as cos: 1.99 depths of 10 um, 80 e/um each.
+    # Mean path of 1/cos, at most 100, over a flux proportional to cos: 1.99 depths of 10 um,
+    # 80 e/um each.
     checks.hold("their mean charge (e)", np.mean(rays), 1592, SIGMAS * np.std(rays) / np.sqrt(len(rays)))
     collected = sum(frame[0].sum() for frame in made)
     lost = 1 - collected / sum(rays)
     checks.hold("part of their charge beyond the border", lost, 0.0, 0.01)
 
 
-# --- the sky --------------------------------------------------------------------------------------------------------
+# --- sky ------------------------------------------------------------------------------------------
 
 
 def krisciunas_schaefer(rho_deg, phase_deg, k, moon_z_deg, z_deg):
@@ -560,7 +561,7 @@ def sky(checks):
         for row in rows
     ]
     print("sky: clouds of 1.5 mag that add their own light")
-    checks.hold("farthest of the stars from what the sky says", np.max(np.abs(off)), 0, 0.01)
+    checks.hold("largest difference of the stars' dimming from the sky's", np.max(np.abs(off)), 0, 0.01)
     checks.hold("part of the sky that is covered", np.mean(light > 1.0001 * even), 0.5, 0.3)
 
 

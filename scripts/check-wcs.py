@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
-"""Holds the FITS headers that `starpipe process --out DIR` writes against astropy's reading of them.
+"""Compares the FITS headers written by `starpipe process --out DIR` with astropy.
 
     python3 scripts/check-wcs.py DIR
 
-For every DIR/*.wcs: the directions of the identified stars in the .csv beside it go through the header's
-inverse (AP, BP) and through astropy's own inversion of A, B, and come out where the star was seen, less the
-residual that the .csv has; the frame's corners and a grid over it go to the sky and back; the centre and the
-position angle of up are those in the .json. Prints the greatest differences in pixels for each frame, and ends with 1
-where one reaches TOLERANCE_PX.
+For every DIR/*.wcs:
+- the directions of the identified stars in the .csv beside it, mapped to pixels by the header's
+  inverse (AP, BP) and by astropy's inversion of A and B, agree with the observed positions up to
+  the residual in the .csv;
+- a grid over the frame returns to itself through the sky;
+- the centre and the position angle of up are those in the .json.
+Prints the largest differences in pixels for each frame. Exits with 1 if one reaches TOLERANCE_PX.
 """
 
 import csv
@@ -61,7 +63,7 @@ def angles(wcs, report):
     north = np.cross(centre, east)
     up = at(centre_x, centre_y - 1e-3) - at(centre_x, centre_y + 1e-3)
     angle = np.degrees(np.arctan2(up @ east, up @ north)) - attitude["up_pa_deg"]
-    # The report's angle is that of the camera's axes; a sheared image has columns that lean against them.
+    # The report's angle is that of the camera's axes; the columns of a sheared image are inclined.
     lens = report["optics"]["distortion"]
     if lens and lens["model"] != "radial":
         stretch, shear = np.array(lens["coefficients_px"][:2]) / lens["radius_px"]
@@ -75,7 +77,7 @@ def check(path):
     report = json.loads(path.with_suffix(".json").read_text())
     x, y, ra, dec, residual = stars(path.with_suffix(".csv"))
 
-    # The star's residual is the distance from where the header must put it to where it was seen.
+    # The residual is the distance between the position by the header and the observed one.
     exact = wcs.all_world2pix(ra, dec, 0, tolerance=1e-7, maxiter=100)
     residuals = float(np.max(np.abs(np.hypot(exact[0] - x, exact[1] - y) - residual)))
     inverse = largest(*by_header_inverse(wcs, ra, dec), *exact)
@@ -102,7 +104,7 @@ def main():
     if not paths:
         sys.exit(f"{sys.argv[1]}: no .wcs files")
     warnings.simplefilter("error")
-    # There is no image in the file, as in those of astrometry.net; and astropy tells of what it adds.
+    # The file has no image, as those of astrometry.net, and astropy reports the keywords it adds.
     warnings.filterwarnings("ignore", message="'datfix' made the change 'Set MJD-OBS")
     warnings.filterwarnings("ignore", message="The WCS transformation has more axes")
     results = [check(path) for path in paths]

@@ -6,8 +6,9 @@ Needs numpy, Pillow, sep and tetra3rs. The frames and their truth come from star
     STARPIPE_PEER_FRAMES=DIR cargo test --release --test accuracy -- --ignored frames_for_peers
     python3 scripts/compare-centroids.py DIR target/release/starpipe
 
-Prints the RMS error over the Cramer-Rao bound by spot size and ratio of signal to noise, and the ratio at which half of the
-stars are found at one false detection a megapixel. Thresholds of the peers are tuned to that rate on frames of noise.
+Prints the RMS error over the Cramér-Rao bound by spot size and signal-to-noise ratio, and the
+signal-to-noise ratio at which half of the stars are detected at one false detection per megapixel.
+Thresholds of the peers are tuned to that rate on frames of noise.
 """
 import csv, json, math, subprocess, sys
 from importlib.metadata import version
@@ -65,7 +66,7 @@ def with_starpipe(program, path, *options):
 
 
 def tuned(detector, frames):
-    """The threshold that gives one false detection a megapixel."""
+    """The threshold that gives one false detection per megapixel."""
     wanted = sum(frame.size for frame in frames) / 1e6
     low, high = 0.8, 12.0
     for _ in range(14):

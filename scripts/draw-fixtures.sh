@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Draws the frames in fixtures/ again; with --check, compares them with what is there and changes nothing.
+# Redraws the frames in fixtures/; with --check, only compares them with the existing files.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
