@@ -1,6 +1,5 @@
 //! From peaks to detections: groups of touching spots, centroids by the chosen method, flags.
 
-use super::Worker;
 use super::centroid;
 use super::components::{Peak, Region};
 use super::config::CentroidMethod;
@@ -36,6 +35,15 @@ const PAIR_MIN_FLUX_SIGMA: f64 = 5.0;
 /// Chi² over the degrees of freedom of a pair is below this.
 const PAIR_MAX_CHI2: f64 = 3.0;
 
+/// The buffers and results of one thread.
+#[derive(Debug, Clone, Default)]
+pub(super) struct MeasureWorker {
+    /// Buffers of the fits.
+    fits: FitWork,
+    /// What the thread has measured.
+    found: Vec<Detection>,
+}
+
 /// All that the measurement of a frame's peaks needs.
 pub(super) struct Measurement<'a> {
     /// The frame and its maps.
@@ -55,7 +63,7 @@ impl Measurement<'_> {
     pub fn run(
         &self,
         peaks: &[Peak],
-        workers: &mut [Worker],
+        workers: &mut [MeasureWorker],
         known: &mut KnownSpots,
         detections: &mut Vec<Detection>,
     ) {
@@ -71,7 +79,7 @@ impl Measurement<'_> {
         for worker in workers.iter_mut() {
             detections.append(&mut worker.found);
         }
-        let Some(Worker { fits, .. }) = workers.first_mut() else {
+        let Some(MeasureWorker { fits, .. }) = workers.first_mut() else {
             return;
         };
         for i in 0..known.close.len() {
@@ -90,7 +98,7 @@ impl Measurement<'_> {
         peaks: &[Peak],
         indices: impl Iterator<Item = usize> + Clone,
         spots: &[Spot],
-        Worker { fits, found, .. }: &mut Worker,
+        MeasureWorker { fits, found }: &mut MeasureWorker,
     ) {
         found.clear();
         let place_of = |index: usize| Place {

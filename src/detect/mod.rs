@@ -65,7 +65,7 @@ use blocks::BlockMaxima;
 use components::{Candidates, Search, SearchConfig};
 use fit::NoiseModel;
 use matched_filter::{Band, Kernel};
-use measure::{KnownSpots, Measurement};
+use measure::{KnownSpots, MeasureWorker, Measurement};
 use multiversion::multiversion;
 use noise::{NoiseWork, PixelNoise, StarFree, Weights};
 use raw_peaks::{RawPeak, RawPeaks};
@@ -106,7 +106,7 @@ fn check(frame: &Frame, config: &DetectConfig) -> Result<(), DetectError> {
 }
 
 /// Buffers that are reused from frame to frame; the result does not depend on what was in them.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Workspace {
     background: Mesh,
     raw_peaks: Vec<RawPeak>,
@@ -118,6 +118,8 @@ pub struct Workspace {
     lowest: Vec<f32>,
     /// One for each thread.
     workers: Vec<Worker>,
+    raw_peak_workers: Vec<RawPeaks>,
+    measure_workers: Vec<MeasureWorker>,
     noise: NoiseWork,
     search: Search,
     fits: FitWork,
@@ -129,24 +131,48 @@ pub struct Workspace {
 #[derive(Debug, Clone, Default)]
 struct Worker {
     cells: CellScratch,
-    raw_peaks: RawPeaks,
     band: Band,
-    fits: FitWork,
-    found: Vec<Detection>,
 }
 
 impl Workspace {
     /// Empty buffers, for one thread.
     pub fn new() -> Self {
-        Self::default()
+        let empty = Self {
+            background: Mesh::default(),
+            raw_peaks: Vec::new(),
+            filtered_mesh: Mesh::default(),
+            filtered_maxima: BlockMaxima::default(),
+            candidates: Vec::new(),
+            lowest: Vec::new(),
+            workers: Vec::new(),
+            raw_peak_workers: Vec::new(),
+            measure_workers: Vec::new(),
+            noise: NoiseWork::default(),
+            search: Search::default(),
+            fits: FitWork::default(),
+            known_spots: KnownSpots::default(),
+            sorted: Vec::new(),
+        };
+        empty.on_threads(NonZeroUsize::MIN)
     }
 
     /// The same, with the passes over the pixels shared among so many threads of the rayon pool that [`detect`] is called in.
     /// The result is the same for any number; one is best where other frames keep the other threads busy.
     #[must_use]
     pub fn on_threads(mut self, threads: NonZeroUsize) -> Self {
-        self.workers.resize_with(threads.get(), Worker::default);
+        let threads = threads.get();
+        self.workers.resize_with(threads, Worker::default);
+        self.raw_peak_workers
+            .resize_with(threads, RawPeaks::default);
+        self.measure_workers
+            .resize_with(threads, MeasureWorker::default);
         self
+    }
+}
+
+impl Default for Workspace {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
@@ -231,7 +257,7 @@ pub fn detect_into(
         .unwrap_or(f32::INFINITY)
         .min(stated_adu);
     let calibration = search_with_own_spot(&view, saturation_adu, config, workspace);
-    let mut workers = std::mem::take(&mut workspace.workers);
+    let mut workers = std::mem::take(&mut workspace.measure_workers);
     let mut known_spots = std::mem::take(&mut workspace.known_spots);
     let measurement = Measurement {
         scene: scene_of(&view, saturation_adu, &calibration, workspace),
@@ -242,7 +268,7 @@ pub fn detect_into(
     };
     let peaks = &workspace.search.peaks;
     measurement.run(peaks, &mut workers, &mut known_spots, &mut found.sources);
-    workspace.workers = workers;
+    workspace.measure_workers = workers;
     workspace.known_spots = known_spots;
     found.sources.sort_unstable_by(|a, b| {
         let place = |d: &Detection| (d.position.y, d.position.x);
@@ -278,9 +304,6 @@ fn measure_background(
         ..
     } = workspace;
     background.prepare(size, &mesh_config);
-    if workers.is_empty() {
-        workers.push(Worker::default());
-    }
     let grid = background.grid;
     lowest.resize(grid.rows, 0.0);
     let mut no_maxima = BlockMaxima::default();
@@ -366,11 +389,17 @@ fn calibrate_unfiltered(
 ) -> bool {
     let Workspace {
         background,
-        workers,
+        raw_peak_workers,
         raw_peaks,
         ..
     } = &mut *workspace;
-    raw_peaks::find(view, background, saturation_adu, workers, raw_peaks);
+    raw_peaks::find(
+        view,
+        background,
+        saturation_adu,
+        raw_peak_workers,
+        raw_peaks,
+    );
     let mut fits = std::mem::take(&mut workspace.fits);
     let mut scene = Scene {
         filtered: None,

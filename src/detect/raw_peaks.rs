@@ -2,7 +2,6 @@
 //!
 //! A star bright enough for that stands out in a single pixel, unless it is far out of focus.
 
-use super::Worker;
 use super::background::Mesh;
 use super::blocks::{BLOCK_PX, Reached, find_reaching};
 use super::fit::Spot;
@@ -77,7 +76,7 @@ pub(super) fn find(
     view: &View<'_>,
     background: &Mesh,
     saturation_adu: f32,
-    workers: &mut [Worker],
+    workers: &mut [RawPeaks],
     peaks: &mut Vec<RawPeak>,
 ) {
     peaks.clear();
@@ -87,14 +86,13 @@ pub(super) fn find(
     for round in 0..rounds {
         on_each(workers, &|worker, thread| {
             let of_thread = (round..bands).step_by(rounds).skip(thread);
-            worker.raw_peaks.found.clear();
+            worker.found.clear();
             for band in of_thread.step_by(threads) {
-                let buffers = &mut worker.raw_peaks;
-                buffers.find_in_band(view, background, band * BAND_PX, saturation_adu);
+                worker.find_in_band(view, background, band * BAND_PX, saturation_adu);
             }
         });
         for worker in workers.iter_mut() {
-            peaks.append(&mut worker.raw_peaks.found);
+            peaks.append(&mut worker.found);
         }
         if peaks.len() >= ENOUGH_PEAKS {
             break;
