@@ -1,8 +1,8 @@
 //! The sky between the stars, for who wants to draw a frame or to look at it without its gradients.
 
-use super::background::{Mesh, MeshConfig, Piece};
-use super::least_noise;
-use super::view::View;
+use crate::detect::background::{Mesh, MeshConfig, Piece};
+use crate::detect::least_noise;
+use crate::detect::pixels::View;
 use crate::frame::{Frame, MIN_SIDE_PX};
 
 /// The level of the background everywhere in a frame, without the stars.

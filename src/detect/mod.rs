@@ -26,54 +26,39 @@
 //! Bertin & Arnouts 1996, doi 10.1051/aas:1996164, for the order of the steps; the README of `sep`
 //! for the matched filter.
 
-mod aligned;
 mod background;
 mod background_map;
-mod blocks;
-mod calibrate;
-mod centroid;
-mod components;
+mod candidates;
 mod config;
 mod detection;
 mod error;
-mod expected;
+mod filter;
+mod filter_model;
 mod fit;
-mod matched_filter;
 mod measure;
-mod medians;
-mod noise;
-mod normal;
-mod plateau;
+mod pixels;
 mod psf;
-mod raw_peaks;
-mod scene;
-mod shape;
-mod side_by_side;
-mod strips;
+mod star_model;
 mod threshold;
-mod view;
 
 pub use background_map::BackgroundMap;
 pub use config::{CentroidMethod, DetectConfig};
 pub use detection::{Detection, DetectionFlags, Detections};
 pub use error::DetectError;
-pub use expected::FilterModel;
+pub use filter_model::FilterModel;
 
 use crate::frame::{Frame, MIN_SIDE_PX};
-use background::{CellScratch, Mesh, MeshConfig};
-use blocks::BlockMaxima;
-use components::{Candidates, Search, SearchConfig};
-use fit::NoiseModel;
-use matched_filter::{Band, Kernel};
+use background::{CellScratch, Mesh, MeshConfig, Strips};
+use candidates::{Candidates, RawPeak, RawPeaks, Search, SearchConfig, raw_peaks};
+use filter::{Band, Kernel};
+use fit::{FitWork, NoiseModel, Scene};
 use measure::{KnownSpots, MeasureWorker, Measurement};
 use multiversion::multiversion;
-use noise::{NoiseWork, PixelNoise, StarFree, Weights};
-use raw_peaks::{RawPeak, RawPeaks};
-use scene::{FitWork, Scene};
+use pixels::{BlockMaxima, View};
+use star_model::calibrate;
 use std::num::NonZeroUsize;
 use std::ops::Range;
-use strips::Strips;
-use view::View;
+use threshold::{NoiseWork, PixelNoise, StarFree, Weights, false_alarms, pixel_noise};
 
 /// Refuses frames and options that make no sense.
 fn check(frame: &Frame, config: &DetectConfig) -> Result<(), DetectError> {
@@ -573,8 +558,8 @@ fn raised_for_noise(
         limit: u as f32,
     };
     let work = &mut workspace.noise;
-    let skewness = noise::photon_skewness(view, background, &star_free, spot_px, work);
-    skewness.map_or(u, |s| noise::threshold_for_photons(u, s, &weights))
+    let skewness = pixel_noise::photon_skewness(view, background, &star_free, spot_px, work);
+    skewness.map_or(u, |s| pixel_noise::threshold_for_photons(u, s, &weights))
 }
 
 /// The threshold `u` raised for noise that is coarse or cut off, whose whole distribution is that of the pixels.
@@ -668,8 +653,8 @@ fn gaussian_threshold(
     spot_px: f64,
     kernel: &Kernel,
 ) -> f64 {
-    let u = threshold::threshold_for_rate(config.false_alarms_per_mpx, kernel.rho, kernel.rho);
-    threshold::for_estimated_noise(u, noise_degrees(size, config, spot_px))
+    let u = false_alarms::threshold_for_rate(config.false_alarms_per_mpx, kernel.rho, kernel.rho);
+    false_alarms::for_estimated_noise(u, noise_degrees(size, config, spot_px))
 }
 
 /// The degrees of freedom of the local noise estimate: the independent samples in a cell (a value of

@@ -6,26 +6,26 @@
 //! # Reference
 //! Wang et al. 2019, Laser & Optoelectronics Progress 56, 101101, Eqs. (1) and (2).
 
-use super::matched_filter::MAX_TAPS;
+use crate::detect::filter::MAX_TAPS;
 use arrayvec::ArrayVec;
 use multiversion::multiversion;
 
 /// The variance of a pixel's own width, in px²: a spot spreads over σ² + 1/12.
-pub(super) const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
+pub(crate) const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
 
 /// The longest side of a fitting window, in pixels.
-pub(super) const MAX_WINDOW_PX: usize = 49;
+pub(crate) const MAX_WINDOW_PX: usize = 49;
 
 /// Pixels of a row treated together.
-pub(super) const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 /// Values of such pixels.
-pub(super) type Lanes = [f32; LANES];
+pub(crate) type Lanes = [f32; LANES];
 /// Groups that make up the longest side.
 const GROUPS: usize = MAX_WINDOW_PX.div_ceil(LANES);
 
 /// Light per pixel along one axis, and its derivatives.
 #[derive(Debug, Clone, Default)]
-pub(super) struct AxisProfile {
+pub(crate) struct AxisProfile {
     /// Part of the light in each pixel.
     value: [Lanes; GROUPS],
     /// Its derivative with respect to the centre, per px.
@@ -36,7 +36,7 @@ pub(super) struct AxisProfile {
 
 /// The same in some of the pixels.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct ProfilePart<T> {
+pub(crate) struct ProfilePart<T> {
     /// Part of the light in a pixel.
     pub value: T,
     /// Its derivative with respect to the centre, per px.
@@ -94,7 +94,7 @@ const EDGES: usize = 8;
 
 /// The light before a place along an axis, in parts of all, and how it changes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Cumulative {
+pub(crate) struct Cumulative {
     scale: f64,
     density: f64,
     by_sigma: f64,
@@ -161,7 +161,7 @@ const ERF_RANGE: f64 = 5.0;
 /// # Reference
 /// Abramowitz & Stegun 1964, 7.1.26: it needs the exponential that the derivatives need anyway.
 #[inline(always)]
-pub(super) fn erf_and_gauss(x: f64) -> (f64, f64) {
+pub(crate) fn erf_and_gauss(x: f64) -> (f64, f64) {
     const A: [f64; 5] = [
         0.254_829_592,
         -0.284_496_736,
@@ -181,11 +181,11 @@ pub(super) fn erf_and_gauss(x: f64) -> (f64, f64) {
 }
 
 /// What [`exp_of_negative`] is good down to.
-pub(super) const LEAST_EXPONENT: f64 = -700.0;
+pub(crate) const LEAST_EXPONENT: f64 = -700.0;
 
 /// `exp(x)` for −700 ≤ x ≤ 0, to 1e-10 of its value: 2ⁿ times the series of what is left.
 #[inline(always)]
-pub(super) fn exp_of_negative(x: f64) -> f64 {
+pub(crate) fn exp_of_negative(x: f64) -> f64 {
     /// Added to a number, it leaves the nearest integer in the lowest bits of the sum.
     const ROUNDER: f64 = 6_755_399_441_055_744.0;
     const EXPONENT_BITS: u32 = 52;
@@ -217,7 +217,7 @@ pub(super) fn exp_of_negative(x: f64) -> f64 {
 /// The spot's profile centred on a pixel: parts of the light at distances 0, 1, … `radius` pixels.
 ///
 /// At most [`MAX_TAPS`] of them.
-pub(super) fn centered_profile(sigma_px: f64, radius: usize) -> ArrayVec<f64, MAX_TAPS> {
+pub(crate) fn centered_profile(sigma_px: f64, radius: usize) -> ArrayVec<f64, MAX_TAPS> {
     let scale = 1.0 / (std::f64::consts::SQRT_2 * sigma_px);
     let edge = |distance: f64| erf_and_gauss(distance * scale).0;
     (0..=radius.min(MAX_TAPS - 1))

@@ -1,8 +1,8 @@
 //! The saturated area of a source: what is left to place it by where hardly any other pixel has its light.
 
-use super::components::Peak;
-use super::psf::{MAX_WINDOW_PX, PIXEL_VARIANCE_PX2};
-use super::scene::Scene;
+use crate::detect::candidates::Peak;
+use crate::detect::fit::Scene;
+use crate::detect::psf::{MAX_WINDOW_PX, PIXEL_VARIANCE_PX2};
 use arrayvec::ArrayVec;
 
 /// The area is followed so far from the peak, in columns and rows: beyond, it is no star's.
@@ -10,7 +10,7 @@ const REACH_PX: usize = (MAX_WINDOW_PX - 1) / 2;
 
 /// 8-connected saturated pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Plateau {
+pub(crate) struct Plateau {
     /// Centre of the area, in pixels.
     pub x: f64,
     /// Centre of the area, in pixels.

@@ -10,7 +10,7 @@
 //! shared among threads.
 
 use super::medians::{self, LANES, Lanes};
-use super::view::{Rows, View};
+use crate::detect::pixels::{Rows, View};
 use multiversion::multiversion;
 use std::ops::Range;
 
@@ -44,7 +44,7 @@ const MIN_CELL_SAMPLES: usize = 12;
 
 /// What a mesh is measured on.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct MeshConfig {
+pub(crate) struct MeshConfig {
     /// Wanted side of a cell, in pixels.
     pub cell_px: usize,
     /// Measure the spread on differences between pixels two columns apart, which gradients do not widen.
@@ -57,7 +57,7 @@ pub(super) struct MeshConfig {
 
 /// How a frame is divided into cells.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Grid {
+pub(crate) struct Grid {
     /// Cells across.
     pub columns: usize,
     /// Cells down.
@@ -101,7 +101,7 @@ impl Grid {
 
 /// A level and a spread for each cell of a frame.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Mesh {
+pub(crate) struct Mesh {
     /// The cells.
     pub grid: Grid,
     cell_width_px: f32,
@@ -398,7 +398,7 @@ impl Mesh {
 
 /// A straight piece of level and reciprocal spread along a row.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Piece {
+pub(crate) struct Piece {
     /// First column.
     pub start: usize,
     /// Column after the last.
@@ -422,7 +422,7 @@ struct Samples<'a> {
 
 /// Buffers for the cells of one row.
 #[derive(Debug, Clone, Default)]
-pub(super) struct CellScratch {
+pub(crate) struct CellScratch {
     start: Vec<f32>,
 }
 

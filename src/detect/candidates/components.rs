@@ -12,10 +12,9 @@
 //! # Reference
 //! Edelsbrunner, Letscher & Zomorodian 2002, doi 10.1007/s00454-002-2885-2, for prominence as persistence.
 
-use super::background::Mesh;
-use super::blocks::{Reached, find_reaching};
-use super::matched_filter::Band;
-use super::view::View;
+use crate::detect::background::Mesh;
+use crate::detect::filter::Band;
+use crate::detect::pixels::{Reached, View, find_reaching};
 use std::ops::Range;
 
 /// A maximum must stand this many noise standard deviations above its saddle to count by itself.
@@ -50,7 +49,7 @@ const STREAK_DASHED: f64 = 8.0;
 
 /// What a row of cells holds that may lie above the threshold.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Candidates {
+pub(crate) struct Candidates {
     /// All pixels of the filtered frame from `cut` on, in reading order.
     pixels: Vec<Candidate>,
     /// The local maxima among them, in reading order.
@@ -168,7 +167,7 @@ struct Run {
 
 /// A local maximum of the filtered frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Peak {
+pub(crate) struct Peak {
     /// Column.
     pub x: usize,
     /// Row.
@@ -189,7 +188,7 @@ pub(super) struct Peak {
 
 /// A connected region above the threshold.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Region {
+pub(crate) struct Region {
     /// Number of pixels.
     pub area_px: usize,
     /// Number of peaks kept.
@@ -249,7 +248,7 @@ impl Region {
 
 /// What the search needs to know.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct SearchConfig {
+pub(crate) struct SearchConfig {
     /// Threshold in units of the local noise.
     pub threshold: f32,
     /// The spot's standard deviation, pixel included, in pixels.
@@ -262,7 +261,7 @@ pub(super) struct SearchConfig {
 
 /// Buffers of the search, and its result.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Search {
+pub(crate) struct Search {
     pixels: Vec<Pixel>,
     /// Index in `pixels` of the first of each row, and the end.
     row_starts: Vec<usize>,

@@ -7,10 +7,9 @@
 //!
 //! The filtered frame is never whole in memory: it is made and looked at in bands of rows that stay in cache.
 
-use super::aligned::{Aligned, LINE};
-use super::background::{Mesh, Piece};
-use super::psf::{PIXEL_VARIANCE_PX2, centered_profile};
-use super::view::{Rows, View};
+use crate::detect::background::{Mesh, Piece};
+use crate::detect::pixels::{Aligned, LINE, Rows, View};
+use crate::detect::psf::{PIXEL_VARIANCE_PX2, centered_profile};
 use arrayvec::ArrayVec;
 use multiversion::multiversion;
 use std::ops::Range;
@@ -20,13 +19,13 @@ const LANES: usize = 32;
 /// Room between rows, in whole lines of the cache.
 const ROW_GAP_PX: usize = 5 * LINE;
 /// The most weights of one half of a kernel: spots up to σ = 13 px.
-pub(super) const MAX_TAPS: usize = 32;
+pub(crate) const MAX_TAPS: usize = 32;
 /// The kernel ends at this many standard deviations: the rest holds under 0.1 % of ΣP².
 const KERNEL_EXTENT_SIGMA: f64 = 2.4;
 
 /// A symmetric kernel along one axis, normalised to a sum of squares of one.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Kernel {
+pub(crate) struct Kernel {
     /// Weights at distances 0, 1, … pixels.
     half: ArrayVec<f32, MAX_TAPS>,
     /// `ΣP²` of the spot in both axes: a star of flux F centred on a pixel of noise n has the
@@ -87,7 +86,7 @@ impl Kernel {
 
 /// A band of rows of the filtered frame, in units of the noise, and the buffers to make it.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Band {
+pub(crate) struct Band {
     /// The width in whole vectors.
     whole_width: usize,
     /// Columns between rows: more than that, for rows a power of two apart would compete for the same places in the cache.
@@ -217,7 +216,7 @@ impl Band {
 
 /// `target = (row − level) / spread` along the pieces of a row, 0 where the pixel has no value.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(super) fn normalise(row: &[f32], pieces: &[Piece], target: &mut [f32]) {
+pub(crate) fn normalise(row: &[f32], pieces: &[Piece], target: &mut [f32]) {
     for piece in pieces {
         let (row, target) = (
             &row[piece.start..piece.end],
@@ -315,8 +314,8 @@ fn sum_along_columns_of<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::background::MeshConfig;
     use super::*;
+    use crate::detect::background::MeshConfig;
 
     /// Level 0 and spread 1, of a frame of zeros.
     fn even_mesh(zeros: &View<'_>) -> Mesh {

@@ -5,18 +5,18 @@
 //! none of them need be few. From the residuals of the stars with that size follow the shot noise per
 //! ADU and the relative error of the spot model, by least squares of the squared residuals.
 
-use super::components::Peak;
-use super::fit::{Fit, FitConfig, NoiseModel, SPOT_RANGE_PX};
-use super::normal::{Factor, ONE_SPOT, Pixels, SpotLight, linearise, sum_of};
-use super::psf::{LANES, PIXEL_VARIANCE_PX2};
-use super::raw_peaks::RawPeak;
-use super::scene::{FitWork, Scene};
+use crate::detect::candidates::{Peak, RawPeak};
+use crate::detect::fit::{
+    Factor, Fit, FitConfig, FitWork, NoiseModel, ONE_SPOT, Pixels, SPOT_RANGE_PX, Scene, SpotLight,
+    linearise, sum_of,
+};
+use crate::detect::psf::{LANES, PIXEL_VARIANCE_PX2};
 use arrayvec::ArrayVec;
 use multiversion::multiversion;
 use std::mem;
 
 /// The spot size where the frame does not tell, in pixels: a well-focused camera.
-pub(super) const DEFAULT_SPOT_PX: f64 = 0.9;
+pub(crate) const DEFAULT_SPOT_PX: f64 = 0.9;
 /// Peaks below this signal-to-noise ratio say little about the size.
 const MIN_SNR: f32 = 12.0;
 /// At most so many of the brightest peaks are fitted.
@@ -46,10 +46,10 @@ const MODE_WIDTH: f64 = 1.25;
 const MODE_ROUNDS: usize = 4;
 
 /// Bright stars, each fitted with a free size.
-pub(super) type BrightStars = ArrayVec<Fit, MAX_STARS>;
+pub(crate) type BrightStars = ArrayVec<Fit, MAX_STARS>;
 
 /// Fits the brightest peaks with a free size.
-pub(super) fn fit_bright_stars(
+pub(crate) fn fit_bright_stars(
     scene: &Scene<'_>,
     peaks: &[Peak],
     work: &mut FitWork,
@@ -77,7 +77,7 @@ pub(super) fn fit_bright_stars(
 }
 
 /// Fits the brightest peaks of the unfiltered frame with a free size.
-pub(super) fn fit_raw_stars(
+pub(crate) fn fit_raw_stars(
     scene: &Scene<'_>,
     peaks: &[RawPeak],
     work: &mut FitWork,
@@ -143,7 +143,7 @@ fn size_from_curvature(peak: &Peak, filter_px: f64) -> f64 {
 
 /// The frame's spot size from its bright stars, in pixels, and how many of them have about that
 /// size; `None` where there are too few.
-pub(super) fn spot_size(stars: &BrightStars) -> Option<(f64, usize)> {
+pub(crate) fn spot_size(stars: &BrightStars) -> Option<(f64, usize)> {
     let mut sizes: ArrayVec<f64, MAX_STARS> = stars
         .iter()
         .map(|star| star.spot_px)
@@ -189,7 +189,7 @@ fn half_sample_mode(sorted: &[f64]) -> f64 {
 
 /// What bright stars of about the frame's spot size tell of all stars.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct StarModel {
+pub(crate) struct StarModel {
     /// Standard deviation of the spot, in pixels.
     pub spot_px: f64,
     /// How the noise grows with light.
@@ -197,7 +197,7 @@ pub(super) struct StarModel {
 }
 
 /// The noise model from the residuals of stars of about the frame's spot size, and that size by the weights that follow.
-pub(super) fn star_model(
+pub(crate) fn star_model(
     scene: &Scene<'_>,
     mut usable: BrightStars,
     work: &mut FitWork,

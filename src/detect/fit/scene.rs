@@ -1,11 +1,11 @@
 //! What the fits need to know of the frame: its pixels, background, noise and saturation.
 
-use super::background::Mesh;
-use super::components::Peak;
-use super::fit::{Fit, FitConfig, Fitter, NoiseModel, Spot, Window, window_radius};
-use super::psf::{LANES, MAX_WINDOW_PX};
+use super::fitter::{Fit, FitConfig, Fitter, NoiseModel, Spot, Window, window_radius};
 use super::side_by_side::SideBySide;
-use super::view::View;
+use crate::detect::background::Mesh;
+use crate::detect::candidates::Peak;
+use crate::detect::pixels::View;
+use crate::detect::psf::{LANES, MAX_WINDOW_PX};
 use multiversion::multiversion;
 
 /// Standard error of the background map over the noise of a pixel: what the map's cells leave.
@@ -15,7 +15,7 @@ const HALO_ERROR: f64 = 0.01;
 
 /// The frame and all maps of it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Scene<'a> {
+pub(crate) struct Scene<'a> {
     /// The frame.
     pub view: View<'a>,
     /// Background and noise of a pixel, in ADU.
@@ -179,7 +179,7 @@ fn copy_above(view: &View, plane: Plane, saturation_adu: f32, window: &mut Windo
 
 /// Buffers of the fits.
 #[derive(Debug, Clone, Default)]
-pub(super) struct FitWork {
+pub(crate) struct FitWork {
     /// The fit's own.
     pub fitter: Fitter,
     /// The pixels.

@@ -1,9 +1,8 @@
 //! The grey-weighted centroid.
 
-use super::detection::Detection;
-use super::fit::{Fit, NoiseModel, window_radius};
-use super::scene::{FitWork, Scene};
 use crate::base::coords::PixelPoint;
+use crate::detect::detection::Detection;
+use crate::detect::fit::{Fit, FitWork, NoiseModel, Scene, window_radius};
 
 /// Grey levels count above this many standard deviations of the background noise.
 const GREY_THRESHOLD_SIGMA: f64 = 3.0;
@@ -18,7 +17,7 @@ const GREY_THRESHOLD_SIGMA: f64 = 3.0;
 /// Wang et al. 2019, Laser & Optoelectronics Progress 56, 101101, Eq. (6). Differs from the source:
 /// the threshold, which it leaves open, is subtracted; that brings the error from some 1.4 times the
 /// Cramér-Rao bound to 1.1.
-pub(super) fn grey_weighted(
+pub(crate) fn grey_weighted(
     scene: &Scene<'_>,
     noise: &NoiseModel,
     fit: &Fit,

@@ -13,14 +13,14 @@
 use super::normal::{
     Factor, Normal, ONE_SPOT, Pixels, SpotLight, TWO_SPOTS, add_light, add_pixels, flux_variance,
 };
-use super::psf::{AxisProfile, LANES, Lanes, MAX_WINDOW_PX};
+use crate::detect::psf::{AxisProfile, LANES, Lanes, MAX_WINDOW_PX, PIXEL_VARIANCE_PX2};
 use arrayvec::ArrayVec;
 
 /// The most spots fitted together.
-pub(super) const MAX_SPOTS: usize = 6;
+pub(crate) const MAX_SPOTS: usize = 6;
 /// Their parameters, the background and the size.
-pub(super) const MAX_PARAMETERS: usize = 3 * MAX_SPOTS + 2;
-pub(super) const MAX_STEPS: usize = 15;
+pub(crate) const MAX_PARAMETERS: usize = 3 * MAX_SPOTS + 2;
+pub(crate) const MAX_STEPS: usize = 15;
 /// Steps shorter than this, in px, end the fit; convergence is quadratic, so little is left after one.
 const CONVERGED_PX: f64 = 2e-3;
 /// So do steps shorter than this part of the standard error: what is left after them is a fifth of it at most.
@@ -34,11 +34,11 @@ const SETTLED_FLUX: f64 = 0.02;
 /// The longest step, in px: farther, the model is not linear.
 const MAX_STEP_PX: f64 = 0.5;
 /// The range of free spot sizes, in px.
-pub(super) const SPOT_RANGE_PX: (f64, f64) = (0.2, 12.0);
+pub(crate) const SPOT_RANGE_PX: (f64, f64) = (0.2, 12.0);
 
 /// How the variance of a pixel grows with the light of the spots in it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct NoiseModel {
+pub(crate) struct NoiseModel {
     /// Variance per ADU of light (the inverse gain), in ADU.
     pub shot_adu: f64,
     /// Squared relative error of the spot model.
@@ -47,7 +47,7 @@ pub(super) struct NoiseModel {
 
 /// The pixels that are fitted.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Window {
+pub(crate) struct Window {
     /// Column of the first.
     pub x0: usize,
     /// Row of the first.
@@ -97,7 +97,7 @@ impl Window {
 
 /// One spot: where, and how much light.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Spot {
+pub(crate) struct Spot {
     /// Column, in pixels.
     pub x: f64,
     /// Row, in pixels.
@@ -115,11 +115,11 @@ pub(super) struct Spot {
 }
 
 /// Spots that are fitted together.
-pub(super) type Spots = ArrayVec<Spot, MAX_SPOTS>;
+pub(crate) type Spots = ArrayVec<Spot, MAX_SPOTS>;
 
 /// What is fitted, and how.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct FitConfig {
+pub(crate) struct FitConfig {
     /// Standard deviation of the spot, in pixels; the start where it is free.
     pub spot_px: f64,
     /// Whether the size of the spot is fitted too.
@@ -130,7 +130,7 @@ pub(super) struct FitConfig {
 
 /// The result of a fit.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Fit {
+pub(crate) struct Fit {
     /// In the order given.
     pub spots: Spots,
     /// Background above the map, in ADU.
@@ -153,7 +153,7 @@ pub(super) struct Fit {
 
 /// Buffers of the fit.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Fitter {
+pub(crate) struct Fitter {
     /// Of each spot, along x and y.
     profiles: Vec<[AxisProfile; 2]>,
     light: Vec<Lanes>,
@@ -367,7 +367,7 @@ impl Fitter {
 }
 
 /// Adds what the map knows of the background.
-pub(super) fn add_background_map<const N: usize>(
+pub(crate) fn add_background_map<const N: usize>(
     normal: &mut Normal<N>,
     window: &Window,
     fit: &Fit,
@@ -380,7 +380,7 @@ pub(super) fn add_background_map<const N: usize>(
 }
 
 /// The pixels of a window, and what the fit adds to the light in them.
-pub(super) fn pixels_of<'a>(window: &'a Window, fit: &Fit, config: &FitConfig) -> Pixels<'a> {
+pub(crate) fn pixels_of<'a>(window: &'a Window, fit: &Fit, config: &FitConfig) -> Pixels<'a> {
     let per_noise = 1.0 / window.noise_adu;
     Pixels {
         data: &window.data,
@@ -401,7 +401,7 @@ fn parameter_count(spots: usize, config: &FitConfig) -> usize {
 
 /// What became of a fit with a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Progress {
+pub(crate) enum Progress {
     /// There is more to do.
     Goes,
     /// The step was small: the fit has its result.
@@ -411,7 +411,7 @@ pub(super) enum Progress {
 }
 
 /// Takes the step number `step` from the equations at `fit`; where it is the last, with the standard errors.
-pub(super) fn advance<const N: usize>(
+pub(crate) fn advance<const N: usize>(
     fit: &mut Fit,
     start: &[Spot],
     normal: &mut Normal<N>,
@@ -515,8 +515,8 @@ fn finish<const N: usize>(
 }
 
 /// The half side of a window for a spot, in pixels: three standard deviations.
-pub(super) fn window_radius(spot_px: f64) -> usize {
-    let width_px = (spot_px * spot_px + super::psf::PIXEL_VARIANCE_PX2).sqrt();
+pub(crate) fn window_radius(spot_px: f64) -> usize {
+    let width_px = (spot_px * spot_px + PIXEL_VARIANCE_PX2).sqrt();
     ((3.0 * width_px).ceil() as usize).clamp(2, (MAX_WINDOW_PX - 1) / 2)
 }
 

@@ -12,12 +12,10 @@
 //! Lugannani & Rice 1980, doi 10.2307/1426607; Barndorff-Nielsen 1986, doi 10.1093/biomet/73.2.307,
 //! for the form used here.
 
-use super::background::{Mesh, Piece};
-use super::blocks::{BLOCK_PX, BlockMaxima};
-use super::matched_filter::{MAX_TAPS, normalise};
-use super::medians::sum_of;
-use super::psf::{AxisProfile, MAX_WINDOW_PX, centered_profile};
-use super::view::View;
+use crate::detect::background::{Mesh, Piece, sum_of};
+use crate::detect::filter::{MAX_TAPS, normalise};
+use crate::detect::pixels::{BLOCK_PX, BlockMaxima, View};
+use crate::detect::psf::{AxisProfile, MAX_WINDOW_PX, centered_profile};
 use arrayvec::ArrayVec;
 use multiversion::multiversion;
 use std::ops::Range;
@@ -65,7 +63,7 @@ const MAX_RAISE: f64 = 1.0;
 
 /// The distribution of the pixels of a frame where no star is, in units of their noise.
 #[derive(Debug, Clone)]
-pub(super) struct PixelNoise {
+pub(crate) struct PixelNoise {
     counts: [f64; BINS],
     count: f64,
     mean: f64,
@@ -77,7 +75,7 @@ pub(super) struct PixelNoise {
 
 /// Buffers for rows of pixels.
 #[derive(Debug, Clone, Default)]
-pub(super) struct NoiseWork {
+pub(crate) struct NoiseWork {
     bins: Vec<u16>,
     standardised: Vec<f32>,
     pieces: Vec<Piece>,
@@ -214,7 +212,7 @@ impl PixelNoise {
 /// exceeds `u`, in units of the spread that a mesh measures on the filtered noise; never below `u`.
 ///
 /// Poisson noise of standard deviation 1 and skewness s has `K(t) = (exp(st) − 1 − st)/s²`.
-pub(super) fn threshold_for_photons(u: f64, skewness: f64, kernel: &Weights) -> f64 {
+pub(crate) fn threshold_for_photons(u: f64, skewness: f64, kernel: &Weights) -> f64 {
     if skewness <= LEAST_SKEWNESS {
         return u;
     }
@@ -243,7 +241,7 @@ pub(super) fn threshold_for_photons(u: f64, skewness: f64, kernel: &Weights) -> 
 ///
 /// Stars skew the pixels, too, but neighbours together: for noise that is independent from pixel to pixel the cumulant
 /// `κ(z, z, z')` of neighbours is 0, for stars it is that of the spot, `ΣP²P'` to `ΣP³` of their own `κ(z, z, z)`.
-pub(super) fn photon_skewness(
+pub(crate) fn photon_skewness(
     view: &View<'_>,
     mesh: &Mesh,
     star_free: &StarFree<'_>,
@@ -333,7 +331,7 @@ fn own_per_mixed(spot_px: f64) -> f64 {
 }
 
 /// Where nothing stands out of the filtered frame.
-pub(super) struct StarFree<'a> {
+pub(crate) struct StarFree<'a> {
     /// The maxima of the filtered frame where it may stand out.
     pub maxima: &'a BlockMaxima,
     /// The mesh of the filtered frame.
@@ -387,7 +385,7 @@ type Weighted = ArrayVec<(f64, f64), { MAX_TAPS * MAX_TAPS }>;
 
 /// The weights of a filter.
 #[derive(Debug, Clone)]
-pub(super) struct Weights {
+pub(crate) struct Weights {
     inside: Weighted,
     at_border: Weighted,
     largest: f64,

@@ -1,15 +1,15 @@
 //! Fits of single spots side by side, a lane of a vector for each.
 //!
-//! The fit is that of [`Fitter`](super::fit::Fitter), step by step; only the sums over the pixels are those of many stars
+//! The fit is that of [`Fitter`](super::fitter::Fitter), step by step; only the sums over the pixels are those of many stars
 //! at once. The windows of spots are small: their rows fill no vector, and sums across one take as long as the pixels do.
 
-use super::fit::{
+use super::fitter::{
     Fit, FitConfig, MAX_STEPS, Progress, Spot, Window, add_background_map, advance, pixels_of,
     window_radius,
 };
 use super::normal::{Normal, ONE_SPOT, flux_variance_of, spot_gradient, variance_of};
-use super::psf::{Cumulative, ProfilePart};
 use super::scene::Scene;
+use crate::detect::psf::{Cumulative, ProfilePart};
 use multiversion::multiversion;
 
 /// Spots treated together.
@@ -18,7 +18,7 @@ const STARS: usize = 16;
 type Stars = [f32; STARS];
 
 /// Where a fit starts: the number of the star, its spot and its size in pixels.
-pub(super) type Start = (usize, Spot, f64);
+pub(crate) type Start = (usize, Spot, f64);
 
 /// A star that is being fitted.
 #[derive(Debug, Clone, Copy)]
@@ -30,7 +30,7 @@ struct Lane {
 
 /// Buffers for the stars that are fitted at the same time.
 #[derive(Debug, Clone, Default)]
-pub(super) struct SideBySide {
+pub(crate) struct SideBySide {
     lanes: [Option<Lane>; STARS],
     fits: [Fit; STARS],
     windows: [Window; STARS],
@@ -196,7 +196,7 @@ impl SideBySide {
 }
 
 /// The standard error of the flux before the last step from noise alone, in ADU, see
-/// [`Fitter::set_flux_noise`](super::fit::Fitter::set_flux_noise).
+/// [`Fitter::set_flux_noise`](super::fitter::Fitter::set_flux_noise).
 fn flux_noise(lane: usize, sums: &Sums, window: &Window) -> f64 {
     let sums = sums.shapes.map(|sum| f64::from(sum[lane]));
     let error2 = window.background_noise * window.background_noise;
@@ -299,8 +299,8 @@ fn sums_over(data: &[Stars], axes: &[Vec<ProfilePart<Stars>>; 2], model: &Model)
 mod tests {
     use super::*;
     use crate::detect::background::{Mesh, MeshConfig};
-    use crate::detect::fit::{Fitter, NoiseModel};
-    use crate::detect::view::View;
+    use crate::detect::fit::fitter::{Fitter, NoiseModel};
+    use crate::detect::pixels::View;
 
     const SPOT_PX: f64 = 0.8;
     const SIDE_PX: usize = 256;

@@ -2,12 +2,10 @@
 //!
 //! A star bright enough for that stands out in a single pixel, unless it is far out of focus.
 
-use super::background::Mesh;
-use super::blocks::{BLOCK_PX, Reached, find_reaching};
-use super::fit::Spot;
-use super::psf::PIXEL_VARIANCE_PX2;
-use super::strips::on_each;
-use super::view::View;
+use crate::detect::background::{Mesh, on_each};
+use crate::detect::fit::Spot;
+use crate::detect::pixels::{BLOCK_PX, Reached, View, find_reaching};
+use crate::detect::psf::PIXEL_VARIANCE_PX2;
 use std::cmp::Ordering;
 
 /// A pixel is looked at from this many standard deviations of the background noise on.
@@ -23,7 +21,7 @@ const ENOUGH_PEAKS: usize = 600;
 
 /// A local maximum of the frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct RawPeak {
+pub(crate) struct RawPeak {
     /// Column.
     pub x: usize,
     /// Row.
@@ -65,14 +63,14 @@ impl RawPeak {
 
 /// The peaks that one thread finds, and its buffers.
 #[derive(Debug, Clone, Default)]
-pub(super) struct RawPeaks {
+pub(crate) struct RawPeaks {
     levels: Vec<f32>,
     blocks: Vec<Reached>,
     found: Vec<RawPeak>,
 }
 
 /// Finds peaks that stand out in single pixels, strongest first; those at the very border are left out.
-pub(super) fn find(
+pub(crate) fn find(
     view: &View<'_>,
     background: &Mesh,
     saturation_adu: f32,

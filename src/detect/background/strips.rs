@@ -3,12 +3,12 @@
 //! Each row of cells is worked on by itself, with its own part of every result: so nothing depends on
 //! how many threads there are.
 
-use super::background::{Grid, Mesh};
-use super::blocks::BlockMaxima;
+use super::mesh::{Grid, Mesh};
+use crate::detect::pixels::BlockMaxima;
 use std::ops::Range;
 
 /// Rows of cells and their parts of the results; `T` is what is kept of a row of cells beside these.
-pub(super) struct Strips<'a, T> {
+pub(crate) struct Strips<'a, T> {
     grid: Grid,
     blocks_per_row: usize,
     /// The rows of cells.
@@ -20,7 +20,7 @@ pub(super) struct Strips<'a, T> {
 }
 
 /// One row of cells.
-pub(super) struct Strip<'a, T> {
+pub(crate) struct Strip<'a, T> {
     /// The rows of pixels in it.
     pub rows: Range<usize>,
     /// A level for each cell.
@@ -114,7 +114,7 @@ impl<'a, T: Send> Strips<'a, T> {
 }
 
 /// Does `work` with each of the workers, on a thread of its own; it is told which of them it is.
-pub(super) fn on_each<W: Send>(workers: &mut [W], work: &(impl Fn(&mut W, usize) + Sync)) {
+pub(crate) fn on_each<W: Send>(workers: &mut [W], work: &(impl Fn(&mut W, usize) + Sync)) {
     fn from<W: Send>(first: usize, workers: &mut [W], work: &(impl Fn(&mut W, usize) + Sync)) {
         if let [worker] = workers {
             return work(worker, first);

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 /// A rectangle of an image; all coordinates inside `detect` are relative to it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct View<'a> {
+pub(crate) struct View<'a> {
     pixels: &'a [f32],
     stride: usize,
     /// Column of the frame that is column 0 here.
@@ -88,7 +88,7 @@ impl<'a> View<'a> {
 
 /// Rows of pixels, `stride` apart in memory.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Rows<'a> {
+pub(crate) struct Rows<'a> {
     /// From the first pixel of the first row on.
     pub values: &'a [f32],
     /// Pixels from the start of a row to that of the next.

@@ -1,9 +1,9 @@
 //! What detection will do in a frame that is only described: for those who predict it.
 
-use super::config::DetectConfig;
-use super::gaussian_threshold;
-use super::matched_filter::Kernel;
-use super::noise::{Weights, threshold_for_photons};
+use crate::detect::config::DetectConfig;
+use crate::detect::filter::Kernel;
+use crate::detect::gaussian_threshold;
+use crate::detect::threshold::{Weights, threshold_for_photons};
 
 /// The matched filter and the threshold of [`detect`](super::detect) in a frame with photon and Gaussian noise.
 #[derive(Debug, Clone, PartialEq)]

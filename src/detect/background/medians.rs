@@ -8,11 +8,11 @@
 use multiversion::multiversion;
 
 /// Sets treated side by side.
-pub(super) const LANES: usize = 16;
+pub(crate) const LANES: usize = 16;
 /// The values of one place in each set.
-pub(super) type Lanes = [f32; LANES];
+pub(crate) type Lanes = [f32; LANES];
 /// The size of the sets that are sorted whole.
-pub(super) const SORTED: usize = 32;
+pub(crate) const SORTED: usize = 32;
 
 /// Levels stick out where they deviate by more than so many standard deviations of their neighbours,
 const OUTLIER_SIGMA: f32 = 3.0;
@@ -36,7 +36,7 @@ fn exchange<const N: usize>(values: &mut [Lanes; N], i: usize, j: usize) {
 /// # Reference
 /// Batcher 1968, doi 10.1145/1468075.1468121: sorting by merging odd and even places.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(super) fn sort_lanes(values: &mut [Lanes; SORTED]) {
+pub(crate) fn sort_lanes(values: &mut [Lanes; SORTED]) {
     let mut part = 1;
     while part < SORTED {
         let mut step = part;
@@ -104,7 +104,7 @@ fn squares(rows: [&[f32]; 3], start: usize, count: usize) -> [Lanes; 9] {
 
 /// The medians of 3x3 values, from rows that are two longer than `medians`.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(super) fn of_squares(rows: [&[f32]; 3], medians: &mut [f32]) {
+pub(crate) fn of_squares(rows: [&[f32]; 3], medians: &mut [f32]) {
     for (block, out) in medians.chunks_mut(LANES).enumerate() {
         let middle = median_of_nine(squares(rows, block * LANES, out.len()));
         out.copy_from_slice(&middle[..out.len()]);
@@ -113,7 +113,7 @@ pub(super) fn of_squares(rows: [&[f32]; 3], medians: &mut [f32]) {
 
 /// Replaces the levels that stick out from the 3x3 about them by the median of these; `rows` are two longer than `levels`.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(super) fn replace_outliers(rows: [&[f32]; 3], spreads: &[f32], levels: &mut [f32]) {
+pub(crate) fn replace_outliers(rows: [&[f32]; 3], spreads: &[f32], levels: &mut [f32]) {
     let blocks = levels.chunks_mut(LANES).zip(spreads.chunks(LANES));
     for (block, (out, spread)) in blocks.enumerate() {
         let around = squares(rows, block * LANES, out.len());
@@ -135,7 +135,7 @@ pub(super) fn replace_outliers(rows: [&[f32]; 3], spreads: &[f32], levels: &mut 
 
 /// The sum, by halves: one after the other, each would wait for the one before.
 #[inline(always)]
-pub(super) fn sum_of<const N: usize>(mut lanes: [f32; N]) -> f32 {
+pub(crate) fn sum_of<const N: usize>(mut lanes: [f32; N]) -> f32 {
     let mut half = N / 2;
     while half > 0 {
         for lane in 0..half {

@@ -5,11 +5,11 @@ use std::ops::{Deref, DerefMut};
 /// Bytes in a line of the cache.
 const LINE_BYTES: usize = 64;
 /// Values in it.
-pub(super) const LINE: usize = LINE_BYTES / size_of::<f32>();
+pub(crate) const LINE: usize = LINE_BYTES / size_of::<f32>();
 
 /// A buffer that begins with a line.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Aligned {
+pub(crate) struct Aligned {
     buffer: Vec<f32>,
     start: usize,
 }

@@ -9,11 +9,10 @@
 //! noise; for a hot pixel the mean is +d². A source is flagged where a single pixel fits better
 //! (D > 0) and a star would have a D that high in under one of 150 cases.
 
-use super::components::{Peak, Region};
-use super::detection::Detection;
-use super::fit::{Fit, FitConfig, NoiseModel, Spot};
-use super::measure::Measurement;
-use super::scene::FitWork;
+use super::measurement::Measurement;
+use crate::detect::candidates::{Peak, Region};
+use crate::detect::detection::Detection;
+use crate::detect::fit::{Fit, FitConfig, FitWork, NoiseModel, Spot};
 
 /// Differences in size or chi² count from this many standard errors on.
 const SIGNIFICANT_SIGMA: f64 = 4.0;
@@ -35,7 +34,7 @@ const TRAIL_LENGTH: f64 = 2.0;
 const MIN_TRAIL_AREA_PX: usize = 8;
 
 /// Sets the flags for sources sharper or wider than the frame's spots; the fit's window is still in `work`.
-pub(super) fn judge(
+pub(crate) fn judge(
     measurement: &Measurement<'_>,
     peak: &Peak,
     fit: &Fit,
@@ -131,7 +130,7 @@ fn is_extended(measurement: &Measurement<'_>, peak: &Peak, fit: &Fit, work: &mut
 }
 
 /// Whether the region of a peak is drawn out beyond what a star of its height covers.
-pub(super) fn is_trail(region: &Region, peak: &Peak, width_px: f64, threshold: f64) -> bool {
+pub(crate) fn is_trail(region: &Region, peak: &Peak, width_px: f64, threshold: f64) -> bool {
     if region.peaks > 1 || region.area_px < MIN_TRAIL_AREA_PX {
         return false;
     }

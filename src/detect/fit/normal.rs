@@ -5,18 +5,18 @@
     reason = "rows and columns of matrices read best as indices"
 )]
 
-use super::fit::{MAX_PARAMETERS, MAX_SPOTS};
-use super::psf::{AxisProfile, LANES, Lanes, ProfilePart};
+use super::fitter::{MAX_PARAMETERS, MAX_SPOTS};
+use crate::detect::psf::{AxisProfile, LANES, Lanes, ProfilePart};
 use multiversion::multiversion;
 
 /// Parameters of one spot: x, y, flux, background, size.
-pub(super) const ONE_SPOT: usize = 5;
+pub(crate) const ONE_SPOT: usize = 5;
 /// Parameters of two spots, by far the most frequent group.
-pub(super) const TWO_SPOTS: usize = 3 * 2 + 2;
+pub(crate) const TWO_SPOTS: usize = 3 * 2 + 2;
 
 /// One linearised step for up to `N` parameters: normal matrix, right-hand side, chi².
 #[derive(Debug, Clone)]
-pub(super) struct Normal<const N: usize> {
+pub(crate) struct Normal<const N: usize> {
     /// Lower triangle; after [`Self::factorise`] that of the factor L below its diagonal of ones.
     pub matrix: [[f64; N]; N],
     /// One over the diagonal D.
@@ -147,7 +147,7 @@ impl<const N: usize> Normal<N> {
 
 /// The factors L and D of normal equations, in single precision.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Factor<const N: usize> {
+pub(crate) struct Factor<const N: usize> {
     /// L below its diagonal.
     lower: [[f32; N]; N],
     /// One over D.
@@ -173,7 +173,7 @@ impl<const N: usize> Factor<N> {
 /// Pixels of a window, and what is added to the light in them, in units of the noise of the background: so single
 /// precision does, whatever the units of the frame are.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Pixels<'a> {
+pub(crate) struct Pixels<'a> {
     /// Row after row, each in so many whole groups; NaN is left out.
     pub data: &'a [Lanes],
     /// Groups in a row.
@@ -213,14 +213,14 @@ impl Pixels<'_> {
 
 /// The variance of a pixel with some light, which has a part for light and one for its square.
 #[inline(always)]
-pub(super) fn variance_of(light: f32, [linear, square]: [f32; 2]) -> f32 {
+pub(crate) fn variance_of(light: f32, [linear, square]: [f32; 2]) -> f32 {
     let positive = if light > 0.0 { light } else { 0.0 };
     1.0 + positive * (linear + square * positive)
 }
 
 /// A spot's light along both sides of a window.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct SpotLight<'a> {
+pub(crate) struct SpotLight<'a> {
     /// Light, in units of the noise.
     pub flux: f32,
     /// Where it falls along x and y.
@@ -229,7 +229,7 @@ pub(super) struct SpotLight<'a> {
 
 /// A spot's light in a group of pixels of a row.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct GroupLight {
+pub(crate) struct GroupLight {
     flux: f32,
     across: ProfilePart<Lanes>,
     down: ProfilePart<f32>,
@@ -251,7 +251,7 @@ impl SpotLight<'_> {
 /// The light in a pixel, and how the model changes there with the parameters of the first `count` spots, in units of the
 /// noise.
 #[inline(always)]
-pub(super) fn linearise<const S: usize, const N: usize>(
+pub(crate) fn linearise<const S: usize, const N: usize>(
     spots: &[GroupLight; S],
     count: usize,
     lane: usize,
@@ -274,7 +274,7 @@ pub(super) fn linearise<const S: usize, const N: usize>(
 
 /// The light of a spot in a pixel, as part of all; and how the light there changes with x, y and size.
 #[inline(always)]
-pub(super) fn spot_gradient(
+pub(crate) fn spot_gradient(
     flux: f32,
     across: &ProfilePart<f32>,
     down: &ProfilePart<f32>,
@@ -289,7 +289,7 @@ pub(super) fn spot_gradient(
 
 /// Adds the pixels of a window, in which the light is that of `spots`.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(super) fn add_pixels<const N: usize>(
+pub(crate) fn add_pixels<const N: usize>(
     normal: &mut Normal<N>,
     spots: &[SpotLight],
     pixels: &Pixels,
@@ -357,7 +357,7 @@ fn add_up<const S: usize, const N: usize>(
 /// The variance of the flux of one spot, in ADU², fitted together with a background of variance
 /// `background_error2`; the spot's place is held, on which a symmetric spot's flux does not depend.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(super) fn flux_variance(spot: &SpotLight, pixels: &Pixels, background_error2: f64) -> f64 {
+pub(crate) fn flux_variance(spot: &SpotLight, pixels: &Pixels, background_error2: f64) -> f64 {
     let mut sums = [[0.0f32; LANES]; 3];
     let [across, down] = spot.axes;
     for group in 0..pixels.groups {
@@ -382,7 +382,7 @@ pub(super) fn flux_variance(spot: &SpotLight, pixels: &Pixels, background_error2
 }
 
 /// The same from the sums of weights, and of these times the light, as part of all, and its square.
-pub(super) fn flux_variance_of(
+pub(crate) fn flux_variance_of(
     [ones, shapes, squares]: [f64; 3],
     per_noise: f64,
     background_error2: f64,
@@ -394,7 +394,7 @@ pub(super) fn flux_variance_of(
 
 /// Adds `sign` times the light of a spot to a window's pixels.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(super) fn add_light(spot: &SpotLight, sign: f32, groups: usize, data: &mut [Lanes]) {
+pub(crate) fn add_light(spot: &SpotLight, sign: f32, groups: usize, data: &mut [Lanes]) {
     let [across, down] = spot.axes;
     for group in 0..groups {
         let value = across.group(group).value;
@@ -409,7 +409,7 @@ pub(super) fn add_light(spot: &SpotLight, sign: f32, groups: usize, data: &mut [
 
 /// The sum, by halves: one after the other, each would wait for the one before.
 #[inline(always)]
-pub(super) fn sum_of(v: Lanes) -> f64 {
+pub(crate) fn sum_of(v: Lanes) -> f64 {
     let four: [f32; 4] = std::array::from_fn(|i| v[i] + v[i + 4]);
     f64::from((four[0] + four[2]) + (four[1] + four[3]))
 }

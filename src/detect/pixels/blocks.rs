@@ -4,14 +4,14 @@ use multiversion::multiversion;
 use std::ops::Range;
 
 /// Width of the blocks.
-pub(super) const BLOCK_PX: usize = 64;
+pub(crate) const BLOCK_PX: usize = 64;
 
 /// The maximum of a block without anything of interest.
 const NOTHING: f32 = f32::MIN;
 
 /// The maxima of those blocks of a frame that hold something of interest.
 #[derive(Debug, Clone, Default)]
-pub(super) struct BlockMaxima {
+pub(crate) struct BlockMaxima {
     /// Blocks in a row.
     pub per_row: usize,
     /// Row by row; [`NOTHING`] for the others.
@@ -39,7 +39,7 @@ impl BlockMaxima {
 
 /// A block of a row with values that reach some level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Reached {
+pub(crate) struct Reached {
     /// Its number in the row.
     pub block: usize,
     /// A bit for each of its columns, the first one lowest.
@@ -62,7 +62,7 @@ impl Reached {
 
 /// Finds the blocks of `row` with values that reach the level of their block; NaN reaches none.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(super) fn find_reaching(row: &[f32], levels: &[f32], found: &mut Vec<Reached>) {
+pub(crate) fn find_reaching(row: &[f32], levels: &[f32], found: &mut Vec<Reached>) {
     found.clear();
     let (blocks, rest) = row.as_chunks::<BLOCK_PX>();
     for (block, (values, &level)) in blocks.iter().zip(levels).enumerate() {

@@ -1,17 +1,17 @@
 //! From peaks to detections: groups of touching spots, centroids by the chosen method, flags.
 
-use super::centroid;
-use super::components::{Peak, Region};
-use super::config::CentroidMethod;
-use super::detection::{Detection, DetectionFlags};
-use super::fit::{Fit, FitConfig, MAX_SPOTS, NoiseModel, Spot, Spots, window_radius};
 use super::plateau::Plateau;
-use super::psf::PIXEL_VARIANCE_PX2;
-use super::scene::{FitWork, Scene};
-use super::shape;
-use super::strips::on_each;
-use super::view::View;
+use super::{centroid, shape};
 use crate::base::coords::PixelPoint;
+use crate::detect::background::on_each;
+use crate::detect::candidates::{Peak, Region};
+use crate::detect::config::CentroidMethod;
+use crate::detect::detection::{Detection, DetectionFlags};
+use crate::detect::fit::{
+    Fit, FitConfig, FitWork, MAX_SPOTS, NoiseModel, Scene, Spot, Spots, window_radius,
+};
+use crate::detect::pixels::View;
+use crate::detect::psf::PIXEL_VARIANCE_PX2;
 use std::mem;
 
 /// Spots closer than this many of their standard deviations touch, and are fitted together.
@@ -37,7 +37,7 @@ const PAIR_MAX_CHI2: f64 = 3.0;
 
 /// The buffers and results of one thread.
 #[derive(Debug, Clone, Default)]
-pub(super) struct MeasureWorker {
+pub(crate) struct MeasureWorker {
     /// Buffers of the fits.
     fits: FitWork,
     /// What the thread has measured.
@@ -45,7 +45,7 @@ pub(super) struct MeasureWorker {
 }
 
 /// All that the measurement of a frame's peaks needs.
-pub(super) struct Measurement<'a> {
+pub(crate) struct Measurement<'a> {
     /// The frame and its maps.
     pub scene: Scene<'a>,
     /// How the noise grows with light.
@@ -495,7 +495,7 @@ fn brightest_within(reach: usize, peak: &Peak, view: &View<'_>) -> f64 {
 
 /// What is known of the spots of all peaks.
 #[derive(Debug, Clone, Default)]
-pub(super) struct KnownSpots {
+pub(crate) struct KnownSpots {
     near: Neighbours,
     /// Each spot as far as it is known: fitted for those stronger than the one at hand.
     spots: Vec<Spot>,

@@ -9,7 +9,7 @@
 //! Taylor, Worsley & Gosselin 2007, "Maxima of discretely sampled random fields", Biometrika 94, 1,
 //! doi 10.1093/biomet/asm004, for a field whose correlation is Gaussian in shape.
 
-use super::psf::{LEAST_EXPONENT, erf_and_gauss, exp_of_negative};
+use crate::detect::psf::{LEAST_EXPONENT, erf_and_gauss, exp_of_negative};
 use multiversion::multiversion;
 use std::f64::consts::{PI, SQRT_2};
 
@@ -87,7 +87,7 @@ fn false_alarm_probability(u: f64, across: &Lower, down: &Lower) -> f64 {
 
 /// The threshold, in standard deviations of the filtered noise, above which pure noise has
 /// `per_mpx` local maxima in a million pixels.
-pub(super) fn threshold_for_rate(per_mpx: f64, rho_x: f64, rho_y: f64) -> f64 {
+pub(crate) fn threshold_for_rate(per_mpx: f64, rho_x: f64, rho_y: f64) -> f64 {
     let wanted = (per_mpx * 1e-6).ln();
     let (across, down) = (Lower::new(rho_x), Lower::new(rho_y));
     let excess = |u: f64| {
@@ -116,7 +116,7 @@ pub(super) fn threshold_for_rate(per_mpx: f64, rho_x: f64, rho_y: f64) -> f64 {
 /// The threshold raised for a noise that is itself estimated, with `degrees` of freedom: the same
 /// tail probability for Student's t as `u` has for a Gaussian, to leading order
 /// `t² = ν(exp(u²/ν) − 1)`.
-pub(super) fn for_estimated_noise(u: f64, degrees: f64) -> f64 {
+pub(crate) fn for_estimated_noise(u: f64, degrees: f64) -> f64 {
     let exponent = (u * u / degrees).min(20.0);
     (degrees * exponent.exp_m1()).sqrt()
 }

@@ -1,0 +1,3 @@
+//! The spot size and the noise model of a frame, from its own bright stars.
+
+pub(crate) mod calibrate;
