@@ -13,7 +13,6 @@
 //! A file is written beside its place and renamed. The table is read and checked at once; a chunk of triangles, when it is
 //! first needed. A file that is not exactly what was written is taken away.
 
-use super::index::TriangleIndex;
 use super::table::{CELLS, CHUNKS, SizeClass, Triangle};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -142,9 +141,13 @@ fn triangle(bytes: &[u8; TRIANGLE_BYTES]) -> Triangle {
 
 fn bytes_of(triangles: &[Triangle]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(triangles.len() * TRIANGLE_BYTES);
-    for triangle in triangles {
-        bytes.extend(triangle.corners.iter().flat_map(|c| c.to_le_bytes()));
-        bytes.extend(triangle.ratios.iter().flat_map(|r| r.to_le_bytes()));
+    for Triangle { corners, ratios } in triangles {
+        for corner in corners {
+            bytes.extend_from_slice(&corner.to_le_bytes());
+        }
+        for ratio in ratios {
+            bytes.extend_from_slice(&ratio.to_le_bytes());
+        }
     }
     bytes
 }
@@ -168,7 +171,10 @@ fn header(catalog_checksum: u64, table: &[u8]) -> [u8; HEADER_BYTES] {
 ///
 /// # Errors
 /// [`CacheError::Io`] if it cannot be read, [`CacheError::Damaged`] if it is not what [`store`] wrote for this catalogue.
-pub fn load(path: &Path, catalog_checksum: u64) -> Result<Option<TriangleIndex>, CacheError> {
+pub fn load(
+    path: &Path,
+    catalog_checksum: u64,
+) -> Result<Option<(Vec<SizeClass>, IndexFile)>, CacheError> {
     let (io_error, damaged) = (io_error("reading", path), damaged(path));
     let mut file = match File::open(path) {
         Ok(file) => file,
@@ -202,7 +208,7 @@ pub fn load(path: &Path, catalog_checksum: u64) -> Result<Option<TriangleIndex>,
         file: Mutex::new(file),
         classes: places,
     };
-    Ok(Some(TriangleIndex::new(classes, Some(file))))
+    Ok(Some((classes, file)))
 }
 
 /// The classes in a table, and where their triangles are.
@@ -230,14 +236,14 @@ fn classes_of(table: &[u8]) -> (Vec<SizeClass>, Vec<ClassPlace>) {
 ///
 /// # Errors
 /// [`CacheError::Io`] if it cannot be written.
-pub fn store(path: &Path, catalog_checksum: u64, index: &TriangleIndex) -> Result<(), CacheError> {
+pub fn store(path: &Path, catalog_checksum: u64, classes: &[SizeClass]) -> Result<(), CacheError> {
     let io_error = io_error("writing", path);
     let directory = path.parent().unwrap_or(Path::new("."));
     std::fs::create_dir_all(directory).map_err(&io_error)?;
     let file = tempfile::NamedTempFile::new_in(directory).map_err(&io_error)?;
     let mut out = io::BufWriter::new(file.as_file());
     let (mut table, mut triangles) = (Vec::new(), Vec::new());
-    for class in &index.classes {
+    for class in classes {
         let bytes = class
             .chunks
             .iter()
@@ -266,55 +272,50 @@ pub fn store(path: &Path, catalog_checksum: u64, index: &TriangleIndex) -> Resul
 
 #[cfg(test)]
 mod tests {
-    use super::super::index::Source;
     use super::*;
-    use crate::base::coords::UnitVector;
-    use crate::sky::catalog::sky_grid::SkyGrid;
-    use crate::sky::catalog::{Star, StarId};
 
-    fn small_index() -> (Vec<Star>, SkyGrid, TriangleIndex) {
-        let stars: Vec<Star> = (0..60u32)
-            .map(|i| {
-                Star::new(
-                    StarId::Skymap(i),
-                    UnitVector::from_ra_dec(f64::from(i * i % 97) * 0.01, f64::from(i) * 0.004),
-                    i as f32 * 0.1,
-                )
-            })
-            .collect();
-        let grid = SkyGrid::new(&stars);
-        let index = TriangleIndex::build(source(&stars, &grid), &|_| ());
-        (stars, grid, index)
+    fn classes() -> Vec<SizeClass> {
+        let triangle = |i: u32| {
+            let share = f64::from(i) / 100.0;
+            Triangle::new([i, i + 1, i + 2], [0.5 + share / 2.0, share])
+        };
+        let triangles: Vec<Triangle> = (0..100).map(triangle).collect();
+        vec![
+            SizeClass::new((0.1, 0.2), &triangles[..40]),
+            SizeClass::new((0.2, 0.3), &triangles[40..]),
+        ]
     }
 
-    fn source<'a>(stars: &'a [Star], grid: &'a SkyGrid) -> Source<'a> {
-        Source { stars, grid }
-    }
-
-    /// All chunks, which are read on the way, and what went wrong then.
-    fn chunks(index: &TriangleIndex, source: Source) -> (Vec<Vec<Triangle>>, usize) {
-        let places = (0..index.classes.len()).flat_map(|c| (0..CHUNKS).map(move |i| (c, i)));
-        let chunks = places.map(|(class, chunk)| index.chunk(source, class, chunk).to_vec());
-        (chunks.collect(), index.take_troubles().len())
+    /// All triangles of an index on disk, and how many of its chunks are damaged.
+    fn read_all((classes, file): (Vec<SizeClass>, IndexFile)) -> (Vec<Triangle>, usize) {
+        let (mut triangles, mut damaged) = (Vec::new(), 0);
+        for (number, class) in classes.iter().enumerate() {
+            for chunk in 0..CHUNKS {
+                match file.chunk(number, chunk, class.range(chunk)) {
+                    Ok(read) => triangles.extend(read),
+                    Err(_) => damaged += 1,
+                }
+            }
+        }
+        (triangles, damaged)
     }
 
     #[test]
-    fn what_is_stored_is_loaded_and_nothing_else() {
+    fn an_index_is_read_as_it_was_written_and_damage_is_found() {
         let directory = tempfile::tempdir().unwrap();
         let path = index_path(&directory.path().join("new"), 7);
         assert!(load(&path, 7).unwrap().is_none());
-        let (stars, grid, index) = small_index();
-        let source = source(&stars, &grid);
-        assert!(!index.is_empty());
-        store(&path, 7, &index).unwrap();
+        let classes = classes();
+        store(&path, 7, &classes).unwrap();
+        let chunks = classes.iter().flat_map(|class| &class.chunks);
+        let expected: Vec<Triangle> = chunks.flat_map(|c| c.get().unwrap().to_vec()).collect();
+        assert_eq!(expected.len(), 100);
         let loaded = load(&path, 7).unwrap().unwrap();
-        assert_eq!(loaded.len(), index.len());
-        let (expected, _) = chunks(&index, source);
-        assert_eq!(chunks(&loaded, source), (expected.clone(), 0));
+        assert_eq!(read_all(loaded), (expected, 0));
         assert!(load(&path, 8).is_err(), "another catalogue's index");
 
         let good = std::fs::read(&path).unwrap();
-        let table_end = good.len() - index.len() * TRIANGLE_BYTES;
+        let table_end = good.len() - 100 * TRIANGLE_BYTES;
         for position in [0, 20, 30, 45, 47, 48, 60, table_end / 2, table_end - 1] {
             let mut bad = good.clone();
             bad[position] ^= 0x10;
@@ -325,17 +326,13 @@ mod tests {
             std::fs::write(&path, &good[..length]).unwrap();
             assert!(load(&path, 7).is_err(), "cut to {length} bytes");
         }
-        // Damage to a chunk shows when that is read; it is made good, and the file is gone.
+        // Damage to a chunk is found when the chunk is read; the file is then removed.
         for position in [table_end, (table_end + good.len()) / 2, good.len() - 1] {
             let mut bad = good.clone();
             bad[position] ^= 0x10;
             std::fs::write(&path, &bad).unwrap();
-            let loaded = load(&path, 7).unwrap().unwrap();
-            assert_eq!(
-                chunks(&loaded, source),
-                (expected.clone(), 1),
-                "byte {position}"
-            );
+            let (_, damaged) = read_all(load(&path, 7).unwrap().unwrap());
+            assert_eq!(damaged, 1, "byte {position}");
             assert!(!path.exists());
         }
     }

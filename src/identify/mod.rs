@@ -3,8 +3,10 @@
 pub mod attitude;
 mod blends;
 mod cache;
+mod cells;
 pub mod diagnosis;
 pub mod index;
+mod listing;
 mod predict;
 mod refine;
 mod search;

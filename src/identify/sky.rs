@@ -1,7 +1,7 @@
 //! The catalogue made ready for identification.
 
 use super::cache::{self, CacheError};
-use super::index::{Source, TriangleIndex};
+use super::index::TriangleIndex;
 use crate::base::units::RAD_PER_DEG;
 use crate::sky::catalog::sky_grid::SkyGrid;
 use crate::sky::catalog::{Catalog, Star};
@@ -63,20 +63,21 @@ impl<'a> Sky<'a> {
             None
         });
         let sky = match cached {
-            Some(triangles) => Self::new(catalog, SkyGrid::new(catalog.stars()), triangles),
+            Some((classes, file)) => Self::new(catalog, TriangleIndex::new(classes, Some(file))),
             None => {
                 let sky = Self::build(catalog, progress);
-                troubles.extend(cache::store(&path, catalog.checksum(), &sky.triangles).err());
+                troubles
+                    .extend(cache::store(&path, catalog.checksum(), &sky.triangles.classes).err());
                 sky
             }
         };
         (sky, troubles)
     }
 
-    fn new(catalog: &'a Catalog, grid: SkyGrid, triangles: TriangleIndex) -> Self {
+    fn new(catalog: &'a Catalog, triangles: TriangleIndex) -> Self {
         Self {
             catalog,
-            grid,
+            grid: SkyGrid::new(catalog.stars()),
             triangles,
             counts: MagnitudeCounts::new(catalog.stars()),
         }
@@ -84,13 +85,7 @@ impl<'a> Sky<'a> {
 
     /// Makes everything anew.
     pub fn build(catalog: &'a Catalog, progress: &(dyn Fn(f64) + Sync)) -> Self {
-        let grid = SkyGrid::new(catalog.stars());
-        let source = Source {
-            stars: catalog.stars(),
-            grid: &grid,
-        };
-        let triangles = TriangleIndex::build(source, progress);
-        Self::new(catalog, grid, triangles)
+        Self::new(catalog, TriangleIndex::build(catalog.stars(), progress))
     }
 
     /// Calls `visit` with the corners of every triangle of a size class whose ratios lie within a tolerance of those given, in
@@ -101,17 +96,14 @@ impl<'a> Sky<'a> {
         similar: (usize, [f64; 2], f64),
         visit: impl FnMut(&[u32; 3]),
     ) {
-        let source = Source {
-            stars: self.stars(),
-            grid: &self.grid,
-        };
-        self.triangles.for_each_similar(source, similar, visit);
+        self.triangles
+            .for_each_similar(self.stars(), similar, visit);
     }
 
     /// What went wrong with the cache since [`Self::open`], or since it was last asked: no reason to stop, since what could not be read was
     /// made anew.
     pub fn take_troubles(&self) -> Vec<CacheError> {
-        self.triangles.take_troubles()
+        self.triangles.take_read_errors()
     }
 
     /// The narrowest and the widest horizontal field of view in which the triangles listed are found, in radians.

@@ -32,13 +32,13 @@ impl Triangle {
     pub fn new(corners: [u32; 3], ratios: [f64; 2]) -> Self {
         Self {
             corners,
-            ratios: ratios.map(steps),
+            ratios: [steps(ratios[0]), steps(ratios[1])],
         }
     }
 
     fn cell(&self) -> usize {
-        let [middle, shortest] = self.ratios.map(ratio);
-        row_of(middle) * COLUMNS + column_of(shortest)
+        let [middle, shortest] = self.ratios;
+        row_of(ratio(middle)) * COLUMNS + column_of(ratio(shortest))
     }
 }
 

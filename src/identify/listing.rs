@@ -1,0 +1,283 @@
+//! Lists the triangles of one size class.
+//!
+//! stars → for each cell of the sky, the brightest stars around it → their triangles
+//!
+//! A triangle is listed for the cell that holds the middle of its longest side, so that none is
+//! listed twice; it is listed if its stars are among the brightest around that cell. Whatever the
+//! width of a field, the brightest stars in it then form triangles of the class that fits it.
+//!
+//! The inner loops use plain numbers: they run some ten million times, also in programs that are
+//! built without optimization.
+
+use super::cells::{SkyCells, Zone};
+use super::table::{SizeClass, Triangle};
+use super::triangle::TriangleShape;
+use crate::base::units::RAD_PER_DEG;
+use crate::sky::catalog::Star;
+use crate::sky::catalog::sky_grid::chord_of;
+use arrayvec::ArrayVec;
+use rayon::prelude::*;
+
+/// Longest sides, as angles, of the smallest and the largest triangles listed: what fields 1.5° to
+/// 60° wide hold.
+const SMALLEST_DEG: f64 = 0.4;
+const LARGEST_DEG: f64 = 45.0;
+/// Smaller classes are added as long as a cell has on average this many stars around it, down to
+/// 0.2°: what fields from 0.75° hold.
+const STARS_AROUND_NARROW_CELL: f64 = 8.0;
+const NARROW_CLASSES_MAX: i32 = 2;
+/// The longest sides in one class differ by no more than this factor.
+const CLASS_FACTOR: f64 = std::f64::consts::SQRT_2;
+/// Height of a cell over the class's smallest longest side.
+const CELL_HEIGHT: f64 = 0.5;
+/// Stars are taken from a cone around a cell's centre: its radius over the class's largest longest
+/// side.
+const CELL_RADIUS: f64 = 0.75;
+/// How many of the brightest stars around a cell make triangles, for classes whose smallest longest
+/// side is below the angle in degrees. Wide fields can afford more: there are few of them.
+const STARS_PER_CELL: [(f64, usize); 4] =
+    [(0.9, 6), (3.0, 7), (8.0, 9), (90.0, MOST_STARS_PER_CELL)];
+const MOST_STARS_PER_CELL: usize = 12;
+
+/// The brightest stars around a cell, brightest first.
+type Around = ArrayVec<u32, MOST_STARS_PER_CELL>;
+
+/// A star of the catalog in the form that listing needs.
+#[derive(Debug, Clone, Copy)]
+pub struct ListedStar {
+    /// Unit vector.
+    direction: [f64; 3],
+    ra_rad: f64,
+}
+
+impl ListedStar {
+    /// All `stars`.
+    pub fn all(stars: &[Star]) -> Vec<Self> {
+        let listed = |star: &Star| Self {
+            direction: (*star.direction.as_vector()).into(),
+            ra_rad: star.direction.to_ra_dec().0,
+        };
+        stars.par_iter().map(listed).collect()
+    }
+}
+
+/// Smallest and largest longest side of each class, in radians, for a catalog of `stars` stars.
+pub fn class_limits_rad(stars: usize) -> Vec<(f64, f64)> {
+    let octaves = (LARGEST_DEG / SMALLEST_DEG).ln() / CLASS_FACTOR.ln();
+    let count = octaves.ceil() as i32;
+    let limits = |class: i32| {
+        let low_rad = SMALLEST_DEG * RAD_PER_DEG * CLASS_FACTOR.powi(class);
+        (low_rad, low_rad * CLASS_FACTOR)
+    };
+    let is_dense = |class: &i32| {
+        // The share of the sphere around a cell.
+        let radius_rad = limits(*class).1 * CELL_RADIUS;
+        stars as f64 * radius_rad * radius_rad / 4.0 >= STARS_AROUND_NARROW_CELL
+    };
+    let narrowest = (-NARROW_CLASSES_MAX..0).find(is_dense).unwrap_or(0);
+    (narrowest..count).map(limits).collect()
+}
+
+/// Lists the class whose longest sides are within `limits_rad`. `stars` are all stars of
+/// the catalog, brightest first.
+pub fn list_class(stars: &[ListedStar], limits_rad: (f64, f64)) -> SizeClass {
+    let (class, cells) = Class::new(stars, limits_rad);
+    let triangles: Vec<Vec<Triangle>> = stars_by_zone(stars, &cells)
+        .into_par_iter()
+        .enumerate()
+        .map(|(zone, near)| class.triangles_of(&cells.zone(zone), &near))
+        .collect();
+    SizeClass::new((class.low, class.high), &triangles.concat())
+}
+
+fn stars_per_cell(low_rad: f64) -> usize {
+    let low_deg = low_rad / RAD_PER_DEG;
+    let class = STARS_PER_CELL.iter().find(|(limit, _)| low_deg < *limit);
+    class.expect("classes end below 90 degrees").1
+}
+
+/// For each zone, the stars that may be in the cones around its cells, brightest first.
+fn stars_by_zone(stars: &[ListedStar], cells: &SkyCells) -> Vec<Vec<u32>> {
+    let mut by_zone = vec![Vec::new(); cells.zones];
+    for (number, star) in stars.iter().enumerate() {
+        for zone in &mut by_zone[cells.zones_near(&star.direction)] {
+            zone.push(number as u32);
+        }
+    }
+    by_zone
+}
+
+/// The stars, and what decides which of their triangles are listed.
+struct Class<'a> {
+    stars: &'a [ListedStar],
+    stars_per_cell: usize,
+    /// Square of the chord of the radius of a cone.
+    chord_sq: f64,
+    /// Smallest and largest longest side, as chords.
+    low: f64,
+    high: f64,
+}
+
+impl<'a> Class<'a> {
+    fn new(stars: &'a [ListedStar], (low_rad, high_rad): (f64, f64)) -> (Self, SkyCells) {
+        let radius_rad = high_rad * CELL_RADIUS;
+        let class = Self {
+            stars,
+            stars_per_cell: stars_per_cell(low_rad),
+            chord_sq: chord_of(radius_rad).powi(2),
+            low: chord_of(low_rad),
+            high: chord_of(high_rad),
+        };
+        (class, SkyCells::new(low_rad * CELL_HEIGHT, radius_rad))
+    }
+
+    /// The triangles of the cells of a zone, cell by cell. `near` are the stars that may be in the
+    /// cones around them, brightest first.
+    fn triangles_of(&self, zone: &Zone, near: &[u32]) -> Vec<Triangle> {
+        let mut triangles = Vec::new();
+        for (cell, around) in self.brightest_around(zone, near).iter().enumerate() {
+            let first = triangles.len();
+            self.list_cell(zone, (cell, around), &mut triangles);
+            triangles[first..].sort_unstable_by_key(|triangle| {
+                let mut corners = triangle.corners;
+                corners.sort_unstable_by(|a, b| b.cmp(a));
+                corners
+            });
+        }
+        triangles
+    }
+
+    /// The brightest stars in the cone around each cell of a zone, brightest first.
+    fn brightest_around(&self, zone: &Zone, near: &[u32]) -> Vec<Around> {
+        let centres = zone.centres();
+        let mut brightest = vec![Around::new(); zone.cells];
+        let mut not_full = zone.cells;
+        for &number in near {
+            let star = &self.stars[number as usize];
+            let direction = in_single_precision(&star.direction);
+            for cell in zone.cells_near(&star.direction, star.ra_rad) {
+                let cell = cell % zone.cells;
+                let around = &mut brightest[cell];
+                if around.len() < self.stars_per_cell
+                    && distance_sq(&direction, &centres[cell]) <= self.chord_sq
+                {
+                    around.push(number);
+                    not_full -= usize::from(around.len() == self.stars_per_cell);
+                }
+            }
+            if not_full == 0 {
+                break;
+            }
+        }
+        brightest
+    }
+
+    /// Lists the triangles of the stars `around` a cell that belong to that cell.
+    fn list_cell(&self, zone: &Zone, (cell, around): (usize, &[u32]), out: &mut Vec<Triangle>) {
+        for i in 1..around.len() {
+            for j in 0..i {
+                let ends = [
+                    &self.stars[around[i] as usize],
+                    &self.stars[around[j] as usize],
+                ];
+                let [p, q] = ends.map(|star| &star.direction);
+                let longest_sq = distance_sq(p, q);
+                // Nearly: the root decides.
+                if longest_sq < self.low * self.low * (1.0 - 1e-9)
+                    || longest_sq > self.high * self.high * (1.0 + 1e-9)
+                {
+                    continue;
+                }
+                let sum = [p[0] + q[0], p[1] + q[1], p[2] + q[2]];
+                if !zone.may_hold(&sum) {
+                    continue;
+                }
+                let mut is_in_cell = None;
+                for k in 0..around.len() {
+                    if k == i || k == j {
+                        continue;
+                    }
+                    let third = &self.stars[around[k] as usize].direction;
+                    let opposite = [distance_sq(q, third), distance_sq(p, third), longest_sq];
+                    if opposite[0] >= longest_sq || opposite[1] >= longest_sq {
+                        continue;
+                    }
+                    let Some(shape) = TriangleShape::of_sides(opposite) else {
+                        continue;
+                    };
+                    if shape.longest >= self.low
+                        && shape.longest < self.high
+                        && *is_in_cell.get_or_insert_with(|| zone.cell_of(&sum) == Some(cell))
+                    {
+                        let corners = [around[i], around[j], around[k]];
+                        let [a, b, c] = shape.order;
+                        let corners = [corners[a], corners[b], corners[c]];
+                        out.push(Triangle::new(corners, shape.ratios));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The direction as the catalog's grid keeps it.
+fn in_single_precision(direction: &[f64; 3]) -> [f64; 3] {
+    let [x, y, z] = *direction;
+    [
+        f64::from(x as f32),
+        f64::from(y as f32),
+        f64::from(z as f32),
+    ]
+}
+
+fn distance_sq(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    x * x + y * y + z * z
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sky::catalog::Catalog;
+
+    #[test]
+    fn a_dense_catalogue_has_narrower_classes() {
+        let smallest_deg = |stars: usize| class_limits_rad(stars)[0].0 / RAD_PER_DEG;
+        assert_eq!(smallest_deg(0), SMALLEST_DEG);
+        assert_eq!(
+            smallest_deg(Catalog::built_in().stars().len()),
+            SMALLEST_DEG
+        );
+        assert!((smallest_deg(2_557_501) - 0.2).abs() < 1e-9);
+        let limits = class_limits_rad(2_557_501);
+        let adjoin = |pair: &[(f64, f64)]| (pair[0].1 / pair[1].0 - 1.0).abs() < 1e-12;
+        assert!(limits.windows(2).all(adjoin));
+    }
+
+    /// The brightest stars around the centre of a cell, from all stars.
+    fn brightest_around(class: &Class, centre: &[f64; 3]) -> Vec<u32> {
+        let is_near = |&number: &u32| {
+            let direction = in_single_precision(&class.stars[number as usize].direction);
+            distance_sq(&direction, centre) <= class.chord_sq
+        };
+        let numbers = 0..class.stars.len() as u32;
+        numbers.filter(is_near).take(class.stars_per_cell).collect()
+    }
+
+    #[test]
+    fn the_stars_around_a_cell_are_those_that_a_search_through_all_stars_finds() {
+        let stars = ListedStar::all(&Catalog::built_in().stars()[..2000]);
+        for limits_deg in [(2.0, 2.8), (9.0, 13.0), (36.0, 51.0)] {
+            let (low_rad, high_rad) = (limits_deg.0 * RAD_PER_DEG, limits_deg.1 * RAD_PER_DEG);
+            let (class, cells) = Class::new(&stars, (low_rad, high_rad));
+            let by_zone = stars_by_zone(&stars, &cells);
+            for number in [0, 1, cells.zones / 3, cells.zones / 2, cells.zones - 1] {
+                let zone = cells.zone(number);
+                let found = class.brightest_around(&zone, &by_zone[number]);
+                for (found, centre) in found.iter().zip(zone.centres()) {
+                    assert_eq!(found[..], brightest_around(&class, &centre));
+                }
+            }
+        }
+    }
+}
