@@ -1,4 +1,4 @@
-//! A point of either study over the spot radius: `cargo bench --bench defocus`
+//! One grid point of each defocus study: `cargo bench --bench defocus`
 
 #![allow(
     clippy::unwrap_used,

@@ -1,5 +1,5 @@
-//! Time of `detect`, reading not counted: the real 16-bit frames in `../shared/frames` where they
-//! are, and synthetic frames, by stage, size and depth. One thread but where said, buffers reused, as in
+//! Time of `detect` without reading: the real 16-bit frames in `../shared/frames` if present, and
+//! synthetic frames, by stage, size and depth. One thread unless stated; buffers are reused, as in
 //! a long run over many frames.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -11,9 +11,9 @@ use std::hint::black_box;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-/// Stars of σ = 1 px, 60 for every 1024 x 768 pixels, their peaks from 5.5 times the noise on.
+/// Stars of σ = 1 px, 60 per 1024 x 768 pixels, with peaks from 5.5 times the noise up.
 ///
-/// `bits`: whole grey levels of 8 or 16 bits; 0 leaves them as they are.
+/// `bits`: 8 or 16 for whole grey levels, 0 for unrounded ones.
 fn synthetic_frame(width: usize, height: usize, bits: u32) -> Frame {
     const STARS: usize = 60;
     const BRIGHTNESSES: i32 = 60;
@@ -102,7 +102,8 @@ fn bench_threads(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The stages: the background alone; all but the fits of the stars, which are then one; all.
+/// Stages: background alone; everything except the stars' fits (a single star is fitted);
+/// everything.
 fn bench_stages(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("detect/stage");
     let frame = synthetic_frame(1024, 768, 16);

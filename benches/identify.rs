@@ -1,6 +1,7 @@
-//! Time of identification with nothing known and with the field of view known to a factor of two, of reading, and of a whole
-//! frame (detection and identification), over the real 16-bit frames in `../shared/frames` where they are; and of what a
-//! new process has to do first. One thread, buffers reused, as in a long run over many frames.
+//! Time of identification with nothing known and with the field of view known to a factor of two,
+//! of reading, and of a whole frame (detection and identification), on the real 16-bit frames in
+//! `../shared/frames` if present; and of the start of a new process. One thread; buffers are
+//! reused, as in a long run over many frames.
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use starpipe::detect::{self, DetectConfig, detect};
@@ -13,7 +14,7 @@ use std::f64::consts::SQRT_2;
 use std::hint::black_box;
 use std::path::Path;
 
-/// The frame, its stars, and what it takes to know its scale to a factor of two in all.
+/// The frame, its stars, and a hint of its scale with a total range of a factor of two.
 fn prepare(path: &Path, sky: &Sky) -> Option<(Frame, StarField, Hints)> {
     let frame = frame::read(path).ok()?;
     let detections = detect(

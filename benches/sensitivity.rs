@@ -1,4 +1,4 @@
-//! What a prediction costs, and what it adds to a frame: `cargo bench --bench sensitivity`
+//! Time of a prediction, alone and as part of a frame: `cargo bench --bench sensitivity`
 
 #![allow(
     clippy::unwrap_used,

@@ -1,4 +1,5 @@
-//! starpipe's side of `scripts/bench-peers`: orders come line by line as JSON, and each is answered with a line.
+//! starpipe's side of `scripts/bench-peers`: reads orders as lines of JSON, answers each with a
+//! line.
 //!
 //! usage: `bench_worker FROM:TO`, the range of horizontal fields in degrees.
 
@@ -15,14 +16,14 @@ use std::time::Instant;
 
 const ARCSEC_PER_RAD: f64 = 206_264.806;
 
-/// What is timed, and the room it works in.
+/// The stages that are timed, and their buffers.
 struct Bench<'a> {
     sky: Sky<'a>,
     fields_deg: (f64, f64),
     frame: Frame,
     detect: detect::Workspace,
     identify: identify::Workspace,
-    /// Of the frame that is loaded.
+    /// Detections of the loaded frame.
     known: Detections,
     found: Detections,
 }
@@ -52,7 +53,7 @@ impl Bench<'_> {
         }
     }
 
-    /// Identifies the stars of the frame that is loaded, or of what was just found.
+    /// Identifies the stars of the loaded frame, or the detections just made.
     fn solve(&mut self, is_known: bool, is_fresh: bool) -> (f64, Option<&Identification>) {
         let hints = self.hints(is_known);
         let start = Instant::now();
@@ -72,19 +73,19 @@ impl Bench<'_> {
             }
             "solve" => {
                 let (ms, found) = self.solve(is_known, false);
-                Ok(told(ms, found))
+                Ok(to_json(ms, found))
             }
             "whole" => {
                 let extract_ms = self.extract()?;
                 let (ms, found) = self.solve(is_known, true);
-                Ok(told(extract_ms + ms, found))
+                Ok(to_json(extract_ms + ms, found))
             }
             other => Err(format!("no such order: {other:?}").into()),
         }
     }
 }
 
-fn told(ms: f64, found: Option<&Identification>) -> Value {
+fn to_json(ms: f64, found: Option<&Identification>) -> Value {
     let arcsec =
         |found: &Identification| found.rms_px / found.camera.focal_length_px * ARCSEC_PER_RAD;
     json!({

@@ -1,5 +1,6 @@
-//! Draws a frame of the sky from the built-in catalogue: photo-electrons, integrated Gaussian spots, sky,
-//! shot and read noise. The same arguments draw the same frame. For fixtures, not for studies.
+//! Draws a frame of the sky from the built-in catalogue: photo-electrons, integrated Gaussian
+//! spots, sky, shot and read noise. The same arguments draw the same frame. For fixtures; studies
+//! use `starpipe simulate`.
 //!
 //! `cargo run --example draw_frame -- OUT.png|OUT.tif RA DEC UP FOV WIDTH HEIGHT SEED` (angles in degrees)
 //!
@@ -19,13 +20,13 @@ use tiff::encoder::{Compression, DeflateLevel, Predictor, TiffEncoder, colortype
 
 /// Standard deviation of a spot before the pixels integrate it.
 const SPOT_SIGMA_PX: f64 = 1.0;
-/// Half the side of the square that a spot is drawn in, in pixels.
+/// Half the side of the square in which a spot is drawn, in pixels.
 const SPOT_REACH_PX: i64 = 8;
 /// Electrons from a star of magnitude 0.
 const ZERO_MAG_E: f64 = 250e3;
 const SKY_E: f64 = 100.0;
 const READ_NOISE_E: f64 = 5.0;
-/// The level that stands for no light, so that noise is not cut off below.
+/// Grey level without light, so that noise is not clipped at 0.
 const OFFSET_ADU: f64 = 10.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -78,7 +79,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Adds a star's light, each pixel with its part of the spot.
+/// Adds a star's light, integrated over each pixel.
 fn add_spot(electrons: &mut [f64], width: i64, at: &PixelPoint, star_e: f64) {
     let height = electrons.len() as i64 / width;
     let (column, row) = (at.x.round() as i64, at.y.round() as i64);
@@ -99,7 +100,7 @@ fn add_spot(electrons: &mut [f64], width: i64, at: &PixelPoint, star_e: f64) {
     }
 }
 
-/// The part of a spot's light that falls on a pixel (on one axis) whose centre is `offset_px` from the spot's.
+/// Share of a spot's light on a pixel (on one axis) whose centre is `offset_px` from the spot's.
 fn share(offset_px: f64) -> f64 {
     const STEPS: i32 = 16;
     let density = |step: i32| {
@@ -109,7 +110,7 @@ fn share(offset_px: f64) -> f64 {
     (0..STEPS).map(density).sum::<f64>() / f64::from(STEPS)
 }
 
-/// Electrons that are read out where so many are expected.
+/// Electrons read out for an expected number.
 fn caught_e(expected_e: f64, random: &mut ChaCha8Rng) -> Result<f64, Box<dyn Error>> {
     Ok(Poisson::new(expected_e)?.sample(random) + Normal::new(0.0, READ_NOISE_E)?.sample(random))
 }

@@ -1,8 +1,9 @@
 //! How long identification takes, over simulated fields of 2° to 40° and over frames named on the command line:
 //! `cargo run --release --example identify_speed -- [FIELDS] [FRAME ...]`
 //!
-//! Each field is identified with nothing known, and with its scale known to a factor of two; the least time of several
-//! counts, so that other work on the machine does not: of five, or as many as the variable REPEATS says.
+//! Each field is identified with nothing known, and with its scale known to a factor of two. The
+//! shortest of several times counts, so that other load on the machine does not: of five, or of the
+//! number in the variable REPEATS.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -18,10 +19,10 @@ use std::time::Instant;
 
 const FIELDS: u64 = 500;
 const FOV_DEG: (f64, f64) = (2.0, 40.0);
-/// Where the environment does not say how often each field is identified.
+/// Default number of repetitions.
 const REPEATS: usize = 5;
 
-/// Milliseconds of each field, and what became of them.
+/// Milliseconds of each field, and the outcomes.
 struct Times {
     workspace: Workspace,
     repeats: usize,
@@ -76,7 +77,7 @@ impl Times {
     }
 }
 
-/// What it takes to know the scale of `camera` to a factor of two in all.
+/// A hint of the scale of `camera` with a total range of a factor of two.
 fn factor_of_two(camera: &CameraModel) -> Hints {
     let scale_rad = 1.0 / camera.focal_length_px;
     Hints {
@@ -85,7 +86,7 @@ fn factor_of_two(camera: &CameraModel) -> Hints {
     }
 }
 
-/// Fields of view spread evenly over the logarithm.
+/// Fields of view, uniform in the logarithm.
 fn simulated(fields: u64, sky: &Sky) {
     if fields == 0 {
         return;
@@ -114,7 +115,7 @@ fn simulated(fields: u64, sky: &Sky) {
     factor.print("factor of two");
 }
 
-/// What is found with nothing known has to be found again; it also tells the scale.
+/// An identification with nothing known must be repeatable; it also gives the scale.
 fn real(frames: &[String], sky: &Sky) -> Result<(), Box<dyn Error>> {
     for path in frames {
         let frame = starpipe::frame::read(path)?;

@@ -1,4 +1,5 @@
-//! How faint a star sensor sees, and which of its parts is worth improving: `cargo run --example limiting_magnitude`
+//! The limiting magnitude of a star sensor, and which of its parameters is worth improving:
+//! `cargo run --example limiting_magnitude`
 
 use starpipe::camera::data_sheet::Preset;
 use starpipe::model::sensitivity::{Budget, Detector, Parameter, Rule, Scenario};

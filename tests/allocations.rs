@@ -1,5 +1,5 @@
-//! Detection allocates nothing from the second frame of a kind on. A test binary of its own, for the counting
-//! allocator is that of the whole process.
+//! Detection allocates nothing from the second frame of a kind on. This is a separate test binary,
+//! because the counting allocator serves the whole process.
 
 #![allow(
     clippy::unwrap_used,
@@ -14,7 +14,8 @@ use starpipe::frame::Frame;
 const WIDTH: usize = 640;
 const HEIGHT: usize = 480;
 
-/// A sky with faint and bright, single, touching and saturated stars, a hot pixel, a trail and pixels without a value.
+/// A sky with faint and bright, single, touching and saturated stars, a hot pixel, a trail and
+/// pixels without a value.
 fn frame(spot_px: f32, level: f32, noise: f32, seed: u64) -> Frame {
     const FULL: f32 = 4095.0;
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
@@ -62,7 +63,7 @@ fn detection_allocates_nothing_in_steady_state() {
     let frames = [
         frame(0.6, 100.0, 8.0, 1),
         frame(1.3, 100.0, 8.0, 2),
-        // Coarse, and cut off at zero.
+        // Coarsely quantised, and clipped at zero.
         frame(1.0, 1.0, 0.7, 3),
     ];
     for centroid in [CentroidMethod::GaussianFit, CentroidMethod::GreyWeighted] {

@@ -1,4 +1,4 @@
-//! Identification allocates nothing once its workspace has seen a field: counted by an allocator that counts.
+//! Identification allocates nothing once its workspace has seen a field.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 #![allow(
@@ -21,15 +21,15 @@ thread_local! {
 }
 
 fn count() {
-    // The thread may be at its end.
+    // The thread may be ending.
     let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
 }
 
-// SAFETY: every call goes to the system's allocator as it is; counting allocates nothing.
+// SAFETY: every call is passed on unchanged to the system's allocator; counting does not allocate.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count();
-        // SAFETY: the caller keeps to the contract of `alloc`, which is the system allocator's.
+        // SAFETY: the caller upholds the contract of `alloc`, which is the system allocator's.
         unsafe { System.alloc(layout) }
     }
 
@@ -54,7 +54,7 @@ fn allocations(work: impl FnOnce()) -> usize {
     ALLOCATIONS.with(Cell::get) - before
 }
 
-/// Fields of several widths; the last is none at all.
+/// Fields of several widths; the last one has no true stars.
 fn fields(sky: &Sky) -> Vec<StarField> {
     let draw = |(seed, fov_deg): (u64, f64)| {
         let protocol = Protocol {
@@ -66,17 +66,17 @@ fn fields(sky: &Sky) -> Vec<StarField> {
         let mut field = Observation::draw(&protocol, sky, &mut random)
             .list
             .star_field(0.0);
-        // Where the spot is known, blends are looked for.
+        // With a known spot, blends are searched for.
         field.spot_sigma_px = Some(1.5);
         field
     };
     let mut fields: Vec<StarField> = (1..).zip([4.0, 10.0, 20.0, 35.0]).map(draw).collect();
-    let mut strewn = fields[0].clone();
-    for (number, star) in strewn.stars.iter_mut().enumerate() {
+    let mut random_dots = fields[0].clone();
+    for (number, star) in random_dots.stars.iter_mut().enumerate() {
         star.position.x = (number * 379 % 1021) as f64;
         star.position.y = (number * 733 % 1019) as f64;
     }
-    fields.push(strewn);
+    fields.push(random_dots);
     fields
 }
 

@@ -1,4 +1,4 @@
-//! The catalogue as a whole: the committed files against their source, known stars, and every kind of file.
+//! The catalogue: committed files compared with their source, known stars, every kind of file.
 #![allow(clippy::unwrap_used)] // Helpers of tests fail as tests do.
 
 mod common;
@@ -19,9 +19,9 @@ use std::fs;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-/// SKY2000 gives positions in steps of 1.5 mas and 1 mas; all that is allowed is floating-point error.
+/// SKY2000 has positions in steps of 1.5 mas and 1 mas; only floating-point error is tolerated.
 const POSITION_TOLERANCE_ARCSEC: f64 = 1e-4;
-/// Half the step of 1 mas a year in which the compact form holds proper motions, and a little more.
+/// Slightly more than half the compact form's step of proper motions, 1 mas a year.
 const PM_TOLERANCE_MAS_PER_YR: f32 = 0.501;
 /// SKY2000 and Tycho-2 are both at J2000 and agree to 0.06″ for these stars.
 const TYCHO2_TOLERANCE_ARCSEC: f64 = 0.1;
@@ -34,7 +34,7 @@ fn sky2000_file() -> Option<PathBuf> {
     shared_dir().map(|shared| shared.join("sky2000/SKYMAP_SKY2000_V5R4.gz"))
 }
 
-/// The catalogue in a single file, and what became of its records.
+/// A catalogue read from one file, and the summary of its records.
 fn import(path: &Path) -> Result<(Catalog, ImportSummary), CatalogError> {
     let mut reading = starpipe::sky::catalog::import(path)?;
     assert_eq!(reading.files.len(), 1);
@@ -126,7 +126,7 @@ fn the_bright_csv_is_what_its_source_makes() {
     );
 }
 
-/// The published layout, not the code's own columns, says which bytes each cell must have come from.
+/// The published layout, not the code's columns, defines the bytes of each cell.
 #[test]
 fn every_cell_of_the_bright_csv_is_what_the_layout_has_under_its_label() {
     let Some(shared) = shared_dir() else { return };
@@ -228,7 +228,7 @@ fn the_built_in_catalog_has_the_counts_of_sky2000() {
 #[test]
 fn known_stars_are_where_their_records_say() {
     let catalog = Catalog::built_in();
-    // Sexagesimal as in the source's columns; V and name too.
+    // Sexagesimal, V and name as in the source's columns.
     let hms = |h: f64, m: f64, s: f64| (h + m / 60.0 + s / 3600.0) * 15.0;
     let dms = |d: f64, m: f64, s: f64| d + m / 60.0 + s / 3600.0;
     let known = [
@@ -294,7 +294,7 @@ fn the_stars_of_the_papers_have_their_magnitudes_and_stand_where_tycho_2_has_the
             };
             let (index, star) = star(Catalog::built_in(), value("skymap_number") as u32);
             assert_eq!(Catalog::built_in().designation(index), row[0]);
-            // The papers print two decimals, SKY2000 has three for some.
+            // The papers print two decimals; SKY2000 has three for some stars.
             let rounded = (f64::from(star.v_mag) * 100.0).round() / 100.0;
             assert_eq!(rounded, value("vmag"), "{}", star.id);
             let tycho2 = from_degrees(value("tycho2_ra_deg"), value("tycho2_dec_deg"));
@@ -310,7 +310,7 @@ fn the_stars_of_the_papers_have_their_magnitudes_and_stand_where_tycho_2_has_the
     assert_eq!(checked, 16);
 }
 
-/// SKY2000 gives each position a second time, as a unit vector with six decimals: an oracle for the parser.
+/// SKY2000 repeats each position as a unit vector with six decimals: an oracle for the parser.
 #[test]
 fn every_position_agrees_with_the_unit_vector_in_its_record() {
     const VECTOR_TOLERANCE: f64 = 0.6e-6;
@@ -349,7 +349,7 @@ fn every_position_agrees_with_the_unit_vector_in_its_record() {
 
 // ---- Kinds of file, and what is wrong with them
 
-/// A record of Polaris, with `edits` (first byte from 1, text) written over it.
+/// A record of Polaris, overwritten with `edits` (first byte, counted from 1; text).
 fn record(edits: &[(usize, &str)]) -> Vec<u8> {
     let mut record = vec![b' '; sky2000::RECORD_BYTES];
     let cells = [
@@ -397,7 +397,7 @@ fn line_ends_the_end_of_file_mark_and_gzip_make_no_difference() {
     for content in [
         [&first[..], b"\n", &second].concat(),
         [&first[..], b"\r\n", &second, b"\r\n\x1a"].concat(),
-        // Blanks at the end of the lines cut off.
+        // Trailing blanks removed.
         [
             first.trim_ascii_end(),
             b"\n",
@@ -426,7 +426,7 @@ fn line_ends_the_end_of_file_mark_and_gzip_make_no_difference() {
 }
 
 #[test]
-fn every_record_that_is_no_star_is_counted_with_its_line() {
+fn records_that_are_not_stars_are_counted_with_their_lines() {
     let folder = tempfile::tempdir().unwrap();
     let mut lines: Vec<Vec<u8>> = (1..=300).map(numbered).collect();
     lines[9] = record(&[(28, "      10"), (233, "      ")]);
@@ -441,9 +441,9 @@ fn every_record_that_is_no_star_is_counted_with_its_line() {
         (summary.without_magnitude, summary.without_position),
         (vec![10], vec![20])
     );
-    let faults: Vec<String> = summary.unreadable.iter().map(ToString::to_string).collect();
+    let errors: Vec<String> = summary.unreadable.iter().map(ToString::to_string).collect();
     assert_eq!(
-        faults,
+        errors,
         [
             "line 30, byte 233 (Vmag): found \" 2.o0 \", expected magnitudes from -32 to 32, in 0.001 mag",
             "line 40, byte 520: found the end of the line after 519 bytes, expected a record of 520 bytes",
@@ -486,7 +486,7 @@ fn more_than_one_percent_unreadable_is_refused_with_the_first_lines() {
 }
 
 #[test]
-fn a_file_of_no_known_kind_says_what_is_read() {
+fn a_file_of_unknown_kind_is_refused_with_the_known_kinds() {
     let folder = tempfile::tempdir().unwrap();
     for content in [
         &b""[..],
@@ -607,9 +607,9 @@ fn a_table_that_lacks_a_column_or_has_a_bad_row_says_which() {
     let text = text.replace("\n7,2,31,", "\n# a comment\n\n7,2,61,");
     let text = text.replace("\n9,2,31,", "\n9,31,");
     let (_, summary) = import(&written(&folder, text.as_bytes())).unwrap();
-    let faults: Vec<String> = summary.unreadable.iter().map(ToString::to_string).collect();
+    let errors: Vec<String> = summary.unreadable.iter().map(ToString::to_string).collect();
     assert_eq!(
-        faults,
+        errors,
         [
             "line 10, column 3 (RAm): found \"61\", expected minutes from 0 to 59",
             "line 12, column 9: found 8 columns, \"9,31,49.0837,+,89,15,50.794,2.00\", expected as many columns as headings",
@@ -688,7 +688,7 @@ fn any_id() -> impl Strategy<Value = StarId> {
     ]
 }
 
-/// A star whose values are on the steps of the compact form.
+/// A star whose values are multiples of the compact form's steps.
 fn any_star() -> impl Strategy<Value = Star> {
     let place = (0.0..360.0_f64, -89.9..89.9_f64);
     let photometry = (-2000..15_000_i16, prop::option::of(-500..6000_i16));
@@ -710,7 +710,7 @@ proptest! {
         stars.sort_by_key(|star| star.id);
         stars.dedup_by_key(|star| star.id);
         let names: Vec<_> = stars.iter().step_by(3).map(|star| (star.id, format!("α {}", star.id))).collect();
-        // Once of all kinds, once of Skymap numbers alone, which are written in another way.
+        // All kinds, and Skymap numbers alone, which have another format.
         let skymap: Vec<Star> = stars.iter().filter(|star| matches!(star.id, StarId::Skymap(_))).copied().collect();
         let only_skymap = Catalog::new("", skymap, vec![]).unwrap();
         prop_assert_eq!(only_skymap.to_compact()[8], 1);
@@ -722,7 +722,7 @@ proptest! {
         prop_assert_eq!(decoded.title(), "a title");
         prop_assert_eq!(decoded.to_compact(), encoded);
         for (index, (ours, theirs)) in decoded.stars().iter().zip(catalog.stars()).enumerate() {
-            // Half a step of 0.5 mas in each coordinate.
+            // Half the step of 0.5 mas in each coordinate.
             prop_assert!(ours.direction.angle_to(&theirs.direction) < 0.0004 * RAD_PER_ARCSEC);
             prop_assert_eq!(Star { direction: theirs.direction, ..*ours }, *theirs);
             prop_assert_eq!(decoded.name_of(index), catalog.name_of(index));

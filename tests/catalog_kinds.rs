@@ -1,4 +1,4 @@
-//! Every kind of catalogue through the program: what it reads, what it refuses, and what it says.
+//! Every kind of catalogue through the program: what is read, refused and reported.
 #![allow(clippy::unwrap_used)] // Helpers of tests fail as tests do.
 
 mod common;
@@ -14,7 +14,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Half a milliarcsecond, the step of positions, and what the last decimal of the tables here leaves.
+/// The step of positions, half a milliarcsecond, plus rounding in the tables of this file.
 const POSITION_TOLERANCE_ARCSEC: f64 = 0.005;
 
 struct Folder(tempfile::TempDir);
@@ -46,7 +46,7 @@ impl Folder {
         )
     }
 
-    /// The import of a table with this content, which is refused; what it says.
+    /// The error message of importing a table with this content.
     fn refused(&self, content: impl AsRef<[u8]>) -> String {
         let ran = self.import(&self.write("table", content));
         assert_eq!(ran.status, 1, "{}", ran.stdout);
@@ -194,8 +194,8 @@ fn vizier_in_degrees(separator: &str) -> String {
     text + "\n"
 }
 
-/// As VizieR answers with `-oc.form=sexa` and a bar between columns, without any units line dropped.
-fn vizier_in_sixtieths() -> String {
+/// As VizieR answers with `-oc.form=sexa`, with bars between columns and the line of units.
+fn vizier_sexagesimal() -> String {
     let mut text = String::from(
         "#\n\nRAJ2000|DEJ2000|ID|Vmag|Vder\n\"h:m:s\"|\"d:m:s\"||mag|mag\n----|----|---|---|---\n",
     );
@@ -266,7 +266,7 @@ fn exports_from_vizier_and_any_tables_hold_the_same_stars() {
         }
     }
     assert_is_bright(
-        &read(&folder.write("sixtieths", vizier_in_sixtieths())).catalog,
+        &read(&folder.write("sixtieths", vizier_sexagesimal())).catalog,
         1e-4,
     );
     for separator in [":", " "] {
@@ -275,7 +275,7 @@ fn exports_from_vizier_and_any_tables_hold_the_same_stars() {
             1e-4,
         );
     }
-    // Two exports one behind the other, as `cat` joins them: headings, units and dashes come again.
+    // Two exports joined by `cat`: headings, units and dashes are repeated.
     let export = vizier_in_degrees("\t");
     let lines: Vec<&str> = export.lines().collect();
     let joined = [&lines[..1000], &[""], &lines[..12], &lines[1000..]]
@@ -337,7 +337,7 @@ fn a_frame_is_identified_with_each_kind() {
 
 // ---- Tycho-2
 
-/// Records as CDS I/259 has them (Høg et al. 2000, A&A 355, L27), chosen for what is special about them.
+/// Records of CDS I/259 (Høg et al. 2000, A&A 355, L27), each a special case.
 const TYCHO2_MAIN: &str = "\
 3124 02056 1| |286.00694770| 40.11621858|  -20.8|  -26.1|  6|  6| 0.8| 0.8|1990.63|1990.85|20|0.8|0.7|0.9|0.8| 9.842|0.022| 7.929|0.011|999|T| 93631   |286.00701139| 40.11627889|1.61|1.67|  5.8|  5.9| | 0.1
 1675 00198 1|X|            |            |       |       |   |   |    |    |       |       |  |   |   |   |   |13.599|0.407|12.115|0.199|999| |         |320.65787417| 21.30806722|1.63|1.79|110.9|109.9| |-0.1
@@ -375,7 +375,7 @@ fn tycho_2_is_read_record_by_record_as_it_is_described() {
     assert!(off_arcsec(unmoving, 320.657_874_17, 21.308_067_22) < 4e-4);
     assert!(unmoving.flags.contains(StarFlags::NO_PROPER_MOTION));
 
-    // Both have the photocentre's mean position; the record says that 0.9″ are between them.
+    // Both have the photocentre's mean position; by the record they are 0.9″ apart.
     let pair = ["TYC 4376-685-1", "TYC 4376-685-2"].map(|id| star(catalog, id));
     let apart_arcsec = pair[0].direction.angle_to(&pair[1].direction) * ARCSEC_PER_RAD;
     assert!((apart_arcsec - 0.9).abs() < 0.1, "{apart_arcsec}");
@@ -423,7 +423,7 @@ fn the_supplement_is_brought_to_j2000_and_read_together_with_the_main_catalogue(
     );
 
     let catalog = Catalog::read(&folder.path().join("out.cat")).unwrap();
-    // Sirius, which moves by 1.3″ a year, and SKY2000's of 2000.
+    // Sirius, which moves by 1.3″ a year, and SKY2000's position of 2000.
     let sirius = star(&catalog, "TYC 5949-2777-1");
     let sky2000 = star(Catalog::built_in(), "06450045");
     assert!(sirius.direction.angle_to(&sky2000.direction) * ARCSEC_PER_RAD < 0.05);
@@ -435,7 +435,7 @@ fn the_supplement_is_brought_to_j2000_and_read_together_with_the_main_catalogue(
     assert_eq!(star(&catalog, "HIP 12318B").v_mag, 10.511);
     assert_eq!(star(&catalog, "TYC 49-1674-1").bv_mag, Some(0.985));
 
-    // Without its blanks the supplement looks like the other one; it is read all the same.
+    // Without its blanks the supplement looks like the main catalogue; it is still read correctly.
     fs::remove_file(folder.path().join("suppl_1.dat.gz")).unwrap();
     fs::remove_file(folder.path().join("suppl_2.dat")).unwrap();
     fs::remove_file(folder.path().join("out.cat")).unwrap();
@@ -522,7 +522,7 @@ fn the_whole_of_tycho_2_becomes_stars() {
         reading.catalog.checksum()
     );
     let Some(_) = shared_dir() else { return };
-    // Nearly all of SKY2000's bright stars stand there, at the same place and about as bright.
+    // It contains nearly all of SKY2000's bright stars, at the same position and magnitude.
     let bright: Vec<&Star> = Catalog::built_in().stars()[..15_424].iter().collect();
     let grid = starpipe::sky::catalog::sky_grid::SkyGrid::new(reading.catalog.stars());
     let has_twin = |star: &&&Star| {
@@ -581,16 +581,16 @@ fn hipparcos_and_gaia_tables_are_read_with_their_own_units_and_epochs() {
         "{}",
         reading.files[0].kind
     );
-    // Nineteen digits go through the compact form.
+    // The compact form keeps nineteen digits.
     let again = Catalog::from_compact(&reading.catalog.to_compact()).unwrap();
     assert_eq!(again.designation(1), reading.catalog.designation(1));
 
-    // VizieR's computed positions are those of J2000, whatever the epoch of the catalogue's own.
+    // VizieR's computed positions are at J2000, whatever the catalogue's epoch.
     let computed =
         "source_id,_RAJ2000,_DEJ2000,epoch,pmra,pmdec,mag\n1,10.0,60.0,1950.0,1000.0,0.0,9\n";
     let found = *star(&read(&folder.write("computed", computed)).catalog, "1");
     assert!(off_arcsec(&found, 10.0, 60.0) < 0.001);
-    // A proper motion in a unit that is not known is none.
+    // A proper motion in an unknown unit is ignored.
     let parsecs = "id,ra,dec,pmra (pc),pmdec (pc),mag\n1,10.0,60.0,1000.0,0.0,9\n";
     let reading = read(&folder.write("parsecs", parsecs));
     assert!(
@@ -613,7 +613,7 @@ fn hipparcos_and_gaia_tables_are_read_with_their_own_units_and_epochs() {
 }
 
 #[test]
-fn coordinates_are_read_in_every_form_that_people_write() {
+fn coordinates_are_read_in_every_common_notation() {
     let folder = Folder::new();
     let (ra, dec) = (83.7, -0.4);
     for (headings, cells) in [
@@ -682,8 +682,8 @@ fn identifiers_are_what_the_table_calls_its_stars() {
 
 // ---- What is refused
 
-/// A table of `count` stars strewn over the sky, right ascension in units of `ra_unit_deg`.
-fn strewn(headings: &str, count: usize, ra_unit_deg: f64) -> Vec<String> {
+/// A table of `count` stars distributed over the sky, right ascension in units of `ra_unit_deg`.
+fn random_table(headings: &str, count: usize, ra_unit_deg: f64) -> Vec<String> {
     let row = |i: usize| {
         let (ra_deg, dec_deg) = ((i * 137) as f64 % 360.0, (i * 53) as f64 % 170.0 - 85.0);
         format!(
@@ -698,9 +698,9 @@ fn strewn(headings: &str, count: usize, ra_unit_deg: f64) -> Vec<String> {
 }
 
 #[test]
-fn bad_records_below_one_percent_are_told_and_above_refused() {
+fn bad_records_are_reported_below_one_percent_and_refused_above() {
     let folder = Folder::new();
-    let mut lines = strewn("id,ra,dec,mag", 300, 1.0);
+    let mut lines = random_table("id,ra,dec,mag", 300, 1.0);
     lines[10] = "10,137.0,xx,5.1".to_owned();
     lines[20] = "20,,,5.1".to_owned();
     lines[30] = "30,30.0,5.0,".to_owned();
@@ -740,9 +740,9 @@ fn bad_records_below_one_percent_are_told_and_above_refused() {
 }
 
 #[test]
-fn swapped_columns_and_hours_for_degrees_are_found_out() {
+fn swapped_columns_and_hours_for_degrees_are_detected() {
     let folder = Folder::new();
-    let swapped = strewn("id,dec,ra,mag", 300, 1.0).join("\n");
+    let swapped = random_table("id,dec,ra,mag", 300, 1.0).join("\n");
     let message = folder.refused(swapped);
     assert!(message.contains("seem to be swapped"), "{message}");
     assert!(
@@ -751,11 +751,11 @@ fn swapped_columns_and_hours_for_degrees_are_found_out() {
     );
 
     for headings in ["id,ra,dec,mag", "id,ra_deg,dec_deg,mag"] {
-        let message = folder.refused(strewn(headings, 300, 15.0).join("\n"));
+        let message = folder.refused(random_table(headings, 300, 15.0).join("\n"));
         assert!(message.contains("name the column ra_hours"), "{message}");
     }
-    // In sixtieths there is no doubt: a strip of the sky, 24 degrees wide.
-    let mut strip = strewn("id,ra,dec,mag", 300, 15.0);
+    // Sexagesimal values are unambiguous: a strip of the sky, 24 degrees wide.
+    let mut strip = random_table("id,ra,dec,mag", 300, 15.0);
     for line in &mut strip[1..] {
         let cells: Vec<&str> = line.split(',').collect();
         let minutes = cells[1].parse::<f64>().unwrap() * 4.0;
@@ -765,13 +765,14 @@ fn swapped_columns_and_hours_for_degrees_are_found_out() {
     let ran = folder.import(&folder.write("table", strip.join("\n")));
     assert_eq!(ran.status, 0, "{}", ran.stderr);
     for (headings, unit_deg) in [("id,ra_hours,dec,mag", 15.0), ("id,ra,dec,mag", 1.0)] {
-        let ran = folder.import(&folder.write("table", strewn(headings, 300, unit_deg).join("\n")));
+        let ran =
+            folder.import(&folder.write("table", random_table(headings, 300, unit_deg).join("\n")));
         assert_eq!(ran.status, 0, "{}", ran.stderr);
     }
 }
 
 #[test]
-fn what_is_no_catalogue_is_refused_with_what_is_missing() {
+fn files_that_are_not_catalogues_are_refused_with_what_is_missing() {
     let folder = Folder::new();
     for (content, part) in [
         ("", "it is empty"),
@@ -804,7 +805,7 @@ fn what_is_no_catalogue_is_refused_with_what_is_missing() {
         let message = folder.refused(content);
         assert!(message.contains(part), "{content:?}: {message}");
     }
-    let text = strewn("id,ra,dec,mag", 3000, 1.0).join("\n");
+    let text = random_table("id,ra,dec,mag", 3000, 1.0).join("\n");
     let mut packed = gzip(text.as_bytes());
     packed.truncate(packed.len() / 2);
     let message = folder.refused(&packed);
@@ -853,7 +854,7 @@ proptest! {
         let source = if supplement { TYCHO2_SUPPLEMENT_1 } else { TYCHO2_MAIN };
         let mut content = source.as_bytes().to_vec();
         for (at, byte) in edits {
-            // What tells the kind stays.
+            // The bytes that identify the kind are kept.
             content[16..][at.index(source.len() - 16)] = byte;
         }
         let _ = starpipe::sky::catalog::read(&folder.write("tyc2.dat", content));

@@ -1,4 +1,4 @@
-//! The program from outside: options, exit statuses, output, and what it makes of bad input.
+//! The program as a whole: options, exit statuses, output, bad input.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -23,18 +23,18 @@ fn orion() -> PathBuf {
     fixture("orion/orion.png")
 }
 
-/// A complaint is one line that tells nothing twice, as careless chains of causes do.
-fn assert_one_line_that_repeats_nothing(complaint: &str) {
-    assert_eq!(complaint.lines().count(), 1, "{complaint}");
-    let mut parts: Vec<&str> = complaint.trim_end_matches('\n').split(": ").collect();
-    assert!(parts.iter().all(|part| part.trim() == *part), "{complaint}");
+/// An error message is one line and repeats nothing.
+fn assert_one_line_that_repeats_nothing(message: &str) {
+    assert_eq!(message.lines().count(), 1, "{message}");
+    let mut parts: Vec<&str> = message.trim_end_matches('\n').split(": ").collect();
+    assert!(parts.iter().all(|part| part.trim() == *part), "{message}");
     let all = parts.len();
     parts.sort_unstable();
     parts.dedup();
-    assert_eq!(parts.len(), all, "{complaint}");
+    assert_eq!(parts.len(), all, "{message}");
 }
 
-/// The JSON without what differs from run to run.
+/// The JSON without the times.
 fn without_times(reports: Vec<Value>) -> Vec<Value> {
     let strip = |mut report: Value| {
         report.as_object_mut().unwrap().remove("timing_ms").unwrap();
@@ -43,7 +43,7 @@ fn without_times(reports: Vec<Value>) -> Vec<Value> {
     reports.into_iter().map(strip).collect()
 }
 
-// ---- The command line -----------------------------------------------------------------------
+// ---- The command line
 
 #[test]
 fn version_and_help_are_results() {
@@ -148,7 +148,7 @@ fn a_wrong_command_line_ends_with_2_and_says_what_is_wrong() {
     }
 }
 
-// ---- What is printed ------------------------------------------------------------------------
+// ---- What is printed
 
 #[test]
 fn text_names_the_stars_and_json_and_csv_agree_with_it() {
@@ -253,7 +253,7 @@ fn with_site_and_time_the_frame_has_a_zenith_distance() {
     };
     let winter = "2020-01-15T22:00:00Z";
     let seen = report(&["--site", "50,10,300", "--date", winter]);
-    // Orion is south of the zenith by about the site's latitude then.
+    // Orion is then south of the zenith by about the site's latitude.
     let zenith_distance_deg = number(&seen, "/observation/zenith_distance_deg");
     assert!((zenith_distance_deg - 51.0).abs() < 3.0, "{seen}");
     assert!((number(&seen, "/observation/azimuth_deg") - 180.0).abs() < 20.0);
@@ -273,7 +273,7 @@ fn with_site_and_time_the_frame_has_a_zenith_distance() {
 }
 
 #[test]
-fn hints_that_fit_help_and_hints_that_do_not_are_believed() {
+fn hints_are_hard_constraints() {
     let frame = orion();
     let fits = run(&[
         "process",
@@ -312,7 +312,7 @@ fn the_date_is_taken_from_the_option_else_from_the_name_and_moves_the_stars() {
     let given = report(&["--date", "2099-12-31T01:00+02:00"], &dated);
     assert_eq!(given["date"]["iso"], "2099-12-30T23:00:00Z");
     assert_eq!(given["date"]["source"], "option");
-    // φ² Orionis goes 0.304″ a year to the south.
+    // φ² Orionis moves 0.304″ a year southward.
     let dec_deg = |report: &Value| {
         let stars = report["stars"].as_array().unwrap();
         let star = stars.iter().find(|star| star["name"] == "40 phi2 Ori");
@@ -355,7 +355,7 @@ fn the_output_is_the_same_for_any_number_of_threads_and_in_the_order_given() {
 }
 
 #[test]
-fn a_reader_that_goes_away_is_no_reason_to_panic() {
+fn a_closed_pipe_is_no_panic() {
     let mut command = Command::new(env!("CARGO_BIN_EXE_starpipe"));
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache");
     let mut child = command
@@ -368,12 +368,12 @@ fn a_reader_that_goes_away_is_no_reason_to_panic() {
         .unwrap();
     drop(child.stdout.take());
     let ended = child.wait_with_output().unwrap();
-    let complaint = String::from_utf8(ended.stderr).unwrap();
-    assert_eq!(complaint, "");
+    let message = String::from_utf8(ended.stderr).unwrap();
+    assert_eq!(message, "");
     assert_eq!(ended.status.code(), Some(0));
 }
 
-// ---- Files ----------------------------------------------------------------------------------
+// ---- Files
 
 #[test]
 fn out_holds_the_json_and_the_stars_of_each_frame() {
@@ -444,7 +444,7 @@ fn an_output_directory_that_cannot_be_made_is_a_failure() {
     assert_one_line_that_repeats_nothing(&ran.stderr);
 }
 
-// ---- The cache ------------------------------------------------------------------------------
+// ---- The cache
 
 #[test]
 fn a_cache_that_cannot_be_written_costs_time_and_nothing_else() {
@@ -461,9 +461,9 @@ fn a_cache_that_cannot_be_written_costs_time_and_nothing_else() {
 }
 
 #[test]
-fn a_damaged_cache_is_made_anew() {
+fn a_damaged_cache_is_rebuilt() {
     let cache = tempfile::tempdir().unwrap();
-    // A small catalogue, since its index is made again and again.
+    // A small catalogue, because its index is built several times.
     let bright = concat!(env!("CARGO_MANIFEST_DIR"), "/catalogs/sky2000-bright.csv");
     let process = || {
         let mut command = starpipe();
@@ -489,7 +489,7 @@ fn a_damaged_cache_is_made_anew() {
             bytes[1000] ^= 0x40;
             bytes
         }),
-        // What is not needed is not read, and so not missed.
+        // Chunks that are not needed are not read, so their damage is not noticed.
         ("every triangle changed", |mut bytes| {
             let middle = bytes.len() / 2;
             let triangles = bytes[middle..].iter_mut().step_by(16);
@@ -513,7 +513,7 @@ fn a_damaged_cache_is_made_anew() {
     }
 }
 
-// ---- Bad frames -----------------------------------------------------------------------------
+// ---- Bad frames
 
 #[test]
 fn a_file_that_holds_no_frame_is_named_and_ends_with_1() {
@@ -594,7 +594,7 @@ fn a_catalogue_that_cannot_be_read_ends_with_1() {
 }
 
 #[test]
-fn an_imported_catalogue_serves_as_well() {
+fn an_imported_catalogue_gives_the_same_result() {
     let directory = tempfile::tempdir().unwrap();
     let compact = directory.path().join("bright.cat");
     let source = concat!(env!("CARGO_MANIFEST_DIR"), "/catalogs/sky2000-bright.csv");
@@ -618,7 +618,7 @@ fn an_imported_catalogue_serves_as_well() {
     assert!(number(&ran.reports()[0], "/magnitude/faintest_vmag") < 6.0);
 }
 
-// ---- Lists of centroids ---------------------------------------------------------------------
+// ---- Lists of centroids
 
 #[test]
 fn a_bad_list_is_named_with_its_line() {
@@ -652,11 +652,11 @@ fn a_bad_list_is_named_with_its_line() {
 }
 
 #[test]
-fn the_stars_of_a_frame_are_identified_from_a_list_of_them_as_well() {
+fn a_list_of_a_frames_stars_is_identified_as_the_frame() {
     let directory = tempfile::tempdir().unwrap();
     let list = directory.path().join("orion.csv");
     let table = run(&["process", "--format", "csv", text(&orion())]).stdout;
-    // The catalogue's magnitudes are an answer, not a question.
+    // The catalogue's magnitudes are results, not input.
     fs::write(&list, table.replace(",vmag,", ",answer,")).unwrap();
     let size = ["--width", "640", "--height", "480", "--format", "json"];
     let from_list = Ran::new(starpipe().arg("identify").args(size).arg(&list)).reports();

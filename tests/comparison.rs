@@ -1,4 +1,4 @@
-//! Frames of a camera that is described: what they should show, beside what they show.
+//! Frames of a described camera: prediction compared with measurement.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -16,18 +16,18 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// A zero point from some hundred stars is this good, besides its own error.
+/// Systematic error of a zero point from about a hundred stars.
 const ZERO_POINT_TOLERANCE_MAG: f64 = 0.03;
-/// The level is a median of whole grey levels.
+/// The background level is a median of whole grey levels.
 const SKY_TOLERANCE_MAG: f64 = 0.05;
-/// The detector's model is this good, besides the error of the measurement: stars that touch are lost to it.
+/// Systematic error of the detector's model, which ignores touching stars.
 const LIMIT_TOLERANCE_MAG: f64 = 0.05;
 
 const CAMERA: Preset = Preset::Imx174;
 const SKY_MAG_ARCSEC2: f64 = 18.5;
 const EXPOSURE_S: &str = "0.05";
 
-/// A directory with a frame of that camera, of Cygnus near the zenith, and with its description.
+/// A directory with a frame of Cygnus near the zenith and the camera's description.
 struct Night {
     directory: TempDir,
     frame: PathBuf,
@@ -101,7 +101,7 @@ fn notes(report: &Value) -> String {
 }
 
 #[test]
-fn a_frame_shows_what_its_camera_should_see() {
+fn a_frame_agrees_with_its_cameras_prediction() {
     let night = Night::new();
     let report = night.report(&["--exposure", EXPOSURE_S]);
     assert_eq!(notes(&report), "");
@@ -145,7 +145,7 @@ fn assert_limit_as_predicted(report: &Value) {
 }
 
 #[test]
-fn the_limit_predicted_is_that_of_the_threshold_asked_for() {
+fn the_predicted_limit_is_that_of_the_requested_threshold() {
     let night = Night::new();
     for threshold in [["--sigma", "10"], ["--false-alarms", "100"]] {
         let arguments = [&["--exposure", EXPOSURE_S][..], &threshold].concat();
@@ -154,16 +154,17 @@ fn the_limit_predicted_is_that_of_the_threshold_asked_for() {
 }
 
 #[test]
-fn the_faintest_star_to_be_expected_is_sought_as_deep_as_the_camera_should_see() {
+fn the_expected_faintest_star_is_not_limited_by_what_the_frame_shows() {
     let night = Night::new();
-    // Such a lens would show three magnitudes more: what the frame shows must not bound what is expected.
+    // Such a lens would reach three magnitudes deeper: the expectation must not be limited by what
+    // the frame shows.
     night.describe(|text| with(&text, "aperture_mm", "100"));
     let report = night.report(&["--exposure", EXPOSURE_S]);
     assert!(number(&report, "/magnitude/faintest_difference_mag") < -1.5);
 }
 
 #[test]
-fn without_an_exposure_nothing_is_predicted_and_without_a_camera_neither() {
+fn nothing_is_predicted_without_exposure_or_camera() {
     let night = Night::new();
     let report = night.report(&[]);
     assert_eq!(report["prediction"], Value::Null);
@@ -210,12 +211,12 @@ fn a_frame_that_contradicts_its_description_says_so() {
         ("spot_sigma_px", "1.5", "the camera's 1.50 px"),
     ] {
         night.describe(|text| with(&text, key, value));
-        let told = notes(&night.report(&exposed));
-        assert!(told.contains(note), "{key}: {told}");
+        let reported = notes(&night.report(&exposed));
+        assert!(reported.contains(note), "{key}: {reported}");
     }
     night.describe(|text| text);
-    // Cygnus at 35° of declination, seen from the north pole, stands 55° from the zenith at any time.
-    let told = notes(
+    // Seen from the north pole, a declination of 35° is always 55° from the zenith.
+    let reported = notes(
         &night.report(
             &[
                 &exposed[..],
@@ -232,13 +233,13 @@ fn a_frame_that_contradicts_its_description_says_so() {
         ),
     );
     assert!(
-        told.contains("stated as 10.0°, by site, date and attitude it is 5"),
-        "{told}"
+        reported.contains("stated as 10.0°, by site, date and attitude it is 5"),
+        "{reported}"
     );
 }
 
 #[test]
-fn the_scale_of_the_camera_is_a_hint_that_may_be_wrong() {
+fn a_wrong_scale_from_the_camera_is_tolerated() {
     let night = Night::new();
     night.describe(|text| with(&text, "focal_length_mm", "120"));
     let report = night.report(&[]);
@@ -248,7 +249,7 @@ fn the_scale_of_the_camera_is_a_hint_that_may_be_wrong() {
 }
 
 #[test]
-fn the_text_holds_one_against_the_other() {
+fn the_text_compares_measurement_and_prediction() {
     let night = Night::new();
     let ran = night.process(&["--exposure", EXPOSURE_S]);
     for part in [
@@ -279,7 +280,7 @@ fn the_limit_predicted_is_that_of_the_threshold_given() {
 }
 
 #[test]
-fn a_site_without_the_time_is_told_of() {
+fn a_site_without_the_time_is_noted() {
     let night = Night::new();
     let site = ["--exposure", EXPOSURE_S, "--site", "52.22,4.42"];
     for date in [&["--date", "2019-07-29"][..], &[]] {
@@ -328,7 +329,7 @@ fn a_wrong_description_or_option_is_refused() {
 }
 
 #[test]
-fn the_drawing_of_the_readme_has_the_zero_point_and_the_sky_that_it_was_drawn_with() {
+fn the_cygnus_fixture_has_the_zero_point_and_the_sky_it_was_drawn_with() {
     let frame = common::fixture("cygnus/cygnus.tif");
     let camera = common::fixture("cygnus/camera.toml");
     let ran = Ran::new(
@@ -340,8 +341,8 @@ fn the_drawing_of_the_readme_has_the_zero_point_and_the_sky_that_it_was_drawn_wi
     assert_eq!(ran.status, 0, "{}", ran.stderr);
     let report = &ran.reports()[0];
     assert_eq!(notes(report), "");
-    // 250,000 electrons of V = 0, and a sky of 100. It was drawn as if colours made no difference, which costs the prediction
-    // some hundredths.
+    // V = 0 gives 250,000 electrons, the sky 100. The drawing ignores colours, which shifts the
+    // prediction by a few hundredths.
     const COLORS_MAG: f64 = 0.05;
     let drawn = 2.5 * 250e3f64.log10();
     let predicted = number(report, "/prediction/zero_point_vmag");

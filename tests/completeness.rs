@@ -1,5 +1,5 @@
-//! How faint the stars are that are found, on frames whose truth is known: the detector as built, and the rule of the
-//! brightest pixel, beside the limit of the sensitivity model.
+//! Limiting magnitudes on frames with known truth, of the detector and of the brightest-pixel rule,
+//! compared with the sensitivity model.
 //!
 //! The whole table: `cargo test --release --test completeness -- --ignored --nocapture`.
 
@@ -16,23 +16,24 @@ use starpipe::model::simulate::star_field;
 
 /// Side of the frames, in pixels.
 const SIDE_PX: usize = 1024;
-/// How far apart the stars stand: of a cell of the background's mesh they are a small part. At half this distance their light
-/// counts as noise, and the detector loses 0.03 to 0.09 mag.
+/// Distance between stars: they cover a small part of a background cell. At half this distance
+/// their light counts as noise, and the detector loses 0.03 to 0.09 mag.
 const SPACING_PX: f64 = 64.0;
-/// Stars are drawn evenly from so much brighter than the limit to so much fainter: a filter finds what no pixel shows.
+/// Stars are drawn uniformly within this range of magnitudes about the limit.
 const MAG_RANGE: std::ops::Range<f64> = -1.2..2.8;
-/// On each frame so many bright stars, whose spot the detector measures, so much brighter than the limit.
+/// Bright stars on each frame, from which the detector measures the spot, and how much brighter
+/// than the limit they are.
 const BRIGHT_STARS: usize = 30;
 const BRIGHT_MAG: (f64, f64) = (2.0, 3.5);
-/// A detection this near to a star's place is that star.
+/// A detection within this distance of a star is that star.
 const MATCH_PX: f64 = 2.0;
 
-/// A star of a frame, and by which rules it is found.
+/// A star of a frame, and which rules detect it.
 struct Trial {
     v_mag: f64,
-    /// Something at its place that may be a star.
+    /// Detected at its position, as something that may be a star.
     detected: bool,
-    /// A pixel that stands out by the wanted ratio of signal to noise.
+    /// A pixel reaches the wanted signal-to-noise ratio.
     peak: bool,
 }
 
@@ -45,7 +46,7 @@ impl Trial {
     }
 }
 
-/// Frames of isolated stars, and what is found of them.
+/// Frames of isolated stars, and which of them are detected.
 fn trials(scenario: &Scenario, frames: u64) -> Vec<Trial> {
     let budget = Budget::new(scenario);
     let mut workspace = Workspace::new();
@@ -100,8 +101,8 @@ fn isolated_stars(
     places.into_iter().zip(v_mags).collect()
 }
 
-/// Whether a pixel within [`MATCH_PX`] of `position` has the wanted ratio of signal to noise, signal and noise as in the
-/// model's equation (11).
+/// Whether a pixel within [`MATCH_PX`] of `position` has the wanted ratio of signal to noise,
+/// signal and noise as in the model's equation (11).
 fn peak_stands_out(
     scenario: &Scenario,
     budget: &Budget,
@@ -125,17 +126,17 @@ fn peak_stands_out(
         })
 }
 
-/// Where half of the stars are found.
+/// The magnitude at which half of the stars are detected.
 #[derive(Debug, Clone, Copy)]
 struct Curve {
     v_mag_50: f64,
     sigma_v_mag_50: f64,
-    /// The standard deviation of noise in flux, as magnitudes at the middle.
+    /// Standard deviation of the flux noise, in magnitudes at the limit.
     width_mag: f64,
 }
 
-/// The probability of finding a star is Φ(a + b · flux): Gaussian noise upon a flux that meets a threshold. By maximum
-/// likelihood, with Fisher's scoring.
+/// Fits the probability of detection Φ(a + b · flux) (a threshold on flux with Gaussian noise) by
+/// maximum likelihood, with Fisher scoring.
 fn fit(trials: &[Trial], limit_v_mag: f64, rule: Rule) -> Option<Curve> {
     const ROUNDS: usize = 100;
     let [mut a, mut b] = [-4.0, 4.0];
@@ -168,7 +169,7 @@ fn fit(trials: &[Trial], limit_v_mag: f64, rule: Rule) -> Option<Curve> {
             (bb * score[0] - ab * score[1]) / determinant,
             (aa * score[1] - ab * score[0]) / determinant,
         ];
-        // Half a step where a whole one would jump.
+        // Damped step, where a full one would overshoot.
         let damping = (1.0 / (step[0].abs().max(step[1].abs()))).min(1.0);
         a += damping * step[0];
         b += damping * step[1];
@@ -198,7 +199,7 @@ fn cumulative(z: f64) -> f64 {
     0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
-/// A camera of these pixels, lens and noise, by night.
+/// A camera with these pixels, lens and noise, under a night sky.
 fn camera(
     name: &str,
     [pitch_um, focal_length_mm, f_number, spot_sigma_px]: [f64; 4],
@@ -235,7 +236,7 @@ fn scenario(sensor: Sensor, exposure_s: f64, sky_mag_arcsec2: f64) -> Scenario {
     scenario
 }
 
-/// One of the paper's experiments, on a frame of the common size.
+/// One of the paper's experiments, with frames of the common size.
 fn experiment(preset: Preset) -> Scenario {
     let mut scenario = Scenario::of(preset);
     (scenario.sensor.width_px, scenario.sensor.height_px) = (SIDE_PX, SIDE_PX);
@@ -273,7 +274,7 @@ fn cases() -> Vec<(&'static str, Scenario)> {
     ]
 }
 
-/// What the model predicts, and what was measured, of one rule.
+/// Prediction and measurement of one rule.
 fn described(predicted: &Detector, measured: Option<Curve>) -> String {
     let model = predicted.vmag_at(0.5);
     let model_width =
@@ -293,7 +294,7 @@ fn described(predicted: &Detector, measured: Option<Curve>) -> String {
 /// Φ(−1).
 const ONE_SIGMA_BELOW: f64 = 0.158_655;
 
-/// How far the model may be off: it knows neither stars that touch nor the skewness of few photons.
+/// Tolerance of the model, which ignores touching stars and the skewness of few photons.
 const MODEL_TOLERANCE_MAG: f64 = 0.05;
 
 #[test]

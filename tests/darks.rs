@@ -1,4 +1,4 @@
-//! Dark frames, flats and calibration through the program: what was put into simulated frames is found, and taken out again.
+//! Darks, flats and calibration through the program: what was simulated is measured and corrected.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -18,7 +18,7 @@ use std::collections::{HashMap, HashSet};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-/// Measured values may be off by so many of their standard errors.
+/// Tolerance of measured values, in standard errors.
 const SIGMAS: f64 = 5.0;
 const READ_NOISE_E: f64 = 12.0;
 const DARK_CURRENT_E_S: f64 = 30.0;
@@ -42,7 +42,7 @@ fn scenario(exposure_s: f64) -> Scenario {
     scenario
 }
 
-/// What the pixels of a detector differ by, in ADU and ADU a second.
+/// Non-uniformity of a detector's pixels, in ADU and ADU a second.
 struct Detector {
     pattern: Vec<f32>,
     hot: HashMap<usize, f32>,
@@ -72,7 +72,7 @@ impl Detector {
         }
     }
 
-    /// Adds what the pixels differ by: the pattern, and the hot pixels' current.
+    /// Adds the pattern and the hot pixels' current.
     fn add_to(&self, frame: &mut Frame, exposure_s: f64) {
         for (i, pixel) in frame.pixels.iter_mut().enumerate() {
             let current = self.hot.get(&i).copied().unwrap_or(0.0);
@@ -152,7 +152,7 @@ fn spread(values: &[f32]) -> f64 {
     (squares.sum::<f64>() / count).sqrt()
 }
 
-/// That dark current and bias are those of the scenario and the detector.
+/// Asserts that dark current and bias are those simulated.
 fn check_current(found: &Value, detector: &Detector) {
     let pixels = detector.pattern.len();
     let (current, sigma) = (
@@ -177,7 +177,7 @@ fn check_current(found: &Value, detector: &Detector) {
     );
 }
 
-/// That the hot pixels listed are those put in.
+/// Asserts that the hot pixels listed are those simulated.
 fn check_hot_pixels(out: &Path, detector: &Detector) {
     let table = fs::read_to_string(out.join("hot-pixels.csv")).unwrap();
     let listed: HashSet<usize> = table
@@ -199,7 +199,7 @@ fn check_hot_pixels(out: &Path, detector: &Detector) {
 }
 
 #[test]
-fn noise_pattern_dark_current_and_hot_pixels_are_found_again() {
+fn noise_pattern_dark_current_and_hot_pixels_are_measured_as_simulated() {
     let place = tempfile::tempdir().unwrap();
     let pixels = SIZE.0 * SIZE.1;
     let detector = Detector::new(pixels, SIZE.0, 0.002);
@@ -221,7 +221,7 @@ fn noise_pattern_dark_current_and_hot_pixels_are_found_again() {
     assert_eq!(done.stderr, "");
     let found = report(&done);
 
-    // Variances of 11 degrees of freedom in each pixel.
+    // Each pixel's variance has 11 degrees of freedom.
     let noise_error = (0.5 / (11.0 * pixels as f64)).sqrt();
     let read_noise = number(&found, "/read_noise_e");
     assert!(
@@ -238,7 +238,7 @@ fn noise_pattern_dark_current_and_hot_pixels_are_found_again() {
     let spread = spread(&detector.pattern);
     let fixed = number(&found, "/pattern/fixed_pattern_adu");
     assert!((fixed / spread - 1.0).abs() < 0.01, "{fixed} {spread}");
-    // Rounding 2.0 adds a twelfth to its variance.
+    // Rounding adds a twelfth to the variance.
     let column = number(&found, "/pattern/column_adu");
     assert!(
         (column - (4.0 + 1.0 / 12.0_f64).sqrt()).abs() < SIGMAS * 2.0 / 640f64.sqrt(),
@@ -279,7 +279,7 @@ fn noise_pattern_dark_current_and_hot_pixels_are_found_again() {
 }
 
 #[test]
-fn exposures_may_be_said_and_rows_are_frames() {
+fn exposures_can_be_given_and_csv_rows_are_frames() {
     let place = tempfile::tempdir().unwrap();
     let detector = Detector::new(SIZE.0 * SIZE.1, SIZE.0, 0.0);
     let (short, long) = (
@@ -322,7 +322,7 @@ fn exposures_may_be_said_and_rows_are_frames() {
     );
     assert_eq!(ran(&["darks", "--exposure", "5:", text(&short)]).status, 2);
     assert_eq!(ran(&["darks", "--bits", "0", text(&short)]).status, 2);
-    // Masters are not among the frames of a directory.
+    // Master frames in a directory are not processed as frames.
     let out = text(&short);
     assert_eq!(ran(&["darks", "--out", out, out]).status, 0);
     assert_eq!(
@@ -332,7 +332,7 @@ fn exposures_may_be_said_and_rows_are_frames() {
 }
 
 #[test]
-fn what_is_no_dark_is_named() {
+fn frames_that_are_not_dark_are_named() {
     let place = tempfile::tempdir().unwrap();
     let detector = Detector::new(SIZE.0 * SIZE.1, SIZE.0, 0.0);
     let directory = darks(place.path(), &detector, 0.1, 2);
@@ -405,7 +405,7 @@ fn what_is_no_dark_is_named() {
     assert_eq!(names(&foreign), ["hot-pixels.csv"]);
 }
 
-/// The drawn stars of Cygnus on a detector with a pattern and hot pixels; and its darks.
+/// Stars of Cygnus on a detector with a pattern and hot pixels, and its darks.
 struct Night {
     place: tempfile::TempDir,
     clean: Frame,
@@ -418,7 +418,8 @@ impl Night {
         let clean = frame::read(fixture("cygnus/cygnus.tif")).unwrap();
         let (pixels, width) = (clean.pixels.len(), clean.width);
         let mut detector = Detector::new(pixels, width, 0.003);
-        // The frame's own noise is large: as much of a pattern, and hot pixels as bright as a star that is easily found.
+        // The frame's noise is large, so the pattern is as large, and hot pixels are as bright as
+        // easily detected stars.
         detector.pattern.iter_mut().for_each(|level| *level *= 3.0);
         detector
             .hot
@@ -527,7 +528,7 @@ fn calibrated_frames_have_their_stars_and_no_hot_pixels() {
         matched(&calibrated),
         matched(&clean)
     );
-    // Level and noise are those of the frame without a pattern.
+    // Level and noise equal those of the frame without a pattern.
     assert!(
         (number(&calibrated, "/background/level") - number(&clean, "/background/level")).abs()
             < 1.0
@@ -541,14 +542,14 @@ fn calibrated_frames_have_their_stars_and_no_hot_pixels() {
 }
 
 #[test]
-fn a_star_over_or_beside_a_pixel_without_value_keeps_its_place_and_its_light() {
+fn a_star_on_or_beside_an_invalid_pixel_keeps_position_and_flux() {
     let night = Night::new();
     let clean_path = night.path("clean.fits");
     write(Path::new(&clean_path), &night.clean, Some(1.0));
     let clean = ran(&["process", "--format", "json", &clean_path])
         .reports()
         .remove(0);
-    // For each of the brighter single stars one pixel: on it, beside it, and so on.
+    // One invalid pixel for each of the brighter single stars: on it, beside it, and so on.
     let stars = clean["stars"].as_array().unwrap();
     let good = stars.iter().filter(|star| {
         star["id"].is_string()
@@ -612,7 +613,7 @@ fn a_star_over_or_beside_a_pixel_without_value_keeps_its_place_and_its_light() {
     );
 }
 
-/// What a lens lets through that darkens towards the corners.
+/// Transmission of a lens with vignetting.
 fn lit(level_adu: f64, seed: u64) -> Frame {
     let (width, height) = SIZE;
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -627,7 +628,7 @@ fn lit(level_adu: f64, seed: u64) -> Frame {
     Frame::new(width, height, pixels.collect()).unwrap()
 }
 
-/// The mean of a square of 40 pixels from this corner on.
+/// Mean of a 40-pixel square with this corner.
 fn mean_of_square(frame: &Frame, (left, top): (usize, usize)) -> f64 {
     let row = |y: usize| &frame.pixels[y * frame.width + left..][..40];
     let rows = (top..top + 40).flat_map(row);
@@ -635,7 +636,7 @@ fn mean_of_square(frame: &Frame, (left, top): (usize, usize)) -> f64 {
 }
 
 #[test]
-fn a_flat_made_and_used_takes_the_lens_away() {
+fn a_flat_corrects_vignetting() {
     let place = tempfile::tempdir().unwrap();
     let levels = [4000.0, 4000.0, 20_000.0, 20_100.0, 20_000.0, 20_000.0];
     let mut names = Vec::new();
@@ -666,7 +667,7 @@ fn a_flat_made_and_used_takes_the_lens_away() {
     let calibrated = &done.reports()[0];
     assert_eq!(calibrated["calibration"]["flat"], text(&flat));
     let noise = number(calibrated, "/background/noise");
-    // That of the light and of reading, in the middle of the frame.
+    // Photon and read noise in the middle of the frame.
     let expected = (2000.0_f64 / GAIN_E_PER_ADU).sqrt().hypot(3.0);
     assert!((noise / expected - 1.0).abs() < 0.1, "{noise} {expected}");
 
@@ -680,14 +681,15 @@ fn a_flat_made_and_used_takes_the_lens_away() {
     calibration.apply(&mut frame).unwrap();
     let corner = mean_of_square(&frame, (0, 0));
     let middle = mean_of_square(&frame, (140, 100));
-    // 1600 pixels each of a noise of some 23, and a little more in the corner.
+    // 1600 pixels each, with a noise of about 23, slightly more in the corner.
     assert!(
         (corner - middle).abs() < SIGMAS * 27.0 / 40.0 * 2f64.sqrt(),
         "{corner} {middle}"
     );
 }
 
-/// Processes the fixture, 640 × 480, with `option`, which has to be refused in one line with these words.
+/// Asserts that processing the fixture (640 × 480) with `option` is refused in one line with these
+/// words.
 fn check_refused(option: &str, path: &Path, words: [&str; 2]) {
     let orion = fixture("orion/orion.png");
     let arguments = ["process", "--format", "json", option, text(path)];
@@ -741,7 +743,7 @@ fn masters_that_do_not_fit_are_refused() {
 }
 
 #[test]
-fn lists_that_are_none_of_hot_pixels_are_refused() {
+fn lists_that_are_not_of_hot_pixels_are_refused() {
     let place = tempfile::tempdir().unwrap();
     let check = |content: &str, words: [&str; 2]| {
         let path = place.path().join("list.csv");

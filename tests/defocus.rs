@@ -1,4 +1,5 @@
-//! `starpipe defocus` through the program: the paper's surface, real stars, the user's dark frames, and bad input.
+//! `starpipe defocus` through the program: the paper's surface, real stars, the user's dark frames,
+//! and bad input.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -19,7 +20,7 @@ fn json(arguments: &[&str]) -> Value {
     serde_json::from_str(&ran.stdout).unwrap()
 }
 
-/// Few radii and noises, and few trials: the program's ways, not its numbers.
+/// Few radii, noises and trials: tests the program's behaviour, not its numbers.
 const SMALL_PEAK: [&str; 6] = [
     "--radius-px",
     "0.4:2.4:12",
@@ -42,7 +43,7 @@ const SMALL_ENERGY: [&str; 10] = [
 ];
 
 #[test]
-fn the_papers_surface_is_found_again_and_the_errors_are_those_of_the_closed_form() {
+fn the_papers_surface_is_reproduced_and_errors_follow_the_closed_form() {
     let answer = json(&["--trials", "100"]);
     assert_eq!(answer["normalisation"], "peak");
     let surface = "/stars/0/surface";
@@ -61,7 +62,7 @@ fn the_papers_surface_is_found_again_and_the_errors_are_those_of_the_closed_form
     let off = number(&answer, &format!("{closed}/difference_px"));
     let chance = number(&answer, &format!("{surface}/scatter_px"));
     assert!((off / chance - 1.0).abs() < 0.05, "{off} {chance}");
-    // Of the paper's statement: a parabola describes the lines, and much better than a straight one.
+    // The paper's statement: a parabola describes the lines much better than a straight line.
     let lines = answer["stars"][0]["equal_error"].as_array().unwrap();
     let parabolas = lines
         .iter()
@@ -96,16 +97,16 @@ fn the_page_for_people_begins_with_the_answer() {
 }
 
 #[test]
-fn a_real_star_wants_a_narrow_spot_and_the_paper_a_wide_one() {
+fn a_real_star_needs_a_narrow_spot_and_the_paper_a_wide_one() {
     let real = json(&SMALL_ENERGY);
     assert_eq!(real["normalisation"], "energy");
     let paper = json(&SMALL_PEAK);
     assert!(number(&real, "/stars/0/best/radius_px") < 0.5);
     assert!(number(&paper, "/stars/0/best/radius_px") > 1.5);
-    // The fit is at the bound, and a wider spot reaches less far.
+    // The fit reaches the bound, and a wider spot has a brighter limit.
     let curve = real["stars"][0]["curve"].as_array().unwrap();
     for row in curve {
-        // 1000 stars know the error to 1.6 %.
+        // With 1000 stars the error is known to 1.6 %.
         let ratio = number(row, "/error_px") / number(row, "/bound_px");
         assert!((0.93..1.12).contains(&ratio), "{row}");
     }
@@ -114,14 +115,14 @@ fn a_real_star_wants_a_narrow_spot_and_the_paper_a_wide_one() {
         limits.windows(2).all(|pair| pair[1] < pair[0]),
         "{limits:?}"
     );
-    // The grey-weighted centroid wants a wider one, and is never better than the fit.
+    // The grey-weighted centroid needs a wider spot, and is never better than the fit.
     let grey = json(&[&SMALL_ENERGY[..], &["--centroid", "grey-weighted"]].concat());
     assert_eq!(grey["centroid"], "grey-weighted");
     let best = |answer: &Value| number(answer, "/stars/0/best/error_px");
     assert!(best(&grey) > best(&real));
 }
 
-/// Dark frames of the preset, with a read noise of its own.
+/// Dark frames of the preset, with another read noise.
 fn simulate_darks(directory: &Path, options: &[&str]) {
     let made = Ran::new(
         starpipe()
@@ -161,7 +162,7 @@ fn the_noise_comes_from_dark_frames_named_by_a_pattern() {
         ]
         .concat(),
     );
-    // 9 e of reading, and the dark current of a tenth of a second.
+    // 9 e of read noise, and the dark current of a tenth of a second.
     let noise_e = number(&answer, "/noise/e");
     assert!((noise_e / 9.0 - 1.0).abs() < 0.03, "{noise_e}");
     assert_eq!(answer["noise"]["darks"]["frames"], 6);
@@ -176,7 +177,7 @@ fn the_noise_comes_from_dark_frames_named_by_a_pattern() {
     assert!((um / px / pitch_um - 1.0).abs() < 1e-9);
     assert!((defocus_um / (4.0 * f_number * um) - 1.0).abs() < 1e-9);
     assert!(number(largest, "/error_px") <= 0.05);
-    // The paper's question takes the spread of all pixels over full scale.
+    // The paper uses the standard deviation of all pixels over full scale.
     let relative = json(
         &[
             &SMALL_PEAK[..],
@@ -196,7 +197,7 @@ fn the_noise_comes_from_dark_frames_named_by_a_pattern() {
 }
 
 #[test]
-fn dark_frames_that_are_none_are_refused() {
+fn frames_that_are_not_dark_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     let place = |name: &str| directory.path().join(name);
     let refused = |darks: &[&Path], what: &str| {
@@ -246,7 +247,7 @@ fn dark_frames_that_are_none_are_refused() {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused_before_any_work() {
+fn nonsensical_options_are_refused_before_any_work() {
     let camera = ["--preset", "nanosat-tracker"];
     let refused: [(&[&str], &str); 18] = [
         (&["--trials", "0"], "0 is not in 1..="),
@@ -317,7 +318,7 @@ fn what_makes_no_sense_is_refused_before_any_work() {
 }
 
 #[test]
-fn an_error_that_no_radius_meets_is_answered_with_the_best_that_can_be_had() {
+fn an_unreachable_error_is_answered_with_the_best_radius() {
     let ran = defocus(&[&SMALL_ENERGY[..], &["--required-error", "1e-6"]].concat());
     assert_eq!(ran.status, 3, "{}", ran.stderr);
     assert!(

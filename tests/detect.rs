@@ -33,13 +33,13 @@ fn erf(x: f64) -> f64 {
     sum * 2.0 / std::f64::consts::PI.sqrt()
 }
 
-/// The part of a spot's light in pixel `i`, along one axis.
+/// Share of a spot's light in pixel `i`, along one axis.
 fn pixel_part(i: f64, center: f64, sigma: f64) -> f64 {
     let edge = |e: f64| erf((e - center) / (sigma * std::f64::consts::SQRT_2));
     0.5 * (edge(i + 0.5) - edge(i - 0.5))
 }
 
-/// A frame in the making: the mean light of each pixel.
+/// The expected light of each pixel of a frame.
 struct Sky {
     width: usize,
     height: usize,
@@ -138,12 +138,12 @@ fn false_alarm_rate(spot: f64, wanted: f64, frames: u64) -> f64 {
     count as f64 / (frames as f64 * 1.048_576)
 }
 
-/// The rate had may differ from the rate wanted by this factor (limits.md, section 8).
+/// Tolerated ratio of the measured to the requested rate.
 const FALSE_ALARM_FACTOR: f64 = 1.5;
 
 #[test]
-fn the_false_alarm_rate_is_the_one_asked_for() {
-    // 100 expected at each spot size: a Poisson error of 10 %, a quarter of what is allowed.
+fn the_false_alarm_rate_is_as_requested() {
+    // 100 expected at each spot size: a Poisson error of 10 %, a quarter of the tolerance.
     for spot in [0.7, 1.0, 1.5] {
         let rate = false_alarm_rate(spot, 10.0, 10);
         println!("spot {spot}: wanted 10, had {rate:.2} per Mpx");
@@ -191,7 +191,7 @@ struct Accuracy {
 
 /// The flux that gives a matched-filter signal-to-noise ratio, averaged over phases.
 fn flux_for(snr: f64, spot: f64) -> f64 {
-    // Neff, phase mean (limits.md, section 2); 4π(s² + 1/12) from 0.7 px on.
+    // Effective number of pixels, averaged over phases; 4π(s² + 1/12) from 0.7 px on.
     let effective_px = if spot < 0.6 {
         4.25
     } else {
@@ -250,9 +250,9 @@ fn accuracy_on_grid(
     }
 }
 
-/// RMS error over the Cramér-Rao bound (limits.md, section 8).
+/// Tolerated RMS error over the Cramér-Rao bound.
 const MAX_RMS_OVER_BOUND: f64 = 1.05;
-/// Pulls have an RMS of one, give or take this.
+/// Tolerance of the RMS of pulls, which should be 1.
 const PULL_TOLERANCE: f64 = 0.1;
 
 #[test]
@@ -281,8 +281,8 @@ fn the_fit_reaches_the_cramer_rao_bound_with_honest_errors() {
 
 #[test]
 fn half_the_stars_at_the_threshold_are_found() {
-    // SNR50 of the matched filter at 1 false alarm per Mpx (limits.md, section 2): 4.91, 4.69, 4.45
-    // for σ = 0.7, 1, 1.5; 0.1 mag is a factor 1.096.
+    // SNR50 of the ideal matched filter at 1 false alarm per Mpx: 4.91, 4.69, 4.45 for σ = 0.7, 1,
+    // 1.5; 0.1 mag is a factor 1.096.
     const MAX_SNR50_RATIO: f64 = 1.096;
     for (spot, simulated) in [(0.7, 4.91), (1.0, 4.69), (1.5, 4.45)] {
         let config = config_with(spot, 1.0);
@@ -296,8 +296,8 @@ fn half_the_stars_at_the_threshold_are_found() {
 }
 
 #[test]
-fn bright_stars_without_noise_are_placed_without_bias() {
-    // Limits.md, section 8, from σ = 0.5 px on.
+fn bright_stars_without_noise_have_no_bias() {
+    // From σ = 0.5 px on.
     const MAX_BIAS_PX: f64 = 0.002;
     for spot in [0.5, 0.7, 1.0, 1.5] {
         let mut rng = ChaCha8Rng::seed_from_u64(21);
@@ -335,7 +335,7 @@ fn bright_stars_without_noise_are_placed_without_bias() {
     }
 }
 
-/// A star field of 60 stars on noise, for tests of what must not disturb them.
+/// 60 stars on noise, for tests of disturbances that must not affect them.
 fn star_field(seed: u64) -> (Sky, Vec<(f64, f64)>) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut sky = Sky::flat(512, 384, BACKGROUND_E);
@@ -429,7 +429,7 @@ fn a_trail_is_one_flagged_source_and_a_nebula_is_extended() {
 
 #[test]
 fn touching_stars_are_separated_and_flagged() {
-    // Eighteen pairs among eighteen single stars, which tell what a single star looks like.
+    // Eighteen pairs among eighteen single stars, from which the spot is measured.
     let mut sky = Sky::flat(256, 256, BACKGROUND_E);
     let places: Vec<(f64, f64)> = (0..36)
         .map(|i| {
@@ -458,8 +458,8 @@ fn touching_stars_are_separated_and_flagged() {
     }
 }
 
-/// Pairs among single stars: the mean error of the brighter towards the fainter in pixels, and the
-/// shares of the brighter found and blended, and of detections in all over stars.
+/// Pairs among single stars: the mean error of the brighter star towards the fainter in pixels, the
+/// shares of brighter stars detected and flagged as blended, and detections over stars.
 fn pairs(spot: f64, separation: f64, ratio: f64) -> [f64; 4] {
     let mut sky = Sky::flat(512, 512, BACKGROUND_E);
     let mut rng = ChaCha8Rng::seed_from_u64(5);
@@ -500,7 +500,7 @@ fn pairs(spot: f64, separation: f64, ratio: f64) -> [f64; 4] {
 }
 
 #[test]
-fn a_neighbour_four_spot_sizes_away_moves_no_star() {
+fn a_neighbour_four_spot_sizes_away_does_not_bias_a_star() {
     const MAX_BIAS_PX: f64 = 0.03;
     let mut failures = Vec::new();
     for spot in [1.0, 1.5] {
@@ -531,7 +531,7 @@ fn a_neighbour_four_spot_sizes_away_moves_no_star() {
 }
 
 #[test]
-fn a_saturated_star_is_one_source_at_its_place() {
+fn a_saturated_star_is_one_source_at_its_position() {
     let mut sky = Sky::flat(200, 200, BACKGROUND_E);
     sky.add_star(100.3, 90.8, 400_000.0, 1.3);
     for i in 0..9 {
@@ -550,13 +550,13 @@ fn a_saturated_star_is_one_source_at_its_place() {
         (star.position.x - 100.3).hypot(star.position.y - 90.8) < 0.05,
         "{star:?}"
     );
-    // About a ninth of its peak is left of it, yet its flux is that of the whole spot.
+    // Only about a ninth of its peak is left, but the flux is that of the whole spot.
     assert!((star.flux_adu / 400_000.0 - 1.0).abs() < 0.1, "{star:?}");
     assert!(star.snr > found.sources[1].snr, "{star:?}");
     assert_eq!(found.sources.len(), 10, "{:?}", found.sources);
 }
 
-/// What holds for every detection, whatever the frame.
+/// Asserts what holds for every detection on any frame.
 fn check_is_sound(s: &Detection, width: usize, height: usize) -> Result<(), String> {
     let is_inside = |at: f64, side: usize| (-0.5..=side as f64 - 0.5).contains(&at);
     let is_sigma = |sigma: f64| sigma > 0.0 && sigma <= width.max(height) as f64;
@@ -576,7 +576,7 @@ fn check_is_sound(s: &Detection, width: usize, height: usize) -> Result<(), Stri
     }
 }
 
-/// A frame of 0 with discs of full scale in it: (x, y, radius).
+/// A frame of zeros with discs at full scale: (x, y, radius).
 fn discs(side: usize, discs: &[(f64, f64, f64)]) -> Frame {
     let mut pixels = vec![0.0f32; side * side];
     for (i, pixel) in pixels.iter_mut().enumerate() {
@@ -592,8 +592,8 @@ fn discs(side: usize, discs: &[(f64, f64, f64)]) -> Frame {
 }
 
 #[test]
-fn a_source_that_is_all_saturated_is_placed_by_its_area() {
-    // From one pixel to a disc that fills the window of any spot.
+fn a_fully_saturated_source_has_the_position_of_its_area() {
+    // From one pixel to a disc larger than the window of any spot.
     for radius in [0.6, 1.0, 1.5, 2.3, 4.2, 8.1] {
         let centres: Vec<(f64, f64, f64)> = (0..16)
             .map(|i| (f64::from(i % 4), f64::from(i / 4)))
@@ -615,15 +615,15 @@ fn a_source_that_is_all_saturated_is_placed_by_its_area() {
                 sigmas < 1.0 && error_px < 3.5 * sigmas,
                 "radius {radius}: {star:?}"
             );
-            // The light that is left is a lower limit of what there was.
+            // The remaining light is a lower limit.
             assert!(star.flux_adu >= 254.0, "radius {radius}: {star:?}");
         }
     }
 }
 
 #[test]
-fn snr_is_that_of_the_noise_however_imperfect_the_spot() {
-    // Stars of two spot sizes: no single spot fits all of them.
+fn snr_depends_on_the_noise_not_on_spot_misfit() {
+    // Stars of two spot sizes, so that no single spot fits all.
     let mut sky = Sky::flat(400, 400, BACKGROUND_E);
     for i in 0..36u32 {
         let (x, y) = (
@@ -633,13 +633,13 @@ fn snr_is_that_of_the_noise_however_imperfect_the_spot() {
         sky.add_star(x, y, 50_000.0, if i % 2 == 0 { 0.9 } else { 1.1 });
     }
     let found = found_in(&sky.expose(12), &DetectConfig::default());
-    // Shot noise alone leaves √50 000 = 224; some of the misfit is taken for shot noise.
+    // Shot noise alone gives √50 000 = 224; part of the misfit is counted as shot noise.
     assert!(
         found.sources.iter().all(|s| s.snr > 80.0 && s.snr < 230.0),
         "{:?}",
         found.sources
     );
-    // The misfit is in the standard errors of the position: noise alone would leave 0.0046 px.
+    // The standard errors of the position include the misfit: noise alone would give 0.0046 px.
     assert!(
         found.sources.iter().all(|s| s.sigma_x_px > 0.0048),
         "{:?}",
@@ -691,7 +691,7 @@ fn the_result_is_the_same_on_any_number_of_threads() {
 }
 
 #[test]
-fn missing_pixels_disturb_nothing_but_themselves() {
+fn missing_pixels_do_not_disturb_others() {
     let (sky, truth) = star_field(11);
     let mut frame = sky.expose(7);
     for i in (0..frame.pixels.len()).step_by(97) {
@@ -709,7 +709,7 @@ fn missing_pixels_disturb_nothing_but_themselves() {
 
 #[test]
 fn the_grey_weighted_centroid_is_near_the_bound_for_bright_stars() {
-    // Limits.md, section 8: 1.2 for a peak SNR of 10 and more.
+    // At most 1.2 for a peak SNR of 10 and more.
     const MAX_GREY_OVER_BOUND: f64 = 1.2;
     let config = DetectConfig {
         centroid: CentroidMethod::GreyWeighted,
@@ -752,7 +752,7 @@ proptest! {
     }
 }
 
-/// Something bright in a frame: what a lamp, a hot column, a dead area or a star leave.
+/// A bright or dark feature: a lamp, a hot column, a dead area or a star.
 #[derive(Debug, Clone)]
 enum Mark {
     Disc {
@@ -820,7 +820,7 @@ fn mark() -> impl Strategy<Value = Mark> {
     ]
 }
 
-/// Draws `marks` over noise of standard deviation `noise`, in whole steps, cut off at full scale.
+/// Draws `marks` over noise of standard deviation `noise`, rounded and clipped at full scale.
 fn marked_frame(marks: &[Mark], (width, height): (usize, usize), noise: f32, seed: u64) -> Frame {
     let mut sky = Sky::flat(width, height, 0.0);
     for mark in marks {
@@ -870,7 +870,7 @@ fn marked_frame(marks: &[Mark], (width, height): (usize, usize), noise: f32, see
             }
         }
     }
-    // One value at least, else there is no frame.
+    // At least one value, otherwise there is no frame.
     pixels[0] = 10.0;
     Frame::new(width, height, pixels)
         .unwrap()
@@ -899,8 +899,8 @@ proptest! {
     }
 }
 
-/// False alarms per megapixel in frames of `width` x `height` pixels of `pixel`, and the counting error
-/// of such a number where `wanted` is had.
+/// False alarms per megapixel in frames of `width` x `height` pixels of `pixel`, and the Poisson
+/// error at the rate `wanted`.
 fn false_alarm_rate_of(
     pixel: impl Fn(&mut ChaCha8Rng) -> f32,
     (width, height): (usize, usize),
@@ -924,7 +924,7 @@ fn false_alarm_rate_of(
     (count / area, (wanted / area).sqrt())
 }
 
-/// Gaussian noise in units of the quantisation step, unrounded.
+/// Gaussian noise in units of the quantisation step, not rounded.
 fn gaussian(level: f32, sigma: f32, rng: &mut ChaCha8Rng) -> f32 {
     level + sigma * rng.sample::<f32, _>(StandardNormal)
 }
@@ -965,7 +965,7 @@ fn skewed_quantised_and_clipped_noise_raise_no_more_false_alarms() {
             false_alarm_rate_of(clipped, whole, spot, WANTED, 10),
         );
     }
-    // Frames that are mostly border.
+    // Frames that consist mostly of border.
     let strip = (1024, 8);
     for spot in [0.7, 1.0, 1.5] {
         let noise = |rng: &mut ChaCha8Rng| gaussian(1000.0, 7.0, rng);

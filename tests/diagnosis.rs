@@ -1,4 +1,4 @@
-//! What is said of frames that are not identified: each reason on a frame drawn for it, and on no other.
+//! Reasons for frames that are not identified: each on a frame drawn for it, and on no other.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -44,17 +44,17 @@ fn reason(path: &Path, options: &[&str]) -> (String, String) {
     (code, text)
 }
 
-fn check(picture: &Picture, options: &[&str], code: &str, said: &[&str]) {
+fn check(picture: &Picture, options: &[&str], code: &str, words_in_reason: &[&str]) {
     let directory = tempfile::tempdir().unwrap();
     let (found, text) = reason(&save(picture, directory.path(), "frame.png"), options);
     assert_eq!(found, code, "{text}");
-    for words in said {
+    for words in words_in_reason {
         assert!(text.contains(words), "{words}: {text}");
     }
 }
 
-/// Places and fluxes that mean nothing.
-fn strewn(seed: u64, count: usize) -> Vec<(f64, f64, f64)> {
+/// Random positions and fluxes.
+fn random_dots(seed: u64, count: usize) -> Vec<(f64, f64, f64)> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut between = |low: f64, high: f64| random.random_range(low..high);
     let right = f64::from(WIDTH) - 60.0;
@@ -100,7 +100,7 @@ fn an_empty_frame_says_that_it_is_empty() {
 }
 
 #[test]
-fn an_overexposed_frame_says_how_much_of_it_is() {
+fn an_overexposed_frame_says_its_share_of_saturated_pixels() {
     let mut picture = ORION.picture(&bright_stars());
     for (x, _, pixel) in picture.enumerate_pixels_mut() {
         if x >= WIDTH / 10 {
@@ -108,7 +108,7 @@ fn an_overexposed_frame_says_how_much_of_it_is() {
         }
     }
     check(&picture, &[], "saturated", &["90 %", "65535"]);
-    // Twelve bits in a file of sixteen.
+    // Twelve-bit levels in a 16-bit file.
     for pixel in picture.pixels_mut() {
         pixel.0[0] = pixel.0[0].min(4095);
     }
@@ -118,7 +118,7 @@ fn an_overexposed_frame_says_how_much_of_it_is() {
 #[test]
 fn a_scale_outside_the_range_says_the_range() {
     let mut canvas = Canvas::new(WIDTH, HEIGHT);
-    for (x, y, flux) in strewn(1, 40) {
+    for (x, y, flux) in random_dots(1, 40) {
         canvas.spot(x, y, flux);
     }
     let picture = canvas.develop(3);
@@ -130,7 +130,7 @@ fn a_scale_outside_the_range_says_the_range() {
 }
 
 #[test]
-fn a_wrong_hint_is_told_from_stars_that_match_without_it() {
+fn a_wrong_hint_is_reported_with_the_solution_without_it() {
     let picture = ORION.picture(&bright_stars());
     let around = "24.0° wide around RA 83.0";
     let scale = ["24.0° wide", "36.0° to 44.0° wide, excludes"];
@@ -148,7 +148,7 @@ fn a_wrong_hint_is_told_from_stars_that_match_without_it() {
 }
 
 #[test]
-fn trails_are_told_with_their_direction_and_length() {
+fn trails_are_reported_with_direction_and_length() {
     let length = 30.0;
     for (angle_deg, direction) in [
         (35.0_f64, "35°, rising"),
@@ -173,7 +173,7 @@ fn trails_are_told_with_their_direction_and_length() {
 #[test]
 fn one_trail_among_stars_is_not_a_frame_of_trails() {
     let mut canvas = Canvas::new(WIDTH, HEIGHT);
-    for (x, y, flux) in strewn(2, 30) {
+    for (x, y, flux) in random_dots(2, 30) {
         canvas.spot(x, y, flux);
     }
     canvas.trail((50.0, 60.0), (500.0, 300.0), flux_adu(-2.0));
@@ -181,9 +181,9 @@ fn one_trail_among_stars_is_not_a_frame_of_trails() {
 }
 
 #[test]
-fn a_double_exposure_is_told_with_its_offset() {
+fn a_double_exposure_is_reported_with_its_offset() {
     let mut canvas = Canvas::new(WIDTH, HEIGHT);
-    for (x, y, flux) in strewn(3, 30) {
+    for (x, y, flux) in random_dots(3, 30) {
         canvas.spot(x, y, flux);
         canvas.spot(x + 23.4, y - 11.2, flux * 0.8);
     }
@@ -196,7 +196,7 @@ fn a_double_exposure_is_told_with_its_offset() {
 }
 
 #[test]
-fn a_double_exposure_of_the_sky_is_identified_or_told() {
+fn a_double_exposure_of_the_sky_is_identified_or_reported() {
     let mut canvas = Canvas::new(WIDTH, HEIGHT);
     for (star, x, y) in ORION.stars(&bright_stars()) {
         canvas.spot(x, y, flux_adu(star.v_mag));
@@ -207,12 +207,12 @@ fn a_double_exposure_of_the_sky_is_identified_or_told() {
     let report = Ran::new(starpipe().args(["process", "--format", "json"]).arg(path))
         .reports()
         .remove(0);
-    let told = report["status"] == "identified" || report["reason_code"] == "double_exposure";
-    assert!(told, "{}", report["reason"]);
+    let reported = report["status"] == "identified" || report["reason_code"] == "double_exposure";
+    assert!(reported, "{}", report["reason"]);
 }
 
 #[test]
-fn a_list_of_centroids_has_reasons_as_well() {
+fn a_list_of_centroids_has_reasons_too() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("list.csv");
     let rows = ORION

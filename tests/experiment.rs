@@ -1,4 +1,4 @@
-//! The paper's experiments, done again by the program.
+//! The paper's experiments, repeated by the program.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -7,8 +7,8 @@ mod common;
 use common::{Ran, names, number, starpipe};
 use serde_json::Value;
 
-/// A mean of faintest stars may be off the expected one by so much, and by so many standard errors besides: the model of the
-/// detector is off its limit by some hundredths.
+/// Tolerances of the mean faintest star: the detector's model is off by a few hundredths, and a
+/// number of standard errors.
 const FAINTEST_TOLERANCE_MAG: f64 = 0.08;
 const FAINTEST_SIGMAS: f64 = 3.5;
 
@@ -17,7 +17,7 @@ fn experiment(arguments: &[&str]) -> Ran {
 }
 
 #[test]
-fn the_limits_and_all_stars_are_the_papers_and_the_frames_are_as_faint_as_expected() {
+fn limits_and_stars_are_the_papers_and_frames_reach_the_expected_limit() {
     for (which, limit, stars, as_bright) in [("1", 8.15, 7, 7), ("2", 9.0, 9, 17)] {
         let ran = experiment(&[which, "--trials", "12", "--format", "json"]);
         assert_eq!(ran.status, 0, "{}", ran.stderr);
@@ -96,7 +96,7 @@ fn the_same_seed_gives_the_same_page_on_any_number_of_threads() {
 }
 
 #[test]
-fn a_picture_that_is_not_ours_is_not_overwritten() {
+fn a_foreign_picture_is_not_overwritten() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("experiment-2.png");
     std::fs::write(&path, "my own").unwrap();

@@ -1,4 +1,4 @@
-//! Files that hold frames, through the program: every format at its depth, and what it makes of bad ones.
+//! Frame files through the program: every format at its depth, and bad files.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use tiff::encoder::colortype::{ColorType, Gray8, Gray16, Gray32Float, Gray64Float};
 use tiff::encoder::{Compression, TiffEncoder, TiffKind, TiffValue};
 
-// ---- Writers --------------------------------------------------------------------------------
+// ---- Writers
 
 fn tiff_of<C: ColorType>(size: (u32, u32), data: &[C::Inner], compression: Compression) -> Vec<u8>
 where
@@ -87,7 +87,7 @@ fn zipped(bytes: &[u8]) -> Vec<u8> {
     encoder.finish().unwrap()
 }
 
-// ---- What the program makes of them ---------------------------------------------------------
+// ---- What the program makes of them
 
 /// A directory of files to run the program on.
 struct Files(tempfile::TempDir);
@@ -113,7 +113,7 @@ fn process(arguments: impl IntoIterator<Item = PathBuf>) -> Ran {
     )
 }
 
-/// What must be the same whatever format a frame comes in.
+/// The part of the report that must not depend on the format.
 fn result(report: &Value) -> Value {
     let mut result = report.clone();
     for differs in ["frame", "timing_ms"] {
@@ -122,7 +122,7 @@ fn result(report: &Value) -> Value {
     result
 }
 
-/// Each file gives the same detections, to the last digit, and the same answer.
+/// Asserts that each file gives exactly the same detections and the same answer.
 fn assert_all_alike(named: &[(&str, Vec<u8>)]) {
     let files = Files::new();
     let paths: Vec<PathBuf> = named.iter().map(|(n, b)| files.add(n, b)).collect();
@@ -241,7 +241,7 @@ fn files_of_other_programs_are_read_to_the_last_bit() {
         (20, 10) => 65535.0,
         _ => (1000 + 7 * x + 13 * y) as f32,
     };
-    // Which row of the levels is the first in the file.
+    // Which row of the levels comes first in the file.
     let from_top = |y: usize| y;
     let from_bottom = |y: usize| 23 - y;
     for (name, row) in [
@@ -274,7 +274,7 @@ fn files_of_other_programs_are_read_to_the_last_bit() {
     );
 }
 
-// ---- What a header tells --------------------------------------------------------------------
+// ---- What a header tells
 
 /// The fixture of Orion as FITS with these keywords.
 fn orion_fits(keywords: &[&str]) -> Vec<u8> {
@@ -317,7 +317,7 @@ fn the_date_is_that_of_the_option_else_of_the_header_else_of_the_name() {
 }
 
 #[test]
-fn a_scale_in_the_header_helps_where_it_is_right_and_does_no_harm_where_it_is_not() {
+fn a_right_scale_in_the_header_helps_and_a_wrong_one_does_no_harm() {
     let files = Files::new();
     // 113.65″ a pixel.
     let right = files.add(
@@ -360,7 +360,7 @@ fn a_scale_in_the_header_helps_where_it_is_right_and_does_no_harm_where_it_is_no
     );
 }
 
-// ---- Standard input, directories, pages -----------------------------------------------------
+// ---- Standard input, directories, pages
 
 #[test]
 fn a_frame_or_a_list_is_read_from_standard_input() {
@@ -387,7 +387,7 @@ fn a_frame_or_a_list_is_read_from_standard_input() {
 }
 
 #[test]
-fn standard_input_is_read_once_and_may_be_bad_as_well() {
+fn standard_input_is_read_once_and_bad_input_is_reported() {
     for command in ["process", "identify"] {
         let ran = Ran::new(starpipe().args([command, "-", "a.csv", "-"]));
         assert_eq!(ran.status, 2, "{}", ran.stderr);
@@ -425,7 +425,7 @@ fn a_directory_stands_for_the_frames_in_it() {
     let ran = process([files.0.path().to_owned()]);
     assert_eq!((ran.status, ran.stderr.as_str()), (0, ""));
     assert_eq!(named(&ran), expected);
-    // A directory without any is an error, and the rest goes on.
+    // A directory without frames is an error; the rest is processed.
     let empty = tempfile::tempdir().unwrap();
     let ran = process([empty.path().to_owned(), expected[1].clone()]);
     assert_eq!(ran.status, 1);
@@ -444,7 +444,7 @@ fn a_directory_stands_for_the_frames_in_it() {
 }
 
 #[test]
-fn a_page_is_chosen_by_its_number() {
+fn a_page_is_selected_by_its_number() {
     let image = orion();
     let size = [image.width(), image.height()];
     let dark = vec![10_u8; image.as_bytes().len()];
@@ -462,18 +462,18 @@ fn a_page_is_chosen_by_its_number() {
     };
     assert_eq!(status("1").0, 3);
     assert_eq!(status("2"), (0, String::new()));
-    let (failed, complaint) = status("3");
+    let (failed, message) = status("3");
     assert_eq!(failed, 1);
     assert!(
-        complaint.ends_with("no page 3: found 2 pages, expected at least 3\n"),
-        "{complaint}"
+        message.ends_with("no page 3: found 2 pages, expected at least 3\n"),
+        "{message}"
     );
     assert_eq!(status("0").0, 2);
 }
 
-// ---- Bad files ------------------------------------------------------------------------------
+// ---- Bad files
 
-/// Each is refused in one line that begins so, without a word on standard output.
+/// Asserts that each file is refused in one line that begins so, with nothing on standard output.
 fn assert_refused(cases: &[(&str, Vec<u8>, &str)]) {
     let files = Files::new();
     let paths: Vec<PathBuf> = cases.iter().map(|(n, b, _)| files.add(n, b)).collect();

@@ -1,5 +1,5 @@
-//! Identification of star fields drawn from the catalogue: any width, any attitude, mirrored or not, with errors,
-//! missing and false stars. What is identified must be right.
+//! Identification of star fields drawn from the catalogue: any width, any attitude, mirrored or
+//! not, with errors, missing and false stars. Every identification must be right.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -22,7 +22,7 @@ const CENTROID_SIGMA_PX: f64 = 0.2;
 const MAGNITUDE_SIGMA_MAG: f64 = 0.3;
 const MISSING: f64 = 0.1;
 const FALSE_STARS: usize = 3;
-/// A right answer's centre is at most this share of the field's width off.
+/// Tolerated error of the centre, as a share of the field's width.
 const CENTRE_TOLERANCE: f64 = 0.002;
 const WIDTH_TOLERANCE: f64 = 0.01;
 
@@ -47,7 +47,8 @@ impl Truth {
         }
     }
 
-    /// The magnitude to which there are about 25 stars in the field, and the places of these stars and of those a little fainter.
+    /// The magnitude at which the field has about 25 stars, and the positions of stars down to
+    /// slightly below it.
     fn places(&self) -> (f64, Vec<(PixelPoint, f64)>) {
         let fov = self.camera.fov_x_rad() * self.camera.fov_y_rad();
         let limit_mag = sky()
@@ -66,7 +67,7 @@ impl Truth {
         (limit_mag, places)
     }
 
-    /// The stars to a magnitude that leaves about 25, as a camera would see them.
+    /// About 25 stars, down to some magnitude, as a camera would measure them.
     fn observe(&self, rng: &mut ChaCha8Rng) -> StarField {
         let (limit_mag, places) = self.places();
         let mut stars: Vec<ObservedStar> = Vec::new();
@@ -105,7 +106,7 @@ fn observed(x: f64, y: f64, mag: f64) -> ObservedStar {
     ObservedStar {
         position: PixelPoint::new(x, y),
         sigma_px: CENTROID_SIGMA_PX,
-        // The zero point is none of identification's business.
+        // Identification does not depend on the zero point.
         mag: mag - 20.0,
         is_saturated: false,
     }
@@ -126,7 +127,7 @@ fn field(mut stars: Vec<ObservedStar>) -> StarField {
 #[test]
 fn fields_of_any_width_and_attitude_are_identified_and_never_wrongly() {
     const FIELDS: usize = 40;
-    // 380 of 400 would be the requirement at 95 %; nine widths of 40 fields, all but 2 % identified.
+    // Nine widths of 40 fields; at least 98 % must be identified.
     const UNIDENTIFIED_AT_MOST: usize = 7;
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let mut unidentified = 0;
@@ -151,7 +152,7 @@ fn fields_of_any_width_and_attitude_are_identified_and_never_wrongly() {
 }
 
 #[test]
-fn a_lens_that_distorts_by_two_percent_is_found_out() {
+fn a_distortion_of_two_percent_is_measured() {
     let mut rng = ChaCha8Rng::seed_from_u64(12);
     for fov_deg in [10.0, 25.0] {
         let mut truth = Truth::random(&mut rng, fov_deg);
@@ -174,7 +175,7 @@ fn a_lens_that_distorts_by_two_percent_is_found_out() {
 }
 
 #[test]
-fn the_poles_are_places_like_any_other() {
+fn the_poles_are_not_special() {
     let mut rng = ChaCha8Rng::seed_from_u64(13);
     for dec_rad in [PI / 2.0, -PI / 2.0, 1.55] {
         let mut truth = Truth::random(&mut rng, 15.0);
@@ -189,7 +190,7 @@ fn the_poles_are_places_like_any_other() {
 }
 
 #[test]
-fn hints_that_are_right_help_and_hints_that_are_wrong_are_believed() {
+fn right_hints_help_and_wrong_hints_exclude() {
     let mut rng = ChaCha8Rng::seed_from_u64(14);
     let truth = Truth::random(&mut rng, 12.0);
     let stars = truth.observe(&mut rng);
@@ -222,7 +223,7 @@ fn hints_that_are_right_help_and_hints_that_are_wrong_are_believed() {
 }
 
 #[test]
-fn a_saturated_star_may_be_brighter_than_it_seems() {
+fn a_saturated_star_may_be_brighter_than_measured() {
     let mut rng = ChaCha8Rng::seed_from_u64(17);
     let complete = Truth::random(&mut rng, 12.0).observe(&mut rng);
     let name_at = |stars: &StarField, place: PixelPoint| {
@@ -244,9 +245,9 @@ fn a_saturated_star_may_be_brighter_than_it_seems() {
 }
 
 #[test]
-fn faint_stars_are_named_though_their_places_are_rough() {
+fn faint_stars_are_named_despite_large_centroid_errors() {
     const FIELDS: usize = 20;
-    // Bright stars are many, and faint ones as rough as at a ratio of signal to noise of five.
+    // Many bright stars, and faint ones with the centroid error of a signal-to-noise ratio of five.
     const FAINT_MAG: f64 = 0.4;
     const BRIGHT_SIGMA_PX: f64 = 0.03;
     const FAINT_SIGMA_PX: f64 = 0.3;
@@ -280,16 +281,17 @@ fn faint_stars_are_named_though_their_places_are_rough() {
             .filter(|m| is_faint(m.observed))
             .count();
     }
-    // A close pair may be named in the wrong order; beyond three standard errors lies one star in ninety.
+    // A close pair may be named in the wrong order; one star in ninety is off by more than three
+    // standard errors.
     assert!(
         named as f64 > 0.97 * faint as f64 && faint > 100,
         "{named} of {faint}"
     );
 }
 
-/// Nothing is similar to a triangle of which nothing is known, and not everything.
+/// A triangle with unbounded errors matches neither nothing nor everything.
 #[test]
-fn centroids_without_any_certainty_are_not_searched_for_ever() {
+fn a_search_with_unbounded_centroid_errors_ends() {
     let mut rng = ChaCha8Rng::seed_from_u64(16);
     let mut stars = Truth::random(&mut rng, 10.0).observe(&mut rng);
     for star in &mut stars.stars {

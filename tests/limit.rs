@@ -1,4 +1,4 @@
-//! The predicted limiting magnitude, and descriptions of cameras, through the program.
+//! `starpipe limit` and `starpipe camera` through the program.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -26,7 +26,7 @@ fn predicted(options: &[&str]) -> Value {
     found.remove(0)
 }
 
-/// A camera's description in `directory`, that of experiment 1 but for one line.
+/// The description of experiment 1 in `directory`, with one line replaced.
 fn camera(directory: &Path, key: &str, line: &str) -> String {
     let text = Ran::new(starpipe().args(["camera", "new"])).stdout;
     let changed = text.lines().map(|old| match old.split(" = ").next() {
@@ -100,7 +100,7 @@ fn the_readings_differ_by_what_the_documentation_says() {
         ];
         assert!((at("experiment-1", &options) - expected).abs() < 0.006);
     }
-    // The noise that would meet the paper's limits in the physical reading.
+    // The noise that reproduces the paper's limits in the physical reading.
     let options = ["--reading", "physical", "--read-noise-e", "35.7"];
     for (preset, expected) in [("experiment-1", 8.15), ("experiment-2", 8.99)] {
         let found = at(preset, &options);
@@ -108,7 +108,7 @@ fn the_readings_differ_by_what_the_documentation_says() {
     }
 }
 
-/// Every number to six digits: machines differ in the last ones.
+/// Every number rounded to six digits: machines differ in the last ones.
 fn rounded(value: &mut Value) {
     match value {
         Value::Number(number) => {
@@ -136,7 +136,7 @@ fn the_fields_are_those_that_other_programs_build_on() {
     }
     let bands = report["budget"]["bands"].as_array_mut().unwrap();
     assert_eq!(bands.len(), 43);
-    // One part of the spectrum is as good as another.
+    // Only the first part of the spectrum is kept.
     bands.drain(..19);
     bands.truncate(1);
     rounded(&mut report);
@@ -162,7 +162,7 @@ fn the_same_is_printed_every_time() {
     }
 }
 
-/// What docs/sensitivity.md says of the presets.
+/// The presets' limits as in docs/camera.md.
 const LIMITS: [(&str, f64); 5] = [
     ("experiment-1", 8.15),
     ("experiment-2", 8.99),
@@ -241,7 +241,7 @@ fn every_parameter_has_an_option_and_can_be_swept() {
 }
 
 #[test]
-fn options_in_other_units_say_the_same() {
+fn options_in_other_units_are_equivalent() {
     let base = predicted(&["--preset", "experiment-1"]);
     let of = |option: &str, name: &str| {
         let value = number(&base, &format!("/parameters/{name}")).to_string();
@@ -264,7 +264,7 @@ fn options_in_other_units_say_the_same() {
 }
 
 #[test]
-fn a_spot_given_in_pixels_is_one_of_the_pixels_given() {
+fn a_spot_in_pixels_refers_to_the_given_pixels() {
     let options = [
         "--preset",
         "experiment-1",
@@ -287,7 +287,7 @@ fn a_curve_comes_from_a_file() {
     let by_file = predicted(&["--preset", "experiment-1", "--quantum-efficiency", path]);
     assert_eq!(number(&by_file, "/parameters/quantum_efficiency"), 0.3);
     assert_eq!(by_file["budget"]["bands"][7]["quantum_efficiency"], 0.3);
-    // A number is the peak, and the curve keeps its form: at 430 nm it is 41/60 of that.
+    // A number scales the curve to that peak: at 430 nm it is 41/60 of it.
     let by_peak = predicted(&["--preset", "experiment-1", "--quantum-efficiency", "0.3"]);
     let found = number(&by_peak, "/budget/bands/7/quantum_efficiency");
     assert!((found - 0.205).abs() < 1e-9, "{found}");
@@ -343,7 +343,7 @@ fn a_sweep_is_a_row_for_each_value() {
 }
 
 #[test]
-fn a_parameter_that_changes_nothing_is_told_of() {
+fn a_parameter_without_effect_is_reported() {
     let options = [
         "--preset",
         "experiment-1",
@@ -359,7 +359,7 @@ fn a_parameter_that_changes_nothing_is_told_of() {
     );
     let physical = limit(&[&options[..], &["--reading", "physical"]].concat());
     assert_eq!(physical.stderr, "");
-    // Of no matter to the brightest pixel, but to the detector.
+    // Irrelevant to the brightest pixel, but not to the detector.
     for sweep in ["false_alarms_per_mpx=0.1:10:2:log", "motion_px=0:5:2"] {
         let ran = limit(&["--preset", "experiment-1", "--sweep", sweep]);
         assert_eq!(ran.stderr, "", "{sweep}");
@@ -367,7 +367,7 @@ fn a_parameter_that_changes_nothing_is_told_of() {
 }
 
 #[test]
-fn a_rule_that_the_noise_passes_has_no_limit() {
+fn a_threshold_below_the_noise_has_no_limit() {
     for (options, rule, other) in [
         (["--snr", "0.5"], "peak_pixel", "detector"),
         (["--snr", "1"], "peak_pixel", "detector"),
@@ -392,7 +392,7 @@ fn a_rule_that_the_noise_passes_has_no_limit() {
 }
 
 #[test]
-fn a_table_of_endless_or_far_too_many_bytes_is_refused() {
+fn an_endless_or_huge_table_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("qe.csv");
     fs::write(&path, vec![b'7'; 3 << 20]).unwrap();
@@ -465,7 +465,7 @@ fn a_plot_is_an_svg_or_a_png() {
     }
     assert_eq!(svg, plot("b.SVG"));
     let picture = image::load_from_memory(&plot("a.png")).unwrap().to_rgb8();
-    // Both curves, and letters.
+    // Both curves and the text.
     for colour in [[0, 114, 178], [213, 94, 0], [0, 0, 0]] {
         assert!(
             picture.pixels().filter(|pixel| pixel.0 == colour).count() > 100,
@@ -514,7 +514,7 @@ fn the_papers_figures_are_eleven_and_a_sheet() {
     }
     let exposure = fs::read_to_string(figures.join("figure-3h-exposure.svg")).unwrap();
     assert!(exposure.contains("aperture 100 mm") && exposure.contains("aperture 50 mm"));
-    // Of another camera they are others.
+    // Another camera gives other figures.
     let other = directory.path().join("other");
     limit(&[
         "--preset",
@@ -526,7 +526,7 @@ fn the_papers_figures_are_eleven_and_a_sheet() {
     assert_ne!(sheet(&figures), sheet(&other));
 }
 
-/// Asserts that a command line is refused with these words, and that nothing is printed.
+/// Asserts that a command line is refused with these words and prints nothing.
 fn is_refused(options: &[&str], expected: &str) {
     let ran = limit(options);
     let found = (ran.status, ran.stdout.as_str());
@@ -535,7 +535,7 @@ fn is_refused(options: &[&str], expected: &str) {
 }
 
 #[test]
-fn an_option_that_makes_no_sense_is_refused() {
+fn nonsensical_options_are_refused() {
     for (option, value, expected) in [
         ("--camera", "a.toml", "cannot be used with"),
         ("--aperture-mm", "-5", "expected a number above 0"),
@@ -574,7 +574,7 @@ fn an_option_that_makes_no_sense_is_refused() {
 }
 
 #[test]
-fn options_that_say_the_same_exclude_each_other() {
+fn equivalent_options_exclude_each_other() {
     for [one, other] in [
         ["--sky-mag-arcsec2=20", "--sky-illuminance-lx=0.01"],
         ["--sky-luminance-cd-m2=1", "--sky-illuminance-lx=0.01"],
@@ -593,7 +593,7 @@ fn options_that_say_the_same_exclude_each_other() {
 }
 
 #[test]
-fn a_sweep_that_makes_no_sense_is_refused_before_anything_is_printed() {
+fn nonsensical_sweeps_are_refused_before_anything_is_printed() {
     for (sweep, expected) in [
         ("aperture_mm=200:5:10", "the sweep runs from 200 to 5"),
         ("aperture_mm=5:200:1", "a sweep of 1 values"),
@@ -721,7 +721,7 @@ fn a_figure_that_cannot_be_written_leaves_nothing_printed() {
 }
 
 #[test]
-fn the_papers_reading_wants_a_curve_over_the_papers_band() {
+fn the_papers_reading_needs_a_curve_over_the_papers_band() {
     let directory = tempfile::tempdir().unwrap();
     let path = camera(directory.path(), "band_from_nm", "band_from_nm = 420");
     let table = directory.path().join("qe.csv");
@@ -739,7 +739,7 @@ fn the_papers_reading_wants_a_curve_over_the_papers_band() {
 }
 
 #[test]
-fn a_camera_is_not_overwritten_unless_that_is_said() {
+fn a_camera_is_not_overwritten_without_force() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("camera.toml");
     fs::write(&path, "mine").unwrap();

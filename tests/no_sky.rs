@@ -1,4 +1,4 @@
-//! What is no sky must not be identified: noise, random dots, drawings, black, white.
+//! Noise, random dots, drawings, black and white frames must not be identified.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -29,7 +29,7 @@ fn noise(seed: u64) -> GrayImage {
     })
 }
 
-/// Spots like stars, strewn at random over noise.
+/// Star-like spots at random positions over noise.
 fn random_dots(seed: u64, count: usize) -> GrayImage {
     let mut image = noise(seed);
     let mut random = random(seed + 1000);
@@ -65,7 +65,7 @@ fn house() -> GrayImage {
     })
 }
 
-/// A regular grid of dots: stars are not arranged so.
+/// A regular grid of dots.
 fn grid_of_dots() -> GrayImage {
     let mut image = noise(7);
     for y in (32..SIDE - 32).step_by(48) {
@@ -83,14 +83,14 @@ const MANY: u64 = 100;
 
 type SensorFrame = ImageBuffer<Luma<u16>, Vec<u16>>;
 
-/// Noise as a sensor of 16 bits gives it.
+/// Noise of a 16-bit sensor.
 fn sensor_noise(random: &mut ChaCha8Rng) -> SensorFrame {
     let level = log_uniform(random, 200.0, 20_000.0);
     let normal = Normal::new(level, log_uniform(random, 2.0, 300.0)).unwrap();
     SensorFrame::from_fn(SIDE, SIDE, |_, _| Luma([normal.sample(random) as u16]))
 }
 
-/// Noise with 5 to 500 spots of any size and brightness strewn over it.
+/// Noise with 5 to 500 spots of any size and brightness.
 fn sensor_dots(random: &mut ChaCha8Rng) -> SensorFrame {
     let mut image = sensor_noise(random);
     let sigma_px = log_uniform(random, 0.5, 3.0);
@@ -110,7 +110,7 @@ fn sensor_dots(random: &mut ChaCha8Rng) -> SensorFrame {
     image
 }
 
-/// A number between the two, of which each power of ten is as likely as the next.
+/// A random number between the two, uniform in its logarithm.
 fn log_uniform(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
     low * (high / low).powf(random.random())
 }
@@ -156,7 +156,7 @@ fn saved(directory: &Path, images: impl IntoIterator<Item = DynamicImage>) -> Ve
 }
 
 #[test]
-fn pictures_of_anything_but_the_sky_are_not_identified() {
+fn pictures_other_than_the_sky_are_not_identified() {
     let directory = tempfile::tempdir().unwrap();
     let images = vec![
         noise(1),
@@ -187,7 +187,7 @@ fn a_hundred_frames_of_random_dots_are_not_identified() {
     assert_none_is_identified(&["process"], &saved(directory.path(), frames));
 }
 
-/// Lists of up to `most` positions and magnitudes that mean nothing.
+/// Lists of up to `most` random positions and magnitudes.
 fn random_lists(directory: &Path, seeds: Range<u64>, most: usize) -> Vec<PathBuf> {
     let list = |seed: u64| {
         let mut random = random(seed);

@@ -1,4 +1,4 @@
-//! What nobody means to do and somebody does: odd names, odd files, results among the frames.
+//! Unusual input: odd names, odd files, results among the frames.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
@@ -31,7 +31,7 @@ fn frames(ran: &Ran) -> Vec<String> {
     ran.reports().iter().map(frame).collect()
 }
 
-// ---- Results among the frames ---------------------------------------------------------------
+// ---- Results among the frames
 
 #[test]
 fn a_directory_may_hold_its_own_results() {
@@ -43,18 +43,18 @@ fn a_directory_may_hold_its_own_results() {
     let (first, written) = (run(), names(place));
     assert_eq!((first.status, first.stderr.as_str()), (0, ""));
     assert_eq!(written.len(), 2 + 2 * 4);
-    // Overlays and headers are no frames, and results of an earlier run may be written over.
+    // Overlays and headers are not processed as frames, and earlier results may be overwritten.
     let again = run();
     assert_eq!((again.status, again.stderr.as_str()), (0, ""));
     assert_eq!(frames(&again), frames(&first));
     assert_eq!(names(place), written);
-    // One that is asked for by its name is taken for a frame all the same.
+    // An overlay named explicitly is processed.
     let asked = process(&[&place.join("a.png")]);
     assert_eq!(asked.reports().len(), 1);
 }
 
 #[test]
-fn a_frame_of_png_is_never_written_over_by_its_overlay() {
+fn a_png_frame_is_never_overwritten_by_its_overlay() {
     let directory = tempfile::tempdir().unwrap();
     let place = directory.path();
     fs::copy(orion(), place.join("a.png")).unwrap();
@@ -64,7 +64,7 @@ fn a_frame_of_png_is_never_written_over_by_its_overlay() {
 }
 
 #[test]
-fn only_results_are_written_over() {
+fn only_results_are_overwritten() {
     for extension in ["json", "csv", "png", "wcs"] {
         let directory = tempfile::tempdir().unwrap();
         let out = directory.path();
@@ -85,7 +85,7 @@ fn only_results_are_written_over() {
             assert_eq!(fs::read(&other).unwrap(), content);
             assert_eq!(names(out).len(), 1);
         }
-        // An empty file holds nothing to lose.
+        // An empty file may be overwritten.
         fs::write(&other, "").unwrap();
         let ran = process(&[&orion(), Path::new("--out"), out]);
         assert_eq!((ran.status, ran.stderr.as_str()), (0, ""), "{extension}");
@@ -93,7 +93,7 @@ fn only_results_are_written_over() {
 }
 
 #[test]
-fn a_link_to_a_device_is_not_written_over() {
+fn a_link_to_a_device_is_not_overwritten() {
     let directory = tempfile::tempdir().unwrap();
     let link = directory.path().join("orion.csv");
     std::os::unix::fs::symlink("/dev/null", &link).unwrap();
@@ -103,7 +103,7 @@ fn a_link_to_a_device_is_not_written_over() {
 }
 
 #[test]
-fn an_imported_catalogue_takes_the_place_of_no_input_and_of_no_device() {
+fn an_import_overwrites_neither_input_nor_device() {
     let directory = tempfile::tempdir().unwrap();
     let source = directory.path().join("bright.csv");
     let bright = concat!(env!("CARGO_MANIFEST_DIR"), "/catalogs/sky2000-bright.csv");
@@ -117,7 +117,7 @@ fn an_imported_catalogue_takes_the_place_of_no_input_and_of_no_device() {
     assert_eq!(itself.status, 2, "{}", itself.stderr);
     assert!(itself.stderr.contains("would overwrite the input"));
     assert_eq!(fs::read(&source).unwrap(), fs::read(bright).unwrap());
-    // A link, so that a failure would replace that and not the device.
+    // A link, so that a failing test would replace the link and not the device.
     let link = directory.path().join("link");
     std::os::unix::fs::symlink("/dev/null", &link).unwrap();
     let device = import(&link);
@@ -157,9 +157,9 @@ fn a_catalogue_without_stars_is_neither_made_nor_used() {
     assert!(ran.stderr.contains("none.cat: no star"), "{}", ran.stderr);
 }
 
-// ---- Names ----------------------------------------------------------------------------------
+// ---- Names
 
-/// A line's end, quotes, a comma, a command to a terminal, and what is no UTF-8.
+/// A line break, quotes, a comma, a terminal escape sequence, and invalid UTF-8.
 fn odd_names() -> [OsString; 4] {
     [
         "two\nlines.png".into(),
@@ -190,7 +190,7 @@ fn odd_names_break_no_line_and_reach_no_terminal() {
         command.args(["process", "--format", format]);
         Ran::new(command.args(paths)).stdout
     };
-    // A table is for programs, and has names as they are.
+    // A table is for programs and has names unchanged.
     let table = of("csv", &paths[..2]);
     let mut reader = csv::Reader::from_reader(table.as_bytes());
     let mut named: Vec<String> = reader
@@ -210,7 +210,7 @@ fn odd_names_break_no_line_and_reach_no_terminal() {
 }
 
 #[test]
-fn complaints_of_odd_names_are_one_line_each() {
+fn errors_with_odd_names_are_one_line_each() {
     let missing = odd_names();
     let ran = process(&missing.each_ref().map(Path::new));
     assert_eq!((ran.status, ran.stdout.as_str()), (1, ""));
@@ -218,10 +218,10 @@ fn complaints_of_odd_names_are_one_line_each() {
     assert!(!ran.stderr.contains(|c: char| c.is_control() && c != '\n'));
 }
 
-// ---- Streams --------------------------------------------------------------------------------
+// ---- Streams
 
 #[test]
-fn a_pipe_is_read_like_a_file_and_what_never_ends_is_left() {
+fn a_pipe_is_read_like_a_file_and_an_endless_stream_is_refused() {
     let mut shell = Command::new("bash");
     let script = "\"$0\" process --format json <(cat \"$1\") && \"$0\" process /dev/zero; \"$0\" identify /dev/zero";
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache");
@@ -252,7 +252,7 @@ fn a_pipe_is_read_like_a_file_and_what_never_ends_is_left() {
 fn a_file_that_is_too_long_is_refused_before_it_is_read() {
     let mut file = tempfile::NamedTempFile::new().unwrap();
     file.write_all(b"P5 3 3 255\n").unwrap();
-    // No disk holds so much, but a file with a hole does.
+    // A sparse file, larger than any disk.
     if file.as_file().set_len(1 << 40).is_err() {
         eprintln!("skipped: no file of 1 TiB can be made here");
         return;
@@ -268,7 +268,7 @@ fn a_file_that_is_too_long_is_refused_before_it_is_read() {
 }
 
 #[test]
-fn trouble_that_cannot_be_told_is_in_the_exit_status() {
+fn errors_that_cannot_be_printed_set_the_exit_status() {
     let Ok(full) = fs::OpenOptions::new().write(true).open("/dev/full") else {
         eprintln!("skipped: no /dev/full");
         return;
@@ -306,10 +306,10 @@ fn a_full_standard_output_is_a_failure() {
     assert!(stderr.contains("writing to standard output"), "{stderr}");
 }
 
-// ---- The cache ------------------------------------------------------------------------------
+// ---- The cache
 
 #[test]
-fn several_at_once_share_an_empty_cache() {
+fn concurrent_runs_share_an_empty_cache() {
     let cache = tempfile::tempdir().unwrap();
     let bright = concat!(env!("CARGO_MANIFEST_DIR"), "/catalogs/sky2000-bright.csv");
     let start = || {

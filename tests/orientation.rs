@@ -1,5 +1,5 @@
-//! Where things are, against frames drawn by other code than the library's: mirrored frames, the poles, the
-//! line of RA 0h, corners, and half a pixel.
+//! Orientation, tested with frames drawn by independent code: mirrored frames, the poles, RA 0h,
+//! corners, half a pixel.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -12,15 +12,15 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
-/// The centre comes out to this many pixels: half a pixel off would be seen.
+/// Tolerance of the centre in pixels: an error of half a pixel would fail.
 const CENTRE_TOLERANCE_PX: f64 = 0.1;
-/// The corners, where the fitted scale and roll count, too.
+/// Tolerance of the corners, where fitted scale and roll matter, too.
 const CORNER_TOLERANCE_PX: f64 = 0.2;
-/// The position of a star above V 5.5, of SNR 200.
+/// Tolerance of the position of a star above V 5.5, with an SNR of 200.
 const STAR_TOLERANCE_PX: f64 = 0.1;
-/// Stars closer than this to each other shift each other's positions.
+/// Stars closer than this shift each other's measured positions.
 const CLOSE_PX: f64 = 12.0;
-/// Directions in the catalogue's CSV and in the report are the same numbers.
+/// Tolerance of directions: the catalogue's CSV and the report have the same numbers.
 const SAME_DIRECTION_DEG: f64 = 1e-5;
 
 const WIDTH: u32 = 640;
@@ -65,7 +65,8 @@ fn header(path: &Path) -> HashMap<String, f64> {
         .collect()
 }
 
-/// The direction in degrees that a header gives to the FITS pixel (x, y), by the formulas of the `TAN` projection and SIP.
+/// The direction in degrees of the FITS pixel (x, y) by a header, by the formulas of the `TAN`
+/// projection and SIP.
 fn header_direction(header: &HashMap<String, f64>, x: f64, y: f64) -> (f64, f64) {
     let value = |keyword: &str| header.get(keyword).copied().unwrap_or(0.0);
     let (u, v) = (x - value("CRPIX1"), y - value("CRPIX2"));
@@ -158,7 +159,7 @@ impl Solved {
             (length_sq - 1.0).abs() < 1e-8 && quaternion[0] >= 0.0,
             "{quaternion:?}"
         );
-        // It takes the axes on the sky to the camera's own x, y and z.
+        // The quaternion turns the axes on the sky into the camera's x, y and z.
         for (k, axis) in view.axes().into_iter().enumerate() {
             let camera = turned(quaternion, axis);
             let off = (0..3).map(|i| (camera[i] - f64::from(u8::from(i == k))).powi(2));
@@ -168,7 +169,7 @@ impl Solved {
                 "{view:?}: axis {k} off by {off_px} px"
             );
         }
-        // On a pole, the angle from north depends on which meridian the centre happens to be on.
+        // At a pole, the angle from north depends on the meridian of the centre.
         if view.dec_deg.abs() < 89.9 {
             let turn_deg = (at("up_pa_deg") - view.up_pa_deg + 180.0).rem_euclid(360.0) - 180.0;
             let off_px = turn_deg.to_radians().abs() * f64::from(view.width) / 2.0;
@@ -179,7 +180,7 @@ impl Solved {
         }
     }
 
-    /// Every bright star is where it was drawn, and is the star that was drawn there.
+    /// Asserts that every bright star has the position and the identity that it was drawn with.
     fn check_stars(&self) {
         let view = &self.view;
         let mut checked = 0;
@@ -233,7 +234,7 @@ impl Solved {
     }
 }
 
-/// The drawing itself, by hand: upright and looking at the equinox, 45° wide in 101 pixels.
+/// Checks the drawing by hand: upright, towards the equinox, 45° wide in 101 pixels.
 #[test]
 fn the_drawing_has_north_up_east_left_and_its_centre_in_the_middle() {
     let mut view = View {
@@ -250,7 +251,7 @@ fn the_drawing_has_north_up_east_left_and_its_centre_in_the_middle() {
         );
     };
     close(view.pixel(0.0, 0.0), (50.0, 50.0));
-    // 45° from the centre is the edge, half a pixel beyond the last pixel's centre.
+    // The edge is half a pixel beyond the last pixel's centre.
     close(view.pixel(45.0, 0.0), (-0.5, 50.0));
     close(view.pixel(0.0, 45.0), (50.0, -0.5));
     view.mirrored = true;

@@ -1,4 +1,4 @@
-//! The files that `--out` makes: all of them whole, or none and a clear word.
+//! The files that `--out` writes: all of them whole, or none and a clear message.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -20,7 +20,7 @@ fn process(out: &Path, frame: &Path) -> Ran {
     Ran::new(command.args([out, frame]))
 }
 
-/// A file system in memory of so many bytes, taken away at the end.
+/// A file system in memory of limited size, unmounted on drop.
 struct SmallDisk {
     place: tempfile::TempDir,
 }
@@ -49,7 +49,7 @@ impl SmallDisk {
 
 impl Drop for SmallDisk {
     fn drop(&mut self) {
-        // Best effort: what is left lies in a temporary directory.
+        // Best effort: leftovers are in a temporary directory.
         let _ = Command::new("umount").arg(self.path()).status();
     }
 }
@@ -62,7 +62,7 @@ fn the_overlay_is_a_picture_of_the_frame_and_the_header_has_its_size() {
     let picture = image::open(directory.path().join("orion.png"))
         .unwrap()
         .to_rgb8();
-    // 640 pixels are drawn twice as large; the strip below comes on top of 960 rows.
+    // 640 pixels are drawn twice as large; the strip below adds to the 960 rows.
     assert_eq!(picture.width(), 1280);
     assert!(
         (1000..1100).contains(&picture.height()),
@@ -126,7 +126,7 @@ fn an_overlay_never_overwrites_the_frame_that_it_is_made_of() {
         ran.stderr
     );
     assert_eq!(fs::read(&frame).unwrap(), fs::read(orion()).unwrap());
-    // Nor one frame's overlay another frame.
+    // A frame's overlay does not overwrite another frame.
     let other = directory.path().join("other");
     fs::create_dir(&other).unwrap();
     let elsewhere = other.join("night.tif");
@@ -165,7 +165,7 @@ fn a_directory_that_takes_no_files_is_named_and_the_result_is_still_printed() {
 
 #[test]
 fn a_full_disk_is_named_and_holds_nothing_half_written() {
-    // There is room for the tables, but not for the picture.
+    // There is space for the tables, but not for the picture.
     let Some(disk) = SmallDisk::new("size=300k") else {
         return;
     };
@@ -219,7 +219,7 @@ fn python_with_astropy() -> Option<String> {
 }
 
 #[test]
-fn astropy_reads_the_headers_as_they_are_meant() {
+fn astropy_agrees_with_the_headers() {
     let Some(python) = python_with_astropy() else {
         return;
     };

@@ -1,4 +1,4 @@
-//! Zero point and completeness of drawn frames, whose truth is known, and of the real sky.
+//! Zero point and completeness of drawn frames with known truth, and of the real sky.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -8,7 +8,7 @@ use common::{Ran, fixture, number, shared_dir, starpipe};
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// `examples/draw_frame.rs`: electrons from a star of magnitude 0.
+/// Electrons from a star of magnitude 0, as in `examples/draw_frame.rs`.
 const DRAWN_ZERO_MAG_E: f64 = 250e3;
 
 fn processed(arguments: &[&str], frames: &[PathBuf]) -> Vec<Value> {
@@ -19,7 +19,7 @@ fn processed(arguments: &[&str], frames: &[PathBuf]) -> Vec<Value> {
     ran.reports()
 }
 
-/// The curve's part fainter, or brighter, than a magnitude: the share detected.
+/// The share detected in the part of the curve fainter, or brighter, than a magnitude.
 fn share(report: &Value, wanted: impl Fn(f64) -> bool) -> f64 {
     let bins = report["photometry"]["completeness"].as_array().unwrap();
     let of = |what: &str| -> f64 {
@@ -32,14 +32,14 @@ fn share(report: &Value, wanted: impl Fn(f64) -> bool) -> f64 {
 }
 
 #[test]
-fn drawn_frames_have_the_zero_point_they_were_drawn_with() {
+fn drawn_frames_have_their_zero_point() {
     for (file, electrons_per_adu) in [("cygnus/cygnus.tif", 1.0), ("orion/orion.png", 8.0)] {
         let report = &processed(&[], &[fixture(file)])[0];
         let expected = 2.5 * (DRAWN_ZERO_MAG_E / electrons_per_adu).log10();
         let found = number(report, "/photometry/zero_point_vmag");
         let sigma = number(report, "/photometry/zero_point_sigma_mag");
         println!("{file}: zero point {found} ± {sigma}, drawn with {expected:.4}");
-        // A hundredth of a magnitude is what the spot's tails and the background are worth.
+        // The spot's tails and the background contribute a hundredth of a magnitude.
         assert!(
             (found - expected).abs() < 3.0 * sigma + 0.01,
             "{file}: {found} {expected}"
@@ -55,12 +55,14 @@ fn drawn_frames_have_the_zero_point_they_were_drawn_with() {
 #[test]
 fn the_limit_of_a_drawn_frame_is_that_of_its_noise() {
     let report = &processed(&["--sigma", "6"], &[fixture("cygnus/cygnus.tif")])[0];
-    // A star is detected where the matched filter's signal exceeds 6 standard deviations of sky and read noise; half of those
-    // that are just so bright. The effective area of the spot of 1 px, integrated over pixels, is 4π(σ² + 1/12).
+    // A star is detected where the matched filter's signal exceeds 6 standard deviations of sky and
+    // read noise; at just this brightness, half of the stars are. The effective area of the spot of
+    // 1 px, integrated over pixels, is 4π(σ² + 1/12).
     let noise_e = f64::sqrt(100.0 + 25.0 + 1.0 / 12.0);
     let effective_px = 4.0 * std::f64::consts::PI * (1.0 + 1.0 / 12.0);
     let faintest_e = 6.0 * noise_e * effective_px.sqrt();
-    // Its signal is sought at whole pixels, 1/6 px² from the spot's centre on average.
+    // The filter is evaluated at whole pixels, on average 1/6 px² (squared distance) from the
+    // spot's centre.
     let off_centre = (1.0 / 6.0) / (4.0 * (1.0 + 1.0 / 12.0));
     let expected = 2.5 * (DRAWN_ZERO_MAG_E / faintest_e).log10() - 1.0857 * off_centre;
     let found = number(report, "/photometry/limit50_vmag");
@@ -70,7 +72,7 @@ fn the_limit_of_a_drawn_frame_is_that_of_its_noise() {
         (found - expected).abs() < 3.0 * sigma + 0.03,
         "{found} {sigma} {expected}"
     );
-    // The faintest star detected is a lucky one.
+    // The faintest star detected lies beyond the limit.
     assert!(number(report, "/magnitude/faintest_vmag") > found);
     assert!(share(report, |vmag| vmag < found - 1.0) > 0.95);
     assert!(share(report, |vmag| vmag > found + 1.0) < 0.05);
@@ -92,11 +94,12 @@ fn lists_of_centroids_have_no_photometry() {
     assert_eq!(ran.reports()[0]["photometry"], Value::Null);
 }
 
-/// Where the frames of [`one_night`] were taken, as far as is known: within some kilometres, seconds of arc in airmass.
+/// Site of the frames of [`one_night`], known to some kilometres, which is negligible in airmass.
 const NIGHT_SITE: &str = "52.22,4.42";
-/// Zero points of the same night differ by no more than this, once the air is accounted for.
+/// Largest difference of zero points of one night after correction for extinction.
 const SAME_SKY_MAG: f64 = 0.05;
-/// Stars of SKY2000 scatter so much about a zero point with a colour term, at most; photon noise of the faint ones is most of it.
+/// Largest scatter of SKY2000's stars about a zero point with a colour term; mostly photon noise of
+/// the faint ones.
 const SCATTER_MAX_MAG: f64 = 0.2;
 
 /// Four 16-bit frames of one camera and one night, at two altitudes.
@@ -125,7 +128,7 @@ fn line(points: &[[f64; 2]]) -> (f64, f64) {
 }
 
 #[test]
-fn zero_points_of_one_night_differ_by_the_air_alone() {
+fn zero_points_of_one_night_differ_by_extinction_alone() {
     let Some(reports) = one_night() else { return };
     let point = |report: &Value| {
         let airmass = number(report, "/observation/airmass");
@@ -137,7 +140,7 @@ fn zero_points_of_one_night_differ_by_the_air_alone() {
         "extinction {:.3} mag an airmass, zero point above the air {intercept:.3}",
         -slope
     );
-    // From the clearest mountain to thick haze.
+    // From a clear mountain site to thick haze.
     assert!((0.1..0.8).contains(&-slope), "{slope}");
     for (report, [airmass, zero_point]) in reports.iter().zip(points) {
         let off = zero_point - (intercept + slope * airmass);
@@ -152,7 +155,7 @@ fn zero_points_of_one_night_differ_by_the_air_alone() {
 }
 
 #[test]
-fn every_frame_of_one_night_has_a_limit_that_the_air_explains() {
+fn limits_of_one_night_differ_as_extinction_explains() {
     let Some(reports) = one_night() else { return };
     let limits: Vec<[f64; 2]> = reports
         .iter()
@@ -167,7 +170,7 @@ fn every_frame_of_one_night_has_a_limit_that_the_air_explains() {
             [number(report, "/observation/airmass"), limit]
         })
         .collect();
-    // At the same altitude the same limit, whatever stars there are; higher up a fainter one.
+    // The limit is the same at the same altitude, whatever the stars, and fainter higher up.
     for pair in limits.chunks(2) {
         assert!((pair[0][1] - pair[1][1]).abs() < 0.15, "{pair:?}");
     }
@@ -178,10 +181,10 @@ fn every_frame_of_one_night_has_a_limit_that_the_air_explains() {
 fn a_photograph_with_a_tone_curve_says_so() {
     let Some(shared) = shared_dir() else { return };
     let report = &processed(&[], &[shared.join("frames/hale_bopp.jpg")])[0];
-    // The curve of sRGB is a power of about 1 / 2.2.
+    // The tone curve of sRGB is a power of about 1 / 2.2.
     let linearity = number(report, "/photometry/linearity");
     assert!((0.4..0.6).contains(&linearity), "{linearity}");
     let notes = report["notes"].as_array().unwrap();
-    let told = |note: &Value| note.as_str().unwrap().contains("not proportional to light");
-    assert!(notes.iter().any(told), "{notes:?}");
+    let reported = |note: &Value| note.as_str().unwrap().contains("not proportional to light");
+    assert!(notes.iter().any(reported), "{notes:?}");
 }

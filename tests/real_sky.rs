@@ -1,4 +1,4 @@
-//! The real sky: photographs and published lists, against what others found in them.
+//! The real sky: photographs and published lists, compared with independent solutions.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -11,26 +11,28 @@ use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;
 
-/// The solutions that truth.csv holds agree among themselves to 0.02°.
+/// The solutions in truth.csv agree with each other to 0.02°.
 const CENTRE_TOLERANCE_DEG: f64 = 0.05;
 const FOV_TOLERANCE: f64 = 0.01;
-/// What a peer reaches on the frames that are not compressed: so many stars, matched so well.
+/// What another program reaches on the uncompressed frames: number of stars and residuals.
 const SHARP_FRAME: &str = ".tiff";
 const SHARP_MATCHED: f64 = 60.0;
 const SHARP_RMS_ARCSEC: f64 = 13.0;
-/// Compressed frames, whose blocks must not become stars, and how many sources they have.
+/// Compressed frames, whose blocks must not become stars, and their number of sources.
 const COMPRESSED: [(&str, f64); 4] = [
     ("hale_bopp.jpg", 1600.0),
     ("jan1_g90_e50ms.jpg", 390.0),
     ("jan1_g90_e100ms.jpg", 190.0),
     ("test2_g100_e50ms.jpg", 80.0),
 ];
-/// Sources more or fewer than that, as a part of them.
+/// Tolerance of that number, relative.
 const COMPRESSED_TOLERANCE: f64 = 0.1;
-/// Stars above this signal-to-noise ratio show the camera model and the catalogue more than the noise.
+/// Above this signal-to-noise ratio, residuals show errors of camera model and catalogue rather
+/// than noise.
 const BRIGHT_SNR: f64 = 20.0;
 
-/// A frame drawn without distortion shows where it points to a small part of a pixel (of 1.4 to 1.9′).
+/// Pointing tolerance of a frame drawn without distortion: a small part of a pixel (of 1.4 to
+/// 1.9′).
 const DRAWN_CENTRE_TOLERANCE_DEG: f64 = 0.003;
 const DRAWN_ROLL_TOLERANCE_DEG: f64 = 0.02;
 const DRAWN_FOV_TOLERANCE: f64 = 5e-4;
@@ -42,7 +44,7 @@ fn rows(path: &Path) -> Vec<HashMap<String, String>> {
 }
 
 #[test]
-fn all_real_frames_are_identified_where_others_found_them() {
+fn all_real_frames_are_identified_as_by_others() {
     let Some(shared) = shared_dir() else { return };
     let rows = rows(&shared.join("frames/truth.csv"));
     assert_eq!(rows.len(), 11);
@@ -62,7 +64,8 @@ fn all_real_frames_are_identified_where_others_found_them() {
             continue;
         }
         let value = |name: &str| row[name].parse::<f64>().unwrap();
-        // Its angle is that of another convention, at another point: the drawn frames test the angle.
+        // The angle in the file has another convention and another reference point: the drawn
+        // frames test the angle.
         let truth = Truth {
             ra_deg: value("ra_deg"),
             dec_deg: value("dec_deg"),
@@ -72,7 +75,7 @@ fn all_real_frames_are_identified_where_others_found_them() {
         let matched = number(&report, "/match/matched");
         let rms_arcsec = number(&report, "/match/rms_arcsec");
         let detected = number(&report, "/match/detected");
-        // A row of the README's table.
+        // A row of the table in docs/results.md.
         println!(
             "| {file} | {matched} of {} | {:.1}″ | {:+.2} % | {rms_arcsec:.1}″ | {} | {:.0} | {:.0} ms |",
             detected,

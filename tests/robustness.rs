@@ -1,5 +1,5 @@
-//! The protocol that measures identification: what it draws is what it says, its table is whole, and
-//! its verdicts can be wrong.
+//! The protocol of `starpipe robustness`: what it draws, its table, and that it recognises wrong
+//! answers.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -65,20 +65,20 @@ fn without_errors_every_centroid_is_where_its_star_is() {
 }
 
 #[test]
-fn errors_missing_and_false_stars_are_as_many_as_asked_for() {
+fn errors_missing_and_false_stars_are_as_requested() {
     let protocol = Protocol {
         centroid_sigma_px: 1.5,
         missing: 0.3,
         false_stars: 0.5,
         ..Protocol::default()
     };
-    let (mut kept, mut strewn, mut squares, mut north) = (0.0, 0.0, 0.0, 0.0);
+    let (mut kept, mut false_stars, mut squares, mut north) = (0.0, 0.0, 0.0, 0.0);
     const TRIALS: u64 = 300;
     for seed in 0..TRIALS {
         let drawn = draw(&protocol, seed);
         let exact = drawn.camera;
         kept += drawn.true_stars() as f64;
-        strewn += (drawn.list.centroids.len() - drawn.true_stars()) as f64;
+        false_stars += (drawn.list.centroids.len() - drawn.true_stars()) as f64;
         for (centroid, catalog) in drawn.list.centroids.iter().zip(&drawn.catalog) {
             let Some(catalog) = *catalog else { continue };
             let direction = drawn
@@ -97,14 +97,14 @@ fn errors_missing_and_false_stars_are_as_many_as_asked_for() {
     }
     let stars = kept / 0.7 / TRIALS as f64;
     assert!((stars / protocol.mean_stars - 1.0).abs() < 0.1, "{stars}");
-    assert!((strewn / (kept / 0.7) - 0.5).abs() < 0.03);
+    assert!((false_stars / (kept / 0.7) - 0.5).abs() < 0.03);
     assert!(((squares / kept).sqrt() - 1.5).abs() < 0.05);
-    // Uniform over the sphere: the mean sine of the declination is 0, give or take 1/√(3·300).
+    // Uniform over the sphere: the mean sine of the declination is 0 ± 1/√(3·300).
     assert!((north / TRIALS as f64).abs() < 0.1);
 }
 
 #[test]
-fn a_pointing_that_is_off_is_a_wrong_answer_and_a_name_that_is_off_a_wrong_name() {
+fn a_wrong_pointing_is_a_wrong_answer_and_a_wrong_name_is_counted() {
     let observation = draw(&Protocol::default(), 3);
     let field = observation.list.star_field(0.0);
     let outcome = identify(&field, &Hints::default(), sky());
@@ -114,7 +114,7 @@ fn a_pointing_that_is_off_is_a_wrong_answer_and_a_name_that_is_off_a_wrong_name(
     let Outcome::Identified(found) = &outcome else {
         panic!("{outcome:?}");
     };
-    // Two hundredths of the field's width about y: the centre is off. About z: only the corners are.
+    // Two hundredths of the field's width: about y the centre is off, about z only the corners.
     for turn in [Vector3::new(0.0, 0.0035, 0.0), Vector3::new(0.0, 0.0, 0.05)] {
         let mut off = found.clone();
         off.icrs_to_camera = off.icrs_to_camera.then_turn(turn);
@@ -147,7 +147,7 @@ fn the_standard_table_is_right_and_the_same_on_any_number_of_threads() {
         let [counted, right, none] =
             ["counted", "right", "no_answer"].map(|name| row[name].as_u64().unwrap());
         assert_eq!(counted, right + none, "{row}");
-        // Of sixty trials at a rate of 99.5 %, more than three go wrong once in five thousand runs.
+        // At a rate of 99.5 %, more than three of sixty trials fail once in five thousand runs.
         assert!(none <= 3, "{row}");
         let expects_stars = row["case"] != "no true star at all";
         assert_eq!(counted > 30, expects_stars, "{row}");
@@ -218,7 +218,7 @@ fn csv_and_text_name_the_case_and_its_interval() {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused() {
+fn nonsensical_options_are_refused() {
     for (option, value, words) in [
         ("--sweep", "roll=0:1:2", "fov, stars, centroid-error"),
         ("--sweep", "stars=1:2", "NAME=FROM:TO:COUNT"),

@@ -1,4 +1,4 @@
-//! Simulated frames against what their physics says.
+//! Simulated frames compared with their physics.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -8,10 +8,10 @@ use starpipe::frame::Frame;
 use starpipe::model::sensitivity::{Budget, Scenario};
 use starpipe::model::simulate::star_field;
 
-/// Measured means and variances may be off by so many of their standard errors.
+/// Tolerance of measured means and variances, in standard errors.
 const SIGMAS: f64 = 4.5;
 
-/// The paper's camera, its noise small enough for its light to show.
+/// The paper's camera, with less noise, so that the light is measurable.
 fn scenario() -> Scenario {
     let mut scenario = Scenario::of(Preset::Experiment2);
     scenario.sensor.read_noise_e = 12.0;
@@ -40,7 +40,7 @@ fn the_sky_has_its_mean_and_its_noise() {
     let frame = star_field(&scenario, &[], 5).unwrap();
     let (mean, variance) = mean_and_variance(&electrons(&frame, &scenario));
     let light_e = budget.background_e + budget.dark_e;
-    // The paper's budget leaves the rounding out: it has a twelfth of a step squared.
+    // The paper's budget has no rounding, whose variance is a twelfth of a step squared.
     let gain = scenario.sensor.gain_e_per_adu;
     let expected = light_e + 12f64.powi(2) + gain * gain / 12.0;
     let count = frame.pixels.len() as f64;
@@ -93,13 +93,13 @@ fn the_same_seed_gives_the_same_frame_and_another_one_another() {
 }
 
 #[test]
-fn levels_are_whole_and_end_where_the_detector_does() {
+fn levels_are_whole_and_limited_by_the_detector() {
     let scenario = scenario();
     let stars = [(PixelPoint::new(300.0, 200.0), -3.0)];
     let frame = star_field(&scenario, &stars, 2).unwrap();
     let most = frame.pixels.iter().copied().fold(0.0, f32::max);
     assert!(frame.pixels.iter().all(|level| level.fract() == 0.0));
-    // 12 bits end before the well is full.
+    // 12 bits end below the full well.
     assert_eq!(
         (most, frame.saturation_adu, frame.step_adu),
         (4095.0, Some(4095.0), 1.0)

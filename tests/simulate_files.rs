@@ -1,4 +1,4 @@
-//! `starpipe simulate` through the program: the files it writes, what they say of themselves, what it refuses.
+//! `starpipe simulate` through the program: its files, their headers, and what it refuses.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -11,7 +11,7 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
-/// A field of 14° in which hundreds of stars are found.
+/// A field of 14° with hundreds of detectable stars.
 const CAMERA: &[&str] = &[
     "--preset=nanosat-tracker",
     "--width-px=640",
@@ -19,7 +19,7 @@ const CAMERA: &[&str] = &[
     "--pitch-x-um=6",
     "--pitch-y-um=6",
 ];
-/// Where there is the Milky Way.
+/// A direction in the Milky Way.
 const SKY: &[&str] = &["--ra=310", "--dec=40", "--roll=25"];
 
 fn simulate(out: &Path, more: &[&str]) -> Ran {
@@ -72,7 +72,7 @@ fn a_frame_says_how_it_was_made_in_fits_and_in_tiff() {
     assert_eq!(known.pixel_size_um, Some(6.0));
     assert_eq!(known.focal_length_mm, Some(16.0));
     assert_eq!(known.date.unwrap().to_iso(), "2026-03-04T05:06:07Z");
-    // The same pixels, whatever the file.
+    // The same pixels in every file format.
     for name in ["a.tif", "packed.tif"] {
         assert_eq!(frame::read(at(name)).unwrap().pixels, fits.pixels, "{name}");
     }
@@ -106,7 +106,7 @@ fn a_frame_says_how_it_was_made_in_fits_and_in_tiff() {
 }
 
 #[test]
-fn the_table_has_the_stars_where_they_are_and_all_else() {
+fn the_table_has_stars_trails_and_rays_at_their_positions() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("a.fits");
     let more = ["--false-stars=20", "--trails=3", "--cosmic-rays-cm2-s=100"];
@@ -163,16 +163,17 @@ fn a_frame_at_random_is_that_of_validate_with_the_same_number() {
     );
     assert_eq!(validated.status, 0, "{}", validated.stderr);
     let random = ["--random-attitude", "--count=2"];
-    let told = made(&frames, &[&more[..], &random].concat());
+    let simulated = made(&frames, &[&more[..], &random].concat());
     let expected = rows(&study.join("frames.csv"));
-    for (told, row) in told.iter().zip(&expected) {
-        assert_eq!(told["seed"].to_string(), row["seed"]);
+    for (simulated, row) in simulated.iter().zip(&expected) {
+        assert_eq!(simulated["seed"].to_string(), row["seed"]);
         for name in ["ra_deg", "dec_deg", "up_pa_deg"] {
-            let off = told["attitude"][name].as_f64().unwrap() - row[name].parse::<f64>().unwrap();
+            let off =
+                simulated["attitude"][name].as_f64().unwrap() - row[name].parse::<f64>().unwrap();
             assert!(off.abs() < 1e-6, "{name}: {off}");
         }
-        // The noise of the pixels, too: the level that the pipeline finds on the file.
-        let path = told["frame"].as_str().unwrap();
+        // The pixel noise is the same, too: compares the level that the pipeline measures.
+        let path = simulated["frame"].as_str().unwrap();
         let processed = Ran::new(starpipe().args(["process", "--format=json", path]));
         let level = number(&processed.reports()[0], "/background/level");
         let of_study = row["background_adu"].parse::<f64>().unwrap();
@@ -186,15 +187,15 @@ fn stars_of_a_list_are_drawn_where_it_says() {
     let list = directory.path().join("list.csv");
     fs::write(&list, "x,y,vmag\n100.25,200.5,3\n400,90.75,4\n").unwrap();
     let out = directory.path().join("field.fits");
-    let told = made(&out, &["--stars", list.to_str().unwrap()]);
-    assert!(told[0]["attitude"].is_null());
+    let simulated = made(&out, &["--stars", list.to_str().unwrap()]);
+    assert!(simulated[0]["attitude"].is_null());
     let rows = rows(&out.with_extension("csv"));
     assert_eq!(rows.len(), 2);
     assert_eq!((&*rows[0]["x"], &*rows[0]["y"]), ("100.25", "200.5"));
     let frame = frame::read(&out).unwrap();
     let level = |x: usize, y: usize| frame.pixels[y * 640 + x];
     assert!(level(100, 200) > level(400, 91) && level(400, 91) > level(300, 300) + 100.0);
-    // Of instrumental magnitudes there is nothing to draw.
+    // Instrumental magnitudes cannot be drawn.
     fs::write(&list, "x,y,flux\n1,2,3\n").unwrap();
     let ran = simulate(&out, &["--force", "--stars", list.to_str().unwrap()]);
     assert_eq!(ran.status, 1);
@@ -206,7 +207,7 @@ fn darks_and_flats_have_no_table_and_no_sky() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("frames");
     fs::create_dir(&out).unwrap();
-    // What is not written is not in the way.
+    // Existing files that are not to be written do not matter.
     fs::write(out.join("dark-00000.csv"), "mine").unwrap();
     made(&out, &["--dark", "--count=2"]);
     made(&out, &["--flat=2000", "--image=fits"]);
@@ -237,7 +238,7 @@ fn darks_and_flats_have_no_table_and_no_sky() {
 }
 
 #[test]
-fn nothing_is_overwritten_unless_asked_for() {
+fn nothing_is_overwritten_without_force() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("a.tif");
     fs::write(&out, "mine").unwrap();
@@ -245,13 +246,13 @@ fn nothing_is_overwritten_unless_asked_for() {
     assert_eq!(fs::read(&out).unwrap(), b"mine");
     assert_eq!(names(directory.path()), ["a.tif"]);
     made(&out, &[SKY, &["--force"]].concat());
-    // Its table counts as well.
+    // An existing table counts as well.
     fs::remove_file(&out).unwrap();
     refused(&out, SKY, "a.csv exists");
 }
 
 #[test]
-fn what_makes_no_sense_is_refused() {
+fn nonsensical_options_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("a.fits");
     let sky = |more: &[&str], what: &str| refused(&out, &[SKY, more].concat(), what);
@@ -291,7 +292,7 @@ fn what_makes_no_sense_is_refused() {
 }
 
 #[test]
-fn a_detector_without_end_is_refused_before_it_takes_memory() {
+fn a_huge_detector_is_refused_before_memory_is_allocated() {
     let directory = tempfile::tempdir().unwrap();
     let out = format!("--out={}", directory.path().join("a.fits").display());
     let sides = ["--width-px=100000", "--height-px=100000"];
@@ -302,7 +303,7 @@ fn a_detector_without_end_is_refused_before_it_takes_memory() {
 }
 
 #[test]
-fn a_bad_description_is_a_fault_of_its_file() {
+fn a_bad_description_is_an_error_of_its_file() {
     let directory = tempfile::tempdir().unwrap();
     let camera = directory.path().join("camera.toml");
     let described = Ran::new(starpipe().args(["camera", "new", "--preset=nanosat-tracker"]));
@@ -330,7 +331,7 @@ fn a_bad_description_is_a_fault_of_its_file() {
 
 #[test]
 fn the_pipeline_finds_the_attitude_that_was_simulated() {
-    /// The error of an attitude may be so many of its standard errors.
+    /// Tolerance of the attitude, in standard errors.
     const SIGMAS: f64 = 5.0;
     let directory = tempfile::tempdir().unwrap();
     for (name, more) in [
@@ -342,15 +343,18 @@ fn the_pipeline_finds_the_attitude_that_was_simulated() {
         ),
     ] {
         let out = directory.path().join(name);
-        let told = &made(&out, &[SKY, more].concat())[0];
+        let simulated = &made(&out, &[SKY, more].concat())[0];
         let processed = Ran::new(starpipe().args(["process", "--format=json"]).arg(&out));
         let report = &processed.reports()[0];
         assert_eq!(report["status"], "identified", "{name}");
-        assert_eq!(report["optics"]["mirrored"], told["mirrored"], "{name}");
+        assert_eq!(
+            report["optics"]["mirrored"], simulated["mirrored"],
+            "{name}"
+        );
         let truth = Truth {
-            ra_deg: number(told, "/attitude/ra_deg"),
-            dec_deg: number(told, "/attitude/dec_deg"),
-            fov_x_deg: number(told, "/fov_x_deg"),
+            ra_deg: number(simulated, "/attitude/ra_deg"),
+            dec_deg: number(simulated, "/attitude/dec_deg"),
+            fov_x_deg: number(simulated, "/fov_x_deg"),
         };
         let sigma = |axis: &str| number(report, &format!("/attitude/sigma_arcsec/{axis}"));
         let off_arcsec = truth.centre_error_deg(report) * 3600.0;
@@ -384,7 +388,7 @@ fn rounded(value: &mut Value) {
 }
 
 #[test]
-fn the_fields_told_of_a_frame_are_these() {
+fn the_fields_of_a_frame_are_these() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("a.fits");
     let more = [
@@ -392,7 +396,7 @@ fn the_fields_told_of_a_frame_are_these() {
         "--rate-y-deg-s=0.1",
         "--seed=9",
     ];
-    let mut told = made(&out, &[SKY, &more].concat());
-    rounded(&mut told[0]);
-    insta::assert_json_snapshot!(told[0]);
+    let mut simulated = made(&out, &[SKY, &more].concat());
+    rounded(&mut simulated[0]);
+    insta::assert_json_snapshot!(simulated[0]);
 }

@@ -1,4 +1,4 @@
-//! The progress bar: where people look, and nowhere else.
+//! The progress bar appears on terminals only.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -8,8 +8,8 @@ use common::fixture;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What a terminal shows of `starpipe process` over some frames, `redirect` being given to the shell.
-/// `None`, saying so, without util-linux's `script`, which makes terminals.
+/// What a terminal shows of `starpipe process` over some frames; `redirect` is passed to the shell.
+/// `None`, saying so, without util-linux's `script`, which provides the terminal.
 fn shown(redirect: &str) -> Option<String> {
     let cache = std::env::var_os("STARPIPE_CACHE_DIR").map_or_else(
         || Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache"),
@@ -33,7 +33,7 @@ fn shown(redirect: &str) -> Option<String> {
     }
 }
 
-/// Lines without what moves the cursor and erases.
+/// Lines without cursor and erase sequences.
 fn plain_lines(shown: &str) -> Vec<String> {
     let mut plain = String::new();
     let mut rest = shown;
@@ -55,7 +55,7 @@ fn results(lines: &[String]) -> usize {
 }
 
 #[test]
-fn a_bar_is_on_the_terminal_and_results_are_whole_beside_it() {
+fn a_bar_is_on_the_terminal_and_results_are_complete() {
     let (Some(alone), Some(both)) = (shown(">/dev/null"), shown("")) else {
         return;
     };

@@ -1,4 +1,5 @@
-//! Validation by simulation: interrupted or not, on any number of threads, the same to the last byte; and what it finds.
+//! `starpipe validate`: the same bytes whether interrupted or not and on any number of threads; and
+//! its results.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -46,8 +47,8 @@ fn validate(out: &Path, more: &[&str]) -> Ran {
     Ran::new(starpipe().args(arguments(out, more)))
 }
 
-/// A larger one, on whose frames stars to V 7 stand every 80 pixels: where they stand closer, the light of faint ones raises the
-/// noise.
+/// A larger camera, with a star to V 7 every 80 pixels: in denser fields the light of faint stars
+/// raises the noise.
 const LARGE_CAMERA: &[&str] = &[
     "--preset",
     "nanosat-tracker",
@@ -67,7 +68,7 @@ const LARGE_CAMERA: &[&str] = &[
     "0.8",
 ];
 
-/// The same, to be killed.
+/// The same command, as a process to be killed.
 fn start(out: &Path, more: &[&str]) -> Child {
     let command = starpipe();
     let mut again = Command::new(command.get_program());
@@ -82,7 +83,7 @@ fn start(out: &Path, more: &[&str]) -> Child {
         .unwrap()
 }
 
-/// All files with their content, but for those that tell of times.
+/// All files with their content, except those with times.
 fn contents(directory: &Path) -> Vec<(String, Vec<u8>)> {
     let mut all = Vec::new();
     for name in names(directory) {
@@ -115,7 +116,7 @@ fn lines(path: &Path) -> usize {
 }
 
 #[test]
-fn killed_at_any_moment_and_gone_on_with_a_run_is_the_same() {
+fn a_killed_and_continued_run_gives_the_same_files() {
     let directory = tempfile::tempdir().unwrap();
     let (whole, broken) = (
         directory.path().join("whole"),
@@ -153,7 +154,7 @@ fn killed_at_any_moment_and_gone_on_with_a_run_is_the_same() {
     assert_eq!(names(&whole.join("stars.parquet")), parts);
 }
 
-/// A directory with forty frames, for a test to do to as it likes.
+/// A directory with forty frames that a test may modify.
 fn forty_frames() -> (tempfile::TempDir, PathBuf) {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("run");
@@ -162,7 +163,7 @@ fn forty_frames() -> (tempfile::TempDir, PathBuf) {
 }
 
 #[test]
-fn tables_cut_at_any_byte_are_made_whole_again() {
+fn tables_truncated_at_any_byte_are_repaired() {
     let (directory, whole) = forty_frames();
     let cut = directory.path().join("cut");
     let mut random = ChaCha8Rng::seed_from_u64(2);
@@ -180,7 +181,7 @@ fn tables_cut_at_any_byte_are_made_whole_again() {
 }
 
 #[test]
-fn a_run_that_is_made_longer_is_the_longer_run() {
+fn an_extended_run_equals_the_longer_run() {
     let (directory, out) = forty_frames();
     let ran = validate(&out, &["--frames", "50", "--format", "json"]);
     assert_eq!(ran.status, 0, "{}", ran.stderr);
@@ -199,7 +200,7 @@ fn a_run_that_is_made_longer_is_the_longer_run() {
 }
 
 #[test]
-fn another_run_is_refused_and_told_apart() {
+fn a_directory_of_another_run_is_refused() {
     let (directory, out) = forty_frames();
     for (more, expected) in [
         (&["--seed", "2"][..], "seed is 1 there and 2 here"),
@@ -233,7 +234,7 @@ fn another_run_is_refused_and_told_apart() {
 }
 
 #[test]
-fn a_table_that_was_changed_is_told_of_with_its_place() {
+fn a_modified_table_is_reported_with_the_position() {
     let (_directory, out) = forty_frames();
     let path = out.join("frames.csv");
     let good = fs::read_to_string(&path).unwrap();
@@ -276,7 +277,7 @@ fn a_table_that_was_changed_is_told_of_with_its_place() {
 }
 
 #[test]
-fn what_is_found_is_what_theory_allows() {
+fn results_agree_with_theory() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().to_str().unwrap();
     let options = ["--frames", "200", "--format", "json", "--figures", "none"];
@@ -351,13 +352,13 @@ fn a_study_has_a_run_and_a_row_for_each_value() {
     );
     assert_eq!(lines(&out.join("study.csv")), 5);
     assert_eq!(lines(&out.join("fov_deg=16/frames.csv")), 13);
-    // Done again, it reads what is there.
+    // A second run reads the existing results.
     let again = validate(&out, study);
     assert_eq!((again.status, again.stdout), (0, ran.stdout));
 }
 
 #[test]
-fn what_makes_no_sense_is_refused_where_it_is_typed() {
+fn nonsensical_options_are_refused_by_name() {
     let directory = tempfile::tempdir().unwrap();
     for (more, expected) in [
         (&["--frames", "0"][..], "0 is not in 1..=10000000"),

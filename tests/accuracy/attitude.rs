@@ -1,4 +1,4 @@
-//! Attitudes of frames of the sky, and what is stated of their errors.
+//! Attitudes of simulated frames, and their stated errors.
 
 use crate::stars::{equivalent_area_px, sensor};
 use crate::tally::Spread;
@@ -15,10 +15,11 @@ use starpipe::pipeline::{Pipeline, SolveConfig, Workspace};
 use starpipe::sky::catalog::Catalog;
 use std::f64::consts::{PI, TAU};
 
-/// The threshold of the detector in standard deviations, about.
+/// Approximate threshold of the detector in standard deviations.
 const THRESHOLD: f64 = 5.2;
 
-/// A camera with a field of so many degrees, an aperture that shows stars of `limit_vmag`, under a sky.
+/// A camera with a field of this width in degrees, an aperture for stars of `limit_vmag`, and a
+/// sky.
 struct Kind {
     name: &'static str,
     side_px: usize,
@@ -59,10 +60,10 @@ impl Kind {
     }
 }
 
-/// Errors of centroids fainter than this are those of stars that noise has made brighter.
+/// Fainter centroids are excluded: their stars are detected where noise made them brighter.
 const LEAST_SNR: f64 = 10.0;
 
-/// Whether no other star has moved the light of this one.
+/// Whether no other star affects the centroid of this one.
 fn is_isolated(star: &TrueStar, truth: &Truth) -> bool {
     const REACH_PX: f64 = 6.0;
     const LEAST_SHARE: f64 = 0.005;
@@ -74,7 +75,7 @@ fn is_isolated(star: &TrueStar, truth: &Truth) -> bool {
     !truth.stars.iter().chain(&truth.beyond).any(disturbs)
 }
 
-/// What came of one frame.
+/// Result of one frame.
 struct Trial {
     /// Error over stated error about x, y and the boresight.
     pulls: [f64; 3],
@@ -194,7 +195,7 @@ fn with_pipeline<T>(run: impl FnOnce(&Pipeline) -> T) -> T {
     run(&Pipeline::new(sky))
 }
 
-/// What is made of many frames.
+/// Statistics of many frames.
 #[derive(Default)]
 struct Summary {
     nees: Spread,
@@ -257,12 +258,12 @@ fn table_of_attitudes() {
 }
 
 #[test]
-fn attitudes_are_as_good_as_they_say() {
+fn attitude_errors_match_their_stated_errors() {
     const FRAMES: u64 = 120;
     const NEES: f64 = 3.0;
     const NEES_TOLERANCE: f64 = 0.1;
     const PULL_TOLERANCE: f64 = 0.05;
-    /// The seeds are fixed: what holds now holds then.
+    /// Seeds are fixed, so the result is reproducible.
     const SIGMAS: f64 = 3.0;
     with_pipeline(|pipeline| {
         let s = summary(pipeline, &kinds()[0], FRAMES);

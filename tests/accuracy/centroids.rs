@@ -1,4 +1,4 @@
-//! Centroids against the Cramer-Rao bound, and what is stated of their errors.
+//! Centroids compared with the Cramér-Rao bound, and their stated errors.
 
 use crate::stars::{Field, Star, found_at, sensor};
 use crate::tally::{Rms, Spread};
@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use starpipe::detect::{CentroidMethod, DetectConfig, Detections, Workspace, detect};
 use starpipe::model::sensitivity::CramerRao;
 
-/// Ratios of signal to noise of the stars, of the matched filter.
+/// Matched-filter signal-to-noise ratios of the stars.
 pub const CLASSES: [(f64, f64); 6] = [
     (5.0, 7.0),
     (10.0, 10.0),
@@ -17,7 +17,7 @@ pub const CLASSES: [(f64, f64); 6] = [
 ];
 const PHASES: usize = 10;
 
-/// How far a star is from the middle of its pixel.
+/// Distance of a star from the centre of its pixel.
 fn offset_px(star: &Star) -> [f64; 2] {
     [star.place.x, star.place.y].map(|at| at - at.round())
 }
@@ -32,7 +32,7 @@ pub fn bound(field: &Field, star: &Star) -> CramerRao {
     )
 }
 
-/// What was measured of the stars of one class.
+/// Measurements of the stars of one class.
 #[derive(Debug, Clone, Default)]
 struct Measured {
     stars: usize,
@@ -41,7 +41,7 @@ struct Measured {
     bounds: [Rms; 2],
     /// Error over stated error: of x, y and flux.
     pulls: [Spread; 3],
-    /// The mean error by place in the pixel, along x and y.
+    /// Mean error by position in the pixel, along x and y.
     by_phase: [[Spread; PHASES]; 2],
 }
 
@@ -95,7 +95,7 @@ impl Measured {
         self.errors[axis].value() / self.bounds[axis].value()
     }
 
-    /// Root mean square of the mean errors by place, their own noise taken away.
+    /// Root mean square of the mean errors by position, corrected for their noise.
     fn bias_rms_px(&self) -> f64 {
         let squares = self
             .by_phase
@@ -106,7 +106,7 @@ impl Measured {
     }
 }
 
-/// What is measured on `frames` frames, class by class.
+/// Measurements on `frames` frames, class by class.
 fn measured(
     field: &Field,
     config: &DetectConfig,
@@ -131,7 +131,7 @@ fn measured(
         .reduce(|| vec![Measured::default(); ranges.len()], merge)
 }
 
-/// Frames of the table; at most so many stars in each class, and a relative error of a hundredth.
+/// Frames of the table, for a relative error of a hundredth in each class.
 const FRAMES: u64 = 36;
 
 #[test]
@@ -176,11 +176,12 @@ fn table_of_centroids() {
 #[test]
 fn centroids_reach_the_bound_and_state_their_errors() {
     const CLASSES: [(f64, f64); 4] = [(5.0, 7.0), (10.0, 10.0), (30.0, 30.0), (200.0, 200.0)];
-    /// What is aimed at: RMS over bound of faint stars and of others; the pulls' departure from 1; the bias.
+    /// Tolerances: RMS over bound of faint stars and of others; the pulls' departure from 1; the
+    /// bias.
     const MOST: [f64; 2] = [1.20, 1.05];
     const PULL_TOLERANCE: f64 = 0.05;
     const MOST_BIAS_PX: f64 = 0.002;
-    /// Of one of some thirty comparisons with 2 x 450 errors each: a chance of 1 in 300 that any is off by more.
+    /// For about thirty comparisons with 2 x 450 errors each: one exceeds it in 1 of 300 runs.
     const SIGMAS: f64 = 3.5;
     for spot_px in [0.5, 0.8, 1.5] {
         let field = Field::new(sensor(1024, spot_px), 100.0);
@@ -190,7 +191,8 @@ fn centroids_reach_the_bound_and_state_their_errors() {
             let most = MOST[usize::from(class > 0)] + chance;
             let name = format!("{spot_px} px, SNR {:?}", CLASSES[class]);
             assert!(m.ratio(0) < most && m.ratio(1) < most, "{name}: {m:?}");
-            // Faint stars are found where noise has made them brighter: their errors are stated for that light.
+            // Faint stars are detected where noise made them brighter, and their errors are stated
+            // for that flux.
             for pull in m.pulls.iter().filter(|_| class > 0) {
                 let off = (pull.sigma() - 1.0).abs();
                 assert!(off < PULL_TOLERANCE + chance, "{name}: {pull:?}");

@@ -1,5 +1,5 @@
-//! How faint the stars are that are found at one false detection a megapixel, beside the ideal matched filter: that with the true
-//! spot, background and noise, and the threshold that gives this rate.
+//! Detection limit at one false detection per megapixel, compared with the ideal matched filter:
+//! the one with the true spot, background and noise, and the threshold that gives this rate.
 
 use crate::stars::{Field, Star, found_at, sensor};
 use rayon::prelude::*;
@@ -9,21 +9,22 @@ use starpipe::detect::{DetectConfig, Workspace, detect};
 use starpipe::frame::Frame;
 
 pub const SIDE_PX: usize = 1024;
-/// Wanted false detections in a million pixels.
+/// Requested false detections per megapixel.
 const FALSE_PER_MPX: f64 = 1.0;
-/// Ratios of signal to noise of the stars that are looked for, evenly strewn, and of those that the spot is measured on.
+/// Signal-to-noise ratios of the faint stars, uniform in this range, and of those from which the
+/// spot is measured.
 pub const FAINT: (f64, f64) = (2.0, 9.0);
 const BRIGHT: (f64, f64) = (50.0, 50.0);
-/// One star in so many is bright.
+/// One star in this many is bright.
 const BRIGHT_EVERY: usize = 8;
-/// A detection so far from all stars is false.
+/// A detection farther than this from all stars is false.
 const FALSE_BEYOND_PX: f64 = 8.0;
 
 pub fn field(spot_sigma_px: f64) -> Field {
     Field::new(sensor(SIDE_PX, spot_sigma_px), 100.0)
 }
 
-/// Faint stars, the first class of signal to noise, and some bright ones.
+/// Faint stars, the first class, and some bright ones.
 pub fn frame(field: &Field, seed: u64) -> (Vec<Star>, Frame) {
     let mut ranges = [FAINT; BRIGHT_EVERY];
     ranges[BRIGHT_EVERY - 1] = BRIGHT;
@@ -34,7 +35,7 @@ fn is_faint(star: &Star) -> bool {
     star.class != BRIGHT_EVERY - 1
 }
 
-/// What a detector found.
+/// Detections of one detector.
 #[derive(Debug, Clone, Copy, Default)]
 struct Found {
     stars: f64,
@@ -53,11 +54,13 @@ impl Found {
         }
     }
 
-    /// The ratio of signal to noise at which half of the stars are found, and its standard error: of stars strewn evenly the part
-    /// found is that beyond it (Spearman 1908, Br. J. Psychol. 2, 227; Kärber 1931).
+    /// The signal-to-noise ratio at which half of the stars are detected, and its standard error:
+    /// of stars uniform in this ratio, the share detected is that beyond it (Spearman 1908, Br. J.
+    /// Psychol. 2, 227; Kärber 1931).
     fn snr_50(&self) -> (f64, f64) {
         let range = FAINT.1 - FAINT.0;
-        // Found or not is chance over a standard deviation or so only: the mean of Φ(1 − Φ) is 1/√π of it.
+        // Detection is random only within about a standard deviation: the mean of Φ(1 − Φ) is 1/√π
+        // of it.
         let variance = range / (self.stars * std::f64::consts::PI.sqrt());
         (FAINT.1 - range * self.found / self.stars, variance.sqrt())
     }
@@ -83,7 +86,7 @@ fn judged(stars: &[Star], places: &[PixelPoint], is_found: impl Fn(&Star) -> boo
     }
 }
 
-/// What the detector finds in so many frames.
+/// Detections in this many frames.
 fn measured(field: &Field, frames: u64) -> Found {
     let config = DetectConfig {
         false_alarms_per_mpx: FALSE_PER_MPX,
@@ -103,7 +106,7 @@ fn measured(field: &Field, frames: u64) -> Found {
         .reduce(Found::default, Found::merge)
 }
 
-/// The matched filter of one who knows everything: its answer in units of the noise, row-major.
+/// Output of the ideal matched filter in units of the noise, row-major.
 fn ideal_filter(field: &Field, frame: &Frame) -> Vec<f64> {
     let sensor = &field.scenario.sensor;
     let radius = (4.0 * sensor.spot_sigma_px).ceil() as usize + 1;
@@ -140,7 +143,7 @@ fn ideal_filter(field: &Field, frame: &Frame) -> Vec<f64> {
     pass(&pass(&data, 1, 0), 0, 1)
 }
 
-/// The local maxima above `threshold`, not at the border, where the ideal filter is not what it is inside.
+/// Local maxima above `threshold`, without the border, where the ideal filter differs.
 fn maxima(filtered: &[f64], threshold: f64) -> Vec<(PixelPoint, f64)> {
     const BORDER: usize = 8;
     let inside = || BORDER..SIDE_PX - BORDER;
@@ -158,7 +161,8 @@ fn maxima(filtered: &[f64], threshold: f64) -> Vec<(PixelPoint, f64)> {
     found
 }
 
-/// The threshold at which the ideal filter makes as many false detections as are wanted, by so many frames of noise.
+/// The threshold at which the ideal filter has the requested rate of false detections, from this
+/// many frames of noise.
 fn ideal_threshold(field: &Field, frames: u64) -> f64 {
     let mut heights: Vec<f64> = (0..frames)
         .into_par_iter()
@@ -192,7 +196,7 @@ fn loss_mag(snr: f64, ideal: f64) -> f64 {
 }
 
 #[test]
-fn stars_are_found_as_faint_as_by_the_ideal_filter_at_the_rate_of_false_detections_asked_for() {
+fn the_limit_is_that_of_the_ideal_filter_at_the_requested_rate() {
     const FRAMES: u64 = 24;
     const MAX_LOSS_MAG: f64 = 0.1;
     for (spot_px, ideal) in IDEAL {
@@ -214,7 +218,8 @@ fn stars_are_found_as_faint_as_by_the_ideal_filter_at_the_rate_of_false_detectio
     }
 }
 
-/// By 60 Mpx of noise and 12 000 stars, see the table: spot sizes in pixels, and the ratio of signal to noise at which the ideal filter finds half of the stars.
+/// Spot sizes in pixels, and the signal-to-noise ratio at which the ideal filter detects half of
+/// the stars; from 60 Mpx of noise and 12 000 stars, see the table.
 const IDEAL: [(f64, f64); 4] = [(0.5, 5.340), (0.7, 5.040), (1.0, 4.685), (1.5, 4.515)];
 
 #[test]

@@ -1,5 +1,5 @@
-//! What is measured, against the truth of simulated frames and against theory: centroids and the Cramer-Rao bound, errors and what is
-//! stated of them, detection and the ideal matched filter.
+//! Accuracy on simulated frames, compared with truth and theory: centroids with the Cramér-Rao
+//! bound, errors with their stated values, detection with the ideal matched filter.
 //!
 //! The whole tables: `cargo test --release --test accuracy -- --ignored --nocapture`.
 

@@ -1,4 +1,4 @@
-//! Frames of isolated stars of known light.
+//! Frames of isolated stars of known flux.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -10,12 +10,12 @@ use starpipe::frame::Frame;
 use starpipe::model::sensitivity::{Budget, Extinction, Scenario, SkyBrightness};
 use starpipe::model::simulate::star_field;
 
-/// How far apart the stars stand: of a cell of the background's mesh they are a small part.
+/// Distance between stars: they cover a small part of a background cell.
 const SPACING_PX: f64 = 64.0;
-/// A detection this near to a star's place is that star.
+/// A detection within this distance of a star is that star.
 const MATCH_PX: f64 = 2.0;
 
-/// A camera of grey levels of one electron, the spot of which has a standard deviation of `spot_sigma_px`.
+/// A camera with a gain of one electron per level and a spot of standard deviation `spot_sigma_px`.
 pub fn sensor(side_px: usize, spot_sigma_px: f64) -> Sensor {
     Sensor {
         name: "test".to_owned(),
@@ -41,19 +41,19 @@ pub fn sensor(side_px: usize, spot_sigma_px: f64) -> Sensor {
     }
 }
 
-/// Frames whose sky gives so many electrons a pixel.
+/// Frames with this many electrons of sky per pixel.
 #[derive(Debug, Clone)]
 pub struct Field {
     pub scenario: Scenario,
     budget: Budget,
 }
 
-/// A star that is truly there.
+/// A true star.
 #[derive(Debug, Clone, Copy)]
 pub struct Star {
     pub place: PixelPoint,
     pub flux_e: f64,
-    /// Index into the ratios of signal to noise asked for.
+    /// Index into the requested signal-to-noise ratios.
     pub class: usize,
 }
 
@@ -82,12 +82,13 @@ impl Field {
         self.budget.background_e
     }
 
-    /// Electrons of a star that the matched filter sees with this ratio of signal to noise, on average over its places in a pixel.
+    /// Electrons of a star with this matched-filter signal-to-noise ratio, averaged over its
+    /// positions in a pixel.
     pub fn flux_e(&self, snr: f64) -> f64 {
         snr * self.pixel_noise_e() * equivalent_area_px(self.scenario.sensor.spot_sigma_px).sqrt()
     }
 
-    /// Places in the cells of a grid, anywhere within a pixel, in random order.
+    /// Positions in the cells of a grid, anywhere within a pixel, in random order.
     pub fn places(&self, random: &mut ChaCha8Rng) -> Vec<PixelPoint> {
         let sensor = &self.scenario.sensor;
         let cells = |side: usize| (side as f64 / SPACING_PX).floor() as usize;
@@ -104,7 +105,7 @@ impl Field {
         places
     }
 
-    /// Stars whose ratios of signal to noise are drawn from each of `ranges` in turn, and their frame.
+    /// Stars with signal-to-noise ratios drawn from each of `ranges` in turn, and their frame.
     pub fn frame(&self, ranges: &[(f64, f64)], seed: u64) -> (Vec<Star>, Frame) {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let places = self.places(&mut random);
@@ -131,7 +132,7 @@ impl Field {
     }
 }
 
-/// 1/ΣP² on average over the places of a star in a pixel, in pixels.
+/// 1/ΣP², averaged over the positions of a star in a pixel, in pixels.
 pub fn equivalent_area_px(spot_sigma_px: f64) -> f64 {
     const PLACES: usize = 32;
     let share = |offset: f64| {
@@ -147,7 +148,7 @@ pub fn equivalent_area_px(spot_sigma_px: f64) -> f64 {
     1.0 / (mean * mean)
 }
 
-/// The detection that is the star at this place, if there is one.
+/// The detection of the star at this position, if there is one.
 pub fn found_at<'a>(detections: &'a Detections, place: &PixelPoint) -> Option<&'a Detection> {
     let distance = |d: &&Detection| d.position.distance_to(place);
     let nearest = detections

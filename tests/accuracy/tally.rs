@@ -1,4 +1,4 @@
-//! Sums of errors and of what is stated of them.
+//! Sums of errors and of their stated values.
 
 /// Root mean squares, with their standard errors for Gaussian errors.
 #[derive(Debug, Clone, Copy, Default)]

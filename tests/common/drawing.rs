@@ -1,5 +1,6 @@
-//! Frames of the sky drawn independently of the library: the bright stars of the catalogue's CSV, the gnomonic
-//! projection by its textbook formula (Calabretta & Greisen 2002, A&A 395, 1077, eq. 54), Gaussian spots.
+//! Frames of the sky drawn independently of the library: the bright stars of the catalogue's CSV,
+//! the gnomonic projection by its textbook formula (Calabretta & Greisen 2002, A&A 395, 1077, eq.
+//! 54), Gaussian spots.
 
 use image::{ImageBuffer, Luma};
 use rand::SeedableRng;
@@ -45,7 +46,7 @@ pub fn bright_stars() -> Vec<SkyStar> {
     reader.records().map(|row| star(row.unwrap())).collect()
 }
 
-/// How the camera looks at the sky.
+/// Pointing and field of a camera.
 #[derive(Debug, Clone, Copy)]
 pub struct View {
     pub ra_deg: f64,
@@ -71,7 +72,8 @@ impl View {
         )
     }
 
-    /// Where a direction in degrees falls, (0, 0) being the centre of the first pixel; `None` behind the camera.
+    /// The pixel of a direction in degrees, (0, 0) at the centre of the first one; `None` behind
+    /// the camera.
     pub fn pixel(&self, ra_deg: f64, dec_deg: f64) -> Option<(f64, f64)> {
         let (sin_d, cos_d) = dec_deg.to_radians().sin_cos();
         let (sin_0, cos_0) = self.dec_deg.to_radians().sin_cos();
@@ -92,7 +94,7 @@ impl View {
         Some((if self.mirrored { 2.0 * cx - x } else { x }, y))
     }
 
-    /// The direction in degrees that a pixel looks in: the inverse, through vectors.
+    /// The direction in degrees of a pixel: the inverse, by vectors.
     pub fn direction(&self, x: f64, y: f64) -> (f64, f64) {
         let (cx, cy) = self.centre();
         let right = if self.mirrored { cx - x } else { x - cx };
@@ -146,7 +148,7 @@ pub fn flux_adu(v_mag: f64) -> f64 {
     ZERO_MAG_ADU * 10_f64.powf(-0.4 * v_mag)
 }
 
-/// Light before it is read out.
+/// Expected light before readout.
 pub struct Canvas {
     width: u32,
     height: u32,
@@ -206,7 +208,7 @@ impl Canvas {
     }
 }
 
-/// Saves a picture and returns where.
+/// Saves a picture and returns its path.
 pub fn save(picture: &Picture, directory: &Path, name: &str) -> std::path::PathBuf {
     let path = directory.join(name);
     picture.save(&path).unwrap();

@@ -1,4 +1,4 @@
-//! What several tests need.
+//! Helpers of several tests.
 
 #![allow(dead_code, reason = "each test program uses its own part of this")]
 
@@ -9,10 +9,10 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-/// The real frames and lists that lie beside the repository, if they are there.
+/// The directory of real frames and lists beside the repository, if it exists.
 ///
 /// # Panics
-/// If they are not, and STARPIPE_REQUIRE_SHARED=1.
+/// If it does not exist and STARPIPE_REQUIRE_SHARED=1.
 pub fn shared_dir() -> Option<PathBuf> {
     let directory = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared");
     if directory.join("frames/truth.csv").is_file() {
@@ -28,7 +28,7 @@ pub fn shared_dir() -> Option<PathBuf> {
     None
 }
 
-/// The program, with a cache that all tests share and that is not the user's own.
+/// The program, with a cache shared by all tests, separate from the user's.
 pub fn starpipe() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_starpipe"));
     if std::env::var_os("STARPIPE_CACHE_DIR").is_none() {
@@ -38,7 +38,7 @@ pub fn starpipe() -> Command {
     command
 }
 
-/// What ran, with its output as text.
+/// A finished run, with its output as text.
 pub struct Ran {
     pub status: i32,
     pub stdout: String,
@@ -70,14 +70,14 @@ impl Ran {
     }
 }
 
-/// A frame of our own making.
+/// The path of a fixture.
 pub fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("fixtures")
         .join(name)
 }
 
-/// The names of what is in `directory`, in order.
+/// The names of the entries of `directory`, sorted.
 pub fn names(directory: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(directory).expect("readable");
     let mut names: Vec<_> = entries
@@ -108,7 +108,7 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// How far the centre of `report` is from the true one, in degrees.
+    /// Distance of the centre of `report` from the true one, in degrees.
     pub fn centre_error_deg(&self, report: &Value) -> f64 {
         let unit = |ra_deg: f64, dec_deg: f64| {
             let (ra, dec) = (ra_deg.to_radians(), dec_deg.to_radians());

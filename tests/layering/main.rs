@@ -1,4 +1,5 @@
-//! The structure of `src`: rooms in one order, no circle between files, and a command line that sees the public library only.
+//! The structure of `src`: rooms in one order, no circle between files, and a command line that
+//! sees the public library only.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 

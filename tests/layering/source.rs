@@ -12,7 +12,8 @@ struct Module {
     file: PathBuf,
     /// Names of the items defined in it.
     items: BTreeSet<String>,
-    /// Imports: the name bound (`*` for all), the path that it stands for, whether it is re-exported.
+    /// Imports: the name bound (`*` for all), the path that it stands for, whether it is
+    /// re-exported.
     imports: Vec<Import>,
     /// Paths of two or more segments in its code.
     paths: Vec<Vec<String>>,
@@ -49,7 +50,8 @@ impl Crate {
             .map(|(path, module)| (path, module.file.as_path()))
     }
 
-    /// For each module, the other modules in whose files the names that it uses are defined. A re-export is no use.
+    /// For each module, the other modules in whose files the names that it uses are defined. A
+    /// re-export is no use.
     pub fn uses(&self) -> BTreeMap<&ModulePath, BTreeSet<&ModulePath>> {
         self.modules
             .iter()
@@ -66,7 +68,8 @@ impl Crate {
             .collect()
     }
 
-    /// The module in whose file the item at `path`, as it is written in the module `here`, is defined.
+    /// The module in whose file the item at `path`, as it is written in the module `here`, is
+    /// defined.
     fn definition(&self, here: &ModulePath, path: &[String], depth: usize) -> Option<&ModulePath> {
         let (first, mut rest) = path.split_first()?;
         let mut module = match first.as_str() {
@@ -259,7 +262,8 @@ fn code(text: &str) -> String {
     code
 }
 
-/// The module that `file` is, under the crate's `root`; `None` for files of unit tests and for another crate's.
+/// The module that `file` is, under the crate's `root`; `None` for files of unit tests and for
+/// another crate's.
 fn module_path(root: &Path, file: &Path) -> Option<ModulePath> {
     let relative = file.strip_prefix(root).ok()?.with_extension("");
     let mut path: ModulePath = relative
