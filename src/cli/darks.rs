@@ -1,26 +1,95 @@
 //! `darks`: frames taken without light.
 
-use super::args::{DarksArgs, Format};
-use super::output::{csv_table, print, write_whole};
-use super::resources::{bar, thread_pool};
-use super::values::ExposureOf;
-use super::{Exit, Fault, batch, chained, complain, input, overwrite, warn};
+use super::exit::{CommandError, Exit};
+use super::input::frames::{self as input, for_each_frame};
+use super::options::catalog::thread_pool;
+use super::options::format::Format;
+use super::options::values;
+use super::output::files::save;
+use super::output::master::{header, image};
+use super::output::messages::{one_line, report_error, report_warning};
+use super::output::overwrite;
+use super::output::rows::csv_table;
+use super::output::stdout::print;
 use anyhow::Context;
+use clap::Args;
 use starpipe::calibration::darks::{
     DarkConfig, DarkStack, Darks, FrameStatistics, FullScaleSource, HotPixelRow,
 };
 use starpipe::camera::data_sheet::Sensor;
 use starpipe::frame::Buffers;
-use starpipe::frame::{CALIBRATION_CREATOR, FitsHeader, FitsSamples, Frame, write_fits};
-use std::ops::ControlFlow;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    starpipe darks darks/\n  \
+    starpipe darks --camera camera.toml --out calibration darks/\n  \
+    starpipe darks --exposure 0.1:short/ --exposure 10:long/ --format json short/ long/\n\n\
+    --out writes master-dark.fits (of several exposures master-dark-0.1s.fits and so on), noise.fits and \
+    hot-pixels.csv, which `starpipe process` takes as --dark and --hot-pixels. Exposures come from the files' headers \
+    unless --exposure says otherwise; with two of them there is a dark current.")]
+pub(crate) struct DarksArgs {
+    /// Frames taken without light; a directory stands for the frames in it, - for standard input
+    #[arg(value_name = "FRAME", required = true)]
+    pub(crate) frames: Vec<PathBuf>,
+    /// Which image of a file with several, from 1 [default: the first]
+    #[arg(long, value_name = "NUMBER")]
+    pub(crate) page: Option<NonZeroUsize>,
+    /// How long frames were exposed, in seconds: those of a file or directory, else all (may be repeated) [default: the
+    /// exposure in the file's header]
+    #[arg(long, value_name = "SECONDS[:PATH]", allow_hyphen_values = true)]
+    pub(crate) exposure: Vec<ExposureOf>,
+    /// Bits of a grey level [default: those of --camera, else of the file's format]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=32))]
+    pub(crate) bits: Option<u32>,
+    /// Description of the camera, see `starpipe camera new`: its gain makes electrons of grey levels
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) camera: Option<PathBuf>,
+    /// Robust standard deviations from which on a pixel is hot
+    #[arg(long, value_name = "NUMBER", value_parser = values::positive, default_value_t = starpipe::calibration::darks::HOT_SIGMA)]
+    pub(crate) hot_sigma: f64,
+    /// What to print: csv has a row for each frame
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub(crate) format: Format,
+    /// Also write the master dark, the noise of each pixel and the hot pixels into this directory
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Threads to work with [default: one for each processor]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) threads: Option<u32>,
+}
+
+/// An exposure, and the file or directory whose frames have it; else all.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ExposureOf {
+    pub(crate) exposure_s: f64,
+    pub(crate) path: Option<PathBuf>,
+}
+
+impl FromStr for ExposureOf {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (seconds, path) = match text.split_once(':') {
+            Some((_, "")) => return Err(values::not_of_form(text, "SECONDS or SECONDS:PATH")),
+            Some((seconds, path)) => (seconds, Some(PathBuf::from(path))),
+            None => (text, None),
+        };
+        Ok(Self {
+            exposure_s: values::exposure(seconds)?,
+            path,
+        })
+    }
+}
 
 /// `starpipe darks`
-pub(crate) fn darks(arguments: DarksArgs) -> Result<Exit, Fault> {
+pub(crate) fn darks(arguments: DarksArgs) -> Result<Exit, CommandError> {
     input::check(&arguments.frames)?;
     let (frames, troubles) = input::frames(arguments.frames.clone());
     for trouble in &troubles {
-        complain(chained(trouble));
+        report_error(one_line(trouble));
     }
     check_exposures(&arguments.exposure, &frames)?;
     let config = config(&arguments)?;
@@ -43,7 +112,7 @@ pub(crate) fn darks(arguments: DarksArgs) -> Result<Exit, Fault> {
     }
     let darks = stack.measure(&config).map_err(anyhow::Error::from)?;
     for warning in &darks.warnings {
-        warn(warning);
+        report_warning(warning);
     }
     if let Some(directory) = &arguments.out {
         let files = files(&darks, directory)?;
@@ -61,51 +130,6 @@ pub(crate) fn darks(arguments: DarksArgs) -> Result<Exit, Fault> {
     Ok(if failed { Exit::Failure } else { Exit::Success })
 }
 
-/// Reads frames on all threads and takes them in their order; tells how many could not be read. What `take` refuses ends it.
-pub(super) fn for_each_frame<R: Send>(
-    pool: &rayon::ThreadPool,
-    frames: &[PathBuf],
-    read: impl Fn(&PathBuf) -> anyhow::Result<R> + Sync,
-    mut take: impl FnMut(R) -> anyhow::Result<()>,
-) -> anyhow::Result<usize> {
-    let progress = bar(frames.len() as u64, "frames {wide_bar} {pos}/{len} {eta}");
-    let mut unread = 0;
-    let mut refused = None;
-    let read = |path: &PathBuf, (): &mut ()| read(path);
-    batch::for_each_ordered(
-        pool,
-        frames,
-        || (),
-        read,
-        |_, result| {
-            progress.inc(1);
-            match result {
-                Err(error) => {
-                    unread += 1;
-                    progress.suspend(|| complain(chained(error.as_ref())));
-                    ControlFlow::Continue(())
-                }
-                Ok(frame) => match take(frame) {
-                    Ok(()) => ControlFlow::Continue(()),
-                    Err(error) => {
-                        refused = Some(error);
-                        ControlFlow::Break(())
-                    }
-                },
-            }
-        },
-    );
-    progress.finish_and_clear();
-    refused.map_or(Ok(unread), Err)
-}
-
-/// Writes `files` into `directory`, all or none.
-pub(super) fn save(directory: &Path, files: &[(PathBuf, Vec<u8>)]) -> anyhow::Result<()> {
-    std::fs::create_dir_all(directory)
-        .with_context(|| format!("making the directory {}", directory.display()))?;
-    write_whole(files)
-}
-
 fn config(arguments: &DarksArgs) -> anyhow::Result<DarkConfig> {
     let sensor = arguments.camera.as_deref().map(Sensor::read).transpose()?;
     let stated = arguments.bits.map(|bits| (bits, FullScaleSource::Option));
@@ -120,10 +144,10 @@ fn config(arguments: &DarksArgs) -> anyhow::Result<DarkConfig> {
 }
 
 /// Refuses an exposure for frames that are not there.
-fn check_exposures(exposures: &[ExposureOf], frames: &[PathBuf]) -> Result<(), Fault> {
+fn check_exposures(exposures: &[ExposureOf], frames: &[PathBuf]) -> Result<(), CommandError> {
     for path in exposures.iter().filter_map(|e| e.path.as_ref()) {
         if !frames.iter().any(|frame| frame.starts_with(path)) {
-            return Err(Fault::Usage(format!(
+            return Err(CommandError::Usage(format!(
                 "--exposure is given for {}, of which no frame is given",
                 path.display()
             )));
@@ -174,27 +198,6 @@ fn files(darks: &Darks, directory: &Path) -> anyhow::Result<Vec<(PathBuf, Vec<u8
     }
     files.push((directory.join("hot-pixels.csv"), hot_pixels_table(darks)?));
     Ok(files)
-}
-
-/// The beginning of the header of every master: it is known by it.
-pub(super) fn header(kind: &str, frames: usize) -> FitsHeader {
-    let mut header = FitsHeader::default();
-    header.text("CREATOR", CALIBRATION_CREATOR, "");
-    header.text("IMAGETYP", kind, "");
-    header.integer("NCOMBINE", frames as i64, "frames");
-    header
-}
-
-/// The bytes of an image of floats.
-pub(super) fn image(
-    (width, height): (usize, usize),
-    pixels: &[f32],
-    header: &FitsHeader,
-) -> anyhow::Result<Vec<u8>> {
-    let frame = Frame::new(width, height, pixels.to_vec())?;
-    let mut bytes = Vec::new();
-    write_fits(&mut bytes, &frame, FitsSamples::Float32, header)?;
-    Ok(bytes)
 }
 
 fn hot_pixels_table(darks: &Darks) -> anyhow::Result<Vec<u8>> {

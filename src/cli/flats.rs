@@ -1,23 +1,60 @@
 //! `flats`: evenly lit frames.
 
-use super::args::{FlatsArgs, Format};
-use super::darks::{for_each_frame, header, image, save};
-use super::output::{csv_table, print};
-use super::resources::thread_pool;
-use super::settings::read_master;
-use super::{Exit, Fault, chained, complain, input, overwrite, warn};
+use super::exit::{CommandError, Exit};
+use super::input::frames::{self as input, for_each_frame, read_master};
+use super::options::catalog::thread_pool;
+use super::options::format::Format;
+use super::output::files::save;
+use super::output::master::{header, image};
+use super::output::messages::{one_line, report_error, report_warning};
+use super::output::overwrite;
+use super::output::rows::csv_table;
+use super::output::stdout::print;
 use anyhow::Context;
+use clap::Args;
 use starpipe::calibration::flats::{FlatConfig, FlatStack, Flats};
 use starpipe::camera::data_sheet::Sensor;
 use starpipe::frame::Buffers;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    starpipe flats --dark master-dark.fits --out calibration flats/\n  \
+    starpipe flats --camera camera.toml --format json dim-1.fits dim-2.fits bright-1.fits bright-2.fits\n\n\
+    --out writes master-flat.fits, with a mean of 1, which `starpipe process` takes as --flat. The first and the second frame \
+    are a pair of the same light, and so on: from the noise of such pairs follows the gain, from pairs of different \
+    light without knowing the read noise.")]
+pub(crate) struct FlatsArgs {
+    /// Evenly lit frames; a directory stands for the frames in it, - for standard input
+    #[arg(value_name = "FRAME", required = true)]
+    pub(crate) frames: Vec<PathBuf>,
+    /// Which image of a file with several, from 1 [default: the first]
+    #[arg(long, value_name = "NUMBER")]
+    pub(crate) page: Option<NonZeroUsize>,
+    /// Frame taken without light, or the mean of many, see `starpipe darks`
+    #[arg(long, value_name = "FILE")]
+    pub(crate) dark: Option<PathBuf>,
+    /// Description of the camera, see `starpipe camera new`: its bias where there is no --dark, and its read noise
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) camera: Option<PathBuf>,
+    /// What to print: csv has a row for each frame
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub(crate) format: Format,
+    /// Also write master-flat.fits into this directory
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Threads to work with [default: one for each processor]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) threads: Option<u32>,
+}
+
 /// `starpipe flats`
-pub(crate) fn flats(arguments: FlatsArgs) -> Result<Exit, Fault> {
+pub(crate) fn flats(arguments: FlatsArgs) -> Result<Exit, CommandError> {
     input::check(&arguments.frames)?;
     let (frames, troubles) = input::frames(arguments.frames.clone());
     for trouble in &troubles {
-        complain(chained(trouble));
+        report_error(one_line(trouble));
     }
     let output = arguments
         .out
@@ -59,7 +96,9 @@ fn config(arguments: &FlatsArgs) -> anyhow::Result<FlatConfig> {
     let sensor = arguments.camera.as_deref().map(Sensor::read).transpose()?;
     let dark = arguments.dark.as_deref().map(read_master).transpose()?;
     if sensor.is_none() && dark.is_none() {
-        warn("the level without light is taken to be 0: --dark or --camera says what it is");
+        report_warning(
+            "the level without light is taken to be 0: --dark or --camera says what it is",
+        );
     }
     Ok(FlatConfig {
         dark: dark.map(|dark| (dark.name, dark.frame)),

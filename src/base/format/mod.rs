@@ -1,8 +1,10 @@
 //! Numbers, angles and counts as text for people and files.
 
+mod number;
 mod rounding;
 mod sexagesimal;
 
+pub use number::five_digits;
 pub(crate) use rounding::{
     decimals_for, finite, half_turn_deg, significant, to_decimals, to_significant, turn_deg,
 };

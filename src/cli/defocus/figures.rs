@@ -2,10 +2,10 @@
 
 use super::answer::{Answer, StarAnswer};
 use super::study::{Study, Theory};
-use crate::cli::limit::number;
 use crate::cli::plot::panel::{Axis, Cell, Dot, Layer, Marks, Panel, Sheet};
 use crate::cli::plot::{BLUE, FigureForm, ORANGE, drawn};
 use plotters::style::RGBColor;
+use starpipe::base::format::five_digits as number;
 use starpipe::model::defocus::{IsoLine, Surface};
 
 const WHITE: RGBColor = RGBColor(255, 255, 255);

@@ -9,10 +9,13 @@ mod text;
 
 pub(crate) use args::DefocusArgs;
 
-use super::args::Format;
-use super::output::{csv_table, json_lines, print, write_whole};
-use super::resources::thread_pool;
-use super::{Exit, Fault, warn};
+use super::exit::{CommandError, Exit};
+use super::options::catalog::thread_pool;
+use super::options::format::Format;
+use super::output::files::write_whole;
+use super::output::messages::report_warning;
+use super::output::rows::{csv_table, json_lines};
+use super::output::stdout::print;
 use answer::{Answer, grid_rows};
 use anyhow::Context;
 use starpipe::model::defocus::Lens;
@@ -20,7 +23,7 @@ use std::path::{Path, PathBuf};
 use study::{Plan, Study};
 
 /// `starpipe defocus`
-pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Exit, Fault> {
+pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Exit, CommandError> {
     let pool = thread_pool(arguments.threads)?;
     let plan = Plan::of(arguments, &pool)?;
     let studies = plan.run(&pool)?;
@@ -39,7 +42,7 @@ pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Exit, Fault> {
     Ok(match answer.is_met() {
         true => Exit::Success,
         false => {
-            warn("no radius meets a required error");
+            report_warning("no radius meets a required error");
             Exit::Unmet
         }
     })
@@ -52,7 +55,7 @@ fn warn_if_too_sharp(answer: &Answer) {
     };
     for star in &answer.stars {
         if star.best.radius.radius_px < least_px {
-            warn(format_args!(
+            report_warning(format_args!(
                 "the best radius, {:.2} px, is below that of diffraction, {least_px:.2} px",
                 star.best.radius.radius_px
             ));

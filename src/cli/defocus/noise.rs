@@ -1,8 +1,9 @@
 //! The noise of a pixel in the dark: the camera's, that of the user's dark frames, or the paper's.
 
 use super::args::DefocusArgs;
-use crate::cli::darks::for_each_frame;
-use crate::cli::{Fault, chained, complain, input, warn};
+use crate::cli::exit::CommandError;
+use crate::cli::input::frames::{self as input, for_each_frame};
+use crate::cli::output::messages::{one_line, report_error, report_warning};
 use anyhow::{Context, anyhow, bail};
 use serde::Serialize;
 use starpipe::calibration::darks::{
@@ -50,7 +51,7 @@ impl Noise {
     pub(super) fn of_peak(
         arguments: &DefocusArgs,
         darks: Option<DarkNoise>,
-    ) -> Result<Self, Fault> {
+    ) -> Result<Self, CommandError> {
         let (relative, source) = match (darks, arguments.at_noise) {
             (Some(dark), _) => {
                 let relative = dark.relative_sigma.filter(|sigma| *sigma > 0.0);
@@ -116,7 +117,7 @@ pub(super) fn of_darks(
     arguments: &DefocusArgs,
     scenario: Option<&Scenario>,
     pool: &rayon::ThreadPool,
-) -> Result<Option<DarkNoise>, Fault> {
+) -> Result<Option<DarkNoise>, CommandError> {
     if arguments.darks.is_empty() {
         return Ok(None);
     }
@@ -158,7 +159,7 @@ fn config(sensor: Option<&Sensor>) -> DarkConfig {
 }
 
 /// The files that paths, directories and patterns stand for.
-fn named(darks: &[PathBuf]) -> Result<Vec<PathBuf>, Fault> {
+fn named(darks: &[PathBuf]) -> Result<Vec<PathBuf>, CommandError> {
     let mut inputs = Vec::new();
     for path in darks {
         let text = path.to_string_lossy();
@@ -166,8 +167,9 @@ fn named(darks: &[PathBuf]) -> Result<Vec<PathBuf>, Fault> {
             inputs.push(path.clone());
             continue;
         }
-        let found = glob::glob(&text)
-            .map_err(|error| Fault::Usage(format!("--darks '{text}' is no pattern: {error}")))?;
+        let found = glob::glob(&text).map_err(|error| {
+            CommandError::Usage(format!("--darks '{text}' is no pattern: {error}"))
+        })?;
         let before = inputs.len();
         for path in found {
             inputs.push(path.map_err(anyhow::Error::from)?);
@@ -182,9 +184,9 @@ fn named(darks: &[PathBuf]) -> Result<Vec<PathBuf>, Fault> {
         [] => Ok(frames),
         [.., last] => {
             for trouble in &troubles[..troubles.len() - 1] {
-                complain(chained(trouble));
+                report_error(one_line(trouble));
             }
-            Err(anyhow!(chained(last)).into())
+            Err(anyhow!(one_line(last)).into())
         }
     }
 }
@@ -204,7 +206,7 @@ fn of_exposure(darks: &Darks, scenario: Option<&Scenario>) -> DarkNoise {
     if let (Some(exposure_s), Some(wanted_s)) = (exposure_s, wanted_s)
         && (exposure_s / wanted_s - 1.0).abs() > SAME_EXPOSURE
     {
-        warn(format_args!(
+        report_warning(format_args!(
             "the dark frames were exposed for {exposure_s} s, the stars for {wanted_s} s: the dark current differs"
         ));
     }

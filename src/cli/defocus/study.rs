@@ -2,9 +2,9 @@
 
 use super::args::{CentroidingArg, DefocusArgs, Normalisation};
 use super::noise::{self, Noise};
-use crate::cli::limit::scenario_of;
-use crate::cli::resources::bar;
-use crate::cli::{Fault, warn};
+use crate::cli::exit::CommandError;
+use crate::cli::output::messages::report_warning;
+use crate::cli::progress::bar;
 use anyhow::anyhow;
 use indicatif::ProgressBar;
 use rayon::prelude::*;
@@ -110,21 +110,17 @@ pub(super) struct Study {
 }
 
 impl Plan {
-    pub(super) fn of(arguments: &DefocusArgs, pool: &rayon::ThreadPool) -> Result<Self, Fault> {
-        let has_camera = arguments.camera.is_some() || arguments.preset.is_some();
+    pub(super) fn of(
+        arguments: &DefocusArgs,
+        pool: &rayon::ThreadPool,
+    ) -> Result<Self, CommandError> {
+        let has_camera = arguments.scenario.camera.is_some() || arguments.scenario.preset.is_some();
         let normalisation = arguments.normalisation.unwrap_or(match has_camera {
             true => Normalisation::Energy,
             false => Normalisation::Peak,
         });
         check(arguments, normalisation, has_camera)?;
-        let scenario = has_camera.then(|| {
-            scenario_of(
-                arguments.camera.as_deref(),
-                arguments.preset,
-                arguments.reading,
-                &arguments.parameters,
-            )
-        });
+        let scenario = has_camera.then(|| arguments.scenario.scenario());
         let scenario = scenario.transpose()?;
         let darks = noise::of_darks(arguments, scenario.as_ref(), pool)?;
         let lens = scenario
@@ -155,7 +151,7 @@ impl Plan {
     }
 
     /// Does the work.
-    pub(super) fn run(&self, pool: &rayon::ThreadPool) -> Result<Vec<Study>, Fault> {
+    pub(super) fn run(&self, pool: &rayon::ThreadPool) -> Result<Vec<Study>, CommandError> {
         let (spots, noises) = (self.grid.spots_px.len(), self.grid.noises.len());
         let points = self.stars.len() * spots * (noises + 1);
         let progress = bar(
@@ -176,7 +172,7 @@ impl Plan {
         star: &Star,
         pool: &rayon::ThreadPool,
         progress: &ProgressBar,
-    ) -> Result<Study, Fault> {
+    ) -> Result<Study, CommandError> {
         let at_own_noise = Grid {
             spots_px: self.grid.spots_px.clone(),
             noises: vec![self.own_noise()],
@@ -263,7 +259,7 @@ impl Plan {
 fn of_peak(
     arguments: &DefocusArgs,
     darks: Option<noise::DarkNoise>,
-) -> Result<(Vec<Star>, Grid, Noise), Fault> {
+) -> Result<(Vec<Star>, Grid, Noise), CommandError> {
     let default = PeakStudy::default();
     let study = PeakStudy {
         peak: arguments.peak.unwrap_or(default.peak),
@@ -289,7 +285,7 @@ fn of_energy(
     arguments: &DefocusArgs,
     mut scenario: Scenario,
     darks: Option<noise::DarkNoise>,
-) -> Result<(Vec<Star>, Grid, Noise), Fault> {
+) -> Result<(Vec<Star>, Grid, Noise), CommandError> {
     /// Trials at each point.
     const TRIALS: usize = 400;
     /// The default noises: from that part of the own one to that multiple, and how many.
@@ -336,7 +332,7 @@ fn default_v_mag(scenario: &Scenario) -> anyhow::Result<f64> {
         ));
     }
     let v_mag = ((limit - BRIGHTER_MAG) * 10.0).round() / 10.0;
-    warn(format_args!(
+    report_warning(format_args!(
         "no --vmag: the star has V {v_mag}, about {BRIGHTER_MAG} brighter than the camera's limit"
     ));
     Ok(v_mag)
@@ -372,15 +368,15 @@ fn check(
     arguments: &DefocusArgs,
     normalisation: Normalisation,
     has_camera: bool,
-) -> Result<(), Fault> {
+) -> Result<(), CommandError> {
     let refuse = |given: bool, option: &str, other: &str| match given {
-        true => Err(Fault::Usage(format!(
+        true => Err(CommandError::Usage(format!(
             "{option} goes with --normalisation {other} only"
         ))),
         false => Ok(()),
     };
-    if !has_camera && !arguments.parameters.is_empty() {
-        return Err(Fault::Usage(
+    if !has_camera && !arguments.scenario.parameters.is_empty() {
+        return Err(CommandError::Usage(
             "numbers of a camera are given, and no camera: expected --camera or --preset"
                 .to_owned(),
         ));
@@ -388,7 +384,7 @@ fn check(
     match normalisation {
         Normalisation::Energy => {
             if !has_camera {
-                return Err(Fault::Usage(
+                return Err(CommandError::Usage(
                     "--normalisation energy is of a camera: expected --camera or --preset"
                         .to_owned(),
                 ));

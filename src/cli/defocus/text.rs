@@ -1,7 +1,7 @@
 //! The answer for people.
 
 use super::answer::{Answer, Best, CurveRow, Radius, Required, StarAnswer};
-use crate::cli::limit::number;
+use starpipe::base::format::five_digits as number;
 use starpipe::model::defocus::{Centroiding, IsoLine, Lens, Surface};
 use std::fmt::Write as _;
 

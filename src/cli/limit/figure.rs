@@ -1,12 +1,12 @@
 //! The limiting magnitude over one parameter or several: a panel for each.
 
-use super::text::number;
 use crate::cli::plot::{
     Area, BLUE, FONT, Figure, LETTERS_PX, MARGIN_PX, ORANGE, chart_on, draw_words, said,
 };
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
+use starpipe::base::format::five_digits as number;
 use starpipe::model::sensitivity::{Budget, Curve, Scenario, Spacing, Sweep};
 use std::ops::Range;
 

@@ -1,23 +1,26 @@
 //! `limit`: a scenario, its prediction, sweeps over its parameters, and their figures.
 
+mod args;
 mod figure;
-mod parameters;
 mod text;
 
-pub(crate) use parameters::ParameterArgs;
-pub(crate) use text::number;
+pub(crate) use args::LimitArgs;
 
-use super::args::{Format, LimitArgs, ReadingArg};
-use super::output::{csv_table, json_lines, print, write_whole};
+use super::exit::{CommandError, Exit};
+use super::options::format::Format;
+use super::options::scenario::usage;
+use super::output::files::write_whole;
+use super::output::messages::report_warning;
+use super::output::rows::{csv_table, json_lines};
+use super::output::stdout::print;
 use super::plot::{self, Form};
-use super::{Exit, Fault, warn};
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use figure::{Panel, Sheet};
 use rayon::prelude::*;
 use serde::Serialize;
 use starpipe::camera::data_sheet::{Preset, Sensor};
 use starpipe::model::sensitivity::{
-    Detector, Faintest, Figure, Prediction, Reading, Scenario, ScenarioError, Series, Sweep, curves,
+    Detector, Faintest, Figure, Prediction, Scenario, Series, Sweep, curves,
 };
 use starpipe::sky::catalog::Catalog;
 use std::path::{Path, PathBuf};
@@ -26,20 +29,15 @@ use std::path::{Path, PathBuf};
 const MAX_SWEEPS: usize = 64;
 
 /// `starpipe limit`
-pub(crate) fn limit(arguments: &LimitArgs) -> Result<Exit, Fault> {
+pub(crate) fn limit(arguments: &LimitArgs) -> Result<Exit, CommandError> {
     let sweeps = arguments.sweep.len();
     if sweeps > MAX_SWEEPS {
-        return Err(Fault::Usage(format!(
+        return Err(CommandError::Usage(format!(
             "--sweep is given {sweeps} times, expected at most {MAX_SWEEPS}"
         )));
     }
     check_plot(arguments)?;
-    let scenario = scenario_of(
-        arguments.camera.as_deref(),
-        arguments.preset,
-        arguments.reading,
-        &arguments.parameters,
-    )?;
+    let scenario = arguments.scenario.scenario()?;
     if let Some(directory) = &arguments.figures {
         return papers_figures(directory, &scenario);
     }
@@ -59,61 +57,18 @@ pub(crate) fn limit(arguments: &LimitArgs) -> Result<Exit, Fault> {
 }
 
 /// Refuses to draw over a file that is read.
-fn check_plot(arguments: &LimitArgs) -> Result<(), Fault> {
+fn check_plot(arguments: &LimitArgs) -> Result<(), CommandError> {
     let Some(Ok(plot)) = arguments.plot.as_ref().map(|p| p.path.canonicalize()) else {
         return Ok(());
     };
-    let mut read = arguments.camera.iter().chain(arguments.parameters.files());
+    let mut read = arguments.scenario.files();
     match read.find(|path| path.canonicalize().is_ok_and(|path| path == plot)) {
-        Some(path) => Err(Fault::Usage(format!(
+        Some(path) => Err(CommandError::Usage(format!(
             "--plot would overwrite the input {}",
             path.display()
         ))),
         None => Ok(()),
     }
-}
-
-/// The scenario that is asked for, in which every value makes sense.
-pub(crate) fn scenario_of(
-    camera: Option<&Path>,
-    preset: Option<Preset>,
-    reading: Option<ReadingArg>,
-    parameters: &ParameterArgs,
-) -> Result<Scenario, Fault> {
-    let mut scenario = match camera {
-        Some(path) => described(path)?,
-        None => Scenario::of(preset.unwrap_or(Preset::Experiment1)),
-    };
-    match reading {
-        None => (),
-        Some(ReadingArg::Paper) => scenario.reading = Reading::Paper,
-        Some(ReadingArg::Physical) => scenario.reading = Reading::Physical,
-    }
-    parameters
-        .apply(&mut scenario)
-        .map_err(anyhow::Error::from)?;
-    scenario
-        .check()
-        .map_err(|error| match parameters.files().next() {
-            // A curve that goes with nothing else is a fault of its file.
-            Some(path) => anyhow!(error).context(path.display().to_string()).into(),
-            None => usage(&error),
-        })?;
-    Ok(scenario)
-}
-
-/// The camera in a file under the default conditions.
-fn described(path: &Path) -> anyhow::Result<Scenario> {
-    let scenario = Scenario::new(Sensor::read(path)?);
-    // What a file says is a fault of the file, not of the options.
-    scenario
-        .check()
-        .with_context(|| path.display().to_string())?;
-    Ok(scenario)
-}
-
-fn usage(error: &ScenarioError) -> Fault {
-    Fault::Usage(error.to_string())
 }
 
 /// A prediction, and for which value of which parameter it is.
@@ -133,17 +88,17 @@ struct Swept {
     value: f64,
 }
 
-fn rows(arguments: &LimitArgs, scenario: &Scenario) -> Result<Vec<Row>, Fault> {
-    let preset = arguments.preset.map(Preset::name);
+fn rows(arguments: &LimitArgs, scenario: &Scenario) -> Result<Vec<Row>, CommandError> {
+    let preset = arguments.scenario.preset.map(Preset::name);
     let row = |scenario: &Scenario, swept: Option<Swept>| {
         let (prediction, detector) =
             Prediction::with_detector(scenario).map_err(|error| match swept {
                 Some(Swept { parameter, value }) => {
-                    Fault::Usage(format!("{parameter} of {value}: {error}"))
+                    CommandError::Usage(format!("{parameter} of {value}: {error}"))
                 }
                 None => usage(&error),
             })?;
-        Ok::<_, Fault>(Row {
+        Ok::<_, CommandError>(Row {
             // For its own sake only: in a sweep it would cost more than all the rest.
             faintest: match swept {
                 None => faintest(&scenario.sensor, &detector),
@@ -197,21 +152,21 @@ fn warn_if_flat(parameter: &str, rows: &[Row]) {
         .windows(2)
         .all(|pair| limits(&pair[0]) == limits(&pair[1]))
     {
-        warn(format_args!(
+        report_warning(format_args!(
             "{parameter} changes nothing: the limits are the same at each of its values"
         ));
     }
 }
 
 /// A panel with the curves of a sweep.
-fn panel(sweep: &Sweep, scenario: &Scenario) -> Result<Panel, Fault> {
+fn panel(sweep: &Sweep, scenario: &Scenario) -> Result<Panel, CommandError> {
     let series = Series::around(scenario, sweep.parameter);
     let curves = curves(scenario, sweep, &series).map_err(|error| usage(&error))?;
     Ok(Panel::new(None, sweep, curves, scenario))
 }
 
 /// The eleven figures, and a sheet of all of them.
-fn papers_figures(directory: &Path, scenario: &Scenario) -> Result<Exit, Fault> {
+fn papers_figures(directory: &Path, scenario: &Scenario) -> Result<Exit, CommandError> {
     let mut panels = Vec::new();
     for figure in Figure::ALL {
         let sweep = figure.sweep().map_err(anyhow::Error::from)?;

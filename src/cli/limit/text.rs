@@ -1,7 +1,7 @@
 //! Predictions for people: the budget, quantity by quantity with the paper's symbols, or a sweep as a table.
 
 use super::Row;
-use starpipe::base::format::printable;
+use starpipe::base::format::{five_digits as number, printable};
 use starpipe::model::sensitivity::{Budget, DetectorReport, Prediction, Reading, Scenario};
 use std::fmt::Write as _;
 
@@ -305,49 +305,4 @@ fn sweeps(rows: &[Row]) -> String {
 
 fn parameter(row: &Row) -> &'static str {
     row.swept.map_or("", |swept| swept.parameter)
-}
-
-/// A number of any size to five digits.
-pub(crate) fn number(value: f64) -> String {
-    let size = value.abs();
-    if value != 0.0 && !(1e-3..1e6).contains(&size) {
-        let text = format!("{value:.4e}");
-        return match text.split_once('e') {
-            Some((digits, exponent)) => format!("{}e{exponent}", trimmed(digits)),
-            None => text,
-        };
-    }
-    let decimals = (4.0 - size.max(1e-3).log10().floor()).max(0.0) as usize;
-    trimmed(&format!("{value:.decimals$}")).to_owned()
-}
-
-/// A decimal fraction without zeros at its end.
-fn trimmed(text: &str) -> &str {
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.')
-    } else {
-        text
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_number_has_five_digits() {
-        for (value, expected) in [
-            (0.0, "0"),
-            (0.1, "0.1"),
-            (8.150_432, "8.1504"),
-            (336.810_9, "336.81"),
-            (21_000.0, "21000"),
-            (999_999.9, "1000000"),
-            (2.788_281e-9, "2.7883e-9"),
-            (5e10, "5e10"),
-            (-12.345_678, "-12.346"),
-        ] {
-            assert_eq!(number(value), expected);
-        }
-    }
 }

@@ -5,6 +5,7 @@ pub(crate) mod panel;
 
 use anyhow::Context;
 use clap::ValueEnum;
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use finer::Finer;
 use panel::Sheet;
 use plotters::coord::Shift;
@@ -48,7 +49,7 @@ pub(crate) enum FigureForm {
 
 impl PlotFile {
     /// The form is told from the name.
-    pub(crate) fn new(path: PathBuf) -> Result<Self, String> {
+    fn new(path: PathBuf) -> Result<Self, String> {
         let extension = path
             .extension()
             .and_then(|e| e.to_str())
@@ -59,6 +60,11 @@ impl PlotFile {
             _ => return Err("figures are .svg or .png".to_owned()),
         };
         Ok(Self { path, form })
+    }
+
+    /// Parses the value of an option.
+    pub(crate) fn parser() -> impl TypedValueParser<Value = Self> {
+        PathBufValueParser::new().try_map(Self::new)
     }
 
     /// The file with the figure in it, to be written.

@@ -1,12 +1,12 @@
 //! A panel with dots, lines and bars over two axes, and sheets of such panels.
 
 use super::{Area, FONT, Figure, LETTERS_PX, MARGIN_PX, chart_on, draw_words, said};
-use crate::cli::limit::number;
 use plotters::coord::combinators::{BindKeyPoints, LogCoord, WithKeyPoints};
 use plotters::coord::ranged1d::Ranged;
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use starpipe::base::format::five_digits as number;
 use std::ops::Range;
 
 const PANEL_PX: (u32, u32) = (440, 330);

@@ -1,19 +1,27 @@
 //! `robustness`: rows of trials, their table, and their figure.
 
+mod args;
 mod figure;
+mod sweep;
 
-use super::args::{Format, MirroredArg, ProtocolArgs, RobustnessArgs};
-use super::output::{csv_table, json_lines, print, write_whole};
-use super::resources::{bar, read_catalog, sky, thread_pool, warn_of};
-use super::{Exit, Fault};
+pub(crate) use args::RobustnessArgs;
+
+use super::exit::{CommandError, Exit};
+use super::options::catalog::{read_catalog, sky, thread_pool, warn_of};
+use super::options::format::Format;
+use super::output::files::write_whole;
+use super::output::rows::{csv_table, json_lines};
+use super::output::stdout::print;
+use super::progress::bar;
 use anyhow::Context;
+use args::{MirroredArg, ProtocolOptions};
 use figure::Rates;
 use starpipe::identify::Photometry;
 use starpipe::study::robustness::{Case, Mirrored, Parameter, Protocol, Row, run, standard_cases};
 use std::fmt::Write as _;
 
 /// `starpipe robustness`
-pub(crate) fn robustness(arguments: &RobustnessArgs) -> Result<Exit, Fault> {
+pub(crate) fn robustness(arguments: &RobustnessArgs) -> Result<Exit, CommandError> {
     let rows = rows(arguments)?;
     if let Some(plot) = &arguments.plot {
         let file = plot.with(&Rates(&rows)).context("drawing the figure")?;
@@ -30,7 +38,7 @@ struct SweptRow {
     swept: Option<(Parameter, f64)>,
 }
 
-impl ProtocolArgs {
+impl ProtocolOptions {
     fn resolve(&self) -> Protocol {
         Protocol {
             fov_deg: self.fov,
@@ -76,7 +84,7 @@ fn cases(arguments: &RobustnessArgs) -> Vec<(Case, Option<(Parameter, f64)>)> {
     cases
 }
 
-fn rows(arguments: &RobustnessArgs) -> Result<Vec<SweptRow>, Fault> {
+fn rows(arguments: &RobustnessArgs) -> Result<Vec<SweptRow>, CommandError> {
     let cases = cases(arguments);
     let pool = thread_pool(arguments.resources.threads)?;
     let catalog = pool.install(|| read_catalog(arguments.resources.catalog.as_deref()))?;

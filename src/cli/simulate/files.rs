@@ -1,10 +1,10 @@
 //! Where simulated frames are written, and as what.
 
+use super::args::SimulateArgs;
 use super::header::Description;
 use super::{Job, Subject, named};
-use crate::cli::Fault;
-use crate::cli::args::SimulateArgs;
-use crate::cli::output::csv_table;
+use crate::cli::exit::CommandError;
+use crate::cli::output::rows::csv_table;
 use anyhow::Context;
 use clap::ValueEnum;
 use serde::Serialize;
@@ -61,10 +61,10 @@ impl Place {
         arguments: &SimulateArgs,
         subject: &Subject,
         sensor: &Sensor,
-    ) -> Result<Self, Fault> {
+    ) -> Result<Self, CommandError> {
         let named_kind = ImageKind::of_name(&arguments.out).filter(|_| !arguments.out.is_dir());
         if named_kind.is_some() && arguments.count > 1 {
-            return Err(Fault::Usage(format!(
+            return Err(CommandError::Usage(format!(
                 "--out {} is one file, expected a directory for {} frames",
                 arguments.out.display(),
                 arguments.count
@@ -73,14 +73,14 @@ impl Place {
         if let (Some(named), Some(wanted)) = (named_kind, arguments.image)
             && named != wanted
         {
-            return Err(Fault::Usage(format!(
+            return Err(CommandError::Usage(format!(
                 "--out {} and --image contradict each other",
                 arguments.out.display()
             )));
         }
         let kind = named_kind.or(arguments.image).unwrap_or(ImageKind::Tiff);
         if arguments.compress && kind == ImageKind::Fits {
-            return Err(Fault::Usage(
+            return Err(CommandError::Usage(
                 "--compress is for TIFF files, and the frames are written as FITS".into(),
             ));
         }
@@ -98,7 +98,7 @@ impl Place {
     }
 
     /// Makes the directory; refuses to write over what is there.
-    pub(super) fn prepare(&self) -> Result<(), Fault> {
+    pub(super) fn prepare(&self) -> Result<(), CommandError> {
         if !self.is_file {
             std::fs::create_dir_all(&self.out)
                 .with_context(|| format!("making the directory {}", self.out.display()))?;
@@ -109,7 +109,7 @@ impl Place {
         };
         let mut files = self.numbers.clone().map(|i| self.image(i)).flat_map(both);
         match files.find(|path| !self.may_overwrite && path.exists()) {
-            Some(path) => Err(Fault::Usage(format!(
+            Some(path) => Err(CommandError::Usage(format!(
                 "{} exists; --force overwrites it",
                 path.display()
             ))),

@@ -1,16 +1,20 @@
 //! `simulate`: frames with known truth, as files.
 
+mod args;
 mod files;
 mod header;
 
-use super::args::{PageFormat, SimulateArgs};
+pub(crate) use args::SimulateArgs;
+
 use super::batch::for_each_ordered;
-use super::centroids::{self, FrameSize};
-use super::output::{print, write_whole};
-use super::resources::{bar, read_catalog, thread_pool};
-use super::{Exit, Fault};
+use super::exit::{CommandError, Exit};
+use super::input::centroid_list::{self as centroids, FrameSize};
+use super::options::catalog::{read_catalog, thread_pool};
+use super::options::format::PageFormat;
+use super::output::files::write_whole;
+use super::output::stdout::print;
+use super::progress::bar;
 use anyhow::{Context, anyhow};
-pub(crate) use files::ImageKind;
 use files::Place;
 use header::Description;
 use indicatif::ProgressBar;
@@ -41,10 +45,10 @@ enum Subject {
 }
 
 impl Subject {
-    fn of(arguments: &SimulateArgs, setup: &Setup) -> Result<Self, Fault> {
+    fn of(arguments: &SimulateArgs, setup: &Setup) -> Result<Self, CommandError> {
         let is_unlit = arguments.dark || arguments.flat.is_some();
         if is_unlit && setup.scene != Scene::default() {
-            return Err(Fault::Usage(
+            return Err(CommandError::Usage(
                 "dark frames and flats are of no sky: expected none of the options of the scene"
                     .into(),
             ));
@@ -149,7 +153,7 @@ struct ToldAttitude {
 }
 
 /// `starpipe simulate`
-pub(crate) fn simulate(arguments: &SimulateArgs) -> Result<Exit, Fault> {
+pub(crate) fn simulate(arguments: &SimulateArgs) -> Result<Exit, CommandError> {
     let setup = arguments.setup.setup()?;
     let subject = Subject::of(arguments, &setup)?;
     let place = Place::of(arguments, &subject, &setup.scenario.sensor)?;

@@ -1,7 +1,7 @@
 //! Which run a directory holds: all that its tables follow from.
 
-use crate::cli::Fault;
-use crate::cli::output::write_whole;
+use crate::cli::exit::CommandError;
+use crate::cli::output::files::write_whole;
 use anyhow::Context;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -43,7 +43,11 @@ struct CatalogIdentity<'a> {
 }
 
 /// Makes `directory` that of this run, or goes on with it where it already is.
-pub(super) fn claim(directory: &Path, protocol: &Protocol, catalog: &Catalog) -> Result<(), Fault> {
+pub(super) fn claim(
+    directory: &Path,
+    protocol: &Protocol,
+    catalog: &Catalog,
+) -> Result<(), CommandError> {
     std::fs::create_dir_all(directory)
         .with_context(|| format!("making the directory {}", directory.display()))?;
     let path = directory.join(FILE);
@@ -68,7 +72,7 @@ pub(super) fn claim(directory: &Path, protocol: &Protocol, catalog: &Catalog) ->
     if differences.is_empty() {
         return Ok(());
     }
-    Err(Fault::Usage(format!(
+    Err(CommandError::Usage(format!(
         "{} holds another run: {}; choose another directory for --out",
         directory.display(),
         differences.join(", ")
@@ -113,10 +117,10 @@ fn curve(response: &Response) -> Option<&[(f64, f64)]> {
 }
 
 /// Tables without a run that they are of are not starpipe's to write over.
-fn refuse_foreign_tables(directory: &Path) -> Result<(), Fault> {
+fn refuse_foreign_tables(directory: &Path) -> Result<(), CommandError> {
     for name in ["frames.csv", "stars.csv", "frames.parquet", "stars.parquet"] {
         if directory.join(name).exists() {
-            return Err(Fault::Usage(format!(
+            return Err(CommandError::Usage(format!(
                 "{} has {name} and no {FILE}, which would tell what run it is of; choose another directory for --out",
                 directory.display()
             )));
@@ -163,8 +167,8 @@ mod tests {
         };
         let claimed = |protocol: &Protocol| match claim(directory.path(), protocol, catalog) {
             Ok(()) => String::new(),
-            Err(Fault::Usage(message)) => message,
-            Err(Fault::Failed(error)) => panic!("{error:#}"),
+            Err(CommandError::Usage(message)) => message,
+            Err(CommandError::Failed(error)) => panic!("{error:#}"),
         };
         assert_eq!(claimed(&protocol), "");
         assert_eq!(claimed(&protocol), "");

@@ -1,18 +1,25 @@
 //! `validate`: frames simulated and processed, run by run; studies over a parameter.
 
+mod args;
 mod columns;
 mod figures;
 mod identity;
 mod parquet;
 mod run;
 mod study;
+mod sweep;
 mod tables;
 
-use super::args::{PageFormat, ValidateArgs};
-use super::output::{json_lines, print};
+pub(crate) use args::ValidateArgs;
+
+use super::exit::{CommandError, Exit};
+use super::options::catalog::{read_catalog, sky, thread_pool, warn_of};
+use super::options::format::PageFormat;
+use super::output::messages::report_error;
+use super::output::rows::json_lines;
+use super::output::stdout::print;
 use super::plot::FigureForm;
-use super::resources::{bar, read_catalog, sky, thread_pool, warn_of};
-use super::{Exit, Fault, complain};
+use super::progress::bar;
 use indicatif::ProgressBar;
 use starpipe::pipeline::Pipeline;
 use starpipe::study::validation::Protocol;
@@ -32,12 +39,12 @@ struct Shared<'a> {
 impl Shared<'_> {
     /// Says something on standard error, above the bar where there is one.
     fn tell(&self, message: impl Display) {
-        self.progress.suspend(|| complain(message));
+        self.progress.suspend(|| report_error(message));
     }
 }
 
 /// `starpipe validate`
-pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Exit, Fault> {
+pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Exit, CommandError> {
     let protocol = Protocol {
         setup: arguments.setup.setup()?,
         scale_known: !arguments.scale_unknown,

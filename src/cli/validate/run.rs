@@ -3,9 +3,9 @@
 use super::figures;
 use super::tables::{Lines, Tables};
 use super::{Shared, identity};
-use crate::cli::Fault;
 use crate::cli::batch::for_each_ordered;
-use crate::cli::output::write_whole;
+use crate::cli::exit::CommandError;
+use crate::cli::output::files::write_whole;
 use crate::cli::plot::FigureForm;
 use anyhow::Context;
 use serde::Serialize;
@@ -40,16 +40,18 @@ pub(super) fn run(
     directory: &Path,
     protocol: &Protocol,
     shared: &Shared,
-) -> Result<Summary, Fault> {
+) -> Result<Summary, CommandError> {
     let validator = Validator::new(shared.pipeline, protocol).map_err(|error| match error {
-        ValidationError::Scenario(_) | ValidationError::NoLimit => Fault::Usage(error.to_string()),
-        other => Fault::Failed(other.into()),
+        ValidationError::Scenario(_) | ValidationError::NoLimit => {
+            CommandError::Usage(error.to_string())
+        }
+        other => CommandError::Failed(other.into()),
     })?;
     identity::claim(directory, protocol, shared.pipeline.catalog())?;
     let mut tables = Tables::open(directory, |number| validator.draw(number).0)?;
     let done = tables.done();
     if done > shared.frames {
-        return Err(Fault::Usage(format!(
+        return Err(CommandError::Usage(format!(
             "{} already holds {done} frames; --frames {} would be fewer",
             directory.display(),
             shared.frames

@@ -1,13 +1,14 @@
 //! Studies: a run for each value of a parameter, and a row for each run.
 
 use super::figures;
+use super::sweep::{Studied, StudySweep};
 use super::{Shared, run};
-use crate::cli::Fault;
-use crate::cli::limit::number;
-use crate::cli::output::{csv_table, write_whole};
-use crate::cli::values::{Studied, StudySweep};
+use crate::cli::exit::CommandError;
+use crate::cli::output::files::write_whole;
+use crate::cli::output::rows::csv_table;
 use anyhow::Context;
 use serde::Serialize;
+use starpipe::base::format::five_digits as number;
 use starpipe::model::sensitivity::Spacing;
 use starpipe::study::validation::{Protocol, Summary};
 use std::fmt::Write as _;
@@ -65,18 +66,23 @@ pub(super) struct StudyRow {
 }
 
 /// The runs that the sweeps ask for, each of which makes sense.
-pub(super) fn protocols(sweeps: &[StudySweep], base: &Protocol) -> Result<Vec<Study>, Fault> {
+pub(super) fn protocols(
+    sweeps: &[StudySweep],
+    base: &Protocol,
+) -> Result<Vec<Study>, CommandError> {
     let mut studies: Vec<Study> = Vec::new();
     for sweep in sweeps {
         let name = sweep.studied.name();
         if studies.iter().any(|study| study.studied.name() == name) {
-            return Err(Fault::Usage(format!("--sweep is given twice for {name}")));
+            return Err(CommandError::Usage(format!(
+                "--sweep is given twice for {name}"
+            )));
         }
         for &value in &sweep.values {
             let mut protocol = base.clone();
             sweep.studied.set(&mut protocol.setup, value);
             let check = protocol.setup.scenario.check();
-            check.map_err(|error| Fault::Usage(format!("{name} of {value}: {error}")))?;
+            check.map_err(|error| CommandError::Usage(format!("{name} of {value}: {error}")))?;
             studies.push(Study {
                 studied: sweep.studied,
                 spacing: sweep.spacing,
@@ -93,7 +99,7 @@ pub(super) fn run(
     directory: &Path,
     studies: &[Study],
     shared: &Shared,
-) -> Result<Vec<StudyRow>, Fault> {
+) -> Result<Vec<StudyRow>, CommandError> {
     let mut rows = Vec::new();
     for study in studies {
         let place = directory.join(format!("{}={}", study.studied.name(), study.value));

@@ -1,7 +1,7 @@
 //! What `--out` may write over: results of an earlier run, and nothing else.
 
-use super::Fault;
-use super::settings::{output_path, result_stem};
+use super::paths::{output_path, result_stem};
+use crate::cli::exit::CommandError;
 use starpipe::frame;
 use std::collections::{HashMap, HashSet};
 use std::ffi::OsStr;
@@ -17,7 +17,7 @@ pub(crate) fn check(
     inputs: &[PathBuf],
     directory: &Path,
     extensions: &[&str],
-) -> Result<(), Fault> {
+) -> Result<(), CommandError> {
     check_each_other(inputs, directory)?;
     let inputs_found: HashSet<PathBuf> = inputs
         .iter()
@@ -36,7 +36,7 @@ pub(crate) fn check(
             } else {
                 "a file that starpipe did not write:"
             };
-            return Err(Fault::Usage(format!(
+            return Err(CommandError::Usage(format!(
                 "the results of {} would overwrite {what} {}; choose another directory for --out",
                 input.display(),
                 output.display(),
@@ -47,7 +47,7 @@ pub(crate) fn check(
 }
 
 /// Refuses to write `results` over one of the inputs, or over a file that is no result.
-pub(crate) fn check_results(inputs: &[PathBuf], results: &[PathBuf]) -> Result<(), Fault> {
+pub(crate) fn check_results(inputs: &[PathBuf], results: &[PathBuf]) -> Result<(), CommandError> {
     let inputs_found: HashSet<PathBuf> = inputs
         .iter()
         .filter_map(|i| i.canonicalize().ok())
@@ -64,7 +64,7 @@ pub(crate) fn check_results(inputs: &[PathBuf], results: &[PathBuf]) -> Result<(
         } else {
             "a file that starpipe did not write:"
         };
-        return Err(Fault::Usage(format!(
+        return Err(CommandError::Usage(format!(
             "the results would overwrite {what} {}; choose another directory for --out",
             output.display(),
         )));
@@ -72,11 +72,11 @@ pub(crate) fn check_results(inputs: &[PathBuf], results: &[PathBuf]) -> Result<(
     Ok(())
 }
 
-fn check_each_other(inputs: &[PathBuf], directory: &Path) -> Result<(), Fault> {
+fn check_each_other(inputs: &[PathBuf], directory: &Path) -> Result<(), CommandError> {
     let mut taken: HashMap<&OsStr, &Path> = HashMap::new();
     for input in inputs {
         if let Some(other) = taken.insert(result_stem(input), input) {
-            return Err(Fault::Usage(format!(
+            return Err(CommandError::Usage(format!(
                 "the results of {} and {} would both be written to {}; process them into different directories",
                 other.display(),
                 input.display(),

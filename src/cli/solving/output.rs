@@ -1,15 +1,16 @@
 //! Results on standard output and in files.
 
-use super::args::Format;
-use super::settings::output_path;
+use crate::cli::options::format::Format;
+use crate::cli::output::files::write_whole;
+use crate::cli::output::paths::output_path;
+use crate::cli::output::stdout::print;
 use anyhow::Context;
-use serde::Serialize;
 use starpipe::frame::Frame;
 use starpipe::pipeline::Solution;
 use starpipe::report::{FrameReport, TextOptions, write_table_header};
+use starpipe::report::{overlay, wcs};
 use starpipe::sky::catalog::Catalog;
-use starpipe::{base::files, report::overlay, report::wcs};
-use std::io::{self, Write};
+use std::io;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -124,41 +125,6 @@ fn remove_stale(path: &Path) -> anyhow::Result<()> {
     }
 }
 
-/// Writes `text` to standard output, whole and at once. Breaks off where nobody reads it any longer.
-pub(crate) fn print(text: &str) -> anyhow::Result<ControlFlow<()>> {
-    let mut stdout = io::stdout().lock();
-    let written = stdout
-        .write_all(text.as_bytes())
-        .and_then(|()| stdout.flush());
-    match written {
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(ControlFlow::Break(())),
-        Err(error) => Err(error).context("writing to standard output"),
-        Ok(()) => Ok(ControlFlow::Continue(())),
-    }
-}
-
-/// Rows as JSON Lines.
-pub(crate) fn json_lines<R: Serialize>(rows: impl Iterator<Item = R>) -> anyhow::Result<String> {
-    let mut lines = String::new();
-    for row in rows {
-        lines += &serde_json::to_string(&row)?;
-        lines.push('\n');
-    }
-    Ok(lines)
-}
-
-/// Rows as a CSV table with a heading.
-pub(crate) fn csv_table<R: Serialize>(rows: impl Iterator<Item = R>) -> anyhow::Result<String> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        writer.serialize(row)?;
-    }
-    let bytes = writer
-        .into_inner()
-        .map_err(csv::IntoInnerError::into_error)?;
-    Ok(String::from_utf8(bytes)?)
-}
-
 fn table(report: &FrameReport, with_header: bool) -> anyhow::Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     if with_header {
@@ -168,65 +134,4 @@ fn table(report: &FrameReport, with_header: bool) -> anyhow::Result<Vec<u8>> {
     writer
         .into_inner()
         .map_err(|error| error.into_error().into())
-}
-
-/// Writes files whole or not at all: into temporary files beside them, which take their names once all are written.
-pub(crate) fn write_whole(files: &[(PathBuf, Vec<u8>)]) -> anyhow::Result<()> {
-    let writing = |path: &Path| format!("writing {}", path.display());
-    let write = |path: &Path, content: &[u8]| {
-        let mut file = files::beside(path)?;
-        file.write_all(content)?;
-        io::Result::Ok(file)
-    };
-    let mut written = Vec::new();
-    for (path, content) in files {
-        let file = write(path, content).with_context(|| writing(path))?;
-        written.push((path, file));
-    }
-    for (path, file) in written {
-        // The error would keep the temporary file as long as it lives.
-        let persisted = file.persist(path).map_err(|refused| refused.error);
-        persisted.with_context(|| writing(path))?;
-    }
-    Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_file_is_replaced_whole_and_nothing_is_left_beside_it() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("a.json");
-        for content in [&b"one, and long"[..], b"two"] {
-            write_whole(&[(path.clone(), content.to_vec())]).unwrap();
-            assert_eq!(std::fs::read(&path).unwrap(), content);
-        }
-        assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 1);
-    }
-
-    #[test]
-    fn a_file_that_cannot_be_written_leaves_nothing_behind_nor_those_before_it() {
-        let directory = tempfile::tempdir().unwrap();
-        let there = directory.path().join("a.json");
-        let elsewhere = directory.path().join("not/there/a.csv");
-        let files = [(there, b"one".to_vec()), (elsewhere, b"two".to_vec())];
-        let error = write_whole(&files).unwrap_err();
-        assert!(
-            format!("{error:#}").contains("not/there/a.csv"),
-            "{error:#}"
-        );
-        assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0);
-    }
-
-    #[test]
-    fn a_name_that_is_taken_by_a_directory_is_no_file_to_write() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("taken");
-        std::fs::create_dir(&path).unwrap();
-        let error = write_whole(&[(path, b"one".to_vec())]).unwrap_err();
-        assert!(format!("{error:#}").contains("taken"), "{error:#}");
-        assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 1);
-    }
 }

@@ -1,13 +1,30 @@
 //! What commands that identify stars need first: threads, the catalogue, its index.
 
-use super::args::ResourceArgs;
-use super::{cache, chained, warn};
+use crate::cli::cache;
+use crate::cli::output::messages::{one_line, report_warning};
+use crate::cli::progress::bar;
 use anyhow::Context;
-use indicatif::{ProgressBar, ProgressStyle};
+use clap::Args;
 use starpipe::identify::{CacheError, Sky};
 use starpipe::sky::catalog::{self, Catalog};
 use std::borrow::Cow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Resources")]
+pub(crate) struct CatalogOptions {
+    /// Star catalogue to use in place of the built-in one: SKY2000, Tycho-2 (a directory of its files), a table
+    /// (CSV, TSV, from VizieR), or what `starpipe catalog import` makes of one, which loads fastest
+    #[arg(long, value_name = "PATH")]
+    pub(crate) catalog: Option<PathBuf>,
+    /// Where to keep the index of the catalogue [default: $STARPIPE_CACHE_DIR, else the user's cache
+    /// directory]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) cache_dir: Option<PathBuf>,
+    /// Threads to work with [default: one for each processor]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) threads: Option<u32>,
+}
 
 pub(crate) fn thread_pool(threads: Option<u32>) -> anyhow::Result<rayon::ThreadPool> {
     rayon::ThreadPoolBuilder::new()
@@ -25,7 +42,7 @@ pub(crate) fn read_catalog(path: Option<&Path>) -> anyhow::Result<Cow<'static, C
             for file in &reading.files {
                 if let Some(reasons) = file.summary.left_out() {
                     let (path, records) = (file.path.display(), file.summary.records);
-                    warn(format_args!(
+                    report_warning(format_args!(
                         "{path}: not every one of {records} records is a star: {reasons}"
                     ));
                 }
@@ -37,7 +54,7 @@ pub(crate) fn read_catalog(path: Option<&Path>) -> anyhow::Result<Cow<'static, C
 }
 
 /// The index comes from the cache where it is there and whole; a cache of no use costs time, not results.
-pub(crate) fn sky<'a>(catalog: &'a Catalog, resources: &ResourceArgs) -> Sky<'a> {
+pub(crate) fn sky<'a>(catalog: &'a Catalog, resources: &CatalogOptions) -> Sky<'a> {
     let progress = bar(100, "indexing the catalogue {wide_bar} {percent} %");
     let show = |part: f64| progress.set_position((part * 100.0) as u64);
     let Some(directory) = cache::directory(resources.cache_dir.clone()) else {
@@ -52,14 +69,7 @@ pub(crate) fn sky<'a>(catalog: &'a Catalog, resources: &ResourceArgs) -> Sky<'a>
 /// Tells of a cache that is of no use.
 pub(crate) fn warn_of(troubles: Vec<CacheError>) {
     for trouble in troubles {
-        let trouble = chained(&trouble);
-        warn(format_args!("{trouble}; this costs time and nothing else"));
+        let trouble = one_line(&trouble);
+        report_warning(format_args!("{trouble}; this costs time and nothing else"));
     }
-}
-
-/// A bar on standard error, which stays empty where that is no terminal.
-pub(crate) fn bar(length: u64, template: &str) -> ProgressBar {
-    let style =
-        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(length).with_style(style)
 }

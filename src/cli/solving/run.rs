@@ -1,112 +1,25 @@
-//! `process` and `identify`.
+//! Solving many inputs at once.
 
-use super::args::{IdentifyArgs, ProcessArgs, ResourceArgs, SolvingArgs};
-use super::centroids::{self, FrameSize};
-use super::input;
 use super::output::{OutputSettings, Printer, ResultFiles, Solved};
-use super::resources::{bar, read_catalog, sky, thread_pool, warn_of};
-use super::settings::{FRAME_RESULTS, LIST_RESULTS};
-use super::{Exit, Fault, batch, chained, complain};
+use crate::cli::batch;
+use crate::cli::exit::{CommandError, Exit};
+use crate::cli::options::catalog::{CatalogOptions, read_catalog, sky, thread_pool, warn_of};
+use crate::cli::output::messages::{one_line, report_error};
+use crate::cli::progress::bar;
 use indicatif::ProgressBar;
-use starpipe::frame::Buffers;
-use starpipe::pipeline::{Knowledge, Pipeline, SolveConfig, Workspace};
+use starpipe::pipeline::{Pipeline, Workspace};
 use starpipe::report::FrameReport;
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-
-/// `starpipe process`
-pub(crate) fn process(arguments: ProcessArgs) -> Result<Exit, Fault> {
-    let ProcessArgs {
-        frames,
-        page,
-        calibration,
-        detection,
-        light,
-        solving,
-    } = arguments;
-    let sensor = solving.hints.sensor()?;
-    let config = SolveConfig {
-        detect: detection.resolve(),
-        knowledge: Knowledge {
-            exposure_s: light.exposure,
-            ..solving.hints.resolve()?
-        },
-        calibration: calibration.resolve(sensor.as_ref())?.map(Arc::new),
-        description: sensor.map(|sensor| light.description(sensor)),
-        page,
-    };
-    input::check(&frames)?;
-    let (frames, troubles) = input::frames(frames);
-    for trouble in &troubles {
-        complain(chained(trouble));
-    }
-    let (settings, resources) = solving.resolve(&frames, FRAME_RESULTS)?;
-    // Frames are large: one is kept only where it is drawn.
-    let keep = settings.directory.is_some();
-    let exit = solve_all(
-        &frames,
-        settings,
-        &resources,
-        |pipeline, path, workspace| {
-            let read = |buffers: &mut Buffers| input::read_frame(path, page, buffers);
-            let (solution, frame) = pipeline.solve_read(path, &config, workspace, read)?;
-            let frame = if keep {
-                Some(frame)
-            } else {
-                workspace.frames.recycle(frame);
-                None
-            };
-            Ok(Solved { solution, frame })
-        },
-    )?;
-    Ok(if troubles.is_empty() {
-        exit
-    } else {
-        Exit::Failure
-    })
-}
-
-/// `starpipe identify`
-pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Exit, Fault> {
-    let IdentifyArgs {
-        lists,
-        width,
-        height,
-        solving,
-    } = arguments;
-    input::check(&lists)?;
-    let knowledge = solving.hints.resolve_with_camera()?;
-    let size = FrameSize { width, height };
-    let (settings, resources) = solving.resolve(&lists, LIST_RESULTS)?;
-    solve_all(&lists, settings, &resources, |pipeline, path, _| {
-        let list = centroids::read(path, size)?;
-        let solution = pipeline.solve_centroids(&list, &knowledge);
-        Ok(Solved {
-            solution,
-            frame: None,
-        })
-    })
-}
-
-impl SolvingArgs {
-    fn resolve(
-        self,
-        inputs: &[PathBuf],
-        extensions: &[&str],
-    ) -> Result<(OutputSettings, ResourceArgs), Fault> {
-        Ok((self.output.resolve(inputs, extensions)?, self.resources))
-    }
-}
 
 /// Solves every input, prints its report, and writes its files; one that cannot be read does not disturb the others.
-fn solve_all(
+pub(crate) fn solve_all(
     inputs: &[PathBuf],
     settings: OutputSettings,
-    resources: &ResourceArgs,
+    resources: &CatalogOptions,
     solve: impl Fn(&Pipeline, &Path, &mut Workspace) -> anyhow::Result<Solved> + Sync,
-) -> Result<Exit, Fault> {
+) -> Result<Exit, CommandError> {
     let mut run = Run::new(&settings, inputs);
     let files = ResultFiles::new(settings)?;
     if inputs.is_empty() {
@@ -178,25 +91,26 @@ impl Run {
         let answer = match result {
             Ok(answer) => answer,
             Err(error) => {
-                self.complain(&error);
+                self.report_error(&error);
                 return ControlFlow::Continue(());
             }
         };
         self.unidentified |= !answer.report.is_identified();
         if let Err(error) = answer.saved {
-            self.complain(&error);
+            self.report_error(&error);
         }
         // The bar steps aside: results may go to the same terminal.
         let printed = self.progress.suspend(|| self.printer.print(&answer.report));
         printed.unwrap_or_else(|error| {
-            self.complain(&error);
+            self.report_error(&error);
             ControlFlow::Continue(())
         })
     }
 
-    fn complain(&mut self, error: &anyhow::Error) {
+    fn report_error(&mut self, error: &anyhow::Error) {
         self.failed = true;
-        self.progress.suspend(|| complain(chained(error.as_ref())));
+        self.progress
+            .suspend(|| report_error(one_line(error.as_ref())));
     }
 
     fn exit(self) -> Exit {

@@ -1,39 +1,28 @@
 //! What is simulated, as it is typed: a camera, its conditions, and the scene, with an option for every number.
 
-use super::Fault;
-use super::args::{ReadingArg, preset};
-use super::limit::{ParameterArgs, number, scenario_of};
+use super::scenario::ScenarioOptions;
+use crate::cli::exit::CommandError;
 use anyhow::anyhow;
 use clap::{Arg, ArgAction, ArgGroup, ArgMatches, Args, Command, Error, FromArgMatches};
-use starpipe::camera::data_sheet::{Preset, SpotForm};
+use starpipe::base::format::five_digits as number;
+use starpipe::camera::data_sheet::SpotForm;
 use starpipe::model::sensitivity::ScenarioError;
 use starpipe::model::simulate::{Parameter, Scene, Setup};
-use std::path::PathBuf;
 
 /// What is simulated.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("simulated").args(["camera", "preset"]).required(true))]
-pub(crate) struct SetupArgs {
-    /// Camera to simulate, as `starpipe camera new` writes one
-    #[arg(long, value_name = "camera.toml")]
-    pub(crate) camera: Option<PathBuf>,
-    /// A camera that is built in, and its conditions
-    #[arg(long, value_name = "NAME", value_parser = preset())]
-    pub(crate) preset: Option<Preset>,
-    /// Which equations [default: as the paper has them for its experiments, else physical]
-    #[arg(long, value_enum)]
-    pub(crate) reading: Option<ReadingArg>,
+pub(crate) struct SetupOptions {
     #[command(flatten)]
-    pub(crate) parameters: ParameterArgs,
+    scenario: ScenarioOptions,
     #[command(flatten)]
-    pub(crate) scene: SceneArgs,
+    scene: SceneOptions,
 }
 
-impl SetupArgs {
+impl SetupOptions {
     /// What is asked for, in which every value makes sense.
-    pub(crate) fn setup(&self) -> Result<Setup, Fault> {
-        let camera = self.camera.as_deref();
-        let scenario = scenario_of(camera, self.preset, self.reading, &self.parameters)?;
+    pub(crate) fn setup(&self) -> Result<Setup, CommandError> {
+        let scenario = self.scenario.scenario()?;
         let mut setup = Setup {
             scenario,
             scene: Scene::default(),
@@ -44,27 +33,27 @@ impl SetupArgs {
     }
 }
 
-impl SetupArgs {
+impl SetupOptions {
     /// What a file says is a fault of the file, where no option was given besides.
-    fn at_fault(&self, error: ScenarioError) -> Fault {
-        match &self.camera {
-            Some(path) if self.parameters.is_empty() && self.scene.is_empty() => {
+    fn at_fault(&self, error: ScenarioError) -> CommandError {
+        match &self.scenario.camera {
+            Some(path) if self.scenario.parameters.is_empty() && self.scene.is_empty() => {
                 anyhow!(error).context(path.display().to_string()).into()
             }
-            _ => Fault::Usage(error.to_string()),
+            _ => CommandError::Usage(error.to_string()),
         }
     }
 }
 
 /// The numbers given beyond those that the limit depends on.
 #[derive(Debug, Clone)]
-pub(crate) struct SceneArgs {
+pub(crate) struct SceneOptions {
     numbers: Vec<(Parameter, f64)>,
     spot_form: Option<SpotForm>,
     mirrored: bool,
 }
 
-impl SceneArgs {
+impl SceneOptions {
     fn is_empty(&self) -> bool {
         self.numbers.is_empty()
     }
@@ -83,7 +72,7 @@ const SPOT_FORM: &str = "spot_form";
 const MIRRORED: &str = "mirrored";
 const CAMERA_HEADING: &str = "Imperfections of the camera";
 
-impl clap::Args for SceneArgs {
+impl clap::Args for SceneOptions {
     fn augment_args(command: Command) -> Command {
         let forms = SpotForm::ALL.map(SpotForm::name).join("|");
         let spot_form = Arg::new(SPOT_FORM)
@@ -108,7 +97,7 @@ impl clap::Args for SceneArgs {
     }
 }
 
-impl FromArgMatches for SceneArgs {
+impl FromArgMatches for SceneOptions {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
         let given = |parameter: Parameter| {
             let value = matches.get_one::<f64>(parameter.name())?;

@@ -1,6 +1,6 @@
 //! Lists of centroids in CSV files.
 
-use super::input::is_stdin;
+use super::frames::is_stdin;
 use anyhow::{Context, anyhow, bail};
 use csv::StringRecord;
 use starpipe::base::coords::PixelPoint;

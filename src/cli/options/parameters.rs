@@ -1,7 +1,7 @@
 //! An option for every parameter of a scenario, made from the table of parameters.
 
-use super::text::number;
 use clap::{Arg, ArgMatches, Command, Error, FromArgMatches};
+use starpipe::base::format::five_digits as number;
 use starpipe::camera::data_sheet::{Response, ResponseError, is_curve};
 use starpipe::model::sensitivity::{Conditions, Parameter, Scenario};
 use std::path::PathBuf;
@@ -20,7 +20,7 @@ const SAME: &[&[&str]] = &[
 
 /// The parameters given, in the order in which they are to be set.
 #[derive(Debug, Clone)]
-pub(crate) struct ParameterArgs(Vec<(Parameter, Given)>);
+pub(crate) struct ParameterOptions(Vec<(Parameter, Given)>);
 
 /// What an option of a parameter may be given.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,7 +30,7 @@ enum Given {
     Curve(PathBuf),
 }
 
-impl ParameterArgs {
+impl ParameterOptions {
     /// Gives `scenario` what was given.
     pub(crate) fn apply(&self, scenario: &mut Scenario) -> Result<(), ResponseError> {
         for (parameter, given) in &self.0 {
@@ -63,7 +63,7 @@ impl ParameterArgs {
     }
 }
 
-impl clap::Args for ParameterArgs {
+impl clap::Args for ParameterOptions {
     fn augment_args(command: Command) -> Command {
         command.args(Parameter::all().map(option))
     }
@@ -73,7 +73,7 @@ impl clap::Args for ParameterArgs {
     }
 }
 
-impl FromArgMatches for ParameterArgs {
+impl FromArgMatches for ParameterOptions {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
         let given = |parameter: Parameter| {
             let given = matches.get_one::<Given>(parameter.name())?;

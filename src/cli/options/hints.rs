@@ -1,0 +1,105 @@
+//! What is known of the frames before they are looked at.
+
+use super::values;
+use crate::cli::exit::CommandError;
+use clap::Args;
+use starpipe::base::coords::UnitVector;
+use starpipe::base::epoch::ObservationDate;
+use starpipe::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
+use starpipe::camera::data_sheet::Sensor;
+use starpipe::pipeline::{DateSource, FrameDate, Knowledge, Scale, ScaleHint};
+use starpipe::sky::observer::Site;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "What is known of the frames")]
+pub(crate) struct HintOptions {
+    /// Horizontal field of view in degrees
+    #[arg(long, value_name = "DEG", value_parser = values::field_of_view, allow_hyphen_values = true,
+          conflicts_with = "pixel_scale")]
+    pub(crate) fov: Option<f64>,
+    /// Angle of a pixel in arcseconds
+    #[arg(long, value_name = "ARCSEC", value_parser = values::pixel_scale, allow_hyphen_values = true)]
+    pub(crate) pixel_scale: Option<f64>,
+    /// How far --fov or --pixel-scale may be off, in percent [default: 10]
+    #[arg(long, value_name = "PERCENT", value_parser = values::percent, allow_hyphen_values = true)]
+    pub(crate) scale_error: Option<f64>,
+    /// Direction near which the frame's centre lies, in degrees
+    #[arg(long, value_name = "RA,DEC", value_parser = values::direction, allow_hyphen_values = true,
+          requires = "radius")]
+    pub(crate) near: Option<values::Direction>,
+    /// How far from --near the frame's centre may lie, in degrees
+    #[arg(long, value_name = "DEG", value_parser = values::radius, allow_hyphen_values = true,
+          requires = "near")]
+    pub(crate) radius: Option<f64>,
+    /// When the frames were taken, as ISO 8601, in UTC unless it says otherwise: stars move [default: for
+    /// frames, the date in the file's header, else in its name; else 2000]
+    #[arg(long, value_name = "ISO8601", allow_hyphen_values = true)]
+    pub(crate) date: Option<ObservationDate>,
+    /// Where they were taken: latitude and longitude (north and east positive) in degrees, and height in metres; with
+    /// the time, that gives zenith distance and airmass
+    #[arg(long, value_name = "LAT,LON[,HEIGHT_M]", allow_hyphen_values = true)]
+    pub(crate) site: Option<Site>,
+    /// Description of the camera, see `starpipe camera new`: gives the scale where no option does and, of frames whose
+    /// exposure is known, what they should show
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) camera: Option<PathBuf>,
+}
+
+/// How far a scale given may be off where nothing is said of it, in percent.
+const DEFAULT_SCALE_ERROR_PERCENT: f64 = 10.0;
+
+impl HintOptions {
+    /// What is known of the frames.
+    pub(crate) fn resolve(&self) -> Result<Knowledge, CommandError> {
+        let fov = self.fov.map(|deg| Scale::FieldOfView(deg * RAD_PER_DEG));
+        let pixel = self
+            .pixel_scale
+            .map(|arcsec| Scale::Pixel(arcsec * RAD_PER_ARCSEC));
+        let scale = fov.or(pixel);
+        if scale.is_none() && self.scale_error.is_some() {
+            return Err(CommandError::Usage(
+                "--scale-error says how far --fov or --pixel-scale may be off; give one of these, too".into(),
+            ));
+        }
+        let tolerance = self.scale_error.unwrap_or(DEFAULT_SCALE_ERROR_PERCENT) / 100.0;
+        let near = self.near.zip(self.radius).map(|(direction, radius_deg)| {
+            let (ra_rad, dec_rad) = (
+                direction.ra_deg * RAD_PER_DEG,
+                direction.dec_deg * RAD_PER_DEG,
+            );
+            (
+                UnitVector::from_ra_dec(ra_rad, dec_rad),
+                radius_deg * RAD_PER_DEG,
+            )
+        });
+        Ok(Knowledge {
+            scale: scale.map(|scale| ScaleHint { scale, tolerance }),
+            near,
+            date: self.date.map(|date| FrameDate {
+                date,
+                source: DateSource::Option,
+            }),
+            site: self.site,
+            exposure_s: None,
+        })
+    }
+
+    /// The same, with the scale of the camera where no other is given.
+    pub(crate) fn resolve_with_camera(&self) -> Result<Knowledge, CommandError> {
+        let sensor = self.sensor()?;
+        let knowledge = self.resolve()?;
+        Ok(Knowledge {
+            scale: knowledge
+                .scale
+                .or(sensor.as_ref().map(ScaleHint::of_camera)),
+            ..knowledge
+        })
+    }
+
+    /// The camera, where it is described.
+    pub(crate) fn sensor(&self) -> anyhow::Result<Option<Sensor>> {
+        let read = |path: &PathBuf| Ok(Sensor::read(path)?);
+        self.camera.as_ref().map(read).transpose()
+    }
+}

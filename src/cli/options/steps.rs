@@ -1,0 +1,46 @@
+//! Values of a sweep: FROM:TO:COUNT[:log].
+
+use super::values::{finite, not_of_form, whole};
+use starpipe::model::sensitivity::Spacing;
+use std::str::FromStr;
+
+/// FROM:TO:COUNT[:log].
+pub(crate) struct Steps {
+    pub(crate) ends: (f64, f64),
+    pub(crate) count: usize,
+    pub(crate) spacing: Spacing,
+}
+
+impl Steps {
+    /// Of `range`, which is `text` or the end of it; `form` is what that should look like.
+    fn of(range: &str, text: &str, form: &str) -> Result<Self, String> {
+        let parts: Vec<&str> = range.split(':').collect();
+        let (from, to, count, spacing) = match parts[..] {
+            [from, to, count] => (from, to, count, Spacing::Linear),
+            [from, to, count, "log"] => (from, to, count, Spacing::Log),
+            _ => return Err(not_of_form(text, form)),
+        };
+        Ok(Self {
+            ends: (finite(from)?, finite(to)?),
+            count: whole(count)?,
+            spacing,
+        })
+    }
+}
+
+impl FromStr for Steps {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::of(text, text, "FROM:TO:COUNT or FROM:TO:COUNT:log")
+    }
+}
+
+/// The parts of NAME=FROM:TO:COUNT[:log].
+pub(crate) fn named_steps(text: &str) -> Result<(String, Steps), String> {
+    const FORM: &str = "NAME=FROM:TO:COUNT or NAME=FROM:TO:COUNT:log";
+    let (name, range) = text
+        .split_once('=')
+        .ok_or_else(|| not_of_form(text, FORM))?;
+    Ok((name.replace('-', "_"), Steps::of(range, text, FORM)?))
+}

@@ -1,0 +1,222 @@
+//! Values of options: what is out of range is refused where it is typed.
+
+use std::fmt::Display;
+
+/// The longest side of a frame that makes sense, in pixels.
+pub(crate) const MAX_SIDE_PX: i64 = 1_000_000;
+
+/// A direction on the sky, in degrees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Direction {
+    pub(crate) ra_deg: f64,
+    pub(crate) dec_deg: f64,
+}
+
+/// Any number that is one.
+pub(crate) fn finite(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err(format!("'{text}' is not a number")),
+    }
+}
+
+fn within(
+    text: &str,
+    what: impl Display,
+    accepts: impl Fn(f64) -> bool,
+    limits: &str,
+) -> Result<f64, String> {
+    let value = finite(text)?;
+    if accepts(value) {
+        Ok(value)
+    } else {
+        Err(format!("{what} must be {limits}"))
+    }
+}
+
+/// A number above zero.
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
+    within(text, "the number", |v| v > 0.0, "above 0")
+}
+
+/// A number that is zero or above it.
+pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
+    within(text, "the number", |v| v >= 0.0, "0 or above")
+}
+
+/// A number above zero, one at most.
+pub(crate) fn share(text: &str) -> Result<f64, String> {
+    within(
+        text,
+        "the part",
+        |v| v > 0.0 && v <= 1.0,
+        "above 0 and at most 1",
+    )
+}
+
+/// A right ascension in degrees.
+pub(crate) fn right_ascension(text: &str) -> Result<f64, String> {
+    let limits = "from 0 to 360 degrees";
+    let accepts = |v| (0.0..=360.0).contains(&v);
+    within(text, "the right ascension", accepts, limits)
+}
+
+/// A declination in degrees.
+pub(crate) fn declination(text: &str) -> Result<f64, String> {
+    let limits = "from -90 to 90 degrees";
+    within(
+        text,
+        "the declination",
+        |v| (-90.0..=90.0).contains(&v),
+        limits,
+    )
+}
+
+/// A mean number of stars.
+pub(crate) fn star_count(text: &str) -> Result<f64, String> {
+    let limits = "above 0 and at most 10000";
+    within(text, "the number of stars", |v| v > 0.0 && v <= 1e4, limits)
+}
+
+/// A part of something, in percent.
+pub(crate) fn part(text: &str) -> Result<f64, String> {
+    let limits = "0 to 100 percent";
+    within(text, "the part", |v| (0.0..=100.0).contains(&v), limits)
+}
+
+/// A multiple of something, in percent.
+pub(crate) fn multiple(text: &str) -> Result<f64, String> {
+    let limits = "0 to 10000 percent";
+    within(text, "the multiple", |v| (0.0..=1e4).contains(&v), limits)
+}
+
+/// A horizontal field of view in degrees.
+pub(crate) fn field_of_view(text: &str) -> Result<f64, String> {
+    within(
+        text,
+        "the field of view",
+        |v| v > 0.0 && v < 180.0,
+        "above 0 and below 180 degrees",
+    )
+}
+
+/// An exposure in seconds.
+pub(crate) fn exposure(text: &str) -> Result<f64, String> {
+    let limits = "from 0.000001 to 1000000 s";
+    within(text, "the exposure", |v| (1e-6..=1e6).contains(&v), limits)
+}
+
+/// A zenith distance in degrees.
+pub(crate) fn zenith_distance(text: &str) -> Result<f64, String> {
+    let limits = "from 0 to below 90 degrees";
+    within(
+        text,
+        "the zenith distance",
+        |v| (0.0..90.0).contains(&v),
+        limits,
+    )
+}
+
+/// Extinction in magnitudes for each airmass.
+pub(crate) fn extinction(text: &str) -> Result<f64, String> {
+    let limits = "from 0 to 10 magnitudes";
+    within(
+        text,
+        "the extinction",
+        |v| (0.0..=10.0).contains(&v),
+        limits,
+    )
+}
+
+/// A pixel scale in arcseconds.
+pub(crate) fn pixel_scale(text: &str) -> Result<f64, String> {
+    within(
+        text,
+        "the pixel scale",
+        |v| v > 0.0 && v <= 36_000.0,
+        "above 0 and at most 36000 arcseconds",
+    )
+}
+
+/// A relative error in percent.
+pub(crate) fn percent(text: &str) -> Result<f64, String> {
+    within(
+        text,
+        "the error of the scale",
+        |v| v > 0.0 && v < 100.0,
+        "above 0 and below 100 percent",
+    )
+}
+
+/// A radius on the sky in degrees.
+pub(crate) fn radius(text: &str) -> Result<f64, String> {
+    within(
+        text,
+        "the radius",
+        |v| v > 0.0 && v <= 180.0,
+        "above 0 and at most 180 degrees",
+    )
+}
+
+/// Right ascension and declination in degrees, with a comma between them.
+pub(crate) fn direction(text: &str) -> Result<Direction, String> {
+    let (ra, dec) = text.split_once(',').ok_or(
+        "right ascension and declination in degrees are needed, with a comma between them",
+    )?;
+    let ra_deg = within(
+        ra,
+        "right ascension",
+        |v| (0.0..=360.0).contains(&v),
+        "from 0 to 360 degrees",
+    )?;
+    let dec_deg = within(
+        dec,
+        "declination",
+        |v| (-90.0..=90.0).contains(&v),
+        "from -90 to 90 degrees",
+    )?;
+    Ok(Direction { ra_deg, dec_deg })
+}
+
+pub(crate) fn not_of_form(text: &str, form: &str) -> String {
+    format!("'{text}' is not of the form {form}")
+}
+
+pub(crate) fn whole(text: &str) -> Result<usize, String> {
+    let count = text.trim().parse();
+    count.map_err(|_| format!("'{text}' is not a whole number"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_is_finite() {
+        assert_eq!(finite(" -1.5 "), Ok(-1.5));
+        for text in ["NaN", "inf", "-inf", "", "ten", "1,5"] {
+            assert!(finite(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_direction_is_on_the_sky() {
+        let orion = Direction {
+            ra_deg: 83.8,
+            dec_deg: -1.2,
+        };
+        assert_eq!(direction("83.8,-1.2"), Ok(orion));
+        assert_eq!(direction("83.8, -1.2"), Ok(orion));
+        for text in ["400,0", "-1,0", "0,91", "0", "0,NaN", "1,2,3"] {
+            assert!(direction(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn ranges_leave_out_what_makes_no_sense() {
+        assert!(field_of_view("180").is_err() && field_of_view("0").is_err());
+        assert!(percent("100").is_err() && percent("10").is_ok());
+        assert!(radius("181").is_err() && radius("180").is_ok());
+        assert!(pixel_scale("-1").is_err() && positive("0").is_err());
+    }
+}

@@ -1,0 +1,18 @@
+//! Standard output.
+
+use anyhow::Context;
+use std::io::{self, Write};
+use std::ops::ControlFlow;
+
+/// Writes `text` to standard output, whole and at once. Breaks off where nobody reads it any longer.
+pub(crate) fn print(text: &str) -> anyhow::Result<ControlFlow<()>> {
+    let mut stdout = io::stdout().lock();
+    let written = stdout
+        .write_all(text.as_bytes())
+        .and_then(|()| stdout.flush());
+    match written {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(ControlFlow::Break(())),
+        Err(error) => Err(error).context("writing to standard output"),
+        Ok(()) => Ok(ControlFlow::Continue(())),
+    }
+}
