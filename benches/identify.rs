@@ -6,7 +6,7 @@
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use starpipe::detect::{self, DetectConfig, detect};
 use starpipe::frame::{self, Frame};
-use starpipe::identify::{self, Hints, Outcome, Sky, StarField, identify};
+use starpipe::identify::{self, Hints, IndexedCatalog, Outcome, StarField, identify};
 use starpipe::pipeline::{Pipeline, SolveConfig, Workspace, star_field};
 use starpipe::sky::catalog::Catalog;
 use starpipe::sky::catalog::sky_grid::SkyGrid;
@@ -15,7 +15,7 @@ use std::hint::black_box;
 use std::path::Path;
 
 /// The frame, its stars, and a hint of its scale with a total range of a factor of two.
-fn prepare(path: &Path, sky: &Sky) -> Option<(Frame, StarField, Hints)> {
+fn prepare(path: &Path, sky: &IndexedCatalog) -> Option<(Frame, StarField, Hints)> {
     let frame = frame::read(path).ok()?;
     let detections = detect(
         &frame,
@@ -44,7 +44,7 @@ fn bench_frames(criterion: &mut Criterion, cache: &Path) {
     let mut paths: Vec<_> = entries.flatten().map(|e| e.path()).collect();
     paths.retain(|p| p.extension().is_some_and(|e| e == "tiff"));
     paths.sort();
-    let (sky, _) = Sky::open(Catalog::built_in(), cache, &|_| ());
+    let (sky, _) = IndexedCatalog::open(Catalog::built_in(), cache, &|_| ());
     let prepared: Vec<_> = paths.iter().filter_map(|p| prepare(p, &sky)).collect();
     for (path, (_, field, hints)) in paths.iter().zip(&prepared) {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -100,7 +100,7 @@ fn bench_start(criterion: &mut Criterion, cache: &Path) {
     group.bench_function("grid and index from the cache", |bencher| {
         bencher.iter_batched(
             || (),
-            |()| black_box(Sky::open(catalog, cache, &|_| ())),
+            |()| black_box(IndexedCatalog::open(catalog, cache, &|_| ())),
             BatchSize::PerIteration,
         );
     });

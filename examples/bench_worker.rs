@@ -6,7 +6,7 @@
 use serde_json::{Value, json};
 use starpipe::detect::{self, DetectConfig, Detections, detect_into};
 use starpipe::frame::{self, Frame};
-use starpipe::identify::{self, Hints, Identification, Sky};
+use starpipe::identify::{self, Hints, Identification, IndexedCatalog};
 use starpipe::pipeline::star_field;
 use starpipe::sky::catalog::Catalog;
 use std::error::Error;
@@ -18,7 +18,7 @@ const ARCSEC_PER_RAD: f64 = 206_264.806;
 
 /// The stages that are timed, and their buffers.
 struct Bench<'a> {
-    sky: Sky<'a>,
+    sky: IndexedCatalog<'a>,
     fields_deg: (f64, f64),
     frame: Frame,
     detect: detect::Workspace,
@@ -104,7 +104,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let range = std::env::args().nth(1).unwrap_or_default();
     let (from, to) = range.split_once(':').ok_or("usage: bench_worker FROM:TO")?;
     let mut bench = Bench {
-        sky: Sky::build(Catalog::built_in(), &|_| {}),
+        sky: IndexedCatalog::build(Catalog::built_in(), &|_| {}),
         fields_deg: (from.parse()?, to.parse()?),
         frame: Frame::new(3, 3, vec![0.0; 9])?,
         detect: detect::Workspace::new(),

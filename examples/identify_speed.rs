@@ -9,7 +9,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use starpipe::camera::CameraModel;
 use starpipe::detect::{self, DetectConfig, detect};
-use starpipe::identify::{Hints, Identification, Sky, StarField, Workspace};
+use starpipe::identify::{Hints, Identification, IndexedCatalog, StarField, Workspace};
 use starpipe::pipeline::star_field;
 use starpipe::sky::catalog::Catalog;
 use starpipe::study::robustness::{Answer, Observation, Protocol};
@@ -43,7 +43,12 @@ impl Times {
         }
     }
 
-    fn add(&mut self, field: &StarField, hints: &Hints, sky: &Sky) -> Option<Identification> {
+    fn add(
+        &mut self,
+        field: &StarField,
+        hints: &Hints,
+        sky: &IndexedCatalog,
+    ) -> Option<Identification> {
         let mut least_ms = f64::MAX;
         let mut found = None;
         for _ in 0..self.repeats.max(1) {
@@ -87,7 +92,7 @@ fn factor_of_two(camera: &CameraModel) -> Hints {
 }
 
 /// Fields of view, uniform in the logarithm.
-fn simulated(fields: u64, sky: &Sky) {
+fn simulated(fields: u64, sky: &IndexedCatalog) {
     if fields == 0 {
         return;
     }
@@ -116,7 +121,7 @@ fn simulated(fields: u64, sky: &Sky) {
 }
 
 /// An identification with nothing known must be repeatable; it also gives the scale.
-fn real(frames: &[String], sky: &Sky) -> Result<(), Box<dyn Error>> {
+fn real(frames: &[String], sky: &IndexedCatalog) -> Result<(), Box<dyn Error>> {
     for path in frames {
         let frame = starpipe::frame::read(path)?;
         let detections = detect(
@@ -154,7 +159,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         _ => FIELDS,
     };
-    let sky = Sky::build(Catalog::built_in(), &|_| {});
+    let sky = IndexedCatalog::build(Catalog::built_in(), &|_| {});
     simulated(fields, &sky);
     real(&arguments, &sky)
 }

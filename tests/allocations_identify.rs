@@ -8,7 +8,7 @@
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use starpipe::identify::{Hints, Reason, Sky, StarField, Workspace};
+use starpipe::identify::{Hints, IndexedCatalog, Reason, StarField, Workspace};
 use starpipe::sky::catalog::Catalog;
 use starpipe::study::robustness::{Observation, Protocol};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -55,7 +55,7 @@ fn allocations(work: impl FnOnce()) -> usize {
 }
 
 /// Fields of several widths; the last one has no true stars.
-fn fields(sky: &Sky) -> Vec<StarField> {
+fn fields(sky: &IndexedCatalog) -> Vec<StarField> {
     let draw = |(seed, fov_deg): (u64, f64)| {
         let protocol = Protocol {
             fov_deg,
@@ -88,7 +88,7 @@ fn the_counter_counts() {
 
 #[test]
 fn a_field_in_steady_state_allocates_nothing() {
-    let sky = Sky::build(Catalog::built_in(), &|_| ());
+    let sky = IndexedCatalog::build(Catalog::built_in(), &|_| ());
     let fields = fields(&sky);
     let mut workspace = Workspace::new();
     let mut run = |field: &StarField| match workspace.identify(field, &Hints::default(), &sky) {

@@ -9,8 +9,8 @@ use rand_distr::StandardNormal;
 use starpipe::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use starpipe::camera::{CameraModel, Distortion, DistortionModel, focal_length_px};
 use starpipe::identify::{
-    Hints, Identification, ObservedStar, Outcome, Photometry, Reason, Sky, StarField, StarMatch,
-    identify,
+    Hints, Identification, IndexedCatalog, ObservedStar, Outcome, Photometry, Reason, StarField,
+    StarMatch, identify,
 };
 use starpipe::sky::catalog::Catalog;
 use std::f64::consts::{PI, TAU};
@@ -26,9 +26,9 @@ const FALSE_STARS: usize = 3;
 const CENTRE_TOLERANCE: f64 = 0.002;
 const WIDTH_TOLERANCE: f64 = 0.01;
 
-fn sky() -> &'static Sky<'static> {
-    static SKY: OnceLock<Sky> = OnceLock::new();
-    SKY.get_or_init(|| Sky::build(Catalog::built_in(), &|_| ()))
+fn sky() -> &'static IndexedCatalog<'static> {
+    static SKY: OnceLock<IndexedCatalog> = OnceLock::new();
+    SKY.get_or_init(|| IndexedCatalog::build(Catalog::built_in(), &|_| ()))
 }
 
 struct Truth {

@@ -10,14 +10,14 @@ use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
-use starpipe::identify::{Hints, Outcome, Sky, identify};
+use starpipe::identify::{Hints, IndexedCatalog, Outcome, identify};
 use starpipe::sky::catalog::Catalog;
 use starpipe::study::robustness::{Answer, Mirrored, Observation, Protocol, Verdict};
 use std::sync::OnceLock;
 
-fn sky() -> &'static Sky<'static> {
-    static SKY: OnceLock<Sky> = OnceLock::new();
-    SKY.get_or_init(|| Sky::build(Catalog::built_in(), &|_| ()))
+fn sky() -> &'static IndexedCatalog<'static> {
+    static SKY: OnceLock<IndexedCatalog> = OnceLock::new();
+    SKY.get_or_init(|| IndexedCatalog::build(Catalog::built_in(), &|_| ()))
 }
 
 fn draw(protocol: &Protocol, seed: u64) -> Observation {

@@ -6,19 +6,19 @@ mod cache;
 mod cells;
 pub mod diagnosis;
 pub mod index;
+mod indexed_catalog;
 mod listing;
 mod predict;
 mod refine;
 mod search;
-mod sky;
 mod table;
 pub mod triangle;
 mod verify;
 
 pub use cache::CacheError;
+pub use indexed_catalog::IndexedCatalog;
 pub use predict::{PredictedStar, View};
 pub use search::LOG10_FALSE_ALARM_LIMIT;
-pub use sky::Sky;
 
 use refine::{Refined, Start};
 use search::{Buffers, Found, Search};
@@ -235,7 +235,7 @@ pub struct StarMatch {
 pub const MIN_STARS: usize = 4;
 
 /// Identifies the stars of `field`. For many fields, [`Workspace::identify`] does the same without allocating.
-pub fn identify(field: &StarField, hints: &Hints, sky: &Sky) -> Outcome {
+pub fn identify(field: &StarField, hints: &Hints, sky: &IndexedCatalog) -> Outcome {
     match Workspace::new().identify(field, hints, sky) {
         Ok(found) => Outcome::Identified(Box::new(found.clone())),
         Err(reason) => Outcome::NotIdentified(reason),
@@ -263,7 +263,7 @@ impl Workspace {
         &mut self,
         field: &StarField,
         hints: &Hints,
-        sky: &Sky,
+        sky: &IndexedCatalog,
     ) -> Result<&Identification, Reason> {
         if field.stars.len() < MIN_STARS {
             return Err(Reason::TooFewStars {

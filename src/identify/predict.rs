@@ -1,6 +1,6 @@
 //! Where the catalogue's stars fall in a frame.
 
-use super::Sky;
+use super::IndexedCatalog;
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::camera::{CameraModel, LANES};
 use crate::sky::catalog::sky_grid::{GridStar, chord_of};
@@ -65,7 +65,7 @@ struct Gathered {
 
 impl View<'_> {
     /// The catalogue stars in the frame, or within 1 % of its diagonal of it, down to a V magnitude, brightest first.
-    pub fn stars_to(&self, sky: &Sky, faintest_v_mag: f64) -> Vec<PredictedStar> {
+    pub fn stars_to(&self, sky: &IndexedCatalog, faintest_v_mag: f64) -> Vec<PredictedStar> {
         let mut predicted = Vec::new();
         Surroundings::default().stars_to(self, sky, faintest_v_mag, &mut predicted);
         predicted
@@ -86,7 +86,7 @@ impl Surroundings {
     pub fn stars_to(
         &mut self,
         view: &View,
-        sky: &Sky,
+        sky: &IndexedCatalog,
         faintest_v_mag: f64,
         predicted: &mut Vec<PredictedStar>,
     ) {
@@ -106,7 +106,7 @@ impl Surroundings {
     pub fn stars_at_least(
         &mut self,
         view: &View,
-        sky: &Sky,
+        sky: &IndexedCatalog,
         (least, likely_v_mag): (Depth, f64),
         predicted: &mut Vec<PredictedStar>,
     ) {
@@ -122,7 +122,7 @@ impl Surroundings {
     }
 
     /// Sees to it that all stars of `view` to a V magnitude are here; returns to which they are.
-    fn gather(&mut self, view: &View, sky: &Sky, faintest_v_mag: f64) -> f64 {
+    fn gather(&mut self, view: &View, sky: &IndexedCatalog, faintest_v_mag: f64) -> f64 {
         let (centre, reach_rad) = (view.boresight(), view.reach_rad());
         let covers =
             |around: &Gathered| around.centre.angle_to(&centre) + reach_rad <= around.radius_rad;
@@ -164,7 +164,7 @@ impl Surroundings {
 /// Makes `predicted` those of `stars`, brightest first, that are in the frame or nearly so, until there are so many that are so faint.
 fn project(
     view: &View,
-    (sky, stars): (&Sky, &[GridStar]),
+    (sky, stars): (&IndexedCatalog, &[GridStar]),
     least: &Depth,
     predicted: &mut Vec<PredictedStar>,
 ) {

@@ -7,7 +7,7 @@
 use super::refine::{Refined, Refiner, Start};
 use super::triangle::TriangleShape;
 use super::verify::{FalseAlarm, Hypothesis, Pair, Scene, TESTED_STARS};
-use super::{Hints, Photometry, Sky, StarField};
+use super::{Hints, IndexedCatalog, Photometry, StarField};
 use crate::base::coords::{Icrs, Rotation, UnitVector};
 use crate::camera::{CameraModel, DistortionModel, focal_length_px, frame_centre};
 use crate::identify::attitude::POSE_PARAMETERS;
@@ -114,7 +114,7 @@ pub struct Buffers {
 pub struct Search<'a> {
     field: &'a StarField,
     hints: &'a Hints,
-    sky: &'a Sky<'a>,
+    sky: &'a IndexedCatalog<'a>,
     buffers: &'a mut Buffers,
     /// Smallest and largest focal length, in pixels.
     focal_px: (f64, f64),

@@ -13,7 +13,7 @@
 
 use super::predict::{Depth, PredictedStar, Surroundings, View};
 use super::search::MAX_HYPOTHESES;
-use super::{ObservedStar, Photometry, Sky, StarField, StarMatch};
+use super::{IndexedCatalog, ObservedStar, Photometry, StarField, StarMatch};
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::base::statistics::{LnProduct, log10_poisson_binomial_tail};
 use crate::base::units::RAD_PER_DEG;
@@ -90,7 +90,7 @@ pub struct Scene<'a> {
     /// The stars seen.
     pub field: &'a StarField,
     /// The catalogue.
-    pub sky: &'a Sky<'a>,
+    pub sky: &'a IndexedCatalog<'a>,
 }
 
 /// How far apart a pair may be.

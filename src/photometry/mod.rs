@@ -1,6 +1,6 @@
 //! How bright what a frame shows is, and how faint it goes: zero point, completeness, sky.
 //!
-//! ([`MeasuredFrame`], [`Sky`]) → [`FramePhotometry`]
+//! ([`MeasuredFrame`], [`IndexedCatalog`]) → [`FramePhotometry`]
 //!
 //! 1. The catalogue's stars in the frame, at its date, down to well below the faintest detection; each claims its detection.
 //! 2. Bright, single, constant stars that are not saturated give the zero point ([`zero_point`]).
@@ -18,7 +18,7 @@ pub mod zero_point;
 
 use crate::base::statistics::median;
 use crate::detect::{Detection, Detections};
-use crate::identify::{Identification, Sky, View};
+use crate::identify::{Identification, IndexedCatalog, View};
 use crate::sky::catalog::{Star, StarFlags};
 use association::{Association, FrameStar, associate};
 use completeness::{Completeness, Trial};
@@ -62,7 +62,7 @@ pub struct FramePhotometry {
 }
 
 /// The photometry of `frame` with the stars of `sky`.
-pub fn measure(frame: &MeasuredFrame, sky: &Sky) -> FramePhotometry {
+pub fn measure(frame: &MeasuredFrame, sky: &IndexedCatalog) -> FramePhotometry {
     let view = View {
         camera: &frame.identification.camera,
         icrs_to_camera: &frame.identification.icrs_to_camera,
@@ -112,7 +112,7 @@ pub fn instrumental_mag(flux: f64) -> f64 {
 }
 
 /// The V magnitude down to which the catalogue's stars are looked at: none much fainter can be detected.
-fn depth_v_mag(frame: &MeasuredFrame, sky: &Sky) -> f64 {
+fn depth_v_mag(frame: &MeasuredFrame, sky: &IndexedCatalog) -> f64 {
     let sources = &frame.detections.sources;
     let matches = &frame.identification.matches;
     let v_mag = |catalog: usize| f64::from(sky.stars()[catalog].v_mag);

@@ -5,7 +5,7 @@ use crate::base::statistics::Estimate;
 use crate::base::units::DEG_PER_RAD;
 use crate::detect::DetectConfig;
 use crate::frame::Frame;
-use crate::identify::{Identification, Outcome, Sky, View};
+use crate::identify::{Identification, IndexedCatalog, Outcome, View};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::{self, Comparison, Description, Seen};
 use crate::sky::observer::Observation;
@@ -20,7 +20,7 @@ pub(super) struct Found<'a> {
     pub photometry: Option<&'a FramePhotometry>,
     pub observation: Option<&'a Observation>,
     pub header_zenith_distance_deg: Option<f64>,
-    pub sky: &'a Sky<'a>,
+    pub sky: &'a IndexedCatalog<'a>,
 }
 
 /// The level from which on the camera's pixels are full, where the frame's levels can be the camera's: files may hold those of

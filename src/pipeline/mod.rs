@@ -4,14 +4,14 @@
 //!
 //! ```no_run
 //! use starpipe::sky::catalog::Catalog;
-//! use starpipe::identify::Sky;
+//! use starpipe::identify::IndexedCatalog;
 //! use starpipe::pipeline::{Pipeline, SolveConfig, Workspace};
 //! use starpipe::report::FrameReport;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let catalog = Catalog::built_in();
-//! // Takes some seconds; `Sky::open` keeps what it makes for the next time.
-//! let pipeline = Pipeline::new(Sky::build(catalog, &|_| {}));
+//! // Takes some seconds; `IndexedCatalog::open` keeps what it makes for the next time.
+//! let pipeline = Pipeline::new(IndexedCatalog::build(catalog, &|_| {}));
 //! let mut workspace = Workspace::new();
 //! let solution =
 //!     pipeline.solve_file("night.tif".as_ref(), &SolveConfig::default(), &mut workspace)?;
@@ -31,7 +31,7 @@ use crate::detect::{self, DetectConfig, DetectError, Detection, DetectionFlags, 
 use crate::frame::{self, Frame, FrameError};
 use crate::identify::diagnosis::{self, Examined};
 use crate::identify::{
-    self, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Outcome, Photometry, Sky, StarField,
+    self, IndexedCatalog, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Outcome, Photometry, StarField,
 };
 use crate::photometry::comparison::{Comparison, Description};
 use crate::photometry::{self, FramePhotometry, MeasuredFrame, instrumental_mag};
@@ -249,17 +249,17 @@ impl Workspace {
 
 /// The stages, ready for any number of frames.
 pub struct Pipeline<'a> {
-    sky: Sky<'a>,
+    sky: IndexedCatalog<'a>,
 }
 
 impl<'a> Pipeline<'a> {
     /// Frames are identified with the stars of `sky`.
-    pub fn new(sky: Sky<'a>) -> Self {
+    pub fn new(sky: IndexedCatalog<'a>) -> Self {
         Self { sky }
     }
 
     /// The stars that frames are identified with.
-    pub fn sky(&self) -> &Sky<'a> {
+    pub fn sky(&self) -> &IndexedCatalog<'a> {
         &self.sky
     }
 

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use starpipe::base::coords::{Rotation, UnitVector};
 use starpipe::base::statistics::median;
-use starpipe::identify::{Outcome, Sky};
+use starpipe::identify::{IndexedCatalog, Outcome};
 use starpipe::model::sensitivity::{Budget, Scenario, SkyBrightness};
 use starpipe::model::simulate::{Pointing, Scene, Simulator, TrueStar, Truth};
 use starpipe::pipeline::{Pipeline, SolveConfig, Workspace};
@@ -191,7 +191,7 @@ fn with_pipeline<T>(run: impl FnOnce(&Pipeline) -> T) -> T {
         || std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache"),
         Into::into,
     );
-    let (sky, _) = Sky::open(Catalog::built_in(), &cache, &|_| {});
+    let (sky, _) = IndexedCatalog::open(Catalog::built_in(), &cache, &|_| {});
     run(&Pipeline::new(sky))
 }
 

@@ -5,7 +5,7 @@ use crate::cli::output::messages::{one_line, report_warning};
 use crate::cli::progress::bar;
 use anyhow::Context;
 use clap::Args;
-use starpipe::identify::{CacheError, Sky};
+use starpipe::identify::{CacheError, IndexedCatalog};
 use starpipe::sky::catalog::{self, Catalog};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -54,13 +54,13 @@ pub(crate) fn read_catalog(path: Option<&Path>) -> anyhow::Result<Cow<'static, C
 }
 
 /// The index comes from the cache where it is there and whole; a cache of no use costs time, not results.
-pub(crate) fn sky<'a>(catalog: &'a Catalog, resources: &CatalogOptions) -> Sky<'a> {
+pub(crate) fn sky<'a>(catalog: &'a Catalog, resources: &CatalogOptions) -> IndexedCatalog<'a> {
     let progress = bar(100, "indexing the catalogue {wide_bar} {percent} %");
     let show = |part: f64| progress.set_position((part * 100.0) as u64);
     let Some(directory) = cache::directory(resources.cache_dir.clone()) else {
-        return Sky::build(catalog, &show);
+        return IndexedCatalog::build(catalog, &show);
     };
-    let (sky, troubles) = Sky::open(catalog, &directory, &show);
+    let (sky, troubles) = IndexedCatalog::open(catalog, &directory, &show);
     progress.finish_and_clear();
     warn_of(troubles);
     sky

@@ -21,7 +21,9 @@ mod trails;
 use crate::camera::focal_length_px;
 use crate::detect::Detections;
 use crate::frame::Frame;
-use crate::identify::{Excluded, Hints, Identification, Outcome, Reason, Sky, StarField, identify};
+use crate::identify::{
+    Excluded, Hints, Identification, IndexedCatalog, Outcome, Reason, StarField, identify,
+};
 
 /// What there is to look at.
 #[derive(Debug, Clone, Copy)]
@@ -35,7 +37,7 @@ pub struct Examined<'a> {
 }
 
 /// The reason why `examined` was not identified; `found` is what the search says.
-pub fn explain(examined: &Examined, sky: &Sky, found: Reason) -> Reason {
+pub fn explain(examined: &Examined, sky: &IndexedCatalog, found: Reason) -> Reason {
     let image = examined.image;
     let has_stars = matches!(found, Reason::NoMatch { .. });
     image
@@ -48,7 +50,7 @@ pub fn explain(examined: &Examined, sky: &Sky, found: Reason) -> Reason {
 }
 
 /// Searches again without the hints.
-fn excluded(examined: &Examined, sky: &Sky) -> Option<Reason> {
+fn excluded(examined: &Examined, sky: &IndexedCatalog) -> Option<Reason> {
     if *examined.hints == Hints::default() {
         return None;
     }
@@ -82,7 +84,7 @@ fn fields_of_view((low, high): (f64, f64), width_px: f64) -> (f64, f64) {
     (fov_rad(low), fov_rad(high))
 }
 
-fn out_of_range(examined: &Examined, sky: &Sky) -> Option<Reason> {
+fn out_of_range(examined: &Examined, sky: &IndexedCatalog) -> Option<Reason> {
     let scale = examined.hints.pixel_scale_rad?;
     let width_px = examined.field.width_px;
     let searched_rad = sky.fov_range_rad();

@@ -29,7 +29,7 @@ pub use table::{Case, Parameter, Row, STANDARD_FOV_DEG, VARIED_FOV_DEG, standard
 pub use tally::{Answer, Tally, Verdict};
 
 use crate::base::units::RAD_PER_DEG;
-use crate::identify::{Photometry, Sky, identify};
+use crate::identify::{IndexedCatalog, Photometry, identify};
 use crate::pipeline::{Knowledge, Scale, ScaleHint};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -113,7 +113,7 @@ impl Protocol {
 
 /// Runs `trials` trials of `protocol` on the threads of the current pool; `done` is called after each.
 pub fn run(
-    sky: &Sky,
+    sky: &IndexedCatalog,
     protocol: &Protocol,
     trials: u64,
     seed: u64,
@@ -131,7 +131,7 @@ pub fn run(
 }
 
 /// Runs the trial number `trial` alone.
-pub fn run_one(sky: &Sky, protocol: &Protocol, seed: u64, trial: u64) -> Verdict {
+pub fn run_one(sky: &IndexedCatalog, protocol: &Protocol, seed: u64, trial: u64) -> Verdict {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(trial);
     let observation = Observation::draw(protocol, sky, &mut rng);

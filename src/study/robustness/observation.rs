@@ -4,7 +4,7 @@ use super::{Mirrored, Protocol};
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::camera::{CameraModel, focal_length_px};
-use crate::identify::{Photometry, Sky};
+use crate::identify::{IndexedCatalog, Photometry};
 use crate::photometry::instrumental_mag;
 use crate::pipeline::{CentroidList, ListedCentroid};
 use rand::Rng;
@@ -31,7 +31,7 @@ pub struct Observation {
 
 impl Observation {
     /// Draws a list as `protocol` says.
-    pub fn draw(protocol: &Protocol, sky: &Sky, rng: &mut ChaCha8Rng) -> Self {
+    pub fn draw(protocol: &Protocol, sky: &IndexedCatalog, rng: &mut ChaCha8Rng) -> Self {
         let icrs_to_camera = random_rotation(rng);
         let mirrored = match protocol.mirrored {
             Mirrored::Never => false,
@@ -92,7 +92,7 @@ impl Drawn {
 /// The catalogue's stars on the frame that are above the limit: where they stand, and their observed magnitudes.
 fn stars_seen(
     protocol: &Protocol,
-    sky: &Sky,
+    sky: &IndexedCatalog,
     (camera, icrs_to_camera): (&CameraModel, &Rotation<Icrs, Camera>),
     rng: &mut ChaCha8Rng,
 ) -> Vec<Drawn> {
@@ -145,7 +145,7 @@ fn false_stars(protocol: &Protocol, stars: &[Drawn], rng: &mut ChaCha8Rng) -> Ve
 }
 
 /// The magnitude to which the sky has, on average, the wanted number of stars on a frame.
-fn limiting_v_mag(protocol: &Protocol, camera: &CameraModel, sky: &Sky) -> f64 {
+fn limiting_v_mag(protocol: &Protocol, camera: &CameraModel, sky: &IndexedCatalog) -> f64 {
     let area_sq_deg = camera.fov_x_rad() * camera.fov_y_rad() * DEG_PER_RAD.powi(2);
     sky.magnitude_of_density(protocol.mean_stars / area_sq_deg)
 }

@@ -15,7 +15,7 @@ const WIDEST_FOV_DEG: f64 = 60.0;
 const WHOLE_SKY_SQ_DEG: f64 = 41_252.96;
 
 /// The catalogue's stars by place, and the triangles that they form.
-pub struct Sky<'a> {
+pub struct IndexedCatalog<'a> {
     catalog: &'a Catalog,
     /// The stars by place.
     pub grid: SkyGrid,
@@ -48,7 +48,7 @@ impl MagnitudeCounts {
     }
 }
 
-impl<'a> Sky<'a> {
+impl<'a> IndexedCatalog<'a> {
     /// Takes the triangles from the cache directory, or makes them (`progress` is then called with the share
     /// done) and puts them there. Also returns what went wrong with the cache, which is no reason to stop.
     pub fn open(
