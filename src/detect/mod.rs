@@ -49,8 +49,8 @@ pub use filter_model::FilterModel;
 
 use crate::frame::{Frame, MIN_SIDE_PX};
 use background::{CellScratch, Mesh, MeshConfig, Strips};
-use candidates::{Candidates, RawPeak, RawPeaks, Search, SearchConfig, raw_peaks};
-use filter::{Band, Kernel};
+use candidates::{Candidates, PeakSearch, RawPeak, RawPeaks, SearchConfig, raw_peaks};
+use filter::{FilteredBand, Kernel};
 use fit::{FitWork, NoiseModel, Scene};
 use measure::{KnownSpots, MeasureWorker, Measurement};
 use multiversion::multiversion;
@@ -106,7 +106,7 @@ pub struct Workspace {
     raw_peak_workers: Vec<RawPeaks>,
     measure_workers: Vec<MeasureWorker>,
     noise: NoiseWork,
-    search: Search,
+    search: PeakSearch,
     fits: FitWork,
     known_spots: KnownSpots,
     sorted: Vec<f32>,
@@ -116,7 +116,7 @@ pub struct Workspace {
 #[derive(Debug, Clone, Default)]
 struct Worker {
     cells: CellScratch,
-    band: Band,
+    band: FilteredBand,
 }
 
 impl Workspace {
@@ -133,7 +133,7 @@ impl Workspace {
             raw_peak_workers: Vec::new(),
             measure_workers: Vec::new(),
             noise: NoiseWork::default(),
-            search: Search::default(),
+            search: PeakSearch::default(),
             fits: FitWork::default(),
             known_spots: KnownSpots::default(),
             sorted: Vec::new(),

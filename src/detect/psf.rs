@@ -1,32 +1,34 @@
-//! The spot of a star: a Gaussian integrated over the pixels (IPSF).
+//! The point spread function: a Gaussian integrated over the pixels, called the spot.
 //!
-//! Along one axis, the part of the light in pixel `i` of a spot at `x` with standard deviation σ is
-//! `½[erf((i+½−x)/√2σ) − erf((i−½−x)/√2σ)]`; the spot is the product of the two axes.
+//! Along one axis, the fraction of the light of a spot at `x` with standard deviation σ that falls on
+//! pixel `i` is `½[erf((i+½−x)/√2σ) − erf((i−½−x)/√2σ)]`; the spot is the product of both axes.
 //!
 //! # Reference
 //! Wang et al. 2019, Laser & Optoelectronics Progress 56, 101101, Eqs. (1) and (2).
 
-use crate::detect::filter::MAX_TAPS;
 use arrayvec::ArrayVec;
 use multiversion::multiversion;
 
-/// The variance of a pixel's own width, in px²: a spot spreads over σ² + 1/12.
+/// Variance of a pixel's own width, in px²: an integrated spot has the variance σ² + 1/12.
 pub(crate) const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
 
-/// The longest side of a fitting window, in pixels.
+/// Maximum length of a [`centered_profile`], in pixels: enough for spots up to σ = 13 px.
+pub(crate) const MAX_TAPS: usize = 32;
+
+/// Maximum side of a fitting window, in pixels.
 pub(crate) const MAX_WINDOW_PX: usize = 49;
 
-/// Pixels of a row treated together.
+/// Adjacent pixels of a row treated together.
 pub(crate) const LANES: usize = 8;
-/// Values of such pixels.
+/// Values of a group of adjacent pixels.
 pub(crate) type Lanes = [f32; LANES];
-/// Groups that make up the longest side.
+/// Groups in the longest side of a window.
 const GROUPS: usize = MAX_WINDOW_PX.div_ceil(LANES);
 
 /// Light per pixel along one axis, and its derivatives.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct AxisProfile {
-    /// Part of the light in each pixel.
+    /// Fraction of the light in each pixel.
     value: [Lanes; GROUPS],
     /// Its derivative with respect to the centre, per px.
     by_center: [Lanes; GROUPS],
@@ -34,10 +36,10 @@ pub(crate) struct AxisProfile {
     by_sigma: [Lanes; GROUPS],
 }
 
-/// The same in some of the pixels.
+/// An [`AxisProfile`] in one or several pixels, as `T` has it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct ProfilePart<T> {
-    /// Part of the light in a pixel.
+    /// Fraction of the light.
     pub value: T,
     /// Its derivative with respect to the centre, per px.
     pub by_center: T,
@@ -46,7 +48,7 @@ pub(crate) struct ProfilePart<T> {
 }
 
 impl<const N: usize> ProfilePart<[f32; N]> {
-    /// All in one of them.
+    /// The values in one lane.
     #[inline(always)]
     pub fn lane(&self, lane: usize) -> ProfilePart<f32> {
         ProfilePart {
@@ -58,17 +60,18 @@ impl<const N: usize> ProfilePart<[f32; N]> {
 }
 
 impl AxisProfile {
-    /// Fills the first `count` pixels for a spot at `center_px` (0 is the centre of the first) with `sigma_px`.
+    /// Fills the first `count` pixels for a spot of `sigma_px` at `center_px`, where 0 is the centre
+    /// of the first pixel.
     pub fn fill(&mut self, center_px: f64, sigma_px: f64, count: usize) {
         fill(self, center_px, sigma_px, count.min(MAX_WINDOW_PX));
     }
 
-    /// The light in the pixels, of which the first `count` were filled.
+    /// Fraction of the light in each pixel; only those that [`Self::fill`] counted are valid.
     pub fn values(&self) -> &[f32] {
         self.value.as_flattened()
     }
 
-    /// All of a group of pixels.
+    /// The values in a group of pixels.
     #[inline(always)]
     pub fn group(&self, group: usize) -> ProfilePart<Lanes> {
         ProfilePart {
@@ -78,7 +81,7 @@ impl AxisProfile {
         }
     }
 
-    /// All of one pixel.
+    /// The values in one pixel.
     #[inline(always)]
     pub fn pixel(&self, pixel: usize) -> ProfilePart<f32> {
         ProfilePart {
@@ -89,10 +92,10 @@ impl AxisProfile {
     }
 }
 
-/// Edges of pixels treated together: of one pixel less.
+/// Pixel edges treated together: those of one pixel less.
 const EDGES: usize = 8;
 
-/// The light before a place along an axis, in parts of all, and how it changes.
+/// Cumulative light along an axis: the fraction that falls before a point, and its derivatives.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cumulative {
     scale: f64,
@@ -101,7 +104,7 @@ pub(crate) struct Cumulative {
 }
 
 impl Cumulative {
-    /// That of a spot with `sigma_px`.
+    /// For a spot of `sigma_px`.
     pub fn of_spot(sigma_px: f64) -> Self {
         let scale = 1.0 / (std::f64::consts::SQRT_2 * sigma_px);
         let density = std::f64::consts::FRAC_2_SQRT_PI * 0.5 * scale;
@@ -112,8 +115,8 @@ impl Cumulative {
         }
     }
 
-    /// At a place so far from the centre, in pixels: the light, less the half; its derivatives with respect to the centre
-    /// and to σ, per px.
+    /// The fraction less one half, and its derivatives with respect to the centre and to σ, per px,
+    /// at a distance from the centre in pixels.
     #[inline(always)]
     pub fn at(&self, distance_px: f64) -> [f64; 3] {
         let (erf, exp) = erf_and_gauss(distance_px * self.scale);
@@ -143,7 +146,7 @@ fn fill(profile: &mut AxisProfile, center_px: f64, sigma_px: f64, count: usize) 
                 edges[edge] = at;
             }
         }
-        // A whole group is written: the profiles have room for it.
+        // May write beyond `count`, as far as the profile is long.
         let part = start..start + EDGES - 1;
         for (result, edges) in results.iter_mut().zip(&edges) {
             for (pixel, edge) in result[part.clone()].iter_mut().zip(edges.windows(2)) {
@@ -156,7 +159,7 @@ fn fill(profile: &mut AxisProfile, center_px: f64, sigma_px: f64, count: usize) 
 /// Beyond this, erf is ±1 and the exponential 0 to one part in 10¹¹.
 const ERF_RANGE: f64 = 5.0;
 
-/// `erf(x)` and `exp(−x²)`; the error of erf is below 1.5e-7. Without branches, for loops of vectors.
+/// `erf(x)`, with an error below 1.5e-7, and `exp(−x²)`. Without branches, so that loops vectorise.
 ///
 /// # Reference
 /// Abramowitz & Stegun 1964, 7.1.26: it needs the exponential that the derivatives need anyway.
@@ -180,13 +183,13 @@ pub(crate) fn erf_and_gauss(x: f64) -> (f64, f64) {
     ((1.0 - polynomial * gauss).copysign(x), gauss)
 }
 
-/// What [`exp_of_negative`] is good down to.
+/// Smallest argument of [`exp_of_negative`].
 pub(crate) const LEAST_EXPONENT: f64 = -700.0;
 
-/// `exp(x)` for −700 ≤ x ≤ 0, to 1e-10 of its value: 2ⁿ times the series of what is left.
+/// `exp(x)` for −700 ≤ x ≤ 0, to a relative 1e-10: 2ⁿ times the series of the remainder.
 #[inline(always)]
 pub(crate) fn exp_of_negative(x: f64) -> f64 {
-    /// Added to a number, it leaves the nearest integer in the lowest bits of the sum.
+    /// Added to a number, leaves the nearest integer in the lowest bits of the sum.
     const ROUNDER: f64 = 6_755_399_441_055_744.0;
     const EXPONENT_BITS: u32 = 52;
     const EXPONENT_BIAS: u64 = 1023;
@@ -214,9 +217,8 @@ pub(crate) fn exp_of_negative(x: f64) -> f64 {
     sum * f64::from_bits(bits)
 }
 
-/// The spot's profile centred on a pixel: parts of the light at distances 0, 1, … `radius` pixels.
-///
-/// At most [`MAX_TAPS`] of them.
+/// Profile of a spot centred on a pixel: fractions of the light at distances 0, 1, … `radius` pixels,
+/// at most [`MAX_TAPS`] of them.
 pub(crate) fn centered_profile(sigma_px: f64, radius: usize) -> ArrayVec<f64, MAX_TAPS> {
     let scale = 1.0 / (std::f64::consts::SQRT_2 * sigma_px);
     let edge = |distance: f64| erf_and_gauss(distance * scale).0;
@@ -230,7 +232,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_light_is_counted_and_its_mean_is_the_centre() {
+    fn fractions_sum_to_one_and_their_mean_is_the_centre() {
         for sigma in [0.3, 0.5, 1.0, 2.0] {
             let mut profile = AxisProfile::default();
             profile.fill(12.3, sigma, 25);
@@ -238,7 +240,7 @@ mod tests {
             let sum: f64 = values().sum();
             let mean: f64 = values().enumerate().map(|(i, v)| i as f64 * v).sum();
             assert!((sum - 1.0).abs() < 1e-6, "{sum}");
-            // Below σ = 0.5 the mean of the pixels is not that of the spot: undersampling.
+            // The mean of the pixels is off where the spot is undersampled.
             assert!(
                 (mean - 12.3).abs() < if sigma < 0.6 { 0.06 } else { 1e-3 },
                 "{mean}"
@@ -247,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn the_exponential_is_that_of_the_standard_library() {
+    fn the_exponential_agrees_with_the_standard_library() {
         for i in 0..=2500 {
             let x = -0.01 * f64::from(i);
             assert!((exp_of_negative(x) / x.exp() - 1.0).abs() < 1e-10, "{x}");

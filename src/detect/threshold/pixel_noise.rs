@@ -13,9 +13,9 @@
 //! for the form used here.
 
 use crate::detect::background::{Mesh, Piece, sum_of};
-use crate::detect::filter::{MAX_TAPS, normalise};
+use crate::detect::filter::normalise;
 use crate::detect::pixels::{BLOCK_PX, BlockMaxima, View};
-use crate::detect::psf::{AxisProfile, MAX_WINDOW_PX, centered_profile};
+use crate::detect::psf::{AxisProfile, MAX_TAPS, MAX_WINDOW_PX, centered_profile};
 use arrayvec::ArrayVec;
 use multiversion::multiversion;
 use std::ops::Range;

@@ -1,0 +1,139 @@
+//! Finds connected regions above the threshold, and the peaks in them.
+//!
+//! [`Candidates`] of each row of cells, mean and noise of the filtered frame → [`Peak`]s, strongest
+//! first, and the [`Region`]s that hold them.
+//!
+//! 1. Candidates above the threshold, in units of the local noise of the filtered frame.
+//! 2. Regions of 8-connected pixels.
+//! 3. Local maxima, each with its prominence.
+//! 4. Peaks that noise or the wing of a brighter star can explain are dropped.
+//! 5. Of the many peaks of a streak one is kept.
+
+use super::candidate_pixels::{CandidatePixel, Candidates, LocalMaximum};
+use super::labelling::{BrightPixel, Labelling};
+use super::peak::{Peak, is_saturated, parabola_vertex};
+use super::prominence::Flooding;
+use super::region::Region;
+use super::search_config::SearchConfig;
+use super::selection::Selection;
+use super::streaks::Streaks;
+use crate::detect::background::Mesh;
+use crate::detect::pixels::View;
+
+/// Buffers of the search, and its result.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct PeakSearch {
+    labelling: Labelling,
+    /// The pixel and the run of each peak while the peaks are in reading order.
+    peak_pixels: Vec<[u32; 2]>,
+    flooding: Flooding,
+    selection: Selection,
+    streaks: Streaks,
+    /// The mesh interpolated to the current row.
+    nodes: Vec<[f32; 2]>,
+    /// Peaks, strongest first.
+    pub peaks: Vec<Peak>,
+    /// All regions.
+    pub regions: Vec<Region>,
+}
+
+impl PeakSearch {
+    /// Finds regions and peaks in the candidates of all rows of cells of the filtered frame, whose
+    /// mean and noise are in `mesh`.
+    pub fn run(
+        &mut self,
+        candidates: &[Candidates],
+        mesh: &Mesh,
+        frame: &View<'_>,
+        config: &SearchConfig,
+    ) {
+        self.collect(candidates, mesh, frame, config);
+        self.labelling.connect(frame.height);
+        self.labelling.measure_regions(&mut self.regions);
+        for (peak, &[_, run]) in self.peaks.iter_mut().zip(&self.peak_pixels) {
+            peak.region = self.labelling.region_of_run(run);
+        }
+        self.count_peaks();
+        self.set_prominences();
+        self.selection.apply(&mut self.peaks, config);
+        self.count_peaks();
+        self.streaks
+            .reduce_regions(&mut self.peaks, &self.regions, config.spot_width_px);
+        self.count_peaks();
+        self.streaks
+            .join_dashes(&mut self.peaks, &mut self.regions, config.spot_width_px);
+    }
+
+    /// Collects the pixels above the threshold, and the peaks among them.
+    fn collect(
+        &mut self,
+        candidates: &[Candidates],
+        mesh: &Mesh,
+        frame: &View<'_>,
+        config: &SearchConfig,
+    ) {
+        self.labelling.clear();
+        self.peaks.clear();
+        self.peak_pixels.clear();
+        for of_cells in candidates {
+            let mut maxima = of_cells.maxima.iter().peekable();
+            for (index, candidate) in (0..).zip(&of_cells.pixels) {
+                let maximum = maxima.next_if(|maximum| maximum.pixel == index);
+                let CandidatePixel { x, y, value } = *candidate;
+                if self.labelling.begin_row(y as usize) {
+                    mesh.across_row(y as usize, &mut self.nodes);
+                }
+                let (mean, sigma) = mesh.at_column(&self.nodes, x as f32);
+                let snr = (value - mean) / sigma;
+                if snr >= config.threshold {
+                    let pixel = BrightPixel { x, y, snr };
+                    let indices = self.labelling.add(pixel);
+                    if let Some(maximum) = maximum {
+                        let (x, y) = (x as usize, y as usize);
+                        let saturated = is_saturated(frame, x, y, config.saturation_adu);
+                        self.peak_pixels.push(indices);
+                        self.peaks.push(new_peak(pixel, value, maximum, saturated));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Sets the prominences where a region has several peaks; a single peak keeps its height.
+    fn set_prominences(&mut self) {
+        for region in 0..self.regions.len() {
+            if self.regions[region].peaks >= 2 {
+                self.flooding.set_prominences(
+                    region,
+                    &self.labelling,
+                    &self.peak_pixels,
+                    &mut self.peaks,
+                );
+            }
+        }
+    }
+
+    fn count_peaks(&mut self) {
+        for region in &mut self.regions {
+            region.peaks = 0;
+        }
+        for peak in &self.peaks {
+            self.regions[peak.region].peaks += 1;
+        }
+    }
+}
+
+/// A peak whose region is not known yet.
+fn new_peak(pixel: BrightPixel, value: f32, maximum: &LocalMaximum, saturated: bool) -> Peak {
+    let adjacent = maximum.adjacent;
+    Peak {
+        x: pixel.x as usize,
+        y: pixel.y as usize,
+        offset_px: adjacent.map_or([0.0; 2], |adjacent| parabola_vertex(value, adjacent)),
+        values: adjacent.map(|adjacent| (value, adjacent)),
+        snr: pixel.snr,
+        prominence: pixel.snr,
+        region: 0,
+        saturated,
+    }
+}
