@@ -147,6 +147,7 @@ impl FilteredBand {
 mod tests {
     use super::*;
     use crate::detect::background::MeshConfig;
+    use crate::detect::psf::centered_profile;
 
     /// A mesh of background 0 and noise 1, from a frame of zeros.
     fn unit_mesh(zeros: &View<'_>) -> Mesh {
