@@ -44,7 +44,7 @@ fn bench_frames(criterion: &mut Criterion, cache: &Path) {
     let mut paths: Vec<_> = entries.flatten().map(|e| e.path()).collect();
     paths.retain(|p| p.extension().is_some_and(|e| e == "tiff"));
     paths.sort();
-    let (sky, _) = IndexedCatalog::open(Catalog::built_in(), cache, &|_| ());
+    let sky = IndexedCatalog::open(Catalog::built_in(), Some(cache), &|_| ());
     let prepared: Vec<_> = paths.iter().filter_map(|p| prepare(p, &sky)).collect();
     for (path, (_, field, hints)) in paths.iter().zip(&prepared) {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -100,7 +100,7 @@ fn bench_start(criterion: &mut Criterion, cache: &Path) {
     group.bench_function("grid and index from the cache", |bencher| {
         bencher.iter_batched(
             || (),
-            |()| black_box(IndexedCatalog::open(catalog, cache, &|_| ())),
+            |()| black_box(IndexedCatalog::open(catalog, Some(cache), &|_| ())),
             BatchSize::PerIteration,
         );
     });

@@ -2,7 +2,7 @@
 
 use super::exit::{CommandError, Exit};
 use super::options::catalog::CatalogOptions;
-use super::options::catalog::{read_catalog, sky, thread_pool, warn_of};
+use super::options::catalog::{index_catalog, read_catalog, thread_pool, warn_of_cache};
 use super::options::format::PageFormat;
 use super::output::files::write_whole;
 use super::output::overwrite;
@@ -59,7 +59,7 @@ pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Exit, CommandErro
     }
     let pool = thread_pool(arguments.resources.threads)?;
     let catalog = pool.install(|| read_catalog(arguments.resources.catalog.as_deref()))?;
-    let pipeline = Pipeline::new(pool.install(|| sky(&catalog, &arguments.resources)));
+    let pipeline = Pipeline::new(pool.install(|| index_catalog(&catalog, &arguments.resources)));
     let trials = Trials {
         count: arguments.trials,
         seed: arguments.seed,
@@ -67,7 +67,7 @@ pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Exit, CommandErro
     let progress = bar(trials.count, "frames {wide_bar} {pos}/{len} {eta}");
     let done = pool.install(|| run(&published, &pipeline, trials, &|| progress.inc(1)));
     progress.finish_and_clear();
-    warn_of(pipeline.sky().take_troubles());
+    warn_of_cache(pipeline.sky());
     let done = done.map_err(anyhow::Error::from)?;
     if let Some(directory) = &arguments.out {
         save(&done, &pipeline, directory, &name)?;

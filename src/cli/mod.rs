@@ -1,7 +1,6 @@
 //! From arguments to exit status: raw arguments, settings, work, printing.
 
 mod batch;
-mod cache;
 mod camera;
 mod catalog;
 mod command;

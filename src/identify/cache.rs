@@ -1,4 +1,4 @@
-//! The triangle index on disk, so that it is made once for each catalogue, and read only where it is needed.
+//! The file that keeps a triangle index, so that it is built once for each catalog.
 //!
 //! All numbers are little-endian. In order, without gaps:
 //!
@@ -7,11 +7,19 @@
 //! | 16 | magic |
 //! | 8, 8 | format version, checksum of the catalogue, `u64` each |
 //! | 8, 8 | bytes and XXH3-64 of the table that follows, `u64` each |
-//! | … | the table: for each size class, its smallest and largest longest side as chords, `f64` each; for each of its chunks the XXH3-64 of their triangles, `u64` each; where its cells begin, `u32` each, and its number of triangles, `u32` |
-//! | … | the triangles, class by class and chunk by chunk: their corners, three `u32`, and their ratios, two `u16` |
+//! | … | the table, an entry for each size class (below) |
+//! | … | the triangles, by class and chunk: corners, three `u32`; ratios, two `u16` |
 //!
-//! A file is written beside its place and renamed. The table is read and checked at once; a chunk of triangles, when it is
-//! first needed. A file that is not exactly what was written is taken away.
+//! An entry of the table:
+//!
+//! | Bytes | Content |
+//! |---|---|
+//! | 8, 8 | smallest and largest longest side as chords, `f64` each |
+//! | 8 × chunks | XXH3-64 of the triangles of each chunk, `u64` each |
+//! | 4 × (cells + 1) | number of triangles before each cell, and in all, `u32` each |
+//!
+//! A file is written under a temporary name and renamed. Its table is read and checked at once, a
+//! chunk when it is first needed. A file with a damaged chunk is deleted.
 
 use super::table::{CELLS, CHUNKS, SizeClass, Triangle};
 use std::fs::File;
@@ -22,30 +30,30 @@ use std::sync::{Mutex, PoisonError};
 use xxhash_rust::xxh3::xxh3_64;
 
 const MAGIC: [u8; 16] = *b"starpipe index\r\n";
-/// To be raised whenever the same catalogue makes another index, or its layout changes.
+/// To be raised whenever the same catalog gets another index, or the layout changes.
 const FORMAT_VERSION: u64 = 2;
 const HEADER_BYTES: usize = 48;
 const TRIANGLE_BYTES: usize = 16;
-/// Of one class in the table.
+/// Size of an entry of the table.
 const CLASS_BYTES: usize = 16 + 8 * CHUNKS + 4 * (CELLS + 1);
-/// No index has more: guards against a damaged length.
+/// Upper limit that guards against a damaged length.
 const MAX_CLASSES: usize = 64;
 
-/// Why an index could not be taken from the cache or put there.
+/// Why an index could not be read from the cache or written to it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CacheError {
-    /// The file system refused.
+    /// The file could not be read or written.
     #[error("{action} the triangle index {path}: {source}")]
     Io {
-        /// What was tried.
+        /// What was attempted.
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
-    /// The file is not what was written.
+    /// The content of the file is not what was written.
     #[error("the triangle index {path} is damaged: {what}")]
     Damaged {
         /// The file.
@@ -55,48 +63,50 @@ pub enum CacheError {
     },
 }
 
-/// Where the index of the catalogue with this checksum is kept.
+/// The file in `directory` for the index of the catalog with this checksum.
 pub fn index_path(directory: &Path, catalog_checksum: u64) -> PathBuf {
     directory.join(format!(
         "triangles-{catalog_checksum:016x}-v{FORMAT_VERSION}.bin"
     ))
 }
 
-/// An index on disk, of which chunks can be read.
+/// An open file, from which chunks are read.
 #[derive(Debug)]
 pub struct IndexFile {
     path: PathBuf,
     file: Mutex<File>,
-    classes: Vec<ClassPlace>,
+    classes: Vec<StoredClass>,
 }
 
-/// Where the triangles of a class begin, and the checksums of its chunks.
+/// The triangles of a class in the file.
 #[derive(Debug)]
-struct ClassPlace {
+struct StoredClass {
+    /// Position of the first triangle, in bytes.
     start: u64,
+    /// Checksum of each chunk.
     checksums: Vec<u64>,
 }
 
 impl IndexFile {
-    /// Reads a chunk of a class, `range` of the class's triangles.
+    /// Reads a chunk of a class: its triangles `range`.
     ///
     /// # Errors
-    /// [`CacheError::Io`] if it cannot be read, [`CacheError::Damaged`] if it is not what [`store`] wrote. Then the file is
-    /// taken away.
+    /// [`CacheError::Io`] if it cannot be read, [`CacheError::Damaged`] if it is not what [`store`]
+    /// wrote. In both cases the file is deleted.
     pub fn chunk(
         &self,
         class: usize,
         chunk: usize,
         range: Range<u32>,
     ) -> Result<Box<[Triangle]>, CacheError> {
-        let place = &self.classes[class];
+        let stored = &self.classes[class];
         let mut bytes = vec![0; range.len() * TRIANGLE_BYTES];
-        let start = place.start + u64::from(range.start) * TRIANGLE_BYTES as u64;
+        let start = stored.start + u64::from(range.start) * TRIANGLE_BYTES as u64;
         self.read_at(start, &mut bytes)
-            .map_err(|source| self.given_up(io_error("reading", &self.path)(source)))?;
-        if xxh3_64(&bytes) != place.checksums[chunk] {
+            .map_err(|source| self.delete_after(io_error("reading", &self.path)(source)))?;
+        if xxh3_64(&bytes) != stored.checksums[chunk] {
             let what = format!("the checksum of chunk {chunk} of class {class} is wrong");
-            return Err(self.given_up(damaged(&self.path)(what)));
+            return Err(self.delete_after(damaged(&self.path)(what)));
         }
         Ok(bytes.as_chunks().0.iter().map(triangle).collect())
     }
@@ -107,9 +117,9 @@ impl IndexFile {
         file.read_exact(bytes)
     }
 
-    /// The same error; the next run makes the file anew.
-    fn given_up(&self, error: CacheError) -> CacheError {
-        // What cannot be taken away is told of again in the next run.
+    /// Deletes the file, so that the next process writes it again; returns `error`.
+    fn delete_after(&self, error: CacheError) -> CacheError {
+        // A file that cannot be deleted is reported again by the next process.
         let _ = std::fs::remove_file(&self.path);
         error
     }
@@ -167,10 +177,11 @@ fn header(catalog_checksum: u64, table: &[u8]) -> [u8; HEADER_BYTES] {
     header
 }
 
-/// Opens the index at `path`; `Ok(None)` if there is no such file.
+/// Opens the index at `path`; `Ok(None)` if there is no such file. The classes have no chunks yet.
 ///
 /// # Errors
-/// [`CacheError::Io`] if it cannot be read, [`CacheError::Damaged`] if it is not what [`store`] wrote for this catalogue.
+/// [`CacheError::Io`] if it cannot be read, [`CacheError::Damaged`] if it is not what [`store`]
+/// wrote for this catalog.
 pub fn load(
     path: &Path,
     catalog_checksum: u64,
@@ -197,7 +208,7 @@ pub fn load(
     if found != header(catalog_checksum, &table) {
         return Err(damaged("the checksum of its table is wrong".into()));
     }
-    let (classes, places) = classes_of(&table);
+    let (classes, stored) = classes_of(&table);
     let triangles: u64 = classes.iter().map(|class| class.len() as u64).sum();
     let expected = (HEADER_BYTES + table.len()) as u64 + triangles * TRIANGLE_BYTES as u64;
     if length != expected {
@@ -206,13 +217,13 @@ pub fn load(
     let file = IndexFile {
         path: path.to_owned(),
         file: Mutex::new(file),
-        classes: places,
+        classes: stored,
     };
     Ok(Some((classes, file)))
 }
 
-/// The classes in a table, and where their triangles are.
-fn classes_of(table: &[u8]) -> (Vec<SizeClass>, Vec<ClassPlace>) {
+/// The classes in a table, and their triangles in the file.
+fn classes_of(table: &[u8]) -> (Vec<SizeClass>, Vec<StoredClass>) {
     let mut start = (HEADER_BYTES + table.len()) as u64;
     let class = |bytes: &[u8]| {
         let (words, starts) = bytes.split_at(16 + 8 * CHUNKS);
@@ -220,19 +231,20 @@ fn classes_of(table: &[u8]) -> (Vec<SizeClass>, Vec<ClassPlace>) {
         let [low, high] = [words[0], words[1]].map(f64::from_le_bytes);
         let starts = starts.as_chunks().0.iter();
         let starts = starts.map(|start| u32::from_le_bytes(*start)).collect();
-        let class = SizeClass::not_read((low, high), starts);
+        let class = SizeClass::not_loaded((low, high), starts);
         let checksums = words[2..].iter().map(|sum| u64::from_le_bytes(*sum));
-        let place = ClassPlace {
+        let stored = StoredClass {
             start,
             checksums: checksums.collect(),
         };
         start += class.len() as u64 * TRIANGLE_BYTES as u64;
-        (class, place)
+        (class, stored)
     };
     table.chunks_exact(CLASS_BYTES).map(class).unzip()
 }
 
-/// Writes the index to `path`, whole or not at all, making the directory if need be. All its chunks must be there.
+/// Writes the index to `path`, whole or not at all; creates the directory if needed. All chunks of
+/// `classes` must be in memory.
 ///
 /// # Errors
 /// [`CacheError::Io`] if it cannot be written.
@@ -312,7 +324,7 @@ mod tests {
         assert_eq!(expected.len(), 100);
         let loaded = load(&path, 7).unwrap().unwrap();
         assert_eq!(read_all(loaded), (expected, 0));
-        assert!(load(&path, 8).is_err(), "another catalogue's index");
+        assert!(load(&path, 8).is_err(), "the index of another catalog");
 
         let good = std::fs::read(&path).unwrap();
         let table_end = good.len() - 100 * TRIANGLE_BYTES;

@@ -22,7 +22,7 @@ pub struct TriangleIndex {
     file: Option<IndexFile>,
     /// Classes listed again because a chunk of them could not be read.
     relisted: Vec<OnceLock<SizeClass>>,
-    read_errors: Mutex<Vec<CacheError>>,
+    cache_errors: Mutex<Vec<CacheError>>,
 }
 
 impl TriangleIndex {
@@ -44,7 +44,7 @@ impl TriangleIndex {
             relisted: classes.iter().map(|_| OnceLock::new()).collect(),
             classes,
             file,
-            read_errors: Mutex::default(),
+            cache_errors: Mutex::default(),
         }
     }
 
@@ -84,7 +84,7 @@ impl TriangleIndex {
         match self.file.as_ref()?.chunk(class, chunk, range) {
             Ok(triangles) => Some(triangles),
             Err(error) => {
-                self.read_errors().push(error);
+                self.cache_errors().push(error);
                 None
             }
         }
@@ -98,13 +98,9 @@ impl TriangleIndex {
         relisted.chunks[chunk].get().cloned().unwrap_or_default()
     }
 
-    /// Errors of reading since the last call. The chunks that could not be read were listed again.
-    pub fn take_read_errors(&self) -> Vec<CacheError> {
-        std::mem::take(&mut *self.read_errors())
-    }
-
-    fn read_errors(&self) -> MutexGuard<'_, Vec<CacheError>> {
-        self.read_errors
+    /// Errors of the cache that were not yet taken.
+    pub(super) fn cache_errors(&self) -> MutexGuard<'_, Vec<CacheError>> {
+        self.cache_errors
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
     }
@@ -204,8 +200,7 @@ mod tests {
                 assert_eq!(read.chunk(stars, number, chunk), expected);
             }
         }
-        assert_eq!(read.take_read_errors().len(), 1);
-        assert!(read.take_read_errors().is_empty());
+        assert_eq!(read.cache_errors().len(), 1);
     }
 
     fn sorted(mut corners: [u32; 3]) -> [u32; 3] {

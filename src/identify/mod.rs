@@ -3,6 +3,7 @@
 pub mod attitude;
 mod blends;
 mod cache;
+mod cache_directory;
 mod cells;
 pub mod diagnosis;
 pub mod index;
@@ -16,6 +17,7 @@ pub mod triangle;
 mod verify;
 
 pub use cache::CacheError;
+pub use cache_directory::cache_directory;
 pub use indexed_catalog::IndexedCatalog;
 pub use predict::{PredictedStar, View};
 pub use search::LOG10_FALSE_ALARM_LIMIT;

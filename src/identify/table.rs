@@ -1,21 +1,25 @@
-//! Triangles of about one size, by their shape.
+//! The triangles of a size class, sorted by shape.
 //!
-//! The plane of the two ratios is cut into rows and columns. The triangles of a cell stand together, and the cells of a row:
-//! what is like a given shape lies in a few stretches. A chunk, which is a part of a row, is made or read when it is first looked at.
+//! The plane of the two ratios is cut into cells, in rows and columns. Triangles are stored cell by
+//! cell and row by row, so a search for a shape reads a few contiguous ranges. The cells of a row
+//! are grouped in chunks, which are loaded when they are first needed.
 
 use std::ops::RangeInclusive;
 use std::sync::OnceLock;
 
-/// Rows, over the middle side's ratio from [`LEAST_MIDDLE_RATIO`] to 1, and columns, over the shortest side's from 0 to 1.
+/// Rows divide the middle side's ratio from [`LEAST_MIDDLE_RATIO`] to 1, columns the shortest
+/// side's from 0 to 1.
 const ROWS: usize = 128;
 const COLUMNS: usize = 256;
-/// Neighbouring cells of a row that make a chunk.
+/// A chunk is this many neighbouring cells of a row.
 const CELLS_PER_CHUNK: usize = 32;
+/// Cells of a class.
 pub const CELLS: usize = ROWS * COLUMNS;
+/// Chunks of a class.
 pub const CHUNKS: usize = CELLS / CELLS_PER_CHUNK;
-/// No middle side is less than half of the longest.
+/// The middle side is at least half of the longest.
 const LEAST_MIDDLE_RATIO: f64 = 0.5;
-/// Ratios are kept in steps of this: a hundredth of the least tolerance.
+/// Ratios are stored in steps of this: a hundredth of the smallest tolerance.
 const RATIO_STEP: f64 = 1.0 / 65536.0;
 
 /// One triangle.
@@ -28,7 +32,7 @@ pub struct Triangle {
 }
 
 impl Triangle {
-    /// Of these corners, with these ratios.
+    /// The triangle with these corners and ratios; ratios are rounded.
     pub fn new(corners: [u32; 3], ratios: [f64; 2]) -> Self {
         Self {
             corners,
@@ -51,29 +55,30 @@ fn ratio(steps: u16) -> f64 {
 }
 
 fn row_of(middle: f64) -> usize {
-    let place = (middle - LEAST_MIDDLE_RATIO) / (1.0 - LEAST_MIDDLE_RATIO);
-    ((place.max(0.0) * ROWS as f64) as usize).min(ROWS - 1)
+    let share = (middle - LEAST_MIDDLE_RATIO) / (1.0 - LEAST_MIDDLE_RATIO);
+    ((share.max(0.0) * ROWS as f64) as usize).min(ROWS - 1)
 }
 
 fn column_of(shortest: f64) -> usize {
     ((shortest.max(0.0) * COLUMNS as f64) as usize).min(COLUMNS - 1)
 }
 
-/// The triangles whose longest sides are alike.
+/// Triangles whose longest sides lie between two limits.
 #[derive(Debug)]
 pub struct SizeClass {
     /// Smallest longest side, as a chord.
     pub low: f64,
     /// Largest longest side, as a chord.
     pub high: f64,
-    /// `cell_starts[c]..cell_starts[c + 1]` are the triangles of cell `c`, row after row.
+    /// `cell_starts[c]..cell_starts[c + 1]` are the triangles of cell `c`; row by row.
     pub cell_starts: Vec<u32>,
-    /// The triangles of each chunk, once they are needed.
+    /// The triangles of each chunk, once it is loaded.
     pub chunks: Vec<OnceLock<Box<[Triangle]>>>,
 }
 
 impl SizeClass {
-    /// The class of `triangles`, whose longest sides are from `low` to `high`, as chords.
+    /// The class of `triangles`, whose longest sides are from `low` to `high` as chords. Triangles
+    /// of the same cell keep their order.
     pub fn new((low, high): (f64, f64), triangles: &[Triangle]) -> Self {
         let mut cell_starts = vec![0u32; CELLS + 1];
         for triangle in triangles {
@@ -82,15 +87,15 @@ impl SizeClass {
         for cell in 1..cell_starts.len() {
             cell_starts[cell] += cell_starts[cell - 1];
         }
-        // A counting sort: stable, and so the same on any number of threads.
+        // A stable counting sort.
         let mut next = cell_starts.clone();
         let mut sorted = triangles.to_vec();
         for triangle in triangles {
-            let place = &mut next[triangle.cell()];
-            sorted[*place as usize] = *triangle;
-            *place += 1;
+            let position = &mut next[triangle.cell()];
+            sorted[*position as usize] = *triangle;
+            *position += 1;
         }
-        let class = Self::not_read((low, high), cell_starts);
+        let class = Self::not_loaded((low, high), cell_starts);
         for (chunk, slot) in class.chunks.iter().enumerate() {
             let range = class.range(chunk);
             let _ = slot.set(sorted[range.start as usize..range.end as usize].into());
@@ -98,8 +103,8 @@ impl SizeClass {
         class
     }
 
-    /// A class of which no chunk is there yet.
-    pub fn not_read((low, high): (f64, f64), cell_starts: Vec<u32>) -> Self {
+    /// A class without its chunks.
+    pub fn not_loaded((low, high): (f64, f64), cell_starts: Vec<u32>) -> Self {
         Self {
             low,
             high,
@@ -113,14 +118,15 @@ impl SizeClass {
         self.cell_starts.last().map_or(0, |end| *end as usize)
     }
 
-    /// Which of the class's triangles are those of a chunk.
+    /// The range of the class's triangles that is a chunk.
     pub fn range(&self, chunk: usize) -> std::ops::Range<u32> {
         let [from, to] = [chunk, chunk + 1].map(|chunk| self.cell_starts[chunk * CELLS_PER_CHUNK]);
         from..to
     }
 
-    /// Calls `visit` with the corners of every triangle whose ratios lie within `tolerance` of `ratios`, in an order that depends on
-    /// nothing but the arguments; `chunk` gives the triangles of a chunk.
+    /// Calls `visit` with the corners of every triangle whose ratios lie within `tolerance` of
+    /// `ratios`, in an order that depends on the arguments alone; `chunk` returns the triangles of a
+    /// chunk.
     #[inline]
     pub fn for_each_similar<'a>(
         &self,
@@ -155,7 +161,7 @@ impl SizeClass {
     }
 }
 
-/// Half a step more: ratios are rounded.
+/// The rows or columns within `tolerance` of `centre`, and a step more since ratios are rounded.
 fn span(of: fn(f64) -> usize, centre: f64, tolerance: f64) -> RangeInclusive<usize> {
     let reach = tolerance + RATIO_STEP;
     of(centre - reach)..=of(centre + reach)

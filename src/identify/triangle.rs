@@ -1,40 +1,41 @@
-//! The shape of a triangle of stars, in numbers that a turn of the camera does not change.
+//! The shape of a triangle of stars, in numbers that do not depend on the attitude.
 //!
-//! The sides are chords between unit vectors, on the sky and in the camera alike: they need no
-//! trigonometry, and stay exact however wide the field is.
+//! The sides are chords between unit vectors, on the sky as in the camera. They need no
+//! trigonometry and are exact in fields of any width.
 
 use nalgebra::Vector3;
 
-/// A triangle's size, and its shape by two ratios that neither a turn, nor a mirror, nor (in narrow fields) the
-/// scale changes.
+/// A triangle's size, and its shape as two ratios that rotation, reflection and (in narrow fields)
+/// scale do not change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TriangleShape {
     /// Longest side, as a chord of the unit sphere.
     pub longest: f64,
     /// Middle and shortest side over the longest.
     pub ratios: [f64; 2],
-    /// Which of the three points given are A, B and C: AB is the longest side, AC the shortest.
+    /// Indices of the points A, B and C: AB is the longest side, AC the shortest.
     pub order: [usize; 3],
 }
 
-/// The shortest side must stand out from the middle one, and that from the longest, by so much of the
-/// longest: else noise decides which point is which.
+/// Least difference between the middle side and either other side, over the longest: below it noise
+/// decides which point is which.
 pub const MIN_RATIO_GAP: f64 = 0.01;
-/// How far the middle and the shortest side together must exceed the longest: flat triangles
-/// determine no parity.
+/// Least excess of the middle and the shortest side together over the longest, over the longest:
+/// flatter triangles have no reliable parity.
 pub const MIN_FLATNESS: f64 = 0.02;
-/// The shortest side must be so much of the longest: else its direction, and so the turn, is ill determined.
+/// Least shortest side over the longest: the direction of a shorter one, and so the roll, is poorly
+/// determined.
 pub const MIN_SHORTEST_RATIO: f64 = 0.08;
 
 impl TriangleShape {
-    /// The shape of the triangle of three unit vectors, or `None` if noise could confuse its corners.
+    /// The shape of the triangle of three unit vectors; `None` if noise could confuse its corners.
     #[inline]
     pub fn new(points: [&Vector3<f64>; 3]) -> Option<Self> {
         let side = |a: usize, b: usize| (points[a] - points[b]).norm_squared();
         Self::of_sides([side(1, 2), side(2, 0), side(0, 1)])
     }
 
-    /// The shape of the triangle with these sides, squared, each opposite to the point with its number.
+    /// The shape of the triangle with these squared sides, each opposite to the point of its index.
     #[inline]
     pub fn of_sides(opposite: [f64; 3]) -> Option<Self> {
         // C faces the longest side, B the shortest.
@@ -129,7 +130,7 @@ mod tests {
                     }
                 }
                 (None, None) => {}
-                // Within rounding of a limit.
+                // A ratio at a limit, within rounding.
                 (one, other) => {
                     let shape = one.or(other).unwrap();
                     let [middle, shortest] = shape.ratios;

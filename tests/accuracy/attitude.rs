@@ -191,7 +191,7 @@ fn with_pipeline<T>(run: impl FnOnce(&Pipeline) -> T) -> T {
         || std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache"),
         Into::into,
     );
-    let (sky, _) = IndexedCatalog::open(Catalog::built_in(), &cache, &|_| {});
+    let sky = IndexedCatalog::open(Catalog::built_in(), Some(&cache), &|_| {});
     run(&Pipeline::new(sky))
 }
 

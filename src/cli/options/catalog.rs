@@ -1,11 +1,10 @@
 //! What commands that identify stars need first: threads, the catalogue, its index.
 
-use crate::cli::cache;
 use crate::cli::output::messages::{one_line, report_warning};
 use crate::cli::progress::bar;
 use anyhow::Context;
 use clap::Args;
-use starpipe::identify::{CacheError, IndexedCatalog};
+use starpipe::identify::{IndexedCatalog, cache_directory};
 use starpipe::sky::catalog::{self, Catalog};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -53,23 +52,24 @@ pub(crate) fn read_catalog(path: Option<&Path>) -> anyhow::Result<Cow<'static, C
     })
 }
 
-/// The index comes from the cache where it is there and whole; a cache of no use costs time, not results.
-pub(crate) fn sky<'a>(catalog: &'a Catalog, resources: &CatalogOptions) -> IndexedCatalog<'a> {
+/// The catalog with its index, which is kept in the cache directory.
+pub(crate) fn index_catalog<'a>(
+    catalog: &'a Catalog,
+    options: &CatalogOptions,
+) -> IndexedCatalog<'a> {
     let progress = bar(100, "indexing the catalogue {wide_bar} {percent} %");
     let show = |part: f64| progress.set_position((part * 100.0) as u64);
-    let Some(directory) = cache::directory(resources.cache_dir.clone()) else {
-        return IndexedCatalog::build(catalog, &show);
-    };
-    let (sky, troubles) = IndexedCatalog::open(catalog, &directory, &show);
+    let directory = options.cache_dir.clone().or_else(cache_directory);
+    let indexed = IndexedCatalog::open(catalog, directory.as_deref(), &show);
     progress.finish_and_clear();
-    warn_of(troubles);
-    sky
+    warn_of_cache(&indexed);
+    indexed
 }
 
-/// Tells of a cache that is of no use.
-pub(crate) fn warn_of(troubles: Vec<CacheError>) {
-    for trouble in troubles {
-        let trouble = one_line(&trouble);
-        report_warning(format_args!("{trouble}; this costs time and nothing else"));
+/// Reports the errors of the cache that were not yet reported.
+pub(crate) fn warn_of_cache(indexed: &IndexedCatalog) {
+    for error in indexed.take_cache_errors() {
+        let error = one_line(&error);
+        report_warning(format_args!("{error}; this costs time and nothing else"));
     }
 }

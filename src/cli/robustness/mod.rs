@@ -7,7 +7,7 @@ mod sweep;
 pub(crate) use args::RobustnessArgs;
 
 use super::exit::{CommandError, Exit};
-use super::options::catalog::{read_catalog, sky, thread_pool, warn_of};
+use super::options::catalog::{index_catalog, read_catalog, thread_pool, warn_of_cache};
 use super::options::format::Format;
 use super::output::files::write_whole;
 use super::output::rows::{csv_table, json_lines};
@@ -88,7 +88,7 @@ fn rows(arguments: &RobustnessArgs) -> Result<Vec<SweptRow>, CommandError> {
     let cases = cases(arguments);
     let pool = thread_pool(arguments.resources.threads)?;
     let catalog = pool.install(|| read_catalog(arguments.resources.catalog.as_deref()))?;
-    let sky = pool.install(|| sky(&catalog, &arguments.resources));
+    let sky = pool.install(|| index_catalog(&catalog, &arguments.resources));
     let progress = bar(
         arguments.trials * cases.len() as u64,
         "trials {wide_bar} {pos}/{len} {eta}",
@@ -109,7 +109,7 @@ fn rows(arguments: &RobustnessArgs) -> Result<Vec<SweptRow>, CommandError> {
     };
     let rows = cases.into_iter().map(row).collect();
     progress.finish_and_clear();
-    warn_of(sky.take_troubles());
+    warn_of_cache(&sky);
     Ok(rows)
 }
 

@@ -3,7 +3,9 @@
 use super::output::{OutputSettings, Printer, ResultFiles, Solved};
 use crate::cli::batch;
 use crate::cli::exit::{CommandError, Exit};
-use crate::cli::options::catalog::{CatalogOptions, read_catalog, sky, thread_pool, warn_of};
+use crate::cli::options::catalog::{
+    CatalogOptions, index_catalog, read_catalog, thread_pool, warn_of_cache,
+};
 use crate::cli::output::messages::{one_line, report_error};
 use crate::cli::progress::bar;
 use indicatif::ProgressBar;
@@ -27,7 +29,7 @@ pub(crate) fn solve_all(
     }
     let pool = thread_pool(resources.threads)?;
     let catalog = pool.install(|| read_catalog(resources.catalog.as_deref()))?;
-    let sky = pool.install(|| sky(&catalog, resources));
+    let sky = pool.install(|| index_catalog(&catalog, resources));
     let pipeline = Pipeline::new(sky);
     // The threads that solve also draw and write: the one that prints waits for nothing else.
     let report = |input: &PathBuf, workspace: &mut Workspace| {
@@ -53,7 +55,7 @@ pub(crate) fn solve_all(
         run.take(result)
     });
     let exit = run.exit();
-    warn_of(pipeline.sky().take_troubles());
+    warn_of_cache(pipeline.sky());
     Ok(exit)
 }
 

@@ -13,7 +13,7 @@ mod tables;
 pub(crate) use args::ValidateArgs;
 
 use super::exit::{CommandError, Exit};
-use super::options::catalog::{read_catalog, sky, thread_pool, warn_of};
+use super::options::catalog::{index_catalog, read_catalog, thread_pool, warn_of_cache};
 use super::options::format::PageFormat;
 use super::output::messages::report_error;
 use super::output::rows::json_lines;
@@ -53,7 +53,7 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Exit, CommandError> {
     let studies = study::protocols(&arguments.sweep, &protocol)?;
     let pool = thread_pool(arguments.resources.threads)?;
     let catalog = pool.install(|| read_catalog(arguments.resources.catalog.as_deref()))?;
-    let pipeline = Pipeline::new(pool.install(|| sky(&catalog, &arguments.resources)));
+    let pipeline = Pipeline::new(pool.install(|| index_catalog(&catalog, &arguments.resources)));
     let runs = studies.len().max(1) as u64;
     let shared = Shared {
         pipeline: &pipeline,
@@ -79,7 +79,7 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Exit, CommandError> {
         }
     };
     shared.progress.finish_and_clear();
-    warn_of(pipeline.sky().take_troubles());
+    warn_of_cache(pipeline.sky());
     // Nobody left to read it: nothing is lost.
     let _ = print(&text)?;
     Ok(Exit::Success)

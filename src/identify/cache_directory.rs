@@ -1,16 +1,18 @@
-//! Where the index of the catalogue is kept between runs.
+//! Where indices are kept between runs.
 
 use std::env;
 use std::path::PathBuf;
 
-/// The directory asked for, else that of the environment, else the user's own cache directory.
-pub(crate) fn directory(asked: Option<PathBuf>) -> Option<PathBuf> {
-    asked
-        .or_else(|| variable("STARPIPE_CACHE_DIR"))
+/// The directory in which starpipe keeps the indices of catalogs, or `None` if the user has none.
+///
+/// It is `STARPIPE_CACHE_DIR` if that is set, else `starpipe` in the user's cache directory:
+/// `XDG_CACHE_HOME` or `~/.cache`, `~/Library/Caches` on macOS, `LOCALAPPDATA` on Windows.
+pub fn cache_directory() -> Option<PathBuf> {
+    variable("STARPIPE_CACHE_DIR")
         .or_else(|| user_cache_directory().map(|directory| directory.join("starpipe")))
 }
 
-/// A variable that is set to something.
+/// A variable that is set and not empty.
 fn variable(name: &str) -> Option<PathBuf> {
     env::var_os(name)
         .filter(|value| !value.is_empty())
