@@ -2,7 +2,8 @@
 //! spots, sky, shot and read noise. The same arguments draw the same frame. For fixtures; studies
 //! use `starpipe simulate`.
 //!
-//! `cargo run --example draw_frame -- OUT.png|OUT.tif RA DEC UP FOV WIDTH HEIGHT SEED` (angles in degrees)
+//! `cargo run --example draw_frame -- OUT.png|OUT.tif RA DEC UP FOV WIDTH HEIGHT SEED`
+//! (angles in degrees)
 //!
 //! A `.png` has 8 bits of 8 electrons each, a `.tif` 16 bits of 1 electron.
 

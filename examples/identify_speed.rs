@@ -1,4 +1,4 @@
-//! How long identification takes, over simulated fields of 2° to 40° and over frames named on the command line:
+//! Time of identification, over simulated fields of 2° to 40° and frames on the command line:
 //! `cargo run --release --example identify_speed -- [FIELDS] [FRAME ...]`
 //!
 //! Each field is identified with nothing known, and with its scale known to a factor of two. The

@@ -45,7 +45,7 @@ class Checks:
         self.preset = preset.stdout.decode()
         self.stars = {}
 
-    def hold(self, what, found, expected, tolerance):
+    def compare(self, what, found, expected, tolerance):
         ok = bool(np.all(np.abs(np.asarray(found) - expected) <= tolerance))
         self.failed |= not ok
         print(f"  {what:58} {found:14.6g}  expected {expected:14.6g} ± {tolerance:.2g}  {'ok' if ok else 'WRONG'}")
@@ -82,7 +82,7 @@ class Checks:
         return self.frames(camera, *options)[0]
 
     def star(self, number):
-        """RA, Dec (degrees), proper motions (mas a year, on the sky), V and B-V of a Skymap number."""
+        """RA, Dec (degrees), proper motions (mas a year), V and B-V of a Skymap number."""
         if not self.stars:
             for line in gzip.open(self.catalog, "rt", encoding="latin-1"):
                 if line[27:35].strip():
@@ -125,7 +125,7 @@ class Lens:
         self.mirrored = toml.get("mirrored", False)
 
     def ideal(self, observed):
-        """From observed to ideal: r (1 - d r^2) - (r^2 P + 2 (P.r) r), P a third of the decentring."""
+        """From observed to ideal: r (1 - d r^2) - (r^2 P + 2 (P.r) r), P = decentring / 3."""
         r = observed / self.radius
         square = np.sum(r * r, axis=-1, keepdims=True)
         third = self.decentring / 3
@@ -195,14 +195,14 @@ def positions(checks):
         print(f"positions: {name}, {len(rows)} stars")
         here = Lens(toml).pixels(unit(star_ra, star_dec) @ matrix(ra, dec, roll).T)
         off = np.max(np.hypot(*(here - seen).T))
-        checks.hold("largest distance from the second projection (px)", off, 0, POSITION_TOLERANCE_PX)
+        checks.compare("largest distance from the second projection (px)", off, 0, POSITION_TOLERANCE_PX)
         wcs = WCS(header)
         by_wcs = np.array(wcs.all_world2pix(star_ra, star_dec, 0, tolerance=1e-8, maxiter=200)).T
         off = np.max(np.hypot(*(by_wcs - seen).T))
-        checks.hold("largest distance from astropy with the header (px)", off, 0, POSITION_TOLERANCE_PX)
+        checks.compare("largest distance from astropy with the header (px)", off, 0, POSITION_TOLERANCE_PX)
         sky_ra, sky_dec = np.array([[float(row["ra_deg"]), float(row["dec_deg"])] for row in rows]).T
         off = np.max(np.linalg.norm(unit(sky_ra, sky_dec) - unit(star_ra, star_dec), axis=1))
-        checks.hold("largest error of the table's directions (arcsec)", np.degrees(off) * 3600, 0, 0.01)
+        checks.compare("largest error of the table's directions (arcsec)", np.degrees(off) * 3600, 0, 0.01)
 
 
 # --- flux -----------------------------------------------------------------------------------------
@@ -275,8 +275,8 @@ def flux(checks):
             expected = rate * 1000 * 10 ** (-0.4 * v) * (1 - vignetting * offset**2)
             found = np.sum(pixels - empty) * header["EGAIN"]
             what = f"{name}, V {v:.2f}, B-V {bv:+.2f}: light over that expected"
-            checks.hold(what, found / expected, 1.0, FLUX_TOLERANCE)
-            checks.hold("  its electrons in the table", float(stars[0]["electrons"]) / expected, 1.0, FLUX_TOLERANCE)
+            checks.compare(what, found / expected, 1.0, FLUX_TOLERANCE)
+            checks.compare("  its electrons in the table", float(stars[0]["electrons"]) / expected, 1.0, FLUX_TOLERANCE)
     camera, toml = checks.camera(**CLEAN)
     pixels, header, _ = checks.frame(
         camera, "--ra", 0, "--dec", 0, "--faintest-vmag", -5, "--sky-mag-arcsec2", 5, "--exposure-s", 10
@@ -284,7 +284,7 @@ def flux(checks):
     arcsec2 = (np.degrees(toml["pitch_x_um"] / 1e3 / toml["focal_length_mm"]) * 3600) ** 2
     expected = electrons_of_mag_0(toml, 5800.0) * 10 * arcsec2 * 10 ** (-0.4 * 5)
     print("flux: the sky, 5 mag in a square arcsecond")
-    checks.hold("light over that expected", pixels.mean() * header["EGAIN"] / expected, 1.0, FLUX_TOLERANCE)
+    checks.compare("light over that expected", pixels.mean() * header["EGAIN"] / expected, 1.0, FLUX_TOLERANCE)
 
 
 # --- noise and pattern ----------------------------------------------------------------------------
@@ -292,9 +292,9 @@ def flux(checks):
 
 def moments(checks, what, values, mean, variance):
     count = values.size
-    checks.hold(f"{what}: mean (ADU)", values.mean(), mean, SIGMAS * np.sqrt(variance / count))
+    checks.compare(f"{what}: mean (ADU)", values.mean(), mean, SIGMAS * np.sqrt(variance / count))
     excess = 3 + 1 / variance
-    checks.hold(f"{what}: variance (ADU^2)", values.var(), variance, SIGMAS * variance * np.sqrt(excess / count))
+    checks.compare(f"{what}: variance (ADU^2)", values.var(), variance, SIGMAS * variance * np.sqrt(excess / count))
 
 
 def dark(checks):
@@ -319,12 +319,12 @@ def flat(checks):
 
 
 def spread(checks, what, stack, expected, scale=1.0):
-    """The standard deviation from pixel to pixel of the mean of a stack, less what its noise leaves."""
+    """Standard deviation of the pixels of a stack's mean, corrected for its noise."""
     mean = stack.mean(axis=0)
     noise = stack.var(axis=0, ddof=1).mean() / len(stack)
     found = np.sqrt(mean.var() - noise) * scale
     total = mean.var() * scale**2
-    checks.hold(what, found, expected, SIGMAS * total / expected / np.sqrt(2 * mean.size))
+    checks.compare(what, found, expected, SIGMAS * total / expected / np.sqrt(2 * mean.size))
 
 
 def stack(checks, camera, *options, count=40):
@@ -338,7 +338,7 @@ def pattern(checks):
     print("pattern: response 3 %, 2000 dead pixels in a million")
     lit = stack(checks, camera, "--flat", 4000)
     is_dead = lit.mean(axis=0) < bias + 1000 / gain
-    checks.hold("dead pixels", is_dead.sum(), 400, SIGMAS * np.sqrt(400))
+    checks.compare("dead pixels", is_dead.sum(), 400, SIGMAS * np.sqrt(400))
     spread(checks, "response, standard deviation", lit[:, ~is_dead][:, :, None], 0.03, gain / 4000)
     camera, _ = checks.camera(**size, offset_sigma_adu=5.0)
     print("pattern: bias of pixels 5 ADU")
@@ -346,7 +346,7 @@ def pattern(checks):
     camera, _ = checks.camera(**size, column_sigma_adu=4.0)
     print("pattern: bias of columns 4 ADU")
     columns = stack(checks, camera, "--dark").mean(axis=(0, 1))
-    checks.hold("columns, standard deviation (ADU)", columns.std(), 4.0, SIGMAS * 4.0 / np.sqrt(2 * 500))
+    checks.compare("columns, standard deviation (ADU)", columns.std(), 4.0, SIGMAS * 4.0 / np.sqrt(2 * 500))
     rate, exposure = 200.0, 2.0
     camera, _ = checks.camera(**size, dark_current_e_s=rate, dark_current_sigma=0.4)
     print("pattern: dark current of pixels 40 %")
@@ -357,8 +357,8 @@ def pattern(checks):
     mean = currents.mean(axis=0)
     noise = currents.var(axis=0, ddof=1).mean() / len(currents)
     found = np.sqrt(mean.var() - noise) * gain / (rate * exposure)
-    checks.hold("dark current, standard deviation", found, 0.4, SIGMAS * 0.4 / 2 * np.sqrt((kurtosis - 1) / mean.size) * 1.2)
-    checks.hold(
+    checks.compare("dark current, standard deviation", found, 0.4, SIGMAS * 0.4 / 2 * np.sqrt((kurtosis - 1) / mean.size) * 1.2)
+    checks.compare(
         "dark current, mean (e/s)", (mean.mean() - bias) * gain / exposure, rate, SIGMAS * rate * 0.4 / np.sqrt(mean.size)
     )
     camera, _ = checks.camera(**size, hot_pixels_per_mpx=5000.0, hot_pixel_e_s=800.0)
@@ -366,8 +366,8 @@ def pattern(checks):
     mean = (stack(checks, camera, "--dark", "--exposure-s", 2).mean(axis=0) - bias) * gain / 2
     hot = mean[mean > 60] - 20
     share = np.exp(-40 / 800)
-    checks.hold("those of more than 40 e/s", hot.size, 1000 * share, SIGMAS * np.sqrt(1000 * share))
-    checks.hold("their mean current (e/s)", hot.mean(), 840, SIGMAS * 800 / np.sqrt(hot.size))
+    checks.compare("those of more than 40 e/s", hot.size, 1000 * share, SIGMAS * np.sqrt(1000 * share))
+    checks.compare("their mean current (e/s)", hot.mean(), 840, SIGMAS * 800 / np.sqrt(hot.size))
 
 
 # --- motion ---------------------------------------------------------------------------------------
@@ -416,14 +416,14 @@ def smear(checks):
         counts = (pixels - empty).sum()
         for i, axis_name in enumerate("xy"):
             error = SIGMAS * np.sqrt(expected[i, i] / counts)
-            checks.hold(f"middle along {axis_name} (px)", middle[i], path.mean(axis=0)[i], max(error, 1e-3))
+            checks.compare(f"middle along {axis_name} (px)", middle[i], path.mean(axis=0)[i], max(error, 1e-3))
         for i, j, name_ij in [(0, 0, "xx"), (1, 1, "yy"), (0, 1, "xy")]:
             error = SIGMAS * np.sqrt(2 * expected[i, i] * expected[j, j] / counts)
-            checks.hold(f"covariance {name_ij} (px^2)", covariance[i, j], expected[i, j], max(error, 2e-3))
+            checks.compare(f"covariance {name_ij} (px^2)", covariance[i, j], expected[i, j], max(error, 2e-3))
         if angle and rates[2] == 0:
             along = np.linalg.eigh(covariance)
             length = np.sqrt(12 * (along[0][1] - toml["spot_sigma_px"] ** 2 - 1 / 12))
-            checks.hold("length (px)", length, np.hypot(*(path[-1] - path[0])), 0.05)
+            checks.compare("length (px)", length, np.hypot(*(path[-1] - path[0])), 0.05)
     noise_of_smear(checks)
 
 
@@ -442,8 +442,8 @@ def noise_of_smear(checks):
     mean = star + pixels * (sky + dark_e)
     variance = mean + pixels * (toml["read_noise_e"] ** 2 + gain**2 / 12)
     print(f"smear: noise of a star of {star:.0f} e along 11 px, 400 frames")
-    checks.hold("light (e)", fluxes.mean(), mean, SIGMAS * np.sqrt(variance / 400))
-    checks.hold("variance (e^2)", fluxes.var(ddof=1), variance, SIGMAS * variance * np.sqrt(2 / 400))
+    checks.compare("light (e)", fluxes.mean(), mean, SIGMAS * np.sqrt(variance / 400))
+    checks.compare("variance (e^2)", fluxes.var(ddof=1), variance, SIGMAS * variance * np.sqrt(2 / 400))
 
 
 # --- trails and cosmic rays -----------------------------------------------------------------------
@@ -470,10 +470,10 @@ def strays(checks):
     expected = lens.focal_px * np.radians(1.0 * exposure)
     light = electrons_of_mag_0(toml, 5800.0) * exposure
     print(f"strays: trails at 1°/s in {exposure} s")
-    checks.hold("trails on 60 frames", inside, 60, SIGMAS * np.sqrt(60))
-    checks.hold("shortest (px)", min(lengths), expected, 0.01)
-    checks.hold("longest (px)", max(lengths), expected, 0.01)
-    checks.hold(f"light of {len(lights)} trails over that expected", np.mean(lights) / light, 1.0, FLUX_TOLERANCE)
+    checks.compare("trails on 60 frames", inside, 60, SIGMAS * np.sqrt(60))
+    checks.compare("shortest (px)", min(lengths), expected, 0.01)
+    checks.compare("longest (px)", max(lengths), expected, 0.01)
+    checks.compare(f"light of {len(lights)} trails over that expected", np.mean(lights) / light, 1.0, FLUX_TOLERANCE)
     per_px = light / expected
     for pixels, header, rows in made:
         trails = [row for row in rows if row["kind"] == "trail"]
@@ -488,7 +488,7 @@ def strays(checks):
             s = (x - middle[0]) * along[0] + (y - middle[1]) * along[1]
             t = (y - middle[1]) * along[0] - (x - middle[0]) * along[1]
             part = pixels[(np.abs(s) < 20) & (np.abs(t) < 12)].sum() * header["EGAIN"] / 40
-            checks.hold("light on a px of one of them (e)", part, per_px, 0.03 * per_px)
+            checks.compare("light on a px of one of them (e)", part, per_px, 0.03 * per_px)
             break
 
     camera, toml = checks.camera(**CLEAN | {"gain_e_per_adu": 1.0, "width_px": 800, "height_px": 600})
@@ -497,13 +497,13 @@ def strays(checks):
     rays = [float(row["electrons"]) for _, _, rows in made for row in rows if row["kind"] == "cosmic_ray"]
     mean = 2000 * area * exposure * 60
     print(f"strays: cosmic rays, {len(rays)} on 60 frames")
-    checks.hold("their number", len(rays), mean, SIGMAS * np.sqrt(mean))
+    checks.compare("their number", len(rays), mean, SIGMAS * np.sqrt(mean))
     # Mean path of 1/cos, at most 100, over a flux proportional to cos: 1.99 depths of 10 um,
     # 80 e/um each.
-    checks.hold("their mean charge (e)", np.mean(rays), 1592, SIGMAS * np.std(rays) / np.sqrt(len(rays)))
+    checks.compare("their mean charge (e)", np.mean(rays), 1592, SIGMAS * np.std(rays) / np.sqrt(len(rays)))
     collected = sum(frame[0].sum() for frame in made)
     lost = 1 - collected / sum(rays)
-    checks.hold("part of their charge beyond the border", lost, 0.0, 0.01)
+    checks.compare("part of their charge beyond the border", lost, 0.0, 0.01)
 
 
 # --- sky ------------------------------------------------------------------------------------------
@@ -537,15 +537,15 @@ def sky(checks):
             there = np.array([*offset, 1]) / np.hypot(np.hypot(*offset), 1)
             rho = np.degrees(np.arccos(there @ moon))
             expected = 1 + krisciunas_schaefer(rho, 40, 0.2, 55, 30) / dark_nl
-            checks.hold(f"at ({x}, {y}), {rho:.1f}° from the Moon, over the dark sky", moonlit[y, x] / even, expected, 2e-3 * expected)
+            checks.compare(f"at ({x}, {y}), {rho:.1f}° from the Moon, over the dark sky", moonlit[y, x] / even, expected, 2e-3 * expected)
 
     camera, toml = checks.camera(**CLEAN)
     even = checks.frame(camera, *empty, "--sky-mag-arcsec2", 15)[0].mean()
     tilted, _, _ = checks.frame(camera, *empty, "--sky-mag-arcsec2", 15, "--sky-gradient", 0.4, "--sky-gradient-deg", 90)
     print("sky: gradient of 0.4 to the right")
     step = 0.4 / 200
-    checks.hold("last column", tilted[:, -1].mean() / even, 1.4 - step / 2, 1e-3)
-    checks.hold("first column", tilted[:, 0].mean() / even, 0.6 + step / 2, 1e-3)
+    checks.compare("last column", tilted[:, -1].mean() / even, 1.4 - step / 2, 1e-3)
+    checks.compare("first column", tilted[:, 0].mean() / even, 0.6 + step / 2, 1e-3)
 
     stars = checks.directory / "list.csv"
     places = [(x, y) for y in range(20, 300, 40) for x in range(20, 400, 40)]
@@ -561,8 +561,8 @@ def sky(checks):
         for row in rows
     ]
     print("sky: clouds of 1.5 mag that add their own light")
-    checks.hold("largest difference of the stars' dimming from the sky's", np.max(np.abs(off)), 0, 0.01)
-    checks.hold("part of the sky that is covered", np.mean(light > 1.0001 * even), 0.5, 0.3)
+    checks.compare("largest difference of the stars' dimming from the sky's", np.max(np.abs(off)), 0, 0.01)
+    checks.compare("part of the sky that is covered", np.mean(light > 1.0001 * even), 0.5, 0.3)
 
 
 def full(checks):
@@ -573,17 +573,17 @@ def full(checks):
     plain, header, rows = checks.frame(camera, *options)
     star = float(rows[0]["electrons"])
     print(f"full: a star of {star:.0f} e, wells of {well:.0f} e")
-    checks.hold("highest level (ADU)", plain.max(), 100 + well / 0.5, 0)
-    checks.hold("saturation in the header (ADU)", header["SATURATE"], 100 + well / 0.5, 0)
+    checks.compare("highest level (ADU)", plain.max(), 100 + well / 0.5, 0)
+    checks.compare("saturation in the header (ADU)", header["SATURATE"], 100 + well / 0.5, 0)
     camera, _ = checks.camera(**keys, blooming=1.0)
     bloomed, _, _ = checks.frame(camera, *options)
-    checks.hold("light with blooming over all", (bloomed - 100).sum() * 0.5 / star, 1.0, SIGMAS / np.sqrt(star))
+    checks.compare("light with blooming over all", (bloomed - 100).sum() * 0.5 / star, 1.0, SIGMAS / np.sqrt(star))
     lit = np.argwhere(bloomed >= bloomed.max())
     rows_lit, columns_lit = np.ptp(lit[:, 0]) + 1, np.ptp(lit[:, 1]) + 1
-    checks.hold("full pixels along the column for each along the row > 1", float(rows_lit > columns_lit), 1.0, 0)
+    checks.compare("full pixels along the column for each along the row > 1", float(rows_lit > columns_lit), 1.0, 0)
     camera, _ = checks.camera(**keys | {"bits": 12})
     clipped, header, _ = checks.frame(camera, *options)
-    checks.hold("highest level of 12 bits (ADU)", clipped.max(), 4095, 0)
+    checks.compare("highest level of 12 bits (ADU)", clipped.max(), 4095, 0)
 
 
 CHECKS = [positions, flux, dark, flat, pattern, smear, strays, sky, full]
