@@ -5,5 +5,6 @@ pub mod coords;
 pub mod epoch;
 pub mod files;
 pub mod format;
+pub(crate) mod neighbors;
 pub mod statistics;
 pub mod units;

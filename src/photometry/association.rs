@@ -3,7 +3,7 @@
 //! Each star, brightest first, claims the nearest detection that may be a star, lies within reach, and is not claimed yet.
 
 use super::MeasuredFrame;
-use crate::base::coords::PixelPoint;
+use crate::base::neighbors::PointTree;
 use crate::detect::Detection;
 use crate::identify::{Identification, PredictedStar};
 use std::f64::consts::{PI, SQRT_2};
@@ -42,73 +42,6 @@ pub(super) struct Association {
     pub chance: f64,
 }
 
-/// Numbered places, by the square of the frame that they lie in.
-struct Places {
-    columns: usize,
-    rows: usize,
-    /// `starts[s]..starts[s + 1]` of `places` are those in square `s`.
-    starts: Vec<u32>,
-    places: Vec<(PixelPoint, usize)>,
-}
-
-/// Side of a square, in pixels: a few times a typical radius.
-const SQUARE_PX: f64 = 16.0;
-
-impl Places {
-    /// Those of a frame of this size; what lies beside it counts to the squares at its border.
-    fn new((width_px, height_px): (f64, f64), places: &[(PixelPoint, usize)]) -> Self {
-        let count = |extent_px: f64| (extent_px / SQUARE_PX).ceil().max(1.0) as usize;
-        let mut sorted = Self {
-            columns: count(width_px),
-            rows: count(height_px),
-            starts: Vec::new(),
-            places: places.to_vec(),
-        };
-        sorted.starts.resize(sorted.columns * sorted.rows + 1, 0);
-        for (place, _) in places {
-            let square = sorted.square_of(*place);
-            sorted.starts[square] += 1;
-        }
-        let mut end = 0;
-        for start in &mut sorted.starts {
-            end += *start;
-            *start = end;
-        }
-        // From the last, so that those of a square stay in their order.
-        for numbered in places.iter().rev() {
-            let square = sorted.square_of(numbered.0);
-            sorted.starts[square] -= 1;
-            sorted.places[sorted.starts[square] as usize] = *numbered;
-        }
-        sorted
-    }
-
-    fn square_of(&self, place: PixelPoint) -> usize {
-        let [column, row] = self.column_and_row(place.x, place.y);
-        row * self.columns + column
-    }
-
-    fn column_and_row(&self, x: f64, y: f64) -> [usize; 2] {
-        let along =
-            |at_px: f64, count: usize| ((at_px / SQUARE_PX).max(0.0) as usize).min(count - 1);
-        [along(x, self.columns), along(y, self.rows)]
-    }
-
-    /// Those within `radius_px` of `centre`, with their distances.
-    fn within(&self, centre: PixelPoint, radius_px: f64) -> impl Iterator<Item = (usize, f64)> {
-        let [left, top] = self.column_and_row(centre.x - radius_px, centre.y - radius_px);
-        let [right, bottom] = self.column_and_row(centre.x + radius_px, centre.y + radius_px);
-        (top..=bottom)
-            .flat_map(move |row| {
-                let first = row * self.columns;
-                let range = self.starts[first + left]..self.starts[first + right + 1];
-                &self.places[range.start as usize..range.end as usize]
-            })
-            .map(move |(place, number)| (*number, place.distance_to(&centre)))
-            .filter(move |(_, distance_px)| *distance_px <= radius_px)
-    }
-}
-
 /// The radius within which two stars are not told apart for sure, in pixels.
 fn apart_px(spot_sigma_px: f64) -> f64 {
     (APART_SPOTS * spot_sigma_px).max(APART_PX)
@@ -121,22 +54,22 @@ pub(super) fn associate(frame: &MeasuredFrame, predicted: &[PredictedStar]) -> A
     let reach_px = |detection: &Detection| {
         reach_px(detection, frame.identification).min(REACH_SHARE * apart_px)
     };
-    let star_like = sources
-        .iter()
-        .zip(0..)
-        .filter(|(source, _)| source.flags.is_star_like() && source.flux_adu > 0.0);
-    let star_like: Vec<_> = star_like.map(|(source, i)| (source.position, i)).collect();
-    let all: Vec<_> = predicted.iter().map(|star| star.pixel).zip(0..).collect();
+    let is_star_like = |source: &Detection| source.flags.is_star_like() && source.flux_adu > 0.0;
+    let star_like: Vec<usize> = (0..sources.len())
+        .filter(|&i| is_star_like(&sources[i]))
+        .collect();
+    let detections = PointTree::new(star_like.iter().map(|&i| sources[i].position));
+    let neighbors = PointTree::new(predicted.iter().map(|star| star.pixel));
     let camera = &frame.identification.camera;
-    let size_px = (camera.width_px, camera.height_px);
-    let (detections, neighbours) = (Places::new(size_px, &star_like), Places::new(size_px, &all));
     let mut claimed = vec![false; sources.len()];
     let mut stars = Vec::with_capacity(predicted.len());
     for (index, star) in predicted.iter().enumerate() {
-        let free = detections
-            .within(star.pixel, REACH_SHARE * apart_px)
-            .filter(|&(i, away_px)| !claimed[i] && away_px <= reach_px(&sources[i]));
-        let nearest = free.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i);
+        let nearest = detections
+            .within(&star.pixel, REACH_SHARE * apart_px)
+            .iter()
+            .map(|near| (star_like[near.index], near.distance_px))
+            .find(|&(i, away_px)| !claimed[i] && away_px <= reach_px(&sources[i]))
+            .map(|(i, _)| i);
         if let Some(detection) = nearest {
             claimed[detection] = true;
         }
@@ -144,9 +77,10 @@ pub(super) fn associate(frame: &MeasuredFrame, predicted: &[PredictedStar]) -> A
             continue;
         }
         let hiding = |i: usize| i != index && predicted[i].v_mag < star.v_mag + HIDING_MAG;
-        let is_alone = !neighbours
-            .within(star.pixel, apart_px)
-            .any(|(i, _)| hiding(i));
+        let is_alone = !neighbors
+            .within(&star.pixel, apart_px)
+            .iter()
+            .any(|near| hiding(near.index));
         stars.push(FrameStar {
             catalog: star.catalog,
             v_mag: f64::from(star.v_mag),
@@ -154,10 +88,8 @@ pub(super) fn associate(frame: &MeasuredFrame, predicted: &[PredictedStar]) -> A
             is_clear: is_alone && camera.nearly_contains(&star.pixel, -apart_px),
         });
     }
-    let unclaimed = star_like.iter().filter(|(_, i)| !claimed[*i]);
-    let reach_area_px: f64 = unclaimed
-        .map(|&(_, i)| PI * reach_px(&sources[i]).powi(2))
-        .sum();
+    let unclaimed = star_like.iter().filter(|&&i| !claimed[i]);
+    let reach_area_px: f64 = unclaimed.map(|&i| PI * reach_px(&sources[i]).powi(2)).sum();
     Association {
         stars,
         chance: reach_area_px / (camera.width_px * camera.height_px),
@@ -175,7 +107,7 @@ fn reach_px(detection: &Detection, identification: &Identification) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::coords::{Rotation, UnitVector};
+    use crate::base::coords::{PixelPoint, Rotation, UnitVector};
     use crate::camera::CameraModel;
     use crate::detect::{DetectionFlags, Detections};
     use nalgebra::Matrix3;

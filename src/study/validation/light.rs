@@ -1,6 +1,7 @@
 //! Whose light a detection is.
 
 use crate::base::coords::PixelPoint;
+use crate::base::neighbors::PointTree;
 use crate::model::sensitivity::Scenario;
 use crate::model::simulate::{TrueStar, Truth};
 
@@ -15,8 +16,8 @@ const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
 
 /// Where each star's light is.
 pub struct Light<'a> {
-    /// In the order of their rows.
     stars: Vec<&'a TrueStar>,
+    by_place: PointTree,
     variance_px2: [f64; 2],
 }
 
@@ -27,9 +28,9 @@ impl<'a> Light<'a> {
         let smear_px2 = truth
             .motion_px
             .map(|motion_px| motion_px * motion_px / 12.0);
-        let mut stars: Vec<_> = truth.stars.iter().chain(&truth.beyond).collect();
-        stars.sort_by(|a, b| a.position.y.total_cmp(&b.position.y));
+        let stars: Vec<_> = truth.stars.iter().chain(&truth.beyond).collect();
         Self {
+            by_place: PointTree::new(stars.iter().map(|star| star.position)),
             stars,
             variance_px2: smear_px2.map(|smear_px2| variance_px2 + smear_px2),
         }
@@ -43,9 +44,9 @@ impl<'a> Light<'a> {
             let exponent: f64 = terms.map(|(d, variance)| d * d / variance).sum();
             star.electrons * (-0.5 * exponent).exp()
         };
-        let stars = self.within_rows(place, self.reach_px());
-        let all: f64 = stars.iter().map(|star| light(star)).sum();
-        let owner = stars.iter().find(|star| 2.0 * light(star) > all)?;
+        let stars = || self.stars_near(place, REACH_SIGMAS * self.sigma_px());
+        let all: f64 = stars().map(light).sum();
+        let owner = stars().find(|star| 2.0 * light(star) > all)?;
         (owner.position.distance_to(place) < self.at_place_px()).then_some(owner)
     }
 
@@ -54,16 +55,14 @@ impl<'a> Light<'a> {
         self.stars_near(place, self.at_place_px())
     }
 
-    /// The stars within `radius_px` of this place.
+    /// The stars within `radius_px` of this place, nearest first.
     pub fn stars_near(
         &self,
         place: &PixelPoint,
         radius_px: f64,
     ) -> impl Iterator<Item = &'a TrueStar> {
-        self.within_rows(place, radius_px)
-            .iter()
-            .copied()
-            .filter(move |star| star.position.distance_to(place) <= radius_px)
+        let near = self.by_place.within(place, radius_px).into_iter();
+        near.map(|near| self.stars[near.index])
     }
 
     /// The standard deviation of the light in a spot, along the axis on which it is wider.
@@ -73,15 +72,6 @@ impl<'a> Light<'a> {
 
     fn at_place_px(&self) -> f64 {
         AT_PLACE_PX.max(AT_PLACE_SIGMAS * self.sigma_px())
-    }
-
-    fn reach_px(&self) -> f64 {
-        REACH_SIGMAS * self.variance_px2[1].sqrt()
-    }
-
-    fn within_rows(&self, place: &PixelPoint, radius_px: f64) -> &[&'a TrueStar] {
-        let before = |y: f64| self.stars.partition_point(|star| star.position.y < y);
-        &self.stars[before(place.y - radius_px)..before(place.y + radius_px)]
     }
 }
 
