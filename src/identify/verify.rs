@@ -720,6 +720,8 @@ fn search_weight(hypotheses: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::neighbors::PointTree;
+    use proptest::prelude::*;
 
     #[test]
     fn a_whole_search_has_a_bounded_chance() {
@@ -727,24 +729,58 @@ mod tests {
         assert!(sum <= 1.0, "{sum}");
     }
 
-    #[test]
-    fn each_star_is_paired_once_with_its_closest() {
-        let observed = [(10.0, 10.0), (13.0, 10.0), (50.0, 50.0)].map(|(x, y)| ObservedStar {
+    fn observed_at((x, y): (f64, f64)) -> ObservedStar {
+        ObservedStar {
             position: PixelPoint::new(x, y),
             sigma_px: 0.1,
             mag: 0.0,
             is_saturated: false,
-        });
-        let predicted = [(12.5, 10.0), (10.0, 11.0), (90.0, 50.0)].map(|(x, y)| PredictedStar {
+        }
+    }
+
+    fn predicted_at((x, y): (f64, f64)) -> PredictedStar {
+        PredictedStar {
             pixel: PixelPoint::new(x, y),
             direction: UnitVector::from_ra_dec(0.0, 0.0),
             v_mag: 0.0,
-            catalog: x as usize,
-        });
+            catalog: x.max(0.0) as usize,
+        }
+    }
+
+    #[test]
+    fn each_star_is_paired_once_with_its_closest() {
+        let observed = [(10.0, 10.0), (13.0, 10.0), (50.0, 50.0)].map(observed_at);
+        let predicted = [(12.5, 10.0), (10.0, 11.0), (90.0, 50.0)].map(predicted_at);
         let mut pairs = Vec::new();
         let stars = (&observed[..], &predicted[..]);
         Pairing::default().pair_up(stars, &Radius::common(4.0), |_, _| Some(0.0), &mut pairs);
         let found: Vec<(usize, usize)> = pairs.iter().map(|p| (p.observed, p.catalog)).collect();
         assert_eq!(found, [(0, 10), (1, 12)]);
+    }
+
+    proptest! {
+        #[test]
+        fn close_pairs_are_those_that_a_k_d_tree_finds(
+            observed in prop::collection::vec((0.0..900.0f64, 0.0..700.0f64), 0..60),
+            predicted in prop::collection::vec((-50.0..950.0f64, -50.0..750.0f64), 0..200),
+            radius_px in 0.5..80.0f64,
+        ) {
+            let observed: Vec<_> = observed.into_iter().map(observed_at).collect();
+            let predicted: Vec<_> = predicted.into_iter().map(predicted_at).collect();
+            let mut pairing = Pairing::default();
+            let stars = (&observed[..], &predicted[..]);
+            pairing.find_close(stars, &Radius::common(radius_px), |_, _| Some(0.0));
+            let mut found: Vec<_> =
+                pairing.close.iter().map(|c| (c.observed, c.predicted)).collect();
+            found.sort_unstable();
+            let tree = PointTree::new(predicted.iter().map(|star| star.pixel));
+            let mut expected = Vec::new();
+            for (o, star) in observed.iter().enumerate() {
+                let near = tree.within(&star.position, radius_px);
+                expected.extend(near.iter().map(|near| (o, near.index)));
+            }
+            expected.sort_unstable();
+            prop_assert_eq!(found, expected);
+        }
     }
 }
