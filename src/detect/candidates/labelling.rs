@@ -204,3 +204,48 @@ impl Labelling {
         start + low..start + high
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{GrayImage, Luma};
+    use imageproc::region_labelling::{Connectivity, connected_components};
+    use proptest::prelude::*;
+
+    /// For each pixel of a mask, the number of its region from 1; 0 where it is in none.
+    fn labels(mask: &GrayImage) -> Vec<u32> {
+        let mut labelling = Labelling::default();
+        for (x, y, pixel) in mask.enumerate_pixels() {
+            labelling.begin_row(y as usize);
+            if pixel.0 != [0] {
+                labelling.add(BrightPixel { x, y, snr: 9.0 });
+            }
+        }
+        labelling.connect(mask.height() as usize);
+        let mut labels = vec![0; mask.len()];
+        for region in 0..labelling.region_starts.len() - 1 {
+            for index in labelling.pixels_of_region(region) {
+                let BrightPixel { x, y, .. } = labelling.pixels[index];
+                labels[(y * mask.width() + x) as usize] = region as u32 + 1;
+            }
+        }
+        labels
+    }
+
+    proptest! {
+        #[test]
+        fn regions_are_those_that_imageproc_labels(
+            width in 1..50_u32,
+            density in 0.05..0.95_f64,
+            values in prop::collection::vec(0.0..1.0_f64, 1..2000),
+        ) {
+            let height = values.len() as u32 / width;
+            let mask = GrayImage::from_fn(width, height, |x, y| {
+                Luma([u8::from(values[(y * width + x) as usize] < density)])
+            });
+            // Both number the regions by their first pixels in reading order.
+            let expected = connected_components(&mask, Connectivity::Eight, Luma([0]));
+            prop_assert_eq!(labels(&mask), expected.into_raw());
+        }
+    }
+}

@@ -175,6 +175,9 @@ fn bar(area: &[usize], width: usize) -> Option<Bar> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use image::{GrayImage, Luma};
+    use imageproc::region_labelling::{Connectivity, connected_components};
+    use proptest::prelude::*;
 
     #[test]
     fn a_bar_has_its_length_breadth_and_direction() {
@@ -191,5 +194,28 @@ mod tests {
         assert!((rising.angle_rad - std::f64::consts::FRAC_PI_4).abs() < 1e-9);
         let square: Vec<usize> = (0..25).map(|i| (i / 5) * width + i % 5).collect();
         assert!(!bar(&square, width).unwrap().is_trail());
+    }
+
+    proptest! {
+        #[test]
+        fn an_area_is_the_region_that_imageproc_labels(
+            width in 16..40_usize,
+            pixels in prop::collection::vec(prop::bool::weighted(0.4), 640..1200),
+        ) {
+            let height = pixels.len() / width;
+            let above: Vec<f32> = pixels.iter().map(|&p| f32::from(u8::from(p))).collect();
+            let frame = Frame::new(width, height, above[..width * height].to_vec()).unwrap();
+            let mask = GrayImage::from_fn(width as u32, height as u32, |x, y| {
+                Luma([u8::from(pixels[y as usize * width + x as usize])])
+            });
+            let labels = connected_components(&mask, Connectivity::Eight, Luma([0])).into_raw();
+            for start in (0..width * height).filter(|&i| pixels[i]) {
+                let mut area = connected(&frame, &above, start, 0.5);
+                area.sort_unstable();
+                let expected: Vec<usize> =
+                    (0..labels.len()).filter(|&i| labels[i] == labels[start]).collect();
+                prop_assert_eq!(area, expected);
+            }
+        }
     }
 }
