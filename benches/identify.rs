@@ -6,16 +6,16 @@
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use starpipe::detect::{self, DetectConfig, detect};
 use starpipe::frame::{self, Frame};
-use starpipe::identify::{self, Hints, IndexedCatalog, Outcome, StarField, identify};
-use starpipe::pipeline::{Pipeline, SolveConfig, Workspace, star_field};
+use starpipe::identify::{self, IndexedCatalog, Priors, ScalePrior, StarField, identify};
+use starpipe::pipeline::{Context, Workspace, solve_frame, star_field};
 use starpipe::sky::catalog::Catalog;
 use starpipe::sky::catalog::sky_grid::SkyGrid;
 use std::f64::consts::SQRT_2;
 use std::hint::black_box;
 use std::path::Path;
 
-/// The frame, its stars, and a hint of its scale with a total range of a factor of two.
-fn prepare(path: &Path, sky: &IndexedCatalog) -> Option<(Frame, StarField, Hints)> {
+/// The frame, its stars, and a prior of its scale with a total range of a factor of two.
+fn prepare(path: &Path, sky: &IndexedCatalog) -> Option<(Frame, StarField, Priors)> {
     let frame = frame::read(path).ok()?;
     let detections = detect(
         &frame,
@@ -23,16 +23,14 @@ fn prepare(path: &Path, sky: &IndexedCatalog) -> Option<(Frame, StarField, Hints
         &mut detect::Workspace::new(),
     )
     .ok()?;
-    let (field, _) = star_field(&frame, &detections, 0.0);
-    let Outcome::Identified(identification) = identify(&field, &Hints::default(), sky) else {
-        return None;
-    };
+    let field = star_field(&frame, &detections, 0.0);
+    let identification = identify(&field, &Priors::default(), sky).ok()?;
     let scale_rad = 1.0 / identification.camera.focal_length_px;
-    let hints = Hints {
-        pixel_scale_rad: Some((scale_rad / SQRT_2, scale_rad * SQRT_2)),
-        near: None,
+    let priors = Priors {
+        scale: Some(ScalePrior::between(scale_rad / SQRT_2, scale_rad * SQRT_2)),
+        ..Priors::default()
     };
-    Some((frame, field, hints))
+    Some((frame, field, priors))
 }
 
 fn bench_frames(criterion: &mut Criterion, cache: &Path) {
@@ -46,17 +44,17 @@ fn bench_frames(criterion: &mut Criterion, cache: &Path) {
     paths.sort();
     let sky = IndexedCatalog::open(Catalog::built_in(), Some(cache), &|_| ());
     let prepared: Vec<_> = paths.iter().filter_map(|p| prepare(p, &sky)).collect();
-    for (path, (_, field, hints)) in paths.iter().zip(&prepared) {
+    for (path, (_, field, priors)) in paths.iter().zip(&prepared) {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         let mut group = criterion.benchmark_group("identify");
-        for (knowledge, hints) in [
-            ("nothing known", &Hints::default()),
-            ("factor of two", hints),
+        for (known, priors) in [
+            ("nothing known", &Priors::default()),
+            ("factor of two", priors),
         ] {
             let mut workspace = identify::Workspace::new();
-            group.bench_function(format!("{name}, {knowledge}"), |bencher| {
+            group.bench_function(format!("{name}, {known}"), |bencher| {
                 bencher.iter(|| {
-                    let found = workspace.identify(black_box(field), hints, &sky);
+                    let found = workspace.identify(black_box(field), priors, &sky);
                     black_box(found.is_ok())
                 });
             });
@@ -73,15 +71,12 @@ fn bench_frames(criterion: &mut Criterion, cache: &Path) {
             });
         });
     }
-    let pipeline = Pipeline::new(sky);
+    let context = Context::new(&sky);
     let mut workspace = Workspace::new();
-    let config = SolveConfig::default();
     for (path, (frame, ..)) in paths.iter().zip(&prepared) {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         criterion.bench_function(&format!("whole/{name}"), |bencher| {
-            bencher.iter(|| {
-                black_box(pipeline.solve_frame(black_box(frame), &config, &mut workspace))
-            });
+            bencher.iter(|| black_box(solve_frame(black_box(frame), &context, &mut workspace)));
         });
     }
 }

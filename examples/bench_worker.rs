@@ -6,7 +6,7 @@
 use serde_json::{Value, json};
 use starpipe::detect::{self, DetectConfig, Detections, detect_into};
 use starpipe::frame::{self, Frame};
-use starpipe::identify::{self, Hints, Identification, IndexedCatalog};
+use starpipe::identify::{self, Identification, IndexedCatalog, Priors, ScalePrior};
 use starpipe::pipeline::star_field;
 use starpipe::sky::catalog::Catalog;
 use std::error::Error;
@@ -43,23 +43,23 @@ impl Bench<'_> {
         Ok(milliseconds(start))
     }
 
-    fn hints(&self, is_known: bool) -> Hints {
+    fn priors(&self, is_known: bool) -> Priors {
         let half_width = 0.5 * self.frame.width as f64;
         let scale_rad = |fov_deg: f64| (0.5 * fov_deg.to_radians()).tan() / half_width;
         let (from, to) = self.fields_deg;
-        Hints {
-            pixel_scale_rad: is_known.then(|| (scale_rad(from), scale_rad(to))),
-            near: None,
+        Priors {
+            scale: is_known.then(|| ScalePrior::between(scale_rad(from), scale_rad(to))),
+            ..Priors::default()
         }
     }
 
     /// Identifies the stars of the loaded frame, or the detections just made.
     fn solve(&mut self, is_known: bool, is_fresh: bool) -> (f64, Option<&Identification>) {
-        let hints = self.hints(is_known);
+        let priors = self.priors(is_known);
         let start = Instant::now();
         let detections = if is_fresh { &self.found } else { &self.known };
-        let (field, _) = star_field(&self.frame, detections, 0.0);
-        let answer = self.identify.identify(&field, &hints, &self.sky);
+        let field = star_field(&self.frame, detections, 0.0);
+        let answer = self.identify.identify(&field, &priors, &self.sky);
         (milliseconds(start), answer.ok())
     }
 

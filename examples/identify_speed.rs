@@ -9,7 +9,9 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use starpipe::camera::CameraModel;
 use starpipe::detect::{self, DetectConfig, detect};
-use starpipe::identify::{Hints, Identification, IndexedCatalog, StarField, Workspace};
+use starpipe::identify::{
+    Identification, IndexedCatalog, Priors, ScalePrior, StarField, Workspace,
+};
 use starpipe::pipeline::star_field;
 use starpipe::sky::catalog::Catalog;
 use starpipe::study::robustness::{Answer, Observation, Protocol};
@@ -46,14 +48,14 @@ impl Times {
     fn add(
         &mut self,
         field: &StarField,
-        hints: &Hints,
+        priors: &Priors,
         sky: &IndexedCatalog,
     ) -> Option<Identification> {
         let mut least_ms = f64::MAX;
         let mut found = None;
         for _ in 0..self.repeats.max(1) {
             let start = Instant::now();
-            let answer = self.workspace.identify(field, hints, sky);
+            let answer = self.workspace.identify(field, priors, sky);
             least_ms = least_ms.min(start.elapsed().as_secs_f64() * 1e3);
             found = answer.ok().cloned();
         }
@@ -82,12 +84,12 @@ impl Times {
     }
 }
 
-/// A hint of the scale of `camera` with a total range of a factor of two.
-fn factor_of_two(camera: &CameraModel) -> Hints {
+/// A prior of the scale of `camera` with a total range of a factor of two.
+fn factor_of_two(camera: &CameraModel) -> Priors {
     let scale_rad = 1.0 / camera.focal_length_px;
-    Hints {
-        pixel_scale_rad: Some((scale_rad / SQRT_2, scale_rad * SQRT_2)),
-        near: None,
+    Priors {
+        scale: Some(ScalePrior::between(scale_rad / SQRT_2, scale_rad * SQRT_2)),
+        ..Priors::default()
     }
 }
 
@@ -107,11 +109,11 @@ fn simulated(fields: u64, sky: &IndexedCatalog) {
         let mut random = ChaCha8Rng::seed_from_u64(number);
         let drawn = Observation::draw(&protocol, sky, &mut random);
         let field = drawn.list.star_field(0.0);
-        for (times, hints) in [
-            (&mut nothing, Hints::default()),
+        for (times, priors) in [
+            (&mut nothing, Priors::default()),
             (&mut factor, factor_of_two(&drawn.camera)),
         ] {
-            if let Some(found) = times.add(&field, &hints, sky) {
+            if let Some(found) = times.add(&field, &priors, sky) {
                 times.judge(Answer::of(&found, &drawn.camera, &drawn.icrs_to_camera));
             }
         }
@@ -129,16 +131,16 @@ fn real(frames: &[String], sky: &IndexedCatalog) -> Result<(), Box<dyn Error>> {
             &DetectConfig::default(),
             &mut detect::Workspace::new(),
         )?;
-        let (field, _) = star_field(&frame, &detections, 0.0);
+        let field = star_field(&frame, &detections, 0.0);
         let mut nothing = Times::new();
-        let found = nothing.add(&field, &Hints::default(), sky);
+        let found = nothing.add(&field, &Priors::default(), sky);
         println!("{path}: {} stars", field.stars.len());
         if let Some(found) = found {
             let truth = (&found.camera, &found.icrs_to_camera);
             nothing.judge(Answer::of(&found, truth.0, truth.1));
             let mut factor = Times::new();
-            let hints = factor_of_two(&found.camera);
-            if let Some(again) = factor.add(&field, &hints, sky) {
+            let priors = factor_of_two(&found.camera);
+            if let Some(again) = factor.add(&field, &priors, sky) {
                 factor.judge(Answer::of(&again, truth.0, truth.1));
             }
             nothing.print("nothing known");

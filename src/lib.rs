@@ -1,4 +1,58 @@
-//! From a photograph of the night sky to the stars in it, where the camera pointed, and how sure that is.
+//! starpipe finds the stars in a photograph of the night sky, names them, determines where the camera
+//! pointed, and says how certain each of these is.
+//!
+//! It is for frames of star sensors and cameras with fields from about 1.5° to 60°: lost in space, with
+//! nothing known beforehand, or with priors. Around that it predicts what a camera should see, simulates
+//! frames, and validates cameras and itself on them. It is not a tool for fisheye lenses, for galaxies and
+//! nebulae, or for spectra, and it does not track an attitude from frame to frame.
+//!
+//! # The way of a frame
+//!
+//! ```text
+//! file ─ frame ─ calibration ─ detect ─ identify ─ photometry ─ report
+//!                                │         │           │
+//!                             sources    sky:       model:
+//!                                      catalogue   what should
+//!                                      of stars    be seen
+//! ```
+//!
+//! [`pipeline`] runs the stages in this order, [`report`] presents the [`Solution`].
+//!
+//! # A first program
+//!
+//! ```no_run
+//! use starpipe::{Context, FrameReport, IndexedCatalog, TextOptions, Workspace};
+//!
+//! fn main() -> Result<(), Box<dyn std::error::Error>> {
+//!     let catalog = IndexedCatalog::built_in();
+//!     let context = Context::new(&catalog);
+//!     let solution = starpipe::solve_file("night.tif", None, &context, &mut Workspace::new())?;
+//!     let report = FrameReport::new("night.tif", &solution, catalog.catalog());
+//!     print!("{}", report.to_text(TextOptions::default()));
+//!     Ok(())
+//! }
+//! ```
+//!
+//! # The rooms
+//!
+//! Each uses only those above it in this table.
+//!
+//! | module | answers |
+//! |---|---|
+//! | [`base`] | what numbers mean: units, directions, dates, statistics |
+//! | [`sky`] | what is up there, and from where it is seen: catalogue, observer |
+//! | [`frame`] | what a file holds: readers, writers, metadata |
+//! | [`camera`] | what instrument: geometry, data sheet |
+//! | [`calibration`] | what the detector does to a frame: darks, flats, hot pixels |
+//! | [`detect`] | where is light: background, threshold, centroids |
+//! | [`identify`] | which stars, which attitude, or why not |
+//! | [`model`] | what should be seen: sensitivity, defocus, simulated frames |
+//! | [`photometry`] | how bright, how faint: zero point, completeness, comparison with the prediction |
+//! | [`pipeline`] | what does a frame show: the stages in order |
+//! | [`report`] | how to present it: JSON, text, tables, overlays, world coordinates |
+//! | [`study`] | is it good enough: validation, robustness, the papers' experiments |
+//!
+//! Pixels, angles and coordinate systems: [`conventions`].
 
 pub mod base;
 pub mod calibration;
@@ -12,6 +66,23 @@ pub mod pipeline;
 pub mod report;
 pub mod sky;
 pub mod study;
+
+pub use base::coords::{PixelPoint, UnitVector};
+pub use base::epoch::ObservationDate;
+pub use calibration::Calibration;
+pub use camera::CameraModel;
+pub use detect::{DetectConfig, Detection, Detections, detect};
+pub use frame::Frame;
+pub use identify::{
+    Identification, IndexedCatalog, Priors, ScalePrior, SkyRegion, StarMatch, identify,
+};
+pub use pipeline::{
+    CentroidList, Context, Note, Outcome, Reason, Solution, Source, Workspace, solve_centroids,
+    solve_file, solve_frame,
+};
+pub use report::{FrameReport, TextOptions};
+pub use sky::catalog::{Catalog, Star};
+pub use sky::observer::Site;
 
 #[doc = include_str!("../docs/conventions.md")]
 pub mod conventions {}

@@ -8,7 +8,7 @@
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use starpipe::identify::{Hints, IndexedCatalog, Reason, StarField, Workspace};
+use starpipe::identify::{IndexedCatalog, Priors, SearchFailure, StarField, Workspace};
 use starpipe::sky::catalog::Catalog;
 use starpipe::study::robustness::{Observation, Protocol};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -91,10 +91,13 @@ fn a_field_in_steady_state_allocates_nothing() {
     let sky = IndexedCatalog::build(Catalog::built_in(), &|_| ());
     let fields = fields(&sky);
     let mut workspace = Workspace::new();
-    let mut run = |field: &StarField| match workspace.identify(field, &Hints::default(), &sky) {
+    let mut run = |field: &StarField| match workspace.identify(field, &Priors::default(), &sky) {
         Ok(found) => Some(found.matches.len()),
         Err(reason) => {
-            assert!(matches!(reason, Reason::NoMatch { .. }), "{reason:?}");
+            assert!(
+                matches!(reason, SearchFailure::NoMatch { .. }),
+                "{reason:?}"
+            );
             None
         }
     };

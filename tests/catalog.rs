@@ -12,7 +12,7 @@ use starpipe::base::coords::{Icrs, UnitVector};
 use starpipe::base::units::{ARCSEC_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
 use starpipe::sky::catalog::{
     Catalog, CatalogError, FaultPlace, HipparcosId, ImportSummary, Star, StarFlags, StarId,
-    TychoId, sky2000,
+    StarIndex, TychoId, sky2000,
 };
 use std::collections::HashMap;
 use std::fs;
@@ -52,11 +52,11 @@ fn from_degrees(ra_deg: f64, dec_deg: f64) -> UnitVector<Icrs> {
     UnitVector::from_ra_dec(ra_deg * RAD_PER_DEG, dec_deg * RAD_PER_DEG)
 }
 
-fn star(catalog: &Catalog, id: u32) -> (usize, Star) {
+fn star(catalog: &Catalog, id: u32) -> (StarIndex, Star) {
     let index = catalog
         .find(StarId::Skymap(id))
         .expect("the star is in the catalogue");
-    (index, catalog.stars()[index])
+    (index, *catalog.star(index))
 }
 
 // ---- The committed files
@@ -108,7 +108,10 @@ fn the_built_in_catalog_is_what_the_import_of_its_source_makes() {
             "{}",
             source.id
         );
-        assert_eq!(built_in.name_of(index), imported.name_of(index));
+        assert_eq!(
+            built_in.name_of(StarIndex::new(index)),
+            imported.name_of(StarIndex::new(index))
+        );
     }
 }
 
@@ -182,7 +185,10 @@ fn the_bright_csv_holds_the_same_stars_as_the_built_in_catalog() {
         assert_eq!((ours.id, ours.flags), (theirs.id, theirs.flags));
         assert_eq!((ours.v_mag, ours.bv_mag), (theirs.v_mag, theirs.bv_mag));
         assert_eq!(ours.direction, theirs.direction, "{}", ours.id);
-        assert_eq!(bright.name_of(index), built_in.name_of(index));
+        assert_eq!(
+            bright.name_of(StarIndex::new(index)),
+            built_in.name_of(StarIndex::new(index))
+        );
     }
     let part = built_in.limited_to(6.5);
     assert_eq!(part.stars(), &built_in.stars()[..8787]);
@@ -265,7 +271,7 @@ fn known_stars_are_where_their_records_say() {
         assert_eq!(catalog.name_of(index), Some(name));
     }
     assert_eq!(
-        catalog.designation(0),
+        catalog.designation(StarIndex::new(0)),
         "06450045",
         "Sirius is the brightest"
     );
@@ -393,7 +399,7 @@ fn line_ends_the_end_of_file_mark_and_gzip_make_no_difference() {
         Catalog::read(&path).unwrap()
     };
     assert_eq!(expected.stars().len(), 2);
-    assert_eq!(expected.name_of(1), Some("1 alp UMi"));
+    assert_eq!(expected.name_of(StarIndex::new(1)), Some("1 alp UMi"));
     for content in [
         [&first[..], b"\n", &second].concat(),
         [&first[..], b"\r\n", &second, b"\r\n\x1a"].concat(),
@@ -585,7 +591,7 @@ fn tables_are_read_by_their_labels_whatever_separates_them() {
         for text in [plain, vizier.clone(), vizier.replace('\n', "\r\n")] {
             let read = Catalog::read(&written(&folder, text.as_bytes())).unwrap();
             assert_eq!(read.stars(), expected.stars(), "{text}");
-            assert_eq!(read.name_of(0), Some("1 alp UMi"));
+            assert_eq!(read.name_of(StarIndex::new(0)), Some("1 alp UMi"));
         }
     }
 }
@@ -725,7 +731,7 @@ proptest! {
             // Half the step of 0.5 mas in each coordinate.
             prop_assert!(ours.direction.angle_to(&theirs.direction) < 0.0004 * RAD_PER_ARCSEC);
             prop_assert_eq!(Star { direction: theirs.direction, ..*ours }, *theirs);
-            prop_assert_eq!(decoded.name_of(index), catalog.name_of(index));
+            prop_assert_eq!(decoded.name_of(StarIndex::new(index)), catalog.name_of(StarIndex::new(index)));
         }
     }
 

@@ -9,7 +9,7 @@ use flate2::write::GzEncoder;
 use proptest::prelude::*;
 use starpipe::base::coords::UnitVector;
 use starpipe::base::units::{ARCSEC_PER_RAD, RAD_PER_DEG};
-use starpipe::sky::catalog::{Catalog, Reading, Star, StarFlags, StarId, TychoId};
+use starpipe::sky::catalog::{Catalog, Reading, Star, StarFlags, StarId, StarIndex, TychoId};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -79,7 +79,7 @@ fn star<'a>(catalog: &'a Catalog, designation: &str) -> &'a Star {
     let stars = 0..catalog.stars().len();
     let index = stars
         .into_iter()
-        .find(|&i| catalog.designation(i) == designation);
+        .find(|&i| catalog.designation(StarIndex::new(i)) == designation);
     &catalog.stars()[index.unwrap_or_else(|| panic!("no star {designation}"))]
 }
 
@@ -224,7 +224,7 @@ fn assert_is_bright(catalog: &Catalog, tolerance_arcsec: f64) {
         .collect();
     by_id.sort_by(|a, b| a.0.cmp(&b.0));
     for (index, ours) in catalog.stars().iter().enumerate() {
-        let designation = catalog.designation(index);
+        let designation = catalog.designation(StarIndex::new(index));
         let digits = designation.trim_start_matches("star ");
         let key = format!("{digits:0>8}");
         let theirs = by_id[by_id.binary_search_by(|entry| entry.0.cmp(&key)).unwrap()].1;
@@ -583,7 +583,10 @@ fn hipparcos_and_gaia_tables_are_read_with_their_own_units_and_epochs() {
     );
     // The compact form keeps nineteen digits.
     let again = Catalog::from_compact(&reading.catalog.to_compact()).unwrap();
-    assert_eq!(again.designation(1), reading.catalog.designation(1));
+    assert_eq!(
+        again.designation(StarIndex::new(1)),
+        reading.catalog.designation(StarIndex::new(1))
+    );
 
     // VizieR's computed positions are at J2000, whatever the catalogue's epoch.
     let computed =
@@ -662,18 +665,25 @@ fn identifiers_are_what_the_table_calls_its_stars() {
     ] {
         let table = folder.write("table", format!("{headings}\n{cell},37.95,89.26,2.0\n"));
         let catalog = read(&table).catalog;
-        assert_eq!(catalog.designation(0), expected, "{headings}");
+        assert_eq!(
+            catalog.designation(StarIndex::new(0)),
+            expected,
+            "{headings}"
+        );
         assert_eq!(
             Catalog::from_compact(&catalog.to_compact())
                 .unwrap()
-                .designation(0),
+                .designation(StarIndex::new(0)),
             expected
         );
     }
     let both = folder.write("table", "id,proper,ra,dec,mag\n7,Polaris,37.95,89.26,2.0\n");
     let catalog = read(&both).catalog;
     assert_eq!(
-        (catalog.designation(0).as_str(), catalog.name_of(0)),
+        (
+            catalog.designation(StarIndex::new(0)).as_str(),
+            catalog.name_of(StarIndex::new(0))
+        ),
         ("7", Some("Polaris"))
     );
     assert_eq!(catalog.stars()[0].id, StarId::Number(7));

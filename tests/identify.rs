@@ -9,8 +9,8 @@ use rand_distr::StandardNormal;
 use starpipe::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use starpipe::camera::{CameraModel, Distortion, DistortionModel, focal_length_px};
 use starpipe::identify::{
-    Hints, Identification, IndexedCatalog, ObservedStar, Outcome, Photometry, Reason, StarField,
-    StarMatch, identify,
+    Identification, IndexedCatalog, ObservedStar, Photometry, Priors, ScalePrior, SearchFailure,
+    SkyRegion, SourceIndex, StarField, StarMatch, identify,
 };
 use starpipe::sky::catalog::Catalog;
 use std::f64::consts::{PI, TAU};
@@ -104,6 +104,7 @@ impl Truth {
 
 fn observed(x: f64, y: f64, mag: f64) -> ObservedStar {
     ObservedStar {
+        source: SourceIndex::new(0),
         position: PixelPoint::new(x, y),
         sigma_px: CENTROID_SIGMA_PX,
         // Identification does not depend on the zero point.
@@ -114,6 +115,9 @@ fn observed(x: f64, y: f64, mag: f64) -> ObservedStar {
 
 fn field(mut stars: Vec<ObservedStar>) -> StarField {
     stars.sort_by(|a, b| a.mag.total_cmp(&b.mag));
+    for (position, star) in stars.iter_mut().enumerate() {
+        star.source = SourceIndex::new(position);
+    }
     StarField {
         width_px: WIDTH_PX,
         height_px: HEIGHT_PX,
@@ -134,14 +138,14 @@ fn fields_of_any_width_and_attitude_are_identified_and_never_wrongly() {
     for fov_deg in [2.5, 3.0, 5.0, 8.0, 12.0, 20.0, 30.0, 45.0, 60.0] {
         for _ in 0..FIELDS {
             let truth = Truth::random(&mut rng, fov_deg);
-            match identify(&truth.observe(&mut rng), &Hints::default(), sky()) {
-                Outcome::Identified(found) => {
+            match identify(&truth.observe(&mut rng), &Priors::default(), sky()) {
+                Ok(found) => {
                     assert!(
                         truth.is_told_by(&found),
                         "wrong at {fov_deg} deg: {found:?}"
                     );
                 }
-                Outcome::NotIdentified(_) => unidentified += 1,
+                Err(_) => unidentified += 1,
             }
         }
     }
@@ -160,9 +164,7 @@ fn a_distortion_of_two_percent_is_measured() {
         let barrel = [0.02 * radius_px];
         truth.camera.distortion =
             Some(Distortion::new(DistortionModel::Radial, radius_px, &barrel));
-        let Outcome::Identified(found) =
-            identify(&truth.observe(&mut rng), &Hints::default(), sky())
-        else {
+        let Ok(found) = identify(&truth.observe(&mut rng), &Priors::default(), sky()) else {
             panic!("{fov_deg} deg: not identified");
         };
         assert!(truth.is_told_by(&found), "{found:?}");
@@ -180,9 +182,7 @@ fn the_poles_are_not_special() {
     for dec_rad in [PI / 2.0, -PI / 2.0, 1.55] {
         let mut truth = Truth::random(&mut rng, 15.0);
         truth.attitude = Rotation::looking_at(&UnitVector::from_ra_dec(0.5, dec_rad), 1.0);
-        let Outcome::Identified(found) =
-            identify(&truth.observe(&mut rng), &Hints::default(), sky())
-        else {
+        let Ok(found) = identify(&truth.observe(&mut rng), &Priors::default(), sky()) else {
             panic!("not identified at declination {dec_rad} rad");
         };
         assert!(truth.is_told_by(&found));
@@ -190,35 +190,36 @@ fn the_poles_are_not_special() {
 }
 
 #[test]
-fn right_hints_help_and_wrong_hints_exclude() {
+fn right_priors_help_and_wrong_priors_exclude() {
     let mut rng = ChaCha8Rng::seed_from_u64(14);
     let truth = Truth::random(&mut rng, 12.0);
     let stars = truth.observe(&mut rng);
     let centre = truth.attitude.boresight_and_up().0;
     let scale_rad = 1.0 / truth.camera.focal_length_px;
-    let right = Hints {
-        pixel_scale_rad: Some((0.9 * scale_rad, 1.1 * scale_rad)),
-        near: Some((centre, 0.1)),
+    let right = Priors {
+        scale: Some(ScalePrior::between(0.9 * scale_rad, 1.1 * scale_rad)),
+        near: Some(SkyRegion {
+            centre,
+            radius_rad: 0.1,
+        }),
+        ..Priors::default()
     };
-    assert!(matches!(
-        identify(&stars, &right, sky()),
-        Outcome::Identified(_)
-    ));
+    assert!(identify(&stars, &right, sky()).is_ok());
     let elsewhere = UnitVector::from_vector(-centre.as_vector());
     for wrong in [
-        Hints {
-            near: Some((elsewhere, 0.1)),
+        Priors {
+            near: Some(SkyRegion {
+                centre: elsewhere,
+                radius_rad: 0.1,
+            }),
             ..right
         },
-        Hints {
-            pixel_scale_rad: Some((1.5 * scale_rad, 2.0 * scale_rad)),
+        Priors {
+            scale: Some(ScalePrior::between(1.5 * scale_rad, 2.0 * scale_rad)),
             ..right
         },
     ] {
-        assert!(matches!(
-            identify(&stars, &wrong, sky()),
-            Outcome::NotIdentified(_)
-        ));
+        assert!(identify(&stars, &wrong, sky()).is_err());
     }
 }
 
@@ -227,11 +228,11 @@ fn a_saturated_star_may_be_brighter_than_measured() {
     let mut rng = ChaCha8Rng::seed_from_u64(17);
     let complete = Truth::random(&mut rng, 12.0).observe(&mut rng);
     let name_at = |stars: &StarField, place: PixelPoint| {
-        let Outcome::Identified(found) = identify(stars, &Hints::default(), sky()) else {
+        let Ok(found) = identify(stars, &Priors::default(), sky()) else {
             panic!("not identified");
         };
-        let at_place = |m: &&StarMatch| stars.stars[m.observed].position == place;
-        found.matches.iter().find(at_place).map(|m| m.catalog)
+        let at_place = |m: &&StarMatch| stars.stars[m.source.get()].position == place;
+        found.matches.iter().find(at_place).map(|m| m.star)
     };
     let place = complete.stars[0].position;
     let name = name_at(&complete, place);
@@ -270,7 +271,7 @@ fn faint_stars_are_named_despite_large_centroid_errors() {
                 .then_some(ObservedStar { sigma_px, ..star })
         };
         let stars = field(places.into_iter().filter_map(&mut star).collect());
-        let Outcome::Identified(found) = identify(&stars, &Hints::default(), sky()) else {
+        let Ok(found) = identify(&stars, &Priors::default(), sky()) else {
             continue;
         };
         let is_faint = |i: usize| stars.stars[i].sigma_px == FAINT_SIGMA_PX;
@@ -278,7 +279,7 @@ fn faint_stars_are_named_despite_large_centroid_errors() {
         named += found
             .matches
             .iter()
-            .filter(|m| is_faint(m.observed))
+            .filter(|m| is_faint(m.source.get()))
             .count();
     }
     // A close pair may be named in the wrong order; one star in ninety is off by more than three
@@ -297,25 +298,25 @@ fn a_search_with_unbounded_centroid_errors_ends() {
     for star in &mut stars.stars {
         star.sigma_px = 1e12;
     }
-    let outcome = identify(&stars, &Hints::default(), sky());
-    assert!(matches!(outcome, Outcome::NotIdentified(_)), "{outcome:?}");
+    let found = identify(&stars, &Priors::default(), sky());
+    assert!(found.is_err(), "{found:?}");
 }
 
 #[test]
 fn three_stars_are_too_few() {
     let stars = [(100.0, 100.0), (500.0, 300.0), (900.0, 700.0)].map(|(x, y)| observed(x, y, 3.0));
-    let outcome = identify(&field(stars.to_vec()), &Hints::default(), sky());
-    let expected = Reason::TooFewStars {
+    let found = identify(&field(stars.to_vec()), &Priors::default(), sky());
+    let expected = SearchFailure::TooFewStars {
         found: 3,
         needed: 4,
     };
-    assert_eq!(outcome, Outcome::NotIdentified(expected));
+    assert_eq!(found, Err(expected));
 }
 
 #[test]
 fn the_same_field_has_the_same_answer_every_time() {
     let mut rng = ChaCha8Rng::seed_from_u64(15);
     let stars = Truth::random(&mut rng, 9.0).observe(&mut rng);
-    let first = identify(&stars, &Hints::default(), sky());
-    assert_eq!(first, identify(&stars, &Hints::default(), sky()));
+    let first = identify(&stars, &Priors::default(), sky());
+    assert_eq!(first, identify(&stars, &Priors::default(), sky()));
 }

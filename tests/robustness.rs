@@ -10,8 +10,9 @@ use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
-use starpipe::identify::{Hints, IndexedCatalog, Outcome, identify};
+use starpipe::identify::{IndexedCatalog, Priors, identify};
 use starpipe::sky::catalog::Catalog;
+use starpipe::sky::catalog::StarIndex;
 use starpipe::study::robustness::{Answer, Mirrored, Observation, Protocol, Verdict};
 use std::sync::OnceLock;
 
@@ -52,8 +53,8 @@ fn without_errors_every_centroid_is_where_its_star_is() {
         let matrix = observation.icrs_to_camera.matrix();
         // Ten degrees over 1024 pixels.
         let focal_px = 512.0 / 5f64.to_radians().tan();
-        for (centroid, catalog) in observation.list.centroids.iter().zip(&observation.catalog) {
-            let star = &sky().stars()[catalog.unwrap()];
+        for (centroid, catalog) in observation.list.centroids.iter().zip(&observation.stars) {
+            let star = sky().catalog().star(catalog.unwrap());
             let seen: Vector3<f64> = matrix * star.direction.as_vector();
             let x = focal_px * seen.x / seen.z;
             let x = if mirrored == Mirrored::Always { -x } else { x };
@@ -79,11 +80,11 @@ fn errors_missing_and_false_stars_are_as_requested() {
         let exact = drawn.camera;
         kept += drawn.true_stars() as f64;
         false_stars += (drawn.list.centroids.len() - drawn.true_stars()) as f64;
-        for (centroid, catalog) in drawn.list.centroids.iter().zip(&drawn.catalog) {
+        for (centroid, catalog) in drawn.list.centroids.iter().zip(&drawn.stars) {
             let Some(catalog) = *catalog else { continue };
             let direction = drawn
                 .icrs_to_camera
-                .apply(&sky().stars()[catalog].direction);
+                .apply(&sky().catalog().star(catalog).direction);
             let place = exact.pixel_of(&direction).unwrap();
             squares += (centroid.position.x - place.x).powi(2);
         }
@@ -107,23 +108,24 @@ fn errors_missing_and_false_stars_are_as_requested() {
 fn a_wrong_pointing_is_a_wrong_answer_and_a_wrong_name_is_counted() {
     let observation = draw(&Protocol::default(), 3);
     let field = observation.list.star_field(0.0);
-    let outcome = identify(&field, &Hints::default(), sky());
-    let verdict = Verdict::new(&observation, &outcome, 0.0);
+    let found = identify(&field, &Priors::default(), sky());
+    let verdict = Verdict::new(&observation, found.as_ref().ok(), 0.0);
     assert_eq!(verdict.answer, Answer::Right);
     assert_eq!(verdict.misnamed, 0);
-    let Outcome::Identified(found) = &outcome else {
-        panic!("{outcome:?}");
+    let Ok(found) = found else {
+        panic!("{found:?}");
     };
     // Two hundredths of the field's width: about y the centre is off, about z only the corners.
     for turn in [Vector3::new(0.0, 0.0035, 0.0), Vector3::new(0.0, 0.0, 0.05)] {
         let mut off = found.clone();
         off.icrs_to_camera = off.icrs_to_camera.then_turn(turn);
-        let verdict = Verdict::new(&observation, &Outcome::Identified(off), 0.0);
+        let verdict = Verdict::new(&observation, Some(&off), 0.0);
         assert_eq!(verdict.answer, Answer::Wrong, "{turn}");
     }
     let mut misnamed = found.clone();
-    misnamed.matches[0].catalog += 1;
-    let verdict = Verdict::new(&observation, &Outcome::Identified(misnamed), 0.0);
+    let other = misnamed.matches[0].star.get() + 1;
+    misnamed.matches[0].star = StarIndex::new(other);
+    let verdict = Verdict::new(&observation, Some(&misnamed), 0.0);
     assert_eq!((verdict.answer, verdict.misnamed), (Answer::Right, 1));
 }
 

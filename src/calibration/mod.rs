@@ -19,6 +19,7 @@ pub use hot::{HotPixelList, read_hot_pixels};
 
 use crate::base::statistics::median;
 use crate::frame::Frame;
+use std::fmt;
 use std::path::PathBuf;
 
 /// With more than this part of its pixels of no use, a flat or a list of hot pixels is a mistake.
@@ -232,16 +233,37 @@ impl Calibration {
         Ok(())
     }
 
-    /// What to say of a frame of this exposure: that the dark has another.
-    pub fn note(&self, exposure_s: Option<f64>) -> Option<String> {
+    /// The dark's exposure, where it differs from the frame's.
+    pub fn exposure_mismatch(&self, frame_exposure_s: Option<f64>) -> Option<ExposureMismatch> {
         let dark = self.dark.as_ref()?;
-        let (of_dark, of_frame) = (dark.frame.metadata.exposure_s?, exposure_s?);
-        ((of_dark - of_frame).abs() > SAME_EXPOSURE * of_dark.max(of_frame)).then(|| {
-            format!(
-                "the dark {} was exposed for {of_dark} s and the frame for {of_frame} s: its dark current is not the frame's",
-                dark.name
-            )
+        let (dark_s, frame_s) = (dark.frame.metadata.exposure_s?, frame_exposure_s?);
+        let differs = (dark_s - frame_s).abs() > SAME_EXPOSURE * dark_s.max(frame_s);
+        differs.then(|| ExposureMismatch {
+            dark: dark.name.clone(),
+            dark_exposure_s: dark_s,
+            frame_exposure_s: frame_s,
         })
+    }
+}
+
+/// A dark whose exposure is not the frame's: its dark current is wrong for the frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExposureMismatch {
+    /// Name of the dark.
+    pub dark: String,
+    /// Exposure of the dark, in seconds.
+    pub dark_exposure_s: f64,
+    /// Exposure of the frame, in seconds.
+    pub frame_exposure_s: f64,
+}
+
+impl fmt::Display for ExposureMismatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "the dark {} was exposed for {} s and the frame for {} s: its dark current is not the frame's",
+            self.dark, self.dark_exposure_s, self.frame_exposure_s
+        )
     }
 }
 

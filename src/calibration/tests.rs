@@ -105,13 +105,17 @@ fn a_dark_of_another_exposure_gets_a_note() {
     dark.frame.metadata.exposure_s = Some(10.0);
     let calibration = Calibration::new(Some(dark), None, None, 0.0).unwrap();
     assert_eq!(
-        (calibration.note(Some(10.001)), calibration.note(None)),
+        (
+            calibration.exposure_mismatch(Some(10.001)),
+            calibration.exposure_mismatch(None)
+        ),
         (None, None)
     );
     assert!(
         calibration
-            .note(Some(1.0))
+            .exposure_mismatch(Some(1.0))
             .unwrap()
+            .to_string()
             .starts_with("the dark master.fits was exposed for 10 s and the frame for 1 s")
     );
 }

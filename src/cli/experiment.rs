@@ -11,7 +11,7 @@ use super::output::stdout::print;
 use super::progress::bar;
 use anyhow::Context;
 use clap::Args;
-use starpipe::pipeline::Pipeline;
+use starpipe::identify::IndexedCatalog;
 use starpipe::report::overlay;
 use starpipe::study::experiment::{Published, Run, Trials, run};
 use std::path::{Path, PathBuf};
@@ -59,18 +59,18 @@ pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Exit, CommandErro
     }
     let pool = thread_pool(arguments.resources.threads)?;
     let catalog = pool.install(|| read_catalog(arguments.resources.catalog.as_deref()))?;
-    let pipeline = Pipeline::new(pool.install(|| index_catalog(&catalog, &arguments.resources)));
+    let sky = pool.install(|| index_catalog(&catalog, &arguments.resources));
     let trials = Trials {
         count: arguments.trials,
         seed: arguments.seed,
     };
     let progress = bar(trials.count, "frames {wide_bar} {pos}/{len} {eta}");
-    let done = pool.install(|| run(&published, &pipeline, trials, &|| progress.inc(1)));
+    let done = pool.install(|| run(&published, &sky, trials, &|| progress.inc(1)));
     progress.finish_and_clear();
-    warn_of_cache(pipeline.sky());
+    warn_of_cache(&sky);
     let done = done.map_err(anyhow::Error::from)?;
     if let Some(directory) = &arguments.out {
-        save(&done, &pipeline, directory, &name)?;
+        save(&done, &sky, directory, &name)?;
     }
     let text = match arguments.format {
         PageFormat::Text => done.report.to_text(),
@@ -86,12 +86,12 @@ pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Exit, CommandErro
 }
 
 /// Draws the first frame, where there is one.
-fn save(done: &Run, pipeline: &Pipeline, directory: &Path, name: &Path) -> anyhow::Result<()> {
+fn save(done: &Run, sky: &IndexedCatalog, directory: &Path, name: &Path) -> anyhow::Result<()> {
     let Some((frame, solution)) = &done.first else {
         return Ok(());
     };
     let title = format!("{}, simulated", name.display());
-    let picture = overlay::draw(&title, frame, solution, pipeline.catalog());
+    let picture = overlay::draw(&title, frame, solution, sky.catalog());
     let path = output_path(directory, name, "png");
     write_whole(&[(path, overlay::to_png(&picture)?)])
 }

@@ -6,8 +6,9 @@ use super::input::frames as input;
 use super::options::values::MAX_SIDE_PX;
 use super::solving::options::{LIST_RESULTS, SolvingOptions};
 use super::solving::output::Solved;
-use super::solving::solve_all;
+use super::solving::{Plan, solve_all};
 use clap::Args;
+use starpipe::pipeline::solve_centroids;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -39,12 +40,15 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Exit, CommandError> {
         solving,
     } = arguments;
     input::check(&lists)?;
-    let knowledge = solving.hints.resolve_with_camera()?;
+    let plan = Plan {
+        priors: solving.hints.resolve_with_camera()?,
+        ..Plan::default()
+    };
     let size = FrameSize { width, height };
     let (settings, resources) = solving.resolve(&lists, LIST_RESULTS)?;
-    solve_all(&lists, settings, &resources, |pipeline, path, _| {
+    solve_all(&lists, settings, &resources, &plan, |context, path, _| {
         let list = centroids::read(path, size)?;
-        let solution = pipeline.solve_centroids(&list, &knowledge);
+        let solution = solve_centroids(&list, context);
         Ok(Solved {
             solution,
             frame: None,

@@ -7,19 +7,19 @@ use super::options::values;
 use super::output::messages::{one_line, report_error};
 use super::solving::options::{FRAME_RESULTS, SolvingOptions};
 use super::solving::output::Solved;
-use super::solving::solve_all;
+use super::solving::{Plan, solve_all};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use starpipe::calibration::{Calibration, read_hot_pixels};
 use starpipe::camera::data_sheet::Sensor;
 use starpipe::detect::{CentroidMethod, DetectConfig};
 use starpipe::frame::Buffers;
+use starpipe::identify::Priors;
 use starpipe::model::sensitivity::Extinction;
-use starpipe::photometry::comparison::Description;
-use starpipe::pipeline::{Knowledge, SolveConfig};
+use starpipe::photometry::comparison::StatedCamera;
+use starpipe::pipeline::solve_read;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
@@ -118,15 +118,14 @@ pub(crate) fn process(arguments: ProcessArgs) -> Result<Exit, CommandError> {
         solving,
     } = arguments;
     let sensor = solving.hints.sensor()?;
-    let config = SolveConfig {
+    let plan = Plan {
         detect: detection.resolve(),
-        knowledge: Knowledge {
+        priors: Priors {
             exposure_s: light.exposure,
             ..solving.hints.resolve()?
         },
-        calibration: calibration.resolve(sensor.as_ref())?.map(Arc::new),
-        description: sensor.map(|sensor| light.description(sensor)),
-        page,
+        calibration: calibration.resolve(sensor.as_ref())?,
+        camera: sensor.map(|sensor| light.stated_camera(sensor)),
     };
     input::check(&frames)?;
     let (frames, troubles) = input::frames(frames);
@@ -140,9 +139,10 @@ pub(crate) fn process(arguments: ProcessArgs) -> Result<Exit, CommandError> {
         &frames,
         settings,
         &resources,
-        |pipeline, path, workspace| {
+        &plan,
+        |context, path, workspace| {
             let read = |buffers: &mut Buffers| input::read_frame(path, page, buffers);
-            let (solution, frame) = pipeline.solve_read(path, &config, workspace, read)?;
+            let (solution, frame) = solve_read(path, read, context, workspace)?;
             let frame = if keep {
                 Some(frame)
             } else {
@@ -199,9 +199,9 @@ impl DetectionOptions {
 }
 
 impl LightOptions {
-    /// The camera `sensor`, and what it looked through.
-    pub(crate) fn description(&self, sensor: Sensor) -> Description {
-        Description {
+    /// The camera, the zenith distance and the extinction as the user states them.
+    pub(crate) fn stated_camera(&self, sensor: Sensor) -> StatedCamera {
+        StatedCamera {
             sensor,
             zenith_distance_deg: self.zenith_distance,
             extinction: self.extinction.map(Extinction::MagPerAirmass),

@@ -1,29 +1,55 @@
-//! What a file says of how its frame was taken.
+//! How a frame was taken, as its file states it.
 
 use crate::base::epoch::ObservationDate;
 use crate::sky::observer::Site;
+use std::fmt;
 use std::ops::RangeInclusive;
 
-/// What a file says of how its frame was taken; nothing of it is checked against the image.
+/// How a frame was taken, as its file states it. The values are plausible, not verified.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrameMetadata {
-    /// When.
+    /// Date of the exposure.
     pub date: Option<ObservationDate>,
-    /// How long it was exposed, in seconds.
+    /// Exposure time, in seconds.
     pub exposure_s: Option<f64>,
-    /// Distance between neighbouring pixels on the detector as they are in the file, binned or not, in micrometres.
+    /// Pixel pitch of the stored pixels (binned, where the file is), in micrometres.
     pub pixel_size_um: Option<f64>,
     /// Focal length of the optics, in millimetres.
     pub focal_length_mm: Option<f64>,
-    /// Where.
+    /// The observer's site.
     pub site: Option<Site>,
-    /// Zenith distance of where the mount believed it pointed, in degrees.
+    /// Zenith distance that the mount reported, in degrees.
     pub zenith_distance_deg: Option<f64>,
-    /// What the file says and cannot be true: for each, what was found and what was expected. None of it is used.
-    pub ignored: Vec<String>,
+    /// Values outside their plausible range. They are not used.
+    pub ignored: Vec<IgnoredValue>,
 }
 
-/// A number that a header may give, and within which limits it makes sense.
+/// A value in a file's header that is not used, because it cannot be true.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct IgnoredValue {
+    /// The keyword or keywords.
+    pub keyword: String,
+    /// The text found there.
+    pub found: String,
+    /// What was expected instead.
+    pub expected: String,
+}
+
+impl fmt::Display for IgnoredValue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            keyword,
+            found,
+            expected,
+        } = self;
+        write!(
+            f,
+            "{keyword} is ignored: found {found}, expected {expected}"
+        )
+    }
+}
+
+/// A number that a header may give, and its plausible range.
 pub(super) struct Quantity {
     name: &'static str,
     unit: &'static str,
@@ -55,14 +81,14 @@ pub(super) const ALTITUDE: Quantity = Quantity {
 };
 
 impl FrameMetadata {
-    /// The angle that a pixel at the frame's centre spans, in radians, where focal length and pixel size tell.
+    /// Pixel scale at the frame's centre, in radians, where focal length and pixel size are known.
     pub fn pixel_scale_rad(&self) -> Option<f64> {
         const UM_PER_MM: f64 = 1000.0;
         let focal_length_um = self.focal_length_mm? * UM_PER_MM;
         Some(self.pixel_size_um? / focal_length_um)
     }
 
-    /// `value` if it makes sense for `quantity`; else it is noted with the `keyword` and the `text` that it comes from.
+    /// Returns `value` if it is plausible for `quantity`; otherwise records it as ignored.
     pub(super) fn sensible(
         &mut self,
         quantity: &Quantity,
@@ -83,7 +109,7 @@ impl FrameMetadata {
         sensible
     }
 
-    /// `date` if it is one; else it is noted.
+    /// Returns `date` if there is one; otherwise records the text as ignored.
     pub(super) fn sensible_date(
         &mut self,
         keyword: &str,
@@ -98,8 +124,8 @@ impl FrameMetadata {
         date
     }
 
-    /// The site at a latitude and a longitude in degrees, and a height in metres; noted with the `keywords` and the `text` that
-    /// it comes from where there is none.
+    /// Returns the site at a latitude and longitude in degrees and a height in metres; records the text as
+    /// ignored where they are out of range.
     pub(super) fn sensible_site(
         &mut self,
         keywords: &str,
@@ -118,9 +144,11 @@ impl FrameMetadata {
     }
 
     fn ignore(&mut self, keyword: &str, text: &str, expected: &str) {
-        self.ignored.push(format!(
-            "{keyword} is ignored: found {text}, expected {expected}"
-        ));
+        self.ignored.push(IgnoredValue {
+            keyword: keyword.to_owned(),
+            found: text.to_owned(),
+            expected: expected.to_owned(),
+        });
     }
 }
 
@@ -141,13 +169,13 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_sense_is_noted_and_not_taken() {
+    fn implausible_values_are_recorded_and_not_used() {
         let mut metadata = FrameMetadata::default();
         for (text, value) in [("0", Some(0.0)), ("NaN", Some(f64::NAN)), ("long", None)] {
             assert_eq!(metadata.sensible(&EXPOSURE, "EXPTIME", text, value), None);
         }
         assert_eq!(
-            metadata.ignored[0],
+            metadata.ignored[0].to_string(),
             "EXPTIME is ignored: found 0, expected an exposure from 0.000001 to 1000000 s"
         );
         assert_eq!(metadata.ignored.len(), 3);

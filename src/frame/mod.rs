@@ -39,7 +39,7 @@ pub(crate) use directory::OVERLAY_TEXT;
 pub use directory::{CALIBRATION_CREATOR, files_in, is_calibration_frame, is_overlay};
 pub use error::{FrameError, FrameFormat};
 pub use fits::{FitsHeader, FitsSamples, FitsWriteError, write_fits};
-pub use metadata::FrameMetadata;
+pub use metadata::{FrameMetadata, IgnoredValue};
 pub use tiff_write::{TiffOptions, TiffSamples, write_tiff};
 
 use std::io::{self, Read};

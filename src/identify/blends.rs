@@ -12,8 +12,10 @@
 //! # Reference
 //! Comaniciu & Meer 2002, IEEE Trans. Pattern Anal. Mach. Intell. 24, 603, doi 10.1109/34.1000236, for the mean shift.
 
-use super::verify::{Hypothesis, Pair, Scene};
+use super::hypothesis::{Hypothesis, Problem};
+use super::pairing::Pair;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
+use crate::sky::catalog::StarIndex;
 use crate::sky::catalog::sky_grid::GridStar;
 
 /// Stars so much fainter than another move it by less than a hundredth of the spot.
@@ -31,13 +33,13 @@ const MAX_STEPS: usize = 50;
 #[derive(Debug, Default)]
 pub struct Blends {
     /// Catalogue stars that are matched, in order.
-    taken: Vec<usize>,
+    taken: Vec<StarIndex>,
     lights: Vec<(PixelPoint, f64)>,
 }
 
 /// What the camera sees.
 struct Seen<'a> {
-    scene: Scene<'a>,
+    problem: Problem<'a>,
     hypothesis: &'a Hypothesis,
     /// Of a spot with the pixels' width.
     variance_px2: f64,
@@ -48,21 +50,26 @@ impl Blends {
     /// all stand alone, or the spot is not known.
     ///
     /// A star that another detection is matched with is no part of a blend: each was measured by itself.
-    pub fn redirect(&mut self, scene: Scene, hypothesis: &Hypothesis, pairs: &mut [Pair]) -> bool {
-        let Some(spot_sigma_px) = scene.field.spot_sigma_px else {
+    pub fn redirect(
+        &mut self,
+        problem: Problem,
+        hypothesis: &Hypothesis,
+        pairs: &mut [Pair],
+    ) -> bool {
+        let Some(spot_sigma_px) = problem.field.spot_sigma_px else {
             return false;
         };
         let seen = Seen {
-            scene,
+            problem,
             hypothesis,
             variance_px2: spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2,
         };
         self.taken.clear();
-        self.taken.extend(pairs.iter().map(|pair| pair.catalog));
+        self.taken.extend(pairs.iter().map(|pair| pair.star));
         self.taken.sort_unstable();
         let mut is_any = false;
         for pair in pairs {
-            if let Some(direction) = self.direction_of(&seen, pair.catalog) {
+            if let Some(direction) = self.direction_of(&seen, pair.star) {
                 pair.direction = direction;
                 is_any = true;
             }
@@ -71,17 +78,17 @@ impl Blends {
     }
 
     /// Where the light of a star is seen; `None` where it stands alone.
-    fn direction_of(&mut self, seen: &Seen, catalog: usize) -> Option<UnitVector<Icrs>> {
-        let sky = seen.scene.sky;
-        let star = &sky.stars()[catalog];
+    fn direction_of(&mut self, seen: &Seen, index: StarIndex) -> Option<UnitVector<Icrs>> {
+        let sky = seen.problem.sky;
+        let star = sky.catalog().star(index);
         let camera = &seen.hypothesis.camera;
         let reach_rad = REACH_SIGMAS * seen.variance_px2.sqrt() / camera.focal_length_px;
         let Self { taken, lights } = self;
         lights.clear();
         let look = |near: &GridStar| {
-            let index = near.catalog as usize;
-            if index != catalog && taken.binary_search(&index).is_err() {
-                lights.extend(seen.light_of(index, star.v_mag));
+            let other = StarIndex::from(near.catalog);
+            if other != index && taken.binary_search(&other).is_err() {
+                lights.extend(seen.light_of(other, star.v_mag));
             }
         };
         let faintest_v_mag = star.v_mag + FAINTER_MAG;
@@ -90,7 +97,7 @@ impl Blends {
         if lights.is_empty() {
             return None;
         }
-        let own = seen.light_of(catalog, star.v_mag)?;
+        let own = seen.light_of(index, star.v_mag)?;
         lights.push(own);
         let pixel = mode_next_to(own.0, lights, seen.variance_px2);
         let to_icrs = seen.hypothesis.icrs_to_camera.inverse();
@@ -100,9 +107,9 @@ impl Blends {
 
 impl Seen<'_> {
     /// A star's place in the frame, and its light in units of that of a star of `unit_v_mag`.
-    fn light_of(&self, catalog: usize, unit_v_mag: f32) -> Option<(PixelPoint, f64)> {
-        let star = &self.scene.sky.stars()[catalog];
-        let direction = star.direction_at(self.scene.field.years_since_j2000);
+    fn light_of(&self, index: StarIndex, unit_v_mag: f32) -> Option<(PixelPoint, f64)> {
+        let star = self.problem.sky.catalog().star(index);
+        let direction = star.direction_at(self.problem.field.years_since_j2000);
         let in_camera = self.hypothesis.icrs_to_camera.apply(&direction);
         let pixel = self.hypothesis.camera.pixel_of(&in_camera)?;
         Some((pixel, 10f64.powf(0.4 * f64::from(unit_v_mag - star.v_mag))))

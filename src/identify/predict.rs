@@ -1,8 +1,9 @@
 //! Where the catalogue's stars fall in a frame.
 
-use super::IndexedCatalog;
+use super::indexed_catalog::IndexedCatalog;
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::camera::{CameraModel, LANES};
+use crate::sky::catalog::StarIndex;
 use crate::sky::catalog::sky_grid::{GridStar, chord_of};
 
 /// Stars predicted so far outside the frame, in units of its diagonal, may still be seen on it.
@@ -23,8 +24,8 @@ pub struct PredictedStar {
     pub direction: UnitVector<Icrs>,
     /// V magnitude.
     pub v_mag: f32,
-    /// Index into the catalogue's stars.
-    pub catalog: usize,
+    /// The star.
+    pub star: StarIndex,
 }
 
 /// A camera in its attitude, at a time.
@@ -214,7 +215,7 @@ fn project(
                 pixel,
                 direction,
                 v_mag: star.v_mag,
-                catalog: star.catalog as usize,
+                star: StarIndex::from(star.catalog),
             });
         }
     }

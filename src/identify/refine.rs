@@ -3,9 +3,10 @@
 //! pair up → fit → pair up within a smaller radius → ... with as much lens distortion as the stars support
 
 use super::blends::Blends;
+use super::field::{ObservedStar, Photometry};
+use super::hypothesis::{Hypothesis, Problem};
+use super::pairing::{Pair, Pairing, Radius};
 use super::predict::{PredictedStar, Surroundings};
-use super::verify::{Hypothesis, Pair, Pairing, Radius, Scene};
-use super::{ObservedStar, Photometry};
 use crate::base::statistics::median;
 use crate::camera::DistortionModel;
 use crate::identify::attitude::{
@@ -127,19 +128,19 @@ impl Refiner {
     /// Pairs up and fits in turn, from `start`; [`Self::pairs`] are the stars that agree.
     ///
     /// `None` where too few stars agree to determine the camera.
-    pub fn refine(&mut self, scene: Scene, start: &Start) -> Option<Refined> {
-        let field = scene.field;
+    pub fn refine(&mut self, problem: Problem, start: &Start) -> Option<Refined> {
+        let field = problem.field;
         let observed = field.brightest(start.stars);
         let hypothesis = start.hypothesis;
-        hypothesis.predict(scene, observed, &mut self.around, &mut self.predicted);
+        hypothesis.predict(problem, observed, &mut self.around, &mut self.predicted);
         let mut radius_px = start.radius_px;
-        self.pair_up(scene, hypothesis, observed, &Radius::common(radius_px));
-        if start.sceptical && !self.is_remarkable(scene, observed.len(), radius_px) {
+        self.pair_up(problem, hypothesis, observed, &Radius::common(radius_px));
+        if start.sceptical && !self.is_remarkable(problem, observed.len(), radius_px) {
             return None;
         }
         let mut model = hypothesis.camera.distortion_model();
         let mut current = self.fitted(
-            scene,
+            problem,
             &Guess {
                 hypothesis,
                 model,
@@ -152,18 +153,18 @@ impl Refiner {
             let hypothesis = current.hypothesis();
             hypothesis.predict_again(&mut self.predicted);
             std::mem::swap(&mut self.pairs, &mut self.before);
-            self.pair_up(scene, &hypothesis, observed, &Radius::common(radius_px));
+            self.pair_up(problem, &hypothesis, observed, &Radius::common(radius_px));
             let settled = self.are_pairs_the_same();
             if settled && model_chosen {
                 std::mem::swap(&mut self.pairs, &mut self.before);
                 break;
             }
             if settled {
-                model = self.choose_model(scene, &current, start.richest);
+                model = self.choose_model(problem, &current, start.richest);
                 model_chosen = true;
             }
             current = self.fitted(
-                scene,
+                problem,
                 &Guess {
                     hypothesis: &hypothesis,
                     model,
@@ -178,22 +179,22 @@ impl Refiner {
     /// looked for as far off as its own error allows: that of the faintest is many times the typical one.
     ///
     /// `None` where they do not determine the camera.
-    pub fn with_all_stars(&mut self, scene: Scene, settled: &Refined) -> Option<Refined> {
+    pub fn with_all_stars(&mut self, problem: Problem, settled: &Refined) -> Option<Refined> {
         let hypothesis = settled.hypothesis();
         let model = hypothesis.camera.distortion_model();
-        hypothesis.predict_all(scene, &mut self.around, &mut self.predicted);
+        hypothesis.predict_all(problem, &mut self.around, &mut self.predicted);
         let mut radius_px = FAINT_RADIUS * self.agreement_radius_px();
         let mut current = *settled;
         for _ in 0..ALL_STARS_ROUNDS {
             let hypothesis = current.hypothesis();
             let radius = Radius {
                 common_px: radius_px,
-                sigmas: CLIP_SIGMAS * self.error_scale(scene, current.excess_sigma_px),
+                sigmas: CLIP_SIGMAS * self.error_scale(problem, current.excess_sigma_px),
                 excess_sigma_px: current.excess_sigma_px,
                 at_most: ROUGH_RADIUS,
             };
             std::mem::swap(&mut self.pairs, &mut self.before);
-            self.pair_up(scene, &hypothesis, &scene.field.stars, &radius);
+            self.pair_up(problem, &hypothesis, &problem.field.stars, &radius);
             if self.are_pairs_the_same() {
                 std::mem::swap(&mut self.pairs, &mut self.before);
                 break;
@@ -203,7 +204,7 @@ impl Refiner {
                 model,
                 excess_sigma_px: current.excess_sigma_px,
             };
-            current = self.fitted(scene, &guess)?;
+            current = self.fitted(problem, &guess)?;
             current.hypothesis().predict_again(&mut self.predicted);
             radius_px = self.next_radius_px(radius_px);
         }
@@ -213,9 +214,9 @@ impl Refiner {
     /// Fits the same stars again, each where its light is seen together with that of those which the camera does not tell from it.
     ///
     /// `None` where they do not determine the camera.
-    pub fn with_blends(&mut self, scene: Scene, settled: Refined) -> Option<Refined> {
+    pub fn with_blends(&mut self, problem: Problem, settled: Refined) -> Option<Refined> {
         let hypothesis = settled.hypothesis();
-        if !self.blends.redirect(scene, &hypothesis, &mut self.pairs) {
+        if !self.blends.redirect(problem, &hypothesis, &mut self.pairs) {
             return Some(settled);
         }
         let model = hypothesis.camera.distortion_model();
@@ -226,19 +227,19 @@ impl Refiner {
                 model,
                 excess_sigma_px: current.excess_sigma_px,
             };
-            current = self.fitted(scene, &guess)?;
+            current = self.fitted(problem, &guess)?;
         }
         Some(current)
     }
 
     fn pair_up(
         &mut self,
-        scene: Scene,
+        problem: Problem,
         hypothesis: &Hypothesis,
         observed: &[ObservedStar],
         radius: &Radius,
     ) {
-        let photometry = scene.field.photometry;
+        let photometry = problem.field.photometry;
         self.pairing.pair_up(
             (observed, &self.predicted),
             radius,
@@ -248,8 +249,8 @@ impl Refiner {
     }
 
     /// Whether more stars agree within `radius_px` than chance would have agree.
-    fn is_remarkable(&self, scene: Scene, observed: usize, radius_px: f64) -> bool {
-        let area_px = scene.field.width_px * scene.field.height_px;
+    fn is_remarkable(&self, problem: Problem, observed: usize, radius_px: f64) -> bool {
+        let area_px = problem.field.width_px * problem.field.height_px;
         let discs_px = self.predicted.len() as f64 * PI * radius_px.powi(2);
         let by_chance = observed as f64 * (discs_px / area_px).min(1.0);
         let wanted = by_chance + SCEPTICAL_SIGMAS * (by_chance + 0.1).sqrt();
@@ -257,7 +258,7 @@ impl Refiner {
     }
 
     fn are_pairs_the_same(&self) -> bool {
-        let stars = |pair: &Pair| (pair.observed, pair.catalog);
+        let stars = |pair: &Pair| (pair.observed, pair.star);
         self.pairs
             .iter()
             .map(stars)
@@ -265,8 +266,8 @@ impl Refiner {
     }
 
     /// The fit to the pairs, from `guess`.
-    fn fitted(&mut self, scene: Scene, guess: &Guess) -> Option<Refined> {
-        self.measure(scene, guess.excess_sigma_px);
+    fn fitted(&mut self, problem: Problem, guess: &Guess) -> Option<Refined> {
+        self.measure(problem, guess.excess_sigma_px);
         let Hypothesis {
             camera,
             icrs_to_camera,
@@ -281,21 +282,21 @@ impl Refiner {
             affordable,
             residuals_px,
         )?;
-        let excess_sigma_px = self.excess_sigma_of(scene, fit.parameters);
+        let excess_sigma_px = self.excess_sigma_of(problem, fit.parameters);
         for (pair, [x, y]) in self.pairs.iter_mut().zip(&self.residuals_px) {
             pair.residual_px = (x * x + y * y).sqrt();
         }
         Some(Refined {
             fit,
-            zero_point_mag: self.zero_point_mag(scene),
+            zero_point_mag: self.zero_point_mag(problem),
             excess_sigma_px,
         })
     }
 
     /// The median difference between catalogue and observed magnitudes.
-    fn zero_point_mag(&mut self, scene: Scene) -> f64 {
-        let observed = &scene.field.stars;
-        match scene.field.photometry {
+    fn zero_point_mag(&mut self, problem: Problem) -> f64 {
+        let observed = &problem.field.stars;
+        match problem.field.photometry {
             Photometry::JohnsonV => 0.0,
             Photometry::Instrumental => self.scratch.median(
                 self.pairs
@@ -308,9 +309,9 @@ impl Refiner {
     /// The stars as the fit takes them. The error of one that is further off than its own error and the common
     /// excess explain (an unresolved companion, say) is raised with its distance, so that it pulls no harder than one that is not
     /// (Huber 1964, Ann. Math. Stat. 35, 73).
-    fn measure(&mut self, scene: Scene, excess_px: f64) {
+    fn measure(&mut self, problem: Problem, excess_px: f64) {
         let measured = |pair: &Pair| {
-            let star = &scene.field.stars[pair.observed];
+            let star = &problem.field.stars[pair.observed];
             let sigma_px = (star.sigma_px.powi(2) + excess_px.powi(2)).sqrt().max(1e-3);
             let excess = pair.residual_px / (HUBER_SIGMAS * sigma_px);
             MeasuredStar {
@@ -326,13 +327,13 @@ impl Refiner {
     /// The simplest model that richer ones do not clearly surpass in predicting stars left out of the fit.
     fn choose_model(
         &mut self,
-        scene: Scene,
+        problem: Problem,
         current: &Refined,
         richest: DistortionModel,
     ) -> Option<DistortionModel> {
         // The pairs are the same, with the residuals of the fit.
         std::mem::swap(&mut self.pairs, &mut self.before);
-        self.measure(scene, current.excess_sigma_px);
+        self.measure(problem, current.excess_sigma_px);
         std::mem::swap(&mut self.pairs, &mut self.before);
         let CameraFit {
             camera,
@@ -360,9 +361,9 @@ impl Refiner {
     }
 
     /// What the stated errors must be multiplied by to be those that the residuals show: at most 1, as the excess is one of them.
-    fn error_scale(&mut self, scene: Scene, excess_sigma_px: f64) -> f64 {
+    fn error_scale(&mut self, problem: Problem, excess_sigma_px: f64) -> f64 {
         let relative = |pair: &Pair| {
-            let sigma_px = scene.field.stars[pair.observed].sigma_px;
+            let sigma_px = problem.field.stars[pair.observed].sigma_px;
             pair.residual_px / sigma_px.hypot(excess_sigma_px).max(1e-3)
         };
         let median = self.scratch.median(self.pairs.iter().map(relative));
@@ -384,11 +385,11 @@ impl Refiner {
     /// What must be added to the stated errors so that the residuals' median is as expected, in pixels; nothing where chance
     /// explains that they are larger. The better measured half of the stars tells: what is to be added shows in them, and the
     /// faintest were found where noise made them bright, and moved them.
-    fn excess_sigma_of(&mut self, scene: Scene, parameters: usize) -> f64 {
+    fn excess_sigma_of(&mut self, problem: Problem, parameters: usize) -> f64 {
         let equations = 2.0 * self.pairs.len() as f64;
         let free = (equations - parameters as f64).max(1.0) / equations.max(1.0);
         let expected_sq = RAYLEIGH_MEDIAN.powi(2) * free;
-        let stated_sq = |pair: &Pair| scene.field.stars[pair.observed].sigma_px.powi(2);
+        let stated_sq = |pair: &Pair| problem.field.stars[pair.observed].sigma_px.powi(2);
         let worst_sq = self.scratch.median(self.pairs.iter().map(stated_sq));
         let residuals = self.residuals_px.iter().zip(&self.pairs);
         let squares = &mut self.scratch.squares;

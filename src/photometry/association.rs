@@ -6,6 +6,7 @@ use super::MeasuredFrame;
 use crate::base::neighbors::PointTree;
 use crate::detect::Detection;
 use crate::identify::{Identification, PredictedStar};
+use crate::sky::catalog::StarIndex;
 use std::f64::consts::{PI, SQRT_2};
 
 /// A star and its detection are no further apart than this, ...
@@ -23,8 +24,8 @@ const HIDING_MAG: f32 = 1.0;
 /// One catalogue star in the frame, and what became of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct FrameStar {
-    /// Index into the catalogue's stars.
-    pub catalog: usize,
+    /// The star.
+    pub star: StarIndex,
     /// V magnitude.
     pub v_mag: f64,
     /// Index of its detection.
@@ -82,7 +83,7 @@ pub(super) fn associate(frame: &MeasuredFrame, predicted: &[PredictedStar]) -> A
             .iter()
             .any(|near| hiding(near.index));
         stars.push(FrameStar {
-            catalog: star.catalog,
+            star: star.star,
             v_mag: f64::from(star.v_mag),
             detection: nearest,
             is_clear: is_alone && camera.nearly_contains(&star.pixel, -apart_px),
@@ -131,7 +132,7 @@ mod tests {
             pixel: PixelPoint::new(x, y),
             direction: UnitVector::from_ra_dec(0.0, 0.0),
             v_mag,
-            catalog: (v_mag * 10.0) as usize,
+            star: StarIndex::new((v_mag * 10.0) as usize),
         }
     }
 

@@ -19,7 +19,7 @@ pub mod zero_point;
 use crate::base::statistics::median;
 use crate::detect::{Detection, Detections};
 use crate::identify::{Identification, IndexedCatalog, View};
-use crate::sky::catalog::{Star, StarFlags};
+use crate::sky::catalog::{Star, StarFlags, StarIndex};
 use association::{Association, FrameStar, associate};
 use completeness::{Completeness, Trial};
 use zero_point::{MeasuredStar, ZeroPoint};
@@ -89,7 +89,7 @@ pub fn measure(frame: &MeasuredFrame, sky: &IndexedCatalog) -> FramePhotometry {
         .filter_map(|star| {
             let detection = &frame.detections.sources[star.detection?];
             let wanted = is_sure(star, detection.snr) && is_unharmed(detection);
-            let known = &sky.stars()[star.catalog];
+            let known = sky.catalog().star(star.star);
             (star.is_clear && wanted && is_constant_and_single(known)).then(|| MeasuredStar {
                 v_mag: star.v_mag,
                 bv_mag: known.bv_mag.map(f64::from),
@@ -115,13 +115,13 @@ pub fn instrumental_mag(flux: f64) -> f64 {
 fn depth_v_mag(frame: &MeasuredFrame, sky: &IndexedCatalog) -> f64 {
     let sources = &frame.detections.sources;
     let matches = &frame.identification.matches;
-    let v_mag = |catalog: usize| f64::from(sky.stars()[catalog].v_mag);
+    let v_mag = |star: StarIndex| f64::from(sky.catalog().star(star).v_mag);
     let mag = |source: &Detection| instrumental_mag(source.flux_adu);
     let mut offsets: Vec<f64> = matches
         .iter()
-        .map(|m| v_mag(m.catalog) - mag(&sources[m.observed]))
+        .map(|m| v_mag(m.star) - mag(&sources[m.source.get()]))
         .collect();
-    let faintest = matches.iter().map(|m| v_mag(m.catalog));
+    let faintest = matches.iter().map(|m| v_mag(m.star));
     let faintest_star = sources
         .iter()
         .filter(|source| source.flags.is_star_like() && source.flux_adu > 0.0)

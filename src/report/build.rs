@@ -13,10 +13,10 @@ use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::Applied;
 use crate::camera::Distortion;
 use crate::detect::DetectionFlags;
-use crate::identify::{Identification, Outcome, StarMatch};
+use crate::identify::{FrameDate, Identification, StarMatch};
 use crate::photometry::FramePhotometry;
 use crate::photometry::completeness::Bin;
-use crate::pipeline::{Background, FrameDate, Solution, Source, Timing};
+use crate::pipeline::{Background, Note, Outcome, Solution, Source, Timing};
 use crate::sky::catalog::Catalog;
 use crate::sky::observer::Observation;
 
@@ -50,7 +50,7 @@ impl FrameReport {
             exposure_s: solution
                 .exposure_s
                 .and_then(|s| significant(s, FLUX_DIGITS)),
-            notes: solution.notes.clone(),
+            notes: solution.notes.iter().map(Note::to_string).collect(),
             status: Status::NotIdentified,
             reason: None,
             reason_code: None,
@@ -94,7 +94,7 @@ impl FrameReport {
         self.matched = Some(quality(identification, self.stars.len()));
         self.magnitude = faintest(identification, catalog);
         for star_match in &identification.matches {
-            if let Some(star) = self.stars.get_mut(star_match.observed) {
+            if let Some(star) = self.stars.get_mut(star_match.source.get()) {
                 name(star, star_match, catalog, years);
             }
         }
@@ -187,14 +187,14 @@ fn quality(identification: &Identification, detected: usize) -> MatchReport {
 }
 
 fn faintest(identification: &Identification, catalog: &Catalog) -> Option<MagnitudeReport> {
-    let v_mag = |star_match: &&StarMatch| catalog.stars()[star_match.catalog].v_mag;
+    let v_mag = |star_match: &&StarMatch| catalog.star(star_match.star).v_mag;
     let faintest = identification
         .matches
         .iter()
         .max_by(|a, b| v_mag(a).total_cmp(&v_mag(b)))?;
     Some(MagnitudeReport {
         faintest_vmag: to_decimals(f64::from(v_mag(&faintest)), 3),
-        faintest_id: catalog.designation(faintest.catalog),
+        faintest_id: catalog.designation(faintest.star),
         predicted_limit_vmag: None,
         difference_mag: None,
         expected_faintest_vmag: None,
@@ -279,10 +279,10 @@ fn unidentified(source: &Source) -> StarReport {
 
 /// Names the star, and tells where it stood `years` after J2000.0.
 fn name(star: &mut StarReport, star_match: &StarMatch, catalog: &Catalog, years: f64) {
-    let known = &catalog.stars()[star_match.catalog];
+    let known = catalog.star(star_match.star);
     let (ra_rad, dec_rad) = known.direction_at(years).to_ra_dec();
-    star.id = Some(catalog.designation(star_match.catalog));
-    star.name = catalog.name_of(star_match.catalog).map(Into::into);
+    star.id = Some(catalog.designation(star_match.star));
+    star.name = catalog.name_of(star_match.star).map(Into::into);
     star.vmag = finite(f64::from(known.v_mag), 3);
     star.ra_deg = Some(turn_deg(ra_rad * DEG_PER_RAD, DIRECTION_DECIMALS));
     star.dec_deg = finite(dec_rad * DEG_PER_RAD, DIRECTION_DECIMALS);

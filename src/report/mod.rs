@@ -19,7 +19,7 @@ pub use compared::PredictionReport;
 pub use table::{TABLE_COLUMNS, write_table_header};
 pub use text::{STARS_SHOWN, TextOptions};
 
-use crate::pipeline::DateSource;
+use crate::identify::DateSource;
 use serde::Serialize;
 
 /// Version of the JSON described here.

@@ -2,35 +2,48 @@
 
 use crate::base::format::decimals_for;
 use crate::base::units::DEG_PER_RAD;
-use crate::identify::{Excluded, LOG10_FALSE_ALARM_LIMIT, Reason};
-use crate::pipeline::Solution;
+use crate::identify::diagnosis::{Diagnosis, Excluded};
+use crate::identify::{LOG10_FALSE_ALARM_LIMIT, SearchFailure};
+use crate::pipeline::{Reason, Solution};
 
 /// `reason` in words.
 pub(super) fn text(reason: &Reason, solution: &Solution) -> String {
     match reason {
-        Reason::TooFewStars { found, needed } => too_few(*found, *needed, solution),
-        Reason::NoMatch {
+        Reason::Search(failure) => failure_text(failure, solution),
+        Reason::Diagnosis(cause) => cause_text(cause),
+    }
+}
+
+fn failure_text(failure: &SearchFailure, solution: &Solution) -> String {
+    match failure {
+        SearchFailure::TooFewStars { found, needed } => too_few(*found, *needed, solution),
+        SearchFailure::NoMatch {
             best_log10_false_alarm,
         } => no_match(*best_log10_false_alarm, solution),
-        Reason::NoVariation { level_adu } => format!(
+    }
+}
+
+fn cause_text(cause: &Diagnosis) -> String {
+    match cause {
+        Diagnosis::NoVariation { level_adu } => format!(
             "the frame is empty: every pixel has the value {level_adu}; was the lens covered?"
         ),
-        Reason::Saturated { share, level_adu } => format!(
+        Diagnosis::Saturated { share, level_adu } => format!(
             "{:.0} % of the pixels are at full scale, {level_adu}; a shorter exposure or less light beside \
              the stars is needed",
             share * 100.0
         ),
-        Reason::Trails {
+        Diagnosis::Trails {
             trails,
             angle_rad,
             length_px,
         } => trails_text(*trails, *angle_rad, *length_px),
-        Reason::DoubleExposure { pairs, offset_px } => format!(
+        Diagnosis::DoubleExposure { pairs, offset_px } => format!(
             "the same stars are there twice, as in a double exposure: {pairs} pairs of detections have the \
              offset ({:+.1}, {:+.1}) px; expose once",
             offset_px[0], offset_px[1]
         ),
-        Reason::ScaleOutOfRange {
+        Diagnosis::ScaleOutOfRange {
             fov_x_rad,
             searched_rad,
         } => format!(
@@ -39,7 +52,7 @@ pub(super) fn text(reason: &Reason, solution: &Solution) -> String {
             range(*fov_x_rad),
             range(*searched_rad),
         ),
-        Reason::HintsExclude(excluded) => excluded_text(excluded),
+        Diagnosis::HintsExclude(excluded) => excluded_text(excluded),
     }
 }
 
@@ -145,8 +158,7 @@ mod tests {
     use super::*;
     use crate::base::coords::{PixelPoint, UnitVector};
     use crate::base::units::RAD_PER_DEG;
-    use crate::identify::Outcome;
-    use crate::pipeline::{Source, Timing};
+    use crate::pipeline::{Outcome, Source, Timing};
 
     fn said(reason: Reason, detections: usize) -> String {
         let source = Source {
@@ -175,16 +187,18 @@ mod tests {
 
     #[test]
     fn a_reason_says_what_was_found_what_was_needed_and_what_may_help() {
-        let few = Reason::TooFewStars {
+        let few = Reason::Search(SearchFailure::TooFewStars {
             found: 1,
             needed: 4,
-        };
+        });
         assert_eq!(
             said(few, 3),
             "only 1 star was found (and 2 detections that have not the shape of a star) and at least 4 are needed"
         );
-        let no_match = |best_log10_false_alarm| Reason::NoMatch {
-            best_log10_false_alarm,
+        let no_match = |best_log10_false_alarm| {
+            Reason::Search(SearchFailure::NoMatch {
+                best_log10_false_alarm,
+            })
         };
         assert!(said(no_match(None), 12).contains("12 detections"));
         assert!(said(no_match(Some(-6.34)), 12).contains("-6.3"));
@@ -201,7 +215,10 @@ mod tests {
             distance_rad: Some((23.0 * RAD_PER_DEG, 5.0 * RAD_PER_DEG)),
         };
         assert_eq!(
-            said(Reason::HintsExclude(Box::new(excluded)), 50),
+            said(
+                Reason::Diagnosis(Diagnosis::HintsExclude(Box::new(excluded))),
+                50
+            ),
             "the stars match (40 of them) in a field 11.4° wide around RA 10.00°, Dec -5.00°, which the scale \
              given (--fov or --pixel-scale), 18.0° to 22.0° wide, excludes, and which is 23.0° from --near, \
              beyond the --radius of 5.00°"

@@ -5,7 +5,7 @@ use super::{
     ObservationReport, OpticsReport, PhotometryReport, StarReport,
 };
 use crate::base::format::{self, counted, decimals_for, printable};
-use crate::pipeline::DateSource;
+use crate::identify::DateSource;
 
 /// Rows of the table of stars that are shown without [`TextOptions::all_stars`].
 pub const STARS_SHOWN: usize = 20;

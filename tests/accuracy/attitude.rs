@@ -8,10 +8,10 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use starpipe::base::coords::{Rotation, UnitVector};
 use starpipe::base::statistics::median;
-use starpipe::identify::{IndexedCatalog, Outcome};
+use starpipe::identify::IndexedCatalog;
 use starpipe::model::sensitivity::{Budget, Scenario, SkyBrightness};
 use starpipe::model::simulate::{Pointing, Scene, Simulator, TrueStar, Truth};
-use starpipe::pipeline::{Pipeline, SolveConfig, Workspace};
+use starpipe::pipeline::{Context, Workspace, solve_frame};
 use starpipe::sky::catalog::Catalog;
 use std::f64::consts::{PI, TAU};
 
@@ -87,7 +87,7 @@ struct Trial {
 }
 
 fn trial(
-    pipeline: &Pipeline,
+    context: &Context,
     scenario: &Scenario,
     workspace: &mut Workspace,
     seed: u64,
@@ -101,26 +101,22 @@ fn trial(
         icrs_to_camera: Rotation::looking_at(&boresight, random.random_range(-PI..PI)),
         years_since_j2000: 0.0,
     };
-    let stars = pipeline.catalog().stars();
+    let stars = context.sky.catalog().stars();
     let simulator = Simulator::new(scenario, &Scene::default(), stars).unwrap();
     let (frame, truth) = simulator.frame(&pointing, random.random()).unwrap();
-    let solution = pipeline
-        .solve_frame(&frame, &SolveConfig::default(), workspace)
-        .unwrap();
-    let Outcome::Identified(found) = &solution.outcome else {
-        return None;
-    };
+    let solution = solve_frame(&frame, context, workspace).unwrap();
+    let found = solution.outcome.identification()?;
     let error = found.icrs_to_camera.matrix() * pointing.icrs_to_camera.matrix().transpose();
     let turn = Vector3::new(error[(2, 1)], error[(0, 2)], error[(1, 0)]);
     let sigma_rad = found.attitude_sigma_rad();
     let gain = scenario.sensor.gain_e_per_adu;
     let of_star = |m: &starpipe::identify::StarMatch| {
-        let source = &solution.sources[m.observed];
+        let source = solution.source(m.source);
         let measured = source.measured?;
         let star = truth
             .stars
             .iter()
-            .find(|star| star.catalog == Some(m.catalog))?;
+            .find(|star| star.catalog == Some(m.star))?;
         let flux = source.flux?;
         let is_measured = measured.snr >= LEAST_SNR && !measured.flags.saturated;
         if !is_measured || !is_isolated(star, &truth) {
@@ -186,13 +182,13 @@ fn kinds() -> Vec<Kind> {
     ]
 }
 
-fn with_pipeline<T>(run: impl FnOnce(&Pipeline) -> T) -> T {
+fn with_context<T>(run: impl FnOnce(&Context) -> T) -> T {
     let cache = std::env::var_os("STARPIPE_CACHE_DIR").map_or_else(
         || std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache"),
         Into::into,
     );
     let sky = IndexedCatalog::open(Catalog::built_in(), Some(&cache), &|_| {});
-    run(&Pipeline::new(sky))
+    run(&Context::new(&sky))
 }
 
 /// Statistics of many frames.
@@ -206,9 +202,9 @@ struct Summary {
     sigma_arcsec: [Vec<f64>; 3],
 }
 
-fn summary(pipeline: &Pipeline, kind: &Kind, frames: u64) -> Summary {
+fn summary(context: &Context, kind: &Kind, frames: u64) -> Summary {
     let scenario = kind.scenario();
-    let run = |workspace: &mut Workspace, seed| trial(pipeline, &scenario, workspace, seed);
+    let run = |workspace: &mut Workspace, seed| trial(context, &scenario, workspace, seed);
     let trials: Vec<_> = (0..frames)
         .into_par_iter()
         .map_init(Workspace::new, run)
@@ -237,9 +233,9 @@ fn table_of_attitudes() {
     println!(
         "frames  identified  stars  distorted  NEES ±  pulls x, y, roll ±  median sigma arcsec  pulls of centroids x, y and of flux"
     );
-    with_pipeline(|pipeline| {
+    with_context(|context| {
         for kind in kinds() {
-            let mut s = summary(pipeline, &kind, FRAMES);
+            let mut s = summary(context, &kind, FRAMES);
             let [x, y, roll] = s.pulls.map(|pull| pull.sigma());
             let [sx, sy, sr] = s.sigma_arcsec.each_mut().map(|all| median(all));
             let [cx, cy, cf] = s.centroids.map(|pull| pull.sigma());
@@ -265,8 +261,8 @@ fn attitude_errors_match_their_stated_errors() {
     const PULL_TOLERANCE: f64 = 0.05;
     /// Seeds are fixed, so the result is reproducible.
     const SIGMAS: f64 = 3.0;
-    with_pipeline(|pipeline| {
-        let s = summary(pipeline, &kinds()[0], FRAMES);
+    with_context(|context| {
+        let s = summary(context, &kinds()[0], FRAMES);
         assert_eq!(s.nees.count, FRAMES as f64);
         // NEES is distributed as χ² with three degrees of freedom, whose variance is six.
         let tolerance = NEES_TOLERANCE + SIGMAS * (6.0 / FRAMES as f64).sqrt();

@@ -5,7 +5,8 @@ use super::hot::Evidence;
 use super::robust::{Typical, typical_variance};
 use super::{
     DarkCurrent, DarkStack, DarksError, FrameStatistics, HOT_SIGMA, HotPixel, Pattern,
-    is_same_exposure, pooled_variances, suspicion,
+    is_same_exposure, pooled_variances,
+    suspicion::{self, NotDark},
 };
 use std::fmt;
 
@@ -129,8 +130,8 @@ pub struct Darks {
     pub noise_adu: Option<Vec<f32>>,
     /// What could not be measured.
     pub missing: Vec<Missing>,
-    /// Frames that do not look dark: a sentence each.
-    pub warnings: Vec<String>,
+    /// Frames that do not look like dark frames.
+    pub warnings: Vec<NotDark>,
 }
 
 impl DarkStack {

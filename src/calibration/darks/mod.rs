@@ -40,6 +40,7 @@ pub use report::{DarksReport, FrameRow, HotPixelRow, HotPixelsReport};
 pub use stack::PixelStack;
 pub(crate) use stack::pooled_variances;
 pub use statistics::FrameStatistics;
+pub use suspicion::{NotDark, NotDarkReason};
 
 use crate::frame::Frame;
 

@@ -1,6 +1,6 @@
 //! What is told of dark frames: plain values with the units in their names.
 
-use super::{Darks, HotPixel, Missing};
+use super::{Darks, HotPixel, Missing, NotDark};
 use crate::base::format::to_significant;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -247,7 +247,7 @@ impl Darks {
                 .iter()
                 .map(|Missing { what, reason }| (*what, reason.clone()))
                 .collect(),
-            warnings: self.warnings.clone(),
+            warnings: self.warnings.iter().map(NotDark::to_string).collect(),
         }
     }
 

@@ -154,13 +154,16 @@ fn a_brighter_frame_among_its_like_is_named() {
     assert_eq!(found.warnings.len(), 1, "{:?}", found.warnings);
     assert!(
         found.warnings[0]
+            .to_string()
             .starts_with("3.fits does not look like a dark frame: its mean level is 136.00"),
         "{:?}",
         found.warnings
     );
     let found = darks(&[dark(3000.0)], &DarkConfig::default());
     assert!(
-        found.warnings[0].ends_with("its mean level is 73 % of full scale"),
+        found.warnings[0]
+            .to_string()
+            .ends_with("its mean level is 73 % of full scale"),
         "{:?}",
         found.warnings
     );

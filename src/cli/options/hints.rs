@@ -7,7 +7,9 @@ use starpipe::base::coords::UnitVector;
 use starpipe::base::epoch::ObservationDate;
 use starpipe::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
 use starpipe::camera::data_sheet::Sensor;
-use starpipe::pipeline::{DateSource, FrameDate, Knowledge, Scale, ScaleHint};
+use starpipe::identify::{
+    DateSource, FrameDate, Priors, Scale, ScalePrior, ScaleSource, SkyRegion,
+};
 use starpipe::sky::observer::Site;
 use std::path::PathBuf;
 
@@ -51,7 +53,7 @@ const DEFAULT_SCALE_ERROR_PERCENT: f64 = 10.0;
 
 impl HintOptions {
     /// What is known of the frames.
-    pub(crate) fn resolve(&self) -> Result<Knowledge, CommandError> {
+    pub(crate) fn resolve(&self) -> Result<Priors, CommandError> {
         let fov = self.fov.map(|deg| Scale::FieldOfView(deg * RAD_PER_DEG));
         let pixel = self
             .pixel_scale
@@ -68,13 +70,13 @@ impl HintOptions {
                 direction.ra_deg * RAD_PER_DEG,
                 direction.dec_deg * RAD_PER_DEG,
             );
-            (
-                UnitVector::from_ra_dec(ra_rad, dec_rad),
-                radius_deg * RAD_PER_DEG,
-            )
+            SkyRegion {
+                centre: UnitVector::from_ra_dec(ra_rad, dec_rad),
+                radius_rad: radius_deg * RAD_PER_DEG,
+            }
         });
-        Ok(Knowledge {
-            scale: scale.map(|scale| ScaleHint { scale, tolerance }),
+        Ok(Priors {
+            scale: scale.map(|scale| ScalePrior::by_user(scale, tolerance)),
             near,
             date: self.date.map(|date| FrameDate {
                 date,
@@ -85,15 +87,17 @@ impl HintOptions {
         })
     }
 
-    /// The same, with the scale of the camera where no other is given.
-    pub(crate) fn resolve_with_camera(&self) -> Result<Knowledge, CommandError> {
+    /// The same, with the scale of the camera, as a hard constraint, where no other is given.
+    pub(crate) fn resolve_with_camera(&self) -> Result<Priors, CommandError> {
         let sensor = self.sensor()?;
-        let knowledge = self.resolve()?;
-        Ok(Knowledge {
-            scale: knowledge
-                .scale
-                .or(sensor.as_ref().map(ScaleHint::of_camera)),
-            ..knowledge
+        let priors = self.resolve()?;
+        let of_camera = sensor.as_ref().map(|sensor| ScalePrior {
+            source: ScaleSource::User,
+            ..ScalePrior::of_camera(sensor)
+        });
+        Ok(Priors {
+            scale: priors.scale.or(of_camera),
+            ..priors
         })
     }
 

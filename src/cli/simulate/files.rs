@@ -188,7 +188,7 @@ pub(super) fn truth_table(
 ) -> anyhow::Result<Vec<u8>> {
     let camera = job.simulator.camera();
     let star = |star: &TrueStar| {
-        let known = star.catalog.map(|index| &job.catalog.stars()[index]);
+        let known = star.catalog.map(|index| job.catalog.star(index));
         let sky = attitude.map(|icrs_to_camera| {
             let direction = camera.direction_of(&star.position);
             let (ra_rad, dec_rad) = icrs_to_camera.inverse().apply(&direction).to_ra_dec();

@@ -4,4 +4,4 @@ pub(crate) mod options;
 pub(crate) mod output;
 mod run;
 
-pub(crate) use run::solve_all;
+pub(crate) use run::{Plan, solve_all};

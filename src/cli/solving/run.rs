@@ -9,18 +9,44 @@ use crate::cli::options::catalog::{
 use crate::cli::output::messages::{one_line, report_error};
 use crate::cli::progress::bar;
 use indicatif::ProgressBar;
-use starpipe::pipeline::{Pipeline, Workspace};
+use starpipe::calibration::Calibration;
+use starpipe::detect::DetectConfig;
+use starpipe::identify::{IndexedCatalog, Priors};
+use starpipe::photometry::comparison::StatedCamera;
+use starpipe::pipeline::{Context, Workspace};
 use starpipe::report::FrameReport;
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+
+/// What inputs are solved with, beside the catalogue.
+#[derive(Default)]
+pub(crate) struct Plan {
+    pub(crate) detect: DetectConfig,
+    pub(crate) priors: Priors,
+    pub(crate) camera: Option<StatedCamera>,
+    pub(crate) calibration: Option<Calibration>,
+}
+
+impl Plan {
+    fn context<'a>(&'a self, sky: &'a IndexedCatalog<'a>) -> Context<'a> {
+        Context {
+            detect: self.detect.clone(),
+            priors: self.priors,
+            camera: self.camera.clone(),
+            calibration: self.calibration.as_ref(),
+            ..Context::new(sky)
+        }
+    }
+}
 
 /// Solves every input, prints its report, and writes its files; one that cannot be read does not disturb the others.
 pub(crate) fn solve_all(
     inputs: &[PathBuf],
     settings: OutputSettings,
     resources: &CatalogOptions,
-    solve: impl Fn(&Pipeline, &Path, &mut Workspace) -> anyhow::Result<Solved> + Sync,
+    plan: &Plan,
+    solve: impl Fn(&Context, &Path, &mut Workspace) -> anyhow::Result<Solved> + Sync,
 ) -> Result<Exit, CommandError> {
     let mut run = Run::new(&settings, inputs);
     let files = ResultFiles::new(settings)?;
@@ -30,13 +56,13 @@ pub(crate) fn solve_all(
     let pool = thread_pool(resources.threads)?;
     let catalog = pool.install(|| read_catalog(resources.catalog.as_deref()))?;
     let sky = pool.install(|| index_catalog(&catalog, resources));
-    let pipeline = Pipeline::new(sky);
+    let context = plan.context(&sky);
     // The threads that solve also draw and write: the one that prints waits for nothing else.
     let report = |input: &PathBuf, workspace: &mut Workspace| {
-        let solved = solve(&pipeline, input, workspace)?;
+        let solved = solve(&context, input, workspace)?;
         let name = input.display().to_string();
-        let report = FrameReport::new(&name, &solved.solution, pipeline.catalog());
-        let saved = files.save(input, &solved, &report, pipeline.catalog());
+        let report = FrameReport::new(&name, &solved.solution, sky.catalog());
+        let saved = files.save(input, &solved, &report, sky.catalog());
         Ok(Answer { report, saved })
     };
     // An input that is alone has all threads for itself.
@@ -55,7 +81,7 @@ pub(crate) fn solve_all(
         run.take(result)
     });
     let exit = run.exit();
-    warn_of_cache(pipeline.sky());
+    warn_of_cache(&sky);
     Ok(exit)
 }
 

@@ -21,13 +21,13 @@ use super::output::stdout::print;
 use super::plot::FigureForm;
 use super::progress::bar;
 use indicatif::ProgressBar;
-use starpipe::pipeline::Pipeline;
+use starpipe::identify::IndexedCatalog;
 use starpipe::study::validation::Protocol;
 use std::fmt::Display;
 
 /// What the runs of one command have in common.
 struct Shared<'a> {
-    pipeline: &'a Pipeline<'a>,
+    sky: &'a IndexedCatalog<'a>,
     pool: &'a rayon::ThreadPool,
     /// Frames of each run.
     frames: u64,
@@ -53,10 +53,10 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Exit, CommandError> {
     let studies = study::protocols(&arguments.sweep, &protocol)?;
     let pool = thread_pool(arguments.resources.threads)?;
     let catalog = pool.install(|| read_catalog(arguments.resources.catalog.as_deref()))?;
-    let pipeline = Pipeline::new(pool.install(|| index_catalog(&catalog, &arguments.resources)));
+    let sky = pool.install(|| index_catalog(&catalog, &arguments.resources));
     let runs = studies.len().max(1) as u64;
     let shared = Shared {
-        pipeline: &pipeline,
+        sky: &sky,
         pool: &pool,
         frames: arguments.frames,
         figures: arguments.figures,
@@ -79,7 +79,7 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Exit, CommandError> {
         }
     };
     shared.progress.finish_and_clear();
-    warn_of_cache(pipeline.sky());
+    warn_of_cache(&sky);
     // Nobody left to read it: nothing is lost.
     let _ = print(&text)?;
     Ok(Exit::Success)

@@ -1,6 +1,7 @@
 //! The same stars twice: a frame exposed two times with the camera moved between.
 
-use crate::identify::{Reason, StarField};
+use super::cause::Diagnosis;
+use crate::identify::StarField;
 
 /// The brightest stars that are looked at.
 const LOOKED_AT: usize = 80;
@@ -38,7 +39,7 @@ impl Offset {
 }
 
 /// Whether many stars have a companion at one and the same offset.
-pub(super) fn explain(field: &StarField) -> Option<Reason> {
+pub(super) fn diagnose(field: &StarField) -> Option<Diagnosis> {
     let offsets = offsets(field);
     let counts: Vec<usize> = (0..offsets.len())
         .map(|i| pairs(&offsets, i).len())
@@ -61,7 +62,7 @@ pub(super) fn explain(field: &StarField) -> Option<Reason> {
         let sum: f64 = agreeing.iter().map(|offset| offset.along[axis]).sum();
         sum / agreeing.len() as f64
     };
-    Some(Reason::DoubleExposure {
+    Some(Diagnosis::DoubleExposure {
         pairs: count,
         offset_px: [mean(0), mean(1)],
     })
@@ -118,12 +119,13 @@ fn pairs(offsets: &[Offset], index: usize) -> Vec<Offset> {
 mod tests {
     use super::*;
     use crate::base::coords::PixelPoint;
-    use crate::identify::{ObservedStar, Photometry};
+    use crate::identify::{ObservedStar, Photometry, SourceIndex};
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
     fn field(positions: Vec<[f64; 3]>) -> StarField {
         let star = |[x, y, mag]: [f64; 3]| ObservedStar {
+            source: SourceIndex::new(0),
             position: PixelPoint::new(x, y),
             sigma_px: 0.1,
             mag,
@@ -160,8 +162,8 @@ mod tests {
                 [x + offset[0] + jitter, y + offset[1] - jitter, mag + 0.4]
             });
             let again: Vec<_> = again.collect();
-            let found = explain(&field(once.into_iter().chain(again).collect()));
-            let Some(Reason::DoubleExposure { pairs, offset_px }) = found else {
+            let found = diagnose(&field(once.into_iter().chain(again).collect()));
+            let Some(Diagnosis::DoubleExposure { pairs, offset_px }) = found else {
                 panic!("{offset:?}: {found:?}");
             };
             assert!(pairs >= 25, "{pairs}");
@@ -175,9 +177,9 @@ mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(2);
         for _ in 0..300 {
             let count = random.random_range(4..200);
-            assert_eq!(explain(&field(strewn(&mut random, count))), None);
+            assert_eq!(diagnose(&field(strewn(&mut random, count))), None);
         }
         let grid = (0..100).map(|i| [f64::from(i % 10) * 48.0, f64::from(i / 10) * 48.0, -8.0]);
-        assert_eq!(explain(&field(grid.collect())), None);
+        assert_eq!(diagnose(&field(grid.collect())), None);
     }
 }

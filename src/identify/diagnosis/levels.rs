@@ -1,7 +1,7 @@
 //! Frames that hold no picture: one value everywhere, or full scale.
 
+use super::cause::Diagnosis;
 use crate::frame::Frame;
-use crate::identify::Reason;
 
 /// A frame is overexposed where this part of its pixels is at its highest level.
 const SATURATED_SHARE: f64 = 0.2;
@@ -9,13 +9,13 @@ const SATURATED_SHARE: f64 = 0.2;
 const FULL_SCALE_STEPS: f32 = 32.0;
 
 /// Whether the frame is empty or overexposed.
-pub(super) fn explain(frame: &Frame) -> Option<Reason> {
+pub(super) fn diagnose(frame: &Frame) -> Option<Diagnosis> {
     let values = || frame.pixels.iter().copied().filter(|p| !p.is_nan());
     let lowest = values().fold(f32::INFINITY, f32::min);
     let highest = values().fold(f32::NEG_INFINITY, f32::max);
     let is_full = frame.saturation_adu.is_some_and(|full| highest >= full);
     if lowest == highest && !is_full {
-        return Some(Reason::NoVariation {
+        return Some(Diagnosis::NoVariation {
             level_adu: f64::from(lowest),
         });
     }
@@ -30,7 +30,7 @@ pub(super) fn explain(frame: &Frame) -> Option<Reason> {
     };
     let at_full = values().filter(|&p| p >= full).count();
     let share = at_full as f64 / values().count() as f64;
-    (share > SATURATED_SHARE).then_some(Reason::Saturated {
+    (share > SATURATED_SHARE).then_some(Diagnosis::Saturated {
         share,
         level_adu: f64::from(full),
     })
@@ -49,28 +49,28 @@ mod tests {
     #[test]
     fn one_value_is_no_picture_and_full_scale_is_too_much_light() {
         assert_eq!(
-            explain(&frame(|_| 7.0)),
-            Some(Reason::NoVariation { level_adu: 7.0 })
+            diagnose(&frame(|_| 7.0)),
+            Some(Diagnosis::NoVariation { level_adu: 7.0 })
         );
-        let white = explain(&frame(|_| 255.0));
+        let white = diagnose(&frame(|_| 255.0));
         assert!(
-            matches!(white, Some(Reason::Saturated { share: 1.0, .. })),
+            matches!(white, Some(Diagnosis::Saturated { share: 1.0, .. })),
             "{white:?}"
         );
-        let half = explain(&frame(|i| if i % 2 == 0 { 255.0 } else { 90.0 }));
+        let half = diagnose(&frame(|i| if i % 2 == 0 { 255.0 } else { 90.0 }));
         assert!(
-            matches!(half, Some(Reason::Saturated { share: 0.5, .. })),
+            matches!(half, Some(Diagnosis::Saturated { share: 0.5, .. })),
             "{half:?}"
         );
     }
 
     #[test]
     fn a_detector_may_be_full_below_the_scale_of_its_file() {
-        let full = explain(&frame(|i| if i % 3 == 0 { 200.0 } else { 90.0 }));
+        let full = diagnose(&frame(|i| if i % 3 == 0 { 200.0 } else { 90.0 }));
         assert!(
             matches!(
                 full,
-                Some(Reason::Saturated {
+                Some(Diagnosis::Saturated {
                     level_adu: 200.0,
                     ..
                 })
@@ -81,9 +81,9 @@ mod tests {
 
     #[test]
     fn dark_frames_of_few_levels_and_frames_with_bright_stars_are_neither() {
-        assert_eq!(explain(&frame(|i| (i % 3) as f32)), None);
+        assert_eq!(diagnose(&frame(|i| (i % 3) as f32)), None);
         assert_eq!(
-            explain(&frame(|i| if i % 50 == 0 { 255.0 } else { 10.0 })),
+            diagnose(&frame(|i| if i % 50 == 0 { 255.0 } else { 10.0 })),
             None
         );
     }

@@ -1,8 +1,8 @@
 //! Stars drawn out into trails, all in one direction: by a camera that moved, or a sky that did.
 
+use super::cause::Diagnosis;
 use crate::detect::{BackgroundMap, Detection, Detections};
 use crate::frame::Frame;
-use crate::identify::Reason;
 use std::collections::HashSet;
 
 /// The brightest detections that are looked at.
@@ -40,7 +40,7 @@ impl Bar {
 }
 
 /// Whether most of the frame's sources are trails in one direction.
-pub(super) fn explain(frame: &Frame, detections: &Detections) -> Option<Reason> {
+pub(super) fn diagnose(frame: &Frame, detections: &Detections) -> Option<Diagnosis> {
     if detections.sources.len() < FEWEST {
         return None;
     }
@@ -65,7 +65,7 @@ pub(super) fn explain(frame: &Frame, detections: &Detections) -> Option<Reason> 
     }
     let mut lengths: Vec<f64> = trails.iter().map(|bar| bar.length_px).collect();
     lengths.sort_by(f64::total_cmp);
-    Some(Reason::Trails {
+    Some(Diagnosis::Trails {
         trails: count,
         angle_rad: sum[1].atan2(sum[0]) / 2.0,
         length_px: lengths[count / 2],

@@ -8,7 +8,7 @@ use super::{Pointing, poisson::poisson};
 use crate::base::coords::UnitVector;
 use crate::camera::CameraModel;
 use crate::model::sensitivity::StarLight;
-use crate::sky::catalog::Star;
+use crate::sky::catalog::{Star, StarIndex};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -76,7 +76,7 @@ impl Starlight<'_> {
             let electrons = self.light.electrons(v_mag, bv_mag) * self.sky.transmission(&position);
             (!is_missing && !is_too_faint).then_some(TrueStar {
                 number: 0,
-                catalog: Some(catalog),
+                catalog: Some(StarIndex::new(catalog)),
                 position,
                 v_mag,
                 electrons,

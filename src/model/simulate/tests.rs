@@ -3,6 +3,7 @@ use crate::base::coords::UnitVector;
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::data_sheet::Preset;
 use crate::sky::catalog::StarId;
+use crate::sky::catalog::StarIndex;
 
 fn pointing() -> Pointing {
     let boresight = UnitVector::from_ra_dec(1.0, 0.3);
@@ -73,7 +74,7 @@ fn a_star_is_true_where_its_place_is_on_the_frame_and_drawn_where_its_light_is()
     let (frame, truth) = simulator.frame(&pointing(), 7).unwrap();
     assert_eq!((truth.stars.len(), truth.beyond.len()), (1, 1));
     let found = &truth.stars[0];
-    assert_eq!((found.catalog, found.v_mag), (Some(1), 2.0));
+    assert_eq!((found.catalog, found.v_mag), (Some(StarIndex::new(1)), 2.0));
     assert!(found.position.distance_to(&PixelPoint::new(100.25, 200.75)) < 1e-6);
     assert!(frame.pixels[300 * frame.width] > 2.0 * frame.pixels[100 * frame.width]);
 }

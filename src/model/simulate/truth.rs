@@ -2,6 +2,7 @@
 
 use super::strays::{CosmicRay, Trail};
 use crate::base::coords::PixelPoint;
+use crate::sky::catalog::StarIndex;
 use nalgebra::Vector3;
 
 /// What is truly on a frame.
@@ -29,8 +30,8 @@ pub struct Truth {
 pub struct TrueStar {
     /// Counts the stars of a frame: no two have the same.
     pub number: usize,
-    /// Its index among the catalogue's stars; a false star has none.
-    pub catalog: Option<usize>,
+    /// The catalogue star; a false star has none.
+    pub catalog: Option<StarIndex>,
     /// Where it stands; in the middle of its way where it moves.
     pub position: PixelPoint,
     /// Johnson V magnitude, as it truly is.

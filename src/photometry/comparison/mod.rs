@@ -1,6 +1,6 @@
 //! What a camera should have seen in a frame, beside what it saw.
 //!
-//! ([`Description`], [`Seen`]) → [`Comparison`]
+//! ([`StatedCamera`], [`FrameMeasurement`]) → [`Comparison`]
 //!
 //! 1. The sky comes from the frame itself: its level above the bias, in the camera's electrons.
 //! 2. With it, the sensitivity model gives the limits and the zero point that the camera should have.
@@ -12,18 +12,20 @@
 //! holds for. The sky's brightness, where it is not that of the whole spectrum of moonlight, shifts the predicted limit by less
 //! than its own error; a bias that is not the camera's shows as noise that does not fit.
 
+mod contradiction;
+
 use crate::base::statistics::Estimate;
-use crate::base::units::ARCSEC_PER_RAD;
 use crate::camera::data_sheet::Sensor;
 use crate::detect::DetectConfig;
 use crate::model::sensitivity::{
     Budget, Detector, Extinction, Faintest, Rule, Scenario, SkyBrightness, StarLight,
 };
 use crate::photometry::zero_point::REFERENCE_BV_MAG;
+pub use contradiction::Contradiction;
 
 /// What is stated of the frame.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Description {
+pub struct StatedCamera {
     /// The camera.
     pub sensor: Sensor,
     /// Zenith distance of the frame's centre, in degrees; else that of site and date, else that of the header, else 0.
@@ -34,7 +36,7 @@ pub struct Description {
 
 /// What the frame shows; what is not known is `None`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Seen<'a> {
+pub struct FrameMeasurement<'a> {
     /// How stars were detected.
     pub detect: DetectConfig,
     /// Columns and rows.
@@ -96,15 +98,15 @@ pub struct Comparison {
     pub limit_difference_mag: Option<Estimate>,
     /// The faintest star found minus the one to be expected; the error is the spread of that.
     pub faintest_difference_mag: Option<Estimate>,
-    /// Where the frame contradicts its description: a sentence each.
-    pub contradictions: Vec<String>,
+    /// Where the frame contradicts the stated camera.
+    pub contradictions: Vec<Contradiction>,
 }
 
 /// A sky that gives no light to speak of, in mag/arcsec².
 const NO_SKY_MAG: f64 = 35.0;
 
 /// What `description` predicts of a frame that shows `seen`; `None` where the exposure is not known.
-pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
+pub fn compare(description: &StatedCamera, seen: &FrameMeasurement) -> Option<Comparison> {
     let exposure_s = seen.exposure_s?;
     let mut scenario = Scenario::new(description.sensor.clone());
     let conditions = &mut scenario.conditions;
@@ -170,7 +172,7 @@ pub fn compare(description: &Description, seen: &Seen) -> Option<Comparison> {
 }
 
 /// V magnitude that stars of the colours seen, treated as the frame's are, would give for one ADU a second.
-fn zero_point_vmag(scenario: &Scenario, seen: &Seen) -> f64 {
+fn zero_point_vmag(scenario: &Scenario, seen: &FrameMeasurement) -> f64 {
     let gain_e_per_adu = scenario.sensor.gain_e_per_adu;
     let light = StarLight::new(scenario);
     let of_a_second = light.budget().vmag_of(gain_e_per_adu, 1.0);
@@ -193,7 +195,7 @@ fn zero_point_vmag(scenario: &Scenario, seen: &Seen) -> f64 {
 }
 
 /// The sky's brightness by the frame's level, else by its noise.
-fn sky_mag_arcsec2(scenario: &Scenario, seen: &Seen) -> f64 {
+fn sky_mag_arcsec2(scenario: &Scenario, seen: &FrameMeasurement) -> f64 {
     let sensor = &scenario.sensor;
     let mut standard = scenario.clone();
     standard.conditions.sky = SkyBrightness::MagArcsec2(0.0);
@@ -220,78 +222,83 @@ const ZERO_POINT_TOLERANCE_MAG: f64 = 0.5;
 /// Zenith distances this far apart, beyond the field itself, are not of one frame, in degrees.
 const ZENITH_TOLERANCE_DEG: f64 = 1.0;
 
-fn contradictions(description: &Description, seen: &Seen, found: &Comparison) -> Vec<String> {
+fn contradictions(
+    description: &StatedCamera,
+    seen: &FrameMeasurement,
+    found: &Comparison,
+) -> Vec<Contradiction> {
     let sensor = &description.sensor;
-    let mut told = Vec::new();
-    let [width, height] = seen.size_px;
-    if [width, height] != [sensor.width_px, sensor.height_px] {
-        told.push(format!(
-            "the frame has {width} × {height} pixels, the camera {} × {}",
-            sensor.width_px, sensor.height_px
-        ));
-    }
-    if let Some(scale_rad) = seen.pixel_scale_rad
-        && is_off(scale_rad, sensor.pixel_scale_rad(), 1.0 + SCALE_TOLERANCE)
-    {
-        let [is, stated] = [scale_rad, sensor.pixel_scale_rad()].map(|rad| rad * ARCSEC_PER_RAD);
-        told.push(format!(
-            "a pixel spans {is:.2}″, by the camera's focal length and pitch {stated:.2}″"
-        ));
-    }
-    if let Some(spot_px) = seen.spot_sigma_px
-        && is_off(spot_px, sensor.spot_sigma_px, SPOT_TOLERANCE)
-    {
-        told.push(format!(
-            "the stars' spots have a standard deviation of {spot_px:.2} px, the camera's {:.2} px",
-            sensor.spot_sigma_px
-        ));
-    }
-    if seen.level_adu < sensor.bias_adu - seen.noise_adu {
-        told.push(format!(
-            "the background's level is {:.1}, below the camera's bias of {}",
-            seen.level_adu, sensor.bias_adu
-        ));
-    }
     let noise_e = seen.noise_adu * sensor.gain_e_per_adu;
-    if is_off(noise_e, found.budget.background_noise_e, NOISE_TOLERANCE) {
-        told.push(format!(
-            "the background's noise is {noise_e:.1} electrons, that of its level by the camera's gain, bias and read noise {:.1}",
-            found.budget.background_noise_e
-        ));
-    }
-    told.extend(found.zero_point_difference_mag.and_then(odd_zero_point));
-    told.extend(odd_zenith(description, seen));
-    told
+    let stated_px = [sensor.width_px, sensor.height_px];
+    let stated_scale_rad = sensor.pixel_scale_rad();
+    let size = (seen.size_px != stated_px).then_some(Contradiction::Size {
+        frame_px: seen.size_px,
+        camera_px: stated_px,
+    });
+    let scale = seen
+        .pixel_scale_rad
+        .filter(|scale_rad| is_off(*scale_rad, stated_scale_rad, 1.0 + SCALE_TOLERANCE))
+        .map(|measured_rad| Contradiction::PixelScale {
+            measured_rad,
+            camera_rad: stated_scale_rad,
+        });
+    let spot = seen
+        .spot_sigma_px
+        .filter(|spot_px| is_off(*spot_px, sensor.spot_sigma_px, SPOT_TOLERANCE))
+        .map(|measured_px| Contradiction::SpotSize {
+            measured_px,
+            camera_px: sensor.spot_sigma_px,
+        });
+    let is_below_bias = seen.level_adu < sensor.bias_adu - seen.noise_adu;
+    let level = is_below_bias.then_some(Contradiction::BelowBias {
+        background_adu: seen.level_adu,
+        bias_adu: sensor.bias_adu,
+    });
+    let noise = is_off(noise_e, found.budget.background_noise_e, NOISE_TOLERANCE).then_some(
+        Contradiction::Noise {
+            measured_e: noise_e,
+            expected_e: found.budget.background_noise_e,
+        },
+    );
+    let all = [
+        size,
+        scale,
+        spot,
+        level,
+        noise,
+        found.zero_point_difference_mag.and_then(zero_point_off),
+        zenith_distance_off(description, seen),
+    ];
+    all.into_iter().flatten().collect()
 }
 
 fn is_off(found: f64, stated: f64, factor: f64) -> bool {
     found > stated * factor || found < stated / factor
 }
 
-fn odd_zero_point(difference: Estimate) -> Option<String> {
+fn zero_point_off(difference: Estimate) -> Option<Contradiction> {
     let Estimate { value, sigma } = difference;
-    let is_odd = value.abs() > ZERO_POINT_TOLERANCE_MAG.max(5.0 * sigma);
-    let way = if value < 0.0 {
-        "less light arrives than the camera should see: haze, a stop, dew, another exposure or gain"
-    } else {
-        "more light arrives than the camera should see: another aperture, exposure or gain"
-    };
-    is_odd.then(|| format!("the zero point is {value:+.2} mag off the camera's; {way}"))
+    let is_off = value.abs() > ZERO_POINT_TOLERANCE_MAG.max(5.0 * sigma);
+    is_off.then_some(Contradiction::ZeroPoint {
+        difference_mag: value,
+    })
 }
 
-fn odd_zenith(description: &Description, seen: &Seen) -> Option<String> {
+fn zenith_distance_off(
+    description: &StatedCamera,
+    seen: &FrameMeasurement,
+) -> Option<Contradiction> {
     let stated_deg = description.zenith_distance_deg;
     let stated_deg = stated_deg.or(seen.header_zenith_distance_deg)?;
-    let true_deg = seen.zenith_distance_deg?;
+    let observed_deg = seen.zenith_distance_deg?;
     let half_px = seen.size_px[0].max(seen.size_px[1]) as f64 / 2.0;
     let half_field_deg = seen
         .pixel_scale_rad
         .map_or(0.0, |rad| (half_px * rad).to_degrees());
-    let apart_deg = (stated_deg - true_deg).abs();
-    (apart_deg > ZENITH_TOLERANCE_DEG + half_field_deg).then(|| {
-        format!(
-            "the zenith distance is stated as {stated_deg:.1}°, by site, date and attitude it is {true_deg:.1}°"
-        )
+    let apart_deg = (stated_deg - observed_deg).abs();
+    (apart_deg > ZENITH_TOLERANCE_DEG + half_field_deg).then_some(Contradiction::ZenithDistance {
+        stated_deg,
+        observed_deg,
     })
 }
 
@@ -300,8 +307,8 @@ mod tests {
     use super::*;
     use crate::camera::data_sheet::Preset;
 
-    fn description() -> Description {
-        Description {
+    fn description() -> StatedCamera {
+        StatedCamera {
             sensor: Preset::Experiment1.sensor(),
             zenith_distance_deg: None,
             extinction: None,
@@ -309,13 +316,13 @@ mod tests {
     }
 
     /// A frame such as the camera takes under a sky of this brightness in 0.04 s.
-    fn seen(sky_mag_arcsec2: f64) -> Seen<'static> {
+    fn seen(sky_mag_arcsec2: f64) -> FrameMeasurement<'static> {
         let mut scenario = Scenario::new(description().sensor);
         scenario.conditions.exposure_s = 0.04;
         scenario.conditions.sky = SkyBrightness::MagArcsec2(sky_mag_arcsec2);
         let budget = Budget::new(&scenario);
         let sensor = &scenario.sensor;
-        Seen {
+        FrameMeasurement {
             detect: DetectConfig::default(),
             size_px: [752, 582],
             exposure_s: Some(0.04),
@@ -413,10 +420,16 @@ mod tests {
 
     #[test]
     fn each_contradiction_has_its_sentence() {
-        let told = |change: &dyn Fn(&mut Description, &mut Seen)| {
+        let told = |change: &dyn Fn(&mut StatedCamera, &mut FrameMeasurement)| {
             let (mut stated, mut frame) = (description(), seen(16.0));
             change(&mut stated, &mut frame);
-            compare(&stated, &frame).unwrap().contradictions.join("; ")
+            compare(&stated, &frame)
+                .unwrap()
+                .contradictions
+                .iter()
+                .map(Contradiction::to_string)
+                .collect::<Vec<_>>()
+                .join("; ")
         };
         assert_eq!(told(&|_, _| ()), "");
         assert!(
@@ -458,7 +471,7 @@ mod tests {
     fn the_zenith_distance_is_as_stated_else_by_the_site_else_by_the_header() {
         let mut frame = seen(18.0);
         let mut stated = description();
-        let reckoned = |stated: &Description, frame: &Seen| {
+        let reckoned = |stated: &StatedCamera, frame: &FrameMeasurement| {
             let found = compare(stated, frame).unwrap();
             let zenith_deg = found.scenario.conditions.zenith_distance_deg;
             (zenith_deg, found.zenith_is_known)

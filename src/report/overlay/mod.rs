@@ -23,7 +23,7 @@ mod names;
 use crate::base::coords::PixelPoint;
 use crate::camera::CameraModel;
 use crate::frame::{Frame, OVERLAY_TEXT};
-use crate::identify::{Identification, Outcome};
+use crate::identify::Identification;
 use crate::pipeline::{Solution, Source};
 use crate::sky::catalog::Catalog;
 pub use canvas::FONT;
@@ -126,8 +126,8 @@ pub fn to_png(picture: &RgbImage) -> Result<Vec<u8>, png::EncodingError> {
 fn marks(solution: &Solution, catalog: &Catalog, grey: &Grey) -> Vec<Mark> {
     let mut catalog_star = vec![None; solution.sources.len()];
     for star_match in identification(solution).iter().flat_map(|i| &i.matches) {
-        if let Some(star) = catalog_star.get_mut(star_match.observed) {
-            *star = Some(star_match.catalog);
+        if let Some(star) = catalog_star.get_mut(star_match.source.get()) {
+            *star = Some(star_match.star);
         }
     }
     let rings = Rings::of(&solution.sources, grey);
@@ -136,7 +136,7 @@ fn marks(solution: &Solution, catalog: &Catalog, grey: &Grey) -> Vec<Mark> {
         .map(|(source, star)| {
             let [x, y] = grey.place_of(&source.position);
             let label = star.map(|index| {
-                let v_mag = catalog.stars()[index].v_mag;
+                let v_mag = catalog.star(index).v_mag;
                 (names::label(catalog, index), v_mag)
             });
             Mark {
@@ -193,10 +193,7 @@ impl Rings {
 }
 
 fn identification(solution: &Solution) -> Option<&Identification> {
-    match &solution.outcome {
-        Outcome::Identified(identification) => Some(identification),
-        Outcome::NotIdentified(_) => None,
-    }
+    solution.outcome.identification()
 }
 
 /// Where in the picture, at the frame's centre, north and east are: unit vectors, y down.

@@ -1,6 +1,6 @@
 //! What is written beside a star.
 
-use crate::sky::catalog::Catalog;
+use crate::sky::catalog::{Catalog, StarIndex};
 
 /// SKY2000's abbreviations of the Greek letters.
 const GREEK: [(&str, char); 24] = [
@@ -33,12 +33,12 @@ const GREEK: [(&str, char); 24] = [
 const SUPERSCRIPTS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
 
 /// The star's name, else its number, and its V magnitude: `α CMa −1.4`.
-pub(super) fn label(catalog: &Catalog, star: usize) -> String {
+pub(super) fn label(catalog: &Catalog, star: StarIndex) -> String {
     let name = match catalog.name_of(star) {
         Some(name) => short(name),
         None => catalog.designation(star),
     };
-    let v_mag = format!("{:.1}", catalog.stars()[star].v_mag);
+    let v_mag = format!("{:.1}", catalog.star(star).v_mag);
     let v_mag = if v_mag == "-0.0" { "0.0" } else { &v_mag };
     format!("{name} {}", v_mag.replace('-', "−"))
 }
@@ -83,15 +83,15 @@ mod tests {
     #[test]
     fn the_brightest_star_is_called_by_its_name_and_the_faintest_by_its_number() {
         let catalog = Catalog::built_in();
-        assert_eq!(label(catalog, 0), "α CMa −1.4");
-        let last = catalog.stars().len() - 1;
+        assert_eq!(label(catalog, StarIndex::new(0)), "α CMa −1.4");
+        let last = StarIndex::new(catalog.stars().len() - 1);
         assert!(label(catalog, last).starts_with(&catalog.designation(last)));
     }
 
     #[test]
     fn every_letter_of_the_catalogue_is_known() {
         let catalog = Catalog::built_in();
-        let names = (0..catalog.stars().len()).filter_map(|i| catalog.name_of(i));
+        let names = (0..catalog.stars().len()).filter_map(|i| catalog.name_of(StarIndex::new(i)));
         for name in names {
             let short = short(name);
             let flamsteed = short.starts_with(|c: char| c.is_ascii_digit());

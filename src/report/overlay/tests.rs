@@ -4,8 +4,9 @@ use super::*;
 use crate::base::coords::{PixelPoint, Rotation, UnitVector};
 use crate::base::units::RAD_PER_DEG;
 use crate::detect::DetectionFlags;
-use crate::identify::{Reason, StarMatch};
-use crate::pipeline::{Background, Measured, Timing};
+use crate::identify::{SearchFailure, SourceIndex, StarMatch};
+use crate::pipeline::{Background, Measured, Outcome, Reason, Timing};
+use crate::sky::catalog::StarIndex;
 use nalgebra::Matrix3;
 
 const WIDTH: usize = 900;
@@ -69,8 +70,8 @@ fn identified(up_deg: f64, mirrored: bool) -> Outcome {
         attitude_covariance_rad2: Matrix3::identity() * 1e-10,
         focal_length_sigma_px: 0.1,
         matches: vec![StarMatch {
-            observed: 0,
-            catalog: 0,
+            source: SourceIndex::new(0),
+            star: StarIndex::new(0),
             residual_px: 0.1,
         }],
         rms_px: 0.1,
@@ -79,10 +80,10 @@ fn identified(up_deg: f64, mirrored: bool) -> Outcome {
 }
 
 fn not_identified() -> Outcome {
-    Outcome::NotIdentified(Reason::TooFewStars {
+    Outcome::NotIdentified(Reason::Search(SearchFailure::TooFewStars {
         found: 2,
         needed: 4,
-    })
+    }))
 }
 
 /// Pixels of just this colour within a square round (x, y).

@@ -57,7 +57,7 @@ mod tycho2;
 pub use error::{CatalogError, CompactFault, FaultPlace, RecordFault};
 pub use id::{HipparcosId, StarId, TychoId};
 pub use import::{ImportSummary, Reading, SourceFile};
-pub use star::{Star, StarFlags};
+pub use star::{Star, StarFlags, StarIndex};
 
 use crate::base::files;
 use std::io::{self, Write};
@@ -191,35 +191,44 @@ impl Catalog {
         &self.contents.stars
     }
 
+    /// One star.
+    ///
+    /// # Panics
+    /// If there is no such star.
+    pub fn star(&self, index: StarIndex) -> &Star {
+        &self.stars()[index.get()]
+    }
+
     /// How many stars are brighter than `v_mag` (Johnson V): they are the first so many of [`stars`](Self::stars).
     pub fn brighter_than(&self, v_mag: f64) -> usize {
         self.stars()
             .partition_point(|star| star.is_brighter_than(v_mag))
     }
 
-    /// The Bayer or Flamsteed name of the star at `index`, as in `"1 alp UMi"`, if it has one.
-    pub fn name_of(&self, index: usize) -> Option<&str> {
+    /// The Bayer or Flamsteed name of a star, as in `"1 alp UMi"`, if it has one.
+    pub fn name_of(&self, star: StarIndex) -> Option<&str> {
         let names = &self.contents.names;
-        let position = names.binary_search_by_key(&index, |name| name.star_index as usize);
+        let position = names.binary_search_by_key(&star.get(), |name| name.star_index as usize);
         position.ok().map(|position| &*names[position].text)
     }
 
-    /// The catalogue's own designation of the star at `index`: its Skymap number, with eight digits, else
-    /// `TYC a-b-c`, `HIP n`, another number, or a name.
+    /// The catalogue's own designation of a star: its Skymap number, with eight digits, else `TYC a-b-c`,
+    /// `HIP n`, another number, or a name.
     ///
     /// # Panics
     /// If there is no such star.
-    pub fn designation(&self, index: usize) -> String {
-        let id = self.stars()[index].id;
-        match (id, self.name_of(index)) {
+    pub fn designation(&self, star: StarIndex) -> String {
+        let id = self.star(star).id;
+        match (id, self.name_of(star)) {
             (StarId::Named(_), Some(name)) => name.to_owned(),
             _ => id.to_string(),
         }
     }
 
     /// The index of the star with the number `id`; looks through the whole catalogue.
-    pub fn find(&self, id: StarId) -> Option<usize> {
-        self.stars().iter().position(|star| star.id == id)
+    pub fn find(&self, id: StarId) -> Option<StarIndex> {
+        let position = self.stars().iter().position(|star| star.id == id);
+        position.map(StarIndex::new)
     }
 
     /// A checksum of the compact form: what is derived from a catalogue is valid for one of the same checksum.

@@ -7,6 +7,31 @@ use nalgebra::Vector3;
 
 const RAD_PER_MAS: f64 = RAD_PER_ARCSEC / 1000.0;
 
+/// Position of a star in [`Catalog::stars`](super::Catalog::stars), brightest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct StarIndex(u32);
+
+impl StarIndex {
+    /// The star at `position`.
+    ///
+    /// # Panics
+    /// If `position` is 2³² or more; no catalogue has as many stars.
+    pub fn new(position: usize) -> Self {
+        Self(u32::try_from(position).expect("a catalogue has fewer than 2^32 stars"))
+    }
+
+    /// The position in the list of stars.
+    pub const fn get(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl From<u32> for StarIndex {
+    fn from(position: u32) -> Self {
+        Self(position)
+    }
+}
+
 /// What the catalogue warns of about a star: a set of yes-or-no remarks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct StarFlags(u8);

@@ -1,6 +1,6 @@
 //! The two experiments of Tong, Li & Wang 2014, done again: the limit, the stars, and frames like theirs.
 //!
-//! ([`Published`], [`Pipeline`]) → [`Run`] with its [`ExperimentReport`]
+//! ([`Published`], [`IndexedCatalog`](crate::identify::IndexedCatalog)) → [`Run`] with its [`ExperimentReport`]
 //!
 //! 1. The limit of the sensitivity model in the paper's reading, beside what the paper prints; and that of the detector as
 //!    built.
@@ -31,12 +31,10 @@ pub use table::{FieldReport, TableReport, TableStar};
 use crate::base::format::to_decimals;
 use crate::detect::DetectError;
 use crate::frame::{Frame, FrameError};
-use crate::identify::Outcome;
+use crate::identify::{DateSource, FrameDate, IndexedCatalog, Priors};
 use crate::model::sensitivity::{Budget, Detector, Rule, Scenario};
 use crate::model::simulate::{Pointing, Scene, Simulator};
-use crate::pipeline::{
-    DateSource, FrameDate, Knowledge, Pipeline, Solution, SolveConfig, Workspace,
-};
+use crate::pipeline::{Context, Solution, Workspace, solve_centroids};
 use serde::Serialize;
 use simulated::Protocol;
 
@@ -131,22 +129,26 @@ impl ExperimentReport {
 /// [`ExperimentError`], for which the paper's camera gives no occasion.
 pub fn run(
     published: &Published,
-    pipeline: &Pipeline,
+    sky: &IndexedCatalog,
     trials: Trials,
     done: &(dyn Fn() + Sync),
 ) -> Result<Run, ExperimentError> {
     let scenario = Scenario::of(published.preset);
     let budget = Budget::new(&scenario);
     let detector = Detector::new(Rule::MatchedFilter, &scenario, &budget);
-    let knowledge = Knowledge {
+    let priors = Priors {
         date: Some(FrameDate {
             date: published.date,
             source: DateSource::Option,
         }),
         site: Some(published.site),
-        ..Knowledge::default()
+        ..Priors::default()
     };
-    let solution = pipeline.solve_centroids(&table::centroids(published, &scenario), &knowledge);
+    let context = Context {
+        priors,
+        ..Context::new(sky)
+    };
+    let solution = solve_centroids(&table::centroids(published, &scenario), &context);
     let mut report = ExperimentReport {
         schema: SCHEMA,
         experiment: published.number,
@@ -160,16 +162,16 @@ pub fn run(
             paper_faintest_vmag: published.faintest_vmag,
             detector_limit_vmag: to_decimals(detector.vmag_at(0.5), 3),
         },
-        table: TableReport::new(published, &scenario, &solution, pipeline.catalog()),
+        table: TableReport::new(published, &scenario, &solution, sky.catalog()),
         simulated: None,
     };
-    let Outcome::Identified(found) = &solution.outcome else {
+    let Some(found) = solution.outcome.identification() else {
         return Ok(Run {
             report,
             first: None,
         });
     };
-    let stars = pipeline.catalog().stars();
+    let stars = sky.catalog().stars();
     let simulator = Simulator::new(&scenario, &Scene::default(), stars)?;
     let protocol = Protocol {
         scenario: &scenario,
@@ -182,16 +184,13 @@ pub fn run(
             icrs_to_camera: found.icrs_to_camera,
             years_since_j2000: published.date.years_since_j2000(),
         },
-        config: &SolveConfig {
-            knowledge,
-            ..SolveConfig::default()
-        },
+        context: &context,
         seed: trials.seed,
     };
-    let simulated = protocol.run(pipeline, trials.count, done)?;
+    let simulated = protocol.run(trials.count, done)?;
     report.simulated = Some(SimulatedReport::new(&simulated, &detector, trials.seed));
     let (frame, _) = protocol.frame(0)?;
-    let solution = protocol.solve(pipeline, &frame, &mut Workspace::new())?;
+    let solution = protocol.solve(&frame, &mut Workspace::new())?;
     Ok(Run {
         report,
         first: Some((frame, solution)),

@@ -4,11 +4,11 @@ use super::ExperimentError;
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::camera::CameraModel;
 use crate::frame::Frame;
-use crate::identify::{Identification, Outcome, StarMatch};
+use crate::identify::{Identification, StarMatch};
 use crate::model::sensitivity::{Detector, Faintest, Scenario};
 use crate::model::simulate::{Pointing, Simulator, Truth};
-use crate::pipeline::{Pipeline, Solution, SolveConfig, Source, Workspace};
-use crate::sky::catalog::Star;
+use crate::pipeline::{Context, Solution, Source, Workspace, solve_frame};
+use crate::sky::catalog::{Catalog, StarIndex};
 use crate::study::validation::Light;
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
@@ -25,7 +25,7 @@ pub(super) struct Protocol<'a> {
     /// The detector as built, and the paper's rule of the brightest pixel.
     pub detectors: [&'a Detector; 2],
     pub pointing: &'a Pointing,
-    pub config: &'a SolveConfig,
+    pub context: &'a Context<'a>,
     pub seed: u64,
 }
 
@@ -65,7 +65,6 @@ impl Protocol<'_> {
     /// So many trials on the threads of the current pool, in their order.
     pub(super) fn run(
         &self,
-        pipeline: &Pipeline,
         trials: u64,
         done: &(dyn Fn() + Sync),
     ) -> Result<Vec<Trial>, ExperimentError> {
@@ -73,9 +72,9 @@ impl Protocol<'_> {
             .into_par_iter()
             .map_init(Workspace::new, |workspace, number| {
                 let (frame, truth) = self.frame(number)?;
-                let solution = self.solve(pipeline, &frame, workspace)?;
+                let solution = self.solve(&frame, workspace)?;
                 done();
-                Ok(self.judged(&truth, &solution, pipeline.catalog().stars()))
+                Ok(self.judged(&truth, &solution, self.context.sky.catalog()))
             })
             .collect()
     }
@@ -94,29 +93,25 @@ impl Protocol<'_> {
 
     pub(super) fn solve(
         &self,
-        pipeline: &Pipeline,
         frame: &Frame,
         workspace: &mut Workspace,
     ) -> Result<Solution, ExperimentError> {
-        Ok(pipeline.solve_frame(frame, self.config, workspace)?)
+        Ok(solve_frame(frame, self.context, workspace)?)
     }
 
-    fn judged(&self, truth: &Truth, solution: &Solution, stars: &[Star]) -> Trial {
+    fn judged(&self, truth: &Truth, solution: &Solution, catalog: &Catalog) -> Trial {
         let light = Light::of(self.scenario, truth);
         let star_like = |source: &&Source| source.measured.is_some_and(|m| m.flags.is_star_like());
-        let owners: Vec<usize> = solution
+        let owners: Vec<StarIndex> = solution
             .sources
             .iter()
             .filter(star_like)
             .filter_map(|source| light.owner(&source.position))
             .filter_map(|star| star.catalog)
             .collect();
-        let found = match &solution.outcome {
-            Outcome::Identified(found) => Some(&**found),
-            Outcome::NotIdentified(_) => None,
-        };
-        let named = |catalog: usize| {
-            found.is_some_and(|found| found.matches.iter().any(|m| m.catalog == catalog))
+        let found = solution.outcome.identification();
+        let named = |star: StarIndex| {
+            found.is_some_and(|found| found.matches.iter().any(|m| m.star == star))
         };
         let trials = truth.stars.iter().map(|star| StarTrial {
             v_mag: star.v_mag,
@@ -129,7 +124,7 @@ impl Protocol<'_> {
             expected: self
                 .detectors
                 .map(|detector| Faintest::among(v_mags(), detector)),
-            identified: found.and_then(|found| identified(found, solution, &light, stars)),
+            identified: found.and_then(|found| identified(found, solution, &light, catalog)),
         }
     }
 }
@@ -152,17 +147,17 @@ fn identified(
     found: &Identification,
     solution: &Solution,
     light: &Light,
-    stars: &[Star],
+    catalog: &Catalog,
 ) -> Option<Identified> {
     let is_wrong = |m: &StarMatch| {
-        let owner = light.owner(&solution.sources[m.observed].position);
-        owner.is_none_or(|star| star.catalog != Some(m.catalog))
+        let owner = light.owner(&solution.source(m.source).position);
+        owner.is_none_or(|star| star.catalog != Some(m.star))
     };
     // The catalogue is in the order of magnitude.
-    let faintest = found.matches.iter().max_by_key(|m| m.catalog)?;
+    let faintest = found.matches.iter().max_by_key(|m| m.star)?;
     Some(Identified {
         wrong: found.matches.iter().filter(|m| is_wrong(m)).count(),
-        faintest_vmag: f64::from(stars[faintest.catalog].v_mag),
+        faintest_vmag: f64::from(catalog.star(faintest.star).v_mag),
         faintest_is_wrong: is_wrong(faintest),
     })
 }

@@ -4,10 +4,10 @@ use super::{Published, PublishedStar};
 use crate::base::coords::PixelPoint;
 use crate::base::format::to_decimals;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
-use crate::identify::{Identification, Outcome, Photometry};
+use crate::identify::{Identification, Photometry, SourceIndex};
 use crate::model::sensitivity::{Budget, Scenario};
 use crate::pipeline::{CentroidList, ListedCentroid, Solution};
-use crate::sky::catalog::{Catalog, StarId};
+use crate::sky::catalog::{Catalog, StarId, StarIndex};
 use serde::Serialize;
 
 /// The paper's table, and what became of it.
@@ -89,22 +89,19 @@ impl TableReport {
         solution: &Solution,
         catalog: &Catalog,
     ) -> Self {
-        let found = match &solution.outcome {
-            Outcome::Identified(found) => Some(&**found),
-            Outcome::NotIdentified(_) => None,
-        };
+        let found = solution.outcome.identification();
         let named = |position| {
-            let is_it = |observed: usize| solution.sources[observed].position == position;
-            found.and_then(|found| found.matches.iter().find(|m| is_it(m.observed)))
+            let is_it = |source: SourceIndex| solution.source(source).position == position;
+            found.and_then(|found| found.matches.iter().find(|m| is_it(m.source)))
         };
         let mut right = 0;
         let stars = published.stars.iter().map(|star| {
             let named = named(star.position());
-            let found_id = named.map(|m| catalog.stars()[m.catalog].id);
+            let found_id = named.map(|m| catalog.star(m.star).id);
             right += usize::from(found_id == Some(StarId::Skymap(star.skymap_number)));
             TableStar {
                 paper_id: StarId::Skymap(star.skymap_number).to_string(),
-                found_id: named.map(|m| catalog.designation(m.catalog)),
+                found_id: named.map(|m| catalog.designation(m.star)),
                 vmag: star.vmag,
                 x_px: star.x_px,
                 y_px: star.y_px,
@@ -129,7 +126,7 @@ impl TableReport {
 impl FieldReport {
     fn new(published: &Published, found: &Identification, catalog: &Catalog) -> Self {
         let among = stars_among(published, found, catalog);
-        let is_listed = |star: &usize| found.matches.iter().any(|m| m.catalog == *star);
+        let is_listed = |star: &&StarIndex| found.matches.iter().any(|m| m.star == **star);
         let unlisted = among.iter().find(|star| !is_listed(star));
         let (boresight, up_pa_rad) = found.icrs_to_camera.boresight_and_up();
         let (ra_rad, dec_rad) = boresight.to_ra_dec();
@@ -156,14 +153,14 @@ fn limit_at(scenario: &Scenario, zenith_distance_deg: f64) -> Option<f64> {
     Some(to_decimals(Budget::new(&there).limit_vmag, 3))
 }
 
-fn v_mag(catalog: &Catalog, star: usize) -> f64 {
-    to_decimals(f64::from(catalog.stars()[star].v_mag), 3)
+fn v_mag(catalog: &Catalog, star: StarIndex) -> f64 {
+    to_decimals(f64::from(catalog.star(star).v_mag), 3)
 }
 
 /// The catalogue's stars that stand among the paper's centroids and are not fainter than the faintest, brightest first.
 ///
 /// How far the paper's frame reached beyond its centroids is not known.
-fn stars_among(published: &Published, found: &Identification, catalog: &Catalog) -> Vec<usize> {
+fn stars_among(published: &Published, found: &Identification, catalog: &Catalog) -> Vec<StarIndex> {
     let positions = || published.stars.iter().map(PublishedStar::position);
     let bounds = |axis: fn(PixelPoint) -> f64| {
         let values = || positions().map(axis);
@@ -172,15 +169,18 @@ fn stars_among(published: &Published, found: &Identification, catalog: &Catalog)
     };
     let (columns, rows) = (bounds(|p| p.x), bounds(|p| p.y));
     let years = published.date.years_since_j2000();
-    let is_among = |star: &usize| {
-        let direction = catalog.stars()[*star].direction_at(years);
+    let is_among = |star: &StarIndex| {
+        let direction = catalog.star(*star).direction_at(years);
         let place = found
             .camera
             .pixel_of(&found.icrs_to_camera.apply(&direction));
         place.is_some_and(|p| columns.contains(&p.x) && rows.contains(&p.y))
     };
     let as_bright = catalog.brighter_than(published.faintest_vmag + HALF_A_DIGIT_MAG);
-    (0..as_bright).filter(is_among).collect()
+    (0..as_bright)
+        .map(StarIndex::new)
+        .filter(is_among)
+        .collect()
 }
 
 /// The paper's own stars at the edge of the rectangle are within it in spite of their residuals.

@@ -29,8 +29,7 @@ pub use table::{Case, Parameter, Row, STANDARD_FOV_DEG, VARIED_FOV_DEG, standard
 pub use tally::{Answer, Tally, Verdict};
 
 use crate::base::units::RAD_PER_DEG;
-use crate::identify::{IndexedCatalog, Photometry, identify};
-use crate::pipeline::{Knowledge, Scale, ScaleHint};
+use crate::identify::{IndexedCatalog, Photometry, Priors, Scale, ScalePrior, identify};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -97,16 +96,15 @@ impl Default for Protocol {
 
 impl Protocol {
     /// What the identification is told: the scale, off by a random part of its stated error.
-    fn knowledge(&self, rng: &mut ChaCha8Rng) -> Knowledge {
-        let scale = self.scale_error.map(|tolerance| ScaleHint {
-            scale: Scale::FieldOfView(
-                self.fov_deg * RAD_PER_DEG / (1.0 + tolerance * rng.random_range(-1.0..1.0)),
-            ),
-            tolerance,
+    fn priors(&self, rng: &mut ChaCha8Rng) -> Priors {
+        let scale = self.scale_error.map(|tolerance| {
+            let error = 1.0 + tolerance * rng.random_range(-1.0..1.0);
+            let fov_rad = self.fov_deg * RAD_PER_DEG / error;
+            ScalePrior::by_user(Scale::FieldOfView(fov_rad), tolerance)
         });
-        Knowledge {
+        Priors {
             scale,
-            ..Knowledge::default()
+            ..Priors::default()
         }
     }
 }
@@ -135,10 +133,10 @@ pub fn run_one(sky: &IndexedCatalog, protocol: &Protocol, seed: u64, trial: u64)
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(trial);
     let observation = Observation::draw(protocol, sky, &mut rng);
-    let knowledge = protocol.knowledge(&mut rng);
+    let priors = protocol.priors(&mut rng);
     let start = Instant::now();
     let field = observation.list.star_field(0.0);
-    let outcome = identify(&field, &knowledge.hints(field.width_px), sky);
+    let found = identify(&field, &priors, sky);
     let time_ms = start.elapsed().as_secs_f64() * 1e3;
-    Verdict::new(&observation, &outcome, time_ms)
+    Verdict::new(&observation, found.as_ref().ok(), time_ms)
 }

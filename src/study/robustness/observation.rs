@@ -7,6 +7,7 @@ use crate::camera::{CameraModel, focal_length_px};
 use crate::identify::{IndexedCatalog, Photometry};
 use crate::photometry::instrumental_mag;
 use crate::pipeline::{CentroidList, ListedCentroid};
+use crate::sky::catalog::StarIndex;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -22,7 +23,7 @@ pub struct Observation {
     /// What the identification sees, brightest first.
     pub list: CentroidList,
     /// Which star of the catalogue each centroid of the list is; `None` for false ones.
-    pub catalog: Vec<Option<usize>>,
+    pub stars: Vec<Option<StarIndex>>,
     /// The camera.
     pub camera: CameraModel,
     /// Its attitude.
@@ -55,7 +56,7 @@ impl Observation {
                     .map(|d| d.listed(protocol.photometry))
                     .collect(),
             },
-            catalog: drawn.iter().map(|d| d.catalog).collect(),
+            stars: drawn.iter().map(|d| d.star).collect(),
             camera,
             icrs_to_camera,
         }
@@ -63,7 +64,7 @@ impl Observation {
 
     /// How many of the centroids are stars.
     pub fn true_stars(&self) -> usize {
-        self.catalog.iter().flatten().count()
+        self.stars.iter().flatten().count()
     }
 }
 
@@ -72,7 +73,7 @@ struct Drawn {
     position: PixelPoint,
     v_mag: f64,
     /// Which star of the catalogue it is, if any.
-    catalog: Option<usize>,
+    star: Option<StarIndex>,
 }
 
 impl Drawn {
@@ -102,18 +103,18 @@ fn stars_seen(
     let mut around = Vec::new();
     sky.grid
         .for_each_within(&centre, camera.radius_rad(), faintest as f32, |star| {
-            around.push(star.catalog as usize);
+            around.push(StarIndex::from(star.catalog));
         });
     around.sort_unstable();
-    let seen = |catalog: usize| {
-        let star = &sky.stars()[catalog];
+    let seen = |index: StarIndex| {
+        let star = sky.catalog().star(index);
         let pixel = camera.pixel_of(&icrs_to_camera.apply(&star.direction));
         let position = pixel.filter(|pixel| camera.contains(pixel))?;
         let v_mag = f64::from(star.v_mag) + protocol.mag_sigma * normal(rng);
         (v_mag <= limit_v_mag).then_some(Drawn {
             position,
             v_mag,
-            catalog: Some(catalog),
+            star: Some(index),
         })
     };
     around.into_iter().filter_map(seen).collect()
@@ -139,7 +140,7 @@ fn false_stars(protocol: &Protocol, stars: &[Drawn], rng: &mut ChaCha8Rng) -> Ve
             rng.random_range(0.0..protocol.height_px as f64) - 0.5,
         ),
         v_mag: stars[rng.random_range(0..stars.len())].v_mag,
-        catalog: None,
+        star: None,
     };
     (0..count).map(|_| strewn()).collect()
 }

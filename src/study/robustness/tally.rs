@@ -3,7 +3,7 @@
 use super::{Interval, Observation};
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation};
 use crate::camera::CameraModel;
-use crate::identify::{Identification, Outcome, StarMatch};
+use crate::identify::{Identification, StarMatch};
 use serde::{Deserialize, Serialize};
 
 /// An answer is right if the centre and the corners of the frame point where they do, to this share of the
@@ -65,12 +65,12 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Compares `outcome` with the truth.
-    pub fn new(observation: &Observation, outcome: &Outcome, time_ms: f64) -> Self {
-        let (answer, named, misnamed) = match outcome {
-            Outcome::NotIdentified(_) => (Answer::None, 0, 0),
-            Outcome::Identified(found) => {
-                let is_wrong = |m: &&StarMatch| observation.catalog[m.observed] != Some(m.catalog);
+    /// Compares the answer with the truth.
+    pub fn new(observation: &Observation, found: Option<&Identification>, time_ms: f64) -> Self {
+        let (answer, named, misnamed) = match found {
+            None => (Answer::None, 0, 0),
+            Some(found) => {
+                let is_wrong = |m: &&StarMatch| observation.stars[m.source.get()] != Some(m.star);
                 let misnamed = found.matches.iter().filter(is_wrong).count();
                 let answer = Answer::of(found, &observation.camera, &observation.icrs_to_camera);
                 (answer, found.matches.len(), misnamed)

@@ -4,10 +4,12 @@ use super::record::{FrameRecord, Kind, Named, StarRecord};
 use super::{BEYOND_LIMIT_MAG, Light, Simulated, Validator};
 use crate::base::format::{to_decimals, to_significant};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
-use crate::identify::{Identification, Outcome};
+use crate::identify::{Identification, SourceIndex};
 use crate::model::sensitivity::{CramerRao, Faintest};
 use crate::model::simulate::TrueStar;
+use crate::pipeline::Outcome;
 use crate::pipeline::{Solution, Source};
+use crate::sky::catalog::StarIndex;
 use crate::study::robustness::Answer;
 use nalgebra::Vector3;
 use std::collections::HashMap;
@@ -35,7 +37,7 @@ pub(super) struct Judge<'a> {
     light: Light<'a>,
     found: Option<&'a Identification>,
     /// The catalogue's star that each source was named, by source.
-    names: HashMap<usize, usize>,
+    names: HashMap<SourceIndex, StarIndex>,
     /// Stars fainter than this are left out.
     faintest_vmag: f64,
 }
@@ -44,9 +46,9 @@ pub(super) struct Judge<'a> {
 #[derive(Default)]
 struct Verdicts {
     /// The sources that are stars: the nearest one to each, by the star's number.
-    of_star: HashMap<usize, usize>,
+    of_star: HashMap<usize, SourceIndex>,
     /// The others that may be stars.
-    others: Vec<(Kind, usize)>,
+    others: Vec<(Kind, SourceIndex)>,
     detected: u64,
 }
 
@@ -57,10 +59,7 @@ impl<'a> Judge<'a> {
         simulated: &'a Simulated,
         solution: &'a Solution,
     ) -> Self {
-        let found = match &solution.outcome {
-            Outcome::Identified(found) => Some(&**found),
-            Outcome::NotIdentified(_) => None,
-        };
+        let found = solution.outcome.identification();
         let matches = found.map_or(&[][..], |found| &found.matches);
         Self {
             validator,
@@ -69,7 +68,7 @@ impl<'a> Judge<'a> {
             solution,
             light: Light::of(&validator.protocol.setup.scenario, &simulated.truth),
             found,
-            names: matches.iter().map(|m| (m.observed, m.catalog)).collect(),
+            names: matches.iter().map(|m| (m.source, m.star)).collect(),
             faintest_vmag: validator.limit_vmag() + BEYOND_LIMIT_MAG,
         }
     }
@@ -81,7 +80,7 @@ impl<'a> Judge<'a> {
         let mut rows: Vec<StarRecord> = counted
             .map(|star| self.star_row(star, verdicts.of_star.get(&star.number).copied()))
             .collect();
-        let other = |&(kind, source): &(Kind, usize)| self.other_row(kind, source);
+        let other = |&(kind, source): &(Kind, SourceIndex)| self.other_row(kind, source);
         rows.extend(verdicts.others.iter().map(other));
         let frame = self.frame_row(&verdicts, rows.len());
         (frame, rows)
@@ -99,6 +98,7 @@ impl<'a> Judge<'a> {
                 continue;
             }
             verdicts.detected += 1;
+            let index = SourceIndex::new(index);
             let place = &source.position;
             let owner = self.light.owner(place).filter(|star| self.counts(star));
             let Some(star) = owner else {
@@ -110,8 +110,8 @@ impl<'a> Judge<'a> {
                 verdicts.others.push((kind, index));
                 continue;
             };
-            let distance = |source: usize| {
-                let found = &self.solution.sources[source].position;
+            let distance = |source: SourceIndex| {
+                let found = &self.solution.source(source).position;
                 found.distance_to(&star.position)
             };
             let nearest = verdicts.of_star.entry(star.number).or_insert(index);
@@ -122,15 +122,15 @@ impl<'a> Judge<'a> {
         verdicts
     }
 
-    fn star_row(&self, star: &TrueStar, source: Option<usize>) -> StarRecord {
-        let catalog = self.validator.pipeline.catalog();
+    fn star_row(&self, star: &TrueStar, source: Option<SourceIndex>) -> StarRecord {
+        let catalog = self.validator.context.sky.catalog();
         let theory = self.validator.spots.theory(&star.position, star.electrons);
         let bound = |of: fn(&CramerRao) -> f64| {
             let bound = theory.bound.as_ref().map(of);
             bound.filter(|b| b.is_finite()).map(significant)
         };
         let bound_flux_e = bound(|b| b.sigma_flux_e);
-        let bv_mag = star.catalog.and_then(|known| catalog.stars()[known].bv_mag);
+        let bv_mag = star.catalog.and_then(|known| catalog.star(known).bv_mag);
         let row = StarRecord {
             frame: self.number,
             kind: Kind::Star,
@@ -187,7 +187,7 @@ impl<'a> Judge<'a> {
     }
 
     /// The row of what was detected and is no star.
-    fn other_row(&self, kind: Kind, source: usize) -> StarRecord {
+    fn other_row(&self, kind: Kind, source: SourceIndex) -> StarRecord {
         self.with_source(self.empty_row(kind), source, None)
     }
 
@@ -220,8 +220,13 @@ impl<'a> Judge<'a> {
     }
 
     /// `row` with what was measured of a source; `star` is what it should be named.
-    fn with_source(&self, row: StarRecord, source: usize, star: Option<&TrueStar>) -> StarRecord {
-        let found = &self.solution.sources[source];
+    fn with_source(
+        &self,
+        row: StarRecord,
+        source: SourceIndex,
+        star: Option<&TrueStar>,
+    ) -> StarRecord {
+        let found = &self.solution.source(source);
         let sigma = |axis: usize| found.measured.map(|m| significant(m.sigma_px[axis]));
         let gain = self.validator.protocol.setup.scenario.sensor.gain_e_per_adu;
         let flux_e = found.flux.map(|flux| flux * gain);
@@ -271,11 +276,11 @@ impl<'a> Judge<'a> {
         let errors = |of: fn(&AttitudeError) -> f64| attitude.as_ref().map(of).map(significant);
         let sensor = &validator.protocol.setup.scenario.sensor;
         let budget = &validator.budget;
-        let stars = validator.pipeline.catalog().stars();
+        let catalog = validator.context.sky.catalog();
         let named = self
             .names
             .values()
-            .map(|star| f64::from(stars[*star].v_mag));
+            .map(|star| f64::from(catalog.star(*star).v_mag));
         let [misnamed, misnamed_companions] = self.misnamed();
         let photometry = solution.photometry.as_ref();
         let limit = photometry.and_then(|p| p.completeness.limit.as_ref().ok());
@@ -340,7 +345,7 @@ impl<'a> Judge<'a> {
     fn misnamed(&self) -> [u64; 2] {
         let (mut wrong, mut companions) = (0, 0);
         for (source, star) in &self.names {
-            let place = &self.solution.sources[*source].position;
+            let place = &self.solution.source(*source).position;
             let is_it = |other: &TrueStar| other.catalog == Some(*star);
             if !self.light.owner(place).is_some_and(is_it) {
                 wrong += 1;

@@ -1,6 +1,6 @@
 //! Frames at random attitudes through the whole pipeline, each result against the truth and against what theory allows.
 //!
-//! ([`Protocol`], [`Pipeline`]) → for each number a [`Trial`]: a [`FrameRecord`] and its [`StarRecord`]s → [`Summary`]
+//! ([`Protocol`], [`IndexedCatalog`](crate::identify::IndexedCatalog)) → for each number a [`Trial`]: a [`FrameRecord`] and its [`StarRecord`]s → [`Summary`]
 //!
 //! 1. The attitude is uniform over all rotations; the frame is simulated with the stars of the catalogue, and processed as
 //!    `starpipe process` does. Its random numbers depend on the seed and its own number only: the same on any number of threads.
@@ -36,10 +36,11 @@ pub use summary::{
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::detect::{DetectConfig, DetectError};
 use crate::frame::{Frame, FrameError};
+use crate::identify::IndexedCatalog;
 use crate::model::sensitivity::{Budget, Detector, Rule, ScenarioError};
 use crate::model::simulate::{Pointing, Setup, Simulator, Truth};
-use crate::photometry::comparison::Description;
-use crate::pipeline::{Pipeline, Solution, SolveConfig, Workspace};
+use crate::photometry::comparison::StatedCamera;
+use crate::pipeline::{Context, Solution, Workspace, solve_frame};
 use crate::study::robustness::random_rotation;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -80,10 +81,9 @@ pub struct Protocol {
 
 /// A [`Protocol`], ready for any number of frames.
 pub struct Validator<'a> {
-    pipeline: &'a Pipeline<'a>,
+    context: Context<'a>,
     protocol: Protocol,
     simulator: Simulator<'a>,
-    config: SolveConfig,
     budget: Budget,
     detector: Detector,
     spots: Spots,
@@ -123,10 +123,10 @@ impl<'a> Validator<'a> {
     ///
     /// # Errors
     /// [`ValidationError::Scenario`], [`ValidationError::NoLimit`] where nothing can be predicted.
-    pub fn new(pipeline: &'a Pipeline<'a>, protocol: &Protocol) -> Result<Self, ValidationError> {
+    pub fn new(sky: &'a IndexedCatalog<'a>, protocol: &Protocol) -> Result<Self, ValidationError> {
         let Setup { scenario, scene } = &protocol.setup;
         protocol.setup.check()?;
-        let simulator = Simulator::new(scenario, scene, pipeline.catalog().stars())?;
+        let simulator = Simulator::new(scenario, scene, sky.catalog().stars())?;
         let scenario = &simulator.evened();
         let budget = Budget::checked(scenario)?;
         let detector = Detector::new(Rule::MatchedFilter, scenario, &budget);
@@ -134,25 +134,24 @@ impl<'a> Validator<'a> {
             return Err(ValidationError::NoLimit);
         }
         let sensor = &scenario.sensor;
-        let description = protocol.scale_known.then(|| Description {
+        let camera = protocol.scale_known.then(|| StatedCamera {
             sensor: sensor.clone(),
             zenith_distance_deg: None,
             extinction: None,
         });
         Ok(Self {
             simulator,
-            config: SolveConfig {
+            context: Context {
                 detect: DetectConfig {
                     false_alarms_per_mpx: scenario.conditions.false_alarms_per_mpx,
                     ..DetectConfig::default()
                 },
                 // The exposure is kept from it: what it would predict with it is predicted here, once for all frames.
-                description,
-                ..SolveConfig::default()
+                camera,
+                ..Context::new(sky)
             },
             spots: Spots::of(scenario, &budget),
             protocol: protocol.clone(),
-            pipeline,
             budget,
             detector,
         })
@@ -181,9 +180,7 @@ impl<'a> Validator<'a> {
         let simulated = self.simulate(number)?;
         let simulate_ms = start.elapsed().as_secs_f64() * 1e3;
         let start = Instant::now();
-        let solution = self
-            .pipeline
-            .solve_frame(&simulated.frame, &self.config, workspace)?;
+        let solution = solve_frame(&simulated.frame, &self.context, workspace)?;
         let process_ms = start.elapsed().as_secs_f64() * 1e3;
         let (frame, stars) = self.judged(number, &simulated, &solution);
         Ok(Trial {

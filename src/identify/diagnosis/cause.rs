@@ -1,0 +1,76 @@
+//! The causes that diagnosis can name.
+
+use crate::base::coords::{Icrs, UnitVector};
+
+/// Why a frame was not identified, in terms that a person can act on.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Diagnosis {
+    /// All pixels of the frame have one value.
+    NoVariation {
+        /// That value, in ADU.
+        level_adu: f64,
+    },
+    /// A large fraction of the frame is at full scale.
+    Saturated {
+        /// That fraction, in [0, 1].
+        share: f64,
+        /// Full scale, in ADU.
+        level_adu: f64,
+    },
+    /// The stars are trails: the camera moved, or the stars did.
+    Trails {
+        /// Number of detections that are trails.
+        trails: usize,
+        /// Their angle to the image's x axis, in radians, in (−π/2, π/2]; positive where they rise to the
+        /// right.
+        angle_rad: f64,
+        /// Their median length, in pixels.
+        length_px: f64,
+    },
+    /// The same pattern of stars occurs twice.
+    DoubleExposure {
+        /// Pairs of stars with this offset.
+        pairs: usize,
+        /// The offset along x and y, in pixels.
+        offset_px: [f64; 2],
+    },
+    /// The stated scale is outside the range that can be identified.
+    ScaleOutOfRange {
+        /// Stated horizontal field of view, from and to, in radians.
+        fov_x_rad: (f64, f64),
+        /// Horizontal fields of view that the catalogue allows, in radians.
+        searched_rad: (f64, f64),
+    },
+    /// Without the priors the stars are identified.
+    HintsExclude(Box<Excluded>),
+}
+
+/// A solution that the priors exclude.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Excluded {
+    /// Its horizontal field of view, in radians.
+    pub fov_x_rad: f64,
+    /// Its boresight.
+    pub boresight: UnitVector<Icrs>,
+    /// Number of identified stars.
+    pub stars: usize,
+    /// The stated field of view, from and to, in radians, where it excludes the solution.
+    pub allowed_fov_x_rad: Option<(f64, f64)>,
+    /// Distance from the stated direction and the stated radius, in radians, where they exclude the solution.
+    pub distance_rad: Option<(f64, f64)>,
+}
+
+impl Diagnosis {
+    /// Code for programs.
+    pub const fn code(&self) -> &'static str {
+        match self {
+            Self::NoVariation { .. } => "no_variation",
+            Self::Saturated { .. } => "saturated",
+            Self::Trails { .. } => "trails",
+            Self::DoubleExposure { .. } => "double_exposure",
+            Self::ScaleOutOfRange { .. } => "scale_out_of_range",
+            Self::HintsExclude(_) => "hints_exclude",
+        }
+    }
+}

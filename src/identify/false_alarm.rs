@@ -1,0 +1,357 @@
+//! Is a hypothesis about pointing and scale true? The probability that chance does as well, and what agrees.
+//!
+//! hypothesis (camera, attitude) → catalogue stars in the frame → nearest observed star of each → false-alarm probability
+//!
+//! Were the hypothesis wrong, each observed star would lie within r of a predicted one of about its brightness with the
+//! probability p = ρπr², ρ being the density of such stars around it. The number of stars that do so is then
+//! Poisson-binomial, each star having a chance of its own, and the probability of as many as were found or
+//! more, times the number of hypotheses, radii and differences in magnitude tried, bounds the number of
+//! equally good answers that chance alone would have given (an a-contrario test: Desolneux, Moisan & Morel
+//! 2000, IJCV 40, 7). The three stars of the triangle that the hypothesis came from agree because it was
+//! looked for, and say nothing; every two parameters fitted beyond pointing, roll and scale use up another star. The stars used
+//! up are taken to be those least likely to agree by chance, which makes the most of the others' chances.
+
+use super::attitude::POSE_PARAMETERS;
+use super::field::{ObservedStar, StarField};
+use super::hypothesis::{Hypothesis, Problem};
+use super::predict::{PredictedStar, Surroundings};
+use crate::base::statistics::{LnProduct, log10_poisson_binomial_tail};
+use std::f64::consts::{LN_10, PI};
+
+/// Most hypotheses that a search tries, so that a frame in which there is nothing to find takes well
+/// under a second. Most fields that can be identified take a few; those with as many false sources as
+/// stars and half of the catalogue's stars missing take up to all of these.
+pub const MAX_HYPOTHESES: u64 = 400_000;
+/// Number of observed stars that are tested, the brightest.
+pub const TESTED_STARS: usize = 60;
+/// Stars that agree by construction.
+const TRIANGLE_STARS: usize = 3;
+/// Radii of agreement tried: from the smallest, in pixels, by this factor, to this share of the frame's diagonal.
+const SMALLEST_RADIUS_PX: f64 = 0.2;
+const RADIUS_FACTOR: f64 = 1.5;
+const LARGEST_RADIUS_SHARE: f64 = 0.014;
+/// Differences in magnitude tried besides the largest that is tolerated at all.
+const MAG_TOLERANCES: [f64; 3] = [0.25, 0.5, 1.0];
+/// Radius of the neighbourhood whose density of predicted stars counts, in units of the radius of agreement.
+const NEIGHBOURHOOD: f64 = 8.0;
+/// An observed and a predicted star that are about as bright as each other.
+#[derive(Debug, Clone, Copy)]
+struct NearPair {
+    observed: usize,
+    predicted: usize,
+    /// Their distance, in pixels.
+    apart_px: f64,
+    /// The smallest radius of agreement in whose neighbourhood it is.
+    radius: usize,
+    /// The difference of their magnitudes, absolute.
+    mag: f64,
+}
+
+/// How likely it is that chance does as well as a hypothesis; keeps its buffers.
+#[derive(Debug, Default)]
+pub struct FalseAlarm {
+    predicted: Vec<PredictedStar>,
+    /// Radii of agreement, smallest first.
+    radii_px: Vec<f64>,
+    /// All pairs in the neighbourhood of the largest.
+    pairs: Vec<NearPair>,
+    /// Those within it, the closest first.
+    close: Vec<NearPair>,
+    /// For each observed star the number of predicted stars that are alike, ...
+    alike: Vec<f64>,
+    /// ... and those of them in the neighbourhood, radius by radius.
+    near: Vec<f64>,
+    observed_taken: Vec<bool>,
+    predicted_taken: Vec<bool>,
+    /// For each radius the most stars that agree within it or a smaller one, with the differences in magnitude tried so far.
+    most: Vec<usize>,
+    tests: Vec<Test>,
+    /// One for each observed star in each test.
+    chances: Vec<f64>,
+    tail: Vec<f64>,
+}
+
+/// Agreement within one radius and one difference in magnitude.
+#[derive(Debug, Clone, Copy)]
+struct Test {
+    /// Observed stars with a predicted star of their own, less those that agree by construction.
+    hits: usize,
+    /// The natural logarithm of the probability of as many by chance is no less.
+    at_least_ln: f64,
+    /// Where its chances begin, and how many of them, the least likely, are used up.
+    chances: usize,
+    used_up: usize,
+}
+
+/// What a test is of.
+struct Tested<'a> {
+    field: &'a StarField,
+    tolerance_mag: f64,
+    used_up: usize,
+}
+
+impl FalseAlarm {
+    /// log10 of the expected number of hypotheses as good as this one among `hypotheses` that chance alone
+    /// would give: the false-alarm probability where it is small.
+    ///
+    /// Agreement is sought within several radii and several differences in magnitude, and the least likely counts: exact
+    /// positions and magnitudes say more than rough ones. That so many tests are made is paid for.
+    pub fn log10(
+        &mut self,
+        hypothesis: &Hypothesis,
+        problem: Problem,
+        around: &mut Surroundings,
+        hypotheses: u64,
+    ) -> f64 {
+        let field = problem.field;
+        let observed = field.brightest(TESTED_STARS);
+        hypothesis.predict(problem, observed, around, &mut self.predicted);
+        self.set_radii(field);
+        self.tests.clear();
+        self.chances.clear();
+        let largest_mag = field.photometry.tolerance_mag();
+        self.find_pairs(hypothesis, observed, largest_mag);
+        let used_up = TRIANGLE_STARS + (hypothesis.parameters - POSE_PARAMETERS).div_ceil(2);
+        self.most.clear();
+        self.most.resize(self.radii_px.len(), used_up);
+        let tried = MAG_TOLERANCES.iter().filter(|&&mag| mag < largest_mag);
+        let mut tests = 0;
+        for tolerance_mag in tried.copied().chain([largest_mag]) {
+            let tested = Tested {
+                field,
+                tolerance_mag,
+                used_up,
+            };
+            self.add_tests(hypothesis, observed, &tested);
+            tests += self.radii_px.len();
+        }
+        let best = self.least_likely(observed.len());
+        (best + (search_weight(hypotheses) * tests as f64).log10()).min(0.0)
+    }
+
+    fn set_radii(&mut self, field: &StarField) {
+        let largest_px = LARGEST_RADIUS_SHARE * field.width_px.hypot(field.height_px);
+        // There is one in the smallest frame.
+        let largest_px = largest_px.max(SMALLEST_RADIUS_PX);
+        let radii = std::iter::successors(Some(SMALLEST_RADIUS_PX), |radius| {
+            Some(radius * RADIUS_FACTOR)
+        });
+        self.radii_px.clear();
+        self.radii_px
+            .extend(radii.take_while(|&radius| radius <= largest_px));
+    }
+
+    /// All pairs within the neighbourhood of the largest radius whose magnitudes differ by no more than is tolerated.
+    fn find_pairs(&mut self, hypothesis: &Hypothesis, observed: &[ObservedStar], largest_mag: f64) {
+        let largest_px = self.radii_px.last().copied().unwrap_or(0.0);
+        let radii_px = &self.radii_px;
+        let near_px = |radius: usize| NEIGHBOURHOOD * radii_px[radius];
+        let reach_px = NEIGHBOURHOOD * largest_px;
+        self.pairs.clear();
+        for (index, star) in observed.iter().enumerate() {
+            let alike = hypothesis.alike(star, &self.predicted, largest_mag);
+            for (candidate, predicted) in self.predicted[alike.clone()].iter().zip(alike) {
+                if (candidate.pixel.x - star.position.x).abs() > reach_px {
+                    continue;
+                }
+                let apart_px = candidate.pixel.distance_to(&star.position);
+                if apart_px > reach_px {
+                    continue;
+                }
+                let mut radius = radii_px.len() - 1;
+                while radius > 0 && apart_px <= near_px(radius - 1) {
+                    radius -= 1;
+                }
+                let mag = f64::from(candidate.v_mag) - star.mag - hypothesis.zero_point_mag;
+                self.pairs.push(NearPair {
+                    observed: index,
+                    predicted,
+                    apart_px,
+                    radius,
+                    mag: mag.abs(),
+                });
+            }
+        }
+        self.close.clear();
+        let close = self.pairs.iter().filter(|pair| pair.apart_px <= largest_px);
+        self.close.extend(close);
+        self.close.sort_unstable_by(|a, b| {
+            let order = a.apart_px.total_cmp(&b.apart_px);
+            order.then((a.observed, a.predicted).cmp(&(b.observed, b.predicted)))
+        });
+    }
+
+    /// One test for each radius at which more stars agree than do so by construction, and than agree within a smaller radius
+    /// or a smaller difference in magnitude: as many in more room are no less likely.
+    fn add_tests(&mut self, hypothesis: &Hypothesis, observed: &[ObservedStar], tested: &Tested) {
+        self.count_alike(hypothesis, observed, tested.tolerance_mag);
+        self.count_near(observed.len(), tested.tolerance_mag);
+        let mut hits = Hits::new(self, observed.len());
+        let mut most = 0;
+        for radius in 0..self.radii_px.len() {
+            let agreeing = hits.within(self.radii_px[radius], tested.tolerance_mag, &self.close);
+            most = most.max(self.most[radius]);
+            if agreeing > most {
+                most = agreeing;
+                let test = self.test(radius, agreeing - tested.used_up, tested);
+                self.tests.push(test);
+            }
+            self.most[radius] = most;
+        }
+        (self.observed_taken, self.predicted_taken) = (hits.observed_taken, hits.predicted_taken);
+    }
+
+    fn count_alike(
+        &mut self,
+        hypothesis: &Hypothesis,
+        observed: &[ObservedStar],
+        tolerance_mag: f64,
+    ) {
+        let predicted = &self.predicted;
+        self.alike.clear();
+        let alike = |star| hypothesis.alike(star, predicted, tolerance_mag).len() as f64;
+        self.alike.extend(observed.iter().map(alike));
+    }
+
+    fn count_near(&mut self, observed: usize, tolerance_mag: f64) {
+        let radii = self.radii_px.len();
+        self.near.clear();
+        self.near.resize(observed * radii, 0.0);
+        for pair in self.pairs.iter().filter(|pair| pair.mag <= tolerance_mag) {
+            self.near[pair.observed * radii + pair.radius] += 1.0;
+        }
+        for of_star in self.near.chunks_exact_mut(radii) {
+            for radius in 1..radii {
+                of_star[radius] += of_star[radius - 1];
+            }
+        }
+    }
+
+    /// The test of so many `hits` within one radius: the chance of each observed star, and what they amount to at the least.
+    ///
+    /// The probability P of just as many hits is the product of all 1 − p, times the sum over all subsets of the
+    /// product of their p / (1 − p). The sum is no less than if all p were their geometric mean (Maclaurin's inequality), and
+    /// ln(1 − p) no less than −p − p² for p below 0.68.
+    fn test(&mut self, radius: usize, hits: usize, tested: &Tested) -> Test {
+        let (radius_px, radii) = (self.radii_px[radius], self.radii_px.len());
+        let frame_px = tested.field.width_px * tested.field.height_px;
+        let chances = self.chances.len();
+        let (mut product, mut lost, mut possible, mut largest) = (LnProduct::ONE, 0.0, 0, 0.0_f64);
+        for (of_star, &alike) in self.near.chunks_exact(radii).zip(&self.alike) {
+            // Less the one that may be its match: what counts is how many others chance could have put there.
+            let crowd = (of_star[radius] - 1.0) / NEIGHBOURHOOD.powi(2);
+            let strewn = alike * PI * radius_px * radius_px / frame_px;
+            let chance = strewn.max(crowd).min(1.0);
+            self.chances.push(chance);
+            if chance > 0.0 {
+                product.multiply(chance);
+                lost += chance + chance * chance;
+                largest = largest.max(chance);
+                possible += 1;
+            }
+        }
+        let counted = possible.min(self.alike.len() - tested.used_up);
+        let at_least_ln = if largest < 0.68 && hits <= counted {
+            ln_binomial(counted, hits) + hits as f64 * product.ln() / possible as f64 - lost
+        } else {
+            f64::NEG_INFINITY
+        };
+        Test {
+            hits,
+            at_least_ln,
+            chances,
+            used_up: tested.used_up,
+        }
+    }
+
+    /// log10 of the lowest probability of any test. Those that cannot be lower are left out.
+    fn least_likely(&mut self, observed: usize) -> f64 {
+        self.tests
+            .sort_unstable_by(|a, b| a.at_least_ln.total_cmp(&b.at_least_ln));
+        let mut best: f64 = 0.0;
+        for test in &self.tests {
+            if test.at_least_ln >= best * LN_10 {
+                break;
+            }
+            let chances = &mut self.chances[test.chances..test.chances + observed];
+            // Those that agree by construction count as the least likely ones.
+            chances.sort_unstable_by(f64::total_cmp);
+            let counted = &chances[test.used_up..];
+            best = best.min(log10_poisson_binomial_tail(
+                counted,
+                test.hits,
+                &mut self.tail,
+            ));
+        }
+        best
+    }
+}
+
+/// Observed stars with a predicted star of their own within a growing radius.
+struct Hits {
+    observed_taken: Vec<bool>,
+    predicted_taken: Vec<bool>,
+    count: usize,
+    /// Pairs looked at.
+    done: usize,
+}
+
+impl Hits {
+    /// None yet, in the buffers of `from`.
+    fn new(from: &mut FalseAlarm, observed: usize) -> Self {
+        let cleared = |mut taken: Vec<bool>, count: usize| {
+            taken.clear();
+            taken.resize(count, false);
+            taken
+        };
+        Self {
+            observed_taken: cleared(std::mem::take(&mut from.observed_taken), observed),
+            predicted_taken: cleared(
+                std::mem::take(&mut from.predicted_taken),
+                from.predicted.len(),
+            ),
+            count: 0,
+            done: 0,
+        }
+    }
+
+    /// How many there are within `radius_px`, which must not be smaller than before; `pairs` are the closest first.
+    fn within(&mut self, radius_px: f64, tolerance_mag: f64, pairs: &[NearPair]) -> usize {
+        while let Some(pair) = pairs.get(self.done).filter(|p| p.apart_px <= radius_px) {
+            let (o, p) = (pair.observed, pair.predicted);
+            let is_alike = pair.mag <= tolerance_mag;
+            if is_alike && !self.observed_taken[o] && !self.predicted_taken[p] {
+                self.observed_taken[o] = true;
+                self.predicted_taken[p] = true;
+                self.count += 1;
+            }
+            self.done += 1;
+        }
+        self.count
+    }
+}
+
+/// ln of the number of ways to choose `some` of `all`.
+fn ln_binomial(all: usize, some: usize) -> f64 {
+    let ln_factorial = |n: usize| libm::lgamma(n as f64 + 1.0);
+    ln_factorial(all) - ln_factorial(some) - ln_factorial(all - some)
+}
+
+/// What the chance of one hypothesis is multiplied by when it is the last of so many.
+///
+/// The weights' inverses add up to no more than one over the longest search there is, so that the probability
+/// that any hypothesis at all of a search passes by chance is bounded, and not only that of one.
+fn search_weight(hypotheses: u64) -> f64 {
+    hypotheses.max(1) as f64 * (1.0 + (MAX_HYPOTHESES as f64).ln())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_whole_search_has_a_bounded_chance() {
+        let sum: f64 = (1..=MAX_HYPOTHESES).map(|n| 1.0 / search_weight(n)).sum();
+        assert!(sum <= 1.0, "{sum}");
+    }
+}

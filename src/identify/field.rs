@@ -1,0 +1,80 @@
+//! The stars observed in one frame: the input of identification.
+
+use crate::base::coords::PixelPoint;
+
+/// Position of a source in the frame's list of sources: its detections, or the lines of a centroid list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SourceIndex(usize);
+
+impl SourceIndex {
+    /// The source at `position` in its list.
+    pub const fn new(position: usize) -> Self {
+        Self(position)
+    }
+
+    /// The position in the list of sources.
+    pub const fn get(self) -> usize {
+        self.0
+    }
+}
+
+/// One observed star.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ObservedStar {
+    /// The source that it is.
+    pub source: SourceIndex,
+    /// Its centroid.
+    pub position: PixelPoint,
+    /// Standard error of the centroid on one axis, in pixels.
+    pub sigma_px: f64,
+    /// Brightness in magnitudes, see [`StarField::photometry`].
+    pub mag: f64,
+    /// Whether the detector was saturated. The star may then be brighter than `mag` by any amount.
+    pub is_saturated: bool,
+}
+
+/// What the observed magnitudes mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Photometry {
+    /// −2.5 log10(flux) with an unknown zero point.
+    Instrumental,
+    /// Johnson V.
+    JohnsonV,
+}
+
+impl Photometry {
+    /// Largest difference between an observed magnitude, converted to V by the zero point, and the
+    /// catalogue's.
+    pub const fn tolerance_mag(self) -> f64 {
+        match self {
+            // Colour, saturation, and the tone curve of a JPEG.
+            Self::Instrumental => 2.5,
+            Self::JohnsonV => 1.5,
+        }
+    }
+}
+
+/// The stars observed in one frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StarField {
+    /// Width of the frame, in pixels.
+    pub width_px: f64,
+    /// Height of the frame, in pixels.
+    pub height_px: f64,
+    /// What the magnitudes of `stars` mean.
+    pub photometry: Photometry,
+    /// Date of the frame, in Julian years since J2000.0, for proper motion.
+    pub years_since_j2000: f64,
+    /// Standard deviation of the PSF before pixel integration, in pixels. Without it no catalogue stars are
+    /// treated as blended.
+    pub spot_sigma_px: Option<f64>,
+    /// Brightest first.
+    pub stars: Vec<ObservedStar>,
+}
+
+impl StarField {
+    /// The `count` brightest stars, or all if there are fewer.
+    pub fn brightest(&self, count: usize) -> &[ObservedStar] {
+        &self.stars[..count.min(self.stars.len())]
+    }
+}

@@ -1,0 +1,155 @@
+//! A hypothesis about pointing and scale, and the catalogue stars that it predicts in the frame.
+
+use super::field::{ObservedStar, Photometry, StarField};
+use super::indexed_catalog::IndexedCatalog;
+use super::predict::{Depth, PredictedStar, Surroundings, View};
+use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
+use crate::base::units::RAD_PER_DEG;
+use crate::camera::{CameraModel, LANES};
+use std::ops::Range;
+
+/// Predicted stars for each observed one, where the zero point of the magnitudes is unknown.
+const PREDICTED_PER_OBSERVED: f64 = 1.5;
+/// Predicted stars in addition, so that a few missing ones do no harm in sparse fields.
+const PREDICTED_EXTRA: usize = 5;
+/// Where the zero point is known: the prediction goes to the magnitude that this fraction of the observed
+/// stars are brighter than (a few odd ones do not count), ...
+const FAINT_SHARE: f64 = 0.95;
+/// ... and this much deeper, for colours and for luck at the threshold.
+const FAINT_ROOM_MAG: f64 = 1.0;
+
+/// A camera and an attitude that may be the true ones.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hypothesis {
+    /// The camera.
+    pub camera: CameraModel,
+    /// The attitude.
+    pub icrs_to_camera: Rotation<Icrs, Camera>,
+    /// Number of parameters fitted to the stars.
+    pub parameters: usize,
+    /// Johnson V minus observed magnitude.
+    pub zero_point_mag: f64,
+}
+
+/// A star field, and the catalogue to identify it with.
+#[derive(Clone, Copy)]
+pub struct Problem<'a> {
+    /// The observed stars.
+    pub field: &'a StarField,
+    /// The catalogue.
+    pub sky: &'a IndexedCatalog<'a>,
+}
+
+impl Hypothesis {
+    /// Makes `predicted` the catalogue stars in the frame to the depth that `observed` asks for, brightest first.
+    pub fn predict(
+        &self,
+        problem: Problem,
+        observed: &[ObservedStar],
+        around: &mut Surroundings,
+        predicted: &mut Vec<PredictedStar>,
+    ) {
+        self.predict_to(problem, observed, f64::NEG_INFINITY, (around, predicted));
+    }
+
+    /// Makes `predicted` the catalogue stars in the frame that may be any of its stars, once the zero point is known: to what the
+    /// faint ones of these have, and the depth that their number asks for at least.
+    pub fn predict_all(
+        &self,
+        problem: Problem,
+        around: &mut Surroundings,
+        predicted: &mut Vec<PredictedStar>,
+    ) {
+        let observed = &problem.field.stars;
+        let faint = (observed.len() as f64 * FAINT_SHARE) as usize;
+        let limit = observed.get(faint).map_or(f64::NEG_INFINITY, |star| {
+            star.mag + self.zero_point_mag + FAINT_ROOM_MAG
+        });
+        self.predict_to(problem, observed, limit, (around, predicted));
+    }
+
+    /// As [`Self::predict`], and to `limit_v_mag` at least.
+    fn predict_to(
+        &self,
+        problem: Problem,
+        observed: &[ObservedStar],
+        limit_v_mag: f64,
+        (around, predicted): (&mut Surroundings, &mut Vec<PredictedStar>),
+    ) {
+        let Problem { field, sky } = problem;
+        let view = self.view(field);
+        match field.photometry {
+            Photometry::JohnsonV => {
+                let faintest = observed.iter().map(|s| s.mag).fold(f64::MIN, f64::max);
+                let limit = faintest + field.photometry.tolerance_mag();
+                around.stars_to(&view, sky, limit.max(limit_v_mag), predicted);
+            }
+            Photometry::Instrumental => {
+                let count = observed.len() as f64 * PREDICTED_PER_OBSERVED;
+                let count = count.ceil() as usize + PREDICTED_EXTRA;
+                let likely = sky.magnitude_of_density(self.per_sq_deg(count));
+                let least = Depth {
+                    count,
+                    v_mag: limit_v_mag,
+                };
+                around.stars_at_least(&view, sky, (least, likely), predicted);
+            }
+        }
+    }
+
+    fn view(&self, field: &StarField) -> View<'_> {
+        View {
+            camera: &self.camera,
+            icrs_to_camera: &self.icrs_to_camera,
+            years_since_j2000: field.years_since_j2000,
+        }
+    }
+
+    /// The same stars where this hypothesis puts them.
+    pub fn predict_again(&self, predicted: &mut [PredictedStar]) {
+        for stars in predicted.chunks_mut(LANES) {
+            let mut directions = [UnitVector::BORESIGHT; LANES];
+            for (direction, star) in directions.iter_mut().zip(&*stars) {
+                *direction = self.icrs_to_camera.apply(&star.direction);
+            }
+            for (star, pixel) in stars.iter_mut().zip(self.camera.pixels_of(&directions)) {
+                star.pixel = pixel.unwrap_or(star.pixel);
+            }
+        }
+    }
+
+    /// The density of so many stars in the frame.
+    fn per_sq_deg(&self, count: usize) -> f64 {
+        count as f64 * RAD_PER_DEG.powi(2) / (self.camera.fov_x_rad() * self.camera.fov_y_rad())
+    }
+
+    /// The difference in brightness in units of what is tolerated; `None` if it is more. No star is too bright for a
+    /// saturated one.
+    pub fn mag_difference(
+        &self,
+        observed: &ObservedStar,
+        predicted: &PredictedStar,
+        photometry: Photometry,
+    ) -> Option<f64> {
+        let difference = f64::from(predicted.v_mag) - observed.mag - self.zero_point_mag;
+        if observed.is_saturated && difference < 0.0 {
+            return Some(0.0);
+        }
+        let relative = difference.abs() / photometry.tolerance_mag();
+        (relative <= 1.0).then_some(relative)
+    }
+
+    /// The part of `predicted`, the brightest first, whose stars are as bright as `star` within a tolerance.
+    pub fn alike(
+        &self,
+        star: &ObservedStar,
+        predicted: &[PredictedStar],
+        tolerance_mag: f64,
+    ) -> Range<usize> {
+        let v_mag = star.mag + self.zero_point_mag;
+        let v_mag_of = |p: &PredictedStar| f64::from(p.v_mag);
+        let from = predicted.partition_point(|p| v_mag_of(p) < v_mag - tolerance_mag);
+        let to = predicted.partition_point(|p| v_mag_of(p) <= v_mag + tolerance_mag);
+        from..to
+    }
+}

@@ -1,0 +1,80 @@
+//! The result of identification.
+
+use super::field::SourceIndex;
+use crate::base::coords::{Camera, Icrs, Rotation};
+use crate::camera::CameraModel;
+use crate::sky::catalog::StarIndex;
+use nalgebra::Matrix3;
+
+/// Fewest stars that can be identified: a triangle, and one star that confirms it.
+pub const MIN_STARS: usize = 4;
+
+/// An identified star field.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identification {
+    /// The camera's geometry: pixel to direction.
+    pub camera: CameraModel,
+    /// The attitude.
+    pub icrs_to_camera: Rotation<Icrs, Camera>,
+    /// Covariance of the attitude error, as small rotations about the camera's x, y and z axes, in rad².
+    pub attitude_covariance_rad2: Matrix3<f64>,
+    /// Standard error of the focal length, in pixels.
+    pub focal_length_sigma_px: f64,
+    /// The identified stars, in the order of the observed stars.
+    pub matches: Vec<StarMatch>,
+    /// Root mean square of the residuals, in pixels.
+    pub rms_px: f64,
+    /// log10 of the false-alarm probability: that chance gives as good an answer, counting all hypotheses
+    /// tried.
+    pub log10_false_alarm: f64,
+}
+
+impl Identification {
+    /// Standard errors of the attitude about the camera's x, y and z axes, in radians.
+    pub fn attitude_sigma_rad(&self) -> [f64; 3] {
+        self.attitude_covariance_rad2
+            .diagonal()
+            .map(f64::sqrt)
+            .into()
+    }
+}
+
+/// An observed star and the catalogue star that it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StarMatch {
+    /// The observed star.
+    pub source: SourceIndex,
+    /// The catalogue star.
+    pub star: StarIndex,
+    /// Distance in pixels between the observed position and the predicted one: that of the star, or of the
+    /// light of all stars blended with it.
+    pub residual_px: f64,
+}
+
+/// Why the search identified no stars.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum SearchFailure {
+    /// Fewer stars than identification needs.
+    TooFewStars {
+        /// Stars found.
+        found: usize,
+        /// Stars needed.
+        needed: usize,
+    },
+    /// No hypothesis reached the required false-alarm probability.
+    NoMatch {
+        /// log10 of the false-alarm probability of the best hypothesis, if there was one.
+        best_log10_false_alarm: Option<f64>,
+    },
+}
+
+impl SearchFailure {
+    /// Code for programs.
+    pub const fn code(&self) -> &'static str {
+        match self {
+            Self::TooFewStars { .. } => "too_few_stars",
+            Self::NoMatch { .. } => "no_match",
+        }
+    }
+}

@@ -1,0 +1,287 @@
+//! Pairs observed stars with predicted ones by place and brightness.
+
+use super::field::ObservedStar;
+use super::predict::PredictedStar;
+use crate::base::coords::{Icrs, PixelPoint, UnitVector};
+use crate::sky::catalog::StarIndex;
+
+/// Strips that a frame's predicted stars are sorted into.
+const STRIPS: usize = 512;
+
+/// An observed star and the catalogue star that it may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pair {
+    /// Position in [`StarField::stars`](super::field::StarField::stars).
+    pub observed: usize,
+    /// The catalogue star.
+    pub star: StarIndex,
+    /// V magnitude of the catalogue.
+    pub v_mag: f32,
+    /// Direction of its light, at the date of the frame.
+    pub direction: UnitVector<Icrs>,
+    /// Distance between the observed and the predicted position, in pixels.
+    pub residual_px: f64,
+}
+
+/// Largest distance of a pair.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Radius {
+    /// For every pair, in pixels.
+    pub common_px: f64,
+    /// For a star with a large error: this many times that error, ...
+    pub sigmas: f64,
+    /// ... to which this one, in pixels, is added in quadrature, ...
+    pub excess_sigma_px: f64,
+    /// ... but at most this many times the common radius.
+    pub at_most: f64,
+}
+
+impl Radius {
+    /// The same for all stars.
+    pub fn common(radius_px: f64) -> Self {
+        Self {
+            common_px: radius_px,
+            sigmas: 0.0,
+            excess_sigma_px: 0.0,
+            at_most: 1.0,
+        }
+    }
+
+    /// The radius for one star, in pixels.
+    fn of(&self, star: &ObservedStar) -> f64 {
+        let own_px = self.sigmas * star.sigma_px.hypot(self.excess_sigma_px);
+        own_px
+            .min(self.at_most * self.common_px)
+            .max(self.common_px)
+    }
+}
+
+/// Pairs observed and predicted stars. Its buffers are reused.
+#[derive(Debug, Default)]
+pub struct Pairing {
+    /// The predicted stars sorted into strips along x, and the start of each strip.
+    by_strip: Vec<(PixelPoint, usize)>,
+    starts: Vec<usize>,
+    candidates: Vec<Candidate>,
+    of_observed: Vec<Claim>,
+    of_predicted: Vec<u32>,
+}
+
+/// Two stars that may be a pair.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    /// Distance in position and brightness, dimensionless.
+    distance: f64,
+    observed: usize,
+    predicted: usize,
+}
+
+/// The candidates of one observed star.
+#[derive(Debug, Clone, Copy, Default)]
+struct Claim {
+    candidates: u32,
+    predicted: Option<usize>,
+}
+
+impl Pairing {
+    /// Fills `pairs` with the stars that lie within `radius` of each other and have a `mag_difference`, each star
+    /// once, closest pairs in position and brightness first. The result is in the order of the observed stars.
+    pub fn pair_up(
+        &mut self,
+        (observed, predicted): (&[ObservedStar], &[PredictedStar]),
+        radius: &Radius,
+        mag_difference: impl Fn(&ObservedStar, &PredictedStar) -> Option<f64>,
+        pairs: &mut Vec<Pair>,
+    ) {
+        self.find_candidates((observed, predicted), radius, mag_difference);
+        self.settle();
+        pairs.clear();
+        let claims = observed.iter().zip(&self.of_observed).enumerate();
+        pairs.extend(claims.filter_map(|(index, (star, claim))| {
+            let found = &predicted[claim.predicted?];
+            Some(Pair {
+                observed: index,
+                star: found.star,
+                v_mag: found.v_mag,
+                direction: found.direction,
+                residual_px: found.pixel.distance_to(&star.position),
+            })
+        }));
+    }
+
+    /// Finds all candidates.
+    fn find_candidates(
+        &mut self,
+        (observed, predicted): (&[ObservedStar], &[PredictedStar]),
+        radius: &Radius,
+        mag_difference: impl Fn(&ObservedStar, &PredictedStar) -> Option<f64>,
+    ) {
+        let strips = Strips::over(predicted);
+        self.sort_into(&strips, predicted);
+        self.candidates.clear();
+        self.of_observed.clear();
+        self.of_observed.resize(observed.len(), Claim::default());
+        self.of_predicted.clear();
+        self.of_predicted.resize(predicted.len(), 0);
+        for (o, star) in observed.iter().enumerate() {
+            let radius_px = radius.of(star);
+            let x = star.position.x;
+            let (first, last) = (strips.of(x - radius_px), strips.of(x + radius_px));
+            for &(pixel, p) in &self.by_strip[self.starts[first]..self.starts[last + 1]] {
+                let distance_px = pixel.distance_to(&star.position);
+                if distance_px <= radius_px
+                    && let Some(difference) = mag_difference(star, &predicted[p])
+                {
+                    // In pixels, not in errors: a star with a large error takes no partner from one with a small error.
+                    let apart = distance_px / radius.common_px;
+                    self.candidates.push(Candidate {
+                        distance: apart * apart + difference * difference,
+                        observed: o,
+                        predicted: p,
+                    });
+                    self.of_observed[o].candidates += 1;
+                    self.of_predicted[p] += 1;
+                }
+            }
+        }
+    }
+
+    /// Counting sort of the predicted stars by strip.
+    fn sort_into(&mut self, strips: &Strips, predicted: &[PredictedStar]) {
+        self.starts.clear();
+        self.starts.resize(STRIPS + 1, 0);
+        for star in predicted {
+            self.starts[strips.of(star.pixel.x)] += 1;
+        }
+        let mut end = 0;
+        for start in &mut self.starts {
+            end += *start;
+            *start = end;
+        }
+        self.by_strip.clear();
+        self.by_strip
+            .resize(predicted.len(), (PixelPoint::new(0.0, 0.0), 0));
+        for (p, star) in predicted.iter().enumerate() {
+            let start = &mut self.starts[strips.of(star.pixel.x)];
+            *start -= 1;
+            self.by_strip[*start] = (star.pixel, p);
+        }
+    }
+
+    /// Pairs the stars that have one candidate only, then the others, closest first.
+    fn settle(&mut self) {
+        let Self {
+            candidates,
+            of_observed,
+            of_predicted,
+            ..
+        } = self;
+        candidates.retain(|pair| {
+            let is_only =
+                of_observed[pair.observed].candidates == 1 && of_predicted[pair.predicted] == 1;
+            if is_only {
+                of_observed[pair.observed].predicted = Some(pair.predicted);
+            }
+            !is_only
+        });
+        candidates.sort_unstable_by(|a, b| {
+            let order = a.distance.total_cmp(&b.distance);
+            order.then((a.observed, a.predicted).cmp(&(b.observed, b.predicted)))
+        });
+        for pair in candidates {
+            let (claim, claimed) = (
+                &mut of_observed[pair.observed].predicted,
+                &mut of_predicted[pair.predicted],
+            );
+            if claim.is_none() && *claimed > 0 {
+                *claim = Some(pair.predicted);
+                *claimed = 0;
+            }
+        }
+    }
+}
+
+/// Strips of equal width between the smallest and the largest x of some stars.
+struct Strips {
+    from_px: f64,
+    per_px: f64,
+}
+
+impl Strips {
+    fn over(predicted: &[PredictedStar]) -> Self {
+        let x = || predicted.iter().map(|star| star.pixel.x);
+        let (low, high) = (x().fold(f64::MAX, f64::min), x().fold(f64::MIN, f64::max));
+        Self {
+            from_px: low,
+            per_px: STRIPS as f64 / (high - low).max(1.0),
+        }
+    }
+
+    fn of(&self, x: f64) -> usize {
+        (((x - self.from_px) * self.per_px).max(0.0) as usize).min(STRIPS - 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::neighbors::PointTree;
+    use crate::identify::SourceIndex;
+    use proptest::prelude::*;
+
+    fn observed_at((x, y): (f64, f64)) -> ObservedStar {
+        ObservedStar {
+            source: SourceIndex::new(0),
+            position: PixelPoint::new(x, y),
+            sigma_px: 0.1,
+            mag: 0.0,
+            is_saturated: false,
+        }
+    }
+
+    fn predicted_at((x, y): (f64, f64)) -> PredictedStar {
+        PredictedStar {
+            pixel: PixelPoint::new(x, y),
+            direction: UnitVector::from_ra_dec(0.0, 0.0),
+            v_mag: 0.0,
+            star: StarIndex::new(x.max(0.0) as usize),
+        }
+    }
+
+    #[test]
+    fn each_star_is_paired_once_with_its_closest() {
+        let observed = [(10.0, 10.0), (13.0, 10.0), (50.0, 50.0)].map(observed_at);
+        let predicted = [(12.5, 10.0), (10.0, 11.0), (90.0, 50.0)].map(predicted_at);
+        let mut pairs = Vec::new();
+        let stars = (&observed[..], &predicted[..]);
+        Pairing::default().pair_up(stars, &Radius::common(4.0), |_, _| Some(0.0), &mut pairs);
+        let found: Vec<(usize, usize)> = pairs.iter().map(|p| (p.observed, p.star.get())).collect();
+        assert_eq!(found, [(0, 10), (1, 12)]);
+    }
+
+    proptest! {
+        #[test]
+        fn close_pairs_are_those_that_a_k_d_tree_finds(
+            observed in prop::collection::vec((0.0..900.0f64, 0.0..700.0f64), 0..60),
+            predicted in prop::collection::vec((-50.0..950.0f64, -50.0..750.0f64), 0..200),
+            radius_px in 0.5..80.0f64,
+        ) {
+            let observed: Vec<_> = observed.into_iter().map(observed_at).collect();
+            let predicted: Vec<_> = predicted.into_iter().map(predicted_at).collect();
+            let mut pairing = Pairing::default();
+            let stars = (&observed[..], &predicted[..]);
+            pairing.find_candidates(stars, &Radius::common(radius_px), |_, _| Some(0.0));
+            let mut found: Vec<_> =
+                pairing.candidates.iter().map(|c| (c.observed, c.predicted)).collect();
+            found.sort_unstable();
+            let tree = PointTree::new(predicted.iter().map(|star| star.pixel));
+            let mut expected = Vec::new();
+            for (o, star) in observed.iter().enumerate() {
+                let near = tree.within(&star.position, radius_px);
+                expected.extend(near.iter().map(|near| (o, near.index)));
+            }
+            expected.sort_unstable();
+            prop_assert_eq!(found, expected);
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! Priors: what is known of a frame before its stars are identified.
+
+use crate::base::coords::{Icrs, UnitVector};
+use crate::base::epoch::ObservationDate;
+use crate::base::units::RAD_PER_DEG;
+use crate::camera::{self, data_sheet::Sensor};
+use crate::sky::observer::Site;
+use serde::Serialize;
+
+/// What is known of a frame beforehand; by default nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Priors {
+    /// The camera's scale.
+    pub scale: Option<ScalePrior>,
+    /// The boresight lies in this region of the sky.
+    pub near: Option<SkyRegion>,
+    /// When the frame was taken.
+    pub date: Option<FrameDate>,
+    /// Where it was taken.
+    pub site: Option<Site>,
+    /// Exposure time, in seconds.
+    pub exposure_s: Option<f64>,
+}
+
+/// A circle on the sky.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SkyRegion {
+    /// Its centre.
+    pub centre: UnitVector<Icrs>,
+    /// Its radius, in radians.
+    pub radius_rad: f64,
+}
+
+/// The camera's scale with a tolerance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScalePrior {
+    /// The scale.
+    pub scale: Scale,
+    /// Fraction by which the true scale may be larger or smaller, in (0, 1).
+    pub tolerance: f64,
+    /// Who states it.
+    pub source: ScaleSource,
+}
+
+/// A camera's scale, in one of the two usual forms.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Scale {
+    /// Horizontal field of view, in radians.
+    FieldOfView(f64),
+    /// Pixel scale at the frame's centre, in radians.
+    Pixel(f64),
+}
+
+/// Who states a scale, and so how far it can be trusted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ScaleSource {
+    /// The user: a hard constraint.
+    User,
+    /// A camera's data sheet: tried first, and dropped where nothing matches with it.
+    Camera,
+    /// The frame's header: tried first, and dropped where nothing matches with it.
+    Header,
+}
+
+/// When a frame was taken, and who states it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameDate {
+    /// The date.
+    pub date: ObservationDate,
+    /// Its source.
+    pub source: DateSource,
+}
+
+/// Source of a frame's date.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum DateSource {
+    /// The user.
+    #[serde(rename = "option")]
+    Option,
+    /// The header of the frame's file.
+    #[serde(rename = "file header")]
+    FileHeader,
+    /// The name of the frame's file.
+    #[serde(rename = "file name")]
+    FileName,
+}
+
+/// Widest field of view that has a pinhole scale, in radians.
+const MAX_FOV_RAD: f64 = 179.0 * RAD_PER_DEG;
+/// Tolerance of the scale that a header or a data sheet gives: focal lengths are nominal. A focal reducer or
+/// binning that it does not mention changes the scale by more.
+const NOMINAL_TOLERANCE: f64 = 0.2;
+
+impl ScalePrior {
+    /// The user's `scale`, a hard constraint.
+    pub const fn by_user(scale: Scale, tolerance: f64) -> Self {
+        Self {
+            scale,
+            tolerance,
+            source: ScaleSource::User,
+        }
+    }
+
+    /// A hard constraint: a pixel scale from `low_rad` to `high_rad`.
+    pub fn between(low_rad: f64, high_rad: f64) -> Self {
+        let middle_rad = (low_rad + high_rad) / 2.0;
+        let tolerance = (high_rad - low_rad) / (high_rad + low_rad);
+        Self::by_user(Scale::Pixel(middle_rad), tolerance)
+    }
+
+    /// The scale of a camera by its data sheet.
+    pub fn of_camera(sensor: &Sensor) -> Self {
+        Self {
+            scale: Scale::Pixel(sensor.pixel_scale_rad()),
+            tolerance: NOMINAL_TOLERANCE,
+            source: ScaleSource::Camera,
+        }
+    }
+
+    /// The pixel scale, in radians, that a frame's header gives.
+    pub const fn of_header(pixel_scale_rad: f64) -> Self {
+        Self {
+            scale: Scale::Pixel(pixel_scale_rad),
+            tolerance: NOMINAL_TOLERANCE,
+            source: ScaleSource::Header,
+        }
+    }
+
+    /// Whether stars may be identified only with this scale.
+    pub fn is_binding(&self) -> bool {
+        self.source == ScaleSource::User
+    }
+
+    /// Smallest and largest pixel scale at the centre of a frame of this width, in radians.
+    pub fn pixel_scale_range_rad(&self, width_px: f64) -> (f64, f64) {
+        let pixel_rad = |factor: f64| match self.scale {
+            Scale::FieldOfView(fov_rad) => {
+                let fov_rad = (fov_rad * factor).min(MAX_FOV_RAD);
+                1.0 / camera::focal_length_px(width_px, fov_rad)
+            }
+            Scale::Pixel(pixel_rad) => pixel_rad * factor,
+        };
+        (
+            pixel_rad(1.0 - self.tolerance),
+            pixel_rad(1.0 + self.tolerance),
+        )
+    }
+}
+
+impl Priors {
+    /// Adds a date, unless one is known.
+    pub fn or_date(self, date: Option<ObservationDate>, source: DateSource) -> Self {
+        let other = date.map(|date| FrameDate { date, source });
+        Self {
+            date: self.date.or(other),
+            ..self
+        }
+    }
+
+    /// Julian years from J2000.0 to the frame's date; 0 where that is unknown.
+    pub fn years_since_j2000(&self) -> f64 {
+        self.date
+            .map_or(0.0, |known| known.date.years_since_j2000())
+    }
+
+    /// Smallest and largest pixel scale at the centre of a frame of this width, in radians, if known.
+    pub fn pixel_scale_range_rad(&self, width_px: f64) -> Option<(f64, f64)> {
+        Some(self.scale?.pixel_scale_range_rad(width_px))
+    }
+
+    /// Whether they restrict the search for the stars.
+    pub fn restrict_search(&self) -> bool {
+        self.scale.is_some() || self.near.is_some()
+    }
+
+    /// The same without a scale that is only tried first.
+    pub fn binding(&self) -> Self {
+        Self {
+            scale: self.scale.filter(ScalePrior::is_binding),
+            ..*self
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::units::RAD_PER_ARCSEC;
+
+    #[test]
+    fn a_field_of_view_and_its_pixel_scale_are_the_same_prior() {
+        let width_px = 1000.0;
+        let prior = ScalePrior::by_user(Scale::FieldOfView(10.0 * RAD_PER_DEG), 0.1);
+        let (low, high) = prior.pixel_scale_range_rad(width_px);
+        let expected = |fov_deg: f64| 2.0 * (fov_deg / 2.0 * RAD_PER_DEG).tan() / width_px;
+        assert!((low - expected(9.0)).abs() < 1e-12);
+        assert!((high - expected(11.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_pixel_scale_widens_by_its_tolerance() {
+        let prior = ScalePrior::by_user(Scale::Pixel(10.0 * RAD_PER_ARCSEC), 0.2);
+        let (low, high) = prior.pixel_scale_range_rad(123.0);
+        assert!((low / RAD_PER_ARCSEC - 8.0).abs() < 1e-9);
+        assert!((high / RAD_PER_ARCSEC - 12.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_range_of_scales_is_kept() {
+        let (low, high) = ScalePrior::between(1e-5, 4e-5).pixel_scale_range_rad(9.0);
+        assert!((low - 1e-5).abs() < 1e-18 && (high - 4e-5).abs() < 1e-18);
+    }
+
+    #[test]
+    fn the_widest_field_of_view_has_a_finite_scale() {
+        let prior = ScalePrior::by_user(Scale::FieldOfView(170.0 * RAD_PER_DEG), 0.5);
+        let (low, high) = prior.pixel_scale_range_rad(500.0);
+        assert!(low > 0.0 && high > low && high.is_finite());
+    }
+}

@@ -1,0 +1,92 @@
+//! Lists of centroids, and their identification.
+
+use super::context::Context;
+use super::identification::{identified, observation};
+use super::note::Note;
+use super::solution::{Solution, Source};
+use super::stopwatch::{Stage, Stopwatch};
+use crate::base::coords::PixelPoint;
+use crate::identify::{self, ObservedStar, Photometry, SourceIndex, StarField};
+
+/// Standard error assumed on each axis of a listed centroid, in pixels.
+pub const LISTED_SIGMA_PX: f64 = 0.5;
+
+/// A list of centroids.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CentroidList {
+    /// Columns of the frame that they come from.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// What the magnitudes are.
+    pub photometry: Photometry,
+    /// The centroids, in any order.
+    pub centroids: Vec<ListedCentroid>,
+}
+
+/// One line of a list of centroids.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ListedCentroid {
+    /// The position.
+    pub position: PixelPoint,
+    /// Brightness in magnitudes, see [`CentroidList::photometry`].
+    pub mag: f64,
+    /// Flux, if the list gives it.
+    pub flux: Option<f64>,
+}
+
+impl CentroidList {
+    /// The star field of a list that is sorted by brightness, observed this many Julian years after J2000.0.
+    pub fn star_field(&self, years_since_j2000: f64) -> StarField {
+        let observed = |(line, centroid): (usize, &ListedCentroid)| ObservedStar {
+            source: SourceIndex::new(line),
+            position: centroid.position,
+            sigma_px: LISTED_SIGMA_PX,
+            mag: centroid.mag,
+            is_saturated: false,
+        };
+        StarField {
+            width_px: self.width as f64,
+            height_px: self.height as f64,
+            photometry: self.photometry,
+            years_since_j2000,
+            spot_sigma_px: None,
+            stars: self.centroids.iter().enumerate().map(observed).collect(),
+        }
+    }
+}
+
+/// Identifies the stars of a list of centroids. Every prior is a hard constraint.
+pub fn solve_centroids(list: &CentroidList, context: &Context) -> Solution {
+    let mut clock = Stopwatch::start();
+    let priors = &context.priors;
+    let mut list = list.clone();
+    list.centroids.sort_by(|a, b| a.mag.total_cmp(&b.mag));
+    let field = list.star_field(priors.years_since_j2000());
+    let found = identify::identify(&field, priors, context.sky);
+    let outcome = identified(found, None, &field, priors, context.sky);
+    let observation = observation(&outcome, priors);
+    clock.lap(Stage::Identify);
+    let source = |centroid: &ListedCentroid| Source {
+        position: centroid.position,
+        measured: None,
+        flux: centroid.flux,
+    };
+    let note = Note::of_observation(observation.as_ref(), priors, &outcome);
+    Solution {
+        width: list.width,
+        height: list.height,
+        date: priors.date,
+        notes: note.into_iter().collect(),
+        observation,
+        exposure_s: priors.exposure_s,
+        sources: list.centroids.iter().map(source).collect(),
+        background: None,
+        outcome,
+        photometry: None,
+        comparison: None,
+        gain_e_per_adu: None,
+        calibration: None,
+        timing: clock.timing(),
+    }
+}

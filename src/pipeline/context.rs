@@ -1,0 +1,120 @@
+//! What the stages need and what does not change from frame to frame.
+
+use crate::base::epoch::ObservationDate;
+use crate::calibration::Calibration;
+use crate::detect::{self, DetectConfig};
+use crate::frame::{self, Frame};
+use crate::identify::{self, DateSource, IndexedCatalog, Priors, ScalePrior};
+use crate::photometry::comparison::StatedCamera;
+use std::path::Path;
+
+/// What the stages need and what does not change from frame to frame.
+#[derive(Clone)]
+pub struct Context<'a> {
+    /// The catalogue's stars and their triangles.
+    pub sky: &'a IndexedCatalog<'a>,
+    /// How to detect stars.
+    pub detect: DetectConfig,
+    /// What is known of every frame beforehand.
+    pub priors: Priors,
+    /// The camera with which frames are compared.
+    pub camera: Option<StatedCamera>,
+    /// The calibration of frames that are read from files.
+    pub calibration: Option<&'a Calibration>,
+}
+
+impl<'a> Context<'a> {
+    /// Default detection, nothing known beforehand, no camera and no calibration.
+    pub fn new(sky: &'a IndexedCatalog<'a>) -> Self {
+        Self {
+            sky,
+            detect: DetectConfig::default(),
+            priors: Priors::default(),
+            camera: None,
+            calibration: None,
+        }
+    }
+
+    /// The priors of one frame: those of every frame, completed from the camera's data sheet, the frame's
+    /// header and the file's name.
+    pub(super) fn priors_of(&self, frame: &Frame, name: Option<&Path>) -> Priors {
+        let header = &frame.metadata;
+        let camera_scale = self.camera.as_ref().map(|camera| &camera.sensor);
+        let header_scale = header.pixel_scale_rad().map(ScalePrior::of_header);
+        let priors = self
+            .priors
+            .or_date(header.date, DateSource::FileHeader)
+            .or_date(
+                name.and_then(ObservationDate::in_file_name),
+                DateSource::FileName,
+            );
+        Priors {
+            scale: priors
+                .scale
+                .or(camera_scale.map(ScalePrior::of_camera))
+                .or(header_scale),
+            site: priors.site.or(header.site),
+            exposure_s: priors.exposure_s.or(header.exposure_s),
+            ..priors
+        }
+    }
+
+    /// How to detect stars in one frame: pixels at the stated camera's full well are saturated.
+    pub(super) fn detect_config(&self, frame: &Frame) -> DetectConfig {
+        let camera = self.camera.as_ref();
+        DetectConfig {
+            saturation_adu: camera
+                .and_then(|camera| saturation_adu(camera, frame))
+                .or(self.detect.saturation_adu),
+            ..self.detect.clone()
+        }
+    }
+}
+
+/// The level from which on the camera's pixels are saturated. `None` where the frame's levels exceed the
+/// camera's full scale: files may hold the levels of few bits multiplied.
+fn saturation_adu(camera: &StatedCamera, frame: &Frame) -> Option<f64> {
+    let sensor = &camera.sensor;
+    let full_scale_adu = sensor.full_scale_adu() as f32;
+    let is_beyond = |pixel: &f32| *pixel > full_scale_adu;
+    (!frame.pixels.iter().any(is_beyond)).then(|| sensor.saturation_adu())
+}
+
+/// Buffers of the stages, reused from frame to frame. One for each thread.
+#[derive(Default)]
+pub struct Workspace {
+    /// For reading.
+    pub frames: frame::Buffers,
+    /// For detection.
+    pub detect: detect::Workspace,
+    /// For identification.
+    pub identify: identify::Workspace,
+}
+
+impl Workspace {
+    /// Empty buffers.
+    pub fn new() -> Self {
+        Self::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::data_sheet::Preset;
+
+    #[test]
+    fn full_well_counts_where_the_levels_can_be_the_cameras() {
+        let camera = StatedCamera {
+            sensor: Preset::Experiment1.sensor(),
+            zenith_distance_deg: None,
+            extinction: None,
+        };
+        let frame = |highest: f32| Frame::new(3, 3, vec![highest; 9]).unwrap();
+        let full_adu = camera.sensor.saturation_adu();
+        assert!(full_adu < 4095.0);
+        assert_eq!(saturation_adu(&camera, &frame(4095.0)), Some(full_adu));
+        // Twelve bits at the upper end of sixteen.
+        assert_eq!(saturation_adu(&camera, &frame(4096.0)), None);
+    }
+}

@@ -1,0 +1,96 @@
+//! Identification of a frame's stars, with priors that may be wrong, and the reason where it fails.
+
+use super::solution::{Outcome, Reason};
+use crate::detect::Detections;
+use crate::frame::Frame;
+use crate::identify::diagnosis::{Unidentified, diagnose};
+use crate::identify::{
+    Identification, IndexedCatalog, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Photometry, Priors,
+    ScalePrior, SearchFailure, SourceIndex, StarField, Workspace,
+};
+use crate::photometry::instrumental_mag;
+use crate::sky::observer::Observation;
+
+/// The detections that may be stars, as identification takes them.
+pub fn star_field(frame: &Frame, detections: &Detections, years_since_j2000: f64) -> StarField {
+    let sources = detections.sources.iter().enumerate();
+    let stars = sources
+        .filter(|(_, source)| source.flags.is_star_like() && source.flux_adu > 0.0)
+        .map(|(index, source)| {
+            let variance_px2 = (source.sigma_x_px.powi(2) + source.sigma_y_px.powi(2)) / 2.0;
+            ObservedStar {
+                source: SourceIndex::new(index),
+                position: source.position,
+                sigma_px: variance_px2.sqrt(),
+                mag: instrumental_mag(source.flux_adu),
+                is_saturated: source.flags.saturated,
+            }
+        });
+    StarField {
+        width_px: frame.width as f64,
+        height_px: frame.height as f64,
+        photometry: Photometry::Instrumental,
+        years_since_j2000,
+        spot_sigma_px: Some(detections.spot_sigma_px),
+        stars: stars.collect(),
+    }
+}
+
+/// Result of the search, and the scale that was dropped because nothing matched with it.
+pub(super) type Searched = (Result<Identification, SearchFailure>, Option<ScalePrior>);
+
+/// Identifies `field`. A scale that is not the user's is tried first and dropped where nothing matches with it.
+pub(super) fn search(
+    field: &StarField,
+    priors: &Priors,
+    sky: &IndexedCatalog,
+    workspace: &mut Workspace,
+) -> Searched {
+    let first = workspace.identify(field, priors, sky).cloned();
+    let tentative = priors.scale.filter(|scale| !scale.is_binding());
+    let (Err(failure), Some(scale)) = (&first, tentative) else {
+        return (first, None);
+    };
+    let second = workspace.identify(field, &priors.binding(), sky).cloned();
+    match second.map(at_second_attempt) {
+        Ok(Some(found)) => (Ok(found), Some(scale)),
+        Ok(None) => (Err(*failure), None),
+        Err(failure) => (Err(failure), None),
+    }
+}
+
+/// An identification at the second attempt, where it is still sure. Chance had at most twice the opportunity:
+/// all that the first attempt can have tried is tried again.
+fn at_second_attempt(mut found: Identification) -> Option<Identification> {
+    found.log10_false_alarm += std::f64::consts::LOG10_2;
+    (found.log10_false_alarm <= LOG10_FALSE_ALARM_LIMIT).then_some(found)
+}
+
+/// The outcome: where nothing is identified, with the reason that explains it best.
+pub(super) fn identified(
+    found: Result<Identification, SearchFailure>,
+    image: Option<(&Frame, &Detections)>,
+    field: &StarField,
+    priors: &Priors,
+    sky: &IndexedCatalog,
+) -> Outcome {
+    let failure = match found {
+        Ok(found) => return Outcome::Identified(Box::new(found)),
+        Err(failure) => failure,
+    };
+    let case = Unidentified {
+        image,
+        field,
+        priors,
+        failure,
+    };
+    let cause = diagnose(&case, sky);
+    Outcome::NotIdentified(cause.map_or(Reason::Search(failure), Reason::Diagnosis))
+}
+
+/// The frame's centre in the observer's sky, where the frame is identified and site and date are known.
+pub(super) fn observation(outcome: &Outcome, priors: &Priors) -> Option<Observation> {
+    let found = outcome.identification()?;
+    let (boresight, _) = found.icrs_to_camera.boresight_and_up();
+    Observation::new(priors.site?, &priors.date?.date, &boresight)
+}

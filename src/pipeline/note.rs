@@ -1,0 +1,147 @@
+//! Notes: what is odd about a frame, its header, or the priors.
+
+use super::solution::Outcome;
+use crate::base::statistics::Estimate;
+use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
+use crate::calibration::ExposureMismatch;
+use crate::frame::IgnoredValue;
+use crate::identify::{Priors, ScalePrior, ScaleSource};
+use crate::photometry::FramePhotometry;
+use crate::photometry::comparison::{Comparison, Contradiction, StatedCamera};
+use crate::sky::observer::Observation;
+use std::fmt;
+
+/// One note about a frame. `Display` gives the sentence, [`code`](Self::code) a stable name.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Note {
+    /// A value in the header is not used.
+    IgnoredHeader(IgnoredValue),
+    /// The scale in the header is not that of the frame.
+    WrongHeaderScale {
+        /// Smallest and largest pixel scale that the header allows, in radians.
+        pixel_scale_rad: (f64, f64),
+    },
+    /// Site, date and attitude contradict each other: the centre was below the horizon.
+    BelowHorizon {
+        /// How far below, in radians.
+        depth_rad: f64,
+    },
+    /// The site is known but not the time of day, so there is no zenith distance.
+    NoTimeOfDay,
+    /// The exposure is unknown, so nothing can be predicted for the stated camera.
+    NoExposure,
+    /// The frame contradicts the stated camera.
+    Camera(Contradiction),
+    /// Grey levels are not proportional to light.
+    NotLinear {
+        /// Magnitudes in the frame for one magnitude of the catalogue.
+        slope: Estimate,
+        /// V magnitude near which the zero point holds.
+        mean_v_mag: f64,
+    },
+    /// The dark has another exposure than the frame.
+    DarkExposure(ExposureMismatch),
+}
+
+impl Note {
+    /// Code for programs.
+    pub const fn code(&self) -> &'static str {
+        match self {
+            Self::IgnoredHeader(_) => "header_value_ignored",
+            Self::WrongHeaderScale { .. } => "header_scale_wrong",
+            Self::BelowHorizon { .. } => "below_horizon",
+            Self::NoTimeOfDay => "time_of_day_unknown",
+            Self::NoExposure => "exposure_unknown",
+            Self::Camera(contradiction) => contradiction.code(),
+            Self::NotLinear { .. } => "not_linear",
+            Self::DarkExposure(_) => "dark_exposure_differs",
+        }
+    }
+
+    /// A scale from the header that had to be dropped, where it is not the true one.
+    pub(super) fn of_scale(dropped: Option<ScalePrior>, outcome: &Outcome) -> Option<Self> {
+        let scale = dropped.filter(|scale| scale.source == ScaleSource::Header)?;
+        let found = outcome.identification()?;
+        let (low_rad, high_rad) = scale.pixel_scale_range_rad(found.camera.width_px);
+        let is_wrong = !(low_rad..=high_rad).contains(&(1.0 / found.camera.focal_length_px));
+        is_wrong.then_some(Self::WrongHeaderScale {
+            pixel_scale_rad: (low_rad, high_rad),
+        })
+    }
+
+    /// A contradiction between site, date and attitude, or what an observation lacks.
+    pub(super) fn of_observation(
+        observation: Option<&Observation>,
+        priors: &Priors,
+        outcome: &Outcome,
+    ) -> Option<Self> {
+        let Some(observation) = observation else {
+            let lacks_time = priors.site.is_some() && outcome.identification().is_some();
+            return lacks_time.then_some(Self::NoTimeOfDay);
+        };
+        observation.apparent.is_none().then(|| Self::BelowHorizon {
+            depth_rad: observation.zenith_distance_rad - std::f64::consts::FRAC_PI_2,
+        })
+    }
+
+    /// The contradictions with the stated camera, or why it was not compared.
+    pub(super) fn of_camera(
+        camera: Option<&StatedCamera>,
+        comparison: Option<&Comparison>,
+    ) -> Vec<Self> {
+        match (camera, comparison) {
+            (_, Some(found)) => found
+                .contradictions
+                .iter()
+                .copied()
+                .map(Self::Camera)
+                .collect(),
+            (Some(_), None) => vec![Self::NoExposure],
+            (None, None) => Vec::new(),
+        }
+    }
+
+    /// Grey levels that are not proportional to light.
+    pub(super) fn of_photometry(photometry: Option<&FramePhotometry>) -> Option<Self> {
+        let zero_point = photometry?.zero_point.filter(|zero| zero.is_nonlinear)?;
+        Some(Self::NotLinear {
+            slope: zero_point.linearity?,
+            mean_v_mag: zero_point.mean_v_mag,
+        })
+    }
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::IgnoredHeader(value) => value.fmt(f),
+            Self::WrongHeaderScale {
+                pixel_scale_rad: (low_rad, high_rad),
+            } => write!(
+                f,
+                "the header's focal length and pixel size are not this frame's: they mean {:.1}″ to {:.1}″ a pixel",
+                low_rad * ARCSEC_PER_RAD,
+                high_rad * ARCSEC_PER_RAD
+            ),
+            Self::BelowHorizon { depth_rad } => write!(
+                f,
+                "the site, the date and the attitude contradict each other: the frame's centre stands {:.1}° below the horizon",
+                depth_rad * DEG_PER_RAD
+            ),
+            Self::NoTimeOfDay => f.write_str(
+                "the time of day is not known, and so the site gives no zenith distance",
+            ),
+            Self::NoExposure => {
+                f.write_str("the exposure is not known, and so nothing is predicted of the camera")
+            }
+            Self::Camera(contradiction) => contradiction.fmt(f),
+            Self::NotLinear { slope, mean_v_mag } => write!(
+                f,
+                "the grey levels are not proportional to light: a magnitude is {:.2} ± {:.2} in this frame, and its zero point holds near V {mean_v_mag:.1} only",
+                slope.value, slope.sigma
+            ),
+            Self::DarkExposure(mismatch) => mismatch.fmt(f),
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! What was found in one frame, or in one list of centroids.
+
+use super::note::Note;
+use super::stopwatch::Timing;
+use crate::base::coords::PixelPoint;
+use crate::calibration::Applied;
+use crate::detect::{Detection, DetectionFlags};
+use crate::identify::diagnosis::Diagnosis;
+use crate::identify::{FrameDate, Identification, SearchFailure, SourceIndex};
+use crate::photometry::FramePhotometry;
+use crate::photometry::comparison::Comparison;
+use crate::sky::observer::Observation;
+
+/// What was found in one frame, or in one list of centroids.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// When the frame was taken, if known. Otherwise star positions are those of J2000.0.
+    pub date: Option<FrameDate>,
+    /// The frame's centre in the observer's sky, where the frame is identified, and site and time of day are
+    /// known.
+    pub observation: Option<Observation>,
+    /// Exposure time, in seconds, if known.
+    pub exposure_s: Option<f64>,
+    /// What is odd about the frame, its header, or the priors.
+    pub notes: Vec<Note>,
+    /// All sources, brightest first.
+    pub sources: Vec<Source>,
+    /// The sky background; a list of centroids has none.
+    pub background: Option<Background>,
+    /// The stars and the attitude, or why they were not found.
+    pub outcome: Outcome,
+    /// Zero point and limiting magnitude of an identified frame; a list of centroids has none.
+    pub photometry: Option<FramePhotometry>,
+    /// Comparison with the stated camera, where there is one and the exposure is known.
+    pub comparison: Option<Comparison>,
+    /// Gain of the stated camera, in electrons per ADU.
+    pub gain_e_per_adu: Option<f64>,
+    /// The calibration applied to the frame, if any.
+    pub calibration: Option<Applied>,
+    /// Time that each stage took.
+    pub timing: Timing,
+}
+
+impl Solution {
+    /// One source.
+    ///
+    /// # Panics
+    /// If `index` is of another solution and there is no such source.
+    pub fn source(&self, index: SourceIndex) -> &Source {
+        &self.sources[index.get()]
+    }
+}
+
+/// Whether the frame was identified.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// The stars are identified.
+    Identified(Box<Identification>),
+    /// They are not.
+    NotIdentified(Reason),
+}
+
+impl Outcome {
+    /// The identification, if there is one.
+    pub fn identification(&self) -> Option<&Identification> {
+        match self {
+            Self::Identified(found) => Some(found),
+            Self::NotIdentified(_) => None,
+        }
+    }
+}
+
+/// Why a frame was not identified: the cause that diagnosis names, else the failure of the search.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Reason {
+    /// The search failed, and nothing else explains it.
+    Search(SearchFailure),
+    /// A cause was found.
+    Diagnosis(Diagnosis),
+}
+
+impl Reason {
+    /// Code for programs.
+    pub const fn code(&self) -> &'static str {
+        match self {
+            Self::Search(failure) => failure.code(),
+            Self::Diagnosis(cause) => cause.code(),
+        }
+    }
+}
+
+/// One source: a detection, or a line of a centroid list.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Source {
+    /// Its centroid.
+    pub position: PixelPoint,
+    /// What only a detection has.
+    pub measured: Option<Measured>,
+    /// Flux above the background, in the frame's own units, if known.
+    pub flux: Option<f64>,
+}
+
+/// What only a detection has.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// Standard errors of the centroid in x and y, in pixels.
+    pub sigma_px: [f64; 2],
+    /// Brightest pixel above the background, in the frame's own units.
+    pub peak: f64,
+    /// Flux over its standard error.
+    pub snr: f64,
+    /// What is unusual about it.
+    pub flags: DetectionFlags,
+}
+
+impl From<&Detection> for Source {
+    fn from(detection: &Detection) -> Self {
+        Self {
+            position: detection.position,
+            measured: Some(Measured {
+                sigma_px: [detection.sigma_x_px, detection.sigma_y_px],
+                peak: detection.peak_adu,
+                snr: detection.snr,
+                flags: detection.flags,
+            }),
+            flux: Some(detection.flux_adu),
+        }
+    }
+}
+
+/// The sky background, in the frame's own units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Background {
+    /// Median level.
+    pub level_adu: f64,
+    /// Standard deviation of one pixel.
+    pub noise_adu: f64,
+}

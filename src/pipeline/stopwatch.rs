@@ -1,0 +1,71 @@
+//! Times the stages.
+
+use std::time::Instant;
+
+/// Time that each stage took, in milliseconds; 0 for a stage that was not needed.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Timing {
+    /// Reading, decoding and calibrating the frame.
+    pub read_ms: f64,
+    /// Detecting and measuring the sources.
+    pub detect_ms: f64,
+    /// Identifying the stars.
+    pub identify_ms: f64,
+    /// Photometry, and comparison with the stated camera.
+    pub photometry_ms: f64,
+    /// All of it.
+    pub total_ms: f64,
+}
+
+/// A stage that is timed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stage {
+    Read,
+    Detect,
+    Identify,
+    Photometry,
+}
+
+/// Times one frame from stage to stage.
+#[derive(Debug)]
+pub(super) struct Stopwatch {
+    start: Instant,
+    lap_start: Instant,
+    timing: Timing,
+}
+
+impl Stopwatch {
+    pub(super) fn start() -> Self {
+        let now = Instant::now();
+        Self {
+            start: now,
+            lap_start: now,
+            timing: Timing::default(),
+        }
+    }
+
+    /// Ends a stage; the next one begins.
+    pub(super) fn lap(&mut self, stage: Stage) {
+        let now = Instant::now();
+        let lap_ms = milliseconds(self.lap_start, now);
+        self.lap_start = now;
+        match stage {
+            Stage::Read => self.timing.read_ms = lap_ms,
+            Stage::Detect => self.timing.detect_ms = lap_ms,
+            Stage::Identify => self.timing.identify_ms = lap_ms,
+            Stage::Photometry => self.timing.photometry_ms = lap_ms,
+        }
+    }
+
+    /// The times of the stages, and the total until now.
+    pub(super) fn timing(&self) -> Timing {
+        Timing {
+            total_ms: milliseconds(self.start, Instant::now()),
+            ..self.timing
+        }
+    }
+}
+
+fn milliseconds(from: Instant, to: Instant) -> f64 {
+    to.duration_since(from).as_secs_f64() * 1e3
+}
