@@ -15,7 +15,7 @@ use std::hint::black_box;
 use std::path::Path;
 
 /// The frame, its stars, and a prior of its scale with a total range of a factor of two.
-fn prepare(path: &Path, sky: &IndexedCatalog) -> Option<(Frame, StarField, Priors)> {
+fn prepare(path: &Path, indexed: &IndexedCatalog) -> Option<(Frame, StarField, Priors)> {
     let frame = frame::read(path).ok()?;
     let detections = detect(
         &frame,
@@ -24,7 +24,7 @@ fn prepare(path: &Path, sky: &IndexedCatalog) -> Option<(Frame, StarField, Prior
     )
     .ok()?;
     let field = star_field(&frame, &detections, 0.0);
-    let identification = identify(&field, &Priors::default(), sky).ok()?;
+    let identification = identify(&field, &Priors::default(), indexed).ok()?;
     let scale_rad = 1.0 / identification.camera.focal_length_px;
     let priors = Priors {
         scale: Some(ScalePrior::between(scale_rad / SQRT_2, scale_rad * SQRT_2)),
@@ -42,8 +42,8 @@ fn bench_frames(criterion: &mut Criterion, cache: &Path) {
     let mut paths: Vec<_> = entries.flatten().map(|e| e.path()).collect();
     paths.retain(|p| p.extension().is_some_and(|e| e == "tiff"));
     paths.sort();
-    let sky = IndexedCatalog::open(Catalog::built_in(), Some(cache), &|_| ());
-    let prepared: Vec<_> = paths.iter().filter_map(|p| prepare(p, &sky)).collect();
+    let indexed = IndexedCatalog::open(Catalog::built_in(), Some(cache), &|_| ());
+    let prepared: Vec<_> = paths.iter().filter_map(|p| prepare(p, &indexed)).collect();
     for (path, (_, field, priors)) in paths.iter().zip(&prepared) {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         let mut group = criterion.benchmark_group("identify");
@@ -54,7 +54,7 @@ fn bench_frames(criterion: &mut Criterion, cache: &Path) {
             let mut workspace = identify::Workspace::new();
             group.bench_function(format!("{name}, {known}"), |bencher| {
                 bencher.iter(|| {
-                    let found = workspace.identify(black_box(field), priors, &sky);
+                    let found = workspace.identify(black_box(field), priors, &indexed);
                     black_box(found.is_ok())
                 });
             });
@@ -71,7 +71,7 @@ fn bench_frames(criterion: &mut Criterion, cache: &Path) {
             });
         });
     }
-    let context = Context::new(&sky);
+    let context = Context::new(&indexed);
     let mut workspace = Workspace::new();
     for (path, (frame, ..)) in paths.iter().zip(&prepared) {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();

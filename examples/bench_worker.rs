@@ -18,7 +18,7 @@ const ARCSEC_PER_RAD: f64 = 206_264.806;
 
 /// The stages that are timed, and their buffers.
 struct Bench<'a> {
-    sky: IndexedCatalog<'a>,
+    indexed: IndexedCatalog<'a>,
     fields_deg: (f64, f64),
     frame: Frame,
     detect: detect::Workspace,
@@ -59,7 +59,7 @@ impl Bench<'_> {
         let start = Instant::now();
         let detections = if is_fresh { &self.found } else { &self.known };
         let field = star_field(&self.frame, detections, 0.0);
-        let answer = self.identify.identify(&field, &priors, &self.sky);
+        let answer = self.identify.identify(&field, &priors, &self.indexed);
         (milliseconds(start), answer.ok())
     }
 
@@ -104,7 +104,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let range = std::env::args().nth(1).unwrap_or_default();
     let (from, to) = range.split_once(':').ok_or("usage: bench_worker FROM:TO")?;
     let mut bench = Bench {
-        sky: IndexedCatalog::build(Catalog::built_in(), &|_| {}),
+        indexed: IndexedCatalog::build(Catalog::built_in(), &|_| {}),
         fields_deg: (from.parse()?, to.parse()?),
         frame: Frame::new(3, 3, vec![0.0; 9])?,
         detect: detect::Workspace::new(),

@@ -49,13 +49,13 @@ impl Times {
         &mut self,
         field: &StarField,
         priors: &Priors,
-        sky: &IndexedCatalog,
+        indexed: &IndexedCatalog,
     ) -> Option<Identification> {
         let mut least_ms = f64::MAX;
         let mut found = None;
         for _ in 0..self.repeats.max(1) {
             let start = Instant::now();
-            let answer = self.workspace.identify(field, priors, sky);
+            let answer = self.workspace.identify(field, priors, indexed);
             least_ms = least_ms.min(start.elapsed().as_secs_f64() * 1e3);
             found = answer.ok().cloned();
         }
@@ -94,7 +94,7 @@ fn factor_of_two(camera: &CameraModel) -> Priors {
 }
 
 /// Fields of view, uniform in the logarithm.
-fn simulated(fields: u64, sky: &IndexedCatalog) {
+fn simulated(fields: u64, indexed: &IndexedCatalog) {
     if fields == 0 {
         return;
     }
@@ -107,13 +107,13 @@ fn simulated(fields: u64, sky: &IndexedCatalog) {
             ..Protocol::default()
         };
         let mut random = ChaCha8Rng::seed_from_u64(number);
-        let drawn = Observation::draw(&protocol, sky, &mut random);
+        let drawn = Observation::draw(&protocol, indexed, &mut random);
         let field = drawn.list.star_field(0.0);
         for (times, priors) in [
             (&mut nothing, Priors::default()),
             (&mut factor, factor_of_two(&drawn.camera)),
         ] {
-            if let Some(found) = times.add(&field, &priors, sky) {
+            if let Some(found) = times.add(&field, &priors, indexed) {
                 times.judge(Answer::of(&found, &drawn.camera, &drawn.icrs_to_camera));
             }
         }
@@ -123,7 +123,7 @@ fn simulated(fields: u64, sky: &IndexedCatalog) {
 }
 
 /// An identification with nothing known must be repeatable; it also gives the scale.
-fn real(frames: &[String], sky: &IndexedCatalog) -> Result<(), Box<dyn Error>> {
+fn real(frames: &[String], indexed: &IndexedCatalog) -> Result<(), Box<dyn Error>> {
     for path in frames {
         let frame = starpipe::frame::read(path)?;
         let detections = detect(
@@ -133,14 +133,14 @@ fn real(frames: &[String], sky: &IndexedCatalog) -> Result<(), Box<dyn Error>> {
         )?;
         let field = star_field(&frame, &detections, 0.0);
         let mut nothing = Times::new();
-        let found = nothing.add(&field, &Priors::default(), sky);
+        let found = nothing.add(&field, &Priors::default(), indexed);
         println!("{path}: {} stars", field.stars.len());
         if let Some(found) = found {
             let truth = (&found.camera, &found.icrs_to_camera);
             nothing.judge(Answer::of(&found, truth.0, truth.1));
             let mut factor = Times::new();
             let priors = factor_of_two(&found.camera);
-            if let Some(again) = factor.add(&field, &priors, sky) {
+            if let Some(again) = factor.add(&field, &priors, indexed) {
                 factor.judge(Answer::of(&again, truth.0, truth.1));
             }
             nothing.print("nothing known");
@@ -161,7 +161,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         _ => FIELDS,
     };
-    let sky = IndexedCatalog::build(Catalog::built_in(), &|_| {});
-    simulated(fields, &sky);
-    real(&arguments, &sky)
+    let indexed = IndexedCatalog::build(Catalog::built_in(), &|_| {});
+    simulated(fields, &indexed);
+    real(&arguments, &indexed)
 }

@@ -24,10 +24,10 @@
 //! use starpipe::{Context, FrameReport, IndexedCatalog, TextOptions, Workspace};
 //!
 //! fn main() -> Result<(), Box<dyn std::error::Error>> {
-//!     let catalog = IndexedCatalog::built_in();
-//!     let context = Context::new(&catalog);
+//!     let indexed = IndexedCatalog::built_in();
+//!     let context = Context::new(&indexed);
 //!     let solution = starpipe::solve_file("night.tif", None, &context, &mut Workspace::new())?;
-//!     let report = FrameReport::new("night.tif", &solution, catalog.catalog());
+//!     let report = FrameReport::new("night.tif", &solution, indexed.catalog());
 //!     print!("{}", report.to_text(TextOptions::default()));
 //!     Ok(())
 //! }

@@ -59,18 +59,18 @@ pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Exit, CommandErro
     }
     let pool = thread_pool(arguments.resources.threads)?;
     let catalog = pool.install(|| read_catalog(arguments.resources.catalog.as_deref()))?;
-    let sky = pool.install(|| index_catalog(&catalog, &arguments.resources));
+    let indexed = pool.install(|| index_catalog(&catalog, &arguments.resources));
     let trials = Trials {
         count: arguments.trials,
         seed: arguments.seed,
     };
     let progress = bar(trials.count, "frames {wide_bar} {pos}/{len} {eta}");
-    let done = pool.install(|| run(&published, &sky, trials, &|| progress.inc(1)));
+    let done = pool.install(|| run(&published, &indexed, trials, &|| progress.inc(1)));
     progress.finish_and_clear();
-    warn_of_cache(&sky);
+    warn_of_cache(&indexed);
     let done = done.map_err(anyhow::Error::from)?;
     if let Some(directory) = &arguments.out {
-        save(&done, &sky, directory, &name)?;
+        save(&done, &indexed, directory, &name)?;
     }
     let text = match arguments.format {
         PageFormat::Text => done.report.to_text(),
@@ -86,12 +86,12 @@ pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Exit, CommandErro
 }
 
 /// Draws the first frame, where there is one.
-fn save(done: &Run, sky: &IndexedCatalog, directory: &Path, name: &Path) -> anyhow::Result<()> {
+fn save(done: &Run, indexed: &IndexedCatalog, directory: &Path, name: &Path) -> anyhow::Result<()> {
     let Some((frame, solution)) = &done.first else {
         return Ok(());
     };
     let title = format!("{}, simulated", name.display());
-    let picture = overlay::draw(&title, frame, solution, sky.catalog());
+    let picture = overlay::draw(&title, frame, solution, indexed.catalog());
     let path = output_path(directory, name, "png");
     write_whole(&[(path, overlay::to_png(&picture)?)])
 }

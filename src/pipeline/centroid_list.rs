@@ -63,8 +63,8 @@ pub fn solve_centroids(list: &CentroidList, context: &Context) -> Solution {
     let mut list = list.clone();
     list.centroids.sort_by(|a, b| a.mag.total_cmp(&b.mag));
     let field = list.star_field(priors.years_since_j2000());
-    let found = identify::identify(&field, priors, context.sky);
-    let outcome = identified(found, None, &field, priors, context.sky);
+    let found = identify::identify(&field, priors, context.indexed);
+    let outcome = identified(found, None, &field, priors, context.indexed);
     let observation = observation(&outcome, priors);
     clock.lap(Stage::Identify);
     let source = |centroid: &ListedCentroid| Source {

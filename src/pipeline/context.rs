@@ -12,7 +12,7 @@ use std::path::Path;
 #[derive(Clone)]
 pub struct Context<'a> {
     /// The catalogue's stars and their triangles.
-    pub sky: &'a IndexedCatalog<'a>,
+    pub indexed: &'a IndexedCatalog<'a>,
     /// How to detect stars.
     pub detect: DetectConfig,
     /// What is known of every frame beforehand.
@@ -25,9 +25,9 @@ pub struct Context<'a> {
 
 impl<'a> Context<'a> {
     /// Default detection, nothing known beforehand, no camera and no calibration.
-    pub fn new(sky: &'a IndexedCatalog<'a>) -> Self {
+    pub fn new(indexed: &'a IndexedCatalog<'a>) -> Self {
         Self {
-            sky,
+            indexed,
             detect: DetectConfig::default(),
             priors: Priors::default(),
             camera: None,

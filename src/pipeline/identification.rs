@@ -1,12 +1,14 @@
 //! Identification of a frame's stars, with priors that may be wrong, and the reason where it fails.
 
+use super::context::Workspace;
 use super::solution::{Outcome, Reason};
 use crate::detect::Detections;
 use crate::frame::Frame;
+use crate::identify;
 use crate::identify::diagnosis::{Unidentified, diagnose};
 use crate::identify::{
     Identification, IndexedCatalog, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Photometry, Priors,
-    ScalePrior, SearchFailure, SourceIndex, StarField, Workspace,
+    ScalePrior, SearchFailure, SourceIndex, StarField,
 };
 use crate::photometry::instrumental_mag;
 use crate::sky::observer::Observation;
@@ -36,22 +38,40 @@ pub fn star_field(frame: &Frame, detections: &Detections, years_since_j2000: f64
     }
 }
 
-/// Result of the search, and the scale that was dropped because nothing matched with it.
-pub(super) type Searched = (Result<Identification, SearchFailure>, Option<ScalePrior>);
+/// Identifies the stars of a frame. Also returns the scale that was dropped because nothing matched with it.
+pub(super) fn identify_stars(
+    frame: &Frame,
+    detections: &Detections,
+    priors: &Priors,
+    indexed: &IndexedCatalog,
+    workspace: &mut Workspace,
+) -> (Outcome, Option<ScalePrior>) {
+    let field = star_field(frame, detections, priors.years_since_j2000());
+    let (found, dropped_scale) = search(&field, priors, indexed, &mut workspace.identify);
+    let image = Some((frame, detections));
+    let outcome = identified(found, image, &field, &priors.binding(), indexed);
+    (outcome, dropped_scale)
+}
 
-/// Identifies `field`. A scale that is not the user's is tried first and dropped where nothing matches with it.
-pub(super) fn search(
+/// Result of the search, and the scale that was dropped because nothing matched with it.
+type Searched = (Result<Identification, SearchFailure>, Option<ScalePrior>);
+
+/// Searches for `field`. A scale that is not the user's is tried first and dropped where nothing matches with
+/// it.
+fn search(
     field: &StarField,
     priors: &Priors,
-    sky: &IndexedCatalog,
-    workspace: &mut Workspace,
+    indexed: &IndexedCatalog,
+    workspace: &mut identify::Workspace,
 ) -> Searched {
-    let first = workspace.identify(field, priors, sky).cloned();
+    let first = workspace.identify(field, priors, indexed).cloned();
     let tentative = priors.scale.filter(|scale| !scale.is_binding());
     let (Err(failure), Some(scale)) = (&first, tentative) else {
         return (first, None);
     };
-    let second = workspace.identify(field, &priors.binding(), sky).cloned();
+    let second = workspace
+        .identify(field, &priors.binding(), indexed)
+        .cloned();
     match second.map(at_second_attempt) {
         Ok(Some(found)) => (Ok(found), Some(scale)),
         Ok(None) => (Err(*failure), None),
@@ -72,7 +92,7 @@ pub(super) fn identified(
     image: Option<(&Frame, &Detections)>,
     field: &StarField,
     priors: &Priors,
-    sky: &IndexedCatalog,
+    indexed: &IndexedCatalog,
 ) -> Outcome {
     let failure = match found {
         Ok(found) => return Outcome::Identified(Box::new(found)),
@@ -84,7 +104,7 @@ pub(super) fn identified(
         priors,
         failure,
     };
-    let cause = diagnose(&case, sky);
+    let cause = diagnose(&case, indexed);
     Outcome::NotIdentified(cause.map_or(Reason::Search(failure), Reason::Diagnosis))
 }
 

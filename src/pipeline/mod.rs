@@ -9,7 +9,6 @@
 //! 5. Where the context has a camera, the frame is compared with it.
 //! 6. Notes collect what is odd.
 
-mod camera_check;
 mod centroid_list;
 mod context;
 mod error;
@@ -17,6 +16,7 @@ mod identification;
 mod note;
 mod solution;
 mod solve;
+mod solved;
 mod stopwatch;
 
 pub use centroid_list::{CentroidList, LISTED_SIGMA_PX, ListedCentroid, solve_centroids};

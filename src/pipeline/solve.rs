@@ -1,16 +1,16 @@
 //! The stages in order.
 
-use super::camera_check::Solved;
 use super::context::{Context, Workspace};
 use super::error::Error;
-use super::identification::{identified, observation, search, star_field};
-use super::note::Note;
-use super::solution::{Background, Solution, Source};
+use super::identification::{identify_stars, observation};
+use super::solution::{Outcome, Solution};
+use super::solved::Solved;
 use super::stopwatch::{Stage, Stopwatch};
 use crate::calibration::Calibration;
-use crate::detect::{self, DetectError};
+use crate::detect::{self, DetectError, Detections};
 use crate::frame::{self, Frame, FrameError};
-use crate::photometry::{self, MeasuredFrame};
+use crate::identify::{IndexedCatalog, Priors};
+use crate::photometry::{self, FramePhotometry, MeasuredFrame};
 use std::num::NonZeroUsize;
 use std::path::Path;
 
@@ -101,77 +101,46 @@ fn solve(
     context: &Context,
     workspace: &mut Workspace,
 ) -> Result<Solution, DetectError> {
-    let Input {
-        frame, mut clock, ..
-    } = input;
-    let (sky, camera) = (context.sky, context.camera.as_ref());
-
+    let (frame, mut clock) = (input.frame, input.clock);
     let priors = context.priors_of(frame, input.name);
+
     let config = context.detect_config(frame);
     let detections = detect::detect(frame, &config, &mut workspace.detect)?;
     clock.lap(Stage::Detect);
 
-    let field = star_field(frame, &detections, priors.years_since_j2000());
-    let (found, dropped_scale) = search(&field, &priors, sky, &mut workspace.identify);
-    let image = Some((frame, &detections));
-    let outcome = identified(found, image, &field, &priors.binding(), sky);
+    let (outcome, dropped_scale) =
+        identify_stars(frame, &detections, &priors, context.indexed, workspace);
     clock.lap(Stage::Identify);
 
-    let photometry = outcome.identification().map(|identification| {
-        let measured = MeasuredFrame {
-            detections: &detections,
-            identification,
-            years_since_j2000: priors.years_since_j2000(),
-            exposure_s: priors.exposure_s,
-        };
-        photometry::measure(&measured, sky)
-    });
-    let observation = observation(&outcome, &priors);
-    let background = Background {
-        level_adu: detections.background_adu,
-        noise_adu: detections.noise_adu,
-    };
+    let photometry = measure_photometry(&detections, &outcome, &priors, context.indexed);
     let solved = Solved {
         context,
         frame,
-        priors: &priors,
-        background,
-        spot_sigma_px: detections.spot_sigma_px,
-        outcome: &outcome,
-        photometry: photometry.as_ref(),
-        observation: observation.as_ref(),
-    };
-    let comparison = camera.and_then(|camera| solved.compare_with(camera));
-    clock.lap(Stage::Photometry);
-
-    let ignored = frame.metadata.ignored.iter().cloned();
-    let mismatch = input
-        .calibration
-        .and_then(|calibration| calibration.exposure_mismatch(priors.exposure_s));
-    let mut notes: Vec<Note> = ignored.map(Note::IgnoredHeader).collect();
-    notes.extend(Note::of_scale(dropped_scale, &outcome));
-    notes.extend(Note::of_observation(
-        observation.as_ref(),
-        &priors,
-        &outcome,
-    ));
-    notes.extend(Note::of_camera(camera, comparison.as_ref()));
-    notes.extend(Note::of_photometry(photometry.as_ref()));
-    notes.extend(mismatch.map(Note::DarkExposure));
-    Ok(Solution {
-        width: frame.width,
-        height: frame.height,
-        date: priors.date,
-        observation,
-        exposure_s: priors.exposure_s,
-        notes,
-        sources: detections.sources.iter().map(Source::from).collect(),
-        background: Some(background),
+        calibration: input.calibration,
+        observation: observation(&outcome, &priors),
+        priors,
+        detections,
         outcome,
+        dropped_scale,
         photometry,
-        comparison,
-        gain_e_per_adu: camera.map(|camera| camera.sensor.gain_e_per_adu),
-        calibration: input.calibration.map(Calibration::applied),
-        timing: clock.timing(),
-    })
+    };
+    let comparison = solved.compare_with_camera();
+    clock.lap(Stage::Photometry);
+    Ok(solved.into_solution(comparison, clock.timing()))
+}
+
+/// Photometry of an identified frame.
+fn measure_photometry(
+    detections: &Detections,
+    outcome: &Outcome,
+    priors: &Priors,
+    indexed: &IndexedCatalog,
+) -> Option<FramePhotometry> {
+    let frame = MeasuredFrame {
+        detections,
+        identification: outcome.identification()?,
+        years_since_j2000: priors.years_since_j2000(),
+        exposure_s: priors.exposure_s,
+    };
+    Some(photometry::measure(&frame, indexed))
 }

@@ -101,7 +101,7 @@ fn trial(
         icrs_to_camera: Rotation::looking_at(&boresight, random.random_range(-PI..PI)),
         years_since_j2000: 0.0,
     };
-    let stars = context.sky.catalog().stars();
+    let stars = context.indexed.catalog().stars();
     let simulator = Simulator::new(scenario, &Scene::default(), stars).unwrap();
     let (frame, truth) = simulator.frame(&pointing, random.random()).unwrap();
     let solution = solve_frame(&frame, context, workspace).unwrap();
@@ -187,8 +187,8 @@ fn with_context<T>(run: impl FnOnce(&Context) -> T) -> T {
         || std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache"),
         Into::into,
     );
-    let sky = IndexedCatalog::open(Catalog::built_in(), Some(&cache), &|_| {});
-    run(&Context::new(&sky))
+    let indexed = IndexedCatalog::open(Catalog::built_in(), Some(&cache), &|_| {});
+    run(&Context::new(&indexed))
 }
 
 /// Statistics of many frames.

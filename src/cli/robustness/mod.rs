@@ -88,7 +88,7 @@ fn rows(arguments: &RobustnessArgs) -> Result<Vec<SweptRow>, CommandError> {
     let cases = cases(arguments);
     let pool = thread_pool(arguments.resources.threads)?;
     let catalog = pool.install(|| read_catalog(arguments.resources.catalog.as_deref()))?;
-    let sky = pool.install(|| index_catalog(&catalog, &arguments.resources));
+    let indexed = pool.install(|| index_catalog(&catalog, &arguments.resources));
     let progress = bar(
         arguments.trials * cases.len() as u64,
         "trials {wide_bar} {pos}/{len} {eta}",
@@ -97,7 +97,7 @@ fn rows(arguments: &RobustnessArgs) -> Result<Vec<SweptRow>, CommandError> {
         let done = || progress.inc(1);
         let tally = pool.install(|| {
             run(
-                &sky,
+                &indexed,
                 &case.protocol,
                 arguments.trials,
                 arguments.seed,
@@ -109,7 +109,7 @@ fn rows(arguments: &RobustnessArgs) -> Result<Vec<SweptRow>, CommandError> {
     };
     let rows = cases.into_iter().map(row).collect();
     progress.finish_and_clear();
-    warn_of_cache(&sky);
+    warn_of_cache(&indexed);
     Ok(rows)
 }
 

@@ -29,13 +29,13 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    fn context<'a>(&'a self, sky: &'a IndexedCatalog<'a>) -> Context<'a> {
+    fn context<'a>(&'a self, indexed: &'a IndexedCatalog<'a>) -> Context<'a> {
         Context {
             detect: self.detect.clone(),
             priors: self.priors,
             camera: self.camera.clone(),
             calibration: self.calibration.as_ref(),
-            ..Context::new(sky)
+            ..Context::new(indexed)
         }
     }
 }
@@ -55,14 +55,14 @@ pub(crate) fn solve_all(
     }
     let pool = thread_pool(resources.threads)?;
     let catalog = pool.install(|| read_catalog(resources.catalog.as_deref()))?;
-    let sky = pool.install(|| index_catalog(&catalog, resources));
-    let context = plan.context(&sky);
+    let indexed = pool.install(|| index_catalog(&catalog, resources));
+    let context = plan.context(&indexed);
     // The threads that solve also draw and write: the one that prints waits for nothing else.
     let report = |input: &PathBuf, workspace: &mut Workspace| {
         let solved = solve(&context, input, workspace)?;
         let name = input.display().to_string();
-        let report = FrameReport::new(&name, &solved.solution, sky.catalog());
-        let saved = files.save(input, &solved, &report, sky.catalog());
+        let report = FrameReport::new(&name, &solved.solution, indexed.catalog());
+        let saved = files.save(input, &solved, &report, indexed.catalog());
         Ok(Answer { report, saved })
     };
     // An input that is alone has all threads for itself.
@@ -81,7 +81,7 @@ pub(crate) fn solve_all(
         run.take(result)
     });
     let exit = run.exit();
-    warn_of_cache(&sky);
+    warn_of_cache(&indexed);
     Ok(exit)
 }
 

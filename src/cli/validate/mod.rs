@@ -27,7 +27,7 @@ use std::fmt::Display;
 
 /// What the runs of one command have in common.
 struct Shared<'a> {
-    sky: &'a IndexedCatalog<'a>,
+    indexed: &'a IndexedCatalog<'a>,
     pool: &'a rayon::ThreadPool,
     /// Frames of each run.
     frames: u64,
@@ -53,10 +53,10 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Exit, CommandError> {
     let studies = study::protocols(&arguments.sweep, &protocol)?;
     let pool = thread_pool(arguments.resources.threads)?;
     let catalog = pool.install(|| read_catalog(arguments.resources.catalog.as_deref()))?;
-    let sky = pool.install(|| index_catalog(&catalog, &arguments.resources));
+    let indexed = pool.install(|| index_catalog(&catalog, &arguments.resources));
     let runs = studies.len().max(1) as u64;
     let shared = Shared {
-        sky: &sky,
+        indexed: &indexed,
         pool: &pool,
         frames: arguments.frames,
         figures: arguments.figures,
@@ -79,7 +79,7 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Exit, CommandError> {
         }
     };
     shared.progress.finish_and_clear();
-    warn_of_cache(&sky);
+    warn_of_cache(&indexed);
     // Nobody left to read it: nothing is lost.
     let _ = print(&text)?;
     Ok(Exit::Success)

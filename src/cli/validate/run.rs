@@ -41,13 +41,13 @@ pub(super) fn run(
     protocol: &Protocol,
     shared: &Shared,
 ) -> Result<Summary, CommandError> {
-    let validator = Validator::new(shared.sky, protocol).map_err(|error| match error {
+    let validator = Validator::new(shared.indexed, protocol).map_err(|error| match error {
         ValidationError::Scenario(_) | ValidationError::NoLimit => {
             CommandError::Usage(error.to_string())
         }
         other => CommandError::Failed(other.into()),
     })?;
-    identity::claim(directory, protocol, shared.sky.catalog())?;
+    identity::claim(directory, protocol, shared.indexed.catalog())?;
     let mut tables = Tables::open(directory, |number| validator.draw(number).0)?;
     let done = tables.done();
     if done > shared.frames {

@@ -129,7 +129,7 @@ impl ExperimentReport {
 /// [`ExperimentError`], for which the paper's camera gives no occasion.
 pub fn run(
     published: &Published,
-    sky: &IndexedCatalog,
+    indexed: &IndexedCatalog,
     trials: Trials,
     done: &(dyn Fn() + Sync),
 ) -> Result<Run, ExperimentError> {
@@ -146,7 +146,7 @@ pub fn run(
     };
     let context = Context {
         priors,
-        ..Context::new(sky)
+        ..Context::new(indexed)
     };
     let solution = solve_centroids(&table::centroids(published, &scenario), &context);
     let mut report = ExperimentReport {
@@ -162,7 +162,7 @@ pub fn run(
             paper_faintest_vmag: published.faintest_vmag,
             detector_limit_vmag: to_decimals(detector.vmag_at(0.5), 3),
         },
-        table: TableReport::new(published, &scenario, &solution, sky.catalog()),
+        table: TableReport::new(published, &scenario, &solution, indexed.catalog()),
         simulated: None,
     };
     let Some(found) = solution.outcome.identification() else {
@@ -171,7 +171,7 @@ pub fn run(
             first: None,
         });
     };
-    let stars = sky.catalog().stars();
+    let stars = indexed.catalog().stars();
     let simulator = Simulator::new(&scenario, &Scene::default(), stars)?;
     let protocol = Protocol {
         scenario: &scenario,

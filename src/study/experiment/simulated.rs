@@ -74,7 +74,7 @@ impl Protocol<'_> {
                 let (frame, truth) = self.frame(number)?;
                 let solution = self.solve(&frame, workspace)?;
                 done();
-                Ok(self.judged(&truth, &solution, self.context.sky.catalog()))
+                Ok(self.judged(&truth, &solution, self.context.indexed.catalog()))
             })
             .collect()
     }

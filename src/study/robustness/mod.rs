@@ -111,7 +111,7 @@ impl Protocol {
 
 /// Runs `trials` trials of `protocol` on the threads of the current pool; `done` is called after each.
 pub fn run(
-    sky: &IndexedCatalog,
+    indexed: &IndexedCatalog,
     protocol: &Protocol,
     trials: u64,
     seed: u64,
@@ -120,7 +120,7 @@ pub fn run(
     let verdicts: Vec<Verdict> = (0..trials)
         .into_par_iter()
         .map(|trial| {
-            let verdict = run_one(sky, protocol, seed, trial);
+            let verdict = run_one(indexed, protocol, seed, trial);
             done();
             verdict
         })
@@ -129,14 +129,14 @@ pub fn run(
 }
 
 /// Runs the trial number `trial` alone.
-pub fn run_one(sky: &IndexedCatalog, protocol: &Protocol, seed: u64, trial: u64) -> Verdict {
+pub fn run_one(indexed: &IndexedCatalog, protocol: &Protocol, seed: u64, trial: u64) -> Verdict {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(trial);
-    let observation = Observation::draw(protocol, sky, &mut rng);
+    let observation = Observation::draw(protocol, indexed, &mut rng);
     let priors = protocol.priors(&mut rng);
     let start = Instant::now();
     let field = observation.list.star_field(0.0);
-    let found = identify(&field, &priors, sky);
+    let found = identify(&field, &priors, indexed);
     let time_ms = start.elapsed().as_secs_f64() * 1e3;
     Verdict::new(&observation, found.as_ref().ok(), time_ms)
 }

@@ -32,7 +32,7 @@ pub struct Observation {
 
 impl Observation {
     /// Draws a list as `protocol` says.
-    pub fn draw(protocol: &Protocol, sky: &IndexedCatalog, rng: &mut ChaCha8Rng) -> Self {
+    pub fn draw(protocol: &Protocol, indexed: &IndexedCatalog, rng: &mut ChaCha8Rng) -> Self {
         let icrs_to_camera = random_rotation(rng);
         let mirrored = match protocol.mirrored {
             Mirrored::Never => false,
@@ -42,7 +42,7 @@ impl Observation {
         let (width_px, height_px) = (protocol.width_px as f64, protocol.height_px as f64);
         let focal_px = focal_length_px(width_px, protocol.fov_deg * RAD_PER_DEG);
         let camera = CameraModel::pinhole(width_px, height_px, focal_px, mirrored);
-        let stars = stars_seen(protocol, sky, (&camera, &icrs_to_camera), rng);
+        let stars = stars_seen(protocol, indexed, (&camera, &icrs_to_camera), rng);
         let mut drawn = drawn_stars(protocol, &stars, rng);
         drawn.extend(false_stars(protocol, &stars, rng));
         drawn.sort_by(|a, b| a.v_mag.total_cmp(&b.v_mag));
@@ -93,21 +93,21 @@ impl Drawn {
 /// The catalogue's stars on the frame that are above the limit: where they stand, and their observed magnitudes.
 fn stars_seen(
     protocol: &Protocol,
-    sky: &IndexedCatalog,
+    indexed: &IndexedCatalog,
     (camera, icrs_to_camera): (&CameraModel, &Rotation<Icrs, Camera>),
     rng: &mut ChaCha8Rng,
 ) -> Vec<Drawn> {
-    let limit_v_mag = limiting_v_mag(protocol, camera, sky);
+    let limit_v_mag = limiting_v_mag(protocol, camera, indexed);
     let faintest = limit_v_mag + FAINTEST_SIGMAS * protocol.mag_sigma;
     let centre = icrs_to_camera.inverse().apply(&UnitVector::BORESIGHT);
     let mut around = Vec::new();
-    sky.grid
+    indexed.grid
         .for_each_within(&centre, camera.radius_rad(), faintest as f32, |star| {
             around.push(StarIndex::from(star.catalog));
         });
     around.sort_unstable();
     let seen = |index: StarIndex| {
-        let star = sky.catalog().star(index);
+        let star = indexed.catalog().star(index);
         let pixel = camera.pixel_of(&icrs_to_camera.apply(&star.direction));
         let position = pixel.filter(|pixel| camera.contains(pixel))?;
         let v_mag = f64::from(star.v_mag) + protocol.mag_sigma * normal(rng);
@@ -146,9 +146,9 @@ fn false_stars(protocol: &Protocol, stars: &[Drawn], rng: &mut ChaCha8Rng) -> Ve
 }
 
 /// The magnitude to which the sky has, on average, the wanted number of stars on a frame.
-fn limiting_v_mag(protocol: &Protocol, camera: &CameraModel, sky: &IndexedCatalog) -> f64 {
+fn limiting_v_mag(protocol: &Protocol, camera: &CameraModel, indexed: &IndexedCatalog) -> f64 {
     let area_sq_deg = camera.fov_x_rad() * camera.fov_y_rad() * DEG_PER_RAD.powi(2);
-    sky.magnitude_of_density(protocol.mean_stars / area_sq_deg)
+    indexed.magnitude_of_density(protocol.mean_stars / area_sq_deg)
 }
 
 /// A rotation taken from all with the same probability: a direction in four dimensions (Shoemake 1992).

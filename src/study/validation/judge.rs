@@ -123,7 +123,7 @@ impl<'a> Judge<'a> {
     }
 
     fn star_row(&self, star: &TrueStar, source: Option<SourceIndex>) -> StarRecord {
-        let catalog = self.validator.context.sky.catalog();
+        let catalog = self.validator.context.indexed.catalog();
         let theory = self.validator.spots.theory(&star.position, star.electrons);
         let bound = |of: fn(&CramerRao) -> f64| {
             let bound = theory.bound.as_ref().map(of);
@@ -276,7 +276,7 @@ impl<'a> Judge<'a> {
         let errors = |of: fn(&AttitudeError) -> f64| attitude.as_ref().map(of).map(significant);
         let sensor = &validator.protocol.setup.scenario.sensor;
         let budget = &validator.budget;
-        let catalog = validator.context.sky.catalog();
+        let catalog = validator.context.indexed.catalog();
         let named = self
             .names
             .values()

@@ -123,10 +123,13 @@ impl<'a> Validator<'a> {
     ///
     /// # Errors
     /// [`ValidationError::Scenario`], [`ValidationError::NoLimit`] where nothing can be predicted.
-    pub fn new(sky: &'a IndexedCatalog<'a>, protocol: &Protocol) -> Result<Self, ValidationError> {
+    pub fn new(
+        indexed: &'a IndexedCatalog<'a>,
+        protocol: &Protocol,
+    ) -> Result<Self, ValidationError> {
         let Setup { scenario, scene } = &protocol.setup;
         protocol.setup.check()?;
-        let simulator = Simulator::new(scenario, scene, sky.catalog().stars())?;
+        let simulator = Simulator::new(scenario, scene, indexed.catalog().stars())?;
         let scenario = &simulator.evened();
         let budget = Budget::checked(scenario)?;
         let detector = Detector::new(Rule::MatchedFilter, scenario, &budget);
@@ -148,7 +151,7 @@ impl<'a> Validator<'a> {
                 },
                 // The exposure is kept from it: what it would predict with it is predicted here, once for all frames.
                 camera,
-                ..Context::new(sky)
+                ..Context::new(indexed)
             },
             spots: Spots::of(scenario, &budget),
             protocol: protocol.clone(),

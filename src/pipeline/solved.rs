@@ -1,0 +1,138 @@
+//! What the stages found in a frame, and what follows from all of it: comparison, notes, solution.
+
+use super::context::Context;
+use super::note::Note;
+use super::solution::{Background, Outcome, Solution, Source};
+use super::stopwatch::Timing;
+use crate::base::statistics::Estimate;
+use crate::base::units::DEG_PER_RAD;
+use crate::calibration::Calibration;
+use crate::detect::Detections;
+use crate::frame::Frame;
+use crate::identify::{Identification, Priors, ScalePrior, View};
+use crate::photometry::FramePhotometry;
+use crate::photometry::comparison::{Comparison, FrameMeasurement, compare};
+use crate::sky::observer::Observation;
+
+/// What the stages found in a frame.
+pub(super) struct Solved<'a> {
+    pub context: &'a Context<'a>,
+    pub frame: &'a Frame,
+    /// The calibration that was applied.
+    pub calibration: Option<&'a Calibration>,
+    pub priors: Priors,
+    pub detections: Detections,
+    pub outcome: Outcome,
+    /// The scale that was dropped because nothing matched with it.
+    pub dropped_scale: Option<ScalePrior>,
+    pub photometry: Option<FramePhotometry>,
+    pub observation: Option<Observation>,
+}
+
+impl Solved<'_> {
+    /// The comparison with the stated camera; `None` without a camera or an exposure.
+    pub(super) fn compare_with_camera(&self) -> Option<Comparison> {
+        let camera = self.context.camera.as_ref()?;
+        let photometry = self.photometry.as_ref();
+        let zero_point = photometry.and_then(|measured| measured.zero_point.as_ref());
+        let limit = photometry.and_then(|measured| measured.completeness.limit.as_ref().ok());
+        let found = self.outcome.identification();
+        let field_vmag = found.map_or(Vec::new(), |found| self.field_vmag(found));
+        let frame = FrameMeasurement {
+            detect: self.context.detect.clone(),
+            size_px: [self.frame.width, self.frame.height],
+            exposure_s: self.priors.exposure_s,
+            level_adu: self.detections.background_adu,
+            noise_adu: self.detections.noise_adu,
+            spot_sigma_px: found.map(|_| self.detections.spot_sigma_px),
+            pixel_scale_rad: found.map(|found| 1.0 / found.camera.focal_length_px),
+            zenith_distance_deg: self.observation.as_ref().map(zenith_distance_deg),
+            header_zenith_distance_deg: self.frame.metadata.zenith_distance_deg,
+            zero_point_vmag: zero_point.map(|zero| Estimate {
+                value: zero.v_mag,
+                sigma: zero.sigma_mag,
+            }),
+            zero_point_colors_mag: photometry
+                .map_or(&[], |measured| &measured.zero_point_colors_mag),
+            has_color_term: zero_point.is_some_and(|zero| zero.color_term.is_some()),
+            limit_vmag: limit.map(|limit| Estimate {
+                value: limit.v_mag,
+                sigma: limit.sigma_mag,
+            }),
+            faintest_vmag: found.and_then(|found| self.faintest_vmag(found)),
+            field_vmag: &field_vmag,
+        };
+        compare(camera, &frame)
+    }
+
+    /// The solution; `timing` is that of its stages.
+    pub(super) fn into_solution(self, comparison: Option<Comparison>, timing: Timing) -> Solution {
+        let camera = self.context.camera.as_ref();
+        Solution {
+            width: self.frame.width,
+            height: self.frame.height,
+            date: self.priors.date,
+            exposure_s: self.priors.exposure_s,
+            notes: self.notes(comparison.as_ref()),
+            sources: self.detections.sources.iter().map(Source::from).collect(),
+            background: Some(Background {
+                level_adu: self.detections.background_adu,
+                noise_adu: self.detections.noise_adu,
+            }),
+            observation: self.observation,
+            outcome: self.outcome,
+            photometry: self.photometry,
+            comparison,
+            gain_e_per_adu: camera.map(|camera| camera.sensor.gain_e_per_adu),
+            calibration: self.calibration.map(Calibration::applied),
+            timing,
+        }
+    }
+
+    fn notes(&self, comparison: Option<&Comparison>) -> Vec<Note> {
+        let (outcome, priors) = (&self.outcome, &self.priors);
+        let ignored = self.frame.metadata.ignored.iter().cloned();
+        let mismatch = self
+            .calibration
+            .and_then(|calibration| calibration.exposure_mismatch(priors.exposure_s));
+        let observation = self.observation.as_ref();
+        let camera = self.context.camera.as_ref();
+        ignored
+            .map(Note::IgnoredHeader)
+            .chain(Note::of_scale(self.dropped_scale, outcome))
+            .chain(Note::of_observation(observation, priors, outcome))
+            .chain(Note::of_camera(camera, comparison))
+            .chain(Note::of_photometry(self.photometry.as_ref()))
+            .chain(mismatch.map(Note::DarkExposure))
+            .collect()
+    }
+
+    /// V magnitude of the faintest identified star.
+    fn faintest_vmag(&self, found: &Identification) -> Option<f64> {
+        let catalog = self.context.indexed.catalog();
+        let v_mag = found.matches.iter().map(|m| catalog.star(m.star).v_mag);
+        v_mag.map(f64::from).reduce(f64::max)
+    }
+
+    /// V magnitudes of all catalogue stars in the frame.
+    fn field_vmag(&self, found: &Identification) -> Vec<f64> {
+        let view = View {
+            camera: &found.camera,
+            icrs_to_camera: &found.icrs_to_camera,
+            years_since_j2000: self.priors.years_since_j2000(),
+        };
+        let indexed = self.context.indexed;
+        let stars = view.stars_to(indexed, indexed.faintest_v_mag());
+        let inside = stars
+            .iter()
+            .filter(|star| found.camera.contains(&star.pixel));
+        inside.map(|star| f64::from(star.v_mag)).collect()
+    }
+}
+
+/// Zenith distance of the frame's centre, in degrees: apparent above the horizon, true below it.
+fn zenith_distance_deg(observation: &Observation) -> f64 {
+    let apparent = observation.apparent.as_ref();
+    let zenith_rad = apparent.map_or(observation.zenith_distance_rad, |a| a.zenith_distance_rad);
+    zenith_rad * DEG_PER_RAD
+}
