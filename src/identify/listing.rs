@@ -138,6 +138,7 @@ impl<'a> Class<'a> {
         for (cell, around) in self.brightest_around(zone, near).iter().enumerate() {
             let first = triangles.len();
             self.list_cell(zone, (cell, around), &mut triangles);
+            // By the faintest star, then the next: independent of how they were found.
             triangles[first..].sort_unstable_by_key(|triangle| {
                 let mut corners = triangle.corners;
                 corners.sort_unstable_by(|a, b| b.cmp(a));
@@ -174,49 +175,62 @@ impl<'a> Class<'a> {
 
     /// Lists the triangles of the stars `around` a cell that belong to that cell.
     fn list_cell(&self, zone: &Zone, (cell, around): (usize, &[u32]), out: &mut Vec<Triangle>) {
+        // Nearly: the root decides.
+        let least_sq = self.low * self.low * (1.0 - 1e-9);
+        let most_sq = self.high * self.high * (1.0 + 1e-9);
         for i in 1..around.len() {
             for j in 0..i {
-                let ends = [
-                    &self.stars[around[i] as usize],
-                    &self.stars[around[j] as usize],
-                ];
-                let [p, q] = ends.map(|star| &star.direction);
-                let longest_sq = distance_sq(p, q);
-                // Nearly: the root decides.
-                if longest_sq < self.low * self.low * (1.0 - 1e-9)
-                    || longest_sq > self.high * self.high * (1.0 + 1e-9)
-                {
+                let side = [around[i], around[j]];
+                let [p, q] = [self.direction(side[0]), self.direction(side[1])];
+                let length_sq = distance_sq(p, q);
+                if length_sq < least_sq || length_sq > most_sq {
                     continue;
                 }
-                let sum = [p[0] + q[0], p[1] + q[1], p[2] + q[2]];
-                if !zone.may_hold(&sum) {
-                    continue;
-                }
-                let mut is_in_cell = None;
-                for k in 0..around.len() {
-                    if k == i || k == j {
-                        continue;
-                    }
-                    let third = &self.stars[around[k] as usize].direction;
-                    let opposite = [distance_sq(q, third), distance_sq(p, third), longest_sq];
-                    if opposite[0] >= longest_sq || opposite[1] >= longest_sq {
-                        continue;
-                    }
-                    let Some(shape) = TriangleShape::of_sides(opposite) else {
-                        continue;
-                    };
-                    if shape.longest >= self.low
-                        && shape.longest < self.high
-                        && *is_in_cell.get_or_insert_with(|| zone.cell_of(&sum) == Some(cell))
-                    {
-                        let corners = [around[i], around[j], around[k]];
-                        let [a, b, c] = shape.order;
-                        let corners = [corners[a], corners[b], corners[c]];
-                        out.push(Triangle::new(corners, shape.ratios));
+                let middle = [p[0] + q[0], p[1] + q[1], p[2] + q[2]];
+                if zone.may_hold(&middle) {
+                    let first = out.len();
+                    self.list_with_longest_side(side, around, out);
+                    if out.len() > first && zone.cell_of(&middle) != Some(cell) {
+                        out.truncate(first);
                     }
                 }
             }
         }
+    }
+
+    /// Lists the triangles of two stars and a third of `around` whose longest side joins the two.
+    fn list_with_longest_side(&self, side: [u32; 2], around: &[u32], out: &mut Vec<Triangle>) {
+        let [p, q] = [self.direction(side[0]), self.direction(side[1])];
+        let longest_sq = distance_sq(p, q);
+        for &third in around {
+            if third == side[0] || third == side[1] {
+                continue;
+            }
+            let direction = self.direction(third);
+            let opposite = [
+                distance_sq(q, direction),
+                distance_sq(p, direction),
+                longest_sq,
+            ];
+            if opposite[0] >= longest_sq || opposite[1] >= longest_sq {
+                continue;
+            }
+            if let Some(shape) = TriangleShape::of_sides(opposite)
+                && shape.longest >= self.low
+                && shape.longest < self.high
+            {
+                let points = [side[0], side[1], third];
+                let [a, b, c] = shape.order;
+                out.push(Triangle::new(
+                    [points[a], points[b], points[c]],
+                    shape.ratios,
+                ));
+            }
+        }
+    }
+
+    fn direction(&self, star: u32) -> &[f64; 3] {
+        &self.stars[star as usize].direction
     }
 }
 
