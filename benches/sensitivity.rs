@@ -41,8 +41,8 @@ fn simulation(criterion: &mut Criterion) {
         b.iter(|| simulator.frame(&pointing, black_box(1)).unwrap());
     });
     let mut patterned = scenario.clone();
-    patterned.sensor.imperfections.response_sigma = 0.01;
-    patterned.sensor.imperfections.vignetting = 0.3;
+    patterned.camera.imperfections.response_sigma = 0.01;
+    patterned.camera.imperfections.vignetting = 0.3;
     let simulator = Simulator::new(&patterned, &Scene::default(), stars).unwrap();
     criterion.bench_function("simulate/752x582_uneven", |b| {
         b.iter(|| simulator.frame(&pointing, black_box(1)).unwrap());

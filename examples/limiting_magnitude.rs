@@ -13,7 +13,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let detector = Detector::new(Rule::MatchedFilter, &scenario, &budget);
     println!(
         "{}: V {:.2} by its brightest pixel; starpipe finds half of the stars of V {:.2}",
-        scenario.sensor.name,
+        scenario.camera.name,
         budget.limit_vmag,
         detector.vmag_at(0.5)
     );

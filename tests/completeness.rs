@@ -8,7 +8,7 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use starpipe::base::coords::PixelPoint;
-use starpipe::camera::data_sheet::{Imperfections, Preset, Response, Sensor};
+use starpipe::camera::data_sheet::{DataSheet, Imperfections, Preset, Response};
 use starpipe::detect::{DetectConfig, Detection, Workspace, detect};
 use starpipe::frame::Frame;
 use starpipe::model::sensitivity::{Budget, Detector, Extinction, Rule, Scenario, SkyBrightness};
@@ -109,7 +109,7 @@ fn peak_stands_out(
     frame: &Frame,
     position: &PixelPoint,
 ) -> bool {
-    let sensor = &scenario.sensor;
+    let sheet = &scenario.camera;
     let floor_e2 = budget.background_noise_e.powi(2);
     let level_e = budget.background_e + budget.dark_e;
     let around = |at: f64| {
@@ -120,8 +120,8 @@ fn peak_stands_out(
         .flat_map(|y| around(position.x).map(move |x| (x, y)))
         .filter(|&(x, y)| PixelPoint::new(x as f64, y as f64).distance_to(position) <= MATCH_PX)
         .any(|(x, y)| {
-            let level_adu = f64::from(frame.pixels[y * frame.width + x]) - sensor.bias_adu;
-            let signal_e = level_adu * sensor.gain_e_per_adu - level_e;
+            let level_adu = f64::from(frame.pixels[y * frame.width + x]) - sheet.bias_adu;
+            let signal_e = level_adu * sheet.gain_e_per_adu - level_e;
             signal_e / (signal_e.max(0.0) + floor_e2).sqrt() >= scenario.conditions.snr
         })
 }
@@ -204,8 +204,8 @@ fn camera(
     name: &str,
     [pitch_um, focal_length_mm, f_number, spot_sigma_px]: [f64; 4],
     [read_noise_e, gain_e_per_adu, full_well_e]: [f64; 3],
-) -> Sensor {
-    Sensor {
+) -> DataSheet {
+    DataSheet {
         name: name.to_owned(),
         width_px: SIDE_PX,
         height_px: SIDE_PX,
@@ -229,8 +229,8 @@ fn camera(
     }
 }
 
-fn scenario(sensor: Sensor, exposure_s: f64, sky_mag_arcsec2: f64) -> Scenario {
-    let mut scenario = Scenario::new(sensor);
+fn scenario(sheet: DataSheet, exposure_s: f64, sky_mag_arcsec2: f64) -> Scenario {
+    let mut scenario = Scenario::new(sheet);
     scenario.conditions.exposure_s = exposure_s;
     scenario.conditions.sky = SkyBrightness::MagArcsec2(sky_mag_arcsec2);
     scenario
@@ -239,7 +239,7 @@ fn scenario(sensor: Sensor, exposure_s: f64, sky_mag_arcsec2: f64) -> Scenario {
 /// One of the paper's experiments, with frames of the common size.
 fn experiment(preset: Preset) -> Scenario {
     let mut scenario = Scenario::of(preset);
-    (scenario.sensor.width_px, scenario.sensor.height_px) = (SIDE_PX, SIDE_PX);
+    (scenario.camera.width_px, scenario.camera.height_px) = (SIDE_PX, SIDE_PX);
     scenario
 }
 

@@ -31,14 +31,14 @@ fn scenario(exposure_s: f64) -> Scenario {
     let mut scenario = Scenario::of(Preset::Experiment2);
     scenario.conditions.sky = SkyBrightness::MagArcsec2(60.0);
     scenario.conditions.exposure_s = exposure_s;
-    let sensor = &mut scenario.sensor;
-    (sensor.width_px, sensor.height_px) = SIZE;
-    sensor.read_noise_e = READ_NOISE_E;
-    sensor.dark_current_e_s = DARK_CURRENT_E_S;
-    sensor.gain_e_per_adu = GAIN_E_PER_ADU;
-    sensor.bias_adu = BIAS_ADU;
-    sensor.bits = 12;
-    sensor.full_well_e = 1e5;
+    let sheet = &mut scenario.camera;
+    (sheet.width_px, sheet.height_px) = SIZE;
+    sheet.read_noise_e = READ_NOISE_E;
+    sheet.dark_current_e_s = DARK_CURRENT_E_S;
+    sheet.gain_e_per_adu = GAIN_E_PER_ADU;
+    sheet.bias_adu = BIAS_ADU;
+    sheet.bits = 12;
+    sheet.full_well_e = 1e5;
     scenario
 }
 

@@ -14,15 +14,15 @@ const SIGMAS: f64 = 4.5;
 /// The paper's camera, with less noise, so that the light is measurable.
 fn scenario() -> Scenario {
     let mut scenario = Scenario::of(Preset::Experiment2);
-    scenario.sensor.read_noise_e = 12.0;
-    scenario.sensor.dark_current_e_s = 400.0;
-    scenario.sensor.gain_e_per_adu = 2.0;
+    scenario.camera.read_noise_e = 12.0;
+    scenario.camera.dark_current_e_s = 400.0;
+    scenario.camera.gain_e_per_adu = 2.0;
     scenario
 }
 
 fn electrons(frame: &Frame, scenario: &Scenario) -> Vec<f64> {
-    let sensor = &scenario.sensor;
-    let electrons = |&adu: &f32| (f64::from(adu) - sensor.bias_adu) * sensor.gain_e_per_adu;
+    let sheet = &scenario.camera;
+    let electrons = |&adu: &f32| (f64::from(adu) - sheet.bias_adu) * sheet.gain_e_per_adu;
     frame.pixels.iter().map(electrons).collect()
 }
 
@@ -41,7 +41,7 @@ fn the_sky_has_its_mean_and_its_noise() {
     let (mean, variance) = mean_and_variance(&electrons(&frame, &scenario));
     let light_e = budget.background_e + budget.dark_e;
     // The paper's budget has no rounding, whose variance is a twelfth of a step squared.
-    let gain = scenario.sensor.gain_e_per_adu;
+    let gain = scenario.camera.gain_e_per_adu;
     let expected = light_e + 12f64.powi(2) + gain * gain / 12.0;
     let count = frame.pixels.len() as f64;
     assert!(
@@ -58,7 +58,7 @@ fn the_sky_has_its_mean_and_its_noise() {
 fn a_star_has_its_electrons_and_their_noise() {
     const STARS: u64 = 300;
     let mut scenario = scenario();
-    (scenario.sensor.width_px, scenario.sensor.height_px) = (21, 21);
+    (scenario.camera.width_px, scenario.camera.height_px) = (21, 21);
     let budget = Budget::new(&scenario);
     let v_mag = 7.5;
     let star_e = budget.electrons_of(v_mag, scenario.conditions.exposure_s);
@@ -112,8 +112,8 @@ fn levels_are_whole_and_limited_by_the_detector() {
 fn motion_smears_along_the_rows() {
     let mut scenario = scenario();
     scenario.conditions.motion_px = 8.0;
-    scenario.sensor.read_noise_e = 0.0;
-    scenario.sensor.dark_current_e_s = 0.0;
+    scenario.camera.read_noise_e = 0.0;
+    scenario.camera.dark_current_e_s = 0.0;
     let place = PixelPoint::new(300.0, 200.0);
     let frame = star_field(&scenario, &[(place, 5.5)], 4).unwrap();
     let budget = Budget::new(&scenario);

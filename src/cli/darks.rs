@@ -16,7 +16,7 @@ use clap::Args;
 use starpipe::calibration::darks::{
     DarkConfig, DarkStack, Darks, FrameStatistics, FullScaleSource, HotPixelRow,
 };
-use starpipe::camera::data_sheet::Sensor;
+use starpipe::camera::data_sheet::DataSheet;
 use starpipe::frame::Buffers;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -131,14 +131,18 @@ pub(crate) fn darks(arguments: DarksArgs) -> Result<Exit, CommandError> {
 }
 
 fn config(arguments: &DarksArgs) -> anyhow::Result<DarkConfig> {
-    let sensor = arguments.camera.as_deref().map(Sensor::read).transpose()?;
+    let sheet = arguments
+        .camera
+        .as_deref()
+        .map(DataSheet::read)
+        .transpose()?;
     let stated = arguments.bits.map(|bits| (bits, FullScaleSource::Option));
-    let described = sensor
+    let described = sheet
         .as_ref()
-        .map(|sensor| (sensor.bits, FullScaleSource::Camera));
+        .map(|sheet| (sheet.bits, FullScaleSource::Camera));
     Ok(DarkConfig {
         bits: stated.or(described),
-        gain_e_per_adu: sensor.map(|sensor| sensor.gain_e_per_adu),
+        gain_e_per_adu: sheet.map(|sheet| sheet.gain_e_per_adu),
         hot_sigma: arguments.hot_sigma,
     })
 }

@@ -13,7 +13,7 @@ use super::output::stdout::print;
 use anyhow::Context;
 use clap::Args;
 use starpipe::calibration::flats::{FlatConfig, FlatStack, Flats};
-use starpipe::camera::data_sheet::Sensor;
+use starpipe::camera::data_sheet::DataSheet;
 use starpipe::frame::Buffers;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -93,17 +93,21 @@ pub(crate) fn flats(arguments: FlatsArgs) -> Result<Exit, CommandError> {
 }
 
 fn config(arguments: &FlatsArgs) -> anyhow::Result<FlatConfig> {
-    let sensor = arguments.camera.as_deref().map(Sensor::read).transpose()?;
+    let sheet = arguments
+        .camera
+        .as_deref()
+        .map(DataSheet::read)
+        .transpose()?;
     let dark = arguments.dark.as_deref().map(read_master).transpose()?;
-    if sensor.is_none() && dark.is_none() {
+    if sheet.is_none() && dark.is_none() {
         report_warning(
             "the level without light is taken to be 0: --dark or --camera says what it is",
         );
     }
     Ok(FlatConfig {
         dark: dark.map(|dark| (dark.name, dark.frame)),
-        bias_adu: sensor.as_ref().map_or(0.0, |sensor| sensor.bias_adu),
-        read_noise_e: sensor.map(|sensor| sensor.read_noise_e),
+        bias_adu: sheet.as_ref().map_or(0.0, |sheet| sheet.bias_adu),
+        read_noise_e: sheet.map(|sheet| sheet.read_noise_e),
     })
 }
 

@@ -11,7 +11,7 @@ use super::solving::{Plan, solve_all};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use starpipe::calibration::{Calibration, read_hot_pixels};
-use starpipe::camera::data_sheet::Sensor;
+use starpipe::camera::data_sheet::DataSheet;
 use starpipe::detect::{CentroidMethod, DetectConfig};
 use starpipe::frame::Buffers;
 use starpipe::identify::Priors;
@@ -117,15 +117,15 @@ pub(crate) fn process(arguments: ProcessArgs) -> Result<Exit, CommandError> {
         light,
         solving,
     } = arguments;
-    let sensor = solving.hints.sensor()?;
+    let sheet = solving.hints.data_sheet()?;
     let plan = Plan {
         detect: detection.resolve(),
         priors: Priors {
             exposure_s: light.exposure,
             ..solving.hints.resolve()?
         },
-        calibration: calibration.resolve(sensor.as_ref())?,
-        camera: sensor.map(|sensor| light.stated_camera(sensor)),
+        calibration: calibration.resolve(sheet.as_ref())?,
+        camera: sheet.map(|sheet| light.stated_camera(sheet)),
     };
     input::check(&frames)?;
     let (frames, troubles) = input::frames(frames);
@@ -161,13 +161,13 @@ pub(crate) fn process(arguments: ProcessArgs) -> Result<Exit, CommandError> {
 
 impl CalibrationOptions {
     /// What is to be taken out of frames, where anything is.
-    pub(crate) fn resolve(&self, sensor: Option<&Sensor>) -> anyhow::Result<Option<Calibration>> {
+    pub(crate) fn resolve(&self, sheet: Option<&DataSheet>) -> anyhow::Result<Option<Calibration>> {
         if self.dark.is_none() && self.flat.is_none() && self.hot_pixels.is_none() {
             return Ok(None);
         }
         let master = |path: &Option<PathBuf>| path.as_deref().map(read_master).transpose();
         let list = self.hot_pixels.as_deref().map(read_hot_pixels).transpose();
-        let bias_adu = sensor.map_or(0.0, |sensor| sensor.bias_adu);
+        let bias_adu = sheet.map_or(0.0, |sheet| sheet.bias_adu);
         let calibration = Calibration::new(
             master(&self.dark)?,
             master(&self.flat)?,
@@ -200,9 +200,9 @@ impl DetectionOptions {
 
 impl LightOptions {
     /// The camera, the zenith distance and the extinction as the user states them.
-    pub(crate) fn stated_camera(&self, sensor: Sensor) -> StatedCamera {
+    pub(crate) fn stated_camera(&self, sheet: DataSheet) -> StatedCamera {
         StatedCamera {
-            sensor,
+            sheet,
             zenith_distance_deg: self.zenith_distance,
             extinction: self.extinction.map(Extinction::MagPerAirmass),
         }

@@ -3,7 +3,7 @@
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::base::units::RAD_PER_DEG;
-use crate::camera::{self, data_sheet::Sensor};
+use crate::camera::{self, data_sheet::DataSheet};
 use crate::sky::observer::Site;
 use serde::Serialize;
 
@@ -109,9 +109,9 @@ impl ScalePrior {
     }
 
     /// The scale of a camera by its data sheet.
-    pub fn of_camera(sensor: &Sensor) -> Self {
+    pub fn of_camera(sheet: &DataSheet) -> Self {
         Self {
-            scale: Scale::Pixel(sensor.pixel_scale_rad()),
+            scale: Scale::Pixel(sheet.pixel_scale_rad()),
             tolerance: NOMINAL_TOLERANCE,
             source: ScaleSource::Camera,
         }

@@ -39,7 +39,7 @@ impl<'a> Context<'a> {
     /// header and the file's name.
     pub(super) fn priors_of(&self, frame: &Frame, name: Option<&Path>) -> Priors {
         let header = &frame.metadata;
-        let camera_scale = self.camera.as_ref().map(|camera| &camera.sensor);
+        let camera_scale = self.camera.as_ref().map(|camera| &camera.sheet);
         let header_scale = header.pixel_scale_rad().map(ScalePrior::of_header);
         let priors = self
             .priors
@@ -74,10 +74,10 @@ impl<'a> Context<'a> {
 /// The level from which on the camera's pixels are saturated. `None` where the frame's levels exceed the
 /// camera's full scale: files may hold the levels of few bits multiplied.
 fn saturation_adu(camera: &StatedCamera, frame: &Frame) -> Option<f64> {
-    let sensor = &camera.sensor;
-    let full_scale_adu = sensor.full_scale_adu() as f32;
+    let sheet = &camera.sheet;
+    let full_scale_adu = sheet.full_scale_adu() as f32;
     let is_beyond = |pixel: &f32| *pixel > full_scale_adu;
-    (!frame.pixels.iter().any(is_beyond)).then(|| sensor.saturation_adu())
+    (!frame.pixels.iter().any(is_beyond)).then(|| sheet.saturation_adu())
 }
 
 /// Buffers of the stages, reused from frame to frame. One for each thread.
@@ -106,12 +106,12 @@ mod tests {
     #[test]
     fn full_well_counts_where_the_levels_can_be_the_cameras() {
         let camera = StatedCamera {
-            sensor: Preset::Experiment1.sensor(),
+            sheet: Preset::Experiment1.data_sheet(),
             zenith_distance_deg: None,
             extinction: None,
         };
         let frame = |highest: f32| Frame::new(3, 3, vec![highest; 9]).unwrap();
-        let full_adu = camera.sensor.saturation_adu();
+        let full_adu = camera.sheet.saturation_adu();
         assert!(full_adu < 4095.0);
         assert_eq!(saturation_adu(&camera, &frame(4095.0)), Some(full_adu));
         // Twelve bits at the upper end of sixteen.

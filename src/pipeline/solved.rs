@@ -83,7 +83,7 @@ impl Solved<'_> {
             outcome: self.outcome,
             photometry: self.photometry,
             comparison,
-            gain_e_per_adu: camera.map(|camera| camera.sensor.gain_e_per_adu),
+            gain_e_per_adu: camera.map(|camera| camera.sheet.gain_e_per_adu),
             calibration: self.calibration.map(Calibration::applied),
             timing,
         }

@@ -68,7 +68,7 @@ impl PredictionReport {
         let charge = |electrons: f64| significant(electrons, CHARGE_DIGITS);
         let (scenario, budget) = (&compared.scenario, &compared.budget);
         Self {
-            camera: scenario.sensor.name.clone(),
+            camera: scenario.camera.name.clone(),
             exposure_s: scenario.conditions.exposure_s,
             zenith_distance_deg: to_decimals(
                 scenario.conditions.zenith_distance_deg,

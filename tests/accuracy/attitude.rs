@@ -1,6 +1,6 @@
 //! Attitudes of simulated frames, and their stated errors.
 
-use crate::stars::{equivalent_area_px, sensor};
+use crate::stars::{data_sheet, equivalent_area_px};
 use crate::tally::Spread;
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
@@ -32,28 +32,27 @@ struct Kind {
 
 impl Kind {
     fn scenario(&self) -> Scenario {
-        let mut sensor = sensor(self.side_px, self.spot_sigma_px);
-        sensor.read_noise_e = 7.0;
-        sensor.gain_e_per_adu = 2.0;
-        sensor.bits = 12;
-        sensor.full_well_e = 10_000.0;
+        let mut sheet = data_sheet(self.side_px, self.spot_sigma_px);
+        sheet.read_noise_e = 7.0;
+        sheet.gain_e_per_adu = 2.0;
+        sheet.bits = 12;
+        sheet.full_well_e = 10_000.0;
         let half_rad = self.fov_deg.to_radians() / 2.0;
-        sensor.focal_length_mm =
-            self.side_px as f64 / 2.0 / half_rad.tan() * sensor.pitch_x_um / 1e3;
-        let mut scenario = Scenario::new(sensor);
+        sheet.focal_length_mm = self.side_px as f64 / 2.0 / half_rad.tan() * sheet.pitch_x_um / 1e3;
+        let mut scenario = Scenario::new(sheet);
         scenario.conditions.exposure_s = self.exposure_s;
         scenario.conditions.sky = SkyBrightness::MagArcsec2(self.sky_mag_arcsec2);
         let (mut low, mut high) = (0.1, 1e4);
         for _ in 0..60 {
-            scenario.sensor.aperture_mm = f64::sqrt(low * high);
+            scenario.camera.aperture_mm = f64::sqrt(low * high);
             let budget = Budget::new(&scenario);
             let faintest_e = THRESHOLD
                 * budget.background_noise_e
                 * equivalent_area_px(self.spot_sigma_px).sqrt();
             if budget.vmag_of(faintest_e, self.exposure_s) > self.limit_vmag {
-                high = scenario.sensor.aperture_mm;
+                high = scenario.camera.aperture_mm;
             } else {
-                low = scenario.sensor.aperture_mm;
+                low = scenario.camera.aperture_mm;
             }
         }
         scenario
@@ -109,7 +108,7 @@ fn trial(
     let error = found.icrs_to_camera.matrix() * pointing.icrs_to_camera.matrix().transpose();
     let turn = Vector3::new(error[(2, 1)], error[(0, 2)], error[(1, 0)]);
     let sigma_rad = found.attitude_sigma_rad();
-    let gain = scenario.sensor.gain_e_per_adu;
+    let gain = scenario.camera.gain_e_per_adu;
     let of_star = |m: &starpipe::identify::StarMatch| {
         let source = solution.source(m.source);
         let measured = source.measured?;

@@ -1,6 +1,6 @@
 //! Centroids compared with the Cramér-Rao bound, and their stated errors.
 
-use crate::stars::{Field, Star, found_at, sensor};
+use crate::stars::{Field, Star, data_sheet, found_at};
 use crate::tally::{Rms, Spread};
 use rayon::prelude::*;
 use starpipe::detect::{CentroidMethod, DetectConfig, Detections, Workspace, detect};
@@ -23,7 +23,7 @@ fn offset_px(star: &Star) -> [f64; 2] {
 }
 
 pub fn bound(field: &Field, star: &Star) -> CramerRao {
-    let spot_sigma_px = field.scenario.sensor.spot_sigma_px;
+    let spot_sigma_px = field.scenario.camera.spot_sigma_px;
     CramerRao::of_spot(
         spot_sigma_px,
         offset_px(star),
@@ -52,9 +52,9 @@ impl Measured {
             return;
         };
         let offset = [star.place.x, star.place.y].map(|at| at - at.round());
-        let sensor = &field.scenario.sensor;
+        let sheet = &field.scenario.camera;
         let bound = CramerRao::of_spot(
-            sensor.spot_sigma_px,
+            sheet.spot_sigma_px,
             offset,
             star.flux_e,
             field.pixel_noise_e().powi(2),
@@ -71,7 +71,7 @@ impl Measured {
             let phase = ((offset[axis] + 0.5) * PHASES as f64) as usize;
             self.by_phase[axis][phase.min(PHASES - 1)].add(errors[axis]);
         }
-        let flux_e = found.flux_adu * field.scenario.sensor.gain_e_per_adu;
+        let flux_e = found.flux_adu * field.scenario.camera.gain_e_per_adu;
         self.pulls[2].add((flux_e - star.flux_e) / (flux_e / found.snr));
     }
 
@@ -143,7 +143,7 @@ fn table_of_centroids() {
     for method in [CentroidMethod::GaussianFit, CentroidMethod::GreyWeighted] {
         println!("{method:?}");
         for spot_px in [0.5, 0.7, 1.0, 1.25, 1.5] {
-            let field = Field::new(sensor(2048, spot_px), 100.0);
+            let field = Field::new(data_sheet(2048, spot_px), 100.0);
             let config = DetectConfig {
                 centroid: method,
                 ..DetectConfig::default()
@@ -184,7 +184,7 @@ fn centroids_reach_the_bound_and_state_their_errors() {
     /// For about thirty comparisons with 2 x 450 errors each: one exceeds it in 1 of 300 runs.
     const SIGMAS: f64 = 3.5;
     for spot_px in [0.5, 0.8, 1.5] {
-        let field = Field::new(sensor(1024, spot_px), 100.0);
+        let field = Field::new(data_sheet(1024, spot_px), 100.0);
         let all = measured(&field, &DetectConfig::default(), &CLASSES, 8);
         for (class, m) in all.iter().enumerate() {
             let chance = SIGMAS * m.errors[0].relative_error();

@@ -1,7 +1,7 @@
 //! Detection limit at one false detection per megapixel, compared with the ideal matched filter:
 //! the one with the true spot, background and noise, and the threshold that gives this rate.
 
-use crate::stars::{Field, Star, found_at, sensor};
+use crate::stars::{Field, Star, data_sheet, found_at};
 use rayon::prelude::*;
 use starpipe::base::coords::PixelPoint;
 use starpipe::base::statistics::normal_cdf;
@@ -21,7 +21,7 @@ const BRIGHT_EVERY: usize = 8;
 const FALSE_BEYOND_PX: f64 = 8.0;
 
 pub fn field(spot_sigma_px: f64) -> Field {
-    Field::new(sensor(SIDE_PX, spot_sigma_px), 100.0)
+    Field::new(data_sheet(SIDE_PX, spot_sigma_px), 100.0)
 }
 
 /// Faint stars, the first class, and some bright ones.
@@ -108,15 +108,15 @@ fn measured(field: &Field, frames: u64) -> Found {
 
 /// Output of the ideal matched filter in units of the noise, row-major.
 fn ideal_filter(field: &Field, frame: &Frame) -> Vec<f64> {
-    let sensor = &field.scenario.sensor;
-    let radius = (4.0 * sensor.spot_sigma_px).ceil() as usize + 1;
+    let sheet = &field.scenario.camera;
+    let radius = (4.0 * sheet.spot_sigma_px).ceil() as usize + 1;
     let share = |i: usize| {
-        let edge = |half: f64| normal_cdf((i as f64 + half) / sensor.spot_sigma_px);
+        let edge = |half: f64| normal_cdf((i as f64 + half) / sheet.spot_sigma_px);
         edge(0.5) - edge(-0.5)
     };
     let half: Vec<f64> = (0..=radius).map(share).collect();
     let norm: f64 = half[0].powi(2) + 2.0 * half[1..].iter().map(|p| p * p).sum::<f64>();
-    let level_e = field.background_e() + sensor.bias_adu;
+    let level_e = field.background_e() + sheet.bias_adu;
     let data: Vec<f64> = frame
         .pixels
         .iter()

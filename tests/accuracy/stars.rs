@@ -4,7 +4,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use starpipe::base::coords::PixelPoint;
 use starpipe::base::statistics::normal_cdf;
-use starpipe::camera::data_sheet::{Imperfections, Response, Sensor};
+use starpipe::camera::data_sheet::{DataSheet, Imperfections, Response};
 use starpipe::detect::{Detection, Detections};
 use starpipe::frame::Frame;
 use starpipe::model::sensitivity::{Budget, Extinction, Scenario, SkyBrightness};
@@ -16,8 +16,8 @@ const SPACING_PX: f64 = 64.0;
 const MATCH_PX: f64 = 2.0;
 
 /// A camera with a gain of one electron per level and a spot of standard deviation `spot_sigma_px`.
-pub fn sensor(side_px: usize, spot_sigma_px: f64) -> Sensor {
-    Sensor {
+pub fn data_sheet(side_px: usize, spot_sigma_px: f64) -> DataSheet {
+    DataSheet {
         name: "test".to_owned(),
         width_px: side_px,
         height_px: side_px,
@@ -58,8 +58,8 @@ pub struct Star {
 }
 
 impl Field {
-    pub fn new(sensor: Sensor, background_e: f64) -> Self {
-        let mut scenario = Scenario::new(sensor);
+    pub fn new(sheet: DataSheet, background_e: f64) -> Self {
+        let mut scenario = Scenario::new(sheet);
         scenario.conditions.extinction = Extinction::MagPerAirmass(0.0);
         let sky_e = |mag: f64| {
             let mut scenario = scenario.clone();
@@ -85,14 +85,14 @@ impl Field {
     /// Electrons of a star with this matched-filter signal-to-noise ratio, averaged over its
     /// positions in a pixel.
     pub fn flux_e(&self, snr: f64) -> f64 {
-        snr * self.pixel_noise_e() * equivalent_area_px(self.scenario.sensor.spot_sigma_px).sqrt()
+        snr * self.pixel_noise_e() * equivalent_area_px(self.scenario.camera.spot_sigma_px).sqrt()
     }
 
     /// Positions in the cells of a grid, anywhere within a pixel, in random order.
     pub fn places(&self, random: &mut ChaCha8Rng) -> Vec<PixelPoint> {
-        let sensor = &self.scenario.sensor;
+        let sheet = &self.scenario.camera;
         let cells = |side: usize| (side as f64 / SPACING_PX).floor() as usize;
-        let (columns, rows) = (cells(sensor.width_px), cells(sensor.height_px));
+        let (columns, rows) = (cells(sheet.width_px), cells(sheet.height_px));
         let mut middle =
             |cell: usize| (cell as f64 + 0.5) * SPACING_PX + random.random_range(-0.5..0.5);
         let mut places: Vec<_> = (0..columns * rows)

@@ -1,7 +1,7 @@
 //! `camera.toml`: read strictly, with errors that name line and key.
 
 use super::keys::{KEYS, Key, Limits, is_curve, nearest_name};
-use super::{IMPERFECTION_KEYS, Imperfections, Response, ResponseError, Sensor, SpotForm};
+use super::{DataSheet, IMPERFECTION_KEYS, Imperfections, Response, ResponseError, SpotForm};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read as _;
@@ -12,7 +12,7 @@ use toml::Spanned;
 /// Why a file describes no camera.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum SensorError {
+pub enum DataSheetError {
     /// It cannot be read.
     #[error("{}", path.display())]
     Read {
@@ -116,13 +116,13 @@ fn is_optional(name: &str) -> bool {
 
 type Table = BTreeMap<Spanned<String>, Spanned<toml::Value>>;
 
-impl Sensor {
+impl DataSheet {
     /// Reads a `camera.toml`. Names of tables in it are relative to its directory.
     ///
     /// # Errors
-    /// [`SensorError`] with the file, the line and the key.
-    pub fn read(path: &Path) -> Result<Self, SensorError> {
-        let failed = |source| SensorError::Read {
+    /// [`DataSheetError`] with the file, the line and the key.
+    pub fn read(path: &Path) -> Result<Self, DataSheetError> {
+        let failed = |source| DataSheetError::Read {
             path: path.to_owned(),
             source,
         };
@@ -132,7 +132,7 @@ impl Sensor {
             .read_to_string(&mut text)
             .map_err(failed)?;
         if text.len() as u64 > MAX_BYTES {
-            return Err(SensorError::TooLarge {
+            return Err(DataSheetError::TooLarge {
                 path: path.to_owned(),
                 limit: MAX_BYTES,
             });
@@ -144,13 +144,13 @@ impl Sensor {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub fn parse(path: &Path, text: &str) -> Result<Self, SensorError> {
-        let table: Table = toml::from_str(text).map_err(|error| SensorError::Syntax {
+    pub fn parse(path: &Path, text: &str) -> Result<Self, DataSheetError> {
+        let table: Table = toml::from_str(text).map_err(|error| DataSheetError::Syntax {
             path: path.to_owned(),
             line: line_of(text, error.span()),
             message: error.message().trim().to_owned(),
         })?;
-        Reading { path, text, table }.sensor()
+        Reading { path, text, table }.data_sheet()
     }
 
     /// What contradicts what, where something does.
@@ -195,9 +195,9 @@ struct Reading<'a> {
 }
 
 impl Reading<'_> {
-    fn sensor(&self) -> Result<Sensor, SensorError> {
+    fn data_sheet(&self) -> Result<DataSheet, DataSheetError> {
         self.check_names()?;
-        let mut sensor = Sensor {
+        let mut sheet = DataSheet {
             name: self.name()?,
             width_px: 0,
             height_px: 0,
@@ -226,19 +226,19 @@ impl Reading<'_> {
         let keys = KEYS.iter().chain(IMPERFECTION_KEYS);
         for key in keys.filter(|key| !is_curve(key.name)) {
             if let Some(value) = self.number(key)? {
-                (key.set)(&mut sensor, value);
+                (key.set)(&mut sheet, value);
             }
         }
-        match sensor.contradiction() {
-            None => Ok(sensor),
-            Some(what) => Err(SensorError::Contradiction {
+        match sheet.contradiction() {
+            None => Ok(sheet),
+            Some(what) => Err(DataSheetError::Contradiction {
                 path: self.path.to_owned(),
                 what,
             }),
         }
     }
 
-    fn check_names(&self) -> Result<(), SensorError> {
+    fn check_names(&self) -> Result<(), DataSheetError> {
         let numbers = || KEYS.iter().chain(IMPERFECTION_KEYS).map(|key| key.name);
         let names = || {
             ["name", "spot_form", "mirrored"]
@@ -248,7 +248,7 @@ impl Reading<'_> {
         for key in self.table.keys() {
             let name = key.get_ref().as_str();
             if !names().any(|known| known == name) {
-                return Err(SensorError::UnknownKey {
+                return Err(DataSheetError::UnknownKey {
                     path: self.path.to_owned(),
                     line: line_of(self.text, Some(key.span())),
                     key: name.to_owned(),
@@ -264,13 +264,13 @@ impl Reading<'_> {
         found.map(|(_, value)| value)
     }
 
-    fn wrong(&self, key: &str, value: &Spanned<toml::Value>, expected: String) -> SensorError {
+    fn wrong(&self, key: &str, value: &Spanned<toml::Value>, expected: String) -> DataSheetError {
         let found = self.text.get(value.span()).unwrap_or_default();
         let mut found: String = found.chars().take(40).collect();
         if found.is_empty() {
             found = "empty".to_owned();
         }
-        SensorError::Value {
+        DataSheetError::Value {
             path: self.path.to_owned(),
             line: line_of(self.text, Some(value.span())),
             key: key.to_owned(),
@@ -279,7 +279,7 @@ impl Reading<'_> {
         }
     }
 
-    fn name(&self) -> Result<String, SensorError> {
+    fn name(&self) -> Result<String, DataSheetError> {
         match self.get("name") {
             None => Ok(self.path.file_stem().map_or_else(
                 || "camera".to_owned(),
@@ -292,7 +292,7 @@ impl Reading<'_> {
         }
     }
 
-    fn spot_form(&self) -> Result<SpotForm, SensorError> {
+    fn spot_form(&self) -> Result<SpotForm, DataSheetError> {
         let Some(value) = self.get("spot_form") else {
             return Ok(SpotForm::default());
         };
@@ -303,7 +303,7 @@ impl Reading<'_> {
         })
     }
 
-    fn mirrored(&self) -> Result<bool, SensorError> {
+    fn mirrored(&self) -> Result<bool, DataSheetError> {
         let Some(value) = self.get("mirrored") else {
             return Ok(false);
         };
@@ -312,7 +312,7 @@ impl Reading<'_> {
     }
 
     /// The value of a key; none where it is to follow from the others.
-    fn number(&self, key: &Key<Sensor>) -> Result<Option<f64>, SensorError> {
+    fn number(&self, key: &Key<DataSheet>) -> Result<Option<f64>, DataSheetError> {
         let Some(value) = self.get(key.name) else {
             let default = DEFAULTS.iter().find(|(name, _)| *name == key.name);
             return match default {
@@ -327,19 +327,19 @@ impl Reading<'_> {
             .ok_or_else(|| self.wrong(key.name, value, key.limits.to_string()))
     }
 
-    fn missing(&self, name: &str) -> SensorError {
+    fn missing(&self, name: &str) -> DataSheetError {
         let key = KEYS.iter().find(|key| key.name == name);
-        SensorError::Missing {
+        DataSheetError::Missing {
             path: self.path.to_owned(),
             key: key.map_or("a key", |key| key.name),
             about: key.map_or("", |key| key.about),
         }
     }
 
-    fn response(&self, name: &str) -> Result<Response, SensorError> {
+    fn response(&self, name: &str) -> Result<Response, DataSheetError> {
         let value = self.get(name).ok_or_else(|| self.missing(name))?;
         let line = line_of(self.text, Some(value.span()));
-        let table = |source| SensorError::Response {
+        let table = |source| DataSheetError::Response {
             path: self.path.to_owned(),
             line,
             key: name.to_owned(),
@@ -401,8 +401,8 @@ mod tests {
     use super::super::{Preset, template};
     use super::*;
 
-    fn parsed(text: &str) -> Result<Sensor, SensorError> {
-        Sensor::parse("camera.toml".as_ref(), text)
+    fn parsed(text: &str) -> Result<DataSheet, DataSheetError> {
+        DataSheet::parse("camera.toml".as_ref(), text)
     }
 
     fn with(key: &str, line: &str) -> String {
@@ -417,7 +417,7 @@ mod tests {
     #[test]
     fn a_template_is_read_back_as_it_was() {
         for preset in Preset::ALL {
-            assert_eq!(parsed(&template(preset)).unwrap(), preset.sensor());
+            assert_eq!(parsed(&template(preset)).unwrap(), preset.data_sheet());
         }
     }
 

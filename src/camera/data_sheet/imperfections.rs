@@ -1,6 +1,6 @@
 //! What a real camera does besides: what makes one pixel differ from another, and the light of a star spread otherwise.
 
-use super::Sensor;
+use super::DataSheet;
 use super::keys::{Key, Limits, key};
 
 /// How the light of a star is spread over the pixels.
@@ -110,7 +110,7 @@ const PART: Limits = Limits::FromTo(0.0, 1.0);
 const DISPLACEMENT_PX: Limits = Limits::FromTo(-1000.0, 1000.0);
 
 /// The numbers of [`Imperfections`] by name. None has to be given.
-pub const IMPERFECTION_KEYS: &[Key<Sensor>] = &[
+pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     key!(vignetting in imperfections, PART, "part of the light lost in the corners"),
     key!(distortion_px in imperfections,
         DISPLACEMENT_PX,

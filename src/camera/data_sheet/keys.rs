@@ -1,6 +1,6 @@
 //! The numbers of a camera by name: one table for the file, the options and the sweeps.
 
-use super::{IMPERFECTION_KEYS, Preset, Response, Sensor, SpotForm};
+use super::{DataSheet, IMPERFECTION_KEYS, Preset, Response, SpotForm};
 use std::fmt;
 use std::fmt::Write as _;
 
@@ -122,10 +122,10 @@ macro_rules! key {
 }
 pub(crate) use key;
 
-/// The numbers of a camera. The two that may be curves, [`Sensor::lens_transmission`] and [`Sensor::quantum_efficiency`],
+/// The numbers of a camera. The two that may be curves, [`DataSheet::lens_transmission`] and [`DataSheet::quantum_efficiency`],
 /// are their largest values here; a curve that is given another one keeps its form. Of `spot_sigma_px` and `peak_share` the
 /// last one given decides what falls on the brightest pixel.
-pub const KEYS: &[Key<Sensor>] = &[
+pub const KEYS: &[Key<DataSheet>] = &[
     key!(
         width_px,
         Limits::Whole(3.0, MAX_SIDE_PX),
@@ -156,15 +156,15 @@ pub const KEYS: &[Key<Sensor>] = &[
         name: "lens_transmission",
         about: "part of the light that the lens lets through (largest, of a curve)",
         limits: Limits::Share,
-        get: |sensor| Some(sensor.lens_transmission.peak()),
-        set: |sensor, peak| sensor.lens_transmission = sensor.lens_transmission.with_peak(peak),
+        get: |sheet| Some(sheet.lens_transmission.peak()),
+        set: |sheet, peak| sheet.lens_transmission = sheet.lens_transmission.with_peak(peak),
     },
     Key {
         name: "quantum_efficiency",
         about: "electrons for each photon on a pixel (largest, of a curve)",
         limits: Limits::Share,
-        get: |sensor| Some(sensor.quantum_efficiency.peak()),
-        set: |sensor, peak| sensor.quantum_efficiency = sensor.quantum_efficiency.with_peak(peak),
+        get: |sheet| Some(sheet.quantum_efficiency.peak()),
+        set: |sheet, peak| sheet.quantum_efficiency = sheet.quantum_efficiency.with_peak(peak),
     },
     key!(
         band_from_nm,
@@ -202,51 +202,51 @@ pub const KEYS: &[Key<Sensor>] = &[
         name: "spot_sigma_px",
         about: "standard deviation of a star's spot, in pixels",
         limits: SPOTS_PX,
-        get: |sensor| Some(sensor.spot_sigma_px),
-        set: |sensor, sigma_px| {
-            sensor.spot_sigma_px = sigma_px;
+        get: |sheet| Some(sheet.spot_sigma_px),
+        set: |sheet, sigma_px| {
+            sheet.spot_sigma_px = sigma_px;
             // A share that was stated is that of another spot.
-            sensor.peak_share = None;
+            sheet.peak_share = None;
         },
     },
     Key {
         name: "peak_share",
         about: "part of a star's light on its brightest pixel (else from spot_sigma_px)",
         limits: Limits::Share,
-        get: |sensor| Some(sensor.peak_share()),
-        set: |sensor, share| sensor.peak_share = Some(share),
+        get: |sheet| Some(sheet.peak_share()),
+        set: |sheet, share| sheet.peak_share = Some(share),
     },
 ];
 
 /// A `camera.toml` with the values of `preset` and a comment at each.
 pub fn template(preset: Preset) -> String {
-    let sensor = preset.sensor();
+    let sheet = preset.data_sheet();
     let mut text = format!("# A camera for starpipe: {}\n", preset.about());
     for line in preset.sources().lines() {
         let _ = writeln!(text, "# {line}");
     }
-    let _ = writeln!(text, "\nname = {:?}", sensor.name);
+    let _ = writeln!(text, "\nname = {:?}", sheet.name);
     for key in KEYS {
         let value = match key.name {
-            "lens_transmission" => response_value(&sensor.lens_transmission),
-            "quantum_efficiency" => response_value(&sensor.quantum_efficiency),
-            "peak_share" => match sensor.peak_share {
+            "lens_transmission" => response_value(&sheet.lens_transmission),
+            "quantum_efficiency" => response_value(&sheet.quantum_efficiency),
+            "peak_share" => match sheet.peak_share {
                 Some(share) => share.to_string(),
                 None => continue,
             },
-            _ => (key.get)(&sensor).map_or_else(String::new, |value| value.to_string()),
+            _ => (key.get)(&sheet).map_or_else(String::new, |value| value.to_string()),
         };
         let _ = writeln!(text, "\n# {}\n{} = {value}", key.about, key.name);
     }
-    text + &imperfections(&sensor)
+    text + &imperfections(&sheet)
 }
 
 /// What a file need not say: as comments, with what then holds.
-fn imperfections(sensor: &Sensor) -> String {
+fn imperfections(sheet: &DataSheet) -> String {
     let mut text =
         "\n# Of the rest, which simulated frames show, each may be left out:\n".to_owned();
     let forms = SpotForm::ALL.map(|form| format!("{:?}", form.name()));
-    let imperfections = &sensor.imperfections;
+    let imperfections = &sheet.imperfections;
     let _ = writeln!(
         text,
         "\n# form of a star's spot: {}\n# spot_form = {:?}\n\n# whether the image is reversed left to right\n# mirrored = {}",
@@ -255,7 +255,7 @@ fn imperfections(sensor: &Sensor) -> String {
         imperfections.mirrored
     );
     for key in IMPERFECTION_KEYS {
-        let value = (key.get)(sensor).map_or_else(String::new, |value| value.to_string());
+        let value = (key.get)(sheet).map_or_else(String::new, |value| value.to_string());
         let _ = writeln!(text, "\n# {}\n# {} = {value}", key.about, key.name);
     }
     text
@@ -293,14 +293,14 @@ mod tests {
 
     #[test]
     fn another_spot_has_another_share_on_its_brightest_pixel() {
-        let mut sensor = Preset::Experiment1.sensor();
+        let mut sheet = Preset::Experiment1.data_sheet();
         let set =
-            |sensor: &mut Sensor, name, value| (Key::find(KEYS, name).unwrap().set)(sensor, value);
-        set(&mut sensor, "spot_sigma_px", 0.5);
+            |sheet: &mut DataSheet, name, value| (Key::find(KEYS, name).unwrap().set)(sheet, value);
+        set(&mut sheet, "spot_sigma_px", 0.5);
         // erf(1/√2)² = 0.682689².
-        assert!((sensor.peak_share() - 0.466_065).abs() < 1e-6);
-        set(&mut sensor, "peak_share", 0.25);
-        assert_eq!((sensor.spot_sigma_px, sensor.peak_share()), (0.5, 0.25));
+        assert!((sheet.peak_share() - 0.466_065).abs() < 1e-6);
+        set(&mut sheet, "peak_share", 0.25);
+        assert_eq!((sheet.spot_sigma_px, sheet.peak_share()), (0.5, 0.25));
     }
 
     #[test]

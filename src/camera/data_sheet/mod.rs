@@ -1,8 +1,8 @@
 //! A camera as its data sheets describe it: pixels, lens, and what a photon becomes.
 //!
-//! `camera.toml` → [`Sensor`]. Lengths are in mm and µm, charges in electrons, times in seconds.
+//! `camera.toml` → [`DataSheet`]. Lengths are in mm and µm, charges in electrons, times in seconds.
 //!
-//! [`Sensor::read`] takes a file whose keys are those of [`KEYS`]; [`Preset`] has some that are ready; [`template`] writes
+//! [`DataSheet::read`] takes a file whose keys are those of [`KEYS`]; [`Preset`] has some that are ready; [`template`] writes
 //! one with comments. A transmission or an efficiency is a number, or a CSV file of two columns, wavelength in
 //! nanometres and value, which [`Response`] interpolates.
 //!
@@ -17,7 +17,7 @@ mod keys;
 mod preset;
 mod response;
 
-pub use file::SensorError;
+pub use file::DataSheetError;
 pub use imperfections::{IMPERFECTION_KEYS, Imperfections, SpotForm};
 pub(crate) use keys::key;
 pub use keys::{KEYS, Key, Limits, is_curve, nearest_name, template};
@@ -28,7 +28,7 @@ use std::f64::consts::SQRT_2;
 
 /// A camera: lens and detector.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sensor {
+pub struct DataSheet {
     /// What it is called.
     pub name: String,
     /// Columns.
@@ -72,7 +72,7 @@ pub struct Sensor {
     pub imperfections: Imperfections,
 }
 
-impl Sensor {
+impl DataSheet {
     /// The area of the entrance pupil, in m².
     #[doc(alias = "A")]
     pub fn aperture_area_m2(&self) -> f64 {
@@ -125,17 +125,17 @@ mod tests {
 
     #[test]
     fn a_ninth_of_the_light_is_on_the_brightest_pixel_at_sigma_1_16() {
-        let mut sensor = Preset::Experiment1.sensor();
-        assert_eq!(sensor.peak_share(), 1.0 / 9.0);
-        sensor.peak_share = None;
-        sensor.spot_sigma_px = 1.16;
-        assert!((sensor.peak_share() * 9.0 - 1.0).abs() < 0.01);
+        let mut sheet = Preset::Experiment1.data_sheet();
+        assert_eq!(sheet.peak_share(), 1.0 / 9.0);
+        sheet.peak_share = None;
+        sheet.spot_sigma_px = 1.16;
+        assert!((sheet.peak_share() * 9.0 - 1.0).abs() < 0.01);
     }
 
     #[test]
     fn the_papers_pixel_is_2_79e_9_sr_and_its_pupil_78_5_cm2() {
-        let sensor = Preset::Experiment1.sensor();
-        assert!((sensor.pixel_solid_angle_sr() / 2.788_28e-9 - 1.0).abs() < 1e-5);
-        assert!((sensor.aperture_area_m2() / 7.853_98e-3 - 1.0).abs() < 1e-6);
+        let sheet = Preset::Experiment1.data_sheet();
+        assert!((sheet.pixel_solid_angle_sr() / 2.788_28e-9 - 1.0).abs() < 1e-5);
+        assert!((sheet.aperture_area_m2() / 7.853_98e-3 - 1.0).abs() < 1e-6);
     }
 }

@@ -1,6 +1,6 @@
 //! Cameras that are ready.
 
-use super::{Imperfections, Response, Sensor};
+use super::{DataSheet, Imperfections, Response};
 
 /// A camera whose description is built in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,7 +71,7 @@ impl Preset {
     }
 
     /// The camera.
-    pub fn sensor(self) -> Sensor {
+    pub fn data_sheet(self) -> DataSheet {
         match self {
             Self::Experiment1 | Self::Experiment2 => papers_camera(),
             Self::NanosatTracker => nanosat_tracker(),
@@ -88,10 +88,10 @@ limits. Not in the paper: the number of pixels is that of a half-inch video dete
 with that peak share, full well is 52 dB above the noise; bits, gain and bias are assumed.";
 
 /// Section 2.2 of the paper.
-fn papers_camera() -> Sensor {
+fn papers_camera() -> DataSheet {
     let qe = include_bytes!("quantum-efficiency.csv");
     let quantum_efficiency = Response::parse("quantum-efficiency.csv".as_ref(), qe);
-    Sensor {
+    DataSheet {
         name: "Tong, Li & Wang 2014".to_owned(),
         width_px: 752,
         height_px: 582,
@@ -123,8 +123,8 @@ dark current (20 electrons/s at 25 degrees C), bias, spot (1.5 px), lens transmi
 of the monochrome version.";
 
 /// `nanosat-tracker`
-fn nanosat_tracker() -> Sensor {
-    Sensor {
+fn nanosat_tracker() -> DataSheet {
+    DataSheet {
         name: "MT9P031, 16 mm f/1.2".to_owned(),
         width_px: 2592,
         height_px: 1944,
@@ -171,8 +171,8 @@ IMX249, which is the same. Lens: 35 mm f/1.4. Estimates: dark current (0.7 elect
 maker's curve).";
 
 /// `imx174-35mm`
-fn imx174() -> Sensor {
-    Sensor {
+fn imx174() -> DataSheet {
+    DataSheet {
         name: "IMX174, 35 mm f/1.4".to_owned(),
         width_px: 1936,
         height_px: 1216,
@@ -218,8 +218,8 @@ well of 4095 electrons, dark current 0.003 electrons/s at -20 degrees C, quantum
 400 nm extrapolated). Lens: 135 mm f/2. Estimates: bias, spot (1.2 px), lens transmission (0.88).";
 
 /// `asi183mm-135mm`
-fn asi183() -> Sensor {
-    Sensor {
+fn asi183() -> DataSheet {
+    DataSheet {
         name: "ASI183MM, 135 mm f/2".to_owned(),
         width_px: 5496,
         height_px: 3672,
@@ -282,17 +282,17 @@ mod tests {
     #[test]
     fn every_preset_is_a_camera_without_a_fault() {
         for preset in Preset::ALL {
-            let (name, sensor) = (preset.name(), preset.sensor());
+            let (name, sheet) = (preset.name(), preset.data_sheet());
             assert_eq!(Preset::named(name), Some(preset));
-            assert_eq!(sensor.contradiction(), None, "{name}");
+            assert_eq!(sheet.contradiction(), None, "{name}");
             for key in KEYS {
-                let value = (key.get)(&sensor).unwrap();
+                let value = (key.get)(&sheet).unwrap();
                 assert!(key.limits.accept(value), "{name}: {} {value}", key.name);
             }
             // The full well ends near where the scale does: bits and gain belong to it.
-            let steps = sensor.full_well_e / sensor.gain_e_per_adu;
+            let steps = sheet.full_well_e / sheet.gain_e_per_adu;
             assert!(
-                (0.9..1.1).contains(&(steps / sensor.full_scale_adu())),
+                (0.9..1.1).contains(&(steps / sheet.full_scale_adu())),
                 "{name}: {steps}"
             );
         }
@@ -302,11 +302,11 @@ mod tests {
     #[test]
     fn figures_in_decibels_are_those_of_the_data_sheets() {
         // The largest ratio is that of the shot noise of a full well, the range that of a full well to the noise of reading.
-        let snr_db = |sensor: &Sensor| 10.0 * sensor.full_well_e.log10();
-        let range_db = |sensor: &Sensor| 20.0 * (sensor.full_well_e / sensor.read_noise_e).log10();
-        let mt9p031 = Preset::NanosatTracker.sensor();
+        let snr_db = |sheet: &DataSheet| 10.0 * sheet.full_well_e.log10();
+        let range_db = |sheet: &DataSheet| 20.0 * (sheet.full_well_e / sheet.read_noise_e).log10();
+        let mt9p031 = Preset::NanosatTracker.data_sheet();
         assert!((snr_db(&mt9p031) - 38.1).abs() < 0.05 && (range_db(&mt9p031) - 70.1).abs() < 0.15);
-        let imx174 = Preset::Imx174.sensor();
+        let imx174 = Preset::Imx174.data_sheet();
         assert!((snr_db(&imx174) - 45.1).abs() < 0.06 && (range_db(&imx174) - 73.0).abs() < 0.7);
     }
 }

@@ -9,7 +9,7 @@ use serde::Serialize;
 use starpipe::calibration::darks::{
     DarkConfig, DarkStack, Darks, ExposureGroup, FrameStatistics, FullScaleSource,
 };
-use starpipe::camera::data_sheet::Sensor;
+use starpipe::camera::data_sheet::DataSheet;
 use starpipe::frame::Buffers;
 use starpipe::model::defocus::PAPER_RELATIVE_NOISE;
 use starpipe::model::sensitivity::{Budget, Scenario};
@@ -76,7 +76,7 @@ impl Noise {
         scenario: &mut Scenario,
         darks: Option<DarkNoise>,
     ) -> anyhow::Result<Self> {
-        let gain = scenario.sensor.gain_e_per_adu;
+        let gain = scenario.camera.gain_e_per_adu;
         let (e, source) = match darks {
             None => {
                 let budget = Budget::new(scenario);
@@ -101,10 +101,10 @@ impl Noise {
             );
         }
         // It stands for both from here on.
-        scenario.sensor.dark_current_e_s = 0.0;
-        scenario.sensor.read_noise_e = e;
+        scenario.camera.dark_current_e_s = 0.0;
+        scenario.camera.read_noise_e = e;
         Ok(Self {
-            relative: Some(e / gain / (scenario.sensor.full_scale_adu() + 1.0)),
+            relative: Some(e / gain / (scenario.camera.full_scale_adu() + 1.0)),
             e: Some(e),
             source: source.to_owned(),
             darks,
@@ -134,10 +134,8 @@ pub(super) fn of_darks(
     if unread > 0 {
         return Err(anyhow!("{unread} of {} dark frames could not be read", frames.len()).into());
     }
-    let sensor = scenario.map(|scenario| &scenario.sensor);
-    let darks = stack
-        .measure(&config(sensor))
-        .map_err(anyhow::Error::from)?;
+    let sheet = scenario.map(|scenario| &scenario.camera);
+    let darks = stack.measure(&config(sheet)).map_err(anyhow::Error::from)?;
     if let [first, others @ ..] = &darks.warnings[..] {
         let others = match others.len() {
             0 => String::new(),
@@ -150,10 +148,10 @@ pub(super) fn of_darks(
     Ok(Some(of_exposure(&darks, scenario)))
 }
 
-fn config(sensor: Option<&Sensor>) -> DarkConfig {
+fn config(sheet: Option<&DataSheet>) -> DarkConfig {
     DarkConfig {
-        bits: sensor.map(|sensor| (sensor.bits, FullScaleSource::Camera)),
-        gain_e_per_adu: sensor.map(|sensor| sensor.gain_e_per_adu),
+        bits: sheet.map(|sheet| (sheet.bits, FullScaleSource::Camera)),
+        gain_e_per_adu: sheet.map(|sheet| sheet.gain_e_per_adu),
         ..DarkConfig::default()
     }
 }

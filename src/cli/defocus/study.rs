@@ -125,10 +125,10 @@ impl Plan {
         let darks = noise::of_darks(arguments, scenario.as_ref(), pool)?;
         let lens = scenario
             .as_ref()
-            .map(|scenario| Lens::of(&scenario.sensor, arguments.focused_px));
+            .map(|scenario| Lens::of(&scenario.camera, arguments.focused_px));
         let present_px = scenario
             .as_ref()
-            .map(|scenario| scenario.sensor.spot_sigma_px);
+            .map(|scenario| scenario.camera.spot_sigma_px);
         let (stars, grid, noise) = match (normalisation, scenario) {
             (Normalisation::Energy, Some(scenario)) => of_energy(arguments, scenario, darks)?,
             _ => of_peak(arguments, darks)?,
@@ -291,7 +291,7 @@ fn of_energy(
     /// The default noises: from that part of the own one to that multiple, and how many.
     const NOISES: (f64, f64, usize) = (0.25, 4.0, 9);
     let noise = Noise::of_energy(&mut scenario, darks)?;
-    let own = scenario.sensor.read_noise_e;
+    let own = scenario.camera.read_noise_e;
     let magnitudes = match &arguments.vmag[..] {
         [] => vec![default_v_mag(&scenario)?],
         given => given.to_vec(),

@@ -18,7 +18,7 @@ use anyhow::Context;
 use figure::{Panel, Sheet};
 use rayon::prelude::*;
 use serde::Serialize;
-use starpipe::camera::data_sheet::{Preset, Sensor};
+use starpipe::camera::data_sheet::{DataSheet, Preset};
 use starpipe::model::sensitivity::{
     Detector, Faintest, Figure, Prediction, Scenario, Series, Sweep, curves,
 };
@@ -101,7 +101,7 @@ fn rows(arguments: &LimitArgs, scenario: &Scenario) -> Result<Vec<Row>, CommandE
         Ok::<_, CommandError>(Row {
             // For its own sake only: in a sweep it would cost more than all the rest.
             faintest: match swept {
-                None => faintest(&scenario.sensor, &detector),
+                None => faintest(&scenario.camera, &detector),
                 Some(_) => None,
             },
             prediction,
@@ -131,8 +131,8 @@ fn rows(arguments: &LimitArgs, scenario: &Scenario) -> Result<Vec<Row>, CommandE
 }
 
 /// The faintest star to be expected in a field, with as many stars as the built-in catalogue has in one on average.
-fn faintest(sensor: &Sensor, detector: &Detector) -> Option<Faintest> {
-    let field_sr = sensor.pixel_solid_angle_sr() * (sensor.width_px * sensor.height_px) as f64;
+fn faintest(sheet: &DataSheet, detector: &Detector) -> Option<Faintest> {
+    let field_sr = sheet.pixel_solid_angle_sr() * (sheet.width_px * sheet.height_px) as f64;
     let part_of_sky = (field_sr / (4.0 * std::f64::consts::PI)).min(1.0);
     let stars = Catalog::built_in().stars().iter();
     Faintest::in_part_of_sky(

@@ -35,12 +35,12 @@ fn words_of(reading: Reading) -> &'static str {
 pub(super) fn caption(scenario: &Scenario) -> Vec<String> {
     let limit_vmag = Budget::new(scenario).limit_vmag;
     vec![
-        scenario.sensor.name.clone(),
+        scenario.camera.name.clone(),
         words_of(scenario.reading).to_owned(),
         format!(
             "dot: exposure {} s, aperture {} mm,",
             number(scenario.conditions.exposure_s),
-            number(scenario.sensor.aperture_mm),
+            number(scenario.camera.aperture_mm),
         ),
         format!("limit V {limit_vmag:.2}"),
     ]

@@ -6,7 +6,7 @@ use clap::Args;
 use starpipe::base::coords::UnitVector;
 use starpipe::base::epoch::ObservationDate;
 use starpipe::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
-use starpipe::camera::data_sheet::Sensor;
+use starpipe::camera::data_sheet::DataSheet;
 use starpipe::identify::{
     DateSource, FrameDate, Priors, Scale, ScalePrior, ScaleSource, SkyRegion,
 };
@@ -89,11 +89,11 @@ impl HintOptions {
 
     /// The same, with the scale of the camera, as a hard constraint, where no other is given.
     pub(crate) fn resolve_with_camera(&self) -> Result<Priors, CommandError> {
-        let sensor = self.sensor()?;
+        let sheet = self.data_sheet()?;
         let priors = self.resolve()?;
-        let of_camera = sensor.as_ref().map(|sensor| ScalePrior {
+        let of_camera = sheet.as_ref().map(|sheet| ScalePrior {
             source: ScaleSource::User,
-            ..ScalePrior::of_camera(sensor)
+            ..ScalePrior::of_camera(sheet)
         });
         Ok(Priors {
             scale: priors.scale.or(of_camera),
@@ -102,8 +102,8 @@ impl HintOptions {
     }
 
     /// The camera, where it is described.
-    pub(crate) fn sensor(&self) -> anyhow::Result<Option<Sensor>> {
-        let read = |path: &PathBuf| Ok(Sensor::read(path)?);
+    pub(crate) fn data_sheet(&self) -> anyhow::Result<Option<DataSheet>> {
+        let read = |path: &PathBuf| Ok(DataSheet::read(path)?);
         self.camera.as_ref().map(read).transpose()
     }
 }

@@ -38,10 +38,10 @@ impl ParameterOptions {
                 Given::Number(value) => parameter.set(scenario, *value),
                 Given::Curve(path) => {
                     let curve = Response::read(path)?;
-                    let sensor = &mut scenario.sensor;
+                    let sheet = &mut scenario.camera;
                     match parameter.name() {
-                        "lens_transmission" => sensor.lens_transmission = curve,
-                        _ => sensor.quantum_efficiency = curve,
+                        "lens_transmission" => sheet.lens_transmission = curve,
+                        _ => sheet.quantum_efficiency = curve,
                     }
                 }
             }
@@ -98,7 +98,7 @@ fn option(parameter: Parameter) -> Arg {
     let mut about = parameter.about().to_owned();
     about[..1].make_ascii_uppercase();
     let default = match parameter {
-        Parameter::Sensor(_) => None,
+        Parameter::Camera(_) => None,
         Parameter::Conditions(key) => (key.get)(&Conditions::default()),
     };
     let default = default.map_or_else(String::new, |value| {
@@ -117,7 +117,7 @@ fn option(parameter: Parameter) -> Arg {
     })
     .help(format!("{about}: {}{default}", parameter.limits()))
     .help_heading(match parameter {
-        Parameter::Sensor(_) => "Camera",
+        Parameter::Camera(_) => "Camera",
         Parameter::Conditions(_) => "Conditions",
     })
     .allow_hyphen_values(true)

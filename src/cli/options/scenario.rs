@@ -5,7 +5,7 @@ use crate::cli::exit::CommandError;
 use anyhow::{Context, anyhow};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use starpipe::camera::data_sheet::{Preset, Sensor};
+use starpipe::camera::data_sheet::{DataSheet, Preset};
 use starpipe::model::sensitivity::{Reading, Scenario, ScenarioError};
 use std::path::{Path, PathBuf};
 
@@ -66,7 +66,7 @@ impl ScenarioOptions {
 
 /// The camera in a file under the default conditions.
 fn described(path: &Path) -> anyhow::Result<Scenario> {
-    let scenario = Scenario::new(Sensor::read(path)?);
+    let scenario = Scenario::new(DataSheet::read(path)?);
     // What a file says is a fault of the file, not of the options.
     scenario
         .check()

@@ -62,7 +62,7 @@ impl SceneOptions {
         for (parameter, value) in &self.numbers {
             parameter.set(setup, *value);
         }
-        let imperfections = &mut setup.scenario.sensor.imperfections;
+        let imperfections = &mut setup.scenario.camera.imperfections;
         imperfections.spot_form = self.spot_form.unwrap_or(imperfections.spot_form);
         imperfections.mirrored |= self.mirrored;
     }

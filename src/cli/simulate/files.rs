@@ -10,7 +10,7 @@ use clap::ValueEnum;
 use serde::Serialize;
 use starpipe::base::coords::{Camera, Icrs, PixelPoint, Rotation};
 use starpipe::base::units::DEG_PER_RAD;
-use starpipe::camera::data_sheet::Sensor;
+use starpipe::camera::data_sheet::DataSheet;
 use starpipe::frame::{FitsSamples, Frame, TiffOptions, TiffSamples, write_fits, write_tiff};
 use starpipe::model::simulate::{TrueStar, Truth};
 use std::io::Cursor;
@@ -60,7 +60,7 @@ impl Place {
     pub(super) fn of(
         arguments: &SimulateArgs,
         subject: &Subject,
-        sensor: &Sensor,
+        sheet: &DataSheet,
     ) -> Result<Self, CommandError> {
         let named_kind = ImageKind::of_name(&arguments.out).filter(|_| !arguments.out.is_dir());
         if named_kind.is_some() && arguments.count > 1 {
@@ -91,7 +91,7 @@ impl Place {
             has_truth: subject.has_truth(),
             kind,
             compressed: arguments.compress,
-            bits: sensor.bits,
+            bits: sheet.bits,
             numbers: arguments.first..arguments.first + arguments.count,
             may_overwrite: arguments.force,
         })

@@ -25,7 +25,7 @@ impl Description<'_> {
 
     /// The keywords that programs know, the world coordinates as they truly are, and all numbers as history.
     pub(super) fn fits_header(&self) -> FitsHeader {
-        let sensor = &self.job.setup.scenario.sensor;
+        let sheet = &self.job.setup.scenario.camera;
         let exposure_s = self.job.setup.scenario.conditions.exposure_s;
         let mut header = FitsHeader::default();
         if let Some(date) = self.job.date {
@@ -37,22 +37,18 @@ impl Description<'_> {
             );
             header.text("TIMESYS", "UTC", "");
         }
-        header.text("INSTRUME", &sensor.name, "simulated camera");
+        header.text("INSTRUME", &sheet.name, "simulated camera");
         header.text("IMAGETYP", self.kind(), "");
         header.real("EXPTIME", exposure_s, "[s] exposure");
-        header.real("XPIXSZ", sensor.pitch_x_um, "[um] distance of columns");
-        header.real("YPIXSZ", sensor.pitch_y_um, "[um] distance of rows");
-        header.real("FOCALLEN", sensor.focal_length_mm, "[mm] focal length");
-        header.real(
-            "APTDIA",
-            sensor.aperture_mm,
-            "[mm] diameter of the aperture",
-        );
-        header.real("EGAIN", sensor.gain_e_per_adu, "[electron/adu]");
-        header.real("RDNOISE", sensor.read_noise_e, "[electron]");
+        header.real("XPIXSZ", sheet.pitch_x_um, "[um] distance of columns");
+        header.real("YPIXSZ", sheet.pitch_y_um, "[um] distance of rows");
+        header.real("FOCALLEN", sheet.focal_length_mm, "[mm] focal length");
+        header.real("APTDIA", sheet.aperture_mm, "[mm] diameter of the aperture");
+        header.real("EGAIN", sheet.gain_e_per_adu, "[electron/adu]");
+        header.real("RDNOISE", sheet.read_noise_e, "[electron]");
         let saturation_adu = self.made.frame.saturation_adu.map_or(0.0, f64::from);
         header.real("SATURATE", saturation_adu, "[adu]");
-        header.integer("BITS", i64::from(sensor.bits), "of a grey level");
+        header.integer("BITS", i64::from(sheet.bits), "of a grey level");
         if let Some(icrs_to_camera) = &self.made.attitude {
             wcs::add_projection(&mut header, self.job.simulator.camera(), icrs_to_camera);
         }
@@ -72,7 +68,7 @@ impl Description<'_> {
 
     fn lines(&self) -> Vec<String> {
         let setup = &self.job.setup;
-        let sensor = &setup.scenario.sensor;
+        let sheet = &setup.scenario.camera;
         let version = env!("CARGO_PKG_VERSION");
         let reading = match setup.scenario.reading {
             Reading::Paper => "paper",
@@ -80,11 +76,11 @@ impl Description<'_> {
         };
         let mut lines = vec![
             format!("Simulated by starpipe {version}: {}", self.kind()),
-            format!("camera = {}", sensor.name),
+            format!("camera = {}", sheet.name),
             format!("seed = {}, frame {}", self.job.seed, self.made.number),
             format!("reading = {reading}"),
-            format!("spot_form = {}", sensor.imperfections.spot_form.name()),
-            format!("mirrored = {}", sensor.imperfections.mirrored),
+            format!("spot_form = {}", sheet.imperfections.spot_form.name()),
+            format!("mirrored = {}", sheet.imperfections.mirrored),
         ];
         if let Subject::Flat(electrons) = self.job.subject {
             lines.push(format!("flat_e = {electrons}"));

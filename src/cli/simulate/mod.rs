@@ -87,11 +87,11 @@ impl Subject {
 
 /// The stars in a list, which must have V magnitudes.
 fn star_list(path: &Path, setup: &Setup) -> anyhow::Result<Vec<(PixelPoint, f64)>> {
-    let sensor = &setup.scenario.sensor;
+    let sheet = &setup.scenario.camera;
     let side = |pixels: usize| u32::try_from(pixels).ok();
     let size = FrameSize {
-        width: side(sensor.width_px),
-        height: side(sensor.height_px),
+        width: side(sheet.width_px),
+        height: side(sheet.height_px),
     };
     let list = centroids::read(path, size)?;
     if list.photometry != Photometry::JohnsonV {
@@ -156,7 +156,7 @@ struct ToldAttitude {
 pub(crate) fn simulate(arguments: &SimulateArgs) -> Result<Exit, CommandError> {
     let setup = arguments.setup.setup()?;
     let subject = Subject::of(arguments, &setup)?;
-    let place = Place::of(arguments, &subject, &setup.scenario.sensor)?;
+    let place = Place::of(arguments, &subject, &setup.scenario.camera)?;
     let pool = thread_pool(arguments.resources.threads)?;
     let catalog = pool.install(|| read_catalog(arguments.resources.catalog.as_deref()))?;
     let simulator = Simulator::new(&setup.scenario, &setup.scene, catalog.stars())
@@ -282,12 +282,12 @@ impl Job<'_> {
 
     /// What the file says of the frame, as a camera's would.
     fn metadata(&self) -> FrameMetadata {
-        let sensor = &self.setup.scenario.sensor;
+        let sheet = &self.setup.scenario.camera;
         FrameMetadata {
             date: self.date,
             exposure_s: Some(self.setup.scenario.conditions.exposure_s),
-            pixel_size_um: Some((sensor.pitch_x_um * sensor.pitch_y_um).sqrt()),
-            focal_length_mm: Some(sensor.focal_length_mm),
+            pixel_size_um: Some((sheet.pitch_x_um * sheet.pitch_y_um).sqrt()),
+            focal_length_mm: Some(sheet.focal_length_mm),
             ..FrameMetadata::default()
         }
     }

@@ -81,7 +81,7 @@ pub(super) fn claim(
 
 fn identity(protocol: &Protocol, catalog: &Catalog) -> anyhow::Result<Value> {
     let scenario = &protocol.setup.scenario;
-    let imperfections = &scenario.sensor.imperfections;
+    let imperfections = &scenario.camera.imperfections;
     let parameters = Parameter::all().filter_map(|parameter| {
         let value = parameter.get(&protocol.setup)?;
         Some((parameter.name().to_owned(), Value::from(value)))
@@ -91,13 +91,13 @@ fn identity(protocol: &Protocol, catalog: &Catalog) -> anyhow::Result<Value> {
         version: env!("CARGO_PKG_VERSION"),
         seed: protocol.seed,
         scale_known: protocol.scale_known,
-        camera: &scenario.sensor.name,
+        camera: &scenario.camera.name,
         reading: scenario.reading,
         spot_form: imperfections.spot_form.name(),
         mirrored: imperfections.mirrored,
         parameters: parameters.collect(),
-        lens_transmission_curve: curve(&scenario.sensor.lens_transmission),
-        quantum_efficiency_curve: curve(&scenario.sensor.quantum_efficiency),
+        lens_transmission_curve: curve(&scenario.camera.lens_transmission),
+        quantum_efficiency_curve: curve(&scenario.camera.quantum_efficiency),
         catalog: CatalogIdentity {
             title: catalog.title(),
             stars: catalog.stars().len(),

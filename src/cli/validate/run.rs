@@ -138,11 +138,11 @@ fn summed_up(
     protocol: &Protocol,
     tables: &Tables,
 ) -> anyhow::Result<Summary> {
-    let sensor = &protocol.setup.scenario.sensor;
+    let sheet = &protocol.setup.scenario.camera;
     let facts = RunFacts {
-        camera: sensor.name.clone(),
-        width_px: sensor.width_px,
-        height_px: sensor.height_px,
+        camera: sheet.name.clone(),
+        width_px: sheet.width_px,
+        height_px: sheet.height_px,
         seed: protocol.seed,
         scale_known: protocol.scale_known,
         false_alarms_per_mpx: protocol.setup.scenario.conditions.false_alarms_per_mpx,

@@ -37,10 +37,10 @@ impl Studied {
         match self {
             Self::Parameter(parameter) => parameter.set(setup, value),
             Self::FieldOfView => {
-                let sensor = &mut setup.scenario.sensor;
-                let pitch_um = (sensor.pitch_x_um * sensor.pitch_y_um).sqrt();
-                let focal_px = focal_length_px(sensor.width_px as f64, value * RAD_PER_DEG);
-                sensor.focal_length_mm = focal_px * pitch_um * 1e-3;
+                let sheet = &mut setup.scenario.camera;
+                let pitch_um = (sheet.pitch_x_um * sheet.pitch_y_um).sqrt();
+                let focal_px = focal_length_px(sheet.width_px as f64, value * RAD_PER_DEG);
+                sheet.focal_length_mm = focal_px * pitch_um * 1e-3;
             }
         }
     }
@@ -110,8 +110,8 @@ mod tests {
         };
         sweep.studied.set(&mut setup, 10.0);
         let scenario = setup.scenario;
-        let half_width_um = 0.5 * scenario.sensor.width_px as f64 * scenario.sensor.pitch_x_um;
-        let half_rad = (half_width_um * 1e-3 / scenario.sensor.focal_length_mm).atan();
+        let half_width_um = 0.5 * scenario.camera.width_px as f64 * scenario.camera.pitch_x_um;
+        let half_rad = (half_width_um * 1e-3 / scenario.camera.focal_length_mm).atan();
         assert!((2.0 * half_rad.to_degrees() - 10.0).abs() < 1e-9);
         for (text, expected) in [
             ("fov_deg=20:5:4", "expected a rising one"),

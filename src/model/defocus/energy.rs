@@ -67,11 +67,11 @@ impl EnergyStudy {
     /// The scenario with this spot in pixels, and this noise of reading in electrons.
     pub fn scenario_of(&self, spot_px: f64, noise_e: f64) -> Scenario {
         let mut scenario = self.scenario.clone();
-        let sensor = &mut scenario.sensor;
-        sensor.spot_sigma_px = spot_px;
+        let sheet = &mut scenario.camera;
+        sheet.spot_sigma_px = spot_px;
         // A share that is stated is that of another spot.
-        sensor.peak_share = None;
-        sensor.read_noise_e = noise_e;
+        sheet.peak_share = None;
+        sheet.read_noise_e = noise_e;
         scenario
     }
 
@@ -92,7 +92,7 @@ impl EnergyStudy {
         while left > 0 {
             let abreast = ((left as f64).sqrt().ceil() as usize).min(MOST_ABREAST);
             let field = Field::new(spot_px, abreast, left.min(abreast * abreast), random);
-            (scenario.sensor.width_px, scenario.sensor.height_px) = (field.side_px, field.side_px);
+            (scenario.camera.width_px, scenario.camera.height_px) = (field.side_px, field.side_px);
             let stars: Vec<_> = field.places.iter().map(|p| (*p, self.v_mag)).collect();
             let frame = star_field(&scenario, &stars, random.random())?;
             match self.method() {
@@ -125,7 +125,7 @@ impl EnergyStudy {
     ) -> Vec<Detection> {
         let config = DetectConfig {
             false_alarms_per_mpx: scenario.conditions.false_alarms_per_mpx,
-            spot_sigma_px: Some(scenario.sensor.spot_sigma_px),
+            spot_sigma_px: Some(scenario.camera.spot_sigma_px),
             centroid,
             ..DetectConfig::default()
         };
@@ -144,9 +144,9 @@ impl EnergyStudy {
         scenario: &Scenario,
         field: &'a Field,
     ) -> impl Iterator<Item = f64> + 'a {
-        let (sensor, budget) = (&scenario.sensor, Budget::new(scenario));
+        let (sheet, budget) = (&scenario.camera, Budget::new(scenario));
         let dark_and_sky_e = budget.background_e + budget.dark_e;
-        let level_adu = sensor.bias_adu + dark_and_sky_e / sensor.gain_e_per_adu;
+        let level_adu = sheet.bias_adu + dark_and_sky_e / sheet.gain_e_per_adu;
         let half = self.half_window_px as i64;
         field.places.iter().filter_map(move |place| {
             let (column, row) = (place.x.round() as i64, place.y.round() as i64);
@@ -177,7 +177,7 @@ impl EnergyStudy {
         Reach {
             bound_px: bound_px(spot_px, star_e, budget.background_noise_e.powi(2)),
             limit_vmag: limit_vmag.is_finite().then_some(limit_vmag),
-            peak_part: peak_e / scenario.sensor.full_well_e,
+            peak_part: peak_e / scenario.camera.full_well_e,
         }
     }
 }
@@ -256,7 +256,7 @@ mod tests {
 
     fn rms_px(study: &EnergyStudy, spot_px: f64) -> f64 {
         let mut random = ChaCha8Rng::seed_from_u64(1);
-        let noise_e = study.scenario.sensor.read_noise_e;
+        let noise_e = study.scenario.camera.read_noise_e;
         let point = study.measure(spot_px, noise_e, &mut random).unwrap();
         assert!(point.found > 290, "{point:?}");
         point.rms_px
@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn the_fit_is_at_the_bound_and_the_others_are_not() {
         let fit = study(4.0, Centroiding::GaussianFit);
-        let bound = fit.reach(1.0, fit.scenario.sensor.read_noise_e).bound_px;
+        let bound = fit.reach(1.0, fit.scenario.camera.read_noise_e).bound_px;
         // 300 stars know a ratio to 3 %.
         let ratio = rms_px(&fit, 1.0) / bound;
         assert!((0.88..1.12).contains(&ratio), "{ratio}");

@@ -1,6 +1,6 @@
 //! How far out of focus a lens makes a spot.
 
-use crate::camera::data_sheet::Sensor;
+use crate::camera::data_sheet::DataSheet;
 use serde::Serialize;
 
 /// Standard deviation along one axis of a cone of light cut at a distance of one f-number: of an even disc of diameter 1, a
@@ -27,11 +27,11 @@ pub struct Lens {
 
 impl Lens {
     /// The lens of a camera, the spot of which in focus has this standard deviation in pixels.
-    pub fn of(sensor: &Sensor, focused_px: f64) -> Self {
+    pub fn of(sheet: &DataSheet, focused_px: f64) -> Self {
         Self {
-            f_number: sensor.focal_length_mm / sensor.aperture_mm,
-            pitch_um: (sensor.pitch_x_um * sensor.pitch_y_um).sqrt(),
-            wavelength_nm: 0.5 * (sensor.band_from_nm + sensor.band_to_nm),
+            f_number: sheet.focal_length_mm / sheet.aperture_mm,
+            pitch_um: (sheet.pitch_x_um * sheet.pitch_y_um).sqrt(),
+            wavelength_nm: 0.5 * (sheet.band_from_nm + sheet.band_to_nm),
             focused_px,
         }
     }

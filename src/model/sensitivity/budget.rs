@@ -103,23 +103,22 @@ pub struct Budget {
 impl Budget {
     /// The budget of `scenario`, which [`Scenario::check`] has found sound.
     pub fn new(scenario: &Scenario) -> Self {
-        let (sensor, conditions) = (&scenario.sensor, &scenario.conditions);
+        let (sheet, conditions) = (&scenario.camera, &scenario.conditions);
         let light = Light::of(scenario);
         let exposure_s = conditions.exposure_s;
-        let aperture_area_m2 = sensor.aperture_area_m2();
+        let aperture_area_m2 = sheet.aperture_area_m2();
         let collected = aperture_area_m2 * exposure_s;
         let background_e = light.sky_electrons_s_m2 * collected;
-        let dark_e = sensor.dark_current_e_s * exposure_s;
+        let dark_e = sheet.dark_current_e_s * exposure_s;
         let quantisation_noise_e = match scenario.reading {
             Reading::Paper => 0.0,
-            Reading::Physical => sensor.quantisation_noise_e(),
+            Reading::Physical => sheet.quantisation_noise_e(),
         };
-        let sensor_variance_e2 =
-            sensor.read_noise_e.powi(2) + dark_e + quantisation_noise_e.powi(2);
+        let sensor_variance_e2 = sheet.read_noise_e.powi(2) + dark_e + quantisation_noise_e.powi(2);
         let background_variance_e2 = background_e + sensor_variance_e2;
         let star_e = signal_for_snr(conditions.snr, background_variance_e2);
         let mag_0_e_s = light.star_electrons_s_m2 * aperture_area_m2;
-        let peak_share = sensor.peak_share();
+        let peak_share = sheet.peak_share();
         let ratio = mag_0_e_s * exposure_s * peak_share / star_e;
         let limit_vmag = light.magnitude(ratio);
         let noise_e = (star_e + background_variance_e2).sqrt();
@@ -127,7 +126,7 @@ impl Budget {
         let at_555 = conditions
             .extinction
             .zenith_transmission(super::conditions::REFERENCE_NM);
-        let pixel_solid_angle_sr = sensor.pixel_solid_angle_sr();
+        let pixel_solid_angle_sr = sheet.pixel_solid_angle_sr();
         Self {
             reading: scenario.reading,
             airmass: light.airmass,
@@ -150,7 +149,7 @@ impl Budget {
             star_e,
             background_e,
             dark_e,
-            read_noise_e: sensor.read_noise_e,
+            read_noise_e: sheet.read_noise_e,
             quantisation_noise_e,
             sensor_noise_e: sensor_variance_e2.sqrt(),
             background_noise_e: background_variance_e2.sqrt(),
@@ -281,11 +280,11 @@ impl Light {
 /// # Reference
 /// Tong, Li & Wang 2014, eqs. (4) to (9).
 fn paper_bands(scenario: &Scenario, airmass: f64) -> Vec<Band> {
-    let (sensor, conditions) = (&scenario.sensor, &scenario.conditions);
+    let (sheet, conditions) = (&scenario.camera, &scenario.conditions);
     let table = light::luminous_efficiency();
     let sum: f64 = table.iter().map(|(_, efficiency)| efficiency).sum();
     let sky_over_star =
-        sensor.pixel_solid_angle_sr() * libm::pow(PAPER_MAG_RATIO, -sky_mag(conditions));
+        sheet.pixel_solid_angle_sr() * libm::pow(PAPER_MAG_RATIO, -sky_mag(conditions));
     let band = |(wavelength_nm, efficiency): (f64, f64)| {
         let star_photons_s_m2 = PAPER_PHOTONS_OF_MAG_0 * efficiency / sum;
         let zenith = conditions.extinction.zenith_transmission(wavelength_nm);
@@ -295,8 +294,8 @@ fn paper_bands(scenario: &Scenario, airmass: f64) -> Vec<Band> {
             star_photons_s_m2,
             sky_photons_s_m2: star_photons_s_m2 * atmosphere_transmission * sky_over_star,
             atmosphere_transmission,
-            lens_transmission: sensor.lens_transmission.at(wavelength_nm),
-            quantum_efficiency: sensor.quantum_efficiency.at(wavelength_nm),
+            lens_transmission: sheet.lens_transmission.at(wavelength_nm),
+            quantum_efficiency: sheet.quantum_efficiency.at(wavelength_nm),
         }
     };
     table.into_iter().map(band).collect()
@@ -307,14 +306,14 @@ const BAND_NM: f64 = 5.0;
 
 /// Black bodies through the camera's own band. The sky's brightness is as seen from the ground: the air takes no more of it.
 fn physical_bands(scenario: &Scenario, airmass: f64) -> Vec<Band> {
-    let (sensor, conditions) = (&scenario.sensor, &scenario.conditions);
-    let width_nm = sensor.band_to_nm - sensor.band_from_nm;
+    let (sheet, conditions) = (&scenario.camera, &scenario.conditions);
+    let width_nm = sheet.band_to_nm - sheet.band_from_nm;
     let count = (width_nm / BAND_NM).ceil().max(1.0);
     let step_nm = width_nm / count;
-    let pixel_arcsec2 = sensor.pixel_solid_angle_sr() * ARCSEC_PER_RAD * ARCSEC_PER_RAD;
+    let pixel_arcsec2 = sheet.pixel_solid_angle_sr() * ARCSEC_PER_RAD * ARCSEC_PER_RAD;
     let sky_over_star = pixel_arcsec2 * libm::pow(10.0, -0.4 * conditions.sky.mag_arcsec2());
     let band = |i: usize| {
-        let wavelength_nm = sensor.band_from_nm + (i as f64 + 0.5) * step_nm;
+        let wavelength_nm = sheet.band_from_nm + (i as f64 + 0.5) * step_nm;
         let photons =
             |temperature_k| light::photons_of_mag_0(wavelength_nm, temperature_k) * step_nm;
         let zenith = conditions.extinction.zenith_transmission(wavelength_nm);
@@ -323,8 +322,8 @@ fn physical_bands(scenario: &Scenario, airmass: f64) -> Vec<Band> {
             star_photons_s_m2: photons(conditions.star_temperature_k),
             sky_photons_s_m2: photons(SKY_TEMPERATURE_K) * sky_over_star,
             atmosphere_transmission: libm::pow(zenith, airmass),
-            lens_transmission: sensor.lens_transmission.at(wavelength_nm),
-            quantum_efficiency: sensor.quantum_efficiency.at(wavelength_nm),
+            lens_transmission: sheet.lens_transmission.at(wavelength_nm),
+            quantum_efficiency: sheet.quantum_efficiency.at(wavelength_nm),
         }
     };
     (0..count as usize).map(band).collect()

@@ -91,7 +91,7 @@ impl Detector {
     /// The detector as built, with the threshold of `config`; the spot is the scenario's.
     pub fn matched_filter(config: &DetectConfig, scenario: &Scenario, budget: &Budget) -> Self {
         let spot = Spot::of(scenario);
-        let size = (scenario.sensor.width_px, scenario.sensor.height_px);
+        let size = (scenario.camera.width_px, scenario.camera.height_px);
         let electrons = budget.background_e + budget.dark_e;
         let skewness = electrons / budget.background_noise_e.powi(3);
         let model = FilterModel::new(config, size, spot.round_sigma_px(), skewness);
@@ -147,7 +147,7 @@ struct Spot {
 impl Spot {
     fn of(scenario: &Scenario) -> Self {
         Self {
-            sigma_px: scenario.sensor.spot_sigma_px,
+            sigma_px: scenario.camera.spot_sigma_px,
             smear_px: scenario.conditions.motion_px,
         }
     }
@@ -353,7 +353,7 @@ mod tests {
 
     fn scenario(changes: &[(&str, f64)]) -> Scenario {
         let mut scenario = Scenario::of(Preset::Experiment1);
-        scenario.sensor.peak_share = None;
+        scenario.camera.peak_share = None;
         for (name, value) in changes {
             Parameter::named(name).unwrap().set(&mut scenario, *value);
         }

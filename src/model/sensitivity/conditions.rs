@@ -1,7 +1,7 @@
 //! What the camera looks through and how long: sky, air, exposure, and what counts as detected.
 
 use super::light;
-use crate::camera::data_sheet::{Preset, Sensor};
+use crate::camera::data_sheet::{DataSheet, Preset};
 use serde::Serialize;
 use std::f64::consts::PI;
 
@@ -138,7 +138,7 @@ impl Default for Conditions {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// The camera.
-    pub sensor: Sensor,
+    pub camera: DataSheet,
     /// The conditions.
     pub conditions: Conditions,
     /// Which equations.
@@ -181,9 +181,9 @@ pub enum ScenarioError {
 
 impl Scenario {
     /// A camera under the default conditions, in the physical reading.
-    pub fn new(sensor: Sensor) -> Self {
+    pub fn new(camera: DataSheet) -> Self {
         Self {
-            sensor,
+            camera,
             conditions: Conditions::default(),
             reading: Reading::Physical,
         }
@@ -193,7 +193,7 @@ impl Scenario {
     /// for the exposure.
     pub fn of(preset: Preset) -> Self {
         let paper = |exposure_s, zenith_distance_deg| Self {
-            sensor: preset.sensor(),
+            camera: preset.data_sheet(),
             conditions: Conditions {
                 exposure_s,
                 zenith_distance_deg,
@@ -203,7 +203,7 @@ impl Scenario {
             reading: Reading::Paper,
         };
         let other = |exposure_s| {
-            let mut scenario = Self::new(preset.sensor());
+            let mut scenario = Self::new(preset.data_sheet());
             scenario.conditions.exposure_s = exposure_s;
             scenario
         };
@@ -234,7 +234,7 @@ impl Scenario {
             }
         }
         match self
-            .sensor
+            .camera
             .contradiction()
             .or_else(|| self.beyond_the_papers_table())
         {
@@ -247,7 +247,7 @@ impl Scenario {
     fn beyond_the_papers_table(&self) -> Option<String> {
         let uncovered = match self.reading {
             Reading::Paper => self
-                .sensor
+                .camera
                 .uncovered(light::PAPER_BAND_NM.0, light::PAPER_BAND_NM.1),
             Reading::Physical => None,
         };
@@ -274,8 +274,8 @@ mod tests {
     #[test]
     fn the_papers_reading_wants_curves_over_its_own_band() {
         let mut scenario = Scenario::of(Preset::Experiment1);
-        scenario.sensor.quantum_efficiency = Response::Table(vec![(400.0, 0.5), (800.0, 0.5)]);
-        scenario.sensor.band_from_nm = 450.0;
+        scenario.camera.quantum_efficiency = Response::Table(vec![(400.0, 0.5), (800.0, 0.5)]);
+        scenario.camera.band_from_nm = 450.0;
         let error = scenario.check().unwrap_err().to_string();
         assert_eq!(
             error,

@@ -1,7 +1,7 @@
 //! The parameters of a scenario by name: the camera's and the conditions' in one list.
 
 use super::conditions::{Conditions, Extinction, Scenario, SkyBrightness};
-use crate::camera::data_sheet::{KEYS, Key, Limits, Sensor, key, nearest_name};
+use crate::camera::data_sheet::{DataSheet, KEYS, Key, Limits, key, nearest_name};
 
 /// The numbers of [`Conditions`]. Of those that say the same thing in other units the last one given holds.
 pub const CONDITION_KEYS: &[Key<Conditions>] = &[
@@ -78,18 +78,18 @@ pub const CONDITION_KEYS: &[Key<Conditions>] = &[
 ];
 
 /// One more number of a camera, for sweeps: pixels of another size under the same spot.
-const PIXEL_AREA: Key<Sensor> = Key {
+const PIXEL_AREA: Key<DataSheet> = Key {
     name: "pixel_area_um2",
     about: "area of a pixel, in µm²; its form and the spot's size in µm stay",
     limits: Limits::Positive,
-    get: |sensor| Some(sensor.pitch_x_um * sensor.pitch_y_um),
-    set: |sensor, area_um2| {
-        let factor = area_um2 / (sensor.pitch_x_um * sensor.pitch_y_um);
-        sensor.pitch_x_um *= factor.sqrt();
-        sensor.pitch_y_um *= factor.sqrt();
-        sensor.spot_sigma_px /= factor.sqrt();
+    get: |sheet| Some(sheet.pitch_x_um * sheet.pitch_y_um),
+    set: |sheet, area_um2| {
+        let factor = area_um2 / (sheet.pitch_x_um * sheet.pitch_y_um);
+        sheet.pitch_x_um *= factor.sqrt();
+        sheet.pitch_y_um *= factor.sqrt();
+        sheet.spot_sigma_px /= factor.sqrt();
         // μ is the pixel's part of the spot's area, and at most all of it.
-        sensor.peak_share = sensor.peak_share.map(|share| (share * factor).min(1.0));
+        sheet.peak_share = sheet.peak_share.map(|share| (share * factor).min(1.0));
     },
 };
 
@@ -143,7 +143,7 @@ fn quantity_of(name: &str) -> String {
 #[derive(Debug, Clone, Copy)]
 pub enum Parameter {
     /// One of the camera.
-    Sensor(&'static Key<Sensor>),
+    Camera(&'static Key<DataSheet>),
     /// One of the conditions.
     Conditions(&'static Key<Conditions>),
 }
@@ -171,8 +171,8 @@ impl UnknownParameter {
 impl Parameter {
     /// All of them, the camera's first.
     pub fn all() -> impl Iterator<Item = Self> {
-        let sensor = KEYS.iter().chain([&PIXEL_AREA]).map(Self::Sensor);
-        sensor.chain(CONDITION_KEYS.iter().map(Self::Conditions))
+        let sheet = KEYS.iter().chain([&PIXEL_AREA]).map(Self::Camera);
+        sheet.chain(CONDITION_KEYS.iter().map(Self::Conditions))
     }
 
     /// The parameter called `name`.
@@ -187,7 +187,7 @@ impl Parameter {
     /// Its name, which ends in its unit.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Sensor(key) => key.name,
+            Self::Camera(key) => key.name,
             Self::Conditions(key) => key.name,
         }
     }
@@ -195,7 +195,7 @@ impl Parameter {
     /// What it is, in a line.
     pub fn about(self) -> &'static str {
         match self {
-            Self::Sensor(key) => key.about,
+            Self::Camera(key) => key.about,
             Self::Conditions(key) => key.about,
         }
     }
@@ -218,7 +218,7 @@ impl Parameter {
     /// What values make sense.
     pub fn limits(self) -> Limits {
         match self {
-            Self::Sensor(key) => key.limits,
+            Self::Camera(key) => key.limits,
             Self::Conditions(key) => key.limits,
         }
     }
@@ -226,7 +226,7 @@ impl Parameter {
     /// Its value, where it has one.
     pub fn get(self, scenario: &Scenario) -> Option<f64> {
         match self {
-            Self::Sensor(key) => (key.get)(&scenario.sensor),
+            Self::Camera(key) => (key.get)(&scenario.camera),
             Self::Conditions(key) => (key.get)(&scenario.conditions),
         }
     }
@@ -234,7 +234,7 @@ impl Parameter {
     /// Gives it a value within the limits.
     pub fn set(self, scenario: &mut Scenario, value: f64) {
         match self {
-            Self::Sensor(key) => (key.set)(&mut scenario.sensor, value),
+            Self::Camera(key) => (key.set)(&mut scenario.camera, value),
             Self::Conditions(key) => (key.set)(&mut scenario.conditions, value),
         }
     }
@@ -297,10 +297,10 @@ mod tests {
         let mut scenario = Scenario::of(Preset::Experiment1);
         let area = Parameter::named("pixel_area_um2").unwrap();
         area.set(&mut scenario, 4.0 * 8.6 * 8.3);
-        let sensor = &scenario.sensor;
+        let sheet = &scenario.camera;
         assert!(
-            (sensor.pitch_x_um - 17.2).abs() < 1e-9 && (sensor.spot_sigma_px - 0.58).abs() < 1e-9
+            (sheet.pitch_x_um - 17.2).abs() < 1e-9 && (sheet.spot_sigma_px - 0.58).abs() < 1e-9
         );
-        assert!((sensor.peak_share() - 4.0 / 9.0).abs() < 1e-9);
+        assert!((sheet.peak_share() - 4.0 / 9.0).abs() < 1e-9);
     }
 }

@@ -133,7 +133,7 @@ impl Prediction {
             airmass: budget.airmass,
             parameters,
             reading: scenario.reading,
-            camera: scenario.sensor.name.clone(),
+            camera: scenario.camera.name.clone(),
             detector: DetectorReport::new(&detector),
             peak_pixel: DetectorReport::new(&peak_pixel),
             budget,

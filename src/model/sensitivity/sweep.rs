@@ -188,7 +188,7 @@ impl Series {
     /// scenario's aperture and half of it.
     pub fn around(base: &Scenario, swept: Parameter) -> Self {
         if swept.name() == "exposure_s" {
-            let aperture_mm = base.sensor.aperture_mm;
+            let aperture_mm = base.camera.aperture_mm;
             return Self {
                 parameter: "aperture_mm",
                 values: [aperture_mm, aperture_mm / 2.0],

@@ -36,7 +36,7 @@ pub use strays::{CosmicRay, Trail};
 pub use truth::{TrueStar, Truth};
 
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation};
-use crate::camera::data_sheet::Sensor;
+use crate::camera::data_sheet::DataSheet;
 use crate::camera::{CameraModel, Distortion, DistortionModel};
 use crate::frame::{self, Frame, FrameError};
 use crate::model::sensitivity::{Scenario, SkyBrightness, StarLight};
@@ -78,11 +78,11 @@ fn random(seed: u64, stream: Stream) -> ChaCha8Rng {
 ///
 /// A camera model has one scale for both axes. Where a pitch differs from the other by percents, the true image could not be
 /// identified as one of square pixels; what is simulated can.
-pub fn camera_of(sensor: &Sensor) -> CameraModel {
-    let made = &sensor.imperfections;
-    let pitch_um = (sensor.pitch_x_um * sensor.pitch_y_um).sqrt();
-    let focal_length_px = sensor.focal_length_mm * 1e3 / pitch_um;
-    let (width_px, height_px) = (sensor.width_px as f64, sensor.height_px as f64);
+pub fn camera_of(sheet: &DataSheet) -> CameraModel {
+    let made = &sheet.imperfections;
+    let pitch_um = (sheet.pitch_x_um * sheet.pitch_y_um).sqrt();
+    let focal_length_px = sheet.focal_length_mm * 1e3 / pitch_um;
+    let (width_px, height_px) = (sheet.width_px as f64, sheet.height_px as f64);
     let mut camera = CameraModel::pinhole(width_px, height_px, focal_length_px, made.mirrored);
     // The model leads from what is observed to the pinhole's image: the other way.
     let [radial, x, y] = [
@@ -127,16 +127,16 @@ impl<'a> Simulator<'a> {
     /// # Errors
     /// [`FrameError::TooSmall`], [`FrameError::TooLarge`] for a detector that no frame can be of.
     pub fn new(scenario: &Scenario, scene: &Scene, stars: &'a [Star]) -> Result<Self, FrameError> {
-        let sensor = &scenario.sensor;
-        frame::check_size(sensor.width_px, sensor.height_px)?;
+        let sheet = &scenario.camera;
+        frame::check_size(sheet.width_px, sheet.height_px)?;
         let light = StarLight::new(scenario);
         let budget = light.budget();
         Ok(Self {
             scenario: scenario.clone(),
             scene: *scene,
             stars,
-            camera: camera_of(sensor),
-            pattern: Pattern::of(sensor),
+            camera: camera_of(sheet),
+            pattern: Pattern::of(sheet),
             even: PoissonTable::new(budget.background_e + budget.dark_e),
             light,
         })
@@ -240,8 +240,8 @@ impl<'a> Simulator<'a> {
     }
 
     fn canvas(&self) -> Canvas {
-        let sensor = &self.scenario.sensor;
-        Canvas::new(sensor.width_px, sensor.height_px, 0.0)
+        let sheet = &self.scenario.camera;
+        Canvas::new(sheet.width_px, sheet.height_px, 0.0)
     }
 
     /// A frame of the stars that `seen` gives, the light of which reaches so many pixels beyond their places.
@@ -250,7 +250,7 @@ impl<'a> Simulator<'a> {
         seed: u64,
         seen: impl FnOnce(&Starlight, f64, &mut ChaCha8Rng) -> Vec<TrueStar>,
     ) -> Result<(Frame, Truth), FrameError> {
-        let (sensor, scene) = (&self.scenario.sensor, &self.scene);
+        let (sheet, scene) = (&self.scenario.camera, &self.scene);
         let conditions = &self.scenario.conditions;
         let exposure_s = conditions.exposure_s;
         let budget = self.light.budget();
@@ -262,7 +262,7 @@ impl<'a> Simulator<'a> {
         let mut canvas = self.canvas();
         sky.expose(&mut canvas, budget.background_e);
         let background_e = mean(canvas.pixels()) + budget.dark_e;
-        let mut spot = Spot::new(sensor.imperfections.spot_form, sensor.spot_sigma_px);
+        let mut spot = Spot::new(sheet.imperfections.spot_form, sheet.spot_sigma_px);
         let starlight = Starlight {
             camera: &self.camera,
             scene,
@@ -280,7 +280,7 @@ impl<'a> Simulator<'a> {
         for trail in &trails {
             self.draw_trail(trail, &sky, &mut canvas, &mut spot);
         }
-        let cosmic_rays = strays::cosmic_rays(scene, sensor, &self.camera, exposure_s, &mut random);
+        let cosmic_rays = strays::cosmic_rays(scene, sheet, &self.camera, exposure_s, &mut random);
         let frame = self.read_out(canvas, &cosmic_rays, seed)?;
         let on_frame = |star: &TrueStar| self.camera.contains(&star.position);
         let (stars, beyond) = stars.into_iter().partition(on_frame);
@@ -317,7 +317,7 @@ impl<'a> Simulator<'a> {
         cosmic_rays: &[CosmicRay],
         seed: u64,
     ) -> Result<Frame, FrameError> {
-        let sensor = &self.scenario.sensor;
+        let sheet = &self.scenario.camera;
         self.convert(canvas.pixels_mut());
         let mut random = random(seed, Stream::Noise);
         collect(canvas.pixels_mut(), self.even.as_ref(), &mut random);
@@ -331,10 +331,10 @@ impl<'a> Simulator<'a> {
                 }
             });
         }
-        let readout = Readout::of(sensor);
+        let readout = Readout::of(sheet);
         let pixels = readout.grey_levels(canvas.pixels_mut(), &self.pattern, &mut random);
-        let frame = Frame::new(sensor.width_px, sensor.height_px, pixels)?;
-        Ok(frame.with_levels(1.0, Some(sensor.saturation_adu() as f32)))
+        let frame = Frame::new(sheet.width_px, sheet.height_px, pixels)?;
+        Ok(frame.with_levels(1.0, Some(sheet.saturation_adu() as f32)))
     }
 
     /// From light to charge: the pixels' response, and their dark current.

@@ -1,6 +1,6 @@
 //! What differs from pixel to pixel, and is the same in every frame of a camera.
 
-use crate::camera::data_sheet::Sensor;
+use crate::camera::data_sheet::DataSheet;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -28,22 +28,22 @@ enum Stream {
 }
 
 impl Pattern {
-    pub(super) fn of(sensor: &Sensor) -> Self {
-        let made = &sensor.imperfections;
+    pub(super) fn of(sheet: &DataSheet) -> Self {
+        let made = &sheet.imperfections;
         let has_response = made.response_sigma > 0.0 || made.dead_pixels_per_mpx > 0.0;
-        let has_dark = made.dark_current_sigma > 0.0 && sensor.dark_current_e_s > 0.0;
+        let has_dark = made.dark_current_sigma > 0.0 && sheet.dark_current_e_s > 0.0;
         let has_hot = made.hot_pixels_per_mpx > 0.0 && made.hot_pixel_e_s > 0.0;
         let has_offset = made.offset_sigma_adu > 0.0 || made.column_sigma_adu > 0.0;
         Self {
-            response: has_response.then(|| response(sensor)),
-            dark_current_e_s: (has_dark || has_hot).then(|| dark_current(sensor)),
-            offset_adu: has_offset.then(|| offset(sensor)),
+            response: has_response.then(|| response(sheet)),
+            dark_current_e_s: (has_dark || has_hot).then(|| dark_current(sheet)),
+            offset_adu: has_offset.then(|| offset(sheet)),
         }
     }
 }
 
-fn random(sensor: &Sensor, stream: Stream) -> ChaCha8Rng {
-    let mut random = ChaCha8Rng::seed_from_u64(sensor.imperfections.pattern_seed as u64);
+fn random(sheet: &DataSheet, stream: Stream) -> ChaCha8Rng {
+    let mut random = ChaCha8Rng::seed_from_u64(sheet.imperfections.pattern_seed as u64);
     random.set_stream(stream as u64);
     random
 }
@@ -52,21 +52,21 @@ fn normal(random: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(random)
 }
 
-fn pixels(sensor: &Sensor) -> usize {
-    sensor.width_px * sensor.height_px
+fn pixels(sheet: &DataSheet) -> usize {
+    sheet.width_px * sheet.height_px
 }
 
 /// Whether each pixel is one of so many in a million.
-fn chosen(sensor: &Sensor, per_mpx: f64, stream: Stream) -> impl Iterator<Item = bool> {
-    let mut random = random(sensor, stream);
+fn chosen(sheet: &DataSheet, per_mpx: f64, stream: Stream) -> impl Iterator<Item = bool> {
+    let mut random = random(sheet, stream);
     std::iter::repeat_with(move || random.random::<f64>() * 1e6 < per_mpx)
 }
 
-fn response(sensor: &Sensor) -> Vec<f32> {
-    let made = &sensor.imperfections;
-    let mut random = random(sensor, Stream::Response);
-    let dead = chosen(sensor, made.dead_pixels_per_mpx, Stream::Dead);
-    dead.take(pixels(sensor))
+fn response(sheet: &DataSheet) -> Vec<f32> {
+    let made = &sheet.imperfections;
+    let mut random = random(sheet, Stream::Response);
+    let dead = chosen(sheet, made.dead_pixels_per_mpx, Stream::Dead);
+    dead.take(pixels(sheet))
         .map(|is_dead| {
             let response = (1.0 + made.response_sigma * normal(&mut random)).max(0.0);
             if is_dead { 0.0 } else { response as f32 }
@@ -74,16 +74,16 @@ fn response(sensor: &Sensor) -> Vec<f32> {
         .collect()
 }
 
-fn dark_current(sensor: &Sensor) -> Vec<f32> {
-    let made = &sensor.imperfections;
-    let mut random_current = random(sensor, Stream::DarkCurrent);
-    let mut random_hot = random(sensor, Stream::Hot);
+fn dark_current(sheet: &DataSheet) -> Vec<f32> {
+    let made = &sheet.imperfections;
+    let mut random_current = random(sheet, Stream::DarkCurrent);
+    let mut random_hot = random(sheet, Stream::Hot);
     // Of a log-normal distribution of mean 1 and this standard deviation.
     let log_variance = libm::log1p(made.dark_current_sigma.powi(2));
-    (0..pixels(sensor))
+    (0..pixels(sheet))
         .map(|_| {
             let spread = log_variance.sqrt() * normal(&mut random_current) - 0.5 * log_variance;
-            let current_e_s = sensor.dark_current_e_s * libm::exp(spread);
+            let current_e_s = sheet.dark_current_e_s * libm::exp(spread);
             let is_hot = random_hot.random::<f64>() * 1e6 < made.hot_pixels_per_mpx;
             let hot_e_s = if is_hot {
                 -made.hot_pixel_e_s * libm::log1p(-random_hot.random::<f64>())
@@ -95,17 +95,17 @@ fn dark_current(sensor: &Sensor) -> Vec<f32> {
         .collect()
 }
 
-fn offset(sensor: &Sensor) -> Vec<f32> {
-    let made = &sensor.imperfections;
-    let mut random_column = random(sensor, Stream::Column);
+fn offset(sheet: &DataSheet) -> Vec<f32> {
+    let made = &sheet.imperfections;
+    let mut random_column = random(sheet, Stream::Column);
     let mut column = || made.column_sigma_adu * normal(&mut random_column);
-    let columns: Vec<f64> = (0..sensor.width_px).map(|_| column()).collect();
-    let mut random_pixel = random(sensor, Stream::Offset);
+    let columns: Vec<f64> = (0..sheet.width_px).map(|_| column()).collect();
+    let mut random_pixel = random(sheet, Stream::Offset);
     let mut offset = |i: usize| {
         let own = made.offset_sigma_adu * normal(&mut random_pixel);
-        (columns[i % sensor.width_px] + own) as f32
+        (columns[i % sheet.width_px] + own) as f32
     };
-    (0..pixels(sensor)).map(&mut offset).collect()
+    (0..pixels(sheet)).map(&mut offset).collect()
 }
 
 #[cfg(test)]
@@ -113,11 +113,11 @@ mod tests {
     use super::*;
     use crate::camera::data_sheet::Preset;
 
-    fn sensor() -> Sensor {
-        let mut sensor = Preset::NanosatTracker.sensor();
-        (sensor.width_px, sensor.height_px) = (500, 400);
-        sensor.dark_current_e_s = 20.0;
-        sensor
+    fn data_sheet() -> DataSheet {
+        let mut sheet = Preset::NanosatTracker.data_sheet();
+        (sheet.width_px, sheet.height_px) = (500, 400);
+        sheet.dark_current_e_s = 20.0;
+        sheet
     }
 
     fn moments(values: &[f32]) -> (f64, f64) {
@@ -129,19 +129,19 @@ mod tests {
 
     #[test]
     fn a_perfect_detector_has_none() {
-        let pattern = Pattern::of(&sensor());
+        let pattern = Pattern::of(&data_sheet());
         assert!(pattern.response.is_none() && pattern.dark_current_e_s.is_none());
         assert!(pattern.offset_adu.is_none());
     }
 
     #[test]
     fn each_part_has_the_spread_that_is_asked_for() {
-        let mut sensor = sensor();
-        sensor.imperfections.response_sigma = 0.02;
-        sensor.imperfections.dark_current_sigma = 0.3;
-        sensor.imperfections.offset_sigma_adu = 2.0;
-        sensor.imperfections.column_sigma_adu = 1.0;
-        let pattern = Pattern::of(&sensor);
+        let mut sheet = data_sheet();
+        sheet.imperfections.response_sigma = 0.02;
+        sheet.imperfections.dark_current_sigma = 0.3;
+        sheet.imperfections.offset_sigma_adu = 2.0;
+        sheet.imperfections.column_sigma_adu = 1.0;
+        let pattern = Pattern::of(&sheet);
         let (mean, sigma) = moments(&pattern.response.unwrap());
         assert!(
             (mean - 1.0).abs() < 3e-4 && (sigma - 0.02).abs() < 2e-4,
@@ -162,10 +162,10 @@ mod tests {
 
     #[test]
     fn hot_and_dead_pixels_are_as_many_as_they_should_be() {
-        let mut sensor = sensor();
-        sensor.imperfections.hot_pixels_per_mpx = 5000.0;
-        sensor.imperfections.dead_pixels_per_mpx = 1000.0;
-        let pattern = Pattern::of(&sensor);
+        let mut sheet = data_sheet();
+        sheet.imperfections.hot_pixels_per_mpx = 5000.0;
+        sheet.imperfections.dead_pixels_per_mpx = 1000.0;
+        let pattern = Pattern::of(&sheet);
         let dark = pattern.dark_current_e_s.unwrap();
         let hot: Vec<f32> = dark.iter().copied().filter(|e| *e > 20.001).collect();
         // 1000 and 200 in 0.2 million; five standard errors.

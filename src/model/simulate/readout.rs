@@ -2,7 +2,7 @@
 
 use super::pattern::Pattern;
 use super::poisson::{PoissonTable, poisson};
-use crate::camera::data_sheet::Sensor;
+use crate::camera::data_sheet::DataSheet;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -29,15 +29,15 @@ pub(super) struct Readout {
 }
 
 impl Readout {
-    pub(super) fn of(sensor: &Sensor) -> Self {
+    pub(super) fn of(sheet: &DataSheet) -> Self {
         Self {
-            width: sensor.width_px,
-            full_well_e: sensor.full_well_e,
-            read_noise_e: sensor.read_noise_e,
-            gain_e_per_adu: sensor.gain_e_per_adu,
-            bias_adu: sensor.bias_adu,
-            full_scale_adu: sensor.full_scale_adu(),
-            blooming: sensor.imperfections.blooming,
+            width: sheet.width_px,
+            full_well_e: sheet.full_well_e,
+            read_noise_e: sheet.read_noise_e,
+            gain_e_per_adu: sheet.gain_e_per_adu,
+            bias_adu: sheet.bias_adu,
+            full_scale_adu: sheet.full_scale_adu(),
+            blooming: sheet.imperfections.blooming,
         }
     }
 
@@ -106,37 +106,37 @@ mod tests {
     use crate::camera::data_sheet::Preset;
     use rand::SeedableRng;
 
-    fn levels(sensor: &Sensor, electrons: &[f64]) -> (f32, Vec<f32>) {
-        let readout = Readout::of(sensor);
+    fn levels(sheet: &DataSheet, electrons: &[f64]) -> (f32, Vec<f32>) {
+        let readout = Readout::of(sheet);
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let mut collected = electrons.to_vec();
         let levels = readout.grey_levels(&mut collected, &Pattern::default(), &mut random);
-        (sensor.saturation_adu() as f32, levels)
+        (sheet.saturation_adu() as f32, levels)
     }
 
     #[test]
     fn a_full_pixel_and_the_end_of_the_scale_saturate() {
-        let mut sensor = Preset::Experiment1.sensor();
-        let (saturation, full) = levels(&sensor, &[1e6; 10_000]);
+        let mut sheet = Preset::Experiment1.data_sheet();
+        let (saturation, full) = levels(&sheet, &[1e6; 10_000]);
         let below = full.iter().filter(|level| **level < saturation).count();
         assert!(below < 5 && saturation < 4095.0, "{below}");
-        sensor.full_well_e = 1e7;
-        let (saturation, clipped) = levels(&sensor, &[1e6; 10_000]);
+        sheet.full_well_e = 1e7;
+        let (saturation, clipped) = levels(&sheet, &[1e6; 10_000]);
         assert_eq!(saturation, 4095.0);
         assert!(clipped.iter().all(|level| *level == 4095.0));
     }
 
     #[test]
     fn what_does_not_fit_flows_along_the_column_and_none_is_lost() {
-        let mut sensor = Preset::Experiment1.sensor();
-        (sensor.width_px, sensor.height_px) = (5, 9);
-        sensor.full_well_e = 100.0;
-        sensor.imperfections.blooming = 1.0;
+        let mut sheet = Preset::Experiment1.data_sheet();
+        (sheet.width_px, sheet.height_px) = (5, 9);
+        sheet.full_well_e = 100.0;
+        sheet.imperfections.blooming = 1.0;
         let mut electrons = vec![10.0; 45];
         electrons[4 * 5 + 2] = 400.0;
         electrons[5 * 5 + 2] = 130.0;
         let before: f64 = electrons.iter().sum();
-        Readout::of(&sensor).bloom(&mut electrons);
+        Readout::of(&sheet).bloom(&mut electrons);
         assert!((electrons.iter().sum::<f64>() - before).abs() < 1e-9);
         let column: Vec<f64> = (0..9).map(|y| electrons[y * 5 + 2]).collect();
         assert_eq!(column[4], 100.0);
@@ -146,9 +146,9 @@ mod tests {
         );
         assert!((0..45).filter(|i| i % 5 != 2).all(|i| electrons[i] == 10.0));
         // A drain takes it.
-        sensor.imperfections.blooming = 0.0;
+        sheet.imperfections.blooming = 0.0;
         let mut drained = vec![400.0; 45];
-        Readout::of(&sensor).bloom(&mut drained);
+        Readout::of(&sheet).bloom(&mut drained);
         assert!(drained.iter().all(|e| *e == 400.0));
     }
 }

@@ -3,7 +3,7 @@
 use super::camera_of;
 use super::scene::{SCENE_KEYS, Scene};
 use super::strays::mean_cosmic_rays;
-use crate::camera::data_sheet::{IMPERFECTION_KEYS, Key, Limits, Sensor};
+use crate::camera::data_sheet::{DataSheet, IMPERFECTION_KEYS, Key, Limits};
 use crate::model::sensitivity::{
     self, Budget, Scenario, ScenarioError, UnknownParameter, title_of,
 };
@@ -41,10 +41,10 @@ impl Setup {
 
     /// The displacements of r³ and of Conrady's second order are steepest at the corner: three times the one, twice the other.
     fn folded_image(&self) -> Option<String> {
-        let made = &self.scenario.sensor.imperfections;
+        let made = &self.scenario.camera.imperfections;
         let decentring_px = made.decentring_x_px.hypot(made.decentring_y_px);
         let found_px = 3.0 * made.distortion_px.abs() + 2.0 * decentring_px;
-        let most_px = MOST_STEEPNESS * camera_of(&self.scenario.sensor).radius_px();
+        let most_px = MOST_STEEPNESS * camera_of(&self.scenario.camera).radius_px();
         (found_px > most_px).then(|| {
             format!(
                 "the image folds: three times distortion_px and twice the decentring are {found_px} pixels, expected at most \
@@ -71,9 +71,9 @@ impl Setup {
 
     fn many_rays(&self) -> Option<String> {
         let Scenario {
-            sensor, conditions, ..
+            camera, conditions, ..
         } = &self.scenario;
-        let mean = mean_cosmic_rays(&self.scene, sensor, conditions.exposure_s);
+        let mean = mean_cosmic_rays(&self.scene, camera, conditions.exposure_s);
         (mean > MOST_COSMIC_RAYS).then(|| {
             format!("cosmic_rays_cm2_s leaves {mean} cosmic rays on a frame, expected at most {MOST_COSMIC_RAYS}")
         })
@@ -86,7 +86,7 @@ pub enum Parameter {
     /// One on which the limit depends.
     Scenario(sensitivity::Parameter),
     /// An imperfection of the camera.
-    Imperfection(&'static Key<Sensor>),
+    Imperfection(&'static Key<DataSheet>),
     /// One of the scene.
     Scene(&'static Key<Scene>),
 }
@@ -150,7 +150,7 @@ impl Parameter {
     pub fn get(self, setup: &Setup) -> Option<f64> {
         match self {
             Self::Scenario(parameter) => parameter.get(&setup.scenario),
-            Self::Imperfection(key) => (key.get)(&setup.scenario.sensor),
+            Self::Imperfection(key) => (key.get)(&setup.scenario.camera),
             Self::Scene(key) => (key.get)(&setup.scene),
         }
     }
@@ -159,7 +159,7 @@ impl Parameter {
     pub fn set(self, setup: &mut Setup, value: f64) {
         match self {
             Self::Scenario(parameter) => parameter.set(&mut setup.scenario, value),
-            Self::Imperfection(key) => (key.set)(&mut setup.scenario.sensor, value),
+            Self::Imperfection(key) => (key.set)(&mut setup.scenario.camera, value),
             Self::Scene(key) => (key.set)(&mut setup.scene, value),
         }
     }
@@ -194,14 +194,14 @@ mod tests {
         );
         assert_eq!(refused(|s| s.scene.trail_rate_deg_s = 1e12), Ok(()));
         says(|s| s.scene.cosmic_rays_cm2_s = 1e9, "cosmic rays");
-        let sensor = |s: &mut Setup, px| s.scenario.sensor.imperfections.distortion_px = px;
+        let distort = |s: &mut Setup, px| s.scenario.camera.imperfections.distortion_px = px;
         // Half the diagonal is 1620 px: 324 px are the most.
         says(
-            |s| s.scenario.sensor.imperfections.distortion_px = -325.0,
+            |s| s.scenario.camera.imperfections.distortion_px = -325.0,
             "folds",
         );
         says(
-            |s| s.scenario.sensor.imperfections.decentring_y_px = 487.0,
+            |s| s.scenario.camera.imperfections.decentring_y_px = 487.0,
             "folds",
         );
         let mut most = Setup {
@@ -209,10 +209,10 @@ mod tests {
             scene: Scene::default(),
         };
         for px in [-323.0, 323.0] {
-            sensor(&mut most, px);
+            distort(&mut most, px);
             assert_eq!(most.check(), Ok(()));
             // All of the image can be found.
-            let camera = camera_of(&most.scenario.sensor);
+            let camera = camera_of(&most.scenario.camera);
             for i in 0..2592 {
                 let there =
                     crate::base::coords::PixelPoint::new(f64::from(i), 1943.0 - f64::from(i) * 0.7);

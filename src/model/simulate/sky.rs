@@ -43,7 +43,7 @@ impl<'a> Sky<'a> {
         let clouds = Clouds::new(scene, random);
         Self {
             camera,
-            vignetting: scenario.sensor.imperfections.vignetting,
+            vignetting: scenario.camera.imperfections.vignetting,
             slope: [steepness * sin, -steepness * cos],
             clouds: (scene.cloud_mag > 0.0 || scene.cloud_light > 0.0).then_some(clouds),
             moonlight: Moonlight::new(scenario, scene, camera),
@@ -268,7 +268,7 @@ mod tests {
     #[test]
     fn corners_lose_the_light_that_vignetting_says() {
         let mut scenario = Scenario::of(Preset::NanosatTracker);
-        scenario.sensor.imperfections.vignetting = 0.4;
+        scenario.camera.imperfections.vignetting = 0.4;
         let pixels = sky(&scenario, &Scene::default());
         assert!((pixels[0] - 60.0).abs() < 0.4, "{}", pixels[0]);
         assert!((pixels[150 * 400 + 200] - 100.0).abs() < 0.01);

@@ -4,7 +4,7 @@ use super::poisson::poisson;
 use super::scene::Scene;
 use crate::base::coords::PixelPoint;
 use crate::camera::CameraModel;
-use crate::camera::data_sheet::Sensor;
+use crate::camera::data_sheet::DataSheet;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -83,24 +83,24 @@ pub struct CosmicRay {
 }
 
 /// How many cosmic rays hit the detector during an exposure, on average.
-pub(super) fn mean_cosmic_rays(scene: &Scene, sensor: &Sensor, exposure_s: f64) -> f64 {
+pub(super) fn mean_cosmic_rays(scene: &Scene, sheet: &DataSheet, exposure_s: f64) -> f64 {
     const CM2_PER_UM2: f64 = 1e-8;
-    let pixels = sensor.width_px as f64 * sensor.height_px as f64;
-    let area_cm2 = pixels * sensor.pitch_x_um * sensor.pitch_y_um * CM2_PER_UM2;
+    let pixels = sheet.width_px as f64 * sheet.height_px as f64;
+    let area_cm2 = pixels * sheet.pitch_x_um * sheet.pitch_y_um * CM2_PER_UM2;
     scene.cosmic_rays_cm2_s * area_cm2 * exposure_s
 }
 
 /// The cosmic rays that hit the detector during an exposure, from all directions of a half space.
 pub(super) fn cosmic_rays(
     scene: &Scene,
-    sensor: &Sensor,
+    sheet: &DataSheet,
     camera: &CameraModel,
     exposure_s: f64,
     random: &mut ChaCha8Rng,
 ) -> Vec<CosmicRay> {
-    let mean = mean_cosmic_rays(scene, sensor, exposure_s);
+    let mean = mean_cosmic_rays(scene, sheet, exposure_s);
     let count = poisson(mean, random) as usize;
-    let depth_um = sensor.imperfections.depth_um;
+    let depth_um = sheet.imperfections.depth_um;
     let mut ray = |_| {
         let from = place(camera, random);
         // As many cross the plane under an angle as see it: the square of the cosine is even.
@@ -113,8 +113,8 @@ pub(super) fn cosmic_rays(
         CosmicRay {
             from,
             to: PixelPoint::new(
-                from.x + along_um * cos / sensor.pitch_x_um,
-                from.y + along_um * sin / sensor.pitch_y_um,
+                from.x + along_um * cos / sheet.pitch_x_um,
+                from.y + along_um * sin / sheet.pitch_y_um,
             ),
             electrons: (scene.cosmic_ray_e_um * way_um * spread).round(),
         }
@@ -150,14 +150,14 @@ mod tests {
 
     #[test]
     fn as_many_rays_hit_as_the_rate_says_and_leave_their_charge() {
-        let sensor = Preset::Imx174.sensor();
-        let camera = camera_of(&sensor);
+        let sheet = Preset::Imx174.data_sheet();
+        let camera = camera_of(&sheet);
         let scene = Scene {
             cosmic_rays_cm2_s: 100.0,
             ..Scene::default()
         };
         let mut random = ChaCha8Rng::seed_from_u64(2);
-        let rays = cosmic_rays(&scene, &sensor, &camera, 10.0, &mut random);
+        let rays = cosmic_rays(&scene, &sheet, &camera, 10.0, &mut random);
         // 1936 · 1216 pixels of 5.86 µm: 0.808 cm², 808 rays; five standard errors.
         assert!((rays.len() as f64 - 808.0).abs() < 143.0, "{}", rays.len());
         let mean_e = rays.iter().map(|ray| ray.electrons).sum::<f64>() / rays.len() as f64;
@@ -170,8 +170,8 @@ mod tests {
 
     #[test]
     fn a_trail_is_as_long_as_the_satellite_moves() {
-        let sensor = Preset::Imx174.sensor();
-        let camera = camera_of(&sensor);
+        let sheet = Preset::Imx174.data_sheet();
+        let camera = camera_of(&sheet);
         let scene = Scene {
             trails: 5.0,
             ..Scene::default()

@@ -22,50 +22,50 @@ fn star_at(camera: &CameraModel, x: f64, y: f64) -> Star {
 
 fn small() -> Scenario {
     let mut scenario = Scenario::of(Preset::NanosatTracker);
-    (scenario.sensor.width_px, scenario.sensor.height_px) = (300, 200);
+    (scenario.camera.width_px, scenario.camera.height_px) = (300, 200);
     scenario
 }
 
 #[test]
 fn square_pixels_have_the_area_of_those_that_are_not() {
-    let sensor = Preset::Experiment1.sensor();
-    let scale_rad = 1.0 / camera_of(&sensor).focal_length_px;
-    assert!((scale_rad * scale_rad / sensor.pixel_solid_angle_sr() - 1.0).abs() < 1e-12);
+    let sheet = Preset::Experiment1.data_sheet();
+    let scale_rad = 1.0 / camera_of(&sheet).focal_length_px;
+    assert!((scale_rad * scale_rad / sheet.pixel_solid_angle_sr() - 1.0).abs() < 1e-12);
 }
 
 #[test]
 fn distortion_moves_the_corner_by_as_much_as_is_asked_for() {
-    let mut sensor = small().sensor;
-    let plain = camera_of(&sensor);
-    let moved = |sensor: &Sensor, place: PixelPoint| {
-        let camera = camera_of(sensor);
+    let mut sheet = small().camera;
+    let plain = camera_of(&sheet);
+    let moved = |sheet: &DataSheet, place: PixelPoint| {
+        let camera = camera_of(sheet);
         let there = camera.pixel_of(&plain.direction_of(&place)).unwrap();
         [there.x - place.x, there.y - place.y]
     };
     let corner = PixelPoint::new(299.5, 199.5);
-    sensor.imperfections.distortion_px = 1.0;
-    let [x, y] = moved(&sensor, corner);
+    sheet.imperfections.distortion_px = 1.0;
+    let [x, y] = moved(&sheet, corner);
     // Outward; of second order in the displacement smaller.
     assert!(
         (x.hypot(y) - 1.0).abs() < 0.02 && x > 0.0 && y > 0.0,
         "{x} {y}"
     );
-    sensor.imperfections.decentring_x_px = 1.0;
-    assert!(camera_of(&sensor).distortion_model() == Some(DistortionModel::Cubic));
-    let same = moved(&sensor, plain.centre());
+    sheet.imperfections.decentring_x_px = 1.0;
+    assert!(camera_of(&sheet).distortion_model() == Some(DistortionModel::Cubic));
+    let same = moved(&sheet, plain.centre());
     assert!(same[0].abs() < 1e-6 && same[1].abs() < 1e-6);
-    sensor.imperfections.distortion_px = 0.0;
+    sheet.imperfections.distortion_px = 0.0;
     // Along x at the corner's distance: 3u² of three.
     let right = PixelPoint::new(plain.centre().x + 0.9 * plain.radius_px(), plain.centre().y);
-    let [x, y] = moved(&sensor, right);
+    let [x, y] = moved(&sheet, right);
     assert!((x - 0.81).abs() < 0.02 && y.abs() < 1e-6, "{x} {y}");
 }
 
 #[test]
 fn a_star_is_true_where_its_place_is_on_the_frame_and_drawn_where_its_light_is() {
     let mut scenario = Scenario::of(Preset::Experiment1);
-    scenario.sensor.read_noise_e = 0.0;
-    let camera = camera_of(&scenario.sensor);
+    scenario.camera.read_noise_e = 0.0;
+    let camera = camera_of(&scenario.camera);
     let stars = [
         star_at(&camera, -1.5, 300.0),
         star_at(&camera, 100.25, 200.75),
@@ -82,7 +82,7 @@ fn a_star_is_true_where_its_place_is_on_the_frame_and_drawn_where_its_light_is()
 #[test]
 fn a_detector_without_end_is_refused() {
     let mut scenario = Scenario::of(Preset::Experiment1);
-    (scenario.sensor.width_px, scenario.sensor.height_px) = (100_000, 100_000);
+    (scenario.camera.width_px, scenario.camera.height_px) = (100_000, 100_000);
     let refused = star_field(&scenario, &[], 1);
     assert!(matches!(refused, Err(FrameError::TooLarge { .. })));
 }
@@ -90,7 +90,7 @@ fn a_detector_without_end_is_refused() {
 #[test]
 fn a_frame_depends_on_its_seed_and_the_pattern_on_the_cameras() {
     let mut scenario = small();
-    scenario.sensor.imperfections.hot_pixels_per_mpx = 2000.0;
+    scenario.camera.imperfections.hot_pixels_per_mpx = 2000.0;
     let dark = |scenario: &Scenario, seed| {
         let simulator = Simulator::new(scenario, &Scene::default(), &[]).unwrap();
         simulator.dark(seed).unwrap().pixels
@@ -107,14 +107,14 @@ fn a_frame_depends_on_its_seed_and_the_pattern_on_the_cameras() {
     let first = hot(dark(&scenario, 1));
     let common = |others: Vec<usize>| others.iter().filter(|at| first.contains(at)).count();
     assert!(common(hot(dark(&scenario, 2))) > 12);
-    scenario.sensor.imperfections.pattern_seed = 2.0;
+    scenario.camera.imperfections.pattern_seed = 2.0;
     assert!(common(hot(dark(&scenario, 1))) < 4);
 }
 
 #[test]
 fn missing_stars_are_missing_and_false_ones_are_of_no_catalogue() {
     let scenario = small();
-    let camera = camera_of(&scenario.sensor);
+    let camera = camera_of(&scenario.camera);
     let places = (0..100).map(|i| (f64::from(i % 10), f64::from(i / 10)));
     let stars: Vec<Star> = places
         .map(|(x, y)| star_at(&camera, 30.0 * x + 10.0, 20.0 * y + 5.0))
@@ -144,11 +144,11 @@ fn missing_stars_are_missing_and_false_ones_are_of_no_catalogue() {
 #[test]
 fn a_turning_camera_smears_its_stars_and_keeps_their_light() {
     let mut scenario = small();
-    scenario.sensor.read_noise_e = 0.0;
-    scenario.sensor.full_well_e = 1e9;
-    scenario.sensor.bits = 32;
-    scenario.sensor.gain_e_per_adu = 0.01;
-    let camera = camera_of(&scenario.sensor);
+    scenario.camera.read_noise_e = 0.0;
+    scenario.camera.full_well_e = 1e9;
+    scenario.camera.bits = 32;
+    scenario.camera.gain_e_per_adu = 0.01;
+    let camera = camera_of(&scenario.camera);
     let stars = [star_at(&camera, 150.0, 100.0)];
     let light = |scene: Scene| {
         let simulator = Simulator::new(&scenario, &scene, &stars).unwrap();
@@ -176,7 +176,7 @@ fn a_turning_camera_smears_its_stars_and_keeps_their_light() {
 #[test]
 fn cosmic_rays_and_trails_are_where_the_truth_says() {
     let mut scenario = small();
-    scenario.sensor.read_noise_e = 1.0;
+    scenario.camera.read_noise_e = 1.0;
     let scene = Scene {
         cosmic_rays_cm2_s: 2e4,
         trails: 1.0,

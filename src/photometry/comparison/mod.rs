@@ -15,7 +15,7 @@
 mod contradiction;
 
 use crate::base::statistics::Estimate;
-use crate::camera::data_sheet::Sensor;
+use crate::camera::data_sheet::DataSheet;
 use crate::detect::DetectConfig;
 use crate::model::sensitivity::{
     Budget, Detector, Extinction, Faintest, Rule, Scenario, SkyBrightness, StarLight,
@@ -27,7 +27,7 @@ pub use contradiction::Contradiction;
 #[derive(Debug, Clone, PartialEq)]
 pub struct StatedCamera {
     /// The camera.
-    pub sensor: Sensor,
+    pub sheet: DataSheet,
     /// Zenith distance of the frame's centre, in degrees; else that of site and date, else that of the header, else 0.
     pub zenith_distance_deg: Option<f64>,
     /// What the air takes away; else the model's own.
@@ -108,7 +108,7 @@ const NO_SKY_MAG: f64 = 35.0;
 /// What `description` predicts of a frame that shows `seen`; `None` where the exposure is not known.
 pub fn compare(description: &StatedCamera, seen: &FrameMeasurement) -> Option<Comparison> {
     let exposure_s = seen.exposure_s?;
-    let mut scenario = Scenario::new(description.sensor.clone());
+    let mut scenario = Scenario::new(description.sheet.clone());
     let conditions = &mut scenario.conditions;
     conditions.exposure_s = exposure_s;
     let by_site_deg = seen.zenith_distance_deg.filter(|z| *z < 90.0);
@@ -121,7 +121,7 @@ pub fn compare(description: &StatedCamera, seen: &FrameMeasurement) -> Option<Co
     conditions.extinction = description.extinction.unwrap_or(conditions.extinction);
     scenario.conditions.sky = SkyBrightness::MagArcsec2(sky_mag_arcsec2(&scenario, seen));
     let [width_px, height_px] = seen.size_px;
-    (scenario.sensor.width_px, scenario.sensor.height_px) = (width_px, height_px);
+    (scenario.camera.width_px, scenario.camera.height_px) = (width_px, height_px);
     let budget = Budget::new(&scenario);
     let detector = Detector::matched_filter(&seen.detect, &scenario, &budget);
     let peak = Detector::new(Rule::PeakPixel, &scenario, &budget);
@@ -173,7 +173,7 @@ pub fn compare(description: &StatedCamera, seen: &FrameMeasurement) -> Option<Co
 
 /// V magnitude that stars of the colours seen, treated as the frame's are, would give for one ADU a second.
 fn zero_point_vmag(scenario: &Scenario, seen: &FrameMeasurement) -> f64 {
-    let gain_e_per_adu = scenario.sensor.gain_e_per_adu;
+    let gain_e_per_adu = scenario.camera.gain_e_per_adu;
     let light = StarLight::new(scenario);
     let of_a_second = light.budget().vmag_of(gain_e_per_adu, 1.0);
     let zero_point = |bv_mag: &f64| of_a_second + light.color_effect_mag(*bv_mag);
@@ -196,12 +196,12 @@ fn zero_point_vmag(scenario: &Scenario, seen: &FrameMeasurement) -> f64 {
 
 /// The sky's brightness by the frame's level, else by its noise.
 fn sky_mag_arcsec2(scenario: &Scenario, seen: &FrameMeasurement) -> f64 {
-    let sensor = &scenario.sensor;
+    let sheet = &scenario.camera;
     let mut standard = scenario.clone();
     standard.conditions.sky = SkyBrightness::MagArcsec2(0.0);
     let of_mag_0 = Budget::new(&standard);
-    let by_level_e = (seen.level_adu - sensor.bias_adu) * sensor.gain_e_per_adu - of_mag_0.dark_e;
-    let noise_e = seen.noise_adu * sensor.gain_e_per_adu;
+    let by_level_e = (seen.level_adu - sheet.bias_adu) * sheet.gain_e_per_adu - of_mag_0.dark_e;
+    let noise_e = seen.noise_adu * sheet.gain_e_per_adu;
     let by_noise_e = noise_e.powi(2) - of_mag_0.sensor_noise_e.powi(2);
     [by_level_e, by_noise_e]
         .into_iter()
@@ -227,10 +227,10 @@ fn contradictions(
     seen: &FrameMeasurement,
     found: &Comparison,
 ) -> Vec<Contradiction> {
-    let sensor = &description.sensor;
-    let noise_e = seen.noise_adu * sensor.gain_e_per_adu;
-    let stated_px = [sensor.width_px, sensor.height_px];
-    let stated_scale_rad = sensor.pixel_scale_rad();
+    let sheet = &description.sheet;
+    let noise_e = seen.noise_adu * sheet.gain_e_per_adu;
+    let stated_px = [sheet.width_px, sheet.height_px];
+    let stated_scale_rad = sheet.pixel_scale_rad();
     let size = (seen.size_px != stated_px).then_some(Contradiction::Size {
         frame_px: seen.size_px,
         camera_px: stated_px,
@@ -244,15 +244,15 @@ fn contradictions(
         });
     let spot = seen
         .spot_sigma_px
-        .filter(|spot_px| is_off(*spot_px, sensor.spot_sigma_px, SPOT_TOLERANCE))
+        .filter(|spot_px| is_off(*spot_px, sheet.spot_sigma_px, SPOT_TOLERANCE))
         .map(|measured_px| Contradiction::SpotSize {
             measured_px,
-            camera_px: sensor.spot_sigma_px,
+            camera_px: sheet.spot_sigma_px,
         });
-    let is_below_bias = seen.level_adu < sensor.bias_adu - seen.noise_adu;
+    let is_below_bias = seen.level_adu < sheet.bias_adu - seen.noise_adu;
     let level = is_below_bias.then_some(Contradiction::BelowBias {
         background_adu: seen.level_adu,
-        bias_adu: sensor.bias_adu,
+        bias_adu: sheet.bias_adu,
     });
     let noise = is_off(noise_e, found.budget.background_noise_e, NOISE_TOLERANCE).then_some(
         Contradiction::Noise {
@@ -309,7 +309,7 @@ mod tests {
 
     fn description() -> StatedCamera {
         StatedCamera {
-            sensor: Preset::Experiment1.sensor(),
+            sheet: Preset::Experiment1.data_sheet(),
             zenith_distance_deg: None,
             extinction: None,
         }
@@ -317,19 +317,19 @@ mod tests {
 
     /// A frame such as the camera takes under a sky of this brightness in 0.04 s.
     fn seen(sky_mag_arcsec2: f64) -> FrameMeasurement<'static> {
-        let mut scenario = Scenario::new(description().sensor);
+        let mut scenario = Scenario::new(description().sheet);
         scenario.conditions.exposure_s = 0.04;
         scenario.conditions.sky = SkyBrightness::MagArcsec2(sky_mag_arcsec2);
         let budget = Budget::new(&scenario);
-        let sensor = &scenario.sensor;
+        let sheet = &scenario.camera;
         FrameMeasurement {
             detect: DetectConfig::default(),
             size_px: [752, 582],
             exposure_s: Some(0.04),
-            level_adu: sensor.bias_adu + budget.background_e / sensor.gain_e_per_adu,
-            noise_adu: budget.background_noise_e / sensor.gain_e_per_adu,
+            level_adu: sheet.bias_adu + budget.background_e / sheet.gain_e_per_adu,
+            noise_adu: budget.background_noise_e / sheet.gain_e_per_adu,
             spot_sigma_px: Some(1.2),
-            pixel_scale_rad: Some(sensor.pixel_scale_rad()),
+            pixel_scale_rad: Some(sheet.pixel_scale_rad()),
             zenith_distance_deg: None,
             header_zenith_distance_deg: None,
             zero_point_vmag: None,

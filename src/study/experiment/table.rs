@@ -75,8 +75,8 @@ pub(super) fn centroids(published: &Published, scenario: &Scenario) -> CentroidL
         flux: None,
     });
     CentroidList {
-        width: scenario.sensor.width_px,
-        height: scenario.sensor.height_px,
+        width: scenario.camera.width_px,
+        height: scenario.camera.height_px,
         photometry: Photometry::JohnsonV,
         centroids: listed.collect(),
     }

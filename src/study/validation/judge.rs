@@ -228,7 +228,7 @@ impl<'a> Judge<'a> {
     ) -> StarRecord {
         let found = &self.solution.source(source);
         let sigma = |axis: usize| found.measured.map(|m| significant(m.sigma_px[axis]));
-        let gain = self.validator.protocol.setup.scenario.sensor.gain_e_per_adu;
+        let gain = self.validator.protocol.setup.scenario.camera.gain_e_per_adu;
         let flux_e = found.flux.map(|flux| flux * gain);
         let snr = found.measured.map(|m| m.snr);
         let sigma_flux_e = flux_e.zip(snr).map(|(flux_e, snr)| flux_e / snr);
@@ -274,7 +274,7 @@ impl<'a> Judge<'a> {
         };
         let attitude = self.attitude();
         let errors = |of: fn(&AttitudeError) -> f64| attitude.as_ref().map(of).map(significant);
-        let sensor = &validator.protocol.setup.scenario.sensor;
+        let sheet = &validator.protocol.setup.scenario.camera;
         let budget = &validator.budget;
         let catalog = validator.context.indexed.catalog();
         let named = self
@@ -323,10 +323,10 @@ impl<'a> Judge<'a> {
             measured_limit_sigma_mag: limit.map(|limit| to_decimals(limit.sigma_mag, 4)),
             background_adu: background.map(|b| significant(b.level_adu)),
             true_background_adu: significant(
-                sensor.bias_adu + truth.background_e / sensor.gain_e_per_adu,
+                sheet.bias_adu + truth.background_e / sheet.gain_e_per_adu,
             ),
             noise_adu: background.map(|b| significant(b.noise_adu)),
-            true_noise_adu: significant(budget.background_noise_e / sensor.gain_e_per_adu),
+            true_noise_adu: significant(budget.background_noise_e / sheet.gain_e_per_adu),
         }
     }
 

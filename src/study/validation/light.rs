@@ -24,7 +24,7 @@ pub struct Light<'a> {
 impl<'a> Light<'a> {
     /// The light of the stars on a frame, and of those beyond its border.
     pub fn of(scenario: &Scenario, truth: &'a Truth) -> Self {
-        let variance_px2 = scenario.sensor.spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2;
+        let variance_px2 = scenario.camera.spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2;
         let smear_px2 = truth
             .motion_px
             .map(|motion_px| motion_px * motion_px / 12.0);

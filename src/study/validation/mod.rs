@@ -136,9 +136,9 @@ impl<'a> Validator<'a> {
         if !detector.vmag_at(0.5).is_finite() {
             return Err(ValidationError::NoLimit);
         }
-        let sensor = &scenario.sensor;
+        let sheet = &scenario.camera;
         let camera = protocol.scale_known.then(|| StatedCamera {
-            sensor: sensor.clone(),
+            sheet: sheet.clone(),
             zenith_distance_deg: None,
             extinction: None,
         });

@@ -32,14 +32,14 @@ pub(super) struct Theory {
 
 impl Spots {
     pub(super) fn of(scenario: &Scenario, budget: &Budget) -> Self {
-        let sensor = &scenario.sensor;
-        let end_e = (sensor.full_scale_adu() - sensor.bias_adu) * sensor.gain_e_per_adu;
+        let sheet = &scenario.camera;
+        let end_e = (sheet.full_scale_adu() - sheet.bias_adu) * sheet.gain_e_per_adu;
         Self {
-            sigma_px: sensor.spot_sigma_px,
+            sigma_px: sheet.spot_sigma_px,
             has_smear: scenario.conditions.motion_px > 0.0,
             noise_e: budget.background_noise_e,
             background_e: budget.background_e + budget.dark_e,
-            full_e: sensor.full_well_e.min(end_e),
+            full_e: sheet.full_well_e.min(end_e),
         }
     }
 
@@ -78,7 +78,7 @@ mod tests {
     #[test]
     fn the_filter_adds_up_the_pixels_of_a_spot() {
         let mut scenario = Scenario::of(Preset::NanosatTracker);
-        scenario.sensor.spot_sigma_px = 1.0;
+        scenario.camera.spot_sigma_px = 1.0;
         let budget = Budget::new(&scenario);
         let spots = Spots::of(&scenario, &budget);
         // 13.6 pixels on average over places, from an independent computation.
@@ -98,7 +98,7 @@ mod tests {
             let spots = Spots::of(scenario, &Budget::new(scenario));
             spots.theory(&PixelPoint::new(3.2, 7.9), electrons)
         };
-        let full_e = scenario.sensor.full_well_e;
+        let full_e = scenario.camera.full_well_e;
         assert!(theory(&scenario, 100.0 * full_e).saturated);
         assert!(!theory(&scenario, 0.1 * full_e).saturated);
         assert!(theory(&scenario, 1e4).bound.is_some());

@@ -135,15 +135,15 @@ fn a_band_is_what_the_tables_and_equation_3_say() {
 fn plain() -> Scenario {
     let mut scenario = Scenario::of(Preset::Experiment1);
     scenario.reading = Reading::Physical;
-    let sensor = &mut scenario.sensor;
-    sensor.lens_transmission = Response::Constant(0.8);
-    sensor.quantum_efficiency = Response::Constant(0.5);
-    (sensor.band_from_nm, sensor.band_to_nm) = (400.0, 700.0);
-    (sensor.pitch_x_um, sensor.pitch_y_um) = (5.5, 5.5);
-    (sensor.focal_length_mm, sensor.aperture_mm) = (50.0, 25.0);
-    (sensor.read_noise_e, sensor.gain_e_per_adu) = (5.0, 2.0);
-    sensor.dark_current_e_s = 20.0;
-    (sensor.spot_sigma_px, sensor.peak_share) = (0.8, None);
+    let sheet = &mut scenario.camera;
+    sheet.lens_transmission = Response::Constant(0.8);
+    sheet.quantum_efficiency = Response::Constant(0.5);
+    (sheet.band_from_nm, sheet.band_to_nm) = (400.0, 700.0);
+    (sheet.pitch_x_um, sheet.pitch_y_um) = (5.5, 5.5);
+    (sheet.focal_length_mm, sheet.aperture_mm) = (50.0, 25.0);
+    (sheet.read_noise_e, sheet.gain_e_per_adu) = (5.0, 2.0);
+    sheet.dark_current_e_s = 20.0;
+    (sheet.spot_sigma_px, sheet.peak_share) = (0.8, None);
     scenario.conditions.exposure_s = 0.1;
     scenario.conditions.sky = SkyBrightness::MagArcsec2(18.0);
     scenario.conditions.extinction = Extinction::MagPerAirmass(0.25);
