@@ -1,16 +1,18 @@
-//! Stars that the camera does not tell apart: where their light is seen together.
+//! Blends: stars that the camera does not resolve, and where the centroid of their light lies.
 //!
-//! matched stars, camera, attitude → direction of the light that each centroid is that of
+//! matched stars, camera, attitude → direction of the blended light of each
 //!
-//! A spot fitted to the light of several stars comes to rest where the frame, filtered with that spot, is brightest: spots
-//! of variance s² have the variance 2s² then, so that the place is a mode of `Σ F exp(−d² / 4s²)`. The mode next to
-//! the star is found by mean shift.
+//! A spot fitted to the light of several stars converges where the frame, filtered with that spot,
+//! has a maximum. Spots of variance s² then have the variance 2s², so the position is a mode of `Σ
+//! F exp(−d² / 4s²)`. Mean shift finds the mode next to the star.
 //!
-//! Caveats: the noise is taken to be that of the background, while with that of its own light a bright blend is placed nearer to its
-//! photocentre; light is that of V magnitudes, whatever the colours; stars that the catalogue lacks are not reckoned with.
+//! Caveats: the noise is assumed to be that of the background; with photon noise a bright blend is
+//! measured nearer to its photocentre. Fluxes are those of V magnitudes, whatever the colour. Stars
+//! that the catalogue lacks do not count.
 //!
 //! # Reference
-//! Comaniciu & Meer 2002, IEEE Trans. Pattern Anal. Mach. Intell. 24, 603, doi 10.1109/34.1000236, for the mean shift.
+//! Comaniciu & Meer 2002, IEEE Trans. Pattern Anal. Mach. Intell. 24, 603, doi 10.1109/34.1000236,
+//! for the mean shift.
 
 use super::hypothesis::{Hypothesis, Problem};
 use super::pairing::Pair;
@@ -18,38 +20,38 @@ use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::sky::catalog::StarIndex;
 use crate::sky::catalog::sky_grid::GridStar;
 
-/// Stars so much fainter than another move it by less than a hundredth of the spot.
+/// Stars fainter than another by more move its centroid by less than a hundredth of the spot.
 const FAINTER_MAG: f32 = 4.5;
-/// So do stars farther off than so many standard deviations of the spot, unless they are brighter: of those it would be part itself.
+/// So do stars farther away, in standard deviations of the spot, unless they are brighter.
 const REACH_SIGMAS: f64 = 4.5;
 /// The variance that a pixel's own width adds to a spot, in px².
 const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
-/// The mean shift ends at steps below this, in pixels, ...
+/// The mean shift ends at steps below this, in pixels, …
 const CONVERGED_PX: f64 = 1e-4;
-/// ... or after so many.
+/// … or after this many steps.
 const MAX_STEPS: usize = 50;
 
-/// Finds stars that are seen together; keeps its buffers.
+/// Finds blends. Its buffers are reused.
 #[derive(Debug, Default)]
 pub struct Blends {
-    /// Catalogue stars that are matched, in order.
+    /// Matched catalogue stars, sorted.
     taken: Vec<StarIndex>,
     lights: Vec<(PixelPoint, f64)>,
 }
 
-/// What the camera sees.
-struct Seen<'a> {
+/// A hypothesis and its PSF.
+struct View<'a> {
     problem: Problem<'a>,
     hypothesis: &'a Hypothesis,
-    /// Of a spot with the pixels' width.
+    /// Variance of the spot, pixel width included.
     variance_px2: f64,
 }
 
 impl Blends {
-    /// Gives each pair the direction in which its light is seen. Returns whether that is another one for any of them: not where
-    /// all stand alone, or the spot is not known.
+    /// Sets the direction of each pair to that of its blended light. Returns whether any changed;
+    /// none does if all stars are single or the PSF is unknown.
     ///
-    /// A star that another detection is matched with is no part of a blend: each was measured by itself.
+    /// A star matched with another detection is not part of a blend: each was measured separately.
     pub fn redirect(
         &mut self,
         problem: Problem,
@@ -59,7 +61,7 @@ impl Blends {
         let Some(spot_sigma_px) = problem.field.spot_sigma_px else {
             return false;
         };
-        let seen = Seen {
+        let view = View {
             problem,
             hypothesis,
             variance_px2: spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2,
@@ -69,7 +71,7 @@ impl Blends {
         self.taken.sort_unstable();
         let mut is_any = false;
         for pair in pairs {
-            if let Some(direction) = self.direction_of(&seen, pair.star) {
+            if let Some(direction) = self.direction_of(&view, pair.star) {
                 pair.direction = direction;
                 is_any = true;
             }
@@ -77,18 +79,18 @@ impl Blends {
         is_any
     }
 
-    /// Where the light of a star is seen; `None` where it stands alone.
-    fn direction_of(&mut self, seen: &Seen, index: StarIndex) -> Option<UnitVector<Icrs>> {
-        let sky = seen.problem.sky;
+    /// Direction of the blended light of a star; `None` if it is single.
+    fn direction_of(&mut self, view: &View, index: StarIndex) -> Option<UnitVector<Icrs>> {
+        let sky = view.problem.sky;
         let star = sky.catalog().star(index);
-        let camera = &seen.hypothesis.camera;
-        let reach_rad = REACH_SIGMAS * seen.variance_px2.sqrt() / camera.focal_length_px;
+        let camera = &view.hypothesis.camera;
+        let reach_rad = REACH_SIGMAS * view.variance_px2.sqrt() / camera.focal_length_px;
         let Self { taken, lights } = self;
         lights.clear();
         let look = |near: &GridStar| {
             let other = StarIndex::from(near.catalog);
             if other != index && taken.binary_search(&other).is_err() {
-                lights.extend(seen.light_of(other, star.v_mag));
+                lights.extend(view.light_of(other, star.v_mag));
             }
         };
         let faintest_v_mag = star.v_mag + FAINTER_MAG;
@@ -97,16 +99,16 @@ impl Blends {
         if lights.is_empty() {
             return None;
         }
-        let own = seen.light_of(index, star.v_mag)?;
+        let own = view.light_of(index, star.v_mag)?;
         lights.push(own);
-        let pixel = mode_next_to(own.0, lights, seen.variance_px2);
-        let to_icrs = seen.hypothesis.icrs_to_camera.inverse();
+        let pixel = mode_next_to(own.0, lights, view.variance_px2);
+        let to_icrs = view.hypothesis.icrs_to_camera.inverse();
         Some(to_icrs.apply(&camera.direction_of(&pixel)))
     }
 }
 
-impl Seen<'_> {
-    /// A star's place in the frame, and its light in units of that of a star of `unit_v_mag`.
+impl View<'_> {
+    /// A star's position in the frame, and its flux in units of that of a star of `unit_v_mag`.
     fn light_of(&self, index: StarIndex, unit_v_mag: f32) -> Option<(PixelPoint, f64)> {
         let star = self.problem.sky.catalog().star(index);
         let direction = star.direction_at(self.problem.field.years_since_j2000);
@@ -154,7 +156,8 @@ mod tests {
         };
         assert!((pair(0.2) - 0.05).abs() < 1e-3, "{}", pair(0.2));
         assert!(pair(8.0) < 1e-5, "{}", pair(8.0));
-        // In between, the slope of one hill against the other: at 2 s it is 2 F₂/F₁ e⁻¹ to first order.
+        // In between, the slope of one hill against the other: at 2 s it is 2 F₂/F₁ e⁻¹ to first
+        // order.
         assert!((0.2..0.5).contains(&pair(2.0)), "{}", pair(2.0));
     }
 }

@@ -1,15 +1,16 @@
-//! Is a hypothesis about pointing and scale true? The probability that chance does as well, and what agrees.
+//! The false-alarm probability of a hypothesis about pointing and scale.
 //!
-//! hypothesis (camera, attitude) → catalogue stars in the frame → nearest observed star of each → false-alarm probability
+//! hypothesis (camera, attitude) → catalogue stars in the frame → nearest observed star of each →
+//! false-alarm probability
 //!
-//! Were the hypothesis wrong, each observed star would lie within r of a predicted one of about its brightness with the
-//! probability p = ρπr², ρ being the density of such stars around it. The number of stars that do so is then
-//! Poisson-binomial, each star having a chance of its own, and the probability of as many as were found or
-//! more, times the number of hypotheses, radii and differences in magnitude tried, bounds the number of
-//! equally good answers that chance alone would have given (an a-contrario test: Desolneux, Moisan & Morel
-//! 2000, IJCV 40, 7). The three stars of the triangle that the hypothesis came from agree because it was
-//! looked for, and say nothing; every two parameters fitted beyond pointing, roll and scale use up another star. The stars used
-//! up are taken to be those least likely to agree by chance, which makes the most of the others' chances.
+//! If the hypothesis is wrong, an observed star lies within r of a predicted star of similar
+//! brightness with probability p = ρπr², where ρ is the density of such stars around it. The number
+//! of stars that do so is Poisson-binomial, as each star has its own p. The probability of at least
+//! the number found, times the number of hypotheses, radii and magnitude differences tried, bounds
+//! the expected number of equally good answers by chance (an a-contrario test: Desolneux, Moisan &
+//! Morel 2000, IJCV 40, 7). The three stars of the triangle agree by construction and do not count.
+//! Every two parameters fitted beyond pointing, roll and scale use up another star. The stars used
+//! up are assumed to be those least likely to agree by chance, which is the pessimistic choice.
 
 use super::attitude::POSE_PARAMETERS;
 use super::field::{ObservedStar, StarField};
@@ -18,72 +19,74 @@ use super::predict::{PredictedStar, Surroundings};
 use crate::base::statistics::{LnProduct, log10_poisson_binomial_tail};
 use std::f64::consts::{LN_10, PI};
 
-/// Most hypotheses that a search tries, so that a frame in which there is nothing to find takes well
-/// under a second. Most fields that can be identified take a few; those with as many false sources as
-/// stars and half of the catalogue's stars missing take up to all of these.
+/// Most hypotheses that a search tries, so that a frame in which there is nothing to find takes
+/// well under a second. Most fields that can be identified take a few; those with as many false
+/// sources as stars and half of the catalogue's stars missing take up to all of these.
 pub const MAX_HYPOTHESES: u64 = 400_000;
 /// Number of observed stars that are tested, the brightest.
 pub const TESTED_STARS: usize = 60;
 /// Stars that agree by construction.
 const TRIANGLE_STARS: usize = 3;
-/// Radii of agreement tried: from the smallest, in pixels, by this factor, to this share of the frame's diagonal.
+/// Radii of agreement tried: from the smallest, in pixels, by this factor, up to this fraction of
+/// the frame's diagonal.
 const SMALLEST_RADIUS_PX: f64 = 0.2;
 const RADIUS_FACTOR: f64 = 1.5;
 const LARGEST_RADIUS_SHARE: f64 = 0.014;
-/// Differences in magnitude tried besides the largest that is tolerated at all.
+/// Magnitude differences tried, besides the largest that is tolerated.
 const MAG_TOLERANCES: [f64; 3] = [0.25, 0.5, 1.0];
-/// Radius of the neighbourhood whose density of predicted stars counts, in units of the radius of agreement.
+/// Radius of the neighbourhood in which the density of predicted stars is measured, in units of the
+/// radius of agreement.
 const NEIGHBOURHOOD: f64 = 8.0;
-/// An observed and a predicted star that are about as bright as each other.
+/// An observed and a predicted star of similar brightness.
 #[derive(Debug, Clone, Copy)]
 struct NearPair {
     observed: usize,
     predicted: usize,
     /// Their distance, in pixels.
     apart_px: f64,
-    /// The smallest radius of agreement in whose neighbourhood it is.
+    /// The smallest radius of agreement whose neighbourhood contains it.
     radius: usize,
-    /// The difference of their magnitudes, absolute.
+    /// Absolute difference of their magnitudes.
     mag: f64,
 }
 
-/// How likely it is that chance does as well as a hypothesis; keeps its buffers.
+/// Computes false-alarm probabilities. Its buffers are reused.
 #[derive(Debug, Default)]
 pub struct FalseAlarm {
     predicted: Vec<PredictedStar>,
     /// Radii of agreement, smallest first.
     radii_px: Vec<f64>,
-    /// All pairs in the neighbourhood of the largest.
+    /// All pairs in the neighbourhood of the largest radius.
     pairs: Vec<NearPair>,
-    /// Those within it, the closest first.
+    /// The pairs within the largest radius, closest first.
     close: Vec<NearPair>,
-    /// For each observed star the number of predicted stars that are alike, ...
+    /// For each observed star, the number of predicted stars of similar brightness, …
     alike: Vec<f64>,
-    /// ... and those of them in the neighbourhood, radius by radius.
+    /// … and how many of them lie in the neighbourhood, radius by radius.
     near: Vec<f64>,
     observed_taken: Vec<bool>,
     predicted_taken: Vec<bool>,
-    /// For each radius the most stars that agree within it or a smaller one, with the differences in magnitude tried so far.
+    /// For each radius, the largest number of agreeing stars so far within it or a smaller one.
     most: Vec<usize>,
     tests: Vec<Test>,
-    /// One for each observed star in each test.
+    /// The chance of each observed star in each test.
     chances: Vec<f64>,
     tail: Vec<f64>,
 }
 
-/// Agreement within one radius and one difference in magnitude.
+/// A test of agreement within one radius and one magnitude difference.
 #[derive(Debug, Clone, Copy)]
 struct Test {
-    /// Observed stars with a predicted star of their own, less those that agree by construction.
+    /// Observed stars with a predicted star of their own, minus those that agree by construction.
     hits: usize,
-    /// The natural logarithm of the probability of as many by chance is no less.
+    /// Lower bound of the natural logarithm of the probability.
     at_least_ln: f64,
-    /// Where its chances begin, and how many of them, the least likely, are used up.
+    /// Start of its chances, and how many of them, the least likely, are used up.
     chances: usize,
     used_up: usize,
 }
 
-/// What a test is of.
+/// The parameters of a test.
 struct Tested<'a> {
     field: &'a StarField,
     tolerance_mag: f64,
@@ -91,11 +94,12 @@ struct Tested<'a> {
 }
 
 impl FalseAlarm {
-    /// log10 of the expected number of hypotheses as good as this one among `hypotheses` that chance alone
-    /// would give: the false-alarm probability where it is small.
+    /// log10 of the expected number of hypotheses as good as this one, among `hypotheses`, by
+    /// chance: the false-alarm probability where it is small.
     ///
-    /// Agreement is sought within several radii and several differences in magnitude, and the least likely counts: exact
-    /// positions and magnitudes say more than rough ones. That so many tests are made is paid for.
+    /// Agreement is tested within several radii and magnitude differences, and the least likely
+    /// result counts, as exact positions and magnitudes say more than rough ones. The number of
+    /// tests is corrected for.
     pub fn log10(
         &mut self,
         hypothesis: &Hypothesis,
@@ -131,7 +135,7 @@ impl FalseAlarm {
 
     fn set_radii(&mut self, field: &StarField) {
         let largest_px = LARGEST_RADIUS_SHARE * field.width_px.hypot(field.height_px);
-        // There is one in the smallest frame.
+        // At least one radius, also in the smallest frame.
         let largest_px = largest_px.max(SMALLEST_RADIUS_PX);
         let radii = std::iter::successors(Some(SMALLEST_RADIUS_PX), |radius| {
             Some(radius * RADIUS_FACTOR)
@@ -141,7 +145,8 @@ impl FalseAlarm {
             .extend(radii.take_while(|&radius| radius <= largest_px));
     }
 
-    /// All pairs within the neighbourhood of the largest radius whose magnitudes differ by no more than is tolerated.
+    /// Finds all pairs within the neighbourhood of the largest radius and the tolerated magnitude
+    /// difference.
     fn find_pairs(&mut self, hypothesis: &Hypothesis, observed: &[ObservedStar], largest_mag: f64) {
         let largest_px = self.radii_px.last().copied().unwrap_or(0.0);
         let radii_px = &self.radii_px;
@@ -181,8 +186,8 @@ impl FalseAlarm {
         });
     }
 
-    /// One test for each radius at which more stars agree than do so by construction, and than agree within a smaller radius
-    /// or a smaller difference in magnitude: as many in more room are no less likely.
+    /// Adds a test for each radius at which more stars agree than by construction, within a smaller
+    /// radius or a smaller magnitude difference. As many stars in more room are no less likely.
     fn add_tests(&mut self, hypothesis: &Hypothesis, observed: &[ObservedStar], tested: &Tested) {
         self.count_alike(hypothesis, observed, tested.tolerance_mag);
         self.count_near(observed.len(), tested.tolerance_mag);
@@ -227,18 +232,20 @@ impl FalseAlarm {
         }
     }
 
-    /// The test of so many `hits` within one radius: the chance of each observed star, and what they amount to at the least.
+    /// The test of `hits` within one radius: the chance of each observed star, and a lower bound of
+    /// the probability.
     ///
-    /// The probability P of just as many hits is the product of all 1 − p, times the sum over all subsets of the
-    /// product of their p / (1 − p). The sum is no less than if all p were their geometric mean (Maclaurin's inequality), and
-    /// ln(1 − p) no less than −p − p² for p below 0.68.
+    /// The probability of exactly this number is the product of all 1 − p, times the sum over all
+    /// subsets of the product of their p / (1 − p). The sum is at least that of equal p, their
+    /// geometric mean (Maclaurin's inequality), and ln(1 − p) is at least −p − p² for p below 0.68.
     fn test(&mut self, radius: usize, hits: usize, tested: &Tested) -> Test {
         let (radius_px, radii) = (self.radii_px[radius], self.radii_px.len());
         let frame_px = tested.field.width_px * tested.field.height_px;
         let chances = self.chances.len();
         let (mut product, mut lost, mut possible, mut largest) = (LnProduct::ONE, 0.0, 0, 0.0_f64);
         for (of_star, &alike) in self.near.chunks_exact(radii).zip(&self.alike) {
-            // Less the one that may be its match: what counts is how many others chance could have put there.
+            // Without the one that may be its match: what counts is how many others chance could
+            // put there.
             let crowd = (of_star[radius] - 1.0) / NEIGHBOURHOOD.powi(2);
             let strewn = alike * PI * radius_px * radius_px / frame_px;
             let chance = strewn.max(crowd).min(1.0);
@@ -264,7 +271,7 @@ impl FalseAlarm {
         }
     }
 
-    /// log10 of the lowest probability of any test. Those that cannot be lower are left out.
+    /// log10 of the lowest probability of all tests. Tests whose bound is higher are skipped.
     fn least_likely(&mut self, observed: usize) -> f64 {
         self.tests
             .sort_unstable_by(|a, b| a.at_least_ln.total_cmp(&b.at_least_ln));
@@ -274,7 +281,7 @@ impl FalseAlarm {
                 break;
             }
             let chances = &mut self.chances[test.chances..test.chances + observed];
-            // Those that agree by construction count as the least likely ones.
+            // Stars that agree by construction count as the least likely ones.
             chances.sort_unstable_by(f64::total_cmp);
             let counted = &chances[test.used_up..];
             best = best.min(log10_poisson_binomial_tail(
@@ -287,17 +294,17 @@ impl FalseAlarm {
     }
 }
 
-/// Observed stars with a predicted star of their own within a growing radius.
+/// Counts observed stars with a predicted star of their own within a growing radius.
 struct Hits {
     observed_taken: Vec<bool>,
     predicted_taken: Vec<bool>,
     count: usize,
-    /// Pairs looked at.
+    /// Number of pairs processed.
     done: usize,
 }
 
 impl Hits {
-    /// None yet, in the buffers of `from`.
+    /// Starts at zero, with the buffers of `from`.
     fn new(from: &mut FalseAlarm, observed: usize) -> Self {
         let cleared = |mut taken: Vec<bool>, count: usize| {
             taken.clear();
@@ -315,7 +322,8 @@ impl Hits {
         }
     }
 
-    /// How many there are within `radius_px`, which must not be smaller than before; `pairs` are the closest first.
+    /// The number within `radius_px`, which must not decrease between calls; `pairs` are sorted by
+    /// distance.
     fn within(&mut self, radius_px: f64, tolerance_mag: f64, pairs: &[NearPair]) -> usize {
         while let Some(pair) = pairs.get(self.done).filter(|p| p.apart_px <= radius_px) {
             let (o, p) = (pair.observed, pair.predicted);
@@ -331,16 +339,16 @@ impl Hits {
     }
 }
 
-/// ln of the number of ways to choose `some` of `all`.
+/// Natural logarithm of the binomial coefficient.
 fn ln_binomial(all: usize, some: usize) -> f64 {
     let ln_factorial = |n: usize| libm::lgamma(n as f64 + 1.0);
     ln_factorial(all) - ln_factorial(some) - ln_factorial(all - some)
 }
 
-/// What the chance of one hypothesis is multiplied by when it is the last of so many.
+/// Factor on the probability of the last of this number of hypotheses.
 ///
-/// The weights' inverses add up to no more than one over the longest search there is, so that the probability
-/// that any hypothesis at all of a search passes by chance is bounded, and not only that of one.
+/// The inverses of the weights add up to at most one over the longest search, so the probability
+/// that any hypothesis of a search passes by chance is bounded.
 fn search_weight(hypotheses: u64) -> f64 {
     hypotheses.max(1) as f64 * (1.0 + (MAX_HYPOTHESES as f64).ln())
 }

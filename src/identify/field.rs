@@ -2,7 +2,8 @@
 
 use crate::base::coords::PixelPoint;
 
-/// Position of a source in the frame's list of sources: its detections, or the lines of a centroid list.
+/// Position of a source in the frame's list of sources: its detections, or the lines of a centroid
+/// list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SourceIndex(usize);
 
@@ -65,8 +66,8 @@ pub struct StarField {
     pub photometry: Photometry,
     /// Date of the frame, in Julian years since J2000.0, for proper motion.
     pub years_since_j2000: f64,
-    /// Standard deviation of the PSF before pixel integration, in pixels. Without it no catalogue stars are
-    /// treated as blended.
+    /// Standard deviation of the PSF before pixel integration, in pixels. Without it no catalogue
+    /// stars are treated as blended.
     pub spot_sigma_px: Option<f64>,
     /// Brightest first.
     pub stars: Vec<ObservedStar>,

@@ -12,10 +12,10 @@ use std::ops::Range;
 const PREDICTED_PER_OBSERVED: f64 = 1.5;
 /// Predicted stars in addition, so that a few missing ones do no harm in sparse fields.
 const PREDICTED_EXTRA: usize = 5;
-/// Where the zero point is known: the prediction goes to the magnitude that this fraction of the observed
-/// stars are brighter than (a few odd ones do not count), ...
+/// Where the zero point is known, the prediction reaches the magnitude that this fraction of the
+/// observed stars exceed (a few outliers do not count), …
 const FAINT_SHARE: f64 = 0.95;
-/// ... and this much deeper, for colours and for luck at the threshold.
+/// … and this much deeper, for colours and for luck at the threshold.
 const FAINT_ROOM_MAG: f64 = 1.0;
 
 /// A camera and an attitude that may be the true ones.
@@ -41,7 +41,8 @@ pub struct Problem<'a> {
 }
 
 impl Hypothesis {
-    /// Makes `predicted` the catalogue stars in the frame to the depth that `observed` asks for, brightest first.
+    /// Fills `predicted` with the catalogue stars in the frame, as many as `observed` needs,
+    /// brightest first.
     pub fn predict(
         &self,
         problem: Problem,
@@ -52,8 +53,8 @@ impl Hypothesis {
         self.predict_to(problem, observed, f64::NEG_INFINITY, (around, predicted));
     }
 
-    /// Makes `predicted` the catalogue stars in the frame that may be any of its stars, once the zero point is known: to what the
-    /// faint ones of these have, and the depth that their number asks for at least.
+    /// Fills `predicted` with all catalogue stars that may be observed stars, once the zero point
+    /// is known: down to the faint observed stars, and at least as many as their number needs.
     pub fn predict_all(
         &self,
         problem: Problem,
@@ -68,7 +69,7 @@ impl Hypothesis {
         self.predict_to(problem, observed, limit, (around, predicted));
     }
 
-    /// As [`Self::predict`], and to `limit_v_mag` at least.
+    /// As [`Self::predict`], and at least down to `limit_v_mag`.
     fn predict_to(
         &self,
         problem: Problem,
@@ -105,7 +106,7 @@ impl Hypothesis {
         }
     }
 
-    /// The same stars where this hypothesis puts them.
+    /// Updates the positions of the stars to those of this hypothesis.
     pub fn predict_again(&self, predicted: &mut [PredictedStar]) {
         for stars in predicted.chunks_mut(LANES) {
             let mut directions = [UnitVector::BORESIGHT; LANES];
@@ -118,13 +119,13 @@ impl Hypothesis {
         }
     }
 
-    /// The density of so many stars in the frame.
+    /// Density of `count` stars in the frame, per square degree.
     fn per_sq_deg(&self, count: usize) -> f64 {
         count as f64 * RAD_PER_DEG.powi(2) / (self.camera.fov_x_rad() * self.camera.fov_y_rad())
     }
 
-    /// The difference in brightness in units of what is tolerated; `None` if it is more. No star is too bright for a
-    /// saturated one.
+    /// The magnitude difference in units of the tolerance; `None` beyond it. No star is too bright
+    /// for a saturated one.
     pub fn mag_difference(
         &self,
         observed: &ObservedStar,
@@ -139,7 +140,7 @@ impl Hypothesis {
         (relative <= 1.0).then_some(relative)
     }
 
-    /// The part of `predicted`, the brightest first, whose stars are as bright as `star` within a tolerance.
+    /// The range of `predicted` (brightest first) with the brightness of `star` within a tolerance.
     pub fn alike(
         &self,
         star: &ObservedStar,

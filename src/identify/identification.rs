@@ -16,7 +16,8 @@ pub struct Identification {
     pub camera: CameraModel,
     /// The attitude.
     pub icrs_to_camera: Rotation<Icrs, Camera>,
-    /// Covariance of the attitude error, as small rotations about the camera's x, y and z axes, in rad².
+    /// Covariance of the attitude error, as small rotations about the camera's x, y and z axes, in
+    /// rad².
     pub attitude_covariance_rad2: Matrix3<f64>,
     /// Standard error of the focal length, in pixels.
     pub focal_length_sigma_px: f64,
@@ -24,8 +25,8 @@ pub struct Identification {
     pub matches: Vec<StarMatch>,
     /// Root mean square of the residuals, in pixels.
     pub rms_px: f64,
-    /// log10 of the false-alarm probability: that chance gives as good an answer, counting all hypotheses
-    /// tried.
+    /// log10 of the false-alarm probability: that chance gives as good an answer, counting all
+    /// hypotheses tried.
     pub log10_false_alarm: f64,
 }
 
@@ -46,8 +47,8 @@ pub struct StarMatch {
     pub source: SourceIndex,
     /// The catalogue star.
     pub star: StarIndex,
-    /// Distance in pixels between the observed position and the predicted one: that of the star, or of the
-    /// light of all stars blended with it.
+    /// Distance in pixels between the observed position and the predicted one: that of the star, or
+    /// of the light of all stars blended with it.
     pub residual_px: f64,
 }
 

@@ -84,8 +84,9 @@ struct Claim {
 }
 
 impl Pairing {
-    /// Fills `pairs` with the stars that lie within `radius` of each other and have a `mag_difference`, each star
-    /// once, closest pairs in position and brightness first. The result is in the order of the observed stars.
+    /// Fills `pairs` with the stars that lie within `radius` of each other and have a
+    /// `mag_difference`, each star once, closest pairs in position and brightness first. The result
+    /// is in the order of the observed stars.
     pub fn pair_up(
         &mut self,
         (observed, predicted): (&[ObservedStar], &[PredictedStar]),
@@ -132,7 +133,8 @@ impl Pairing {
                 if distance_px <= radius_px
                     && let Some(difference) = mag_difference(star, &predicted[p])
                 {
-                    // In pixels, not in errors: a star with a large error takes no partner from one with a small error.
+                    // In pixels, not in errors: a star with a large error takes no partner from one
+                    // with a small error.
                     let apart = distance_px / radius.common_px;
                     self.candidates.push(Candidate {
                         distance: apart * apart + difference * difference,

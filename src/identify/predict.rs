@@ -1,4 +1,4 @@
-//! Where the catalogue's stars fall in a frame.
+//! Predicts the positions of catalogue stars in a frame.
 
 use super::indexed_catalog::IndexedCatalog;
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
@@ -6,21 +6,23 @@ use crate::camera::{CameraModel, LANES};
 use crate::sky::catalog::StarIndex;
 use crate::sky::catalog::sky_grid::{GridStar, chord_of};
 
-/// Stars predicted so far outside the frame, in units of its diagonal, may still be seen on it.
+/// Margin outside the frame, in units of its diagonal, within which a predicted star may still be
+/// observed.
 const MARGIN: f64 = 0.01;
-/// Lenses shift stars by no more than so much of the frame's half diagonal.
+/// Largest shift by lens distortion, in units of the frame's half diagonal.
 const UNDISTORTED_MARGIN: f64 = 0.1;
-/// So much further than a view asks for, in units of its radius, stars are gathered: the next view is a little off.
+/// Margin around a view, in units of its radius, within which stars are gathered, as the next view
+/// differs a little.
 const GATHERED_MARGIN: f64 = 0.04;
-/// How much deeper to look where the stars are too few, in magnitudes.
+/// Magnitudes to go deeper where the stars are too few.
 const DEEPER_MAG: f64 = 0.7;
 
-/// A catalogue star where camera and attitude put it.
+/// A catalogue star at its predicted position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PredictedStar {
-    /// Its place in the frame.
+    /// Position in the frame.
     pub pixel: PixelPoint,
-    /// Its direction at the time of the frame.
+    /// Direction at the date of the frame.
     pub direction: UnitVector<Icrs>,
     /// V magnitude.
     pub v_mag: f32,
@@ -28,27 +30,27 @@ pub struct PredictedStar {
     pub star: StarIndex,
 }
 
-/// A camera in its attitude, at a time.
+/// A camera, its attitude, and the date.
 #[derive(Debug, Clone, Copy)]
 pub struct View<'a> {
     /// The camera.
     pub camera: &'a CameraModel,
     /// The attitude.
     pub icrs_to_camera: &'a Rotation<Icrs, Camera>,
-    /// When, in Julian years since J2000.0: the stars move.
+    /// Date in Julian years since J2000.0, for proper motion.
     pub years_since_j2000: f64,
 }
 
-/// So many stars, and all that are so bright.
+/// How deep to predict: at least a number of stars, and all to a magnitude.
 #[derive(Debug, Clone, Copy)]
 pub struct Depth {
-    /// How many.
+    /// Number of stars.
     pub count: usize,
-    /// Down to which V magnitude.
+    /// V magnitude.
     pub v_mag: f64,
 }
 
-/// Catalogue stars around a direction: a field's are predicted many times, and looked up once.
+/// Catalogue stars around a direction: looked up once, predicted many times.
 #[derive(Debug, Default)]
 pub struct Surroundings {
     /// Brightest first.
@@ -56,7 +58,7 @@ pub struct Surroundings {
     around: Option<Gathered>,
 }
 
-/// What was gathered.
+/// The region and depth that were gathered.
 #[derive(Debug, Clone, Copy)]
 struct Gathered {
     centre: UnitVector<Icrs>,
@@ -65,14 +67,15 @@ struct Gathered {
 }
 
 impl View<'_> {
-    /// The catalogue stars in the frame, or within 1 % of its diagonal of it, down to a V magnitude, brightest first.
+    /// The catalogue stars in the frame, or within 1 % of its diagonal outside it, down to a V
+    /// magnitude, brightest first.
     pub fn stars_to(&self, sky: &IndexedCatalog, faintest_v_mag: f64) -> Vec<PredictedStar> {
         let mut predicted = Vec::new();
         Surroundings::default().stars_to(self, sky, faintest_v_mag, &mut predicted);
         predicted
     }
 
-    /// The largest angle from the boresight at which there are stars of the frame.
+    /// Largest angle between the boresight and a star in the frame.
     fn reach_rad(&self) -> f64 {
         self.camera.radius_rad() * (1.0 + 2.0 * MARGIN)
     }
@@ -83,7 +86,7 @@ impl View<'_> {
 }
 
 impl Surroundings {
-    /// Makes `predicted` the stars of [`View::stars_to`].
+    /// Fills `predicted` with the stars of [`View::stars_to`].
     pub fn stars_to(
         &mut self,
         view: &View,
@@ -102,8 +105,8 @@ impl Surroundings {
         project(view, (sky, &self.stars[..bright_enough]), &all, predicted);
     }
 
-    /// Makes `predicted` the brightest stars of [`View::stars_to`] to the depth `least`, or all of the catalogue's there are;
-    /// most likely the count is brighter than `likely_v_mag`.
+    /// Fills `predicted` with the brightest stars of [`View::stars_to`] to the depth `least`, or
+    /// with all that the catalogue has. The search starts at `likely_v_mag`.
     pub fn stars_at_least(
         &mut self,
         view: &View,
@@ -122,7 +125,7 @@ impl Surroundings {
         }
     }
 
-    /// Sees to it that all stars of `view` to a V magnitude are here; returns to which they are.
+    /// Gathers all stars of `view` down to a V magnitude; returns the magnitude reached.
     fn gather(&mut self, view: &View, sky: &IndexedCatalog, faintest_v_mag: f64) -> f64 {
         let (centre, reach_rad) = (view.boresight(), view.reach_rad());
         let covers =
@@ -156,13 +159,14 @@ impl Surroundings {
         faintest_v_mag
     }
 
-    /// To be called where another catalogue may be next.
+    /// Forgets the stars: call it when the catalogue may change.
     pub fn forget(&mut self) {
         self.around = None;
     }
 }
 
-/// Makes `predicted` those of `stars`, brightest first, that are in the frame or nearly so, until there are so many that are so faint.
+/// Fills `predicted` with those of `stars` (brightest first) that lie in the frame or nearly so,
+/// until both the number and the magnitude of `least` are reached.
 fn project(
     view: &View,
     (sky, stars): (&IndexedCatalog, &[GridStar]),
@@ -171,7 +175,7 @@ fn project(
 ) {
     let camera = view.camera;
     let margin_px = MARGIN * camera.width_px.hypot(camera.height_px);
-    // The cone is rounder than the frame: most of what it holds beside it needs no closer look.
+    // The cone is larger than the frame: a quick test rejects most stars outside it.
     let nearly_px = margin_px + UNDISTORTED_MARGIN * camera.radius_px();
     let reach = [camera.width_px, camera.height_px]
         .map(|extent_px| (0.5 * extent_px + nearly_px) / camera.focal_length_px);
@@ -190,7 +194,7 @@ fn project(
         for (lane, star) in lanes.iter_mut().zip(&mut near) {
             *lane = Some(star);
         }
-        // One after the other without any decision: the memory of all is waited for at once.
+        // No branches here, so that the memory accesses overlap.
         let directions = lanes.map(|lane| {
             lane.map_or(boresight, |star: &GridStar| {
                 sky.stars()[star.catalog as usize].direction_at(view.years_since_j2000)

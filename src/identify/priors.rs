@@ -87,8 +87,8 @@ pub enum DateSource {
 
 /// Widest field of view that has a pinhole scale, in radians.
 const MAX_FOV_RAD: f64 = 179.0 * RAD_PER_DEG;
-/// Tolerance of the scale that a header or a data sheet gives: focal lengths are nominal. A focal reducer or
-/// binning that it does not mention changes the scale by more.
+/// Tolerance of the scale that a header or a data sheet gives: focal lengths are nominal. A focal
+/// reducer or binning that it does not mention changes the scale by more.
 const NOMINAL_TOLERANCE: f64 = 0.2;
 
 impl ScalePrior {
@@ -163,7 +163,8 @@ impl Priors {
             .map_or(0.0, |known| known.date.years_since_j2000())
     }
 
-    /// Smallest and largest pixel scale at the centre of a frame of this width, in radians, if known.
+    /// Smallest and largest pixel scale at the centre of a frame of this width, in radians, if
+    /// known.
     pub fn pixel_scale_range_rad(&self, width_px: f64) -> Option<(f64, f64)> {
         Some(self.scale?.pixel_scale_range_rad(width_px))
     }

@@ -1,6 +1,7 @@
-//! From a hypothesis that is nearly right to the best camera and attitude, and all the stars that agree.
+//! Refinement of a hypothesis: camera and attitude are fitted to all stars that agree.
 //!
-//! pair up → fit → pair up within a smaller radius → ... with as much lens distortion as the stars support
+//! pairing → fit → pairing within a smaller radius → … with as much lens distortion as the stars
+//! support
 
 use super::blends::Blends;
 use super::field::{ObservedStar, Photometry};
@@ -14,37 +15,39 @@ use crate::identify::attitude::{
 };
 use std::f64::consts::PI;
 
-/// Pairs further apart than so many times the typical error on an axis are no pairs.
+/// Largest distance of a pair, in typical errors on one axis.
 const CLIP_SIGMAS: f64 = 5.0;
 /// The median distance of errors with standard deviation 1 on each axis (Rayleigh).
 const RAYLEIGH_MEDIAN: f64 = 1.177_41;
-/// No two stars are told apart by less than this.
+/// Smallest pairing radius.
 const MIN_RADIUS_PX: f64 = 0.25;
-/// A distortion model is tried where there are so many equations to each parameter.
+/// Equations per parameter that a distortion model needs.
 const EQUATIONS_PER_PARAMETER: f64 = 4.0;
-/// How much likelier (twice the logarithm) a richer model must make the stars left out of the fit to be taken.
+/// Gain in likelihood of the stars left out of the fit (twice its logarithm) that a richer model
+/// needs.
 const WORTH_IT: f64 = 12.0;
-/// With few equations chance does more, as the tails of the F distribution are heavier than those of χ².
+/// With few equations the required gain is larger: the F distribution has heavier tails than χ².
 const TAIL_EQUATIONS: f64 = 8.0;
-/// Residuals exceed the stated errors where their median does so by this many of its standard errors.
+/// Residuals exceed the stated errors if their median does so by this many of its standard errors.
 const EXCESS_SIGMAS: f64 = 2.0;
-/// The relative standard error of the median of n squared distances, times √n: they are distributed exponentially.
+/// Relative standard error of the median of n squared distances, times √n (exponential
+/// distribution).
 const MEDIAN_ERROR: f64 = 1.0 / std::f64::consts::LN_2;
-/// Halvings of the interval in which the excess is sought: to a ten-thousandth of the largest residual.
+/// Bisections for the excess error, down to a ten-thousandth of the largest residual.
 const EXCESS_BISECTIONS: usize = 14;
-/// Distance in standard errors from which on a star pulls no harder.
+/// Residual in standard errors beyond which a star pulls no harder.
 const HUBER_SIGMAS: f64 = 2.5;
-/// How much further off than the bright stars faint ones may be.
+/// Pairing radius of the faint stars over that of the bright ones.
 const FAINT_RADIUS: f64 = 3.0;
-/// Farther off than so many times the typical star no star is looked for, however large its error.
+/// Largest pairing radius for stars with large errors, over the common one.
 const ROUGH_RADIUS: f64 = 5.0;
-/// Rounds of fitting to blends: in the first the weights are still those of stars by themselves.
+/// Rounds of fitting with blends. The first still has the weights of single stars.
 const BLEND_ROUNDS: usize = 2;
 /// Rounds of pairing and fitting with all the stars.
 const ALL_STARS_ROUNDS: usize = 2;
-/// A sceptic wants so many standard deviations more agreement than chance makes.
+/// Agreement above chance that a sceptical refinement needs, in standard deviations.
 const SCEPTICAL_SIGMAS: f64 = 3.0;
-/// Rounds of pairing and fitting at the most.
+/// Maximum rounds of pairing and fitting.
 const MAX_ROUNDS: usize = 8;
 
 /// A fitted hypothesis.
@@ -52,9 +55,10 @@ const MAX_ROUNDS: usize = 8;
 pub struct Refined {
     /// The fit.
     pub fit: CameraFit,
-    /// What must be added to the observed magnitudes to make them V.
+    /// Johnson V minus observed magnitude.
     pub zero_point_mag: f64,
-    /// Standard deviation on each axis, in pixels, that must be added to the stated centroid errors to explain the residuals.
+    /// Standard deviation on each axis, in pixels, that the stated centroid errors lack to explain
+    /// the residuals.
     pub excess_sigma_px: f64,
 }
 
@@ -75,13 +79,13 @@ impl Refined {
 pub struct Start<'a> {
     /// The hypothesis.
     pub hypothesis: &'a Hypothesis,
-    /// How far true pairs may be apart under it.
+    /// Largest distance of true pairs under it, in pixels.
     pub radius_px: f64,
-    /// Whether to give up at once where no more stars agree than chance would have agree.
+    /// Whether to give up at once if no more stars agree than by chance.
     pub sceptical: bool,
-    /// How many stars to take, the brightest, ...
+    /// Number of stars to use, the brightest.
     pub stars: usize,
-    /// ... and the richest model of distortion to try.
+    /// Richest distortion model to try.
     pub richest: DistortionModel,
 }
 
@@ -93,12 +97,12 @@ struct Guess<'a> {
     excess_sigma_px: f64,
 }
 
-/// Refines hypotheses; keeps its buffers.
+/// Refines hypotheses. Its buffers are reused.
 #[derive(Debug, Default)]
 pub struct Refiner {
     /// Catalogue stars of the field.
     pub around: Surroundings,
-    /// The stars that agreed with what was refined last.
+    /// The pairs of the last refinement.
     pub pairs: Vec<Pair>,
     before: Vec<Pair>,
     predicted: Vec<PredictedStar>,
@@ -109,7 +113,7 @@ pub struct Refiner {
     scratch: Scratch,
 }
 
-/// Room for medians.
+/// Buffers for medians.
 #[derive(Debug, Default)]
 struct Scratch {
     values: Vec<f64>,
@@ -125,9 +129,8 @@ impl Scratch {
 }
 
 impl Refiner {
-    /// Pairs up and fits in turn, from `start`; [`Self::pairs`] are the stars that agree.
-    ///
-    /// `None` where too few stars agree to determine the camera.
+    /// Pairs and fits in turn from `start`; [`Self::pairs`] are then the stars that agree. `None`
+    /// if too few agree to determine the camera.
     pub fn refine(&mut self, problem: Problem, start: &Start) -> Option<Refined> {
         let field = problem.field;
         let observed = field.brightest(start.stars);
@@ -175,10 +178,9 @@ impl Refiner {
         Some(current)
     }
 
-    /// Adds the stars that were too faint for the refinement so far, and fits the same distortion model to all of them. Each is
-    /// looked for as far off as its own error allows: that of the faintest is many times the typical one.
-    ///
-    /// `None` where they do not determine the camera.
+    /// Adds the fainter stars and fits the same distortion model to all. Each star has a pairing
+    /// radius by its own error, as that of the faintest is many times the typical one. `None` if
+    /// they do not determine the camera.
     pub fn with_all_stars(&mut self, problem: Problem, settled: &Refined) -> Option<Refined> {
         let hypothesis = settled.hypothesis();
         let model = hypothesis.camera.distortion_model();
@@ -211,9 +213,8 @@ impl Refiner {
         Some(current)
     }
 
-    /// Fits the same stars again, each where its light is seen together with that of those which the camera does not tell from it.
-    ///
-    /// `None` where they do not determine the camera.
+    /// Fits the same stars again, each at the position of its blend. `None` if they do not
+    /// determine the camera.
     pub fn with_blends(&mut self, problem: Problem, settled: Refined) -> Option<Refined> {
         let hypothesis = settled.hypothesis();
         if !self.blends.redirect(problem, &hypothesis, &mut self.pairs) {
@@ -248,7 +249,7 @@ impl Refiner {
         );
     }
 
-    /// Whether more stars agree within `radius_px` than chance would have agree.
+    /// Whether clearly more stars agree within `radius_px` than by chance.
     fn is_remarkable(&self, problem: Problem, observed: usize, radius_px: f64) -> bool {
         let area_px = problem.field.width_px * problem.field.height_px;
         let discs_px = self.predicted.len() as f64 * PI * radius_px.powi(2);
@@ -306,8 +307,8 @@ impl Refiner {
         }
     }
 
-    /// The stars as the fit takes them. The error of one that is further off than its own error and the common
-    /// excess explain (an unresolved companion, say) is raised with its distance, so that it pulls no harder than one that is not
+    /// Converts the pairs to the input of the fit. The error of an outlier (with an unresolved
+    /// companion, for example) grows with its residual, so that it pulls no harder than other stars
     /// (Huber 1964, Ann. Math. Stat. 35, 73).
     fn measure(&mut self, problem: Problem, excess_px: f64) {
         let measured = |pair: &Pair| {
@@ -324,7 +325,8 @@ impl Refiner {
         self.stars.extend(self.pairs.iter().map(measured));
     }
 
-    /// The simplest model that richer ones do not clearly surpass in predicting stars left out of the fit.
+    /// The simplest distortion model that no richer one clearly surpasses in predicting left-out
+    /// stars.
     fn choose_model(
         &mut self,
         problem: Problem,
@@ -352,7 +354,7 @@ impl Refiner {
                 Some(chi_sq) if equations * (best.1 / chi_sq).ln() > worth_it => {
                     best = (Some(model), chi_sq);
                 }
-                // The quintic is not tried where the cubic is no better than what is simpler.
+                // The quintic is not tried where the cubic is no better.
                 _ if model == DistortionModel::Cubic => break,
                 _ => {}
             }
@@ -360,7 +362,7 @@ impl Refiner {
         best.0
     }
 
-    /// What the stated errors must be multiplied by to be those that the residuals show: at most 1, as the excess is one of them.
+    /// Factor from the stated errors, with the excess, to those that the residuals show; at most 1.
     fn error_scale(&mut self, problem: Problem, excess_sigma_px: f64) -> f64 {
         let relative = |pair: &Pair| {
             let sigma_px = problem.field.stars[pair.observed].sigma_px;
@@ -370,21 +372,23 @@ impl Refiner {
         (median / RAYLEIGH_MEDIAN).min(1.0)
     }
 
-    /// The radius that holds practically all true pairs, by the typical residual of the last fit.
+    /// The radius that contains practically all true pairs, from the median residual of the last
+    /// fit.
     fn agreement_radius_px(&mut self) -> f64 {
         let distances_px = self.pairs.iter().map(|pair| pair.residual_px);
         let sigma_px = self.scratch.median(distances_px) / RAYLEIGH_MEDIAN;
         (CLIP_SIGMAS * sigma_px).max(MIN_RADIUS_PX)
     }
 
-    /// The same, but no larger than before and not so much smaller that a bad fit would throw good pairs away.
+    /// The same, but at most as large as before, and not so small that a bad fit would lose good
+    /// pairs.
     fn next_radius_px(&mut self, before_px: f64) -> f64 {
         self.agreement_radius_px().clamp(before_px / 4.0, before_px)
     }
 
-    /// What must be added to the stated errors so that the residuals' median is as expected, in pixels; nothing where chance
-    /// explains that they are larger. The better measured half of the stars tells: what is to be added shows in them, and the
-    /// faintest were found where noise made them bright, and moved them.
+    /// The error in pixels that must be added in quadrature to the stated ones to explain the
+    /// median residual; 0 where chance explains it. Only the better measured half of the stars
+    /// counts: the faintest were detected because noise made them brighter, and it moved them, too.
     fn excess_sigma_of(&mut self, problem: Problem, parameters: usize) -> f64 {
         let equations = 2.0 * self.pairs.len() as f64;
         let free = (equations - parameters as f64).max(1.0) / equations.max(1.0);
@@ -399,7 +403,7 @@ impl Refiner {
                 .map(|([x, y], pair)| (x * x + y * y, stated_sq(pair)))
                 .filter(|(_, stated_sq)| *stated_sq <= worst_sq),
         );
-        // Whether the median of the squares, in units of what is stated and added, is above a limit.
+        // Whether the median squared residual, in units of the squared errors, is above a limit.
         let is_median_above = |excess_sq: f64, limit: f64| {
             let is_below = |&(d, s): &(f64, f64)| d / (s + excess_sq).max(1e-6) <= limit;
             let below = squares.iter().map(|pair| usize::from(is_below(pair)));

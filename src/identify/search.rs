@@ -1,10 +1,11 @@
 //! The search for a hypothesis: pointing, roll and scale.
 //!
-//! Triangles of bright observed stars → similar catalogue triangles → hypotheses → confirmed by further stars.
+//! Triangles of bright observed stars → similar catalogue triangles → hypotheses → confirmed by
+//! further stars.
 //!
-//! A size class of the index corresponds to a range of focal lengths. In wide fields the shape of a triangle
-//! depends on the focal length (gnomonic projection), so the range is divided into steps within which it does
-//! not change noticeably.
+//! A size class of the index corresponds to a range of focal lengths. In wide fields the shape of a
+//! triangle depends on the focal length (gnomonic projection), so the range is divided into steps
+//! within which it does not change noticeably.
 
 use super::false_alarm::{FalseAlarm, MAX_HYPOTHESES, TESTED_STARS};
 use super::field::{Photometry, StarField};
@@ -20,19 +21,21 @@ use crate::identify::attitude::POSE_PARAMETERS;
 use crate::sky::catalog::sky_grid::{GridStar, chord_of};
 use nalgebra::{Matrix3, Vector3};
 
-/// Margin on the fields of view that the index allows, so that a field of exactly that width is found.
+/// Margin on the fields of view that the index allows, so that a field of exactly that width is
+/// found.
 const FOV_SLACK: f64 = 1.05;
 
 /// One sweep over the triangles of the brightest stars.
 struct Pass {
     /// Number of stars that form triangles, the brightest.
     stars: usize,
-    /// Faintest star of the first triangle; triangles of brighter stars were tried in the pass before.
+    /// Faintest star of the first triangle; triangles of brighter stars were tried in the pass
+    /// before.
     from: usize,
     /// Relative error of a triangle's sides caused by lens distortion.
     tolerance: f64,
-    /// Probability that another observed star confirms a true hypothesis. Some are false, and some are not in
-    /// the catalogue.
+    /// Probability that another observed star confirms a true hypothesis. Some are false, and some
+    /// are not in the catalogue.
     true_confirmation: f64,
 }
 
@@ -74,23 +77,25 @@ const DROP_BELOW: f64 = 0.030_197_383_422_318_5;
 const TAKE_ABOVE: f64 = 1_096.633_158_428_458_6;
 /// ... and above which they confirm it when all stars were tested (e).
 const TAKE_AT_END: f64 = std::f64::consts::E;
-/// Largest distance of a confirming star from its catalogue star: in distortion tolerances times the frame's
-/// diagonal, and in centroid errors extrapolated from the triangle.
+/// Largest distance of a confirming star from its catalogue star: in distortion tolerances times
+/// the frame's diagonal, and in centroid errors extrapolated from the triangle.
 const CONFIRMING_TOLERANCES: f64 = 1.5;
 const CONFIRMING_SIGMAS: f64 = 3.5;
-/// Maximum number of hypotheses for each triangle. Few stars have few triangles, and every pass tries the
-/// same ones again, so more hypotheses would hardly find anything.
+/// Maximum number of hypotheses for each triangle. Few stars have few triangles, and every pass
+/// tries the same ones again, so more hypotheses would hardly find anything.
 const HYPOTHESES_PER_TRIANGLE: u64 = 250;
 /// Minimum number of hypotheses, however few the triangles.
 const LEAST_HYPOTHESES: u64 = 30_000;
-/// Maximum number of catalogue triangles of the right shape. Most of them fail at once, by size or brightness.
+/// Maximum number of catalogue triangles of the right shape. Most of them fail at once, by size or
+/// brightness.
 const MAX_CANDIDATES: u64 = 20_000_000;
 /// Triangles with a larger tolerance of their ratios resemble too many others.
 const MAX_TOLERANCE: f64 = 0.03;
 /// Largest log10 of the false-alarm probability at which a frame counts as identified.
 pub const LOG10_FALSE_ALARM_LIMIT: f64 = -8.0;
-/// A hypothesis below this ends the search. One between the two limits waits for the end of its pass, in case
-/// a better one comes: a few inexact stars may also agree with a neighbour of the truth.
+/// A hypothesis below this ends the search. One between the two limits waits for the end of its
+/// pass, in case a better one comes: a few inexact stars may also agree with a neighbour of the
+/// truth.
 const LOG10_SURE: f64 = -14.0;
 
 /// Result of the search.
@@ -145,7 +150,8 @@ struct ObservedTriangle {
     true_confirmation: f64,
 }
 
-/// A triangle with its corners in the order of its shape, and the focal lengths for which it has that shape.
+/// A triangle with its corners in the order of its shape, and the focal lengths for which it has
+/// that shape.
 struct Query {
     triangle: ObservedTriangle,
     /// Its longest side, as a chord, at the focal length `middle_px`.
@@ -418,9 +424,10 @@ impl<'a> Search<'a> {
         consistent.then_some(zero_point)
     }
 
-    /// Whether other observed stars confirm the hypothesis: the brightest ones are compared one by one with the
-    /// catalogue stars of about their brightness at their place, until the likelihood ratio is decisive (Wald
-    /// 1945, Ann. Math. Stat. 16, 117: the sequential probability ratio test).
+    /// Whether other observed stars confirm the hypothesis: the brightest ones are compared one by
+    /// one with the catalogue stars of about their brightness at their place, until the likelihood
+    /// ratio is decisive (Wald 1945, Ann. Math. Stat. 16, 117: the sequential probability ratio
+    /// test).
     fn is_confirmed(&self, triangle: &ObservedTriangle, pose: &Pose, zero_point: f64) -> bool {
         let radius_rad = triangle.confirming_px / pose.focal_px;
         let chord = chord_of(radius_rad);
@@ -451,8 +458,8 @@ impl<'a> Search<'a> {
         ratio > TAKE_AT_END
     }
 
-    /// Fits the hypothesis to all the stars that agree and computes its false-alarm probability. Returns it if
-    /// it ends the search.
+    /// Fits the hypothesis to all the stars that agree and computes its false-alarm probability.
+    /// Returns it if it ends the search.
     fn decide(&mut self, hypothesis: &Hypothesis, triangle: &ObservedTriangle) -> Option<Found> {
         let start = Start {
             hypothesis,
@@ -493,7 +500,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// log10 of the false-alarm probability of `hypothesis`; `None` where it contradicts the priors.
+    /// log10 of the false-alarm probability of `hypothesis`; `None` where it contradicts the
+    /// priors.
     pub fn log10_false_alarm(&mut self, hypothesis: &Hypothesis) -> Option<f64> {
         let focal_px = hypothesis.camera.focal_length_px;
         let slack = 1.0 + 2.0 * PASSES[1].tolerance;
@@ -520,7 +528,8 @@ fn triple([a, b, c]: &[Vector3<f64>; 3]) -> f64 {
     a.cross(b).dot(c)
 }
 
-/// The rotation from the sky to the camera by two stars (TRIAD, with the middle of AB as the first vector).
+/// The rotation from the sky to the camera by two stars (TRIAD, with the middle of AB as the first
+/// vector).
 fn two_star_rotation(
     observed: &[Vector3<f64>; 3],
     sky: &[Vector3<f64>; 3],

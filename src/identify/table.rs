@@ -125,8 +125,8 @@ impl SizeClass {
     }
 
     /// Calls `visit` with the corners of every triangle whose ratios lie within `tolerance` of
-    /// `ratios`, in an order that depends on the arguments alone; `chunk` returns the triangles of a
-    /// chunk.
+    /// `ratios`, in an order that depends on the arguments alone; `chunk` returns the triangles of
+    /// a chunk.
     #[inline]
     pub fn for_each_similar<'a>(
         &self,

@@ -16,7 +16,8 @@ const CALIBRATION_STARS: usize = 120;
 /// First pairing radius of the final fit, in units of the frame's diagonal.
 const FINAL_RADIUS_SHARE: f64 = 0.005;
 
-/// Identifies the stars of `field`. For many fields, [`Workspace::identify`] does the same without allocating.
+/// Identifies the stars of `field`. For many fields, [`Workspace::identify`] does the same without
+/// allocating.
 ///
 /// # Errors
 /// The [`SearchFailure`] where they are not identified.
@@ -28,7 +29,8 @@ pub fn identify(
     Workspace::new().identify(field, priors, sky).cloned()
 }
 
-/// Buffers for identification, reused from field to field: after the largest field nothing is allocated.
+/// Buffers for identification, reused from field to field: after the largest field nothing is
+/// allocated.
 #[derive(Debug, Default)]
 pub struct Workspace {
     buffers: Buffers,
@@ -78,8 +80,8 @@ impl Workspace {
     }
 }
 
-/// The final fit, with all stars and as much distortion as they support. `None` where the search's own answer
-/// is the surer one.
+/// The final fit, with all stars and as much distortion as they support. `None` where the search's
+/// own answer is the surer one.
 fn with_all_stars(problem: Problem, search: &mut Search, found: &Found) -> Option<(Refined, f64)> {
     let field = problem.field;
     let hypothesis = found.refined.hypothesis();

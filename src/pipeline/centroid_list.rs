@@ -36,7 +36,8 @@ pub struct ListedCentroid {
 }
 
 impl CentroidList {
-    /// The star field of a list that is sorted by brightness, observed this many Julian years after J2000.0.
+    /// The star field of a list that is sorted by brightness, observed this many Julian years after
+    /// J2000.0.
     pub fn star_field(&self, years_since_j2000: f64) -> StarField {
         let observed = |(line, centroid): (usize, &ListedCentroid)| ObservedStar {
             source: SourceIndex::new(line),

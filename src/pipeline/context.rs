@@ -35,8 +35,8 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// The priors of one frame: those of every frame, completed from the camera's data sheet, the frame's
-    /// header and the file's name.
+    /// The priors of one frame: those of every frame, completed from the camera's data sheet, the
+    /// frame's header and the file's name.
     pub(super) fn priors_of(&self, frame: &Frame, name: Option<&Path>) -> Priors {
         let header = &frame.metadata;
         let camera_scale = self.camera.as_ref().map(|camera| &camera.sheet);
@@ -71,8 +71,8 @@ impl<'a> Context<'a> {
     }
 }
 
-/// The level from which on the camera's pixels are saturated. `None` where the frame's levels exceed the
-/// camera's full scale: files may hold the levels of few bits multiplied.
+/// The level from which on the camera's pixels are saturated. `None` where the frame's levels
+/// exceed the camera's full scale: files may hold the levels of few bits multiplied.
 fn saturation_adu(camera: &StatedCamera, frame: &Frame) -> Option<f64> {
     let sheet = &camera.sheet;
     let full_scale_adu = sheet.full_scale_adu() as f32;

@@ -5,8 +5,8 @@ use crate::detect::DetectError;
 use crate::frame::FrameError;
 use std::path::PathBuf;
 
-/// Why the frame in a file could not be examined. A frame whose stars are not identified is no error but an
-/// [`Outcome`](super::Outcome).
+/// Why the frame in a file could not be examined. A frame whose stars are not identified is no
+/// error but an [`Outcome`](super::Outcome).
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

@@ -1,7 +1,7 @@
 //! Identification of a frame's stars, with priors that may be wrong, and the reason where it fails.
 
 use super::context::Workspace;
-use super::solution::{Outcome, Reason};
+use super::outcome::{Outcome, Reason};
 use crate::detect::Detections;
 use crate::frame::Frame;
 use crate::identify;
@@ -38,7 +38,8 @@ pub fn star_field(frame: &Frame, detections: &Detections, years_since_j2000: f64
     }
 }
 
-/// Identifies the stars of a frame. Also returns the scale that was dropped because nothing matched with it.
+/// Identifies the stars of a frame. Also returns the scale that was dropped because nothing matched
+/// with it.
 pub(super) fn identify_stars(
     frame: &Frame,
     detections: &Detections,
@@ -56,8 +57,8 @@ pub(super) fn identify_stars(
 /// Result of the search, and the scale that was dropped because nothing matched with it.
 type Searched = (Result<Identification, SearchFailure>, Option<ScalePrior>);
 
-/// Searches for `field`. A scale that is not the user's is tried first and dropped where nothing matches with
-/// it.
+/// Searches for `field`. A scale that is not the user's is tried first and dropped where nothing
+/// matches with it.
 fn search(
     field: &StarField,
     priors: &Priors,
@@ -79,8 +80,8 @@ fn search(
     }
 }
 
-/// An identification at the second attempt, where it is still sure. Chance had at most twice the opportunity:
-/// all that the first attempt can have tried is tried again.
+/// An identification at the second attempt, where it is still sure. Chance had at most twice the
+/// opportunity: all that the first attempt can have tried is tried again.
 fn at_second_attempt(mut found: Identification) -> Option<Identification> {
     found.log10_false_alarm += std::f64::consts::LOG10_2;
     (found.log10_false_alarm <= LOG10_FALSE_ALARM_LIMIT).then_some(found)
@@ -108,7 +109,8 @@ pub(super) fn identified(
     Outcome::NotIdentified(cause.map_or(Reason::Search(failure), Reason::Diagnosis))
 }
 
-/// The frame's centre in the observer's sky, where the frame is identified and site and date are known.
+/// The frame's centre in the observer's sky, where the frame is identified and site and date are
+/// known.
 pub(super) fn observation(outcome: &Outcome, priors: &Priors) -> Option<Observation> {
     let found = outcome.identification()?;
     let (boresight, _) = found.icrs_to_camera.boresight_and_up();

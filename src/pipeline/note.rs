@@ -1,6 +1,6 @@
 //! Notes: what is odd about a frame, its header, or the priors.
 
-use super::solution::Outcome;
+use super::outcome::Outcome;
 use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;

@@ -1,12 +1,12 @@
 //! What was found in one frame, or in one list of centroids.
 
 use super::note::Note;
+use super::outcome::Outcome;
 use super::stopwatch::Timing;
 use crate::base::coords::PixelPoint;
 use crate::calibration::Applied;
 use crate::detect::{Detection, DetectionFlags};
-use crate::identify::diagnosis::Diagnosis;
-use crate::identify::{FrameDate, Identification, SearchFailure, SourceIndex};
+use crate::identify::{FrameDate, SourceIndex};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::Comparison;
 use crate::sky::observer::Observation;
@@ -20,8 +20,8 @@ pub struct Solution {
     pub height: usize,
     /// When the frame was taken, if known. Otherwise star positions are those of J2000.0.
     pub date: Option<FrameDate>,
-    /// The frame's centre in the observer's sky, where the frame is identified, and site and time of day are
-    /// known.
+    /// The frame's centre in the observer's sky, where the frame is identified, and site and time
+    /// of day are known.
     pub observation: Option<Observation>,
     /// Exposure time, in seconds, if known.
     pub exposure_s: Option<f64>,
@@ -52,44 +52,6 @@ impl Solution {
     /// If `index` is of another solution and there is no such source.
     pub fn source(&self, index: SourceIndex) -> &Source {
         &self.sources[index.get()]
-    }
-}
-
-/// Whether the frame was identified.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Outcome {
-    /// The stars are identified.
-    Identified(Box<Identification>),
-    /// They are not.
-    NotIdentified(Reason),
-}
-
-impl Outcome {
-    /// The identification, if there is one.
-    pub fn identification(&self) -> Option<&Identification> {
-        match self {
-            Self::Identified(found) => Some(found),
-            Self::NotIdentified(_) => None,
-        }
-    }
-}
-
-/// Why a frame was not identified: the cause that diagnosis names, else the failure of the search.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Reason {
-    /// The search failed, and nothing else explains it.
-    Search(SearchFailure),
-    /// A cause was found.
-    Diagnosis(Diagnosis),
-}
-
-impl Reason {
-    /// Code for programs.
-    pub const fn code(&self) -> &'static str {
-        match self {
-            Self::Search(failure) => failure.code(),
-            Self::Diagnosis(cause) => cause.code(),
-        }
     }
 }
 

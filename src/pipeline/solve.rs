@@ -3,7 +3,8 @@
 use super::context::{Context, Workspace};
 use super::error::Error;
 use super::identification::{identify_stars, observation};
-use super::solution::{Outcome, Solution};
+use super::outcome::Outcome;
+use super::solution::Solution;
 use super::solved::Solved;
 use super::stopwatch::{Stage, Stopwatch};
 use crate::calibration::Calibration;
@@ -17,8 +18,8 @@ use std::path::Path;
 /// Solves the frame in a file, or its image number `page`, counted from 1.
 ///
 /// # Errors
-/// [`Error::Read`] if there is no frame in the file, [`Error::Calibrate`] if the calibration is of another
-/// camera, [`Error::Detect`] if stars cannot be detected in it.
+/// [`Error::Read`] if there is no frame in the file, [`Error::Calibrate`] if the calibration is of
+/// another camera, [`Error::Detect`] if stars cannot be detected in it.
 pub fn solve_file(
     path: impl AsRef<Path>,
     page: Option<NonZeroUsize>,
@@ -32,8 +33,9 @@ pub fn solve_file(
     Ok(solution)
 }
 
-/// Solves the frame that `read` returns, and returns it with the solution. Give it back to the workspace once
-/// it is no longer needed ([`frame::Buffers::recycle`]). `name` is the file's name, or stands for one.
+/// Solves the frame that `read` returns, and returns it with the solution. Give it back to the
+/// workspace once it is no longer needed ([`frame::Buffers::recycle`]). `name` is the file's name,
+/// or stands for one.
 ///
 /// # Errors
 /// As [`solve_file`].

@@ -2,7 +2,8 @@
 
 use super::context::Context;
 use super::note::Note;
-use super::solution::{Background, Outcome, Solution, Source};
+use super::outcome::Outcome;
+use super::solution::{Background, Solution, Source};
 use super::stopwatch::Timing;
 use crate::base::statistics::Estimate;
 use crate::base::units::DEG_PER_RAD;

@@ -29,7 +29,6 @@ const ROOMS: &[(&str, &[&str])] = &[
             "base",
             "sky",
             "frame",
-            "camera",
             "calibration",
             "detect",
             "identify",

@@ -1,11 +1,13 @@
-//! Attitude, focal length and lens distortion, adjusted together to star positions in pixels.
+//! Joint fit of attitude, focal length and lens distortion to star positions in pixels.
 //!
-//! matched stars + first guess → Gauss-Newton on (turn about x, y, z; ln f; distortion) → camera, attitude, covariance
+//! matched stars + first guess → Gauss-Newton on (turn about x, y, z; ln f; distortion) → camera,
+//! attitude, covariance
 //!
-//! In the ideal image plane, with (x, y) the tangent-plane coordinates of a star, f the focal length in
-//! pixels and (u, v) the observed offset from the centre, each star gives two equations,
-//! `f·x − u − Σ cₖ Bₖu(u, v) = 0` and the same in y; they are linear in the distortion cₖ and nearly so
-//! in the small turn ω, since `dx = −ωx·x·y + ωy·(1 + x²) − ωz·y`, `dy = −ωx·(1 + y²) + ωy·x·y + ωz·x`.
+//! In the ideal image plane, with (x, y) the tangent-plane coordinates of a star, f the focal
+//! length in pixels and (u, v) the observed offset from the centre, each star gives two equations,
+//! `f·x − u − Σ cₖ Bₖu(u, v) = 0` and the same in y; they are linear in the distortion cₖ and
+//! nearly so in the small turn ω, since `dx = −ωx·x·y + ωy·(1 + x²) − ωz·y`, `dy = −ωx·(1 + y²) +
+//! ωy·x·y + ωz·x`.
 
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::camera::{
@@ -15,49 +17,52 @@ use crate::camera::{
 use multiversion::multiversion;
 use nalgebra::{Cholesky, Const, Matrix4, SMatrix, SVector, Vector3};
 
-/// A star whose place on the sky is known.
+/// A star with known direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredStar {
     /// Its centroid.
     pub pixel: PixelPoint,
-    /// Its catalogue direction at the time of the frame.
+    /// Its catalogue direction at the date of the frame.
     pub icrs: UnitVector<Icrs>,
     /// Standard error of the measured position on each axis, in pixels.
     pub sigma_px: f64,
 }
 
-/// The camera and the attitude that fit best.
+/// Result of the fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraFit {
     /// The camera.
     pub camera: CameraModel,
     /// The attitude.
     pub icrs_to_camera: Rotation<Icrs, Camera>,
-    /// Covariance of the small turn about the camera's x, y, z axes in radians and of ln(focal length),
-    /// the distortion marginalised, for the standard errors as given.
+    /// Covariance of the small rotation about the camera's x, y, z axes, in radians, and of
+    /// ln(focal length), marginalised over the distortion, for the stated standard errors.
     pub covariance: Matrix4<f64>,
     /// Free parameters.
     pub parameters: usize,
 }
 
-/// Parameters without any distortion: turn about three axes, and ln f.
+/// Parameters without distortion: rotation about three axes, and ln f.
 pub const POSE_PARAMETERS: usize = 4;
-/// These, and the one term of a radial distortion.
+/// With the one term of a radial distortion.
 const RADIAL_PARAMETERS: usize = POSE_PARAMETERS + 1;
-/// These, and the two linear terms of a polynomial.
+/// With the two linear terms of a polynomial.
 const LINEAR_PARAMETERS: usize = POSE_PARAMETERS + 2;
 const MAX_ITERATIONS: usize = 10;
-/// A step above this (radians) leads nowhere.
+/// Largest step in radians: beyond it the fit has diverged.
 const LARGEST_STEP: f64 = 0.5;
-/// The least share of an equation that may be left to its own residual when it is left out.
+/// Smallest freedom of an equation at which its left-out residual is defined.
 const MIN_FREEDOM: f64 = 1e-6;
-/// After a step below this the next would be about its square: far below any centroid error.
+/// The fit has converged below this step: the next would be about its square, far below centroid
+/// errors.
 const CONVERGED: f64 = 1e-5;
 
-/// Fits attitude, focal length and, with a `model`, the distortion, starting from `camera` and `icrs_to_camera`. Then
-/// `residuals_px` are observed minus predicted position of each star along the camera's axes, in pixels.
+/// Fits attitude, focal length and, with a `model`, the distortion, starting from `camera` and
+/// `icrs_to_camera`. Sets `residuals_px` to observed minus predicted position of each star along
+/// the camera's axes, in pixels.
 ///
-/// `None` where the stars do not determine the parameters (too few, or in bad places) or are not in front of the camera.
+/// `None` if the stars do not determine the parameters (too few, or badly placed) or are behind the
+/// camera.
 pub fn fit_camera(
     stars: &[MeasuredStar],
     camera: &CameraModel,
@@ -82,8 +87,8 @@ pub fn fit_camera(
     }
 }
 
-/// Σ (residual / σ)² with each equation predicted by a fit of `model` to the others: it rises where a model has too
-/// much freedom. `camera` and `icrs_to_camera` must be close to the best ones.
+/// Σ (residual / σ)² with each equation predicted by a fit of `model` to the others. It grows where
+/// a model has too much freedom. `camera` and `icrs_to_camera` must be close to the best ones.
 ///
 /// `None` where the stars do not determine the parameters.
 pub fn left_out_chi_sq(
@@ -109,10 +114,11 @@ pub fn left_out_chi_sq(
     }
 }
 
-/// An adjustment of `P` parameters that both equations of a star have, and of `K` coefficients of monomials in each.
+/// A least-squares adjustment of `P` parameters that both equations of a star share, and of `K`
+/// monomial coefficients for each axis.
 ///
-/// The monomials and their weights are the same in the equations along x and along y, and do not change with the pose. So the
-/// normal matrix is one of blocks, `[A Bₓ Bᵧ; Bₓᵀ C 0; Bᵧᵀ 0 C]`, of which C is decomposed once, and the rest is
+/// The monomials and their weights are the same along x and y and do not change with the pose. So
+/// the normal matrix has blocks, `[A Bₓ Bᵧ; Bₓᵀ C 0; Bᵧᵀ 0 C]`. C is decomposed once; the rest is
 /// `S = A − Bₓ C⁻¹ Bₓᵀ − Bᵧ C⁻¹ Bᵧᵀ`.
 struct Adjustment<'a, const P: usize, const K: usize> {
     stars: &'a [MeasuredStar],
@@ -124,10 +130,10 @@ struct Adjustment<'a, const P: usize, const K: usize> {
     inverse_root: SMatrix<f64, K, K>,
 }
 
-/// A number for each of several stars, which are worked on at once.
+/// One number for each of several stars that are processed together.
 type Lanes = [f64; LANES];
 
-/// The two equations of several stars, divided by their standard errors, without what the monomials add.
+/// The two equations of several stars, divided by their standard errors, without the monomials.
 struct Rows<const P: usize, const K: usize> {
     /// Along x and y.
     common: [[Lanes; P]; 2],
@@ -136,9 +142,9 @@ struct Rows<const P: usize, const K: usize> {
     rhs: [Lanes; 2],
 }
 
-/// What the normal equations are made of, summed over the stars of each lane.
+/// The normal equations, summed over the stars of each lane.
 struct Sums<const P: usize, const K: usize> {
-    /// A, of which the part above the diagonal is left out, and what it is multiplied with.
+    /// A (lower triangle), and its right-hand side.
     block: [[Lanes; P]; P],
     vector: [Lanes; P],
     /// Bᵀ along x and y, and the same for the monomials.
@@ -178,7 +184,7 @@ fn total(lanes: &Lanes) -> f64 {
     lanes.iter().sum()
 }
 
-/// The normal equations, solved in part.
+/// The normal equations after elimination of the monomials.
 struct Reduced<const P: usize, const K: usize> {
     /// S, decomposed.
     root: Cholesky<f64, Const<P>>,
@@ -217,7 +223,7 @@ impl<'a, const P: usize, const K: usize> Adjustment<'a, P, K> {
         P + 2 * K
     }
 
-    /// Offsets from the centre along u and v in units of the radius, and 1 / σ, which is 0 where there is no star.
+    /// Offsets from the centre along u and v in units of the radius, and 1 / σ (0 in empty lanes).
     #[inline(always)]
     fn offsets_and_weights(&self, stars: &[MeasuredStar]) -> ([Lanes; 2], Lanes) {
         let (mut offsets, mut weights) = ([[0.0; LANES]; 2], [0.0; LANES]);
@@ -263,7 +269,7 @@ impl<'a, const P: usize, const K: usize> Adjustment<'a, P, K> {
         for lane in 0..LANES {
             let ([x, y], [u, v], weight) = ([x[lane], y[lane]], [u[lane], v[lane]], weights[lane]);
             let pose = [[-x * y, 1.0 + x * x, -y, x], [-(1.0 + y * y), x * y, x, y]];
-            // The terms of the distortion that are no monomials along one axis.
+            // The distortion terms that are not monomials along one axis.
             let r_sq = u * u + v * v;
             let terms = match self.model {
                 None => [[0.0; 2]; 2],
@@ -288,8 +294,8 @@ impl<'a, const P: usize, const K: usize> Adjustment<'a, P, K> {
         })
     }
 
-    /// One Gauss-Newton step; returns its size (radians, and relative change of the focal length) and the normal equations
-    /// that it was made with.
+    /// One Gauss-Newton step. Returns its size (radians, and relative change of the focal length)
+    /// and its normal equations.
     fn step(&mut self) -> Option<(f64, Reduced<P, K>)> {
         let sums = sums(self)?;
         let mut block =
@@ -365,7 +371,7 @@ impl<'a, const P: usize, const K: usize> Adjustment<'a, P, K> {
         })
     }
 
-    /// Where a pinhole would have put the star, less where it puts its direction.
+    /// Position by a pinhole minus position by the star's direction.
     fn residual_px(&self, star: &MeasuredStar) -> Option<[f64; 2]> {
         let f = self.camera.focal_length_px;
         let [x, y] = self.tangent(star)?;
@@ -378,7 +384,7 @@ impl<'a, const P: usize, const K: usize> Adjustment<'a, P, K> {
         left_out_sum(&self, &reduced)
     }
 
-    /// The share of each equation of some stars that it is fitted itself, along x and y.
+    /// The leverage of each equation of some stars, along x and y.
     #[inline(always)]
     fn leverages(&self, rows: &Rows<P, K>, reduced: &Reduced<P, K>) -> [Lanes; 2] {
         let mut of_monomials = [[0.0; LANES]; K];
@@ -416,7 +422,7 @@ fn add_scaled(sums: &mut Lanes, factor: f64, values: &Lanes) {
     }
 }
 
-/// C, of which the part above the diagonal is left out, summed over the stars of each lane.
+/// C (lower triangle), summed over the stars of each lane.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn shared_sums<const P: usize, const K: usize>(adjustment: &Adjustment<P, K>) -> [[Lanes; K]; K] {
     let mut sums = [[[0.0; LANES]; K]; K];
@@ -447,7 +453,7 @@ fn sums<const P: usize, const K: usize>(adjustment: &Adjustment<P, K>) -> Option
     Some(sums)
 }
 
-/// Σ (residual / σ)² over all equations, each residual as if its equation had been left out of the fit.
+/// Σ (residual / σ)² over all equations, each residual as if its equation were left out of the fit.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn left_out_sum<const P: usize, const K: usize>(
     adjustment: &Adjustment<P, K>,
@@ -472,7 +478,7 @@ mod tests {
     use super::*;
     use crate::base::units::RAD_PER_DEG;
 
-    /// What stopping early may leave: a thousandth of the best centroid.
+    /// Largest effect of stopping early: a thousandth of the best centroid error.
     const CONVERGED_PX: f64 = 1e-5;
 
     fn stars_of(camera: &CameraModel, attitude: &Rotation<Icrs, Camera>) -> Vec<MeasuredStar> {

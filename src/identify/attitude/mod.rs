@@ -1,8 +1,8 @@
-//! From pairs of the same direction on the sky and in the camera to the attitude, with its covariance.
+//! Attitude with covariance, from directions known on the sky and measured in the camera.
 //!
-//! [`estimate_attitude`] solves Wahba's problem for directions measured with a known camera;
-//! [`fit_camera`] adjusts attitude, focal length and lens distortion together to star positions in
-//! pixels, which is what a camera of which nothing is known asks for.
+//! [`estimate_attitude`] solves Wahba's problem for directions measured with a known camera.
+//! [`fit_camera`] fits attitude, focal length and lens distortion to star positions in pixels, for
+//! an unknown camera.
 
 mod fit;
 
@@ -11,32 +11,33 @@ pub use fit::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera, left_out_chi
 use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use nalgebra::{Matrix3, SVD};
 
-/// One direction, known on the sky and measured in the camera.
+/// One direction on the sky and in the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DirectionPair {
-    /// Where the star stands.
+    /// Direction on the sky.
     pub icrs: UnitVector<Icrs>,
-    /// Where the camera saw it.
+    /// Measured direction in the camera.
     pub camera: UnitVector<Camera>,
-    /// Standard error of the measured direction on each axis across it, in radians.
+    /// Standard error of the measured direction on each perpendicular axis, in radians.
     pub sigma_rad: f64,
 }
 
-/// An attitude and how well it is known.
+/// An attitude and its covariance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attitude {
-    /// Turns a direction on the sky into camera axes.
+    /// Rotation from the sky to camera axes.
     pub icrs_to_camera: Rotation<Icrs, Camera>,
-    /// Covariance of the small turn about the camera's x, y and z axes, in rad².
+    /// Covariance of the small rotation about the camera's x, y and z axes, in rad².
     pub covariance_rad2: Matrix3<f64>,
 }
 
-/// The attitude that minimises Σ |camera − R · icrs|² / σ² (Wahba's problem), by singular value decomposition.
+/// The attitude that minimises Σ |camera − R · icrs|² / σ² (Wahba's problem), by singular value
+/// decomposition.
 ///
 /// `None` for fewer than two directions, or where all of them are parallel.
 /// # Reference
-/// Markley 1988, J. Astronaut. Sci. 36, 245 (the solution); Shuster & Oh 1981, J. Guid. Control 4, 70,
-/// eq. (90) (the covariance, `[Σ σ⁻² (1 − w wᵀ)]⁻¹`).
+/// Markley 1988, J. Astronaut. Sci. 36, 245 (the solution); Shuster & Oh 1981, J. Guid. Control 4,
+/// 70, eq. (90) (the covariance, `[Σ σ⁻² (1 − w wᵀ)]⁻¹`).
 pub fn estimate_attitude(pairs: &[DirectionPair]) -> Option<Attitude> {
     let mut profile = Matrix3::zeros();
     let mut information = Matrix3::zeros();

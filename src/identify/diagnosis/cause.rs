@@ -22,8 +22,8 @@ pub enum Diagnosis {
     Trails {
         /// Number of detections that are trails.
         trails: usize,
-        /// Their angle to the image's x axis, in radians, in (−π/2, π/2]; positive where they rise to the
-        /// right.
+        /// Their angle to the image's x axis, in radians, in (−π/2, π/2]; positive where they rise
+        /// to the right.
         angle_rad: f64,
         /// Their median length, in pixels.
         length_px: f64,
@@ -57,7 +57,8 @@ pub struct Excluded {
     pub stars: usize,
     /// The stated field of view, from and to, in radians, where it excludes the solution.
     pub allowed_fov_x_rad: Option<(f64, f64)>,
-    /// Distance from the stated direction and the stated radius, in radians, where they exclude the solution.
+    /// Distance from the stated direction and the stated radius, in radians, where they exclude the
+    /// solution.
     pub distance_rad: Option<(f64, f64)>,
 }
 

@@ -1,24 +1,25 @@
-//! The same stars twice: a frame exposed two times with the camera moved between.
+//! Double exposures: every star occurs twice, as the camera moved between the exposures.
 
 use super::cause::Diagnosis;
 use crate::identify::StarField;
 
-/// The brightest stars that are looked at.
+/// Number of stars examined, the brightest.
 const LOOKED_AT: usize = 80;
-/// Offsets that differ by less than this on both axes are the same, in pixels.
+/// Tolerance of an offset on each axis, in pixels.
 const TOLERANCE_PX: f64 = 1.5;
-/// Smaller offsets are those of close pairs and of split stars.
+/// Smallest offset, in pixels: close pairs and split stars have smaller ones.
 const LEAST_OFFSET_PX: f64 = 4.0;
-/// Both exposures show the stars in the same order of brightness, to so many magnitudes.
+/// Tolerance of the magnitude difference: both exposures show the stars in the same order.
 const TOLERANCE_MAG: f64 = 0.7;
-/// So many pairs have the offset, ...
+/// Fewest pairs with the offset, …
 const FEWEST_PAIRS: usize = 6;
-/// ... out of so many stars. All stars twice would be half of them.
+/// … as a fraction of the stars. If all stars occur twice it is a half.
 const LEAST_SHARE: f64 = 0.25;
-/// Another offset has at most this part of the pairs; regular patterns have many offsets.
+/// Largest number of pairs with another offset, over that with the best one: regular patterns have
+/// many offsets.
 const SECOND_SHARE: f64 = 0.6;
 
-/// From one star to another.
+/// The offset from one star to another.
 #[derive(Debug, Clone, Copy)]
 struct Offset {
     along: [f64; 2],
@@ -38,7 +39,7 @@ impl Offset {
     }
 }
 
-/// Whether many stars have a companion at one and the same offset.
+/// Whether many stars have a companion at the same offset.
 pub(super) fn diagnose(field: &StarField) -> Option<Diagnosis> {
     let offsets = offsets(field);
     let counts: Vec<usize> = (0..offsets.len())
@@ -68,7 +69,7 @@ pub(super) fn diagnose(field: &StarField) -> Option<Diagnosis> {
     })
 }
 
-/// The offsets of all pairs, each to the right or straight down, by their length along x.
+/// The offsets of all pairs, each pointing right or straight down, sorted along x.
 fn offsets(field: &StarField) -> Vec<Offset> {
     let stars = field.brightest(LOOKED_AT);
     let mut offsets = Vec::new();
@@ -78,7 +79,7 @@ fn offsets(field: &StarField) -> Vec<Offset> {
             if dx.hypot(dy) < LEAST_OFFSET_PX {
                 continue;
             }
-            // Nearly upright offsets must not point up once and down another time.
+            // Nearly vertical offsets must all point the same way.
             let forward = if dx.abs() < TOLERANCE_PX {
                 dy > 0.0
             } else {
@@ -97,7 +98,7 @@ fn offsets(field: &StarField) -> Vec<Offset> {
     offsets
 }
 
-/// The pairs with the same offset as the one at `index`, each star once at either end.
+/// The pairs with the same offset as the one at `index`, each star once at each end.
 fn pairs(offsets: &[Offset], index: usize) -> Vec<Offset> {
     let this = &offsets[index];
     let start = offsets.partition_point(|o| o.along[0] <= this.along[0] - TOLERANCE_PX);

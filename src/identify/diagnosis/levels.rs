@@ -1,11 +1,11 @@
-//! Frames that hold no picture: one value everywhere, or full scale.
+//! Frames without an image: one value everywhere, or mostly full scale.
 
 use super::cause::Diagnosis;
 use crate::frame::Frame;
 
-/// A frame is overexposed where this part of its pixels is at its highest level.
+/// Fraction of pixels at the highest level from which a frame is overexposed.
 const SATURATED_SHARE: f64 = 0.2;
-/// The highest level is a full scale, and no accident of a few coarse levels, this many steps above the lowest.
+/// Fewest steps between the lowest and the highest level for the latter to be a full scale.
 const FULL_SCALE_STEPS: f32 = 32.0;
 
 /// Whether the frame is empty or overexposed.
@@ -20,7 +20,7 @@ pub(super) fn diagnose(frame: &Frame) -> Option<Diagnosis> {
         });
     }
     let steps = (highest - lowest) / frame.step_adu;
-    // Detectors of fewer bits than their files are full below the format's own scale.
+    // A detector with fewer bits than its file saturates below the format's full scale.
     if !is_full && (steps.is_nan() || steps < FULL_SCALE_STEPS) {
         return None;
     }

@@ -10,8 +10,8 @@
 //! 4. Most of the sources are trails in one direction.
 //! 5. The same pattern of stars occurs twice.
 //!
-//! It costs time only where a frame was not identified. The search without the priors takes longest: as long
-//! as any search with nothing known.
+//! It costs time only where a frame was not identified. The search without the priors takes
+//! longest: as long as any search with nothing known.
 
 mod cause;
 mod doubles;

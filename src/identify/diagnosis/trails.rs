@@ -1,32 +1,33 @@
-//! Stars drawn out into trails, all in one direction: by a camera that moved, or a sky that did.
+//! Trails: stars elongated in one direction, because the camera or the sky moved.
 
 use super::cause::Diagnosis;
 use crate::detect::{BackgroundMap, Detection, Detections};
 use crate::frame::Frame;
 use std::collections::HashSet;
 
-/// The brightest detections that are looked at.
+/// Number of detections examined, the brightest.
 const LOOKED_AT: usize = 80;
-/// A source's area is what is above this part of its peak, and above so many standard deviations of the noise.
+/// A source's region is above this fraction of its peak, and above this many noise sigmas.
 const PEAK_SHARE: f32 = 0.25;
 const NOISE_SIGMA: f32 = 4.0;
-/// Areas larger than this are no stars, however they are drawn out.
+/// Largest region of a star, in pixels.
 const LARGEST_PX: usize = 6000;
-/// Smaller areas have no direction to speak of.
+/// Smallest region with a defined direction, in pixels.
 const SMALLEST_PX: usize = 6;
-/// A trail is this many times as long as broad, and at least this long.
+/// Smallest ratio of length to width of a trail, and its smallest length.
 const ELONGATION: f64 = 2.0;
 const SHORTEST_PX: f64 = 6.0;
-/// So many trails, ...
+/// Fewest trails, …
 const FEWEST: usize = 5;
-/// ... this part of all sources looked at, ...
+/// … their smallest fraction of the examined sources, …
 const MOST_OF_ALL: f64 = 0.6;
-/// ... and this mean length of unit vectors along twice their angles: 1 where all are parallel.
+/// … and their smallest alignment: the mean of unit vectors at twice their angles, 1 if all are
+/// parallel.
 const ALIGNMENT: f64 = 0.9;
-/// Side of the cells of the background.
+/// Cell size of the background mesh, in pixels.
 const CELL_PX: usize = 64;
 
-/// A source's area as a bar.
+/// A source's region as a bar with the same second moments.
 struct Bar {
     angle_rad: f64,
     length_px: f64,
@@ -39,7 +40,7 @@ impl Bar {
     }
 }
 
-/// Whether most of the frame's sources are trails in one direction.
+/// Whether most sources are trails in one direction.
 pub(super) fn diagnose(frame: &Frame, detections: &Detections) -> Option<Diagnosis> {
     if detections.sources.len() < FEWEST {
         return None;
@@ -55,7 +56,7 @@ pub(super) fn diagnose(frame: &Frame, detections: &Detections) -> Option<Diagnos
     if count < FEWEST || (count as f64) < MOST_OF_ALL * areas.len() as f64 {
         return None;
     }
-    // An angle and the one opposite are the same direction: twice the angle tells no difference.
+    // Opposite angles are the same direction, so the angle is doubled.
     let sum = trails.iter().fold([0.0, 0.0], |[x, y], bar| {
         let (sin, cos) = (2.0 * bar.angle_rad).sin_cos();
         [x + cos, y + sin]
@@ -85,7 +86,8 @@ fn above_background(frame: &Frame) -> Vec<f32> {
     above
 }
 
-/// The areas of the brightest sources, as indices of pixels; an area with several sources counts once.
+/// The regions of the brightest sources, as pixel indices; a region with several sources counts
+/// once.
 fn areas(frame: &Frame, above: &[f32], detections: &Detections) -> Vec<Vec<usize>> {
     let noise = detections.noise_adu as f32;
     let mut taken = HashSet::new();
@@ -107,7 +109,7 @@ fn areas(frame: &Frame, above: &[f32], detections: &Detections) -> Vec<Vec<usize
     areas
 }
 
-/// The brightest pixel of the nine round a source's position.
+/// The brightest pixel in the 3 × 3 pixels around a source.
 fn brightest_near(frame: &Frame, above: &[f32], source: &Detection) -> Option<usize> {
     let (x, y) = (source.position.x.round(), source.position.y.round());
     let around = |at: f64, count: usize| {
@@ -120,7 +122,7 @@ fn brightest_near(frame: &Frame, above: &[f32], source: &Detection) -> Option<us
         .max_by(|&i, &j| above[i].total_cmp(&above[j]))
 }
 
-/// The pixels above `threshold` that hang together with `start`; it ends above [`LARGEST_PX`].
+/// The connected pixels above `threshold` around `start`, up to [`LARGEST_PX`].
 fn connected(frame: &Frame, above: &[f32], start: usize, threshold: f32) -> Vec<usize> {
     let mut seen = HashSet::from([start]);
     let mut area = Vec::new();
@@ -143,7 +145,7 @@ fn connected(frame: &Frame, above: &[f32], start: usize, threshold: f32) -> Vec<
     area
 }
 
-/// The bar with the second moments of the area; `None` for one that is too large to be a star's.
+/// The bar with the second moments of the region; `None` if it is too large for a star.
 fn bar(area: &[usize], width: usize) -> Option<Bar> {
     if area.len() > LARGEST_PX {
         return None;
@@ -155,7 +157,7 @@ fn bar(area: &[usize], width: usize) -> Option<Bar> {
         .map(place)
         .fold([0.0, 0.0], |[x, y], p| [x + p[0], y + p[1]]);
     let mean = [sum[0] / count, sum[1] / count];
-    // A pixel has an extent of its own.
+    // A pixel has a variance of its own.
     let (mut xx, mut yy, mut xy) = (count / 12.0, count / 12.0, 0.0);
     for [x, y] in area.iter().map(place) {
         let (dx, dy) = (x - mean[0], y - mean[1]);
@@ -165,7 +167,7 @@ fn bar(area: &[usize], width: usize) -> Option<Bar> {
     // A bar of length l has the variance l²/12 along it.
     let extent = |moment: f64| (12.0 * moment.max(0.0) / count).sqrt();
     Some(Bar {
-        // y runs down; angles are as people see them.
+        // y points down; angles are counted as seen.
         angle_rad: -(2.0 * xy).atan2(xx - yy) / 2.0,
         length_px: extent(middle + half),
         breadth_px: extent(middle - half),

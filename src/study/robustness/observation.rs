@@ -101,7 +101,8 @@ fn stars_seen(
     let faintest = limit_v_mag + FAINTEST_SIGMAS * protocol.mag_sigma;
     let centre = icrs_to_camera.inverse().apply(&UnitVector::BORESIGHT);
     let mut around = Vec::new();
-    indexed.grid
+    indexed
+        .grid
         .for_each_within(&centre, camera.radius_rad(), faintest as f32, |star| {
             around.push(StarIndex::from(star.catalog));
         });
