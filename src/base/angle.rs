@@ -1,19 +1,19 @@
-//! Angles as people write them: decimal, or in sixtieths.
+//! Parses angles, decimal or sexagesimal: text → [`Angle`].
 
-/// What a text says: a number, and in which form it stood.
+/// A parsed angle, with the form in which it was written.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Angle {
-    /// A decimal number of some unit.
+    /// A decimal number without a unit.
     Decimal(f64),
-    /// Sixtieths of whatever the first number counts (`05:34:48.0`, `-00 24 00`).
-    Sixtieths(f64),
-    /// Sixtieths of hours (`05h34m48.0s`), in hours.
+    /// Sexagesimal without a unit (`05:34:48.0`, `-00 24 00`): hours or degrees.
+    Sexagesimal(f64),
+    /// Sexagesimal hours (`05h34m48.0s`).
     Hours(f64),
-    /// Sixtieths of degrees (`-00d24m00s`, `-00°24′00″`), in degrees.
+    /// Sexagesimal degrees (`-00d24m00s`, `-00°24′00″`).
     Degrees(f64),
 }
 
-/// The marks that may stand behind the first, second and third number.
+/// The unit marks allowed after the first, second and third number.
 const MARKS: [&[char]; 3] = [
     &['h', 'd', '°', 'H', 'D'],
     &['m', '\'', '′', 'M'],
@@ -21,15 +21,15 @@ const MARKS: [&[char]; 3] = [
 ];
 
 impl Angle {
-    /// The value in degrees, where a number without a unit counts degrees; `None` for hours.
+    /// The value in degrees, which are assumed where no unit is given; `None` for hours.
     pub fn in_degrees(self) -> Option<f64> {
         match self {
-            Self::Decimal(value) | Self::Sixtieths(value) | Self::Degrees(value) => Some(value),
+            Self::Decimal(value) | Self::Sexagesimal(value) | Self::Degrees(value) => Some(value),
             Self::Hours(_) => None,
         }
     }
 
-    /// The angle in `text`; `None` if it is not one, or has sixtieths of sixty and more.
+    /// Parses `text`; `None` if it is no angle, or its minutes or seconds reach 60.
     pub fn parse(text: &str) -> Option<Self> {
         let text = text.trim();
         if let Some(number) = decimal(text) {
@@ -46,7 +46,7 @@ impl Angle {
             let end = rest.find(|c: char| !(c.is_ascii_digit() || c == '.'));
             let (number, behind) = rest.split_at(end.unwrap_or(rest.len()));
             let part = decimal(number)?;
-            // Only the last number has decimals, and only the first may reach sixty.
+            // Only the last number may have decimals, and only the first may reach 60.
             if !whole || (seconds < 3600.0 && part >= 60.0) {
                 return None;
             }
@@ -71,14 +71,14 @@ impl Angle {
         }
         let value = if negative { -value } else { value } / 3600.0;
         Some(match unit {
-            None => Self::Sixtieths(value),
+            None => Self::Sexagesimal(value),
             Some('h' | 'H') => Self::Hours(value),
             Some(_) => Self::Degrees(value),
         })
     }
 }
 
-/// A finite number of digits, without the words that `parse` would let pass.
+/// Parses a finite decimal number; unlike `str::parse`, rejects words such as `inf`.
 pub fn decimal(text: &str) -> Option<f64> {
     let plain = text
         .bytes()
@@ -93,7 +93,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn every_common_way_of_writing_is_read() {
+    fn all_common_notations_are_parsed() {
         let hours = 5.0 + 34.0 / 60.0 + 48.0 / 3600.0;
         for text in [
             "05:34:48.0",
@@ -103,13 +103,17 @@ mod tests {
             "+05 34 48",
             "5 : 34 : 48",
         ] {
-            assert_eq!(Angle::parse(text), Some(Angle::Sixtieths(hours)), "{text}");
+            assert_eq!(
+                Angle::parse(text),
+                Some(Angle::Sexagesimal(hours)),
+                "{text}"
+            );
         }
         for text in ["05h34m48.0s", "5h 34m 48s", "5H34M48S", "5h34m48"] {
             assert_eq!(Angle::parse(text), Some(Angle::Hours(hours)), "{text}");
         }
         for text in ["-00 24 00.0", "-0:24", "−00:24:00", "- 0 24 0"] {
-            assert_eq!(Angle::parse(text), Some(Angle::Sixtieths(-0.4)), "{text}");
+            assert_eq!(Angle::parse(text), Some(Angle::Sexagesimal(-0.4)), "{text}");
         }
         for text in ["-00°24′00″", "-0d24m", "-00d 24' 00\""] {
             assert_eq!(Angle::parse(text), Some(Angle::Degrees(-0.4)), "{text}");
@@ -119,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_angle_is_refused() {
+    fn other_text_is_rejected() {
         for text in [
             "",
             "-",
@@ -145,27 +149,36 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_written_in_sixtieths_is_read_back(steps in 0..359_u64 * 3_600_000, south in any::<bool>()) {
+        fn sexagesimal_text_round_trips(
+            steps in 0..359_u64 * 3_600_000,
+            south in any::<bool>(),
+        ) {
             let (whole, minutes, ms) = (steps / 3_600_000, steps / 60_000 % 60, steps % 60_000);
             let sign = if south { "-" } else { "" };
             let seconds = format!("{:02}.{:03}", ms / 1000, ms % 1000);
             let expected = if south { -1.0 } else { 1.0 } * steps as f64 / 3_600_000.0;
-            for (text, form) in [
-                (format!("{sign}{whole:02}:{minutes:02}:{seconds}"), Angle::Sixtieths as fn(f64) -> Angle),
-                (format!("{sign}{whole} {minutes} {seconds}"), Angle::Sixtieths),
-                (format!("{sign}{whole}h{minutes}m{seconds}s"), Angle::Hours),
-                (format!("{sign}{whole}°{minutes}′{seconds}″"), Angle::Degrees),
-            ] {
+            let value_of = |text: String, form: fn(f64) -> Angle| {
                 let found = Angle::parse(&text).unwrap();
-                let (Angle::Decimal(value) | Angle::Sixtieths(value) | Angle::Hours(value) | Angle::Degrees(value)) = found;
-                prop_assert!((value - expected).abs() < 1e-12, "{}", text);
-                prop_assert_eq!(form(value), found);
+                let (Angle::Decimal(value)
+                | Angle::Sexagesimal(value)
+                | Angle::Hours(value)
+                | Angle::Degrees(value)) = found;
+                assert_eq!(form(value), found);
+                value
+            };
+            for value in [
+                value_of(format!("{sign}{whole:02}:{minutes:02}:{seconds}"), Angle::Sexagesimal),
+                value_of(format!("{sign}{whole} {minutes} {seconds}"), Angle::Sexagesimal),
+                value_of(format!("{sign}{whole}h{minutes}m{seconds}s"), Angle::Hours),
+                value_of(format!("{sign}{whole}°{minutes}′{seconds}″"), Angle::Degrees),
+            ] {
+                prop_assert!((value - expected).abs() < 1e-12, "{}", value);
             }
         }
 
         #[test]
-        fn any_text_is_read_without_panic(text in "\\PC{0,20}", close in "[-+0-9:hdms°'\". ]{0,16}") {
-            let _ = (Angle::parse(&text), Angle::parse(&close));
+        fn no_text_panics(text in "\\PC{0,20}", similar in "[-+0-9:hdms°'\". ]{0,16}") {
+            let _ = (Angle::parse(&text), Angle::parse(&similar));
         }
     }
 }

@@ -1,12 +1,14 @@
-//! Coordinate systems: directions on the sky and in the camera, the rotation between them, and pixels.
+//! Coordinate systems: directions on the sky and in the camera, rotations between them, pixels.
 //!
 //! Conventions: directions are unit vectors; [`Icrs`] is right-handed with x to RA 0, Dec 0 and z to
 //! the north pole; [`Camera`] has x along image x (right), y along image y (down), z out along the
-//! boresight. Angles are radians. Pixels: x right, y down, the **centre** of the top-left pixel is (0, 0).
+//! boresight. Angles are in radians. Pixels: x right, y down; (0, 0) is the **centre** of the
+//! top-left pixel.
 //!
-//! The trigonometry is that of [`libm`], which is the same on every machine: simulated frames and their headers depend on it.
+//! Trigonometric functions come from [`libm`], which gives the same bits on every machine:
+//! simulated frames and their headers depend on it.
 //!
-//! A direction carries its system in its type, so that mixing two of them does not compile:
+//! A direction carries its system in its type, so mixing two systems does not compile:
 //!
 //! ```compile_fail
 //! use starpipe::base::coords::{Camera, Icrs, UnitVector};
@@ -27,7 +29,7 @@ pub struct Icrs;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Camera;
 
-/// A position in the image in pixels; (0, 0) is the centre of the top-left pixel, y runs down.
+/// A position in the image, in pixels; (0, 0) is the centre of the top-left pixel, y runs down.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PixelPoint {
     /// To the right, in pixels.
@@ -54,7 +56,7 @@ pub struct UnitVector<S> {
     system: PhantomData<S>,
 }
 
-// Derived impls would ask for `S: Clone` and so on, which a marker need not be.
+// Derived impls would require `S: Clone` and so on, although `S` is only a marker.
 impl<S> Clone for UnitVector<S> {
     fn clone(&self) -> Self {
         *self
@@ -79,7 +81,7 @@ impl<S> UnitVector<S> {
         Self::from_unit(vector.normalize())
     }
 
-    /// Takes `vector` as it is; the caller vouches that its length is one.
+    /// The direction of `vector`, whose length must be one.
     pub fn from_unit(vector: Vector3<f64>) -> Self {
         Self {
             vector,
@@ -139,7 +141,7 @@ impl UnitVector<Camera> {
     };
 }
 
-/// A proper rotation that turns a direction given in `From` into the same direction given in `To`.
+/// A proper rotation that converts directions from the system `From` to the system `To`.
 pub struct Rotation<From, To> {
     rotation: Rotation3<f64>,
     systems: PhantomData<(From, To)>,
@@ -176,7 +178,7 @@ impl<A, B> Rotation<A, B> {
         self.rotation.matrix()
     }
 
-    /// The rotation with the quaternion [w, x, y, z], which is normalised first and must not be zero.
+    /// The rotation with the quaternion [w, x, y, z], which is normalised and must not be zero.
     pub fn from_quaternion([w, x, y, z]: [f64; 4]) -> Self {
         let quaternion = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
         Self {
@@ -192,12 +194,12 @@ impl<A, B> Rotation<A, B> {
         [q.w * sign, q.i * sign, q.j * sign, q.k * sign]
     }
 
-    /// The direction in the system `B` that `direction` has in the system `A`.
+    /// Converts `direction` from the system `A` to the system `B`.
     pub fn apply(&self, direction: &UnitVector<A>) -> UnitVector<B> {
         UnitVector::from_unit(self.rotation * direction.vector)
     }
 
-    /// The rotation back.
+    /// The inverse rotation.
     pub fn inverse(&self) -> Rotation<B, A> {
         Rotation {
             rotation: self.rotation.inverse(),
@@ -205,7 +207,7 @@ impl<A, B> Rotation<A, B> {
         }
     }
 
-    /// This rotation followed by a small turn by `vector_rad` about the axes of `B`.
+    /// This rotation followed by a rotation by the vector `vector_rad` about the axes of `B`.
     pub fn then_turn(&self, vector_rad: Vector3<f64>) -> Self {
         Self {
             rotation: Rotation3::new(vector_rad) * self.rotation,
@@ -221,8 +223,8 @@ impl<A, B> Rotation<A, B> {
 }
 
 impl Rotation<Icrs, Camera> {
-    /// The attitude of a camera that looks at `boresight` and whose image-up (−y) has the position
-    /// angle `up_pa_rad`, from north through east.
+    /// The attitude of a camera with this boresight, whose image-up (−y) has the position angle
+    /// `up_pa_rad`, from north through east.
     pub fn looking_at(boresight: &UnitVector<Icrs>, up_pa_rad: f64) -> Self {
         let (east, north) = boresight.east_north();
         let (sin_pa, cos_pa) = libm::sincos(up_pa_rad);
@@ -235,7 +237,7 @@ impl Rotation<Icrs, Camera> {
         ]))
     }
 
-    /// The direction that the camera looks at, and the position angle in radians, in (−π, π], of image-up (−y) there.
+    /// The boresight, and the position angle of image-up (−y) there in radians, in (−π, π].
     pub fn boresight_and_up(&self) -> (UnitVector<Icrs>, f64) {
         let boresight = self.inverse().apply(&UnitVector::BORESIGHT);
         let (east, north) = boresight.east_north();

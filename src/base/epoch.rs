@@ -1,9 +1,8 @@
-//! When a frame was taken: stars move, the fastest by ten arcseconds a year.
+//! When was a frame taken? Text or a file name → [`ObservationDate`] → Julian years since J2000.0.
 //!
-//! Text or a file's name → [`ObservationDate`] → Julian years since J2000.0.
-//!
-//! Caveats: UTC is taken for the uniform time of the catalogue, about a minute apart, in which no star moves by a
-//! measurable angle. Years are those of [`YEARS`]: further away stars no longer move along straight lines at an even pace.
+//! Caveats: UTC is used as if it were the uniform time of the catalogue. They differ by about a
+//! minute, in which no star moves measurably. Only dates within [`YEARS`] are accepted: linear
+//! proper motion does not hold over longer times.
 
 use jiff::SignedDuration;
 use jiff::civil::{Date, DateTime, Time};
@@ -12,28 +11,29 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 use std::str::FromStr;
 
-/// The years in which a frame can have been taken: since stars were first photographed.
+/// Accepted years of observation: from the first photograph of a star.
 pub const YEARS: RangeInclusive<i16> = 1850..=2100;
 
 /// The epoch J2000.0.
 const J2000: DateTime = jiff::civil::datetime(2000, 1, 1, 12, 0, 0, 0);
-/// What stands for a day of which the hour is not known.
+/// The time assumed where only the day is known.
 const MIDDAY: Time = jiff::civil::time(12, 0, 0, 0);
 const SECONDS_PER_JULIAN_YEAR: f64 = 365.25 * 86_400.0;
 
-/// Why a text is no date of an observation.
+/// Why a text is not an observation date.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DateError {
-    /// It is not written as ISO 8601 wants it, or there is no such day or hour.
+    /// It is not ISO 8601, or the day or time does not exist.
     #[error(
-        "'{text}' is no date; expected ISO 8601, like 2019-07-29, 2019-07-29T20:47:26Z or 2019-07-29T22:47:26+02:00"
+        "'{text}' is no date; expected ISO 8601, like 2019-07-29, 2019-07-29T20:47:26Z or \
+         2019-07-29T22:47:26+02:00"
     )]
     Malformed {
         /// What was found.
         text: String,
     },
-    /// Nobody photographed stars then.
+    /// The year is outside [`YEARS`].
     #[error("the year {year} is not from {} to {}", YEARS.start(), YEARS.end())]
     OutOfRange {
         /// The year found.
@@ -41,7 +41,7 @@ pub enum DateError {
     },
 }
 
-/// When a frame was taken, in UTC: the day, and the time where it is known.
+/// When a frame was taken, in UTC: the day, and the time where known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ObservationDate {
     day: Date,
@@ -49,10 +49,11 @@ pub struct ObservationDate {
 }
 
 impl ObservationDate {
-    /// The date that `path`'s last component unmistakably holds, as programs that take photographs write it:
-    /// `2019-07-29T204726`, `2019-07-29_20-47-26`, `20190729_204726`, `20190729204726`, or the day alone.
+    /// The date in the file name of `path`, in the formats of capture programs:
+    /// `2019-07-29T204726`, `2019-07-29_20-47-26`, `20190729_204726`, `20190729204726`, or the day
+    /// alone.
     ///
-    /// A date is no part of a longer number, and where a name holds two different days neither is taken.
+    /// `None` where a name holds two different days. Parts of longer numbers are ignored.
     pub fn in_file_name(path: &Path) -> Option<Self> {
         let name = path.file_name()?.to_string_lossy();
         let bytes = name.as_bytes();
@@ -61,7 +62,7 @@ impl ObservationDate {
         found.all(|other| other.day == first.day).then_some(first)
     }
 
-    /// The date that begins at `start`.
+    /// The date that begins at byte `start`.
     fn at(bytes: &[u8], start: usize) -> Option<Self> {
         if start > 0 && bytes[start - 1].is_ascii_digit() {
             return None;
@@ -75,14 +76,13 @@ impl ObservationDate {
         }
         let day = Date::new(year, month as i8, text.number(2)? as i8).ok()?;
         let time = text.clone().time();
-        // Digits behind the day are a time or make it a longer number.
+        // Digits after the day are a time, or the day is part of a longer number.
         let alone = !text.number_follows() || (separator.is_none() && time.is_some());
         (YEARS.contains(&year) && alone).then_some(Self { day, time })
     }
 
-    /// The date that a Modified Julian Date stands for: days since 1858-11-17 00:00 UTC.
-    ///
-    /// None where it is not within [`YEARS`].
+    /// The date of a Modified Julian Date, in days since 1858-11-17 00:00 UTC; `None` outside
+    /// [`YEARS`].
     pub fn from_modified_julian_date(days: f64) -> Option<Self> {
         const MJD_ZERO: DateTime = jiff::civil::datetime(1858, 11, 17, 0, 0, 0, 0);
         const SECONDS_PER_DAY: f64 = 86_400.0;
@@ -103,31 +103,31 @@ impl ObservationDate {
         self.time.is_some()
     }
 
-    /// Julian years of 365.25 days since J2000.0; a day without a time counts as its middle.
+    /// Julian years of 365.25 days since J2000.0; midday is assumed where the time is not known.
     pub fn years_since_j2000(&self) -> f64 {
         self.utc().duration_since(J2000).as_secs_f64() / SECONDS_PER_JULIAN_YEAR
     }
 
-    /// The Julian epoch: 2000 and the years since.
+    /// The Julian epoch: 2000 plus the years since J2000.0.
     pub fn julian_epoch(&self) -> f64 {
         2000.0 + self.years_since_j2000()
     }
 
-    /// The date as ISO 8601 writes it: `2019-07-29T20:47:26Z`, or `2019-07-29` where the time is not known.
+    /// The date in ISO 8601: `2019-07-29T20:47:26Z`, or `2019-07-29` where the time is not known.
     pub fn to_iso(&self) -> String {
         self.time
             .map_or(self.day.to_string(), |_| format!("{}Z", self.utc()))
     }
 }
 
-/// ISO 8601: a day, or a day and a time, with `Z`, an offset, or nothing for UTC.
+/// Parses ISO 8601: a day, or a day and a time, with `Z`, an offset, or nothing for UTC.
 impl FromStr for ObservationDate {
     type Err = DateError;
 
     fn from_str(text: &str) -> Result<Self, DateError> {
         let text = text.trim();
         let malformed = || DateError::Malformed { text: text.into() };
-        // The name of a time zone in brackets would need the zone's rules.
+        // A time zone's name in brackets would need a time zone database.
         if text.contains('[') {
             return Err(malformed());
         }
@@ -147,7 +147,7 @@ impl FromStr for ObservationDate {
     }
 }
 
-/// A place in a file's name.
+/// A reading position in a file name.
 #[derive(Clone)]
 struct Cursor<'a> {
     bytes: &'a [u8],
@@ -159,11 +159,11 @@ impl Cursor<'_> {
         self.bytes.get(self.at).is_some_and(u8::is_ascii_digit)
     }
 
-    /// The number that the next `digits` digits are.
+    /// Reads a number of exactly `digits` digits.
     fn number(&mut self, digits: usize) -> Option<i16> {
         let end = self.at + digits;
         let text = self.bytes.get(self.at..end)?;
-        // A sign is no digit, whatever the parser of numbers thinks.
+        // `parse` would accept a sign.
         if !text.iter().all(u8::is_ascii_digit) {
             return None;
         }
@@ -171,13 +171,13 @@ impl Cursor<'_> {
         std::str::from_utf8(text).ok()?.parse().ok()
     }
 
-    /// The next byte, if it is one of `wanted`.
+    /// Reads the next byte if it is one of `wanted`.
     fn any_of(&mut self, wanted: &[u8]) -> Option<u8> {
         let next = *self.bytes.get(self.at)?;
         wanted.contains(&next).then(|| self.at += 1).map(|()| next)
     }
 
-    /// Hour, minute and second, with what commonly stands before and between them.
+    /// Reads hour, minute and second, with the usual separators before and between them.
     fn time(mut self) -> Option<Time> {
         self.any_of(b"T_- t");
         let hour = self.number(2)?;
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_date_is_refused_with_what_was_expected() {
+    fn other_text_is_rejected_with_the_expected_format() {
         for text in [
             "",
             "today",
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn a_modified_julian_date_is_a_moment() {
+    fn modified_julian_dates_are_converted() {
         let iso = |days| ObservationDate::from_modified_julian_date(days).map(|date| date.to_iso());
         assert_eq!(iso(51_544.5).as_deref(), Some("2000-01-01T12:00:00Z"));
         assert_eq!(
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_that_only_resembles_a_date_is_none() {
+    fn numbers_that_resemble_a_date_are_ignored() {
         for name in [
             "orion.png",
             "2019.png",
@@ -336,7 +336,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_written_is_read_back(date in moments()) {
+        fn dates_round_trip(date in moments()) {
             prop_assert_eq!(parsed(&date.to_iso()), date);
             prop_assert_eq!(ObservationDate::in_file_name(date.to_iso().as_ref()), Some(date));
             let plain = date.to_iso().replace([':', '-'], "").replace('T', "_");
@@ -344,7 +344,7 @@ mod tests {
         }
 
         #[test]
-        fn any_text_and_any_name_are_read_without_panic(text in "\\PC{0,40}", digits in "[-0-9T:_.é ]{0,30}") {
+        fn no_text_panics(text in "\\PC{0,40}", digits in "[-0-9T:_.é ]{0,30}") {
             let _ = (text.parse::<ObservationDate>(), digits.parse::<ObservationDate>());
             let _ = (named(&text), named(&digits));
         }

@@ -1,14 +1,15 @@
-//! Files that are written whole or not at all.
+//! Atomic file writes: a reader finds the old file or the new one, never a part.
 
 use std::fs;
 use std::io;
 use std::path::Path;
 
-/// A temporary file beside `path`, with the permissions of any other new file, which takes that name by
-/// [`persist`](tempfile::NamedTempFile::persist) once it is whole.
+/// Creates a temporary file in the folder of `path`, with the permissions of any new file.
+///
+/// Once written, [`persist`](tempfile::NamedTempFile::persist) renames it to `path`.
 ///
 /// # Errors
-/// Those of the system; and where `path` is a device, a pipe or a directory, whose place a new name would take.
+/// I/O errors, and `path` being a device, a pipe or a directory, which the rename would replace.
 pub fn beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
     if fs::metadata(path).is_ok_and(|found| !found.is_file()) {
         return Err(io::Error::other("it exists and is no regular file"));
@@ -18,7 +19,7 @@ pub fn beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        // Temporary files are private by default; the process's umask takes away what the user wants taken away.
+        // Temporary files are private by default; the process's umask still applies.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     builder.tempfile_in(parent.unwrap_or(Path::new(".")))

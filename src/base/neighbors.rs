@@ -1,29 +1,29 @@
-//! Which of many points on a frame lie near a place, by a k-d tree.
+//! Neighbour search among points on a frame, with a k-d tree.
 
 use super::coords::PixelPoint;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
-/// Points on a frame, arranged for searches by place.
+/// A k-d tree of points on a frame.
 pub(crate) struct PointTree(ImmutableKdTree<f64, 2>);
 
-/// A point near a place.
+/// A point near the centre of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Neighbor {
-    /// Its position among the points given.
+    /// Its index among the points of the tree.
     pub index: usize,
-    /// Its distance from the place, in pixels.
+    /// Its distance from the centre, in pixels.
     pub distance_px: f64,
 }
 
 impl PointTree {
-    /// Arranges `points`.
+    /// Builds the tree of `points`.
     pub fn new(points: impl IntoIterator<Item = PixelPoint>) -> Self {
         let points: Vec<_> = points.into_iter().map(|p| [p.x, p.y]).collect();
         let tree = ImmutableKdTree::new_from_slice(&points);
         Self(tree.expect("no frame has 2^32 points"))
     }
 
-    /// The points within `radius_px` of `center`, nearest first, equally near ones in the order given.
+    /// The points within `radius_px` of `center`, by distance, then by index.
     pub fn within(&self, center: &PixelPoint, radius_px: f64) -> Vec<Neighbor> {
         let mut near = Vec::new();
         self.0

@@ -1,12 +1,12 @@
-//! Probabilities, and the middle of what was measured.
+//! Distribution functions and medians.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use std::sync::LazyLock;
 
-/// A number and its standard error.
+/// A value and its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// The number.
+    /// The value.
     pub value: f64,
     /// Its standard error.
     pub sigma: f64,
@@ -22,25 +22,25 @@ pub fn normal_density(z: f64) -> f64 {
     libm::exp(-0.5 * z * z) / (2.0 * PI).sqrt()
 }
 
-/// Steps of the table of the normal distribution, to one standard deviation, and how far it goes.
-const TABLE_STEPS: f64 = 32.0;
-const TABLE_END: f64 = 6.0;
-
-/// What [`normal_cdf`] and [`normal_density`] are, to 1e-13, in a tenth of the time: for sums over many stars.
+/// [`normal_cdf`] and [`normal_density`] from a table, to 1e-13, in a tenth of the time.
 pub fn normal_cdf_and_density(z: f64) -> (f64, f64) {
+    /// Entries of the table per standard deviation.
+    const TABLE_STEPS: f64 = 32.0;
+    /// The table covers ± this many standard deviations.
+    const TABLE_END: f64 = 6.0;
     static TABLE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| {
         let entries = 0..=(2.0 * TABLE_END * TABLE_STEPS) as usize;
         let z = entries.map(|entry| entry as f64 / TABLE_STEPS - TABLE_END);
         z.map(|z| (normal_cdf(z), normal_density(z))).collect()
     });
-    // What is no number is beyond the table as well.
+    // False for NaN, too.
     let is_within = z.abs() <= TABLE_END;
-    let place = ((z + TABLE_END) * TABLE_STEPS + 0.5) as usize;
-    let Some((cdf, density)) = TABLE.get(place).filter(|_| is_within) else {
+    let nearest = ((z + TABLE_END) * TABLE_STEPS + 0.5) as usize;
+    let Some((cdf, density)) = TABLE.get(nearest).filter(|_| is_within) else {
         return (normal_cdf(z), normal_density(z));
     };
-    // Taylor's series about the nearest entry, whose terms are Hermite's polynomials.
-    let z0 = place as f64 / TABLE_STEPS - TABLE_END;
+    // Taylor series about the nearest entry; its coefficients are Hermite polynomials.
+    let z0 = nearest as f64 / TABLE_STEPS - TABLE_END;
     let d = z - z0;
     let z0_sq = z0 * z0;
     let he = [
@@ -61,22 +61,22 @@ pub fn normal_cdf_and_density(z: f64) -> (f64, f64) {
     (cdf + density * in_cdf, density * in_density)
 }
 
-/// The logarithm of a product of many numbers from 1e-100 to 1: it is the logarithm that takes time, and few are needed.
+/// Computes the logarithm of a product of many numbers from 1e-100 to 1 with few logarithms.
 #[derive(Debug, Clone, Copy)]
 pub struct LnProduct {
     ln: f64,
-    /// What is not in `ln` yet.
+    /// The product of the numbers not yet in `ln`.
     factor: f64,
 }
 
 impl LnProduct {
-    /// Of no numbers.
+    /// The empty product.
     pub const ONE: Self = Self {
         ln: 0.0,
         factor: 1.0,
     };
 
-    /// One number more.
+    /// Multiplies the product by `number`.
     #[inline]
     pub fn multiply(&mut self, number: f64) {
         self.factor *= number;
@@ -86,13 +86,15 @@ impl LnProduct {
         }
     }
 
-    /// The logarithm.
+    /// The natural logarithm of the product.
     pub fn ln(&self) -> f64 {
         self.ln + self.factor.ln()
     }
 }
 
-/// The median of `values`, the upper of the two in the middle where their number is even; 0 where there are none. Changes their order.
+/// The median of `values`: the upper one if their number is even, 0 if there are none.
+///
+/// Reorders `values`.
 pub fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {
         return 0.0;
@@ -101,14 +103,12 @@ pub fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// With more hits than this the terms of a factorial are not added up one by one.
-const MANY_HITS: usize = 1000;
-
-/// With more trials than this what is likely is reckoned from what is not.
-const MANY_TRIALS: usize = 10_000;
-
 /// log10 of the probability of `hits` or more successes in `trials` at `chance` each.
 pub fn log10_binomial_tail(trials: usize, hits: usize, chance: f64) -> f64 {
+    /// With more hits than this, factorials are taken from the gamma function.
+    const MANY_HITS: usize = 1000;
+    /// With more trials than this, a likely tail is computed from the complementary one.
+    const MANY_TRIALS: usize = 10_000;
     if hits == 0 || chance >= 1.0 {
         return 0.0;
     }
@@ -116,7 +116,7 @@ pub fn log10_binomial_tail(trials: usize, hits: usize, chance: f64) -> f64 {
         return f64::NEG_INFINITY;
     }
     if trials > MANY_TRIALS && (hits as f64) < trials as f64 * chance {
-        // Below the mean the terms rise, and there may be as many as trials: those of too few hits are fewer.
+        // Below the mean the terms rise, and up to `trials` of them matter.
         let too_few = log10_binomial_tail(trials, trials - hits + 1, 1.0 - chance);
         return (-10f64.powf(too_few)).ln_1p() / std::f64::consts::LN_10;
     }
@@ -130,7 +130,7 @@ pub fn log10_binomial_tail(trials: usize, hits: usize, chance: f64) -> f64 {
             log_term += ((trials - i) as f64).ln() - ((i + 1) as f64).ln();
         }
     }
-    // The terms after the first, relative to it.
+    // The further terms, relative to the first.
     let odds = chance / (1.0 - chance);
     let (mut ratio, mut sum) = (1.0, 1.0);
     for k in hits..trials {
@@ -143,18 +143,20 @@ pub fn log10_binomial_tail(trials: usize, hits: usize, chance: f64) -> f64 {
     ((log_term + sum.ln()) / std::f64::consts::LN_10).min(0.0)
 }
 
-/// What keeps products of many small chances within the range of numbers: one for each success.
-const SUCCESS_SCALE: f64 = 1e4;
-
-/// log10 of the probability of `hits` or more successes in trials with these `chances`, one each; `scaled` is room to work in.
+/// log10 of the probability of `hits` or more successes in trials with these `chances`.
+///
+/// `scaled` is a buffer that is reused.
 pub fn log10_poisson_binomial_tail(chances: &[f64], hits: usize, scaled: &mut Vec<f64>) -> f64 {
+    /// Factor per success that prevents underflow of products of small chances.
+    const SUCCESS_SCALE: f64 = 1e4;
     if hits == 0 {
         return 0.0;
     }
     if hits > chances.len() {
         return f64::NEG_INFINITY;
     }
-    // The probability of each number of successes so far, scaled, the highest number first; that is of so many or more.
+    // Scaled probabilities of each number of successes so far, in descending order; the first is
+    // that of `hits` or more.
     scaled.clear();
     scaled.resize(hits + 1, 0.0);
     scaled[hits] = 1.0;
@@ -164,8 +166,8 @@ pub fn log10_poisson_binomial_tail(chances: &[f64], hits: usize, scaled: &mut Ve
         if first == 0 {
             scaled[0] += scaled[1] * success;
         }
-        for place in first.max(1)..hits {
-            scaled[place] = scaled[place] * (1.0 - chance) + scaled[place + 1] * success;
+        for i in first.max(1)..hits {
+            scaled[i] = scaled[i] * (1.0 - chance) + scaled[i + 1] * success;
         }
         scaled[hits] *= 1.0 - chance;
     }
@@ -177,7 +179,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_of_the_normal_distribution_is_as_good_as_the_functions() {
+    fn the_table_of_the_normal_distribution_agrees_with_the_functions() {
         for step in -90_000..=90_000 {
             let z = f64::from(step) * 7.7e-5;
             let (cdf, density) = normal_cdf_and_density(z);
@@ -201,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn the_binomial_tail_is_right_where_it_can_be_summed() {
+    fn the_binomial_tail_agrees_with_direct_sums() {
         assert_eq!(log10_binomial_tail(10, 0, 0.3), 0.0);
         assert!((log10_binomial_tail(1, 1, 0.01) + 2.0).abs() < 1e-12);
         // 1 − 0.9³ for one or more of three.
@@ -210,14 +212,14 @@ mod tests {
         assert!((log10_binomial_tail(3, 2, 0.1) - 0.028f64.log10()).abs() < 1e-12);
         assert!((log10_binomial_tail(60, 50, 0.01) + 89.166).abs() < 0.002);
         assert_eq!(log10_binomial_tail(3, 4, 0.1), f64::NEG_INFINITY);
-        // Either way to reckon with factorials: one hit more is a little less likely.
+        // Across the change of method for factorials: one more hit is slightly less likely.
         let at = |hits| log10_binomial_tail(20_000, hits, 0.05);
         let steps = [999, 1000, 1001].map(|hits| at(hits) - at(hits + 1));
         assert!(
             (steps[1] - 0.5 * (steps[0] + steps[2])).abs() < 1e-5,
             "{steps:?}"
         );
-        // Below the mean and above it, of so many trials that either is reckoned in its own way.
+        // Below the mean (complementary tail) and above it.
         for hits in [1, 5, 9, 15] {
             let exact = log10_poisson_binomial_tail(&[1e-3; 10_001], hits, &mut Vec::new());
             let found = log10_binomial_tail(10_001, hits, 1e-3);
@@ -228,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn trials_of_equal_chance_are_binomial() {
+    fn equal_chances_give_the_binomial_tail() {
         for (trials, hits, chance) in [(3, 1, 0.1), (3, 2, 0.1), (60, 50, 0.01), (57, 57, 1e-6)] {
             let expected = log10_binomial_tail(trials, hits, chance);
             let found = log10_poisson_binomial_tail(&vec![chance; trials], hits, &mut Vec::new());
@@ -237,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn trials_of_unequal_chance_are_summed_over_all_outcomes() {
+    fn unequal_chances_agree_with_the_sum_over_all_outcomes() {
         let chances = [0.5, 0.2, 0.01, 0.9];
         for hits in 0..=5 {
             let outcomes = (0..16u32).filter(|outcome| outcome.count_ones() as usize >= hits);

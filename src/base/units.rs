@@ -1,4 +1,4 @@
-//! Conversions between the units that people read and the radians that the code computes in.
+//! Conversion factors between angular units.
 
 use std::f64::consts::PI;
 
@@ -10,5 +10,3 @@ pub const RAD_PER_ARCSEC: f64 = PI / (180.0 * 3600.0);
 pub const DEG_PER_RAD: f64 = 180.0 / PI;
 /// Arcseconds in one radian.
 pub const ARCSEC_PER_RAD: f64 = 180.0 * 3600.0 / PI;
-/// Degrees in one milliarcsecond.
-pub const DEG_PER_MAS: f64 = 1.0 / 3.6e6;

@@ -1,4 +1,4 @@
-//! Numbers, angles and counts as text for people and files.
+//! Formats numbers, angles and counts as text, for people and files.
 
 mod number;
 mod rounding;
@@ -10,8 +10,8 @@ pub(crate) use rounding::{
 };
 pub(crate) use sexagesimal::{degrees, hours, small};
 
-/// `text` with control characters escaped, as `\n` and `\u{1b}`: names of files and headers may hold
-/// commands to a terminal.
+/// `text` with control characters escaped, as `\n` and `\u{1b}`: file names and headers may contain
+/// terminal escape sequences.
 pub fn printable(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for character in text.chars() {
@@ -24,7 +24,7 @@ pub fn printable(text: &str) -> String {
     shown
 }
 
-/// `1 detection`, `2 detections`.
+/// A count with its noun: `1 detection`, `2 detections`.
 pub fn counted(count: usize, noun: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{count} {noun}{plural}")

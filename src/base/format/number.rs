@@ -1,7 +1,7 @@
-//! Numbers of any size as short text.
+//! Numbers of any magnitude as short text.
 
-/// `value` with five significant digits, without trailing zeros; very large and very small numbers
-/// in scientific notation: `8.1504`, `21000`, `2.7883e-9`.
+/// `value` with five significant digits, without trailing zeros: `8.1504`, `21000`; below 1e-3 and
+/// from 1e6 in scientific notation: `2.7883e-9`.
 pub fn five_digits(value: f64) -> String {
     let size = value.abs();
     if value != 0.0 && !(1e-3..1e6).contains(&size) {
@@ -15,7 +15,7 @@ pub fn five_digits(value: f64) -> String {
     trimmed(&format!("{value:.decimals$}")).to_owned()
 }
 
-/// A decimal fraction without zeros at its end.
+/// A decimal number without trailing zeros.
 fn trimmed(text: &str) -> &str {
     if text.contains('.') {
         text.trim_end_matches('0').trim_end_matches('.')

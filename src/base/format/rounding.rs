@@ -1,10 +1,10 @@
-//! Numbers as they are printed: no more digits than they deserve, and never NaN.
+//! Rounds numbers for output, to decimals or significant digits.
 
-/// `value` to `decimals` places; −0 becomes 0.
+/// Rounds `value` to `decimals` places; −0 becomes 0.
 pub(crate) fn to_decimals(value: f64, decimals: i32) -> f64 {
     let scale = 10_f64.powi(decimals);
     let rounded = (value * scale).round() / scale;
-    // Beyond 2^53 the product has no fraction left to round, or has overflowed.
+    // The product overflowed: `value` has no fraction to round.
     if rounded.is_finite() {
         rounded + 0.0
     } else {
@@ -12,7 +12,7 @@ pub(crate) fn to_decimals(value: f64, decimals: i32) -> f64 {
     }
 }
 
-/// `value` to `digits` significant digits.
+/// Rounds `value` to `digits` significant digits.
 pub(crate) fn to_significant(value: f64, digits: i32) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;
@@ -27,12 +27,12 @@ pub(crate) fn to_significant(value: f64, digits: i32) -> f64 {
     }
 }
 
-/// [`to_decimals`], and `None` where there is no number.
+/// [`to_decimals`]; `None` for NaN and infinities.
 pub(crate) fn finite(value: f64, decimals: i32) -> Option<f64> {
     value.is_finite().then(|| to_decimals(value, decimals))
 }
 
-/// [`to_significant`], and `None` where there is no number.
+/// [`to_significant`]; `None` for NaN and infinities.
 pub(crate) fn significant(value: f64, digits: i32) -> Option<f64> {
     value.is_finite().then(|| to_significant(value, digits))
 }
@@ -53,7 +53,7 @@ pub(crate) fn half_turn_deg(angle_deg: f64, decimals: i32) -> f64 {
     }
 }
 
-/// The decimals at which a value with the standard error `sigma` shows two digits of that error, at most `most`.
+/// The decimals that show two significant digits of the standard error `sigma`, at most `most`.
 pub(crate) fn decimals_for(sigma: f64, most: usize) -> usize {
     if !(sigma > 0.0 && sigma.is_finite()) {
         return most;
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_left_out() {
+    fn nan_and_infinities_are_none() {
         assert_eq!(finite(f64::NAN, 3), None);
         assert_eq!(finite(f64::INFINITY, 3), None);
         assert_eq!(finite(-0.000_01, 3), Some(0.0));

@@ -1,6 +1,6 @@
-//! Angles as astronomers read them.
+//! Formats angles in sexagesimal notation.
 
-/// An angle in degrees cut into whole units, minutes and seconds; rounding carries over, so 60 is never printed.
+/// An angle split into whole units, minutes and seconds, rounded first so that 60 never appears.
 struct Sexagesimal {
     whole: u64,
     minutes: u64,
@@ -44,7 +44,8 @@ pub(crate) fn degrees(dec_deg: f64, decimals: usize) -> String {
     format!("{sign}{:02}° {:02}′ {seconds}″", parts.whole, parts.minutes)
 }
 
-/// A small angle in the unit that suits its size: `3.1″`, `2.4′`, `1.2°`.
+/// A small angle in the unit that suits its size, with two significant digits: `3.1″`, `2.4′`,
+/// `1.2°`.
 pub(crate) fn small(arcsec: f64) -> String {
     let (value, unit) = match arcsec.abs() {
         size if size < 99.5 => (arcsec, '″'),
@@ -74,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn small_angles_take_the_unit_that_suits_them() {
+    fn small_angles_are_in_the_unit_that_suits_them() {
         assert_eq!(small(0.0123), "0.012″");
         assert_eq!(small(3.21), "3.2″");
         assert_eq!(small(144.0), "2.4′");

@@ -618,7 +618,7 @@ impl Cells<'_> {
         let degrees = match angle {
             Some(Angle::Decimal(value)) => column.unit.unwrap_or(Unit::Degrees).to_degrees(value),
             // A heading in degrees does not make `05:34:48` degrees: sixtieths of right ascension are hours.
-            Some(Angle::Sixtieths(value)) => sixtieths_of.to_degrees(value),
+            Some(Angle::Sexagesimal(value)) => sixtieths_of.to_degrees(value),
             Some(Angle::Hours(value)) if sixtieths_of == Unit::Hours => value * 15.0,
             Some(Angle::Degrees(value)) => value,
             Some(Angle::Hours(_)) | None => {

@@ -1,15 +1,17 @@
-//! How much air starlight comes through, in units of that at the zenith, and how far it bends the light.
+//! Airmass and refraction as functions of the zenith distance.
 //!
-//! Caveats: a mean atmosphere; real refraction differs by some per cent, near the horizon by minutes of arc.
+//! Caveat: refraction is that of a mean atmosphere; real refraction differs by a few per cent, near
+//! the horizon by minutes of arc.
 
 use crate::base::units::{DEG_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
 use std::f64::consts::FRAC_PI_2;
 
-/// The airmass at this apparent zenith distance, in radians, from 0 to π/2: 0.9997 at the zenith, 38 at the horizon, finite everywhere.
+/// The airmass at an apparent zenith distance in radians, clamped to 0 to π/2: 0.9997 at the
+/// zenith, 38 at the horizon.
 ///
 /// # Reference
-/// Kasten & Young 1989, Appl. Opt. 28, 4735, doi 10.1364/AO.28.004735, eq. 3. Agrees with Pickering 2002 (DIO 12, 1, p. 20)
-/// within 0.3 % above an altitude of 5°.
+/// Kasten & Young 1989, Appl. Opt. 28, 4735, doi 10.1364/AO.28.004735, eq. 3. Agrees with Pickering
+/// 2002 (DIO 12, 1, p. 20) within 0.3 % above an altitude of 5°.
 pub fn airmass_kasten_young(apparent_zenith_distance_rad: f64) -> f64 {
     let zenith_distance_rad = apparent_zenith_distance_rad.clamp(0.0, FRAC_PI_2);
     let altitude_deg = 96.079_95 - zenith_distance_rad * DEG_PER_RAD;
@@ -17,12 +19,13 @@ pub fn airmass_kasten_young(apparent_zenith_distance_rad: f64) -> f64 {
     1.0 / (libm::cos(zenith_distance_rad) + 0.505_72 * altitude_term)
 }
 
-/// The airmass sec z of plane layers: within 1 % to 70° from the zenith, and infinite towards the horizon.
+/// The airmass sec z of plane-parallel layers: within 1 % up to 70° from the zenith, infinite at
+/// the horizon.
 pub fn airmass_plane_parallel(zenith_distance_rad: f64) -> f64 {
     1.0 / libm::cos(zenith_distance_rad)
 }
 
-/// The airmass for light scattered in the air: 1 at the zenith, 5 at the horizon.
+/// The airmass for scattered light: 1 at the zenith, 5 at the horizon.
 ///
 /// # Reference
 /// Krisciunas & Schaefer 1991, PASP 103, 1033, eq. (3).
@@ -31,8 +34,8 @@ pub fn airmass_krisciunas_schaefer(zenith_distance_rad: f64) -> f64 {
     (1.0 - 0.96 * sine * sine).sqrt().recip()
 }
 
-/// The part of the sea level's pressure that is left at a height in metres: the 1976 US Standard Atmosphere's troposphere
-/// continued, 0 where that ends.
+/// The air pressure at a height in metres, relative to sea level: the troposphere of the 1976 US
+/// Standard Atmosphere, extrapolated upwards until it reaches 0.
 ///
 /// # Reference
 /// U.S. Standard Atmosphere, 1976 (NOAA-S/T 76-1562), eq. 33a.
@@ -40,20 +43,21 @@ fn relative_pressure(height_m: f64) -> f64 {
     (1.0 - 2.255_77e-5 * height_m).max(0.0).powf(5.255_88)
 }
 
-/// How far refraction lifts what stands at this true altitude, in radians, seen from a height in metres; at 10 °C.
+/// Refraction in radians at a true altitude in radians, from a height in metres, at 10 °C.
 ///
 /// # Reference
-/// Sæmundsson 1986, Sky & Telescope 72, 70, as in Meeus 1998, Astronomical Algorithms, eq. 16.4. Within 0.1′ of tables.
+/// Sæmundsson 1986, Sky & Telescope 72, 70, as in Meeus 1998, Astronomical Algorithms, eq. 16.4.
+/// Within 0.1′ of tables.
 pub(super) fn refraction_rad(true_altitude_rad: f64, height_m: f64) -> f64 {
-    /// Below this the formula is not made for; nothing there is above the horizon.
+    /// The formula does not hold below this altitude.
     const LOWEST_DEG: f64 = -2.0;
-    /// The formula's own air, in parts of the sea level's pressure.
+    /// The pressure that the formula assumes, relative to sea level.
     const PRESSURE: f64 = 1010.0 / 1013.25;
     const ARCMIN_RAD: f64 = 60.0 * RAD_PER_ARCSEC;
     let altitude_deg = (true_altitude_rad * DEG_PER_RAD).max(LOWEST_DEG);
     let bent_deg = altitude_deg + 10.3 / (altitude_deg + 5.11);
     let arcmin = 1.02 / (bent_deg * RAD_PER_DEG).tan();
-    // At the zenith the formula is off by 0.1″ the other way.
+    // At the zenith the formula gives −0.1″.
     arcmin.max(0.0) * ARCMIN_RAD * relative_pressure(height_m) / PRESSURE
 }
 
@@ -67,11 +71,11 @@ mod tests {
         1.0 / (bent_deg * RAD_PER_DEG).sin()
     }
 
-    /// The paper's formula stays so close to the paper's tables.
+    /// The relative difference between the paper's formula and its tables.
     const TABLE_TOLERANCE: f64 = 2e-3;
 
     #[test]
-    fn scattered_light_comes_through_less_air() {
+    fn the_airmass_of_scattered_light_follows_the_paper() {
         assert_eq!(airmass_krisciunas_schaefer(0.0), 1.0);
         // (1 − 0.96 · 0.75)^−½ at 60°.
         assert!((airmass_krisciunas_schaefer(60f64.to_radians()) - 1.889_82).abs() < 1e-5);

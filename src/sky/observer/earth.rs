@@ -1,7 +1,8 @@
-//! From the stars' axes to the Earth's: precession, nutation, aberration and the Earth's rotation.
+//! Transforms ICRS directions to axes fixed to the Earth: precession, nutation, aberration, rotation.
 //!
-//! Caveats: UT1 is taken for UTC, from which it differs by less than 0.9 s, 13″ along the parallel. The frame bias (0.02″), the
-//! motion of the poles (0.3″), diurnal aberration (0.3″) and the lesser terms of nutation (0.5″) are left out.
+//! Caveats: UT1 is assumed equal to UTC; they differ by less than 0.9 s, 13″ in right ascension.
+//! Frame bias (0.02″), polar motion (0.3″), diurnal aberration (0.3″) and the smaller terms of
+//! nutation (0.5″) are neglected.
 
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
@@ -10,15 +11,15 @@ use std::f64::consts::TAU;
 
 const DAYS_PER_JULIAN_YEAR: f64 = 365.25;
 
-/// The direction in which a star of ICRS direction `icrs` is seen `years` Julian years after J2000.0, along the Earth's own axes:
-/// x to longitude 0 on the equator, y to 90° east, z to the north pole.
+/// The apparent direction of a star at `icrs`, `years` Julian years after J2000.0, in axes fixed to
+/// the Earth: x to longitude 0 on the equator, y to 90° east, z to the north pole.
 pub(super) fn terrestrial(icrs: &UnitVector<Icrs>, years: f64) -> Vector3<f64> {
     let date = Date::new(years);
-    let seen = date.to_true_equator() * icrs.as_vector() + date.aberration();
-    about_z(date.sidereal_time_rad()) * seen.normalize()
+    let apparent = date.to_true_equator() * icrs.as_vector() + date.aberration();
+    about_z(date.sidereal_time_rad()) * apparent.normalize()
 }
 
-/// A date, in Julian centuries since J2000.0, with what follows from it.
+/// A date in Julian centuries since J2000.0, and the orientation of the Earth's axis then.
 struct Date {
     centuries: f64,
     /// Nutation in longitude and in obliquity, in radians.
@@ -31,11 +32,12 @@ fn polynomial(t: f64, coefficients: &[f64]) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * t + c)
 }
 
-/// Turns the axes by `angle_rad` about x or z: what is not turned appears turned the other way.
+/// Rotates the axes by `angle_rad` about x, that is, vectors by −`angle_rad`.
 fn about_x(angle_rad: f64) -> Matrix3<f64> {
     *Rotation3::from_axis_angle(&Vector3::x_axis(), -angle_rad).matrix()
 }
 
+/// Rotates the axes by `angle_rad` about z.
 fn about_z(angle_rad: f64) -> Matrix3<f64> {
     *Rotation3::from_axis_angle(&Vector3::z_axis(), -angle_rad).matrix()
 }
@@ -74,7 +76,8 @@ impl Date {
     /// Precession (IAU 2006): from ICRS to the mean equator and equinox of the date.
     ///
     /// # Reference
-    /// Capitaine, Wallace & Chapront 2003, A&A 412, 567, eq. 37 (ψ_A), 39 (ω_A and χ_A), with their ε₀; the rotations are eq. 38.
+    /// Capitaine, Wallace & Chapront 2003, A&A 412, 567, eq. 37 (ψ_A), 39 (ω_A and χ_A), with their
+    /// ε₀; the rotations are eq. 38.
     fn precession(&self) -> Matrix3<f64> {
         const OBLIQUITY_J2000_ARCSEC: f64 = 84_381.406;
         let arcsec = |c: &[f64]| polynomial(self.centuries, c) * RAD_PER_ARCSEC;
@@ -90,10 +93,12 @@ impl Date {
         about_z(chi) * about_x(-omega) * about_z(-psi) * about_x(obliquity_j2000)
     }
 
-    /// The Earth's velocity over that of light, along the axes of the true equator and equinox of the date.
+    /// The Earth's velocity in units of the speed of light, in the axes of the true equator and
+    /// equinox of the date.
     ///
     /// # Reference
-    /// Meeus 1998, chapters 23 (the constant) and 25 (the Sun's longitude, the Earth's eccentricity and perihelion).
+    /// Meeus 1998, chapters 23 (the constant) and 25 (the Sun's longitude, the Earth's eccentricity
+    /// and perihelion).
     fn aberration(&self) -> Vector3<f64> {
         const CONSTANT_RAD: f64 = 20.495_52 * RAD_PER_ARCSEC;
         let t = self.centuries;
@@ -110,13 +115,13 @@ impl Date {
         about_x(-self.mean_obliquity_rad) * ecliptic * CONSTANT_RAD
     }
 
-    /// Greenwich apparent sidereal time.
+    /// Greenwich apparent sidereal time in radians.
     ///
     /// # Reference
     /// IERS Conventions 2010, eq. 5.15 (Earth rotation angle) and 5.32 (IAU 2006 sidereal time).
     fn sidereal_time_rad(&self) -> f64 {
         let days = self.centuries * 100.0 * DAYS_PER_JULIAN_YEAR;
-        // Whole turns are taken away before they cost digits; at J2000.0, noon, half a day has passed.
+        // Whole turns are removed first, to keep digits.
         let turns = 0.779_057_273_264 + 0.002_737_811_911_354_48 * days + days.rem_euclid(1.0);
         let precession_arcsec =
             polynomial(self.centuries, &[0.014_506, 4_612.156_534, 1.391_581_7]);
@@ -133,16 +138,16 @@ mod tests {
     use sofars::{eph::epv00, erst::gst06a, pnp};
 
     const J2000_JD: f64 = 2_451_545.0;
-    /// The terms of fourth order and above are left out: up to 0.00017″ t⁴, which is 0.014″ after three
-    /// centuries, in angles that compensate each other in part.
+    /// Terms of fourth order and above are neglected: up to 0.00017″ t⁴, which is 0.014″ after three
+    /// centuries, in angles that partly cancel.
     const PRECESSION_ARCSEC: f64 = 0.01;
-    /// The lesser terms of nutation (0.5″ in longitude, 0.1″ in obliquity) and the frame bias (0.02″).
+    /// Smaller terms of nutation (0.5″ in longitude, 0.1″ in obliquity) and the frame bias (0.02″).
     const NUTATION_ARCSEC: f64 = 0.6;
-    /// The Earth's orbit is an ellipse about the Sun here: the Sun's own motion about the barycentre is
-    /// up to 16 m/s, 0.011″, and that of the Earth about its own with the Moon 12 m/s, 0.009″.
+    /// The Earth's orbit is assumed to be an ellipse about the Sun. The Sun moves about the
+    /// barycentre with up to 16 m/s (0.011″), the Earth about that with the Moon with 12 m/s (0.009″).
     const ABERRATION_ARCSEC: f64 = 0.03;
 
-    /// Every 97 days from so many years before J2000.0 to so many after it.
+    /// Every 97 days from `years` before J2000.0 to `years` after it.
     fn dates(years: f64) -> impl Iterator<Item = (f64, Date)> {
         let last = (years * DAYS_PER_JULIAN_YEAR / 97.0) as i32;
         (-last..=last).map(|i| {
@@ -156,7 +161,7 @@ mod tests {
     }
 
     /// The angle by which two rotations differ.
-    fn apart_arcsec(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
+    fn difference_arcsec(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
         // The norm of the difference is 2√2 sin(angle/2).
         (a - b).norm() / std::f64::consts::SQRT_2 * ARCSEC_PER_RAD
     }
@@ -169,7 +174,7 @@ mod tests {
     fn precession_over_six_centuries_is_that_of_sofa() {
         let worst = worst(dates(300.0).map(|(days, date)| {
             let (_, precession, _) = pnp::bp06(J2000_JD, days);
-            apart_arcsec(&date.precession(), &matrix(precession))
+            difference_arcsec(&date.precession(), &matrix(precession))
         }));
         println!("largest difference: {worst:.4} arcsec");
         assert!(worst < PRECESSION_ARCSEC, "{worst}");
@@ -179,7 +184,7 @@ mod tests {
     fn nutation_over_six_centuries_is_that_of_sofa() {
         let worst = worst(dates(300.0).map(|(days, date)| {
             let expected = matrix(pnp::pnm06a(J2000_JD, days));
-            apart_arcsec(&date.to_true_equator(), &expected)
+            difference_arcsec(&date.to_true_equator(), &expected)
         }));
         println!("largest difference: {worst:.4} arcsec");
         assert!(worst < NUTATION_ARCSEC, "{worst}");

@@ -1,18 +1,19 @@
-//! The observer's sky, against astropy.
+//! Compares the observer's sky with astropy.
 
 use super::*;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use proptest::prelude::*;
 
-/// What is left out adds up to less: the lesser nutation, the pole's motion, diurnal aberration, frame bias.
+/// Above the sum of what is neglected: nutation terms, polar motion, diurnal aberration, frame bias.
 const TOLERANCE_ARCSEC: f64 = 1.5;
 
-/// Date, site (latitude and longitude in degrees, height in metres), direction (RA and Dec in degrees), and true zenith distance
-/// and azimuth in degrees by astropy 8.0.2: `SkyCoord(ra, dec).transform_to(AltAz(obstime, location, pressure=0))`, with
+/// Date, site (latitude and longitude in degrees, height in metres), direction (RA and Dec in
+/// degrees), and true zenith distance and azimuth in degrees by astropy 8.0.2:
+/// `SkyCoord(ra, dec).transform_to(AltAz(obstime, location, pressure=0))`, with
 /// `obstime.delta_ut1_utc = 0` and the Earth orientation table that comes with it.
-type Row = (&'static str, [f64; 3], [f64; 2], [f64; 2]);
+type Expected = (&'static str, [f64; 3], [f64; 2], [f64; 2]);
 #[rustfmt::skip]
-const ASTROPY: &[Row] = &[
+const ASTROPY: &[Expected] = &[
     ("1950-03-21T03:15:00Z", [52.2200, 4.4200, 0.0], [322.9970, 14.4888], [79.467435, 80.258988]),
     ("1950-03-21T03:15:00Z", [-30.2407, -70.7366, 2715.0], [81.0746, 33.4611], [95.791722, 305.567704]),
     ("1950-03-21T03:15:00Z", [19.8207, -155.4681, 4205.0], [168.4566, 36.4513], [83.204222, 53.335243]),
@@ -45,7 +46,7 @@ fn direction([ra_deg, dec_deg]: [f64; 2]) -> UnitVector<Icrs> {
     UnitVector::from_ra_dec(ra_deg * RAD_PER_DEG, dec_deg * RAD_PER_DEG)
 }
 
-fn observation((date, [lat, lon, height], at, _): &Row) -> Observation {
+fn observation((date, [lat, lon, height], at, _): &Expected) -> Observation {
     let site = Site::new(*lat, *lon, *height).unwrap();
     Observation::new(site, &date.parse().unwrap(), &direction(*at)).unwrap()
 }
@@ -88,7 +89,7 @@ fn refraction_lifts_what_is_just_below_the_horizon() {
 }
 
 #[test]
-fn a_day_without_a_time_has_no_zenith() {
+fn without_a_time_there_is_no_observation() {
     let site = Site::new(0.0, 0.0, 0.0).unwrap();
     let day = "2019-07-29".parse().unwrap();
     assert_eq!(Observation::new(site, &day, &direction([0.0, 0.0])), None);
@@ -128,12 +129,12 @@ fn a_site_is_two_or_three_numbers_in_range() {
 
 proptest! {
     #[test]
-    fn any_text_is_read_without_panic(text in "[-0-9., eNaif]{0,30}") {
+    fn no_text_panics(text in "[-0-9., eNaif]{0,30}") {
         let _ = text.parse::<Site>();
     }
 
     #[test]
-    fn no_place_and_no_direction_gives_what_is_no_number(
+    fn all_results_are_in_range(
         site in (-90.0..=90.0, -180.0..=360.0, -500.0..=1e5),
         at in (0.0..360.0, -90.0..=90.0),
         day in 0..90_000,
