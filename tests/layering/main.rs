@@ -56,6 +56,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "sky",
             "frame",
             "camera",
+            "calibration",
             "detect",
             "identify",
             "model",

@@ -1,45 +1,43 @@
 //! `defocus`: the error of centroids over spot radius and noise, and the radius to set.
 
-mod answer;
 mod args;
+mod darks;
 mod figures;
-mod noise;
-mod study;
-mod text;
+mod plan;
 
 pub(crate) use args::DefocusArgs;
 
 use super::exit::{CommandError, Exit};
 use super::options::catalog::thread_pool;
 use super::options::format::Format;
-use super::output::files::write_whole;
+use super::output::files;
 use super::output::messages::report_warning;
 use super::output::rows::{csv_table, json_lines};
 use super::output::stdout::print;
-use answer::{Answer, grid_rows};
+use super::progress::bar;
 use anyhow::Context;
 use starpipe::model::defocus::Lens;
+use starpipe::study::defocus::{DefocusReport, GridRow, Plan, StarStudy};
 use std::path::{Path, PathBuf};
-use study::{Plan, Study};
 
 /// `starpipe defocus`
 pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Exit, CommandError> {
     let pool = thread_pool(arguments.threads)?;
-    let plan = Plan::of(arguments, &pool)?;
-    let studies = plan.run(&pool)?;
-    let answer = Answer::of(&plan, &studies);
-    warn_if_too_sharp(&answer);
+    let plan = plan::plan(arguments, &pool)?;
+    let studies = run(&plan, &pool)?;
+    let report = DefocusReport::new(&plan, &studies);
+    warn_if_too_sharp(&report);
     if let Some(directory) = &arguments.out {
-        save(directory, arguments, &answer, &studies)?;
+        save(directory, arguments, &report, &studies)?;
     }
     let text = match arguments.format {
-        Format::Text => text::rendered(&answer),
-        Format::Json => json_lines(std::iter::once(&answer))?,
-        Format::Csv => csv_table(studies.iter().flat_map(grid_rows))?,
+        Format::Text => report.to_text(),
+        Format::Json => json_lines(std::iter::once(&report))?,
+        Format::Csv => grid_table(&studies)?,
     };
     // Nobody left to read it: nothing is lost.
     let _ = print(&text)?;
-    Ok(match answer.is_met() {
+    Ok(match report.is_met() {
         true => Exit::Success,
         false => {
             report_warning("no radius meets a required error");
@@ -48,12 +46,22 @@ pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Exit, CommandError> {
     })
 }
 
+fn run(plan: &Plan, pool: &rayon::ThreadPool) -> anyhow::Result<Vec<StarStudy>> {
+    let progress = bar(
+        plan.point_count() as u64,
+        "radii and noises {wide_bar} {pos}/{len} {eta}",
+    );
+    let studies = pool.install(|| plan.run(&|| progress.inc(1)));
+    progress.finish_and_clear();
+    Ok(studies?)
+}
+
 /// No lens makes a spot that is sharper than diffraction.
-fn warn_if_too_sharp(answer: &Answer) {
-    let Some(least_px) = answer.lens.as_ref().map(Lens::diffraction_px) else {
+fn warn_if_too_sharp(report: &DefocusReport) {
+    let Some(least_px) = report.lens.as_ref().map(Lens::diffraction_px) else {
         return;
     };
-    for star in &answer.stars {
+    for star in &report.stars {
         if star.best.radius.radius_px < least_px {
             report_warning(format_args!(
                 "the best radius, {:.2} px, is below that of diffraction, {least_px:.2} px",
@@ -63,33 +71,31 @@ fn warn_if_too_sharp(answer: &Answer) {
     }
 }
 
+fn grid_table(studies: &[StarStudy]) -> anyhow::Result<String> {
+    csv_table(studies.iter().flat_map(GridRow::rows))
+}
+
 /// Writes all files, or none.
 fn save(
     directory: &Path,
     arguments: &DefocusArgs,
-    answer: &Answer,
-    studies: &[Study],
+    report: &DefocusReport,
+    studies: &[StarStudy],
 ) -> anyhow::Result<()> {
-    let json = serde_json::to_string_pretty(answer).context("writing JSON")? + "\n";
-    let curve = answer.stars.iter().flat_map(|star| &star.curve);
-    let mut files = vec![
-        (
-            "grid.csv".to_owned(),
-            csv_table(studies.iter().flat_map(grid_rows))?.into_bytes(),
-        ),
-        ("curve.csv".to_owned(), csv_table(curve)?.into_bytes()),
-        ("defocus.json".to_owned(), json.into_bytes()),
-        (
-            "defocus.txt".to_owned(),
-            text::rendered(answer).into_bytes(),
-        ),
+    let json = serde_json::to_string_pretty(report).context("writing JSON")? + "\n";
+    let curve = csv_table(report.stars.iter().flat_map(|star| &star.curve))?;
+    let texts = [
+        ("grid.csv", grid_table(studies)?),
+        ("curve.csv", curve),
+        ("defocus.json", json),
+        ("defocus.txt", report.to_text()),
     ];
-    files.extend(figures::of(answer, studies, arguments.figures)?);
-    std::fs::create_dir_all(directory)
-        .with_context(|| format!("making the directory {}", directory.display()))?;
-    let placed: Vec<(PathBuf, Vec<u8>)> = files
+    let texts = texts.map(|(name, text)| (name.to_owned(), text.into_bytes()));
+    let figures = figures::of(report, studies, arguments.figures)?;
+    let files: Vec<(PathBuf, Vec<u8>)> = texts
         .into_iter()
+        .chain(figures)
         .map(|(name, content)| (directory.join(name), content))
         .collect();
-    write_whole(&placed)
+    files::save(directory, &files)
 }

@@ -3,6 +3,7 @@
 mod args;
 mod figure;
 mod sweep;
+mod table;
 
 pub(crate) use args::RobustnessArgs;
 
@@ -15,27 +16,30 @@ use super::output::stdout::print;
 use super::progress::bar;
 use anyhow::Context;
 use args::{MirroredArg, ProtocolOptions};
-use figure::Rates;
+use figure::RateTable;
 use starpipe::identify::Photometry;
 use starpipe::study::robustness::{Case, Mirrored, Parameter, Protocol, Row, run, standard_cases};
-use std::fmt::Write as _;
+use table::SweptRow;
 
 /// `starpipe robustness`
 pub(crate) fn robustness(arguments: &RobustnessArgs) -> Result<Exit, CommandError> {
     let rows = rows(arguments)?;
     if let Some(plot) = &arguments.plot {
-        let file = plot.with(&Rates(&rows)).context("drawing the figure")?;
-        write_whole(&[file])?;
+        let file = match figure::sweeps(&rows) {
+            Some(sheet) => plot.with(&sheet),
+            None => plot.with(&RateTable(&rows)),
+        };
+        write_whole(&[file.context("drawing the figure")?])?;
     }
+    let table = rows.iter().map(|swept| &swept.row);
+    let text = match arguments.format {
+        Format::Text => table::text(arguments, &rows),
+        Format::Json => json_lines(table)?,
+        Format::Csv => csv_table(table)?,
+    };
     // Nobody left to read it: nothing is lost.
-    let _ = print(&rendered(arguments, &rows)?)?;
+    let _ = print(&text)?;
     Ok(Exit::Success)
-}
-
-/// A row of the table, and the value of the parameter that is swept in it.
-struct SweptRow {
-    row: Row,
-    swept: Option<(Parameter, f64)>,
 }
 
 impl ProtocolOptions {
@@ -64,7 +68,7 @@ impl ProtocolOptions {
     }
 }
 
-/// The cases that are asked for.
+/// The cases that the options ask for, with the value of the parameter that is swept.
 fn cases(arguments: &RobustnessArgs) -> Vec<(Case, Option<(Parameter, f64)>)> {
     let base = arguments.protocol.resolve();
     if arguments.sweep.is_empty() {
@@ -93,17 +97,10 @@ fn rows(arguments: &RobustnessArgs) -> Result<Vec<SweptRow>, CommandError> {
         arguments.trials * cases.len() as u64,
         "trials {wide_bar} {pos}/{len} {eta}",
     );
+    let (trials, seed) = (arguments.trials, arguments.seed);
+    let done = || progress.inc(1);
     let row = |(case, swept): (Case, Option<(Parameter, f64)>)| {
-        let done = || progress.inc(1);
-        let tally = pool.install(|| {
-            run(
-                &indexed,
-                &case.protocol,
-                arguments.trials,
-                arguments.seed,
-                &done,
-            )
-        });
+        let tally = pool.install(|| run(&indexed, &case.protocol, trials, seed, &done));
         let row = Row::new(&case, &tally, arguments.least_true_stars);
         SweptRow { row, swept }
     };
@@ -111,69 +108,4 @@ fn rows(arguments: &RobustnessArgs) -> Result<Vec<SweptRow>, CommandError> {
     progress.finish_and_clear();
     warn_of_cache(&indexed);
     Ok(rows)
-}
-
-fn rendered(arguments: &RobustnessArgs, rows: &[SweptRow]) -> anyhow::Result<String> {
-    match arguments.format {
-        Format::Text => Ok(text(arguments, rows)),
-        Format::Json => json_lines(rows.iter().map(|swept| &swept.row)),
-        Format::Csv => csv_table(rows.iter().map(|swept| &swept.row)),
-    }
-}
-
-fn text(arguments: &RobustnessArgs, rows: &[SweptRow]) -> String {
-    let protocol = &arguments.protocol;
-    let scale = if protocol.scale_unknown {
-        "unknown".to_owned()
-    } else {
-        format!("known to {} %", protocol.scale_error)
-    };
-    let mut text = format!(
-        "{} trials a row, seed {}; {} × {} px, {} stars on average; unless the row says otherwise centroids {} px and \
-         magnitudes {} off, {} % of the stars missing, {} % false, field of view {scale}.\n\
-         Rates are of the trials with {} true stars or more, with 95 % intervals; wrong answers and times are of all trials.\n\n",
-        arguments.trials,
-        arguments.seed,
-        protocol.width,
-        protocol.height,
-        protocol.stars,
-        protocol.centroid_error,
-        protocol.mag_error,
-        protocol.missing,
-        protocol.false_stars,
-        arguments.least_true_stars,
-    );
-    let _ = writeln!(
-        text,
-        "{:<28} {:>8} {:>8} {:>6} {:>6} {:>9} {:>17} {:>7} {:>9} {:>9}",
-        "", "counted", "right", "none", "wrong", "right", "95 %", "wrong", "median", "99 %"
-    );
-    for SweptRow { row, .. } in rows {
-        let interval = format!(
-            "{:.2} to {:.2} %",
-            row.right_low_percent, row.right_high_percent
-        );
-        let rate = match row.counted {
-            0 => "–".to_owned(),
-            _ => format!("{:.2} %", row.right_percent),
-        };
-        let interval = if row.counted == 0 {
-            "–".to_owned()
-        } else {
-            interval
-        };
-        let _ = writeln!(
-            text,
-            "{:<28} {:>8} {:>8} {:>6} {:>6} {rate:>9} {interval:>17} {:>7} {:>6.2} ms {:>6.1} ms",
-            row.case,
-            row.counted,
-            row.right,
-            row.no_answer,
-            row.wrong_of_all,
-            format!("<{:.2} %", row.wrong_high_percent + 0.005),
-            row.median_ms,
-            row.p99_ms,
-        );
-    }
-    text
 }

@@ -1,16 +1,16 @@
 //! The figures of a run and of a study.
 
-use super::study::StudyRow;
-use crate::cli::plot::panel::{Axis, Dot, Layer, Marks, Panel, Sheet};
-use crate::cli::plot::{BLUE, FigureForm, ORANGE, drawn};
+use crate::cli::plot::{
+    Axis, BLUE, Dot, FigureForm, Layer, Marks, ORANGE, Panel, Sheet, figure_files,
+};
 use plotters::style::RGBColor;
 use starpipe::base::statistics::normal_density;
 use starpipe::study::validation::{
     AttitudeSummary, CentroidSummary, CompletenessSummary, DifferenceSummary, Histogram,
-    IdentificationSummary, Pull, PullSummary, Summary,
+    IdentificationSummary, Pull, PullSummary, StudyRow, Summary,
 };
 
-/// The colours of what is told beside the middle.
+/// The 95th percentile beside the median.
 const PALE_BLUE: RGBColor = RGBColor(120, 180, 220);
 const PALE_ORANGE: RGBColor = RGBColor(240, 170, 110);
 
@@ -27,7 +27,7 @@ pub(super) fn of_run(
         ("faintest", faintest(&summary.faintest)),
     ];
     sheets.extend(summary.attitude.as_ref().map(|a| ("attitude", attitude(a))));
-    drawn(sheets, form)
+    figure_files(sheets, form)
 }
 
 /// The figures of a study, one for each parameter.
@@ -36,7 +36,7 @@ pub(super) fn of_study(
     form: FigureForm,
 ) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
     let parameters = rows.chunk_by(|a, b| a.parameter == b.parameter);
-    drawn(
+    figure_files(
         parameters
             .map(|rows| (rows[0].parameter, study(rows)))
             .collect(),
@@ -74,14 +74,14 @@ fn identification(found: &IdentificationSummary) -> Sheet {
     })
 }
 
-/// Where an axis of rates begins.
+/// The start of an axis of rates: below all intervals.
 fn lowest_percent(rates: &[Dot]) -> f64 {
     let lowest = rates.iter().map(|rate| rate.2[0]);
     lowest.fold(90.0, f64::min).floor()
 }
 
 fn completeness(found: &CompletenessSummary) -> Sheet {
-    // The first bin is of all brighter stars.
+    // The first bin has all brighter stars.
     let bins = found.bins.get(1..).unwrap_or_default();
     let dots = bins.iter().map(|bin| {
         (
@@ -115,11 +115,15 @@ fn completeness(found: &CompletenessSummary) -> Sheet {
 
 fn centroids(found: &CentroidSummary) -> Sheet {
     let bins = &found.bins;
-    // The standard error of a root mean square of 2n values is its 1/√(4n).
-    let part = |stars: usize| 1.0 / (4.0 * stars as f64).sqrt();
+    // Standard error of a root mean square of 2n values, relative to it.
+    let relative_error = |stars: usize| 1.0 / (4.0 * stars as f64).sqrt();
     let errors = bins.iter().map(|bin| {
-        let room = bin.rms_px * part(bin.stars);
-        (bin.snr, bin.rms_px, [bin.rms_px - room, bin.rms_px + room])
+        let sigma = bin.rms_px * relative_error(bin.stars);
+        (
+            bin.snr,
+            bin.rms_px,
+            [bin.rms_px - sigma, bin.rms_px + sigma],
+        )
     });
     let bound = bins.iter().filter_map(|bin| Some((bin.snr, bin.bound_px?)));
     let ratios: Vec<_> = bins
@@ -130,8 +134,8 @@ fn centroids(found: &CentroidSummary) -> Sheet {
         })
         .collect();
     let snr = || Axis::log("signal-to-noise ratio of the matched filter", true);
-    Sheet {
-        panels: vec![
+    Sheet::new(
+        vec![
             Panel {
                 title: "Error of a centroid on one axis".to_owned(),
                 x: snr(),
@@ -151,11 +155,11 @@ fn centroids(found: &CentroidSummary) -> Sheet {
                 ],
             },
         ],
-        abreast: 2,
-    }
+        2,
+    )
 }
 
-/// The bars of a histogram, as high as a density is.
+/// The bars of a histogram as a density.
 fn densities(histogram: &Histogram, count: usize) -> Vec<([f64; 2], f64)> {
     let Histogram { from, step, counts } = histogram;
     let bar = |(bin, values): (usize, &usize)| {
@@ -206,10 +210,7 @@ fn pulls(found: &PullSummary) -> Sheet {
         ("Turn about y", &found.attitude_y),
         ("Roll", &found.roll),
     ];
-    Sheet {
-        panels: panels.into_iter().map(panel).collect(),
-        abreast: 3,
-    }
+    Sheet::new(panels.into_iter().map(panel).collect(), 3)
 }
 
 fn faintest(found: &DifferenceSummary) -> Sheet {
@@ -238,10 +239,10 @@ fn faintest(found: &DifferenceSummary) -> Sheet {
 }
 
 fn attitude(found: &AttitudeSummary) -> Sheet {
-    let below = |values: &[f64]| {
+    let cumulative = |values: &[f64]| {
         let point = |(percent, value): (usize, &f64)| (*value, percent as f64);
         let points = values.iter().enumerate().map(point);
-        // On a logarithmic axis there is no place for an error of nothing.
+        // A logarithmic axis has no place for an error of zero.
         Marks::Line(points.filter(|(value, _)| *value > 0.0).skip(1).collect())
     };
     let (boresight, roll) = (&found.boresight_arcsec, &found.roll_arcsec);
@@ -253,18 +254,18 @@ fn attitude(found: &AttitudeSummary) -> Sheet {
             Layer::new(
                 format!("boresight: half below {:.2}″", boresight.p50),
                 BLUE,
-                below(&found.boresight_percentiles_arcsec),
+                cumulative(&found.boresight_percentiles_arcsec),
             ),
             Layer::new(
                 format!("roll: half below {:.1}″", roll.p50),
                 ORANGE,
-                below(&found.roll_percentiles_arcsec),
+                cumulative(&found.roll_percentiles_arcsec),
             ),
         ],
     })
 }
 
-/// A number of a row and its standard error.
+/// A value of a row and its standard error.
 type Measured = fn(&StudyRow) -> (Option<f64>, Option<f64>);
 
 /// The rows of one parameter.
@@ -275,69 +276,76 @@ fn study(rows: &[StudyRow]) -> Sheet {
         y,
         layers,
     };
-    let line = |of: fn(&StudyRow) -> Option<f64>| {
-        let points = rows.iter().filter_map(|row| Some((row.value, of(row)?)));
-        Marks::Line(points.collect())
+    let (rate, rates) = rates(rows);
+    let panels = vec![
+        panel("Identified rightly", rate, rates),
+        panel(
+            "Half of the stars are found at",
+            Axis::of("V"),
+            limits(rows),
+        ),
+        panel(
+            "Errors of centroids in units of the bound",
+            Axis::of("root mean square / bound"),
+            vec![
+                Layer::guide(Marks::Levels(vec![1.0])),
+                measured("± standard error", rows, |row| {
+                    (row.centroid_ratio, row.centroid_ratio_sigma)
+                }),
+            ],
+        ),
+        panel(
+            "Errors of the attitude",
+            Axis::log("arcseconds", true),
+            attitude_errors(rows),
+        ),
+    ];
+    Sheet::new(panels, 2)
+}
+
+fn rates(rows: &[StudyRow]) -> (Axis, Vec<Layer>) {
+    let rate = |row: &StudyRow| {
+        let interval = [row.right_low_percent, row.right_high_percent];
+        (row.value, row.right_percent, interval)
     };
-    let measured = |label: &str, of: Measured| {
-        let dots = rows.iter().filter_map(|row| {
-            let (Some(value), Some(sigma)) = of(row) else {
-                return None;
-            };
-            Some((row.value, value, [value - sigma, value + sigma]))
-        });
-        Layer::new(label, BLUE, Marks::Dots(dots.collect()))
-    };
-    let rates: Vec<Dot> = rows
-        .iter()
-        .map(|row| {
-            let ends = [row.right_low_percent, row.right_high_percent];
-            (row.value, row.right_percent, ends)
-        })
-        .collect();
-    let rate = Axis::of("% of the frames").within(lowest_percent(&rates), 100.5);
-    let errors = vec![
+    let rates: Vec<Dot> = rows.iter().map(rate).collect();
+    let axis = Axis::of("% of the frames").within(lowest_percent(&rates), 100.5);
+    let layer = Layer::new("with 95 % intervals", BLUE, Marks::Dots(rates));
+    (axis, vec![layer])
+}
+
+fn limits(rows: &[StudyRow]) -> Vec<Layer> {
+    let predicted = line(rows, |row| Some(row.predicted_limit_vmag));
+    vec![
+        Layer::new("predicted", ORANGE, predicted),
+        measured("measured", rows, |row| {
+            (row.measured_limit_vmag, row.measured_limit_sigma_mag)
+        }),
+    ]
+}
+
+fn attitude_errors(rows: &[StudyRow]) -> Vec<Layer> {
+    let line = |value| line(rows, value);
+    vec![
         Layer::new("boresight 50 %", BLUE, line(|row| row.boresight_p50_arcsec)),
         Layer::new("95 %", PALE_BLUE, line(|row| row.boresight_p95_arcsec)),
         Layer::new("roll 50 %", ORANGE, line(|row| row.roll_p50_arcsec)),
         Layer::new("95 %", PALE_ORANGE, line(|row| row.roll_p95_arcsec)),
-    ];
-    let limits = vec![
-        Layer::new(
-            "predicted",
-            ORANGE,
-            line(|row| Some(row.predicted_limit_vmag)),
-        ),
-        measured("measured", |row| {
-            (row.measured_limit_vmag, row.measured_limit_sigma_mag)
-        }),
-    ];
-    let ratios = vec![
-        Layer::guide(Marks::Levels(vec![1.0])),
-        measured("± standard error", |row| {
-            (row.centroid_ratio, row.centroid_ratio_sigma)
-        }),
-    ];
-    let in_bounds = Axis::of("root mean square / bound");
-    Sheet {
-        panels: vec![
-            panel(
-                "Identified rightly",
-                rate,
-                vec![Layer::new("with 95 % intervals", BLUE, Marks::Dots(rates))],
-            ),
-            panel("Half of the stars are found at", Axis::of("V"), limits),
-            panel(
-                "Errors of centroids in units of the bound",
-                in_bounds,
-                ratios,
-            ),
-            panel(
-                "Errors of the attitude",
-                Axis::log("arcseconds", true),
-                errors,
-            ),
-        ],
-        abreast: 2,
-    }
+    ]
+}
+
+fn line(rows: &[StudyRow], value: fn(&StudyRow) -> Option<f64>) -> Marks {
+    let points = rows.iter().filter_map(|row| Some((row.value, value(row)?)));
+    Marks::Line(points.collect())
+}
+
+/// Dots with standard errors, where both are known.
+fn measured(label: &str, rows: &[StudyRow], value: Measured) -> Layer {
+    let dots = rows.iter().filter_map(|row| {
+        let (Some(value), Some(sigma)) = value(row) else {
+            return None;
+        };
+        Some((row.value, value, [value - sigma, value + sigma]))
+    });
+    Layer::new(label, BLUE, Marks::Dots(dots.collect()))
 }

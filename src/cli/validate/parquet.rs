@@ -1,6 +1,6 @@
-//! The tables as Parquet: a directory of parts, each of so many frames, written whole.
+//! The tables as Parquet: for each table a directory of parts, each of a part of the frames.
 
-use super::columns::{Cell, Column, Row};
+use super::shared::remove_outdated;
 use anyhow::Context;
 use parquet::basic::Compression;
 use parquet::column::writer::ColumnWriter;
@@ -8,66 +8,100 @@ use parquet::data_type::ByteArray;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::parser::parse_message_type;
+use starpipe::study::validation::store::{Column, FieldValue, RunTables, StoreError, TableRow};
+use starpipe::study::validation::{FrameRecord, StarRecord};
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Frames in a part.
-pub(super) const FRAMES_PER_PART: u64 = 1000;
-/// Rows that are kept in memory at once.
+/// Rows in memory at once.
 const ROWS_PER_GROUP: usize = 1 << 16;
 
-/// Where the parts of the table of `R` are.
-pub(super) fn parts_directory<R: Row>(directory: &Path) -> PathBuf {
-    directory.join(format!("{}.parquet", R::TABLE))
+/// The parts in a run's directory.
+pub(super) struct Parts<'a> {
+    directory: &'a Path,
+    /// Number of parts that are known to be written.
+    written: u64,
 }
 
-/// Where the part with this number is.
-pub(super) fn part_path<R: Row>(directory: &Path, part: u64) -> PathBuf {
-    parts_directory::<R>(directory).join(format!("part-{part:05}.parquet"))
+impl<'a> Parts<'a> {
+    pub(super) fn new(directory: &'a Path) -> Self {
+        let written = 0;
+        Self { directory, written }
+    }
+
+    /// Removes the part that does not have all its frames yet, and any after it.
+    pub(super) fn remove_unfinished(&self, tables: &RunTables) -> anyhow::Result<()> {
+        let first = tables.whole_parts();
+        remove_parts::<FrameRecord>(self.directory, first)?;
+        remove_parts::<StarRecord>(self.directory, first)
+    }
+
+    /// Writes the whole parts that are missing.
+    pub(super) fn write_whole(&mut self, tables: &RunTables) -> anyhow::Result<()> {
+        self.write_up_to(tables, tables.whole_parts())
+    }
+
+    /// Writes all parts that are missing, the last one with the frames that there are.
+    pub(super) fn write_all(&mut self, tables: &RunTables) -> anyhow::Result<()> {
+        self.write_up_to(tables, tables.parts())
+    }
+
+    fn write_up_to(&mut self, tables: &RunTables, end: u64) -> anyhow::Result<()> {
+        for part in self.written..end {
+            let (frames, stars) = tables.part(part)?;
+            write_part(self.directory, part, frames)?;
+            write_part(self.directory, part, stars)?;
+        }
+        self.written = end;
+        Ok(())
+    }
 }
 
-/// Writes a part whole: beside its place, which it takes when it is done.
-pub(super) fn write_part<R: Row>(
+fn part_path<R: TableRow>(directory: &Path, part: u64) -> PathBuf {
+    let parts = directory.join(format!("{}.parquet", R::TABLE));
+    parts.join(format!("part-{part:05}.parquet"))
+}
+
+/// Writes a part unless it is there. It takes its name when it is complete.
+fn write_part<R: TableRow>(
     directory: &Path,
     part: u64,
-    rows: impl Iterator<Item = anyhow::Result<R>>,
+    rows: impl Iterator<Item = Result<R, StoreError>>,
 ) -> anyhow::Result<()> {
-    let parts = parts_directory::<R>(directory);
-    std::fs::create_dir_all(&parts)
-        .with_context(|| format!("making the directory {}", parts.display()))?;
     let path = part_path::<R>(directory, part);
-    // Always of the same name: what a run that was killed leaves is written over.
+    if path.exists() {
+        return Ok(());
+    }
+    if let Some(parts) = path.parent() {
+        std::fs::create_dir_all(parts)
+            .with_context(|| format!("making the directory {}", parts.display()))?;
+    }
+    // Always the same name, so that the next run overwrites what a killed one has left.
     let beside = path.with_extension("tmp");
     let write = || -> anyhow::Result<()> {
-        let file = File::create(&beside)?;
-        write_table(file, rows)?;
+        write_table(File::create(&beside)?, rows)?;
         Ok(std::fs::rename(&beside, &path)?)
     };
     write().with_context(|| format!("writing {}", path.display()))
 }
 
-/// Takes away the parts from this number on, which are out of date.
-pub(super) fn remove_parts<R: Row>(directory: &Path, from: u64) -> anyhow::Result<()> {
-    let mut part = from;
-    loop {
+/// Removes the parts from this number on.
+fn remove_parts<R: TableRow>(directory: &Path, from: u64) -> anyhow::Result<()> {
+    for part in from.. {
         let path = part_path::<R>(directory, part);
-        match std::fs::remove_file(&path) {
-            Ok(()) => part += 1,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-            Err(error) => {
-                return Err(error)
-                    .with_context(|| format!("removing {}, which is out of date", path.display()));
-            }
+        if !remove_outdated(&path)? {
+            break;
         }
     }
+    Ok(())
 }
 
-fn write_table<R: Row, W: Write + Send>(
+fn write_table<R: TableRow, W: Write + Send>(
     target: W,
-    rows: impl Iterator<Item = anyhow::Result<R>>,
+    rows: impl Iterator<Item = Result<R, StoreError>>,
 ) -> anyhow::Result<()> {
     let columns = R::columns();
     let schema = Arc::new(parse_message_type(&schema(&columns))?);
@@ -96,7 +130,7 @@ fn write_table<R: Row, W: Write + Send>(
 }
 
 /// The schema in Parquet's own notation.
-fn schema<R: Row>(columns: &[Column<R>]) -> String {
+fn schema<R: TableRow>(columns: &[Column<R>]) -> String {
     let mut text = format!("message {} {{\n", R::TABLE);
     for column in columns {
         let presence = if column.is_optional {
@@ -104,14 +138,14 @@ fn schema<R: Row>(columns: &[Column<R>]) -> String {
         } else {
             "required"
         };
-        let (kind, means) = match (&column.empty, column.name) {
-            (Cell::Whole(_), "seed") => ("int64", " (INTEGER(64, false))"),
-            (Cell::Whole(_), _) => ("int64", ""),
-            (Cell::Number(_), _) => ("double", ""),
-            (Cell::Yes(_), _) => ("boolean", ""),
-            (Cell::Text(_), _) => ("binary", " (UTF8)"),
+        let (kind, logical) = match (&column.empty, column.name) {
+            (FieldValue::Integer(_), "seed") => ("int64", " (INTEGER(64, false))"),
+            (FieldValue::Integer(_), _) => ("int64", ""),
+            (FieldValue::Number(_), _) => ("double", ""),
+            (FieldValue::Bool(_), _) => ("boolean", ""),
+            (FieldValue::Text(_), _) => ("binary", " (UTF8)"),
         };
-        let _ = writeln!(text, "  {presence} {kind} {}{means};", column.name);
+        let _ = writeln!(text, "  {presence} {kind} {}{logical};", column.name);
     }
     text + "}\n"
 }
@@ -121,75 +155,94 @@ fn write_column<R>(
     column: &Column<R>,
     rows: &[R],
 ) -> anyhow::Result<()> {
-    let cells = || rows.iter().map(column.of);
-    let is_there = |cell: Cell| i16::from(!is_empty(&cell));
-    // Which of the values are there, of a column in which some are not.
-    let levels: Option<Vec<i16>> = column.is_optional.then(|| cells().map(is_there).collect());
+    let fields = || rows.iter().map(column.value);
+    let level = |field: FieldValue| i16::from(!is_empty(&field));
+    // Definition levels: 1 for a value, 0 for an empty field.
+    let levels: Option<Vec<i16>> = column.is_optional.then(|| fields().map(level).collect());
     let levels = levels.as_deref();
     match writer {
         ColumnWriter::Int64ColumnWriter(typed) => {
-            let values: Vec<i64> = cells().filter_map(whole).collect();
+            let values: Vec<i64> = fields().filter_map(integer).collect();
             typed.write_batch(&values, levels, None)?;
         }
         ColumnWriter::DoubleColumnWriter(typed) => {
-            let values: Vec<f64> = cells().filter_map(number).collect();
+            let values: Vec<f64> = fields().filter_map(number).collect();
             typed.write_batch(&values, levels, None)?;
         }
         ColumnWriter::BoolColumnWriter(typed) => {
-            let values: Vec<bool> = cells().filter_map(yes).collect();
+            let values: Vec<bool> = fields().filter_map(boolean).collect();
             typed.write_batch(&values, levels, None)?;
         }
         ColumnWriter::ByteArrayColumnWriter(typed) => {
-            let values: Vec<ByteArray> = cells().filter_map(text).collect();
+            let values: Vec<ByteArray> = fields().filter_map(text).collect();
             typed.write_batch(&values, levels, None)?;
         }
-        _ => anyhow::bail!("column {} is of no kind that is written", column.name),
+        _ => anyhow::bail!("column {} has a type that is not supported", column.name),
     }
     Ok(())
 }
 
-fn is_empty(cell: &Cell) -> bool {
+fn is_empty(field: &FieldValue) -> bool {
     matches!(
-        cell,
-        Cell::Whole(None) | Cell::Number(None) | Cell::Yes(None) | Cell::Text(None)
+        field,
+        FieldValue::Integer(None)
+            | FieldValue::Number(None)
+            | FieldValue::Bool(None)
+            | FieldValue::Text(None)
     )
 }
 
-fn whole(cell: Cell) -> Option<i64> {
-    match cell {
-        Cell::Whole(value) => value,
+fn integer(field: FieldValue) -> Option<i64> {
+    match field {
+        FieldValue::Integer(value) => value,
         _ => None,
     }
 }
 
-fn number(cell: Cell) -> Option<f64> {
-    match cell {
-        Cell::Number(value) => value,
+fn number(field: FieldValue) -> Option<f64> {
+    match field {
+        FieldValue::Number(value) => value,
         _ => None,
     }
 }
 
-fn yes(cell: Cell) -> Option<bool> {
-    match cell {
-        Cell::Yes(value) => value,
+fn boolean(field: FieldValue) -> Option<bool> {
+    match field {
+        FieldValue::Bool(value) => value,
         _ => None,
     }
 }
 
-fn text(cell: Cell) -> Option<ByteArray> {
-    match cell {
-        Cell::Text(value) => value.map(|text| text.into_bytes().into()),
+fn text(field: FieldValue) -> Option<ByteArray> {
+    match field {
+        FieldValue::Text(value) => value.map(|text| text.into_bytes().into()),
         _ => None,
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::columns::tests::{frame_row, star_row};
     use super::*;
     use parquet::file::reader::{FileReader, SerializedFileReader};
     use parquet::record::RowAccessor;
-    use starpipe::study::validation::{FrameRecord, StarRecord};
+
+    /// A frame of which only what is required is known.
+    fn frame_row(frame: u64) -> FrameRecord {
+        let json = serde_json::json!({
+            "frame": frame, "seed": u64::MAX - frame, "ra_deg": 12.5, "dec_deg": -3.25, "up_pa_deg": 170.0,
+            "status": "right", "stars_above_limit": 40, "detected": 41, "rejected": 0, "named": 39, "misnamed": 0,
+            "misnamed_companions": 0, "false_detections": 1, "blends": 0, "star_rows": 1,
+            "predicted_limit_vmag": 7.0, "true_background_adu": 100.0, "true_noise_adu": 5.0,
+        });
+        serde_json::from_value(json).unwrap()
+    }
+
+    /// A false detection.
+    fn star_row(frame: u64) -> StarRecord {
+        let json =
+            serde_json::json!({"frame": frame, "kind": "false", "detected": false, "named": "no"});
+        serde_json::from_value(json).unwrap()
+    }
 
     #[test]
     fn what_is_written_is_read_again_and_nothing_is_left_beside_it() {

@@ -1,8 +1,8 @@
-//! One run: its frames, as many as are not there yet, and what they say together.
+//! One run: simulates and processes the missing frames, and summarizes all of them.
 
 use super::figures;
-use super::tables::{Lines, Tables};
-use super::{Shared, identity};
+use super::parquet::Parts;
+use super::shared::{Shared, remove_outdated};
 use crate::cli::batch::for_each_ordered;
 use crate::cli::exit::CommandError;
 use crate::cli::output::files::write_whole;
@@ -10,32 +10,30 @@ use crate::cli::plot::FigureForm;
 use anyhow::Context;
 use serde::Serialize;
 use starpipe::pipeline::Workspace;
-use starpipe::study::validation::{
-    Accumulator, Protocol, RunFacts, Summary, ValidationError, Validator,
+use starpipe::study::validation::store::{
+    FRAMES_PER_PART, FrameLines, RunTables, StoreError, claim_directory,
 };
+use starpipe::study::validation::{Protocol, Summary, ValidationError, Validator};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Frames are handed out in portions of so many: those of a part of the Parquet tables.
-const PORTION: u64 = super::parquet::FRAMES_PER_PART;
-
-/// What an earlier, shorter run may have left, and what says that a run has ended.
+/// Files of a complete run. An incomplete one has none of them.
 const RESULTS: [&str; 2] = ["summary.json", "summary.txt"];
 
-/// How long the frames of this start took. It differs from run to run, and is kept apart from what does not.
+/// How long the frames of this start took. It differs from start to start, so it has a file of its own.
 #[derive(Debug, Default, Serialize)]
 struct Timing {
     frames: u64,
     threads: usize,
     wall_s: f64,
     frames_per_s: f64,
-    /// On one thread, on average over the frames.
+    /// On one thread, mean over the frames.
     simulate_ms: f64,
     process_ms: f64,
 }
 
-/// Does what is left to do of a run of so many frames in `directory`, and sums it up.
+/// Completes the run in `directory` and summarizes it.
 pub(super) fn run(
     directory: &Path,
     protocol: &Protocol,
@@ -47,8 +45,9 @@ pub(super) fn run(
         }
         other => CommandError::Failed(other.into()),
     })?;
-    identity::claim(directory, protocol, shared.indexed.catalog())?;
-    let mut tables = Tables::open(directory, |number| validator.draw(number).0)?;
+    claim_directory(directory, protocol, shared.indexed.catalog()).map_err(claim_error)?;
+    let mut tables = RunTables::open(directory, |number| validator.draw(number).0)
+        .map_err(anyhow::Error::from)?;
     let done = tables.done();
     if done > shared.frames {
         return Err(CommandError::Usage(format!(
@@ -57,72 +56,72 @@ pub(super) fn run(
             shared.frames
         )));
     }
+    let mut parts = Parts::new(directory);
     shared.progress.inc(done);
     shared.progress.reset_eta();
     if done < shared.frames {
-        if done > 0 {
-            shared.tell(format_args!(
-                "going on in {} after {done} frames",
-                directory.display()
-            ));
-        }
-        remove_results(directory)?;
-        tables.remove_unfinished_part()?;
-        let timing = simulate(&validator, &mut tables, shared)?;
-        let text = serde_json::to_string_pretty(&timing).context("writing JSON")? + "\n";
-        write_whole(&[(directory.join("timing.json"), text.into_bytes())])?;
-        shared.tell(format_args!(
-            "{} frames in {:.1} s, {:.1} frames a second; {:.1} ms to simulate one, {:.1} ms to process it",
-            timing.frames,
-            timing.wall_s,
-            timing.frames_per_s,
-            timing.simulate_ms,
-            timing.process_ms
-        ));
+        complete(directory, &validator, &mut tables, &mut parts, shared)?;
     }
-    tables.write_parts(true)?;
-    let summary = summed_up(&validator, protocol, &tables)?;
+    parts.write_all(&tables)?;
+    let summary = tables
+        .summary(validator.facts(), validator.limit_vmag())
+        .map_err(anyhow::Error::from)?;
     save(directory, &summary, shared.figures)?;
     Ok(summary)
 }
 
-/// Simulates and processes the frames that are left, and adds them to the tables.
-fn simulate(validator: &Validator, tables: &mut Tables, shared: &Shared) -> anyhow::Result<Timing> {
+/// A directory that holds something else is an error of the command line.
+fn claim_error(error: StoreError) -> CommandError {
+    match error {
+        StoreError::OtherRun { .. } | StoreError::UnknownRun { .. } => {
+            CommandError::Usage(format!("{error}; choose another directory for --out"))
+        }
+        other => CommandError::Failed(other.into()),
+    }
+}
+
+/// Simulates and processes the missing frames, and reports how long it took.
+fn complete(
+    directory: &Path,
+    validator: &Validator,
+    tables: &mut RunTables,
+    parts: &mut Parts,
+    shared: &Shared,
+) -> anyhow::Result<()> {
+    let done = tables.done();
+    if done > 0 {
+        let directory = directory.display();
+        shared.report(format_args!("going on in {directory} after {done} frames"));
+    }
+    for name in RESULTS {
+        remove_outdated(&directory.join(name))?;
+    }
+    parts.remove_unfinished(tables)?;
+    let timing = simulate(validator, tables, parts, shared)?;
+    let text = serde_json::to_string_pretty(&timing).context("writing JSON")? + "\n";
+    write_whole(&[(directory.join("timing.json"), text.into_bytes())])?;
+    shared.report(format_args!(
+        "{} frames in {:.1} s, {:.1} frames a second; {:.1} ms to simulate one, {:.1} ms to process it",
+        timing.frames, timing.wall_s, timing.frames_per_s, timing.simulate_ms, timing.process_ms
+    ));
+    Ok(())
+}
+
+/// Simulates and processes the missing frames, part by part, and adds them to the tables.
+fn simulate(
+    validator: &Validator,
+    tables: &mut RunTables,
+    parts: &mut Parts,
+    shared: &Shared,
+) -> anyhow::Result<Timing> {
     let start = Instant::now();
     let mut timing = Timing {
         threads: shared.pool.current_num_threads(),
         ..Timing::default()
     };
     while tables.done() < shared.frames {
-        let from = tables.done();
-        let to = ((from / PORTION + 1) * PORTION).min(shared.frames);
-        let numbers: Vec<u64> = (from..to).collect();
-        let work = |number: &u64, workspace: &mut Workspace| -> anyhow::Result<_> {
-            let trial = validator.run_one(*number, workspace)?;
-            let lines = Lines::new(&trial.frame, &trial.stars)?;
-            Ok((lines, trial.simulate_ms, trial.process_ms))
-        };
-        let mut failed = None;
-        for_each_ordered(shared.pool, &numbers, Workspace::new, work, |_, done| {
-            let added = done.and_then(|(lines, simulate_ms, process_ms)| {
-                timing.simulate_ms += simulate_ms;
-                timing.process_ms += process_ms;
-                timing.frames += 1;
-                tables.add(&lines)
-            });
-            shared.progress.inc(1);
-            match added {
-                Ok(()) => ControlFlow::Continue(()),
-                Err(error) => {
-                    failed = Some(error);
-                    ControlFlow::Break(())
-                }
-            }
-        });
-        if let Some(error) = failed {
-            return Err(error);
-        }
-        tables.write_parts(false)?;
+        simulate_part(validator, tables, shared, &mut timing)?;
+        parts.write_whole(tables)?;
     }
     let frames = timing.frames as f64;
     timing.wall_s = start.elapsed().as_secs_f64();
@@ -132,54 +131,50 @@ fn simulate(validator: &Validator, tables: &mut Tables, shared: &Shared) -> anyh
     Ok(timing)
 }
 
-/// What all rows say together: read again from the tables, so that it cannot depend on how often the run was interrupted.
-fn summed_up(
+/// Simulates and processes the missing frames of one part.
+fn simulate_part(
     validator: &Validator,
-    protocol: &Protocol,
-    tables: &Tables,
-) -> anyhow::Result<Summary> {
-    let sheet = &protocol.setup.scenario.camera;
-    let facts = RunFacts {
-        camera: sheet.name.clone(),
-        width_px: sheet.width_px,
-        height_px: sheet.height_px,
-        seed: protocol.seed,
-        scale_known: protocol.scale_known,
-        false_alarms_per_mpx: protocol.setup.scenario.conditions.false_alarms_per_mpx,
+    tables: &mut RunTables,
+    shared: &Shared,
+    timing: &mut Timing,
+) -> anyhow::Result<()> {
+    let first = tables.done();
+    let end = ((first / FRAMES_PER_PART + 1) * FRAMES_PER_PART).min(shared.frames);
+    let numbers: Vec<u64> = (first..end).collect();
+    let work = |number: &u64, workspace: &mut Workspace| -> anyhow::Result<_> {
+        let trial = validator.run_one(*number, workspace)?;
+        let lines = FrameLines::new(&trial.frame, &trial.stars)?;
+        Ok((lines, trial.simulate_ms, trial.process_ms))
     };
-    let mut accumulator = Accumulator::new(facts, validator.limit_vmag());
-    for frame in tables.frames()? {
-        accumulator.add_frame(&frame?);
-    }
-    for star in tables.stars()? {
-        accumulator.add_star(&star?);
-    }
-    Ok(accumulator.finish())
-}
-
-fn remove_results(directory: &Path) -> anyhow::Result<()> {
-    for name in RESULTS {
-        let path = directory.join(name);
-        match std::fs::remove_file(&path) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                return Err(error)
-                    .with_context(|| format!("removing {}, which is out of date", path.display()));
+    let mut result = Ok(());
+    for_each_ordered(shared.pool, &numbers, Workspace::new, work, |_, done| {
+        shared.progress.inc(1);
+        let added = done.and_then(|(lines, simulate_ms, process_ms)| {
+            timing.simulate_ms += simulate_ms;
+            timing.process_ms += process_ms;
+            timing.frames += 1;
+            Ok(tables.add(&lines)?)
+        });
+        match added {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(error) => {
+                result = Err(error);
+                ControlFlow::Break(())
             }
-            _ => (),
         }
-    }
-    Ok(())
+    });
+    result
 }
 
-/// Writes the summary, for programs and for people, and its figures.
+/// Writes the summary as JSON and text, and its figures.
 fn save(directory: &Path, summary: &Summary, form: FigureForm) -> anyhow::Result<()> {
     let json = serde_json::to_string_pretty(summary).context("writing JSON")? + "\n";
-    let [for_programs, for_people] = RESULTS.map(|name| directory.join(name));
     let mut files: Vec<(PathBuf, Vec<u8>)> = figures::of_run(summary, form)?
         .into_iter()
         .map(|(name, content)| (directory.join(name), content))
         .collect();
-    files.push((for_programs, json.into_bytes()));
-    files.push((for_people, summary.to_text().into_bytes()));
+    for (name, text) in RESULTS.into_iter().zip([json, summary.to_text()]) {
+        files.push((directory.join(name), text.into_bytes()));
+    }
     write_whole(&files)
 }

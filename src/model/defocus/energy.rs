@@ -64,6 +64,17 @@ const MATCH_PX: f64 = 2.0;
 const MATCH_SIGMAS: f64 = 1.0;
 
 impl EnergyStudy {
+    /// A star of V magnitude `v_mag`: 400 trials, Gaussian fits, windows of 15 pixels.
+    pub fn new(scenario: Scenario, v_mag: f64) -> Self {
+        Self {
+            scenario,
+            v_mag,
+            centroiding: Centroiding::GaussianFit,
+            half_window_px: 7,
+            trials: 400,
+        }
+    }
+
     /// The scenario with this spot in pixels, and this noise of reading in electrons.
     pub fn scenario_of(&self, spot_px: f64, noise_e: f64) -> Scenario {
         let mut scenario = self.scenario.clone();

@@ -1,5 +1,6 @@
 //! The grid of spot radii and noises, and the errors of centroids on it.
 
+use crate::model::sensitivity::Spacing;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -14,6 +15,24 @@ pub struct Grid {
     /// Noises, rising: parts of full scale, or electrons.
     #[doc(alias = "sigma_g")]
     pub noises: Vec<f64>,
+}
+
+impl Grid {
+    /// Radii and noises of the paper, as parts of full scale.
+    pub fn of_paper() -> Self {
+        Self {
+            spots_px: Spacing::Linear.values(0.4, 2.4, 200),
+            noises: Spacing::Linear.values(2e-4, 20e-4, 100),
+        }
+    }
+
+    /// Radii of usual lenses, and noises from a quarter to four times `noise_e` electrons.
+    pub fn around(noise_e: f64) -> Self {
+        Self {
+            spots_px: Spacing::Linear.values(0.2, 2.4, 45),
+            noises: Spacing::Log.values(0.25 * noise_e, 4.0 * noise_e, 9),
+        }
+    }
 }
 
 /// The error of the centroid at one radius and one noise.

@@ -28,8 +28,10 @@ mod figures;
 mod light;
 mod parameters;
 mod prediction;
+mod rows;
 mod star_light;
 mod sweep;
+mod text;
 
 pub use budget::{Band, Budget};
 pub use completeness::{Detector, Rule};
@@ -42,5 +44,6 @@ pub use figures::Figure;
 pub use light::temperature_k_of;
 pub use parameters::{CONDITION_KEYS, Parameter, UnknownParameter, title_of};
 pub use prediction::{CompletenessPoint, DetectorReport, Prediction};
+pub use rows::{PredictionError, PredictionRow, PredictionTableRow, SweptValue};
 pub use star_light::StarLight;
 pub use sweep::{Curve, Series, Spacing, Sweep, SweepError, curves};

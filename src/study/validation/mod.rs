@@ -20,12 +20,15 @@
 
 mod judge;
 mod light;
+mod parameter_study;
 mod record;
 mod spot;
+pub mod store;
 mod summary;
 mod text;
 
 pub use light::Light;
+pub use parameter_study::{StudyParameter, StudyRow};
 pub use record::{FrameRecord, Kind, Named, StarRecord};
 pub use summary::{
     Accumulator, AttitudeSummary, CentroidBin, CentroidSummary, CompletenessBin,
@@ -163,6 +166,19 @@ impl<'a> Validator<'a> {
     /// V magnitude at which half of the stars should be detected.
     pub fn limit_vmag(&self) -> f64 {
         self.detector.vmag_at(0.5)
+    }
+
+    /// What a summary says of the run besides what is in its tables.
+    pub fn facts(&self) -> RunFacts {
+        let scenario = &self.protocol.setup.scenario;
+        RunFacts {
+            camera: scenario.camera.name.clone(),
+            width_px: scenario.camera.width_px,
+            height_px: scenario.camera.height_px,
+            seed: self.protocol.seed,
+            scale_known: self.protocol.scale_known,
+            false_alarms_per_mpx: scenario.conditions.false_alarms_per_mpx,
+        }
     }
 
     /// The seed of the random numbers in the pixels of the frame with this number, and its attitude.

@@ -1,15 +1,19 @@
-//! A figure with more pixels: letters and lines of one unit are drawn with several.
+//! A backend with several pixels for each unit, so that PNG figures are sharp.
+//!
+//! Everything is drawn in the units of the SVG figure, so that both are the same picture. Larger
+//! letters alone would not do: lines, dots, margins and panels would have to grow with them, each in
+//! its place. Rendering the SVG would need an SVG renderer, which is larger than starpipe.
 
 use plotters::style::{FontDesc, RGBAColor, TextStyle};
 use plotters_backend::{
     BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind,
 };
 
-/// Pixels in a unit.
+/// Pixels in a unit, on either axis.
 pub(super) const FACTOR: u32 = 2;
 
-/// Draws on `B` with [`FACTOR`] pixels for each unit.
-pub(super) struct Finer<B>(pub(super) B);
+/// Draws on the backend `B` with [`FACTOR`] pixels for each unit.
+pub(super) struct Scaled<B>(pub(super) B);
 
 type Drawn<B> = Result<(), DrawingErrorKind<<B as DrawingBackend>::ErrorType>>;
 
@@ -28,18 +32,18 @@ impl BackendStyle for Style {
     }
 }
 
-fn finer_style(style: &impl BackendStyle) -> Style {
+fn scaled_style(style: &impl BackendStyle) -> Style {
     Style {
         color: style.color(),
         stroke_width: style.stroke_width() * FACTOR,
     }
 }
 
-fn finer((x, y): BackendCoord) -> BackendCoord {
+fn scaled((x, y): BackendCoord) -> BackendCoord {
     (x * FACTOR as i32, y * FACTOR as i32)
 }
 
-impl<B: DrawingBackend> DrawingBackend for Finer<B> {
+impl<B: DrawingBackend> DrawingBackend for Scaled<B> {
     type ErrorType = B::ErrorType;
 
     fn get_size(&self) -> (u32, u32) {
@@ -56,9 +60,9 @@ impl<B: DrawingBackend> DrawingBackend for Finer<B> {
     }
 
     fn draw_pixel(&mut self, point: BackendCoord, color: BackendColor) -> Drawn<B> {
-        let next = finer((point.0 + 1, point.1 + 1));
+        let next = scaled((point.0 + 1, point.1 + 1));
         let last = (next.0 - 1, next.1 - 1);
-        self.0.draw_rect(finer(point), last, &color, true)
+        self.0.draw_rect(scaled(point), last, &color, true)
     }
 
     fn draw_line<S: BackendStyle>(
@@ -77,8 +81,8 @@ impl<B: DrawingBackend> DrawingBackend for Finer<B> {
         style: &S,
         fill: bool,
     ) -> Drawn<B> {
-        let (from, to) = (finer(upper_left), finer(bottom_right));
-        self.0.draw_rect(from, to, &finer_style(style), fill)
+        let (from, to) = (scaled(upper_left), scaled(bottom_right));
+        self.0.draw_rect(from, to, &scaled_style(style), fill)
     }
 
     fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
@@ -87,7 +91,7 @@ impl<B: DrawingBackend> DrawingBackend for Finer<B> {
         style: &S,
     ) -> Drawn<B> {
         self.0
-            .draw_path(path.into_iter().map(finer), &finer_style(style))
+            .draw_path(path.into_iter().map(scaled), &scaled_style(style))
     }
 
     fn draw_circle<S: BackendStyle>(
@@ -97,9 +101,9 @@ impl<B: DrawingBackend> DrawingBackend for Finer<B> {
         style: &S,
         fill: bool,
     ) -> Drawn<B> {
-        let style = finer_style(style);
+        let style = scaled_style(style);
         self.0
-            .draw_circle(finer(center), radius * FACTOR, &style, fill)
+            .draw_circle(scaled(center), radius * FACTOR, &style, fill)
     }
 
     fn fill_polygon<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
@@ -107,7 +111,7 @@ impl<B: DrawingBackend> DrawingBackend for Finer<B> {
         corners: I,
         style: &S,
     ) -> Drawn<B> {
-        self.0.fill_polygon(corners.into_iter().map(finer), style)
+        self.0.fill_polygon(corners.into_iter().map(scaled), style)
     }
 
     fn draw_text<T: BackendTextStyle>(
@@ -121,6 +125,6 @@ impl<B: DrawingBackend> DrawingBackend for Finer<B> {
         let BackendColor { rgb, alpha } = style.color();
         let color = RGBAColor(rgb.0, rgb.1, rgb.2, alpha);
         let style = TextStyle::from(font).color(&color).pos(style.anchor());
-        self.0.draw_text(text, &style, finer(place))
+        self.0.draw_text(text, &style, scaled(place))
     }
 }

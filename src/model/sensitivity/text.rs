@@ -1,118 +1,113 @@
-//! Predictions for people: the budget, quantity by quantity with the paper's symbols, or a sweep as a table.
+//! Predictions as text for people: the budget with the paper's symbols, or a table for each sweep.
 
-use super::Row;
-use starpipe::base::format::{five_digits as number, printable};
-use starpipe::model::sensitivity::{Budget, DetectorReport, Prediction, Reading, Scenario};
+use super::budget::Budget;
+use super::conditions::Reading;
+use super::faintest::Faintest;
+use super::prediction::{DetectorReport, Prediction};
+use super::rows::PredictionRow;
+use crate::base::format::{five_digits, printable};
 use std::fmt::Write as _;
 
-/// A quantity: symbol, words, value, unit.
+/// A quantity: symbol, description, value, unit.
 type Line = (&'static str, &'static str, f64, &'static str);
 
-pub(super) fn rendered(rows: &[Row]) -> String {
-    let Some(first) = rows.first() else {
-        return String::new();
-    };
-    match first.swept {
-        None => budget(first),
-        Some(_) => heading(first) + &sweeps(rows),
-    }
-}
-
-fn heading(row: &Row) -> String {
-    let reading = words_of(row.prediction.reading);
-    let preset = row.preset.map_or(String::new(), |name| format!("{name}: "));
-    printable(&format!("{preset}{}, {reading}", row.prediction.camera)) + "\n"
-}
-
-fn words_of(reading: Reading) -> &'static str {
-    match reading {
-        Reading::Paper => "the paper's reading",
-        Reading::Physical => "physical reading",
-    }
-}
-
-/// What the figures are of, in lines.
-pub(super) fn caption(scenario: &Scenario) -> Vec<String> {
-    let limit_vmag = Budget::new(scenario).limit_vmag;
-    vec![
-        scenario.camera.name.clone(),
-        words_of(scenario.reading).to_owned(),
-        format!(
-            "dot: exposure {} s, aperture {} mm,",
-            number(scenario.conditions.exposure_s),
-            number(scenario.camera.aperture_mm),
-        ),
-        format!("limit V {limit_vmag:.2}"),
-    ]
-}
-
-fn budget(row: &Row) -> String {
-    let prediction = &row.prediction;
-    let mut text = heading(row);
-    let _ = writeln!(
-        text,
-        "  limit  V {:.2}: its brightest pixel has {} times the noise",
-        prediction.limit_vmag,
-        number(prediction.snr),
-    );
-    for (title, lines) in [
-        ("camera", camera(prediction)),
-        ("conditions", conditions(prediction)),
-        ("on the way", on_the_way(&prediction.budget)),
-        ("noise of the brightest pixel", noise(&prediction.budget)),
-        ("the faintest star", faintest(&prediction.budget)),
-    ] {
-        let _ = writeln!(text, "\n  {title}");
-        for (symbol, words, value, unit) in lines {
-            let line = format!("    {symbol:<5} {words:<55} {:>13} {unit}", number(value));
-            let _ = writeln!(text, "{}", line.trim_end());
+impl Reading {
+    /// The reading in words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Paper => "the paper's reading",
+            Self::Physical => "physical reading",
         }
     }
-    text + &detectors(row)
+}
+
+impl PredictionRow {
+    /// `rows` as text of several lines, each with its end: the budget of one scenario, or tables of
+    /// sweeps.
+    pub fn to_text(rows: &[Self]) -> String {
+        match rows {
+            [] => String::new(),
+            [row, ..] if row.swept.is_none() => row.heading_text() + &row.budget_text(),
+            [first, ..] => first.heading_text() + &sweeps_text(rows),
+        }
+    }
+
+    fn heading_text(&self) -> String {
+        let prediction = &self.prediction;
+        let preset = self
+            .preset
+            .map_or(String::new(), |name| format!("{name}: "));
+        let reading = prediction.reading.words();
+        printable(&format!("{preset}{}, {reading}", prediction.camera)) + "\n"
+    }
+
+    fn budget_text(&self) -> String {
+        let prediction = &self.prediction;
+        let mut text = format!(
+            "  limit  V {:.2}: its brightest pixel has {} times the noise\n",
+            prediction.limit_vmag,
+            five_digits(prediction.snr),
+        );
+        for (title, lines) in [
+            ("camera", camera(prediction)),
+            ("conditions", conditions(prediction)),
+            ("on the way", on_the_way(&prediction.budget)),
+            ("noise of the brightest pixel", noise(&prediction.budget)),
+            ("the faintest star", faintest_star(&prediction.budget)),
+        ] {
+            let _ = writeln!(text, "\n  {title}");
+            for (symbol, description, value, unit) in lines {
+                let value = five_digits(value);
+                let line = format!("    {symbol:<5} {description:<55} {value:>13} {unit}");
+                let _ = writeln!(text, "{}", line.trim_end());
+            }
+        }
+        text += &detectors_text(&prediction.peak_pixel, &prediction.detector);
+        text + &self
+            .faintest
+            .as_ref()
+            .map_or_else(String::new, faintest_text)
+    }
 }
 
 /// What is found of the stars, by both rules.
-fn detectors(row: &Row) -> String {
-    let prediction = &row.prediction;
-    let (peak, filter) = (&prediction.peak_pixel, &prediction.detector);
+fn detectors_text(peak: &DetectorReport, filter: &DetectorReport) -> String {
     let mut text = format!(
         "\n  {:<37} {:>20} {:>20}\n",
         "what is found", "brightest pixel", "starpipe's filter"
     );
     let v_mag = |v_mag: Option<f64>| v_mag.map_or("none".to_owned(), |v_mag| format!("{v_mag:.2}"));
-    let lines = |d: &DetectorReport| {
+    let values = |d: &DetectorReport| {
         [
             v_mag(d.limit50_vmag),
             v_mag(d.limit90_vmag),
-            number(d.threshold_sigma),
-            number(d.false_alarms_per_mpx),
+            five_digits(d.threshold_sigma),
+            five_digits(d.false_alarms_per_mpx),
         ]
     };
-    let words = [
+    let names = [
         "half of the stars at V",
         "nine in ten at V",
         "threshold, in standard deviations",
         "false detections in a million pixels",
     ];
-    for ((words, peak), filter) in words.iter().zip(lines(peak)).zip(lines(filter)) {
-        let _ = writeln!(text, "    {words:<36} {peak:>19} {filter:>20}");
-    }
-    if let Some(faintest) = &row.faintest {
-        let expected = format!("{:.2} ± {:.2}", faintest.mean_vmag, faintest.sigma_mag);
-        let found = number((faintest.stars_found * 10.0).round() / 10.0);
-        let _ = writeln!(
-            text,
-            "    {:<36} {:>40}\n    {:<36} {:>40}",
-            "catalogue's stars found in the field",
-            found,
-            "faintest of them to be expected at V",
-            expected
-        );
+    for ((name, peak), filter) in names.iter().zip(values(peak)).zip(values(filter)) {
+        let _ = writeln!(text, "    {name:<36} {peak:>19} {filter:>20}");
     }
     text
 }
 
-fn given(
+fn faintest_text(faintest: &Faintest) -> String {
+    let found = five_digits((faintest.stars_found * 10.0).round() / 10.0);
+    let expected = format!("{:.2} ± {:.2}", faintest.mean_vmag, faintest.sigma_mag);
+    format!(
+        "    {:<36} {found:>40}\n    {:<36} {expected:>40}\n",
+        "catalogue's stars found in the field", "faintest of them to be expected at V",
+    )
+}
+
+/// Lines of parameters, by their names.
+fn parameters(
     prediction: &Prediction,
     lines: &[(&'static str, &'static str, &str, &'static str)],
 ) -> Vec<Line> {
@@ -129,7 +124,7 @@ fn given(
 }
 
 fn camera(prediction: &Prediction) -> Vec<Line> {
-    given(
+    parameters(
         prediction,
         &[
             ("D", "aperture", "aperture_mm", "mm"),
@@ -149,7 +144,7 @@ fn camera(prediction: &Prediction) -> Vec<Line> {
 }
 
 fn conditions(prediction: &Prediction) -> Vec<Line> {
-    given(
+    parameters(
         prediction,
         &[
             ("T", "exposure", "exposure_s", "s"),
@@ -248,7 +243,7 @@ fn noise(budget: &Budget) -> Vec<Line> {
     ]
 }
 
-fn faintest(budget: &Budget) -> Vec<Line> {
+fn faintest_star(budget: &Budget) -> Vec<Line> {
     let below = budget.star_illuminance_ground_lx;
     vec![
         (
@@ -275,34 +270,36 @@ fn faintest(budget: &Budget) -> Vec<Line> {
 }
 
 /// One table for each parameter that is swept.
-fn sweeps(rows: &[Row]) -> String {
+fn sweeps_text(rows: &[PredictionRow]) -> String {
+    let parameter = |row: &PredictionRow| row.swept.map(|swept| swept.parameter);
     let mut text = String::new();
     for rows in rows.chunk_by(|a, b| parameter(a) == parameter(b)) {
-        let name = parameter(&rows[0]);
+        let name = parameter(&rows[0]).unwrap_or_default();
         let _ = writeln!(
             text,
             "\n  {name:>26}  {:>7}  {:>7}  {:>10}  {:>12}  {:>10}  {:>8}",
             "limit", "filter", "star e", "background e", "noise e", "airmass"
         );
         for row in rows {
-            let prediction = &row.prediction;
-            let filter = prediction.detector.limit50_vmag;
-            let _ = writeln!(
-                text,
-                "  {:>26}  {:>7.3}  {:>7}  {:>10}  {:>12}  {:>10}  {:>8}",
-                number(row.swept.map_or(f64::NAN, |swept| swept.value)),
-                prediction.limit_vmag,
-                filter.map_or("none".to_owned(), |limit| format!("{limit:.3}")),
-                number(prediction.star_e),
-                number(prediction.background_e),
-                number(prediction.noise_e),
-                number(prediction.airmass),
-            );
+            text += &row.sweep_line();
         }
     }
     text
 }
 
-fn parameter(row: &Row) -> &'static str {
-    row.swept.map_or("", |swept| swept.parameter)
+impl PredictionRow {
+    fn sweep_line(&self) -> String {
+        let prediction = &self.prediction;
+        let filter = prediction.detector.limit50_vmag;
+        format!(
+            "  {:>26}  {:>7.3}  {:>7}  {:>10}  {:>12}  {:>10}  {:>8}\n",
+            five_digits(self.swept.map_or(f64::NAN, |swept| swept.value)),
+            prediction.limit_vmag,
+            filter.map_or("none".to_owned(), |limit| format!("{limit:.3}")),
+            five_digits(prediction.star_e),
+            five_digits(prediction.background_e),
+            five_digits(prediction.noise_e),
+            five_digits(prediction.airmass),
+        )
+    }
 }

@@ -1,22 +1,22 @@
-//! Which run a directory holds: all that its tables follow from.
+//! `run.json`: which run a directory holds, by all that its tables depend on.
 
-use crate::cli::exit::CommandError;
-use crate::cli::output::files::write_whole;
-use anyhow::Context;
+use super::error::StoreError;
+use crate::base::files;
+use crate::camera::data_sheet::Response;
+use crate::model::sensitivity::Reading;
+use crate::model::simulate::Parameter;
+use crate::sky::catalog::Catalog;
+use crate::study::validation::Protocol;
 use serde::Serialize;
 use serde_json::{Map, Value};
-use starpipe::camera::data_sheet::Response;
-use starpipe::model::sensitivity::Reading;
-use starpipe::model::simulate::Parameter;
-use starpipe::sky::catalog::Catalog;
-use starpipe::study::validation::Protocol;
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 
-/// The file that tells.
 const FILE: &str = "run.json";
-/// Version of the tables and of this file.
+/// Version of the tables and of `run.json`.
 const SCHEMA: u32 = 1;
+/// Files that a run writes.
+const TABLES: [&str; 4] = ["frames.csv", "stars.csv", "frames.parquet", "stars.parquet"];
 
 #[derive(Serialize)]
 struct Identity<'a> {
@@ -29,7 +29,7 @@ struct Identity<'a> {
     spot_form: &'a str,
     mirrored: bool,
     parameters: Map<String, Value>,
-    /// Wavelengths in nm and values, of curves.
+    /// Wavelengths in nm and values, if it is a curve.
     lens_transmission_curve: Option<&'a [(f64, f64)]>,
     quantum_efficiency_curve: Option<&'a [(f64, f64)]>,
     catalog: CatalogIdentity<'a>,
@@ -42,44 +42,50 @@ struct CatalogIdentity<'a> {
     checksum: String,
 }
 
-/// Makes `directory` that of this run, or goes on with it where it already is.
-pub(super) fn claim(
+/// Makes `directory` that of a run. One that already holds this very run is continued.
+///
+/// # Errors
+/// [`StoreError::OtherRun`], [`StoreError::UnknownRun`], [`StoreError::File`], [`StoreError::Json`].
+pub fn claim_directory(
     directory: &Path,
     protocol: &Protocol,
     catalog: &Catalog,
-) -> Result<(), CommandError> {
+) -> Result<(), StoreError> {
     std::fs::create_dir_all(directory)
-        .with_context(|| format!("making the directory {}", directory.display()))?;
+        .map_err(StoreError::file("making the directory", directory))?;
     let path = directory.join(FILE);
-    let wanted = identity(protocol, catalog)?;
-    let text = match std::fs::read_to_string(&path) {
-        Ok(text) => text,
-        Err(error) if error.kind() == ErrorKind::NotFound => {
-            refuse_foreign_tables(directory)?;
-            let text = serde_json::to_string_pretty(&wanted).context("writing JSON")? + "\n";
-            return Ok(write_whole(&[(path, text.into_bytes())])?);
-        }
-        Err(error) => {
-            return Err(anyhow::Error::from(error)
-                .context(format!("reading {}", path.display()))
-                .into());
-        }
+    let json_error = |source| StoreError::Json {
+        path: path.clone(),
+        source,
     };
-    let found: Value =
-        serde_json::from_str(&text).with_context(|| format!("reading {}", path.display()))?;
+    let wanted = identity(protocol, catalog).map_err(json_error)?;
+    let text = match std::fs::read_to_string(&path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            refuse_unknown_tables(directory)?;
+            return write(&path, &wanted).map_err(StoreError::file("writing", &path));
+        }
+        read => read.map_err(StoreError::file("reading", &path))?,
+    };
+    let found: Value = serde_json::from_str(&text).map_err(json_error)?;
     let mut differences = Vec::new();
     compare("", &found, &wanted, &mut differences);
     if differences.is_empty() {
         return Ok(());
     }
-    Err(CommandError::Usage(format!(
-        "{} holds another run: {}; choose another directory for --out",
-        directory.display(),
-        differences.join(", ")
-    )))
+    Err(StoreError::OtherRun {
+        directory: directory.to_owned(),
+        differences: differences.join(", "),
+    })
 }
 
-fn identity(protocol: &Protocol, catalog: &Catalog) -> anyhow::Result<Value> {
+fn write(path: &Path, identity: &Value) -> io::Result<()> {
+    let mut file = files::beside(path)?;
+    file.write_all(format!("{identity:#}\n").as_bytes())?;
+    file.persist(path)?;
+    Ok(())
+}
+
+fn identity(protocol: &Protocol, catalog: &Catalog) -> Result<Value, serde_json::Error> {
     let scenario = &protocol.setup.scenario;
     let imperfections = &scenario.camera.imperfections;
     let parameters = Parameter::all().filter_map(|parameter| {
@@ -104,9 +110,8 @@ fn identity(protocol: &Protocol, catalog: &Catalog) -> anyhow::Result<Value> {
             checksum: format!("{:016x}", catalog.checksum()),
         },
     };
-    // As it is read again: numbers have the same digits then.
-    let text = serde_json::to_string(&identity).context("writing JSON")?;
-    serde_json::from_str(&text).context("writing JSON")
+    // Written and read, so that numbers have the same digits as those of a file.
+    serde_json::from_str(&serde_json::to_string(&identity)?)
 }
 
 fn curve(response: &Response) -> Option<&[(f64, f64)]> {
@@ -116,17 +121,15 @@ fn curve(response: &Response) -> Option<&[(f64, f64)]> {
     }
 }
 
-/// Tables without a run that they are of are not starpipe's to write over.
-fn refuse_foreign_tables(directory: &Path) -> Result<(), CommandError> {
-    for name in ["frames.csv", "stars.csv", "frames.parquet", "stars.parquet"] {
-        if directory.join(name).exists() {
-            return Err(CommandError::Usage(format!(
-                "{} has {name} and no {FILE}, which would tell what run it is of; choose another directory for --out",
-                directory.display()
-            )));
-        }
+/// Tables of an unknown run must not be overwritten.
+fn refuse_unknown_tables(directory: &Path) -> Result<(), StoreError> {
+    match TABLES.iter().find(|name| directory.join(name).exists()) {
+        Some(&name) => Err(StoreError::UnknownRun {
+            directory: directory.to_owned(),
+            name,
+        }),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 /// Lists where two objects differ.
@@ -149,14 +152,13 @@ fn compare(name: &str, found: &Value, wanted: &Value, into: &mut Vec<String>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use starpipe::camera::data_sheet::Preset;
-    use starpipe::model::sensitivity::Scenario;
-    use starpipe::model::simulate::{Scene, Setup};
+    use crate::camera::data_sheet::Preset;
+    use crate::model::sensitivity::Scenario;
+    use crate::model::simulate::{Scene, Setup};
 
     #[test]
     fn a_directory_is_of_one_run() {
         let directory = tempfile::tempdir().unwrap();
-        let catalog = Catalog::built_in();
         let mut protocol = Protocol {
             setup: Setup {
                 scenario: Scenario::of(Preset::NanosatTracker),
@@ -165,19 +167,30 @@ mod tests {
             scale_known: true,
             seed: u64::MAX,
         };
-        let claimed = |protocol: &Protocol| match claim(directory.path(), protocol, catalog) {
-            Ok(()) => String::new(),
-            Err(CommandError::Usage(message)) => message,
-            Err(CommandError::Failed(error)) => panic!("{error:#}"),
-        };
-        assert_eq!(claimed(&protocol), "");
-        assert_eq!(claimed(&protocol), "");
+        let claim =
+            |protocol: &Protocol| claim_directory(directory.path(), protocol, Catalog::built_in());
+        claim(&protocol).unwrap();
+        claim(&protocol).unwrap();
         protocol.seed = 1;
         protocol.setup.scenario.conditions.exposure_s = 0.7;
-        let message = claimed(&protocol);
+        let message = claim(&protocol).unwrap_err().to_string();
         assert!(
             message.contains("exposure_s is 0.1 there and 0.7 here, seed is 18446744073709551615 there and 1 here"),
             "{message}"
         );
+    }
+
+    #[test]
+    fn tables_of_an_unknown_run_are_left_alone() {
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("stars.csv"), "").unwrap();
+        let error = refuse_unknown_tables(directory.path()).unwrap_err();
+        assert!(matches!(
+            error,
+            StoreError::UnknownRun {
+                name: "stars.csv",
+                ..
+            }
+        ));
     }
 }

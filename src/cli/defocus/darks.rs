@@ -1,0 +1,113 @@
+//! The noise of the user's dark frames.
+
+use crate::cli::exit::CommandError;
+use crate::cli::input::frames::{self as input, for_each_frame};
+use crate::cli::output::messages::{one_line, report_error, report_warning};
+use anyhow::{Context, anyhow};
+use starpipe::calibration::darks::{
+    DarkConfig, DarkStack, Darks, FrameStatistics, FullScaleSource,
+};
+use starpipe::camera::data_sheet::DataSheet;
+use starpipe::frame::Buffers;
+use starpipe::model::sensitivity::Scenario;
+use starpipe::study::defocus::DarkNoise;
+use std::path::PathBuf;
+
+/// Exposures that differ by more than this part have different dark currents.
+const SAME_EXPOSURE: f64 = 0.05;
+
+/// The noise of the dark frames in `paths`, at the exposure nearest to that of the scenario.
+pub(super) fn dark_noise(
+    paths: &[PathBuf],
+    scenario: Option<&Scenario>,
+    pool: &rayon::ThreadPool,
+) -> Result<DarkNoise, CommandError> {
+    let frames = named_frames(paths)?;
+    let darks = measure(&frames, scenario.map(|scenario| &scenario.camera), pool)?;
+    let wanted_s = scenario.map(|scenario| scenario.conditions.exposure_s);
+    let noise = DarkNoise::at_exposure(&darks, wanted_s);
+    if let (Some(exposure_s), Some(wanted_s)) = (noise.exposure_s, wanted_s)
+        && (exposure_s / wanted_s - 1.0).abs() > SAME_EXPOSURE
+    {
+        report_warning(format_args!(
+            "the dark frames were exposed for {exposure_s} s, the stars for {wanted_s} s: the dark current differs"
+        ));
+    }
+    Ok(noise)
+}
+
+/// Reads and measures dark frames; none may be unreadable or look like no dark frame.
+fn measure(
+    frames: &[PathBuf],
+    sheet: Option<&DataSheet>,
+    pool: &rayon::ThreadPool,
+) -> anyhow::Result<Darks> {
+    let mut stack = DarkStack::new();
+    let read = |path: &PathBuf| -> anyhow::Result<_> {
+        let frame = input::read_frame(path, None, &mut Buffers::new()).context("reading")?;
+        let statistics = FrameStatistics::of(&path.display().to_string(), &frame, None);
+        Ok((frame, statistics))
+    };
+    let unread = for_each_frame(pool, frames, read, |(frame, statistics)| {
+        Ok(stack.add(&frame, statistics)?)
+    })?;
+    if unread > 0 {
+        return Err(anyhow!(
+            "{unread} of {} dark frames could not be read",
+            frames.len()
+        ));
+    }
+    let darks = stack.measure(&DarkConfig {
+        bits: sheet.map(|sheet| (sheet.bits, FullScaleSource::Camera)),
+        gain_e_per_adu: sheet.map(|sheet| sheet.gain_e_per_adu),
+        ..DarkConfig::default()
+    })?;
+    match &darks.warnings[..] {
+        [] => Ok(darks),
+        [first] => Err(anyhow!(
+            "{first}: such frames do not show the noise of the dark"
+        )),
+        [first, others @ ..] => Err(anyhow!(
+            "{first}; {} more frames: such frames do not show the noise of the dark",
+            others.len()
+        )),
+    }
+}
+
+/// The files that paths, directories and patterns stand for.
+fn named_frames(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CommandError> {
+    let mut inputs = Vec::new();
+    for path in paths {
+        let text = path.to_string_lossy();
+        if path.exists() || input::is_stdin(path) || !text.contains(['*', '?', '[']) {
+            inputs.push(path.clone());
+        } else {
+            inputs.extend(matching(&text)?);
+        }
+    }
+    input::check(&inputs)?;
+    let (frames, errors) = input::frames(inputs);
+    match &errors[..] {
+        [] => Ok(frames),
+        [others @ .., last] => {
+            for error in others {
+                report_error(one_line(error));
+            }
+            Err(anyhow!(one_line(last)).into())
+        }
+    }
+}
+
+/// The files that match a pattern, at least one.
+fn matching(pattern: &str) -> Result<Vec<PathBuf>, CommandError> {
+    let found = glob::glob(pattern).map_err(|error| {
+        CommandError::Usage(format!("--darks '{pattern}' is no pattern: {error}"))
+    })?;
+    let found: Vec<_> = found
+        .collect::<Result<_, _>>()
+        .map_err(anyhow::Error::from)?;
+    if found.is_empty() {
+        return Err(anyhow!("{pattern}: no frame has such a name").into());
+    }
+    Ok(found)
+}

@@ -1,0 +1,71 @@
+//! Files with figures, as options name them.
+
+use super::figure::{Figure, Form};
+use super::sheet::Sheet;
+use anyhow::Context;
+use clap::ValueEnum;
+use clap::builder::{PathBufValueParser, TypedValueParser};
+use std::path::PathBuf;
+
+/// A file for one figure.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct PlotFile {
+    pub(crate) path: PathBuf,
+    form: Form,
+}
+
+impl PlotFile {
+    /// The extension of the name says what the figure is made of.
+    fn new(path: PathBuf) -> Result<Self, String> {
+        let extension = path
+            .extension()
+            .and_then(|extension| extension.to_str())
+            .unwrap_or_default();
+        let form = match extension.to_ascii_lowercase().as_str() {
+            "svg" => Form::Svg,
+            "png" => Form::Png,
+            _ => return Err("figures are .svg or .png".to_owned()),
+        };
+        Ok(Self { path, form })
+    }
+
+    /// Parses the value of an option.
+    pub(crate) fn parser() -> impl TypedValueParser<Value = Self> {
+        PathBufValueParser::new().try_map(Self::new)
+    }
+
+    /// The file and its content.
+    pub(crate) fn with(&self, figure: &impl Figure) -> anyhow::Result<(PathBuf, Vec<u8>)> {
+        Ok((self.path.clone(), figure.render(self.form)?))
+    }
+}
+
+/// What the figures of a command are drawn as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FigureForm {
+    /// Lines and letters
+    Svg,
+    /// Pixels
+    Png,
+    /// Not at all
+    None,
+}
+
+/// Names and contents of the files with `sheets`.
+pub(crate) fn figure_files(
+    sheets: Vec<(&str, Sheet)>,
+    form: FigureForm,
+) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
+    let (form, extension) = match form {
+        FigureForm::Svg => (Form::Svg, "svg"),
+        FigureForm::Png => (Form::Png, "png"),
+        FigureForm::None => return Ok(Vec::new()),
+    };
+    let file = |(name, sheet): (&str, Sheet)| {
+        let drawing = sheet
+            .render(form)
+            .with_context(|| format!("drawing {name}"))?;
+        Ok((format!("{name}.{extension}"), drawing))
+    };
+    sheets.into_iter().map(file).collect()
+}

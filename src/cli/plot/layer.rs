@@ -1,0 +1,89 @@
+//! What is drawn in a panel: layers of marks of one kind and colour.
+
+use super::style::GREY;
+use plotters::style::RGBColor;
+
+/// Marks of one kind and colour.
+#[derive(Clone)]
+pub(crate) struct Layer {
+    /// Name in the legend, if it is there.
+    pub(crate) label: Option<String>,
+    pub(crate) colour: RGBColor,
+    pub(crate) marks: Marks,
+}
+
+/// x, y, and an interval of y.
+pub(crate) type Dot = (f64, f64, [f64; 2]);
+
+/// Marks at (x, y).
+#[derive(Clone)]
+pub(crate) enum Marks {
+    Line(Vec<(f64, f64)>),
+    /// Several lines.
+    Lines(Vec<Vec<(f64, f64)>>),
+    /// Dots without an interval.
+    Points(Vec<(f64, f64)>),
+    Dots(Vec<Dot>),
+    /// An interval of x, and a height.
+    Bars(Vec<([f64; 2], f64)>),
+    /// A line from side to side at each y.
+    Levels(Vec<f64>),
+    /// Rectangles with colours of their own, from left to right and then upwards.
+    Cells(Vec<Cell>),
+    /// Text centred on a place.
+    Texts(Vec<(f64, f64, String)>),
+}
+
+/// A filled rectangle.
+#[derive(Clone)]
+pub(crate) struct Cell {
+    pub(crate) x: [f64; 2],
+    pub(crate) y: [f64; 2],
+    pub(crate) colour: RGBColor,
+}
+
+impl Layer {
+    pub(crate) fn new(label: impl Into<String>, colour: RGBColor, marks: Marks) -> Self {
+        Self {
+            label: Some(label.into()),
+            colour,
+            marks,
+        }
+    }
+
+    /// Marks that are not in the legend.
+    pub(crate) fn unnamed(colour: RGBColor, marks: Marks) -> Self {
+        Self {
+            label: None,
+            colour,
+            marks,
+        }
+    }
+
+    /// Grey marks that show what is expected.
+    pub(crate) fn guide(marks: Marks) -> Self {
+        Self::unnamed(GREY, marks)
+    }
+
+    /// The points that the axes must reach.
+    pub(super) fn points(&self) -> Vec<(f64, f64)> {
+        match &self.marks {
+            Marks::Line(points) | Marks::Points(points) => points.clone(),
+            Marks::Lines(lines) => lines.concat(),
+            Marks::Dots(dots) => dots
+                .iter()
+                .flat_map(|&(x, y, [low, high])| [(x, y), (x, low), (x, high)])
+                .collect(),
+            Marks::Bars(bars) => bars
+                .iter()
+                .flat_map(|&([from, to], y)| [(from, 0.0), (to, y)])
+                .collect(),
+            Marks::Cells(cells) => cells
+                .iter()
+                .flat_map(|cell| [(cell.x[0], cell.y[0]), (cell.x[1], cell.y[1])])
+                .collect(),
+            Marks::Texts(texts) => texts.iter().map(|(x, y, _)| (*x, *y)).collect(),
+            Marks::Levels(_) => Vec::new(),
+        }
+    }
+}

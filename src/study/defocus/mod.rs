@@ -1,0 +1,30 @@
+//! How wide should a star's spot be, and how far out of focus does the lens make it?
+//!
+//! [`Plan`] → [`Plan::run`]: a [`StarStudy`] for each star → [`DefocusReport`]
+//!
+//! 1. [`Noise`]: the noise of a pixel without light, from the camera, from dark frames or from the
+//!    paper. The radii are reported for this noise.
+//! 2. [`StarStudy`]: the errors of the star's centroids over the grid of radii and noises and, with
+//!    more trials, over the radii at the noise of step 1; the curves, lines and surface through them.
+//! 3. [`DefocusReport`]: the best radius, the radii that meet each required error, and all tables,
+//!    for JSON, CSV and text.
+//!
+//! [`crate::model::defocus`] defines radius, error and noise, and the two kinds of stars.
+
+mod error;
+mod noise;
+mod plan;
+mod report;
+mod star;
+mod surface;
+mod text;
+
+pub use error::{DefocusError, NoiseError};
+pub use noise::{DarkNoise, Noise};
+pub use plan::Plan;
+pub use report::{
+    BestAtNoise, BestRadius, CurveRow, DefocusReport, GridRow, RequiredError, SpotRadius,
+    StarReport,
+};
+pub use star::{BRIGHTER_THAN_LIMIT_MAG, RadiusPoint, StarModel, StarStudy, Theory, default_v_mag};
+pub use surface::{ClosedFormReport, PaperSurface, SurfaceReport};

@@ -1,0 +1,148 @@
+//! What is studied, and how.
+
+use super::error::DefocusError;
+use super::noise::Noise;
+use super::star::{RadiusPoint, StarModel, StarStudy};
+use crate::model::defocus::{ErrorCurve, ErrorGrid, Expected, Grid, IsoLine, Lens, Surface};
+use rayon::prelude::*;
+
+/// Least number of trials at the noise of the study: the reported radii depend on them.
+const LEAST_TRIALS: usize = 1000;
+
+/// Stars, radii and noises of a study.
+pub struct Plan {
+    /// The stars, all of one kind.
+    pub stars: Vec<StarModel>,
+    /// Radii and noises.
+    pub grid: Grid,
+    /// The noise for which radii are reported.
+    pub noise: Noise,
+    /// The lens, if there is a camera.
+    pub lens: Option<Lens>,
+    /// The camera's spot radius, in pixels.
+    pub present_px: Option<f64>,
+    /// Required errors, in pixels.
+    pub required_px: Vec<f64>,
+    /// Seed of the random numbers.
+    pub seed: u64,
+}
+
+impl Plan {
+    /// Number of points that are measured: how often [`Self::run`] calls `done`.
+    pub fn point_count(&self) -> usize {
+        self.stars.len() * self.grid.spots_px.len() * (self.grid.noises.len() + 1)
+    }
+
+    /// Studies all stars on the threads of the current pool; `done` is called after each point.
+    ///
+    /// # Errors
+    /// [`DefocusError::TooFaint`], [`DefocusError::Simulate`].
+    pub fn run(&self, done: &(impl Fn() + Sync)) -> Result<Vec<StarStudy>, DefocusError> {
+        let stars = self.stars.iter();
+        stars.map(|star| self.study(star, done)).collect()
+    }
+
+    fn study(
+        &self,
+        star: &StarModel,
+        done: &(impl Fn() + Sync),
+    ) -> Result<StarStudy, DefocusError> {
+        let points = self.points(star, done)?;
+        let curve = ErrorCurve::through(points.iter().map(|at| (at.spot_px, &at.point)))
+            .ok_or_else(|| self.too_faint(star))?;
+        let errors = star.measure(self.grid.clone(), self.seed, done)?;
+        let noises = (0..self.grid.noises.len()).into_par_iter();
+        let curves: Vec<_> = noises
+            .map(|number| ErrorCurve::through(errors.at_noise(number)))
+            .collect();
+        let levels = isoline_levels_px(&errors, &self.required_px);
+        let isolines = levels
+            .par_iter()
+            .map(|&level| IsoLine::of(&errors, &curves, level))
+            .collect();
+        Ok(StarStudy {
+            star: star.clone(),
+            expected: self.expected(star),
+            surface: Surface::fit(&errors),
+            errors,
+            curves,
+            points,
+            curve,
+            isolines,
+        })
+    }
+
+    /// Measures the errors over the radius at the noise of the study.
+    fn points(
+        &self,
+        star: &StarModel,
+        done: &(impl Fn() + Sync),
+    ) -> Result<Vec<RadiusPoint>, DefocusError> {
+        let noise = self.noise.value();
+        let grid = Grid {
+            spots_px: self.grid.spots_px.clone(),
+            noises: vec![noise],
+        };
+        let precise = star.with_trials(star.trials().max(LEAST_TRIALS));
+        // Another seed: these random numbers are not those of the grid.
+        let errors = precise.measure(grid, !self.seed, done)?;
+        let points = errors.grid.spots_px.par_iter().zip(&errors.points);
+        let points = points.map(|(&spot_px, &point)| RadiusPoint {
+            spot_px,
+            point,
+            theory: star.theory(spot_px, noise),
+        });
+        Ok(points.collect())
+    }
+
+    /// The closed form over the grid, in the order of its points.
+    fn expected(&self, star: &StarModel) -> Option<Vec<Expected>> {
+        let StarModel::Peak(study) = star else {
+            return None;
+        };
+        let at_radius = |&spot_px: &f64| -> Vec<Expected> {
+            let spot = study.spot(spot_px);
+            let noises = self.grid.noises.iter();
+            noises.map(|&noise| spot.expected(noise)).collect()
+        };
+        let rows: Vec<_> = self.grid.spots_px.par_iter().map(at_radius).collect();
+        Some(rows.concat())
+    }
+
+    fn too_faint(&self, star: &StarModel) -> DefocusError {
+        let limits = self.grid.spots_px.iter().filter_map(|&spot_px| match star {
+            StarModel::Energy(study) => study.reach(spot_px, self.noise.value()).limit_vmag,
+            StarModel::Peak(_) => None,
+        });
+        DefocusError::TooFaint {
+            v_mag: star.v_mag().unwrap_or(f64::NAN),
+            limit_vmag: limits.fold(f64::NEG_INFINITY, f64::max),
+        }
+    }
+}
+
+/// Errors of which isolines are drawn, in pixels: those required, and round numbers within the errors
+/// of the grid.
+fn isoline_levels_px(errors: &ErrorGrid, required_px: &[f64]) -> Vec<f64> {
+    /// Mantissas of round numbers.
+    const ROUND: [f64; 3] = [1.0, 2.0, 5.0];
+    /// Most round numbers.
+    const MOST: usize = 6;
+    let sound = errors.points.iter().filter(|point| point.is_sound());
+    let mut sorted: Vec<f64> = sound.map(|point| point.rms_px).collect();
+    sorted.sort_by(f64::total_cmp);
+    let (Some(&least), Some(&most)) = (sorted.first(), sorted.get(sorted.len() * 19 / 20)) else {
+        return required_px.to_vec();
+    };
+    let decades = -5..2;
+    let round = decades.flat_map(|decade| ROUND.map(|mantissa| format!("{mantissa}e{decade}")));
+    let round = round.filter_map(|text| text.parse::<f64>().ok());
+    let mut levels: Vec<f64> = round
+        .filter(|level| (least..most).contains(level))
+        .collect();
+    levels.truncate(MOST);
+    levels.extend(required_px);
+    levels.sort_by(f64::total_cmp);
+    levels.dedup();
+    levels
+}

@@ -1,0 +1,169 @@
+//! The columns of the tables, in their order: name, type and value.
+
+use crate::study::robustness::Answer;
+use crate::study::validation::record::{FrameRecord, Kind, Named, StarRecord};
+use serde::{Serialize, de::DeserializeOwned};
+
+/// The value of a field of a row; none if the field is empty.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FieldValue {
+    /// A whole number. Of unsigned ones the bits.
+    Integer(Option<i64>),
+    /// A number.
+    Number(Option<f64>),
+    /// Yes or no.
+    Bool(Option<bool>),
+    /// Words.
+    Text(Option<String>),
+}
+
+/// A column of a table with rows `R`.
+pub struct Column<R> {
+    /// Its name.
+    pub name: &'static str,
+    /// The value in a row.
+    pub value: fn(&R) -> FieldValue,
+    /// An empty value of the column's type.
+    pub empty: FieldValue,
+    /// Whether some values may be empty.
+    pub is_optional: bool,
+}
+
+/// A row of a table.
+pub trait TableRow: Sized + Serialize + DeserializeOwned {
+    /// The table's name.
+    const TABLE: &'static str;
+
+    /// Its columns.
+    fn columns() -> Vec<Column<Self>>;
+}
+
+/// A type of the fields of records.
+trait Field {
+    const OPTIONAL: bool = false;
+    fn value(&self) -> FieldValue;
+    fn empty() -> FieldValue;
+}
+
+macro_rules! field {
+    ($($type:ty => $kind:ident, |$value:ident| $made:expr;)*) => {$(
+        impl Field for $type {
+            fn value(&self) -> FieldValue {
+                let $value = self;
+                FieldValue::$kind(Some($made))
+            }
+            fn empty() -> FieldValue {
+                FieldValue::$kind(None)
+            }
+        }
+    )*};
+}
+
+field! {
+    // Keeps the bits: a seed may have all 64 of them.
+    u64 => Integer, |value| value.cast_signed();
+    f64 => Number, |value| *value;
+    bool => Bool, |value| *value;
+    String => Text, |value| value.clone();
+    Answer => Text, |value| match value {
+        Answer::Right => "right",
+        Answer::Wrong => "wrong",
+        Answer::None => "none",
+    }.to_owned();
+    Kind => Text, |value| match value {
+        Kind::Star => "star",
+        Kind::Blend => "blend",
+        Kind::False => "false",
+    }.to_owned();
+    Named => Text, |value| match value {
+        Named::Right => "right",
+        Named::Wrong => "wrong",
+        Named::No => "no",
+    }.to_owned();
+}
+
+impl<T: Field> Field for Option<T> {
+    const OPTIONAL: bool = true;
+    fn value(&self) -> FieldValue {
+        self.as_ref().map_or_else(T::empty, Field::value)
+    }
+    fn empty() -> FieldValue {
+        T::empty()
+    }
+}
+
+/// An empty value of a field's type, and whether the field is optional.
+fn type_of<R, F: Field>(_: fn(&R) -> &F) -> (FieldValue, bool) {
+    (F::empty(), F::OPTIONAL)
+}
+
+macro_rules! row {
+    ($record:ty, $table:literal: $($field:ident)*) => {
+        impl TableRow for $record {
+            const TABLE: &'static str = $table;
+
+            fn columns() -> Vec<Column<Self>> {
+                vec![$({
+                    let (empty, is_optional) = type_of(|row: &Self| &row.$field);
+                    Column {
+                        name: stringify!($field),
+                        value: |row| row.$field.value(),
+                        empty,
+                        is_optional,
+                    }
+                }),*]
+            }
+        }
+    };
+}
+
+row!(FrameRecord, "frames":
+    frame seed ra_deg dec_deg up_pa_deg status reason stars_above_limit detected rejected named misnamed
+    misnamed_companions false_detections blends star_rows error_x_arcsec error_y_arcsec error_roll_arcsec sigma_x_arcsec sigma_y_arcsec
+    sigma_roll_arcsec nees focal_error_px focal_sigma_px rms_px faintest_vmag expected_faintest_vmag
+    expected_faintest_sigma_mag predicted_limit_vmag measured_limit_vmag measured_limit_sigma_mag background_adu
+    true_background_adu noise_adu true_noise_adu);
+
+row!(StarRecord, "stars":
+    frame kind id vmag bv_mag true_x_px true_y_px true_flux_e isolated saturated probability snr bound_x_px bound_y_px
+    bound_flux_e detected x_px y_px sigma_x_px sigma_y_px flux_e sigma_flux_e named);
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{frame_row, star_row};
+    use super::*;
+
+    /// The fields of a row as they are written.
+    fn fields<R: TableRow>(row: &R) -> Vec<(String, String)> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.serialize(row).unwrap();
+        let bytes = writer.into_inner().unwrap();
+        let mut reader = csv::Reader::from_reader(&bytes[..]);
+        let names = reader.headers().unwrap().clone();
+        let record = reader.records().next().unwrap().unwrap();
+        let pairs = names.iter().zip(record.iter());
+        pairs.map(|(n, v)| (n.to_owned(), v.to_owned())).collect()
+    }
+
+    fn check<R: TableRow>(row: &R) {
+        let columns = R::columns();
+        let fields = fields(row);
+        assert_eq!(fields.len(), columns.len());
+        for (column, (name, value)) in columns.iter().zip(fields) {
+            assert_eq!(column.name, name);
+            let found = match (column.value)(row) {
+                FieldValue::Integer(value) => value.map(|v| v.cast_unsigned().to_string()),
+                FieldValue::Number(value) => value.map(|v| format!("{v:?}")),
+                FieldValue::Bool(value) => value.map(|v| v.to_string()),
+                FieldValue::Text(value) => value,
+            };
+            assert_eq!(found.unwrap_or_default(), value, "{name}");
+        }
+    }
+
+    #[test]
+    fn columns_are_the_fields_of_the_rows_in_their_order() {
+        check(&frame_row(3));
+        check(&star_row(3));
+    }
+}
