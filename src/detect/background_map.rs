@@ -1,22 +1,22 @@
-//! The sky between the stars, for who wants to draw a frame or to look at it without its gradients.
+//! The background of a whole frame, to draw the frame or to subtract its gradients.
 
-use crate::detect::background::{Mesh, MeshConfig, Piece};
-use crate::detect::least_noise;
+use crate::detect::background::{Mesh, MeshConfig, Piece, sigma_floor};
 use crate::detect::pixels::View;
 use crate::frame::{Frame, MIN_SIDE_PX};
 
-/// The level of the background everywhere in a frame, without the stars.
+/// The background at every pixel of a frame, without the stars.
 #[derive(Debug, Clone)]
 pub struct BackgroundMap {
     mesh: Mesh,
-    /// The part of the frame that was measured: first column and row, columns and rows.
+    /// First column and row of the part that was measured.
     first: [usize; 2],
+    /// Its columns and rows; 0 for a frame without light.
     size: [usize; 2],
 }
 
 impl BackgroundMap {
     /// Measures the background of `frame` in cells of about `cell_px` pixels a side.
-    /// A frame without light has the level 0.
+    /// The background of a frame without light is 0.
     pub fn measure(frame: &Frame, cell_px: usize) -> Self {
         let view = View::of_live_pixels(frame);
         let mut map = Self {
@@ -28,36 +28,33 @@ impl BackgroundMap {
             map.size = [0, 0];
             return map;
         }
-        let config = MeshConfig {
-            cell_px,
-            spread_of_differences: true,
-            spread_floor: least_noise(&view),
-            is_normalised: false,
-        };
+        let config = MeshConfig::of_pixels(cell_px, sigma_floor(&view, 0.0));
         map.mesh.measure(&view, &config);
         map
     }
 
-    /// Writes the levels of the frame's row `y` into `levels`, in ADU; beyond dead borders they are held.
-    pub fn row(&self, y: usize, levels: &mut [f32]) {
+    /// Writes the background of the frame's row `y` into `row`, in ADU. Dead borders take the values next
+    /// to them.
+    pub fn row(&self, y: usize, row: &mut [f32]) {
         let ([x0, y0], [width, height]) = (self.first, self.size);
         if width == 0 {
-            return levels.fill(0.0);
+            return row.fill(0.0);
         }
         let mut pieces: Vec<Piece> = Vec::new();
         let y = y.saturating_sub(y0).min(height - 1);
         self.mesh.row_pieces(y, &mut pieces);
         for piece in &pieces {
             for x in piece.start..piece.end {
-                let level = piece.level + (x - piece.start) as f32 * piece.level_slope;
-                if let Some(place) = levels.get_mut(x0 + x) {
-                    *place = level;
+                let background =
+                    piece.background + (x - piece.start) as f32 * piece.background_slope;
+                if let Some(pixel) = row.get_mut(x0 + x) {
+                    *pixel = background;
                 }
             }
         }
-        let (left, right) = (levels[x0], levels[x0 + width - 1]);
-        levels[..x0].fill(left);
-        levels[x0 + width..].fill(right);
+        let (left, right) = (row[x0], row[x0 + width - 1]);
+        row[..x0].fill(left);
+        row[x0 + width..].fill(right);
     }
 }
 
@@ -91,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_of_one_level_has_no_background_to_speak_of() {
+    fn the_background_of_a_frame_without_light_is_zero() {
         let frame = Frame::new(10, 10, vec![7.0; 100]).unwrap();
         let mut levels = vec![1.0; 10];
         BackgroundMap::measure(&frame, 64).row(3, &mut levels);

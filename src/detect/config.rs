@@ -1,13 +1,15 @@
 //! Options of detection.
 
-/// How positions are measured.
+use crate::frame::Frame;
+
+/// How centroids are measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum CentroidMethod {
     /// Variance-weighted least-squares fit of a pixel-integrated Gaussian.
     #[default]
     GaussianFit,
-    /// Mean of the pixels' positions, weighted with their grey level above a threshold.
+    /// Mean of the pixels' positions, weighted by their grey level above a threshold.
     GreyWeighted,
 }
 
@@ -20,20 +22,20 @@ pub struct DetectConfig {
     pub threshold_sigma: Option<f64>,
     /// Standard deviation of the spot before pixel integration, in pixels; measured where `None`.
     pub spot_sigma_px: Option<f64>,
-    /// How positions are measured.
+    /// How centroids are measured.
     pub centroid: CentroidMethod,
     /// Side of the cells in which background and noise are measured, in pixels.
     pub cell_px: usize,
-    /// At most so many detections, the strongest.
+    /// Most detections that are kept, the strongest.
     pub max_detections: usize,
-    /// The level from which on a pixel is saturated, in ADU, where that is below what the frame's format says.
+    /// The level from which on a pixel is saturated, in ADU, where it is below that of the frame's format.
     pub saturation_adu: Option<f64>,
 }
 
 impl DetectConfig {
     /// Default of [`Self::false_alarms_per_mpx`]: one in ten frames of a megapixel.
     pub const DEFAULT_FALSE_ALARMS_PER_MPX: f64 = 0.1;
-    /// Default of [`Self::cell_px`]: well above any spot, well below a vignette.
+    /// Default of [`Self::cell_px`]: much larger than a spot, much smaller than vignetting.
     pub const DEFAULT_CELL_PX: usize = 64;
     /// Default of [`Self::max_detections`].
     pub const DEFAULT_MAX_DETECTIONS: usize = 20_000;
@@ -50,5 +52,13 @@ impl Default for DetectConfig {
             max_detections: Self::DEFAULT_MAX_DETECTIONS,
             saturation_adu: None,
         }
+    }
+}
+
+impl DetectConfig {
+    /// The level from which on a pixel of `frame` is saturated, in ADU; infinite where none is known.
+    pub(crate) fn saturation_adu(&self, frame: &Frame) -> f32 {
+        let stated = self.saturation_adu.map_or(f32::INFINITY, |adu| adu as f32);
+        frame.saturation_adu.unwrap_or(f32::INFINITY).min(stated)
     }
 }

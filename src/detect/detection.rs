@@ -1,13 +1,14 @@
 //! The sources of a frame, as detection reports them.
 
 use crate::base::coords::PixelPoint;
+use std::cmp::Ordering;
 
 /// One detected source, in the frame's own units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Detection {
     /// The centroid.
     pub position: PixelPoint,
-    /// Standard error of the centroid in x, in pixels: of noise and of the imperfect spot model.
+    /// Standard error of the centroid in x, in pixels: from noise and from the error of the spot model.
     pub sigma_x_px: f64,
     /// Standard error of the centroid in y, in pixels.
     pub sigma_y_px: f64,
@@ -15,12 +16,22 @@ pub struct Detection {
     pub flux_adu: f64,
     /// Brightest pixel above the background, in ADU.
     pub peak_adu: f64,
-    /// Flux over its noise: that of the background, and of the star's own light as far as the frame's
-    /// bright stars tell it. The spot model's error is not in it, else no star would exceed some 30;
-    /// it is in the standard errors of the centroid.
+    /// Flux over its noise: that of the background and, where the frame's bright stars allow to measure
+    /// it, the shot noise of the star. The error of the spot model is not included (it would limit this to
+    /// about 30); it is included in the standard errors of the centroid.
     pub snr: f64,
     /// What is unusual about it.
     pub flags: DetectionFlags,
+}
+
+impl Detection {
+    /// Order of brightness, brightest first; equal ones by position.
+    pub(crate) fn by_brightness(&self, other: &Self) -> Ordering {
+        let (a, b) = (self.position, other.position);
+        let by_position = || a.y.total_cmp(&b.y).then(a.x.total_cmp(&b.x));
+        let by_flux = other.flux_adu.total_cmp(&self.flux_adu);
+        by_flux.then_with(by_position)
+    }
 }
 
 /// What is unusual about a detection.

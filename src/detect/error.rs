@@ -1,8 +1,9 @@
 //! Errors of detection.
 
-use crate::frame::MIN_SIDE_PX;
+use super::config::DetectConfig;
+use crate::frame::{Frame, MIN_SIDE_PX};
 
-/// Why stars could not be looked for.
+/// Errors of [`detect`](super::detect).
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DetectError {
@@ -21,17 +22,47 @@ pub enum DetectError {
     WrongLength {
         /// Width times height.
         expected: usize,
-        /// The pixels there are.
+        /// The number of pixels.
         found: usize,
     },
-    /// An option has a value without meaning.
+    /// An option is out of range.
     #[error("{name} is {found}, expected {expected}")]
     Config {
         /// The option.
         name: &'static str,
         /// Its value.
         found: f64,
-        /// What it may be.
+        /// Its range.
         expected: &'static str,
     },
+}
+
+/// Checks size and length of the frame, and the range of the options.
+pub(crate) fn check(frame: &Frame, config: &DetectConfig) -> Result<(), DetectError> {
+    let (width, height) = (frame.width, frame.height);
+    if width < MIN_SIDE_PX || height < MIN_SIDE_PX {
+        return Err(DetectError::FrameTooSmall { width, height });
+    }
+    if frame.pixels.len() != width * height {
+        return Err(DetectError::WrongLength {
+            expected: width * height,
+            found: frame.pixels.len(),
+        });
+    }
+    let positive = [
+        ("false_alarms_per_mpx", config.false_alarms_per_mpx),
+        ("threshold_sigma", config.threshold_sigma.unwrap_or(1.0)),
+        ("spot_sigma_px", config.spot_sigma_px.unwrap_or(1.0)),
+        ("cell_px", config.cell_px as f64),
+    ];
+    for (name, found) in positive {
+        if !(found > 0.0 && found.is_finite()) {
+            return Err(DetectError::Config {
+                name,
+                found,
+                expected: "a number above 0",
+            });
+        }
+    }
+    Ok(())
 }

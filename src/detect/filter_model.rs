@@ -1,23 +1,23 @@
-//! What detection will do in a frame that is only described: for those who predict it.
+//! The filter and the threshold that a frame would get, to predict detection without a frame.
 
 use crate::detect::config::DetectConfig;
 use crate::detect::filter::Kernel;
-use crate::detect::gaussian_threshold;
-use crate::detect::threshold::{Weights, threshold_for_photons};
+use crate::detect::threshold::{FilterWeights, gaussian_threshold, threshold_for_photons};
 
-/// The matched filter and the threshold of [`detect`](super::detect) in a frame with photon and Gaussian noise.
+/// The matched filter and the threshold of [`detect`](super::detect), for photon noise and Gaussian
+/// noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FilterModel {
-    /// The weights along either axis at distances 0, 1, … pixels; the sum of their squares, both sides counted, is 1. So
-    /// filtered white noise keeps its standard deviation.
+    /// The filter's weights along either axis at distances 0, 1, … pixels. The sum of their squares, both
+    /// sides counted, is 1, so filtered white noise keeps its standard deviation.
     pub half_kernel: Vec<f64>,
     /// The threshold in standard deviations of the noise.
     pub threshold_sigma: f64,
 }
 
 impl FilterModel {
-    /// For frames of this size in pixels, spots of this standard deviation, and pixels whose noise has this skewness: of λ
-    /// photoelectrons and noise of n electrons in all, λ/n³.
+    /// The model for a frame size and a spot's standard deviation, both in pixels, and the skewness of the
+    /// noise of a pixel: λ/n³ for λ photoelectrons and a total noise of n electrons.
     pub fn new(
         config: &DetectConfig,
         size_px: (usize, usize),
@@ -27,7 +27,7 @@ impl FilterModel {
         let kernel = Kernel::for_spot(spot_sigma_px);
         let threshold_sigma = config.threshold_sigma.unwrap_or_else(|| {
             let u = gaussian_threshold(config, size_px, spot_sigma_px, &kernel);
-            let weights = Weights::for_spot(spot_sigma_px, kernel.radius(), size_px);
+            let weights = FilterWeights::for_spot(spot_sigma_px, kernel.radius(), size_px);
             threshold_for_photons(u, skewness, &weights)
         });
         Self {

@@ -1,4 +1,4 @@
-//! Medians of many small sets side by side: vectors compared, without branches.
+//! Medians of many small sets side by side, by vector comparisons without branches.
 
 #![allow(
     clippy::needless_range_loop,
@@ -7,36 +7,29 @@
 
 use multiversion::multiversion;
 
-/// Sets treated side by side.
-pub(crate) const LANES: usize = 16;
-/// The values of one place in each set.
-pub(crate) type Lanes = [f32; LANES];
-/// The size of the sets that are sorted whole.
+/// Cells treated side by side.
+pub(crate) const CELL_LANES: usize = 16;
+/// One value of each of [`CELL_LANES`] cells.
+pub(crate) type CellLanes = [f32; CELL_LANES];
+/// The number of values that [`sort_lanes`] sorts.
 pub(crate) const SORTED: usize = 32;
 
-/// Levels stick out where they deviate by more than so many standard deviations of their neighbours,
-const OUTLIER_SIGMA: f32 = 3.0;
-/// which are so many median deviations,
-const SIGMA_PER_MEDIAN_DEVIATION: f32 = 1.4826;
-/// and this part of the spread.
-const OUTLIER_SPREAD: f32 = 0.5;
-
-/// Puts the lower values of two places into the first.
+/// Orders values `i` and `j` of each lane.
 #[inline(always)]
-fn exchange<const N: usize>(values: &mut [Lanes; N], i: usize, j: usize) {
+fn exchange<const N: usize>(values: &mut [CellLanes; N], i: usize, j: usize) {
     let (a, b) = (values[i], values[j]);
-    for lane in 0..LANES {
+    for lane in 0..CELL_LANES {
         values[i][lane] = if b[lane] < a[lane] { b[lane] } else { a[lane] };
         values[j][lane] = if b[lane] < a[lane] { a[lane] } else { b[lane] };
     }
 }
 
-/// Sorts each lane, the lowest values first; there must be no NaN in a lane whose result is used.
+/// Sorts each lane, lowest value first. CellLanes with NaN end in no defined order.
 ///
 /// # Reference
-/// Batcher 1968, doi 10.1145/1468075.1468121: sorting by merging odd and even places.
+/// Batcher 1968, doi 10.1145/1468075.1468121: odd-even merge sort.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(crate) fn sort_lanes(values: &mut [Lanes; SORTED]) {
+pub(crate) fn sort_lanes(values: &mut [CellLanes; SORTED]) {
     let mut part = 1;
     while part < SORTED {
         let mut step = part;
@@ -54,12 +47,12 @@ pub(crate) fn sort_lanes(values: &mut [Lanes; SORTED]) {
     }
 }
 
-/// The medians of nine values each.
+/// The median of nine values in each lane.
 ///
 /// # Reference
 /// Paeth 1990, "Median finding on a 3x3 grid", Graphics Gems, 171.
 #[inline(always)]
-fn median_of_nine(mut v: [Lanes; 9]) -> Lanes {
+fn median_of_nine(mut v: [CellLanes; 9]) -> CellLanes {
     const EXCHANGES: [(usize, usize); 19] = [
         (1, 2),
         (4, 5),
@@ -87,63 +80,59 @@ fn median_of_nine(mut v: [Lanes; 9]) -> Lanes {
     v[4]
 }
 
-/// The 3x3 values about up to [`LANES`] places from `start` on, which is the first column of these.
+/// The 3x3 values around up to [`CELL_LANES`] cells; `start` is the left column of the first square.
 #[inline(always)]
-fn squares(rows: [&[f32]; 3], start: usize, count: usize) -> [Lanes; 9] {
+fn squares(rows: [&[f32]; 3], start: usize, count: usize) -> [CellLanes; 9] {
     std::array::from_fn(|i| {
         let from = start + i % 3;
         let row = rows[i / 3];
-        if let Some(whole) = row[from..].first_chunk::<LANES>() {
+        if let Some(whole) = row[from..].first_chunk::<CELL_LANES>() {
             return *whole;
         }
-        let mut lanes = [0.0; LANES];
+        let mut lanes = [0.0; CELL_LANES];
         lanes[..count].copy_from_slice(&row[from..from + count]);
         lanes
     })
 }
 
-/// The medians of 3x3 values, from rows that are two longer than `medians`.
+/// The medians of 3x3 values; the rows are two longer than `medians`.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 pub(crate) fn of_squares(rows: [&[f32]; 3], medians: &mut [f32]) {
-    for (block, out) in medians.chunks_mut(LANES).enumerate() {
-        let middle = median_of_nine(squares(rows, block * LANES, out.len()));
-        out.copy_from_slice(&middle[..out.len()]);
+    for (block, out) in medians.chunks_mut(CELL_LANES).enumerate() {
+        let median = median_of_nine(squares(rows, block * CELL_LANES, out.len()));
+        out.copy_from_slice(&median[..out.len()]);
     }
 }
 
-/// Replaces the levels that stick out from the 3x3 about them by the median of these; `rows` are two longer than `levels`.
+/// Replaces backgrounds that are outliers among the 3x3 around them by the median of these; the rows are
+/// two longer than `backgrounds`.
+///
+/// An outlier deviates from the median by more than three standard deviations of its neighbours, by
+/// their median deviation, and half the noise of a pixel.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(crate) fn replace_outliers(rows: [&[f32]; 3], spreads: &[f32], levels: &mut [f32]) {
-    let blocks = levels.chunks_mut(LANES).zip(spreads.chunks(LANES));
-    for (block, (out, spread)) in blocks.enumerate() {
-        let around = squares(rows, block * LANES, out.len());
-        let middle = median_of_nine(around);
-        let deviations = around.map(|lanes| -> Lanes {
-            std::array::from_fn(|lane| (lanes[lane] - middle[lane]).abs())
+pub(crate) fn replace_outliers(rows: [&[f32]; 3], sigmas: &[f32], backgrounds: &mut [f32]) {
+    const OUTLIER_SIGMA: f32 = 3.0;
+    const SIGMA_PER_MEDIAN_DEVIATION: f32 = 1.4826;
+    const OUTLIER_NOISE: f32 = 0.5;
+    let blocks = backgrounds
+        .chunks_mut(CELL_LANES)
+        .zip(sigmas.chunks(CELL_LANES));
+    for (block, (out, sigma)) in blocks.enumerate() {
+        let around = squares(rows, block * CELL_LANES, out.len());
+        let median = median_of_nine(around);
+        let deviations = around.map(|lanes| -> CellLanes {
+            std::array::from_fn(|lane| (lanes[lane] - median[lane]).abs())
         });
         let deviation = median_of_nine(deviations);
-        for (lane, (level, spread)) in out.iter_mut().zip(spread).enumerate() {
-            // A plane has the same deviations as its own gradient: only what exceeds them sticks out.
+        for (lane, (background, sigma)) in out.iter_mut().zip(sigma).enumerate() {
+            // Cells on a plane deviate by its gradient: an outlier exceeds that.
             let allowed = OUTLIER_SIGMA * SIGMA_PER_MEDIAN_DEVIATION * deviation[lane]
-                + OUTLIER_SPREAD * spread;
-            if (*level - middle[lane]).abs() > allowed {
-                *level = middle[lane];
+                + OUTLIER_NOISE * sigma;
+            if (*background - median[lane]).abs() > allowed {
+                *background = median[lane];
             }
         }
     }
-}
-
-/// The sum, by halves: one after the other, each would wait for the one before.
-#[inline(always)]
-pub(crate) fn sum_of<const N: usize>(mut lanes: [f32; N]) -> f32 {
-    let mut half = N / 2;
-    while half > 0 {
-        for lane in 0..half {
-            lanes[lane] += lanes[lane + half];
-        }
-        half /= 2;
-    }
-    lanes[0]
 }
 
 #[cfg(test)]
@@ -151,12 +140,12 @@ mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
 
-    fn random_lanes<const N: usize>() -> [Lanes; N] {
+    fn random_lanes<const N: usize>() -> [CellLanes; N] {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
         std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(0..20) as f32))
     }
 
-    fn sorted_lane<const N: usize>(values: &[Lanes; N], lane: usize) -> Vec<f32> {
+    fn sorted_lane<const N: usize>(values: &[CellLanes; N], lane: usize) -> Vec<f32> {
         let mut column: Vec<f32> = values.iter().map(|v| v[lane]).collect();
         column.sort_unstable_by(f32::total_cmp);
         column
@@ -169,7 +158,7 @@ mod tests {
         sort_lanes(&mut sorted);
         let nine = random_lanes::<9>();
         let medians = median_of_nine(nine);
-        for lane in 0..LANES {
+        for lane in 0..CELL_LANES {
             let column: Vec<f32> = sorted.iter().map(|v| v[lane]).collect();
             assert_eq!(column, sorted_lane(&values, lane));
             assert_eq!(medians[lane], sorted_lane(&nine, lane)[4]);
@@ -177,16 +166,15 @@ mod tests {
     }
 
     #[test]
-    fn a_level_that_sticks_out_is_replaced_and_a_plane_is_not() {
+    fn an_outlier_is_replaced_and_a_plane_is_not() {
         let row = |y: f32| -> Vec<f32> { (0..22).map(|x| x as f32 + 10.0 * y).collect() };
         let (top, mut middle, bottom) = (row(0.0), row(1.0), row(2.0));
         middle[8] = 500.0;
-        let mut levels = middle[1..21].to_vec();
+        let mut backgrounds = middle[1..21].to_vec();
         let rows = [top.as_slice(), &middle, &bottom];
-        replace_outliers(rows, &[1.0; 20], &mut levels);
-        assert!((levels[7] - 18.0).abs() <= 2.0, "{}", levels[7]);
-        levels[7] = middle[8];
-        assert_eq!(levels, middle[1..21]);
-        assert_eq!(sum_of([1.0, 2.0, 3.0, 4.0]), 10.0);
+        replace_outliers(rows, &[1.0; 20], &mut backgrounds);
+        assert!((backgrounds[7] - 18.0).abs() <= 2.0, "{}", backgrounds[7]);
+        backgrounds[7] = middle[8];
+        assert_eq!(backgrounds, middle[1..21]);
     }
 }

@@ -5,7 +5,7 @@
 //! pixels are gathered down to a lower cut first, and compared with the threshold later.
 
 use crate::detect::filter::FilteredBand;
-use crate::detect::pixels::{Reached, find_reaching};
+use crate::detect::pixels::{ReachedBlock, find_reaching};
 use std::ops::Range;
 
 /// The pixels of a row of cells that may lie above the threshold.
@@ -20,7 +20,7 @@ pub(crate) struct Candidates {
     /// The cut for each block of columns.
     block_cuts: Vec<f32>,
     /// The blocks of the current row that reach the cut.
-    blocks: Vec<Reached>,
+    blocks: Vec<ReachedBlock>,
 }
 
 /// A pixel of the filtered frame.

@@ -3,7 +3,7 @@
 use super::convolution::{VECTOR_PX, normalise, sum_along_columns, sum_along_row};
 use super::kernel::Kernel;
 use crate::detect::background::{Mesh, Piece};
-use crate::detect::pixels::{Aligned, LINE, Rows, View};
+use crate::detect::pixels::{Aligned, LINE, PixelRows, View};
 use crate::detect::psf::MAX_TAPS;
 use arrayvec::ArrayVec;
 use std::ops::Range;
@@ -125,8 +125,8 @@ impl FilteredBand {
     }
 
     /// Some of the rows of the filtered frame that the band holds.
-    pub fn rows(&self, rows: Range<usize>) -> Rows<'_> {
-        Rows {
+    pub fn rows(&self, rows: Range<usize>) -> PixelRows<'_> {
+        PixelRows {
             values: &self.values[rows.start.saturating_sub(self.rows.start) * self.stride..],
             stride: self.stride,
             width: self.width,
@@ -152,13 +152,7 @@ mod tests {
     /// A mesh of background 0 and noise 1, from a frame of zeros.
     fn unit_mesh(zeros: &View<'_>) -> Mesh {
         let mut mesh = Mesh::default();
-        let config = MeshConfig {
-            cell_px: 64,
-            spread_of_differences: false,
-            spread_floor: 1.0,
-            is_normalised: false,
-        };
-        mesh.measure(zeros, &config);
+        mesh.measure(zeros, &MeshConfig::of_pixels(64, 1.0));
         mesh
     }
 

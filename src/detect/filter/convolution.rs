@@ -20,8 +20,8 @@ pub(crate) fn normalise(row: &[f32], pieces: &[Piece], target: &mut [f32]) {
         let piece = *piece;
         for (i, (out, &pixel)) in target.iter_mut().zip(row).enumerate() {
             let t = i as i32 as f32;
-            let value = (pixel - (piece.level + t * piece.level_slope))
-                * (piece.inverse + t * piece.inverse_slope);
+            let value = (pixel - (piece.background + t * piece.background_slope))
+                * (piece.inverse_sigma + t * piece.inverse_sigma_slope);
             *out = if value.is_nan() { 0.0 } else { value };
         }
     }

@@ -341,15 +341,7 @@ mod tests {
         let pixels = frame_of(&truth);
         let view = View::new(&pixels, SIDE_PX, SIDE_PX);
         let mut mesh = Mesh::default();
-        mesh.measure(
-            &view,
-            &MeshConfig {
-                cell_px: 64,
-                spread_of_differences: true,
-                spread_floor: 1e-6,
-                is_normalised: false,
-            },
-        );
+        mesh.measure(&view, &MeshConfig::of_pixels(64, 1e-6));
         let scene = Scene {
             view,
             background: &mesh,

@@ -3,7 +3,6 @@
 use super::plateau::Plateau;
 use super::{centroid, shape};
 use crate::base::coords::PixelPoint;
-use crate::detect::background::on_each;
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::config::CentroidMethod;
 use crate::detect::detection::{Detection, DetectionFlags};
@@ -12,6 +11,7 @@ use crate::detect::fit::{
 };
 use crate::detect::pixels::View;
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
+use crate::detect::threads::for_each_worker;
 use std::mem;
 
 /// Spots closer than this many of their standard deviations touch, and are fitted together.
@@ -71,7 +71,7 @@ impl Measurement<'_> {
         let threads = workers.len();
         // What is alone can be measured in any order.
         let KnownSpots { spots, alone, .. } = &*known;
-        on_each(workers, &|worker, thread| {
+        for_each_worker(workers, &|worker, thread| {
             let of_thread = alone.iter().skip(thread).step_by(threads);
             let indices = of_thread.map(|&index| index as usize);
             self.measure_alone(peaks, indices, spots, worker);

@@ -1,13 +1,13 @@
-//! Rows of pixels that begin where a line of the cache does: a vector across two lines takes two loads.
+//! Buffers that begin at a cache line: a vector across two lines takes two loads.
 
 use std::ops::{Deref, DerefMut};
 
-/// Bytes in a line of the cache.
+/// Bytes in a cache line.
 const LINE_BYTES: usize = 64;
-/// Values in it.
+/// Values in a cache line.
 pub(crate) const LINE: usize = LINE_BYTES / size_of::<f32>();
 
-/// A buffer that begins with a line.
+/// A buffer that begins at a cache line.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Aligned {
     buffer: Vec<f32>,
@@ -15,7 +15,7 @@ pub(crate) struct Aligned {
 }
 
 impl Aligned {
-    /// Makes room for at least `length` values; those held stay.
+    /// Grows to at least `length` values; the values so far are kept.
     pub fn grow(&mut self, length: usize) {
         if self.len() >= length {
             return;
@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_stay_where_they_were_as_the_buffer_grows() {
+    fn values_are_kept_as_the_buffer_grows() {
         let mut buffer = Aligned::default();
         for length in [3, 100, 100, 5000] {
             buffer.grow(length);

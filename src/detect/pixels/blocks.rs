@@ -1,20 +1,20 @@
-//! Short blocks of columns: most hold nothing of interest, and need no second look.
+//! Blocks of columns of a row. Most hold no bright pixel, and are skipped as a whole.
 
 use multiversion::multiversion;
 use std::ops::Range;
 
-/// Width of the blocks.
+/// Width of a block, in pixels.
 pub(crate) const BLOCK_PX: usize = 64;
 
-/// The maximum of a block without anything of interest.
-const NOTHING: f32 = f32::MIN;
+/// The maximum of a block without candidates.
+const NO_CANDIDATE: f32 = f32::MIN;
 
-/// The maxima of those blocks of a frame that hold something of interest.
+/// The maxima of those blocks of a frame that hold candidates.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BlockMaxima {
     /// Blocks in a row.
     pub per_row: usize,
-    /// Row by row; [`NOTHING`] for the others.
+    /// Row by row; [`NO_CANDIDATE`] for the other blocks.
     pub values: Vec<f32>,
 }
 
@@ -23,7 +23,7 @@ impl BlockMaxima {
     pub fn prepare(&mut self, (width, height): (usize, usize)) {
         self.per_row = width.div_ceil(BLOCK_PX);
         self.values.clear();
-        self.values.resize(self.per_row * height, NOTHING);
+        self.values.resize(self.per_row * height, NO_CANDIDATE);
     }
 
     /// The maxima of the blocks in `rows`, row by row.
@@ -37,17 +37,17 @@ impl BlockMaxima {
     }
 }
 
-/// A block of a row with values that reach some level.
+/// A block of a row in which pixels reach a threshold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Reached {
-    /// Its number in the row.
+pub(crate) struct ReachedBlock {
+    /// Number of the block in its row.
     pub block: usize,
-    /// A bit for each of its columns, the first one lowest.
+    /// One bit for each column, the lowest for the first.
     bits: u64,
 }
 
-impl Reached {
-    /// The columns of the row whose values reach the level.
+impl ReachedBlock {
+    /// The columns of the row whose pixels reach the threshold.
     pub fn columns(&self) -> impl Iterator<Item = usize> + use<> {
         let Self { block, mut bits } = *self;
         std::iter::from_fn(move || {
@@ -60,31 +60,31 @@ impl Reached {
     }
 }
 
-/// Finds the blocks of `row` with values that reach the level of their block; NaN reaches none.
+/// Finds the blocks of `row` with pixels of at least the threshold of their block; NaN is below any.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(crate) fn find_reaching(row: &[f32], levels: &[f32], found: &mut Vec<Reached>) {
+pub(crate) fn find_reaching(row: &[f32], thresholds: &[f32], found: &mut Vec<ReachedBlock>) {
     found.clear();
     let (blocks, rest) = row.as_chunks::<BLOCK_PX>();
-    for (block, (values, &level)) in blocks.iter().zip(levels).enumerate() {
-        if values.iter().fold(false, |any, &v| any | (v >= level)) {
-            let bits = bits_of(values, level);
-            found.push(Reached { block, bits });
+    for (block, (values, &threshold)) in blocks.iter().zip(thresholds).enumerate() {
+        if values.iter().fold(false, |any, &v| any | (v >= threshold)) {
+            let bits = bits_of(values, threshold);
+            found.push(ReachedBlock { block, bits });
         }
     }
-    if let Some(&level) = levels.get(blocks.len()) {
-        let bits = bits_of(rest, level);
+    if let Some(&threshold) = thresholds.get(blocks.len()) {
+        let bits = bits_of(rest, threshold);
         if bits != 0 {
             let block = blocks.len();
-            found.push(Reached { block, bits });
+            found.push(ReachedBlock { block, bits });
         }
     }
 }
 
-/// A bit for each value, at most 64, that reaches the level.
+/// A bit for each of at most 64 values, set from the threshold on.
 #[inline(always)]
-fn bits_of(values: &[f32], level: f32) -> u64 {
+fn bits_of(values: &[f32], threshold: f32) -> u64 {
     let bits = values.iter().enumerate();
-    bits.fold(0, |bits, (i, &v)| bits | (u64::from(v >= level) << i))
+    bits.fold(0, |bits, (i, &v)| bits | (u64::from(v >= threshold) << i))
 }
 
 #[cfg(test)]
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn blocks_are_found_with_the_columns_that_reach_their_level() {
+    fn blocks_are_found_with_the_columns_that_reach_their_threshold() {
         let mut row = vec![0.0; 2 * BLOCK_PX + 10];
         let high = [0, 63, 64 + 20, 128 + 9];
         for x in high {
@@ -101,11 +101,11 @@ mod tests {
         (row[3], row[100]) = (f32::NAN, 4.0);
         let mut found = Vec::new();
         find_reaching(&row, &[5.0; 3], &mut found);
-        let columns: Vec<usize> = found.iter().flat_map(Reached::columns).collect();
+        let columns: Vec<usize> = found.iter().flat_map(ReachedBlock::columns).collect();
         assert_eq!(columns, high);
         assert_eq!(found.iter().map(|f| f.block).collect::<Vec<_>>(), [0, 1, 2]);
         find_reaching(&row, &[6.0, 3.0, f32::NAN], &mut found);
-        let columns: Vec<usize> = found.iter().flat_map(Reached::columns).collect();
+        let columns: Vec<usize> = found.iter().flat_map(ReachedBlock::columns).collect();
         assert_eq!(columns, [64 + 20, 100]);
     }
 }

@@ -3,7 +3,7 @@
 use crate::frame::Frame;
 use std::ops::Range;
 
-/// A rectangle of an image; all coordinates inside `detect` are relative to it.
+/// A rectangle of an image. All coordinates inside `detect` are relative to it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct View<'a> {
     pixels: &'a [f32],
@@ -14,12 +14,12 @@ pub(crate) struct View<'a> {
     pub y0: usize,
     /// Columns.
     pub width: usize,
-    /// Rows.
+    /// PixelRows.
     pub height: usize,
 }
 
 impl<'a> View<'a> {
-    /// The whole of an image whose rows are `stride` long, of which `width = stride` are used.
+    /// The whole of an image.
     pub fn new(pixels: &'a [f32], width: usize, height: usize) -> Self {
         Self::with_stride(pixels, width, width, height)
     }
@@ -37,7 +37,7 @@ impl<'a> View<'a> {
     }
 
     /// The frame without the outer rows and columns that hold a single value each, such as zero
-    /// padding or overscan: they carry no light, and their edge would be taken for a source.
+    /// padding or overscan: they hold no light, and their edge would be detected as a source.
     pub fn of_live_pixels(frame: &'a Frame) -> Self {
         let mut view = Self::new(&frame.pixels, frame.width, frame.height);
         let is_flat = |values: &mut dyn Iterator<Item = f32>| {
@@ -69,9 +69,9 @@ impl<'a> View<'a> {
         &self.pixels[start..start + self.width]
     }
 
-    /// Some of the rows.
-    pub fn rows(&self, rows: Range<usize>) -> Rows<'a> {
-        Rows {
+    /// A range of rows.
+    pub fn rows(&self, rows: Range<usize>) -> PixelRows<'a> {
+        PixelRows {
             values: &self.pixels[(self.y0 + rows.start) * self.stride + self.x0..],
             stride: self.stride,
             width: self.width,
@@ -86,26 +86,26 @@ impl<'a> View<'a> {
     }
 }
 
-/// Rows of pixels, `stride` apart in memory.
+/// PixelRows of pixels, `stride` apart in memory.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Rows<'a> {
+pub(crate) struct PixelRows<'a> {
     /// From the first pixel of the first row on.
     pub values: &'a [f32],
     /// Pixels from the start of a row to that of the next.
     pub stride: usize,
     /// Columns.
     pub width: usize,
-    /// Rows.
+    /// PixelRows.
     pub height: usize,
 }
 
-impl<'a> Rows<'a> {
-    /// One of them.
+impl<'a> PixelRows<'a> {
+    /// Row `y`.
     pub fn row(&self, y: usize) -> &'a [f32] {
         &self.values[y * self.stride..][..self.width]
     }
 
-    /// Every `step`th of them.
+    /// Every `step`th row.
     pub fn step_by(self, step: usize) -> Self {
         Self {
             stride: step * self.stride,
@@ -114,7 +114,7 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Some of their columns.
+    /// A range of columns.
     pub fn columns(self, columns: Range<usize>) -> Self {
         Self {
             values: &self.values[columns.start.min(self.values.len())..],

@@ -1,3 +1,13 @@
-//! The spot size and the noise model of a frame, from its own bright stars.
+//! The spot size and the noise model of a frame: peaks -> [`StarModel`].
+//!
+//! 1. Bright, isolated stars are fitted with a free size (`bright_stars`).
+//! 2. The mode of the sizes is the frame's spot size (`spot_size`).
+//! 3. The residuals of the stars of that size give the noise model (`noise_model`).
 
-pub(crate) mod calibrate;
+mod bright_stars;
+mod noise_model;
+mod spot_size;
+
+pub(crate) use bright_stars::{fit_bright_stars, fit_raw_stars};
+pub(crate) use noise_model::{StarModel, star_model};
+pub(crate) use spot_size::{DEFAULT_SPOT_PX, SpotSize, spot_size};

@@ -13,31 +13,22 @@ use crate::detect::psf::{LEAST_EXPONENT, erf_and_gauss, exp_of_negative};
 use multiversion::multiversion;
 use std::f64::consts::{PI, SQRT_2};
 
-/// Steps of the outer integral, which spans [`SPAN`] above u.
-const STEPS: usize = 24;
-const SPAN: f64 = 3.0;
-/// Thresholds are looked for in this range.
+/// Range of thresholds, in standard deviations.
 const RANGE: (f64, f64) = (1.0, 12.0);
-/// Secant steps at most; some three are needed.
-const MAX_SECANTS: usize = 60;
-/// They end where the logarithm of the rate is this close.
-const SETTLED: f64 = 1e-4;
-/// It falls at least so much with u².
-const LEAST_SLOPE: f64 = -0.1;
-
-/// Parts of the inner integral.
+/// Steps of the inner integral.
 const PARTS: usize = 8;
 
-/// The chance that both neighbours on an axis lie lower, for one correlation.
+/// The probability Q that both neighbours on an axis are lower, for one correlation ρ.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Lower {
+struct BothLower {
     h: f64,
+    /// Step of θ.
     step: f64,
-    /// `½h²/sin²θ` in the middle of each part of the range of θ.
+    /// `½h²/sin²θ` in the middle of each step of θ.
     exponents: [f64; PARTS],
 }
 
-impl Lower {
+impl BothLower {
     fn new(rho: f64) -> Self {
         let h = ((1.0 - rho) / (1.0 + rho)).sqrt();
         let alpha = ((1.0 - rho * rho) / 2.0).sqrt().asin();
@@ -51,9 +42,9 @@ impl Lower {
         }
     }
 
-    /// Q(ρ, z): the chance that both neighbours on one axis lie below z at a pixel whose value is z.
+    /// Q(ρ, z), for a pixel of value z.
     #[inline(always)]
-    fn chance(&self, z: f64) -> f64 {
+    fn probability(&self, z: f64) -> f64 {
         let tail = 1.0 - erf_and_gauss(self.h * z / SQRT_2).0;
         let mut parts = [0.0; PARTS];
         for (part, exponent) in parts.iter_mut().zip(&self.exponents) {
@@ -64,17 +55,20 @@ impl Lower {
     }
 }
 
-/// The chance per pixel that filtered noise has a local maximum above `u` standard deviations.
+/// The probability that a pixel of filtered noise is a local maximum above `u` standard deviations.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn false_alarm_probability(u: f64, across: &Lower, down: &Lower) -> f64 {
+fn false_alarm_probability(u: f64, across: &BothLower, down: &BothLower) -> f64 {
+    /// The integral runs from u to u + `SPAN`.
+    const SPAN: f64 = 3.0;
+    const STEPS: usize = 24;
     let step = SPAN / STEPS as f64;
     let density = |z: f64| {
         let phi = exp_of_negative(-0.5 * z * z) / (2.0 * PI).sqrt();
-        let of_row = across.chance(z);
+        let of_row = across.probability(z);
         let of_column = if across == down {
             of_row
         } else {
-            down.chance(z)
+            down.probability(z)
         };
         phi * of_row * of_column
     };
@@ -88,22 +82,28 @@ fn false_alarm_probability(u: f64, across: &Lower, down: &Lower) -> f64 {
 /// The threshold, in standard deviations of the filtered noise, above which pure noise has
 /// `per_mpx` local maxima in a million pixels.
 pub(crate) fn threshold_for_rate(per_mpx: f64, rho_x: f64, rho_y: f64) -> f64 {
+    /// Some three are needed.
+    const MAX_SECANTS: usize = 60;
+    /// Tolerance of the logarithm of the rate.
+    const TOLERANCE: f64 = 1e-4;
+    /// The logarithm of the rate falls at least this much with u².
+    const LEAST_SLOPE: f64 = -0.1;
     let wanted = (per_mpx * 1e-6).ln();
-    let (across, down) = (Lower::new(rho_x), Lower::new(rho_y));
+    let (across, down) = (BothLower::new(rho_x), BothLower::new(rho_y));
     let excess = |u: f64| {
         false_alarm_probability(u, &across, &down)
             .max(f64::MIN_POSITIVE)
             .ln()
             - wanted
     };
-    // The rate falls about as exp(−u²/2): its logarithm over u² is nearly straight, and secants settle fast.
+    // The rate falls about as exp(−u²/2): its logarithm is nearly linear in u², and secants converge fast.
     let within = |square: f64| square.clamp(RANGE.0 * RANGE.0, RANGE.1 * RANGE.1);
     let mut square = within(-2.0 * wanted);
     let mut slope = -0.5;
     let mut at = excess(square.sqrt());
     for _ in 0..MAX_SECANTS {
         let next = within(square - at / slope);
-        if at.abs() < SETTLED || next == square {
+        if at.abs() < TOLERANCE || next == square {
             break;
         }
         let at_next = excess(next.sqrt());
@@ -113,7 +113,7 @@ pub(crate) fn threshold_for_rate(per_mpx: f64, rho_x: f64, rho_y: f64) -> f64 {
     square.sqrt()
 }
 
-/// The threshold raised for a noise that is itself estimated, with `degrees` of freedom: the same
+/// The threshold raised for noise that is itself estimated, with `degrees` of freedom: the same
 /// tail probability for Student's t as `u` has for a Gaussian, to leading order
 /// `t² = ν(exp(u²/ν) − 1)`.
 pub(crate) fn for_estimated_noise(u: f64, degrees: f64) -> f64 {
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
 
     fn rate_above(u: f64, rho: f64) -> f64 {
-        false_alarm_probability(u, &Lower::new(rho), &Lower::new(rho))
+        false_alarm_probability(u, &BothLower::new(rho), &BothLower::new(rho))
     }
 
     #[test]
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn full_correlation_leaves_no_maxima_and_thresholds_invert_rates() {
-        assert!(Lower::new(0.999_999).chance(3.0) < 0.01);
+        assert!(BothLower::new(0.999_999).probability(3.0) < 0.01);
         let u = threshold_for_rate(1.0, 0.78, 0.78);
         assert!((rate_above(u, 0.78) * 1e6 - 1.0).abs() < 1e-3);
         // Simulated for a spot of σ = 1 px at one per megapixel: 4.71 (80 Mpx, ±0.05).

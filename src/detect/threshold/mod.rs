@@ -1,6 +1,22 @@
-//! Step 3: the threshold, from the wanted number of false detections and the noise of the frame.
+//! The threshold: wanted number of false detections, and noise of the frame -> standard deviations of
+//! the filtered noise.
+//!
+//! 1. Gaussian noise: the rate of local maxima above a threshold, solved for the threshold
+//!    (`false_alarms`).
+//! 2. Other noise has longer tails. Photon noise is skewed (`photons`); noise below a quantisation step,
+//!    and noise that is cut off at zero, are measured whole (`pixel_noise`). Both are measured where no
+//!    star is (`star_free`); what they make of the tail of the filtered noise is in `saddlepoint`.
+//! 3. `frame_threshold` decides which of these holds for a frame.
 
-pub(crate) mod false_alarms;
-pub(crate) mod pixel_noise;
+mod false_alarms;
+mod filter_weights;
+mod frame_threshold;
+mod photons;
+mod pixel_noise;
+mod saddlepoint;
+mod star_free;
 
-pub(crate) use pixel_noise::{NoiseWork, PixelNoise, StarFree, Weights, threshold_for_photons};
+pub(crate) use filter_weights::FilterWeights;
+pub(crate) use frame_threshold::{FrameNoise, gaussian_threshold};
+pub(crate) use photons::threshold_for_photons;
+pub(crate) use star_free::NoiseWork;

@@ -1,0 +1,128 @@
+//! Mean and standard deviation of samples with outliers, by clipping at three standard deviations.
+
+use crate::detect::pixels::{PixelRows, pairwise_sum};
+use multiversion::multiversion;
+
+/// Samples further off than this many standard deviations are not counted: 99.7 % of Gaussian noise is.
+const CLIP_SIGMA: f32 = 3.0;
+/// The standard deviation of a Gaussian clipped at ±3σ, over σ.
+const CLIPPED_SHRINK: f32 = 0.986_58;
+/// The part of an error of σ that is left after a round of clipping: d ln s/d ln k at k = 3, with s the
+/// standard deviation of a Gaussian clipped at ±kσ. Each round extrapolates to where many would lead.
+const ERROR_LEFT_BY_ROUND: f32 = 0.11;
+/// Most rounds of clipping; one to three are usual.
+const MAX_ROUNDS: usize = 8;
+/// Fewer samples than this have no mean.
+pub(crate) const MIN_SAMPLES: usize = 12;
+/// Distance of the two pixels of a difference, in columns.
+pub(crate) const DIFFERENCE_PX: usize = 2;
+/// Samples summed side by side.
+const LANES: usize = 32;
+
+/// Mean and standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Gaussian {
+    /// The mean.
+    pub mean: f32,
+    /// The standard deviation.
+    pub sigma: f32,
+}
+
+/// Changes, in units of σ, below which clipping has converged.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Tolerance {
+    /// Of the mean.
+    pub mean: f32,
+    /// Of the standard deviation.
+    pub sigma: f32,
+}
+
+/// Samples of a cell: its pixels, or the differences of pixels [`DIFFERENCE_PX`] columns apart.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Samples<'a> {
+    /// The pixels.
+    pub rows: PixelRows<'a>,
+    /// Whether the samples are differences.
+    pub are_differences: bool,
+}
+
+/// Mean and standard deviation without outliers, from a first estimate; `None` for too few samples.
+/// NaN is left out. The standard deviation is at least `floor`.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+pub(crate) fn clipped(
+    samples: &Samples,
+    start: Gaussian,
+    floor: f32,
+    tolerance: Tolerance,
+) -> Option<Gaussian> {
+    let (mut center, mut sigma) = (start.mean, start.sigma.max(floor));
+    for round in 0..MAX_ROUNDS {
+        let [count, sum, squares] = clipped_moments(samples, center, CLIP_SIGMA * sigma);
+        if count < MIN_SAMPLES as f32 {
+            return (round > 0).then_some(Gaussian {
+                mean: center,
+                sigma,
+            });
+        }
+        let mean = sum / count;
+        let variance = (squares / count - mean * mean).max(0.0);
+        let clipped = variance.sqrt() / CLIPPED_SHRINK;
+        let new_sigma = (sigma + (clipped - sigma) / (1.0 - ERROR_LEFT_BY_ROUND)).max(0.0);
+        let is_settled = (new_sigma - sigma).abs() <= tolerance.sigma * sigma
+            && mean.abs() <= tolerance.mean * sigma;
+        center += mean;
+        sigma = new_sigma.max(floor);
+        if is_settled || new_sigma <= floor {
+            break;
+        }
+    }
+    Some(Gaussian {
+        mean: center,
+        sigma,
+    })
+}
+
+/// Number, sum and sum of squares of `sample - center` where it is at most `half_width` in size.
+#[inline(always)]
+fn clipped_moments(samples: &Samples<'_>, center: f32, half_width: f32) -> [f32; 3] {
+    let [mut count, mut sum, mut squares] = [[0.0f32; LANES]; 3];
+    let mut add = |lane: usize, value: f32| {
+        let deviation = value - center;
+        let inside = deviation.abs() <= half_width;
+        let kept = if inside { deviation } else { 0.0 };
+        count[lane] += if inside { 1.0 } else { 0.0 };
+        sum[lane] += kept;
+        squares[lane] += kept * kept;
+    };
+    let Samples {
+        rows,
+        are_differences,
+    } = *samples;
+    for y in 0..rows.height {
+        let row = rows.row(y);
+        if are_differences {
+            let (first, second) = (&row[..row.len() - DIFFERENCE_PX], &row[DIFFERENCE_PX..]);
+            let (chunks, rest) = first.as_chunks::<LANES>();
+            let (later_chunks, later_rest) = second.as_chunks::<LANES>();
+            for (chunk, later) in chunks.iter().zip(later_chunks) {
+                for lane in 0..LANES {
+                    add(lane, later[lane] - chunk[lane]);
+                }
+            }
+            for (lane, (value, later)) in rest.iter().zip(later_rest).enumerate() {
+                add(lane, later - value);
+            }
+        } else {
+            let (chunks, rest) = row.as_chunks::<LANES>();
+            for chunk in chunks {
+                for (lane, value) in chunk.iter().enumerate() {
+                    add(lane, *value);
+                }
+            }
+            for (lane, value) in rest.iter().enumerate() {
+                add(lane, *value);
+            }
+        }
+    }
+    [count, sum, squares].map(pairwise_sum)
+}

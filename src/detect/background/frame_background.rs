@@ -1,0 +1,86 @@
+//! Background and noise of the frame, with the buffers to measure them.
+
+use super::cell_rows::CellRows;
+use super::cells::CellMeasurer;
+use super::mesh::{Mesh, MeshConfig};
+use crate::detect::pixels::{BlockMaxima, View, largest_magnitude_in_row, lower, lowest_in_row};
+
+/// The standard deviation of rounding to whole steps, over the step: 1/√12.
+const ROUNDING_SIGMA: f32 = 0.288_675_13;
+/// The precision of single-precision pixels, relative to the largest.
+const RELATIVE_PRECISION: f32 = 1e-6;
+
+/// Background and noise of a frame, in ADU.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct FrameBackground {
+    /// Background and standard deviation of the noise of a pixel, in ADU.
+    pub mesh: Mesh,
+    /// Median of the background over the mesh, in ADU.
+    pub median_adu: f64,
+    /// Median of the noise over the mesh, in ADU.
+    pub median_sigma_adu: f64,
+    /// The lowest sampled pixel of each row of cells, in ADU.
+    lowest_adu: Vec<f32>,
+    /// One for each thread.
+    workers: Vec<CellMeasurer>,
+    sorted: Vec<f32>,
+}
+
+impl FrameBackground {
+    /// Shares the rows of cells among `threads` threads.
+    pub fn set_threads(&mut self, threads: usize) {
+        self.workers.resize_with(threads, CellMeasurer::default);
+    }
+
+    /// Measures background and noise in cells of about `cell_px` pixels a side.
+    pub fn measure(&mut self, view: &View<'_>, step_adu: f32, cell_px: usize) {
+        let config = MeshConfig::of_pixels(cell_px, sigma_floor(view, step_adu));
+        self.mesh.prepare((view.width, view.height), &config);
+        let grid = self.mesh.grid;
+        self.lowest_adu.resize(grid.rows, 0.0);
+        let mut no_maxima = BlockMaxima::default();
+        let cell_rows = CellRows::of(&mut self.mesh, &mut no_maxima, &mut self.lowest_adu);
+        cell_rows.share(&mut self.workers, &|worker, cells| {
+            let rows = view.rows(cells.rows).step_by(grid.row_stride());
+            // This also brings the rows from memory in one go, and not cell by cell.
+            let minimum = |m, y| lowest_in_row(m, rows.row(y));
+            *cells.output = (0..rows.height).fold(f32::INFINITY, minimum);
+            let output = (cells.background, cells.sigma);
+            worker.measure_row(&grid, rows, &config, output);
+        });
+        self.mesh.finish();
+        self.median_adu = median(&self.mesh.background, &mut self.sorted);
+        self.median_sigma_adu = median(&self.mesh.sigma, &mut self.sorted);
+    }
+
+    /// The lowest sampled pixel, in ADU.
+    pub fn lowest_adu(&self) -> f32 {
+        self.lowest_adu.iter().copied().fold(f32::INFINITY, lower)
+    }
+}
+
+/// The noise of rounding to steps of `step_adu`, in ADU.
+pub(crate) fn rounding_sigma_adu(step_adu: f32) -> f32 {
+    ROUNDING_SIGMA * step_adu
+}
+
+/// A noise that is certainly below that of the frame, in ADU: that of rounding, or the precision of the
+/// pixels' numbers.
+pub(crate) fn sigma_floor(view: &View<'_>, step_adu: f32) -> f32 {
+    const SAMPLED_ROWS: usize = 16;
+    let rows = (0..view.height).step_by((view.height / SAMPLED_ROWS).max(1));
+    let largest = rows.fold(0.0, |m, y| largest_magnitude_in_row(m, view.row(y)));
+    let precision = (largest * RELATIVE_PRECISION).max(f32::MIN_POSITIVE * 1e6);
+    rounding_sigma_adu(step_adu).max(precision)
+}
+
+/// The median, of two middle values the upper; 0 without values. `sorted` is a buffer.
+pub(crate) fn median(values: &[f32], sorted: &mut Vec<f32>) -> f64 {
+    sorted.clear();
+    sorted.extend_from_slice(values);
+    let middle = sorted.len() / 2;
+    if values.is_empty() {
+        return 0.0;
+    }
+    f64::from(*sorted.select_nth_unstable_by(middle, f32::total_cmp).1)
+}

@@ -1,0 +1,54 @@
+//! The cells of a frame.
+
+use std::ops::Range;
+
+/// Row sampling stride in large cells.
+const ROW_STRIDE: usize = 4;
+/// Cells with fewer pixels than this are sampled in full.
+const SMALL_CELL_PX: usize = 1024;
+
+/// How a frame is divided into cells.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct CellGrid {
+    /// Cells across.
+    pub columns: usize,
+    /// Cells down.
+    pub rows: usize,
+    /// Pixels across.
+    pub width_px: usize,
+    /// Pixels down.
+    pub height_px: usize,
+}
+
+impl CellGrid {
+    /// Cells of about `cell_px` pixels a side in a frame of `width_px` times `height_px` pixels.
+    pub fn new((width_px, height_px): (usize, usize), cell_px: usize) -> Self {
+        let cells = |side: usize| ((side as f32 / cell_px as f32).round() as usize).max(1);
+        Self {
+            columns: cells(width_px),
+            rows: cells(height_px),
+            width_px,
+            height_px,
+        }
+    }
+
+    /// The columns of pixels in a column of cells.
+    pub fn columns_of(&self, column: usize) -> Range<usize> {
+        column * self.width_px / self.columns..(column + 1) * self.width_px / self.columns
+    }
+
+    /// The rows of pixels in a row of cells.
+    pub fn rows_of(&self, row: usize) -> Range<usize> {
+        row * self.height_px / self.rows..(row + 1) * self.height_px / self.rows
+    }
+
+    /// Row sampling stride: every this many rows of pixels are measured.
+    pub fn row_stride(&self) -> usize {
+        let cell_px = (self.width_px / self.columns) * (self.height_px / self.rows);
+        if cell_px >= SMALL_CELL_PX {
+            ROW_STRIDE
+        } else {
+            1
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! The filtered frame: its noise, and the candidates in it.
+//!
+//! The frame is filtered band by band. While a band is in the cache, its noise is measured and its
+//! candidates are gathered, so the filtered frame is never in memory as a whole.
+
+use super::candidate_pixels::Candidates;
+use crate::detect::background::{CellMeasurer, CellRows, Mesh, MeshConfig};
+use crate::detect::filter::{FilteredBand, Kernel};
+use crate::detect::pixels::{BlockMaxima, View};
+use std::ops::Range;
+
+/// Least noise of the filtered frame, as a part of that of independent pixels: a frame that is smooth
+/// below its own rounding is not known better.
+const SIGMA_FLOOR: f32 = 0.5;
+/// Candidates are gathered from this part of the threshold of their own row of cells on: the final
+/// threshold, from the smoothed mesh, is hardly lower.
+const CANDIDATE_MARGIN: f32 = 0.85;
+
+/// What is kept of a filtered frame.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct FilteredFrame {
+    /// Mean and standard deviation of the filtered frame, in units of the frame's noise.
+    pub mesh: Mesh,
+    /// The maxima of the blocks that hold candidates.
+    pub maxima: BlockMaxima,
+    /// The candidates of each row of cells.
+    pub candidates: Vec<Candidates>,
+    /// One for each thread.
+    workers: Vec<FilterWorker>,
+}
+
+/// The buffers of one thread.
+#[derive(Debug, Clone, Default)]
+struct FilterWorker {
+    cells: CellMeasurer,
+    band: FilteredBand,
+}
+
+impl FilteredFrame {
+    /// Shares the rows of cells among `threads` threads.
+    pub fn set_threads(&mut self, threads: usize) {
+        self.workers.resize_with(threads, FilterWorker::default);
+    }
+
+    /// Filters the frame, measures mean and noise in cells of about `cell_px` pixels a side, and gathers
+    /// the pixels that may be above `threshold` standard deviations.
+    pub fn filter(
+        &mut self,
+        view: &View<'_>,
+        background: &Mesh,
+        kernel: &Kernel,
+        cell_px: usize,
+        threshold: f64,
+    ) {
+        let Self {
+            mesh,
+            maxima,
+            candidates,
+            workers,
+        } = self;
+        let config = MeshConfig::of_filtered(cell_px, SIGMA_FLOOR);
+        let size = (view.width, view.height);
+        mesh.prepare(size, &config);
+        maxima.prepare(size);
+        let grid = mesh.grid;
+        candidates.resize_with(grid.rows, Candidates::default);
+        for worker in workers.iter_mut() {
+            worker.band.prepare(view.width, kernel);
+        }
+        CellRows::of(mesh, maxima, candidates).share(workers, &|worker, row| {
+            let FilterWorker { cells, band } = worker;
+            let rows = row.rows;
+            let filtered = with_neighbours(&rows, view.height);
+            band.filter(view, background, kernel, filtered);
+            let sampled = band.rows(rows.clone()).step_by(grid.row_stride());
+            cells.measure_row(&grid, sampled, &config, (row.background, row.sigma));
+            let cut = candidate_cut(row.background, row.sigma, threshold as f32);
+            row.output.gather(band, rows, cut, row.maxima);
+        });
+        mesh.finish();
+    }
+
+    /// Gathers candidates again in the rows of cells where `threshold` is lower than the cut so far.
+    pub fn gather_missed(
+        &mut self,
+        view: &View<'_>,
+        background: &Mesh,
+        kernel: &Kernel,
+        threshold: f32,
+    ) {
+        let Some(FilterWorker { band, .. }) = self.workers.first_mut() else {
+            return;
+        };
+        for (row, candidates) in self.candidates.iter_mut().enumerate() {
+            let lowest = self.mesh.lowest_about_row(row, threshold);
+            if !candidates.reach_down_to(lowest) {
+                let rows = self.mesh.grid.rows_of(row);
+                let filtered = with_neighbours(&rows, view.height);
+                band.filter(view, background, kernel, filtered);
+                let maxima = self.maxima.rows_mut(rows.clone());
+                candidates.gather(band, rows, lowest, maxima);
+            }
+        }
+    }
+}
+
+/// The value from which on pixels of a row of cells are candidates.
+fn candidate_cut(background: &[f32], sigma: &[f32], threshold: f32) -> f32 {
+    let cells = background.iter().zip(sigma);
+    let thresholds = cells.map(|(mean, sigma)| mean + threshold * sigma.max(SIGMA_FLOOR));
+    // A cell without a value (NaN) is ignored: it will get that of its neighbours.
+    let lowest = thresholds.fold(f32::INFINITY, f32::min);
+    let lowest = if lowest.is_finite() {
+        lowest
+    } else {
+        threshold * SIGMA_FLOOR
+    };
+    CANDIDATE_MARGIN * lowest
+}
+
+/// The rows, and one on either side within the frame.
+fn with_neighbours(rows: &Range<usize>, height: usize) -> Range<usize> {
+    rows.start.saturating_sub(1)..(rows.end + 1).min(height)
+}

@@ -1,0 +1,229 @@
+//! The search for sources: filter and threshold that fit the frame's own stars, then the peaks.
+//!
+//! The filter needs the spot size, and the spot size is measured on stars. Sharp stars stand out in the
+//! unfiltered frame; where there are too few of these, the frame is filtered with a guessed size, and
+//! again until the size of the stars found settles.
+
+use super::background::{FrameBackground, Mesh};
+use super::candidates::{FilteredFrame, PeakSearch, RawPeakFinder, SearchConfig};
+use super::config::DetectConfig;
+use super::filter::Kernel;
+use super::fit::{FitWork, Scene};
+use super::pixels::View;
+use super::psf::PIXEL_VARIANCE_PX2;
+use super::star_model::{
+    DEFAULT_SPOT_PX, SpotSize, StarModel, fit_bright_stars, fit_raw_stars, spot_size, star_model,
+};
+use super::threshold::{FrameNoise, NoiseWork, gaussian_threshold};
+
+/// A guessed spot size must be right within this factor; else the frame is filtered again.
+const SPOT_GUESS_TOLERANCE: f64 = 1.15;
+/// Most times that the frame is filtered.
+const MAX_FILTER_ROUNDS: usize = 3;
+/// This many stars of one size, found without a filter, settle the spot size; fewer may be chance.
+const ENOUGH_RAW_STARS: usize = 8;
+/// Smaller spots put so much light in one pixel that the brightest pixels are the brightest stars;
+/// wider ones are measured on the filtered frame.
+const SHARP_SPOT_PX: f64 = 0.75;
+
+/// A frame to be searched.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SearchInput<'a> {
+    /// The frame.
+    pub view: &'a View<'a>,
+    /// Its background and noise.
+    pub background: &'a FrameBackground,
+    /// Level from which on a pixel is saturated, in ADU.
+    pub saturation_adu: f32,
+    /// The options.
+    pub config: &'a DetectConfig,
+}
+
+impl<'a> SearchInput<'a> {
+    /// What fits need to know of the frame.
+    pub fn scene(&self, filtered: Option<&'a Mesh>, spot_px: f64, matched_gain: f64) -> Scene<'a> {
+        Scene {
+            view: *self.view,
+            background: &self.background.mesh,
+            filtered,
+            saturation_adu: self.saturation_adu,
+            spot_px,
+            matched_gain,
+        }
+    }
+
+    /// The size that the options state, else that of the stars.
+    fn with_stated_size(&self, model: StarModel) -> StarModel {
+        StarModel {
+            spot_px: self.config.spot_sigma_px.unwrap_or(model.spot_px),
+            ..model
+        }
+    }
+}
+
+/// How a frame was searched; its peaks and regions are in [`SearchWork`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Searched {
+    /// Spot size and noise model of the frame's stars.
+    pub stars: StarModel,
+    /// Filter and threshold of the last pass.
+    pub pass: Pass,
+}
+
+/// A pass of the filter over the frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pass {
+    /// Signal-to-noise ratio of a star whose flux equals the noise of a pixel: √ΣP².
+    pub matched_gain: f64,
+    /// The threshold, in standard deviations of the filtered noise.
+    pub threshold: f64,
+}
+
+/// What bright stars say about a frame.
+enum StarEstimate {
+    /// Size and noise model are final.
+    Settled(StarModel),
+    /// A better guess of the spot size, in pixels.
+    Guess(f64),
+}
+
+/// Buffers of the search, and the peaks that it found.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SearchWork {
+    /// The filtered frame.
+    pub filtered: FilteredFrame,
+    /// Peaks and regions above the threshold.
+    pub found: PeakSearch,
+    raw_peaks: RawPeakFinder,
+    noise: NoiseWork,
+    fits: FitWork,
+}
+
+impl SearchWork {
+    /// Shares the passes over the pixels among `threads` threads.
+    pub fn set_threads(&mut self, threads: usize) {
+        self.filtered.set_threads(threads);
+        self.raw_peaks.set_threads(threads);
+    }
+
+    /// Searches the frame with a filter of the size that its own stars have.
+    pub fn run(&mut self, input: &SearchInput<'_>) -> Searched {
+        let mut spot_px = match self.measure_unfiltered(input) {
+            StarEstimate::Settled(stars) => {
+                let pass = self.find_peaks(input, stars.spot_px);
+                return Searched { stars, pass };
+            }
+            StarEstimate::Guess(spot_px) => spot_px,
+        };
+        let mut rounds_left = MAX_FILTER_ROUNDS;
+        loop {
+            let pass = self.find_peaks(input, spot_px);
+            rounds_left -= 1;
+            match self.measure_filtered(input, spot_px, &pass, rounds_left == 0) {
+                StarEstimate::Settled(stars) => return Searched { stars, pass },
+                StarEstimate::Guess(better_px) => spot_px = better_px,
+            }
+        }
+    }
+
+    /// Measures the stars that stand out without a filter.
+    fn measure_unfiltered(&mut self, input: &SearchInput<'_>) -> StarEstimate {
+        let SearchInput { view, config, .. } = *input;
+        let Self {
+            raw_peaks, fits, ..
+        } = self;
+        raw_peaks.find(view, &input.background.mesh, input.saturation_adu);
+        let start_px = config.spot_sigma_px.unwrap_or(DEFAULT_SPOT_PX);
+        let matched_gain = Kernel::for_spot(start_px).matched_gain();
+        let mut scene = input.scene(None, start_px, matched_gain);
+        let stars = fit_raw_stars(&scene, &raw_peaks.peaks, fits);
+        let measured = spot_size(&stars);
+        if let (None, Some(size)) = (config.spot_sigma_px, measured) {
+            scene.spot_px = size.spot_px;
+        }
+        let is_enough =
+            |size: SpotSize| size.stars >= ENOUGH_RAW_STARS && size.spot_px < SHARP_SPOT_PX;
+        if measured.is_some_and(is_enough) {
+            let model = star_model(&scene, stars, fits);
+            StarEstimate::Settled(input.with_stated_size(model))
+        } else {
+            StarEstimate::Guess(scene.spot_px)
+        }
+    }
+
+    /// Measures the stars among the peaks of a pass with a filter for `spot_px`; the last pass settles.
+    fn measure_filtered(
+        &mut self,
+        input: &SearchInput<'_>,
+        spot_px: f64,
+        pass: &Pass,
+        is_last: bool,
+    ) -> StarEstimate {
+        let Self {
+            filtered,
+            found,
+            fits,
+            ..
+        } = self;
+        let mut scene = input.scene(Some(&filtered.mesh), spot_px, pass.matched_gain);
+        let stars = fit_bright_stars(&scene, &found.peaks, fits);
+        let measured = match input.config.spot_sigma_px {
+            None => spot_size(&stars).map(|size| size.spot_px),
+            Some(_) => None,
+        };
+        let measured_px = measured.unwrap_or(spot_px);
+        let ratio = (measured_px / spot_px).max(spot_px / measured_px);
+        if ratio < SPOT_GUESS_TOLERANCE || is_last {
+            scene.spot_px = measured_px;
+            let model = star_model(&scene, stars, fits);
+            StarEstimate::Settled(input.with_stated_size(model))
+        } else {
+            StarEstimate::Guess(measured_px)
+        }
+    }
+
+    /// Filters the frame for spots of `spot_px`, sets the threshold, and finds regions and peaks.
+    fn find_peaks(&mut self, input: &SearchInput<'_>, spot_px: f64) -> Pass {
+        let SearchInput {
+            view,
+            background,
+            saturation_adu,
+            config,
+        } = *input;
+        let Self {
+            filtered,
+            found,
+            noise,
+            ..
+        } = self;
+        let kernel = Kernel::for_spot(spot_px);
+        let size = (view.width, view.height);
+        let mesh = &background.mesh;
+        let gaussian = config
+            .threshold_sigma
+            .unwrap_or_else(|| gaussian_threshold(config, size, spot_px, &kernel));
+        filtered.filter(view, mesh, &kernel, config.cell_px, gaussian);
+        let frame_noise = FrameNoise {
+            view,
+            background,
+            filtered_mesh: &filtered.mesh,
+            filtered_maxima: &filtered.maxima,
+        };
+        let threshold = config
+            .threshold_sigma
+            .unwrap_or_else(|| frame_noise.raised_threshold(gaussian, spot_px, &kernel, noise));
+        filtered.gather_missed(view, mesh, &kernel, threshold as f32);
+        let spot_width_px = (spot_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt();
+        let search_config = SearchConfig {
+            threshold: threshold as f32,
+            spot_width_px: spot_width_px as f32,
+            saturation_adu,
+            max_peaks: config.max_detections,
+        };
+        found.run(&filtered.candidates, &filtered.mesh, view, &search_config);
+        Pass {
+            matched_gain: kernel.matched_gain(),
+            threshold,
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! How the noise grows with light, from the residuals of bright stars.
+//!
+//! Shot noise per ADU and the relative error of the spot model follow by least squares of the squared
+//! residuals.
+
+use super::bright_stars::{BrightStars, MAX_MODEL_ERROR, MAX_STARS};
+use super::spot_size::{MODE_WIDTH, weighted_size};
+use crate::detect::fit::{
+    Factor, Fit, FitConfig, FitWork, NoiseModel, ONE_SPOT, Pixels, Scene, SpotLight, linearise,
+    sum_of,
+};
+use crate::detect::psf::LANES;
+use arrayvec::ArrayVec;
+use multiversion::multiversion;
+use std::mem;
+
+/// An error of the spot model below this many standard errors is chance.
+const SIGNIFICANT_SIGMA: f64 = 2.0;
+/// Squared residuals count as at most this many variances. Those of close neighbours, which no star's
+/// noise explains, would grow with the variance that they cause.
+const MAX_SQUARED_SIGMA: f32 = 4.0;
+/// The mean of squared standard Gaussians that are cut off there.
+const CUT_OFF_MEAN: f32 = 0.920_5;
+/// Rounds of the least squares.
+const NOISE_ROUNDS: usize = 3;
+
+/// Size and noise of the stars of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct StarModel {
+    /// Standard deviation of the spot, in pixels.
+    pub spot_px: f64,
+    /// How the noise grows with light.
+    pub noise: NoiseModel,
+}
+
+/// The noise model from the residuals of stars of about the frame's spot size, and their mean size with
+/// the weights that follow from it.
+pub(crate) fn star_model(
+    scene: &Scene<'_>,
+    mut stars: BrightStars,
+    work: &mut FitWork,
+) -> StarModel {
+    stars.retain(|fit| (fit.spot_px / scene.spot_px).ln().abs() < MODE_WIDTH.ln());
+    // The start must not have too little noise: else a fit follows the brightest pixel wherever it is.
+    let brightest = stars.first().map(|fit| fit.spots[0]);
+    let mut model = NoiseModel {
+        shot_adu: brightest.map_or(0.0, |spot| scene.noise_at(spot.x, spot.y)),
+        model_error2: 0.0,
+    };
+    // Each round weights the squared residuals by the variance from the round before.
+    for _ in 0..NOISE_ROUNDS {
+        let mut sums = Moments::default();
+        let config = FitConfig {
+            spot_px: stars.iter().map(|s| s.spot_px).fold(0.0, f64::max),
+            free_spot: true,
+            noise: model,
+        };
+        let mut side_by_side = mem::take(&mut work.side_by_side);
+        let of_star = |(i, star): (usize, &Fit)| (i, star.spots[0], star.spot_px);
+        let starts: ArrayVec<_, MAX_STARS> = stars.iter().enumerate().map(of_star).collect();
+        let starts = starts.into_iter();
+        side_by_side.fit(scene, starts, &config, |i, fit, window| {
+            if let Some(fit) = fit {
+                work.window.copy_from(window);
+                sums.add_star(work, &fit, &config);
+                stars[i] = fit;
+            }
+        });
+        work.side_by_side = side_by_side;
+        model = sums.solve();
+        model.model_error2 = model.model_error2.min(MAX_MODEL_ERROR * MAX_MODEL_ERROR);
+    }
+    StarModel {
+        spot_px: weighted_size(&stars).unwrap_or(scene.spot_px),
+        noise: model,
+    }
+}
+
+/// Sums over pixels for `Σ [r² − (1 − h) v] ∂v / v² = 0`, with `v = n² + shot·m + ε²·m²` and the leverage
+/// h, the part of a pixel's variance that the star's own parameters absorb.
+///
+/// # Reference
+/// Davidian & Carroll 1987, J. Am. Stat. Assoc. 82, 1079, doi 10.1080/01621459.1987.10478543:
+/// pseudo-likelihood, corrected for leverage.
+#[derive(Debug, Default)]
+struct Moments {
+    /// Σ w m², Σ w m³, Σ w m⁴.
+    matrix: [f64; 3],
+    /// Σ w m d, Σ w m² d.
+    right: [f64; 2],
+}
+
+impl Moments {
+    /// Adds the pixels of one star in which its light is significant.
+    fn add_star(&mut self, work: &mut FitWork, fit: &Fit, config: &FitConfig) {
+        let FitWork { fitter, window, .. } = work;
+        let Some((factor, spot, pixels)) = fitter.factorised(window, fit, config) else {
+            return;
+        };
+        let per_noise = pixels.per_noise;
+        let [a, b, c, p, q] = sums_of(&factor, &spot, &pixels);
+        self.matrix[0] += a * per_noise * per_noise;
+        self.matrix[1] += b * per_noise;
+        self.matrix[2] += c;
+        self.right[0] += p * per_noise;
+        self.right[1] += q;
+    }
+
+    /// The non-negative solution; the error of the spot model is 0 where chance explains it.
+    fn solve(&self) -> NoiseModel {
+        let [a, b, c] = self.matrix;
+        let [p, q] = self.right;
+        let finite = |v: f64| if v.is_finite() { v.max(0.0) } else { 0.0 };
+        let noise_model = |shot: f64, error2: f64| NoiseModel {
+            shot_adu: finite(shot),
+            model_error2: finite(error2),
+        };
+        let determinant = a * c - b * b;
+        if determinant <= 1e-9 * a * c || !determinant.is_finite() {
+            return noise_model(0.0, q / c);
+        }
+        let shot = (p * c - q * b) / determinant;
+        let error2 = (q * a - p * b) / determinant;
+        let chance = SIGNIFICANT_SIGMA * (2.0 * a / determinant).sqrt();
+        if error2 < chance {
+            noise_model(p / a, 0.0)
+        } else if shot < 0.0 {
+            noise_model(0.0, q / c)
+        } else {
+            noise_model(shot, error2)
+        }
+    }
+}
+
+/// The sums of [`Moments`] over the pixels of one star, in units of the noise.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn sums_of(factor: &Factor<ONE_SPOT>, spot: &SpotLight, pixels: &Pixels) -> [f64; 5] {
+    let mut sums = [[0.0f32; LANES]; 5];
+    for group in 0..pixels.groups {
+        for (row, data) in pixels.column_of_groups(group).enumerate() {
+            let lights = [spot.in_group(group, row)];
+            for lane in 0..LANES {
+                let (light, gradient) = linearise(&lights, 1, lane);
+                let m2 = light * light;
+                let variance = pixels.variance(light);
+                let stands_out = light >= 0.0 && m2 >= 0.25 && !data[lane].is_nan();
+                let residual = data[lane] - light - pixels.background;
+                let free = (1.0 - factor.leverage(&gradient) / variance).max(0.0);
+                let squared = (residual * residual).min(MAX_SQUARED_SIGMA * free * variance);
+                let above_noise = squared / CUT_OFF_MEAN - free;
+                let weight = 1.0 / (variance * variance);
+                let terms = [
+                    free * m2,
+                    free * m2 * light,
+                    free * m2 * m2,
+                    light * above_noise,
+                    m2 * above_noise,
+                ];
+                for (sum, term) in sums.iter_mut().zip(terms) {
+                    sum[lane] += if stands_out { weight * term } else { 0.0 };
+                }
+            }
+        }
+    }
+    sums.map(sum_of)
+}

@@ -1,0 +1,133 @@
+//! The threshold for a frame: for Gaussian noise first, then raised for the noise that the frame has.
+
+use super::false_alarms::{for_estimated_noise, threshold_for_rate};
+use super::filter_weights::FilterWeights;
+use super::photons::{photon_skewness, threshold_for_photons};
+use super::pixel_noise::PixelNoise;
+use super::star_free::{NoiseWork, StarFree};
+use crate::detect::background::{FrameBackground, Mesh, median};
+use crate::detect::config::DetectConfig;
+use crate::detect::filter::Kernel;
+use crate::detect::pixels::{BlockMaxima, View};
+use crate::detect::psf::PIXEL_VARIANCE_PX2;
+
+/// Noise below this multiple of that of rounding, about half a step, is coarse: a few isolated pixels.
+const COARSE: f64 = 1.75;
+/// Coarse noise is measured again where it raises the threshold by more than this.
+const REPEAT_AT_RAISE: f64 = 0.2;
+
+/// The threshold for Gaussian noise that is measured on the frame itself, in standard deviations.
+pub(crate) fn gaussian_threshold(
+    config: &DetectConfig,
+    size: (usize, usize),
+    spot_px: f64,
+    kernel: &Kernel,
+) -> f64 {
+    let u = threshold_for_rate(config.false_alarms_per_mpx, kernel.rho, kernel.rho);
+    for_estimated_noise(u, noise_degrees(size, config, spot_px))
+}
+
+/// The degrees of freedom of the local noise estimate: the independent samples in a cell (a value of
+/// the filtered frame is correlated with 2πs² pixels), and a gain of 5 from the median of 3x3 cells.
+fn noise_degrees((width, height): (usize, usize), config: &DetectConfig, spot_px: f64) -> f64 {
+    const SMOOTHING_GAIN: f64 = 5.0;
+    const EFFICIENCY: f64 = 0.8;
+    let cell = (width.min(config.cell_px) * height.min(config.cell_px)) as f64;
+    let cells = ((width * height) as f64 / cell).max(1.0);
+    let correlated = std::f64::consts::TAU * (spot_px.powi(2) + PIXEL_VARIANCE_PX2);
+    (EFFICIENCY * cell / correlated.max(1.0) * SMOOTHING_GAIN.min(cells)).max(3.0)
+}
+
+/// A filtered frame whose threshold is wanted.
+pub(crate) struct FrameNoise<'a> {
+    /// The frame.
+    pub view: &'a View<'a>,
+    /// Its background and noise.
+    pub background: &'a FrameBackground,
+    /// Mean and noise of the filtered frame.
+    pub filtered_mesh: &'a Mesh,
+    /// The maxima of the blocks of the filtered frame that hold candidates.
+    pub filtered_maxima: &'a BlockMaxima,
+}
+
+impl FrameNoise<'_> {
+    /// The threshold `u` for Gaussian noise, raised for the longer tail that the frame's noise has.
+    pub fn raised_threshold(
+        &self,
+        u: f64,
+        spot_px: f64,
+        kernel: &Kernel,
+        work: &mut NoiseWork,
+    ) -> f64 {
+        let size = (self.view.width, self.view.height);
+        let filter = FilterWeights::for_spot(spot_px, kernel.radius(), size);
+        let mesh = &self.background.mesh;
+        let sigma = self.background.median_sigma_adu;
+        let is_coarse = sigma < COARSE * f64::from(mesh.sigma_floor);
+        if is_coarse || self.is_cut_off() {
+            return self.raised_for_histogram(u, &filter, is_coarse, work);
+        }
+        let star_free = self.star_free(u);
+        let skewness = photon_skewness(self.view, mesh, &star_free, spot_px, work);
+        skewness.map_or(u, |s| threshold_for_photons(u, s, &filter))
+    }
+
+    /// The threshold `u` raised for noise that is coarse or cut off, by the distribution of the pixels.
+    fn raised_for_histogram(
+        &self,
+        u: f64,
+        filter: &FilterWeights,
+        is_coarse: bool,
+        work: &mut NoiseWork,
+    ) -> f64 {
+        let floor = f64::from(self.filtered_mesh.sigma_floor);
+        let is_at_floor = median(&self.filtered_mesh.sigma, &mut work.sorted) <= floor * 1.001;
+        let mut raised = |limit: f64| {
+            let star_free = self.star_free(limit);
+            let noise = PixelNoise::measure(self.view, &self.background.mesh, &star_free, work);
+            noise.map_or(u, |n| {
+                let known_sigma = is_at_floor.then_some(floor / n.sigma);
+                n.threshold(u, filter, known_sigma)
+            })
+        };
+        // The isolated pixels of coarse noise are high, but they are no stars.
+        let limit = if is_coarse { 2.0 * u } else { u };
+        let first = raised(limit);
+        if first > limit + REPEAT_AT_RAISE {
+            // Pixels between the two limits were left out, but are noise.
+            raised(first)
+        } else {
+            first
+        }
+    }
+
+    /// The part of the frame where the filtered frame stays below `limit` standard deviations.
+    fn star_free(&self, limit: f64) -> StarFree<'_> {
+        StarFree {
+            maxima: self.filtered_maxima,
+            filtered_mesh: self.filtered_mesh,
+            limit: limit as f32,
+        }
+    }
+
+    /// Whether the noise is cut off at the frame's lowest value: many pixels have just that value.
+    fn is_cut_off(&self) -> bool {
+        /// Row sampling stride.
+        const STRIDE: usize = 16;
+        /// The lowest value of noise that is not cut off is further below the background, in σ.
+        const SIGMAS: f32 = 2.5;
+        /// Of noise that is cut off, one pixel in this many has the lowest value.
+        const ONE_IN: usize = 50;
+        let view = self.view;
+        let lowest = self.background.lowest_adu();
+        let below = self.background.median_adu - f64::from(lowest);
+        if below >= f64::from(SIGMAS) * self.background.median_sigma_adu {
+            return false;
+        }
+        let rows = (0..view.height).step_by(STRIDE).map(|y| view.row(y));
+        let count = |row: &[f32]| row.iter().map(|&v| u32::from(v == lowest)).sum::<u32>();
+        let at_lowest: usize = rows.map(|row| count(row) as usize).sum();
+        let total = view.width * view.height.div_ceil(STRIDE);
+        at_lowest * ONE_IN > total
+    }
+}

@@ -1,0 +1,75 @@
+//! Which pixels of a frame are free of stars, so that its noise can be measured on them.
+
+use crate::detect::background::{Mesh, Piece};
+use crate::detect::pixels::{BLOCK_PX, BlockMaxima, View};
+use std::ops::Range;
+
+/// Rows above and below that must be free of stars as well: their wings.
+const WING_ROWS: [usize; 2] = [4, 9];
+/// Fewer samples than this tell nothing about the tails of the noise.
+pub(crate) const MIN_SAMPLES: f64 = 2000.0;
+
+/// Buffers of the measurement of noise.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct NoiseWork {
+    /// The histogram bin of each pixel of a row.
+    pub bins: Vec<u16>,
+    /// A row in units of its noise.
+    pub standardised: Vec<f32>,
+    /// Background and noise along a row.
+    pub pieces: Vec<Piece>,
+    /// Mean and noise of the filtered frame along a row.
+    pub nodes: Vec<[f32; 2]>,
+    /// Values that are sorted for their median.
+    pub sorted: Vec<f32>,
+}
+
+/// The part of a frame without stars: where the filtered frame stays below a limit.
+pub(crate) struct StarFree<'a> {
+    /// The maxima of the blocks of the filtered frame that hold candidates.
+    pub maxima: &'a BlockMaxima,
+    /// The mesh of the filtered frame.
+    pub filtered_mesh: &'a Mesh,
+    /// The limit, in standard deviations of the filtered noise.
+    pub limit: f32,
+}
+
+impl StarFree<'_> {
+    /// Calls `each` with the columns of row `y` without stars and their wings, as spans of whole blocks.
+    pub fn spans(
+        &self,
+        y: usize,
+        view: &View<'_>,
+        nodes: &mut Vec<[f32; 2]>,
+        mut each: impl FnMut(Range<usize>),
+    ) {
+        let rows = [
+            y,
+            y.saturating_sub(WING_ROWS[0]),
+            y.saturating_sub(WING_ROWS[1]),
+            (y + WING_ROWS[0]).min(view.height - 1),
+            (y + WING_ROWS[1]).min(view.height - 1),
+        ]
+        .map(|row| self.maxima.row(row));
+        self.filtered_mesh.across_row(y, nodes);
+        let mut free = 0..0;
+        for block in 0..rows[0].len() {
+            let start = block * BLOCK_PX;
+            let end = (start + BLOCK_PX).min(view.width);
+            let middle = (start + end) as f32 * 0.5;
+            let (mean, sigma) = self.filtered_mesh.at_column(nodes, middle);
+            let limit = mean + self.limit * sigma;
+            if rows.iter().all(|r| r[block] < limit) {
+                free.end = end;
+            } else {
+                if !free.is_empty() {
+                    each(free);
+                }
+                free = end..end;
+            }
+        }
+        if !free.is_empty() {
+            each(free);
+        }
+    }
+}

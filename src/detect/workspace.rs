@@ -1,0 +1,47 @@
+//! Buffers of detection.
+
+use super::background::FrameBackground;
+use super::measure::{KnownSpots, MeasureWorker};
+use super::search::SearchWork;
+use std::num::NonZeroUsize;
+
+/// Buffers that are reused from frame to frame. Results do not depend on their contents.
+#[derive(Debug, Clone)]
+pub struct Workspace {
+    pub(crate) background: FrameBackground,
+    pub(crate) search: SearchWork,
+    pub(crate) measure_workers: Vec<MeasureWorker>,
+    pub(crate) known_spots: KnownSpots,
+}
+
+impl Workspace {
+    /// Empty buffers, for one thread.
+    pub fn new() -> Self {
+        let empty = Self {
+            background: FrameBackground::default(),
+            search: SearchWork::default(),
+            measure_workers: Vec::new(),
+            known_spots: KnownSpots::default(),
+        };
+        empty.on_threads(NonZeroUsize::MIN)
+    }
+
+    /// Shares the passes over the pixels among `threads` threads of the rayon pool in which
+    /// [`detect`](super::detect) is called. Results are the same for any number. One is best where other
+    /// frames keep the other threads busy.
+    #[must_use]
+    pub fn on_threads(mut self, threads: NonZeroUsize) -> Self {
+        let threads = threads.get();
+        self.background.set_threads(threads);
+        self.search.set_threads(threads);
+        self.measure_workers
+            .resize_with(threads, MeasureWorker::default);
+        self
+    }
+}
+
+impl Default for Workspace {
+    fn default() -> Self {
+        Self::new()
+    }
+}
