@@ -33,8 +33,8 @@ impl BackgroundMap {
         map
     }
 
-    /// Writes the background of the frame's row `y` into `row`, in ADU. Dead borders take the values next
-    /// to them.
+    /// Writes the background of the frame's row `y` into `row`, in ADU. Dead borders take the
+    /// values next to them.
     pub fn row(&self, y: usize, row: &mut [f32]) {
         let ([x0, y0], [width, height]) = (self.first, self.size);
         if width == 0 {

@@ -28,7 +28,8 @@ pub struct DetectConfig {
     pub cell_px: usize,
     /// Most detections that are kept, the strongest.
     pub max_detections: usize,
-    /// The level from which on a pixel is saturated, in ADU, where it is below that of the frame's format.
+    /// The level from which on a pixel is saturated, in ADU, where it is below that of the frame's
+    /// format.
     pub saturation_adu: Option<f64>,
 }
 
@@ -56,7 +57,8 @@ impl Default for DetectConfig {
 }
 
 impl DetectConfig {
-    /// The level from which on a pixel of `frame` is saturated, in ADU; infinite where none is known.
+    /// The level from which on a pixel of `frame` is saturated, in ADU; infinite where none is
+    /// known.
     pub(crate) fn saturation_adu(&self, frame: &Frame) -> f32 {
         let stated = self.saturation_adu.map_or(f32::INFINITY, |adu| adu as f32);
         frame.saturation_adu.unwrap_or(f32::INFINITY).min(stated)

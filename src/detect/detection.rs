@@ -8,7 +8,8 @@ use std::cmp::Ordering;
 pub struct Detection {
     /// The centroid.
     pub position: PixelPoint,
-    /// Standard error of the centroid in x, in pixels: from noise and from the error of the spot model.
+    /// Standard error of the centroid in x, in pixels: from noise and from the error of the spot
+    /// model.
     pub sigma_x_px: f64,
     /// Standard error of the centroid in y, in pixels.
     pub sigma_y_px: f64,
@@ -16,9 +17,9 @@ pub struct Detection {
     pub flux_adu: f64,
     /// Brightest pixel above the background, in ADU.
     pub peak_adu: f64,
-    /// Flux over its noise: that of the background and, where the frame's bright stars allow to measure
-    /// it, the shot noise of the star. The error of the spot model is not included (it would limit this to
-    /// about 30); it is included in the standard errors of the centroid.
+    /// Flux over its noise: that of the background and, where the frame's bright stars allow to
+    /// measure it, the shot noise of the star. The error of the spot model is not included (it
+    /// would limit this to about 30); it is included in the standard errors of the centroid.
     pub snr: f64,
     /// What is unusual about it.
     pub flags: DetectionFlags,

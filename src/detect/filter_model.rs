@@ -8,16 +8,16 @@ use crate::detect::threshold::{FilterWeights, gaussian_threshold, threshold_for_
 /// noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FilterModel {
-    /// The filter's weights along either axis at distances 0, 1, … pixels. The sum of their squares, both
-    /// sides counted, is 1, so filtered white noise keeps its standard deviation.
+    /// The filter's weights along either axis at distances 0, 1, … pixels. The sum of their
+    /// squares, both sides counted, is 1, so filtered white noise keeps its standard deviation.
     pub half_kernel: Vec<f64>,
     /// The threshold in standard deviations of the noise.
     pub threshold_sigma: f64,
 }
 
 impl FilterModel {
-    /// The model for a frame size and a spot's standard deviation, both in pixels, and the skewness of the
-    /// noise of a pixel: λ/n³ for λ photoelectrons and a total noise of n electrons.
+    /// The model for a frame size and a spot's standard deviation, both in pixels, and the skewness
+    /// of the noise of a pixel: λ/n³ for λ photoelectrons and a total noise of n electrons.
     pub fn new(
         config: &DetectConfig,
         size_px: (usize, usize),

@@ -1,21 +1,22 @@
 //! From a frame to its sources: positions with standard errors, fluxes and flags.
 //!
-//! [`Frame`] → [`Detections`], brightest first. Positions: (0, 0) is the centre of the first stored pixel.
+//! [`Frame`] → [`Detections`], brightest first. Positions: (0, 0) is the centre of the first stored
+//! pixel.
 //!
 //! 1. `background`: background and noise on a mesh of cells, robust against stars.
-//! 2. `filter`: a matched filter with the frame's own spot, a pixel-integrated Gaussian. The spot size
-//!    and the noise model are measured on bright stars (`star_model`).
+//! 2. `filter`: a matched filter with the frame's own spot, a pixel-integrated Gaussian. The spot
+//!    size and the noise model are measured on bright stars (`star_model`).
 //! 3. `threshold`: the noise of the filtered frame is measured on a mesh again, so correlated noise
-//!    (JPEG, demosaicing) is measured and not assumed. The threshold follows from the wanted number of
-//!    false detections, and from the distribution of the pixels where it is not Gaussian: few photons,
-//!    coarse steps, a black level that cuts off half of the noise.
-//! 4. `candidates`: connected regions above the threshold, their peaks, and which of those are sources
-//!    of their own.
-//! 5. `fit`, `measure`: a fit of each source, together with those that it touches, or a grey-weighted
-//!    centroid; flags for what is no star, or no whole one.
+//!    (JPEG, demosaicing) is measured and not assumed. The threshold follows from the wanted number
+//!    of false detections, and from the distribution of the pixels where it is not Gaussian: few
+//!    photons, coarse steps, a black level that cuts off half of the noise.
+//! 4. `candidates`: connected regions above the threshold, their peaks, and which of those are
+//!    sources of their own.
+//! 5. `fit`, `measure`: a fit of each source, together with those that it touches, or a
+//!    grey-weighted centroid; flags for what is no star, or no whole one.
 //!
-//! `search` runs steps 2 to 4, up to three times, until the filter fits the stars that it finds. Steps 1
-//! to 3 process the pixels in rows of cells, each by itself, so that threads can share them
+//! `search` runs steps 2 to 4, up to three times, until the filter fits the stars that it finds.
+//! Steps 1 to 3 process the pixels in rows of cells, each by itself, so that threads can share them
 //! ([`Workspace::on_threads`]) and the filtered frame is never in memory as a whole.
 //!
 //! Caveats: one spot size for the whole frame; a frame with fewer than three bright stars gets a
@@ -60,8 +61,8 @@ use search::SearchInput;
 /// Finds the stars of `frame`, and other sources, brightest first.
 ///
 /// `frame`: row-major, `height * width`, ADU. NaN pixels are masked; saturated stars are kept and
-/// flagged. A frame without light (one value everywhere) gives an empty list. Results do not depend on
-/// what `workspace` was used for before.
+/// flagged. A frame without light (one value everywhere) gives an empty list. Results do not depend
+/// on what `workspace` was used for before.
 ///
 /// # Errors
 /// [`DetectError::FrameTooSmall`], [`DetectError::WrongLength`] for frames of impossible size,
@@ -79,7 +80,8 @@ use search::SearchInput;
 ///     pixels[(40 + dy) * 128 + 60 + dx] += light;
 /// }
 /// let frame = Frame::new(128, 96, pixels)?;
-/// let found = detect(&frame, &DetectConfig::default(), &mut Workspace::new()).expect("the frame is large enough");
+/// let config = DetectConfig::default();
+/// let found = detect(&frame, &config, &mut Workspace::new()).expect("the frame is large enough");
 /// assert!((found.sources[0].position.x - 60.3).abs() < 0.3);
 /// # Ok::<(), starpipe::frame::FrameError>(())
 /// ```

@@ -1,8 +1,8 @@
 //! The search for sources: filter and threshold that fit the frame's own stars, then the peaks.
 //!
-//! The filter needs the spot size, and the spot size is measured on stars. Sharp stars stand out in the
-//! unfiltered frame; where there are too few of these, the frame is filtered with a guessed size, and
-//! again until the size of the stars found settles.
+//! The filter needs the spot size, and the spot size is measured on stars. Sharp stars stand out in
+//! the unfiltered frame; where there are too few of these, the frame is filtered with a guessed
+//! size, and again until the size of the stars found settles.
 
 use super::background::{FrameBackground, Mesh};
 use super::candidates::{FilteredFrame, PeakSearch, RawPeakFinder, SearchConfig};
@@ -151,7 +151,8 @@ impl SearchWork {
         }
     }
 
-    /// Measures the stars among the peaks of a pass with a filter for `spot_px`; the last pass settles.
+    /// Measures the stars among the peaks of a pass with a filter for `spot_px`; the last pass
+    /// settles.
     fn measure_filtered(
         &mut self,
         input: &SearchInput<'_>,

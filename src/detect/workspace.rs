@@ -27,8 +27,8 @@ impl Workspace {
     }
 
     /// Shares the passes over the pixels among `threads` threads of the rayon pool in which
-    /// [`detect`](super::detect) is called. Results are the same for any number. One is best where other
-    /// frames keep the other threads busy.
+    /// [`detect`](super::detect) is called. Results are the same for any number. One is best where
+    /// other frames keep the other threads busy.
     #[must_use]
     pub fn on_threads(mut self, threads: NonZeroUsize) -> Self {
         let threads = threads.get();

@@ -4,7 +4,7 @@
 use super::clipping::{DIFFERENCE_PX, Gaussian, MIN_SAMPLES, Samples, Tolerance, clipped};
 use super::grid::CellGrid;
 use super::medians::{self, CELL_LANES, CellLanes};
-use super::mesh::{MeshConfig, Sampled};
+use super::mesh_config::{MeshConfig, Sampled};
 use crate::detect::pixels::PixelRows;
 use std::f32::consts::SQRT_2;
 use std::ops::Range;
@@ -14,8 +14,8 @@ const FILTERED_TOLERANCE: Tolerance = Tolerance {
     mean: 1.2e-2,
     sigma: 1.2e-2,
 };
-/// Of the pixels of the frame: a 37th of an error of the mean is left after the last round, and σ is
-/// only a start for that of differences.
+/// Of the pixels of the frame: a 37th of an error of the mean is left after the last round, and σ
+/// is only a start for that of differences.
 const PIXEL_TOLERANCE: Tolerance = Tolerance {
     mean: 0.1,
     sigma: 0.2,
@@ -33,8 +33,8 @@ pub(crate) struct CellMeasurer {
 }
 
 impl CellMeasurer {
-    /// Measures background and noise of a row of cells, of which `rows` of pixels are sampled; NaN where
-    /// a cell has too few values.
+    /// Measures background and noise of a row of cells, of which `rows` of pixels are sampled; NaN
+    /// where a cell has too few values.
     pub fn measure_row(
         &mut self,
         grid: &CellGrid,

@@ -3,12 +3,14 @@
 use crate::detect::pixels::{PixelRows, pairwise_sum};
 use multiversion::multiversion;
 
-/// Samples further off than this many standard deviations are not counted: 99.7 % of Gaussian noise is.
+/// Samples further off than this many standard deviations are not counted: 99.7 % of Gaussian noise
+/// is.
 const CLIP_SIGMA: f32 = 3.0;
 /// The standard deviation of a Gaussian clipped at ±3σ, over σ.
 const CLIPPED_SHRINK: f32 = 0.986_58;
-/// The part of an error of σ that is left after a round of clipping: d ln s/d ln k at k = 3, with s the
-/// standard deviation of a Gaussian clipped at ±kσ. Each round extrapolates to where many would lead.
+/// The part of an error of σ that is left after a round of clipping: d ln s/d ln k at k = 3, with s
+/// the standard deviation of a Gaussian clipped at ±kσ. Each round extrapolates to where many would
+/// lead.
 const ERROR_LEFT_BY_ROUND: f32 = 0.11;
 /// Most rounds of clipping; one to three are usual.
 const MAX_ROUNDS: usize = 8;

@@ -2,7 +2,8 @@
 
 use super::cell_rows::CellRows;
 use super::cells::CellMeasurer;
-use super::mesh::{Mesh, MeshConfig};
+use super::mesh::Mesh;
+use super::mesh_config::MeshConfig;
 use crate::detect::pixels::{BlockMaxima, View, largest_magnitude_in_row, lower, lowest_in_row};
 
 /// The standard deviation of rounding to whole steps, over the step: 1/√12.
@@ -64,8 +65,8 @@ pub(crate) fn rounding_sigma_adu(step_adu: f32) -> f32 {
     ROUNDING_SIGMA * step_adu
 }
 
-/// A noise that is certainly below that of the frame, in ADU: that of rounding, or the precision of the
-/// pixels' numbers.
+/// A noise that is certainly below that of the frame, in ADU: that of rounding, or the precision of
+/// the pixels' numbers.
 pub(crate) fn sigma_floor(view: &View<'_>, step_adu: f32) -> f32 {
     const SAMPLED_ROWS: usize = 16;
     let rows = (0..view.height).step_by((view.height / SAMPLED_ROWS).max(1));

@@ -80,7 +80,8 @@ fn median_of_nine(mut v: [CellLanes; 9]) -> CellLanes {
     v[4]
 }
 
-/// The 3x3 values around up to [`CELL_LANES`] cells; `start` is the left column of the first square.
+/// The 3x3 values around up to [`CELL_LANES`] cells; `start` is the left column of the first
+/// square.
 #[inline(always)]
 fn squares(rows: [&[f32]; 3], start: usize, count: usize) -> [CellLanes; 9] {
     std::array::from_fn(|i| {
@@ -104,8 +105,8 @@ pub(crate) fn of_squares(rows: [&[f32]; 3], medians: &mut [f32]) {
     }
 }
 
-/// Replaces backgrounds that are outliers among the 3x3 around them by the median of these; the rows are
-/// two longer than `backgrounds`.
+/// Replaces backgrounds that are outliers among the 3x3 around them by the median of these; the
+/// rows are two longer than `backgrounds`.
 ///
 /// An outlier deviates from the median by more than three standard deviations of its neighbours, by
 /// their median deviation, and half the noise of a pixel.

@@ -4,49 +4,9 @@
 
 use super::cells::CellMeasurer;
 use super::grid::CellGrid;
+use super::mesh_config::MeshConfig;
 use super::smoothing::Smoother;
 use crate::detect::pixels::View;
-
-/// What is sampled for a mesh.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Sampled {
-    /// Pixels of a frame. Their noise is measured on differences between pixels two columns apart, which
-    /// gradients do not widen.
-    Pixels,
-    /// Pixels of a filtered frame, whose background is about 0 and whose noise is about 1.
-    Filtered,
-}
-
-/// How a mesh is measured.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct MeshConfig {
-    /// Wanted side of a cell, in pixels.
-    pub cell_px: usize,
-    /// What is sampled.
-    pub sampled: Sampled,
-    /// Least noise of a cell.
-    pub sigma_floor: f32,
-}
-
-impl MeshConfig {
-    /// The mesh of a frame.
-    pub fn of_pixels(cell_px: usize, sigma_floor: f32) -> Self {
-        Self {
-            cell_px,
-            sampled: Sampled::Pixels,
-            sigma_floor,
-        }
-    }
-
-    /// The mesh of a filtered frame.
-    pub fn of_filtered(cell_px: usize, sigma_floor: f32) -> Self {
-        Self {
-            cell_px,
-            sampled: Sampled::Filtered,
-            sigma_floor,
-        }
-    }
-}
 
 /// Background and noise of each cell of a frame, and between the cells' centres (the nodes).
 #[derive(Debug, Clone, Default)]
@@ -187,8 +147,8 @@ impl Mesh {
 
     /// Background and reciprocal noise along row `y`, as straight pieces between nodes.
     ///
-    /// Unlike [`Self::at`], this interpolates the reciprocal of the noise: the difference is below the
-    /// error of either.
+    /// Unlike [`Self::at`], this interpolates the reciprocal of the noise: the difference is below
+    /// the error of either.
     pub fn row_pieces(&self, y: usize, pieces: &mut Vec<Piece>) {
         let (row, fy) = Self::node(y as f32, self.rows_per_px, self.grid.rows);
         let below = (row + 1).min(self.grid.rows - 1);
@@ -277,7 +237,8 @@ impl Mesh {
         }));
     }
 
-    /// Background and noise at column `x` of the row whose nodes are given: the same as [`Self::at`].
+    /// Background and noise at column `x` of the row whose nodes are given: the same as
+    /// [`Self::at`].
     pub fn at_column(&self, nodes: &[[f32; 2]], x: f32) -> (f32, f32) {
         let (column, fx) = Self::node(x, self.columns_per_px, nodes.len());
         let (a, b) = (nodes[column], nodes[(column + 1).min(nodes.len() - 1)]);
@@ -294,11 +255,7 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, Normal};
 
-    const CONFIG: MeshConfig = MeshConfig {
-        cell_px: 64,
-        sampled: Sampled::Pixels,
-        sigma_floor: 1e-6,
-    };
+    const CONFIG: MeshConfig = MeshConfig::of_pixels(64, 1e-6);
 
     fn noise_frame(side: usize, sigma: f32, truth: impl Fn(usize, usize) -> f32) -> Vec<f32> {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);

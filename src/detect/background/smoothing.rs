@@ -1,7 +1,7 @@
 //! Gaps and outliers of a mesh.
 //!
-//! Cells without a value take the mean of their neighbours. The noise is smoothed by a median of 3x3
-//! cells; the background is replaced by it only where it is an outlier. Beyond the border the
+//! Cells without a value take the mean of their neighbours. The noise is smoothed by a median of
+//! 3x3 cells; the background is replaced by it only where it is an outlier. Beyond the border the
 //! background goes on as a plane does.
 
 use super::grid::CellGrid;
@@ -72,7 +72,8 @@ impl Smoother {
         }
     }
 
-    /// The median noise about a cell at the border: of an even number of cells, the lower middle one.
+    /// The median noise about a cell at the border: of an even number of cells, the lower middle
+    /// one.
     fn median_at_border(&self, grid: &CellGrid, cell: usize) -> f32 {
         let mut around = [f32::INFINITY; 9];
         let mut count = 0;
@@ -89,7 +90,8 @@ impl Smoother {
     fn pad(&mut self, grid: &CellGrid, background: &[f32]) {
         let CellGrid { columns, rows, .. } = *grid;
         let stride = columns + 2;
-        // Along one axis: the cell next to the border, and as far inside it as the wanted one is outside.
+        // Along one axis: the cell next to the border, and as far inside it as the wanted one is
+        // outside.
         let mirror = |at: usize, count: usize| {
             let inside = at.clamp(1, count) - 1;
             let mirrored = (2 * inside + 1).saturating_sub(at).min(count - 1);

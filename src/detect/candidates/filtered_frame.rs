@@ -9,8 +9,8 @@ use crate::detect::filter::{FilteredBand, Kernel};
 use crate::detect::pixels::{BlockMaxima, View};
 use std::ops::Range;
 
-/// Least noise of the filtered frame, as a part of that of independent pixels: a frame that is smooth
-/// below its own rounding is not known better.
+/// Least noise of the filtered frame, as a part of that of independent pixels: a frame that is
+/// smooth below its own rounding is not known better.
 const SIGMA_FLOOR: f32 = 0.5;
 /// Candidates are gathered from this part of the threshold of their own row of cells on: the final
 /// threshold, from the smoothed mesh, is hardly lower.
@@ -42,8 +42,8 @@ impl FilteredFrame {
         self.workers.resize_with(threads, FilterWorker::default);
     }
 
-    /// Filters the frame, measures mean and noise in cells of about `cell_px` pixels a side, and gathers
-    /// the pixels that may be above `threshold` standard deviations.
+    /// Filters the frame, measures mean and noise in cells of about `cell_px` pixels a side, and
+    /// gathers the pixels that may be above `threshold` standard deviations.
     pub fn filter(
         &mut self,
         view: &View<'_>,
@@ -80,7 +80,8 @@ impl FilteredFrame {
         mesh.finish();
     }
 
-    /// Gathers candidates again in the rows of cells where `threshold` is lower than the cut so far.
+    /// Gathers candidates again in the rows of cells where `threshold` is lower than the cut so
+    /// far.
     pub fn gather_missed(
         &mut self,
         view: &View<'_>,

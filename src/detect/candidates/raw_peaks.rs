@@ -126,8 +126,8 @@ impl BandWorker {
     }
 }
 
-/// A threshold for each block of columns in the band that begins at row `top`, below which no pixel is
-/// a peak.
+/// A threshold for each block of columns in the band that begins at row `top`, below which no pixel
+/// is a peak.
 fn block_thresholds(view: &View<'_>, background: &Mesh, top: usize, thresholds: &mut Vec<f32>) {
     thresholds.clear();
     let bottom = (top + BAND_PX) as f32;

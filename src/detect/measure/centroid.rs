@@ -15,8 +15,8 @@ const GREY_THRESHOLD_SIGMA: f64 = 3.0;
 ///
 /// # Reference
 /// Wang et al. 2019, Laser & Optoelectronics Progress 56, 101101, Eq. (6). Differs from the source:
-/// the threshold, which it leaves open, is subtracted; that brings the error from some 1.4 times the
-/// Cramér-Rao bound to 1.1.
+/// the threshold, which it leaves open, is subtracted; that brings the error from some 1.4 times
+/// the Cramér-Rao bound to 1.1.
 pub(crate) fn grey_weighted(
     scene: &Scene<'_>,
     noise: &NoiseModel,

@@ -60,7 +60,8 @@ impl ReachedBlock {
     }
 }
 
-/// Finds the blocks of `row` with pixels of at least the threshold of their block; NaN is below any.
+/// Finds the blocks of `row` with pixels of at least the threshold of their block; NaN is below
+/// any.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 pub(crate) fn find_reaching(row: &[f32], thresholds: &[f32], found: &mut Vec<ReachedBlock>) {
     found.clear();

@@ -1,5 +1,5 @@
-//! Reductions of rows of pixels, many columns side by side: one after the other, each step would wait
-//! for the one before.
+//! Reductions of rows of pixels, many columns side by side: one after the other, each step would
+//! wait for the one before.
 
 use multiversion::multiversion;
 

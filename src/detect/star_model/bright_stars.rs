@@ -1,7 +1,7 @@
 //! Fits of a frame's bright stars, each with a free size.
 //!
-//! Bright peaks that are neither saturated nor close to others are fitted. Hot pixels and cosmic rays
-//! are sharper than stars, lamps and comets wider, and none of them need be few.
+//! Bright peaks that are neither saturated nor close to others are fitted. Hot pixels and cosmic
+//! rays are sharper than stars, lamps and comets wider, and none of them need be few.
 
 use crate::detect::candidates::{Peak, RawPeak};
 use crate::detect::fit::{Fit, FitWork, NoiseModel, Scene, Spot};
@@ -22,8 +22,8 @@ const ISOLATION_SIGMA: f32 = 6.0;
 const SIZE_MARGIN_PX: f64 = 0.3;
 /// Peaks below this part of a peak do not disturb it.
 const FAINT_NEIGHBOUR: f32 = 0.1;
-/// Largest error of the spot model, as a part of the light in a pixel: a source with a larger one is no
-/// star.
+/// Largest error of the spot model, as a part of the light in a pixel: a source with a larger one
+/// is no star.
 pub(crate) const MAX_MODEL_ERROR: f64 = 0.1;
 
 /// Bright stars, each fitted with a free size.
@@ -108,8 +108,8 @@ fn fit_star(scene: &Scene<'_>, start: Spot, size_px: f64, work: &mut FitWork) ->
     is_star.then_some(fit)
 }
 
-/// Whether the fit's window, which is still in `work`, holds no light of another star: no pixel with
-/// next to no light of the star is above what its error and noise explain.
+/// Whether the fit's window, which is still in `work`, holds no light of another star: no pixel
+/// with next to no light of the star is above what its error and noise explain.
 fn is_alone(fit: &Fit, work: &mut FitWork) -> bool {
     /// Noise of a pixel, in standard deviations.
     const NOISE_SIGMA: f64 = 5.0;

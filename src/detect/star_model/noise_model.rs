@@ -1,7 +1,7 @@
 //! How the noise grows with light, from the residuals of bright stars.
 //!
-//! Shot noise per ADU and the relative error of the spot model follow by least squares of the squared
-//! residuals.
+//! Shot noise per ADU and the relative error of the spot model follow by least squares of the
+//! squared residuals.
 
 use super::bright_stars::{BrightStars, MAX_MODEL_ERROR, MAX_STARS};
 use super::spot_size::{MODE_WIDTH, weighted_size};
@@ -16,8 +16,8 @@ use std::mem;
 
 /// An error of the spot model below this many standard errors is chance.
 const SIGNIFICANT_SIGMA: f64 = 2.0;
-/// Squared residuals count as at most this many variances. Those of close neighbours, which no star's
-/// noise explains, would grow with the variance that they cause.
+/// Squared residuals count as at most this many variances. Those of close neighbours, which no
+/// star's noise explains, would grow with the variance that they cause.
 const MAX_SQUARED_SIGMA: f32 = 4.0;
 /// The mean of squared standard Gaussians that are cut off there.
 const CUT_OFF_MEAN: f32 = 0.920_5;
@@ -33,15 +33,16 @@ pub(crate) struct StarModel {
     pub noise: NoiseModel,
 }
 
-/// The noise model from the residuals of stars of about the frame's spot size, and their mean size with
-/// the weights that follow from it.
+/// The noise model from the residuals of stars of about the frame's spot size, and their mean size
+/// with the weights that follow from it.
 pub(crate) fn star_model(
     scene: &Scene<'_>,
     mut stars: BrightStars,
     work: &mut FitWork,
 ) -> StarModel {
     stars.retain(|fit| (fit.spot_px / scene.spot_px).ln().abs() < MODE_WIDTH.ln());
-    // The start must not have too little noise: else a fit follows the brightest pixel wherever it is.
+    // The start must not have too little noise: else a fit follows the brightest pixel wherever it
+    // is.
     let brightest = stars.first().map(|fit| fit.spots[0]);
     let mut model = NoiseModel {
         shot_adu: brightest.map_or(0.0, |spot| scene.noise_at(spot.x, spot.y)),
@@ -76,8 +77,8 @@ pub(crate) fn star_model(
     }
 }
 
-/// Sums over pixels for `Σ [r² − (1 − h) v] ∂v / v² = 0`, with `v = n² + shot·m + ε²·m²` and the leverage
-/// h, the part of a pixel's variance that the star's own parameters absorb.
+/// Sums over pixels for `Σ [r² − (1 − h) v] ∂v / v² = 0`, with `v = n² + shot·m + ε²·m²` and the
+/// leverage h, the part of a pixel's variance that the star's own parameters absorb.
 ///
 /// # Reference
 /// Davidian & Carroll 1987, J. Am. Stat. Assoc. 82, 1079, doi 10.1080/01621459.1987.10478543:

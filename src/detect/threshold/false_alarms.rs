@@ -1,9 +1,10 @@
 //! The threshold that gives a wanted number of false detections in pure noise.
 //!
-//! Noise filtered by a separable kernel is a Gaussian field on a grid, correlated by ρx and ρy between
-//! neighbours in a row and in a column. The chance that a pixel is a local maximum above u is
-//! `∫_u^∞ φ(z) Q(ρx,z) Q(ρy,z) dz`, where Q is the chance that both neighbours on an axis lie lower:
-//! `Q(ρ,z) = 1 − 2Φ̄(hz) + (1/π)∫₀^α exp(−½h²z²/sin²θ) dθ`, `h = √((1−ρ)/(1+ρ))`, `α = arcsin √((1−ρ²)/2)`.
+//! Noise filtered by a separable kernel is a Gaussian field on a grid, correlated by ρx and ρy
+//! between neighbours in a row and in a column. The chance that a pixel is a local maximum above u
+//! is `∫_u^∞ φ(z) Q(ρx,z) Q(ρy,z) dz`, where Q is the chance that both neighbours on an axis lie
+//! lower: `Q(ρ,z) = 1 − 2Φ̄(hz) + (1/π)∫₀^α exp(−½h²z²/sin²θ) dθ`, `h = √((1−ρ)/(1+ρ))`,
+//! `α = arcsin √((1−ρ²)/2)`.
 //!
 //! # Reference
 //! Taylor, Worsley & Gosselin 2007, "Maxima of discretely sampled random fields", Biometrika 94, 1,
@@ -96,7 +97,8 @@ pub(crate) fn threshold_for_rate(per_mpx: f64, rho_x: f64, rho_y: f64) -> f64 {
             .ln()
             - wanted
     };
-    // The rate falls about as exp(−u²/2): its logarithm is nearly linear in u², and secants converge fast.
+    // The rate falls about as exp(−u²/2): its logarithm is nearly linear in u², and secants
+    // converge fast.
     let within = |square: f64| square.clamp(RANGE.0 * RANGE.0, RANGE.1 * RANGE.1);
     let mut square = within(-2.0 * wanted);
     let mut slope = -0.5;

@@ -49,8 +49,9 @@ impl FilterWeights {
         }
     }
 
-    /// The value that the filtered noise of interior and border exceeds as often as Gaussian noise exceeds
-    /// `u`, from the quantile for given weights. `shift` is the mean at the border less that of the interior.
+    /// The value that the filtered noise of interior and border exceeds as often as Gaussian noise
+    /// exceeds `u`, from the quantile for given weights. `shift` is the mean at the border less
+    /// that of the interior.
     pub fn quantile_of_frame(
         &self,
         u: f64,

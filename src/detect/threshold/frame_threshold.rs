@@ -1,4 +1,5 @@
-//! The threshold for a frame: for Gaussian noise first, then raised for the noise that the frame has.
+//! The threshold for a frame: for Gaussian noise first, then raised for the noise that the frame
+//! has.
 
 use super::false_alarms::{for_estimated_noise, threshold_for_rate};
 use super::filter_weights::FilterWeights;
@@ -11,7 +12,8 @@ use crate::detect::filter::Kernel;
 use crate::detect::pixels::{BlockMaxima, View};
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
 
-/// Noise below this multiple of that of rounding, about half a step, is coarse: a few isolated pixels.
+/// Noise below this multiple of that of rounding, about half a step, is coarse: a few isolated
+/// pixels.
 const COARSE: f64 = 1.75;
 /// Coarse noise is measured again where it raises the threshold by more than this.
 const REPEAT_AT_RAISE: f64 = 0.2;
@@ -27,8 +29,9 @@ pub(crate) fn gaussian_threshold(
     for_estimated_noise(u, noise_degrees(size, config, spot_px))
 }
 
-/// The degrees of freedom of the local noise estimate: the independent samples in a cell (a value of
-/// the filtered frame is correlated with 2πs² pixels), and a gain of 5 from the median of 3x3 cells.
+/// The degrees of freedom of the local noise estimate: the independent samples in a cell (a value
+/// of the filtered frame is correlated with 2πs² pixels), and a gain of 5 from the median of 3x3
+/// cells.
 fn noise_degrees((width, height): (usize, usize), config: &DetectConfig, spot_px: f64) -> f64 {
     const SMOOTHING_GAIN: f64 = 5.0;
     const EFFICIENCY: f64 = 0.8;
@@ -72,7 +75,8 @@ impl FrameNoise<'_> {
         skewness.map_or(u, |s| threshold_for_photons(u, s, &filter))
     }
 
-    /// The threshold `u` raised for noise that is coarse or cut off, by the distribution of the pixels.
+    /// The threshold `u` raised for noise that is coarse or cut off, by the distribution of the
+    /// pixels.
     fn raised_for_histogram(
         &self,
         u: f64,

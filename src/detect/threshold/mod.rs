@@ -1,11 +1,12 @@
-//! The threshold: wanted number of false detections, and noise of the frame -> standard deviations of
-//! the filtered noise.
+//! The threshold: wanted number of false detections, and noise of the frame -> standard deviations
+//! of the filtered noise.
 //!
 //! 1. Gaussian noise: the rate of local maxima above a threshold, solved for the threshold
 //!    (`false_alarms`).
-//! 2. Other noise has longer tails. Photon noise is skewed (`photons`); noise below a quantisation step,
-//!    and noise that is cut off at zero, are measured whole (`pixel_noise`). Both are measured where no
-//!    star is (`star_free`); what they make of the tail of the filtered noise is in `saddlepoint`.
+//! 2. Other noise has longer tails. Photon noise is skewed (`photons`); noise below a quantisation
+//!    step, and noise that is cut off at zero, are measured whole (`pixel_noise`). Both are
+//!    measured where no star is (`star_free`); what they make of the tail of the filtered noise is
+//!    in `saddlepoint`.
 //! 3. `frame_threshold` decides which of these holds for a frame.
 
 mod false_alarms;

@@ -1,8 +1,8 @@
 //! The skewness of photon noise, and the threshold for it.
 //!
-//! The threshold does not follow from the measured tail itself: that is mostly of stars too faint to be
-//! detected, and a threshold raised for these would lose a third of the stars that can be detected.
-//! The skewness of the noise can be separated from that of faint stars.
+//! The threshold does not follow from the measured tail itself: that is mostly of stars too faint
+//! to be detected, and a threshold raised for these would lose a third of the stars that can be
+//! detected. The skewness of the noise can be separated from that of faint stars.
 
 use super::filter_weights::{FilterWeights, sum_of_powers};
 use super::saddlepoint::{CumulantTable, MAX_RAISE, after_clipping, saddlepoint_quantile};
@@ -20,8 +20,9 @@ const SAMPLES: usize = 75_000;
 /// Noise of neighbours with a higher correlation is not counted photons; faint stars make 0.02.
 const MAX_CORRELATION: f64 = 0.1;
 
-/// The threshold that filtered photon noise, of pixels with this skewness, exceeds as often as Gaussian
-/// noise exceeds `u`; at least `u`. It is in units of the noise that a mesh measures in the filtered frame.
+/// The threshold that filtered photon noise, of pixels with this skewness, exceeds as often as
+/// Gaussian noise exceeds `u`; at least `u`. It is in units of the noise that a mesh measures in
+/// the filtered frame.
 ///
 /// Poisson noise of standard deviation 1 and skewness s has `K(t) = (exp(st) − 1 − st)/s²`.
 pub(crate) fn threshold_for_photons(u: f64, skewness: f64, filter: &FilterWeights) -> f64 {
@@ -51,11 +52,13 @@ pub(crate) fn threshold_for_photons(u: f64, skewness: f64, filter: &FilterWeight
     })
 }
 
-/// The skewness of the pixels' noise, without that of stars too faint to be detected; `None` for too few
-/// pixels without stars, and where the noise of neighbours is correlated (JPEG, demosaicing).
+/// The skewness of the pixels' noise, without that of stars too faint to be detected; `None` for
+/// too few pixels without stars, and where the noise of neighbours is correlated (JPEG,
+/// demosaicing).
 ///
-/// Faint stars skew the pixels, too, but neighbours together. For noise that is independent from pixel
-/// to pixel the cumulant `κ(z, z, z')` of neighbours is 0; for stars it is `ΣP²P'/ΣP³` of `κ(z, z, z)`.
+/// Faint stars skew the pixels, too, but neighbours together. For noise that is independent from
+/// pixel to pixel the cumulant `κ(z, z, z')` of neighbours is 0; for stars it is `ΣP²P'/ΣP³` of
+/// `κ(z, z, z)`.
 pub(crate) fn photon_skewness(
     view: &View<'_>,
     mesh: &Mesh,
@@ -151,7 +154,8 @@ mod tests {
 
     #[test]
     fn photons_have_the_tail_of_the_poisson_distribution() {
-        // 16 pixels of 25 photons each: 400 together, and P(> 497.7) is that of a Gaussian beyond 4.5.
+        // 16 pixels of 25 photons each: 400 together, and P(> 497.7) is that of a Gaussian beyond
+        // 4.5.
         let filter = FilterWeights {
             inside: [(16.0, 0.25)].into_iter().collect(),
             at_border: [(16.0, 0.25)].into_iter().collect(),

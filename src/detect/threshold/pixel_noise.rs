@@ -1,7 +1,7 @@
 //! The distribution of noise that is coarse or cut off, measured on the pixels of a frame.
 //!
-//! Noise below a quantisation step, and noise that is cut off at zero, are skewed and heavy-tailed. Their
-//! cumulants K are those of the pixels' histogram.
+//! Noise below a quantisation step, and noise that is cut off at zero, are skewed and heavy-tailed.
+//! Their cumulants K are those of the pixels' histogram.
 
 use super::filter_weights::{FilterWeights, sum_of_powers};
 use super::saddlepoint::{
@@ -37,7 +37,8 @@ pub(crate) struct PixelNoise {
 }
 
 impl PixelNoise {
-    /// Measures a sample of the rows of `view` where it is free of stars; `None` for too few pixels.
+    /// Measures a sample of the rows of `view` where it is free of stars; `None` for too few
+    /// pixels.
     pub fn measure(
         view: &View<'_>,
         mesh: &Mesh,
@@ -121,9 +122,9 @@ impl PixelNoise {
         })
     }
 
-    /// The threshold that the filtered noise exceeds as often as Gaussian noise exceeds `u`; at least `u`.
-    /// It is in units of the noise that a mesh measures in the filtered frame, or of `known_sigma` times
-    /// the filtered noise.
+    /// The threshold that the filtered noise exceeds as often as Gaussian noise exceeds `u`; at
+    /// least `u`. It is in units of the noise that a mesh measures in the filtered frame, or of
+    /// `known_sigma` times the filtered noise.
     pub fn threshold(&self, u: f64, filter: &FilterWeights, known_sigma: Option<f64>) -> f64 {
         let table = self.tabulate(CumulantTable::step_for(filter));
         // A small sample lacks the tail that the saddlepoint depends on, but has the skewness.
@@ -152,8 +153,8 @@ impl PixelNoise {
         }
     }
 
-    /// The standard error of a raised threshold, from those of skewness and kurtosis of a Gaussian sample;
-    /// `cubes` and `fourths` are the filter's sums of powers.
+    /// The standard error of a raised threshold, from those of skewness and kurtosis of a Gaussian
+    /// sample; `cubes` and `fourths` are the filter's sums of powers.
     fn error_of_raise(&self, u: f64, cubes: f64, fourths: f64) -> f64 {
         // By Cornish and Fisher's expansion.
         let per_skewness = (u * u - 1.0) / 6.0;

@@ -1,9 +1,9 @@
 //! Tails of filtered noise that is not Gaussian, by the saddlepoint approximation.
 //!
-//! A filtered value is a sum `Σ W_p x_p` of independent pixels, so its cumulant generating function (the
-//! logarithm of the moment-generating function) is `Σ K(t W_p)`, with the K of a pixel. The tail follows:
-//! `P(> K'(t)) = Φ̄(w + ln(v/w)/w)`, `w = √(2(tK' − K))`, `v = t √K''`. To leading order this is the
-//! Cornish–Fisher correction; it stays accurate for strong skews and far tails.
+//! A filtered value is a sum `Σ W_p x_p` of independent pixels, so its cumulant generating function
+//! (the logarithm of the moment-generating function) is `Σ K(t W_p)`, with the K of a pixel. The
+//! tail follows: `P(> K'(t)) = Φ̄(w + ln(v/w)/w)`, `w = √(2(tK' − K))`, `v = t √K''`. To leading
+//! order this is the Cornish–Fisher correction; it stays accurate for strong skews and far tails.
 //!
 //! # Reference
 //! Lugannani & Rice 1980, doi 10.2307/1426607; Barndorff-Nielsen 1986, doi 10.1093/biomet/73.2.307,
@@ -61,8 +61,8 @@ impl CumulantTable {
     }
 }
 
-/// Mean and standard deviation of a nearly Gaussian sample of mean 0 and variance 1, after clipping at
-/// ±3σ until it settles, by Edgeworth's series.
+/// Mean and standard deviation of a nearly Gaussian sample of mean 0 and variance 1, after clipping
+/// at ±3σ until it settles, by Edgeworth's series.
 pub(crate) fn after_clipping(skewness: f64, excess_kurtosis: f64) -> (f64, f64) {
     const MEAN_PER_SKEWNESS: f64 = -0.041;
     const SIGMA_PER_SQUARED_SKEWNESS: f64 = -0.0265;

@@ -35,7 +35,8 @@ pub(crate) struct StarFree<'a> {
 }
 
 impl StarFree<'_> {
-    /// Calls `each` with the columns of row `y` without stars and their wings, as spans of whole blocks.
+    /// Calls `each` with the columns of row `y` without stars and their wings, as spans of whole
+    /// blocks.
     pub fn spans(
         &self,
         y: usize,

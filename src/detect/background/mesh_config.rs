@@ -1,0 +1,42 @@
+//! How a mesh is measured.
+
+/// What is sampled for a mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Sampled {
+    /// Pixels of a frame. Their noise is measured on differences between pixels two columns apart,
+    /// which gradients do not widen.
+    Pixels,
+    /// Pixels of a filtered frame, whose background is about 0 and whose noise is about 1.
+    Filtered,
+}
+
+/// How a mesh is measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct MeshConfig {
+    /// Wanted side of a cell, in pixels.
+    pub cell_px: usize,
+    /// What is sampled.
+    pub sampled: Sampled,
+    /// Least noise of a cell.
+    pub sigma_floor: f32,
+}
+
+impl MeshConfig {
+    /// The mesh of a frame.
+    pub const fn of_pixels(cell_px: usize, sigma_floor: f32) -> Self {
+        Self {
+            cell_px,
+            sampled: Sampled::Pixels,
+            sigma_floor,
+        }
+    }
+
+    /// The mesh of a filtered frame.
+    pub const fn of_filtered(cell_px: usize, sigma_floor: f32) -> Self {
+        Self {
+            cell_px,
+            sampled: Sampled::Filtered,
+            sigma_floor,
+        }
+    }
+}
