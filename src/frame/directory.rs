@@ -1,21 +1,24 @@
 //! The frames in a directory.
 
-use super::{FrameError, FrameFormat, HEAD_BYTES, format_inside, format_of};
+use super::error::FrameError;
+use super::format::FrameFormat;
+use super::gzip::format_inside;
+use super::limits::HEAD_BYTES;
 use memchr::memmem;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// The text in a PNG file, keyword and value, by which an overlay is known.
+/// Keyword and value of the PNG text that marks an overlay.
 pub(crate) const OVERLAY_TEXT: (&str, &str) = ("Software", "starpipe overlay");
 
-/// The files in `directory` that begin like an image, in the order of their names; directories in it are left out,
-/// and so is what was made of frames: overlays ([`is_overlay`]), masters ([`is_calibration_frame`]), and headers without an
-/// image (`.wcs`).
+/// The files in `directory` that begin like an image, sorted by name.
 ///
-/// A file of which not even the beginning can be read counts as a frame, so that this is told when it is read.
+/// Left out are subdirectories and products of starpipe: overlays ([`is_overlay`]), calibration
+/// frames ([`is_calibration_frame`]) and headers without an image (`.wcs`). A file that cannot be
+/// opened is listed, so that reading it reports the error.
 /// # Errors
-/// [`FrameError::File`] with the directory, around [`FrameError::Io`] or [`FrameError::NoFrames`].
+/// [`FrameError::File`] with the directory and [`FrameError::Io`] or [`FrameError::NoFrames`].
 pub fn files_in(directory: &Path) -> Result<Vec<PathBuf>, FrameError> {
     let files = all_files_in(directory).map_err(|e| FrameError::from(e).in_file(directory))?;
     let found = files.len();
@@ -33,7 +36,7 @@ fn all_files_in(directory: &Path) -> io::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(directory)? {
         let path = entry?.path();
-        // Opening anything but a file, a pipe for one, might wait for ever.
+        // Opening anything else, such as a pipe, may block.
         if path.is_file() {
             files.push(path);
         }
@@ -42,20 +45,23 @@ fn all_files_in(directory: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Whether the file that begins with `head` is a picture of a frame with its stars marked, as starpipe draws them.
+/// Whether the file that begins with `head` is an overlay: a frame with its stars marked, drawn by
+/// starpipe.
 pub fn is_overlay(head: &[u8]) -> bool {
     let (keyword, text) = OVERLAY_TEXT;
     let chunk = [b"tEXt", keyword.as_bytes(), b"\0", text.as_bytes()].concat();
-    format_of(head) == Some(FrameFormat::Png) && memmem::find(head, &chunk).is_some()
+    FrameFormat::of(head) == Some(FrameFormat::Png) && memmem::find(head, &chunk).is_some()
 }
 
-/// What the keyword CREATOR of a master frame begins with, by which it is known.
+/// Beginning of the CREATOR keyword that marks a calibration frame.
 pub const CALIBRATION_CREATOR: &str = "starpipe calibration";
 
-/// Whether the file that begins with `head` is a master dark, a master flat or a map of noise, as starpipe writes them.
+/// Whether the file that begins with `head` is a master dark, a master flat or a noise map written
+/// by starpipe.
 pub fn is_calibration_frame(head: &[u8]) -> bool {
     let card = format!("CREATOR = '{CALIBRATION_CREATOR}");
-    format_of(head) == Some(FrameFormat::Fits) && memmem::find(head, card.as_bytes()).is_some()
+    FrameFormat::of(head) == Some(FrameFormat::Fits)
+        && memmem::find(head, card.as_bytes()).is_some()
 }
 
 fn begins_like_a_frame(path: &Path) -> io::Result<bool> {
@@ -64,7 +70,7 @@ fn begins_like_a_frame(path: &Path) -> io::Result<bool> {
     }
     let mut head = Vec::new();
     File::open(path)?.take(HEAD_BYTES).read_to_end(&mut head)?;
-    Ok(match format_of(&head) {
+    Ok(match FrameFormat::of(&head) {
         Some(FrameFormat::Png) => !is_overlay(&head),
         Some(FrameFormat::Fits) => !is_calibration_frame(&head),
         Some(FrameFormat::Gzip) => format_inside(&head).0.is_some(),

@@ -1,93 +1,61 @@
-//! The kinds of file that can be read, and why one could not be.
+//! Errors of reading frames.
 
-use super::{MAX_PIXELS, MIN_SIDE_PX};
+use super::format::FrameFormat;
+use super::limits::{MAX_PIXELS, MIN_SIDE_PX};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-/// What a file may be.
+/// The formats, as error messages list them.
 const FORMATS: &str = "FITS, TIFF, PNG, JPEG, BMP or PGM";
 
-/// The kinds of file that can be read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FrameFormat {
-    /// Flexible Image Transport System.
-    Fits,
-    /// Tagged Image File Format, also BigTIFF.
-    Tiff,
-    /// Portable Network Graphics.
-    Png,
-    /// JPEG (JFIF or Exif).
-    Jpeg,
-    /// Windows bitmap.
-    Bmp,
-    /// Portable anymap: PBM, PGM, PPM or PAM.
-    Pnm,
-    /// Any of the others, compressed with gzip.
-    Gzip,
-}
-
-impl std::fmt::Display for FrameFormat {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Fits => "FITS",
-            Self::Tiff => "TIFF",
-            Self::Png => "PNG",
-            Self::Jpeg => "JPEG",
-            Self::Bmp => "BMP",
-            Self::Pnm => "PNM",
-            Self::Gzip => "gzip",
-        })
-    }
-}
-
-/// Why a frame could not be read.
+/// Error of reading a frame.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameError {
-    /// Something is wrong with a file.
+    /// An error in a file.
     #[error("{}: {source}", path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The error.
         source: Box<FrameError>,
     },
     /// The file cannot be opened or read.
     #[error("cannot be read: {0}")]
     Io(#[from] std::io::Error),
-    /// There are no bytes.
+    /// The file is empty.
     #[error("empty: found 0 bytes, expected an image ({FORMATS})")]
     Empty,
-    /// The first bytes are of no known image format.
+    /// The first bytes match no known image format.
     #[error("not an image: found {found} at byte 0, expected {FORMATS}")]
     UnknownFormat {
-        /// The first bytes, as text where they are text.
+        /// The first bytes, as text if they are text.
         found: String,
     },
-    /// The data end before the image does.
+    /// The data end before the image is complete.
     #[error("truncated {format}: found {found_bytes} bytes, expected more ({detail})")]
     Truncated {
-        /// The kind of file.
+        /// The format.
         format: FrameFormat,
-        /// The bytes there are.
+        /// Size of the data, in bytes.
         found_bytes: usize,
         /// What was being read.
         detail: String,
     },
-    /// The data break the format's rules.
+    /// The data violate the format.
     #[error("damaged {format}: {detail}")]
     Malformed {
-        /// The kind of file.
+        /// The format.
         format: FrameFormat,
-        /// What was found, and where.
+        /// What is wrong, and where.
         detail: String,
     },
-    /// A valid file of a kind that is not supported.
+    /// A valid file with a feature that is not supported.
     #[error("unsupported {format}: found {found}, expected {expected}")]
     Unsupported {
-        /// The kind of file.
+        /// The format.
         format: FrameFormat,
-        /// What the file holds.
+        /// The feature.
         found: String,
         /// What is supported.
         expected: &'static str,
@@ -100,10 +68,10 @@ pub enum FrameError {
         /// Rows.
         height: usize,
     },
-    /// More bytes than the largest frame has.
-    #[error("too large: found more than {limit} bytes, expected at most so many")]
+    /// More bytes than the largest frame needs.
+    #[error("too large: found more than {limit} bytes, expected at most {limit}")]
     TooManyBytes {
-        /// The most bytes of a file.
+        /// Maximum size, in bytes.
         limit: u64,
     },
     /// A side shorter than [`MIN_SIDE_PX`].
@@ -121,7 +89,7 @@ pub enum FrameError {
     WrongLength {
         /// Width times height.
         expected: usize,
-        /// The pixels there are.
+        /// Number of pixels.
         found: usize,
     },
     /// No pixel has a value.
@@ -132,19 +100,19 @@ pub enum FrameError {
     NoSuchPage {
         /// The page asked for, counted from 1.
         page: NonZeroUsize,
-        /// The pages there are.
+        /// Number of pages in the file.
         pages: usize,
     },
-    /// No file in a directory begins like an image.
+    /// A directory without frames.
     #[error("a directory without frames: found {} in it, expected {FORMATS}", files_found(*files))]
     NoFrames {
-        /// The files there are.
+        /// Number of files in it.
         files: usize,
     },
 }
 
 impl FrameError {
-    /// The same, with the file in which it is.
+    /// Wraps the error in [`FrameError::File`] with the path of its file.
     pub fn in_file(self, path: &Path) -> Self {
         Self::File {
             path: path.to_path_buf(),

@@ -1,17 +1,18 @@
-//! Exif, which cameras write into TIFF, JPEG and PNG.
+//! Exif attributes in TIFF, JPEG and PNG.
 //!
-//! Taken are `DateTimeOriginal`, `ExposureTime`, `FocalLength`, `FocalPlaneXResolution` and the place by GPS. TIFF's own `DateTime`
-//! is not: it is when the file was made or changed.
+//! Exif attributes → [`FrameMetadata`], from `DateTimeOriginal`, `ExposureTime`, `FocalLength`,
+//! `FocalPlaneXResolution` and the GPS position. TIFF's own `DateTime` is ignored: it is the time
+//! at which the file was last changed.
 //!
-//! Caveat: without `OffsetTimeOriginal` the clock's time zone is not known, and only the day is taken.
+//! Caveat: without `OffsetTimeOriginal` the time zone is unknown, and only the day is used.
 
-use super::metadata::{EXPOSURE, FOCAL_LENGTH, FrameMetadata, PIXEL_SIZE, Quantity};
+use super::metadata::{EXPOSURE, FOCAL_LENGTH, FrameMetadata, HeaderNumber, PIXEL_SIZE};
 use crate::base::epoch::ObservationDate;
 use crate::sky::observer::Site;
 use exif::{Field, In, Reader, Tag, Value};
 
-/// What the Exif attributes in `bytes`, laid out as a TIFF file, say of a frame `width` pixels wide. Attributes that
-/// cannot be understood are no reason to refuse an image.
+/// Metadata from the Exif attributes in `bytes`, which have the layout of a TIFF file, for a frame
+/// `width` pixels wide. Attributes that cannot be parsed are skipped.
 pub(super) fn metadata(bytes: &[u8], width: usize) -> FrameMetadata {
     let attributes = Attributes(fields(bytes));
     let mut metadata = FrameMetadata::default();
@@ -21,12 +22,12 @@ pub(super) fn metadata(bytes: &[u8], width: usize) -> FrameMetadata {
     metadata.site = attributes.site(&mut metadata);
     if let Some(day) = attributes.text(Tag::DateTimeOriginal) {
         let date = attributes.date(&day);
-        metadata.date = metadata.sensible_date("DateTimeOriginal", &day, date);
+        metadata.date = metadata.plausible_date("DateTimeOriginal", &day, date);
     }
     metadata
 }
 
-/// All attributes that can be read; many a camera's Exif breaks the rules somewhere.
+/// All attributes that can be parsed. Many cameras write Exif that violates the standard somewhere.
 fn fields(bytes: &[u8]) -> Vec<Field> {
     if let Ok((fields, _)) = exif::parse_exif(bytes) {
         return fields;
@@ -53,7 +54,7 @@ impl Attributes {
             Value::Ascii(lines) => {
                 let text = String::from_utf8_lossy(lines.first()?);
                 let text = text.trim_matches(['\0', ' ']).to_owned();
-                // Cameras without a clock write blanks between the colons.
+                // Cameras without a clock write blanks and colons.
                 text.contains(|c: char| c.is_ascii_digit()).then_some(text)
             }
             _ => None,
@@ -70,17 +71,13 @@ impl Attributes {
         }
     }
 
-    fn number(&self, metadata: &mut FrameMetadata, quantity: &Quantity, tag: Tag) -> Option<f64> {
-        let number = self.raw_number(tag)?;
-        metadata.sensible(
-            quantity,
-            &tag.to_string(),
-            &number.to_string(),
-            Some(number),
-        )
+    fn number(&self, metadata: &mut FrameMetadata, number: &HeaderNumber, tag: Tag) -> Option<f64> {
+        let value = self.raw_number(tag)?;
+        metadata.plausible(number, &tag.to_string(), &value.to_string(), Some(value))
     }
 
-    /// From pixels for a unit of length on the detector; where the image was made smaller since, pixels are larger.
+    /// The pixel pitch, from the resolution in the focal plane. If the image was scaled down, its
+    /// pixels are larger by that factor.
     fn pixel_size_um(&self, metadata: &mut FrameMetadata, width: usize) -> Option<f64> {
         let per_unit = self.raw_number(Tag::FocalPlaneXResolution)?;
         let unit_um = match self
@@ -90,14 +87,15 @@ impl Attributes {
             Some(3) => 10_000.0,
             Some(4) => 1000.0,
             Some(5) => 1.0,
-            // Inches, also where nothing is said.
+            // Inches are the default.
             _ => 25_400.0,
         };
-        let taken_width = self
+        let original_width = self
             .raw_number(Tag::PixelXDimension)
-            .filter(|taken| *taken > 0.0);
-        let size_um = unit_um / per_unit * taken_width.map_or(1.0, |taken| taken / width as f64);
-        metadata.sensible(
+            .filter(|width| *width > 0.0);
+        let reduction = original_width.map_or(1.0, |original| original / width as f64);
+        let size_um = unit_um / per_unit * reduction;
+        metadata.plausible(
             &PIXEL_SIZE,
             &Tag::FocalPlaneXResolution.to_string(),
             &format!("{per_unit} pixels on {unit_um} µm"),
@@ -105,7 +103,7 @@ impl Attributes {
         )
     }
 
-    /// Degrees, minutes and seconds, each a ratio, and a letter for the hemisphere.
+    /// The GPS position: degrees, minutes and seconds as ratios, and a letter for the hemisphere.
     fn site(&self, metadata: &mut FrameMetadata) -> Option<Site> {
         let angle = |tag: Tag, letter: Tag, negative: u8| -> Option<f64> {
             let Value::Rational(parts) = self.value(tag)? else {
@@ -129,14 +127,14 @@ impl Attributes {
         let height_m = self.raw_number(Tag::GPSAltitude).unwrap_or(0.0);
         let height_m = if is_below { -height_m } else { height_m };
         let text = format!("{lat_deg}, {lon_deg}");
-        metadata.sensible_site(
+        metadata.plausible_site(
             "GPSLatitude, GPSLongitude",
             &text,
             Some((lat_deg, lon_deg, height_m)),
         )
     }
 
-    /// `day` is as Exif writes it, `2019:07:29 20:47:26`.
+    /// Parses a date as Exif writes it, `2019:07:29 20:47:26`.
     fn date(&self, day: &str) -> Option<ObservationDate> {
         let (day, time) = day.split_once(' ').unwrap_or((day, ""));
         let day = day.replace(':', "-");

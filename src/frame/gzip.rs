@@ -1,16 +1,18 @@
 //! Files compressed with gzip.
 
-use super::{FrameError, FrameFormat, MAX_PIXELS, first_bytes, format_inside};
+use super::error::FrameError;
+use super::format::{FrameFormat, first_bytes};
+use super::limits::MAX_PIXELS;
 use flate2::read::MultiGzDecoder;
 use std::io::{ErrorKind, Read};
 
-/// The most bytes that may be in one: the largest frame in 64-bit floats, and some headers.
+/// Maximum decompressed size: the largest frame in 64-bit floats, and some headers.
 const MAX_UNPACKED_BYTES: u64 = MAX_PIXELS as u64 * 8 + (1 << 24);
 
-/// The image file in the file `bytes`.
+/// Decompresses the image file in `bytes`.
 /// # Errors
-/// [`FrameError::UnknownFormat`] if what is inside does not begin like one, before much of it is unpacked;
-/// [`FrameError::Truncated`], [`FrameError::Malformed`].
+/// [`FrameError::UnknownFormat`] if the content does not begin like an image, before much of it is
+/// decompressed; [`FrameError::Truncated`], [`FrameError::Malformed`].
 pub(super) fn unpack(bytes: &[u8]) -> Result<Vec<u8>, FrameError> {
     let format = FrameFormat::Gzip;
     let (known, inside) = format_inside(bytes);
@@ -42,8 +44,17 @@ pub(super) fn unpack(bytes: &[u8]) -> Result<Vec<u8>, FrameError> {
     Ok(unpacked)
 }
 
-/// As many bytes from the beginning of the file of which `head` is the beginning as can be had from it.
-pub(super) fn unpack_beginning(head: &[u8], wanted: usize) -> Vec<u8> {
+/// The format inside the gzip file that begins with `head`, and the first bytes of the content.
+/// Gzip inside gzip counts as no format.
+pub(super) fn format_inside(head: &[u8]) -> (Option<FrameFormat>, Vec<u8>) {
+    const SIGNATURE_BYTES: usize = 16;
+    let inside = unpack_beginning(head, SIGNATURE_BYTES);
+    let format = FrameFormat::of(&inside).filter(|format| *format != FrameFormat::Gzip);
+    (format, inside)
+}
+
+/// The first `wanted` bytes of the content, or as many as `head`, the beginning of the file, holds.
+fn unpack_beginning(head: &[u8], wanted: usize) -> Vec<u8> {
     let mut reader = MultiGzDecoder::new(head);
     let mut unpacked = vec![0; wanted];
     let mut filled = 0;

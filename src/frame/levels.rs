@@ -1,25 +1,27 @@
-//! From the samples that a reader decoded to a frame: luminance, saturation, and the unit that the levels come in.
+//! From decoded samples to a frame: luminance, saturation and the step between grey levels.
 
-use super::{Frame, FrameError, LUMINANCE_WEIGHTS, check_size};
+use super::error::FrameError;
+use super::image::{Frame, check_size};
 use multiversion::multiversion;
 
-/// The largest unit of levels looked for where a file holds fewer bits than its words: 2¹².
-const MAX_STEP: i64 = 1 << 12;
-/// How many values are looked at for a smaller unit before it is asked whether there can be one.
-const LOOKED_AT_TOGETHER: usize = 1024;
+/// Weights of red, green and blue in luminance: ITU-R BT.601, as in JPEG.
+pub const LUMINANCE_WEIGHTS: [f32; 3] = [0.299, 0.587, 0.114];
 
-/// Samples of one frame as a reader decoded them.
+/// Largest step between grey levels that is recognized in files that store few bits in wide words:
+/// 2¹².
+const MAX_STEP: i64 = 1 << 12;
+
+/// Decoded samples of one frame.
 pub(super) struct Samples<'a, T> {
     pub width: usize,
     pub height: usize,
     /// Interleaved, `height * width * channels`.
     pub values: &'a [T],
-    /// 1 grey, 2 grey and alpha, 3 colour, 4 colour and alpha.
+    /// 1: grey; 2: grey and alpha; 3: colour; 4: colour and alpha.
     pub channels: usize,
 }
 
-/// The frame of integer samples, of which `full_scale` is the largest of the format, in ADU: luminance,
-/// saturation, and the unit that the levels come in.
+/// Makes a frame from integer samples; `full_scale` is the largest value of the format, in ADU.
 pub(super) fn frame_from_integers<T: Copy + Into<i64>>(
     samples: &Samples<'_, T>,
     full_scale: T,
@@ -49,16 +51,16 @@ pub(super) fn frame_from_integers<T: Copy + Into<i64>>(
     } else {
         1
     };
-    let frame = Frame::of_numbers(width, height, pixels);
+    let frame = Frame::from_checked(width, height, pixels);
     Ok(with_step(frame, step, full_scale.into()))
 }
 
-/// The frame of `words` of 16 bits, `height * width` of them; its pixels lie in `room`.
+/// Makes a frame from `height * width` words of 16 bits; its pixels are stored in `buffer`.
 pub(super) fn frame_from_words(
     (width, height): (usize, usize),
     words: &[[u8; 2]],
     is_big_endian: bool,
-    mut room: Vec<f32>,
+    mut buffer: Vec<f32>,
 ) -> Result<Frame, FrameError> {
     check_size(width, height)?;
     let expected = width * height;
@@ -66,15 +68,16 @@ pub(super) fn frame_from_words(
         expected,
         found: words.len(),
     })?;
-    // What is overwritten need not be cleared.
-    room.resize(expected, 0.0);
-    let bits = numbers_of(words, is_big_endian, &mut room);
+    // Clears only what is new: all of it is overwritten.
+    buffer.resize(expected, 0.0);
+    let bits = numbers_of(words, is_big_endian, &mut buffer);
     let step = step_of(bits.into(), u16::MAX.into());
-    let frame = Frame::of_numbers(width, height, room);
+    let frame = Frame::from_checked(width, height, buffer);
     Ok(with_step(frame, step, u16::MAX.into()))
 }
 
-/// Writes the numbers of `words` into `pixels`; the bits that occur in those below full scale.
+/// Writes the values of `words` into `pixels`. Returns the union of the bits of all values below
+/// full scale.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn numbers_of(words: &[[u8; 2]], is_big_endian: bool, pixels: &mut [f32]) -> u16 {
     let mut bits = 0;
@@ -91,12 +94,13 @@ fn numbers_of(words: &[[u8; 2]], is_big_endian: bool, pixels: &mut [f32]) -> u16
 }
 
 fn with_step(frame: Frame, step: i64, full_scale: i64) -> Frame {
-    // Twelve bits in the upper part of sixteen saturate at 65520, not at 65535.
+    // Twelve bits in the upper part of sixteen saturate at 65520 instead of 65535.
     let saturation = full_scale / step * step;
     frame.with_levels(step as f32, Some(saturation as f32))
 }
 
-/// The frame of float samples, `height * width * channels` of them, which have neither steps nor a full scale.
+/// Makes a frame from `height * width * channels` float samples, which have no step and no full
+/// scale.
 pub(super) fn frame_from_floats(
     (width, height): (usize, usize),
     channels: usize,
@@ -113,7 +117,7 @@ pub(super) fn frame_from_floats(
     Frame::new(width, height, pixels)
 }
 
-/// Samples that come as one plane after another, pixel by pixel.
+/// Interleaves samples that are stored plane by plane.
 pub(super) fn interleaved<T: Copy>(planes: &[T], channels: usize) -> Vec<T> {
     let mut values = planes.to_vec();
     for (channel, plane) in planes.chunks_exact(planes.len() / channels).enumerate() {
@@ -123,7 +127,7 @@ pub(super) fn interleaved<T: Copy>(planes: &[T], channels: usize) -> Vec<T> {
     values
 }
 
-/// The luminance of one pixel; `full` where a channel is saturated.
+/// The luminance of one pixel; `full` if a channel is saturated.
 fn luminance(rgb: [f32; 3], full: f32) -> f32 {
     if rgb.iter().any(|&channel| channel >= full) {
         return full;
@@ -134,11 +138,13 @@ fn luminance(rgb: [f32; 3], full: f32) -> f32 {
     rgb.iter().zip(LUMINANCE_WEIGHTS).map(|(c, w)| c * w).sum()
 }
 
-/// The largest power of two that divides all levels below full scale: 16 where twelve bits are stored in sixteen.
+/// The largest power of two that divides all levels below full scale: 16 if twelve bits are stored
+/// in the upper part of sixteen.
 fn level_step<S>(samples: &[S], level: impl Fn(&S) -> i64, full_scale: i64) -> i64 {
+    /// Values between two checks for an early exit; a check at each would prevent vectorization.
+    const CHUNK: usize = 1024;
     let mut bits = MAX_STEP;
-    // The compiler works on many values at once where it need not look at the result after each.
-    for chunk in samples.chunks(LOOKED_AT_TOGETHER) {
+    for chunk in samples.chunks(CHUNK) {
         bits |= chunk.iter().map(&level).fold(0, |bits, value| {
             bits | if value == full_scale { 0 } else { value }
         });
@@ -149,10 +155,10 @@ fn level_step<S>(samples: &[S], level: impl Fn(&S) -> i64, full_scale: i64) -> i
     step_of(bits, full_scale)
 }
 
-/// The unit of levels in which these bits occur, of a format with this full scale.
+/// The step between levels in which only `bits` occur.
 fn step_of(bits: i64, full_scale: i64) -> i64 {
     let step = 1 << (bits | MAX_STEP).trailing_zeros();
-    // All levels zero, or nothing but full scale: nothing can be told.
+    // Only zeros and full scale: the step cannot be determined.
     if step >= MAX_STEP.min(full_scale) {
         1
     } else {

@@ -1,18 +1,18 @@
-//! How a frame was taken, as its file states it.
+//! How a frame was taken, according to its file.
 
 use crate::base::epoch::ObservationDate;
 use crate::sky::observer::Site;
 use std::fmt;
 use std::ops::RangeInclusive;
 
-/// How a frame was taken, as its file states it. The values are plausible, not verified.
+/// How a frame was taken, according to its file. The values are plausible, not verified.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrameMetadata {
     /// Date of the exposure.
     pub date: Option<ObservationDate>,
     /// Exposure time, in seconds.
     pub exposure_s: Option<f64>,
-    /// Pixel pitch of the stored pixels (binned, where the file is), in micrometres.
+    /// Pixel pitch of the stored pixels, binning included, in micrometres.
     pub pixel_size_um: Option<f64>,
     /// Focal length of the optics, in millimetres.
     pub focal_length_mm: Option<f64>,
@@ -24,7 +24,7 @@ pub struct FrameMetadata {
     pub ignored: Vec<IgnoredValue>,
 }
 
-/// A value in a file's header that is not used, because it cannot be true.
+/// A value in a file's header that is not used because it is implausible.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct IgnoredValue {
     /// The keyword or keywords.
@@ -49,32 +49,32 @@ impl fmt::Display for IgnoredValue {
     }
 }
 
-/// A number that a header may give, and its plausible range.
-pub(super) struct Quantity {
+/// A number in a header, and its plausible range.
+pub(super) struct HeaderNumber {
     name: &'static str,
     unit: &'static str,
     limits: RangeInclusive<f64>,
 }
 
-pub(super) const EXPOSURE: Quantity = Quantity {
+pub(super) const EXPOSURE: HeaderNumber = HeaderNumber {
     name: "an exposure",
     unit: "s",
     limits: 1e-6..=1e6,
 };
 
-pub(super) const PIXEL_SIZE: Quantity = Quantity {
+pub(super) const PIXEL_SIZE: HeaderNumber = HeaderNumber {
     name: "a pixel",
     unit: "µm",
     limits: 0.1..=200.0,
 };
 
-pub(super) const FOCAL_LENGTH: Quantity = Quantity {
+pub(super) const FOCAL_LENGTH: HeaderNumber = HeaderNumber {
     name: "a focal length",
     unit: "mm",
     limits: 1.0..=100_000.0,
 };
 
-pub(super) const ALTITUDE: Quantity = Quantity {
+pub(super) const ALTITUDE: HeaderNumber = HeaderNumber {
     name: "an altitude",
     unit: "degrees",
     limits: 0.0..=90.0,
@@ -88,29 +88,29 @@ impl FrameMetadata {
         Some(self.pixel_size_um? / focal_length_um)
     }
 
-    /// Returns `value` if it is plausible for `quantity`; otherwise records it as ignored.
-    pub(super) fn sensible(
+    /// Returns `value` if it is within the range of `number`; otherwise records it as ignored.
+    pub(super) fn plausible(
         &mut self,
-        quantity: &Quantity,
+        number: &HeaderNumber,
         keyword: &str,
         text: &str,
         value: Option<f64>,
     ) -> Option<f64> {
-        let sensible = value.filter(|value| quantity.limits.contains(value));
-        if sensible.is_none() {
-            let (low, high) = (quantity.limits.start(), quantity.limits.end());
-            let Quantity { name, unit, .. } = quantity;
+        let plausible = value.filter(|value| number.limits.contains(value));
+        if plausible.is_none() {
+            let (low, high) = (number.limits.start(), number.limits.end());
+            let HeaderNumber { name, unit, .. } = number;
             self.ignore(
                 keyword,
                 text,
                 &format!("{name} from {low} to {high} {unit}"),
             );
         }
-        sensible
+        plausible
     }
 
     /// Returns `date` if there is one; otherwise records the text as ignored.
-    pub(super) fn sensible_date(
+    pub(super) fn plausible_date(
         &mut self,
         keyword: &str,
         text: &str,
@@ -124,9 +124,9 @@ impl FrameMetadata {
         date
     }
 
-    /// Returns the site at a latitude and longitude in degrees and a height in metres; records the text as
-    /// ignored where they are out of range.
-    pub(super) fn sensible_site(
+    /// Returns the site at a latitude and longitude in degrees and a height in metres. If they are
+    /// out of range, records the text as ignored.
+    pub(super) fn plausible_site(
         &mut self,
         keywords: &str,
         text: &str,
@@ -172,7 +172,7 @@ mod tests {
     fn implausible_values_are_recorded_and_not_used() {
         let mut metadata = FrameMetadata::default();
         for (text, value) in [("0", Some(0.0)), ("NaN", Some(f64::NAN)), ("long", None)] {
-            assert_eq!(metadata.sensible(&EXPOSURE, "EXPTIME", text, value), None);
+            assert_eq!(metadata.plausible(&EXPOSURE, "EXPTIME", text, value), None);
         }
         assert_eq!(
             metadata.ignored[0].to_string(),
@@ -180,7 +180,7 @@ mod tests {
         );
         assert_eq!(metadata.ignored.len(), 3);
         assert_eq!(
-            metadata.sensible(&EXPOSURE, "EXPTIME", "2", Some(2.0)),
+            metadata.plausible(&EXPOSURE, "EXPTIME", "2", Some(2.0)),
             Some(2.0)
         );
         assert_eq!(metadata.ignored.len(), 3);

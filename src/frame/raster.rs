@@ -1,7 +1,11 @@
-//! PNG, JPEG, BMP and PNM, decoded by the `image` crate to 8 or 16 bits a sample.
+//! PNG, JPEG, BMP and PNM, decoded by the `image` crate to 8 or 16 bits per sample.
 
+use super::error::FrameError;
+use super::exif;
+use super::format::FrameFormat;
+use super::image::{Frame, check_size};
 use super::levels::{Samples, frame_from_integers};
-use super::{Frame, FrameError, FrameFormat, MAX_PIXELS, check_size, exif};
+use super::limits::MAX_PIXELS;
 use image::codecs::bmp::BmpDecoder;
 use image::codecs::jpeg::JpegDecoder;
 use image::codecs::png::PngDecoder;
@@ -10,12 +14,13 @@ use image::error::{ImageError, UnsupportedErrorKind};
 use image::{ColorType, DynamicImage, ExtendedColorType, ImageDecoder, Limits};
 use std::io::{Cursor, ErrorKind};
 
-/// Decodes a PNG of any colour type and depth; depths below 8 bits are spread over 0-255, as PNG defines.
+/// Decodes a PNG of any colour type and depth. Depths below 8 bits are scaled to 0-255, as PNG
+/// defines.
 /// # Errors
-/// As [`super::decode`].
+/// As [`super::reader::decode`].
 pub(super) fn decode_png(bytes: &[u8]) -> Result<Frame, FrameError> {
     let format = FrameFormat::Png;
-    // Looked at first, so that the decoder allocates nothing for absurd sizes.
+    // Checked first, so that the decoder allocates nothing for absurd sizes.
     if let (Some(width), Some(height)) = (word(bytes, 16), word(bytes, 20)) {
         check_size(
             u32::from_be_bytes(width) as usize,
@@ -37,12 +42,12 @@ pub(super) fn decode_png(bytes: &[u8]) -> Result<Frame, FrameError> {
 
 /// Decodes a baseline or progressive JPEG.
 /// # Errors
-/// As [`super::decode`].
+/// As [`super::reader::decode`].
 pub(super) fn decode_jpeg(bytes: &[u8]) -> Result<Frame, FrameError> {
     let format = FrameFormat::Jpeg;
     let decoder =
         JpegDecoder::new(Cursor::new(bytes)).map_err(|e| error_of(e, format, bytes.len()))?;
-    // The decoder paints what is missing grey, without a word.
+    // The decoder fills missing data with grey and reports no error.
     if !has_jpeg_end(bytes) {
         return Err(FrameError::Truncated {
             format,
@@ -55,17 +60,17 @@ pub(super) fn decode_jpeg(bytes: &[u8]) -> Result<Frame, FrameError> {
 
 /// Decodes a Windows bitmap.
 /// # Errors
-/// As [`super::decode`].
+/// As [`super::reader::decode`].
 pub(super) fn decode_bmp(bytes: &[u8]) -> Result<Frame, FrameError> {
-    /// The least that a header is long if its sides have four bytes each.
+    /// Minimum length of a header that stores width and height in four bytes each.
     const LONG_HEADER: u32 = 16;
     let format = FrameFormat::Bmp;
-    // The decoder has limits of its own; a size beyond ours is told as in any other format.
+    // The decoder has limits of its own; this reports a large size as in every other format.
     if let (Some(header), Some(width), Some(height)) =
         (word(bytes, 14), word(bytes, 18), word(bytes, 22))
         && u32::from_le_bytes(header) >= LONG_HEADER
     {
-        // Rows run upward, or downward where the height is negative.
+        // A negative height means rows from top to bottom.
         let side = |word| i32::from_le_bytes(word).unsigned_abs() as usize;
         check_size(side(width), side(height))?;
     }
@@ -74,29 +79,29 @@ pub(super) fn decode_bmp(bytes: &[u8]) -> Result<Frame, FrameError> {
     decode_with(decoder, format, bytes.len())
 }
 
-/// Decodes a portable anymap: PBM, PGM, PPM (plain or binary) or PAM, with levels as they are in the file.
+/// Decodes a portable anymap: PBM, PGM, PPM (plain or binary) or PAM, with the levels of the file.
 /// # Errors
-/// As [`super::decode`].
+/// As [`super::reader::decode`].
 pub(super) fn decode_pnm(bytes: &[u8]) -> Result<Frame, FrameError> {
     let format = FrameFormat::Pnm;
     let decoder =
         PnmDecoder::new(Cursor::new(bytes)).map_err(|e| error_of(e, format, bytes.len()))?;
     let maxval = decoder.header().maximal_sample();
     let decoded = Decoded::new(decoder, format, bytes.len())?;
-    // The decoder spreads the levels up to `maxval` over all of 8 or 16 bits, and rounds.
-    let level = |spread: u16, full: u16| {
-        let level = f64::from(spread) * f64::from(maxval) / f64::from(full);
+    // The decoder scales levels from 0..=maxval to all of 8 or 16 bits, and rounds: this is undone.
+    let level = |scaled: u16, full: u16| {
+        let level = f64::from(scaled) * f64::from(maxval) / f64::from(full);
         level.round() as u16
     };
     match (decoded.depth, u16::try_from(maxval)) {
         (Depth::Eight, Ok(maxval @ 0..=0xff)) => {
-            let spread = decoded.image.as_bytes().iter();
-            let levels: Vec<u16> = spread.map(|&v| level(u16::from(v), 0xff)).collect();
+            let scaled = decoded.image.as_bytes().iter();
+            let levels: Vec<u16> = scaled.map(|&v| level(u16::from(v), 0xff)).collect();
             decoded.integers(&levels, maxval)
         }
         (Depth::Sixteen, Ok(maxval)) => {
-            let spread = decoded.words();
-            let levels: Vec<u16> = spread.iter().map(|&v| level(v, u16::MAX)).collect();
+            let scaled = decoded.words();
+            let levels: Vec<u16> = scaled.iter().map(|&v| level(v, u16::MAX)).collect();
             decoded.integers(&levels, maxval)
         }
         _ => Err(unsupported(
@@ -111,7 +116,8 @@ fn word(bytes: &[u8], at: usize) -> Option<[u8; 4]> {
     bytes.get(at..)?.first_chunk().copied()
 }
 
-/// Whether an end-of-image marker follows the last start of a scan; scan data cannot contain either.
+/// Whether an end-of-image marker follows the last start of a scan; scan data cannot contain
+/// either.
 fn has_jpeg_end(bytes: &[u8]) -> bool {
     let last = |marker: u8| bytes.windows(2).rposition(|pair| pair == [0xff, marker]);
     match (last(0xda), last(0xd9)) {
@@ -126,7 +132,7 @@ fn limits() -> Limits {
     limits
 }
 
-/// Checks the size, decodes, and makes luminance of it; adds what Exif says.
+/// Checks the size, decodes, converts to luminance and adds the Exif metadata.
 fn decode_with(
     mut decoder: impl ImageDecoder,
     format: FrameFormat,
@@ -142,14 +148,14 @@ fn decode_with(
     Ok(frame.with_metadata(metadata.unwrap_or_default()))
 }
 
-/// Bits of a sample.
+/// Bits per sample.
 #[derive(Clone, Copy)]
 enum Depth {
     Eight,
     Sixteen,
 }
 
-/// What a decoder made of a file.
+/// A decoded image.
 struct Decoded {
     image: DynamicImage,
     channels: usize,
@@ -181,7 +187,7 @@ impl Decoded {
         })
     }
 
-    /// The samples of an image of 16 bits.
+    /// The samples of a 16-bit image.
     fn words(&self) -> Vec<u16> {
         let pairs = self.image.as_bytes().chunks_exact(2);
         pairs.map(|p| u16::from_ne_bytes([p[0], p[1]])).collect()
@@ -206,7 +212,7 @@ fn unsupported(format: FrameFormat, found: String) -> FrameError {
     FrameError::Unsupported {
         format,
         found,
-        expected: "8 or 16 bits a sample, grey or colour",
+        expected: "8 or 16 bits per sample, grey or colour",
     }
 }
 
@@ -227,7 +233,7 @@ fn error_of(error: ImageError, format: FrameFormat, found_bytes: usize) -> Frame
                 _ => detail,
             },
         ),
-        // The decoders below word the end of the data in their own ways.
+        // The decoders have no common error for the end of the data.
         _ if [
             "end of file",
             "eof",

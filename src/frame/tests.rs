@@ -1,6 +1,8 @@
+use super::reader::read_limited;
 use super::*;
 use proptest::prelude::*;
-use std::io::{Cursor, Write};
+use std::io::{Cursor, Read, Write};
+use std::num::NonZeroUsize;
 
 fn tiff_of<C: ::tiff::encoder::colortype::ColorType>(
     width: u32,
@@ -16,7 +18,7 @@ where
     out.into_inner()
 }
 
-fn encoded_by_image(image: &image::DynamicImage, format: image::ImageFormat) -> Vec<u8> {
+fn encoded_by_image(image: &::image::DynamicImage, format: ::image::ImageFormat) -> Vec<u8> {
     let mut out = Cursor::new(Vec::new());
     image.write_to(&mut out, format).unwrap();
     out.into_inner()
@@ -68,7 +70,7 @@ fn nan_pixels_of_a_float_tiff_stay_nan() {
 
 #[test]
 fn png_and_jpeg_are_read_in_grey_and_colour() {
-    use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgba};
+    use ::image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgba};
     let grey16 = DynamicImage::ImageLuma16(ImageBuffer::from_fn(5, 4, |x, _| {
         Luma([1000 * x as u16 + 7])
     }));
@@ -106,10 +108,10 @@ fn a_truncated_file_of_any_kind_is_an_error() {
     let tiff = tiff_of::<Gray16>(64, 64, &data);
     // The encoder writes the directory last; without it nothing can be read.
     assert!(decode(&tiff[..tiff.len() / 2]).is_err());
-    let grey = image::DynamicImage::ImageLuma8(image::ImageBuffer::from_fn(64, 64, |x, y| {
-        image::Luma([(x * 7 + y * 13) as u8])
+    let grey = ::image::DynamicImage::ImageLuma8(::image::ImageBuffer::from_fn(64, 64, |x, y| {
+        ::image::Luma([(x * 7 + y * 13) as u8])
     }));
-    for format in [image::ImageFormat::Png, image::ImageFormat::Jpeg] {
+    for format in [::image::ImageFormat::Png, ::image::ImageFormat::Jpeg] {
         let bytes = encoded_by_image(&grey, format);
         let error = decode(&bytes[..bytes.len() * 2 / 3]).unwrap_err();
         assert!(
@@ -184,9 +186,9 @@ const SAMPLES: usize = 19;
 
 /// A small valid file of one of many kinds.
 fn sample(kind: usize) -> Vec<u8> {
+    use ::image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgb};
     use ::tiff::encoder::colortype::{Gray16, Gray32Float, GrayI16, RGB8};
     use ::tiff::encoder::{Compression, TiffEncoder};
-    use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgb};
     let bytes: Vec<u8> = (0..24 * 16).map(|i| i as u8).collect();
     let words: Vec<u16> = (0..24 * 16).map(|i| i * 150).collect();
     let grey = || DynamicImage::ImageLuma8(ImageBuffer::from_raw(24, 16, bytes.clone()).unwrap());

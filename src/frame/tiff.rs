@@ -1,28 +1,34 @@
-//! TIFF: integers of 1 to 64 bits with and without sign, floats of 16 to 64 bits; grey or colour, with or without alpha;
-//! in strips or tiles, interleaved or plane by plane, as the `tiff` crate decodes them.
+//! TIFF, decoded by the `tiff` crate.
+//!
+//! Signed and unsigned integers of 1 to 64 bits, floats of 16 to 64 bits; grey or colour, with or
+//! without alpha; in strips or tiles, interleaved or plane by plane.
 
+use super::error::FrameError;
+use super::exif;
+use super::format::FrameFormat;
+use super::image::{Frame, check_size};
 use super::levels::{
     Samples, frame_from_floats, frame_from_integers, frame_from_words, interleaved,
 };
-use super::{Frame, FrameError, FrameFormat, MAX_PIXELS, check_size, exif};
+use super::limits::MAX_PIXELS;
 use std::io::Cursor;
 use std::num::NonZeroUsize;
 use tiff::decoder::{BufferLayoutPreference, Decoder, DecodingResult, Limits};
 use tiff::tags::{ByteOrder, SampleFormat, Tag};
 use tiff::{ColorType, TiffError, TiffFormatError};
 
-/// The most bytes of one decoded sample array: four 16-bit channels of the largest frame.
+/// Maximum size of one decoded sample array: four 16-bit channels of the largest frame.
 const MAX_DECODED_BYTES: usize = MAX_PIXELS * 8;
 
-const SUPPORTED: &str = "grey or colour of 1 to 64 bits a sample; not packed, or with LZW, deflate, PackBits, JPEG or fax";
+const SUPPORTED: &str = "grey or colour of 1 to 64 bits per sample, uncompressed or with LZW, deflate, PackBits, JPEG or fax";
 
-/// Decodes one image of a TIFF file: `page`, counted from 1, else the first.
+/// Decodes image `page` of a TIFF file, counted from 1; without `page`, the first.
 /// # Errors
-/// As [`super::decode_page`].
+/// As [`super::reader::decode_page`].
 pub(super) fn decode(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
-    room: &mut Vec<f32>,
+    buffer: &mut Vec<f32>,
 ) -> Result<Frame, FrameError> {
     let fail = |e: TiffError| error_of(e, bytes.len());
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(fail)?;
@@ -51,7 +57,7 @@ pub(super) fn decode(
         None
     };
     let frame = if let Some(words) = words {
-        let pixels = std::mem::take(room);
+        let pixels = std::mem::take(buffer);
         let is_big_endian = decoder.byte_order() == ByteOrder::BigEndian;
         frame_from_words((width, height), words, is_big_endian, pixels)
     } else {
@@ -62,20 +68,20 @@ pub(super) fn decode(
     Ok(frame?.with_metadata(exif::metadata(bytes, width)))
 }
 
-/// The samples of 16 bits as they stand in the file, where they do so in one piece and mean what they say: not packed, 0 is black.
+/// The 16-bit samples as stored in the file, if they are contiguous, uncompressed, and 0 is black.
 fn plain_words<'a>(decoder: &mut Decoder<Cursor<&[u8]>>, bytes: &'a [u8]) -> Option<&'a [[u8; 2]]> {
-    const NOT_PACKED: u16 = 1;
+    const UNCOMPRESSED: u16 = 1;
     const BLACK_IS_ZERO: u16 = 1;
-    // Each with the value that it has where it is not given.
+    // Tag, its default, and the value required.
     let plain = [
-        (Tag::Compression, 1, NOT_PACKED),
+        (Tag::Compression, 1, UNCOMPRESSED),
         (Tag::PhotometricInterpretation, 0, BLACK_IS_ZERO),
         (Tag::Predictor, 1, 1),
         (Tag::FillOrder, 1, 1),
     ];
-    for (tag, default, wanted) in plain {
+    for (tag, default, required) in plain {
         let found: Option<u16> = decoder.find_tag_unsigned(tag).ok()?;
-        if found.unwrap_or(default) != wanted {
+        if found.unwrap_or(default) != required {
             return None;
         }
     }
@@ -94,7 +100,7 @@ fn plain_words<'a>(decoder: &mut Decoder<Cursor<&[u8]>>, bytes: &'a [u8]) -> Opt
     (words.len() == width as usize * height as usize).then_some(words)
 }
 
-/// Goes to the image `page`, counted from 1.
+/// Moves the decoder to image `page`, counted from 1.
 fn seek(
     decoder: &mut Decoder<Cursor<&[u8]>>,
     page: NonZeroUsize,
@@ -117,11 +123,11 @@ fn seek(
     }
 }
 
-/// The number of samples that make a pixel.
+/// The number of samples per pixel.
 fn channels_of(color: ColorType) -> Result<usize, FrameError> {
     match color {
         ColorType::Gray(_) => Ok(1),
-        // This is how the decoder calls grey with something more, which is transparency.
+        // The decoder reports grey and alpha as two bands.
         ColorType::GrayA(_) | ColorType::Multiband { num_samples: 2, .. } => Ok(2),
         ColorType::RGB(_) => Ok(3),
         ColorType::RGBA(_) => Ok(4),
@@ -129,25 +135,25 @@ fn channels_of(color: ColorType) -> Result<usize, FrameError> {
     }
 }
 
-/// How decoded samples make an image.
+/// How decoded samples are arranged.
 struct Layout {
     width: usize,
     height: usize,
     bits: u8,
     channels: usize,
-    /// 1 where the channels of a pixel follow each other, else one for each channel.
+    /// 1 if the channels are interleaved, otherwise one plane per channel.
     planes: usize,
 }
 
 impl Layout {
-    /// Whether it is what most cameras write: grey, 16 bits without sign.
+    /// Whether the image is grey with unsigned 16-bit samples, as most cameras write.
     fn is_grey_words(&self, stored: &BufferLayoutPreference) -> bool {
         let is_unsigned = stored.sample_format == SampleFormat::Uint;
         self.bits == 16 && is_unsigned && self.channels == 1 && self.planes == 1
     }
 
     fn frame(&self, samples: DecodingResult) -> Result<Frame, FrameError> {
-        // What has more than 24 bits is rounded, integer or not.
+        // Values of more than 24 bits are rounded.
         let rounded = |values: Vec<f32>| Ok(self.floats(values)?.with_levels(1.0, None));
         match samples {
             DecodingResult::U8(packed) if self.bits < 8 => {
@@ -176,7 +182,7 @@ impl Layout {
         let samples = Samples {
             width: self.width,
             height: self.height,
-            values: &self.by_pixel(values),
+            values: &self.interleaved(values),
             channels: self.channels,
         };
         frame_from_integers(&samples, full_scale)
@@ -184,10 +190,11 @@ impl Layout {
 
     fn floats(&self, values: Vec<f32>) -> Result<Frame, FrameError> {
         let size = (self.width, self.height);
-        frame_from_floats(size, self.channels, self.by_pixel(values))
+        frame_from_floats(size, self.channels, self.interleaved(values))
     }
 
-    fn by_pixel<T: Copy>(&self, values: Vec<T>) -> Vec<T> {
+    /// The samples of all channels, interleaved.
+    fn interleaved<T: Copy>(&self, values: Vec<T>) -> Vec<T> {
         let wanted = self.width * self.height * self.channels;
         match values.get(..wanted) {
             Some(planes) if self.planes > 1 => interleaved(planes, self.channels),
@@ -195,7 +202,7 @@ impl Layout {
         }
     }
 
-    /// Samples of less than a byte, of which each row begins with a new byte and the highest bits come first.
+    /// Unpacks samples of less than 8 bits. Each row begins at a byte; the highest bits come first.
     fn unpacked(&self, packed: &[u8]) -> Vec<u8> {
         let bits = usize::from(self.bits);
         let row_samples = self.width * self.channels;

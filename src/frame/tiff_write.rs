@@ -1,6 +1,6 @@
-//! One image as a TIFF file, with what is known of it in Exif attributes.
+//! Writes a frame as a TIFF file with Exif attributes.
 
-use super::Frame;
+use super::image::Frame;
 use std::io::{Seek, Write};
 use tiff::encoder::{Compression, DeflateLevel, Predictor, Rational, TiffEncoder, colortype};
 use tiff::tags::Tag;
@@ -22,15 +22,14 @@ pub enum TiffSamples {
 pub struct TiffOptions<'a> {
     /// How pixels are stored.
     pub samples: TiffSamples,
-    /// Whether to compress them: deflate after differences along the rows.
+    /// Whether to compress them, with deflate and horizontal differencing.
     pub compressed: bool,
-    /// Lines of text for the attribute `ImageDescription`.
-    /// Characters that TIFF's text cannot have become question marks.
+    /// Text for the attribute `ImageDescription`. Characters outside ASCII become question marks.
     pub description: &'a str,
 }
 
-/// Writes the pixels of `frame`; of its metadata the date, the exposure, the focal length and the size of a pixel. A level that the
-/// samples cannot hold becomes the nearest that they can.
+/// Writes the pixels of `frame`, and of its metadata the date, exposure, focal length and pixel
+/// size. A level outside the range of the samples is clipped; a fraction is rounded.
 ///
 /// # Errors
 /// [`TiffError`] where `writer` fails.
@@ -67,7 +66,7 @@ pub fn write_tiff(
     }
 }
 
-/// Writes the Exif attributes; where they are in the file.
+/// Writes the Exif attributes and returns their offset in the file.
 fn write_exif<W: Write + Seek>(encoder: &mut TiffEncoder<W>, frame: &Frame) -> TiffResult<u32> {
     const EXPOSURE_TIME: u16 = 0x829A;
     const DATE_TIME_ORIGINAL: u16 = 0x9003;
@@ -94,7 +93,7 @@ fn write_exif<W: Write + Seek>(encoder: &mut TiffEncoder<W>, frame: &Frame) -> T
         exif.write_tag(Tag::Unknown(FOCAL_PLANE_RESOLUTION_UNIT), MILLIMETRE)?;
     }
     if let Some(date) = metadata.date {
-        // Exif has whole seconds, and colons in the date as in the time.
+        // Exif has whole seconds, and colons in the date, too.
         let iso = date.to_iso();
         let (day, rest) = iso.split_once('T').unwrap_or((&iso, "00:00:00"));
         let time = rest.get(..8).unwrap_or(rest);
@@ -102,8 +101,7 @@ fn write_exif<W: Write + Seek>(encoder: &mut TiffEncoder<W>, frame: &Frame) -> T
         exif.write_tag(Tag::Unknown(DATE_TIME_ORIGINAL), text.as_str())?;
         exif.write_tag(Tag::Unknown(OFFSET_TIME_ORIGINAL), "+00:00")?;
     }
-    let place = exif.finish_with_offsets()?;
-    Ok(place.offset)
+    Ok(exif.finish_with_offsets()?.offset)
 }
 
 fn write_image<C, W, T>(
@@ -131,7 +129,7 @@ where
     image.write_data(pixels)
 }
 
-/// The ratio nearest to a number above 0.
+/// The fraction nearest to a number above 0.
 fn rational(value: f64) -> Rational {
     const LARGEST: f64 = 4e9;
     let mut d = 1u32;

@@ -1,42 +1,42 @@
-//! The cards of a FITS header to be written: 80 characters each, values in fixed format.
+//! Header cards for writing: 80 characters each, values in fixed format.
 
-use super::BLOCK_BYTES;
+use super::header::BLOCK_BYTES;
 
-/// Characters of a card.
+/// Width of a card, in characters.
 const CARD: usize = 80;
-/// Characters of a number in fixed format.
+/// Width of a number in fixed format.
 const NUMBER_WIDTH: usize = 20;
-/// Characters of a keyword.
+/// Width of a keyword.
 const KEYWORD: usize = 8;
-/// Where the value of a text begins, behind `= '`, and how many characters fit before the closing mark.
+/// Number of characters of text between the quotation marks on one card.
 const TEXT_WIDTH: usize = CARD - "KEYWORD = '".len() - 1;
 
-/// A FITS header as it grows, card by card, for [`write_fits`](super::write_fits) or a file of its own.
+/// A FITS header for [`write_fits`](super::write_fits) or a file of its own. Each call adds cards.
 ///
-/// What is not printable ASCII becomes a question mark, for FITS knows nothing else. A text that one card does not
-/// hold is continued on more (`CONTINUE`); a comment that does not fit is cut off.
+/// FITS allows printable ASCII only: other characters become question marks. A long text continues
+/// on further cards (`CONTINUE`); a comment that does not fit is cut off.
 ///
 /// # Reference
 /// FITS Standard 4.0 (2018), sect. 4.1 and 4.2.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FitsHeader {
-    /// Each keyword as it was given, and its card.
+    /// Each keyword as given, and its card.
     cards: Vec<(String, String)>,
 }
 
 impl FitsHeader {
-    /// A card with a truth value.
+    /// Adds a card with a truth value.
     pub fn logical(&mut self, keyword: &str, value: bool, comment: &str) {
         self.value(keyword, if value { "T" } else { "F" }, comment);
     }
 
-    /// A card with a whole number.
+    /// Adds a card with an integer.
     pub fn integer(&mut self, keyword: &str, value: i64, comment: &str) {
         self.value(keyword, &value.to_string(), comment);
     }
 
-    /// A card with a number; at least 13 significant digits are kept. NaN and infinities, which FITS does not know,
-    /// become a keyword without a value.
+    /// Adds a card with a real number, to at least 13 significant digits. NaN and infinities, which
+    /// FITS cannot represent, give a keyword without a value.
     pub fn real(&mut self, keyword: &str, value: f64, comment: &str) {
         let text = if value.is_finite() {
             real(value)
@@ -46,7 +46,7 @@ impl FitsHeader {
         self.value(keyword, &text, comment);
     }
 
-    /// A card with a text, or as many as it needs.
+    /// Adds one or more cards with a text.
     pub fn text(&mut self, keyword: &str, value: &str, comment: &str) {
         let quoted: Vec<char> = printable(&value.replace('\'', "''")).chars().collect();
         let pieces = pieces(&quoted);
@@ -67,7 +67,7 @@ impl FitsHeader {
         }
     }
 
-    /// Text on the file's history, on as many cards as it needs.
+    /// Adds one or more HISTORY cards.
     pub fn history(&mut self, text: &str) {
         let characters: Vec<char> = text.chars().collect();
         for piece in characters.chunks(CARD - "HISTORY ".len()) {
@@ -78,17 +78,17 @@ impl FitsHeader {
         }
     }
 
-    /// The cards of `other` after those of this one.
+    /// Appends the cards of `other`.
     pub(super) fn extend(&mut self, other: &Self) {
         self.cards.extend_from_slice(&other.cards);
     }
 
-    /// The keywords as they were given, one for each card.
+    /// The keywords as given, one per card.
     pub(super) fn keywords(&self) -> impl Iterator<Item = &str> {
         self.cards.iter().map(|(keyword, _)| keyword.as_str())
     }
 
-    /// The header with its end, in whole blocks of 2880 bytes.
+    /// The header with END, padded to blocks of 2880 bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
         let cards = self.cards.iter().flat_map(|(_, card)| card.bytes());
         let mut bytes: Vec<u8> = cards.chain(*b"END").collect();
@@ -113,8 +113,8 @@ fn printable(text: &str) -> String {
     text.chars().map(printable).collect()
 }
 
-/// A quoted text in pieces that fit on a card, each but the last with room for the sign that it goes on. No doubled
-/// quotation mark is torn apart.
+/// Splits a quoted text into pieces that fit on a card, with room for the continuation sign `&` on
+/// all but the last. Doubled quotation marks are kept together.
 fn pieces(quoted: &[char]) -> Vec<String> {
     let mut pieces = Vec::new();
     let mut rest = quoted;
@@ -137,8 +137,8 @@ fn with_comment(card: String, comment: &str) -> String {
     }
 }
 
-/// A number in at most [`NUMBER_WIDTH`] characters: in full where it fits, else with 13 decimals and an exponent, or
-/// 12 where the exponent is long.
+/// Formats a number in at most [`NUMBER_WIDTH`] characters: in full if it fits, otherwise with an
+/// exponent and 13 decimals, or 12 if the exponent is long.
 fn real(value: f64) -> String {
     let full = format!("{value:?}");
     if full.len() <= NUMBER_WIDTH && !full.contains('e') {

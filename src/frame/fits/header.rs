@@ -1,49 +1,51 @@
 //! The header of one header-data unit: cards of 80 bytes, in blocks of 2880.
 
-use super::{BLOCK_BYTES, malformed, truncated};
+use super::error::{malformed, truncated};
 use crate::frame::FrameError;
 use std::borrow::Cow;
 
+/// Headers and data are padded to a multiple of this.
+pub(super) const BLOCK_BYTES: usize = 2880;
 const CARD_BYTES: usize = 80;
 const KEYWORD_BYTES: usize = 8;
-/// A header of more cards than this is taken for something else.
+/// Maximum number of cards. A longer header is assumed to be damaged.
 const MAX_CARDS: usize = 100_000;
 
-/// A keyword and what it is set to.
+/// A keyword and its value.
 struct Card<'a> {
-    /// Where in the file.
-    at: usize,
+    /// Offset in the file.
+    offset: usize,
     keyword: &'a [u8],
-    /// From behind `= ` to the card's end, any comment included.
+    /// Everything after `= `, including the comment.
     value: &'a [u8],
 }
 
 /// The keywords of one header.
 pub(super) struct Header<'a> {
     cards: Vec<Card<'a>>,
-    /// Where in the file it begins.
-    at: usize,
+    /// Offset in the file.
+    offset: usize,
 }
 
 impl<'a> Header<'a> {
-    /// Reads the header at byte `at`; also tells where the data begin.
-    pub fn parse(bytes: &'a [u8], at: usize) -> Result<(Self, usize), FrameError> {
+    /// Parses the header at `offset`. Also returns the offset of the data.
+    pub fn parse(bytes: &'a [u8], offset: usize) -> Result<(Self, usize), FrameError> {
         let mut cards = Vec::new();
-        let all = bytes.get(at..).unwrap_or_default().chunks_exact(CARD_BYTES);
+        let header = bytes.get(offset..).unwrap_or_default();
+        let all = header.chunks_exact(CARD_BYTES);
         for (number, card) in all.enumerate().take(MAX_CARDS) {
-            let at_card = at + number * CARD_BYTES;
             let (keyword, rest) = card.split_at(KEYWORD_BYTES);
             let keyword = keyword.trim_ascii_end();
             if keyword == b"END" {
                 let length = (number + 1) * CARD_BYTES;
                 return Ok((
-                    Self { cards, at },
-                    at + length.next_multiple_of(BLOCK_BYTES),
+                    Self { cards, offset },
+                    offset + length.next_multiple_of(BLOCK_BYTES),
                 ));
             }
             if let Some(value) = rest.strip_prefix(b"= ") {
                 cards.push(Card {
-                    at: at_card,
+                    offset: offset + number * CARD_BYTES,
                     keyword,
                     value,
                 });
@@ -55,7 +57,7 @@ impl<'a> Header<'a> {
         }
         Err(truncated(
             bytes.len(),
-            format!("the header at byte {at} has no END"),
+            format!("the header at byte {offset} has no END"),
         ))
     }
 
@@ -65,11 +67,12 @@ impl<'a> Header<'a> {
             .find(|card| card.keyword == keyword.as_bytes())
     }
 
-    /// The value without quotation marks, blanks around it and comment; nothing where there is no value.
+    /// The value of `keyword` without quotation marks, surrounding blanks and comment; `None` if
+    /// empty.
     pub fn text(&self, keyword: &str) -> Option<Cow<'a, str>> {
         let value = self.card(keyword)?.value.trim_ascii_start();
         let text = match value.strip_prefix(b"'") {
-            Some(quoted) => string(quoted),
+            Some(quoted) => quoted_text(quoted),
             None => {
                 let end = value.iter().position(|b| *b == b'/');
                 String::from_utf8_lossy(&value[..end.unwrap_or(value.len())])
@@ -82,49 +85,50 @@ impl<'a> Header<'a> {
         (!text.is_empty()).then_some(text)
     }
 
-    /// A number, also one that somebody put between quotation marks.
+    /// The value as a number, with or without quotation marks.
     pub fn number(&self, keyword: &str) -> Option<f64> {
-        number(&self.text(keyword)?)
+        parse_number(&self.text(keyword)?)
     }
 
+    /// Whether the value is `T`.
     pub fn is_true(&self, keyword: &str) -> bool {
         self.text(keyword).as_deref() == Some("T")
     }
 
-    /// An integer that has to be there.
+    /// The value as an integer; an error if it is missing.
     pub fn required(&self, keyword: &str, expected: &str) -> Result<i64, FrameError> {
         match self.optional(keyword, expected) {
             Ok(None) => Err(malformed(format!(
                 "the header at byte {} has no {keyword}, expected {expected}",
-                self.at
+                self.offset
             ))),
             Ok(Some(value)) => Ok(value),
             Err(error) => Err(error),
         }
     }
 
-    /// An integer, if it is there.
+    /// The value as an integer, `None` if it is missing.
     pub fn optional(&self, keyword: &str, expected: &str) -> Result<Option<i64>, FrameError> {
         let Some(text) = self.text(keyword) else {
             return Ok(None);
         };
         let value = text.parse();
-        value.map(Some).map_err(|_| self.bad(keyword, expected))
+        value.map(Some).map_err(|_| self.invalid(keyword, expected))
     }
 
-    /// A finite number that is `otherwise` where it is not there.
-    pub fn factor(&self, keyword: &str, otherwise: f64) -> Result<f64, FrameError> {
+    /// The value as a finite number, `default` if it is missing.
+    pub fn number_or(&self, keyword: &str, default: f64) -> Result<f64, FrameError> {
         let Some(text) = self.text(keyword) else {
-            return Ok(otherwise);
+            return Ok(default);
         };
-        number(&text)
+        parse_number(&text)
             .filter(|value| value.is_finite())
-            .ok_or_else(|| self.bad(keyword, "a finite number"))
+            .ok_or_else(|| self.invalid(keyword, "a finite number"))
     }
 
-    /// That the value of `keyword` is not as `expected`.
-    pub fn bad(&self, keyword: &str, expected: &str) -> FrameError {
-        let at = self.card(keyword).map_or(self.at, |card| card.at);
+    /// The error for a value of `keyword` that is not as `expected`.
+    pub fn invalid(&self, keyword: &str, expected: &str) -> FrameError {
+        let at = self.card(keyword).map_or(self.offset, |card| card.offset);
         let found = self.text(keyword).unwrap_or_default();
         malformed(format!(
             "keyword {keyword} at byte {at}: found {found}, expected {expected}"
@@ -132,13 +136,13 @@ impl<'a> Header<'a> {
     }
 }
 
-/// A number as FITS writes it, with E or D before the exponent.
-fn number(text: &str) -> Option<f64> {
+/// Parses a FITS number, with E or D before the exponent.
+fn parse_number(text: &str) -> Option<f64> {
     text.replace(['D', 'd'], "E").parse().ok()
 }
 
-/// What is between quotation marks, of which the first is gone; two of them inside stand for one.
-fn string(quoted: &[u8]) -> Cow<'_, str> {
+/// The text up to the closing quotation mark; a doubled mark inside stands for one.
+fn quoted_text(quoted: &[u8]) -> Cow<'_, str> {
     let mut end = 0;
     let mut doubled = false;
     while end < quoted.len() {
@@ -201,18 +205,18 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_value_is_named_with_its_place() {
+    fn an_invalid_value_is_reported_with_its_offset() {
         let bytes = header(&["SIMPLE  = T", "NAXIS   = two", "BSCALE  = NaN"]);
         let (header, _) = Header::parse(&bytes, 0).unwrap();
-        let complaint = header.required("NAXIS", "a number").unwrap_err();
+        let error = header.required("NAXIS", "a number").unwrap_err();
         assert!(
-            complaint
+            error
                 .to_string()
                 .contains("keyword NAXIS at byte 80: found two, expected a number"),
-            "{complaint}"
+            "{error}"
         );
-        assert!(header.factor("BSCALE", 1.0).is_err());
-        assert_eq!(header.factor("BZERO", 0.0).unwrap(), 0.0);
+        assert!(header.number_or("BSCALE", 1.0).is_err());
+        assert_eq!(header.number_or("BZERO", 0.0).unwrap(), 0.0);
         assert!(header.required("BITPIX", "it").is_err());
     }
 

@@ -1,26 +1,28 @@
-//! What a FITS header says of how the image was taken, in the keywords that programs really write.
+//! Metadata from FITS headers, in the keywords that programs use in practice.
 //!
-//! - Date: DATE-OBS, with the time in TIME-OBS, UT, UTC or UTSTART where it has none; else DATE-AVG, DATE-BEG,
-//!   DATE-END, MJD-OBS, MJD-AVG or MJD-BEG. Which moment of the exposure it is makes no difference to where stars are.
+//! - Date: DATE-OBS, if necessary with the time in TIME-OBS, UT, UTC or UTSTART; else DATE-AVG,
+//!   DATE-BEG, DATE-END, MJD-OBS, MJD-AVG or MJD-BEG. The moment within the exposure does not
+//!   matter for star positions.
 //! - Exposure: EXPTIME, EXPOSURE or EXP_TIME, in seconds.
-//! - Pixels: XPIXSZ, which contains the binning; else PIXSIZE1 or PIXSIZE, which do not and are multiplied by
-//!   XBINNING; in micrometres.
+//! - Pixel size in micrometres: XPIXSZ, which includes the binning; else PIXSIZE1 or PIXSIZE, which
+//!   do not and are multiplied by XBINNING.
 //! - Focal length: FOCALLEN, FOCAL or FOCLEN, in millimetres.
-//! - Site: SITELAT and SITELONG (height SITEELEV), LAT-OBS and LONG-OBS (ALT-OBS), or OBSGEO-B and OBSGEO-L (OBSGEO-H); degrees,
-//!   decimal or in sixtieths, north and east positive; metres.
+//! - Site: SITELAT and SITELONG (height SITEELEV), LAT-OBS and LONG-OBS (ALT-OBS), or OBSGEO-B and
+//!   OBSGEO-L (OBSGEO-H). Angles in degrees, decimal or sexagesimal, north and east positive;
+//!   heights in metres.
 //! - Zenith distance: CENTALT or OBJCTALT, the altitude in degrees.
 //!
-//! Where the mount believed it pointed (OBJCTRA, RA, CRVAL1) is not used.
+//! The pointing of the mount (OBJCTRA, RA, CRVAL1) is not used.
 
 use super::header::Header;
 use crate::base::angle::Angle;
 use crate::base::epoch::ObservationDate;
 use crate::frame::metadata::{
-    ALTITUDE, EXPOSURE, FOCAL_LENGTH, FrameMetadata, PIXEL_SIZE, Quantity,
+    ALTITUDE, EXPOSURE, FOCAL_LENGTH, FrameMetadata, HeaderNumber, PIXEL_SIZE,
 };
 use crate::sky::observer::Site;
 
-/// What `headers` say; of a keyword in several the first counts.
+/// Metadata from `headers`; earlier headers have priority.
 pub(super) fn metadata<'a>(headers: impl Iterator<Item = &'a Header<'a>>) -> FrameMetadata {
     let keywords = Keywords(headers.collect());
     let mut metadata = FrameMetadata::default();
@@ -50,17 +52,17 @@ impl Keywords<'_> {
         found.map(|text| text.into_owned())
     }
 
-    /// The first of `keywords` that makes sense.
+    /// The first plausible value among `keywords`.
     fn number(
         &self,
         metadata: &mut FrameMetadata,
-        quantity: &Quantity,
+        number: &HeaderNumber,
         keywords: &[&str],
     ) -> Option<f64> {
         keywords.iter().find_map(|keyword| {
             let text = self.text(keyword)?;
             let value = self.0.iter().find_map(|header| header.number(keyword));
-            metadata.sensible(quantity, keyword, &text, value)
+            metadata.plausible(number, keyword, &text, value)
         })
     }
 
@@ -87,7 +89,7 @@ impl Keywords<'_> {
             let place = degrees(&texts.0).zip(degrees(&texts.1));
             let place = place.map(|(lat_deg, lon_deg)| (lat_deg, lon_deg, height_m.unwrap_or(0.0)));
             let (keywords, text) = (format!("{lat}, {lon}"), format!("{}, {}", texts.0, texts.1));
-            metadata.sensible_site(&keywords, &text, place)
+            metadata.plausible_site(&keywords, &text, place)
         })
     }
 
@@ -96,7 +98,7 @@ impl Keywords<'_> {
         let from_calendar = calendar.iter().find_map(|keyword| {
             let text = self.text(keyword)?;
             let date = self.calendar_date(&text);
-            metadata.sensible_date(keyword, &text, date)
+            metadata.plausible_date(keyword, &text, date)
         });
         from_calendar.or_else(|| {
             ["MJD-OBS", "MJD-AVG", "MJD-BEG"]
@@ -105,12 +107,12 @@ impl Keywords<'_> {
                     let text = self.text(keyword)?;
                     let days = self.0.iter().find_map(|header| header.number(keyword));
                     let date = days.and_then(ObservationDate::from_modified_julian_date);
-                    metadata.sensible_date(keyword, &text, date)
+                    metadata.plausible_date(keyword, &text, date)
                 })
         })
     }
 
-    /// `text` is ISO 8601, or a day as FITS wrote it until 1999: DD/MM/YY.
+    /// Parses ISO 8601, or DD/MM/YY as in FITS until 1999.
     fn calendar_date(&self, text: &str) -> Option<ObservationDate> {
         let day = match text.split('/').collect::<Vec<_>>()[..] {
             [day, month, year] if year.len() == 2 => format!("19{year}-{month}-{day}"),

@@ -1,3 +1,4 @@
+use super::header::BLOCK_BYTES;
 use super::*;
 use proptest::prelude::*;
 
@@ -57,7 +58,7 @@ fn page(number: usize) -> Option<NonZeroUsize> {
     NonZeroUsize::new(number)
 }
 
-fn complaint(bytes: &[u8], page: Option<NonZeroUsize>) -> String {
+fn error_of(bytes: &[u8], page: Option<NonZeroUsize>) -> String {
     decode(bytes, page).unwrap_err().to_string()
 }
 
@@ -193,7 +194,7 @@ fn pages_are_images_of_two_axes_and_planes_of_cubes() {
     assert_eq!([1, 2, 3].map(|n| first(page(n))), [1.0, 2.0, 3.0]);
     assert!((first(page(4)) - (29.9 + 29.35 + 2.28)).abs() < 1e-4);
     assert_eq!(
-        complaint(&file, page(5)),
+        error_of(&file, page(5)),
         "no page 5: found 4 pages, expected at least 5"
     );
     let exposure = |n| decode(&file, page(n)).unwrap().metadata.exposure_s;
@@ -203,7 +204,7 @@ fn pages_are_images_of_two_axes_and_planes_of_cubes() {
 #[test]
 fn a_cube_is_refused_unless_a_plane_is_chosen() {
     let cube = image(8, &[3, 3, 5], &[], &[6; 45]);
-    assert!(complaint(&cube, None).contains("a cube of 5 planes"));
+    assert!(error_of(&cube, None).contains("a cube of 5 planes"));
     assert_eq!(decode(&cube, page(5)).unwrap().pixels[0], 6.0);
     let one = image(8, &[3, 3, 1, 1], &[], &[6; 9]);
     assert_eq!(decode(&one, None).unwrap().pixels.len(), 9);
@@ -213,10 +214,10 @@ fn a_cube_is_refused_unless_a_plane_is_chosen() {
 fn files_without_an_image_say_what_they_hold() {
     let tables = [empty_primary(&[]), table(&[])].concat();
     assert!(
-        complaint(&tables, None).contains("found no image in it, and 1 table, expected an image")
+        error_of(&tables, None).contains("found no image in it, and 1 table, expected an image")
     );
     let compressed = [empty_primary(&[]), table(&["ZIMAGE  = T"])].concat();
-    assert!(complaint(&compressed, None).contains("unpack it with funpack"));
+    assert!(error_of(&compressed, None).contains("unpack it with funpack"));
 }
 
 #[test]
@@ -226,7 +227,7 @@ fn damage_is_named_with_its_place() {
         let text: String = bytes.iter().map(|b| char::from(*b)).collect();
         let changed = text.replacen(&format!("{card:<80}"), &format!("{instead:<80}"), 1);
         assert_ne!(text, changed);
-        complaint(&changed.chars().map(|c| c as u8).collect::<Vec<_>>(), None)
+        error_of(&changed.chars().map(|c| c as u8).collect::<Vec<_>>(), None)
     };
     for (card, instead, expected) in [
         (
@@ -287,16 +288,16 @@ fn damage_is_named_with_its_place() {
 fn a_truncated_image_says_how_many_bytes_are_there_and_needed() {
     let bytes = image(16, &[100, 100], &[], &words(&[1; 10_000]));
     assert_eq!(
-        complaint(&bytes[..9999], None),
+        error_of(&bytes[..9999], None),
         "truncated FITS: found 9999 bytes, expected more (the image of 100 x 100 pixels ends at byte 22880)"
     );
     // The padding behind the last pixel is not needed.
     assert!(decode(&bytes[..22_880], None).is_ok());
-    assert!(complaint(&bytes[..22_879], None).contains("truncated"));
-    assert!(complaint(&bytes[..300], None).contains("has no END"));
+    assert!(error_of(&bytes[..22_879], None).contains("truncated"));
+    assert!(error_of(&bytes[..300], None).contains("has no END"));
     let cut_in_table = [empty_primary(&[]), table(&[])].concat();
     assert_eq!(
-        complaint(&cut_in_table[..9000], None),
+        error_of(&cut_in_table[..9000], None),
         "truncated FITS: found 9000 bytes, expected more (the data before the next header end at byte 10772)"
     );
 }
@@ -323,7 +324,7 @@ fn sizes_beyond_all_numbers_are_refused() {
         extension(&image(8, &[3, 3], &[], &[1; 9])),
     ]
     .concat();
-    assert!(complaint(&file, None).contains("truncated"));
+    assert!(error_of(&file, None).contains("truncated"));
 }
 
 fn metadata_of(more: &[&str]) -> crate::frame::FrameMetadata {

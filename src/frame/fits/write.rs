@@ -1,14 +1,11 @@
-//! One image as a FITS file: the primary header-data unit and nothing else.
+//! Writes a frame as a FITS file with only a primary header-data unit.
 
-use super::{BLOCK_BYTES, FitsHeader};
+use super::cards::FitsHeader;
+use super::header::BLOCK_BYTES;
 use crate::frame::Frame;
 use std::io::{self, Write};
 
-/// The largest level that 16 bits hold.
-const LARGEST_16: f32 = u16::MAX as f32;
-/// What makes signed words of 16 bits unsigned.
-const ZERO_16: i64 = 1 << 15;
-/// What the writer itself has to say: nobody else may.
+/// Keywords that the writer sets itself.
 const RESERVED: [&str; 11] = [
     "SIMPLE", "BITPIX", "NAXIS", "NAXIS1", "NAXIS2", "EXTEND", "BSCALE", "BZERO", "BLANK", "END",
     "XTENSION",
@@ -17,17 +14,17 @@ const RESERVED: [&str; 11] = [
 /// How pixels are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FitsSamples {
-    /// Floats of 32 bits (BITPIX −32): every pixel as it is; NaN is a pixel without a value.
+    /// Floats of 32 bits (BITPIX −32), unchanged; NaN marks a pixel without a value.
     Float32,
     /// Unsigned integers of 16 bits (BITPIX 16, BZERO 32768): whole levels from 0 to 65535.
     Unsigned16,
 }
 
-/// Why an image could not be written.
+/// Error of writing an image.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FitsWriteError {
-    /// It could not be written where it should go.
+    /// The writer failed.
     #[error("cannot be written: {0}")]
     Io(#[from] io::Error),
     /// A pixel does not fit into 16 bits.
@@ -40,27 +37,30 @@ pub enum FitsWriteError {
         /// Its value.
         found: f32,
     },
-    /// A keyword that cannot be one, or that the writer sets itself.
+    /// A keyword that is invalid or reserved for the writer.
     #[error("keyword {keyword:?}: found {found}, expected {expected}")]
     Keyword {
         /// The keyword.
         keyword: String,
         /// What is wrong with it.
         found: &'static str,
-        /// What a keyword is.
+        /// What is allowed.
         expected: &'static str,
     },
 }
 
-/// Writes the pixels of `frame` as a FITS image, with the cards of `header` behind those that say what it is.
+/// Writes the pixels of `frame` as a FITS image, with the cards of `header` after the mandatory
+/// ones.
 ///
-/// The first row is the first in the file: what is read back has the same (0, 0). Everything is checked before the first
-/// byte is written. The frame's metadata are not written: what should be in the file stands in `header`.
+/// The first row of the frame is the first in the file, so (0, 0) is the same when read back.
+/// Everything is checked before the first byte is written. The frame's metadata are not written;
+/// put them into `header`.
 ///
 /// ```
 /// use starpipe::frame::{self, FitsHeader, FitsSamples, Frame};
 ///
-/// let frame = Frame::new(3, 3, vec![100.0, 101.0, 99.0, 100.0, 300.0, 98.0, 100.0, 102.0, 101.0])?;
+/// let pixels = vec![100.0, 101.0, 99.0, 100.0, 300.0, 98.0, 100.0, 102.0, 101.0];
+/// let frame = Frame::new(3, 3, pixels)?;
 /// let mut header = FitsHeader::default();
 /// header.real("EXPTIME", 0.1, "[s] exposure");
 /// let mut file = Vec::new();
@@ -71,8 +71,8 @@ pub enum FitsWriteError {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 /// # Errors
-/// [`FitsWriteError::NoLevel`] for 16 bits, where a pixel has no value, a fraction, or is out of range;
-/// [`FitsWriteError::Keyword`]; [`FitsWriteError::Io`].
+/// [`FitsWriteError::NoLevel`] with 16 bits, if a pixel has no value, a fraction, or is out of
+/// range; [`FitsWriteError::Keyword`]; [`FitsWriteError::Io`].
 /// # Reference
 /// FITS Standard 4.0 (2018), sect. 4.4 and 5.
 pub fn write_fits(
@@ -85,9 +85,9 @@ pub fn write_fits(
     if samples == FitsSamples::Unsigned16 {
         check_levels(frame)?;
     }
-    let mut whole = mandatory(frame, samples);
-    whole.extend(header);
-    writer.write_all(&whole.to_bytes())?;
+    let mut cards = mandatory(frame, samples);
+    cards.extend(header);
+    writer.write_all(&cards.to_bytes())?;
     let mut length = 0;
     let mut bytes = Vec::with_capacity(frame.width * 4);
     for row in frame.pixels.chunks(frame.width) {
@@ -95,7 +95,7 @@ pub fn write_fits(
         for &pixel in row {
             match samples {
                 FitsSamples::Float32 => bytes.extend(pixel.to_be_bytes()),
-                // A signed word is an unsigned one with its highest bit turned.
+                // Subtracts BZERO: unsigned and signed integers differ by their highest bit.
                 FitsSamples::Unsigned16 => bytes.extend((pixel as u16 ^ 1 << 15).to_be_bytes()),
             }
         }
@@ -107,7 +107,7 @@ pub fn write_fits(
     Ok(writer.flush()?)
 }
 
-/// The cards that say what the image is.
+/// The cards that describe the image.
 fn mandatory(frame: &Frame, samples: FitsSamples) -> FitsHeader {
     let mut header = FitsHeader::default();
     header.logical("SIMPLE", true, "FITS Standard 4.0");
@@ -120,14 +120,15 @@ fn mandatory(frame: &Frame, samples: FitsSamples) -> FitsHeader {
     header.integer("NAXIS1", frame.width as i64, "columns");
     header.integer("NAXIS2", frame.height as i64, "rows");
     if samples == FitsSamples::Unsigned16 {
-        header.integer("BZERO", ZERO_16, "levels are unsigned");
+        header.integer("BZERO", 1 << 15, "levels are unsigned");
         header.integer("BSCALE", 1, "");
     }
     header
 }
 
 fn check_levels(frame: &Frame) -> Result<(), FitsWriteError> {
-    let fits = |&pixel: &f32| (0.0..=LARGEST_16).contains(&pixel) && pixel.fract() == 0.0;
+    const LARGEST: f32 = u16::MAX as f32;
+    let fits = |&pixel: &f32| (0.0..=LARGEST).contains(&pixel) && pixel.fract() == 0.0;
     match frame.pixels.iter().position(|pixel| !fits(pixel)) {
         None => Ok(()),
         Some(at) => Err(FitsWriteError::NoLevel {

@@ -1,0 +1,162 @@
+//! Decodes one image of a header-data unit.
+
+use super::error::{truncated, unsupported};
+use super::unit::{StoredType, Unit};
+use crate::frame::levels::{Samples, frame_from_floats, frame_from_integers, interleaved};
+use crate::frame::{Frame, FrameError, check_size};
+
+/// Location and scaling of one image in a file.
+pub(super) struct Image {
+    width: usize,
+    height: usize,
+    /// 1, or 3 for colour.
+    channels: usize,
+    /// Offset in the file.
+    offset: usize,
+    stored: StoredType,
+    scale: f64,
+    zero: f64,
+    /// The stored integer that marks a pixel without a value.
+    blank: Option<i64>,
+}
+
+impl Image {
+    /// The image `plane` of `unit`. A cube has several planes, and one must be chosen.
+    pub fn new(unit: &Unit, plane: Option<usize>) -> Result<Self, FrameError> {
+        if unit.is_compressed_image() {
+            let found = "an image compressed tile by tile (ZIMAGE)".to_owned();
+            let expected = "one that is not: unpack it with funpack first";
+            return Err(unsupported(found, expected));
+        }
+        if plane.is_none() && unit.pages() > 1 {
+            let found = format!("a cube of {} planes", unit.planes());
+            let expected = "one plane, three of colour, or a page that says which";
+            return Err(unsupported(found, expected));
+        }
+        let (width, height) = (unit.axes[0], unit.axes[1]);
+        check_size(width, height)?;
+        let scale = unit.header.number_or("BSCALE", 1.0)?;
+        if scale == 0.0 {
+            return Err(unit.header.invalid("BSCALE", "a number other than 0"));
+        }
+        let before = (width * height * unit.stored.bytes())
+            .checked_mul(plane.unwrap_or(0))
+            .and_then(|before| before.checked_add(unit.data));
+        Ok(Self {
+            width,
+            height,
+            channels: if unit.is_colour() { 3 } else { 1 },
+            offset: before.unwrap_or(usize::MAX),
+            stored: unit.stored,
+            scale,
+            zero: unit.header.number_or("BZERO", 0.0)?,
+            blank: if unit.stored.is_float() {
+                None
+            } else {
+                unit.header.optional("BLANK", "an integer")?
+            },
+        })
+    }
+
+    /// Decodes the image from `bytes`, the content of the file.
+    pub fn frame(&self, bytes: &[u8]) -> Result<Frame, FrameError> {
+        let length = self.width * self.height * self.channels * self.stored.bytes();
+        let end = self.offset.saturating_add(length);
+        let data = bytes.get(self.offset..end).ok_or_else(|| {
+            let Self { width, height, .. } = self;
+            let detail = format!("the image of {width} x {height} pixels ends at byte {end}");
+            truncated(bytes.len(), detail)
+        })?;
+        if self.scale == 1.0 && !self.stored.is_float() {
+            const HALF_8: f64 = (1_u8 << 7) as f64;
+            const HALF_16: f64 = (1_u16 << 15) as f64;
+            const HALF_32: f64 = (1_u32 << 31) as f64;
+            // Signed and unsigned integers differ by their highest bit.
+            match (self.stored, self.zero) {
+                (StoredType::U8, 0.0) => return self.integers(data, |[b]| b, u8::MAX),
+                (StoredType::U8, zero) if zero == -HALF_8 => {
+                    return self.integers(data, |[b]| (b ^ 1 << 7) as i8, i8::MAX);
+                }
+                (StoredType::I16, 0.0) => return self.integers(data, i16::from_be_bytes, i16::MAX),
+                (StoredType::I16, HALF_16) => {
+                    return self.integers(data, |b| u16::from_be_bytes(b) ^ 1 << 15, u16::MAX);
+                }
+                (StoredType::I32, 0.0) => return self.integers(data, i32::from_be_bytes, i32::MAX),
+                (StoredType::I32, HALF_32) => {
+                    return self.integers(data, |b| u32::from_be_bytes(b) ^ 1 << 31, u32::MAX);
+                }
+                _ => {}
+            }
+        }
+        match self.stored {
+            StoredType::U8 => self.scaled(data, |[b]: [u8; 1]| i64::from(b)),
+            StoredType::I16 => self.scaled(data, |b| i64::from(i16::from_be_bytes(b))),
+            StoredType::I32 => self.scaled(data, |b| i64::from(i32::from_be_bytes(b))),
+            StoredType::I64 => self.scaled(data, i64::from_be_bytes),
+            StoredType::F32 => self.floats(data, |b| f64::from(f32::from_be_bytes(b))),
+            StoredType::F64 => self.floats(data, f64::from_be_bytes),
+        }
+    }
+
+    /// Decodes unscaled integers; `full_scale` is the largest value of the type.
+    fn integers<const N: usize, T: Copy + PartialEq + Into<i64>>(
+        &self,
+        data: &[u8],
+        level: impl Fn([u8; N]) -> T,
+        full_scale: T,
+    ) -> Result<Frame, FrameError> {
+        let values = self.interleaved(data.as_chunks().0.iter().map(|b| level(*b)).collect());
+        let samples = Samples {
+            width: self.width,
+            height: self.height,
+            values: &values,
+            channels: self.channels,
+        };
+        let frame = frame_from_integers(&samples, full_scale)?;
+        let Some(blank) = self.blank else {
+            return Ok(frame);
+        };
+        let blank = blank.saturating_add(self.zero as i64);
+        let mut pixels = frame.pixels;
+        for (pixel, levels) in pixels.iter_mut().zip(values.chunks_exact(self.channels)) {
+            if levels.iter().any(|level| (*level).into() == blank) {
+                *pixel = f32::NAN;
+            }
+        }
+        Ok(Frame::new(self.width, self.height, pixels)?
+            .with_levels(frame.step_adu, frame.saturation_adu))
+    }
+
+    /// Decodes integers with a scale and an offset.
+    fn scaled<const N: usize>(
+        &self,
+        data: &[u8],
+        integer: impl Fn([u8; N]) -> i64,
+    ) -> Result<Frame, FrameError> {
+        let value = |bytes| match integer(bytes) {
+            stored if Some(stored) == self.blank => f64::NAN,
+            stored => stored as f64,
+        };
+        let frame = self.floats(data, value)?;
+        Ok(frame.with_levels(self.scale.abs() as f32, None))
+    }
+
+    /// Decodes values with a scale and an offset.
+    fn floats<const N: usize>(
+        &self,
+        data: &[u8],
+        value: impl Fn([u8; N]) -> f64,
+    ) -> Result<Frame, FrameError> {
+        let level = |bytes: &[u8; N]| (self.zero + self.scale * value(*bytes)) as f32;
+        let values = self.interleaved(data.as_chunks().0.iter().map(level).collect());
+        frame_from_floats((self.width, self.height), self.channels, values)
+    }
+
+    /// The values of all channels, interleaved.
+    fn interleaved<T: Copy>(&self, values: Vec<T>) -> Vec<T> {
+        match self.channels {
+            1 => values,
+            channels => interleaved(&values, channels),
+        }
+    }
+}

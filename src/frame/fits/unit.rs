@@ -1,0 +1,183 @@
+//! The header-data units of a file.
+
+use super::error::truncated;
+use super::header::{BLOCK_BYTES, Header};
+use crate::frame::FrameError;
+
+/// Iterates over the header-data units of a file.
+pub(super) struct Units<'a> {
+    bytes: &'a [u8],
+    /// Offset of the next unit.
+    next: usize,
+    /// End of the data of the last unit, without padding.
+    end: usize,
+}
+
+impl<'a> Units<'a> {
+    /// The units in `bytes`, the content of a file.
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self {
+            bytes,
+            next: 0,
+            end: 0,
+        }
+    }
+
+    /// The next unit, `None` after the last.
+    pub fn next(&mut self) -> Result<Option<Unit<'a>>, FrameError> {
+        if self.end > self.bytes.len() {
+            let detail = format!("the data before the next header end at byte {}", self.end);
+            return Err(truncated(self.bytes.len(), detail));
+        }
+        let at = self.next;
+        let rest = self.bytes.get(at..).unwrap_or_default();
+        // Anything other than an extension ends the file.
+        if at > 0 && !rest.starts_with(b"XTENSION") {
+            return Ok(None);
+        }
+        let (header, data) = Header::parse(self.bytes, at)?;
+        let unit = Unit::new(header, data)?;
+        let end = unit
+            .data_bytes()
+            .and_then(|length| data.checked_add(length));
+        self.end = end.unwrap_or(usize::MAX);
+        // Headers and data are padded to whole blocks.
+        let next = self.end.checked_next_multiple_of(BLOCK_BYTES);
+        self.next = next.unwrap_or(usize::MAX);
+        Ok(Some(unit))
+    }
+}
+
+/// Type of the stored values (BITPIX).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum StoredType {
+    U8,
+    I16,
+    I32,
+    I64,
+    F32,
+    F64,
+}
+
+impl StoredType {
+    fn of(header: &Header) -> Result<Self, FrameError> {
+        const EXPECTED: &str = "8, 16, 32, 64, -32 or -64";
+        Ok(match header.required("BITPIX", EXPECTED)? {
+            8 => Self::U8,
+            16 => Self::I16,
+            32 => Self::I32,
+            64 => Self::I64,
+            -32 => Self::F32,
+            -64 => Self::F64,
+            _ => return Err(header.invalid("BITPIX", EXPECTED)),
+        })
+    }
+
+    /// Size of a value, in bytes.
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::U8 => 1,
+            Self::I16 => 2,
+            Self::I32 | Self::F32 => 4,
+            Self::I64 | Self::F64 => 8,
+        }
+    }
+
+    pub fn is_float(self) -> bool {
+        matches!(self, Self::F32 | Self::F64)
+    }
+}
+
+/// One header-data unit.
+pub(super) struct Unit<'a> {
+    pub header: Header<'a>,
+    /// Offset of the data in the file.
+    pub data: usize,
+    pub stored: StoredType,
+    /// NAXIS1, NAXIS2, …
+    pub axes: Vec<usize>,
+}
+
+impl<'a> Unit<'a> {
+    fn new(header: Header<'a>, data: usize) -> Result<Self, FrameError> {
+        const MAX_AXES: i64 = 999;
+        let stored = StoredType::of(&header)?;
+        let expected = "a number of axes from 0 to 999";
+        let count = header.required("NAXIS", expected)?;
+        if !(0..=MAX_AXES).contains(&count) {
+            return Err(header.invalid("NAXIS", expected));
+        }
+        let axis = |number: i64| {
+            let keyword = format!("NAXIS{number}");
+            let expected = "a length of 0 or more";
+            let length = header.required(&keyword, expected)?;
+            usize::try_from(length).map_err(|_| header.invalid(&keyword, expected))
+        };
+        let axes = (1..=count).map(axis).collect::<Result<_, _>>()?;
+        Ok(Self {
+            header,
+            data,
+            stored,
+            axes,
+        })
+    }
+
+    /// Size of the data without padding, in bytes; `None` on overflow.
+    fn data_bytes(&self) -> Option<usize> {
+        let count = |keyword: &str, default: usize| {
+            let found = self.header.optional(keyword, "a count").ok().flatten();
+            found
+                .and_then(|n| usize::try_from(n).ok())
+                .unwrap_or(default)
+        };
+        if self.axes.is_empty() {
+            return Some(0);
+        }
+        product(&self.axes)?
+            .checked_add(count("PCOUNT", 0))?
+            .checked_mul(count("GCOUNT", 1))?
+            .checked_mul(self.stored.bytes())
+    }
+
+    pub fn is_table(&self) -> bool {
+        let kind = self.header.text("XTENSION");
+        !self.is_compressed_image() && kind.is_some_and(|kind| kind.ends_with("TABLE"))
+    }
+
+    /// Whether the unit is a tile-compressed image, which is stored as a table.
+    pub fn is_compressed_image(&self) -> bool {
+        self.header.is_true("ZIMAGE")
+    }
+
+    /// Number of planes of a cube.
+    pub fn planes(&self) -> usize {
+        product(self.axes.get(2..).unwrap_or_default()).unwrap_or(usize::MAX)
+    }
+
+    pub fn is_colour(&self) -> bool {
+        self.axes.get(2) == Some(&3) && self.planes() == 3
+    }
+
+    /// Number of images in it: none, one, or the planes of a cube.
+    pub fn pages(&self) -> usize {
+        if self.is_compressed_image() {
+            return 1;
+        }
+        let kind = self.header.text("XTENSION");
+        let is_image = kind.is_none_or(|kind| kind == "IMAGE");
+        match self.axes[..] {
+            [width, height, ..] if is_image && width > 0 && height > 0 => {
+                if self.is_colour() {
+                    1
+                } else {
+                    self.planes()
+                }
+            }
+            _ => 0,
+        }
+    }
+}
+
+fn product(lengths: &[usize]) -> Option<usize> {
+    lengths.iter().try_fold(1, |n: usize, &l| n.checked_mul(l))
+}

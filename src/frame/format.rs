@@ -1,0 +1,73 @@
+//! File formats and the signatures that identify them.
+
+use std::fmt;
+
+/// A file format that can be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameFormat {
+    /// Flexible Image Transport System.
+    Fits,
+    /// Tagged Image File Format, also BigTIFF.
+    Tiff,
+    /// Portable Network Graphics.
+    Png,
+    /// JPEG (JFIF or Exif).
+    Jpeg,
+    /// Windows bitmap.
+    Bmp,
+    /// Portable anymap: PBM, PGM, PPM or PAM.
+    Pnm,
+    /// Any of the other formats, compressed with gzip.
+    Gzip,
+}
+
+impl fmt::Display for FrameFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Fits => "FITS",
+            Self::Tiff => "TIFF",
+            Self::Png => "PNG",
+            Self::Jpeg => "JPEG",
+            Self::Bmp => "BMP",
+            Self::Pnm => "PNM",
+            Self::Gzip => "gzip",
+        })
+    }
+}
+
+impl FrameFormat {
+    /// The format whose signature `bytes` begin with.
+    pub(super) fn of(bytes: &[u8]) -> Option<Self> {
+        const SIGNATURES: [(&[u8], FrameFormat); 8] = [
+            (b"SIMPLE  =", FrameFormat::Fits),
+            (b"II*\0", FrameFormat::Tiff),
+            (b"MM\0*", FrameFormat::Tiff),
+            (b"II+\0", FrameFormat::Tiff),
+            (b"MM\0+", FrameFormat::Tiff),
+            (b"\x89PNG\r\n\x1a\n", FrameFormat::Png),
+            (b"\xff\xd8\xff", FrameFormat::Jpeg),
+            (b"\x1f\x8b", FrameFormat::Gzip),
+        ];
+        match bytes {
+            [b'P', b'1'..=b'7', space, ..] if space.is_ascii_whitespace() => Some(Self::Pnm),
+            // "BM" alone is too short a signature: the reserved bytes after the file size must be
+            // 0.
+            [b'B', b'M', _, _, _, _, 0, 0, 0, 0, ..] => Some(Self::Bmp),
+            _ => SIGNATURES
+                .iter()
+                .find(|(signature, _)| bytes.starts_with(signature))
+                .map(|&(_, format)| format),
+        }
+    }
+}
+
+/// The first bytes for an error message: as text if they are text, otherwise in hexadecimal.
+pub(super) fn first_bytes(bytes: &[u8]) -> String {
+    let head = &bytes[..bytes.len().min(8)];
+    let is_text = |b: &u8| b.is_ascii_graphic() || b.is_ascii_whitespace();
+    if head.iter().all(is_text) {
+        return format!("the text {:?}", String::from_utf8_lossy(head));
+    }
+    let hex: Vec<String> = head.iter().map(|b| format!("{b:02x}")).collect();
+    format!("the bytes {}", hex.join(" "))
+}

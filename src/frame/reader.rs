@@ -1,0 +1,158 @@
+//! Reads files and streams, and decodes them by their format.
+
+use super::error::FrameError;
+use super::format::{FrameFormat, first_bytes};
+use super::image::Frame;
+use super::limits::{HEAD_BYTES, MAX_FILE_BYTES};
+use super::{fits, gzip, raster, tiff};
+use std::io::{self, Read};
+use std::num::NonZeroUsize;
+use std::path::Path;
+
+/// Buffers for reading, reused from frame to frame. Without them, reading spends most of its time
+/// in the operating system, which allocates and clears the memory of each frame.
+#[derive(Debug, Default)]
+pub struct Buffers {
+    /// Content of the file.
+    bytes: Vec<u8>,
+    /// Pixels of a discarded frame.
+    pixels: Vec<f32>,
+}
+
+impl Buffers {
+    /// Empty buffers.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Reuses the pixels of a frame that is no longer needed.
+    pub fn recycle(&mut self, frame: Frame) {
+        self.pixels = frame.pixels;
+    }
+}
+
+/// Reads the first image of the file `path`. Its extension does not matter.
+/// # Errors
+/// As [`read_page`].
+pub fn read(path: impl AsRef<Path>) -> Result<Frame, FrameError> {
+    read_page(path, None)
+}
+
+/// Reads image `page` of the file `path`, counted from 1; without `page`, the first.
+/// # Errors
+/// [`FrameError::File`] with the path and the error.
+pub fn read_page(path: impl AsRef<Path>, page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
+    read_page_with(path, page, &mut Buffers::new())
+}
+
+/// [`read_page`] with buffers that are reused from frame to frame.
+/// # Errors
+/// As [`read_page`].
+pub fn read_page_with(
+    path: impl AsRef<Path>,
+    page: Option<NonZeroUsize>,
+    buffers: &mut Buffers,
+) -> Result<Frame, FrameError> {
+    let path = path.as_ref();
+    let Buffers { bytes, pixels } = buffers;
+    std::fs::File::open(path)
+        .map_err(FrameError::from)
+        .and_then(|file| {
+            let length = file.metadata().map_or(0, |metadata| metadata.len());
+            read_limited(file, length, MAX_FILE_BYTES, bytes)?;
+            decode_with(bytes, page, pixels)
+        })
+        .map_err(|error| error.in_file(path))
+}
+
+/// Reads `stream` to its end and decodes image `page`, counted from 1; without `page`, the first.
+///
+/// A stream that does not begin like an image is not read further: it may be endless.
+/// # Errors
+/// As [`decode_page`]; [`FrameError::Io`], [`FrameError::TooManyBytes`].
+pub fn read_stream(stream: impl Read, page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
+    let mut bytes = Vec::new();
+    read_limited(stream, 0, MAX_FILE_BYTES, &mut bytes)?;
+    decode_page(&bytes, page)
+}
+
+/// Reads all of `stream` into `bytes`: about `expected` bytes, at most `limit`.
+pub(super) fn read_limited(
+    mut stream: impl Read,
+    expected: u64,
+    limit: u64,
+    bytes: &mut Vec<u8>,
+) -> Result<(), FrameError> {
+    bytes.clear();
+    stream.by_ref().take(HEAD_BYTES).read_to_end(bytes)?;
+    if FrameFormat::of(bytes).is_none() {
+        return Err(not_an_image(bytes));
+    }
+    if expected > limit {
+        return Err(FrameError::TooManyBytes { limit });
+    }
+    let reserved = bytes.try_reserve(expected as usize);
+    reserved.map_err(|_| io::Error::from(io::ErrorKind::OutOfMemory))?;
+    let rest = (limit + 1).saturating_sub(bytes.len() as u64);
+    stream.take(rest).read_to_end(bytes)?;
+    if bytes.len() as u64 > limit {
+        return Err(FrameError::TooManyBytes { limit });
+    }
+    Ok(())
+}
+
+/// The error for `bytes` that do not begin like an image.
+fn not_an_image(bytes: &[u8]) -> FrameError {
+    if bytes.is_empty() {
+        return FrameError::Empty;
+    }
+    FrameError::UnknownFormat {
+        found: first_bytes(bytes),
+    }
+}
+
+/// Decodes the first image in `bytes`.
+/// # Errors
+/// As [`decode_page`].
+pub fn decode(bytes: &[u8]) -> Result<Frame, FrameError> {
+    decode_page(bytes, None)
+}
+
+/// Decodes image `page` in `bytes`, counted from 1; without `page`, the first.
+/// # Errors
+/// [`FrameError`], never [`FrameError::File`].
+pub fn decode_page(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
+    decode_with(bytes, page, &mut Vec::new())
+}
+
+fn decode_with(
+    bytes: &[u8],
+    page: Option<NonZeroUsize>,
+    buffer: &mut Vec<f32>,
+) -> Result<Frame, FrameError> {
+    match FrameFormat::of(bytes) {
+        Some(FrameFormat::Gzip) => decode_image(&gzip::unpack(bytes)?, page, buffer),
+        _ => decode_image(bytes, page, buffer),
+    }
+}
+
+/// Decodes one image that is not compressed with gzip.
+fn decode_image(
+    bytes: &[u8],
+    page: Option<NonZeroUsize>,
+    buffer: &mut Vec<f32>,
+) -> Result<Frame, FrameError> {
+    let single = |read: fn(&[u8]) -> Result<Frame, FrameError>| match page {
+        Some(page) if page.get() > 1 => Err(FrameError::NoSuchPage { page, pages: 1 }),
+        _ => read(bytes),
+    };
+    match FrameFormat::of(bytes) {
+        Some(FrameFormat::Fits) => fits::decode(bytes, page),
+        Some(FrameFormat::Tiff) => tiff::decode(bytes, page, buffer),
+        Some(FrameFormat::Png) => single(raster::decode_png),
+        Some(FrameFormat::Jpeg) => single(raster::decode_jpeg),
+        Some(FrameFormat::Bmp) => single(raster::decode_bmp),
+        Some(FrameFormat::Pnm) => single(raster::decode_pnm),
+        Some(FrameFormat::Gzip) | None => Err(not_an_image(bytes)),
+    }
+}
