@@ -1,6 +1,18 @@
-//! What instrument: its geometry (which direction each pixel looks in) and its data sheet.
+//! What instrument? Which direction each pixel looks in, and what the data sheet says.
+//!
+//! - [`CameraModel`]: pixel ↔ direction in camera axes, a pinhole with lens distortion.
+//! - [`data_sheet`]: `camera.toml` → [`DataSheet`](data_sheet::DataSheet), pixels, lens and
+//!   detector.
+//!
+//! pixel → offset from the frame's centre (x reversed if the frame is mirrored) → distortion
+//! removed → pinhole → direction; and the same way back.
+//!
+//! Caveat: the optical axis goes through the centre of the frame.
 
 pub mod data_sheet;
-mod geometry;
+mod distortion;
+mod model;
 
-pub use geometry::*;
+pub(crate) use distortion::{CUBIC_MONOMIALS, LANES, QUINTIC_MONOMIALS, monomials_in_lanes};
+pub use distortion::{Distortion, DistortionModel};
+pub use model::{CameraModel, focal_length_px, frame_centre};

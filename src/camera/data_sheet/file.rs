@@ -1,7 +1,10 @@
-//! `camera.toml`: read strictly, with errors that name line and key.
+//! Reads `camera.toml` strictly, with errors that name line and key.
 
-use super::keys::{KEYS, Key, Limits, is_curve, nearest_name};
-use super::{DataSheet, IMPERFECTION_KEYS, Imperfections, Response, ResponseError, SpotForm};
+use super::imperfections::{Imperfections, SpotForm};
+use super::key::{Key, Limits, nearest_name};
+use super::keys::{IMPERFECTION_KEYS, KEYS, is_curve};
+use super::response::{Response, ResponseError};
+use super::sheet::DataSheet;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read as _;
@@ -9,82 +12,82 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
-/// Why a file describes no camera.
+/// Error of reading a data sheet.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DataSheetError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("{}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// It is larger than such a file can be.
-    #[error("{}: larger than {limit} bytes, which no camera's description is", path.display())]
+    /// The file is larger than any data sheet.
+    #[error("{}: larger than {limit} bytes: too large for a description of a camera", path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// The most bytes.
+        /// Maximum size, in bytes.
         limit: u64,
     },
-    /// It is no TOML.
+    /// The file is not valid TOML.
     #[error("{}, line {line}: {message}", path.display())]
     Syntax {
         /// The file.
         path: PathBuf,
-        /// The line.
+        /// The line, from 1.
         line: usize,
-        /// What the parser says.
+        /// Error of the parser.
         message: String,
     },
-    /// A key that has no meaning.
-    #[error("{}, line {line}: unknown key '{key}'{}", path.display(), meant(.nearest.as_deref()))]
+    /// An unknown key.
+    #[error("{}, line {line}: unknown key '{key}'{}", path.display(), suggestion(.nearest.as_deref()))]
     UnknownKey {
         /// The file.
         path: PathBuf,
-        /// The line.
+        /// The line, from 1.
         line: usize,
         /// The key.
         key: String,
-        /// The key that may have been meant.
+        /// The most similar key.
         nearest: Option<String>,
     },
-    /// A value that makes no sense.
+    /// An invalid value.
     #[error("{}, line {line}: {key} is {found}, expected {expected}", path.display())]
     Value {
         /// The file.
         path: PathBuf,
-        /// The line.
+        /// The line, from 1.
         line: usize,
         /// The key.
         key: String,
         /// The value.
         found: String,
-        /// What it may be.
+        /// What is valid.
         expected: String,
     },
-    /// A key that is needed.
+    /// A required key is missing.
     #[error("{}: {key} is missing: {about}", path.display())]
     Missing {
         /// The file.
         path: PathBuf,
         /// The key.
         key: &'static str,
-        /// What it is.
+        /// Description of the key.
         about: &'static str,
     },
-    /// The table of a transmission or an efficiency.
+    /// An invalid curve of a transmission or an efficiency.
     #[error("{}, line {line}: {key}", path.display())]
     Response {
         /// The file.
         path: PathBuf,
-        /// The line.
+        /// The line, from 1.
         line: usize,
         /// The key.
         key: String,
-        /// What is wrong with the table.
+        /// The error in the curve.
         source: Box<ResponseError>,
     },
     /// Values that contradict each other.
@@ -92,24 +95,25 @@ pub enum DataSheetError {
     Contradiction {
         /// The file.
         path: PathBuf,
-        /// Which do, and how.
+        /// Description of the contradiction.
         what: String,
     },
 }
 
-fn meant(nearest: Option<&str>) -> String {
+fn suggestion(nearest: Option<&str>) -> String {
     nearest.map_or_else(String::new, |name| format!("; did you mean '{name}'?"))
 }
 
-/// The most bytes of a camera's description.
+/// Maximum size of a data sheet, in bytes.
 const MAX_BYTES: u64 = 1 << 20;
-/// What a file need not say, and what then holds.
+/// Optional keys and their default values.
 const DEFAULTS: &[(&str, f64)] = &[
     ("bias_adu", 0.0),
     ("band_from_nm", 400.0),
     ("band_to_nm", 900.0),
 ];
-/// Whether a file need not say it, and it then follows from the others, or is none.
+
+/// Whether the key may be missing and has no default value in [`DEFAULTS`].
 fn is_optional(name: &str) -> bool {
     name == "peak_share" || IMPERFECTION_KEYS.iter().any(|key| key.name == name)
 }
@@ -117,7 +121,7 @@ fn is_optional(name: &str) -> bool {
 type Table = BTreeMap<Spanned<String>, Spanned<toml::Value>>;
 
 impl DataSheet {
-    /// Reads a `camera.toml`. Names of tables in it are relative to its directory.
+    /// Reads a `camera.toml`. File names in it are relative to its directory.
     ///
     /// # Errors
     /// [`DataSheetError`] with the file, the line and the key.
@@ -140,7 +144,7 @@ impl DataSheet {
         Self::parse(path, &text)
     }
 
-    /// Parses the text of such a file; `path` stands for its name.
+    /// Parses the text of such a file; `path` is its name.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -150,10 +154,10 @@ impl DataSheet {
             line: line_of(text, error.span()),
             message: error.message().trim().to_owned(),
         })?;
-        Reading { path, text, table }.data_sheet()
+        CameraFile { path, text, table }.data_sheet()
     }
 
-    /// What contradicts what, where something does.
+    /// The first contradiction between values, if any.
     pub fn contradiction(&self) -> Option<String> {
         let (from, to) = (self.band_from_nm, self.band_to_nm);
         if from >= to {
@@ -170,7 +174,7 @@ impl DataSheet {
         })
     }
 
-    /// Which curve is not known all the way between two wavelengths in nm, where one is not.
+    /// A message if a curve does not cover the band between two wavelengths in nm.
     pub fn uncovered(&self, from_nm: f64, to_nm: f64) -> Option<String> {
         let curves = [
             ("lens_transmission", &self.lens_transmission),
@@ -187,14 +191,14 @@ impl DataSheet {
     }
 }
 
-/// A file while it is read.
-struct Reading<'a> {
+/// A parsed TOML file.
+struct CameraFile<'a> {
     path: &'a Path,
     text: &'a str,
     table: Table,
 }
 
-impl Reading<'_> {
+impl CameraFile<'_> {
     fn data_sheet(&self) -> Result<DataSheet, DataSheetError> {
         self.check_names()?;
         let mut sheet = DataSheet {
@@ -264,7 +268,7 @@ impl Reading<'_> {
         found.map(|(_, value)| value)
     }
 
-    fn wrong(&self, key: &str, value: &Spanned<toml::Value>, expected: String) -> DataSheetError {
+    fn invalid(&self, key: &str, value: &Spanned<toml::Value>, expected: String) -> DataSheetError {
         let found = self.text.get(value.span()).unwrap_or_default();
         let mut found: String = found.chars().take(40).collect();
         if found.is_empty() {
@@ -287,7 +291,7 @@ impl Reading<'_> {
             )),
             Some(value) => match value.get_ref() {
                 toml::Value::String(name) => Ok(name.clone()),
-                _ => Err(self.wrong("name", value, "a text in quotes".to_owned())),
+                _ => Err(self.invalid("name", value, "a text in quotes".to_owned())),
             },
         }
     }
@@ -299,7 +303,7 @@ impl Reading<'_> {
         let form = value.get_ref().as_str().and_then(SpotForm::named);
         form.ok_or_else(|| {
             let names = SpotForm::ALL.map(|form| format!("\"{}\"", form.name()));
-            self.wrong("spot_form", value, format!("one of {}", names.join(", ")))
+            self.invalid("spot_form", value, format!("one of {}", names.join(", ")))
         })
     }
 
@@ -308,10 +312,10 @@ impl Reading<'_> {
             return Ok(false);
         };
         let mirrored = value.get_ref().as_bool();
-        mirrored.ok_or_else(|| self.wrong("mirrored", value, "true or false".to_owned()))
+        mirrored.ok_or_else(|| self.invalid("mirrored", value, "true or false".to_owned()))
     }
 
-    /// The value of a key; none where it is to follow from the others.
+    /// The value of a key, or its default; `None` if it is optional without a default.
     fn number(&self, key: &Key<DataSheet>) -> Result<Option<f64>, DataSheetError> {
         let Some(value) = self.get(key.name) else {
             let default = DEFAULTS.iter().find(|(name, _)| *name == key.name);
@@ -324,7 +328,7 @@ impl Reading<'_> {
         as_number(value.get_ref())
             .filter(|number| key.limits.accept(*number))
             .map(Some)
-            .ok_or_else(|| self.wrong(key.name, value, key.limits.to_string()))
+            .ok_or_else(|| self.invalid(key.name, value, key.limits.to_string()))
     }
 
     fn missing(&self, name: &str) -> DataSheetError {
@@ -353,7 +357,7 @@ impl Reading<'_> {
             toml::Value::Array(points) => {
                 let text = csv_of(points).ok_or_else(|| {
                     let expected = "pairs of wavelength in nm and value";
-                    self.wrong(name, value, expected.to_owned())
+                    self.invalid(name, value, expected.to_owned())
                 })?;
                 Response::parse(self.path, text.as_bytes()).map_err(table)
             }
@@ -362,7 +366,7 @@ impl Reading<'_> {
                 .map(Response::Constant)
                 .ok_or_else(|| {
                     let expected = "a number above 0 and at most 1, or the name of a CSV file";
-                    self.wrong(name, value, expected.to_owned())
+                    self.invalid(name, value, expected.to_owned())
                 }),
         }
     }
@@ -374,7 +378,7 @@ fn as_number(value: &toml::Value) -> Option<f64> {
         .or_else(|| value.as_integer().map(|whole| whole as f64))
 }
 
-/// Points in the file itself, as a table's text would have them.
+/// Points listed in the file itself, as the text of a CSV table.
 fn csv_of(points: &[toml::Value]) -> Option<String> {
     let mut text = "wavelength_nm,value\n".to_owned();
     for point in points {
@@ -386,7 +390,7 @@ fn csv_of(points: &[toml::Value]) -> Option<String> {
     Some(text)
 }
 
-/// The line, counted from 1, in which a part of the text begins.
+/// The line, counted from 1, in which `span` begins.
 fn line_of(text: &str, span: Option<Range<usize>>) -> usize {
     let end = span.map_or(0, |span| span.start).min(text.len());
     text.as_bytes()[..end]

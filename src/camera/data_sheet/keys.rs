@@ -1,147 +1,38 @@
-//! The numbers of a camera by name: one table for the file, the options and the sweeps.
+//! The numbers of a data sheet by name: one table for the file, the options and the sweeps.
 
-use super::{DataSheet, IMPERFECTION_KEYS, Preset, Response, SpotForm};
-use std::fmt;
-use std::fmt::Write as _;
+use super::key::{Key, Limits, key};
+use super::sheet::DataSheet;
 
-/// What values make sense.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Limits {
-    /// Above 0.
-    Positive,
-    /// 0 or above.
-    NotNegative,
-    /// Above 0, at most 1.
-    Share,
-    /// A whole number from one to the other.
-    Whole(f64, f64),
-    /// From the first to the second.
-    FromTo(f64, f64),
-    /// From the first to below the second.
-    FromToBelow(f64, f64),
-    /// Any number.
-    Finite,
-}
-
-impl Limits {
-    /// Whether `value` is within them.
-    pub fn accept(self, value: f64) -> bool {
-        value.is_finite()
-            && match self {
-                Self::Positive => value > 0.0,
-                Self::NotNegative => value >= 0.0,
-                Self::Share => value > 0.0 && value <= 1.0,
-                Self::Whole(from, to) => (from..=to).contains(&value) && value.fract() == 0.0,
-                Self::FromTo(from, to) => (from..=to).contains(&value),
-                Self::FromToBelow(from, to) => (from..to).contains(&value),
-                Self::Finite => true,
-            }
-    }
-}
-
-impl fmt::Display for Limits {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Positive => write!(f, "a number above 0"),
-            Self::NotNegative => write!(f, "a number from 0 up"),
-            Self::Share => write!(f, "a number above 0 and at most 1"),
-            Self::Whole(from, to) => write!(f, "a whole number from {from} to {to}"),
-            Self::FromTo(from, to) => write!(f, "a number from {from} to {to}"),
-            Self::FromToBelow(from, to) => write!(f, "a number from {from} to below {to}"),
-            Self::Finite => write!(f, "a number"),
-        }
-    }
-}
-
-/// A number of a `T` that has a name.
-pub struct Key<T> {
-    /// The name, which ends in the unit.
-    pub name: &'static str,
-    /// What it is, in a line.
-    pub about: &'static str,
-    /// What values make sense.
-    pub limits: Limits,
-    /// Its value, where it has one.
-    pub get: fn(&T) -> Option<f64>,
-    /// Gives it a value within the limits.
-    pub set: fn(&mut T, f64),
-}
-
-impl<T> Key<T> {
-    /// The key called `name` among `keys`.
-    pub fn find<'a>(keys: &'a [Self], name: &str) -> Option<&'a Self> {
-        keys.iter().find(|key| key.name == name)
-    }
-}
-
-impl<T> fmt::Debug for Key<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name)
-    }
-}
-
-/// The name among `names` that is most like `name`, where one is like it at all.
-pub fn nearest_name<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    const ALIKE: f64 = 0.75;
-    let name = name.to_lowercase().replace('-', "_");
-    // A name that begins alike is what was meant when only the unit was forgotten.
-    names
-        .map(|known| {
-            let begins = known.starts_with(&name) || name.starts_with(known);
-            let likeness = strsim::jaro_winkler(&name, known);
-            (likeness + if begins { 0.5 } else { 0.0 }, known)
-        })
-        .filter(|(likeness, _)| *likeness > ALIKE)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, known)| known)
-}
-
-/// Whether the number called `name` may be a curve by wavelength, and is then its largest value.
+/// Whether the number called `name` may be a curve over wavelength. Its value is then the peak.
 pub fn is_curve(name: &str) -> bool {
     ["lens_transmission", "quantum_efficiency"].contains(&name)
 }
 
-/// The longest side of a detector that makes sense, in pixels.
-const MAX_SIDE_PX: f64 = 100_000.0;
-/// Standard deviations of spots that make sense, in pixels: a wider one is no star.
+/// Width and height of a detector, in pixels.
+const SIDES_PX: Limits = Limits::Whole(3.0, 100_000.0);
+/// Standard deviation of a star's spot, in pixels.
 const SPOTS_PX: Limits = Limits::FromToBelow(0.05, 20.0);
-/// Wavelengths of which a detector may make anything, in nm.
+/// Wavelengths that a detector may be sensitive to, in nm.
 const WAVELENGTHS_NM: Limits = Limits::FromToBelow(100.0, 10_000.0);
 
-/// The key of the number that a field is, of the whole itself or of what stands in another field of it.
-macro_rules! key {
-    ($name:ident $(in $within:ident)?, $limits:expr, $about:literal) => {
-        $crate::camera::data_sheet::Key {
-            name: stringify!($name),
-            about: $about,
-            limits: $limits,
-            get: |whole| Some(whole$(.$within)?.$name as f64),
-            set: |whole, value| whole$(.$within)?.$name = value as _,
-        }
-    };
-}
-pub(crate) use key;
-
-/// The numbers of a camera. The two that may be curves, [`DataSheet::lens_transmission`] and [`DataSheet::quantum_efficiency`],
-/// are their largest values here; a curve that is given another one keeps its form. Of `spot_sigma_px` and `peak_share` the
-/// last one given decides what falls on the brightest pixel.
+/// The numbers of a camera.
+///
+/// For a curve ([`DataSheet::lens_transmission`], [`DataSheet::quantum_efficiency`]) the value is
+/// the peak, and setting it scales the curve. `spot_sigma_px` and `peak_share` exclude each other:
+/// the last one set applies.
 pub const KEYS: &[Key<DataSheet>] = &[
-    key!(
-        width_px,
-        Limits::Whole(3.0, MAX_SIDE_PX),
-        "columns of the detector"
-    ),
-    key!(
-        height_px,
-        Limits::Whole(3.0, MAX_SIDE_PX),
-        "rows of the detector"
-    ),
+    key!(width_px, SIDES_PX, "columns of the detector"),
+    key!(height_px, SIDES_PX, "rows of the detector"),
     key!(
         pitch_x_um,
         Limits::Positive,
-        "distance between columns, in µm"
+        "pixel pitch along a row, in µm"
     ),
-    key!(pitch_y_um, Limits::Positive, "distance between rows, in µm"),
+    key!(
+        pitch_y_um,
+        Limits::Positive,
+        "pixel pitch along a column, in µm"
+    ),
     key!(
         focal_length_mm,
         Limits::Positive,
@@ -154,14 +45,14 @@ pub const KEYS: &[Key<DataSheet>] = &[
     ),
     Key {
         name: "lens_transmission",
-        about: "part of the light that the lens lets through (largest, of a curve)",
+        about: "transmission of the lens (peak, if it is a curve)",
         limits: Limits::Share,
         get: |sheet| Some(sheet.lens_transmission.peak()),
         set: |sheet, peak| sheet.lens_transmission = sheet.lens_transmission.with_peak(peak),
     },
     Key {
         name: "quantum_efficiency",
-        about: "electrons for each photon on a pixel (largest, of a curve)",
+        about: "electrons per photon on a pixel (peak, if it is a curve)",
         limits: Limits::Share,
         get: |sheet| Some(sheet.quantum_efficiency.peak()),
         set: |sheet, peak| sheet.quantum_efficiency = sheet.quantum_efficiency.with_peak(peak),
@@ -179,25 +70,29 @@ pub const KEYS: &[Key<DataSheet>] = &[
     key!(
         read_noise_e,
         Limits::NotNegative,
-        "noise of reading a pixel, in electrons"
+        "read noise of a pixel, in electrons"
     ),
     key!(
         dark_current_e_s,
         Limits::NotNegative,
-        "dark current of a pixel, in electrons a second"
+        "dark current of a pixel, in electrons per second"
     ),
     key!(
         full_well_e,
         Limits::Positive,
-        "charge at which a pixel is full, in electrons"
+        "full well of a pixel, in electrons"
     ),
     key!(
         gain_e_per_adu,
         Limits::Positive,
-        "electrons for a step of the grey level"
+        "gain, in electrons per grey level"
     ),
-    key!(bits, Limits::Whole(1.0, 32.0), "bits of the grey level"),
-    key!(bias_adu, Limits::NotNegative, "grey level without light"),
+    key!(bits, Limits::Whole(1.0, 32.0), "bits of a grey level"),
+    key!(
+        bias_adu,
+        Limits::NotNegative,
+        "bias: grey level without light"
+    ),
     Key {
         name: "spot_sigma_px",
         about: "standard deviation of a star's spot, in pixels",
@@ -205,91 +100,85 @@ pub const KEYS: &[Key<DataSheet>] = &[
         get: |sheet| Some(sheet.spot_sigma_px),
         set: |sheet, sigma_px| {
             sheet.spot_sigma_px = sigma_px;
-            // A share that was stated is that of another spot.
+            // A stated share belongs to the previous spot.
             sheet.peak_share = None;
         },
     },
     Key {
         name: "peak_share",
-        about: "part of a star's light on its brightest pixel (else from spot_sigma_px)",
+        about: "share of a star's light on its brightest pixel (default: from spot_sigma_px)",
         limits: Limits::Share,
         get: |sheet| Some(sheet.peak_share()),
         set: |sheet, share| sheet.peak_share = Some(share),
     },
 ];
 
-/// A `camera.toml` with the values of `preset` and a comment at each.
-pub fn template(preset: Preset) -> String {
-    let sheet = preset.data_sheet();
-    let mut text = format!("# A camera for starpipe: {}\n", preset.about());
-    for line in preset.sources().lines() {
-        let _ = writeln!(text, "# {line}");
-    }
-    let _ = writeln!(text, "\nname = {:?}", sheet.name);
-    for key in KEYS {
-        let value = match key.name {
-            "lens_transmission" => response_value(&sheet.lens_transmission),
-            "quantum_efficiency" => response_value(&sheet.quantum_efficiency),
-            "peak_share" => match sheet.peak_share {
-                Some(share) => share.to_string(),
-                None => continue,
-            },
-            _ => (key.get)(&sheet).map_or_else(String::new, |value| value.to_string()),
-        };
-        let _ = writeln!(text, "\n# {}\n{} = {value}", key.about, key.name);
-    }
-    text + &imperfections(&sheet)
-}
+/// A share, 0 and 1 included.
+const SHARE: Limits = Limits::FromTo(0.0, 1.0);
+/// Displacement by the lens, in pixels.
+const DISPLACEMENT_PX: Limits = Limits::FromTo(-1000.0, 1000.0);
 
-/// What a file need not say: as comments, with what then holds.
-fn imperfections(sheet: &DataSheet) -> String {
-    let mut text =
-        "\n# Of the rest, which simulated frames show, each may be left out:\n".to_owned();
-    let forms = SpotForm::ALL.map(|form| format!("{:?}", form.name()));
-    let imperfections = &sheet.imperfections;
-    let _ = writeln!(
-        text,
-        "\n# form of a star's spot: {}\n# spot_form = {:?}\n\n# whether the image is reversed left to right\n# mirrored = {}",
-        forms.join(", "),
-        imperfections.spot_form.name(),
-        imperfections.mirrored
-    );
-    for key in IMPERFECTION_KEYS {
-        let value = (key.get)(sheet).map_or_else(String::new, |value| value.to_string());
-        let _ = writeln!(text, "\n# {}\n# {} = {value}", key.about, key.name);
-    }
-    text
-}
-
-/// A response as the file takes it: a number, or points in place of a file's name.
-fn response_value(response: &Response) -> String {
-    match response {
-        Response::Constant(value) => value.to_string(),
-        Response::Table(points) => {
-            let points: Vec<String> = points
-                .iter()
-                .map(|(nm, value)| format!("    [{nm}, {value}],\n"))
-                .collect();
-            format!(
-                "[ # wavelength in nm, value; or the name of a CSV file: \"curve.csv\"\n{}]",
-                points.concat()
-            )
-        }
-    }
-}
+/// The numbers of the imperfections, all of them optional.
+pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
+    key!(vignetting in imperfections, SHARE, "share of the light lost in the corners"),
+    key!(distortion_px in imperfections,
+        DISPLACEMENT_PX,
+        "radial distortion: outward displacement of a star in the corner, in pixels"
+    ),
+    key!(decentring_x_px in imperfections,
+        DISPLACEMENT_PX,
+        "decentred lens, along x: displacement at the distance of the corner, in pixels"
+    ),
+    key!(decentring_y_px in imperfections,
+        DISPLACEMENT_PX,
+        "decentred lens, along y: displacement at the distance of the corner, in pixels"
+    ),
+    key!(response_sigma in imperfections,
+        SHARE,
+        "standard deviation of the pixels' response, relative to its mean (PRNU)"
+    ),
+    key!(dark_current_sigma in imperfections,
+        Limits::FromTo(0.0, 10.0),
+        "standard deviation of the pixels' dark current, relative to its mean (DSNU)"
+    ),
+    key!(hot_pixels_per_mpx in imperfections,
+        Limits::FromTo(0.0, 1e6),
+        "hot pixels per million pixels"
+    ),
+    key!(hot_pixel_e_s in imperfections,
+        Limits::NotNegative,
+        "mean dark current of a hot pixel, in electrons per second"
+    ),
+    key!(dead_pixels_per_mpx in imperfections,
+        Limits::FromTo(0.0, 1e6),
+        "dead pixels per million pixels"
+    ),
+    key!(offset_sigma_adu in imperfections,
+        Limits::NotNegative,
+        "standard deviation of the pixels' bias, in grey levels"
+    ),
+    key!(column_sigma_adu in imperfections,
+        Limits::NotNegative,
+        "standard deviation of the columns' bias, in grey levels"
+    ),
+    key!(blooming in imperfections,
+        SHARE,
+        "share of the charge above full well that flows along the column"
+    ),
+    key!(depth_um in imperfections,
+        Limits::FromTo(0.1, 1000.0),
+        "depth of the layer that collects charge, in µm (for cosmic rays)"
+    ),
+    key!(pattern_seed in imperfections,
+        Limits::Whole(0.0, 9_007_199_254_740_991.0),
+        "seed of the pixel pattern, which is the same in every frame"
+    ),
+];
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_name_that_was_meant_is_found() {
-        let nearest = |name| nearest_name(name, KEYS.iter().map(|key| key.name));
-        assert_eq!(nearest("apertur_mm"), Some("aperture_mm"));
-        assert_eq!(nearest("read-noise"), Some("read_noise_e"));
-        assert_eq!(nearest("focal_lenght_mm"), Some("focal_length_mm"));
-        assert_eq!(nearest("zzz"), None);
-    }
+    use crate::camera::data_sheet::Preset;
 
     #[test]
     fn another_spot_has_another_share_on_its_brightest_pixel() {
@@ -309,14 +198,5 @@ mod tests {
             let limits = Key::find(KEYS, name).unwrap().limits;
             assert!(limits.accept(400.0) && !limits.accept(1e300), "{name}");
         }
-    }
-
-    #[test]
-    fn values_without_sense_are_outside_the_limits() {
-        assert!(!Limits::Positive.accept(0.0) && !Limits::Positive.accept(f64::NAN));
-        assert!(Limits::NotNegative.accept(0.0) && !Limits::NotNegative.accept(-1.0));
-        assert!(Limits::Share.accept(1.0) && !Limits::Share.accept(1.1));
-        assert!(Limits::Whole(1.0, 32.0).accept(12.0) && !Limits::Whole(1.0, 32.0).accept(12.5));
-        assert!(!Limits::FromToBelow(0.0, 90.0).accept(90.0));
     }
 }

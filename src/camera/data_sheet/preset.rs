@@ -1,13 +1,15 @@
-//! Cameras that are ready.
+//! Built-in cameras.
 
-use super::{DataSheet, Imperfections, Response};
+use super::imperfections::Imperfections;
+use super::response::Response;
+use super::sheet::DataSheet;
 
-/// A camera whose description is built in.
+/// A built-in camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Preset {
     /// The camera of experiment 1 of Tong, Li & Wang 2014.
     Experiment1,
-    /// That of their experiment 2: the same one.
+    /// The same camera under the conditions of experiment 2.
     Experiment2,
     /// A star tracker for small satellites: an MT9P031 behind 16 mm f/1.2.
     NanosatTracker,
@@ -18,7 +20,7 @@ pub enum Preset {
 }
 
 impl Preset {
-    /// All of them.
+    /// All presets.
     pub const ALL: [Self; 5] = [
         Self::Experiment1,
         Self::Experiment2,
@@ -27,12 +29,12 @@ impl Preset {
         Self::Asi183,
     ];
 
-    /// The preset of that name.
+    /// The preset called `name`.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|preset| preset.name() == name)
     }
 
-    /// The name of its option.
+    /// Name in options.
     pub fn name(self) -> &'static str {
         match self {
             Self::Experiment1 => "experiment-1",
@@ -43,7 +45,7 @@ impl Preset {
         }
     }
 
-    /// The camera in a few words.
+    /// Short description.
     pub fn about(self) -> &'static str {
         match self {
             Self::Experiment1 => {
@@ -60,7 +62,7 @@ impl Preset {
         }
     }
 
-    /// Where the figures are from, and which are assumed.
+    /// Sources of the figures, and which are assumed.
     pub fn sources(self) -> &'static str {
         match self {
             Self::Experiment1 | Self::Experiment2 => PAPER_SOURCES,
@@ -70,10 +72,10 @@ impl Preset {
         }
     }
 
-    /// The camera.
+    /// The data sheet.
     pub fn data_sheet(self) -> DataSheet {
         match self {
-            Self::Experiment1 | Self::Experiment2 => papers_camera(),
+            Self::Experiment1 | Self::Experiment2 => paper_camera(),
             Self::NanosatTracker => nanosat_tracker(),
             Self::Imx174 => imx174(),
             Self::Asi183 => asi183(),
@@ -82,13 +84,14 @@ impl Preset {
 }
 
 const PAPER_SOURCES: &str = "\
-Tong, Li & Wang, Acta Optica Sinica 34, 1004003 (2014), section 2.2: transmission, aperture, focal length, pixel pitch,
-quantum efficiency (table 2), peak share 1/9. The paper has the noise of the sensor as 52 dB only: 52.5 electrons give its
-limits. Not in the paper: the number of pixels is that of a half-inch video detector of that pitch, the spot is the one
-with that peak share, full well is 52 dB above the noise; bits, gain and bias are assumed.";
+Tong, Li & Wang, Acta Optica Sinica 34, 1004003 (2014), section 2.2: transmission, aperture,
+focal length, pixel pitch, quantum efficiency (table 2), peak share 1/9. The paper states the noise
+as 52 dB only; 52.5 electrons reproduce its limits. Assumed: the number of pixels of a half-inch
+video detector of that pitch, the spot with that peak share, a full well 52 dB above the noise;
+bits, gain and bias.";
 
-/// Section 2.2 of the paper.
-fn papers_camera() -> DataSheet {
+/// `experiment-1` and `experiment-2`: section 2.2 of the paper.
+fn paper_camera() -> DataSheet {
     let qe = include_bytes!("quantum-efficiency.csv");
     let quantum_efficiency = Response::parse("quantum-efficiency.csv".as_ref(), qe);
     DataSheet {
@@ -101,7 +104,7 @@ fn papers_camera() -> DataSheet {
         aperture_mm: 100.0,
         lens_transmission: Response::Constant(0.85),
         quantum_efficiency: quantum_efficiency
-            .expect("the built-in table is sound, as a test shows"),
+            .expect("the built-in table is valid, as a test shows"),
         band_from_nm: 360.0,
         band_to_nm: 780.0,
         read_noise_e: 52.5,
@@ -117,10 +120,10 @@ fn papers_camera() -> DataSheet {
 }
 
 const NANOSAT_SOURCES: &str = "\
-onsemi MT9P031/D, table 1: pixels, pitch, bits; full well 6460 electrons from its largest ratio of signal to noise, 38.1 dB;
-read noise 2.0 electrons from its dynamic range, 70.1 dB; gain: the full well over 12 bits. Lens: 16 mm f/1.2. Estimates:
-dark current (20 electrons/s at 25 degrees C), bias, spot (1.5 px), lens transmission (0.85), the quantum efficiency
-of the monochrome version.";
+onsemi MT9P031/D, table 1: pixels, pitch, bits; full well 6460 electrons from its maximum
+signal-to-noise ratio, 38.1 dB; read noise 2.0 electrons from its dynamic range, 70.1 dB; gain: the
+full well over 12 bits. Lens: 16 mm f/1.2. Estimates: dark current (20 electrons/s at 25 degrees C),
+bias, spot (1.5 px), lens transmission (0.85), the quantum efficiency of the monochrome version.";
 
 /// `nanosat-tracker`
 fn nanosat_tracker() -> DataSheet {
@@ -164,11 +167,12 @@ fn nanosat_tracker() -> DataSheet {
 }
 
 const IMX174_SOURCES: &str = "\
-Pixels, pitch and bits: Sony IMX174 and IMX249, the same pixel. Full well 32691 electrons, read noise 6.83 electrons, gain
-8.0 electrons/ADU: EMVA 1288 figures published for cameras with the IMX174; the mvBlueFOX3 manual has 45.1 dB and 73 dB for the
-IMX249, which is the same. Lens: 35 mm f/1.4. Estimates: dark current (0.7 electrons/s at 25 degrees C), bias, spot
-(0.7 px), lens transmission (0.87), the quantum efficiency except for its peak of 0.77 at 525 nm (to 0.06, after the
-maker's curve).";
+Pixels, pitch and bits: Sony IMX174 and IMX249, which have the same pixel. Full well 32691
+electrons, read noise 6.83 electrons, gain 8.0 electrons/ADU: EMVA 1288 figures published for
+cameras with the IMX174; the 45.1 dB and 73 dB of the IMX249 in the mvBlueFOX3 manual agree. Lens:
+35 mm f/1.4. Estimates: dark current (0.7 electrons/s at 25 degrees C), bias, spot (0.7 px), lens
+transmission (0.87), the quantum efficiency except for its peak of 0.77 at 525 nm (to 0.06, from the
+manufacturer's curve).";
 
 /// `imx174-35mm`
 fn imx174() -> DataSheet {
@@ -213,9 +217,10 @@ fn imx174() -> DataSheet {
 }
 
 const ASI183_SOURCES: &str = "\
-ZWO's ASI183MM manual and graphs, at unity gain: pixels, pitch, bits, read noise 2.2 electrons, 1.0 electrons/ADU and so a full
-well of 4095 electrons, dark current 0.003 electrons/s at -20 degrees C, quantum efficiency read off the graph (350 and
-400 nm extrapolated). Lens: 135 mm f/2. Estimates: bias, spot (1.2 px), lens transmission (0.88).";
+ZWO's ASI183MM manual and graphs, at unity gain: pixels, pitch, bits, read noise 2.2 electrons, 1.0
+electrons/ADU and thus a full well of 4095 electrons, dark current 0.003 electrons/s at -20 degrees
+C, quantum efficiency read off the graph (350 and 400 nm extrapolated). Lens: 135 mm f/2. Estimates:
+bias, spot (1.2 px), lens transmission (0.88).";
 
 /// `asi183mm-135mm`
 fn asi183() -> DataSheet {
@@ -280,7 +285,7 @@ mod tests {
     use crate::camera::data_sheet::KEYS;
 
     #[test]
-    fn every_preset_is_a_camera_without_a_fault() {
+    fn every_preset_is_valid() {
         for preset in Preset::ALL {
             let (name, sheet) = (preset.name(), preset.data_sheet());
             assert_eq!(Preset::named(name), Some(preset));
@@ -289,7 +294,7 @@ mod tests {
                 let value = (key.get)(&sheet).unwrap();
                 assert!(key.limits.accept(value), "{name}: {} {value}", key.name);
             }
-            // The full well ends near where the scale does: bits and gain belong to it.
+            // The full well is near full scale: bits and gain match it.
             let steps = sheet.full_well_e / sheet.gain_e_per_adu;
             assert!(
                 (0.9..1.1).contains(&(steps / sheet.full_scale_adu())),
@@ -301,7 +306,8 @@ mod tests {
 
     #[test]
     fn figures_in_decibels_are_those_of_the_data_sheets() {
-        // The largest ratio is that of the shot noise of a full well, the range that of a full well to the noise of reading.
+        // Maximum signal-to-noise ratio: shot noise at full well. Dynamic range: full well over
+        // read noise.
         let snr_db = |sheet: &DataSheet| 10.0 * sheet.full_well_e.log10();
         let range_db = |sheet: &DataSheet| 20.0 * (sheet.full_well_e / sheet.read_noise_e).log10();
         let mt9p031 = Preset::NanosatTracker.data_sheet();

@@ -1,22 +1,24 @@
-//! A transmission or an efficiency, by wavelength.
+//! A transmission or an efficiency as a function of wavelength.
 
+use csv::ByteRecord;
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-/// The most bytes of a table.
+/// Maximum size of a table, in bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// A number between 0 and 1 at each wavelength.
+/// A number from 0 to 1 at each wavelength.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Response {
     /// The same at every wavelength.
     Constant(f64),
-    /// Straight lines between points, wavelength in nm and value, the wavelengths rising; nothing is known outside.
+    /// Points of wavelength in nm and value, by rising wavelength, with linear interpolation.
     Table(Vec<(f64, f64)>),
 }
 
-/// Why a table is no response.
+/// Error of reading a response.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ResponseError {
@@ -25,27 +27,27 @@ pub enum ResponseError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// Far more bytes than a table has.
-    #[error("{}: larger than {limit} bytes, which no table of wavelengths and values is", path.display())]
+    /// The file is larger than any table.
+    #[error("{}: larger than {limit} bytes: too large for a table of wavelengths and values", path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// The most it may have.
+        /// Maximum size, in bytes.
         limit: u64,
     },
-    /// A row is not two numbers.
+    /// A row does not hold two valid numbers.
     #[error("{}, line {line}: '{found}' where {expected} was expected", path.display())]
     Value {
         /// The file.
         path: PathBuf,
-        /// The line.
+        /// The line, from 1.
         line: u64,
-        /// What is there.
+        /// The value.
         found: String,
-        /// What should be.
+        /// What is valid.
         expected: &'static str,
     },
     /// The wavelengths do not rise.
@@ -53,11 +55,11 @@ pub enum ResponseError {
     NotSorted {
         /// The file.
         path: PathBuf,
-        /// The line.
+        /// The line, from 1.
         line: u64,
-        /// The wavelength there.
+        /// The wavelength.
         wavelength_nm: f64,
-        /// The one before it.
+        /// The previous wavelength.
         before_nm: f64,
     },
     /// There are fewer than two rows.
@@ -65,13 +67,13 @@ pub enum ResponseError {
     TooShort {
         /// The file.
         path: PathBuf,
-        /// The rows there are.
+        /// Number of rows.
         found: usize,
     },
 }
 
 impl Response {
-    /// The value at a wavelength in nm; outside of a table that of its nearer end.
+    /// The value at a wavelength in nm. Outside a table, the value at its nearer end.
     pub fn at(&self, wavelength_nm: f64) -> f64 {
         let points = match self {
             Self::Constant(value) => return *value,
@@ -87,7 +89,7 @@ impl Response {
         }
     }
 
-    /// The largest value.
+    /// The peak value.
     pub fn peak(&self) -> f64 {
         match self {
             Self::Constant(value) => *value,
@@ -95,7 +97,7 @@ impl Response {
         }
     }
 
-    /// The same curve with its largest value `peak`.
+    /// The curve scaled to the given peak value.
     #[must_use]
     pub fn with_peak(&self, peak: f64) -> Self {
         match self {
@@ -115,7 +117,7 @@ impl Response {
         }
     }
 
-    /// Reads a CSV file: wavelength in nm and value in each row, below a heading or without one.
+    /// Reads a CSV file with wavelength in nm and value in each row, with or without a heading.
     ///
     /// # Errors
     /// [`ResponseError`] with the file and the line.
@@ -138,7 +140,7 @@ impl Response {
         Self::parse(path, &bytes)
     }
 
-    /// Parses the content of such a file; `path` stands for its name in errors.
+    /// Parses the content of such a file; `path` is its name in errors.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -155,35 +157,11 @@ impl Response {
                 path: path.to_owned(),
                 source: error.into(),
             })?;
-            let cell = |column| String::from_utf8_lossy(row.get(column).unwrap_or_default());
-            if i == 0 && cell(0).parse::<f64>().is_err() {
-                // The heading.
-                continue;
+            let is_heading = i == 0 && cell(&row, 0).parse::<f64>().is_err();
+            if !is_heading {
+                let point = parse_row(path, &row, points.last())?;
+                points.push(point);
             }
-            let line = row.position().map_or(0, csv::Position::line);
-            let number = |column: usize, expected, accepts: fn(f64) -> bool| {
-                let found = cell(column);
-                let value = found.parse::<f64>().ok();
-                value.filter(|v| accepts(*v)).ok_or(ResponseError::Value {
-                    path: path.to_owned(),
-                    line,
-                    found: found.chars().take(40).collect(),
-                    expected,
-                })
-            };
-            let nm = number(0, "a wavelength in nanometres, before a comma,", |nm| {
-                nm > 0.0 && nm.is_finite()
-            })?;
-            let value = number(1, "a value from 0 to 1", |v| (0.0..=1.0).contains(&v))?;
-            if let Some((before_nm, _)) = points.last().filter(|(before, _)| *before >= nm) {
-                return Err(ResponseError::NotSorted {
-                    path: path.to_owned(),
-                    line,
-                    wavelength_nm: nm,
-                    before_nm: *before_nm,
-                });
-            }
-            points.push((nm, value));
         }
         if points.len() < 2 {
             return Err(ResponseError::TooShort {
@@ -192,6 +170,42 @@ impl Response {
             });
         }
         Ok(Self::Table(points))
+    }
+}
+
+fn cell(row: &ByteRecord, column: usize) -> Cow<'_, str> {
+    String::from_utf8_lossy(row.get(column).unwrap_or_default())
+}
+
+/// Wavelength and value in `row`; the wavelength must be above that of the `previous` row.
+fn parse_row(
+    path: &Path,
+    row: &ByteRecord,
+    previous: Option<&(f64, f64)>,
+) -> Result<(f64, f64), ResponseError> {
+    let line = row.position().map_or(0, csv::Position::line);
+    let number = |column: usize, expected, accepts: fn(f64) -> bool| {
+        let found = cell(row, column);
+        let value = found.parse::<f64>().ok();
+        value.filter(|v| accepts(*v)).ok_or(ResponseError::Value {
+            path: path.to_owned(),
+            line,
+            found: found.chars().take(40).collect(),
+            expected,
+        })
+    };
+    let nm = number(0, "a wavelength in nanometres, before a comma,", |nm| {
+        nm > 0.0 && nm.is_finite()
+    })?;
+    let value = number(1, "a value from 0 to 1", |v| (0.0..=1.0).contains(&v))?;
+    match previous {
+        Some((before_nm, _)) if *before_nm >= nm => Err(ResponseError::NotSorted {
+            path: path.to_owned(),
+            line,
+            wavelength_nm: nm,
+            before_nm: *before_nm,
+        }),
+        _ => Ok((nm, value)),
     }
 }
 

@@ -1,34 +1,26 @@
-//! The camera: which direction each pixel looks in.
-//!
-//! pixel → offset from the frame's centre (x reversed where the frame is mirrored) → distortion
-//! removed → pinhole → direction in camera axes; and the same way back.
+//! The camera model: which direction each pixel looks in.
 
-mod distortion;
-
-pub(crate) const LANES: usize = distortion::LANES;
-pub(crate) use distortion::{CUBIC_MONOMIALS, QUINTIC_MONOMIALS, monomials_in_lanes};
-pub use distortion::{Distortion, DistortionModel};
-
+use super::distortion::{Distortion, DistortionModel, LANES};
 use crate::base::coords::{Camera, PixelPoint, UnitVector};
 use nalgebra::Vector3;
 
-/// A camera: a pinhole whose axis goes through the frame's centre, a lens distortion, and perhaps a mirror.
+/// A pinhole camera whose axis goes through the frame's centre, with lens distortion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraModel {
     /// Columns of the frame.
     pub width_px: f64,
     /// Rows of the frame.
     pub height_px: f64,
-    /// Focal length in pixels: the scale at the centre is 1 / `focal_length_px` radians a pixel.
+    /// Focal length in pixels: the scale at the centre is 1 / `focal_length_px` radians per pixel.
     pub focal_length_px: f64,
-    /// Whether the image is reversed left to right, as seen through an odd number of mirrors.
+    /// Whether the image is reversed left to right, as by an odd number of mirrors.
     pub mirrored: bool,
-    /// The lens's departure from the pinhole, where it is known.
+    /// Lens distortion, if known.
     pub distortion: Option<Distortion>,
 }
 
 impl CameraModel {
-    /// A pinhole camera.
+    /// A pinhole camera without distortion.
     pub fn pinhole(width_px: f64, height_px: f64, focal_length_px: f64, mirrored: bool) -> Self {
         Self {
             width_px,
@@ -39,7 +31,7 @@ impl CameraModel {
         }
     }
 
-    /// The model of its distortion, if it has one.
+    /// The distortion model, if there is a distortion.
     pub fn distortion_model(&self) -> Option<DistortionModel> {
         self.distortion.as_ref().map(Distortion::model)
     }
@@ -54,14 +46,14 @@ impl CameraModel {
         libm::hypot(self.width_px, self.height_px) / 2.0
     }
 
-    /// The pixel's offset from the centre along the camera's x and y axes, as observed, in pixels.
+    /// Observed offset of `pixel` from the centre along the camera's x and y axes, in pixels.
     pub fn offset_of(&self, pixel: &PixelPoint) -> [f64; 2] {
         let centre = self.centre();
         let u = pixel.x - centre.x;
         [if self.mirrored { -u } else { u }, pixel.y - centre.y]
     }
 
-    /// Where a pinhole would have put what is observed at `pixel`: offset from the centre along the camera's axes, in pixels.
+    /// Offset of `pixel` from the centre without distortion, along the camera's axes, in pixels.
     pub fn ideal_offset_of(&self, pixel: &PixelPoint) -> [f64; 2] {
         let offset = self.offset_of(pixel);
         match &self.distortion {
@@ -70,13 +62,13 @@ impl CameraModel {
         }
     }
 
-    /// The direction that `pixel` looks in.
+    /// The direction in which `pixel` looks.
     pub fn direction_of(&self, pixel: &PixelPoint) -> UnitVector<Camera> {
         let [u, v] = self.ideal_offset_of(pixel);
         UnitVector::from_vector(Vector3::new(u, v, self.focal_length_px))
     }
 
-    /// Where `direction` falls in the image plane (perhaps outside the frame); `None` behind the camera.
+    /// The pixel at `direction`, inside or outside the frame; `None` behind the camera.
     pub fn pixel_of(&self, direction: &UnitVector<Camera>) -> Option<PixelPoint> {
         let d = direction.as_vector();
         if d.z <= 0.0 {
@@ -95,22 +87,22 @@ impl CameraModel {
         Some(PixelPoint::new(centre.x + u, centre.y + v))
     }
 
-    /// [`Self::pixel_of`] for the first [`LANES`] of `directions`: many are worked out in less time so.
+    /// [`Self::pixel_of`] for the first [`LANES`] of `directions`, which is faster than one by one.
     pub(crate) fn pixels_of(
         &self,
         directions: &[UnitVector<Camera>],
     ) -> [Option<PixelPoint>; LANES] {
         let mut ideal = [[0.0; LANES]; 2];
-        let mut is_before = [false; LANES];
+        let mut in_front = [false; LANES];
         for (lane, direction) in directions.iter().take(LANES).enumerate() {
             let d = direction.as_vector();
-            is_before[lane] = d.z > 0.0;
-            if is_before[lane] {
+            in_front[lane] = d.z > 0.0;
+            if in_front[lane] {
                 ideal[0][lane] = self.focal_length_px * d.x / d.z;
                 ideal[1][lane] = self.focal_length_px * d.y / d.z;
             }
         }
-        let (offsets, found) = match &self.distortion {
+        let (offsets, inverted) = match &self.distortion {
             Some(distortion) => distortion.apply_to_lanes(&ideal),
             None => (ideal, [true; LANES]),
         };
@@ -118,8 +110,8 @@ impl CameraModel {
         std::array::from_fn(|lane| {
             let [u, v] = [offsets[0][lane], offsets[1][lane]];
             let u = if self.mirrored { -u } else { u };
-            let is_there = is_before[lane] && found[lane];
-            is_there.then(|| PixelPoint::new(centre.x + u, centre.y + v))
+            let is_valid = in_front[lane] && inverted[lane];
+            is_valid.then(|| PixelPoint::new(centre.x + u, centre.y + v))
         })
     }
 
@@ -135,7 +127,7 @@ impl CameraModel {
             && (low..self.height_px - 0.5 + margin_px).contains(&pixel.y)
     }
 
-    /// Angle between the middles of the left and the right edge, in radians.
+    /// Angle between the midpoints of the left and right edges, in radians.
     pub fn fov_x_rad(&self) -> f64 {
         let y = self.centre().y;
         self.angle_between(
@@ -144,7 +136,7 @@ impl CameraModel {
         )
     }
 
-    /// Angle between the middles of the upper and the lower edge, in radians.
+    /// Angle between the midpoints of the upper and lower edges, in radians.
     pub fn fov_y_rad(&self) -> f64 {
         let x = self.centre().x;
         self.angle_between(
@@ -175,7 +167,7 @@ pub fn frame_centre(width_px: f64, height_px: f64) -> PixelPoint {
     PixelPoint::new((width_px - 1.0) / 2.0, (height_px - 1.0) / 2.0)
 }
 
-/// The focal length in pixels of a pinhole camera that sees `fov_rad` across `extent_px` pixels.
+/// Focal length, in pixels, of a pinhole camera whose field is `fov_rad` across `extent_px` pixels.
 pub fn focal_length_px(extent_px: f64, fov_rad: f64) -> f64 {
     extent_px / 2.0 / (fov_rad / 2.0).tan()
 }

@@ -1,23 +1,24 @@
-//! What a lens, and the air before it, do beyond the pinhole.
+//! Distortion of the image by the lens and by differential refraction.
 //!
-//! observed offset (u, v) from the frame's centre → ideal offset (u, v) + Σ cₖ Bₖ(u/R, v/R), in pixels.
+//! observed offset (u, v) from the frame's centre → ideal offset (u, v) + Σ cₖ Bₖ(u/R, v/R), in
+//! pixels.
 //!
-//! The sense is that of the SIP convention (Shupe et al. 2005, ASP Conf. 347, 491: pixel → ideal), so that a
-//! FITS header can be written from it without inversion. R is half the frame's diagonal: a coefficient is
-//! the displacement in pixels that its term makes at a corner. A turn, a shift and a change of scale are
-//! no part of it: they belong to the attitude and the focal length.
+//! The direction is that of the SIP convention (Shupe et al. 2005, ASP Conf. 347, 491: pixel →
+//! ideal), so that a FITS header needs no inversion. R is half the frame's diagonal, so a
+//! coefficient is the displacement in pixels by its term at a corner. Rotation, shift and scale are
+//! not part of the distortion: they belong to the attitude and the focal length.
 
 use multiversion::multiversion;
 
-/// How much freedom a distortion has.
+/// Form of the distortion polynomial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum DistortionModel {
     /// One radial term, r³.
     Radial,
-    /// Unequal scale along two axes (2 terms), and all of second (6) and third order (8): tilted
-    /// sensors, decentred lenses, differential refraction.
+    /// Unequal scale along two axes (2 terms), second order (6) and third order (8): tilted
+    /// detectors, decentred lenses, differential refraction.
     Cubic,
-    /// [`DistortionModel::Cubic`] and all of fourth (10) and fifth order (12).
+    /// [`DistortionModel::Cubic`], fourth order (10 terms) and fifth order (12).
     Quintic,
 }
 
@@ -34,7 +35,7 @@ impl DistortionModel {
         }
     }
 
-    /// Name, as reports print it.
+    /// Name, as in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Radial => "radial",
@@ -52,11 +53,12 @@ impl DistortionModel {
     }
 }
 
-/// Monomials of second and third order, and up to fifth.
+/// Number of monomials of second and third order.
 pub(crate) const CUBIC_MONOMIALS: usize = 7;
+/// Number of monomials of second to fifth order.
 pub(crate) const QUINTIC_MONOMIALS: usize = 18;
 
-/// The first `K` monomials of second and higher order, order by order, powers of u falling.
+/// The first `K` monomials of second and higher order: by order, then by falling power of u.
 #[inline]
 pub(crate) fn monomials<const K: usize>([u, v]: [f64; 2]) -> [f64; K] {
     let (mut u_powers, mut v_powers) = ([1.0; MAX_ORDER + 1], [1.0; MAX_ORDER + 1]);
@@ -107,22 +109,23 @@ const fn powers<const K: usize>() -> [[usize; 2]; K] {
     powers
 }
 
-/// How many offsets are worked on at once.
-pub(super) const LANES: usize = 8;
+/// Number of offsets that are computed together.
+pub(crate) const LANES: usize = 8;
 
+/// Inverts the polynomial for [`LANES`] offsets: the observed offsets, and whether each converged.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn apply_to_lanes(
     distortion: &Distortion,
     ideal: &[[f64; LANES]; 2],
 ) -> ([[f64; LANES]; 2], [bool; LANES]) {
     let mut observed = *ideal;
-    let (mut found, mut lost) = ([false; LANES], [false; LANES]);
+    let (mut found, mut diverged) = ([false; LANES], [false; LANES]);
     for _ in 0..INVERSION_STEPS {
-        let there = distortion.remove_from_lanes(&observed);
+        let removed = distortion.remove_from_lanes(&observed);
         let mut is_open = false;
         for lane in 0..LANES {
-            let error = [0, 1].map(|axis| ideal[axis][lane] - there[axis][lane]);
-            let is_done = found[lane] | lost[lane];
+            let error = [0, 1].map(|axis| ideal[axis][lane] - removed[axis][lane]);
+            let is_done = found[lane] | diverged[lane];
             for axis in 0..2 {
                 let next = observed[axis][lane] + error[axis];
                 observed[axis][lane] = if is_done { observed[axis][lane] } else { next };
@@ -131,8 +134,8 @@ fn apply_to_lanes(
             let reach_px = observed[0][lane].abs() + observed[1][lane].abs();
             let is_near = reach_px <= 10.0 * distortion.radius_px;
             found[lane] |= !is_done & is_exact;
-            lost[lane] |= !is_done & !is_exact & !is_near;
-            is_open |= !(found[lane] | lost[lane]);
+            diverged[lane] |= !is_done & !is_exact & !is_near;
+            is_open |= !(found[lane] | diverged[lane]);
         }
         if !is_open {
             break;
@@ -141,29 +144,31 @@ fn apply_to_lanes(
     (observed, found)
 }
 
-/// The departure of a lens from the pinhole camera.
+/// Distortion relative to a pinhole camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distortion {
     model: DistortionModel,
     radius_px: f64,
-    /// As many as the model has terms, then zeros.
+    /// One per term of the model, then zeros.
     coefficients_px: [f64; MAX_TERMS],
 }
 
-/// The highest order of any model, and the most terms.
+/// Highest order of any model.
 const MAX_ORDER: usize = 5;
+/// Largest number of terms of any model.
 const MAX_TERMS: usize = DistortionModel::Quintic.terms();
 
-/// Steps of the fixed-point iteration that inverts the polynomial, and where it may stop.
+/// Maximum number of steps of the fixed-point iteration that inverts the polynomial.
 const INVERSION_STEPS: usize = 50;
+/// Residual at which the iteration stops.
 const INVERSION_TOLERANCE_PX: f64 = 1e-5;
 
 impl Distortion {
-    /// A distortion with one coefficient in pixels for each term of `model`; `radius_px` is the
-    /// offset at which a normalised offset is 1.
+    /// Makes a distortion with one coefficient in pixels per term of `model`. Offsets are divided
+    /// by `radius_px` in the polynomial.
     ///
     /// # Panics
-    /// If there are not as many coefficients as the model has terms.
+    /// If the number of coefficients is not the number of terms.
     pub fn new(model: DistortionModel, radius_px: f64, coefficients_px: &[f64]) -> Self {
         assert_eq!(coefficients_px.len(), model.terms(), "one per term");
         let mut padded = [0.0; MAX_TERMS];
@@ -175,28 +180,29 @@ impl Distortion {
         }
     }
 
-    /// Its model.
+    /// The distortion model.
     pub fn model(&self) -> DistortionModel {
         self.model
     }
 
-    /// The offset in pixels at which a normalised offset is 1.
+    /// The radius R by which offsets are divided, in pixels.
     pub fn radius_px(&self) -> f64 {
         self.radius_px
     }
 
-    /// The coefficients in pixels, one for each term: of a radial model (u r², v r²); else (u, −v) and
-    /// (v, u), then for each monomial of second and higher order, powers of u falling, one along u and one along v.
+    /// The coefficients in pixels, one per term. Radial model: (u r², v r²). Other models: (u, −v)
+    /// and (v, u), then two for each monomial of second and higher order, along u and along v;
+    /// monomials are sorted by order, then by falling power of u.
     pub fn coefficients_px(&self) -> &[f64] {
         &self.coefficients_px[..self.model.terms()]
     }
 
-    /// Its polynomial term by term: the powers of u/R and of v/R, and the displacement along u and v in pixels.
-    /// Terms of the same powers may occur more than once.
+    /// The terms of the polynomial: powers of u/R and v/R, and the coefficients along u and v in
+    /// pixels. The same powers may occur more than once.
     pub fn monomials(&self) -> Vec<(usize, usize, [f64; 2])> {
         let c = self.coefficients_px();
         if self.model == DistortionModel::Radial {
-            // r² u and r² v, written out.
+            // r² u and r² v, expanded.
             return vec![
                 (3, 0, [c[0], 0.0]),
                 (1, 2, [c[0], 0.0]),
@@ -216,7 +222,7 @@ impl Distortion {
         monomials
     }
 
-    /// From the observed offset to the ideal one, in pixels.
+    /// Converts the observed offset to the ideal one, in pixels.
     #[inline]
     pub fn remove(&self, observed: [f64; 2]) -> [f64; 2] {
         let [u, v] = [observed[0] / self.radius_px, observed[1] / self.radius_px];
@@ -230,7 +236,7 @@ impl Distortion {
         }
     }
 
-    /// The offset `observed` with the displacement that a model with `K` monomials makes at the normalised offset.
+    /// Adds the displacement by a model with `K` monomials at the normalized offset to `observed`.
     #[inline]
     fn polynomial<const K: usize>(&self, [u, v]: [f64; 2], observed: [f64; 2]) -> [f64; 2] {
         let c = &self.coefficients_px;
@@ -243,13 +249,13 @@ impl Distortion {
         [along_u, along_v]
     }
 
-    /// From the ideal offset to the observed one, in pixels; `None` where the polynomial cannot be
-    /// inverted, as may be far outside the frame.
+    /// Converts the ideal offset to the observed one, in pixels. `None` if the inversion does not
+    /// converge, which may happen far outside the frame.
     pub fn apply(&self, ideal: [f64; 2]) -> Option<[f64; 2]> {
         let mut observed = ideal;
         for _ in 0..INVERSION_STEPS {
-            let there = self.remove(observed);
-            let error = [ideal[0] - there[0], ideal[1] - there[1]];
+            let removed = self.remove(observed);
+            let error = [ideal[0] - removed[0], ideal[1] - removed[1]];
             observed = [observed[0] + error[0], observed[1] + error[1]];
             if error[0].abs() + error[1].abs() < INVERSION_TOLERANCE_PX {
                 return Some(observed);
@@ -262,7 +268,8 @@ impl Distortion {
         None
     }
 
-    /// [`Self::apply`] for several offsets at once, in vector registers, to the last bit; `None` turns into false.
+    /// [`Self::apply`] for several offsets in vector registers, with identical results; `None`
+    /// becomes false.
     pub(super) fn apply_to_lanes(
         &self,
         ideal: &[[f64; LANES]; 2],
@@ -310,7 +317,7 @@ impl Distortion {
         ideal
     }
 
-    /// The largest displacement within the normalising radius, on a ring at it, in pixels.
+    /// The largest displacement on a circle of radius R, in pixels.
     pub fn largest_px(&self) -> f64 {
         (0..64)
             .map(|step| {
