@@ -7,7 +7,7 @@ use clap::{Arg, ArgAction, ArgGroup, ArgMatches, Args, Command, Error, FromArgMa
 use starpipe::base::format::five_digits as number;
 use starpipe::camera::data_sheet::SpotForm;
 use starpipe::model::sensitivity::ScenarioError;
-use starpipe::model::simulate::{Parameter, Scene, Setup};
+use starpipe::model::simulate::{Scene, Setup, SetupParameter};
 
 /// What is simulated.
 #[derive(Debug, Args)]
@@ -48,7 +48,7 @@ impl SetupOptions {
 /// The numbers given beyond those that the limit depends on.
 #[derive(Debug, Clone)]
 pub(crate) struct SceneOptions {
-    numbers: Vec<(Parameter, f64)>,
+    numbers: Vec<(SetupParameter, f64)>,
     spot_form: Option<SpotForm>,
     mirrored: bool,
 }
@@ -88,7 +88,7 @@ impl clap::Args for SceneOptions {
             .help("Reverse the image left to right")
             .help_heading(CAMERA_HEADING)
             .action(ArgAction::SetTrue);
-        let numbers = Parameter::beyond_scenario().map(option);
+        let numbers = SetupParameter::beyond_scenario().map(option);
         command.args([spot_form, mirrored]).args(numbers)
     }
 
@@ -99,12 +99,14 @@ impl clap::Args for SceneOptions {
 
 impl FromArgMatches for SceneOptions {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
-        let given = |parameter: Parameter| {
+        let given = |parameter: SetupParameter| {
             let value = matches.get_one::<f64>(parameter.name())?;
             Some((parameter, *value))
         };
         Ok(Self {
-            numbers: Parameter::beyond_scenario().filter_map(given).collect(),
+            numbers: SetupParameter::beyond_scenario()
+                .filter_map(given)
+                .collect(),
             spot_form: matches.get_one::<SpotForm>(SPOT_FORM).copied(),
             mirrored: matches.get_flag(MIRRORED),
         })
@@ -116,13 +118,13 @@ impl FromArgMatches for SceneOptions {
     }
 }
 
-fn option(parameter: Parameter) -> Arg {
+fn option(parameter: SetupParameter) -> Arg {
     let name = parameter.name();
     let mut about = parameter.about().to_owned();
     about[..1].make_ascii_uppercase();
     let limits = parameter.limits();
     let (heading, default) = match parameter {
-        Parameter::Scene(key) => {
+        SetupParameter::Scene(key) => {
             let default = (key.get)(&Scene::default());
             let default = default.map(|value| format!(" [default: {}]", number(value)));
             ("Scene", default.unwrap_or_default())

@@ -3,7 +3,7 @@
 use super::{Job, Made, Subject};
 use starpipe::frame::FitsHeader;
 use starpipe::model::sensitivity::Reading;
-use starpipe::model::simulate::Parameter;
+use starpipe::model::simulate::SetupParameter;
 use starpipe::report::wcs;
 use std::fmt::Write as _;
 
@@ -89,11 +89,11 @@ impl Description<'_> {
             let [w, x, y, z] = icrs_to_camera.to_quaternion();
             lines.push(format!("quaternion = {w:.9} {x:.9} {y:.9} {z:.9}"));
         }
-        let number = |parameter: Parameter| {
+        let number = |parameter: SetupParameter| {
             let value = parameter.get(setup)?;
             Some(format!("{} = {value}", parameter.name()))
         };
-        lines.extend(Parameter::all().filter_map(number));
+        lines.extend(SetupParameter::all().filter_map(number));
         lines
     }
 }

@@ -161,7 +161,7 @@ pub(crate) fn simulate(arguments: &SimulateArgs) -> Result<Exit, CommandError> {
     let catalog = pool.install(|| read_catalog(arguments.resources.catalog.as_deref()))?;
     let simulator = Simulator::new(&setup.scenario, &setup.scene, catalog.stars())
         .context("simulating a frame")?;
-    let evened = simulator.evened();
+    let evened = simulator.uniform_scenario();
     let detector = Detector::new(Rule::MatchedFilter, &evened, &Budget::new(&evened));
     let job = Job {
         setup: &setup,

@@ -24,18 +24,18 @@ const NEARLY: f64 = 1.05;
 /// Cleveland 1979, J. Am. Stat. Assoc. 74, 829.
 #[derive(Debug, Clone)]
 pub struct ErrorCurve {
-    points: Vec<Point>,
+    points: Vec<CurvePoint>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Point {
+struct CurvePoint {
     spot_px: f64,
     log_spot: f64,
     log_rms: f64,
     weight: f64,
 }
 
-impl Point {
+impl CurvePoint {
     /// The squared distances of two normal axes are exponential. The logarithm of the mean of n such is on average 1/(2n) below that of
     /// what it is the mean of, its root's half of that; its variance is about 1/n.
     fn new(spot_px: f64, point: &ErrorPoint) -> Self {
@@ -66,13 +66,15 @@ impl ErrorCurve {
     /// The curve through the sound points; none where there are too few.
     pub fn through<'a>(points: impl Iterator<Item = (f64, &'a ErrorPoint)>) -> Option<Self> {
         let sound = points.filter(|(_, point)| point.is_sound());
-        let points: Vec<_> = sound.map(|(px, point)| Point::new(px, point)).collect();
+        let points: Vec<_> = sound
+            .map(|(px, point)| CurvePoint::new(px, point))
+            .collect();
         (points.len() >= 2).then_some(Self { points })
     }
 
     /// First and last radius, in pixels.
     pub fn range_px(&self) -> [f64; 2] {
-        let of = |point: Option<&Point>| point.map_or(f64::NAN, |point| point.spot_px);
+        let of = |point: Option<&CurvePoint>| point.map_or(f64::NAN, |point| point.spot_px);
         [of(self.points.first()), of(self.points.last())]
     }
 

@@ -102,16 +102,16 @@ impl EnergyStudy {
         let mut left = self.trials;
         while left > 0 {
             let abreast = ((left as f64).sqrt().ceil() as usize).min(MOST_ABREAST);
-            let field = Field::new(spot_px, abreast, left.min(abreast * abreast), random);
-            (scenario.camera.width_px, scenario.camera.height_px) = (field.side_px, field.side_px);
-            let stars: Vec<_> = field.places.iter().map(|p| (*p, self.v_mag)).collect();
+            let cells = StarCells::new(spot_px, abreast, left.min(abreast * abreast), random);
+            (scenario.camera.width_px, scenario.camera.height_px) = (cells.side_px, cells.side_px);
+            let stars: Vec<_> = cells.places.iter().map(|p| (*p, self.v_mag)).collect();
             let frame = star_field(&scenario, &stars, random.random())?;
             match self.method() {
                 Some(method) => {
                     let found = self.detected(&frame, &scenario, method, &mut workspace);
-                    squares.extend(field.squares(&found));
+                    squares.extend(cells.squares(&found));
                 }
-                None => squares.extend(self.squares_in_windows(&frame, &scenario, &field)),
+                None => squares.extend(self.squares_in_windows(&frame, &scenario, &cells)),
             }
             left -= stars.len();
         }
@@ -153,13 +153,13 @@ impl EnergyStudy {
         &'a self,
         frame: &'a Frame,
         scenario: &Scenario,
-        field: &'a Field,
+        cells: &'a StarCells,
     ) -> impl Iterator<Item = f64> + 'a {
         let (sheet, budget) = (&scenario.camera, Budget::new(scenario));
         let dark_and_sky_e = budget.background_e + budget.dark_e;
         let level_adu = sheet.bias_adu + dark_and_sky_e / sheet.gain_e_per_adu;
         let half = self.half_window_px as i64;
-        field.places.iter().filter_map(move |place| {
+        cells.places.iter().filter_map(move |place| {
             let (column, row) = (place.x.round() as i64, place.y.round() as i64);
             let (mut sum, mut sum_x, mut sum_y) = (0.0, 0.0, 0.0);
             for y in -half..=half {
@@ -208,7 +208,7 @@ fn bound_px(spot_px: f64, star_e: f64, variance_e2: f64) -> f64 {
 }
 
 /// Stars in the cells of a square frame, each anywhere within the middle pixel of its cell.
-struct Field {
+struct StarCells {
     side_px: usize,
     cell_px: usize,
     abreast: usize,
@@ -216,7 +216,7 @@ struct Field {
     reach_px: f64,
 }
 
-impl Field {
+impl StarCells {
     fn new(spot_px: f64, abreast: usize, stars: usize, random: &mut ChaCha8Rng) -> Self {
         let cell_px = (SPACING_SIGMAS * spot_px).max(LEAST_SPACING_PX).ceil() as usize;
         let middle = (cell_px / 2) as f64;

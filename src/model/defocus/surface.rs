@@ -81,7 +81,7 @@ impl Surface {
                 trials,
             });
         }
-        let (Some(along), Some(across)) = (Axis::of(spots), Axis::of(noises)) else {
+        let (Some(along), Some(across)) = (ScaledAxis::of(spots), ScaledAxis::of(noises)) else {
             return Err(too_few);
         };
         let values = errors.points.iter().map(|point| point.rms_px);
@@ -136,13 +136,13 @@ fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// An axis brought to −1 to 1: `t = (value − middle) / half`.
-struct Axis {
+struct ScaledAxis {
     values: Vec<f64>,
     middle: f64,
     half: f64,
 }
 
-impl Axis {
+impl ScaledAxis {
     fn of(values: &[f64]) -> Option<Self> {
         let (first, last) = (*values.first()?, *values.last()?);
         (values.len() >= TERMS && last > first).then(|| Self {

@@ -1,9 +1,11 @@
 //! From a scenario to its limiting magnitude, with all that lies between.
 
-use super::conditions::{Conditions, Reading, Scenario, ScenarioError};
+use super::check::ScenarioError;
+use super::conditions::{Conditions, REFERENCE_NM};
 use super::light::{
     self, ILLUMINANCE_OF_MAG_0_LX, PAPER_MAG_RATIO, PAPER_PHOTONS_OF_MAG_0, SKY_TEMPERATURE_K,
 };
+use super::scenario::{Reading, Scenario};
 use crate::base::units::ARCSEC_PER_RAD;
 use crate::sky::observer::airmass;
 use serde::Serialize;
@@ -104,7 +106,7 @@ impl Budget {
     /// The budget of `scenario`, which [`Scenario::check`] has found sound.
     pub fn new(scenario: &Scenario) -> Self {
         let (sheet, conditions) = (&scenario.camera, &scenario.conditions);
-        let light = Light::of(scenario);
+        let light = SpectralSums::of(scenario);
         let exposure_s = conditions.exposure_s;
         let aperture_area_m2 = sheet.aperture_area_m2();
         let collected = aperture_area_m2 * exposure_s;
@@ -123,9 +125,7 @@ impl Budget {
         let limit_vmag = light.magnitude(ratio);
         let noise_e = (star_e + background_variance_e2).sqrt();
         let star_illuminance_lx = ILLUMINANCE_OF_MAG_0_LX / ratio;
-        let at_555 = conditions
-            .extinction
-            .zenith_transmission(super::conditions::REFERENCE_NM);
+        let at_555 = conditions.extinction.zenith_transmission(REFERENCE_NM);
         let pixel_solid_angle_sr = sheet.pixel_solid_angle_sr();
         Self {
             reading: scenario.reading,
@@ -228,7 +228,7 @@ fn sky_mag(conditions: &Conditions) -> f64 {
 }
 
 /// The light of a star of magnitude 0, and of the sky in a pixel, through air, lens and detector.
-struct Light {
+struct SpectralSums {
     reading: Reading,
     airmass: f64,
     bands: Vec<Band>,
@@ -240,7 +240,7 @@ struct Light {
     atmosphere_transmission: f64,
 }
 
-impl Light {
+impl SpectralSums {
     fn of(scenario: &Scenario) -> Self {
         let conditions = &scenario.conditions;
         let zenith_distance_deg = conditions.zenith_distance_deg;

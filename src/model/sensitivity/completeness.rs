@@ -14,7 +14,7 @@
 //! filter expects; a smeared spot is searched with the round one that fits it best.
 
 use super::budget::Budget;
-use super::conditions::Scenario;
+use super::scenario::Scenario;
 use crate::base::statistics::normal_cdf;
 use crate::detect::{DetectConfig, FilterModel};
 use rand::SeedableRng;
@@ -71,7 +71,7 @@ impl Detector {
     /// The paper's rule.
     fn peak_pixel(scenario: &Scenario, budget: &Budget) -> Self {
         let threshold_e = budget.star_e;
-        let spot = Spot::of(scenario);
+        let spot = SmearedSpot::of(scenario);
         let filter = Filter {
             half_kernel: vec![1.0],
             threshold_e,
@@ -90,7 +90,7 @@ impl Detector {
 
     /// The detector as built, with the threshold of `config`; the spot is the scenario's.
     pub fn matched_filter(config: &DetectConfig, scenario: &Scenario, budget: &Budget) -> Self {
-        let spot = Spot::of(scenario);
+        let spot = SmearedSpot::of(scenario);
         let size = (scenario.camera.width_px, scenario.camera.height_px);
         let electrons = budget.background_e + budget.dark_e;
         let skewness = electrons / budget.background_noise_e.powi(3);
@@ -139,12 +139,12 @@ impl Detector {
 }
 
 /// A star's spot, smeared along the rows.
-struct Spot {
+struct SmearedSpot {
     sigma_px: f64,
     smear_px: f64,
 }
 
-impl Spot {
+impl SmearedSpot {
     fn of(scenario: &Scenario) -> Self {
         Self {
             sigma_px: scenario.camera.spot_sigma_px,
@@ -209,14 +209,19 @@ impl Filter {
 }
 
 /// The magnitude at which the star of each trial is just found, faintest first.
-fn critical_vmag(filter: &Filter, spot: &Spot, scenario: &Scenario, budget: &Budget) -> Vec<f64> {
+fn critical_vmag(
+    filter: &Filter,
+    spot: &SmearedSpot,
+    scenario: &Scenario,
+    budget: &Budget,
+) -> Vec<f64> {
     let exposure_s = scenario.conditions.exposure_s;
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
-    let mut trial = Trial::new(filter, spot);
-    let pixels: usize = trial.half.iter().map(|half| 2 * half + 1).product();
+    let mut draw = NoiseDraw::new(filter, spot);
+    let pixels: usize = draw.half.iter().map(|half| 2 * half + 1).product();
     let draws = if pixels < WIDE_PX { DRAWS } else { DRAWS / 4 };
     let mut critical: Vec<f64> = (0..draws)
-        .flat_map(|i| trial.critical_fluxes_e(i, &mut random))
+        .flat_map(|i| draw.critical_fluxes_e(i, &mut random))
         .map(|flux_e| budget.vmag_of(flux_e, exposure_s))
         .collect();
     critical.sort_by(|a, b| b.total_cmp(a));
@@ -224,9 +229,9 @@ fn critical_vmag(filter: &Filter, spot: &Spot, scenario: &Scenario, budget: &Bud
 }
 
 /// One star in one draw of noise, and the buffers for it.
-struct Trial<'a> {
+struct NoiseDraw<'a> {
     filter: &'a Filter,
-    spot: &'a Spot,
+    spot: &'a SmearedSpot,
     /// From the star's pixel to the last whose answer is looked at, along x and y.
     reach: [usize; 2],
     /// From the star's pixel to the last that these answers depend on.
@@ -238,8 +243,8 @@ struct Trial<'a> {
     rows: [Vec<f64>; 2],
 }
 
-impl<'a> Trial<'a> {
-    fn new(filter: &'a Filter, spot: &'a Spot) -> Self {
+impl<'a> NoiseDraw<'a> {
+    fn new(filter: &'a Filter, spot: &'a SmearedSpot) -> Self {
         let smear = (spot.smear_px / 2.0).ceil() as usize;
         let reach = [filter.reach_px + smear, filter.reach_px];
         let radius = filter.half_kernel.len() - 1;
@@ -419,7 +424,7 @@ mod tests {
 
     #[test]
     fn a_smeared_spot_keeps_its_light_and_its_width() {
-        let spot = Spot {
+        let spot = SmearedSpot {
             sigma_px: 0.8,
             smear_px: 3.0,
         };

@@ -1,19 +1,7 @@
 //! What the camera looks through and how long: sky, air, exposure, and what counts as detected.
 
 use super::light;
-use crate::camera::data_sheet::{DataSheet, Preset};
-use serde::Serialize;
 use std::f64::consts::PI;
-
-/// Which equations.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Reading {
-    /// The paper's, as its authors used them.
-    Paper,
-    /// With the physics put right.
-    Physical,
-}
 
 /// How bright the sky is, in one of the ways in which people say it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -134,131 +122,9 @@ impl Default for Conditions {
     }
 }
 
-/// A camera under conditions, and how to reckon.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Scenario {
-    /// The camera.
-    pub camera: DataSheet,
-    /// The conditions.
-    pub conditions: Conditions,
-    /// Which equations.
-    pub reading: Reading,
-}
-
-/// What in a scenario makes no sense.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ScenarioError {
-    /// A value out of its limits.
-    #[error("{name} is {found}, expected {expected}")]
-    Value {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        found: f64,
-        /// What it may be.
-        expected: String,
-    },
-    /// Values that contradict each other.
-    #[error("{0}")]
-    Contradiction(String),
-    /// Values of which no number follows.
-    #[error(
-        "there is no limiting magnitude: with {star_photons_s_m2:e} photons of a star of V = 0 below the air per second and \
-         m², {background_e:e} electrons of the sky and a noise of {noise_e:e} electrons it would be {limit_vmag}"
-    )]
-    NoLimit {
-        /// The limit that would be.
-        limit_vmag: f64,
-        /// Photons of a star of V = 0 below the air.
-        star_photons_s_m2: f64,
-        /// Electrons of the sky in a pixel.
-        background_e: f64,
-        /// Noise of the brightest pixel, in electrons.
-        noise_e: f64,
-    },
-}
-
-impl Scenario {
-    /// A camera under the default conditions, in the physical reading.
-    pub fn new(camera: DataSheet) -> Self {
-        Self {
-            camera,
-            conditions: Conditions::default(),
-            reading: Reading::Physical,
-        }
-    }
-
-    /// The scenario of a preset: the paper's experiments as the paper has them, other cameras under the default conditions but
-    /// for the exposure.
-    pub fn of(preset: Preset) -> Self {
-        let paper = |exposure_s, zenith_distance_deg| Self {
-            camera: preset.data_sheet(),
-            conditions: Conditions {
-                exposure_s,
-                zenith_distance_deg,
-                sky: SkyBrightness::IlluminanceLx(0.01),
-                ..Conditions::default()
-            },
-            reading: Reading::Paper,
-        };
-        let other = |exposure_s| {
-            let mut scenario = Self::new(preset.data_sheet());
-            scenario.conditions.exposure_s = exposure_s;
-            scenario
-        };
-        match preset {
-            Preset::Experiment1 => paper(0.04, 0.0),
-            Preset::Experiment2 => paper(0.1, 45.0),
-            Preset::NanosatTracker => other(0.1),
-            Preset::Imx174 => other(0.2),
-            Preset::Asi183 => other(0.5),
-        }
-    }
-
-    /// Checks every parameter against its limits, and the camera's against each other.
-    ///
-    /// # Errors
-    /// [`ScenarioError`] with the parameter, its value, and what it may be.
-    pub fn check(&self) -> Result<(), ScenarioError> {
-        for parameter in super::Parameter::all() {
-            let Some(found) = parameter.get(self) else {
-                continue;
-            };
-            if !parameter.limits().accept(found) {
-                return Err(ScenarioError::Value {
-                    name: parameter.name(),
-                    found,
-                    expected: parameter.limits().to_string(),
-                });
-            }
-        }
-        match self
-            .camera
-            .contradiction()
-            .or_else(|| self.beyond_the_papers_table())
-        {
-            Some(what) => Err(ScenarioError::Contradiction(what)),
-            None => Ok(()),
-        }
-    }
-
-    /// The paper's reading reckons with the wavelengths of its table 1, whatever the camera's band.
-    fn beyond_the_papers_table(&self) -> Option<String> {
-        let uncovered = match self.reading {
-            Reading::Paper => self
-                .camera
-                .uncovered(light::PAPER_BAND_NM.0, light::PAPER_BAND_NM.1),
-            Reading::Physical => None,
-        };
-        uncovered.map(|uncovered| format!("{uncovered} of the paper's reading"))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::data_sheet::Response;
 
     #[test]
     fn a_hundredth_of_a_lux_is_a_sky_of_18_8() {
@@ -269,21 +135,6 @@ mod tests {
         assert!((back.illuminance_lx() - 0.01).abs() < 1e-12);
         let same = SkyBrightness::LuminanceCdM2(back.luminance_cd_m2());
         assert!((same.mag_arcsec2() - sky.mag_arcsec2()).abs() < 1e-12);
-    }
-
-    #[test]
-    fn the_papers_reading_wants_curves_over_its_own_band() {
-        let mut scenario = Scenario::of(Preset::Experiment1);
-        scenario.camera.quantum_efficiency = Response::Table(vec![(400.0, 0.5), (800.0, 0.5)]);
-        scenario.camera.band_from_nm = 450.0;
-        let error = scenario.check().unwrap_err().to_string();
-        assert_eq!(
-            error,
-            "quantum_efficiency is known from 400 to 800 nm, which does not cover the band from 360 to 780 nm of the \
-             paper's reading"
-        );
-        scenario.reading = Reading::Physical;
-        assert_eq!(scenario.check(), Ok(()));
     }
 
     #[test]

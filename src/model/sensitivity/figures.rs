@@ -7,7 +7,8 @@
 //! # Reference
 //! Tong, Li & Wang 2014, section 3, figures 3 and 4.
 
-use super::conditions::{Scenario, ScenarioError};
+use super::check::ScenarioError;
+use super::scenario::Scenario;
 use super::sweep::{Curve, Series, Spacing, Sweep, SweepError, curves};
 
 /// Values along a figure's axis.

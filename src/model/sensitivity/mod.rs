@@ -20,6 +20,7 @@
 //! Tong, Li & Wang 2014, Acta Optica Sinica 34, 1004003, doi 10.3788/AOS201434.1004003.
 
 mod budget;
+mod check;
 mod completeness;
 mod conditions;
 mod cramer_rao;
@@ -29,15 +30,15 @@ mod light;
 mod parameters;
 mod prediction;
 mod rows;
+mod scenario;
 mod star_light;
 mod sweep;
 mod text;
 
 pub use budget::{Band, Budget};
+pub use check::ScenarioError;
 pub use completeness::{Detector, Rule};
-pub use conditions::{
-    Conditions, Extinction, REFERENCE_NM, Reading, Scenario, ScenarioError, SkyBrightness,
-};
+pub use conditions::{Conditions, Extinction, REFERENCE_NM, SkyBrightness};
 pub use cramer_rao::CramerRao;
 pub use faintest::Faintest;
 pub use figures::Figure;
@@ -45,5 +46,6 @@ pub use light::temperature_k_of;
 pub use parameters::{CONDITION_KEYS, Parameter, UnknownParameter, title_of};
 pub use prediction::{CompletenessPoint, DetectorReport, Prediction};
 pub use rows::{PredictionError, PredictionRow, PredictionTableRow, SweptValue};
+pub use scenario::{Reading, Scenario};
 pub use star_light::StarLight;
 pub use sweep::{Curve, Series, Spacing, Sweep, SweepError, curves};

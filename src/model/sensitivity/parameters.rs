@@ -1,6 +1,7 @@
 //! The parameters of a scenario by name: the camera's and the conditions' in one list.
 
-use super::conditions::{Conditions, Extinction, Scenario, SkyBrightness};
+use super::conditions::{Conditions, Extinction, REFERENCE_NM, SkyBrightness};
+use super::scenario::Scenario;
 use crate::camera::data_sheet::{DataSheet, KEYS, Key, Limits, key, nearest_name};
 
 /// The numbers of [`Conditions`]. Of those that say the same thing in other units the last one given holds.
@@ -36,13 +37,7 @@ pub const CONDITION_KEYS: &[Key<Conditions>] = &[
         name: "zenith_transmission",
         about: "part of the light of 555 nm that comes through one airmass, by the law of eq. (3)",
         limits: Limits::Share,
-        get: |conditions| {
-            Some(
-                conditions
-                    .extinction
-                    .zenith_transmission(super::conditions::REFERENCE_NM),
-            )
-        },
+        get: |conditions| Some(conditions.extinction.zenith_transmission(REFERENCE_NM)),
         set: |conditions, part| conditions.extinction = Extinction::law_through(part),
     },
     Key {

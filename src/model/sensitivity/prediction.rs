@@ -1,9 +1,10 @@
 //! What is told of a scenario: its limit, the parameters it follows from, and all that lies between.
 
 use super::budget::Budget;
+use super::check::ScenarioError;
 use super::completeness::{Detector, Rule};
-use super::conditions::{Reading, Scenario, ScenarioError};
 use super::parameters::Parameter;
+use super::scenario::{Reading, Scenario};
 use serde::{Serialize, Serializer};
 
 /// The limit of a scenario with everything it follows from. The first fields are those that other programs build on.

@@ -1,8 +1,9 @@
 //! One parameter after its other values, all else as it is.
 
 use super::budget::Budget;
-use super::conditions::{Scenario, ScenarioError};
+use super::check::ScenarioError;
 use super::parameters::{Parameter, UnknownParameter};
+use super::scenario::Scenario;
 use crate::camera::data_sheet::Limits;
 use std::cmp::Ordering;
 

@@ -18,7 +18,7 @@ pub(super) struct Pattern {
 
 /// Streams of random numbers: one part of a pattern does not depend on whether there is another.
 #[derive(Clone, Copy)]
-enum Stream {
+enum PatternStream {
     Response,
     Dead,
     DarkCurrent,
@@ -42,7 +42,7 @@ impl Pattern {
     }
 }
 
-fn random(sheet: &DataSheet, stream: Stream) -> ChaCha8Rng {
+fn random(sheet: &DataSheet, stream: PatternStream) -> ChaCha8Rng {
     let mut random = ChaCha8Rng::seed_from_u64(sheet.imperfections.pattern_seed as u64);
     random.set_stream(stream as u64);
     random
@@ -57,15 +57,15 @@ fn pixels(sheet: &DataSheet) -> usize {
 }
 
 /// Whether each pixel is one of so many in a million.
-fn chosen(sheet: &DataSheet, per_mpx: f64, stream: Stream) -> impl Iterator<Item = bool> {
+fn chosen(sheet: &DataSheet, per_mpx: f64, stream: PatternStream) -> impl Iterator<Item = bool> {
     let mut random = random(sheet, stream);
     std::iter::repeat_with(move || random.random::<f64>() * 1e6 < per_mpx)
 }
 
 fn response(sheet: &DataSheet) -> Vec<f32> {
     let made = &sheet.imperfections;
-    let mut random = random(sheet, Stream::Response);
-    let dead = chosen(sheet, made.dead_pixels_per_mpx, Stream::Dead);
+    let mut random = random(sheet, PatternStream::Response);
+    let dead = chosen(sheet, made.dead_pixels_per_mpx, PatternStream::Dead);
     dead.take(pixels(sheet))
         .map(|is_dead| {
             let response = (1.0 + made.response_sigma * normal(&mut random)).max(0.0);
@@ -76,8 +76,8 @@ fn response(sheet: &DataSheet) -> Vec<f32> {
 
 fn dark_current(sheet: &DataSheet) -> Vec<f32> {
     let made = &sheet.imperfections;
-    let mut random_current = random(sheet, Stream::DarkCurrent);
-    let mut random_hot = random(sheet, Stream::Hot);
+    let mut random_current = random(sheet, PatternStream::DarkCurrent);
+    let mut random_hot = random(sheet, PatternStream::Hot);
     // Of a log-normal distribution of mean 1 and this standard deviation.
     let log_variance = libm::log1p(made.dark_current_sigma.powi(2));
     (0..pixels(sheet))
@@ -97,10 +97,10 @@ fn dark_current(sheet: &DataSheet) -> Vec<f32> {
 
 fn offset(sheet: &DataSheet) -> Vec<f32> {
     let made = &sheet.imperfections;
-    let mut random_column = random(sheet, Stream::Column);
+    let mut random_column = random(sheet, PatternStream::Column);
     let mut column = || made.column_sigma_adu * normal(&mut random_column);
     let columns: Vec<f64> = (0..sheet.width_px).map(|_| column()).collect();
-    let mut random_pixel = random(sheet, Stream::Offset);
+    let mut random_pixel = random(sheet, PatternStream::Offset);
     let mut offset = |i: usize| {
         let own = made.offset_sigma_adu * normal(&mut random_pixel);
         (columns[i % sheet.width_px] + own) as f32

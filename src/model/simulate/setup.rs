@@ -1,6 +1,6 @@
 //! All numbers of a simulation by name.
 
-use super::camera_of;
+use super::camera::camera_of;
 use super::scene::{SCENE_KEYS, Scene};
 use super::strays::mean_cosmic_rays;
 use crate::camera::data_sheet::{DataSheet, IMPERFECTION_KEYS, Key, Limits};
@@ -82,7 +82,7 @@ impl Setup {
 
 /// A parameter of a [`Setup`].
 #[derive(Debug, Clone, Copy)]
-pub enum Parameter {
+pub enum SetupParameter {
     /// One on which the limit depends.
     Scenario(sensitivity::Parameter),
     /// An imperfection of the camera.
@@ -91,7 +91,7 @@ pub enum Parameter {
     Scene(&'static Key<Scene>),
 }
 
-impl Parameter {
+impl SetupParameter {
     /// All of them.
     pub fn all() -> impl Iterator<Item = Self> {
         sensitivity::Parameter::all()
@@ -229,7 +229,7 @@ mod tests {
             scene: Scene::default(),
         };
         let mut names = Vec::new();
-        for parameter in Parameter::all() {
+        for parameter in SetupParameter::all() {
             names.push(parameter.name());
             let Some(value) = parameter.get(&setup) else {
                 continue;

@@ -1,6 +1,6 @@
 //! The light of the sky in each pixel, and what clouds leave of the stars'.
 
-use super::canvas::Canvas;
+use super::image::ElectronImage;
 use super::scene::Scene;
 use crate::base::coords::{Camera, PixelPoint, UnitVector};
 use crate::camera::CameraModel;
@@ -59,23 +59,23 @@ impl<'a> Sky<'a> {
         clouds * self.lens(place)
     }
 
-    /// Fills `canvas` with `sky_e` electrons, as they are distributed.
-    pub(super) fn expose(&self, canvas: &mut Canvas, sky_e: f64) {
+    /// Fills `image` with `sky_e` electrons, as they are distributed.
+    pub(super) fn expose(&self, image: &mut ElectronImage, sky_e: f64) {
         let is_even = self.vignetting == 0.0 && self.slope == [0.0; 2];
         if is_even && self.clouds.is_none() && self.moonlight.is_none() {
-            return canvas.pixels_mut().fill(sky_e);
+            return image.pixels_mut().fill(sky_e);
         }
         let moon = self
             .moonlight
             .as_ref()
-            .map(|moon| Grid::of(canvas, GRID_PX, |place| moon.at(self.camera, place)));
+            .map(|moon| CoarseGrid::of(image, GRID_PX, |place| moon.at(self.camera, place)));
         let clouds = self.clouds.as_ref().filter(|clouds| clouds.light > 0.0);
         let clouds = clouds.map(|clouds| {
-            let grid = Grid::of(canvas, clouds.grid_px(), |place| clouds.height(place));
+            let grid = CoarseGrid::of(image, clouds.grid_px(), |place| clouds.height(place));
             (clouds.light, grid)
         });
         let centre = self.camera.centre();
-        for (y, row) in canvas.rows_mut() {
+        for (y, row) in image.rows_mut() {
             let gradient_y = 1.0 + self.slope[1] * (y as f64 - centre.y);
             for (x, pixel) in row.iter_mut().enumerate() {
                 let place = PixelPoint::new(x as f64, y as f64);
@@ -99,15 +99,15 @@ impl<'a> Sky<'a> {
 }
 
 /// Values at points of the frame, and between them.
-struct Grid {
+struct CoarseGrid {
     step_px: usize,
     columns: usize,
     values: Vec<f64>,
 }
 
-impl Grid {
-    fn of(canvas: &Canvas, step_px: usize, value: impl Fn(&PixelPoint) -> f64) -> Self {
-        let [columns, rows] = [canvas.width(), canvas.height()].map(|side| side / step_px + 2);
+impl CoarseGrid {
+    fn of(image: &ElectronImage, step_px: usize, value: impl Fn(&PixelPoint) -> f64) -> Self {
+        let [columns, rows] = [image.width(), image.height()].map(|side| side / step_px + 2);
         let places = (0..columns * rows).map(|i| {
             let at = |step: usize| (step * step_px) as f64;
             PixelPoint::new(at(i % columns), at(i / columns))
@@ -242,9 +242,9 @@ mod tests {
     fn sky(scenario: &Scenario, scene: &Scene) -> Vec<f64> {
         let camera = camera();
         let mut random = ChaCha8Rng::seed_from_u64(1);
-        let mut canvas = Canvas::new(400, 300, 0.0);
-        Sky::new(scenario, scene, &camera, &mut random).expose(&mut canvas, 100.0);
-        canvas.into_pixels()
+        let mut image = ElectronImage::new(400, 300, 0.0);
+        Sky::new(scenario, scene, &camera, &mut random).expose(&mut image, 100.0);
+        image.into_pixels()
     }
 
     #[test]
@@ -305,10 +305,10 @@ mod tests {
         };
         for mirrored in [false, true] {
             let camera = CameraModel::pinhole(400.0, 300.0, 1000.0, mirrored);
-            let mut canvas = Canvas::new(400, 300, 0.0);
+            let mut image = ElectronImage::new(400, 300, 0.0);
             let mut random = ChaCha8Rng::seed_from_u64(1);
-            Sky::new(&scenario, &scene, &camera, &mut random).expose(&mut canvas, 100.0);
-            let row = canvas.row_mut(150);
+            Sky::new(&scenario, &scene, &camera, &mut random).expose(&mut image, 100.0);
+            let row = image.row_mut(150);
             assert!(row[399] > 1.05 * row[0], "{} {}", row[0], row[399]);
         }
     }
@@ -326,12 +326,12 @@ mod tests {
             };
             let mut random = ChaCha8Rng::seed_from_u64(2);
             let sky = Sky::new(&scenario, &scene, &camera, &mut random);
-            let mut canvas = Canvas::new(400, 300, 0.0);
-            sky.expose(&mut canvas, 1.0);
+            let mut image = ElectronImage::new(400, 300, 0.0);
+            sky.expose(&mut image, 1.0);
             let off = |i: usize| {
                 let place = PixelPoint::new((i % 400) as f64, (i / 400) as f64);
                 let thickness = -2.5 * sky.transmission(&place).log10();
-                (canvas.pixels()[i] - 1.0 - thickness).abs()
+                (image.pixels()[i] - 1.0 - thickness).abs()
             };
             let most = (0..120_000).step_by(7).map(off).fold(0.0, f64::max);
             assert!(most < 0.01, "{cloud_size_px}: {most}");
@@ -374,9 +374,9 @@ mod tests {
         let least = left.iter().copied().fold(1.0, f64::min);
         assert!((least - 10f64.powf(-0.8)).abs() < 0.05, "{least}");
         assert!(left.contains(&1.0));
-        let mut canvas = Canvas::new(400, 300, 0.0);
-        sky.expose(&mut canvas, 100.0);
-        let most = canvas.pixels().iter().copied().fold(0.0, f64::max);
+        let mut image = ElectronImage::new(400, 300, 0.0);
+        sky.expose(&mut image, 100.0);
+        let most = image.pixels().iter().copied().fold(0.0, f64::max);
         assert!((most - 200.0).abs() < 2.0, "{most}");
     }
 }

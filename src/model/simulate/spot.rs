@@ -1,6 +1,6 @@
 //! The light of a star on its pixels.
 
-use super::canvas::Canvas;
+use super::image::ElectronImage;
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::{normal_cdf, normal_density};
 use crate::camera::data_sheet::SpotForm;
@@ -14,7 +14,7 @@ const DISC_RADIUS: f64 = 2.0;
 
 /// A star's spot, in the form that the camera gives it.
 #[derive(Debug, Clone)]
-pub(super) struct Spot {
+pub(super) struct SpotRenderer {
     form: SpotForm,
     sigma_px: f64,
     /// Room for the parts of the light in the columns and the rows of one star.
@@ -22,7 +22,7 @@ pub(super) struct Spot {
     rows: Vec<f64>,
 }
 
-impl Spot {
+impl SpotRenderer {
     pub(super) fn new(form: SpotForm, sigma_px: f64) -> Self {
         Self {
             form,
@@ -47,9 +47,9 @@ impl Spot {
     }
 
     /// Adds so many electrons of a star at `position` to those that are expected in each pixel.
-    pub(super) fn add(&mut self, canvas: &mut Canvas, position: &PixelPoint, electrons: f64) {
-        let columns = pixels_within(position.x, self.reach_px(), canvas.width());
-        let rows = pixels_within(position.y, self.reach_px(), canvas.height());
+    pub(super) fn add(&mut self, image: &mut ElectronImage, position: &PixelPoint, electrons: f64) {
+        let columns = pixels_within(position.x, self.reach_px(), image.width());
+        let rows = pixels_within(position.y, self.reach_px(), image.height());
         if columns.is_empty() || rows.is_empty() {
             return;
         }
@@ -57,7 +57,7 @@ impl Spot {
             let radius_px = self.reach_px();
             for y in rows {
                 let y_px = y as f64 - position.y;
-                let pixels = &mut canvas.row_mut(y)[columns.clone()];
+                let pixels = &mut image.row_mut(y)[columns.clone()];
                 for (x, pixel) in columns.clone().zip(pixels) {
                     *pixel += electrons * disc_share(x as f64 - position.x, y_px, radius_px);
                 }
@@ -80,7 +80,7 @@ impl Spot {
         );
         for (y, share) in rows.zip(&self.rows) {
             let row_e = electrons * share;
-            let pixels = &mut canvas.row_mut(y)[columns.clone()];
+            let pixels = &mut image.row_mut(y)[columns.clone()];
             for (pixel, share) in pixels.iter_mut().zip(&self.columns) {
                 *pixel += row_e * share;
             }
@@ -157,10 +157,10 @@ mod tests {
 
     /// The pixels of a spot on an empty frame.
     fn drawn(form: SpotForm, sigma_px: f64, at: (f64, f64)) -> Vec<f64> {
-        let mut canvas = Canvas::new(SIDE, SIDE, 0.0);
+        let mut image = ElectronImage::new(SIDE, SIDE, 0.0);
         let position = PixelPoint::new(at.0, at.1);
-        Spot::new(form, sigma_px).add(&mut canvas, &position, 1.0);
-        canvas.into_pixels()
+        SpotRenderer::new(form, sigma_px).add(&mut image, &position, 1.0);
+        image.into_pixels()
     }
 
     /// Mean and variance along x and y of light that adds up to 1.

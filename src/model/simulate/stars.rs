@@ -1,10 +1,11 @@
 //! The stars on a frame: where they stand and how bright they are.
 
+use super::camera::Pointing;
+use super::poisson::poisson;
 use super::scene::Scene;
 use super::sky::Sky;
 use super::strays::place;
 use super::truth::TrueStar;
-use super::{Pointing, poisson::poisson};
 use crate::base::coords::UnitVector;
 use crate::camera::CameraModel;
 use crate::model::sensitivity::StarLight;
@@ -18,14 +19,14 @@ use std::f64::consts::PI;
 const PROPER_MOTION_ROOM_RAD: f64 = 0.01;
 
 /// What stars are drawn with.
-pub(super) struct Starlight<'a> {
+pub(super) struct StarSampler<'a> {
     pub(super) camera: &'a CameraModel,
     pub(super) scene: &'a Scene,
     pub(super) light: &'a StarLight,
     pub(super) sky: &'a Sky<'a>,
 }
 
-impl Starlight<'_> {
+impl StarSampler<'_> {
     /// The catalogue's stars whose light falls on the frame, and false ones after them.
     pub(super) fn on_frame(
         &self,

@@ -9,7 +9,7 @@ use crate::model::sensitivity::{Detector, Faintest, Scenario};
 use crate::model::simulate::{Pointing, Simulator, Truth};
 use crate::pipeline::{Context, Solution, Source, Workspace, solve_frame};
 use crate::sky::catalog::{Catalog, StarIndex};
-use crate::study::validation::Light;
+use crate::study::validation::LightMap;
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -100,7 +100,7 @@ impl Protocol<'_> {
     }
 
     fn judged(&self, truth: &Truth, solution: &Solution, catalog: &Catalog) -> Trial {
-        let light = Light::of(self.scenario, truth);
+        let light = LightMap::of(self.scenario, truth);
         let star_like = |source: &&Source| source.measured.is_some_and(|m| m.flags.is_star_like());
         let owners: Vec<StarIndex> = solution
             .sources
@@ -146,7 +146,7 @@ fn shifted(
 fn identified(
     found: &Identification,
     solution: &Solution,
-    light: &Light,
+    light: &LightMap,
     catalog: &Catalog,
 ) -> Option<Identified> {
     let is_wrong = |m: &StarMatch| {

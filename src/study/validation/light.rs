@@ -15,13 +15,13 @@ const REACH_SIGMAS: f64 = 8.0;
 const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
 
 /// Where each star's light is.
-pub struct Light<'a> {
+pub struct LightMap<'a> {
     stars: Vec<&'a TrueStar>,
     by_place: PointTree,
     variance_px2: [f64; 2],
 }
 
-impl<'a> Light<'a> {
+impl<'a> LightMap<'a> {
     /// The light of the stars on a frame, and of those beyond its border.
     pub fn of(scenario: &Scenario, truth: &'a Truth) -> Self {
         let variance_px2 = scenario.camera.spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2;
@@ -103,7 +103,7 @@ mod tests {
             beyond: vec![star(-1.0, 30.0, 500.0)],
             ..Truth::default()
         };
-        let light = Light::of(&scenario, &truth);
+        let light = LightMap::of(&scenario, &truth);
         let owner = |x, y| {
             light
                 .owner(&PixelPoint::new(x, y))

@@ -5,7 +5,7 @@ use crate::base::format::five_digits;
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::focal_length_px;
 use crate::model::sensitivity::{Spacing, UnknownParameter};
-use crate::model::simulate::{Parameter, Setup};
+use crate::model::simulate::{Setup, SetupParameter};
 use serde::Serialize;
 use std::fmt::Write as _;
 
@@ -13,7 +13,7 @@ use std::fmt::Write as _;
 #[derive(Debug, Clone, Copy)]
 pub enum StudyParameter {
     /// A parameter of the camera, of the conditions or of the scene.
-    Setup(Parameter),
+    Setup(SetupParameter),
     /// The horizontal field of view, in degrees, by the focal length; pixels and spot stay the same.
     FieldOfView,
 }
@@ -29,7 +29,7 @@ impl StudyParameter {
         if name == Self::FIELD_OF_VIEW {
             return Ok(Self::FieldOfView);
         }
-        Parameter::named(name).map(Self::Setup)
+        SetupParameter::named(name).map(Self::Setup)
     }
 
     /// Its name.

@@ -5,6 +5,9 @@
 use crate::study::robustness::Answer;
 use serde::{Deserialize, Serialize};
 
+/// The table of stars goes so far beyond the predicted limit.
+pub const BEYOND_LIMIT_MAG: f64 = 1.5;
+
 /// A simulated frame, and what the pipeline made of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameRecord {
@@ -86,7 +89,7 @@ pub struct FrameRecord {
 /// What a row of the table of stars is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum RowKind {
     /// A true star, detected or not.
     Star,
     /// A detection with the light of several stars, none of which has more than half of it.
@@ -107,14 +110,14 @@ pub enum Named {
     No,
 }
 
-/// A true star brighter than the predicted limit and [`BEYOND_LIMIT_MAG`](super::BEYOND_LIMIT_MAG); or a detection that is no
+/// A true star brighter than the predicted limit and [`BEYOND_LIMIT_MAG`]; or a detection that is no
 /// such star.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StarRecord {
     /// The frame.
     pub frame: u64,
     /// What it is.
-    pub kind: Kind,
+    pub kind: RowKind,
     /// The catalogue's identifier.
     pub id: Option<String>,
     /// True Johnson V.
@@ -151,10 +154,41 @@ pub struct StarRecord {
     pub sigma_x_px: Option<f64>,
     /// The same of the row.
     pub sigma_y_px: Option<f64>,
-    /// Light found.
+    /// LightMap found.
     pub flux_e: Option<f64>,
     /// Its stated standard error.
     pub sigma_flux_e: Option<f64>,
     /// Whether it was named.
     pub named: Named,
+}
+
+impl StarRecord {
+    /// A row of this frame without any measurement.
+    pub fn empty(frame: u64, kind: RowKind) -> Self {
+        Self {
+            frame,
+            kind,
+            id: None,
+            vmag: None,
+            bv_mag: None,
+            true_x_px: None,
+            true_y_px: None,
+            true_flux_e: None,
+            isolated: None,
+            saturated: None,
+            probability: None,
+            snr: None,
+            bound_x_px: None,
+            bound_y_px: None,
+            bound_flux_e: None,
+            detected: false,
+            x_px: None,
+            y_px: None,
+            sigma_x_px: None,
+            sigma_y_px: None,
+            flux_e: None,
+            sigma_flux_e: None,
+            named: Named::No,
+        }
+    }
 }

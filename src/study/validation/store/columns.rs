@@ -1,7 +1,7 @@
 //! The columns of the tables, in their order: name, type and value.
 
 use crate::study::robustness::Answer;
-use crate::study::validation::record::{FrameRecord, Kind, Named, StarRecord};
+use crate::study::validation::record::{FrameRecord, Named, RowKind, StarRecord};
 use serde::{Serialize, de::DeserializeOwned};
 
 /// The value of a field of a row; none if the field is empty.
@@ -70,10 +70,10 @@ field! {
         Answer::Wrong => "wrong",
         Answer::None => "none",
     }.to_owned();
-    Kind => Text, |value| match value {
-        Kind::Star => "star",
-        Kind::Blend => "blend",
-        Kind::False => "false",
+    RowKind => Text, |value| match value {
+        RowKind::Star => "star",
+        RowKind::Blend => "blend",
+        RowKind::False => "false",
     }.to_owned();
     Named => Text, |value| match value {
         Named::Right => "right",

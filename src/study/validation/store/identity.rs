@@ -4,7 +4,7 @@ use super::error::StoreError;
 use crate::base::files;
 use crate::camera::data_sheet::Response;
 use crate::model::sensitivity::Reading;
-use crate::model::simulate::Parameter;
+use crate::model::simulate::SetupParameter;
 use crate::sky::catalog::Catalog;
 use crate::study::validation::Protocol;
 use serde::Serialize;
@@ -88,7 +88,7 @@ fn write(path: &Path, identity: &Value) -> io::Result<()> {
 fn identity(protocol: &Protocol, catalog: &Catalog) -> Result<Value, serde_json::Error> {
     let scenario = &protocol.setup.scenario;
     let imperfections = &scenario.camera.imperfections;
-    let parameters = Parameter::all().filter_map(|parameter| {
+    let parameters = SetupParameter::all().filter_map(|parameter| {
         let value = parameter.get(&protocol.setup)?;
         Some((parameter.name().to_owned(), Value::from(value)))
     });

@@ -1,7 +1,7 @@
 //! Rows for the tests of the tables.
 
 use crate::study::robustness::Answer;
-use crate::study::validation::record::{FrameRecord, Kind, Named, StarRecord};
+use crate::study::validation::record::{FrameRecord, Named, RowKind, StarRecord};
 
 /// A frame.
 pub(super) fn frame_row(frame: u64) -> FrameRecord {
@@ -48,28 +48,12 @@ pub(super) fn frame_row(frame: u64) -> FrameRecord {
 /// A false detection.
 pub(super) fn star_row(frame: u64) -> StarRecord {
     StarRecord {
-        frame,
-        kind: Kind::False,
-        id: None,
-        vmag: None,
-        bv_mag: None,
-        true_x_px: None,
-        true_y_px: None,
-        true_flux_e: None,
-        isolated: None,
-        saturated: None,
-        probability: None,
-        snr: None,
-        bound_x_px: None,
-        bound_y_px: None,
-        bound_flux_e: None,
-        detected: false,
         x_px: Some(1.5),
         y_px: Some(2.5),
         sigma_x_px: Some(0.1),
         sigma_y_px: Some(0.1),
         flux_e: Some(100.0),
         sigma_flux_e: Some(20.0),
-        named: Named::No,
+        ..StarRecord::empty(frame, RowKind::False)
     }
 }

@@ -51,9 +51,9 @@ pub struct CentroidBin {
     pub flux_ratio: Option<f64>,
 }
 
-/// Sums of one bin.
+/// CentroidSums of one bin.
 #[derive(Clone, Copy, Default)]
-struct Sums {
+struct CentroidSums {
     stars: usize,
     snr: f64,
     errors_px2: f64,
@@ -66,7 +66,7 @@ struct Sums {
 
 #[derive(Default)]
 pub(super) struct Centroids {
-    bins: [Sums; BINS],
+    bins: [CentroidSums; BINS],
     sure: usize,
     /// Sum of the squares of errors in units of their bounds.
     in_bounds: f64,
@@ -114,7 +114,7 @@ impl Centroids {
     }
 }
 
-impl Sums {
+impl CentroidSums {
     fn bin(&self, bin: usize) -> CentroidBin {
         let stars = self.stars as f64;
         let edge = |bin: usize| {

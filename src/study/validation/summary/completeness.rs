@@ -3,6 +3,7 @@
 use crate::base::format::{to_decimals, to_significant};
 use crate::base::statistics::{Estimate, normal_cdf, normal_density};
 use crate::study::robustness::Interval;
+use crate::study::validation::record::BEYOND_LIMIT_MAG;
 use serde::Serialize;
 
 /// Width of a bin, in magnitudes.
@@ -10,7 +11,7 @@ const BIN_MAG: f64 = 0.1;
 /// Bins begin so much brighter than the predicted limit; stars brighter than that are one bin.
 const BRIGHTER_MAG: f64 = 2.0;
 /// And end so much fainter: with the table of stars.
-const FAINTER_MAG: f64 = super::super::BEYOND_LIMIT_MAG;
+const FAINTER_MAG: f64 = BEYOND_LIMIT_MAG;
 
 /// What part of the isolated stars of each magnitude is found.
 ///
@@ -51,9 +52,9 @@ pub struct CompletenessBin {
     pub predicted: f64,
 }
 
-/// Sums of one bin.
+/// CompletenessSums of one bin.
 #[derive(Clone, Copy, Default)]
-struct Sums {
+struct CompletenessSums {
     stars: usize,
     vmag: f64,
     detected: usize,
@@ -64,7 +65,7 @@ pub(super) struct Completeness {
     limit_vmag: f64,
     /// The lower edge of the second bin.
     from_vmag: f64,
-    bins: Vec<Sums>,
+    bins: Vec<CompletenessSums>,
 }
 
 impl Completeness {
@@ -77,7 +78,7 @@ impl Completeness {
         Self {
             limit_vmag,
             from_vmag: from * BIN_MAG,
-            bins: vec![Sums::default(); (to - from) as usize + 2],
+            bins: vec![CompletenessSums::default(); (to - from) as usize + 2],
         }
     }
 
@@ -96,7 +97,7 @@ impl Completeness {
             .bins
             .iter()
             .filter(|sums| sums.stars > 0)
-            .map(Sums::bin)
+            .map(CompletenessSums::bin)
             .collect();
         let fit = |part: fn(&CompletenessBin) -> f64| fitted_limit(&bins, part, self.limit_vmag);
         let measured = fit(|bin| bin.measured);
@@ -113,7 +114,7 @@ impl Completeness {
     }
 }
 
-impl Sums {
+impl CompletenessSums {
     fn bin(&self) -> CompletenessBin {
         let stars = self.stars as f64;
         let interval = Interval::of(self.detected, self.stars);

@@ -14,13 +14,13 @@ pub use completeness::{CompletenessBin, CompletenessSummary};
 pub use identification::{IdentificationBin, IdentificationSummary};
 pub use pulls::{DifferenceSummary, Histogram, Pull, PullSummary};
 
-use super::record::{FrameRecord, Kind, StarRecord};
+use super::record::{FrameRecord, RowKind, StarRecord};
 use crate::base::format::{to_decimals, to_significant};
 use crate::study::robustness::{Answer, Interval};
 use centroids::Centroids;
 use completeness::Completeness;
 use identification::Identifications;
-use pulls::Tally;
+use pulls::RunningStatistics;
 use serde::Serialize;
 
 /// Version of the JSON described here.
@@ -175,23 +175,23 @@ pub struct Accumulator {
     completeness: Completeness,
     centroids: Centroids,
     /// Of x, y and light; of the turns about x, y and the boresight; of the focal length.
-    pulls: [Tally; 7],
+    pulls: [RunningStatistics; 7],
     boresight_arcsec: Vec<f64>,
     roll_arcsec: Vec<f64>,
     squares_arcsec2: [f64; 3],
     nees_sum: f64,
     rms_px_sum: f64,
-    faintest: Tally,
+    faintest: RunningStatistics,
     faintest_variance_sum: f64,
-    frame_limit: Tally,
-    background: Tally,
-    noise_ratio: Tally,
+    frame_limit: RunningStatistics,
+    background: RunningStatistics,
+    noise_ratio: RunningStatistics,
 }
 
 impl Accumulator {
     /// Of a run with the predicted limit of its detector.
     pub fn new(facts: RunFacts, limit_vmag: f64) -> Self {
-        let magnitudes = || Tally::new(0.1, 2.0);
+        let magnitudes = || RunningStatistics::new(0.1, 2.0);
         Self {
             facts,
             frames: 0,
@@ -199,7 +199,7 @@ impl Accumulator {
             identification: Identifications::default(),
             completeness: Completeness::around(limit_vmag),
             centroids: Centroids::default(),
-            pulls: std::array::from_fn(|_| Tally::new(0.25, 5.0)),
+            pulls: std::array::from_fn(|_| RunningStatistics::new(0.25, 5.0)),
             boresight_arcsec: Vec::new(),
             roll_arcsec: Vec::new(),
             squares_arcsec2: [0.0; 3],
@@ -276,7 +276,7 @@ impl Accumulator {
 
     /// Takes in a star.
     pub fn add_star(&mut self, row: &StarRecord) {
-        if row.kind != Kind::Star || row.isolated != Some(true) {
+        if row.kind != RowKind::Star || row.isolated != Some(true) {
             return;
         }
         if let (Some(vmag), Some(probability)) = (row.vmag, row.probability) {

@@ -71,7 +71,7 @@ pub struct DifferenceSummary {
 }
 
 /// Values, counted.
-pub(super) struct Tally {
+pub(super) struct RunningStatistics {
     count: usize,
     mean: f64,
     /// Sum of the squares of the differences to the mean.
@@ -84,7 +84,7 @@ pub(super) struct Tally {
 
 const TAILS: [f64; 3] = [2.0, 3.0, 5.0];
 
-impl Tally {
+impl RunningStatistics {
     /// With a histogram from −`reach` to `reach`.
     pub(super) fn new(step: f64, reach: f64) -> Self {
         let bins = (2.0 * reach / step).round() as usize;

@@ -59,7 +59,7 @@ fn frame(number: u64, status: Answer, errors: [f64; 3]) -> FrameRecord {
 fn star(vmag: f64, snr: f64, off: f64) -> StarRecord {
     StarRecord {
         frame: 0,
-        kind: Kind::Star,
+        kind: RowKind::Star,
         id: Some("1".to_owned()),
         vmag: Some(vmag),
         bv_mag: None,
@@ -178,7 +178,7 @@ fn centroids_are_of_isolated_stars_and_pulls_of_sure_ones() {
             ..star(5.0, 10.0, 50.0)
         },
         StarRecord {
-            kind: Kind::False,
+            kind: RowKind::False,
             ..star(5.0, 10.0, 50.0)
         },
     ];

@@ -10,7 +10,7 @@ const REACH_SIGMAS: f64 = 6.0;
 const FULL_SIGMAS: f64 = 4.0;
 
 /// The spots of a scenario, and the noise that they stand in.
-pub(super) struct Spots {
+pub(super) struct Theory {
     sigma_px: f64,
     has_smear: bool,
     noise_e: f64,
@@ -21,7 +21,7 @@ pub(super) struct Spots {
 }
 
 /// What theory says of one star.
-pub(super) struct Theory {
+pub(super) struct StarTheory {
     /// Its light over the noise of the matched filter, its own light's not counted.
     pub snr: f64,
     /// Whether its brightest pixel may be full.
@@ -30,7 +30,7 @@ pub(super) struct Theory {
     pub bound: Option<CramerRao>,
 }
 
-impl Spots {
+impl Theory {
     pub(super) fn of(scenario: &Scenario, budget: &Budget) -> Self {
         let sheet = &scenario.camera;
         let end_e = (sheet.full_scale_adu() - sheet.bias_adu) * sheet.gain_e_per_adu;
@@ -43,7 +43,7 @@ impl Spots {
         }
     }
 
-    pub(super) fn theory(&self, place: &PixelPoint, electrons: f64) -> Theory {
+    pub(super) fn of_star(&self, place: &PixelPoint, electrons: f64) -> StarTheory {
         let offset_px = [place.x, place.y].map(|at| at - at.round());
         let [columns, rows] = offset_px.map(|offset| self.shares(offset));
         let squares = |shares: &[f64]| shares.iter().map(|share| share * share).sum::<f64>();
@@ -53,7 +53,7 @@ impl Spots {
             let variance_e2 = self.noise_e.powi(2);
             CramerRao::of_spot(self.sigma_px, offset_px, electrons, variance_e2)
         };
-        Theory {
+        StarTheory {
             snr: electrons * (squares(&columns) * squares(&rows)).sqrt() / self.noise_e,
             saturated: peak_e + FULL_SIGMAS * peak_e.sqrt() >= self.full_e,
             bound: (!self.has_smear).then(bound),
@@ -80,11 +80,11 @@ mod tests {
         let mut scenario = Scenario::of(Preset::NanosatTracker);
         scenario.camera.spot_sigma_px = 1.0;
         let budget = Budget::new(&scenario);
-        let spots = Spots::of(&scenario, &budget);
+        let theory = Theory::of(&scenario, &budget);
         // 13.6 pixels on average over places, from an independent computation.
         let places = (0..100).map(|i| [i % 10, i / 10].map(|n| 0.05 + 0.1 * f64::from(n)));
         let pixels = places.map(|[x, y]| {
-            let snr = spots.theory(&PixelPoint::new(x, y), 1e3).snr;
+            let snr = theory.of_star(&PixelPoint::new(x, y), 1e3).snr;
             (1e3 / (snr * budget.background_noise_e)).powi(2)
         });
         let mean = pixels.sum::<f64>() / 100.0;
@@ -95,8 +95,8 @@ mod tests {
     fn a_bright_star_fills_its_pixel_and_a_smeared_one_has_no_bound() {
         let mut scenario = Scenario::of(Preset::Experiment1);
         let theory = |scenario: &Scenario, electrons| {
-            let spots = Spots::of(scenario, &Budget::new(scenario));
-            spots.theory(&PixelPoint::new(3.2, 7.9), electrons)
+            let theory = Theory::of(scenario, &Budget::new(scenario));
+            theory.of_star(&PixelPoint::new(3.2, 7.9), electrons)
         };
         let full_e = scenario.camera.full_well_e;
         assert!(theory(&scenario, 100.0 * full_e).saturated);

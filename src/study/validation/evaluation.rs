@@ -1,7 +1,8 @@
 //! One frame: what was found in it, beside what is there.
 
-use super::record::{FrameRecord, Kind, Named, StarRecord};
-use super::{BEYOND_LIMIT_MAG, Light, Simulated, Validator};
+use super::light::LightMap;
+use super::record::{BEYOND_LIMIT_MAG, FrameRecord, Named, RowKind, StarRecord};
+use super::validator::{Simulated, Validator};
 use crate::base::format::{to_decimals, to_significant};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::identify::{Identification, SourceIndex};
@@ -19,7 +20,7 @@ const ALONE_SIGMAS: f64 = 8.0;
 const ALONE_PX: f64 = 2.0;
 /// A star so much fainter than the predicted limit may still be detected.
 const MAY_BE_DETECTED_MAG: f64 = 0.5;
-/// Light of others that is less than this part of the error of a star's own light does not matter.
+/// LightMap of others that is less than this part of the error of a star's own light does not matter.
 const ALONE_PART: f64 = 0.05;
 /// A star is whole on the frame so many standard deviations of its spot, and a pixel, from the border.
 const WHOLE_SIGMAS: f64 = 4.0;
@@ -29,12 +30,12 @@ const DARK_SIGMAS: f64 = 3.0;
 /// Digits that are kept of what is measured.
 const DIGITS: i32 = 7;
 
-pub(super) struct Judge<'a> {
+pub(super) struct Evaluation<'a> {
     validator: &'a Validator<'a>,
     number: u64,
     simulated: &'a Simulated,
     solution: &'a Solution,
-    light: Light<'a>,
+    light: LightMap<'a>,
     found: Option<&'a Identification>,
     /// The catalogue's star that each source was named, by source.
     names: HashMap<SourceIndex, StarIndex>,
@@ -44,15 +45,15 @@ pub(super) struct Judge<'a> {
 
 /// What the detections are.
 #[derive(Default)]
-struct Verdicts {
+struct Assignments {
     /// The sources that are stars: the nearest one to each, by the star's number.
     of_star: HashMap<usize, SourceIndex>,
     /// The others that may be stars.
-    others: Vec<(Kind, SourceIndex)>,
+    others: Vec<(RowKind, SourceIndex)>,
     detected: u64,
 }
 
-impl<'a> Judge<'a> {
+impl<'a> Evaluation<'a> {
     pub(super) fn new(
         validator: &'a Validator<'a>,
         number: u64,
@@ -66,7 +67,7 @@ impl<'a> Judge<'a> {
             number,
             simulated,
             solution,
-            light: Light::of(&validator.protocol.setup.scenario, &simulated.truth),
+            light: LightMap::of(&validator.protocol.setup.scenario, &simulated.truth),
             found,
             names: matches.iter().map(|m| (m.source, m.star)).collect(),
             faintest_vmag: validator.limit_vmag() + BEYOND_LIMIT_MAG,
@@ -74,15 +75,15 @@ impl<'a> Judge<'a> {
     }
 
     pub(super) fn records(&self) -> (FrameRecord, Vec<StarRecord>) {
-        let verdicts = self.verdicts();
+        let assignments = self.assignments();
         let truth = &self.simulated.truth;
         let counted = truth.stars.iter().filter(|star| self.counts(star));
         let mut rows: Vec<StarRecord> = counted
-            .map(|star| self.star_row(star, verdicts.of_star.get(&star.number).copied()))
+            .map(|star| self.star_row(star, assignments.of_star.get(&star.number).copied()))
             .collect();
-        let other = |&(kind, source): &(Kind, SourceIndex)| self.other_row(kind, source);
-        rows.extend(verdicts.others.iter().map(other));
-        let frame = self.frame_row(&verdicts, rows.len());
+        let other = |&(kind, source): &(RowKind, SourceIndex)| self.other_row(kind, source);
+        rows.extend(assignments.others.iter().map(other));
+        let frame = self.frame_row(&assignments, rows.len());
         (frame, rows)
     }
 
@@ -90,41 +91,44 @@ impl<'a> Judge<'a> {
         star.v_mag <= self.faintest_vmag
     }
 
-    fn verdicts(&self) -> Verdicts {
-        let mut verdicts = Verdicts::default();
+    fn assignments(&self) -> Assignments {
+        let mut assignments = Assignments::default();
         let dark_px = DARK_SIGMAS * self.light.sigma_px() + 1.0;
         for (index, source) in self.solution.sources.iter().enumerate() {
             if !is_star_like(source) {
                 continue;
             }
-            verdicts.detected += 1;
+            assignments.detected += 1;
             let index = SourceIndex::new(index);
             let place = &source.position;
             let owner = self.light.owner(place).filter(|star| self.counts(star));
             let Some(star) = owner else {
                 let mut near = self.light.stars_near(place, dark_px);
                 let kind = match near.any(|star| self.counts(star)) {
-                    true => Kind::Blend,
-                    false => Kind::False,
+                    true => RowKind::Blend,
+                    false => RowKind::False,
                 };
-                verdicts.others.push((kind, index));
+                assignments.others.push((kind, index));
                 continue;
             };
             let distance = |source: SourceIndex| {
                 let found = &self.solution.source(source).position;
                 found.distance_to(&star.position)
             };
-            let nearest = verdicts.of_star.entry(star.number).or_insert(index);
+            let nearest = assignments.of_star.entry(star.number).or_insert(index);
             if distance(index) < distance(*nearest) {
                 *nearest = index;
             }
         }
-        verdicts
+        assignments
     }
 
     fn star_row(&self, star: &TrueStar, source: Option<SourceIndex>) -> StarRecord {
         let catalog = self.validator.context.indexed.catalog();
-        let theory = self.validator.spots.theory(&star.position, star.electrons);
+        let theory = self
+            .validator
+            .theory
+            .of_star(&star.position, star.electrons);
         let bound = |of: fn(&CramerRao) -> f64| {
             let bound = theory.bound.as_ref().map(of);
             bound.filter(|b| b.is_finite()).map(significant)
@@ -132,8 +136,6 @@ impl<'a> Judge<'a> {
         let bound_flux_e = bound(|b| b.sigma_flux_e);
         let bv_mag = star.catalog.and_then(|known| catalog.star(known).bv_mag);
         let row = StarRecord {
-            frame: self.number,
-            kind: Kind::Star,
             id: star.catalog.map(|known| catalog.designation(known)),
             vmag: Some(to_decimals(star.v_mag, 3)),
             bv_mag: bv_mag.map(|bv| to_decimals(f64::from(bv), 3)),
@@ -147,7 +149,7 @@ impl<'a> Judge<'a> {
             bound_x_px: bound(|b| b.sigma_x_px),
             bound_y_px: bound(|b| b.sigma_y_px),
             bound_flux_e,
-            ..self.empty_row(Kind::Star)
+            ..StarRecord::empty(self.number, RowKind::Star)
         };
         match source {
             Some(source) => self.with_source(row, source, Some(star)),
@@ -187,36 +189,8 @@ impl<'a> Judge<'a> {
     }
 
     /// The row of what was detected and is no star.
-    fn other_row(&self, kind: Kind, source: SourceIndex) -> StarRecord {
-        self.with_source(self.empty_row(kind), source, None)
-    }
-
-    fn empty_row(&self, kind: Kind) -> StarRecord {
-        StarRecord {
-            frame: self.number,
-            kind,
-            id: None,
-            vmag: None,
-            bv_mag: None,
-            true_x_px: None,
-            true_y_px: None,
-            true_flux_e: None,
-            isolated: None,
-            saturated: None,
-            probability: None,
-            snr: None,
-            bound_x_px: None,
-            bound_y_px: None,
-            bound_flux_e: None,
-            detected: false,
-            x_px: None,
-            y_px: None,
-            sigma_x_px: None,
-            sigma_y_px: None,
-            flux_e: None,
-            sigma_flux_e: None,
-            named: Named::No,
-        }
+    fn other_row(&self, kind: RowKind, source: SourceIndex) -> StarRecord {
+        self.with_source(StarRecord::empty(self.number, kind), source, None)
     }
 
     /// `row` with what was measured of a source; `star` is what it should be named.
@@ -249,7 +223,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    fn frame_row(&self, verdicts: &Verdicts, star_rows: usize) -> FrameRecord {
+    fn frame_row(&self, assignments: &Assignments, star_rows: usize) -> FrameRecord {
         let Self {
             validator,
             simulated,
@@ -265,8 +239,8 @@ impl<'a> Judge<'a> {
         // Only the catalogue's stars can be named.
         let known = truth.stars.iter().filter(|star| star.catalog.is_some());
         let expected = Faintest::of(known.map(|star| (star.v_mag, self.probability(star))));
-        let count = |of: Kind| {
-            verdicts
+        let count = |of: RowKind| {
+            assignments
                 .others
                 .iter()
                 .filter(|(kind, _)| *kind == of)
@@ -297,13 +271,13 @@ impl<'a> Judge<'a> {
                 Outcome::NotIdentified(reason) => Some(reason.code().to_owned()),
             },
             stars_above_limit: v_mags().filter(|v_mag| *v_mag < limit_vmag).count() as u64,
-            detected: verdicts.detected,
-            rejected: solution.sources.len() as u64 - verdicts.detected,
+            detected: assignments.detected,
+            rejected: solution.sources.len() as u64 - assignments.detected,
             named: self.names.len() as u64,
             misnamed,
             misnamed_companions,
-            false_detections: count(Kind::False) as u64,
-            blends: count(Kind::Blend) as u64,
+            false_detections: count(RowKind::False) as u64,
+            blends: count(RowKind::Blend) as u64,
             star_rows: star_rows as u64,
             error_x_arcsec: errors(|a| a.error_arcsec.x),
             error_y_arcsec: errors(|a| a.error_arcsec.y),

@@ -1,9 +1,9 @@
 use super::*;
-use crate::base::coords::UnitVector;
+use crate::base::coords::{Rotation, UnitVector};
 use crate::base::units::RAD_PER_DEG;
-use crate::camera::data_sheet::Preset;
-use crate::sky::catalog::StarId;
-use crate::sky::catalog::StarIndex;
+use crate::camera::DistortionModel;
+use crate::camera::data_sheet::{DataSheet, Preset};
+use crate::sky::catalog::{StarId, StarIndex};
 
 fn pointing() -> Pointing {
     let boresight = UnitVector::from_ra_dec(1.0, 0.3);

@@ -2,12 +2,12 @@
 
 /// Row-major expected electrons.
 #[derive(Debug, Clone)]
-pub(super) struct Canvas {
+pub(super) struct ElectronImage {
     width: usize,
     pixels: Vec<f64>,
 }
 
-impl Canvas {
+impl ElectronImage {
     /// So many electrons in every pixel; both sides are at least 1.
     pub(super) fn new(width: usize, height: usize, electrons: f64) -> Self {
         Self {

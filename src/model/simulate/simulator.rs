@@ -1,0 +1,311 @@
+//! Simulates frames of one camera, sky and scene.
+
+use super::camera::{Pointing, camera_of};
+use super::image::ElectronImage;
+use super::motion::Motion;
+use super::pattern::Pattern;
+use super::poisson::PoissonTable;
+use super::readout::{Readout, collect};
+use super::scene::Scene;
+use super::sky::Sky;
+use super::spot::SpotRenderer;
+use super::stars::StarSampler;
+use super::strays::{self, CosmicRay, Trail};
+use super::truth::{TrueStar, Truth};
+use crate::base::coords::PixelPoint;
+use crate::camera::CameraModel;
+use crate::frame::{self, Frame, FrameError};
+use crate::model::sensitivity::{Scenario, SkyBrightness, StarLight};
+use crate::sky::catalog::Star;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// Streams of random numbers of one frame: what happens in the scene does not change the noise.
+#[derive(Clone, Copy)]
+enum FrameStream {
+    Noise,
+    Scene,
+}
+
+fn random(seed: u64, stream: FrameStream) -> ChaCha8Rng {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(stream as u64);
+    random
+}
+
+/// A camera under a sky, ready for any number of frames.
+#[derive(Debug, Clone)]
+pub struct Simulator<'a> {
+    scenario: Scenario,
+    scene: Scene,
+    stars: &'a [Star],
+    camera: CameraModel,
+    light: StarLight,
+    pattern: Pattern,
+    /// Of the mean that most pixels have, where there is one.
+    uniform: Option<PoissonTable>,
+}
+
+impl<'a> Simulator<'a> {
+    /// A simulator of `scenario` and `scene`, which [`Setup::check`] has found sound, with the catalogue's `stars`.
+    ///
+    /// All stars are drawn, however faint: the catalogue should go deeper than the camera.
+    ///
+    /// # Errors
+    /// [`FrameError::TooSmall`], [`FrameError::TooLarge`] for a detector that no frame can be of.
+    pub fn new(scenario: &Scenario, scene: &Scene, stars: &'a [Star]) -> Result<Self, FrameError> {
+        let sheet = &scenario.camera;
+        frame::check_size(sheet.width_px, sheet.height_px)?;
+        let light = StarLight::new(scenario);
+        let budget = light.budget();
+        Ok(Self {
+            scenario: scenario.clone(),
+            scene: *scene,
+            stars,
+            camera: camera_of(sheet),
+            pattern: Pattern::of(sheet),
+            uniform: PoissonTable::new(budget.background_e + budget.dark_e),
+            light,
+        })
+    }
+
+    /// The same with another camera than that of the sensor's data: one that was fitted to a real frame. Its size is the
+    /// sensor's.
+    #[must_use]
+    pub fn with_camera(mut self, camera: CameraModel) -> Self {
+        self.camera = camera;
+        self
+    }
+
+    /// The camera: which direction each pixel looks in.
+    pub fn camera(&self) -> &CameraModel {
+        &self.camera
+    }
+
+    /// The even scenario that is most like what is simulated: with the mean brightness of its sky and the typical motion of its
+    /// stars. The sensitivity model's predictions are for that.
+    pub fn uniform_scenario(&self) -> Scenario {
+        let mut uniform = self.scenario.clone();
+        let conditions = &mut uniform.conditions;
+        let turn_rad = self.scene.typical_rate_rad_s() * conditions.exposure_s;
+        let motion_px = turn_rad * self.camera.focal_length_px;
+        conditions.motion_px = conditions.motion_px.hypot(motion_px);
+        let none = Scene {
+            sky_gradient: 0.0,
+            cloud_mag: 0.0,
+            cloud_light: 0.0,
+            ..self.scene
+        };
+        let mut random = random(0, FrameStream::Scene);
+        let mut image = self.image();
+        Sky::new(&self.scenario, &none, &self.camera, &mut random).expose(&mut image, 1.0);
+        let sky_mag = conditions.sky.mag_arcsec2() - 2.5 * mean(image.pixels()).log10();
+        conditions.sky = SkyBrightness::MagArcsec2(sky_mag);
+        uniform
+    }
+
+    /// The light of its stars.
+    pub fn light(&self) -> &StarLight {
+        &self.light
+    }
+
+    /// A frame of the sky, seen from a `pointing`, and what is truly on it.
+    ///
+    /// # Errors
+    /// None for a simulator that could be made.
+    pub fn frame(&self, pointing: &Pointing, seed: u64) -> Result<(Frame, Truth), FrameError> {
+        self.exposed(seed, |sampler, reach_px, random| {
+            sampler.on_frame(pointing, self.stars, reach_px, random)
+        })
+    }
+
+    /// A frame of stars at these places, of these V magnitudes and of the scenario's temperature, in place of the catalogue's.
+    ///
+    /// # Errors
+    /// As [`Self::frame`].
+    pub fn star_field(
+        &self,
+        stars: &[(PixelPoint, f64)],
+        seed: u64,
+    ) -> Result<(Frame, Truth), FrameError> {
+        self.exposed(seed, |sampler, _, _| {
+            let star = |(number, &(position, v_mag)): (usize, &(PixelPoint, f64))| TrueStar {
+                number,
+                catalog: None,
+                position,
+                v_mag,
+                electrons: self.light.electrons(v_mag, None) * sampler.sky.transmission(&position),
+            };
+            stars.iter().enumerate().map(star).collect()
+        })
+    }
+
+    /// A frame without any light: the shutter is closed.
+    ///
+    /// # Errors
+    /// As [`Self::frame`].
+    pub fn dark(&self, seed: u64) -> Result<Frame, FrameError> {
+        self.evenly_lit(0.0, seed)
+    }
+
+    /// A frame of an even light that leaves so many electrons in a pixel in the middle: a flat field.
+    ///
+    /// # Errors
+    /// As [`Self::frame`].
+    pub fn evenly_lit(&self, electrons: f64, seed: u64) -> Result<Frame, FrameError> {
+        let none = Scene::default();
+        let sky = Sky::new(
+            &self.scenario,
+            &none,
+            &self.camera,
+            &mut random(seed, FrameStream::Scene),
+        );
+        let mut image = self.image();
+        sky.expose(&mut image, electrons);
+        self.read_out(image, &[], seed)
+    }
+
+    fn image(&self) -> ElectronImage {
+        let sheet = &self.scenario.camera;
+        ElectronImage::new(sheet.width_px, sheet.height_px, 0.0)
+    }
+
+    /// A frame of the stars that `seen` gives, the light of which reaches so many pixels beyond their places.
+    fn exposed(
+        &self,
+        seed: u64,
+        seen: impl FnOnce(&StarSampler, f64, &mut ChaCha8Rng) -> Vec<TrueStar>,
+    ) -> Result<(Frame, Truth), FrameError> {
+        let (sheet, scene) = (&self.scenario.camera, &self.scene);
+        let conditions = &self.scenario.conditions;
+        let exposure_s = conditions.exposure_s;
+        let budget = self.light.budget();
+        let mut random = random(seed, FrameStream::Scene);
+        let angular_rate_rad_s = scene.angular_rate_rad_s(&mut random);
+        let turn_rad = angular_rate_rad_s * exposure_s;
+        let motion = Motion::new(&self.camera, turn_rad, conditions.motion_px);
+        let sky = Sky::new(&self.scenario, scene, &self.camera, &mut random);
+        let mut image = self.image();
+        sky.expose(&mut image, budget.background_e);
+        let background_e = mean(image.pixels()) + budget.dark_e;
+        let mut spot = SpotRenderer::new(sheet.imperfections.spot_form, sheet.spot_sigma_px);
+        let sampler = StarSampler {
+            camera: &self.camera,
+            scene,
+            light: &self.light,
+            sky: &sky,
+        };
+        let reach_px = spot.reach_px() + motion.longest_px() / 2.0;
+        let stars = seen(&sampler, reach_px, &mut random);
+        for star in &stars {
+            motion.along(&star.position, spot.sigma_px(), |place, part| {
+                spot.add(&mut image, place, star.electrons * part);
+            });
+        }
+        let trails = strays::trails(scene, &self.camera, exposure_s, &mut random);
+        for trail in &trails {
+            self.draw_trail(trail, &sky, &mut image, &mut spot);
+        }
+        let cosmic_rays = strays::cosmic_rays(scene, sheet, &self.camera, exposure_s, &mut random);
+        let frame = self.read_out(image, &cosmic_rays, seed)?;
+        let on_frame = |star: &TrueStar| self.camera.contains(&star.position);
+        let (stars, beyond) = stars.into_iter().partition(on_frame);
+        let truth = Truth {
+            stars,
+            beyond,
+            trails,
+            cosmic_rays,
+            background_e,
+            angular_rate_rad_s,
+            motion_px: motion.of_centre_px(),
+        };
+        Ok((frame, truth))
+    }
+
+    fn draw_trail(
+        &self,
+        trail: &Trail,
+        sky: &Sky,
+        image: &mut ElectronImage,
+        spot: &mut SpotRenderer,
+    ) {
+        /// Spots so close, in standard deviations, are one even trail.
+        const STEP_SIGMAS: f64 = 0.25;
+        let electrons = self.light.electrons(self.scene.trail_vmag, None);
+        let steps = (trail.length_px() / (STEP_SIGMAS * spot.sigma_px()))
+            .ceil()
+            .max(1.0);
+        for step in 0..steps as usize {
+            let place = trail.at((step as f64 + 0.5) / steps);
+            let part_e = sky.transmission(&place) * electrons / steps;
+            spot.add(image, &place, part_e);
+        }
+    }
+
+    /// The frame of pixels in which so many electrons of light are expected.
+    fn read_out(
+        &self,
+        mut image: ElectronImage,
+        cosmic_rays: &[CosmicRay],
+        seed: u64,
+    ) -> Result<Frame, FrameError> {
+        let sheet = &self.scenario.camera;
+        self.convert(image.pixels_mut());
+        let mut random = random(seed, FrameStream::Noise);
+        collect(image.pixels_mut(), self.uniform.as_ref(), &mut random);
+        for ray in cosmic_rays {
+            ray.along(|x, y, electrons| {
+                let on_frame =
+                    |at: i64, side: usize| usize::try_from(at).ok().filter(|at| *at < side);
+                if let Some((x, y)) = on_frame(x, image.width()).zip(on_frame(y, image.height())) {
+                    image.row_mut(y)[x] += electrons;
+                }
+            });
+        }
+        let readout = Readout::of(sheet);
+        let pixels = readout.grey_levels(image.pixels_mut(), &self.pattern, &mut random);
+        let frame = Frame::new(sheet.width_px, sheet.height_px, pixels)?;
+        Ok(frame.with_levels(1.0, Some(sheet.saturation_adu() as f32)))
+    }
+
+    /// From light to charge: the pixels' response, and their dark current.
+    fn convert(&self, pixels: &mut [f64]) {
+        if let Some(response) = &self.pattern.response {
+            for (pixel, response) in pixels.iter_mut().zip(response) {
+                *pixel *= f64::from(*response);
+            }
+        }
+        let exposure_s = self.scenario.conditions.exposure_s;
+        match &self.pattern.dark_current_e_s {
+            Some(dark) => {
+                for (pixel, dark_e_s) in pixels.iter_mut().zip(dark) {
+                    *pixel += f64::from(*dark_e_s) * exposure_s;
+                }
+            }
+            None => {
+                let dark_e = self.light.budget().dark_e;
+                pixels.iter_mut().for_each(|pixel| *pixel += dark_e);
+            }
+        }
+    }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// A frame of stars at these places, of these V magnitudes, and nothing else.
+///
+/// # Errors
+/// As [`Simulator::new`].
+pub fn star_field(
+    scenario: &Scenario,
+    stars: &[(PixelPoint, f64)],
+    seed: u64,
+) -> Result<Frame, FrameError> {
+    let simulator = Simulator::new(scenario, &Scene::default(), &[])?;
+    Ok(simulator.star_field(stars, seed)?.0)
+}
+
+#[cfg(test)]
+mod tests;
