@@ -1,4 +1,4 @@
-//! What should be seen: the sensitivity model, the choice of defocus, and simulated frames.
+//! What a camera should see: the sensitivity model, the choice of defocus, and simulated frames.
 
 pub mod defocus;
 pub mod sensitivity;

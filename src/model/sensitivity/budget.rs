@@ -1,4 +1,4 @@
-//! From a scenario to its limiting magnitude, with all that lies between.
+//! From a scenario to its limiting magnitude, with all intermediate quantities.
 
 use super::check::ScenarioError;
 use super::conditions::{Conditions, REFERENCE_NM};
@@ -10,20 +10,20 @@ use crate::base::units::ARCSEC_PER_RAD;
 use crate::sky::observer::airmass;
 use serde::Serialize;
 
-/// A part of the spectrum.
+/// A narrow band of the spectrum.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Band {
-    /// The wavelength in its middle.
+    /// Central wavelength.
     pub wavelength_nm: f64,
-    /// Photons of a star of V = 0 above the atmosphere in it, per second and m² (eq. 4: φ₀).
+    /// Photons of a star of V = 0 above the atmosphere, per second and m² (eq. 4: φ₀).
     pub star_photons_s_m2: f64,
-    /// Photons of a sky whose solid angle is that of the pixel, V = 0 in it, before the lens, per second and m².
+    /// Photons of the sky within one pixel's solid angle, before the lens, per second and m².
     pub sky_photons_s_m2: f64,
-    /// Part of the light that comes through the air (eq. 2 and 3: τ to the power of the airmass).
+    /// Transmission of the atmosphere (eqs. 2 and 3: τ to the power of the airmass).
     pub atmosphere_transmission: f64,
-    /// Part of the light that the lens lets through (K).
+    /// Transmission of the lens (K).
     pub lens_transmission: f64,
-    /// Electrons for each photon on a pixel (Q).
+    /// Quantum efficiency, in electrons per photon (Q).
     pub quantum_efficiency: f64,
 }
 
@@ -37,73 +37,73 @@ impl Band {
     }
 }
 
-/// Every quantity between a star and the limiting magnitude.
+/// Every quantity between a star's light and the limiting magnitude.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Budget {
-    /// Which equations.
+    /// Set of equations.
     pub reading: Reading,
-    /// Thickness of the air in units of that at the zenith.
+    /// Airmass.
     pub airmass: f64,
     /// Area of the entrance pupil (A).
     pub aperture_area_m2: f64,
     /// Solid angle of a pixel (A_P).
     pub pixel_solid_angle_sr: f64,
-    /// The same in square arcseconds.
+    /// Solid angle of a pixel in square arcseconds.
     pub pixel_area_arcsec2: f64,
-    /// Part of the light that comes through one airmass at 555 nm.
+    /// Transmission of one airmass at 555 nm.
     pub zenith_transmission: f64,
-    /// Part of the electrons of a star that the air leaves, over the band.
+    /// Transmission of the atmosphere for the star's electrons, over the band.
     pub atmosphere_transmission: f64,
     /// Photons of a star of V = 0 above the atmosphere, over the band, per second and m² (Φ₀).
     pub mag_0_photons_s_m2: f64,
-    /// Electrons of such a star on all its pixels, per second.
+    /// Electrons of that star on all its pixels, per second.
     pub mag_0_e_s: f64,
-    /// Part of a star's light on its brightest pixel (μ), smear not counted.
+    /// Fraction of a star's light on its brightest pixel (μ), without motion.
     pub peak_share: f64,
-    /// Brightness of the sky in V magnitudes in a square arcsecond.
+    /// Sky brightness in V magnitudes per square arcsecond.
     pub sky_mag_arcsec2: f64,
-    /// The same in cd/m².
+    /// Sky luminance in cd/m².
     pub sky_luminance_cd_m2: f64,
-    /// The same in lx on level ground (E_B).
+    /// Illuminance of level ground by the sky (E_B), in lx.
     pub sky_illuminance_lx: f64,
-    /// The magnitude whose illuminance is that of the sky (eq. 7: M_B).
+    /// Magnitude with the illuminance of the sky (eq. 7: M_B).
     pub sky_mag: f64,
-    /// Johnson V of the faintest star with the wanted ratio of signal to noise in its brightest pixel (eq. 12).
+    /// V magnitude of the faintest star with the required SNR in its brightest pixel (eq. 12).
     pub limit_vmag: f64,
     /// Illuminance of that star above the atmosphere (eq. 1).
     pub star_illuminance_lx: f64,
-    /// The same below it, with the air's transmission at 555 nm (eq. 2).
+    /// Illuminance of that star on the ground, with the transmission at 555 nm (eq. 2).
     pub star_illuminance_ground_lx: f64,
-    /// Photons of that star below the atmosphere, per second and m² (eq. 5: φ_S).
+    /// Photons of that star on the ground, per second and m² (eq. 5: φ_S).
     pub star_photons_s_m2: f64,
-    /// Its electrons on its brightest pixel (eq. 8: S).
+    /// Electrons of that star on its brightest pixel (eq. 8: S).
     pub star_e: f64,
-    /// Electrons of the sky in a pixel (eq. 9: B).
+    /// Sky electrons per pixel (eq. 9: B).
     pub background_e: f64,
-    /// Electrons of the dark current in a pixel.
+    /// Dark electrons per pixel.
     pub dark_e: f64,
-    /// Noise of reading a pixel.
+    /// Read noise.
     pub read_noise_e: f64,
-    /// Noise of rounding to whole grey levels; [`Reading::Physical`] only.
+    /// Quantisation noise; [`Reading::Physical`] only.
     pub quantisation_noise_e: f64,
-    /// The noise of the sensor: dark current, reading, rounding (eq. 10: N_C).
+    /// Sensor noise: dark current, read-out, quantisation (eq. 10: N_C).
     pub sensor_noise_e: f64,
-    /// The noise of a pixel without a star: sky and sensor.
+    /// Noise of a pixel without a star: sky and sensor.
     pub background_noise_e: f64,
-    /// The shot noise of the star on its brightest pixel (eq. 10: n_S).
+    /// Shot noise of the star on its brightest pixel (eq. 10: n_S).
     pub star_noise_e: f64,
-    /// The shot noise of the sky (eq. 10: n_B).
+    /// Shot noise of the sky (eq. 10: n_B).
     pub sky_noise_e: f64,
-    /// All noise of the brightest pixel (eq. 10: N).
+    /// Total noise of the brightest pixel (eq. 10: N).
     pub noise_e: f64,
-    /// Signal over noise in the brightest pixel (eq. 11: R_SN).
+    /// Signal-to-noise ratio of the brightest pixel (eq. 11: R_SN).
     pub snr: f64,
-    /// The spectrum in parts.
+    /// The spectrum, band by band.
     pub bands: Vec<Band>,
 }
 
 impl Budget {
-    /// The budget of `scenario`, which [`Scenario::check`] has found sound.
+    /// The budget of a scenario that passes [`Scenario::check`].
     pub fn new(scenario: &Scenario) -> Self {
         let (sheet, conditions) = (&scenario.camera, &scenario.conditions);
         let light = SpectralSums::of(scenario);
@@ -161,10 +161,10 @@ impl Budget {
         }
     }
 
-    /// The budget of a scenario that may make no sense.
+    /// Checks a scenario and computes its budget.
     ///
     /// # Errors
-    /// [`ScenarioError`] where it makes none, or its limit is no finite number.
+    /// [`ScenarioError`] if the scenario is invalid or its limit is not finite.
     pub fn checked(scenario: &Scenario) -> Result<Self, ScenarioError> {
         scenario.check()?;
         let budget = Self::new(scenario);
@@ -185,12 +185,12 @@ impl Budget {
         })
     }
 
-    /// V magnitude of a star that leaves so many electrons on all its pixels during an exposure.
+    /// V magnitude of a star with this number of electrons on all its pixels in an exposure.
     pub fn vmag_of(&self, electrons: f64, exposure_s: f64) -> f64 {
         magnitude(self.reading, self.mag_0_e_s * exposure_s / electrons)
     }
 
-    /// Electrons on all pixels of a star of this V magnitude during an exposure.
+    /// Electrons on all pixels of a star of this V magnitude in an exposure.
     pub fn electrons_of(&self, v_mag: f64, exposure_s: f64) -> f64 {
         let ratio = match self.reading {
             Reading::Paper => libm::pow(PAPER_MAG_RATIO, v_mag),
@@ -200,7 +200,7 @@ impl Budget {
     }
 }
 
-/// The magnitude of a star whose light is a `ratio`-th of that of magnitude 0.
+/// Magnitude of a star `ratio` times fainter than one of magnitude 0.
 fn magnitude(reading: Reading, ratio: f64) -> f64 {
     match reading {
         Reading::Paper => libm::log10(ratio) / libm::log10(PAPER_MAG_RATIO),
@@ -216,10 +216,9 @@ fn signal_for_snr(snr: f64, variance_e2: f64) -> f64 {
     snr * snr / 2.0 + snr * (variance_e2 + snr * snr / 4.0).sqrt()
 }
 
-/// The magnitude whose illuminance is that of the sky.
+/// Magnitude with the illuminance of the sky.
 ///
-/// # Reference
-/// Tong, Li & Wang 2014, eq. (7).
+/// # Reference Tong, Li & Wang 2014, eq. (7).
 fn sky_mag(conditions: &Conditions) -> f64 {
     magnitude(
         Reading::Paper,
@@ -227,7 +226,7 @@ fn sky_mag(conditions: &Conditions) -> f64 {
     )
 }
 
-/// The light of a star of magnitude 0, and of the sky in a pixel, through air, lens and detector.
+/// Light of a star of magnitude 0, and of the sky in a pixel, summed over the bands.
 struct SpectralSums {
     reading: Reading,
     airmass: f64,
@@ -235,7 +234,7 @@ struct SpectralSums {
     star_photons_s_m2: f64,
     star_photons_ground_s_m2: f64,
     star_electrons_s_m2: f64,
-    /// In one pixel.
+    /// Per pixel.
     sky_electrons_s_m2: f64,
     atmosphere_transmission: f64,
 }
@@ -274,11 +273,10 @@ impl SpectralSums {
     }
 }
 
-/// The bands of table 1. The sky's light goes through the air as a star's does, and comes from the solid angle of a pixel
-/// out of one steradian.
+/// The bands of table 1. The atmosphere attenuates the sky's light like a star's, and a pixel
+/// receives its solid angle's share of one steradian.
 ///
-/// # Reference
-/// Tong, Li & Wang 2014, eqs. (4) to (9).
+/// # Reference Tong, Li & Wang 2014, eqs. (4) to (9).
 fn paper_bands(scenario: &Scenario, airmass: f64) -> Vec<Band> {
     let (sheet, conditions) = (&scenario.camera, &scenario.conditions);
     let table = light::luminous_efficiency();
@@ -301,10 +299,11 @@ fn paper_bands(scenario: &Scenario, airmass: f64) -> Vec<Band> {
     table.into_iter().map(band).collect()
 }
 
-/// Width of a part of the spectrum that is treated as one wavelength, at most, in nm.
+/// Largest width of a band, in nm.
 const BAND_NM: f64 = 5.0;
 
-/// Black bodies through the camera's own band. The sky's brightness is as seen from the ground: the air takes no more of it.
+/// Black bodies in bands over the camera's own range. The sky's brightness is that seen from the
+/// ground, so it is not attenuated.
 fn physical_bands(scenario: &Scenario, airmass: f64) -> Vec<Band> {
     let (sheet, conditions) = (&scenario.camera, &scenario.conditions);
     let width_nm = sheet.band_to_nm - sheet.band_from_nm;

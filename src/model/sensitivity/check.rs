@@ -1,37 +1,37 @@
-//! Checks that a scenario is possible.
+//! Checks a scenario.
 
 use super::light;
 use super::parameters::Parameter;
 use super::scenario::{Reading, Scenario};
 
-/// What in a scenario makes no sense.
+/// Why a scenario is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScenarioError {
-    /// A value out of its limits.
+    /// A value outside its limits.
     #[error("{name} is {found}, expected {expected}")]
     Value {
-        /// The parameter.
+        /// Name of the parameter.
         name: &'static str,
         /// Its value.
         found: f64,
-        /// What it may be.
+        /// Valid values.
         expected: String,
     },
     /// Values that contradict each other.
     #[error("{0}")]
     Contradiction(String),
-    /// Values of which no number follows.
+    /// The limiting magnitude is not finite.
     #[error(
         "there is no limiting magnitude: with {star_photons_s_m2:e} photons of a star of V = 0 below the air per second and \
          m², {background_e:e} electrons of the sky and a noise of {noise_e:e} electrons it would be {limit_vmag}"
     )]
     NoLimit {
-        /// The limit that would be.
+        /// Its value.
         limit_vmag: f64,
-        /// Photons of a star of V = 0 below the air.
+        /// Photons of a star of V = 0 below the atmosphere, per second and m².
         star_photons_s_m2: f64,
-        /// Electrons of the sky in a pixel.
+        /// Sky electrons per pixel.
         background_e: f64,
         /// Noise of the brightest pixel, in electrons.
         noise_e: f64,
@@ -39,10 +39,10 @@ pub enum ScenarioError {
 }
 
 impl Scenario {
-    /// Checks every parameter against its limits, and the camera's against each other.
+    /// Checks every parameter against its limits, and the camera data for contradictions.
     ///
     /// # Errors
-    /// [`ScenarioError`] with the parameter, its value, and what it may be.
+    /// [`ScenarioError`] for the first violation.
     pub fn check(&self) -> Result<(), ScenarioError> {
         for parameter in Parameter::all() {
             let Some(found) = parameter.get(self) else {
@@ -66,7 +66,7 @@ impl Scenario {
         }
     }
 
-    /// The paper's reading reckons with the wavelengths of its table 1, whatever the camera's band.
+    /// [`Reading::Paper`] uses the wavelengths of the paper's table 1, whatever the camera's band.
     fn beyond_the_papers_table(&self) -> Option<String> {
         let uncovered = match self.reading {
             Reading::Paper => self

@@ -1,17 +1,20 @@
-//! The part of the stars of each magnitude that a detector finds.
+//! Completeness: the fraction of the stars of each magnitude that a detector finds.
 //!
-//! (scenario, budget) → [`Detector`]: threshold, false alarms and completeness, which are three views of one number.
+//! (scenario, budget) → [`Detector`]: threshold, false alarms and completeness
 //!
-//! A linear detector compares `T = F a + √v w₁ + √F w₂` with a threshold at every pixel, and finds a star where the largest
-//! `T` around it passes: F is the star's light, a the filter's answer to a spot of one electron, v the variance of
-//! a pixel without a star, and w₁ and w₂ the filtered noise of the background and of the star's own light. For one draw of the noise and
-//! one place of the star within its pixel there is a *critical flux* at which it is just found, a root of a
-//! quadratic. The distribution of the critical flux over noise and places is the completeness, for all magnitudes at once, and
-//! its median is the limit. It counts what the textbook formula `Φ(SNR − u)` leaves out: that the spot is not centred on a pixel,
-//! that the noise lifts one of several pixels, and the star's own photons.
+//! A linear detector compares `T = F a + √v w₁ + √F w₂` with a threshold at every pixel, and finds
+//! a star where the largest `T` around it exceeds the threshold. F is the star's flux, a the
+//! response of the filter to a spot of one electron, v the variance of a pixel without a star, and
+//! w₁ and w₂ are the filtered noise of the background and of the star's own light. For one
+//! realisation of the noise and one position of the star within its pixel there is a *critical
+//! flux* at which it is just detected, the root of a quadratic. The distribution of the critical
+//! flux over noise and positions is the completeness at all magnitudes, and its median is the
+//! limit. Unlike the textbook formula `Φ(SNR − u)` this includes positions off the pixel centre,
+//! the choice of the highest of several pixels, and the star's own shot noise.
 //!
-//! Caveats: Gaussian noise but for the threshold, which knows that photons are skewed, as many stars as one likes without touching each other, and spots of the size that the
-//! filter expects; a smeared spot is searched with the round one that fits it best.
+//! Caveats: noise is Gaussian, except that the threshold allows for the skewness of photon noise.
+//! Stars do not overlap. Spots have the size that the filter expects; a spot smeared by motion is
+//! filtered with the round one that fits it best.
 
 use super::budget::Budget;
 use super::scenario::Scenario;
@@ -23,40 +26,41 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::Serialize;
 use std::f64::consts::SQRT_2;
 
-/// What a star must do to be found.
+/// Detection rule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Rule {
-    /// Its brightest pixel stands above the noise by the wanted ratio (eq. 11).
+    /// The brightest pixel has the required SNR (eq. 11).
     PeakPixel,
-    /// The matched filter answers above its threshold, as [`detect`](crate::detect::detect) has it.
+    /// The matched filter exceeds its threshold, as in [`detect`](crate::detect::detect).
     MatchedFilter,
 }
 
 /// A detector under a scenario.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detector {
-    /// What a star must do to be found.
+    /// Detection rule.
     pub rule: Rule,
-    /// The threshold, in standard deviations of the (filtered) noise without a star.
+    /// Threshold in standard deviations of the (filtered) background noise.
     pub threshold_sigma: f64,
-    /// False detections in a million pixels without a star; of a matched filter those asked for, which a threshold that is given
-    /// overrides.
+    /// False detections per million pixels; for a matched filter, the configured number, even if
+    /// the threshold is set explicitly.
     pub false_alarms_per_mpx: f64,
-    /// The magnitudes at which each trial's star is just found, faintest first.
+    /// Magnitude at which the star of each draw is just detected, faintest first.
     critical_vmag: Vec<f64>,
 }
 
-/// Draws of noise and place, each used with all four signs of both kinds of noise: the limit is then known to 0.003 mag.
+/// Number of draws of noise and position, each used with all four signs of both kinds of noise: the
+/// limit is then known to 0.003 mag.
 const DRAWS: usize = 2048;
-/// Where the noise of so many pixels counts, a quarter of them do: 0.006 mag, and not seconds of work.
+/// With at least this number of pixels a quarter of the draws is used: 0.006 mag, but fast.
 const WIDE_PX: usize = 2500;
 const SIGNS: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
-/// The draws are the same every time.
+/// Seed of the draws, constant so that results repeat.
 const SEED: u64 = 1;
 
 impl Detector {
-    /// The detector that goes by `rule`, with the false alarms and the signal-to-noise ratio of the scenario.
+    /// The detector with this rule, and the false alarms and SNR of the scenario.
     pub fn new(rule: Rule, scenario: &Scenario, budget: &Budget) -> Self {
         let config = DetectConfig {
             false_alarms_per_mpx: scenario.conditions.false_alarms_per_mpx,
@@ -76,7 +80,7 @@ impl Detector {
             half_kernel: vec![1.0],
             threshold_e,
             noise_e: budget.background_noise_e,
-            // Two standard deviations from the spot's middle no pixel is the brightest.
+            // The brightest pixel is within two standard deviations of the centre.
             reach_px: (2.0 * spot.sigma_px).ceil() as usize,
         };
         let threshold_sigma = threshold_e / budget.background_noise_e;
@@ -88,7 +92,7 @@ impl Detector {
         }
     }
 
-    /// The detector as built, with the threshold of `config`; the spot is the scenario's.
+    /// The matched filter with the threshold of `config`; the spot is the scenario's.
     pub fn matched_filter(config: &DetectConfig, scenario: &Scenario, budget: &Budget) -> Self {
         let spot = SmearedSpot::of(scenario);
         let size = (scenario.camera.width_px, scenario.camera.height_px);
@@ -99,7 +103,7 @@ impl Detector {
             half_kernel: model.half_kernel,
             threshold_e: model.threshold_sigma * budget.background_noise_e,
             noise_e: budget.background_noise_e,
-            // Filtered noise moves the highest point by a fraction of the spot.
+            // Filtered noise moves the maximum by a fraction of the spot.
             reach_px: (1.2 * spot.sigma_px).ceil() as usize,
         };
         Self {
@@ -110,10 +114,10 @@ impl Detector {
         }
     }
 
-    /// The probability that a star of this V magnitude is found.
+    /// Probability that a star of this V magnitude is detected.
     pub fn probability(&self, v_mag: f64) -> f64 {
         let trials = &self.critical_vmag;
-        // The trials whose limit is at least as faint; between two of them a straight line.
+        // Draws with a limit at least as faint; linear between two of them.
         let found = trials.partition_point(|limit| *limit >= v_mag);
         let between = match (found.checked_sub(1).map(|i| trials[i]), trials.get(found)) {
             (Some(fainter), Some(_)) if fainter.is_infinite() => 1.0,
@@ -126,8 +130,8 @@ impl Detector {
         (count / trials.len() as f64).clamp(0.0, 1.0)
     }
 
-    /// The V magnitude at which a star is found with this probability: 0.5 for the limit. Not finite where the noise alone
-    /// is found more often.
+    /// V magnitude at which a star is detected with this probability; 0.5 gives the limit. Not
+    /// finite where noise alone is detected more often.
     pub fn vmag_at(&self, probability: f64) -> f64 {
         let last = self.critical_vmag.len() - 1;
         let place = probability * self.critical_vmag.len() as f64 - 0.5;
@@ -138,7 +142,7 @@ impl Detector {
     }
 }
 
-/// A star's spot, smeared along the rows.
+/// A star's spot, smeared by motion along the rows.
 struct SmearedSpot {
     sigma_px: f64,
     smear_px: f64,
@@ -152,13 +156,14 @@ impl SmearedSpot {
         }
     }
 
-    /// The round spot that is most like it: the geometric mean of its widths.
+    /// Width of the most similar round spot: the geometric mean of both widths.
     fn round_sigma_px(&self) -> f64 {
         let along = self.sigma_px.hypot(self.smear_px / 12f64.sqrt());
         (along * self.sigma_px).sqrt()
     }
 
-    /// Parts of its light in pixels −`half` to `half` along one axis, its middle at `center_px`.
+    /// Fractions of the light in pixels −`half` to `half` along one axis, for a spot at
+    /// `center_px`.
     fn profile(&self, center_px: f64, smear_px: f64, half: usize, into: &mut Vec<f64>) {
         let half = half as isize;
         into.clear();
@@ -171,7 +176,7 @@ impl SmearedSpot {
         }
     }
 
-    /// Part of the light at distances below `at_px` from the middle: a Gaussian's, averaged over the smear.
+    /// Fraction of the light at offsets below `at_px`: a Gaussian's, averaged over the smear.
     fn light_before(&self, at_px: f64, smear_px: f64) -> f64 {
         let t = |distance: f64| distance / (SQRT_2 * self.sigma_px);
         if smear_px < 1e-3 * self.sigma_px {
@@ -190,12 +195,12 @@ struct Filter {
     half_kernel: Vec<f64>,
     threshold_e: f64,
     noise_e: f64,
-    /// How far from the star the largest answer is looked for.
+    /// Radius within which the maximum is searched.
     reach_px: usize,
 }
 
 impl Filter {
-    /// Its answer at `middle` along one axis of `values`.
+    /// Response at `middle` along one axis of `values`.
     fn at(&self, middle: usize, values: impl Fn(usize) -> f64) -> f64 {
         let weighted = |(distance, weight): (usize, &f64)| {
             let both = match distance {
@@ -208,7 +213,7 @@ impl Filter {
     }
 }
 
-/// The magnitude at which the star of each trial is just found, faintest first.
+/// Magnitudes at which the star of each draw is just detected, faintest first.
 fn critical_vmag(
     filter: &Filter,
     spot: &SmearedSpot,
@@ -228,18 +233,18 @@ fn critical_vmag(
     critical
 }
 
-/// One star in one draw of noise, and the buffers for it.
+/// One star and one draw of noise, with reused buffers.
 struct NoiseDraw<'a> {
     filter: &'a Filter,
     spot: &'a SmearedSpot,
-    /// From the star's pixel to the last whose answer is looked at, along x and y.
+    /// Pixels from the star's pixel to the last whose response is evaluated, along x and y.
     reach: [usize; 2],
-    /// From the star's pixel to the last that these answers depend on.
+    /// Pixels to the last that these responses depend on.
     half: [usize; 2],
     profiles: [Vec<f64>; 2],
-    /// Noise of the background and of the star's light, in the order of rows.
+    /// Noise of the background and of the star's light, row-major.
     noise: [Vec<f64>; 2],
-    /// Filtered along x.
+    /// The noise filtered along x.
     rows: [Vec<f64>; 2],
 }
 
@@ -259,7 +264,8 @@ impl<'a> NoiseDraw<'a> {
         }
     }
 
-    /// The least light, in electrons, with which the star of draw `i` is found, for each of [`SIGNS`] of the noise.
+    /// Smallest flux, in electrons, at which the star of draw `i` is detected, for each of
+    /// [`SIGNS`] of the noise.
     fn critical_fluxes_e(&mut self, i: usize, random: &mut ChaCha8Rng) -> [f64; 4] {
         let [x, y] = place_in_pixel(i);
         let [half_x, half_y] = self.half;
@@ -303,7 +309,7 @@ impl<'a> NoiseDraw<'a> {
         }
     }
 
-    /// Filters both kinds of noise along x at the columns that are looked at.
+    /// Filters both kinds of noise along x at the evaluated columns.
     fn filter_rows(&mut self) {
         let width = 2 * self.half[0] + 1;
         let reach = self.reach[0] as isize;
@@ -317,7 +323,7 @@ impl<'a> NoiseDraw<'a> {
         }
     }
 
-    /// The filter's answer at `at` pixels from the middle of `values`, which is its element `half`.
+    /// Response at `at` pixels from element `half` of `values`.
     fn filtered(&self, values: &[f64], half: usize, at: isize) -> f64 {
         self.filter
             .at(half.wrapping_add_signed(at), |place| values[place])
@@ -332,7 +338,7 @@ impl<'a> NoiseDraw<'a> {
     }
 }
 
-/// The flux F with `answer` F + `own` √F = `missing_e`.
+/// The flux F for which `answer` F + `own` √F = `missing_e`.
 fn flux_at_threshold(answer: f64, own: f64, missing_e: f64) -> f64 {
     if missing_e <= 0.0 {
         return f64::MIN_POSITIVE;
@@ -341,10 +347,10 @@ fn flux_at_threshold(answer: f64, own: f64, missing_e: f64) -> f64 {
     ((root - own) / (2.0 * answer)).powi(2)
 }
 
-/// Places within a pixel that fill it evenly.
+/// Low-discrepancy positions within a pixel.
 ///
-/// # Reference
-/// Roberts 2018, "The unreasonable effectiveness of quasirandom sequences": additive recurrence with powers of 1/1.3247…
+/// # Reference Roberts 2018, "The unreasonable effectiveness of quasirandom sequences": additive
+/// recurrence with powers of 1/1.3247…
 fn place_in_pixel(i: usize) -> [f64; 2] {
     const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_2];
     STEPS.map(|step| (0.5 + (i + 1) as f64 * step).fract() - 0.5)
@@ -386,7 +392,8 @@ mod tests {
 
     #[test]
     fn the_matched_filter_is_near_the_textbook_formula() {
-        // SNR = F √ΣP² / n at the threshold u; the largest of several pixels is some 0.05 to 0.1 mag better.
+        // SNR = F √ΣP² / n at the threshold u; the largest of several pixels is some 0.05 to 0.1
+        // mag better.
         let scenario = scenario(&[("spot_sigma_px", 1.5), ("sky_mag_arcsec2", 14.0)]);
         let budget = Budget::new(&scenario);
         let detector = Detector::new(Rule::MatchedFilter, &scenario, &budget);

@@ -1,21 +1,21 @@
-//! What the camera looks through and how long: sky, air, exposure, and what counts as detected.
+//! Observing conditions: sky, atmosphere, exposure, and the detection criterion.
 
 use super::light;
 use std::f64::consts::PI;
 
-/// How bright the sky is, in one of the ways in which people say it.
+/// Sky brightness, in one of the usual units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SkyBrightness {
-    /// Johnson V magnitudes in a square arcsecond, as seen from the ground.
+    /// V magnitudes per square arcsecond, as seen from the ground.
     MagArcsec2(f64),
     /// Luminance, in cd/m².
     LuminanceCdM2(f64),
-    /// Illuminance by the whole sky on level ground, in lx: π times the luminance where that is the same everywhere.
+    /// Illuminance of level ground by the whole sky, in lx: π times the luminance of a uniform sky.
     IlluminanceLx(f64),
 }
 
 impl SkyBrightness {
-    /// In V magnitudes in a square arcsecond.
+    /// Brightness in V magnitudes per square arcsecond.
     pub fn mag_arcsec2(self) -> f64 {
         match self {
             Self::MagArcsec2(mag) => mag,
@@ -24,7 +24,7 @@ impl SkyBrightness {
         }
     }
 
-    /// In cd/m².
+    /// Luminance in cd/m².
     pub fn luminance_cd_m2(self) -> f64 {
         match self {
             Self::MagArcsec2(mag) => light::luminance_cd_m2(mag),
@@ -33,7 +33,7 @@ impl SkyBrightness {
         }
     }
 
-    /// In lx, from a sky that is the same everywhere.
+    /// Illuminance of level ground in lx, for a uniform sky.
     pub fn illuminance_lx(self) -> f64 {
         match self {
             Self::IlluminanceLx(illuminance) => illuminance,
@@ -42,17 +42,17 @@ impl SkyBrightness {
     }
 }
 
-/// What the air takes away.
+/// Atmospheric extinction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Extinction {
-    /// The paper's eq. (3), its optical depth multiplied by this factor.
+    /// Eq. (3) of the paper, its optical depth multiplied by this factor.
     Law(f64),
-    /// So many magnitudes for each airmass, the same at every wavelength; 0 in space.
+    /// Magnitudes per airmass, the same at every wavelength; 0 in space.
     MagPerAirmass(f64),
 }
 
 impl Extinction {
-    /// Part of the light that comes through one airmass, at a wavelength in nm.
+    /// Fraction of the light transmitted through one airmass, at a wavelength in nm.
     #[doc(alias = "tau_lambda")]
     pub fn zenith_transmission(self, wavelength_nm: f64) -> f64 {
         match self {
@@ -61,27 +61,26 @@ impl Extinction {
         }
     }
 
-    /// The paper's law with its optical depth multiplied so that this part of the light of 555 nm comes
-    /// through one airmass.
+    /// The law of the paper, scaled so that one airmass transmits this fraction of the light at 555
+    /// nm.
     pub fn law_through(zenith_transmission: f64) -> Self {
         Self::Law(-libm::log(zenith_transmission) / law_optical_depth(REFERENCE_NM))
     }
 }
 
-/// The wavelength at which the paper states the air's transmission (section 3.2), in nm.
+/// Wavelength at which the paper states the atmospheric transmission (section 3.2), in nm.
 pub const REFERENCE_NM: f64 = 555.0;
 
-/// The optical depth of one airmass at a wavelength in nm.
+/// Optical depth of one airmass at a wavelength in nm.
 ///
-/// # Reference
-/// Tong, Li & Wang 2014, eq. (3), with the wavelength in µm.
+/// # Reference Tong, Li & Wang 2014, eq. (3), with the wavelength in µm.
 fn law_optical_depth(wavelength_nm: f64) -> f64 {
     const RAYLEIGH: f64 = 0.009;
     const GREY: f64 = 0.223;
     RAYLEIGH * (wavelength_nm * 1e-3).powi(-4) + GREY
 }
 
-/// What the camera looks through and how long.
+/// Observing conditions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conditions {
     /// Exposure, in seconds.
@@ -90,24 +89,25 @@ pub struct Conditions {
     /// Zenith distance, in degrees, from 0 to below 90.
     #[doc(alias = "Z")]
     pub zenith_distance_deg: f64,
-    /// How bright the sky is.
+    /// Sky brightness.
     #[doc(alias = "E_B")]
     pub sky: SkyBrightness,
-    /// What the air takes away.
+    /// Atmospheric extinction.
     pub extinction: Extinction,
-    /// Colour temperature of the star, in kelvin; [`Reading::Physical`] only.
+    /// Colour temperature of the star, in kelvin; used by
+    /// [`Reading::Physical`](super::Reading::Physical) only.
     pub star_temperature_k: f64,
-    /// How far a star moves during the exposure, along the rows, in pixels.
+    /// Motion of a star during the exposure, along the rows, in pixels.
     pub motion_px: f64,
-    /// Signal over noise in the brightest pixel that counts as a detection.
+    /// Required signal-to-noise ratio of the brightest pixel.
     #[doc(alias = "R_SN")]
     pub snr: f64,
-    /// False detections in a million pixels that the detector as built accepts.
+    /// False detections per million pixels that the matched filter accepts.
     pub false_alarms_per_mpx: f64,
 }
 
 impl Default for Conditions {
-    /// A dark sky at the zenith, a tenth of a second.
+    /// A dark sky at the zenith, and an exposure of 0.1 s.
     fn default() -> Self {
         Self {
             exposure_s: 0.1,

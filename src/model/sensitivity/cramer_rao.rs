@@ -1,30 +1,32 @@
-//! How well a star's place and light can be known at best.
+//! Lower bounds of the errors of a star's position and flux.
 
 use crate::base::statistics::{normal_cdf, normal_density};
 use nalgebra::{Matrix3, Vector3};
 
-/// Beyond so many standard deviations of the spot, and two pixels, no pixel tells anything.
+/// Half width of the summed window, in standard deviations of the spot, plus two pixels.
 const REACH_SIGMAS: f64 = 6.0;
 
-/// The least standard errors that an unbiased estimate of a star can have, its background known.
+/// Smallest standard errors of unbiased estimates of a star's position and flux, for a known
+/// background.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CramerRao {
-    /// Of the place along the rows, in pixels.
+    /// Of x, in pixels.
     pub sigma_x_px: f64,
-    /// Of the place along the columns, in pixels.
+    /// Of y, in pixels.
     pub sigma_y_px: f64,
-    /// Of the light, in electrons.
+    /// Of the flux, in electrons.
     pub sigma_flux_e: f64,
 }
 
 impl CramerRao {
-    /// The bound for a Gaussian spot of `spot_sigma_px`, integrated over the pixels, whose middle is `offset_px` from that of a
-    /// pixel, with `flux_e` electrons above a background that has a variance of `background_variance_e2` in a pixel.
+    /// The bound for a pixel-integrated Gaussian spot of `spot_sigma_px` at `offset_px` from the
+    /// centre of a pixel, with `flux_e` electrons above a background whose variance per pixel is
+    /// `background_variance_e2`.
     ///
-    /// Each pixel has the variance of its own light besides; that the variance itself tells of the place is left out.
+    /// The shot noise of the star's own light is included. The information in the variance itself
+    /// is ignored.
     ///
-    /// # Reference
-    /// Mortensen et al. 2010, Nature Methods 7, 377, with pixels of Gaussian noise.
+    /// # Reference Mortensen et al. 2010, Nature Methods 7, 377, with pixels of Gaussian noise.
     pub fn of_spot(
         spot_sigma_px: f64,
         offset_px: [f64; 2],
@@ -42,7 +44,7 @@ impl CramerRao {
             for &[share_x, slope_x] in &columns {
                 let share = share_x * share_y;
                 let variance_e2 = background_variance_e2 + flux_e * share;
-                // Of a pixel without noise there is nothing to add where it has no light either.
+                // A pixel without noise has no light either: it adds nothing.
                 if variance_e2 > 0.0 {
                     let by_place = flux_e * Vector3::new(slope_x * share_y, share_x * slope_y, 0.0);
                     let gradient = by_place + Vector3::new(0.0, 0.0, share);
@@ -60,7 +62,8 @@ impl CramerRao {
     }
 }
 
-/// The part of the light in a pixel whose middle is `offset_px` from the spot's, and its change as the spot moves on.
+/// The fraction of the light in a pixel at `offset_px` from the centre of the spot, and its
+/// derivative with respect to the spot's position.
 fn share_and_slope(offset_px: f64, sigma_px: f64) -> [f64; 2] {
     let [low, high] = [-0.5, 0.5].map(|half| (offset_px + half) / sigma_px);
     [
@@ -73,7 +76,7 @@ fn share_and_slope(offset_px: f64, sigma_px: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// The mean square of σ over places in a pixel, its root.
+    /// Root mean square of σ over positions in a pixel.
     fn mean_sigma_px(spot_sigma_px: f64, flux_e: f64, variance_e2: f64) -> f64 {
         let places = (0..400).map(|i| [i % 20, i / 20].map(|n| (f64::from(n) + 0.5) / 20.0 - 0.5));
         let bound = |place| CramerRao::of_spot(spot_sigma_px, place, flux_e, variance_e2);
@@ -97,7 +100,8 @@ mod tests {
 
     #[test]
     fn the_bounds_are_those_computed_elsewhere() {
-        // Background 100 e, read noise 5 e: (σ, F, bound), four digits from an independent computation.
+        // Background 100 e, read noise 5 e: (σ, F, bound), four digits from an independent
+        // computation.
         for (sigma, flux_e, expected) in [
             (0.5, 240.0, 0.0943),
             (0.7, 1217.0, 0.0376),

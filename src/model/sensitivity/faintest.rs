@@ -1,36 +1,37 @@
-//! The faintest star to be expected among those of a field.
+//! Expected magnitude of the faintest detected star of a field.
 //!
-//! The faintest of many stars lies beyond the limit: among enough faint ones some are lifted by the noise. What is found is to be
-//! held against this, and not against the limit.
+//! The faintest of many stars lies beyond the limit, as noise lifts some of the fainter ones. An
+//! observed faintest star is to be compared with this expectation, not with the limit.
 
 use super::completeness::Detector;
 use serde::Serialize;
 
-/// The faintest star that will be found.
+/// The faintest star that will be detected.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Faintest {
-    /// Its expected V magnitude, if any star is found at all.
+    /// Expected V magnitude, given that any star is detected.
     pub mean_vmag: f64,
-    /// The standard deviation of that over repetitions.
+    /// Its standard deviation over repetitions.
     pub sigma_mag: f64,
-    /// How many stars will be found on average.
+    /// Expected number of detected stars.
     pub stars_found: f64,
 }
 
 impl Faintest {
-    /// Of the stars with these V magnitudes, each once; none where there is hardly a star to be found.
+    /// Among stars of these V magnitudes, each once; none if a detection is unlikely.
     pub fn among(v_mags: impl IntoIterator<Item = f64>, detector: &Detector) -> Option<Self> {
         let found = |v_mag| (v_mag, detector.probability(v_mag));
         Self::of(v_mags.into_iter().map(found))
     }
 
-    /// Of stars with these V magnitudes and probabilities to be found, each once; none where there is hardly a star to be found.
+    /// Among stars given by V magnitude and detection probability, each once; none if a detection
+    /// is unlikely.
     pub fn of(stars: impl IntoIterator<Item = (f64, f64)>) -> Option<Self> {
         let found = |(v_mag, probability)| (v_mag, probability, 1.0);
         Self::from_chances(stars.into_iter().map(found).collect(), |chance, _| chance)
     }
 
-    /// In a field that holds a `part` of a sky with stars of these V magnitudes, anywhere.
+    /// In a field that covers a fraction `part` of a sky with stars of these V magnitudes.
     pub fn in_part_of_sky(
         v_mags: impl IntoIterator<Item = f64>,
         part: f64,
@@ -41,17 +42,17 @@ impl Faintest {
         Self::from_chances(v_mags.into_iter().map(found).collect(), any)
     }
 
-    /// From magnitude, chance to be found and mean number of each star; `any` makes of the latter two the chance that at
-    /// least one is found.
+    /// From magnitude, detection probability and mean number of each star; `any` combines the
+    /// latter two into the probability of at least one detection.
     fn from_chances(
         mut stars: Vec<(f64, f64, f64)>,
         any: impl Fn(f64, f64) -> f64,
     ) -> Option<Self> {
-        /// Below this the rest of the stars does not matter.
+        /// Remaining probability at which the sum stops.
         const NEGLIGIBLE: f64 = 1e-12;
         stars.sort_by(|a, b| b.0.total_cmp(&a.0));
         let stars_found = stars.iter().map(|(_, chance, mean)| chance * mean).sum();
-        // The probability that nothing fainter is found.
+        // Probability that nothing fainter is detected.
         let mut none_yet = 1.0;
         let (mut total, mut sum, mut squares) = (0.0, 0.0, 0.0);
         for (v_mag, chance, mean) in stars {
@@ -87,7 +88,7 @@ mod tests {
         Detector::new(Rule::MatchedFilter, &scenario, &Budget::new(&scenario))
     }
 
-    /// So many stars brighter than the limit, ten times as many for two magnitudes.
+    /// This number of stars brighter than the limit, ten times as many per two magnitudes.
     fn stars(count: usize, limit: f64) -> Vec<f64> {
         let deepest = (1.5 * 0.5 * 10f64.ln()).exp() * count as f64;
         let star = |i: usize| limit + 2.0 * ((i as f64 + 0.5) / count as f64).log10();
@@ -122,7 +123,8 @@ mod tests {
             let found = Faintest::among(stars(count, limit), &detector).unwrap();
             found.mean_vmag - limit
         };
-        // With 20 and 500 stars to the limit, 0.42 and 1.19 mag by simulation for a matched filter and a steeper law.
+        // With 20 and 500 stars to the limit, 0.42 and 1.19 mag by simulation for a matched filter
+        // and a steeper law.
         let (few, many) = (beyond(20), beyond(500));
         assert!(
             (0.1..0.7).contains(&few) && many > few + 0.2,

@@ -1,38 +1,37 @@
-//! The paper's eleven figures: the limiting magnitude over one parameter after the other.
+//! The eleven figures of the paper: the limiting magnitude over one parameter each.
 //!
-//! Each has two curves, for exposures of 0.04 s and 0.5 s; that over the exposure has them for apertures of 100 mm and
-//! 50 mm. The scan of the paper has lost the curves and the ends of their axes: the ranges here are chosen so that what its text
-//! says of them can be seen.
+//! Each has two curves, for exposures of 0.04 s and 0.5 s; the figure over the exposure has them
+//! for apertures of 100 mm and 50 mm. In the available scan of the paper the curves and the ends of
+//! the axes are lost: the ranges here are chosen to show what its text describes.
 //!
-//! # Reference
-//! Tong, Li & Wang 2014, section 3, figures 3 and 4.
+//! # Reference Tong, Li & Wang 2014, section 3, figures 3 and 4.
 
 use super::check::ScenarioError;
 use super::scenario::Scenario;
 use super::sweep::{Curve, Series, Spacing, Sweep, SweepError, curves};
 
-/// Values along a figure's axis.
+/// Number of values along a figure's axis.
 const VALUES: usize = 96;
 
-/// One of the paper's figures.
+/// A figure of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Figure {
-    /// Its number and letter in the paper: `3a`.
+    /// Number and letter in the paper: `3a`.
     pub id: &'static str,
-    /// What it shows, in words.
+    /// Title.
     pub title: &'static str,
-    /// The name of the parameter along its axis.
+    /// Name of the parameter along the axis.
     pub parameter: &'static str,
     /// First and last value of the parameter.
     pub range: (f64, f64),
-    /// How the values lie.
+    /// Spacing of the values.
     pub spacing: Spacing,
-    /// What tells its curves apart.
+    /// The parameter that differs between the curves.
     pub series: Series,
 }
 
 impl Figure {
-    /// The eleven.
+    /// All eleven figures.
     pub const ALL: [Self; 11] = [
         Self::over("3a", "Lens transmission", "lens_transmission", (0.1, 1.0)),
         Self::over("3b", "Aperture", "aperture_mm", (5.0, 200.0)),
@@ -89,7 +88,7 @@ impl Figure {
         }
     }
 
-    /// The name of a file of it, without an extension: `figure-3b-aperture`.
+    /// Name of its file without extension: `figure-3b-aperture`.
     pub fn file_stem(&self) -> String {
         let words: Vec<String> = self
             .title
@@ -100,18 +99,17 @@ impl Figure {
         format!("figure-{}-{}", self.id, words.join("-"))
     }
 
-    /// The values along its axis.
+    /// The values along the axis.
     ///
-    /// # Errors
-    /// None for the figures of [`Self::ALL`].
+    /// # Errors None for the figures of [`Self::ALL`].
     pub fn sweep(&self) -> Result<Sweep, SweepError> {
         Sweep::new(self.parameter, self.range, VALUES, self.spacing)
     }
 
-    /// Its curves for the camera and the conditions of `base`, all else as there.
+    /// The curves for the camera and the conditions of `base`.
     ///
     /// # Errors
-    /// [`ScenarioError`] where there is no limit for a value.
+    /// [`ScenarioError`] if a value has no limit.
     pub fn curves(&self, base: &Scenario, sweep: &Sweep) -> Result<Vec<Curve>, ScenarioError> {
         curves(base, sweep, &self.series)
     }

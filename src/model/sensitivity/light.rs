@@ -1,7 +1,7 @@
-//! Photons and lux of a star and of the sky.
+//! Photometric constants and black bodies: photons and lux of a star and of the sky.
 //!
-//! The functions of the mathematical library are those of [`libm`], here and wherever simulated frames depend on them: the same on
-//! every machine.
+//! Mathematical functions are those of [`libm`], here and wherever simulated frames depend on them:
+//! the same on every machine.
 
 use crate::camera::data_sheet::Response;
 
@@ -11,32 +11,35 @@ pub(super) const ILLUMINANCE_OF_MAG_0_LX: f64 = 2.65e-6;
 /// Photons of a star of V = 0 above the atmosphere in the paper's band, per second and m² (eq. 4).
 #[doc(alias = "Phi_0")]
 pub(super) const PAPER_PHOTONS_OF_MAG_0: f64 = 5e10;
-/// First and last wavelength of the paper's table 1, in nm.
+/// First and last wavelength of table 1 of the paper, in nm.
 pub(super) const PAPER_BAND_NM: (f64, f64) = (360.0, 780.0);
-/// The paper's ratio of brightness between magnitudes (eqs. 1, 5).
+/// Brightness ratio of one magnitude in the paper (eqs. 1, 5).
 pub(super) const PAPER_MAG_RATIO: f64 = 2.512;
-/// Luminance of a sky of one star of V = 0 in each square arcsecond, in cd/m².
+/// Luminance of a sky of V = 0 per square arcsecond, in cd/m².
 const LUMINANCE_OF_MAG_0_CD_M2: f64 = 10.8e4;
 
-/// Photons of a star of V = 0 above the atmosphere at [`FLUX_NM`], per second, m² and nm: 1005 per second, cm² and Å.
+/// Photons of a star of V = 0 above the atmosphere at [`FLUX_NM`], per second, m² and nm: 1005 per
+/// second, cm² and Å.
 ///
-/// 3.63e-9 erg s⁻¹ cm⁻² Å⁻¹ over the energy of a photon (Bessell, Castelli & Plez 1998, A&A 333, 231, table A2).
+/// 3.63e-9 erg s⁻¹ cm⁻² Å⁻¹ over the energy of a photon (Bessell, Castelli & Plez 1998, A&A 333,
+/// 231, table A2).
 const PHOTONS_OF_MAG_0: f64 = 1005.0 * 1e4 * 10.0;
 const FLUX_NM: f64 = 550.0;
-/// Colour temperature of the night sky: moonlight is sunlight.
+/// Colour temperature of the night sky, assumed to be sunlight reflected by the Moon.
 pub(super) const SKY_TEMPERATURE_K: f64 = 5800.0;
 
-/// V magnitudes in a square arcsecond of a luminance in cd/m².
+/// V magnitudes per square arcsecond of a luminance in cd/m².
 pub(super) fn mag_arcsec2(luminance_cd_m2: f64) -> f64 {
     -2.5 * libm::log10(luminance_cd_m2 / LUMINANCE_OF_MAG_0_CD_M2)
 }
 
-/// Luminance in cd/m² of a sky of so many V magnitudes in a square arcsecond.
+/// Luminance in cd/m² of a brightness in V magnitudes per square arcsecond.
 pub(super) fn luminance_cd_m2(mag_arcsec2: f64) -> f64 {
     LUMINANCE_OF_MAG_0_CD_M2 * libm::pow(10.0, -0.4 * mag_arcsec2)
 }
 
-/// Photons per second, m² and nm at a wavelength in nm, of a black body of V = 0 above the atmosphere.
+/// Photons per second, m² and nm at a wavelength in nm, of a black body of V = 0 above the
+/// atmosphere.
 pub(super) fn photons_of_mag_0(wavelength_nm: f64, temperature_k: f64) -> f64 {
     /// hc/k, in nm K.
     const SECOND_RADIATION_CONSTANT: f64 = 1.438_776_877e7;
@@ -47,23 +50,21 @@ pub(super) fn photons_of_mag_0(wavelength_nm: f64, temperature_k: f64) -> f64 {
     PHOTONS_OF_MAG_0 * photons(wavelength_nm) / photons(FLUX_NM)
 }
 
-/// The colours B−V that stars have, in magnitudes.
+/// Range of the colours B−V of stars, in magnitudes.
 pub(super) const BV_RANGE_MAG: (f64, f64) = (-0.35, 2.0);
 
-/// The temperature in kelvin of the black body that has this B−V, in magnitudes; beyond the colours that stars have, that of the
-/// last of them.
+/// Temperature in kelvin of the black body of this B−V, which is clamped to the range of stars.
 ///
-/// # Reference
-/// Ballesteros 2012, EPL 97, 34008, eq. 14: within 2 % of stars' effective temperatures.
+/// # Reference Ballesteros 2012, EPL 97, 34008, eq. 14: within 2 % of stars' effective
+/// temperatures.
 pub fn temperature_k_of(bv_mag: f64) -> f64 {
     let scaled = 0.92 * bv_mag.clamp(BV_RANGE_MAG.0, BV_RANGE_MAG.1);
     4600.0 * (1.0 / (scaled + 1.7) + 1.0 / (scaled + 0.62))
 }
 
-/// The sensitivity of the eye by wavelength.
+/// Luminous efficiency of the eye by wavelength.
 ///
-/// # Reference
-/// Tong, Li & Wang 2014, table 1.
+/// # Reference Tong, Li & Wang 2014, table 1.
 #[doc(alias = "S_e")]
 pub(super) fn luminous_efficiency() -> Vec<(f64, f64)> {
     let table = include_bytes!("luminous-efficiency.csv");
@@ -88,8 +89,8 @@ mod tests {
 
     #[test]
     fn photons_of_black_bodies_are_those_of_the_literature() {
-        // Totals of 400 to 900 nm for V = 0, in photons per second and m²: 4.2e10 at 9600 K, 4.7e10 at 5800 K, 6.4e10 at
-        // 4000 K, to the two digits given.
+        // Totals of 400 to 900 nm for V = 0, in photons per second and m²: 4.2e10 at 9600 K, 4.7e10
+        // at 5800 K, 6.4e10 at 4000 K, to the two digits given.
         for (temperature_k, expected) in [(9600.0, 4.2e10), (5800.0, 4.7e10), (4000.0, 6.4e10)] {
             let total: f64 = (400..900)
                 .map(|nm| photons_of_mag_0(f64::from(nm) + 0.5, temperature_k))

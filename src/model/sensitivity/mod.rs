@@ -1,23 +1,25 @@
-//! From a camera, a sky and an exposure to the faintest star that can be detected.
+//! How faint a star can a camera detect?
 //!
-//! [`Scenario`] → [`Budget`]: every quantity between the star and the limiting magnitude, each with its unit.
+//! [`Scenario`] (camera, sky, exposure) → [`Budget`] (every quantity up to the limiting magnitude)
+//! → [`Prediction`]
 //!
-//! 1. [`Atmosphere`](Conditions): what is left of the light at each wavelength and zenith distance.
-//! 2. The star's electrons on its brightest pixel, and those of the sky, for a star of magnitude 0.
-//! 3. The noise, and the signal that stands above it by the wanted ratio: the limiting magnitude of the peak-pixel rule.
-//! 4. [`Detector`]: what a detector makes of it, the peak-pixel rule and the matched filter as built: completeness.
-//! 5. [`Faintest`]: the faintest star to be expected among so many.
-//! 6. [`StarLight`]: the electrons of stars of all colours.
-//! 7. [`CramerRao`]: how well a star's place and light can be known at best.
+//! 1. Transmission of the atmosphere by wavelength and zenith distance ([`Extinction`]).
+//! 2. Electrons of a star of magnitude 0 on its brightest pixel, and of the sky in a pixel.
+//! 3. Noise, and the limiting magnitude of the peak-pixel rule: the star with the required SNR in
+//! its brightest pixel ([`Budget`]).
+//! 4. Threshold, false alarms and completeness of two detectors: the peak-pixel rule and the
+//! matched filter of [`detect`](crate::detect::detect) ([`Detector`]).
+//! 5. Expected magnitude of the faintest detected star of a field ([`Faintest`]).
+//! 6. Electrons of stars by colour ([`StarLight`]).
+//! 7. Lower bounds of the errors of position and flux ([`CramerRao`]).
 //!
-//! [`Prediction`] is what is told of a scenario, [`Sweep`] and [`curves`] follow its limit over one parameter, and [`Figure`]
-//! has those of the paper.
+//! [`Prediction`] is the result for one scenario, [`Sweep`] and [`curves`] vary one parameter, and
+//! [`Figure`] has the figures of the paper.
 //!
-//! There are two readings. [`Reading::Paper`] is the paper's equations (1) to (12) as its authors used them.
-//! [`Reading::Physical`] is the same budget with the physics put right.
+//! There are two sets of equations. [`Reading::Paper`] has equations (1) to (12) of the paper as
+//! its authors used them. [`Reading::Physical`] corrects their physics.
 //!
-//! # Reference
-//! Tong, Li & Wang 2014, Acta Optica Sinica 34, 1004003, doi 10.3788/AOS201434.1004003.
+//! # Reference Tong, Li & Wang 2014, Acta Optica Sinica 34, 1004003, doi 10.3788/AOS201434.1004003.
 
 mod budget;
 mod check;

@@ -1,10 +1,11 @@
-//! The parameters of a scenario by name: the camera's and the conditions' in one list.
+//! The parameters of a scenario by name: those of the camera and of the conditions in one list.
 
 use super::conditions::{Conditions, Extinction, REFERENCE_NM, SkyBrightness};
 use super::scenario::Scenario;
 use crate::camera::data_sheet::{DataSheet, KEYS, Key, Limits, key, nearest_name};
 
-/// The numbers of [`Conditions`]. Of those that say the same thing in other units the last one given holds.
+/// The numbers in [`Conditions`]. Of several that state the same quantity in different units, the
+/// last one given counts.
 pub const CONDITION_KEYS: &[Key<Conditions>] = &[
     key!(exposure_s, Limits::Positive, "exposure, in seconds"),
     key!(
@@ -72,7 +73,7 @@ pub const CONDITION_KEYS: &[Key<Conditions>] = &[
     ),
 ];
 
-/// One more number of a camera, for sweeps: pixels of another size under the same spot.
+/// Pixel area, for sweeps: pixels of another size under the same spot.
 const PIXEL_AREA: Key<DataSheet> = Key {
     name: "pixel_area_um2",
     about: "area of a pixel, in µm²; its form and the spot's size in µm stay",
@@ -83,12 +84,12 @@ const PIXEL_AREA: Key<DataSheet> = Key {
         sheet.pitch_x_um *= factor.sqrt();
         sheet.pitch_y_um *= factor.sqrt();
         sheet.spot_sigma_px /= factor.sqrt();
-        // μ is the pixel's part of the spot's area, and at most all of it.
+        // μ is proportional to the pixel area, and at most 1.
         sheet.peak_share = sheet.peak_share.map(|share| (share * factor).min(1.0));
     },
 };
 
-/// How names end, and the unit that stands for. An ending comes before those that it ends in itself.
+/// Suffix of a name and its unit. A suffix stands before the shorter ones that it ends in.
 const UNITS: &[(&str, &str)] = &[
     ("_mag_per_airmass", "mag / airmass"),
     ("_mag_arcsec2", "V mag / square arcsec"),
@@ -113,7 +114,7 @@ const UNITS: &[(&str, &str)] = &[
     ("_k", "K"),
 ];
 
-/// What an axis of the parameter called `name` is called: `focal length (mm)`.
+/// Title of an axis of the parameter called `name`: `focal length (mm)`.
 pub fn title_of(name: &str) -> String {
     match unit_of(name) {
         "" => quantity_of(name),
@@ -137,24 +138,24 @@ fn quantity_of(name: &str) -> String {
 /// A parameter of a [`Scenario`].
 #[derive(Debug, Clone, Copy)]
 pub enum Parameter {
-    /// One of the camera.
+    /// A parameter of the camera.
     Camera(&'static Key<DataSheet>),
-    /// One of the conditions.
+    /// A parameter of the conditions.
     Conditions(&'static Key<Conditions>),
 }
 
-/// A name that no parameter has.
+/// There is no parameter of this name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("'{name}' is no parameter{}", match .nearest { Some(known) => format!("; did you mean '{known}'?"), None => String::new() })]
 pub struct UnknownParameter {
     /// The name.
     pub name: String,
-    /// The one that may have been meant.
+    /// The most similar name.
     pub nearest: Option<&'static str>,
 }
 
 impl UnknownParameter {
-    /// What `name` is, and what of `names` it may have been meant to be.
+    /// The error for `name`, with the most similar one of `names`.
     pub fn among(name: &str, names: impl Iterator<Item = &'static str>) -> Self {
         Self {
             name: name.to_owned(),
@@ -164,7 +165,7 @@ impl UnknownParameter {
 }
 
 impl Parameter {
-    /// All of them, the camera's first.
+    /// All parameters, the camera's first.
     pub fn all() -> impl Iterator<Item = Self> {
         let sheet = KEYS.iter().chain([&PIXEL_AREA]).map(Self::Camera);
         sheet.chain(CONDITION_KEYS.iter().map(Self::Conditions))
@@ -173,13 +174,13 @@ impl Parameter {
     /// The parameter called `name`.
     ///
     /// # Errors
-    /// [`UnknownParameter`] with the nearest name there is.
+    /// [`UnknownParameter`] with the most similar name.
     pub fn named(name: &str) -> Result<Self, UnknownParameter> {
         let found = Self::all().find(|parameter| parameter.name() == name);
         found.ok_or_else(|| UnknownParameter::among(name, Self::all().map(Self::name)))
     }
 
-    /// Its name, which ends in its unit.
+    /// Name, which ends in the unit.
     pub fn name(self) -> &'static str {
         match self {
             Self::Camera(key) => key.name,
@@ -187,7 +188,7 @@ impl Parameter {
         }
     }
 
-    /// What it is, in a line.
+    /// Description in one line.
     pub fn about(self) -> &'static str {
         match self {
             Self::Camera(key) => key.about,
@@ -195,22 +196,22 @@ impl Parameter {
         }
     }
 
-    /// The unit of its values, as people write it; empty where it is a pure number.
+    /// Unit as printed; empty for a dimensionless number.
     pub fn unit(self) -> &'static str {
         unit_of(self.name())
     }
 
-    /// Its name without the unit, in words: `focal length`.
+    /// Name without the unit, in words: `focal length`.
     pub fn quantity(self) -> String {
         quantity_of(self.name())
     }
 
-    /// What an axis of it is called: `focal length (mm)`.
+    /// Title of its axis: `focal length (mm)`.
     pub fn title(self) -> String {
         title_of(self.name())
     }
 
-    /// What values make sense.
+    /// Valid values.
     pub fn limits(self) -> Limits {
         match self {
             Self::Camera(key) => key.limits,
@@ -218,7 +219,7 @@ impl Parameter {
         }
     }
 
-    /// Its value, where it has one.
+    /// Value, if it has one.
     pub fn get(self, scenario: &Scenario) -> Option<f64> {
         match self {
             Self::Camera(key) => (key.get)(&scenario.camera),
@@ -226,7 +227,7 @@ impl Parameter {
         }
     }
 
-    /// Gives it a value within the limits.
+    /// Sets a value, which must be within the limits.
     pub fn set(self, scenario: &mut Scenario, value: f64) {
         match self {
             Self::Camera(key) => (key.set)(&mut scenario.camera, value),

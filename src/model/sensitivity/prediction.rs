@@ -1,4 +1,4 @@
-//! What is told of a scenario: its limit, the parameters it follows from, and all that lies between.
+//! The prediction for a scenario: its limit, the parameters, and all intermediate quantities.
 
 use super::budget::Budget;
 use super::check::ScenarioError;
@@ -7,65 +7,66 @@ use super::parameters::Parameter;
 use super::scenario::{Reading, Scenario};
 use serde::{Serialize, Serializer};
 
-/// The limit of a scenario with everything it follows from. The first fields are those that other programs build on.
+/// Limiting magnitude of a scenario and everything that it follows from. Other programs read the
+/// first fields.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Prediction {
-    /// Johnson V of the faintest star with the wanted ratio of signal to noise in its brightest pixel.
+    /// V magnitude of the faintest star with the required SNR in its brightest pixel.
     pub limit_vmag: f64,
-    /// That star's electrons on its brightest pixel.
+    /// Electrons of that star on its brightest pixel.
     pub star_e: f64,
-    /// Electrons of the sky in a pixel.
+    /// Sky electrons per pixel.
     pub background_e: f64,
-    /// All noise of the brightest pixel, in electrons.
+    /// Total noise of the brightest pixel, in electrons.
     pub noise_e: f64,
-    /// Signal over noise in the brightest pixel.
+    /// Signal-to-noise ratio of the brightest pixel.
     pub snr: f64,
-    /// Thickness of the air in units of that at the zenith.
+    /// Airmass.
     pub airmass: f64,
-    /// Every parameter that has a value, by name.
+    /// Name and value of every parameter that has a value.
     #[serde(serialize_with = "as_map")]
     pub parameters: Vec<(&'static str, f64)>,
-    /// Which equations.
+    /// Set of equations.
     pub reading: Reading,
-    /// What the camera is called.
+    /// Name of the camera.
     pub camera: String,
-    /// What the matched filter of [`detect`](crate::detect::detect) finds.
+    /// Performance of the matched filter of [`detect`](crate::detect::detect).
     pub detector: DetectorReport,
-    /// What the rule of the brightest pixel finds.
+    /// Performance of the peak-pixel rule.
     pub peak_pixel: DetectorReport,
-    /// All that lies between.
+    /// All intermediate quantities.
     pub budget: Budget,
 }
 
-/// What a detector finds: three views of one threshold.
+/// Performance of a detector: limits, threshold, false alarms and completeness.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DetectorReport {
-    /// What a star must do to be found.
+    /// Detection rule.
     pub rule: Rule,
-    /// V magnitude at which half of the stars are found; none where the noise alone is found more often.
+    /// V magnitude of 50 % completeness; none where noise alone is detected more often.
     pub limit50_vmag: Option<f64>,
-    /// V magnitude at which nine in ten are found; none as well.
+    /// V magnitude of 90 % completeness; none likewise.
     pub limit90_vmag: Option<f64>,
-    /// The threshold, in standard deviations of the (filtered) noise without a star.
+    /// Threshold in standard deviations of the (filtered) background noise.
     pub threshold_sigma: f64,
-    /// False detections in a million pixels without a star.
+    /// False detections per million pixels.
     pub false_alarms_per_mpx: f64,
-    /// The part of the stars that is found, by V magnitude, around the first of these limits that there is.
+    /// Completeness by V magnitude, around the first of these limits that exists.
     pub completeness: Vec<CompletenessPoint>,
 }
 
-/// A point of a curve of completeness.
+/// A point of the completeness curve.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CompletenessPoint {
-    /// V magnitude of the stars.
+    /// V magnitude.
     pub vmag: f64,
-    /// The part of them that is found.
+    /// Fraction of the stars that is detected.
     pub part: f64,
 }
 
-/// The curve of completeness spans so many magnitudes on either side of the limit, ...
+/// Half width of the completeness curve, in magnitudes.
 const CURVE_REACH_MAG: f64 = 1.2;
-/// ... in steps of this size.
+/// Step of the completeness curve, in magnitudes.
 const CURVE_STEP_MAG: f64 = 0.1;
 
 impl DetectorReport {
@@ -75,7 +76,7 @@ impl DetectorReport {
         let steps = (CURVE_REACH_MAG / CURVE_STEP_MAG).round() as i32;
         let point = |around: f64, step: i32| {
             let middle = (around / CURVE_STEP_MAG).round();
-            // Divided, and not multiplied, so that 8.3 is 8.3.
+            // A division, so that 8.3 is exactly 8.3.
             let vmag = (middle + f64::from(step)) / (1.0 / CURVE_STEP_MAG).round();
             CompletenessPoint {
                 vmag,
@@ -109,15 +110,14 @@ impl Prediction {
     /// The prediction for a scenario.
     ///
     /// # Errors
-    /// [`ScenarioError`] where the scenario makes no sense or has no limit.
+    /// [`ScenarioError`] if the scenario is invalid or has no limit.
     pub fn new(scenario: &Scenario) -> Result<Self, ScenarioError> {
         Self::with_detector(scenario).map(|(prediction, _)| prediction)
     }
 
-    /// The same, and the matched filter that it tells of.
+    /// The prediction, and the matched filter it describes.
     ///
-    /// # Errors
-    /// As [`Self::new`].
+    /// # Errors As [`Self::new`].
     pub fn with_detector(scenario: &Scenario) -> Result<(Self, Detector), ScenarioError> {
         let budget = Budget::checked(scenario)?;
         let detector = Detector::new(Rule::MatchedFilter, scenario, &budget);

@@ -4,29 +4,29 @@ use super::conditions::{Conditions, SkyBrightness};
 use crate::camera::data_sheet::{DataSheet, Preset};
 use serde::Serialize;
 
-/// Which equations.
+/// Set of equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Reading {
-    /// The paper's, as its authors used them.
+    /// Those of the paper, as its authors used them.
     Paper,
-    /// With the physics put right.
+    /// Those of the paper with corrected physics.
     Physical,
 }
 
-/// A camera under conditions, and how to reckon.
+/// A camera, its observing conditions, and the equations to use.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// The camera.
     pub camera: DataSheet,
     /// The conditions.
     pub conditions: Conditions,
-    /// Which equations.
+    /// Set of equations.
     pub reading: Reading,
 }
 
 impl Scenario {
-    /// A camera under the default conditions, in the physical reading.
+    /// A camera under default conditions, with [`Reading::Physical`].
     pub fn new(camera: DataSheet) -> Self {
         Self {
             camera,
@@ -35,8 +35,8 @@ impl Scenario {
         }
     }
 
-    /// The scenario of a preset: the paper's experiments as the paper has them, other cameras under the default conditions but
-    /// for the exposure.
+    /// The scenario of a preset: the experiments of the paper with their own conditions and
+    /// [`Reading::Paper`], other cameras under default conditions except for the exposure.
     pub fn of(preset: Preset) -> Self {
         let paper = |exposure_s, zenith_distance_deg| Self {
             camera: preset.data_sheet(),

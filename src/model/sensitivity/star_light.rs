@@ -3,21 +3,22 @@
 use super::light::{BV_RANGE_MAG, temperature_k_of};
 use super::{Budget, Reading, Scenario};
 
-/// Between colours so far apart, in magnitudes, the light is interpolated: to better than 10⁻⁵.
+/// Step of the colour table, in magnitudes: linear interpolation is accurate to 10⁻⁵.
 const STEP_MAG: f64 = 0.01;
 
-/// What stars of all colours leave on a detector.
+/// Electrons that stars of any colour leave on a detector.
 #[derive(Debug, Clone)]
 pub struct StarLight {
     budget: Budget,
     exposure_s: f64,
-    /// Light of a star of V = 0 at colours in steps of [`STEP_MAG`], in units of that of the scenario's own star; empty where the
-    /// reading knows no colours.
+    /// Light of a star of V = 0 at colours in steps of [`STEP_MAG`], relative to that of the
+    /// scenario's star; empty for [`Reading::Paper`], which has no colours.
     relative: Vec<f64>,
 }
 
 impl StarLight {
-    /// The light of stars under `scenario`, which [`Scenario::check`] has found sound. Only [`Reading::Physical`] knows colours.
+    /// The light of stars in a scenario that passes [`Scenario::check`]. Only [`Reading::Physical`]
+    /// distinguishes colours.
     pub fn new(scenario: &Scenario) -> Self {
         let budget = Budget::new(scenario);
         let (bluest, reddest) = BV_RANGE_MAG;
@@ -44,20 +45,20 @@ impl StarLight {
         &self.budget
     }
 
-    /// Electrons, on all its pixels, of a star of this V magnitude and, where it is known, B−V; else it has the scenario's
-    /// temperature.
+    /// Electrons, on all its pixels, of a star of this V magnitude and B−V; without B−V, of the
+    /// scenario's temperature.
     pub fn electrons(&self, v_mag: f64, bv_mag: Option<f64>) -> f64 {
         let of_scenario = self.budget.electrons_of(v_mag, self.exposure_s);
         of_scenario * bv_mag.map_or(1.0, |bv_mag| self.relative(bv_mag))
     }
 
-    /// How much fainter in V than a star of the scenario's temperature one of this B−V may be to leave as many electrons, in
-    /// magnitudes.
+    /// Magnitude offset in V at which a star of this B−V leaves as many electrons as one of the
+    /// scenario's temperature; positive if fainter.
     pub fn color_effect_mag(&self, bv_mag: f64) -> f64 {
         2.5 * self.relative(bv_mag).log10()
     }
 
-    /// The V magnitude at which a star of the scenario's temperature leaves so many electrons.
+    /// V magnitude at which a star of the scenario's temperature leaves this number of electrons.
     pub fn vmag_of(&self, electrons: f64) -> f64 {
         self.budget.vmag_of(electrons, self.exposure_s)
     }
@@ -92,7 +93,7 @@ mod tests {
                 "{bv_mag}: {found} {expected}"
             );
         }
-        // Beyond the colours that stars have: those of the last.
+        // Colours beyond the range are clamped.
         assert_eq!(
             light.electrons(5.0, Some(9.0)),
             light.electrons(5.0, Some(2.0))

@@ -1,4 +1,4 @@
-//! One parameter after its other values, all else as it is.
+//! Sweeps: the limiting magnitude over one parameter, the others constant.
 
 use super::budget::Budget;
 use super::check::ScenarioError;
@@ -7,18 +7,18 @@ use super::scenario::Scenario;
 use crate::camera::data_sheet::Limits;
 use std::cmp::Ordering;
 
-/// How values lie between the first and the last.
+/// Spacing of values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spacing {
-    /// The same difference from each to the next.
+    /// Constant difference.
     Linear,
-    /// The same ratio.
+    /// Constant ratio.
     Log,
 }
 
 impl Spacing {
-    /// `count` values from `from` to `to`, both among them; in logarithmic spacing both are above 0. Decimal fractions look
-    /// like themselves: 12 digits are kept.
+    /// `count` values from `from` to `to`, both included; for logarithmic spacing both must be
+    /// above 0. Values are rounded to 12 digits, so that decimal fractions print as such.
     pub fn values(self, from: f64, to: f64, count: usize) -> Vec<f64> {
         let last = count.max(2) - 1;
         let value = |i: usize| {
@@ -38,10 +38,9 @@ impl Spacing {
 }
 
 impl Spacing {
-    /// [`Self::values`] of a sweep that is one.
+    /// [`Self::values`] with checked arguments.
     ///
-    /// # Errors
-    /// [`SweepError::Count`], [`SweepError::Backwards`], [`SweepError::LogOfNothing`].
+    /// # Errors [`SweepError::Count`], [`SweepError::Backwards`], [`SweepError::LogOfNothing`].
     pub fn checked_values(
         self,
         (from, to): (f64, f64),
@@ -50,7 +49,7 @@ impl Spacing {
         if !(2..=Sweep::MAX_VALUES).contains(&count) {
             return Err(SweepError::Count { count });
         }
-        // NaN does not rise either.
+        // Also refuses NaN.
         if from.partial_cmp(&to) != Some(Ordering::Less) {
             return Err(SweepError::Backwards { from, to });
         }
@@ -61,10 +60,10 @@ impl Spacing {
     }
 }
 
-/// `value` to the twelfth digit of `size`.
+/// `value`, rounded to the twelfth digit of `size`.
 fn rounded_as(value: f64, size: f64) -> f64 {
     let decimals = (11.0 - size.log10().floor()).max(0.0) as usize;
-    // Through decimal digits: a product with a power of ten is not exact.
+    // Via decimal digits, as a product with a power of ten is not exact.
     format!("{value:.decimals$}").parse().unwrap_or(value)
 }
 
@@ -73,26 +72,26 @@ fn rounded_as(value: f64, size: f64) -> f64 {
 pub struct Sweep {
     /// The parameter.
     pub parameter: Parameter,
-    /// Its values, rising.
+    /// Its values, increasing.
     pub values: Vec<f64>,
-    /// How they lie.
+    /// Their spacing.
     pub spacing: Spacing,
 }
 
-/// Why something is no sweep.
+/// Why a sweep is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SweepError {
-    /// No parameter has the name.
+    /// There is no parameter of this name.
     #[error(transparent)]
     Unknown(#[from] UnknownParameter),
-    /// It has no value, or one, or too many.
+    /// Fewer than two values, or too many.
     #[error("a sweep of {count} values, expected 2 to {}", Sweep::MAX_VALUES)]
     Count {
-        /// The values it would have.
+        /// Number of values.
         count: usize,
     },
-    /// It does not rise.
+    /// The values do not increase.
     #[error("the sweep runs from {from} to {to}, expected a rising one")]
     Backwards {
         /// The first value.
@@ -100,17 +99,17 @@ pub enum SweepError {
         /// The last value.
         to: f64,
     },
-    /// It has a value that the parameter cannot have.
+    /// A value is outside the parameter's limits.
     #[error("{name} would be {found}, expected {expected}")]
     Value {
         /// The parameter.
         name: &'static str,
         /// The value.
         found: f64,
-        /// What it may be.
+        /// Valid values.
         expected: Limits,
     },
-    /// Ratios need values above 0.
+    /// Logarithmic spacing needs values above 0.
     #[error("logarithmic steps from {from}, expected a start above 0")]
     LogOfNothing {
         /// The first value.
@@ -119,13 +118,14 @@ pub enum SweepError {
 }
 
 impl Sweep {
-    /// More values than this are a mistake.
+    /// Largest number of values.
     pub const MAX_VALUES: usize = 1000;
 
     /// `count` values of the parameter called `name`.
     ///
     /// # Errors
-    /// [`SweepError`]: an unknown name, a value outside the parameter's limits, a sweep that does not rise or is no sweep.
+    /// [`SweepError`] for an unknown name, a value outside the limits, or an invalid range or
+    /// count.
     pub fn new(
         name: &str,
         (from, to): (f64, f64),
@@ -149,10 +149,10 @@ impl Sweep {
         }
     }
 
-    /// `base` with each of the values, every one checked.
+    /// `base` with each of the values, all checked.
     ///
     /// # Errors
-    /// [`ScenarioError`] where a value contradicts what else is known.
+    /// [`ScenarioError`] if a value contradicts another parameter.
     pub fn scenarios(&self, base: &Scenario) -> Result<Vec<Scenario>, ScenarioError> {
         let scenario = |value: &f64| {
             let mut scenario = base.clone();
@@ -164,12 +164,12 @@ impl Sweep {
     }
 }
 
-/// What tells the curves of a figure apart: a parameter, and its value for each curve.
+/// The parameter that differs between the curves of a figure, and its values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Series {
-    /// The name of the parameter.
+    /// Name of the parameter.
     pub parameter: &'static str,
-    /// Its value for either curve.
+    /// Its value for each curve.
     pub values: [f64; 2],
 }
 
@@ -185,8 +185,8 @@ impl Series {
         values: [100.0, 50.0],
     };
 
-    /// As the paper chose them for its camera: the scenario's exposure and one 12.5 times as long; over the exposure, the
-    /// scenario's aperture and half of it.
+    /// The choice of the paper, applied to another camera: the scenario's exposure and one 12.5
+    /// times as long; over the exposure, the scenario's aperture and half of it.
     pub fn around(base: &Scenario, swept: Parameter) -> Self {
         if swept.name() == "exposure_s" {
             let aperture_mm = base.camera.aperture_mm;
@@ -203,19 +203,19 @@ impl Series {
     }
 }
 
-/// A line of a figure.
+/// A curve of a figure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// What tells it apart: `exposure 0.04 s`.
+    /// Label: `exposure 0.04 s`.
     pub label: String,
-    /// Value of the parameter, and limiting magnitude.
+    /// Values of the parameter and limiting magnitudes.
     pub points: Vec<(f64, f64)>,
 }
 
 /// The limiting magnitude over `sweep`, once for each value of `series`.
 ///
 /// # Errors
-/// [`ScenarioError`] where a value contradicts what else is known, or there is no limit.
+/// [`ScenarioError`] if a value contradicts another parameter or has no limit.
 pub fn curves(
     base: &Scenario,
     sweep: &Sweep,

@@ -1,6 +1,6 @@
-//! The electrons expected in each pixel.
+//! The expected electrons in each pixel.
 
-/// Row-major expected electrons.
+/// Expected electrons per pixel, row-major.
 #[derive(Debug, Clone)]
 pub(super) struct ElectronImage {
     width: usize,
@@ -8,7 +8,7 @@ pub(super) struct ElectronImage {
 }
 
 impl ElectronImage {
-    /// So many electrons in every pixel; both sides are at least 1.
+    /// An image with this number of electrons in every pixel; both sides are at least 1.
     pub(super) fn new(width: usize, height: usize, electrons: f64) -> Self {
         Self {
             width,
@@ -28,7 +28,7 @@ impl ElectronImage {
         &mut self.pixels[y * self.width..(y + 1) * self.width]
     }
 
-    /// The rows with their numbers, from the top.
+    /// Rows with their indices, from the top.
     pub(super) fn rows_mut(&mut self) -> impl Iterator<Item = (usize, &mut [f64])> {
         self.pixels.chunks_exact_mut(self.width).enumerate()
     }

@@ -1,21 +1,25 @@
-//! Frames with truth: what a camera would make of known stars.
+//! What frame would a camera record of known stars? Simulated frames with ground truth.
 //!
-//! [`Simulator`] of a [`Scenario`], a [`Scene`] and catalogue stars; [`Pointing`], seed → [`Frame`], [`Truth`]
+//! [`Setup`] (scenario, [`Scene`]), catalogue stars, [`Pointing`], seed → [`Simulator`] →
+//! [`Frame`](crate::frame::Frame), [`Truth`]
 //!
-//! 1. Each star's place on the detector, at the date, through the lens with its distortion; its expected electrons by the
-//!    sensitivity model ([`StarLight`]: magnitude and colour), less what clouds and vignetting take.
-//! 2. The sky in each pixel: even, with a gradient, moonlight, clouds.
-//! 3. Each star's spot, integrated over each pixel, along its way while the camera turns; trails of satellites likewise.
+//! 1. The position of each star on the detector at the date, through the lens with its distortion;
+//! its expected electrons by the sensitivity model
+//! ([`StarLight`](crate::model::sensitivity::StarLight): magnitude and colour), reduced by clouds
+//! and vignetting.
+//! 2. The sky in each pixel: uniform, with a gradient, moonlight, clouds.
+//! 3. The spot of each star, integrated over pixels, along its path while the camera turns;
+//! satellite trails likewise.
 //! 4. The response of each pixel, and its dark current.
-//! 5. Whole electrons (Poisson), cosmic rays, and what flows out of a full pixel.
-//! 6. What is read out: noise of reading, gain, bias, whole grey levels of so many bits.
+//! 5. Whole electrons (Poisson), cosmic rays, and blooming of full pixels.
+//! 6. Read-out: read noise, gain, bias, quantisation.
 //!
-//! The random numbers depend on the seed alone, those of the detector's pattern on the camera's own: the same frame on any
-//! number of threads. Where a function of the mathematical library decides, it is that of [`libm`], which is the same on
-//! every machine.
+//! Random numbers depend on the seed only, those of the detector's fixed pattern on the camera's
+//! pattern seed only: a frame is the same on any number of threads. Mathematical functions are
+//! those of [`libm`], so a frame is the same on every machine.
 //!
-//! Caveats: one spot for the whole field. Pixels are square ([`camera_of`]). A sky, a star and an angular rate do not vary
-//! during the exposure. Charge flows along columns only.
+//! Caveats: the spot is the same over the whole field. Pixels are square ([`camera_of`]). Sky,
+//! stars and angular rate are constant during the exposure. Charge blooms along columns only.
 
 mod camera;
 mod image;

@@ -1,29 +1,30 @@
-//! The way of a star over the detector while the camera turns.
+//! The path of a star over the detector while the camera turns.
 
 use crate::base::coords::{PixelPoint, UnitVector};
 use crate::camera::CameraModel;
 use nalgebra::Vector3;
 
-/// A star's light is put down at points of its way, six in each part of it that is no longer than so many standard deviations of
-/// the spot: to 10⁻⁹ of its light.
+/// Largest length of a path segment, in standard deviations of the spot. Six points per segment
+/// give the light to 10⁻⁹.
 const PART_SIGMAS: f64 = 1.5;
-/// Gauss-Legendre quadrature of six points, on the interval from −1 to 1: place and weight of those on one side.
+/// Gauss-Legendre quadrature with six points on −1 to 1: position and weight of those on one side.
 const QUADRATURE: [(f64, f64); 3] = [
     (0.238_619_186_083_196_9, 0.467_913_934_572_691),
     (0.661_209_386_466_264_5, 0.360_761_573_048_138_6),
     (0.932_469_514_203_152, 0.171_324_492_379_170_36),
 ];
-/// A way shorter than this, in standard deviations, changes no pixel by 10⁻⁷ of its light, and is none.
+/// Paths shorter than this, in standard deviations, are ignored: they change no pixel by 10⁻⁷ of
+/// the light.
 const LEAST_SIGMAS: f64 = 1e-3;
 
-/// How stars move during one exposure.
+/// The motion of stars during one exposure.
 #[derive(Debug, Clone)]
 pub(super) struct Motion<'a> {
     camera: &'a CameraModel,
-    /// About which of its own axes the camera turns, and by how much during the exposure, in radians.
+    /// Rotation axis in camera axes, and rotation angle during the exposure, in radians.
     axis: Vector3<f64>,
     angle_rad: f64,
-    /// How far all stars move along the rows besides, in pixels.
+    /// Additional motion of all stars along the rows, in pixels.
     along_x_px: f64,
 }
 
@@ -37,7 +38,7 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// The longest way of any star on the frame, in pixels.
+    /// Longest path of any star on the frame, in pixels.
     pub(super) fn longest_px(&self) -> f64 {
         let (right, bottom) = (self.camera.width_px - 0.5, self.camera.height_px - 0.5);
         let corners = [(-0.5, -0.5), (right, -0.5), (-0.5, bottom), (right, bottom)];
@@ -48,15 +49,15 @@ impl<'a> Motion<'a> {
             .fold(0.0, f64::max)
     }
 
-    /// How far the star that is in the middle of the frame moves along x and y, in pixels.
+    /// Motion of a star at the centre of the frame along x and y, in pixels.
     pub(super) fn of_centre_px(&self) -> [f64; 2] {
         let centre = self.camera.centre();
         let [from, to] = [-0.5, 0.5].map(|time| self.at(&centre, time).unwrap_or(centre));
         [to.x - from.x, to.y - from.y]
     }
 
-    /// Calls `put` with points of the way of the star that is at `middle` in the middle of the exposure, and the part of its
-    /// light for each.
+    /// Calls `put` with points along the path of the star that is at `middle` in the middle of the
+    /// exposure, and the fraction of its light at each.
     pub(super) fn along(
         &self,
         middle: &PixelPoint,
@@ -81,7 +82,7 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// The length of the way through `middle`, in pixels, by that of two chords.
+    /// Length of the path through `middle`, in pixels, as that of two chords.
     fn length_px(&self, middle: &PixelPoint) -> f64 {
         if self.angle_rad == 0.0 {
             return self.along_x_px.abs();
@@ -93,7 +94,7 @@ impl<'a> Motion<'a> {
         half(-0.5) + half(0.5)
     }
 
-    /// Where the star is at `time`, from −½ to ½ of the exposure.
+    /// Position at `time`, from −½ to ½ of the exposure.
     fn at(&self, middle: &PixelPoint, time: f64) -> Option<PixelPoint> {
         let mut place = *middle;
         if self.angle_rad != 0.0 {
@@ -104,9 +105,10 @@ impl<'a> Motion<'a> {
         Some(place)
     }
 
-    /// The direction in the camera at `time` of what is in `direction` in the middle: by Rodrigues' formula.
+    /// Direction in the camera at `time` of what is in `direction` at time 0, by Rodrigues'
+    /// formula.
     fn turned(&self, direction: &Vector3<f64>, time: f64) -> Vector3<f64> {
-        // The camera turns one way, the stars the other.
+        // Stars turn opposite to the camera.
         let (sin, cos) = libm::sincos(-time * self.angle_rad);
         let along_axis = self.axis * (self.axis.dot(direction) * (1.0 - cos));
         direction * cos + self.axis.cross(direction) * sin + along_axis
@@ -121,7 +123,7 @@ mod tests {
         CameraModel::pinhole(200.0, 100.0, 1000.0, false)
     }
 
-    /// Sum of the parts, and their mean place.
+    /// Sum of the fractions, mean position, and points.
     fn summed(motion: &Motion, middle: PixelPoint) -> (f64, PixelPoint, Vec<PixelPoint>) {
         let (mut sum, mut mean, mut points) = (0.0, PixelPoint::default(), Vec::new());
         motion.along(&middle, 1.0, |point, part| {
@@ -135,7 +137,8 @@ mod tests {
     #[test]
     fn a_camera_that_turns_about_y_moves_the_stars_along_the_rows() {
         let camera = camera();
-        // 0.01 rad at a focal length of 1000 px; x to the right, the camera turns to it, stars go left.
+        // 0.01 rad at a focal length of 1000 px; x to the right, the camera turns to it, stars go
+        // left.
         let motion = Motion::new(&camera, Vector3::new(0.0, 0.01, 0.0), 0.0);
         let end = motion.at(&camera.centre(), 0.5).unwrap();
         assert!((end.x - (camera.centre().x - 5.0)).abs() < 1e-3 && (end.y - 49.5).abs() < 1e-9);
@@ -157,7 +160,7 @@ mod tests {
         assert_eq!(points, [camera.centre()]);
         let edge = PixelPoint::new(camera.centre().x + 90.0, camera.centre().y);
         assert!((motion.length_px(&edge) - 9.0).abs() < 0.01);
-        // It keeps its distance from the centre.
+        // The distance from the centre is constant.
         let (_, _, points) = summed(&motion, edge);
         let off = |point: &PixelPoint| (point.distance_to(&camera.centre()) - 90.0).abs();
         assert!(points.iter().all(|point| off(point) < 1e-9));

@@ -1,22 +1,22 @@
-//! What differs from pixel to pixel, and is the same in every frame of a camera.
+//! Fixed pattern: differences between pixels that are the same in every frame of a camera.
 
 use crate::camera::data_sheet::DataSheet;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// The pattern of a detector; a part that does not vary is not there. Row-major.
+/// The fixed pattern of a detector, row-major; a part without variation is `None`.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Pattern {
     /// Response to light, relative to its mean.
     pub(super) response: Option<Vec<f32>>,
-    /// Dark current, in electrons a second.
+    /// Dark current, in electrons per second.
     pub(super) dark_current_e_s: Option<Vec<f32>>,
-    /// What the bias differs by, in grey levels.
+    /// Difference of the bias from its mean, in ADU.
     pub(super) offset_adu: Option<Vec<f32>>,
 }
 
-/// Streams of random numbers: one part of a pattern does not depend on whether there is another.
+/// Streams of random numbers: each part of the pattern is independent of the others.
 #[derive(Clone, Copy)]
 enum PatternStream {
     Response,
@@ -56,7 +56,7 @@ fn pixels(sheet: &DataSheet) -> usize {
     sheet.width_px * sheet.height_px
 }
 
-/// Whether each pixel is one of so many in a million.
+/// Whether each pixel is chosen, at a rate per million pixels.
 fn chosen(sheet: &DataSheet, per_mpx: f64, stream: PatternStream) -> impl Iterator<Item = bool> {
     let mut random = random(sheet, stream);
     std::iter::repeat_with(move || random.random::<f64>() * 1e6 < per_mpx)
@@ -78,7 +78,7 @@ fn dark_current(sheet: &DataSheet) -> Vec<f32> {
     let made = &sheet.imperfections;
     let mut random_current = random(sheet, PatternStream::DarkCurrent);
     let mut random_hot = random(sheet, PatternStream::Hot);
-    // Of a log-normal distribution of mean 1 and this standard deviation.
+    // Variance of the logarithm of a log-normal distribution of mean 1 and this standard deviation.
     let log_variance = libm::log1p(made.dark_current_sigma.powi(2));
     (0..pixels(sheet))
         .map(|_| {
@@ -155,7 +155,7 @@ mod tests {
         let offset = pattern.offset_adu.unwrap();
         let (_, sigma) = moments(&offset);
         assert!((sigma - 5f64.sqrt()).abs() < 0.1, "{sigma}");
-        // A column's own part is common to its pixels.
+        // The offset of a column is common to its pixels.
         let column: Vec<f32> = offset.iter().step_by(500).copied().collect();
         assert!((moments(&column).1 - 2.0).abs() < 0.4);
     }

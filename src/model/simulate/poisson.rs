@@ -1,18 +1,18 @@
-//! Random numbers of electrons.
+//! Poisson random numbers.
 //!
-//! The functions are those of [`libm`], which are the same on every machine.
+//! Mathematical functions are those of [`libm`], the same on every machine.
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Up to this mean a sum of few terms is faster than rejection.
+/// Largest mean for which inversion is faster than rejection.
 const SMALL_MEAN: f64 = 12.0;
-/// Above this mean, in electrons, a distribution is not tabulated.
+/// Largest mean that is tabulated, in electrons.
 const LARGEST_TABLE_E: f64 = 1e6;
-/// Parts of the interval from 0 to 1 in each of which the search in a table begins at a place of its own.
+/// Number of guide entries into the table: equal parts of the interval from 0 to 1.
 const GUIDES: usize = 1 << 10;
 
-/// A number with the Poisson distribution of this `mean`, which is no smaller than 0; a mean beyond 2⁵³ is itself.
+/// A Poisson random number of this non-negative `mean`; a mean beyond 2⁵³ is returned itself.
 pub(super) fn poisson(mean: f64, random: &mut ChaCha8Rng) -> f64 {
     const EXACT: f64 = (1u64 << 53) as f64;
     if mean < SMALL_MEAN {
@@ -24,9 +24,9 @@ pub(super) fn poisson(mean: f64, random: &mut ChaCha8Rng) -> f64 {
     mean
 }
 
-/// Adds up probabilities until they pass a random one.
+/// Inversion: adds up probabilities until they exceed a uniform random number.
 fn by_inversion(mean: f64, random: &mut ChaCha8Rng) -> f64 {
-    // The probabilities of a mean of 12 are below 10⁻¹⁶ from there on.
+    // Probabilities beyond are below 10⁻¹⁶ for a mean of 12.
     const LAST: u32 = 80;
     let mut term = libm::exp(-mean);
     let mut rest: f64 = random.random();
@@ -67,25 +67,25 @@ fn by_rejection(mean: f64, random: &mut ChaCha8Rng) -> f64 {
     }
 }
 
-/// The Poisson distribution of one mean, tabulated: for the many pixels that expect the same.
+/// A tabulated Poisson distribution, for many pixels of the same mean.
 #[derive(Debug, Clone)]
 pub(super) struct PoissonTable {
     mean: f64,
-    /// The number that the first element of `cumulative` belongs to.
+    /// The count of the first element of `cumulative`.
     first: u32,
-    /// Probability of at most so many.
+    /// Probability of at most each count.
     cumulative: Vec<f64>,
-    /// For each part of the interval, where in `cumulative` the search begins.
+    /// Start of the search in `cumulative`, by part of the interval.
     guides: Vec<u32>,
 }
 
 impl PoissonTable {
-    /// The table; none for a mean that has no use for one.
+    /// The table; none for a mean of 0 or one that is too large.
     pub(super) fn new(mean: f64) -> Option<Self> {
         if !(mean > 0.0 && mean < LARGEST_TABLE_E) {
             return None;
         }
-        // Probabilities beyond are smaller than the steps of a random number.
+        // Probabilities beyond are below the resolution of a random number.
         let reach = 10.0 * mean.sqrt() + 40.0;
         let first = (mean - reach).max(0.0) as u32;
         let last = (mean + reach) as u32;
@@ -146,11 +146,12 @@ mod tests {
         [mean, central(2), central(3)]
     }
 
-    /// All three moments of a Poisson distribution are its mean.
+    /// All three moments of a Poisson distribution equal its mean.
     fn check(mean: f64, samples: &[f64]) {
         let n = samples.len() as f64;
         let found = moments(samples);
-        // Standard errors of the three, from the distribution's moments up to the sixth; five of them.
+        // Standard errors of the three, from the distribution's moments up to the sixth; five of
+        // them.
         let errors = [
             (mean / n).sqrt(),
             ((mean + 2.0 * mean * mean) / n).sqrt(),

@@ -1,4 +1,4 @@
-//! From expected electrons to grey levels.
+//! From expected electrons to ADU.
 
 use super::pattern::Pattern;
 use super::poisson::{PoissonTable, poisson};
@@ -6,17 +6,22 @@ use crate::camera::data_sheet::DataSheet;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Makes whole electrons of expected ones. `even` is the distribution of the mean that most pixels have.
-pub(super) fn collect(electrons: &mut [f64], even: Option<&PoissonTable>, random: &mut ChaCha8Rng) {
+/// Draws whole electrons for the expected ones. `uniform` is the distribution for the mean that
+/// most pixels have.
+pub(super) fn collect(
+    electrons: &mut [f64],
+    uniform: Option<&PoissonTable>,
+    random: &mut ChaCha8Rng,
+) {
     for pixel in electrons {
-        *pixel = match even {
+        *pixel = match uniform {
             Some(table) if table.mean() == *pixel => table.sample(random),
             _ => poisson(*pixel, random),
         };
     }
 }
 
-/// What becomes of the charge in a pixel.
+/// Blooming and read-out of the collected charge.
 #[derive(Debug, Clone)]
 pub(super) struct Readout {
     width: usize,
@@ -41,7 +46,7 @@ impl Readout {
         }
     }
 
-    /// The grey levels of pixels that have collected so many electrons.
+    /// ADU values of pixels with these collected electrons.
     pub(super) fn grey_levels(
         &self,
         collected_e: &mut [f64],
@@ -62,7 +67,8 @@ impl Readout {
         collected_e.iter().enumerate().map(&mut level).collect()
     }
 
-    /// Lets the charge of pixels that are more than full flow up and down their columns, to the pixels that have room.
+    /// Moves the excess charge of overfull pixels up and down their columns, to pixels with free
+    /// capacity.
     fn bloom(&self, collected_e: &mut [f64]) {
         if self.blooming == 0.0 {
             return;
@@ -79,7 +85,7 @@ impl Readout {
         }
     }
 
-    /// Puts `excess_e` into the pixels that `next` leads to, until it is used up or there are no more.
+    /// Adds `excess_e` to the pixels that `next` leads to, until it is used up or the column ends.
     fn flow(
         &self,
         collected_e: &mut [f64],
@@ -145,7 +151,7 @@ mod tests {
             "{column:?}"
         );
         assert!((0..45).filter(|i| i % 5 != 2).all(|i| electrons[i] == 10.0));
-        // A drain takes it.
+        // With an anti-blooming drain the excess does not flow.
         sheet.imperfections.blooming = 0.0;
         let mut drained = vec![400.0; 45];
         Readout::of(&sheet).bloom(&mut drained);

@@ -1,4 +1,4 @@
-//! What happens while a frame is exposed: how the camera turns, and what is in the sky besides stars.
+//! What happens during the exposure: motion of the camera, and everything in the sky besides stars.
 
 use crate::camera::data_sheet::{Key, Limits, key};
 use nalgebra::Vector3;
@@ -6,29 +6,32 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, UnitSphere};
 
-/// What happens while a frame is exposed. The default is a camera at rest under an even sky, and nothing besides stars.
+/// What happens during the exposure. The default is a camera at rest under a uniform sky, with
+/// nothing besides stars.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scene {
-    /// Angular rate of the camera about its x axis, in degrees a second.
+    /// Angular rate about the camera's x axis, in degrees per second.
     pub rate_x_deg_s: f64,
-    /// About its y axis.
+    /// Angular rate about its y axis, in degrees per second.
     pub rate_y_deg_s: f64,
-    /// About its boresight.
+    /// Angular rate about its boresight, in degrees per second.
     pub rate_z_deg_s: f64,
-    /// A tumbling satellite: angular rate about an axis that is another one in each frame, in degrees a second.
+    /// Tumbling satellite: angular rate about an axis that is random for each frame, in degrees per
+    /// second.
     pub tumble_deg_s: f64,
-    /// A rolling ship: amplitude of its swing about the camera's y axis, in degrees; each frame meets it at another phase.
+    /// Rolling ship: amplitude of the swing about the camera's y axis, in degrees; its phase is
+    /// random for each frame.
     pub swing_deg: f64,
     /// Period of that swing, in seconds.
     pub swing_period_s: f64,
-    /// How much brighter than in the centre the sky is at the frame's border, in the direction of [`Self::sky_gradient_deg`],
-    /// relative to the centre; as much darker on the opposite side.
+    /// Relative increase of the sky brightness from the centre to the border, in the direction of
+    /// [`Self::sky_gradient_deg`]; decrease on the opposite side.
     pub sky_gradient: f64,
-    /// Where the sky is brighter: degrees from image-up towards the right.
+    /// Direction of the brighter side, in degrees from image-up towards the right.
     pub sky_gradient_deg: f64,
-    /// Angle between boresight and Moon, in degrees, where there is one above the horizon.
+    /// Angle between boresight and Moon, in degrees; none without a Moon.
     pub moon_distance_deg: Option<f64>,
-    /// Where the Moon is: degrees from image-up towards the right.
+    /// Direction of the Moon, in degrees from image-up towards the right.
     pub moon_direction_deg: f64,
     /// Phase angle of the Moon, in degrees: 0 is full, 90 half, 180 new.
     pub moon_phase_deg: f64,
@@ -38,27 +41,27 @@ pub struct Scene {
     pub cloud_mag: f64,
     /// Size of clouds, in pixels.
     pub cloud_size_px: f64,
-    /// How much light the thickest cloud adds to the sky, relative to the clear sky.
+    /// Light that the thickest cloud adds, relative to the clear sky.
     pub cloud_light: f64,
-    /// Cosmic rays on a square centimetre in a second.
+    /// Cosmic rays per cm² and second.
     pub cosmic_rays_cm2_s: f64,
-    /// Electrons that one leaves on a micrometre of its way.
+    /// Electrons that a cosmic ray leaves per micrometre of its path.
     pub cosmic_ray_e_um: f64,
-    /// Trails of satellites on a frame, on average.
+    /// Mean number of satellite trails on a frame.
     pub trails: f64,
-    /// V magnitude of such a satellite.
+    /// V magnitude of a satellite.
     pub trail_vmag: f64,
-    /// How fast it moves, in degrees a second.
+    /// Angular rate of a satellite, in degrees per second.
     pub trail_rate_deg_s: f64,
-    /// False stars on a frame, on average.
+    /// Mean number of false stars on a frame.
     pub false_stars: f64,
-    /// V magnitude of the faintest false star; the camera's limit where nothing is said.
+    /// V magnitude of the faintest false star; the camera's limit by default.
     pub false_star_vmag: Option<f64>,
-    /// Part of the catalogue's stars that are not in the sky.
+    /// Fraction of the catalogue stars that are missing in the sky.
     pub missing: f64,
-    /// Standard deviation of the stars' magnitudes about those of the catalogue.
+    /// Standard deviation of true about catalogue magnitudes.
     pub vmag_sigma: f64,
-    /// The faintest V magnitude of a star that is drawn, where there is one.
+    /// V magnitude of the faintest star that is drawn; no limit by default.
     pub faintest_vmag: Option<f64>,
 }
 
@@ -95,9 +98,9 @@ impl Default for Scene {
 }
 
 impl Scene {
-    /// How fast the boresight typically moves, in radians a second.
+    /// Typical angular rate of the boresight, in radians per second.
     pub(super) fn typical_rate_rad_s(&self) -> f64 {
-        // The mean over directions of a sine, and over phases of a cosine.
+        // Mean of a sine over directions, and of a cosine over phases.
         const SINE: f64 = std::f64::consts::FRAC_PI_4;
         const COSINE: f64 = std::f64::consts::FRAC_2_PI;
         let swing_deg_s = COSINE * std::f64::consts::TAU * self.swing_deg / self.swing_period_s;
@@ -109,14 +112,14 @@ impl Scene {
             .to_radians()
     }
 
-    /// The fastest that the camera may turn in any frame, in degrees a second.
+    /// Largest angular rate in any frame, in degrees per second.
     pub(super) fn largest_rate_deg_s(&self) -> f64 {
         let steady = Vector3::new(self.rate_x_deg_s, self.rate_y_deg_s, self.rate_z_deg_s);
         let swing_deg_s = std::f64::consts::TAU * self.swing_deg / self.swing_period_s;
         steady.norm() + self.tumble_deg_s.abs() + swing_deg_s
     }
 
-    /// The camera's angular velocity about its own axes in one frame, in radians a second.
+    /// Angular velocity about the camera axes in one frame, in radians per second.
     pub(super) fn angular_rate_rad_s(&self, random: &mut ChaCha8Rng) -> Vector3<f64> {
         let steady = Vector3::new(self.rate_x_deg_s, self.rate_y_deg_s, self.rate_z_deg_s);
         let axis = Vector3::from(UnitSphere.sample(random));
@@ -140,14 +143,14 @@ macro_rules! optional_key {
     };
 }
 
-/// Angular rates that make sense, in degrees a second.
+/// Valid angular rates, in degrees per second.
 const RATES_DEG_S: Limits = Limits::FromTo(-360.0, 360.0);
-/// Directions.
+/// Valid directions, in degrees.
 const ANGLES_DEG: Limits = Limits::FromTo(-360.0, 360.0);
-/// Magnitudes that make sense: from the Sun to what no telescope sees.
+/// Valid magnitudes: from the Sun to beyond any telescope.
 const MAGNITUDES: Limits = Limits::FromTo(-27.0, 40.0);
 
-/// The numbers of [`Scene`] by name. None has to be given.
+/// The numbers in [`Scene`] by name. All are optional.
 pub const SCENE_KEYS: &[Key<Scene>] = &[
     key!(
         rate_x_deg_s,

@@ -1,4 +1,4 @@
-//! All numbers of a simulation by name.
+//! All parameters of a simulation by name.
 
 use super::camera::camera_of;
 use super::scene::{SCENE_KEYS, Scene};
@@ -8,28 +8,30 @@ use crate::model::sensitivity::{
     self, Budget, Scenario, ScenarioError, UnknownParameter, title_of,
 };
 
-/// What is simulated.
+/// What is simulated: a scenario and a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setup {
     /// Camera, sky and exposure.
     pub scenario: Scenario,
-    /// What happens meanwhile.
+    /// What happens during the exposure.
     pub scene: Scene,
 }
 
-/// The farthest a camera or a satellite may turn during an exposure, in degrees: beyond, its trail is no picture of anything.
+/// Largest turn of the camera or a satellite during an exposure, in degrees: a longer trail is no
+/// longer realistic.
 const MOST_TURN_DEG: f64 = 90.0;
-/// The most cosmic rays on a frame.
+/// Largest mean number of cosmic rays on a frame.
 const MOST_COSMIC_RAYS: f64 = 1e6;
-/// The steepest distortion, in pixels a pixel. At 1 the image folds; up to this it can be inverted within a few steps.
+/// Largest gradient of the distortion, in pixels per pixel. At 1 the image folds; up to this value
+/// the mapping can be inverted in a few steps.
 const MOST_STEEPNESS: f64 = 0.6;
 
 impl Setup {
-    /// Checks the scenario, and that a frame of the scene can be made.
+    /// Checks the scenario, and that the scene can be simulated.
     ///
     /// # Errors
-    /// [`ScenarioError`] with what makes no sense: a value out of its limits, a lens that folds its image, a turn beyond a quarter
-    /// of a circle, cosmic rays without number.
+    /// [`ScenarioError`] for a value outside its limits, a lens that folds the image, a turn beyond
+    /// a quarter of a circle, or too many cosmic rays.
     pub fn check(&self) -> Result<(), ScenarioError> {
         Budget::checked(&self.scenario)?;
         let faults = [self.folded_image(), self.far_turn(), self.many_rays()];
@@ -39,7 +41,8 @@ impl Setup {
         }
     }
 
-    /// The displacements of r³ and of Conrady's second order are steepest at the corner: three times the one, twice the other.
+    /// The displacements of r³ and of Conrady's second order are steepest in the corner: the
+    /// gradients there are three times and twice the displacement.
     fn folded_image(&self) -> Option<String> {
         let made = &self.scenario.camera.imperfections;
         let decentring_px = made.decentring_x_px.hypot(made.decentring_y_px);
@@ -83,23 +86,23 @@ impl Setup {
 /// A parameter of a [`Setup`].
 #[derive(Debug, Clone, Copy)]
 pub enum SetupParameter {
-    /// One on which the limit depends.
+    /// A parameter of the scenario.
     Scenario(sensitivity::Parameter),
     /// An imperfection of the camera.
     Imperfection(&'static Key<DataSheet>),
-    /// One of the scene.
+    /// A parameter of the scene.
     Scene(&'static Key<Scene>),
 }
 
 impl SetupParameter {
-    /// All of them.
+    /// All parameters.
     pub fn all() -> impl Iterator<Item = Self> {
         sensitivity::Parameter::all()
             .map(Self::Scenario)
             .chain(Self::beyond_scenario())
     }
 
-    /// Those that are none of the scenario.
+    /// All parameters except those of the scenario.
     pub fn beyond_scenario() -> impl Iterator<Item = Self> {
         let imperfections = IMPERFECTION_KEYS.iter().map(Self::Imperfection);
         imperfections.chain(SCENE_KEYS.iter().map(Self::Scene))
@@ -108,18 +111,18 @@ impl SetupParameter {
     /// The parameter called `name`.
     ///
     /// # Errors
-    /// [`UnknownParameter`] with the nearest name there is.
+    /// [`UnknownParameter`] with the most similar name.
     pub fn named(name: &str) -> Result<Self, UnknownParameter> {
         let found = Self::all().find(|parameter| parameter.name() == name);
         found.ok_or_else(|| UnknownParameter::among(name, Self::all().map(Self::name)))
     }
 
-    /// What an axis of it is called.
+    /// Title of its axis.
     pub fn title(self) -> String {
         title_of(self.name())
     }
 
-    /// Its name, which ends in its unit.
+    /// Name, which ends in the unit.
     pub fn name(self) -> &'static str {
         match self {
             Self::Scenario(parameter) => parameter.name(),
@@ -128,7 +131,7 @@ impl SetupParameter {
         }
     }
 
-    /// What it is, in a line.
+    /// Description in one line.
     pub fn about(self) -> &'static str {
         match self {
             Self::Scenario(parameter) => parameter.about(),
@@ -137,7 +140,7 @@ impl SetupParameter {
         }
     }
 
-    /// What values make sense.
+    /// Valid values.
     pub fn limits(self) -> Limits {
         match self {
             Self::Scenario(parameter) => parameter.limits(),
@@ -146,7 +149,7 @@ impl SetupParameter {
         }
     }
 
-    /// Its value, where it has one.
+    /// Value, if it has one.
     pub fn get(self, setup: &Setup) -> Option<f64> {
         match self {
             Self::Scenario(parameter) => parameter.get(&setup.scenario),
@@ -155,7 +158,7 @@ impl SetupParameter {
         }
     }
 
-    /// Gives it a value within the limits.
+    /// Sets a value, which must be within the limits.
     pub fn set(self, setup: &mut Setup, value: f64) {
         match self {
             Self::Scenario(parameter) => parameter.set(&mut setup.scenario, value),

@@ -20,7 +20,7 @@ use crate::sky::catalog::Star;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// Streams of random numbers of one frame: what happens in the scene does not change the noise.
+/// Streams of random numbers of one frame: the content of the scene does not change the noise.
 #[derive(Clone, Copy)]
 enum FrameStream {
     Noise,
@@ -33,7 +33,7 @@ fn random(seed: u64, stream: FrameStream) -> ChaCha8Rng {
     random
 }
 
-/// A camera under a sky, ready for any number of frames.
+/// A camera, sky and scene, ready to simulate any number of frames.
 #[derive(Debug, Clone)]
 pub struct Simulator<'a> {
     scenario: Scenario,
@@ -42,17 +42,18 @@ pub struct Simulator<'a> {
     camera: CameraModel,
     light: StarLight,
     pattern: Pattern,
-    /// Of the mean that most pixels have, where there is one.
+    /// Distribution of the counts in a pixel with sky and dark current only.
     uniform: Option<PoissonTable>,
 }
 
 impl<'a> Simulator<'a> {
-    /// A simulator of `scenario` and `scene`, which [`Setup::check`] has found sound, with the catalogue's `stars`.
+    /// A simulator of `scenario` and `scene`, which pass [`Setup::check`](super::Setup::check),
+    /// with the catalogue's `stars`.
     ///
-    /// All stars are drawn, however faint: the catalogue should go deeper than the camera.
+    /// All stars are drawn, however faint: the catalogue should be deeper than the camera's limit.
     ///
     /// # Errors
-    /// [`FrameError::TooSmall`], [`FrameError::TooLarge`] for a detector that no frame can be of.
+    /// [`FrameError::TooSmall`], [`FrameError::TooLarge`] for an unsupported detector size.
     pub fn new(scenario: &Scenario, scene: &Scene, stars: &'a [Star]) -> Result<Self, FrameError> {
         let sheet = &scenario.camera;
         frame::check_size(sheet.width_px, sheet.height_px)?;
@@ -69,21 +70,22 @@ impl<'a> Simulator<'a> {
         })
     }
 
-    /// The same with another camera than that of the sensor's data: one that was fitted to a real frame. Its size is the
-    /// sensor's.
+    /// Replaces the camera model, for example by one fitted to a real frame. It must have the size
+    /// of the detector.
     #[must_use]
     pub fn with_camera(mut self, camera: CameraModel) -> Self {
         self.camera = camera;
         self
     }
 
-    /// The camera: which direction each pixel looks in.
+    /// The camera model.
     pub fn camera(&self) -> &CameraModel {
         &self.camera
     }
 
-    /// The even scenario that is most like what is simulated: with the mean brightness of its sky and the typical motion of its
-    /// stars. The sensitivity model's predictions are for that.
+    /// The scenario without structure that is most similar to what is simulated: with the mean
+    /// brightness of its sky and the typical motion of its stars. The predictions of the
+    /// sensitivity model refer to it.
     pub fn uniform_scenario(&self) -> Scenario {
         let mut uniform = self.scenario.clone();
         let conditions = &mut uniform.conditions;
@@ -104,25 +106,25 @@ impl<'a> Simulator<'a> {
         uniform
     }
 
-    /// The light of its stars.
+    /// Electrons of its stars.
     pub fn light(&self) -> &StarLight {
         &self.light
     }
 
-    /// A frame of the sky, seen from a `pointing`, and what is truly on it.
+    /// A frame at a `pointing`, and its ground truth.
     ///
     /// # Errors
-    /// None for a simulator that could be made.
+    /// None for a valid simulator.
     pub fn frame(&self, pointing: &Pointing, seed: u64) -> Result<(Frame, Truth), FrameError> {
         self.exposed(seed, |sampler, reach_px, random| {
             sampler.on_frame(pointing, self.stars, reach_px, random)
         })
     }
 
-    /// A frame of stars at these places, of these V magnitudes and of the scenario's temperature, in place of the catalogue's.
+    /// A frame of stars at these positions, with these V magnitudes and the scenario's temperature,
+    /// instead of the catalogue's.
     ///
-    /// # Errors
-    /// As [`Self::frame`].
+    /// # Errors As [`Self::frame`].
     pub fn star_field(
         &self,
         stars: &[(PixelPoint, f64)],
@@ -140,18 +142,17 @@ impl<'a> Simulator<'a> {
         })
     }
 
-    /// A frame without any light: the shutter is closed.
+    /// A dark frame.
     ///
-    /// # Errors
-    /// As [`Self::frame`].
+    /// # Errors As [`Self::frame`].
     pub fn dark(&self, seed: u64) -> Result<Frame, FrameError> {
         self.evenly_lit(0.0, seed)
     }
 
-    /// A frame of an even light that leaves so many electrons in a pixel in the middle: a flat field.
+    /// A flat-field frame: uniform light that leaves this number of electrons in a pixel at the
+    /// centre.
     ///
-    /// # Errors
-    /// As [`Self::frame`].
+    /// # Errors As [`Self::frame`].
     pub fn evenly_lit(&self, electrons: f64, seed: u64) -> Result<Frame, FrameError> {
         let none = Scene::default();
         let sky = Sky::new(
@@ -170,7 +171,8 @@ impl<'a> Simulator<'a> {
         ElectronImage::new(sheet.width_px, sheet.height_px, 0.0)
     }
 
-    /// A frame of the stars that `seen` gives, the light of which reaches so many pixels beyond their places.
+    /// A frame of the stars that `seen` returns; its second argument is the radius beyond a
+    /// position that a star's light reaches, in pixels.
     fn exposed(
         &self,
         seed: u64,
@@ -229,7 +231,7 @@ impl<'a> Simulator<'a> {
         image: &mut ElectronImage,
         spot: &mut SpotRenderer,
     ) {
-        /// Spots so close, in standard deviations, are one even trail.
+        /// Distance of the spots that a trail is made of, in standard deviations.
         const STEP_SIGMAS: f64 = 0.25;
         let electrons = self.light.electrons(self.scene.trail_vmag, None);
         let steps = (trail.length_px() / (STEP_SIGMAS * spot.sigma_px()))
@@ -242,7 +244,7 @@ impl<'a> Simulator<'a> {
         }
     }
 
-    /// The frame of pixels in which so many electrons of light are expected.
+    /// The frame for an image of expected electrons of light.
     fn read_out(
         &self,
         mut image: ElectronImage,
@@ -268,7 +270,7 @@ impl<'a> Simulator<'a> {
         Ok(frame.with_levels(1.0, Some(sheet.saturation_adu() as f32)))
     }
 
-    /// From light to charge: the pixels' response, and their dark current.
+    /// Applies the pixel response and adds the dark current.
     fn convert(&self, pixels: &mut [f64]) {
         if let Some(response) = &self.pattern.response {
             for (pixel, response) in pixels.iter_mut().zip(response) {
@@ -294,10 +296,9 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// A frame of stars at these places, of these V magnitudes, and nothing else.
+/// A frame of stars at these positions with these V magnitudes, and nothing else.
 ///
-/// # Errors
-/// As [`Simulator::new`].
+/// # Errors As [`Simulator::new`].
 pub fn star_field(
     scenario: &Scenario,
     stars: &[(PixelPoint, f64)],

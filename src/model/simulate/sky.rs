@@ -1,4 +1,4 @@
-//! The light of the sky in each pixel, and what clouds leave of the stars'.
+//! Sky brightness in each pixel, and the transmission of clouds and lens.
 
 use super::image::ElectronImage;
 use super::scene::Scene;
@@ -10,18 +10,18 @@ use nalgebra::Vector3;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Moonlight is reckoned at points so many pixels apart, clouds at points so many times nearer than their size, but no farther;
-/// between them both are interpolated.
+/// Grid step on which moonlight is computed, in pixels. Clouds use a step of their size over
+/// [`GRIDS_IN_A_CLOUD`], at most this. Values between grid points are interpolated.
 const GRID_PX: usize = 16;
 const GRIDS_IN_A_CLOUD: f64 = 32.0;
-/// Waves of which clouds are made up.
+/// Number of waves that clouds are composed of.
 const WAVES: usize = 16;
 
-/// The sky of one frame, relative to the even one of the scenario.
+/// The sky of one frame, relative to the uniform one of the scenario.
 pub(super) struct Sky<'a> {
     camera: &'a CameraModel,
     vignetting: f64,
-    /// Change of the brightness for a pixel along x and along y.
+    /// Change of the brightness per pixel along x and y.
     slope: [f64; 2],
     clouds: Option<Clouds>,
     moonlight: Option<Moonlight>,
@@ -35,11 +35,11 @@ impl<'a> Sky<'a> {
         random: &mut ChaCha8Rng,
     ) -> Self {
         let (sin, cos) = libm::sincos(scene.sky_gradient_deg.to_radians());
-        // The border in that direction is where the gradient is reached.
+        // The gradient reaches its stated value at the border in its direction.
         let [half_x, half_y] = [camera.width_px / 2.0, camera.height_px / 2.0];
         let to_border_px = half_x * sin.abs() + half_y * cos.abs();
         let steepness = scene.sky_gradient / to_border_px;
-        // The random numbers are drawn whether they are needed or not: what follows does not depend on it.
+        // Always drawn, so that later random numbers do not depend on the scene.
         let clouds = Clouds::new(scene, random);
         Self {
             camera,
@@ -50,7 +50,7 @@ impl<'a> Sky<'a> {
         }
     }
 
-    /// The part of a star's light that clouds and lens leave at `place`.
+    /// Fraction of a star's light that clouds and lens transmit at `place`.
     pub(super) fn transmission(&self, place: &PixelPoint) -> f64 {
         let clouds = self
             .clouds
@@ -59,7 +59,7 @@ impl<'a> Sky<'a> {
         clouds * self.lens(place)
     }
 
-    /// Fills `image` with `sky_e` electrons, as they are distributed.
+    /// Fills `image` with the sky, where `sky_e` is that of the uniform sky, in electrons.
     pub(super) fn expose(&self, image: &mut ElectronImage, sky_e: f64) {
         let is_even = self.vignetting == 0.0 && self.slope == [0.0; 2];
         if is_even && self.clouds.is_none() && self.moonlight.is_none() {
@@ -90,7 +90,7 @@ impl<'a> Sky<'a> {
         }
     }
 
-    /// What the lens lets through, relative to the centre.
+    /// Transmission of the lens relative to the centre.
     fn lens(&self, place: &PixelPoint) -> f64 {
         let [u, v] = self.camera.offset_of(place);
         let radius_px = self.camera.radius_px();
@@ -98,7 +98,7 @@ impl<'a> Sky<'a> {
     }
 }
 
-/// Values at points of the frame, and between them.
+/// Values on a grid over the frame, interpolated between.
 struct CoarseGrid {
     step_px: usize,
     columns: usize,
@@ -129,10 +129,10 @@ impl CoarseGrid {
     }
 }
 
-/// Clouds: a random field made up of waves.
+/// Clouds: a random field composed of waves.
 struct Clouds {
     extinction_mag: f64,
-    /// How much the thickest adds to the clear sky.
+    /// Light of the thickest cloud relative to the clear sky.
     light: f64,
     size_px: f64,
     /// Wave number along x and y in 1/px, and phase.
@@ -157,20 +157,21 @@ impl Clouds {
         }
     }
 
-    /// How far points may be apart between which their height is interpolated.
+    /// Grid step for interpolation of the height.
     fn grid_px(&self) -> usize {
         ((self.size_px / GRIDS_IN_A_CLOUD) as usize).clamp(1, GRID_PX)
     }
 
-    /// The field: a cloud is where it is above 0.
+    /// The random field; there is a cloud where it is above 0.
     fn height(&self, place: &PixelPoint) -> f64 {
         let wave = |[a, b, phase]: [f64; 3]| libm::cos(a * place.x + b * place.y + phase);
         let sum: f64 = self.waves.map(wave).iter().sum();
-        // A sum of so many cosines has a variance of half their number: half of the sky is free, a sixth all covered.
+        // The sum has a variance of half the number of waves: half of the sky is clear, a sixth
+        // fully covered.
         sum / (WAVES as f64 / 2.0).sqrt()
     }
 
-    /// From 0 where there is none to 1 where it is thickest.
+    /// Relative thickness from 0 (clear) to 1 (thickest).
     fn thickness_of(height: f64) -> f64 {
         height.clamp(0.0, 1.0)
     }
@@ -185,16 +186,17 @@ impl Clouds {
 
 /// Moonlight scattered by the air.
 struct Moonlight {
-    /// In camera axes.
+    /// Direction of the Moon in camera axes.
     direction: UnitVector<Camera>,
-    /// Its brightness for a scattering function of 1, relative to the sky's own.
+    /// Brightness for a scattering function of 1, relative to the sky.
     strength: f64,
 }
 
 impl Moonlight {
     /// # Reference
-    /// Krisciunas & Schaefer 1991, PASP 103, 1033, eqs. (3), (15), (20), (21); brightness in nanolamberts by their eq. (1). Extinction
-    /// is that of the scenario at 555 nm, and the air the same all over the frame.
+    /// Krisciunas & Schaefer 1991, PASP 103, 1033, eqs. (3), (15), (20), (21); brightness in
+    /// nanolamberts by their eq. (1). Extinction is that of the scenario at 555 nm, and the airmass
+    /// is constant over the frame.
     fn new(scenario: &Scenario, scene: &Scene, camera: &CameraModel) -> Option<Self> {
         let distance_rad = scene.moon_distance_deg?.to_radians();
         let (sin_way, cos_way) = libm::sincos(scene.moon_direction_deg.to_radians());
@@ -218,7 +220,7 @@ impl Moonlight {
         })
     }
 
-    /// Its brightness at `place`, relative to the sky's own.
+    /// Brightness at `place`, relative to the sky.
     fn at(&self, camera: &CameraModel, place: &PixelPoint) -> f64 {
         let angle_rad = camera.direction_of(place).angle_to(&self.direction);
         let cosine = libm::cos(angle_rad);
@@ -255,7 +257,7 @@ mod tests {
             ..Scene::default()
         };
         let pixels = sky(&scenario, &scene);
-        // Up: half of a pixel's step is missing at the first row.
+        // Up: the first row is half a pixel inside the border.
         assert!((pixels[200] - 150.0).abs() < 0.5 && (pixels[299 * 400] - 50.0).abs() < 0.5);
         let right = Scene {
             sky_gradient_deg: 90.0,
@@ -287,11 +289,12 @@ mod tests {
         };
         let pixels = sky(&scenario, &scene);
         let change_mag = -2.5 * (pixels[150 * 400 + 200] / 100.0).log10();
-        // f(60°) = 10^5.36 (1.06 + 0.25) + 10^(6.15 − 1.5) = 300107 + 44668 = 344775; I* = 10^(−1.536) = 0.029107;
-        // X(60°) = (1 − 0.96 · 0.75)^−½ = 1.88982: 10^(−0.4 · 0.172 · 1.88982) = 0.74127; 1 − 10^(−0.0688) = 0.14649;
-        // B = 1089.8 nL; B0 = 34.08 exp(20.7233 − 0.92104 · 21.587) = 79.0 nL: −2.5 log10(1 + 13.795) = −2.925.
+        // f(60°) = 10^5.36 (1.06 + 0.25) + 10^(6.15 − 1.5) = 300107 + 44668 = 344775; I* =
+        // 10^(−1.536) = 0.029107; X(60°) = (1 − 0.96 · 0.75)^−½ = 1.88982: 10^(−0.4 · 0.172 ·
+        // 1.88982) = 0.74127; 1 − 10^(−0.0688) = 0.14649; B = 1089.8 nL; B0 = 34.08 exp(20.7233 −
+        // 0.92104 · 21.587) = 79.0 nL: −2.5 log10(1 + 13.795) = −2.925.
         assert!((change_mag + 2.925).abs() < 0.01, "{change_mag}");
-        // It brightens towards the Moon, which is up.
+        // The sky brightens towards the Moon, which is up.
         assert!(pixels[200] > pixels[299 * 400 + 200]);
     }
 

@@ -1,4 +1,4 @@
-//! The light of a star on its pixels.
+//! Draws the spots of stars.
 
 use super::image::ElectronImage;
 use crate::base::coords::PixelPoint;
@@ -7,17 +7,17 @@ use crate::camera::data_sheet::SpotForm;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Beyond so many standard deviations a Gaussian has less than 10⁻¹⁴ of its light.
+/// Radius of a Gaussian spot, in standard deviations: less than 10⁻¹⁴ of its light lies beyond.
 const REACH_SIGMAS: f64 = 8.0;
-/// The radius of an even disc whose standard deviation along an axis is 1.
+/// Radius of a uniform disc whose standard deviation along an axis is 1.
 const DISC_RADIUS: f64 = 2.0;
 
-/// A star's spot, in the form that the camera gives it.
+/// Draws spots of the camera's form.
 #[derive(Debug, Clone)]
 pub(super) struct SpotRenderer {
     form: SpotForm,
     sigma_px: f64,
-    /// Room for the parts of the light in the columns and the rows of one star.
+    /// Buffers: the fractions of the light in the columns and the rows of one star.
     columns: Vec<f64>,
     rows: Vec<f64>,
 }
@@ -32,12 +32,12 @@ impl SpotRenderer {
         }
     }
 
-    /// Its standard deviation on each axis, in pixels.
+    /// Standard deviation on each axis, in pixels.
     pub(super) fn sigma_px(&self) -> f64 {
         self.sigma_px
     }
 
-    /// How far from its middle its light reaches, in pixels.
+    /// Radius of a spot, in pixels.
     pub(super) fn reach_px(&self) -> f64 {
         let sigmas = match self.form {
             SpotForm::Gaussian | SpotForm::SampledGaussian => REACH_SIGMAS,
@@ -46,7 +46,7 @@ impl SpotRenderer {
         sigmas * self.sigma_px
     }
 
-    /// Adds so many electrons of a star at `position` to those that are expected in each pixel.
+    /// Adds a star of `electrons` at `position` to the expected electrons.
     pub(super) fn add(&mut self, image: &mut ElectronImage, position: &PixelPoint, electrons: f64) {
         let columns = pixels_within(position.x, self.reach_px(), image.width());
         let rows = pixels_within(position.y, self.reach_px(), image.height());
@@ -88,14 +88,15 @@ impl SpotRenderer {
     }
 }
 
-/// The pixels on a side of `side` whose centre is not farther than `reach_px` and a half from `at`.
+/// The pixels of an axis of `side` pixels whose centres are within `reach_px` plus half a pixel of
+/// `at`.
 fn pixels_within(at: f64, reach_px: f64, side: usize) -> Range<usize> {
     let bound = |pixel: f64| pixel.clamp(0.0, side as f64) as usize;
     let first = bound((at - reach_px).round());
     first..bound((at + reach_px).round() + 1.0).max(first)
 }
 
-/// The parts of the light, along one axis, in `pixels`, of a Gaussian whose middle is `at`.
+/// Fractions of the light of a Gaussian at `at` in `pixels`, along one axis.
 fn profile(form: SpotForm, sigma_px: f64, pixels: Range<usize>, at: f64, into: &mut Vec<f64>) {
     into.clear();
     if form == SpotForm::SampledGaussian {
@@ -106,7 +107,7 @@ fn profile(form: SpotForm, sigma_px: f64, pixels: Range<usize>, at: f64, into: &
     let mut low = before(pixels.start);
     into.extend(pixels.map(|x| {
         let high = before(x + 1);
-        // The difference of what is left beyond is exact where both are near 1.
+        // The difference of the upper tails is exact where both values are near 1.
         let share = if low < 0.5 {
             high - low
         } else {
@@ -118,7 +119,7 @@ fn profile(form: SpotForm, sigma_px: f64, pixels: Range<usize>, at: f64, into: &
     }));
 }
 
-/// The part of an even disc in a pixel whose middle is at (x, y) from the disc's.
+/// Fraction of a uniform disc in a pixel whose centre is at (x, y) from the disc's.
 fn disc_share(x_px: f64, y_px: f64, radius_px: f64) -> f64 {
     let [left, right] = [-0.5, 0.5].map(|half| (x_px + half) / radius_px);
     let [top, bottom] = [-0.5, 0.5].map(|half| (y_px + half) / radius_px);
@@ -188,7 +189,7 @@ mod tests {
             let pixels = drawn(form, sigma, (31.3, 30.8));
             assert!((pixels.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{form:?}");
             let [(x, var_x), (y, var_y)] = moments(&pixels);
-            // What the sampling by pixels shows of spots that are not much wider: of those with sharp edges the most.
+            // Effect of sampling by pixels on narrow spots, most on those with sharp edges.
             let tolerance_px = if form == SpotForm::Disc { 0.02 } else { 1e-3 };
             assert!((x - 31.3).abs() < tolerance_px, "{form:?} {x}");
             assert!((y - 30.8).abs() < tolerance_px, "{form:?} {y}");
@@ -205,7 +206,7 @@ mod tests {
 
     #[test]
     fn a_pixel_of_the_integrated_spot_is_its_integral_to_the_twelfth_digit() {
-        // Simpson's rule in both directions over each pixel: nothing of the error function in it.
+        // Simpson's rule in both directions over each pixel, independent of the error function.
         let (sigma, at) = (0.83, (20.37, 19.71));
         let pixels = drawn(SpotForm::Gaussian, sigma, at);
         const STEPS: i32 = 2000;
@@ -237,8 +238,9 @@ mod tests {
     #[test]
     fn pixels_are_those_reckoned_to_twenty_digits() {
         use SpotForm::{Disc, Gaussian, SampledGaussian};
-        // By mpmath 1.3 with 40 digits: Gauss-Legendre quadrature of the density over the pixel, of the disc's chords between the
-        // places where its edge crosses the pixel's sides.
+        // Computed with mpmath 1.3 to 40 digits: Gauss-Legendre quadrature of the density over the
+        // pixel, or of the disc's chords between the points where its edge crosses the pixel's
+        // sides.
         #[rustfmt::skip]
         #[expect(clippy::excessive_precision, reason = "as they were reckoned")]
         let expected = [
@@ -284,7 +286,7 @@ mod tests {
             let density = expected(x as f64 - 20.25, y as f64 - 20.0);
             assert!((pixels[y * SIDE + x] - density).abs() < 1e-14);
         }
-        // Its light depends on where in the pixel it is.
+        // Its total light depends on the position within the pixel.
         let centred = drawn(SpotForm::SampledGaussian, 0.3, (20.0, 20.0));
         assert!(centred.iter().sum::<f64>() > 1.5);
     }

@@ -1,4 +1,4 @@
-//! The stars on a frame: where they stand and how bright they are.
+//! The stars on a frame: positions and magnitudes.
 
 use super::camera::Pointing;
 use super::poisson::poisson;
@@ -15,10 +15,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::PI;
 
-/// How far a star may move between J2000.0 and any date that is asked for: Barnard's Star in 200 years.
+/// Largest proper motion between J2000.0 and any requested date: Barnard's Star in 200 years.
 const PROPER_MOTION_ROOM_RAD: f64 = 0.01;
 
-/// What stars are drawn with.
+/// Draws the stars of a frame.
 pub(super) struct StarSampler<'a> {
     pub(super) camera: &'a CameraModel,
     pub(super) scene: &'a Scene,
@@ -27,7 +27,7 @@ pub(super) struct StarSampler<'a> {
 }
 
 impl StarSampler<'_> {
-    /// The catalogue's stars whose light falls on the frame, and false ones after them.
+    /// The catalogue stars whose light reaches the frame, followed by false ones.
     pub(super) fn on_frame(
         &self,
         pointing: &Pointing,
@@ -54,7 +54,7 @@ impl StarSampler<'_> {
             .icrs_to_camera
             .inverse()
             .apply(&UnitVector::BORESIGHT);
-        // Room for the light that reaches in from outside, and for a star's own motion.
+        // Margin for light from outside, and for proper motion.
         let margin_rad = 2.0 * reach_px / self.camera.focal_length_px + PROPER_MOTION_ROOM_RAD;
         let least_cosine = libm::cos((self.camera.radius_rad() + margin_rad).min(PI));
         let is_near = |star: &Star| star.direction.dot(&boresight) > least_cosine;
@@ -86,9 +86,9 @@ impl StarSampler<'_> {
         .collect()
     }
 
-    /// Stars of no catalogue, anywhere, as many of each magnitude as there are in the sky.
+    /// False stars at random positions, with the magnitude distribution of the sky.
     fn false_ones(&self, random: &mut ChaCha8Rng) -> Vec<TrueStar> {
-        /// Star counts grow by this power of ten with each magnitude.
+        /// Slope of log₁₀ star counts per magnitude.
         const COUNTS: f64 = 0.5;
         let limit = self.light.budget().limit_vmag;
         let faintest = self.scene.false_star_vmag.unwrap_or(limit);

@@ -1,4 +1,4 @@
-//! Light and charge that comes from no star: trails of satellites, and cosmic rays.
+//! Satellite trails and cosmic rays.
 
 use super::poisson::poisson;
 use super::scene::Scene;
@@ -10,36 +10,36 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
-/// The longest way of a particle, in depths of the layer: that of one almost in its plane.
+/// Longest path of a particle, in depths of the layer, for one almost parallel to it.
 const LONGEST_WAY: f64 = 100.0;
-/// Standard deviation of the logarithm of what a particle leaves on a micrometre.
+/// Standard deviation of the logarithm of the charge per micrometre.
 const CHARGE_SPREAD: f64 = 0.3;
-/// A way is followed in steps of this, in pixels.
+/// Step along the path of a particle, in pixels.
 const STEP_PX: f64 = 0.25;
 
 /// The trail of a satellite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trail {
-    /// Where it begins.
+    /// Start.
     pub from: PixelPoint,
-    /// Where it ends.
+    /// End.
     pub to: PixelPoint,
 }
 
 impl Trail {
-    /// Its length, in pixels.
+    /// Length, in pixels.
     pub fn length_px(&self) -> f64 {
         self.from.distance_to(&self.to)
     }
 
-    /// The point at this part of its length.
+    /// The point at a fraction `part` of its length.
     pub fn at(&self, part: f64) -> PixelPoint {
         let along = |from: f64, to: f64| from + part * (to - from);
         PixelPoint::new(along(self.from.x, self.to.x), along(self.from.y, self.to.y))
     }
 }
 
-/// The trails on a frame: each through a place on it that it has in the middle of the exposure.
+/// The trails on a frame: each crosses a random position on it in the middle of the exposure.
 pub(super) fn trails(
     scene: &Scene,
     camera: &CameraModel,
@@ -65,24 +65,24 @@ pub(super) fn trails(
     (0..count).map(&mut trail).collect()
 }
 
-/// A place anywhere on the frame.
+/// A random position on the frame.
 pub(super) fn place(camera: &CameraModel, random: &mut ChaCha8Rng) -> PixelPoint {
     let mut along = |side: f64| random.random_range(-0.5..side - 0.5);
     PixelPoint::new(along(camera.width_px), along(camera.height_px))
 }
 
-/// The way of a cosmic ray through the detector.
+/// The path of a cosmic ray through the detector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CosmicRay {
-    /// Where it enters.
+    /// Entry point.
     pub from: PixelPoint,
-    /// Where it leaves.
+    /// Exit point.
     pub to: PixelPoint,
-    /// The charge on its way.
+    /// Charge along the path.
     pub electrons: f64,
 }
 
-/// How many cosmic rays hit the detector during an exposure, on average.
+/// Mean number of cosmic rays on the detector in an exposure.
 pub(super) fn mean_cosmic_rays(scene: &Scene, sheet: &DataSheet, exposure_s: f64) -> f64 {
     const CM2_PER_UM2: f64 = 1e-8;
     let pixels = sheet.width_px as f64 * sheet.height_px as f64;
@@ -90,7 +90,7 @@ pub(super) fn mean_cosmic_rays(scene: &Scene, sheet: &DataSheet, exposure_s: f64
     scene.cosmic_rays_cm2_s * area_cm2 * exposure_s
 }
 
-/// The cosmic rays that hit the detector during an exposure, from all directions of a half space.
+/// The cosmic rays on the detector in an exposure, from all directions of a half space.
 pub(super) fn cosmic_rays(
     scene: &Scene,
     sheet: &DataSheet,
@@ -103,7 +103,8 @@ pub(super) fn cosmic_rays(
     let depth_um = sheet.imperfections.depth_um;
     let mut ray = |_| {
         let from = place(camera, random);
-        // As many cross the plane under an angle as see it: the square of the cosine is even.
+        // The flux through a plane is proportional to the cosine of the angle: the square of the
+        // cosine is uniform.
         let cosine: f64 = random.random::<f64>().sqrt();
         let way_um = depth_um * (1.0 / cosine).min(LONGEST_WAY);
         let along_um = (way_um * way_um - depth_um * depth_um).max(0.0).sqrt();
@@ -123,7 +124,7 @@ pub(super) fn cosmic_rays(
 }
 
 impl CosmicRay {
-    /// Calls `put` with the column and row of pixels on its way, in steps, and the charge of each step.
+    /// Calls `put` with the column and row of points along the path, and the charge of each step.
     pub(super) fn along(&self, mut put: impl FnMut(i64, i64, f64)) {
         let trail = Trail {
             from: self.from,

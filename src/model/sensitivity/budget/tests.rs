@@ -1,4 +1,5 @@
-//! The budget of the paper's experiments, quantity by quantity, against figures worked out apart from this code.
+//! The budget of the paper's experiments, quantity by quantity, against figures worked out apart
+//! from this code.
 
 use super::*;
 use crate::camera::data_sheet::{Preset, Response};
@@ -52,7 +53,8 @@ fn every_quantity_of_experiment_1_is_what_a_hand_calculation_gives() {
         1e-5,
     );
     close("Φ₀", found.mag_0_photons_s_m2, 5e10, 1e-12);
-    // Σ Φ₀ S̄_e τ K Q over table 1 and table 2, by a script of its own: 1.757159e10 electrons per second and m².
+    // Σ Φ₀ S̄_e τ K Q over table 1 and table 2, by a script of its own: 1.757159e10 electrons per
+    // second and m².
     close(
         "Σ Φ₀ S̄_e τ K Q A",
         found.mag_0_e_s,
@@ -165,7 +167,8 @@ fn the_physical_reading_is_what_a_hand_calculation_gives() {
         collected * 10f64.powf(-0.1 * 1.994_293),
         1e-5,
     );
-    // (5.5 µm / 50 mm)² = 1.21e-8 sr = 514.80 arcsec²; the sky is as seen from the ground, without extinction.
+    // (5.5 µm / 50 mm)² = 1.21e-8 sr = 514.80 arcsec²; the sky is as seen from the ground, without
+    // extinction.
     close("pixel", found.pixel_area_arcsec2, 514.80, 1e-4);
     close(
         "sky",

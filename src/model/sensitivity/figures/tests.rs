@@ -1,6 +1,7 @@
 //! What the paper says of its figures, held against the model.
 //!
-//! Where a statement holds in part only, the test says for which part, and pins down the rest: docs/sensitivity.md has the table.
+//! Where a statement holds in part only, the test says for which part, and pins down the rest:
+//! docs/sensitivity.md has the table.
 
 use super::*;
 use crate::camera::data_sheet::Preset;
@@ -66,7 +67,8 @@ fn there_are_eleven_each_with_two_curves_and_a_name_of_its_own() {
 
 #[test]
 fn section_3_1_1_transmission_and_efficiency_are_nearly_linear_over_their_upper_half() {
-    // Small where lenses and detectors differ, and as large as that of any factor over the whole range.
+    // Small where lenses and detectors differ, and as large as that of any factor over the whole
+    // range.
     const RANGES: [(f64, f64); 3] = [(0.7, 1.0), (0.5, 1.0), (0.1, 1.0)];
     for (name, exposure_s, gains) in [
         ("lens_transmission", SHORT_S, [0.38, 0.75, 2.49]),
@@ -235,7 +237,8 @@ fn section_4_nothing_doubled_gains_as_much_as_the_aperture_but_a_sharper_spot() 
             let found = best(exposure_s, name);
             assert!(found < aperture - 0.3, "{name}: {found}, {aperture}");
         }
-        // Half the sigma is a quarter of the spot's area: the light of the brightest pixel is 3.4 times as much.
+        // Half the sigma is a quarter of the spot's area: the light of the brightest pixel is 3.4
+        // times as much.
         about(best(exposure_s, "spot_sigma_px"), 1.32);
     }
     about(best(SHORT_S, "aperture_mm"), 1.47);

@@ -13,7 +13,7 @@ fn pointing() -> Pointing {
     }
 }
 
-/// A star of V = 2 that falls on this place.
+/// A star of V = 2 at this position.
 fn star_at(camera: &CameraModel, x: f64, y: f64) -> Star {
     let direction = camera.direction_of(&PixelPoint::new(x, y));
     let on_sky = pointing().icrs_to_camera.inverse().apply(&direction);
@@ -45,7 +45,7 @@ fn distortion_moves_the_corner_by_as_much_as_is_asked_for() {
     let corner = PixelPoint::new(299.5, 199.5);
     sheet.imperfections.distortion_px = 1.0;
     let [x, y] = moved(&sheet, corner);
-    // Outward; of second order in the displacement smaller.
+    // Outward, except for terms of second order in the displacement.
     assert!(
         (x.hypot(y) - 1.0).abs() < 0.02 && x > 0.0 && y > 0.0,
         "{x} {y}"
@@ -103,7 +103,7 @@ fn a_frame_depends_on_its_seed_and_the_pattern_on_the_cameras() {
         order.truncate(20);
         order
     };
-    // The brightest change places by the noise.
+    // The order of the brightest pixels changes with the noise.
     let first = hot(dark(&scenario, 1));
     let common = |others: Vec<usize>| others.iter().filter(|at| first.contains(at)).count();
     assert!(common(hot(dark(&scenario, 2))) > 12);
