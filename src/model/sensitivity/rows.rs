@@ -1,9 +1,10 @@
 //! Predictions as rows for JSON and CSV: of one scenario, or of each value of a sweep.
 
+use super::check::ScenarioError;
 use super::completeness::Detector;
-use super::conditions::{Scenario, ScenarioError};
 use super::faintest::Faintest;
 use super::prediction::Prediction;
+use super::scenario::Scenario;
 use super::sweep::Sweep;
 use crate::camera::data_sheet::{DataSheet, Preset};
 use crate::sky::catalog::Catalog;

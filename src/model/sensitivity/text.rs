@@ -1,10 +1,10 @@
 //! Predictions as text for people: the budget with the paper's symbols, or a table for each sweep.
 
 use super::budget::Budget;
-use super::conditions::Reading;
 use super::faintest::Faintest;
 use super::prediction::{DetectorReport, Prediction};
 use super::rows::PredictionRow;
+use super::scenario::Reading;
 use crate::base::format::{five_digits, printable};
 use std::fmt::Write as _;
 

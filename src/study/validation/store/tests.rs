@@ -1,7 +1,7 @@
 //! Rows for the tests of the tables.
 
 use crate::study::robustness::Answer;
-use crate::study::validation::record::{FrameRecord, Named, RowKind, StarRecord};
+use crate::study::validation::record::{FrameRecord, RowKind, StarRecord};
 
 /// A frame.
 pub(super) fn frame_row(frame: u64) -> FrameRecord {
