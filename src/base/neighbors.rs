@@ -23,19 +23,29 @@ impl PointTree {
         Self(tree.expect("no frame has 2^32 points"))
     }
 
-    /// The points within `radius_px` of `center`, by distance, then by index.
-    pub fn within(&self, center: &PixelPoint, radius_px: f64) -> Vec<Neighbor> {
-        let mut near = Vec::new();
+    /// Calls `visit` for every point within `radius_px` of `center`, in no particular order.
+    pub fn for_each_within(
+        &self,
+        center: &PixelPoint,
+        radius_px: f64,
+        mut visit: impl FnMut(Neighbor),
+    ) {
         self.0
             .query(&[center.x, center.y])
             .within::<SquaredEuclidean<f64>>(radius_px * radius_px)
             .unsorted()
             .visit(|found| {
-                near.push(Neighbor {
+                visit(Neighbor {
                     index: found.item as usize,
                     distance_px: found.distance.sqrt(),
                 });
             });
+    }
+
+    /// The points within `radius_px` of `center`, by distance, then by index.
+    pub fn within(&self, center: &PixelPoint, radius_px: f64) -> Vec<Neighbor> {
+        let mut near = Vec::new();
+        self.for_each_within(center, radius_px, |neighbor| near.push(neighbor));
         near.sort_unstable_by(|a, b| {
             let order = a.distance_px.total_cmp(&b.distance_px);
             order.then(a.index.cmp(&b.index))

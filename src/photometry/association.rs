@@ -1,108 +1,115 @@
-//! Which of the catalogue's stars in a frame were detected.
+//! Finds which catalogue stars in a frame were detected.
 //!
-//! Each star, brightest first, claims the nearest detection that may be a star, lies within reach, and is not claimed yet.
+//! Each star, brightest first, claims the nearest star-like detection that lies within its match
+//! radius and is not claimed yet.
 
-use super::MeasuredFrame;
+use super::IdentifiedFrame;
 use crate::base::neighbors::PointTree;
 use crate::detect::Detection;
 use crate::identify::{Identification, PredictedStar};
 use crate::sky::catalog::StarIndex;
 use std::f64::consts::{PI, SQRT_2};
 
-/// A star and its detection are no further apart than this, ...
-const REACH_PX: f64 = 1.5;
-/// ... or so many standard errors of the detection's place and the camera model together, ...
-const REACH_SIGMAS: f64 = 3.0;
-/// ... but never more than this part of the distance within which stars are not told apart.
-const REACH_SHARE: f64 = 0.5;
-/// Stars closer than so many standard deviations of the spot, and than so many pixels, are not told apart for sure.
-const APART_SPOTS: f64 = 6.0;
-const APART_PX: f64 = 4.0;
-/// A neighbour fainter by more than this does not hide a star.
-const HIDING_MAG: f32 = 1.0;
+/// Smallest match radius, in pixels.
+const MATCH_RADIUS_PX: f64 = 1.5;
+/// The match radius in standard errors of detection and camera model, where that is larger.
+const MATCH_SIGMAS: f64 = 3.0;
+/// Largest match radius, as a share of the distance at which stars are resolved.
+const MATCH_SHARE: f64 = 0.5;
+/// A neighbour fainter by more than this does not crowd a star.
+const CROWDING_MAG: f32 = 1.0;
 
-/// One catalogue star in the frame, and what became of it.
+/// A catalogue star in the frame, with its detection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct FrameStar {
     /// The star.
     pub star: StarIndex,
     /// V magnitude.
     pub v_mag: f64,
-    /// Index of its detection.
+    /// Index of its detection; `None` if it was not detected.
     pub detection: Option<usize>,
-    /// Whether it stands alone, and well inside the frame.
+    /// Whether it is single and well inside the frame.
     pub is_clear: bool,
 }
 
-/// What was associated.
+/// Catalog stars and their detections.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Association {
     /// The stars, brightest first.
     pub stars: Vec<FrameStar>,
-    /// The probability that a detection that is none of the stars lies within reach of a given place.
+    /// Probability that an unrelated detection lies within the match radius of a given position.
     pub chance: f64,
 }
 
-/// The radius within which two stars are not told apart for sure, in pixels.
-fn apart_px(spot_sigma_px: f64) -> f64 {
-    (APART_SPOTS * spot_sigma_px).max(APART_PX)
+/// The distance at which two stars are resolved for sure, in pixels.
+fn resolved_px(spot_sigma_px: f64) -> f64 {
+    (6.0 * spot_sigma_px).max(4.0)
 }
 
 /// Associates the stars `predicted`, brightest first, with the detections of `frame`.
-pub(super) fn associate(frame: &MeasuredFrame, predicted: &[PredictedStar]) -> Association {
+pub(super) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) -> Association {
     let sources = &frame.detections.sources;
-    let apart_px = apart_px(frame.detections.spot_sigma_px);
-    let reach_px = |detection: &Detection| {
-        reach_px(detection, frame.identification).min(REACH_SHARE * apart_px)
+    let resolved_px = resolved_px(frame.detections.spot_sigma_px);
+    let match_radius_px = |source: usize| {
+        let radius_px = match_radius_px(&sources[source], frame.identification);
+        radius_px.min(MATCH_SHARE * resolved_px)
     };
     let is_star_like = |source: &Detection| source.flags.is_star_like() && source.flux_adu > 0.0;
     let star_like: Vec<usize> = (0..sources.len())
         .filter(|&i| is_star_like(&sources[i]))
         .collect();
-    let detections = PointTree::new(star_like.iter().map(|&i| sources[i].position));
-    let neighbors = PointTree::new(predicted.iter().map(|star| star.pixel));
+    // The predicted stars, followed by the detections.
+    let stars = predicted.iter().map(|star| star.pixel);
+    let detections = star_like.iter().map(|&i| sources[i].position);
+    let tree = PointTree::new(stars.chain(detections));
     let camera = &frame.identification.camera;
     let mut claimed = vec![false; sources.len()];
     let mut stars = Vec::with_capacity(predicted.len());
     for (index, star) in predicted.iter().enumerate() {
-        let nearest = detections
-            .within(&star.pixel, REACH_SHARE * apart_px)
-            .iter()
-            .map(|near| (star_like[near.index], near.distance_px))
-            .find(|&(i, away_px)| !claimed[i] && away_px <= reach_px(&sources[i]))
-            .map(|(i, _)| i);
-        if let Some(detection) = nearest {
-            claimed[detection] = true;
-        }
-        if !camera.contains(&star.pixel) {
-            continue;
-        }
-        let hiding = |i: usize| i != index && predicted[i].v_mag < star.v_mag + HIDING_MAG;
-        let is_alone = !neighbors
-            .within(&star.pixel, apart_px)
-            .iter()
-            .any(|near| hiding(near.index));
-        stars.push(FrameStar {
-            star: star.star,
-            v_mag: f64::from(star.v_mag),
-            detection: nearest,
-            is_clear: is_alone && camera.nearly_contains(&star.pixel, -apart_px),
+        let mut nearest: Option<(f64, usize)> = None;
+        let mut is_single = true;
+        tree.for_each_within(&star.pixel, resolved_px, |near| {
+            if let Some(neighbor) = predicted.get(near.index) {
+                let is_bright = neighbor.v_mag < star.v_mag + CROWDING_MAG;
+                is_single &= near.index == index || !is_bright;
+                return;
+            }
+            let source = star_like[near.index - predicted.len()];
+            let candidate = (near.distance_px, source);
+            if !claimed[source]
+                && near.distance_px <= match_radius_px(source)
+                && nearest.is_none_or(|best| candidate < best)
+            {
+                nearest = Some(candidate);
+            }
         });
+        let detection = nearest.map(|(_, source)| source);
+        if let Some(source) = detection {
+            claimed[source] = true;
+        }
+        if camera.contains(&star.pixel) {
+            stars.push(FrameStar {
+                star: star.star,
+                v_mag: f64::from(star.v_mag),
+                detection,
+                is_clear: is_single && camera.nearly_contains(&star.pixel, -resolved_px),
+            });
+        }
     }
     let unclaimed = star_like.iter().filter(|&&i| !claimed[i]);
-    let reach_area_px: f64 = unclaimed.map(|&i| PI * reach_px(&sources[i]).powi(2)).sum();
+    let area_px: f64 = unclaimed.map(|&i| PI * match_radius_px(i).powi(2)).sum();
     Association {
         stars,
-        chance: reach_area_px / (camera.width_px * camera.height_px),
+        chance: area_px / (camera.width_px * camera.height_px),
     }
 }
 
-/// How far `detection` may be from where its star is predicted, in pixels.
-fn reach_px(detection: &Detection, identification: &Identification) -> f64 {
+/// The largest distance between `detection` and the predicted position of its star, in pixels.
+fn match_radius_px(detection: &Detection, identification: &Identification) -> f64 {
     let sigma_px = detection.sigma_x_px.hypot(detection.sigma_y_px) / SQRT_2;
     let model_px = identification.rms_px / SQRT_2;
-    // A standard error that is no number leaves the least reach.
-    REACH_PX.max(REACH_SIGMAS * sigma_px.hypot(model_px))
+    // `max` keeps the smallest radius where the standard error is NaN.
+    MATCH_RADIUS_PX.max(MATCH_SIGMAS * sigma_px.hypot(model_px))
 }
 
 #[cfg(test)]
@@ -136,7 +143,7 @@ mod tests {
         }
     }
 
-    /// Stars of growing magnitudes, and detections, in a frame with spots of 1 px.
+    /// Associates `stars`, brightest first, with `sources`; the spots have a sigma of 1 px.
     fn associated(stars: &[PredictedStar], sources: Vec<Detection>) -> Association {
         let centre = UnitVector::from_ra_dec(0.0, 0.0);
         let identification = Identification {
@@ -154,7 +161,7 @@ mod tests {
             noise_adu: 1.0,
             spot_sigma_px: 1.0,
         };
-        let frame = MeasuredFrame {
+        let frame = IdentifiedFrame {
             detections: &detections,
             identification: &identification,
             years_since_j2000: 0.0,
@@ -173,7 +180,7 @@ mod tests {
     };
 
     #[test]
-    fn each_star_claims_the_nearest_detection_within_reach() {
+    fn each_star_claims_the_nearest_detection_within_the_match_radius() {
         let sources = vec![
             detection(100.5, 100.0, PLAIN),
             detection(101.2, 100.0, PLAIN),
@@ -186,13 +193,13 @@ mod tests {
     }
 
     #[test]
-    fn the_brighter_of_two_stars_has_the_first_claim_and_hides_the_other() {
+    fn the_brighter_of_two_stars_claims_first_and_crowds_the_other() {
         let sources = vec![detection(100.7, 100.0, PLAIN)];
         let stars = [star(100.0, 100.0, 5.0), star(101.0, 100.0, 7.0)];
         let found = associated(&stars, sources);
         assert_eq!(found.stars[0].detection, Some(0));
         assert_eq!(found.stars[1].detection, None);
-        // A companion of two magnitudes less does not hide the brighter one.
+        // A companion two magnitudes fainter does not crowd the brighter star.
         assert!(found.stars[0].is_clear && !found.stars[1].is_clear);
     }
 
@@ -209,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_star_is_not_claimed_and_what_is_unclaimed_may_be_met_by_chance() {
+    fn trails_are_not_claimed_and_unclaimed_detections_make_the_chance() {
         let trail = DetectionFlags {
             trail: true,
             ..PLAIN
@@ -220,7 +227,7 @@ mod tests {
         ];
         let found = associated(&[star(100.0, 100.0, 5.0)], sources);
         assert_eq!(found.stars[0].detection, None);
-        let expected = PI * REACH_PX.powi(2) / SIDE_PX.powi(2);
+        let expected = PI * MATCH_RADIUS_PX.powi(2) / SIDE_PX.powi(2);
         assert!((found.chance / expected - 1.0).abs() < 1e-9);
     }
 }

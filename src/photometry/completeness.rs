@@ -1,4 +1,4 @@
-//! Which part of the stars of each magnitude is detected, and the magnitude at which half of them are.
+//! The share of stars detected at each magnitude, and the magnitude at which half are detected.
 //!
 //! (magnitude, detected or not) of single stars → [`Completeness`]
 //!
@@ -8,84 +8,82 @@
 //! C(m) = c + (1 − c − λ) Φ((m₅₀ − m) / w)
 //! ```
 //!
-//! m₅₀ and the width w are wanted; λ is the part of bright stars that is lost for other reasons (doubles, clouds, trees, errors of
-//! the catalogue), without which one bright star lost would make w several magnitudes; c is the probability of an unrelated
-//! detection at a star's place, and known. Half of what is not lost is detected at m₅₀. The likelihood of all
-//! stars, one by one, is maximised (Fisher scoring), and the standard errors are those of its information matrix.
+//! m₅₀ and the width w are fitted. λ is the share of bright stars lost for other reasons (doubles,
+//! clouds, trees, catalogue errors); without it, one lost bright star would make w several
+//! magnitudes. c is the known probability of an unrelated detection at a star's position. Half of
+//! the stars that are not lost are detected at m₅₀. The likelihood of all stars is maximised by
+//! Fisher scoring, and the standard errors follow from the information matrix.
 //!
-//! Few stars do not determine w and λ, and weak priors do: ln w is normal about [`TYPICAL_WIDTH_MAG`], which is noise at
-//! the threshold of detection (1.0857 / SNR) and a little colour and vignetting, with a factor of e either way;
-//! λ has a beta distribution as if a quarter of a star of ten had been lost before. Where bright stars are few (80 in all, or a
-//! wide fall) m₅₀ is off by up to 0.3 of its standard error for that.
+//! Few stars do not determine w and λ, so both have weak priors. ln w is normal about
+//! [`TYPICAL_WIDTH_MAG`], the noise at the detection threshold (1.0857 / SNR) with a little colour
+//! and vignetting, with a factor of e either way. λ has a beta distribution, as if a quarter of a
+//! star in ten had been lost before. Where bright stars are few (80 in all, or a large w) this
+//! shifts m₅₀ by up to 0.3 of its standard error.
 //!
 //! # Reference
-//! Probit regression with a guessing and a lapse rate: Wichmann & Hill 2001, Percept. Psychophys. 63, 1293.
+//! Probit regression with a guessing and a lapse rate: Wichmann & Hill 2001, Percept. Psychophys.
+//! 63, 1293.
 
 use crate::base::statistics::{LnProduct, normal_cdf_and_density};
 use nalgebra::{Matrix3, Vector3};
 
-/// Where the prior of the width has its middle, in magnitudes.
+/// Centre of the prior of the width, in magnitudes.
 pub const TYPICAL_WIDTH_MAG: f64 = 0.3;
 /// Standard deviation of the prior of ln w.
 const LN_WIDTH_SIGMA: f64 = 1.0;
-/// The prior of λ: so many stars lost, and so many not.
+/// The prior of λ: stars lost and stars kept.
 const PRIOR_LOST: f64 = 0.25;
 const PRIOR_KEPT: f64 = 9.75;
-/// At least so many stars, half of them or more detected, are brighter than the limit, and so many fainter.
-const FEWEST_EITHER_SIDE: usize = 4;
-/// A standard error above this is no measurement, in magnitudes.
-const SIGMA_MAX_MAG: f64 = 0.5;
-/// Width of the steps in which the curve is told, in magnitudes.
+/// Minimum number of detected stars brighter than m₅₀, and of missed stars fainter than it.
+const MIN_PER_SIDE: usize = 4;
+/// Largest standard error of a limit, in magnitudes.
+const MAX_SIGMA_MAG: f64 = 0.5;
+/// Width of a bin of the curve, in magnitudes.
 pub const BIN_MAG: f64 = 0.5;
-const MAX_ROUNDS: usize = 60;
-/// Settled where a step is below a hundredth of the standard errors (squared).
-const SETTLED: f64 = 1e-4;
-/// Stars further from the limit than so many widths are all alike.
-const FAR_WIDTHS: f64 = 5.0;
 
-/// A catalogue star: was it detected?
+/// A catalogue star that counts in the completeness.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Trial {
+pub struct CountedStar {
     /// V magnitude.
     pub v_mag: f64,
-    /// Whether it was.
+    /// Whether it was detected.
     pub detected: bool,
 }
 
-/// The curve, and the limiting magnitude fitted to it.
+/// The completeness curve, and the limiting magnitude fitted to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Completeness {
-    /// The curve, in steps of [`BIN_MAG`] without gaps, brightest first.
-    pub bins: Vec<Bin>,
-    /// The limit, or why there is none.
+    /// The curve in bins of [`BIN_MAG`] without gaps, brightest first.
+    pub bins: Vec<MagnitudeBin>,
+    /// The limit, or the reason why there is none.
     pub limit: Result<Limit, NoLimit>,
 }
 
-/// One step of the curve.
+/// One bin of the curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bin {
-    /// V magnitude of its middle.
+pub struct MagnitudeBin {
+    /// V magnitude of its centre.
     pub v_mag: f64,
-    /// Stars in the catalogue.
+    /// Number of catalogue stars.
     pub stars: usize,
-    /// Those of them that were detected.
+    /// Number of detected stars.
     pub detected: usize,
 }
 
-/// Where completeness falls.
+/// The limiting magnitude, where the completeness falls.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limit {
-    /// V magnitude m₅₀ at which half of the stars that are not lost otherwise are detected.
+    /// V magnitude m₅₀ at which half of the stars that are not otherwise lost are detected.
     pub v_mag: f64,
     /// Its standard error, in magnitudes.
     pub sigma_mag: f64,
-    /// Standard deviation w of the fall, in magnitudes.
+    /// Width w of the fall (standard deviation), in magnitudes.
     pub width_mag: f64,
-    /// The part λ of bright stars that is not detected.
+    /// The share λ of bright stars that is not detected.
     pub lost: f64,
 }
 
-/// Why no limit can be given.
+/// Why there is no limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoLimit {
@@ -94,75 +92,79 @@ pub enum NoLimit {
         "the catalogue ends before completeness falls: too few of its stars are too faint for the frame"
     )]
     CatalogEnds,
-    /// Hardly any star is bright enough.
+    /// Too few stars are bright enough.
     #[error("too few of the catalogue's stars are bright enough for the frame")]
     TooFewDetected,
-    /// There is no clear fall.
+    /// The fall is not clear.
     #[error("too few stars to tell where completeness falls")]
     Uncertain,
 }
 
-/// The completeness that `trials`, in any order, show; `chance` is c, the probability that a star not seen has an unrelated detection
-/// at its place.
-pub fn measure(trials: &[Trial], chance: f64) -> Completeness {
-    let mut trials = trials.to_vec();
-    trials.sort_unstable_by(|a, b| {
+/// Measures the completeness of `stars`, in any order. `chance` is c, the probability that an
+/// undetected star has an unrelated detection at its position.
+pub fn measure(stars: &[CountedStar], chance: f64) -> Completeness {
+    let mut stars = stars.to_vec();
+    stars.sort_unstable_by(|a, b| {
         let order = a.v_mag.total_cmp(&b.v_mag);
         order.then(b.detected.cmp(&a.detected))
     });
     Completeness {
-        bins: bins(&trials),
-        limit: limit(&trials, chance),
+        bins: bins(&stars),
+        limit: limit(&stars, chance),
     }
 }
 
-/// The curve of `trials`, brightest first.
-fn bins(trials: &[Trial]) -> Vec<Bin> {
-    let step = |trial: &Trial| (trial.v_mag / BIN_MAG).floor();
-    let (Some(first), Some(last)) = (trials.first().map(step), trials.last().map(step)) else {
+/// The bins of `stars`, brightest first.
+fn bins(stars: &[CountedStar]) -> Vec<MagnitudeBin> {
+    let step = |star: &CountedStar| (star.v_mag / BIN_MAG).floor();
+    let (Some(first), Some(last)) = (stars.first().map(step), stars.last().map(step)) else {
         return Vec::new();
     };
     let bin = |offset: usize| {
-        let place = first + offset as f64;
-        let from = trials.partition_point(|trial| step(trial) < place);
-        let to = trials.partition_point(|trial| step(trial) <= place);
-        let in_it = &trials[from..to];
-        Bin {
-            v_mag: (place + 0.5) * BIN_MAG,
-            stars: in_it.len(),
-            detected: in_it.iter().filter(|trial| trial.detected).count(),
+        let own = first + offset as f64;
+        let from = stars.partition_point(|star| step(star) < own);
+        let to = stars.partition_point(|star| step(star) <= own);
+        let inside = &stars[from..to];
+        MagnitudeBin {
+            v_mag: (own + 0.5) * BIN_MAG,
+            stars: inside.len(),
+            detected: inside.iter().filter(|star| star.detected).count(),
         }
     };
     (0..=(last - first) as usize).map(bin).collect()
 }
 
-fn limit(trials: &[Trial], chance: f64) -> Result<Limit, NoLimit> {
-    let detected = trials.iter().filter(|trial| trial.detected).count();
-    if detected < FEWEST_EITHER_SIDE {
+fn limit(stars: &[CountedStar], chance: f64) -> Result<Limit, NoLimit> {
+    let detected = stars.iter().filter(|star| star.detected).count();
+    if detected < MIN_PER_SIDE {
         return Err(NoLimit::TooFewDetected);
     }
-    if trials.len() - detected < FEWEST_EITHER_SIDE {
+    if stars.len() - detected < MIN_PER_SIDE {
         return Err(NoLimit::CatalogEnds);
     }
-    let fit = Curve::fit(trials, chance).ok_or(NoLimit::Uncertain)?;
+    let fit = Curve::fit(stars, chance).ok_or(NoLimit::Uncertain)?;
     let sigma_mag = fit.sigma_mag.ok_or(NoLimit::Uncertain)?;
-    let brighter = trials.partition_point(|trial| trial.v_mag < fit.curve.v_mag);
-    let seen = trials[..brighter].iter().filter(|t| t.detected).count();
-    let not_seen = trials[brighter..].iter().filter(|t| !t.detected).count();
-    match (seen, not_seen) {
-        (_, fainter) if fainter < FEWEST_EITHER_SIDE => Err(NoLimit::CatalogEnds),
-        (brighter, _) if brighter < FEWEST_EITHER_SIDE => Err(NoLimit::TooFewDetected),
-        _ if sigma_mag > SIGMA_MAX_MAG => Err(NoLimit::Uncertain),
-        _ => Ok(Limit {
-            v_mag: fit.curve.v_mag,
-            sigma_mag,
-            width_mag: fit.curve.ln_width.exp(),
-            lost: fit.curve.lost(),
-        }),
+    let brighter = stars.partition_point(|star| star.v_mag < fit.curve.v_mag);
+    let detected = stars[..brighter].iter().filter(|t| t.detected).count();
+    let missed = stars[brighter..].iter().filter(|t| !t.detected).count();
+    if missed < MIN_PER_SIDE {
+        return Err(NoLimit::CatalogEnds);
     }
+    if detected < MIN_PER_SIDE {
+        return Err(NoLimit::TooFewDetected);
+    }
+    if sigma_mag > MAX_SIGMA_MAG {
+        return Err(NoLimit::Uncertain);
+    }
+    Ok(Limit {
+        v_mag: fit.curve.v_mag,
+        sigma_mag,
+        width_mag: fit.curve.ln_width.exp(),
+        lost: fit.curve.lost(),
+    })
 }
 
-/// The curve's parameters, as they are fitted: without bounds.
+/// The parameters of the curve, transformed so that they are unbounded.
 #[derive(Debug, Clone, Copy)]
 struct Curve {
     v_mag: f64,
@@ -171,13 +173,13 @@ struct Curve {
     chance: f64,
 }
 
-/// A curve fitted, and the standard error of its m₅₀.
-struct Fitted {
+/// A fitted curve, and the standard error of its m₅₀.
+struct CurveFit {
     curve: Curve,
     sigma_mag: Option<f64>,
 }
 
-/// The logarithm of the posterior probability, its gradient, and the expected information.
+/// The logarithm of a posterior probability, its gradient, and the expected information.
 struct Likelihood {
     log: f64,
     gradient: Vector3<f64>,
@@ -185,15 +187,19 @@ struct Likelihood {
 }
 
 impl Curve {
-    fn fit(trials: &[Trial], chance: f64) -> Option<Fitted> {
+    /// Fits the curve to `stars`, brightest first, by damped Fisher scoring.
+    fn fit(stars: &[CountedStar], chance: f64) -> Option<CurveFit> {
+        const MAX_ROUNDS: usize = 60;
+        /// Converged where a step is below a hundredth of the standard errors (squared).
+        const CONVERGED: f64 = 1e-4;
         let lost = PRIOR_LOST / (PRIOR_LOST + PRIOR_KEPT);
         let mut curve = Self {
-            v_mag: best_step(trials)?,
+            v_mag: best_step(stars)?,
             ln_width: TYPICAL_WIDTH_MAG.ln(),
             logit_lost: (lost / (1.0 - lost)).ln(),
             chance: chance.clamp(1e-6, 0.25),
         };
-        let mut current = curve.likelihood(trials);
+        let mut current = curve.likelihood(stars);
         let mut damping = 1e-3;
         for _ in 0..MAX_ROUNDS {
             let mut damped = current.information;
@@ -201,11 +207,11 @@ impl Curve {
                 damped[(axis, axis)] *= 1.0 + damping;
             }
             let step = damped.cholesky()?.solve(&current.gradient);
-            if step.dot(&current.gradient) < SETTLED {
+            if step.dot(&current.gradient) < CONVERGED {
                 break;
             }
             let next = curve.moved(&step);
-            let there = next.likelihood(trials);
+            let there = next.likelihood(stars);
             if there.log > current.log {
                 (curve, current) = (next, there);
                 damping *= 0.2;
@@ -214,7 +220,7 @@ impl Curve {
             }
         }
         let covariance = current.information.try_inverse();
-        Some(Fitted {
+        Some(CurveFit {
             curve,
             sigma_mag: covariance
                 .map(|c| c[(0, 0)].sqrt())
@@ -235,17 +241,15 @@ impl Curve {
         1.0 / (1.0 + (-self.logit_lost).exp())
     }
 
-    /// Of `trials`, brightest first.
-    fn likelihood(&self, trials: &[Trial]) -> Likelihood {
-        let (width, lost) = (self.ln_width.exp(), self.lost());
-        let from_middle = (self.ln_width - TYPICAL_WIDTH_MAG.ln()) / LN_WIDTH_SIGMA;
-        let mut sum = Likelihood {
-            log: -0.5 * from_middle.powi(2)
-                + PRIOR_LOST * lost.ln()
-                + PRIOR_KEPT * (1.0 - lost).ln(),
+    /// The prior of width and λ.
+    fn prior(&self) -> Likelihood {
+        let lost = self.lost();
+        let off = (self.ln_width - TYPICAL_WIDTH_MAG.ln()) / LN_WIDTH_SIGMA;
+        Likelihood {
+            log: -0.5 * off.powi(2) + PRIOR_LOST * lost.ln() + PRIOR_KEPT * (1.0 - lost).ln(),
             gradient: Vector3::new(
                 0.0,
-                -from_middle / LN_WIDTH_SIGMA,
+                -off / LN_WIDTH_SIGMA,
                 PRIOR_LOST - (PRIOR_LOST + PRIOR_KEPT) * lost,
             ),
             information: Matrix3::from_diagonal(&Vector3::new(
@@ -253,9 +257,18 @@ impl Curve {
                 LN_WIDTH_SIGMA.powi(-2),
                 (PRIOR_LOST + PRIOR_KEPT) * lost * (1.0 - lost),
             )),
-        };
+        }
+    }
+
+    /// The posterior of `stars`, brightest first.
+    fn likelihood(&self, stars: &[CountedStar]) -> Likelihood {
+        /// Stars further from m₅₀ than this many widths are treated alike.
+        const FAR_WIDTHS: f64 = 5.0;
+        let (width, lost) = (self.ln_width.exp(), self.lost());
+        let mut sum = self.prior();
         let full = 1.0 - self.chance - lost;
-        // Adds so many stars to all but the logarithm, and returns the probability of what became of each.
+        // Adds `count` stars to gradient and information, and returns the probability of each one's
+        // outcome.
         let mut add = |z: f64, detected: bool, count: usize| {
             let (above, density) = normal_cdf_and_density(z);
             let p = (self.chance + full * above).clamp(1e-12, 1.0 - 1e-12);
@@ -270,43 +283,44 @@ impl Curve {
             sum.information += change * change.transpose() * (count / (p * (1.0 - p)));
             probability
         };
-        let brighter_than = |v_mag: f64| trials.partition_point(|trial| trial.v_mag < v_mag);
+        let brighter_than = |v_mag: f64| stars.partition_point(|star| star.v_mag < v_mag);
         let near = brighter_than(self.v_mag - FAR_WIDTHS * width)
             ..brighter_than(self.v_mag + FAR_WIDTHS * width);
         let mut log = 0.0;
         for (z, far) in [
-            (FAR_WIDTHS, &trials[..near.start]),
-            (-FAR_WIDTHS, &trials[near.end..]),
+            (FAR_WIDTHS, &stars[..near.start]),
+            (-FAR_WIDTHS, &stars[near.end..]),
         ] {
-            let detected = far.iter().filter(|trial| trial.detected).count();
+            let detected = far.iter().filter(|star| star.detected).count();
             for (is_detected, count) in [(true, detected), (false, far.len() - detected)] {
                 log += count as f64 * add(z, is_detected, count).ln();
             }
         }
         let mut product = LnProduct::ONE;
-        for trial in &trials[near] {
-            let z = (self.v_mag - trial.v_mag) / width;
-            product.multiply(add(z, trial.detected, 1));
+        for star in &stars[near] {
+            let z = (self.v_mag - star.v_mag) / width;
+            product.multiply(add(z, star.detected, 1));
         }
         sum.log += log + product.ln();
         sum
     }
 }
 
-/// The magnitude that best parts stars detected from stars not detected, of `trials`, brightest first.
-fn best_step(trials: &[Trial]) -> Option<f64> {
-    // Misplaced, if the step is before the first: all that are detected.
-    let mut misplaced = trials.iter().filter(|trial| trial.detected).count();
-    let mut best = (misplaced, trials.first()?.v_mag);
-    for (i, trial) in trials.iter().enumerate() {
-        if trial.detected {
+/// The magnitude that best separates detected stars from missed ones; `stars` are sorted, brightest
+/// first.
+fn best_step(stars: &[CountedStar]) -> Option<f64> {
+    // Misplaced stars for a step before the first star: all detected ones.
+    let mut misplaced = stars.iter().filter(|star| star.detected).count();
+    let mut best = (misplaced, stars.first()?.v_mag);
+    for (i, star) in stars.iter().enumerate() {
+        if star.detected {
             misplaced -= 1;
         } else {
             misplaced += 1;
         }
         if misplaced < best.0 {
-            let next = trials.get(i + 1).map_or(trial.v_mag, |next| next.v_mag);
-            best = (misplaced, 0.5 * (trial.v_mag + next));
+            let next = stars.get(i + 1).map_or(star.v_mag, |next| next.v_mag);
+            best = (misplaced, 0.5 * (star.v_mag + next));
         }
     }
     Some(best.1)
@@ -319,7 +333,7 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// How stars are drawn.
+    /// The parameters of simulated stars.
     #[derive(Debug, Clone, Copy)]
     struct Sky {
         stars: usize,
@@ -343,20 +357,20 @@ mod tests {
             self
         }
 
-        /// Stars from 5.5 to 10 mag, three times as many to each fainter magnitude.
-        fn draw(&self, seed: u64) -> Vec<Trial> {
+        /// Stars from 5.5 to 10 mag, three times as many per fainter magnitude.
+        fn draw(&self, seed: u64) -> Vec<CountedStar> {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             let faintest = 3_f64.powf(4.5);
-            let mut trial = || {
+            let mut star = || {
                 let v_mag = 5.5 + random.random_range(1.0..faintest).ln() / 3_f64.ln();
                 let above = normal_cdf((self.limit - v_mag) / self.width);
                 let seen = random.random_bool((1.0 - self.lost) * above);
-                Trial {
+                CountedStar {
                     v_mag,
                     detected: seen || random.random_bool(self.chance),
                 }
             };
-            (0..self.stars).map(|_| trial()).collect()
+            (0..self.stars).map(|_| star()).collect()
         }
 
         /// Mean and standard deviation of (found − true) / standard error.
@@ -376,22 +390,23 @@ mod tests {
 
     #[test]
     fn the_limit_is_found_within_its_standard_error() {
-        // 600 frames show a mean to 0.04 and a standard deviation to 0.03.
+        // 600 frames determine a mean to 0.04 and a standard deviation to 0.03.
         let well_determined = [
             TYPICAL,
             TYPICAL.with(|sky| sky.stars = 1500),
             TYPICAL.with(|sky| sky.width = 0.15),
             TYPICAL.with(|sky| sky.chance = 0.05),
         ];
-        // Few stars are bright enough to tell losses from the fall: what the priors say shows.
-        let hardly = [
+        // With few bright stars, losses and the fall are hard to separate, and the priors show.
+        let poorly_determined = [
             TYPICAL.with(|sky| sky.stars = 80),
             TYPICAL.with(|sky| sky.width = 0.7),
             TYPICAL.with(|sky| sky.lost = 0.15),
         ];
-        for (skies, mean_tolerance, spread_tolerance) in
-            [(&well_determined[..], 0.15, 0.1), (&hardly[..], 0.5, 0.25)]
-        {
+        for (skies, mean_tolerance, spread_tolerance) in [
+            (&well_determined[..], 0.15, 0.1),
+            (&poorly_determined[..], 0.5, 0.25),
+        ] {
             for sky in skies {
                 let (mean, spread) = sky.pulls();
                 println!("{sky:?}: pulls {mean:+.3} ± {spread:.3}");
@@ -411,47 +426,47 @@ mod tests {
 
     #[test]
     fn one_bright_star_that_is_lost_moves_nothing() {
-        let mut trials = TYPICAL.draw(7);
-        let before = measure(&trials, TYPICAL.chance).limit.unwrap();
-        trials.push(Trial {
+        let mut stars = TYPICAL.draw(7);
+        let before = measure(&stars, TYPICAL.chance).limit.unwrap();
+        stars.push(CountedStar {
             v_mag: 3.0,
             detected: false,
         });
-        let after = measure(&trials, TYPICAL.chance).limit.unwrap();
+        let after = measure(&stars, TYPICAL.chance).limit.unwrap();
         assert!((after.v_mag - before.v_mag).abs() < before.sigma_mag);
         assert!(after.width_mag < 1.1 * before.width_mag);
     }
 
     #[test]
     fn a_faint_star_at_the_place_of_another_detection_moves_nothing() {
-        let mut trials = TYPICAL.draw(8);
-        let before = measure(&trials, TYPICAL.chance).limit.unwrap();
-        trials.push(Trial {
+        let mut stars = TYPICAL.draw(8);
+        let before = measure(&stars, TYPICAL.chance).limit.unwrap();
+        stars.push(CountedStar {
             v_mag: 12.0,
             detected: true,
         });
-        let after = measure(&trials, TYPICAL.chance).limit.unwrap();
+        let after = measure(&stars, TYPICAL.chance).limit.unwrap();
         assert!((after.v_mag - before.v_mag).abs() < 0.3 * before.sigma_mag);
     }
 
     #[test]
     fn a_sharp_edge_is_found_between_the_stars_on_either_side() {
-        let trials: Vec<Trial> = (0..40)
-            .map(|i| Trial {
+        let stars: Vec<CountedStar> = (0..40)
+            .map(|i| CountedStar {
                 v_mag: 6.0 + 0.1 * f64::from(i),
                 detected: i < 20,
             })
             .collect();
-        let limit = measure(&trials, 0.0).limit.unwrap();
+        let limit = measure(&stars, 0.0).limit.unwrap();
         assert!((limit.v_mag - 7.95).abs() < 0.1, "{limit:?}");
         assert!((0.02..0.3).contains(&limit.sigma_mag), "{limit:?}");
     }
 
     #[test]
     fn there_is_no_limit_where_completeness_does_not_fall_or_nothing_is_seen() {
-        let all = |detected| -> Vec<Trial> {
-            let trials = TYPICAL.draw(3).into_iter();
-            trials.map(|trial| Trial { detected, ..trial }).collect()
+        let all = |detected| -> Vec<CountedStar> {
+            let stars = TYPICAL.draw(3).into_iter();
+            stars.map(|star| CountedStar { detected, ..star }).collect()
         };
         assert_eq!(measure(&all(true), 0.0).limit, Err(NoLimit::CatalogEnds));
         assert_eq!(
@@ -459,32 +474,29 @@ mod tests {
             Err(NoLimit::TooFewDetected)
         );
         assert_eq!(measure(&[], 0.0).limit, Err(NoLimit::TooFewDetected));
-        // A tenth is lost, at any magnitude.
+        // A tenth is lost at any magnitude.
         let mut some = all(true);
         some.iter_mut()
             .step_by(10)
-            .for_each(|trial| trial.detected = false);
+            .for_each(|star| star.detected = false);
         assert_eq!(measure(&some, 0.0).limit, Err(NoLimit::CatalogEnds));
     }
 
     #[test]
     fn the_curve_holds_every_star_once_and_has_no_gap() {
-        let mut trials = TYPICAL.draw(4);
-        trials.push(Trial {
+        let mut stars = TYPICAL.draw(4);
+        stars.push(CountedStar {
             v_mag: 2.5,
             detected: true,
         });
-        let bins = measure(&trials, 0.0).bins;
+        let bins = measure(&stars, 0.0).bins;
         assert_eq!(bins[0].v_mag, 2.75);
         assert!(
             bins.windows(2)
                 .all(|pair| pair[1].v_mag - pair[0].v_mag == BIN_MAG)
         );
-        assert_eq!(
-            bins.iter().map(|bin| bin.stars).sum::<usize>(),
-            trials.len()
-        );
-        let detected = trials.iter().filter(|trial| trial.detected).count();
+        assert_eq!(bins.iter().map(|bin| bin.stars).sum::<usize>(), stars.len());
+        let detected = stars.iter().filter(|star| star.detected).count();
         assert_eq!(bins.iter().map(|bin| bin.detected).sum::<usize>(), detected);
         assert!(measure(&[], 0.0).bins.is_empty());
     }

@@ -6,99 +6,98 @@
 //! V = ZP + m + k (B−V − 0.6) + s (V − V̄)
 //! ```
 //!
-//! 1. The noise of a star is that of its flux, and a scatter besides (catalogue, colour, pixels), which is found from the residuals.
-//! 2. Outliers count the less the further off they are, and from 4.7 standard deviations on not at all (Tukey's biweight): they are
-//!    unresolved companions and variables, most of them on one side.
-//! 3. The terms k (colour) and s (a grey level not proportional to light) are there only where they are clearly needed.
+//! 1. The variance of a star is that of its flux, plus a scatter (catalogue, colour, pixels) that
+//!    is estimated from the residuals.
+//! 2. Outliers, mostly unresolved companions and variables on one side, are down-weighted with
+//!    Tukey's biweight, to zero from 4.7 standard deviations on.
+//! 3. The terms k (colour) and s (grey levels not proportional to light) are used only where they
+//!    are significant.
 //!
-//! With the colour term, the zero point is that of a star of B−V = 0.6; without, that of the mean of the stars, whose B−V is given. With
-//! s, it is right for stars of the mean magnitude V̄, and no others; a magnitude in V is 1 − s instrumental ones.
+//! With the colour term, the zero point is that of a star of B−V = 0.6; without it, that of the
+//! mean star, whose B−V is given. With s, it holds only for stars of the mean magnitude V̄; one
+//! magnitude in V is then 1 − s instrumental ones.
 //!
-//! The stars must have been chosen by V, not by their flux: else those are preferred that noise and colour make bright.
+//! The stars must be chosen by V and not by flux, which would prefer stars that noise or colour
+//! makes brighter.
 
 use crate::base::statistics::{Estimate, median};
 use nalgebra::{DMatrix, DVector};
 
-/// The B−V of the stars whose zero point is given, where there is a colour term: the Sun's, nearly, and that of many field stars.
+/// Reference B−V of the zero point where there is a colour term: about that of the Sun and of many
+/// field stars.
 pub const REFERENCE_BV_MAG: f64 = 0.6;
-/// Fewer stars make no zero point.
-pub const FEWEST_STARS: usize = 5;
-/// Fewer stars make no further term.
-const FEWEST_FOR_TERMS: usize = 15;
-/// A colour term is kept where chance alone makes so large a one in one frame of a hundred (standard deviations of a normal deviate): one
-/// too many costs little precision, and one missing makes the zero points of frames with other stars differ.
+/// Minimum number of stars for a zero point.
+pub const MIN_STARS: usize = 5;
+/// Minimum number of stars for a further term.
+const MIN_STARS_FOR_TERMS: usize = 15;
+/// Significance of a colour term, as a normal deviate: one frame in a hundred by chance. A spurious
+/// term costs little precision; a missing one makes zero points of frames with other stars differ.
 const COLOR_SIGMAS: f64 = 2.575_8;
-/// A slope is kept in one frame of a thousand: it says that something is wrong.
+/// Significance of a slope, one frame in a thousand by chance: it is reported as a fault of the
+/// frame.
 const SLOPE_SIGMAS: f64 = 3.290_5;
-/// A colour term is looked for where this part of the stars, or more, have a colour.
-const COLORED_SHARE: f64 = 0.5;
-/// Distance in standard deviations from which on a star does not count: 95 % efficient where there are no outliers.
+/// A colour term is tried where at least this share of the stars has a colour.
+const MIN_COLORED_SHARE: f64 = 0.5;
+/// Residual from which on a star does not count, in standard deviations: 95 % efficient without
+/// outliers.
 const BIWEIGHT_SIGMAS: f64 = 4.685;
-/// No stars agree better than this, in magnitudes.
-const LEAST_SCATTER_MAG: f64 = 0.003;
-/// From the median of absolute deviations to the standard deviation of a normal distribution.
+/// Smallest scatter, in magnitudes.
+const MIN_SCATTER_MAG: f64 = 0.003;
+/// Standard deviation per median absolute deviation, for a normal distribution.
 const SIGMA_PER_MAD: f64 = 1.482_6;
-/// The scatter of few stars is known roughly, and the standard errors are raised by this over the degrees of freedom less 2: so
-/// they are right for drawn stars, from 8 to 200; for 6 they are a fifth too small.
-const FEW_STARS: f64 = 1.5;
-/// No star takes more of its own residual than all but this.
-const LEAST_FREEDOM: f64 = 0.1;
-const MAX_ROUNDS: usize = 30;
-/// A smaller change matters to nobody, in magnitudes.
-const SETTLED_MAG: f64 = 1e-6;
 
-/// A star with its measured flux.
+/// A star of known V magnitude with its measured flux.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MeasuredStar {
-    /// V magnitude of the catalogue.
+pub struct StandardStar {
+    /// V magnitude from the catalogue.
     pub v_mag: f64,
     /// B−V, where known.
     pub bv_mag: Option<f64>,
     /// −2.5 log10(flux).
     pub instrumental_mag: f64,
-    /// Its standard error, of the flux alone.
+    /// Its standard error from the flux alone.
     pub sigma_mag: f64,
 }
 
-/// What makes an instrumental magnitude a V magnitude.
+/// The conversion from instrumental to V magnitudes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZeroPoint {
     /// V magnitude of a star with a flux of 1.
     pub v_mag: f64,
     /// Its standard error.
     pub sigma_mag: f64,
-    /// Standard deviation of a star about the relation, flux noise included; robust.
+    /// Robust standard deviation of a star about the relation, flux noise included.
     pub scatter_mag: f64,
-    /// Stars it is from.
+    /// Number of stars.
     pub stars: usize,
-    /// The B−V for which it holds; none where no star has one.
+    /// The B−V for which it holds; `None` where no star has one.
     pub bv_mag: Option<f64>,
-    /// k, in magnitudes to one magnitude of B−V, where it is needed.
+    /// k, in magnitudes per magnitude of B−V, where it is significant.
     pub color_term: Option<Estimate>,
-    /// Instrumental magnitudes to one magnitude of V: 1 where the grey level is proportional to light. None where there are too
-    /// few stars to tell.
+    /// Instrumental magnitudes per magnitude of V: 1 where grey levels are proportional to light.
+    /// `None` with too few stars.
     pub linearity: Option<Estimate>,
-    /// Mean V magnitude of the stars: where the frame is not linear, the zero point holds there.
+    /// Mean V magnitude of the stars, at which the zero point of a nonlinear frame holds.
     pub mean_v_mag: f64,
-    /// Whether [`Self::linearity`] clearly is not 1.
+    /// Whether [`Self::linearity`] differs significantly from 1.
     pub is_nonlinear: bool,
 }
 
-/// A term that the relation may have besides the zero point.
+/// An optional term of the relation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Term {
     Color,
     Slope,
 }
 
-/// The zero point of `stars`; `None` where they are too few.
-pub fn measure(stars: &[MeasuredStar]) -> Option<ZeroPoint> {
-    if stars.len() < FEWEST_STARS {
+/// Measures the zero point of `stars`; `None` if they are too few.
+pub fn measure(stars: &[StandardStar]) -> Option<ZeroPoint> {
+    if stars.len() < MIN_STARS {
         return None;
     }
-    let colored = |star: &&MeasuredStar| star.bv_mag.is_some();
-    let colored: Vec<MeasuredStar> = stars.iter().filter(colored).copied().collect();
-    let is_colored = colored.len() as f64 >= COLORED_SHARE * stars.len() as f64
+    let colored = |star: &&StandardStar| star.bv_mag.is_some();
+    let colored: Vec<StandardStar> = stars.iter().filter(colored).copied().collect();
+    let is_colored = colored.len() as f64 >= MIN_COLORED_SHARE * stars.len() as f64
         && Relation::fit(&colored, &[Term::Color]).is_some_and(|fit| fit.needs_last_term());
     let (terms, stars) = if is_colored {
         (&[Term::Color][..], &colored[..])
@@ -114,7 +113,7 @@ pub fn measure(stars: &[MeasuredStar]) -> Option<ZeroPoint> {
     }
 }
 
-/// The relation between V and instrumental magnitudes, fitted.
+/// The fitted relation between V and instrumental magnitudes.
 struct Relation {
     terms: Vec<Term>,
     coefficients: DVector<f64>,
@@ -124,46 +123,41 @@ struct Relation {
 }
 
 impl Relation {
-    /// Fits zero point and `terms`. `None` where there are too few stars for them.
-    fn fit(stars: &[MeasuredStar], terms: &[Term]) -> Option<Self> {
+    /// Fits zero point and `terms`; `None` with too few stars.
+    fn fit(stars: &[StandardStar], terms: &[Term]) -> Option<Self> {
+        const MAX_ROUNDS: usize = 30;
+        /// Converged where no coefficient changes by more, in magnitudes.
+        const CONVERGED_MAG: f64 = 1e-6;
         let parameters = 1 + terms.len();
-        if stars.len() < FEWEST_STARS || (parameters > 1 && stars.len() < FEWEST_FOR_TERMS) {
+        if stars.len() < MIN_STARS || (parameters > 1 && stars.len() < MIN_STARS_FOR_TERMS) {
             return None;
         }
-        let mean_mag = mean(stars.iter().map(|star| star.v_mag));
-        let columns = DMatrix::from_fn(stars.len(), parameters, |row, column| {
-            let star = &stars[row];
-            match column.checked_sub(1).map(|term| terms[term]) {
-                None => 1.0,
-                Some(Term::Color) => star.bv_mag.map_or(0.0, |bv| bv - REFERENCE_BV_MAG),
-                Some(Term::Slope) => star.v_mag - mean_mag,
-            }
-        });
+        let columns = design_matrix(stars, terms);
         let offsets = DVector::from_iterator(
             stars.len(),
             stars.iter().map(|star| star.v_mag - star.instrumental_mag),
         );
         let mut coefficients = DVector::zeros(parameters);
         coefficients[0] = median(&mut offsets.iter().copied().collect::<Vec<f64>>());
-        let mut weighing = Weighing::new(stars, parameters);
+        let mut weights = RobustWeights::new(stars, parameters);
         let mut residuals = &offsets - &columns * &coefficients;
-        weighing.weigh(stars, &residuals);
+        weights.update(stars, &residuals);
         for _ in 0..MAX_ROUNDS {
-            let (normal, vector) = weighing.normal(&columns, &offsets);
+            let (normal, vector) = weights.normal(&columns, &offsets);
             let before = coefficients;
             coefficients = normal.cholesky()?.solve(&vector);
-            if (&coefficients - before).amax() < SETTLED_MAG {
+            if (&coefficients - before).amax() < CONVERGED_MAG {
                 break;
             }
             residuals.copy_from(&offsets);
             residuals.gemv(-1.0, &columns, &coefficients, 1.0);
-            weighing.weigh(stars, &residuals);
+            weights.update(stars, &residuals);
         }
         Some(Self {
             terms: terms.to_vec(),
-            covariance: weighing.covariance(&columns)?,
+            covariance: weights.covariance(&columns)?,
             coefficients,
-            scatter_mag: weighing.scatter_mag,
+            scatter_mag: weights.scatter_mag,
             stars: stars.len(),
         })
     }
@@ -180,7 +174,7 @@ impl Relation {
         }
     }
 
-    /// Whether chance hardly makes so large a last term (Student's t test).
+    /// Whether the last term is significant (Student's t test).
     fn needs_last_term(&self) -> bool {
         let last = self.estimate(self.terms.len());
         let degrees_of_freedom = self.stars as f64 - self.coefficients.len() as f64;
@@ -191,7 +185,7 @@ impl Relation {
         last.value.abs() > student_quantile(sigmas, degrees_of_freedom) * last.sigma
     }
 
-    /// Instrumental magnitudes to one of V; the slope is the last term.
+    /// Instrumental magnitudes per magnitude of V; the slope is the last term.
     fn linearity(&self) -> Estimate {
         let slope = self.estimate(self.terms.len());
         Estimate {
@@ -202,7 +196,7 @@ impl Relation {
 
     fn zero_point(
         &self,
-        stars: &[MeasuredStar],
+        stars: &[StandardStar],
         linearity: Option<Estimate>,
         is_nonlinear: bool,
     ) -> ZeroPoint {
@@ -224,48 +218,62 @@ impl Relation {
     }
 }
 
-/// How much each star counts, from the residuals so far.
-struct Weighing {
-    /// The median variance of the fluxes' noise.
-    typical: f64,
-    /// What a scatter found must be multiplied by, as parameters were fitted.
-    used_up: f64,
+/// The columns of the linear model: 1, and one column per term.
+fn design_matrix(stars: &[StandardStar], terms: &[Term]) -> DMatrix<f64> {
+    let mean_mag = mean(stars.iter().map(|star| star.v_mag));
+    DMatrix::from_fn(stars.len(), 1 + terms.len(), |row, column| {
+        let star = &stars[row];
+        match column.checked_sub(1).map(|term| terms[term]) {
+            None => 1.0,
+            Some(Term::Color) => star.bv_mag.map_or(0.0, |bv| bv - REFERENCE_BV_MAG),
+            Some(Term::Slope) => star.v_mag - mean_mag,
+        }
+    })
+}
+
+/// The weight of each star, from the residuals so far.
+struct RobustWeights {
+    /// Median variance of the fluxes' noise.
+    typical_variance: f64,
+    /// Correction of the scatter for the fitted parameters.
+    freedom_factor: f64,
     scatter_mag: f64,
     absolute: Vec<f64>,
-    /// 1 / σ², less for outliers.
+    /// 1 / σ², smaller for outliers.
     weights: Vec<f64>,
     /// Weight times residual, and its derivative.
     pulls: Vec<f64>,
     curvatures: Vec<f64>,
 }
 
-impl Weighing {
-    fn new(stars: &[MeasuredStar], parameters: usize) -> Self {
+impl RobustWeights {
+    fn new(stars: &[StandardStar], parameters: usize) -> Self {
         let count = stars.len() as f64;
         let mut variances: Vec<f64> = stars.iter().map(|star| star.sigma_mag.powi(2)).collect();
-        let room = || Vec::with_capacity(stars.len());
+        let buffer = || Vec::with_capacity(stars.len());
         Self {
-            typical: median(&mut variances),
-            used_up: (count / (count - parameters as f64)).sqrt(),
+            typical_variance: median(&mut variances),
+            freedom_factor: (count / (count - parameters as f64)).sqrt(),
             scatter_mag: 0.0,
-            absolute: room(),
-            weights: room(),
-            pulls: room(),
-            curvatures: room(),
+            absolute: buffer(),
+            weights: buffer(),
+            pulls: buffer(),
+            curvatures: buffer(),
         }
     }
 
-    /// Weighs the stars by their `residuals`.
-    fn weigh(&mut self, stars: &[MeasuredStar], residuals: &DVector<f64>) {
+    /// Updates scatter and weights from the `residuals`.
+    fn update(&mut self, stars: &[StandardStar], residuals: &DVector<f64>) {
         self.absolute.clear();
         self.absolute.extend(residuals.iter().map(|r| r.abs()));
-        self.scatter_mag = SIGMA_PER_MAD * median(&mut self.absolute) * self.used_up;
-        let besides = (self.scatter_mag.powi(2) - self.typical).max(LEAST_SCATTER_MAG.powi(2));
+        self.scatter_mag = SIGMA_PER_MAD * median(&mut self.absolute) * self.freedom_factor;
+        let extra_variance =
+            (self.scatter_mag.powi(2) - self.typical_variance).max(MIN_SCATTER_MAG.powi(2));
         self.weights.clear();
         self.pulls.clear();
         self.curvatures.clear();
         for (star, residual) in stars.iter().zip(residuals.iter()) {
-            let variance = star.sigma_mag.powi(2) + besides;
+            let variance = star.sigma_mag.powi(2) + extra_variance;
             let off_sq = (residual.powi(2) / (BIWEIGHT_SIGMAS.powi(2) * variance)).min(1.0);
             let weight = (1.0 - off_sq).powi(2) / variance;
             self.weights.push(weight);
@@ -295,30 +303,39 @@ impl Weighing {
         (matrix, vector)
     }
 
-    /// The covariance of the coefficients, from the residuals themselves; each is raised by what its own star took of it.
+    /// The covariance of the coefficients, estimated from the residuals (sandwich estimator), each
+    /// divided by 1 − leverage.
     ///
     /// # Reference
-    /// Huber 1981, Robust Statistics, eq. 7.6.3; MacKinnon & White 1985, J. Econometrics 29, 305 (their HC3).
+    /// Huber 1981, Robust Statistics, eq. 7.6.3; MacKinnon & White 1985, J. Econometrics 29, 305
+    /// (their HC3).
     fn covariance(&self, columns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        /// Smallest 1 − leverage of a star.
+        const MIN_FREEDOM: f64 = 0.1;
+        /// The scatter of few stars is uncertain, so the standard errors are raised by this over
+        /// the degrees of freedom minus 2. They are then right for simulated frames of 8 to 200
+        /// stars; with 6 stars they are a fifth too small.
+        const FEW_STARS: f64 = 1.5;
         let scaled = |factor: &dyn Fn(usize) -> f64| {
             DMatrix::from_fn(columns.nrows(), columns.ncols(), |row, column| {
                 factor(row) * columns[(row, column)]
             })
         };
         let bread = (scaled(&|row| self.curvatures[row]).transpose() * columns).try_inverse()?;
-        let leverages = columns * &bread;
-        let own = |row: usize| self.weights[row] * leverages.row(row).dot(&columns.row(row));
-        let pulls = scaled(&|row| self.pulls[row] / (1.0 - own(row)).max(LEAST_FREEDOM));
+        let projected = columns * &bread;
+        let leverage = |row: usize| self.weights[row] * projected.row(row).dot(&columns.row(row));
+        let pulls = scaled(&|row| self.pulls[row] / (1.0 - leverage(row)).max(MIN_FREEDOM));
         let free = (columns.nrows() - columns.ncols()) as f64;
-        let rough_scale = 1.0 + FEW_STARS / (free - 2.0).max(1.0);
-        Some(&bread * (pulls.transpose() * &pulls) * &bread * rough_scale.powi(2))
+        let scale = 1.0 + FEW_STARS / (free - 2.0).max(1.0);
+        Some(&bread * (pulls.transpose() * &pulls) * &bread * scale.powi(2))
     }
 }
 
-/// What a deviate of Student's distribution exceeds as seldom as a normal one exceeds `z`.
+/// The quantile of Student's distribution with the tail probability of the normal quantile `z`.
 ///
 /// # Reference
-/// Abramowitz & Stegun 1964, eq. 26.7.5, to the second order: within 2 % from 10 degrees of freedom.
+/// Abramowitz & Stegun 1964, eq. 26.7.5, to the second order: within 2 % from 10 degrees of
+/// freedom.
 fn student_quantile(z: f64, degrees_of_freedom: f64) -> f64 {
     let first = (z.powi(3) + z) / 4.0;
     let second = (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0;
@@ -337,7 +354,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, Normal};
 
-    /// How stars are drawn.
+    /// The parameters of simulated stars.
     #[derive(Clone, Copy)]
     struct Stars {
         count: usize,
@@ -358,7 +375,7 @@ mod tests {
     };
 
     impl Stars {
-        fn draw(&self, seed: u64) -> Vec<MeasuredStar> {
+        fn draw(&self, seed: u64) -> Vec<StandardStar> {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             let normal = Normal::new(0.0, 1.0).unwrap();
             let mut star = || {
@@ -371,7 +388,7 @@ mod tests {
                     sigma_mag.hypot(self.scatter) * normal.sample(&mut random)
                 };
                 let color = self.color_term * (bv_mag - REFERENCE_BV_MAG);
-                MeasuredStar {
+                StandardStar {
                     v_mag,
                     bv_mag: Some(bv_mag),
                     instrumental_mag: 6.0 + self.linearity * (v_mag - 6.0)
@@ -384,9 +401,9 @@ mod tests {
             (0..self.count).map(|_| star()).collect()
         }
 
-        fn measured(&self, frames: u64) -> Vec<ZeroPoint> {
-            let measured = |seed| measure(&self.draw(seed)).unwrap();
-            (0..frames).map(measured).collect()
+        fn zero_points(&self, frames: u64) -> Vec<ZeroPoint> {
+            let zero_point = |seed| measure(&self.draw(seed)).unwrap();
+            (0..frames).map(zero_point).collect()
         }
     }
 
@@ -400,7 +417,7 @@ mod tests {
     #[test]
     fn the_zero_point_is_found_within_its_standard_error() {
         for count in [8, 12, 40, 200] {
-            let found = Stars { count, ..TYPICAL }.measured(600);
+            let found = Stars { count, ..TYPICAL }.zero_points(600);
             let pulls: Vec<f64> = found
                 .iter()
                 .map(|zero| (zero.v_mag - TYPICAL.zero_point) / zero.sigma_mag)
@@ -420,7 +437,7 @@ mod tests {
             outliers: 0.15,
             ..TYPICAL
         };
-        let found = stars.measured(200);
+        let found = stars.zero_points(200);
         let off: Vec<f64> = found
             .iter()
             .map(|zero| zero.v_mag - stars.zero_point)
@@ -435,14 +452,14 @@ mod tests {
     fn terms_are_not_kept_where_chance_alone_makes_them() {
         const FRAMES: u64 = 3000;
         for count in [15, 20, 60] {
-            let found = Stars { count, ..TYPICAL }.measured(FRAMES);
+            let found = Stars { count, ..TYPICAL }.zero_points(FRAMES);
             let colored = found
                 .iter()
                 .filter(|zero| zero.color_term.is_some())
                 .count();
             let sloping = found.iter().filter(|zero| zero.is_nonlinear).count();
             println!("{count} stars: {colored} color terms, {sloping} slopes in {FRAMES} frames");
-            // The median absolute deviation of few stars is a rough scale, which raises the rates.
+            // The median absolute deviation of few stars is uncertain, which raises the rates.
             assert!(colored as f64 <= 0.025 * FRAMES as f64, "{colored}");
             assert!(sloping as f64 <= 0.006 * FRAMES as f64, "{sloping}");
         }
@@ -455,7 +472,7 @@ mod tests {
             color_term: 0.25,
             ..TYPICAL
         };
-        let found = stars.measured(200);
+        let found = stars.zero_points(200);
         let kept: Vec<_> = found
             .iter()
             .filter_map(|zero| Some((zero, zero.color_term?)))
@@ -479,7 +496,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tone_curve_is_noticed() {
+    fn a_tone_curve_is_detected() {
         let stars = Stars {
             linearity: 0.45,
             ..TYPICAL
@@ -491,7 +508,7 @@ mod tests {
             (linearity.value - 0.45).abs() < 4.0 * linearity.sigma,
             "{found:?}"
         );
-        // The curve is no scatter.
+        // The tone curve does not count as scatter.
         assert!(found.scatter_mag < 2.0 * TYPICAL.scatter, "{found:?}");
     }
 
@@ -504,8 +521,8 @@ mod tests {
             (found.bv_mag, found.color_term, found.stars),
             (None, None, 40)
         );
-        assert_eq!(measure(&stars[..FEWEST_STARS - 1]), None);
-        let same = vec![stars[0]; FEWEST_STARS];
+        assert_eq!(measure(&stars[..MIN_STARS - 1]), None);
+        let same = vec![stars[0]; MIN_STARS];
         assert!(measure(&same).is_some_and(|zero| zero.sigma_mag.is_finite()));
     }
 

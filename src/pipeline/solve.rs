@@ -11,7 +11,7 @@ use crate::calibration::Calibration;
 use crate::detect::{self, DetectError, Detections};
 use crate::frame::{self, Frame, FrameError};
 use crate::identify::{IndexedCatalog, Priors};
-use crate::photometry::{self, FramePhotometry, MeasuredFrame};
+use crate::photometry::{self, FramePhotometry, IdentifiedFrame};
 use std::num::NonZeroUsize;
 use std::path::Path;
 
@@ -138,7 +138,7 @@ fn measure_photometry(
     priors: &Priors,
     indexed: &IndexedCatalog,
 ) -> Option<FramePhotometry> {
-    let frame = MeasuredFrame {
+    let frame = IdentifiedFrame {
         detections,
         identification: outcome.identification()?,
         years_since_j2000: priors.years_since_j2000(),

@@ -43,7 +43,7 @@ impl Solved<'_> {
             detect: self.context.detect.clone(),
             size_px: [self.frame.width, self.frame.height],
             exposure_s: self.priors.exposure_s,
-            level_adu: self.detections.background_adu,
+            background_adu: self.detections.background_adu,
             noise_adu: self.detections.noise_adu,
             spot_sigma_px: found.map(|_| self.detections.spot_sigma_px),
             pixel_scale_rad: found.map(|found| 1.0 / found.camera.focal_length_px),

@@ -15,7 +15,7 @@ use crate::camera::Distortion;
 use crate::detect::DetectionFlags;
 use crate::identify::{FrameDate, Identification, StarMatch};
 use crate::photometry::FramePhotometry;
-use crate::photometry::completeness::Bin;
+use crate::photometry::completeness::MagnitudeBin;
 use crate::pipeline::{Background, Note, Outcome, Solution, Source, Timing};
 use crate::sky::catalog::Catalog;
 use crate::sky::observer::Observation;
@@ -212,7 +212,7 @@ fn photometry(measured: &FramePhotometry) -> PhotometryReport {
     let limit = measured.completeness.limit;
     let fitted = limit.as_ref().ok();
     let mag = |value: f64| finite(value, MAG_DECIMALS);
-    let step = |bin: &Bin| CompletenessReport {
+    let step = |bin: &MagnitudeBin| CompletenessReport {
         vmag: to_decimals(bin.v_mag, MAG_DECIMALS),
         stars: bin.stars,
         detected: bin.detected,

@@ -1,0 +1,57 @@
+//! The two sides of the comparison: the stated camera and the measured frame.
+
+use crate::base::statistics::Estimate;
+use crate::camera::data_sheet::DataSheet;
+use crate::detect::DetectConfig;
+use crate::model::sensitivity::Extinction;
+
+/// The camera with which a frame was taken, as stated by the user.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StatedCamera {
+    /// Its data sheet.
+    pub sheet: DataSheet,
+    /// Zenith distance of the frame's centre, in degrees. Default: that of site and date, else that
+    /// of the header, else 0.
+    pub zenith_distance_deg: Option<f64>,
+    /// Atmospheric extinction; default: that of the model.
+    pub extinction: Option<Extinction>,
+}
+
+/// What was measured in a frame; `None` where unknown.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameMeasurement<'a> {
+    /// The configuration of the detection.
+    pub detect: DetectConfig,
+    /// Columns and rows.
+    pub size_px: [usize; 2],
+    /// Exposure, in seconds.
+    pub exposure_s: Option<f64>,
+    /// Median level of the background, in ADU.
+    pub background_adu: f64,
+    /// Background noise of one pixel (standard deviation), in ADU.
+    pub noise_adu: f64,
+    /// Standard deviation of a star's spot, in pixels.
+    pub spot_sigma_px: Option<f64>,
+    /// Pixel scale, in radians.
+    pub pixel_scale_rad: Option<f64>,
+    /// Apparent zenith distance of the centre from site, date and attitude, in degrees; above 90
+    /// below the horizon.
+    pub zenith_distance_deg: Option<f64>,
+    /// Zenith distance of the centre from the file's header, in degrees.
+    pub header_zenith_distance_deg: Option<f64>,
+    /// V magnitude of a star that gives 1 ADU/s.
+    pub zero_point_vmag: Option<Estimate>,
+    /// B−V of the stars of the zero point, where known.
+    pub zero_point_colors_mag: &'a [f64],
+    /// Whether the zero point has a colour term and holds for
+    /// [`REFERENCE_BV_MAG`](crate::photometry::zero_point::REFERENCE_BV_MAG), instead of for the
+    /// mean of its stars.
+    pub has_color_term: bool,
+    /// V magnitude at which half of the stars are detected.
+    pub limit_vmag: Option<Estimate>,
+    /// V magnitude of the faintest identified star.
+    pub faintest_vmag: Option<f64>,
+    /// V magnitudes of all catalogue stars in the field, also of those fainter than the frame
+    /// shows.
+    pub field_vmag: &'a [f64],
+}

@@ -1,0 +1,17 @@
+//! The input of the photometry.
+
+use crate::detect::Detections;
+use crate::identify::Identification;
+
+/// An identified frame.
+#[derive(Debug, Clone, Copy)]
+pub struct IdentifiedFrame<'a> {
+    /// The detections.
+    pub detections: &'a Detections,
+    /// Camera, attitude and matches; the matches are indices into the detections.
+    pub identification: &'a Identification,
+    /// Date of the frame, in Julian years since J2000.0.
+    pub years_since_j2000: f64,
+    /// Exposure in seconds, where known.
+    pub exposure_s: Option<f64>,
+}
