@@ -14,7 +14,7 @@ use starpipe::identify::{
 };
 use starpipe::pipeline::star_field;
 use starpipe::sky::catalog::Catalog;
-use starpipe::study::robustness::{Answer, Observation, Protocol};
+use starpipe::study::robustness::{Answer, Protocol, SimulatedCentroids};
 use std::error::Error;
 use std::f64::consts::SQRT_2;
 use std::time::Instant;
@@ -107,7 +107,7 @@ fn simulated(fields: u64, indexed: &IndexedCatalog) {
             ..Protocol::default()
         };
         let mut random = ChaCha8Rng::seed_from_u64(number);
-        let drawn = Observation::draw(&protocol, indexed, &mut random);
+        let drawn = SimulatedCentroids::draw(&protocol, indexed, &mut random);
         let field = drawn.list.star_field(0.0);
         for (times, priors) in [
             (&mut nothing, Priors::default()),

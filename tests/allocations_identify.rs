@@ -10,7 +10,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use starpipe::identify::{IndexedCatalog, Priors, SearchFailure, StarField, Workspace};
 use starpipe::sky::catalog::Catalog;
-use starpipe::study::robustness::{Observation, Protocol};
+use starpipe::study::robustness::{Protocol, SimulatedCentroids};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -63,7 +63,7 @@ fn fields(sky: &IndexedCatalog) -> Vec<StarField> {
             ..Protocol::default()
         };
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut field = Observation::draw(&protocol, sky, &mut random)
+        let mut field = SimulatedCentroids::draw(&protocol, sky, &mut random)
             .list
             .star_field(0.0);
         // With a known spot, blends are searched for.

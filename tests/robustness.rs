@@ -13,7 +13,7 @@ use serde_json::Value;
 use starpipe::identify::{IndexedCatalog, Priors, identify};
 use starpipe::sky::catalog::Catalog;
 use starpipe::sky::catalog::StarIndex;
-use starpipe::study::robustness::{Answer, Mirrored, Observation, Protocol, Verdict};
+use starpipe::study::robustness::{Answer, Mirrored, Protocol, SimulatedCentroids, TrialResult};
 use std::sync::OnceLock;
 
 fn sky() -> &'static IndexedCatalog<'static> {
@@ -21,8 +21,8 @@ fn sky() -> &'static IndexedCatalog<'static> {
     SKY.get_or_init(|| IndexedCatalog::build(Catalog::built_in(), &|_| ()))
 }
 
-fn draw(protocol: &Protocol, seed: u64) -> Observation {
-    Observation::draw(protocol, sky(), &mut ChaCha8Rng::seed_from_u64(seed))
+fn draw(protocol: &Protocol, seed: u64) -> SimulatedCentroids {
+    SimulatedCentroids::draw(protocol, sky(), &mut ChaCha8Rng::seed_from_u64(seed))
 }
 
 /// Rows of `starpipe robustness` with these options.
@@ -109,9 +109,9 @@ fn a_wrong_pointing_is_a_wrong_answer_and_a_wrong_name_is_counted() {
     let observation = draw(&Protocol::default(), 3);
     let field = observation.list.star_field(0.0);
     let found = identify(&field, &Priors::default(), sky());
-    let verdict = Verdict::new(&observation, found.as_ref().ok(), 0.0);
-    assert_eq!(verdict.answer, Answer::Right);
-    assert_eq!(verdict.misnamed, 0);
+    let result = TrialResult::new(&observation, found.as_ref().ok(), 0.0);
+    assert_eq!(result.answer, Answer::Right);
+    assert_eq!(result.misnamed, 0);
     let Ok(found) = found else {
         panic!("{found:?}");
     };
@@ -119,14 +119,14 @@ fn a_wrong_pointing_is_a_wrong_answer_and_a_wrong_name_is_counted() {
     for turn in [Vector3::new(0.0, 0.0035, 0.0), Vector3::new(0.0, 0.0, 0.05)] {
         let mut off = found.clone();
         off.icrs_to_camera = off.icrs_to_camera.then_turn(turn);
-        let verdict = Verdict::new(&observation, Some(&off), 0.0);
-        assert_eq!(verdict.answer, Answer::Wrong, "{turn}");
+        let result = TrialResult::new(&observation, Some(&off), 0.0);
+        assert_eq!(result.answer, Answer::Wrong, "{turn}");
     }
     let mut misnamed = found.clone();
     let other = misnamed.matches[0].star.get() + 1;
     misnamed.matches[0].star = StarIndex::new(other);
-    let verdict = Verdict::new(&observation, Some(&misnamed), 0.0);
-    assert_eq!((verdict.answer, verdict.misnamed), (Answer::Right, 1));
+    let result = TrialResult::new(&observation, Some(&misnamed), 0.0);
+    assert_eq!((result.answer, result.misnamed), (Answer::Right, 1));
 }
 
 #[test]

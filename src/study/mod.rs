@@ -1,4 +1,5 @@
-//! Is it good enough: validation over simulated frames, robustness of identification, and the paper's experiments.
+//! Is it good enough? Validation with simulated frames, robustness of the identification, and the
+//! experiments of a paper.
 
 pub mod defocus;
 pub mod experiment;

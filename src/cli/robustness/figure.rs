@@ -6,7 +6,7 @@ use crate::cli::plot::{
     Panel, Sheet, chart_on, plot_error,
 };
 use plotters::prelude::*;
-use starpipe::study::robustness::{Parameter, Row};
+use starpipe::study::robustness::{CaseResult, Parameter};
 
 const PANELS_ABREAST: usize = 2;
 const TABLE_WIDTH_PX: u32 = 900;
@@ -35,13 +35,13 @@ pub(super) fn sweeps(rows: &[SweptRow]) -> Option<Sheet> {
 /// The rates over the values of one parameter.
 fn panel(parameter: Parameter, rows: &[SweptRow]) -> Panel {
     let of_parameter = |row: &SweptRow| row.swept.filter(|(swept, _)| *swept == parameter);
-    let mut points: Vec<(f64, &Row)> = rows
+    let mut points: Vec<(f64, &CaseResult)> = rows
         .iter()
         .filter_map(|row| of_parameter(row).map(|(_, value)| (value, &row.row)))
         .collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let line = |label: &str, colour, count: fn(&Row) -> usize| {
-        let percent = |row: &Row| 100.0 * count(row) as f64 / row.counted.max(1) as f64;
+    let line = |label: &str, colour, count: fn(&CaseResult) -> usize| {
+        let percent = |row: &CaseResult| 100.0 * count(row) as f64 / row.counted.max(1) as f64;
         let line = points.iter().map(|(value, row)| (*value, percent(row)));
         Layer::new(label, colour, Marks::Line(line.collect()))
     };
@@ -74,7 +74,7 @@ impl Figure for RateTable<'_> {
 
     fn draw<B: DrawingBackend>(&self, area: &Area<B>) -> anyhow::Result<()> {
         let counted = self.0.iter().map(|swept| &swept.row);
-        let counted: Vec<&Row> = counted.filter(|row| row.counted > 0).collect();
+        let counted: Vec<&CaseResult> = counted.filter(|row| row.counted > 0).collect();
         let worst = counted.iter().map(|row| row.right_low_percent);
         let lowest = (worst.fold(99.0, f64::min) - 0.2).max(0.0);
         let last = counted.len() as f64;

@@ -18,7 +18,9 @@ use anyhow::Context;
 use args::{MirroredArg, ProtocolOptions};
 use figure::RateTable;
 use starpipe::identify::Photometry;
-use starpipe::study::robustness::{Case, Mirrored, Parameter, Protocol, Row, run, standard_cases};
+use starpipe::study::robustness::{
+    Case, CaseResult, Mirrored, Parameter, Protocol, run, standard_cases,
+};
 use table::SweptRow;
 
 /// `starpipe robustness`
@@ -101,7 +103,7 @@ fn rows(arguments: &RobustnessArgs) -> Result<Vec<SweptRow>, CommandError> {
     let done = || progress.inc(1);
     let row = |(case, swept): (Case, Option<(Parameter, f64)>)| {
         let tally = pool.install(|| run(&indexed, &case.protocol, trials, seed, &done));
-        let row = Row::new(&case, &tally, arguments.least_true_stars);
+        let row = CaseResult::new(&case, &tally, arguments.least_true_stars);
         SweptRow { row, swept }
     };
     let rows = cases.into_iter().map(row).collect();

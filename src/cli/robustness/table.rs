@@ -1,11 +1,11 @@
 //! The table as text.
 
 use super::args::RobustnessArgs;
-use starpipe::study::robustness::{Parameter, Row};
+use starpipe::study::robustness::{CaseResult, Parameter};
 
 /// A row of the table, and the parameter and value that are swept in it.
 pub(super) struct SweptRow {
-    pub(super) row: Row,
+    pub(super) row: CaseResult,
     pub(super) swept: Option<(Parameter, f64)>,
 }
 
@@ -55,7 +55,7 @@ fn introduction(arguments: &RobustnessArgs) -> String {
     )
 }
 
-fn line(row: &Row) -> String {
+fn line(row: &CaseResult) -> String {
     let (rate, interval) = match row.counted {
         0 => ("–".to_owned(), "–".to_owned()),
         _ => (

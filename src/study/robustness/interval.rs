@@ -5,10 +5,7 @@ use crate::base::statistics::log10_binomial_tail;
 /// The level of confidence of an [`Interval`].
 pub const CONFIDENCE: f64 = 0.95;
 
-/// Halvings of [0, 1]: to better than 10⁻⁹.
-const BISECTIONS: usize = 32;
-
-/// Where a probability lies with [`CONFIDENCE`]: each end is exceeded with half of what is left.
+/// A confidence interval of level [`CONFIDENCE`]; both tails have the same probability.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {
     /// Lower end.
@@ -21,22 +18,24 @@ impl Interval {
     /// The interval after `hits` in `trials` (Clopper & Pearson 1934, Biometrika 26, 404); [0, 1] without trials.
     pub fn of(hits: usize, trials: usize) -> Self {
         let log10_tail = ((1.0 - CONFIDENCE) / 2.0).log10();
-        // So likely that as many are no longer unlikely, and the same for the misses.
-        let least = |count: usize| {
+        // The probability at which `count` or more become likely enough.
+        let low = |count: usize| {
             if count == 0 {
                 return 0.0;
             }
             bisect(|p| log10_binomial_tail(trials, count, p) < log10_tail)
         };
         Self {
-            low: least(hits),
-            high: 1.0 - least(trials - hits),
+            low: low(hits),
+            high: 1.0 - low(trials - hits),
         }
     }
 }
 
-/// Where in [0, 1] `below` turns false.
+/// The point in [0, 1] where `below` becomes false.
 fn bisect(below: impl Fn(f64) -> bool) -> f64 {
+    /// To better than 10⁻⁹.
+    const BISECTIONS: usize = 32;
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..BISECTIONS {
         let middle = 0.5 * (low + high);
@@ -69,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn without_trials_nothing_is_known() {
+    fn without_trials_the_interval_is_everything() {
         close(Interval::of(0, 0), 0.0, 1.0);
     }
 }

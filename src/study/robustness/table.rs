@@ -1,91 +1,51 @@
-//! Protocols in rows: the standard table, sweeps over one parameter, and what came of each.
+//! The standard table, sweeps over one parameter, and their results.
 
-use super::{Answer, Mirrored, Protocol, Tally};
+use super::protocol::{Mirrored, Protocol};
+use super::trial::{Answer, TrialResults};
 use crate::identify::Photometry;
 use serde::Serialize;
 
 /// Fields of view of the standard table, in degrees.
 pub const STANDARD_FOV_DEG: [f64; 5] = [2.5, 5.0, 10.0, 20.0, 40.0];
-/// The field of view at which the standard table varies the rest, in degrees.
+/// The field of view at which the standard table varies other parameters, in degrees.
 pub const VARIED_FOV_DEG: f64 = 10.0;
 
-/// A protocol, and what it is called in a table.
+/// A protocol with its label in a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Case {
-    /// What is special about it.
+    /// Label of the case.
     pub label: String,
     /// The protocol.
     pub protocol: Protocol,
 }
 
-/// The standard table: `base` at five fields of view, then with one thing worse at a time.
+/// The standard table: `base` at five fields of view, then with one parameter worse at a time.
 pub fn standard_cases(base: &Protocol) -> Vec<Case> {
-    let case = |label: &str, protocol: Protocol| Case {
-        label: label.to_owned(),
-        protocol,
+    let case = |label: &str, change: &dyn Fn(&mut Protocol)| {
+        let mut protocol = Protocol {
+            fov_deg: VARIED_FOV_DEG,
+            ..*base
+        };
+        change(&mut protocol);
+        Case {
+            label: label.to_owned(),
+            protocol,
+        }
     };
-    let fields = STANDARD_FOV_DEG.map(|fov_deg| {
-        let label = format!("{fov_deg}° field");
-        case(&label, Protocol { fov_deg, ..*base })
-    });
-    let varied = Protocol {
-        fov_deg: VARIED_FOV_DEG,
-        ..*base
-    };
-    let mut cases = fields.to_vec();
-    cases.extend([
-        case(
-            "centroids 1 px off",
-            Protocol {
-                centroid_sigma_px: 1.0,
-                ..varied
-            },
-        ),
-        case(
-            "centroids 2 px off",
-            Protocol {
-                centroid_sigma_px: 2.0,
-                ..varied
-            },
-        ),
-        case(
-            "magnitudes 0.5 off",
-            Protocol {
-                mag_sigma: 0.5,
-                ..varied
-            },
-        ),
-        case(
-            "as many false stars as true",
-            Protocol {
-                false_stars: 1.0,
-                ..varied
-            },
-        ),
-        case(
-            "field of view unknown",
-            Protocol {
-                scale_error: None,
-                ..varied
-            },
-        ),
-        case(
-            "half as many stars",
-            Protocol {
-                mean_stars: base.mean_stars / 2.0,
-                ..varied
-            },
-        ),
-        case(
-            "no true star at all",
-            Protocol {
-                missing: 1.0,
-                false_stars: 1.0,
-                ..varied
-            },
-        ),
-    ]);
-    cases
+    let fields = STANDARD_FOV_DEG
+        .map(|fov_deg| case(&format!("{fov_deg}° field"), &|p| p.fov_deg = fov_deg));
+    let varied = [
+        case("centroids 1 px off", &|p| p.centroid_sigma_px = 1.0),
+        case("centroids 2 px off", &|p| p.centroid_sigma_px = 2.0),
+        case("magnitudes 0.5 off", &|p| p.mag_sigma = 0.5),
+        case("as many false stars as true", &|p| p.false_stars = 1.0),
+        case("field of view unknown", &|p| p.scale_error = None),
+        case("half as many stars", &|p| p.mean_stars /= 2.0),
+        case("no true star at all", &|p| {
+            (p.missing, p.false_stars) = (1.0, 1.0)
+        }),
+    ];
+    fields.into_iter().chain(varied).collect()
 }
 
 /// A parameter that can be swept.
@@ -106,7 +66,7 @@ pub enum Parameter {
 }
 
 impl Parameter {
-    /// All of them.
+    /// All parameters.
     pub const ALL: [Self; 6] = [
         Self::FieldOfView,
         Self::Stars,
@@ -116,7 +76,7 @@ impl Parameter {
         Self::FalseStars,
     ];
 
-    /// What it is called as an option.
+    /// Its name as an option.
     pub const fn name(self) -> &'static str {
         match self {
             Self::FieldOfView => "fov",
@@ -128,7 +88,7 @@ impl Parameter {
         }
     }
 
-    /// What it is, and in which unit.
+    /// Description with unit.
     pub const fn title(self) -> &'static str {
         match self {
             Self::FieldOfView => "horizontal field of view (°)",
@@ -156,11 +116,11 @@ impl Parameter {
     }
 }
 
-/// One row of a table: the protocol and what came of it. Rates are in percent, intervals have
+/// The result of a case: one row of the table. Rates are in percent; intervals have
 /// [`CONFIDENCE`](super::CONFIDENCE).
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Row {
-    /// What is special about it.
+pub struct CaseResult {
+    /// Label of the case.
     pub case: String,
     /// See [`Protocol::fov_deg`].
     pub fov_deg: f64,
@@ -178,43 +138,44 @@ pub struct Row {
     pub scale_error_percent: Option<f64>,
     /// See [`Protocol::mirrored`].
     pub mirrored: Mirrored,
-    /// Whether the magnitudes are given as Johnson V (else as fluxes).
+    /// Whether the magnitudes are Johnson V (else fluxes).
     pub johnson_v: bool,
-    /// True stars from which on a trial counts in the rates.
+    /// Minimum number of true stars of a trial that counts in the rates.
     pub least_true_stars: usize,
-    /// All trials.
+    /// Number of trials.
     pub trials: usize,
-    /// Trials with enough true stars: those that follow are of these.
+    /// Number of trials with enough true stars; the following fields count only these.
     pub counted: usize,
-    /// Identified rightly.
+    /// Identified correctly.
     pub right: usize,
-    /// Identified as what they are not.
+    /// Identified wrongly.
     pub wrong: usize,
     /// Not identified.
     pub no_answer: usize,
-    /// The rate of right answers.
+    /// Rate of right answers.
     pub right_percent: f64,
-    /// Its interval's lower end.
+    /// Lower end of its interval.
     pub right_low_percent: f64,
-    /// Its interval's upper end.
+    /// Upper end of its interval.
     pub right_high_percent: f64,
-    /// Wrong answers among all trials, whatever the number of stars.
+    /// Number of wrong answers in all trials, whatever the number of stars.
     pub wrong_of_all: usize,
-    /// The upper end of the interval of the rate of wrong answers among all trials.
+    /// Upper end of the interval of the rate of wrong answers in all trials.
     pub wrong_high_percent: f64,
-    /// Centroids that were named.
+    /// Number of identified centroids.
     pub named: usize,
-    /// Those of them that are another star, or none.
+    /// Number of wrongly identified centroids.
     pub misnamed: usize,
-    /// Median time of an identification over all trials, in milliseconds.
+    /// Median identification time over all trials, in milliseconds.
     pub median_ms: f64,
-    /// Time that 99 of 100 did not exceed, in milliseconds.
+    /// 99th percentile of the identification time, in milliseconds.
     pub p99_ms: f64,
 }
 
-impl Row {
-    /// The row of `case`, of which `all` came; a trial counts in the rates from so many true stars on.
-    pub fn new(case: &Case, all: &Tally, least_true_stars: usize) -> Self {
+impl CaseResult {
+    /// The result of `case` from all its trials. Only trials with at least `least_true_stars` count
+    /// in the rates.
+    pub fn new(case: &Case, all: &TrialResults, least_true_stars: usize) -> Self {
         let counted = all.with_true_stars(least_true_stars);
         let right = counted.interval(Answer::Right);
         let rate = counted.count(Answer::Right) as f64 / counted.trials().max(1) as f64;
@@ -250,9 +211,9 @@ impl Row {
     }
 }
 
-/// A part in percent, to as many digits as a table can use.
-fn percent(part: f64) -> f64 {
-    (part * 1e6).round() / 1e4
+/// A share in percent, to four decimals.
+fn percent(share: f64) -> f64 {
+    (share * 1e6).round() / 1e4
 }
 
 fn milliseconds(time_ms: f64) -> f64 {

@@ -1,6 +1,6 @@
-//! One list of centroids, and the truth about it.
+//! Simulated centroids, and the truth about them.
 
-use super::{Mirrored, Protocol};
+use super::protocol::{Mirrored, Protocol};
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::camera::{CameraModel, focal_length_px};
@@ -12,17 +12,12 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Stars so many standard deviations below the limit may still be observed above it.
-const FAINTEST_SIGMAS: f64 = 4.0;
-/// The flux of a star of V = 0 in lists of instrumental magnitudes: any would do.
-const FLUX_OF_V_0: f64 = 1e8;
-
-/// A list of centroids as a camera would give it.
+/// A simulated list of centroids, with its truth.
 #[derive(Debug, Clone)]
-pub struct Observation {
-    /// What the identification sees, brightest first.
+pub struct SimulatedCentroids {
+    /// The list, brightest first.
     pub list: CentroidList,
-    /// Which star of the catalogue each centroid of the list is; `None` for false ones.
+    /// The catalogue star of each centroid; `None` for false stars.
     pub stars: Vec<Option<StarIndex>>,
     /// The camera.
     pub camera: CameraModel,
@@ -30,8 +25,8 @@ pub struct Observation {
     pub icrs_to_camera: Rotation<Icrs, Camera>,
 }
 
-impl Observation {
-    /// Draws a list as `protocol` says.
+impl SimulatedCentroids {
+    /// Draws a list according to `protocol`.
     pub fn draw(protocol: &Protocol, indexed: &IndexedCatalog, rng: &mut ChaCha8Rng) -> Self {
         let icrs_to_camera = random_rotation(rng);
         let mirrored = match protocol.mirrored {
@@ -42,42 +37,44 @@ impl Observation {
         let (width_px, height_px) = (protocol.width_px as f64, protocol.height_px as f64);
         let focal_px = focal_length_px(width_px, protocol.fov_deg * RAD_PER_DEG);
         let camera = CameraModel::pinhole(width_px, height_px, focal_px, mirrored);
-        let stars = stars_seen(protocol, indexed, (&camera, &icrs_to_camera), rng);
-        let mut drawn = drawn_stars(protocol, &stars, rng);
-        drawn.extend(false_stars(protocol, &stars, rng));
-        drawn.sort_by(|a, b| a.v_mag.total_cmp(&b.v_mag));
+        let stars = observed_stars(protocol, indexed, (&camera, &icrs_to_camera), rng);
+        let mut centroids = listed_stars(protocol, &stars, rng);
+        centroids.extend(false_stars(protocol, &stars, rng));
+        centroids.sort_by(|a, b| a.v_mag.total_cmp(&b.v_mag));
         Self {
             list: CentroidList {
                 width: protocol.width_px,
                 height: protocol.height_px,
                 photometry: protocol.photometry,
-                centroids: drawn
+                centroids: centroids
                     .iter()
-                    .map(|d| d.listed(protocol.photometry))
+                    .map(|centroid| centroid.listed(protocol.photometry))
                     .collect(),
             },
-            stars: drawn.iter().map(|d| d.star).collect(),
+            stars: centroids.iter().map(|centroid| centroid.star).collect(),
             camera,
             icrs_to_camera,
         }
     }
 
-    /// How many of the centroids are stars.
+    /// Number of centroids that are true stars.
     pub fn true_stars(&self) -> usize {
         self.stars.iter().flatten().count()
     }
 }
 
-/// One centroid of the list.
-struct Drawn {
+/// A simulated centroid.
+struct Centroid {
     position: PixelPoint,
     v_mag: f64,
-    /// Which star of the catalogue it is, if any.
+    /// Its catalogue star; `None` for a false star.
     star: Option<StarIndex>,
 }
 
-impl Drawn {
+impl Centroid {
     fn listed(&self, photometry: Photometry) -> ListedCentroid {
+        /// Flux of a star of V = 0 in lists of instrumental magnitudes (arbitrary).
+        const FLUX_OF_V_0: f64 = 1e8;
         let flux = match photometry {
             Photometry::JohnsonV => None,
             Photometry::Instrumental => Some(FLUX_OF_V_0 * 10f64.powf(-0.4 * self.v_mag)),
@@ -90,15 +87,17 @@ impl Drawn {
     }
 }
 
-/// The catalogue's stars on the frame that are above the limit: where they stand, and their observed magnitudes.
-fn stars_seen(
+/// The catalogue stars on the frame above the limit, with true positions and observed magnitudes.
+fn observed_stars(
     protocol: &Protocol,
     indexed: &IndexedCatalog,
     (camera, icrs_to_camera): (&CameraModel, &Rotation<Icrs, Camera>),
     rng: &mut ChaCha8Rng,
-) -> Vec<Drawn> {
+) -> Vec<Centroid> {
+    /// Stars fainter than the limit by this many standard deviations may be observed above it.
+    const MARGIN_SIGMAS: f64 = 4.0;
     let limit_v_mag = limiting_v_mag(protocol, camera, indexed);
-    let faintest = limit_v_mag + FAINTEST_SIGMAS * protocol.mag_sigma;
+    let faintest = limit_v_mag + MARGIN_SIGMAS * protocol.mag_sigma;
     let centre = icrs_to_camera.inverse().apply(&UnitVector::BORESIGHT);
     let mut around = Vec::new();
     indexed
@@ -107,35 +106,35 @@ fn stars_seen(
             around.push(StarIndex::from(star.catalog));
         });
     around.sort_unstable();
-    let seen = |index: StarIndex| {
+    let observed = |index: StarIndex| {
         let star = indexed.catalog().star(index);
         let pixel = camera.pixel_of(&icrs_to_camera.apply(&star.direction));
         let position = pixel.filter(|pixel| camera.contains(pixel))?;
         let v_mag = f64::from(star.v_mag) + protocol.mag_sigma * normal(rng);
-        (v_mag <= limit_v_mag).then_some(Drawn {
+        (v_mag <= limit_v_mag).then_some(Centroid {
             position,
             v_mag,
             star: Some(index),
         })
     };
-    around.into_iter().filter_map(seen).collect()
+    around.into_iter().filter_map(observed).collect()
 }
 
-/// The stars that are not missing, with the errors of their centroids.
-fn drawn_stars(protocol: &Protocol, stars: &[Drawn], rng: &mut ChaCha8Rng) -> Vec<Drawn> {
-    let drawn = |star: &Drawn| {
+/// The stars that are not missing, with centroid errors.
+fn listed_stars(protocol: &Protocol, stars: &[Centroid], rng: &mut ChaCha8Rng) -> Vec<Centroid> {
+    let listed = |star: &Centroid| {
         let [dx, dy] = [normal(rng), normal(rng)].map(|n| protocol.centroid_sigma_px * n);
         let position = PixelPoint::new(star.position.x + dx, star.position.y + dy);
-        (!rng.random_bool(protocol.missing)).then_some(Drawn { position, ..*star })
+        (!rng.random_bool(protocol.missing)).then_some(Centroid { position, ..*star })
     };
-    stars.iter().filter_map(drawn).collect()
+    stars.iter().filter_map(listed).collect()
 }
 
-/// Strewn evenly over the frame, each as bright as a star of this frame taken at random.
-fn false_stars(protocol: &Protocol, stars: &[Drawn], rng: &mut ChaCha8Rng) -> Vec<Drawn> {
+/// False stars, uniform over the frame, each as bright as a random star of this frame.
+fn false_stars(protocol: &Protocol, stars: &[Centroid], rng: &mut ChaCha8Rng) -> Vec<Centroid> {
     let wanted = protocol.false_stars * stars.len() as f64;
     let count = wanted as usize + usize::from(rng.random_bool(wanted.fract()));
-    let mut strewn = || Drawn {
+    let mut false_star = || Centroid {
         position: PixelPoint::new(
             rng.random_range(0.0..protocol.width_px as f64) - 0.5,
             rng.random_range(0.0..protocol.height_px as f64) - 0.5,
@@ -143,16 +142,17 @@ fn false_stars(protocol: &Protocol, stars: &[Drawn], rng: &mut ChaCha8Rng) -> Ve
         v_mag: stars[rng.random_range(0..stars.len())].v_mag,
         star: None,
     };
-    (0..count).map(|_| strewn()).collect()
+    (0..count).map(|_| false_star()).collect()
 }
 
-/// The magnitude to which the sky has, on average, the wanted number of stars on a frame.
+/// The magnitude limit that gives the requested mean number of stars on a frame.
 fn limiting_v_mag(protocol: &Protocol, camera: &CameraModel, indexed: &IndexedCatalog) -> f64 {
     let area_sq_deg = camera.fov_x_rad() * camera.fov_y_rad() * DEG_PER_RAD.powi(2);
     indexed.magnitude_of_density(protocol.mean_stars / area_sq_deg)
 }
 
-/// A rotation taken from all with the same probability: a direction in four dimensions (Shoemake 1992).
+/// A random rotation, uniform over all rotations: a uniform direction in four dimensions (Shoemake
+/// 1992).
 pub fn random_rotation(rng: &mut ChaCha8Rng) -> Rotation<Icrs, Camera> {
     Rotation::from_quaternion(std::array::from_fn(|_| normal(rng)))
 }

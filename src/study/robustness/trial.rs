@@ -1,0 +1,149 @@
+//! Results of trials, and their rates.
+
+use super::centroids::SimulatedCentroids;
+use super::interval::Interval;
+use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation};
+use crate::camera::CameraModel;
+use crate::identify::{Identification, StarMatch};
+use serde::{Deserialize, Serialize};
+
+/// The answer of an identification, compared with the truth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Answer {
+    /// Identified correctly.
+    Right,
+    /// Identified as another field.
+    Wrong,
+    /// Not identified.
+    None,
+}
+
+impl Answer {
+    /// Compares `found` with the true `camera` and attitude.
+    pub fn of(
+        found: &Identification,
+        camera: &CameraModel,
+        icrs_to_camera: &Rotation<Icrs, Camera>,
+    ) -> Self {
+        /// Largest error of a right answer at the centre and the corners, as a share of the frame's
+        /// width. Wrong answers are nearly always off by more than the whole width.
+        const TOLERANCE: f64 = 0.01;
+        let (right, bottom) = (camera.width_px - 1.0, camera.height_px - 1.0);
+        let corners = [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)];
+        let tolerance_rad = TOLERANCE * camera.fov_x_rad();
+        let is_right = |pixel: PixelPoint| {
+            let true_direction = icrs_to_camera.inverse().apply(&camera.direction_of(&pixel));
+            let direction = found
+                .icrs_to_camera
+                .inverse()
+                .apply(&found.camera.direction_of(&pixel));
+            direction.angle_to(&true_direction) <= tolerance_rad
+        };
+        let corners = corners.map(|(x, y)| PixelPoint::new(x, y));
+        if is_right(camera.centre()) && corners.into_iter().all(is_right) {
+            Self::Right
+        } else {
+            Self::Wrong
+        }
+    }
+}
+
+/// The result of one trial.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrialResult {
+    /// The answer.
+    pub answer: Answer,
+    /// Number of true stars in the list.
+    pub true_stars: usize,
+    /// Number of identified centroids.
+    pub named: usize,
+    /// Number of centroids identified as the wrong star, or that are false stars.
+    pub misnamed: usize,
+    /// Time for the identification, in milliseconds.
+    pub time_ms: f64,
+}
+
+impl TrialResult {
+    /// Compares the answer with the truth.
+    pub fn new(
+        centroids: &SimulatedCentroids,
+        found: Option<&Identification>,
+        time_ms: f64,
+    ) -> Self {
+        let (answer, named, misnamed) = match found {
+            None => (Answer::None, 0, 0),
+            Some(found) => {
+                let is_misnamed = |m: &&StarMatch| centroids.stars[m.source.get()] != Some(m.star);
+                let misnamed = found.matches.iter().filter(is_misnamed).count();
+                let answer = Answer::of(found, &centroids.camera, &centroids.icrs_to_camera);
+                (answer, found.matches.len(), misnamed)
+            }
+        };
+        Self {
+            answer,
+            true_stars: centroids.true_stars(),
+            named,
+            misnamed,
+            time_ms,
+        }
+    }
+}
+
+/// The results of many trials.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrialResults {
+    results: Vec<TrialResult>,
+}
+
+impl TrialResults {
+    /// Collects `results`, by the number of the trial.
+    pub fn new(results: Vec<TrialResult>) -> Self {
+        Self { results }
+    }
+
+    /// The results, by the number of the trial.
+    pub fn results(&self) -> &[TrialResult] {
+        &self.results
+    }
+
+    /// The trials with at least `min` true stars.
+    #[must_use]
+    pub fn with_true_stars(&self, min: usize) -> Self {
+        let has_enough = |result: &&TrialResult| result.true_stars >= min;
+        Self::new(self.results.iter().filter(has_enough).copied().collect())
+    }
+
+    /// Number of trials.
+    pub fn trials(&self) -> usize {
+        self.results.len()
+    }
+
+    /// Number of trials with this answer.
+    pub fn count(&self, answer: Answer) -> usize {
+        self.results.iter().filter(|v| v.answer == answer).count()
+    }
+
+    /// Confidence interval of the probability of this answer.
+    pub fn interval(&self, answer: Answer) -> Interval {
+        Interval::of(self.count(answer), self.trials())
+    }
+
+    /// Numbers of identified and of wrongly identified centroids.
+    pub fn names(&self) -> (usize, usize) {
+        self.results
+            .iter()
+            .fold((0, 0), |sum, v| (sum.0 + v.named, sum.1 + v.misnamed))
+    }
+
+    /// The quantile `share` of the identification times, in milliseconds; 0 without trials.
+    pub fn time_quantile_ms(&self, share: f64) -> f64 {
+        let mut times: Vec<f64> = self.results.iter().map(|v| v.time_ms).collect();
+        times.sort_unstable_by(f64::total_cmp);
+        let last = times.len().saturating_sub(1);
+        times
+            .get((share * last as f64).round() as usize)
+            .copied()
+            .unwrap_or(0.0)
+    }
+}
