@@ -19,21 +19,21 @@ pub(crate) const MAX_TAPS: usize = 32;
 pub(crate) const MAX_WINDOW_PX: usize = 49;
 
 /// Adjacent pixels of a row treated together.
-pub(crate) const LANES: usize = 8;
+pub(crate) const GROUP_PX: usize = 8;
 /// Values of a group of adjacent pixels.
-pub(crate) type Lanes = [f32; LANES];
+pub(crate) type PixelGroup = [f32; GROUP_PX];
 /// Groups in the longest side of a window.
-const GROUPS: usize = MAX_WINDOW_PX.div_ceil(LANES);
+const GROUPS: usize = MAX_WINDOW_PX.div_ceil(GROUP_PX);
 
 /// Light per pixel along one axis, and its derivatives.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct AxisProfile {
     /// Fraction of the light in each pixel.
-    value: [Lanes; GROUPS],
+    value: [PixelGroup; GROUPS],
     /// Its derivative with respect to the centre, per px.
-    by_center: [Lanes; GROUPS],
+    by_center: [PixelGroup; GROUPS],
     /// Its derivative with respect to σ, per px.
-    by_sigma: [Lanes; GROUPS],
+    by_sigma: [PixelGroup; GROUPS],
 }
 
 /// An [`AxisProfile`] in one or several pixels, as `T` has it.
@@ -73,7 +73,7 @@ impl AxisProfile {
 
     /// The values in a group of pixels.
     #[inline(always)]
-    pub fn group(&self, group: usize) -> ProfilePart<Lanes> {
+    pub fn group(&self, group: usize) -> ProfilePart<PixelGroup> {
         ProfilePart {
             value: self.value[group],
             by_center: self.by_center[group],

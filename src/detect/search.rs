@@ -8,7 +8,7 @@ use super::background::{FrameBackground, Mesh};
 use super::candidates::{FilteredFrame, PeakSearch, RawPeakFinder, SearchConfig};
 use super::config::DetectConfig;
 use super::filter::Kernel;
-use super::fit::{FitWork, Scene};
+use super::fit::{FitBuffers, FrameMaps};
 use super::pixels::View;
 use super::psf::PIXEL_VARIANCE_PX2;
 use super::star_model::{
@@ -40,9 +40,14 @@ pub(crate) struct SearchInput<'a> {
 }
 
 impl<'a> SearchInput<'a> {
-    /// What fits need to know of the frame.
-    pub fn scene(&self, filtered: Option<&'a Mesh>, spot_px: f64, matched_gain: f64) -> Scene<'a> {
-        Scene {
+    /// The frame with its maps, for the fits.
+    pub fn maps(
+        &self,
+        filtered: Option<&'a Mesh>,
+        spot_px: f64,
+        matched_gain: f64,
+    ) -> FrameMaps<'a> {
+        FrameMaps {
             view: *self.view,
             background: &self.background.mesh,
             filtered,
@@ -96,7 +101,7 @@ pub(crate) struct SearchWork {
     pub found: PeakSearch,
     raw_peaks: RawPeakFinder,
     noise: NoiseWork,
-    fits: FitWork,
+    fits: FitBuffers,
 }
 
 impl SearchWork {
@@ -135,19 +140,19 @@ impl SearchWork {
         raw_peaks.find(view, &input.background.mesh, input.saturation_adu);
         let start_px = config.spot_sigma_px.unwrap_or(DEFAULT_SPOT_PX);
         let matched_gain = Kernel::for_spot(start_px).matched_gain();
-        let mut scene = input.scene(None, start_px, matched_gain);
-        let stars = fit_raw_stars(&scene, &raw_peaks.peaks, fits);
+        let mut maps = input.maps(None, start_px, matched_gain);
+        let stars = fit_raw_stars(&maps, &raw_peaks.peaks, fits);
         let measured = spot_size(&stars);
         if let (None, Some(size)) = (config.spot_sigma_px, measured) {
-            scene.spot_px = size.spot_px;
+            maps.spot_px = size.spot_px;
         }
         let is_enough =
             |size: SpotSize| size.stars >= ENOUGH_RAW_STARS && size.spot_px < SHARP_SPOT_PX;
         if measured.is_some_and(is_enough) {
-            let model = star_model(&scene, stars, fits);
+            let model = star_model(&maps, stars, fits);
             StarEstimate::Settled(input.with_stated_size(model))
         } else {
-            StarEstimate::Guess(scene.spot_px)
+            StarEstimate::Guess(maps.spot_px)
         }
     }
 
@@ -166,8 +171,8 @@ impl SearchWork {
             fits,
             ..
         } = self;
-        let mut scene = input.scene(Some(&filtered.mesh), spot_px, pass.matched_gain);
-        let stars = fit_bright_stars(&scene, &found.peaks, fits);
+        let mut maps = input.maps(Some(&filtered.mesh), spot_px, pass.matched_gain);
+        let stars = fit_bright_stars(&maps, &found.peaks, fits);
         let measured = match input.config.spot_sigma_px {
             None => spot_size(&stars).map(|size| size.spot_px),
             Some(_) => None,
@@ -175,8 +180,8 @@ impl SearchWork {
         let measured_px = measured.unwrap_or(spot_px);
         let ratio = (measured_px / spot_px).max(spot_px / measured_px);
         if ratio < SPOT_GUESS_TOLERANCE || is_last {
-            scene.spot_px = measured_px;
-            let model = star_model(&scene, stars, fits);
+            maps.spot_px = measured_px;
+            let model = star_model(&maps, stars, fits);
             StarEstimate::Settled(input.with_stated_size(model))
         } else {
             StarEstimate::Guess(measured_px)

@@ -2,7 +2,7 @@
 
 use crate::base::coords::PixelPoint;
 use crate::detect::detection::Detection;
-use crate::detect::fit::{Fit, FitWork, NoiseModel, Scene, window_radius};
+use crate::detect::fit::{Fit, FitBuffers, FrameMaps, NoiseModel, window_radius};
 
 /// Grey levels count above this many standard deviations of the background noise.
 const GREY_THRESHOLD_SIGMA: f64 = 3.0;
@@ -18,19 +18,19 @@ const GREY_THRESHOLD_SIGMA: f64 = 3.0;
 /// the threshold, which it leaves open, is subtracted; that brings the error from some 1.4 times
 /// the Cramér-Rao bound to 1.1.
 pub(crate) fn grey_weighted(
-    scene: &Scene<'_>,
+    maps: &FrameMaps<'_>,
     noise: &NoiseModel,
     fit: &Fit,
     detection: &mut Detection,
-    work: &mut FitWork,
+    buffers: &mut FitBuffers,
 ) {
-    let radius = window_radius(scene.spot_px);
-    let unsaturated = Scene {
+    let radius = window_radius(maps.spot_px);
+    let unsaturated = FrameMaps {
         saturation_adu: f32::INFINITY,
-        ..*scene
+        ..*maps
     };
-    let window = &mut work.window;
-    unsaturated.cut(&fit.spots[..1], radius, window);
+    let window = &mut buffers.window;
+    unsaturated.cut_out(&fit.spots[..1], radius, window);
     for threshold_sigma in [GREY_THRESHOLD_SIGMA, 0.0] {
         let threshold = threshold_sigma * window.noise_adu;
         let bright = || {

@@ -1,8 +1,13 @@
 //! Step 6: positions, fluxes and flags of the sources.
 
 mod centroid;
+mod estimate;
+mod known_spots;
 mod measurement;
-mod plateau;
+mod neighbour_grid;
+mod pairs;
+mod saturated_area;
 mod shape;
 
-pub(crate) use measurement::{KnownSpots, MeasureWorker, Measurement};
+pub(crate) use known_spots::KnownSpots;
+pub(crate) use measurement::{MeasureWorker, Measurement};

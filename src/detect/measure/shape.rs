@@ -1,94 +1,94 @@
-//! Whether a source has the shape of a star: hot pixels, wide sources, trails.
+//! Tests whether a source has the shape of a star: hot pixels, wide sources, trails.
 //!
 //! Each flag needs a difference that is large in units of its error *and* large by itself, so that
 //! neither faint noise nor the imperfect spots of bright stars are flagged.
 //!
-//! A hot pixel is told from a sharp star by comparing two hypotheses, all light in one pixel and a
-//! spot somewhat sharper than the frame's. Their chi² differ by `D`. For a true star D is Gaussian
-//! with mean −d² and standard deviation 2d, with d the distance of the two models in units of the
-//! noise; for a hot pixel the mean is +d². A source is flagged where a single pixel fits better
-//! (D > 0) and a star would have a D that high in under one of 150 cases.
+//! A hot pixel and a sharp star are two hypotheses: all light in one pixel, or a spot somewhat sharper
+//! than the frame's. Their chi² differ by `D`. For a true star D is Gaussian with mean −d² and standard
+//! deviation 2d, where d is the distance of the two models in units of the noise; for a hot pixel the
+//! mean is +d². A source is flagged where a single pixel fits better (D > 0) and a star would have a D
+//! that high in under one of 150 cases.
 
-use super::measurement::Measurement;
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::detection::Detection;
-use crate::detect::fit::{Fit, FitConfig, FitWork, NoiseModel, Spot};
+use crate::detect::fit::{Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate};
 
-/// Differences in size or chi² count from this many standard errors on.
-const SIGNIFICANT_SIGMA: f64 = 4.0;
-/// A true star passes for a hot pixel beyond this many standard deviations of its chi² difference.
-const STAR_LOST_SIGMA: f64 = 2.5;
-/// A spot's size may be this part of the frame's before it is too sharp for a star.
-const SHARPEST: f64 = 0.8;
-/// And this multiple of the frame's before it is too wide.
-const WIDEST: f64 = 1.6;
-/// A share of this of the signal is put down to an imperfect spot.
-const SPOT_IMPERFECTION: f64 = 0.03;
-/// Sizes are looked at more closely from this many standard errors on.
-const SUSPICIOUS_SIGMA: f64 = 1.5;
-/// Length over breadth of a trail.
-const TRAIL_ELONGATION: f64 = 2.0;
-/// Length of a trail over that of a star of the same height.
-const TRAIL_LENGTH: f64 = 2.0;
-/// Regions below this area have no elongation to speak of, in pixels.
-const MIN_TRAIL_AREA_PX: usize = 8;
+/// Size of a star's spot, over that of the frame's spot.
+struct StarSize;
 
-/// Sets the flags for sources sharper or wider than the frame's spots; the fit's window is still in `work`.
-pub(crate) fn judge(
-    measurement: &Measurement<'_>,
+impl StarSize {
+    /// Sharper spots are hot pixels or cosmic rays.
+    const MIN: f64 = 0.8;
+    /// Wider spots are extended sources.
+    const MAX: f64 = 1.6;
+    /// A size too small by this many standard errors is tested for a hot pixel.
+    const TESTED_SIGMA: f64 = 1.5;
+    /// A difference in size or chi² is significant at this many standard errors.
+    const SIGNIFICANT_SIGMA: f64 = 4.0;
+}
+
+/// Sets the flags of sources sharper or wider than the frame's spot; the window of the fit is in
+/// `buffers`.
+pub(super) fn flag_size(
+    maps: &FrameMaps<'_>,
     peak: &Peak,
     fit: &Fit,
     detection: &mut Detection,
-    work: &mut FitWork,
+    buffers: &mut FitBuffers,
 ) {
-    let spot_px = measurement.scene.spot_px;
     let excess = fit.size_excess_px / fit.size_error_px;
-    if excess < -SUSPICIOUS_SIGMA {
-        detection.flags.hot_pixel = is_hot_pixel(measurement, peak, fit, work);
+    if excess < -StarSize::TESTED_SIGMA {
+        detection.flags.hot_pixel = is_hot_pixel(maps, peak, fit, buffers);
     } else if !detection.flags.border
-        && excess > SIGNIFICANT_SIGMA
-        && fit.size_excess_px > 0.3 * (WIDEST - 1.0) * spot_px
+        && excess > StarSize::SIGNIFICANT_SIGMA
+        && fit.size_excess_px > 0.3 * (StarSize::MAX - 1.0) * maps.spot_px
     {
-        detection.flags.extended = is_extended(measurement, peak, fit, work);
+        detection.flags.extended = is_extended(maps, peak, fit, buffers);
     }
 }
 
-/// What chi² may differ by, for the share of an imperfect spot.
-fn imperfection(measurement: &Measurement<'_>, peak: &Peak, spot: &Spot) -> f64 {
-    let correlation2 = measurement.scene.correlation_at(spot.x, spot.y).powi(2);
-    (SPOT_IMPERFECTION * f64::from(peak.snr)).powi(2) * correlation2
+/// The difference in chi² that an imperfect spot model may cause.
+fn imperfection(maps: &FrameMaps<'_>, peak: &Peak, spot: &SpotEstimate) -> f64 {
+    /// Error of the spot model over the signal.
+    const MODEL_ERROR: f64 = 0.03;
+    let correlation2 = maps.correlation_at(spot.x, spot.y).powi(2);
+    (MODEL_ERROR * f64::from(peak.snr)).powi(2) * correlation2
 }
 
-/// Whether one pixel explains the source better than any star does.
-fn is_hot_pixel(measurement: &Measurement<'_>, peak: &Peak, fit: &Fit, work: &mut FitWork) -> bool {
+/// Whether a single pixel explains the source better than any star does.
+fn is_hot_pixel(maps: &FrameMaps<'_>, peak: &Peak, fit: &Fit, buffers: &mut FitBuffers) -> bool {
+    /// The chi² difference of a true star exceeds its mean by less than this many standard deviations.
+    const STAR_SIGMA: f64 = 2.5;
     let spot = fit.spots[0];
-    // Plain noise: a noise model that forgives an imperfect spot would forgive a hot pixel, too.
+    // Without shot noise and model errors: these would excuse a hot pixel, too.
     let config = FitConfig {
-        spot_px: SHARPEST * measurement.scene.spot_px,
-        free_spot: false,
+        spot_px: StarSize::MIN * maps.spot_px,
+        free_size: false,
         noise: NoiseModel::default(),
     };
-    let correlation2 = measurement.scene.correlation_at(spot.x, spot.y).powi(2);
-    let allowed = imperfection(measurement, peak, &spot);
-    let is_single = |star: &Fit, work: &mut FitWork| {
-        let [difference, distance2] = against_one_pixel(star, work).map(|v| v / correlation2);
-        let unlike_a_star = difference + distance2 > STAR_LOST_SIGMA * 2.0 * distance2.sqrt();
-        difference > allowed && unlike_a_star
+    let correlation2 = maps.correlation_at(spot.x, spot.y).powi(2);
+    let allowed = imperfection(maps, peak, &spot);
+    let is_single = |star: &Fit, buffers: &mut FitBuffers| {
+        let [difference, distance2] =
+            compare_with_one_pixel(star, buffers).map(|v| v / correlation2);
+        let is_unlike_star = difference + distance2 > STAR_SIGMA * 2.0 * distance2.sqrt();
+        difference > allowed && is_unlike_star
     };
-    // Where even a sharp star that is not fitted is better than a single pixel, one that is fitted is.
+    // Where a sharp star that is not fitted is better than a single pixel, a fitted one is, too.
     let unfitted = Fit {
         spot_px: config.spot_px,
         ..fit.clone()
     };
-    is_single(&unfitted, work) && {
-        let star = work.fitter.fit(&work.window, &fit.spots[..1], &config);
-        is_single(&star, work)
+    is_single(&unfitted, buffers) && {
+        let FitBuffers { fitter, window, .. } = &mut *buffers;
+        let star = fitter.fit(window, &fit.spots[..1], &config);
+        is_single(&star, buffers)
     }
 }
 
-/// What chi² of a star is above that of all its light in one pixel, and the squared distance of the two models.
-fn against_one_pixel(star: &Fit, work: &mut FitWork) -> [f64; 2] {
-    let FitWork { fitter, window, .. } = work;
+/// Chi² of a star less that of all its light in one pixel, and the squared distance of the two models.
+fn compare_with_one_pixel(star: &Fit, buffers: &mut FitBuffers) -> [f64; 2] {
+    let FitBuffers { fitter, window, .. } = buffers;
     let (mut difference, mut distance2) = (0.0, 0.0);
     let mut brightest = (0.0, 0.0);
     for (above, light) in fitter.compare(window, star) {
@@ -105,38 +105,40 @@ fn against_one_pixel(star: &Fit, work: &mut FitWork) -> [f64; 2] {
     ]
 }
 
-/// Whether a spot well wider than the frame's explains the source much better.
-fn is_extended(measurement: &Measurement<'_>, peak: &Peak, fit: &Fit, work: &mut FitWork) -> bool {
-    let spot_px = measurement.scene.spot_px;
-    let free =
-        measurement
-            .scene
-            .fit_free(fit.spots[0], &[], (spot_px, NoiseModel::default()), work);
-    if !free.converged || free.spot_px < WIDEST * spot_px {
+/// Whether a much wider spot than the frame's explains the source much better.
+fn is_extended(maps: &FrameMaps<'_>, peak: &Peak, fit: &Fit, buffers: &mut FitBuffers) -> bool {
+    let spot = fit.spots[0];
+    let size = (maps.spot_px, NoiseModel::default());
+    let free = buffers.fit_free_size(maps, spot, &[], size);
+    if !free.converged || free.spot_px < StarSize::MAX * maps.spot_px {
         return false;
     }
     let config = FitConfig {
-        spot_px: WIDEST * spot_px,
-        free_spot: false,
+        spot_px: StarSize::MAX * maps.spot_px,
+        free_size: false,
         noise: NoiseModel::default(),
     };
-    let star = work.fitter.fit(&work.window, &free.spots, &config);
-    let correlation2 = measurement
-        .scene
-        .correlation_at(fit.spots[0].x, fit.spots[0].y)
-        .powi(2);
-    let allowed = SIGNIFICANT_SIGMA.powi(2) * correlation2;
-    star.chi2 - free.chi2 > allowed + imperfection(measurement, peak, &fit.spots[0])
+    let FitBuffers { fitter, window, .. } = buffers;
+    let star = fitter.fit(window, &free.spots, &config);
+    let correlation2 = maps.correlation_at(spot.x, spot.y).powi(2);
+    let allowed = StarSize::SIGNIFICANT_SIGMA.powi(2) * correlation2;
+    star.chi2 - free.chi2 > allowed + imperfection(maps, peak, &spot)
 }
 
-/// Whether the region of a peak is drawn out beyond what a star of its height covers.
-pub(crate) fn is_trail(region: &Region, peak: &Peak, width_px: f64, threshold: f64) -> bool {
-    if region.peaks > 1 || region.area_px < MIN_TRAIL_AREA_PX {
+/// Whether the region of a peak is longer than a star of its height is wide.
+pub(super) fn is_trail(region: &Region, peak: &Peak, width_px: f64, threshold: f64) -> bool {
+    /// Minimum area, in pixels: smaller regions have no meaningful elongation.
+    const MIN_AREA_PX: usize = 8;
+    /// Minimum ratio of the principal axes.
+    const MIN_ELONGATION: f64 = 2.0;
+    /// Minimum length over that of a star of the same height.
+    const MIN_LENGTH: f64 = 2.0;
+    if region.peaks > 1 || region.area_px < MIN_AREA_PX {
         return false;
     }
     // A filtered star falls to the threshold where r² = 4 s² ln(snr / threshold); 1.5 px for the grid.
     let height = (f64::from(peak.snr) / threshold).max(1.0);
     let radius_px = 2.0 * width_px * height.ln().sqrt() + 1.5;
-    let is_long = region.major_px > TRAIL_LENGTH * 0.5 * radius_px;
-    is_long && region.major_px > TRAIL_ELONGATION * region.minor_px
+    let is_long = region.major_px > MIN_LENGTH * 0.5 * radius_px;
+    is_long && region.major_px > MIN_ELONGATION * region.minor_px
 }

@@ -4,7 +4,7 @@
 //! rays are sharper than stars, lamps and comets wider, and none of them need be few.
 
 use crate::detect::candidates::{Peak, RawPeak};
-use crate::detect::fit::{Fit, FitWork, NoiseModel, Scene, Spot};
+use crate::detect::fit::{Fit, FitBuffers, FrameMaps, NoiseModel, SpotEstimate};
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
 use arrayvec::ArrayVec;
 
@@ -31,12 +31,12 @@ pub(crate) type BrightStars = ArrayVec<Fit, MAX_STARS>;
 
 /// Fits the brightest peaks of the filtered frame.
 pub(crate) fn fit_bright_stars(
-    scene: &Scene<'_>,
+    maps: &FrameMaps<'_>,
     peaks: &[Peak],
-    work: &mut FitWork,
+    buffers: &mut FitBuffers,
 ) -> BrightStars {
     let neighbours = &peaks[..peaks.len().min(MAX_NEIGHBOURS)];
-    let reach_px = ISOLATION_SIGMA * (scene.spot_px + SIZE_MARGIN_PX) as f32;
+    let reach_px = ISOLATION_SIGMA * (maps.spot_px + SIZE_MARGIN_PX) as f32;
     let bright = peaks
         .iter()
         .take(MAX_PEAKS)
@@ -49,8 +49,8 @@ pub(crate) fn fit_bright_stars(
             !others.any(|other| is_near(place(peak), place(other), reach_px))
         })
         .filter_map(|peak| {
-            let size_px = size_from_curvature(peak, scene.spot_px);
-            fit_star(scene, scene.first_guess(peak), size_px, work)
+            let size_px = size_from_curvature(peak, maps.spot_px);
+            fit_star(maps, maps.initial_guess(peak), size_px, buffers)
         })
         .take(MAX_STARS)
         .collect()
@@ -58,9 +58,9 @@ pub(crate) fn fit_bright_stars(
 
 /// Fits the brightest peaks of the unfiltered frame.
 pub(crate) fn fit_raw_stars(
-    scene: &Scene<'_>,
+    maps: &FrameMaps<'_>,
     peaks: &[RawPeak],
-    work: &mut FitWork,
+    buffers: &mut FitBuffers,
 ) -> BrightStars {
     let neighbours = &peaks[..peaks.len().min(MAX_NEIGHBOURS)];
     let bright = peaks
@@ -69,7 +69,7 @@ pub(crate) fn fit_raw_stars(
         .take_while(|peak| peak.snr >= MIN_SNR);
     bright
         .filter(|peak| !peak.saturated)
-        .map(|peak| (peak, peak.size_px(&scene.view)))
+        .map(|peak| (peak, peak.size_px(&maps.view)))
         .filter(|(peak, size_px)| {
             let reach_px = ISOLATION_SIGMA * (*size_px as f32 + SIZE_MARGIN_PX as f32);
             let place = |p: &RawPeak| (p.x, p.y);
@@ -77,13 +77,13 @@ pub(crate) fn fit_raw_stars(
             !others.any(|other| is_near(place(peak), place(other), reach_px))
         })
         .filter_map(|(peak, size_px)| {
-            let start = Spot {
+            let start = SpotEstimate {
                 x: peak.x as f64,
                 y: peak.y as f64,
                 flux: peak.flux_adu,
-                ..Spot::default()
+                ..SpotEstimate::default()
             };
-            fit_star(scene, start, size_px, work)
+            fit_star(maps, start, size_px, buffers)
         })
         .take(MAX_STARS)
         .collect()
@@ -102,18 +102,23 @@ fn is_near(a: (usize, usize), b: (usize, usize), reach_px: f32) -> bool {
 }
 
 /// Fits a star with a free size; `None` where it is none, or not alone.
-fn fit_star(scene: &Scene<'_>, start: Spot, size_px: f64, work: &mut FitWork) -> Option<Fit> {
-    let fit = scene.fit_free(start, &[], (size_px, NoiseModel::default()), work);
-    let is_star = fit.converged && fit.spots[0].flux > 0.0 && is_alone(&fit, work);
+fn fit_star(
+    maps: &FrameMaps<'_>,
+    start: SpotEstimate,
+    size_px: f64,
+    buffers: &mut FitBuffers,
+) -> Option<Fit> {
+    let fit = buffers.fit_free_size(maps, start, &[], (size_px, NoiseModel::default()));
+    let is_star = fit.converged && fit.spots[0].flux > 0.0 && is_alone(&fit, buffers);
     is_star.then_some(fit)
 }
 
-/// Whether the fit's window, which is still in `work`, holds no light of another star: no pixel
+/// Whether the fit's window, which is still in `buffers`, holds no light of another star: no pixel
 /// with next to no light of the star is above what its error and noise explain.
-fn is_alone(fit: &Fit, work: &mut FitWork) -> bool {
+fn is_alone(fit: &Fit, buffers: &mut FitBuffers) -> bool {
     /// Noise of a pixel, in standard deviations.
     const NOISE_SIGMA: f64 = 5.0;
-    let mut pixels = work.fitter.compare(&work.window, fit);
+    let mut pixels = buffers.fitter.compare(&buffers.window, fit);
     let peak = pixels
         .clone()
         .fold(0.0f64, |peak, (_, light)| peak.max(light));

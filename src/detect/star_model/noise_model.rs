@@ -6,10 +6,10 @@
 use super::bright_stars::{BrightStars, MAX_MODEL_ERROR, MAX_STARS};
 use super::spot_size::{MODE_WIDTH, weighted_size};
 use crate::detect::fit::{
-    Factor, Fit, FitConfig, FitWork, NoiseModel, ONE_SPOT, Pixels, Scene, SpotLight, linearise,
-    sum_of,
+    BatchStart, CholeskyFactor, Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, ONE_SPOT,
+    SpotLight, WindowPixels, linearise, sum_of,
 };
-use crate::detect::psf::LANES;
+use crate::detect::psf::GROUP_PX;
 use arrayvec::ArrayVec;
 use multiversion::multiversion;
 use std::mem;
@@ -36,16 +36,16 @@ pub(crate) struct StarModel {
 /// The noise model from the residuals of stars of about the frame's spot size, and their mean size
 /// with the weights that follow from it.
 pub(crate) fn star_model(
-    scene: &Scene<'_>,
+    maps: &FrameMaps<'_>,
     mut stars: BrightStars,
-    work: &mut FitWork,
+    buffers: &mut FitBuffers,
 ) -> StarModel {
-    stars.retain(|fit| (fit.spot_px / scene.spot_px).ln().abs() < MODE_WIDTH.ln());
+    stars.retain(|fit| (fit.spot_px / maps.spot_px).ln().abs() < MODE_WIDTH.ln());
     // The start must not have too little noise: else a fit follows the brightest pixel wherever it
     // is.
     let brightest = stars.first().map(|fit| fit.spots[0]);
     let mut model = NoiseModel {
-        shot_adu: brightest.map_or(0.0, |spot| scene.noise_at(spot.x, spot.y)),
+        shot_adu: brightest.map_or(0.0, |spot| maps.noise_at(spot.x, spot.y)),
         model_error2: 0.0,
     };
     // Each round weights the squared residuals by the variance from the round before.
@@ -53,26 +53,30 @@ pub(crate) fn star_model(
         let mut sums = Moments::default();
         let config = FitConfig {
             spot_px: stars.iter().map(|s| s.spot_px).fold(0.0, f64::max),
-            free_spot: true,
+            free_size: true,
             noise: model,
         };
-        let mut side_by_side = mem::take(&mut work.side_by_side);
-        let of_star = |(i, star): (usize, &Fit)| (i, star.spots[0], star.spot_px);
+        let mut batch = mem::take(&mut buffers.batch);
+        let of_star = |(number, star): (usize, &Fit)| BatchStart {
+            number,
+            spot: star.spots[0],
+            spot_px: star.spot_px,
+        };
         let starts: ArrayVec<_, MAX_STARS> = stars.iter().enumerate().map(of_star).collect();
         let starts = starts.into_iter();
-        side_by_side.fit(scene, starts, &config, |i, fit, window| {
+        batch.fit(maps, starts, &config, |i, fit, window| {
             if let Some(fit) = fit {
-                work.window.copy_from(window);
-                sums.add_star(work, &fit, &config);
+                buffers.window.copy_from(window);
+                sums.add_star(buffers, &fit, &config);
                 stars[i] = fit;
             }
         });
-        work.side_by_side = side_by_side;
+        buffers.batch = batch;
         model = sums.solve();
         model.model_error2 = model.model_error2.min(MAX_MODEL_ERROR * MAX_MODEL_ERROR);
     }
     StarModel {
-        spot_px: weighted_size(&stars).unwrap_or(scene.spot_px),
+        spot_px: weighted_size(&stars).unwrap_or(maps.spot_px),
         noise: model,
     }
 }
@@ -93,8 +97,8 @@ struct Moments {
 
 impl Moments {
     /// Adds the pixels of one star in which its light is significant.
-    fn add_star(&mut self, work: &mut FitWork, fit: &Fit, config: &FitConfig) {
-        let FitWork { fitter, window, .. } = work;
+    fn add_star(&mut self, buffers: &mut FitBuffers, fit: &Fit, config: &FitConfig) {
+        let FitBuffers { fitter, window, .. } = buffers;
         let Some((factor, spot, pixels)) = fitter.factorised(window, fit, config) else {
             return;
         };
@@ -135,12 +139,12 @@ impl Moments {
 
 /// The sums of [`Moments`] over the pixels of one star, in units of the noise.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn sums_of(factor: &Factor<ONE_SPOT>, spot: &SpotLight, pixels: &Pixels) -> [f64; 5] {
-    let mut sums = [[0.0f32; LANES]; 5];
+fn sums_of(factor: &CholeskyFactor<ONE_SPOT>, spot: &SpotLight, pixels: &WindowPixels) -> [f64; 5] {
+    let mut sums = [[0.0f32; GROUP_PX]; 5];
     for group in 0..pixels.groups {
         for (row, data) in pixels.column_of_groups(group).enumerate() {
             let lights = [spot.in_group(group, row)];
-            for lane in 0..LANES {
+            for lane in 0..GROUP_PX {
                 let (light, gradient) = linearise(&lights, 1, lane);
                 let m2 = light * light;
                 let variance = pixels.variance(light);

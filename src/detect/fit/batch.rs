@@ -1,100 +1,112 @@
-//! Fits of single spots side by side, a lane of a vector for each.
+//! Fits of single spots in batches, one star in each lane of a vector.
 //!
-//! The fit is that of [`Fitter`](super::fitter::Fitter), step by step; only the sums over the pixels are those of many stars
-//! at once. The windows of spots are small: their rows fill no vector, and sums across one take as long as the pixels do.
+//! Each fit takes the same steps as that of [`Fitter`](super::fitter::Fitter); only the sums over the
+//! pixels run over many stars at once. Windows are small: their rows do not fill a vector, and the sum
+//! across a vector takes as long as the pixels.
 
-use super::fitter::{
-    Fit, FitConfig, MAX_STEPS, Progress, Spot, Window, add_background_map, advance, pixels_of,
-    window_radius,
-};
-use super::normal::{Normal, ONE_SPOT, flux_variance_of, spot_gradient, variance_of};
-use super::scene::Scene;
+use super::frame_maps::FrameMaps;
+use super::gauss_newton::{MAX_STEPS, StepOutcome, add_background_map, advance, pixels_of};
+use super::light::spot_gradient;
+use super::normal::NormalEquations;
+use super::parameters::{Fit, FitConfig, ONE_SPOT, SpotEstimate};
+use super::sums::{flux_variance_of, variance_of};
+use super::window::{Window, window_radius};
 use crate::detect::psf::{Cumulative, ProfilePart};
 use multiversion::multiversion;
 
-/// Spots treated together.
-const STARS: usize = 16;
+/// Stars fitted at the same time.
+const BATCH: usize = 16;
 /// A value for each of them.
-type Stars = [f32; STARS];
+type PerStar = [f32; BATCH];
 
-/// Where a fit starts: the number of the star, its spot and its size in pixels.
-pub(crate) type Start = (usize, Spot, f64);
-
-/// A star that is being fitted.
+/// Initial guess of a fit.
 #[derive(Debug, Clone, Copy)]
-struct Lane {
-    start: Start,
+pub(crate) struct BatchStart {
+    /// Number of the star, passed back with its fit.
+    pub number: usize,
+    /// Initial position and flux.
+    pub spot: SpotEstimate,
+    /// Initial standard deviation of the spot, in pixels.
+    pub spot_px: f64,
+}
+
+/// A fit in progress.
+#[derive(Debug, Clone, Copy)]
+struct ActiveFit {
+    start: BatchStart,
     /// Steps taken.
     steps: usize,
 }
 
-/// Buffers for the stars that are fitted at the same time.
+/// Fits many single spots; holds the buffers.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct SideBySide {
-    lanes: [Option<Lane>; STARS],
-    fits: [Fit; STARS],
-    windows: [Window; STARS],
-    /// Pixels on a side of the windows.
+pub(crate) struct BatchFitter {
+    lanes: [Option<ActiveFit>; BATCH],
+    fits: [Fit; BATCH],
+    windows: [Window; BATCH],
+    /// Side of the windows, in pixels.
     side: usize,
-    /// Row by row, above the background map, in units of the noise; NaN is left out.
-    data: Vec<Stars>,
-    /// The spots' light along x and y.
-    axes: [Vec<ProfilePart<Stars>>; 2],
+    /// Row by row: the pixels above the background map, in units of the noise; NaN where left out.
+    data: Vec<PerStar>,
+    /// Profiles of the spots along x and y.
+    axes: [Vec<ProfilePart<PerStar>>; 2],
 }
 
-/// What differs from star to star in a pixel, in units of the noise.
+/// The model of a pixel, in units of the noise.
 #[derive(Debug, Clone, Copy)]
-struct Model {
-    flux: Stars,
-    background: Stars,
-    /// Variance of a pixel per light, and per squared light.
-    variance: [Stars; 2],
+struct BatchModel {
+    flux: PerStar,
+    background: PerStar,
+    /// Coefficients of the variance of a pixel: of the light, and of its square.
+    variance: [PerStar; 2],
 }
 
 /// Sums over the pixels of each star.
 #[derive(Debug, Clone, Copy)]
-struct Sums {
+struct BatchSums {
     /// Lower triangle.
-    matrix: [[Stars; ONE_SPOT]; ONE_SPOT],
-    right: [Stars; ONE_SPOT],
-    chi2: Stars,
-    pixels: Stars,
-    /// Of weights by noise alone, and of these times the light, as part of all, and its square.
-    shapes: [Stars; 3],
+    matrix: [[PerStar; ONE_SPOT]; ONE_SPOT],
+    right: [PerStar; ONE_SPOT],
+    chi2: PerStar,
+    pixels: PerStar,
+    /// Of w, w·s and w·s²: w is the weight from noise alone, s the fraction of the light.
+    shapes: [PerStar; 3],
 }
 
-impl SideBySide {
-    /// Fits one spot at each start, none of which is larger than that in `config`; `each` is told the star's number, the fit
-    /// if it succeeds, and its window.
+impl BatchFitter {
+    /// Fits one spot from each initial guess; `config.spot_px` is the largest of their sizes.
     ///
-    /// A lane whose star is done takes the next; what it finds does not depend on the others.
+    /// Calls `on_fit` with the star's number, the fit if it converged, and the window. A lane whose
+    /// star is done takes the next one; fits do not depend on each other.
     pub fn fit(
         &mut self,
-        scene: &Scene<'_>,
-        mut starts: impl Iterator<Item = Start>,
+        maps: &FrameMaps<'_>,
+        mut starts: impl Iterator<Item = BatchStart>,
         config: &FitConfig,
-        mut each: impl FnMut(usize, Option<Fit>, &Window),
+        mut on_fit: impl FnMut(usize, Option<Fit>, &Window),
     ) {
         self.side = 2 * window_radius(config.spot_px) + 1;
         self.data.clear();
-        self.data.resize(self.side * self.side, [f32::NAN; STARS]);
-        for lane in 0..STARS {
-            self.begin(lane, starts.next(), scene);
+        self.data.resize(self.side * self.side, [f32::NAN; BATCH]);
+        for lane in 0..BATCH {
+            self.begin(lane, starts.next(), maps);
         }
         while self.lanes.iter().any(Option::is_some) {
             self.fill_axes();
             let sums = sums_over(&self.data, &self.axes, &self.model(config));
-            for lane in 0..STARS {
-                let Some(Lane { start, steps }) = self.lanes[lane] else {
+            for lane in 0..BATCH {
+                let Some(ActiveFit { start, steps }) = self.lanes[lane] else {
                     continue;
                 };
-                let (number, spot, spot_px) = start;
                 let mut normal = self.normal_of(lane, &sums, config);
                 let fit = &mut self.fits[lane];
-                let config = FitConfig { spot_px, ..*config };
-                let progress = advance(fit, &[spot], &mut normal, steps, &config);
-                if progress == Progress::Goes && steps + 1 < MAX_STEPS {
-                    self.lanes[lane] = Some(Lane {
+                let config = FitConfig {
+                    spot_px: start.spot_px,
+                    ..*config
+                };
+                let outcome = advance(fit, &[start.spot], &mut normal, steps, &config);
+                if outcome == StepOutcome::Continue && steps + 1 < MAX_STEPS {
+                    self.lanes[lane] = Some(ActiveFit {
                         start,
                         steps: steps + 1,
                     });
@@ -102,17 +114,17 @@ impl SideBySide {
                 }
                 let window = &self.windows[lane];
                 fit.spots[0].noise_flux = flux_noise(lane, &sums, window);
-                let found = (progress == Progress::Settled).then(|| fit.clone());
-                each(number, found, window);
-                self.begin(lane, starts.next(), scene);
+                let converged = (outcome == StepOutcome::Converged).then(|| fit.clone());
+                on_fit(start.number, converged, window);
+                self.begin(lane, starts.next(), maps);
             }
         }
     }
 
-    /// Puts a star into a lane, or leaves it empty.
-    fn begin(&mut self, lane: usize, start: Option<Start>, scene: &Scene<'_>) {
-        self.lanes[lane] = start.map(|start| Lane { start, steps: 0 });
-        let Some((_, spot, spot_px)) = start else {
+    /// Starts the fit of a star in a lane, or leaves the lane empty.
+    fn begin(&mut self, lane: usize, start: Option<BatchStart>, maps: &FrameMaps<'_>) {
+        self.lanes[lane] = start.map(|start| ActiveFit { start, steps: 0 });
+        let Some(BatchStart { spot, spot_px, .. }) = start else {
             return;
         };
         let fit = &mut self.fits[lane];
@@ -122,9 +134,9 @@ impl SideBySide {
         };
         fit.spots.push(spot);
         let window = &mut self.windows[lane];
-        scene.cut(&[spot], window_radius(spot_px), window);
+        maps.cut_out(&[spot], window_radius(spot_px), window);
         let groups = window.groups().max(1);
-        // What the window has less than others is left out.
+        // NaN beyond the window, where it is smaller than the others.
         for (y, to) in self.data.chunks_mut(self.side).enumerate() {
             let row = window
                 .data
@@ -137,10 +149,10 @@ impl SideBySide {
         }
     }
 
-    /// The spots' profiles along both sides of their windows.
+    /// Computes the spots' profiles along both sides of their windows.
     fn fill_axes(&mut self) {
-        let mut centers_px = [[0.0f64; STARS]; 2];
-        let mut cumulative = [Cumulative::of_spot(1.0); STARS];
+        let mut centers_px = [[0.0f64; BATCH]; 2];
+        let mut cumulative = [Cumulative::of_spot(1.0); BATCH];
         for (lane, (fit, window)) in self.fits.iter().zip(&self.windows).enumerate() {
             let Some(spot) = fit.spots.first() else {
                 continue;
@@ -155,11 +167,11 @@ impl SideBySide {
         }
     }
 
-    fn model(&self, config: &FitConfig) -> Model {
-        let mut model = Model {
-            flux: [0.0; STARS],
-            background: [0.0; STARS],
-            variance: [[0.0; STARS]; 2],
+    fn model(&self, config: &FitConfig) -> BatchModel {
+        let mut model = BatchModel {
+            flux: [0.0; BATCH],
+            background: [0.0; BATCH],
+            variance: [[0.0; BATCH]; 2],
         };
         for (lane, (fit, window)) in self.fits.iter().zip(&self.windows).enumerate() {
             let Some(spot) = fit.spots.first() else {
@@ -175,12 +187,17 @@ impl SideBySide {
         model
     }
 
-    /// The equations of one star.
-    fn normal_of(&self, lane: usize, sums: &Sums, config: &FitConfig) -> Normal<ONE_SPOT> {
+    /// The normal equations of one star.
+    fn normal_of(
+        &self,
+        lane: usize,
+        sums: &BatchSums,
+        config: &FitConfig,
+    ) -> NormalEquations<ONE_SPOT> {
         let (fit, window) = (&self.fits[lane], &self.windows[lane]);
         let pixels = pixels_of(window, fit, config);
         let units: [f64; ONE_SPOT] = std::array::from_fn(|i| pixels.unit(i, 1));
-        let mut normal = Normal::empty();
+        let mut normal = NormalEquations::empty();
         for i in 0..ONE_SPOT {
             normal.right[i] = f64::from(sums.right[i][lane]) * units[i];
             for j in 0..i + 1 {
@@ -195,24 +212,25 @@ impl SideBySide {
     }
 }
 
-/// The standard error of the flux before the last step from noise alone, in ADU, see
+/// The standard error of the flux from noise alone, before the last step, in ADU. See
 /// [`Fitter::set_flux_noise`](super::fitter::Fitter::set_flux_noise).
-fn flux_noise(lane: usize, sums: &Sums, window: &Window) -> f64 {
+fn flux_noise(lane: usize, sums: &BatchSums, window: &Window) -> f64 {
     let sums = sums.shapes.map(|sum| f64::from(sum[lane]));
     let error2 = window.background_noise * window.background_noise;
     flux_variance_of(sums, 1.0 / window.noise_adu, error2).sqrt()
 }
 
-/// Fills the pixels of an axis, for spots at `center_px` (0 is the centre of the first).
+/// Computes the profiles along an axis, for spots at `center_px`, where 0 is the centre of the first
+/// pixel.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn fill(
-    pixels: &mut [ProfilePart<Stars>],
-    center_px: &[f64; STARS],
-    cumulative: &[Cumulative; STARS],
+    pixels: &mut [ProfilePart<PerStar>],
+    center_px: &[f64; BATCH],
+    cumulative: &[Cumulative; BATCH],
 ) {
     let edges_at = |edge: usize| {
-        let mut edges = [[0.0f64; STARS]; 3];
-        for lane in 0..STARS {
+        let mut edges = [[0.0f64; BATCH]; 3];
+        for lane in 0..BATCH {
             let at = cumulative[lane].at(edge as f64 - 0.5 - center_px[lane]);
             for (edges, at) in edges.iter_mut().zip(at) {
                 edges[lane] = at;
@@ -225,7 +243,7 @@ fn fill(
         let after = edges_at(i + 1);
         let parts = [&mut pixel.value, &mut pixel.by_center, &mut pixel.by_sigma];
         for (part, (after, before)) in parts.into_iter().zip(after.iter().zip(&before)) {
-            for lane in 0..STARS {
+            for lane in 0..BATCH {
                 part[lane] = (after[lane] - before[lane]) as f32;
             }
         }
@@ -233,23 +251,27 @@ fn fill(
     }
 }
 
-/// The sums of the normal equations.
+/// Sums over the pixels of all stars.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn sums_over(data: &[Stars], axes: &[Vec<ProfilePart<Stars>>; 2], model: &Model) -> Sums {
-    let mut matrix = [[[0.0f32; STARS]; ONE_SPOT]; ONE_SPOT];
-    let mut right = [[0.0f32; STARS]; ONE_SPOT];
-    let [mut chi2, mut pixels] = [[0.0f32; STARS]; 2];
-    let mut shapes = [[0.0f32; STARS]; 3];
+fn sums_over(
+    data: &[PerStar],
+    axes: &[Vec<ProfilePart<PerStar>>; 2],
+    model: &BatchModel,
+) -> BatchSums {
+    let mut matrix = [[[0.0f32; BATCH]; ONE_SPOT]; ONE_SPOT];
+    let mut right = [[0.0f32; BATCH]; ONE_SPOT];
+    let [mut chi2, mut pixels] = [[0.0f32; BATCH]; 2];
+    let mut shapes = [[0.0f32; BATCH]; 3];
     let [across, down] = axes;
     let model = *model;
     for (down, row) in down.iter().zip(data.chunks_exact(across.len().max(1))) {
         let down = *down;
         for (across, data) in across.iter().zip(row) {
-            // Copies, of which it is plain that nothing else is written to.
+            // Copied so that the compiler need not assume aliasing.
             let (across, data) = (*across, *data);
-            let mut gradient = [[1.0f32; STARS]; ONE_SPOT];
-            let [mut weight, mut residual] = [[0.0f32; STARS]; 2];
-            for lane in 0..STARS {
+            let mut gradient = [[1.0f32; BATCH]; ONE_SPOT];
+            let [mut weight, mut residual] = [[0.0f32; BATCH]; 2];
+            for lane in 0..BATCH {
                 let flux = model.flux[lane];
                 let (a, d) = (across.lane(lane), down.lane(lane));
                 let [shape, by_x, by_y, by_size] = spot_gradient(flux, &a, &d);
@@ -274,19 +296,19 @@ fn sums_over(data: &[Stars], axes: &[Vec<ProfilePart<Stars>>; 2], model: &Model)
             }
             for i in 0..ONE_SPOT {
                 let mut weighted = weight;
-                for lane in 0..STARS {
+                for lane in 0..BATCH {
                     weighted[lane] *= gradient[i][lane];
                     right[i][lane] += weighted[lane] * residual[lane];
                 }
                 for j in 0..i + 1 {
-                    for lane in 0..STARS {
+                    for lane in 0..BATCH {
                         matrix[i][j][lane] += weighted[lane] * gradient[j][lane];
                     }
                 }
             }
         }
     }
-    Sums {
+    BatchSums {
         matrix,
         right,
         chi2,
@@ -299,25 +321,26 @@ fn sums_over(data: &[Stars], axes: &[Vec<ProfilePart<Stars>>; 2], model: &Model)
 mod tests {
     use super::*;
     use crate::detect::background::{Mesh, MeshConfig};
-    use crate::detect::fit::fitter::{Fitter, NoiseModel};
+    use crate::detect::fit::fitter::Fitter;
+    use crate::detect::fit::parameters::NoiseModel;
     use crate::detect::pixels::View;
 
     const SPOT_PX: f64 = 0.8;
     const SIDE_PX: usize = 256;
 
-    /// Stars in rows, the brighter the further down, on a sky of noise.
-    fn stars() -> Vec<Spot> {
+    /// Stars in rows, brighter further down.
+    fn stars() -> Vec<SpotEstimate> {
         let place = |i: usize| 12.0 + 16.0 * i as f64 + 0.37 * (i % 3) as f64;
-        let star = |i: usize| Spot {
+        let star = |i: usize| SpotEstimate {
             x: place(i % 15),
             y: place(i / 15),
             flux: 400.0 + 60.0 * i as f64,
-            ..Spot::default()
+            ..SpotEstimate::default()
         };
         (0..15 * 15).map(star).collect()
     }
 
-    fn frame_of(stars: &[Spot]) -> Vec<f32> {
+    fn frame_of(stars: &[SpotEstimate]) -> Vec<f32> {
         let noise = |i: usize| ((i * 7919) % 101) as f32 * 0.2;
         let mut pixels: Vec<f32> = (0..SIDE_PX * SIDE_PX).map(noise).collect();
         let cumulative = Cumulative::of_spot(SPOT_PX);
@@ -336,13 +359,13 @@ mod tests {
     }
 
     #[test]
-    fn each_star_has_the_fit_that_it_has_by_itself() {
+    fn batch_fits_agree_with_single_fits() {
         let truth = stars();
         let pixels = frame_of(&truth);
         let view = View::new(&pixels, SIDE_PX, SIDE_PX);
         let mut mesh = Mesh::default();
         mesh.measure(&view, &MeshConfig::of_pixels(64, 1e-6));
-        let scene = Scene {
+        let maps = FrameMaps {
             view,
             background: &mesh,
             filtered: None,
@@ -350,30 +373,39 @@ mod tests {
             spot_px: SPOT_PX,
             matched_gain: 0.3,
         };
-        for free_spot in [false, true] {
+        for free_size in [false, true] {
             let config = FitConfig {
                 spot_px: SPOT_PX,
-                free_spot,
+                free_size,
                 noise: NoiseModel {
                     shot_adu: 0.5,
                     model_error2: 1e-4,
                 },
             };
-            let start = |(i, star): (usize, &Spot)| {
+            let start = |(i, star): (usize, &SpotEstimate)| {
                 let (x, y) = (star.x.round(), star.y.round());
-                (i, Spot { x, y, ..*star }, SPOT_PX)
+                BatchStart {
+                    number: i,
+                    spot: SpotEstimate { x, y, ..*star },
+                    spot_px: SPOT_PX,
+                }
             };
             let starts = truth.iter().enumerate().map(start);
-            let mut found = vec![None; truth.len()];
-            SideBySide::default().fit(&scene, starts.clone(), &config, |i, fit, _| found[i] = fit);
+            let mut fits = vec![None; truth.len()];
+            BatchFitter::default().fit(&maps, starts.clone(), &config, |i, fit, _| fits[i] = fit);
             let mut fitter = Fitter::default();
             let mut window = Window::default();
-            for (i, spot, spot_px) in starts {
-                scene.cut(&[spot], window_radius(spot_px), &mut window);
+            for start in starts {
+                let BatchStart {
+                    number: i,
+                    spot,
+                    spot_px,
+                } = start;
+                maps.cut_out(&[spot], window_radius(spot_px), &mut window);
                 let mut alone = fitter.fit(&window, &[spot], &config);
                 fitter.set_flux_noise(&window, &mut alone, &config);
-                assert_eq!(alone.converged, found[i].is_some(), "star {i}");
-                let Some(fit) = &found[i] else { continue };
+                assert_eq!(alone.converged, fits[i].is_some(), "star {i}");
+                let Some(fit) = &fits[i] else { continue };
                 let (a, b) = (fit.spots[0], alone.spots[0]);
                 let off = (a.x - b.x).abs().max((a.y - b.y).abs());
                 assert!(off < 1e-3 * b.sigma_x, "star {i}: {off} px");
@@ -387,7 +419,7 @@ mod tests {
                 ] {
                     assert!((a - b).abs() <= 2e-3 * b.abs(), "star {i}: {a}, not {b}");
                 }
-                // Here it is that of the flux before the last step.
+                // The batch takes the flux before the last step.
                 let off = (a.noise_flux / b.noise_flux - 1.0).abs();
                 assert!(
                     off < 0.02,
@@ -396,8 +428,8 @@ mod tests {
                     b.noise_flux
                 );
             }
-            let settled = found.iter().flatten().count();
-            assert!(settled > 200, "{settled} of {}", found.len());
+            let converged = fits.iter().flatten().count();
+            assert!(converged > 200, "{converged} of {}", fits.len());
         }
     }
 }

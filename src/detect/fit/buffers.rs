@@ -1,0 +1,73 @@
+//! Buffers of the fits of one thread, and the fit of a spot of free size.
+
+use super::batch::BatchFitter;
+use super::fitter::Fitter;
+use super::frame_maps::FrameMaps;
+use super::parameters::{Fit, FitConfig, NoiseModel, SpotEstimate};
+use super::window::{Window, window_radius};
+
+/// Buffers of the fits of one thread.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct FitBuffers {
+    /// For a single fit.
+    pub fitter: Fitter,
+    /// The pixels of the last fit.
+    pub window: Window,
+    /// The pixels of a fit that is kept while another is tried.
+    pub kept_window: Window,
+    /// For many fits of single spots.
+    pub batch: BatchFitter,
+}
+
+impl FitBuffers {
+    /// Fits spots of the frame's size; the light of the spots `beyond` the window is subtracted first.
+    pub fn fit_fixed_size(
+        &mut self,
+        maps: &FrameMaps<'_>,
+        start: &[SpotEstimate],
+        beyond: &[SpotEstimate],
+        noise: NoiseModel,
+    ) -> Fit {
+        let config = FitConfig {
+            spot_px: maps.spot_px,
+            free_size: false,
+            noise,
+        };
+        let Self { fitter, window, .. } = self;
+        maps.cut_out(start, window_radius(maps.spot_px), window);
+        fitter.subtract(window, beyond, maps.spot_px);
+        fitter.fit(window, start, &config)
+    }
+
+    /// Fits one spot of free size, initially `spot_px`, in a window that grows with the size; the
+    /// light of the spots `beyond` the window is subtracted first.
+    pub fn fit_free_size(
+        &mut self,
+        maps: &FrameMaps<'_>,
+        start: SpotEstimate,
+        beyond: &[SpotEstimate],
+        (spot_px, noise): (f64, NoiseModel),
+    ) -> Fit {
+        const MAX_WINDOWS: usize = 3;
+        let mut config = FitConfig {
+            spot_px,
+            free_size: true,
+            noise,
+        };
+        let Self { fitter, window, .. } = self;
+        let mut radius = window_radius(spot_px);
+        let mut fit = Fit::default();
+        for _ in 0..MAX_WINDOWS {
+            maps.cut_out(&[start], radius, window);
+            fitter.subtract(window, beyond, maps.spot_px);
+            fit = fitter.fit(window, &[start], &config);
+            let wanted = window_radius(fit.spot_px);
+            if !fit.converged || wanted <= radius {
+                break;
+            }
+            radius = wanted;
+            config.spot_px = fit.spot_px;
+        }
+        fit
+    }
+}

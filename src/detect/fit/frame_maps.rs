@@ -1,0 +1,154 @@
+//! The frame with its background, noise and spot, and the windows that fits cut out of it.
+
+use super::parameters::SpotEstimate;
+use super::window::Window;
+use crate::detect::background::Mesh;
+use crate::detect::candidates::Peak;
+use crate::detect::pixels::View;
+use crate::detect::psf::{GROUP_PX, MAX_WINDOW_PX, PIXEL_VARIANCE_PX2};
+use multiversion::multiversion;
+
+/// The frame with its maps of background and noise, and its spot.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FrameMaps<'a> {
+    /// The frame.
+    pub view: View<'a>,
+    /// Background and noise of a pixel, in ADU.
+    pub background: &'a Mesh,
+    /// Mean and noise of the filtered frame; `None` before it is filtered.
+    pub filtered: Option<&'a Mesh>,
+    /// Level at and above which a pixel is saturated, in ADU.
+    pub saturation_adu: f32,
+    /// Standard deviation of the spot, in pixels.
+    pub spot_px: f64,
+    /// √ΣP²: the signal-to-noise ratio of a star whose flux equals the noise of a pixel.
+    pub matched_gain: f64,
+}
+
+impl FrameMaps<'_> {
+    /// Standard deviation of the spot, pixel included, in pixels.
+    pub fn width_px(&self) -> f64 {
+        (self.spot_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt()
+    }
+
+    /// The noise of a pixel at a point, in ADU.
+    pub fn noise_at(&self, x: f64, y: f64) -> f64 {
+        f64::from(self.background.at(x as f32, y as f32).1)
+    }
+
+    /// Noise of a spot's flux over that of independent pixels: above 1 where the noise is correlated;
+    /// 1 before the frame is filtered.
+    pub fn correlation_at(&self, x: f64, y: f64) -> f64 {
+        self.filtered
+            .map_or(1.0, |mesh| f64::from(mesh.at(x as f32, y as f32).1))
+    }
+
+    /// The initial guess of a spot at a peak of the filtered frame.
+    pub fn initial_guess(&self, peak: &Peak) -> SpotEstimate {
+        let (x, y) = (peak.x as f64, peak.y as f64);
+        let snr = f64::from(peak.snr) * self.correlation_at(x, y);
+        SpotEstimate {
+            x: x + f64::from(peak.offset_px[0]),
+            y: y + f64::from(peak.offset_px[1]),
+            flux: snr * self.noise_at(x, y) / self.matched_gain,
+            ..SpotEstimate::default()
+        }
+    }
+
+    /// Cuts out the pixels within `radius` of the points, less the background; saturated pixels are
+    /// left out.
+    pub fn cut_out(&self, points: &[SpotEstimate], radius: usize, window: &mut Window) {
+        /// Standard error of the background map over the noise of a pixel.
+        const MAP_ERROR: f64 = 0.15;
+        /// Error of the local background over the peak of the star: its halo is not in the map.
+        const HALO_ERROR: f64 = 0.01;
+        let (columns, rows) = (
+            points
+                .iter()
+                .map(|p| span_around(p.x, radius, self.view.width)),
+            points
+                .iter()
+                .map(|p| span_around(p.y, radius, self.view.height)),
+        );
+        (window.x0, window.width) = union_of(columns);
+        (window.y0, window.height) = union_of(rows);
+        let cx = window.x0 + window.width / 2;
+        let cy = window.y0 + window.height / 2;
+        let noise = self.noise_at(cx as f64, cy as f64);
+        window.noise_adu = noise;
+        let peak = points.iter().map(|p| p.flux).fold(0.0, f64::max) * self.matched_gain;
+        window.background_noise = MAP_ERROR * noise;
+        let halo_error = HALO_ERROR * peak;
+        window.background_error = (window.background_noise.powi(2) + halo_error.powi(2)).sqrt();
+        self.fill(window);
+    }
+
+    /// Fills the window with its pixels, less a plane through the background map.
+    fn fill(&self, window: &mut Window) {
+        let background = |x: usize, y: usize| self.background.at(x as f32, y as f32).0;
+        let (x0, y0) = (window.x0, window.y0);
+        let corner = background(x0, y0);
+        let plane = BackgroundPlane {
+            corner,
+            across: (background(x0 + window.width, y0) - corner) / window.width.max(1) as f32,
+            down: (background(x0, y0 + window.height) - corner) / window.height.max(1) as f32,
+        };
+        copy_above(&self.view, plane, self.saturation_adu, window);
+    }
+}
+
+/// First and end of the pixels within `radius` of a point along an axis, on a side of `side` pixels.
+fn span_around(center: f64, radius: usize, side: usize) -> [usize; 2] {
+    let first = (center.round() - radius as f64).max(0.0) as usize;
+    let last = (center.round() + radius as f64).max(0.0) as usize;
+    [first, (last + 1).min(side)]
+}
+
+/// First pixel and length of the union of spans, at most [`MAX_WINDOW_PX`] long.
+fn union_of(spans: impl Iterator<Item = [usize; 2]>) -> (usize, usize) {
+    let union = spans.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+    let [first, end] = union.unwrap_or_default();
+    (first, end.saturating_sub(first).min(MAX_WINDOW_PX))
+}
+
+/// The background in a window: a plane.
+#[derive(Debug, Clone, Copy)]
+struct BackgroundPlane {
+    /// Background in the first pixel, in ADU.
+    corner: f32,
+    /// Increase from column to column, in ADU.
+    across: f32,
+    /// Increase from row to row, in ADU.
+    down: f32,
+}
+
+/// Copies the pixels of a window, less the background and in units of the noise; NaN where saturated.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn copy_above(view: &View, plane: BackgroundPlane, saturation_adu: f32, window: &mut Window) {
+    let groups = window.groups();
+    window.data.resize(groups * window.height, [0.0; GROUP_PX]);
+    let per_noise = (1.0 / window.noise_adu) as f32;
+    for group in 0..groups {
+        let first = group * GROUP_PX;
+        let columns = (window.width - first).min(GROUP_PX);
+        for row in 0..window.height {
+            let pixels = &view.row(window.y0 + row)[window.x0 + first..];
+            let pixels = pixels.first_chunk().copied().unwrap_or_else(|| {
+                let mut part = [f32::NAN; GROUP_PX];
+                part[..columns].copy_from_slice(&pixels[..columns]);
+                part
+            });
+            let start = plane.corner + row as f32 * plane.down + first as f32 * plane.across;
+            let above = &mut window.data[row * groups + group];
+            for lane in 0..GROUP_PX {
+                let is_used = lane < columns && pixels[lane] < saturation_adu;
+                let background = start + lane as i32 as f32 * plane.across;
+                above[lane] = if is_used {
+                    (pixels[lane] - background) * per_noise
+                } else {
+                    f32::NAN
+                };
+            }
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! Sums over the pixels of a window: the normal equations, and the variance of a flux.
+
+#![allow(
+    clippy::needless_range_loop,
+    reason = "rows and columns of matrices read best as indices"
+)]
+
+use super::light::{SpotLight, linearise};
+use super::normal::NormalEquations;
+use super::parameters::{MAX_PARAMETERS, MAX_SPOTS, ONE_SPOT, TWO_SPOTS};
+use crate::detect::psf::{GROUP_PX, PixelGroup};
+use multiversion::multiversion;
+
+/// The pixels of a window, their background and variance. All are in units of the background noise,
+/// so that single precision suffices whatever the units of the frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct WindowPixels<'a> {
+    /// Row by row, each in whole groups; NaN where a pixel is left out.
+    pub data: &'a [PixelGroup],
+    /// Groups in a row.
+    pub groups: usize,
+    /// Inverse of the background noise, in ADU⁻¹.
+    pub per_noise: f64,
+    /// Fitted background above the map.
+    pub background: f32,
+    /// Variance of a pixel per light, and per squared light.
+    pub variance: [f32; 2],
+}
+
+impl WindowPixels<'_> {
+    /// One group of columns, row by row.
+    #[inline(always)]
+    pub fn column_of_groups(&self, group: usize) -> impl Iterator<Item = PixelGroup> {
+        self.data.iter().skip(group).step_by(self.groups).copied()
+    }
+
+    /// The variance of a pixel with this light.
+    #[inline(always)]
+    pub fn variance(&self, light: f32) -> f32 {
+        variance_of(light, self.variance)
+    }
+
+    /// Converts the derivative by a parameter to ADU: parameters that are light are divided by the
+    /// noise.
+    #[inline(always)]
+    pub fn unit(&self, parameter: usize, spots: usize) -> f64 {
+        let is_light = if parameter < 3 * spots {
+            parameter % 3 == 2
+        } else {
+            parameter == 3 * spots
+        };
+        if is_light { self.per_noise } else { 1.0 }
+    }
+}
+
+/// The variance of a pixel with this light: one, plus a term linear in the light, plus one in its
+/// square.
+#[inline(always)]
+pub(crate) fn variance_of(light: f32, [linear, square]: [f32; 2]) -> f32 {
+    let positive = if light > 0.0 { light } else { 0.0 };
+    1.0 + positive * (linear + square * positive)
+}
+
+/// Adds the pixels of a window to the normal equations of `spots`.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+pub(crate) fn add_pixels<const N: usize>(
+    normal: &mut NormalEquations<N>,
+    spots: &[SpotLight],
+    pixels: &WindowPixels,
+) {
+    // With a count known at compile time the loops are unrolled.
+    match (N, spots) {
+        (ONE_SPOT, &[spot]) => add_up(normal, &[spot], 1, pixels),
+        (TWO_SPOTS, &[first, second]) => add_up(normal, &[first, second], 2, pixels),
+        (MAX_PARAMETERS, &[first, ..]) => {
+            let mut several = [first; MAX_SPOTS];
+            for (spot, from) in several.iter_mut().zip(spots) {
+                *spot = *from;
+            }
+            add_up(normal, &several, spots.len().min(MAX_SPOTS), pixels);
+        }
+        _ => {}
+    }
+}
+
+/// [`add_pixels`] for the first `count` spots.
+#[inline(always)]
+fn add_up<const S: usize, const N: usize>(
+    normal: &mut NormalEquations<N>,
+    spots: &[SpotLight<'_>; S],
+    count: usize,
+    pixels: &WindowPixels<'_>,
+) {
+    let parameters = 3 * count + 2;
+    let mut matrix = [[[0.0f32; GROUP_PX]; N]; N];
+    let mut right = [[0.0f32; GROUP_PX]; N];
+    let [mut chi2, mut valid] = [[0.0f32; GROUP_PX]; 2];
+    for group in 0..pixels.groups {
+        for (row, data) in pixels.column_of_groups(group).enumerate() {
+            let lights = spots.map(|spot| spot.in_group(group, row));
+            for lane in 0..GROUP_PX {
+                let (light, gradient) = linearise::<S, N>(&lights, count, lane);
+                let is_valid = !data[lane].is_nan();
+                let weight = 1.0 / pixels.variance(light);
+                let weight = if is_valid { weight } else { 0.0 };
+                let residual = data[lane] - light - pixels.background;
+                let residual = if is_valid { residual } else { 0.0 };
+                valid[lane] += if is_valid { 1.0 } else { 0.0 };
+                chi2[lane] += residual * residual * weight;
+                for i in 0..parameters {
+                    let weighted = gradient[i] * weight;
+                    right[i][lane] += weighted * residual;
+                    for j in 0..i + 1 {
+                        matrix[i][j][lane] += weighted * gradient[j];
+                    }
+                }
+            }
+        }
+    }
+    for i in 0..N {
+        let unit = pixels.unit(i, count);
+        normal.right[i] += sum_of(right[i]) * unit;
+        for j in 0..i + 1 {
+            normal.matrix[i][j] += sum_of(matrix[i][j]) * unit * pixels.unit(j, count);
+        }
+    }
+    normal.chi2 += sum_of(chi2);
+    normal.pixels += sum_of(valid) as usize;
+}
+
+/// The variance of the flux of one spot, in ADU², fitted together with a background of variance
+/// `background_error2` in ADU². The position is held: a symmetric spot's flux does not depend on it.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+pub(crate) fn flux_variance(
+    spot: &SpotLight,
+    pixels: &WindowPixels,
+    background_error2: f64,
+) -> f64 {
+    let mut sums = [[0.0f32; GROUP_PX]; 3];
+    let [across, down] = spot.axes;
+    for group in 0..pixels.groups {
+        let value = across.group(group).value;
+        for (row, data) in pixels.column_of_groups(group).enumerate() {
+            let down = down.pixel(row).value;
+            for lane in 0..GROUP_PX {
+                let shape = value[lane] * down;
+                let variance = pixels.variance(spot.flux * shape);
+                let weight = if data[lane].is_nan() {
+                    0.0
+                } else {
+                    1.0 / variance
+                };
+                sums[0][lane] += weight;
+                sums[1][lane] += weight * shape;
+                sums[2][lane] += weight * shape * shape;
+            }
+        }
+    }
+    flux_variance_of(sums.map(sum_of), pixels.per_noise, background_error2)
+}
+
+/// [`flux_variance`] from the sums of w, w·s and w·s², where w is the weight of a pixel and s the
+/// fraction of the light in it.
+pub(crate) fn flux_variance_of(
+    [ones, shapes, squares]: [f64; 3],
+    per_noise: f64,
+    background_error2: f64,
+) -> f64 {
+    let per_noise2 = per_noise * per_noise;
+    let own = squares - shapes * shapes / (ones + 1.0 / (per_noise2 * background_error2));
+    1.0 / (per_noise2 * own)
+}
+
+/// The sum of a group, pairwise: adding one value after the other would be slower.
+#[inline(always)]
+pub(crate) fn sum_of(v: PixelGroup) -> f64 {
+    let four: [f32; 4] = std::array::from_fn(|i| v[i] + v[i + 4]);
+    f64::from((four[0] + four[2]) + (four[1] + four[3]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::psf::AxisProfile;
+
+    /// The normal equations of one spot pixel by pixel, in double precision.
+    fn plain_sums(spot: &SpotLight<'_>, pixels: &WindowPixels<'_>) -> NormalEquations<ONE_SPOT> {
+        let mut normal = NormalEquations::empty();
+        let [across, down] = spot.axes;
+        for (i, data) in pixels.data.as_flattened().iter().enumerate() {
+            let width = pixels.groups * GROUP_PX;
+            let (a, d) = (across.pixel(i % width), down.pixel(i / width));
+            let [value, by_center, by_sigma] = [a.value, a.by_center, a.by_sigma].map(f64::from);
+            let [d_value, d_center, d_sigma] = [d.value, d.by_center, d.by_sigma].map(f64::from);
+            let flux = f64::from(spot.flux);
+            let light = flux * value * d_value;
+            let gradient = [
+                flux * by_center * d_value,
+                flux * value * d_center,
+                value * d_value,
+                1.0,
+                flux * (by_sigma * d_value + value * d_sigma),
+            ];
+            let [linear, square] = pixels.variance.map(f64::from);
+            let weight = 1.0 / (1.0 + light * (linear + square * light));
+            let residual = f64::from(*data) - light - f64::from(pixels.background);
+            if data.is_nan() {
+                continue;
+            }
+            normal.chi2 += residual * residual * weight;
+            normal.pixels += 1;
+            for i in 0..ONE_SPOT {
+                let unit = pixels.unit(i, 1);
+                normal.right[i] += gradient[i] * residual * weight * unit;
+                for j in 0..=i {
+                    let units = unit * pixels.unit(j, 1);
+                    normal.matrix[i][j] += gradient[i] * gradient[j] * weight * units;
+                }
+            }
+        }
+        normal
+    }
+
+    #[test]
+    fn sums_in_single_precision_agree_with_double() {
+        let (width, height, groups) = (11, 9, 2);
+        for flux in [0.0, 30.0, 1e3, 1e6] {
+            let mut axes = [AxisProfile::default(), AxisProfile::default()];
+            axes[0].fill(5.3, 0.9, width);
+            axes[1].fill(4.1, 0.9, height);
+            let spot = SpotLight { flux, axes: &axes };
+            let noise = |i: usize| ((i * 7919) % 101) as f32 * 0.03 - 1.5;
+            let mut data = vec![[f32::NAN; GROUP_PX]; groups * height];
+            for (i, pixel) in data.as_flattened_mut().iter_mut().enumerate() {
+                let (column, row) = (i % (groups * GROUP_PX), i / (groups * GROUP_PX));
+                if column < width && (column, row) != (6, 4) {
+                    let light = axes[0].pixel(column).value * axes[1].pixel(row).value * flux;
+                    *pixel = noise(i) * (1.0 + 0.01 * light).sqrt() + light;
+                }
+            }
+            let pixels = WindowPixels {
+                data: &data,
+                groups,
+                per_noise: 0.2,
+                background: 0.1,
+                variance: [0.01, 1e-6],
+            };
+            let mut found: NormalEquations<ONE_SPOT> = NormalEquations::empty();
+            add_pixels(&mut found, &[spot], &pixels);
+            let expected = plain_sums(&spot, &pixels);
+            assert_eq!(found.pixels, width * height - 1);
+            assert!((found.chi2 / expected.chi2 - 1.0).abs() < 1e-3);
+            for i in 0..ONE_SPOT {
+                let scale = |j: usize| expected.matrix[j][j].sqrt();
+                for j in 0..=i {
+                    let off = found.matrix[i][j] - expected.matrix[i][j];
+                    assert!(off.abs() <= 2e-6 * scale(i) * scale(j), "{flux}: {i}, {j}");
+                }
+                // The error of a step over its standard error.
+                let off = (found.right[i] - expected.right[i]) / scale(i).max(f64::MIN_POSITIVE);
+                assert!(off.abs() < 1e-3, "{flux}: {i}: {off}");
+            }
+        }
+    }
+}

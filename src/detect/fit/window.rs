@@ -1,0 +1,60 @@
+//! The pixels of a fit.
+
+use crate::detect::psf::{GROUP_PX, MAX_WINDOW_PX, PIXEL_VARIANCE_PX2, PixelGroup};
+
+/// A rectangle of pixels cut out of the frame.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Window {
+    /// Column of the first.
+    pub x0: usize,
+    /// Row of the first.
+    pub y0: usize,
+    /// Columns, at most [`MAX_WINDOW_PX`].
+    pub width: usize,
+    /// Rows, at most [`MAX_WINDOW_PX`].
+    pub height: usize,
+    /// Row by row, each in whole groups: the pixels above the background map, in units of the noise.
+    /// NaN where a pixel is left out, and beyond the end of a row.
+    pub data: Vec<PixelGroup>,
+    /// Standard deviation of the background noise, in ADU.
+    pub noise_adu: f64,
+    /// Standard error of the background map, in ADU.
+    pub background_error: f64,
+    /// The part of `background_error` that is noise, in ADU.
+    pub background_noise: f64,
+}
+
+impl Window {
+    /// Groups of pixels in a row.
+    pub fn groups(&self) -> usize {
+        self.width.div_ceil(GROUP_PX)
+    }
+
+    /// The pixel in a column and a row of the window, in units of the noise.
+    pub fn at(&self, column: usize, row: usize) -> f64 {
+        f64::from(self.data[row * self.groups() + column / GROUP_PX][column % GROUP_PX])
+    }
+
+    /// Column, row and value in ADU of each pixel.
+    pub fn pixels_adu(&self) -> impl Iterator<Item = (f64, f64, f64)> {
+        let pixels =
+            (0..self.height).flat_map(|row| (0..self.width).map(move |column| (column, row)));
+        pixels.map(|(column, row)| {
+            let value = self.noise_adu * self.at(column, row);
+            (column as f64, row as f64, value)
+        })
+    }
+
+    /// Becomes a copy of another window, without a new allocation where the pixels fit.
+    pub fn copy_from(&mut self, other: &Self) {
+        let mut data = std::mem::take(&mut self.data);
+        data.clone_from(&other.data);
+        *self = Self { data, ..*other };
+    }
+}
+
+/// Half the side of the window for a spot, in pixels: three standard deviations.
+pub(crate) fn window_radius(spot_px: f64) -> usize {
+    let width_px = (spot_px * spot_px + PIXEL_VARIANCE_PX2).sqrt();
+    ((3.0 * width_px).ceil() as usize).clamp(2, (MAX_WINDOW_PX - 1) / 2)
+}
