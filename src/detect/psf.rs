@@ -1,7 +1,7 @@
 //! The point spread function: a Gaussian integrated over the pixels, called the spot.
 //!
-//! Along one axis, the fraction of the light of a spot at `x` with standard deviation σ that falls on
-//! pixel `i` is `½[erf((i+½−x)/√2σ) − erf((i−½−x)/√2σ)]`; the spot is the product of both axes.
+//! Along one axis, the fraction of the light of a spot at `x` with standard deviation σ that falls
+//! on pixel `i` is `½[erf((i+½−x)/√2σ) − erf((i−½−x)/√2σ)]`; the spot is the product of both axes.
 //!
 //! # Reference
 //! Wang et al. 2019, Laser & Optoelectronics Progress 56, 101101, Eqs. (1) and (2).
@@ -60,8 +60,8 @@ impl<const N: usize> ProfilePart<[f32; N]> {
 }
 
 impl AxisProfile {
-    /// Fills the first `count` pixels for a spot of `sigma_px` at `center_px`, where 0 is the centre
-    /// of the first pixel.
+    /// Fills the first `count` pixels for a spot of `sigma_px` at `center_px`, where 0 is the
+    /// centre of the first pixel.
     pub fn fill(&mut self, center_px: f64, sigma_px: f64, count: usize) {
         fill(self, center_px, sigma_px, count.min(MAX_WINDOW_PX));
     }
@@ -217,8 +217,8 @@ pub(crate) fn exp_of_negative(x: f64) -> f64 {
     sum * f64::from_bits(bits)
 }
 
-/// Profile of a spot centred on a pixel: fractions of the light at distances 0, 1, … `radius` pixels,
-/// at most [`MAX_TAPS`] of them.
+/// Profile of a spot centred on a pixel: fractions of the light at distances 0, 1, … `radius`
+/// pixels, at most [`MAX_TAPS`] of them.
 pub(crate) fn centered_profile(sigma_px: f64, radius: usize) -> ArrayVec<f64, MAX_TAPS> {
     let scale = 1.0 / (std::f64::consts::SQRT_2 * sigma_px);
     let edge = |distance: f64| erf_and_gauss(distance * scale).0;

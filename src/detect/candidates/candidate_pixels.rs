@@ -88,7 +88,7 @@ impl Candidates {
     }
 }
 
-/// Whether none of the eight neighbours is higher; of equal pixels the first in reading order counts.
+/// Whether no neighbour is higher; of equal pixels the first in reading order counts.
 fn is_local_maximum(row: &[f32], [above, below]: [Option<&[f32]>; 2], x: usize) -> bool {
     let value = row[x];
     let columns = x.saturating_sub(1)..(x + 2).min(row.len());

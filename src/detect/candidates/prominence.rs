@@ -22,8 +22,8 @@ pub(super) struct Flooding {
 }
 
 impl Flooding {
-    /// Sets the prominences of a region's peaks; `peak_pixels` holds the pixel of each of all peaks,
-    /// in ascending order, and its run.
+    /// Sets the prominences of a region's peaks; `peak_pixels` holds the pixel of each of all
+    /// peaks, in ascending order, and its run.
     pub fn set_prominences(
         &mut self,
         region: usize,

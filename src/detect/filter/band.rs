@@ -23,7 +23,7 @@ pub(crate) struct FilteredBand {
     /// Rows of the frame that the band holds.
     rows: Range<usize>,
     values: Aligned,
-    /// A normalised row, from `lead` on, with zeros on either side over at least the kernel's radius.
+    /// A normalised row from `lead` on, padded with zeros over at least the kernel's radius.
     padded_row: Aligned,
     lead: usize,
     /// Ring buffer of rows filtered along x: row y is in slot y modulo their number.

@@ -38,7 +38,8 @@ macro_rules! with_known_length {
     };
 }
 
-/// `out[x] = half[0]·padded[x+r] + Σ half[j]·(padded[x+r−j] + padded[x+r+j])`, r the kernel's radius.
+/// `out[x] = half[0]·padded[x+r] + Σ half[j]·(padded[x+r−j] + padded[x+r+j])`, r the kernel's
+/// radius.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 pub(super) fn sum_along_row(half: &[f32], padded: &[f32], out: &mut [f32]) {
     with_known_length!(half.len(), sum_along_row_of(half, padded, out), 2 3 4 5 6 7);

@@ -1,8 +1,8 @@
 //! Fits of single spots in batches, one star in each lane of a vector.
 //!
-//! Each fit takes the same steps as that of [`Fitter`](super::fitter::Fitter); only the sums over the
-//! pixels run over many stars at once. Windows are small: their rows do not fill a vector, and the sum
-//! across a vector takes as long as the pixels.
+//! Each fit takes the same steps as that of [`Fitter`](super::fitter::Fitter); only the sums over
+//! the pixels run over many stars at once. Windows are small: their rows do not fill a vector, and
+//! the sum across a vector takes as long as the pixels.
 
 use super::frame_maps::FrameMaps;
 use super::gauss_newton::{MAX_STEPS, StepOutcome, add_background_map, advance, pixels_of};
@@ -220,8 +220,8 @@ fn flux_noise(lane: usize, sums: &BatchSums, window: &Window) -> f64 {
     flux_variance_of(sums, 1.0 / window.noise_adu, error2).sqrt()
 }
 
-/// Computes the profiles along an axis, for spots at `center_px`, where 0 is the centre of the first
-/// pixel.
+/// Computes the profiles along an axis, for spots at `center_px`, where 0 is the centre of the
+/// first pixel.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn fill(
     pixels: &mut [ProfilePart<PerStar>],

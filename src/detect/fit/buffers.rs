@@ -20,7 +20,7 @@ pub(crate) struct FitBuffers {
 }
 
 impl FitBuffers {
-    /// Fits spots of the frame's size; the light of the spots `beyond` the window is subtracted first.
+    /// Fits spots of the frame's size, after subtracting those `beyond` the window.
     pub fn fit_fixed_size(
         &mut self,
         maps: &FrameMaps<'_>,
@@ -39,8 +39,8 @@ impl FitBuffers {
         fitter.fit(window, start, &config)
     }
 
-    /// Fits one spot of free size, initially `spot_px`, in a window that grows with the size; the
-    /// light of the spots `beyond` the window is subtracted first.
+    /// Fits one spot of free size, initially `spot_px`, in a window that grows with the size, after
+    /// subtracting those `beyond` the window.
     pub fn fit_free_size(
         &mut self,
         maps: &FrameMaps<'_>,

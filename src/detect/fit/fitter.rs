@@ -20,7 +20,7 @@ pub(crate) struct Fitter {
 }
 
 impl Fitter {
-    /// Fits at most [`MAX_SPOTS`] spots to the pixels of `window`, from the initial guesses `start`.
+    /// Fits at most [`MAX_SPOTS`] spots to the pixels of `window`, beginning at `start`.
     ///
     /// Without convergence the result is `start`, with the standard errors for these parameters.
     pub fn fit(&mut self, window: &Window, start: &[SpotEstimate], config: &FitConfig) -> Fit {
@@ -134,8 +134,8 @@ impl Fitter {
         }
     }
 
-    /// Value above the fitted background, and fitted light, of each pixel that is not NaN, in units of
-    /// the noise.
+    /// Value above the fitted background, and fitted light, of each pixel that is not left out, in
+    /// units of the noise.
     pub fn compare(
         &mut self,
         window: &Window,
@@ -205,7 +205,7 @@ impl Fitter {
         }
     }
 
-    /// The normal equations at `fit`, with the size as the last parameter whether or not it is fitted.
+    /// The normal equations at `fit`; the last parameter is the size, whether or not it is fitted.
     fn linearise<const N: usize>(
         &mut self,
         window: &Window,

@@ -36,8 +36,8 @@ impl FrameMaps<'_> {
         f64::from(self.background.at(x as f32, y as f32).1)
     }
 
-    /// Noise of a spot's flux over that of independent pixels: above 1 where the noise is correlated;
-    /// 1 before the frame is filtered.
+    /// Noise of a spot's flux over that of independent pixels: above 1 where the noise is
+    /// correlated; 1 before the frame is filtered.
     pub fn correlation_at(&self, x: f64, y: f64) -> f64 {
         self.filtered
             .map_or(1.0, |mesh| f64::from(mesh.at(x as f32, y as f32).1))
@@ -97,7 +97,7 @@ impl FrameMaps<'_> {
     }
 }
 
-/// First and end of the pixels within `radius` of a point along an axis, on a side of `side` pixels.
+/// First and end of the pixels within `radius` of a point along an axis of `side` pixels.
 fn span_around(center: f64, radius: usize, side: usize) -> [usize; 2] {
     let first = (center.round() - radius as f64).max(0.0) as usize;
     let last = (center.round() + radius as f64).max(0.0) as usize;
@@ -122,7 +122,7 @@ struct BackgroundPlane {
     down: f32,
 }
 
-/// Copies the pixels of a window, less the background and in units of the noise; NaN where saturated.
+/// Copies the pixels of a window above the background, in units of the noise; NaN where saturated.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn copy_above(view: &View, plane: BackgroundPlane, saturation_adu: f32, window: &mut Window) {
     let groups = window.groups();

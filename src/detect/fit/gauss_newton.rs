@@ -14,8 +14,8 @@ const MAX_STEP_PX: f64 = 0.5;
 struct Convergence;
 
 impl Convergence {
-    /// Steps shorter than this, in px, end the fit. Convergence is quadratic, so little is left after
-    /// one.
+    /// Steps shorter than this, in px, end the fit. Convergence is quadratic, so little is left
+    /// after one.
     const STEP_PX: f64 = 2e-3;
     /// So do steps shorter than this fraction of the standard error: at most a fifth of it is left,
     const STEP_SIGMA: f64 = 0.1;
@@ -23,12 +23,12 @@ impl Convergence {
     const MAX_STEP_PX: f64 = 0.02;
     /// The same where the size is free: the flux depends on it, most where the core is saturated.
     const MAX_STEP_FREE_SIZE_PX: f64 = 0.005;
-    /// The first step ends the fit only where it changes the flux by less than this fraction, because
-    /// the weights follow from the flux.
+    /// The first step ends the fit only where it changes the flux by less than this fraction,
+    /// because the weights follow from the flux.
     const FLUX_CHANGE: f64 = 0.02;
 
-    /// Steps shorter than this end the fit, in px; `information` is the inverse variance of the best
-    /// known coordinate.
+    /// Steps shorter than this end the fit, in px; `information` is the inverse variance of the
+    /// best known coordinate.
     fn step_px(information: f64, config: &FitConfig) -> f64 {
         let longest = if config.free_size {
             Self::MAX_STEP_FREE_SIZE_PX

@@ -57,8 +57,8 @@ pub(crate) fn linearise<const S: usize, const N: usize>(
     (light, gradient)
 }
 
-/// The fraction of a spot's light in a pixel, and the derivatives of the light there with respect to
-/// x, y and size.
+/// The fraction of a spot's light in a pixel, and the derivatives of the light there with respect
+/// to x, y and size.
 #[inline(always)]
 pub(crate) fn spot_gradient(
     flux: f32,

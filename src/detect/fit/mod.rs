@@ -1,11 +1,11 @@
-//! Step 5: variance-weighted least-squares fits of pixel-integrated Gaussians and a local background.
+//! Step 5: least-squares fits of pixel-integrated Gaussians and a local background.
 //!
-//! Parameters: x, y and flux of each spot, one background, and optionally one spot size. Gauss-Newton
-//! with weights 1/v from the model of the step before: `v = n² + g·m + (ε·m)²`, where m is the light
-//! of the spots, n the background noise, g the shot noise per ADU and ε the relative error of the spot
-//! model. The background map enters as a measurement of the background with its standard error. For
-//! Gaussian and Poisson noise this is maximum likelihood to leading order, and reaches the Cramér-Rao
-//! bound for signal-to-noise ratios above about 9.
+//! Parameters: x, y and flux of each spot, one background, and optionally one spot size.
+//! Gauss-Newton with weights 1/v from the model of the step before: `v = n² + g·m + (ε·m)²`, where
+//! m is the light of the spots, n the background noise, g the shot noise per ADU and ε the relative
+//! error of the spot model. The background map enters as a measurement of the background with its
+//! standard error. For Gaussian and Poisson noise this is maximum likelihood to leading order, and
+//! reaches the Cramér-Rao bound for signal-to-noise ratios above about 9.
 //!
 //! # Reference
 //! Mighell 2005, doi 10.1111/j.1365-2966.2005.09208.x, for PSF fitting and its error budget.

@@ -1,4 +1,4 @@
-//! What is fitted: the parameters of the spots, the noise of the pixels, settings and result of a fit.
+//! Parameters, settings and result of a fit.
 
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
 use arrayvec::ArrayVec;

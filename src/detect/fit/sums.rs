@@ -129,7 +129,8 @@ fn add_up<const S: usize, const N: usize>(
 }
 
 /// The variance of the flux of one spot, in ADU², fitted together with a background of variance
-/// `background_error2` in ADU². The position is held: a symmetric spot's flux does not depend on it.
+/// `background_error2` in ADU². The position is held: a symmetric spot's flux does not depend on
+/// it.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 pub(crate) fn flux_variance(
     spot: &SpotLight,

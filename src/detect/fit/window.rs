@@ -13,8 +13,8 @@ pub(crate) struct Window {
     pub width: usize,
     /// Rows, at most [`MAX_WINDOW_PX`].
     pub height: usize,
-    /// Row by row, each in whole groups: the pixels above the background map, in units of the noise.
-    /// NaN where a pixel is left out, and beyond the end of a row.
+    /// Row by row, each in whole groups: the pixels above the background map, in units of the
+    /// noise. NaN where a pixel is left out, and beyond the end of a row.
     pub data: Vec<PixelGroup>,
     /// Standard deviation of the background noise, in ADU.
     pub noise_adu: f64,

@@ -7,8 +7,7 @@ use crate::detect::detection::{Detection, DetectionFlags};
 use crate::detect::fit::{Fit, FrameMaps, NoiseModel, SpotEstimate, window_radius};
 use crate::detect::pixels::View;
 
-/// The detection of a source with the flags that need no test of its shape; coordinates are those of
-/// the view.
+/// The detection of a source in coordinates of the view, without the flags of its shape.
 pub(super) fn detection_of(
     maps: &FrameMaps<'_>,
     noise: &NoiseModel,
@@ -45,8 +44,8 @@ pub(super) fn detection_of(
     }
 }
 
-/// The fitted spot, with errors for correlated noise. Where the fit does not fix the position, that of
-/// the saturated area or of the filtered peak.
+/// The fitted spot, with errors for correlated noise. Where the fit does not fix the position, that
+/// of the saturated area or of the filtered peak.
 fn best_estimate(
     maps: &FrameMaps<'_>,
     noise: &NoiseModel,
@@ -136,7 +135,7 @@ fn clamp_to_frame(spot: &mut SpotEstimate, width: usize, height: usize) {
     clamp(&mut spot.y, &mut spot.sigma_y, height);
 }
 
-/// The highest value within this many columns and rows of a peak; negative infinity where all are NaN.
+/// The highest value within `reach` columns and rows of a peak; negative infinity if all are NaN.
 pub(super) fn brightest_within(reach: usize, peak: &Peak, view: &View<'_>) -> f64 {
     let columns = peak.x.saturating_sub(reach)..(peak.x + reach + 1).min(view.width);
     let rows = peak.y.saturating_sub(reach)..(peak.y + reach + 1).min(view.height);

@@ -40,7 +40,7 @@ impl NeighbourGrid {
             let cell = cell_of(self, peak);
             self.starts[cell] += 1;
         }
-        // Counting sort: counts become ends, and ends become starts as cells are filled from the back.
+        // Counting sort: counts become ends, and ends become starts while filling from the back.
         let mut end = 0;
         for start in &mut self.starts {
             end += *start;

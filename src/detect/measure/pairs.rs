@@ -1,7 +1,7 @@
 //! Close pairs: two stars that the matched filter merges into one peak.
 //!
-//! The filter merges stars closer than about two spot sizes, and makes a shoulder of a fainter one up
-//! to four spot sizes away.
+//! The filter merges stars closer than about two spot sizes, and makes a shoulder of a fainter one
+//! up to four spot sizes away.
 
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::fit::{

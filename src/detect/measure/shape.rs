@@ -3,11 +3,11 @@
 //! Each flag needs a difference that is large in units of its error *and* large by itself, so that
 //! neither faint noise nor the imperfect spots of bright stars are flagged.
 //!
-//! A hot pixel and a sharp star are two hypotheses: all light in one pixel, or a spot somewhat sharper
-//! than the frame's. Their chi² differ by `D`. For a true star D is Gaussian with mean −d² and standard
-//! deviation 2d, where d is the distance of the two models in units of the noise; for a hot pixel the
-//! mean is +d². A source is flagged where a single pixel fits better (D > 0) and a star would have a D
-//! that high in under one of 150 cases.
+//! A hot pixel and a sharp star are two hypotheses: all light in one pixel, or a spot somewhat
+//! sharper than the frame's. Their chi² differ by `D`. For a true star D is Gaussian with mean −d²
+//! and standard deviation 2d, where d is the distance of the two models in units of the noise; for
+//! a hot pixel the mean is +d². A source is flagged where a single pixel fits better (D > 0) and a
+//! star would have a D that high in under one of 150 cases.
 
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::detection::Detection;
@@ -57,7 +57,7 @@ fn imperfection(maps: &FrameMaps<'_>, peak: &Peak, spot: &SpotEstimate) -> f64 {
 
 /// Whether a single pixel explains the source better than any star does.
 fn is_hot_pixel(maps: &FrameMaps<'_>, peak: &Peak, fit: &Fit, buffers: &mut FitBuffers) -> bool {
-    /// The chi² difference of a true star exceeds its mean by less than this many standard deviations.
+    /// Maximum deviation of a true star's chi² difference, in standard deviations.
     const STAR_SIGMA: f64 = 2.5;
     let spot = fit.spots[0];
     // Without shot noise and model errors: these would excuse a hot pixel, too.
@@ -86,7 +86,7 @@ fn is_hot_pixel(maps: &FrameMaps<'_>, peak: &Peak, fit: &Fit, buffers: &mut FitB
     }
 }
 
-/// Chi² of a star less that of all its light in one pixel, and the squared distance of the two models.
+/// Chi² of a star less that of all light in one pixel, and the squared distance of the two models.
 fn compare_with_one_pixel(star: &Fit, buffers: &mut FitBuffers) -> [f64; 2] {
     let FitBuffers { fitter, window, .. } = buffers;
     let (mut difference, mut distance2) = (0.0, 0.0);
@@ -136,7 +136,7 @@ pub(super) fn is_trail(region: &Region, peak: &Peak, width_px: f64, threshold: f
     if region.peaks > 1 || region.area_px < MIN_AREA_PX {
         return false;
     }
-    // A filtered star falls to the threshold where r² = 4 s² ln(snr / threshold); 1.5 px for the grid.
+    // A filtered star falls to the threshold at r² = 4 s² ln(snr / threshold); 1.5 px for the grid.
     let height = (f64::from(peak.snr) / threshold).max(1.0);
     let radius_px = 2.0 * width_px * height.ln().sqrt() + 1.5;
     let is_long = region.major_px > MIN_LENGTH * 0.5 * radius_px;
