@@ -129,7 +129,7 @@ pub fn detect_into(
     let (stars, pass) = (searched.stars, searched.pass);
     let filtered = Some(&search.filtered.mesh);
     let measurement = Measurement {
-        scene: input.scene(filtered, stars.spot_px, pass.matched_gain),
+        maps: input.maps(filtered, stars.spot_px, pass.matched_gain),
         noise: stars.noise,
         method: config.centroid,
         regions: &search.found.regions,
