@@ -184,7 +184,7 @@ pub(crate) fn erf_and_gauss(x: f64) -> (f64, f64) {
 }
 
 /// Smallest argument of [`exp_of_negative`].
-pub(crate) const LEAST_EXPONENT: f64 = -700.0;
+pub(crate) const MIN_EXPONENT: f64 = -700.0;
 
 /// `exp(x)` for −700 ≤ x ≤ 0, to a relative 1e-10: 2ⁿ times the series of the remainder.
 #[inline(always)]

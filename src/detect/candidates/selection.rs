@@ -4,7 +4,6 @@ use super::peak::Peak;
 use super::search_config::SearchConfig;
 
 /// Minimum prominence of a peak that is not the highest of its region.
-#[derive(Debug, Clone, Copy)]
 struct MinProminence;
 
 impl MinProminence {

@@ -5,15 +5,7 @@ use super::disjoint_sets::{self, join, root_of};
 use super::peak::Peak;
 use super::region::Region;
 
-/// A region is a streak where it has at least this many peaks,
-const MIN_PEAKS: usize = 4;
-/// its longer principal axis is this many times the shorter,
-const MIN_ELONGATION: f64 = 4.0;
-/// and this many times the spot's width.
-const MIN_LENGTH_SIGMA: f32 = 5.0;
-
 /// A chain of peaks of which each is close to another, and all are close to a straight line.
-#[derive(Debug, Clone, Copy)]
 struct DashedStreak;
 
 impl DashedStreak {
@@ -135,6 +127,11 @@ impl Streaks {
 
 /// Whether the region is one long streak with many peaks, and not a few stars in a row.
 fn is_streak(region: &Region, spot_width_px: f32) -> bool {
+    const MIN_PEAKS: usize = 4;
+    /// Minimum ratio of the principal axes.
+    const MIN_ELONGATION: f64 = 4.0;
+    /// Minimum standard deviation along the longer axis, in spot widths.
+    const MIN_LENGTH_SIGMA: f32 = 5.0;
     region.peaks >= MIN_PEAKS
         && region.major_px > MIN_ELONGATION * region.minor_px
         && region.major_px > f64::from(MIN_LENGTH_SIGMA * spot_width_px)

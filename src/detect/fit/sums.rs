@@ -23,7 +23,7 @@ pub(crate) struct WindowPixels<'a> {
     pub per_noise: f64,
     /// Fitted background above the map.
     pub background: f32,
-    /// Variance of a pixel per light, and per squared light.
+    /// Coefficients of the variance of a pixel: of the light, and of its square.
     pub variance: [f32; 2],
 }
 
@@ -129,8 +129,7 @@ fn add_up<const S: usize, const N: usize>(
 }
 
 /// The variance of the flux of one spot, in ADU², fitted together with a background of variance
-/// `background_error2` in ADU². The position is held: a symmetric spot's flux does not depend on
-/// it.
+/// `background_error2` in ADU². The position is held: a symmetric spot's flux is independent of it.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 pub(crate) fn flux_variance(
     spot: &SpotLight,
