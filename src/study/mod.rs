@@ -1,5 +1,5 @@
-//! Is it good enough? Validation with simulated frames, robustness of the identification, and the
-//! experiments of a paper.
+//! How good is it? Validation with simulated frames, robustness of identification, and the
+//! experiments of the paper.
 
 pub mod defocus;
 pub mod experiment;

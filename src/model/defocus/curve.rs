@@ -1,24 +1,25 @@
-//! The error over the radius at one noise: a smooth curve through the trials, its lowest point, and where it meets an error.
+//! The error over the radius at one noise: a smooth curve, its minimum, and the radii that meet an
+//! error.
 
 use super::ErrorPoint;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
-/// Radii within this factor of each other, as a natural logarithm, count together.
+/// Smallest half width of the local regression, as a logarithm of the ratio of radii.
 const REACH: f64 = 0.3;
-/// At least so many points count together: as many as a parabola needs, and two.
+/// Smallest number of points in a local fit: two more than a parabola needs.
 const FEWEST: usize = 5;
-/// Of fewer points in all no parabola is fitted: it would go through all of them.
+/// With fewer points in total no parabola is fitted, as it would pass through all of them.
 const FEWEST_FOR_PARABOLA: usize = 4;
-/// Radii at which the lowest point is looked for.
+/// Number of steps in the search for the minimum.
 const STEPS: usize = 600;
-/// Errors so much larger than the least are as good for a designer.
+/// Errors up to this factor above the minimum count as nearly optimal.
 const NEARLY: f64 = 1.05;
 
-/// The error over the radius.
+/// The error over the radius, smoothed.
 ///
-/// Between two radii the logarithm of the error is that of a parabola in the logarithm of the radius, fitted to the points
-/// around (local regression), each with the weight of the stars found.
+/// The logarithm of the error is a parabola in the logarithm of the radius, fitted to the points
+/// around (local regression), weighted with the number of detected stars.
 ///
 /// # Reference
 /// Cleveland 1979, J. Am. Stat. Assoc. 74, 829.
@@ -36,8 +37,8 @@ struct CurvePoint {
 }
 
 impl CurvePoint {
-    /// The squared distances of two normal axes are exponential. The logarithm of the mean of n such is on average 1/(2n) below that of
-    /// what it is the mean of, its root's half of that; its variance is about 1/n.
+    /// Squared distances of two normal axes are exponential. The logarithm of the mean of n of them
+    /// is on average 1/(2n) too low, that of its root half as much; its variance is about 1/n.
     fn new(spot_px: f64, point: &ErrorPoint) -> Self {
         let found = point.found as f64;
         Self {
@@ -49,21 +50,21 @@ impl CurvePoint {
     }
 }
 
-/// The radius with the least error.
+/// The radius of smallest error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Optimum {
     /// The radius, in pixels.
     pub spot_px: f64,
     /// Its error, in pixels.
     pub rms_px: f64,
-    /// The radii between which the error is at most a twentieth larger, in pixels.
+    /// Range of radii with an error at most 5 % larger, in pixels.
     pub nearly_px: [f64; 2],
-    /// Whether it is the first or the last radius of the grid: the true one lies beyond.
+    /// Whether it is the first or last radius of the grid, so that the true optimum lies beyond.
     pub is_at_edge: bool,
 }
 
 impl ErrorCurve {
-    /// The curve through the sound points; none where there are too few.
+    /// The curve through the sound points; none if there are too few.
     pub fn through<'a>(points: impl Iterator<Item = (f64, &'a ErrorPoint)>) -> Option<Self> {
         let sound = points.filter(|(_, point)| point.is_sound());
         let points: Vec<_> = sound
@@ -88,7 +89,7 @@ impl ErrorCurve {
         log_rms.exp()
     }
 
-    /// Along the straight line between the points next to it, in logarithms.
+    /// Linear interpolation between the adjacent points, in logarithms.
     fn joined_at(&self, at: f64) -> f64 {
         let last = self.points.len() - 2;
         let before = self.points[1..=last].partition_point(|point| point.log_spot <= at);
@@ -97,7 +98,7 @@ impl ErrorCurve {
         from.log_rms + part * (to.log_rms - from.log_rms)
     }
 
-    /// By the parabola through the points around, in logarithms.
+    /// Local parabola, in logarithms.
     fn fitted_at(&self, at: f64) -> f64 {
         let reach = self.reach_at(at);
         let mut squared = Matrix3::zeros();
@@ -111,22 +112,22 @@ impl ErrorCurve {
                 right += row * (weight * point.log_rms);
             }
         }
-        // Radii differ, and four of them count: the matrix has an inverse.
+        // At least four distinct radii count: the matrix can be inverted.
         let solved = squared.cholesky().map(|c| c.solve(&right)[0]);
         solved.unwrap_or_else(|| self.joined_at(at))
     }
 
-    /// How far points count, as a natural logarithm: [`REACH`], or as far as [`FEWEST`] of them are.
+    /// Half width of the local regression: [`REACH`], or as much as [`FEWEST`] points need.
     fn reach_at(&self, at: f64) -> f64 {
         let distances = self.points.iter().map(|point| (point.log_spot - at).abs());
         let mut distances: Vec<f64> = distances.collect();
         let last = distances.len().min(FEWEST) - 1;
         let (_, far, _) = distances.select_nth_unstable_by(last, f64::total_cmp);
-        // The farthest has no weight itself.
+        // The farthest point itself has no weight.
         (*far * 1.2).max(REACH)
     }
 
-    /// Radii in even ratios over the range, in pixels.
+    /// Logarithmically spaced radii over the range, in pixels.
     fn radii_px(&self) -> impl Iterator<Item = f64> + use<> {
         let [first, last] = self.range_px();
         (0..=STEPS).map(move |i| match i {
@@ -136,7 +137,7 @@ impl ErrorCurve {
         })
     }
 
-    /// The lowest point.
+    /// The minimum.
     pub fn optimum(&self) -> Optimum {
         let errors: Vec<(f64, f64)> = self.radii_px().map(|r| (r, self.at(r))).collect();
         let lowest = (0..errors.len()).min_by(|&a, &b| errors[a].1.total_cmp(&errors[b].1));
@@ -154,18 +155,18 @@ impl ErrorCurve {
         }
     }
 
-    /// The smallest radius whose error is at most `rms_px`, in pixels; none where no radius meets it.
+    /// Smallest radius whose error is at most `rms_px`, in pixels; none if no radius meets it.
     pub fn smallest_within(&self, rms_px: f64) -> Option<f64> {
         self.first_within(rms_px, self.radii_px())
     }
 
-    /// The largest radius whose error is at most `rms_px`, in pixels; none where no radius meets it.
+    /// Largest radius whose error is at most `rms_px`, in pixels; none if no radius meets it.
     pub fn largest_within(&self, rms_px: f64) -> Option<f64> {
         let radii: Vec<f64> = self.radii_px().collect();
         self.first_within(rms_px, radii.into_iter().rev())
     }
 
-    /// The first radius that meets an error, where they come from one side.
+    /// The first of the radii that meets an error, refined between neighbours.
     fn first_within(&self, rms_px: f64, radii_px: impl Iterator<Item = f64>) -> Option<f64> {
         let mut before = None;
         for radius in radii_px {
@@ -177,7 +178,7 @@ impl ErrorCurve {
         None
     }
 
-    /// Where between a radius with a larger error and one that meets it the error is met.
+    /// Bisection between a radius with a larger error and one that meets it.
     fn crossing(&self, mut above: f64, mut within: f64, rms_px: f64) -> f64 {
         const HALVINGS: usize = 30;
         for _ in 0..HALVINGS {
@@ -199,7 +200,7 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    /// An error with its least value 0.02 at a radius of 0.8.
+    /// An error with its minimum 0.02 at a radius of 0.8.
     fn valley(spot_px: f64) -> f64 {
         0.02 * (2.0 * (spot_px / 0.8).ln().powi(2)).exp()
     }
@@ -256,7 +257,7 @@ mod tests {
         let curve = ErrorCurve::through(radii.iter().copied().zip(&points)).unwrap();
         let log_ratio = |&px: &f64| (curve.at(px) / study.expected(px, 1e-3).rms_px).ln();
         let mean = radii.iter().map(log_ratio).sum::<f64>() / radii.len() as f64;
-        // 6000 stars know the root to 0.65 %.
+        // The standard error of the root from 6000 stars is 0.65 %.
         assert!(mean.abs() < 0.02, "{mean}");
     }
 

@@ -1,8 +1,9 @@
-//! What a real sensor faces: a star of a given magnitude, in electrons, measured as starpipe measures stars.
+//! The study of a real sensor: a star of given magnitude, in electrons, measured by this crate.
 //!
-//! Each trial is a star in a frame of the [simulator](crate::model::simulate): shot noise of star and sky, dark current, noise of
-//! reading, full pixels, whole grey levels. The frame goes through [`detect`], which is told the spot's size, as a
-//! camera's is known, and measures background and noise itself.
+//! Each trial is a star in a [simulated](crate::model::simulate) frame: shot noise of star and sky,
+//! dark current, read noise, saturation, quantisation. The frame goes through [`detect`], which is
+//! given the size of the spot, as it is known for a camera, and measures background and noise
+//! itself.
 
 use super::ErrorPoint;
 use crate::base::coords::PixelPoint;
@@ -14,7 +15,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-/// How a star's place is measured.
+/// Centroiding method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Centroiding {
@@ -22,44 +23,46 @@ pub enum Centroiding {
     GaussianFit,
     /// [`CentroidMethod::GreyWeighted`].
     GreyWeighted,
-    /// The paper's: the grey-weighted mean of a fixed window about the star's pixel, the background known, without a threshold.
+    /// That of the paper: the intensity-weighted mean over a fixed window around the star's pixel,
+    /// with known background and without a threshold.
     FixedWindow,
 }
 
-/// A star of a camera under a sky.
+/// A star, camera and sky, and how to measure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EnergyStudy {
-    /// The camera and its conditions; spot and noise of reading are varied.
+    /// Camera and conditions; spot and read noise are varied.
     pub scenario: Scenario,
-    /// Johnson V of the star.
+    /// V magnitude of the star.
     pub v_mag: f64,
-    /// How it is measured.
+    /// Centroiding method.
     pub centroiding: Centroiding,
-    /// Pixels from the middle of a fixed window to its edge.
+    /// Half width of the fixed window, without its central pixel, in pixels.
     pub half_window_px: usize,
-    /// Stars at each point of the grid.
+    /// Number of stars at each point of the grid.
     pub trials: usize,
 }
 
-/// What else a spot decides.
+/// Other consequences of the spot's size.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Reach {
-    /// The least root mean square of the distance that an unbiased centroid of the star can have, averaged over its places in a
-    /// pixel, in pixels; full pixels are not counted.
+    /// Cramér-Rao bound of the RMS distance, averaged over positions in a pixel, in pixels;
+    /// saturation is ignored.
     pub bound_px: f64,
-    /// V magnitude at which half of the stars are detected.
+    /// V magnitude of 50 % completeness.
     pub limit_vmag: Option<f64>,
-    /// Charge of the star's brightest pixel, centred on it, over the full well.
+    /// Charge of the star's brightest pixel, with the star at its centre, over the full well.
     pub peak_part: f64,
 }
 
-/// Stars along the side of a frame, at most.
+/// Largest number of stars along a side of a frame.
 const MOST_ABREAST: usize = 32;
-/// Distance of the stars: so many standard deviations of the spot, and at least so many pixels. Of the background they are a
-/// small part, and none touches another.
+/// Distance between stars, in standard deviations of the spot, and its minimum in pixels. At this
+/// distance they cover a small part of the background and do not overlap.
 const SPACING_SIGMAS: f64 = 20.0;
 const LEAST_SPACING_PX: f64 = 40.0;
-/// A detection is that of a star within so many pixels, and standard deviations of the spot, of it.
+/// Largest distance between a star and its detection: this many pixels plus standard deviations of
+/// the spot.
 const MATCH_PX: f64 = 2.0;
 const MATCH_SIGMAS: f64 = 1.0;
 
@@ -75,21 +78,21 @@ impl EnergyStudy {
         }
     }
 
-    /// The scenario with this spot in pixels, and this noise of reading in electrons.
+    /// The scenario with this spot in pixels and read noise in electrons.
     pub fn scenario_of(&self, spot_px: f64, noise_e: f64) -> Scenario {
         let mut scenario = self.scenario.clone();
         let sheet = &mut scenario.camera;
         sheet.spot_sigma_px = spot_px;
-        // A share that is stated is that of another spot.
+        // A stated peak share belongs to another spot.
         sheet.peak_share = None;
         sheet.read_noise_e = noise_e;
         scenario
     }
 
-    /// The error at a radius in pixels and a noise of reading in electrons, by trials.
+    /// Measures the error at a radius in pixels and a read noise in electrons.
     ///
     /// # Errors
-    /// [`FrameError`] where there is no memory for a frame.
+    /// [`FrameError`] if there is no memory for a frame.
     pub fn measure(
         &self,
         spot_px: f64,
@@ -126,7 +129,7 @@ impl EnergyStudy {
         }
     }
 
-    /// What may be stars in the frame.
+    /// Star-like detections in the frame.
     fn detected(
         &self,
         frame: &Frame,
@@ -140,7 +143,7 @@ impl EnergyStudy {
             centroid,
             ..DetectConfig::default()
         };
-        // The frame is large enough and the options are sound: nothing is refused.
+        // The frame is large enough and the options are valid: `detect` does not fail.
         let found = detect(frame, &config, workspace).map_or_else(|_| Vec::new(), |d| d.sources);
         let star_like = found
             .into_iter()
@@ -148,7 +151,7 @@ impl EnergyStudy {
         star_like.collect()
     }
 
-    /// The squared errors of the paper's centroid.
+    /// Squared errors of the paper's centroid.
     fn squares_in_windows<'a>(
         &'a self,
         frame: &'a Frame,
@@ -177,7 +180,7 @@ impl EnergyStudy {
         })
     }
 
-    /// What theory says of such a spot at this noise of reading.
+    /// Bound, limit and peak charge for such a spot at this read noise.
     pub fn reach(&self, spot_px: f64, noise_e: f64) -> Reach {
         let scenario = self.scenario_of(spot_px, noise_e);
         let budget = Budget::new(&scenario);
@@ -193,9 +196,9 @@ impl EnergyStudy {
     }
 }
 
-/// The Cramér-Rao bound of the distance, its mean square taken over places in a pixel.
+/// Cramér-Rao bound of the RMS distance, averaged over positions in a pixel.
 fn bound_px(spot_px: f64, star_e: f64, variance_e2: f64) -> f64 {
-    /// Places along half a pixel: the other half is its mirror image.
+    /// Positions along half a pixel; the other half is its mirror image.
     const PLACES: usize = 6;
     let place = |i: usize| 0.5 * (i as f64 + 0.5) / PLACES as f64;
     let mut sum = 0.0;
@@ -207,7 +210,8 @@ fn bound_px(spot_px: f64, star_e: f64, variance_e2: f64) -> f64 {
     (sum / (PLACES * PLACES) as f64).sqrt()
 }
 
-/// Stars in the cells of a square frame, each anywhere within the middle pixel of its cell.
+/// Stars in the cells of a square frame, each at a random position within the central pixel of its
+/// cell.
 struct StarCells {
     side_px: usize,
     cell_px: usize,
@@ -233,7 +237,7 @@ impl StarCells {
         }
     }
 
-    /// The squared distances between the stars that were found and the nearest detection to each.
+    /// Squared distances between the detected stars and the nearest detection of each.
     fn squares(&self, found: &[Detection]) -> impl Iterator<Item = f64> + use<> {
         let mut nearest = vec![f64::INFINITY; self.abreast * self.abreast];
         for source in found {
@@ -277,7 +281,7 @@ mod tests {
     fn the_fit_is_at_the_bound_and_the_others_are_not() {
         let fit = study(4.0, Centroiding::GaussianFit);
         let bound = fit.reach(1.0, fit.scenario.camera.read_noise_e).bound_px;
-        // 300 stars know a ratio to 3 %.
+        // The standard error of the ratio from 300 stars is 3 %.
         let ratio = rms_px(&fit, 1.0) / bound;
         assert!((0.88..1.12).contains(&ratio), "{ratio}");
         let grey = rms_px(&study(4.0, Centroiding::GreyWeighted), 1.0) / bound;

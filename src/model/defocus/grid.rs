@@ -1,4 +1,4 @@
-//! The grid of spot radii and noises, and the errors of centroids on it.
+//! The grid of spot radii and noises, and the centroid errors on it.
 
 use crate::model::sensitivity::Spacing;
 use rand::SeedableRng;
@@ -6,13 +6,13 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Where errors are measured.
+/// Radii and noises at which errors are measured.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
-    /// Standard deviations of the spot, rising, in pixels.
+    /// Standard deviations of the spot, increasing, in pixels.
     #[doc(alias = "sigma_s")]
     pub spots_px: Vec<f64>,
-    /// Noises, rising: parts of full scale, or electrons.
+    /// Noises, increasing: fractions of full scale, or electrons.
     #[doc(alias = "sigma_g")]
     pub noises: Vec<f64>,
 }
@@ -35,22 +35,23 @@ impl Grid {
     }
 }
 
-/// The error of the centroid at one radius and one noise.
+/// Centroid error at one radius and one noise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ErrorPoint {
-    /// Stars.
+    /// Number of stars.
     pub trials: usize,
-    /// Those of them that were found.
+    /// Number of detected stars.
     pub found: usize,
-    /// Root mean square of the distance between centroid and truth of those found, in pixels (eq. 8); NaN where none was.
+    /// RMS distance between centroid and true position of the detected stars, in pixels (eq. 8);
+    /// NaN if there are none.
     #[doc(alias = "sigma_e")]
     pub rms_px: f64,
-    /// Its standard error, from the scatter of the trials.
+    /// Standard error of the RMS, from the scatter of the trials.
     pub rms_sigma_px: f64,
 }
 
 impl ErrorPoint {
-    /// Of the squared distances of the stars found among so many.
+    /// From the squared distances of the detected stars.
     pub fn of_squares(trials: usize, squares_px2: &[f64]) -> Self {
         let count = squares_px2.len() as f64;
         let mean = squares_px2.iter().sum::<f64>() / count;
@@ -61,16 +62,16 @@ impl ErrorPoint {
             trials,
             found: squares_px2.len(),
             rms_px,
-            // Of the mean square, by the slope of the root.
+            // Propagated from the mean square through the root.
             rms_sigma_px: (variance / count).sqrt() / (2.0 * rms_px),
         }
     }
 
-    /// Whether enough stars were found for the error to be that of all.
+    /// Whether enough stars were detected for an unbiased error.
     pub fn is_sound(&self) -> bool {
-        /// Fewer are chance.
+        /// Minimum number of detected stars.
         const FEWEST: usize = 10;
-        /// Where fewer are found, these are the ones that noise helped.
+        /// Minimum detected fraction; below, noise selects the stars.
         const LEAST_PART: f64 = 0.5;
         let fewest = self.trials.min(FEWEST);
         self.found >= fewest
@@ -82,19 +83,19 @@ impl ErrorPoint {
 /// The errors on a grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorGrid {
-    /// Where.
+    /// Radii and noises.
     pub grid: Grid,
-    /// Of each radius at all noises, one radius after the other.
+    /// Row-major: all noises of the first radius, then of the next.
     pub points: Vec<ErrorPoint>,
 }
 
 impl ErrorGrid {
-    /// Measures all points on the threads of the current pool; `done` is called after each.
+    /// Measures all points on the threads of the current pool and calls `done` after each.
     ///
-    /// Every point has random numbers of its own, which depend on `seed` and its number alone.
+    /// The random numbers of a point depend only on `seed` and its index.
     ///
     /// # Errors
-    /// The first of `measure`.
+    /// The first error of `measure`.
     pub fn measure<E: Send>(
         grid: Grid,
         seed: u64,
@@ -128,13 +129,13 @@ impl ErrorGrid {
             .map(|((spot_px, noise), point)| (spot_px, noise, point))
     }
 
-    /// The errors over the radius at the noise of this number.
+    /// Errors over the radius at the noise of this index.
     pub fn at_noise(&self, number: usize) -> impl Iterator<Item = (f64, &ErrorPoint)> {
         let points = self.points[number..].iter().step_by(self.grid.noises.len());
         self.grid.spots_px.iter().copied().zip(points)
     }
 
-    /// Root mean square of the errors' own standard errors, in pixels: how far the points scatter about the truth.
+    /// RMS of the errors' standard errors, in pixels: the statistical scatter of the points.
     pub fn scatter_px(&self) -> f64 {
         let squares = self.points.iter().map(|point| point.rms_sigma_px.powi(2));
         (squares.sum::<f64>() / self.points.len() as f64).sqrt()
@@ -148,7 +149,8 @@ mod tests {
 
     #[test]
     fn an_error_has_the_standard_error_of_its_scatter() {
-        // Squared distances of two normal axes are exponential: the error of the root is 1/(2 √n) of it.
+        // Squared distances of two normal axes are exponential: the relative standard error of the
+        // root is 1/(2 √n).
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let squares: Vec<f64> = (0..40_000)
             .map(|_| -2.0 * (1.0 - random.random::<f64>()).ln())

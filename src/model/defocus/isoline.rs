@@ -1,15 +1,15 @@
-//! Lines of equal error over the noise, and the parabola that the paper sees in them.
+//! Lines of equal error over the noise, and the parabola fitted to them in the paper.
 
 use super::{ErrorCurve, ErrorGrid};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-/// For each noise, the radii that meet an error (the paper's figure 4).
+/// For each noise, the range of radii that meets an error (the paper's figure 4).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct IsoLine {
     /// The error, in pixels.
     pub rms_px: f64,
-    /// The noises at which a radius of the grid meets it.
+    /// Points at the noises where a radius of the grid meets it.
     pub points: Vec<IsoPoint>,
     /// Smallest radius as a parabola of the noise, as the paper has it.
     pub radius_of_noise: Option<Parabola>,
@@ -17,32 +17,33 @@ pub struct IsoLine {
     pub noise_of_radius: Option<Parabola>,
 }
 
-/// A point of such a line.
+/// A point of a line of equal error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct IsoPoint {
     /// The noise.
     pub noise: f64,
-    /// The smallest radius that meets the error, in pixels; none where the first of the grid does, and smaller ones may as well.
+    /// Smallest radius that meets the error, in pixels; none if the first of the grid does, as
+    /// smaller ones may, too.
     pub smallest_px: Option<f64>,
-    /// The largest one; none where the last of the grid does.
+    /// Largest radius that meets it; none if the last of the grid does.
     pub largest_px: Option<f64>,
 }
 
-/// `c₀ + c₁ x + c₂ x²`, the nearest to points by least squares.
+/// Least-squares parabola `c₀ + c₁ x + c₂ x²`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Parabola {
     /// c₀, c₁, c₂.
     pub coefficients: [f64; 3],
-    /// Root mean square of what the points differ from it, in units of y.
+    /// RMS residual, in units of y.
     pub residual: f64,
-    /// The same of the nearest straight line: what the square is good for.
+    /// RMS residual of a straight line, for comparison.
     pub residual_of_line: f64,
-    /// The part of the points' variance that it explains (R²).
+    /// Fraction of the variance that is explained (R²).
     pub explained: f64,
 }
 
 impl IsoLine {
-    /// The line of an error over the noises of the grid, of which `curves` are the curves, where there are any.
+    /// The line of an error, from the curves at the noises of the grid, where they exist.
     pub fn of(errors: &ErrorGrid, curves: &[Option<ErrorCurve>], rms_px: f64) -> Self {
         let points: Vec<_> = errors
             .grid
@@ -75,7 +76,7 @@ impl IsoLine {
 }
 
 impl Parabola {
-    /// The parabola nearest to points (x, y); none for fewer than four, through three of which one goes whatever they are.
+    /// Fits a parabola to points (x, y); none for fewer than four points.
     pub fn nearest_to(points: &[(f64, f64)]) -> Option<Self> {
         if points.len() < 4 {
             return None;
@@ -118,7 +119,7 @@ mod tests {
             assert!((found / expected - 1.0).abs() < 1e-9, "{found}");
         }
         assert!(found.residual < 1e-12 && found.explained > 0.999_999);
-        // Of c₂ x² about its line: c₂ h² · √(4/45), h half the range, for many points.
+        // Residual of c₂ x² about its line: c₂ h² · √(4/45), h half the range, for many points.
         let expected = 9e4 * 9e-4f64.powi(2) * (4.0f64 / 45.0).sqrt();
         assert!((found.residual_of_line / expected - 1.0).abs() < 0.15);
         assert_eq!(Parabola::nearest_to(&points[..3]), None);

@@ -1,12 +1,13 @@
-//! How far out of focus a lens makes a spot.
+//! Defocus distance of a lens for a given spot.
 
 use crate::camera::data_sheet::DataSheet;
 use serde::Serialize;
 
-/// Standard deviation along one axis of a cone of light cut at a distance of one f-number: of an even disc of diameter 1, a
-/// quarter.
+/// Standard deviation along one axis of a uniform disc of diameter 1: the cross-section of a cone
+/// of light at one f-number from focus.
 const DISC_SIGMA: f64 = 0.25;
-/// Standard deviation of the Gaussian that is most like the core of Airy's pattern, over wavelength times f-number.
+/// Standard deviation of the Gaussian closest to the core of the Airy pattern, in units of
+/// wavelength times f-number.
 ///
 /// # Reference
 /// Zhang, Zerubia & Olivo-Marin 2007, Applied Optics 46, 1819: 0.21 λ/NA, with 1/NA = 2 N.
@@ -17,16 +18,16 @@ const AIRY_SIGMA: f64 = 0.42;
 pub struct Lens {
     /// Focal length over aperture.
     pub f_number: f64,
-    /// Side of a pixel, in µm: the geometric mean of both.
+    /// Pixel pitch, in µm: the geometric mean of both.
     pub pitch_um: f64,
-    /// The middle of the band, in nm.
+    /// Central wavelength, in nm.
     pub wavelength_nm: f64,
     /// Standard deviation of the spot in focus, in pixels.
     pub focused_px: f64,
 }
 
 impl Lens {
-    /// The lens of a camera, the spot of which in focus has this standard deviation in pixels.
+    /// The lens of a camera with this standard deviation of the spot in focus, in pixels.
     pub fn of(sheet: &DataSheet, focused_px: f64) -> Self {
         Self {
             f_number: sheet.focal_length_mm / sheet.aperture_mm,
@@ -41,15 +42,17 @@ impl Lens {
         spot_px * self.pitch_um
     }
 
-    /// The distance from the focus that makes a spot of this radius, in µm; none for one that is sharper than in focus.
+    /// Distance from focus that makes a spot of this radius, in µm; none if it is sharper than the
+    /// spot in focus.
     ///
-    /// Geometric blur: an even disc of the diameter distance over f-number, whose variance adds to that of the spot in focus.
+    /// Geometric blur: a uniform disc whose diameter is distance over f-number. Its variance adds
+    /// to that of the spot in focus.
     pub fn distance_um(&self, spot_px: f64) -> Option<f64> {
         let blur2 = spot_px * spot_px - self.focused_px * self.focused_px;
         (blur2 >= 0.0).then(|| blur2.sqrt() * self.pitch_um * self.f_number / DISC_SIGMA)
     }
 
-    /// The radius of a perfect lens's spot in focus, by diffraction, in pixels.
+    /// Radius of the diffraction-limited spot in focus, in pixels.
     pub fn diffraction_px(&self) -> f64 {
         AIRY_SIGMA * self.wavelength_nm * 1e-3 * self.f_number / self.pitch_um
     }

@@ -1,23 +1,28 @@
-//! How wide a star's spot should be: the error of its centroid over spot radius and noise.
+//! How wide should a star's spot be? Centroid error over spot radius and noise.
 //!
-//! [`Grid`], and [`PeakStudy`] or [`EnergyStudy`] → [`ErrorGrid`] → [`Surface`], [`ErrorCurve`]s → [`Optimum`], [`IsoLine`]s
+//! [`Grid`], and [`PeakStudy`] or [`EnergyStudy`] → [`ErrorGrid`] → [`Surface`], [`ErrorCurve`]s →
+//! [`Optimum`], [`IsoLine`]s
 //!
-//! 1. At every radius and noise of the grid, stars at random places within a pixel, and the root of the mean of the squared
-//!    distances between centroids and places: σ_e.
-//! 2. The paper's least-squares surface through all of them ([`Surface`]).
-//! 3. A smooth curve over the radius at each noise, and from it the best radius, and the smallest that meets an error.
+//! 1. At every radius and noise of the grid: stars at random positions within a pixel, and the RMS
+//!    distance between centroid and true position, σ_e.
+//! 2. The least-squares surface of the paper through all of them ([`Surface`]).
+//! 3. At each noise a smooth curve over the radius, its optimum, and the smallest radius that meets
+//!    a given error.
 //! 4. The lines of equal error, and how well a parabola describes each ([`Parabola`]).
-//! 5. How far from its focus a lens makes such a spot ([`Lens`]).
+//! 5. The distance from focus at which a lens makes such a spot ([`Lens`]).
 //!
-//! There are two questions, which must not be mixed up. [`PeakStudy`] is the paper's: all spots have the same *brightest
-//! pixel*, so a wider one has more light, and wide spots win. [`EnergyStudy`] is what a real sensor faces: a star's *energy*
-//! is what it is, a wider spot spreads it over more noise, and the best spot is narrow.
+//! Two questions must be kept apart. [`PeakStudy`] is that of the paper: all spots have the same
+//! *brightest pixel*, so a wider spot has more light, and wide spots win. [`EnergyStudy`] is that
+//! of a real sensor: the *energy* of a star is given, a wider spot spreads it over more noise, and
+//! the best spot is narrow.
 //!
-//! Everywhere σ_s, the "radius", is the standard deviation of a Gaussian spot before the pixels integrate it, in pixels, and σ_e
-//! is the root mean square of the distance, √2 times that along one axis.
+//! Throughout, the "radius" σ_s is the standard deviation in pixels of a Gaussian spot before
+//! integration over pixels, and σ_e is the RMS distance in two dimensions, √2 times the RMS error
+//! on one axis.
 //!
 //! # Reference
-//! Wang, Wang, Zhu, Liu & Ge 2019, Laser & Optoelectronics Progress 56, 101101, doi 10.3788/LOP56.101101.
+//! Wang, Wang, Zhu, Liu & Ge 2019, Laser & Optoelectronics Progress 56, 101101, doi
+//! 10.3788/LOP56.101101.
 
 mod curve;
 mod energy;
@@ -35,7 +40,7 @@ pub use lens::Lens;
 pub use peak::{Expected, PeakStudy, SpotInWindow, sampling_bias_px};
 pub use surface::{Surface, SurfaceError};
 
-/// The relative noise of the paper's twenty dark frames: parts of full scale (eq. 4).
+/// Relative noise of the paper's twenty dark frames: fraction of full scale (eq. 4).
 pub const PAPER_RELATIVE_NOISE: f64 = 9.32e-4;
-/// The root mean square of the paper's own errors about its surface, in pixels (eq. 14).
+/// RMS residual of the paper's own errors from its surface, in pixels (eq. 14).
 pub const PAPER_RESIDUAL_PX: f64 = 0.0025;

@@ -1,7 +1,9 @@
-//! The paper's experiment: spots of one peak, and the grey-weighted mean of a fixed window.
+//! The experiment of the paper: spots of the same peak, and the intensity-weighted mean of a fixed
+//! window.
 //!
-//! The mean is of all pixels of the window, without a threshold: `x = Σ i g / Σ g` (eq. 6). Its error is known in closed
-//! form ([`PeakStudy::expected`]): the bias of the sampled spot and of the window's edge, and the noise of the pixels.
+//! The mean is over all pixels of the window, without a threshold: `x = Σ i g / Σ g` (eq. 6). Its
+//! error has a closed form ([`PeakStudy::expected`]): the bias by sampling and by the edge of the
+//! window, and the noise of the pixels.
 
 use super::ErrorPoint;
 use crate::base::statistics::normal_cdf;
@@ -11,19 +13,20 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::Serialize;
 use std::f64::consts::{PI, SQRT_2};
 
-/// The paper's experiment.
+/// The experiment of the paper.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PeakStudy {
-    /// Grey level of the brightest pixel of a spot centred on it, as a part of full scale.
+    /// Value of the brightest pixel of a spot centred on it, as a fraction of full scale.
     pub peak: f64,
-    /// Pixels from the middle of the window to its edge.
+    /// Half width of the window, without its central pixel, in pixels.
     pub half_window_px: usize,
-    /// Stars at each point of the grid.
+    /// Number of stars at each point of the grid.
     pub trials: usize,
 }
 
 impl Default for PeakStudy {
-    /// The paper's window and trials. It does not state the peak; its surface is that of 0.65 to 0.70.
+    /// Window and trials of the paper. It does not state the peak; its surface corresponds to 0.65
+    /// to 0.70.
     fn default() -> Self {
         Self {
             peak: 0.675,
@@ -33,17 +36,17 @@ impl Default for PeakStudy {
     }
 }
 
-/// What the error should be.
+/// Expected error in closed form.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Expected {
-    /// Root mean square of the distance, in pixels.
+    /// RMS distance, in pixels.
     pub rms_px: f64,
-    /// The part of it without any noise: what sampling by pixels and the edge of the window do, in pixels.
+    /// Its part without noise: bias by sampling and by the edge of the window, in pixels.
     pub bias_px: f64,
 }
 
 impl PeakStudy {
-    /// The light of a spot, in parts of full scale, of which the peak has its part: A of eq. (2).
+    /// Total light of a spot with this peak, as a fraction of full scale: A of eq. (2).
     pub fn energy(&self, spot_px: f64) -> f64 {
         self.peak / libm::erf(0.5 / (SQRT_2 * spot_px)).powi(2)
     }
@@ -52,7 +55,7 @@ impl PeakStudy {
         2 * self.half_window_px + 1
     }
 
-    /// The error at a radius in pixels and a noise in parts of full scale, by trials.
+    /// Measures the error at a radius in pixels and a noise as a fraction of full scale.
     pub fn measure(&self, spot_px: f64, noise: f64, random: &mut ChaCha8Rng) -> ErrorPoint {
         let energy = self.energy(spot_px);
         let half = self.half_window_px as f64;
@@ -81,7 +84,8 @@ impl PeakStudy {
         ErrorPoint::of_squares(self.trials, &squares)
     }
 
-    /// Parts of the light of a spot, whose middle is `at` from that of the window, in its columns or rows.
+    /// Fractions of the light in the columns or rows of the window, for a spot at `at` from its
+    /// centre.
     fn shares(&self, spot_px: f64, at: f64, into: &mut Vec<f64>) {
         let edge = |pixel: usize| (pixel as f64 - self.half_window_px as f64 - 0.5 - at) / spot_px;
         let mut before = normal_cdf(edge(0));
@@ -99,7 +103,7 @@ impl PeakStudy {
         self.spot(spot_px).expected(noise)
     }
 
-    /// A spot of this radius in pixels in the window, for any number of noises.
+    /// A spot of this radius in pixels in the window, for any noise.
     pub fn spot(&self, spot_px: f64) -> SpotInWindow {
         let place = |i: usize| (i as f64 + 0.5) / PLACES as f64 - 0.5;
         SpotInWindow {
@@ -125,24 +129,25 @@ impl PeakStudy {
     }
 }
 
-/// Places along either axis over which the mean is taken.
+/// Positions along either axis over which the mean is taken.
 const PLACES: usize = 24;
 
-/// What the closed form needs of a spot, whatever the noise.
+/// The quantities of a spot for the closed form, independent of the noise.
 #[derive(Debug, Clone)]
 pub struct SpotInWindow {
     energy: f64,
     half_window_px: usize,
-    /// At [`PLACES`] within a pixel.
+    /// At [`PLACES`] positions within a pixel.
     axis: Vec<AxisSums>,
 }
 
 impl SpotInWindow {
-    /// The error in closed form, averaged over places in the pixel; exact but for the fourth power of the noise in the window over
-    /// the light in it.
+    /// The error in closed form, averaged over positions in the pixel; exact up to the fourth power
+    /// of noise over light in the window.
     ///
-    /// With window W of n² pixels, light G in it, its mean place x̄, noise σ, and `a = Σ (i − x̄) ν / G`, `e = Σ ν / G` of
-    /// the noise ν: `x − x₀ = x̄ − x₀ + a / (1 + e)`, of which the variances of a and e and their covariance follow.
+    /// With a window of n² pixels, light G in it, its mean position x̄, noise σ, and `a = Σ (i −
+    /// x̄) ν / G`, `e = Σ ν / G` of the noise ν: `x − x₀ = x̄ − x₀ + a / (1 + e)`, expanded in the
+    /// variances of a and e and their covariance.
     pub fn expected(&self, noise: f64) -> Expected {
         let half = self.half_window_px as f64;
         let n = 2.0 * half + 1.0;
@@ -163,7 +168,7 @@ impl SpotInWindow {
                     + 3.0 * (var_a * var_e + 2.0 * covariance * covariance);
             }
         }
-        // Both axes are alike.
+        // Both axes contribute the same.
         let root = |sum: f64| (2.0 * sum / (PLACES * PLACES) as f64).sqrt();
         Expected {
             rms_px: root(of_all),
@@ -172,7 +177,7 @@ impl SpotInWindow {
     }
 }
 
-/// A spot along one axis of the window.
+/// Sums of a spot along one axis of the window.
 #[derive(Debug, Clone, Copy)]
 struct AxisSums {
     truth: f64,
@@ -180,14 +185,14 @@ struct AxisSums {
     mean: f64,
 }
 
-/// How far the mean place of a pixel-integrated Gaussian is from its true one, `at_px` from the middle of a pixel, in a
-/// window without end.
+/// Bias of the centroid of a pixel-integrated Gaussian at `at_px` from the centre of a pixel, in an
+/// infinite window.
 ///
-/// By Poisson's summation: `Σ_k (−1)^k / (π k) exp(−2 π² σ² k²) sin(2 π k x)`, of which the first term is nearly all from
-/// σ = 0.3 px on.
+/// By Poisson summation: `Σ_k (−1)^k / (π k) exp(−2 π² σ² k²) sin(2 π k x)`. From σ = 0.3 px on the
+/// first term dominates.
 #[doc(alias = "S-curve")]
 pub fn sampling_bias_px(spot_px: f64, at_px: f64) -> f64 {
-    /// From here on terms are nothing for spots of a tenth of a pixel.
+    /// Number of terms; later ones are negligible for σ of 0.1 px or more.
     const TERMS: i32 = 12;
     let term = |k: i32| {
         let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
@@ -238,7 +243,7 @@ mod tests {
             trials: 4000,
             ..PeakStudy::default()
         };
-        // Where sampling, noise and the window's edge decide.
+        // Dominated by sampling, by noise, or by the edge of the window.
         for (number, (spot_px, noise)) in [
             (0.4, 1e-6),
             (0.4, 2e-3),

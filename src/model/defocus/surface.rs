@@ -1,21 +1,21 @@
-//! The paper's surface: a polynomial of the fourth degree in radius and noise.
+//! The surface of the paper: a polynomial of fourth degree in radius and noise.
 
 use super::ErrorGrid;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-/// Coefficients along either axis.
+/// Number of coefficients along either axis.
 const TERMS: usize = 5;
 
 /// σ_e as a polynomial: `Σ c[j][i] σ_s^j σ_g^i` (eqs. 9, 10 and 13).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct Surface {
-    /// By the power of the radius in pixels, then by that of the noise.
+    /// Indexed by the power of the radius in pixels, then by that of the noise.
     pub coefficients: [[f64; TERMS]; TERMS],
 }
 
-/// Why there is no surface.
+/// Why no surface can be fitted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SurfaceError {
@@ -24,9 +24,9 @@ pub enum SurfaceError {
         "a surface of {TERMS} x {TERMS} coefficients needs as many radii and noises, found {spots} x {noises}"
     )]
     TooFew {
-        /// Radii.
+        /// Number of radii.
         spots: usize,
-        /// Noises.
+        /// Number of noises.
         noises: usize,
     },
     /// A point has no error.
@@ -38,15 +38,15 @@ pub enum SurfaceError {
         spot_px: f64,
         /// The noise.
         noise: f64,
-        /// Stars found.
+        /// Number of detected stars.
         found: usize,
-        /// Stars.
+        /// Number of stars.
         trials: usize,
     },
 }
 
 impl Surface {
-    /// The paper's own (its table 1, with the exponents that the print lost).
+    /// The surface of the paper (its table 1, with the exponents that are missing in print).
     pub fn of_paper() -> Self {
         let mut coefficients = [[0.0; TERMS]; TERMS];
         let rows = include_str!("paper-surface.csv").lines().skip(1);
@@ -58,14 +58,15 @@ impl Surface {
         Self { coefficients }
     }
 
-    /// The least-squares surface through all points, each with the same weight.
+    /// The least-squares surface through all points with equal weights.
     ///
-    /// The paper's eq. (11) inverts BᵀB and GᵀG as they are, which squares the condition of a basis of powers. Here both axes
-    /// are brought to −1 to 1, the powers are Chebyshev's polynomials, and both systems are solved by an orthogonal
-    /// decomposition; only then the powers of radius and noise are expanded.
+    /// Differs from the source: eq. (11) of the paper inverts BᵀB and GᵀG directly, which squares
+    /// the condition number of the power basis. Here both axes are scaled to −1 to 1, the basis is
+    /// Chebyshev's polynomials, and both systems are solved by QR decomposition; the result is then
+    /// expanded in powers of radius and noise.
     ///
     /// # Errors
-    /// [`SurfaceError`] for a grid that does not determine one.
+    /// [`SurfaceError`] if the grid does not determine a surface.
     pub fn fit(errors: &ErrorGrid) -> Result<Self, SurfaceError> {
         let (spots, noises) = (&errors.grid.spots_px, &errors.grid.noises);
         let too_few = SurfaceError::TooFew {
@@ -107,7 +108,7 @@ impl Surface {
         rows.fold(0.0, |sum, row| sum * spot_px + of_noise(row))
     }
 
-    /// Root mean square of what the errors differ from it, in pixels (eq. 14).
+    /// RMS residual of the errors, in pixels (eq. 14).
     pub fn residual_px(&self, errors: &ErrorGrid) -> f64 {
         root_mean_square(
             errors
@@ -116,7 +117,7 @@ impl Surface {
         )
     }
 
-    /// Root mean square of what another surface differs from it where `errors` has points, in pixels.
+    /// RMS difference from another surface at the points of `errors`, in pixels.
     pub fn difference_px(&self, other: &Self, errors: &ErrorGrid) -> f64 {
         root_mean_square(
             errors
@@ -135,7 +136,7 @@ fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     (sum / f64::from(count.max(1))).sqrt()
 }
 
-/// An axis brought to −1 to 1: `t = (value − middle) / half`.
+/// An axis scaled to −1 to 1: `t = (value − middle) / half`.
 struct ScaledAxis {
     values: Vec<f64>,
     middle: f64,
@@ -152,7 +153,7 @@ impl ScaledAxis {
         })
     }
 
-    /// The coefficients of Chebyshev's polynomials that are nearest to each column of `right`.
+    /// Least-squares coefficients of Chebyshev's polynomials for each column of `right`.
     fn solve(&self, right: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let basis = DMatrix::from_fn(self.values.len(), TERMS, |row, degree| {
             let t = (self.values[row] - self.middle) / self.half;
@@ -168,7 +169,7 @@ impl ScaledAxis {
             .solve_upper_triangular(&(decomposed.q().transpose() * right))
     }
 
-    /// Chebyshev's polynomials, a row each, as powers of the value.
+    /// Chebyshev's polynomials, one per row, in powers of the value.
     fn powers(&self) -> DMatrix<f64> {
         let mut powers = DMatrix::zeros(TERMS, TERMS);
         powers[(0, 0)] = 1.0;

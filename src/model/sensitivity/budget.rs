@@ -218,7 +218,8 @@ fn signal_for_snr(snr: f64, variance_e2: f64) -> f64 {
 
 /// Magnitude with the illuminance of the sky.
 ///
-/// # Reference Tong, Li & Wang 2014, eq. (7).
+/// # Reference
+/// Tong, Li & Wang 2014, eq. (7).
 fn sky_mag(conditions: &Conditions) -> f64 {
     magnitude(
         Reading::Paper,
@@ -276,7 +277,8 @@ impl SpectralSums {
 /// The bands of table 1. The atmosphere attenuates the sky's light like a star's, and a pixel
 /// receives its solid angle's share of one steradian.
 ///
-/// # Reference Tong, Li & Wang 2014, eqs. (4) to (9).
+/// # Reference
+/// Tong, Li & Wang 2014, eqs. (4) to (9).
 fn paper_bands(scenario: &Scenario, airmass: f64) -> Vec<Band> {
     let (sheet, conditions) = (&scenario.camera, &scenario.conditions);
     let table = light::luminous_efficiency();

@@ -349,8 +349,9 @@ fn flux_at_threshold(answer: f64, own: f64, missing_e: f64) -> f64 {
 
 /// Low-discrepancy positions within a pixel.
 ///
-/// # Reference Roberts 2018, "The unreasonable effectiveness of quasirandom sequences": additive
-/// recurrence with powers of 1/1.3247…
+/// # Reference
+/// Roberts 2018, "The unreasonable effectiveness of quasirandom sequences": additive recurrence
+/// with powers of 1/1.3247…
 fn place_in_pixel(i: usize) -> [f64; 2] {
     const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_2];
     STEPS.map(|step| (0.5 + (i + 1) as f64 * step).fract() - 0.5)

@@ -73,7 +73,8 @@ pub const REFERENCE_NM: f64 = 555.0;
 
 /// Optical depth of one airmass at a wavelength in nm.
 ///
-/// # Reference Tong, Li & Wang 2014, eq. (3), with the wavelength in µm.
+/// # Reference
+/// Tong, Li & Wang 2014, eq. (3), with the wavelength in µm.
 fn law_optical_depth(wavelength_nm: f64) -> f64 {
     const RAYLEIGH: f64 = 0.009;
     const GREY: f64 = 0.223;

@@ -26,7 +26,8 @@ impl CramerRao {
     /// The shot noise of the star's own light is included. The information in the variance itself
     /// is ignored.
     ///
-    /// # Reference Mortensen et al. 2010, Nature Methods 7, 377, with pixels of Gaussian noise.
+    /// # Reference
+    /// Mortensen et al. 2010, Nature Methods 7, 377, with pixels of Gaussian noise.
     pub fn of_spot(
         spot_sigma_px: f64,
         offset_px: [f64; 2],

@@ -4,7 +4,8 @@
 //! for apertures of 100 mm and 50 mm. In the available scan of the paper the curves and the ends of
 //! the axes are lost: the ranges here are chosen to show what its text describes.
 //!
-//! # Reference Tong, Li & Wang 2014, section 3, figures 3 and 4.
+//! # Reference
+//! Tong, Li & Wang 2014, section 3, figures 3 and 4.
 
 use super::check::ScenarioError;
 use super::scenario::Scenario;
@@ -101,7 +102,8 @@ impl Figure {
 
     /// The values along the axis.
     ///
-    /// # Errors None for the figures of [`Self::ALL`].
+    /// # Errors
+    /// None for the figures of [`Self::ALL`].
     pub fn sweep(&self) -> Result<Sweep, SweepError> {
         Sweep::new(self.parameter, self.range, VALUES, self.spacing)
     }

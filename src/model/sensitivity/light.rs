@@ -55,8 +55,8 @@ pub(super) const BV_RANGE_MAG: (f64, f64) = (-0.35, 2.0);
 
 /// Temperature in kelvin of the black body of this B−V, which is clamped to the range of stars.
 ///
-/// # Reference Ballesteros 2012, EPL 97, 34008, eq. 14: within 2 % of stars' effective
-/// temperatures.
+/// # Reference
+/// Ballesteros 2012, EPL 97, 34008, eq. 14: within 2 % of stars' effective temperatures.
 pub fn temperature_k_of(bv_mag: f64) -> f64 {
     let scaled = 0.92 * bv_mag.clamp(BV_RANGE_MAG.0, BV_RANGE_MAG.1);
     4600.0 * (1.0 / (scaled + 1.7) + 1.0 / (scaled + 0.62))
@@ -64,7 +64,8 @@ pub fn temperature_k_of(bv_mag: f64) -> f64 {
 
 /// Luminous efficiency of the eye by wavelength.
 ///
-/// # Reference Tong, Li & Wang 2014, table 1.
+/// # Reference
+/// Tong, Li & Wang 2014, table 1.
 #[doc(alias = "S_e")]
 pub(super) fn luminous_efficiency() -> Vec<(f64, f64)> {
     let table = include_bytes!("luminous-efficiency.csv");

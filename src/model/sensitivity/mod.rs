@@ -6,9 +6,9 @@
 //! 1. Transmission of the atmosphere by wavelength and zenith distance ([`Extinction`]).
 //! 2. Electrons of a star of magnitude 0 on its brightest pixel, and of the sky in a pixel.
 //! 3. Noise, and the limiting magnitude of the peak-pixel rule: the star with the required SNR in
-//! its brightest pixel ([`Budget`]).
+//!    its brightest pixel ([`Budget`]).
 //! 4. Threshold, false alarms and completeness of two detectors: the peak-pixel rule and the
-//! matched filter of [`detect`](crate::detect::detect) ([`Detector`]).
+//!    matched filter of [`detect`](crate::detect::detect) ([`Detector`]).
 //! 5. Expected magnitude of the faintest detected star of a field ([`Faintest`]).
 //! 6. Electrons of stars by colour ([`StarLight`]).
 //! 7. Lower bounds of the errors of position and flux ([`CramerRao`]).
@@ -19,7 +19,8 @@
 //! There are two sets of equations. [`Reading::Paper`] has equations (1) to (12) of the paper as
 //! its authors used them. [`Reading::Physical`] corrects their physics.
 //!
-//! # Reference Tong, Li & Wang 2014, Acta Optica Sinica 34, 1004003, doi 10.3788/AOS201434.1004003.
+//! # Reference
+//! Tong, Li & Wang 2014, Acta Optica Sinica 34, 1004003, doi 10.3788/AOS201434.1004003.
 
 mod budget;
 mod check;

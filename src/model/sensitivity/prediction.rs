@@ -117,7 +117,8 @@ impl Prediction {
 
     /// The prediction, and the matched filter it describes.
     ///
-    /// # Errors As [`Self::new`].
+    /// # Errors
+    /// As [`Self::new`].
     pub fn with_detector(scenario: &Scenario) -> Result<(Self, Detector), ScenarioError> {
         let budget = Budget::checked(scenario)?;
         let detector = Detector::new(Rule::MatchedFilter, scenario, &budget);

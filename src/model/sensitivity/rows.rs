@@ -17,7 +17,8 @@ pub struct PredictionRow {
     /// The prediction.
     #[serde(flatten)]
     pub prediction: Prediction,
-    /// The faintest star expected among those of the catalog, averaged over the sky; not in sweeps.
+    /// The faintest star expected among those of the catalogue, averaged over the sky; not in
+    /// sweeps.
     pub faintest: Option<Faintest>,
     /// Name of the preset, if the scenario is one.
     pub preset: Option<&'static str>,
@@ -70,8 +71,8 @@ impl PredictionRow {
         })
     }
 
-    /// The predictions for each value of `sweep`, without the faintest star: it would cost more than
-    /// all else.
+    /// The predictions for each value of `sweep`, without the faintest star: it would cost more
+    /// than all else.
     ///
     /// # Errors
     /// [`PredictionError`].
@@ -100,7 +101,8 @@ impl PredictionRow {
         rows.into_iter().collect()
     }
 
-    /// Whether `rows` all have the same limits, by the rule of the brightest pixel and by the filter.
+    /// Whether `rows` all have the same limits, by the rule of the brightest pixel and by the
+    /// filter.
     pub fn have_same_limits(rows: &[Self]) -> bool {
         let limits = |row: &Self| {
             let prediction = &row.prediction;
@@ -138,7 +140,7 @@ impl PredictionRow {
     }
 }
 
-/// The faintest star expected in a field with as many stars as the catalog has in one on average.
+/// The faintest star expected in a field with as many stars as the catalogue has in one on average.
 fn faintest(sheet: &DataSheet, detector: &Detector, catalog: &Catalog) -> Option<Faintest> {
     let field_sr = sheet.pixel_solid_angle_sr() * (sheet.width_px * sheet.height_px) as f64;
     let part_of_sky = (field_sr / (4.0 * std::f64::consts::PI)).min(1.0);

@@ -40,7 +40,8 @@ impl Spacing {
 impl Spacing {
     /// [`Self::values`] with checked arguments.
     ///
-    /// # Errors [`SweepError::Count`], [`SweepError::Backwards`], [`SweepError::LogOfNothing`].
+    /// # Errors
+    /// [`SweepError::Count`], [`SweepError::Backwards`], [`SweepError::LogOfNothing`].
     pub fn checked_values(
         self,
         (from, to): (f64, f64),

@@ -4,12 +4,12 @@
 //! [`Frame`](crate::frame::Frame), [`Truth`]
 //!
 //! 1. The position of each star on the detector at the date, through the lens with its distortion;
-//! its expected electrons by the sensitivity model
-//! ([`StarLight`](crate::model::sensitivity::StarLight): magnitude and colour), reduced by clouds
-//! and vignetting.
+//!    its expected electrons by the sensitivity model
+//!    ([`StarLight`](crate::model::sensitivity::StarLight): magnitude and colour), reduced by
+//!    clouds and vignetting.
 //! 2. The sky in each pixel: uniform, with a gradient, moonlight, clouds.
 //! 3. The spot of each star, integrated over pixels, along its path while the camera turns;
-//! satellite trails likewise.
+//!    satellite trails likewise.
 //! 4. The response of each pixel, and its dark current.
 //! 5. Whole electrons (Poisson), cosmic rays, and blooming of full pixels.
 //! 6. Read-out: read noise, gain, bias, quantisation.

@@ -124,7 +124,8 @@ impl<'a> Simulator<'a> {
     /// A frame of stars at these positions, with these V magnitudes and the scenario's temperature,
     /// instead of the catalogue's.
     ///
-    /// # Errors As [`Self::frame`].
+    /// # Errors
+    /// As [`Self::frame`].
     pub fn star_field(
         &self,
         stars: &[(PixelPoint, f64)],
@@ -144,7 +145,8 @@ impl<'a> Simulator<'a> {
 
     /// A dark frame.
     ///
-    /// # Errors As [`Self::frame`].
+    /// # Errors
+    /// As [`Self::frame`].
     pub fn dark(&self, seed: u64) -> Result<Frame, FrameError> {
         self.evenly_lit(0.0, seed)
     }
@@ -152,7 +154,8 @@ impl<'a> Simulator<'a> {
     /// A flat-field frame: uniform light that leaves this number of electrons in a pixel at the
     /// centre.
     ///
-    /// # Errors As [`Self::frame`].
+    /// # Errors
+    /// As [`Self::frame`].
     pub fn evenly_lit(&self, electrons: f64, seed: u64) -> Result<Frame, FrameError> {
         let none = Scene::default();
         let sky = Sky::new(
@@ -298,7 +301,8 @@ fn mean(values: &[f64]) -> f64 {
 
 /// A frame of stars at these positions with these V magnitudes, and nothing else.
 ///
-/// # Errors As [`Simulator::new`].
+/// # Errors
+/// As [`Simulator::new`].
 pub fn star_field(
     scenario: &Scenario,
     stars: &[(PixelPoint, f64)],

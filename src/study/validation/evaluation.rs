@@ -1,4 +1,4 @@
-//! One frame: what was found in it, beside what is there.
+//! Compares the results of one frame with the truth.
 
 use super::light::LightMap;
 use super::record::{BEYOND_LIMIT_MAG, FrameRecord, Named, RowKind, StarRecord};
@@ -15,19 +15,22 @@ use crate::study::robustness::Answer;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
-/// Other stars that may be detected do not matter further away than so many standard deviations of a spot, and so many pixels.
+/// Radius without another detectable star around an isolated one, in standard deviations of a spot
+/// plus pixels.
 const ALONE_SIGMAS: f64 = 8.0;
 const ALONE_PX: f64 = 2.0;
-/// A star so much fainter than the predicted limit may still be detected.
+/// Magnitudes below the predicted limit at which a star may still be detected.
 const MAY_BE_DETECTED_MAG: f64 = 0.5;
-/// LightMap of others that is less than this part of the error of a star's own light does not matter.
+/// Largest light of other stars at an isolated star, in units of the error of its own flux.
 const ALONE_PART: f64 = 0.05;
-/// A star is whole on the frame so many standard deviations of its spot, and a pixel, from the border.
+/// Distance from the border at which a star is entirely on the frame, in standard deviations of its
+/// spot plus one pixel.
 const WHOLE_SIGMAS: f64 = 4.0;
-/// A detection is false where within so many standard deviations of a spot, and a pixel, there is no star.
+/// Radius around a false detection without any star, in standard deviations of a spot plus one
+/// pixel.
 const DARK_SIGMAS: f64 = 3.0;
 
-/// Digits that are kept of what is measured.
+/// Significant digits of measured values.
 const DIGITS: i32 = 7;
 
 pub(super) struct Evaluation<'a> {
@@ -37,18 +40,18 @@ pub(super) struct Evaluation<'a> {
     solution: &'a Solution,
     light: LightMap<'a>,
     found: Option<&'a Identification>,
-    /// The catalogue's star that each source was named, by source.
+    /// The star that each source was identified as.
     names: HashMap<SourceIndex, StarIndex>,
-    /// Stars fainter than this are left out.
+    /// V magnitude of the faintest star in the table.
     faintest_vmag: f64,
 }
 
-/// What the detections are.
+/// Which detection belongs to which star.
 #[derive(Default)]
 struct Assignments {
-    /// The sources that are stars: the nearest one to each, by the star's number.
+    /// The nearest source of each star, by the star's number.
     of_star: HashMap<usize, SourceIndex>,
-    /// The others that may be stars.
+    /// The other star-like sources.
     others: Vec<(RowKind, SourceIndex)>,
     detected: u64,
 }
@@ -157,13 +160,14 @@ impl<'a> Evaluation<'a> {
         }
     }
 
-    /// The probability that it is found, by the light that it has on this frame.
+    /// Detection probability for the star's expected electrons on this frame.
     fn probability(&self, star: &TrueStar) -> f64 {
         let v_mag = self.validator.simulator.light().vmag_of(star.electrons);
         self.validator.detector.probability(v_mag)
     }
 
-    /// Whether it is whole on the frame, and what light of others is near it does not matter.
+    /// Whether the star is entirely on the frame and the light of other stars near it is
+    /// negligible.
     fn is_alone(&self, star: &TrueStar, own_error_e: Option<f64>) -> bool {
         let camera = self.validator.simulator.camera();
         let sigma_px = self.light.sigma_px();
@@ -181,19 +185,19 @@ impl<'a> Evaluation<'a> {
             if other.v_mag <= bright_vmag {
                 return false;
             }
-            // What a filter of the spot's own form makes of it at the star's place.
+            // Response of a matched filter at the star's position.
             let off = other.position.distance_to(&star.position) / sigma_px;
             light_e += other.electrons * (-0.25 * off * off).exp();
         }
         light_e < ALONE_PART * own_error_e.unwrap_or_else(|| star.electrons.sqrt())
     }
 
-    /// The row of what was detected and is no star.
+    /// The row of a detection that is no star.
     fn other_row(&self, kind: RowKind, source: SourceIndex) -> StarRecord {
         self.with_source(StarRecord::empty(self.number, kind), source, None)
     }
 
-    /// `row` with what was measured of a source; `star` is what it should be named.
+    /// `row` with the measurements of a source; `star` is its true star.
     fn with_source(
         &self,
         row: StarRecord,
@@ -236,7 +240,7 @@ impl<'a> Evaluation<'a> {
         let limit_vmag = validator.limit_vmag();
         let truth = &simulated.truth;
         let v_mags = || truth.stars.iter().map(|star| star.v_mag);
-        // Only the catalogue's stars can be named.
+        // Only catalogue stars can be named.
         let known = truth.stars.iter().filter(|star| star.catalog.is_some());
         let expected = Faintest::of(known.map(|star| (star.v_mag, self.probability(star))));
         let count = |of: RowKind| {
@@ -315,7 +319,8 @@ impl<'a> Evaluation<'a> {
         })
     }
 
-    /// Sources named as what they are not; and those of them that have the name of a star that stands there as well.
+    /// Number of misnamed sources, and of those among them named as another star at the same
+    /// position.
     fn misnamed(&self) -> [u64; 2] {
         let (mut wrong, mut companions) = (0, 0);
         for (source, star) in &self.names {
@@ -329,7 +334,7 @@ impl<'a> Evaluation<'a> {
         [wrong, companions]
     }
 
-    /// How far off a right answer is.
+    /// Attitude error of a right answer.
     fn attitude(&self) -> Option<AttitudeError> {
         let found = self.found.filter(|_| self.answer() == Answer::Right)?;
         let truth = &self.simulated.icrs_to_camera;
@@ -352,7 +357,7 @@ impl<'a> Evaluation<'a> {
     }
 }
 
-/// How far a right answer is off, and how far by its own account.
+/// Error of a right answer, and its stated standard error.
 struct AttitudeError {
     error_arcsec: Vector3<f64>,
     sigma_arcsec: [f64; 3],

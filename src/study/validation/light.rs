@@ -1,20 +1,20 @@
-//! Whose light a detection is.
+//! Which star a detection belongs to.
 
 use crate::base::coords::PixelPoint;
 use crate::base::neighbors::PointTree;
 use crate::model::sensitivity::Scenario;
 use crate::model::simulate::{TrueStar, Truth};
 
-/// A detection at a star's place is no farther from it than so many pixels, ...
+/// Largest distance of a detection from its star: this many pixels, …
 const AT_PLACE_PX: f64 = 2.0;
-/// ... or, of wide spots, than so many of their standard deviations.
+/// … or this many standard deviations of the spot, if that is more.
 const AT_PLACE_SIGMAS: f64 = 1.5;
-/// Beyond so many standard deviations a spot has no light.
+/// Radius of a spot, in standard deviations.
 const REACH_SIGMAS: f64 = 8.0;
-/// The variance of the places in a pixel.
+/// Variance of a uniform distribution over a pixel.
 const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
 
-/// Where each star's light is.
+/// The light of the true stars over the frame.
 pub struct LightMap<'a> {
     stars: Vec<&'a TrueStar>,
     by_place: PointTree,
@@ -22,7 +22,7 @@ pub struct LightMap<'a> {
 }
 
 impl<'a> LightMap<'a> {
-    /// The light of the stars on a frame, and of those beyond its border.
+    /// The light of the stars on a frame and just outside it.
     pub fn of(scenario: &Scenario, truth: &'a Truth) -> Self {
         let variance_px2 = scenario.camera.spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2;
         let smear_px2 = truth
@@ -36,7 +36,8 @@ impl<'a> LightMap<'a> {
         }
     }
 
-    /// The star at this place to which more than half of the light of stars there is due.
+    /// The star that contributes more than half of the starlight at this position, if it is near
+    /// enough.
     pub fn owner(&self, place: &PixelPoint) -> Option<&'a TrueStar> {
         let light = |star: &TrueStar| {
             let offset = [star.position.x - place.x, star.position.y - place.y];
@@ -50,12 +51,12 @@ impl<'a> LightMap<'a> {
         (owner.position.distance_to(place) < self.at_place_px()).then_some(owner)
     }
 
-    /// The stars at this place: so near that a detection there may be of any of them.
+    /// The stars that a detection at this position may be.
     pub fn stars_at(&self, place: &PixelPoint) -> impl Iterator<Item = &'a TrueStar> {
         self.stars_near(place, self.at_place_px())
     }
 
-    /// The stars within `radius_px` of this place, nearest first.
+    /// The stars within `radius_px` of this position, nearest first.
     pub fn stars_near(
         &self,
         place: &PixelPoint,
@@ -65,7 +66,7 @@ impl<'a> LightMap<'a> {
         near.map(|near| self.stars[near.index])
     }
 
-    /// The standard deviation of the light in a spot, along the axis on which it is wider.
+    /// Standard deviation of a spot along its wider axis.
     pub fn sigma_px(&self) -> f64 {
         self.variance_px2[0].max(self.variance_px2[1]).sqrt()
     }
@@ -111,10 +112,11 @@ mod tests {
         };
         assert_eq!(owner(50.5, 50.0), None);
         assert_eq!(owner(49.9, 50.0), Some(truth.stars[0].position));
-        // A faint star in the light of a bright one owns nothing, not even its own place.
+        // A faint star in the light of a bright one contributes too little even at its own
+        // position.
         assert_eq!(owner(80.5, 20.0), Some(truth.stars[2].position));
         assert_eq!(owner(0.0, 30.0), Some(truth.beyond[0].position));
-        // Three pixels off there is light of it, but no place.
+        // Three pixels off, its light dominates, but it is too far away.
         assert_eq!(owner(83.0, 20.0), None);
         let place = PixelPoint::new(80.0, 21.0);
         assert_eq!(light.stars_near(&place, 1.05).count(), 1);

@@ -1,22 +1,27 @@
-//! Frames at random attitudes through the whole pipeline, each result against the truth and against what theory allows.
+//! How accurate is the whole pipeline? Simulated frames at random attitudes, compared with the
+//! truth and with theory.
 //!
-//! ([`Protocol`], [`IndexedCatalog`](crate::identify::IndexedCatalog)) → for each number a [`ValidatedFrame`]: a [`FrameRecord`] and its [`StarRecord`]s → [`Summary`]
+//! [`Protocol`], [`IndexedCatalog`](crate::identify::IndexedCatalog) → [`Validator`] → for each
+//! number a [`ValidatedFrame`] ([`FrameRecord`], [`StarRecord`]s) → [`Summary`]
 //!
-//! 1. The attitude is uniform over all rotations; the frame is simulated with the stars of the catalogue, and processed as
-//!    `starpipe process` does. Its random numbers depend on the seed and its own number only: the same on any number of threads.
-//! 2. The answer is right, wrong or none, by where the centre and the corners point.
-//! 3. Each detection is the star's to which more than half of the light there is due. It is held against the star's true place
-//!    and light, and against the Cramér-Rao bound.
-//! 4. The attitude is held against the true one about the camera's axes, in units of its stated covariance.
-//! 5. What is found of the stars of each magnitude is held against the predicted completeness, and the faintest star named
-//!    against the faintest to be expected of the very stars on the frame.
+//! 1. Draw an attitude uniformly over all rotations, simulate the frame with the stars of the
+//!    catalogue, and process it as `starpipe process` does. Random numbers depend on the seed and
+//!    the frame's number only, so results do not depend on the number of threads.
+//! 2. Classify the answer as right, wrong or none, by the directions of the centre and the corners.
+//! 3. Assign each detection to the star that contributes more than half of the light there. Compare
+//!    it with the star's true position and flux, and with the Cramér-Rao bound.
+//! 4. Compare the attitude with the truth about the camera axes, in units of its stated covariance.
+//! 5. Compare the detected fraction of the stars of each magnitude with the predicted completeness,
+//!    and the faintest named star with the expectation for the stars on the frame.
 //!
-//! Caveats: those of [`crate::model::simulate`]; the stars are those of the catalogue that they are identified with. Stars are *isolated*
-//! where they are whole on the frame, no other star that may be detected is near, and the light of the others there does not matter; what is said of
-//! centroids, pulls and completeness is of these.
+//! Caveats: those of [`crate::model::simulate`]; and the simulated stars are those of the catalogue
+//! used for identification. Statistics of centroids, pulls and completeness are of *isolated*
+//! stars: entirely on the frame, without another detectable star nearby, and with negligible light
+//! of other stars.
 //!
 //! # Reference
-//! Bar-Shalom, Li & Kirubarajan 2001, Estimation with Applications to Tracking and Navigation, section 5.4 (consistency).
+//! Bar-Shalom, Li & Kirubarajan 2001, Estimation with Applications to Tracking and Navigation,
+//! section 5.4 (consistency).
 
 mod evaluation;
 mod light;
@@ -42,24 +47,24 @@ use crate::pipeline::{Workspace, solve_frame};
 use evaluation::Evaluation;
 use std::time::Instant;
 
-/// What came of one frame.
+/// A simulated frame, compared with the truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ValidatedFrame {
-    /// Of the frame.
+    /// Results of the frame.
     pub frame: FrameRecord,
-    /// Of its stars, bright ones first, and then of what was detected and is no star.
+    /// Results of its true stars, then of detections that are no star.
     pub stars: Vec<StarRecord>,
-    /// Time for the simulation, in milliseconds.
+    /// Duration of the simulation, in milliseconds.
     pub simulate_ms: f64,
-    /// Time for the pipeline.
+    /// Duration of the pipeline, in milliseconds.
     pub process_ms: f64,
 }
 
 impl Validator<'_> {
-    /// Simulates the frame with this number, examines it, and holds what comes of it against the truth.
+    /// Simulates the frame with this number, processes it, and compares the result with the truth.
     ///
     /// # Errors
-    /// [`ValidationError::Simulate`], [`ValidationError::Detect`] for a detector that no frame can be of.
+    /// [`ValidationError::Simulate`], [`ValidationError::Detect`] for an unsupported detector size.
     pub fn run_one(
         &self,
         number: u64,

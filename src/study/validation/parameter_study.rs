@@ -14,7 +14,8 @@ use std::fmt::Write as _;
 pub enum StudyParameter {
     /// A parameter of the camera, of the conditions or of the scene.
     Setup(SetupParameter),
-    /// The horizontal field of view, in degrees, by the focal length; pixels and spot stay the same.
+    /// The horizontal field of view, in degrees, by the focal length; pixels and spot stay the
+    /// same.
     FieldOfView,
 }
 

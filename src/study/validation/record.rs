@@ -1,17 +1,18 @@
-//! What is kept of each simulated frame, and of each star on it: rows of tables.
+//! Rows of the tables: results of each simulated frame and of each star on it.
 //!
-//! Lengths are in pixels, light in electrons, angles in the unit of their name. What there is none of is empty.
+//! Lengths are in pixels, light in electrons, angles in the unit in their name. Missing values are
+//! empty.
 
 use crate::study::robustness::Answer;
 use serde::{Deserialize, Serialize};
 
-/// The table of stars goes so far beyond the predicted limit.
+/// Magnitudes beyond the predicted limit down to which the table of stars goes.
 pub const BEYOND_LIMIT_MAG: f64 = 1.5;
 
-/// A simulated frame, and what the pipeline made of it.
+/// A simulated frame, and the result of the pipeline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameRecord {
-    /// Its number, from 0.
+    /// Number of the frame, from 0.
     pub frame: u64,
     /// Seed of the random numbers in its pixels.
     pub seed: u64,
@@ -21,102 +22,105 @@ pub struct FrameRecord {
     pub dec_deg: f64,
     /// True position angle of image-up.
     pub up_pa_deg: f64,
-    /// Whether it was identified, and rightly.
+    /// Whether it was identified correctly.
     pub status: Answer,
-    /// Why it was not, as a word for programs.
+    /// Code of the reason why not.
     pub reason: Option<String>,
-    /// True stars on it that are brighter than the predicted limit.
+    /// True stars on the frame that are brighter than the predicted limit.
     pub stars_above_limit: u64,
-    /// Detections that may be stars.
+    /// Star-like detections.
     pub detected: u64,
-    /// Detections that were taken for no stars: hot pixels, trails, extended light.
+    /// Detections rejected as hot pixels, trails or extended light.
     pub rejected: u64,
-    /// Detections that were named.
+    /// Named detections.
     pub named: u64,
-    /// Those of them that are another star, or none.
+    /// Named detections that are another star, or none.
     pub misnamed: u64,
-    /// Those of these that have the name of a star that stands there as well: of the fainter one of a pair, or of one of
-    /// several, that the frame does not resolve.
+    /// Misnamed detections whose name is that of another star at the same position, such as the
+    /// fainter one of an unresolved pair.
     pub misnamed_companions: u64,
-    /// Detections that may be stars to which no star's light belongs.
+    /// Star-like detections without the light of any star.
     pub false_detections: u64,
-    /// Detections that may be stars with the light of several, none of which has more than half of it.
+    /// Star-like detections with the light of several stars, none of which contributes more than
+    /// half.
     pub blends: u64,
     /// Rows of the table of stars.
     pub star_rows: u64,
-    /// The turn about the camera's x axis from the true attitude to the one found; only of right answers, as what follows.
+    /// Rotation about the camera's x axis from the true to the measured attitude; this and the
+    /// following for right answers only.
     pub error_x_arcsec: Option<f64>,
-    /// The same about the y axis.
+    /// Rotation about the y axis.
     pub error_y_arcsec: Option<f64>,
-    /// The same about the boresight.
+    /// Rotation about the boresight.
     pub error_roll_arcsec: Option<f64>,
-    /// The stated standard error of the turn about x.
+    /// Stated standard error of the rotation about x.
     pub sigma_x_arcsec: Option<f64>,
-    /// The same about y.
+    /// Stated standard error of the rotation about y.
     pub sigma_y_arcsec: Option<f64>,
-    /// The same about the boresight.
+    /// Stated standard error of the rotation about the boresight.
     pub sigma_roll_arcsec: Option<f64>,
-    /// The error squared in units of its stated covariance (normalised estimation error squared): 3 on average where that is true.
+    /// Normalised squared attitude error, in units of its stated covariance (NEES): 3 on average if
+    /// the covariance is right.
     pub nees: Option<f64>,
-    /// Focal length found minus the true one.
+    /// Measured minus true focal length.
     pub focal_error_px: Option<f64>,
-    /// Its stated standard error.
+    /// Stated standard error of the focal length.
     pub focal_sigma_px: Option<f64>,
-    /// Root mean square of the residuals.
+    /// RMS residual.
     pub rms_px: Option<f64>,
-    /// V magnitude of the faintest star that was named.
+    /// V magnitude of the faintest named star.
     pub faintest_vmag: Option<f64>,
-    /// V magnitude of the faintest star to be expected among the true ones.
+    /// Expected V magnitude of the faintest detected star, for the stars on the frame.
     pub expected_faintest_vmag: Option<f64>,
-    /// How far it is off that by chance.
+    /// Standard deviation of that magnitude by chance.
     pub expected_faintest_sigma_mag: Option<f64>,
-    /// V magnitude at which half of the stars should be detected.
+    /// V magnitude of predicted 50 % completeness.
     pub predicted_limit_vmag: f64,
-    /// The same as the pipeline measured it on this frame.
+    /// V magnitude of 50 % completeness measured on this frame.
     pub measured_limit_vmag: Option<f64>,
     /// Its stated standard error.
     pub measured_limit_sigma_mag: Option<f64>,
-    /// Median level of the background as measured.
+    /// Measured background level (median).
     pub background_adu: Option<f64>,
-    /// The true one.
+    /// True background level.
     pub true_background_adu: f64,
-    /// Noise of a pixel as measured.
+    /// Measured noise of a pixel.
     pub noise_adu: Option<f64>,
-    /// The true one.
+    /// True noise of a pixel.
     pub true_noise_adu: f64,
 }
 
-/// What a row of the table of stars is of.
+/// Type of a row in the table of stars.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RowKind {
     /// A true star, detected or not.
     Star,
-    /// A detection with the light of several stars, none of which has more than half of it.
+    /// A detection with the light of several stars, none of which contributes more than half.
     Blend,
-    /// A detection to which no star's light belongs.
+    /// A detection without the light of any star.
     False,
 }
 
-/// Whether a detection was named.
+/// Whether a detection was named correctly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Named {
-    /// As the star that it is.
+    /// Named as the true star.
     Right,
-    /// As another star.
+    /// Named as another star.
     Wrong,
-    /// It was not.
+    /// Not named.
     No,
 }
 
-/// A true star brighter than the predicted limit and [`BEYOND_LIMIT_MAG`]; or a detection that is no
+/// A true star, down to [`BEYOND_LIMIT_MAG`] below the predicted limit; or a detection that is no
 /// such star.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StarRecord {
-    /// The frame.
+    /// Number of the frame.
     pub frame: u64,
-    /// What it is.
+    /// Type of the row.
     pub kind: RowKind,
     /// The catalogue's identifier.
     pub id: Option<String>,
@@ -124,41 +128,41 @@ pub struct StarRecord {
     pub vmag: Option<f64>,
     /// True B−V.
     pub bv_mag: Option<f64>,
-    /// True column.
+    /// True x.
     pub true_x_px: Option<f64>,
-    /// True row.
+    /// True y.
     pub true_y_px: Option<f64>,
-    /// Electrons to be expected of it.
+    /// Expected electrons.
     pub true_flux_e: Option<f64>,
-    /// Whether it is whole on the frame, and no other star's light near it matters.
+    /// Whether it is entirely on the frame and the light of other stars is negligible.
     pub isolated: Option<bool>,
-    /// Whether its brightest pixel may be full.
+    /// Whether its brightest pixel may be saturated.
     pub saturated: Option<bool>,
-    /// Predicted probability of its detection.
+    /// Predicted detection probability.
     pub probability: Option<f64>,
-    /// Its light over the noise of the matched filter at its place, its own light's not counted.
+    /// Signal-to-noise ratio of the matched filter at its position, without its own shot noise.
     pub snr: Option<f64>,
-    /// The least standard error of its column that an unbiased estimate can have (Cramér-Rao).
+    /// Cramér-Rao bound of the standard error of x.
     pub bound_x_px: Option<f64>,
-    /// The same of its row.
+    /// Cramér-Rao bound of y.
     pub bound_y_px: Option<f64>,
-    /// The same of its light.
+    /// Cramér-Rao bound of the flux.
     pub bound_flux_e: Option<f64>,
-    /// Whether there is a detection that may be a star, more than half of whose light is its own.
+    /// Whether there is a star-like detection to which it contributes more than half of the light.
     pub detected: bool,
-    /// Column found.
+    /// Measured x.
     pub x_px: Option<f64>,
-    /// Row found.
+    /// Measured y.
     pub y_px: Option<f64>,
-    /// The stated standard error of the column.
+    /// Stated standard error of x.
     pub sigma_x_px: Option<f64>,
-    /// The same of the row.
+    /// Stated standard error of y.
     pub sigma_y_px: Option<f64>,
-    /// LightMap found.
+    /// Measured flux.
     pub flux_e: Option<f64>,
-    /// Its stated standard error.
+    /// Stated standard error of the flux.
     pub sigma_flux_e: Option<f64>,
-    /// Whether it was named.
+    /// Whether it was named correctly.
     pub named: Named,
 }
 

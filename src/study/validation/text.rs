@@ -1,4 +1,4 @@
-//! A summary for people.
+//! Summary as text for people.
 
 use super::summary::{
     AttitudeSummary, DifferenceSummary, IdentificationBin, Pull, Quantiles, Summary,
@@ -6,7 +6,7 @@ use super::summary::{
 use std::fmt::Write as _;
 
 impl Summary {
-    /// The summary as text of several lines, each with its end.
+    /// The summary as text of several lines, each with a line end.
     pub fn to_text(&self) -> String {
         let facts = &self.facts;
         let mut text = format!(

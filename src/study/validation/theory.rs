@@ -1,32 +1,32 @@
-//! What theory allows of a star: how clearly it stands out, and how well it can be known.
+//! Theoretical SNR, saturation and error bounds of a star.
 
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::normal_cdf;
 use crate::model::sensitivity::{Budget, CramerRao, Scenario};
 
-/// Pixels further from the spot's middle than so many standard deviations, and one, have no light.
+/// Radius of a spot, in standard deviations plus one pixel.
 const REACH_SIGMAS: f64 = 6.0;
-/// A pixel so many standard deviations of its own light below the full one may be full.
+/// Standard deviations below saturation at which a pixel may be saturated by noise.
 const FULL_SIGMAS: f64 = 4.0;
 
-/// The spots of a scenario, and the noise that they stand in.
+/// Spots of a scenario and their noise.
 pub(super) struct Theory {
     sigma_px: f64,
     has_smear: bool,
     noise_e: f64,
-    /// Electrons of sky and dark current.
+    /// Electrons of sky and dark current per pixel.
     background_e: f64,
-    /// Electrons at which a pixel is full, or the scale ends.
+    /// Electrons at saturation: full well or end of the scale.
     full_e: f64,
 }
 
-/// What theory says of one star.
+/// Theoretical performance for one star.
 pub(super) struct StarTheory {
-    /// Its light over the noise of the matched filter, its own light's not counted.
+    /// Signal-to-noise ratio of the matched filter, without the star's own shot noise.
     pub snr: f64,
-    /// Whether its brightest pixel may be full.
+    /// Whether its brightest pixel may be saturated.
     pub saturated: bool,
-    /// How well it can be known; none of a smeared spot, for which it is not worked out.
+    /// Cramér-Rao bounds; none for a smeared spot.
     pub bound: Option<CramerRao>,
 }
 
@@ -60,7 +60,8 @@ impl Theory {
         }
     }
 
-    /// Parts of the light in the pixels along one axis, the spot's middle so far from that of one.
+    /// Fractions of the light in the pixels along one axis, for a spot at `offset_px` from the
+    /// centre of a pixel.
     fn shares(&self, offset_px: f64) -> Vec<f64> {
         let reach = (REACH_SIGMAS * self.sigma_px).ceil() as i32 + 1;
         let before = |pixel: i32| normal_cdf((f64::from(pixel) - 0.5 - offset_px) / self.sigma_px);
@@ -81,7 +82,7 @@ mod tests {
         scenario.camera.spot_sigma_px = 1.0;
         let budget = Budget::new(&scenario);
         let theory = Theory::of(&scenario, &budget);
-        // 13.6 pixels on average over places, from an independent computation.
+        // 13.6 pixels on average over positions, from an independent computation.
         let places = (0..100).map(|i| [i % 10, i / 10].map(|n| 0.05 + 0.1 * f64::from(n)));
         let pixels = places.map(|[x, y]| {
             let snr = theory.of_star(&PixelPoint::new(x, y), 1e3).snr;

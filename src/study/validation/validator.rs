@@ -1,4 +1,4 @@
-//! What all frames of a validation have in common, and how each is simulated.
+//! What all frames of a validation have in common, and the simulation of each.
 
 use super::summary::RunFacts;
 use super::theory::Theory;
@@ -14,36 +14,36 @@ use crate::study::robustness::random_rotation;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Why frames cannot be validated.
+/// Why a validation is impossible.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ValidationError {
-    /// The scenario makes no sense.
+    /// The scenario is invalid.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    /// The detector finds noise more often than not.
+    /// There is no limit: noise alone is detected more often than not.
     #[error("there is no limiting magnitude: noise alone is detected at half of all places")]
     NoLimit,
-    /// No such frame can be.
+    /// The frame cannot be simulated.
     #[error("simulating a frame")]
     Simulate(#[from] FrameError),
-    /// No such frame can be examined.
+    /// The frame cannot be processed.
     #[error("detecting stars in a simulated frame")]
     Detect(#[from] DetectError),
 }
 
-/// What is simulated, and what the pipeline is told of it.
+/// What is simulated, and what the pipeline knows about it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Protocol {
-    /// Camera, sky and exposure, and what happens meanwhile.
+    /// Camera, sky, exposure and scene.
     pub setup: Setup,
-    /// Whether the pipeline has the camera's description, which gives it the scale.
+    /// Whether the pipeline is given the camera's data sheet, and thereby the scale.
     pub scale_known: bool,
     /// Seed of the random numbers.
     pub seed: u64,
 }
 
-/// A [`Protocol`], ready for any number of frames.
+/// Simulates and processes the frames of a [`Protocol`].
 pub struct Validator<'a> {
     pub(super) context: Context<'a>,
     pub(super) protocol: Protocol,
@@ -53,7 +53,7 @@ pub struct Validator<'a> {
     pub(super) theory: Theory,
 }
 
-/// A frame before it is examined.
+/// A simulated frame, not yet processed.
 pub(super) struct Simulated {
     pub(super) frame: Frame,
     pub(super) truth: Truth,
@@ -61,7 +61,7 @@ pub(super) struct Simulated {
     pub(super) seed: u64,
 }
 
-/// The seed of the random numbers in the pixels of the frame with this number, and its attitude, in a run with this `seed`.
+/// Pixel seed and attitude of the frame with this number, in a run with this `seed`.
 pub fn draw(seed: u64, number: u64) -> (u64, Rotation<Icrs, Camera>) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(number);
@@ -70,10 +70,10 @@ pub fn draw(seed: u64, number: u64) -> (u64, Rotation<Icrs, Camera>) {
 }
 
 impl<'a> Validator<'a> {
-    /// Makes ready what all frames have in common.
+    /// Prepares what all frames have in common.
     ///
     /// # Errors
-    /// [`ValidationError::Scenario`], [`ValidationError::NoLimit`] where nothing can be predicted.
+    /// [`ValidationError::Scenario`]; [`ValidationError::NoLimit`] if there is no limit to predict.
     pub fn new(
         indexed: &'a IndexedCatalog<'a>,
         protocol: &Protocol,
@@ -100,7 +100,7 @@ impl<'a> Validator<'a> {
                     false_alarms_per_mpx: scenario.conditions.false_alarms_per_mpx,
                     ..DetectConfig::default()
                 },
-                // The exposure is kept from it: what it would predict with it is predicted here, once for all frames.
+                // Without the exposure: the limit is predicted here, once for all frames.
                 camera,
                 ..Context::new(indexed)
             },
@@ -111,12 +111,12 @@ impl<'a> Validator<'a> {
         })
     }
 
-    /// V magnitude at which half of the stars should be detected.
+    /// V magnitude of predicted 50 % completeness.
     pub fn limit_vmag(&self) -> f64 {
         self.detector.vmag_at(0.5)
     }
 
-    /// What a summary says of the run besides what is in its tables.
+    /// What a summary says of the run, besides the contents of its tables.
     pub fn facts(&self) -> RunFacts {
         let scenario = &self.protocol.setup.scenario;
         RunFacts {
@@ -129,12 +129,12 @@ impl<'a> Validator<'a> {
         }
     }
 
-    /// The seed of the random numbers in the pixels of the frame with this number, and its attitude.
+    /// Pixel seed and attitude of the frame with this number.
     pub fn draw(&self, number: u64) -> (u64, Rotation<Icrs, Camera>) {
         draw(self.protocol.seed, number)
     }
 
-    /// The one place that knows how frames are made.
+    /// Simulates the frame with this number.
     pub(super) fn simulate(&self, number: u64) -> Result<Simulated, ValidationError> {
         let (seed, icrs_to_camera) = self.draw(number);
         let pointing = Pointing {

@@ -1,57 +1,56 @@
-//! Errors of places and light, against the least that they can be.
+//! Errors of positions and flux, compared with the Cramér-Rao bound.
 
 use crate::base::format::{to_decimals, to_significant};
 use crate::study::validation::StarRecord;
 use serde::Serialize;
 
-/// The signal-to-noise ratio at which the first bin begins, ...
+/// Lower end of the first bin.
 const FIRST_SNR: f64 = 4.0;
-/// ... how many bins there are to a factor of two, ...
+/// Bins per factor of two.
 const BINS_PER_OCTAVE: f64 = 2.0;
-/// ... and how many in all: to 2900.
+/// Number of bins: up to an SNR of 2900.
 const BINS: usize = 19;
 
-/// How well places and light are measured, of isolated stars that are not saturated, by the signal-to-noise ratio of the matched
-/// filter.
+/// Errors of positions and flux of isolated, unsaturated stars, by the SNR of the matched filter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CentroidSummary {
-    /// Root mean square of the errors on either axis, each in units of its Cramér-Rao bound, of stars that are detected with a
+    /// RMS error on either axis in units of its Cramér-Rao bound, for stars with a detection
     /// probability of 99 % or more.
     pub ratio: Option<f64>,
-    /// Standard error of that, of Gaussian errors.
+    /// Standard error of that ratio for Gaussian errors.
     pub ratio_sigma: Option<f64>,
-    /// Bins without a star are left out.
+    /// Bins without empty ones.
     pub bins: Vec<CentroidBin>,
 }
 
-/// Stars of about one signal-to-noise ratio. Errors of places are on one axis.
+/// A bin of SNR. Position errors are on one axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CentroidBin {
-    /// Signal-to-noise ratio from.
+    /// Lower end of the SNR.
     pub from_snr: f64,
-    /// To below.
+    /// Upper end of the SNR, exclusive.
     pub to_snr: f64,
-    /// Its mean.
+    /// Mean SNR.
     pub snr: f64,
-    /// Stars detected.
+    /// Number of detected stars.
     pub stars: usize,
-    /// Root mean square of the errors of columns and rows.
+    /// RMS error of x and y.
     pub rms_px: f64,
-    /// Root mean square of their Cramér-Rao bounds; none of smeared spots.
+    /// RMS Cramér-Rao bound; none for smeared spots.
     pub bound_px: Option<f64>,
-    /// The former over the latter.
+    /// RMS error over bound.
     pub ratio: Option<f64>,
-    /// Standard error of that, of Gaussian errors.
+    /// Standard error of that ratio for Gaussian errors.
     pub ratio_sigma: Option<f64>,
-    /// Root mean square of the stated standard errors.
+    /// RMS stated standard error.
     pub stated_px: f64,
-    /// Mean of the light found over the true.
+    /// Mean measured over true flux.
     pub flux_part: f64,
-    /// Root mean square of the errors of the light over that of their bounds.
+    /// RMS error of the flux over its bound.
     pub flux_ratio: Option<f64>,
 }
 
-/// CentroidSums of one bin.
+/// Sums of one bin.
 #[derive(Clone, Copy, Default)]
 struct CentroidSums {
     stars: usize,
@@ -68,12 +67,12 @@ struct CentroidSums {
 pub(super) struct Centroids {
     bins: [CentroidSums; BINS],
     sure: usize,
-    /// Sum of the squares of errors in units of their bounds.
+    /// Sum of squared errors in units of their bounds.
     in_bounds: f64,
 }
 
 impl Centroids {
-    /// Takes in a star with its errors in x, y and light.
+    /// Adds a star with its errors in x, y and flux.
     pub(super) fn add(&mut self, row: &StarRecord, errors: [Option<f64>; 3], is_sure: bool) {
         let ([Some(dx), Some(dy), Some(flux_error_e)], Some(snr)) = (errors, row.snr) else {
             return;

@@ -1,4 +1,4 @@
-//! What part of the stars of each magnitude is found, and what part should be.
+//! Measured and predicted completeness by magnitude.
 
 use crate::base::format::{to_decimals, to_significant};
 use crate::base::statistics::{Estimate, normal_cdf, normal_density};
@@ -8,51 +8,52 @@ use serde::Serialize;
 
 /// Width of a bin, in magnitudes.
 const BIN_MAG: f64 = 0.1;
-/// Bins begin so much brighter than the predicted limit; stars brighter than that are one bin.
+/// Magnitudes brighter than the predicted limit at which the bins begin; all brighter stars share
+/// one bin.
 const BRIGHTER_MAG: f64 = 2.0;
-/// And end so much fainter: with the table of stars.
+/// Magnitudes fainter than the limit at which they end, with the table of stars.
 const FAINTER_MAG: f64 = BEYOND_LIMIT_MAG;
 
-/// What part of the isolated stars of each magnitude is found.
+/// Completeness of isolated stars by magnitude.
 ///
-/// The limits are those of a normal distribution's integral that is fitted to what was found, and in the same way to what was
-/// predicted, so that where that is no such integral it does not matter.
+/// The limits are those of a normal distribution function, fitted to the detections and, in the
+/// same way, to the predicted probabilities. Deviations from that form cancel in the difference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CompletenessSummary {
-    /// V magnitude at which half of the stars should be found, by the model itself.
+    /// V magnitude of 50 % completeness, by the model itself.
     pub predicted_limit_vmag: f64,
-    /// The same by a fit to the stars' predicted probabilities.
+    /// V magnitude of 50 % completeness, by a fit to the predicted probabilities.
     pub predicted_fit_vmag: Option<f64>,
-    /// V magnitude at which half of them are found, by the same fit: none where too few stars tell.
+    /// V magnitude of 50 % completeness, by a fit to the detections; none with too few stars.
     pub measured_limit_vmag: Option<f64>,
     /// Its standard error.
     pub measured_limit_sigma_mag: Option<f64>,
-    /// The measured limit minus the predicted one, both fitted.
+    /// Measured minus predicted limit, both fitted.
     pub difference_mag: Option<f64>,
-    /// Bright ones first; those without a star are left out.
+    /// Bins, brightest first, without empty ones.
     pub bins: Vec<CompletenessBin>,
 }
 
-/// Stars of about one magnitude.
+/// A bin of magnitudes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CompletenessBin {
     /// Mean V magnitude of its stars.
     pub vmag: f64,
-    /// Stars.
+    /// Number of stars.
     pub stars: usize,
-    /// Those of them that are detected.
+    /// Number of detected stars.
     pub detected: usize,
-    /// The part of them.
+    /// Detected fraction.
     pub measured: f64,
-    /// Its 95 % interval's lower end.
+    /// Lower end of its 95 % interval.
     pub low: f64,
-    /// And upper end.
+    /// Upper end of its 95 % interval.
     pub high: f64,
-    /// Their mean predicted probability.
+    /// Mean predicted probability.
     pub predicted: f64,
 }
 
-/// CompletenessSums of one bin.
+/// Sums of one bin.
 #[derive(Clone, Copy, Default)]
 struct CompletenessSums {
     stars: usize,
@@ -63,7 +64,7 @@ struct CompletenessSums {
 
 pub(super) struct Completeness {
     limit_vmag: f64,
-    /// The lower edge of the second bin.
+    /// Lower edge of the second bin.
     from_vmag: f64,
     bins: Vec<CompletenessSums>,
 }
@@ -131,17 +132,17 @@ impl CompletenessSums {
 }
 
 const MAX_ROUNDS: usize = 50;
-/// Settled where a step is smaller, in magnitudes.
+/// Convergence limit of a step, in magnitudes.
 const SETTLED_MAG: f64 = 1e-7;
-/// Where the fit begins, in magnitudes.
+/// Initial width of the fit, in magnitudes.
 const TYPICAL_WIDTH_MAG: f64 = 0.3;
-/// A fall wider than this, or narrower, is none, in magnitudes.
+/// Valid widths of the transition, in magnitudes.
 const WIDTHS_MAG: std::ops::Range<f64> = 0.01..3.0;
-/// Further from the limit no star tells, and a probability is 0 or 1.
+/// Clamp for probabilities far from the limit.
 const LEAST_PROBABILITY: f64 = 1e-9;
 
-/// The magnitude m₅₀ of Φ((m₅₀ − m) / w) that makes this `part` of the stars in each bin likeliest, by Fisher scoring for
-/// a = m₅₀ / w and b = 1 / w.
+/// Maximum-likelihood magnitude m₅₀ of Φ((m₅₀ − m) / w) for this `part` of the stars in each bin,
+/// by Fisher scoring in a = m₅₀ / w and b = 1 / w.
 ///
 /// # Reference
 /// Bliss 1935, Ann. Appl. Biol. 22, 134 (probit analysis).
@@ -150,7 +151,7 @@ fn fitted_limit(
     part: fn(&CompletenessBin) -> f64,
     start_vmag: f64,
 ) -> Option<Estimate> {
-    // Magnitudes count from the start, so that the two numbers hardly depend on each other.
+    // Magnitudes are relative to the start, so that a and b are nearly uncorrelated.
     let (mut a, mut b) = (0.0, 1.0 / TYPICAL_WIDTH_MAG);
     for _ in 0..MAX_ROUNDS {
         let (mut information, mut slope) = ([0.0; 3], [0.0; 2]);
@@ -174,7 +175,7 @@ fn fitted_limit(
         }
         let step_a = (bb * slope[0] - ab * slope[1]) / determinant;
         let step_b = (aa * slope[1] - ab * slope[0]) / determinant;
-        // A step that would turn the curve round is cut short.
+        // A step that would change the sign of b is shortened.
         let shorter = (0.5 * b / step_b.abs()).min(1.0);
         a += shorter * step_a;
         b += shorter * step_b;
@@ -182,7 +183,7 @@ fn fitted_limit(
             return None;
         }
         if (step_a / b).abs() < SETTLED_MAG && (step_b / (b * b)).abs() < SETTLED_MAG {
-            // The variance of a / b, linearised.
+            // Variance of a / b, linearised.
             let m50 = a / b;
             let variance = (bb + 2.0 * m50 * ab + m50 * m50 * aa) / (determinant * b * b);
             return Some(Estimate {

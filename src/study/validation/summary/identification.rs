@@ -1,44 +1,45 @@
-//! How often frames are identified, and rightly.
+//! Rates of right, wrong and no identification.
 
 use crate::base::format::to_decimals;
 use crate::study::robustness::{Answer, Interval};
 use serde::Serialize;
 
-/// Stars brighter than the limit at which a bin begins.
+/// Lower ends of the bins, in stars brighter than the limit.
 const FROM_STARS: [u64; 11] = [0, 4, 6, 8, 10, 15, 20, 30, 50, 100, 200];
 
-/// How many frames were identified, and rightly. Rates are in percent, their intervals of 95 % (Clopper & Pearson).
+/// Rates of right, wrong and no identification, in percent, with 95 % intervals (Clopper &
+/// Pearson).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct IdentificationSummary {
     /// All frames.
     #[serde(flatten)]
     pub all: IdentificationBin,
-    /// By stars brighter than the predicted limit; bins without a frame are left out.
+    /// By the number of stars brighter than the predicted limit, without empty bins.
     pub by_stars: Vec<IdentificationBin>,
 }
 
-/// Frames with so many stars.
+/// Frames by number of stars.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct IdentificationBin {
-    /// Stars brighter than the predicted limit, from.
+    /// Lower end of the number of stars brighter than the predicted limit.
     pub from_stars: u64,
-    /// To, with it.
+    /// Upper end, inclusive.
     pub to_stars: u64,
-    /// Frames.
+    /// Number of frames.
     pub frames: usize,
-    /// Identified rightly.
+    /// Correctly identified frames.
     pub right: usize,
-    /// Identified as what they are not.
+    /// Wrongly identified frames.
     pub wrong: usize,
-    /// Not identified.
+    /// Frames without identification.
     pub none: usize,
-    /// Rate of right answers.
+    /// Percentage of right answers.
     pub right_percent: f64,
-    /// Its interval's lower end.
+    /// Lower end of its interval.
     pub right_low_percent: f64,
-    /// And upper end.
+    /// Upper end of its interval.
     pub right_high_percent: f64,
-    /// The upper end of the interval of the rate of wrong answers.
+    /// Upper end of the interval of wrong answers.
     pub wrong_high_percent: f64,
 }
 
@@ -62,7 +63,7 @@ impl IdentificationBin {
     }
 }
 
-/// Answers, counted.
+/// Counts of answers.
 #[derive(Default)]
 pub(super) struct Identifications {
     counts: [[usize; 3]; FROM_STARS.len()],

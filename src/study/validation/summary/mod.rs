@@ -1,8 +1,8 @@
-//! What many frames say together.
+//! Statistics over many frames.
 //!
-//! rows of both tables, one by one → [`Accumulator`] → [`Summary`]
+//! rows of both tables, one at a time → [`Accumulator`] → [`Summary`]
 //!
-//! The memory needed does not depend on the number of stars, and is three numbers a frame.
+//! Memory does not depend on the number of stars, and is three numbers per frame.
 
 mod centroids;
 mod completeness;
@@ -23,114 +23,114 @@ use identification::Identifications;
 use pulls::RunningStatistics;
 use serde::Serialize;
 
-/// Version of the JSON described here.
+/// Version of the JSON schema.
 pub const SCHEMA: u32 = 1;
 
-/// Pulls, centroids and light are of stars that are detected with this probability or more: of fainter ones those are found that
-/// noise makes bright.
+/// Smallest detection probability of stars in the statistics of pulls, centroids and flux: fainter
+/// stars are detected preferentially when noise brightens them.
 const SURE_PROBABILITY: f64 = 0.99;
 
-/// What the tables do not say.
+/// Facts about the run that are not in the tables.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunFacts {
-    /// What the camera is called.
+    /// Name of the camera.
     pub camera: String,
-    /// Columns.
+    /// Width of a frame.
     pub width_px: usize,
-    /// Rows.
+    /// Height of a frame.
     pub height_px: usize,
     /// Seed of the random numbers.
     pub seed: u64,
-    /// Whether the pipeline had the camera's description, which gives it the scale.
+    /// Whether the pipeline was given the camera's data sheet, and thereby the scale.
     pub scale_known: bool,
-    /// False detections in a million pixels that were asked for.
+    /// Configured false detections per million pixels.
     pub false_alarms_per_mpx: f64,
 }
 
-/// What many frames say together.
+/// Statistics over many frames.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// Version of the fields described here.
+    /// Version of the JSON schema.
     pub schema: u32,
     /// What was simulated.
     #[serde(flatten)]
     pub facts: RunFacts,
-    /// Frames.
+    /// Number of frames.
     pub frames: usize,
-    /// How many were identified, and rightly.
+    /// Rates of right, wrong and no identification.
     pub identification: IdentificationSummary,
-    /// What was detected and named.
+    /// Numbers of detections and names.
     pub detection: DetectionSummary,
-    /// What part of the stars of each magnitude is found.
+    /// Completeness by magnitude.
     pub completeness: CompletenessSummary,
-    /// How well places and light are measured.
+    /// Errors of positions and flux.
     pub centroids: CentroidSummary,
     /// Errors in units of their stated standard errors.
     pub pulls: PullSummary,
-    /// How well the attitude is known; none where no frame was rightly identified.
+    /// Errors of the attitude; none without a right identification.
     pub attitude: Option<AttitudeSummary>,
-    /// The faintest star named minus the faintest to be expected, in magnitudes.
+    /// Faintest named star minus its expectation, in magnitudes.
     pub faintest: DifferenceSummary,
-    /// The limit that the pipeline measures on a frame minus the predicted one, in magnitudes.
+    /// Limit measured on a frame minus the predicted one, in magnitudes.
     pub frame_limit: DifferenceSummary,
-    /// The background as measured minus the true one, in ADU.
+    /// Measured minus true background, in ADU.
     pub background: DifferenceSummary,
-    /// Its noise, measured over true.
+    /// Measured over true noise.
     pub noise_ratio: DifferenceSummary,
 }
 
-/// What was detected and named.
+/// Numbers of detections and names.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DetectionSummary {
-    /// Detections that may be stars.
+    /// Star-like detections.
     pub detected: u64,
-    /// Those that were taken for no stars.
+    /// Rejected detections.
     pub rejected: u64,
-    /// Those with the light of several stars, none of which has more than half.
+    /// Detections with the light of several stars, none of which contributes more than half.
     pub blends: u64,
-    /// Those that were named.
+    /// Named detections.
     pub named: u64,
-    /// Those of them that are another star, or none.
+    /// Named detections that are another star, or none.
     pub misnamed: u64,
-    /// Those of these that have the name of a star that stands there as well.
+    /// Misnamed detections whose name is that of another star at the same position.
     pub misnamed_companions: u64,
-    /// Those that may be stars to which no star's light belongs.
+    /// Star-like detections without the light of any star.
     pub false_detections: u64,
-    /// The same in a million pixels.
+    /// False detections per million pixels.
     pub false_per_mpx: f64,
-    /// Its 95 % interval's lower end.
+    /// Lower end of its 95 % interval.
     pub false_low_per_mpx: f64,
-    /// And upper end.
+    /// Upper end of its 95 % interval.
     pub false_high_per_mpx: f64,
 }
 
-/// How well the attitude is known.
+/// Errors of the attitude.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AttitudeSummary {
-    /// Frames rightly identified.
+    /// Correctly identified frames.
     pub frames: usize,
-    /// How far the boresight points off.
+    /// Direction error of the boresight.
     pub boresight_arcsec: Quantiles,
-    /// How far the frame is turned about the boresight.
+    /// Rotation error about the boresight.
     pub roll_arcsec: Quantiles,
-    /// The same in steps of one percent, from the least to the largest.
+    /// Percentiles 0 to 100 of the boresight error.
     pub boresight_percentiles_arcsec: Vec<f64>,
-    /// And of the roll.
+    /// Percentiles 0 to 100 of the roll error.
     pub roll_percentiles_arcsec: Vec<f64>,
-    /// Root mean square of the turns about x, y and the boresight.
+    /// RMS rotations about x, y and the boresight.
     pub rms_arcsec: [f64; 3],
-    /// Mean of the squared error in units of its stated covariance: 3 where that is true.
+    /// Mean normalised squared error (NEES): 3 if the stated covariance is right.
     pub nees_mean: f64,
-    /// Standard error of that mean where the covariance is true.
+    /// Standard error of that mean if the covariance is right.
     pub nees_sigma: f64,
-    /// Root mean square of the residuals, on average over frames.
+    /// RMS residual, averaged over frames.
     pub rms_px: f64,
 }
 
-/// What part of many values lies below.
+/// Quantiles of a distribution.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Quantiles {
-    /// Half of them.
+    /// Median.
     pub p50: f64,
     /// 68.3 %.
     pub p68: f64,
@@ -138,12 +138,12 @@ pub struct Quantiles {
     pub p95: f64,
     /// 99 %.
     pub p99: f64,
-    /// All.
+    /// Maximum.
     pub max: f64,
 }
 
 impl Quantiles {
-    /// Of `sorted` values, of which there is at least one.
+    /// Quantiles of `sorted` values; none if there are none.
     fn of(sorted: &[f64]) -> Option<Self> {
         (!sorted.is_empty()).then(|| Self {
             p50: quantile(sorted, 0.5),
@@ -155,7 +155,7 @@ impl Quantiles {
     }
 }
 
-/// What this part of `sorted` values, of which there is at least one, lies below.
+/// Quantile of `sorted` values, of which there is at least one.
 fn quantile(sorted: &[f64], part: f64) -> f64 {
     let place = part * (sorted.len() - 1) as f64;
     to_significant(sorted[place.round() as usize], 6)
@@ -166,7 +166,7 @@ fn percentiles(sorted: &[f64]) -> Vec<f64> {
     (0..=100).map(percentile).collect()
 }
 
-/// Takes rows in, one by one.
+/// Accumulates rows one at a time.
 pub struct Accumulator {
     facts: RunFacts,
     frames: usize,
@@ -174,7 +174,7 @@ pub struct Accumulator {
     identification: Identifications,
     completeness: Completeness,
     centroids: Centroids,
-    /// Of x, y and light; of the turns about x, y and the boresight; of the focal length.
+    /// Pulls of x, y and flux; of the rotations about x, y and the boresight; of the focal length.
     pulls: [RunningStatistics; 7],
     boresight_arcsec: Vec<f64>,
     roll_arcsec: Vec<f64>,
@@ -189,7 +189,7 @@ pub struct Accumulator {
 }
 
 impl Accumulator {
-    /// Of a run with the predicted limit of its detector.
+    /// An accumulator for a run with this predicted limit.
     pub fn new(facts: RunFacts, limit_vmag: f64) -> Self {
         let magnitudes = || RunningStatistics::new(0.1, 2.0);
         Self {
@@ -213,7 +213,7 @@ impl Accumulator {
         }
     }
 
-    /// Takes in a frame.
+    /// Adds a frame.
     pub fn add_frame(&mut self, row: &FrameRecord) {
         self.frames += 1;
         let counts = [
@@ -274,7 +274,7 @@ impl Accumulator {
         }
     }
 
-    /// Takes in a star.
+    /// Adds a star.
     pub fn add_star(&mut self, row: &StarRecord) {
         if row.kind != RowKind::Star || row.isolated != Some(true) {
             return;
@@ -302,7 +302,7 @@ impl Accumulator {
         }
     }
 
-    /// What they say together.
+    /// The summary.
     pub fn finish(mut self) -> Summary {
         let attitude = self.attitude();
         let detection = self.detection();

@@ -1,91 +1,91 @@
-//! Means, scatter and tails of many values.
+//! Mean, scatter and tails of many values.
 
 use crate::base::format::{to_decimals, to_significant};
 use serde::Serialize;
 
-/// Errors in units of their stated standard errors. Where these are true, a pull has a mean of 0, a standard deviation of 1 and
-/// 4.55 % beyond 2.
+/// Pulls: errors in units of their stated standard errors. If those are right, a pull has mean 0,
+/// standard deviation 1, and 4.55 % beyond 2.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PullSummary {
-    /// Of the columns of isolated stars that are not saturated and are detected with a probability of 99 % or more.
+    /// Of x, for isolated, unsaturated stars with a detection probability of 99 % or more.
     pub x: Pull,
-    /// Of their rows.
+    /// Of y.
     pub y: Pull,
-    /// Of their light.
+    /// Of the flux.
     pub flux: Pull,
-    /// Of the attitude's turn about x.
+    /// Of the rotation about x.
     pub attitude_x: Pull,
-    /// About y.
+    /// Of the rotation about y.
     pub attitude_y: Pull,
-    /// About the boresight.
+    /// Of the rotation about the boresight.
     pub roll: Pull,
     /// Of the focal length.
     pub focal_length: Pull,
 }
 
-/// One of them.
+/// Statistics of one pull.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Pull {
-    /// Values.
+    /// Number of values.
     pub count: usize,
     /// Mean.
     pub mean: f64,
-    /// Standard deviation about it.
+    /// Standard deviation.
     pub sd: f64,
-    /// Part of the values further from 0 than 2, in percent.
+    /// Percentage of values beyond ±2.
     pub beyond_2_percent: f64,
-    /// Than 3.
+    /// Percentage of values beyond ±3.
     pub beyond_3_percent: f64,
-    /// Than 5.
+    /// Percentage of values beyond ±5.
     pub beyond_5_percent: f64,
-    /// How often each value is.
+    /// Histogram.
     pub histogram: Histogram,
 }
 
-/// How often values are.
+/// Histogram of values.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Histogram {
-    /// Where the first bin begins; what is below is counted in none.
+    /// Lower edge of the first bin; values below are not counted.
     pub from: f64,
     /// Width of a bin.
     pub step: f64,
-    /// Values in each.
+    /// Number of values per bin.
     pub counts: Vec<usize>,
 }
 
-/// Differences of what was measured to what was expected.
+/// Statistics of measured minus expected values.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DifferenceSummary {
-    /// Frames that have it.
+    /// Number of frames with a value.
     pub count: usize,
     /// Mean.
     pub mean: f64,
     /// Standard error of the mean, from the scatter.
     pub mean_sigma: f64,
-    /// Standard deviation of one.
+    /// Standard deviation.
     pub sd: f64,
-    /// The standard deviation to be expected, where it is known.
+    /// Expected standard deviation, if known.
     pub expected_sd: Option<f64>,
-    /// How often each value is.
+    /// Histogram.
     pub histogram: Histogram,
 }
 
-/// Values, counted.
+/// Running mean, variance, tails and histogram.
 pub(super) struct RunningStatistics {
     count: usize,
     mean: f64,
-    /// Sum of the squares of the differences to the mean.
+    /// Sum of squared deviations from the mean.
     squares: f64,
     beyond: [usize; 3],
     step: f64,
-    /// From minus the reach to it.
+    /// Histogram, symmetric about 0.
     counts: Vec<usize>,
 }
 
 const TAILS: [f64; 3] = [2.0, 3.0, 5.0];
 
 impl RunningStatistics {
-    /// With a histogram from −`reach` to `reach`.
+    /// Statistics with a histogram from −`reach` to `reach`.
     pub(super) fn new(step: f64, reach: f64) -> Self {
         let bins = (2.0 * reach / step).round() as usize;
         Self {
@@ -98,7 +98,7 @@ impl RunningStatistics {
         }
     }
 
-    /// Welford 1962, Technometrics 4, 419.
+    /// Adds a finite value (Welford 1962, Technometrics 4, 419).
     pub(super) fn add(&mut self, value: f64) {
         if !value.is_finite() {
             return;

@@ -55,7 +55,8 @@ fn frame(number: u64, status: Answer, errors: [f64; 3]) -> FrameRecord {
     }
 }
 
-/// A star of this magnitude and SNR, off by so much in x, in units of a bound of 0.1 px and a stated error of 0.05 px.
+/// A star of this magnitude and SNR with an error of `off` bounds of 0.1 px in x, and a stated
+/// error of 0.05 px.
 fn star(vmag: f64, snr: f64, off: f64) -> StarRecord {
     StarRecord {
         frame: 0,
@@ -100,7 +101,7 @@ fn frames_are_counted_by_answer_and_by_stars() {
         (2, 1, 1)
     );
     assert_eq!(found.all.right_percent, 50.0);
-    // Of 2 in 4: 6.76 to 93.24 %.
+    // Interval of 2 in 4: 6.76 to 93.24 %.
     assert!((found.all.right_low_percent - 6.76).abs() < 0.01);
     let bins: Vec<_> = found
         .by_stars
@@ -115,7 +116,7 @@ fn frames_are_counted_by_answer_and_by_stars() {
     );
     assert_eq!((detection.rejected, detection.blends), (4, 8));
     assert_eq!(detection.misnamed_companions, 2);
-    // Four on four frames of half a million pixels; an exact interval of 4 is 1.09 to 10.24.
+    // Four on four frames of half a million pixels; the exact interval of 4 is 1.09 to 10.24.
     assert_eq!(detection.false_per_mpx, 2.0);
     assert!((detection.false_low_per_mpx - 1.09 / 2.0).abs() < 0.005);
     assert!((detection.false_high_per_mpx - 10.24 / 2.0).abs() < 0.005);
@@ -195,7 +196,7 @@ fn centroids_are_of_isolated_stars_and_pulls_of_sure_ones() {
         panic!("{:?}", summary.centroids);
     };
     assert_eq!((five.stars, ten.stars), (1, 2));
-    // Errors of 0.2 px in x and of none in y, against bounds of 0.1 px.
+    // Errors of 0.2 px in x and 0 in y, with bounds of 0.1 px.
     assert!((ten.rms_px - 0.2 / 2f64.sqrt()).abs() < 1e-5);
     let root_of_2 = |ratio: Option<f64>| (ratio.unwrap().powi(2) - 2.0).abs() < 1e-3;
     assert_eq!(ten.bound_px, Some(0.1));
@@ -206,7 +207,7 @@ fn centroids_are_of_isolated_stars_and_pulls_of_sure_ones() {
         (2, 100.0)
     );
     assert_eq!(summary.pulls.flux.mean, 2.0);
-    // The saturated one counts in completeness.
+    // The saturated star counts in completeness.
     let bins = &summary.completeness.bins;
     let counts: Vec<_> = bins
         .iter()
