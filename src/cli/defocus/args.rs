@@ -14,10 +14,10 @@ use std::path::PathBuf;
     starpipe defocus --camera camera.toml --vmag 6 --required-error 0.05 --darks 'darks/*.tif'\n  \
     starpipe defocus --preset nanosat-tracker --vmag 4,5,6 --centroid grey-weighted --out defocus\n  \
     starpipe defocus --normalisation peak --trials 1000 --out defocus\n\n\
-    The radius is the standard deviation of the spot, the error the root mean square of the distance between \
-    centroid and truth. With --normalisation peak it is the experiment of Wang et al., Laser & Optoelectronics Progress \
-    56, 101101 (2019), where all spots have the same brightest pixel; with energy a star has the light it has. The \
-    two have different answers.\n\n\
+    The radius is the standard deviation of the spot. The error is the root mean square distance \
+    between centroid and truth. --normalisation peak repeats the experiment of Wang et al., Laser & \
+    Optoelectronics Progress 56, 101101 (2019): all spots have the same brightest pixel. With energy \
+    all spots have the light of the star. The two have different answers.\n\n\
     Exit status: 0 done, 1 something could not be read or written, 2 the command line is wrong,\n\
     3 no radius meets a required error.")]
 pub(crate) struct DefocusArgs {
@@ -29,13 +29,13 @@ pub(crate) struct DefocusArgs {
     /// Johnson V of the star, or several with commas; energy only [default: 1.5 brighter than the camera's limit]
     #[arg(long, value_name = "V[,V...]", value_delimiter = ',', value_parser = values::finite, allow_hyphen_values = true)]
     pub(super) vmag: Vec<f64>,
-    /// Say which radius is the smallest whose error is at most so many pixels, or several with commas
+    /// Required error in pixels, or several with commas: report the radii that meet it
     #[arg(long, value_name = "PX[,PX...]", value_delimiter = ',', value_parser = values::positive, allow_hyphen_values = true)]
     pub(super) required_error: Vec<f64>,
-    /// Take the noise from frames taken without light: files, directories, or patterns such as 'darks/*.tif'
+    /// Measure the noise on dark frames: files, directories, or patterns such as 'darks/*.tif'
     #[arg(long, value_name = "FRAME", num_args = 1..)]
     pub(super) darks: Vec<PathBuf>,
-    /// Noise for which radii are told, as a part of full scale; peak only [default: that of --darks, else the paper's 9.32e-4]
+    /// Noise for which radii are reported, as a part of full scale; peak only [default: that of --darks, else the paper's 9.32e-4]
     #[arg(long, value_name = "NUMBER", value_parser = values::positive, allow_hyphen_values = true, conflicts_with = "darks")]
     pub(super) at_noise: Option<f64>,
     /// Radii: standard deviations of the spot, in pixels [default: 0.4:2.4:200 for peak, 0.2:2.4:45 for energy]
@@ -44,7 +44,7 @@ pub(crate) struct DefocusArgs {
     /// Noises as parts of full scale; peak only [default: 2e-4:20e-4:100]
     #[arg(long, value_name = "FROM:TO:COUNT[:log]", value_parser = range, allow_hyphen_values = true)]
     pub(super) noise_relative: Option<Range>,
-    /// Noises of a pixel in the dark, in electrons; energy only [default: nine from a quarter to four times the camera's]
+    /// Noises of a pixel without light, in electrons; energy only [default: nine from a quarter to four times the camera's]
     #[arg(long, value_name = "FROM:TO:COUNT[:log]", value_parser = range, allow_hyphen_values = true, conflicts_with = "noise_relative")]
     pub(super) noise_e: Option<Range>,
     /// Stars at each point of the grid [default: 20 for peak, as the paper has it, 400 for energy]
@@ -56,13 +56,13 @@ pub(crate) struct DefocusArgs {
     /// Brightest pixel of a spot centred on it, as a part of full scale; peak only [default: 0.675]
     #[arg(long, value_name = "PART", value_parser = values::share, allow_hyphen_values = true)]
     pub(super) peak: Option<f64>,
-    /// Pixels from the middle of a fixed window to its edge
+    /// Pixels from the centre of a fixed window to its edge
     #[arg(long, value_name = "PX", default_value_t = 7, value_parser = clap::value_parser!(u8).range(1..=15))]
     pub(super) half_window_px: u8,
-    /// How to measure a star's place [default: fixed-window for peak, gaussian-fit for energy]
+    /// How to measure a star's position [default: fixed-window for peak, gaussian-fit for energy]
     #[arg(long, value_enum, value_name = "METHOD")]
     pub(super) centroid: Option<CentroidingArg>,
-    /// Standard deviation of the lens's spot in focus, in pixels: it counts besides the geometric blur
+    /// Standard deviation of the lens's spot in focus, in pixels; geometric blur adds to it
     #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = values::not_negative, allow_hyphen_values = true)]
     pub(super) focused_px: f64,
     /// What to print: csv has a row for each point of the grid
@@ -71,7 +71,7 @@ pub(crate) struct DefocusArgs {
     /// Also write grid.csv, curve.csv, defocus.json, defocus.txt and figures into this directory
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
-    /// What figures are drawn as
+    /// Format of the figures
     #[arg(long, value_enum, default_value_t = FigureForm::Svg, requires = "out")]
     pub(super) figures: FigureForm,
     /// Threads to work with [default: one for each processor]
@@ -84,7 +84,7 @@ pub(crate) struct DefocusArgs {
 pub(super) enum Normalisation {
     /// The brightest pixel, as in the paper: a wider spot has more light
     Peak,
-    /// The light, as of a real star
+    /// The light, as with a real star
     Energy,
 }
 
@@ -94,7 +94,7 @@ pub(super) enum CentroidingArg {
     GaussianFit,
     /// Centre of the light above a threshold
     GreyWeighted,
-    /// The paper's: centre of the light in a fixed window, without a threshold
+    /// Centre of the light in a fixed window, without a threshold, as in the paper
     FixedWindow,
 }
 
@@ -108,11 +108,11 @@ impl From<CentroidingArg> for Centroiding {
     }
 }
 
-/// Values of an axis, above 0.
+/// Values above 0 of an axis of the grid.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Range(pub(super) Vec<f64>);
 
-/// Spots that make sense: a narrower one is a point, and a wider one does not fit into a window.
+/// Valid radii: a narrower spot is a point, a wider one does not fit into a window.
 const RADII_PX: std::ops::RangeInclusive<f64> = 0.1..=5.0;
 
 fn radii(text: &str) -> Result<Range, String> {

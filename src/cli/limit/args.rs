@@ -16,15 +16,15 @@ use std::str::FromStr;
     starpipe limit --preset experiment-1 --sweep aperture_mm=5:200:40 --plot aperture.svg --format csv\n  \
     starpipe limit --preset imx174-35mm --sweep exposure_s=0.01:10:31:log\n  \
     starpipe limit --figures figures\n\n\
-    The rule is that of the paper: the star's brightest pixel stands --snr times its noise above the\n\
-    sky. Every number of the camera and of the conditions has an option; docs/sensitivity.md has the\n\
+    The limit is that of the paper: the signal of the star's brightest pixel is --snr times its noise.\n\
+    Every number of the camera and of the conditions has an option; docs/sensitivity.md has the\n\
     equations.")]
 #[command(group = ArgGroup::new("scenario").args(["camera", "preset", "figures"]).required(true).multiple(true))]
 pub(crate) struct LimitArgs {
     #[command(flatten)]
     pub(crate) scenario: ScenarioOptions,
-    /// Repeat the prediction over one parameter, named as its option with _ or - (may be repeated); :log makes even ratios
-    /// of the steps
+    /// Repeat the prediction over one parameter, named as its option with _ or - (may be repeated);
+    /// :log spaces the values by even ratios
     #[arg(
         long,
         value_name = "NAME=FROM:TO:COUNT[:log]",
@@ -34,17 +34,17 @@ pub(crate) struct LimitArgs {
     /// What to print
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub(crate) format: Format,
-    /// Also draw the sweeps into this file, a panel for each, with a second curve for 12.5 times the exposure (over the
-    /// exposure: for half the aperture)
+    /// Also draw the sweeps into this file, a panel for each, with a second curve for 12.5 times the
+    /// exposure (in a sweep over the exposure: for half the aperture)
     #[arg(long, value_name = "FILE.svg|png", value_parser = PlotFile::parser(), requires = "sweep")]
     pub(crate) plot: Option<PlotFile>,
-    /// Draw the eleven figures of the paper into this directory, for exposures of 0.04 s and 0.5 s [default camera:
-    /// experiment-1]
+    /// Draw the eleven figures of the paper into this directory, for exposures of 0.04 s and 0.5 s
+    /// [default camera: experiment-1]
     #[arg(long, value_name = "DIR", conflicts_with_all = ["sweep", "plot", "format"])]
     pub(crate) figures: Option<PathBuf>,
 }
 
-/// A sweep of the sensitivity.
+/// A sweep of the prediction.
 #[derive(Debug, Clone)]
 pub(crate) struct LimitSweep(pub(crate) sensitivity::Sweep);
 

@@ -40,14 +40,14 @@ impl PlotFile {
     }
 }
 
-/// What the figures of a command are drawn as.
+/// Format of the figures of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum FigureForm {
-    /// Lines and letters
+    /// Vector graphics
     Svg,
-    /// Pixels
+    /// Bitmaps
     Png,
-    /// Not at all
+    /// No figures
     None,
 }
 

@@ -14,34 +14,34 @@ use std::path::PathBuf;
     starpipe validate --preset nanosat-tracker --exposure-s 0.2 --scale-unknown --out validation\n  \
     starpipe validate --camera camera.toml --frames 500 --sweep read_noise_e=1:30:7:log --out study\n  \
     starpipe validate --camera camera.toml --sweep fov_deg=4:32:8 --out study\n\n\
-    Frames are made and worked on in memory, at attitudes that are uniform over all rotations. DIR gets frames.csv and\n\
-    stars.csv, a row for each frame and each star, the same as Parquet in frames.parquet/ and stars.parquet/, what\n\
-    they say together as summary.json and summary.txt, and figures. A study has all that for each value in\n\
-    DIR/NAME=VALUE/, and a row for each in study.csv and study.json.\n\n\
-    A run may be ended at any time, with Ctrl-C as well: the same command goes on where it stopped, one with more\n\
-    --frames makes it longer, and what comes of it is the same to the last byte on any number of threads.")]
+    Frames are simulated and processed in memory, at attitudes that are uniform over all rotations. DIR\n\
+    gets frames.csv and stars.csv with a row for each frame and each star, the same as Parquet in\n\
+    frames.parquet/ and stars.parquet/, a summary in summary.json and summary.txt, and figures. A study\n\
+    writes all this for each value into DIR/NAME=VALUE/, and a row for each into study.csv and study.json.\n\n\
+    A run may be stopped at any time, also by Ctrl-C. The same command continues it, and one with more\n\
+    --frames extends it. The results are the same to the last byte on any number of threads.")]
 pub(crate) struct ValidateArgs {
-    /// Frames, of each value of a study
+    /// Frames; in a study, of each value
     #[arg(long, value_name = "NUMBER", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     pub(crate) frames: u64,
     /// Seed of the random numbers
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Directory for the results; one that holds the beginning of the same run is gone on with
+    /// Directory for the results; an interrupted run in it is continued
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// Keep the camera's description from the pipeline: it knows nothing, not even the scale
+    /// Do not give the camera's description to the pipeline: it has no hints, not even the scale
     #[arg(long)]
     pub(crate) scale_unknown: bool,
-    /// Do it for values of one parameter, named as its option with _ or -, or fov_deg (may be repeated); :log makes even
-    /// ratios of the steps
+    /// Study: a run for each value of one parameter, named as its option with _ or -, or fov_deg (may
+    /// be repeated); :log spaces the values by even ratios
     #[arg(
         long,
         value_name = "NAME=FROM:TO:COUNT[:log]",
         allow_hyphen_values = true
     )]
     pub(crate) sweep: Vec<StudySweep>,
-    /// What figures are drawn as
+    /// Format of the figures
     #[arg(long, value_enum, default_value_t = FigureForm::Svg)]
     pub(crate) figures: FigureForm,
     /// What to print
