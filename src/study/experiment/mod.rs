@@ -1,59 +1,45 @@
-//! The two experiments of Tong, Li & Wang 2014, done again: the limit, the stars, and frames like theirs.
+//! Can the two experiments of Tong, Li & Wang 2014 be reproduced? Their limits, stars and frames.
 //!
-//! ([`Published`], [`IndexedCatalog`](crate::identify::IndexedCatalog)) → [`Run`] with its [`ExperimentReport`]
+//! ([`Published`], [`IndexedCatalog`]) → [`Run`] with its [`ExperimentReport`]
 //!
-//! 1. The limit of the sensitivity model in the paper's reading, beside what the paper prints; and that of the detector as
-//!    built.
-//! 2. The paper's table: its centroids are identified with nothing known but time and place, and the numbers that come out
-//!    are held against the paper's.
-//! 3. Frames are simulated with the experiment's camera, sky and exposure, at the pointing and the pixel scale of its
-//!    table, each moved by a part of a pixel and with noise of its own, and go through the pipeline with nothing known. Of
-//!    each the faintest star named is held against the faintest to be expected of the very stars that are on it.
+//! 1. The limiting magnitude of the sensitivity model in the paper's reading is compared with the
+//!    printed one, and with that of this detector.
+//! 2. The centroids of the paper's table are identified without priors but time and site, and the
+//!    identified stars are compared with the paper's.
+//! 3. Frames are simulated with the experiment's camera, sky and exposure, at the pointing and
+//!    pixel scale of its table, each with its own subpixel shift and noise, and solved without
+//!    priors. The faintest identified star of each is compared with the expected one for the stars
+//!    on the frame.
 //!
-//! Caveats: the stars of the frames are those of the catalogue that they are identified with; the true sky has more
-//! faint ones, and they would disturb. The pixels are square and have the scale of the paper's own table, which is not that of
-//! the pitches that the paper states. The zenith distance, as stated, makes the extinction, though site, time and pointing
-//! contradict it.
+//! Caveats: the simulated stars are those of the catalogue used to identify them; the true sky has
+//! more faint stars, which would disturb. Pixels are square with the scale of the paper's table,
+//! which is not that of the stated pixel pitches. The extinction is that of the stated zenith
+//! distance, though it contradicts site, time and pointing.
 //!
 //! # Reference
 //! Tong, Li & Wang 2014, Acta Optica Sinica 34, 1004003, doi 10.3788/AOS201434.1004003.
 
 mod published;
+mod report;
 mod simulated;
 mod summary;
 mod table;
 mod text;
 
 pub use published::{Published, PublishedStar};
+pub use report::{ExperimentReport, LimitReport, SCHEMA};
+pub use simulated::ExperimentError;
 pub use summary::{CompletenessBin, ExpectedFaintest, FoundFaintest, SimulatedReport};
 pub use table::{FieldReport, TableReport, TableStar};
 
-use crate::base::format::to_decimals;
-use crate::detect::DetectError;
-use crate::frame::{Frame, FrameError};
+use crate::frame::Frame;
 use crate::identify::{DateSource, FrameDate, IndexedCatalog, Priors};
 use crate::model::sensitivity::{Budget, Detector, Rule, Scenario};
 use crate::model::simulate::{Pointing, Scene, Simulator};
 use crate::pipeline::{Context, Solution, Workspace, solve_centroids};
-use serde::Serialize;
-use simulated::Protocol;
+use simulated::Simulation;
 
-/// Version of the JSON described here.
-pub const SCHEMA: u32 = 1;
-
-/// Why an experiment cannot be done.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ExperimentError {
-    /// No such frame can be.
-    #[error("simulating a frame")]
-    Simulate(#[from] FrameError),
-    /// No such frame can be examined.
-    #[error("detecting stars in a simulated frame")]
-    Detect(#[from] DetectError),
-}
-
-/// How often, and from which random numbers on.
+/// Number of simulated frames, and their seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Trials {
     /// Frames to simulate.
@@ -62,71 +48,20 @@ pub struct Trials {
     pub seed: u64,
 }
 
-/// What came of an experiment.
+/// The result of an experiment.
 #[derive(Debug)]
 pub struct Run {
-    /// What is told of it.
+    /// The report.
     pub report: ExperimentReport,
-    /// The first frame simulated and what was found in it; none where the paper's table was not identified.
+    /// The first simulated frame with its solution; `None` where the paper's table was not
+    /// identified.
     pub first: Option<(Frame, Solution)>,
 }
 
-/// What is told of an experiment.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ExperimentReport {
-    /// [`SCHEMA`].
-    pub schema: u32,
-    /// Its number in the paper.
-    pub experiment: u8,
-    /// When its frame was taken, ISO 8601, in UTC.
-    pub date: String,
-    /// Latitude of where it was taken, in degrees, north positive.
-    pub site_lat_deg: f64,
-    /// Longitude, in degrees, east positive.
-    pub site_lon_deg: f64,
-    /// Exposure, in seconds.
-    pub exposure_s: f64,
-    /// How faint stars may be.
-    pub limit: LimitReport,
-    /// The paper's stars.
-    pub table: TableReport,
-    /// Frames like the paper's; none where its stars are not identified, so that the pointing is not known.
-    pub simulated: Option<SimulatedReport>,
-}
-
-/// How faint stars may be, in V.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LimitReport {
-    /// By the paper's equations.
-    pub limit_vmag: f64,
-    /// The same as the paper prints it.
-    pub paper_limit_vmag: f64,
-    /// The faintest star of the paper's table.
-    pub paper_faintest_vmag: f64,
-    /// Of the detector as built: half of the stars of this magnitude are found.
-    pub detector_limit_vmag: f64,
-}
-
-impl ExperimentReport {
-    /// Whether the paper's stars and every simulated frame are identified.
-    pub fn is_identified(&self) -> bool {
-        let all = |simulated: &SimulatedReport| simulated.frames_identified == simulated.frames;
-        self.simulated.as_ref().is_some_and(all)
-    }
-
-    /// The report as one line of JSON, without the line's end.
-    ///
-    /// # Errors
-    /// [`serde_json::Error`], which these types give no occasion for.
-    pub fn to_json_line(&self) -> Result<String, serde_json::Error> {
-        serde_json::to_string(self)
-    }
-}
-
-/// Does the experiment, its frames on the threads of the current pool; `done` is called after each.
+/// Runs the experiment, its frames on the threads of the current pool; `done` is called after each.
 ///
 /// # Errors
-/// [`ExperimentError`], for which the paper's camera gives no occasion.
+/// [`ExperimentError`], which does not occur with the paper's cameras.
 pub fn run(
     published: &Published,
     indexed: &IndexedCatalog,
@@ -136,18 +71,7 @@ pub fn run(
     let scenario = Scenario::of(published.preset);
     let budget = Budget::new(&scenario);
     let detector = Detector::new(Rule::MatchedFilter, &scenario, &budget);
-    let priors = Priors {
-        date: Some(FrameDate {
-            date: published.date,
-            source: DateSource::Option,
-        }),
-        site: Some(published.site),
-        ..Priors::default()
-    };
-    let context = Context {
-        priors,
-        ..Context::new(indexed)
-    };
+    let context = context(published, indexed);
     let solution = solve_centroids(&table::centroids(published, &scenario), &context);
     let mut report = ExperimentReport {
         schema: SCHEMA,
@@ -156,12 +80,7 @@ pub fn run(
         site_lat_deg: published.site.lat_deg(),
         site_lon_deg: published.site.lon_deg(),
         exposure_s: scenario.conditions.exposure_s,
-        limit: LimitReport {
-            limit_vmag: to_decimals(budget.limit_vmag, 3),
-            paper_limit_vmag: published.limit_vmag,
-            paper_faintest_vmag: published.faintest_vmag,
-            detector_limit_vmag: to_decimals(detector.vmag_at(0.5), 3),
-        },
+        limit: LimitReport::new(published, &budget, &detector),
         table: TableReport::new(published, &scenario, &solution, indexed.catalog()),
         simulated: None,
     };
@@ -173,7 +92,7 @@ pub fn run(
     };
     let stars = indexed.catalog().stars();
     let simulator = Simulator::new(&scenario, &Scene::default(), stars)?;
-    let protocol = Protocol {
+    let simulation = Simulation {
         scenario: &scenario,
         simulator: &simulator.with_camera(found.camera),
         detectors: [
@@ -187,12 +106,28 @@ pub fn run(
         context: &context,
         seed: trials.seed,
     };
-    let simulated = protocol.run(trials.count, done)?;
+    let simulated = simulation.run(trials.count, done)?;
     report.simulated = Some(SimulatedReport::new(&simulated, &detector, trials.seed));
-    let (frame, _) = protocol.frame(0)?;
-    let solution = protocol.solve(&frame, &mut Workspace::new())?;
+    let (frame, _) = simulation.frame(0)?;
+    let solution = simulation.solve(&frame, &mut Workspace::new())?;
     Ok(Run {
         report,
         first: Some((frame, solution)),
     })
+}
+
+/// The context of the identification: date and site are known.
+fn context<'a>(published: &Published, indexed: &'a IndexedCatalog<'a>) -> Context<'a> {
+    let date = FrameDate {
+        date: published.date,
+        source: DateSource::Option,
+    };
+    Context {
+        priors: Priors {
+            date: Some(date),
+            site: Some(published.site),
+            ..Priors::default()
+        },
+        ..Context::new(indexed)
+    }
 }

@@ -1,4 +1,4 @@
-//! What the paper says of its experiments.
+//! The paper's data of its experiments.
 
 use crate::base::coords::PixelPoint;
 use crate::base::epoch::ObservationDate;
@@ -11,21 +11,21 @@ use serde::Deserialize;
 pub struct Published {
     /// Its number in the paper.
     pub number: u8,
-    /// Its camera, and with it exposure, sky and zenith distance.
+    /// Its camera, with exposure, sky and zenith distance.
     pub preset: Preset,
-    /// When the frame was taken.
+    /// Date of the frame.
     pub date: ObservationDate,
-    /// Where it was taken.
+    /// Site.
     pub site: Site,
-    /// The limit that the paper computes: V, eq. (13) and (14).
+    /// The limiting magnitude that the paper computes: V, eq. (13) and (14).
     pub limit_vmag: f64,
-    /// The faintest star that it found: V.
+    /// The faintest star that it found, in V.
     pub faintest_vmag: f64,
     /// The stars of its table.
     pub stars: Vec<PublishedStar>,
 }
 
-/// A row of table 3 or 4.
+/// A star of table 3 or 4.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct PublishedStar {
     /// Its number in SKY2000.
@@ -39,14 +39,14 @@ pub struct PublishedStar {
 }
 
 impl PublishedStar {
-    /// Its centroid.
+    /// Position of its centroid.
     pub fn position(&self) -> PixelPoint {
         PixelPoint::new(self.x_px, self.y_px)
     }
 }
 
 impl Published {
-    /// Experiment 1 or 2; there is no other.
+    /// Experiment 1 or 2; `None` for other numbers.
     ///
     /// # Reference
     /// Tong, Li & Wang 2014, section 2.2.
@@ -79,7 +79,7 @@ impl Published {
     }
 }
 
-/// The rows of a built-in table, which a test shows to be whole.
+/// The rows of a built-in table; a test checks that they are complete.
 fn rows(table: &str) -> Vec<PublishedStar> {
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_tables_are_whole_and_their_faintest_stars_are_the_papers() {
+    fn the_tables_are_complete_and_their_faintest_stars_are_the_papers() {
         let [first, second] = [1, 2].map(|number| Published::experiment(number).unwrap());
         assert_eq!((first.stars.len(), second.stars.len()), (7, 9));
         assert_eq!((first.faintest_vmag, second.faintest_vmag), (8.17, 8.97));

@@ -1,9 +1,9 @@
-//! Frames simulated with the experiment's camera, sky and pointing, and what the pipeline finds in them.
+//! Frames simulated with the experiment's camera, sky and pointing, and their solutions.
 
-use super::ExperimentError;
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::camera::CameraModel;
-use crate::frame::Frame;
+use crate::detect::DetectError;
+use crate::frame::{Frame, FrameError};
 use crate::identify::{Identification, StarMatch};
 use crate::model::sensitivity::{Detector, Faintest, Scenario};
 use crate::model::simulate::{Pointing, Simulator, Truth};
@@ -15,71 +15,83 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// The pointing of a trial is moved by up to so many pixels along each axis.
+/// Why an experiment cannot be run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExperimentError {
+    /// A frame cannot be simulated.
+    #[error("simulating a frame")]
+    Simulate(#[from] FrameError),
+    /// Stars cannot be detected in a simulated frame.
+    #[error("detecting stars in a simulated frame")]
+    Detect(#[from] DetectError),
+}
+
+/// Largest shift of the pointing along each axis, in pixels.
 pub(super) const SHIFT_PX: f64 = 0.5;
 
-/// What is simulated, again and again.
-pub(super) struct Protocol<'a> {
+/// The simulation of frames like the paper's.
+pub(super) struct Simulation<'a> {
     pub scenario: &'a Scenario,
     pub simulator: &'a Simulator<'a>,
-    /// The detector as built, and the paper's rule of the brightest pixel.
+    /// This detector, and the paper's rule of the brightest pixel.
     pub detectors: [&'a Detector; 2],
     pub pointing: &'a Pointing,
     pub context: &'a Context<'a>,
     pub seed: u64,
 }
 
-/// What became of one simulated frame.
+/// The result of one simulated frame.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Trial {
-    /// The catalogue's stars on it, faint ones without a chance included.
-    pub stars: Vec<StarTrial>,
-    /// What is to be expected of the faintest: of the detector as built, and by the paper's rule.
+pub(super) struct FrameResult {
+    /// The catalogue stars on the frame, also those too faint to be found.
+    pub stars: Vec<StarResult>,
+    /// The expected faintest star: for this detector, and by the paper's rule.
     pub expected: [Option<Faintest>; 2],
-    /// What was identified; none where the frame was not.
-    pub identified: Option<Identified>,
+    /// The identified stars; `None` where the frame is not identified.
+    pub identified: Option<IdentifiedStars>,
 }
 
-/// What became of a star.
+/// The result of one star.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct StarTrial {
+pub(super) struct StarResult {
     pub v_mag: f64,
-    /// There is a detection that may be a star, whose light is more this star's than all others'.
+    /// Whether a star-like detection has more of its light from this star than from all others.
     pub detected: bool,
-    /// It was named.
+    /// Whether it was identified.
     pub identified: bool,
 }
 
-/// What was identified in a frame.
+/// The identified stars of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Identified {
-    /// Stars named at the light of another star, or of none.
+pub(super) struct IdentifiedStars {
+    /// Number of stars identified at the light of another star, or of none.
     pub wrong: usize,
-    /// V of the faintest star named.
+    /// V magnitude of the faintest identified star.
     pub faintest_vmag: f64,
-    /// Whether that one is wrong.
+    /// Whether that star is wrong.
     pub faintest_is_wrong: bool,
 }
 
-impl Protocol<'_> {
-    /// So many trials on the threads of the current pool, in their order.
+impl Simulation<'_> {
+    /// Simulates and solves `frames` frames on the threads of the current pool, in order.
     pub(super) fn run(
         &self,
-        trials: u64,
+        frames: u64,
         done: &(dyn Fn() + Sync),
-    ) -> Result<Vec<Trial>, ExperimentError> {
-        (0..trials)
+    ) -> Result<Vec<FrameResult>, ExperimentError> {
+        (0..frames)
             .into_par_iter()
             .map_init(Workspace::new, |workspace, number| {
                 let (frame, truth) = self.frame(number)?;
                 let solution = self.solve(&frame, workspace)?;
                 done();
-                Ok(self.judged(&truth, &solution, self.context.indexed.catalog()))
+                Ok(self.evaluate(&truth, &solution, self.context.indexed.catalog()))
             })
             .collect()
     }
 
-    /// The frame of one trial; its random numbers depend on the seed and its own number only.
+    /// Frame number `number`; its random numbers depend only on the seed and this number.
     pub(super) fn frame(&self, number: u64) -> Result<(Frame, Truth), ExperimentError> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         random.set_stream(number);
@@ -99,7 +111,7 @@ impl Protocol<'_> {
         Ok(solve_frame(frame, self.context, workspace)?)
     }
 
-    fn judged(&self, truth: &Truth, solution: &Solution, catalog: &Catalog) -> Trial {
+    fn evaluate(&self, truth: &Truth, solution: &Solution, catalog: &Catalog) -> FrameResult {
         let light = LightMap::of(self.scenario, truth);
         let star_like = |source: &&Source| source.measured.is_some_and(|m| m.flags.is_star_like());
         let owners: Vec<StarIndex> = solution
@@ -113,14 +125,14 @@ impl Protocol<'_> {
         let named = |star: StarIndex| {
             found.is_some_and(|found| found.matches.iter().any(|m| m.star == star))
         };
-        let trials = truth.stars.iter().map(|star| StarTrial {
+        let stars = truth.stars.iter().map(|star| StarResult {
             v_mag: star.v_mag,
             detected: star.catalog.is_some_and(|star| owners.contains(&star)),
             identified: star.catalog.is_some_and(named),
         });
         let v_mags = || truth.stars.iter().map(|star| star.v_mag);
-        Trial {
-            stars: trials.collect(),
+        FrameResult {
+            stars: stars.collect(),
             expected: self
                 .detectors
                 .map(|detector| Faintest::among(v_mags(), detector)),
@@ -129,7 +141,7 @@ impl Protocol<'_> {
     }
 }
 
-/// The attitude with which every star falls so many pixels further along x and y, near the frame's centre.
+/// The attitude that moves all stars by `dx`, `dy` pixels near the frame's centre.
 fn shifted(
     pointing: &Pointing,
     camera: &CameraModel,
@@ -142,20 +154,20 @@ fn shifted(
         .then_turn(Vector3::new(-radian(dy), radian(dx), 0.0))
 }
 
-/// What was named, rightly and wrongly.
+/// Evaluates the identified stars.
 fn identified(
     found: &Identification,
     solution: &Solution,
     light: &LightMap,
     catalog: &Catalog,
-) -> Option<Identified> {
+) -> Option<IdentifiedStars> {
     let is_wrong = |m: &StarMatch| {
         let owner = light.owner(&solution.source(m.source).position);
         owner.is_none_or(|star| star.catalog != Some(m.star))
     };
-    // The catalogue is in the order of magnitude.
+    // The catalogue is sorted by magnitude.
     let faintest = found.matches.iter().max_by_key(|m| m.star)?;
-    Some(Identified {
+    Some(IdentifiedStars {
         wrong: found.matches.iter().filter(|m| is_wrong(m)).count(),
         faintest_vmag: f64::from(catalog.star(faintest.star).v_mag),
         faintest_is_wrong: is_wrong(faintest),

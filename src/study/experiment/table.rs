@@ -1,6 +1,6 @@
-//! The paper's stars, identified from its centroids.
+//! The stars of the paper's table, identified from its centroids.
 
-use super::{Published, PublishedStar};
+use super::published::{Published, PublishedStar};
 use crate::base::coords::PixelPoint;
 use crate::base::format::to_decimals;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
@@ -10,29 +10,29 @@ use crate::pipeline::{CentroidList, ListedCentroid, Solution};
 use crate::sky::catalog::{Catalog, StarId, StarIndex};
 use serde::Serialize;
 
-/// The paper's table, and what became of it.
+/// The result of the paper's table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TableReport {
-    /// Stars that have the paper's number.
+    /// Number of stars identified with the paper's number.
     pub right: usize,
     /// The stars in the paper's order.
     pub stars: Vec<TableStar>,
-    /// Where the frame's centre is, and how good the identification; none where there is none.
+    /// The frame's centre, and the quality of the identification; `None` where not identified.
     pub field: Option<FieldReport>,
-    /// Zenith distance of the centre as the paper states it, in degrees.
+    /// Stated zenith distance of the centre, in degrees.
     pub stated_zenith_distance_deg: f64,
-    /// The same, without refraction, from site, time and the centre found.
+    /// Zenith distance, without refraction, from site, time and centre, in degrees.
     pub zenith_distance_deg: Option<f64>,
-    /// The limit by the paper's equations at that zenith distance, in V, where it is above the horizon.
+    /// The limit from the paper's equations at that zenith distance, in V, if above the horizon.
     pub limit_there_vmag: Option<f64>,
 }
 
 /// A star of the paper's table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TableStar {
-    /// The paper's number for it, of SKY2000.
+    /// Its SKY2000 number in the paper.
     pub paper_id: String,
-    /// The number of the catalogue's star found for its centroid.
+    /// The number of the star identified for its centroid.
     pub found_id: Option<String>,
     /// V magnitude, from the paper.
     pub vmag: f64,
@@ -40,11 +40,11 @@ pub struct TableStar {
     pub x_px: f64,
     /// Row of its centroid, in pixels.
     pub y_px: f64,
-    /// Distance between the centroid and the star's predicted place, in pixels.
+    /// Distance between its centroid and its predicted position, in pixels.
     pub residual_px: Option<f64>,
 }
 
-/// Where the paper's camera pointed.
+/// The field of the paper's camera.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FieldReport {
     /// Right ascension of the frame's centre, in degrees.
@@ -53,21 +53,22 @@ pub struct FieldReport {
     pub dec_deg: f64,
     /// Position angle of image-up there, from north through east, in degrees.
     pub up_pa_deg: f64,
-    /// Angle that a pixel spans at the centre.
+    /// Pixel scale at the centre, in arcseconds.
     pub pixel_scale_arcsec: f64,
-    /// Whether the image is reversed left to right.
+    /// Whether the image is mirrored.
     pub mirrored: bool,
     /// Root mean square of the residuals, in pixels.
     pub rms_px: f64,
-    /// log10 of the probability that chance does as well.
+    /// log10 of the false-alarm probability.
     pub log10_false_alarm: f64,
-    /// Catalogue stars, as bright as the paper's faintest or brighter, in the rectangle that its centroids span.
+    /// Number of catalogue stars in the rectangle of its centroids that are not fainter than its
+    /// faintest star.
     pub stars_as_bright: usize,
-    /// V magnitude of the brightest of them that the paper does not list.
+    /// V magnitude of the brightest of them that is not in the table.
     pub brightest_unlisted_vmag: Option<f64>,
 }
 
-/// The list that the paper's table is.
+/// The list of centroids in the paper's table.
 pub(super) fn centroids(published: &Published, scenario: &Scenario) -> CentroidList {
     let listed = published.stars.iter().map(|star| ListedCentroid {
         position: star.position(),
@@ -145,7 +146,7 @@ impl FieldReport {
     }
 }
 
-/// The limit of `scenario` at another zenith distance; none below the horizon.
+/// The limit of `scenario` at another zenith distance; `None` below the horizon.
 fn limit_at(scenario: &Scenario, zenith_distance_deg: f64) -> Option<f64> {
     let mut there = scenario.clone();
     there.conditions.zenith_distance_deg = zenith_distance_deg;
@@ -157,10 +158,15 @@ fn v_mag(catalog: &Catalog, star: StarIndex) -> f64 {
     to_decimals(f64::from(catalog.star(star).v_mag), 3)
 }
 
-/// The catalogue's stars that stand among the paper's centroids and are not fainter than the faintest, brightest first.
+/// The catalogue stars in the rectangle of the paper's centroids that are not fainter than its
+/// faintest star, brightest first.
 ///
-/// How far the paper's frame reached beyond its centroids is not known.
+/// The frame's size beyond the centroids is not known.
 fn stars_among(published: &Published, found: &Identification, catalog: &Catalog) -> Vec<StarIndex> {
+    /// Border of the rectangle, so that the paper's own stars at its edge lie within it.
+    const BORDER_PX: f64 = 2.0;
+    /// Rounding error of the paper's magnitudes, which have two decimals.
+    const ROUNDING_MAG: f64 = 0.005;
     let positions = || published.stars.iter().map(PublishedStar::position);
     let bounds = |axis: fn(PixelPoint) -> f64| {
         let values = || positions().map(axis);
@@ -176,14 +182,9 @@ fn stars_among(published: &Published, found: &Identification, catalog: &Catalog)
             .pixel_of(&found.icrs_to_camera.apply(&direction));
         place.is_some_and(|p| columns.contains(&p.x) && rows.contains(&p.y))
     };
-    let as_bright = catalog.brighter_than(published.faintest_vmag + HALF_A_DIGIT_MAG);
+    let as_bright = catalog.brighter_than(published.faintest_vmag + ROUNDING_MAG);
     (0..as_bright)
         .map(StarIndex::new)
         .filter(is_among)
         .collect()
 }
-
-/// The paper's own stars at the edge of the rectangle are within it in spite of their residuals.
-const BORDER_PX: f64 = 2.0;
-/// The paper's magnitudes have two decimals.
-const HALF_A_DIGIT_MAG: f64 = 0.005;

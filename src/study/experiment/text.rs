@@ -1,11 +1,10 @@
-//! An experiment for people: one page.
+//! The report of an experiment as text: one page.
 
-use super::{ExperimentReport, LimitReport, SimulatedReport, TableReport};
+use super::report::{ExperimentReport, LimitReport};
+use super::summary::SimulatedReport;
+use super::table::TableReport;
 use crate::base::format::{degrees, hours};
 use std::fmt::Write as _;
-
-/// Zenith distances that differ by more than this, in degrees, are not those of one direction.
-const CONTRADICTION_DEG: f64 = 1.0;
 
 impl ExperimentReport {
     /// The report as text of several lines, each with its end.
@@ -83,8 +82,9 @@ fn table_text(table: &TableReport) -> String {
     text
 }
 
-/// Whether the zenith distance can be as the paper has it.
+/// Compares the stated zenith distance with that of site, time and centre.
 fn zenith_text(table: &TableReport) -> String {
+    const TOLERANCE_DEG: f64 = 1.0;
     let Some(found_deg) = table.zenith_distance_deg else {
         return String::new();
     };
@@ -96,14 +96,14 @@ fn zenith_text(table: &TableReport) -> String {
         Some(v_mag) => format!("; there, the limit is V {v_mag:.2}"),
         None => String::new(),
     };
-    if (found_deg - stated_deg).abs() > CONTRADICTION_DEG {
+    if (found_deg - stated_deg).abs() > TOLERANCE_DEG {
         format!("{both}: they contradict each other{limit}\n")
     } else {
         format!("{both}\n")
     }
 }
 
-/// What the paper could have listed and did not.
+/// The stars missing in the paper's table.
 fn unlisted_text(table: &TableReport) -> String {
     let Some(field) = &table.field else {
         return String::new();
@@ -174,7 +174,7 @@ fn simulated_text(simulated: &SimulatedReport, limit: &LimitReport, paper_stars:
     text
 }
 
-/// What part of the stars is found, by magnitude.
+/// Share of stars found, by magnitude.
 fn completeness_text(simulated: &SimulatedReport) -> String {
     let mut text = format!(
         "\n  {:<14} {:>8} {:>9} {:>9} {:>9}\n",

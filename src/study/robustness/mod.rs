@@ -1,24 +1,24 @@
 //! How often is an identification right, wrong, or not possible? The usual Monte Carlo protocol.
 //!
-//! [`Protocol`] → for each trial a list of centroids drawn from the catalogue → identification as in
-//! `starpipe identify` → [`TrialResult`] → [`TrialResults`] → [`CaseResult`]
+//! [`Protocol`] → for each trial a list of centroids drawn from the catalogue → identification as
+//! in `starpipe identify` → [`TrialResult`] → [`TrialResults`] → [`CaseResult`]
 //!
 //! 1. The attitude is uniform over all rotations; the camera is a pinhole.
 //! 2. The stars of a frame are the catalogue stars whose observed magnitude lies above a limit. The
 //!    limit is the same over the whole sky, so rich and poor fields are as frequent as on the sky.
-//! 3. Positions and magnitudes get Gaussian errors. Some stars are removed whatever their brightness,
-//!    and false stars are added uniformly, with the magnitudes of true ones.
+//! 3. Positions and magnitudes get Gaussian errors. Some stars are removed whatever their
+//!    brightness, and false stars are added uniformly, with the magnitudes of true ones.
 //! 4. The scale prior is off by up to its stated error, or there is none.
-//! 5. A trial is right, wrong or without an answer. Its random numbers depend only on the seed and its
-//!    own number: results do not depend on the number of threads, and all rows of a table have the
-//!    same attitudes.
+//! 5. A trial is right, wrong or without an answer. Its random numbers depend only on the seed and
+//!    its own number: results do not depend on the number of threads, and all rows of a table have
+//!    the same attitudes.
 //!
 //! Caveats: the stars come from the catalogue that is searched, so only the false stars stand for
 //! stars that it lacks; double stars are not merged.
 //!
 //! # Reference
-//! Rijlaarsdam, Yous, Byrne, Oddenino, Furano, Moloney 2020, Sensors 20, 2579 (what to report and to
-//! state with it).
+//! Rijlaarsdam, Yous, Byrne, Oddenino, Furano, Moloney 2020, Sensors 20, 2579 (what to report and
+//! to state with it).
 
 mod centroids;
 mod interval;
@@ -38,7 +38,8 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::time::Instant;
 
-/// Runs `trials` trials of `protocol` on the threads of the current pool; `done` is called after each.
+/// Runs `trials` trials of `protocol` on the threads of the current pool; `done` is called after
+/// each.
 pub fn run(
     indexed: &IndexedCatalog,
     protocol: &Protocol,
