@@ -727,7 +727,7 @@ fn bad_records_are_reported_below_one_percent_and_refused_above() {
     );
     assert!(
         ran.stderr
-            .contains("not every one of 300 records is a star: 1 without a magnitude"),
+            .contains("not all of its 300 records are stars: 1 without a magnitude"),
         "{}",
         ran.stderr
     );

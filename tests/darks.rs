@@ -316,7 +316,7 @@ fn exposures_can_be_given_and_csv_rows_are_frames() {
     assert_eq!(done.status, 2);
     assert!(
         done.stderr
-            .contains("--exposure is given for elsewhere, of which no frame is given"),
+            .contains("--exposure names elsewhere, but no frame of it is given"),
         "{}",
         done.stderr
     );

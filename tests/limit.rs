@@ -750,7 +750,7 @@ fn a_camera_is_not_overwritten_without_force() {
     let refused = new(&[]);
     assert_eq!(refused.status, 2);
     assert!(
-        refused.stderr.contains("is there already; --force"),
+        refused.stderr.contains("exists; --force"),
         "{}",
         refused.stderr
     );

@@ -1,14 +1,14 @@
-//! Many inputs at once, their results in the order given.
+//! Parallel work on many inputs, with results in input order.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 
-/// Applies `work` to every item on the threads of `pool`, and hands each result to `take` on this thread, in
-/// the order of the items, as soon as it and all before it are there. `take` may end it early.
+/// Applies `work` to all items on the threads of `pool`, and hands the results to `take` on this thread, in the
+/// order of the items and as early as that order allows. If `take` breaks, the remaining items are skipped.
 ///
-/// Every thread has a state of its own, made by `state`, for buffers that are worth keeping.
+/// `state` makes a state for each thread, such as buffers to reuse.
 pub(crate) fn for_each_ordered<T: Sync, S, R: Send>(
     pool: &rayon::ThreadPool,
     items: &[T],
@@ -38,16 +38,16 @@ pub(crate) fn for_each_ordered<T: Sync, S, R: Send>(
             scope.spawn(move |_| worker(sender));
         }
         drop(sender);
-        let mut early = BTreeMap::new();
-        let mut due = 0;
+        let mut waiting = BTreeMap::new();
+        let mut next = 0;
         for (position, result) in receiver {
-            early.insert(position, result);
-            while let Some(result) = early.remove(&due) {
-                if take(&items[due], result).is_break() {
+            waiting.insert(position, result);
+            while let Some(result) = waiting.remove(&next) {
+                if take(&items[next], result).is_break() {
                     stopped.store(true, Ordering::Relaxed);
                     return;
                 }
-                due += 1;
+                next += 1;
             }
         }
     });
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn results_come_in_the_order_of_the_items_whatever_takes_longest() {
+    fn results_come_in_input_order_however_long_each_takes() {
         let items: Vec<u64> = (0..40).collect();
         for threads in [1, 2, 7] {
             let mut seen = Vec::new();
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn an_early_end_leaves_the_rest() {
+    fn no_results_come_after_a_break() {
         let items: Vec<usize> = (0..1000).collect();
         let mut seen = 0;
         for_each_ordered(
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_do_is_done_at_once() {
+    fn no_items_are_no_work() {
         let none: [u8; 0] = [];
         for_each_ordered(
             &pool(2),

@@ -1,18 +1,52 @@
-//! How a command ends: what it prints, its exit status, its errors.
+//! How a command ends: its output, its exit status, its errors.
 
+use std::fmt::Display;
 use std::process::ExitCode;
 
-/// How a run ended.
+/// Result of a command: what is still to be printed on standard output, and the exit status.
+pub(crate) struct Outcome {
+    pub(crate) text: String,
+    pub(crate) exit: Exit,
+}
+
+impl Outcome {
+    /// Success, with `text` to print.
+    pub(crate) fn success(text: String) -> Self {
+        Self {
+            text,
+            exit: Exit::Success,
+        }
+    }
+}
+
+impl From<Exit> for Outcome {
+    /// Nothing is left to print.
+    fn from(exit: Exit) -> Self {
+        Self {
+            text: String::new(),
+            exit,
+        }
+    }
+}
+
+/// Exit status of the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Exit {
-    /// All went well, and every frame was identified.
+    /// Everything succeeded, and every frame was identified.
     Success,
     /// Something could not be read, written or understood.
     Failure,
-    /// Everything was read, but some frame was not identified.
+    /// Everything was read, but at least one frame was not identified.
     NotIdentified,
-    /// All was done, but there is nothing that meets what is required.
+    /// The work is done, but no result meets the requirement.
     Unmet,
+}
+
+impl Exit {
+    /// [`Exit::Failure`] if something failed, else [`Exit::Success`].
+    pub(crate) fn of(failed: bool) -> Self {
+        if failed { Self::Failure } else { Self::Success }
+    }
 }
 
 impl From<Exit> for ExitCode {
@@ -20,22 +54,29 @@ impl From<Exit> for ExitCode {
         Self::from(match exit {
             Exit::Success => 0,
             Exit::Failure => 1,
-            // clap leaves with 2 where the command line is wrong.
+            // clap exits with 2 if the command line is wrong.
             Exit::NotIdentified | Exit::Unmet => 3,
         })
     }
 }
 
-/// Why a command could not do its work.
+/// Why a command stopped.
 pub(crate) enum CommandError {
-    /// The command line is wrong, in a way that only shows when it is read as a whole.
+    /// The command line is wrong: options contradict each other, or the files that they name.
     Usage(String),
     /// Anything else.
     Failed(anyhow::Error),
 }
 
-impl From<anyhow::Error> for CommandError {
-    fn from(error: anyhow::Error) -> Self {
-        Self::Failed(error)
+impl CommandError {
+    /// The command line is wrong.
+    pub(crate) fn usage(message: impl Display) -> Self {
+        Self::Usage(message.to_string())
+    }
+}
+
+impl<E: Into<anyhow::Error>> From<E> for CommandError {
+    fn from(error: E) -> Self {
+        Self::Failed(error.into())
     }
 }

@@ -1,14 +1,12 @@
-//! `experiment`: the paper's experiments, done again.
+//! `experiment`: repeats the experiments of the sensitivity paper.
 
-use super::exit::{CommandError, Exit};
+use super::exit::{CommandError, Exit, Outcome};
 use super::options::catalog::CatalogOptions;
-use super::options::catalog::{index_catalog, read_catalog, thread_pool, warn_of_cache};
 use super::options::format::PageFormat;
-use super::output::files::write_whole;
+use super::output::files::{make_directory, write_whole};
 use super::output::overwrite;
 use super::output::paths::output_path;
-use super::output::stdout::print;
-use super::progress::bar;
+use super::progress::frames_bar;
 use anyhow::Context;
 use clap::Args;
 use starpipe::identify::IndexedCatalog;
@@ -22,71 +20,71 @@ use std::path::{Path, PathBuf};
     starpipe experiment 2 --trials 200 --format json > experiment-2.json\n  \
     starpipe experiment 1 --out results\n\n\
     The paper is Tong, Li & Wang, Acta Optica Sinica 34, 1004003 (2014). The frames are simulated \
-    with its camera and sky at the pointing of its table of stars, and identified with nothing \
-    known. The stars have numbers of SKY2000: with another --catalog they are found under other numbers.")]
+    with its camera and sky at the pointing of its table of stars, and identified without hints. \
+    The stars have SKY2000 numbers: with another --catalog they have other numbers.")]
 pub(crate) struct ExperimentArgs {
-    /// Which of the paper's two
+    /// Which of the paper's two experiments
     #[arg(value_name = "1|2", value_parser = clap::value_parser!(u8).range(1..=2))]
-    pub(crate) number: u8,
+    number: u8,
     /// Frames to simulate
     #[arg(long, value_name = "NUMBER", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=100_000))]
-    pub(crate) trials: u64,
+    trials: u64,
     /// Seed of the random numbers
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
-    pub(crate) seed: u64,
+    seed: u64,
     /// What to print
     #[arg(long, value_enum, default_value_t = PageFormat::Text)]
-    pub(crate) format: PageFormat,
-    /// Also write, into this directory, the first frame simulated as experiment-1.png or -2.png, its stars ringed and named
+    format: PageFormat,
+    /// Also write the first simulated frame, its stars marked and named, as experiment-1.png or -2.png into this directory
     #[arg(long, value_name = "DIR")]
-    pub(crate) out: Option<PathBuf>,
+    out: Option<PathBuf>,
     #[command(flatten)]
-    pub(crate) resources: CatalogOptions,
+    catalog: CatalogOptions,
 }
 
 /// `starpipe experiment`
-pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Exit, CommandError> {
-    let Some(published) = Published::experiment(arguments.number) else {
-        return Err(CommandError::Usage(
-            "the paper has experiments 1 and 2".into(),
-        ));
-    };
+pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Outcome, CommandError> {
+    let published = Published::experiment(arguments.number)
+        .ok_or_else(|| CommandError::usage("the paper has experiments 1 and 2"))?;
     let name = PathBuf::from(format!("experiment-{}", published.number));
     if let Some(directory) = &arguments.out {
         overwrite::check(std::slice::from_ref(&name), directory, &["png"])?;
-        std::fs::create_dir_all(directory)
-            .with_context(|| format!("making the directory {}", directory.display()))?;
+        make_directory(directory)?;
     }
-    let pool = thread_pool(arguments.resources.threads)?;
-    let catalog = pool.install(|| read_catalog(arguments.resources.catalog.as_deref()))?;
-    let indexed = pool.install(|| index_catalog(&catalog, &arguments.resources));
     let trials = Trials {
         count: arguments.trials,
         seed: arguments.seed,
     };
-    let progress = bar(trials.count, "frames {wide_bar} {pos}/{len} {eta}");
-    let done = pool.install(|| run(&published, &indexed, trials, &|| progress.inc(1)));
-    progress.finish_and_clear();
-    warn_of_cache(&indexed);
-    let done = done.map_err(anyhow::Error::from)?;
-    if let Some(directory) = &arguments.out {
-        save(&done, &indexed, directory, &name)?;
-    }
-    let text = match arguments.format {
-        PageFormat::Text => done.report.to_text(),
-        PageFormat::Json => done.report.to_json_line().context("writing JSON")? + "\n",
-    };
-    // Nobody left to read it: nothing is lost.
-    let _ = print(&text)?;
-    Ok(if done.report.is_identified() {
-        Exit::Success
-    } else {
-        Exit::NotIdentified
+    let report = arguments.catalog.with_index(|pool, indexed| {
+        let progress = frames_bar(trials.count);
+        let done = pool.install(|| run(&published, indexed, trials, &|| progress.inc(1)));
+        progress.finish_and_clear();
+        let done = done?;
+        if let Some(directory) = &arguments.out {
+            save_overlay(&done, indexed, directory, &name)?;
+        }
+        Ok(done.report)
+    })?;
+    Ok(Outcome {
+        text: match arguments.format {
+            PageFormat::Text => report.to_text(),
+            PageFormat::Json => report.to_json_line().context("writing JSON")? + "\n",
+        },
+        exit: if report.is_identified() {
+            Exit::Success
+        } else {
+            Exit::NotIdentified
+        },
     })
 }
 
-/// Draws the first frame, where there is one.
-fn save(done: &Run, indexed: &IndexedCatalog, directory: &Path, name: &Path) -> anyhow::Result<()> {
+/// Draws the first frame, if there is one.
+fn save_overlay(
+    done: &Run,
+    indexed: &IndexedCatalog,
+    directory: &Path,
+    name: &Path,
+) -> anyhow::Result<()> {
     let Some((frame, solution)) = &done.first else {
         return Ok(());
     };

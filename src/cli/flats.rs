@@ -1,128 +1,107 @@
-//! `flats`: evenly lit frames.
+//! `flats`: makes a master flat of evenly lit frames, and measures gain and response.
 
-use super::exit::{CommandError, Exit};
-use super::input::frames::{self as input, for_each_frame, read_master};
-use super::options::catalog::thread_pool;
+use super::exit::{CommandError, Exit, Outcome};
+use super::input::frames::{FrameList, for_each_frame, read_master};
 use super::options::format::Format;
-use super::output::files::save;
-use super::output::master::{header, image};
-use super::output::messages::{one_line, report_error, report_warning};
+use super::options::frames::FrameOptions;
+use super::options::threads::ThreadOptions;
+use super::output::files::write_into;
+use super::output::master::{fits_image, header};
+use super::output::messages::report_warning;
 use super::output::overwrite;
-use super::output::rows::csv_table;
-use super::output::stdout::print;
-use anyhow::Context;
+use super::output::rows::{csv_table, json_line};
 use clap::Args;
 use starpipe::calibration::flats::{FlatConfig, FlatStack, Flats};
 use starpipe::camera::data_sheet::DataSheet;
-use starpipe::frame::Buffers;
-use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use starpipe::frame::Frame;
+use std::path::{Path, PathBuf};
+
+/// The file that `--out` writes.
+const MASTER: &str = "master-flat.fits";
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     starpipe flats --dark master-dark.fits --out calibration flats/\n  \
     starpipe flats --camera camera.toml --format json dim-1.fits dim-2.fits bright-1.fits bright-2.fits\n\n\
-    --out writes master-flat.fits, with a mean of 1, which `starpipe process` takes as --flat. The first and the second frame \
-    are a pair of the same light, and so on: from the noise of such pairs follows the gain, from pairs of different \
-    light without knowing the read noise.")]
+    --out writes master-flat.fits, with a mean of 1, for the option --flat of `starpipe process`. The first and second \
+    frame are a pair with the same light, and so on: the gain follows from the noise of such pairs, and if they have \
+    different light, without knowing the read noise.")]
 pub(crate) struct FlatsArgs {
-    /// Evenly lit frames; a directory stands for the frames in it, - for standard input
-    #[arg(value_name = "FRAME", required = true)]
-    pub(crate) frames: Vec<PathBuf>,
-    /// Which image of a file with several, from 1 [default: the first]
-    #[arg(long, value_name = "NUMBER")]
-    pub(crate) page: Option<NonZeroUsize>,
-    /// Frame taken without light, or the mean of many, see `starpipe darks`
+    #[command(flatten)]
+    frames: FrameOptions,
+    /// Frame taken without light, or the mean of many; see `starpipe darks`
     #[arg(long, value_name = "FILE")]
-    pub(crate) dark: Option<PathBuf>,
-    /// Description of the camera, see `starpipe camera new`: its bias where there is no --dark, and its read noise
+    dark: Option<PathBuf>,
+    /// Description of the camera, see `starpipe camera new`: its bias if there is no --dark, and its read noise
     #[arg(long, value_name = "FILE.toml")]
-    pub(crate) camera: Option<PathBuf>,
+    camera: Option<PathBuf>,
     /// What to print: csv has a row for each frame
     #[arg(long, value_enum, default_value_t = Format::Text)]
-    pub(crate) format: Format,
+    format: Format,
     /// Also write master-flat.fits into this directory
     #[arg(long, value_name = "DIR")]
-    pub(crate) out: Option<PathBuf>,
-    /// Threads to work with [default: one for each processor]
-    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1024))]
-    pub(crate) threads: Option<u32>,
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    threads: ThreadOptions,
 }
 
 /// `starpipe flats`
-pub(crate) fn flats(arguments: FlatsArgs) -> Result<Exit, CommandError> {
-    input::check(&arguments.frames)?;
-    let (frames, troubles) = input::frames(arguments.frames.clone());
-    for trouble in &troubles {
-        report_error(one_line(trouble));
-    }
-    let output = arguments
-        .out
-        .as_ref()
-        .map(|directory| directory.join("master-flat.fits"));
-    if let Some(output) = &output {
+pub(crate) fn flats(arguments: FlatsArgs) -> Result<Outcome, CommandError> {
+    let (frames, failed) = FrameList::of(arguments.frames.frames.clone())?.reported();
+    if let Some(directory) = &arguments.out {
         let inputs: Vec<_> = frames.iter().chain(&arguments.dark).cloned().collect();
-        overwrite::check_results(&inputs, std::slice::from_ref(output))?;
+        overwrite::check_results(&inputs, &[directory.join(MASTER)])?;
     }
-    let pool = thread_pool(arguments.threads)?;
-    let mut stack = FlatStack::new(config(&arguments)?);
-    let read = |path: &PathBuf| -> anyhow::Result<_> {
-        let frame =
-            input::read_frame(path, arguments.page, &mut Buffers::new()).context("reading")?;
-        Ok((path.display().to_string(), frame))
-    };
-    let unread = for_each_frame(&pool, &frames, read, |(name, frame)| {
-        Ok(stack.add(&name, &frame)?)
-    })?;
+    let pool = arguments.threads.pool()?;
+    let mut stack = FlatStack::new(arguments.config()?);
+    let named = |path: &Path, frame: Frame| (path.display().to_string(), frame);
+    let take = |(name, frame): (String, Frame)| Ok(stack.add(&name, &frame)?);
+    let unread = for_each_frame(&pool, &frames, arguments.frames.page, named, take)?;
     if unread == frames.len() {
-        return Ok(Exit::Failure);
+        return Ok(Exit::Failure.into());
     }
-    let flats = stack.measure().map_err(anyhow::Error::from)?;
-    if let (Some(directory), Some(output)) = (&arguments.out, output) {
-        save(directory, &[(output, master(&flats, &arguments)?)])?;
+    let flats = stack.measure()?;
+    if let Some(directory) = &arguments.out {
+        let master = master(&flats, arguments.dark.as_deref())?;
+        write_into(directory, [(MASTER.to_owned(), master)])?;
     }
-    let text = match arguments.format {
-        Format::Text => flats.report().to_text(),
-        Format::Json => serde_json::to_string(&flats.report()).context("writing JSON")? + "\n",
-        Format::Csv => csv_table(flats.frame_rows())?,
-    };
-    // Nobody left to read it: nothing is lost.
-    let _ = print(&text)?;
-    let failed = unread > 0 || !troubles.is_empty();
-    Ok(if failed { Exit::Failure } else { Exit::Success })
-}
-
-fn config(arguments: &FlatsArgs) -> anyhow::Result<FlatConfig> {
-    let sheet = arguments
-        .camera
-        .as_deref()
-        .map(DataSheet::read)
-        .transpose()?;
-    let dark = arguments.dark.as_deref().map(read_master).transpose()?;
-    if sheet.is_none() && dark.is_none() {
-        report_warning(
-            "the level without light is taken to be 0: --dark or --camera says what it is",
-        );
-    }
-    Ok(FlatConfig {
-        dark: dark.map(|dark| (dark.name, dark.frame)),
-        bias_adu: sheet.as_ref().map_or(0.0, |sheet| sheet.bias_adu),
-        read_noise_e: sheet.map(|sheet| sheet.read_noise_e),
+    Ok(Outcome {
+        text: match arguments.format {
+            Format::Text => flats.report().to_text(),
+            Format::Json => json_line(&flats.report())?,
+            Format::Csv => csv_table(flats.frame_rows())?,
+        },
+        exit: Exit::of(failed || unread > 0),
     })
 }
 
-fn master(flats: &Flats, arguments: &FlatsArgs) -> anyhow::Result<Vec<u8>> {
+impl FlatsArgs {
+    fn config(&self) -> anyhow::Result<FlatConfig> {
+        let sheet = self.camera.as_deref().map(DataSheet::read).transpose()?;
+        let dark = self.dark.as_deref().map(read_master).transpose()?;
+        if sheet.is_none() && dark.is_none() {
+            report_warning("the level without light is assumed to be 0: give --dark or --camera");
+        }
+        Ok(FlatConfig {
+            dark: dark.map(|dark| (dark.name, dark.frame)),
+            bias_adu: sheet.as_ref().map_or(0.0, |sheet| sheet.bias_adu),
+            read_noise_e: sheet.map(|sheet| sheet.read_noise_e),
+        })
+    }
+}
+
+/// The master flat as a FITS file.
+fn master(flats: &Flats, dark: Option<&Path>) -> anyhow::Result<Vec<u8>> {
     let mut header = header("FLAT", flats.frames.len());
     if let Some(gain) = flats.gain {
         header.real("GAIN", gain.e_per_adu, "[e/ADU] by photon transfer");
     }
     header.real("RMS", flats.nonuniformity, "of the response, of its mean");
-    let dark = arguments.dark.as_ref();
     header.history(&format!(
         "Mean response of each pixel over {} frames, by starpipe flats {}; dark: {}",
         flats.frames.len(),
         env!("CARGO_PKG_VERSION"),
         dark.map_or("none".to_owned(), |dark| dark.display().to_string())
     ));
-    image((flats.width, flats.height), &flats.master, &header)
+    fits_image((flats.width, flats.height), &flats.master, &header)
 }

@@ -1,4 +1,8 @@
-//! From arguments to exit status: raw arguments, settings, work, printing.
+//! The command line: arguments → settings → the library's work → output and exit status.
+//!
+//! - Each command is one file or folder: its arguments, and a function that returns an [`exit::Outcome`].
+//! - `options`, `input`, `output`, `batch`, `progress` and `plot` hold what several commands share.
+//! - Only `run` and the reports of `solving`, which appear frame by frame, write to standard output.
 
 mod batch;
 mod camera;
@@ -24,16 +28,35 @@ mod validate;
 
 use clap::{ArgMatches, CommandFactory, FromArgMatches, error::ErrorKind};
 use command::{Arguments, Command};
-use exit::{CommandError, Exit};
-use output::messages::{one_line, report_error};
+use exit::{CommandError, Exit, Outcome};
+use output::messages::report_error;
+use output::stdout::print;
 use starpipe::base::format::printable;
 use std::process::ExitCode;
 
-/// Does what the command line asks for.
+/// Runs the command that the command line names.
 pub(crate) fn run() -> ExitCode {
     let matches = Arguments::command().get_matches();
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    let done = match arguments.command {
+    let exit = run_command(arguments.command).and_then(|outcome| {
+        // If the reader closed the pipe, nobody waits for the rest.
+        let _ = print(&outcome.text)?;
+        Ok(outcome.exit)
+    });
+    match exit {
+        Ok(exit) => exit.into(),
+        Err(CommandError::Usage(message)) => typed_command(&matches)
+            .error(ErrorKind::ValueValidation, printable(&message))
+            .exit(),
+        Err(CommandError::Failed(error)) => {
+            report_error(error.as_ref());
+            Exit::Failure.into()
+        }
+    }
+}
+
+fn run_command(command: Command) -> Result<Outcome, CommandError> {
+    match command {
         Command::Process(arguments) => process::process(arguments),
         Command::Identify(arguments) => identify::identify(arguments),
         Command::Catalog(arguments) => catalog::catalog(arguments),
@@ -46,21 +69,11 @@ pub(crate) fn run() -> ExitCode {
         Command::Experiment(arguments) => experiment::experiment(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments),
-    };
-    match done {
-        Ok(exit) => exit.into(),
-        Err(CommandError::Usage(message)) => command_of(&matches)
-            .error(ErrorKind::ValueValidation, printable(&message))
-            .exit(),
-        Err(CommandError::Failed(error)) => {
-            report_error(one_line(error.as_ref()));
-            Exit::Failure.into()
-        }
     }
 }
 
-/// The command that was typed, for its usage to be shown.
-fn command_of(mut matches: &ArgMatches) -> clap::Command {
+/// The subcommand that was typed: its usage is shown with the error.
+fn typed_command(mut matches: &ArgMatches) -> clap::Command {
     let mut command = Arguments::command();
     command.build();
     while let Some((name, below)) = matches.subcommand() {

@@ -1,14 +1,13 @@
-//! `process`: frames.
+//! `process`: finds and identifies the stars in frames.
 
-use super::exit::{CommandError, Exit};
-use super::input::frames as input;
-use super::input::frames::read_master;
+use super::exit::{CommandError, Exit, Outcome};
+use super::input::frames::{FrameList, read_frame, read_master};
+use super::options::frames::FrameOptions;
 use super::options::values;
-use super::output::messages::{one_line, report_error};
 use super::solving::options::{FRAME_RESULTS, SolvingOptions};
-use super::solving::output::Solved;
+use super::solving::result_files::Solved;
 use super::solving::{Plan, solve_all};
-use anyhow::Context;
+use anyhow::Context as _;
 use clap::{Args, ValueEnum};
 use starpipe::calibration::{Calibration, read_hot_pixels};
 use starpipe::camera::data_sheet::DataSheet;
@@ -17,9 +16,8 @@ use starpipe::frame::Buffers;
 use starpipe::identify::Priors;
 use starpipe::model::sensitivity::Extinction;
 use starpipe::photometry::comparison::StatedCamera;
-use starpipe::pipeline::solve_read;
-use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use starpipe::pipeline::{Context, Workspace, solve_read};
+use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
@@ -30,138 +28,119 @@ use std::path::PathBuf;
     starpipe process --page 2 night.fits\n  \
     starpipe process --dark master-dark.fits --flat master-flat.fits --hot-pixels hot-pixels.csv night.fits\n  \
     funpack -S night.fits.fz | starpipe process -\n\n\
-    The kind of a file is told from its content; any may be compressed with gzip. A date, an exposure,\n\
-    a pixel size and a focal length in FITS keywords or Exif are used where no option says otherwise.\n\n\
-    --out results makes results/night.json, night.csv, night.wcs and night.png of night.tif, and\n\
-    overwrites nothing but such results. Those among the frames of a directory are left out.")]
+    The format of a file is recognized from its content; any may be compressed with gzip. Date, exposure,\n\
+    pixel size and focal length are taken from FITS keywords or Exif unless an option gives them.\n\n\
+    --out results writes results/night.json, night.csv, night.wcs and night.png for night.tif, and\n\
+    overwrites only such results. In directories of frames such results are skipped.")]
 pub(crate) struct ProcessArgs {
-    /// Frames to process; a directory stands for the frames in it, - for standard input
-    #[arg(value_name = "FRAME", required = true)]
-    pub(crate) frames: Vec<PathBuf>,
-    /// Which image of a file with several, from 1: a TIFF's page, a FITS image or plane [default: the first]
-    #[arg(long, value_name = "NUMBER", help_heading = "Frame")]
-    pub(crate) page: Option<NonZeroUsize>,
     #[command(flatten)]
-    pub(crate) calibration: CalibrationOptions,
+    frames: FrameOptions,
     #[command(flatten)]
-    pub(crate) detection: DetectionOptions,
+    calibration: CalibrationOptions,
     #[command(flatten)]
-    pub(crate) light: LightOptions,
+    detection: DetectionOptions,
     #[command(flatten)]
-    pub(crate) solving: SolvingOptions,
+    exposure: ExposureOptions,
+    #[command(flatten)]
+    solving: SolvingOptions,
 }
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Calibration")]
-pub(crate) struct CalibrationOptions {
-    /// Frame taken without light, or the mean of many: its pattern is subtracted, see `starpipe darks`
+struct CalibrationOptions {
+    /// Frame taken without light, or the mean of many, which is subtracted; see `starpipe darks`
     #[arg(long, value_name = "FILE")]
-    pub(crate) dark: Option<PathBuf>,
-    /// Mean of evenly lit frames: what is above the dark level is divided by it, see `starpipe flats`
+    dark: Option<PathBuf>,
+    /// Mean of evenly lit frames: the signal above the dark level is divided by it; see `starpipe flats`
     #[arg(long, value_name = "FILE")]
-    pub(crate) flat: Option<PathBuf>,
-    /// Pixels not to be believed: a table with the columns x,y, see `starpipe darks`
+    flat: Option<PathBuf>,
+    /// Pixels to ignore: a table with the columns x,y; see `starpipe darks`
     #[arg(long, value_name = "FILE.csv")]
-    pub(crate) hot_pixels: Option<PathBuf>,
+    hot_pixels: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Detection")]
-pub(crate) struct DetectionOptions {
+struct DetectionOptions {
     /// Detection threshold in standard deviations of the background, in place of --false-alarms
     #[arg(long, value_name = "NUMBER", value_parser = values::positive, allow_hyphen_values = true,
           conflicts_with = "false_alarms")]
-    pub(crate) sigma: Option<f64>,
-    /// False detections to accept in a million pixels of noise [default: 0.1]
+    sigma: Option<f64>,
+    /// Accepted false detections in a million pixels of noise [default: 0.1]
     #[arg(long, value_name = "NUMBER", value_parser = values::positive, allow_hyphen_values = true)]
-    pub(crate) false_alarms: Option<f64>,
-    /// How to measure a star's position
+    false_alarms: Option<f64>,
+    /// How to measure the position of a star
     #[arg(long, value_name = "METHOD", value_enum)]
-    pub(crate) centroid: Option<Centroid>,
+    centroid: Option<Centroid>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Centroid {
+enum Centroid {
     /// Fit of a Gaussian spot: the most accurate
     GaussianFit,
     /// Centre of the light above a threshold: the fastest
     GreyWeighted,
 }
 
-/// What is known of the light in a frame; lists of centroids have none.
+/// Hints that apply to frames, but not to lists of centroids.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "What is known of the frames")]
-pub(crate) struct LightOptions {
-    /// How long the frames were exposed, in seconds [default: the exposure in the file's header]
+struct ExposureOptions {
+    /// Exposure of the frames, in seconds [default: the exposure in the file's header]
     #[arg(long, value_name = "SECONDS", value_parser = values::exposure, allow_hyphen_values = true)]
-    pub(crate) exposure: Option<f64>,
-    /// With --camera, zenith distance of the frames' centres in degrees [default: by --site and the date, else by
+    exposure: Option<f64>,
+    /// With --camera, zenith distance of the frames' centres in degrees [default: from --site and the date, else from
     /// the header, else 0]
     #[arg(long, value_name = "DEG", value_parser = values::zenith_distance, allow_hyphen_values = true,
           requires = "camera")]
-    pub(crate) zenith_distance: Option<f64>,
-    /// With --camera, extinction in magnitudes for each airmass [default: the law of the sensitivity paper, 0.35
-    /// in V]
+    zenith_distance: Option<f64>,
+    /// With --camera, extinction in magnitudes per airmass [default: the law of the sensitivity paper, 0.35 in V]
     #[arg(long, value_name = "MAG", value_parser = values::extinction, allow_hyphen_values = true,
           requires = "camera")]
-    pub(crate) extinction: Option<f64>,
+    extinction: Option<f64>,
 }
 
 /// `starpipe process`
-pub(crate) fn process(arguments: ProcessArgs) -> Result<Exit, CommandError> {
-    let ProcessArgs {
-        frames,
-        page,
-        calibration,
-        detection,
-        light,
-        solving,
-    } = arguments;
-    let sheet = solving.hints.data_sheet()?;
-    let plan = Plan {
-        detect: detection.resolve(),
-        priors: Priors {
-            exposure_s: light.exposure,
-            ..solving.hints.resolve()?
-        },
-        calibration: calibration.resolve(sheet.as_ref())?,
-        camera: sheet.map(|sheet| light.stated_camera(sheet)),
+pub(crate) fn process(arguments: ProcessArgs) -> Result<Outcome, CommandError> {
+    let plan = arguments.plan()?;
+    let page = arguments.frames.page;
+    let (frames, failed) = FrameList::of(arguments.frames.frames)?.reported();
+    // Frames are large: one is kept only to be drawn.
+    let keep = arguments.solving.writes_files();
+    let solve = |context: &Context, path: &Path, workspace: &mut Workspace| {
+        let read = |buffers: &mut Buffers| read_frame(path, page, buffers);
+        let (solution, frame) = solve_read(path, read, context, workspace)?;
+        let frame = if keep {
+            Some(frame)
+        } else {
+            workspace.frames.recycle(frame);
+            None
+        };
+        Ok(Solved { solution, frame })
     };
-    input::check(&frames)?;
-    let (frames, troubles) = input::frames(frames);
-    for trouble in &troubles {
-        report_error(one_line(trouble));
+    let exit = solve_all(&frames, arguments.solving, FRAME_RESULTS, &plan, solve)?;
+    Ok(if failed { Exit::Failure } else { exit }.into())
+}
+
+impl ProcessArgs {
+    fn plan(&self) -> Result<Plan, CommandError> {
+        let hints = &self.solving.hints;
+        let sheet = hints.data_sheet()?;
+        Ok(Plan {
+            detect: self.detection.config(),
+            priors: Priors {
+                exposure_s: self.exposure.exposure,
+                ..hints.resolve()?
+            },
+            calibration: self.calibration.read(sheet.as_ref())?,
+            camera: sheet.map(|sheet| self.exposure.stated_camera(sheet)),
+        })
     }
-    let (settings, resources) = solving.resolve(&frames, FRAME_RESULTS)?;
-    // Frames are large: one is kept only where it is drawn.
-    let keep = settings.directory.is_some();
-    let exit = solve_all(
-        &frames,
-        settings,
-        &resources,
-        &plan,
-        |context, path, workspace| {
-            let read = |buffers: &mut Buffers| input::read_frame(path, page, buffers);
-            let (solution, frame) = solve_read(path, read, context, workspace)?;
-            let frame = if keep {
-                Some(frame)
-            } else {
-                workspace.frames.recycle(frame);
-                None
-            };
-            Ok(Solved { solution, frame })
-        },
-    )?;
-    Ok(if troubles.is_empty() {
-        exit
-    } else {
-        Exit::Failure
-    })
 }
 
 impl CalibrationOptions {
-    /// What is to be taken out of frames, where anything is.
-    pub(crate) fn resolve(&self, sheet: Option<&DataSheet>) -> anyhow::Result<Option<Calibration>> {
+    /// Reads the calibration, if any is given. Without a dark, the bias is that of `sheet`.
+    fn read(&self, sheet: Option<&DataSheet>) -> anyhow::Result<Option<Calibration>> {
         if self.dark.is_none() && self.flat.is_none() && self.hot_pixels.is_none() {
             return Ok(None);
         }
@@ -179,28 +158,30 @@ impl CalibrationOptions {
 }
 
 impl DetectionOptions {
-    /// How to detect stars; what is not given stays as the library has it.
-    pub(crate) fn resolve(&self) -> DetectConfig {
-        let mut config = DetectConfig {
+    /// The library's defaults, with the options given.
+    fn config(&self) -> DetectConfig {
+        let default = DetectConfig::default();
+        DetectConfig {
             threshold_sigma: self.sigma,
-            ..DetectConfig::default()
-        };
-        if let Some(number) = self.false_alarms {
-            config.false_alarms_per_mpx = number;
+            false_alarms_per_mpx: self.false_alarms.unwrap_or(default.false_alarms_per_mpx),
+            centroid: self.centroid.map_or(default.centroid, CentroidMethod::from),
+            ..default
         }
-        if let Some(centroid) = self.centroid {
-            config.centroid = match centroid {
-                Centroid::GaussianFit => CentroidMethod::GaussianFit,
-                Centroid::GreyWeighted => CentroidMethod::GreyWeighted,
-            };
-        }
-        config
     }
 }
 
-impl LightOptions {
-    /// The camera, the zenith distance and the extinction as the user states them.
-    pub(crate) fn stated_camera(&self, sheet: DataSheet) -> StatedCamera {
+impl From<Centroid> for CentroidMethod {
+    fn from(centroid: Centroid) -> Self {
+        match centroid {
+            Centroid::GaussianFit => Self::GaussianFit,
+            Centroid::GreyWeighted => Self::GreyWeighted,
+        }
+    }
+}
+
+impl ExposureOptions {
+    /// The camera with its zenith distance and extinction as the user states them.
+    fn stated_camera(&self, sheet: DataSheet) -> StatedCamera {
         StatedCamera {
             sheet,
             zenith_distance_deg: self.zenith_distance,

@@ -3,6 +3,7 @@
 use crate::cli::options::format::Format;
 use crate::cli::options::scenario::ScenarioOptions;
 use crate::cli::options::steps::Steps;
+use crate::cli::options::threads::ThreadOptions;
 use crate::cli::options::values;
 use crate::cli::plot::FigureForm;
 use clap::{Args, ValueEnum};
@@ -74,9 +75,8 @@ pub(crate) struct DefocusArgs {
     /// Format of the figures
     #[arg(long, value_enum, default_value_t = FigureForm::Svg, requires = "out")]
     pub(super) figures: FigureForm,
-    /// Threads to work with [default: one for each processor]
-    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1024))]
-    pub(super) threads: Option<u32>,
+    #[command(flatten)]
+    pub(super) threads: ThreadOptions,
 }
 
 /// What all spots have in common.
@@ -126,17 +126,12 @@ fn radii(text: &str) -> Result<Range, String> {
 }
 
 fn range(text: &str) -> Result<Range, String> {
-    let Steps {
-        ends,
-        count,
-        spacing,
-    } = text.parse()?;
-    if ends.0 <= 0.0 {
+    let steps: Steps = text.parse()?;
+    let (first, _) = steps.ends;
+    if first <= 0.0 {
         return Err(format!(
-            "found {} at its beginning, expected a number above 0",
-            ends.0
+            "found {first} as the first value, expected a number above 0"
         ));
     }
-    let values = spacing.checked_values(ends, count);
-    values.map(Range).map_err(|error| error.to_string())
+    steps.values().map(Range)
 }

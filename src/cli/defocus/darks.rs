@@ -1,17 +1,18 @@
 //! The noise of the user's dark frames.
 
 use crate::cli::exit::CommandError;
-use crate::cli::input::frames::{self as input, for_each_frame};
-use crate::cli::output::messages::{one_line, report_error, report_warning};
-use anyhow::{Context, anyhow};
+use crate::cli::input::frames::{FrameList, for_each_frame};
+use crate::cli::input::stdin::is_stdin;
+use crate::cli::output::messages::report_warning;
+use anyhow::anyhow;
 use starpipe::calibration::darks::{
     DarkConfig, DarkStack, Darks, FrameStatistics, FullScaleSource,
 };
 use starpipe::camera::data_sheet::DataSheet;
-use starpipe::frame::Buffers;
+use starpipe::frame::Frame;
 use starpipe::model::sensitivity::Scenario;
 use starpipe::study::defocus::DarkNoise;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Exposures that differ by more than this part have different dark currents.
 const SAME_EXPOSURE: f64 = 0.05;
@@ -43,14 +44,12 @@ fn measure(
     pool: &rayon::ThreadPool,
 ) -> anyhow::Result<Darks> {
     let mut stack = DarkStack::new();
-    let read = |path: &PathBuf| -> anyhow::Result<_> {
-        let frame = input::read_frame(path, None, &mut Buffers::new()).context("reading")?;
+    let measure = |path: &Path, frame: Frame| {
         let statistics = FrameStatistics::of(&path.display().to_string(), &frame, None);
-        Ok((frame, statistics))
+        (frame, statistics)
     };
-    let unread = for_each_frame(pool, frames, read, |(frame, statistics)| {
-        Ok(stack.add(&frame, statistics)?)
-    })?;
+    let take = |(frame, statistics): (Frame, FrameStatistics)| Ok(stack.add(&frame, statistics)?);
+    let unread = for_each_frame(pool, frames, None, measure, take)?;
     if unread > 0 {
         return Err(anyhow!(
             "{unread} of {} dark frames could not be read",
@@ -79,23 +78,18 @@ fn named_frames(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CommandError> {
     let mut inputs = Vec::new();
     for path in paths {
         let text = path.to_string_lossy();
-        if path.exists() || input::is_stdin(path) || !text.contains(['*', '?', '[']) {
+        if path.exists() || is_stdin(path) || !text.contains(['*', '?', '[']) {
             inputs.push(path.clone());
         } else {
             inputs.extend(matching(&text)?);
         }
     }
-    input::check(&inputs)?;
-    let (frames, errors) = input::frames(inputs);
-    match &errors[..] {
-        [] => Ok(frames),
-        [others @ .., last] => {
-            for error in others {
-                report_error(one_line(error));
-            }
-            Err(anyhow!(one_line(last)).into())
-        }
-    }
+    let mut list = FrameList::of(inputs)?;
+    let Some(last) = list.errors.pop() else {
+        return Ok(list.paths);
+    };
+    list.reported();
+    Err(last.into())
 }
 
 /// The files that match a pattern, at least one.
@@ -103,9 +97,7 @@ fn matching(pattern: &str) -> Result<Vec<PathBuf>, CommandError> {
     let found = glob::glob(pattern).map_err(|error| {
         CommandError::Usage(format!("--darks '{pattern}' is no pattern: {error}"))
     })?;
-    let found: Vec<_> = found
-        .collect::<Result<_, _>>()
-        .map_err(anyhow::Error::from)?;
+    let found: Vec<_> = found.collect::<Result<_, _>>()?;
     if found.is_empty() {
         return Err(anyhow!("{pattern}: no frame has such a name").into());
     }

@@ -7,22 +7,19 @@ mod plan;
 
 pub(crate) use args::DefocusArgs;
 
-use super::exit::{CommandError, Exit};
-use super::options::catalog::thread_pool;
+use super::exit::{CommandError, Exit, Outcome};
 use super::options::format::Format;
-use super::output::files;
+use super::output::files::write_into;
 use super::output::messages::report_warning;
-use super::output::rows::{csv_table, json_lines};
-use super::output::stdout::print;
+use super::output::rows::{csv_table, json_indented, json_line};
 use super::progress::bar;
-use anyhow::Context;
 use starpipe::model::defocus::Lens;
 use starpipe::study::defocus::{DefocusReport, GridRow, Plan, StarStudy};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// `starpipe defocus`
-pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Exit, CommandError> {
-    let pool = thread_pool(arguments.threads)?;
+pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Outcome, CommandError> {
+    let pool = arguments.threads.pool()?;
     let plan = plan::plan(arguments, &pool)?;
     let studies = run(&plan, &pool)?;
     let report = DefocusReport::new(&plan, &studies);
@@ -32,18 +29,16 @@ pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Exit, CommandError> {
     }
     let text = match arguments.format {
         Format::Text => report.to_text(),
-        Format::Json => json_lines(std::iter::once(&report))?,
+        Format::Json => json_line(&report)?,
         Format::Csv => grid_table(&studies)?,
     };
-    // Nobody left to read it: nothing is lost.
-    let _ = print(&text)?;
-    Ok(match report.is_met() {
-        true => Exit::Success,
-        false => {
-            report_warning("no radius meets a required error");
-            Exit::Unmet
-        }
-    })
+    let exit = if report.is_met() {
+        Exit::Success
+    } else {
+        report_warning("no radius meets a required error");
+        Exit::Unmet
+    };
+    Ok(Outcome { text, exit })
 }
 
 fn run(plan: &Plan, pool: &rayon::ThreadPool) -> anyhow::Result<Vec<StarStudy>> {
@@ -82,20 +77,15 @@ fn save(
     report: &DefocusReport,
     studies: &[StarStudy],
 ) -> anyhow::Result<()> {
-    let json = serde_json::to_string_pretty(report).context("writing JSON")? + "\n";
     let curve = csv_table(report.stars.iter().flat_map(|star| &star.curve))?;
     let texts = [
         ("grid.csv", grid_table(studies)?),
         ("curve.csv", curve),
-        ("defocus.json", json),
+        ("defocus.json", json_indented(report)?),
         ("defocus.txt", report.to_text()),
     ];
     let texts = texts.map(|(name, text)| (name.to_owned(), text.into_bytes()));
     let figures = figures::of(report, studies, arguments.figures)?;
-    let files: Vec<(PathBuf, Vec<u8>)> = texts
-        .into_iter()
-        .chain(figures)
-        .map(|(name, content)| (directory.join(name), content))
-        .collect();
-    files::save(directory, &files)
+    write_into(directory, texts.into_iter().chain(figures))?;
+    Ok(())
 }

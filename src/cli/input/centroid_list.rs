@@ -1,6 +1,6 @@
-//! Lists of centroids in CSV files.
+//! Reads lists of centroids from CSV files.
 
-use super::frames::is_stdin;
+use super::stdin::is_stdin;
 use anyhow::{Context, anyhow, bail};
 use csv::StringRecord;
 use starpipe::base::coords::PixelPoint;
@@ -11,21 +11,21 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Sides of the frame in pixels, where they are known.
+/// Width and height of the frame in pixels, if known.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct FrameSize {
     pub(crate) width: Option<u32>,
     pub(crate) height: Option<u32>,
 }
 
-/// A frame wider than this is taken for a mistake in the list.
+/// Largest coordinate of a frame whose size is unknown; larger ones are errors in the list.
 const MAX_COORDINATE_PX: f64 = 1e6;
-/// No list is longer: some millions of centroids.
+/// Largest size of a list: some millions of centroids.
 const MAX_BYTES: u64 = 1 << 28;
-/// The centre of a star that is cut by the border may lie so far outside the frame, in pixels.
+/// How far outside the frame a centroid may lie, in pixels: stars at the border are cut.
 const BORDER_PX: f64 = 5.0;
 
-/// Reads the list in the file `path`, `-` for standard input.
+/// Reads the list in the file `path`, or in standard input if that is `-`.
 pub(crate) fn read(path: &Path, size: FrameSize) -> anyhow::Result<CentroidList> {
     let reading = || format!("reading {}", path.display());
     let stream: Box<dyn Read> = if is_stdin(path) {
@@ -37,17 +37,17 @@ pub(crate) fn read(path: &Path, size: FrameSize) -> anyhow::Result<CentroidList>
     list.with_context(reading)
 }
 
-/// All bytes of `stream`, which may have no end, where they are not more than `limit`.
+/// All bytes of `stream`, at most `limit`.
 fn limited(stream: impl Read, limit: u64) -> anyhow::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     stream.take(limit + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > limit {
-        bail!("too large: found more than {limit} bytes, expected at most so many");
+        bail!("too large: found more than {limit} bytes");
     }
     Ok(bytes)
 }
 
-/// How a list tells brightness.
+/// Meaning of the brightness column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Brightness {
     JohnsonV,
@@ -55,7 +55,7 @@ enum Brightness {
     Flux,
 }
 
-/// A column: where it is and what it is called.
+/// Position and name of a column.
 struct Column {
     position: usize,
     name: String,
@@ -68,7 +68,7 @@ struct Columns {
     kind: Brightness,
 }
 
-/// Reads a list; lines are counted from 1, the heading included.
+/// Parses a list. Lines in errors are counted from 1, heading included.
 fn parse(input: impl Read, size: FrameSize) -> anyhow::Result<CentroidList> {
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
@@ -79,7 +79,7 @@ fn parse(input: impl Read, size: FrameSize) -> anyhow::Result<CentroidList> {
     let mut centroids = Vec::new();
     for record in reader.records() {
         let record = record.map_err(not_a_table)?;
-        // A line of blanks and commas at the end of a spreadsheet's table tells nothing.
+        // Spreadsheets write such lines at the end of a table.
         if record.iter().all(str::is_empty) {
             continue;
         }
@@ -87,13 +87,13 @@ fn parse(input: impl Read, size: FrameSize) -> anyhow::Result<CentroidList> {
         let centroid = columns
             .centroid(&record)
             .with_context(|| format!("line {line}"))?;
-        inside(&centroid.position, size).with_context(|| format!("line {line}"))?;
+        check_inside(&centroid.position, size).with_context(|| format!("line {line}"))?;
         centroids.push(centroid);
     }
     if centroids.is_empty() {
-        bail!("there is no centroid under the heading");
+        bail!("found a heading without centroids below it");
     }
-    let (width, height) = sides(&centroids, size);
+    let (width, height) = frame_size(&centroids, size);
     Ok(CentroidList {
         width,
         height,
@@ -105,12 +105,12 @@ fn parse(input: impl Read, size: FrameSize) -> anyhow::Result<CentroidList> {
     })
 }
 
-/// What keeps a file from being a table, and where.
+/// Describes an error of the CSV reader with its line.
 fn not_a_table(error: csv::Error) -> anyhow::Error {
     let line = error.position().map_or(1, csv::Position::line);
     match error.kind() {
         csv::ErrorKind::Utf8 { err, .. } => anyhow!(
-            "line {line}: found bytes that are no text in UTF-8 in its column {}, expected a CSV table",
+            "line {line}: found bytes that are not UTF-8 in column {}, expected a CSV table",
             err.field() + 1
         ),
         _ => error.into(),
@@ -128,7 +128,7 @@ impl Columns {
             names.iter().find_map(|name| {
                 let position = headings
                     .iter()
-                    // A byte order mark is no part of the first heading.
+                    // The first heading may begin with a byte order mark.
                     .position(|h| h.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name))?;
                 let name = (*name).to_owned();
                 Some(Column { position, name })
@@ -208,8 +208,8 @@ fn number(record: &StringRecord, column: &Column) -> anyhow::Result<f64> {
     }
 }
 
-/// Refuses a position outside the frame, which reaches half a pixel beyond the centres of the border's pixels.
-fn inside(position: &PixelPoint, size: FrameSize) -> anyhow::Result<()> {
+/// Refuses positions outside the frame, which extends half a pixel beyond the centres of its border pixels.
+fn check_inside(position: &PixelPoint, size: FrameSize) -> anyhow::Result<()> {
     let axes = [
         ("x", position.x, size.width),
         ("y", position.y, size.height),
@@ -218,26 +218,26 @@ fn inside(position: &PixelPoint, size: FrameSize) -> anyhow::Result<()> {
         let limit = side.map_or(MAX_COORDINATE_PX, f64::from) - 0.5;
         if !(-0.5 - BORDER_PX..=limit + BORDER_PX).contains(&value) {
             bail!(
-                "column {name}: {value} is more than {BORDER_PX} px outside the frame, which reaches from -0.5 to {limit} px"
+                "column {name}: {value} is more than {BORDER_PX} px outside the frame, which extends from -0.5 to {limit} px"
             );
         }
     }
     Ok(())
 }
 
-/// The sides of the frame: those known, else as far as the centroids reach.
-fn sides(centroids: &[ListedCentroid], size: FrameSize) -> (usize, usize) {
+/// Width and height of the frame: as given, else as far as the centroids reach.
+fn frame_size(centroids: &[ListedCentroid], size: FrameSize) -> (usize, usize) {
     let reach = |coordinate: fn(&PixelPoint) -> f64| {
-        let most = centroids
+        let largest = centroids
             .iter()
             .map(|c| coordinate(&c.position))
             .fold(0.0, f64::max);
-        most.round() as usize + 1
+        largest.round() as usize + 1
     };
-    let known = |side: Option<u32>| side.map(|side| side as usize);
+    let given = |side: Option<u32>| side.map(|side| side as usize);
     (
-        known(size.width).unwrap_or_else(|| reach(|p| p.x)),
-        known(size.height).unwrap_or_else(|| reach(|p| p.y)),
+        given(size.width).unwrap_or_else(|| reach(|p| p.x)),
+        given(size.height).unwrap_or_else(|| reach(|p| p.y)),
     )
 }
 
@@ -249,12 +249,12 @@ mod tests {
         parse(text.as_bytes(), FrameSize::default())
     }
 
-    fn complaint(text: &str) -> String {
+    fn error(text: &str) -> String {
         format!("{:#}", parsed(text).unwrap_err())
     }
 
     #[test]
-    fn headings_may_be_in_any_order_case_and_company() {
+    fn columns_may_have_any_order_and_case_and_others_are_ignored() {
         let list = parsed("id, VMAG , Y_px,note,X_PX\n7, 6.5, 20.2 ,hello, 10.6\n").unwrap();
         assert_eq!(list.photometry, Photometry::JohnsonV);
         assert_eq!(list.centroids[0].position, PixelPoint::new(10.6, 20.2));
@@ -271,13 +271,13 @@ mod tests {
     }
 
     #[test]
-    fn a_byte_order_mark_comments_and_blank_lines_do_no_harm() {
+    fn a_byte_order_mark_comments_and_blank_lines_are_ignored() {
         let list = parsed("\u{feff}x,y,mag\r\n# a remark\r\n1,2,3\r\n\r\n,,\r\n").unwrap();
         assert_eq!(list.centroids.len(), 1);
     }
 
     #[test]
-    fn a_bad_value_is_named_by_line_and_column() {
+    fn errors_name_line_and_column() {
         for (row, expected) in [
             ("1,NaN,3", "line 3: column y: 'NaN' is not a number"),
             ("inf,2,3", "line 3: column x: 'inf' is not a number"),
@@ -291,13 +291,13 @@ mod tests {
             ),
             ("1,1e300,3", "line 3: column y: 1000000"),
         ] {
-            let complaint = complaint(&format!("x,y,flux\n5,5,5\n{row}\n"));
-            assert!(complaint.starts_with(expected), "{complaint}");
+            let error = error(&format!("x,y,flux\n5,5,5\n{row}\n"));
+            assert!(error.starts_with(expected), "{error}");
         }
     }
 
     #[test]
-    fn a_missing_column_is_named_along_with_those_found() {
+    fn errors_of_missing_columns_list_those_found() {
         for (heading, expected) in [
             ("", "the file is empty"),
             (
@@ -306,10 +306,10 @@ mod tests {
             ),
             ("x,b,c\n1,2,3\n", "expected y or y_px"),
             ("x,y,c\n1,2,3\n", "expected flux, vmag or mag"),
-            ("x,y,mag\n", "no centroid under the heading"),
+            ("x,y,mag\n", "a heading without centroids"),
         ] {
-            let complaint = complaint(heading);
-            assert!(complaint.contains(expected), "{complaint}");
+            let error = error(heading);
+            assert!(error.contains(expected), "{error}");
         }
     }
 
@@ -319,9 +319,9 @@ mod tests {
             width: Some(100),
             height: None,
         };
-        let complaint = parse("x,y,mag\n99.4,2,3\n105,2,3\n".as_bytes(), size).unwrap_err();
+        let error = parse("x,y,mag\n99.4,2,3\n105,2,3\n".as_bytes(), size).unwrap_err();
         assert!(
-            format!("{complaint:#}").starts_with("line 3: column x: 105 is more than 5 px outside")
+            format!("{error:#}").starts_with("line 3: column x: 105 is more than 5 px outside")
         );
         let list = parse("x,y,mag\n9,2,3\n".as_bytes(), size).unwrap();
         assert_eq!((list.width, list.height), (100, 3));
@@ -335,9 +335,9 @@ mod tests {
     }
 
     #[test]
-    fn a_stream_without_an_end_is_refused() {
-        let complaint = limited(io::repeat(b'1'), 1000).unwrap_err().to_string();
-        assert!(complaint.starts_with("too large: found more than 1000 bytes"));
+    fn an_endless_stream_is_refused() {
+        let error = limited(io::repeat(b'1'), 1000).unwrap_err().to_string();
+        assert!(error.starts_with("too large: found more than 1000 bytes"));
         assert_eq!(
             limited(io::repeat(b'1').take(1000), 1000).unwrap().len(),
             1000
@@ -345,16 +345,19 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_text_is_refused() {
+    fn binary_content_is_refused() {
         for (text, expected) in [
             (
                 &b"x,y,mag\n1,\xff\xfe,3\n"[..],
-                "line 2: found bytes that are no text in UTF-8 in its column 2",
+                "line 2: found bytes that are not UTF-8 in column 2",
             ),
-            (b"\x89PNG\r\n\x1a\n", "line 1: found bytes that are no text"),
+            (
+                b"\x89PNG\r\n\x1a\n",
+                "line 1: found bytes that are not UTF-8",
+            ),
         ] {
-            let complaint = parse(text, FrameSize::default()).unwrap_err().to_string();
-            assert!(complaint.starts_with(expected), "{complaint}");
+            let error = parse(text, FrameSize::default()).unwrap_err().to_string();
+            assert!(error.starts_with(expected), "{error}");
         }
     }
 }

@@ -2,3 +2,4 @@
 
 pub(crate) mod centroid_list;
 pub(crate) mod frames;
+pub(crate) mod stdin;

@@ -2,7 +2,7 @@
 
 use crate::cli::options::format::Format;
 use crate::cli::options::scenario::ScenarioOptions;
-use crate::cli::options::steps::{Steps, named_steps};
+use crate::cli::options::steps::named_steps;
 use crate::cli::plot::PlotFile;
 use clap::{ArgGroup, Args};
 use starpipe::model::sensitivity;
@@ -53,12 +53,7 @@ impl FromStr for LimitSweep {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (name, steps) = named_steps(text)?;
-        let Steps {
-            ends,
-            count,
-            spacing,
-        } = steps;
-        sensitivity::Sweep::new(&name, ends, count, spacing)
+        sensitivity::Sweep::new(&name, steps.ends, steps.count, steps.spacing)
             .map(Self)
             .map_err(|error| error.to_string())
     }

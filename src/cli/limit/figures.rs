@@ -1,7 +1,6 @@
 //! The limiting magnitude over one parameter: a panel for each sweep, or the paper's figures.
 
 use crate::cli::exit::CommandError;
-use crate::cli::options::scenario::usage;
 use crate::cli::plot::{Axis, BLACK, BLUE, Figure as _, Form, Layer, Marks, ORANGE, Panel, Sheet};
 use anyhow::Context;
 use starpipe::base::format::five_digits;
@@ -21,7 +20,7 @@ pub(super) fn of_sweeps<'a>(
 ) -> Result<Sheet, CommandError> {
     let panel = |sweep: &Sweep| {
         let series = Series::around(scenario, sweep.parameter);
-        let curves = curves(scenario, sweep, &series).map_err(|error| usage(&error))?;
+        let curves = curves(scenario, sweep, &series).map_err(CommandError::usage)?;
         Ok(panel(String::new(), sweep, curves, scenario))
     };
     let panels = sweeps.map(panel).collect::<Result<_, CommandError>>()?;
@@ -35,7 +34,7 @@ pub(super) fn of_paper(scenario: &Scenario) -> Result<Vec<(String, Vec<u8>)>, Co
         let sweep = figure.sweep().map_err(anyhow::Error::from)?;
         let curves = figure
             .curves(scenario, &sweep)
-            .map_err(|error| usage(&error))?;
+            .map_err(CommandError::usage)?;
         let title = format!("{}  {}", figure.id, figure.title);
         panels.push(panel(title, &sweep, curves, scenario));
     }

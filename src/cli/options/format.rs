@@ -1,7 +1,8 @@
-//! What a command prints: text, JSON or CSV.
+//! What a command prints.
 
 use clap::ValueEnum;
 
+/// The forms of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Format {
     /// A report for people
@@ -12,9 +13,10 @@ pub(crate) enum Format {
     Csv,
 }
 
+/// The forms of a report that is not a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum PageFormat {
-    /// A page for people
+    /// A report for people
     Text,
     /// One JSON object
     Json,

@@ -1,4 +1,4 @@
-//! What is known of the frames before they are looked at.
+//! Hints: what is known of the frames in advance.
 
 use super::values;
 use crate::cli::exit::CommandError;
@@ -26,7 +26,7 @@ pub(crate) struct HintOptions {
     /// How far --fov or --pixel-scale may be off, in percent [default: 10]
     #[arg(long, value_name = "PERCENT", value_parser = values::percent, allow_hyphen_values = true)]
     pub(crate) scale_error: Option<f64>,
-    /// Direction near which the frame's centre lies, in degrees
+    /// Approximate direction of the frame's centre, in degrees
     #[arg(long, value_name = "RA,DEC", value_parser = values::direction, allow_hyphen_values = true,
           requires = "radius")]
     pub(crate) near: Option<values::Direction>,
@@ -34,25 +34,25 @@ pub(crate) struct HintOptions {
     #[arg(long, value_name = "DEG", value_parser = values::radius, allow_hyphen_values = true,
           requires = "near")]
     pub(crate) radius: Option<f64>,
-    /// When the frames were taken, as ISO 8601, in UTC unless it says otherwise: stars move [default: for
+    /// When the frames were taken, as ISO 8601, in UTC unless it has an offset; used for proper motion [default: of
     /// frames, the date in the file's header, else in its name; else 2000]
     #[arg(long, value_name = "ISO8601", allow_hyphen_values = true)]
     pub(crate) date: Option<ObservationDate>,
     /// Where they were taken: latitude and longitude (north and east positive) in degrees, and height in metres; with
-    /// the time, that gives zenith distance and airmass
+    /// the date, gives zenith distance and airmass
     #[arg(long, value_name = "LAT,LON[,HEIGHT_M]", allow_hyphen_values = true)]
     pub(crate) site: Option<Site>,
-    /// Description of the camera, see `starpipe camera new`: gives the scale where no option does and, of frames whose
-    /// exposure is known, what they should show
+    /// Description of the camera, see `starpipe camera new`: gives the scale if no option does, and a predicted limiting
+    /// magnitude for frames whose exposure is known
     #[arg(long, value_name = "FILE.toml")]
     pub(crate) camera: Option<PathBuf>,
 }
 
-/// How far a scale given may be off where nothing is said of it, in percent.
+/// Default of --scale-error, in percent.
 const DEFAULT_SCALE_ERROR_PERCENT: f64 = 10.0;
 
 impl HintOptions {
-    /// What is known of the frames.
+    /// The hints, without the camera's.
     pub(crate) fn resolve(&self) -> Result<Priors, CommandError> {
         let fov = self.fov.map(|deg| Scale::FieldOfView(deg * RAD_PER_DEG));
         let pixel = self
@@ -60,16 +60,14 @@ impl HintOptions {
             .map(|arcsec| Scale::Pixel(arcsec * RAD_PER_ARCSEC));
         let scale = fov.or(pixel);
         if scale.is_none() && self.scale_error.is_some() {
-            return Err(CommandError::Usage(
-                "--scale-error says how far --fov or --pixel-scale may be off; give one of these, too".into(),
+            return Err(CommandError::usage(
+                "--scale-error is the error of --fov or --pixel-scale; give one of these, too",
             ));
         }
         let tolerance = self.scale_error.unwrap_or(DEFAULT_SCALE_ERROR_PERCENT) / 100.0;
         let near = self.near.zip(self.radius).map(|(direction, radius_deg)| {
-            let (ra_rad, dec_rad) = (
-                direction.ra_deg * RAD_PER_DEG,
-                direction.dec_deg * RAD_PER_DEG,
-            );
+            let ra_rad = direction.ra_deg * RAD_PER_DEG;
+            let dec_rad = direction.dec_deg * RAD_PER_DEG;
             SkyRegion {
                 centre: UnitVector::from_ra_dec(ra_rad, dec_rad),
                 radius_rad: radius_deg * RAD_PER_DEG,
@@ -87,7 +85,7 @@ impl HintOptions {
         })
     }
 
-    /// The same, with the scale of the camera, as a hard constraint, where no other is given.
+    /// The hints, with the camera's scale as a hard constraint if no other is given.
     pub(crate) fn resolve_with_camera(&self) -> Result<Priors, CommandError> {
         let sheet = self.data_sheet()?;
         let priors = self.resolve()?;
@@ -101,7 +99,7 @@ impl HintOptions {
         })
     }
 
-    /// The camera, where it is described.
+    /// The camera, if one is given.
     pub(crate) fn data_sheet(&self) -> anyhow::Result<Option<DataSheet>> {
         let read = |path: &PathBuf| Ok(DataSheet::read(path)?);
         self.camera.as_ref().map(read).transpose()

@@ -1,13 +1,13 @@
-//! An option for every parameter of a scenario, made from the table of parameters.
+//! An option for each parameter of a scenario, generated from the table of parameters.
 
 use clap::{Arg, ArgMatches, Command, Error, FromArgMatches};
 use starpipe::base::format::five_digits as number;
-use starpipe::camera::data_sheet::{Response, ResponseError, is_curve};
+use starpipe::camera::data_sheet::{Limits, Response, ResponseError, is_curve};
 use starpipe::model::sensitivity::{Conditions, Parameter, Scenario};
 use std::path::PathBuf;
 
-/// Parameters that say the same: at most one of each is given.
-const SAME: &[&[&str]] = &[
+/// Parameters that exclude each other: they set the same quantity.
+const EXCLUSIVE: &[&[&str]] = &[
     &[
         "sky_mag_arcsec2",
         "sky_luminance_cd_m2",
@@ -18,11 +18,11 @@ const SAME: &[&[&str]] = &[
     &["pixel_area_um2", "pitch_y_um"],
 ];
 
-/// The parameters given, in the order in which they are to be set.
+/// The parameters given, in the order in which they have to be set.
 #[derive(Debug, Clone)]
 pub(crate) struct ParameterOptions(Vec<(Parameter, Given)>);
 
-/// What an option of a parameter may be given.
+/// Value of a parameter's option.
 #[derive(Debug, Clone, PartialEq)]
 enum Given {
     Number(f64),
@@ -31,7 +31,7 @@ enum Given {
 }
 
 impl ParameterOptions {
-    /// Gives `scenario` what was given.
+    /// Sets the parameters of `scenario`.
     pub(crate) fn apply(&self, scenario: &mut Scenario) -> Result<(), ResponseError> {
         for (parameter, given) in &self.0 {
             match given {
@@ -49,12 +49,12 @@ impl ParameterOptions {
         Ok(())
     }
 
-    /// Whether nothing was given.
+    /// Whether no parameter is given.
     pub(crate) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// The files among what was given.
+    /// The files that are given as values.
     pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.0.iter().filter_map(|(_, given)| match given {
             Given::Curve(path) => Some(path),
@@ -80,7 +80,7 @@ impl FromArgMatches for ParameterOptions {
             Some((parameter, given.clone()))
         };
         let mut all: Vec<_> = Parameter::all().filter_map(given).collect();
-        // Pixels of another size first: what is in pixels is in these.
+        // The pixel size first: other values are in pixels of that size.
         all.sort_by_key(|(parameter, _)| parameter.name() != "pixel_area_um2");
         Ok(Self(all))
     }
@@ -93,43 +93,49 @@ impl FromArgMatches for ParameterOptions {
 
 fn option(parameter: Parameter) -> Arg {
     let name = parameter.name();
-    let others = SAME.iter().filter(|same| same.contains(&name));
-    let others = others.flat_map(|same| same.iter().filter(|other| **other != name));
-    let mut about = parameter.about().to_owned();
-    about[..1].make_ascii_uppercase();
-    let default = match parameter {
-        Parameter::Camera(_) => None,
-        Parameter::Conditions(key) => (key.get)(&Conditions::default()),
+    let others = EXCLUSIVE.iter().filter(|group| group.contains(&name));
+    let others = others.flat_map(|group| group.iter().filter(|other| **other != name));
+    let (heading, default) = match parameter {
+        Parameter::Camera(_) => ("Camera", None),
+        Parameter::Conditions(key) => ("Conditions", (key.get)(&Conditions::default())),
     };
     let default = default.map_or_else(String::new, |value| {
         format!(" [default with --camera: {}]", number(value))
     });
-    let arg = Arg::new(name).long(name.replace('_', "-"));
-    // As `process` has it.
-    let arg = match name {
+    let arg = number_option(name, parameter.about(), parameter.limits(), &default)
+        .help_heading(heading)
+        .conflicts_with_all(others.copied())
+        .value_parser(move |text: &str| given(parameter, text));
+    match name {
+        // The name of the option of `process`.
         "exposure_s" => arg.visible_alias("exposure"),
+        _ if is_curve(name) => arg.value_name("NUMBER|FILE.csv"),
         _ => arg,
-    };
-    arg.value_name(if is_curve(name) {
-        "NUMBER|FILE.csv"
-    } else {
-        "NUMBER"
-    })
-    .help(format!("{about}: {}{default}", parameter.limits()))
-    .help_heading(match parameter {
-        Parameter::Camera(_) => "Camera",
-        Parameter::Conditions(_) => "Conditions",
-    })
-    .allow_hyphen_values(true)
-    .conflicts_with_all(others.copied())
-    .value_parser(move |text: &str| given(parameter, text))
+    }
 }
 
 fn given(parameter: Parameter, text: &str) -> Result<Given, String> {
-    let limits = parameter.limits();
+    if is_curve(parameter.name()) && text.trim().parse::<f64>().is_err() {
+        return Ok(Given::Curve(PathBuf::from(text)));
+    }
+    within_limits(text, parameter.limits()).map(Given::Number)
+}
+
+/// An option for a number, without its parser.
+pub(super) fn number_option(name: &'static str, about: &str, limits: Limits, default: &str) -> Arg {
+    let mut about = about.to_owned();
+    about[..1].make_ascii_uppercase();
+    Arg::new(name)
+        .long(name.replace('_', "-"))
+        .value_name("NUMBER")
+        .help(format!("{about}: {limits}{default}"))
+        .allow_hyphen_values(true)
+}
+
+/// Parses a number and checks its limits.
+pub(super) fn within_limits(text: &str, limits: Limits) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
-        Ok(value) if limits.accept(value) => Ok(Given::Number(value)),
-        Err(_) if is_curve(parameter.name()) => Ok(Given::Curve(PathBuf::from(text))),
+        Ok(value) if limits.accept(value) => Ok(value),
         _ => Err(format!("expected {limits}")),
     }
 }

@@ -1,24 +1,23 @@
-//! A camera and its conditions.
+//! A camera and its observing conditions.
 
 use super::parameters::ParameterOptions;
 use crate::cli::exit::CommandError;
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use starpipe::camera::data_sheet::{DataSheet, Preset};
 use starpipe::model::sensitivity::{Reading, Scenario, ScenarioError};
 use std::path::{Path, PathBuf};
 
-/// A camera and its conditions.
 #[derive(Debug, Args)]
 pub(crate) struct ScenarioOptions {
     /// Camera, as `starpipe camera new` writes one
     #[arg(long, value_name = "camera.toml", conflicts_with = "preset")]
     pub(crate) camera: Option<PathBuf>,
-    /// A camera that is built in, and its conditions
+    /// A built-in camera with its observing conditions
     #[arg(long, value_name = "NAME", value_parser = preset())]
     pub(crate) preset: Option<Preset>,
-    /// Which equations [default: as the paper has them for its experiments, else physical]
+    /// Which equations [default: paper for the paper's two experiments, else physical]
     #[arg(long, value_enum)]
     pub(crate) reading: Option<ReadingArg>,
     #[command(flatten)]
@@ -29,20 +28,20 @@ pub(crate) struct ScenarioOptions {
 pub(crate) enum ReadingArg {
     /// Equations (1) to (12) of Tong, Li & Wang 2014 as their authors used them
     Paper,
-    /// The same budget with the physics put right
+    /// The same budget with the physical errors corrected
     Physical,
 }
 
 impl ScenarioOptions {
-    /// The files that are read.
+    /// The files that are to be read.
     pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.camera.iter().chain(self.parameters.files())
     }
 
-    /// The scenario that is asked for, in which every value makes sense.
+    /// The scenario that the options describe, checked.
     pub(crate) fn scenario(&self) -> Result<Scenario, CommandError> {
         let mut scenario = match self.camera.as_deref() {
-            Some(path) => described(path)?,
+            Some(path) => of_camera(path)?,
             None => Scenario::of(self.preset.unwrap_or(Preset::Experiment1)),
         };
         match self.reading {
@@ -50,35 +49,29 @@ impl ScenarioOptions {
             Some(ReadingArg::Paper) => scenario.reading = Reading::Paper,
             Some(ReadingArg::Physical) => scenario.reading = Reading::Physical,
         }
-        self.parameters
-            .apply(&mut scenario)
-            .map_err(anyhow::Error::from)?;
-        scenario
-            .check()
-            .map_err(|error| match self.parameters.files().next() {
-                // A curve that goes with nothing else is a fault of its file.
-                Some(path) => anyhow!(error).context(path.display().to_string()).into(),
-                None => usage(&error),
-            })?;
-        Ok(scenario)
+        self.parameters.apply(&mut scenario)?;
+        match (scenario.check(), self.parameters.files().next()) {
+            (Ok(()), _) => Ok(scenario),
+            // The error is in the curve's file rather than in the options.
+            (Err(error), Some(path)) => Err(in_file(error, path)),
+            (Err(error), None) => Err(CommandError::usage(error)),
+        }
     }
 }
 
 /// The camera in a file under the default conditions.
-fn described(path: &Path) -> anyhow::Result<Scenario> {
+fn of_camera(path: &Path) -> Result<Scenario, CommandError> {
     let scenario = Scenario::new(DataSheet::read(path)?);
-    // What a file says is a fault of the file, not of the options.
-    scenario
-        .check()
-        .with_context(|| path.display().to_string())?;
-    Ok(scenario)
+    let checked = scenario.check().map_err(|error| in_file(error, path));
+    checked.map(|()| scenario)
 }
 
-pub(crate) fn usage(error: &ScenarioError) -> CommandError {
-    CommandError::Usage(error.to_string())
+/// The error, with the file that caused it.
+pub(crate) fn in_file(error: ScenarioError, path: &Path) -> CommandError {
+    anyhow!(error).context(path.display().to_string()).into()
 }
 
-/// A preset by its name.
+/// Parses the name of a built-in camera.
 pub(crate) fn preset() -> impl TypedValueParser<Value = Preset> {
     let names = Preset::ALL.map(|preset| PossibleValue::new(preset.name()).help(preset.about()));
     PossibleValuesParser::new(names).try_map(|name| Preset::named(&name).ok_or("no such preset"))

@@ -1,15 +1,14 @@
-//! What is simulated, as it is typed: a camera, its conditions, and the scene, with an option for every number.
+//! Options for simulated frames: a camera, its conditions, and the scene, with an option for every number.
 
-use super::scenario::ScenarioOptions;
+use super::parameters::{number_option, within_limits};
+use super::scenario::{ScenarioOptions, in_file};
 use crate::cli::exit::CommandError;
-use anyhow::anyhow;
 use clap::{Arg, ArgAction, ArgGroup, ArgMatches, Args, Command, Error, FromArgMatches};
 use starpipe::base::format::five_digits as number;
 use starpipe::camera::data_sheet::SpotForm;
 use starpipe::model::sensitivity::ScenarioError;
 use starpipe::model::simulate::{Scene, Setup, SetupParameter};
 
-/// What is simulated.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("simulated").args(["camera", "preset"]).required(true))]
 pub(crate) struct SetupOptions {
@@ -20,7 +19,7 @@ pub(crate) struct SetupOptions {
 }
 
 impl SetupOptions {
-    /// What is asked for, in which every value makes sense.
+    /// The setup that the options describe, checked.
     pub(crate) fn setup(&self) -> Result<Setup, CommandError> {
         let scenario = self.scenario.scenario()?;
         let mut setup = Setup {
@@ -28,24 +27,22 @@ impl SetupOptions {
             scene: Scene::default(),
         };
         self.scene.apply(&mut setup);
-        setup.check().map_err(|error| self.at_fault(error))?;
+        setup.check().map_err(|error| self.cause(error))?;
         Ok(setup)
     }
-}
 
-impl SetupOptions {
-    /// What a file says is a fault of the file, where no option was given besides.
-    fn at_fault(&self, error: ScenarioError) -> CommandError {
+    /// The error, with the camera's file if no option can be the cause.
+    fn cause(&self, error: ScenarioError) -> CommandError {
         match &self.scenario.camera {
             Some(path) if self.scenario.parameters.is_empty() && self.scene.is_empty() => {
-                anyhow!(error).context(path.display().to_string()).into()
+                in_file(error, path)
             }
-            _ => CommandError::Usage(error.to_string()),
+            _ => CommandError::usage(error),
         }
     }
 }
 
-/// The numbers given beyond those that the limit depends on.
+/// The options given of the scene and of the camera's imperfections: those beyond the scenario's parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct SceneOptions {
     numbers: Vec<(SetupParameter, f64)>,
@@ -78,14 +75,14 @@ impl clap::Args for SceneOptions {
         let spot_form = Arg::new(SPOT_FORM)
             .long("spot-form")
             .value_name(forms.clone())
-            .help("Form of a star's spot: integrated or sampled Gaussian, or an even disc [default: the camera's]")
+            .help("Form of a star's spot: integrated or sampled Gaussian, or a uniform disc [default: the camera's]")
             .help_heading(CAMERA_HEADING)
             .value_parser(move |text: &str| {
                 SpotForm::named(text).ok_or_else(|| format!("expected {forms}"))
             });
         let mirrored = Arg::new(MIRRORED)
             .long("mirrored")
-            .help("Reverse the image left to right")
+            .help("Reverse the image from left to right")
             .help_heading(CAMERA_HEADING)
             .action(ArgAction::SetTrue);
         let numbers = SetupParameter::beyond_scenario().map(option);
@@ -119,9 +116,6 @@ impl FromArgMatches for SceneOptions {
 }
 
 fn option(parameter: SetupParameter) -> Arg {
-    let name = parameter.name();
-    let mut about = parameter.about().to_owned();
-    about[..1].make_ascii_uppercase();
     let limits = parameter.limits();
     let (heading, default) = match parameter {
         SetupParameter::Scene(key) => {
@@ -131,14 +125,7 @@ fn option(parameter: SetupParameter) -> Arg {
         }
         _ => (CAMERA_HEADING, " [default: the camera's]".to_owned()),
     };
-    Arg::new(name)
-        .long(name.replace('_', "-"))
-        .value_name("NUMBER")
-        .help(format!("{about}: {limits}{default}"))
+    number_option(parameter.name(), parameter.about(), limits, &default)
         .help_heading(heading)
-        .allow_hyphen_values(true)
-        .value_parser(move |text: &str| match text.trim().parse::<f64>() {
-            Ok(value) if limits.accept(value) => Ok(value),
-            _ => Err(format!("expected {limits}")),
-        })
+        .value_parser(move |text: &str| within_limits(text, limits))
 }

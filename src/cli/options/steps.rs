@@ -1,10 +1,10 @@
-//! Values of a sweep: FROM:TO:COUNT[:log].
+//! Values of a sweep, typed as FROM:TO:COUNT[:log].
 
 use super::values::{finite, not_of_form, whole};
 use starpipe::model::sensitivity::Spacing;
 use std::str::FromStr;
 
-/// FROM:TO:COUNT[:log].
+/// First and last value, their number, and how they are spaced.
 pub(crate) struct Steps {
     pub(crate) ends: (f64, f64),
     pub(crate) count: usize,
@@ -12,7 +12,7 @@ pub(crate) struct Steps {
 }
 
 impl Steps {
-    /// Of `range`, which is `text` or the end of it; `form` is what that should look like.
+    /// Parses `range`, the whole or the end of `text`; `form` is the expected form of `text`.
     fn of(range: &str, text: &str, form: &str) -> Result<Self, String> {
         let parts: Vec<&str> = range.split(':').collect();
         let (from, to, count, spacing) = match parts[..] {
@@ -26,6 +26,12 @@ impl Steps {
             spacing,
         })
     }
+
+    /// The values, which must rise.
+    pub(crate) fn values(&self) -> Result<Vec<f64>, String> {
+        let values = self.spacing.checked_values(self.ends, self.count);
+        values.map_err(|error| error.to_string())
+    }
 }
 
 impl FromStr for Steps {
@@ -36,7 +42,7 @@ impl FromStr for Steps {
     }
 }
 
-/// The parts of NAME=FROM:TO:COUNT[:log].
+/// Parses NAME=FROM:TO:COUNT[:log]; the name is returned with _ for -.
 pub(crate) fn named_steps(text: &str) -> Result<(String, Steps), String> {
     const FORM: &str = "NAME=FROM:TO:COUNT or NAME=FROM:TO:COUNT:log";
     let (name, range) = text

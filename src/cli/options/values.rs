@@ -1,8 +1,8 @@
-//! Values of options: what is out of range is refused where it is typed.
+//! Parsers of option values, which refuse values out of range.
 
 use std::fmt::Display;
 
-/// The longest side of a frame that makes sense, in pixels.
+/// Largest side of a frame, in pixels.
 pub(crate) const MAX_SIDE_PX: i64 = 1_000_000;
 
 /// A direction on the sky, in degrees.
@@ -12,7 +12,7 @@ pub(crate) struct Direction {
     pub(crate) dec_deg: f64,
 }
 
-/// Any number that is one.
+/// A number; neither NaN nor infinite.
 pub(crate) fn finite(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
@@ -39,12 +39,12 @@ pub(crate) fn positive(text: &str) -> Result<f64, String> {
     within(text, "the number", |v| v > 0.0, "above 0")
 }
 
-/// A number that is zero or above it.
+/// A number of zero or above.
 pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
     within(text, "the number", |v| v >= 0.0, "0 or above")
 }
 
-/// A number above zero, one at most.
+/// A number above zero and at most one.
 pub(crate) fn share(text: &str) -> Result<f64, String> {
     within(
         text,
@@ -158,24 +158,15 @@ pub(crate) fn radius(text: &str) -> Result<f64, String> {
     )
 }
 
-/// Right ascension and declination in degrees, with a comma between them.
+/// Right ascension and declination in degrees, separated by a comma.
 pub(crate) fn direction(text: &str) -> Result<Direction, String> {
-    let (ra, dec) = text.split_once(',').ok_or(
-        "right ascension and declination in degrees are needed, with a comma between them",
-    )?;
-    let ra_deg = within(
-        ra,
-        "right ascension",
-        |v| (0.0..=360.0).contains(&v),
-        "from 0 to 360 degrees",
-    )?;
-    let dec_deg = within(
-        dec,
-        "declination",
-        |v| (-90.0..=90.0).contains(&v),
-        "from -90 to 90 degrees",
-    )?;
-    Ok(Direction { ra_deg, dec_deg })
+    let (ra, dec) = text
+        .split_once(',')
+        .ok_or("expected right ascension and declination in degrees, separated by a comma")?;
+    Ok(Direction {
+        ra_deg: right_ascension(ra)?,
+        dec_deg: declination(dec)?,
+    })
 }
 
 pub(crate) fn not_of_form(text: &str, form: &str) -> String {
@@ -192,7 +183,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_number_is_finite() {
+    fn nan_infinity_and_words_are_refused() {
         assert_eq!(finite(" -1.5 "), Ok(-1.5));
         for text in ["NaN", "inf", "-inf", "", "ten", "1,5"] {
             assert!(finite(text).is_err(), "{text}");
@@ -200,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_direction_is_on_the_sky() {
+    fn a_direction_off_the_sky_is_refused() {
         let orion = Direction {
             ra_deg: 83.8,
             dec_deg: -1.2,
@@ -213,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn ranges_leave_out_what_makes_no_sense() {
+    fn values_out_of_range_are_refused() {
         assert!(field_of_view("180").is_err() && field_of_view("0").is_err());
         assert!(percent("100").is_err() && percent("10").is_ok());
         assert!(radius("181").is_err() && radius("180").is_ok());

@@ -5,8 +5,11 @@ use starpipe::base::files;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Writes files whole or not at all: into temporary files beside them, which take their names once all are written.
-pub(crate) fn write_whole(files: &[(PathBuf, Vec<u8>)]) -> anyhow::Result<()> {
+/// A file to write: its path and its content.
+pub(crate) type NewFile = (PathBuf, Vec<u8>);
+
+/// Writes all files or none: into temporary files beside them, which are renamed once all are written.
+pub(crate) fn write_whole(files: &[NewFile]) -> anyhow::Result<()> {
     let writing = |path: &Path| format!("writing {}", path.display());
     let write = |path: &Path, content: &[u8]| {
         let mut file = files::beside(path)?;
@@ -19,18 +22,40 @@ pub(crate) fn write_whole(files: &[(PathBuf, Vec<u8>)]) -> anyhow::Result<()> {
         written.push((path, file));
     }
     for (path, file) in written {
-        // The error would keep the temporary file as long as it lives.
+        // The error itself owns the temporary file and would keep it.
         let persisted = file.persist(path).map_err(|refused| refused.error);
         persisted.with_context(|| writing(path))?;
     }
     Ok(())
 }
 
-/// Writes `files` into `directory`, all or none.
-pub(crate) fn save(directory: &Path, files: &[(PathBuf, Vec<u8>)]) -> anyhow::Result<()> {
+/// Writes all files or none into `directory`, which is made if necessary; `files` are names and contents.
+pub(crate) fn write_into(
+    directory: &Path,
+    files: impl IntoIterator<Item = (String, Vec<u8>)>,
+) -> anyhow::Result<Vec<PathBuf>> {
+    make_directory(directory)?;
+    let placed = |(name, content)| (directory.join::<String>(name), content);
+    let files: Vec<NewFile> = files.into_iter().map(placed).collect();
+    write_whole(&files)?;
+    Ok(files.into_iter().map(|(path, _)| path).collect())
+}
+
+/// Makes `directory` and those above it, if necessary.
+pub(crate) fn make_directory(directory: &Path) -> anyhow::Result<()> {
     std::fs::create_dir_all(directory)
-        .with_context(|| format!("making the directory {}", directory.display()))?;
-    write_whole(files)
+        .with_context(|| format!("making the directory {}", directory.display()))
+}
+
+/// Removes a file of an earlier run. Returns whether it existed.
+pub(crate) fn remove_outdated(path: &Path) -> anyhow::Result<bool> {
+    match std::fs::remove_file(path) {
+        Ok(()) => Ok(true),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+        Err(error) => {
+            Err(error).with_context(|| format!("removing {}, which is out of date", path.display()))
+        }
+    }
 }
 
 #[cfg(test)]
@@ -38,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_is_replaced_whole_and_nothing_is_left_beside_it() {
+    fn a_file_is_replaced_and_no_temporary_file_remains() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("a.json");
         for content in [&b"one, and long"[..], b"two"] {
@@ -49,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_cannot_be_written_leaves_nothing_behind_nor_those_before_it() {
+    fn if_one_file_cannot_be_written_none_is() {
         let directory = tempfile::tempdir().unwrap();
         let there = directory.path().join("a.json");
         let elsewhere = directory.path().join("not/there/a.csv");
@@ -63,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_that_is_taken_by_a_directory_is_no_file_to_write() {
+    fn a_directory_is_not_replaced_by_a_file() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("taken");
         std::fs::create_dir(&path).unwrap();

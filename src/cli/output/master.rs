@@ -1,8 +1,8 @@
-//! Master frames as FITS files.
+//! Master darks and flats as FITS files.
 
 use starpipe::frame::{CALIBRATION_CREATOR, FitsHeader, FitsSamples, Frame, write_fits};
 
-/// The beginning of the header of every master: it is known by it.
+/// The first keywords of every master's header: starpipe recognizes its masters by them.
 pub(crate) fn header(kind: &str, frames: usize) -> FitsHeader {
     let mut header = FitsHeader::default();
     header.text("CREATOR", CALIBRATION_CREATOR, "");
@@ -11,8 +11,8 @@ pub(crate) fn header(kind: &str, frames: usize) -> FitsHeader {
     header
 }
 
-/// The bytes of an image of floats.
-pub(crate) fn image(
+/// Content of a FITS file with an image of 32-bit floats.
+pub(crate) fn fits_image(
     (width, height): (usize, usize),
     pixels: &[f32],
     header: &FitsHeader,

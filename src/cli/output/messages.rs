@@ -1,10 +1,27 @@
-//! Errors and warnings on standard error.
+//! Errors and warnings on standard error, each in one line.
 
 use starpipe::base::format::printable;
 use std::fmt::Display;
 use std::io::{self, Write};
 
-/// An error and its causes in one line. A cause that the message before it ends with is not said again.
+/// Reports an error with its causes.
+pub(crate) fn report_error(error: &(dyn std::error::Error + 'static)) {
+    report(one_line(error));
+}
+
+/// Reports something unexpected that leaves the results valid.
+pub(crate) fn report_warning(message: impl Display) {
+    report(format_args!("warning: {message}"));
+}
+
+/// Writes one line to standard error.
+pub(crate) fn report(message: impl Display) {
+    let line = printable(&format!("starpipe: {message}"));
+    // If standard error cannot be written, the exit status still tells of the failure.
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// An error and its causes in one line, without causes that the text before them already ends with.
 pub(crate) fn one_line(error: &(dyn std::error::Error + 'static)) -> String {
     let mut line = String::new();
     for cause in std::iter::successors(Some(error), |error| error.source()) {
@@ -18,25 +35,13 @@ pub(crate) fn one_line(error: &(dyn std::error::Error + 'static)) -> String {
     line.replace('\n', " ")
 }
 
-/// Tells of trouble, on standard error.
-pub(crate) fn report_error(message: impl Display) {
-    let line = printable(&format!("starpipe: {message}"));
-    // Where standard error cannot be written nobody can be told; the exit status still does.
-    let _ = writeln!(io::stderr(), "{line}");
-}
-
-/// Tells of something odd that does no harm, on standard error.
-pub(crate) fn report_warning(message: impl Display) {
-    report_error(format_args!("warning: {message}"));
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use anyhow::{Context, anyhow};
 
     #[test]
-    fn causes_are_chained_in_one_line_and_said_once() {
+    fn causes_are_joined_in_one_line_without_repetition() {
         let cause = anyhow!("no such file");
         let error = Err::<(), _>(cause)
             .context("a.tif: no such file")

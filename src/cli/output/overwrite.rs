@@ -1,78 +1,78 @@
-//! What `--out` may write over: results of an earlier run, and nothing else.
+//! What may be overwritten: results of an earlier run, and nothing else.
 
 use super::paths::{output_path, result_stem};
 use crate::cli::exit::CommandError;
 use starpipe::frame;
+use starpipe::report::wcs;
 use std::collections::{HashMap, HashSet};
 use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// As much of a file tells whether it is a result: the longest header has fewer bytes.
+/// This much of a file shows whether it is a result: the longest header has fewer bytes.
 const HEAD_BYTES: u64 = 1 << 16;
 
-/// Refuses inputs whose results would overwrite each other, one of the inputs, or a file that is no result.
+/// Refuses inputs whose results would overwrite each other, an input, or a file that is not a result.
 pub(crate) fn check(
     inputs: &[PathBuf],
     directory: &Path,
     extensions: &[&str],
 ) -> Result<(), CommandError> {
-    check_each_other(inputs, directory)?;
-    let inputs_found: HashSet<PathBuf> = inputs
-        .iter()
-        .filter_map(|i| i.canonicalize().ok())
-        .collect();
+    check_names_differ(inputs, directory)?;
+    let inputs_found = found(inputs);
     for input in inputs {
+        let results = format!("the results of {}", input.display());
         for extension in extensions {
-            let output = output_path(directory, input, extension);
-            let Ok(there) = output.canonicalize() else {
-                continue;
-            };
-            let what = if inputs_found.contains(&there) {
-                "the input"
-            } else if is_result(&there, extension) {
-                continue;
-            } else {
-                "a file that starpipe did not write:"
-            };
-            return Err(CommandError::Usage(format!(
-                "the results of {} would overwrite {what} {}; choose another directory for --out",
-                input.display(),
-                output.display(),
-            )));
+            check_result(
+                &output_path(directory, input, extension),
+                &inputs_found,
+                &results,
+            )?;
         }
     }
     Ok(())
 }
 
-/// Refuses to write `results` over one of the inputs, or over a file that is no result.
+/// Refuses `results` that would overwrite an input, or a file that is not a result.
 pub(crate) fn check_results(inputs: &[PathBuf], results: &[PathBuf]) -> Result<(), CommandError> {
-    let inputs_found: HashSet<PathBuf> = inputs
+    let inputs_found = found(inputs);
+    results
         .iter()
-        .filter_map(|i| i.canonicalize().ok())
-        .collect();
-    for output in results {
-        let Ok(there) = output.canonicalize() else {
-            continue;
-        };
-        let extension = output.extension().and_then(OsStr::to_str);
-        let what = if inputs_found.contains(&there) {
-            "the input"
-        } else if is_result(&there, extension.unwrap_or_default()) {
-            continue;
-        } else {
-            "a file that starpipe did not write:"
-        };
-        return Err(CommandError::Usage(format!(
-            "the results would overwrite {what} {}; choose another directory for --out",
-            output.display(),
-        )));
-    }
-    Ok(())
+        .try_for_each(|result| check_result(result, &inputs_found, "the results"))
 }
 
-fn check_each_other(inputs: &[PathBuf], directory: &Path) -> Result<(), CommandError> {
+/// The inputs that exist, with links resolved.
+fn found(inputs: &[PathBuf]) -> HashSet<PathBuf> {
+    inputs
+        .iter()
+        .filter_map(|input| input.canonicalize().ok())
+        .collect()
+}
+
+fn check_result(
+    output: &Path,
+    inputs_found: &HashSet<PathBuf>,
+    results: &str,
+) -> Result<(), CommandError> {
+    let Ok(existing) = output.canonicalize() else {
+        return Ok(());
+    };
+    let extension = output.extension().and_then(OsStr::to_str);
+    let what = if inputs_found.contains(&existing) {
+        "the input"
+    } else if is_result(&existing, extension.unwrap_or_default()) {
+        return Ok(());
+    } else {
+        "a file that starpipe did not write:"
+    };
+    Err(CommandError::Usage(format!(
+        "{results} would overwrite {what} {}; choose another directory for --out",
+        output.display(),
+    )))
+}
+
+fn check_names_differ(inputs: &[PathBuf], directory: &Path) -> Result<(), CommandError> {
     let mut taken: HashMap<&OsStr, &Path> = HashMap::new();
     for input in inputs {
         if let Some(other) = taken.insert(result_stem(input), input) {
@@ -87,7 +87,13 @@ fn check_each_other(inputs: &[PathBuf], directory: &Path) -> Result<(), CommandE
     Ok(())
 }
 
-/// Whether `path` is a result of this form, or empty. Anything but a regular file is not, and one that cannot be read.
+/// Whether both paths lead to the same file, which exists.
+pub(crate) fn is_same_file(a: &Path, b: &Path) -> bool {
+    let found = a.canonicalize();
+    found.is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
+}
+
+/// Whether `path` is a regular file that is a result of this kind, or empty. Unreadable files are not.
 fn is_result(path: &Path, extension: &str) -> bool {
     let head = || -> io::Result<Vec<u8>> {
         let mut head = Vec::new();
@@ -106,6 +112,6 @@ fn begins_like_a_result(head: &[u8], extension: &str) -> bool {
         "csv" => head.starts_with(b"frame,x,y,") || head.starts_with(b"x,y,level_adu,"),
         "fits" => frame::is_calibration_frame(head),
         "png" => frame::is_overlay(head),
-        _ => starpipe::report::wcs::is_header(head),
+        _ => wcs::is_header(head),
     }
 }

@@ -1,10 +1,10 @@
-//! Names of files of results.
+//! Names of result files.
 
-use crate::cli::input::frames::is_stdin;
+use crate::cli::input::stdin::is_stdin;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// The name under which the results of `input` are written, without its extension.
+/// The name of the result files of `input`, without extension.
 pub(crate) fn result_stem(input: &Path) -> &OsStr {
     if is_stdin(input) {
         return OsStr::new("stdin");
@@ -12,7 +12,7 @@ pub(crate) fn result_stem(input: &Path) -> &OsStr {
     input.file_stem().unwrap_or(OsStr::new("frame"))
 }
 
-/// The file that holds the results of `input` in one form.
+/// The path of the result file of `input` with this extension.
 pub(crate) fn output_path(directory: &Path, input: &Path, extension: &str) -> PathBuf {
     let mut name = result_stem(input).to_owned();
     name.push(".");

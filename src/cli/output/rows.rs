@@ -1,23 +1,34 @@
-//! Tables of serializable rows.
+//! Serializable values as JSON and CSV.
 
+use anyhow::Context;
 use serde::Serialize;
 
-/// Rows as JSON Lines.
-pub(crate) fn json_lines<R: Serialize>(rows: impl Iterator<Item = R>) -> anyhow::Result<String> {
-    let mut lines = String::new();
-    for row in rows {
-        lines += &serde_json::to_string(&row)?;
-        lines.push('\n');
-    }
-    Ok(lines)
+/// One JSON object on one line.
+pub(crate) fn json_line(value: &impl Serialize) -> anyhow::Result<String> {
+    Ok(serde_json::to_string(value).context("writing JSON")? + "\n")
 }
 
-/// Rows as a CSV table with a heading.
+/// JSON Lines: one object for each row.
+pub(crate) fn json_lines<R: Serialize>(rows: impl Iterator<Item = R>) -> anyhow::Result<String> {
+    rows.map(|row| json_line(&row)).collect()
+}
+
+/// Indented JSON, for files that people read as well.
+pub(crate) fn json_indented(value: &impl Serialize) -> anyhow::Result<String> {
+    Ok(serde_json::to_string_pretty(value).context("writing JSON")? + "\n")
+}
+
+/// A CSV table with a heading, which is missing if there is no row.
 pub(crate) fn csv_table<R: Serialize>(rows: impl Iterator<Item = R>) -> anyhow::Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in rows {
         writer.serialize(row)?;
     }
+    finished(writer)
+}
+
+/// The text that `writer` has written.
+pub(crate) fn finished(writer: csv::Writer<Vec<u8>>) -> anyhow::Result<String> {
     let bytes = writer
         .into_inner()
         .map_err(csv::IntoInnerError::into_error)?;

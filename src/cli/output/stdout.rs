@@ -4,7 +4,7 @@ use anyhow::Context;
 use std::io::{self, Write};
 use std::ops::ControlFlow;
 
-/// Writes `text` to standard output, whole and at once. Breaks off where nobody reads it any longer.
+/// Writes `text` to standard output and flushes it. Breaks if the reader has closed the pipe.
 pub(crate) fn print(text: &str) -> anyhow::Result<ControlFlow<()>> {
     let mut stdout = io::stdout().lock();
     let written = stdout

@@ -6,6 +6,8 @@ use crate::cli::options::format::Format;
 use crate::cli::options::values::{self, MAX_SIDE_PX};
 use crate::cli::plot::PlotFile;
 use clap::{Args, ValueEnum};
+use starpipe::identify::Photometry;
+use starpipe::study::robustness::{Mirrored, Protocol};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
@@ -13,81 +15,114 @@ use clap::{Args, ValueEnum};
     starpipe robustness --trials 10000 --stars 20 --format csv > robustness.csv\n  \
     starpipe robustness --sweep centroid-error=0:5:11 --sweep false=0:200:9 --plot robustness.svg\n\n\
     Lists of centroids are drawn from the catalogue, at attitudes uniform over all rotations, with errors, missing\n\
-    and false stars, and identified as `starpipe identify` does. Without --sweep the table is the standard\n\
-    one: five fields of view, then one thing worse at a time in a field of 10 degrees.")]
+    and false stars, and identified like those of `starpipe identify`. Without --sweep the table is the\n\
+    standard one: five fields of view, then one worse condition at a time in a field of 10 degrees.")]
 pub(crate) struct RobustnessArgs {
     /// Trials in each row of the table
     #[arg(long, value_name = "NUMBER", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
-    pub(crate) trials: u64,
+    pub(super) trials: u64,
     /// Seed of the random numbers
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
-    pub(crate) seed: u64,
+    pub(super) seed: u64,
     #[command(flatten)]
-    pub(crate) protocol: ProtocolOptions,
-    /// Trials with fewer true stars than this count only where the answer is wrong
+    pub(super) protocol: ProtocolOptions,
+    /// Trials with fewer true stars than this count only if the answer is wrong
     #[arg(long, value_name = "NUMBER", default_value_t = 8)]
-    pub(crate) least_true_stars: usize,
-    /// Vary one thing from one value to another in so many steps, in place of the standard table (fov, stars,
-    /// centroid-error, mag-error, missing or false; may be repeated)
+    pub(super) least_true_stars: usize,
+    /// Vary one parameter over COUNT values, in place of the standard table (fov, stars, centroid-error, mag-error,
+    /// missing or false; may be repeated)
     #[arg(long, value_name = "NAME=FROM:TO:COUNT")]
-    pub(crate) sweep: Vec<Sweep>,
+    pub(super) sweep: Vec<Sweep>,
     /// What to print
     #[arg(long, value_enum, default_value_t = Format::Text)]
-    pub(crate) format: Format,
+    pub(super) format: Format,
     /// Also draw the rates into this file
     #[arg(long, value_name = "FILE.svg|png", value_parser = PlotFile::parser())]
-    pub(crate) plot: Option<PlotFile>,
+    pub(super) plot: Option<PlotFile>,
     #[command(flatten)]
-    pub(crate) resources: CatalogOptions,
+    pub(super) catalog: CatalogOptions,
 }
 
 #[derive(Debug, Args)]
-#[command(next_help_heading = "What is drawn")]
-pub(crate) struct ProtocolOptions {
+#[command(next_help_heading = "Simulated lists")]
+pub(super) struct ProtocolOptions {
     /// Horizontal field of view in degrees, for sweeps
     #[arg(long, value_name = "DEG", default_value_t = 10.0, value_parser = values::field_of_view, allow_hyphen_values = true)]
-    pub(crate) fov: f64,
+    pub(super) fov: f64,
     /// Width of the frame in pixels
     #[arg(long, value_name = "PIXELS", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(3..=MAX_SIDE_PX))]
-    pub(crate) width: u32,
+    pub(super) width: u32,
     /// Height of the frame in pixels
     #[arg(long, value_name = "PIXELS", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(3..=MAX_SIDE_PX))]
-    pub(crate) height: u32,
-    /// Catalogue stars on a frame on average over the sky, which sets the limiting magnitude
+    pub(super) height: u32,
+    /// Mean number of catalogue stars on a frame, which sets the limiting magnitude
     #[arg(long, value_name = "NUMBER", default_value_t = 30.0, value_parser = values::star_count)]
-    pub(crate) stars: f64,
-    /// Standard deviation of a centroid on each axis, in pixels
+    pub(super) stars: f64,
+    /// Standard deviation of centroids on each axis, in pixels
     #[arg(long, value_name = "PIXELS", default_value_t = 0.3, value_parser = values::not_negative)]
-    pub(crate) centroid_error: f64,
-    /// Standard deviation of a magnitude
+    pub(super) centroid_error: f64,
+    /// Standard deviation of magnitudes
     #[arg(long, value_name = "MAG", default_value_t = 0.2, value_parser = values::not_negative)]
-    pub(crate) mag_error: f64,
+    pub(super) mag_error: f64,
     /// Stars that are missing, in percent
     #[arg(long, value_name = "PERCENT", default_value_t = 15.0, value_parser = values::part)]
-    pub(crate) missing: f64,
+    pub(super) missing: f64,
     /// False stars, in percent of the true ones
     #[arg(long = "false", value_name = "PERCENT", default_value_t = 15.0, value_parser = values::multiple)]
-    pub(crate) false_stars: f64,
-    /// How far off the stated field of view may be, in percent
+    pub(super) false_stars: f64,
+    /// Largest error of the stated field of view, in percent
     #[arg(long, value_name = "PERCENT", default_value_t = 10.0, value_parser = values::percent, conflicts_with = "scale_unknown")]
-    pub(crate) scale_error: f64,
+    pub(super) scale_error: f64,
     /// State no field of view
     #[arg(long)]
-    pub(crate) scale_unknown: bool,
+    pub(super) scale_unknown: bool,
     /// Which frames are mirrored
     #[arg(long, value_enum, default_value_t = MirroredArg::Half)]
-    pub(crate) mirrored: MirroredArg,
-    /// Give magnitudes as Johnson V, and not as fluxes with an unknown zero point
+    pub(super) mirrored: MirroredArg,
+    /// Give Johnson V magnitudes, not fluxes with an unknown zero point
     #[arg(long)]
-    pub(crate) vmag: bool,
+    pub(super) vmag: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum MirroredArg {
+pub(super) enum MirroredArg {
     /// None
     Never,
     /// Every second one, at random
     Half,
     /// All
     Always,
+}
+
+impl ProtocolOptions {
+    /// The protocol that the options describe.
+    pub(super) fn protocol(&self) -> Protocol {
+        Protocol {
+            fov_deg: self.fov,
+            width_px: self.width as usize,
+            height_px: self.height as usize,
+            mean_stars: self.stars,
+            centroid_sigma_px: self.centroid_error,
+            mag_sigma: self.mag_error,
+            missing: self.missing / 100.0,
+            false_stars: self.false_stars / 100.0,
+            scale_error: (!self.scale_unknown).then_some(self.scale_error / 100.0),
+            mirrored: self.mirrored.into(),
+            photometry: if self.vmag {
+                Photometry::JohnsonV
+            } else {
+                Photometry::Instrumental
+            },
+        }
+    }
+}
+
+impl From<MirroredArg> for Mirrored {
+    fn from(argument: MirroredArg) -> Self {
+        match argument {
+            MirroredArg::Never => Self::Never,
+            MirroredArg::Half => Self::Half,
+            MirroredArg::Always => Self::Always,
+        }
+    }
 }

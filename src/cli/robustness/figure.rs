@@ -1,6 +1,6 @@
 //! The rates as a figure: a panel for each parameter that is swept, or the standard table.
 
-use super::table::SweptRow;
+use super::rows::SweptRow;
 use crate::cli::plot::{
     Area, Axis, BLACK, BLUE as RIGHT, FONT, Figure, LETTERS_PX, Layer, Marks, ORANGE as WRONG,
     Panel, Sheet, chart_on, plot_error,
@@ -86,7 +86,7 @@ impl Figure for RateTable<'_> {
             .configure_mesh()
             .disable_y_mesh()
             .disable_y_axis()
-            .x_desc("identified rightly, % of the trials, with 95 % intervals; × has wrong answers")
+            .x_desc("correctly identified, % of the trials, with 95 % intervals; ×: wrong answers")
             .label_style((FONT, LETTERS_PX))
             .draw()
             .map_err(plot_error)?;

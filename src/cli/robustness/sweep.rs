@@ -7,39 +7,32 @@ use starpipe::model::sensitivity::Spacing;
 use starpipe::study::robustness::Parameter;
 use std::str::FromStr;
 
-/// Values of one parameter, evenly spaced.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Sweep {
-    pub(crate) parameter: Parameter,
-    pub(crate) values: Vec<f64>,
-}
+/// Largest number of values.
+const MAX_VALUES: usize = 1000;
+const FORM: &str = "NAME=FROM:TO:COUNT";
 
-/// More values than this are a mistake.
-const SWEEP_VALUES_MAX: usize = 1000;
+/// Evenly spaced values of one parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Sweep {
+    pub(super) parameter: Parameter,
+    pub(super) values: Vec<f64>,
+}
 
 impl FromStr for Sweep {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let (name, range) = named_range(text, "NAME=FROM:TO:COUNT")?;
-        let known = Parameter::ALL.iter().find(|known| known.name() == name);
-        let parameter = *known.ok_or_else(|| {
-            let names = Parameter::ALL.map(Parameter::name).join(", ");
-            format!("'{name}' is not one of {names}")
-        })?;
-        let check = match parameter {
-            Parameter::FieldOfView => field_of_view,
-            Parameter::Stars => star_count,
-            Parameter::CentroidError | Parameter::MagError => not_negative,
-            Parameter::Missing => part,
-            Parameter::FalseStars => multiple,
+        let Some((name, range)) = text.split_once('=') else {
+            return Err(not_of_form(text, FORM));
         };
-        let [from, to, count] = range[..] else {
-            return Err(not_of_form(text, "NAME=FROM:TO:COUNT"));
+        let parameter = named(name)?;
+        let [from, to, count] = range.split(':').collect::<Vec<_>>()[..] else {
+            return Err(not_of_form(text, FORM));
         };
-        let (from, to, count) = (check(from)?, check(to)?, whole(count)?);
-        if !(1..=SWEEP_VALUES_MAX).contains(&count) {
-            return Err(format!("the count must be 1 to {SWEEP_VALUES_MAX}"));
+        let parse = parser(parameter);
+        let (from, to, count) = (parse(from)?, parse(to)?, whole(count)?);
+        if !(1..=MAX_VALUES).contains(&count) {
+            return Err(format!("the count must be 1 to {MAX_VALUES}"));
         }
         Ok(Self {
             parameter,
@@ -48,10 +41,21 @@ impl FromStr for Sweep {
     }
 }
 
-/// The name and the parts of NAME=PART:PART:...
-fn named_range<'a>(text: &'a str, form: &str) -> Result<(&'a str, Vec<&'a str>), String> {
-    let (name, range) = text
-        .split_once('=')
-        .ok_or_else(|| not_of_form(text, form))?;
-    Ok((name, range.split(':').collect()))
+fn named(name: &str) -> Result<Parameter, String> {
+    let known = Parameter::ALL.iter().find(|known| known.name() == name);
+    known.copied().ok_or_else(|| {
+        let names = Parameter::ALL.map(Parameter::name).join(", ");
+        format!("'{name}' is not one of {names}")
+    })
+}
+
+/// The parser of the parameter's values, as for its own option.
+fn parser(parameter: Parameter) -> fn(&str) -> Result<f64, String> {
+    match parameter {
+        Parameter::FieldOfView => field_of_view,
+        Parameter::Stars => star_count,
+        Parameter::CentroidError | Parameter::MagError => not_negative,
+        Parameter::Missing => part,
+        Parameter::FalseStars => multiple,
+    }
 }

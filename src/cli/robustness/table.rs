@@ -1,13 +1,8 @@
 //! The table as text.
 
 use super::args::RobustnessArgs;
-use starpipe::study::robustness::{CaseResult, Parameter};
-
-/// A row of the table, and the parameter and value that are swept in it.
-pub(super) struct SweptRow {
-    pub(super) row: CaseResult,
-    pub(super) swept: Option<(Parameter, f64)>,
-}
+use super::rows::SweptRow;
+use starpipe::study::robustness::CaseResult;
 
 /// The table with what its rows have in common.
 pub(super) fn text(arguments: &RobustnessArgs, rows: &[SweptRow]) -> String {

@@ -1,34 +1,30 @@
-//! What a file says of the simulated frame in it: everything.
+//! The parameters of a simulated frame, for the header of its file.
 
-use super::{Job, Made, Subject};
+use super::generator::{Generator, Simulated};
+use super::subject::Subject;
 use starpipe::frame::FitsHeader;
 use starpipe::model::sensitivity::Reading;
 use starpipe::model::simulate::SetupParameter;
 use starpipe::report::wcs;
-use std::fmt::Write as _;
 
-/// What is known of a frame.
+/// Describes a frame.
 pub(super) struct Description<'a> {
-    pub(super) job: &'a Job<'a>,
-    pub(super) made: &'a Made,
+    pub(super) generator: &'a Generator<'a>,
+    pub(super) simulated: &'a Simulated,
 }
 
 impl Description<'_> {
-    /// All numbers, a line each.
+    /// All parameters, one on each line.
     pub(super) fn text(&self) -> String {
-        let mut text = String::new();
-        for line in self.lines() {
-            let _ = writeln!(text, "{line}");
-        }
-        text
+        self.lines().join("\n") + "\n"
     }
 
-    /// The keywords that programs know, the world coordinates as they truly are, and all numbers as history.
+    /// Common keywords, the true world coordinates, and all parameters as history.
     pub(super) fn fits_header(&self) -> FitsHeader {
-        let sheet = &self.job.setup.scenario.camera;
-        let exposure_s = self.job.setup.scenario.conditions.exposure_s;
+        let sheet = &self.generator.setup.scenario.camera;
+        let exposure_s = self.generator.setup.scenario.conditions.exposure_s;
         let mut header = FitsHeader::default();
-        if let Some(date) = self.job.date {
+        if let Some(date) = self.generator.date {
             let utc = date.to_iso();
             header.text(
                 "DATE-OBS",
@@ -46,11 +42,15 @@ impl Description<'_> {
         header.real("APTDIA", sheet.aperture_mm, "[mm] diameter of the aperture");
         header.real("EGAIN", sheet.gain_e_per_adu, "[electron/adu]");
         header.real("RDNOISE", sheet.read_noise_e, "[electron]");
-        let saturation_adu = self.made.frame.saturation_adu.map_or(0.0, f64::from);
+        let saturation_adu = self.simulated.frame.saturation_adu.map_or(0.0, f64::from);
         header.real("SATURATE", saturation_adu, "[adu]");
         header.integer("BITS", i64::from(sheet.bits), "of a grey level");
-        if let Some(icrs_to_camera) = &self.made.attitude {
-            wcs::add_projection(&mut header, self.job.simulator.camera(), icrs_to_camera);
+        if let Some(icrs_to_camera) = &self.simulated.attitude {
+            wcs::add_projection(
+                &mut header,
+                self.generator.simulator.camera(),
+                icrs_to_camera,
+            );
         }
         for line in self.lines() {
             header.history(&line);
@@ -59,7 +59,7 @@ impl Description<'_> {
     }
 
     fn kind(&self) -> &'static str {
-        match self.job.subject {
+        match self.generator.subject {
             Subject::Sky(_) | Subject::Stars(_) => "Light Frame",
             Subject::Dark => "Dark Frame",
             Subject::Flat(_) => "Flat Frame",
@@ -67,7 +67,7 @@ impl Description<'_> {
     }
 
     fn lines(&self) -> Vec<String> {
-        let setup = &self.job.setup;
+        let setup = &self.generator.setup;
         let sheet = &setup.scenario.camera;
         let version = env!("CARGO_PKG_VERSION");
         let reading = match setup.scenario.reading {
@@ -77,15 +77,18 @@ impl Description<'_> {
         let mut lines = vec![
             format!("Simulated by starpipe {version}: {}", self.kind()),
             format!("camera = {}", sheet.name),
-            format!("seed = {}, frame {}", self.job.seed, self.made.number),
+            format!(
+                "seed = {}, frame {}",
+                self.generator.seed, self.simulated.number
+            ),
             format!("reading = {reading}"),
             format!("spot_form = {}", sheet.imperfections.spot_form.name()),
             format!("mirrored = {}", sheet.imperfections.mirrored),
         ];
-        if let Subject::Flat(electrons) = self.job.subject {
+        if let Subject::Flat(electrons) = self.generator.subject {
             lines.push(format!("flat_e = {electrons}"));
         }
-        if let Some(icrs_to_camera) = &self.made.attitude {
+        if let Some(icrs_to_camera) = &self.simulated.attitude {
             let [w, x, y, z] = icrs_to_camera.to_quaternion();
             lines.push(format!("quaternion = {w:.9} {x:.9} {y:.9} {z:.9}"));
         }

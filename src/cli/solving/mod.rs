@@ -1,7 +1,8 @@
-//! What `process` and `identify` share: every input is solved, its report printed, its files written.
+//! What `process` and `identify` share: each input is solved, its report printed, its result files written.
 
 pub(crate) mod options;
-pub(crate) mod output;
+mod printer;
+pub(crate) mod result_files;
 mod run;
 
 pub(crate) use run::{Plan, solve_all};

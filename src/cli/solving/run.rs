@@ -1,13 +1,13 @@
-//! Solving many inputs at once.
+//! Solves many inputs on all threads.
 
-use super::output::{OutputSettings, Printer, ResultFiles, Solved};
+use super::options::{OutputOptions, SolvingOptions};
+use super::printer::Printer;
+use super::result_files::{ResultFiles, Solved};
 use crate::cli::batch;
 use crate::cli::exit::{CommandError, Exit};
-use crate::cli::options::catalog::{
-    CatalogOptions, index_catalog, read_catalog, thread_pool, warn_of_cache,
-};
-use crate::cli::output::messages::{one_line, report_error};
-use crate::cli::progress::bar;
+use crate::cli::output::messages::report_error;
+use crate::cli::output::overwrite;
+use crate::cli::progress::frames_bar;
 use indicatif::ProgressBar;
 use starpipe::calibration::Calibration;
 use starpipe::detect::DetectConfig;
@@ -19,7 +19,7 @@ use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-/// What inputs are solved with, beside the catalogue.
+/// The parts of a [`Context`] that the options give.
 #[derive(Default)]
 pub(crate) struct Plan {
     pub(crate) detect: DetectConfig,
@@ -40,110 +40,108 @@ impl Plan {
     }
 }
 
-/// Solves every input, prints its report, and writes its files; one that cannot be read does not disturb the others.
+/// Solves every input, prints its report and writes its result files, which have these `extensions`. Inputs that
+/// cannot be read are reported, and the others solved.
 pub(crate) fn solve_all(
     inputs: &[PathBuf],
-    settings: OutputSettings,
-    resources: &CatalogOptions,
+    options: SolvingOptions,
+    extensions: &[&str],
     plan: &Plan,
     solve: impl Fn(&Context, &Path, &mut Workspace) -> anyhow::Result<Solved> + Sync,
 ) -> Result<Exit, CommandError> {
-    let mut run = Run::new(&settings, inputs);
-    let files = ResultFiles::new(settings)?;
+    let SolvingOptions {
+        output, catalog, ..
+    } = options;
+    if let Some(directory) = &output.out {
+        overwrite::check(inputs, directory, extensions)?;
+    }
+    let mut run = Run::new(&output, inputs.len());
+    let files = ResultFiles::new(output.out)?;
     if inputs.is_empty() {
         return Ok(run.exit());
     }
-    let pool = thread_pool(resources.threads)?;
-    let catalog = pool.install(|| read_catalog(resources.catalog.as_deref()))?;
-    let indexed = pool.install(|| index_catalog(&catalog, resources));
-    let context = plan.context(&indexed);
-    // The threads that solve also draw and write: the one that prints waits for nothing else.
-    let report = |input: &PathBuf, workspace: &mut Workspace| {
-        let solved = solve(&context, input, workspace)?;
-        let name = input.display().to_string();
-        let report = FrameReport::new(&name, &solved.solution, indexed.catalog());
-        let saved = files.save(input, &solved, &report, indexed.catalog());
-        Ok(Answer { report, saved })
-    };
-    // An input that is alone has all threads for itself.
-    let threads = match inputs.len() {
-        1 => NonZeroUsize::new(pool.current_num_threads()),
-        _ => None,
-    };
-    let workspace = || {
-        let mut workspace = Workspace::new();
-        if let Some(threads) = threads {
-            workspace.detect = workspace.detect.on_threads(threads);
-        }
-        workspace
-    };
-    batch::for_each_ordered(&pool, inputs, workspace, report, |_, result| {
-        run.take(result)
-    });
-    let exit = run.exit();
-    warn_of_cache(&indexed);
-    Ok(exit)
+    catalog.with_index(|pool, indexed| {
+        let context = plan.context(indexed);
+        // The threads that solve also draw and write files; this one only prints.
+        let work = |input: &PathBuf, workspace: &mut Workspace| {
+            let solved = solve(&context, input, workspace)?;
+            let name = input.display().to_string();
+            let report = FrameReport::new(&name, &solved.solution, indexed.catalog());
+            let saved = files.save(input, &solved, &report, indexed.catalog());
+            Ok(Answer { report, saved })
+        };
+        let workspace = || workspace(pool, inputs.len());
+        batch::for_each_ordered(pool, inputs, workspace, work, |_, result| run.take(result));
+        Ok(run.exit())
+    })
 }
 
-/// What is told of an input, and whether it is in its files as well.
+/// A workspace of one thread. A single input is solved on all threads.
+fn workspace(pool: &rayon::ThreadPool, inputs: usize) -> Workspace {
+    let mut workspace = Workspace::new();
+    if let (1, Some(threads)) = (inputs, NonZeroUsize::new(pool.current_num_threads())) {
+        workspace.detect = workspace.detect.on_threads(threads);
+    }
+    workspace
+}
+
+/// The report of an input, and whether its files could be written.
 struct Answer {
     report: FrameReport,
     saved: anyhow::Result<()>,
 }
 
-/// What has become of the inputs so far.
+/// State of the inputs so far.
 struct Run {
     printer: Printer,
     progress: ProgressBar,
-    failed: bool,
-    unidentified: bool,
+    has_failed: bool,
+    has_unidentified: bool,
 }
 
 impl Run {
-    fn new(settings: &OutputSettings, inputs: &[PathBuf]) -> Self {
-        let progress = if inputs.len() > 1 {
-            bar(inputs.len() as u64, "frames {wide_bar} {pos}/{len} {eta}")
-        } else {
-            ProgressBar::hidden()
-        };
+    fn new(options: &OutputOptions, inputs: usize) -> Self {
         Self {
-            printer: Printer::new(settings),
-            progress,
-            failed: false,
-            unidentified: false,
+            printer: Printer::new(options),
+            progress: match inputs {
+                0 | 1 => ProgressBar::hidden(),
+                _ => frames_bar(inputs as u64),
+            },
+            has_failed: false,
+            has_unidentified: false,
         }
     }
 
+    /// Prints a report or an error. Breaks if nobody reads the reports any longer.
     fn take(&mut self, result: anyhow::Result<Answer>) -> ControlFlow<()> {
         self.progress.inc(1);
         let answer = match result {
             Ok(answer) => answer,
             Err(error) => {
-                self.report_error(&error);
+                self.fail(&error);
                 return ControlFlow::Continue(());
             }
         };
-        self.unidentified |= !answer.report.is_identified();
+        self.has_unidentified |= !answer.report.is_identified();
         if let Err(error) = answer.saved {
-            self.report_error(&error);
+            self.fail(&error);
         }
-        // The bar steps aside: results may go to the same terminal.
+        // The bar is hidden meanwhile: results may go to the same terminal.
         let printed = self.progress.suspend(|| self.printer.print(&answer.report));
         printed.unwrap_or_else(|error| {
-            self.report_error(&error);
+            self.fail(&error);
             ControlFlow::Continue(())
         })
     }
 
-    fn report_error(&mut self, error: &anyhow::Error) {
-        self.failed = true;
-        self.progress
-            .suspend(|| report_error(one_line(error.as_ref())));
+    fn fail(&mut self, error: &anyhow::Error) {
+        self.has_failed = true;
+        self.progress.suspend(|| report_error(error.as_ref()));
     }
 
     fn exit(self) -> Exit {
         self.progress.finish_and_clear();
-        match (self.failed, self.unidentified) {
+        match (self.has_failed, self.has_unidentified) {
             (true, _) => Exit::Failure,
             (false, true) => Exit::NotIdentified,
             (false, false) => Exit::Success,

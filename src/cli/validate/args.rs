@@ -50,5 +50,5 @@ pub(crate) struct ValidateArgs {
     #[command(flatten)]
     pub(crate) setup: SetupOptions,
     #[command(flatten)]
-    pub(crate) resources: CatalogOptions,
+    pub(crate) catalog: CatalogOptions,
 }

@@ -1,6 +1,6 @@
 //! The tables as Parquet: for each table a directory of parts, each of a part of the frames.
 
-use super::shared::remove_outdated;
+use crate::cli::output::files::remove_outdated;
 use anyhow::Context;
 use parquet::basic::Compression;
 use parquet::column::writer::ColumnWriter;

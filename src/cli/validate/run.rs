@@ -2,12 +2,12 @@
 
 use super::figures;
 use super::parquet::Parts;
-use super::shared::{Shared, remove_outdated};
+use super::shared::Shared;
 use crate::cli::batch::for_each_ordered;
 use crate::cli::exit::CommandError;
-use crate::cli::output::files::write_whole;
+use crate::cli::output::files::{remove_outdated, write_into, write_whole};
+use crate::cli::output::rows::json_indented;
 use crate::cli::plot::FigureForm;
-use anyhow::Context;
 use serde::Serialize;
 use starpipe::pipeline::Workspace;
 use starpipe::study::validation::store::{
@@ -15,7 +15,7 @@ use starpipe::study::validation::store::{
 };
 use starpipe::study::validation::{Protocol, Summary, ValidationError, Validator};
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 /// Files of a complete run. An incomplete one has none of them.
@@ -46,8 +46,7 @@ pub(super) fn run(
         other => CommandError::Failed(other.into()),
     })?;
     claim_directory(directory, protocol, shared.indexed.catalog()).map_err(claim_error)?;
-    let mut tables = RunTables::open(directory, |number| validator.draw(number).0)
-        .map_err(anyhow::Error::from)?;
+    let mut tables = RunTables::open(directory, |number| validator.draw(number).0)?;
     let done = tables.done();
     if done > shared.frames {
         return Err(CommandError::Usage(format!(
@@ -63,9 +62,7 @@ pub(super) fn run(
         complete(directory, &validator, &mut tables, &mut parts, shared)?;
     }
     parts.write_all(&tables)?;
-    let summary = tables
-        .summary(validator.facts(), validator.limit_vmag())
-        .map_err(anyhow::Error::from)?;
+    let summary = tables.summary(validator.facts(), validator.limit_vmag())?;
     save(directory, &summary, shared.figures)?;
     Ok(summary)
 }
@@ -98,7 +95,7 @@ fn complete(
     }
     parts.remove_unfinished(tables)?;
     let timing = simulate(validator, tables, parts, shared)?;
-    let text = serde_json::to_string_pretty(&timing).context("writing JSON")? + "\n";
+    let text = json_indented(&timing)?;
     write_whole(&[(directory.join("timing.json"), text.into_bytes())])?;
     shared.report(format_args!(
         "{} frames in {:.1} s, {:.1} frames a second; {:.1} ms to simulate one, {:.1} ms to process it",
@@ -168,13 +165,10 @@ fn simulate_part(
 
 /// Writes the summary as JSON and text, and its figures.
 fn save(directory: &Path, summary: &Summary, form: FigureForm) -> anyhow::Result<()> {
-    let json = serde_json::to_string_pretty(summary).context("writing JSON")? + "\n";
-    let mut files: Vec<(PathBuf, Vec<u8>)> = figures::of_run(summary, form)?
-        .into_iter()
-        .map(|(name, content)| (directory.join(name), content))
-        .collect();
-    for (name, text) in RESULTS.into_iter().zip([json, summary.to_text()]) {
-        files.push((directory.join(name), text.into_bytes()));
-    }
-    write_whole(&files)
+    let texts = [json_indented(summary)?, summary.to_text()];
+    let results = RESULTS.into_iter().zip(texts);
+    let results = results.map(|(name, text)| (name.to_owned(), text.into_bytes()));
+    let figures = figures::of_run(summary, form)?;
+    write_into(directory, figures.into_iter().chain(results))?;
+    Ok(())
 }

@@ -4,12 +4,11 @@ use super::shared::Shared;
 use super::sweep::StudySweep;
 use super::{figures, run};
 use crate::cli::exit::CommandError;
-use crate::cli::output::files::write_whole;
-use crate::cli::output::rows::csv_table;
-use anyhow::Context;
+use crate::cli::output::files::write_into;
+use crate::cli::output::rows::{csv_table, json_indented};
 use starpipe::model::sensitivity::Spacing;
 use starpipe::study::validation::{Protocol, StudyParameter, StudyRow};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// One value of one parameter.
 pub(super) struct StudyRun {
@@ -62,15 +61,12 @@ pub(super) fn run(
             &summary,
         ));
     }
-    let json = serde_json::to_string_pretty(&rows).context("writing JSON")? + "\n";
-    let table = csv_table(rows.iter())?;
-    let tables = [("study.json", json), ("study.csv", table)];
+    let tables = [
+        ("study.json", json_indented(&rows)?),
+        ("study.csv", csv_table(rows.iter())?),
+    ];
     let tables = tables.map(|(name, text)| (name.to_owned(), text.into_bytes()));
-    let files: Vec<(PathBuf, Vec<u8>)> = figures::of_study(&rows, shared.figures)?
-        .into_iter()
-        .chain(tables)
-        .map(|(name, content)| (directory.join(name), content))
-        .collect();
-    write_whole(&files)?;
+    let figures = figures::of_study(&rows, shared.figures)?;
+    write_into(directory, figures.into_iter().chain(tables))?;
     Ok(rows)
 }

@@ -1,6 +1,6 @@
 //! Sweeps over a parameter of the simulated frames.
 
-use crate::cli::options::steps::{Steps, named_steps};
+use crate::cli::options::steps::named_steps;
 use crate::cli::options::values::field_of_view;
 use starpipe::model::sensitivity::Spacing;
 use starpipe::study::validation::StudyParameter;
@@ -19,14 +19,7 @@ impl FromStr for StudySweep {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (name, steps) = named_steps(text)?;
-        let Steps {
-            ends,
-            count,
-            spacing,
-        } = steps;
-        let values = spacing
-            .checked_values(ends, count)
-            .map_err(|error| error.to_string())?;
+        let values = steps.values()?;
         let parameter = StudyParameter::named(&name).map_err(|error| error.to_string())?;
         values
             .iter()
@@ -34,7 +27,7 @@ impl FromStr for StudySweep {
         Ok(Self {
             parameter,
             values,
-            spacing,
+            spacing: steps.spacing,
         })
     }
 }

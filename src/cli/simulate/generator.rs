@@ -1,0 +1,74 @@
+//! Simulates frames by number.
+
+use super::subject::Subject;
+use starpipe::base::coords::{Camera, Icrs, Rotation};
+use starpipe::base::epoch::ObservationDate;
+use starpipe::frame::{Frame, FrameError, FrameMetadata};
+use starpipe::model::simulate::{Pointing, Setup, Simulator, Truth};
+use starpipe::sky::catalog::Catalog;
+use starpipe::study::validation::draw;
+
+/// Simulates frames of one subject with one camera.
+pub(super) struct Generator<'a> {
+    pub(super) setup: &'a Setup,
+    pub(super) simulator: &'a Simulator<'a>,
+    pub(super) subject: &'a Subject,
+    pub(super) catalog: &'a Catalog,
+    pub(super) date: Option<ObservationDate>,
+    pub(super) seed: u64,
+    pub(super) limit_vmag: f64,
+}
+
+/// A simulated frame, and what is known of it.
+pub(super) struct Simulated {
+    pub(super) frame: Frame,
+    pub(super) truth: Option<Truth>,
+    pub(super) attitude: Option<Rotation<Icrs, Camera>>,
+    pub(super) number: u64,
+    pub(super) seed: u64,
+}
+
+impl Generator<'_> {
+    /// Simulates the frame with this number.
+    pub(super) fn frame(&self, number: u64) -> Result<Simulated, FrameError> {
+        let (seed, drawn) = draw(self.seed, number);
+        let simulator = self.simulator;
+        let (mut frame, truth, attitude) = match self.subject {
+            Subject::Sky(fixed) => {
+                let icrs_to_camera = fixed.unwrap_or(drawn);
+                let pointing = Pointing {
+                    icrs_to_camera,
+                    years_since_j2000: self.date.map_or(0.0, |date| date.years_since_j2000()),
+                };
+                let (frame, truth) = simulator.frame(&pointing, seed)?;
+                (frame, Some(truth), Some(icrs_to_camera))
+            }
+            Subject::Stars(stars) => {
+                let (frame, truth) = simulator.star_field(stars, seed)?;
+                (frame, Some(truth), None)
+            }
+            Subject::Dark => (simulator.dark(seed)?, None, None),
+            Subject::Flat(electrons) => (simulator.evenly_lit(*electrons, seed)?, None, None),
+        };
+        frame.metadata = self.metadata();
+        Ok(Simulated {
+            frame,
+            truth,
+            attitude,
+            number,
+            seed,
+        })
+    }
+
+    /// Metadata as a real camera writes them.
+    fn metadata(&self) -> FrameMetadata {
+        let sheet = &self.setup.scenario.camera;
+        FrameMetadata {
+            date: self.date,
+            exposure_s: Some(self.setup.scenario.conditions.exposure_s),
+            pixel_size_um: Some((sheet.pitch_x_um * sheet.pitch_y_um).sqrt()),
+            focal_length_mm: Some(sheet.focal_length_mm),
+            ..FrameMetadata::default()
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Result files of an input, which `--out` asks for.
+
+use crate::cli::output::files::{make_directory, remove_outdated, write_whole};
+use crate::cli::output::paths::output_path;
+use crate::cli::output::rows::finished;
+use starpipe::frame::Frame;
+use starpipe::pipeline::Solution;
+use starpipe::report::{FrameReport, overlay, wcs, write_table_header};
+use starpipe::sky::catalog::Catalog;
+use std::path::{Path, PathBuf};
+
+/// A solved input.
+pub(crate) struct Solved {
+    pub(crate) solution: Solution,
+    /// The frame to draw on, if there is one.
+    pub(crate) frame: Option<Frame>,
+}
+
+/// Writes result files into a directory, if one is given.
+pub(super) struct ResultFiles {
+    directory: Option<PathBuf>,
+}
+
+impl ResultFiles {
+    /// Makes the directory, if one is given.
+    pub(super) fn new(directory: Option<PathBuf>) -> anyhow::Result<Self> {
+        directory.as_deref().map(make_directory).transpose()?;
+        Ok(Self { directory })
+    }
+
+    /// Writes the files of `input`, all or none, and removes the FITS header of an earlier run if there is
+    /// none now.
+    pub(super) fn save(
+        &self,
+        input: &Path,
+        solved: &Solved,
+        report: &FrameReport,
+        catalog: &Catalog,
+    ) -> anyhow::Result<()> {
+        let Some(directory) = &self.directory else {
+            return Ok(());
+        };
+        let path = |extension: &str| output_path(directory, input, extension);
+        let json = report.to_json_line()? + "\n";
+        let mut files = vec![
+            (path("json"), json.into_bytes()),
+            (path("csv"), table(report, true)?.into_bytes()),
+        ];
+        if let Some(frame) = &solved.frame {
+            let title = input.file_name().unwrap_or(input.as_os_str());
+            let title = title.to_string_lossy();
+            let picture = overlay::draw(&title, frame, &solved.solution, catalog);
+            files.push((path("png"), overlay::to_png(&picture)?));
+        }
+        let header = wcs::header(&report.frame, &solved.solution);
+        let has_header = header.is_some();
+        files.extend(header.map(|header| (path("wcs"), header)));
+        write_whole(&files)?;
+        if !has_header {
+            remove_outdated(&path("wcs"))?;
+        }
+        Ok(())
+    }
+}
+
+/// The stars of `report` as CSV.
+pub(super) fn table(report: &FrameReport, with_header: bool) -> anyhow::Result<String> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    if with_header {
+        write_table_header(&mut writer)?;
+    }
+    report.write_table_rows(&mut writer)?;
+    finished(writer)
+}
