@@ -115,8 +115,7 @@ pub fn detect_into(
     let Workspace {
         background,
         search,
-        measure_workers,
-        known_spots,
+        measure,
     } = workspace;
     background.measure(&view, frame.step_adu, config.cell_px);
     let input = SearchInput {
@@ -136,7 +135,7 @@ pub fn detect_into(
         threshold: pass.threshold,
     };
     let peaks = &search.found.peaks;
-    measurement.run(peaks, measure_workers, known_spots, &mut found.sources);
+    measurement.run(peaks, measure, &mut found.sources);
     found.sources.sort_unstable_by(Detection::by_brightness);
     found.background_adu = background.median_adu;
     found.noise_adu = background.median_sigma_adu;

@@ -14,7 +14,7 @@ use super::psf::PIXEL_VARIANCE_PX2;
 use super::star_model::{
     DEFAULT_SPOT_PX, SpotSize, StarModel, fit_bright_stars, fit_raw_stars, spot_size, star_model,
 };
-use super::threshold::{FrameNoise, NoiseWork, gaussian_threshold};
+use super::threshold::{FrameNoise, NoiseBuffers, gaussian_threshold};
 
 /// A guessed spot size must be right within this factor; else the frame is filtered again.
 const SPOT_GUESS_TOLERANCE: f64 = 1.15;
@@ -66,7 +66,7 @@ impl<'a> SearchInput<'a> {
     }
 }
 
-/// How a frame was searched; its peaks and regions are in [`SearchWork`].
+/// How a frame was searched; its peaks and regions are in [`FrameSearch`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Searched {
     /// Spot size and noise model of the frame's stars.
@@ -92,19 +92,19 @@ enum StarEstimate {
     Guess(f64),
 }
 
-/// Buffers of the search, and the peaks that it found.
+/// Searches frames; holds the peaks found last, and the buffers.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct SearchWork {
+pub(crate) struct FrameSearch {
     /// The filtered frame.
     pub filtered: FilteredFrame,
     /// Peaks and regions above the threshold.
     pub found: PeakSearch,
     raw_peaks: RawPeakFinder,
-    noise: NoiseWork,
+    noise: NoiseBuffers,
     fits: FitBuffers,
 }
 
-impl SearchWork {
+impl FrameSearch {
     /// Shares the passes over the pixels among `threads` threads.
     pub fn set_threads(&mut self, threads: usize) {
         self.filtered.set_threads(threads);

@@ -1,17 +1,16 @@
 //! Buffers of detection.
 
 use super::background::FrameBackground;
-use super::measure::{KnownSpots, MeasureWorker};
-use super::search::SearchWork;
+use super::measure::MeasureBuffers;
+use super::search::FrameSearch;
 use std::num::NonZeroUsize;
 
 /// Buffers that are reused from frame to frame. Results do not depend on their contents.
 #[derive(Debug, Clone)]
 pub struct Workspace {
     pub(crate) background: FrameBackground,
-    pub(crate) search: SearchWork,
-    pub(crate) measure_workers: Vec<MeasureWorker>,
-    pub(crate) known_spots: KnownSpots,
+    pub(crate) search: FrameSearch,
+    pub(crate) measure: MeasureBuffers,
 }
 
 impl Workspace {
@@ -19,9 +18,8 @@ impl Workspace {
     pub fn new() -> Self {
         let empty = Self {
             background: FrameBackground::default(),
-            search: SearchWork::default(),
-            measure_workers: Vec::new(),
-            known_spots: KnownSpots::default(),
+            search: FrameSearch::default(),
+            measure: MeasureBuffers::default(),
         };
         empty.on_threads(NonZeroUsize::MIN)
     }
@@ -34,8 +32,7 @@ impl Workspace {
         let threads = threads.get();
         self.background.set_threads(threads);
         self.search.set_threads(threads);
-        self.measure_workers
-            .resize_with(threads, MeasureWorker::default);
+        self.measure.set_threads(threads);
         self
     }
 }

@@ -6,7 +6,7 @@ use crate::detect::fit::{FrameMaps, MAX_SPOTS, SpotEstimate, SpotGroup};
 
 /// The spots of all peaks, as far as they are known.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct KnownSpots {
+pub(super) struct KnownSpots {
     neighbours: NeighbourGrid,
     /// The spot of each peak: fitted once it was measured, before that the initial guess.
     pub(super) spots: Vec<SpotEstimate>,

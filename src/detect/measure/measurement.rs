@@ -18,9 +18,24 @@ use std::mem;
 /// Spots closer than this many of their standard deviations touch, and are fitted together.
 const TOUCHING_SIGMA: f64 = 4.6;
 
+/// Buffers of the measurement.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct MeasureBuffers {
+    /// One for each thread.
+    workers: Vec<MeasureWorker>,
+    known: KnownSpots,
+}
+
+impl MeasureBuffers {
+    /// Shares the isolated peaks among `threads` threads.
+    pub fn set_threads(&mut self, threads: usize) {
+        self.workers.resize_with(threads, MeasureWorker::default);
+    }
+}
+
 /// Buffers and results of one thread.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct MeasureWorker {
+struct MeasureWorker {
     fits: FitBuffers,
     /// Detections of this thread.
     detections: Vec<Detection>,
@@ -45,10 +60,10 @@ impl Measurement<'_> {
     pub fn run(
         &self,
         peaks: &[Peak],
-        workers: &mut [MeasureWorker],
-        known: &mut KnownSpots,
+        buffers: &mut MeasureBuffers,
         detections: &mut Vec<Detection>,
     ) {
+        let MeasureBuffers { workers, known } = buffers;
         known.begin(peaks, &self.maps, self.reach_px());
         let threads = workers.len();
         // Isolated peaks do not depend on each other: threads share them.

@@ -9,5 +9,4 @@ mod pairs;
 mod saturated_area;
 mod shape;
 
-pub(crate) use known_spots::KnownSpots;
-pub(crate) use measurement::{MeasureWorker, Measurement};
+pub(crate) use measurement::{MeasureBuffers, Measurement};

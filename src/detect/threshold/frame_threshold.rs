@@ -5,7 +5,7 @@ use super::false_alarms::{for_estimated_noise, threshold_for_rate};
 use super::filter_weights::FilterWeights;
 use super::photons::{photon_skewness, threshold_for_photons};
 use super::pixel_noise::PixelNoise;
-use super::star_free::{NoiseWork, StarFree};
+use super::star_free::{NoiseBuffers, StarFree};
 use crate::detect::background::{FrameBackground, Mesh, median};
 use crate::detect::config::DetectConfig;
 use crate::detect::filter::Kernel;
@@ -60,7 +60,7 @@ impl FrameNoise<'_> {
         u: f64,
         spot_px: f64,
         kernel: &Kernel,
-        work: &mut NoiseWork,
+        buffers: &mut NoiseBuffers,
     ) -> f64 {
         let size = (self.view.width, self.view.height);
         let filter = FilterWeights::for_spot(spot_px, kernel.radius(), size);
@@ -68,10 +68,10 @@ impl FrameNoise<'_> {
         let sigma = self.background.median_sigma_adu;
         let is_coarse = sigma < COARSE * f64::from(mesh.sigma_floor);
         if is_coarse || self.is_cut_off() {
-            return self.raised_for_histogram(u, &filter, is_coarse, work);
+            return self.raised_for_histogram(u, &filter, is_coarse, buffers);
         }
         let star_free = self.star_free(u);
-        let skewness = photon_skewness(self.view, mesh, &star_free, spot_px, work);
+        let skewness = photon_skewness(self.view, mesh, &star_free, spot_px, buffers);
         skewness.map_or(u, |s| threshold_for_photons(u, s, &filter))
     }
 
@@ -82,13 +82,13 @@ impl FrameNoise<'_> {
         u: f64,
         filter: &FilterWeights,
         is_coarse: bool,
-        work: &mut NoiseWork,
+        buffers: &mut NoiseBuffers,
     ) -> f64 {
         let floor = f64::from(self.filtered_mesh.sigma_floor);
-        let is_at_floor = median(&self.filtered_mesh.sigma, &mut work.sorted) <= floor * 1.001;
+        let is_at_floor = median(&self.filtered_mesh.sigma, &mut buffers.sorted) <= floor * 1.001;
         let mut raised = |limit: f64| {
             let star_free = self.star_free(limit);
-            let noise = PixelNoise::measure(self.view, &self.background.mesh, &star_free, work);
+            let noise = PixelNoise::measure(self.view, &self.background.mesh, &star_free, buffers);
             noise.map_or(u, |n| {
                 let known_sigma = is_at_floor.then_some(floor / n.sigma);
                 n.threshold(u, filter, known_sigma)

@@ -20,4 +20,4 @@ mod star_free;
 pub(crate) use filter_weights::FilterWeights;
 pub(crate) use frame_threshold::{FrameNoise, gaussian_threshold};
 pub(crate) use photons::threshold_for_photons;
-pub(crate) use star_free::NoiseWork;
+pub(crate) use star_free::NoiseBuffers;

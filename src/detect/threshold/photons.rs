@@ -6,7 +6,7 @@
 
 use super::filter_weights::{FilterWeights, sum_of_powers};
 use super::saddlepoint::{CumulantTable, MAX_RAISE, after_clipping, saddlepoint_quantile};
-use super::star_free::{MIN_SAMPLES, NoiseWork, StarFree};
+use super::star_free::{MIN_SAMPLES, NoiseBuffers, StarFree};
 use crate::detect::background::Mesh;
 use crate::detect::filter::normalise;
 use crate::detect::pixels::{View, pairwise_sum};
@@ -64,15 +64,15 @@ pub(crate) fn photon_skewness(
     mesh: &Mesh,
     star_free: &StarFree<'_>,
     spot_px: f64,
-    work: &mut NoiseWork,
+    buffers: &mut NoiseBuffers,
 ) -> Option<f64> {
     let mut sums = [0.0f64; MOMENTS];
-    let NoiseWork {
+    let NoiseBuffers {
         standardised,
         pieces,
         nodes,
         ..
-    } = work;
+    } = buffers;
     standardised.resize(view.width, 0.0);
     let step = (view.width * view.height / SAMPLES).max(1);
     for y in (step / 2..view.height).step_by(step) {

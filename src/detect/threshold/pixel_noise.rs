@@ -8,7 +8,7 @@ use super::saddlepoint::{
     CumulantTable, MAX_RAISE, SIGMA_PER_KURTOSIS, after_clipping, quantile_for_skewness,
     saddlepoint_quantile,
 };
-use super::star_free::{MIN_SAMPLES, NoiseWork, StarFree};
+use super::star_free::{MIN_SAMPLES, NoiseBuffers, StarFree};
 use crate::detect::background::{Mesh, Piece};
 use crate::detect::pixels::View;
 use multiversion::multiversion;
@@ -43,15 +43,15 @@ impl PixelNoise {
         view: &View<'_>,
         mesh: &Mesh,
         star_free: &StarFree<'_>,
-        work: &mut NoiseWork,
+        buffers: &mut NoiseBuffers,
     ) -> Option<Self> {
         let mut histogram = [0u32; BINS + 1];
-        let NoiseWork {
+        let NoiseBuffers {
             bins,
             pieces,
             nodes,
             ..
-        } = work;
+        } = buffers;
         bins.resize(view.width, 0);
         let step = (view.width * view.height / SAMPLES).max(1);
         for y in (step / 2..view.height).step_by(step) {

@@ -11,7 +11,7 @@ pub(crate) const MIN_SAMPLES: f64 = 2000.0;
 
 /// Buffers of the measurement of noise.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct NoiseWork {
+pub(crate) struct NoiseBuffers {
     /// The histogram bin of each pixel of a row.
     pub bins: Vec<u16>,
     /// A row in units of its noise.
