@@ -11,7 +11,7 @@ use proptest::prelude::*;
 use starpipe::base::coords::{Icrs, UnitVector};
 use starpipe::base::units::{ARCSEC_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
 use starpipe::sky::catalog::{
-    Catalog, CatalogError, FaultPlace, HipparcosId, ImportSummary, Star, StarFlags, StarId,
+    Catalog, CatalogError, HipparcosId, ImportSummary, RecordLocation, Star, StarFlags, StarId,
     StarIndex, TychoId, sky2000,
 };
 use std::collections::HashMap;
@@ -456,7 +456,7 @@ fn records_that_are_not_stars_are_counted_with_their_lines() {
             "line 50, byte 28 (ID): found 00000001, expected an identifier that no record before has",
         ]
     );
-    assert_eq!(summary.unreadable[0].place, FaultPlace::Byte(233));
+    assert_eq!(summary.unreadable[0].location, RecordLocation::Byte(233));
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Coordinate systems: directions on the sky and in the camera, rotations between them, pixels.
 //!
-//! Conventions: directions are unit vectors; [`Icrs`] is right-handed with x to RA 0, Dec 0 and z to
-//! the north pole; [`Camera`] has x along image x (right), y along image y (down), z out along the
-//! boresight. Angles are in radians. Pixels: x right, y down; (0, 0) is the **centre** of the
+//! Conventions: directions are unit vectors; [`Icrs`] is right-handed with x to RA 0, Dec 0 and z
+//! to the north pole; [`Camera`] has x along image x (right), y along image y (down), z out along
+//! the boresight. Angles are in radians. Pixels: x right, y down; (0, 0) is the **centre** of the
 //! top-left pixel.
 //!
 //! Trigonometric functions come from [`libm`], which gives the same bits on every machine:

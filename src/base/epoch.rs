@@ -247,7 +247,8 @@ mod tests {
     fn years_are_julian_and_counted_from_noon() {
         assert_eq!(parsed("2000-01-01T12:00:00Z").years_since_j2000(), 0.0);
         assert_eq!(parsed("2000-01-01").years_since_j2000(), 0.0);
-        // By Julian dates: noon of that day is 2458694, J2000.0 is 2451545, and 1899-12-31 is 2415020.
+        // By Julian dates: noon of that day is 2458694, J2000.0 is 2451545, and 1899-12-31 is
+        // 2415020.
         let night = parsed("2019-07-29T20:47:26Z").julian_epoch();
         let expected = 2000.0 + (7149.0 + 31_646.0 / 86_400.0) / 365.25;
         assert!((night - expected).abs() < 1e-9, "{night}");

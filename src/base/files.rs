@@ -1,7 +1,7 @@
 //! Atomic file writes: a reader finds the old file or the new one, never a part.
 
 use std::fs;
-use std::io;
+use std::io::{self, Write};
 use std::path::Path;
 
 /// Creates a temporary file in the folder of `path`, with the permissions of any new file.
@@ -23,4 +23,16 @@ pub fn beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     builder.tempfile_in(parent.unwrap_or(Path::new(".")))
+}
+
+/// Writes `bytes` to `path` atomically.
+///
+/// # Errors
+/// As for [`beside`], and I/O errors on writing.
+pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = beside(path)?;
+    file.write_all(bytes)?;
+    file.as_file().sync_all()?;
+    file.persist(path).map_err(|refused| refused.error)?;
+    Ok(())
 }

@@ -1,12 +1,17 @@
-//! What can go wrong with a catalogue file.
+//! Errors of catalogue files.
 
 use super::StarId;
 use std::fmt;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// How many of the unreadable records an error message shows.
-const FAULTS_SHOWN: usize = 5;
+/// The readable kinds of files, for messages.
+const KINDS_READ: &str = "a compact catalog of starpipe, SKY2000 records of 520 bytes, the files of \
+     Tycho-2, or a table with headings for identifiers, right ascension, declination and magnitude, \
+     plain or gzip";
+/// The kinds of files that can be imported, for messages.
+const KINDS_IMPORTED: &str = "SKY2000 records of 520 bytes, the files of Tycho-2, or a table with \
+     headings for identifiers, right ascension, declination and magnitude, plain or gzip";
 
 /// Why a catalogue could not be read, made or written.
 #[derive(Debug, thiserror::Error)]
@@ -17,7 +22,7 @@ pub enum CatalogError {
     Open {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The cause.
         source: io::Error,
     },
     /// The file could not be read to its end.
@@ -25,9 +30,9 @@ pub enum CatalogError {
     Read {
         /// The file.
         path: PathBuf,
-        /// The lines that were read before (0 in a binary file).
+        /// The number of lines read before (0 in a binary file).
         lines_read: u64,
-        /// What the system, or the decompression, says.
+        /// The cause, from the system or the decompression.
         source: io::Error,
     },
     /// The file could not be written.
@@ -35,10 +40,10 @@ pub enum CatalogError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The cause.
         source: io::Error,
     },
-    /// The content is of no kind that is read.
+    /// The content is of no readable kind.
     #[error(
         "{}: not a catalog that can be read: it begins with {found}; expected {expected}",
         path.display()
@@ -46,12 +51,12 @@ pub enum CatalogError {
     UnknownKind {
         /// The file.
         path: PathBuf,
-        /// How the (decompressed) content begins.
+        /// The beginning of the (decompressed) content.
         found: String,
-        /// The kinds that are read.
+        /// The readable kinds.
         expected: &'static str,
     },
-    /// A table lacks columns that a catalogue must have.
+    /// A table lacks required columns.
     #[error(
         "{}, line {line}: the table has no column {}; found {found}",
         path.display(),
@@ -64,28 +69,28 @@ pub enum CatalogError {
         line: u64,
         /// The labels of the missing columns.
         missing: Vec<&'static str>,
-        /// The headings that are there.
+        /// The headings found.
         found: String,
     },
-    /// So many records are unreadable that the file cannot be what it seems to be.
+    /// Too many records are unreadable.
     #[error(
         "{}: {}{} of {records} records are unreadable, at most {limit_percent} % are tolerated; the first: {}",
         path.display(), reason.as_ref().map_or(String::new(), |reason| format!("{reason}; ")),
-        faults.len(), first_of(faults)
+        errors.len(), first_of(errors)
     )]
     TooManyUnreadable {
         /// The file.
         path: PathBuf,
         /// Records read so far, unreadable ones included.
         records: u64,
-        /// The share that would have been tolerated, in percent.
+        /// The largest share tolerated, in percent.
         limit_percent: u64,
         /// Every unreadable record so far.
-        faults: Vec<RecordFault>,
-        /// What is probably wrong, where that can be told.
+        errors: Vec<RecordError>,
+        /// The probable cause, where known.
         reason: Option<String>,
     },
-    /// The records can be read one by one, but together they cannot be right.
+    /// Every record is valid, but together they cannot be right.
     #[error("{}: {reason}", path.display())]
     Doubtful {
         /// The file.
@@ -94,7 +99,10 @@ pub enum CatalogError {
         reason: String,
     },
     /// A directory holds no catalogue, or more than one.
-    #[error("{}: {found}; expected a directory with the files of Tycho-2 or one other catalog", path.display())]
+    #[error(
+        "{}: {found}; expected a directory with the files of Tycho-2 or one other catalog",
+        path.display()
+    )]
     Directory {
         /// The directory.
         path: PathBuf,
@@ -109,13 +117,13 @@ pub enum CatalogError {
         /// Records read.
         records: u64,
     },
-    /// A compact catalogue is damaged, or of a version that is not read.
-    #[error("the catalog {}: {fault}", path.display())]
+    /// A compact catalogue is damaged, or of an unknown version.
+    #[error("the catalog {}: {error}", path.display())]
     Compact {
         /// The file.
         path: PathBuf,
         /// The damage.
-        fault: CompactFault,
+        error: CompactError,
     },
     /// A star has a value that the compact form cannot hold.
     #[error("star {id}: {quantity} is {value}, expected {expected}")]
@@ -126,19 +134,19 @@ pub enum CatalogError {
         quantity: &'static str,
         /// Its value.
         value: f64,
-        /// The values that can be held.
+        /// The range of values that can be held.
         expected: &'static str,
     },
-    /// Two stars have the same number.
-    #[error("star {id} occurs twice; expected every number once")]
+    /// Two stars have the same identifier.
+    #[error("star {id} occurs twice; expected every identifier once")]
     DuplicateStar {
-        /// The number.
+        /// The identifier.
         id: StarId,
     },
-    /// A name is given to no star, twice to one star, or is no short text.
+    /// A name has no star, is the second one of a star, or is empty or too long.
     #[error("the name {name:?} of star {id}: expected {expected}")]
     BadName {
-        /// The number of the star named.
+        /// The star.
         id: StarId,
         /// The name.
         name: String,
@@ -147,52 +155,97 @@ pub enum CatalogError {
     },
 }
 
-fn first_of(faults: &[RecordFault]) -> String {
-    let shown: Vec<String> = faults
-        .iter()
-        .take(FAULTS_SHOWN)
-        .map(ToString::to_string)
-        .collect();
-    shown.join("; ")
-}
+impl CatalogError {
+    /// Converts an I/O error on opening `path`.
+    pub(super) fn open(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        |source| Self::Open { path, source }
+    }
 
-/// Where in a line a record is at fault.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum FaultPlace {
-    /// A byte of a fixed-width record, from 1.
-    Byte(usize),
-    /// A cell of a table, from 1.
-    Cell(usize),
-}
+    /// Converts an I/O error on reading `path` after `lines_read` lines.
+    pub(super) fn read(path: &Path, lines_read: u64) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Read {
+            path,
+            lines_read,
+            source,
+        }
+    }
 
-impl fmt::Display for FaultPlace {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Byte(number) => write!(f, "byte {number}"),
-            Self::Cell(number) => write!(f, "column {number}"),
+    /// Converts an I/O error on writing `path`.
+    pub(super) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        |source| Self::Write { path, source }
+    }
+
+    /// The error for a file that begins with `head`, of no readable kind.
+    pub(super) fn unknown_kind(path: &Path, head: &[u8]) -> Self {
+        const SHOWN_BYTES: usize = 16;
+        Self::UnknownKind {
+            path: path.to_owned(),
+            found: if head.is_empty() {
+                "nothing: it is empty".to_owned()
+            } else {
+                quoted(&head[..head.len().min(SHOWN_BYTES)])
+            },
+            expected: KINDS_READ,
+        }
+    }
+
+    /// The error for importing a catalogue that is compact already.
+    pub(super) fn already_compact(path: &Path) -> Self {
+        Self::UnknownKind {
+            path: path.to_owned(),
+            found: "the mark of a compact catalog, which is imported already".to_owned(),
+            expected: KINDS_IMPORTED,
         }
     }
 }
 
-/// One record that cannot be read, and why.
+/// The first few errors, for messages.
+fn first_of(errors: &[RecordError]) -> String {
+    const SHOWN: usize = 5;
+    let shown: Vec<String> = errors.iter().take(SHOWN).map(ToString::to_string).collect();
+    shown.join("; ")
+}
+
+/// Where in a row an error is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RecordLocation {
+    /// A byte of a fixed-width record, from 1.
+    Byte(usize),
+    /// A column of a table, from 1.
+    Column(usize),
+}
+
+impl fmt::Display for RecordLocation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Byte(number) => write!(f, "byte {number}"),
+            Self::Column(number) => write!(f, "column {number}"),
+        }
+    }
+}
+
+/// An unreadable record, and why.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct RecordFault {
+pub struct RecordError {
     /// The line in the file, from 1.
     pub line: u64,
     /// Where in the line.
-    pub place: FaultPlace,
-    /// The label of the column at fault; empty if the line as a whole is.
+    pub location: RecordLocation,
+    /// The label of the column; empty for the line as a whole.
     pub label: String,
-    /// What stands there.
+    /// What was found.
     pub found: String,
-    /// What should stand there.
+    /// What was expected.
     pub expected: &'static str,
 }
 
-impl fmt::Display for RecordFault {
+impl fmt::Display for RecordError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "line {}, {}", self.line, self.place)?;
+        write!(f, "line {}, {}", self.line, self.location)?;
         if !self.label.is_empty() {
             write!(f, " ({})", self.label)?;
         }
@@ -200,19 +253,19 @@ impl fmt::Display for RecordFault {
     }
 }
 
-/// Where and how a compact catalogue is damaged.
+/// Damage of a compact catalogue.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("byte {byte}: found {found}, expected {expected}")]
-pub struct CompactFault {
+pub struct CompactError {
     /// The offset in the file, from 0.
     pub byte: usize,
-    /// What stands there.
+    /// What was found.
     pub found: String,
-    /// What should stand there.
+    /// What was expected.
     pub expected: String,
 }
 
-/// Raw bytes as they are shown in a message: quoted, escaped, cut after `SHOWN` bytes.
+/// Raw bytes for messages: quoted, escaped, cut after `SHOWN` bytes.
 pub(super) fn quoted(bytes: &[u8]) -> String {
     const SHOWN: usize = 40;
     let more = if bytes.len() > SHOWN { "…" } else { "" };

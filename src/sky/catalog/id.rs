@@ -1,24 +1,25 @@
-//! What a catalogue calls a star.
+//! Identifiers of catalogue stars.
 
 use std::fmt;
 
-/// What a catalogue calls a star: no two stars of a catalogue have the same.
+/// The identifier of a star, unique within a catalogue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum StarId {
     /// SKY2000's Skymap number.
     ///
-    /// Shown as SKY2000 and the papers write it: eight digits, `02480053` for Polaris. It is HHMMnnnn
-    /// after a right ascension, but not always the star's own: never derive a position from it.
+    /// Printed as in SKY2000 and the papers with eight digits, `02480053` for Polaris. It is
+    /// HHMMnnnn after a right ascension, but not always that of the star: never derive a position
+    /// from it.
     Skymap(u32),
-    /// The number in Tycho-1 and Tycho-2, as in `TYC 3124-2056-1`.
+    /// A number of Tycho-1 and Tycho-2, as in `TYC 3124-2056-1`.
     Tycho(TychoId),
-    /// The number in Hipparcos, as in `HIP 11767` or, of a component of a double star, `HIP 12318B`.
+    /// A number of Hipparcos, as in `HIP 11767` or, for a component of a double star, `HIP 12318B`.
     Hipparcos(HipparcosId),
-    /// Another catalogue's number, as in Gaia's `source_id`.
+    /// A number of another catalogue, such as Gaia's `source_id`.
     Number(u64),
-    /// A star that only has a name (see [`Catalog::name_of`](super::Catalog::name_of)); the number
-    /// does no more than tell it from others.
+    /// A star that has only a name (see [`Catalog::name_of`](super::Catalog::name_of)); the number
+    /// is arbitrary.
     Named(u32),
 }
 
@@ -35,7 +36,7 @@ impl fmt::Display for StarId {
 }
 
 impl StarId {
-    /// What kind of identifier it is, and its value, as the compact form has them.
+    /// The kind and value of the identifier in the compact form.
     pub(super) const fn to_raw(self) -> (u8, u64) {
         match self {
             Self::Skymap(number) => (0, number as u64),
@@ -46,7 +47,7 @@ impl StarId {
         }
     }
 
-    /// The identifier in the compact form; `None` for what [`to_raw`](Self::to_raw) does not give.
+    /// The inverse of [`to_raw`](Self::to_raw); `None` for an unknown kind or a value out of range.
     pub(super) fn from_raw(kind: u8, value: u64) -> Option<Self> {
         let small = || u32::try_from(value).ok();
         match kind {
@@ -59,8 +60,8 @@ impl StarId {
         }
     }
 
-    /// The identifier that `text` is in words: `TYC 1-13-1`, `HIP 11767`, `HIP 12318B`.
-    pub(super) fn in_words(text: &str) -> Option<Self> {
+    /// Parses an identifier with its catalogue: `TYC 1-13-1`, `HIP 11767`, `HIP 12318B`.
+    pub(super) fn parse(text: &str) -> Option<Self> {
         let (catalog, number) = text.split_at_checked(3)?;
         let number = number.trim_start();
         if catalog.eq_ignore_ascii_case("TYC") {
@@ -73,7 +74,8 @@ impl StarId {
     }
 }
 
-/// A number of Tycho-1 and Tycho-2: a region of the Guide Star Catalog, a star in it, a component.
+/// A number of Tycho-1 and Tycho-2: a region of the Guide Star Catalog, a star in it, a component
+/// of that star.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TychoId(u32);
 
@@ -82,8 +84,8 @@ impl TychoId {
     const STAR_BITS: u32 = 14;
     const COMPONENT_BITS: u32 = 4;
 
-    /// The star `TYC region-star-component`; `None` for numbers that no Tycho catalogue has
-    /// (0, or above 16383 in the first two, 15 in the last).
+    /// The star `TYC region-star-component`; `None` unless region and star are from 1 to 16383 and
+    /// the component from 1 to 15.
     pub fn new(region: u32, star: u32, component: u32) -> Option<Self> {
         let fits = |value: u32, bits: u32| value > 0 && value < 1 << bits;
         let valid = fits(region, Self::REGION_BITS)
@@ -96,7 +98,7 @@ impl TychoId {
         ))
     }
 
-    /// Three numbers with hyphens or blanks between them.
+    /// Parses three numbers separated by hyphens or blanks.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let mut parts = text
             .split(['-', ' '])
@@ -118,18 +120,19 @@ impl fmt::Display for TychoId {
     }
 }
 
-/// A number of the Hipparcos Catalogue, and a component of that star if it is a double one.
+/// A number of the Hipparcos Catalogue, with the component of a double star.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct HipparcosId(u32);
 
 impl HipparcosId {
-    /// `HIP number`, or its component with a capital letter; `None` for a number above 16,777,215 or another letter.
+    /// The star `HIP number`, or its component with a capital letter; `None` for a number above
+    /// 16,777,215 or another letter.
     pub fn new(number: u32, component: Option<u8>) -> Option<Self> {
         let valid = number < 1 << 24 && component.is_none_or(|letter| letter.is_ascii_uppercase());
         valid.then_some(Self((number << 8) | u32::from(component.unwrap_or(0))))
     }
 
-    /// A number, with or without a letter behind it.
+    /// Parses a number, optionally followed by a letter.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let bytes = text.as_bytes();
         let (digits, component) = match bytes {
@@ -151,10 +154,10 @@ impl fmt::Display for HipparcosId {
     }
 }
 
-/// The number that `digits`, and nothing but digits, stand for.
+/// Parses a number of digits alone.
 pub(super) fn whole_number(digits: &[u8]) -> Option<u64> {
     let digits = str::from_utf8(digits).ok()?;
-    // `parse` would let a sign pass.
+    // `parse` would accept a sign.
     let plain = digits.bytes().all(|byte| byte.is_ascii_digit());
     plain.then(|| digits.parse().ok()).flatten()
 }
@@ -171,11 +174,11 @@ mod tests {
     }
 
     #[test]
-    fn identifiers_in_words_are_read_as_they_are_written() {
+    fn identifiers_with_their_catalogue_are_parsed() {
         for text in ["TYC 1-13-1", "TYC 9537-12121-4", "HIP 11767", "HIP 12318B"] {
-            assert_eq!(StarId::in_words(text).unwrap().to_string(), text);
+            assert_eq!(StarId::parse(text).unwrap().to_string(), text);
         }
-        let padded = StarId::in_words("TYC 0001 00013 1").unwrap();
+        let padded = StarId::parse("TYC 0001 00013 1").unwrap();
         assert_eq!(padded.to_string(), "TYC 1-13-1");
         for text in [
             "",
@@ -193,13 +196,17 @@ mod tests {
             "HD 1",
             "ÄÖÜ",
         ] {
-            assert_eq!(StarId::in_words(text), None, "{text}");
+            assert_eq!(StarId::parse(text), None, "{text}");
         }
     }
 
     proptest! {
         #[test]
-        fn identifiers_go_through_the_compact_form(kind in 0..6_u8, value in any::<u64>(), small in any::<u32>()) {
+        fn identifiers_survive_the_compact_form(
+            kind in 0..6_u8,
+            value in any::<u64>(),
+            small in any::<u32>(),
+        ) {
             for value in [value, u64::from(small)] {
                 if let Some(id) = StarId::from_raw(kind, value) {
                     prop_assert_eq!(id.to_raw(), (kind, value));

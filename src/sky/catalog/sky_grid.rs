@@ -1,8 +1,11 @@
-//! Which catalogue stars lie near a direction, brightest first.
+//! Which catalogue stars are near a direction, down to a limiting magnitude?
 //!
-//! The cube around the unit sphere is cut into cubic cells; the stars of a cell stand together, brightest
-//! first, so that a search to a limiting magnitude stops early. That needs no trigonometry and knows no
-//! poles. Wide and shallow searches go through the brightest stars of the whole sky instead.
+//! Stars, brightest first → [`SkyGrid`] → the stars within a radius.
+//!
+//! The cube around the unit sphere is divided into cubic cells, and the stars of each cell are
+//! stored together, brightest first, so a search stops at its limiting magnitude. This needs no
+//! trigonometry and has no special cases at the poles. Wide and shallow searches scan the brightest
+//! stars of the whole sky instead.
 
 use super::Star;
 use crate::base::coords::{Icrs, UnitVector};
@@ -11,14 +14,14 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
-/// One star as the grid keeps it: packed, since most of a search is waiting for memory.
+/// A star of the grid: small, because searches are limited by memory access.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridStar {
-    /// Components of the ICRS unit vector (single precision: 0.01 arcsec).
+    /// The ICRS unit vector (single precision: 0.01 arcsec).
     pub direction: [f32; 3],
     /// V magnitude.
     pub v_mag: f32,
-    /// Index into the catalogue's stars.
+    /// Index of the star in the catalogue.
     pub catalog: u32,
 }
 
@@ -32,38 +35,34 @@ impl GridStar {
         }
     }
 
-    /// The unit vector, as accurate as it is kept.
+    /// The unit vector, in single precision.
     #[inline]
     pub fn vector(&self) -> Vector3<f64> {
         Vector3::from(self.direction.map(f64::from))
     }
 
-    /// Whether it stands within a chord, of which this is the square, of `centre`, a unit vector.
+    /// Whether the star is within a chord of the unit vector `centre`, given the chord squared.
     #[inline]
     pub fn is_within(&self, centre: &Vector3<f64>, chord_sq: f64) -> bool {
         (self.vector() - centre).norm_squared() <= chord_sq
     }
 }
 
-/// The catalogue's stars by place.
+/// The stars of a catalogue, by position.
 #[derive(Debug, Clone)]
 pub struct SkyGrid {
-    /// `cell_starts[c]..cell_starts[c + 1]` are the stars of cell `c` in `by_cell`.
+    /// The stars of cell `c` are `by_cell[cell_starts[c]..cell_starts[c + 1]]`.
     cell_starts: Vec<u32>,
     by_cell: Vec<GridStar>,
-    /// In the order of the catalogue, brightest first.
+    /// In the order of the catalogue.
     by_brightness: Vec<GridStar>,
 }
 
-/// Cells along an edge of the cube: on the sphere they are 1.8° wide and hold sixteen catalogue stars.
+/// Cells along an edge of the cube: on the sphere they are 1.8° wide and hold 16 stars of SKY2000.
 const CELLS: usize = 64;
 const CELL_SIZE: f64 = 2.0 / CELLS as f64;
-/// Going to a cell costs about as much as looking at so many stars in a row.
-const STARS_PER_CELL_VISIT: f64 = 4.0;
-/// How far single precision may put a star off the sphere.
-const OFF_SPHERE: f64 = 1e-6;
 
-/// The chord of an angle, which counts as half a turn beyond that.
+/// The chord of an angle, which is clamped to half a turn.
 #[inline]
 pub fn chord_of(angle_rad: f64) -> f64 {
     2.0 * (angle_rad.clamp(0.0, PI) / 2.0).sin()
@@ -78,11 +77,11 @@ fn cells_along(centre: f64, radius: f64) -> RangeInclusive<usize> {
 }
 
 impl SkyGrid {
-    /// Sorts `stars`, which stand brightest first, into cells.
+    /// Sorts `stars`, which must be ordered brightest first, into cells.
     pub fn new(stars: &[Star]) -> Self {
         let packed = |(index, star)| GridStar::new(index, star);
         let by_brightness: Vec<GridStar> = stars.par_iter().enumerate().map(packed).collect();
-        // A counting sort: stable, so that a cell's stars stay brightest first.
+        // A counting sort is stable: the stars of a cell stay ordered brightest first.
         let cell_of = |star: &GridStar| Self::cell_of(star) as u32;
         let cells: Vec<u32> = by_brightness.par_iter().map(cell_of).collect();
         let mut cell_starts = vec![0u32; CELLS.pow(3) + 1];
@@ -94,11 +93,11 @@ impl SkyGrid {
         }
         let mut by_cell = by_brightness.clone();
         for (star, &cell) in by_brightness.iter().zip(&cells) {
-            let place = &mut cell_starts[cell as usize];
-            by_cell[*place as usize] = *star;
-            *place += 1;
+            let next = &mut cell_starts[cell as usize];
+            by_cell[*next as usize] = *star;
+            *next += 1;
         }
-        // Each start has moved on to the next cell's.
+        // Each start is now that of the next cell.
         cell_starts.rotate_right(1);
         cell_starts[0] = 0;
         Self {
@@ -113,14 +112,14 @@ impl SkyGrid {
         (x * CELLS + y) * CELLS + z
     }
 
-    /// The star at this index of the catalogue.
+    /// The star at an index of the catalogue.
     #[inline]
     pub fn star(&self, catalog: u32) -> &GridStar {
         &self.by_brightness[catalog as usize]
     }
 
-    /// Calls `visit` with every star within `radius_rad` of `centre` that is not fainter than
-    /// `faintest_v_mag`, in an order that depends on nothing but the arguments.
+    /// Calls `visit` for every star within `radius_rad` of `centre` that is not fainter than
+    /// `faintest_v_mag`, in a deterministic order.
     #[inline]
     pub fn for_each_within(
         &self,
@@ -136,7 +135,7 @@ impl SkyGrid {
             faintest_v_mag,
         };
         if chord < CELL_SIZE {
-            // The cells around a point: which of them the sphere crosses does not matter.
+            // So few cells that those off the sphere need not be skipped.
             for x in cells_along(cone.centre.x, chord) {
                 for y in cells_along(cone.centre.y, chord) {
                     self.visit_column(&cone, [x, y], cells_along(cone.centre.z, chord), &mut visit);
@@ -147,7 +146,8 @@ impl SkyGrid {
         }
     }
 
-    /// Whether there is a star within `chord` of `centre` with a V magnitude in `magnitudes`: fast where the chord is short.
+    /// Whether a star with a V magnitude in `magnitudes` is within `chord` of `centre`; fast for
+    /// short chords.
     #[inline]
     pub fn is_any_within(
         &self,
@@ -185,6 +185,8 @@ impl SkyGrid {
     }
 
     fn for_each_in_wide_cone(&self, cone: &Cone, visit: &mut impl FnMut(&GridStar)) {
+        /// The cost of visiting a cell, in stars of a linear scan.
+        const STARS_PER_CELL_VISIT: f64 = 4.0;
         let bright_enough = self
             .by_brightness
             .partition_point(|s| s.v_mag <= cone.faintest_v_mag);
@@ -236,8 +238,11 @@ struct Cone<'a> {
     faintest_v_mag: f32,
 }
 
-/// The cells of the column at (x, y) that the sphere crosses: below and above the equator, each cell once.
+/// The cells of the column at (x, y) that the sphere crosses, below and above the equator, each
+/// once.
 fn sphere_crossings(x: usize, y: usize) -> impl Iterator<Item = RangeInclusive<usize>> {
+    /// The largest distance of a star from the sphere, due to single precision.
+    const OFF_SPHERE: f64 = 1e-6;
     let nearest_and_farthest = |cell: usize| {
         let low = cell as f64 * CELL_SIZE - 1.0;
         let high = low + CELL_SIZE;
@@ -272,7 +277,7 @@ mod tests {
         Star::new(StarId::Skymap(index), direction, index as f32 * 0.001)
     }
 
-    /// The stars that a k-d tree finds.
+    /// The same search with a k-d tree.
     struct Oracle {
         stars: Vec<GridStar>,
         tree: ImmutableKdTree<f64, 3>,
@@ -287,7 +292,7 @@ mod tests {
         }
 
         fn within(&self, center: &UnitVector<Icrs>, radius_rad: f64, limit: f32) -> Vec<u32> {
-            // Half a turn is the whole sky; beyond it the chord would shrink again.
+            // The chord would shrink again beyond half a turn, which is the whole sky.
             let chord = 2.0 * (radius_rad.min(PI) / 2.0).sin();
             let near = self
                 .tree
@@ -302,7 +307,7 @@ mod tests {
         }
     }
 
-    /// Whether the grid says of the same cone whether there is any star from half the limit on.
+    /// Whether the grid agrees on the existence of stars from half the limit to the limit.
     fn agrees_on_any(
         grid: &SkyGrid,
         expected: &[u32],
@@ -325,12 +330,12 @@ mod tests {
     proptest! {
         #[test]
         fn a_cone_holds_what_a_k_d_tree_finds(
-            places in prop::collection::vec((0.0..TAU, -1.0..1.0f64), 1..500),
+            positions in prop::collection::vec((0.0..TAU, -1.0..1.0f64), 1..500),
             ra_rad in 0.0..TAU, dec_rad in -FRAC_PI_2..FRAC_PI_2,
             radius_rad in prop_oneof![0.0..0.015f64, 0.0..0.3f64, 0.0..3.2f64],
             limit in 0.0..0.6f32,
         ) {
-            let stars: Vec<Star> = places
+            let stars: Vec<Star> = positions
                 .iter()
                 .enumerate()
                 .map(|(i, &(ra, sin_dec))| star(i as u32, ra, sin_dec))
@@ -344,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn cones_of_all_sizes_in_the_whole_catalogue_hold_what_they_should() {
+    fn cones_of_all_sizes_agree_with_a_k_d_tree_in_the_whole_catalogue() {
         let stars = crate::sky::catalog::Catalog::built_in().stars();
         let (grid, oracle) = (SkyGrid::new(stars), Oracle::new(stars));
         for (i, radius_deg) in [0.1, 0.8, 1.0, 3.0, 12.0, 40.0].into_iter().enumerate() {

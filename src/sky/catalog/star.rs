@@ -1,73 +1,78 @@
-//! One star of the catalogue.
+//! A catalogue star.
 
 use super::StarId;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::units::RAD_PER_ARCSEC;
 use nalgebra::Vector3;
 
-const RAD_PER_MAS: f64 = RAD_PER_ARCSEC / 1000.0;
+/// The epoch of all positions in a [`Catalog`](super::Catalog), as a Julian year.
+pub(super) const J2000_YEAR: f64 = 2000.0;
+/// The largest |V| and |B−V| that the compact form holds.
+pub(super) const MAG_LIMIT: f32 = 32.0;
+/// The fastest proper motion that the compact form holds, in mas a year.
+pub(super) const PM_LIMIT_MAS_PER_YR: f32 = 32_767.0;
 
-/// Position of a star in [`Catalog::stars`](super::Catalog::stars), brightest first.
+/// The index of a star in [`Catalog::stars`](super::Catalog::stars), brightest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct StarIndex(u32);
 
 impl StarIndex {
-    /// The star at `position`.
+    /// The star at `index`.
     ///
     /// # Panics
-    /// If `position` is 2³² or more; no catalogue has as many stars.
-    pub fn new(position: usize) -> Self {
-        Self(u32::try_from(position).expect("a catalogue has fewer than 2^32 stars"))
+    /// If `index` is 2³² or more; no catalogue has as many stars.
+    pub fn new(index: usize) -> Self {
+        Self(u32::try_from(index).expect("a catalogue has fewer than 2^32 stars"))
     }
 
-    /// The position in the list of stars.
+    /// The index as a number.
     pub const fn get(self) -> usize {
         self.0 as usize
     }
 }
 
 impl From<u32> for StarIndex {
-    fn from(position: u32) -> Self {
-        Self(position)
+    fn from(index: u32) -> Self {
+        Self(index)
     }
 }
 
-/// What the catalogue warns of about a star: a set of yes-or-no remarks.
+/// Caveats about a star: a set of flags.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct StarFlags(u8);
 
 impl StarFlags {
-    /// Nothing to remark.
+    /// No flags.
     pub const NONE: Self = Self(0);
-    /// The position is that of two or more stars together (SKY2000 `f_pos`).
+    /// The position is the joint position of two or more stars (SKY2000 `f_pos`).
     pub const BLENDED_POSITION: Self = Self(1);
-    /// The V magnitude is that of two or more stars together (SKY2000 `f_Vmag`).
+    /// The V magnitude is the joint magnitude of two or more stars (SKY2000 `f_Vmag`).
     pub const BLENDED_MAGNITUDE: Self = Self(1 << 1);
-    /// A double or multiple star with a measured separation (SKY2000 `sep`), or one of a pair of which
-    /// Tycho-2 has the photocentre.
+    /// A double or multiple star with a measured separation (SKY2000 `sep`), or one of a pair of
+    /// which Tycho-2 gives the photocentre.
     pub const MULTIPLE: Self = Self(1 << 2);
-    /// A variable star, or one suspected of it (SKY2000 `varTyp` or `Vname`).
+    /// A variable or suspected variable star (SKY2000 `varTyp` or `Vname`).
     pub const VARIABLE: Self = Self(1 << 3);
-    /// The V magnitude was derived from other magnitudes (SKY2000 `Vder`, Tycho-2, Gaia), not observed.
+    /// The V magnitude is derived from other magnitudes (SKY2000 `Vder`, Tycho-2, Gaia).
     pub const DERIVED_MAGNITUDE: Self = Self(1 << 4);
-    /// The proper motion is unknown; it is given as zero.
+    /// The proper motion is unknown, and zero here.
     pub const NO_PROPER_MOTION: Self = Self(1 << 5);
 
     const ALL_BITS: u8 = (1 << 6) - 1;
 
-    /// Whether every remark of `other` is in this set.
+    /// Whether every flag of `other` is in this set.
     pub const fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
 
-    /// The remarks of both sets.
+    /// The flags of both sets.
     pub const fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// `self` where `present`, else nothing.
-    pub(super) const fn only_if(self, present: bool) -> Self {
-        if present { self } else { Self::NONE }
+    /// `self` if `condition`, else no flags.
+    pub(super) const fn only_if(self, condition: bool) -> Self {
+        if condition { self } else { Self::NONE }
     }
 
     /// The byte of the compact form.
@@ -75,7 +80,7 @@ impl StarFlags {
         self.0
     }
 
-    /// The set in a byte of the compact form; `None` if a bit has no meaning.
+    /// Decodes the byte of the compact form; `None` if it has unknown flags.
     pub(super) const fn from_bits(bits: u8) -> Option<Self> {
         if bits & !Self::ALL_BITS == 0 {
             Some(Self(bits))
@@ -85,10 +90,10 @@ impl StarFlags {
     }
 }
 
-/// One catalogue star, at the catalogue's epoch J2000.
+/// A catalogue star at epoch J2000.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Star {
-    /// What the catalogue calls the star.
+    /// The identifier in the catalogue.
     pub id: StarId,
     /// Direction at epoch J2000.
     pub direction: UnitVector<Icrs>,
@@ -100,12 +105,12 @@ pub struct Star {
     pub v_mag: f32,
     /// Johnson B−V, where known.
     pub bv_mag: Option<f32>,
-    /// What the catalogue warns of.
+    /// Caveats about the star.
     pub flags: StarFlags,
 }
 
 impl Star {
-    /// A star of which no more is known than number, place and V magnitude.
+    /// A star of which only identifier, direction and V magnitude are known.
     pub fn new(id: StarId, direction: UnitVector<Icrs>, v_mag: f32) -> Self {
         Self {
             id,
@@ -118,26 +123,27 @@ impl Star {
         }
     }
 
-    /// Whether the star is brighter than `v_mag` (Johnson V), to the whole thousandth that the catalogue knows.
+    /// Whether the star is brighter than `v_mag` (Johnson V), its V rounded to 0.001 mag.
     pub fn is_brighter_than(&self, v_mag: f64) -> bool {
         f64::from(mmag(self.v_mag)) / 1000.0 < v_mag
     }
 
-    /// The direction in which the star stands `years_since_j2000` Julian years after J2000.0.
+    /// The direction of the star `years_since_j2000` Julian years after J2000.0.
     ///
-    /// Uniform motion along a straight line across the line of sight. Radial velocity, parallax and
-    /// aberration are not in it: the first is worth less than 1″ in 30 years for the fastest stars, the
-    /// second less than 1″ for all, the last up to 20.5″ but nearly the same over a whole field.
+    /// Linear motion across the line of sight. Neglects radial velocity (less than 1″ in 30 years
+    /// for the fastest stars), parallax (less than 1″) and aberration (up to 20.5″, but nearly
+    /// constant over a field).
     ///
     /// # Reference
     /// ESA 1997, The Hipparcos and Tycho Catalogues (SP-1200), vol. 1, eq. 1.5.4, without ζ₀.
     pub fn direction_at(&self, years_since_j2000: f64) -> UnitVector<Icrs> {
+        const RAD_PER_MAS: f64 = RAD_PER_ARCSEC / 1000.0;
         let east_rad = f64::from(self.pm_ra_mas_per_yr) * RAD_PER_MAS * years_since_j2000;
         let north_rad = f64::from(self.pm_dec_mas_per_yr) * RAD_PER_MAS * years_since_j2000;
         if east_rad == 0.0 && north_rad == 0.0 {
             return self.direction;
         }
-        // As `east_north`, without the trip through the angles: this runs over whole catalogues.
+        // As `east_north`, but without trigonometry: this runs over whole catalogues.
         let position = self.direction.as_vector();
         let from_axis = (position.x * position.x + position.y * position.y).sqrt();
         let (sin_ra, cos_ra) = if from_axis > 0.0 {
@@ -156,13 +162,13 @@ pub(super) fn mmag(mag: f32) -> i16 {
     (f64::from(mag) * 1000.0).round() as i16
 }
 
-/// A magnitude in magnitudes: the `f32` nearest to the decimal fraction, as if it had been parsed.
+/// A magnitude in magnitudes: the `f32` nearest to the decimal number, as parsing would give.
 pub(super) fn mag_from_mmag(mmag: i16) -> f32 {
     f32::from(mmag) / 1000.0
 }
 
-/// A magnitude within ±32, to the thousandth that the compact form knows.
-pub(super) fn mag_on_grid(mag: f64) -> f32 {
+/// A magnitude within ±32, rounded to 0.001 mag as in the compact form.
+pub(super) fn rounded_mag(mag: f64) -> f32 {
     mag_from_mmag((mag * 1000.0).round() as i16)
 }
 
@@ -179,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn proper_motion_goes_east_and_north_by_its_own_arcseconds() {
+    fn proper_motion_moves_a_star_east_and_north() {
         let mut star = star_at(100.0, 60.0);
         star.pm_ra_mas_per_yr = 500.0;
         star.pm_dec_mas_per_yr = -200.0;
@@ -197,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_star_without_motion_stays_and_one_at_the_pole_moves() {
+    fn a_star_without_motion_stays_and_a_polar_star_moves() {
         let still = star_at(10.0, 10.0);
         assert_eq!(still.direction_at(25.0), still.direction);
         let mut polar = Star::new(

@@ -1,4 +1,5 @@
-//! Transforms ICRS directions to axes fixed to the Earth: precession, nutation, aberration, rotation.
+//! Transforms ICRS directions to axes fixed to the Earth: precession, nutation, aberration,
+//! rotation.
 //!
 //! Caveats: UT1 is assumed equal to UTC; they differ by less than 0.9 s, 13″ in right ascension.
 //! Frame bias (0.02″), polar motion (0.3″), diurnal aberration (0.3″) and the smaller terms of
@@ -138,13 +139,14 @@ mod tests {
     use sofars::{eph::epv00, erst::gst06a, pnp};
 
     const J2000_JD: f64 = 2_451_545.0;
-    /// Terms of fourth order and above are neglected: up to 0.00017″ t⁴, which is 0.014″ after three
-    /// centuries, in angles that partly cancel.
+    /// Terms of fourth order and above are neglected: up to 0.00017″ t⁴, which is 0.014″ after
+    /// three centuries, in angles that partly cancel.
     const PRECESSION_ARCSEC: f64 = 0.01;
     /// Smaller terms of nutation (0.5″ in longitude, 0.1″ in obliquity) and the frame bias (0.02″).
     const NUTATION_ARCSEC: f64 = 0.6;
     /// The Earth's orbit is assumed to be an ellipse about the Sun. The Sun moves about the
-    /// barycentre with up to 16 m/s (0.011″), the Earth about that with the Moon with 12 m/s (0.009″).
+    /// barycentre with up to 16 m/s (0.011″), the Earth about that with the Moon with 12 m/s
+    /// (0.009″).
     const ABERRATION_ARCSEC: f64 = 0.03;
 
     /// Every 97 days from `years` before J2000.0 to `years` after it.

@@ -59,8 +59,8 @@ impl Site {
     /// and a height above the ellipsoid in metres.
     ///
     /// # Errors
-    /// [`SiteError::OutOfRange`] if the latitude is not within ±90°, the longitude not from −180° to
-    /// 360°, or the height not from −500 m to 100 000 m.
+    /// [`SiteError::OutOfRange`] if the latitude is not within ±90°, the longitude not from −180°
+    /// to 360°, or the height not from −500 m to 100 000 m.
     pub fn new(lat_deg: f64, lon_deg: f64, height_m: f64) -> Result<Self, SiteError> {
         let ranges = [
             ("latitude", lat_deg, -90.0..=90.0, "from -90 to 90 degrees"),

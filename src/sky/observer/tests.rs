@@ -4,7 +4,8 @@ use super::*;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use proptest::prelude::*;
 
-/// Above the sum of what is neglected: nutation terms, polar motion, diurnal aberration, frame bias.
+/// Above the sum of what is neglected: nutation terms, polar motion, diurnal aberration, frame
+/// bias.
 const TOLERANCE_ARCSEC: f64 = 1.5;
 
 /// Date, site (latitude and longitude in degrees, height in metres), direction (RA and Dec in

@@ -1,56 +1,54 @@
-//! The rows of a text file, many at once, so that they can be parsed on all threads.
+//! Splits a text file into rows, many at once, so that they can be parsed on all threads.
 
 use memchr::memchr;
 use std::io::{self, BufRead, Read};
 use std::ops::Range;
 
-/// How much of a file is in memory at a time; also the longest row.
+/// The part of a file that is in memory at a time; also the longest row.
 const BUFFER_BYTES: usize = 1 << 23;
-/// A quote that is not closed within so many bytes does not open anything.
-const QUOTED_BYTES_MAX: usize = 1 << 14;
-const END_OF_FILE_MARK: u8 = 0x1a;
 
-/// One row without its line end.
+/// A row without its line end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Row<'a> {
-    /// The line on which it begins, from 1.
-    pub(super) line: u64,
+pub(in crate::sky::catalog) struct Row<'a> {
+    /// The line of its beginning, from 1.
+    pub(in crate::sky::catalog) line: u64,
     /// Its bytes.
-    pub(super) bytes: &'a [u8],
+    pub(in crate::sky::catalog) bytes: &'a [u8],
 }
 
 impl Row<'_> {
     /// Whether the row is empty or a comment.
-    pub(super) fn is_void(&self) -> bool {
+    pub(in crate::sky::catalog) fn is_blank_or_comment(&self) -> bool {
         self.bytes.starts_with(b"#") || self.bytes.trim_ascii().is_empty()
     }
 }
 
-/// Where a row lies in the buffer, its line end included.
+/// The range of a row in the buffer, with its line end.
 struct Span {
     line: u64,
     range: Range<usize>,
 }
 
-/// Cuts what it reads into rows. A line end is LF or CR LF; a last byte 0x1A (end of file, of old) is let pass.
-pub(super) struct Rows<R> {
+/// Splits what it reads into rows. Lines end with LF or CR LF; a last byte 0x1A (the end-of-file
+/// mark of DOS) is ignored.
+pub(in crate::sky::catalog) struct Rows<R> {
     reader: R,
     buffer: Vec<u8>,
-    /// Where in the buffer the next row begins, and on which line.
+    /// Where the next row begins: its byte in the buffer, and its line.
     next_byte: usize,
     next_line: u64,
-    /// Nothing is left to read.
+    /// The reader is at its end.
     ended: bool,
-    /// The rest of a line too long to be a row is still to be passed over.
+    /// The rest of an overlong line is still to be skipped.
     in_long_line: bool,
-    /// What went wrong behind the rows in the buffer.
-    trouble: Option<io::Error>,
-    /// The separator, where a cell that begins with a quote may hold line ends.
+    /// An error in reading after the rows in the buffer.
+    error: Option<io::Error>,
+    /// The separator of cells, where quoted cells may contain line ends.
     quoting: Option<u8>,
 }
 
 impl<R: BufRead> Rows<R> {
-    pub(super) fn new(reader: R) -> Self {
+    pub(in crate::sky::catalog) fn new(reader: R) -> Self {
         Self {
             reader,
             buffer: Vec::new(),
@@ -58,29 +56,29 @@ impl<R: BufRead> Rows<R> {
             next_line: 1,
             ended: false,
             in_long_line: false,
-            trouble: None,
+            error: None,
             quoting: None,
         }
     }
 
-    /// From here on a cell that begins with a quote goes on to the closing one, over line ends too.
-    pub(super) fn quote_between(&mut self, separator: u8) {
+    /// From here on, quoted cells between separators may contain line ends.
+    pub(in crate::sky::catalog) fn quote_between(&mut self, separator: u8) {
         self.quoting = Some(separator);
     }
 
-    /// How many lines were given out.
-    pub(super) fn lines_read(&self) -> u64 {
+    /// The number of lines returned so far.
+    pub(in crate::sky::catalog) fn lines_read(&self) -> u64 {
         self.next_line - 1
     }
 
     /// The next row; `None` at the end.
-    pub(super) fn next(&mut self) -> io::Result<Option<Row<'_>>> {
+    pub(in crate::sky::catalog) fn next(&mut self) -> io::Result<Option<Row<'_>>> {
         let span = self.next_span()?;
         Ok(span.map(|span| self.row(span)))
     }
 
-    /// The next row, which stays the next one; `None` at the end.
-    pub(super) fn peek(&mut self) -> io::Result<Option<Row<'_>>> {
+    /// The next row, without consuming it; `None` at the end.
+    pub(in crate::sky::catalog) fn peek(&mut self) -> io::Result<Option<Row<'_>>> {
         let Some(span) = self.next_span()? else {
             return Ok(None);
         };
@@ -88,8 +86,8 @@ impl<R: BufRead> Rows<R> {
         Ok(Some(self.row(span)))
     }
 
-    /// The next rows, as many as are in memory; none at the end.
-    pub(super) fn batch(&mut self) -> io::Result<Vec<Row<'_>>> {
+    /// All rows that are in memory, at least one; none at the end.
+    pub(in crate::sky::catalog) fn batch(&mut self) -> io::Result<Vec<Row<'_>>> {
         let mut spans: Vec<Span> = self.next_span()?.into_iter().collect();
         while !spans.is_empty()
             && let Some(span) = self.take_span()
@@ -113,8 +111,8 @@ impl<R: BufRead> Rows<R> {
             if let Some(span) = self.take_span() {
                 return Ok(Some(span));
             }
-            if let Some(trouble) = self.trouble.take() {
-                return Err(trouble);
+            if let Some(error) = self.error.take() {
+                return Err(error);
             }
             if self.ended {
                 return Ok(None);
@@ -123,7 +121,7 @@ impl<R: BufRead> Rows<R> {
         }
     }
 
-    /// Moves what is left to the front of the buffer, and fills it up behind.
+    /// Moves the remaining bytes to the front of the buffer, and fills the rest.
     fn fill(&mut self) {
         self.buffer.drain(..self.next_byte);
         self.next_byte = 0;
@@ -137,12 +135,13 @@ impl<R: BufRead> Rows<R> {
         let read = read.and_then(|_| reader.take(wanted).read_to_end(&mut self.buffer));
         match read {
             Ok(read) => self.ended = (read as u64) < wanted,
-            Err(trouble) => self.trouble = Some(trouble),
+            Err(error) => self.error = Some(error),
         }
     }
 
-    /// The next row of those that are whole in the buffer.
+    /// The next row that is complete in the buffer.
     fn take_span(&mut self) -> Option<Span> {
+        const END_OF_FILE_MARK: u8 = 0x1a;
         let start = self.next_byte;
         let rest = &self.buffer[start..];
         let (length, lines) = match self.row_length(rest) {
@@ -164,8 +163,10 @@ impl<R: BufRead> Rows<R> {
         Some(span)
     }
 
-    /// The bytes and lines of the row that `rest` begins with, if it is whole there.
+    /// The number of bytes and lines of the first row of `rest`, if it is complete.
     fn row_length(&self, rest: &[u8]) -> Option<(usize, u64)> {
+        /// A quote that is not closed within this many bytes is an ordinary character.
+        const QUOTED_BYTES_MAX: usize = 1 << 14;
         let first_end = memchr(b'\n', rest)? + 1;
         let Some(separator) = self.quoting else {
             return Some((first_end, 1));
@@ -175,7 +176,7 @@ impl<R: BufRead> Rows<R> {
             let searched = &rest[end..rest.len().min(QUOTED_BYTES_MAX.max(end))];
             match memchr(b'\n', searched) {
                 Some(more) => (end, lines) = (end + more + 1, lines + 1),
-                // More of it may come with the next filling of the buffer.
+                // The rest may follow with the next filling of the buffer.
                 None if rest.len() < QUOTED_BYTES_MAX && !self.ended => return None,
                 None => return Some((first_end, 1)),
             }
@@ -184,14 +185,14 @@ impl<R: BufRead> Rows<R> {
     }
 }
 
-/// Whether the end of `text` is inside a cell that began with a quote.
+/// Whether `text` ends inside a quoted cell.
 fn ends_in_quotes(text: &[u8], separator: u8) -> bool {
     if memchr(b'"', text).is_none() {
         return false;
     }
     let (mut quoted, mut at_start) = (false, true);
     for &byte in text {
-        // A quote that is doubled inside a quoted cell closes and opens it again.
+        // A doubled quote inside a quoted cell closes and reopens it.
         if byte == b'"' && (quoted || at_start) {
             quoted = !quoted;
             at_start = !quoted;
@@ -221,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_end_at_line_ends_and_know_their_lines() {
+    fn rows_end_at_line_ends_and_have_line_numbers() {
         let expected = vec![(1, b"a".to_vec()), (2, b"".to_vec()), (3, b"b".to_vec())];
         for content in ["a\n\nb", "a\r\n\r\nb\r\n", "a\n\nb\n\x1a"] {
             assert_eq!(rows_of(content.as_bytes(), None), expected);
@@ -230,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quoted_cell_may_hold_line_ends_but_an_open_quote_swallows_nothing() {
+    fn quoted_cells_may_contain_line_ends_but_unclosed_quotes_do_not() {
         let content = b"a,\"x\ny \"\"z\"\" \",1\nb,5\",2\nc\n";
         let rows = rows_of(content, Some(b','));
         assert_eq!(rows[0], (1, b"a,\"x\ny \"\"z\"\" \",1".to_vec()));

@@ -1,0 +1,19 @@
+//! What became of the records of the source files? Rows of text → stars, counts, a catalogue.
+//!
+//! 1. [`OpenedFile`] decompresses a file and shows its first bytes, which tell its kind.
+//! 2. [`Rows`] splits its content into rows, many at once.
+//! 3. A [`Format`] parses each row; [`Tally`] collects the stars and counts the other records.
+//! 4. [`combine`] makes the catalogue of all files, without repeated identifiers.
+
+mod combine;
+mod opened;
+mod rows;
+mod summary;
+mod tally;
+
+pub(super) use combine::{Part, combine};
+pub use combine::{Reading, SourceFile};
+pub(super) use opened::OpenedFile;
+pub(super) use rows::{Row, Rows};
+pub use summary::ImportSummary;
+pub(super) use tally::{Format, NamedStar, Parsed, Rejection, Tally, both_or_neither};

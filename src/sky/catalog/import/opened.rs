@@ -1,0 +1,56 @@
+//! Opens plain and gzip files alike.
+
+use crate::sky::catalog::CatalogError;
+use flate2::bufread::MultiGzDecoder;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Cursor, Read};
+use std::path::Path;
+
+const BUFFER_BYTES: usize = 1 << 16;
+
+/// A file, decompressed if necessary, with its first bytes.
+pub(in crate::sky::catalog) struct OpenedFile {
+    /// The first bytes, which `reader` returns again.
+    pub(in crate::sky::catalog) head: Vec<u8>,
+    /// The content from its beginning.
+    pub(in crate::sky::catalog) reader: Box<dyn BufRead>,
+}
+
+impl OpenedFile {
+    /// Opens the file `path`.
+    pub(in crate::sky::catalog) fn open(path: &Path) -> Result<Self, CatalogError> {
+        let file = File::open(path).map_err(CatalogError::open(path))?;
+        let reader = Box::new(BufReader::with_capacity(BUFFER_BYTES, file));
+        Self::decompress(reader).map_err(CatalogError::read(path, 0))
+    }
+
+    /// The whole content of the file, which is `path`.
+    pub(in crate::sky::catalog) fn read_to_end(
+        mut self,
+        path: &Path,
+    ) -> Result<Vec<u8>, CatalogError> {
+        let mut content = Vec::new();
+        let read = self.reader.read_to_end(&mut content);
+        read.map_err(CatalogError::read(path, 0))?;
+        Ok(content)
+    }
+
+    fn decompress(reader: Box<dyn BufRead>) -> io::Result<Self> {
+        const GZIP_MARK: [u8; 2] = [0x1f, 0x8b];
+        let plain = Self::peek(reader)?;
+        if !plain.head.starts_with(&GZIP_MARK) {
+            return Ok(plain);
+        }
+        let unpacked = MultiGzDecoder::new(plain.reader);
+        Self::peek(Box::new(BufReader::with_capacity(BUFFER_BYTES, unpacked)))
+    }
+
+    fn peek(mut reader: Box<dyn BufRead>) -> io::Result<Self> {
+        /// Enough to distinguish the kinds: more than a record of Tycho-2.
+        const HEAD_BYTES: u64 = 256;
+        let mut head = Vec::new();
+        reader.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
+        let reader = Box::new(Cursor::new(head.clone()).chain(reader));
+        Ok(Self { head, reader })
+    }
+}

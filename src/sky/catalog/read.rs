@@ -1,0 +1,220 @@
+//! Reads a catalogue, a file or a directory, whose kind is detected from its content.
+
+use super::import::{
+    Format, ImportSummary, OpenedFile, Part, Reading, Rows, SourceFile, Tally, combine,
+};
+use super::sky2000::FixedWidth;
+use super::table::Table;
+use super::tycho2::Tycho2;
+use super::{Catalog, CatalogError, compact};
+use rayon::prelude::*;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+impl Catalog {
+    /// Reads the catalogue in the file or directory `path`, whose [kind](super#kinds) is detected
+    /// from the content.
+    ///
+    /// # Errors
+    /// [`CatalogError`] if it cannot be read, is of another kind, or is damaged. Up to 1 % of the
+    /// records may be unreadable; [`read`] reports them.
+    pub fn read(path: &Path) -> Result<Self, CatalogError> {
+        read(path).map(|reading| reading.catalog)
+    }
+}
+
+/// Reads a catalogue like [`Catalog::read`], and reports what became of the records of each file.
+///
+/// # Errors
+/// As for [`Catalog::read`].
+pub fn read(path: &Path) -> Result<Reading, CatalogError> {
+    if path.is_dir() {
+        return read_directory(path);
+    }
+    let file = OpenedFile::open(path)?;
+    if let Kind::Compact = Kind::of(&file.head) {
+        let catalog = read_compact(path, file)?;
+        let files = Vec::new();
+        return Ok(Reading { catalog, files });
+    }
+    let part = read_part(path, file)?;
+    combine(path, title(path, &*part.format), vec![part])
+}
+
+/// Reads a catalogue that is not compact, and reports what became of each record.
+///
+/// # Errors
+/// As for [`Catalog::read`]; [`CatalogError::UnknownKind`] also for a compact catalogue, which has
+/// no records.
+pub fn import(path: &Path) -> Result<Reading, CatalogError> {
+    let reading = read(path)?;
+    if reading.files.is_empty() {
+        return Err(CatalogError::already_compact(path));
+    }
+    Ok(reading)
+}
+
+/// The kind of a file, as far as its first bytes tell.
+enum Kind {
+    Compact,
+    Sky2000,
+    Tycho2(Tycho2),
+    /// Or none of them.
+    Table,
+}
+
+impl Kind {
+    fn of(head: &[u8]) -> Self {
+        if head.starts_with(&compact::MAGIC) {
+            Self::Compact
+        } else if FixedWidth::is_in(head) {
+            Self::Sky2000
+        } else {
+            Tycho2::detect(head).map_or(Self::Table, Self::Tycho2)
+        }
+    }
+}
+
+fn read_compact(path: &Path, file: OpenedFile) -> Result<Catalog, CatalogError> {
+    let bytes = file.read_to_end(path)?;
+    let catalog = Catalog::from_compact(&bytes).map_err(|error| CatalogError::Compact {
+        path: path.to_owned(),
+        error,
+    })?;
+    if catalog.stars().is_empty() {
+        let (path, records) = (path.to_owned(), 0);
+        return Err(CatalogError::NoStars { path, records });
+    }
+    Ok(catalog)
+}
+
+/// Reads the records of a file that is not compact.
+fn read_part(path: &Path, file: OpenedFile) -> Result<Part, CatalogError> {
+    let kind = Kind::of(&file.head);
+    let mut rows = Rows::new(file.reader);
+    let format: Box<dyn Format + Send> = match kind {
+        Kind::Sky2000 => Box::new(FixedWidth),
+        Kind::Tycho2(file) => Box::new(file),
+        Kind::Compact | Kind::Table => Box::new(Table::open(&mut rows, path)?),
+    };
+    let tally = Tally::read(&mut rows, &*format, path)?;
+    Ok(Part {
+        path: path.to_owned(),
+        format,
+        tally,
+    })
+}
+
+/// The files of a directory by kind.
+#[derive(Default)]
+struct Directory {
+    tycho2: Vec<PathBuf>,
+    /// Files of Tycho-2 whose entries are probably not stars.
+    left_out: Vec<PathBuf>,
+    /// Catalogues of other kinds.
+    others: Vec<PathBuf>,
+}
+
+impl Directory {
+    fn list(path: &Path) -> Result<Self, CatalogError> {
+        let mut found = Self::default();
+        let mut has_supplement_1 = false;
+        for path in files_in(path)? {
+            let file = OpenedFile::open(&path)?;
+            match Kind::of(&file.head) {
+                Kind::Tycho2(Tycho2::Supplement2) => found.left_out.push(path),
+                Kind::Tycho2(part) => {
+                    has_supplement_1 |= part == Tycho2::Supplement1;
+                    found.tycho2.push(path);
+                }
+                Kind::Compact | Kind::Sky2000 => found.others.push(path),
+                Kind::Table => match Table::open(&mut Rows::new(file.reader), &path) {
+                    Ok(_) => found.others.push(path),
+                    Err(error @ CatalogError::Read { .. }) => return Err(error),
+                    Err(_) => {}
+                },
+            }
+        }
+        if !has_supplement_1 {
+            // Without trailing blanks, supplement 1 is as wide as supplement 2.
+            found.tycho2.append(&mut found.left_out);
+        }
+        Ok(found)
+    }
+}
+
+/// Reads the catalogue in a directory: all files of Tycho-2, or the one file of another kind.
+fn read_directory(path: &Path) -> Result<Reading, CatalogError> {
+    let found = Directory::list(path)?;
+    if let ([], [only]) = (&*found.tycho2, &*found.others) {
+        return read(only);
+    }
+    if found.tycho2.is_empty() || !found.others.is_empty() {
+        return Err(CatalogError::Directory {
+            path: path.to_owned(),
+            found: contents_of(&found.tycho2, &found.others),
+        });
+    }
+    // Collected before the first error is returned, so that it is the same on any number of
+    // threads.
+    let files = found.tycho2.par_iter();
+    let parts: Vec<Result<Part, CatalogError>> = files
+        .map(|file| read_part(file, OpenedFile::open(file)?))
+        .collect();
+    let parts: Vec<Part> = parts.into_iter().collect::<Result<_, _>>()?;
+    let mut reading = combine(path, title(path, &*parts[0].format), parts)?;
+    let left_out = found.left_out.into_iter().map(|path| SourceFile {
+        path,
+        kind: format!(
+            "{}, left out: its entries are probably not stars",
+            Tycho2::Supplement2.kind()
+        ),
+        summary: ImportSummary::default(),
+    });
+    reading.files.extend(left_out);
+    Ok(reading)
+}
+
+/// The files in a directory that are not hidden, by name.
+fn files_in(path: &Path) -> Result<Vec<PathBuf>, CatalogError> {
+    let list = || -> io::Result<Vec<PathBuf>> {
+        let paths = fs::read_dir(path)?.map(|entry| Ok(entry?.path()));
+        let mut files = paths.collect::<io::Result<Vec<PathBuf>>>()?;
+        let is_hidden = |file: &Path| {
+            let name = file.file_name();
+            name.is_some_and(|name| name.as_encoded_bytes().starts_with(b"."))
+        };
+        files.retain(|file| file.is_file() && !is_hidden(file));
+        files.sort();
+        Ok(files)
+    };
+    list().map_err(CatalogError::open(path))
+}
+
+/// Describes a directory without exactly one catalogue.
+fn contents_of(tycho2: &[PathBuf], others: &[PathBuf]) -> String {
+    if others.is_empty() {
+        return "no catalog is in it".to_owned();
+    }
+    let names: Vec<String> = tycho2
+        .iter()
+        .take(1)
+        .chain(others.iter().take(3))
+        .filter_map(|file| Some(file.file_name()?.to_string_lossy().into_owned()))
+        .collect();
+    format!("more than one catalog is in it ({}, ...)", names.join(", "))
+}
+
+/// The title of a catalogue, with the file name, which alone tells the version.
+fn title(path: &Path, format: &dyn Format) -> String {
+    // `.` has no name of its own.
+    let full = path.canonicalize().unwrap_or_default();
+    let name = path.file_name().or(full.file_name()).unwrap_or_default();
+    let name = name.to_string_lossy();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    match format.catalog() {
+        Some(catalog) => format!("{catalog} ({name})"),
+        None => name.to_owned(),
+    }
+}
