@@ -5,16 +5,8 @@ use super::ErrorPoint;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
-/// Smallest half width of the local regression, as a logarithm of the ratio of radii.
-const REACH: f64 = 0.3;
-/// Smallest number of points in a local fit: two more than a parabola needs.
-const FEWEST: usize = 5;
-/// With fewer points in total no parabola is fitted, as it would pass through all of them.
-const FEWEST_FOR_PARABOLA: usize = 4;
 /// Number of steps in the search for the minimum.
 const STEPS: usize = 600;
-/// Errors up to this factor above the minimum count as nearly optimal.
-const NEARLY: f64 = 1.05;
 
 /// The error over the radius, smoothed.
 ///
@@ -81,6 +73,8 @@ impl ErrorCurve {
 
     /// The error at a radius within the range, both in pixels.
     pub fn at(&self, spot_px: f64) -> f64 {
+        /// With fewer points in total no parabola is fitted, as it would pass through all of them.
+        const FEWEST_FOR_PARABOLA: usize = 4;
         let at = spot_px.ln();
         let log_rms = match self.points.len() {
             0..FEWEST_FOR_PARABOLA => self.joined_at(at),
@@ -117,8 +111,12 @@ impl ErrorCurve {
         solved.unwrap_or_else(|| self.joined_at(at))
     }
 
-    /// Half width of the local regression: [`REACH`], or as much as [`FEWEST`] points need.
+    /// Half width of the local regression, as a logarithm of the ratio of radii.
     fn reach_at(&self, at: f64) -> f64 {
+        /// Smallest half width of the local regression, as a logarithm of the ratio of radii.
+        const REACH: f64 = 0.3;
+        /// Smallest number of points in a local fit: two more than a parabola needs.
+        const FEWEST: usize = 5;
         let distances = self.points.iter().map(|point| (point.log_spot - at).abs());
         let mut distances: Vec<f64> = distances.collect();
         let last = distances.len().min(FEWEST) - 1;
@@ -139,6 +137,8 @@ impl ErrorCurve {
 
     /// The minimum.
     pub fn optimum(&self) -> Optimum {
+        /// Errors up to this factor above the minimum count as nearly optimal.
+        const NEARLY: f64 = 1.05;
         let errors: Vec<(f64, f64)> = self.radii_px().map(|r| (r, self.at(r))).collect();
         let lowest = (0..errors.len()).min_by(|&a, &b| errors[a].1.total_cmp(&errors[b].1));
         let lowest = lowest.unwrap_or(0);

@@ -55,17 +55,6 @@ pub struct Reach {
     pub peak_part: f64,
 }
 
-/// Largest number of stars along a side of a frame.
-const MOST_ABREAST: usize = 32;
-/// Distance between stars, in standard deviations of the spot, and its minimum in pixels. At this
-/// distance they cover a small part of the background and do not overlap.
-const SPACING_SIGMAS: f64 = 20.0;
-const LEAST_SPACING_PX: f64 = 40.0;
-/// Largest distance between a star and its detection: this many pixels plus standard deviations of
-/// the spot.
-const MATCH_PX: f64 = 2.0;
-const MATCH_SIGMAS: f64 = 1.0;
-
 impl EnergyStudy {
     /// A star of V magnitude `v_mag`: 400 trials, Gaussian fits, windows of 15 pixels.
     pub fn new(scenario: Scenario, v_mag: f64) -> Self {
@@ -99,6 +88,8 @@ impl EnergyStudy {
         noise_e: f64,
         random: &mut ChaCha8Rng,
     ) -> Result<ErrorPoint, FrameError> {
+        /// Largest number of stars along a side of a frame.
+        const MOST_ABREAST: usize = 32;
         let mut scenario = self.scenario_of(spot_px, noise_e);
         let mut workspace = Workspace::new();
         let mut squares = Vec::with_capacity(self.trials);
@@ -222,6 +213,14 @@ struct StarCells {
 
 impl StarCells {
     fn new(spot_px: f64, abreast: usize, stars: usize, random: &mut ChaCha8Rng) -> Self {
+        /// Largest distance between a star and its detection: this many pixels plus standard
+        /// deviations of the spot.
+        const MATCH_PX: f64 = 2.0;
+        const MATCH_SIGMAS: f64 = 1.0;
+        /// Distance between stars, in standard deviations of the spot, and its minimum in pixels.
+        /// At this distance they cover a small part of the background and do not overlap.
+        const SPACING_SIGMAS: f64 = 20.0;
+        const LEAST_SPACING_PX: f64 = 40.0;
         let cell_px = (SPACING_SIGMAS * spot_px).max(LEAST_SPACING_PX).ceil() as usize;
         let middle = (cell_px / 2) as f64;
         let mut at = |cell: usize| (cell * cell_px) as f64 + middle + random.random::<f64>() - 0.5;

@@ -3,16 +3,6 @@
 use crate::camera::data_sheet::DataSheet;
 use serde::Serialize;
 
-/// Standard deviation along one axis of a uniform disc of diameter 1: the cross-section of a cone
-/// of light at one f-number from focus.
-const DISC_SIGMA: f64 = 0.25;
-/// Standard deviation of the Gaussian closest to the core of the Airy pattern, in units of
-/// wavelength times f-number.
-///
-/// # Reference
-/// Zhang, Zerubia & Olivo-Marin 2007, Applied Optics 46, 1819: 0.21 λ/NA, with 1/NA = 2 N.
-const AIRY_SIGMA: f64 = 0.42;
-
 /// A lens and its pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Lens {
@@ -48,12 +38,21 @@ impl Lens {
     /// Geometric blur: a uniform disc whose diameter is distance over f-number. Its variance adds
     /// to that of the spot in focus.
     pub fn distance_um(&self, spot_px: f64) -> Option<f64> {
+        /// Standard deviation along one axis of a uniform disc of diameter 1: the cross-section of
+        /// a cone of light at one f-number from focus.
+        const DISC_SIGMA: f64 = 0.25;
         let blur2 = spot_px * spot_px - self.focused_px * self.focused_px;
         (blur2 >= 0.0).then(|| blur2.sqrt() * self.pitch_um * self.f_number / DISC_SIGMA)
     }
 
     /// Radius of the diffraction-limited spot in focus, in pixels.
     pub fn diffraction_px(&self) -> f64 {
+        /// Standard deviation of the Gaussian closest to the core of the Airy pattern, in units of
+        /// wavelength times f-number.
+        ///
+        /// # Reference
+        /// Zhang, Zerubia & Olivo-Marin 2007, Applied Optics 46, 1819: 0.21 λ/NA, with 1/NA = 2 N.
+        const AIRY_SIGMA: f64 = 0.42;
         AIRY_SIGMA * self.wavelength_nm * 1e-3 * self.f_number / self.pitch_um
     }
 }

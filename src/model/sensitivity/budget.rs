@@ -301,12 +301,11 @@ fn paper_bands(scenario: &Scenario, airmass: f64) -> Vec<Band> {
     table.into_iter().map(band).collect()
 }
 
-/// Largest width of a band, in nm.
-const BAND_NM: f64 = 5.0;
-
 /// Black bodies in bands over the camera's own range. The sky's brightness is that seen from the
 /// ground, so it is not attenuated.
 fn physical_bands(scenario: &Scenario, airmass: f64) -> Vec<Band> {
+    /// Largest width of a band, in nm.
+    const BAND_NM: f64 = 5.0;
     let (sheet, conditions) = (&scenario.camera, &scenario.conditions);
     let width_nm = sheet.band_to_nm - sheet.band_from_nm;
     let count = (width_nm / BAND_NM).ceil().max(1.0);

@@ -3,9 +3,6 @@
 use crate::base::statistics::{normal_cdf, normal_density};
 use nalgebra::{Matrix3, Vector3};
 
-/// Half width of the summed window, in standard deviations of the spot, plus two pixels.
-const REACH_SIGMAS: f64 = 6.0;
-
 /// Smallest standard errors of unbiased estimates of a star's position and flux, for a known
 /// background.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +31,8 @@ impl CramerRao {
         flux_e: f64,
         background_variance_e2: f64,
     ) -> Self {
+        /// Half width of the summed window, in standard deviations of the spot, plus two pixels.
+        const REACH_SIGMAS: f64 = 6.0;
         let reach = (REACH_SIGMAS * spot_sigma_px).ceil() as i32 + 2;
         let profile = |middle: f64| -> Vec<[f64; 2]> {
             let at = |pixel: i32| share_and_slope(f64::from(pixel) - middle, spot_sigma_px);

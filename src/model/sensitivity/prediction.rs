@@ -64,13 +64,12 @@ pub struct CompletenessPoint {
     pub part: f64,
 }
 
-/// Half width of the completeness curve, in magnitudes.
-const CURVE_REACH_MAG: f64 = 1.2;
-/// Step of the completeness curve, in magnitudes.
-const CURVE_STEP_MAG: f64 = 0.1;
-
 impl DetectorReport {
     fn new(detector: &Detector) -> Self {
+        /// Half width of the completeness curve, in magnitudes.
+        const CURVE_REACH_MAG: f64 = 1.2;
+        /// Step of the completeness curve, in magnitudes.
+        const CURVE_STEP_MAG: f64 = 0.1;
         let vmag_at = |part| Some(detector.vmag_at(part)).filter(|vmag| vmag.is_finite());
         let (limit50_vmag, limit90_vmag) = (vmag_at(0.5), vmag_at(0.9));
         let steps = (CURVE_REACH_MAG / CURVE_STEP_MAG).round() as i32;

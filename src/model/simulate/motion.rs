@@ -4,19 +4,6 @@ use crate::base::coords::{PixelPoint, UnitVector};
 use crate::camera::CameraModel;
 use nalgebra::Vector3;
 
-/// Largest length of a path segment, in standard deviations of the spot. Six points per segment
-/// give the light to 10⁻⁹.
-const PART_SIGMAS: f64 = 1.5;
-/// Gauss-Legendre quadrature with six points on −1 to 1: position and weight of those on one side.
-const QUADRATURE: [(f64, f64); 3] = [
-    (0.238_619_186_083_196_9, 0.467_913_934_572_691),
-    (0.661_209_386_466_264_5, 0.360_761_573_048_138_6),
-    (0.932_469_514_203_152, 0.171_324_492_379_170_36),
-];
-/// Paths shorter than this, in standard deviations, are ignored: they change no pixel by 10⁻⁷ of
-/// the light.
-const LEAST_SIGMAS: f64 = 1e-3;
-
 /// The motion of stars during one exposure.
 #[derive(Debug, Clone)]
 pub(super) struct Motion<'a> {
@@ -64,6 +51,19 @@ impl<'a> Motion<'a> {
         sigma_px: f64,
         mut put: impl FnMut(&PixelPoint, f64),
     ) {
+        /// Largest length of a path segment, in standard deviations of the spot. Six points per
+        /// segment give the light to 10⁻⁹.
+        const PART_SIGMAS: f64 = 1.5;
+        /// Gauss-Legendre quadrature with six points on −1 to 1: position and weight of those on
+        /// one side.
+        const QUADRATURE: [(f64, f64); 3] = [
+            (0.238_619_186_083_196_9, 0.467_913_934_572_691),
+            (0.661_209_386_466_264_5, 0.360_761_573_048_138_6),
+            (0.932_469_514_203_152, 0.171_324_492_379_170_36),
+        ];
+        /// Paths shorter than this, in standard deviations, are ignored: they change no pixel by
+        /// 10⁻⁷ of the light.
+        const LEAST_SIGMAS: f64 = 1e-3;
         let length_px = self.length_px(middle);
         if length_px < LEAST_SIGMAS * sigma_px {
             return put(middle, 1.0);

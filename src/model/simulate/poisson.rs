@@ -5,8 +5,6 @@
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Largest mean for which inversion is faster than rejection.
-const SMALL_MEAN: f64 = 12.0;
 /// Largest mean that is tabulated, in electrons.
 const LARGEST_TABLE_E: f64 = 1e6;
 /// Number of guide entries into the table: equal parts of the interval from 0 to 1.
@@ -14,6 +12,8 @@ const GUIDES: usize = 1 << 10;
 
 /// A Poisson random number of this non-negative `mean`; a mean beyond 2⁵³ is returned itself.
 pub(super) fn poisson(mean: f64, random: &mut ChaCha8Rng) -> f64 {
+    /// Largest mean for which inversion is faster than rejection.
+    const SMALL_MEAN: f64 = 12.0;
     const EXACT: f64 = (1u64 << 53) as f64;
     if mean < SMALL_MEAN {
         return by_inversion(mean, random);

@@ -3,7 +3,7 @@
 use super::camera::camera_of;
 use super::scene::{SCENE_KEYS, Scene};
 use super::strays::mean_cosmic_rays;
-use crate::camera::data_sheet::{DataSheet, IMPERFECTION_KEYS, Key, Limits};
+use crate::camera::data_sheet::{IMPERFECTION_KEYS, Key, Limits};
 use crate::model::sensitivity::{
     self, Budget, Scenario, ScenarioError, UnknownParameter, title_of,
 };
@@ -16,15 +16,6 @@ pub struct Setup {
     /// What happens during the exposure.
     pub scene: Scene,
 }
-
-/// Largest turn of the camera or a satellite during an exposure, in degrees: a longer trail is no
-/// longer realistic.
-const MOST_TURN_DEG: f64 = 90.0;
-/// Largest mean number of cosmic rays on a frame.
-const MOST_COSMIC_RAYS: f64 = 1e6;
-/// Largest gradient of the distortion, in pixels per pixel. At 1 the image folds; up to this value
-/// the mapping can be inverted in a few steps.
-const MOST_STEEPNESS: f64 = 0.6;
 
 impl Setup {
     /// Checks the scenario, and that the scene can be simulated.
@@ -44,6 +35,9 @@ impl Setup {
     /// The displacements of r³ and of Conrady's second order are steepest in the corner: the
     /// gradients there are three times and twice the displacement.
     fn folded_image(&self) -> Option<String> {
+        /// Largest gradient of the distortion, in pixels per pixel. At 1 the image folds; up to
+        /// this value the mapping can be inverted in a few steps.
+        const MOST_STEEPNESS: f64 = 0.6;
         let made = &self.scenario.camera.imperfections;
         let decentring_px = made.decentring_x_px.hypot(made.decentring_y_px);
         let found_px = 3.0 * made.distortion_px.abs() + 2.0 * decentring_px;
@@ -57,6 +51,9 @@ impl Setup {
     }
 
     fn far_turn(&self) -> Option<String> {
+        /// Largest turn of the camera or a satellite during an exposure, in degrees: a longer trail
+        /// is no longer realistic.
+        const MOST_TURN_DEG: f64 = 90.0;
         let exposure_s = self.scenario.conditions.exposure_s;
         let camera_deg = self.scene.largest_rate_deg_s() * exposure_s;
         let trail_deg = self.scene.trail_rate_deg_s * exposure_s;
@@ -73,6 +70,8 @@ impl Setup {
     }
 
     fn many_rays(&self) -> Option<String> {
+        /// Largest mean number of cosmic rays on a frame.
+        const MOST_COSMIC_RAYS: f64 = 1e6;
         let Scenario {
             camera, conditions, ..
         } = &self.scenario;
@@ -86,10 +85,8 @@ impl Setup {
 /// A parameter of a [`Setup`].
 #[derive(Debug, Clone, Copy)]
 pub enum SetupParameter {
-    /// A parameter of the scenario.
+    /// A parameter of the scenario, or an imperfection of its camera.
     Scenario(sensitivity::Parameter),
-    /// An imperfection of the camera.
-    Imperfection(&'static Key<DataSheet>),
     /// A parameter of the scene.
     Scene(&'static Key<Scene>),
 }
@@ -104,8 +101,10 @@ impl SetupParameter {
 
     /// All parameters except those of the scenario.
     pub fn beyond_scenario() -> impl Iterator<Item = Self> {
-        let imperfections = IMPERFECTION_KEYS.iter().map(Self::Imperfection);
-        imperfections.chain(SCENE_KEYS.iter().map(Self::Scene))
+        let imperfections = IMPERFECTION_KEYS.iter().map(sensitivity::Parameter::Camera);
+        imperfections
+            .map(Self::Scenario)
+            .chain(SCENE_KEYS.iter().map(Self::Scene))
     }
 
     /// The parameter called `name`.
@@ -126,7 +125,6 @@ impl SetupParameter {
     pub fn name(self) -> &'static str {
         match self {
             Self::Scenario(parameter) => parameter.name(),
-            Self::Imperfection(key) => key.name,
             Self::Scene(key) => key.name,
         }
     }
@@ -135,7 +133,6 @@ impl SetupParameter {
     pub fn about(self) -> &'static str {
         match self {
             Self::Scenario(parameter) => parameter.about(),
-            Self::Imperfection(key) => key.about,
             Self::Scene(key) => key.about,
         }
     }
@@ -144,7 +141,6 @@ impl SetupParameter {
     pub fn limits(self) -> Limits {
         match self {
             Self::Scenario(parameter) => parameter.limits(),
-            Self::Imperfection(key) => key.limits,
             Self::Scene(key) => key.limits,
         }
     }
@@ -153,7 +149,6 @@ impl SetupParameter {
     pub fn get(self, setup: &Setup) -> Option<f64> {
         match self {
             Self::Scenario(parameter) => parameter.get(&setup.scenario),
-            Self::Imperfection(key) => (key.get)(&setup.scenario.camera),
             Self::Scene(key) => (key.get)(&setup.scene),
         }
     }
@@ -162,7 +157,6 @@ impl SetupParameter {
     pub fn set(self, setup: &mut Setup, value: f64) {
         match self {
             Self::Scenario(parameter) => parameter.set(&mut setup.scenario, value),
-            Self::Imperfection(key) => (key.set)(&mut setup.scenario.camera, value),
             Self::Scene(key) => (key.set)(&mut setup.scene, value),
         }
     }

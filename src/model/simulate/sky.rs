@@ -11,9 +11,8 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 /// Grid step on which moonlight is computed, in pixels. Clouds use a step of their size over
-/// [`GRIDS_IN_A_CLOUD`], at most this. Values between grid points are interpolated.
+/// 32, at most this. Values between grid points are interpolated.
 const GRID_PX: usize = 16;
-const GRIDS_IN_A_CLOUD: f64 = 32.0;
 /// Number of waves that clouds are composed of.
 const WAVES: usize = 16;
 
@@ -159,6 +158,7 @@ impl Clouds {
 
     /// Grid step for interpolation of the height.
     fn grid_px(&self) -> usize {
+        const GRIDS_IN_A_CLOUD: f64 = 32.0;
         ((self.size_px / GRIDS_IN_A_CLOUD) as usize).clamp(1, GRID_PX)
     }
 

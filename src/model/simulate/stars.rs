@@ -15,9 +15,6 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::PI;
 
-/// Largest proper motion between J2000.0 and any requested date: Barnard's Star in 200 years.
-const PROPER_MOTION_ROOM_RAD: f64 = 0.01;
-
 /// Draws the stars of a frame.
 pub(super) struct StarSampler<'a> {
     pub(super) camera: &'a CameraModel,
@@ -50,6 +47,9 @@ impl StarSampler<'_> {
         reach_px: f64,
         random: &mut ChaCha8Rng,
     ) -> Vec<TrueStar> {
+        /// Largest proper motion between J2000.0 and any requested date: Barnard's Star in 200
+        /// years.
+        const PROPER_MOTION_ROOM_RAD: f64 = 0.01;
         let boresight = pointing
             .icrs_to_camera
             .inverse()

@@ -10,13 +10,6 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
-/// Longest path of a particle, in depths of the layer, for one almost parallel to it.
-const LONGEST_WAY: f64 = 100.0;
-/// Standard deviation of the logarithm of the charge per micrometre.
-const CHARGE_SPREAD: f64 = 0.3;
-/// Step along the path of a particle, in pixels.
-const STEP_PX: f64 = 0.25;
-
 /// The trail of a satellite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trail {
@@ -98,6 +91,10 @@ pub(super) fn cosmic_rays(
     exposure_s: f64,
     random: &mut ChaCha8Rng,
 ) -> Vec<CosmicRay> {
+    /// Longest path of a particle, in depths of the layer, for one almost parallel to it.
+    const LONGEST_WAY: f64 = 100.0;
+    /// Standard deviation of the logarithm of the charge per micrometre.
+    const CHARGE_SPREAD: f64 = 0.3;
     let mean = mean_cosmic_rays(scene, sheet, exposure_s);
     let count = poisson(mean, random) as usize;
     let depth_um = sheet.imperfections.depth_um;
@@ -126,6 +123,8 @@ pub(super) fn cosmic_rays(
 impl CosmicRay {
     /// Calls `put` with the column and row of points along the path, and the charge of each step.
     pub(super) fn along(&self, mut put: impl FnMut(i64, i64, f64)) {
+        /// Step along the path of a particle, in pixels.
+        const STEP_PX: f64 = 0.25;
         let trail = Trail {
             from: self.from,
             to: self.to,

@@ -8,7 +8,7 @@ use crate::identify::{Identification, StarMatch};
 use serde::{Deserialize, Serialize};
 
 /// The answer of an identification, compared with the truth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Answer {
     /// Identified correctly.
@@ -16,6 +16,7 @@ pub enum Answer {
     /// Identified as another field.
     Wrong,
     /// Not identified.
+    #[default]
     None,
 }
 

@@ -15,24 +15,6 @@ use crate::study::robustness::Answer;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
-/// Radius without another detectable star around an isolated one, in standard deviations of a spot
-/// plus pixels.
-const ALONE_SIGMAS: f64 = 8.0;
-const ALONE_PX: f64 = 2.0;
-/// Magnitudes below the predicted limit at which a star may still be detected.
-const MAY_BE_DETECTED_MAG: f64 = 0.5;
-/// Largest light of other stars at an isolated star, in units of the error of its own flux.
-const ALONE_PART: f64 = 0.05;
-/// Distance from the border at which a star is entirely on the frame, in standard deviations of its
-/// spot plus one pixel.
-const WHOLE_SIGMAS: f64 = 4.0;
-/// Radius around a false detection without any star, in standard deviations of a spot plus one
-/// pixel.
-const DARK_SIGMAS: f64 = 3.0;
-
-/// Significant digits of measured values.
-const DIGITS: i32 = 7;
-
 pub(super) struct Evaluation<'a> {
     validator: &'a Validator<'a>,
     number: u64,
@@ -80,21 +62,26 @@ impl<'a> Evaluation<'a> {
     pub(super) fn records(&self) -> (FrameRecord, Vec<StarRecord>) {
         let assignments = self.assignments();
         let truth = &self.simulated.truth;
-        let counted = truth.stars.iter().filter(|star| self.counts(star));
+        let counted = truth.stars.iter().filter(|star| self.is_tabulated(star));
         let mut rows: Vec<StarRecord> = counted
             .map(|star| self.star_row(star, assignments.of_star.get(&star.number).copied()))
             .collect();
-        let other = |&(kind, source): &(RowKind, SourceIndex)| self.other_row(kind, source);
+        let other = |&(kind, source): &(RowKind, SourceIndex)| {
+            self.with_source(StarRecord::empty(self.number, kind), source, None)
+        };
         rows.extend(assignments.others.iter().map(other));
         let frame = self.frame_row(&assignments, rows.len());
         (frame, rows)
     }
 
-    fn counts(&self, star: &TrueStar) -> bool {
+    fn is_tabulated(&self, star: &TrueStar) -> bool {
         star.v_mag <= self.faintest_vmag
     }
 
     fn assignments(&self) -> Assignments {
+        /// Radius around a false detection without any star, in standard deviations of a spot plus
+        /// one pixel.
+        const DARK_SIGMAS: f64 = 3.0;
         let mut assignments = Assignments::default();
         let dark_px = DARK_SIGMAS * self.light.sigma_px() + 1.0;
         for (index, source) in self.solution.sources.iter().enumerate() {
@@ -104,10 +91,13 @@ impl<'a> Evaluation<'a> {
             assignments.detected += 1;
             let index = SourceIndex::new(index);
             let place = &source.position;
-            let owner = self.light.owner(place).filter(|star| self.counts(star));
+            let owner = self
+                .light
+                .owner(place)
+                .filter(|star| self.is_tabulated(star));
             let Some(star) = owner else {
                 let mut near = self.light.stars_near(place, dark_px);
-                let kind = match near.any(|star| self.counts(star)) {
+                let kind = match near.any(|star| self.is_tabulated(star)) {
                     true => RowKind::Blend,
                     false => RowKind::False,
                 };
@@ -145,7 +135,7 @@ impl<'a> Evaluation<'a> {
             true_x_px: Some(to_decimals(star.position.x, 5)),
             true_y_px: Some(to_decimals(star.position.y, 5)),
             true_flux_e: Some(significant(star.electrons)),
-            isolated: Some(self.is_alone(star, bound_flux_e)),
+            isolated: Some(self.is_isolated(star, bound_flux_e)),
             saturated: Some(theory.saturated),
             probability: Some(to_decimals(self.probability(star), 5)),
             snr: Some(significant(theory.snr)),
@@ -168,7 +158,18 @@ impl<'a> Evaluation<'a> {
 
     /// Whether the star is entirely on the frame and the light of other stars near it is
     /// negligible.
-    fn is_alone(&self, star: &TrueStar, own_error_e: Option<f64>) -> bool {
+    fn is_isolated(&self, star: &TrueStar, own_error_e: Option<f64>) -> bool {
+        /// Distance from the border at which a star is entirely on the frame, in standard
+        /// deviations of its spot plus one pixel.
+        const WHOLE_SIGMAS: f64 = 4.0;
+        /// Radius without another detectable star around an isolated one, in standard deviations of
+        /// a spot plus pixels.
+        const ALONE_SIGMAS: f64 = 8.0;
+        const ALONE_PX: f64 = 2.0;
+        /// Magnitudes below the predicted limit at which a star may still be detected.
+        const MAY_BE_DETECTED_MAG: f64 = 0.5;
+        /// Largest light of other stars at an isolated star, in units of the error of its own flux.
+        const ALONE_PART: f64 = 0.05;
         let camera = self.validator.simulator.camera();
         let sigma_px = self.light.sigma_px();
         let whole_px = WHOLE_SIGMAS * sigma_px + 1.0;
@@ -190,11 +191,6 @@ impl<'a> Evaluation<'a> {
             light_e += other.electrons * (-0.25 * off * off).exp();
         }
         light_e < ALONE_PART * own_error_e.unwrap_or_else(|| star.electrons.sqrt())
-    }
-
-    /// The row of a detection that is no star.
-    fn other_row(&self, kind: RowKind, source: SourceIndex) -> StarRecord {
-        self.with_source(StarRecord::empty(self.number, kind), source, None)
     }
 
     /// `row` with the measurements of a source; `star` is its true star.
@@ -228,41 +224,18 @@ impl<'a> Evaluation<'a> {
     }
 
     fn frame_row(&self, assignments: &Assignments, star_rows: usize) -> FrameRecord {
-        let Self {
-            validator,
-            simulated,
-            solution,
-            ..
-        } = self;
+        let (simulated, solution) = (self.simulated, self.solution);
         let (boresight, up_pa_rad) = simulated.icrs_to_camera.boresight_and_up();
         let (ra_rad, dec_rad) = boresight.to_ra_dec();
         let degrees = |rad: f64| to_decimals(rad * DEG_PER_RAD, 7);
-        let limit_vmag = validator.limit_vmag();
-        let truth = &simulated.truth;
-        let v_mags = || truth.stars.iter().map(|star| star.v_mag);
-        // Only catalogue stars can be named.
-        let known = truth.stars.iter().filter(|star| star.catalog.is_some());
-        let expected = Faintest::of(known.map(|star| (star.v_mag, self.probability(star))));
+        let limit_vmag = self.validator.limit_vmag();
+        let is_above_limit = |star: &&TrueStar| star.v_mag < limit_vmag;
+        let above_limit = simulated.truth.stars.iter().filter(is_above_limit);
         let count = |of: RowKind| {
-            assignments
-                .others
-                .iter()
-                .filter(|(kind, _)| *kind == of)
-                .count()
+            let others = assignments.others.iter();
+            others.filter(|(kind, _)| *kind == of).count() as u64
         };
-        let attitude = self.attitude();
-        let errors = |of: fn(&AttitudeError) -> f64| attitude.as_ref().map(of).map(significant);
-        let sheet = &validator.protocol.setup.scenario.camera;
-        let budget = &validator.budget;
-        let catalog = validator.context.indexed.catalog();
-        let named = self
-            .names
-            .values()
-            .map(|star| f64::from(catalog.star(*star).v_mag));
         let [misnamed, misnamed_companions] = self.misnamed();
-        let photometry = solution.photometry.as_ref();
-        let limit = photometry.and_then(|p| p.completeness.limit.as_ref().ok());
-        let background = solution.background.as_ref();
         FrameRecord {
             frame: self.number,
             seed: simulated.seed,
@@ -274,37 +247,46 @@ impl<'a> Evaluation<'a> {
                 Outcome::Identified(_) => None,
                 Outcome::NotIdentified(reason) => Some(reason.code().to_owned()),
             },
-            stars_above_limit: v_mags().filter(|v_mag| *v_mag < limit_vmag).count() as u64,
+            stars_above_limit: above_limit.count() as u64,
             detected: assignments.detected,
             rejected: solution.sources.len() as u64 - assignments.detected,
             named: self.names.len() as u64,
             misnamed,
             misnamed_companions,
-            false_detections: count(RowKind::False) as u64,
-            blends: count(RowKind::Blend) as u64,
+            false_detections: count(RowKind::False),
+            blends: count(RowKind::Blend),
             star_rows: star_rows as u64,
-            error_x_arcsec: errors(|a| a.error_arcsec.x),
-            error_y_arcsec: errors(|a| a.error_arcsec.y),
-            error_roll_arcsec: errors(|a| a.error_arcsec.z),
-            sigma_x_arcsec: errors(|a| a.sigma_arcsec[0]),
-            sigma_y_arcsec: errors(|a| a.sigma_arcsec[1]),
-            sigma_roll_arcsec: errors(|a| a.sigma_arcsec[2]),
-            nees: attitude.as_ref().and_then(|a| a.nees).map(significant),
-            focal_error_px: errors(|a| a.focal_error_px),
-            focal_sigma_px: errors(|a| a.focal_sigma_px),
-            rms_px: errors(|a| a.rms_px),
-            faintest_vmag: named.reduce(f64::max).map(|v_mag| to_decimals(v_mag, 3)),
+            ..self.photometric_fields()
+        }
+    }
+
+    /// Limits, background and noise; and what [`Self::attitude_fields`] has.
+    fn photometric_fields(&self) -> FrameRecord {
+        let (validator, truth) = (self.validator, &self.simulated.truth);
+        let catalog = validator.context.indexed.catalog();
+        let v_mag = |star: &StarIndex| f64::from(catalog.star(*star).v_mag);
+        let faintest = self.names.values().map(v_mag).reduce(f64::max);
+        // Only catalogue stars can be named.
+        let known = truth.stars.iter().filter(|star| star.catalog.is_some());
+        let expected = Faintest::of(known.map(|star| (star.v_mag, self.probability(star))));
+        let photometry = self.solution.photometry.as_ref();
+        let limit = photometry.and_then(|p| p.completeness.limit.as_ref().ok());
+        let background = self.solution.background.as_ref();
+        let sheet = &validator.protocol.setup.scenario.camera;
+        let level_adu = sheet.bias_adu + truth.background_e / sheet.gain_e_per_adu;
+        let noise_adu = validator.budget.background_noise_e / sheet.gain_e_per_adu;
+        FrameRecord {
+            faintest_vmag: faintest.map(|v_mag| to_decimals(v_mag, 3)),
             expected_faintest_vmag: expected.map(|e| to_decimals(e.mean_vmag, 4)),
             expected_faintest_sigma_mag: expected.map(|e| to_decimals(e.sigma_mag, 4)),
-            predicted_limit_vmag: to_decimals(limit_vmag, 4),
+            predicted_limit_vmag: to_decimals(validator.limit_vmag(), 4),
             measured_limit_vmag: limit.map(|limit| to_decimals(limit.v_mag, 4)),
             measured_limit_sigma_mag: limit.map(|limit| to_decimals(limit.sigma_mag, 4)),
             background_adu: background.map(|b| significant(b.level_adu)),
-            true_background_adu: significant(
-                sheet.bias_adu + truth.background_e / sheet.gain_e_per_adu,
-            ),
+            true_background_adu: significant(level_adu),
             noise_adu: background.map(|b| significant(b.noise_adu)),
-            true_noise_adu: significant(budget.background_noise_e / sheet.gain_e_per_adu),
+            true_noise_adu: significant(noise_adu),
+            ..self.attitude_fields().unwrap_or_default()
         }
     }
 
@@ -334,37 +316,33 @@ impl<'a> Evaluation<'a> {
         [wrong, companions]
     }
 
-    /// Attitude error of a right answer.
-    fn attitude(&self) -> Option<AttitudeError> {
+    /// Errors of attitude and focal length of a right answer, and their stated standard errors.
+    fn attitude_fields(&self) -> Option<FrameRecord> {
         let found = self.found.filter(|_| self.answer() == Answer::Right)?;
         let truth = &self.simulated.icrs_to_camera;
         let turn = found.icrs_to_camera.matrix() * truth.matrix().transpose();
         let half = (turn - turn.transpose()) * 0.5;
         let error_rad = Vector3::new(half[(2, 1)], half[(0, 2)], half[(1, 0)]);
-        let nees = found
-            .attitude_covariance_rad2
-            .cholesky()
-            .map(|factor| error_rad.dot(&factor.solve(&error_rad)));
-        let camera = self.validator.simulator.camera();
-        Some(AttitudeError {
-            error_arcsec: error_rad * ARCSEC_PER_RAD,
-            sigma_arcsec: found.attitude_sigma_rad().map(|rad| rad * ARCSEC_PER_RAD),
-            nees,
-            focal_error_px: found.camera.focal_length_px - camera.focal_length_px,
-            focal_sigma_px: found.focal_length_sigma_px,
-            rms_px: found.rms_px,
+        let factor = found.attitude_covariance_rad2.cholesky();
+        let nees = factor.map(|factor| error_rad.dot(&factor.solve(&error_rad)));
+        let error_arcsec = error_rad * ARCSEC_PER_RAD;
+        let sigma_arcsec = found.attitude_sigma_rad().map(|rad| rad * ARCSEC_PER_RAD);
+        let true_focal_px = self.validator.simulator.camera().focal_length_px;
+        let some = |value: f64| Some(significant(value));
+        Some(FrameRecord {
+            error_x_arcsec: some(error_arcsec.x),
+            error_y_arcsec: some(error_arcsec.y),
+            error_roll_arcsec: some(error_arcsec.z),
+            sigma_x_arcsec: some(sigma_arcsec[0]),
+            sigma_y_arcsec: some(sigma_arcsec[1]),
+            sigma_roll_arcsec: some(sigma_arcsec[2]),
+            nees: nees.map(significant),
+            focal_error_px: some(found.camera.focal_length_px - true_focal_px),
+            focal_sigma_px: some(found.focal_length_sigma_px),
+            rms_px: some(found.rms_px),
+            ..FrameRecord::default()
         })
     }
-}
-
-/// Error of a right answer, and its stated standard error.
-struct AttitudeError {
-    error_arcsec: Vector3<f64>,
-    sigma_arcsec: [f64; 3],
-    nees: Option<f64>,
-    focal_error_px: f64,
-    focal_sigma_px: f64,
-    rms_px: f64,
 }
 
 fn is_star_like(source: &Source) -> bool {
@@ -372,5 +350,7 @@ fn is_star_like(source: &Source) -> bool {
 }
 
 fn significant(value: f64) -> f64 {
+    /// Significant digits of measured values.
+    const DIGITS: i32 = 7;
     to_significant(value, DIGITS)
 }

@@ -5,15 +5,6 @@ use crate::base::neighbors::PointTree;
 use crate::model::sensitivity::Scenario;
 use crate::model::simulate::{TrueStar, Truth};
 
-/// Largest distance of a detection from its star: this many pixels, …
-const AT_PLACE_PX: f64 = 2.0;
-/// … or this many standard deviations of the spot, if that is more.
-const AT_PLACE_SIGMAS: f64 = 1.5;
-/// Radius of a spot, in standard deviations.
-const REACH_SIGMAS: f64 = 8.0;
-/// Variance of a uniform distribution over a pixel.
-const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
-
 /// The light of the true stars over the frame.
 pub struct LightMap<'a> {
     stars: Vec<&'a TrueStar>,
@@ -24,6 +15,8 @@ pub struct LightMap<'a> {
 impl<'a> LightMap<'a> {
     /// The light of the stars on a frame and just outside it.
     pub fn of(scenario: &Scenario, truth: &'a Truth) -> Self {
+        /// Variance of a uniform distribution over a pixel.
+        const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
         let variance_px2 = scenario.camera.spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2;
         let smear_px2 = truth
             .motion_px
@@ -39,6 +32,8 @@ impl<'a> LightMap<'a> {
     /// The star that contributes more than half of the starlight at this position, if it is near
     /// enough.
     pub fn owner(&self, place: &PixelPoint) -> Option<&'a TrueStar> {
+        /// Radius of a spot, in standard deviations.
+        const REACH_SIGMAS: f64 = 8.0;
         let light = |star: &TrueStar| {
             let offset = [star.position.x - place.x, star.position.y - place.y];
             let terms = offset.iter().zip(self.variance_px2);
@@ -72,6 +67,10 @@ impl<'a> LightMap<'a> {
     }
 
     fn at_place_px(&self) -> f64 {
+        /// Largest distance of a detection from its star: this many pixels, …
+        const AT_PLACE_PX: f64 = 2.0;
+        /// … or this many standard deviations of the spot, if that is more.
+        const AT_PLACE_SIGMAS: f64 = 1.5;
         AT_PLACE_PX.max(AT_PLACE_SIGMAS * self.sigma_px())
     }
 }

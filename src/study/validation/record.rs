@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub const BEYOND_LIMIT_MAG: f64 = 1.5;
 
 /// A simulated frame, and the result of the pipeline.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct FrameRecord {
     /// Number of the frame, from 0.
     pub frame: u64,
@@ -91,10 +91,11 @@ pub struct FrameRecord {
 }
 
 /// Type of a row in the table of stars.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RowKind {
     /// A true star, detected or not.
+    #[default]
     Star,
     /// A detection with the light of several stars, none of which contributes more than half.
     Blend,
@@ -103,7 +104,7 @@ pub enum RowKind {
 }
 
 /// Whether a detection was named correctly.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Named {
     /// Named as the true star.
@@ -111,12 +112,13 @@ pub enum Named {
     /// Named as another star.
     Wrong,
     /// Not named.
+    #[default]
     No,
 }
 
 /// A true star, down to [`BEYOND_LIMIT_MAG`] below the predicted limit; or a detection that is no
 /// such star.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct StarRecord {
     /// Number of the frame.
     pub frame: u64,
@@ -172,27 +174,7 @@ impl StarRecord {
         Self {
             frame,
             kind,
-            id: None,
-            vmag: None,
-            bv_mag: None,
-            true_x_px: None,
-            true_y_px: None,
-            true_flux_e: None,
-            isolated: None,
-            saturated: None,
-            probability: None,
-            snr: None,
-            bound_x_px: None,
-            bound_y_px: None,
-            bound_flux_e: None,
-            detected: false,
-            x_px: None,
-            y_px: None,
-            sigma_x_px: None,
-            sigma_y_px: None,
-            flux_e: None,
-            sigma_flux_e: None,
-            named: Named::No,
+            ..Self::default()
         }
     }
 }

@@ -4,11 +4,6 @@ use crate::base::coords::PixelPoint;
 use crate::base::statistics::normal_cdf;
 use crate::model::sensitivity::{Budget, CramerRao, Scenario};
 
-/// Radius of a spot, in standard deviations plus one pixel.
-const REACH_SIGMAS: f64 = 6.0;
-/// Standard deviations below saturation at which a pixel may be saturated by noise.
-const FULL_SIGMAS: f64 = 4.0;
-
 /// Spots of a scenario and their noise.
 pub(super) struct Theory {
     sigma_px: f64,
@@ -44,6 +39,8 @@ impl Theory {
     }
 
     pub(super) fn of_star(&self, place: &PixelPoint, electrons: f64) -> StarTheory {
+        /// Standard deviations below saturation at which a pixel may be saturated by noise.
+        const FULL_SIGMAS: f64 = 4.0;
         let offset_px = [place.x, place.y].map(|at| at - at.round());
         let [columns, rows] = offset_px.map(|offset| self.shares(offset));
         let squares = |shares: &[f64]| shares.iter().map(|share| share * share).sum::<f64>();
@@ -63,6 +60,8 @@ impl Theory {
     /// Fractions of the light in the pixels along one axis, for a spot at `offset_px` from the
     /// centre of a pixel.
     fn shares(&self, offset_px: f64) -> Vec<f64> {
+        /// Radius of a spot, in standard deviations plus one pixel.
+        const REACH_SIGMAS: f64 = 6.0;
         let reach = (REACH_SIGMAS * self.sigma_px).ceil() as i32 + 1;
         let before = |pixel: i32| normal_cdf((f64::from(pixel) - 0.5 - offset_px) / self.sigma_px);
         (-reach..=reach)

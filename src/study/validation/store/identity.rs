@@ -45,7 +45,8 @@ struct CatalogIdentity<'a> {
 /// Makes `directory` that of a run. One that already holds this very run is continued.
 ///
 /// # Errors
-/// [`StoreError::OtherRun`], [`StoreError::UnknownRun`], [`StoreError::File`], [`StoreError::Json`].
+/// [`StoreError::OtherRun`], [`StoreError::UnknownRun`], [`StoreError::File`],
+/// [`StoreError::Json`].
 pub fn claim_directory(
     directory: &Path,
     protocol: &Protocol,

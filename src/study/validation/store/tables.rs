@@ -12,7 +12,8 @@ use std::path::Path;
 /// Frames in a part of the tables.
 pub const FRAMES_PER_PART: u64 = 1000;
 
-/// The tables of frames and of stars in a run's directory. No other process can open them meanwhile.
+/// The tables of frames and of stars in a run's directory. No other process can open them
+/// meanwhile.
 pub struct RunTables {
     _lock: File,
     frames: Table<FrameRecord>,

@@ -8,11 +8,6 @@ use serde::Serialize;
 
 /// Width of a bin, in magnitudes.
 const BIN_MAG: f64 = 0.1;
-/// Magnitudes brighter than the predicted limit at which the bins begin; all brighter stars share
-/// one bin.
-const BRIGHTER_MAG: f64 = 2.0;
-/// Magnitudes fainter than the limit at which they end, with the table of stars.
-const FAINTER_MAG: f64 = BEYOND_LIMIT_MAG;
 
 /// Completeness of isolated stars by magnitude.
 ///
@@ -71,6 +66,11 @@ pub(super) struct Completeness {
 
 impl Completeness {
     pub(super) fn around(limit_vmag: f64) -> Self {
+        /// Magnitudes brighter than the predicted limit at which the bins begin; all brighter stars
+        /// share one bin.
+        const BRIGHTER_MAG: f64 = 2.0;
+        /// Magnitudes fainter than the limit at which they end, with the table of stars.
+        const FAINTER_MAG: f64 = BEYOND_LIMIT_MAG;
         let whole = |vmag: f64| (vmag / BIN_MAG).floor();
         let (from, to) = (
             whole(limit_vmag - BRIGHTER_MAG),
@@ -131,16 +131,6 @@ impl CompletenessSums {
     }
 }
 
-const MAX_ROUNDS: usize = 50;
-/// Convergence limit of a step, in magnitudes.
-const SETTLED_MAG: f64 = 1e-7;
-/// Initial width of the fit, in magnitudes.
-const TYPICAL_WIDTH_MAG: f64 = 0.3;
-/// Valid widths of the transition, in magnitudes.
-const WIDTHS_MAG: std::ops::Range<f64> = 0.01..3.0;
-/// Clamp for probabilities far from the limit.
-const LEAST_PROBABILITY: f64 = 1e-9;
-
 /// Maximum-likelihood magnitude m₅₀ of Φ((m₅₀ − m) / w) for this `part` of the stars in each bin,
 /// by Fisher scoring in a = m₅₀ / w and b = 1 / w.
 ///
@@ -151,6 +141,15 @@ fn fitted_limit(
     part: fn(&CompletenessBin) -> f64,
     start_vmag: f64,
 ) -> Option<Estimate> {
+    const MAX_ROUNDS: usize = 50;
+    /// Convergence limit of a step, in magnitudes.
+    const SETTLED_MAG: f64 = 1e-7;
+    /// Initial width of the fit, in magnitudes.
+    const TYPICAL_WIDTH_MAG: f64 = 0.3;
+    /// Valid widths of the transition, in magnitudes.
+    const WIDTHS_MAG: std::ops::Range<f64> = 0.01..3.0;
+    /// Clamp for probabilities far from the limit.
+    const LEAST_PROBABILITY: f64 = 1e-9;
     // Magnitudes are relative to the start, so that a and b are nearly uncorrelated.
     let (mut a, mut b) = (0.0, 1.0 / TYPICAL_WIDTH_MAG);
     for _ in 0..MAX_ROUNDS {

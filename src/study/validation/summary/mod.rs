@@ -80,7 +80,7 @@ pub struct Summary {
 }
 
 /// Numbers of detections and names.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct DetectionSummary {
     /// Star-like detections.
     pub detected: u64,
@@ -170,7 +170,7 @@ fn percentiles(sorted: &[f64]) -> Vec<f64> {
 pub struct Accumulator {
     facts: RunFacts,
     frames: usize,
-    counts: [u64; 7],
+    detection: DetectionSummary,
     identification: Identifications,
     completeness: Completeness,
     centroids: Centroids,
@@ -195,7 +195,7 @@ impl Accumulator {
         Self {
             facts,
             frames: 0,
-            counts: [0; 7],
+            detection: DetectionSummary::default(),
             identification: Identifications::default(),
             completeness: Completeness::around(limit_vmag),
             centroids: Centroids::default(),
@@ -216,18 +216,14 @@ impl Accumulator {
     /// Adds a frame.
     pub fn add_frame(&mut self, row: &FrameRecord) {
         self.frames += 1;
-        let counts = [
-            row.detected,
-            row.rejected,
-            row.blends,
-            row.named,
-            row.misnamed,
-            row.misnamed_companions,
-            row.false_detections,
-        ];
-        for (sum, count) in self.counts.iter_mut().zip(counts) {
-            *sum += count;
-        }
+        let sums = &mut self.detection;
+        sums.detected += row.detected;
+        sums.rejected += row.rejected;
+        sums.blends += row.blends;
+        sums.named += row.named;
+        sums.misnamed += row.misnamed;
+        sums.misnamed_companions += row.misnamed_companions;
+        sums.false_detections += row.false_detections;
         self.identification.add(row.stars_above_limit, row.status);
         if let (Some(found), Some(expected)) = (row.faintest_vmag, row.expected_faintest_vmag)
             && row.status == Answer::Right
@@ -335,29 +331,15 @@ impl Accumulator {
     }
 
     fn detection(&self) -> DetectionSummary {
-        let [
-            detected,
-            rejected,
-            blends,
-            named,
-            misnamed,
-            misnamed_companions,
-            false_detections,
-        ] = self.counts;
+        let count = self.detection.false_detections;
         let pixels = self.frames * self.facts.width_px * self.facts.height_px;
-        let interval = Interval::of(false_detections as usize, pixels);
+        let interval = Interval::of(count as usize, pixels);
         let per_mpx = |part: f64| to_significant(part * 1e6, 4);
         DetectionSummary {
-            detected,
-            rejected,
-            blends,
-            named,
-            misnamed,
-            misnamed_companions,
-            false_detections,
-            false_per_mpx: per_mpx(false_detections as f64 / pixels.max(1) as f64),
+            false_per_mpx: per_mpx(count as f64 / pixels.max(1) as f64),
             false_low_per_mpx: per_mpx(interval.low),
             false_high_per_mpx: per_mpx(interval.high),
+            ..self.detection
         }
     }
 
