@@ -1,4 +1,5 @@
 use super::*;
+use crate::frame::Frame;
 
 fn frame(pixels: &[f32]) -> Frame {
     Frame::new(3, pixels.len() / 3, pixels.to_vec()).unwrap()
@@ -25,7 +26,7 @@ fn the_pattern_goes_and_the_level_stays() {
 
 #[test]
 fn a_flat_divides_about_the_dark_level() {
-    // Twice as high as it should be: its mean does not matter.
+    // The mean of a flat does not matter.
     let mut response = [2.0; 12];
     (response[0], response[1]) = (1.0, 3.0);
     let calibration = Calibration::new(master(&DARK), master(&response), None, 0.0).unwrap();
@@ -46,7 +47,7 @@ fn a_flat_divides_about_the_dark_level() {
 }
 
 #[test]
-fn what_was_saturated_stays_so_and_nothing_else_becomes_so() {
+fn saturated_pixels_stay_saturated_and_no_others_become_so() {
     let mut response = [1.0; 12];
     (response[0], response[1]) = (0.5, 1.5);
     let calibration = Calibration::new(None, master(&response), None, 0.0).unwrap();
@@ -62,7 +63,7 @@ fn what_was_saturated_stays_so_and_nothing_else_becomes_so() {
 }
 
 #[test]
-fn pixels_of_no_use_have_no_value_and_too_many_are_refused() {
+fn unusable_pixels_have_no_value_and_too_many_are_refused() {
     let mut response = [1.0; 12];
     response[4] = 0.0;
     let calibration = Calibration::new(None, master(&response), None, 0.0).unwrap();

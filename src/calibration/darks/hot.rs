@@ -1,91 +1,92 @@
-//! Pixels that stand out.
+//! Hot pixels: outliers of level, dark current or noise.
 
-use super::DarkCurrent;
-use super::robust::{Typical, variance_deviate};
+use super::current::DarkCurrent;
+use super::noise::PixelNoise;
+use crate::calibration::robust::{Moments, variance_deviate};
 
-/// How many standard deviations off a pixel counts as hot where nothing is said.
+/// Default threshold of hot pixels, in standard deviations.
 ///
-/// A normal distribution exceeds 6 once in a thousand million, so that of the largest detector no ordinary pixel is called hot;
-/// at 5 it would be one in two frames of a megapixel, at 4 thirty a frame.
+/// A normal distribution exceeds 6 once in a thousand million, so no ordinary pixel of the largest
+/// detector counts as hot. At 5 it would be one in two frames of a megapixel, at 4 thirty per
+/// frame.
 pub const HOT_SIGMA: f64 = 6.0;
 
-/// What stands out of a pixel.
+/// Why a pixel is hot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct HotReasons {
-    /// Its level, above or below.
+    /// Its level is too high or too low.
     pub level: bool,
-    /// Its dark current, above or below.
+    /// Its dark current is too high or too low.
     pub dark_current: bool,
-    /// Its noise, above.
+    /// Its noise is too high.
     pub noise: bool,
 }
 
-/// A pixel that stands out.
+/// A hot pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HotPixel {
     /// Column.
     pub x: usize,
     /// Row.
     pub y: usize,
-    /// Its mean level at the longest exposure, in ADU.
+    /// Mean level at the longest exposure, in ADU.
     pub level_adu: f64,
-    /// That less the level of an ordinary pixel.
+    /// Mean level minus that of ordinary pixels, in ADU.
     pub excess_adu: f64,
-    /// The standard deviation of its value from frame to frame, in ADU.
+    /// Standard deviation from frame to frame, in ADU.
     pub noise_adu: Option<f64>,
-    /// Its dark current, in ADU a second.
+    /// Dark current, in ADU per second.
     pub dark_current_adu_s: Option<f64>,
-    /// What stands out.
+    /// Why it is hot.
     pub reasons: HotReasons,
 }
 
-/// What pixels are judged by.
-pub(super) struct Evidence<'a> {
+/// What the search for hot pixels is based on.
+pub(super) struct PixelData<'a> {
     pub width: usize,
     /// Mean levels at the longest exposure.
     pub levels: &'a [f32],
-    /// Variances over the frames, how many degrees of freedom they have, and what an ordinary one is.
-    pub variances: Option<(&'a [f32], f64, f64)>,
+    pub noise: Option<&'a PixelNoise>,
     pub dark_current: Option<&'a DarkCurrent>,
-    /// Half of it is the least spread of levels.
+    /// Step between grey levels. Half of it is the smallest sigma of levels.
     pub step_adu: f64,
-    /// The exposure that levels belong to, where there is a dark current: a step of a level is one of a current.
+    /// The longest exposure, if known. It converts a step of level into one of dark current.
     pub longest_s: Option<f64>,
 }
 
-impl Evidence<'_> {
-    /// The pixels that stand out by more than `hot_sigma`, row by row.
+impl PixelData<'_> {
+    /// The pixels that deviate by more than `hot_sigma` standard deviations, row by row.
     pub(super) fn hot_pixels(&self, hot_sigma: f64) -> Vec<HotPixel> {
         let floor = self.step_adu / 2.0;
-        let Some(level) = Typical::of(self.levels, floor) else {
+        let Some(level) = Moments::clipped(self.levels, floor) else {
             return Vec::new();
         };
         let currents = self.dark_current.map(|c| c.of_pixels_adu_s.as_slice());
         let current_floor = floor / self.longest_s.unwrap_or(1.0);
-        let current = currents.and_then(|currents| Typical::of(currents, current_floor));
-        let off = |value: f64, typical: &Typical, floor: f64| {
-            (value - typical.level).abs() > hot_sigma * typical.spread.max(floor)
+        let current = currents.and_then(|currents| Moments::clipped(currents, current_floor));
+        let is_outlier = |value: f64, moments: &Moments, floor: f64| {
+            (value - moments.mean).abs() > hot_sigma * moments.sigma.max(floor)
         };
         let judge = |(i, &mean): (usize, &f32)| {
             let level_adu = f64::from(mean);
             let dark_current_adu_s = currents.map(|currents| f64::from(currents[i]));
-            let variance = self.variances.map(|(all, ..)| f64::from(all[i]));
+            let variance = self.noise.map(|noise| f64::from(noise.variances[i]));
             let reasons = HotReasons {
-                level: off(level_adu, &level, floor),
+                level: is_outlier(level_adu, &level, floor),
                 dark_current: dark_current_adu_s
                     .zip(current)
-                    .is_some_and(|(value, typical)| off(value, &typical, current_floor)),
-                noise: self.variances.is_some_and(|(all, freedom, typical)| {
-                    // Rounding alone makes so much of a variance.
-                    let typical = typical.max(floor * floor);
-                    variance_deviate(f64::from(all[i]), typical, freedom) > hot_sigma
+                    .is_some_and(|(value, moments)| is_outlier(value, &moments, current_floor)),
+                noise: variance.zip(self.noise).is_some_and(|(variance, noise)| {
+                    // Rounding alone may cause this variance.
+                    let typical = noise.typical.max(floor * floor);
+                    variance_deviate(variance, typical, noise.freedom) > hot_sigma
                 }),
             };
             (reasons != HotReasons::default()).then(|| HotPixel {
                 x: i % self.width,
                 y: i / self.width,
                 level_adu,
-                excess_adu: level_adu - level.level,
+                excess_adu: level_adu - level.mean,
                 noise_adu: variance.map(f64::sqrt),
                 dark_current_adu_s,
                 reasons,

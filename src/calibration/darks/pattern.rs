@@ -1,13 +1,14 @@
-//! What is the same on every frame: the spread of the pixels' means over the detector, its columns and its rows.
+//! Fixed pattern: the variation of the pixels' means over the detector, its columns and its rows.
 
-use super::robust::{Typical, mean_and_sigma};
+use crate::calibration::robust::Moments;
 
-/// The spread of the pixels' means, as standard deviations in ADU. Pixels that stand out are left out.
+/// Standard deviations of the pixels' means, in ADU, without outliers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pattern {
-    /// Of all means: pattern, and the noise that is left in a mean.
+    /// Of all means: pattern, and the noise left in the means.
     pub spatial_adu: f64,
-    /// Of the pattern alone, columns and rows included; none where one frame does not tell it from noise.
+    /// Of the pattern alone, columns and rows included. `None` from one frame, which does not
+    /// separate pattern from noise.
     pub fixed_adu: Option<f64>,
     /// Of the columns.
     pub column_adu: f64,
@@ -16,13 +17,14 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// The pattern in `means`, row-major with rows of `width`, in which a noise of variance `noise_left` is left; `step` is
-    /// that between grey levels.
+    /// Measures the pattern in `means`, row-major with rows of `width`. `noise_left` is the
+    /// variance of the noise left in the means, `step` the step between grey levels.
     ///
-    /// The variance is that of pixels, columns and rows: s² = sₚ² + s_c² + s_r². The mean of a column varies by
-    /// s_c² + sₚ²/height, that of a row by s_r² + sₚ²/width.
+    /// The variance is the sum of those of pixels, columns and rows: s² = sₚ² + s_c² + s_r². The
+    /// mean of a column has the variance s_c² + sₚ²/height, that of a row s_r² + sₚ²/width.
     ///
-    /// Differs from the source: robust, and without its filter, so that a glow or a gradient counts as columns and rows.
+    /// Differences from the source: outliers are clipped, and there is no high-pass filter, so a
+    /// glow or a gradient counts as columns and rows.
     /// # Reference
     /// EMVA Standard 1288, release 4.0 (2021), sect. 8.2.
     pub(super) fn of(
@@ -32,14 +34,14 @@ impl Pattern {
         step: f64,
     ) -> Option<Self> {
         let floor = step / 2.0;
-        let typical = Typical::of(means, floor)?;
+        let moments = Moments::clipped(means, floor)?;
         let height = means.len() / width;
         let mut columns = vec![(0.0, 0_u32); width];
         let mut rows = vec![(0.0, 0_u32); height];
         for (y, row) in means.chunks(width).enumerate() {
             for (x, &mean) in row.iter().enumerate() {
-                let off = f64::from(mean) - typical.level;
-                if typical.holds(f64::from(mean), floor) {
+                let off = f64::from(mean) - moments.mean;
+                if moments.includes(f64::from(mean), floor) {
                     for (sum, count) in [&mut columns[x], &mut rows[y]] {
                         *sum += off;
                         *count += 1;
@@ -49,16 +51,16 @@ impl Pattern {
         }
         let variance = |lines: &[(f64, u32)]| {
             let known = lines.iter().filter(|(_, count)| *count > 0);
-            let spread = mean_and_sigma(known.map(|(sum, count)| sum / f64::from(*count))).spread;
-            spread * spread
+            let sigma = Moments::of(known.map(|(sum, count)| sum / f64::from(*count))).sigma;
+            sigma * sigma
         };
         let (of_columns, of_rows) = (variance(&columns), variance(&rows));
-        let all = typical.spread * typical.spread;
+        let all = moments.sigma * moments.sigma;
         let (in_column, in_row) = (1.0 / height as f64, 1.0 / width as f64);
         let of_pixels = ((all - of_columns - of_rows) / (1.0 - in_column - in_row)).max(0.0);
         let root = |variance: f64| variance.max(0.0).sqrt();
         Some(Self {
-            spatial_adu: typical.spread,
+            spatial_adu: moments.sigma,
             fixed_adu: noise_left.map(|noise| root(all - noise)),
             column_adu: root(of_columns - of_pixels * in_column),
             row_adu: root(of_rows - of_pixels * in_row),
@@ -74,7 +76,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     #[test]
-    fn columns_rows_and_pixels_are_told_apart() {
+    fn columns_rows_and_pixels_are_separated() {
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let mut normal = |sigma: f64| -> f64 {
             sigma * Distribution::<f64>::sample(&StandardNormal, &mut random)
@@ -88,7 +90,7 @@ mod tests {
         means[7] = 4000.0;
         means[8] = f32::NAN;
         let found = Pattern::of(&means, width, Some(1.0), 1.0).unwrap();
-        // Of n columns the spread is known to 1/√(2n).
+        // The sigma of n columns is known to 1/√(2n).
         assert!(
             (found.column_adu - 2.0).abs() < 5.0 * 2.0 / 800f64.sqrt(),
             "{found:?}"

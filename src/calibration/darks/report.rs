@@ -1,19 +1,20 @@
-//! What is told of dark frames: plain values with the units in their names.
+//! Report on dark frames: values with the units in their names, for JSON and CSV.
 
-use super::{Darks, HotPixel, Missing, NotDark};
+use super::current::Fitted;
+use super::hot::HotPixel;
+use super::measure::{Darks, Missing};
+use super::noise::ExposureGroup;
+use super::not_dark::NotDark;
 use crate::base::format::to_significant;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Significant digits of what is measured.
-const DIGITS: i32 = 6;
-
-/// All that is told, see [`Darks`]. What is not known is null, and `missing` says why.
+/// Report on dark frames, see [`Darks`]. Unknown values are null; `missing` gives the reasons.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DarksReport {
-    /// Version of this form.
+    /// Version of the format.
     pub schema: u32,
-    /// Frames.
+    /// Number of frames.
     pub frames: usize,
     /// Columns.
     pub width: usize,
@@ -23,31 +24,31 @@ pub struct DarksReport {
     pub mean_adu: f64,
     /// Root of the mean of the frames' variances (σ_g).
     pub sigma_adu: f64,
-    /// What is full scale: 2^bits.
+    /// Full scale.
     pub full_scale_adu: Option<f64>,
     /// `option`, `camera` or `file format`.
     pub full_scale_source: Option<String>,
-    /// The mean over full scale (γ_eg).
+    /// Mean relative to full scale (γ_eg).
     pub relative_mean: Option<f64>,
-    /// The standard deviation over full scale (γ_σg).
+    /// Standard deviation relative to full scale (γ_σg).
     pub relative_sigma: Option<f64>,
-    /// Electrons for a step of the grey level.
+    /// Gain, in electrons per grey level.
     pub gain_e_per_adu: Option<f64>,
-    /// Noise of reading a pixel.
+    /// Read noise of a pixel.
     pub read_noise_adu: Option<f64>,
     /// The same in electrons.
     pub read_noise_e: Option<f64>,
-    /// At each exposure.
+    /// Each exposure.
     pub exposures: Vec<ExposureReport>,
-    /// What is the same on every frame.
+    /// Fixed pattern.
     pub pattern: Option<PatternReport>,
-    /// What grows with the exposure.
+    /// Dark current and bias.
     pub dark_current: Option<DarkCurrentReport>,
-    /// Pixels that stand out.
+    /// Hot pixels.
     pub hot_pixels: HotPixelsReport,
-    /// Of each frame.
+    /// Each frame.
     pub per_frame: Vec<FrameRow>,
-    /// What is not known, and why.
+    /// Unknown quantities and the reasons.
     pub missing: BTreeMap<&'static str, String>,
     /// Frames that do not look dark.
     pub warnings: Vec<String>,
@@ -56,11 +57,11 @@ pub struct DarksReport {
 /// The frames of one exposure.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ExposureReport {
-    /// The exposure.
+    /// Exposure.
     pub exposure_s: Option<f64>,
-    /// Its frames.
+    /// Number of frames.
     pub frames: usize,
-    /// Their mean level.
+    /// Mean level.
     pub level_adu: f64,
     /// Standard deviation of a pixel from frame to frame.
     pub temporal_noise_adu: Option<f64>,
@@ -70,12 +71,12 @@ pub struct ExposureReport {
     pub frame_to_frame_adu: Option<f64>,
 }
 
-/// What is the same on every frame, as standard deviations over the pixels.
+/// Fixed pattern, as standard deviations over the pixels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PatternReport {
-    /// The exposure at which.
+    /// Exposure at which it was measured.
     pub exposure_s: Option<f64>,
-    /// Of the pixels' means, with the noise that is left in them.
+    /// Of the pixels' means, including the noise left in them.
     pub spatial_adu: f64,
     /// Of the pattern alone.
     pub fixed_pattern_adu: Option<f64>,
@@ -91,7 +92,7 @@ pub struct PatternReport {
     pub row_e: Option<f64>,
 }
 
-/// What grows with the exposure; each `_sigma` is a standard error.
+/// Dark current and bias; each `_sigma` is a standard error.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DarkCurrentReport {
     /// Median over the pixels.
@@ -104,55 +105,55 @@ pub struct DarkCurrentReport {
     pub mean_sigma_adu_s: Option<f64>,
     /// The median in electrons.
     pub median_e_s: Option<f64>,
-    /// The standard error of that.
+    /// Its standard error.
     pub median_sigma_e_s: Option<f64>,
     /// The mean in electrons.
     pub mean_e_s: Option<f64>,
-    /// The standard error of that.
+    /// Its standard error.
     pub mean_sigma_e_s: Option<f64>,
-    /// The level without exposure.
+    /// Bias: the level at exposure 0.
     pub bias_adu: f64,
     /// Its standard error.
     pub bias_sigma_adu: Option<f64>,
 }
 
-/// How many pixels stand out.
+/// Numbers of hot pixels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HotPixelsReport {
-    /// Standard deviations from which on they do.
+    /// Threshold, in standard deviations.
     pub hot_sigma: f64,
-    /// All of them.
+    /// All hot pixels.
     pub count: usize,
     /// Their share of all pixels.
     pub share: f64,
-    /// Those by their level.
+    /// Hot by level.
     pub by_level: usize,
-    /// Those by their dark current.
+    /// Hot by dark current.
     pub by_dark_current: usize,
-    /// Those by their noise.
+    /// Hot by noise.
     pub by_noise: usize,
 }
 
 /// One frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FrameRow {
-    /// What it is called.
+    /// Name of the frame.
     pub frame: String,
-    /// Its exposure.
+    /// Exposure.
     pub exposure_s: Option<f64>,
-    /// Its mean (Eᵢ).
+    /// Mean (Eᵢ).
     pub mean_adu: f64,
-    /// Its standard deviation (σ_gi).
+    /// Standard deviation (σ_gi).
     pub sigma_adu: f64,
-    /// The mean over full scale.
+    /// Mean relative to full scale.
     pub relative_mean: Option<f64>,
-    /// The standard deviation over full scale.
+    /// Standard deviation relative to full scale.
     pub relative_sigma: Option<f64>,
-    /// Pixels without a value.
+    /// Number of pixels without a value.
     pub without_value: usize,
-    /// Pixels at full scale.
+    /// Number of pixels at full scale.
     pub saturated: usize,
-    /// Spots that look like stars.
+    /// Number of spots that look like stars.
     pub star_like: usize,
 }
 
@@ -165,18 +166,18 @@ pub struct HotPixelRow {
     pub y: usize,
     /// Mean level at the longest exposure.
     pub level_adu: f64,
-    /// That less the level of an ordinary pixel.
+    /// Mean level minus that of ordinary pixels.
     pub excess_adu: f64,
     /// Standard deviation from frame to frame.
     pub noise_adu: Option<f64>,
     /// Dark current.
     pub dark_current_adu_s: Option<f64>,
-    /// What stands out: `level`, `dark current`, `noise`, with + between.
+    /// Why it is hot: `level`, `dark current`, `noise`, joined by +.
     pub reason: String,
 }
 
 impl HotPixelRow {
-    /// The names of its columns.
+    /// Names of the columns.
     pub const COLUMNS: [&str; 7] = [
         "x",
         "y",
@@ -208,7 +209,9 @@ impl From<&HotPixel> for HotPixelRow {
     }
 }
 
+/// Rounds to the significant digits of the report.
 fn rounded(value: f64) -> f64 {
+    const DIGITS: i32 = 6;
     to_significant(value, DIGITS)
 }
 
@@ -217,7 +220,7 @@ fn known(value: Option<f64>) -> Option<f64> {
 }
 
 impl Darks {
-    /// What is told of them.
+    /// The report.
     pub fn report(&self) -> DarksReport {
         let full = self.full_scale.map(|full| full.levels_adu);
         let electrons =
@@ -252,7 +255,7 @@ impl Darks {
     }
 
     fn exposures(&self, electrons: &impl Fn(Option<f64>) -> Option<f64>) -> Vec<ExposureReport> {
-        let report = |group: &super::ExposureGroup| ExposureReport {
+        let report = |group: &ExposureGroup| ExposureReport {
             exposure_s: group.exposure_s,
             frames: group.frames,
             level_adu: rounded(group.level_adu),
@@ -286,7 +289,10 @@ impl Darks {
     ) -> Option<DarkCurrentReport> {
         let current = self.dark_current.as_ref()?;
         let median_sigma = current.median().map(|median| median.sigma);
-        let (mean, mean_sigma) = current.mean_adu_s;
+        let Fitted {
+            value: mean,
+            sigma: mean_sigma,
+        } = current.mean_adu_s;
         Some(DarkCurrentReport {
             median_adu_s: rounded(current.median_adu_s),
             median_sigma_adu_s: known(median_sigma),
@@ -296,8 +302,8 @@ impl Darks {
             median_sigma_e_s: electrons(median_sigma),
             mean_e_s: electrons(Some(mean)),
             mean_sigma_e_s: electrons(mean_sigma),
-            bias_adu: rounded(current.bias_adu.0),
-            bias_sigma_adu: known(current.bias_adu.1),
+            bias_adu: rounded(current.bias_adu.value),
+            bias_sigma_adu: known(current.bias_adu.sigma),
         })
     }
 
@@ -314,7 +320,7 @@ impl Darks {
         }
     }
 
-    /// One row a frame.
+    /// One row per frame.
     pub fn frame_rows(&self) -> impl Iterator<Item = FrameRow> {
         let full = self.full_scale.map(|full| full.levels_adu);
         self.frames.iter().map(move |frame| FrameRow {

@@ -1,129 +1,94 @@
-//! Mean and variance of every pixel over any number of frames, without keeping the frames.
+//! Accumulates dark frames.
 
-use super::DarksError;
+use super::error::{DarksError, MAX_EXPOSURES};
+use super::frame_statistics::{FrameStatistics, is_same_exposure};
+use crate::calibration::pixel_stack::PixelStack;
+use crate::frame::Frame;
 
-/// Mean and variance of every pixel, frame by frame; a pixel without a value is left out of its own.
-///
-/// # Reference
-/// Welford 1962, doi 10.1080/00401706.1962.10490022.
+/// Accumulates dark frames: the statistics of each frame, and of every pixel for each exposure.
+#[derive(Debug, Clone, Default)]
+pub struct DarkStack {
+    pub(super) frames: Vec<FrameStatistics>,
+    pub(super) exposures: Vec<ExposureStack>,
+    /// The smallest step between grey levels among the frames.
+    pub(super) step_adu: Option<f32>,
+    /// The largest saturation level among the frames.
+    pub(super) saturation_adu: Option<f32>,
+}
+
+/// The pixels of all frames of one exposure.
 #[derive(Debug, Clone)]
-pub struct PixelStack {
-    frames: usize,
-    counts: Vec<u32>,
-    means: Vec<f64>,
-    squares: Vec<f64>,
+pub(super) struct ExposureStack {
+    pub exposure_s: Option<f64>,
+    pub pixels: PixelStack,
 }
 
-impl PixelStack {
-    /// A stack of frames of so many pixels.
+impl DarkStack {
+    /// An empty stack.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds `frame` with its `statistics` from [`FrameStatistics::of`].
     /// # Errors
-    /// [`DarksError::Memory`] where there is no room for it.
-    pub fn new(pixels: usize) -> Result<Self, DarksError> {
-        fn zeros<T: Clone + Default>(pixels: usize) -> Result<Vec<T>, DarksError> {
-            let mut all = Vec::new();
-            let room = all.try_reserve_exact(pixels);
-            room.map_err(|_| DarksError::Memory { pixels })?;
-            all.resize(pixels, T::default());
-            Ok(all)
+    /// [`DarksError::SizesDiffer`], [`DarksError::TooManyExposures`], [`DarksError::Memory`].
+    pub fn add(&mut self, frame: &Frame, statistics: FrameStatistics) -> Result<(), DarksError> {
+        if let Some(first) = self.frames.first() {
+            check_same_size(first, &statistics)?;
         }
-        Ok(Self {
-            frames: 0,
-            counts: zeros(pixels)?,
-            means: zeros(pixels)?,
-            squares: zeros(pixels)?,
-        })
+        let stack = self.stack_for(&statistics, frame.pixels.len())?;
+        stack.add(frame.pixels.iter().copied());
+        self.step_adu = Some(
+            self.step_adu
+                .map_or(frame.step_adu, |s| s.min(frame.step_adu)),
+        );
+        self.saturation_adu = match (self.saturation_adu, frame.saturation_adu) {
+            (Some(one), Some(other)) => Some(one.max(other)),
+            (one, other) => one.or(other),
+        };
+        self.frames.push(statistics);
+        Ok(())
     }
 
-    /// Adds a frame, row-major, of as many pixels; NaN is no value.
-    pub fn add(&mut self, pixels: impl Iterator<Item = f32>) {
-        self.frames += 1;
-        let moments = self.means.iter_mut().zip(&mut self.squares);
-        for (pixel, (count, (mean, squares))) in pixels.zip(self.counts.iter_mut().zip(moments)) {
-            if pixel.is_nan() {
-                continue;
+    /// The stack for the exposure of a frame, which is made if the exposure is new.
+    fn stack_for(
+        &mut self,
+        frame: &FrameStatistics,
+        pixels: usize,
+    ) -> Result<&mut PixelStack, DarksError> {
+        let exposure_s = frame.exposure_s;
+        let known = self
+            .exposures
+            .iter()
+            .position(|stack| is_same_exposure(stack.exposure_s, exposure_s));
+        let index = match known {
+            Some(index) => index,
+            None if self.exposures.len() == MAX_EXPOSURES => {
+                return Err(DarksError::TooManyExposures {
+                    frame: frame.frame.clone(),
+                    exposure_s: exposure_s.unwrap_or(f64::NAN),
+                });
             }
-            *count += 1;
-            let off = f64::from(pixel) - *mean;
-            *mean += off / f64::from(*count);
-            *squares += off * (f64::from(pixel) - *mean);
-        }
-    }
-
-    /// Frames added.
-    pub fn frames(&self) -> usize {
-        self.frames
-    }
-
-    /// The mean of every pixel; NaN where it never had a value.
-    pub fn means(&self) -> Vec<f32> {
-        let mean = |(&mean, &count): (&f64, &u32)| if count == 0 { f32::NAN } else { mean as f32 };
-        self.means.iter().zip(&self.counts).map(mean).collect()
-    }
-
-    /// The sum of squares of a pixel's values about their mean, and its degrees of freedom.
-    pub(super) fn squares(&self, pixel: usize) -> (f64, u32) {
-        (self.squares[pixel], self.counts[pixel].saturating_sub(1))
+            None => {
+                let pixels = PixelStack::new(pixels)?;
+                self.exposures.push(ExposureStack { exposure_s, pixels });
+                self.exposures.len() - 1
+            }
+        };
+        Ok(&mut self.exposures[index].pixels)
     }
 }
 
-/// The variance of every pixel within each of `stacks`, pooled; NaN where none has two values.
-pub(crate) fn pooled_variances<'a>(
-    stacks: impl Iterator<Item = &'a PixelStack> + Clone,
-    pixels: usize,
-) -> Vec<f32> {
-    let variance = |pixel| {
-        let (mut squares, mut freedom) = (0.0, 0);
-        for stack in stacks.clone() {
-            let (s, f) = stack.squares(pixel);
-            squares += s;
-            freedom += f;
-        }
-        if freedom == 0 {
-            f32::NAN
-        } else {
-            (squares / f64::from(freedom)) as f32
-        }
-    };
-    (0..pixels).map(variance).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn the_moments_are_those_of_two_passes(
-            values in prop::collection::vec(-1000..1000_i32, 1..20),
-            offset in 0..60_000_i32,
-        ) {
-            let values: Vec<f64> = values.iter().map(|v| f64::from(v + offset)).collect();
-            let mut stack = PixelStack::new(2).unwrap();
-            for &value in &values {
-                stack.add([value as f32, f32::NAN].into_iter());
-            }
-            let n = values.len() as f64;
-            let mean = values.iter().sum::<f64>() / n;
-            let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
-            prop_assert!((f64::from(stack.means()[0]) - mean).abs() <= 1e-7 * mean.abs().max(1.0));
-            prop_assert!(stack.means()[1].is_nan());
-            let variances = pooled_variances([&stack, &stack].into_iter(), 2);
-            prop_assert!(variances[1].is_nan());
-            if values.len() == 1 {
-                prop_assert!(variances[0].is_nan());
-            } else {
-                let expected = squares / (n - 1.0);
-                prop_assert!((f64::from(variances[0]) - expected).abs() <= 1e-6 * expected);
-            }
-        }
+fn check_same_size(first: &FrameStatistics, other: &FrameStatistics) -> Result<(), DarksError> {
+    if (first.width, first.height) == (other.width, other.height) {
+        return Ok(());
     }
-
-    #[test]
-    fn absurd_sizes_are_refused() {
-        assert!(matches!(
-            PixelStack::new(usize::MAX / 32),
-            Err(DarksError::Memory { .. })
-        ));
-    }
+    Err(DarksError::SizesDiffer {
+        first: first.frame.clone(),
+        first_width: first.width,
+        first_height: first.height,
+        frame: other.frame.clone(),
+        width: other.width,
+        height: other.height,
+    })
 }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::frame::Frame;
 
 fn frame(pixels: &[f32]) -> Frame {
     Frame::new(3, pixels.len() / 3, pixels.to_vec()).unwrap()
@@ -40,7 +41,7 @@ fn the_papers_equations_3_and_4_by_hand() {
 }
 
 #[test]
-fn full_scale_is_that_of_the_file_unless_somebody_knows_better() {
+fn full_scale_is_that_of_the_file_unless_bits_are_given() {
     let sixteen = |step: f32| {
         let levels: Vec<f32> = (0..9).map(|i| step * (100 + i) as f32).collect();
         frame(&levels).with_levels(step, Some(65536.0 - step))
@@ -75,7 +76,7 @@ fn full_scale_is_that_of_the_file_unless_somebody_knows_better() {
 }
 
 #[test]
-fn one_frame_tells_what_it_can_and_why_not_the_rest() {
+fn one_frame_gives_what_it_can_and_reasons_for_the_rest() {
     let levels: Vec<f32> = (0..900).map(|i| 100.0 + (i * 7 % 11) as f32).collect();
     let one = Frame::new(30, 30, levels)
         .unwrap()
@@ -117,7 +118,7 @@ fn sizes_that_differ_and_exposures_without_end_are_refused() {
     };
     for exposure in 1..=MAX_EXPOSURES {
         add("a.fits", 9, exposure as f64).unwrap();
-        // The same but for a header's last digit.
+        // The same exposure up to rounding.
         add("a.fits", 9, exposure as f64 * 1.0004).unwrap();
     }
     let refused = add("b.fits", 12, 1.0).unwrap_err().to_string();
@@ -176,7 +177,7 @@ fn a_noise_that_the_grey_levels_hide_is_not_given() {
     assert_eq!(found.read_noise_adu, None);
     assert_eq!(
         found.report().missing["read_noise"],
-        "the noise is less than half of the step between grey levels"
+        "the noise is less than half the step between grey levels"
     );
     assert!(found.hot_pixels.is_empty());
 }

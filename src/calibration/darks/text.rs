@@ -1,11 +1,11 @@
-//! The report for people.
+//! The report on dark frames as text.
 
-use super::report::{DarkCurrentReport, DarksReport, PatternReport};
+use super::report::{DarkCurrentReport, DarksReport, ExposureReport, PatternReport};
 use crate::base::format::counted;
 use std::fmt::Write as _;
 
 impl DarksReport {
-    /// A page for people.
+    /// The report as text.
     pub fn to_text(&self) -> String {
         let mut text = format!(
             "{}, {} × {} px\n",
@@ -27,7 +27,7 @@ impl DarksReport {
         if let (Some(full), Some(source)) = (self.full_scale_adu, &self.full_scale_source) {
             line(
                 "full scale",
-                format!("{full} levels, by {}", said_by(source)),
+                format!("{full} levels, by {}", source_text(source)),
             );
         }
         if let Some(noise) = self.read_noise_adu {
@@ -40,22 +40,7 @@ impl DarksReport {
             let label = exposure
                 .exposure_s
                 .map_or("exposure ?".to_owned(), |s| format!("at {s} s"));
-            let mut value = format!(
-                "{}, level {:.3} ADU",
-                counted(exposure.frames, "frame"),
-                exposure.level_adu
-            );
-            if let Some(noise) = exposure.temporal_noise_adu {
-                let _ = write!(
-                    value,
-                    ", noise {}",
-                    with(noise, "ADU", exposure.temporal_noise_e.map(electrons))
-                );
-            }
-            if let Some(drift) = exposure.frame_to_frame_adu {
-                let _ = write!(value, ", from frame to frame {drift:.3} ADU");
-            }
-            line(&label, value);
+            line(&label, exposure_text(exposure));
         }
         if let Some(pattern) = &self.pattern {
             line("pattern", pattern_text(pattern));
@@ -87,7 +72,7 @@ impl DarksReport {
     }
 }
 
-fn said_by(source: &str) -> &str {
+fn source_text(source: &str) -> &str {
     match source {
         "option" => "--bits",
         "camera" => "the camera's description",
@@ -103,14 +88,31 @@ fn electrons(value: f64) -> String {
     format!("{value:.3} e")
 }
 
-fn with(value: f64, unit: &str, besides: Option<String>) -> String {
-    let besides = besides.map_or(String::new(), |text| format!(" ({text})"));
-    format!("{value:.3} {unit}{besides}")
+/// A value with its unit, and the same in another unit in parentheses.
+fn with(value: f64, unit: &str, other: Option<String>) -> String {
+    let other = other.map_or(String::new(), |text| format!(" ({text})"));
+    format!("{value:.3} {unit}{other}")
 }
 
 fn plus_minus(value: f64, sigma: Option<f64>, unit: &str) -> String {
     let sigma = sigma.map_or(String::new(), |sigma| format!(" ± {sigma:.3}"));
     format!("{value:.3}{sigma} {unit}")
+}
+
+fn exposure_text(exposure: &ExposureReport) -> String {
+    let mut text = format!(
+        "{}, level {:.3} ADU",
+        counted(exposure.frames, "frame"),
+        exposure.level_adu
+    );
+    if let Some(noise) = exposure.temporal_noise_adu {
+        let noise = with(noise, "ADU", exposure.temporal_noise_e.map(electrons));
+        text += &format!(", noise {noise}");
+    }
+    if let Some(drift) = exposure.frame_to_frame_adu {
+        text += &format!(", from frame to frame {drift:.3} ADU");
+    }
+    text
 }
 
 fn pattern_text(pattern: &PatternReport) -> String {

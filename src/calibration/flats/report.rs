@@ -1,43 +1,42 @@
-//! What is told of flats: plain values with the units in their names.
+//! Report on flats: values with the units in their names, and as text.
 
-use super::Flats;
+use super::stack::Flats;
+use super::transfer::PairPoint;
 use crate::base::format::{counted, to_significant};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-const DIGITS: i32 = 6;
-
-/// All that is told, see [`Flats`]. What is not known is null, and `missing` says why.
+/// Report on flats, see [`Flats`]. Unknown values are null; `missing` gives the reasons.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FlatsReport {
-    /// Version of this form.
+    /// Version of the format.
     pub schema: u32,
-    /// Frames.
+    /// Number of frames.
     pub frames: usize,
     /// Columns.
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Standard deviation of the response over the frame, of its mean, in percent.
+    /// Standard deviation of the response over the frame, relative to its mean.
     pub nonuniformity_percent: f64,
-    /// That from pixel to pixel.
+    /// The same from pixel to pixel.
     pub pixel_nonuniformity_percent: Option<f64>,
-    /// Pixels whose response is not known.
+    /// Number of pixels without a known response.
     pub without_response: usize,
-    /// Electrons for a step of the grey level.
+    /// Gain, in electrons per grey level.
     pub gain_e_per_adu: Option<f64>,
     /// Its standard error.
     pub gain_sigma_e_per_adu: Option<f64>,
-    /// How it was found.
+    /// How it was measured.
     pub gain_method: Option<&'static str>,
-    /// Read noise, from the same line.
+    /// Read noise, from the same fit.
     pub read_noise_adu: Option<f64>,
-    /// What the gain is from.
+    /// The pairs from which the gain was measured.
     pub pairs: Vec<PairReport>,
-    /// Of each frame.
+    /// Each frame.
     pub per_frame: Vec<FlatRow>,
-    /// What is not known, and why.
+    /// Unknown quantities and the reasons.
     pub missing: BTreeMap<&'static str, &'static str>,
 }
 
@@ -55,28 +54,30 @@ pub struct PairReport {
 /// One frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FlatRow {
-    /// What it is called.
+    /// Name of the frame.
     pub frame: String,
-    /// Its exposure.
+    /// Exposure.
     pub exposure_s: Option<f64>,
     /// Level above the dark.
     pub level_adu: f64,
-    /// Pixels at full scale.
+    /// Number of pixels at full scale.
     pub saturated: usize,
 }
 
+/// Rounds to the significant digits of the report.
 fn rounded(value: f64) -> f64 {
+    const DIGITS: i32 = 6;
     to_significant(value, DIGITS)
 }
 
 impl Flats {
-    /// What is told of them.
+    /// The report.
     pub fn report(&self) -> FlatsReport {
         let mut missing = BTreeMap::new();
         if self.pixel_nonuniformity.is_none() {
             missing.insert(
                 "pixel_nonuniformity",
-                "one frame does not tell pattern from noise",
+                "one frame does not separate pattern from noise",
             );
         }
         if self.gain.is_none() {
@@ -104,7 +105,7 @@ impl Flats {
         }
     }
 
-    /// One row a frame.
+    /// One row per frame.
     pub fn frame_rows(&self) -> impl Iterator<Item = FlatRow> {
         self.frames.iter().map(|frame| FlatRow {
             frame: frame.frame.clone(),
@@ -115,8 +116,8 @@ impl Flats {
     }
 }
 
-impl From<&super::PairPoint> for PairReport {
-    fn from(pair: &super::PairPoint) -> Self {
+impl From<&PairPoint> for PairReport {
+    fn from(pair: &PairPoint) -> Self {
         Self {
             signal_adu: rounded(pair.signal_adu),
             variance_adu2: rounded(pair.variance_adu2),
@@ -126,7 +127,7 @@ impl From<&super::PairPoint> for PairReport {
 }
 
 impl FlatsReport {
-    /// A page for people.
+    /// The report as text.
     pub fn to_text(&self) -> String {
         let mut text = format!(
             "{}, {} × {} px\n",

@@ -1,4 +1,5 @@
 use super::*;
+use crate::frame::Frame;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -66,7 +67,7 @@ fn gain_and_read_noise_follow_from_pairs_of_different_light() {
 }
 
 #[test]
-fn of_one_light_the_read_noise_has_to_be_known() {
+fn with_one_light_the_read_noise_must_be_known() {
     let known = FlatConfig {
         read_noise_e: Some(READ_NOISE_ADU * GAIN_E_PER_ADU),
         ..FlatConfig::default()
@@ -101,7 +102,7 @@ fn the_master_is_the_response_and_its_unevenness_that_of_the_pixels() {
 }
 
 #[test]
-fn what_is_no_flat_is_refused() {
+fn frames_that_are_no_flats_are_refused() {
     let refused = |frame: Frame, config: FlatConfig| {
         FlatStack::new(config)
             .add("a.fits", &frame)

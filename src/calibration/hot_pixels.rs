@@ -1,13 +1,10 @@
 //! Lists of hot pixels, as `starpipe darks` writes them.
 
-use super::{CalibrationError, check_bad};
+use super::error::{CalibrationError, check_bad};
 use crate::frame::Frame;
 use std::path::{Path, PathBuf};
 
-/// What a coordinate must be.
-const COORDINATE: &str = "a whole number from 0";
-
-/// Pixels that are not to be believed.
+/// Hot pixels of a detector, with the file that lists them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HotPixelList {
     path: PathBuf,
@@ -15,8 +12,8 @@ pub struct HotPixelList {
     pixels: Vec<(u64, usize, usize)>,
 }
 
-/// Reads a list of hot pixels: CSV with the columns `x` and `y`, whole numbers with (0, 0) for the top-left pixel; others are
-/// ignored.
+/// Reads a list of hot pixels: CSV with the columns `x` and `y`, whole numbers; (0, 0) is the
+/// top-left pixel. Other columns are ignored.
 /// # Errors
 /// [`CalibrationError::List`], [`CalibrationError::Malformed`].
 pub fn read_hot_pixels(path: &Path) -> Result<HotPixelList, CalibrationError> {
@@ -40,7 +37,7 @@ pub fn read_hot_pixels(path: &Path) -> Result<HotPixelList, CalibrationError> {
             .iter()
             .position(|h| h.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name))
     };
-    let (Some(of_x), Some(of_y)) = (column("x"), column("y")) else {
+    let (Some(x_column), Some(y_column)) = (column("x"), column("y")) else {
         let found: Vec<_> = headings.iter().take(8).collect();
         return Err(malformed(
             1,
@@ -55,9 +52,9 @@ pub fn read_hot_pixels(path: &Path) -> Result<HotPixelList, CalibrationError> {
         let coordinate = |column: usize| {
             let text = record.get(column).unwrap_or_default();
             text.parse::<usize>()
-                .map_err(|_| malformed(line, &format!("{text:?}"), COORDINATE))
+                .map_err(|_| malformed(line, &format!("{text:?}"), "a whole number from 0"))
         };
-        pixels.push((line, coordinate(of_x)?, coordinate(of_y)?));
+        pixels.push((line, coordinate(x_column)?, coordinate(y_column)?));
     }
     Ok(HotPixelList {
         path: path.to_owned(),
@@ -76,7 +73,7 @@ impl HotPixelList {
         self.pixels.iter().map(|&(_, x, y)| (x, y))
     }
 
-    /// Whether all of them are on `frame`, and few enough.
+    /// Refuses pixels outside `frame`, and too many of them.
     pub(super) fn check(&self, frame: &Frame) -> Result<(), CalibrationError> {
         for &(line, x, y) in &self.pixels {
             if x >= frame.width || y >= frame.height {

@@ -1,21 +1,8 @@
 //! Recognises frames that were not taken without light.
 
-use super::{FrameStatistics, is_same_exposure};
+use super::frame_statistics::{FrameStatistics, is_same_exposure};
 use crate::base::statistics::median;
 use std::fmt;
-
-/// Star-like spots expected in any dark frame (clusters of hot pixels, cosmic rays): a number, and a
-/// fraction of all bright pixels.
-const STAR_LIKE_ANYWHERE: f64 = 5.0;
-const STAR_LIKE_PART: f64 = 0.01;
-/// A mean differs from the others' when it is this many robust deviations away, and by this fraction of
-/// the noise.
-const LEVEL_SIGMA: f64 = 8.0;
-const LEVEL_PART_OF_NOISE: f64 = 0.5;
-/// No dark frame has a mean above this fraction of full scale.
-const BRIGHT_PART: f64 = 0.5;
-/// Fewest frames of one exposure with which a frame can be compared.
-const FEWEST: usize = 4;
 
 /// A frame that does not look like a dark frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,12 +18,12 @@ pub struct NotDark {
 pub enum NotDarkReason {
     /// Spots that look like stars.
     Stars {
-        /// How many.
+        /// Number of spots.
         spots: usize,
     },
     /// The mean level is high.
     Bright {
-        /// Mean, as a fraction of full scale.
+        /// Mean, as a share of full scale.
         share: f64,
     },
     /// The mean level differs from that of the other frames of the same exposure.
@@ -93,23 +80,35 @@ pub(super) fn warnings(frames: &[FrameStatistics], full_scale_adu: Option<f64>) 
 }
 
 fn stars(frame: &FrameStatistics) -> Option<NotDarkReason> {
-    let most = STAR_LIKE_ANYWHERE + STAR_LIKE_PART * frame.bright as f64;
+    /// Star-like spots expected in any dark frame (clusters of hot pixels, cosmic rays): a number,
+    /// and a share of the bright pixels.
+    const EXPECTED: f64 = 5.0;
+    const EXPECTED_SHARE: f64 = 0.01;
+    let most = EXPECTED + EXPECTED_SHARE * frame.bright as f64;
     (frame.star_like as f64 > most).then_some(NotDarkReason::Stars {
         spots: frame.star_like,
     })
 }
 
 fn bright(frame: &FrameStatistics, full_scale_adu: Option<f64>) -> Option<NotDarkReason> {
+    /// Maximum mean of a dark frame, as a share of full scale.
+    const MAX_SHARE: f64 = 0.5;
     let share = frame.mean_adu / full_scale_adu?;
-    (share > BRIGHT_PART).then_some(NotDarkReason::Bright { share })
+    (share > MAX_SHARE).then_some(NotDarkReason::Bright { share })
 }
 
 fn other_level(frame: &FrameStatistics, frames: &[FrameStatistics]) -> Option<NotDarkReason> {
+    /// Minimum number of frames of one exposure for a comparison.
+    const MIN_FRAMES: usize = 4;
+    /// Minimum difference from the median: in robust standard deviations, and as a share of the
+    /// noise.
+    const LEVEL_SIGMA: f64 = 8.0;
+    const LEVEL_NOISE_SHARE: f64 = 0.5;
     let alike = frames
         .iter()
         .filter(|other| is_same_exposure(other.exposure_s, frame.exposure_s));
     let mut means: Vec<f64> = alike.clone().map(|other| other.mean_adu).collect();
-    if means.len() < FEWEST {
+    if means.len() < MIN_FRAMES {
         return None;
     }
     let median_adu = median(&mut means);
@@ -118,7 +117,7 @@ fn other_level(frame: &FrameStatistics, frames: &[FrameStatistics]) -> Option<No
         .for_each(|mean| *mean = (*mean - median_adu).abs());
     let scale = 1.4826 * median(&mut means);
     let mut sigmas: Vec<f64> = alike.map(|other| other.sigma_adu).collect();
-    let least = (LEVEL_SIGMA * scale).max(LEVEL_PART_OF_NOISE * median(&mut sigmas));
+    let least = (LEVEL_SIGMA * scale).max(LEVEL_NOISE_SHARE * median(&mut sigmas));
     ((frame.mean_adu - median_adu).abs() > least).then_some(NotDarkReason::OtherLevel {
         mean_adu: frame.mean_adu,
         median_adu,
