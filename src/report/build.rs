@@ -1,11 +1,11 @@
-//! From what the pipeline found to what is told of it.
+//! Makes a report of a solution.
 
-use super::reason;
-use super::{
+use super::frame_report::{
     AttitudeReport, AttitudeSigma, BackgroundReport, CalibrationReport, CompletenessReport,
     DateReport, DistortionReport, FrameReport, MagnitudeReport, MatchReport, ObservationReport,
     OpticsReport, PhotometryReport, SCHEMA, SiteReport, StarReport, Status, TimingReport,
 };
+use super::reason;
 use crate::base::format::{
     finite, half_turn_deg, significant, to_decimals, to_significant, turn_deg,
 };
@@ -24,7 +24,7 @@ use crate::sky::observer::Observation;
 const PIXEL_DECIMALS: i32 = 4;
 /// Decimals of a direction in degrees: 0.4 milliarcseconds.
 const DIRECTION_DECIMALS: i32 = 7;
-/// Decimals of an angle in the observer's sky, in degrees: 0.4″, and what is left out is more.
+/// Decimals of an angle in the observer's sky, in degrees: 0.4″, less than the neglected effects.
 pub(super) const HORIZON_DECIMALS: i32 = 4;
 /// Decimals of an airmass.
 pub(super) const AIRMASS_DECIMALS: i32 = 4;
@@ -38,7 +38,7 @@ const FLUX_DIGITS: i32 = 6;
 const SIGMA_DIGITS: i32 = 4;
 
 impl FrameReport {
-    /// What is told of `solution`, whose stars are those of `catalog`; `frame` is what to call it.
+    /// The report of `solution`, whose stars are those of `catalog`; `frame` is its name.
     pub fn new(frame: &str, solution: &Solution, catalog: &Catalog) -> Self {
         let mut report = Self {
             schema: SCHEMA,
@@ -71,13 +71,12 @@ impl FrameReport {
                 report.reason_code = Some(reason.code());
             }
             Outcome::Identified(identification) => {
-                let known = solution.date;
-                let years = known.map_or(0.0, |known| known.date.years_since_j2000());
-                report.add(identification, catalog, years);
+                let years = solution.date.map_or(0.0, |d| d.date.years_since_j2000());
+                report.add_identification(identification, catalog, years);
             }
         }
-        if let Some(compared) = &solution.comparison {
-            report.add_comparison(compared);
+        if let Some(comparison) = &solution.comparison {
+            report.add_comparison(comparison);
         }
         if let Some(gain_e_per_adu) = solution.gain_e_per_adu {
             for star in &mut report.stars {
@@ -87,15 +86,20 @@ impl FrameReport {
         report
     }
 
-    fn add(&mut self, identification: &Identification, catalog: &Catalog, years: f64) {
+    fn add_identification(
+        &mut self,
+        identification: &Identification,
+        catalog: &Catalog,
+        years: f64,
+    ) {
         self.status = Status::Identified;
         self.attitude = Some(attitude(identification));
         self.optics = Some(optics(identification));
-        self.matched = Some(quality(identification, self.stars.len()));
+        self.matched = Some(match_quality(identification, self.stars.len()));
         self.magnitude = faintest(identification, catalog);
         for star_match in &identification.matches {
             if let Some(star) = self.stars.get_mut(star_match.source.get()) {
-                name(star, star_match, catalog, years);
+                add_star(star, star_match, catalog, years);
             }
         }
     }
@@ -175,7 +179,7 @@ fn distortion(distortion: &Distortion) -> DistortionReport {
     }
 }
 
-fn quality(identification: &Identification, detected: usize) -> MatchReport {
+fn match_quality(identification: &Identification, detected: usize) -> MatchReport {
     let pixel_arcsec = ARCSEC_PER_RAD / identification.camera.focal_length_px;
     MatchReport {
         detected,
@@ -195,13 +199,7 @@ fn faintest(identification: &Identification, catalog: &Catalog) -> Option<Magnit
     Some(MagnitudeReport {
         faintest_vmag: to_decimals(f64::from(v_mag(&faintest)), 3),
         faintest_id: catalog.designation(faintest.star),
-        predicted_limit_vmag: None,
-        difference_mag: None,
-        expected_faintest_vmag: None,
-        expected_faintest_sigma_mag: None,
-        faintest_difference_mag: None,
-        limit_difference_mag: None,
-        limit_difference_sigma_mag: None,
+        ..MagnitudeReport::default()
     })
 }
 
@@ -212,7 +210,7 @@ fn photometry(measured: &FramePhotometry) -> PhotometryReport {
     let limit = measured.completeness.limit;
     let fitted = limit.as_ref().ok();
     let mag = |value: f64| finite(value, MAG_DECIMALS);
-    let step = |bin: &MagnitudeBin| CompletenessReport {
+    let bin = |bin: &MagnitudeBin| CompletenessReport {
         vmag: to_decimals(bin.v_mag, MAG_DECIMALS),
         stars: bin.stars,
         detected: bin.detected,
@@ -234,7 +232,7 @@ fn photometry(measured: &FramePhotometry) -> PhotometryReport {
         limit50_width_mag: fitted.and_then(|limit| mag(limit.width_mag)),
         lost_share: fitted.and_then(|limit| mag(limit.lost)),
         limit50_reason: limit.err().map(|reason| reason.to_string()),
-        completeness: measured.completeness.bins.iter().map(step).collect(),
+        completeness: measured.completeness.bins.iter().map(bin).collect(),
     }
 }
 
@@ -264,21 +262,14 @@ fn unidentified(source: &Source) -> StarReport {
         sigma_y: measured.and_then(|m| significant(m.sigma_px[1], SIGMA_DIGITS)),
         flux: source.flux.and_then(|flux| significant(flux, FLUX_DIGITS)),
         peak: measured.and_then(|m| significant(m.peak, FLUX_DIGITS)),
-        flux_e: None,
-        peak_e: None,
         snr: measured.and_then(|m| significant(m.snr, SIGMA_DIGITS)),
-        id: None,
-        name: None,
-        vmag: None,
-        ra_deg: None,
-        dec_deg: None,
-        residual_px: None,
         flags: measured.map(|m| flag_names(m.flags)).unwrap_or_default(),
+        ..StarReport::default()
     }
 }
 
-/// Names the star, and tells where it stood `years` after J2000.0.
-fn name(star: &mut StarReport, star_match: &StarMatch, catalog: &Catalog, years: f64) {
+/// Adds the identified star, with its position `years` after J2000.0.
+fn add_star(star: &mut StarReport, star_match: &StarMatch, catalog: &Catalog, years: f64) {
     let known = catalog.star(star_match.star);
     let (ra_rad, dec_rad) = known.direction_at(years).to_ra_dec();
     star.id = Some(catalog.designation(star_match.star));
@@ -299,7 +290,7 @@ fn flag_names(flags: DetectionFlags) -> Vec<&'static str> {
         (flags.border, "border"),
     ]
     .into_iter()
-    .filter_map(|(set, word)| set.then_some(word))
+    .filter_map(|(is_set, name)| is_set.then_some(name))
     .collect()
 }
 

@@ -1,4 +1,4 @@
-//! Why a frame was not identified, in words, with what may help.
+//! The reasons why a frame was not identified, as text with what may help.
 
 use crate::base::format::decimals_for;
 use crate::base::units::DEG_PER_RAD;
@@ -6,7 +6,7 @@ use crate::identify::diagnosis::{Diagnosis, Excluded};
 use crate::identify::{LOG10_FALSE_ALARM_LIMIT, SearchFailure};
 use crate::pipeline::{Reason, Solution};
 
-/// `reason` in words.
+/// `reason` as text.
 pub(super) fn text(reason: &Reason, solution: &Solution) -> String {
     match reason {
         Reason::Search(failure) => failure_text(failure, solution),
@@ -121,28 +121,29 @@ fn excluded_text(excluded: &Excluded) -> String {
         ra_rad * DEG_PER_RAD,
         dec_rad * DEG_PER_RAD,
     );
-    let mut joint = ", which";
+    let mut conjunction = ", which";
     if let Some(allowed) = excluded.allowed_fov_x_rad {
         let allowed = range(allowed);
-        text +=
-            &format!("{joint} the scale given (--fov or --pixel-scale), {allowed} wide, excludes");
-        joint = ", and which";
+        text += &format!(
+            "{conjunction} the scale given (--fov or --pixel-scale), {allowed} wide, excludes"
+        );
+        conjunction = ", and which";
     }
     if let Some((distance_rad, radius_rad)) = excluded.distance_rad {
         text += &format!(
-            "{joint} is {} from --near, beyond the --radius of {}",
+            "{conjunction} is {} from --near, beyond the --radius of {}",
             degrees(distance_rad),
             degrees(radius_rad)
         );
-        joint = ", and";
+        conjunction = ", and";
     }
-    if joint == ", which" {
+    if conjunction == ", which" {
         text += ", but only without the hints";
     }
     text
 }
 
-/// An angle with three digits.
+/// An angle with three significant digits.
 fn degrees(angle_rad: f64) -> String {
     let angle_deg = angle_rad * DEG_PER_RAD;
     let decimals = decimals_for(angle_deg / 10.0, 4);
@@ -158,41 +159,31 @@ mod tests {
     use super::*;
     use crate::base::coords::{PixelPoint, UnitVector};
     use crate::base::units::RAD_PER_DEG;
-    use crate::pipeline::{Outcome, Source, Timing};
+    use crate::pipeline::{Outcome, Source};
+    use crate::report::sample;
 
-    fn said(reason: Reason, detections: usize) -> String {
+    fn text_of(reason: Reason, detections: usize) -> String {
         let source = Source {
             position: PixelPoint::new(1.0, 2.0),
             measured: None,
             flux: None,
         };
+        let outcome = Outcome::NotIdentified(reason.clone());
         let solution = Solution {
-            width: 100,
-            height: 100,
-            date: None,
             sources: vec![source; detections],
-            observation: None,
-            photometry: None,
-            comparison: None,
-            gain_e_per_adu: None,
-            calibration: None,
-            exposure_s: None,
-            notes: Vec::new(),
-            background: None,
-            outcome: Outcome::NotIdentified(reason.clone()),
-            timing: Timing::default(),
+            ..sample::solution(100, 100, outcome)
         };
         text(&reason, &solution)
     }
 
     #[test]
-    fn a_reason_says_what_was_found_what_was_needed_and_what_may_help() {
+    fn a_reason_names_found_and_needed_stars_and_what_may_help() {
         let few = Reason::Search(SearchFailure::TooFewStars {
             found: 1,
             needed: 4,
         });
         assert_eq!(
-            said(few, 3),
+            text_of(few, 3),
             "only 1 star was found (and 2 detections that have not the shape of a star) and at least 4 are needed"
         );
         let no_match = |best_log10_false_alarm| {
@@ -200,13 +191,13 @@ mod tests {
                 best_log10_false_alarm,
             })
         };
-        assert!(said(no_match(None), 12).contains("12 detections"));
-        assert!(said(no_match(Some(-6.34)), 12).contains("-6.3"));
-        assert!(!said(no_match(Some(f64::NAN)), 12).contains("NaN"));
+        assert!(text_of(no_match(None), 12).contains("12 detections"));
+        assert!(text_of(no_match(Some(-6.34)), 12).contains("-6.3"));
+        assert!(!text_of(no_match(Some(f64::NAN)), 12).contains("NaN"));
     }
 
     #[test]
-    fn a_solution_that_hints_exclude_is_told_with_what_excludes_it() {
+    fn an_excluded_solution_names_the_priors_that_exclude_it() {
         let excluded = Excluded {
             fov_x_rad: 11.427 * RAD_PER_DEG,
             boresight: UnitVector::from_ra_dec(10.0 * RAD_PER_DEG, -5.0 * RAD_PER_DEG),
@@ -215,7 +206,7 @@ mod tests {
             distance_rad: Some((23.0 * RAD_PER_DEG, 5.0 * RAD_PER_DEG)),
         };
         assert_eq!(
-            said(
+            text_of(
                 Reason::Diagnosis(Diagnosis::HintsExclude(Box::new(excluded))),
                 50
             ),
@@ -226,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn the_direction_of_trails_is_told_as_it_is_seen() {
+    fn the_direction_of_trails_is_given_as_seen() {
         for (angle_deg, expected) in [
             (0.3_f64, "lie level"),
             (90.0, "lie upright"),

@@ -1,9 +1,10 @@
 //! The stars of a frame as a table.
 
-use super::{FrameReport, StarReport};
+use super::frame_report::{FrameReport, StarReport};
 use std::io;
 
-/// The columns, in order. `flags` are separated by blanks; the light in electrons is there where a camera is given.
+/// The columns, in order. `flags` are separated by blanks; `flux_e` and `peak_e` are filled where a
+/// camera is stated.
 pub const TABLE_COLUMNS: [&str; 17] = [
     "frame",
     "x",
@@ -27,16 +28,17 @@ pub const TABLE_COLUMNS: [&str; 17] = [
 /// Writes the row of column names.
 ///
 /// # Errors
-/// What the writer gives.
+/// Errors of the writer.
 pub fn write_table_header<W: io::Write>(writer: &mut csv::Writer<W>) -> csv::Result<()> {
     writer.write_record(TABLE_COLUMNS)
 }
 
 impl FrameReport {
-    /// Writes one row a detection, brightest first, without the row of column names ([`write_table_header`]).
+    /// Writes one row per detection, brightest first, without the row of column names
+    /// ([`write_table_header`]).
     ///
     /// # Errors
-    /// What the writer gives.
+    /// Errors of the writer.
     pub fn write_table_rows<W: io::Write>(&self, writer: &mut csv::Writer<W>) -> csv::Result<()> {
         for star in &self.stars {
             writer.write_record(self.row(star))?;

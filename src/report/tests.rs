@@ -1,6 +1,7 @@
-//! The three forms of a report, against their snapshots.
+//! The three forms of a report, compared with their snapshots.
 
 use super::*;
+use crate::identify::DateSource;
 
 fn star(x: f64, id: Option<&str>, name: Option<&str>) -> StarReport {
     StarReport {

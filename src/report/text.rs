@@ -1,35 +1,36 @@
-//! A frame's report for people, at most [`LINE_WIDTH`] columns wide where the names allow it.
+//! The report as text, at most [`LINE_WIDTH`] columns wide where names allow it.
 
-use super::{
+use super::frame_report::{
     AttitudeReport, CalibrationReport, FrameReport, MagnitudeReport, MatchReport,
     ObservationReport, OpticsReport, PhotometryReport, StarReport,
 };
 use crate::base::format::{self, counted, decimals_for, printable};
+use crate::base::units::ARCSEC_PER_RAD;
 use crate::identify::DateSource;
 
-/// Rows of the table of stars that are shown without [`TextOptions::all_stars`].
+/// Number of stars listed without [`TextOptions::all_stars`].
 pub const STARS_SHOWN: usize = 20;
 
-/// Columns that a line of text fills at most.
+/// Largest width of a line, in columns.
 const LINE_WIDTH: usize = 96;
-/// Columns of the labels in front of the lines.
+/// Width of the labels in front of the lines, in columns.
 const LABEL_WIDTH: usize = 12;
 
-/// What to show.
+/// Options of the text report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct TextOptions {
-    /// Every identified star, and not just the [`STARS_SHOWN`] brightest.
+    /// List every identified star, not only the [`STARS_SHOWN`] brightest.
     pub all_stars: bool,
 }
 
 impl FrameReport {
-    /// The report as text of several lines, each with its end.
+    /// The report as text; every line has its end.
     pub fn to_text(&self, options: TextOptions) -> String {
         let mut lines = vec![format!(
             "{}  {} × {} px",
             self.frame, self.width, self.height
         )];
-        lines.extend(self.verdict());
+        lines.extend(self.outcome_lines());
         lines.extend(self.attitude.iter().flat_map(attitude_lines));
         lines.extend(self.optics.iter().flat_map(optics_lines));
         lines.extend(self.matched.iter().map(residual_line));
@@ -52,7 +53,7 @@ impl FrameReport {
         lines.iter().map(|line| printable(line) + "\n").collect()
     }
 
-    fn verdict(&self) -> Vec<String> {
+    fn outcome_lines(&self) -> Vec<String> {
         let text = match (&self.matched, &self.reason) {
             (Some(matched), _) => format!(
                 "identified: {} of {}; chance alone would do as well {}",
@@ -158,7 +159,7 @@ fn attitude_lines(attitude: &AttitudeReport) -> Vec<String> {
     let sigma_arcsec = sigma.x.max(sigma.y);
     let sigma_deg = sigma_arcsec / 3600.0;
     let seconds = decimals_for(sigma_arcsec, 4);
-    // One second of right ascension is up to fifteen arcseconds: it takes a digit more.
+    // One second of right ascension is up to 15″, so it takes one more digit.
     let ra = format::hours(attitude.ra_deg, (seconds + 1).min(4));
     let dec = format::degrees(attitude.dec_deg, seconds);
     let decimals = decimals_for(sigma_deg, 7);
@@ -194,7 +195,7 @@ fn optics_lines(optics: &OpticsReport) -> Vec<String> {
     if sigma_px.is_finite() {
         focal += &format!(" ± {sigma_px:.decimals$}");
     }
-    let pixel_arcsec = crate::base::units::ARCSEC_PER_RAD / optics.focal_length_px;
+    let pixel_arcsec = ARCSEC_PER_RAD / optics.focal_length_px;
     let mirrored = if optics.mirrored {
         "mirrored"
     } else {
@@ -219,15 +220,16 @@ fn optics_lines(optics: &OpticsReport) -> Vec<String> {
 }
 
 fn photometry_lines(photometry: &PhotometryReport) -> Vec<String> {
-    let pair = |value: Option<f64>, sigma: Option<f64>| value.zip(sigma);
-    let limit = pair(photometry.limit50_vmag, photometry.limit50_sigma_mag);
+    let limit = photometry.limit50_vmag.zip(photometry.limit50_sigma_mag);
     let limit_text = match (limit, &photometry.limit50_reason) {
         (Some((vmag, sigma)), _) => {
             format!("V {vmag:.2} ± {sigma:.2}, where half of the catalogue's stars are detected")
         }
         (None, reason) => reason.clone().unwrap_or_default(),
     };
-    let zero_point = pair(photometry.zero_point_vmag, photometry.zero_point_sigma_mag);
+    let zero_point = photometry
+        .zero_point_vmag
+        .zip(photometry.zero_point_sigma_mag);
     let mut text = match zero_point {
         Some((vmag, sigma)) => format!(
             "V {vmag:.3} ± {sigma:.3} is 1 {}; {} scatter by {:.2}",
@@ -237,7 +239,7 @@ fn photometry_lines(photometry: &PhotometryReport) -> Vec<String> {
         ),
         None => "too few stars to tell".to_owned(),
     };
-    if let Some((term, sigma)) = pair(photometry.color_term, photometry.color_term_sigma) {
+    if let Some((term, sigma)) = photometry.color_term.zip(photometry.color_term_sigma) {
         text += &format!("; {term:+.2} ± {sigma:.2} (B−V − 0.6)");
     }
     vec![
@@ -255,7 +257,7 @@ fn residual_line(matched: &MatchReport) -> String {
     labelled("residuals", &text)
 }
 
-/// The rows of the table under their heading.
+/// The table of stars with its heading.
 fn star_table(stars: &[&StarReport]) -> Vec<String> {
     let id = |star: &StarReport| star.id.clone().unwrap_or_default();
     let name = |star: &StarReport| star.name.clone().unwrap_or_default();
@@ -297,7 +299,7 @@ fn or_dash(value: Option<f64>, print: impl Fn(f64) -> String) -> String {
     value.map_or_else(|| "–".to_owned(), print)
 }
 
-/// How seldom something of this probability happens.
+/// How rare an event of this probability is.
 fn odds(log10_probability: f64) -> String {
     let power = -log10_probability;
     if power < 1.0 {
@@ -312,18 +314,18 @@ fn calibration_line(applied: &CalibrationReport) -> String {
         ("flat", &applied.flat),
         ("hot pixels", &applied.hot_pixels),
     ];
-    let said = parts.into_iter().filter_map(|(what, file)| {
+    let applied = parts.into_iter().filter_map(|(kind, file)| {
         let file = file.as_ref()?;
-        Some(format!("{what} {file}"))
+        Some(format!("{kind} {file}"))
     });
-    labelled("calibrated", &said.collect::<Vec<_>>().join(", "))
+    labelled("calibrated", &applied.collect::<Vec<_>>().join(", "))
 }
 
 pub(super) fn labelled(label: &str, text: &str) -> String {
     format!("  {label:<LABEL_WIDTH$}{text}")
 }
 
-/// `text` cut at blanks into lines of at most `width` characters, longer words excepted.
+/// Wraps `text` at blanks into lines of at most `width` characters, except for longer words.
 fn wrap(text: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {

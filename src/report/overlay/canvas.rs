@@ -1,4 +1,4 @@
-//! Strokes and letters on a picture.
+//! Draws strokes and letters on a picture.
 
 use super::grey::Grey;
 use image::RgbImage;
@@ -6,13 +6,13 @@ use std::sync::OnceLock;
 use tiny_skia::{FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Stroke, Transform};
 use ttf_parser::{Face, OutlineBuilder};
 
-/// Letters, Latin and Greek: assets/README.md says where they are from.
+/// Font with Latin and Greek letters; its source is in assets/README.md.
 pub static FONT: &[u8] = include_bytes!("../../../assets/DejaVuSans-subset.ttf");
 
-/// Breadth of the dark border round letters, in units of strokes.
+/// Width of the dark border around letters, in units of strokes.
 const HALO: f32 = 3.0;
 const HALO_OPACITY: u8 = 200;
-/// What is behind the strip below the picture.
+/// Background of the strip below the frame.
 const BACKDROP: Colour = Colour([16, 18, 24]);
 
 fn face() -> &'static Face<'static> {
@@ -42,10 +42,10 @@ impl Colour {
     }
 }
 
-/// A picture that is drawn on. Sizes of strokes and letters are in units that suit its size.
+/// A picture to draw on. Sizes of strokes and letters are in units that suit its size.
 pub(super) struct Canvas {
     pixmap: Pixmap,
-    /// Pixels in a unit.
+    /// Pixels per unit.
     pub(super) unit: f32,
 }
 
@@ -70,14 +70,14 @@ impl Canvas {
         self.pixmap.width() as f32
     }
 
-    /// A circle; `radius` in pixels.
+    /// Draws a circle; `radius` in pixels.
     pub(super) fn ring(&mut self, [x, y]: [f32; 2], radius: f32, stroke: f32, colour: Colour) {
         if let Some(path) = PathBuilder::from_circle(x, y, radius) {
             self.stroke(&path, stroke * self.unit, colour, 255);
         }
     }
 
-    /// A line through `points`.
+    /// Draws a line through `points`.
     pub(super) fn line(&mut self, points: &[[f32; 2]], stroke: f32, colour: Colour) {
         let mut builder = PathBuilder::new();
         for (i, [x, y]) in points.iter().enumerate() {
@@ -92,7 +92,7 @@ impl Canvas {
         }
     }
 
-    /// `text` with a dark border, its baseline beginning at `at`; `size` in units.
+    /// Draws `text` with a dark border, its baseline beginning at `at`; `size` in units.
     pub(super) fn text(&mut self, text: &str, at: [f32; 2], size: f32, colour: Colour) {
         let Some(path) = outline(text, at, size * self.unit) else {
             return;
@@ -130,7 +130,7 @@ impl Canvas {
     }
 }
 
-/// Width of `text` in letters of this size, in the same unit.
+/// Width of `text` in letters of this size, in the unit of `size`.
 pub(super) fn text_width(text: &str, size: f32) -> f32 {
     let face = face();
     let scale = size / f32::from(face.units_per_em());
@@ -138,7 +138,7 @@ pub(super) fn text_width(text: &str, size: f32) -> f32 {
     text.chars().map(advance).sum::<f32>() * scale
 }
 
-/// Letters that the font does not have are drawn as its empty box.
+/// The glyph of `c`; the empty box if the font does not have it.
 fn glyph(c: char) -> ttf_parser::GlyphId {
     face().glyph_index(c).unwrap_or(ttf_parser::GlyphId(0))
 }
@@ -159,7 +159,7 @@ fn outline(text: &str, [x, y]: [f32; 2], size_px: f32) -> Option<Path> {
     pen.builder.finish()
 }
 
-/// Draws letters, which the font has with y up.
+/// Converts the font's outlines, which have y up, to paths.
 struct Pen {
     builder: PathBuilder,
     scale: f32,

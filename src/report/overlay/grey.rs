@@ -1,34 +1,11 @@
-//! The frame's levels as greys.
+//! The frame as grey levels.
 
-use super::scaled;
 use crate::base::coords::PixelPoint;
 use crate::detect::BackgroundMap;
 use crate::frame::Frame;
 use crate::pipeline::Background;
 
-/// Frames with a longer side below this are enlarged, by the smallest whole factor that brings it there.
-const ENLARGE_BELOW_PX: usize = 800;
-/// Frames with a longer side above this are reduced, by the smallest whole factor that brings it below.
-const REDUCE_ABOVE_PX: usize = 2500;
-/// Letters and strokes grow with pictures that have a longer side above this.
-const LARGE_PICTURE_PX: f32 = 1300.0;
-
-/// Cells of the background across the longer side: wide enough to leave the glow round bright stars.
-const CELLS: usize = 16;
-const MIN_CELL_PX: usize = 64;
-
-/// Black is so many standard deviations of the noise below the background.
-const BLACK_SIGMA: f32 = 1.5;
-/// Up to so many standard deviations above black the grey grows in proportion, then with the logarithm.
-const LINEAR_SIGMA: f32 = 4.0;
-/// White is the level that this part of the pixels exceeds, ...
-const WHITE_SHARE: f32 = 5e-4;
-/// ... but no less than so many standard deviations.
-const LEAST_WHITE_SIGMA: f32 = 40.0;
-/// Steps of the table from level to grey.
-const STEPS: usize = 4096;
-
-/// The frame as a picture without colour.
+/// The frame as a grey picture.
 pub(super) struct Grey {
     /// Columns of the picture.
     pub(super) width: usize,
@@ -41,8 +18,13 @@ pub(super) struct Grey {
 }
 
 impl Grey {
-    /// `frame` without its background, enlarged or reduced to a size that can be looked at.
+    /// `frame` without its background, enlarged or reduced by the smallest whole factor that gives
+    /// a picture of suitable size.
     pub(super) fn of(frame: &Frame, background: Option<&Background>) -> Self {
+        /// Frames with a shorter longest side are enlarged to at least this.
+        const ENLARGE_BELOW_PX: usize = 800;
+        /// Frames with a longer longest side are reduced to at most this.
+        const REDUCE_ABOVE_PX: usize = 2500;
         let longer = frame.width.max(frame.height);
         let enlarged = if longer < ENLARGE_BELOW_PX {
             ENLARGE_BELOW_PX.div_ceil(longer)
@@ -55,7 +37,7 @@ impl Grey {
             frame.height.div_ceil(reduced),
         );
         let light = light(frame, reduced, [width, height]);
-        // The mean of n² pixels has an n-th of the noise of one.
+        // The mean of n² pixels has 1/n of the noise.
         let noise = background.map_or(0.0, |sky| sky.noise_adu as f32) / reduced as f32;
         let small = greys(&light, noise);
         let levels = if enlarged > 1 {
@@ -72,24 +54,29 @@ impl Grey {
         }
     }
 
-    /// Pixels of the picture in a pixel of the frame, on one axis.
+    /// Pixels of the picture per pixel of the frame, along one axis.
     pub(super) fn scale(&self) -> f32 {
         self.enlarged as f32 / self.reduced as f32
     }
 
-    /// How much larger letters and strokes are than on a picture of ordinary size.
+    /// Size of letters and strokes, relative to those on a picture of ordinary size.
     pub(super) fn stroke_unit(&self) -> f32 {
+        /// Letters and strokes grow with pictures that have a longer side above this.
+        const LARGE_PICTURE_PX: f32 = 1300.0;
         (self.width.max(self.height) as f32 / LARGE_PICTURE_PX).max(1.0)
     }
 
-    /// Where in the picture a position in the frame is.
-    pub(super) fn place_of(&self, position: &PixelPoint) -> [f32; 2] {
-        scaled(position, self.scale())
+    /// Position in the picture of a position in the frame; (0, 0) is the upper left corner.
+    pub(super) fn position_of(&self, pixel: &PixelPoint) -> [f32; 2] {
+        [pixel.x, pixel.y].map(|along| (along as f32 + 0.5) * self.scale())
     }
 }
 
-/// What is above the background: means over squares of `side` pixels, NaN where there is no value.
+/// Light above the background: means over squares of `side` pixels, NaN where there is no value.
 fn light(frame: &Frame, side: usize, [width, height]: [usize; 2]) -> Vec<f32> {
+    /// Background cells along the longer side: wide enough to keep the glow around bright stars.
+    const CELLS: usize = 16;
+    const MIN_CELL_PX: usize = 64;
     let cell_px = (frame.width.max(frame.height) / CELLS).max(MIN_CELL_PX);
     let background = BackgroundMap::measure(frame, cell_px);
     let mut levels = vec![0.0; frame.width];
@@ -111,20 +98,31 @@ fn light(frame: &Frame, side: usize, [width, height]: [usize; 2]) -> Vec<f32> {
     light
 }
 
-/// From light to grey: asinh between a little below the background and the level of bright stars.
+/// Converts light to grey with an asinh stretch, from just below the background to the level of
+/// bright stars.
 ///
 /// # Reference
 /// Lupton, Gunn & Szalay 1999, AJ 118, 1406, for asinh.
 fn greys(light: &[f32], noise: f32) -> Vec<u8> {
+    /// Black is this many standard deviations of the noise below the background.
+    const BLACK_SIGMA: f32 = 1.5;
+    /// The stretch is linear up to this many standard deviations above black, then logarithmic.
+    const LINEAR_SIGMA: f32 = 4.0;
+    /// White is the level that this share of the pixels exceeds, ...
+    const WHITE_SHARE: f32 = 5e-4;
+    /// ... but at least this many standard deviations.
+    const MIN_WHITE_SIGMA: f32 = 40.0;
+    /// Entries of the table from level to grey.
+    const STEPS: usize = 4096;
     let bright = level_exceeded_by(light, WHITE_SHARE);
     let brightest = light.iter().copied().fold(0.0, f32::max);
-    // A drawing has no noise: its own range then sets the scale.
+    // Without noise, as in a drawing, the range of the frame sets the scale.
     let noise = noise.max(brightest * 1e-3).max(f32::MIN_POSITIVE * 1e6);
-    let white = (bright.max(LEAST_WHITE_SIGMA * noise)).min(brightest.max(noise));
+    let white = (bright.max(MIN_WHITE_SIGMA * noise)).min(brightest.max(noise));
     let black = -BLACK_SIGMA * noise;
     let stretch = |above: f32| (above / (LINEAR_SIGMA * noise)).asinh();
     let most = stretch(white - black);
-    // The table is fine where the curve is steep: its steps are even in the root of the level.
+    // The table is even in the square root of the level, hence fine where the curve is steep.
     let table: Vec<u8> = (0..STEPS)
         .map(|step| {
             let above = (step as f32 / (STEPS - 1) as f32).powi(2) * (white - black);
@@ -136,14 +134,14 @@ fn greys(light: &[f32], noise: f32) -> Vec<u8> {
         if share > 0.0 {
             table[(share.min(1.0).sqrt() * (STEPS - 1) as f32) as usize]
         } else {
-            // Also what has no value.
+            // Also NaN.
             0
         }
     };
     light.iter().map(grey).collect()
 }
 
-/// The level that a part of all values exceeds.
+/// The level that a share of all values exceeds.
 fn level_exceeded_by(values: &[f32], share: f32) -> f32 {
     let mut finite: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
     if finite.is_empty() {
@@ -154,7 +152,7 @@ fn level_exceeded_by(values: &[f32], share: f32) -> f32 {
     *finite.select_nth_unstable_by(place, f32::total_cmp).1
 }
 
-/// Every pixel as a square of `factor` pixels a side.
+/// Enlarges every pixel to a square of `factor` pixels a side.
 fn enlarge(levels: &[u8], width: usize, factor: usize) -> Vec<u8> {
     let mut enlarged = Vec::with_capacity(levels.len() * factor * factor);
     for row in levels.chunks(width) {
@@ -201,7 +199,7 @@ mod tests {
     #[test]
     fn the_centre_of_the_first_pixel_is_the_middle_of_its_square() {
         let grey = Grey::of(&frame(400, 400), None);
-        assert_eq!(grey.place_of(&PixelPoint::new(0.0, 399.0)), [1.0, 799.0]);
+        assert_eq!(grey.position_of(&PixelPoint::new(0.0, 399.0)), [1.0, 799.0]);
     }
 
     #[test]

@@ -1,30 +1,23 @@
-//! Where names go: the brightest stars first, each where it hides neither another name nor a bright star.
+//! Places names, brightest stars first, where they cover neither another name nor a bright star.
 
-use super::Mark;
 use super::canvas::text_width;
+use super::mark::Mark;
 
 /// Size of the letters, in units of strokes.
 pub(super) const SIZE: f32 = 12.5;
-/// Height of capitals and digits, over the size.
+/// Height of capitals and digits, as a share of the size.
 const CAPITALS: f32 = 0.74;
-/// Between a ring and its name, and round every name.
-const GAP: f32 = 3.0;
+/// Space around a name.
 const MARGIN: f32 = 2.0;
-/// Rings of so many of the brightest detections are kept free, and of no more than this part of all.
+/// Number of the brightest detections whose rings are kept free.
 const KEPT_FREE: usize = 250;
-const KEPT_FREE_SHARE: f32 = 0.4;
-/// One name on such an area at the most, in square units: more cannot be taken in.
-const AREA_A_LABEL: f32 = 9000.0;
 
-/// Where there is no room beside the ring, names go so much further away, with a line to the ring.
-const FURTHER: f32 = 16.0;
-
-/// A name and where its baseline begins, in pixels.
+/// A name and the start of its baseline, in pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Label {
     pub(super) text: String,
     pub(super) at: [f32; 2],
-    /// From the ring to a name that is not beside it.
+    /// Line from the ring to a name that is not beside it.
     pub(super) line: Option<[[f32; 2]; 2]>,
 }
 
@@ -32,14 +25,14 @@ pub(super) struct Label {
 type Rectangle = [f32; 4];
 
 impl Mark {
-    /// Whether the rectangle hides a part of the ring or of what is in it.
-    fn is_under(&self, [left, top, right, bottom]: &Rectangle) -> bool {
+    /// Whether the rectangle covers a part of the ring or its inside.
+    fn is_covered_by(&self, [left, top, right, bottom]: &Rectangle) -> bool {
         let dx = self.x - self.x.clamp(*left, *right);
         let dy = self.y - self.y.clamp(*top, *bottom);
         dx.hypot(dy) < self.radius
     }
 
-    /// From the ring to the nearest point of the rectangle.
+    /// Line from the ring to the nearest point of the rectangle.
     fn line_to(&self, [left, top, right, bottom]: &Rectangle) -> [[f32; 2]; 2] {
         let (x, y) = (self.x.clamp(*left, *right), self.y.clamp(*top, *bottom));
         let share = self.radius / (x - self.x).hypot(y - self.y).max(self.radius);
@@ -48,19 +41,26 @@ impl Mark {
     }
 }
 
-/// Finds places for the names of `marks`, which come brightest first, on a picture of `image` pixels.
+/// Places the names of `marks`, brightest first, on a picture of `image` pixels.
 pub(super) fn place(marks: &[Mark], image: [f32; 2], unit: f32) -> Vec<Label> {
+    /// Distance of a name from its ring, ...
+    const GAP: f32 = 3.0;
+    /// ... and where there is no room beside it, with a line to the ring.
+    const FAR_GAP: f32 = 16.0;
+    /// Largest share of the rings that is kept free.
+    const KEPT_FREE_SHARE: f32 = 0.4;
+    /// Smallest area per name, in square units: more names are unreadable.
+    const AREA_PER_LABEL: f32 = 9000.0;
     let mut named: Vec<(usize, &str, f32)> = marks
         .iter()
         .enumerate()
         .filter_map(|(i, mark)| {
-            mark.label
-                .as_ref()
-                .map(|(text, v_mag)| (i, &**text, *v_mag))
+            let (text, v_mag) = mark.label.as_ref()?;
+            Some((i, &**text, *v_mag))
         })
         .collect();
     named.sort_by(|a, b| a.2.total_cmp(&b.2));
-    let most = (image[0] * image[1] / (AREA_A_LABEL * unit * unit)).ceil() as usize;
+    let most = (image[0] * image[1] / (AREA_PER_LABEL * unit * unit)).ceil() as usize;
     let kept_free = ((marks.len() as f32 * KEPT_FREE_SHARE) as usize).min(KEPT_FREE);
     let mut taken: Vec<Rectangle> = Vec::new();
     let mut labels = Vec::new();
@@ -73,21 +73,21 @@ pub(super) fn place(marks: &[Mark], image: [f32; 2], unit: f32) -> Vec<Label> {
                 && !taken.iter().any(|other| overlap(rectangle, other))
                 && !marks[..kept_free]
                     .iter()
-                    .any(|mark| mark.is_under(rectangle))
+                    .any(|mark| mark.is_covered_by(rectangle))
         };
-        // Rings of faint stars may be crossed, but rather fewer of them.
+        // Names may cross rings of faint stars, but as few as possible.
         let crossed = |rectangle: &Rectangle| {
             let others = marks[kept_free..].iter();
-            others.filter(|mark| mark.is_under(rectangle)).count()
+            others.filter(|mark| mark.is_covered_by(rectangle)).count()
         };
         let size = [text_width(text, SIZE * unit), CAPITALS * SIZE * unit];
         let mark = &marks[index];
         let find = |gap: f32| {
-            let places = places(mark, size, gap * unit, unit).into_iter();
-            places.filter(is_free).min_by_key(crossed)
+            let candidates = candidates(mark, size, gap * unit, unit).into_iter();
+            candidates.filter(is_free).min_by_key(crossed)
         };
         let beside = find(GAP);
-        if let Some(rectangle) = beside.or_else(|| find(FURTHER)) {
+        if let Some(rectangle) = beside.or_else(|| find(FAR_GAP)) {
             taken.push(rectangle);
             let margin = MARGIN * unit;
             labels.push(Label {
@@ -100,12 +100,12 @@ pub(super) fn place(marks: &[Mark], image: [f32; 2], unit: f32) -> Vec<Label> {
     labels
 }
 
-/// Places round a ring, the best first: beside it, at its corners, above and below.
-fn places(mark: &Mark, [width, height]: [f32; 2], gap: f32, unit: f32) -> [Rectangle; 8] {
+/// Positions around a ring, best first: beside it, at its corners, above and below.
+fn candidates(mark: &Mark, [width, height]: [f32; 2], gap: f32, unit: f32) -> [Rectangle; 8] {
     let away = mark.radius + gap;
     let corner = away * std::f32::consts::FRAC_1_SQRT_2;
     let margin = MARGIN * unit;
-    // Where the middle of the name is: offset of the ring's side, then half the name's own size.
+    // The centre of the name: offset of the ring's edge, then in half sizes of the name.
     [
         (away, 0.0, 1.0, 0.0),
         (-away, 0.0, -1.0, 0.0),
@@ -139,7 +139,7 @@ fn overlap(a: &Rectangle, b: &Rectangle) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Kind;
+    use super::super::mark::Kind;
     use super::*;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -184,7 +184,7 @@ mod tests {
                     .iter()
                     .all(|other| !overlap(&own, &rectangle(other)))
             );
-            let hidden = marks[..KEPT_FREE].iter().filter(|m| m.is_under(&own));
+            let hidden = marks[..KEPT_FREE].iter().filter(|m| m.is_covered_by(&own));
             assert_eq!(hidden.count(), 0, "{label:?}");
         }
     }

@@ -1,32 +1,27 @@
-//! The strip below the frame: what it is, how large, and how it lies.
+//! The strip below the frame: name, field, counts, scale bar and compass.
 
 use super::canvas::{Canvas, Colour, text_width};
 use super::grey::Grey;
-use super::{Kind, Mark, identification, length_px, north_and_east};
+use super::mark::{Kind, Mark};
 use crate::base::format::{counted, degrees, hours};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
+use crate::camera::CameraModel;
 use crate::identify::Identification;
 use crate::pipeline::Solution;
 
-/// Everything here is in units of strokes.
+/// Height of the strip. Lengths are in units of strokes.
 const HEIGHT: f32 = 76.0;
-/// The strip needs this much, also below a narrow frame.
-const LEAST_WIDTH: f32 = 460.0;
+/// Smallest width of the strip, also below a narrow frame.
+const MIN_WIDTH: f32 = 460.0;
 const LETTERS: f32 = 13.0;
 const PADDING: f32 = 10.0;
 const LINE: f32 = 20.0;
-/// Side of the square with the arrows, and their length.
+/// Side of the square with the arrows.
 const COMPASS: f32 = 72.0;
-const ARROW: f32 = 20.0;
-/// The scale bar is at most so long, and no longer than this part of the frame.
-const BAR: f32 = 150.0;
-const BAR_SHARE: f32 = 0.3;
-/// Between the text and the scale bar.
-const GAP: f32 = 24.0;
 
-/// Lengths for the scale bar, in arcseconds, and what they are called.
+/// Lengths of the scale bar in arcseconds, and their names.
 const LENGTHS: [(f64, &str); 20] = [
-    (36_000.0 * 2.0, "20°"),
+    (72_000.0, "20°"),
     (36_000.0, "10°"),
     (18_000.0, "5°"),
     (7_200.0, "2°"),
@@ -48,10 +43,10 @@ const LENGTHS: [(f64, &str); 20] = [
     (0.1, "0.1″"),
 ];
 
-/// Size in pixels of the whole picture: the frame and the strip.
+/// Size of the whole picture, frame and strip, in pixels.
 pub(super) fn size(grey: &Grey, unit: f32) -> [usize; 2] {
     [
-        grey.width.max((LEAST_WIDTH * unit) as usize),
+        grey.width.max((MIN_WIDTH * unit) as usize),
         grey.height + (HEIGHT * unit) as usize,
     ]
 }
@@ -64,9 +59,11 @@ pub(super) fn draw(
     solution: &Solution,
     marks: &[Mark],
 ) {
+    /// Between the text and the scale bar.
+    const GAP: f32 = 24.0;
     let top = grey.height as f32;
     let mut right = canvas.width() - PADDING * canvas.unit;
-    if let Some(found) = identification(solution) {
+    if let Some(found) = solution.outcome.identification() {
         right -= COMPASS * canvas.unit;
         let centre = [
             right + COMPASS * canvas.unit / 2.0,
@@ -76,7 +73,7 @@ pub(super) fn draw(
         right = draw_scale(canvas, grey, [right, top], found) - GAP * canvas.unit;
     }
     let left = PADDING * canvas.unit;
-    let lines = [title.to_owned(), place_line(solution)];
+    let lines = [title.to_owned(), field_line(solution)];
     for (number, (line, colour)) in lines.iter().zip([Colour::WHITE, Colour::DIM]).enumerate() {
         let at = [left, baseline(canvas, top, number)];
         let text = shortened(line, (right - left) / canvas.unit);
@@ -89,9 +86,9 @@ fn baseline(canvas: &Canvas, top: f32, line: usize) -> f32 {
     top + (PADDING + LETTERS + LINE * line as f32) * canvas.unit
 }
 
-/// Where the frame is and how wide, or that this is not known.
-fn place_line(solution: &Solution) -> String {
-    let Some(found) = identification(solution) else {
+/// Centre and field of the frame.
+fn field_line(solution: &Solution) -> String {
+    let Some(found) = solution.outcome.identification() else {
         return "not identified".to_owned();
     };
     let (boresight, _) = found.icrs_to_camera.boresight_and_up();
@@ -105,7 +102,7 @@ fn place_line(solution: &Solution) -> String {
     )
 }
 
-/// How many detections there are of each kind, each in the colour of its rings.
+/// Draws the number of detections of each kind, in the colour of its rings.
 fn draw_counts(canvas: &mut Canvas, [left, y]: [f32; 2], right: f32, marks: &[Mark]) {
     let count = |kind: Kind| marks.iter().filter(|mark| mark.kind == kind).count();
     let kinds = [
@@ -130,13 +127,16 @@ fn draw_counts(canvas: &mut Canvas, [left, y]: [f32; 2], right: f32, marks: &[Ma
     }
 }
 
-/// A bar of a round length, ending at the right; returns where it begins.
+/// Draws a scale bar of a round length that ends at the right; returns where it begins.
 fn draw_scale(
     canvas: &mut Canvas,
     grey: &Grey,
     [right, top]: [f32; 2],
     found: &Identification,
 ) -> f32 {
+    /// Largest length in units, and as a share of the picture's width.
+    const BAR: f32 = 150.0;
+    const BAR_SHARE: f32 = 0.3;
     let most = (BAR * canvas.unit).min(BAR_SHARE * canvas.width());
     let pixels =
         |arcsec: f64| length_px(&found.camera, arcsec / 3600.0 * RAD_PER_DEG) as f32 * grey.scale();
@@ -164,27 +164,29 @@ fn draw_scale(
     left.min(at[0])
 }
 
-/// Arrows to the north, which is the longer one, and to the east.
+/// Draws arrows to the north (the longer one) and to the east.
 fn draw_compass(canvas: &mut Canvas, centre: [f32; 2], found: &Identification) {
+    /// Length of the arrow to the north.
+    const ARROW: f32 = 20.0;
     let arrows = north_and_east(found)
         .into_iter()
         .zip([("N", 1.0, Colour::WHITE), ("E", 0.75, Colour::DIM)]);
     for ([dx, dy], (letter, length, colour)) in arrows {
-        let reach = |far: f32, aside: f32| {
-            let (far, aside) = (far * canvas.unit, aside * canvas.unit);
+        let point = |along: f32, aside: f32| {
+            let (along, aside) = (along * canvas.unit, aside * canvas.unit);
             [
-                centre[0] + far * dx - aside * dy,
-                centre[1] + far * dy + aside * dx,
+                centre[0] + along * dx - aside * dy,
+                centre[1] + along * dy + aside * dx,
             ]
         };
         let tip = length * ARROW;
-        let arrow = [reach(0.0, 0.0), reach(tip, 0.0)];
+        let arrow = [point(0.0, 0.0), point(tip, 0.0)];
         let head = [
-            reach(tip - 6.0, 3.5),
-            reach(tip, 0.0),
-            reach(tip - 6.0, -3.5),
+            point(tip - 6.0, 3.5),
+            point(tip, 0.0),
+            point(tip - 6.0, -3.5),
         ];
-        let middle = reach(tip + 8.0, 0.0);
+        let middle = point(tip + 8.0, 0.0);
         canvas.line(&arrow, 1.5, colour);
         canvas.line(&head, 1.5, colour);
         let size = LETTERS - 2.0;
@@ -196,7 +198,28 @@ fn draw_compass(canvas: &mut Canvas, centre: [f32; 2], found: &Identification) {
     }
 }
 
-/// The text, or as much of it as goes into this width, in units.
+/// Directions of north and east at the frame's centre: unit vectors, y down.
+pub(super) fn north_and_east(identification: &Identification) -> [[f32; 2]; 2] {
+    let (boresight, _) = identification.icrs_to_camera.boresight_and_up();
+    let (east, north) = boresight.east_north();
+    [north, east].map(|axis| {
+        let along = identification.icrs_to_camera.matrix() * axis;
+        let x = if identification.camera.mirrored {
+            -along.x
+        } else {
+            along.x
+        };
+        let length = x.hypot(along.y);
+        [(x / length) as f32, (along.y / length) as f32]
+    })
+}
+
+/// Length of an angle across the centre, in pixels of the frame.
+fn length_px(camera: &CameraModel, angle_rad: f64) -> f64 {
+    2.0 * camera.focal_length_px * (angle_rad / 2.0).tan()
+}
+
+/// `text` cut to this width, in units.
 fn shortened(text: &str, width: f32) -> String {
     if text_width(text, LETTERS) <= width {
         return text.to_owned();

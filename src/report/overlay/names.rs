@@ -1,4 +1,4 @@
-//! What is written beside a star.
+//! The label of a star: its name and magnitude.
 
 use crate::sky::catalog::{Catalog, StarIndex};
 
@@ -32,7 +32,7 @@ const GREEK: [(&str, char); 24] = [
 
 const SUPERSCRIPTS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
 
-/// The star's name, else its number, and its V magnitude: `α CMa −1.4`.
+/// The star's name, or its number, and its V magnitude: `α CMa −1.4`.
 pub(super) fn label(catalog: &Catalog, star: StarIndex) -> String {
     let name = match catalog.name_of(star) {
         Some(name) => short(name),
@@ -43,7 +43,8 @@ pub(super) fn label(catalog: &Catalog, star: StarIndex) -> String {
     format!("{name} {}", v_mag.replace('-', "−"))
 }
 
-/// The Bayer letter in Greek, else the Flamsteed number, and the constellation: `9 alp CMa` is `α CMa`.
+/// The Bayer letter in Greek, or the Flamsteed number, with the constellation: `9 alp CMa` is `α
+/// CMa`.
 fn short(name: &str) -> String {
     let words: Vec<&str> = name.split_whitespace().collect();
     let greek = |word: &str| {

@@ -1,11 +1,14 @@
-//! Pictures of drawn frames, looked at where something must be.
+//! Tests of pictures of drawn frames.
 
+use super::canvas::Colour;
 use super::*;
 use crate::base::coords::{PixelPoint, Rotation, UnitVector};
 use crate::base::units::RAD_PER_DEG;
+use crate::camera::CameraModel;
 use crate::detect::DetectionFlags;
-use crate::identify::{SearchFailure, SourceIndex, StarMatch};
-use crate::pipeline::{Background, Measured, Outcome, Reason, Timing};
+use crate::identify::{Identification, SearchFailure, SourceIndex, StarMatch};
+use crate::pipeline::{Background, Measured, Outcome, Reason, Source};
+use crate::report::sample;
 use crate::sky::catalog::StarIndex;
 use nalgebra::Matrix3;
 
@@ -37,31 +40,21 @@ fn solution(width: usize, height: usize, outcome: Outcome) -> Solution {
     };
     let star = DetectionFlags::default();
     Solution {
-        width,
-        height,
-        date: None,
         sources: vec![
             source(200.0, 300.0, star),
             source(500.0, 400.0, star),
             source(700.0, 100.0, hot),
         ],
-        observation: None,
-        photometry: None,
-        comparison: None,
-        gain_e_per_adu: None,
-        calibration: None,
-        exposure_s: None,
-        notes: Vec::new(),
         background: Some(Background {
             level_adu: 55.0,
             noise_adu: 2.9,
         }),
-        outcome,
-        timing: Timing::default(),
+        ..sample::solution(width, height, outcome)
     }
 }
 
-/// Looks north-east-wise at RA 80°, Dec 30° with image-up at the position angle `up_deg`; the first source is Sirius.
+/// An identification at RA 80°, Dec 30° with image-up at the position angle `up_deg`; the first
+/// source is Sirius.
 fn identified(up_deg: f64, mirrored: bool) -> Outcome {
     let boresight = UnitVector::from_ra_dec(80.0 * RAD_PER_DEG, 30.0 * RAD_PER_DEG);
     Outcome::Identified(Box::new(Identification {
@@ -86,7 +79,7 @@ fn not_identified() -> Outcome {
     }))
 }
 
-/// Pixels of just this colour within a square round (x, y).
+/// Number of pixels of about this colour within a square around (x, y).
 fn count(picture: &RgbImage, colour: Colour, [x, y]: [u32; 2], reach: u32) -> usize {
     let columns = x - reach..=x + reach;
     let rows = y - reach..=y + reach;
@@ -164,7 +157,7 @@ fn north_and_east_are_where_the_camera_sees_them() {
         (90.0, true, left, up),
     ] {
         let solution = solution(WIDTH, HEIGHT, identified(up_deg, mirrored));
-        let [n, e] = north_and_east(identification(&solution).unwrap());
+        let [n, e] = legend::north_and_east(solution.outcome.identification().unwrap());
         assert!(
             close(n, north) && close(e, east),
             "{up_deg} {mirrored}: {n:?} {e:?}"

@@ -1,12 +1,12 @@
-//! The identified frame's coordinates as a FITS header: for every program that reads WCS.
+//! How do pixels map to the sky? The identified frame's coordinates as a FITS header (WCS).
 //!
-//! [`Solution`] → a primary header without data, as astrometry.net writes its `.wcs` files: cards of 80
-//! characters, filled up to blocks of 2880 bytes.
+//! [`Solution`] → a primary header without data, like the `.wcs` files of astrometry.net: cards of
+//! 80 characters in blocks of 2880 bytes
 //!
-//! Conventions: those of FITS. The centre of the first pixel is (1, 1); `CRPIX` is the frame's centre, `CRVAL`
-//! the boresight, `CD` in degrees a pixel. A mirrored frame has a `CD` matrix of the other sign. A distortion
-//! is written in SIP form: `A`, `B` from what is observed to what a pinhole would show, exactly; `AP`, `BP`
-//! back, fitted over the frame, with their largest error beside them.
+//! Conventions are those of FITS. The centre of the first pixel is (1, 1). `CRPIX` is the frame's
+//! centre, `CRVAL` the boresight, `CD` in degrees per pixel; the determinant of `CD` has the other
+//! sign for a mirrored frame. A distortion is written in SIP form: `A` and `B` from observed to
+//! ideal (pinhole) offsets, exact; `AP` and `BP` back, fitted over the frame.
 //!
 //! # Reference
 //! Calabretta & Greisen 2002, A&A 395, 1077 (`TAN`); Shupe et al. 2005, ASP Conf. 347, 491 (SIP);
@@ -15,20 +15,19 @@
 mod sip;
 
 use crate::base::coords::{Camera, Icrs, Rotation};
-use crate::base::units::DEG_PER_RAD;
+use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::camera::CameraModel;
 use crate::frame::FitsHeader;
 use crate::identify::Identification;
-use crate::pipeline::Outcome;
-use crate::pipeline::Solution;
+use crate::pipeline::{Outcome, Solution};
 use memchr::memmem;
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, RowVector2, Vector3};
 use sip::{Polynomial, Sip};
 
-/// The beginning of the history that each header has.
+/// Start of the history that each header has.
 const SOLVED_BY: &str = "Solved by starpipe";
 
-/// The header of the frame called `frame`; `None` where its stars are not identified.
+/// The header of the frame named `frame`; `None` where it is not identified.
 pub fn header(frame: &str, solution: &Solution) -> Option<Vec<u8>> {
     let Outcome::Identified(identification) = &solution.outcome else {
         return None;
@@ -54,12 +53,12 @@ pub fn header(frame: &str, solution: &Solution) -> Option<Vec<u8>> {
     Some(header.to_bytes())
 }
 
-/// Whether `file` is a header made by [`header`].
+/// Whether `file` is a header written by [`header`].
 pub fn is_header(file: &[u8]) -> bool {
     file.starts_with(b"SIMPLE  =") && memmem::find(file, SOLVED_BY.as_bytes()).is_some()
 }
 
-/// Adds what leads from pixels to the sky, of a `camera` of this attitude.
+/// Adds the mapping from pixels to the sky, for a `camera` in this attitude.
 pub fn add_projection(
     header: &mut FitsHeader,
     camera: &CameraModel,
@@ -106,31 +105,26 @@ pub fn add_projection(
 fn add_errors(header: &mut FitsHeader, identification: &Identification) {
     let (east, north) = sky_axes(&identification.icrs_to_camera);
     let [sigma_x, sigma_y, _] = identification.attitude_sigma_rad();
-    // A turn about x moves the boresight along y, and the other way round.
+    // A rotation about x moves the boresight along y, and one about y along x.
     for (keyword, axis) in [("CRDER1", east), ("CRDER2", north)] {
         let sigma_rad = (axis[0] * sigma_y).hypot(axis[1] * sigma_x);
-        header.real(
-            keyword,
-            sigma_rad * DEG_PER_RAD,
-            "standard error of the centre",
-        );
+        let sigma_deg = sigma_rad * DEG_PER_RAD;
+        header.real(keyword, sigma_deg, "standard error of the centre");
     }
 }
 
-/// How far east and north lies what lies one unit along the camera's x and y.
-fn sky_axes(
-    icrs_to_camera: &Rotation<Icrs, Camera>,
-) -> (nalgebra::RowVector2<f64>, nalgebra::RowVector2<f64>) {
+/// East and north components of the camera's x and y axes at the centre.
+fn sky_axes(icrs_to_camera: &Rotation<Icrs, Camera>) -> (RowVector2<f64>, RowVector2<f64>) {
     let (boresight, _) = icrs_to_camera.boresight_and_up();
     let (east, north) = boresight.east_north();
-    let along = |axis: nalgebra::Vector3<f64>| {
+    let along = |axis: Vector3<f64>| {
         let in_camera = icrs_to_camera.matrix() * axis;
-        nalgebra::RowVector2::new(in_camera.x, in_camera.y)
+        RowVector2::new(in_camera.x, in_camera.y)
     };
     (along(east), along(north))
 }
 
-/// From offsets in the file to offsets along the camera's axes.
+/// Converts offsets in the file to offsets along the camera's axes.
 fn mirror(camera: &CameraModel) -> Matrix2<f64> {
     let x = if camera.mirrored { -1.0 } else { 1.0 };
     Matrix2::new(x, 0.0, 0.0, 1.0)
@@ -161,7 +155,7 @@ fn add_history(
     let camera = &identification.camera;
     let sigma = identification
         .attitude_sigma_rad()
-        .map(|sigma_rad| sigma_rad * crate::base::units::ARCSEC_PER_RAD);
+        .map(|sigma_rad| sigma_rad * ARCSEC_PER_RAD);
     let matched = identification.matches.len();
     let lines = [
         format!("{SOLVED_BY} {}", env!("CARGO_PKG_VERSION")),

@@ -1,19 +1,19 @@
-//! A lens distortion as SIP polynomials in pixel offsets.
+//! Lens distortion as SIP polynomials of pixel offsets.
 
 use crate::base::coords::PixelPoint;
 use crate::camera::{CameraModel, Distortion};
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
-/// The highest order of the inverse: keywords have one digit for each power.
+/// Highest order of the inverse; keywords have one digit per power.
 const MAX_INVERSE_ORDER: usize = 9;
-/// The inverse is good enough where it is off by less than this many pixels everywhere on the frame.
+/// Largest accepted error of the inverse on the frame, in pixels.
 const INVERSE_TOLERANCE_PX: f64 = 1e-3;
-/// The inverse is fitted on so many points a side, which lie closer towards the borders, ...
+/// Points per side on which the inverse is fitted, denser towards the borders.
 const FIT_POINTS: usize = 24;
-/// ... as far as this beyond the frame's border, in units of its half side.
+/// How far the points reach, in units of the frame's half side.
 const FIT_REACH: f64 = 1.02;
 
-/// A polynomial in two offsets, in pixels.
+/// A polynomial of two offsets, in pixels.
 #[derive(Debug, Clone)]
 pub(super) struct Polynomial {
     pub(super) order: usize,
@@ -27,7 +27,7 @@ fn powers(order: usize) -> impl Iterator<Item = (usize, usize)> {
 }
 
 impl Polynomial {
-    /// The powers of the first and the second offset, and the coefficient of each term.
+    /// Both powers and the coefficient of each term.
     pub(super) fn terms(&self) -> impl Iterator<Item = (usize, usize, f64)> {
         powers(self.order)
             .zip(&self.coefficients)
@@ -41,13 +41,13 @@ impl Polynomial {
     }
 }
 
-/// A distortion as FITS writes it.
+/// A distortion in SIP form.
 ///
-/// SIP keeps terms of first order out of its polynomials: with observed offsets U in the file's own
-/// directions, ideal offset = `linear` (U + `forward`(U)).
+/// SIP polynomials have no terms of first order: with observed offsets U in the file's axes, ideal
+/// offset = `linear` (U + `forward`(U)).
 #[derive(Debug, Clone)]
 pub(super) struct Sip {
-    /// What the linear part of the distortion does, to be multiplied into `CD`.
+    /// The linear part of the distortion, a factor of `CD`.
     pub(super) linear: Matrix2<f64>,
     /// `A` and `B`.
     pub(super) forward: [Polynomial; 2],
@@ -68,7 +68,7 @@ impl Sip {
     }
 }
 
-/// The terms of the distortion by their powers, the linear ones apart.
+/// Splits the distortion into its linear part and the polynomials of higher order.
 fn expand(distortion: &Distortion, mirrored: bool) -> (Matrix2<f64>, [Polynomial; 2]) {
     let order = distortion.model().order();
     let sign: f64 = if mirrored { -1.0 } else { 1.0 };
@@ -77,20 +77,20 @@ fn expand(distortion: &Distortion, mirrored: bool) -> (Matrix2<f64>, [Polynomial
     let mut higher = vec![Vector2::zeros(); count];
     for (p, q, along) in distortion.monomials() {
         let scale = distortion.radius_px().powi((p + q) as i32);
-        // Reversed x: u changes its sign as a variable, and as a result.
+        // With x reversed, u changes sign as a variable and as a result.
         let flip = sign * sign.powi(p as i32);
-        let turned = Vector2::new(along[0] * flip, along[1] * sign.powi(p as i32)) / scale;
+        let flipped = Vector2::new(along[0] * flip, along[1] * sign.powi(p as i32)) / scale;
         match (p, q) {
-            (1, 0) => linear.set_column(0, &(linear.column(0) + turned)),
-            (0, 1) => linear.set_column(1, &(linear.column(1) + turned)),
+            (1, 0) => linear.set_column(0, &(linear.column(0) + flipped)),
+            (0, 1) => linear.set_column(1, &(linear.column(1) + flipped)),
             _ => {
                 if let Some(place) = powers(order).position(|powers| powers == (p, q)) {
-                    higher[place] += turned;
+                    higher[place] += flipped;
                 }
             }
         }
     }
-    // Close to one: lenses do not fold the image.
+    // `linear` is close to the identity: lenses do not fold the image.
     let inverse = linear.try_inverse().unwrap_or_else(Matrix2::identity);
     let polynomial = |axis: usize| Polynomial {
         order,
@@ -99,7 +99,7 @@ fn expand(distortion: &Distortion, mirrored: bool) -> (Matrix2<f64>, [Polynomial
     (linear, [polynomial(0), polynomial(1)])
 }
 
-/// The polynomials that undo `forward` over the frame, of the lowest order that is good enough.
+/// The inverse of `forward` over the frame, of the lowest order that is accurate enough.
 fn invert(forward: &[Polynomial; 2], camera: &CameraModel) -> [Polynomial; 2] {
     let half = [camera.width_px / 2.0, camera.height_px / 2.0];
     let points = points(half);
@@ -131,7 +131,7 @@ fn invert(forward: &[Polynomial; 2], camera: &CameraModel) -> [Polynomial; 2] {
     best.map_or_else(|| forward.clone(), |(_, inverse)| inverse)
 }
 
-/// Offsets on the frame, closer towards its borders, where polynomials are worst.
+/// Offsets on the frame, denser towards its borders, where polynomials are worst.
 fn points(half: [f64; 2]) -> Vec<[f64; 2]> {
     let node = |i: usize| {
         let angle = (i as f64 + 0.5) / FIT_POINTS as f64 * std::f64::consts::PI;
@@ -143,7 +143,7 @@ fn points(half: [f64; 2]) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// Least squares: polynomials of the ideal offsets that give the shift back to the observed ones.
+/// Fits by least squares the polynomials of ideal offsets that give the shift to observed ones.
 fn fit(
     order: usize,
     observed: &[[f64; 2]],
@@ -151,7 +151,7 @@ fn fit(
     radius_px: f64,
 ) -> Option<[Polynomial; 2]> {
     let terms: Vec<(usize, usize)> = powers(order).collect();
-    // In units of the radius, so that high powers stay near one.
+    // In units of the radius, so that high powers stay of order one.
     let design = DMatrix::from_fn(ideal.len(), terms.len(), |row, column| {
         let ([u, v], (p, q)) = (ideal[row], terms[column]);
         (u / radius_px).powi(p as i32) * (v / radius_px).powi(q as i32)

@@ -1,16 +1,16 @@
-//! The header against the camera that it was made from, read by an evaluator of its own: cards, SIP
-//! polynomials, and the gnomonic projection by the formulas of Calabretta & Greisen 2002.
+//! Tests of the header against its camera, with an independent evaluator of cards, SIP polynomials
+//! and the gnomonic projection (formulas of Calabretta & Greisen 2002).
 
 use super::*;
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::{Distortion, DistortionModel};
-use crate::pipeline::Timing;
+use crate::report::sample;
 use nalgebra::Matrix3;
 use proptest::prelude::*;
 use std::collections::HashMap;
 
-/// Agreement asked for, in pixels.
+/// Required agreement, in pixels.
 const FORWARD_TOLERANCE_PX: f64 = 1e-5;
 const INVERSE_TOLERANCE_PX: f64 = 0.02;
 
@@ -29,7 +29,7 @@ fn cards(header: &[u8]) -> HashMap<String, String> {
         .collect()
 }
 
-/// What the test makes of a header.
+/// The evaluator of a header.
 struct Wcs(HashMap<String, String>);
 
 impl Wcs {
@@ -89,33 +89,23 @@ impl Wcs {
 }
 
 fn solution(camera: CameraModel, attitude: Rotation<Icrs, Camera>) -> Solution {
-    Solution {
-        width: camera.width_px as usize,
-        height: camera.height_px as usize,
-        date: None,
-        sources: Vec::new(),
-        observation: None,
-        photometry: None,
-        comparison: None,
-        gain_e_per_adu: None,
-        calibration: None,
-        exposure_s: None,
-        notes: Vec::new(),
-        background: None,
-        outcome: Outcome::Identified(Box::new(Identification {
-            camera,
-            icrs_to_camera: attitude,
-            attitude_covariance_rad2: Matrix3::from_diagonal(&[1e-10, 4e-10, 9e-10].into()),
-            focal_length_sigma_px: 0.1,
-            matches: Vec::new(),
-            rms_px: 0.1,
-            log10_false_alarm: -50.0,
-        })),
-        timing: Timing::default(),
-    }
+    let identification = Identification {
+        camera,
+        icrs_to_camera: attitude,
+        attitude_covariance_rad2: Matrix3::from_diagonal(&[1e-10, 4e-10, 9e-10].into()),
+        focal_length_sigma_px: 0.1,
+        matches: Vec::new(),
+        rms_px: 0.1,
+        log10_false_alarm: -50.0,
+    };
+    sample::solution(
+        camera.width_px as usize,
+        camera.height_px as usize,
+        Outcome::Identified(Box::new(identification)),
+    )
 }
 
-/// Directions in which there is something to get wrong, among any others.
+/// Pointings, with more than their share of poles and of right ascensions near 0° and 180°.
 fn pointing() -> impl Strategy<Value = (f64, f64)> {
     prop_oneof![
         4 => (0.0..360.0_f64, -90.0..90.0_f64),
@@ -139,7 +129,7 @@ fn camera() -> impl Strategy<Value = CameraModel> {
             let radius_px = width.hypot(height) / 2.0;
             let mut camera = CameraModel::pinhole(width, height, focal * 2.0 * radius_px, mirrored);
             camera.distortion = model.map(|model| {
-                // Every term up to so much of the half diagonal, which is a poor lens.
+                // Each coefficient is at most this large: a poor lens.
                 let most_px = 0.02 * radius_px / (model.terms() as f64).sqrt();
                 let c = coefficients[..model.terms()].iter().map(|c| c * most_px);
                 Distortion::new(model, radius_px, &c.collect::<Vec<f64>>())

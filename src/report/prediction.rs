@@ -1,58 +1,16 @@
-//! What the camera should have seen, beside what it saw.
+//! The prediction for the stated camera, and the comparison with it.
 
 use super::build::{AIRMASS_DECIMALS, HORIZON_DECIMALS};
+use super::frame_report::{FrameReport, MagnitudeReport, PredictionReport, StarReport};
 use super::text::labelled;
-use super::{FrameReport, MagnitudeReport, StarReport};
 use crate::base::format::{finite, significant, to_decimals};
 use crate::base::statistics::Estimate;
 use crate::photometry::comparison::Comparison;
-use serde::Serialize;
 
 /// Decimals of a magnitude.
 const MAG_DECIMALS: i32 = 3;
 /// Significant digits of a charge.
 const CHARGE_DIGITS: i32 = 5;
-
-/// What the sensitivity model makes of the camera, the exposure, and the frame's own sky.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct PredictionReport {
-    /// What the camera is called.
-    pub camera: String,
-    /// Exposure, in seconds.
-    pub exposure_s: f64,
-    /// Zenith distance that was reckoned with, in degrees.
-    pub zenith_distance_deg: f64,
-    /// Whether it is known, and not just taken for 0.
-    pub zenith_distance_known: bool,
-    /// Airmass that was reckoned with.
-    pub airmass: f64,
-    /// V magnitude at which the detector finds half of the stars.
-    pub limit50_vmag: Option<f64>,
-    /// V magnitude at which it finds nine in ten.
-    pub limit90_vmag: Option<f64>,
-    /// V magnitude at which half of the stars have a brightest pixel that stands out by a signal-to-noise ratio of 6.
-    pub peak_limit50_vmag: Option<f64>,
-    /// Stars of the catalogue in the field that should be found.
-    pub stars_expected: Option<f64>,
-    /// V magnitude of a star that should give one ADU a second, of the B−V for which the measured zero point holds.
-    pub zero_point_vmag: Option<f64>,
-    /// The measured zero point minus that.
-    pub zero_point_difference_mag: Option<f64>,
-    /// Its standard error.
-    pub zero_point_difference_sigma_mag: Option<f64>,
-    /// V magnitude of the sky in a square arcsecond, as seen from the ground, with the camera's throughput.
-    pub sky_camera_mag_arcsec2: Option<f64>,
-    /// The same with the measured zero point: by the stars in the frame.
-    pub sky_mag_arcsec2: Option<f64>,
-    /// Its standard error, that of the zero point.
-    pub sky_sigma_mag: Option<f64>,
-    /// Electrons of the sky in a pixel.
-    pub background_e: Option<f64>,
-    /// Noise of a pixel without a star, in electrons.
-    pub background_noise_e: Option<f64>,
-    /// Noise of the sensor in it: dark current, reading, rounding.
-    pub sensor_noise_e: Option<f64>,
-}
 
 fn value(estimate: Option<Estimate>) -> Option<f64> {
     estimate.and_then(|e| finite(e.value, MAG_DECIMALS))
@@ -63,10 +21,10 @@ fn sigma(estimate: Option<Estimate>) -> Option<f64> {
 }
 
 impl PredictionReport {
-    pub(super) fn new(compared: &Comparison) -> Self {
+    fn new(comparison: &Comparison) -> Self {
         let mag = |value: f64| finite(value, MAG_DECIMALS);
         let charge = |electrons: f64| significant(electrons, CHARGE_DIGITS);
-        let (scenario, budget) = (&compared.scenario, &compared.budget);
+        let (scenario, budget) = (&comparison.scenario, &comparison.budget);
         Self {
             camera: scenario.camera.name.clone(),
             exposure_s: scenario.conditions.exposure_s,
@@ -74,25 +32,25 @@ impl PredictionReport {
                 scenario.conditions.zenith_distance_deg,
                 HORIZON_DECIMALS,
             ),
-            zenith_distance_known: compared.zenith_is_known,
+            zenith_distance_known: comparison.zenith_is_known,
             airmass: to_decimals(budget.airmass, AIRMASS_DECIMALS),
-            limit50_vmag: mag(compared.limit_vmag),
-            limit90_vmag: mag(compared.limit90_vmag),
-            peak_limit50_vmag: mag(compared.peak_limit_vmag),
-            stars_expected: compared.faintest.and_then(|f| charge(f.stars_found)),
-            zero_point_vmag: mag(compared.zero_point_vmag),
-            zero_point_difference_mag: value(compared.zero_point_difference_mag),
-            zero_point_difference_sigma_mag: sigma(compared.zero_point_difference_mag),
-            sky_camera_mag_arcsec2: compared.sky_camera_mag_arcsec2.and_then(mag),
-            sky_mag_arcsec2: value(compared.sky_mag_arcsec2),
-            sky_sigma_mag: sigma(compared.sky_mag_arcsec2),
+            limit50_vmag: mag(comparison.limit_vmag),
+            limit90_vmag: mag(comparison.limit90_vmag),
+            peak_limit50_vmag: mag(comparison.peak_limit_vmag),
+            stars_expected: comparison.faintest.and_then(|f| charge(f.stars_found)),
+            zero_point_vmag: mag(comparison.zero_point_vmag),
+            zero_point_difference_mag: value(comparison.zero_point_difference_mag),
+            zero_point_difference_sigma_mag: sigma(comparison.zero_point_difference_mag),
+            sky_camera_mag_arcsec2: comparison.sky_camera_mag_arcsec2.and_then(mag),
+            sky_mag_arcsec2: value(comparison.sky_mag_arcsec2),
+            sky_sigma_mag: sigma(comparison.sky_mag_arcsec2),
             background_e: charge(budget.background_e),
             background_noise_e: charge(budget.background_noise_e),
             sensor_noise_e: charge(budget.sensor_noise_e),
         }
     }
 
-    /// Lines of the report for people.
+    /// The lines of the text report.
     pub(super) fn lines(&self, magnitude: Option<&MagnitudeReport>) -> Vec<String> {
         let known = if self.zenith_distance_known {
             ""
@@ -155,25 +113,25 @@ fn difference(mag: f64, sigma: Option<f64>) -> String {
 }
 
 impl FrameReport {
-    /// Adds what `compared` says.
-    pub(super) fn add_comparison(&mut self, compared: &Comparison) {
-        self.prediction = Some(PredictionReport::new(compared));
+    /// Adds the prediction, and the differences from it.
+    pub(super) fn add_comparison(&mut self, comparison: &Comparison) {
+        self.prediction = Some(PredictionReport::new(comparison));
         let Some(magnitude) = &mut self.magnitude else {
             return;
         };
         let mag = |value: f64| finite(value, MAG_DECIMALS);
-        magnitude.predicted_limit_vmag = mag(compared.limit_vmag);
-        magnitude.difference_mag = mag(magnitude.faintest_vmag - compared.limit_vmag);
-        magnitude.expected_faintest_vmag = compared.faintest.and_then(|f| mag(f.mean_vmag));
-        magnitude.expected_faintest_sigma_mag = compared.faintest.and_then(|f| mag(f.sigma_mag));
-        magnitude.faintest_difference_mag = value(compared.faintest_difference_mag);
-        magnitude.limit_difference_mag = value(compared.limit_difference_mag);
-        magnitude.limit_difference_sigma_mag = sigma(compared.limit_difference_mag);
+        magnitude.predicted_limit_vmag = mag(comparison.limit_vmag);
+        magnitude.difference_mag = mag(magnitude.faintest_vmag - comparison.limit_vmag);
+        magnitude.expected_faintest_vmag = comparison.faintest.and_then(|f| mag(f.mean_vmag));
+        magnitude.expected_faintest_sigma_mag = comparison.faintest.and_then(|f| mag(f.sigma_mag));
+        magnitude.faintest_difference_mag = value(comparison.faintest_difference_mag);
+        magnitude.limit_difference_mag = value(comparison.limit_difference_mag);
+        magnitude.limit_difference_sigma_mag = sigma(comparison.limit_difference_mag);
     }
 }
 
 impl StarReport {
-    /// Adds the light in electrons.
+    /// Adds flux and peak in electrons.
     pub(super) fn add_electrons(&mut self, gain_e_per_adu: f64) {
         let electrons = |adu: f64| significant(adu * gain_e_per_adu, CHARGE_DIGITS + 1);
         self.flux_e = self.flux.and_then(electrons);

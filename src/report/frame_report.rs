@@ -1,0 +1,383 @@
+//! The report of a frame: its fields, as JSON has them.
+
+use crate::identify::DateSource;
+use serde::Serialize;
+
+/// Version of the JSON described here.
+pub const SCHEMA: u32 = 1;
+
+/// The report of one frame.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FrameReport {
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// Name of the frame, usually a path.
+    pub frame: String,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Date of the frame, if known; otherwise star positions are those of J2000.0.
+    pub date: Option<DateReport>,
+    /// The frame's centre in the observer's sky, where the frame is identified, and site and time
+    /// of day are known.
+    pub observation: Option<ObservationReport>,
+    /// Exposure in seconds, if known.
+    pub exposure_s: Option<f64>,
+    /// What is odd about the frame, its header, or the priors: one sentence each.
+    pub notes: Vec<String>,
+    /// Whether the stars are identified.
+    pub status: Status,
+    /// Why they are not identified, and what may help.
+    pub reason: Option<String>,
+    /// Code of the reason, see [`Reason::code`](crate::pipeline::Reason::code).
+    pub reason_code: Option<&'static str>,
+    /// The attitude of the camera.
+    pub attitude: Option<AttitudeReport>,
+    /// The fitted camera.
+    pub optics: Option<OpticsReport>,
+    /// Quality of the identification.
+    #[serde(rename = "match")]
+    pub matched: Option<MatchReport>,
+    /// The faintest star, compared with the prediction.
+    pub magnitude: Option<MagnitudeReport>,
+    /// Zero point and completeness; `None` for lists of centroids.
+    pub photometry: Option<PhotometryReport>,
+    /// The prediction for the stated camera, where there is one and the exposure is known.
+    pub prediction: Option<PredictionReport>,
+    /// The calibration that was applied, if any.
+    pub calibration: Option<CalibrationReport>,
+    /// The sky background.
+    pub background: BackgroundReport,
+    /// Every detection, brightest first.
+    pub stars: Vec<StarReport>,
+    /// Run times.
+    pub timing_ms: TimingReport,
+}
+
+/// The files of the applied calibration.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CalibrationReport {
+    /// The dark that was subtracted.
+    pub dark: Option<String>,
+    /// The flat by which the frame was divided.
+    pub flat: Option<String>,
+    /// The list of hot pixels, which were masked.
+    pub hot_pixels: Option<String>,
+}
+
+/// The date of a frame.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DateReport {
+    /// ISO 8601, in UTC; only the day where the time is not known.
+    pub iso: String,
+    /// Julian epoch, in years.
+    pub year: f64,
+    /// `option`, `file header` or `file name`.
+    pub source: DateSource,
+}
+
+/// The frame's centre in the observer's sky.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ObservationReport {
+    /// The site.
+    pub site: SiteReport,
+    /// True zenith distance, without refraction, in degrees.
+    pub zenith_distance_deg: f64,
+    /// Zenith distance with refraction, in degrees; `None` below the horizon.
+    pub apparent_zenith_distance_deg: Option<f64>,
+    /// Azimuth from north through east, in degrees, in [0, 360).
+    pub azimuth_deg: f64,
+    /// Airmass; `None` below the horizon.
+    pub airmass: Option<f64>,
+}
+
+/// A site on the Earth.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SiteReport {
+    /// Geodetic latitude in degrees, north positive.
+    pub lat_deg: f64,
+    /// Longitude in degrees, east positive.
+    pub lon_deg: f64,
+    /// Height in metres.
+    pub height_m: f64,
+}
+
+/// Whether the stars of a frame are identified.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// Identified.
+    Identified,
+    /// Not identified.
+    NotIdentified,
+}
+
+/// The attitude of the camera.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AttitudeReport {
+    /// Right ascension of the frame's centre, in degrees, in [0, 360).
+    pub ra_deg: f64,
+    /// Declination of the frame's centre, in degrees.
+    pub dec_deg: f64,
+    /// Position angle of image-up at the centre, from north through east, in degrees, in (−180,
+    /// 180].
+    pub up_pa_deg: f64,
+    /// [w, x, y, z], w ≥ 0; rotates ICRS vectors into camera axes.
+    pub quaternion: [f64; 4],
+    /// Standard errors of the attitude.
+    pub sigma_arcsec: AttitudeSigma,
+}
+
+/// Standard errors of the attitude, as small rotations about the camera's axes, in arcseconds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AttitudeSigma {
+    /// About the image's x axis (moves the boresight along y).
+    pub x: f64,
+    /// About the image's y axis (moves the boresight along x).
+    pub y: f64,
+    /// About the boresight.
+    pub roll: f64,
+}
+
+/// The fitted camera.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OpticsReport {
+    /// Angle between the middles of the left and right borders, in degrees.
+    pub fov_x_deg: f64,
+    /// Angle between the middles of the upper and lower borders, in degrees.
+    pub fov_y_deg: f64,
+    /// Focal length over pixel pitch.
+    pub focal_length_px: f64,
+    /// Standard error of the focal length, in pixels.
+    pub focal_length_sigma_px: Option<f64>,
+    /// Whether the image is a mirror image of the sky.
+    pub mirrored: bool,
+    /// Distortion, where it is significant.
+    pub distortion: Option<DistortionReport>,
+}
+
+/// Distortion, as [`Distortion`](crate::camera::Distortion) defines it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DistortionReport {
+    /// Name of the [`DistortionModel`](crate::camera::DistortionModel).
+    pub model: &'static str,
+    /// Radius at which a normalised offset is 1, in pixels.
+    pub radius_px: f64,
+    /// Largest displacement at that radius, in pixels.
+    pub largest_px: f64,
+    /// The coefficients in pixels, in the model's order.
+    pub coefficients_px: Vec<f64>,
+}
+
+/// Quality of the identification.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MatchReport {
+    /// Number of detections.
+    pub detected: usize,
+    /// Number of detections identified with a catalogue star.
+    pub matched: usize,
+    /// Root mean square distance between observed and predicted position, in pixels.
+    pub rms_px: f64,
+    /// The same on the sky, in arcseconds.
+    pub rms_arcsec: f64,
+    /// log10 of the false-alarm probability.
+    pub log10_false_alarm: f64,
+}
+
+/// The faintest identified star, compared with the prediction.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct MagnitudeReport {
+    /// Johnson V of the faintest identified star.
+    pub faintest_vmag: f64,
+    /// Its catalogue number.
+    pub faintest_id: String,
+    /// Johnson V at which the stated camera should find half of the stars.
+    pub predicted_limit_vmag: Option<f64>,
+    /// Faintest star minus that limit. Not a comparison of like with like: the faintest of many
+    /// stars lies beyond the limit.
+    pub difference_mag: Option<f64>,
+    /// Johnson V of the expected faintest star among those in the field.
+    pub expected_faintest_vmag: Option<f64>,
+    /// Standard deviation of that expectation.
+    pub expected_faintest_sigma_mag: Option<f64>,
+    /// Faintest identified star minus the expected one; its standard error is that standard
+    /// deviation.
+    pub faintest_difference_mag: Option<f64>,
+    /// Measured minus predicted limit (where half of the stars are found).
+    pub limit_difference_mag: Option<f64>,
+    /// Its standard error, from the measurement.
+    pub limit_difference_sigma_mag: Option<f64>,
+}
+
+/// Zero point and completeness of a frame, see [`photometry`](crate::photometry).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PhotometryReport {
+    /// V magnitude of a star whose flux is 1 in `flux_unit`; `None` with too few stars.
+    pub zero_point_vmag: Option<f64>,
+    /// Its standard error.
+    pub zero_point_sigma_mag: Option<f64>,
+    /// `ADU/s` where the exposure is known, else `ADU`.
+    pub flux_unit: &'static str,
+    /// Robust standard deviation of a star about zero point and colour term.
+    pub scatter_mag: Option<f64>,
+    /// Number of stars of the zero point.
+    pub zero_point_stars: usize,
+    /// Their mean V magnitude.
+    pub zero_point_mean_vmag: Option<f64>,
+    /// B−V for which the zero point holds.
+    pub zero_point_bv_mag: Option<f64>,
+    /// Increase of V − instrumental magnitude per magnitude of B−V, where it is significant.
+    pub color_term: Option<f64>,
+    /// Its standard error.
+    pub color_term_sigma: Option<f64>,
+    /// Instrumental magnitudes per magnitude of V: 1 where grey levels are proportional to light.
+    pub linearity: Option<f64>,
+    /// Its standard error.
+    pub linearity_sigma: Option<f64>,
+    /// V magnitude at which half of the catalogue's stars are detected.
+    pub limit50_vmag: Option<f64>,
+    /// Its standard error.
+    pub limit50_sigma_mag: Option<f64>,
+    /// Width (standard deviation) of the fall of completeness.
+    pub limit50_width_mag: Option<f64>,
+    /// Share of much brighter stars that is not detected.
+    pub lost_share: Option<f64>,
+    /// Why there is no limit.
+    pub limit50_reason: Option<String>,
+    /// The completeness in bins of half a magnitude.
+    pub completeness: Vec<CompletenessReport>,
+}
+
+/// One bin of the completeness.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CompletenessReport {
+    /// V magnitude of its centre.
+    pub vmag: f64,
+    /// Number of single catalogue stars in the frame.
+    pub stars: usize,
+    /// Number of those that were detected.
+    pub detected: usize,
+}
+
+/// The prediction of the sensitivity model for the camera, the exposure, and the frame's own sky.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PredictionReport {
+    /// Name of the camera.
+    pub camera: String,
+    /// Exposure, in seconds.
+    pub exposure_s: f64,
+    /// Zenith distance used, in degrees.
+    pub zenith_distance_deg: f64,
+    /// Whether it is known and not assumed to be 0.
+    pub zenith_distance_known: bool,
+    /// Airmass used.
+    pub airmass: f64,
+    /// V magnitude at which the detector finds half of the stars.
+    pub limit50_vmag: Option<f64>,
+    /// V magnitude at which it finds 90 % of the stars.
+    pub limit90_vmag: Option<f64>,
+    /// V magnitude at which the brightest pixel of half of the stars has a signal-to-noise ratio of
+    /// 6.
+    pub peak_limit50_vmag: Option<f64>,
+    /// Expected number of catalogue stars found in the field.
+    pub stars_expected: Option<f64>,
+    /// Predicted V magnitude of a star that gives 1 ADU/s, of the B−V for which the measured zero
+    /// point holds.
+    pub zero_point_vmag: Option<f64>,
+    /// Measured minus predicted zero point.
+    pub zero_point_difference_mag: Option<f64>,
+    /// Its standard error.
+    pub zero_point_difference_sigma_mag: Option<f64>,
+    /// Sky brightness in V, seen from the ground, with the camera's throughput, per square
+    /// arcsecond.
+    pub sky_camera_mag_arcsec2: Option<f64>,
+    /// The same with the measured zero point, that is, from the stars in the frame.
+    pub sky_mag_arcsec2: Option<f64>,
+    /// Its standard error, that of the zero point.
+    pub sky_sigma_mag: Option<f64>,
+    /// Sky background in a pixel, in electrons.
+    pub background_e: Option<f64>,
+    /// Noise of a pixel without a star, in electrons.
+    pub background_noise_e: Option<f64>,
+    /// Part of it from the sensor: dark current, read noise, quantisation.
+    pub sensor_noise_e: Option<f64>,
+}
+
+/// The sky background, in the frame's own units.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct BackgroundReport {
+    /// Median background; `None` for a list of centroids.
+    pub level: Option<f64>,
+    /// Noise of one pixel (standard deviation).
+    pub noise: Option<f64>,
+}
+
+/// One detection and its star.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct StarReport {
+    /// Position to the right, in pixels.
+    pub x: f64,
+    /// Position downward, in pixels.
+    pub y: f64,
+    /// Standard error of `x`, in pixels.
+    pub sigma_x: Option<f64>,
+    /// Standard error of `y`, in pixels.
+    pub sigma_y: Option<f64>,
+    /// Flux above the background, in the frame's own units.
+    pub flux: Option<f64>,
+    /// Brightest pixel above the background, in the frame's own units.
+    pub peak: Option<f64>,
+    /// Flux in electrons, where a camera is stated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flux_e: Option<f64>,
+    /// Brightest pixel in electrons, where a camera is stated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_e: Option<f64>,
+    /// Flux over its standard error.
+    pub snr: Option<f64>,
+    /// Catalogue number of the star.
+    pub id: Option<String>,
+    /// Its name, if it has one.
+    pub name: Option<String>,
+    /// Its Johnson V magnitude.
+    pub vmag: Option<f64>,
+    /// Its right ascension (ICRS) at the frame's date, in degrees.
+    pub ra_deg: Option<f64>,
+    /// Its declination (ICRS) at the frame's date, in degrees.
+    pub dec_deg: Option<f64>,
+    /// Distance between observed and predicted position, in pixels.
+    pub residual_px: Option<f64>,
+    /// Flags of the detection: `saturated`, `hot_pixel`, `trail`, `extended`, `blended`, `border`.
+    pub flags: Vec<&'static str>,
+}
+
+/// Run time of each stage, in milliseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct TimingReport {
+    /// Reading and decoding the file.
+    pub read: f64,
+    /// Detecting and measuring the stars.
+    pub detect: f64,
+    /// Identifying them.
+    pub identify: f64,
+    /// Zero point and completeness.
+    pub photometry: f64,
+    /// All stages.
+    pub total: f64,
+}
+
+impl FrameReport {
+    /// The report as one line of JSON, without the line's end.
+    ///
+    /// # Errors
+    /// [`serde_json::Error`], which does not occur with these types.
+    pub fn to_json_line(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string(self)
+    }
+
+    /// Whether the stars are identified.
+    pub fn is_identified(&self) -> bool {
+        self.status == Status::Identified
+    }
+}

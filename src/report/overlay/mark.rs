@@ -1,0 +1,133 @@
+//! Detections as they are drawn.
+
+use super::canvas::Colour;
+use super::grey::Grey;
+use super::names;
+use crate::pipeline::{Solution, Source};
+use crate::sky::catalog::Catalog;
+
+/// Smallest and largest radius of a ring, in units of strokes.
+const RADIUS: (f32, f32) = (5.0, 15.0);
+
+/// Kind of a detection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Identified,
+    Unidentified,
+    NotAStar,
+}
+
+impl Kind {
+    /// The colours also differ in brightness, for colour-blind readers.
+    pub(super) fn colour(self) -> Colour {
+        match self {
+            Self::Identified => Colour([110, 240, 150]),
+            Self::Unidentified => Colour([255, 170, 60]),
+            Self::NotAStar => Colour([205, 85, 95]),
+        }
+    }
+
+    pub(super) fn stroke(self) -> f32 {
+        match self {
+            Self::Identified => 1.3,
+            Self::Unidentified => 1.1,
+            Self::NotAStar => 0.8,
+        }
+    }
+}
+
+/// A detection as it is drawn, in pixels of the picture.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Mark {
+    pub(super) x: f32,
+    pub(super) y: f32,
+    pub(super) radius: f32,
+    pub(super) kind: Kind,
+    /// Label and V magnitude of an identified star.
+    pub(super) label: Option<(String, f32)>,
+}
+
+/// The marks of all detections, brightest first.
+pub(super) fn marks(solution: &Solution, catalog: &Catalog, grey: &Grey) -> Vec<Mark> {
+    let mut catalog_star = vec![None; solution.sources.len()];
+    for star_match in solution
+        .outcome
+        .identification()
+        .iter()
+        .flat_map(|i| &i.matches)
+    {
+        if let Some(star) = catalog_star.get_mut(star_match.source.get()) {
+            *star = Some(star_match.star);
+        }
+    }
+    let rings = Rings::of(&solution.sources, grey);
+    let sources = solution.sources.iter().zip(catalog_star);
+    sources
+        .map(|(source, star)| {
+            let [x, y] = grey.position_of(&source.position);
+            let label = star.map(|index| {
+                let v_mag = catalog.star(index).v_mag;
+                (names::label(catalog, index), v_mag)
+            });
+            Mark {
+                x,
+                y,
+                radius: rings.radius(source),
+                kind: kind(source, label.is_some()),
+                label,
+            }
+        })
+        .collect()
+}
+
+fn kind(source: &Source, identified: bool) -> Kind {
+    let star_like = source.measured.is_none_or(|m| m.flags.is_star_like());
+    match (identified, star_like) {
+        (true, _) => Kind::Identified,
+        (false, true) => Kind::Unidentified,
+        (false, false) => Kind::NotAStar,
+    }
+}
+
+/// Radii of rings, in pixels of the picture.
+struct Rings {
+    /// The flux of the smallest ring.
+    flux: f64,
+    smallest: f32,
+    unit: f32,
+}
+
+impl Rings {
+    /// The radii for `sources`, brightest first.
+    fn of(sources: &[Source], grey: &Grey) -> Self {
+        /// Smallest radius in pixels of the frame: enlarged stars need larger rings.
+        const MIN_RADIUS_PX: f32 = 3.0;
+        /// In a crowd, the smallest ring is this share of the mean distance between stars, ...
+        const SHARE_OF_SPACING: f32 = 0.2;
+        /// ... but at least this share of its usual size.
+        const MIN_SHARE: f32 = 0.6;
+        /// Share of the detections that get larger rings than the smallest.
+        const LARGER_RINGS: f64 = 0.8;
+        let place = (sources.len() as f64 * LARGER_RINGS) as usize;
+        let area = (grey.width * grey.height) as f32;
+        let spacing = (area / sources.len().max(1) as f32).sqrt();
+        let usual = (RADIUS.0 * grey.stroke_unit()).max(MIN_RADIUS_PX * grey.scale());
+        Self {
+            flux: sources.get(place).and_then(|s| s.flux).unwrap_or(f64::NAN),
+            smallest: usual * (SHARE_OF_SPACING * spacing / usual).clamp(MIN_SHARE, 1.0),
+            unit: grey.stroke_unit(),
+        }
+    }
+
+    fn radius(&self, source: &Source) -> f32 {
+        /// What a magnitude adds, in units of strokes.
+        const PER_MAG: f32 = 1.1;
+        let above = source
+            .flux
+            .map_or(0.0, |flux| 2.5 * (flux / self.flux).log10());
+        // NaN gets the smallest ring.
+        let above = if above > 0.0 { above as f32 } else { 0.0 };
+        let most = (RADIUS.1 * self.unit).max(self.smallest);
+        (self.smallest + PER_MAG * self.unit * above).min(most)
+    }
+}

@@ -1,0 +1,23 @@
+//! A solution for tests.
+
+use crate::pipeline::{Outcome, Solution, Timing};
+
+/// A solution with this `outcome` and nothing else.
+pub(super) fn solution(width: usize, height: usize, outcome: Outcome) -> Solution {
+    Solution {
+        width,
+        height,
+        date: None,
+        sources: Vec::new(),
+        observation: None,
+        photometry: None,
+        comparison: None,
+        gain_e_per_adu: None,
+        calibration: None,
+        exposure_s: None,
+        notes: Vec::new(),
+        background: None,
+        outcome,
+        timing: Timing::default(),
+    }
+}
