@@ -50,7 +50,7 @@
 //! | [`photometry`] | how bright, how faint: zero point, completeness, comparison with the prediction |
 //! | [`pipeline`] | what does a frame show: the stages in order |
 //! | [`report`] | how to present it: JSON, text, tables, overlays, world coordinates |
-//! | [`study`] | is it good enough: validation, robustness, the papers' experiments |
+//! | [`study`] | is it good enough: validation, robustness, defocus, the papers' experiments |
 //!
 //! Pixels, angles and coordinate systems: [`conventions`].
 

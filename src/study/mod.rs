@@ -1,5 +1,5 @@
-//! How good is it? Validation with simulated frames, robustness of identification, and the
-//! experiments of the paper.
+//! How good is it? Validation with simulated frames, robustness of identification, the radius of a
+//! defocused star's spot, and the experiments of the paper.
 
 pub mod defocus;
 pub mod experiment;

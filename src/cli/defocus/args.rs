@@ -27,7 +27,8 @@ pub(crate) struct DefocusArgs {
     pub(super) normalisation: Option<Normalisation>,
     #[command(flatten)]
     pub(super) scenario: ScenarioOptions,
-    /// Johnson V of the star, or several with commas; energy only [default: 1.5 brighter than the camera's limit]
+    /// Johnson V of the star, or several with commas; energy only [default: 1.5 brighter than the
+    /// camera's limit]
     #[arg(long, value_name = "V[,V...]", value_delimiter = ',', value_parser = values::finite, allow_hyphen_values = true)]
     pub(super) vmag: Vec<f64>,
     /// Required error in pixels, or several with commas: report the radii that meet it
@@ -36,16 +37,19 @@ pub(crate) struct DefocusArgs {
     /// Measure the noise on dark frames: files, directories, or patterns such as 'darks/*.tif'
     #[arg(long, value_name = "FRAME", num_args = 1..)]
     pub(super) darks: Vec<PathBuf>,
-    /// Noise for which radii are reported, as a part of full scale; peak only [default: that of --darks, else the paper's 9.32e-4]
+    /// Noise for which radii are reported, as a part of full scale; peak only [default: that of
+    /// --darks, else the paper's 9.32e-4]
     #[arg(long, value_name = "NUMBER", value_parser = values::positive, allow_hyphen_values = true, conflicts_with = "darks")]
     pub(super) at_noise: Option<f64>,
-    /// Radii: standard deviations of the spot, in pixels [default: 0.4:2.4:200 for peak, 0.2:2.4:45 for energy]
+    /// Radii: standard deviations of the spot, in pixels [default: 0.4:2.4:200 for peak, 0.2:2.4:45
+    /// for energy]
     #[arg(long, value_name = "FROM:TO:COUNT[:log]", value_parser = radii, allow_hyphen_values = true)]
     pub(super) radius_px: Option<Range>,
     /// Noises as parts of full scale; peak only [default: 2e-4:20e-4:100]
     #[arg(long, value_name = "FROM:TO:COUNT[:log]", value_parser = range, allow_hyphen_values = true)]
     pub(super) noise_relative: Option<Range>,
-    /// Noises of a pixel without light, in electrons; energy only [default: nine from a quarter to four times the camera's]
+    /// Noises of a pixel without light, in electrons; energy only [default: nine from a quarter to
+    /// four times the camera's]
     #[arg(long, value_name = "FROM:TO:COUNT[:log]", value_parser = range, allow_hyphen_values = true, conflicts_with = "noise_relative")]
     pub(super) noise_e: Option<Range>,
     /// Stars at each point of the grid [default: 20 for peak, as the paper has it, 400 for energy]

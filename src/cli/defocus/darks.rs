@@ -37,7 +37,7 @@ pub(super) fn dark_noise(
     Ok(noise)
 }
 
-/// Reads and measures dark frames; none may be unreadable or look like no dark frame.
+/// Reads and measures dark frames. All must be readable and taken without light.
 fn measure(
     frames: &[PathBuf],
     sheet: Option<&DataSheet>,
@@ -61,16 +61,15 @@ fn measure(
         gain_e_per_adu: sheet.map(|sheet| sheet.gain_e_per_adu),
         ..DarkConfig::default()
     })?;
-    match &darks.warnings[..] {
-        [] => Ok(darks),
-        [first] => Err(anyhow!(
-            "{first}: such frames do not show the noise of the dark"
-        )),
-        [first, others @ ..] => Err(anyhow!(
-            "{first}; {} more frames: such frames do not show the noise of the dark",
-            others.len()
-        )),
-    }
+    let more = match &darks.warnings[..] {
+        [] => return Ok(darks),
+        [_] => String::new(),
+        [_, others @ ..] => format!("; {} more do not either", others.len()),
+    };
+    let first = &darks.warnings[0];
+    Err(anyhow!(
+        "{first}{more}: the noise without light cannot be measured"
+    ))
 }
 
 /// The files that paths, directories and patterns stand for.

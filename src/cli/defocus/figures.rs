@@ -342,7 +342,7 @@ fn radii_for_errors(report: &DefocusReport, star: &StarReport, study: &StarStudy
     }
 }
 
-/// Error over limiting magnitude as the radius grows: a line for each star, with a few radii beside.
+/// Error over limiting magnitude as the radius grows: a line for each star, a few radii beside it.
 fn accuracy_and_reach(report: &DefocusReport) -> Panel {
     let stars = report.stars.iter().zip(COLOURS);
     Panel {

@@ -34,8 +34,8 @@ pub(crate) struct LimitArgs {
     /// What to print
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub(crate) format: Format,
-    /// Also draw the sweeps into this file, a panel for each, with a second curve for 12.5 times the
-    /// exposure (in a sweep over the exposure: for half the aperture)
+    /// Also draw the sweeps into this file, a panel for each, with a second curve for 12.5 times
+    /// the exposure (in a sweep over the exposure: for half the aperture)
     #[arg(long, value_name = "FILE.svg|png", value_parser = PlotFile::parser(), requires = "sweep")]
     pub(crate) plot: Option<PlotFile>,
     /// Draw the eleven figures of the paper into this directory, for exposures of 0.04 s and 0.5 s

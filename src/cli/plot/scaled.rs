@@ -1,8 +1,8 @@
 //! A backend with several pixels for each unit, so that PNG figures are sharp.
 //!
 //! Everything is drawn in the units of the SVG figure, so that both are the same picture. Larger
-//! letters alone would not do: lines, dots, margins and panels would have to grow with them, each in
-//! its place. Rendering the SVG would need an SVG renderer, which is larger than starpipe.
+//! letters alone would not do: lines, dots, margins and panels would have to grow with them, each
+//! in its place. Rendering the SVG would need an SVG renderer, which is larger than starpipe.
 
 use plotters::style::{FontDesc, RGBAColor, TextStyle};
 use plotters_backend::{

@@ -33,8 +33,8 @@ pub(crate) struct ValidateArgs {
     /// Do not give the camera's description to the pipeline: it has no hints, not even the scale
     #[arg(long)]
     pub(crate) scale_unknown: bool,
-    /// Study: a run for each value of one parameter, named as its option with _ or -, or fov_deg (may
-    /// be repeated); :log spaces the values by even ratios
+    /// Study: a run for each value of one parameter, named as its option with _ or -, or fov_deg
+    /// (may be repeated); :log spaces the values by even ratios
     #[arg(
         long,
         value_name = "NAME=FROM:TO:COUNT[:log]",

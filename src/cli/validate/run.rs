@@ -21,7 +21,7 @@ use std::time::Instant;
 /// Files of a complete run. An incomplete one has none of them.
 const RESULTS: [&str; 2] = ["summary.json", "summary.txt"];
 
-/// How long the frames of this start took. It differs from start to start, so it has a file of its own.
+/// Time that the frames of this start took. It differs each time, so it has a file of its own.
 #[derive(Debug, Default, Serialize)]
 struct Timing {
     frames: u64,

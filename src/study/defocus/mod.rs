@@ -5,7 +5,7 @@
 //! 1. [`Noise`]: the noise of a pixel without light, from the camera, from dark frames or from the
 //!    paper. The radii are reported for this noise.
 //! 2. [`StarStudy`]: the errors of the star's centroids over the grid of radii and noises and, with
-//!    more trials, over the radii at the noise of step 1; the curves, lines and surface through them.
+//!    more trials, over the radii at the noise of step 1; curves, lines and a surface through them.
 //! 3. [`DefocusReport`]: the best radius, the radii that meet each required error, and all tables,
 //!    for JSON, CSV and text.
 //!

@@ -121,8 +121,8 @@ impl Plan {
     }
 }
 
-/// Errors of which isolines are drawn, in pixels: those required, and round numbers within the errors
-/// of the grid.
+/// Errors of the isolines, in pixels: those required, and round numbers within the errors of the
+/// grid.
 fn isoline_levels_px(errors: &ErrorGrid, required_px: &[f64]) -> Vec<f64> {
     /// Mantissas of round numbers.
     const ROUND: [f64; 3] = [1.0, 2.0, 5.0];
