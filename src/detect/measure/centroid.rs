@@ -2,7 +2,7 @@
 
 use crate::base::coords::PixelPoint;
 use crate::detect::detection::Detection;
-use crate::detect::fit::{Fit, FitBuffers, FrameMaps, NoiseModel, window_radius};
+use crate::detect::fit::{Fit, FitBuffers, FrameMaps, NoiseModel, Window, window_radius};
 
 /// Grey levels count above this many standard deviations of the background noise.
 const GREY_THRESHOLD_SIGMA: f64 = 3.0;
@@ -31,8 +31,29 @@ pub(crate) fn grey_weighted(
     };
     let window = &mut buffers.window;
     unsaturated.cut_out(&fit.spots[..1], radius, window);
-    for threshold_sigma in [GREY_THRESHOLD_SIGMA, 0.0] {
-        let threshold = threshold_sigma * window.noise_adu;
+    let thresholds = [GREY_THRESHOLD_SIGMA, 0.0].map(|sigma| sigma * window.noise_adu);
+    let mut centroids = thresholds.into_iter();
+    if let Some(centroid) = centroids.find_map(|t| GreyCentroid::above(t, window, noise)) {
+        let (x, y) = (centroid.x, centroid.y);
+        detection.position = PixelPoint::new(x + window.x0 as f64, y + window.y0 as f64);
+        detection.sigma_x_px = centroid.sigma_x;
+        detection.sigma_y_px = centroid.sigma_y;
+    }
+}
+
+/// A grey-weighted centroid, and its standard errors, in the columns and rows of a window.
+struct GreyCentroid {
+    x: f64,
+    y: f64,
+    sigma_x: f64,
+    sigma_y: f64,
+}
+
+impl GreyCentroid {
+    /// The centroid of the light above `threshold`, in ADU; `None` where there is none.
+    fn above(threshold: f64, window: &Window, noise: &NoiseModel) -> Option<Self> {
+        /// Standard error of the position within a single pixel: 1/√12.
+        const SINGLE_PIXEL_PX: f64 = 0.29;
         let bright = || {
             let grey = window
                 .pixels_adu()
@@ -47,7 +68,7 @@ pub(crate) fn grey_weighted(
             sum_y += row * grey;
         }
         if sum <= 0.0 {
-            continue;
+            return None;
         }
         let (x, y) = (sum_x / sum, sum_y / sum);
         let (mut variance_x, mut variance_y) = (0.0, 0.0);
@@ -56,12 +77,15 @@ pub(crate) fn grey_weighted(
             variance_x += variance * (column - x).powi(2);
             variance_y += variance * (row - y).powi(2);
         }
-        detection.position = PixelPoint::new(x + window.x0 as f64, y + window.y0 as f64);
-        // A single pixel gives a position within that pixel.
-        let floor =
-            |variance: f64| (variance.sqrt() / sum).max(if variance > 0.0 { 0.0 } else { 0.29 });
-        detection.sigma_x_px = floor(variance_x);
-        detection.sigma_y_px = floor(variance_y);
-        return;
+        let error = |variance: f64| {
+            let least = if variance > 0.0 { 0.0 } else { SINGLE_PIXEL_PX };
+            (variance.sqrt() / sum).max(least)
+        };
+        Some(Self {
+            x,
+            y,
+            sigma_x: error(variance_x),
+            sigma_y: error(variance_y),
+        })
     }
 }

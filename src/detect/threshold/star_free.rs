@@ -6,7 +6,7 @@ use std::ops::Range;
 
 /// Rows above and below that must be free of stars as well: their wings.
 const WING_ROWS: [usize; 2] = [4, 9];
-/// Fewer samples than this tell nothing about the tails of the noise.
+/// Fewer samples than this do not determine the tails of the noise.
 pub(crate) const MIN_SAMPLES: f64 = 2000.0;
 
 /// Buffers of the measurement of noise.
