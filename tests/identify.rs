@@ -60,7 +60,7 @@ impl Truth {
         sky()
             .grid
             .for_each_within(&centre, radius_rad, limit_mag as f32 + 1.0, |star| {
-                let direction = sky().stars()[star.catalog as usize].direction;
+                let direction = sky().stars()[star.index.get()].direction;
                 let pixel = self.camera.pixel_of(&self.attitude.apply(&direction));
                 places.extend(pixel.map(|p| (p, f64::from(star.v_mag))));
             });

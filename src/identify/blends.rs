@@ -88,9 +88,8 @@ impl Blends {
         let Self { taken, lights } = self;
         lights.clear();
         let look = |near: &GridStar| {
-            let other = StarIndex::from(near.catalog);
-            if other != index && taken.binary_search(&other).is_err() {
-                lights.extend(view.light_of(other, star.v_mag));
+            if near.index != index && taken.binary_search(&near.index).is_err() {
+                lights.extend(view.light_of(near.index, star.v_mag));
             }
         };
         let faintest_v_mag = star.v_mag + FAINTER_MAG;

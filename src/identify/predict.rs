@@ -151,7 +151,7 @@ impl Surroundings {
                     self.stars.push(*star);
                 }
             });
-        self.stars[known..].sort_unstable_by_key(|star| star.catalog);
+        self.stars[known..].sort_unstable_by_key(|star| star.index);
         self.around = Some(Gathered {
             faintest_v_mag,
             ..around
@@ -197,7 +197,7 @@ fn project(
         // No branches here, so that the memory accesses overlap.
         let directions = lanes.map(|lane| {
             lane.map_or(boresight, |star: &GridStar| {
-                sky.stars()[star.catalog as usize].direction_at(view.years_since_j2000)
+                sky.stars()[star.index.get()].direction_at(view.years_since_j2000)
             })
         });
         let in_camera = directions.map(|direction| view.icrs_to_camera.apply(&direction));
@@ -219,7 +219,7 @@ fn project(
                 pixel,
                 direction,
                 v_mag: star.v_mag,
-                star: StarIndex::from(star.catalog),
+                star: star.index,
             });
         }
     }

@@ -7,7 +7,7 @@
 //! trigonometry and has no special cases at the poles. Wide and shallow searches scan the brightest
 //! stars of the whole sky instead.
 
-use super::Star;
+use super::{Star, StarIndex};
 use crate::base::coords::{Icrs, UnitVector};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -21,8 +21,8 @@ pub struct GridStar {
     pub direction: [f32; 3],
     /// V magnitude.
     pub v_mag: f32,
-    /// Index of the star in the catalogue.
-    pub catalog: u32,
+    /// The star in the catalogue.
+    pub index: StarIndex,
 }
 
 impl GridStar {
@@ -31,7 +31,7 @@ impl GridStar {
         Self {
             direction: [v.x as f32, v.y as f32, v.z as f32],
             v_mag: star.v_mag,
-            catalog: index as u32,
+            index: StarIndex::new(index),
         }
     }
 
@@ -114,8 +114,8 @@ impl SkyGrid {
 
     /// The star at an index of the catalogue.
     #[inline]
-    pub fn star(&self, catalog: u32) -> &GridStar {
-        &self.by_brightness[catalog as usize]
+    pub fn star(&self, index: u32) -> &GridStar {
+        &self.by_brightness[index as usize]
     }
 
     /// Calls `visit` for every star within `radius_rad` of `centre` that is not fainter than
@@ -322,7 +322,9 @@ mod tests {
 
     fn found(grid: &SkyGrid, centre: &UnitVector<Icrs>, radius_rad: f64, limit: f32) -> Vec<u32> {
         let mut found = Vec::new();
-        grid.for_each_within(centre, radius_rad, limit, |s| found.push(s.catalog));
+        grid.for_each_within(centre, radius_rad, limit, |s| {
+            found.push(s.index.get() as u32)
+        });
         found.sort_unstable();
         found
     }

@@ -103,7 +103,7 @@ fn observed_stars(
     indexed
         .grid
         .for_each_within(&centre, camera.radius_rad(), faintest as f32, |star| {
-            around.push(StarIndex::from(star.catalog));
+            around.push(star.index);
         });
     around.sort_unstable();
     let observed = |index: StarIndex| {

@@ -12,32 +12,13 @@ pub(super) fn may_quote(separator: u8) -> bool {
 
 /// The units in a line below the headings; `None` if it is not a line of units.
 pub(super) fn units_in(text: &[u8], separator: u8, width: usize) -> Option<Vec<String>> {
-    const UNITS: [&str; 19] = [
-        "deg",
-        "degrees",
-        "h",
-        "hours",
-        "rad",
-        "min",
-        "s",
-        "arcmin",
-        "arcsec",
-        "h:m:s",
-        "d:m:s",
-        "mag",
-        "mas/yr",
-        "mas/a",
-        "s/a",
-        "s/yr",
-        "arcsec/a",
-        "arcsec/yr",
-        "yr",
-    ];
+    const UNITS: &str = "deg degrees h hours rad min s arcmin arcsec h:m:s d:m:s mag mas/yr mas/a \
+         s/a s/yr arcsec/a arcsec/yr yr";
     let cells: Vec<String> = split(text, separator)
         .iter()
         .map(|cell| unquoted(cell).to_lowercase())
         .collect();
-    let is_unit = |cell: &String| UNITS.contains(&cell.as_str());
+    let is_unit = |cell: &String| UNITS.split(' ').any(|unit| unit == cell);
     let is_number =
         |cell: &String| cell.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
     let units = cells.len() == width && cells.iter().any(is_unit) && !cells.iter().any(is_number);

@@ -45,7 +45,7 @@ impl GeneralColumns {
         };
         let ra = &headings[position.ra.cell];
         let epoch = Epoch::find(headings, ra, &note_of(&ra.text).unwrap_or_default());
-        let name = find_column(headings, &["name", "proper"]);
+        let name = find_column(headings, "name proper");
         Ok(Self {
             texts: headings
                 .iter()
@@ -55,7 +55,7 @@ impl GeneralColumns {
             id,
             position,
             magnitude,
-            b_minus_v: find_column(headings, &["b-v", "b_v", "bv", "b_minus_v"]),
+            b_minus_v: find_column(headings, "b-v b_v bv b_minus_v"),
             motion: MotionColumns::find(headings),
             epoch,
             sexagesimal_seen: AtomicBool::new(false),

@@ -62,8 +62,8 @@ impl Heading {
     }
 }
 
-/// The column of the first of `labels` that is a heading.
-pub(super) fn find_column(headings: &[Heading], labels: &[&str]) -> Option<usize> {
-    let position = |label: &&str| headings.iter().position(|heading| heading.label == **label);
-    labels.iter().find_map(position)
+/// The column of the first of `labels`, separated by blanks, that is a heading.
+pub(super) fn find_column(headings: &[Heading], labels: &str) -> Option<usize> {
+    let position = |label: &str| headings.iter().position(|heading| heading.label == label);
+    labels.split(' ').find_map(position)
 }

@@ -31,33 +31,20 @@ pub(super) enum IdKind {
 impl IdColumns {
     pub(super) fn find(headings: &[Heading]) -> Option<Self> {
         /// Headings of identifiers, in order of preference.
-        const IDENTIFIERS: [(&str, IdKind); 22] = [
-            ("skymap", IdKind::Skymap),
-            ("skymap_number", IdKind::Skymap),
-            ("id", IdKind::Any),
-            ("star_id", IdKind::Any),
-            ("starid", IdKind::Any),
-            ("source_id", IdKind::Any),
-            ("source", IdKind::Any),
-            ("objid", IdKind::Any),
-            ("tyc", IdKind::Tycho),
-            ("tyc_id", IdKind::Tycho),
-            ("tycho", IdKind::Tycho),
-            ("tyc2", IdKind::Tycho),
+        const IDENTIFIERS: [(&str, IdKind); 9] = [
+            ("skymap skymap_number", IdKind::Skymap),
+            ("id star_id starid source_id source objid", IdKind::Any),
+            ("tyc tyc_id tycho tyc2", IdKind::Tycho),
             ("hip", IdKind::Hipparcos),
-            ("identifier", IdKind::Any),
-            ("designation", IdKind::Any),
-            ("main_id", IdKind::Any),
-            ("star", IdKind::Any),
-            ("name", IdKind::Any),
+            ("identifier designation main_id star name", IdKind::Any),
             ("hd", IdKind::NumberOf("HD")),
             ("hr", IdKind::NumberOf("HR")),
             ("sao", IdKind::NumberOf("SAO")),
             ("recno", IdKind::Any),
         ];
-        let position = |label: &str| find_column(headings, &[label]);
+        let column = |labels: &str| find_column(headings, labels);
         if let (Some(region), Some(star), Some(component)) =
-            (position("tyc1"), position("tyc2"), position("tyc3"))
+            (column("tyc1"), column("tyc2"), column("tyc3"))
         {
             return Some(Self {
                 kind: IdKind::Tycho,
@@ -66,11 +53,9 @@ impl IdColumns {
         }
         let (kind, cell) = IDENTIFIERS
             .iter()
-            .find_map(|(label, kind)| Some((*kind, position(label)?)))?;
+            .find_map(|(labels, kind)| Some((*kind, column(labels)?)))?;
         // In a table with SKY2000's own columns, `ID` is the Skymap number.
-        let is_sky2000 = ["vder", "id_merg", "sky2000"]
-            .iter()
-            .any(|label| position(label).is_some());
+        let is_sky2000 = column("vder id_merg sky2000").is_some();
         let is_skymap = is_sky2000 && headings[cell].label == "id";
         Some(Self {
             kind: if is_skymap { IdKind::Skymap } else { kind },
@@ -168,43 +153,29 @@ pub(super) enum MagnitudeColumns {
 
 impl MagnitudeColumns {
     pub(super) fn find(headings: &[Heading]) -> Option<Self> {
-        const JOHNSON_V: [&str; 9] = [
-            "vmag",
-            "v",
-            "v_mag",
-            "mag_v",
-            "vjmag",
-            "v_johnson",
-            "johnson_v",
-            "vmag_johnson",
-            "mag_johnson_v",
-        ];
+        const JOHNSON_V: &str =
+            "vmag v v_mag mag_v vjmag v_johnson johnson_v vmag_johnson mag_johnson_v";
         /// Headings of approximate V magnitudes, with the band, in order of preference.
-        const NEAR_V: [(&str, &str); 10] = [
-            ("mag", "magnitude"),
-            ("magnitude", "magnitude"),
-            ("hpmag", "Hipparcos Hp"),
-            ("hp", "Hipparcos Hp"),
-            ("phot_g_mean_mag", "Gaia G"),
-            ("gmag", "Gaia G"),
-            ("g_mag", "Gaia G"),
-            ("g", "Gaia G"),
+        const APPROXIMATE_V: [(&str, &str); 5] = [
+            ("mag magnitude", "magnitude"),
+            ("hpmag hp", "Hipparcos Hp"),
+            ("phot_g_mean_mag gmag g_mag g", "Gaia G"),
             ("vder", "derived V"),
             ("phot_visual_mag", "visual magnitude"),
         ];
-        if let Some(observed) = find_column(headings, &JOHNSON_V) {
-            let derived = find_column(headings, &["vder"]);
+        let column = |labels: &str| find_column(headings, labels);
+        if let Some(observed) = column(JOHNSON_V) {
+            let derived = column("vder");
             return Some(Self::Johnson { observed, derived });
         }
-        if let Some(vt) = find_column(headings, &["vtmag", "vt", "vt_mag"]) {
-            let bt = find_column(headings, &["btmag", "bt", "bt_mag"]);
+        if let Some(vt) = column("vtmag vt vt_mag") {
+            let bt = column("btmag bt bt_mag");
             return Some(Self::Tycho { bt, vt });
         }
-        let near = NEAR_V.iter();
-        let mut near =
-            near.filter_map(|&(label, band)| Some((find_column(headings, &[label])?, band)));
-        near.next()
-            .map(|(cell, band)| Self::Approximate { cell, band })
+        APPROXIMATE_V.iter().find_map(|&(labels, band)| {
+            let cell = column(labels)?;
+            Some(Self::Approximate { cell, band })
+        })
     }
 
     /// The columns used, for people; `text` gives their headings.
@@ -238,34 +209,17 @@ pub(super) struct MotionColumns {
 impl MotionColumns {
     /// `None` also for unknown units.
     pub(super) fn find(headings: &[Heading]) -> Option<Self> {
-        const MOTION_RA: [&str; 7] = [
-            "pmra",
-            "pm_ra",
-            "pmra*",
-            "pm_ra_cosdec",
-            "pmra_cosdec",
-            "mu_alpha_star",
-            "mu_alpha",
-        ];
-        const MOTION_DEC: [&str; 5] = ["pmde", "pmdec", "pm_de", "pm_dec", "mu_delta"];
-        let (ra, dec) = (
-            find_column(headings, &MOTION_RA)?,
-            find_column(headings, &MOTION_DEC)?,
-        );
+        const MOTION_RA: &str = "pmra pm_ra pmra* pm_ra_cosdec pmra_cosdec mu_alpha_star mu_alpha";
+        let column = |labels: &str| find_column(headings, labels);
+        let ra = column(MOTION_RA)?;
+        let dec = column("pmde pmdec pm_de pm_dec mu_delta")?;
         // SKY2000's units are not in its headings.
-        let bare_sky2000 =
-            find_column(headings, &["vder"]).is_some() && headings[ra].unit.is_empty();
-        let mas = |cell: usize| {
-            let unit = headings[cell].unit.replace(['.', ' '], "/");
-            let angle = unit
-                .split_once('/')
-                .map_or(unit.as_str(), |(angle, _)| angle);
-            match angle {
-                "" | "mas" => Some((1.0, false)),
-                "arcsec" | "as" | "\"" => Some((1000.0, false)),
-                "s" => Some((15_000.0, true)),
-                _ => None,
-            }
+        let bare_sky2000 = column("vder").is_some() && headings[ra].unit.is_empty();
+        let mas = |cell: usize| match headings[cell].unit.split(['/', '.', ' ']).next() {
+            Some("" | "mas") => Some((1.0, false)),
+            Some("arcsec" | "as" | "\"") => Some((1000.0, false)),
+            Some("s") => Some((15_000.0, true)),
+            _ => None,
         };
         let ((ra_unit_mas, ra_needs_cos_dec), (dec_unit_mas, _)) = if bare_sky2000 {
             ((15_000.0, true), (1000.0, false))
@@ -295,7 +249,7 @@ impl Epoch {
     /// The epoch of the right ascensions under `ra`; `note` is what the file says about that
     /// column.
     pub(super) fn find(headings: &[Heading], ra: &Heading, note: &str) -> Self {
-        match find_column(headings, &["ref_epoch", "epoch", "ep"]) {
+        match find_column(headings, "ref_epoch epoch ep") {
             Some(cell) if ra.label != VIZIER_RA_J2000 => Self::Column(cell),
             _ => Self::Year(epoch_in(note).unwrap_or(J2000_YEAR)),
         }
