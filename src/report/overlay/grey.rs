@@ -148,8 +148,8 @@ fn level_exceeded_by(values: &[f32], share: f32) -> f32 {
         return 0.0;
     }
     let above = (finite.len() as f32 * share) as usize;
-    let place = finite.len() - 1 - above.min(finite.len() - 1);
-    *finite.select_nth_unstable_by(place, f32::total_cmp).1
+    let index = finite.len() - 1 - above.min(finite.len() - 1);
+    *finite.select_nth_unstable_by(index, f32::total_cmp).1
 }
 
 /// Enlarges every pixel to a square of `factor` pixels a side.
@@ -226,8 +226,8 @@ mod tests {
         assert_eq!(grey.levels[5], 0);
         let mean = |from: usize| {
             let column = |x: usize| (0..200).map(move |y| x + y * width);
-            let places = (from..from + 100).flat_map(column);
-            places.map(|i| f32::from(grey.levels[i])).sum::<f32>() / 20_000.0
+            let indices = (from..from + 100).flat_map(column);
+            indices.map(|i| f32::from(grey.levels[i])).sum::<f32>() / 20_000.0
         };
         let (left, right) = (mean(0), mean(width - 100));
         assert!((10.0..60.0).contains(&left), "{left}");

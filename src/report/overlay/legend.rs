@@ -9,12 +9,17 @@ use crate::camera::CameraModel;
 use crate::identify::Identification;
 use crate::pipeline::Solution;
 
-/// Height of the strip. Lengths are in units of strokes.
+// Lengths are in units of strokes.
+
+/// Height of the strip.
 const HEIGHT: f32 = 76.0;
 /// Smallest width of the strip, also below a narrow frame.
 const MIN_WIDTH: f32 = 460.0;
+/// Size of letters.
 const LETTERS: f32 = 13.0;
+/// Space around the contents.
 const PADDING: f32 = 10.0;
+/// Distance of the lines of text.
 const LINE: f32 = 20.0;
 /// Side of the square with the arrows.
 const COMPASS: f32 = 72.0;

@@ -50,12 +50,8 @@ pub(super) struct Mark {
 /// The marks of all detections, brightest first.
 pub(super) fn marks(solution: &Solution, catalog: &Catalog, grey: &Grey) -> Vec<Mark> {
     let mut catalog_star = vec![None; solution.sources.len()];
-    for star_match in solution
-        .outcome
-        .identification()
-        .iter()
-        .flat_map(|i| &i.matches)
-    {
+    let identification = solution.outcome.identification();
+    for star_match in identification.iter().flat_map(|found| &found.matches) {
         if let Some(star) = catalog_star.get_mut(star_match.source.get()) {
             *star = Some(star_match.star);
         }
@@ -108,12 +104,15 @@ impl Rings {
         const MIN_SHARE: f32 = 0.6;
         /// Share of the detections that get larger rings than the smallest.
         const LARGER_RINGS: f64 = 0.8;
-        let place = (sources.len() as f64 * LARGER_RINGS) as usize;
+        let faintest_larger = (sources.len() as f64 * LARGER_RINGS) as usize;
         let area = (grey.width * grey.height) as f32;
         let spacing = (area / sources.len().max(1) as f32).sqrt();
         let usual = (RADIUS.0 * grey.stroke_unit()).max(MIN_RADIUS_PX * grey.scale());
         Self {
-            flux: sources.get(place).and_then(|s| s.flux).unwrap_or(f64::NAN),
+            flux: sources
+                .get(faintest_larger)
+                .and_then(|s| s.flux)
+                .unwrap_or(f64::NAN),
             smallest: usual * (SHARE_OF_SPACING * spacing / usual).clamp(MIN_SHARE, 1.0),
             unit: grey.stroke_unit(),
         }

@@ -96,15 +96,19 @@ fn every_detection_has_a_ring_of_the_colour_of_its_kind() {
     let frame = frame(WIDTH, HEIGHT);
     let solution = solution(WIDTH, HEIGHT, identified(0.0, false));
     let picture = draw("a.tif", &frame, &solution, Catalog::built_in());
-    for (kind, place) in [
+    for (kind, center) in [
         (Kind::Identified, [200, 300]),
         (Kind::Unidentified, [500, 400]),
         (Kind::NotAStar, [700, 100]),
     ] {
         for other in [Kind::Identified, Kind::Unidentified, Kind::NotAStar] {
-            let drawn = count(&picture, other.colour(), place, 8);
+            let drawn = count(&picture, other.colour(), center, 8);
             // A thin ring mixes its colour with the sky's.
-            assert_eq!(drawn >= 3, other == kind, "{other:?} at {place:?}: {drawn}");
+            assert_eq!(
+                drawn >= 3,
+                other == kind,
+                "{other:?} at {center:?}: {drawn}"
+            );
         }
     }
     // Sirius is named to the right of its ring.

@@ -84,8 +84,8 @@ fn expand(distortion: &Distortion, mirrored: bool) -> (Matrix2<f64>, [Polynomial
             (1, 0) => linear.set_column(0, &(linear.column(0) + flipped)),
             (0, 1) => linear.set_column(1, &(linear.column(1) + flipped)),
             _ => {
-                if let Some(place) = powers(order).position(|powers| powers == (p, q)) {
-                    higher[place] += flipped;
+                if let Some(index) = powers(order).position(|powers| powers == (p, q)) {
+                    higher[index] += flipped;
                 }
             }
         }

@@ -177,10 +177,10 @@ fn stars_among(published: &Published, found: &Identification, catalog: &Catalog)
     let years = published.date.years_since_j2000();
     let is_among = |star: &StarIndex| {
         let direction = catalog.star(*star).direction_at(years);
-        let place = found
+        let pixel = found
             .camera
             .pixel_of(&found.icrs_to_camera.apply(&direction));
-        place.is_some_and(|p| columns.contains(&p.x) && rows.contains(&p.y))
+        pixel.is_some_and(|p| columns.contains(&p.x) && rows.contains(&p.y))
     };
     let as_bright = catalog.brighter_than(published.faintest_vmag + ROUNDING_MAG);
     (0..as_bright)
