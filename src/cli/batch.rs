@@ -5,8 +5,9 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 
-/// Applies `work` to all items on the threads of `pool`, and hands the results to `take` on this thread, in the
-/// order of the items and as early as that order allows. If `take` breaks, the remaining items are skipped.
+/// Applies `work` to all items on the threads of `pool`, and hands the results to `take` on this
+/// thread, in the order of the items and as early as that order allows. If `take` breaks, the
+/// remaining items are skipped.
 ///
 /// `state` makes a state for each thread, such as buffers to reuse.
 pub(crate) fn for_each_ordered<T: Sync, S, R: Send>(

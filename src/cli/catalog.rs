@@ -18,7 +18,8 @@ pub(crate) struct CatalogArgs {
 
 #[derive(Debug, Subcommand)]
 enum CatalogCommand {
-    /// Convert a catalogue from its published form into the compact form that --catalog loads fastest
+    /// Convert a catalogue from its published form into the compact form that --catalog loads
+    /// fastest
     Import(ImportArgs),
 }
 

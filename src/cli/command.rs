@@ -14,7 +14,8 @@ use super::simulate::SimulateArgs;
 use super::validate::ValidateArgs;
 use clap::{Parser, Subcommand};
 
-/// Finds and identifies the stars in photographs of the night sky, and determines where the camera pointed
+/// Finds and identifies the stars in photographs of the night sky, and determines where the camera
+/// pointed
 #[derive(Debug, Parser)]
 #[command(
     name = "starpipe",
@@ -51,7 +52,8 @@ pub(crate) enum Command {
     Experiment(ExperimentArgs),
     /// Simulate frames of a camera, with tables of what is on them
     Simulate(Box<SimulateArgs>),
-    /// Simulate and process thousands of frames, and compare the results with the truth and with theory
+    /// Simulate and process thousands of frames, and compare the results with the truth and with
+    /// theory
     Validate(Box<ValidateArgs>),
     /// Find the spot radius with the smallest centroid error, and the defocus that gives it
     Defocus(Box<DefocusArgs>),

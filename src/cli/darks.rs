@@ -32,14 +32,15 @@ use std::str::FromStr;
 pub(crate) struct DarksArgs {
     #[command(flatten)]
     frames: FrameOptions,
-    /// Exposure in seconds, of one file or directory, else of all frames (may be repeated) [default: the exposure in
-    /// the file's header]
+    /// Exposure in seconds, of one file or directory, else of all frames (may be repeated)
+    /// [default: the exposure in the file's header]
     #[arg(long, value_name = "SECONDS[:PATH]", allow_hyphen_values = true)]
     exposure: Vec<ExposureOf>,
     /// Bits of a grey level [default: those of --camera, else of the file's format]
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=32))]
     bits: Option<u32>,
-    /// Description of the camera, see `starpipe camera new`: its gain converts grey levels to electrons
+    /// Description of the camera, see `starpipe camera new`: its gain converts grey levels to
+    /// electrons
     #[arg(long, value_name = "FILE.toml")]
     camera: Option<PathBuf>,
     /// Threshold for hot pixels, in robust standard deviations
@@ -144,7 +145,8 @@ fn check_exposures(exposures: &[ExposureOf], frames: &[PathBuf]) -> Result<(), C
     Ok(())
 }
 
-/// The exposure given for `frame`: that of the longest path that leads to it, else that of all frames.
+/// The exposure given for `frame`: that of the longest path that leads to it, else that of all
+/// frames.
 fn exposure_of(frame: &Path, exposures: &[ExposureOf]) -> Option<f64> {
     let applies = exposures.iter().filter(|of| {
         let path = of.path.as_ref();

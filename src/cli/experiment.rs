@@ -35,7 +35,8 @@ pub(crate) struct ExperimentArgs {
     /// What to print
     #[arg(long, value_enum, default_value_t = PageFormat::Text)]
     format: PageFormat,
-    /// Also write the first simulated frame, its stars marked and named, as experiment-1.png or -2.png into this directory
+    /// Also write the first simulated frame, its stars marked and named, as experiment-1.png or
+    /// -2.png into this directory
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]

@@ -32,7 +32,8 @@ pub(crate) struct FlatsArgs {
     /// Frame taken without light, or the mean of many; see `starpipe darks`
     #[arg(long, value_name = "FILE")]
     dark: Option<PathBuf>,
-    /// Description of the camera, see `starpipe camera new`: its bias if there is no --dark, and its read noise
+    /// Description of the camera, see `starpipe camera new`: its bias if there is no --dark, and
+    /// its read noise
     #[arg(long, value_name = "FILE.toml")]
     camera: Option<PathBuf>,
     /// What to print: csv has a row for each frame

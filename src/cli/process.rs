@@ -51,7 +51,8 @@ struct CalibrationOptions {
     /// Frame taken without light, or the mean of many, which is subtracted; see `starpipe darks`
     #[arg(long, value_name = "FILE")]
     dark: Option<PathBuf>,
-    /// Mean of evenly lit frames: the signal above the dark level is divided by it; see `starpipe flats`
+    /// Mean of evenly lit frames: the signal above the dark level is divided by it; see `starpipe
+    /// flats`
     #[arg(long, value_name = "FILE")]
     flat: Option<PathBuf>,
     /// Pixels to ignore: a table with the columns x,y; see `starpipe darks`
@@ -89,12 +90,13 @@ struct ExposureOptions {
     /// Exposure of the frames, in seconds [default: the exposure in the file's header]
     #[arg(long, value_name = "SECONDS", value_parser = values::exposure, allow_hyphen_values = true)]
     exposure: Option<f64>,
-    /// With --camera, zenith distance of the frames' centres in degrees [default: from --site and the date, else from
-    /// the header, else 0]
+    /// With --camera, zenith distance of the frames' centres in degrees [default: from --site and
+    /// the date, else from the header, else 0]
     #[arg(long, value_name = "DEG", value_parser = values::zenith_distance, allow_hyphen_values = true,
           requires = "camera")]
     zenith_distance: Option<f64>,
-    /// With --camera, extinction in magnitudes per airmass [default: the law of the sensitivity paper, 0.35 in V]
+    /// With --camera, extinction in magnitudes per airmass [default: the law of the sensitivity
+    /// paper, 0.35 in V]
     #[arg(long, value_name = "MAG", value_parser = values::extinction, allow_hyphen_values = true,
           requires = "camera")]
     extinction: Option<f64>,

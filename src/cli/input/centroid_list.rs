@@ -208,7 +208,8 @@ fn number(record: &StringRecord, column: &Column) -> anyhow::Result<f64> {
     }
 }
 
-/// Refuses positions outside the frame, which extends half a pixel beyond the centres of its border pixels.
+/// Refuses positions outside the frame, which extends half a pixel beyond the centres of its border
+/// pixels.
 fn check_inside(position: &PixelPoint, size: FrameSize) -> anyhow::Result<()> {
     let axes = [
         ("x", position.x, size.width),

@@ -8,6 +8,7 @@ use crate::cli::progress::frames_bar;
 use anyhow::Context;
 use starpipe::calibration::Master;
 use starpipe::frame::{self, Buffers, Frame, FrameError};
+use starpipe::pipeline;
 use std::io;
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
@@ -17,7 +18,7 @@ use std::path::{Path, PathBuf};
 pub(crate) struct FrameList {
     pub(crate) paths: Vec<PathBuf>,
     /// One for each directory that could not be read or has no frames.
-    pub(crate) errors: Vec<FrameError>,
+    pub(crate) errors: Vec<pipeline::Error>,
 }
 
 impl FrameList {
@@ -35,7 +36,7 @@ impl FrameList {
             }
             match frame::files_in(&input) {
                 Ok(found) => list.paths.extend(found),
-                Err(error) => list.errors.push(error),
+                Err(error) => list.errors.push(error.into()),
             }
         }
         Ok(list)
@@ -70,8 +71,8 @@ pub(crate) fn read_master(path: &Path) -> anyhow::Result<Master> {
     })
 }
 
-/// Reads and measures frames on all threads, and hands the results to `take` in input order. Returns the
-/// number of frames that could not be read, which are reported.
+/// Reads and measures frames on all threads, and hands the results to `take` in input order.
+/// Returns the number of frames that could not be read, which are reported.
 ///
 /// # Errors
 /// The first error of `take`, which stops reading.

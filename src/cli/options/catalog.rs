@@ -13,12 +13,13 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Resources")]
 pub(crate) struct CatalogOptions {
-    /// Star catalogue to use in place of the built-in one: SKY2000, Tycho-2 (a directory of its files), a table
-    /// (CSV, TSV, from VizieR), or a file written by `starpipe catalog import`, which loads fastest
+    /// Star catalogue to use in place of the built-in one: SKY2000, Tycho-2 (a directory of its
+    /// files), a table (CSV, TSV, from VizieR), or a file written by `starpipe catalog import`,
+    /// which loads fastest
     #[arg(long, value_name = "PATH")]
     catalog: Option<PathBuf>,
-    /// Directory in which the index of the catalogue is kept [default: $STARPIPE_CACHE_DIR, else the user's cache
-    /// directory]
+    /// Directory in which the index of the catalogue is kept [default: $STARPIPE_CACHE_DIR, else
+    /// the user's cache directory]
     #[arg(long, value_name = "DIR")]
     cache_dir: Option<PathBuf>,
     #[command(flatten)]
@@ -26,7 +27,8 @@ pub(crate) struct CatalogOptions {
 }
 
 impl CatalogOptions {
-    /// Runs `work` with the threads and the catalogue with its index; errors of the index's cache are reported.
+    /// Runs `work` with the threads and the catalogue with its index; errors of the index's cache
+    /// are reported.
     pub(crate) fn with_index<R>(
         &self,
         work: impl FnOnce(&rayon::ThreadPool, &IndexedCatalog) -> Result<R, CommandError>,

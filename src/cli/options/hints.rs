@@ -34,16 +34,16 @@ pub(crate) struct HintOptions {
     #[arg(long, value_name = "DEG", value_parser = values::radius, allow_hyphen_values = true,
           requires = "near")]
     pub(crate) radius: Option<f64>,
-    /// When the frames were taken, as ISO 8601, in UTC unless it has an offset; used for proper motion [default: of
-    /// frames, the date in the file's header, else in its name; else 2000]
+    /// When the frames were taken, as ISO 8601, in UTC unless it has an offset; used for proper
+    /// motion [default: of frames, the date in the file's header, else in its name; else 2000]
     #[arg(long, value_name = "ISO8601", allow_hyphen_values = true)]
     pub(crate) date: Option<ObservationDate>,
-    /// Where they were taken: latitude and longitude (north and east positive) in degrees, and height in metres; with
-    /// the date, gives zenith distance and airmass
+    /// Where they were taken: latitude and longitude (north and east positive) in degrees, and
+    /// height in metres; with the date, gives zenith distance and airmass
     #[arg(long, value_name = "LAT,LON[,HEIGHT_M]", allow_hyphen_values = true)]
     pub(crate) site: Option<Site>,
-    /// Description of the camera, see `starpipe camera new`: gives the scale if no option does, and a predicted limiting
-    /// magnitude for frames whose exposure is known
+    /// Description of the camera, see `starpipe camera new`: gives the scale if no option does, and
+    /// a predicted limiting magnitude for frames whose exposure is known
     #[arg(long, value_name = "FILE.toml")]
     pub(crate) camera: Option<PathBuf>,
 }

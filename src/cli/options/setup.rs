@@ -1,4 +1,5 @@
-//! Options for simulated frames: a camera, its conditions, and the scene, with an option for every number.
+//! Options for simulated frames: a camera, its conditions, and the scene, with an option for every
+//! number.
 
 use super::parameters::{number_option, within_limits};
 use super::scenario::{ScenarioOptions, in_file};
@@ -42,7 +43,8 @@ impl SetupOptions {
     }
 }
 
-/// The options given of the scene and of the camera's imperfections: those beyond the scenario's parameters.
+/// The options given of the scene and of the camera's imperfections: those beyond the scenario's
+/// parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct SceneOptions {
     numbers: Vec<(SetupParameter, f64)>,

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 /// A file to write: its path and its content.
 pub(crate) type NewFile = (PathBuf, Vec<u8>);
 
-/// Writes all files or none: into temporary files beside them, which are renamed once all are written.
+/// Writes all files or none: into temporary files beside them, which are renamed once all are
+/// written.
 pub(crate) fn write_whole(files: &[NewFile]) -> anyhow::Result<()> {
     let writing = |path: &Path| format!("writing {}", path.display());
     let write = |path: &Path, content: &[u8]| {
@@ -29,7 +30,8 @@ pub(crate) fn write_whole(files: &[NewFile]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes all files or none into `directory`, which is made if necessary; `files` are names and contents.
+/// Writes all files or none into `directory`, which is made if necessary; `files` are names and
+/// contents.
 pub(crate) fn write_into(
     directory: &Path,
     files: impl IntoIterator<Item = (String, Vec<u8>)>,

@@ -13,7 +13,8 @@ use std::path::{Path, PathBuf};
 /// This much of a file shows whether it is a result: the longest header has fewer bytes.
 const HEAD_BYTES: u64 = 1 << 16;
 
-/// Refuses inputs whose results would overwrite each other, an input, or a file that is not a result.
+/// Refuses inputs whose results would overwrite each other, an input, or a file that is not a
+/// result.
 pub(crate) fn check(
     inputs: &[PathBuf],
     directory: &Path,
@@ -93,7 +94,8 @@ pub(crate) fn is_same_file(a: &Path, b: &Path) -> bool {
     found.is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
 }
 
-/// Whether `path` is a regular file that is a result of this kind, or empty. Unreadable files are not.
+/// Whether `path` is a regular file that is a result of this kind, or empty. Unreadable files are
+/// not.
 fn is_result(path: &Path, extension: &str) -> bool {
     let head = || -> io::Result<Vec<u8>> {
         let mut head = Vec::new();

@@ -29,8 +29,8 @@ pub(crate) struct RobustnessArgs {
     /// Trials with fewer true stars than this count only if the answer is wrong
     #[arg(long, value_name = "NUMBER", default_value_t = 8)]
     pub(super) least_true_stars: usize,
-    /// Vary one parameter over COUNT values, in place of the standard table (fov, stars, centroid-error, mag-error,
-    /// missing or false; may be repeated)
+    /// Vary one parameter over COUNT values, in place of the standard table (fov, stars,
+    /// centroid-error, mag-error, missing or false; may be repeated)
     #[arg(long, value_name = "NAME=FROM:TO:COUNT")]
     pub(super) sweep: Vec<Sweep>,
     /// What to print

@@ -1,4 +1,5 @@
-//! `robustness`: measures how often identification is right, wrong or fails, on simulated lists of centroids.
+//! `robustness`: measures how often identification is right, wrong or fails, on simulated lists of
+//! centroids.
 
 mod args;
 mod figure;

@@ -26,7 +26,8 @@ pub(crate) struct SimulateArgs {
     /// Declination of the frame's centre, in degrees
     #[arg(long, value_name = "DEG", value_parser = values::declination, allow_hyphen_values = true, requires = "ra")]
     pub(super) dec: Option<f64>,
-    /// Position angle of the image's up direction at its centre, from north through east, in degrees
+    /// Position angle of the image's up direction at its centre, from north through east, in
+    /// degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = values::finite, allow_hyphen_values = true, requires = "ra")]
     pub(super) roll: f64,
     /// A random pointing for each frame, uniform over all rotations

@@ -1,4 +1,5 @@
-//! What `process` and `identify` share: each input is solved, its report printed, its result files written.
+//! What `process` and `identify` share: each input is solved, its report printed, its result files
+//! written.
 
 pub(crate) mod options;
 mod printer;

@@ -25,8 +25,8 @@ pub(super) struct OutputOptions {
     /// With --format text, list every identified star and not just the brightest
     #[arg(long)]
     pub(super) all_stars: bool,
-    /// Also write into this directory FRAME.json, FRAME.csv (its stars), FRAME.wcs (a FITS header, if the frame
-    /// is identified) and, for frames, FRAME.png (the stars marked and named)
+    /// Also write into this directory FRAME.json, FRAME.csv (its stars), FRAME.wcs (a FITS header,
+    /// if the frame is identified) and, for frames, FRAME.png (the stars marked and named)
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
 }

@@ -28,8 +28,8 @@ impl ResultFiles {
         Ok(Self { directory })
     }
 
-    /// Writes the files of `input`, all or none, and removes the FITS header of an earlier run if there is
-    /// none now.
+    /// Writes the files of `input`, all or none, and removes the FITS header of an earlier run if
+    /// there is none now.
     pub(super) fn save(
         &self,
         input: &Path,

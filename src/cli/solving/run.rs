@@ -40,8 +40,8 @@ impl Plan {
     }
 }
 
-/// Solves every input, prints its report and writes its result files, which have these `extensions`. Inputs that
-/// cannot be read are reported, and the others solved.
+/// Solves every input, prints its report and writes its result files, which have these
+/// `extensions`. Inputs that cannot be read are reported, and the others solved.
 pub(crate) fn solve_all(
     inputs: &[PathBuf],
     options: SolvingOptions,
