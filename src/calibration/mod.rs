@@ -16,7 +16,7 @@
 //! [`darks`] and [`flats`] measure the detector from dark frames and flats.
 //!
 //! Caveats: the dark is not scaled to the frame's exposure. If the exposures differ, the dark
-//! current is wrong, and [`Calibration::exposure_mismatch`] says so.
+//! current is wrong, which [`Calibration::exposure_mismatch`] reports.
 
 mod apply;
 pub mod darks;

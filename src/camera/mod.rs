@@ -1,4 +1,4 @@
-//! What instrument? Which direction each pixel looks in, and what the data sheet says.
+//! What is the instrument? The direction in which each pixel looks, and the data sheet.
 //!
 //! - [`CameraModel`]: pixel ↔ direction in camera axes, a pinhole with lens distortion.
 //! - [`data_sheet`]: `camera.toml` → [`DataSheet`](data_sheet::DataSheet), pixels, lens and

@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_by_gps_is_read_and_one_without_a_fix_is_noted() {
+    fn a_gps_position_is_read_and_one_without_a_fix_is_recorded() {
         let three = |parts: [(u32, u32); 3]| {
             let ratio = |(num, denom)| Rational { num, denom };
             Value::Rational(parts.map(ratio).to_vec())
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn what_can_be_read_of_damaged_attributes_is() {
+    fn undamaged_attributes_among_damaged_ones_are_read() {
         let mut bytes = written(&[
             field(Tag::ExposureTime, ratio(1, 4)),
             field(Tag::FocalLength, ratio(350, 10)),
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_is_noted_and_a_clock_never_set_is_not() {
+    fn implausible_attributes_are_recorded_but_an_unset_clock_is_not() {
         let bytes = written(&[
             field(Tag::DateTimeOriginal, ascii("0000:00:00 00:00:00")),
             field(Tag::FocalLength, ratio(0, 1)),

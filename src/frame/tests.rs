@@ -36,7 +36,7 @@ fn a_16_bit_tiff_keeps_its_full_depth_and_order() {
 }
 
 #[test]
-fn twelve_bits_stored_in_sixteen_are_told_from_their_levels() {
+fn twelve_bits_stored_in_sixteen_are_recognized_by_their_levels() {
     use ::tiff::encoder::colortype::Gray16;
     let data: Vec<u16> = (0..12).map(|i| 16 * (i + 3)).collect();
     let frame = decode(&tiff_of::<Gray16>(4, 3, &data)).unwrap();
@@ -87,7 +87,7 @@ fn png_and_jpeg_are_read_in_grey_and_colour() {
 }
 
 #[test]
-fn what_is_no_image_says_what_was_found_and_expected() {
+fn an_unknown_format_reports_what_was_found_and_expected() {
     let text = decode(b"hello, world").unwrap_err().to_string();
     assert!(
         text.contains("\"hello, w\"") && text.contains("TIFF"),
@@ -170,7 +170,7 @@ proptest! {
         let mut bytes = sample(kind);
         let all = bytes.len();
         for (at, value) in changes {
-            // Headers are small, and where most can go wrong.
+            // Most damage matters in the headers, which are small.
             let range = if early { all.min(200) } else { all };
             bytes[usize::from(at) % range] = value;
         }
@@ -181,7 +181,7 @@ proptest! {
     }
 }
 
-/// How many kinds of small files [`sample`] makes.
+/// Number of kinds of files that [`sample`] makes.
 const SAMPLES: usize = 19;
 
 /// A small valid file of one of many kinds.
@@ -273,7 +273,7 @@ fn plain_and_binary_grey_maps_keep_the_levels_of_their_own_depth() {
     }
     let bits = decode(b"P1 3 3 1 0 1 0 1 0 1 0 1\n").unwrap();
     assert_eq!(bits.pixels[..3], [0.0, 1.0, 0.0], "1 is black");
-    // Without its type the decoder would take such levels for bytes.
+    // Without a TUPLTYPE, the decoder would read such levels as bytes.
     let untyped = b"P7\nWIDTH 3\nHEIGHT 3\nDEPTH 1\nMAXVAL 65535\nENDHDR\n012345678012345678";
     assert!(matches!(
         decode(untyped),
@@ -327,7 +327,7 @@ fn tiffs_of_any_integer_and_float_are_read() {
     );
 }
 
-/// A TIFF by hand, for what the encoder does not write: little-endian, one strip a plane.
+/// Builds a TIFF that the encoder cannot write: little-endian, one strip per plane.
 fn tiff_by_hand(tags: &[(u16, u32)], planes: &[&[u8]]) -> Vec<u8> {
     let entries = tags.len() + 2;
     let after = 8 + 2 + 12 * entries as u32 + 4;
@@ -347,7 +347,7 @@ fn tiff_by_hand(tags: &[(u16, u32)], planes: &[&[u8]]) -> Vec<u8> {
     bytes.extend((entries as u16).to_le_bytes());
     for (tag, count, value) in all {
         bytes.extend(tag.to_le_bytes());
-        // Places are LONG, the others SHORT.
+        // Offsets are LONG, other values SHORT.
         let kind: u16 = if [273, 279].contains(&tag) { 4 } else { 3 };
         bytes.extend(kind.to_le_bytes());
         bytes.extend(count.to_le_bytes());
@@ -365,7 +365,7 @@ fn tiff_by_hand(tags: &[(u16, u32)], planes: &[&[u8]]) -> Vec<u8> {
 fn tiffs_of_few_bits_white_as_zero_and_planes_apart_are_read() {
     const SIZE: [(u16, u32); 2] = [(256, 5), (257, 3)];
     let tags = |more: &[(u16, u32)]| [&SIZE, more].concat();
-    // Rows of five samples begin with a byte of their own.
+    // Each row of five samples begins at a byte.
     let bits = tiff_by_hand(&tags(&[(258, 1), (262, 1)]), &[&[0b1010_1000, 0, 0xff]]);
     let frame = decode(&bits).unwrap();
     assert_eq!(frame.pixels[..6], [1.0, 0.0, 1.0, 0.0, 1.0, 0.0]);
@@ -447,7 +447,7 @@ fn infinities_have_no_value_and_alone_make_no_frame() {
 }
 
 #[test]
-fn a_stream_without_an_end_is_left_where_it_is_no_image_or_too_long() {
+fn an_endless_stream_is_refused_if_no_image_or_too_long() {
     let zeros = read_stream(std::io::repeat(0), None).unwrap_err();
     assert!(matches!(zeros, FrameError::UnknownFormat { .. }), "{zeros}");
     let nothing = read_stream(std::io::empty(), None).unwrap_err();
@@ -466,7 +466,7 @@ fn a_stream_without_an_end_is_left_where_it_is_no_image_or_too_long() {
 }
 
 #[test]
-fn words_in_one_piece_and_words_in_pieces_are_read_alike() {
+fn contiguous_and_scattered_words_are_read_alike() {
     const TAGS: [(u16, u32); 5] = [(256, 5), (257, 3), (258, 16), (262, 1), (278, 1)];
     let levels: [u16; 15] = std::array::from_fn(|i| 4000 * i as u16 + 1);
     let expected: Vec<f32> = levels.map(f32::from).into();
@@ -478,21 +478,21 @@ fn words_in_one_piece_and_words_in_pieces_are_read_alike() {
     let whole = tiff_by_hand(&TAGS, &strips);
     assert_eq!(decode(&whole).unwrap().pixels, expected);
     assert_eq!(decode(&whole).unwrap().saturation_adu, Some(65535.0));
-    // The last two strips change places, in the file and in the table.
+    // Swaps the last two strips, in the file and in the table.
     let mut pieces = tiff_by_hand(&TAGS, &[strips[0], strips[2], strips[1]]);
     let table = pieces.len() - 30 - 24;
     let (left, right) = pieces[table + 4..table + 12].split_at_mut(4);
     left.swap_with_slice(right);
     assert_eq!(decode(&pieces).unwrap().pixels, expected);
-    // Where white is 0, levels are turned round.
+    // With white as 0, levels are inverted.
     let white_is_zero = TAGS.map(|(tag, value)| (tag, if tag == 262 { 0 } else { value }));
-    let turned = decode(&tiff_by_hand(&white_is_zero, &strips)).unwrap();
-    assert_eq!(turned.pixels[1], 65535.0 - expected[1]);
+    let inverted = decode(&tiff_by_hand(&white_is_zero, &strips)).unwrap();
+    assert_eq!(inverted.pixels[1], 65535.0 - expected[1]);
     assert!(decode(&whole[..whole.len() - 1]).is_err(), "cut short");
 }
 
 #[test]
-fn words_of_either_order_are_read_alike() {
+fn words_of_either_byte_order_are_read_alike() {
     let levels: [u16; 9] = std::array::from_fn(|i| 300 * i as u16 + 7);
     let mut bytes = b"MM\0*\0\0\0\x08\0\x06".to_vec();
     for (tag, value) in [

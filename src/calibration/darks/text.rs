@@ -1,6 +1,8 @@
 //! The report on dark frames as text.
 
-use super::report::{DarkCurrentReport, DarksReport, ExposureReport, PatternReport};
+use super::report::{
+    DarkCurrentReport, DarksReport, ExposureReport, HotPixelsReport, PatternReport,
+};
 use crate::base::format::counted;
 use std::fmt::Write as _;
 
@@ -52,19 +54,7 @@ impl DarksReport {
                 plus_minus(current.bias_adu, current.bias_sigma_adu, "ADU"),
             );
         }
-        let hot = &self.hot_pixels;
-        line(
-            "hot pixels",
-            format!(
-                "{} ({:.4} %) beyond {} deviations: {} by level, {} by dark current, {} by noise",
-                hot.count,
-                hot.share * 100.0,
-                hot.hot_sigma,
-                hot.by_level,
-                hot.by_dark_current,
-                hot.by_noise
-            ),
-        );
+        line("hot pixels", hot_pixels_text(&self.hot_pixels));
         for (what, reason) in &self.missing {
             line("not known", format!("{}: {reason}", what.replace('_', " ")));
         }
@@ -123,6 +113,18 @@ fn pattern_text(pattern: &PatternReport) -> String {
     format!(
         "{fixed}; of columns {:.3}, of rows {:.3} ADU",
         pattern.column_adu, pattern.row_adu
+    )
+}
+
+fn hot_pixels_text(hot: &HotPixelsReport) -> String {
+    format!(
+        "{} ({:.4} %) beyond {} deviations: {} by level, {} by dark current, {} by noise",
+        hot.count,
+        hot.share * 100.0,
+        hot.hot_sigma,
+        hot.by_level,
+        hot.by_dark_current,
+        hot.by_noise
     )
 }
 

@@ -113,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_name_that_was_meant_is_found() {
+    fn the_most_similar_name_is_found() {
         let nearest = |name| {
             nearest_name(
                 name,

@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn no_row_is_lost_where_there_is_no_heading() {
+    fn no_row_is_lost_without_a_heading() {
         let rows = "400,0.2\n500,0.6\n";
         let expected = Response::Table(vec![(400.0, 0.2), (500.0, 0.6)]);
         for head in [
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_table_is_refused_with_its_line() {
+    fn an_invalid_table_is_refused_with_its_line() {
         for (text, expected) in [
             (
                 "nm,qe\n400,0.2\n390,0.3\n",

@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_text_goes_on_without_tearing_its_quotation_marks() {
+    fn a_long_text_is_continued_without_splitting_doubled_marks() {
         let mut header = FitsHeader::default();
         let long = format!("{}''{}", "a".repeat(65), "b".repeat(80));
         header.text("ORIGIN", &long, "made up");
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_has_no_value() {
+    fn nan_has_no_value() {
         let mut header = FitsHeader::default();
         header.real("GAIN", f64::NAN, "unknown");
         header.real("SMALL", -1.234_567_890_123_456e-300, "");

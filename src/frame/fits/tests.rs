@@ -2,7 +2,7 @@ use super::header::BLOCK_BYTES;
 use super::*;
 use proptest::prelude::*;
 
-/// A header-data unit of these cards and data, padded as the standard wants it.
+/// A header-data unit of these cards and data, padded to blocks.
 fn unit(cards: &[&str], data: &[u8]) -> Vec<u8> {
     let mut text: String = cards.iter().map(|card| format!("{card:<80}")).collect();
     text += &format!("{:<80}", "END");
@@ -111,7 +111,7 @@ fn every_bitpix_is_read() {
 }
 
 #[test]
-fn the_unsigned_and_signed_likes_of_bzero_keep_their_full_scale() {
+fn the_other_unsigned_and_signed_types_keep_their_full_scale() {
     let bytes = [0x80_u8, 0, 0x7f, 0xff].repeat(9);
     let zero = ["BZERO   = 2147483648.0"];
     let frame = decode(&image(32, &[3, 3], &zero, &bytes), None).unwrap();
@@ -221,7 +221,7 @@ fn files_without_an_image_say_what_they_hold() {
 }
 
 #[test]
-fn damage_is_named_with_its_place() {
+fn damage_is_reported_with_its_offset() {
     let bad = |card: &str, instead: &str| {
         let bytes = image(16, &[3, 3], &["BSCALE  = 1"], &words(&[1; 9]));
         let text: String = bytes.iter().map(|b| char::from(*b)).collect();
@@ -291,7 +291,7 @@ fn a_truncated_image_says_how_many_bytes_are_there_and_needed() {
         error_of(&bytes[..9999], None),
         "truncated FITS: found 9999 bytes, expected more (the image of 100 x 100 pixels ends at byte 22880)"
     );
-    // The padding behind the last pixel is not needed.
+    // The padding after the last pixel is not needed.
     assert!(decode(&bytes[..22_880], None).is_ok());
     assert!(error_of(&bytes[..22_879], None).contains("truncated"));
     assert!(error_of(&bytes[..300], None).contains("has no END"));
@@ -303,7 +303,7 @@ fn a_truncated_image_says_how_many_bytes_are_there_and_needed() {
 }
 
 #[test]
-fn sizes_beyond_all_numbers_are_refused() {
+fn overflowing_sizes_are_refused() {
     let huge = usize::MAX / 2;
     for axes in [
         vec![huge, huge],
@@ -314,7 +314,7 @@ fn sizes_beyond_all_numbers_are_refused() {
             assert!(decode(&image(-64, &axes, &[], &[]), page).is_err());
         }
     }
-    // A table that claims to be endless leaves nothing behind it.
+    // Nothing can follow a table of absurd size.
     let mut endless = table(&["NAXIS2  = 9"]);
     let at = endless.windows(6).position(|w| w == b"PCOUNT").unwrap();
     endless[at + 10..at + 29].copy_from_slice(b"9223372036854775807");
@@ -421,7 +421,7 @@ fn the_site_is_read_in_all_its_keywords() {
 }
 
 #[test]
-fn absurd_keywords_are_noted_and_the_next_is_taken() {
+fn absurd_values_are_recorded_and_the_next_keyword_is_used() {
     let metadata = metadata_of(&[
         "DATE-OBS= '0000-00-00T00:00:00'",
         "MJD-OBS = 51544.5",

@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_keyword_that_is_none_or_the_writers_own_is_refused() {
+    fn invalid_and_reserved_keywords_are_refused() {
         let frame = frame_of(vec![1.0; 9]);
         for keyword in [
             "",
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_that_16_bits_do_not_hold_is_named() {
+    fn a_level_outside_16_bits_is_reported() {
         for value in [-1.0, 65536.0, 0.5, f32::NAN] {
             let mut pixels = vec![0.0; 12];
             pixels[7] = value;
@@ -247,7 +247,7 @@ mod tests {
             prop_assert_eq!(crate::frame::decode(&bytes).unwrap().pixels, whole.pixels);
             let bits = |frame: &Frame| frame.pixels.iter().map(|p| p.to_bits()).collect::<Vec<_>>();
             let any = words.iter().map(|w| f32::from_bits(*w)).collect();
-            // Infinities are no values, and some NaN is like another.
+            // Infinities become NaN, and all NaN count as equal.
             let mut any: Vec<f32> = any;
             any[0] = 1.0;
             any.iter_mut().filter(|p| !p.is_finite()).for_each(|p| *p = f32::NAN);
