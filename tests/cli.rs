@@ -626,7 +626,7 @@ fn a_bad_list_is_named_with_its_line() {
     for (content, expected) in [
         ("", "empty"),
         ("a,b\n1,2\n", "line 1"),
-        ("x,y,flux\n", "no centroid"),
+        ("x,y,flux\n", "without centroids"),
         ("x,y,flux\n1,2,3\n1,2,three\n", "line 3: column flux"),
         ("x,y,flux\n1,2,-3\n", "line 2: column flux"),
         ("x,y,flux\n1,NaN,3\n", "line 2: column y"),
