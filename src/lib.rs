@@ -44,8 +44,8 @@
 //! | [`frame`] | what a file holds: readers, writers, metadata |
 //! | [`camera`] | what instrument: geometry, data sheet |
 //! | [`calibration`] | what the detector does to a frame: darks, flats, hot pixels |
-//! | [`detect`] | where is light: background, threshold, centroids |
-//! | [`identify`] | which stars, which attitude, or why not |
+//! | [`detect`](mod@detect) | where is light: background, threshold, centroids |
+//! | [`identify`](mod@identify) | which stars, which attitude, or why not |
 //! | [`model`] | what should be seen: sensitivity, defocus, simulated frames |
 //! | [`photometry`] | how bright, how faint: zero point, completeness, comparison with the prediction |
 //! | [`pipeline`] | what does a frame show: the stages in order |

@@ -228,12 +228,12 @@ fn darks_and_flats_have_no_table_and_no_sky() {
     refused(
         &out,
         &["--dark", "--force", "--trails=2"],
-        "none of the options of the scene",
+        "the options of the scene do not apply",
     );
     refused(
         &out,
         &["--flat=1", "--rate-x-deg-s=1"],
-        "none of the options of the scene",
+        "the options of the scene do not apply",
     );
 }
 

@@ -1,8 +1,10 @@
 //! The command line: arguments → settings → the library's work → output and exit status.
 //!
-//! - Each command is one file or folder: its arguments, and a function that returns an [`exit::Outcome`].
+//! - Each command is one file or folder: its arguments, and a function that returns an
+//!   [`exit::Outcome`].
 //! - `options`, `input`, `output`, `batch`, `progress` and `plot` hold what several commands share.
-//! - Only `run` and the reports of `solving`, which appear frame by frame, write to standard output.
+//! - Only `run` and the reports of `solving`, which appear frame by frame, write to standard
+//!   output.
 
 mod batch;
 mod camera;

@@ -208,7 +208,7 @@ impl FrameSearch {
         let gaussian = config
             .threshold_sigma
             .unwrap_or_else(|| gaussian_threshold(config, size, spot_px, &kernel));
-        filtered.filter(view, mesh, &kernel, config.cell_px, gaussian);
+        filtered.filter(view, mesh, &kernel, (config.cell_px, gaussian));
         let frame_noise = FrameNoise {
             view,
             background,

@@ -3,11 +3,11 @@
 //! [`StarField`] (positions and magnitudes) and [`Priors`] → [`Identification`]: catalogue stars,
 //! attitude and scale, or the [`SearchFailure`].
 //!
-//! 1. [`search`]: triangles of bright observed stars are looked up in an index of catalogue
+//! 1. `search`: triangles of bright observed stars are looked up in an index of catalogue
 //!    triangles. Each similar triangle is a hypothesis, which further stars confirm or refute.
-//! 2. [`refine`]: the hypothesis is fitted to all the stars that agree, with as much lens
+//! 2. `refine`: the hypothesis is fitted to all the stars that agree, with as much lens
 //!    distortion as they support.
-//! 3. [`false_alarm`]: the probability that chance gives as good an answer decides.
+//! 3. `false_alarm`: the probability that chance gives as good an answer decides.
 //! 4. [`diagnosis`]: where nothing is identified, why.
 //!
 //! Caveats: fields from about 1.5° to 60°, a pinhole camera with the optical axis at the frame's

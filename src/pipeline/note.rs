@@ -80,9 +80,9 @@ impl Note {
             let lacks_time = priors.site.is_some() && outcome.identification().is_some();
             return lacks_time.then_some(Self::NoTimeOfDay);
         };
-        observation.apparent.is_none().then(|| Self::BelowHorizon {
-            depth_rad: observation.zenith_distance_rad - std::f64::consts::FRAC_PI_2,
-        })
+        let depth_rad = observation.zenith_distance_rad - std::f64::consts::FRAC_PI_2;
+        let is_below = observation.apparent.is_none();
+        is_below.then_some(Self::BelowHorizon { depth_rad })
     }
 
     /// The contradictions with the stated camera, or why it was not compared.

@@ -2,8 +2,8 @@
 //!
 //! `camera.toml` → [`DataSheet`]. Lengths are in mm and µm, charges in electrons, times in seconds.
 //!
-//! - [`DataSheet::read`] reads a file with the keys in [`KEYS`]; [`template`] writes one with
-//!   comments.
+//! - [`DataSheet::read`] reads a file with the keys in [`KEYS`]; [`template`](fn@template) writes
+//!   one with comments.
 //! - [`Preset`] lists the built-in cameras.
 //! - [`Response`] is a transmission or an efficiency: a number, or a CSV file with wavelength in
 //!   nanometres and value, which is interpolated.

@@ -1,6 +1,6 @@
 //! Background and noise of a frame: view of the pixels -> [`Mesh`].
 //!
-//! 1. The frame is divided into cells ([`CellGrid`]), which threads share row by row
+//! 1. The frame is divided into cells (`CellGrid`), which threads share row by row
 //!    ([`CellRows`]).
 //! 2. Each cell gets a mean and a standard deviation that ignore stars ([`CellMeasurer`]).
 //! 3. Gaps are filled, outliers replaced, the noise smoothed.

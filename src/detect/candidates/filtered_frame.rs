@@ -49,8 +49,7 @@ impl FilteredFrame {
         view: &View<'_>,
         background: &Mesh,
         kernel: &Kernel,
-        cell_px: usize,
-        threshold: f64,
+        (cell_px, threshold): (usize, f64),
     ) {
         let Self {
             mesh,

@@ -37,10 +37,10 @@ impl CumulantTable {
     }
 
     /// The table of K at 0, `step`, 2 `step`, …, which `next` returns one after the other.
-    pub fn new(step: f64, mut next: impl FnMut(usize) -> Cumulants) -> Self {
+    pub fn new(step: f64, next: impl FnMut(usize) -> Cumulants) -> Self {
         Self {
             step,
-            values: std::array::from_fn(|i| next(i)),
+            values: std::array::from_fn(next),
         }
     }
 

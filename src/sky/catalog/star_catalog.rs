@@ -10,13 +10,14 @@ use std::sync::OnceLock;
 /// A star catalogue: stars, brightest first, and their names.
 ///
 /// ```
-/// use starpipe::sky::catalog::Catalog;
+/// use starpipe::sky::catalog::{Catalog, StarIndex};
 ///
 /// let catalog = Catalog::built_in();
 /// let to_naked_eye = &catalog.stars()[..catalog.brighter_than(6.0)];
 /// assert_eq!(to_naked_eye.len(), 5008);
-/// assert_eq!(catalog.designation(0), "06450045");
-/// assert_eq!(catalog.name_of(0), Some("9 alp CMa"));
+/// let sirius = StarIndex::new(0);
+/// assert_eq!(catalog.designation(sirius), "06450045");
+/// assert_eq!(catalog.name_of(sirius), Some("9 alp CMa"));
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Catalog {

@@ -17,8 +17,8 @@ use xxhash_rust::xxh3::xxh3_64;
 /// Decodes a compact catalogue.
 ///
 /// # Errors
-/// [`CompactError`] for anything that [`encode`](super::encode) does not write: another version, a
-/// wrong length or checksum, a value out of range, stars or names out of order.
+/// [`CompactError`] for anything that [`encode`](fn@super::encode) does not write: another version,
+/// a wrong length or checksum, a value out of range, stars or names out of order.
 pub(in crate::sky::catalog) fn decode(bytes: &[u8]) -> Result<Contents, CompactError> {
     let header = Header::read(bytes)?;
     header.check_length(bytes)?;

@@ -3,7 +3,7 @@
 //! 1. [`OpenedFile`] decompresses a file and shows its first bytes, which tell its kind.
 //! 2. [`Rows`] splits its content into rows, many at once.
 //! 3. A [`Format`] parses each row; [`Tally`] collects the stars and counts the other records.
-//! 4. [`combine`] makes the catalogue of all files, without repeated identifiers.
+//! 4. [`combine`](fn@combine) makes the catalogue of all files, without repeated identifiers.
 
 mod combine;
 mod opened;
