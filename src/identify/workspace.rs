@@ -11,7 +11,7 @@ use super::refine::{Refined, Start};
 use super::search::{Buffers, Found, LOG10_FALSE_ALARM_LIMIT, Search};
 use crate::camera::DistortionModel;
 
-/// The brightest stars, so many, decide how much distortion there is.
+/// Number of stars, the brightest, that decide how much distortion is fitted.
 const CALIBRATION_STARS: usize = 120;
 /// First pairing radius of the final fit, in units of the frame's diagonal.
 const FINAL_RADIUS_SHARE: f64 = 0.005;
