@@ -14,7 +14,9 @@ use super::psf::PIXEL_VARIANCE_PX2;
 use super::star_model::{
     DEFAULT_SPOT_PX, SpotSize, StarModel, fit_bright_stars, fit_raw_stars, spot_size, star_model,
 };
-use super::threshold::{FrameNoise, NoiseBuffers, gaussian_threshold};
+use super::threshold::{
+    FilterWeights, FrameNoise, NoiseBuffers, gaussian_threshold, raise_filtered_noise,
+};
 
 /// A guessed spot size must be right within this factor; else the frame is filtered again.
 const SPOT_GUESS_TOLERANCE: f64 = 1.15;
@@ -209,6 +211,8 @@ impl FrameSearch {
             .threshold_sigma
             .unwrap_or_else(|| gaussian_threshold(config, size, spot_px, &kernel));
         filtered.filter(view, mesh, &kernel, (config.cell_px, gaussian));
+        let filter = FilterWeights::for_spot(spot_px, kernel.radius(), size);
+        raise_filtered_noise(&background.cut_off, &mut filtered.mesh, gaussian, &filter);
         let frame_noise = FrameNoise {
             view,
             background,
@@ -217,7 +221,7 @@ impl FrameSearch {
         };
         let threshold = config
             .threshold_sigma
-            .unwrap_or_else(|| frame_noise.raised_threshold(gaussian, spot_px, &kernel, noise));
+            .unwrap_or_else(|| frame_noise.raised_threshold(gaussian, spot_px, &filter, noise));
         filtered.gather_missed(view, mesh, &kernel, threshold as f32);
         let spot_width_px = (spot_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt();
         let search_config = SearchConfig {

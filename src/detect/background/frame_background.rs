@@ -2,10 +2,14 @@
 
 use super::cell_rows::CellRows;
 use super::cells::CellMeasurer;
+use super::cut_off::CutOff;
 use super::mesh::Mesh;
 use super::mesh_config::MeshConfig;
 use crate::detect::pixels::{BlockMaxima, View, largest_magnitude_in_row, lower, lowest_in_row};
 
+/// Noise below this multiple of that of rounding, about half a step, is coarse: a few isolated
+/// pixels.
+const COARSE: f32 = 1.75;
 /// The standard deviation of rounding to whole steps, over the step: 1/√12.
 const ROUNDING_SIGMA: f32 = 0.288_675_13;
 /// The precision of single-precision pixels, relative to the largest.
@@ -20,6 +24,10 @@ pub(crate) struct FrameBackground {
     pub median_adu: f64,
     /// Median of the noise over the mesh, in ADU.
     pub median_sigma_adu: f64,
+    /// Whether the noise is coarse: about half a step or less.
+    pub is_coarse: bool,
+    /// Where the noise is cut off at the lowest value.
+    pub cut_off: CutOff,
     /// The lowest sampled pixel of each row of cells, in ADU.
     lowest_adu: Vec<f32>,
     /// One for each thread.
@@ -49,7 +57,14 @@ impl FrameBackground {
             let output = (cells.background, cells.sigma);
             worker.measure_row(&grid, rows, &config, output);
         });
+        let coarse_adu = COARSE * self.mesh.sigma_floor;
+        let lowest_adu = self.lowest_adu();
+        self.cut_off
+            .find(view, &mut self.mesh, lowest_adu, coarse_adu);
         self.mesh.finish();
+        let beneath_adu = median(&self.mesh.sigma, &mut self.sorted);
+        self.is_coarse = beneath_adu < f64::from(coarse_adu);
+        self.cut_off.apply(&mut self.mesh);
         self.median_adu = median(&self.mesh.background, &mut self.sorted);
         self.median_sigma_adu = median(&self.mesh.sigma, &mut self.sorted);
     }

@@ -42,6 +42,15 @@ impl CellGrid {
         row * self.height_px / self.rows..(row + 1) * self.height_px / self.rows
     }
 
+    /// The cell that holds a pixel, or one next to it, row by row.
+    pub fn cell_at(&self, x: usize, y: usize) -> usize {
+        let (column, row) = (
+            x * self.columns / self.width_px,
+            y * self.rows / self.height_px,
+        );
+        row * self.columns + column
+    }
+
     /// Row sampling stride: every this many rows of pixels are measured.
     pub fn row_stride(&self) -> usize {
         let cell_px = (self.width_px / self.columns) * (self.height_px / self.rows);

@@ -168,8 +168,8 @@ impl Mesh {
         }));
     }
 
-    /// Sets the pieces along each row of nodes.
-    fn set_pieces(&mut self) {
+    /// Sets the pieces along each row of nodes: after any change of background or noise.
+    pub fn set_pieces(&mut self) {
         let columns = self.grid.columns;
         self.pieces.clear();
         for row in 0..self.grid.rows {

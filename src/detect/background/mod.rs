@@ -5,10 +5,15 @@
 //! 2. Each cell gets a mean and a standard deviation that ignore stars ([`CellMeasurer`]).
 //! 3. Gaps are filled, outliers replaced, the noise smoothed.
 //! 4. Between the cells' centres both are interpolated.
+//!
+//! Cells in which the noise is cut off at the frame's lowest value are measured by themselves
+//! ([`CutOff`]), before step 3.
 
 mod cell_rows;
 mod cells;
+mod censored_noise;
 mod clipping;
+mod cut_off;
 mod frame_background;
 mod grid;
 mod medians;
@@ -18,6 +23,8 @@ mod smoothing;
 
 pub(crate) use cell_rows::CellRows;
 pub(crate) use cells::CellMeasurer;
+pub(crate) use censored_noise::{CensoredNoise, MAX_DEPTH};
+pub(crate) use cut_off::{CutOff, REACH_SIGMA};
 pub(crate) use frame_background::{FrameBackground, median, rounding_sigma_adu, sigma_floor};
 pub(crate) use mesh::{Mesh, Piece};
 pub(crate) use mesh_config::MeshConfig;

@@ -12,9 +12,6 @@ use crate::detect::filter::Kernel;
 use crate::detect::pixels::{BlockMaxima, View};
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
 
-/// Noise below this multiple of that of rounding, about half a step, is coarse: a few isolated
-/// pixels.
-const COARSE: f64 = 1.75;
 /// Coarse noise is measured again where it raises the threshold by more than this.
 const REPEAT_AT_RAISE: f64 = 0.2;
 
@@ -59,29 +56,24 @@ impl FrameNoise<'_> {
         &self,
         u: f64,
         spot_px: f64,
-        kernel: &Kernel,
+        filter: &FilterWeights,
         buffers: &mut NoiseBuffers,
     ) -> f64 {
-        let size = (self.view.width, self.view.height);
-        let filter = FilterWeights::for_spot(spot_px, kernel.radius(), size);
         let mesh = &self.background.mesh;
-        let sigma = self.background.median_sigma_adu;
-        let is_coarse = sigma < COARSE * f64::from(mesh.sigma_floor);
-        if is_coarse || self.is_cut_off() {
-            return self.raised_for_histogram(u, &filter, is_coarse, buffers);
+        if self.background.is_coarse || self.background.cut_off.is_any() {
+            return self.raised_for_histogram(u, filter, buffers);
         }
         let star_free = self.star_free(u);
         let skewness = photon_skewness(self.view, mesh, &star_free, spot_px, buffers);
-        skewness.map_or(u, |s| threshold_for_photons(u, s, &filter))
+        skewness.map_or(u, |s| threshold_for_photons(u, s, filter))
     }
 
     /// The threshold `u` raised for noise that is coarse or cut off, by the distribution of the
-    /// pixels.
+    /// pixels: where it is cut off, of those of which little is.
     fn raised_for_histogram(
         &self,
         u: f64,
         filter: &FilterWeights,
-        is_coarse: bool,
         buffers: &mut NoiseBuffers,
     ) -> f64 {
         let floor = f64::from(self.filtered_mesh.sigma_floor);
@@ -95,7 +87,11 @@ impl FrameNoise<'_> {
             })
         };
         // The isolated pixels of coarse noise are high, but they are no stars.
-        let limit = if is_coarse { 2.0 * u } else { u };
+        let limit = if self.background.is_coarse {
+            2.0 * u
+        } else {
+            u
+        };
         let first = raised(limit);
         if first > limit + REPEAT_AT_RAISE {
             // Pixels between the two limits were left out, but are noise.
@@ -110,28 +106,8 @@ impl FrameNoise<'_> {
         StarFree {
             maxima: self.filtered_maxima,
             filtered_mesh: self.filtered_mesh,
+            cut_off: &self.background.cut_off,
             limit: limit as f32,
         }
-    }
-
-    /// Whether the noise is cut off at the frame's lowest value: many pixels have just that value.
-    fn is_cut_off(&self) -> bool {
-        /// Row sampling stride.
-        const STRIDE: usize = 16;
-        /// The lowest value of noise that is not cut off is further below the background, in σ.
-        const SIGMAS: f32 = 2.5;
-        /// Of noise that is cut off, one pixel in this many has the lowest value.
-        const ONE_IN: usize = 50;
-        let view = self.view;
-        let lowest = self.background.lowest_adu();
-        let below = self.background.median_adu - f64::from(lowest);
-        if below >= f64::from(SIGMAS) * self.background.median_sigma_adu {
-            return false;
-        }
-        let rows = (0..view.height).step_by(STRIDE).map(|y| view.row(y));
-        let count = |row: &[f32]| row.iter().map(|&v| u32::from(v == lowest)).sum::<u32>();
-        let at_lowest: usize = rows.map(|row| count(row) as usize).sum();
-        let total = view.width * view.height.div_ceil(STRIDE);
-        at_lowest * ONE_IN > total
     }
 }

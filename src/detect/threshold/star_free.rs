@@ -1,11 +1,15 @@
-//! Which pixels of a frame are free of stars, so that its noise can be measured on them.
+//! Which pixels of a frame are free of stars, so that its noise can be measured on them. Where much
+//! of the noise is cut off, it is known otherwise.
 
-use crate::detect::background::{Mesh, Piece};
+use crate::detect::background::{CutOff, Mesh, Piece};
 use crate::detect::pixels::{BLOCK_PX, BlockMaxima, View};
 use std::ops::Range;
 
 /// Rows above and below that must be free of stars as well: their wings.
 const WING_ROWS: [usize; 2] = [4, 9];
+/// Noise of which more is cut off is another distribution than that of the rest of the frame: the
+/// cut is farther above the background than this, in standard deviations.
+const MAX_DEPTH: f32 = -1.0;
 /// Fewer samples than this do not determine the tails of the noise.
 pub(crate) const MIN_SAMPLES: f64 = 2000.0;
 
@@ -24,12 +28,15 @@ pub(crate) struct NoiseBuffers {
     pub sorted: Vec<f32>,
 }
 
-/// The part of a frame without stars: where the filtered frame stays below a limit.
+/// The part of a frame without stars, of whose noise little is cut off: where the filtered frame stays
+/// below a limit.
 pub(crate) struct StarFree<'a> {
     /// The maxima of the blocks of the filtered frame that hold candidates.
     pub maxima: &'a BlockMaxima,
     /// The mesh of the filtered frame.
     pub filtered_mesh: &'a Mesh,
+    /// Where the noise is cut off.
+    pub cut_off: &'a CutOff,
     /// The limit, in standard deviations of the filtered noise.
     pub limit: f32,
 }
@@ -53,6 +60,9 @@ impl StarFree<'_> {
         ]
         .map(|row| self.maxima.row(row));
         self.filtered_mesh.across_row(y, nodes);
+        let grid = &self.filtered_mesh.grid;
+        let depth_at = |x: usize| self.cut_off.depth.get(grid.cell_at(x, y));
+        let is_cut_off = |x: usize| depth_at(x).is_some_and(|&depth| depth > MAX_DEPTH);
         let mut free = 0..0;
         for block in 0..rows[0].len() {
             let start = block * BLOCK_PX;
@@ -60,7 +70,7 @@ impl StarFree<'_> {
             let middle = (start + end) as f32 * 0.5;
             let (mean, sigma) = self.filtered_mesh.at_column(nodes, middle);
             let limit = mean + self.limit * sigma;
-            if rows.iter().all(|r| r[block] < limit) {
+            if rows.iter().all(|r| r[block] < limit) && !is_cut_off(start) {
                 free.end = end;
             } else {
                 if !free.is_empty() {
