@@ -82,12 +82,12 @@ class Checks:
         return self.frames(camera, *options)[0]
 
     def star(self, number):
-        """RA, Dec (degrees), proper motions (mas a year), V and B-V of a Skymap number."""
+        """RA, Dec (degrees), proper motions (mas a year), V and B-V of the star "SKYMAP nnnnnnnn"."""
         if not self.stars:
             for line in gzip.open(self.catalog, "rt", encoding="latin-1"):
                 if line[27:35].strip():
                     self.stars[int(line[27:35])] = line
-        line = self.stars[int(number)]
+        line = self.stars[int(number.removeprefix("SKYMAP "))]
         cut = lambda first, last: line[first - 1 : last].strip().replace(" ", "")
         value = lambda first, last: float(cut(first, last) or 0)
         ra = 15 * (value(119, 120) + value(121, 122) / 60 + value(123, 129) / 3600)
@@ -189,7 +189,7 @@ def positions(checks):
         camera, toml = checks.camera(**keys)
         where = ["--ra", ra, "--dec", dec, "--roll", roll, "--date", date + "Z"]
         _, header, rows = checks.frame(camera, *where)
-        rows = [row for row in rows if row["kind"] == "star" and row["id"].isdigit()]
+        rows = [row for row in rows if row["kind"] == "star" and row["id"].startswith("SKYMAP ")]
         seen = np.array([[float(row["x"]), float(row["y"])] for row in rows])
         star_ra, star_dec = at_date([checks.star(row["id"]) for row in rows], date)
         print(f"positions: {name}, {len(rows)} stars")

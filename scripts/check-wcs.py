@@ -5,10 +5,12 @@
 
 For every DIR/*.wcs:
 - the directions of the identified stars in the .csv beside it, mapped to pixels by the header's
-  inverse (AP, BP) and by astropy's inversion of A and B, agree with the observed positions up to
-  the residual in the .csv;
+  inverse (AP, BP) and by astropy's inversion of A and B, are as far from the observed positions as
+  the residual in the .csv says;
+- the directions of the other detections are those of their pixels;
 - a grid over the frame returns to itself through the sky;
 - the centre and the position angle of up are those in the .json.
+A header refers to the rows of its file, which run upwards where the .json says "bottom-up".
 Prints the largest differences in pixels for each frame. Exits with 1 if one reaches TOLERANCE_PX.
 """
 
@@ -22,16 +24,26 @@ import numpy as np
 from astropy.io import fits
 from astropy.wcs import WCS
 
-TOLERANCE_PX = 0.1
+TOLERANCE_PX = 0.02
 ANGLE_TOLERANCE_DEG = 1e-5
 
 
-def stars(path):
-    """Pixel positions (0-based), directions and residuals of the identified stars."""
+def detections(path, report):
+    """File positions (0-based), directions and residuals: of the named stars, and of the others."""
     with open(path, newline="") as file:
-        rows = [row for row in csv.DictReader(file) if row["id"]]
-    column = lambda name: np.array([float(row[name]) for row in rows])
-    return column("x"), column("y"), column("ra_deg"), column("dec_deg"), column("residual_px")
+        rows = list(csv.DictReader(file))
+
+    def columns(rows):
+        column = lambda name: np.array([float(row[name] or 0) for row in rows])
+        x, y = column("x"), column("y")
+        return x, in_file(y, report), column("ra_deg"), column("dec_deg"), column("residual_px")
+
+    return columns([row for row in rows if row["id"]]), columns([row for row in rows if not row["id"]])
+
+
+def in_file(y, report):
+    """Rows of the file, from 0, of rows of the picture."""
+    return report["height"] - 1 - y if report.get("row_order") == "bottom-up" else y
 
 
 def by_header_inverse(wcs, ra, dec):
@@ -54,7 +66,7 @@ def angles(wcs, report):
     to_unit = lambda ra, dec: np.array(
         [np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)]
     )
-    at = lambda x, y: to_unit(*np.radians(wcs.all_pix2world(x, y, 0)))
+    at = lambda x, y: to_unit(*np.radians(wcs.all_pix2world(x, in_file(y, report), 0)))
     attitude = report["attitude"]
     ra, dec = np.radians([attitude["ra_deg"], attitude["dec_deg"]])
     centre = to_unit(ra, dec)
@@ -75,11 +87,15 @@ def check(path):
     header = fits.getheader(path)
     wcs = WCS(header)
     report = json.loads(path.with_suffix(".json").read_text())
-    x, y, ra, dec, residual = stars(path.with_suffix(".csv"))
+    (x, y, ra, dec, residual), unnamed = detections(path.with_suffix(".csv"), report)
 
-    # The residual is the distance between the position by the header and the observed one.
+    # The residual is the distance between the star's own position by the header and the observed one.
     exact = wcs.all_world2pix(ra, dec, 0, tolerance=1e-7, maxiter=100)
     residuals = float(np.max(np.abs(np.hypot(exact[0] - x, exact[1] - y) - residual)))
+    others = 0.0
+    if len(unnamed[0]):
+        there = wcs.all_world2pix(unnamed[2], unnamed[3], 0, tolerance=1e-7, maxiter=100)
+        others = largest(*there, *unnamed[:2])
     inverse = largest(*by_header_inverse(wcs, ra, dec), *exact)
 
     width, height = report["width"], report["height"]
@@ -88,9 +104,9 @@ def check(path):
     sky = wcs.all_pix2world(gx, gy, 0)
     grid = largest(*by_header_inverse(wcs, *sky), gx, gy)
     off, turn = angles(wcs, report)
-    ok = max(residuals, inverse, grid) < TOLERANCE_PX and max(off, turn) < ANGLE_TOLERANCE_DEG
+    ok = max(residuals, others, inverse, grid) < TOLERANCE_PX and max(off, turn) < ANGLE_TOLERANCE_DEG
     print(
-        f"{path.name:45} {header['CTYPE1']:13} stars {len(x):5}  residuals {residuals:.5f} px  "
+        f"{path.name:45} {header['CTYPE1']:13} stars {len(x):5}  residuals {residuals:.5f} px  others {others:.5f} px  "
         f"AP/BP at stars {inverse:.5f} px  grid and back {grid:.5f} px  "
         f"centre {off * 3600:.4f}\"  up {turn * 3600:.4f}\"  {'ok' if ok else 'WRONG'}"
     )

@@ -272,10 +272,13 @@ fn known_stars_are_where_their_records_say() {
     }
     assert_eq!(
         catalog.designation(StarIndex::new(0)),
-        "06450045",
+        "SKYMAP 06450045",
         "Sirius is the brightest"
     );
-    assert_eq!(catalog.designation(star(catalog, 2_480_053).0), "02480053");
+    assert_eq!(
+        catalog.designation(star(catalog, 2_480_053).0),
+        "SKYMAP 02480053"
+    );
     // Vega, ESA 1997 (HIP 91262): 201.03 and 287.47 mas a year.
     let (_, vega) = star(catalog, 18_360_206);
     assert!((vega.pm_ra_mas_per_yr - 201.0).abs() < 1.0);
@@ -299,7 +302,8 @@ fn the_stars_of_the_papers_have_their_magnitudes_and_stand_where_tycho_2_has_the
                 row[column].parse().unwrap()
             };
             let (index, star) = star(Catalog::built_in(), value("skymap_number") as u32);
-            assert_eq!(Catalog::built_in().designation(index), row[0]);
+            let designation = Catalog::built_in().designation(index);
+            assert_eq!(designation, format!("SKYMAP {}", &row[0]));
             // The papers print two decimals; SKY2000 has three for some stars.
             let rounded = (f64::from(star.v_mag) * 100.0).round() / 100.0;
             assert_eq!(rounded, value("vmag"), "{}", star.id);
@@ -453,7 +457,7 @@ fn records_that_are_not_stars_are_counted_with_their_lines() {
         [
             "line 30, byte 233 (Vmag): found \" 2.o0 \", expected magnitudes from -32 to 32, in 0.001 mag",
             "line 40, byte 520: found the end of the line after 519 bytes, expected a record of 520 bytes",
-            "line 50, byte 28 (ID): found 00000001, expected an identifier that no record before has",
+            "line 50, byte 28 (ID): found SKYMAP 00000001, expected an identifier that no record before has",
         ]
     );
     assert_eq!(summary.unreadable[0].location, RecordLocation::Byte(233));

@@ -225,8 +225,8 @@ fn assert_is_bright(catalog: &Catalog, tolerance_arcsec: f64) {
     by_id.sort_by(|a, b| a.0.cmp(&b.0));
     for (index, ours) in catalog.stars().iter().enumerate() {
         let designation = catalog.designation(StarIndex::new(index));
-        let digits = designation.trim_start_matches("star ");
-        let key = format!("{digits:0>8}");
+        let digits = designation.trim_start_matches(|c: char| !c.is_ascii_digit());
+        let key = format!("SKYMAP {digits:0>8}");
         let theirs = by_id[by_id.binary_search_by(|entry| entry.0.cmp(&key)).unwrap()].1;
         assert_eq!(ours.v_mag, theirs.v_mag, "{designation}");
         let off_arcsec = ours.direction.angle_to(&theirs.direction) * ARCSEC_PER_RAD;
@@ -425,7 +425,7 @@ fn the_supplement_is_brought_to_j2000_and_read_together_with_the_main_catalogue(
     let catalog = Catalog::read(&folder.path().join("out.cat")).unwrap();
     // Sirius, which moves by 1.3″ a year, and SKY2000's position of 2000.
     let sirius = star(&catalog, "TYC 5949-2777-1");
-    let sky2000 = star(Catalog::built_in(), "06450045");
+    let sky2000 = star(Catalog::built_in(), "SKYMAP 06450045");
     assert!(sirius.direction.angle_to(&sky2000.direction) * ARCSEC_PER_RAD < 0.05);
     assert_eq!(sirius.v_mag, -1.088, "Hp stands for V");
     let moved = off_arcsec(sirius, 101.288_541_05, -16.713_143_06);
@@ -551,7 +551,7 @@ fn hipparcos_and_gaia_tables_are_read_with_their_own_units_and_epochs() {
         32349;101.28854105;-16.71314306;-1.44;-546.01;-1223.08;0.009\n";
     let reading = read(&folder.write("hip", hipparcos));
     let sirius = star(&reading.catalog, "HIP 32349");
-    let sky2000 = star(Catalog::built_in(), "06450045");
+    let sky2000 = star(Catalog::built_in(), "SKYMAP 06450045");
     assert!(sirius.direction.angle_to(&sky2000.direction) * ARCSEC_PER_RAD < 0.05);
     assert_eq!((sirius.v_mag, sirius.bv_mag), (-1.44, Some(0.009)));
     let kind = &reading.files[0].kind;
@@ -565,12 +565,12 @@ fn hipparcos_and_gaia_tables_are_read_with_their_own_units_and_epochs() {
         6917528443525529728,10.0,60.0,2016.0,1000.0,-500.0,12.25\n\
         4472832130942575872,20.0,-60.0,2016.0,,,9.5\n";
     let reading = read(&folder.write("gaia", gaia));
-    let found = star(&reading.catalog, "6917528443525529728");
+    let found = star(&reading.catalog, "ID 6917528443525529728");
     let (ra, dec) = (10.0 - 16.0 / 3600.0 / 0.5, 60.0 + 8.0 / 3600.0);
     assert!(off_arcsec(found, ra, dec) < 0.01);
     assert_eq!(found.v_mag, 12.25);
     assert!(
-        star(&reading.catalog, "4472832130942575872")
+        star(&reading.catalog, "ID 4472832130942575872")
             .flags
             .contains(StarFlags::NO_PROPER_MOTION)
     );
@@ -591,7 +591,7 @@ fn hipparcos_and_gaia_tables_are_read_with_their_own_units_and_epochs() {
     // VizieR's computed positions are at J2000, whatever the catalogue's epoch.
     let computed =
         "source_id,_RAJ2000,_DEJ2000,epoch,pmra,pmdec,mag\n1,10.0,60.0,1950.0,1000.0,0.0,9\n";
-    let found = *star(&read(&folder.write("computed", computed)).catalog, "1");
+    let found = *star(&read(&folder.write("computed", computed)).catalog, "ID 1");
     assert!(off_arcsec(&found, 10.0, 60.0) < 0.001);
     // A proper motion in an unknown unit is ignored.
     let parsecs = "id,ra,dec,pmra (pc),pmdec (pc),mag\n1,10.0,60.0,1000.0,0.0,9\n";
@@ -640,7 +640,7 @@ fn coordinates_are_read_in_every_common_notation() {
         ),
     ] {
         let catalog = read(&folder.write("table", format!("{headings}\n{cells}\n"))).catalog;
-        let found = star(&catalog, "1");
+        let found = star(&catalog, "ID 1");
         assert!(off_arcsec(found, ra, dec) < 0.001, "{headings}: {cells}");
         assert_eq!(found.v_mag, 5.0);
     }
@@ -661,7 +661,7 @@ fn identifiers_are_what_the_table_calls_its_stars() {
         ),
         ("tyc,ra,dec,mag", "1-13-1", "TYC 1-13-1"),
         ("star,ra,dec,mag", "α Umi", "α Umi"),
-        ("Skymap,ra,dec,mag", "2480053", "02480053"),
+        ("Skymap,ra,dec,mag", "2480053", "SKYMAP 02480053"),
     ] {
         let table = folder.write("table", format!("{headings}\n{cell},37.95,89.26,2.0\n"));
         let catalog = read(&table).catalog;
@@ -684,7 +684,7 @@ fn identifiers_are_what_the_table_calls_its_stars() {
             catalog.designation(StarIndex::new(0)).as_str(),
             catalog.name_of(StarIndex::new(0))
         ),
-        ("7", Some("Polaris"))
+        ("ID 7", Some("Polaris"))
     );
     assert_eq!(catalog.stars()[0].id, StarId::Number(7));
     assert_eq!(TychoId::new(1, 13, 1).unwrap().to_string(), "TYC 1-13-1");

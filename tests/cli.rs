@@ -167,11 +167,11 @@ fn text_names_the_stars_and_json_and_csv_agree_with_it() {
 }
 
 #[test]
-fn json_has_the_fields_of_schema_1() {
+fn json_has_the_fields_of_schema_2() {
     let frame = orion();
     let reports = run(&["process", "--format", "json", text(&frame)]).reports();
     let report = &reports[0];
-    assert_eq!(report["schema"], 1);
+    assert_eq!(report["schema"], 2);
     assert_eq!(report["status"], "identified");
     assert!(report["reason"].is_null());
     for pointer in [
@@ -268,8 +268,9 @@ fn with_site_and_time_the_frame_has_a_zenith_distance() {
     }
     let summer = report(&["--site", "50,10", "--date", "2020-07-15T22:00:00Z"]);
     assert_eq!(summer["observation"]["airmass"], Value::Null);
-    let note = summer["notes"][0].as_str().unwrap();
+    let note = summer["notes"][0]["text"].as_str().unwrap();
     assert!(note.contains("below the horizon"), "{note}");
+    assert_eq!(summer["notes"][0]["code"], "below_horizon");
 }
 
 #[test]

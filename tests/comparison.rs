@@ -96,7 +96,7 @@ fn with(text: &str, key: &str, value: &str) -> String {
 fn notes(report: &Value) -> String {
     let notes = report["notes"].as_array().unwrap().iter();
     notes
-        .map(|note| note.as_str().unwrap().to_owned() + "\n")
+        .map(|note| note["text"].as_str().unwrap().to_owned() + "\n")
         .collect()
 }
 

@@ -335,7 +335,7 @@ fn a_right_scale_in_the_header_helps_and_a_wrong_one_does_no_harm() {
     let ran = process([right, wrong, absurd]);
     assert_eq!((ran.status, ran.stderr.as_str()), (0, ""));
     let reports = ran.reports();
-    let note = |report: &Value| report["notes"][0].as_str().map(str::to_owned);
+    let note = |report: &Value| report["notes"][0]["text"].as_str().map(str::to_owned);
     assert_eq!(note(&reports[0]), None);
     let wrong = note(&reports[1]).unwrap();
     assert!(

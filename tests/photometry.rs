@@ -185,6 +185,9 @@ fn a_photograph_with_a_tone_curve_says_so() {
     let linearity = number(report, "/photometry/linearity");
     assert!((0.4..0.6).contains(&linearity), "{linearity}");
     let notes = report["notes"].as_array().unwrap();
-    let reported = |note: &Value| note.as_str().unwrap().contains("not proportional to light");
+    let reported = |note: &Value| {
+        let text = note["text"].as_str().unwrap();
+        note["code"] == "not_linear" && text.contains("not proportional to light")
+    };
     assert!(notes.iter().any(reported), "{notes:?}");
 }

@@ -1,7 +1,7 @@
 //! The result of identification.
 
 use super::field::SourceIndex;
-use crate::base::coords::{Camera, Icrs, Rotation};
+use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::camera::CameraModel;
 use crate::sky::catalog::StarIndex;
 use nalgebra::Matrix3;
@@ -47,8 +47,11 @@ pub struct StarMatch {
     pub source: SourceIndex,
     /// The catalogue star.
     pub star: StarIndex,
-    /// Distance in pixels between the observed position and the predicted one: that of the star, or
-    /// of the light of all stars blended with it.
+    /// Direction of its light at the date of the frame: that of the star, or of the light of all
+    /// stars blended with it.
+    pub light: UnitVector<Icrs>,
+    /// Distance between the observed position and that of its light, in pixels of an ideal pinhole
+    /// camera.
     pub residual_px: f64,
 }
 

@@ -104,6 +104,7 @@ fn star_match(pair: &Pair, field: &StarField) -> StarMatch {
     StarMatch {
         source: field.stars[pair.observed].source,
         star: pair.star,
+        light: pair.direction,
         residual_px: pair.residual_px,
     }
 }

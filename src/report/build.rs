@@ -1,41 +1,28 @@
 //! Makes a report of a solution.
 
+use super::digits::{
+    AIRMASS_DECIMALS, DIRECTION_DECIMALS, FLUX_DIGITS, HORIZON_DECIMALS, MAG_DECIMALS,
+    PIXEL_DECIMALS, SIGMA_DIGITS, YEAR_DECIMALS,
+};
 use super::frame_report::{
     AttitudeReport, AttitudeSigma, BackgroundReport, CalibrationReport, CompletenessReport,
-    DateReport, DistortionReport, FrameReport, MagnitudeReport, MatchReport, ObservationReport,
-    OpticsReport, PhotometryReport, SCHEMA, SiteReport, StarReport, Status, TimingReport,
+    DateReport, DistortionReport, FrameReport, MagnitudeReport, MatchReport, NoteReport,
+    ObservationReport, OpticsReport, PhotometryReport, SCHEMA, SiteReport, Status, TimingReport,
 };
 use super::reason;
+use super::stars::{self, Pointing};
 use crate::base::format::{
     finite, half_turn_deg, significant, to_decimals, to_significant, turn_deg,
 };
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::Applied;
 use crate::camera::Distortion;
-use crate::detect::DetectionFlags;
 use crate::identify::{FrameDate, Identification, StarMatch};
 use crate::photometry::FramePhotometry;
 use crate::photometry::completeness::MagnitudeBin;
-use crate::pipeline::{Background, Note, Outcome, Solution, Source, Timing};
+use crate::pipeline::{Background, Note, Outcome, Solution, Timing};
 use crate::sky::catalog::Catalog;
 use crate::sky::observer::Observation;
-
-/// Decimals of a position or residual in pixels.
-const PIXEL_DECIMALS: i32 = 4;
-/// Decimals of a direction in degrees: 0.4 milliarcseconds.
-const DIRECTION_DECIMALS: i32 = 7;
-/// Decimals of an angle in the observer's sky, in degrees: 0.4″, less than the neglected effects.
-pub(super) const HORIZON_DECIMALS: i32 = 4;
-/// Decimals of an airmass.
-pub(super) const AIRMASS_DECIMALS: i32 = 4;
-/// Decimals of a year: an hour.
-const YEAR_DECIMALS: i32 = 4;
-/// Decimals of a magnitude.
-const MAG_DECIMALS: i32 = 4;
-/// Significant digits of a flux.
-const FLUX_DIGITS: i32 = 6;
-/// Significant digits of a standard error.
-const SIGMA_DIGITS: i32 = 4;
 
 impl FrameReport {
     /// The report of `solution`, whose stars are those of `catalog`; `frame` is its name.
@@ -50,7 +37,7 @@ impl FrameReport {
             exposure_s: solution
                 .exposure_s
                 .and_then(|s| significant(s, FLUX_DIGITS)),
-            notes: solution.notes.iter().map(Note::to_string).collect(),
+            notes: solution.notes.iter().map(note).collect(),
             status: Status::NotIdentified,
             reason: None,
             reason_code: None,
@@ -62,7 +49,7 @@ impl FrameReport {
             prediction: None,
             calibration: solution.calibration.as_ref().map(calibration),
             background: background(solution.background.as_ref()),
-            stars: solution.sources.iter().map(unidentified).collect(),
+            stars: solution.sources.iter().map(stars::detection).collect(),
             timing_ms: timing(&solution.timing),
         };
         match &solution.outcome {
@@ -97,11 +84,18 @@ impl FrameReport {
         self.optics = Some(optics(identification));
         self.matched = Some(match_quality(identification, self.stars.len()));
         self.magnitude = faintest(identification, catalog);
-        for star_match in &identification.matches {
-            if let Some(star) = self.stars.get_mut(star_match.source.get()) {
-                add_star(star, star_match, catalog, years);
-            }
-        }
+        let pointing = Pointing {
+            identification,
+            years_since_j2000: years,
+        };
+        pointing.add_to(&mut self.stars, catalog);
+    }
+}
+
+fn note(note: &Note) -> NoteReport {
+    NoteReport {
+        code: note.code(),
+        text: note.to_string(),
     }
 }
 
@@ -250,61 +244,5 @@ fn timing(measured: &Timing) -> TimingReport {
         identify: to_decimals(measured.identify_ms, 3),
         photometry: to_decimals(measured.photometry_ms, 3),
         total: to_decimals(measured.total_ms, 3),
-    }
-}
-
-fn unidentified(source: &Source) -> StarReport {
-    let measured = source.measured.as_ref();
-    StarReport {
-        x: to_decimals(source.position.x, PIXEL_DECIMALS),
-        y: to_decimals(source.position.y, PIXEL_DECIMALS),
-        sigma_x: measured.and_then(|m| significant(m.sigma_px[0], SIGMA_DIGITS)),
-        sigma_y: measured.and_then(|m| significant(m.sigma_px[1], SIGMA_DIGITS)),
-        flux: source.flux.and_then(|flux| significant(flux, FLUX_DIGITS)),
-        peak: measured.and_then(|m| significant(m.peak, FLUX_DIGITS)),
-        snr: measured.and_then(|m| significant(m.snr, SIGMA_DIGITS)),
-        flags: measured.map(|m| flag_names(m.flags)).unwrap_or_default(),
-        ..StarReport::default()
-    }
-}
-
-/// Adds the identified star, with its position `years` after J2000.0.
-fn add_star(star: &mut StarReport, star_match: &StarMatch, catalog: &Catalog, years: f64) {
-    let known = catalog.star(star_match.star);
-    let (ra_rad, dec_rad) = known.direction_at(years).to_ra_dec();
-    star.id = Some(catalog.designation(star_match.star));
-    star.name = catalog.name_of(star_match.star).map(Into::into);
-    star.vmag = finite(f64::from(known.v_mag), 3);
-    star.ra_deg = Some(turn_deg(ra_rad * DEG_PER_RAD, DIRECTION_DECIMALS));
-    star.dec_deg = finite(dec_rad * DEG_PER_RAD, DIRECTION_DECIMALS);
-    star.residual_px = finite(star_match.residual_px, PIXEL_DECIMALS);
-}
-
-fn flag_names(flags: DetectionFlags) -> Vec<&'static str> {
-    [
-        (flags.saturated, "saturated"),
-        (flags.hot_pixel, "hot_pixel"),
-        (flags.trail, "trail"),
-        (flags.extended, "extended"),
-        (flags.blended, "blended"),
-        (flags.border, "border"),
-    ]
-    .into_iter()
-    .filter_map(|(is_set, name)| is_set.then_some(name))
-    .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn flags_are_named_in_a_fixed_order() {
-        let flags = DetectionFlags {
-            border: true,
-            saturated: true,
-            ..DetectionFlags::default()
-        };
-        assert_eq!(flag_names(flags), ["saturated", "border"]);
     }
 }

@@ -4,7 +4,7 @@ use crate::identify::DateSource;
 use serde::Serialize;
 
 /// Version of the JSON described here.
-pub const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 2;
 
 /// The report of one frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -24,8 +24,8 @@ pub struct FrameReport {
     pub observation: Option<ObservationReport>,
     /// Exposure in seconds, if known.
     pub exposure_s: Option<f64>,
-    /// What is odd about the frame, its header, or the priors: one sentence each.
-    pub notes: Vec<String>,
+    /// What is odd about the frame, its header, or the priors.
+    pub notes: Vec<NoteReport>,
     /// Whether the stars are identified.
     pub status: Status,
     /// Why they are not identified, and what may help.
@@ -53,6 +53,15 @@ pub struct FrameReport {
     pub stars: Vec<StarReport>,
     /// Run times.
     pub timing_ms: TimingReport,
+}
+
+/// One note.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct NoteReport {
+    /// Code of the note, see [`Note::code`](crate::pipeline::Note::code).
+    pub code: &'static str,
+    /// The note as a sentence.
+    pub text: String,
 }
 
 /// The files of the applied calibration.
@@ -336,18 +345,22 @@ pub struct StarReport {
     pub peak_e: Option<f64>,
     /// Flux over its standard error.
     pub snr: Option<f64>,
-    /// Catalogue number of the star.
+    /// The star's identifier, with its catalogue; `None` where it is not identified.
     pub id: Option<String>,
     /// Its name, if it has one.
     pub name: Option<String>,
     /// Its Johnson V magnitude.
     pub vmag: Option<f64>,
-    /// Its right ascension (ICRS) at the frame's date, in degrees.
+    /// Right ascension (ICRS) of the star at the frame's date, or of the detection where no star is
+    /// identified, in degrees; `None` in a frame that is not identified.
     pub ra_deg: Option<f64>,
-    /// Its declination (ICRS) at the frame's date, in degrees.
+    /// Declination of the same, in degrees.
     pub dec_deg: Option<f64>,
-    /// Distance between observed and predicted position, in pixels.
+    /// Distance of the detection from the star's own predicted position, in pixels.
     pub residual_px: Option<f64>,
+    /// Distance of the detection from the light of the star and all those blended with it, in
+    /// pixels; `None` for a single star.
+    pub residual_blend_px: Option<f64>,
     /// Flags of the detection: `saturated`, `hot_pixel`, `trail`, `extended`, `blended`, `border`.
     pub flags: Vec<&'static str>,
 }

@@ -9,6 +9,7 @@
 //! none is renamed or dropped without a new [`SCHEMA`].
 
 mod build;
+mod digits;
 mod frame_report;
 #[cfg(feature = "overlay")]
 pub mod overlay;
@@ -16,6 +17,7 @@ mod prediction;
 mod reason;
 #[cfg(test)]
 mod sample;
+mod stars;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -24,9 +26,9 @@ pub mod wcs;
 
 pub use frame_report::{
     AttitudeReport, AttitudeSigma, BackgroundReport, CalibrationReport, CompletenessReport,
-    DateReport, DistortionReport, FrameReport, MagnitudeReport, MatchReport, ObservationReport,
-    OpticsReport, PhotometryReport, PredictionReport, SCHEMA, SiteReport, StarReport, Status,
-    TimingReport,
+    DateReport, DistortionReport, FrameReport, MagnitudeReport, MatchReport, NoteReport,
+    ObservationReport, OpticsReport, PhotometryReport, PredictionReport, SCHEMA, SiteReport,
+    StarReport, Status, TimingReport,
 };
 pub use table::{TABLE_COLUMNS, write_table_header};
 pub use text::{STARS_SHOWN, TextOptions};

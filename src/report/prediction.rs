@@ -1,6 +1,6 @@
 //! The prediction for the stated camera, and the comparison with it.
 
-use super::build::{AIRMASS_DECIMALS, HORIZON_DECIMALS};
+use super::digits::{AIRMASS_DECIMALS, HORIZON_DECIMALS};
 use super::frame_report::{FrameReport, MagnitudeReport, PredictionReport, StarReport};
 use super::text::labelled;
 use crate::base::format::{finite, significant, to_decimals};

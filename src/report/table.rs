@@ -5,7 +5,7 @@ use std::io;
 
 /// The columns, in order. `flags` are separated by blanks; `flux_e` and `peak_e` are filled where a
 /// camera is stated.
-pub const TABLE_COLUMNS: [&str; 17] = [
+pub const TABLE_COLUMNS: [&str; 18] = [
     "frame",
     "x",
     "y",
@@ -20,6 +20,7 @@ pub const TABLE_COLUMNS: [&str; 17] = [
     "ra_deg",
     "dec_deg",
     "residual_px",
+    "residual_blend_px",
     "flags",
     "flux_e",
     "peak_e",
@@ -64,6 +65,7 @@ impl FrameReport {
             number(star.ra_deg),
             number(star.dec_deg),
             number(star.residual_px),
+            number(star.residual_blend_px),
             star.flags.join(" "),
             number(star.flux_e),
             number(star.peak_e),

@@ -17,9 +17,10 @@ fn star(x: f64, id: Option<&str>, name: Option<&str>) -> StarReport {
         id: id.map(Into::into),
         name: name.map(Into::into),
         vmag: id.map(|_| 0.45),
-        ra_deg: id.map(|_| 88.792_939_2),
-        dec_deg: id.map(|_| 7.407_063_1),
+        ra_deg: Some(88.792_939_2),
+        dec_deg: Some(7.407_063_1),
         residual_px: id.map(|_| 0.0712),
+        residual_blend_px: name.map(|_| 0.0312),
         flags: vec!["saturated"],
     }
 }
@@ -52,7 +53,11 @@ fn unidentified() -> FrameReport {
             level: Some(1012.25),
             noise: Some(12.3418),
         },
-        stars: vec![star(12.3456, None, None)],
+        stars: vec![StarReport {
+            ra_deg: None,
+            dec_deg: None,
+            ..star(12.3456, None, None)
+        }],
         timing_ms: TimingReport {
             read: 1.25,
             detect: 3.5,
@@ -136,9 +141,11 @@ fn identified() -> FrameReport {
             flat: None,
             hot_pixels: Some("hot-pixels.csv".to_owned()),
         }),
-        notes: vec![
-            "FOCALLEN is ignored: found 0, expected a focal length from 1 to 100000 mm".into(),
-        ],
+        notes: vec![NoteReport {
+            code: "header_value_ignored",
+            text: "FOCALLEN is ignored: found 0, expected a focal length from 1 to 100000 mm"
+                .into(),
+        }],
         status: Status::Identified,
         reason: None,
         reason_code: None,
@@ -170,7 +177,7 @@ fn identified() -> FrameReport {
         }),
         magnitude: Some(MagnitudeReport {
             faintest_vmag: 7.321,
-            faintest_id: "05350123".into(),
+            faintest_id: "SKYMAP 05350123".into(),
             predicted_limit_vmag: Some(7.0),
             difference_mag: Some(0.321),
             expected_faintest_vmag: Some(7.412),
@@ -182,9 +189,9 @@ fn identified() -> FrameReport {
         photometry: Some(photometry()),
         prediction: Some(prediction()),
         stars: vec![
-            star(123.4567, Some("05550020"), Some("Betelgeuse")),
+            star(123.4567, Some("SKYMAP 05550020"), Some("Betelgeuse")),
             star(12.3456, None, None),
-            star(512.0, Some("05350123"), None),
+            star(512.0, Some("SKYMAP 05350123"), None),
         ],
         ..unidentified()
     }
@@ -229,16 +236,16 @@ fn the_table_has_a_row_for_every_detection() {
 #[test]
 fn json_is_one_line() {
     let line = identified().to_json_line().unwrap();
-    assert!(!line.contains('\n') && line.starts_with("{\"schema\":1,"));
+    assert!(!line.contains('\n') && line.starts_with("{\"schema\":2,"));
 }
 
 #[test]
 fn a_long_table_is_cut_unless_all_stars_are_wanted() {
     let mut report = identified();
-    report.stars = vec![star(1.0, Some("05550020"), None); STARS_SHOWN + 5];
+    report.stars = vec![star(1.0, Some("SKYMAP 05550020"), None); STARS_SHOWN + 5];
     let rows = |text: &str| {
         text.lines()
-            .filter(|line| line.contains("05550020"))
+            .filter(|line| line.contains("SKYMAP 05550020"))
             .count()
     };
     let cut = report.to_text(TextOptions::default());

@@ -46,7 +46,7 @@ impl FrameReport {
         lines.push(self.date_line());
         lines.extend(self.observation.iter().map(observation_line));
         lines.extend(self.calibration.iter().map(calibration_line));
-        lines.extend(self.notes.iter().map(|note| labelled("note", note)));
+        lines.extend(self.notes.iter().map(|note| labelled("note", &note.text)));
         lines.extend(self.background_line());
         lines.push(self.timing_line());
         lines.extend(self.star_lines(options));

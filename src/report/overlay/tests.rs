@@ -65,6 +65,7 @@ fn identified(up_deg: f64, mirrored: bool) -> Outcome {
         matches: vec![StarMatch {
             source: SourceIndex::new(0),
             star: StarIndex::new(0),
+            light: boresight,
             residual_px: 0.1,
         }],
         rms_px: 0.1,

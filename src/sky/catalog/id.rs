@@ -3,12 +3,14 @@
 use std::fmt;
 
 /// The identifier of a star, unique within a catalogue.
+///
+/// `Display` names the catalogue, so that no reader of a table takes the identifier for a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum StarId {
     /// SKY2000's Skymap number.
     ///
-    /// Printed as in SKY2000 and the papers with eight digits, `02480053` for Polaris. It is
+    /// Printed with eight digits as in SKY2000 and the papers, `SKYMAP 02480053` for Polaris. It is
     /// HHMMnnnn after a right ascension, but not always that of the star: never derive a position
     /// from it.
     Skymap(u32),
@@ -16,7 +18,7 @@ pub enum StarId {
     Tycho(TychoId),
     /// A number of Hipparcos, as in `HIP 11767` or, for a component of a double star, `HIP 12318B`.
     Hipparcos(HipparcosId),
-    /// A number of another catalogue, such as Gaia's `source_id`.
+    /// A number of another catalogue, such as Gaia's `source_id`; printed as `ID 4472832130942575872`.
     Number(u64),
     /// A star that has only a name (see [`Catalog::name_of`](super::Catalog::name_of)); the number
     /// is arbitrary.
@@ -26,10 +28,10 @@ pub enum StarId {
 impl fmt::Display for StarId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Skymap(number) => write!(f, "{number:08}"),
+            Self::Skymap(number) => write!(f, "SKYMAP {number:08}"),
             Self::Tycho(id) => write!(f, "{id}"),
             Self::Hipparcos(id) => write!(f, "{id}"),
-            Self::Number(number) => write!(f, "{number}"),
+            Self::Number(number) => write!(f, "ID {number}"),
             Self::Named(number) => write!(f, "named star {number}"),
         }
     }
@@ -60,16 +62,23 @@ impl StarId {
         }
     }
 
-    /// Parses an identifier with its catalogue: `TYC 1-13-1`, `HIP 11767`, `HIP 12318B`.
+    /// Parses an identifier with its catalogue: `SKYMAP 02480053`, `TYC 1-13-1`, `HIP 11767`, `HIP
+    /// 12318B`, `ID 7`.
     pub(super) fn parse(text: &str) -> Option<Self> {
-        let (catalog, number) = text.split_at_checked(3)?;
-        let number = number.trim_start();
-        if catalog.eq_ignore_ascii_case("TYC") {
+        let number_of = |catalog: &str| {
+            let (start, number) = text.split_at_checked(catalog.len())?;
+            let is_it = start.eq_ignore_ascii_case(catalog);
+            is_it.then(|| number.trim_start())
+        };
+        if let Some(number) = number_of("TYC") {
             TychoId::parse(number).map(Self::Tycho)
-        } else if catalog.eq_ignore_ascii_case("HIP") {
+        } else if let Some(number) = number_of("HIP") {
             HipparcosId::parse(number).map(Self::Hipparcos)
+        } else if let Some(number) = number_of("SKYMAP") {
+            let number = whole_number(number.as_bytes())?;
+            u32::try_from(number).ok().map(Self::Skymap)
         } else {
-            None
+            whole_number(number_of("ID ")?.as_bytes()).map(Self::Number)
         }
     }
 }
@@ -168,14 +177,21 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn a_skymap_number_is_shown_with_eight_digits() {
-        assert_eq!(StarId::Skymap(2_480_053).to_string(), "02480053");
-        assert_eq!(StarId::Skymap(14_220_079).to_string(), "14220079");
+    fn a_skymap_number_is_shown_with_eight_digits_after_its_catalogue() {
+        assert_eq!(StarId::Skymap(2_480_053).to_string(), "SKYMAP 02480053");
+        assert_eq!(StarId::Skymap(14_220_079).to_string(), "SKYMAP 14220079");
     }
 
     #[test]
     fn identifiers_with_their_catalogue_are_parsed() {
-        for text in ["TYC 1-13-1", "TYC 9537-12121-4", "HIP 11767", "HIP 12318B"] {
+        for text in [
+            "TYC 1-13-1",
+            "TYC 9537-12121-4",
+            "HIP 11767",
+            "HIP 12318B",
+            "SKYMAP 02480053",
+            "ID 4472832130942575872",
+        ] {
             assert_eq!(StarId::parse(text).unwrap().to_string(), text);
         }
         let padded = StarId::parse("TYC 0001 00013 1").unwrap();
@@ -194,6 +210,13 @@ mod tests {
             "HIP 3b",
             "HIP 99999999",
             "HD 1",
+            "SKYMAP",
+            "SKYMAP 4294967296",
+            "SKYMAP -1",
+            "ID",
+            "ID ",
+            "ID x",
+            "IDA 1",
             "ÄÖÜ",
         ] {
             assert_eq!(StarId::parse(text), None, "{text}");

@@ -16,7 +16,7 @@ use std::sync::OnceLock;
 /// let to_naked_eye = &catalog.stars()[..catalog.brighter_than(6.0)];
 /// assert_eq!(to_naked_eye.len(), 5008);
 /// let sirius = StarIndex::new(0);
-/// assert_eq!(catalog.designation(sirius), "06450045");
+/// assert_eq!(catalog.designation(sirius), "SKYMAP 06450045");
 /// assert_eq!(catalog.name_of(sirius), Some("9 alp CMa"));
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -117,8 +117,8 @@ impl Catalog {
         position.ok().map(|position| &*names[position].text)
     }
 
-    /// The catalogue's own designation of a star: its Skymap number with eight digits, `TYC a-b-c`,
-    /// `HIP n`, another number, or a name.
+    /// The catalogue's own designation of a star: `SKYMAP nnnnnnnn`, `TYC a-b-c`, `HIP n`, `ID n`,
+    /// or a name.
     ///
     /// # Panics
     /// If there is no such star.

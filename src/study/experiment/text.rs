@@ -45,7 +45,7 @@ fn table_text(table: &TableReport) -> String {
     );
     let _ = writeln!(
         text,
-        "  {:<10} {:<14} {:>5} {:>8} {:>8} {:>9}",
+        "  {:<15} {:<15} {:>5} {:>8} {:>8} {:>9}",
         "paper", "found", "V", "x", "y", "residual"
     );
     for star in &table.stars {
@@ -54,7 +54,7 @@ fn table_text(table: &TableReport) -> String {
             .map_or("–".to_owned(), |px| format!("{px:.2} px"));
         let _ = writeln!(
             text,
-            "  {:<10} {:<14} {:>5.2} {:>8.2} {:>8.2} {residual:>9}",
+            "  {:<15} {:<15} {:>5.2} {:>8.2} {:>8.2} {residual:>9}",
             star.paper_id,
             star.found_id.as_deref().unwrap_or("–"),
             star.vmag,

@@ -88,7 +88,7 @@ impl TableRow<'_> {
         let hipparcos = || HipparcosId::parse(&text).map(StarId::Hipparcos);
         let with_catalog = || StarId::parse(&text);
         let (known, expected) = match kind {
-            IdKind::Skymap => (skymap(), "a Skymap number"),
+            IdKind::Skymap => (skymap().or_else(with_catalog), "a Skymap number"),
             IdKind::Tycho => (tycho().or_else(with_catalog), "a TYC number like 1-13-1"),
             IdKind::Hipparcos => (hipparcos().or_else(with_catalog), "a Hipparcos number"),
             IdKind::Any => {

@@ -1,0 +1,115 @@
+//! The reports of detections and their stars.
+
+use super::digits::{DIRECTION_DECIMALS, FLUX_DIGITS, PIXEL_DECIMALS, SIGMA_DIGITS};
+use super::frame_report::StarReport;
+use crate::base::coords::{Icrs, PixelPoint, UnitVector};
+use crate::base::format::{finite, significant, to_decimals, turn_deg};
+use crate::base::units::DEG_PER_RAD;
+use crate::detect::DetectionFlags;
+use crate::identify::{Identification, StarMatch};
+use crate::pipeline::Source;
+use crate::sky::catalog::Catalog;
+
+/// The report of a detection that is not identified.
+pub(super) fn detection(source: &Source) -> StarReport {
+    let measured = source.measured.as_ref();
+    StarReport {
+        x: to_decimals(source.position.x, PIXEL_DECIMALS),
+        y: to_decimals(source.position.y, PIXEL_DECIMALS),
+        sigma_x: measured.and_then(|m| significant(m.sigma_px[0], SIGMA_DIGITS)),
+        sigma_y: measured.and_then(|m| significant(m.sigma_px[1], SIGMA_DIGITS)),
+        flux: source.flux.and_then(|flux| significant(flux, FLUX_DIGITS)),
+        peak: measured.and_then(|m| significant(m.peak, FLUX_DIGITS)),
+        snr: measured.and_then(|m| significant(m.snr, SIGMA_DIGITS)),
+        flags: measured.map(|m| flag_names(m.flags)).unwrap_or_default(),
+        ..StarReport::default()
+    }
+}
+
+/// Where an identified frame points, and when.
+pub(super) struct Pointing<'a> {
+    pub identification: &'a Identification,
+    pub years_since_j2000: f64,
+}
+
+impl Pointing<'_> {
+    /// Adds right ascension and declination to all detections, and its star to each named one.
+    pub(super) fn add_to(&self, stars: &mut [StarReport], catalog: &Catalog) {
+        for star in stars.iter_mut() {
+            let to_icrs = self.identification.icrs_to_camera.inverse();
+            let pixel = PixelPoint::new(star.x, star.y);
+            let direction = self.identification.camera.direction_of(&pixel);
+            star.set_direction(&to_icrs.apply(&direction));
+        }
+        for star_match in &self.identification.matches {
+            if let Some(star) = stars.get_mut(star_match.source.get()) {
+                self.name(star, star_match, catalog);
+            }
+        }
+    }
+
+    /// Adds the identified star, with its position at the date of the frame.
+    fn name(&self, star: &mut StarReport, star_match: &StarMatch, catalog: &Catalog) {
+        let known = catalog.star(star_match.star);
+        let direction = known.direction_at(self.years_since_j2000);
+        star.id = Some(catalog.designation(star_match.star));
+        star.name = catalog.name_of(star_match.star).map(Into::into);
+        star.vmag = finite(f64::from(known.v_mag), 3);
+        star.residual_px = self.residual_px(star, &direction);
+        // The light of a single star has exactly the star's direction.
+        let is_blend = star_match.light != direction;
+        star.residual_blend_px = is_blend
+            .then(|| self.residual_px(star, &star_match.light))
+            .flatten();
+        star.set_direction(&direction);
+    }
+
+    /// Distance of a detection from what is seen in this direction, in pixels.
+    fn residual_px(&self, star: &StarReport, direction: &UnitVector<Icrs>) -> Option<f64> {
+        let Identification {
+            camera,
+            icrs_to_camera,
+            ..
+        } = self.identification;
+        let predicted = camera.pixel_of(&icrs_to_camera.apply(direction))?;
+        let distance_px = predicted.distance_to(&PixelPoint::new(star.x, star.y));
+        finite(distance_px, PIXEL_DECIMALS)
+    }
+}
+
+impl StarReport {
+    fn set_direction(&mut self, direction: &UnitVector<Icrs>) {
+        let (ra_rad, dec_rad) = direction.to_ra_dec();
+        self.ra_deg = Some(turn_deg(ra_rad * DEG_PER_RAD, DIRECTION_DECIMALS));
+        self.dec_deg = finite(dec_rad * DEG_PER_RAD, DIRECTION_DECIMALS);
+    }
+}
+
+fn flag_names(flags: DetectionFlags) -> Vec<&'static str> {
+    [
+        (flags.saturated, "saturated"),
+        (flags.hot_pixel, "hot_pixel"),
+        (flags.trail, "trail"),
+        (flags.extended, "extended"),
+        (flags.blended, "blended"),
+        (flags.border, "border"),
+    ]
+    .into_iter()
+    .filter_map(|(is_set, name)| is_set.then_some(name))
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flags_are_named_in_a_fixed_order() {
+        let flags = DetectionFlags {
+            border: true,
+            saturated: true,
+            ..DetectionFlags::default()
+        };
+        assert_eq!(flag_names(flags), ["saturated", "border"]);
+    }
+}
