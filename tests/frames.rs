@@ -59,6 +59,9 @@ fn fits_unit(first: &str, bitpix: i32, axes: &[u32], more: &[&str], data: &[u8])
         cards.push(format!("NAXIS{:<3}= {length:20}", number + 1));
     }
     cards.extend(more.iter().map(|card| (*card).to_owned()));
+    if !more.iter().any(|card| card.starts_with("ROWORDER")) {
+        cards.push("ROWORDER= 'TOP-DOWN'".to_owned());
+    }
     cards.push("END".to_owned());
     let text: String = cards.iter().map(|card| format!("{card:<80}")).collect();
     let mut bytes = text.into_bytes();
@@ -241,13 +244,14 @@ fn files_of_other_programs_are_read_to_the_last_bit() {
         (20, 10) => 65535.0,
         _ => (1000 + 7 * x + 13 * y) as f32,
     };
-    // Which row of the levels comes first in the file.
-    let from_top = |y: usize| y;
+    // astropy stores the rows of an array in their order, and the first one is the bottom of a FITS
+    // image; ImageMagick stores the bottom of the picture first, and CFITSIO copies that.
     let from_bottom = |y: usize| 23 - y;
+    let from_top = |y: usize| y;
     for (name, row) in [
-        ("astropy.fits.gz", from_top as fn(usize) -> usize),
-        ("imagemagick.fits", from_bottom),
-        ("cfitsio.fits.gz", from_bottom),
+        ("astropy.fits.gz", from_bottom as fn(usize) -> usize),
+        ("imagemagick.fits", from_top),
+        ("cfitsio.fits.gz", from_top),
     ] {
         let frame = frame::read(fixture("formats").join(name)).unwrap();
         assert_eq!((frame.width, frame.height), (32, 24));
@@ -285,6 +289,33 @@ fn orion_fits(keywords: &[&str]) -> Vec<u8> {
         keywords,
         image.as_bytes(),
     )
+}
+
+#[test]
+fn a_fits_file_stored_bottom_up_is_the_same_picture() {
+    let files = Files::new();
+    let image = orion();
+    let (width, height) = (image.width(), image.height());
+    let rows = image.as_bytes().rchunks(width as usize);
+    let bottom_up: Vec<u8> = rows.flatten().copied().collect();
+    let stored = |card: &str| fits(8, (width, height), &[card], &bottom_up);
+    let ran = process([
+        fixture("orion/orion.png"),
+        files.add("top.fits", &orion_fits(&[])),
+        files.add("says.fits", &stored("ROWORDER= 'BOTTOM-UP'")),
+        // As most programs write FITS: without the keyword. This card is not one.
+        files.add("silent.fits", &stored("ROWORDER")),
+    ]);
+    assert_eq!((ran.status, ran.stderr.as_str()), (0, ""));
+    let reports = ran.reports();
+    let orders = ["top-down", "top-down", "bottom-up", "bottom-up"];
+    for (report, order) in reports.iter().zip(orders) {
+        assert_eq!(report["row_order"], order);
+        for field in ["attitude", "optics", "match", "stars"] {
+            assert_eq!(report[field], reports[0][field], "{field}");
+        }
+    }
+    assert_eq!(reports[0]["optics"]["mirrored"], false);
 }
 
 #[test]

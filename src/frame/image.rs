@@ -3,6 +3,7 @@
 use super::error::FrameError;
 use super::limits::{MAX_PIXELS, MIN_SIDE_PX};
 use super::metadata::FrameMetadata;
+use super::row_order::RowOrder;
 
 /// One image of light intensities.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,6 +76,18 @@ impl Frame {
     #[must_use]
     pub fn with_metadata(mut self, metadata: FrameMetadata) -> Self {
         self.metadata = metadata;
+        self
+    }
+
+    /// Puts the top row first, for rows in the order of the file.
+    pub(super) fn upright(mut self) -> Self {
+        if self.metadata.row_order == RowOrder::BottomUp {
+            let (upper, lower) = self.pixels.split_at_mut(self.height / 2 * self.width);
+            let from_bottom = lower.rchunks_exact_mut(self.width);
+            for (above, below) in upper.chunks_exact_mut(self.width).zip(from_bottom) {
+                above.swap_with_slice(below);
+            }
+        }
         self
     }
 }

@@ -1,5 +1,6 @@
 //! How a frame was taken, according to its file.
 
+use super::row_order::RowOrder;
 use crate::base::epoch::ObservationDate;
 use crate::sky::observer::Site;
 use std::fmt;
@@ -8,6 +9,8 @@ use std::ops::RangeInclusive;
 /// How a frame was taken, according to its file. The values are plausible, not verified.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrameMetadata {
+    /// Order of the rows in the file.
+    pub row_order: RowOrder,
     /// Date of the exposure.
     pub date: Option<ObservationDate>,
     /// Exposure time, in seconds.
@@ -143,7 +146,8 @@ impl FrameMetadata {
         site
     }
 
-    fn ignore(&mut self, keyword: &str, text: &str, expected: &str) {
+    /// Records a value as ignored.
+    pub(super) fn ignore(&mut self, keyword: &str, text: &str, expected: &str) {
         self.ignored.push(IgnoredValue {
             keyword: keyword.to_owned(),
             found: text.to_owned(),

@@ -1,8 +1,8 @@
 //! What does a file hold? The image as the detector recorded it.
 //!
 //! file or bytes → [`Frame`]: pixel values as `f32` at the file's full depth, and
-//! [`FrameMetadata`], how the image was taken. Pixels are row-major, without a flip; (0, 0) is the
-//! centre of the first stored pixel.
+//! [`FrameMetadata`], how the image was taken. Pixels are row-major, the top row of the picture
+//! first; (0, 0) is the centre of the top-left pixel.
 //!
 //! 1. The first bytes decide the format; the file's name is not used. Gzip is decompressed first.
 //! 2. The size in the header is checked against [`MAX_PIXELS`] before anything is allocated.
@@ -16,9 +16,8 @@
 //! chosen. Pages are the images of a TIFF file in file order, and in FITS every image with two axes
 //! in a header-data unit and every plane of a cube. A cube of three planes is one colour image.
 //!
-//! FITS images are not flipped: y = 0 is the first row, and `ROWORDER` is ignored. x and y are thus
-//! the FITS coordinates minus 1. FITS viewers put the first row at the bottom, so an image that
-//! looks upright in a viewer counts as mirrored here.
+//! FITS images are stored bottom-up, unless `ROWORDER` is `TOP-DOWN`: their rows are reversed on
+//! reading, so that y = 0 is the top row as FITS viewers draw the picture ([`RowOrder`]).
 //!
 //! Caveats: transparency is ignored. JPEG's gamma is not undone, so fluxes from JPEG are not
 //! linear. Integers and floats of more than 24 bits are rounded to 24.
@@ -35,6 +34,7 @@ mod limits;
 mod metadata;
 mod raster;
 mod reader;
+mod row_order;
 mod tiff;
 mod tiff_write;
 
@@ -50,6 +50,7 @@ pub use levels::LUMINANCE_WEIGHTS;
 pub use limits::{MAX_PIXELS, MIN_SIDE_PX};
 pub use metadata::{FrameMetadata, IgnoredValue};
 pub use reader::{Buffers, decode, decode_page, read, read_page, read_page_with, read_stream};
+pub use row_order::RowOrder;
 pub use tiff_write::{TiffOptions, TiffSamples, write_tiff};
 
 #[cfg(test)]

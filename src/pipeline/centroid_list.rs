@@ -77,6 +77,7 @@ pub fn solve_centroids(list: &CentroidList, context: &Context) -> Solution {
     Solution {
         width: list.width,
         height: list.height,
+        row_order: None,
         date: priors.date,
         notes: note.into_iter().collect(),
         observation,

@@ -6,6 +6,7 @@ use super::stopwatch::Timing;
 use crate::base::coords::PixelPoint;
 use crate::calibration::Applied;
 use crate::detect::{Detection, DetectionFlags};
+use crate::frame::RowOrder;
 use crate::identify::{FrameDate, SourceIndex};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::Comparison;
@@ -18,6 +19,8 @@ pub struct Solution {
     pub width: usize,
     /// Rows.
     pub height: usize,
+    /// Order of the rows in the frame's file; a list of centroids has none.
+    pub row_order: Option<RowOrder>,
     /// When the frame was taken, if known. Otherwise star positions are those of J2000.0.
     pub date: Option<FrameDate>,
     /// The frame's centre in the observer's sky, where the frame is identified, and site and time

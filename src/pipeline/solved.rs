@@ -72,6 +72,7 @@ impl Solved<'_> {
         Solution {
             width: self.frame.width,
             height: self.frame.height,
+            row_order: Some(self.frame.metadata.row_order),
             date: self.priors.date,
             exposure_s: self.priors.exposure_s,
             notes: self.notes(comparison.as_ref()),

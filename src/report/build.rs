@@ -32,6 +32,7 @@ impl FrameReport {
             frame: frame.to_owned(),
             width: solution.width,
             height: solution.height,
+            row_order: solution.row_order,
             date: solution.date.as_ref().map(date),
             observation: solution.observation.as_ref().map(observation),
             exposure_s: solution

@@ -1,5 +1,6 @@
 //! The report of a frame: its fields, as JSON has them.
 
+use crate::frame::RowOrder;
 use crate::identify::DateSource;
 use serde::Serialize;
 
@@ -17,6 +18,8 @@ pub struct FrameReport {
     pub width: usize,
     /// Rows.
     pub height: usize,
+    /// Order of the rows in the file; `None` for lists of centroids.
+    pub row_order: Option<RowOrder>,
     /// Date of the frame, if known; otherwise star positions are those of J2000.0.
     pub date: Option<DateReport>,
     /// The frame's centre in the observer's sky, where the frame is identified, and site and time

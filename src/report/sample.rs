@@ -7,6 +7,7 @@ pub(super) fn solution(width: usize, height: usize, outcome: Outcome) -> Solutio
     Solution {
         width,
         height,
+        row_order: None,
         date: None,
         sources: Vec::new(),
         observation: None,

@@ -1,6 +1,7 @@
 //! The three forms of a report, compared with their snapshots.
 
 use super::*;
+use crate::frame::RowOrder;
 use crate::identify::DateSource;
 
 fn star(x: f64, id: Option<&str>, name: Option<&str>) -> StarReport {
@@ -31,6 +32,7 @@ fn unidentified() -> FrameReport {
         frame: "night/a.tif".into(),
         width: 1024,
         height: 768,
+        row_order: Some(RowOrder::TopDown),
         date: None,
         observation: None,
         exposure_s: None,

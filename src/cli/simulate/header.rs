@@ -2,7 +2,7 @@
 
 use super::generator::{Generator, Simulated};
 use super::subject::Subject;
-use starpipe::frame::FitsHeader;
+use starpipe::frame::{FitsHeader, RowOrder};
 use starpipe::model::sensitivity::Reading;
 use starpipe::model::simulate::SetupParameter;
 use starpipe::report::wcs;
@@ -50,6 +50,7 @@ impl Description<'_> {
                 &mut header,
                 self.generator.simulator.camera(),
                 icrs_to_camera,
+                RowOrder::TopDown,
             );
         }
         for line in self.lines() {

@@ -10,6 +10,8 @@
 //! - Site: SITELAT and SITELONG (height SITEELEV), LAT-OBS and LONG-OBS (ALT-OBS), or OBSGEO-B and
 //!   OBSGEO-L (OBSGEO-H). Angles in degrees, decimal or sexagesimal, north and east positive;
 //!   heights in metres.
+//! - Order of the rows: ROWORDER, `TOP-DOWN` or `BOTTOM-UP`. Without it an image is bottom-up, as FITS
+//!   viewers draw it and as Siril and PixInsight read it.
 //! - Zenith distance: CENTALT or OBJCTALT, the altitude in degrees.
 //!
 //! The pointing of the mount (OBJCTRA, RA, CRVAL1) is not used.
@@ -17,6 +19,7 @@
 use super::header::Header;
 use crate::base::angle::Angle;
 use crate::base::epoch::ObservationDate;
+use crate::frame::RowOrder;
 use crate::frame::metadata::{
     ALTITUDE, EXPOSURE, FOCAL_LENGTH, FrameMetadata, HeaderNumber, PIXEL_SIZE,
 };
@@ -26,6 +29,7 @@ use crate::sky::observer::Site;
 pub(super) fn metadata<'a>(headers: impl Iterator<Item = &'a Header<'a>>) -> FrameMetadata {
     let keywords = Keywords(headers.collect());
     let mut metadata = FrameMetadata::default();
+    metadata.row_order = keywords.row_order(&mut metadata);
     metadata.exposure_s = keywords.number(
         &mut metadata,
         &EXPOSURE,
@@ -47,6 +51,17 @@ pub(super) fn metadata<'a>(headers: impl Iterator<Item = &'a Header<'a>>) -> Fra
 struct Keywords<'a>(Vec<&'a Header<'a>>);
 
 impl Keywords<'_> {
+    fn row_order(&self, metadata: &mut FrameMetadata) -> RowOrder {
+        const KEYWORD: &str = "ROWORDER";
+        let Some(text) = self.text(KEYWORD) else {
+            return RowOrder::BottomUp;
+        };
+        RowOrder::of_keyword(&text).unwrap_or_else(|| {
+            metadata.ignore(KEYWORD, &text, "TOP-DOWN or BOTTOM-UP");
+            RowOrder::BottomUp
+        })
+    }
+
     fn text(&self, keyword: &str) -> Option<String> {
         let found = self.0.iter().find_map(|header| header.text(keyword));
         found.map(|text| text.into_owned())

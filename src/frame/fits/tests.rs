@@ -1,5 +1,6 @@
 use super::header::BLOCK_BYTES;
 use super::*;
+use crate::frame::RowOrder;
 use proptest::prelude::*;
 
 /// A header-data unit of these cards and data, padded to blocks.
@@ -13,7 +14,8 @@ fn unit(cards: &[&str], data: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// The primary image of this size and kind, with more cards.
+/// The primary image of this size and kind, with more cards, stored top-down unless these say
+/// otherwise.
 fn image(bitpix: i32, axes: &[usize], more: &[&str], data: &[u8]) -> Vec<u8> {
     let mut cards = vec![
         "SIMPLE  = T".to_owned(),
@@ -24,6 +26,9 @@ fn image(bitpix: i32, axes: &[usize], more: &[&str], data: &[u8]) -> Vec<u8> {
         cards.push(format!("NAXIS{:<3}= {length}", number + 1));
     }
     cards.extend(more.iter().map(|card| (*card).to_owned()));
+    if !more.iter().any(|card| card.starts_with("ROWORDER")) {
+        cards.push("ROWORDER= 'TOP-DOWN'".to_owned());
+    }
     let cards: Vec<&str> = cards.iter().map(String::as_str).collect();
     unit(&cards, data)
 }
@@ -164,12 +169,37 @@ fn blank_nan_and_infinity_are_no_values() {
 }
 
 #[test]
-fn rows_stay_in_the_order_in_which_they_are_stored() {
-    let data: Vec<u8> = (0..12).collect();
-    let more = ["ROWORDER= 'BOTTOM-UP'"];
-    let frame = decode(&image(8, &[4, 3], &more, &data), None).unwrap();
-    assert_eq!((frame.width, frame.height), (4, 3));
-    assert_eq!(frame.pixels[4], 4.0);
+fn the_top_row_comes_first_whichever_way_the_file_is_stored() {
+    let top_down: Vec<u8> = (0..15).collect();
+    let bottom_up: Vec<u8> = top_down.rchunks(3).flatten().copied().collect();
+    let upright: Vec<f32> = top_down.iter().copied().map(f32::from).collect();
+    // Without the keyword a file is bottom-up; any card may stand in its place.
+    for (card, data, order, ignored) in [
+        ("ROWORDER= 'TOP-DOWN'", &top_down, RowOrder::TopDown, 0),
+        ("ROWORDER= 'top-down'", &top_down, RowOrder::TopDown, 0),
+        ("ROWORDER= 'BOTTOM-UP'", &bottom_up, RowOrder::BottomUp, 0),
+        ("ROWORDER= 'sideways'", &bottom_up, RowOrder::BottomUp, 1),
+        ("ROWORDER", &bottom_up, RowOrder::BottomUp, 0),
+    ] {
+        let frame = decode(&image(8, &[3, 5], &[card], data), None).unwrap();
+        assert_eq!(frame.pixels, upright, "{card}");
+        assert_eq!(frame.metadata.row_order, order, "{card}");
+        assert_eq!(frame.metadata.ignored.len(), ignored, "{card}");
+    }
+}
+
+#[test]
+fn the_order_of_rows_may_stand_in_the_primary_header() {
+    let file = [
+        empty_primary(&["ROWORDER= 'TOP-DOWN'"]),
+        extension(&image(
+            8,
+            &[3, 3],
+            &["ROWORDER"],
+            &[1, 1, 1, 2, 2, 2, 3, 3, 3],
+        )),
+    ];
+    assert_eq!(decode(&file.concat(), None).unwrap().pixels[0], 1.0);
 }
 
 #[test]

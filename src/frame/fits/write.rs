@@ -2,13 +2,13 @@
 
 use super::cards::FitsHeader;
 use super::header::BLOCK_BYTES;
-use crate::frame::Frame;
+use crate::frame::{Frame, RowOrder};
 use std::io::{self, Write};
 
 /// Keywords that the writer sets itself.
-const RESERVED: [&str; 11] = [
+const RESERVED: [&str; 12] = [
     "SIMPLE", "BITPIX", "NAXIS", "NAXIS1", "NAXIS2", "EXTEND", "BSCALE", "BZERO", "BLANK", "END",
-    "XTENSION",
+    "XTENSION", "ROWORDER",
 ];
 
 /// How pixels are stored.
@@ -52,7 +52,7 @@ pub enum FitsWriteError {
 /// Writes the pixels of `frame` as a FITS image, with the cards of `header` after the mandatory
 /// ones.
 ///
-/// The first row of the frame is the first in the file, so (0, 0) is the same when read back.
+/// The top row of the frame is the first in the file, and ROWORDER says so.
 /// Everything is checked before the first byte is written. The frame's metadata are not written;
 /// put them into `header`.
 ///
@@ -119,6 +119,8 @@ fn mandatory(frame: &Frame, samples: FitsSamples) -> FitsHeader {
     header.integer("NAXIS", 2, "");
     header.integer("NAXIS1", frame.width as i64, "columns");
     header.integer("NAXIS2", frame.height as i64, "rows");
+    let order = RowOrder::TopDown.keyword_value();
+    header.text("ROWORDER", order, "the first row is the top");
     if samples == FitsSamples::Unsigned16 {
         header.integer("BZERO", 1 << 15, "levels are unsigned");
         header.integer("BSCALE", 1, "");
@@ -191,6 +193,7 @@ mod tests {
             "ÄRGER",
             "NAXIS1",
             "BZERO",
+            "ROWORDER",
         ] {
             let mut header = FitsHeader::default();
             header.integer(keyword, 1, "");

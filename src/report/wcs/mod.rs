@@ -3,8 +3,8 @@
 //! [`Solution`] → a primary header without data, like the `.wcs` files of astrometry.net: cards of
 //! 80 characters in blocks of 2880 bytes
 //!
-//! Conventions are those of FITS. The centre of the first pixel is (1, 1). `CRPIX` is the frame's
-//! centre, `CRVAL` the boresight, `CD` in degrees per pixel; the determinant of `CD` has the other
+//! Conventions are those of FITS. The centre of the first pixel of the file is (1, 1); `ROWORDER` says
+//! whether that is the top or the bottom of the picture. `CRPIX` is the frame's centre, `CRVAL` the boresight, `CD` in degrees per pixel; the determinant of `CD` has the other
 //! sign for a mirrored frame. A distortion is written in SIP form: `A` and `B` from observed to
 //! ideal (pinhole) offsets, exact; `AP` and `BP` back, fitted over the frame.
 //!
@@ -17,7 +17,7 @@ mod sip;
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::camera::CameraModel;
-use crate::frame::FitsHeader;
+use crate::frame::{FitsHeader, RowOrder};
 use crate::identify::Identification;
 use crate::pipeline::{Outcome, Solution};
 use memchr::memmem;
@@ -38,10 +38,14 @@ pub fn header(frame: &str, solution: &Solution) -> Option<Vec<u8>> {
     header.integer("NAXIS", 0, "the image is in the file named below");
     header.integer("IMAGEW", solution.width as i64, "columns of the image");
     header.integer("IMAGEH", solution.height as i64, "rows of the image");
+    let row_order = solution.row_order.unwrap_or_default();
+    let order = row_order.keyword_value();
+    header.text("ROWORDER", order, "of the image's file");
     add_projection(
         &mut header,
         &identification.camera,
         &identification.icrs_to_camera,
+        row_order,
     );
     add_errors(&mut header, identification);
     if let Some(known) = &solution.date {
@@ -58,14 +62,21 @@ pub fn is_header(file: &[u8]) -> bool {
     file.starts_with(b"SIMPLE  =") && memmem::find(file, SOLVED_BY.as_bytes()).is_some()
 }
 
-/// Adds the mapping from pixels to the sky, for a `camera` in this attitude.
+/// Adds the mapping from a file's pixels to the sky, for a `camera` in this attitude.
 pub fn add_projection(
     header: &mut FitsHeader,
     camera: &CameraModel,
     icrs_to_camera: &Rotation<Icrs, Camera>,
+    row_order: RowOrder,
 ) {
     let distortion = camera.distortion.as_ref();
     let sip = distortion.map(|distortion| Sip::new(distortion, camera));
+    // The centre is the same pixel in both orders: only offsets from it change.
+    let (sip, rows) = match row_order {
+        RowOrder::TopDown => (sip, 1.0),
+        RowOrder::BottomUp => (sip.as_ref().map(Sip::with_rows_reversed), -1.0),
+    };
+    let reversal = Matrix2::new(1.0, 0.0, 0.0, rows);
     let (boresight, _) = icrs_to_camera.boresight_and_up();
     let (ra_rad, dec_rad) = boresight.to_ra_dec();
     let (east, north) = sky_axes(icrs_to_camera);
@@ -74,7 +85,7 @@ pub fn add_projection(
     let linear = sip
         .as_ref()
         .map_or_else(Matrix2::identity, |sip| sip.linear);
-    let cd = pinhole * linear;
+    let cd = pinhole * reversal * linear;
     let centre = camera.centre();
     let projection = if sip.is_some() {
         ["RA---TAN-SIP", "DEC--TAN-SIP"]

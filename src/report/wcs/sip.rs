@@ -34,6 +34,15 @@ impl Polynomial {
             .map(|((p, q), value)| (p, q, *value))
     }
 
+    /// `sign` times the polynomial at (u, −v).
+    fn with_rows_reversed(&self, sign: f64) -> Self {
+        let term = |(_, q, value): (usize, usize, f64)| sign * (-1.0_f64).powi(q as i32) * value;
+        Self {
+            order: self.order,
+            coefficients: self.terms().map(term).collect(),
+        }
+    }
+
     fn at(&self, [u, v]: [f64; 2]) -> f64 {
         self.terms()
             .map(|(p, q, value)| value * u.powi(p as i32) * v.powi(q as i32))
@@ -64,6 +73,18 @@ impl Sip {
             linear,
             forward,
             inverse,
+        }
+    }
+
+    /// The same for offsets whose second coordinate has the other sign.
+    pub(super) fn with_rows_reversed(&self) -> Self {
+        let reversal = Matrix2::new(1.0, 0.0, 0.0, -1.0);
+        let reversed =
+            |[x, y]: &[Polynomial; 2]| [x.with_rows_reversed(1.0), y.with_rows_reversed(-1.0)];
+        Self {
+            linear: reversal * self.linear * reversal,
+            forward: reversed(&self.forward),
+            inverse: reversed(&self.inverse),
         }
     }
 }
