@@ -292,6 +292,54 @@ fn orion_fits(keywords: &[&str]) -> Vec<u8> {
 }
 
 #[test]
+fn formats_that_are_not_read_are_named_with_what_to_convert_them_to() {
+    let files = Files::new();
+    for (name, begin, found, advice) in [
+        (
+            "a.heic",
+            &b"\0\0\0\x18ftypheic\0\0\0\0mif1heic"[..],
+            "a HEIC photograph",
+            "heif-convert",
+        ),
+        (
+            "a.cr3",
+            b"\0\0\0\x18ftypcrx \0\0\0\x01crx isom",
+            "(CR3)",
+            "16-bit TIFF",
+        ),
+        (
+            "a.xisf",
+            b"XISF0100\0\0\0\0\0\0\0\0",
+            "an XISF image",
+            "FITS",
+        ),
+        (
+            "a.webp",
+            b"RIFF\x10\0\0\0WEBPVP8 ",
+            "a WebP picture",
+            "dwebp",
+        ),
+        ("a.ser", b"LUCAM-RECORDER\0\0\0\0", "a SER video", "FITS"),
+        // The name does not matter.
+        ("a.png", b"GIF89a\0\0\0\0\0\0\0\0", "a GIF picture", "PNG"),
+    ] {
+        let ran = process([files.add(name, &[begin, &[0; 2000]].concat())]);
+        assert_eq!(ran.status, 1, "{name}");
+        let expected = format!("{name}: found {found}");
+        assert!(
+            ran.stderr.contains(found) && ran.stderr.contains(advice),
+            "{expected}: {}",
+            ran.stderr
+        );
+        assert!(
+            ran.stderr.contains("expected FITS, TIFF, PNG, JPEG"),
+            "{}",
+            ran.stderr
+        );
+    }
+}
+
+#[test]
 fn a_fits_file_stored_bottom_up_is_the_same_picture() {
     let files = Files::new();
     let image = orion();

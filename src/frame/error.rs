@@ -32,6 +32,14 @@ pub enum FrameError {
         /// The first bytes, as text if they are text.
         found: String,
     },
+    /// An image in a format that is not read.
+    #[error("found {found}, expected {FORMATS}: {advice}")]
+    ForeignFormat {
+        /// The format, with an article.
+        found: &'static str,
+        /// What to convert it to, and how.
+        advice: &'static str,
+    },
     /// The data end before the image is complete.
     #[error("truncated {format}: found {found_bytes} bytes, expected more ({detail})")]
     Truncated {

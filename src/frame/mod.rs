@@ -5,6 +5,7 @@
 //! first; (0, 0) is the centre of the top-left pixel.
 //!
 //! 1. The first bytes decide the format; the file's name is not used. Gzip is decompressed first.
+//!    Formats of cameras and phones that are not read are named, with what to convert them to.
 //! 2. The size in the header is checked against [`MAX_PIXELS`] before anything is allocated.
 //! 3. Colour is converted to luminance with the ITU-R BT.601 weights ([`LUMINANCE_WEIGHTS`]). They
 //!    are the inverse of JPEG's colour transform, so a colour JPEG gives the luma that it stores.
@@ -26,6 +27,7 @@ mod directory;
 mod error;
 mod exif;
 mod fits;
+mod foreign;
 mod format;
 mod gzip;
 mod image;

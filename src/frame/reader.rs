@@ -1,6 +1,7 @@
 //! Reads files and streams, and decodes them by their format.
 
 use super::error::FrameError;
+use super::foreign::{self, Foreign};
 use super::format::{FrameFormat, first_bytes};
 use super::image::Frame;
 use super::limits::{HEAD_BYTES, MAX_FILE_BYTES};
@@ -106,8 +107,18 @@ fn not_an_image(bytes: &[u8]) -> FrameError {
     if bytes.is_empty() {
         return FrameError::Empty;
     }
+    if let Some(known) = foreign::of(bytes) {
+        return foreign_format(known);
+    }
     FrameError::UnknownFormat {
         found: first_bytes(bytes),
+    }
+}
+
+fn foreign_format(known: Foreign) -> FrameError {
+    FrameError::ForeignFormat {
+        found: known.name,
+        advice: known.advice,
     }
 }
 
@@ -148,7 +159,10 @@ fn decode_image(
     };
     match FrameFormat::of(bytes) {
         Some(FrameFormat::Fits) => fits::decode(bytes, page),
-        Some(FrameFormat::Tiff) => tiff::decode(bytes, page, buffer),
+        Some(FrameFormat::Tiff) => match foreign::raw_tiff(bytes) {
+            Some(known) => Err(foreign_format(known)),
+            None => tiff::decode(bytes, page, buffer),
+        },
         Some(FrameFormat::Png) => single(raster::decode_png),
         Some(FrameFormat::Jpeg) => single(raster::decode_jpeg),
         Some(FrameFormat::Bmp) => single(raster::decode_bmp),
