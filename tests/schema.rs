@@ -137,3 +137,67 @@ fn every_code_of_a_note_is_documented() {
         assert!(page.contains(&format!("| `{code}` |")), "{code}");
     }
 }
+
+#[test]
+fn identify_reads_the_table_that_process_writes() {
+    let directory = tempfile::tempdir().unwrap();
+    let table = directory.path().join("stars.csv");
+    // Blends, false stars and trails are in these frames.
+    for name in ["orion/orion.png", "regression/strays.tif"] {
+        let mut process = starpipe();
+        process.args(["process", "--format", "csv"]);
+        std::fs::write(&table, Ran::new(process.arg(fixture(name))).stdout).unwrap();
+        let whole = report(name, &[]);
+        let mut identify = starpipe();
+        identify.args(["identify", "--format", "json"]);
+        for side in ["width", "height"] {
+            identify.args([format!("--{side}"), whole[side].to_string()]);
+        }
+        let ran = Ran::new(identify.arg(&table));
+        assert_eq!(ran.status, 0, "{}", ran.stderr);
+        let listed = &ran.reports()[0];
+        let detected = |report: &Value| report["match"]["detected"].clone();
+        assert_eq!(detected(listed), detected(&whole));
+        for angle in ["ra_deg", "dec_deg"] {
+            let pointer = format!("/attitude/{angle}");
+            let difference_deg = number(listed, &pointer) - number(&whole, &pointer);
+            assert!(
+                difference_deg.abs() < 1e-4,
+                "{name} {angle}: {difference_deg}"
+            );
+        }
+        // What process took for no star has no name.
+        let flagged = whole["stars"].as_array().unwrap().iter().filter(|star| {
+            let flags = star["flags"].as_array().unwrap().iter();
+            flags
+                .into_iter()
+                .any(|flag| flag == "trail" || flag == "hot_pixel")
+        });
+        for star in flagged {
+            let same = |other: &&Value| other["x"] == star["x"] && other["y"] == star["y"];
+            let stars = listed["stars"].as_array().unwrap();
+            assert!(stars.iter().find(same).unwrap()["id"].is_null(), "{star}");
+        }
+    }
+}
+
+#[test]
+fn one_frame_of_a_table_of_several_is_chosen_by_name() {
+    let directory = tempfile::tempdir().unwrap();
+    let table = directory.path().join("stars.csv");
+    let frames = ["orion/orion.png", "regression/clean.tif"].map(fixture);
+    let mut process = starpipe();
+    process.args(["process", "--format", "csv"]);
+    std::fs::write(&table, Ran::new(process.args(&frames)).stdout).unwrap();
+    let identify = |options: &[&str]| {
+        let mut command = starpipe();
+        command.args(["identify", "--format", "json"]).args(options);
+        Ran::new(command.arg(&table))
+    };
+    let refused = identify(&[]);
+    assert_eq!(refused.status, 1);
+    assert!(refused.stderr.contains("2 frames"), "{}", refused.stderr);
+    assert!(refused.stderr.contains("--frame"), "{}", refused.stderr);
+    let chosen = identify(&["--frame", frames[1].to_str().unwrap()]);
+    assert_eq!(chosen.status, 0, "{}", chosen.stderr);
+}

@@ -1,7 +1,7 @@
 //! `identify`: identifies the stars in lists of centroids.
 
 use super::exit::{CommandError, Outcome};
-use super::input::centroid_list::{self, FrameSize};
+use super::input::centroid_list::{self, ListOptions};
 use super::input::stdin;
 use super::options::values::MAX_SIDE_PX;
 use super::solving::options::{LIST_RESULTS, SolvingOptions};
@@ -14,9 +14,10 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     starpipe identify centroids.csv\n  \
-    starpipe identify --pixel-scale 10.8 --width 752 --height 480 centroids.csv\n\n\
+    starpipe identify --pixel-scale 10.8 --width 752 --height 480 centroids.csv\n  \
+    starpipe process --format csv a.fits b.fits > stars.csv; starpipe identify --frame a.fits stars.csv\n\n\
     The columns are x,y (or x_px,y_px) and one of vmag (Johnson V), mag (instrumental) or flux;\n\
-    others are ignored. (0, 0) is the centre of the top-left pixel, y points down.")]
+    others are ignored. The tables of starpipe process are read with their errors and flags. (0, 0) is the centre of the top-left pixel, y points down.")]
 pub(crate) struct IdentifyArgs {
     /// Lists of centroids to identify; - for standard input
     #[arg(value_name = "CENTROIDS.csv", required = true)]
@@ -27,6 +28,9 @@ pub(crate) struct IdentifyArgs {
     /// Height of the frame in pixels [default: as far as the centroids reach]
     #[arg(long, value_name = "PIXELS", help_heading = "Frame", value_parser = clap::value_parser!(u32).range(1..=MAX_SIDE_PX))]
     height: Option<u32>,
+    /// Frame whose rows to use, in a table of starpipe process of several frames
+    #[arg(long, value_name = "NAME", help_heading = "Frame")]
+    frame: Option<String>,
     #[command(flatten)]
     solving: SolvingOptions,
 }
@@ -37,6 +41,7 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Outcome, CommandError>
         lists,
         width,
         height,
+        frame,
         solving,
     } = arguments;
     stdin::check_once(&lists)?;
@@ -44,9 +49,13 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Outcome, CommandError>
         priors: solving.hints.resolve_with_camera()?,
         ..Plan::default()
     };
-    let size = FrameSize { width, height };
+    let options = ListOptions {
+        width,
+        height,
+        frame,
+    };
     let solve = |context: &Context, path: &Path, _: &mut Workspace| {
-        let list = centroid_list::read(path, size)?;
+        let list = centroid_list::read(path, &options)?;
         Ok(Solved {
             solution: solve_centroids(&list, context),
             frame: None,

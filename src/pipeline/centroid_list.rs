@@ -6,9 +6,10 @@ use super::note::Note;
 use super::solution::{Solution, Source};
 use super::stopwatch::{Stage, Stopwatch};
 use crate::base::coords::PixelPoint;
+use crate::detect::DetectionFlags;
 use crate::identify::{self, ObservedStar, Photometry, SourceIndex, StarField};
 
-/// Standard error assumed on each axis of a listed centroid, in pixels.
+/// Standard error assumed on each axis of a centroid that is listed without one, in pixels.
 pub const LISTED_SIGMA_PX: f64 = 0.5;
 
 /// A list of centroids.
@@ -33,6 +34,23 @@ pub struct ListedCentroid {
     pub mag: f64,
     /// Flux, if the list gives it.
     pub flux: Option<f64>,
+    /// Standard error on one axis in pixels, if the list gives it.
+    pub sigma_px: Option<f64>,
+    /// Flags, if the list gives them. What is no star takes no part in the identification.
+    pub flags: DetectionFlags,
+}
+
+impl ListedCentroid {
+    /// A centroid of which only position and magnitude are known.
+    pub fn new(position: PixelPoint, mag: f64) -> Self {
+        Self {
+            position,
+            mag,
+            flux: None,
+            sigma_px: None,
+            flags: DetectionFlags::default(),
+        }
+    }
 }
 
 impl CentroidList {
@@ -42,17 +60,19 @@ impl CentroidList {
         let observed = |(line, centroid): (usize, &ListedCentroid)| ObservedStar {
             source: SourceIndex::new(line),
             position: centroid.position,
-            sigma_px: LISTED_SIGMA_PX,
+            sigma_px: centroid.sigma_px.unwrap_or(LISTED_SIGMA_PX),
             mag: centroid.mag,
-            is_saturated: false,
+            is_saturated: centroid.flags.saturated,
         };
+        let lines = self.centroids.iter().enumerate();
+        let stars = lines.filter(|(_, centroid)| centroid.flags.is_star_like());
         StarField {
             width_px: self.width as f64,
             height_px: self.height as f64,
             photometry: self.photometry,
             years_since_j2000,
             spot_sigma_px: None,
-            stars: self.centroids.iter().enumerate().map(observed).collect(),
+            stars: stars.map(observed).collect(),
         }
     }
 }

@@ -4,6 +4,7 @@ use super::stdin::is_stdin;
 use anyhow::{Context, anyhow, bail};
 use csv::StringRecord;
 use starpipe::base::coords::PixelPoint;
+use starpipe::detect::DetectionFlags;
 use starpipe::identify::Photometry;
 use starpipe::photometry::instrumental_mag;
 use starpipe::pipeline::{CentroidList, ListedCentroid};
@@ -11,11 +12,15 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Width and height of the frame in pixels, if known.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct FrameSize {
+/// What is known of a list besides its content.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct ListOptions {
+    /// Width of the frame in pixels.
     pub(crate) width: Option<u32>,
+    /// Its height.
     pub(crate) height: Option<u32>,
+    /// The frame whose rows are used, where the list is of several.
+    pub(crate) frame: Option<String>,
 }
 
 /// Largest coordinate of a frame whose size is unknown; larger ones are errors in the list.
@@ -26,14 +31,14 @@ const MAX_BYTES: u64 = 1 << 28;
 const BORDER_PX: f64 = 5.0;
 
 /// Reads the list in the file `path`, or in standard input if that is `-`.
-pub(crate) fn read(path: &Path, size: FrameSize) -> anyhow::Result<CentroidList> {
+pub(crate) fn read(path: &Path, options: &ListOptions) -> anyhow::Result<CentroidList> {
     let reading = || format!("reading {}", path.display());
     let stream: Box<dyn Read> = if is_stdin(path) {
         Box::new(io::stdin().lock())
     } else {
         Box::new(File::open(path).with_context(reading)?)
     };
-    let list = limited(stream, MAX_BYTES).and_then(|bytes| parse(&bytes[..], size));
+    let list = limited(stream, MAX_BYTES).and_then(|bytes| parse(&bytes[..], options));
     list.with_context(reading)
 }
 
@@ -66,10 +71,20 @@ struct Columns {
     y: Column,
     brightness: Column,
     kind: Brightness,
+    /// What only a table of `starpipe process` has.
+    measured: Option<MeasuredColumns>,
+}
+
+/// Columns of a table of `starpipe process`. Its magnitudes are the catalogue's, and say nothing
+/// about the frame.
+struct MeasuredColumns {
+    frame: Column,
+    sigmas: [Column; 2],
+    flags: Column,
 }
 
 /// Parses a list. Lines in errors are counted from 1, heading included.
-fn parse(input: impl Read, size: FrameSize) -> anyhow::Result<CentroidList> {
+fn parse(input: impl Read, options: &ListOptions) -> anyhow::Result<CentroidList> {
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .flexible(true)
@@ -77,23 +92,28 @@ fn parse(input: impl Read, size: FrameSize) -> anyhow::Result<CentroidList> {
         .from_reader(input);
     let columns = Columns::find(reader.headers().map_err(not_a_table)?)?;
     let mut centroids = Vec::new();
+    let mut frames = Frames::new(options.frame.as_deref());
     for record in reader.records() {
         let record = record.map_err(not_a_table)?;
         // Spreadsheets write such lines at the end of a table.
         if record.iter().all(str::is_empty) {
             continue;
         }
+        if !frames.is_wanted(columns.frame_of(&record)) {
+            continue;
+        }
         let line = record.position().map_or(0, csv::Position::line);
         let centroid = columns
             .centroid(&record)
             .with_context(|| format!("line {line}"))?;
-        check_inside(&centroid.position, size).with_context(|| format!("line {line}"))?;
+        check_inside(&centroid.position, options).with_context(|| format!("line {line}"))?;
         centroids.push(centroid);
     }
+    frames.check()?;
     if centroids.is_empty() {
         bail!("found a heading without centroids below it");
     }
-    let (width, height) = frame_size(&centroids, size);
+    let (width, height) = frame_size(&centroids, options);
     Ok(CentroidList {
         width,
         height,
@@ -155,14 +175,18 @@ impl Columns {
                 found()
             );
         };
-        let kinds = [
-            ("vmag", Brightness::JohnsonV),
-            ("mag", Brightness::Mag),
-            ("flux", Brightness::Flux),
-        ];
+        let measured = MeasuredColumns::find(column);
+        let kinds: &[_] = match measured {
+            Some(_) => &[("flux", Brightness::Flux)],
+            None => &[
+                ("vmag", Brightness::JohnsonV),
+                ("mag", Brightness::Mag),
+                ("flux", Brightness::Flux),
+            ],
+        };
         let brightness = kinds
-            .into_iter()
-            .find_map(|(name, kind)| Some((column(&[name])?, kind)));
+            .iter()
+            .find_map(|&(name, kind)| Some((column(&[name])?, kind)));
         let Some((brightness, kind)) = brightness else {
             bail!(
                 "{}; expected flux, vmag or mag among them, with commas between",
@@ -174,7 +198,13 @@ impl Columns {
             y,
             brightness,
             kind,
+            measured,
         })
+    }
+
+    /// The frame of a row, in a table that names it.
+    fn frame_of<'a>(&self, record: &'a StringRecord) -> Option<&'a str> {
+        record.get(self.measured.as_ref()?.frame.position)
     }
 
     fn centroid(&self, record: &StringRecord) -> anyhow::Result<ListedCentroid> {
@@ -185,11 +215,107 @@ impl Columns {
             Brightness::Flux => bail!("column flux: {value} is not above 0"),
             Brightness::JohnsonV | Brightness::Mag => (value, None),
         };
-        Ok(ListedCentroid {
-            position,
-            mag,
+        let mut centroid = ListedCentroid {
             flux,
+            ..ListedCentroid::new(position, mag)
+        };
+        if let Some(measured) = &self.measured {
+            centroid.sigma_px = measured.sigma_px(record)?;
+            centroid.flags = measured.flags(record);
+        }
+        Ok(centroid)
+    }
+}
+
+impl MeasuredColumns {
+    /// `None` unless all of them are there.
+    fn find(column: impl Fn(&[&str]) -> Option<Column>) -> Option<Self> {
+        Some(Self {
+            frame: column(&["frame"])?,
+            sigmas: [column(&["sigma_x"])?, column(&["sigma_y"])?],
+            flags: column(&["flags"])?,
         })
+    }
+
+    /// The standard error on one axis; `None` where the table has none.
+    fn sigma_px(&self, record: &StringRecord) -> anyhow::Result<Option<f64>> {
+        let mut variance_px2 = 0.0;
+        for column in &self.sigmas {
+            if record.get(column.position).is_none_or(str::is_empty) {
+                return Ok(None);
+            }
+            let sigma_px = number(record, column)?;
+            if sigma_px <= 0.0 {
+                bail!("column {}: {sigma_px} is not above 0", column.name);
+            }
+            variance_px2 += sigma_px.powi(2) / 2.0;
+        }
+        Ok(Some(variance_px2.sqrt()))
+    }
+
+    fn flags(&self, record: &StringRecord) -> DetectionFlags {
+        let text = record.get(self.flags.position).unwrap_or_default();
+        let has = |flag: &str| text.split_whitespace().any(|word| word == flag);
+        DetectionFlags {
+            saturated: has("saturated"),
+            hot_pixel: has("hot_pixel"),
+            trail: has("trail"),
+            extended: has("extended"),
+            blended: has("blended"),
+            border: has("border"),
+        }
+    }
+}
+
+/// The frames that a table has rows of.
+struct Frames<'a> {
+    /// The one that is used, if it is chosen.
+    chosen: Option<&'a str>,
+    /// All of them, in order.
+    found: Vec<String>,
+}
+
+impl<'a> Frames<'a> {
+    fn new(chosen: Option<&'a str>) -> Self {
+        Self {
+            chosen,
+            found: Vec::new(),
+        }
+    }
+
+    /// Whether a row of this frame is used. A row that names none is.
+    fn is_wanted(&mut self, frame: Option<&str>) -> bool {
+        let Some(frame) = frame else {
+            return true;
+        };
+        if self.found.last().is_none_or(|last| last != frame) {
+            self.found.push(frame.to_owned());
+        }
+        self.chosen.is_none_or(|chosen| chosen == frame)
+    }
+
+    /// Refuses a table of several frames of which none is chosen, and one without the chosen one.
+    fn check(mut self) -> anyhow::Result<()> {
+        const MOST_NAMED: usize = 3;
+        self.found.sort();
+        self.found.dedup();
+        let count = self.found.len();
+        let mut names = self.found[..count.min(MOST_NAMED)].join(", ");
+        if count > MOST_NAMED {
+            names += ", …";
+        }
+        match self.chosen {
+            None if count > 1 => bail!(
+                "found the rows of {count} frames ({names}), expected those of one: choose it with --frame"
+            ),
+            Some(chosen) if count == 0 => {
+                bail!("found no column that names a frame, expected rows of {chosen}")
+            }
+            Some(chosen) if !self.found.iter().any(|frame| frame == chosen) => {
+                bail!("found rows of {names}, expected some of {chosen}")
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -210,7 +336,7 @@ fn number(record: &StringRecord, column: &Column) -> anyhow::Result<f64> {
 
 /// Refuses positions outside the frame, which extends half a pixel beyond the centres of its border
 /// pixels.
-fn check_inside(position: &PixelPoint, size: FrameSize) -> anyhow::Result<()> {
+fn check_inside(position: &PixelPoint, size: &ListOptions) -> anyhow::Result<()> {
     let axes = [
         ("x", position.x, size.width),
         ("y", position.y, size.height),
@@ -227,7 +353,7 @@ fn check_inside(position: &PixelPoint, size: FrameSize) -> anyhow::Result<()> {
 }
 
 /// Width and height of the frame: as given, else as far as the centroids reach.
-fn frame_size(centroids: &[ListedCentroid], size: FrameSize) -> (usize, usize) {
+fn frame_size(centroids: &[ListedCentroid], size: &ListOptions) -> (usize, usize) {
     let reach = |coordinate: fn(&PixelPoint) -> f64| {
         let largest = centroids
             .iter()
@@ -247,7 +373,7 @@ mod tests {
     use super::*;
 
     fn parsed(text: &str) -> anyhow::Result<CentroidList> {
-        parse(text.as_bytes(), FrameSize::default())
+        parse(text.as_bytes(), &ListOptions::default())
     }
 
     fn error(text: &str) -> String {
@@ -269,6 +395,57 @@ mod tests {
         assert_eq!(list.photometry, Photometry::Instrumental);
         assert_eq!(list.centroids[0].mag, -5.0);
         assert_eq!(list.centroids[0].flux, Some(100.0));
+    }
+
+    const TABLE: &str = "frame,x,y,sigma_x,sigma_y,flux,id,vmag,flags\n\
+                         a.png,1,2,0.3,0.4,100,SKYMAP 00000001,5.5,saturated border\n\
+                         a.png,3,4,0.1,0.1,50,,,trail\n\
+                         b.png,5,6,,,20,,,\n";
+
+    fn of_frame(frame: &str) -> anyhow::Result<CentroidList> {
+        let options = ListOptions {
+            frame: Some(frame.to_owned()),
+            ..ListOptions::default()
+        };
+        parse(TABLE.as_bytes(), &options)
+    }
+
+    #[test]
+    fn a_table_of_process_gives_fluxes_errors_and_flags() {
+        let list = of_frame("a.png").unwrap();
+        assert_eq!(list.photometry, Photometry::Instrumental);
+        assert_eq!(list.centroids.len(), 2);
+        assert_eq!(list.centroids[0].flux, Some(100.0));
+        let sigma_px = list.centroids[0].sigma_px.unwrap();
+        assert!((sigma_px - 0.125_f64.sqrt()).abs() < 1e-12, "{sigma_px}");
+        assert!(list.centroids[0].flags.saturated && list.centroids[0].flags.border);
+        // What is no star stays in the list and out of the star field.
+        assert!(list.centroids[1].flags.trail);
+        let field = list.star_field(0.0);
+        assert_eq!(field.stars.len(), 1);
+        assert!(field.stars[0].is_saturated);
+        let other = of_frame("b.png").unwrap();
+        assert_eq!(other.centroids[0].sigma_px, None);
+        assert_eq!(other.centroids[0].flags, DetectionFlags::default());
+    }
+
+    #[test]
+    fn one_frame_of_a_table_must_be_chosen() {
+        assert_eq!(
+            error(TABLE),
+            "found the rows of 2 frames (a.png, b.png), expected those of one: choose it with --frame"
+        );
+        let missing = of_frame("c.png").unwrap_err().to_string();
+        assert_eq!(
+            missing,
+            "found rows of a.png, b.png, expected some of c.png"
+        );
+        let one: String = TABLE
+            .lines()
+            .take(3)
+            .map(|line| format!("{line}\n"))
+            .collect();
+        assert_eq!(parsed(&one).unwrap().centroids.len(), 2);
     }
 
     #[test]
@@ -316,15 +493,15 @@ mod tests {
 
     #[test]
     fn a_position_outside_a_known_frame_is_refused() {
-        let size = FrameSize {
+        let size = ListOptions {
             width: Some(100),
-            height: None,
+            ..ListOptions::default()
         };
-        let error = parse("x,y,mag\n99.4,2,3\n105,2,3\n".as_bytes(), size).unwrap_err();
+        let error = parse("x,y,mag\n99.4,2,3\n105,2,3\n".as_bytes(), &size).unwrap_err();
         assert!(
             format!("{error:#}").starts_with("line 3: column x: 105 is more than 5 px outside")
         );
-        let list = parse("x,y,mag\n9,2,3\n".as_bytes(), size).unwrap();
+        let list = parse("x,y,mag\n9,2,3\n".as_bytes(), &size).unwrap();
         assert_eq!((list.width, list.height), (100, 3));
     }
 
@@ -357,7 +534,9 @@ mod tests {
                 "line 1: found bytes that are not UTF-8",
             ),
         ] {
-            let error = parse(text, FrameSize::default()).unwrap_err().to_string();
+            let error = parse(text, &ListOptions::default())
+                .unwrap_err()
+                .to_string();
             assert!(error.starts_with(expected), "{error}");
         }
     }

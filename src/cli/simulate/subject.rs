@@ -2,7 +2,7 @@
 
 use super::args::SimulateArgs;
 use crate::cli::exit::CommandError;
-use crate::cli::input::centroid_list::{self, FrameSize};
+use crate::cli::input::centroid_list::{self, ListOptions};
 use anyhow::anyhow;
 use starpipe::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use starpipe::identify::Photometry;
@@ -66,11 +66,12 @@ impl Subject {
 fn star_list(path: &Path, setup: &Setup) -> anyhow::Result<Vec<(PixelPoint, f64)>> {
     let sheet = &setup.scenario.camera;
     let side = |pixels: usize| u32::try_from(pixels).ok();
-    let size = FrameSize {
+    let options = ListOptions {
         width: side(sheet.width_px),
         height: side(sheet.height_px),
+        ..ListOptions::default()
     };
-    let list = centroid_list::read(path, size)?;
+    let list = centroid_list::read(path, &options)?;
     if list.photometry != Photometry::JohnsonV {
         let error = anyhow!("found no column vmag, expected the V magnitudes of the stars");
         return Err(error.context(format!("reading {}", path.display())));

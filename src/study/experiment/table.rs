@@ -70,11 +70,8 @@ pub struct FieldReport {
 
 /// The list of centroids in the paper's table.
 pub(super) fn centroids(published: &Published, scenario: &Scenario) -> CentroidList {
-    let listed = published.stars.iter().map(|star| ListedCentroid {
-        position: star.position(),
-        mag: star.vmag,
-        flux: None,
-    });
+    let stars = published.stars.iter();
+    let listed = stars.map(|star| ListedCentroid::new(star.position(), star.vmag));
     CentroidList {
         width: scenario.camera.width_px,
         height: scenario.camera.height_px,

@@ -80,9 +80,8 @@ impl Centroid {
             Photometry::Instrumental => Some(FLUX_OF_V_0 * 10f64.powf(-0.4 * self.v_mag)),
         };
         ListedCentroid {
-            position: self.position,
-            mag: flux.map_or(self.v_mag, instrumental_mag),
             flux,
+            ..ListedCentroid::new(self.position, flux.map_or(self.v_mag, instrumental_mag))
         }
     }
 }
