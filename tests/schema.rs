@@ -111,6 +111,23 @@ fn identifiers_carry_their_catalogue_in_every_format() {
 }
 
 #[test]
+fn bright_stars_have_their_proper_names_before_their_designations() {
+    let report = report("orion/orion.png", &[]);
+    let stars = report["stars"].as_array().unwrap();
+    let names: Vec<&str> = stars
+        .iter()
+        .filter_map(|star| star["name"].as_str())
+        .collect();
+    for name in [
+        "Rigel (19 bet Ori)",
+        "Betelgeuse (58 alp Ori)",
+        "Alnilam (46 eps Ori)",
+    ] {
+        assert!(names.contains(&name), "{name}: {names:?}");
+    }
+}
+
+#[test]
 fn notes_have_a_code_and_a_text() {
     let report = report("orion/orion.png", &["--site", "50,10"]);
     let note = &report["notes"][0];

@@ -53,7 +53,7 @@ impl Pointing<'_> {
         let known = catalog.star(star_match.star);
         let direction = known.direction_at(self.years_since_j2000);
         star.id = Some(catalog.designation(star_match.star));
-        star.name = catalog.name_of(star_match.star).map(Into::into);
+        star.name = catalog.full_name(star_match.star);
         star.vmag = finite(f64::from(known.v_mag), 3);
         star.residual_px = self.residual_px(star, &direction);
         // The light of a single star has exactly the star's direction.

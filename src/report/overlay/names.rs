@@ -32,11 +32,13 @@ const GREEK: [(&str, char); 24] = [
 
 const SUPERSCRIPTS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
 
-/// The star's name, or its number, and its V magnitude: `α CMa −1.4`.
+/// The star's proper name, else its letter, else its number, and its V magnitude: `Sirius −1.4`, `α CMi
+/// 0.4`.
 pub(super) fn label(catalog: &Catalog, star: StarIndex) -> String {
-    let name = match catalog.name_of(star) {
-        Some(name) => short(name),
-        None => catalog.designation(star),
+    let name = match (catalog.proper_name(star), catalog.name_of(star)) {
+        (Some(name), _) => name.to_owned(),
+        (None, Some(name)) => short(name),
+        (None, None) => catalog.designation(star),
     };
     let v_mag = format!("{:.1}", catalog.star(star).v_mag);
     let v_mag = if v_mag == "-0.0" { "0.0" } else { &v_mag };
@@ -84,7 +86,15 @@ mod tests {
     #[test]
     fn the_brightest_star_is_called_by_its_name_and_the_faintest_by_its_number() {
         let catalog = Catalog::built_in();
-        assert_eq!(label(catalog, StarIndex::new(0)), "α CMa −1.4");
+        assert_eq!(label(catalog, StarIndex::new(0)), "Sirius −1.4");
+        let is_lettered = |star: &StarIndex| {
+            let letter = catalog
+                .name_of(*star)
+                .is_some_and(|name| name.contains("gam "));
+            letter && catalog.proper_name(*star).is_none()
+        };
+        let lettered = (0..500).map(StarIndex::new).find(is_lettered).unwrap();
+        assert!(label(catalog, lettered).starts_with('γ'));
         let last = StarIndex::new(catalog.stars().len() - 1);
         assert!(label(catalog, last).starts_with(&catalog.designation(last)));
     }

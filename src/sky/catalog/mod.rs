@@ -49,6 +49,7 @@ mod error;
 mod id;
 mod import;
 mod position;
+mod proper_names;
 mod read;
 pub mod sky2000;
 pub mod sky_grid;

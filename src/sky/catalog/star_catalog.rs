@@ -2,7 +2,7 @@
 
 use super::contents::Contents;
 use super::star::J2000_YEAR;
-use super::{CatalogError, CompactError, Star, StarId, StarIndex, compact};
+use super::{CatalogError, CompactError, Star, StarId, StarIndex, compact, proper_names};
 use crate::base::files;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -18,6 +18,7 @@ use std::sync::OnceLock;
 /// let sirius = StarIndex::new(0);
 /// assert_eq!(catalog.designation(sirius), "SKYMAP 06450045");
 /// assert_eq!(catalog.name_of(sirius), Some("9 alp CMa"));
+/// assert_eq!(catalog.proper_name(sirius), Some("Sirius"));
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Catalog {
@@ -115,6 +116,26 @@ impl Catalog {
         let names = &self.contents.names;
         let position = names.binary_search_by_key(&star.get(), |name| name.star_index as usize);
         position.ok().map(|position| &*names[position].text)
+    }
+
+    /// The proper name of a bright star, as in `"Polaris"`, if the International Astronomical Union
+    /// has approved one. Stars are known by their Skymap or Hipparcos number.
+    ///
+    /// # Panics
+    /// If there is no such star.
+    pub fn proper_name(&self, star: StarIndex) -> Option<&'static str> {
+        proper_names::of(self.star(star).id)
+    }
+
+    /// All names of a star, the proper one first: `"Polaris (1 alp UMi)"`.
+    ///
+    /// # Panics
+    /// If there is no such star.
+    pub fn full_name(&self, star: StarIndex) -> Option<String> {
+        match (self.proper_name(star), self.name_of(star)) {
+            (Some(proper), Some(name)) if proper != name => Some(format!("{proper} ({name})")),
+            (proper, name) => proper.or(name).map(str::to_owned),
+        }
     }
 
     /// The catalogue's own designation of a star: `SKYMAP nnnnnnnn`, `TYC a-b-c`, `HIP n`, `ID n`,
