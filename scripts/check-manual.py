@@ -3,10 +3,10 @@
 
     python3 scripts/check-manual.py target/release/starpipe [PAGE.md...]
 
-Takes the program, and the pages to check (default: all of docs/). Runs every line of their `sh`
-blocks that uses starpipe, page by page in a new clone, with at most 20 frames or trials. Prints
-exit status and time of each, and exits with 1 if one fails. A frame that is not identified (exit
-status 3) is no failure.
+Takes the program, and the pages to check (default: README.md and all of docs/). Runs every line of
+their `sh` blocks that uses starpipe, and in the README the commands within sentences, in order, page
+by page in a new clone, with at most 20 frames or trials. Prints exit status and time of each, and
+exits with 1 if one fails. A frame that is not identified (exit status 3) is no failure.
 """
 
 import os
@@ -25,10 +25,13 @@ def commands(page):
     """The command lines of a page's `sh` blocks, without comments."""
     for block in re.findall(r"```sh\n(.*?)```", page.read_text(), re.DOTALL):
         lines = re.sub(r"\\\n\s*", "", block).splitlines()
+        lines = [line.replace("cargo run --release --", "starpipe") for line in lines]
         lines = [re.sub(r"\s+#.*", "", line).strip() for line in lines]
         if any(line.startswith("for ") for line in lines):
             lines = ["; ".join(lines).replace("do;", "do")]
         yield from (line for line in lines if "starpipe " in line and not line.startswith("python3"))
+    if page.name == "README.md":
+        yield from re.findall(r"`(starpipe [a-z][^`]*)`", page.read_text())
 
 
 def shortened(command):
@@ -62,7 +65,7 @@ def run(page, program):
 def main():
     if len(sys.argv) < 2:
         sys.exit(__doc__)
-    pages = [pathlib.Path(page) for page in sys.argv[2:]] or sorted((ROOT / "docs").glob("*.md"))
+    pages = [pathlib.Path(page) for page in sys.argv[2:]] or [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
     results = [run(page, pathlib.Path(sys.argv[1])) for page in pages]
     sys.exit(0 if all(results) else 1)
 
