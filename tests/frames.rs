@@ -340,6 +340,25 @@ fn formats_that_are_not_read_are_named_with_what_to_convert_them_to() {
 }
 
 #[test]
+fn a_directory_of_photographs_that_are_not_read_says_so() {
+    let files = Files::new();
+    files.add("a.txt", b"remarks");
+    files.add("b.heic", b"\0\0\0\x18ftypheic\0\0\0\0mif1heic");
+    let ran = process([files.0.path().to_owned()]);
+    assert_eq!(ran.status, 1);
+    assert!(
+        ran.stderr.contains("b.heic: found a HEIC photograph"),
+        "{}",
+        ran.stderr
+    );
+    // Beside a frame such a file is left out, as cameras write both.
+    files.add("c.fits", &orion_fits(&[]));
+    let ran = process([files.0.path().to_owned()]);
+    assert_eq!((ran.status, ran.stderr.as_str()), (0, ""));
+    assert_eq!(ran.reports().len(), 1);
+}
+
+#[test]
 fn a_fits_file_stored_bottom_up_is_the_same_picture() {
     let files = Files::new();
     let image = orion();

@@ -1,6 +1,7 @@
 //! The frames in a directory.
 
 use super::error::FrameError;
+use super::foreign;
 use super::format::FrameFormat;
 use super::gzip::format_inside;
 use super::limits::HEAD_BYTES;
@@ -18,18 +19,33 @@ pub(crate) const OVERLAY_TEXT: (&str, &str) = ("Software", "starpipe overlay");
 /// frames ([`is_calibration_frame`]) and headers without an image (`.wcs`). A file that cannot be
 /// opened is listed, so that reading it reports the error.
 /// # Errors
-/// [`FrameError::File`] with the directory and [`FrameError::Io`] or [`FrameError::NoFrames`].
+/// [`FrameError::File`] with the directory and [`FrameError::Io`] or [`FrameError::NoFrames`]; without
+/// frames, with the first file in a format that is not read and [`FrameError::ForeignFormat`].
 pub fn files_in(directory: &Path) -> Result<Vec<PathBuf>, FrameError> {
     let files = all_files_in(directory).map_err(|e| FrameError::from(e).in_file(directory))?;
-    let found = files.len();
-    let frames: Vec<PathBuf> = files
-        .into_iter()
-        .filter(|path| begins_like_a_frame(path).unwrap_or(true))
-        .collect();
-    if frames.is_empty() {
-        return Err(FrameError::NoFrames { files: found }.in_file(directory));
+    let is_frame = |path: &&PathBuf| begins_like_a_frame(path).unwrap_or(true);
+    let frames: Vec<PathBuf> = files.iter().filter(is_frame).cloned().collect();
+    if !frames.is_empty() {
+        return Ok(frames);
     }
-    Ok(frames)
+    Err(foreign_file(&files).unwrap_or_else(|| {
+        let nothing = FrameError::NoFrames { files: files.len() };
+        nothing.in_file(directory)
+    }))
+}
+
+/// The error of the first file in a format that is known but not read.
+fn foreign_file(files: &[PathBuf]) -> Option<FrameError> {
+    files.iter().find_map(|path| {
+        let known = foreign::of(&head_of(path).ok()?)?;
+        Some(FrameError::from(known).in_file(path))
+    })
+}
+
+fn head_of(path: &Path) -> io::Result<Vec<u8>> {
+    let mut head = Vec::new();
+    File::open(path)?.take(HEAD_BYTES).read_to_end(&mut head)?;
+    Ok(head)
 }
 
 fn all_files_in(directory: &Path) -> io::Result<Vec<PathBuf>> {
@@ -68,8 +84,7 @@ fn begins_like_a_frame(path: &Path) -> io::Result<bool> {
     if path.extension().is_some_and(|extension| extension == "wcs") {
         return Ok(false);
     }
-    let mut head = Vec::new();
-    File::open(path)?.take(HEAD_BYTES).read_to_end(&mut head)?;
+    let head = head_of(path)?;
     Ok(match FrameFormat::of(&head) {
         Some(FrameFormat::Png) => !is_overlay(&head),
         Some(FrameFormat::Fits) => !is_calibration_frame(&head),

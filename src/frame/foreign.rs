@@ -7,6 +7,8 @@
 //! ISO/IEC 14496-12 (file type box); TIFF 6.0 (1992), sect. 2; TIFF/EP (ISO 12234-2) and the DNG
 //! specification for the tags of raw files.
 
+use super::error::FrameError;
+
 /// A format that is not read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Foreign {
@@ -14,6 +16,15 @@ pub(super) struct Foreign {
     pub name: &'static str,
     /// What to do.
     pub advice: &'static str,
+}
+
+impl From<Foreign> for FrameError {
+    fn from(known: Foreign) -> Self {
+        Self::ForeignFormat {
+            found: known.name,
+            advice: known.advice,
+        }
+    }
 }
 
 const PHOTOGRAPH: &str =

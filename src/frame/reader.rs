@@ -1,11 +1,10 @@
 //! Reads files and streams, and decodes them by their format.
 
 use super::error::FrameError;
-use super::foreign::{self, Foreign};
 use super::format::{FrameFormat, first_bytes};
 use super::image::Frame;
 use super::limits::{HEAD_BYTES, MAX_FILE_BYTES};
-use super::{fits, gzip, raster, tiff};
+use super::{fits, foreign, gzip, raster, tiff};
 use std::io::{self, Read};
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -108,17 +107,10 @@ fn not_an_image(bytes: &[u8]) -> FrameError {
         return FrameError::Empty;
     }
     if let Some(known) = foreign::of(bytes) {
-        return foreign_format(known);
+        return known.into();
     }
     FrameError::UnknownFormat {
         found: first_bytes(bytes),
-    }
-}
-
-fn foreign_format(known: Foreign) -> FrameError {
-    FrameError::ForeignFormat {
-        found: known.name,
-        advice: known.advice,
     }
 }
 
@@ -160,7 +152,7 @@ fn decode_image(
     match FrameFormat::of(bytes) {
         Some(FrameFormat::Fits) => fits::decode(bytes, page),
         Some(FrameFormat::Tiff) => match foreign::raw_tiff(bytes) {
-            Some(known) => Err(foreign_format(known)),
+            Some(known) => Err(known.into()),
             None => tiff::decode(bytes, page, buffer),
         },
         Some(FrameFormat::Png) => single(raster::decode_png),
