@@ -40,7 +40,7 @@
 //! | module | answers |
 //! |---|---|
 //! | [`base`] | what numbers mean: units, directions, dates, statistics |
-//! | [`sky`] | what is up there, and from where it is seen: catalogue, observer |
+//! | [`sky`] | what is up there, and from where it is seen: catalogue, Moon and planets, observer |
 //! | [`frame`] | what a file holds: readers, writers, metadata |
 //! | [`camera`] | what instrument: geometry, data sheet |
 //! | [`calibration`] | what the detector does to a frame: darks, flats, hot pixels |

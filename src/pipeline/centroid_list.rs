@@ -1,5 +1,6 @@
 //! Lists of centroids, and their identification.
 
+use super::bodies::find_bodies;
 use super::context::Context;
 use super::identification::{identified, observation};
 use super::note::Note;
@@ -85,26 +86,32 @@ pub fn solve_centroids(list: &CentroidList, context: &Context) -> Solution {
     list.centroids.sort_by(|a, b| a.mag.total_cmp(&b.mag));
     let field = list.star_field(priors.years_since_j2000());
     let found = identify::identify(&field, priors, context.indexed);
-    let outcome = identified(found, None, &field, priors, context.indexed);
+    let mut outcome = identified(found, None, &field, priors, context.indexed);
     let observation = observation(&outcome, priors);
-    clock.lap(Stage::Identify);
     let source = |centroid: &ListedCentroid| Source {
         position: centroid.position,
         measured: None,
         flux: centroid.flux,
     };
+    let sources: Vec<Source> = list.centroids.iter().map(source).collect();
+    let catalog = context.indexed.catalog();
+    let bodies = find_bodies(&mut outcome, &sources, priors, catalog);
+    clock.lap(Stage::Identify);
     let note = Note::of_observation(observation.as_ref(), priors, &outcome);
+    let notes = note.into_iter();
+    let notes = notes.chain(Note::of_bodies(&bodies, &outcome, catalog));
     Solution {
         width: list.width,
         height: list.height,
         row_order: None,
         date: priors.date,
-        notes: note.into_iter().collect(),
+        notes: notes.collect(),
         observation,
         exposure_s: priors.exposure_s,
-        sources: list.centroids.iter().map(source).collect(),
+        sources,
         background: None,
         outcome,
+        bodies,
         photometry: None,
         comparison: None,
         gain_e_per_adu: None,

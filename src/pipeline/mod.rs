@@ -5,10 +5,13 @@
 //! 1. The frame is read, and calibrated where the context has a calibration.
 //! 2. Its priors are resolved: the context's, then the camera's, the header's and the file name's.
 //! 3. Stars are detected, and identified; where they are not, the cause is sought.
-//! 4. Photometry: zero point and limiting magnitude.
-//! 5. Where the context has a camera, the frame is compared with it.
-//! 6. Notes collect what is odd.
+//! 4. The Moon and the planets are found where the date is known.
+//! 5. Photometry: zero point and limiting magnitude.
+//! 6. Where the context has a camera, the frame is compared with it.
+//! 7. Notes collect what is odd.
 
+mod bodies;
+mod body_in_frame;
 mod centroid_list;
 mod context;
 mod error;
@@ -20,6 +23,7 @@ mod solve;
 mod solved;
 mod stopwatch;
 
+pub use body_in_frame::BodyInFrame;
 pub use centroid_list::{CentroidList, LISTED_SIGMA_PX, ListedCentroid, solve_centroids};
 pub use context::{Context, Workspace};
 pub use error::Error;

@@ -1,5 +1,6 @@
 //! Notes: what is odd about a frame, its header, or the priors.
 
+use super::body_in_frame::BodyInFrame;
 use super::outcome::Outcome;
 use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
@@ -8,7 +9,9 @@ use crate::frame::IgnoredValue;
 use crate::identify::{Priors, ScalePrior, ScaleSource};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::{Comparison, Contradiction, StatedCamera};
+use crate::sky::catalog::Catalog;
 use crate::sky::observer::Observation;
+use crate::sky::solar_system::BodyKind;
 use std::fmt;
 
 /// One note about a frame. `Display` gives the sentence, [`code`](Self::code) a stable name.
@@ -42,6 +45,8 @@ pub enum Note {
     },
     /// The dark has another exposure than the frame.
     DarkExposure(ExposureMismatch),
+    /// The Moon or a planet is in the frame.
+    BodyInFrame(BodyInFrame),
 }
 
 impl Note {
@@ -55,6 +60,7 @@ impl Note {
             Self::NoExposure => "exposure_unknown",
             Self::Camera(contradiction) => contradiction.code(),
             Self::NotLinear { .. } => "not_linear",
+            Self::BodyInFrame(_) => "body_in_frame",
             Self::DarkExposure(_) => "dark_exposure_differs",
         }
     }
@@ -102,6 +108,21 @@ impl Note {
         }
     }
 
+    /// The Moon and the planets in the frame that may be seen in it.
+    pub(super) fn of_bodies(
+        bodies: &[BodyInFrame],
+        outcome: &Outcome,
+        catalog: &Catalog,
+    ) -> Vec<Self> {
+        let matches = outcome.identification().map_or(&[][..], |m| &m.matches);
+        let v_mag = matches
+            .iter()
+            .map(|m| f64::from(catalog.star(m.star).v_mag));
+        let faintest = v_mag.reduce(f64::max);
+        let notable = bodies.iter().filter(|body| body.is_notable(faintest));
+        notable.copied().map(Self::BodyInFrame).collect()
+    }
+
     /// Grey levels that are not proportional to light.
     pub(super) fn of_photometry(photometry: Option<&FramePhotometry>) -> Option<Self> {
         let zero_point = photometry?.zero_point.filter(|zero| zero.is_nonlinear)?;
@@ -142,6 +163,33 @@ impl fmt::Display for Note {
                 slope.value, slope.sigma
             ),
             Self::DarkExposure(mismatch) => mismatch.fmt(f),
+            Self::BodyInFrame(seen) => write_body(f, seen),
         }
+    }
+}
+
+fn write_body(f: &mut fmt::Formatter<'_>, seen: &BodyInFrame) -> fmt::Result {
+    let BodyInFrame { body, position, .. } = seen;
+    let article = if body.kind == BodyKind::Moon {
+        "the "
+    } else {
+        ""
+    };
+    write!(
+        f,
+        "{article}{} (V {:.1}) is in the frame at ({:.1}, {:.1})",
+        body.kind.name(),
+        body.v_mag,
+        position.x,
+        position.y
+    )?;
+    match (seen.source, seen.uncertainty_px < 1.0) {
+        (Some(_), _) => f.write_str(", and the detection there is not a star"),
+        (None, true) => f.write_str(", where no detection can be told to be it"),
+        (None, false) => write!(
+            f,
+            ", give or take {:.0} px for what is known of time and site; no detection can be told to be it",
+            seen.uncertainty_px
+        ),
     }
 }

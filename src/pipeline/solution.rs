@@ -1,5 +1,6 @@
 //! What was found in one frame, or in one list of centroids.
 
+use super::body_in_frame::BodyInFrame;
 use super::note::Note;
 use super::outcome::Outcome;
 use super::stopwatch::Timing;
@@ -36,6 +37,8 @@ pub struct Solution {
     pub background: Option<Background>,
     /// The stars and the attitude, or why they were not found.
     pub outcome: Outcome,
+    /// The Moon and the planets in an identified frame whose date is known.
+    pub bodies: Vec<BodyInFrame>,
     /// Zero point and limiting magnitude of an identified frame; a list of centroids has none.
     pub photometry: Option<FramePhotometry>,
     /// Comparison with the stated camera, where there is one and the exposure is known.

@@ -1,10 +1,11 @@
 //! The stages in order.
 
+use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
 use super::error::Error;
 use super::identification::{identify_stars, observation};
 use super::outcome::Outcome;
-use super::solution::Solution;
+use super::solution::{Solution, Source};
 use super::solved::Solved;
 use super::stopwatch::{Stage, Stopwatch};
 use crate::calibration::Calibration;
@@ -110,8 +111,10 @@ fn solve(
     let detections = detect::detect(frame, &config, &mut workspace.detect)?;
     clock.lap(Stage::Detect);
 
-    let (outcome, dropped_scale) =
+    let (mut outcome, dropped_scale) =
         identify_stars(frame, &detections, &priors, context.indexed, workspace);
+    let sources: Vec<Source> = detections.sources.iter().map(Source::from).collect();
+    let bodies = find_bodies(&mut outcome, &sources, &priors, context.indexed.catalog());
     clock.lap(Stage::Identify);
 
     let photometry = measure_photometry(&detections, &outcome, &priors, context.indexed);
@@ -122,7 +125,9 @@ fn solve(
         observation: observation(&outcome, &priors),
         priors,
         detections,
+        sources,
         outcome,
+        bodies,
         dropped_scale,
         photometry,
     };

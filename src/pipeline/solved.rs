@@ -1,5 +1,6 @@
 //! What the stages found in a frame, and what follows from all of it: comparison, notes, solution.
 
+use super::body_in_frame::BodyInFrame;
 use super::context::Context;
 use super::note::Note;
 use super::outcome::Outcome;
@@ -23,7 +24,10 @@ pub(super) struct Solved<'a> {
     pub calibration: Option<&'a Calibration>,
     pub priors: Priors,
     pub detections: Detections,
+    /// The detections as sources.
+    pub sources: Vec<Source>,
     pub outcome: Outcome,
+    pub bodies: Vec<BodyInFrame>,
     /// The scale that was dropped because nothing matched with it.
     pub dropped_scale: Option<ScalePrior>,
     pub photometry: Option<FramePhotometry>,
@@ -76,13 +80,14 @@ impl Solved<'_> {
             date: self.priors.date,
             exposure_s: self.priors.exposure_s,
             notes: self.notes(comparison.as_ref()),
-            sources: self.detections.sources.iter().map(Source::from).collect(),
+            sources: self.sources,
             background: Some(Background {
                 level_adu: self.detections.background_adu,
                 noise_adu: self.detections.noise_adu,
             }),
             observation: self.observation,
             outcome: self.outcome,
+            bodies: self.bodies,
             photometry: self.photometry,
             comparison,
             gain_e_per_adu: camera.map(|camera| camera.sheet.gain_e_per_adu),
@@ -105,6 +110,11 @@ impl Solved<'_> {
             .chain(Note::of_observation(observation, priors, outcome))
             .chain(Note::of_camera(camera, comparison))
             .chain(Note::of_photometry(self.photometry.as_ref()))
+            .chain(Note::of_bodies(
+                &self.bodies,
+                outcome,
+                self.context.indexed.catalog(),
+            ))
             .chain(mismatch.map(Note::DarkExposure))
             .collect()
     }

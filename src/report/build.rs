@@ -1,5 +1,6 @@
 //! Makes a report of a solution.
 
+use super::bodies;
 use super::digits::{
     AIRMASS_DECIMALS, DIRECTION_DECIMALS, FLUX_DIGITS, HORIZON_DECIMALS, MAG_DECIMALS,
     PIXEL_DECIMALS, SIGMA_DIGITS, YEAR_DECIMALS,
@@ -50,6 +51,7 @@ impl FrameReport {
             prediction: None,
             calibration: solution.calibration.as_ref().map(calibration),
             background: background(solution.background.as_ref()),
+            bodies: Vec::new(),
             stars: solution.sources.iter().map(stars::detection).collect(),
             timing_ms: timing(&solution.timing),
         };
@@ -61,6 +63,7 @@ impl FrameReport {
             Outcome::Identified(identification) => {
                 let years = solution.date.map_or(0.0, |d| d.date.years_since_j2000());
                 report.add_identification(identification, catalog, years);
+                bodies::add_to(&mut report, &solution.bodies, identification);
             }
         }
         if let Some(comparison) = &solution.comparison {

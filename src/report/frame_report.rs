@@ -52,6 +52,8 @@ pub struct FrameReport {
     pub calibration: Option<CalibrationReport>,
     /// The sky background.
     pub background: BackgroundReport,
+    /// The Moon and the planets in the frame, where its date is known.
+    pub bodies: Vec<BodyReport>,
     /// Every detection, brightest first.
     pub stars: Vec<StarReport>,
     /// Run times.
@@ -325,6 +327,29 @@ pub struct BackgroundReport {
     pub noise: Option<f64>,
 }
 
+/// The Moon or a planet in the frame.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BodyReport {
+    /// Its name in English.
+    pub name: &'static str,
+    /// Expected position to the right, in pixels.
+    pub x: f64,
+    /// Expected position downward, in pixels.
+    pub y: f64,
+    /// Its position may be off by this much, in pixels: error of theory, time and parallax.
+    pub uncertainty_px: f64,
+    /// Astrometric right ascension (ICRS), in degrees.
+    pub ra_deg: f64,
+    /// Astrometric declination (ICRS), in degrees.
+    pub dec_deg: f64,
+    /// Approximate Johnson V magnitude.
+    pub vmag: f64,
+    /// Angular radius, in pixels.
+    pub radius_px: f64,
+    /// Index of its detection in `stars`, counted from 0.
+    pub detection: Option<usize>,
+}
+
 /// One detection and its star.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct StarReport {
@@ -350,7 +375,7 @@ pub struct StarReport {
     pub snr: Option<f64>,
     /// The star's identifier, with its catalogue; `None` where it is not identified.
     pub id: Option<String>,
-    /// Its name, if it has one.
+    /// Its name, if it has one; that of the Moon or a planet, without `id`.
     pub name: Option<String>,
     /// Its Johnson V magnitude.
     pub vmag: Option<f64>,

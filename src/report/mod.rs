@@ -8,6 +8,7 @@
 //! that is not finite is `null` in JSON and an empty field in CSV. Fields may be added to the JSON;
 //! none is renamed or dropped without a new [`SCHEMA`].
 
+mod bodies;
 mod build;
 mod digits;
 mod frame_report;
@@ -25,10 +26,10 @@ mod text;
 pub mod wcs;
 
 pub use frame_report::{
-    AttitudeReport, AttitudeSigma, BackgroundReport, CalibrationReport, CompletenessReport,
-    DateReport, DistortionReport, FrameReport, MagnitudeReport, MatchReport, NoteReport,
-    ObservationReport, OpticsReport, PhotometryReport, PredictionReport, SCHEMA, SiteReport,
-    StarReport, Status, TimingReport,
+    AttitudeReport, AttitudeSigma, BackgroundReport, BodyReport, CalibrationReport,
+    CompletenessReport, DateReport, DistortionReport, FrameReport, MagnitudeReport, MatchReport,
+    NoteReport, ObservationReport, OpticsReport, PhotometryReport, PredictionReport, SCHEMA,
+    SiteReport, StarReport, Status, TimingReport,
 };
 pub use table::{TABLE_COLUMNS, write_table_header};
 pub use text::{STARS_SHOWN, TextOptions};

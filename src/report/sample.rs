@@ -19,6 +19,7 @@ pub(super) fn solution(width: usize, height: usize, outcome: Outcome) -> Solutio
         notes: Vec::new(),
         background: None,
         outcome,
+        bodies: Vec::new(),
         timing: Timing::default(),
     }
 }

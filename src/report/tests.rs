@@ -55,6 +55,7 @@ fn unidentified() -> FrameReport {
             level: Some(1012.25),
             noise: Some(12.3418),
         },
+        bodies: Vec::new(),
         stars: vec![StarReport {
             ra_deg: None,
             dec_deg: None,

@@ -1,7 +1,10 @@
-//! What is in the sky, and where does the observer see it? Star catalogue; site and atmosphere.
+//! What is in the sky, and where does the observer see it? Star catalogue; Moon and
+//! planets; site and atmosphere.
 //!
 //! - [`catalog`]: a catalogue file → stars, brightest first, and search by position.
 //! - [`observer`]: site, date and direction → zenith distance, azimuth and airmass.
+//! - [`solar_system`]: date and site → the Moon and the planets.
 
 pub mod catalog;
 pub mod observer;
+pub mod solar_system;

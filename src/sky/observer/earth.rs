@@ -20,6 +20,14 @@ pub(super) fn terrestrial(icrs: &UnitVector<Icrs>, years: f64) -> Vector3<f64> {
     about_z(date.sidereal_time_rad()) * apparent.normalize()
 }
 
+/// The ICRS axes' components of a vector that is given in axes fixed to the Earth, `years` Julian
+/// years after J2000.0.
+pub(super) fn icrs(terrestrial: &Vector3<f64>, years: f64) -> Vector3<f64> {
+    let date = Date::new(years);
+    let to_terrestrial = about_z(date.sidereal_time_rad()) * date.to_true_equator();
+    to_terrestrial.tr_mul(terrestrial)
+}
+
 /// A date in Julian centuries since J2000.0, and the orientation of the Earth's axis then.
 struct Date {
     centuries: f64,

@@ -110,6 +110,26 @@ impl Site {
         self.height_m
     }
 
+    /// From the Earth's centre to the site, in ICRS axes, in kilometres, `years` Julian years after
+    /// J2000.0.
+    pub(crate) fn geocentric_icrs_km(&self, years: f64) -> Vector3<f64> {
+        // WGS 84.
+        const EQUATORIAL_RADIUS_KM: f64 = 6_378.137;
+        const FLATTENING: f64 = 1.0 / 298.257_223_563;
+        const POLAR_SHARE: f64 = (1.0 - FLATTENING) * (1.0 - FLATTENING);
+        let [_, _, up] = self.north_east_up();
+        let sin_lat = up.z;
+        let normal_km =
+            EQUATORIAL_RADIUS_KM / (1.0 - (1.0 - POLAR_SHARE) * sin_lat * sin_lat).sqrt();
+        let height_km = self.height_m / 1000.0;
+        let terrestrial = Vector3::new(
+            (normal_km + height_km) * up.x,
+            (normal_km + height_km) * up.y,
+            (normal_km * POLAR_SHARE + height_km) * up.z,
+        );
+        earth::icrs(&terrestrial, years)
+    }
+
     /// The unit vectors towards north, east and the zenith, in axes fixed to the Earth.
     fn north_east_up(&self) -> [Vector3<f64>; 3] {
         let (sin_lat, cos_lat) = (self.lat_deg * RAD_PER_DEG).sin_cos();
