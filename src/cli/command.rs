@@ -2,6 +2,7 @@
 
 use super::camera::CameraArgs;
 use super::catalog::CatalogArgs;
+use super::clutter::ClutterArgs;
 use super::darks::DarksArgs;
 use super::defocus::DefocusArgs;
 use super::experiment::ExperimentArgs;
@@ -44,6 +45,9 @@ pub(crate) enum Command {
     Catalog(CatalogArgs),
     /// Measure how often identification is right, wrong or fails, on simulated lists of centroids
     Robustness(RobustnessArgs),
+    /// Measure how often names are wrong, on simulated frames with foliage, clouds, trails and the
+    /// like, and whether pictures of no sky are identified
+    Clutter(Box<ClutterArgs>),
     /// Predict the faintest star that a camera detects
     Limit(Box<LimitArgs>),
     /// Write and list descriptions of cameras

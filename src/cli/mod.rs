@@ -9,6 +9,7 @@
 mod batch;
 mod camera;
 mod catalog;
+mod clutter;
 mod command;
 mod darks;
 mod defocus;
@@ -63,6 +64,7 @@ fn run_command(command: Command) -> Result<Outcome, CommandError> {
         Command::Identify(arguments) => identify::identify(arguments),
         Command::Catalog(arguments) => catalog::catalog(arguments),
         Command::Robustness(arguments) => robustness::robustness(&arguments),
+        Command::Clutter(arguments) => clutter::clutter(&arguments),
         Command::Limit(arguments) => limit::limit(&arguments),
         Command::Camera(arguments) => camera::camera(&arguments),
         Command::Defocus(arguments) => defocus::defocus(&arguments),

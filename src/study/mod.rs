@@ -1,6 +1,7 @@
-//! How good is it? Validation with simulated frames, robustness of identification, the radius of a
-//! defocused star's spot, and the experiments of the paper.
+//! How good is it? Validation with simulated frames, robustness of identification, frames with
+//! clutter, the radius of a defocused star's spot, and the experiments of the paper.
 
+pub mod clutter;
 pub mod defocus;
 pub mod experiment;
 pub mod robustness;

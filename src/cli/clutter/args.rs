@@ -1,0 +1,81 @@
+//! The options of `clutter`.
+
+use crate::cli::options::catalog::CatalogOptions;
+use crate::cli::options::format::Format;
+use crate::cli::options::setup::SetupOptions;
+use clap::Args;
+use starpipe::study::clutter::Kind;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    starpipe clutter --preset imx174-35mm\n  \
+    starpipe clutter --camera camera.toml --kinds sky --frames 250 --format csv > clutter.csv\n  \
+    starpipe clutter --preset imx174-35mm --kinds foliage,jpeg --frames 5 --pictures pictures\n\n\
+    Frames are simulated at random attitudes, clutter is drawn before the sky or into it, and they are\n\
+    processed with nothing known beforehand. Pictures of no sky are drawn, too: none may be identified.\n\
+    Kinds with sky: clean, foliage, edges, reflections, clouds, trails, false-stars, black-level, jpeg;\n\
+    without: noise, coloured-noise, dots, text, drawings, foliage-alone, windows, snow, bokeh.")]
+pub(crate) struct ClutterArgs {
+    /// Frames of each kind
+    #[arg(long, value_name = "NUMBER", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    pub(super) frames: u64,
+    /// Seed of the random numbers
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Kinds of frames: all, sky, no-sky, or names with commas between them
+    #[arg(long, value_name = "KIND,...", default_value = "all", value_parser = kinds)]
+    pub(super) kinds: Kinds,
+    /// Also write the first frames of each kind into this directory, as TIFF
+    #[arg(long, value_name = "DIR")]
+    pub(super) pictures: Option<PathBuf>,
+    /// What to print
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub(super) format: Format,
+    #[command(flatten)]
+    pub(super) setup: SetupOptions,
+    #[command(flatten)]
+    pub(super) catalog: CatalogOptions,
+}
+
+/// Kinds of frames, in their order.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Kinds(pub(super) Vec<Kind>);
+
+fn kinds(text: &str) -> Result<Kinds, String> {
+    let all = Kind::ALL.into_iter();
+    let kinds: Vec<Kind> = match text {
+        "all" => all.collect(),
+        "sky" => all.filter(|kind| kind.is_sky()).collect(),
+        "no-sky" => all.filter(|kind| !kind.is_sky()).collect(),
+        names => {
+            let wanted: Result<Vec<Kind>, String> = names.split(',').map(named).collect();
+            let wanted = wanted?;
+            all.filter(|kind| wanted.contains(kind)).collect()
+        }
+    };
+    Ok(Kinds(kinds))
+}
+
+fn named(name: &str) -> Result<Kind, String> {
+    Kind::named(name.trim()).ok_or_else(|| {
+        let known = Kind::ALL.map(Kind::name).join(", ");
+        format!("'{name}' is not one of all, sky, no-sky, {known}")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kinds_are_named_one_by_one_or_together() {
+        assert_eq!(kinds("all").unwrap().0, Kind::ALL);
+        assert_eq!(kinds("sky").unwrap().0.len(), 9);
+        assert_eq!(kinds("no-sky").unwrap().0.len(), 9);
+        let two = kinds("jpeg, foliage").unwrap().0;
+        assert_eq!(two, [Kind::Foliage, Kind::Jpeg]);
+        assert!(kinds("").unwrap_err().contains("foliage"));
+        assert!(kinds("jpeg,sea").unwrap_err().contains("'sea'"));
+    }
+}

@@ -1,0 +1,42 @@
+//! Writes frames of a study, to be looked at.
+
+use crate::cli::exit::CommandError;
+use crate::cli::output::files::write_into;
+use starpipe::frame::{TiffOptions, TiffSamples, write_tiff};
+use starpipe::identify::IndexedCatalog;
+use starpipe::study::clutter::{FrameMaker, Kind, Protocol};
+use std::io::Cursor;
+use std::path::Path;
+
+/// Frames of each kind that are written.
+const MOST_FRAMES: u64 = 20;
+
+/// Writes the first frames of each kind into `directory`, as KIND-NUMBER.tif.
+pub(super) fn write(
+    directory: &Path,
+    kinds: &[Kind],
+    protocol: &Protocol,
+    indexed: &IndexedCatalog,
+) -> Result<(), CommandError> {
+    for kind in kinds {
+        let maker = FrameMaker::new(*kind, &protocol.setup, indexed)?;
+        for number in 0..protocol.frames.min(MOST_FRAMES) {
+            let made = maker.frame(protocol.seed, number)?;
+            let name = format!("{}-{number:05}.tif", kind.name());
+            let is_8_bit = made.frame.saturation_adu.is_some_and(|most| most <= 255.0);
+            let options = TiffOptions {
+                samples: if is_8_bit {
+                    TiffSamples::Unsigned8
+                } else {
+                    TiffSamples::Unsigned16
+                },
+                compressed: true,
+                description: kind.name(),
+            };
+            let mut content = Cursor::new(Vec::new());
+            write_tiff(&mut content, &made.frame, &options)?;
+            write_into(directory, [(name, content.into_inner())])?;
+        }
+    }
+    Ok(())
+}

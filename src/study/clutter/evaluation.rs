@@ -1,0 +1,141 @@
+//! Compares what was found in a frame with the truth.
+
+use super::frames::{FrameMaker, TrueSky};
+use crate::base::coords::PixelPoint;
+use crate::identify::{Identification, StarMatch};
+use crate::model::simulate::{TrueStar, Truth};
+use crate::pipeline::{Solution, Source};
+use crate::study::robustness::Answer;
+use crate::study::validation::LightMap;
+
+/// The result of one frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameResult {
+    /// Whether the pointing is right. A frame without sky has no right one.
+    pub answer: Answer,
+    /// Millions of pixels.
+    pub megapixels: f64,
+    /// Detections that may be stars.
+    pub detected: usize,
+    /// Detections that may be stars where none is.
+    pub false_detections: usize,
+    /// Detections with a name.
+    pub named: usize,
+    /// Detections with a wrong name: that star is not there.
+    pub misnamed: usize,
+    /// The sum of the stated probabilities that a name is chance, where they are stated.
+    pub stated_misnamed: Option<f64>,
+}
+
+/// Compares `solution` with the truth of its frame.
+pub(super) fn evaluate(
+    maker: &FrameMaker,
+    sky: Option<&TrueSky>,
+    solution: &Solution,
+) -> FrameResult {
+    let found = solution.outcome.identification();
+    let matches = found.map_or(&[][..], |found| &found.matches);
+    let truth = sky.map(|sky| Sky::of(maker, &sky.truth));
+    let star_like = solution
+        .sources
+        .iter()
+        .filter(|source| is_star_like(source));
+    let is_false = |source: &&Source| {
+        let place = &source.position;
+        truth.as_ref().is_none_or(|sky| !sky.has_star_at(place))
+    };
+    let is_misnamed = |named: &&StarMatch| {
+        let source = solution.source(named.source);
+        truth
+            .as_ref()
+            .is_none_or(|sky| !sky.is_there(named, source))
+    };
+    let stated: Option<Vec<f64>> = matches.iter().map(p_chance).collect();
+    FrameResult {
+        answer: answer(maker, sky, found),
+        megapixels: (solution.width * solution.height) as f64 / 1e6,
+        detected: star_like.clone().count(),
+        false_detections: star_like.filter(is_false).count(),
+        named: matches.len(),
+        misnamed: matches.iter().filter(is_misnamed).count(),
+        stated_misnamed: stated.map(|stated| stated.iter().sum()),
+    }
+}
+
+/// The stated probability that a name is chance, where one is stated.
+fn p_chance(_named: &StarMatch) -> Option<f64> {
+    None
+}
+
+fn answer(maker: &FrameMaker, sky: Option<&TrueSky>, found: Option<&Identification>) -> Answer {
+    match (found, sky) {
+        (None, _) => Answer::None,
+        (Some(_), None) => Answer::Wrong,
+        (Some(found), Some(sky)) => Answer::of(
+            found,
+            maker.simulator.camera(),
+            &sky.pointing.icrs_to_camera,
+        ),
+    }
+}
+
+fn is_star_like(source: &Source) -> bool {
+    source.measured.is_some_and(|m| m.flags.is_star_like())
+}
+
+/// The true stars of a frame.
+struct Sky<'a> {
+    light: LightMap<'a>,
+    limit_vmag: f64,
+    /// Half of the length of a trail.
+    half_trail_px: f64,
+}
+
+impl<'a> Sky<'a> {
+    fn of(maker: &FrameMaker, truth: &'a Truth) -> Self {
+        let [x, y] = truth.motion_px;
+        Self {
+            light: LightMap::of(&maker.scenario, truth),
+            limit_vmag: maker.limit_vmag,
+            half_trail_px: x.hypot(y) / 2.0,
+        }
+    }
+
+    /// Whether a star bright enough to be detected has light at `place`.
+    fn has_star_at(&self, place: &PixelPoint) -> bool {
+        /// Magnitudes beyond the limit at which a star may still cause a detection.
+        const BEYOND_LIMIT_MAG: f64 = 1.5;
+        /// The widest wings, of the brightest stars.
+        const MOST_PX: f64 = 20.0;
+        let mut near = self.light.stars_near(place, MOST_PX + self.half_trail_px);
+        near.any(|star| {
+            star.v_mag < self.limit_vmag + BEYOND_LIMIT_MAG
+                && star.position.distance_to(place) < self.reach_px(star)
+        })
+    }
+
+    /// How far from a star a detection may be due to its light: to where its wings are below the
+    /// noise.
+    fn reach_px(&self, star: &TrueStar) -> f64 {
+        /// About the signal-to-noise ratio of a star at the limit.
+        const SNR_AT_LIMIT: f64 = 5.0;
+        /// Beyond the wings: a pixel and a half, for the peak of noise on them.
+        const MARGIN_PX: f64 = 1.5;
+        let brighter_mag = (self.limit_vmag - star.v_mag).max(0.0);
+        let peak_snr = SNR_AT_LIMIT * libm::pow(10.0, 0.4 * brighter_mag);
+        let wings = (2.0 * libm::log(peak_snr)).sqrt();
+        wings * self.light.sigma_px() + MARGIN_PX + self.half_trail_px
+    }
+
+    /// Whether the star that `source` was named after is within its errors, or two pixels.
+    fn is_there(&self, named: &StarMatch, source: &Source) -> bool {
+        const LEAST_PX: f64 = 2.0;
+        const SIGMAS: f64 = 3.0;
+        let sigma_px = source
+            .measured
+            .map_or(0.0, |m| m.sigma_px[0].max(m.sigma_px[1]));
+        let tolerance_px = LEAST_PX.max(SIGMAS * sigma_px) + self.half_trail_px;
+        let mut near = self.light.stars_near(&source.position, tolerance_px);
+        near.any(|star| star.catalog == Some(named.star))
+    }
+}

@@ -1,0 +1,177 @@
+//! Makes the frames of a study, each with its truth.
+
+use super::canvas::Canvas;
+use super::kind::Kind;
+use super::recording::{self, RecordingError};
+use super::{no_sky, scenery};
+use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
+use crate::frame::{Frame, FrameError, FrameMetadata};
+use crate::identify::IndexedCatalog;
+use crate::model::sensitivity::{Budget, Detector, Rule, Scenario, ScenarioError};
+use crate::model::simulate::{Pointing, Setup, Simulator, TrueStar, Truth};
+use crate::study::robustness::random_rotation;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Why a study is impossible.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ClutterError {
+    /// The scenario is invalid.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// A frame cannot be simulated.
+    #[error("simulating a frame")]
+    Simulate(#[from] FrameError),
+    /// A frame cannot be recorded.
+    #[error(transparent)]
+    Record(#[from] RecordingError),
+    /// A frame cannot be processed.
+    #[error("detecting stars in a simulated frame")]
+    Detect(#[from] crate::detect::DetectError),
+}
+
+/// A frame of a study.
+#[derive(Debug, Clone)]
+pub struct ClutteredFrame {
+    /// The frame.
+    pub frame: Frame,
+    /// What is on it; `None` where it shows no sky.
+    pub sky: Option<TrueSky>,
+}
+
+/// The sky on a frame.
+#[derive(Debug, Clone)]
+pub struct TrueSky {
+    /// Where the camera pointed.
+    pub pointing: Pointing,
+    /// The stars that nothing hides, without false ones.
+    pub truth: Truth,
+}
+
+/// Makes the frames of one kind.
+pub struct FrameMaker<'a> {
+    kind: Kind,
+    pub(super) scenario: Scenario,
+    pub(super) simulator: Simulator<'a>,
+    /// V magnitude at which half of the stars are detected, without clutter.
+    pub(super) limit_vmag: f64,
+}
+
+impl<'a> FrameMaker<'a> {
+    /// Prepares what all frames of `kind` have in common.
+    ///
+    /// # Errors
+    /// [`ClutterError::Scenario`], [`ClutterError::Simulate`].
+    pub fn new(
+        kind: Kind,
+        setup: &Setup,
+        indexed: &'a IndexedCatalog<'a>,
+    ) -> Result<Self, ClutterError> {
+        setup.check()?;
+        let catalog = indexed.catalog();
+        let budget = Budget::checked(&setup.scenario)?;
+        let detector = Detector::new(Rule::MatchedFilter, &setup.scenario, &budget);
+        let limit_vmag = detector.vmag_at(0.5);
+        let plain = Simulator::new(&setup.scenario, &setup.scene, catalog.stars())?;
+        let setup = with_clutter(kind, setup, &plain, (limit_vmag, indexed));
+        setup.check()?;
+        Ok(Self {
+            kind,
+            simulator: Simulator::new(&setup.scenario, &setup.scene, catalog.stars())?,
+            scenario: setup.scenario,
+            limit_vmag,
+        })
+    }
+
+    /// The frame with this number in a study with this `seed`.
+    ///
+    /// # Errors
+    /// [`ClutterError`] where it cannot be simulated or recorded.
+    pub fn frame(&self, seed: u64, number: u64) -> Result<ClutteredFrame, ClutterError> {
+        /// More frames than any study has.
+        const KIND_STRIDE: u64 = 1 << 40;
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream(self.kind as u64 * KIND_STRIDE + number);
+        if !self.kind.is_sky() {
+            let frame = no_sky::picture(self.kind, &mut random)?;
+            return Ok(ClutteredFrame { frame, sky: None });
+        }
+        let pointing = Pointing {
+            icrs_to_camera: random_rotation(&mut random),
+            years_since_j2000: 0.0,
+        };
+        let (mut frame, mut truth) = self.simulator.frame(&pointing, random.random())?;
+        // It would tell the scale.
+        frame.metadata = FrameMetadata::default();
+        let mut canvas = Canvas::new(frame.width, frame.height);
+        let frame = self.with_clutter(frame, &mut canvas, &mut random)?;
+        let is_there = |star: &TrueStar| star.catalog.is_some() && !canvas.hides(&star.position);
+        truth.stars.retain(is_there);
+        let sky = Some(TrueSky { pointing, truth });
+        Ok(ClutteredFrame { frame, sky })
+    }
+
+    fn with_clutter(
+        &self,
+        frame: Frame,
+        canvas: &mut Canvas,
+        random: &mut ChaCha8Rng,
+    ) -> Result<Frame, ClutterError> {
+        match self.kind {
+            Kind::Foliage => scenery::foliage(canvas, random),
+            Kind::Edges => {
+                scenery::roofs(canvas, random);
+                if random.random_bool(0.5) {
+                    canvas.turn();
+                }
+            }
+            Kind::Reflections => scenery::ghosts(canvas, random),
+            _ => (),
+        }
+        let frame = recording::behind(frame, canvas, random);
+        Ok(match self.kind {
+            Kind::Reflections => recording::mirrored_in_window(frame, random),
+            Kind::BlackLevel => recording::cut_off(frame, random),
+            Kind::Jpeg => recording::as_jpeg(&frame, random)?,
+            _ => frame,
+        })
+    }
+}
+
+/// `setup` with the clutter that the simulator draws itself.
+fn with_clutter(
+    kind: Kind,
+    setup: &Setup,
+    plain: &Simulator,
+    (limit_vmag, indexed): (f64, &IndexedCatalog),
+) -> Setup {
+    /// Extinction and light of the thickest clouds, and their size as a share of the frame.
+    const CLOUD: (f64, f64, f64) = (2.5, 3.0, 0.25);
+    /// Mean length of trails, in pixels: over all axes of the turn it is π/4 of the longest.
+    const TRAIL_PX: f64 = 5.0;
+    let mut setup = setup.clone();
+    let camera = plain.camera();
+    let scene = &mut setup.scene;
+    match kind {
+        Kind::Clouds => {
+            let (extinction_mag, light, share) = CLOUD;
+            (scene.cloud_mag, scene.cloud_light) = (extinction_mag, light);
+            scene.cloud_size_px = share * camera.width_px;
+        }
+        Kind::Trails => {
+            let turn_rad = TRAIL_PX / std::f64::consts::FRAC_PI_4 / camera.focal_length_px;
+            let exposure_s = setup.scenario.conditions.exposure_s;
+            scene.tumble_deg_s = turn_rad * DEG_PER_RAD / exposure_s;
+        }
+        Kind::FalseStars => {
+            let stars = indexed.catalog().stars();
+            let bright = stars.partition_point(|star| f64::from(star.v_mag) <= limit_vmag);
+            let sphere_sq_deg = 4.0 * std::f64::consts::PI / RAD_PER_DEG.powi(2);
+            let frame_sq_deg = camera.fov_x_rad() * camera.fov_y_rad() * DEG_PER_RAD.powi(2);
+            scene.false_stars += bright as f64 * frame_sq_deg / sphere_sq_deg;
+        }
+        _ => (),
+    }
+    setup
+}

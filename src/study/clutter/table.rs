@@ -1,0 +1,200 @@
+//! Rows of results, one for each kind of frame.
+
+use super::evaluation::FrameResult;
+use super::kind::Kind;
+use crate::base::format::{to_decimals, to_significant};
+use crate::study::robustness::{Answer, Interval};
+use serde::Serialize;
+
+/// The results of all frames of a kind.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct KindResult {
+    /// The kind.
+    pub kind: Kind,
+    /// Whether it shows the sky. Where it does not, every identification is wrong.
+    pub is_sky: bool,
+    /// Number of frames.
+    pub frames: usize,
+    /// Frames that were identified rightly.
+    pub right: usize,
+    /// Frames that were identified wrongly.
+    pub wrong: usize,
+    /// Upper end of the 95 % interval of the rate of wrong pointings.
+    pub wrong_high_percent: f64,
+    /// Detections that may be stars.
+    pub detected: usize,
+    /// Detections that may be stars where none is: clutter, or noise.
+    pub false_detections: usize,
+    /// The same, in a million pixels.
+    pub false_per_mpx: f64,
+    /// The number of false detections from noise alone that was asked for.
+    pub asked_per_mpx: f64,
+    /// Detections with a name, in all identified frames.
+    pub named: usize,
+    /// Detections with a wrong name: that star is not there.
+    pub misnamed: usize,
+    /// Lower end of the 95 % interval of the share of wrong names.
+    pub misnamed_low_percent: f64,
+    /// Upper end of it.
+    pub misnamed_high_percent: f64,
+    /// The number of wrong names that the stated probabilities add up to; `None` where none are
+    /// stated.
+    pub stated_misnamed: Option<f64>,
+}
+
+impl KindResult {
+    /// The results of the frames of a kind, which were processed with this rate of false
+    /// detections.
+    pub fn new(kind: Kind, results: &[FrameResult], asked_per_mpx: f64) -> Self {
+        let count = |answer| {
+            results
+                .iter()
+                .filter(|result| result.answer == answer)
+                .count()
+        };
+        let sum = |of: fn(&FrameResult) -> usize| results.iter().map(of).sum::<usize>();
+        let megapixels: f64 = results.iter().map(|result| result.megapixels).sum();
+        let (named, misnamed) = (sum(|r| r.named), sum(|r| r.misnamed));
+        let false_detections = sum(|r| r.false_detections);
+        let stated: Option<Vec<f64>> = results.iter().map(|r| r.stated_misnamed).collect();
+        let is_stated = named > 0;
+        let share = Interval::of(misnamed, named);
+        let percent = |share: f64| to_significant(100.0 * share, 4);
+        Self {
+            kind,
+            is_sky: kind.is_sky(),
+            frames: results.len(),
+            right: count(Answer::Right),
+            wrong: count(Answer::Wrong),
+            wrong_high_percent: percent(Interval::of(count(Answer::Wrong), results.len()).high),
+            detected: sum(|r| r.detected),
+            false_detections,
+            false_per_mpx: to_significant(false_detections as f64 / megapixels, 4),
+            asked_per_mpx,
+            named,
+            misnamed,
+            misnamed_low_percent: percent(share.low),
+            misnamed_high_percent: percent(share.high),
+            stated_misnamed: stated
+                .filter(|_| is_stated)
+                .map(|stated| to_decimals(stated.iter().sum(), 3)),
+        }
+    }
+
+    /// The rows as text, with sums over the frames with and without sky.
+    pub fn to_text(rows: &[Self]) -> String {
+        let mut text = format!(
+            "{:<16} {:>7} {:>7} {:>6} {:>9} {:>10} {:>9} {:>8} {:>7} {:>15} {:>8}\n",
+            "",
+            "frames",
+            "right",
+            "wrong",
+            "detected",
+            "false/Mpx",
+            "asked for",
+            "named",
+            "wrong",
+            "95 %",
+            "stated"
+        );
+        for row in rows {
+            text += &row.line();
+        }
+        for (name, is_sky) in [("with sky", true), ("without sky", false)] {
+            let of_part = || rows.iter().filter(|row| row.is_sky == is_sky);
+            if of_part().count() > 1 {
+                text += &sums(name, of_part());
+            }
+        }
+        text
+    }
+
+    fn line(&self) -> String {
+        let names = names(self.named, self.misnamed, self.stated_misnamed);
+        format!(
+            "{:<16} {:>7} {:>7} {:>6} {:>9} {:>10.3} {:>9} {names}\n",
+            self.kind.name(),
+            self.frames,
+            self.right,
+            self.wrong,
+            self.detected,
+            self.false_per_mpx,
+            self.asked_per_mpx,
+        )
+    }
+}
+
+fn sums<'a>(name: &str, rows: impl Iterator<Item = &'a KindResult> + Clone) -> String {
+    let sum = |of: fn(&KindResult) -> usize| rows.clone().map(of).sum::<usize>();
+    let with_names = rows.clone().filter(|row| row.named > 0);
+    let stated: Option<Vec<f64>> = with_names.map(|row| row.stated_misnamed).collect();
+    let stated = stated.map(|stated| stated.iter().sum());
+    let names = names(sum(|r| r.named), sum(|r| r.misnamed), stated);
+    format!(
+        "{name:<16} {:>7} {:>7} {:>6} {:>9} {:>10} {:>9} {names}\n",
+        sum(|r| r.frames),
+        sum(|r| r.right),
+        sum(|r| r.wrong),
+        sum(|r| r.detected),
+        "",
+        "",
+    )
+}
+
+/// Numbers of names and wrong names, the interval of their share, and the stated number.
+fn names(named: usize, misnamed: usize, stated: Option<f64>) -> String {
+    let share = Interval::of(misnamed, named);
+    let [low, high] = [share.low, share.high].map(|share| 100.0 * share);
+    let interval = match named {
+        0 => "–".to_owned(),
+        _ => format!("{low:.3} to {high:.3} %"),
+    };
+    let stated = match (named, stated) {
+        (0, _) | (_, None) => "–".to_owned(),
+        (_, Some(stated)) => format!("{stated:.2}"),
+    };
+    format!("{named:>8} {misnamed:>7} {interval:>15} {stated:>8}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn result(answer: Answer, named: usize, misnamed: usize) -> FrameResult {
+        FrameResult {
+            answer,
+            megapixels: 2.0,
+            detected: 30,
+            false_detections: 4,
+            named,
+            misnamed,
+            stated_misnamed: Some(0.25),
+        }
+    }
+
+    #[test]
+    fn a_row_counts_frames_and_names() {
+        let results = [
+            result(Answer::Right, 20, 1),
+            result(Answer::Wrong, 10, 10),
+            result(Answer::None, 0, 0),
+        ];
+        let row = KindResult::new(Kind::Foliage, &results, 0.1);
+        assert_eq!((row.frames, row.right, row.wrong), (3, 1, 1));
+        assert_eq!((row.named, row.misnamed), (30, 11));
+        assert_eq!(row.stated_misnamed, Some(0.75));
+        assert_eq!(row.false_per_mpx, 2.0);
+        let text = KindResult::to_text(&[row.clone(), row]);
+        assert!(text.lines().all(|line| line.chars().count() < 120));
+        assert!(text.contains("with sky") && !text.contains("without sky"));
+    }
+
+    #[test]
+    fn without_stated_probabilities_none_are_summed() {
+        let mut unstated = result(Answer::Right, 20, 0);
+        unstated.stated_misnamed = None;
+        let row = KindResult::new(Kind::Clean, &[unstated], 0.1);
+        assert_eq!(row.stated_misnamed, None);
+        assert!(row.line().contains('–'));
+    }
+}
