@@ -565,12 +565,12 @@ fn hipparcos_and_gaia_tables_are_read_with_their_own_units_and_epochs() {
         6917528443525529728,10.0,60.0,2016.0,1000.0,-500.0,12.25\n\
         4472832130942575872,20.0,-60.0,2016.0,,,9.5\n";
     let reading = read(&folder.write("gaia", gaia));
-    let found = star(&reading.catalog, "ID 6917528443525529728");
+    let found = star(&reading.catalog, "GAIA 6917528443525529728");
     let (ra, dec) = (10.0 - 16.0 / 3600.0 / 0.5, 60.0 + 8.0 / 3600.0);
     assert!(off_arcsec(found, ra, dec) < 0.01);
     assert_eq!(found.v_mag, 12.25);
     assert!(
-        star(&reading.catalog, "ID 4472832130942575872")
+        star(&reading.catalog, "GAIA 4472832130942575872")
             .flags
             .contains(StarFlags::NO_PROPER_MOTION)
     );
@@ -591,7 +591,7 @@ fn hipparcos_and_gaia_tables_are_read_with_their_own_units_and_epochs() {
     // VizieR's computed positions are at J2000, whatever the catalogue's epoch.
     let computed =
         "source_id,_RAJ2000,_DEJ2000,epoch,pmra,pmdec,mag\n1,10.0,60.0,1950.0,1000.0,0.0,9\n";
-    let found = *star(&read(&folder.write("computed", computed)).catalog, "ID 1");
+    let found = *star(&read(&folder.write("computed", computed)).catalog, "GAIA 1");
     assert!(off_arcsec(&found, 10.0, 60.0) < 0.001);
     // A proper motion in an unknown unit is ignored.
     let parsecs = "id,ra,dec,pmra (pc),pmdec (pc),mag\n1,10.0,60.0,1000.0,0.0,9\n";

@@ -18,11 +18,13 @@ pub enum StarId {
     Tycho(TychoId),
     /// A number of Hipparcos, as in `HIP 11767` or, for a component of a double star, `HIP 12318B`.
     Hipparcos(HipparcosId),
-    /// A number of another catalogue, such as Gaia's `source_id`; printed as `ID 4472832130942575872`.
+    /// A number whose catalogue is not known; printed as `ID 7`.
     Number(u64),
     /// A star that has only a name (see [`Catalog::name_of`](super::Catalog::name_of)); the number
     /// is arbitrary.
     Named(u32),
+    /// Gaia's `source_id`; printed as `GAIA 4472832130942575872`.
+    Gaia(u64),
 }
 
 impl fmt::Display for StarId {
@@ -33,6 +35,7 @@ impl fmt::Display for StarId {
             Self::Hipparcos(id) => write!(f, "{id}"),
             Self::Number(number) => write!(f, "ID {number}"),
             Self::Named(number) => write!(f, "named star {number}"),
+            Self::Gaia(number) => write!(f, "GAIA {number}"),
         }
     }
 }
@@ -46,6 +49,7 @@ impl StarId {
             Self::Hipparcos(HipparcosId(packed)) => (2, packed as u64),
             Self::Number(number) => (3, number),
             Self::Named(number) => (4, number as u64),
+            Self::Gaia(number) => (5, number),
         }
     }
 
@@ -58,12 +62,13 @@ impl StarId {
             2 => small().map(|packed| Self::Hipparcos(HipparcosId(packed))),
             3 => Some(Self::Number(value)),
             4 => small().map(Self::Named),
+            5 => Some(Self::Gaia(value)),
             _ => None,
         }
     }
 
     /// Parses an identifier with its catalogue: `SKYMAP 02480053`, `TYC 1-13-1`, `HIP 11767`, `HIP
-    /// 12318B`, `ID 7`.
+    /// 12318B`, `GAIA 4472832130942575872`, `ID 7`.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let number_of = |catalog: &str| {
             let (start, number) = text.split_at_checked(catalog.len())?;
@@ -77,6 +82,8 @@ impl StarId {
         } else if let Some(number) = number_of("SKYMAP") {
             let number = whole_number(number.as_bytes())?;
             u32::try_from(number).ok().map(Self::Skymap)
+        } else if let Some(number) = number_of("GAIA ") {
+            whole_number(number.as_bytes()).map(Self::Gaia)
         } else {
             whole_number(number_of("ID ")?.as_bytes()).map(Self::Number)
         }
@@ -190,7 +197,8 @@ mod tests {
             "HIP 11767",
             "HIP 12318B",
             "SKYMAP 02480053",
-            "ID 4472832130942575872",
+            "GAIA 4472832130942575872",
+            "ID 7",
         ] {
             assert_eq!(StarId::parse(text).unwrap().to_string(), text);
         }
@@ -226,7 +234,7 @@ mod tests {
     proptest! {
         #[test]
         fn identifiers_survive_the_compact_form(
-            kind in 0..6_u8,
+            kind in 0..7_u8,
             value in any::<u64>(),
             small in any::<u32>(),
         ) {

@@ -138,8 +138,8 @@ impl Catalog {
         }
     }
 
-    /// The catalogue's own designation of a star: `SKYMAP nnnnnnnn`, `TYC a-b-c`, `HIP n`, `ID n`,
-    /// or a name.
+    /// The catalogue's own designation of a star: `SKYMAP nnnnnnnn`, `TYC a-b-c`, `HIP n`,
+    /// `GAIA n`, `ID n`, or a name.
     ///
     /// # Panics
     /// If there is no such star.

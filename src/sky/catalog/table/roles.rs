@@ -22,6 +22,8 @@ pub(super) enum IdKind {
     Skymap,
     Tycho,
     Hipparcos,
+    /// Gaia's, or text.
+    Gaia,
     /// Numbers of this catalogue.
     NumberOf(&'static str),
     /// Numbers or text.
@@ -31,9 +33,11 @@ pub(super) enum IdKind {
 impl IdColumns {
     pub(super) fn find(headings: &[Heading]) -> Option<Self> {
         /// Headings of identifiers, in order of preference.
-        const IDENTIFIERS: [(&str, IdKind); 9] = [
+        const IDENTIFIERS: [(&str, IdKind); 11] = [
             ("skymap skymap_number", IdKind::Skymap),
-            ("id star_id starid source_id source objid", IdKind::Any),
+            ("id star_id starid", IdKind::Any),
+            ("source_id", IdKind::Gaia),
+            ("source objid", IdKind::Any),
             ("tyc tyc_id tycho tyc2", IdKind::Tycho),
             ("hip", IdKind::Hipparcos),
             ("identifier designation main_id star name", IdKind::Any),

@@ -91,8 +91,12 @@ impl TableRow<'_> {
             IdKind::Skymap => (skymap().or_else(with_catalog), "a Skymap number"),
             IdKind::Tycho => (tycho().or_else(with_catalog), "a TYC number like 1-13-1"),
             IdKind::Hipparcos => (hipparcos().or_else(with_catalog), "a Hipparcos number"),
-            IdKind::Any => {
-                let known = with_catalog().or_else(|| number().map(StarId::Number));
+            IdKind::Any | IdKind::Gaia => {
+                let numbered = match kind {
+                    IdKind::Gaia => StarId::Gaia,
+                    _ => StarId::Number,
+                };
+                let known = with_catalog().or_else(|| number().map(numbered));
                 return known.map_or_else(|| self.named(text), |id| Ok((id, None)));
             }
             IdKind::NumberOf(catalog) if number().is_some() => {
