@@ -556,6 +556,121 @@ fn a_saturated_star_is_one_source_at_its_position() {
     assert_eq!(found.sources.len(), 10, "{:?}", found.sources);
 }
 
+/// A sky with a star at each place, its light in the core and, `tail_px` aside, in a wider and
+/// fainter spot: the coma of a lens.
+fn lopsided(side: usize, stars: &[(f64, f64, f64)], tail_px: f64) -> Sky {
+    let mut sky = Sky::flat(side, side, BACKGROUND_E);
+    for &(x, y, flux) in stars {
+        sky.add_star(x, y, 0.7 * flux, 1.2);
+        sky.add_star(x + tail_px, y + tail_px, 0.3 * flux, 3.0);
+    }
+    sky
+}
+
+#[test]
+fn a_saturated_star_with_coma_is_where_the_faint_ones_would_be() {
+    const FULL_SCALE: f32 = 4095.0;
+    let faint = (0..64).map(|i| {
+        let at = |n: i32| 30.0 + 48.0 * f64::from(n) + 0.013 * f64::from(i);
+        (at(i % 8), at(i / 8), 4000.0)
+    });
+    let bright = [(54.3, 54.1), (150.2, 246.4), (294.4, 102.3), (342.0, 342.2)];
+    let saturated = bright.map(|(x, y)| (x, y, 300_000.0));
+    let stars: Vec<_> = faint.chain(saturated).collect();
+    let mut frame = lopsided(400, &stars, 3.0).expose(3);
+    frame.pixels.iter_mut().for_each(|p| *p = p.min(FULL_SCALE));
+    let frame = frame.with_levels(1.0, Some(FULL_SCALE));
+    let found = found_in(&frame, &DetectConfig::default());
+    for (x, y) in bright {
+        let star = nearest(&found, x, y, 6.0).unwrap();
+        println!("({x}, {y}): {star:?}");
+        assert!(star.flags.saturated && star.flags.is_star_like());
+        // The coma itself is 4.2 px aside.
+        let error_px = (star.position.x - x).hypot(star.position.y - y);
+        assert!(error_px < 1.5, "{error_px}");
+        assert!(error_px < 3.5 * star.sigma_x_px, "{error_px}: {star:?}");
+    }
+}
+
+/// Stars that the camera's motion drew out alike, along the diagonal, over `length_px`.
+fn drawn_out(side: usize, stars: &[(f64, f64, f64)], length_px: f64, seed: u64) -> Frame {
+    const PARTS: usize = 24;
+    let mut sky = Sky::flat(side, side, BACKGROUND_E);
+    for &(x, y, flux) in stars {
+        for part in 0..PARTS {
+            let along = length_px * ((part as f64 + 0.5) / PARTS as f64 - 0.5);
+            let step = along * std::f64::consts::FRAC_1_SQRT_2;
+            sky.add_star(x + step, y + step, flux / PARTS as f64, 1.2);
+        }
+    }
+    sky.expose(seed)
+}
+
+#[test]
+fn stars_drawn_out_alike_are_stars_and_one_drawn_out_across_is_a_trail() {
+    const SIDE: usize = 400;
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let mut stars = Vec::new();
+    for i in 0..49 {
+        let at = |n: i32| 32.0 + 56.0 * f64::from(n);
+        let flux = 4000.0 * rng.random_range(1.0f64..4.0).exp();
+        stars.push((
+            at(i % 7) + rng.random_range(-2.0..2.0),
+            at(i / 7) + rng.random_range(-2.0..2.0),
+            flux,
+        ));
+    }
+    let mut frame = drawn_out(SIDE, &stars, 9.0, 4);
+    // A satellite, across the direction of the stars.
+    for i in 0..30 {
+        frame.pixels[(60 + i) * SIDE + 74 - i] += 400.0;
+        frame.pixels[(61 + i) * SIDE + 74 - i] += 400.0;
+    }
+    let found = found_in(&frame, &DetectConfig::default());
+    let mut pulls = 0.0;
+    let trails: Vec<_> = found.sources.iter().filter(|s| s.flags.trail).collect();
+    assert_eq!(trails.len(), 1, "{trails:?}");
+    assert!((trails[0].position.x - 59.5).abs() < 3.0, "{:?}", trails[0]);
+    for &(x, y, _) in &stars {
+        let near = |s: &&Detection| (s.position.x - x).hypot(s.position.y - y) < 9.0;
+        let own: Vec<_> = found.sources.iter().filter(near).collect();
+        assert_eq!(own.len(), 1, "({x}, {y}): {own:?}");
+        assert!(own[0].flags.is_star_like(), "{:?}", own[0]);
+        let error_px = (own[0].position.x - x).hypot(own[0].position.y - y);
+        let sigma_px = own[0].sigma_x_px;
+        pulls += (error_px / sigma_px).powi(2) / 2.0;
+        println!(
+            "{:.1}: off by {error_px:.4} px, {sigma_px:.4} stated",
+            own[0].snr
+        );
+        assert!(error_px < 0.5, "{error_px}: {:?}", own[0]);
+    }
+    let pull = (pulls / stars.len() as f64).sqrt();
+    println!("RMS of pulls {pull:.2}");
+    assert!((0.4..1.6).contains(&pull), "{pull}");
+}
+
+#[test]
+fn a_plateau_brighter_than_all_else_is_one_source() {
+    // The image of a bright star in a phone's picture: wide and flat, below full scale.
+    const SIDE: usize = 320;
+    let mut sky = Sky::flat(SIDE, SIDE, BACKGROUND_E);
+    for i in 0..25 {
+        let at = |n: i32| 20.0 + 70.0 * f64::from(n);
+        sky.add_star(at(i % 5), at(i / 5), 3000.0, 1.0);
+    }
+    let mut frame = sky.expose(6);
+    for (i, pixel) in frame.pixels.iter_mut().enumerate() {
+        let (x, y) = ((i % SIDE) as f32 - 125.4, (i / SIDE) as f32 - 124.8);
+        // A tilted plateau: the background of a phone's picture is uneven.
+        let blob = (4000.0 + 0.5 * x) / (1.0 + ((x * x + y * y) / 90.0).powi(4));
+        *pixel += blob.round();
+    }
+    let found = found_in(&frame, &DetectConfig::default());
+    let own = nearest(&found, 125.4, 124.8, 3.0);
+    assert!(own.is_some(), "{:?}", &found.sources[..5]);
+}
+
 /// Asserts what holds for every detection on any frame.
 fn check_is_sound(s: &Detection, width: usize, height: usize) -> Result<(), String> {
     let is_inside = |at: f64, side: usize| (-0.5..=side as f64 - 0.5).contains(&at);

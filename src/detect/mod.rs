@@ -54,7 +54,8 @@ pub use filter_model::FilterModel;
 pub use workspace::Workspace;
 
 use crate::frame::{Frame, MIN_SIDE_PX};
-use measure::Measurement;
+use candidates::PeakSearch;
+use measure::{Measurement, StarShape};
 use pixels::View;
 use search::SearchInput;
 
@@ -127,14 +128,18 @@ pub fn detect_into(
     let searched = search.run(&input);
     let (stars, pass) = (searched.stars, searched.pass);
     let filtered = Some(&search.filtered.mesh);
+    let maps = input.maps(filtered, stars.spot_px, pass.matched_gain);
+    let PeakSearch { peaks, regions, .. } = &mut search.found;
+    let shape = StarShape::measure(&maps, peaks);
+    shape.merge_peaks(peaks, regions);
     let measurement = Measurement {
-        maps: input.maps(filtered, stars.spot_px, pass.matched_gain),
+        maps,
+        shape,
         noise: stars.noise,
         method: config.centroid,
-        regions: &search.found.regions,
+        regions,
         threshold: pass.threshold,
     };
-    let peaks = &search.found.peaks;
     measurement.run(peaks, measure, &mut found.sources);
     found.sources.sort_unstable_by(Detection::by_brightness);
     found.background_adu = background.median_adu;

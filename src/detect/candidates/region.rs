@@ -13,6 +13,8 @@ pub(crate) struct Region {
     pub x: f64,
     /// Centre, weighted with the filtered values.
     pub y: f64,
+    /// Variances along x and y, and covariance, in px².
+    pub covariance: [f64; 3],
     /// Standard deviation along the longer principal axis, in pixels.
     pub major_px: f64,
     /// Standard deviation along the shorter principal axis, in pixels.
@@ -45,6 +47,7 @@ impl Region {
             peaks: 0,
             x: x + x0,
             y: y + y0,
+            covariance: [xx + PIXEL_VARIANCE_PX2, yy + PIXEL_VARIANCE_PX2, xy],
             major_px: (mean + half_range + PIXEL_VARIANCE_PX2).sqrt(),
             minor_px: minor_px2.max(PIXEL_VARIANCE_PX2).sqrt(),
         }

@@ -27,6 +27,8 @@ pub(crate) struct PeakSearch {
     /// The pixel and the run of each peak while the peaks are in reading order.
     peak_pixels: Vec<[u32; 2]>,
     flooding: Flooding,
+    /// The highest peak of each region.
+    highest: Vec<Option<usize>>,
     selection: Selection,
     streaks: Streaks,
     /// The mesh interpolated to the current row.
@@ -99,8 +101,12 @@ impl PeakSearch {
         }
     }
 
-    /// Sets the prominences where a region has several peaks; a single peak keeps its height.
+    /// Sets the prominences where a region has several peaks; a single peak keeps its height, and
+    /// so does the highest: on a plateau, the highest pixel in units of the local noise may be
+    /// next to it.
     fn set_prominences(&mut self) {
+        self.highest.clear();
+        self.highest.resize(self.regions.len(), None);
         for region in 0..self.regions.len() {
             if self.regions[region].peaks >= 2 {
                 self.flooding.set_prominences(
@@ -110,6 +116,15 @@ impl PeakSearch {
                     &mut self.peaks,
                 );
             }
+        }
+        for (index, peak) in self.peaks.iter().enumerate() {
+            let highest = &mut self.highest[peak.region];
+            if highest.is_none_or(|other| self.peaks[other].snr < peak.snr) {
+                *highest = Some(index);
+            }
+        }
+        for &index in self.highest.iter().flatten() {
+            self.peaks[index].prominence = self.peaks[index].snr;
         }
     }
 

@@ -1,8 +1,10 @@
 //! From peaks to detections: groups of touching spots, close pairs, centroids, flags.
 
+use super::core::Core;
 use super::estimate::{brightest_within, detection_of};
 use super::known_spots::{KnownSpots, PeakSurroundings};
 use super::pairs::{PairFitter, may_be_pair};
+use super::star_shape::StarShape;
 use super::{centroid, shape};
 use crate::base::coords::PixelPoint;
 use crate::detect::candidates::{Peak, Region};
@@ -12,6 +14,7 @@ use crate::detect::fit::{
     BatchStart, Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate, SpotGroup,
     window_radius,
 };
+use crate::detect::psf::PIXEL_VARIANCE_PX2;
 use crate::detect::threads::for_each_worker;
 use std::mem;
 
@@ -47,6 +50,8 @@ pub(crate) struct Measurement<'a> {
     pub maps: FrameMaps<'a>,
     /// Variance of the pixels.
     pub noise: NoiseModel,
+    /// The shape of the stars.
+    pub shape: StarShape,
     /// How positions are measured.
     pub method: CentroidMethod,
     /// The regions that hold the peaks.
@@ -165,7 +170,10 @@ impl Measurement<'_> {
         };
         fit.converged &= fit.spots[0].has_position(fit.spot_px);
         let is_single = fit.converged && start.len() == 1;
-        let pair = if is_single && may_be_pair(&fit, peak, region, self.maps.spot_px) {
+        let may_be_pair = is_single
+            && !self.shape.is_elongated()
+            && may_be_pair(&fit, peak, region, self.maps.spot_px);
+        let pair = if may_be_pair {
             let pair_fitter = PairFitter {
                 maps: &self.maps,
                 noise: self.noise,
@@ -176,15 +184,27 @@ impl Measurement<'_> {
             None
         };
         let is_star = pair.is_none() && is_single && !peak.saturated;
+        if pair.is_none() && is_single && peak.saturated {
+            self.move_to_core(&mut fit, peak);
+        }
         if let Some(pair) = pair {
             fit = self.add_companion(pair, surroundings, buffers, out);
         }
         let mut detection = detection_of(&self.maps, &self.noise, &fit, peak, region);
         if is_star {
-            shape::flag_size(&self.maps, peak, &fit, &mut detection, buffers);
+            shape::flag_size(
+                (&self.maps, &self.shape),
+                peak,
+                &fit,
+                &mut detection,
+                buffers,
+            );
         }
         detection.flags.blended = fit.spots.len() > 1;
         self.flag_trail(peak, region, &mut detection);
+        if self.shape.is_elongated() && fit.spots.len() == 1 {
+            self.center_elongated(&fit, peak, &mut detection, buffers);
+        }
         self.finish(&fit, &mut detection, buffers, out);
         fit.converged.then(|| fit.spots[0])
     }
@@ -208,6 +228,64 @@ impl Measurement<'_> {
             fitter.set_flux_noise(window, &mut fit, &self.fit_config());
         }
         fit
+    }
+
+    /// Takes the centre of light for an elongated star: a round spot has no certain place along it.
+    fn center_elongated(
+        &self,
+        fit: &Fit,
+        peak: &Peak,
+        detection: &mut Detection,
+        buffers: &mut FitBuffers,
+    ) {
+        /// Fainter stars have no core: noise breaks it up.
+        const MIN_SNR: f32 = 15.0;
+        if detection.flags.trail {
+            return;
+        }
+        let core = Core::at(&self.maps, peak).filter(|_| peak.snr >= MIN_SNR);
+        if let Some(core) = core {
+            detection.position = PixelPoint::new(core.x, core.y);
+            detection.sigma_x_px = core.sigma_px;
+            detection.sigma_y_px = core.sigma_px;
+        } else {
+            centroid::grey_weighted(&self.maps, &self.noise, fit, detection, buffers);
+            // The window cuts off its ends at whole pixels.
+            for sigma in [&mut detection.sigma_x_px, &mut detection.sigma_y_px] {
+                *sigma = sigma.hypot(PIXEL_VARIANCE_PX2.sqrt());
+            }
+        }
+    }
+
+    /// Moves a saturated star from the centre of its wings, which are all that was fitted, to its
+    /// core where the two disagree: its spot is lopsided (coma), and of the stars that are not
+    /// saturated hardly more than the core stands out.
+    fn move_to_core(&self, fit: &mut Fit, peak: &Peak) {
+        /// Distance of the two that is significant, in standard errors.
+        const SIGNIFICANT_SIGMA: f64 = 3.0;
+        /// The core of a star whose charge ran along a column is longer than this, over its
+        /// breadth; its wings are right.
+        const MAX_ELONGATION: f64 = 2.0;
+        let Some(core) = Core::at(&self.maps, peak) else {
+            return;
+        };
+        // Of a star that is hardly saturated the wings are nearly all.
+        let is_wide = core.spot_px() > self.maps.width_px();
+        let [major_px, minor_px] = StarShape::default().axes_px(core.covariance);
+        let is_compact = major_px < MAX_ELONGATION * minor_px;
+        let spot = &mut fit.spots[0];
+        let distance_px = (core.x - spot.x).hypot(core.y - spot.y);
+        let error_px = core.sigma_px.hypot(spot.sigma_x.max(spot.sigma_y));
+        let is_off = distance_px > SIGNIFICANT_SIGMA * error_px;
+        if is_wide && is_compact && is_off {
+            (spot.x, spot.y) = (core.x, core.y);
+            // The centre depends on the level by about the distance of the two.
+            let uncertain_px = distance_px * PIXEL_VARIANCE_PX2.sqrt();
+            // Not that of noise, for which errors are raised where it is correlated.
+            let correlation = self.maps.correlation_at(spot.x, spot.y);
+            let sigma_px = core.sigma_px.hypot(uncertain_px) / correlation;
+            (spot.sigma_x, spot.sigma_y) = (sigma_px, sigma_px);
+        }
     }
 
     /// Adds the companion of a pair, unless that is another peak, which is measured by itself.
@@ -254,7 +332,7 @@ impl Measurement<'_> {
 
     /// Flags a trail. Its position is the centre of its region, with its length as standard error.
     fn flag_trail(&self, peak: &Peak, region: &Region, detection: &mut Detection) {
-        if shape::is_trail(region, peak, self.maps.width_px(), self.threshold) {
+        if shape::is_trail((&self.maps, &self.shape), region, peak, self.threshold) {
             detection.flags.trail = true;
             detection.position = PixelPoint::new(region.x, region.y);
             detection.sigma_x_px = region.major_px;
@@ -273,7 +351,8 @@ impl Measurement<'_> {
     ) {
         let is_by_area = detection.flags.saturated && !fit.converged;
         let is_grey = self.method == CentroidMethod::GreyWeighted;
-        if is_grey && !detection.flags.trail && !is_by_area {
+        let is_centered = self.shape.is_elongated() && !detection.flags.blended;
+        if is_grey && !is_centered && !detection.flags.trail && !is_by_area {
             centroid::grey_weighted(&self.maps, &self.noise, fit, detection, buffers);
         }
         detection.position.x += self.maps.view.x0 as f64;

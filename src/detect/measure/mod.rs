@@ -1,6 +1,7 @@
 //! Step 6: positions, fluxes and flags of the sources.
 
 mod centroid;
+mod core;
 mod estimate;
 mod known_spots;
 mod measurement;
@@ -8,5 +9,7 @@ mod neighbour_grid;
 mod pairs;
 mod saturated_area;
 mod shape;
+mod star_shape;
 
 pub(crate) use measurement::{MeasureBuffers, Measurement};
+pub(crate) use star_shape::StarShape;

@@ -25,7 +25,7 @@ impl PairCriteria {
     const MIN_ELONGATION: f64 = 1.35;
 }
 
-/// Whether a source may be a close pair.
+/// Whether a source may be a close pair, in a frame whose stars are round.
 pub(super) fn may_be_pair(fit: &Fit, peak: &Peak, region: &Region, spot_px: f64) -> bool {
     let is_wide = fit.size_excess_px > PairCriteria::MIN_EXCESS_SIGMA * fit.size_error_px
         && fit.size_excess_px > PairCriteria::MIN_EXCESS * spot_px;

@@ -29,7 +29,7 @@ impl SaturatedArea {
     /// The area that has a pixel within one pixel of `peak`; `None` where there is none.
     pub fn at(maps: &FrameMaps<'_>, peak: &Peak) -> Option<Self> {
         let mut sums = [0.0; 6];
-        for_each_saturated(maps, peak, |column, row| {
+        for_each_from(maps, peak, maps.saturation_adu, |column, row| {
             let background = f64::from(maps.background.at(column as f32, row as f32).0);
             let light = f64::from(maps.view.at(column, row)) - background;
             let (x, y) = (column as f64 - peak.x as f64, row as f64 - peak.y as f64);
@@ -55,8 +55,14 @@ impl SaturatedArea {
     }
 }
 
-/// Calls `visit` with column and row of each pixel of the area at `peak` (flood fill).
-fn for_each_saturated(maps: &FrameMaps<'_>, peak: &Peak, mut visit: impl FnMut(usize, usize)) {
+/// Calls `visit` with column and row of each pixel at or above `level` that is connected with
+/// `peak` (flood fill).
+pub(super) fn for_each_from(
+    maps: &FrameMaps<'_>,
+    peak: &Peak,
+    level: f32,
+    mut visit: impl FnMut(usize, usize),
+) {
     let left = peak.x.saturating_sub(REACH_PX);
     let top = peak.y.saturating_sub(REACH_PX);
     let mut is_seen = [[false; MAX_WINDOW_PX]; MAX_WINDOW_PX];
@@ -68,7 +74,7 @@ fn for_each_saturated(maps: &FrameMaps<'_>, peak: &Peak, mut visit: impl FnMut(u
         let columns = x.saturating_sub(1)..(x + 2).min(maps.view.width);
         let rows = y.saturating_sub(1)..(y + 2).min(maps.view.height);
         rows.flat_map(move |row| columns.clone().map(move |column| (column, row)))
-            .filter(|&(x, y)| maps.view.at(x, y) >= maps.saturation_adu)
+            .filter(|&(x, y)| maps.view.at(x, y) >= level)
     };
     // Each pixel is new once: there is room for all.
     let mut open: ArrayVec<(usize, usize), { MAX_WINDOW_PX * MAX_WINDOW_PX }> =

@@ -9,6 +9,8 @@
 //! a hot pixel the mean is +d². A source is flagged where a single pixel fits better (D > 0) and a
 //! star would have a D that high in under one of 150 cases.
 
+use super::core::Core;
+use super::star_shape::StarShape;
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::detection::Detection;
 use crate::detect::fit::{Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate};
@@ -30,7 +32,7 @@ impl StarSize {
 /// Sets the flags of sources sharper or wider than the frame's spot; the window of the fit is in
 /// `buffers`.
 pub(super) fn flag_size(
-    maps: &FrameMaps<'_>,
+    (maps, shape): (&FrameMaps<'_>, &StarShape),
     peak: &Peak,
     fit: &Fit,
     detection: &mut Detection,
@@ -43,7 +45,9 @@ pub(super) fn flag_size(
         && excess > StarSize::SIGNIFICANT_SIGMA
         && fit.size_excess_px > 0.3 * (StarSize::MAX - 1.0) * maps.spot_px
     {
-        detection.flags.extended = is_extended(maps, peak, fit, buffers);
+        let is_wider = shape.is_wider(maps, peak, StarSize::MAX);
+        detection.flags.extended =
+            is_wider.unwrap_or_else(|| is_extended(maps, peak, fit, buffers));
     }
 }
 
@@ -125,8 +129,14 @@ fn is_extended(maps: &FrameMaps<'_>, peak: &Peak, fit: &Fit, buffers: &mut FitBu
     star.chi2 - free.chi2 > allowed + imperfection(maps, peak, &spot)
 }
 
-/// Whether the region of a peak is longer than a star of its height is wide.
-pub(super) fn is_trail(region: &Region, peak: &Peak, width_px: f64, threshold: f64) -> bool {
+/// Whether the region of a peak is longer than a star of its height is wide. The halo of a saturated
+/// star may be so; its core is not.
+pub(super) fn is_trail(
+    (maps, shape): (&FrameMaps<'_>, &StarShape),
+    region: &Region,
+    peak: &Peak,
+    threshold: f64,
+) -> bool {
     /// Minimum area, in pixels: smaller regions have no meaningful elongation.
     const MIN_AREA_PX: usize = 8;
     /// Minimum ratio of the principal axes.
@@ -136,9 +146,14 @@ pub(super) fn is_trail(region: &Region, peak: &Peak, width_px: f64, threshold: f
     if region.peaks > 1 || region.area_px < MIN_AREA_PX {
         return false;
     }
+    let has_round_core = || {
+        let axes = Core::at(maps, peak).map(|core| shape.axes_px(core.covariance));
+        axes.is_some_and(|[major, minor]| major < MIN_ELONGATION * minor)
+    };
     // A filtered star falls to the threshold at r² = 4 s² ln(snr / threshold); 1.5 px for the grid.
     let height = (f64::from(peak.snr) / threshold).max(1.0);
-    let radius_px = 2.0 * width_px * height.ln().sqrt() + 1.5;
-    let is_long = region.major_px > MIN_LENGTH * 0.5 * radius_px;
-    is_long && region.major_px > MIN_ELONGATION * region.minor_px
+    let radius_px = 2.0 * maps.width_px() * height.ln().sqrt() + 1.5;
+    let [major_px, minor_px] = shape.axes_px(region.covariance);
+    let is_long = major_px > MIN_LENGTH * 0.5 * radius_px;
+    is_long && major_px > MIN_ELONGATION * minor_px && !(peak.saturated && has_round_core())
 }
