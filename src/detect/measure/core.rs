@@ -52,18 +52,21 @@ impl Core {
             return None;
         }
         let (x, y) = (x / area_px, y / area_px);
-        // The edge of the area is known to a pixel in each of its rows, about √area of them.
-        let sigma_px = (PIXEL_VARIANCE_PX2 / area_px.sqrt()).sqrt();
+        let covariance = [
+            xx / area_px - x * x + PIXEL_VARIANCE_PX2,
+            yy / area_px - y * y + PIXEL_VARIANCE_PX2,
+            xy / area_px - x * y,
+        ];
+        // Each pixel is one sample of where the light ends; noise moves the centre by a part of the
+        // width.
+        let of_pixels = (PIXEL_VARIANCE_PX2 / area_px).sqrt();
+        let of_noise = (covariance[0] + covariance[1]).sqrt() / f64::from(peak.snr);
         Some(Self {
             x: peak.x as f64 + light_x / light,
             y: peak.y as f64 + light_y / light,
-            sigma_px,
+            sigma_px: of_pixels.hypot(of_noise),
             area_px,
-            covariance: [
-                xx / area_px - x * x + PIXEL_VARIANCE_PX2,
-                yy / area_px - y * y + PIXEL_VARIANCE_PX2,
-                xy / area_px - x * y,
-            ],
+            covariance,
         })
     }
 }
