@@ -54,10 +54,10 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Outcome, CommandError>
         height,
         frame,
     };
-    let solve = |context: &Context, path: &Path, _: &mut Workspace| {
+    let solve = |context: &Context, path: &Path, workspace: &mut Workspace| {
         let list = centroid_list::read(path, &options)?;
         Ok(Solved {
-            solution: solve_centroids(&list, context),
+            solution: solve_centroids(&list, context, workspace),
             frame: None,
         })
     };

@@ -15,7 +15,7 @@
 //! for the mean shift.
 
 use super::hypothesis::{Hypothesis, Problem};
-use super::pairing::Pair;
+use super::naming::Candidate;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::sky::catalog::StarIndex;
 use crate::sky::catalog::sky_grid::GridStar;
@@ -26,6 +26,8 @@ const FAINTER_MAG: f32 = 4.5;
 const REACH_SIGMAS: f64 = 4.5;
 /// The variance that a pixel's own width adds to a spot, in px².
 const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
+/// Lights closer than this, in standard deviations of the spot, are the same.
+const SAME_LIGHT_SIGMAS: f64 = 0.25;
 /// The mean shift ends at steps below this, in pixels, …
 const CONVERGED_PX: f64 = 1e-4;
 /// … or after this many steps.
@@ -34,7 +36,7 @@ const MAX_STEPS: usize = 50;
 /// Finds blends. Its buffers are reused.
 #[derive(Debug, Default)]
 pub struct Blends {
-    /// Matched catalogue stars, sorted.
+    /// Catalogue stars of other detections, sorted.
     taken: Vec<StarIndex>,
     lights: Vec<(PixelPoint, f64)>,
 }
@@ -48,18 +50,20 @@ struct View<'a> {
 }
 
 impl Blends {
-    /// Sets the direction of each pair to that of its blended light. Returns whether any changed;
-    /// none does if all stars are single or the PSF is unknown.
+    /// Gives each candidate position and magnitude of the light that its star is part of. A star in
+    /// the blend of a brighter one is absorbed by it; none is if the PSF is unknown.
     ///
-    /// A star matched with another detection is not part of a blend: each was measured separately.
+    /// The stars `taken` are those of other detections: each was measured separately, and so is not
+    /// part of a blend.
     pub fn redirect(
         &mut self,
         problem: Problem,
         hypothesis: &Hypothesis,
-        pairs: &mut [Pair],
-    ) -> bool {
+        taken: impl Iterator<Item = StarIndex>,
+        candidates: &mut [Candidate],
+    ) {
         let Some(spot_sigma_px) = problem.field.spot_sigma_px else {
-            return false;
+            return;
         };
         let view = View {
             problem,
@@ -67,20 +71,25 @@ impl Blends {
             variance_px2: spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2,
         };
         self.taken.clear();
-        self.taken.extend(pairs.iter().map(|pair| pair.star));
+        self.taken.extend(taken);
         self.taken.sort_unstable();
-        let mut is_any = false;
-        for pair in pairs {
-            if let Some(direction) = self.direction_of(&view, pair.star) {
-                pair.direction = direction;
-                is_any = true;
+        let same_px = SAME_LIGHT_SIGMAS * view.variance_px2.sqrt();
+        for of_observed in candidates.chunk_by_mut(|a, b| a.observed == b.observed) {
+            for candidate in &mut *of_observed {
+                if let Some(light) = self.light_around(&view, candidate.star) {
+                    let observed = &problem.field.stars[candidate.observed];
+                    candidate.distance_px = light.pixel.distance_to(&observed.position);
+                    candidate.light = light.pixel;
+                    candidate.direction = view.direction_of(&light.pixel);
+                    candidate.v_mag = light.v_mag;
+                }
             }
+            absorb(of_observed, same_px);
         }
-        is_any
     }
 
-    /// Direction of the blended light of a star; `None` if it is single.
-    fn direction_of(&mut self, view: &View, index: StarIndex) -> Option<UnitVector<Icrs>> {
+    /// The blended light of a star; `None` if it is single.
+    fn light_around(&mut self, view: &View, index: StarIndex) -> Option<Light> {
         let sky = view.problem.sky;
         let star = sky.catalog().star(index);
         let camera = &view.hypothesis.camera;
@@ -101,9 +110,33 @@ impl Blends {
         let own = view.light_of(index, star.v_mag)?;
         lights.push(own);
         let pixel = mode_next_to(own.0, lights, view.variance_px2);
-        let to_icrs = view.hypothesis.icrs_to_camera.inverse();
-        Some(to_icrs.apply(&camera.direction_of(&pixel)))
+        let sum: f64 = lights
+            .iter()
+            .map(|(place, light)| light * weight_at(&pixel, place, view.variance_px2))
+            .sum();
+        Some(Light {
+            pixel,
+            v_mag: f64::from(star.v_mag) - 2.5 * sum.log10(),
+        })
     }
+}
+
+/// Marks the candidates of one detection whose light is that of a candidate with a brighter star.
+fn absorb(candidates: &mut [Candidate], same_px: f64) {
+    for index in 0..candidates.len() {
+        let Candidate { light, star, .. } = candidates[index];
+        // Stars are numbered by brightness.
+        candidates[index].is_absorbed = candidates
+            .iter()
+            .any(|other| other.star < star && other.light.distance_to(&light) < same_px);
+    }
+}
+
+/// Blended light.
+struct Light {
+    pixel: PixelPoint,
+    /// V magnitude of all of it that a spot at its place takes up.
+    v_mag: f64,
 }
 
 impl View<'_> {
@@ -115,6 +148,16 @@ impl View<'_> {
         let pixel = self.hypothesis.camera.pixel_of(&in_camera)?;
         Some((pixel, 10f64.powf(0.4 * f64::from(unit_v_mag - star.v_mag))))
     }
+
+    fn direction_of(&self, pixel: &PixelPoint) -> UnitVector<Icrs> {
+        let to_icrs = self.hypothesis.icrs_to_camera.inverse();
+        to_icrs.apply(&self.hypothesis.camera.direction_of(pixel))
+    }
+}
+
+/// What a spot at `at` takes up of the light of a star at `place`.
+fn weight_at(at: &PixelPoint, place: &PixelPoint, variance_px2: f64) -> f64 {
+    (-at.distance_to(place).powi(2) / (4.0 * variance_px2)).exp()
 }
 
 /// The mode of `Σ F exp(−d² / 4s²)` uphill from `start`.
@@ -123,7 +166,7 @@ fn mode_next_to(start: PixelPoint, lights: &[(PixelPoint, f64)], variance_px2: f
     for _ in 0..MAX_STEPS {
         let [mut sum, mut x, mut y] = [0.0; 3];
         for (place, light) in lights {
-            let weight = light * (-at.distance_to(place).powi(2) / (4.0 * variance_px2)).exp();
+            let weight = light * weight_at(&at, place, variance_px2);
             sum += weight;
             x += weight * place.x;
             y += weight * place.y;

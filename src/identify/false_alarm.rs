@@ -25,6 +25,9 @@ use std::f64::consts::{LN_10, PI};
 pub const MAX_HYPOTHESES: u64 = 400_000;
 /// Number of observed stars that are tested, the brightest.
 pub const TESTED_STARS: usize = 60;
+/// The test is made with these numbers of them: where most detections are none (foliage, clouds),
+/// the brightest alone show the agreement that all together hide.
+const BRIGHTEST: [usize; 3] = [TESTED_STARS, 30, 15];
 /// Stars that agree by construction.
 const TRIANGLE_STARS: usize = 3;
 /// Radii of agreement tried: from the smallest, in pixels, by this factor, up to this fraction of
@@ -74,21 +77,24 @@ pub struct FalseAlarm {
     tail: Vec<f64>,
 }
 
-/// A test of agreement within one radius and one magnitude difference.
+/// A test of agreement of some of the stars within one radius and one magnitude difference.
 #[derive(Debug, Clone, Copy)]
 struct Test {
     /// Observed stars with a predicted star of their own, minus those that agree by construction.
     hits: usize,
     /// Lower bound of the natural logarithm of the probability.
     at_least_ln: f64,
-    /// Start of its chances, and how many of them, the least likely, are used up.
+    /// Start of its chances, their number, and how many of them, the least likely, are used up.
     chances: usize,
+    stars: usize,
     used_up: usize,
 }
 
 /// The parameters of a test.
 struct Tested<'a> {
     field: &'a StarField,
+    /// Number of observed stars, the brightest.
+    stars: usize,
     tolerance_mag: f64,
     used_up: usize,
 }
@@ -116,20 +122,27 @@ impl FalseAlarm {
         let largest_mag = field.photometry.tolerance_mag();
         self.find_pairs(hypothesis, observed, largest_mag);
         let used_up = TRIANGLE_STARS + (hypothesis.parameters - POSE_PARAMETERS).div_ceil(2);
-        self.most.clear();
-        self.most.resize(self.radii_px.len(), used_up);
-        let tried = MAG_TOLERANCES.iter().filter(|&&mag| mag < largest_mag);
         let mut tests = 0;
-        for tolerance_mag in tried.copied().chain([largest_mag]) {
-            let tested = Tested {
-                field,
-                tolerance_mag,
-                used_up,
-            };
-            self.add_tests(hypothesis, observed, &tested);
-            tests += self.radii_px.len();
+        for (index, count) in BRIGHTEST.into_iter().enumerate() {
+            if index > 0 && count >= observed.len() {
+                continue;
+            }
+            let observed = &observed[..count.min(observed.len())];
+            self.most.clear();
+            self.most.resize(self.radii_px.len(), used_up);
+            let tried = MAG_TOLERANCES.iter().filter(|&&mag| mag < largest_mag);
+            for tolerance_mag in tried.copied().chain([largest_mag]) {
+                let tested = Tested {
+                    field,
+                    stars: observed.len(),
+                    tolerance_mag,
+                    used_up,
+                };
+                self.add_tests(hypothesis, observed, &tested);
+                tests += self.radii_px.len();
+            }
         }
-        let best = self.least_likely(observed.len());
+        let best = self.least_likely();
         (best + (search_weight(hypotheses) * tests as f64).log10()).min(0.0)
     }
 
@@ -222,7 +235,8 @@ impl FalseAlarm {
         let radii = self.radii_px.len();
         self.near.clear();
         self.near.resize(observed * radii, 0.0);
-        for pair in self.pairs.iter().filter(|pair| pair.mag <= tolerance_mag) {
+        let counts = |pair: &&NearPair| pair.observed < observed && pair.mag <= tolerance_mag;
+        for pair in self.pairs.iter().filter(counts) {
             self.near[pair.observed * radii + pair.radius] += 1.0;
         }
         for of_star in self.near.chunks_exact_mut(radii) {
@@ -267,12 +281,13 @@ impl FalseAlarm {
             hits,
             at_least_ln,
             chances,
+            stars: tested.stars,
             used_up: tested.used_up,
         }
     }
 
     /// log10 of the lowest probability of all tests. Tests whose bound is higher are skipped.
-    fn least_likely(&mut self, observed: usize) -> f64 {
+    fn least_likely(&mut self) -> f64 {
         self.tests
             .sort_unstable_by(|a, b| a.at_least_ln.total_cmp(&b.at_least_ln));
         let mut best: f64 = 0.0;
@@ -280,7 +295,7 @@ impl FalseAlarm {
             if test.at_least_ln >= best * LN_10 {
                 break;
             }
-            let chances = &mut self.chances[test.chances..test.chances + observed];
+            let chances = &mut self.chances[test.chances..test.chances + test.stars];
             // Stars that agree by construction count as the least likely ones.
             chances.sort_unstable_by(f64::total_cmp);
             let counted = &chances[test.used_up..];
@@ -327,7 +342,7 @@ impl Hits {
     fn within(&mut self, radius_px: f64, tolerance_mag: f64, pairs: &[NearPair]) -> usize {
         while let Some(pair) = pairs.get(self.done).filter(|p| p.apart_px <= radius_px) {
             let (o, p) = (pair.observed, pair.predicted);
-            let is_alike = pair.mag <= tolerance_mag;
+            let is_alike = o < self.observed_taken.len() && pair.mag <= tolerance_mag;
             if is_alike && !self.observed_taken[o] && !self.predicted_taken[p] {
                 self.observed_taken[o] = true;
                 self.predicted_taken[p] = true;

@@ -21,6 +21,10 @@ pub struct Identification {
     pub attitude_covariance_rad2: Matrix3<f64>,
     /// Standard error of the focal length, in pixels.
     pub focal_length_sigma_px: f64,
+    /// Standard deviation on each axis, in pixels, that the stated centroid errors lack to explain
+    /// the residuals: the error of the lens model, and of spots that are not the detector's. The
+    /// errors of attitude and focal length include it.
+    pub excess_sigma_px: f64,
     /// The identified stars, in the order of the observed stars.
     pub matches: Vec<StarMatch>,
     /// Root mean square of the residuals, in pixels.
@@ -53,6 +57,8 @@ pub struct StarMatch {
     /// Distance between the observed position and that of its light, in pixels of an ideal pinhole
     /// camera.
     pub residual_px: f64,
+    /// Probability that the name is chance.
+    pub p_chance: f64,
 }
 
 /// Why the search identified no stars.

@@ -11,8 +11,8 @@ use std::path::Path;
 /// Width of the narrowest field over the smallest longest side listed: narrower fields hold too few
 /// of the triangles.
 const FIELD_TO_SMALLEST: f64 = 3.75;
-/// The pinhole model does not hold beyond this.
-const WIDEST_FOV_DEG: f64 = 60.0;
+/// Wider lenses are no pinholes any more.
+const WIDEST_FOV_DEG: f64 = 80.0;
 /// Area of the whole sky.
 const WHOLE_SKY_SQ_DEG: f64 = 41_252.96;
 

@@ -5,12 +5,14 @@
 //!
 //! 1. `search`: triangles of bright observed stars are looked up in an index of catalogue
 //!    triangles. Each similar triangle is a hypothesis, which further stars confirm or refute.
-//! 2. `refine`: the hypothesis is fitted to all the stars that agree, with as much lens
+//! 2. `refine`: the hypothesis is fitted to the bright stars that agree, with as much lens
 //!    distortion as they support.
-//! 3. `false_alarm`: the probability that chance gives as good an answer decides.
-//! 4. [`diagnosis`]: where nothing is identified, why.
+//! 3. `naming`: each star gets its name and the probability that the name is chance. Camera and
+//!    attitude are fitted to the sure names alone.
+//! 4. `false_alarm`: the probability that chance gives as good an answer decides.
+//! 5. [`diagnosis`]: where nothing is identified, why.
 //!
-//! Caveats: fields from about 1.5° to 60°, a pinhole camera with the optical axis at the frame's
+//! Caveats: fields from about 1.5° to 80°, a pinhole camera with the optical axis at the frame's
 //! centre and a distortion up to fifth order, at least [`MIN_STARS`] stars of the catalogue.
 
 pub mod attitude;
@@ -26,6 +28,7 @@ mod identification;
 pub mod index;
 mod indexed_catalog;
 mod listing;
+mod naming;
 mod pairing;
 mod predict;
 mod priors;
@@ -43,4 +46,4 @@ pub use indexed_catalog::IndexedCatalog;
 pub use predict::{PredictedStar, View};
 pub use priors::{DateSource, FrameDate, Priors, Scale, ScalePrior, ScaleSource, SkyRegion};
 pub use search::LOG10_FALSE_ALARM_LIMIT;
-pub use workspace::{Workspace, identify};
+pub use workspace::{NAME_ODDS, Workspace, identify};

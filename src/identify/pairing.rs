@@ -21,39 +21,8 @@ pub struct Pair {
     pub direction: UnitVector<Icrs>,
     /// Distance between the observed and the predicted position, in pixels.
     pub residual_px: f64,
-}
-
-/// Largest distance of a pair.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Radius {
-    /// For every pair, in pixels.
-    pub common_px: f64,
-    /// For a star with a large error: this many times that error, ...
-    pub sigmas: f64,
-    /// ... to which this one, in pixels, is added in quadrature, ...
-    pub excess_sigma_px: f64,
-    /// ... but at most this many times the common radius.
-    pub at_most: f64,
-}
-
-impl Radius {
-    /// The same for all stars.
-    pub fn common(radius_px: f64) -> Self {
-        Self {
-            common_px: radius_px,
-            sigmas: 0.0,
-            excess_sigma_px: 0.0,
-            at_most: 1.0,
-        }
-    }
-
-    /// The radius for one star, in pixels.
-    fn of(&self, star: &ObservedStar) -> f64 {
-        let own_px = self.sigmas * star.sigma_px.hypot(self.excess_sigma_px);
-        own_px
-            .min(self.at_most * self.common_px)
-            .max(self.common_px)
-    }
+    /// Probability that the pair is chance; 1 as long as it was not computed.
+    pub p_chance: f64,
 }
 
 /// Pairs observed and predicted stars. Its buffers are reused.
@@ -62,18 +31,22 @@ pub struct Pairing {
     /// The predicted stars sorted into strips along x, and the start of each strip.
     by_strip: Vec<(PixelPoint, usize)>,
     starts: Vec<usize>,
-    candidates: Vec<Candidate>,
+    candidates: Vec<NearPair>,
     of_observed: Vec<Claim>,
     of_predicted: Vec<u32>,
 }
 
 /// Two stars that may be a pair.
 #[derive(Debug, Clone, Copy)]
-struct Candidate {
+pub struct NearPair {
     /// Distance in position and brightness, dimensionless.
     distance: f64,
-    observed: usize,
-    predicted: usize,
+    /// Their distance, in pixels.
+    pub distance_px: f64,
+    /// Position in the list of observed stars.
+    pub observed: usize,
+    /// Position in the list of predicted stars.
+    pub predicted: usize,
 }
 
 /// The candidates of one observed star.
@@ -84,17 +57,17 @@ struct Claim {
 }
 
 impl Pairing {
-    /// Fills `pairs` with the stars that lie within `radius` of each other and have a
+    /// Fills `pairs` with the stars that lie within `radius_px` of each other and have a
     /// `mag_difference`, each star once, closest pairs in position and brightness first. The result
     /// is in the order of the observed stars.
     pub fn pair_up(
         &mut self,
         (observed, predicted): (&[ObservedStar], &[PredictedStar]),
-        radius: &Radius,
+        radius_px: f64,
         mag_difference: impl Fn(&ObservedStar, &PredictedStar) -> Option<f64>,
         pairs: &mut Vec<Pair>,
     ) {
-        self.find_candidates((observed, predicted), radius, mag_difference);
+        self.candidates((observed, predicted), |_, _| radius_px, mag_difference);
         self.settle();
         pairs.clear();
         let claims = observed.iter().zip(&self.of_observed).enumerate();
@@ -106,17 +79,19 @@ impl Pairing {
                 v_mag: found.v_mag,
                 direction: found.direction,
                 residual_px: found.pixel.distance_to(&star.position),
+                p_chance: 1.0,
             })
         }));
     }
 
-    /// Finds all candidates.
-    fn find_candidates(
+    /// All pairs within the `radius_px` of an observed star (given its position in the list) that
+    /// have a `mag_difference`, in the order of the observed stars.
+    pub fn candidates(
         &mut self,
         (observed, predicted): (&[ObservedStar], &[PredictedStar]),
-        radius: &Radius,
+        radius_px: impl Fn(usize, &ObservedStar) -> f64,
         mag_difference: impl Fn(&ObservedStar, &PredictedStar) -> Option<f64>,
-    ) {
+    ) -> &[NearPair] {
         let strips = Strips::over(predicted);
         self.sort_into(&strips, predicted);
         self.candidates.clear();
@@ -125,7 +100,7 @@ impl Pairing {
         self.of_predicted.clear();
         self.of_predicted.resize(predicted.len(), 0);
         for (o, star) in observed.iter().enumerate() {
-            let radius_px = radius.of(star);
+            let radius_px = radius_px(o, star);
             let x = star.position.x;
             let (first, last) = (strips.of(x - radius_px), strips.of(x + radius_px));
             for &(pixel, p) in &self.by_strip[self.starts[first]..self.starts[last + 1]] {
@@ -133,11 +108,10 @@ impl Pairing {
                 if distance_px <= radius_px
                     && let Some(difference) = mag_difference(star, &predicted[p])
                 {
-                    // In pixels, not in errors: a star with a large error takes no partner from one
-                    // with a small error.
-                    let apart = distance_px / radius.common_px;
-                    self.candidates.push(Candidate {
+                    let apart = distance_px / radius_px;
+                    self.candidates.push(NearPair {
                         distance: apart * apart + difference * difference,
+                        distance_px,
                         observed: o,
                         predicted: p,
                     });
@@ -146,6 +120,7 @@ impl Pairing {
                 }
             }
         }
+        &self.candidates
     }
 
     /// Counting sort of the predicted stars by strip.
@@ -256,7 +231,7 @@ mod tests {
         let predicted = [(12.5, 10.0), (10.0, 11.0), (90.0, 50.0)].map(predicted_at);
         let mut pairs = Vec::new();
         let stars = (&observed[..], &predicted[..]);
-        Pairing::default().pair_up(stars, &Radius::common(4.0), |_, _| Some(0.0), &mut pairs);
+        Pairing::default().pair_up(stars, 4.0, |_, _| Some(0.0), &mut pairs);
         let found: Vec<(usize, usize)> = pairs.iter().map(|p| (p.observed, p.star.get())).collect();
         assert_eq!(found, [(0, 10), (1, 12)]);
     }
@@ -272,7 +247,7 @@ mod tests {
             let predicted: Vec<_> = predicted.into_iter().map(predicted_at).collect();
             let mut pairing = Pairing::default();
             let stars = (&observed[..], &predicted[..]);
-            pairing.find_candidates(stars, &Radius::common(radius_px), |_, _| Some(0.0));
+            pairing.candidates(stars, |_, _| radius_px, |_, _| Some(0.0));
             let mut found: Vec<_> =
                 pairing.candidates.iter().map(|c| (c.observed, c.predicted)).collect();
             found.sort_unstable();

@@ -6,7 +6,8 @@
 use super::blends::Blends;
 use super::field::{ObservedStar, Photometry};
 use super::hypothesis::{Hypothesis, Problem};
-use super::pairing::{Pair, Pairing, Radius};
+use super::naming::{Candidate, Naming, Stars};
+use super::pairing::{Pair, Pairing};
 use super::predict::{PredictedStar, Surroundings};
 use crate::base::statistics::median;
 use crate::camera::DistortionModel;
@@ -37,14 +38,8 @@ const MEDIAN_ERROR: f64 = 1.0 / std::f64::consts::LN_2;
 const EXCESS_BISECTIONS: usize = 14;
 /// Residual in standard errors beyond which a star pulls no harder.
 const HUBER_SIGMAS: f64 = 2.5;
-/// Pairing radius of the faint stars over that of the bright ones.
-const FAINT_RADIUS: f64 = 3.0;
-/// Largest pairing radius for stars with large errors, over the common one.
-const ROUGH_RADIUS: f64 = 5.0;
-/// Rounds of fitting with blends. The first still has the weights of single stars.
-const BLEND_ROUNDS: usize = 2;
-/// Rounds of pairing and fitting with all the stars.
-const ALL_STARS_ROUNDS: usize = 2;
+/// Maximum rounds of naming and fitting.
+const NAMING_ROUNDS: usize = 3;
 /// Agreement above chance that a sceptical refinement needs, in standard deviations.
 const SCEPTICAL_SIGMAS: f64 = 3.0;
 /// Maximum rounds of pairing and fitting.
@@ -107,6 +102,7 @@ pub struct Refiner {
     before: Vec<Pair>,
     predicted: Vec<PredictedStar>,
     pairing: Pairing,
+    naming: Naming,
     blends: Blends,
     stars: Vec<MeasuredStar>,
     residuals_px: Vec<[f64; 2]>,
@@ -137,7 +133,7 @@ impl Refiner {
         let hypothesis = start.hypothesis;
         hypothesis.predict(problem, observed, &mut self.around, &mut self.predicted);
         let mut radius_px = start.radius_px;
-        self.pair_up(problem, hypothesis, observed, &Radius::common(radius_px));
+        self.pair_up(problem, hypothesis, observed, radius_px);
         if start.sceptical && !self.is_remarkable(problem, observed.len(), radius_px) {
             return None;
         }
@@ -156,14 +152,17 @@ impl Refiner {
             let hypothesis = current.hypothesis();
             hypothesis.predict_again(&mut self.predicted);
             std::mem::swap(&mut self.pairs, &mut self.before);
-            self.pair_up(problem, &hypothesis, observed, &Radius::common(radius_px));
+            self.pair_up(problem, &hypothesis, observed, radius_px);
             let settled = self.are_pairs_the_same();
             if settled && model_chosen {
                 std::mem::swap(&mut self.pairs, &mut self.before);
                 break;
             }
             if settled {
+                // The pairs are the same, with the residuals of the fit.
+                std::mem::swap(&mut self.pairs, &mut self.before);
                 model = self.choose_model(problem, &current, start.richest);
+                std::mem::swap(&mut self.pairs, &mut self.before);
                 model_chosen = true;
             }
             current = self.fitted(
@@ -178,59 +177,83 @@ impl Refiner {
         Some(current)
     }
 
-    /// Adds the fainter stars and fits the same distortion model to all. Each star has a pairing
-    /// radius by its own error, as that of the faintest is many times the typical one. `None` if
-    /// they do not determine the camera.
-    pub fn with_all_stars(&mut self, problem: Problem, settled: &Refined) -> Option<Refined> {
+    /// Names all stars, the faint ones, too, and fits camera and attitude to those with a name that
+    /// is chance with at most the probability `most_chance`; [`Self::pairs`] are then these. `None`
+    /// if they do not determine the camera.
+    pub fn with_names(
+        &mut self,
+        problem: Problem,
+        settled: &Refined,
+        most_chance: f64,
+    ) -> Option<Refined> {
         let hypothesis = settled.hypothesis();
-        let model = hypothesis.camera.distortion_model();
         hypothesis.predict_all(problem, &mut self.around, &mut self.predicted);
-        let mut radius_px = FAINT_RADIUS * self.agreement_radius_px();
+        let stars = Stars {
+            field: problem.field,
+            predicted: &self.predicted,
+        };
+        self.naming.start(stars, hypothesis.zero_point_mag);
+        let mut model = hypothesis.camera.distortion_model();
         let mut current = *settled;
-        for _ in 0..ALL_STARS_ROUNDS {
+        for round in 0..NAMING_ROUNDS {
             let hypothesis = current.hypothesis();
-            let radius = Radius {
-                common_px: radius_px,
-                sigmas: CLIP_SIGMAS * self.error_scale(problem, current.excess_sigma_px),
-                excess_sigma_px: current.excess_sigma_px,
-                at_most: ROUGH_RADIUS,
-            };
-            std::mem::swap(&mut self.pairs, &mut self.before);
-            self.pair_up(problem, &hypothesis, &problem.field.stars, &radius);
+            if round > 0 {
+                hypothesis.predict_again(&mut self.predicted);
+            }
+            self.name(problem, &current, round == 0);
+            self.take_names(most_chance);
             if self.are_pairs_the_same() {
-                std::mem::swap(&mut self.pairs, &mut self.before);
                 break;
             }
-            let guess = Guess {
+            let mut guess = Guess {
                 hypothesis: &hypothesis,
                 model,
                 excess_sigma_px: current.excess_sigma_px,
             };
             current = self.fitted(problem, &guess)?;
-            current.hypothesis().predict_again(&mut self.predicted);
-            radius_px = self.next_radius_px(radius_px);
+            if self.are_residuals_unexplained(problem, &current) {
+                let richer = self.choose_model(problem, &current, DistortionModel::Quintic);
+                if richer != model {
+                    model = richer;
+                    guess.model = richer;
+                    current = self.fitted(problem, &guess)?;
+                }
+            }
         }
         Some(current)
     }
 
-    /// Fits the same stars again, each at the position of its blend. `None` if they do not
-    /// determine the camera.
-    pub fn with_blends(&mut self, problem: Problem, settled: Refined) -> Option<Refined> {
-        let hypothesis = settled.hypothesis();
-        if !self.blends.redirect(problem, &hypothesis, &mut self.pairs) {
-            return Some(settled);
-        }
-        let model = hypothesis.camera.distortion_model();
-        let mut current = settled;
-        for _ in 0..BLEND_ROUNDS {
-            let guess = Guess {
-                hypothesis: &current.hypothesis(),
-                model,
-                excess_sigma_px: current.excess_sigma_px,
-            };
-            current = self.fitted(problem, &guess)?;
-        }
-        Some(current)
+    /// Computes the probabilities of all candidates for a name under `current`.
+    fn name(&mut self, problem: Problem, current: &Refined, is_first: bool) {
+        let hypothesis = current.hypothesis();
+        let stars = Stars {
+            field: problem.field,
+            predicted: &self.predicted,
+        };
+        let at = (&hypothesis, current.excess_sigma_px);
+        self.naming.find_candidates(stars, at, &mut self.pairing);
+        let taken = self.pairs.iter().map(|pair| pair.star);
+        let candidates = &mut self.naming.candidates;
+        self.blends
+            .redirect(problem, &hypothesis, taken, candidates);
+        self.naming.compute(stars, is_first);
+    }
+
+    /// Whether most of the residuals is not explained by the centroid errors: the lens model may be
+    /// too simple.
+    fn are_residuals_unexplained(&mut self, problem: Problem, current: &Refined) -> bool {
+        let stars = &problem.field.stars;
+        let sigma_px = self.pairs.iter().map(|pair| stars[pair.observed].sigma_px);
+        current.excess_sigma_px > self.scratch.median(sigma_px)
+    }
+
+    /// Makes the sure names the pairs.
+    fn take_names(&mut self, most_chance: f64) {
+        std::mem::swap(&mut self.pairs, &mut self.before);
+        self.pairs.clear();
+        let sure = self.naming.candidates.iter();
+        let sure = sure.filter(|candidate| candidate.p_chance <= most_chance);
+        self.pairs.extend(sure.map(Candidate::pair));
     }
 
     fn pair_up(
@@ -238,12 +261,12 @@ impl Refiner {
         problem: Problem,
         hypothesis: &Hypothesis,
         observed: &[ObservedStar],
-        radius: &Radius,
+        radius_px: f64,
     ) {
         let photometry = problem.field.photometry;
         self.pairing.pair_up(
             (observed, &self.predicted),
-            radius,
+            radius_px,
             |o, p| hypothesis.mag_difference(o, p, photometry),
             &mut self.pairs,
         );
@@ -333,10 +356,7 @@ impl Refiner {
         current: &Refined,
         richest: DistortionModel,
     ) -> Option<DistortionModel> {
-        // The pairs are the same, with the residuals of the fit.
-        std::mem::swap(&mut self.pairs, &mut self.before);
         self.measure(problem, current.excess_sigma_px);
-        std::mem::swap(&mut self.pairs, &mut self.before);
         let CameraFit {
             camera,
             icrs_to_camera,
@@ -360,16 +380,6 @@ impl Refiner {
             }
         }
         best.0
-    }
-
-    /// Factor from the stated errors, with the excess, to those that the residuals show; at most 1.
-    fn error_scale(&mut self, problem: Problem, excess_sigma_px: f64) -> f64 {
-        let relative = |pair: &Pair| {
-            let sigma_px = problem.field.stars[pair.observed].sigma_px;
-            pair.residual_px / sigma_px.hypot(excess_sigma_px).max(1e-3)
-        };
-        let median = self.scratch.median(self.pairs.iter().map(relative));
-        (median / RAYLEIGH_MEDIAN).min(1.0)
     }
 
     /// The radius that contains practically all true pairs, from the median residual of the last

@@ -11,7 +11,6 @@ use super::false_alarm::{FalseAlarm, MAX_HYPOTHESES, TESTED_STARS};
 use super::field::{Photometry, StarField};
 use super::hypothesis::{Hypothesis, Problem};
 use super::indexed_catalog::IndexedCatalog;
-use super::pairing::Pair;
 use super::priors::{Priors, SkyRegion};
 use super::refine::{Refined, Refiner, Start};
 use super::triangle::TriangleShape;
@@ -98,15 +97,6 @@ pub const LOG10_FALSE_ALARM_LIMIT: f64 = -8.0;
 /// truth.
 const LOG10_SURE: f64 = -14.0;
 
-/// Result of the search.
-#[derive(Debug, Clone, Copy)]
-pub struct Found {
-    /// The hypothesis, fitted to the brightest stars.
-    pub refined: Refined,
-    /// log10 of its false-alarm probability.
-    pub log10_false_alarm: f64,
-}
-
 /// Buffers of the search, reused from field to field.
 #[derive(Debug, Default)]
 pub struct Buffers {
@@ -115,8 +105,6 @@ pub struct Buffers {
     /// Refines hypotheses.
     pub refiner: Refiner,
     false_alarm: FalseAlarm,
-    /// The stars of the accepted hypothesis.
-    pub found: Vec<Pair>,
 }
 
 /// The search over one field.
@@ -133,7 +121,7 @@ pub struct Search<'a> {
     candidates: u64,
     best_log10: Option<f64>,
     /// The best hypothesis that passes the limit but does not end the search.
-    provisional: Option<Found>,
+    provisional: Option<Refined>,
 }
 
 /// A triangle of observed stars.
@@ -224,15 +212,15 @@ impl<'a> Search<'a> {
         self.best_log10
     }
 
-    /// Tries triangles until a hypothesis passes.
-    pub fn run(&mut self) -> Option<Found> {
+    /// Tries triangles until a hypothesis passes. Returns it, fitted to the brightest stars.
+    pub fn run(&mut self) -> Option<Refined> {
         PASSES
             .iter()
             .find_map(|pass| self.sweep(pass).or_else(|| self.provisional.take()))
     }
 
     /// Tries the triangles of one pass in the order of their faintest star, then of the second.
-    fn sweep(&mut self, pass: &Pass) -> Option<Found> {
+    fn sweep(&mut self, pass: &Pass) -> Option<Refined> {
         let stars = pass.stars.min(self.buffers.offsets.len());
         for faintest in pass.from..stars {
             for middle in 1..faintest {
@@ -285,11 +273,11 @@ impl<'a> Search<'a> {
         })
     }
 
-    fn try_triangle(&mut self, triangle: &ObservedTriangle) -> Option<Found> {
+    fn try_triangle(&mut self, triangle: &ObservedTriangle) -> Option<Refined> {
         (0..self.sky.triangles.classes.len()).find_map(|class| self.try_class(triangle, class))
     }
 
-    fn try_class(&mut self, triangle: &ObservedTriangle, number: usize) -> Option<Found> {
+    fn try_class(&mut self, triangle: &ObservedTriangle, number: usize) -> Option<Refined> {
         let class = &self.sky.triangles.classes[number];
         let low_px = self
             .focal_of_chord(triangle, class.high)?
@@ -341,7 +329,7 @@ impl<'a> Search<'a> {
         triangle: &ObservedTriangle,
         class: usize,
         range_px: (f64, f64),
-    ) -> Option<Found> {
+    ) -> Option<Refined> {
         let middle_px = (range_px.0 * range_px.1).sqrt();
         let vectors = self.vectors(triangle, middle_px);
         let shape = TriangleShape::new([&vectors[0], &vectors[1], &vectors[2]])?;
@@ -366,7 +354,7 @@ impl<'a> Search<'a> {
     }
 
     /// Tests one hypothesis: the three observed stars are these three of the catalogue.
-    fn try_hypothesis(&mut self, query: &Query, corners: &[u32; 3]) -> Option<Found> {
+    fn try_hypothesis(&mut self, query: &Query, corners: &[u32; 3]) -> Option<Refined> {
         let triangle = &query.triangle;
         let stars = corners.map(|c| self.sky.grid.star(c));
         let zero_point = self.zero_point(std::array::from_fn(|i| {
@@ -460,7 +448,7 @@ impl<'a> Search<'a> {
 
     /// Fits the hypothesis to all the stars that agree and computes its false-alarm probability.
     /// Returns it if it ends the search.
-    fn decide(&mut self, hypothesis: &Hypothesis, triangle: &ObservedTriangle) -> Option<Found> {
+    fn decide(&mut self, hypothesis: &Hypothesis, triangle: &ObservedTriangle) -> Option<Refined> {
         let start = Start {
             hypothesis,
             radius_px: triangle.confirming_px,
@@ -474,21 +462,11 @@ impl<'a> Search<'a> {
         if is_best {
             self.best_log10 = Some(log10);
         }
-        let found = Found {
-            refined,
-            log10_false_alarm: log10,
-        };
-        let is_sure = log10 <= LOG10_SURE;
-        let passes = is_best && log10 <= LOG10_FALSE_ALARM_LIMIT;
-        if is_sure || passes {
-            let Buffers { refiner, found, .. } = self.buffers;
-            std::mem::swap(&mut refiner.pairs, found);
+        if log10 <= LOG10_SURE {
+            return Some(refined);
         }
-        if is_sure {
-            return Some(found);
-        }
-        if passes {
-            self.provisional = Some(found);
+        if is_best && log10 <= LOG10_FALSE_ALARM_LIMIT {
+            self.provisional = Some(refined);
         }
         None
     }

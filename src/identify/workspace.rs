@@ -1,6 +1,5 @@
 //! Identification of one star field: search, then the final fit with all the stars.
 
-use super::attitude::CameraFit;
 use super::field::StarField;
 use super::hypothesis::Problem;
 use super::identification::{Identification, MIN_STARS, SearchFailure, StarMatch};
@@ -8,13 +7,16 @@ use super::indexed_catalog::IndexedCatalog;
 use super::pairing::Pair;
 use super::priors::Priors;
 use super::refine::{Refined, Start};
-use super::search::{Buffers, Found, LOG10_FALSE_ALARM_LIMIT, Search};
+use super::search::{Buffers, LOG10_FALSE_ALARM_LIMIT, Search};
 use crate::camera::DistortionModel;
 
 /// Number of stars, the brightest, that decide how much distortion is fitted.
 const CALIBRATION_STARS: usize = 120;
 /// First pairing radius of the final fit, in units of the frame's diagonal.
 const FINAL_RADIUS_SHARE: f64 = 0.005;
+
+/// A name is given where the odds that it is right are at least these, unless others are stated.
+pub const NAME_ODDS: f64 = 100.0;
 
 /// Identifies the stars of `field`. For many fields, [`Workspace::identify`] does the same without
 /// allocating.
@@ -31,16 +33,37 @@ pub fn identify(
 
 /// Buffers for identification, reused from field to field: after the largest field nothing is
 /// allocated.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Workspace {
+    name_odds: f64,
     buffers: Buffers,
     answer: Option<Identification>,
 }
 
+impl Default for Workspace {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Workspace {
-    /// Empty buffers.
+    /// Empty buffers; names of [`NAME_ODDS`].
     pub fn new() -> Self {
-        Self::default()
+        Self {
+            name_odds: NAME_ODDS,
+            buffers: Buffers::default(),
+            answer: None,
+        }
+    }
+
+    /// The same, but a name is given where the odds that it is right are at least `odds` to 1.
+    /// Names less sure than 1 to 1 are never given: a star would have several.
+    #[must_use]
+    pub fn with_name_odds(self, odds: f64) -> Self {
+        Self {
+            name_odds: odds.max(1.0),
+            ..self
+        }
     }
 
     /// Identifies the stars of `field`. The answer is kept in the workspace.
@@ -66,25 +89,30 @@ impl Workspace {
                 best_log10_false_alarm: search.best_log10_false_alarm(),
             });
         };
-        let completed = with_all_stars(problem, &mut search, &found);
-        let (refined, log10, pairs) = match completed {
-            Some((refined, log10)) => (refined, log10, &self.buffers.refiner.pairs),
-            None => (found.refined, found.log10_false_alarm, &self.buffers.found),
+        let most_chance = 1.0 / (1.0 + self.name_odds);
+        let named = with_names(problem, &mut search, (&found, most_chance));
+        let Some((refined, log10)) = named else {
+            return Err(SearchFailure::NoMatch {
+                best_log10_false_alarm: search.best_log10_false_alarm(),
+            });
         };
+        let pairs = &self.buffers.refiner.pairs;
         let mut matches = self.answer.take().map_or_else(Vec::new, |old| old.matches);
         matches.clear();
         matches.extend(pairs.iter().map(|pair| star_match(pair, field)));
-        Ok(self
-            .answer
-            .insert(identification(&refined.fit, log10, matches)))
+        Ok(self.answer.insert(identification(&refined, log10, matches)))
     }
 }
 
-/// The final fit, with all stars and as much distortion as they support. `None` where the search's
-/// own answer is the surer one.
-fn with_all_stars(problem: Problem, search: &mut Search, found: &Found) -> Option<(Refined, f64)> {
+/// The final fit, to all stars with a sure name, with as much distortion as they support. It starts
+/// from the search's own answer where a richer one fails. `None` where there are too few names.
+fn with_names(
+    problem: Problem,
+    search: &mut Search,
+    (found, most_chance): (&Refined, f64),
+) -> Option<(Refined, f64)> {
     let field = problem.field;
-    let hypothesis = found.refined.hypothesis();
+    let hypothesis = found.hypothesis();
     let start = Start {
         hypothesis: &hypothesis,
         radius_px: FINAL_RADIUS_SHARE * field.width_px.hypot(field.height_px),
@@ -92,12 +120,17 @@ fn with_all_stars(problem: Problem, search: &mut Search, found: &Found) -> Optio
         stars: CALIBRATION_STARS,
         richest: DistortionModel::Quintic,
     };
-    let refiner = search.refiner();
-    let settled = refiner.refine(problem, &start)?;
-    let settled = refiner.with_all_stars(problem, &settled)?;
-    let refined = refiner.with_blends(problem, settled)?;
-    let log10 = search.log10_false_alarm(&refined.hypothesis())?;
-    (log10 <= LOG10_FALSE_ALARM_LIMIT).then_some((refined, log10))
+    let richer = search.refiner().refine(problem, &start);
+    let starts = [richer, Some(*found)].into_iter().flatten();
+    let mut named = starts.filter_map(|settled| {
+        let refiner = search.refiner();
+        let refined = refiner.with_names(problem, &settled, most_chance)?;
+        let names = refiner.pairs.len();
+        let log10 = search.log10_false_alarm(&refined.hypothesis())?;
+        let is_sure = names >= MIN_STARS && log10 <= LOG10_FALSE_ALARM_LIMIT;
+        is_sure.then_some((refined, log10))
+    });
+    named.next()
 }
 
 fn star_match(pair: &Pair, field: &StarField) -> StarMatch {
@@ -106,14 +139,16 @@ fn star_match(pair: &Pair, field: &StarField) -> StarMatch {
         star: pair.star,
         light: pair.direction,
         residual_px: pair.residual_px,
+        p_chance: pair.p_chance,
     }
 }
 
 fn identification(
-    fit: &CameraFit,
+    refined: &Refined,
     log10_false_alarm: f64,
     matches: Vec<StarMatch>,
 ) -> Identification {
+    let fit = &refined.fit;
     let covariance = &fit.covariance;
     let sum_sq: f64 = matches.iter().map(|m| m.residual_px.powi(2)).sum();
     Identification {
@@ -121,6 +156,7 @@ fn identification(
         focal_length_sigma_px: covariance[(3, 3)].sqrt() * fit.camera.focal_length_px,
         camera: fit.camera,
         icrs_to_camera: fit.icrs_to_camera,
+        excess_sigma_px: refined.excess_sigma_px,
         rms_px: (sum_sq / matches.len().max(1) as f64).sqrt(),
         matches,
         log10_false_alarm,

@@ -3,7 +3,7 @@
 //! ([`IdentifiedFrame`], [`IndexedCatalog`]) → [`FramePhotometry`]
 //!
 //! 1. The catalogue's stars in the frame are predicted, at its date and to well below the faintest
-//!    detection. Each claims its detection.
+//!    detection. Those that a detection has the name of are detected.
 //! 2. Bright, single, constant, unsaturated stars give the zero point ([`zero_point`]).
 //! 3. All single stars, detected or not, give the completeness ([`completeness`]) and the limiting
 //!    magnitude, at which half of the stars are detected. The faintest detected star is a poor

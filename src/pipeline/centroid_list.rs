@@ -1,14 +1,14 @@
 //! Lists of centroids, and their identification.
 
 use super::bodies::find_bodies;
-use super::context::Context;
+use super::context::{Context, Workspace};
 use super::identification::{identified, observation};
 use super::note::Note;
 use super::solution::{Solution, Source};
 use super::stopwatch::{Stage, Stopwatch};
 use crate::base::coords::PixelPoint;
 use crate::detect::DetectionFlags;
-use crate::identify::{self, ObservedStar, Photometry, SourceIndex, StarField};
+use crate::identify::{ObservedStar, Photometry, SourceIndex, StarField};
 
 /// Standard error assumed on each axis of a centroid that is listed without one, in pixels.
 pub const LISTED_SIGMA_PX: f64 = 0.5;
@@ -79,13 +79,18 @@ impl CentroidList {
 }
 
 /// Identifies the stars of a list of centroids. Every prior is a hard constraint.
-pub fn solve_centroids(list: &CentroidList, context: &Context) -> Solution {
+pub fn solve_centroids(
+    list: &CentroidList,
+    context: &Context,
+    workspace: &mut Workspace,
+) -> Solution {
     let mut clock = Stopwatch::start();
     let priors = &context.priors;
     let mut list = list.clone();
     list.centroids.sort_by(|a, b| a.mag.total_cmp(&b.mag));
     let field = list.star_field(priors.years_since_j2000());
-    let found = identify::identify(&field, priors, context.indexed);
+    let found = workspace.identify.identify(&field, priors, context.indexed);
+    let found = found.cloned();
     let mut outcome = identified(found, None, &field, priors, context.indexed);
     let observation = observation(&outcome, priors);
     let source = |centroid: &ListedCentroid| Source {

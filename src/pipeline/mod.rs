@@ -12,6 +12,7 @@
 
 mod bodies;
 mod body_in_frame;
+mod bright_stars;
 mod centroid_list;
 mod context;
 mod error;
@@ -24,6 +25,7 @@ mod solved;
 mod stopwatch;
 
 pub use body_in_frame::BodyInFrame;
+pub use bright_stars::MissingStar;
 pub use centroid_list::{CentroidList, LISTED_SIGMA_PX, ListedCentroid, solve_centroids};
 pub use context::{Context, Workspace};
 pub use error::Error;

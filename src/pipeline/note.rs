@@ -1,18 +1,24 @@
 //! Notes: what is odd about a frame, its header, or the priors.
 
 use super::body_in_frame::BodyInFrame;
+use super::bright_stars::MissingStar;
 use super::outcome::Outcome;
 use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;
 use crate::frame::IgnoredValue;
-use crate::identify::{Priors, ScalePrior, ScaleSource};
+use crate::identify::{Identification, Priors, ScalePrior, ScaleSource};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::{Comparison, Contradiction, StatedCamera};
 use crate::sky::catalog::Catalog;
 use crate::sky::observer::Observation;
 use crate::sky::solar_system::BodyKind;
 use std::fmt;
+
+/// An error of the lens model, or of spots, that deserves a note, in pixels.
+const LARGE_EXCESS_PX: f64 = 1.0;
+/// Most stars or detections that a note lists.
+const MOST_LISTED: usize = 5;
 
 /// One note about a frame. `Display` gives the sentence, [`code`](Self::code) a stable name.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,6 +53,17 @@ pub enum Note {
     DarkExposure(ExposureMismatch),
     /// The Moon or a planet is in the frame.
     BodyInFrame(BodyInFrame),
+    /// Bright catalogue stars in the frame have no sure name.
+    BrightStarsNotNamed(Vec<MissingStar>),
+    /// Positions of bright detections that have no sure name.
+    BrightDetectionsNotNamed(Vec<[f64; 2]>),
+    /// The residuals are larger than the centroid errors.
+    LargeResiduals {
+        /// Root mean square of the residuals, in pixels.
+        rms_px: f64,
+        /// Standard deviation on each axis that the centroid errors do not explain, in pixels.
+        excess_sigma_px: f64,
+    },
 }
 
 impl Note {
@@ -62,6 +79,9 @@ impl Note {
             Self::NotLinear { .. } => "not_linear",
             Self::BodyInFrame(_) => "body_in_frame",
             Self::DarkExposure(_) => "dark_exposure_differs",
+            Self::BrightStarsNotNamed(_) => "bright_stars_not_named",
+            Self::BrightDetectionsNotNamed(_) => "bright_detections_not_named",
+            Self::LargeResiduals { .. } => "large_residuals",
         }
     }
 
@@ -123,6 +143,25 @@ impl Note {
         notable.copied().map(Self::BodyInFrame).collect()
     }
 
+    /// Bright stars without a name, and positions of bright detections without one.
+    pub(super) fn of_bright_stars(
+        missing: Vec<MissingStar>,
+        unnamed: Vec<[f64; 2]>,
+    ) -> impl Iterator<Item = Self> {
+        let missing = (!missing.is_empty()).then_some(Self::BrightStarsNotNamed(missing));
+        let unnamed = (!unnamed.is_empty()).then_some(Self::BrightDetectionsNotNamed(unnamed));
+        missing.into_iter().chain(unnamed)
+    }
+
+    /// Residuals that centroid errors do not explain.
+    pub(super) fn of_residuals(found: Option<&Identification>) -> Option<Self> {
+        let found = found.filter(|found| found.excess_sigma_px > LARGE_EXCESS_PX)?;
+        Some(Self::LargeResiduals {
+            rms_px: found.rms_px,
+            excess_sigma_px: found.excess_sigma_px,
+        })
+    }
+
     /// Grey levels that are not proportional to light.
     pub(super) fn of_photometry(photometry: Option<&FramePhotometry>) -> Option<Self> {
         let zero_point = photometry?.zero_point.filter(|zero| zero.is_nonlinear)?;
@@ -164,6 +203,22 @@ impl fmt::Display for Note {
             ),
             Self::DarkExposure(mismatch) => mismatch.fmt(f),
             Self::BodyInFrame(seen) => write_body(f, seen),
+            Self::BrightStarsNotNamed(stars) => {
+                let list = listed(stars.iter().map(MissingStar::to_string));
+                write!(f, "bright stars without a sure name: {list}")
+            }
+            Self::BrightDetectionsNotNamed(places) => {
+                let place = |[x, y]: &[f64; 2]| format!("({x:.1}, {y:.1})");
+                let list = listed(places.iter().map(place));
+                write!(f, "bright detections without a sure name: at {list}")
+            }
+            Self::LargeResiduals {
+                rms_px,
+                excess_sigma_px,
+            } => write!(
+                f,
+                "the stars lie {rms_px:.1} px (rms) from where they are expected, more than their centroid errors explain: the lens or the spots are not as assumed; the stated errors include {excess_sigma_px:.1} px a star on each axis"
+            ),
         }
     }
 }
@@ -192,4 +247,14 @@ fn write_body(f: &mut fmt::Formatter<'_>, seen: &BodyInFrame) -> fmt::Result {
             seen.uncertainty_px
         ),
     }
+}
+
+/// A list for people; what is beyond its first items is counted.
+fn listed(items: impl ExactSizeIterator<Item = String>) -> String {
+    let more = items.len().saturating_sub(MOST_LISTED);
+    let mut list: Vec<String> = items.take(MOST_LISTED).collect();
+    if more > 0 {
+        list.push(format!("{more} more"));
+    }
+    list.join(", ")
 }

@@ -1,6 +1,7 @@
 //! What the stages found in a frame, and what follows from all of it: comparison, notes, solution.
 
 use super::body_in_frame::BodyInFrame;
+use super::bright_stars::NamedFrame;
 use super::context::Context;
 use super::note::Note;
 use super::outcome::Outcome;
@@ -11,10 +12,11 @@ use crate::base::units::DEG_PER_RAD;
 use crate::calibration::Calibration;
 use crate::detect::Detections;
 use crate::frame::Frame;
-use crate::identify::{Identification, Priors, ScalePrior, View};
+use crate::identify::{Identification, Priors, ScalePrior, SourceIndex, View};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::{Comparison, FrameMeasurement, compare};
 use crate::sky::observer::Observation;
+use std::collections::HashSet;
 
 /// What the stages found in a frame.
 pub(super) struct Solved<'a> {
@@ -116,7 +118,25 @@ impl Solved<'_> {
                 self.context.indexed.catalog(),
             ))
             .chain(mismatch.map(Note::DarkExposure))
+            .chain(Note::of_residuals(outcome.identification()))
+            .chain(self.notes_of_bright_stars())
             .collect()
+    }
+
+    fn notes_of_bright_stars(&self) -> Vec<Note> {
+        let Some(identification) = self.outcome.identification() else {
+            return Vec::new();
+        };
+        let frame = NamedFrame {
+            detections: &self.detections,
+            identification,
+            indexed: self.context.indexed,
+            years_since_j2000: self.priors.years_since_j2000(),
+        };
+        let sources = self.bodies.iter().filter_map(|body| body.source);
+        let known: HashSet<usize> = sources.map(SourceIndex::get).collect();
+        let unnamed = frame.unnamed_detections(&known);
+        Note::of_bright_stars(frame.missing_stars(), unnamed).collect()
     }
 
     /// V magnitude of the faintest identified star.

@@ -14,5 +14,7 @@ pub(super) const YEAR_DECIMALS: i32 = 4;
 pub(super) const MAG_DECIMALS: i32 = 4;
 /// Significant digits of a flux.
 pub(super) const FLUX_DIGITS: i32 = 6;
+/// Significant digits of a probability.
+pub(super) const CHANCE_DIGITS: i32 = 2;
 /// Significant digits of a standard error.
 pub(super) const SIGMA_DIGITS: i32 = 4;

@@ -389,6 +389,8 @@ pub struct StarReport {
     /// Distance of the detection from the light of the star and all those blended with it, in
     /// pixels; `None` for a single star.
     pub residual_blend_px: Option<f64>,
+    /// Probability that the name is chance.
+    pub p_chance: Option<f64>,
     /// Flags of the detection: `saturated`, `hot_pixel`, `trail`, `extended`, `blended`, `border`.
     pub flags: Vec<&'static str>,
 }

@@ -1,6 +1,6 @@
 //! The reports of detections and their stars.
 
-use super::digits::{DIRECTION_DECIMALS, FLUX_DIGITS, PIXEL_DECIMALS, SIGMA_DIGITS};
+use super::digits::{CHANCE_DIGITS, DIRECTION_DECIMALS, FLUX_DIGITS, PIXEL_DECIMALS, SIGMA_DIGITS};
 use super::frame_report::StarReport;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::base::format::{finite, significant, to_decimals, turn_deg};
@@ -56,6 +56,7 @@ impl Pointing<'_> {
         star.name = catalog.full_name(star_match.star);
         star.vmag = finite(f64::from(known.v_mag), 3);
         star.residual_px = self.residual_px(star, &direction);
+        star.p_chance = significant(star_match.p_chance, CHANCE_DIGITS);
         // The light of a single star has exactly the star's direction.
         let is_blend = star_match.light != direction;
         star.residual_blend_px = is_blend

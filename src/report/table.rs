@@ -5,7 +5,7 @@ use std::io;
 
 /// The columns, in order. `flags` are separated by blanks; `flux_e` and `peak_e` are filled where a
 /// camera is stated.
-pub const TABLE_COLUMNS: [&str; 18] = [
+pub const TABLE_COLUMNS: [&str; 19] = [
     "frame",
     "x",
     "y",
@@ -21,6 +21,7 @@ pub const TABLE_COLUMNS: [&str; 18] = [
     "dec_deg",
     "residual_px",
     "residual_blend_px",
+    "p_chance",
     "flags",
     "flux_e",
     "peak_e",
@@ -66,6 +67,7 @@ impl FrameReport {
             number(star.dec_deg),
             number(star.residual_px),
             number(star.residual_blend_px),
+            number(star.p_chance),
             star.flags.join(" "),
             number(star.flux_e),
             number(star.peak_e),

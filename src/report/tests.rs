@@ -22,6 +22,7 @@ fn star(x: f64, id: Option<&str>, name: Option<&str>) -> StarReport {
         dec_deg: Some(7.407_063_1),
         residual_px: id.map(|_| 0.0712),
         residual_blend_px: name.map(|_| 0.0312),
+        p_chance: id.map(|_| 3.1e-7),
         flags: vec!["saturated"],
     }
 }

@@ -272,18 +272,19 @@ fn star_table(stars: &[&StarReport]) -> Vec<String> {
         format!("  {id:<id_width$}{gap}{name:<name_width$}{rest}")
     };
     let heading = format!(
-        "{:>7}{:>10}{:>10}{:>9}{:>14}",
-        "V", "x", "y", "SNR", "residual (px)"
+        "{:>7}{:>10}{:>10}{:>9}{:>14}{:>9}",
+        "V", "x", "y", "SNR", "residual (px)", "chance"
     );
     let mut lines = vec![row("star", "", &heading)];
     lines.extend(stars.iter().map(|star| {
         let rest = format!(
-            "{:>7}{:>10.2}{:>10.2}{:>9}{:>14}",
+            "{:>7}{:>10.2}{:>10.2}{:>9}{:>14}{:>9}",
             or_dash(star.vmag, |v| format!("{v:.2}")),
             star.x,
             star.y,
             or_dash(star.snr, snr),
             or_dash(star.residual_px, |px| format!("{px:.3}")),
+            or_dash(star.p_chance, |p| format!("{p:.0e}")),
         );
         row(&id(star), &name(star), &rest)
     }));

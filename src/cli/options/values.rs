@@ -39,6 +39,11 @@ pub(crate) fn positive(text: &str) -> Result<f64, String> {
     within(text, "the number", |v| v > 0.0, "above 0")
 }
 
+/// Odds to one.
+pub(crate) fn odds(text: &str) -> Result<f64, String> {
+    within(text, "the odds", |v| v >= 1.0, "1 or above")
+}
+
 /// A number of zero or above.
 pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
     within(text, "the number", |v| v >= 0.0, "0 or above")

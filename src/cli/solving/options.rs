@@ -3,13 +3,19 @@
 use crate::cli::options::catalog::CatalogOptions;
 use crate::cli::options::format::Format;
 use crate::cli::options::hints::HintOptions;
+use crate::cli::options::values;
 use clap::Args;
+use starpipe::identify::NAME_ODDS;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct SolvingOptions {
     #[command(flatten)]
     pub(crate) hints: HintOptions,
+    /// Give a star a name only where the odds are at least this many to 1 that it is right
+    #[arg(long, value_name = "NUMBER", value_parser = values::odds, allow_hyphen_values = true,
+          default_value_t = NAME_ODDS, help_heading = "Identification")]
+    pub(super) name_odds: f64,
     #[command(flatten)]
     pub(super) output: OutputOptions,
     #[command(flatten)]

@@ -50,7 +50,10 @@ pub(crate) fn solve_all(
     solve: impl Fn(&Context, &Path, &mut Workspace) -> anyhow::Result<Solved> + Sync,
 ) -> Result<Exit, CommandError> {
     let SolvingOptions {
-        output, catalog, ..
+        output,
+        catalog,
+        name_odds,
+        ..
     } = options;
     if let Some(directory) = &output.out {
         overwrite::check(inputs, directory, extensions)?;
@@ -70,15 +73,16 @@ pub(crate) fn solve_all(
             let saved = files.save(input, &solved, &report, indexed.catalog());
             Ok(Answer { report, saved })
         };
-        let workspace = || workspace(pool, inputs.len());
+        let workspace = || workspace(pool, inputs.len(), name_odds);
         batch::for_each_ordered(pool, inputs, workspace, work, |_, result| run.take(result));
         Ok(run.exit())
     })
 }
 
 /// A workspace of one thread. A single input is solved on all threads.
-fn workspace(pool: &rayon::ThreadPool, inputs: usize) -> Workspace {
+fn workspace(pool: &rayon::ThreadPool, inputs: usize, name_odds: f64) -> Workspace {
     let mut workspace = Workspace::new();
+    workspace.identify = workspace.identify.with_name_odds(name_odds);
     if let (1, Some(threads)) = (inputs, NonZeroUsize::new(pool.current_num_threads())) {
         workspace.detect = workspace.detect.on_threads(threads);
     }

@@ -67,7 +67,9 @@ fn identified(up_deg: f64, mirrored: bool) -> Outcome {
             star: StarIndex::new(0),
             light: boresight,
             residual_px: 0.1,
+            p_chance: 1e-6,
         }],
+        excess_sigma_px: 0.0,
         rms_px: 0.1,
         log10_false_alarm: -30.0,
     }))

@@ -93,6 +93,7 @@ fn solution(camera: CameraModel, attitude: Rotation<Icrs, Camera>) -> Solution {
         camera,
         icrs_to_camera: attitude,
         attitude_covariance_rad2: Matrix3::from_diagonal(&[1e-10, 4e-10, 9e-10].into()),
+        excess_sigma_px: 0.0,
         focal_length_sigma_px: 0.1,
         matches: Vec::new(),
         rms_px: 0.1,

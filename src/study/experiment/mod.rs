@@ -72,7 +72,11 @@ pub fn run(
     let budget = Budget::new(&scenario);
     let detector = Detector::new(Rule::MatchedFilter, &scenario, &budget);
     let context = context(published, indexed);
-    let solution = solve_centroids(&table::centroids(published, &scenario), &context);
+    let solution = solve_centroids(
+        &table::centroids(published, &scenario),
+        &context,
+        &mut Workspace::new(),
+    );
     let mut report = ExperimentReport {
         schema: SCHEMA,
         experiment: published.number,

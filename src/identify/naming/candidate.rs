@@ -1,0 +1,77 @@
+//! A pair of stars that may be one.
+
+use crate::base::coords::{Icrs, PixelPoint, UnitVector};
+use crate::identify::pairing::{NearPair, Pair};
+use crate::identify::predict::PredictedStar;
+use crate::sky::catalog::StarIndex;
+
+/// An observed star and the catalogue star that it may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Candidate {
+    /// Position in [`StarField::stars`](crate::identify::StarField::stars).
+    pub observed: usize,
+    /// Position in the list of predicted stars.
+    pub predicted: usize,
+    /// The catalogue star.
+    pub star: StarIndex,
+    /// Its own V magnitude.
+    pub own_v_mag: f32,
+    /// V magnitude of its light: its own, or that of the blend.
+    pub v_mag: f64,
+    /// Position of its light in the frame.
+    pub light: PixelPoint,
+    /// Direction of its light: its own, or that of the blend.
+    pub direction: UnitVector<Icrs>,
+    /// Distance between the observed position and that of the light, in pixels.
+    pub distance_px: f64,
+    /// Standard error of that distance on each axis, in pixels.
+    pub sigma_px: f64,
+    /// The largest distance of a candidate of this observed star, in pixels.
+    pub gate_px: f64,
+    /// Whether its light is that of a brighter star, in whose blend it is.
+    pub is_absorbed: bool,
+    /// Density of the distance of a true pair, per square pixel.
+    pub position_density: f64,
+    /// Odds that it is a true pair.
+    pub odds: f64,
+    /// Probability that it is not.
+    pub p_chance: f64,
+}
+
+impl Candidate {
+    /// A candidate whose star is single. `sigma_px` and `gate_px` are those of the observed star.
+    pub fn new(
+        near: &NearPair,
+        predicted: &PredictedStar,
+        (sigma_px, gate_px): (f64, f64),
+    ) -> Self {
+        Self {
+            observed: near.observed,
+            predicted: near.predicted,
+            star: predicted.star,
+            own_v_mag: predicted.v_mag,
+            v_mag: f64::from(predicted.v_mag),
+            light: predicted.pixel,
+            direction: predicted.direction,
+            distance_px: near.distance_px,
+            sigma_px,
+            gate_px,
+            is_absorbed: false,
+            position_density: 0.0,
+            odds: 0.0,
+            p_chance: 1.0,
+        }
+    }
+
+    /// The candidate as a pair.
+    pub fn pair(&self) -> Pair {
+        Pair {
+            observed: self.observed,
+            star: self.star,
+            v_mag: self.own_v_mag,
+            direction: self.direction,
+            residual_px: self.distance_px,
+            p_chance: self.p_chance,
+        }
+    }
+}
