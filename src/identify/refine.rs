@@ -202,15 +202,16 @@ impl Refiner {
             }
             self.name(problem, &current, round == 0);
             self.take_names(most_chance);
-            if self.are_pairs_the_same() {
-                break;
-            }
+            let settled = self.are_pairs_the_same();
             let mut guess = Guess {
                 hypothesis: &hypothesis,
                 model,
                 excess_sigma_px: current.excess_sigma_px,
             };
             current = self.fitted(problem, &guess)?;
+            if settled {
+                break;
+            }
             if self.are_residuals_unexplained(problem, &current) {
                 let richer = self.choose_model(problem, &current, DistortionModel::Quintic);
                 if richer != model {
