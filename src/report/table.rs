@@ -67,7 +67,7 @@ impl FrameReport {
             number(star.dec_deg),
             number(star.residual_px),
             number(star.residual_blend_px),
-            number(star.p_chance),
+            star.p_chance.map(|p| format!("{p:e}")).unwrap_or_default(),
             star.flags.join(" "),
             number(star.flux_e),
             number(star.peak_e),
