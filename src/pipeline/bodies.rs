@@ -178,6 +178,7 @@ mod tests {
                 source: SourceIndex::new(index),
                 star: StarIndex::new(source.2?),
                 residual_px: 0.1,
+                p_chance: 1e-6,
                 light: body.direction,
             })
         });
@@ -186,6 +187,7 @@ mod tests {
             icrs_to_camera,
             attitude_covariance_rad2: Matrix3::zeros(),
             focal_length_sigma_px: 0.1,
+            excess_sigma_px: 0.0,
             matches: matches.collect(),
             rms_px: 0.3,
             log10_false_alarm: -50.0,
