@@ -35,6 +35,7 @@ mod priors;
 mod refine;
 mod search;
 mod table;
+mod thinning;
 pub mod triangle;
 mod workspace;
 

@@ -116,6 +116,8 @@ pub struct Search<'a> {
     /// Smallest and largest focal length, in pixels.
     focal_px: (f64, f64),
     diagonal_px: f64,
+    /// log10 of the number of searches over the field.
+    searches_log10: f64,
     hypotheses: u64,
     most_hypotheses: u64,
     candidates: u64,
@@ -194,11 +196,20 @@ impl<'a> Search<'a> {
             buffers,
             focal_px,
             diagonal_px: field.width_px.hypot(field.height_px),
+            searches_log10: 0.0,
             hypotheses: 0,
             most_hypotheses,
             candidates: 0,
             best_log10: None,
             provisional: None,
+        }
+    }
+
+    /// The same, as the second search: chance has twice the opportunity.
+    pub fn as_second(self) -> Self {
+        Self {
+            searches_log10: std::f64::consts::LOG10_2,
+            ..self
         }
     }
 
@@ -498,7 +509,8 @@ impl<'a> Search<'a> {
             false_alarm,
             ..
         } = self.buffers;
-        Some(false_alarm.log10(hypothesis, problem, &mut refiner.around, hypotheses))
+        let log10 = false_alarm.log10(hypothesis, problem, &mut refiner.around, hypotheses);
+        Some((log10 + self.searches_log10).min(0.0))
     }
 }
 

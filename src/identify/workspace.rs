@@ -8,12 +8,21 @@ use super::pairing::Pair;
 use super::priors::Priors;
 use super::refine::{Refined, Start};
 use super::search::{Buffers, LOG10_FALSE_ALARM_LIMIT, Search};
+use super::thinning::Thinning;
 use crate::camera::DistortionModel;
+use std::f64::consts::PI;
 
-/// Number of stars, the brightest, that decide how much distortion is fitted.
-const CALIBRATION_STARS: usize = 120;
-/// First pairing radius of the final fit, in units of the frame's diagonal.
+/// Numbers of stars, the brightest, that decide how much distortion is fitted. Where most
+/// detections are none, the fewer brightest have less chance pairs among them.
+const CALIBRATION_STARS: [usize; 3] = [120, 30, 12];
+/// First pairing radius of the final fit, in units of the frame's diagonal, and the largest for few
+/// stars, …
 const FINAL_RADIUS_SHARE: f64 = 0.005;
+const LARGEST_RADIUS_SHARE: f64 = 0.0125;
+/// … which chance reaches for this share of the stars.
+const CHANCE_PAIRS: f64 = 0.02;
+/// A fit is good if it names this share of the stars that it began with.
+const GOOD_SHARE: f64 = 0.5;
 
 /// A name is given where the odds that it is right are at least these, unless others are stated.
 pub const NAME_ODDS: f64 = 100.0;
@@ -37,6 +46,7 @@ pub fn identify(
 pub struct Workspace {
     name_odds: f64,
     buffers: Buffers,
+    thinning: Thinning,
     answer: Option<Identification>,
 }
 
@@ -52,6 +62,7 @@ impl Workspace {
         Self {
             name_odds: NAME_ODDS,
             buffers: Buffers::default(),
+            thinning: Thinning::default(),
             answer: None,
         }
     }
@@ -84,16 +95,31 @@ impl Workspace {
         }
         let problem = Problem { field, sky };
         let mut search = Search::new(problem, priors, &mut self.buffers);
-        let Some(found) = search.run() else {
+        let mut found = search.run();
+        let mut best_log10 = search.best_log10_false_alarm();
+        if found.is_none()
+            && let Some(thinned) = self.thinning.thin(field)
+        {
+            let problem = Problem {
+                field: thinned,
+                sky,
+            };
+            drop(search);
+            search = Search::new(problem, priors, &mut self.buffers).as_second();
+            found = search.run();
+            let second = search.best_log10_false_alarm();
+            best_log10 = [best_log10, second].into_iter().flatten().reduce(f64::min);
+        }
+        let Some(found) = found else {
             return Err(SearchFailure::NoMatch {
-                best_log10_false_alarm: search.best_log10_false_alarm(),
+                best_log10_false_alarm: best_log10,
             });
         };
         let most_chance = 1.0 / (1.0 + self.name_odds);
         let named = with_names(problem, &mut search, (&found, most_chance));
         let Some((refined, log10)) = named else {
             return Err(SearchFailure::NoMatch {
-                best_log10_false_alarm: search.best_log10_false_alarm(),
+                best_log10_false_alarm: best_log10,
             });
         };
         let pairs = &self.buffers.refiner.pairs;
@@ -104,33 +130,93 @@ impl Workspace {
     }
 }
 
-/// The final fit, to all stars with a sure name, with as much distortion as they support. It starts
-/// from the search's own answer where a richer one fails. `None` where there are too few names.
+/// The final fit, to all stars with a sure name, with as much distortion as they support; the
+/// search's buffers hold these names. `None` where there are too few names.
+///
+/// It begins with the brightest stars. If hardly any of them get a name, it begins again with fewer
+/// of them, and at last with the search's own answer; the fit with most names counts.
 fn with_names(
     problem: Problem,
     search: &mut Search,
     (found, most_chance): (&Refined, f64),
 ) -> Option<(Refined, f64)> {
+    let mut best: Option<Named> = None;
+    let mut is_best_last = true;
+    for start in CALIBRATION_STARS.map(Some).into_iter().chain([None]) {
+        let settled = match start {
+            Some(stars) => settle(problem, search, found, stars),
+            None => Some(*found),
+        };
+        let named = settled.and_then(|settled| name(problem, search, &settled, most_chance));
+        let Some(named) = named else {
+            is_best_last = false;
+            continue;
+        };
+        let began_with = start.map_or(0, |stars| stars.min(problem.field.stars.len()));
+        let is_good = named.names as f64 >= GOOD_SHARE * began_with as f64;
+        is_best_last = best.as_ref().is_none_or(|best| named.names > best.names);
+        if is_best_last {
+            best = Some(named);
+        }
+        if is_good {
+            break;
+        }
+    }
+    let best = best?;
+    // The buffers hold the names of the last fit.
+    if !is_best_last {
+        name(problem, search, &best.settled, most_chance)?;
+    }
+    Some((best.refined, best.log10))
+}
+
+/// A fit to the stars with sure names.
+struct Named {
+    /// Where it began.
+    settled: Refined,
+    refined: Refined,
+    log10: f64,
+    names: usize,
+}
+
+/// Fits as much distortion as the `stars` brightest stars support.
+fn settle(problem: Problem, search: &mut Search, found: &Refined, stars: usize) -> Option<Refined> {
     let field = problem.field;
+    let diagonal_px = field.width_px.hypot(field.height_px);
+    let area_px2 = field.width_px * field.height_px;
+    let by_chance_px = (CHANCE_PAIRS * area_px2 / (PI * stars as f64)).sqrt();
     let hypothesis = found.hypothesis();
     let start = Start {
         hypothesis: &hypothesis,
-        radius_px: FINAL_RADIUS_SHARE * field.width_px.hypot(field.height_px),
+        radius_px: by_chance_px.clamp(
+            FINAL_RADIUS_SHARE * diagonal_px,
+            LARGEST_RADIUS_SHARE * diagonal_px,
+        ),
         sceptical: false,
-        stars: CALIBRATION_STARS,
+        stars,
         richest: DistortionModel::Quintic,
     };
-    let richer = search.refiner().refine(problem, &start);
-    let starts = [richer, Some(*found)].into_iter().flatten();
-    let mut named = starts.filter_map(|settled| {
-        let refiner = search.refiner();
-        let refined = refiner.with_names(problem, &settled, most_chance)?;
-        let names = refiner.pairs.len();
-        let log10 = search.log10_false_alarm(&refined.hypothesis())?;
-        let is_sure = names >= MIN_STARS && log10 <= LOG10_FALSE_ALARM_LIMIT;
-        is_sure.then_some((refined, log10))
-    });
-    named.next()
+    search.refiner().refine(problem, &start)
+}
+
+/// Names all stars, from `settled` on; `None` where too few have a sure name.
+fn name(
+    problem: Problem,
+    search: &mut Search,
+    settled: &Refined,
+    most_chance: f64,
+) -> Option<Named> {
+    let refiner = search.refiner();
+    let refined = refiner.with_names(problem, settled, most_chance)?;
+    let names = refiner.pairs.len();
+    let log10 = search.log10_false_alarm(&refined.hypothesis())?;
+    let is_sure = names >= MIN_STARS && log10 <= LOG10_FALSE_ALARM_LIMIT;
+    is_sure.then_some(Named {
+        settled: *settled,
+        refined,
+        log10,
+        names,
+    })
 }
 
 fn star_match(pair: &Pair, field: &StarField) -> StarMatch {

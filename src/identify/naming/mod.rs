@@ -8,7 +8,8 @@
 //!
 //! `o = C f g / ((1 − C) λ)`
 //!
-//! with the probability C that a star of j's magnitude is detected ([`completeness`]), the
+//! with the probability C that a star of j's magnitude is detected at its place ([`completeness`]),
+//! the
 //! densities f and g of the differences in position and magnitude of a true pair
 //! ([`likelihood`]), and the density λ of observed stars of i's magnitude, at its place, that are
 //! not catalogue stars ([`unrelated`]). Other candidates of i and of j compete with it: its
@@ -24,6 +25,7 @@
 
 mod candidate;
 mod completeness;
+mod grid;
 mod likelihood;
 mod unrelated;
 
@@ -46,8 +48,9 @@ const GATE_SIGMAS: f64 = 10.0;
 /// … or, where bright stars are rare, so far that this number of unrelated stars as bright as the
 /// observed one lies within that distance: saturated and bloomed stars are measured badly, …
 const GATE_CHANCE: f64 = 0.01;
-/// … but always within this fraction of the frame's diagonal.
-const GATE_SHARE: f64 = 0.005;
+/// … but always within these fractions of the frame's diagonal.
+const ERROR_GATE_SHARE: f64 = 0.005;
+const RARE_GATE_SHARE: f64 = 0.01;
 
 /// Computes the probabilities of names. Its buffers are reused.
 #[derive(Debug, Default)]
@@ -169,7 +172,9 @@ impl Naming {
 
     /// What the frame shows, from the probabilities.
     fn maximise(&mut self, stars: Stars) {
-        self.completeness.measure(&self.is_observed);
+        let Stars { field, predicted } = stars;
+        self.completeness
+            .measure(field, predicted, &self.is_observed);
         if stars.field.photometry == Photometry::Instrumental {
             self.magnitudes
                 .fit_zero_point(stars.field, &self.candidates);
@@ -183,7 +188,7 @@ struct Gate {
     excess_sigma_px: f64,
     /// Of the brightest star.
     rare_px: f64,
-    largest_px: f64,
+    diagonal_px: f64,
 }
 
 impl Gate {
@@ -192,14 +197,16 @@ impl Gate {
         Self {
             excess_sigma_px,
             rare_px: (GATE_CHANCE * area_px2 / PI).sqrt(),
-            largest_px: GATE_SHARE * field.width_px.hypot(field.height_px),
+            diagonal_px: field.width_px.hypot(field.height_px),
         }
     }
 
     fn radius_px(&self, rank: usize, star: &ObservedStar) -> f64 {
         let by_error_px = GATE_SIGMAS * star.sigma_px.hypot(self.excess_sigma_px);
         let by_rarity_px = self.rare_px / ((rank + 1) as f64).sqrt();
-        by_error_px.max(by_rarity_px).min(self.largest_px)
+        let by_error_px = by_error_px.min(ERROR_GATE_SHARE * self.diagonal_px);
+        let by_rarity_px = by_rarity_px.min(RARE_GATE_SHARE * self.diagonal_px);
+        by_error_px.max(by_rarity_px)
     }
 }
 

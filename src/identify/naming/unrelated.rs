@@ -4,6 +4,7 @@
 //! places, so the density at a place is that of its surroundings on the scale where they are
 //! densest.
 
+use super::grid::Grid;
 use crate::identify::field::StarField;
 
 /// Half the width of the range of magnitudes that counts as the same brightness.
@@ -81,7 +82,7 @@ impl Unrelated {
     fn add_scale(&mut self, field: &StarField, has_name: &[f64], (cells, mean): (usize, f64)) {
         let grid = Grid::new(field, cells);
         self.cells.clear();
-        self.cells.resize(grid.columns * grid.rows, 0.0);
+        self.cells.resize(grid.cells(), 0.0);
         let stars = || field.stars.iter().zip(has_name);
         for (star, has_name) in stars() {
             self.cells[grid.cell_of(star.position.x, star.position.y)] += weight(has_name);
@@ -97,51 +98,6 @@ impl Unrelated {
 /// Probability that an observed star is unrelated to the catalogue.
 fn weight(has_name: &f64) -> f64 {
     (1.0 - has_name).clamp(0.0, 1.0)
-}
-
-/// A division of the frame into square cells.
-struct Grid {
-    columns: usize,
-    rows: usize,
-    cell_px: f64,
-}
-
-impl Grid {
-    fn new(field: &StarField, cells: usize) -> Self {
-        let cell_px = field.width_px.max(field.height_px) / cells as f64;
-        let count = |extent_px: f64| ((extent_px / cell_px).ceil() as usize).max(1);
-        Self {
-            columns: count(field.width_px),
-            rows: count(field.height_px),
-            cell_px,
-        }
-    }
-
-    /// Column and row of the cell at a position.
-    fn column_and_row(&self, x: f64, y: f64) -> (usize, usize) {
-        let cell = |at: f64, count: usize| ((at / self.cell_px).max(0.0) as usize).min(count - 1);
-        (cell(x, self.columns), cell(y, self.rows))
-    }
-
-    fn cell_of(&self, x: f64, y: f64) -> usize {
-        let (column, row) = self.column_and_row(x, y);
-        row * self.columns + column
-    }
-
-    /// The sum of `values` of the cell at a position and its neighbours, and how many these are.
-    fn around(&self, x: f64, y: f64, values: &[f64]) -> (f64, usize) {
-        let (column, row) = self.column_and_row(x, y);
-        let columns = column.saturating_sub(1)..(column + 2).min(self.columns);
-        let rows = row.saturating_sub(1)..(row + 2).min(self.rows);
-        let cells = columns.len() * rows.len();
-        let of_row = |row: usize| {
-            let start = row * self.columns;
-            values[start + columns.start..start + columns.end]
-                .iter()
-                .sum::<f64>()
-        };
-        (rows.map(of_row).sum(), cells)
-    }
 }
 
 #[cfg(test)]

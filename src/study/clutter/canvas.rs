@@ -39,10 +39,22 @@ impl Canvas {
         sum / self.opacity.len() as f64
     }
 
-    /// Whether most of the light at `place` is hidden.
-    pub(super) fn hides(&self, place: &PixelPoint) -> bool {
-        let [x, y] = [place.x, place.y].map(|at| at.round().max(0.0) as usize);
-        x < self.width && y < self.height && self.opacity[y * self.width + x] > 0.5
+    /// The share that is seen of a spot at `place` with this standard deviation.
+    pub(super) fn share_seen(&self, place: &PixelPoint, sigma_px: f64) -> f64 {
+        /// Practically all light of a Gaussian is within this many standard deviations.
+        const REACH_SIGMAS: f64 = 4.0;
+        let [columns, rows] = self.around(place, REACH_SIGMAS * sigma_px);
+        let (mut all, mut seen) = (0.0, 0.0);
+        for y in rows {
+            for x in columns.clone() {
+                let apart_px = PixelPoint::new(x as f64, y as f64).distance_to(place);
+                let light = libm::exp(-0.5 * (apart_px / sigma_px).powi(2));
+                all += light;
+                seen += light * (1.0 - f64::from(self.opacity[y * self.width + x]));
+            }
+        }
+        // A star outside the frame is not hidden.
+        if all > 0.0 { seen / all } else { 1.0 }
     }
 
     fn around(&self, centre: &PixelPoint, reach_px: f64) -> Bounds {

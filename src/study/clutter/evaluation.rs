@@ -24,7 +24,7 @@ pub struct FrameResult {
     /// Detections with a wrong name: that star is not there.
     pub misnamed: usize,
     /// The sum of the stated probabilities that a name is chance, where they are stated.
-    pub stated_misnamed: Option<f64>,
+    pub stated_misnamed: f64,
 }
 
 /// Compares `solution` with the truth of its frame.
@@ -50,7 +50,6 @@ pub(super) fn evaluate(
             .as_ref()
             .is_none_or(|sky| !sky.is_there(named, source))
     };
-    let stated: Option<Vec<f64>> = matches.iter().map(p_chance).collect();
     FrameResult {
         answer: answer(maker, sky, found),
         megapixels: (solution.width * solution.height) as f64 / 1e6,
@@ -58,13 +57,8 @@ pub(super) fn evaluate(
         false_detections: star_like.filter(is_false).count(),
         named: matches.len(),
         misnamed: matches.iter().filter(is_misnamed).count(),
-        stated_misnamed: stated.map(|stated| stated.iter().sum()),
+        stated_misnamed: matches.iter().map(|named| named.p_chance).sum(),
     }
-}
-
-/// The stated probability that a name is chance, where one is stated.
-fn p_chance(_named: &StarMatch) -> Option<f64> {
-    None
 }
 
 fn answer(maker: &FrameMaker, sky: Option<&TrueSky>, found: Option<&Identification>) -> Answer {

@@ -106,10 +106,22 @@ impl<'a> FrameMaker<'a> {
         frame.metadata = FrameMetadata::default();
         let mut canvas = Canvas::new(frame.width, frame.height);
         let frame = self.with_clutter(frame, &mut canvas, &mut random)?;
-        let is_there = |star: &TrueStar| star.catalog.is_some() && !canvas.hides(&star.position);
-        truth.stars.retain(is_there);
+        truth.stars.retain_mut(|star| self.is_seen(star, &canvas));
         let sky = Some(TrueSky { pointing, truth });
         Ok(ClutteredFrame { frame, sky })
+    }
+
+    /// Whether a star may be detected beside what stands before it; dims it to the light that is
+    /// left. A bright star is seen through leaves that hide its centre.
+    fn is_seen(&self, star: &mut TrueStar, canvas: &Canvas) -> bool {
+        /// Magnitudes beyond the limit at which a star may still be detected.
+        const BEYOND_LIMIT_MAG: f64 = 1.0;
+        let sigma_px = self.scenario.camera.spot_sigma_px.max(0.3);
+        let seen = canvas.share_seen(&star.position, sigma_px);
+        if seen < 1.0 {
+            star.v_mag -= 2.5 * seen.log10();
+        }
+        star.catalog.is_some() && (seen >= 0.5 || star.v_mag <= self.limit_vmag + BEYOND_LIMIT_MAG)
     }
 
     fn with_clutter(

@@ -37,9 +37,8 @@ pub struct KindResult {
     pub misnamed_low_percent: f64,
     /// Upper end of it.
     pub misnamed_high_percent: f64,
-    /// The number of wrong names that the stated probabilities add up to; `None` where none are
-    /// stated.
-    pub stated_misnamed: Option<f64>,
+    /// The number of wrong names that the stated probabilities add up to.
+    pub stated_misnamed: f64,
 }
 
 impl KindResult {
@@ -56,8 +55,7 @@ impl KindResult {
         let megapixels: f64 = results.iter().map(|result| result.megapixels).sum();
         let (named, misnamed) = (sum(|r| r.named), sum(|r| r.misnamed));
         let false_detections = sum(|r| r.false_detections);
-        let stated: Option<Vec<f64>> = results.iter().map(|r| r.stated_misnamed).collect();
-        let is_stated = named > 0;
+        let stated: f64 = results.iter().map(|r| r.stated_misnamed).sum();
         let share = Interval::of(misnamed, named);
         let percent = |share: f64| to_significant(100.0 * share, 4);
         Self {
@@ -75,9 +73,7 @@ impl KindResult {
             misnamed,
             misnamed_low_percent: percent(share.low),
             misnamed_high_percent: percent(share.high),
-            stated_misnamed: stated
-                .filter(|_| is_stated)
-                .map(|stated| to_decimals(stated.iter().sum(), 3)),
+            stated_misnamed: to_decimals(stated, 3),
         }
     }
 
@@ -126,9 +122,7 @@ impl KindResult {
 
 fn sums<'a>(name: &str, rows: impl Iterator<Item = &'a KindResult> + Clone) -> String {
     let sum = |of: fn(&KindResult) -> usize| rows.clone().map(of).sum::<usize>();
-    let with_names = rows.clone().filter(|row| row.named > 0);
-    let stated: Option<Vec<f64>> = with_names.map(|row| row.stated_misnamed).collect();
-    let stated = stated.map(|stated| stated.iter().sum());
+    let stated = rows.clone().map(|row| row.stated_misnamed).sum();
     let names = names(sum(|r| r.named), sum(|r| r.misnamed), stated);
     format!(
         "{name:<16} {:>7} {:>7} {:>6} {:>9} {:>10} {:>9} {names}\n",
@@ -142,18 +136,14 @@ fn sums<'a>(name: &str, rows: impl Iterator<Item = &'a KindResult> + Clone) -> S
 }
 
 /// Numbers of names and wrong names, the interval of their share, and the stated number.
-fn names(named: usize, misnamed: usize, stated: Option<f64>) -> String {
+fn names(named: usize, misnamed: usize, stated: f64) -> String {
     let share = Interval::of(misnamed, named);
     let [low, high] = [share.low, share.high].map(|share| 100.0 * share);
     let interval = match named {
         0 => "–".to_owned(),
         _ => format!("{low:.3} to {high:.3} %"),
     };
-    let stated = match (named, stated) {
-        (0, _) | (_, None) => "–".to_owned(),
-        (_, Some(stated)) => format!("{stated:.2}"),
-    };
-    format!("{named:>8} {misnamed:>7} {interval:>15} {stated:>8}")
+    format!("{named:>8} {misnamed:>7} {interval:>15} {stated:>8.2}")
 }
 
 #[cfg(test)]
@@ -168,7 +158,7 @@ mod tests {
             false_detections: 4,
             named,
             misnamed,
-            stated_misnamed: Some(0.25),
+            stated_misnamed: 0.25,
         }
     }
 
@@ -182,19 +172,10 @@ mod tests {
         let row = KindResult::new(Kind::Foliage, &results, 0.1);
         assert_eq!((row.frames, row.right, row.wrong), (3, 1, 1));
         assert_eq!((row.named, row.misnamed), (30, 11));
-        assert_eq!(row.stated_misnamed, Some(0.75));
+        assert_eq!(row.stated_misnamed, 0.75);
         assert_eq!(row.false_per_mpx, 2.0);
         let text = KindResult::to_text(&[row.clone(), row]);
         assert!(text.lines().all(|line| line.chars().count() < 120));
         assert!(text.contains("with sky") && !text.contains("without sky"));
-    }
-
-    #[test]
-    fn without_stated_probabilities_none_are_summed() {
-        let mut unstated = result(Answer::Right, 20, 0);
-        unstated.stated_misnamed = None;
-        let row = KindResult::new(Kind::Clean, &[unstated], 0.1);
-        assert_eq!(row.stated_misnamed, None);
-        assert!(row.line().contains('–'));
     }
 }

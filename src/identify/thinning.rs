@@ -1,0 +1,91 @@
+//! A field in which no place has more than a few stars: the brightest of each cell.
+//!
+//! Windows, foliage and reflections put many bright detections into few places. There they hide the
+//! stars elsewhere from a search that begins with the brightest. Stars are everywhere.
+//!
+//! # Reference
+//! Lang et al. 2010, AJ 139, 1782, section 2.1, for the same in astrometry.net.
+
+use super::field::StarField;
+
+/// Cells along the frame's longer side.
+const CELLS: f64 = 8.0;
+/// Stars that each cell keeps, the brightest.
+const STARS_PER_CELL: u8 = 2;
+/// Number of the brightest stars that must change; else a search would find nothing else.
+const LOOKED_AT: usize = 40;
+
+/// Thins fields out. Its buffers are reused.
+#[derive(Debug, Default)]
+pub struct Thinning {
+    field: Option<StarField>,
+    kept: Vec<u8>,
+}
+
+impl Thinning {
+    /// `field` with the brightest stars of each cell only; `None` if that hardly changes it.
+    pub fn thin(&mut self, field: &StarField) -> Option<&StarField> {
+        let cell_px = field.width_px.max(field.height_px) / CELLS;
+        let columns = (field.width_px / cell_px).ceil() as usize;
+        let rows = (field.height_px / cell_px).ceil() as usize;
+        self.kept.clear();
+        self.kept.resize(columns * rows, 0);
+        let cell = |at: f64, count: usize| ((at / cell_px).max(0.0) as usize).min(count - 1);
+        let mut stars = self.field.take().map_or_else(Vec::new, |old| old.stars);
+        stars.clear();
+        stars.extend(field.stars.iter().filter(|star| {
+            let (column, row) = (cell(star.position.x, columns), cell(star.position.y, rows));
+            let kept = &mut self.kept[row * columns + column];
+            *kept = kept.saturating_add(1);
+            *kept <= STARS_PER_CELL
+        }));
+        let brightest = field.brightest(LOOKED_AT);
+        let is_other = !stars.starts_with(brightest);
+        let thinned = self.field.insert(StarField { stars, ..*field });
+        is_other.then_some(thinned)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::coords::PixelPoint;
+    use crate::identify::{ObservedStar, Photometry, SourceIndex};
+
+    fn field(places: &[(f64, f64)]) -> StarField {
+        let star = |(index, &(x, y)): (usize, &(f64, f64))| ObservedStar {
+            source: SourceIndex::new(index),
+            position: PixelPoint::new(x, y),
+            sigma_px: 0.1,
+            mag: index as f64,
+            is_saturated: false,
+        };
+        StarField {
+            width_px: 800.0,
+            height_px: 600.0,
+            photometry: Photometry::Instrumental,
+            years_since_j2000: 0.0,
+            spot_sigma_px: None,
+            stars: places.iter().enumerate().map(star).collect(),
+        }
+    }
+
+    #[test]
+    fn a_crowded_place_keeps_its_brightest_stars() {
+        let windows = (0..50).map(|i| (10.0 + f64::from(i), 590.0));
+        let stars = (0..6).map(|i| (60.0 + 110.0 * f64::from(i), 120.0));
+        let all: Vec<_> = windows.chain(stars).collect();
+        let mut thinning = Thinning::default();
+        let thinned = thinning.thin(&field(&all)).unwrap();
+        let sources: Vec<usize> = thinned.stars.iter().map(|s| s.source.get()).collect();
+        assert_eq!(sources, [0, 1, 50, 51, 52, 53, 54, 55]);
+    }
+
+    #[test]
+    fn a_field_without_crowded_places_stays_as_it_is() {
+        let stars: Vec<_> = (0..6)
+            .map(|i| (60.0 + 110.0 * f64::from(i), 120.0))
+            .collect();
+        assert_eq!(Thinning::default().thin(&field(&stars)), None);
+    }
+}
