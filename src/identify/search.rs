@@ -206,7 +206,7 @@ impl<'a> Search<'a> {
     }
 
     /// The same, as the second search: chance has twice the opportunity.
-    pub fn as_second(self) -> Self {
+    pub fn again(self) -> Self {
         Self {
             searches_log10: std::f64::consts::LOG10_2,
             ..self

@@ -104,8 +104,7 @@ impl Workspace {
                 field: thinned,
                 sky,
             };
-            drop(search);
-            search = Search::new(problem, priors, &mut self.buffers).as_second();
+            search = Search::new(problem, priors, &mut self.buffers).again();
             found = search.run();
             let second = search.best_log10_false_alarm();
             best_log10 = [best_log10, second].into_iter().flatten().reduce(f64::min);

@@ -230,7 +230,8 @@ impl Measurement<'_> {
         fit
     }
 
-    /// Takes the centre of light for an elongated star: a round spot has no certain place along it.
+    /// Takes the centre of light for a long star, or an elongated one where the fit is elsewhere: a
+    /// round spot may settle anywhere along it. Where they agree the fit is the more exact.
     fn center_elongated(
         &self,
         fit: &Fit,
@@ -240,20 +241,28 @@ impl Measurement<'_> {
     ) {
         /// Fainter stars have no core: noise breaks it up.
         const MIN_SNR: f32 = 15.0;
+        /// Distance of the two that is significant, in standard errors.
+        const SIGNIFICANT_SIGMA: f64 = 3.0;
         if detection.flags.trail {
             return;
         }
-        let core = Core::at(&self.maps, peak).filter(|_| peak.snr >= MIN_SNR);
-        if let Some(core) = core {
-            detection.position = PixelPoint::new(core.x, core.y);
-            detection.sigma_x_px = core.sigma_px;
-            detection.sigma_y_px = core.sigma_px;
+        let mut centred = *detection;
+        if let Some(core) = Core::at(&self.maps, peak).filter(|_| peak.snr >= MIN_SNR) {
+            centred.position = PixelPoint::new(core.x, core.y);
+            (centred.sigma_x_px, centred.sigma_y_px) = (core.sigma_px, core.sigma_px);
         } else {
-            centroid::grey_weighted(&self.maps, &self.noise, fit, detection, buffers);
+            centroid::grey_weighted(&self.maps, &self.noise, fit, &mut centred, buffers);
             // The window cuts off its ends at whole pixels.
-            for sigma in [&mut detection.sigma_x_px, &mut detection.sigma_y_px] {
+            for sigma in [&mut centred.sigma_x_px, &mut centred.sigma_y_px] {
                 *sigma = sigma.hypot(PIXEL_VARIANCE_PX2.sqrt());
             }
+        }
+        let error_px = |d: &Detection| d.sigma_x_px.max(d.sigma_y_px);
+        let distance_px = centred.position.distance_to(&detection.position);
+        let fit_error_px = error_px(detection);
+        let is_off = distance_px > SIGNIFICANT_SIGMA * fit_error_px.hypot(error_px(&centred));
+        if is_off || self.shape.is_long() || !fit_error_px.is_finite() {
+            *detection = centred;
         }
     }
 

@@ -38,9 +38,15 @@ struct Elongation {
 impl StarShape {
     /// The shape of the brightest of the peaks, which come brightest first.
     pub fn measure(maps: &FrameMaps<'_>, peaks: &[Peak]) -> Self {
-        let bright = peaks.iter().take_while(|peak| peak.snr >= MIN_SNR);
-        let cores: Vec<Core> = bright
+        // Bloomed stars are elongated by their charge: they do not count.
+        let bright: Vec<&Peak> = peaks
+            .iter()
+            .take_while(|peak| peak.snr >= MIN_SNR)
+            .filter(|peak| !peak.saturated)
             .take(MAX_STARS)
+            .collect();
+        let cores: Vec<Core> = bright
+            .iter()
             .filter_map(|peak| Core::at(maps, peak))
             .filter(|core| core.area_px >= MIN_AREA_PX)
             .collect();
@@ -63,8 +69,17 @@ impl StarShape {
             area_px: median(&|star| cores[star].area_px),
         };
         Self {
-            elongation: (are_elongated && 2 * alike > shapes.len()).then_some(elongation),
+            // Sharp stars, too small to have a shape, are not elongated.
+            elongation: (are_elongated && 2 * alike > bright.len()).then_some(elongation),
         }
+    }
+
+    /// Whether the stars are so long that a round spot has no certain place along them.
+    pub fn is_long(&self) -> bool {
+        /// Axes in a ratio of 3.
+        const LONG_ELLIPTICITY: f64 = 0.8;
+        let is_long = |e: Elongation| e.ellipticity[0].hypot(e.ellipticity[1]) > LONG_ELLIPTICITY;
+        self.elongation.is_some_and(is_long)
     }
 
     /// Whether the stars are elongated.

@@ -22,7 +22,7 @@ const FIRST_SCATTER_MAG: f64 = 0.6;
 const LEAST_SCATTER_MAG: f64 = 0.15;
 /// Share of saturated stars that are brighter than measured, by up to this many magnitudes.
 const BRIGHTER_SHARE: f64 = 0.5;
-const BRIGHTER_MAG: f64 = 3.0;
+const BRIGHTER_MAG: f64 = 6.0;
 /// Standard deviation of the slope of catalogue over observed magnitudes about 1, before it is
 /// measured: tone curves of JPEGs compress light.
 const SLOPE_SIGMA: f64 = 0.3;

@@ -207,7 +207,7 @@ mod tests {
         let area = |draw: fn(&mut Canvas, &PixelPoint)| {
             let mut canvas = Canvas::new(100, 80);
             draw(&mut canvas, &middle);
-            assert!(canvas.hides(&PixelPoint::new(51.0, 41.0)));
+            assert!(canvas.share_seen(&PixelPoint::new(51.0, 41.0), 0.5) < 0.1);
             canvas.covered() * 8000.0
         };
         let disc = area(|canvas, at| canvas.ellipse(at, [20.0, 20.0], 0.4, 1.0));
@@ -234,6 +234,6 @@ mod tests {
         canvas.spot(&PixelPoint::new(70.0, -30.0), 2.0, 100.0);
         assert_eq!(canvas.covered(), 0.0);
         assert!(canvas.glow.iter().all(|glow| *glow == 0.0));
-        assert!(!canvas.hides(&PixelPoint::new(-3.0, 400.0)));
+        assert_eq!(canvas.share_seen(&PixelPoint::new(-30.0, 400.0), 0.5), 1.0);
     }
 }
