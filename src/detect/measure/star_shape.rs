@@ -4,6 +4,7 @@
 use super::core::Core;
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::fit::FrameMaps;
+use arrayvec::ArrayVec;
 
 /// Peaks below this signal-to-noise ratio have no shape.
 const MIN_SNR: f32 = 15.0;
@@ -39,23 +40,24 @@ impl StarShape {
     /// The shape of the brightest of the peaks, which come brightest first.
     pub fn measure(maps: &FrameMaps<'_>, peaks: &[Peak]) -> Self {
         // Bloomed stars are elongated by their charge: they do not count.
-        let bright: Vec<&Peak> = peaks
+        let bright: ArrayVec<&Peak, MAX_STARS> = peaks
             .iter()
             .take_while(|peak| peak.snr >= MIN_SNR)
             .filter(|peak| !peak.saturated)
             .take(MAX_STARS)
             .collect();
-        let cores: Vec<Core> = bright
+        let cores: ArrayVec<Core, MAX_STARS> = bright
             .iter()
             .filter_map(|peak| Core::at(maps, peak))
             .filter(|core| core.area_px >= MIN_AREA_PX)
             .collect();
-        let shapes: Vec<[f64; 2]> = cores.iter().map(|c| ellipticity_of(c.covariance)).collect();
+        let shapes = cores.iter().map(|c| ellipticity_of(c.covariance));
+        let shapes: ArrayVec<[f64; 2], MAX_STARS> = shapes.collect();
         if shapes.len() < MIN_STARS {
             return Self::default();
         }
         let median = |value: &dyn Fn(usize) -> f64| {
-            let mut values: Vec<f64> = (0..cores.len()).map(value).collect();
+            let mut values: ArrayVec<f64, MAX_STARS> = (0..cores.len()).map(value).collect();
             values.sort_unstable_by(f64::total_cmp);
             values[values.len() / 2]
         };
@@ -76,8 +78,8 @@ impl StarShape {
 
     /// Whether the stars are so long that a round spot has no certain place along them.
     pub fn is_long(&self) -> bool {
-        /// Axes in a ratio of 3.
-        const LONG_ELLIPTICITY: f64 = 0.8;
+        /// Axes in a ratio of 2.4.
+        const LONG_ELLIPTICITY: f64 = 0.7;
         let is_long = |e: Elongation| e.ellipticity[0].hypot(e.ellipticity[1]) > LONG_ELLIPTICITY;
         self.elongation.is_some_and(is_long)
     }
