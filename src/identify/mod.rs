@@ -23,6 +23,7 @@ mod cells;
 pub mod diagnosis;
 mod false_alarm;
 mod field;
+mod grid;
 mod hypothesis;
 mod identification;
 pub mod index;

@@ -11,6 +11,7 @@ use super::false_alarm::{FalseAlarm, MAX_HYPOTHESES, TESTED_STARS};
 use super::field::{Photometry, StarField};
 use super::hypothesis::{Hypothesis, Problem};
 use super::indexed_catalog::IndexedCatalog;
+use super::pairing::Pair;
 use super::priors::{Priors, SkyRegion};
 use super::refine::{Refined, Refiner, Start};
 use super::triangle::TriangleShape;
@@ -105,6 +106,8 @@ pub struct Buffers {
     /// Refines hypotheses.
     pub refiner: Refiner,
     false_alarm: FalseAlarm,
+    /// The stars of the best fit so far, while others are tried.
+    best: Vec<Pair>,
 }
 
 /// The search over one field.
@@ -216,6 +219,16 @@ impl<'a> Search<'a> {
     /// The refiner of hypotheses, with the stars that agreed with the last one.
     pub fn refiner(&mut self) -> &mut Refiner {
         &mut self.buffers.refiner
+    }
+
+    /// Keeps the stars of the refiner's last fit.
+    pub fn keep_pairs(&mut self) {
+        self.buffers.best.clone_from(&self.buffers.refiner.pairs);
+    }
+
+    /// Gives the refiner the stars that were kept.
+    pub fn restore_pairs(&mut self) {
+        self.buffers.refiner.pairs.clone_from(&self.buffers.best);
     }
 
     /// Lowest log10 of the false-alarm probabilities computed so far.

@@ -7,9 +7,10 @@
 //! Lang et al. 2010, AJ 139, 1782, section 2.1, for the same in astrometry.net.
 
 use super::field::StarField;
+use super::grid::Grid;
 
 /// Cells along the frame's longer side.
-const CELLS: f64 = 8.0;
+const CELLS: usize = 8;
 /// Stars that each cell keeps, the brightest.
 const STARS_PER_CELL: u8 = 2;
 /// Number of the brightest stars that must change; else a search would find nothing else.
@@ -25,17 +26,13 @@ pub struct Thinning {
 impl Thinning {
     /// `field` with the brightest stars of each cell only; `None` if that hardly changes it.
     pub fn thin(&mut self, field: &StarField) -> Option<&StarField> {
-        let cell_px = field.width_px.max(field.height_px) / CELLS;
-        let columns = (field.width_px / cell_px).ceil() as usize;
-        let rows = (field.height_px / cell_px).ceil() as usize;
+        let grid = Grid::new(field, CELLS);
         self.kept.clear();
-        self.kept.resize(columns * rows, 0);
-        let cell = |at: f64, count: usize| ((at / cell_px).max(0.0) as usize).min(count - 1);
+        self.kept.resize(grid.cells(), 0);
         let mut stars = self.field.take().map_or_else(Vec::new, |old| old.stars);
         stars.clear();
         stars.extend(field.stars.iter().filter(|star| {
-            let (column, row) = (cell(star.position.x, columns), cell(star.position.y, rows));
-            let kept = &mut self.kept[row * columns + column];
+            let kept = &mut self.kept[grid.cell_of(star.position.x, star.position.y)];
             *kept = kept.saturating_add(1);
             *kept <= STARS_PER_CELL
         }));

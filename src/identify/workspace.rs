@@ -140,7 +140,6 @@ fn with_names(
     (found, most_chance): (&Refined, f64),
 ) -> Option<(Refined, f64)> {
     let mut best: Option<Named> = None;
-    let mut is_best_last = true;
     for start in CALIBRATION_STARS.map(Some).into_iter().chain([None]) {
         let settled = match start {
             Some(stars) => settle(problem, search, found, stars),
@@ -148,13 +147,12 @@ fn with_names(
         };
         let named = settled.and_then(|settled| name(problem, search, &settled, most_chance));
         let Some(named) = named else {
-            is_best_last = false;
             continue;
         };
         let began_with = start.map_or(0, |stars| stars.min(problem.field.stars.len()));
         let is_good = named.names as f64 >= GOOD_SHARE * began_with as f64;
-        is_best_last = best.as_ref().is_none_or(|best| named.names > best.names);
-        if is_best_last {
+        if best.as_ref().is_none_or(|best| named.names > best.names) {
+            search.keep_pairs();
             best = Some(named);
         }
         if is_good {
@@ -162,17 +160,12 @@ fn with_names(
         }
     }
     let best = best?;
-    // The buffers hold the names of the last fit.
-    if !is_best_last {
-        name(problem, search, &best.settled, most_chance)?;
-    }
+    search.restore_pairs();
     Some((best.refined, best.log10))
 }
 
 /// A fit to the stars with sure names.
 struct Named {
-    /// Where it began.
-    settled: Refined,
     refined: Refined,
     log10: f64,
     names: usize,
@@ -211,7 +204,6 @@ fn name(
     let log10 = search.log10_false_alarm(&refined.hypothesis())?;
     let is_sure = names >= MIN_STARS && log10 <= LOG10_FALSE_ALARM_LIMIT;
     is_sure.then_some(Named {
-        settled: *settled,
         refined,
         log10,
         names,

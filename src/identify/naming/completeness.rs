@@ -8,8 +8,8 @@
 //! that of the stars around it, over what their brightness alone would give: first in large
 //! cells, then in smaller ones, where those around have enough stars to say more.
 
-use super::grid::Grid;
 use crate::identify::field::StarField;
+use crate::identify::grid::Grid;
 use crate::identify::predict::PredictedStar;
 
 /// A star's probability is never closer to 1 than this: bright stars are lost, too.

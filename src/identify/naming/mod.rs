@@ -9,8 +9,7 @@
 //! `o = C f g / ((1 − C) λ)`
 //!
 //! with the probability C that a star of j's magnitude is detected at its place ([`completeness`]),
-//! the
-//! densities f and g of the differences in position and magnitude of a true pair
+//! the densities f and g of the differences in position and magnitude of a true pair
 //! ([`likelihood`]), and the density λ of observed stars of i's magnitude, at its place, that are
 //! not catalogue stars ([`unrelated`]). Other candidates of i and of j compete with it: its
 //! probability is `o / (1 + Σ o)` over all candidates of both.
@@ -25,7 +24,6 @@
 
 mod candidate;
 mod completeness;
-mod grid;
 mod likelihood;
 mod unrelated;
 

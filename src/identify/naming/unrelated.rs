@@ -4,8 +4,8 @@
 //! places, so the density at a place is that of its surroundings on the scale where they are
 //! densest.
 
-use super::grid::Grid;
 use crate::identify::field::StarField;
+use crate::identify::grid::Grid;
 
 /// Half the width of the range of magnitudes that counts as the same brightness.
 const HALF_RANGE_MAG: f64 = 0.5;

@@ -1,6 +1,6 @@
 //! Square cells over a frame, for what is counted place by place.
 
-use crate::identify::field::StarField;
+use super::field::StarField;
 
 /// A division of the frame into square cells.
 pub struct Grid {
