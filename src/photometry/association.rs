@@ -31,7 +31,7 @@ pub(super) struct Association {
 }
 
 /// The distance at which two stars are resolved for sure, in pixels.
-fn resolved_px(spot_sigma_px: f64) -> f64 {
+pub(crate) fn resolved_px(spot_sigma_px: f64) -> f64 {
     (6.0 * spot_sigma_px).max(4.0)
 }
 

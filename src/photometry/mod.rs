@@ -21,6 +21,7 @@ pub mod completeness;
 mod identified_frame;
 pub mod zero_point;
 
+pub(crate) use association::resolved_px;
 pub use identified_frame::IdentifiedFrame;
 
 use crate::base::statistics::median;

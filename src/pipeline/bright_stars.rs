@@ -2,6 +2,7 @@
 
 use crate::detect::{Detection, Detections};
 use crate::identify::{Identification, IndexedCatalog, PredictedStar, View};
+use crate::photometry::resolved_px;
 use crate::sky::catalog::StarIndex;
 use std::collections::HashSet;
 use std::fmt;
@@ -14,10 +15,6 @@ const BRIGHT_DETECTIONS: usize = 10;
 /// the spot, and at least in pixels.
 const BORDER_SIGMAS: f64 = 6.0;
 const BORDER_PX: f64 = 5.0;
-/// Stars closer to a brighter one than this, in standard deviations of the spot and at least in
-/// pixels, are part of its light.
-const RESOLVED_SIGMAS: f64 = 6.0;
-const RESOLVED_PX: f64 = 4.0;
 /// A detection within this fraction of the frame's diagonal may be the star.
 const NEAR_SHARE: f64 = 0.01;
 
@@ -82,7 +79,7 @@ impl NamedFrame<'_> {
 
     /// Whether a star is part of the light of a `brighter` one.
     fn is_in_light_of(&self, brighter: &[PredictedStar], star: &PredictedStar) -> bool {
-        let resolved_px = (RESOLVED_SIGMAS * self.detections.spot_sigma_px).max(RESOLVED_PX);
+        let resolved_px = resolved_px(self.detections.spot_sigma_px);
         let is_near = |other: &PredictedStar| other.pixel.distance_to(&star.pixel) < resolved_px;
         brighter.iter().any(is_near)
     }

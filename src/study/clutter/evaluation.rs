@@ -23,7 +23,7 @@ pub struct FrameResult {
     pub named: usize,
     /// Detections with a wrong name: that star is not there.
     pub misnamed: usize,
-    /// The sum of the stated probabilities that a name is chance, where they are stated.
+    /// The sum of the stated probabilities that a name is chance.
     pub stated_misnamed: f64,
 }
 
