@@ -15,7 +15,8 @@ use super::star_model::{
     DEFAULT_SPOT_PX, SpotSize, StarModel, fit_bright_stars, fit_raw_stars, spot_size, star_model,
 };
 use super::threshold::{
-    FilterWeights, FrameNoise, NoiseBuffers, gaussian_threshold, raise_filtered_noise,
+    Correlation, Extrema, FilterWeights, FrameNoise, NoiseBuffers, gaussian_threshold,
+    raise_filtered_noise,
 };
 
 /// A guessed spot size must be right within this factor; else the frame is filtered again.
@@ -27,6 +28,11 @@ const ENOUGH_RAW_STARS: usize = 8;
 /// Smaller spots put so much light in one pixel that the brightest pixels are the brightest stars;
 /// wider ones are measured on the filtered frame.
 const SHARP_SPOT_PX: f64 = 0.75;
+
+/// Correlated noise raises the threshold at most by this factor: what stands out more is no noise.
+const MAX_RAISE: f64 = 2.0;
+/// The same for coarse noise, whose standard deviation may be far from that of its tail.
+const MAX_RAISE_OF_COARSE: f64 = 20.0;
 
 /// A frame to be searched.
 #[derive(Debug, Clone, Copy)]
@@ -103,6 +109,7 @@ pub(crate) struct FrameSearch {
     pub found: PeakSearch,
     raw_peaks: RawPeakFinder,
     noise: NoiseBuffers,
+    extrema: Extrema,
     fits: FitBuffers,
 }
 
@@ -202,6 +209,7 @@ impl FrameSearch {
             filtered,
             found,
             noise,
+            extrema,
             ..
         } = self;
         let kernel = Kernel::for_spot(spot_px);
@@ -213,15 +221,25 @@ impl FrameSearch {
         filtered.filter(view, mesh, &kernel, (config.cell_px, gaussian));
         let filter = FilterWeights::for_spot(spot_px, kernel.radius(), size);
         raise_filtered_noise(&background.cut_off, &mut filtered.mesh, gaussian, &filter);
-        let frame_noise = FrameNoise {
-            view,
-            background,
-            filtered_mesh: &filtered.mesh,
-            filtered_maxima: &filtered.maxima,
-        };
-        let threshold = config
-            .threshold_sigma
-            .unwrap_or_else(|| frame_noise.raised_threshold(gaussian, spot_px, &filter, noise));
+        let threshold = config.threshold_sigma.unwrap_or_else(|| {
+            let frame_noise = FrameNoise {
+                view,
+                background,
+                filtered_mesh: &filtered.mesh,
+                filtered_maxima: &filtered.maxima,
+            };
+            let raised = frame_noise.raised_threshold(gaussian, spot_px, &filter, noise);
+            let most = match frame_noise.correlation(noise) {
+                Correlation::None => return raised,
+                Correlation::Measured => MAX_RAISE * raised,
+                Correlation::Coarse => MAX_RAISE_OF_COARSE * raised,
+            };
+            extrema.prepare(size);
+            filtered.for_sampled_rows(view, mesh, &kernel, |rows, y, filtered_mesh| {
+                extrema.add_row(rows, y, filtered_mesh);
+            });
+            extrema.raised(raised, config.false_alarms_per_mpx, most)
+        });
         filtered.gather_missed(view, mesh, &kernel, threshold as f32);
         let spot_width_px = (spot_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt();
         let search_config = SearchConfig {

@@ -15,7 +15,7 @@
 //! for the mean shift.
 
 use super::hypothesis::{Hypothesis, Problem};
-use super::naming::Candidate;
+use super::naming::{Candidate, position_density};
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::sky::catalog::StarIndex;
 use crate::sky::catalog::sky_grid::GridStar;
@@ -24,6 +24,9 @@ use crate::sky::catalog::sky_grid::GridStar;
 const FAINTER_MAG: f32 = 4.5;
 /// So do stars farther away, in standard deviations of the spot, unless they are brighter.
 const REACH_SIGMAS: f64 = 4.5;
+/// The probability that a star is measured by its own light where one spot would take up that of
+/// its neighbours as well: the detector separates some stars that this model does not.
+const SEPARATED_SHARE: f64 = 0.05;
 /// The variance that a pixel's own width adds to a spot, in px².
 const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
 /// Lights closer than this, in standard deviations of the spot, are the same.
@@ -38,6 +41,8 @@ const MAX_STEPS: usize = 50;
 pub struct Blends {
     /// Catalogue stars of other detections, sorted.
     taken: Vec<StarIndex>,
+    /// Of the candidates of one observed star.
+    blends: Vec<Option<Light>>,
     lights: Vec<(PixelPoint, f64)>,
 }
 
@@ -50,8 +55,9 @@ struct View<'a> {
 }
 
 impl Blends {
-    /// Gives each candidate position and magnitude of the light that its star is part of. A star in
-    /// the blend of a brighter one is absorbed by it; none is if the PSF is unknown.
+    /// Gives each candidate position and magnitude of the light that its star is part of, where
+    /// that agrees better with the observed star than the star's own light; none if the PSF is
+    /// unknown. A star in the blend of a brighter one has its own light only.
     ///
     /// The stars `taken` are those of other detections: each was measured separately, and so is not
     /// part of a blend.
@@ -74,18 +80,33 @@ impl Blends {
         self.taken.extend(taken);
         self.taken.sort_unstable();
         let same_px = SAME_LIGHT_SIGMAS * view.variance_px2.sqrt();
+        let mut blends = std::mem::take(&mut self.blends);
         for of_observed in candidates.chunk_by_mut(|a, b| a.observed == b.observed) {
-            for candidate in &mut *of_observed {
-                if let Some(light) = self.light_around(&view, candidate.star) {
-                    let observed = &problem.field.stars[candidate.observed];
-                    candidate.distance_px = light.pixel.distance_to(&observed.position);
-                    candidate.light = light.pixel;
-                    candidate.direction = view.direction_of(&light.pixel);
-                    candidate.v_mag = light.v_mag;
+            blends.clear();
+            let stars = of_observed.iter().map(|candidate| candidate.star);
+            blends.extend(stars.map(|star| self.light_around(&view, star)));
+            let star = &problem.field.stars[of_observed[0].observed];
+            for index in 0..of_observed.len() {
+                let Some(blend) = blends[index] else {
+                    continue;
+                };
+                let is_absorbed = is_absorbed((of_observed, &blends), index, same_px);
+                let candidate = &mut of_observed[index];
+                let distance_px = blend.pixel.distance_to(&star.position);
+                let density =
+                    |distance_px| position_density(candidate, distance_px, star.is_saturated);
+                let separated = SEPARATED_SHARE * density(candidate.distance_px);
+                if is_absorbed || separated > density(distance_px) {
+                    candidate.share = SEPARATED_SHARE;
+                } else {
+                    candidate.distance_px = distance_px;
+                    candidate.light = blend.pixel;
+                    candidate.direction = view.direction_of(&blend.pixel);
+                    candidate.v_mag = blend.v_mag;
                 }
             }
-            absorb(of_observed, same_px);
         }
+        self.blends = blends;
     }
 
     /// The blended light of a star; `None` if it is single.
@@ -94,7 +115,7 @@ impl Blends {
         let star = sky.catalog().star(index);
         let camera = &view.hypothesis.camera;
         let reach_rad = REACH_SIGMAS * view.variance_px2.sqrt() / camera.focal_length_px;
-        let Self { taken, lights } = self;
+        let Self { taken, lights, .. } = self;
         lights.clear();
         let look = |near: &GridStar| {
             if near.index != index && taken.binary_search(&near.index).is_err() {
@@ -121,18 +142,25 @@ impl Blends {
     }
 }
 
-/// Marks the candidates of one detection whose light is that of a candidate with a brighter star.
-fn absorb(candidates: &mut [Candidate], same_px: f64) {
-    for index in 0..candidates.len() {
-        let Candidate { light, star, .. } = candidates[index];
-        // Stars are numbered by brightness.
-        candidates[index].is_absorbed = candidates
-            .iter()
-            .any(|other| other.star < star && other.light.distance_to(&light) < same_px);
-    }
+/// Whether the blend of a candidate is the light of a brighter star, alone or in its own blend.
+/// Until it is redirected, `light` of a candidate is its own.
+fn is_absorbed(
+    (candidates, blends): (&[Candidate], &[Option<Light>]),
+    index: usize,
+    same_px: f64,
+) -> bool {
+    let Some(blend) = blends[index] else {
+        return false;
+    };
+    let is_at = |place: &PixelPoint| place.distance_to(&blend.pixel) < same_px;
+    let others = candidates.iter().zip(blends);
+    // Stars are numbered by brightness.
+    let mut brighter = others.filter(|(other, _)| other.star < candidates[index].star);
+    brighter.any(|(other, blend)| is_at(&other.light) || blend.is_some_and(|b| is_at(&b.pixel)))
 }
 
 /// Blended light.
+#[derive(Debug, Clone, Copy)]
 struct Light {
     pixel: PixelPoint,
     /// V magnitude of all of it that a spot at its place takes up.

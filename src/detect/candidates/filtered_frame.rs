@@ -16,6 +16,9 @@ const SIGMA_FLOOR: f32 = 0.5;
 /// threshold, from the smoothed mesh, is hardly lower.
 const CANDIDATE_MARGIN: f32 = 0.85;
 
+/// Pixels that are sampled of large frames, at least.
+const SAMPLED_PX: usize = 2_000_000;
+
 /// What is kept of a filtered frame.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct FilteredFrame {
@@ -99,6 +102,38 @@ impl FilteredFrame {
                 band.filter(view, background, kernel, filtered);
                 let maxima = self.maxima.rows_mut(rows.clone());
                 candidates.gather(band, rows, lowest, maxima);
+            }
+        }
+    }
+
+    /// Filters rows of cells spread over the frame again, and calls `each` with every row in them
+    /// that has two neighbours, with these and its number.
+    pub fn for_sampled_rows(
+        &mut self,
+        view: &View<'_>,
+        background: &Mesh,
+        kernel: &Kernel,
+        mut each: impl FnMut([&[f32]; 3], usize, &Mesh),
+    ) {
+        let Self { mesh, workers, .. } = self;
+        let Some(FilterWorker { band, .. }) = workers.first_mut() else {
+            return;
+        };
+        let stride = (view.width * view.height / SAMPLED_PX).max(1);
+        for row in (0..mesh.grid.rows).step_by(stride) {
+            let rows = mesh.grid.rows_of(row);
+            band.filter(
+                view,
+                background,
+                kernel,
+                with_neighbours(&rows, view.height),
+            );
+            for y in rows.start.max(1)..rows.end.min(view.height.saturating_sub(1)) {
+                if let (Some(above), Some(here), Some(below)) =
+                    (band.row(y - 1), band.row(y), band.row(y + 1))
+                {
+                    each([above, here, below], y, mesh);
+                }
             }
         }
     }

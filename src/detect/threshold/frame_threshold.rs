@@ -38,6 +38,17 @@ fn noise_degrees((width, height): (usize, usize), config: &DetectConfig, spot_px
     (EFFICIENCY * cell / correlated.max(1.0) * SMOOTHING_GAIN.min(cells)).max(3.0)
 }
 
+/// Whether the noise of neighbouring pixels is correlated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Correlation {
+    /// It is independent.
+    None,
+    /// It is correlated: the noise of the filtered frame is not that of independent pixels.
+    Measured,
+    /// It may be: the noise is coarse.
+    Coarse,
+}
+
 /// A filtered frame whose threshold is wanted.
 pub(crate) struct FrameNoise<'a> {
     /// The frame.
@@ -66,6 +77,31 @@ impl FrameNoise<'_> {
         let star_free = self.star_free(u);
         let skewness = photon_skewness(self.view, mesh, &star_free, spot_px, buffers);
         skewness.map_or(u, |s| threshold_for_photons(u, s, filter))
+    }
+
+    /// Whether the noise of neighbouring pixels is correlated. Noise that is cut off is taken as
+    /// independent: its negative has no tail.
+    pub fn correlation(&self, buffers: &mut NoiseBuffers) -> Correlation {
+        if self.background.cut_off.is_any() {
+            Correlation::None
+        } else if self.background.is_coarse {
+            Correlation::Coarse
+        } else if self.is_correlated(buffers) {
+            Correlation::Measured
+        } else {
+            Correlation::None
+        }
+    }
+
+    fn is_correlated(&self, buffers: &mut NoiseBuffers) -> bool {
+        /// Noise of the filtered frame, in units of that of independent pixels.
+        const INDEPENDENT: std::ops::RangeInclusive<f64> = 0.85..=1.15;
+        /// Clouds and crowded stars reach 0.25, JPEGs have 0.3 to 0.8.
+        const LEAST_CORRELATION: f64 = 0.3;
+        let of_filtered = median(&self.filtered_mesh.sigma, &mut buffers.sorted);
+        let sigma_adu = self.background.median_sigma_adu as f32;
+        !INDEPENDENT.contains(&of_filtered)
+            && correlation_of_neighbours(self.view, sigma_adu) > LEAST_CORRELATION
     }
 
     /// The threshold `u` raised for noise that is coarse or cut off, by the distribution of the
@@ -109,5 +145,32 @@ impl FrameNoise<'_> {
             cut_off: &self.background.cut_off,
             limit: limit as f32,
         }
+    }
+}
+
+/// The correlation of the noise of pixels that are next to each other in a row, less that of
+/// pixels three columns apart, which a structured background has as well: from the mean absolute
+/// differences, in a sample of rows. `sigma` is the noise.
+fn correlation_of_neighbours(view: &View<'_>, sigma: f32) -> f64 {
+    const SAMPLED_ROWS: usize = 32;
+    const FAR_PX: usize = 3;
+    /// Larger differences are those of stars and edges.
+    const LARGEST_SIGMAS: f32 = 4.0;
+    let largest = LARGEST_SIGMAS * sigma;
+    let (mut near, mut far) = (0.0, 0.0);
+    for y in (0..view.height).step_by((view.height / SAMPLED_ROWS).max(1)) {
+        for pixels in view.row(y).windows(FAR_PX + 1) {
+            let to_next = (pixels[1] - pixels[0]).abs();
+            let to_far = (pixels[FAR_PX] - pixels[0]).abs();
+            if to_next < largest && to_far < largest {
+                near += f64::from(to_next);
+                far += f64::from(to_far);
+            }
+        }
+    }
+    if far > 0.0 {
+        1.0 - (near / far).powi(2)
+    } else {
+        0.0
     }
 }

@@ -8,12 +8,15 @@
 //!    are measured where no star is (`star_free`); what they make of the tail of the filtered noise
 //!    is in `saddlepoint`.
 //! 3. Where much of the noise is cut off, each cell gets a threshold of its own (`cut_off_noise`).
-//! 4. `frame_threshold` decides which of these holds for a frame.
+//! 4. Coarse noise that is correlated, as in JPEGs, has the tail that the negative of the frame shows
+//!    (`negative`).
+//! 5. `frame_threshold` decides which of these holds for a frame.
 
 mod cut_off_noise;
 mod false_alarms;
 mod filter_weights;
 mod frame_threshold;
+mod negative;
 mod photons;
 mod pixel_noise;
 mod saddlepoint;
@@ -21,6 +24,7 @@ mod star_free;
 
 pub(crate) use cut_off_noise::raise_filtered_noise;
 pub(crate) use filter_weights::FilterWeights;
-pub(crate) use frame_threshold::{FrameNoise, gaussian_threshold};
+pub(crate) use frame_threshold::{Correlation, FrameNoise, gaussian_threshold};
+pub(crate) use negative::Extrema;
 pub(crate) use photons::threshold_for_photons;
 pub(crate) use star_free::NoiseBuffers;

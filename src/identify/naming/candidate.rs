@@ -28,8 +28,8 @@ pub struct Candidate {
     pub sigma_px: f64,
     /// The largest distance of a candidate of this observed star, in pixels.
     pub gate_px: f64,
-    /// Whether its light is that of a brighter star, in whose blend it is.
-    pub is_absorbed: bool,
+    /// Probability that a star among such neighbours is measured by this light.
+    pub share: f64,
     /// Density of the distance of a true pair, per square pixel.
     pub position_density: f64,
     /// Odds that it is a true pair.
@@ -56,7 +56,7 @@ impl Candidate {
             distance_px: near.distance_px,
             sigma_px,
             gate_px,
-            is_absorbed: false,
+            share: 1.0,
             position_density: 0.0,
             odds: 0.0,
             p_chance: 1.0,

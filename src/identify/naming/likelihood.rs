@@ -31,14 +31,14 @@ const MEASURING_CHANCE: f64 = 0.5;
 /// Pseudo-stars with the first scatter.
 const PRIOR_STARS: f64 = 4.0;
 
-/// Density of the distance between the stars of a true pair, per square pixel.
-pub fn position_density(candidate: &Candidate, is_saturated: bool) -> f64 {
+/// Density of the distance between the stars of a true pair, per square pixel, at `distance_px`.
+pub fn position_density(candidate: &Candidate, distance_px: f64, is_saturated: bool) -> f64 {
     let far_share = if is_saturated {
         FAR_SHARE_SATURATED
     } else {
         FAR_SHARE
     };
-    let distance_sq = candidate.distance_px.powi(2);
+    let distance_sq = distance_px.powi(2);
     let sigma_sq = candidate.sigma_px.powi(2);
     let density = |share: f64, variance: f64| {
         share * (-distance_sq / (2.0 * variance)).exp() / (2.0 * PI * variance)

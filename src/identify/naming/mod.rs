@@ -28,13 +28,14 @@ mod likelihood;
 mod unrelated;
 
 pub use candidate::Candidate;
+pub use likelihood::position_density;
 
 use super::field::{ObservedStar, Photometry, StarField};
 use super::hypothesis::Hypothesis;
 use super::pairing::Pairing;
 use super::predict::PredictedStar;
 use completeness::Completeness;
-use likelihood::{MagnitudeRelation, position_density};
+use likelihood::MagnitudeRelation;
 use std::f64::consts::PI;
 use unrelated::Unrelated;
 
@@ -116,7 +117,8 @@ impl Naming {
     pub fn compute(&mut self, stars: Stars, is_first: bool) {
         for candidate in &mut self.candidates {
             let star = &stars.field.stars[candidate.observed];
-            candidate.position_density = position_density(candidate, star.is_saturated);
+            let density = position_density(candidate, candidate.distance_px, star.is_saturated);
+            candidate.position_density = candidate.share * density;
         }
         let rounds = if is_first {
             FIRST_ROUNDS
@@ -146,10 +148,8 @@ impl Naming {
             let star = &field.stars[i];
             let like = candidate.position_density * self.magnitudes.density(star, candidate.v_mag);
             candidate.odds = self.completeness.odds(j) * like / self.unrelated.density(i);
-            if !candidate.is_absorbed {
-                self.odds_of_observed[i] += candidate.odds;
-                self.odds_of_predicted[j] += candidate.odds;
-            }
+            self.odds_of_observed[i] += candidate.odds;
+            self.odds_of_predicted[j] += candidate.odds;
         }
         clear(&mut self.has_name, field.stars.len());
         clear(&mut self.is_observed, predicted.len());
@@ -158,11 +158,7 @@ impl Naming {
             let all = self.odds_of_observed[i] + self.odds_of_predicted[j];
             // The candidate's own odds are in both sums.
             let others = (all - 2.0 * candidate.odds).max(0.0);
-            candidate.p_chance = if candidate.is_absorbed {
-                1.0
-            } else {
-                (1.0 + others) / (1.0 + others + candidate.odds)
-            };
+            candidate.p_chance = (1.0 + others) / (1.0 + others + candidate.odds);
             self.has_name[i] += 1.0 - candidate.p_chance;
             self.is_observed[j] += 1.0 - candidate.p_chance;
         }

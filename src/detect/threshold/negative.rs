@@ -1,0 +1,196 @@
+//! The threshold for coarse noise that is correlated, as JPEG leaves it: most of the noise below
+//! the steps of the compression is gone, and what is left stands out in patterns that look like
+//! stars.
+//!
+//! The tail of such noise is measured on the negative of the filtered frame, where no star is. The
+//! positive side has the same tail on another scale: the ratio of the heights where either side has
+//! a thousand extrema in a million pixels. Stars among these are left out, as many as the positive
+//! side has above the threshold, on the assumption that their number falls as one over their flux.
+//!
+//! Foliage and roofs have tails of their own: the frame is divided into parts, and the median of
+//! the parts' thresholds holds.
+
+use crate::detect::background::Mesh;
+
+/// Parts of a frame have at least this many pixels, so that the tail is measured on some ten
+/// extrema.
+const MIN_PART_PX: usize = 200_000;
+/// Most parts across and down.
+const MAX_PARTS: usize = 4;
+/// Extrema in a million pixels where the scale of the two sides is compared: so many that stars are
+/// few among them.
+const SCALE_PER_MPX: f64 = 1000.0;
+/// Extrema in a million pixels from which the tail is extrapolated, together with those above.
+const TAIL_PER_MPX: f64 = 50.0;
+/// A threshold is raised by the negative from this much on, in standard deviations: about twice the
+/// error of a threshold that is measured on one part.
+const LEAST_RAISE: f64 = 0.3;
+/// Extrema that are lower than this, in standard deviations, are not kept.
+const LEAST_HEIGHT: f32 = 0.25;
+
+/// Local extrema of a filtered frame, by part of the frame.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Extrema {
+    size: (usize, usize),
+    parts: (usize, usize),
+    heights: Vec<Sides>,
+}
+
+/// The heights of the extrema of a part, in standard deviations.
+#[derive(Debug, Clone, Default)]
+struct Sides {
+    /// Pixels that were searched.
+    pixels: usize,
+    /// Of maxima.
+    positive: Vec<f32>,
+    /// Of minima, with the sign turned.
+    negative: Vec<f32>,
+}
+
+impl Extrema {
+    /// Clears what was measured, for a frame of this size.
+    pub fn prepare(&mut self, (width, height): (usize, usize)) {
+        let most = ((width * height / MIN_PART_PX) as f64).sqrt() as usize;
+        let parts = most.clamp(1, MAX_PARTS);
+        self.size = (width, height);
+        self.parts = (parts, parts);
+        self.heights.resize_with(parts * parts, Sides::default);
+        for sides in &mut self.heights {
+            sides.pixels = 0;
+            sides.positive.clear();
+            sides.negative.clear();
+        }
+    }
+
+    /// Adds the extrema of row `y` of the filtered frame, given with the rows above and below; mean
+    /// and noise of the filtered frame are in `mesh`.
+    pub fn add_row(&mut self, rows: [&[f32]; 3], y: usize, mesh: &Mesh) {
+        let (width, height) = self.size;
+        let first_part = y * self.parts.1 / height * self.parts.0;
+        for sides in &mut self.heights[first_part..first_part + self.parts.0] {
+            sides.pixels += width / self.parts.0;
+        }
+        for x in 1..width.saturating_sub(1) {
+            let here = rows[1][x];
+            let (left, right) = (rows[1][x - 1], rows[1][x + 1]);
+            let is_above = here > left && here >= right;
+            if !is_above && !(here < left && here <= right) {
+                continue;
+            }
+            let others = [rows[0], rows[2]].map(|row| &row[x - 1..=x + 1]);
+            let mut others = others.into_iter().flatten();
+            let is_extremum = if is_above {
+                others.all(|other| here > *other)
+            } else {
+                others.all(|other| here < *other)
+            };
+            if !is_extremum {
+                continue;
+            }
+            let (mean, sigma) = mesh.at(x as f32, y as f32);
+            let value = (here - mean) / sigma;
+            let sides = &mut self.heights[first_part + x * self.parts.0 / width];
+            match (is_above, value) {
+                (true, v) if v > LEAST_HEIGHT => sides.positive.push(v),
+                (false, v) if v < -LEAST_HEIGHT => sides.negative.push(-v),
+                _ => (),
+            }
+        }
+    }
+
+    /// The threshold `u` raised to where noise has `per_mpx` maxima in a million pixels, at most to
+    /// `most`, in standard deviations.
+    pub fn raised(&mut self, u: f64, per_mpx: f64, most: f64) -> f64 {
+        let thresholds = self.heights.iter_mut();
+        let mut found: Vec<f64> = thresholds
+            .filter_map(|sides| sides.threshold(per_mpx))
+            .collect();
+        found.sort_unstable_by(f64::total_cmp);
+        let error = LEAST_RAISE / (self.heights.len() as f64).sqrt();
+        match found.get(found.len() / 2) {
+            Some(&middle) if middle > u + error => middle.min(most).max(u),
+            _ => u,
+        }
+    }
+}
+
+impl Sides {
+    /// The threshold above which noise has `per_mpx` maxima in a million pixels, in standard
+    /// deviations; `None` where there are too few extrema to tell.
+    fn threshold(&mut self, per_mpx: f64) -> Option<f64> {
+        let megapixels = self.pixels as f64 / 1e6;
+        for heights in [&mut self.positive, &mut self.negative] {
+            heights.sort_unstable_by(|a, b| b.total_cmp(a));
+        }
+        let negative_at = |per_mpx: f64| {
+            let height = self.negative.get((per_mpx * megapixels) as usize)?;
+            Some(f64::from(*height))
+        };
+        let (near, far) = (negative_at(SCALE_PER_MPX)?, negative_at(TAIL_PER_MPX)?);
+        // As a Gaussian has it: the logarithm of the number is linear in the square of the height.
+        let slope = (far.powi(2) - near.powi(2)) / (SCALE_PER_MPX / TAIL_PER_MPX).ln();
+        let square = far.powi(2) + slope * (TAIL_PER_MPX / per_mpx).ln();
+        let tail = square.max(0.0).sqrt() / near;
+        let count = SCALE_PER_MPX * megapixels;
+        // Where stars are not few, both sides are taken to be alike.
+        Some(tail * self.positive_scale(count, tail).unwrap_or(near))
+    }
+
+    /// The height at which `count` maxima that are no stars are higher; the threshold is `tail`
+    /// times as high.
+    fn positive_scale(&self, count: f64, tail: f64) -> Option<f64> {
+        const ROUNDS: usize = 5;
+        let mut scale = f64::from(*self.positive.get(count as usize)?);
+        for _ in 0..ROUNDS {
+            let threshold = tail * scale;
+            let stars = self.positive.partition_point(|&h| f64::from(h) > threshold) as f64;
+            let is_enough = |(index, &height): (usize, &f32)| {
+                index as f64 - stars * threshold / f64::from(height) >= count
+            };
+            let at = self.positive.iter().enumerate().position(is_enough)?;
+            scale = f64::from(self.positive[at]);
+        }
+        Some(scale)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+
+    /// Extrema of a part of one megapixel, whose negative is Gaussian with standard deviation
+    /// `negative` and whose positive side is so with `positive`, with `stars` above 1.
+    fn sides(negative: f64, positive: f64, stars: usize) -> Sides {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        let mut tail = |scale: f64| {
+            let unit: f64 = random.random_range(1e-9..1.0);
+            (scale * (-2.0 * unit.ln()).sqrt()) as f32
+        };
+        let mut sides = Sides {
+            pixels: 1_000_000,
+            negative: (0..60_000).map(|_| tail(negative)).collect(),
+            positive: (0..60_000).map(|_| tail(positive)).collect(),
+        };
+        let star = |i: usize| stars as f32 / (i as f32 + 0.5);
+        sides.positive.extend((0..stars).map(star));
+        sides
+    }
+
+    #[test]
+    fn the_tail_of_the_negative_holds_on_the_scale_of_the_positive() {
+        let expected = (2.0 * (60_000.0_f64 / 0.1).ln()).sqrt();
+        for (positive, stars) in [(1.0, 0), (1.5, 0), (0.7, 0), (1.5, 800)] {
+            let found = sides(1.0, positive, stars).threshold(0.1).unwrap();
+            let ratio = found / (expected * positive);
+            assert!((ratio - 1.0).abs() < 0.06, "{positive} {stars}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn too_few_extrema_tell_nothing() {
+        let mut few = sides(1.0, 1.0, 0);
+        few.negative.truncate(10);
+        assert_eq!(few.threshold(0.1), None);
+    }
+}
