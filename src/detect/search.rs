@@ -12,7 +12,7 @@ use super::fit::{FitBuffers, FrameMaps};
 use super::pixels::View;
 use super::psf::PIXEL_VARIANCE_PX2;
 use super::star_model::{
-    DEFAULT_SPOT_PX, SpotSize, StarModel, fit_bright_stars, fit_raw_stars, spot_size, star_model,
+    DEFAULT_SPOT_PX, SpotSize, StarModel, fit_bright_stars, spot_size, star_model,
 };
 use super::threshold::{
     Correlation, Extrema, FilterWeights, FrameNoise, NoiseBuffers, gaussian_threshold,
@@ -150,7 +150,7 @@ impl FrameSearch {
         let start_px = config.spot_sigma_px.unwrap_or(DEFAULT_SPOT_PX);
         let matched_gain = Kernel::for_spot(start_px).matched_gain();
         let mut maps = input.maps(None, start_px, matched_gain);
-        let stars = fit_raw_stars(&maps, &raw_peaks.peaks, fits);
+        let stars = fit_bright_stars(&maps, &raw_peaks.peaks, fits);
         let measured = spot_size(&stars);
         if let (None, Some(size)) = (config.spot_sigma_px, measured) {
             maps.spot_px = size.spot_px;

@@ -37,7 +37,7 @@ pub(crate) struct RawPeak {
 
 impl RawPeak {
     /// The spot size from the peak's curvature, in pixels.
-    pub fn size_px(&self, view: &View<'_>) -> f64 {
+    pub fn size_in(&self, view: &View<'_>) -> f64 {
         // A Gaussian of variance σ² + 1/12 falls to exp(−1/2S²) at the next pixel.
         let above = |x: usize, y: usize| f64::from(view.at(x, y) - self.background_adu);
         let (x, y) = (self.x, self.y);

@@ -3,15 +3,13 @@
 //! Bright peaks that are neither saturated nor close to others are fitted. Hot pixels and cosmic
 //! rays are sharper than stars, lamps and comets wider, and none of them need be few.
 
+use super::spot_size::{BrightStars, MAX_STARS, spot_size};
 use crate::detect::candidates::{Peak, RawPeak};
 use crate::detect::fit::{Fit, FitBuffers, FrameMaps, NoiseModel, SpotEstimate};
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
-use arrayvec::ArrayVec;
 
 /// Peaks below this signal-to-noise ratio say little about the size.
 const MIN_SNR: f32 = 12.0;
-/// Most stars that are fitted.
-pub(crate) const MAX_STARS: usize = 30;
 /// Peaks that are tried, the brightest.
 const MAX_PEAKS: usize = 4 * MAX_STARS;
 /// Peaks that may disturb others, the brightest.
@@ -26,67 +24,159 @@ const FAINT_NEIGHBOUR: f32 = 0.1;
 /// is no star.
 pub(crate) const MAX_MODEL_ERROR: f64 = 0.1;
 
-/// Bright stars, each fitted with a free size.
-pub(crate) type BrightStars = ArrayVec<Fit, MAX_STARS>;
+/// A peak of the frame or of the filtered frame.
+pub(crate) trait BrightPeak {
+    /// Column and row.
+    fn place(&self) -> (usize, usize);
+    /// Signal-to-noise ratio.
+    fn snr(&self) -> f32;
+    /// Whether it is saturated.
+    fn is_saturated(&self) -> bool;
+    /// Size of the spot by the peak's curvature, in pixels.
+    fn size_px(&self, maps: &FrameMaps<'_>) -> f64;
+    /// The larger of the sizes that it and its neighbours may have, in pixels.
+    fn largest_px(&self, maps: &FrameMaps<'_>) -> f64;
+    /// Where a fit starts.
+    fn start(&self, maps: &FrameMaps<'_>) -> SpotEstimate;
+}
 
-/// Fits the brightest peaks of the filtered frame.
-pub(crate) fn fit_bright_stars(
+impl BrightPeak for Peak {
+    fn place(&self) -> (usize, usize) {
+        (self.x, self.y)
+    }
+
+    fn snr(&self) -> f32 {
+        self.snr
+    }
+
+    fn is_saturated(&self) -> bool {
+        self.saturated
+    }
+
+    /// A Gaussian of variance S² = σ² + σ_filter² + 2/12 falls to exp(−1/2S²) at the next pixel.
+    fn size_px(&self, maps: &FrameMaps<'_>) -> f64 {
+        let filter_px = maps.spot_px;
+        let Some((value, around)) = self.values else {
+            return filter_px;
+        };
+        let log = |value: f32| f64::from(value.max(1e-3)).ln();
+        let drop = log(value) - 0.25 * around.into_iter().map(log).sum::<f64>();
+        let variance = 0.5 / drop.max(1e-3) - filter_px * filter_px - 2.0 * PIXEL_VARIANCE_PX2;
+        variance.max(0.0).sqrt().clamp(0.35, 6.0)
+    }
+
+    fn largest_px(&self, maps: &FrameMaps<'_>) -> f64 {
+        maps.spot_px
+    }
+
+    fn start(&self, maps: &FrameMaps<'_>) -> SpotEstimate {
+        maps.initial_guess(self)
+    }
+}
+
+impl BrightPeak for RawPeak {
+    fn place(&self) -> (usize, usize) {
+        (self.x, self.y)
+    }
+
+    fn snr(&self) -> f32 {
+        self.snr
+    }
+
+    fn is_saturated(&self) -> bool {
+        self.saturated
+    }
+
+    fn size_px(&self, maps: &FrameMaps<'_>) -> f64 {
+        self.size_in(&maps.view)
+    }
+
+    fn largest_px(&self, maps: &FrameMaps<'_>) -> f64 {
+        self.size_px(maps)
+    }
+
+    fn start(&self, _: &FrameMaps<'_>) -> SpotEstimate {
+        SpotEstimate {
+            x: self.x as f64,
+            y: self.y as f64,
+            flux: self.flux_adu,
+            ..SpotEstimate::default()
+        }
+    }
+}
+
+/// Fits the brightest of `peaks`, brightest first.
+///
+/// Where these crowd in a few places, as windows and lamps do, the brightest of many places are
+/// fitted as well, and the sharper ones of the two are the stars.
+pub(crate) fn fit_bright_stars<P: BrightPeak>(
     maps: &FrameMaps<'_>,
-    peaks: &[Peak],
+    peaks: &[P],
+    buffers: &mut FitBuffers,
+) -> BrightStars {
+    let bright = &peaks[..peaks.partition_point(|peak| peak.snr() >= MIN_SNR)];
+    let brightest = fit_peaks(maps, (bright.iter(), peaks), buffers);
+    let size = (maps.view.width, maps.view.height);
+    let Some(spread) = spread(bright, size) else {
+        return brightest;
+    };
+    let spread = fit_peaks(maps, (spread.into_iter(), peaks), buffers);
+    let is_sharper = match (spot_size(&spread), spot_size(&brightest)) {
+        (Some(a), Some(b)) => a.spot_px < b.spot_px && 2 * a.stars >= b.stars,
+        (of_spread, _) => of_spread.is_some(),
+    };
+    if is_sharper { spread } else { brightest }
+}
+
+/// Fits the first of `bright` that are alone among all `peaks`.
+fn fit_peaks<'a, P: BrightPeak + 'a>(
+    maps: &FrameMaps<'_>,
+    (bright, peaks): (impl Iterator<Item = &'a P>, &[P]),
     buffers: &mut FitBuffers,
 ) -> BrightStars {
     let neighbours = &peaks[..peaks.len().min(MAX_NEIGHBOURS)];
-    let reach_px = ISOLATION_SIGMA * (maps.spot_px + SIZE_MARGIN_PX) as f32;
-    let bright = peaks
-        .iter()
-        .take(MAX_PEAKS)
-        .take_while(|peak| peak.snr >= MIN_SNR);
     bright
-        .filter(|peak| !peak.saturated)
+        .take(MAX_PEAKS)
+        .filter(|peak| !peak.is_saturated())
         .filter(|peak| {
-            let place = |p: &Peak| (p.x, p.y);
-            let mut others = neighbours.iter().filter(|o| is_rival(o.snr, peak.snr));
-            !others.any(|other| is_near(place(peak), place(other), reach_px))
+            let reach_px = ISOLATION_SIGMA * (peak.largest_px(maps) + SIZE_MARGIN_PX) as f32;
+            let mut others = neighbours.iter().filter(|o| is_rival(o.snr(), peak.snr()));
+            !others.any(|other| is_near(peak.place(), other.place(), reach_px))
         })
-        .filter_map(|peak| {
-            let size_px = size_from_curvature(peak, maps.spot_px);
-            fit_star(maps, maps.initial_guess(peak), size_px, buffers)
-        })
+        .filter_map(|peak| fit_star(maps, peak.start(maps), peak.size_px(maps), buffers))
         .take(MAX_STARS)
         .collect()
 }
 
-/// Fits the brightest peaks of the unfiltered frame.
-pub(crate) fn fit_raw_stars(
-    maps: &FrameMaps<'_>,
-    peaks: &[RawPeak],
-    buffers: &mut FitBuffers,
-) -> BrightStars {
-    let neighbours = &peaks[..peaks.len().min(MAX_NEIGHBOURS)];
-    let bright = peaks
-        .iter()
-        .take(MAX_PEAKS)
-        .take_while(|peak| peak.snr >= MIN_SNR);
-    bright
-        .filter(|peak| !peak.saturated)
-        .map(|peak| (peak, peak.size_px(&maps.view)))
-        .filter(|(peak, size_px)| {
-            let reach_px = ISOLATION_SIGMA * (*size_px as f32 + SIZE_MARGIN_PX as f32);
-            let place = |p: &RawPeak| (p.x, p.y);
-            let mut others = neighbours.iter().filter(|o| is_rival(o.snr, peak.snr));
-            !others.any(|other| is_near(place(peak), place(other), reach_px))
-        })
-        .filter_map(|(peak, size_px)| {
-            let start = SpotEstimate {
-                x: peak.x as f64,
-                y: peak.y as f64,
-                flux: peak.flux_adu,
-                ..SpotEstimate::default()
-            };
-            fit_star(maps, start, size_px, buffers)
-        })
-        .take(MAX_STARS)
-        .collect()
+/// The peaks, those first that are the brightest of their place; `None` where the brightest peaks
+/// of the frame are not crowded.
+fn spread<P: BrightPeak>(peaks: &[P], (width, height): (usize, usize)) -> Option<Vec<&P>> {
+    /// Places along each side.
+    const CELLS: usize = 6;
+    /// The brightest stars of a frame are in 20 of the 36 places on average, with a standard
+    /// deviation of 2.
+    const CROWDED_CELLS: usize = 12;
+    let cell_of = |peak: &P| {
+        let (x, y) = peak.place();
+        y * CELLS / height * CELLS + x * CELLS / width
+    };
+    let mut in_cell = [0usize; CELLS * CELLS];
+    for peak in peaks.iter().take(MAX_STARS) {
+        in_cell[cell_of(peak)] += 1;
+    }
+    let occupied = in_cell.iter().filter(|count| **count > 0).count();
+    if peaks.len() <= MAX_STARS || occupied >= CROWDED_CELLS {
+        return None;
+    }
+    in_cell.fill(0);
+    let ranks = peaks.iter().map(|peak| {
+        let count = &mut in_cell[cell_of(peak)];
+        *count += 1;
+        *count
+    });
+    let mut ranked: Vec<(usize, &P)> = ranks.zip(peaks).collect();
+    ranked.sort_by_key(|(rank, _)| *rank);
+    Some(ranked.into_iter().map(|(_, peak)| peak).collect())
 }
 
 /// Whether a peak is bright enough to disturb another.
@@ -127,14 +217,33 @@ fn is_alone(fit: &Fit, buffers: &mut FitBuffers) -> bool {
     !pixels.any(|(above, light)| light < faint && above - light > most)
 }
 
-/// The spot size from the filtered peak's curvature, in pixels: a Gaussian of variance
-/// S² = σ² + σ_filter² + 2/12 falls to exp(−1/2S²) at the next pixel.
-fn size_from_curvature(peak: &Peak, filter_px: f64) -> f64 {
-    let Some((value, around)) = peak.values else {
-        return filter_px;
-    };
-    let log = |value: f32| f64::from(value.max(1e-3)).ln();
-    let drop = log(value) - 0.25 * around.into_iter().map(log).sum::<f64>();
-    let variance = 0.5 / drop.max(1e-3) - filter_px * filter_px - 2.0 * PIXEL_VARIANCE_PX2;
-    variance.max(0.0).sqrt().clamp(0.35, 6.0)
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn peak((x, y): (usize, usize)) -> Peak {
+        Peak {
+            x,
+            y,
+            offset_px: [0.0; 2],
+            values: None,
+            snr: 20.0,
+            prominence: 20.0,
+            region: 0,
+            saturated: false,
+        }
+    }
+
+    #[test]
+    fn lamps_in_one_place_do_not_hide_stars_elsewhere() {
+        let lamps = (0..200).map(|i| (i % 20, 100 + i / 20));
+        let stars = (0..30).map(|i| (300 + 20 * i, 37 * i % 600));
+        let peaks: Vec<_> = lamps.chain(stars).map(peak).collect();
+        let tried = spread(&peaks, (900, 600)).unwrap();
+        let stars = tried.iter().take(MAX_STARS).filter(|peak| peak.x >= 300);
+        assert!(stars.count() > 15);
+        let stars = (0..200).map(|i| (i * 377 % 900, i * 239 % 600));
+        let peaks: Vec<_> = stars.map(peak).collect();
+        assert!(spread(&peaks, (900, 600)).is_none());
+    }
 }

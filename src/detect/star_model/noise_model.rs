@@ -3,7 +3,8 @@
 //! Shot noise per ADU and the relative error of the spot model follow by least squares of the
 //! squared residuals.
 
-use super::bright_stars::{BrightStars, MAX_MODEL_ERROR, MAX_STARS};
+use super::bright_stars::MAX_MODEL_ERROR;
+use super::spot_size::{BrightStars, MAX_STARS};
 use super::spot_size::{MODE_WIDTH, weighted_size};
 use crate::detect::fit::{
     BatchStart, CholeskyFactor, Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, ONE_SPOT,

@@ -1,6 +1,5 @@
 //! The spot size of a frame: the mode of the sizes of its bright stars.
 
-use super::bright_stars::{BrightStars, MAX_STARS};
 use crate::detect::fit::{Fit, SPOT_RANGE_PX};
 use arrayvec::ArrayVec;
 
@@ -8,6 +7,12 @@ use arrayvec::ArrayVec;
 pub(crate) const DEFAULT_SPOT_PX: f64 = 0.9;
 /// Sizes within this factor of the mode are of stars.
 pub(crate) const MODE_WIDTH: f64 = 1.25;
+
+/// Most bright stars that are fitted.
+pub(crate) const MAX_STARS: usize = 30;
+
+/// Bright stars, each fitted with a free size.
+pub(crate) type BrightStars = ArrayVec<Fit, MAX_STARS>;
 
 /// The mode of the sizes of bright stars.
 #[derive(Debug, Clone, Copy, PartialEq)]
