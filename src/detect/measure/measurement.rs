@@ -5,7 +5,7 @@ use super::estimate::{brightest_within, detection_of};
 use super::known_spots::{KnownSpots, PeakSurroundings};
 use super::pairs::{PairFitter, may_be_pair};
 use super::star_shape::StarShape;
-use super::{centroid, shape};
+use super::{centroid, ring, shape};
 use crate::base::coords::PixelPoint;
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::config::CentroidMethod;
@@ -201,6 +201,8 @@ impl Measurement<'_> {
             );
         }
         detection.flags.blended = fit.spots.len() > 1;
+        let may_be_edge = fit.spots.len() == 1 && !peak.saturated;
+        detection.flags.extended |= may_be_edge && ring::is_bright(&self.maps, peak);
         self.flag_trail(peak, region, &mut detection);
         if self.shape.is_elongated() && fit.spots.len() == 1 {
             self.center_elongated(&fit, peak, &mut detection, buffers);

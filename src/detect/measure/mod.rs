@@ -8,6 +8,7 @@ mod measurement;
 mod neighbour_grid;
 mod pairs;
 mod saturated_area;
+mod ring;
 mod shape;
 mod star_shape;
 
