@@ -27,6 +27,9 @@ const REACH_SIGMAS: f64 = 4.5;
 /// The probability that a star is measured by its own light where one spot would take up that of
 /// its neighbours as well: the detector separates some stars that this model does not.
 const SEPARATED_SHARE: f64 = 0.05;
+/// No star is measured by its own light that is closer than this to the light of its blend, in
+/// standard deviations of the spot.
+const SEPARABLE_SIGMAS: f64 = 1.5;
 /// The variance that a pixel's own width adds to a spot, in px².
 const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
 /// Lights closer than this, in standard deviations of the spot, are the same.
@@ -80,6 +83,7 @@ impl Blends {
         self.taken.extend(taken);
         self.taken.sort_unstable();
         let same_px = SAME_LIGHT_SIGMAS * view.variance_px2.sqrt();
+        let separable_px = SEPARABLE_SIGMAS * view.variance_px2.sqrt();
         let mut blends = std::mem::take(&mut self.blends);
         for of_observed in candidates.chunk_by_mut(|a, b| a.observed == b.observed) {
             blends.clear();
@@ -87,17 +91,20 @@ impl Blends {
             blends.extend(stars.map(|star| self.light_around(&view, star)));
             let star = &problem.field.stars[of_observed[0].observed];
             for index in 0..of_observed.len() {
-                let Some(blend) = blends[index] else {
-                    continue;
-                };
                 let is_absorbed = is_absorbed((of_observed, &blends), index, same_px);
                 let candidate = &mut of_observed[index];
+                let Some(blend) = blends[index] else {
+                    candidate.share = if is_absorbed { 0.0 } else { 1.0 };
+                    continue;
+                };
                 let distance_px = blend.pixel.distance_to(&star.position);
                 let density =
                     |distance_px| position_density(candidate, distance_px, star.is_saturated);
                 let separated = SEPARATED_SHARE * density(candidate.distance_px);
                 if is_absorbed || separated > density(distance_px) {
-                    candidate.share = SEPARATED_SHARE;
+                    let is_separable =
+                        !is_absorbed || candidate.light.distance_to(&blend.pixel) > separable_px;
+                    candidate.share = if is_separable { SEPARATED_SHARE } else { 0.0 };
                 } else {
                     candidate.distance_px = distance_px;
                     candidate.light = blend.pixel;
@@ -142,17 +149,15 @@ impl Blends {
     }
 }
 
-/// Whether the blend of a candidate is the light of a brighter star, alone or in its own blend.
+/// Whether the light of a candidate is that of a brighter star, alone or in its own blend.
 /// Until it is redirected, `light` of a candidate is its own.
 fn is_absorbed(
     (candidates, blends): (&[Candidate], &[Option<Light>]),
     index: usize,
     same_px: f64,
 ) -> bool {
-    let Some(blend) = blends[index] else {
-        return false;
-    };
-    let is_at = |place: &PixelPoint| place.distance_to(&blend.pixel) < same_px;
+    let light = blends[index].map_or(candidates[index].light, |blend| blend.pixel);
+    let is_at = |place: &PixelPoint| place.distance_to(&light) < same_px;
     let others = candidates.iter().zip(blends);
     // Stars are numbered by brightness.
     let mut brighter = others.filter(|(other, _)| other.star < candidates[index].star);

@@ -7,8 +7,8 @@ mod known_spots;
 mod measurement;
 mod neighbour_grid;
 mod pairs;
-mod saturated_area;
 mod ring;
+mod saturated_area;
 mod shape;
 mod star_shape;
 

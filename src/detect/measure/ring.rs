@@ -12,6 +12,8 @@ const RADIUS_SIGMAS: f64 = 3.5;
 const MIN_RADIUS_PX: f64 = 3.0;
 /// Part of the height of the source from which on a pixel is as bright.
 const BRIGHT: f32 = 0.7;
+/// Pixels below this height are noise, in standard deviations.
+const NOISE_SIGMAS: f32 = 2.5;
 /// Pixels of the ring that are as bright at an edge: a corner of a right angle has 4, a line and two
 /// neighbours of the same brightness at most 3.
 const BRIGHT_PIXELS: usize = 5;
@@ -19,8 +21,9 @@ const BRIGHT_PIXELS: usize = 5;
 /// Whether a large part of the ring is as bright as the source.
 pub(super) fn is_bright(maps: &FrameMaps<'_>, peak: &Peak) -> bool {
     let view = &maps.view;
-    let background = maps.background.at(peak.x as f32, peak.y as f32).0;
-    let bright = background + BRIGHT * (view.at(peak.x, peak.y) - background);
+    let (background, sigma) = maps.background.at(peak.x as f32, peak.y as f32);
+    let height = view.at(peak.x, peak.y) - background;
+    let bright = background + (BRIGHT * height).max(NOISE_SIGMAS * sigma);
     let radius_px = (RADIUS_SIGMAS * maps.width_px()).max(MIN_RADIUS_PX);
     let is_bright = |index: &usize| {
         let angle = std::f64::consts::TAU * *index as f64 / PIXELS as f64;
