@@ -414,6 +414,44 @@ fn hot_pixels_are_flagged_and_stars_are_not() {
 }
 
 #[test]
+fn a_lit_wall_has_no_stars_and_its_windows_do_not_hide_the_sky() {
+    let mut sky = Sky::flat(640, 480, BACKGROUND_E);
+    for y in 0..160 {
+        for x in 0..640 {
+            let is_window = x % 20 < 11 && y % 16 < 9;
+            sky.mean[y * 640 + x] = if is_window { 4000.0 } else { 400.0 };
+        }
+    }
+    let stars: Vec<(f64, f64)> = (0..40)
+        .map(|i| {
+            (
+                20.3 + 61.0 * f64::from(i % 10),
+                200.4 + 66.0 * f64::from(i / 10),
+            )
+        })
+        .collect();
+    for &(x, y) in &stars {
+        sky.add_star(x, y, 3000.0, 1.0);
+    }
+    let found = found_in(&sky.expose(5), &DetectConfig::default());
+    assert!(
+        (found.spot_sigma_px - 1.0).abs() < 0.05,
+        "{}",
+        found.spot_sigma_px
+    );
+    let (of_sky, of_wall): (Vec<&Detection>, Vec<&Detection>) =
+        found.sources.iter().partition(|s| s.position.y > 165.0);
+    assert_eq!(of_sky.len(), stars.len());
+    assert!(of_sky.iter().all(|s| s.flags.is_star_like()));
+    let stars_of_wall = of_wall.iter().filter(|s| s.flags.is_star_like()).count();
+    assert!(
+        stars_of_wall * 10 < of_wall.len(),
+        "{stars_of_wall} of {}",
+        of_wall.len()
+    );
+}
+
+#[test]
 fn a_trail_is_one_flagged_source_and_a_nebula_is_extended() {
     let (mut sky, _) = star_field(6);
     for i in 0..240 {

@@ -4,8 +4,16 @@
 use crate::detect::candidates::Peak;
 use crate::detect::fit::FrameMaps;
 
-/// Pixels of the ring.
-const PIXELS: usize = 16;
+/// Directions of the pixels of the ring in one quadrant, as cosine and sine: each 22.5 degrees.
+const QUADRANT: [[f64; 2]; 4] = [
+    [1.0, 0.0],
+    [0.923_879_532_511_286_7, 0.382_683_432_365_089_8],
+    [
+        std::f64::consts::FRAC_1_SQRT_2,
+        std::f64::consts::FRAC_1_SQRT_2,
+    ],
+    [0.382_683_432_365_089_8, 0.923_879_532_511_286_7],
+];
 /// Radius of the ring, in standard deviations of the spot: a star has 0.2 % of its peak there.
 const RADIUS_SIGMAS: f64 = 3.5;
 /// Smallest radius, in pixels.
@@ -14,7 +22,7 @@ const MIN_RADIUS_PX: f64 = 3.0;
 const BRIGHT: f32 = 0.7;
 /// Pixels below this height are noise, in standard deviations.
 const NOISE_SIGMAS: f32 = 2.5;
-/// Pixels of the ring that are as bright at an edge: a corner of a right angle has 4, a line and two
+/// Of the 16 pixels of the ring those that are as bright at an edge: a corner of a right angle has 4, a line and two
 /// neighbours of the same brightness at most 3.
 const BRIGHT_PIXELS: usize = 5;
 
@@ -25,13 +33,16 @@ pub(super) fn is_bright(maps: &FrameMaps<'_>, peak: &Peak) -> bool {
     let height = view.at(peak.x, peak.y) - background;
     let bright = background + (BRIGHT * height).max(NOISE_SIGMAS * sigma);
     let radius_px = (RADIUS_SIGMAS * maps.width_px()).max(MIN_RADIUS_PX);
-    let is_bright = |index: &usize| {
-        let angle = std::f64::consts::TAU * *index as f64 / PIXELS as f64;
-        let (sin, cos) = libm::sincos(angle);
-        let x = (peak.x as f64 + radius_px * cos).round();
-        let y = (peak.y as f64 + radius_px * sin).round();
+    let (x, y) = (peak.x as f64, peak.y as f64);
+    let is_bright = |[along, up]: &[f64; 2]| {
+        let (x, y) = (
+            (x + radius_px * along).round(),
+            (y + radius_px * up).round(),
+        );
         let is_inside = x >= 0.0 && y >= 0.0 && x < view.width as f64 && y < view.height as f64;
         is_inside && view.at(x as usize, y as usize) >= bright
     };
-    (0..PIXELS).filter(is_bright).count() >= BRIGHT_PIXELS
+    let quadrants = |&[c, s]: &[f64; 2]| [[c, s], [-s, c], [-c, -s], [s, -c]];
+    let directions = QUADRANT.iter().flat_map(quadrants);
+    directions.filter(is_bright).count() >= BRIGHT_PIXELS
 }

@@ -35,6 +35,7 @@ pub struct Completeness {
     /// Stars that are observed, and that are expected to be, in the cells of one scale.
     observed: Vec<f64>,
     expected: Vec<f64>,
+    scratch: Vec<f64>,
 }
 
 impl Completeness {
@@ -49,15 +50,23 @@ impl Completeness {
         self.odds[predicted]
     }
 
-    /// Measures it by the probability of each star of `predicted`, brightest first, that it is
-    /// observed.
-    pub fn measure(&mut self, field: &StarField, predicted: &[PredictedStar], is_observed: &[f64]) {
-        self.measure_shares(is_observed);
+    /// Measures how visible stars are at the place of each one of `predicted`, by the probability of
+    /// each that it is observed. The share by brightness must have been measured.
+    pub fn measure_visibility(
+        &mut self,
+        field: &StarField,
+        predicted: &[PredictedStar],
+        is_observed: &[f64],
+    ) {
         self.visibility.clear();
         self.visibility.resize(predicted.len(), 1.0);
         for cells in CELLS {
             self.add_scale(&Grid::new(field, cells), predicted, is_observed);
         }
+    }
+
+    /// Sets the odds from share and visibility.
+    pub fn set_odds(&mut self) {
         let share = self.shares.iter().zip(&self.visibility);
         self.odds.clear();
         self.odds.extend(share.map(|(share, visibility)| {
@@ -66,13 +75,13 @@ impl Completeness {
         }));
     }
 
-    /// The share by brightness.
-    fn measure_shares(&mut self, is_observed: &[f64]) {
+    /// Measures the share by brightness, by the probability of each star that it is observed.
+    pub fn measure_shares(&mut self, is_observed: &[f64]) {
         self.steps.clear();
         for &observed in is_observed {
             let mut step = (1, observed.min(1.0));
             while let Some(&(stars, observed)) = self.steps.last() {
-                if observed / stars as f64 > step.1 / step.0 as f64 {
+                if observed * step.0 as f64 > step.1 * stars as f64 {
                     break;
                 }
                 step = (step.0 + stars, step.1 + observed);
@@ -99,11 +108,14 @@ impl Completeness {
             self.observed[cell] += observed.min(1.0);
             self.expected[cell] += share;
         }
+        for cells in [&mut self.observed, &mut self.expected] {
+            grid.sum_with_neighbours(cells, &mut self.scratch);
+        }
         for ((star, (observed, share)), visibility) in stars().zip(&mut self.visibility) {
-            let around = |values| grid.around(star.pixel.x, star.pixel.y, values).0;
+            let cell = grid.cell_of(star.pixel.x, star.pixel.y);
             // Without the star itself: it must not vouch for its own name.
-            let observed = (around(&self.observed) - observed.min(1.0)).max(0.0);
-            let expected = (around(&self.expected) - share).max(0.0);
+            let observed = (self.observed[cell] - observed.min(1.0)).max(0.0);
+            let expected = (self.expected[cell] - share).max(0.0);
             *visibility = (observed + PRIOR_AROUND * *visibility) / (expected + PRIOR_AROUND);
         }
     }
@@ -171,7 +183,9 @@ mod tests {
             .map(|s| f64::from(u8::from(!is_behind(s))))
             .collect();
         let mut found = Completeness::default();
-        found.measure(&field(), &stars, &observed);
+        found.measure_shares(&observed);
+        found.measure_visibility(&field(), &stars, &observed);
+        found.set_odds();
         for (index, star) in stars.iter().enumerate() {
             let odds = found.odds(index);
             if star.pixel.x > 900.0 {

@@ -40,7 +40,7 @@ use std::f64::consts::PI;
 use unrelated::Unrelated;
 
 /// Rounds of expectation maximisation in the first fit, and after that, when little changes.
-const FIRST_ROUNDS: usize = 6;
+const FIRST_ROUNDS: usize = 5;
 const FURTHER_ROUNDS: usize = 2;
 /// Candidates lie within this many standard errors, …
 const GATE_SIGMAS: f64 = 10.0;
@@ -126,13 +126,14 @@ impl Naming {
             FURTHER_ROUNDS
         };
         for round in 0..rounds {
-            // It changes little from round to round.
-            if round == 0 || round + 1 == rounds {
+            // What depends on place changes little from round to round.
+            let is_by_place = round == 0 || (is_first && round + 1 == rounds);
+            if is_by_place {
                 let (field, has_name) = (stars.field, &self.has_name);
                 self.unrelated.measure_crowding(field, has_name);
             }
             self.expect(stars);
-            self.maximise(stars);
+            self.maximise(stars, is_by_place);
         }
         self.expect(stars);
     }
@@ -165,10 +166,14 @@ impl Naming {
     }
 
     /// What the frame shows, from the probabilities.
-    fn maximise(&mut self, stars: Stars) {
+    fn maximise(&mut self, stars: Stars, is_by_place: bool) {
         let Stars { field, predicted } = stars;
-        self.completeness
-            .measure(field, predicted, &self.is_observed);
+        self.completeness.measure_shares(&self.is_observed);
+        if is_by_place {
+            self.completeness
+                .measure_visibility(field, predicted, &self.is_observed);
+        }
+        self.completeness.set_odds();
         if stars.field.photometry == Photometry::Instrumental {
             self.magnitudes
                 .fit_zero_point(stars.field, &self.candidates);
