@@ -38,11 +38,18 @@ pub(super) fn label(catalog: &Catalog, star: StarIndex) -> String {
     let name = match (catalog.proper_name(star), catalog.name_of(star)) {
         (Some(name), _) => name.to_owned(),
         (None, Some(name)) => short(name),
-        (None, None) => catalog.designation(star),
+        (None, None) => number(&catalog.designation(star)).to_owned(),
     };
     let v_mag = format!("{:.1}", catalog.star(star).v_mag);
     let v_mag = if v_mag == "-0.0" { "0.0" } else { &v_mag };
     format!("{name} {}", v_mag.replace('-', "−"))
+}
+
+/// A designation without its catalogue, which would be the same for all stars of the picture.
+fn number(designation: &str) -> &str {
+    designation
+        .split_once(' ')
+        .map_or(designation, |(_, number)| number)
 }
 
 /// The Bayer letter in Greek, or the Flamsteed number, with the constellation: `9 alp CMa` is `α
