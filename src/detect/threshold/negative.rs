@@ -74,7 +74,8 @@ impl Extrema {
             let here = rows[1][x];
             let (left, right) = (rows[1][x - 1], rows[1][x + 1]);
             let is_above = here > left && here >= right;
-            if !is_above && !(here < left && here <= right) {
+            let is_below = here < left && here <= right;
+            if !is_above && !is_below {
                 continue;
             }
             let others = [rows[0], rows[2]].map(|row| &row[x - 1..=x + 1]);
