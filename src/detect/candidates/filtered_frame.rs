@@ -15,8 +15,7 @@ const SIGMA_FLOOR: f32 = 0.5;
 /// Candidates are gathered from this part of the threshold of their own row of cells on: the final
 /// threshold, from the smoothed mesh, is hardly lower.
 const CANDIDATE_MARGIN: f32 = 0.85;
-
-/// Pixels that are sampled of large frames, at least.
+/// Of larger frames, at least this many pixels are sampled.
 const SAMPLED_PX: usize = 2_000_000;
 
 /// What is kept of a filtered frame.

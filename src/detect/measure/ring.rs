@@ -22,8 +22,8 @@ const MIN_RADIUS_PX: f64 = 3.0;
 const BRIGHT: f32 = 0.7;
 /// Pixels below this height are noise, in standard deviations.
 const NOISE_SIGMAS: f32 = 2.5;
-/// Of the 16 pixels of the ring those that are as bright at an edge: a corner of a right angle has 4, a line and two
-/// neighbours of the same brightness at most 3.
+/// At an edge at least this many of the 16 pixels of the ring are as bright: a corner of a right
+/// angle has 4, a line and two neighbours of the same brightness at most 3.
 const BRIGHT_PIXELS: usize = 5;
 
 /// Whether a large part of the ring is as bright as the source.

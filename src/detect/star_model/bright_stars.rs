@@ -34,8 +34,8 @@ pub(crate) trait BrightPeak {
     fn is_saturated(&self) -> bool;
     /// Size of the spot by the peak's curvature, in pixels.
     fn size_px(&self, maps: &FrameMaps<'_>) -> f64;
-    /// The larger of the sizes that it and its neighbours may have, in pixels.
-    fn largest_px(&self, maps: &FrameMaps<'_>) -> f64;
+    /// The spot size that decides which neighbours disturb it, given its own, in pixels.
+    fn isolation_px(&self, maps: &FrameMaps<'_>, size_px: f64) -> f64;
     /// Where a fit starts.
     fn start(&self, maps: &FrameMaps<'_>) -> SpotEstimate;
 }
@@ -65,7 +65,7 @@ impl BrightPeak for Peak {
         variance.max(0.0).sqrt().clamp(0.35, 6.0)
     }
 
-    fn largest_px(&self, maps: &FrameMaps<'_>) -> f64 {
+    fn isolation_px(&self, maps: &FrameMaps<'_>, _: f64) -> f64 {
         maps.spot_px
     }
 
@@ -91,8 +91,8 @@ impl BrightPeak for RawPeak {
         self.size_in(&maps.view)
     }
 
-    fn largest_px(&self, maps: &FrameMaps<'_>) -> f64 {
-        self.size_px(maps)
+    fn isolation_px(&self, _: &FrameMaps<'_>, size_px: f64) -> f64 {
+        size_px
     }
 
     fn start(&self, _: &FrameMaps<'_>) -> SpotEstimate {
@@ -138,12 +138,14 @@ fn fit_peaks<'a, P: BrightPeak + 'a>(
     bright
         .take(MAX_PEAKS)
         .filter(|peak| !peak.is_saturated())
-        .filter(|peak| {
-            let reach_px = ISOLATION_SIGMA * (peak.largest_px(maps) + SIZE_MARGIN_PX) as f32;
+        .map(|peak| (peak, peak.size_px(maps)))
+        .filter(|(peak, size_px)| {
+            let isolation_px = peak.isolation_px(maps, *size_px) as f32;
+            let reach_px = ISOLATION_SIGMA * (isolation_px + SIZE_MARGIN_PX as f32);
             let mut others = neighbours.iter().filter(|o| is_rival(o.snr(), peak.snr()));
             !others.any(|other| is_near(peak.place(), other.place(), reach_px))
         })
-        .filter_map(|peak| fit_star(maps, peak.start(maps), peak.size_px(maps), buffers))
+        .filter_map(|(peak, size_px)| fit_star(maps, peak.start(maps), size_px, buffers))
         .take(MAX_STARS)
         .collect()
 }

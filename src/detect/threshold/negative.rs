@@ -32,7 +32,8 @@ const LEAST_HEIGHT: f32 = 0.25;
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Extrema {
     size: (usize, usize),
-    parts: (usize, usize),
+    /// Parts across, and down.
+    parts: usize,
     heights: Vec<Sides>,
 }
 
@@ -53,7 +54,7 @@ impl Extrema {
         let most = ((width * height / MIN_PART_PX) as f64).sqrt() as usize;
         let parts = most.clamp(1, MAX_PARTS);
         self.size = (width, height);
-        self.parts = (parts, parts);
+        self.parts = parts;
         self.heights.resize_with(parts * parts, Sides::default);
         for sides in &mut self.heights {
             sides.pixels = 0;
@@ -66,9 +67,9 @@ impl Extrema {
     /// and noise of the filtered frame are in `mesh`.
     pub fn add_row(&mut self, rows: [&[f32]; 3], y: usize, mesh: &Mesh) {
         let (width, height) = self.size;
-        let first_part = y * self.parts.1 / height * self.parts.0;
-        for sides in &mut self.heights[first_part..first_part + self.parts.0] {
-            sides.pixels += width / self.parts.0;
+        let first_part = y * self.parts / height * self.parts;
+        for sides in &mut self.heights[first_part..first_part + self.parts] {
+            sides.pixels += width / self.parts;
         }
         for x in 1..width.saturating_sub(1) {
             let here = rows[1][x];
@@ -89,12 +90,15 @@ impl Extrema {
                 continue;
             }
             let (mean, sigma) = mesh.at(x as f32, y as f32);
-            let value = (here - mean) / sigma;
-            let sides = &mut self.heights[first_part + x * self.parts.0 / width];
-            match (is_above, value) {
-                (true, v) if v > LEAST_HEIGHT => sides.positive.push(v),
-                (false, v) if v < -LEAST_HEIGHT => sides.negative.push(-v),
-                _ => (),
+            let above = (here - mean) / sigma;
+            let sides = &mut self.heights[first_part + x * self.parts / width];
+            let (height, heights) = if is_above {
+                (above, &mut sides.positive)
+            } else {
+                (-above, &mut sides.negative)
+            };
+            if height > LEAST_HEIGHT {
+                heights.push(height);
             }
         }
     }
