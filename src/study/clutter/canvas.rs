@@ -207,7 +207,7 @@ mod tests {
         let area = |draw: fn(&mut Canvas, &PixelPoint)| {
             let mut canvas = Canvas::new(100, 80);
             draw(&mut canvas, &middle);
-            assert!(canvas.share_seen(&PixelPoint::new(51.0, 41.0), 0.2) < 0.5);
+            assert!(canvas.share_seen(&PixelPoint::new(51.0, 41.0), 0.2) < 0.1);
             canvas.covered() * 8000.0
         };
         let disc = area(|canvas, at| canvas.ellipse(at, [20.0, 20.0], 0.4, 1.0));
