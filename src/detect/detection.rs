@@ -70,4 +70,18 @@ pub struct Detections {
     pub noise_adu: f64,
     /// Standard deviation of the Gaussian spot before pixel integration, in pixels.
     pub spot_sigma_px: f64,
+    /// Why the rate of false detections asked for is held less well than in independent noise.
+    pub noise_tail: Option<NoiseTail>,
+}
+
+/// What makes large values of the filtered noise more frequent than in independent noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoiseTail {
+    /// The noise of neighbouring pixels is correlated, as compression and denoising leave it.
+    Correlated,
+    /// The noise is below the steps of the grey levels, and has more large values than that
+    /// explains.
+    Coarse,
+    /// The black level cuts off the lower part of the noise.
+    CutOff,
 }

@@ -48,7 +48,7 @@ mod workspace;
 
 pub use background_map::BackgroundMap;
 pub use config::{CentroidMethod, DetectConfig};
-pub use detection::{Detection, DetectionFlags, Detections};
+pub use detection::{Detection, DetectionFlags, Detections, NoiseTail};
 pub use error::DetectError;
 pub use filter_model::FilterModel;
 pub use workspace::Workspace;
@@ -145,6 +145,7 @@ pub fn detect_into(
     found.background_adu = background.median_adu;
     found.noise_adu = background.median_sigma_adu;
     found.spot_sigma_px = stars.spot_px;
+    found.noise_tail = pass.noise_tail;
     Ok(())
 }
 
@@ -154,4 +155,5 @@ fn describe_darkness(frame: &Frame, config: &DetectConfig, found: &mut Detection
     found.background_adu = f64::from(level.unwrap_or(0.0));
     found.noise_adu = f64::from(background::rounding_sigma_adu(frame.step_adu));
     found.spot_sigma_px = config.spot_sigma_px.unwrap_or(star_model::DEFAULT_SPOT_PX);
+    found.noise_tail = None;
 }

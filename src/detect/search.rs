@@ -7,6 +7,7 @@
 use super::background::{FrameBackground, Mesh};
 use super::candidates::{FilteredFrame, PeakSearch, RawPeakFinder, SearchConfig};
 use super::config::DetectConfig;
+use super::detection::NoiseTail;
 use super::filter::Kernel;
 use super::fit::{FitBuffers, FrameMaps};
 use super::pixels::View;
@@ -15,8 +16,7 @@ use super::star_model::{
     DEFAULT_SPOT_PX, SpotSize, StarModel, fit_bright_stars, spot_size, star_model,
 };
 use super::threshold::{
-    Correlation, Extrema, FilterWeights, FrameNoise, NoiseBuffers, gaussian_threshold,
-    raise_filtered_noise,
+    Extrema, FilterWeights, FrameNoise, NoiseBuffers, gaussian_threshold, raise_filtered_noise,
 };
 
 /// A guessed spot size must be right within this factor; else the frame is filtered again.
@@ -90,6 +90,8 @@ pub(crate) struct Pass {
     pub matched_gain: f64,
     /// The threshold, in standard deviations of the filtered noise.
     pub threshold: f64,
+    /// Why the threshold holds less well than in independent noise.
+    pub noise_tail: Option<NoiseTail>,
 }
 
 /// What bright stars say about a frame.
@@ -221,25 +223,30 @@ impl FrameSearch {
         filtered.filter(view, mesh, &kernel, (config.cell_px, gaussian));
         let filter = FilterWeights::for_spot(spot_px, kernel.radius(), size);
         raise_filtered_noise(&background.cut_off, &mut filtered.mesh, gaussian, &filter);
-        let threshold = config.threshold_sigma.unwrap_or_else(|| {
+        let measured = || {
             let frame_noise = FrameNoise {
                 view,
                 background,
                 filtered_mesh: &filtered.mesh,
                 filtered_maxima: &filtered.maxima,
             };
-            let raised = frame_noise.raised_threshold(gaussian, spot_px, &filter, noise);
-            let most = match frame_noise.correlation(noise) {
-                Correlation::None => return raised,
-                Correlation::Measured => MAX_RAISE * raised,
-                Correlation::Coarse => MAX_RAISE_OF_COARSE * raised,
+            let threshold = frame_noise.raised_threshold(gaussian, spot_px, &filter, noise);
+            let noise_tail = frame_noise.tail(noise);
+            let most = match noise_tail {
+                // The negative of noise that is cut off has no tail.
+                None | Some(NoiseTail::CutOff) => return (threshold, noise_tail),
+                Some(NoiseTail::Correlated) => MAX_RAISE * threshold,
+                Some(NoiseTail::Coarse) => MAX_RAISE_OF_COARSE * threshold,
             };
             extrema.prepare(size);
             filtered.for_sampled_rows(view, mesh, &kernel, |rows, y, filtered_mesh| {
                 extrema.add_row(rows, y, filtered_mesh);
             });
-            extrema.raised(raised, config.false_alarms_per_mpx, most)
-        });
+            let raised = extrema.raised(threshold, config.false_alarms_per_mpx, most);
+            (raised, noise_tail.filter(|_| raised > threshold))
+        };
+        let stated = config.threshold_sigma.map(|stated| (stated, None));
+        let (threshold, noise_tail) = stated.unwrap_or_else(measured);
         filtered.gather_missed(view, mesh, &kernel, threshold as f32);
         let spot_width_px = (spot_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt();
         let search_config = SearchConfig {
@@ -252,6 +259,7 @@ impl FrameSearch {
         Pass {
             matched_gain: kernel.matched_gain(),
             threshold,
+            noise_tail,
         }
     }
 }

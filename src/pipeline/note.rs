@@ -6,6 +6,7 @@ use super::outcome::Outcome;
 use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;
+use crate::detect::NoiseTail;
 use crate::frame::IgnoredValue;
 use crate::identify::{Identification, Priors, ScalePrior, ScaleSource};
 use crate::photometry::FramePhotometry;
@@ -49,6 +50,8 @@ pub enum Note {
         /// V magnitude near which the zero point holds.
         mean_v_mag: f64,
     },
+    /// The noise is not independent: the rate of false detections asked for holds less well.
+    FalseDetections(NoiseTail),
     /// The dark has another exposure than the frame.
     DarkExposure(ExposureMismatch),
     /// The Moon or a planet is in the frame.
@@ -77,6 +80,7 @@ impl Note {
             Self::NoExposure => "exposure_unknown",
             Self::Camera(contradiction) => contradiction.code(),
             Self::NotLinear { .. } => "not_linear",
+            Self::FalseDetections(_) => "false_detections",
             Self::BodyInFrame(_) => "body_in_frame",
             Self::DarkExposure(_) => "dark_exposure_differs",
             Self::BrightStarsNotNamed(_) => "bright_stars_not_named",
@@ -201,6 +205,7 @@ impl fmt::Display for Note {
                 "the grey levels are not proportional to light: a magnitude is {:.2} ± {:.2} in this frame, and its zero point holds near V {mean_v_mag:.1} only",
                 slope.value, slope.sigma
             ),
+            Self::FalseDetections(tail) => write_noise_tail(f, *tail),
             Self::DarkExposure(mismatch) => mismatch.fmt(f),
             Self::BodyInFrame(seen) => write_body(f, seen),
             Self::BrightStarsNotNamed(stars) => {
@@ -247,6 +252,18 @@ fn write_body(f: &mut fmt::Formatter<'_>, seen: &BodyInFrame) -> fmt::Result {
             seen.uncertainty_px
         ),
     }
+}
+
+fn write_noise_tail(f: &mut fmt::Formatter<'_>, tail: NoiseTail) -> fmt::Result {
+    let cause = match tail {
+        NoiseTail::Correlated => "is correlated between pixels",
+        NoiseTail::Coarse => "is below the steps of the grey levels and has rare large values",
+        NoiseTail::CutOff => "is cut off at the frame's lowest value",
+    };
+    write!(
+        f,
+        "the noise {cause}, and the rate of false detections may be some ten times that asked for"
+    )
 }
 
 /// A list for people; what is beyond its first items is counted.

@@ -112,6 +112,7 @@ impl Solved<'_> {
             .chain(Note::of_observation(observation, priors, outcome))
             .chain(Note::of_camera(camera, comparison))
             .chain(Note::of_photometry(self.photometry.as_ref()))
+            .chain(self.detections.noise_tail.map(Note::FalseDetections))
             .chain(Note::of_bodies(
                 &self.bodies,
                 outcome,

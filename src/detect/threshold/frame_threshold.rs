@@ -8,6 +8,7 @@ use super::pixel_noise::PixelNoise;
 use super::star_free::{NoiseBuffers, StarFree};
 use crate::detect::background::{FrameBackground, Mesh, median};
 use crate::detect::config::DetectConfig;
+use crate::detect::detection::NoiseTail;
 use crate::detect::filter::Kernel;
 use crate::detect::pixels::{BlockMaxima, View};
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
@@ -36,17 +37,6 @@ fn noise_degrees((width, height): (usize, usize), config: &DetectConfig, spot_px
     let cells = ((width * height) as f64 / cell).max(1.0);
     let correlated = std::f64::consts::TAU * (spot_px.powi(2) + PIXEL_VARIANCE_PX2);
     (EFFICIENCY * cell / correlated.max(1.0) * SMOOTHING_GAIN.min(cells)).max(3.0)
-}
-
-/// Whether the noise of neighbouring pixels is correlated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Correlation {
-    /// It is independent.
-    None,
-    /// It is correlated: the noise of the filtered frame is not that of independent pixels.
-    Measured,
-    /// It may be: the noise is coarse.
-    Coarse,
 }
 
 /// A filtered frame whose threshold is wanted.
@@ -79,17 +69,15 @@ impl FrameNoise<'_> {
         skewness.map_or(u, |s| threshold_for_photons(u, s, filter))
     }
 
-    /// Whether the noise of neighbouring pixels is correlated. Noise that is cut off is taken as
-    /// independent: its negative has no tail.
-    pub fn correlation(&self, buffers: &mut NoiseBuffers) -> Correlation {
+    /// What may make large values of the filtered noise more frequent than in independent noise.
+    pub fn tail(&self, buffers: &mut NoiseBuffers) -> Option<NoiseTail> {
         if self.background.cut_off.is_any() {
-            Correlation::None
+            Some(NoiseTail::CutOff)
         } else if self.background.is_coarse {
-            Correlation::Coarse
-        } else if self.is_correlated(buffers) {
-            Correlation::Measured
+            Some(NoiseTail::Coarse)
         } else {
-            Correlation::None
+            let is_correlated = self.is_correlated(buffers);
+            is_correlated.then_some(NoiseTail::Correlated)
         }
     }
 

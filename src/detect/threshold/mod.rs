@@ -24,7 +24,7 @@ mod star_free;
 
 pub(crate) use cut_off_noise::raise_filtered_noise;
 pub(crate) use filter_weights::FilterWeights;
-pub(crate) use frame_threshold::{Correlation, FrameNoise, gaussian_threshold};
+pub(crate) use frame_threshold::{FrameNoise, gaussian_threshold};
 pub(crate) use negative::Extrema;
 pub(crate) use photons::threshold_for_photons;
 pub(crate) use star_free::NoiseBuffers;
