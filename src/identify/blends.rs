@@ -27,9 +27,13 @@ const REACH_SIGMAS: f64 = 4.5;
 /// The probability that a star is measured by its own light where one spot would take up that of
 /// its neighbours as well: the detector separates some stars that this model does not.
 const SEPARATED_SHARE: f64 = 0.05;
-/// No star is measured by its own light that is closer than this to the light of its blend, in
-/// standard deviations of the spot.
+/// The detector does not separate a star whose own light is closer than this to the light of its
+/// blend, in standard deviations of the spot.
 const SEPARABLE_SIGMAS: f64 = 1.5;
+/// The probability that such a star is measured by its own light all the same: its neighbours in the
+/// catalogue are not there, or much fainter. It is small, so that a bright star cannot pull the
+/// attitude to where its own light agrees.
+const MISTAKEN_SHARE: f64 = 0.001;
 /// The variance that a pixel's own width adds to a spot, in px².
 const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
 /// Lights closer than this, in standard deviations of the spot, are the same.
@@ -100,11 +104,14 @@ impl Blends {
                 let distance_px = blend.pixel.distance_to(&star.position);
                 let density =
                     |distance_px| position_density(candidate, distance_px, star.is_saturated);
-                let separated = SEPARATED_SHARE * density(candidate.distance_px);
-                if is_absorbed || separated > density(distance_px) {
-                    let is_separable =
-                        !is_absorbed || candidate.light.distance_to(&blend.pixel) > separable_px;
-                    candidate.share = if is_separable { SEPARATED_SHARE } else { 0.0 };
+                let is_separable = candidate.light.distance_to(&blend.pixel) > separable_px;
+                let share = match (is_separable, is_absorbed) {
+                    (true, _) => SEPARATED_SHARE,
+                    (false, true) => 0.0,
+                    (false, false) => MISTAKEN_SHARE,
+                };
+                if is_absorbed || share * density(candidate.distance_px) > density(distance_px) {
+                    candidate.share = share;
                 } else {
                     candidate.distance_px = distance_px;
                     candidate.light = blend.pixel;
