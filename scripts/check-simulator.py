@@ -120,17 +120,24 @@ class Lens:
         self.focal_px = toml["focal_length_mm"] / pitch_mm
         self.size = np.array([toml["width_px"], toml["height_px"]])
         self.radius = np.hypot(*self.size) / 2
-        self.distortion = toml.get("distortion_px", 0)
+        radial = ["distortion_px", "distortion5_px", "distortion7_px"]
+        self.radial = [toml.get(key, 0) for key in radial]
+        self.tilt = np.array([toml.get("tilt_x_px", 0), toml.get("tilt_y_px", 0)])
         self.decentring = np.array([toml.get("decentring_x_px", 0), toml.get("decentring_y_px", 0)])
         self.mirrored = toml.get("mirrored", False)
 
     def ideal(self, observed):
-        """From observed to ideal: r (1 - d r^2) - (r^2 P + 2 (P.r) r), P = decentring / 3."""
+        """From observed to ideal: r (1 - a r^2 - b r^4 - c r^6) - (r^2 P + 2 (P.r) r) - (T.r) r.
+
+        P is a third of the decentring, T the tilt.
+        """
         r = observed / self.radius
         square = np.sum(r * r, axis=-1, keepdims=True)
         third = self.decentring / 3
         along = (r @ third)[..., None]
-        return observed - self.distortion * square * r - (square * third + 2 * along * r)
+        radial = sum(term * square ** (i + 1) for i, term in enumerate(self.radial))
+        tilted = (r @ self.tilt)[..., None]
+        return observed - radial * r - (square * third + 2 * along * r) - tilted * r
 
     def pixels(self, directions):
         """Pixels of unit vectors in camera axes; inverts the polynomial by Newton's method."""
@@ -174,8 +181,14 @@ def positions(checks):
         ("radial, outward", {"distortion_px": 40.0}, (266.4, -28.9, -120.0)),
         ("radial, inward, mirrored", {"distortion_px": -60.0, "mirrored": True}, (310.0, 40.0, 200.0)),
         (
+            "radial of all orders",
+            {"distortion_px": -45.0, "distortion5_px": 20.0, "distortion7_px": 9.0},
+            (83.8, -1.2, 33.0),
+        ),
+        (
             "all of it, at the north pole",
-            {"distortion_px": 25.0, "decentring_x_px": 6.0, "decentring_y_px": -9.0},
+            {"distortion_px": 25.0, "decentring_x_px": 6.0, "decentring_y_px": -9.0}
+            | {"distortion5_px": -7.0, "distortion7_px": 5.0, "tilt_x_px": 3.0, "tilt_y_px": 4.0},
             (120.0, 89.7, 75.0),
         ),
         (

@@ -11,10 +11,19 @@
 use multiversion::multiversion;
 
 /// Form of the distortion polynomial.
+///
+/// # Reference
+/// Brown 1971, Photogrammetric Engineering 37, 855 (radial and decentring terms).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum DistortionModel {
     /// One radial term, r³.
     Radial,
+    /// Two radial terms, r³ and r⁵.
+    Radial5,
+    /// Three radial terms, r³, r⁵ and r⁷.
+    Radial7,
+    /// [`DistortionModel::Radial7`], a decentred lens (2 terms) and a tilted detector (2).
+    BrownConrady,
     /// Unequal scale along two axes (2 terms), second order (6) and third order (8): tilted
     /// detectors, decentred lenses, differential refraction.
     Cubic,
@@ -24,12 +33,30 @@ pub enum DistortionModel {
 
 impl DistortionModel {
     /// Every model, simplest first.
-    pub const ALL: [Self; 3] = [Self::Radial, Self::Cubic, Self::Quintic];
+    pub const ALL: [Self; 6] = [
+        Self::Radial,
+        Self::Radial5,
+        Self::Radial7,
+        Self::BrownConrady,
+        Self::Cubic,
+        Self::Quintic,
+    ];
+
+    /// The models of lenses, simplest first. Each has the terms of those before it.
+    pub const LENSES: [Self; 4] = [
+        Self::Radial,
+        Self::Radial5,
+        Self::Radial7,
+        Self::BrownConrady,
+    ];
 
     /// Number of coefficients.
     pub const fn terms(self) -> usize {
         match self {
             Self::Radial => 1,
+            Self::Radial5 => 2,
+            Self::Radial7 => 3,
+            Self::BrownConrady => LENS_TERMS,
             Self::Cubic => 16,
             Self::Quintic => 38,
         }
@@ -39,6 +66,9 @@ impl DistortionModel {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Radial => "radial",
+            Self::Radial5 => "radial5",
+            Self::Radial7 => "radial7",
+            Self::BrownConrady => "brown_conrady",
             Self::Cubic => "cubic",
             Self::Quintic => "quintic",
         }
@@ -48,9 +78,36 @@ impl DistortionModel {
     pub const fn order(self) -> usize {
         match self {
             Self::Radial | Self::Cubic => 3,
-            Self::Quintic => 5,
+            Self::Radial5 | Self::Quintic => 5,
+            Self::Radial7 | Self::BrownConrady => 7,
         }
     }
+
+    /// Whether the terms are those of a lens, the first of [`lens_terms`], and not monomials.
+    const fn is_lens(self) -> bool {
+        match self {
+            Self::Radial | Self::Radial5 | Self::Radial7 | Self::BrownConrady => true,
+            Self::Cubic | Self::Quintic => false,
+        }
+    }
+}
+
+/// Number of terms of a lens.
+pub const LENS_TERMS: usize = 7;
+
+/// The terms of a lens along u and v at a normalized offset: r³, r⁵, r⁷; a lens decentred along u
+/// and along v, in thirds, so that each is at most r²; a detector tilted along u and along v.
+#[inline(always)]
+pub(crate) fn lens_terms([u, v]: [f64; 2]) -> [[f64; LENS_TERMS]; 2] {
+    const THIRD: f64 = 1.0 / 3.0;
+    let [uu, uv, vv] = [u * u, u * v, v * v];
+    let r2 = uu + vv;
+    let (r4, r6) = (r2 * r2, r2 * r2 * r2);
+    let (far, across, near) = (uu + THIRD * vv, 2.0 * THIRD * uv, THIRD * uu + vv);
+    [
+        [u * r2, u * r4, u * r6, far, across, uu, uv],
+        [v * r2, v * r4, v * r6, across, near, uv, vv],
+    ]
 }
 
 /// Number of monomials of second and third order.
@@ -190,9 +247,12 @@ impl Distortion {
         self.radius_px
     }
 
-    /// The coefficients in pixels, one per term. Radial model: (u r², v r²). Other models: (u, −v)
-    /// and (v, u), then two for each monomial of second and higher order, along u and along v;
-    /// monomials are sorted by order, then by falling power of u.
+    /// The coefficients in pixels, one per term, with (u, v) the normalized offset and r its length.
+    ///
+    /// - Lenses, as many as the model has: r² (u, v); r⁴ (u, v); r⁶ (u, v); (u² + v²/3, 2uv/3) and
+    ///   (2uv/3, u²/3 + v²), decentring; u (u, v) and v (u, v), tilt.
+    /// - Other models: (u, −v) and (v, u), then two for each monomial of second and higher order,
+    ///   along u and along v; monomials are sorted by order, then by falling power of u.
     pub fn coefficients_px(&self) -> &[f64] {
         &self.coefficients_px[..self.model.terms()]
     }
@@ -200,16 +260,10 @@ impl Distortion {
     /// The terms of the polynomial: powers of u/R and v/R, and the coefficients along u and v in
     /// pixels. The same powers may occur more than once.
     pub fn monomials(&self) -> Vec<(usize, usize, [f64; 2])> {
-        let c = self.coefficients_px();
-        if self.model == DistortionModel::Radial {
-            // r² u and r² v, expanded.
-            return vec![
-                (3, 0, [c[0], 0.0]),
-                (1, 2, [c[0], 0.0]),
-                (2, 1, [0.0, c[0]]),
-                (0, 3, [0.0, c[0]]),
-            ];
+        if self.model.is_lens() {
+            return self.lens_monomials();
         }
+        let c = self.coefficients_px();
         let mut monomials = vec![(1, 0, [c[0], c[1]]), (0, 1, [c[1], -c[0]])];
         let powers = const { powers::<QUINTIC_MONOMIALS>() };
         let pairs = c[2..].as_chunks().0;
@@ -222,18 +276,60 @@ impl Distortion {
         monomials
     }
 
+    /// The terms of a lens, expanded.
+    fn lens_monomials(&self) -> Vec<(usize, usize, [f64; 2])> {
+        let [third, fifth, seventh, along_u, along_v, tilt_u, tilt_v] = self.lens_coefficients();
+        let across = [2.0 / 3.0 * along_u, 2.0 / 3.0 * along_v];
+        let mut monomials = vec![
+            (2, 0, [along_u + tilt_u, along_v / 3.0]),
+            (1, 1, [across[1] + tilt_v, across[0] + tilt_u]),
+            (0, 2, [along_u / 3.0, along_v + tilt_v]),
+        ];
+        // r² = u² + v², and its powers.
+        let expanded: [(f64, &[f64]); 3] = [
+            (third, &[1.0, 1.0]),
+            (fifth, &[1.0, 2.0, 1.0]),
+            (seventh, &[1.0, 3.0, 3.0, 1.0]),
+        ];
+        for (coefficient, binomials) in expanded {
+            let most = 2 * (binomials.len() - 1);
+            for (of_v, binomial) in binomials.iter().enumerate() {
+                let (p, q, value) = (most - 2 * of_v, 2 * of_v, coefficient * binomial);
+                monomials.push((p + 1, q, [value, 0.0]));
+                monomials.push((p, q + 1, [0.0, value]));
+            }
+        }
+        let order = self.model.order();
+        monomials.retain(|(p, q, _)| p + q <= order);
+        monomials
+    }
+
+    /// The coefficients of all terms of a lens; those that the model lacks are 0.
+    #[inline(always)]
+    fn lens_coefficients(&self) -> [f64; LENS_TERMS] {
+        std::array::from_fn(|term| self.coefficients_px[term])
+    }
+
     /// Converts the observed offset to the ideal one, in pixels.
     #[inline]
     pub fn remove(&self, observed: [f64; 2]) -> [f64; 2] {
         let [u, v] = [observed[0] / self.radius_px, observed[1] / self.radius_px];
         match self.model {
-            DistortionModel::Radial => {
-                let [c, r_sq] = [self.coefficients_px[0], u * u + v * v];
-                [observed[0] + c * (u * r_sq), observed[1] + c * (v * r_sq)]
-            }
+            DistortionModel::Radial
+            | DistortionModel::Radial5
+            | DistortionModel::Radial7
+            | DistortionModel::BrownConrady => self.lens([u, v], observed),
             DistortionModel::Cubic => self.polynomial::<CUBIC_MONOMIALS>([u, v], observed),
             DistortionModel::Quintic => self.polynomial::<QUINTIC_MONOMIALS>([u, v], observed),
         }
+    }
+
+    /// Adds the displacement by a lens at the normalized offset to `observed`.
+    #[inline(always)]
+    fn lens(&self, offset: [f64; 2], observed: [f64; 2]) -> [f64; 2] {
+        let (terms, c) = (lens_terms(offset), self.lens_coefficients());
+        let shift = |axis: usize| -> f64 { terms[axis].iter().zip(&c).map(|(t, c)| t * c).sum() };
+        [observed[0] + shift(0), observed[1] + shift(1)]
     }
 
     /// Adds the displacement by a model with `K` monomials at the normalized offset to `observed`.
@@ -280,20 +376,22 @@ impl Distortion {
     #[inline(always)]
     fn remove_from_lanes(&self, observed: &[[f64; LANES]; 2]) -> [[f64; LANES]; 2] {
         match self.model {
-            DistortionModel::Radial => self.radial_lanes(observed),
+            DistortionModel::Radial
+            | DistortionModel::Radial5
+            | DistortionModel::Radial7
+            | DistortionModel::BrownConrady => self.lens_lanes(observed),
             DistortionModel::Cubic => self.polynomial_lanes::<CUBIC_MONOMIALS>(observed),
             DistortionModel::Quintic => self.polynomial_lanes::<QUINTIC_MONOMIALS>(observed),
         }
     }
 
     #[inline(always)]
-    fn radial_lanes(&self, observed: &[[f64; LANES]; 2]) -> [[f64; LANES]; 2] {
+    fn lens_lanes(&self, observed: &[[f64; LANES]; 2]) -> [[f64; LANES]; 2] {
         let mut ideal = *observed;
         for lane in 0..LANES {
-            let [u, v] = [0, 1].map(|axis| observed[axis][lane] / self.radius_px);
-            let [c, r_sq] = [self.coefficients_px[0], u * u + v * v];
-            ideal[0][lane] = observed[0][lane] + c * (u * r_sq);
-            ideal[1][lane] = observed[1][lane] + c * (v * r_sq);
+            let observed = [observed[0][lane], observed[1][lane]];
+            let offset = observed.map(|along| along / self.radius_px);
+            [ideal[0][lane], ideal[1][lane]] = self.lens(offset, observed);
         }
         ideal
     }
@@ -327,5 +425,51 @@ impl Distortion {
                 (ideal[0] - edge[0]).hypot(ideal[1] - edge[1])
             })
             .fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_expanded_polynomial_is_the_displacement() {
+        for model in DistortionModel::ALL {
+            let coefficient = |term: usize| 3.0 - 1.7 * (term % 5) as f64;
+            let coefficients: Vec<f64> = (0..model.terms()).map(coefficient).collect();
+            let distortion = Distortion::new(model, 500.0, &coefficients);
+            for [u, v] in [[0.3_f64, -0.8], [-0.6, 0.1], [0.7, 0.7]] {
+                let [mut along_u, mut along_v] = [500.0 * u, 500.0 * v];
+                for (p, q, [of_u, of_v]) in distortion.monomials() {
+                    assert!(p + q <= model.order(), "{model:?}");
+                    let monomial = u.powi(p as i32) * v.powi(q as i32);
+                    along_u += of_u * monomial;
+                    along_v += of_v * monomial;
+                }
+                let found = distortion.remove([500.0 * u, 500.0 * v]);
+                let off_px = (found[0] - along_u).hypot(found[1] - along_v);
+                assert!(off_px < 1e-10, "{model:?} {off_px}");
+            }
+        }
+    }
+
+    #[test]
+    fn each_term_of_a_lens_moves_a_point_on_its_axis_at_the_radius_by_its_coefficient() {
+        for term in 0..LENS_TERMS {
+            let mut coefficients = [0.0; LENS_TERMS];
+            coefficients[term] = 1.0;
+            let model = DistortionModel::BrownConrady;
+            let distortion = Distortion::new(model, 100.0, &coefficients);
+            let at = if matches!(term, 4 | 6) {
+                [0.0, 100.0]
+            } else {
+                [100.0, 0.0]
+            };
+            let found = distortion.remove(at);
+            assert!(
+                (found[0] + found[1] - 101.0).abs() < 1e-12,
+                "{term} {found:?}"
+            );
+        }
     }
 }

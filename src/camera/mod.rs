@@ -13,6 +13,8 @@ pub mod data_sheet;
 mod distortion;
 mod model;
 
-pub(crate) use distortion::{CUBIC_MONOMIALS, LANES, QUINTIC_MONOMIALS, monomials_in_lanes};
-pub use distortion::{Distortion, DistortionModel};
+pub(crate) use distortion::{
+    CUBIC_MONOMIALS, LANES, QUINTIC_MONOMIALS, lens_terms, monomials_in_lanes,
+};
+pub use distortion::{Distortion, DistortionModel, LENS_TERMS};
 pub use model::{CameraModel, focal_length_px, frame_centre};

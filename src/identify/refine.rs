@@ -209,16 +209,17 @@ impl Refiner {
                 excess_sigma_px: current.excess_sigma_px,
             };
             current = self.fitted(problem, &guess)?;
-            if settled {
-                break;
-            }
-            if self.are_residuals_unexplained(problem, &current) {
-                let richer = self.choose_model(problem, &current, DistortionModel::Quintic);
-                if richer != model {
-                    model = richer;
-                    guess.model = richer;
+            // The names are more stars than those that the model was chosen for.
+            if round == 0 || (!settled && self.are_residuals_unexplained(problem, &current)) {
+                let chosen = self.choose_model(problem, &current, DistortionModel::Quintic);
+                if chosen != model {
+                    model = chosen;
+                    guess.model = chosen;
                     current = self.fitted(problem, &guess)?;
                 }
+            }
+            if settled {
+                break;
             }
         }
         Some(current)
@@ -363,9 +364,10 @@ impl Refiner {
             icrs_to_camera,
             ..
         } = &current.fit;
-        let left_out = |model| left_out_chi_sq(&self.stars, camera, icrs_to_camera, model);
         let equations = 2.0 * self.stars.len() as f64;
         let worth_it = WORTH_IT * equations / (equations - TAIL_EQUATIONS).max(1.0);
+        let is_unexplained = self.are_residuals_unexplained(problem, current);
+        let left_out = |model| left_out_chi_sq(&self.stars, camera, icrs_to_camera, model);
         let mut best = (None, left_out(None)?);
         for model in DistortionModel::ALL {
             if model > richest || !is_affordable(model, self.stars.len()) {
@@ -375,8 +377,8 @@ impl Refiner {
                 Some(chi_sq) if equations * (best.1 / chi_sq).ln() > worth_it => {
                     best = (Some(model), chi_sq);
                 }
-                // The quintic is not tried where the cubic is no better.
-                _ if model == DistortionModel::Cubic => break,
+                // Slow: not tried where the cubic is no better and little is left to explain.
+                _ if model == DistortionModel::Cubic && !is_unexplained => break,
                 _ => {}
             }
         }

@@ -1,6 +1,8 @@
 //! Deviations of a real camera from the ideal: the lens, differences between pixels, the form of
 //! spots.
 
+use crate::camera::LENS_TERMS;
+
 /// Form of a star's spot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SpotForm {
@@ -50,11 +52,19 @@ pub struct Imperfections {
     /// Third-order radial distortion: displacement of a star in the corner, in pixels, positive
     /// away from the centre.
     pub distortion_px: f64,
+    /// Fifth-order radial distortion: the same.
+    pub distortion5_px: f64,
+    /// Seventh-order radial distortion: the same.
+    pub distortion7_px: f64,
     /// Decentred lens, along x: displacement by the second-order term at the distance of the
     /// corner, in pixels.
     pub decentring_x_px: f64,
     /// The same along y.
     pub decentring_y_px: f64,
+    /// Detector tilted along x: displacement at the distance of the corner along x, in pixels.
+    pub tilt_x_px: f64,
+    /// The same along y.
+    pub tilt_y_px: f64,
     /// Standard deviation of the pixels' response to light, relative to its mean.
     #[doc(alias = "PRNU")]
     pub response_sigma: f64,
@@ -84,13 +94,34 @@ pub struct Imperfections {
     pub mirrored: bool,
 }
 
+impl Imperfections {
+    /// Displacement by each term of the lens, in the order of
+    /// [`DistortionModel::BrownConrady`](crate::camera::DistortionModel::BrownConrady), in pixels,
+    /// outward positive.
+    pub fn lens_terms_px(&self) -> [f64; LENS_TERMS] {
+        [
+            self.distortion_px,
+            self.distortion5_px,
+            self.distortion7_px,
+            self.decentring_x_px,
+            self.decentring_y_px,
+            self.tilt_x_px,
+            self.tilt_y_px,
+        ]
+    }
+}
+
 impl Default for Imperfections {
     fn default() -> Self {
         Self {
             vignetting: 0.0,
             distortion_px: 0.0,
+            distortion5_px: 0.0,
+            distortion7_px: 0.0,
             decentring_x_px: 0.0,
             decentring_y_px: 0.0,
+            tilt_x_px: 0.0,
+            tilt_y_px: 0.0,
             response_sigma: 0.0,
             dark_current_sigma: 0.0,
             hot_pixels_per_mpx: 0.0,

@@ -123,8 +123,10 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     key!(vignetting in imperfections, SHARE, "share of the light lost in the corners"),
     key!(distortion_px in imperfections,
         DISPLACEMENT_PX,
-        "radial distortion: outward displacement of a star in the corner, in pixels"
+        "radial distortion of third order: outward displacement of a star in the corner, in pixels"
     ),
+    key!(distortion5_px in imperfections, DISPLACEMENT_PX, "the same of fifth order"),
+    key!(distortion7_px in imperfections, DISPLACEMENT_PX, "the same of seventh order"),
     key!(decentring_x_px in imperfections,
         DISPLACEMENT_PX,
         "decentred lens, along x: displacement at the distance of the corner, in pixels"
@@ -132,6 +134,14 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     key!(decentring_y_px in imperfections,
         DISPLACEMENT_PX,
         "decentred lens, along y: displacement at the distance of the corner, in pixels"
+    ),
+    key!(tilt_x_px in imperfections,
+        DISPLACEMENT_PX,
+        "detector tilted along x: displacement at the distance of the corner along x, in pixels"
+    ),
+    key!(tilt_y_px in imperfections,
+        DISPLACEMENT_PX,
+        "detector tilted along y: displacement at the distance of the corner along y, in pixels"
     ),
     key!(response_sigma in imperfections,
         SHARE,

@@ -11,8 +11,8 @@
 
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::camera::{
-    CUBIC_MONOMIALS, CameraModel, Distortion, DistortionModel, LANES, QUINTIC_MONOMIALS,
-    monomials_in_lanes,
+    CUBIC_MONOMIALS, CameraModel, Distortion, DistortionModel, LANES, LENS_TERMS,
+    QUINTIC_MONOMIALS, lens_terms, monomials_in_lanes,
 };
 use multiversion::multiversion;
 use nalgebra::{Cholesky, Const, Matrix4, SMatrix, SVector, Vector3};
@@ -44,10 +44,8 @@ pub struct CameraFit {
 
 /// Parameters without distortion: rotation about three axes, and ln f.
 pub const POSE_PARAMETERS: usize = 4;
-/// With the one term of a radial distortion.
-const RADIAL_PARAMETERS: usize = POSE_PARAMETERS + 1;
-/// With the two linear terms of a polynomial.
-const LINEAR_PARAMETERS: usize = POSE_PARAMETERS + 2;
+/// The linear terms of a polynomial.
+const LINEAR_TERMS: usize = 2;
 const MAX_ITERATIONS: usize = 10;
 /// Largest step in radians: beyond it the fit has diverged.
 const LARGEST_STEP: f64 = 0.5;
@@ -56,6 +54,29 @@ const MIN_FREEDOM: f64 = 1e-6;
 /// The fit has converged below this step: the next would be about its square, far below centroid
 /// errors.
 const CONVERGED: f64 = 1e-5;
+
+/// The result of a method of the [`Adjustment`] for a model: its numbers of parameters and of
+/// monomials are known to the compiler.
+macro_rules! adjusted {
+    ($stars:expr, $at:expr, $model:expr, $method:ident($($argument:expr)?)) => {{
+        use DistortionModel::{BrownConrady, Cubic, Quintic, Radial, Radial5, Radial7};
+        macro_rules! with {
+            ($shared:expr, $monomials:expr) => {
+                Adjustment::<{ POSE_PARAMETERS + $shared }, { $monomials }>::new($stars, $at, $model)?
+                    .$method($($argument)?)
+            };
+        }
+        match $model {
+            None => with!(0, 0),
+            Some(Radial) => with!(Radial.terms(), 0),
+            Some(Radial5) => with!(Radial5.terms(), 0),
+            Some(Radial7) => with!(Radial7.terms(), 0),
+            Some(BrownConrady) => with!(BrownConrady.terms(), 0),
+            Some(Cubic) => with!(LINEAR_TERMS, CUBIC_MONOMIALS),
+            Some(Quintic) => with!(LINEAR_TERMS, QUINTIC_MONOMIALS),
+        }
+    }};
+}
 
 /// Fits attitude, focal length and, with a `model`, the distortion, starting from `camera` and
 /// `icrs_to_camera`. Sets `residuals_px` to observed minus predicted position of each star along
@@ -71,20 +92,7 @@ pub fn fit_camera(
     residuals_px: &mut Vec<[f64; 2]>,
 ) -> Option<CameraFit> {
     let at = (camera, icrs_to_camera);
-    match model {
-        None => Adjustment::<POSE_PARAMETERS, 0>::new(stars, at, None)?.fit(residuals_px),
-        Some(DistortionModel::Radial) => {
-            Adjustment::<RADIAL_PARAMETERS, 0>::new(stars, at, model)?.fit(residuals_px)
-        }
-        Some(DistortionModel::Cubic) => {
-            Adjustment::<LINEAR_PARAMETERS, CUBIC_MONOMIALS>::new(stars, at, model)?
-                .fit(residuals_px)
-        }
-        Some(DistortionModel::Quintic) => {
-            Adjustment::<LINEAR_PARAMETERS, QUINTIC_MONOMIALS>::new(stars, at, model)?
-                .fit(residuals_px)
-        }
-    }
+    adjusted!(stars, at, model, fit(residuals_px))
 }
 
 /// Σ (residual / σ)² with each equation predicted by a fit of `model` to the others. It grows where
@@ -98,20 +106,7 @@ pub fn left_out_chi_sq(
     model: Option<DistortionModel>,
 ) -> Option<f64> {
     let at = (camera, icrs_to_camera);
-    match model {
-        None => Adjustment::<POSE_PARAMETERS, 0>::new(stars, at, None)?.left_out_chi_sq(),
-        Some(DistortionModel::Radial) => {
-            Adjustment::<RADIAL_PARAMETERS, 0>::new(stars, at, model)?.left_out_chi_sq()
-        }
-        Some(DistortionModel::Cubic) => {
-            Adjustment::<LINEAR_PARAMETERS, CUBIC_MONOMIALS>::new(stars, at, model)?
-                .left_out_chi_sq()
-        }
-        Some(DistortionModel::Quintic) => {
-            Adjustment::<LINEAR_PARAMETERS, QUINTIC_MONOMIALS>::new(stars, at, model)?
-                .left_out_chi_sq()
-        }
-    }
+    adjusted!(stars, at, model, left_out_chi_sq())
 }
 
 /// A least-squares adjustment of `P` parameters that both equations of a star share, and of `K`
@@ -270,11 +265,13 @@ impl<'a, const P: usize, const K: usize> Adjustment<'a, P, K> {
             let ([x, y], [u, v], weight) = ([x[lane], y[lane]], [u[lane], v[lane]], weights[lane]);
             let pose = [[-x * y, 1.0 + x * x, -y, x], [-(1.0 + y * y), x * y, x, y]];
             // The distortion terms that are not monomials along one axis.
-            let r_sq = u * u + v * v;
-            let terms = match self.model {
-                None => [[0.0; 2]; 2],
-                Some(DistortionModel::Radial) => [[u * r_sq, 0.0], [v * r_sq, 0.0]],
-                Some(_) => [[u, v], [-v, u]],
+            let terms = if K == 0 {
+                lens_terms([u, v])
+            } else {
+                let mut linear = [[0.0; LENS_TERMS]; 2];
+                [linear[0][0], linear[0][1]] = [u, v];
+                [linear[1][0], linear[1][1]] = [-v, u];
+                linear
             };
             for axis in 0..2 {
                 for parameter in 0..P {
@@ -497,6 +494,30 @@ mod tests {
             }
         }
         stars
+    }
+
+    #[test]
+    fn a_known_lens_is_found_again() {
+        let truth = Rotation::looking_at(&UnitVector::from_ra_dec(0.3, 1.5), 2.0);
+        for model in DistortionModel::LENSES {
+            let coefficients = [6.0, -4.0, 3.0, 1.0, -2.0, 0.5, 1.5];
+            let mut camera = CameraModel::pinhole(1024.0, 768.0, 2000.0, false);
+            let distortion = Distortion::new(model, 640.0, &coefficients[..model.terms()]);
+            camera.distortion = Some(distortion);
+            let stars = stars_of(&camera, &truth);
+            let start = CameraModel::pinhole(1024.0, 768.0, 2010.0, false);
+            let mut residuals_px = Vec::new();
+            let fit = fit_camera(&stars, &start, &truth, Some(model), &mut residuals_px).unwrap();
+            let off_px = (fit.camera.focal_length_px - 2000.0).abs();
+            assert!(off_px < 1e-4, "{model:?} {off_px}");
+            let found = fit.camera.distortion.unwrap();
+            for (found, expected) in found.coefficients_px().iter().zip(coefficients) {
+                assert!(
+                    (found - expected).abs() < 1e-4,
+                    "{model:?} {found} {expected}"
+                );
+            }
+        }
     }
 
     #[test]

@@ -25,24 +25,14 @@ pub fn camera_of(sheet: &DataSheet) -> CameraModel {
     let (width_px, height_px) = (sheet.width_px as f64, sheet.height_px as f64);
     let mut camera = CameraModel::pinhole(width_px, height_px, focal_length_px, made.mirrored);
     // The model maps observed to pinhole positions, which is the opposite direction.
-    let [radial, x, y] = [
-        -made.distortion_px,
-        -made.decentring_x_px,
-        -made.decentring_y_px,
-    ];
-    if x != 0.0 || y != 0.0 {
-        // Conrady 1919: u and v of x (3u² + v², 2uv) + y (2uv, u² + 3v²), in thirds; then r² (u,
-        // v).
-        let third = 1.0 / 3.0;
-        let second = [x, y * third, 2.0 * third * y, 2.0 * third * x, x * third, y];
-        let cubic = [radial, 0.0, 0.0, radial, radial, 0.0, 0.0, radial];
-        let terms: Vec<f64> = [0.0; 2].into_iter().chain(second).chain(cubic).collect();
-        let distortion = Distortion::new(DistortionModel::Cubic, camera.radius_px(), &terms);
-        camera.distortion = Some(distortion);
-    } else if radial != 0.0 {
-        let radius_px = camera.radius_px();
-        let distortion = Distortion::new(DistortionModel::Radial, radius_px, &[radial]);
-        camera.distortion = Some(distortion);
+    let terms_px = made.lens_terms_px().map(|outward| -outward);
+    if let Some(last) = terms_px.iter().rposition(|term| *term != 0.0) {
+        let has_all = |model: &DistortionModel| model.terms() > last;
+        let simplest = DistortionModel::LENSES.into_iter().find(has_all);
+        camera.distortion = simplest.map(|model| {
+            let of_model = &terms_px[..model.terms()];
+            Distortion::new(model, camera.radius_px(), of_model)
+        });
     }
     camera
 }

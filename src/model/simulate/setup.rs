@@ -32,20 +32,21 @@ impl Setup {
         }
     }
 
-    /// The displacements of r³ and of Conrady's second order are steepest in the corner: the
-    /// gradients there are three times and twice the displacement.
+    /// The terms of the lens are steepest in the corner: the gradients there are as many times the
+    /// displacement as the term's order.
     fn folded_image(&self) -> Option<String> {
         /// Largest gradient of the distortion, in pixels per pixel. At 1 the image folds; up to
         /// this value the mapping can be inverted in a few steps.
         const MOST_STEEPNESS: f64 = 0.6;
-        let made = &self.scenario.camera.imperfections;
-        let decentring_px = made.decentring_x_px.hypot(made.decentring_y_px);
-        let found_px = 3.0 * made.distortion_px.abs() + 2.0 * decentring_px;
+        let terms_px = self.scenario.camera.imperfections.lens_terms_px();
+        let [third, fifth, seventh, x, y, tilt_x, tilt_y] = terms_px;
+        let radial_px = 3.0 * third.abs() + 5.0 * fifth.abs() + 7.0 * seventh.abs();
+        let found_px = radial_px + 2.0 * (x.hypot(y) + tilt_x.hypot(tilt_y));
         let most_px = MOST_STEEPNESS * camera_of(&self.scenario.camera).radius_px();
         (found_px > most_px).then(|| {
             format!(
-                "the image folds: three times distortion_px and twice the decentring are {found_px} pixels, expected at most \
-                 {most_px:.1} on this detector"
+                "the image folds: 3, 5 and 7 times the radial distortion of these orders, and twice the decentring and the tilt, \
+                 are {found_px} pixels, expected at most {most_px:.1} on this detector"
             )
         })
     }

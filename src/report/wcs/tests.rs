@@ -116,12 +116,7 @@ fn pointing() -> impl Strategy<Value = (f64, f64)> {
 }
 
 fn camera() -> impl Strategy<Value = CameraModel> {
-    let model = prop_oneof![
-        Just(None),
-        Just(Some(DistortionModel::Radial)),
-        Just(Some(DistortionModel::Cubic)),
-        Just(Some(DistortionModel::Quintic)),
-    ];
+    let model = prop::option::weighted(0.8, prop::sample::select(DistortionModel::ALL.to_vec()));
     let size = (100.0..3000.0_f64, 100.0..3000.0_f64);
     let coefficients = prop::collection::vec(-1.0..1.0_f64, 38);
     (size, 0.6..20.0_f64, any::<bool>(), model, coefficients).prop_map(

@@ -50,8 +50,9 @@ fn distortion_moves_the_corner_by_as_much_as_is_asked_for() {
         (x.hypot(y) - 1.0).abs() < 0.02 && x > 0.0 && y > 0.0,
         "{x} {y}"
     );
+    assert!(camera_of(&sheet).distortion_model() == Some(DistortionModel::Radial));
     sheet.imperfections.decentring_x_px = 1.0;
-    assert!(camera_of(&sheet).distortion_model() == Some(DistortionModel::Cubic));
+    assert!(camera_of(&sheet).distortion_model() == Some(DistortionModel::BrownConrady));
     let same = moved(&sheet, plain.centre());
     assert!(same[0].abs() < 1e-6 && same[1].abs() < 1e-6);
     sheet.imperfections.distortion_px = 0.0;
