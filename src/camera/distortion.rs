@@ -84,7 +84,7 @@ impl DistortionModel {
     }
 
     /// Whether the terms are those of a lens, the first of [`lens_terms`], and not monomials.
-    const fn is_lens(self) -> bool {
+    pub const fn is_lens(self) -> bool {
         match self {
             Self::Radial | Self::Radial5 | Self::Radial7 | Self::BrownConrady => true,
             Self::Cubic | Self::Quintic => false,

@@ -12,7 +12,8 @@ use super::predict::{PredictedStar, Surroundings};
 use crate::base::statistics::median;
 use crate::camera::DistortionModel;
 use crate::identify::attitude::{
-    CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera, left_out_chi_sq,
+    CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera, left_out_by_lens_terms,
+    left_out_of_polynomial,
 };
 use std::f64::consts::PI;
 
@@ -367,13 +368,21 @@ impl Refiner {
         let equations = 2.0 * self.stars.len() as f64;
         let worth_it = WORTH_IT * equations / (equations - TAIL_EQUATIONS).max(1.0);
         let is_unexplained = self.are_residuals_unexplained(problem, current);
-        let left_out = |model| left_out_chi_sq(&self.stars, camera, icrs_to_camera, model);
-        let mut best = (None, left_out(None)?);
+        let stars = &self.stars;
+        let of_lenses = left_out_by_lens_terms(stars, camera, icrs_to_camera)?;
+        let left_out = |model: DistortionModel| {
+            if model.is_lens() {
+                Some(of_lenses[model.terms()])
+            } else {
+                left_out_of_polynomial(stars, camera, icrs_to_camera, model)
+            }
+        };
+        let mut best = (None, of_lenses[0]);
         for model in DistortionModel::ALL {
             if model > richest || !is_affordable(model, self.stars.len()) {
                 break;
             }
-            match left_out(Some(model)) {
+            match left_out(model) {
                 Some(chi_sq) if equations * (best.1 / chi_sq).ln() > worth_it => {
                     best = (Some(model), chi_sq);
                 }

@@ -4,9 +4,13 @@
 //! [`fit_camera`] fits attitude, focal length and lens distortion to star positions in pixels, for
 //! an unknown camera.
 
+mod adjustment;
 mod fit;
+mod left_out;
 
-pub use fit::{CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera, left_out_chi_sq};
+pub use adjustment::{MeasuredStar, POSE_PARAMETERS};
+pub use fit::{CameraFit, fit_camera};
+pub use left_out::{left_out_by_lens_terms, left_out_of_polynomial};
 
 use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use nalgebra::{Matrix3, SVD};

@@ -1,0 +1,237 @@
+//! How well a fit of each lens model predicts a star that is left out of it.
+//!
+//! The residual of an equation that is left out is its residual over 1 − h, with h its leverage, so
+//! no fit is repeated (Allen 1974, Technometrics 16, 125). The models of lenses are nested: each
+//! has the terms of those before it. One orthogonalisation of all terms gives residuals and
+//! leverages of each model in turn.
+
+use super::adjustment::{
+    Adjustment, LINEAR_TERMS, Lanes, MeasuredStar, POSE_PARAMETERS, Reduced, Rows, add_products,
+};
+use crate::base::coords::{Camera, Icrs, Rotation};
+use crate::camera::{
+    CUBIC_MONOMIALS, CameraModel, DistortionModel, LANES, LENS_TERMS, QUINTIC_MONOMIALS,
+};
+use multiversion::multiversion;
+use nalgebra::SVector;
+
+/// Smallest freedom of an equation at which its left-out residual is defined.
+const MIN_FREEDOM: f64 = 1e-6;
+/// Parameters of a camera with all terms of a lens.
+const LENS_PARAMETERS: usize = POSE_PARAMETERS + LENS_TERMS;
+
+/// Σ (residual / σ)² with each equation predicted by a fit to the others: for lenses with no terms,
+/// with the first, with the first two and so on, to all of [`DistortionModel::BrownConrady`]. It
+/// grows where a model has too much freedom. `camera` and `icrs_to_camera` must be close to the
+/// best ones.
+///
+/// `None` where the stars do not determine the parameters.
+pub fn left_out_by_lens_terms(
+    stars: &[MeasuredStar],
+    camera: &CameraModel,
+    icrs_to_camera: &Rotation<Icrs, Camera>,
+) -> Option<[f64; LENS_TERMS + 1]> {
+    let model = Some(DistortionModel::BrownConrady);
+    let adjustment = Adjustment::<LENS_PARAMETERS, 0>::new(stars, (camera, icrs_to_camera), model)?;
+    let reduced = adjustment.reduced()?;
+    let shares = reduced
+        .root
+        .l_dirty()
+        .solve_lower_triangular(&reduced.vector)?;
+    nested_sums(&adjustment, &reduced, &shares)
+}
+
+/// The same for the richest models, [`DistortionModel::Cubic`] and [`DistortionModel::Quintic`].
+pub fn left_out_of_polynomial(
+    stars: &[MeasuredStar],
+    camera: &CameraModel,
+    icrs_to_camera: &Rotation<Icrs, Camera>,
+    model: DistortionModel,
+) -> Option<f64> {
+    const PARAMETERS: usize = POSE_PARAMETERS + LINEAR_TERMS;
+    let at = (camera, icrs_to_camera);
+    if model == DistortionModel::Cubic {
+        left_out(Adjustment::<PARAMETERS, CUBIC_MONOMIALS>::new(
+            stars,
+            at,
+            Some(model),
+        )?)
+    } else {
+        left_out(Adjustment::<PARAMETERS, QUINTIC_MONOMIALS>::new(
+            stars,
+            at,
+            Some(model),
+        )?)
+    }
+}
+
+fn left_out<const P: usize, const K: usize>(mut adjustment: Adjustment<P, K>) -> Option<f64> {
+    let (_, reduced) = adjustment.step()?;
+    left_out_sum(&adjustment, &reduced)
+}
+
+/// The sums of [`left_out_by_lens_terms`]; `shares` is L⁻¹ times the right-hand side.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn nested_sums(
+    adjustment: &Adjustment<LENS_PARAMETERS, 0>,
+    reduced: &Reduced<LENS_PARAMETERS, 0>,
+    shares: &SVector<f64, LENS_PARAMETERS>,
+) -> Option<[f64; LENS_TERMS + 1]> {
+    let root = reduced.root.l_dirty();
+    let mut sums = [[0.0; LANES]; LENS_TERMS + 1];
+    for stars in adjustment.stars.chunks(LANES) {
+        let rows = adjustment.rows(stars)?;
+        for axis in 0..2 {
+            let (mut terms, mut residual) = (rows.common[axis], rows.rhs[axis]);
+            let mut leverage = [0.0; LANES];
+            for i in 0..LENS_PARAMETERS {
+                let (above, below) = terms.split_at_mut(i);
+                let this = &mut below[0];
+                for (j, above) in above.iter().enumerate() {
+                    add_scaled(this, -root[(i, j)], above);
+                }
+                *this = this.map(|value| value / root[(i, i)]);
+                add_products(&mut leverage, this, this);
+                add_scaled(&mut residual, -shares[i], this);
+                if i + 1 >= POSE_PARAMETERS {
+                    add_left_out(&mut sums[i + 1 - POSE_PARAMETERS], &residual, &leverage);
+                }
+            }
+        }
+    }
+    Some(sums.map(|lanes| lanes.iter().sum()))
+}
+
+#[inline(always)]
+fn add_left_out(sums: &mut Lanes, residual: &Lanes, leverage: &Lanes) {
+    for lane in 0..LANES {
+        let left_out = residual[lane] / (1.0 - leverage[lane]).max(MIN_FREEDOM);
+        sums[lane] += left_out * left_out;
+    }
+}
+
+/// Σ (residual / σ)² over all equations, each residual as if its equation were left out of the fit.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn left_out_sum<const P: usize, const K: usize>(
+    adjustment: &Adjustment<P, K>,
+    reduced: &Reduced<P, K>,
+) -> Option<f64> {
+    let mut sum = 0.0;
+    for stars in adjustment.stars.chunks(LANES) {
+        let leverages = leverages(adjustment, &adjustment.rows(stars)?, reduced);
+        for (lane, star) in stars.iter().enumerate() {
+            let residual_px = adjustment.residual_px(star)?;
+            for axis in 0..2 {
+                let freedom = (1.0 - leverages[axis][lane]).max(MIN_FREEDOM);
+                sum += (residual_px[axis] / star.sigma_px / freedom).powi(2);
+            }
+        }
+    }
+    Some(sum)
+}
+
+/// The leverage of each equation of some stars, along x and y.
+#[inline(always)]
+fn leverages<const P: usize, const K: usize>(
+    adjustment: &Adjustment<P, K>,
+    rows: &Rows<P, K>,
+    reduced: &Reduced<P, K>,
+) -> [Lanes; 2] {
+    let mut of_monomials = [[0.0; LANES]; K];
+    let mut shared = [0.0; LANES];
+    for (i, of_monomial) in of_monomials.iter_mut().enumerate() {
+        for (j, monomial) in rows.monomials[..=i].iter().enumerate() {
+            add_scaled(of_monomial, adjustment.inverse_root[(i, j)], monomial);
+        }
+        add_products(&mut shared, of_monomial, of_monomial);
+    }
+    let root = reduced.root.l_dirty();
+    [0, 1].map(|axis: usize| {
+        let (mut rest, mut leverage) = (rows.common[axis], shared);
+        for i in 0..P {
+            let (above, below) = rest.split_at_mut(i);
+            let this = &mut below[0];
+            for (k, of_monomial) in of_monomials.iter().enumerate() {
+                add_scaled(this, -reduced.coupling[axis][(k, i)], of_monomial);
+            }
+            for (j, above) in above.iter().enumerate() {
+                add_scaled(this, -root[(i, j)], above);
+            }
+            *this = this.map(|value| value / root[(i, i)]);
+            add_products(&mut leverage, this, this);
+        }
+        leverage
+    })
+}
+
+#[inline(always)]
+fn add_scaled(sums: &mut Lanes, factor: f64, values: &Lanes) {
+    for lane in 0..LANES {
+        sums[lane] += factor * values[lane];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::coords::{PixelPoint, UnitVector};
+
+    /// A camera and its attitude, and stars whose positions scatter by about 0.1 px.
+    fn scattered_stars() -> (CameraModel, Rotation<Icrs, Camera>, Vec<MeasuredStar>) {
+        let camera = CameraModel::pinhole(1024.0, 768.0, 2000.0, false);
+        let attitude = Rotation::looking_at(&UnitVector::from_ra_dec(0.0, 0.5), 0.0);
+        let star = |i: usize| {
+            let place = PixelPoint::new((i * 151 % 1024) as f64, (i * 89 % 768) as f64);
+            let phase = (i * i * 7 % 31) as f64;
+            let (dx, dy) = (0.1 * phase.sin(), 0.1 * (phase * 1.7).cos());
+            MeasuredStar {
+                pixel: PixelPoint::new(place.x + dx, place.y + dy),
+                icrs: attitude.inverse().apply(&camera.direction_of(&place)),
+                sigma_px: 0.1,
+            }
+        };
+        (camera, attitude, (0..43).map(star).collect())
+    }
+
+    #[test]
+    fn nested_models_are_as_each_by_itself() {
+        let (camera, attitude, stars) = scattered_stars();
+        let nested = left_out_by_lens_terms(&stars, &camera, &attitude).unwrap();
+        let at = (&camera, &attitude);
+        let [radial, radial5, radial7, all] = DistortionModel::LENSES.map(Some);
+        let alone = [
+            (
+                0,
+                left_out(Adjustment::<4, 0>::new(&stars, at, None).unwrap()),
+            ),
+            (
+                1,
+                left_out(Adjustment::<5, 0>::new(&stars, at, radial).unwrap()),
+            ),
+            (
+                2,
+                left_out(Adjustment::<6, 0>::new(&stars, at, radial5).unwrap()),
+            ),
+            (
+                3,
+                left_out(Adjustment::<7, 0>::new(&stars, at, radial7).unwrap()),
+            ),
+            (
+                7,
+                left_out(Adjustment::<11, 0>::new(&stars, at, all).unwrap()),
+            ),
+        ];
+        for (terms, expected) in alone {
+            let ratio = nested[terms] / expected.unwrap();
+            assert!((ratio - 1.0).abs() < 1e-3, "{terms} {ratio}");
+        }
+    }
+
+    #[test]
+    fn too_much_freedom_shows() {
+        let (camera, attitude, stars) = scattered_stars();
+        let lenses = left_out_by_lens_terms(&stars, &camera, &attitude).unwrap();
+        let rich = left_out_of_polynomial(&stars, &camera, &attitude, DistortionModel::Quintic);
+        assert!(rich.unwrap() > lenses[0]);
+    }
+}
