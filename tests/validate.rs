@@ -252,7 +252,7 @@ fn a_modified_table_is_reported_with_the_position() {
             with_line(5, &bad_word),
             "line 5: unknown variant `rihgt`, expected one of `right`",
         ),
-        (with_line(5, "3,1"), "line 5: 2 fields, expected 36"),
+        (with_line(5, "3,1"), "line 5: 2 fields, expected 40"),
         (with_line(5, rows[5]), "line 5: frame 4 with the seed"),
         (
             with_line(1, "a,b"),
@@ -358,6 +358,40 @@ fn a_study_has_a_run_and_a_row_for_each_value() {
 }
 
 #[test]
+fn the_focal_length_is_right_for_every_lens_of_the_hard_suite() {
+    /// Largest error in units of the stated one, root mean square of so few frames.
+    const MOST_SIGMAS: f64 = 2.5;
+    let directory = tempfile::tempdir().unwrap();
+    let out = directory.path().join("hard");
+    let camera = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/validation/camera.toml");
+    let options = [
+        "--camera", camera, "--frames", "8", "--suite", "hard", "--format", "json",
+    ];
+    let run = || {
+        let to = ["validate", "--out", out.to_str().unwrap()];
+        Ran::new(starpipe().args([&to[..], &options].concat()))
+    };
+    let ran = run();
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    let rows = ran.reports();
+    assert_eq!(lines(&out.join("suite.csv")), rows.len() + 1);
+    for row in &rows {
+        let case = row["case"].as_str().unwrap();
+        assert_eq!(row["frames"], 8, "{case}");
+        assert_eq!(row["wrong"], 0, "{case}");
+        if case.starts_with("lens") || case.starts_with("detector") {
+            assert_eq!(row["right"], 8, "{case}");
+            let of = |name: &str| row[name].as_f64().unwrap();
+            let sigmas = of("pull_focal_length_mean").hypot(of("pull_focal_length_sd"));
+            assert!(sigmas < MOST_SIGMAS, "{case}: {sigmas}");
+        }
+    }
+    // A second run reads the existing results.
+    let again = run();
+    assert_eq!((again.status, again.stdout), (0, ran.stdout));
+}
+
+#[test]
 fn nonsensical_options_are_refused_by_name() {
     let directory = tempfile::tempdir().unwrap();
     for (more, expected) in [
@@ -370,6 +404,10 @@ fn nonsensical_options_are_refused_by_name() {
         ),
         (&["--sweep", "band_to_nm=300:500:2"], "band_to_nm of 300"),
         (&["--figures", "gif"], "invalid value 'gif'"),
+        (
+            &["--suite", "hard", "--sweep", "bits=8:9:2"],
+            "cannot be used with",
+        ),
         (&["--camera", "a.toml"], "cannot be used with"),
     ] {
         let ran = validate(directory.path(), more);

@@ -25,9 +25,12 @@ const RAYLEIGH_MEDIAN: f64 = 1.177_41;
 const MIN_RADIUS_PX: f64 = 0.25;
 /// Equations per parameter that a distortion model needs.
 const EQUATIONS_PER_PARAMETER: f64 = 4.0;
-/// Gain in likelihood of the stars left out of the fit (twice its logarithm) that a richer model
-/// needs.
-const WORTH_IT: f64 = 12.0;
+/// Gain in likelihood of the stars left out of the fit (twice its logarithm) that each further term
+/// of a lens needs. It is small: a term that is missed shifts the focal length by several standard
+/// errors, and one that is not needed makes these larger, but not false.
+const WORTH_A_TERM: f64 = 3.0;
+/// The same that a polynomial needs, whose many terms go astray where there are no stars.
+const WORTH_A_POLYNOMIAL: f64 = 12.0;
 /// With few equations the required gain is larger: the F distribution has heavier tails than χ².
 const TAIL_EQUATIONS: f64 = 8.0;
 /// Residuals exceed the stated errors if their median does so by this many of its standard errors.
@@ -366,7 +369,7 @@ impl Refiner {
             ..
         } = &current.fit;
         let equations = 2.0 * self.stars.len() as f64;
-        let worth_it = WORTH_IT * equations / (equations - TAIL_EQUATIONS).max(1.0);
+        let heavier_tails = equations / (equations - TAIL_EQUATIONS).max(1.0);
         let is_unexplained = self.are_residuals_unexplained(problem, current);
         let stars = &self.stars;
         let of_lenses = left_out_by_lens_terms(stars, camera, icrs_to_camera)?;
@@ -382,6 +385,7 @@ impl Refiner {
             if model > richest || !is_affordable(model, self.stars.len()) {
                 break;
             }
+            let worth_it = heavier_tails * least_gain(model, best.0);
             match left_out(model) {
                 Some(chi_sq) if equations * (best.1 / chi_sq).ln() > worth_it => {
                     best = (Some(model), chi_sq);
@@ -446,6 +450,16 @@ impl Refiner {
             }
         }
         high
+    }
+}
+
+/// The gain in likelihood over a simpler model that a model needs.
+fn least_gain(model: DistortionModel, simpler: Option<DistortionModel>) -> f64 {
+    if model.is_lens() {
+        let terms = simpler.map_or(0, DistortionModel::terms);
+        WORTH_A_TERM * (model.terms() - terms) as f64
+    } else {
+        WORTH_A_POLYNOMIAL
     }
 }
 

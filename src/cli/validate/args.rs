@@ -5,19 +5,28 @@ use crate::cli::options::catalog::CatalogOptions;
 use crate::cli::options::format::PageFormat;
 use crate::cli::options::setup::SetupOptions;
 use crate::cli::plot::FigureForm;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use std::path::PathBuf;
+
+/// Cases that are run together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Suite {
+    /// Lenses, spots and detectors that are not what the pipeline assumes
+    Hard,
+}
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     starpipe validate --camera camera.toml --frames 1000 --seed 1 --out validation\n  \
     starpipe validate --preset nanosat-tracker --exposure-s 0.2 --scale-unknown --out validation\n  \
     starpipe validate --camera camera.toml --frames 500 --sweep read_noise_e=1:30:7:log --out study\n  \
-    starpipe validate --camera camera.toml --sweep fov_deg=4:32:8 --out study\n\n\
+    starpipe validate --camera camera.toml --sweep fov_deg=4:32:8 --out study\n  \
+    starpipe validate --camera camera.toml --frames 200 --suite hard --out hard\n\n\
     Frames are simulated and processed in memory, at attitudes that are uniform over all rotations. DIR\n\
     gets frames.csv and stars.csv with a row for each frame and each star, the same as Parquet in\n\
     frames.parquet/ and stars.parquet/, a summary in summary.json and summary.txt, and figures. A study\n\
-    writes all this for each value into DIR/NAME=VALUE/, and a row for each into study.csv and study.json.\n\n\
+    writes all this for each value into DIR/NAME=VALUE/, and a row for each into study.csv and study.json;\n\
+    a suite does so in DIR/CASE/, suite.csv, suite.json and suite.txt.\n\n\
     A run may be stopped at any time, also by Ctrl-C. The same command continues it, and one with more\n\
     --frames extends it. The results are the same to the last byte on any number of threads.")]
 pub(crate) struct ValidateArgs {
@@ -41,6 +50,9 @@ pub(crate) struct ValidateArgs {
         allow_hyphen_values = true
     )]
     pub(crate) sweep: Vec<StudySweep>,
+    /// A run for each case of a suite
+    #[arg(long, value_enum, conflicts_with = "sweep")]
+    pub(crate) suite: Option<Suite>,
     /// Format of the figures
     #[arg(long, value_enum, default_value_t = FigureForm::Svg)]
     pub(crate) figures: FigureForm,

@@ -6,8 +6,10 @@ mod parquet;
 mod run;
 mod shared;
 mod study;
+mod suite;
 mod sweep;
 
+use args::Suite;
 pub(crate) use args::ValidateArgs;
 
 use super::exit::{CommandError, Outcome};
@@ -15,7 +17,7 @@ use super::options::format::PageFormat;
 use super::output::rows::{json_line, json_lines};
 use super::progress::frames_bar_with_speed;
 use shared::Shared;
-use starpipe::study::validation::{Protocol, StudyRow};
+use starpipe::study::validation::{HARD_SUITE, HardRow, Protocol, StudyRow};
 
 /// `starpipe validate`
 pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Outcome, CommandError> {
@@ -25,7 +27,10 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Outcome, CommandError
         seed: arguments.seed,
     };
     let study_runs = study::runs(&arguments.sweep, &protocol)?;
-    let runs = study_runs.len().max(1) as u64;
+    let runs = match arguments.suite {
+        Some(Suite::Hard) => HARD_SUITE.len(),
+        None => study_runs.len().max(1),
+    } as u64;
     let text = arguments.catalog.with_index(|pool, indexed| {
         let shared = Shared {
             indexed,
@@ -34,7 +39,13 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Outcome, CommandError
             figures: arguments.figures,
             progress: frames_bar_with_speed(arguments.frames * runs),
         };
-        let text = if study_runs.is_empty() {
+        let text = if arguments.suite.is_some() {
+            let rows = suite::run(&arguments.out, &protocol, &shared)?;
+            match arguments.format {
+                PageFormat::Text => HardRow::to_text(&rows),
+                PageFormat::Json => json_lines(rows.iter())?,
+            }
+        } else if study_runs.is_empty() {
             let summary = run::run(&arguments.out, &protocol, &shared)?;
             match arguments.format {
                 PageFormat::Text => summary.to_text(),

@@ -69,7 +69,8 @@ pub fn compare(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Compar
     let budget = Budget::new(&scenario);
     let detector = Detector::matched_filter(&frame.detect, &scenario, &budget);
     let peak = Detector::new(Rule::PeakPixel, &scenario, &budget);
-    let zero_point_vmag = zero_point_vmag(&scenario, frame);
+    let colors = frame.zero_point_colors_mag;
+    let zero_point_vmag = expected_zero_point_vmag(&scenario, colors, frame.has_color_term);
     let limit_vmag = detector.vmag_at(0.5);
     let faintest = Faintest::among(frame.field_vmag.iter().copied(), &detector);
     let minus = |measured: Option<Estimate>, predicted: f64| {
@@ -128,13 +129,14 @@ fn scenario(stated: &StatedCamera, frame: &FrameMeasurement, exposure_s: f64) ->
     (scenario, zenith_deg.is_some())
 }
 
-/// Predicted V magnitude for 1 ADU/s, for stars of the colours in the frame and the same fit.
-fn zero_point_vmag(scenario: &Scenario, frame: &FrameMeasurement) -> f64 {
+/// Predicted V magnitude of a star that gives 1 ADU/s, by the same fit as the measured one: `colors`
+/// are B−V of the stars of the zero point, and `has_color_term` is whether it holds for
+/// [`REFERENCE_BV_MAG`] instead of for their mean.
+pub fn expected_zero_point_vmag(scenario: &Scenario, colors: &[f64], has_color_term: bool) -> f64 {
     let gain_e_per_adu = scenario.camera.gain_e_per_adu;
     let light = StarLight::new(scenario);
     let sun_like_vmag = light.budget().vmag_of(gain_e_per_adu, 1.0);
     let zero_point = |bv_mag: &f64| sun_like_vmag + light.color_effect_mag(*bv_mag);
-    let colors = frame.zero_point_colors_mag;
     let mean = |value: &dyn Fn(&f64) -> f64| {
         colors.iter().map(value).sum::<f64>() / colors.len().max(1) as f64
     };
@@ -142,7 +144,7 @@ fn zero_point_vmag(scenario: &Scenario, frame: &FrameMeasurement) -> f64 {
         return sun_like_vmag;
     }
     let (mean_bv_mag, mean_vmag) = (mean(&|bv| *bv), mean(&zero_point));
-    if !frame.has_color_term {
+    if !has_color_term {
         return mean_vmag;
     }
     let deviation = |bv: &f64| bv - mean_bv_mag;

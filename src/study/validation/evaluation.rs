@@ -8,12 +8,12 @@ use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::identify::{Identification, SourceIndex};
 use crate::model::sensitivity::{CramerRao, Faintest};
 use crate::model::simulate::TrueStar;
-use crate::pipeline::Outcome;
-use crate::pipeline::{Solution, Source};
+use crate::photometry::comparison::expected_zero_point_vmag;
+use crate::pipeline::{Note, Outcome, Solution, Source};
 use crate::sky::catalog::StarIndex;
 use crate::study::robustness::Answer;
 use nalgebra::Vector3;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 pub(super) struct Evaluation<'a> {
     validator: &'a Validator<'a>,
@@ -36,6 +36,8 @@ struct Assignments {
     /// The other star-like sources.
     others: Vec<(RowKind, SourceIndex)>,
     detected: u64,
+    /// Stars with several sources.
+    split: HashSet<usize>,
 }
 
 impl<'a> Evaluation<'a> {
@@ -109,6 +111,9 @@ impl<'a> Evaluation<'a> {
                 found.distance_to(&star.position)
             };
             let nearest = assignments.of_star.entry(star.number).or_insert(index);
+            if *nearest != index {
+                assignments.split.insert(star.number);
+            }
             if distance(index) < distance(*nearest) {
                 *nearest = index;
             }
@@ -256,6 +261,8 @@ impl<'a> Evaluation<'a> {
             false_detections: count(RowKind::False),
             blends: count(RowKind::Blend),
             star_rows: star_rows as u64,
+            split: assignments.split.len() as u64,
+            notes: self.notes(),
             ..self.photometric_fields()
         }
     }
@@ -275,6 +282,7 @@ impl<'a> Evaluation<'a> {
         let sheet = &validator.protocol.setup.scenario.camera;
         let level_adu = sheet.bias_adu + truth.background_e / sheet.gain_e_per_adu;
         let noise_adu = validator.budget.background_noise_e / sheet.gain_e_per_adu;
+        let zero_point = self.zero_point_mag();
         FrameRecord {
             faintest_vmag: faintest.map(|v_mag| to_decimals(v_mag, 3)),
             expected_faintest_vmag: expected.map(|e| to_decimals(e.mean_vmag, 4)),
@@ -286,8 +294,29 @@ impl<'a> Evaluation<'a> {
             true_background_adu: significant(level_adu),
             noise_adu: background.map(|b| significant(b.noise_adu)),
             true_noise_adu: significant(noise_adu),
+            zero_point_error_mag: zero_point.map(|(error_mag, _)| to_decimals(error_mag, 5)),
+            zero_point_sigma_mag: zero_point.map(|(_, sigma_mag)| to_decimals(sigma_mag, 5)),
             ..self.attitude_fields().unwrap_or_default()
         }
+    }
+
+    /// The codes of the notes; that of the exposure, which the pipeline is not told, says nothing.
+    fn notes(&self) -> Option<String> {
+        let notes = self.solution.notes.iter();
+        let said = notes.filter(|note| !matches!(note, Note::NoExposure));
+        let codes: Vec<&str> = said.map(Note::code).collect();
+        (!codes.is_empty()).then(|| codes.join(" "))
+    }
+
+    /// Measured minus true zero point of the frame's exposure, and its stated standard error.
+    fn zero_point_mag(&self) -> Option<(f64, f64)> {
+        let photometry = self.solution.photometry.as_ref()?;
+        let measured = photometry.zero_point.as_ref()?;
+        let scenario = &self.validator.protocol.setup.scenario;
+        let colors = &photometry.zero_point_colors_mag;
+        let of_a_second = expected_zero_point_vmag(scenario, colors, measured.color_term.is_some());
+        let expected = of_a_second + 2.5 * scenario.conditions.exposure_s.log10();
+        Some((measured.v_mag - expected, measured.sigma_mag))
     }
 
     fn answer(&self) -> Answer {

@@ -28,6 +28,7 @@ mod light;
 mod parameter_study;
 mod record;
 pub mod store;
+mod suite;
 mod summary;
 mod text;
 mod theory;
@@ -36,6 +37,7 @@ mod validator;
 pub use light::LightMap;
 pub use parameter_study::{StudyParameter, StudyRow};
 pub use record::{BEYOND_LIMIT_MAG, FrameRecord, Named, RowKind, StarRecord};
+pub use suite::{HARD_SUITE, HardCase, HardRow};
 pub use summary::{
     Accumulator, AttitudeSummary, CentroidBin, CentroidSummary, CompletenessBin,
     CompletenessSummary, DetectionSummary, DifferenceSummary, Histogram, IdentificationBin,

@@ -88,6 +88,14 @@ pub struct FrameRecord {
     pub noise_adu: Option<f64>,
     /// True noise of a pixel.
     pub true_noise_adu: f64,
+    /// True stars that were detected as several.
+    pub split: u64,
+    /// Measured minus true photometric zero point.
+    pub zero_point_error_mag: Option<f64>,
+    /// Stated standard error of the zero point.
+    pub zero_point_sigma_mag: Option<f64>,
+    /// Codes of the frame's notes, separated by spaces.
+    pub notes: Option<String>,
 }
 
 /// Type of a row in the table of stars.

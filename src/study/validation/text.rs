@@ -29,7 +29,7 @@ impl Summary {
         if let Some(attitude) = &self.attitude {
             text += &attitude_text(attitude);
         }
-        text + &self.differences_text()
+        text + &self.differences_text() + &self.notes_text()
     }
 
     fn identification_text(&self) -> String {
@@ -62,7 +62,7 @@ impl Summary {
         format!(
             "\nDetection\n  a frame has {:.1} detections, {:.1} of them named; named wrongly {} of {}, {} of these as a star that stands there as well\n  \
              false: {} on all frames, {} in a million pixels (95 %: {} to {}), asked for {}\n  \
-             blends {}, taken for no stars {}\n",
+             blends {}, taken for no stars {}, stars found as several {}\n",
             per_frame(d.detected),
             per_frame(d.named),
             d.misnamed,
@@ -75,6 +75,7 @@ impl Summary {
             self.facts.false_alarms_per_mpx,
             d.blends,
             d.rejected,
+            d.split,
         )
     }
 
@@ -155,7 +156,7 @@ impl Summary {
             "0.00 %"
         );
         let p = &self.pulls;
-        let lines: [(&str, &Pull); 7] = [
+        let lines: [(&str, &Pull); 8] = [
             ("star's x", &p.x),
             ("star's y", &p.y),
             ("star's light", &p.flux),
@@ -163,6 +164,7 @@ impl Summary {
             ("turn about y", &p.attitude_y),
             ("roll", &p.roll),
             ("focal length", &p.focal_length),
+            ("zero point", &p.zero_point),
         ];
         for (name, pull) in lines {
             let _ = writeln!(
@@ -193,6 +195,7 @@ impl Summary {
         };
         line("faintest star named", " mag", &self.faintest);
         line("limit by the frame alone", " mag", &self.frame_limit);
+        line("zero point", " mag", &self.zero_point);
         line("background", " ADU", &self.background);
         let noise = &self.noise_ratio;
         let _ = writeln!(
@@ -200,6 +203,20 @@ impl Summary {
             "  noise, over the true one {:.4} ± {:.4}, scatter {:.4}; {} frames",
             noise.mean, noise.mean_sigma, noise.sd, noise.count
         );
+        text
+    }
+}
+
+impl Summary {
+    /// The frames with each note; empty where there are none.
+    fn notes_text(&self) -> String {
+        if self.notes.is_empty() {
+            return String::new();
+        }
+        let mut text = "\nFrames with a note\n".to_owned();
+        for (code, frames) in &self.notes {
+            let _ = writeln!(text, "  {code:<28} {frames:>6}");
+        }
         text
     }
 }

@@ -14,7 +14,7 @@ use std::path::Path;
 
 const FILE: &str = "run.json";
 /// Version of the tables and of `run.json`.
-const SCHEMA: u32 = 1;
+const SCHEMA: u32 = 2;
 /// Files that a run writes.
 const TABLES: [&str; 4] = ["frames.csv", "stars.csv", "frames.parquet", "stars.parquet"];
 

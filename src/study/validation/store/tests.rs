@@ -42,6 +42,10 @@ pub(super) fn frame_row(frame: u64) -> FrameRecord {
         true_background_adu: 100.0,
         noise_adu: Some(5.0),
         true_noise_adu: 5.0,
+        split: 1,
+        zero_point_error_mag: Some(0.01),
+        zero_point_sigma_mag: Some(0.02),
+        notes: Some("not_linear large_residuals".to_owned()),
     }
 }
 

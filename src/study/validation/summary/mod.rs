@@ -22,6 +22,7 @@ use completeness::Completeness;
 use identification::Identifications;
 use pulls::RunningStatistics;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Version of the JSON schema.
 pub const SCHEMA: u32 = 1;
@@ -77,6 +78,10 @@ pub struct Summary {
     pub background: DifferenceSummary,
     /// Measured over true noise.
     pub noise_ratio: DifferenceSummary,
+    /// Measured minus true zero point, in magnitudes.
+    pub zero_point: DifferenceSummary,
+    /// Frames with a note, by its code.
+    pub notes: BTreeMap<String, u64>,
 }
 
 /// Numbers of detections and names.
@@ -88,6 +93,8 @@ pub struct DetectionSummary {
     pub rejected: u64,
     /// Detections with the light of several stars, none of which contributes more than half.
     pub blends: u64,
+    /// Stars that were detected as several.
+    pub split: u64,
     /// Named detections.
     pub named: u64,
     /// Named detections that are another star, or none.
@@ -174,8 +181,9 @@ pub struct Accumulator {
     identification: Identifications,
     completeness: Completeness,
     centroids: Centroids,
-    /// Pulls of x, y and flux; of the rotations about x, y and the boresight; of the focal length.
-    pulls: [RunningStatistics; 7],
+    /// Pulls of x, y and flux; of the rotations about x, y and the boresight; of the focal length;
+    /// of the zero point.
+    pulls: [RunningStatistics; 8],
     boresight_arcsec: Vec<f64>,
     roll_arcsec: Vec<f64>,
     squares_arcsec2: [f64; 3],
@@ -186,6 +194,8 @@ pub struct Accumulator {
     frame_limit: RunningStatistics,
     background: RunningStatistics,
     noise_ratio: RunningStatistics,
+    zero_point: RunningStatistics,
+    notes: BTreeMap<String, u64>,
 }
 
 impl Accumulator {
@@ -210,6 +220,8 @@ impl Accumulator {
             frame_limit: magnitudes(),
             background: magnitudes(),
             noise_ratio: magnitudes(),
+            zero_point: magnitudes(),
+            notes: BTreeMap::new(),
         }
     }
 
@@ -220,6 +232,7 @@ impl Accumulator {
         sums.detected += row.detected;
         sums.rejected += row.rejected;
         sums.blends += row.blends;
+        sums.split += row.split;
         sums.named += row.named;
         sums.misnamed += row.misnamed;
         sums.misnamed_companions += row.misnamed_companions;
@@ -239,7 +252,23 @@ impl Accumulator {
             self.background.add(level - row.true_background_adu);
             self.noise_ratio.add(noise / row.true_noise_adu);
         }
+        for code in row.notes.iter().flat_map(|codes| codes.split(' ')) {
+            *self.notes.entry(code.to_owned()).or_default() += 1;
+        }
+        if row.status == Answer::Right {
+            self.add_zero_point(row);
+        }
         self.add_attitude(row);
+    }
+
+    fn add_zero_point(&mut self, row: &FrameRecord) {
+        let (error, sigma) = (row.zero_point_error_mag, row.zero_point_sigma_mag);
+        if let Some(error) = error {
+            self.zero_point.add(error);
+        }
+        if let Some(pull) = self.pulls.last_mut() {
+            pull.add_pull(error, sigma);
+        }
     }
 
     fn add_attitude(&mut self, row: &FrameRecord) {
@@ -302,7 +331,17 @@ impl Accumulator {
     pub fn finish(mut self) -> Summary {
         let attitude = self.attitude();
         let detection = self.detection();
-        let [x, y, flux, attitude_x, attitude_y, roll, focal_length] = self.pulls.map(|p| p.pull());
+        let pulls = self.pulls.map(|p| p.pull());
+        let [
+            x,
+            y,
+            flux,
+            attitude_x,
+            attitude_y,
+            roll,
+            focal_length,
+            zero_point,
+        ] = pulls;
         let faintest_sigma = self.faintest.count().max(1) as f64;
         let expected_sigma = (self.faintest_variance_sum / faintest_sigma).sqrt();
         Summary {
@@ -320,12 +359,15 @@ impl Accumulator {
                 attitude_y,
                 roll,
                 focal_length,
+                zero_point,
             },
             attitude,
             faintest: self.faintest.difference(Some(expected_sigma)),
             frame_limit: self.frame_limit.difference(None),
             background: self.background.difference(None),
             noise_ratio: self.noise_ratio.difference(None),
+            zero_point: self.zero_point.difference(None),
+            notes: self.notes,
             facts: self.facts,
         }
     }

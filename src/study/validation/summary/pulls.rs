@@ -21,6 +21,8 @@ pub struct PullSummary {
     pub roll: Pull,
     /// Of the focal length.
     pub focal_length: Pull,
+    /// Of the photometric zero point.
+    pub zero_point: Pull,
 }
 
 /// Statistics of one pull.

@@ -52,6 +52,10 @@ fn frame(number: u64, status: Answer, errors: [f64; 3]) -> FrameRecord {
         true_background_adu: 100.0,
         noise_adu: Some(9.0),
         true_noise_adu: 10.0,
+        split: 1,
+        zero_point_error_mag: of_right(0.03),
+        zero_point_sigma_mag: of_right(0.02),
+        notes: (number > 0).then(|| "not_linear large_residuals".to_owned()),
     }
 }
 
@@ -146,6 +150,13 @@ fn errors_of_the_attitude_are_of_right_answers_and_in_units_of_their_own() {
     assert_eq!((pulls.attitude_x.mean, pulls.attitude_x.sd), (0.0, 2.1213));
     assert_eq!((pulls.roll.mean, pulls.roll.beyond_2_percent), (1.0, 50.0));
     assert_eq!(pulls.focal_length.mean, 3.0);
+    assert_eq!((pulls.zero_point.count, pulls.zero_point.mean), (2, 1.5));
+    assert_eq!(
+        (summary.zero_point.mean, summary.detection.split),
+        (0.03, 3)
+    );
+    assert_eq!(summary.notes.len(), 2);
+    assert_eq!(summary.notes["not_linear"], 2);
     let faintest = &summary.faintest;
     assert_eq!(
         (faintest.count, faintest.mean, faintest.expected_sd),

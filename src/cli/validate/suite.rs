@@ -1,0 +1,36 @@
+//! The hard suite: a run for each case, and a row for each run.
+
+use super::run;
+use super::shared::Shared;
+use crate::cli::exit::CommandError;
+use crate::cli::output::files::write_into;
+use crate::cli::output::rows::{csv_table, json_indented};
+use starpipe::study::validation::{HARD_SUITE, HardRow, Protocol};
+use std::path::Path;
+
+/// Does the runs of all cases, one after the other, and writes a table of them.
+pub(super) fn run(
+    directory: &Path,
+    base: &Protocol,
+    shared: &Shared,
+) -> Result<Vec<HardRow>, CommandError> {
+    let mut rows = Vec::new();
+    for case in &HARD_SUITE {
+        let protocol = Protocol {
+            setup: case.setup(&base.setup),
+            ..base.clone()
+        };
+        let check = protocol.setup.check();
+        check.map_err(|error| CommandError::Usage(format!("{}: {error}", case.name)))?;
+        let summary = run::run(&directory.join(case.name), &protocol, shared)?;
+        rows.push(HardRow::new(case, &summary));
+    }
+    let tables = [
+        ("suite.json", json_indented(&rows)?),
+        ("suite.csv", csv_table(rows.iter())?),
+        ("suite.txt", HardRow::to_text(&rows)),
+    ];
+    let tables = tables.map(|(name, text)| (name.to_owned(), text.into_bytes()));
+    write_into(directory, tables.into_iter())?;
+    Ok(rows)
+}

@@ -1,0 +1,273 @@
+//! The hard suite: lenses, spots and detectors that are not those that the pipeline assumes, a run
+//! for each, and a row for each run.
+
+use super::summary::Summary;
+use crate::camera::LENS_TERMS;
+use crate::camera::data_sheet::SpotForm;
+use crate::model::simulate::{Setup, camera_of};
+use serde::Serialize;
+use std::fmt::Write as _;
+
+/// A case of the suite.
+#[derive(Debug, Clone, Copy)]
+pub struct HardCase {
+    /// Name, also of its directory.
+    pub name: &'static str,
+    /// What is hard about it.
+    pub what: &'static str,
+    change: fn(&mut Setup),
+}
+
+impl HardCase {
+    /// The camera, sky and scene of the case.
+    pub fn setup(&self, base: &Setup) -> Setup {
+        let mut setup = base.clone();
+        (self.change)(&mut setup);
+        setup
+    }
+}
+
+/// The cases. Displacements by lenses are in thousandths of half of the diagonal.
+pub const HARD_SUITE: [HardCase; 12] = [
+    HardCase {
+        name: "ideal",
+        what: "as the camera is described",
+        change: |_| (),
+    },
+    HardCase {
+        name: "lens-r3",
+        what: "lens with r³: 25 thousandths in the corner",
+        change: |setup| lens(setup, [25.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+    },
+    HardCase {
+        name: "lens-r3-r5",
+        what: "r³ and r⁵: 25 thousandths",
+        change: |setup| lens(setup, [17.0, 8.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+    },
+    HardCase {
+        name: "lens-strong",
+        what: "r³ and r⁵: 62 thousandths",
+        change: |setup| lens(setup, [83.0, -21.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+    },
+    HardCase {
+        name: "lens-r3-r5-r7",
+        what: "r³, r⁵ and r⁷ of alternating sign",
+        change: |setup| lens(setup, [-69.0, 41.0, -17.0, 0.0, 0.0, 0.0, 0.0]),
+    },
+    HardCase {
+        name: "lens-5-percent",
+        what: "5 % at half of the width of a square frame",
+        change: |setup| lens(setup, [100.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+    },
+    HardCase {
+        name: "lens-decentred",
+        what: "r³ and r⁵, decentred",
+        change: |setup| lens(setup, [28.0, -11.0, 0.0, 2.8, -1.4, 0.0, 0.0]),
+    },
+    HardCase {
+        name: "detector-tilted",
+        what: "r³, and a tilted detector",
+        change: |setup| lens(setup, [-21.0, 0.0, 0.0, 0.0, 0.0, 4.0, 3.0]),
+    },
+    HardCase {
+        name: "spot-disc",
+        what: "spots are discs of 4 px radius",
+        change: |setup| {
+            let camera = &mut setup.scenario.camera;
+            camera.imperfections.spot_form = SpotForm::Disc;
+            camera.spot_sigma_px = 2.0;
+            camera.peak_share = None;
+        },
+    },
+    HardCase {
+        name: "spot-smeared",
+        what: "stars smeared by 5 px along the rows",
+        change: |setup| setup.scenario.conditions.motion_px = 5.0,
+    },
+    HardCase {
+        name: "vignetting",
+        what: "60 % of the light lost in the corners",
+        change: |setup| setup.scenario.camera.imperfections.vignetting = 0.6,
+    },
+    HardCase {
+        name: "response",
+        what: "response of the pixels differs by 3 %",
+        change: |setup| setup.scenario.camera.imperfections.response_sigma = 0.03,
+    },
+];
+
+/// Sets the terms of the lens, in thousandths of half of the diagonal.
+fn lens(setup: &mut Setup, thousandths: [f64; LENS_TERMS]) {
+    let camera = &mut setup.scenario.camera;
+    let unit_px = camera_of(camera).radius_px() / 1000.0;
+    let made = &mut camera.imperfections;
+    [
+        made.distortion_px,
+        made.distortion5_px,
+        made.distortion7_px,
+        made.decentring_x_px,
+        made.decentring_y_px,
+        made.tilt_x_px,
+        made.tilt_y_px,
+    ] = thousandths.map(|displacement| displacement * unit_px);
+}
+
+/// The results of a case.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HardRow {
+    /// Name of the case.
+    pub case: &'static str,
+    /// What is hard about it.
+    pub what: &'static str,
+    /// Frames.
+    pub frames: usize,
+    /// Frames identified correctly.
+    pub right: usize,
+    /// Frames identified wrongly.
+    pub wrong: usize,
+    /// Mean of the squared error of the attitude in units of its covariance; 3 if that is correct.
+    pub nees_mean: Option<f64>,
+    /// Standard error of that mean if the covariance is correct.
+    pub nees_sigma: Option<f64>,
+    /// Standard deviation of the errors of x over their stated errors.
+    pub pull_x_sd: f64,
+    /// The same of y.
+    pub pull_y_sd: f64,
+    /// Mean of the errors of the flux over their stated errors.
+    pub pull_flux_mean: f64,
+    /// Their standard deviation.
+    pub pull_flux_sd: f64,
+    /// Mean of the errors of the focal length over their stated errors.
+    pub pull_focal_length_mean: f64,
+    /// Their standard deviation.
+    pub pull_focal_length_sd: f64,
+    /// Mean of the errors of the zero point over their stated errors.
+    pub pull_zero_point_mean: f64,
+    /// Their standard deviation.
+    pub pull_zero_point_sd: f64,
+    /// Mean of the measured minus the true zero point.
+    pub zero_point_difference_mag: f64,
+    /// Measured minus predicted limit.
+    pub limit_difference_mag: Option<f64>,
+    /// Stars that were detected as several.
+    pub split: u64,
+    /// Detections with a wrong name.
+    pub misnamed: u64,
+    /// False detections per million pixels.
+    pub false_per_mpx: f64,
+    /// Codes of notes, each with the number of frames that have it.
+    pub notes: String,
+}
+
+impl HardRow {
+    /// The row of a case.
+    pub fn new(case: &HardCase, summary: &Summary) -> Self {
+        let identification = &summary.identification.all;
+        let attitude = summary.attitude.as_ref();
+        let pulls = &summary.pulls;
+        let notes = summary.notes.iter();
+        let notes: Vec<String> = notes.map(|(code, n)| format!("{code} {n}")).collect();
+        Self {
+            case: case.name,
+            what: case.what,
+            frames: summary.frames,
+            right: identification.right,
+            wrong: identification.wrong,
+            nees_mean: attitude.map(|a| a.nees_mean),
+            nees_sigma: attitude.map(|a| a.nees_sigma),
+            pull_x_sd: pulls.x.sd,
+            pull_y_sd: pulls.y.sd,
+            pull_flux_mean: pulls.flux.mean,
+            pull_flux_sd: pulls.flux.sd,
+            pull_focal_length_mean: pulls.focal_length.mean,
+            pull_focal_length_sd: pulls.focal_length.sd,
+            pull_zero_point_mean: pulls.zero_point.mean,
+            pull_zero_point_sd: pulls.zero_point.sd,
+            zero_point_difference_mag: summary.zero_point.mean,
+            limit_difference_mag: summary.completeness.difference_mag,
+            split: summary.detection.split,
+            misnamed: summary.detection.misnamed,
+            false_per_mpx: summary.detection.false_per_mpx,
+            notes: notes.join(", "),
+        }
+    }
+
+    /// `rows` as a table in text.
+    pub fn to_text(rows: &[Self]) -> String {
+        let mut text = "Mean and standard deviation of errors over stated errors, 0 and 1 where these are true; NEES 3.\n\n".to_owned();
+        let _ = writeln!(
+            text,
+            "{:<16} {:>6} {:>6} {:>6} {:>6} {:>5} {:>5} {:>14} {:>14} {:>14} {:>7} {:>6}  notes",
+            "",
+            "frames",
+            "right",
+            "wrong",
+            "NEES",
+            "x",
+            "y",
+            "flux",
+            "focal length",
+            "zero point",
+            "limit",
+            "split"
+        );
+        for row in rows {
+            text += &row.line();
+        }
+        text
+    }
+
+    fn line(&self) -> String {
+        let pull = |mean: f64, sd: f64| format!("{mean:+.2} ± {sd:.2}");
+        let or_dash = |value: Option<f64>, sign: bool| match (value, sign) {
+            (None, _) => "–".to_owned(),
+            (Some(value), true) => format!("{value:+.3}"),
+            (Some(value), false) => format!("{value:.2}"),
+        };
+        format!(
+            "{:<16} {:>6} {:>6} {:>6} {:>6} {:>5.2} {:>5.2} {:>14} {:>14} {:>14} {:>7} {:>6}  {}\n",
+            self.case,
+            self.frames,
+            self.right,
+            self.wrong,
+            or_dash(self.nees_mean, false),
+            self.pull_x_sd,
+            self.pull_y_sd,
+            pull(self.pull_flux_mean, self.pull_flux_sd),
+            pull(self.pull_focal_length_mean, self.pull_focal_length_sd),
+            pull(self.pull_zero_point_mean, self.pull_zero_point_sd),
+            or_dash(self.limit_difference_mag, true),
+            self.split,
+            self.notes,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::data_sheet::Preset;
+    use crate::model::sensitivity::Scenario;
+    use crate::model::simulate::Scene;
+
+    #[test]
+    fn each_case_can_be_simulated_and_has_a_name_of_its_own() {
+        for preset in Preset::ALL {
+            let base = Setup {
+                scenario: Scenario::of(preset),
+                scene: Scene::default(),
+            };
+            let mut names = Vec::new();
+            for case in HARD_SUITE {
+                assert_eq!(
+                    case.setup(&base).check(),
+                    Ok(()),
+                    "{} of {preset:?}",
+                    case.name
+                );
+                assert!(!names.contains(&case.name), "{}", case.name);
+                names.push(case.name);
+            }
+        }
+    }
+}
