@@ -31,6 +31,6 @@ pub(super) fn run(
         ("suite.txt", HardRow::to_text(&rows)),
     ];
     let tables = tables.map(|(name, text)| (name.to_owned(), text.into_bytes()));
-    write_into(directory, tables.into_iter())?;
+    write_into(directory, tables)?;
     Ok(rows)
 }
