@@ -83,7 +83,7 @@ impl DistortionModel {
         }
     }
 
-    /// Whether the terms are those of a lens, the first of [`lens_terms`], and not monomials.
+    /// Whether it is one of [`Self::LENSES`], and not a polynomial of all monomials.
     pub const fn is_lens(self) -> bool {
         match self {
             Self::Radial | Self::Radial5 | Self::Radial7 | Self::BrownConrady => true,
