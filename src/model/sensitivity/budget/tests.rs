@@ -2,6 +2,7 @@
 //! from this code.
 
 use super::*;
+use crate::base::statistics::normal_cdf;
 use crate::camera::data_sheet::{Preset, Response};
 use crate::model::sensitivity::{Extinction, Parameter, SkyBrightness};
 
@@ -243,6 +244,55 @@ fn the_limit_moves_as_it_must_with_every_lever() {
         assert!(
             (after - before) * sign > 1e-3,
             "{name}: {before} to {after}"
+        );
+    }
+}
+
+/// The transmission at 555 nm, which eq. (2) takes for all wavelengths, over the mean that is
+/// weighted with the eye's sensitivity.
+fn excess_of_eq_2(zenith_distance_deg: f64) -> f64 {
+    let mut scenario = Scenario::of(Preset::Experiment1);
+    scenario.conditions.zenith_distance_deg = zenith_distance_deg;
+    let budget = Budget::new(&scenario);
+    let sum = |of: fn(&Band) -> f64| budget.bands.iter().map(of).sum::<f64>();
+    let mean = sum(|band| band.star_photons_s_m2 * band.atmosphere_transmission)
+        / sum(|band| band.star_photons_s_m2);
+    budget.zenith_transmission.powf(budget.airmass) / mean - 1.0
+}
+
+#[test]
+fn equation_2_is_at_most_2_percent_too_large() {
+    // By a script of its own.
+    for (zenith_distance_deg, expected) in [(0.0, 0.0048), (45.0, 0.0065), (80.0, 0.0143)] {
+        let found = excess_of_eq_2(zenith_distance_deg);
+        assert!(
+            (found - expected).abs() < 1e-4,
+            "{zenith_distance_deg}: {found}"
+        );
+    }
+}
+
+#[test]
+fn six_sigma_stars_are_found_in_95_percent_only_where_a_frame_has_a_false_one() {
+    /// z of the quantile of 95 %.
+    const Z_95: f64 = 1.644_854;
+    for (preset, expected_false) in [(Preset::Experiment1, 0.89), (Preset::Experiment2, 0.90)] {
+        let scenario = Scenario::of(preset);
+        let budget = Budget::new(&scenario);
+        let pixels = (scenario.camera.width_px * scenario.camera.height_px) as f64;
+        // Of a threshold that finds 95 %.
+        let threshold = (budget.star_e - Z_95 * budget.noise_e) / budget.background_noise_e;
+        let falsely = pixels * normal_cdf(-threshold);
+        assert!((threshold - 4.61).abs() < 0.01, "{threshold}");
+        assert!((falsely - expected_false).abs() < 0.01, "{falsely}");
+        // Of one that is exceeded by noise in 5 % of frames, 0.0513 times a frame.
+        let threshold = 5.170;
+        assert!((pixels * normal_cdf(-threshold) - 0.0513).abs() < 0.0003);
+        let over = (budget.star_e - threshold * budget.background_noise_e) / budget.noise_e;
+        assert!(
+            (normal_cdf(over) - 0.867).abs() < 0.001,
+            "{}",
+            normal_cdf(over)
         );
     }
 }
