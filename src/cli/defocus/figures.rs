@@ -1,4 +1,5 @@
-//! The figures: errors over radius and noise, sections, best radius, accuracy and limit.
+//! The figures: errors over radius and noise, sections, best radius, accuracy and limit; and those
+//! of the paper, its spots and its surface.
 
 use crate::cli::plot::{
     Axis, BLACK, BLUE, Cell, Dot, FigureForm, Layer, Marks, ORANGE, Panel, Sheet, WHITE,
@@ -6,8 +7,8 @@ use crate::cli::plot::{
 };
 use plotters::style::RGBColor;
 use starpipe::base::format::five_digits;
-use starpipe::model::defocus::{ErrorCurve, IsoLine, Surface};
-use starpipe::study::defocus::{DefocusReport, StarReport, StarStudy, Theory};
+use starpipe::model::defocus::{ErrorCurve, ErrorPoint, Expected, IsoLine, PeakStudy, Surface};
+use starpipe::study::defocus::{DefocusReport, StarModel, StarReport, StarStudy, Theory};
 
 /// Colours of a few lines that everybody can tell apart.
 const COLOURS: [RGBColor; 4] = [BLUE, ORANGE, RGBColor(0, 158, 115), RGBColor(204, 121, 167)];
@@ -21,6 +22,8 @@ const SCALE: [[f64; 3]; 5] = [
 ];
 /// Number of shades; neighbouring cells of one shade are drawn as one.
 const SHADES: f64 = 40.0;
+/// Radii of the paper's figure 1, in pixels.
+const PAPER_SPOTS_PX: [f64; 2] = [0.6, 1.5];
 /// Lines in a section.
 const SECTION_LINES: usize = 4;
 
@@ -43,6 +46,7 @@ pub(super) fn of(
         [study] if study.star.v_mag().is_none() => {
             let panel = radii_for_errors(report, &report.stars[0], study);
             sheets.push(("best-radius", Sheet::of_one(panel)));
+            sheets.extend(of_paper(report, study));
         }
         _ => {
             sheets.push(("best-radius", Sheet::of_one(best_radii(report))));
@@ -85,7 +89,8 @@ fn errors(report: &DefocusReport, study: &StarStudy) -> Panel {
     // A third along the outline the lines are farthest apart.
     let labels = line_labels(study, &lines, |line| line.len() / 3);
     let [least, most] = colour_range_px(study).map(|error| five_digits(two_digits(error)));
-    let mut layers = vec![Layer::unnamed(BLACK, Marks::Cells(cells(study)))];
+    let measured = |_, _, point: &ErrorPoint| point.is_sound().then_some(point.rms_px);
+    let mut layers = vec![Layer::unnamed(BLACK, Marks::Cells(cells(study, measured)))];
     if study.star.v_mag().is_none() {
         let paper = study.isolines.iter();
         let paper = paper.map(|line| paper_line(study, line.rms_px)).collect();
@@ -155,6 +160,82 @@ fn paper_line(study: &StarStudy, rms_px: f64) -> Vec<(f64, f64)> {
     points.collect()
 }
 
+/// The paper's figures 1 and 3, and what its model of a spot costs where it is sampled.
+fn of_paper(report: &DefocusReport, study: &StarStudy) -> Vec<(&'static str, Sheet)> {
+    let StarModel::Peak(experiment) = &study.star else {
+        return Vec::new();
+    };
+    let spots = PAPER_SPOTS_PX.map(|spot_px| spot(experiment, spot_px));
+    let (own, paper) = (study.surface.as_ref().ok(), Surface::of_paper());
+    let surfaces = [("ours", own), ("the paper's", Some(&paper))].into_iter();
+    let surfaces =
+        surfaces.filter_map(|(whose, surface)| Some(fitted(report, study, whose, surface?)));
+    vec![
+        ("spots", Sheet::new(spots.into(), 2)),
+        ("surface", Sheet::new(surfaces.collect(), 2)),
+        ("sampled", Sheet::of_one(sampled(report, study))),
+    ]
+}
+
+/// The pixels of a spot in the middle of its window: the paper's figure 1.
+fn spot(experiment: &PeakStudy, spot_px: f64) -> Panel {
+    let half = experiment.half_window_px as f64;
+    let pixels = experiment.pixels(spot_px, [0.0; 2]);
+    let side = 2 * experiment.half_window_px + 1;
+    let cell = |(number, value): (usize, &f64)| {
+        let [column, row] = [number % side, number / side].map(|i| i as f64 - half);
+        let grey = (255.0 * value / experiment.peak).round() as u8;
+        Cell {
+            x: [column - 0.5, column + 0.5],
+            y: [row - 0.5, row + 0.5],
+            colour: RGBColor(grey, grey, grey),
+        }
+    };
+    let cells = pixels.iter().enumerate().map(cell).collect();
+    Panel {
+        title: format!("a spot of radius {} px", five_digits(spot_px)),
+        x: Axis::of("column (px)"),
+        y: Axis::of("row (px)"),
+        layers: vec![Layer::unnamed(BLACK, Marks::Cells(cells))],
+    }
+}
+
+/// A surface in the colours of the errors: the paper's figure 3.
+fn fitted(report: &DefocusReport, study: &StarStudy, whose: &str, surface: &Surface) -> Panel {
+    let value = |spot_px: f64, noise: f64, _: &ErrorPoint| Some(surface.at(spot_px, noise));
+    Panel {
+        title: format!("the fitted surface (eq. 13), {whose}"),
+        x: noise_axis(report),
+        y: radius_axis(report),
+        layers: vec![Layer::unnamed(BLACK, Marks::Cells(cells(study, value)))],
+    }
+}
+
+/// The closed form over the radius for spots that are integrated over the pixels, and sampled.
+fn sampled(report: &DefocusReport, study: &StarStudy) -> Panel {
+    let grid = &study.errors.grid;
+    let count = grid.noises.len();
+    let line = |all: &[Expected], noise: usize| {
+        let column = all.iter().skip(noise).step_by(count);
+        let points = grid.spots_px.iter().zip(column);
+        Marks::Line(points.map(|(&spot_px, at)| (spot_px, at.rms_px)).collect())
+    };
+    let layers = a_few(count).flat_map(|(noise, colour)| {
+        let label = five_digits(two_digits(grid.noises[noise]));
+        let integrated = study.expected.as_ref();
+        let integrated = integrated.map(|all| Layer::new(label, colour, line(all, noise)));
+        let sampled = study.sampled.as_ref();
+        let sampled = sampled.map(|all| Layer::guide(line(all, noise)));
+        sampled.into_iter().chain(integrated)
+    });
+    Panel {
+        title: "closed form at four noises; grey: spots sampled, not integrated".to_owned(),
+        x: radius_axis(report),
+        y: Axis::log("error (px)", true),
+        layers: layers.collect(),
+    }
+}
+
 /// The 5th and the 95th percentile of the errors: the ends of the colours.
 fn colour_range_px(study: &StarStudy) -> [f64; 2] {
     let sound = study.errors.points.iter().filter(|point| point.is_sound());
@@ -164,8 +245,9 @@ fn colour_range_px(study: &StarStudy) -> [f64; 2] {
     [at(1).unwrap_or(1e-3), at(19).unwrap_or(1.0)]
 }
 
-/// The grid as cells; those beside each other with one shade are one cell.
-fn cells(study: &StarStudy) -> Vec<Cell> {
+/// The grid as cells, with the colours of the errors that `error_px` gives; those beside each other
+/// with one shade are one cell.
+fn cells(study: &StarStudy, error_px: impl Fn(f64, f64, &ErrorPoint) -> Option<f64>) -> Vec<Cell> {
     let grid = &study.errors.grid;
     let [least, most] = colour_range_px(study);
     let (columns, rows) = (edges(&grid.noises), edges(&grid.spots_px));
@@ -173,9 +255,10 @@ fn cells(study: &StarStudy) -> Vec<Cell> {
     for (row, points) in study.errors.points.chunks(grid.noises.len()).enumerate() {
         let mut last_shade = None;
         for (column, point) in points.iter().enumerate() {
-            let part = (point.rms_px / least).ln() / (most / least).ln();
-            let shade = (part.clamp(0.0, 1.0) * SHADES).round();
-            let shade = point.is_sound().then_some(shade);
+            let shade = error_px(grid.spots_px[row], grid.noises[column], point).map(|error_px| {
+                let part = (error_px.max(least) / least).ln() / (most / least).ln();
+                (part.clamp(0.0, 1.0) * SHADES).round()
+            });
             match (cells.last_mut(), shade) {
                 (Some(cell), Some(_)) if column > 0 && shade == last_shade => {
                     cell.x[1] = columns[column + 1];

@@ -232,7 +232,7 @@ mod tests {
             "frame": frame, "seed": u64::MAX - frame, "ra_deg": 12.5, "dec_deg": -3.25, "up_pa_deg": 170.0,
             "status": "right", "stars_above_limit": 40, "detected": 41, "rejected": 0, "named": 39, "misnamed": 0,
             "misnamed_companions": 0, "false_detections": 1, "blends": 0, "star_rows": 1,
-            "predicted_limit_vmag": 7.0, "true_background_adu": 100.0, "true_noise_adu": 5.0,
+            "predicted_limit_vmag": 7.0, "true_background_adu": 100.0, "true_noise_adu": 5.0, "split": 0,
         });
         serde_json::from_value(json).unwrap()
     }

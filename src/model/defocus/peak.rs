@@ -6,7 +6,7 @@
 //! window, and the noise of the pixels.
 
 use super::ErrorPoint;
-use crate::base::statistics::normal_cdf;
+use crate::base::statistics::{normal_cdf, normal_density};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -98,6 +98,31 @@ impl PeakStudy {
         }));
     }
 
+    /// The same for a Gaussian that is sampled in the middle of each pixel instead of integrated.
+    #[doc(alias = "SPSF")]
+    fn sampled_shares(&self, spot_px: f64, at: f64, into: &mut Vec<f64>) {
+        let offset = |pixel: usize| pixel as f64 - self.half_window_px as f64 - at;
+        let density = |pixel: usize| normal_density(offset(pixel) / spot_px) / spot_px;
+        into.clear();
+        into.extend((0..self.window_px()).map(density));
+    }
+
+    /// The pixels of a spot of this radius at (x, y) from the centre of the window, as fractions of
+    /// full scale, row by row: eqs. (1) and (2).
+    pub fn pixels(&self, spot_px: f64, at: [f64; 2]) -> Vec<f64> {
+        let mut shares = [(); 2].map(|()| Vec::with_capacity(self.window_px()));
+        for (shares, at) in shares.iter_mut().zip(at) {
+            self.shares(spot_px, at, shares);
+        }
+        let [columns, rows] = &shares;
+        let energy = self.energy(spot_px);
+        let mut pixels = Vec::with_capacity(rows.len() * columns.len());
+        for row in rows {
+            pixels.extend(columns.iter().map(|column| energy * row * column));
+        }
+        pixels
+    }
+
     /// The error in closed form, see [`SpotInWindow::expected`].
     pub fn expected(&self, spot_px: f64, noise: f64) -> Expected {
         self.spot(spot_px).expected(noise)
@@ -105,17 +130,31 @@ impl PeakStudy {
 
     /// A spot of this radius in pixels in the window, for any noise.
     pub fn spot(&self, spot_px: f64) -> SpotInWindow {
+        self.spot_of(spot_px, Self::shares)
+    }
+
+    /// The same light in a spot whose Gaussian is sampled in the middle of each pixel instead of
+    /// integrated.
+    ///
+    /// # Reference
+    /// Wang et al. 2019, section 2: SPSF, where [`Self::spot`] is IPSF.
+    pub fn sampled_spot(&self, spot_px: f64) -> SpotInWindow {
+        self.spot_of(spot_px, Self::sampled_shares)
+    }
+
+    fn spot_of(&self, spot_px: f64, shares: Shares) -> SpotInWindow {
         let place = |i: usize| (i as f64 + 0.5) / PLACES as f64 - 0.5;
+        let sums = |i| self.sums(spot_px, place(i), shares);
         SpotInWindow {
             energy: self.energy(spot_px),
             half_window_px: self.half_window_px,
-            axis: (0..PLACES).map(|i| self.sums(spot_px, place(i))).collect(),
+            axis: (0..PLACES).map(sums).collect(),
         }
     }
 
-    fn sums(&self, spot_px: f64, truth: f64) -> AxisSums {
+    fn sums(&self, spot_px: f64, truth: f64, shares_of: Shares) -> AxisSums {
         let mut shares = Vec::new();
-        self.shares(spot_px, truth, &mut shares);
+        shares_of(self, spot_px, truth, &mut shares);
         let sum: f64 = shares.iter().sum();
         let places = shares
             .iter()
@@ -128,6 +167,9 @@ impl PeakStudy {
         }
     }
 }
+
+/// The fractions of the light in the columns or rows of the window.
+type Shares = fn(&PeakStudy, f64, f64, &mut Vec<f64>);
 
 /// Positions along either axis over which the mean is taken.
 const PLACES: usize = 24;
@@ -227,7 +269,7 @@ mod tests {
         };
         for spot_px in [0.1, 0.25, 0.4, 0.7] {
             for at in [-0.5, -0.37, -0.1, 0.0, 0.2, 0.25, 0.44] {
-                let found = study.sums(spot_px, at).mean - at;
+                let found = study.sums(spot_px, at, PeakStudy::shares).mean - at;
                 let series = sampling_bias_px(spot_px, at);
                 assert!(
                     (found - series).abs() < 1e-12,
@@ -235,6 +277,23 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn sampling_costs_narrow_spots_most_and_wide_ones_nothing() {
+        let study = PeakStudy::default();
+        let ratio = |spot_px: f64, noise: f64| {
+            let [sampled, integrated] = [study.sampled_spot(spot_px), study.spot(spot_px)]
+                .map(|spot| spot.expected(noise).rms_px);
+            sampled / integrated
+        };
+        // By the series 4πσ² exp(−2π²σ²) sin 2πx of the sampled Gaussian's mean, of first order, over
+        // that of `sampling_bias_px`: 4π²σ².
+        let first_order = (2.0 * PI * 0.6).powi(2);
+        assert!((ratio(0.6, 1e-9) / first_order - 1.0).abs() < 0.01);
+        assert!(ratio(0.4, 2e-4) > 3.0);
+        assert!((ratio(1.0, 1e-3) - 1.0).abs() < 0.1);
+        assert!((ratio(2.0, 1e-3) - 1.0).abs() < 0.03);
     }
 
     #[test]

@@ -3,7 +3,9 @@
 use super::error::DefocusError;
 use super::noise::Noise;
 use super::star::{RadiusPoint, StarModel, StarStudy};
-use crate::model::defocus::{ErrorCurve, ErrorGrid, Expected, Grid, IsoLine, Lens, Surface};
+use crate::model::defocus::{
+    ErrorCurve, ErrorGrid, Expected, Grid, IsoLine, Lens, PeakStudy, SpotInWindow, Surface,
+};
 use rayon::prelude::*;
 
 /// Least number of trials at the noise of the study: the reported radii depend on them.
@@ -62,7 +64,8 @@ impl Plan {
             .collect();
         Ok(StarStudy {
             star: star.clone(),
-            expected: self.expected(star),
+            expected: self.expected(star, PeakStudy::spot),
+            sampled: self.expected(star, PeakStudy::sampled_spot),
             surface: Surface::fit(&errors),
             errors,
             curves,
@@ -95,13 +98,17 @@ impl Plan {
         Ok(points.collect())
     }
 
-    /// The closed form over the grid, in the order of its points.
-    fn expected(&self, star: &StarModel) -> Option<Vec<Expected>> {
+    /// The closed form over the grid, in the order of its points, for spots of this kind.
+    fn expected(
+        &self,
+        star: &StarModel,
+        spot: fn(&PeakStudy, f64) -> SpotInWindow,
+    ) -> Option<Vec<Expected>> {
         let StarModel::Peak(study) = star else {
             return None;
         };
         let at_radius = |&spot_px: &f64| -> Vec<Expected> {
-            let spot = study.spot(spot_px);
+            let spot = spot(study, spot_px);
             let noises = self.grid.noises.iter();
             noises.map(|&noise| spot.expected(noise)).collect()
         };

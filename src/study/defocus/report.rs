@@ -154,6 +154,7 @@ pub struct GridRow {
     trials: usize,
     found: usize,
     expected_px: Option<f64>,
+    sampled_px: Option<f64>,
     surface_px: Option<f64>,
 }
 
@@ -317,6 +318,7 @@ impl GridRow {
             trials: point.trials,
             found: point.found,
             expected_px: study.expected.as_ref().map(|all| all[number].rms_px),
+            sampled_px: study.sampled.as_ref().map(|all| all[number].rms_px),
             surface_px: study.surface.as_ref().ok().map(|s| s.at(radius_px, noise)),
         })
     }

@@ -123,6 +123,8 @@ pub struct StarStudy {
     pub errors: ErrorGrid,
     /// The closed form at each point of the grid, if there is one.
     pub expected: Option<Vec<Expected>>,
+    /// The same for spots that are sampled instead of integrated.
+    pub sampled: Option<Vec<Expected>>,
     /// The surface through the errors.
     pub surface: Result<Surface, SurfaceError>,
     /// The curve over the radius at each noise of the grid.
