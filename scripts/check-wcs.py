@@ -77,7 +77,7 @@ def angles(wcs, report):
     angle = np.degrees(np.arctan2(up @ east, up @ north)) - attitude["up_pa_deg"]
     # The report's angle is that of the camera's axes; the columns of a sheared image are inclined.
     lens = report["optics"]["distortion"]
-    if lens and lens["model"] != "radial":
+    if lens and lens["model"] in ("cubic", "quintic"):
         stretch, shear = np.array(lens["coefficients_px"][:2]) / lens["radius_px"]
         angle += np.degrees(np.arctan2(-shear, 1 - stretch))
     return off, abs((angle + 180) % 360 - 180)
