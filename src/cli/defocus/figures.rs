@@ -180,7 +180,7 @@ fn of_paper(report: &DefocusReport, study: &StarStudy) -> Vec<(&'static str, She
 /// The pixels of a spot in the middle of its window: the paper's figure 1.
 fn spot(experiment: &PeakStudy, spot_px: f64) -> Panel {
     let half = experiment.half_window_px as f64;
-    let pixels = experiment.pixels(spot_px, [0.0; 2]);
+    let pixels = experiment.pixels(spot_px);
     let side = 2 * experiment.half_window_px + 1;
     let cell = |(number, value): (usize, &f64)| {
         let [column, row] = [number % side, number / side].map(|i| i as f64 - half);

@@ -107,18 +107,15 @@ impl PeakStudy {
         into.extend((0..self.window_px()).map(density));
     }
 
-    /// The pixels of a spot of this radius at (x, y) from the centre of the window, as fractions of
-    /// full scale, row by row: eqs. (1) and (2).
-    pub fn pixels(&self, spot_px: f64, at: [f64; 2]) -> Vec<f64> {
-        let mut shares = [(); 2].map(|()| Vec::with_capacity(self.window_px()));
-        for (shares, at) in shares.iter_mut().zip(at) {
-            self.shares(spot_px, at, shares);
-        }
-        let [columns, rows] = &shares;
+    /// The pixels of a spot of this radius in the middle of the window, as fractions of full scale,
+    /// row by row: eqs. (1) and (2).
+    pub fn pixels(&self, spot_px: f64) -> Vec<f64> {
+        let mut shares = Vec::with_capacity(self.window_px());
+        self.shares(spot_px, 0.0, &mut shares);
         let energy = self.energy(spot_px);
-        let mut pixels = Vec::with_capacity(rows.len() * columns.len());
-        for row in rows {
-            pixels.extend(columns.iter().map(|column| energy * row * column));
+        let mut pixels = Vec::with_capacity(shares.len().pow(2));
+        for row in &shares {
+            pixels.extend(shares.iter().map(|column| energy * row * column));
         }
         pixels
     }

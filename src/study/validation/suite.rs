@@ -219,24 +219,20 @@ impl HardRow {
 
     fn line(&self) -> String {
         let pull = |mean: f64, sd: f64| format!("{mean:+.2} ± {sd:.2}");
-        let or_dash = |value: Option<f64>, sign: bool| match (value, sign) {
-            (None, _) => "–".to_owned(),
-            (Some(value), true) => format!("{value:+.3}"),
-            (Some(value), false) => format!("{value:.2}"),
-        };
+        let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".to_owned());
         format!(
             "{:<16} {:>6} {:>6} {:>6} {:>6} {:>5.2} {:>5.2} {:>14} {:>14} {:>14} {:>7} {:>6}  {}\n",
             self.case,
             self.frames,
             self.right,
             self.wrong,
-            or_dash(self.nees_mean, false),
+            or_dash(self.nees_mean.map(|nees| format!("{nees:.2}"))),
             self.pull_x_sd,
             self.pull_y_sd,
             pull(self.pull_flux_mean, self.pull_flux_sd),
             pull(self.pull_focal_length_mean, self.pull_focal_length_sd),
             pull(self.pull_zero_point_mean, self.pull_zero_point_sd),
-            or_dash(self.limit_difference_mag, true),
+            or_dash(self.limit_difference_mag.map(|mag| format!("{mag:+.3}"))),
             self.split,
             self.notes,
         )

@@ -205,9 +205,7 @@ impl Summary {
         );
         text
     }
-}
 
-impl Summary {
     /// The frames with each note; empty where there are none.
     fn notes_text(&self) -> String {
         if self.notes.is_empty() {
