@@ -21,11 +21,24 @@ pub enum SpotForm {
     /// is twice the spot's standard deviation, so that its standard deviation along each axis is
     /// the same.
     Disc,
+    /// Moffat's profile, as turbulent air makes it: a core with wide wings. Its full width at half
+    /// maximum is that of a Gaussian of the spot's standard deviation; its exponent
+    /// [`Imperfections::moffat_beta`].
+    Moffat,
+    /// Airy's pattern of a pupil with a central [`Imperfections::obstruction`]. Without obstruction
+    /// its full width at half maximum is that of a Gaussian of the spot's standard deviation.
+    Airy,
 }
 
 impl SpotForm {
     /// All forms.
-    pub const ALL: [Self; 3] = [Self::Gaussian, Self::SampledGaussian, Self::Disc];
+    pub const ALL: [Self; 5] = [
+        Self::Gaussian,
+        Self::SampledGaussian,
+        Self::Disc,
+        Self::Moffat,
+        Self::Airy,
+    ];
 
     /// Name in files and options.
     pub const fn name(self) -> &'static str {
@@ -33,6 +46,8 @@ impl SpotForm {
             Self::Gaussian => "gaussian",
             Self::SampledGaussian => "sampled-gaussian",
             Self::Disc => "disc",
+            Self::Moffat => "moffat",
+            Self::Airy => "airy",
         }
     }
 
@@ -88,6 +103,23 @@ pub struct Imperfections {
     pub depth_um: f64,
     /// Seed of the pixel pattern, which is the same in every frame of the camera.
     pub pattern_seed: f64,
+    /// Longer over shorter axis of the spot; the product of both stays that of a round spot.
+    pub spot_axis_ratio: f64,
+    /// Direction of the longer axis, from x towards y, in degrees.
+    pub spot_angle_deg: f64,
+    /// Coma: length of the flare of a star in the corner, in pixels, outward positive; it grows
+    /// with the distance from the centre.
+    pub coma_px: f64,
+    /// Astigmatism: half of the length of the line that a star in the corner is drawn out to, in
+    /// pixels, radial if positive; it grows with the square of the distance.
+    pub astigmatism_px: f64,
+    /// Curvature of the field: radius of the disc of a star in the corner, in pixels; it grows with
+    /// the square of the distance.
+    pub field_curvature_px: f64,
+    /// Exponent of Moffat's profile.
+    pub moffat_beta: f64,
+    /// Diameter of the central obstruction of the pupil, over that of the pupil.
+    pub obstruction: f64,
     /// The form of a star's spot.
     pub spot_form: SpotForm,
     /// Whether the image is reversed left to right.
@@ -132,6 +164,13 @@ impl Default for Imperfections {
             blooming: 0.0,
             depth_um: 10.0,
             pattern_seed: 1.0,
+            spot_axis_ratio: 1.0,
+            spot_angle_deg: 0.0,
+            coma_px: 0.0,
+            astigmatism_px: 0.0,
+            field_curvature_px: 0.0,
+            moffat_beta: 2.5,
+            obstruction: 0.0,
             spot_form: SpotForm::default(),
             mirrored: false,
         }

@@ -117,6 +117,8 @@ pub const KEYS: &[Key<DataSheet>] = &[
 const SHARE: Limits = Limits::FromTo(0.0, 1.0);
 /// Displacement by the lens, in pixels.
 const DISPLACEMENT_PX: Limits = Limits::FromTo(-1000.0, 1000.0);
+/// Length of a spot by aberrations, in pixels.
+const ABERRATION_PX: Limits = Limits::FromTo(-50.0, 50.0);
 
 /// The numbers of the imperfections, all of them optional.
 pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
@@ -142,6 +144,34 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     key!(tilt_y_px in imperfections,
         DISPLACEMENT_PX,
         "detector tilted along y: displacement at the distance of the corner along y, in pixels"
+    ),
+    key!(spot_axis_ratio in imperfections,
+        Limits::FromTo(1.0, 10.0),
+        "longer over shorter axis of a star's spot; their product stays that of a round one"
+    ),
+    key!(spot_angle_deg in imperfections,
+        Limits::FromTo(-180.0, 180.0),
+        "direction of the longer axis, from x towards y, in degrees"
+    ),
+    key!(coma_px in imperfections,
+        ABERRATION_PX,
+        "coma: length of the flare of a star in the corner, in pixels, outward positive"
+    ),
+    key!(astigmatism_px in imperfections,
+        ABERRATION_PX,
+        "astigmatism: half length of the line that a star in the corner is drawn out to, in pixels"
+    ),
+    key!(field_curvature_px in imperfections,
+        ABERRATION_PX,
+        "curvature of the field: radius of the disc of a star in the corner, in pixels"
+    ),
+    key!(moffat_beta in imperfections,
+        Limits::FromTo(1.2, 100.0),
+        "exponent of a spot of Moffat's profile"
+    ),
+    key!(obstruction in imperfections,
+        Limits::FromTo(0.0, 0.95),
+        "diameter of the central obstruction over that of the pupil, for spots of Airy's pattern"
     ),
     key!(response_sigma in imperfections,
         SHARE,

@@ -18,14 +18,16 @@
 //! pattern seed only: a frame is the same on any number of threads. Mathematical functions are
 //! those of [`libm`], so a frame is the same on every machine.
 //!
-//! Caveats: the spot is the same over the whole field. Pixels are square ([`camera_of`]). Sky,
+//! Caveats: aberrations are those of rays, without diffraction. Pixels are square ([`camera_of`]). Sky,
 //! stars and angular rate are constant during the exposure. Charge blooms along columns only.
 
+mod aberrations;
 mod camera;
 mod image;
 mod motion;
 mod pattern;
 mod poisson;
+mod radial_profile;
 mod readout;
 mod scene;
 mod setup;

@@ -193,7 +193,7 @@ impl<'a> Simulator<'a> {
         let mut image = self.image();
         sky.expose(&mut image, budget.background_e);
         let background_e = mean(image.pixels()) + budget.dark_e;
-        let mut spot = SpotRenderer::new(sheet.imperfections.spot_form, sheet.spot_sigma_px);
+        let mut spot = SpotRenderer::new(sheet);
         let sampler = StarSampler {
             camera: &self.camera,
             scene,

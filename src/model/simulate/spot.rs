@@ -1,9 +1,11 @@
 //! Draws the spots of stars.
 
+use super::aberrations::{Aberrations, Ray};
 use super::image::ElectronImage;
+use super::radial_profile::{PROFILE_SIGMAS, RadialProfile};
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::{normal_cdf, normal_density};
-use crate::camera::data_sheet::SpotForm;
+use crate::camera::data_sheet::{DataSheet, SpotForm};
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -16,74 +18,105 @@ const DISC_RADIUS: f64 = 2.0;
 #[derive(Debug, Clone)]
 pub(super) struct SpotRenderer {
     form: SpotForm,
-    sigma_px: f64,
-    /// Buffers: the fractions of the light in the columns and the rows of one star.
+    aberrations: Aberrations,
+    /// Of forms that are not a Gaussian or a disc.
+    profile: Option<RadialProfile>,
+    /// Buffers: the rays of one star, and the fractions of a ray's light in columns and rows.
+    rays: Vec<Ray>,
     columns: Vec<f64>,
     rows: Vec<f64>,
 }
 
 impl SpotRenderer {
-    pub(super) fn new(form: SpotForm, sigma_px: f64) -> Self {
+    pub(super) fn new(sheet: &DataSheet) -> Self {
+        let form = sheet.imperfections.spot_form;
+        let aberrations = Aberrations::of(sheet);
         Self {
             form,
-            sigma_px,
+            profile: RadialProfile::of(&sheet.imperfections, aberrations.ray_sigma_px()),
+            aberrations,
+            rays: Vec::new(),
             columns: Vec::new(),
             rows: Vec::new(),
         }
     }
 
-    /// Standard deviation on each axis, in pixels.
+    /// Standard deviation of a Gaussian that is as sharp, in pixels.
     pub(super) fn sigma_px(&self) -> f64 {
-        self.sigma_px
+        self.aberrations.ray_sigma_px()
     }
 
     /// Radius of a spot, in pixels.
     pub(super) fn reach_px(&self) -> f64 {
+        self.ray_reach_px() + self.aberrations.reach_px()
+    }
+
+    /// Radius of the spot of one ray, in pixels.
+    fn ray_reach_px(&self) -> f64 {
         let sigmas = match self.form {
             SpotForm::Gaussian | SpotForm::SampledGaussian => REACH_SIGMAS,
             SpotForm::Disc => DISC_RADIUS,
+            SpotForm::Moffat | SpotForm::Airy => PROFILE_SIGMAS,
         };
-        sigmas * self.sigma_px
+        sigmas * self.sigma_px()
     }
 
     /// Adds a star of `electrons` at `position` to the expected electrons.
     pub(super) fn add(&mut self, image: &mut ElectronImage, position: &PixelPoint, electrons: f64) {
-        let columns = pixels_within(position.x, self.reach_px(), image.width());
-        let rows = pixels_within(position.y, self.reach_px(), image.height());
+        let mut rays = std::mem::take(&mut self.rays);
+        self.aberrations.trace(position, &mut rays);
+        for Ray { offset_px, share } in &rays {
+            let place = PixelPoint::new(position.x + offset_px[0], position.y + offset_px[1]);
+            self.add_ray(image, &place, share * electrons);
+        }
+        self.rays = rays;
+    }
+
+    fn add_ray(&mut self, image: &mut ElectronImage, position: &PixelPoint, electrons: f64) {
+        let reach_px = self.ray_reach_px();
+        let columns = pixels_within(position.x, reach_px, image.width());
+        let rows = pixels_within(position.y, reach_px, image.height());
         if columns.is_empty() || rows.is_empty() {
             return;
         }
-        if self.form == SpotForm::Disc {
-            let radius_px = self.reach_px();
-            for y in rows {
-                let y_px = y as f64 - position.y;
-                let pixels = &mut image.row_mut(y)[columns.clone()];
-                for (x, pixel) in columns.clone().zip(pixels) {
-                    *pixel += electrons * disc_share(x as f64 - position.x, y_px, radius_px);
-                }
-            }
-            return;
+        if let Some(profile) = &self.profile {
+            let share = |x, y| profile.share(x, y);
+            return add_pixels(image, position, electrons, (columns, rows), share);
         }
-        profile(
-            self.form,
-            self.sigma_px,
-            columns.clone(),
-            position.x,
-            &mut self.columns,
-        );
-        profile(
-            self.form,
-            self.sigma_px,
-            rows.clone(),
-            position.y,
-            &mut self.rows,
-        );
+        if self.form == SpotForm::Disc {
+            let share = |x, y| disc_share(x, y, reach_px);
+            return add_pixels(image, position, electrons, (columns, rows), share);
+        }
+        let sigma_px = self.sigma_px();
+        for (pixels, at, into) in [
+            (columns.clone(), position.x, &mut self.columns),
+            (rows.clone(), position.y, &mut self.rows),
+        ] {
+            gaussian_profile(self.form, sigma_px, pixels, at, into);
+        }
         for (y, share) in rows.zip(&self.rows) {
             let row_e = electrons * share;
             let pixels = &mut image.row_mut(y)[columns.clone()];
             for (pixel, share) in pixels.iter_mut().zip(&self.columns) {
                 *pixel += row_e * share;
             }
+        }
+    }
+}
+
+/// Adds light of which `share` is the fraction in a pixel at a distance along x and y.
+fn add_pixels(
+    image: &mut ElectronImage,
+    position: &PixelPoint,
+    electrons: f64,
+    (columns, rows): (Range<usize>, Range<usize>),
+    share: impl Fn(f64, f64) -> f64,
+) {
+    for y in rows {
+        let y_px = y as f64 - position.y;
+        let pixels = &mut image.row_mut(y)[columns.clone()];
+        for (x, pixel) in columns.clone().zip(pixels) {
+            *pixel += electrons * share(x as f64 - position.x, y_px);
         }
     }
 }
@@ -97,7 +130,13 @@ fn pixels_within(at: f64, reach_px: f64, side: usize) -> Range<usize> {
 }
 
 /// Fractions of the light of a Gaussian at `at` in `pixels`, along one axis.
-fn profile(form: SpotForm, sigma_px: f64, pixels: Range<usize>, at: f64, into: &mut Vec<f64>) {
+fn gaussian_profile(
+    form: SpotForm,
+    sigma_px: f64,
+    pixels: Range<usize>,
+    at: f64,
+    into: &mut Vec<f64>,
+) {
     into.clear();
     if form == SpotForm::SampledGaussian {
         let density = |x: usize| normal_density((x as f64 - at) / sigma_px) / sigma_px;
@@ -153,6 +192,7 @@ fn disc_before(x: f64, y: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::data_sheet::Preset;
 
     const SIDE: usize = 64;
 
@@ -160,7 +200,10 @@ mod tests {
     fn drawn(form: SpotForm, sigma_px: f64, at: (f64, f64)) -> Vec<f64> {
         let mut image = ElectronImage::new(SIDE, SIDE, 0.0);
         let position = PixelPoint::new(at.0, at.1);
-        SpotRenderer::new(form, sigma_px).add(&mut image, &position, 1.0);
+        let mut sheet = Preset::Experiment1.data_sheet();
+        sheet.spot_sigma_px = sigma_px;
+        sheet.imperfections.spot_form = form;
+        SpotRenderer::new(&sheet).add(&mut image, &position, 1.0);
         image.into_pixels()
     }
 

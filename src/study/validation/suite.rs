@@ -28,7 +28,7 @@ impl HardCase {
 }
 
 /// The cases. Displacements by lenses are in thousandths of half of the diagonal.
-pub const HARD_SUITE: [HardCase; 12] = [
+pub const HARD_SUITE: [HardCase; 18] = [
     HardCase {
         name: "ideal",
         what: "as the camera is described",
@@ -83,6 +83,51 @@ pub const HARD_SUITE: [HardCase; 12] = [
         name: "spot-smeared",
         what: "stars smeared by 5 px along the rows",
         change: |setup| setup.scenario.conditions.motion_px = 5.0,
+    },
+    HardCase {
+        name: "spot-elongated",
+        what: "spots twice as long as wide, at 30 degrees",
+        change: |setup| {
+            let made = &mut setup.scenario.camera.imperfections;
+            (made.spot_axis_ratio, made.spot_angle_deg) = (2.0, 30.0);
+        },
+    },
+    HardCase {
+        name: "spot-coma",
+        what: "coma of 6 px in the corner",
+        change: |setup| setup.scenario.camera.imperfections.coma_px = 6.0,
+    },
+    HardCase {
+        name: "spot-curved-field",
+        what: "spots twice as wide in the corner",
+        change: |setup| {
+            let camera = &mut setup.scenario.camera;
+            // A disc has half of its radius as standard deviation on an axis.
+            camera.imperfections.field_curvature_px = 2.0 * 3f64.sqrt() * camera.spot_sigma_px;
+        },
+    },
+    HardCase {
+        name: "spot-astigmatism",
+        what: "spots twice as long as wide in the corner, radially",
+        change: |setup| {
+            let camera = &mut setup.scenario.camera;
+            let radius_px = 3f64.sqrt() * camera.spot_sigma_px;
+            camera.imperfections.field_curvature_px = radius_px;
+            camera.imperfections.astigmatism_px = radius_px;
+        },
+    },
+    HardCase {
+        name: "spot-moffat",
+        what: "wings of a Moffat profile with exponent 2.5",
+        change: |setup| setup.scenario.camera.imperfections.spot_form = SpotForm::Moffat,
+    },
+    HardCase {
+        name: "spot-airy",
+        what: "Airy pattern of a pupil obstructed by a third",
+        change: |setup| {
+            let made = &mut setup.scenario.camera.imperfections;
+            (made.spot_form, made.obstruction) = (SpotForm::Airy, 0.33);
+        },
     },
     HardCase {
         name: "vignetting",
