@@ -33,6 +33,7 @@ mod background_map;
 mod candidates;
 mod config;
 mod detection;
+mod effective_psf;
 mod error;
 mod filter;
 mod filter_model;
@@ -40,6 +41,7 @@ mod fit;
 mod measure;
 mod pixels;
 mod psf;
+mod psf_fit;
 mod search;
 mod star_model;
 mod threads;
@@ -57,7 +59,8 @@ use crate::frame::{Frame, MIN_SIDE_PX};
 use candidates::PeakSearch;
 use measure::{Measurement, StarShape};
 use pixels::View;
-use search::SearchInput;
+use psf_fit::measure_psf;
+use search::{FrameSearch, SearchInput};
 
 /// Finds the stars of `frame`, and other sources, brightest first.
 ///
@@ -126,12 +129,18 @@ pub fn detect_into(
         config,
     };
     let searched = search.run(&input);
-    let (stars, pass) = (searched.stars, searched.pass);
-    let filtered = Some(&search.filtered.mesh);
-    let maps = input.maps(filtered, stars.spot_px, pass.matched_gain);
-    let PeakSearch { peaks, regions, .. } = &mut search.found;
+    let (mut stars, pass) = (searched.stars, searched.pass);
+    let FrameSearch {
+        filtered,
+        found: PeakSearch { peaks, regions, .. },
+        fits,
+        ..
+    } = search;
+    let mut maps = input.maps(Some(&filtered.mesh), stars.spot_px, pass.matched_gain);
     let shape = StarShape::measure(&maps, peaks);
     shape.merge_peaks(peaks, regions);
+    let psf = measure_psf(&maps, peaks, &mut stars, fits);
+    maps.psf = psf.as_ref();
     let measurement = Measurement {
         maps,
         shape,

@@ -62,6 +62,7 @@ impl<'a> SearchInput<'a> {
             saturation_adu: self.saturation_adu,
             spot_px,
             matched_gain,
+            psf: None,
         }
     }
 
@@ -112,7 +113,8 @@ pub(crate) struct FrameSearch {
     raw_peaks: RawPeakFinder,
     noise: NoiseBuffers,
     extrema: Extrema,
-    fits: FitBuffers,
+    /// Buffers of fits.
+    pub fits: FitBuffers,
 }
 
 impl FrameSearch {

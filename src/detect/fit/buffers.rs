@@ -4,7 +4,7 @@ use super::batch::BatchFitter;
 use super::fitter::Fitter;
 use super::frame_maps::FrameMaps;
 use super::parameters::{Fit, FitConfig, NoiseModel, SpotEstimate};
-use super::window::{Window, window_radius};
+use super::window::Window;
 
 /// Buffers of the fits of one thread.
 #[derive(Debug, Clone, Default)]
@@ -34,7 +34,7 @@ impl FitBuffers {
             noise,
         };
         let Self { fitter, window, .. } = self;
-        maps.cut_out(start, window_radius(maps.spot_px), window);
+        maps.cut_out(start, maps.window_radius(maps.spot_px), window);
         fitter.subtract(window, beyond, maps.spot_px);
         fitter.fit(window, start, &config)
     }
@@ -55,13 +55,13 @@ impl FitBuffers {
             noise,
         };
         let Self { fitter, window, .. } = self;
-        let mut radius = window_radius(spot_px);
+        let mut radius = maps.window_radius(spot_px);
         let mut fit = Fit::default();
         for _ in 0..MAX_WINDOWS {
             maps.cut_out(&[start], radius, window);
             fitter.subtract(window, beyond, maps.spot_px);
             fit = fitter.fit(window, &[start], &config);
-            let wanted = window_radius(fit.spot_px);
+            let wanted = maps.window_radius(fit.spot_px);
             if !fit.converged || wanted <= radius {
                 break;
             }

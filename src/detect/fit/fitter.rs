@@ -1,7 +1,8 @@
 //! Fits spots to the pixels of a window.
 
 use super::gauss_newton::{MAX_STEPS, StepOutcome, add_background_map, advance, finish, pixels_of};
-use super::light::{SpotLight, add_light};
+use super::light::{GaussianLight, add_light};
+use super::mixture::{MixtureImage, MixtureLight};
 use super::normal::{CholeskyFactor, NormalEquations};
 use super::parameters::{
     Fit, FitConfig, MAX_PARAMETERS, MAX_SPOTS, NoiseModel, ONE_SPOT, SpotEstimate, TWO_SPOTS,
@@ -11,11 +12,32 @@ use super::window::Window;
 use crate::detect::psf::{AxisProfile, GROUP_PX, PixelGroup};
 use arrayvec::ArrayVec;
 
+/// The light of a spot of either kind.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum AnyLight<'a> {
+    /// A round Gaussian.
+    Gaussian(GaussianLight<'a>),
+    /// An effective PSF.
+    Mixture(MixtureLight<'a>),
+}
+
+impl AnyLight<'_> {
+    /// Adds `sign` times the light to pixels.
+    fn add_to(&self, pixels: &mut [PixelGroup], sign: f32, groups: usize) {
+        match self {
+            Self::Gaussian(light) => add_light(light, sign, groups, pixels),
+            Self::Mixture(light) => add_light(light, sign, groups, pixels),
+        }
+    }
+}
+
 /// Fits spots; holds the buffers.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Fitter {
-    /// Profiles of each spot along x and y.
+    /// Of each spot, where it is a Gaussian: its profiles along x and y.
     profiles: Vec<[AxisProfile; 2]>,
+    /// Of each spot, where it is not: its pixels.
+    images: Vec<MixtureImage>,
     light: Vec<PixelGroup>,
 }
 
@@ -82,11 +104,14 @@ impl Fitter {
             ..*config
         };
         if let [spot] = fit.spots.as_slice() {
-            // The profiles are those before the last step, a fraction of the standard error away.
-            let light = self.light_of(0, spot, window);
+            // The light is that before the last step, a fraction of the standard error away.
             let pixels = pixels_of(window, fit, &noise_only);
             let error2 = window.background_noise * window.background_noise;
-            fit.spots[0].noise_flux = flux_variance(&light, &pixels, error2).sqrt();
+            let variance = match self.light_of(0, spot, window) {
+                AnyLight::Gaussian(light) => flux_variance(&light, &pixels, error2),
+                AnyLight::Mixture(light) => flux_variance(&light, &pixels, error2),
+            };
+            fit.spots[0].noise_flux = variance.sqrt();
             return;
         }
         if fit.spots.len() == 2 {
@@ -115,23 +140,58 @@ impl Fitter {
         }
     }
 
-    /// Computes the spots' profiles along both sides of the window.
-    fn fill_profiles(&mut self, window: &Window, spots: &[SpotEstimate], spot_px: f64) {
-        if self.profiles.len() < spots.len() {
-            self.profiles.resize_with(spots.len(), Default::default);
-        }
-        for (spot, [across, down]) in spots.iter().zip(&mut self.profiles) {
-            across.fill(spot.x - window.x0 as f64, spot_px, window.width);
-            down.fill(spot.y - window.y0 as f64, spot_px, window.height);
+    /// Computes the light of the spots of one size in the window.
+    fn draw(&mut self, window: &Window, spots: &[SpotEstimate], spot_px: f64) {
+        let Self {
+            profiles, images, ..
+        } = self;
+        if window.psf.is_gaussian() {
+            if profiles.len() < spots.len() {
+                profiles.resize_with(spots.len(), Default::default);
+            }
+            for (spot, [across, down]) in spots.iter().zip(profiles) {
+                across.fill(spot.x - window.x0 as f64, spot_px, window.width);
+                down.fill(spot.y - window.y0 as f64, spot_px, window.height);
+            }
+        } else {
+            if images.len() < spots.len() {
+                images.resize_with(spots.len(), Default::default);
+            }
+            for (spot, image) in spots.iter().zip(images) {
+                image.draw(window, [spot.x, spot.y], spot_px);
+            }
         }
     }
 
-    /// The light of a spot that has the profiles of this index.
-    fn light_of(&self, index: usize, spot: &SpotEstimate, window: &Window) -> SpotLight<'_> {
-        SpotLight {
+    /// The light of the spot that was drawn at this index.
+    fn light_of(&self, index: usize, spot: &SpotEstimate, window: &Window) -> AnyLight<'_> {
+        if window.psf.is_gaussian() {
+            AnyLight::Gaussian(self.gaussian_light(index, spot, window))
+        } else {
+            AnyLight::Mixture(self.mixture_light(index, spot, window))
+        }
+    }
+
+    fn gaussian_light(
+        &self,
+        index: usize,
+        spot: &SpotEstimate,
+        window: &Window,
+    ) -> GaussianLight<'_> {
+        GaussianLight {
             flux: (spot.flux / window.noise_adu) as f32,
             axes: &self.profiles[index],
         }
+    }
+
+    fn mixture_light(
+        &self,
+        index: usize,
+        spot: &SpotEstimate,
+        window: &Window,
+    ) -> MixtureLight<'_> {
+        let flux = (spot.flux / window.noise_adu) as f32;
+        self.images[index].light(flux, window.groups())
     }
 
     /// Value above the fitted background, and fitted light, of each pixel that is not left out, in
@@ -144,10 +204,10 @@ impl Fitter {
         let mut light = std::mem::take(&mut self.light);
         light.clear();
         light.resize(window.data.len(), [0.0; GROUP_PX]);
-        self.fill_profiles(window, &fit.spots, fit.spot_px);
+        self.draw(window, &fit.spots, fit.spot_px);
         for (i, spot) in fit.spots.iter().enumerate() {
             let of_spot = self.light_of(i, spot, window);
-            add_light(&of_spot, 1.0, window.groups(), &mut light);
+            of_spot.add_to(&mut light, 1.0, window.groups());
         }
         self.light = light;
         let background = fit.background / window.noise_adu;
@@ -182,7 +242,7 @@ impl Fitter {
         window: &'a Window,
         fit: &Fit,
         config: &FitConfig,
-    ) -> Option<(CholeskyFactor<ONE_SPOT>, SpotLight<'a>, WindowPixels<'a>)> {
+    ) -> Option<(CholeskyFactor<ONE_SPOT>, AnyLight<'a>, WindowPixels<'a>)> {
         let [spot] = fit.spots.as_slice() else {
             return None;
         };
@@ -199,9 +259,9 @@ impl Fitter {
     pub fn subtract(&mut self, window: &mut Window, spots: &[SpotEstimate], spot_px: f64) {
         let groups = window.groups();
         for spot in spots {
-            self.fill_profiles(window, &[*spot], spot_px);
+            self.draw(window, &[*spot], spot_px);
             let light = self.light_of(0, spot, window);
-            add_light(&light, -1.0, groups, &mut window.data);
+            light.add_to(&mut window.data, -1.0, groups);
         }
     }
 
@@ -213,12 +273,20 @@ impl Fitter {
         config: &FitConfig,
     ) -> NormalEquations<N> {
         let mut normal = NormalEquations::empty();
-        self.fill_profiles(window, &fit.spots, fit.spot_px);
+        self.draw(window, &fit.spots, fit.spot_px);
+        let pixels = pixels_of(window, fit, config);
         let spots = fit.spots.iter().enumerate();
-        let lights: ArrayVec<_, MAX_SPOTS> = spots
-            .map(|(i, spot)| self.light_of(i, spot, window))
-            .collect();
-        add_pixels(&mut normal, &lights, &pixels_of(window, fit, config));
+        if window.psf.is_gaussian() {
+            let lights: ArrayVec<_, MAX_SPOTS> = spots
+                .map(|(i, spot)| self.gaussian_light(i, spot, window))
+                .collect();
+            add_pixels(&mut normal, &lights, &pixels);
+        } else {
+            let lights: ArrayVec<_, MAX_SPOTS> = spots
+                .map(|(i, spot)| self.mixture_light(i, spot, window))
+                .collect();
+            add_pixels(&mut normal, &lights, &pixels);
+        }
         add_background_map(&mut normal, window, fit);
         normal
     }

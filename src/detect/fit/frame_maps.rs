@@ -1,9 +1,10 @@
 //! The frame with its background, noise and spot, and the windows that fits cut out of it.
 
 use super::parameters::SpotEstimate;
-use super::window::Window;
+use super::window::{Window, window_radius};
 use crate::detect::background::Mesh;
 use crate::detect::candidates::Peak;
+use crate::detect::effective_psf::EffectivePsf;
 use crate::detect::pixels::View;
 use crate::detect::psf::{GROUP_PX, MAX_WINDOW_PX, PIXEL_VARIANCE_PX2};
 use multiversion::multiversion;
@@ -23,12 +24,20 @@ pub(crate) struct FrameMaps<'a> {
     pub spot_px: f64,
     /// √ΣP²: the signal-to-noise ratio of a star whose flux equals the noise of a pixel.
     pub matched_gain: f64,
+    /// The spot where it is not a round Gaussian of that size.
+    pub psf: Option<&'a EffectivePsf>,
 }
 
 impl FrameMaps<'_> {
     /// Standard deviation of the spot, pixel included, in pixels.
     pub fn width_px(&self) -> f64 {
         (self.spot_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt()
+    }
+
+    /// Half of the side of the window of a spot of this size, in pixels.
+    pub fn window_radius(&self, spot_px: f64) -> usize {
+        self.psf
+            .map_or_else(|| window_radius(spot_px), |psf| psf.window_radius(spot_px))
     }
 
     /// The noise of a pixel at a point, in ADU.
@@ -74,6 +83,10 @@ impl FrameMaps<'_> {
         (window.y0, window.height) = union_of(rows);
         let cx = window.x0 + window.width / 2;
         let cy = window.y0 + window.height / 2;
+        match self.psf {
+            Some(psf) => psf.at(cx as f64, cy as f64, &mut window.psf),
+            None => window.psf.lobes.clear(),
+        }
         let noise = self.noise_at(cx as f64, cy as f64);
         window.noise_adu = noise;
         let peak = points.iter().map(|p| p.flux).fold(0.0, f64::max) * self.matched_gain;

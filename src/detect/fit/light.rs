@@ -4,61 +4,90 @@ use crate::detect::psf::{AxisProfile, GROUP_PX, PixelGroup, ProfilePart};
 use multiversion::multiversion;
 
 /// The light of a spot in a window.
+pub(crate) trait SpotLight: Copy {
+    /// In a group of pixels of a row.
+    type Group: GroupLight;
+
+    /// Flux, in units of the noise.
+    fn flux(&self) -> f32;
+
+    /// The light in a group of pixels of a row.
+    fn in_group(&self, group: usize, row: usize) -> Self::Group;
+
+    /// The fraction of the light in each pixel of a group.
+    fn shares(&self, group: usize, row: usize) -> PixelGroup;
+}
+
+/// The light of a spot in a group of pixels of a row.
+pub(crate) trait GroupLight: Copy {
+    /// Flux of the spot, in units of the noise.
+    fn flux(&self) -> f32;
+
+    /// The fraction of the spot's light in a pixel, and the derivatives of the light there with
+    /// respect to x, y and size.
+    fn gradient(&self, lane: usize) -> [f32; 4];
+}
+
+/// The light of a Gaussian spot.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct SpotLight<'a> {
+pub(crate) struct GaussianLight<'a> {
     /// Flux, in units of the noise.
     pub flux: f32,
     /// Profiles along x and y.
     pub axes: &'a [AxisProfile; 2],
 }
 
-/// The light of a spot in a group of pixels of a row.
+/// The same in a group of pixels of a row.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct GroupLight {
+pub(crate) struct GaussianGroup {
     flux: f32,
     across: ProfilePart<PixelGroup>,
     down: ProfilePart<f32>,
 }
 
-impl SpotLight<'_> {
-    /// The light in a group of pixels of a row.
+impl SpotLight for GaussianLight<'_> {
+    type Group = GaussianGroup;
+
     #[inline(always)]
-    pub fn in_group(&self, group: usize, row: usize) -> GroupLight {
+    fn flux(&self) -> f32 {
+        self.flux
+    }
+
+    #[inline(always)]
+    fn in_group(&self, group: usize, row: usize) -> GaussianGroup {
         let [across, down] = self.axes;
-        GroupLight {
+        GaussianGroup {
             flux: self.flux,
             across: across.group(group),
             down: down.pixel(row),
         }
     }
-}
 
-/// The light in a pixel, and the gradient of the model with respect to the parameters of the first
-/// `count` spots, in units of the noise.
-#[inline(always)]
-pub(crate) fn linearise<const S: usize, const N: usize>(
-    spots: &[GroupLight; S],
-    count: usize,
-    lane: usize,
-) -> (f32, [f32; N]) {
-    let background = 3 * count;
-    let mut light = 0.0;
-    let mut gradient = [0.0; N];
-    gradient[background] = 1.0;
-    for (i, spot) in spots.iter().enumerate().take(count) {
-        let [shape, by_x, by_y, by_size] =
-            spot_gradient(spot.flux, &spot.across.lane(lane), &spot.down);
-        light += spot.flux * shape;
-        gradient[3 * i] = by_x;
-        gradient[3 * i + 1] = by_y;
-        gradient[3 * i + 2] = shape;
-        gradient[background + 1] += by_size;
+    #[inline(always)]
+    fn shares(&self, group: usize, row: usize) -> PixelGroup {
+        let [across, down] = self.axes;
+        let (mut shares, down) = (across.group(group).value, down.pixel(row).value);
+        for share in &mut shares {
+            *share *= down;
+        }
+        shares
     }
-    (light, gradient)
 }
 
-/// The fraction of a spot's light in a pixel, and the derivatives of the light there with respect
-/// to x, y and size.
+impl GroupLight for GaussianGroup {
+    #[inline(always)]
+    fn flux(&self) -> f32 {
+        self.flux
+    }
+
+    #[inline(always)]
+    fn gradient(&self, lane: usize) -> [f32; 4] {
+        spot_gradient(self.flux, &self.across.lane(lane), &self.down)
+    }
+}
+
+/// The fraction of a Gaussian spot's light in a pixel, and the derivatives of the light there with
+/// respect to x, y and size.
 #[inline(always)]
 pub(crate) fn spot_gradient(
     flux: f32,
@@ -73,16 +102,38 @@ pub(crate) fn spot_gradient(
     ]
 }
 
+/// The light in a pixel, and the gradient of the model with respect to the parameters of the first
+/// `count` spots, in units of the noise.
+#[inline(always)]
+pub(crate) fn linearise<G: GroupLight, const S: usize, const N: usize>(
+    spots: &[G; S],
+    count: usize,
+    lane: usize,
+) -> (f32, [f32; N]) {
+    let background = 3 * count;
+    let mut light = 0.0;
+    let mut gradient = [0.0; N];
+    gradient[background] = 1.0;
+    for (i, spot) in spots.iter().enumerate().take(count) {
+        let [shape, by_x, by_y, by_size] = spot.gradient(lane);
+        light += spot.flux() * shape;
+        gradient[3 * i] = by_x;
+        gradient[3 * i + 1] = by_y;
+        gradient[3 * i + 2] = shape;
+        gradient[background + 1] += by_size;
+    }
+    (light, gradient)
+}
+
 /// Adds `sign` times the light of a spot to the pixels of a window.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(crate) fn add_light(spot: &SpotLight, sign: f32, groups: usize, data: &mut [PixelGroup]) {
-    let [across, down] = spot.axes;
+pub(crate) fn add_light<L: SpotLight>(spot: &L, sign: f32, groups: usize, data: &mut [PixelGroup]) {
+    let flux = sign * spot.flux();
     for group in 0..groups {
-        let value = across.group(group).value;
         for (row, pixels) in data.iter_mut().skip(group).step_by(groups).enumerate() {
-            let light = sign * spot.flux * down.pixel(row).value;
+            let shares = spot.shares(group, row);
             for lane in 0..GROUP_PX {
-                pixels[lane] += value[lane] * light;
+                pixels[lane] += flux * shares[lane];
             }
         }
     }

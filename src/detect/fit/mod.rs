@@ -1,5 +1,7 @@
 //! Step 5: least-squares fits of pixel-integrated Gaussians and a local background.
 //!
+//! Where the frame's spots are no round Gaussians, its effective PSF takes their place.
+//!
 //! Parameters: x, y and flux of each spot, one background, and optionally one spot size.
 //! Gauss-Newton with weights 1/v from the model of the step before: `v = n² + g·m + (ε·m)²`, where
 //! m is the light of the spots, n the background noise, g the shot noise per ADU and ε the relative
@@ -16,6 +18,7 @@ mod fitter;
 mod frame_maps;
 mod gauss_newton;
 mod light;
+mod mixture;
 mod normal;
 mod parameters;
 mod sums;
@@ -23,11 +26,12 @@ mod window;
 
 pub(crate) use batch::BatchStart;
 pub(crate) use buffers::FitBuffers;
+pub(crate) use fitter::AnyLight;
 pub(crate) use frame_maps::FrameMaps;
 pub(crate) use light::{SpotLight, linearise};
-pub(crate) use normal::CholeskyFactor;
+pub(crate) use normal::{CholeskyFactor, NormalEquations};
 pub(crate) use parameters::{
     Fit, FitConfig, MAX_SPOTS, NoiseModel, ONE_SPOT, SPOT_RANGE_PX, SpotEstimate, SpotGroup,
 };
 pub(crate) use sums::{WindowPixels, sum_of};
-pub(crate) use window::{Window, window_radius};
+pub(crate) use window::Window;

@@ -63,9 +63,9 @@ pub(crate) fn variance_of(light: f32, [linear, square]: [f32; 2]) -> f32 {
 
 /// Adds the pixels of a window to the normal equations of `spots`.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(crate) fn add_pixels<const N: usize>(
+pub(crate) fn add_pixels<L: SpotLight, const N: usize>(
     normal: &mut NormalEquations<N>,
-    spots: &[SpotLight],
+    spots: &[L],
     pixels: &WindowPixels,
 ) {
     // With a count known at compile time the loops are unrolled.
@@ -85,9 +85,9 @@ pub(crate) fn add_pixels<const N: usize>(
 
 /// [`add_pixels`] for the first `count` spots.
 #[inline(always)]
-fn add_up<const S: usize, const N: usize>(
+fn add_up<L: SpotLight, const S: usize, const N: usize>(
     normal: &mut NormalEquations<N>,
-    spots: &[SpotLight<'_>; S],
+    spots: &[L; S],
     count: usize,
     pixels: &WindowPixels<'_>,
 ) {
@@ -99,7 +99,7 @@ fn add_up<const S: usize, const N: usize>(
         for (row, data) in pixels.column_of_groups(group).enumerate() {
             let lights = spots.map(|spot| spot.in_group(group, row));
             for lane in 0..GROUP_PX {
-                let (light, gradient) = linearise::<S, N>(&lights, count, lane);
+                let (light, gradient) = linearise::<L::Group, S, N>(&lights, count, lane);
                 let is_valid = !data[lane].is_nan();
                 let weight = 1.0 / pixels.variance(light);
                 let weight = if is_valid { weight } else { 0.0 };
@@ -131,20 +131,18 @@ fn add_up<const S: usize, const N: usize>(
 /// The variance of the flux of one spot, in ADU², fitted together with a background of variance
 /// `background_error2` in ADU². The position is held: a symmetric spot's flux is independent of it.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(crate) fn flux_variance(
-    spot: &SpotLight,
+pub(crate) fn flux_variance<L: SpotLight>(
+    spot: &L,
     pixels: &WindowPixels,
     background_error2: f64,
 ) -> f64 {
     let mut sums = [[0.0f32; GROUP_PX]; 3];
-    let [across, down] = spot.axes;
     for group in 0..pixels.groups {
-        let value = across.group(group).value;
         for (row, data) in pixels.column_of_groups(group).enumerate() {
-            let down = down.pixel(row).value;
+            let shares = spot.shares(group, row);
             for lane in 0..GROUP_PX {
-                let shape = value[lane] * down;
-                let variance = pixels.variance(spot.flux * shape);
+                let shape = shares[lane];
+                let variance = pixels.variance(spot.flux() * shape);
                 let weight = if data[lane].is_nan() {
                     0.0
                 } else {
@@ -181,10 +179,14 @@ pub(crate) fn sum_of(v: PixelGroup) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detect::fit::light::GaussianLight;
     use crate::detect::psf::AxisProfile;
 
     /// The normal equations of one spot pixel by pixel, in double precision.
-    fn plain_sums(spot: &SpotLight<'_>, pixels: &WindowPixels<'_>) -> NormalEquations<ONE_SPOT> {
+    fn plain_sums(
+        spot: &GaussianLight<'_>,
+        pixels: &WindowPixels<'_>,
+    ) -> NormalEquations<ONE_SPOT> {
         let mut normal = NormalEquations::empty();
         let [across, down] = spot.axes;
         for (i, data) in pixels.data.as_flattened().iter().enumerate() {
@@ -228,7 +230,7 @@ mod tests {
             let mut axes = [AxisProfile::default(), AxisProfile::default()];
             axes[0].fill(5.3, 0.9, width);
             axes[1].fill(4.1, 0.9, height);
-            let spot = SpotLight { flux, axes: &axes };
+            let spot = GaussianLight { flux, axes: &axes };
             let noise = |i: usize| ((i * 7919) % 101) as f32 * 0.03 - 1.5;
             let mut data = vec![[f32::NAN; GROUP_PX]; groups * height];
             for (i, pixel) in data.as_flattened_mut().iter_mut().enumerate() {

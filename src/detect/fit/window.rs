@@ -1,5 +1,6 @@
 //! The pixels of a fit.
 
+use crate::detect::effective_psf::LocalPsf;
 use crate::detect::psf::{GROUP_PX, MAX_WINDOW_PX, PIXEL_VARIANCE_PX2, PixelGroup};
 
 /// A rectangle of pixels cut out of the frame.
@@ -22,6 +23,8 @@ pub(crate) struct Window {
     pub background_error: f64,
     /// The part of `background_error` that is noise, in ADU.
     pub background_noise: f64,
+    /// The spot at this place.
+    pub psf: LocalPsf,
 }
 
 impl Window {
@@ -48,8 +51,15 @@ impl Window {
     /// Becomes a copy of another window, without a new allocation where the pixels fit.
     pub fn copy_from(&mut self, other: &Self) {
         let mut data = std::mem::take(&mut self.data);
+        let mut lobes = std::mem::take(&mut self.psf.lobes);
         data.clone_from(&other.data);
-        *self = Self { data, ..*other };
+        lobes.clone_from(&other.psf.lobes);
+        let psf = LocalPsf { lobes, ..other.psf };
+        *self = Self {
+            data,
+            psf,
+            ..*other
+        };
     }
 }
 

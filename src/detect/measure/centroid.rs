@@ -2,7 +2,7 @@
 
 use crate::base::coords::PixelPoint;
 use crate::detect::detection::Detection;
-use crate::detect::fit::{Fit, FitBuffers, FrameMaps, NoiseModel, Window, window_radius};
+use crate::detect::fit::{Fit, FitBuffers, FrameMaps, NoiseModel, Window};
 
 /// Grey levels count above this many standard deviations of the background noise.
 const GREY_THRESHOLD_SIGMA: f64 = 3.0;
@@ -24,7 +24,7 @@ pub(crate) fn grey_weighted(
     detection: &mut Detection,
     buffers: &mut FitBuffers,
 ) {
-    let radius = window_radius(maps.spot_px);
+    let radius = maps.window_radius(maps.spot_px);
     let unsaturated = FrameMaps {
         saturation_adu: f32::INFINITY,
         ..*maps

@@ -4,7 +4,7 @@ use super::saturated_area::SaturatedArea;
 use crate::base::coords::PixelPoint;
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::detection::{Detection, DetectionFlags};
-use crate::detect::fit::{Fit, FrameMaps, NoiseModel, SpotEstimate, window_radius};
+use crate::detect::fit::{Fit, FrameMaps, NoiseModel, SpotEstimate};
 use crate::detect::pixels::View;
 
 /// The detection of a source in coordinates of the view, without the flags of its shape.
@@ -20,7 +20,7 @@ pub(super) fn detection_of(
     clamp_to_frame(&mut spot, width, height);
     let background = f64::from(maps.background.at(peak.x as f32, peak.y as f32).0);
     // Where all pixels next to the peak are NaN, more distant ones made it.
-    let brightest = [1, window_radius(maps.spot_px)]
+    let brightest = [1, maps.window_radius(maps.spot_px)]
         .into_iter()
         .map(|reach| brightest_within(reach, peak, &maps.view))
         .find(|value| value.is_finite());

@@ -12,7 +12,6 @@ use crate::detect::config::CentroidMethod;
 use crate::detect::detection::Detection;
 use crate::detect::fit::{
     BatchStart, Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate, SpotGroup,
-    window_radius,
 };
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
 use crate::detect::threads::for_each_worker;
@@ -111,13 +110,15 @@ impl Measurement<'_> {
             start: SpotGroup::from_iter([spots[index]]),
             beyond: &[],
         };
-        let saturated = indices.clone().filter(|&i| peaks[i].saturated);
-        let unsaturated = indices.filter(|&i| !peaks[i].saturated);
-        for index in saturated {
+        // Only Gaussian spots are fitted in batches.
+        let is_single = |i: &usize| peaks[*i].saturated || self.maps.psf.is_some();
+        let singly = indices.clone().filter(is_single);
+        let in_batches = indices.filter(|i| !is_single(i));
+        for index in singly {
             self.measure(&surroundings(index), None, fits, detections);
         }
         let mut batch = mem::take(&mut fits.batch);
-        let starts = unsaturated.map(|index| BatchStart {
+        let starts = in_batches.map(|index| BatchStart {
             number: index,
             spot: spots[index],
             spot_px: self.maps.spot_px,
@@ -134,12 +135,18 @@ impl Measurement<'_> {
     fn reach_px(&self) -> f64 {
         /// Spots closer than this many standard deviations beyond the window have light in it.
         const MARGIN_SIGMA: f64 = 3.0;
-        window_radius(self.maps.spot_px) as f64 * 1.5 + MARGIN_SIGMA * self.maps.width_px()
+        self.maps.window_radius(self.maps.spot_px) as f64 * 1.5
+            + MARGIN_SIGMA * self.maps.width_px()
     }
 
     /// Distance within which spots touch, in pixels.
     fn touching_px(&self) -> f64 {
         TOUCHING_SIGMA * self.maps.width_px()
+    }
+
+    /// Whether stars are elongated, and fitted with round spots.
+    fn is_misfitted(&self) -> bool {
+        self.shape.is_elongated() && self.maps.psf.is_none()
     }
 
     fn fit_config(&self) -> FitConfig {
@@ -170,9 +177,8 @@ impl Measurement<'_> {
         };
         fit.converged &= fit.spots[0].has_position(fit.spot_px);
         let is_single = fit.converged && start.len() == 1;
-        let may_be_pair = is_single
-            && !self.shape.is_elongated()
-            && may_be_pair(&fit, peak, region, self.maps.spot_px);
+        let may_be_pair =
+            is_single && !self.is_misfitted() && may_be_pair(&fit, peak, region, self.maps.spot_px);
         let pair = if may_be_pair {
             let pair_fitter = PairFitter {
                 maps: &self.maps,
@@ -204,7 +210,7 @@ impl Measurement<'_> {
         let may_be_edge = fit.spots.len() == 1 && !peak.saturated;
         detection.flags.extended |= may_be_edge && ring::is_bright(&self.maps, peak);
         self.flag_trail(peak, region, &mut detection);
-        if self.shape.is_elongated() && fit.spots.len() == 1 {
+        if self.is_misfitted() && fit.spots.len() == 1 {
             self.center_elongated(&fit, peak, &mut detection, buffers);
         }
         self.finish(&fit, &mut detection, buffers, out);
@@ -362,7 +368,7 @@ impl Measurement<'_> {
     ) {
         let is_by_area = detection.flags.saturated && !fit.converged;
         let is_grey = self.method == CentroidMethod::GreyWeighted;
-        let is_centered = self.shape.is_elongated() && !detection.flags.blended;
+        let is_centered = self.is_misfitted() && !detection.flags.blended;
         if is_grey && !is_centered && !detection.flags.trail && !is_by_area {
             centroid::grey_weighted(&self.maps, &self.noise, fit, detection, buffers);
         }

@@ -4,9 +4,7 @@
 //! up to four spot sizes away.
 
 use crate::detect::candidates::{Peak, Region};
-use crate::detect::fit::{
-    Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate, window_radius,
-};
+use crate::detect::fit::{Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate};
 
 /// A bright single source is tried as a pair where it is too wide, fits badly or is elongated.
 struct PairCriteria;
@@ -84,7 +82,7 @@ impl PairFitter<'_> {
         /// Flux of a spot over that in its brightest 3x3 pixels, roughly.
         const FLUX_OVER_BRIGHTEST: f64 = 1.5;
         let spot_px = self.maps.spot_px;
-        let radius = window_radius(spot_px) + self.maps.width_px().ceil() as usize;
+        let radius = self.maps.window_radius(spot_px) + self.maps.width_px().ceil() as usize;
         let FitBuffers { fitter, window, .. } = buffers;
         self.maps.cut_out(&fit.spots[..1], radius, window);
         fitter.subtract(window, self.beyond, spot_px);

@@ -134,9 +134,21 @@ fn fit_peaks<'a, P: BrightPeak + 'a>(
     (bright, peaks): (impl Iterator<Item = &'a P>, &[P]),
     buffers: &mut FitBuffers,
 ) -> BrightStars {
+    isolated_peaks(maps, bright.take(MAX_PEAKS), peaks)
+        .filter_map(|(peak, size_px)| fit_star(maps, peak.start(maps), size_px, buffers))
+        .take(MAX_STARS)
+        .collect()
+}
+
+/// Those of `bright` that are not saturated, and that no other of all `peaks` disturbs, with their
+/// sizes by the peaks' curvature in pixels.
+pub(crate) fn isolated_peaks<'a, P: BrightPeak + 'a>(
+    maps: &FrameMaps<'_>,
+    bright: impl Iterator<Item = &'a P>,
+    peaks: &[P],
+) -> impl Iterator<Item = (&'a P, f64)> {
     let neighbours = &peaks[..peaks.len().min(MAX_NEIGHBOURS)];
     bright
-        .take(MAX_PEAKS)
         .filter(|peak| !peak.is_saturated())
         .map(|peak| (peak, peak.size_px(maps)))
         .filter(|(peak, size_px)| {
@@ -145,9 +157,6 @@ fn fit_peaks<'a, P: BrightPeak + 'a>(
             let mut others = neighbours.iter().filter(|o| is_rival(o.snr(), peak.snr()));
             !others.any(|other| is_near(peak.place(), other.place(), reach_px))
         })
-        .filter_map(|(peak, size_px)| fit_star(maps, peak.start(maps), size_px, buffers))
-        .take(MAX_STARS)
-        .collect()
 }
 
 /// The peaks, those first that are the brightest of their place; `None` where the brightest peaks

@@ -8,6 +8,6 @@ mod bright_stars;
 mod noise_model;
 mod spot_size;
 
-pub(crate) use bright_stars::fit_bright_stars;
-pub(crate) use noise_model::{StarModel, star_model};
+pub(crate) use bright_stars::{fit_bright_stars, isolated_peaks};
+pub(crate) use noise_model::{StarModel, noise_of, star_model};
 pub(crate) use spot_size::{DEFAULT_SPOT_PX, SpotSize, spot_size};

@@ -7,8 +7,8 @@ use super::bright_stars::MAX_MODEL_ERROR;
 use super::spot_size::{BrightStars, MAX_STARS};
 use super::spot_size::{MODE_WIDTH, weighted_size};
 use crate::detect::fit::{
-    BatchStart, CholeskyFactor, Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, ONE_SPOT,
-    SpotLight, WindowPixels, linearise, sum_of,
+    AnyLight, BatchStart, CholeskyFactor, Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel,
+    ONE_SPOT, SpotEstimate, SpotLight, Window, WindowPixels, linearise, sum_of,
 };
 use crate::detect::psf::GROUP_PX;
 use arrayvec::ArrayVec;
@@ -82,6 +82,38 @@ pub(crate) fn star_model(
     }
 }
 
+/// The noise model from the residuals of the stars in these windows, with spots of one size. The
+/// stars' fits begin, and end, with the estimates given.
+pub(crate) fn noise_of(
+    stars: &mut [(Window, SpotEstimate)],
+    spot_px: f64,
+    buffers: &mut FitBuffers,
+) -> NoiseModel {
+    let mut model = NoiseModel {
+        shot_adu: stars.first().map_or(0.0, |(window, _)| window.noise_adu),
+        model_error2: 0.0,
+    };
+    for _ in 0..NOISE_ROUNDS {
+        let mut sums = Moments::default();
+        let config = FitConfig {
+            spot_px,
+            free_size: false,
+            noise: model,
+        };
+        for (window, spot) in stars.iter_mut() {
+            buffers.window.copy_from(window);
+            let fit = buffers.fitter.fit(window, &[*spot], &config);
+            if fit.converged {
+                *spot = fit.spots[0];
+                sums.add_star(buffers, &fit, &config);
+            }
+        }
+        model = sums.solve();
+        model.model_error2 = model.model_error2.min(MAX_MODEL_ERROR * MAX_MODEL_ERROR);
+    }
+    model
+}
+
 /// Sums over pixels for `Σ [r² − (1 − h) v] ∂v / v² = 0`, with `v = n² + shot·m + ε²·m²` and the
 /// leverage h, the part of a pixel's variance that the star's own parameters absorb.
 ///
@@ -104,7 +136,10 @@ impl Moments {
             return;
         };
         let per_noise = pixels.per_noise;
-        let [a, b, c, p, q] = sums_of(&factor, &spot, &pixels);
+        let [a, b, c, p, q] = match spot {
+            AnyLight::Gaussian(spot) => sums_of(&factor, &spot, &pixels),
+            AnyLight::Mixture(spot) => sums_of(&factor, &spot, &pixels),
+        };
         self.matrix[0] += a * per_noise * per_noise;
         self.matrix[1] += b * per_noise;
         self.matrix[2] += c;
@@ -140,7 +175,11 @@ impl Moments {
 
 /// The sums of [`Moments`] over the pixels of one star, in units of the noise.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn sums_of(factor: &CholeskyFactor<ONE_SPOT>, spot: &SpotLight, pixels: &WindowPixels) -> [f64; 5] {
+fn sums_of<L: SpotLight>(
+    factor: &CholeskyFactor<ONE_SPOT>,
+    spot: &L,
+    pixels: &WindowPixels,
+) -> [f64; 5] {
     let mut sums = [[0.0f32; GROUP_PX]; 5];
     for group in 0..pixels.groups {
         for (row, data) in pixels.column_of_groups(group).enumerate() {

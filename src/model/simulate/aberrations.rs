@@ -84,8 +84,8 @@ impl Aberrations {
             let (sin_2_phi, cos_2_phi) = libm::sincos(2.0 * phi);
             let radial = (defocus_px + astigmatism_px) * rho * cos_phi
                 + coma_px / 3.0 * (rho2 * (2.0 + cos_2_phi) - 1.0);
-            let tangential = (defocus_px - astigmatism_px) * rho * sin_phi
-                + coma_px / 3.0 * rho2 * sin_2_phi;
+            let tangential =
+                (defocus_px - astigmatism_px) * rho * sin_phi + coma_px / 3.0 * rho2 * sin_2_phi;
             let [x, y] = [
                 radial * cos - tangential * sin,
                 radial * sin + tangential * cos,

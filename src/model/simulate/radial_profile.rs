@@ -65,11 +65,13 @@ impl RadialProfile {
         } else {
             &COARSE
         };
-        let points = || rule.iter().flat_map(|&(at, weight)| [(at, weight), (-at, weight)]);
+        let points = || {
+            rule.iter()
+                .flat_map(|&(at, weight)| [(at, weight), (-at, weight)])
+        };
         let row = |(y, of_y): (f64, f64)| {
-            let point = move |(x, of_x): (f64, f64)| {
-                of_x * of_y * self.density((x_px + x).hypot(y_px + y))
-            };
+            let point =
+                move |(x, of_x): (f64, f64)| of_x * of_y * self.density((x_px + x).hypot(y_px + y));
             points().map(point).sum::<f64>()
         };
         points().map(row).sum()
@@ -92,11 +94,7 @@ fn airy(half_width_px: f64, obstruction: f64) -> impl Fn(f64) -> f64 {
     let peak = open / (4.0 * PI * unit_px * unit_px);
     // 2 J₁(v) / v.
     let jinc = |v: f64| {
-        if v < 1e-6 {
-            1.0
-        } else {
-            2.0 * libm::j1(v) / v
-        }
+        if v < 1e-6 { 1.0 } else { 2.0 * libm::j1(v) / v }
     };
     move |distance_px| {
         let v = distance_px / unit_px;

@@ -1,0 +1,273 @@
+//! The effective point spread function of a frame whose spots are not round Gaussians: a mixture of
+//! round Gaussians on a grid, integrated over the pixels, stretched and turned over the field.
+//!
+//! # Reference
+//! Anderson & King 2000, PASP 112, 1360, doi 10.1086/316632, for the effective PSF and its change
+//! over the field.
+
+use super::psf::MAX_WINDOW_PX;
+
+/// Size and elongation of a spot: `[ln σ, e₁, e₂]`. Its covariance is `σ² exp(e₁ K + e₂ L)` with the
+/// matrices K = diag(1, −1) and L = ((0, 1), (1, 0)): its axes are in a ratio of `exp |e|`.
+pub(crate) type SpotMoments = [f64; 3];
+
+/// Terms of the polynomials over the field: 1, x, y; x², xy, y²; the last three times r².
+pub(crate) const FIELD_TERMS: usize = 9;
+
+/// Part of a spot: a round Gaussian.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Lobe {
+    /// Position relative to the spot's centre of light, along x and y, in pixels.
+    pub offset_px: [f64; 2],
+    /// Share of the light.
+    pub share: f64,
+}
+
+/// The spot at one place: a mixture of Gaussians, or a single one.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct LocalPsf {
+    /// Empty for a single Gaussian of the size that is fitted.
+    pub lobes: Vec<Lobe>,
+    /// Standard deviation of each, in pixels.
+    pub lobe_px: f64,
+    /// The size, as [`Fit::spot_px`](super::fit::Fit::spot_px), of a spot that is not scaled, in
+    /// pixels.
+    pub spot_px: f64,
+}
+
+impl LocalPsf {
+    /// Whether it is a single Gaussian.
+    pub fn is_gaussian(&self) -> bool {
+        self.lobes.is_empty()
+    }
+}
+
+/// Where on the frame a star is: relative to the centre, in units of half of the diagonal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FieldFrame {
+    centre_px: [f64; 2],
+    radius_px: f64,
+}
+
+impl FieldFrame {
+    /// Of a frame of this width and height, in pixels.
+    pub fn of((width, height): (usize, usize)) -> Self {
+        let [width, height] = [width, height].map(|side| side as f64);
+        Self {
+            centre_px: [0.5 * (width - 1.0), 0.5 * (height - 1.0)],
+            radius_px: 0.5 * width.hypot(height),
+        }
+    }
+
+    /// Values of the terms of the polynomials at a pixel.
+    pub fn terms(&self, x_px: f64, y_px: f64) -> [f64; FIELD_TERMS] {
+        let x = (x_px - self.centre_px[0]) / self.radius_px;
+        let y = (y_px - self.centre_px[1]) / self.radius_px;
+        let r2 = x * x + y * y;
+        let [xx, xy, yy] = [x * x, x * y, y * y];
+        [1.0, x, y, xx, xy, yy, xx * r2, xy * r2, yy * r2]
+    }
+}
+
+/// Size and elongation over the field.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FieldMoments {
+    /// The frame that the terms refer to.
+    pub frame: FieldFrame,
+    /// Coefficients of each of the moments.
+    pub coefficients: [[f64; FIELD_TERMS]; 3],
+    /// Smallest and largest value of each: the polynomials do not hold beyond the stars.
+    pub range: [[f64; 2]; 3],
+}
+
+impl FieldMoments {
+    /// The same moments everywhere.
+    pub fn constant(frame: FieldFrame, moments: SpotMoments) -> Self {
+        Self {
+            frame,
+            coefficients: moments.map(|moment| {
+                let mut coefficients = [0.0; FIELD_TERMS];
+                coefficients[0] = moment;
+                coefficients
+            }),
+            range: moments.map(|moment| [moment; 2]),
+        }
+    }
+
+    /// The moments at a pixel.
+    pub fn at(&self, x_px: f64, y_px: f64) -> SpotMoments {
+        let terms = self.frame.terms(x_px, y_px);
+        std::array::from_fn(|i| {
+            let terms = self.coefficients[i].iter().zip(&terms);
+            let value: f64 = terms.map(|(c, t)| c * t).sum();
+            value.clamp(self.range[i][0], self.range[i][1])
+        })
+    }
+}
+
+/// The effective PSF of a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct EffectivePsf {
+    /// Of a spot of the typical moments.
+    pub lobes: Vec<Lobe>,
+    /// Standard deviation of each of them, in pixels.
+    pub lobe_px: f64,
+    /// Moments that the lobes have as they are.
+    pub typical: SpotMoments,
+    /// Moments over the field.
+    pub moments: FieldMoments,
+    /// Size of the frame's spot where it is taken for a round Gaussian, in pixels.
+    pub spot_px: f64,
+    /// Half of the side of a window that holds the spot, in pixels.
+    pub radius_px: usize,
+}
+
+impl EffectivePsf {
+    /// Round Gaussians of these sizes; elongations are left out.
+    pub fn gaussian(moments: FieldMoments, spot_px: f64, radius_px: usize) -> Self {
+        let centre = Lobe {
+            offset_px: [0.0; 2],
+            share: 1.0,
+        };
+        Self {
+            lobes: vec![centre],
+            lobe_px: spot_px,
+            typical: [spot_px.ln(), 0.0, 0.0],
+            moments,
+            spot_px,
+            radius_px,
+        }
+    }
+
+    /// The spot at a pixel.
+    pub fn at(&self, x_px: f64, y_px: f64, local: &mut LocalPsf) {
+        let here = self.moments.at(x_px, y_px);
+        let stretch = product(root(here), inverse_root(self.typical));
+        local.lobes.clear();
+        local.lobes.extend(self.lobes.iter().map(|lobe| Lobe {
+            offset_px: stretch.map(|[a, b]| a * lobe.offset_px[0] + b * lobe.offset_px[1]),
+            share: lobe.share,
+        }));
+        local.lobe_px = self.lobe_px * (here[0] - self.typical[0]).exp();
+        local.spot_px = self.spot_px;
+    }
+
+    /// Half of the side of the window of a spot of this size, in pixels.
+    pub fn window_radius(&self, spot_px: f64) -> usize {
+        let scaled = (self.radius_px as f64 * spot_px / self.spot_px).ceil() as usize;
+        scaled.clamp(self.radius_px, (MAX_WINDOW_PX - 1) / 2)
+    }
+}
+
+/// Rows of a matrix.
+pub(crate) type Matrix = [[f64; 2]; 2];
+
+/// Covariance of a spot, in px².
+pub(crate) fn covariance([ln_sigma, e1, e2]: SpotMoments) -> Matrix {
+    scaled_exponential((2.0 * ln_sigma).exp(), [e1, e2])
+}
+
+/// Derivatives of the covariance with respect to the moments: of xx, yy and xy.
+pub(crate) fn covariance_by(moments: SpotMoments) -> [[f64; 3]; 3] {
+    derivatives(moments, covariance).map(|[[xx, xy], [_, yy]]| [xx, yy, xy])
+}
+
+/// For each of the moments, the matrix by which a larger one moves the parts of a spot.
+pub(crate) fn stretch_by(moments: SpotMoments) -> [Matrix; 3] {
+    let inverse = inverse_root(moments);
+    derivatives(moments, root).map(|change| product(change, inverse))
+}
+
+/// Derivatives of a matrix with respect to the moments.
+fn derivatives(moments: SpotMoments, matrix: impl Fn(SpotMoments) -> Matrix) -> [Matrix; 3] {
+    /// Half of the difference that is taken.
+    const STEP: f64 = 1e-4;
+    std::array::from_fn(|i| {
+        let at = |step: f64| {
+            let mut near = moments;
+            near[i] += step;
+            matrix(near)
+        };
+        let (above, below) = (at(STEP), at(-STEP));
+        let slope = |r: usize, c: usize| (above[r][c] - below[r][c]) / (2.0 * STEP);
+        [[slope(0, 0), slope(0, 1)], [slope(1, 0), slope(1, 1)]]
+    })
+}
+
+/// The inverse of a symmetric matrix.
+pub(crate) fn inverse([[xx, xy], [_, yy]]: Matrix) -> Matrix {
+    let determinant = xx * yy - xy * xy;
+    [
+        [yy / determinant, -xy / determinant],
+        [-xy / determinant, xx / determinant],
+    ]
+}
+
+/// The symmetric square root of the covariance.
+fn root([ln_sigma, e1, e2]: SpotMoments) -> Matrix {
+    scaled_exponential(ln_sigma.exp(), [0.5 * e1, 0.5 * e2])
+}
+
+/// Its inverse.
+fn inverse_root([ln_sigma, e1, e2]: SpotMoments) -> Matrix {
+    scaled_exponential((-ln_sigma).exp(), [-0.5 * e1, -0.5 * e2])
+}
+
+/// `scale · exp(e₁ K + e₂ L)`.
+fn scaled_exponential(scale: f64, [e1, e2]: [f64; 2]) -> Matrix {
+    let e = e1.hypot(e2);
+    let sinh_per_e = if e > 0.0 { e.sinh() / e } else { 1.0 };
+    let [cosh, plus, cross] = [e.cosh(), sinh_per_e * e1, sinh_per_e * e2].map(|part| scale * part);
+    [[cosh + plus, cross], [cross, cosh - plus]]
+}
+
+fn product(a: Matrix, b: Matrix) -> Matrix {
+    a.map(|[p, q]| [0, 1].map(|column| p * b[0][column] + q * b[1][column]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lobes_are_stretched_to_the_moments_of_the_place() {
+        let frame = FieldFrame::of((101, 101));
+        let mut moments = FieldMoments::constant(frame, [0.0; 3]);
+        moments.range = [[-1.0, 1.0]; 3];
+        // Wider and elongated along x to the right.
+        moments.coefficients[0][1] = 0.3;
+        moments.coefficients[1][1] = 0.8;
+        let offsets = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+        let psf = EffectivePsf {
+            lobes: offsets
+                .map(|offset_px| Lobe {
+                    offset_px,
+                    share: 0.25,
+                })
+                .to_vec(),
+            lobe_px: 0.5,
+            typical: [0.0; 3],
+            moments,
+            spot_px: 1.0,
+            radius_px: 4,
+        };
+        let mut local = LocalPsf::default();
+        psf.at(50.0, 50.0, &mut local);
+        assert_eq!(local.lobes, psf.lobes);
+        psf.at(100.0, 50.0, &mut local);
+        let xx: f64 = local
+            .lobes
+            .iter()
+            .map(|l| l.share * l.offset_px[0].powi(2))
+            .sum();
+        let yy: f64 = local
+            .lobes
+            .iter()
+            .map(|l| l.share * l.offset_px[1].powi(2))
+            .sum();
+        // Half of the unit circle's moment, times σ² and the ratio of the axes.
+        let x = moments.frame.terms(100.0, 50.0)[1];
+        assert!((xx * yy - 0.25 * (4.0 * 0.3 * x).exp()).abs() < 1e-12);
+        assert!((xx / yy - (2.0 * 0.8 * x).exp()).abs() < 1e-9);
+    }
+}

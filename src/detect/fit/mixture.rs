@@ -1,0 +1,138 @@
+//! The light of an effective PSF in a window: the sum over its lobes, pixel by pixel.
+
+use super::light::{GroupLight, SpotLight};
+use super::window::Window;
+use crate::detect::effective_psf::Lobe;
+use crate::detect::psf::{AxisProfile, GROUP_PX, PixelGroup};
+use multiversion::multiversion;
+
+/// The fraction of the light in a group of pixels, and its derivatives with respect to x, y and
+/// size, per px.
+pub(super) type ShareGroup = [PixelGroup; 4];
+
+/// The pixels of an effective PSF.
+#[derive(Debug, Clone, Default)]
+pub(super) struct MixtureImage {
+    /// Row by row, as the pixels of the window.
+    groups: Vec<ShareGroup>,
+    axes: [AxisProfile; 2],
+}
+
+impl MixtureImage {
+    /// Draws the PSF of the window, scaled to `spot_px`, at (x, y) in the frame.
+    pub fn draw(&mut self, window: &Window, [x_px, y_px]: [f64; 2], spot_px: f64) {
+        let psf = &window.psf;
+        let width = window.groups();
+        self.groups.clear();
+        self.groups
+            .resize(width * window.height, [[0.0; GROUP_PX]; 4]);
+        let scale = spot_px / psf.spot_px;
+        let lobe_px = scale * psf.lobe_px;
+        let [across, down] = &mut self.axes;
+        let corner = [window.x0, window.y0].map(|at| at as f64);
+        for lobe in &psf.lobes {
+            let [dx, dy] = lobe.offset_px;
+            across.fill(x_px - corner[0] + scale * dx, lobe_px, window.width);
+            down.fill(y_px - corner[1] + scale * dy, lobe_px, window.height);
+            // What a larger spot moves, and widens, its lobes by.
+            let by_spot = [dx, dy, psf.lobe_px].map(|part| (part / psf.spot_px) as f32);
+            add_lobe(lobe, by_spot, [across, down], &mut self.groups, width);
+        }
+    }
+
+    /// The light of a spot of this flux, in units of the noise.
+    pub fn light(&self, flux: f32, groups: usize) -> MixtureLight<'_> {
+        MixtureLight {
+            flux,
+            shares: &self.groups,
+            groups,
+        }
+    }
+}
+
+/// Adds a lobe to the rows of `width` groups.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn add_lobe(
+    lobe: &Lobe,
+    by_spot: [f32; 3],
+    [across, down]: [&AxisProfile; 2],
+    into: &mut [ShareGroup],
+    width: usize,
+) {
+    let share = lobe.share as f32;
+    let [to_x, to_y, wider] = by_spot;
+    for group in 0..width {
+        let across = across.group(group);
+        for (row, into) in into.iter_mut().skip(group).step_by(width).enumerate() {
+            let down = down.pixel(row);
+            let [value, slope, growth] =
+                [down.value, down.by_center, down.by_sigma].map(|part| share * part);
+            for lane in 0..GROUP_PX {
+                let here = across.value[lane];
+                let by_x = across.by_center[lane] * value;
+                let by_y = here * slope;
+                let by_lobe = across.by_sigma[lane] * value + here * growth;
+                into[0][lane] += here * value;
+                into[1][lane] += by_x;
+                into[2][lane] += by_y;
+                into[3][lane] += by_x * to_x + by_y * to_y + by_lobe * wider;
+            }
+        }
+    }
+}
+
+/// The light of a spot that has the effective PSF.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct MixtureLight<'a> {
+    flux: f32,
+    shares: &'a [ShareGroup],
+    /// Groups in a row.
+    groups: usize,
+}
+
+/// The same in a group of pixels of a row.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct MixtureGroup {
+    flux: f32,
+    shares: ShareGroup,
+}
+
+impl SpotLight for MixtureLight<'_> {
+    type Group = MixtureGroup;
+
+    #[inline(always)]
+    fn flux(&self) -> f32 {
+        self.flux
+    }
+
+    #[inline(always)]
+    fn in_group(&self, group: usize, row: usize) -> MixtureGroup {
+        MixtureGroup {
+            flux: self.flux,
+            shares: self.shares[row * self.groups + group],
+        }
+    }
+
+    #[inline(always)]
+    fn shares(&self, group: usize, row: usize) -> PixelGroup {
+        self.shares[row * self.groups + group][0]
+    }
+}
+
+impl GroupLight for MixtureGroup {
+    #[inline(always)]
+    fn flux(&self) -> f32 {
+        self.flux
+    }
+
+    #[inline(always)]
+    fn gradient(&self, lane: usize) -> [f32; 4] {
+        let [shape, by_x, by_y, by_size] = self.shares.map(|of_group| of_group[lane]);
+        [
+            shape,
+            self.flux * by_x,
+            self.flux * by_y,
+            self.flux * by_size,
+        ]
+    }
+}

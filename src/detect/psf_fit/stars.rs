@@ -1,0 +1,291 @@
+//! The bright stars that tell the PSF, fitted with a size and an elongation of their own.
+
+use crate::base::statistics::median;
+use crate::detect::candidates::Peak;
+use crate::detect::effective_psf::{
+    EffectivePsf, FieldFrame, FieldMoments, LocalPsf, SpotMoments, covariance_by, stretch_by,
+};
+use crate::detect::fit::{FrameMaps, NoiseModel, NormalEquations, SpotEstimate, Window};
+use crate::detect::psf::AxisProfile;
+use crate::detect::star_model::isolated_peaks;
+
+/// Most stars that are used.
+const MAX_STARS: usize = 60;
+/// Peaks below this signal-to-noise ratio tell little about the form of a spot.
+const MIN_SNR: f32 = 25.0;
+/// Error of the PSF while it is measured, as a part of the light, squared: the brightest stars must
+/// not count for all.
+pub(super) const MODEL_ERROR2: f64 = 0.02 * 0.02;
+
+/// Parameters of a star: x, y, flux, background; size and elongation.
+const PARAMETERS: usize = 7;
+/// Those without size and elongation.
+const PLACE: usize = 4;
+
+/// A bright star.
+#[derive(Debug, Clone)]
+pub(super) struct PsfStar {
+    /// Its pixels, and the spot at its place.
+    pub window: Window,
+    /// Position and flux.
+    pub spot: SpotEstimate,
+    /// Background above the map, in ADU.
+    pub background: f64,
+    /// Size and elongation of its own.
+    pub moments: SpotMoments,
+    /// Their variances.
+    pub variances: SpotMoments,
+    /// Chi² over the degrees of freedom.
+    pub chi2: f64,
+}
+
+/// What a pixel of a spot holds: the share of the light, and its derivatives with respect to x, y,
+/// and the moments.
+type PixelShare = [f64; 6];
+
+/// Fits the stars; holds the buffers.
+#[derive(Debug, Default)]
+pub(super) struct StarFitter {
+    noise: NoiseModel,
+    axes: [AxisProfile; 2],
+    shares: Vec<PixelShare>,
+    local: LocalPsf,
+}
+
+impl StarFitter {
+    pub fn new(noise: NoiseModel) -> Self {
+        Self {
+            noise,
+            ..Self::default()
+        }
+    }
+
+    /// Moves all stars by a step of their fits to `psf`; sets their own moments where these are
+    /// `free`.
+    pub fn step(&mut self, stars: &mut [PsfStar], psf: &EffectivePsf, free: bool) {
+        for star in stars {
+            let parameters = if free { PARAMETERS } else { PLACE };
+            let change = self.step_one(star, psf, parameters);
+            if free {
+                let here = psf.moments.at(star.spot.x, star.spot.y);
+                let change = change.unwrap_or_default();
+                star.moments = std::array::from_fn(|i| here[i] + change[i].clamp(-0.5, 0.5));
+            }
+        }
+    }
+
+    /// A step of one star; returns the change of its moments, `None` where there is no solution.
+    fn step_one(
+        &mut self,
+        star: &mut PsfStar,
+        psf: &EffectivePsf,
+        parameters: usize,
+    ) -> Option<SpotMoments> {
+        /// Longest step, in pixels.
+        const MAX_STEP_PX: f64 = 0.5;
+        self.draw(star, psf);
+        let mut normal = self.linearise(star);
+        star.chi2 = normal.chi2 / (normal.pixels as f64 - PARAMETERS as f64).max(1.0);
+        if normal.factorise(parameters) < parameters {
+            star.variances = [f64::INFINITY; 3];
+            return None;
+        }
+        let change = normal.solve(parameters);
+        let variances = normal.variances(parameters);
+        star.spot.x += change[0].clamp(-MAX_STEP_PX, MAX_STEP_PX);
+        star.spot.y += change[1].clamp(-MAX_STEP_PX, MAX_STEP_PX);
+        star.spot.flux += change[2];
+        star.background += change[3];
+        if parameters < PARAMETERS {
+            return Some([0.0; 3]);
+        }
+        star.variances = std::array::from_fn(|i| variances[PLACE + i]);
+        Some(std::array::from_fn(|i| change[PLACE + i]))
+    }
+
+    /// Computes the shares of the pixels of a star with this PSF.
+    fn draw(&mut self, star: &PsfStar, psf: &EffectivePsf) {
+        let Self {
+            axes: [across, down],
+            shares,
+            local,
+            ..
+        } = self;
+        let PsfStar { window, spot, .. } = star;
+        psf.at(spot.x, spot.y, local);
+        let here = psf.moments.at(spot.x, spot.y);
+        let stretches = stretch_by(here);
+        // A single lobe widens itself; those of a mixture move, and widen with the size only.
+        let widening = if local.lobes.len() == 1 {
+            covariance_by(here)
+        } else {
+            let wider = 2.0 * local.lobe_px * local.lobe_px;
+            [[wider, wider, 0.0], [0.0; 3], [0.0; 3]]
+        };
+        shares.clear();
+        shares.resize(window.width * window.height, [0.0; 6]);
+        let per_sigma = 1.0 / local.lobe_px;
+        for lobe in &local.lobes {
+            let [dx, dy] = lobe.offset_px;
+            across.fill(spot.x + dx - window.x0 as f64, local.lobe_px, window.width);
+            down.fill(spot.y + dy - window.y0 as f64, local.lobe_px, window.height);
+            let moves = stretches.map(|rows| rows.map(|[a, b]| a * dx + b * dy));
+            for (row, shares) in shares.chunks_exact_mut(window.width).enumerate() {
+                let d = down.pixel(row);
+                let [dv, d1, d2] =
+                    [d.value, d.by_center, d.by_sigma].map(|part| lobe.share * f64::from(part));
+                for (column, share) in shares.iter_mut().enumerate() {
+                    let a = across.pixel(column);
+                    let [av, a1, a2] = [a.value, a.by_center, a.by_sigma].map(f64::from);
+                    let [by_x, by_y] = [a1 * dv, av * d1];
+                    // The derivative with respect to σ is σ times the second one with respect to
+                    // the place.
+                    let [xx, yy, xy] = [a2 * dv * per_sigma, av * d2 * per_sigma, a1 * d1];
+                    share[0] += av * dv;
+                    share[1] += by_x;
+                    share[2] += by_y;
+                    for ((share, [u, v]), [cxx, cyy, cxy]) in
+                        share[3..].iter_mut().zip(moves).zip(widening)
+                    {
+                        *share += by_x * u + by_y * v + 0.5 * (xx * cxx + yy * cyy) + xy * cxy;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The normal equations of a star whose shares were drawn, in ADU.
+    fn linearise(&self, star: &PsfStar) -> NormalEquations<PARAMETERS> {
+        let PsfStar { window, spot, .. } = star;
+        let mut normal = NormalEquations::empty();
+        let flux = spot.flux;
+        for (value, weight, share) in self.pixels(star) {
+            let [part, by_x, by_y, by_size, by_e1, by_e2] = *share;
+            let gradient = [
+                flux * by_x,
+                flux * by_y,
+                part,
+                1.0,
+                flux * by_size,
+                flux * by_e1,
+                flux * by_e2,
+            ];
+            let residual = value - flux * part - star.background;
+            for i in 0..PARAMETERS {
+                normal.right[i] += weight * gradient[i] * residual;
+                for j in 0..=i {
+                    normal.matrix[i][j] += weight * gradient[i] * gradient[j];
+                }
+            }
+            normal.chi2 += weight * residual * residual;
+            normal.pixels += 1;
+        }
+        let weight = window.background_error.powi(-2);
+        normal.matrix[3][3] += weight;
+        normal.right[3] -= weight * star.background;
+        normal
+    }
+
+    /// Value above the map in ADU, weight and shares of the pixels.
+    fn pixels<'a>(&'a self, star: &'a PsfStar) -> impl Iterator<Item = (f64, f64, &'a PixelShare)> {
+        let (noise, flux) = (self.noise, star.spot.flux);
+        let noise2 = star.window.noise_adu.powi(2);
+        let pixels = star.window.pixels_adu().zip(&self.shares);
+        pixels.map(move |((.., value), share)| {
+            let light = (flux * share[0]).max(0.0);
+            let variance = noise2 + light * (noise.shot_adu + noise.model_error2 * light);
+            (value, 1.0 / variance, share)
+        })
+    }
+
+    /// Weight, and value above the background in ADU, of each pixel of a star with this PSF.
+    pub fn weigh(&mut self, star: &PsfStar, psf: &EffectivePsf, into: &mut Vec<[f64; 2]>) {
+        self.draw(star, psf);
+        into.clear();
+        let pixels = self.pixels(star);
+        into.extend(pixels.map(|(value, weight, _)| [weight, value - star.background]));
+    }
+}
+
+/// The bright stars of a frame, alone and whole within `radius_px`, with moments of their own.
+pub(super) fn bright_stars(
+    maps: &FrameMaps<'_>,
+    peaks: &[Peak],
+    radius_px: usize,
+    fitter: &mut StarFitter,
+) -> Vec<PsfStar> {
+    let bright = &peaks[..peaks.partition_point(|peak| peak.snr >= MIN_SNR)];
+    let isolated = isolated_peaks(maps, bright.iter(), peaks);
+    let mut stars: Vec<PsfStar> = isolated
+        .filter_map(|(peak, _)| first_fit(maps, peak, radius_px, fitter))
+        .take(MAX_STARS)
+        .collect();
+    keep_alike(&mut stars);
+    stars
+}
+
+/// Fits a star with a size of its own; `None` where that does not converge, or pixels are left out.
+fn first_fit(
+    maps: &FrameMaps<'_>,
+    peak: &Peak,
+    radius_px: usize,
+    fitter: &mut StarFitter,
+) -> Option<PsfStar> {
+    const STEPS: usize = 6;
+    /// A fit has converged when its last step is shorter, in pixels and in ln σ.
+    const MAX_LAST_STEP: f64 = 0.05;
+    let spot = maps.initial_guess(peak);
+    let mut window = Window::default();
+    maps.cut_out(&[spot], radius_px, &mut window);
+    let side = 2 * radius_px + 1;
+    let is_whole = window.width == side && window.height == side;
+    if !is_whole || window.pixels_adu().any(|(.., value)| value.is_nan()) {
+        return None;
+    }
+    let ln_spot = maps.spot_px.ln();
+    let mut star = PsfStar {
+        window,
+        spot,
+        background: 0.0,
+        moments: [ln_spot, 0.0, 0.0],
+        variances: [f64::INFINITY; 3],
+        chi2: 0.0,
+    };
+    let frame = FieldFrame::of((maps.view.width, maps.view.height));
+    let mut moved = f64::INFINITY;
+    for _ in 0..STEPS {
+        let before = star.spot;
+        let size = [star.moments[0], 0.0, 0.0];
+        let psf =
+            EffectivePsf::gaussian(FieldMoments::constant(frame, size), maps.spot_px, radius_px);
+        let [by_size, e1, e2] = fitter.step_one(&mut star, &psf, PARAMETERS)?;
+        let by_size = by_size.clamp(-0.3, 0.3);
+        star.moments = [star.moments[0] + by_size, e1, e2];
+        let distance = (star.spot.x - before.x).hypot(star.spot.y - before.y);
+        moved = distance.max(by_size.abs());
+    }
+    let is_near = (star.spot.x - spot.x).hypot(star.spot.y - spot.y) < 1.0 + maps.spot_px;
+    let is_star = moved < MAX_LAST_STEP && is_near && star.spot.flux > 0.0;
+    is_star.then_some(star)
+}
+
+/// Drops what is no star: of another size than most, or with far larger residuals.
+fn keep_alike(stars: &mut Vec<PsfStar>) {
+    /// Largest factor of the size to that of the median star.
+    const SIZE_FACTOR: f64 = 2.0;
+    /// Largest chi² over that of the median star.
+    const CHI2_FACTOR: f64 = 8.0;
+    let median_of = |value: &dyn Fn(&PsfStar) -> f64| {
+        let mut values: Vec<f64> = stars.iter().map(value).collect();
+        median(&mut values)
+    };
+    if stars.is_empty() {
+        return;
+    }
+    let size = median_of(&|star| star.moments[0]);
+    let chi2 = median_of(&|star| star.chi2);
+    stars.retain(|star| {
+        let is_alike = (star.moments[0] - size).abs() < SIZE_FACTOR.ln();
+        is_alike && star.chi2 < CHI2_FACTOR * chi2.max(1.0)
+    });
+}
