@@ -15,12 +15,23 @@ pub(crate) type SpotMoments = [f64; 3];
 pub(crate) const FIELD_TERMS: usize = 9;
 
 /// Part of a spot: a round Gaussian.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Lobe {
     /// Position relative to the spot's centre of light, along x and y, in pixels.
     pub offset_px: [f64; 2],
+    /// Standard deviation, in pixels.
+    pub sigma_px: f64,
     /// Share of the light.
     pub share: f64,
+}
+
+/// A part of the spots of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FieldLobe {
+    /// Where its share is that of the centre of the frame.
+    pub lobe: Lobe,
+    /// Its share in the corners, where the spots turn with the field.
+    pub corner_share: f64,
 }
 
 /// The spot at one place: a mixture of Gaussians, or a single one.
@@ -28,8 +39,6 @@ pub(crate) struct Lobe {
 pub(crate) struct LocalPsf {
     /// Empty for a single Gaussian of the size that is fitted.
     pub lobes: Vec<Lobe>,
-    /// Standard deviation of each, in pixels.
-    pub lobe_px: f64,
     /// The size, as [`Fit::spot_px`](super::fit::Fit::spot_px), of a spot that is not scaled, in
     /// pixels.
     pub spot_px: f64,
@@ -57,6 +66,12 @@ impl FieldFrame {
             centre_px: [0.5 * (width - 1.0), 0.5 * (height - 1.0)],
             radius_px: 0.5 * width.hypot(height),
         }
+    }
+
+    /// Distance from the centre at a pixel, at most that of the corners: 1.
+    pub fn distance(&self, x_px: f64, y_px: f64) -> f64 {
+        let [_, x, y, ..] = self.terms(x_px, y_px);
+        x.hypot(y).min(1.0)
     }
 
     /// Values of the terms of the polynomials at a pixel.
@@ -105,13 +120,24 @@ impl FieldMoments {
     }
 }
 
+/// How the spots change over the field, apart from their moments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum FieldForm {
+    /// Not at all.
+    Fixed,
+    /// They point outward, and their lobes' shares change linearly from the centre to the corners:
+    /// coma.
+    Radial,
+}
+
 /// The effective PSF of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct EffectivePsf {
-    /// Of a spot of the typical moments.
-    pub lobes: Vec<Lobe>,
-    /// Standard deviation of each of them, in pixels.
-    pub lobe_px: f64,
+    /// Of a spot of the typical moments; for [`FieldForm::Radial`], of a star to the right of the
+    /// centre.
+    pub lobes: Vec<FieldLobe>,
+    /// How they change over the field.
+    pub form: FieldForm,
     /// Moments that the lobes have as they are.
     pub typical: SpotMoments,
     /// Moments over the field.
@@ -125,13 +151,18 @@ pub(crate) struct EffectivePsf {
 impl EffectivePsf {
     /// Round Gaussians of these sizes; elongations are left out.
     pub fn gaussian(moments: FieldMoments, spot_px: f64, radius_px: usize) -> Self {
-        let centre = Lobe {
+        let lobe = Lobe {
             offset_px: [0.0; 2],
+            sigma_px: spot_px,
             share: 1.0,
         };
+        let lobe = FieldLobe {
+            lobe,
+            corner_share: 1.0,
+        };
         Self {
-            lobes: vec![centre],
-            lobe_px: spot_px,
+            lobes: vec![lobe],
+            form: FieldForm::Fixed,
             typical: [spot_px.ln(), 0.0, 0.0],
             moments,
             spot_px,
@@ -139,16 +170,52 @@ impl EffectivePsf {
         }
     }
 
-    /// The spot at a pixel.
+    /// The spot at a pixel, its centre of light at its place.
     pub fn at(&self, x_px: f64, y_px: f64, local: &mut LocalPsf) {
+        self.place_lobes(x_px, y_px, local);
+        let lobes = &mut local.lobes;
+        let sum: f64 = lobes.iter().map(|lobe| lobe.share).sum();
+        for axis in 0..2 {
+            let moments = lobes.iter().map(|lobe| lobe.share * lobe.offset_px[axis]);
+            let centre = moments.sum::<f64>() / sum;
+            for lobe in lobes.iter_mut() {
+                lobe.offset_px[axis] -= centre;
+            }
+        }
+        for lobe in lobes {
+            lobe.share /= sum;
+        }
+    }
+
+    /// The lobes at a pixel, about the point that their offsets refer to.
+    pub fn place_lobes(&self, x_px: f64, y_px: f64, local: &mut LocalPsf) {
         let here = self.moments.at(x_px, y_px);
-        let stretch = product(root(here), inverse_root(self.typical));
+        let mut stretch = product(root(here), inverse_root(self.typical));
+        let mut outward = 0.0;
+        if self.form == FieldForm::Radial {
+            let [_, x, y, ..] = self.moments.frame.terms(x_px, y_px);
+            outward = x.hypot(y).min(1.0);
+            let [cos, sin] = if outward > 0.0 {
+                [x / outward, y / outward]
+            } else {
+                [1.0, 0.0]
+            };
+            stretch = product(stretch, [[cos, -sin], [sin, cos]]);
+        }
+        let scale = (here[0] - self.typical[0]).exp();
         local.lobes.clear();
-        local.lobes.extend(self.lobes.iter().map(|lobe| Lobe {
-            offset_px: stretch.map(|[a, b]| a * lobe.offset_px[0] + b * lobe.offset_px[1]),
-            share: lobe.share,
+        local.lobes.extend(self.lobes.iter().map(|of_field| {
+            let Lobe {
+                offset_px: [x, y],
+                sigma_px,
+                share,
+            } = of_field.lobe;
+            Lobe {
+                offset_px: stretch.map(|[a, b]| a * x + b * y),
+                sigma_px: scale * sigma_px,
+                share: share + outward * (of_field.corner_share - share),
+            }
         }));
-        local.lobe_px = self.lobe_px * (here[0] - self.typical[0]).exp();
         local.spot_px = self.spot_px;
     }
 
@@ -238,14 +305,17 @@ mod tests {
         moments.coefficients[0][1] = 0.3;
         moments.coefficients[1][1] = 0.8;
         let offsets = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+        let lobe = |offset_px: [f64; 2]| FieldLobe {
+            lobe: Lobe {
+                offset_px,
+                sigma_px: 0.5,
+                share: 0.25,
+            },
+            corner_share: 0.25,
+        };
         let psf = EffectivePsf {
-            lobes: offsets
-                .map(|offset_px| Lobe {
-                    offset_px,
-                    share: 0.25,
-                })
-                .to_vec(),
-            lobe_px: 0.5,
+            lobes: offsets.map(lobe).to_vec(),
+            form: FieldForm::Fixed,
             typical: [0.0; 3],
             moments,
             spot_px: 1.0,
@@ -253,21 +323,21 @@ mod tests {
         };
         let mut local = LocalPsf::default();
         psf.at(50.0, 50.0, &mut local);
-        assert_eq!(local.lobes, psf.lobes);
+        assert_eq!(
+            local.lobes,
+            psf.lobes.iter().map(|l| l.lobe).collect::<Vec<_>>()
+        );
         psf.at(100.0, 50.0, &mut local);
-        let xx: f64 = local
-            .lobes
-            .iter()
-            .map(|l| l.share * l.offset_px[0].powi(2))
-            .sum();
-        let yy: f64 = local
-            .lobes
-            .iter()
-            .map(|l| l.share * l.offset_px[1].powi(2))
-            .sum();
+        let moment = |i: usize| {
+            local
+                .lobes
+                .iter()
+                .map(|l| l.share * l.offset_px[i].powi(2))
+                .sum::<f64>()
+        };
         // Half of the unit circle's moment, times σ² and the ratio of the axes.
         let x = moments.frame.terms(100.0, 50.0)[1];
-        assert!((xx * yy - 0.25 * (4.0 * 0.3 * x).exp()).abs() < 1e-12);
-        assert!((xx / yy - (2.0 * 0.8 * x).exp()).abs() < 1e-9);
+        assert!((moment(0) * moment(1) - 0.25 * (4.0 * 0.3 * x).exp()).abs() < 1e-12);
+        assert!((moment(0) / moment(1) - (2.0 * 0.8 * x).exp()).abs() < 1e-9);
     }
 }

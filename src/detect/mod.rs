@@ -139,7 +139,14 @@ pub fn detect_into(
     let mut maps = input.maps(Some(&filtered.mesh), stars.spot_px, pass.matched_gain);
     let shape = StarShape::measure(&maps, peaks);
     shape.merge_peaks(peaks, regions);
-    let psf = measure_psf(&maps, peaks, &mut stars, fits);
+    let psf = if stars.is_departure {
+        measure_psf(&maps, peaks, &mut stars, fits)
+    } else {
+        None
+    };
+    if std::env::var("SP_DEBUG").is_ok() {
+        eprintln!("departure {} psf {}", stars.is_departure, psf.is_some());
+    }
     maps.psf = psf.as_ref();
     let measurement = Measurement {
         maps,

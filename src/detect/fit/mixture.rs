@@ -27,15 +27,22 @@ impl MixtureImage {
         self.groups
             .resize(width * window.height, [[0.0; GROUP_PX]; 4]);
         let scale = spot_px / psf.spot_px;
-        let lobe_px = scale * psf.lobe_px;
         let [across, down] = &mut self.axes;
         let corner = [window.x0, window.y0].map(|at| at as f64);
         for lobe in &psf.lobes {
             let [dx, dy] = lobe.offset_px;
-            across.fill(x_px - corner[0] + scale * dx, lobe_px, window.width);
-            down.fill(y_px - corner[1] + scale * dy, lobe_px, window.height);
+            across.fill(
+                x_px - corner[0] + scale * dx,
+                scale * lobe.sigma_px,
+                window.width,
+            );
+            down.fill(
+                y_px - corner[1] + scale * dy,
+                scale * lobe.sigma_px,
+                window.height,
+            );
             // What a larger spot moves, and widens, its lobes by.
-            let by_spot = [dx, dy, psf.lobe_px].map(|part| (part / psf.spot_px) as f32);
+            let by_spot = [dx, dy, lobe.sigma_px].map(|part| (part / psf.spot_px) as f32);
             add_lobe(lobe, by_spot, [across, down], &mut self.groups, width);
         }
     }

@@ -28,7 +28,7 @@ pub(crate) use batch::BatchStart;
 pub(crate) use buffers::FitBuffers;
 pub(crate) use fitter::AnyLight;
 pub(crate) use frame_maps::FrameMaps;
-pub(crate) use light::{SpotLight, linearise};
+pub(crate) use light::{GaussianLight, SpotLight, linearise};
 pub(crate) use normal::{CholeskyFactor, NormalEquations};
 pub(crate) use parameters::{
     Fit, FitConfig, MAX_SPOTS, NoiseModel, ONE_SPOT, SPOT_RANGE_PX, SpotEstimate, SpotGroup,

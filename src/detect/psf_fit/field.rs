@@ -1,59 +1,112 @@
-//! Size and elongation of the spots over the field: polynomials of the lowest degree that the stars
-//! allow.
+//! Size and elongation of the spots over the field: the simplest polynomial that the stars allow.
 
 use super::stars::PsfStar;
 use crate::detect::effective_psf::{FIELD_TERMS, FieldFrame, FieldMoments};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SVector};
 
-/// Numbers of terms that are tried: constant, linear, quadratic, quartic.
-const TERMS: [usize; 4] = [1, 3, 6, FIELD_TERMS];
 /// Scatter of the stars' own moments beyond their errors: their colours, their neighbours.
 const SCATTER: f64 = 0.02;
-/// More terms must lower chi² by more than chance does in one of 10⁴ cases.
-const CHANCE_SIGMA: f64 = 4.0;
+/// A parameter more must lower chi² by this: that of the Bayesian information criterion for some
+/// hundred values.
+const CHI2_PER_PARAMETER: f64 = 5.0;
 
-/// Value, variance and terms of each star, for one of the moments.
+/// Coefficients of the moments that one parameter multiplies.
+type Basis = [[f64; FIELD_TERMS]; 3];
+/// The moments of one star.
+type Moments = SVector<f64, 3>;
+
+/// One number of a basis: moment, term, coefficient.
+type Part = (usize, usize, f64);
+
+/// The basis with these parts.
+fn basis(parts: &[Part]) -> Basis {
+    let mut basis = [[0.0; FIELD_TERMS]; 3];
+    for &(moment, term, coefficient) in parts {
+        basis[moment][term] = coefficient;
+    }
+    basis
+}
+
+/// The same term of each of the moments.
+fn of_each_moment(term: usize) -> impl Iterator<Item = Basis> {
+    (0..3).map(move |moment| basis(&[(moment, term, 1.0)]))
+}
+
+/// Curvature of the field and astigmatism of a centred lens, of which the first term is `xx`: a
+/// size that grows outward, and a radial elongation.
+fn centred(xx: usize) -> [Basis; 2] {
+    let [xy, yy] = [xx + 1, xx + 2];
+    [
+        basis(&[(0, xx, 1.0), (0, yy, 1.0)]),
+        basis(&[(1, xx, 1.0), (1, yy, -1.0), (2, xy, 2.0)]),
+    ]
+}
+
+/// The models, the simplest first. The numbers are those of [`FieldFrame::terms`].
+fn models() -> [Vec<Basis>; 7] {
+    let terms = |range: std::ops::Range<usize>| range.flat_map(of_each_moment);
+    let constant = || terms(0..1);
+    [
+        constant().collect(),
+        constant().chain(centred(3)).collect(),
+        constant().chain(centred(3)).chain(centred(6)).collect(),
+        terms(0..3).collect(),
+        terms(0..3).chain(centred(3)).collect(),
+        terms(0..6).collect(),
+        terms(0..9).collect(),
+    ]
+}
+
+/// The moments of one star, their variances, and the terms at its place.
 struct Sample {
-    value: f64,
-    variance: f64,
+    values: Moments,
+    variances: Moments,
     terms: [f64; FIELD_TERMS],
 }
 
-/// The moments of the stars over the field; whether they differ from place to place.
-pub(super) fn moments_over_field(frame: FieldFrame, stars: &[PsfStar]) -> (FieldMoments, bool) {
-    let samples: [Vec<Sample>; 3] = std::array::from_fn(|i| {
-        let sample = |star: &PsfStar| Sample {
-            value: star.moments[i],
-            variance: star.variances[i] + SCATTER * SCATTER,
+impl Sample {
+    fn of(star: &PsfStar, frame: &FieldFrame) -> Self {
+        Self {
+            values: Moments::from(star.moments),
+            variances: Moments::from(star.variances).add_scalar(SCATTER * SCATTER),
             terms: frame.terms(star.spot.x, star.spot.y),
-        };
-        let known = stars.iter().filter(|star| star.variances[i].is_finite());
-        known.map(sample).collect()
-    });
-    let fits = |terms: usize| {
-        samples
-            .each_ref()
-            .map(|samples| Polynomial::fit(samples, terms))
-    };
-    let chi2 = |fits: &[Polynomial; 3]| fits.iter().map(|fit| fit.chi2).sum::<f64>();
-    let values = 3 * stars.len();
-    let mut best = fits(1);
-    let mut best_terms = 1;
-    for terms in TERMS {
-        // Two stars for each term, and some more.
-        if stars.len() < 2 * terms + 4 {
-            break;
-        }
-        let larger = fits(terms);
-        let of_noise = (chi2(&larger) / (values - 3 * terms) as f64).max(1.0);
-        let more = (3 * (terms - best_terms)) as f64;
-        let chance = more + CHANCE_SIGMA * (2.0 * more).sqrt();
-        if chi2(&best) - chi2(&larger) > chance * of_noise {
-            (best, best_terms) = (larger, terms);
         }
     }
-    let range = samples.each_ref().map(|samples| {
-        let values = || samples.iter().map(|sample| sample.value);
+
+    /// The moments that coefficients give.
+    fn predicted(&self, coefficients: &Basis) -> Moments {
+        let of_moment =
+            |row: &[f64; FIELD_TERMS]| row.iter().zip(&self.terms).map(|(c, t)| c * t).sum();
+        Moments::from(coefficients.each_ref().map(of_moment))
+    }
+}
+
+/// The moments of the stars over the field, and whether they differ from place to place.
+pub(super) fn moments_over_field(frame: FieldFrame, stars: &[PsfStar]) -> (FieldMoments, bool) {
+    let known = stars
+        .iter()
+        .filter(|star| star.variances.iter().all(|v| v.is_finite()));
+    let samples: Vec<Sample> = known.map(|star| Sample::of(star, &frame)).collect();
+    let values = 3 * samples.len();
+    let is_allowed = |model: &&Vec<Basis>| values >= 2 * model.len() + 6;
+    let fits: Vec<(usize, FieldFit)> = models()
+        .iter()
+        .filter(is_allowed)
+        .filter_map(|model| Some((model.len(), FieldFit::of(&samples, model)?)))
+        .collect();
+    // The scatter that no model explains.
+    let of_noise = fits
+        .iter()
+        .map(|(parameters, fit)| fit.chi2 / (values - parameters) as f64);
+    let of_noise = of_noise.fold(f64::INFINITY, f64::min).max(1.0);
+    let cost = |(parameters, fit): &(usize, FieldFit)| {
+        fit.chi2 / of_noise + CHI2_PER_PARAMETER * *parameters as f64
+    };
+    let best = fits.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
+    let coefficients = best.map_or([[0.0; FIELD_TERMS]; 3], |(_, fit)| fit.coefficients);
+    let predicted = || samples.iter().map(|sample| sample.predicted(&coefficients));
+    let range = std::array::from_fn(|i| {
+        let values = || predicted().map(|moments| moments[i]);
         [
             values().fold(f64::INFINITY, f64::min),
             values().fold(f64::NEG_INFINITY, f64::max),
@@ -61,50 +114,66 @@ pub(super) fn moments_over_field(frame: FieldFrame, stars: &[PsfStar]) -> (Field
     });
     let moments = FieldMoments {
         frame,
-        coefficients: best.map(|fit| fit.coefficients),
+        coefficients,
         range,
     };
-    (moments, best_terms > 1)
+    (moments, best.is_some_and(|(parameters, _)| *parameters > 3))
 }
 
-/// A polynomial over the field.
-struct Polynomial {
-    coefficients: [f64; FIELD_TERMS],
+/// Coefficients that fit the stars.
+struct FieldFit {
+    coefficients: Basis,
     chi2: f64,
 }
 
-impl Polynomial {
-    /// The weighted least-squares fit of the first `terms` terms; samples far off count less.
-    fn fit(samples: &[Sample], terms: usize) -> Self {
+impl FieldFit {
+    /// The weighted least-squares fit of a model; stars far off count less. `None` where the stars
+    /// do not fix it.
+    fn of(samples: &[Sample], model: &[Basis]) -> Option<Self> {
         /// Rounds of weights.
         const ROUNDS: usize = 4;
         /// Residuals beyond this many standard deviations count less.
         const HUBER_SIGMA: f64 = 2.5;
-        let mut coefficients = [0.0; FIELD_TERMS];
-        let mut weights: Vec<f64> = samples.iter().map(|s| 1.0 / s.variance).collect();
-        let mut chi2 = 0.0;
+        let mut weights: Vec<Moments> = samples
+            .iter()
+            .map(|s| s.variances.map(f64::recip))
+            .collect();
+        let mut fit = Self {
+            coefficients: [[0.0; FIELD_TERMS]; 3],
+            chi2: 0.0,
+        };
         for _ in 0..ROUNDS {
-            let mut matrix = DMatrix::<f64>::identity(terms, terms) * 1e-6;
-            let mut right = DVector::<f64>::zeros(terms);
+            let mut matrix = DMatrix::<f64>::identity(model.len(), model.len()) * 1e-6;
+            let mut right = DVector::<f64>::zeros(model.len());
             for (sample, weight) in samples.iter().zip(&weights) {
-                let row = DVector::from_column_slice(&sample.terms[..terms]);
-                right.axpy(weight * sample.value, &row, 1.0);
-                matrix.ger(*weight, &row, &row, 1.0);
+                let columns: Vec<Moments> = model.iter().map(|b| sample.predicted(b)).collect();
+                for (i, column) in columns.iter().enumerate() {
+                    let weighted = column.component_mul(weight);
+                    right[i] += weighted.dot(&sample.values);
+                    for (j, other) in columns.iter().enumerate() {
+                        matrix[(i, j)] += weighted.dot(other);
+                    }
+                }
             }
-            let Some(factor) = matrix.cholesky() else {
-                break;
-            };
-            coefficients[..terms].copy_from_slice(factor.solve(&right).as_slice());
-            chi2 = 0.0;
+            let solution = matrix.cholesky()?.solve(&right);
+            fit.coefficients = [[0.0; FIELD_TERMS]; 3];
+            for (basis, factor) in model.iter().zip(solution.iter()) {
+                let numbers = fit.coefficients.as_flattened_mut().iter_mut();
+                for (sum, part) in numbers.zip(basis.as_flattened()) {
+                    *sum += factor * part;
+                }
+            }
+            fit.chi2 = 0.0;
             for (sample, weight) in samples.iter().zip(&mut weights) {
-                let terms = sample.terms.iter().zip(&coefficients);
-                let residual = sample.value - terms.map(|(t, c)| t * c).sum::<f64>();
-                let sigmas = residual.abs() / sample.variance.sqrt();
-                let part = (HUBER_SIGMA / sigmas).min(1.0);
-                *weight = part / sample.variance;
-                chi2 += part * sigmas * sigmas;
+                let residual = sample.values - sample.predicted(&fit.coefficients);
+                for i in 0..3 {
+                    let sigmas = residual[i].abs() / sample.variances[i].sqrt();
+                    let part = (HUBER_SIGMA / sigmas).min(1.0);
+                    weight[i] = part / sample.variances[i];
+                    fit.chi2 += part * sigmas * sigmas;
+                }
             }
         }
-        Self { coefficients, chi2 }
+        Some(fit)
     }
 }

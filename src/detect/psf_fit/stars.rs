@@ -12,7 +12,7 @@ use crate::detect::star_model::isolated_peaks;
 /// Most stars that are used.
 const MAX_STARS: usize = 60;
 /// Peaks below this signal-to-noise ratio tell little about the form of a spot.
-const MIN_SNR: f32 = 25.0;
+const MIN_SNR: f32 = 15.0;
 /// Error of the PSF while it is measured, as a part of the light, squared: the brightest stars must
 /// not count for all.
 pub(super) const MODEL_ERROR2: f64 = 0.02 * 0.02;
@@ -116,19 +116,19 @@ impl StarFitter {
         let here = psf.moments.at(spot.x, spot.y);
         let stretches = stretch_by(here);
         // A single lobe widens itself; those of a mixture move, and widen with the size only.
-        let widening = if local.lobes.len() == 1 {
-            covariance_by(here)
-        } else {
-            let wider = 2.0 * local.lobe_px * local.lobe_px;
+        let widening_of = |sigma_px: f64| {
+            let wider = 2.0 * sigma_px * sigma_px;
             [[wider, wider, 0.0], [0.0; 3], [0.0; 3]]
         };
+        let of_single = (local.lobes.len() == 1).then(|| covariance_by(here));
         shares.clear();
         shares.resize(window.width * window.height, [0.0; 6]);
-        let per_sigma = 1.0 / local.lobe_px;
         for lobe in &local.lobes {
+            let per_sigma = 1.0 / lobe.sigma_px;
+            let widening = of_single.unwrap_or_else(|| widening_of(lobe.sigma_px));
             let [dx, dy] = lobe.offset_px;
-            across.fill(spot.x + dx - window.x0 as f64, local.lobe_px, window.width);
-            down.fill(spot.y + dy - window.y0 as f64, local.lobe_px, window.height);
+            across.fill(spot.x + dx - window.x0 as f64, lobe.sigma_px, window.width);
+            down.fill(spot.y + dy - window.y0 as f64, lobe.sigma_px, window.height);
             let moves = stretches.map(|rows| rows.map(|[a, b]| a * dx + b * dy));
             for (row, shares) in shares.chunks_exact_mut(window.width).enumerate() {
                 let d = down.pixel(row);

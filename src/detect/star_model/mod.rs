@@ -5,6 +5,7 @@
 //! 3. The residuals of the stars of that size give the noise model (`noise_model`).
 
 mod bright_stars;
+mod departure;
 mod noise_model;
 mod spot_size;
 

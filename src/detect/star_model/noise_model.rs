@@ -4,6 +4,7 @@
 //! squared residuals.
 
 use super::bright_stars::MAX_MODEL_ERROR;
+use super::departure::{CommonElongation, is_departure};
 use super::spot_size::{BrightStars, MAX_STARS};
 use super::spot_size::{MODE_WIDTH, weighted_size};
 use crate::detect::fit::{
@@ -32,6 +33,8 @@ pub(crate) struct StarModel {
     pub spot_px: f64,
     /// How the noise grows with light.
     pub noise: NoiseModel,
+    /// Whether the stars may be no round Gaussians of one size.
+    pub is_departure: bool,
 }
 
 /// The noise model from the residuals of stars of about the frame's spot size, and their mean size
@@ -41,6 +44,7 @@ pub(crate) fn star_model(
     mut stars: BrightStars,
     buffers: &mut FitBuffers,
 ) -> StarModel {
+    let of_all_sizes = stars.clone();
     stars.retain(|fit| (fit.spot_px / maps.spot_px).ln().abs() < MODE_WIDTH.ln());
     // The start must not have too little noise: else a fit follows the brightest pixel wherever it
     // is.
@@ -49,6 +53,7 @@ pub(crate) fn star_model(
         shot_adu: brightest.map_or(0.0, |spot| maps.noise_at(spot.x, spot.y)),
         model_error2: 0.0,
     };
+    let mut elongation = CommonElongation::default();
     // Each round weights the squared residuals by the variance from the round before.
     for _ in 0..NOISE_ROUNDS {
         let mut sums = Moments::default();
@@ -65,10 +70,11 @@ pub(crate) fn star_model(
         };
         let starts: ArrayVec<_, MAX_STARS> = stars.iter().enumerate().map(of_star).collect();
         let starts = starts.into_iter();
+        elongation = CommonElongation::default();
         batch.fit(maps, starts, &config, |i, fit, window| {
             if let Some(fit) = fit {
                 buffers.window.copy_from(window);
-                sums.add_star(buffers, &fit, &config);
+                sums.add_star(buffers, &fit, &config, &mut elongation);
                 stars[i] = fit;
             }
         });
@@ -76,9 +82,11 @@ pub(crate) fn star_model(
         model = sums.solve();
         model.model_error2 = model.model_error2.min(MAX_MODEL_ERROR * MAX_MODEL_ERROR);
     }
+    let all: ArrayVec<&Fit, MAX_STARS> = stars.iter().collect();
     StarModel {
-        spot_px: weighted_size(&stars).unwrap_or(maps.spot_px),
+        spot_px: weighted_size(&all).unwrap_or(maps.spot_px),
         noise: model,
+        is_departure: is_departure(&elongation, &model, &of_all_sizes, maps.spot_px),
     }
 }
 
@@ -105,7 +113,7 @@ pub(crate) fn noise_of(
             let fit = buffers.fitter.fit(window, &[*spot], &config);
             if fit.converged {
                 *spot = fit.spots[0];
-                sums.add_star(buffers, &fit, &config);
+                sums.add_star(buffers, &fit, &config, &mut CommonElongation::default());
             }
         }
         model = sums.solve();
@@ -130,14 +138,23 @@ struct Moments {
 
 impl Moments {
     /// Adds the pixels of one star in which its light is significant.
-    fn add_star(&mut self, buffers: &mut FitBuffers, fit: &Fit, config: &FitConfig) {
+    fn add_star(
+        &mut self,
+        buffers: &mut FitBuffers,
+        fit: &Fit,
+        config: &FitConfig,
+        elongation: &mut CommonElongation,
+    ) {
         let FitBuffers { fitter, window, .. } = buffers;
         let Some((factor, spot, pixels)) = fitter.factorised(window, fit, config) else {
             return;
         };
         let per_noise = pixels.per_noise;
         let [a, b, c, p, q] = match spot {
-            AnyLight::Gaussian(spot) => sums_of(&factor, &spot, &pixels),
+            AnyLight::Gaussian(spot) => {
+                elongation.add(&spot, fit.spot_px, &pixels);
+                sums_of(&factor, &spot, &pixels)
+            }
             AnyLight::Mixture(spot) => sums_of(&factor, &spot, &pixels),
         };
         self.matrix[0] += a * per_noise * per_noise;

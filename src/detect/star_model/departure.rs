@@ -1,0 +1,97 @@
+//! Whether a frame's stars depart from round Gaussians of one size: cheap tests that decide whether
+//! their PSF is measured.
+
+use super::spot_size::{MODE_WIDTH, weighted_size};
+use crate::detect::fit::{Fit, GaussianLight, NoiseModel, WindowPixels};
+use crate::detect::psf::GROUP_PX;
+
+/// Smaller elongations do not matter, as the logarithm of the ratio of the axes.
+const MIN_ELONGATION: f64 = 0.06;
+/// Nor do smaller errors of the spot model, relative to the light.
+const MIN_MODEL_ERROR: f64 = 0.015;
+/// Nor a smaller scatter of the sizes, relative to the size.
+const MIN_SIZE_SCATTER: f64 = 0.04;
+/// A departure below this many standard errors is chance.
+const SIGNIFICANT_SIGMA: f64 = 5.0;
+
+/// The elongation that most stars share, from the residuals of fits of round spots: a score test.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct CommonElongation {
+    /// Of `[e₁, e₂]` as in [`SpotMoments`](crate::detect::effective_psf::SpotMoments): sums of
+    /// residual times derivative, and of the squares of the derivatives, over the variance.
+    sums: [[f64; 2]; 2],
+}
+
+impl CommonElongation {
+    /// Adds the pixels of a star.
+    pub fn add(&mut self, light: &GaussianLight<'_>, spot_px: f64, pixels: &WindowPixels<'_>) {
+        let [across, down] = light.axes;
+        let mut sums = [[0.0f32; 2]; 2];
+        let sigma = spot_px as f32;
+        for group in 0..pixels.groups {
+            let across = across.group(group);
+            for (row, data) in pixels.column_of_groups(group).enumerate() {
+                let down = down.pixel(row);
+                for lane in 0..GROUP_PX {
+                    if data[lane].is_nan() {
+                        continue;
+                    }
+                    let a = across.lane(lane);
+                    let share = light.flux * a.value * down.value;
+                    let residual = data[lane] - share - pixels.background;
+                    let weight = 1.0 / pixels.variance(share);
+                    let scale = light.flux * sigma;
+                    let by_e1 = 0.5 * scale * (a.by_sigma * down.value - a.value * down.by_sigma);
+                    let by_e2 = scale * sigma * a.by_center * down.by_center;
+                    for (sums, by) in sums.iter_mut().zip([by_e1, by_e2]) {
+                        sums[0] += weight * by * residual;
+                        sums[1] += weight * by * by;
+                    }
+                }
+            }
+        }
+        for (sums, of_star) in self.sums.iter_mut().zip(sums) {
+            for (sum, of_star) in sums.iter_mut().zip(of_star) {
+                *sum += f64::from(of_star);
+            }
+        }
+    }
+
+    /// Whether it is large and certain.
+    fn is_significant(&self) -> bool {
+        let [e1, e2] = self.sums.map(|[score, information]| score / information);
+        let information = self.sums[0][1].min(self.sums[1][1]);
+        let e = e1.hypot(e2);
+        e > MIN_ELONGATION && e > SIGNIFICANT_SIGMA / information.sqrt()
+    }
+}
+
+/// Whether the stars depart from round Gaussians of one size. `stars` have free sizes.
+pub(super) fn is_departure(
+    elongation: &CommonElongation,
+    noise: &NoiseModel,
+    stars: &[Fit],
+    spot_px: f64,
+) -> bool {
+    let is_misfitted = noise.model_error2 > MIN_MODEL_ERROR * MIN_MODEL_ERROR;
+    is_misfitted || elongation.is_significant() || have_scattered_sizes(stars, spot_px)
+}
+
+/// Whether the sizes of stars differ by more than their errors.
+fn have_scattered_sizes(stars: &[Fit], spot_px: f64) -> bool {
+    /// Sizes beyond this factor of the frame's are not of stars.
+    const MAX_FACTOR: f64 = MODE_WIDTH * MODE_WIDTH;
+    let is_star = |fit: &&Fit| (fit.spot_px / spot_px).ln().abs() < MAX_FACTOR.ln();
+    let stars: Vec<&Fit> = stars.iter().filter(is_star).collect();
+    let scatter = MIN_SIZE_SCATTER * spot_px;
+    let Some(mean_px) = weighted_size(&stars) else {
+        return false;
+    };
+    let squares = stars.iter().map(|fit| {
+        let variance = fit.sigma_spot_px.powi(2) + scatter * scatter;
+        (fit.spot_px - mean_px).powi(2) / variance
+    });
+    let (chi2, count) = squares.fold((0.0, 0.0), |(sum, n), square| (sum + square, n + 1.0));
+    let freedom: f64 = count - 1.0;
+    chi2 > freedom + SIGNIFICANT_SIGMA * (2.0 * freedom).sqrt()
+}
