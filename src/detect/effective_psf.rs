@@ -123,6 +123,8 @@ impl FieldMoments {
 /// How the spots change over the field, apart from their moments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FieldForm {
+    /// Not at all, and they are the same turned by 180 degrees: motion, defocus.
+    Symmetric,
     /// Not at all.
     Fixed,
     /// They point outward, and their lobes' shares change linearly from the centre to the corners:
@@ -162,7 +164,7 @@ impl EffectivePsf {
         };
         Self {
             lobes: vec![lobe],
-            form: FieldForm::Fixed,
+            form: FieldForm::Symmetric,
             typical: [spot_px.ln(), 0.0, 0.0],
             moments,
             spot_px,

@@ -4,11 +4,12 @@ use super::stars::{PsfStar, StarFitter};
 use crate::detect::effective_psf::{
     EffectivePsf, FieldForm, FieldLobe, Lobe, LocalPsf, SpotMoments, covariance, inverse,
 };
-use crate::detect::psf::AxisProfile;
+use crate::detect::psf::{AxisProfile, GROUP_PX, PixelGroup};
+use multiversion::multiversion;
 use nalgebra::{DMatrix, DVector};
 
 /// Standard deviation of a lobe over that of the spot along its shorter axis.
-const LOBE_SIZE: f64 = 0.5;
+const LOBE_SIZE: f64 = 0.55;
 /// The same at most.
 const MAX_LOBE_SIZE: f64 = 0.85;
 /// Distance of the lobes over their standard deviation: a sum of such lobes has no ripples.
@@ -18,15 +19,31 @@ const REACH_SIGMAS: f64 = 2.8;
 /// Most lobes: with more, they are larger.
 const MAX_LOBES: f64 = 100.0;
 /// Lobes with a smaller share are left out.
-const MIN_SHARE: f64 = 1e-4;
+const MIN_SHARE: f64 = 3e-4;
 /// Standard deviations of the lobes that wings have, over that of the spot.
 const WINGS: [f64; 2] = [2.0, 4.0];
+
+/// What a PSF is taken for before the stars tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Expected {
+    /// A Gaussian.
+    Gaussian,
+    /// A uniform disc or ellipse: a star out of focus.
+    Disc,
+}
 
 /// The lobes that a PSF may have.
 #[derive(Debug, Clone)]
 pub(super) struct LobeGrid {
-    /// With the shares of a Gaussian.
     lobes: Vec<Lobe>,
+    /// Distance of each from the centre in standard deviations of the spot without the lobes' own
+    /// width; infinite for those of wings.
+    distances: Vec<f64>,
+    /// Lobes of the same number have the same share: where the PSF is the same turned by 180
+    /// degrees; where it is the same reflected at the x axis; and where it is both.
+    turned: Vec<usize>,
+    reflected: Vec<usize>,
+    both: Vec<usize>,
 }
 
 impl LobeGrid {
@@ -44,6 +61,7 @@ impl LobeGrid {
         let outline = inverse(total);
         let [[xx, xy], [_, yy]] = total;
         let own = sigma_px * sigma_px;
+        // Of the lobes, without their own width.
         let density = inverse([[xx - own, xy], [xy, yy - own]]);
         let square = |[[xx, xy], [_, yy]]: [[f64; 2]; 2], [x, y]: [f64; 2]| {
             xx * x * x + 2.0 * xy * x * y + yy * y * y
@@ -57,24 +75,73 @@ impl LobeGrid {
             .map(|offset_px| Lobe {
                 offset_px,
                 sigma_px,
-                share: (-0.5 * square(density, offset_px)).exp(),
+                share: 1.0,
             })
             .collect();
-        let sum: f64 = lobes.iter().map(|lobe| lobe.share).sum();
-        lobes.iter_mut().for_each(|lobe| lobe.share /= sum);
+        let distance = |lobe: &Lobe| square(density, lobe.offset_px).sqrt();
+        let mut distances: Vec<f64> = lobes.iter().map(distance).collect();
         if has_wings {
+            distances.extend(WINGS.map(|_| f64::INFINITY));
             lobes.extend(WINGS.map(|factor| Lobe {
                 offset_px: [0.0; 2],
                 sigma_px: factor * typical[0].exp(),
-                share: 0.0,
+                share: 1.0,
             }));
         }
-        Self { lobes }
+        let class_of = |image: fn([f64; 2]) -> [f64; 2]| -> Vec<usize> {
+            let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) < 0.1 * pitch_px;
+            let class = |(number, lobe): (usize, &Lobe)| {
+                let at = image(lobe.offset_px);
+                let is_same =
+                    |other: &Lobe| other.sigma_px == lobe.sigma_px && near(other.offset_px, at);
+                lobes
+                    .iter()
+                    .position(is_same)
+                    .map_or(number, |other| other.min(number))
+            };
+            lobes.iter().enumerate().map(class).collect()
+        };
+        let turned = class_of(|[x, y]| [-x, -y]);
+        let reflected = class_of(|[x, y]| [x, -y]);
+        // The class of the class: the image of an image.
+        let both = class_of(|[x, y]| [-x.abs(), -y.abs()]);
+        Self {
+            lobes,
+            distances,
+            turned,
+            reflected,
+            both,
+        }
+    }
+
+    /// The class of each number of shares.
+    fn classes(&self, form: FieldForm) -> Vec<usize> {
+        let count = self.lobes.len();
+        match form {
+            FieldForm::Symmetric => self.turned.clone(),
+            FieldForm::Fixed => (0..count).collect(),
+            FieldForm::Radial => {
+                let corner = self.reflected.iter().map(|class| class + count);
+                self.both.iter().copied().chain(corner).collect()
+            }
+        }
+    }
+
+    /// The shares that are expected; they add up to one.
+    fn expected_shares(&self, expected: Expected) -> Vec<f64> {
+        let share = |sigmas: &f64| match expected {
+            Expected::Gaussian => (-0.5 * sigmas * sigmas).exp(),
+            Expected::Disc => disc_share(*sigmas),
+        };
+        let mut shares: Vec<f64> = self.distances.iter().map(share).collect();
+        let sum: f64 = shares.iter().sum();
+        shares.iter_mut().for_each(|share| *share /= sum);
+        shares
     }
 
     /// The lobes of a Gaussian.
     pub fn gaussian(&self) -> Vec<FieldLobe> {
-        let shares: Vec<f64> = self.lobes.iter().map(|lobe| lobe.share).collect();
+        let shares = self.expected_shares(Expected::Gaussian);
         self.with_shares(&[&shares, &shares])
     }
 
@@ -93,16 +160,16 @@ impl LobeGrid {
         lobes.filter(has_light).collect()
     }
 
-    /// Sets the lobes of `psf` from all stars. Returns those for the stars of even numbers, from
-    /// the odd ones, and the other way round.
-    pub fn solve(
+    /// The normal equations of each half of the stars, those of even and of odd numbers, for a PSF
+    /// that changes over the field as `psf` does.
+    pub fn sums(
         &self,
-        psf: &mut EffectivePsf,
+        psf: &EffectivePsf,
         stars: &[PsfStar],
         fitter: &mut StarFitter,
-    ) -> [Vec<FieldLobe>; 2] {
-        let mut even = Sums::new(self, psf.form);
-        let mut odd = even.clone();
+    ) -> [LobeSums; 2] {
+        let mut of_halves = [0; 2].map(|_| LobeSums::new(self, psf.form));
+        let mut images = LobeImages::default();
         let mut local = LocalPsf::default();
         let mut pixels = Vec::new();
         let every_lobe = self.lobes.iter().map(|&lobe| FieldLobe {
@@ -117,61 +184,50 @@ impl LobeGrid {
             let (x_px, y_px) = (star.spot.x, star.spot.y);
             fitter.weigh(star, psf, &mut pixels);
             all.place_lobes(x_px, y_px, &mut local);
+            images.draw(star, &local, &pixels);
             let outward = psf.moments.frame.distance(x_px, y_px);
-            let half = if number % 2 == 0 { &mut even } else { &mut odd };
-            half.add(star, &local, outward, &pixels);
+            of_halves[number % 2].add(&images, outward);
         }
-        let lobes = |sums: &Sums| {
-            let shares = sums.solve(&self.lobes);
-            let corner = shares.chunks(self.lobes.len()).last().unwrap_or_default();
-            self.with_shares(&[&shares[..self.lobes.len()], corner])
-        };
-        psf.lobes = lobes(&even.plus(&odd));
-        [lobes(&odd), lobes(&even)]
+        of_halves
+    }
+
+    /// The lobes that fit best.
+    pub fn solve(&self, sums: &LobeSums, form: FieldForm, expected: Expected) -> Vec<FieldLobe> {
+        let shares = sums.solve(&self.expected_shares(expected), &self.classes(form));
+        let corner = shares.chunks(self.lobes.len()).last().unwrap_or_default();
+        self.with_shares(&[&shares[..self.lobes.len()], corner])
     }
 }
 
-/// Normal equations of the shares: of the centre, and where the PSF changes of the corners.
-#[derive(Debug, Clone)]
-struct Sums {
-    form: FieldForm,
-    matrix: DMatrix<f64>,
-    right: DVector<f64>,
-    /// Buffers: the light of each lobe in the pixels of a star, and the profiles of a lobe.
-    light: Vec<f64>,
+/// The pixels of one star and the light of each lobe in them, over their noise.
+#[derive(Debug, Default)]
+struct LobeImages {
+    /// Lobe by lobe, each in whole groups.
+    light: Vec<PixelGroup>,
+    values: Vec<PixelGroup>,
+    /// Square roots of the weights.
+    roots: Vec<PixelGroup>,
     axes: [AxisProfile; 2],
 }
 
-impl Sums {
-    fn new(grid: &LobeGrid, form: FieldForm) -> Self {
-        let sets = match form {
-            FieldForm::Fixed => 1,
-            FieldForm::Radial => 2,
-        };
-        let count = sets * grid.lobes.len();
-        Self {
-            form,
-            matrix: DMatrix::zeros(count, count),
-            right: DVector::zeros(count),
-            light: Vec::new(),
-            axes: Default::default(),
-        }
-    }
-
-    fn plus(&self, other: &Self) -> Self {
-        Self {
-            matrix: &self.matrix + &other.matrix,
-            right: &self.right + &other.right,
-            ..self.clone()
-        }
-    }
-
-    /// Adds the pixels of a star, with weights and values. The lobes have shares of one.
-    fn add(&mut self, star: &PsfStar, local: &LocalPsf, outward: f64, pixels: &[[f64; 2]]) {
+impl LobeImages {
+    /// Draws lobes with shares of one, for pixels with weights and values.
+    fn draw(&mut self, star: &PsfStar, local: &LocalPsf, pixels: &[[f64; 2]]) {
         let PsfStar { window, spot, .. } = star;
+        let width = window.groups();
+        let empty = [0.0; GROUP_PX];
+        for part in [&mut self.values, &mut self.roots] {
+            part.clear();
+            part.resize(width * window.height, empty);
+        }
+        for (number, [weight, value]) in pixels.iter().enumerate() {
+            let (row, column) = (number / window.width, number % window.width);
+            let (group, lane) = (row * width + column / GROUP_PX, column % GROUP_PX);
+            let root = weight.sqrt();
+            self.roots[group][lane] = root as f32;
+            self.values[group][lane] = (root * value) as f32;
+        }
         let [across, down] = &mut self.axes;
-        // Rows are weighted by the square root, so that the matrix is a product.
-        let roots: Vec<f64> = pixels.iter().map(|[weight, _]| weight.sqrt()).collect();
         self.light.clear();
         for Lobe {
             offset_px: [dx, dy],
@@ -181,59 +237,115 @@ impl Sums {
         {
             across.fill(spot.x + dx - window.x0 as f64, *sigma_px, window.width);
             down.fill(spot.y + dy - window.y0 as f64, *sigma_px, window.height);
-            let columns = &across.values()[..window.width];
-            let rows = &down.values()[..window.height];
-            for (row, roots) in rows.iter().zip(roots.chunks_exact(window.width)) {
-                let of_row = spot.flux * f64::from(*row);
-                let pixels = columns.iter().zip(roots);
-                self.light
-                    .extend(pixels.map(|(column, root)| of_row * f64::from(*column) * root));
+            for (row, roots) in self.roots.chunks_exact(width).enumerate() {
+                let of_row = spot.flux as f32 * down.pixel(row).value;
+                for (group, roots) in roots.iter().enumerate() {
+                    let columns = across.group(group).value;
+                    self.light.push(std::array::from_fn(|lane| {
+                        of_row * columns[lane] * roots[lane]
+                    }));
+                }
             }
         }
-        let values = pixels
-            .iter()
-            .zip(&roots)
-            .map(|([_, value], root)| value * root);
-        let values = DVector::from_iterator(pixels.len(), values);
-        let count = local.lobes.len();
-        let light = DMatrix::from_column_slice(pixels.len(), count, &self.light);
-        let product = light.tr_mul(&light);
-        let right = light.tr_mul(&values);
+    }
+}
+
+/// Normal equations of the shares: of the centre, and where the PSF changes of the corners.
+#[derive(Debug, Clone)]
+pub(super) struct LobeSums {
+    form: FieldForm,
+    matrix: DMatrix<f64>,
+    right: DVector<f64>,
+}
+
+impl LobeSums {
+    fn new(grid: &LobeGrid, form: FieldForm) -> Self {
+        let sets = match form {
+            FieldForm::Symmetric | FieldForm::Fixed => 1,
+            FieldForm::Radial => 2,
+        };
+        let count = sets * grid.lobes.len();
+        Self {
+            form,
+            matrix: DMatrix::zeros(count, count),
+            right: DVector::zeros(count),
+        }
+    }
+
+    /// The sums over both halves.
+    pub fn plus(&self, other: &Self) -> Self {
+        Self {
+            form: self.form,
+            matrix: &self.matrix + &other.matrix,
+            right: &self.right + &other.right,
+        }
+    }
+
+    /// Adds the pixels of a star.
+    fn add(&mut self, images: &LobeImages, outward: f64) {
         let parts: &[f64] = match self.form {
-            FieldForm::Fixed => &[1.0],
+            FieldForm::Symmetric | FieldForm::Fixed => &[1.0],
             FieldForm::Radial => &[1.0 - outward, outward],
         };
-        for (i, of_row) in parts.iter().enumerate() {
-            let mut rows = self.right.rows_mut(i * count, count);
-            rows.axpy(*of_row, &right, 1.0);
-            for (j, of_column) in parts.iter().enumerate() {
-                let mut block = self.matrix.view_mut((i * count, j * count), (count, count));
-                block.zip_apply(&product, |sum, part| *sum += of_row * of_column * part);
+        let pixels = images.values.len();
+        let lobes = || images.light.chunks_exact(pixels);
+        let count = images.light.len() / pixels;
+        for (i, lobe) in lobes().enumerate() {
+            let right = dot(lobe, &images.values);
+            for (set, part) in parts.iter().enumerate() {
+                self.right[set * count + i] += part * right;
+            }
+            for (j, other) in lobes().enumerate().take(i + 1) {
+                let product = dot(lobe, other);
+                for (a, of_row) in parts.iter().enumerate() {
+                    for (b, of_column) in parts.iter().enumerate() {
+                        let part = of_row * of_column * product;
+                        self.matrix[(a * count + i, b * count + j)] += part;
+                        if i != j {
+                            self.matrix[(a * count + j, b * count + i)] += part;
+                        }
+                    }
+                }
             }
         }
     }
 
     /// The non-negative shares, by coordinate descent from those of `expected`, which count as
-    /// known to within a part of themselves.
-    fn solve(&self, expected: &[Lobe]) -> Vec<f64> {
+    /// known to within a part of themselves. Shares of the same class are equal.
+    fn solve(&self, expected: &[f64], classes: &[usize]) -> Vec<f64> {
         const SWEEPS: usize = 200;
         /// Descent ends when no share changes by more.
         const MIN_CHANGE: f64 = 1e-5;
         /// Uncertainty of what is expected: of the share, and of the largest share.
         const UNCERTAIN: [f64; 2] = [0.5, 0.3];
-        let largest = expected.iter().map(|lobe| lobe.share).fold(0.0, f64::max);
-        let expected = expected.iter().map(|lobe| lobe.share).cycle();
-        let expected: Vec<f64> = expected.take(self.right.len()).collect();
-        let weight = |share: &f64| (UNCERTAIN[0] * share + UNCERTAIN[1] * largest).powi(-2);
-        let weights: Vec<f64> = expected.iter().map(weight).collect();
-        let mut shares = expected.clone();
+        let largest = expected.iter().copied().fold(0.0, f64::max);
+        let expected = |number: usize| expected[number % expected.len()];
+        let mut names = classes.to_vec();
+        names.sort_unstable();
+        names.dedup();
+        // Each share is that of its class.
+        let class = |number: usize| names.binary_search(&classes[number]).unwrap_or_default();
+        let count = names.len();
+        let mut matrix = DMatrix::<f64>::zeros(count, count);
+        let mut right = DVector::<f64>::zeros(count);
+        let mut shares = vec![0.0; count];
+        for number in 0..classes.len() {
+            let at = class(number);
+            let share = expected(number);
+            let weight = (UNCERTAIN[0] * share + UNCERTAIN[1] * largest).powi(-2);
+            shares[at] = share;
+            matrix[(at, at)] += weight;
+            right[at] += self.right[number] + weight * share;
+            for other in 0..classes.len() {
+                matrix[(at, class(other))] += self.matrix[(number, other)];
+            }
+        }
         for _ in 0..SWEEPS {
             let mut moved = 0.0f64;
-            for k in 0..shares.len() {
-                let column = self.matrix.column(k);
+            for k in 0..count {
+                let column = matrix.column(k);
                 let product: f64 = column.iter().zip(&shares).map(|(a, s)| a * s).sum();
-                let slope = self.right[k] - product - weights[k] * (shares[k] - expected[k]);
-                let share = (shares[k] + slope / (column[k] + weights[k])).max(0.0);
+                let share = (shares[k] + (right[k] - product) / column[k]).max(0.0);
                 moved = moved.max((share - shares[k]).abs());
                 shares[k] = share;
             }
@@ -241,6 +353,29 @@ impl Sums {
                 break;
             }
         }
-        shares
+        (0..classes.len())
+            .map(|number| shares[class(number)])
+            .collect()
     }
+}
+
+/// The sum of the products of pixels.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn dot(a: &[PixelGroup], b: &[PixelGroup]) -> f64 {
+    let mut sum = [0.0f32; GROUP_PX];
+    for (a, b) in a.iter().zip(b) {
+        for lane in 0..GROUP_PX {
+            sum[lane] += a[lane] * b[lane];
+        }
+    }
+    sum.iter().copied().map(f64::from).sum()
+}
+
+/// The share of a lobe at a distance from the centre of a uniform disc, in standard deviations: the
+/// radius is twice the standard deviation along an axis, and the edge as wide as the lobes are
+/// apart.
+fn disc_share(sigmas: f64) -> f64 {
+    const RADIUS_SIGMAS: f64 = 2.0;
+    const EDGE_SIGMAS: f64 = 0.5;
+    (0.5 + (RADIUS_SIGMAS - sigmas) / EDGE_SIGMAS).clamp(0.0, 1.0)
 }

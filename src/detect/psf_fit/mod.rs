@@ -13,13 +13,13 @@ mod mixture;
 mod stars;
 
 use super::candidates::Peak;
-use super::effective_psf::{EffectivePsf, FieldForm, FieldFrame, FieldLobe, SpotMoments};
+use super::effective_psf::{EffectivePsf, FieldForm, FieldFrame, SpotMoments};
 use super::fit::{FitBuffers, FrameMaps, NoiseModel};
 use super::psf::MAX_WINDOW_PX;
 use super::star_model::{StarModel, noise_of};
 use crate::base::statistics::median;
 use field::moments_over_field;
-use mixture::LobeGrid;
+use mixture::{Expected, LobeGrid, LobeSums};
 use stars::{PsfStar, StarFitter};
 
 /// Fewer stars than this do not tell the PSF.
@@ -30,12 +30,12 @@ const MIN_STARS_OF_FIELD: usize = 12;
 const ROUNDS: usize = 2;
 /// Steps of the stars' fits in each round.
 const STEPS: usize = 2;
-/// Elongations and errors of the spot below this are those of a round Gaussian.
+/// A form is better than a simpler one where it lowers chi² by this.
+const BETTER_CHI2: f64 = 20.0;
+/// Spots are no round Gaussians from this elongation on,
 const MIN_ELONGATION: f64 = 0.06;
-/// Else the variance by light must fall to this part of that of a round Gaussian.
+/// or where the PSF lowers the variance by light to this part.
 const MAX_VARIANCE_RATIO: f64 = 0.8;
-/// The PSF changes its form over the field where that lowers the variance by light to this part.
-const MAX_RADIAL_RATIO: f64 = 0.9;
 
 /// Measures the effective PSF, and sets the noise model to that of its residuals. `None` where a
 /// round Gaussian does as well, or too few stars tell.
@@ -50,84 +50,130 @@ pub(crate) fn measure_psf(
         model_error2: stars::MODEL_ERROR2,
         ..model.noise
     });
-    let stars = stars::bright_stars(maps, peaks, radius_px, &mut fitter);
+    let mut stars = stars::bright_stars(maps, peaks, radius_px, &mut fitter);
     if stars.len() < MIN_STARS {
         return None;
     }
-    let light = typical_light(&stars, maps);
-    let variance = |noise: NoiseModel| light * (noise.shot_adu + noise.model_error2 * light);
-    let round = variance(noise_of_round(maps, &stars, buffers));
-    let mut best = Measured::of(FieldForm::Fixed, maps, stars.clone(), &mut fitter, buffers);
-    if stars.len() >= MIN_STARS_OF_FIELD {
-        let radial = Measured::of(FieldForm::Radial, maps, stars, &mut fitter, buffers);
-        if variance(radial.noise) < MAX_RADIAL_RATIO * variance(best.noise) {
-            best = radial;
+    let round = noise_of_round(maps, &stars, buffers);
+    let frame = FieldFrame::of((maps.view.width, maps.view.height));
+    let typical = typical_moments(&stars);
+    let grid = LobeGrid::of(typical, false);
+    let (moments, mut is_varied) = moments_over_field(frame, &stars);
+    let mut psf = EffectivePsf {
+        lobes: grid.gaussian(),
+        form: FieldForm::Symmetric,
+        typical,
+        moments,
+        spot_px: maps.spot_px,
+        radius_px,
+    };
+    let mut sums = None;
+    for _ in 0..ROUNDS {
+        for _ in 0..STEPS {
+            fitter.step(&mut stars, &psf, true);
+            (psf.moments, is_varied) = moments_over_field(frame, &stars);
+        }
+        let [even, odd] = sums.insert(grid.sums(&psf, &stars, &mut fitter));
+        psf.lobes = grid.solve(&even.plus(odd), psf.form, Expected::Gaussian);
+        for _ in 0..STEPS {
+            fitter.step(&mut stars, &psf, false);
         }
     }
-    let [_, e1, e2] = best.psf.typical;
-    let is_better = variance(best.noise) < MAX_VARIANCE_RATIO * round;
-    let is_needed = is_better || best.is_varied || e1.hypot(e2) > MIN_ELONGATION;
+    let best = best_of(&grid, &psf, &sums?, &stars, &mut fitter);
+    let noise = noise_of_psf(&best, &stars, buffers);
+    let light = typical_light(&stars, maps);
+    let variance = |noise: NoiseModel| light * (noise.shot_adu + noise.model_error2 * light);
+    let is_better = variance(noise) < MAX_VARIANCE_RATIO * variance(round);
+    let is_elongated = typical[1].hypot(typical[2]) > MIN_ELONGATION;
     if std::env::var("SP_DEBUG").is_ok() {
         eprintln!(
             "form {:?} ratio {:.3} varied {} e {:.2} lobes {}",
             best.psf.form,
-            variance(best.noise) / round,
-            best.is_varied,
-            e1.hypot(e2),
+            variance(noise) / variance(round),
+            is_varied,
+            is_elongated,
             best.psf.lobes.len()
         );
     }
-    is_needed.then(|| {
-        model.noise = best.noise;
+    (is_better || is_varied || is_elongated).then(|| {
+        model.noise = noise;
         best.psf
     })
 }
 
-/// A PSF and the noise model of its residuals.
-struct Measured {
+/// A PSF, and those of each half of the stars.
+struct Candidate {
     psf: EffectivePsf,
-    noise: NoiseModel,
-    /// Whether size or elongation differ from place to place.
-    is_varied: bool,
+    /// For the stars of even numbers, from the odd ones, and the other way round.
+    of_halves: [EffectivePsf; 2],
+    /// Of each half of the stars with the PSF of the other.
+    chi2: f64,
 }
 
-impl Measured {
+impl Candidate {
     fn of(
-        form: FieldForm,
-        maps: &FrameMaps<'_>,
-        mut stars: Vec<PsfStar>,
+        grid: &LobeGrid,
+        psf: &EffectivePsf,
+        [even, odd]: &[LobeSums; 2],
+        (form, expected): (FieldForm, Expected),
+        stars: &[PsfStar],
         fitter: &mut StarFitter,
-        buffers: &mut FitBuffers,
     ) -> Self {
-        let frame = FieldFrame::of((maps.view.width, maps.view.height));
-        let typical = typical_moments(&stars);
-        let grid = LobeGrid::of(typical, false);
-        let (moments, mut is_varied) = moments_over_field(frame, &stars);
-        let mut psf = EffectivePsf {
-            lobes: grid.gaussian(),
+        let with = |sums: &LobeSums| EffectivePsf {
+            lobes: grid.solve(sums, form, expected),
             form,
-            typical,
-            moments,
-            spot_px: maps.spot_px,
-            radius_px: radius_px(maps),
+            ..psf.clone()
         };
-        let mut of_halves = Default::default();
-        for _ in 0..ROUNDS {
-            for _ in 0..STEPS {
-                fitter.step(&mut stars, &psf, true);
-                (psf.moments, is_varied) = moments_over_field(frame, &stars);
-            }
-            of_halves = grid.solve(&mut psf, &stars, fitter);
-            for _ in 0..STEPS {
-                fitter.step(&mut stars, &psf, false);
-            }
-        }
+        let of_halves = [with(odd), with(even)];
+        let chi2 = stars.iter().enumerate();
+        let chi2 = chi2.map(|(number, star)| fitter.chi2(star, &of_halves[number % 2]));
         Self {
-            noise: noise_of_psf(&psf, of_halves, &stars, buffers),
-            psf,
-            is_varied,
+            chi2: chi2.sum(),
+            psf: with(&even.plus(odd)),
+            of_halves,
         }
     }
+}
+
+/// The best form of the PSF, the simplest of those that are as good.
+fn best_of(
+    grid: &LobeGrid,
+    psf: &EffectivePsf,
+    sums: &[LobeSums; 2],
+    stars: &[PsfStar],
+    fitter: &mut StarFitter,
+) -> Candidate {
+    const FORMS: [(FieldForm, Expected); 2] = [
+        (FieldForm::Symmetric, Expected::Disc),
+        (FieldForm::Fixed, Expected::Gaussian),
+    ];
+    let first = (FieldForm::Symmetric, Expected::Gaussian);
+    let mut best = Candidate::of(grid, psf, sums, first, stars, fitter);
+    let mut consider = |other: Candidate| {
+        if other.chi2 < best.chi2 - BETTER_CHI2 {
+            best = other;
+        }
+    };
+    for form in FORMS {
+        consider(Candidate::of(grid, psf, sums, form, stars, fitter));
+    }
+    if stars.len() >= MIN_STARS_OF_FIELD {
+        let form = (FieldForm::Radial, Expected::Gaussian);
+        let mut stars = stars.to_vec();
+        let mut radial = EffectivePsf {
+            form: FieldForm::Radial,
+            ..psf.clone()
+        };
+        // Its lobes are placed from the axis outward: those so far are round enough to begin with.
+        let [even, odd] = grid.sums(&radial, &stars, fitter);
+        radial.lobes = grid.solve(&even.plus(&odd), form.0, form.1);
+        for _ in 0..STEPS {
+            fitter.step(&mut stars, &radial, false);
+        }
+        let sums = grid.sums(&radial, &stars, fitter);
+        consider(Candidate::of(grid, &radial, &sums, form, &stars, fitter));
+    }
+    best
 }
 
 /// Half of the side of the windows, in pixels.
@@ -160,21 +206,12 @@ fn noise_of_round(maps: &FrameMaps<'_>, stars: &[PsfStar], buffers: &mut FitBuff
 }
 
 /// The noise model of the stars, each compared with the PSF from the other half of them.
-fn noise_of_psf(
-    psf: &EffectivePsf,
-    of_halves: [Vec<FieldLobe>; 2],
-    stars: &[PsfStar],
-    buffers: &mut FitBuffers,
-) -> NoiseModel {
-    let of_halves = of_halves.map(|lobes| EffectivePsf {
-        lobes,
-        ..psf.clone()
-    });
+fn noise_of_psf(best: &Candidate, stars: &[PsfStar], buffers: &mut FitBuffers) -> NoiseModel {
     let windows = stars.iter().enumerate().map(|(number, star)| {
         let mut window = star.window.clone();
-        of_halves[number % 2].at(star.spot.x, star.spot.y, &mut window.psf);
+        best.of_halves[number % 2].at(star.spot.x, star.spot.y, &mut window.psf);
         (window, star.spot)
     });
     let mut windows: Vec<_> = windows.collect();
-    noise_of(&mut windows, psf.spot_px, buffers)
+    noise_of(&mut windows, best.psf.spot_px, buffers)
 }

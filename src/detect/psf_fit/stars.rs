@@ -6,8 +6,9 @@ use crate::detect::effective_psf::{
     EffectivePsf, FieldFrame, FieldMoments, LocalPsf, SpotMoments, covariance_by, stretch_by,
 };
 use crate::detect::fit::{FrameMaps, NoiseModel, NormalEquations, SpotEstimate, Window};
-use crate::detect::psf::AxisProfile;
+use crate::detect::psf::{AxisProfile, GROUP_PX, PixelGroup};
 use crate::detect::star_model::isolated_peaks;
+use multiversion::multiversion;
 
 /// Most stars that are used.
 const MAX_STARS: usize = 60;
@@ -39,16 +40,17 @@ pub(super) struct PsfStar {
     pub chi2: f64,
 }
 
-/// What a pixel of a spot holds: the share of the light, and its derivatives with respect to x, y,
-/// and the moments.
-type PixelShare = [f64; 6];
+/// What the pixels of a group hold of a spot: the share of the light, and its derivatives with
+/// respect to x, y, and the moments.
+type ShareGroup = [PixelGroup; 6];
 
 /// Fits the stars; holds the buffers.
 #[derive(Debug, Default)]
 pub(super) struct StarFitter {
     noise: NoiseModel,
     axes: [AxisProfile; 2],
-    shares: Vec<PixelShare>,
+    /// Row by row, as the pixels of the window.
+    shares: Vec<ShareGroup>,
     local: LocalPsf,
 }
 
@@ -103,6 +105,17 @@ impl StarFitter {
         Some(std::array::from_fn(|i| change[PLACE + i]))
     }
 
+    /// Chi² of a star with `psf`, fitted from where it is.
+    pub fn chi2(&mut self, star: &PsfStar, psf: &EffectivePsf) -> f64 {
+        const STEPS: usize = 2;
+        let mut star = star.clone();
+        for _ in 0..STEPS {
+            let _ = self.step_one(&mut star, psf, PLACE);
+        }
+        self.draw(&star, psf);
+        self.linearise(&star).chi2
+    }
+
     /// Computes the shares of the pixels of a star with this PSF.
     fn draw(&mut self, star: &PsfStar, psf: &EffectivePsf) {
         let Self {
@@ -121,36 +134,20 @@ impl StarFitter {
             [[wider, wider, 0.0], [0.0; 3], [0.0; 3]]
         };
         let of_single = (local.lobes.len() == 1).then(|| covariance_by(here));
+        let width = window.groups();
         shares.clear();
-        shares.resize(window.width * window.height, [0.0; 6]);
+        shares.resize(width * window.height, [[0.0; GROUP_PX]; 6]);
         for lobe in &local.lobes {
-            let per_sigma = 1.0 / lobe.sigma_px;
-            let widening = of_single.unwrap_or_else(|| widening_of(lobe.sigma_px));
             let [dx, dy] = lobe.offset_px;
             across.fill(spot.x + dx - window.x0 as f64, lobe.sigma_px, window.width);
             down.fill(spot.y + dy - window.y0 as f64, lobe.sigma_px, window.height);
-            let moves = stretches.map(|rows| rows.map(|[a, b]| a * dx + b * dy));
-            for (row, shares) in shares.chunks_exact_mut(window.width).enumerate() {
-                let d = down.pixel(row);
-                let [dv, d1, d2] =
-                    [d.value, d.by_center, d.by_sigma].map(|part| lobe.share * f64::from(part));
-                for (column, share) in shares.iter_mut().enumerate() {
-                    let a = across.pixel(column);
-                    let [av, a1, a2] = [a.value, a.by_center, a.by_sigma].map(f64::from);
-                    let [by_x, by_y] = [a1 * dv, av * d1];
-                    // The derivative with respect to σ is σ times the second one with respect to
-                    // the place.
-                    let [xx, yy, xy] = [a2 * dv * per_sigma, av * d2 * per_sigma, a1 * d1];
-                    share[0] += av * dv;
-                    share[1] += by_x;
-                    share[2] += by_y;
-                    for ((share, [u, v]), [cxx, cyy, cxy]) in
-                        share[3..].iter_mut().zip(moves).zip(widening)
-                    {
-                        *share += by_x * u + by_y * v + 0.5 * (xx * cxx + yy * cyy) + xy * cxy;
-                    }
-                }
-            }
+            let widening = of_single.unwrap_or_else(|| widening_of(lobe.sigma_px));
+            let changes = LobeChanges {
+                per_sigma: (1.0 / lobe.sigma_px) as f32,
+                moves: stretches.map(|rows| rows.map(|[a, b]| (a * dx + b * dy) as f32)),
+                widening: widening.map(|of_moment| of_moment.map(|change| change as f32)),
+            };
+            add_lobe(lobe.share as f32, &changes, [across, down], shares, width);
         }
     }
 
@@ -160,7 +157,7 @@ impl StarFitter {
         let mut normal = NormalEquations::empty();
         let flux = spot.flux;
         for (value, weight, share) in self.pixels(star) {
-            let [part, by_x, by_y, by_size, by_e1, by_e2] = *share;
+            let [part, by_x, by_y, by_size, by_e1, by_e2] = share;
             let gradient = [
                 flux * by_x,
                 flux * by_y,
@@ -187,11 +184,15 @@ impl StarFitter {
     }
 
     /// Value above the map in ADU, weight and shares of the pixels.
-    fn pixels<'a>(&'a self, star: &'a PsfStar) -> impl Iterator<Item = (f64, f64, &'a PixelShare)> {
-        let (noise, flux) = (self.noise, star.spot.flux);
-        let noise2 = star.window.noise_adu.powi(2);
-        let pixels = star.window.pixels_adu().zip(&self.shares);
-        pixels.map(move |((.., value), share)| {
+    fn pixels<'a>(&'a self, star: &'a PsfStar) -> impl Iterator<Item = (f64, f64, [f64; 6])> {
+        let PsfStar { window, spot, .. } = star;
+        let (noise, flux) = (self.noise, spot.flux);
+        let noise2 = window.noise_adu.powi(2);
+        let groups = window.groups();
+        window.pixels_adu().map(move |(column, row, value)| {
+            let (column, row) = (column as usize, row as usize);
+            let group = &self.shares[row * groups + column / GROUP_PX];
+            let share = group.map(|of_group| f64::from(of_group[column % GROUP_PX]));
             let light = (flux * share[0]).max(0.0);
             let variance = noise2 + light * (noise.shot_adu + noise.model_error2 * light);
             (value, 1.0 / variance, share)
@@ -204,6 +205,53 @@ impl StarFitter {
         into.clear();
         let pixels = self.pixels(star);
         into.extend(pixels.map(|(value, weight, _)| [weight, value - star.background]));
+    }
+}
+
+/// What larger moments change in a lobe.
+struct LobeChanges {
+    /// Inverse of its standard deviation, in px⁻¹.
+    per_sigma: f32,
+    /// How far each of the moments moves it along x and y, in pixels.
+    moves: [[f32; 2]; 3],
+    /// Change of its covariance xx, yy, xy by each of the moments, in px².
+    widening: [[f32; 3]; 3],
+}
+
+/// Adds a lobe to the rows of `width` groups.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn add_lobe(
+    share: f32,
+    changes: &LobeChanges,
+    [across, down]: [&AxisProfile; 2],
+    into: &mut [ShareGroup],
+    width: usize,
+) {
+    for group in 0..width {
+        let across = across.group(group);
+        for (row, into) in into.iter_mut().skip(group).step_by(width).enumerate() {
+            let down = down.pixel(row);
+            let [value, slope, growth] =
+                [down.value, down.by_center, down.by_sigma].map(|part| share * part);
+            for lane in 0..GROUP_PX {
+                let here = across.value[lane];
+                let by_x = across.by_center[lane] * value;
+                let by_y = here * slope;
+                // The derivative with respect to σ is σ times the second one with respect to the
+                // place.
+                let xx = 0.5 * across.by_sigma[lane] * value * changes.per_sigma;
+                let yy = 0.5 * here * growth * changes.per_sigma;
+                let xy = across.by_center[lane] * slope;
+                into[0][lane] += here * value;
+                into[1][lane] += by_x;
+                into[2][lane] += by_y;
+                for moment in 0..3 {
+                    let [u, v] = changes.moves[moment];
+                    let [cxx, cyy, cxy] = changes.widening[moment];
+                    into[3 + moment][lane] += by_x * u + by_y * v + xx * cxx + yy * cyy + xy * cxy;
+                }
+            }
+        }
     }
 }
 
