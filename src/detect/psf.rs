@@ -59,6 +59,63 @@ impl<const N: usize> ProfilePart<[f32; N]> {
     }
 }
 
+/// The part of a window that a narrow spot has light in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct LitPart {
+    /// First group of a row, and the one after the last.
+    pub groups: [usize; 2],
+    /// First row, and the one after the last.
+    pub rows: [usize; 2],
+}
+
+/// Profiles of a narrow spot along both axes, in the part of a window that it has light in.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct NarrowProfiles {
+    across: AxisProfile,
+    down: AxisProfile,
+}
+
+impl NarrowProfiles {
+    /// Computes the profiles of a spot at a place in a window of `width` times `height` pixels.
+    pub fn fill(
+        &mut self,
+        [x_px, y_px]: [f64; 2],
+        sigma_px: f64,
+        [width, height]: [usize; 2],
+    ) -> LitPart {
+        /// Less than 10⁻⁵ of the light is beyond this many standard deviations of a pixel's edge.
+        const REACH_SIGMAS: f64 = 4.5;
+        let reach_px = REACH_SIGMAS * sigma_px + 0.5;
+        let range = |at: f64, side: usize| {
+            let bound = |pixel: f64| pixel.clamp(0.0, side as f64) as usize;
+            [
+                bound((at - reach_px).ceil()),
+                bound((at + reach_px).floor() + 1.0),
+            ]
+        };
+        let [columns, rows] = [range(x_px, width), range(y_px, height)];
+        let groups = [columns[0] / GROUP_PX, columns[1].div_ceil(GROUP_PX)];
+        let first = groups[0] * GROUP_PX;
+        let count = (groups[1] * GROUP_PX).min(width).saturating_sub(first);
+        self.across.fill(x_px - first as f64, sigma_px, count);
+        let count = rows[1].saturating_sub(rows[0]);
+        self.down.fill(y_px - rows[0] as f64, sigma_px, count);
+        LitPart { groups, rows }
+    }
+
+    /// The values along x in a group of the part.
+    #[inline(always)]
+    pub fn across(&self, group: usize, part: &LitPart) -> ProfilePart<PixelGroup> {
+        self.across.group(group - part.groups[0])
+    }
+
+    /// The values along y in a row of the part.
+    #[inline(always)]
+    pub fn down(&self, row: usize, part: &LitPart) -> ProfilePart<f32> {
+        self.down.pixel(row - part.rows[0])
+    }
+}
+
 impl AxisProfile {
     /// Fills the first `count` pixels for a spot of `sigma_px` at `center_px`, where 0 is the
     /// centre of the first pixel.

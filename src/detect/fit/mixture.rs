@@ -2,8 +2,7 @@
 
 use super::light::{GroupLight, SpotLight};
 use super::window::Window;
-use crate::detect::effective_psf::Lobe;
-use crate::detect::psf::{AxisProfile, GROUP_PX, PixelGroup};
+use crate::detect::psf::{GROUP_PX, LitPart, NarrowProfiles, PixelGroup};
 use multiversion::multiversion;
 
 /// The fraction of the light in a group of pixels, and its derivatives with respect to x, y and
@@ -15,7 +14,7 @@ pub(super) type ShareGroup = [PixelGroup; 4];
 pub(super) struct MixtureImage {
     /// Row by row, as the pixels of the window.
     groups: Vec<ShareGroup>,
-    axes: [AxisProfile; 2],
+    profiles: NarrowProfiles,
 }
 
 impl MixtureImage {
@@ -27,23 +26,22 @@ impl MixtureImage {
         self.groups
             .resize(width * window.height, [[0.0; GROUP_PX]; 4]);
         let scale = spot_px / psf.spot_px;
-        let [across, down] = &mut self.axes;
         let corner = [window.x0, window.y0].map(|at| at as f64);
+        let size = [window.width, window.height];
         for lobe in &psf.lobes {
             let [dx, dy] = lobe.offset_px;
-            across.fill(
-                x_px - corner[0] + scale * dx,
-                scale * lobe.sigma_px,
-                window.width,
-            );
-            down.fill(
-                y_px - corner[1] + scale * dy,
-                scale * lobe.sigma_px,
-                window.height,
-            );
+            let place = [x_px - corner[0] + scale * dx, y_px - corner[1] + scale * dy];
+            let part = self.profiles.fill(place, scale * lobe.sigma_px, size);
             // What a larger spot moves, and widens, its lobes by.
             let by_spot = [dx, dy, lobe.sigma_px].map(|part| (part / psf.spot_px) as f32);
-            add_lobe(lobe, by_spot, [across, down], &mut self.groups, width);
+            let share = lobe.share as f32;
+            add_lobe(
+                (share, by_spot),
+                &self.profiles,
+                part,
+                &mut self.groups,
+                width,
+            );
         }
     }
 
@@ -60,20 +58,20 @@ impl MixtureImage {
 /// Adds a lobe to the rows of `width` groups.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn add_lobe(
-    lobe: &Lobe,
-    by_spot: [f32; 3],
-    [across, down]: [&AxisProfile; 2],
+    (share, by_spot): (f32, [f32; 3]),
+    profiles: &NarrowProfiles,
+    part: LitPart,
     into: &mut [ShareGroup],
     width: usize,
 ) {
-    let share = lobe.share as f32;
     let [to_x, to_y, wider] = by_spot;
-    for group in 0..width {
-        let across = across.group(group);
-        for (row, into) in into.iter_mut().skip(group).step_by(width).enumerate() {
-            let down = down.pixel(row);
-            let [value, slope, growth] =
-                [down.value, down.by_center, down.by_sigma].map(|part| share * part);
+    for row in part.rows[0]..part.rows[1] {
+        let down = profiles.down(row, &part);
+        let [value, slope, growth] =
+            [down.value, down.by_center, down.by_sigma].map(|part| share * part);
+        for group in part.groups[0]..part.groups[1] {
+            let across = profiles.across(group, &part);
+            let into = &mut into[row * width + group];
             for lane in 0..GROUP_PX {
                 let here = across.value[lane];
                 let by_x = across.by_center[lane] * value;

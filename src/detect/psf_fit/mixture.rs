@@ -4,7 +4,7 @@ use super::stars::{PsfStar, StarFitter};
 use crate::detect::effective_psf::{
     EffectivePsf, FieldForm, FieldLobe, Lobe, LocalPsf, SpotMoments, covariance, inverse,
 };
-use crate::detect::psf::{AxisProfile, GROUP_PX, PixelGroup};
+use crate::detect::psf::{GROUP_PX, NarrowProfiles, PixelGroup};
 use multiversion::multiversion;
 use nalgebra::{DMatrix, DVector};
 
@@ -204,10 +204,14 @@ impl LobeGrid {
 struct LobeImages {
     /// Lobe by lobe, each in whole groups.
     light: Vec<PixelGroup>,
+    /// Rows of each lobe that have light.
+    rows: Vec<[usize; 2]>,
+    /// Groups in a row.
+    width: usize,
     values: Vec<PixelGroup>,
     /// Square roots of the weights.
     roots: Vec<PixelGroup>,
-    axes: [AxisProfile; 2],
+    profiles: NarrowProfiles,
 }
 
 impl LobeImages {
@@ -227,26 +231,40 @@ impl LobeImages {
             self.roots[group][lane] = root as f32;
             self.values[group][lane] = (root * value) as f32;
         }
-        let [across, down] = &mut self.axes;
+        self.width = width;
+        self.rows.clear();
         self.light.clear();
-        for Lobe {
-            offset_px: [dx, dy],
-            sigma_px,
-            ..
-        } in &local.lobes
-        {
-            across.fill(spot.x + dx - window.x0 as f64, *sigma_px, window.width);
-            down.fill(spot.y + dy - window.y0 as f64, *sigma_px, window.height);
-            for (row, roots) in self.roots.chunks_exact(width).enumerate() {
-                let of_row = spot.flux as f32 * down.pixel(row).value;
-                for (group, roots) in roots.iter().enumerate() {
-                    let columns = across.group(group).value;
-                    self.light.push(std::array::from_fn(|lane| {
-                        of_row * columns[lane] * roots[lane]
-                    }));
+        self.light
+            .resize(local.lobes.len() * self.values.len(), empty);
+        let images = self.light.chunks_exact_mut(self.values.len());
+        for (lobe, image) in local.lobes.iter().zip(images) {
+            let place = [
+                spot.x + lobe.offset_px[0] - window.x0 as f64,
+                spot.y + lobe.offset_px[1] - window.y0 as f64,
+            ];
+            let size = [window.width, window.height];
+            let part = self.profiles.fill(place, lobe.sigma_px, size);
+            self.rows.push(part.rows);
+            for row in part.rows[0]..part.rows[1] {
+                let of_row = spot.flux as f32 * self.profiles.down(row, &part).value;
+                for group in part.groups[0]..part.groups[1] {
+                    let columns = self.profiles.across(group, &part).value;
+                    let at = row * width + group;
+                    let roots = &self.roots[at];
+                    image[at] = std::array::from_fn(|lane| of_row * columns[lane] * roots[lane]);
                 }
             }
         }
+    }
+
+    /// The groups of two images, in the rows in which both lobes have light.
+    fn common(&self, i: usize, j: usize) -> [&[PixelGroup]; 2] {
+        let ([a, b], [c, d]) = (self.rows[i], self.rows[j]);
+        let first = a.max(c);
+        let last = b.min(d).max(first);
+        let count = self.values.len();
+        let rows = first * self.width..last * self.width;
+        [i, j].map(|lobe| &self.light[lobe * count..][rows.clone()])
     }
 }
 
@@ -288,14 +306,14 @@ impl LobeSums {
             FieldForm::Radial => &[1.0 - outward, outward],
         };
         let pixels = images.values.len();
-        let lobes = || images.light.chunks_exact(pixels);
-        let count = images.light.len() / pixels;
-        for (i, lobe) in lobes().enumerate() {
+        let count = images.rows.len();
+        for (i, lobe) in images.light.chunks_exact(pixels).enumerate() {
             let right = dot(lobe, &images.values);
             for (set, part) in parts.iter().enumerate() {
                 self.right[set * count + i] += part * right;
             }
-            for (j, other) in lobes().enumerate().take(i + 1) {
+            for j in 0..=i {
+                let [lobe, other] = images.common(i, j);
                 let product = dot(lobe, other);
                 for (a, of_row) in parts.iter().enumerate() {
                     for (b, of_column) in parts.iter().enumerate() {

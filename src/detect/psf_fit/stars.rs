@@ -6,7 +6,7 @@ use crate::detect::effective_psf::{
     EffectivePsf, FieldFrame, FieldMoments, LocalPsf, SpotMoments, covariance_by, stretch_by,
 };
 use crate::detect::fit::{FrameMaps, NoiseModel, NormalEquations, SpotEstimate, Window};
-use crate::detect::psf::{AxisProfile, GROUP_PX, PixelGroup};
+use crate::detect::psf::{GROUP_PX, LitPart, NarrowProfiles, PixelGroup};
 use crate::detect::star_model::isolated_peaks;
 use multiversion::multiversion;
 
@@ -48,7 +48,7 @@ type ShareGroup = [PixelGroup; 6];
 #[derive(Debug, Default)]
 pub(super) struct StarFitter {
     noise: NoiseModel,
-    axes: [AxisProfile; 2],
+    profiles: NarrowProfiles,
     /// Row by row, as the pixels of the window.
     shares: Vec<ShareGroup>,
     local: LocalPsf,
@@ -105,13 +105,10 @@ impl StarFitter {
         Some(std::array::from_fn(|i| change[PLACE + i]))
     }
 
-    /// Chi² of a star with `psf`, fitted from where it is.
+    /// Chi² of a star a step of its fit to `psf` on.
     pub fn chi2(&mut self, star: &PsfStar, psf: &EffectivePsf) -> f64 {
-        const STEPS: usize = 2;
         let mut star = star.clone();
-        for _ in 0..STEPS {
-            let _ = self.step_one(&mut star, psf, PLACE);
-        }
+        let _ = self.step_one(&mut star, psf, PLACE);
         self.draw(&star, psf);
         self.linearise(&star).chi2
     }
@@ -119,7 +116,7 @@ impl StarFitter {
     /// Computes the shares of the pixels of a star with this PSF.
     fn draw(&mut self, star: &PsfStar, psf: &EffectivePsf) {
         let Self {
-            axes: [across, down],
+            profiles,
             shares,
             local,
             ..
@@ -139,15 +136,18 @@ impl StarFitter {
         shares.resize(width * window.height, [[0.0; GROUP_PX]; 6]);
         for lobe in &local.lobes {
             let [dx, dy] = lobe.offset_px;
-            across.fill(spot.x + dx - window.x0 as f64, lobe.sigma_px, window.width);
-            down.fill(spot.y + dy - window.y0 as f64, lobe.sigma_px, window.height);
+            let place = [
+                spot.x + dx - window.x0 as f64,
+                spot.y + dy - window.y0 as f64,
+            ];
+            let part = profiles.fill(place, lobe.sigma_px, [window.width, window.height]);
             let widening = of_single.unwrap_or_else(|| widening_of(lobe.sigma_px));
             let changes = LobeChanges {
                 per_sigma: (1.0 / lobe.sigma_px) as f32,
                 moves: stretches.map(|rows| rows.map(|[a, b]| (a * dx + b * dy) as f32)),
                 widening: widening.map(|of_moment| of_moment.map(|change| change as f32)),
             };
-            add_lobe(lobe.share as f32, &changes, [across, down], shares, width);
+            add_lobe(lobe.share as f32, &changes, (profiles, part), shares, width);
         }
     }
 
@@ -223,16 +223,17 @@ struct LobeChanges {
 fn add_lobe(
     share: f32,
     changes: &LobeChanges,
-    [across, down]: [&AxisProfile; 2],
+    (profiles, part): (&NarrowProfiles, LitPart),
     into: &mut [ShareGroup],
     width: usize,
 ) {
-    for group in 0..width {
-        let across = across.group(group);
-        for (row, into) in into.iter_mut().skip(group).step_by(width).enumerate() {
-            let down = down.pixel(row);
-            let [value, slope, growth] =
-                [down.value, down.by_center, down.by_sigma].map(|part| share * part);
+    for row in part.rows[0]..part.rows[1] {
+        let down = profiles.down(row, &part);
+        let [value, slope, growth] =
+            [down.value, down.by_center, down.by_sigma].map(|part| share * part);
+        for group in part.groups[0]..part.groups[1] {
+            let across = profiles.across(group, &part);
+            let into = &mut into[row * width + group];
             for lane in 0..GROUP_PX {
                 let here = across.value[lane];
                 let by_x = across.by_center[lane] * value;
