@@ -10,27 +10,20 @@ use nalgebra::{DMatrix, DVector};
 
 /// Standard deviation of a lobe over that of the spot along its shorter axis.
 const LOBE_SIZE: f64 = 0.55;
-/// The same at most.
+/// A lobe is not larger than this, in pixels: the pixels blur the edges of a spot no more.
+const MAX_LOBE_PX: f64 = 0.65;
+/// Where that would be too many lobes, they are larger, up to this over that of the spot.
 const MAX_LOBE_SIZE: f64 = 0.85;
 /// Distance of the lobes over their standard deviation: a sum of such lobes has no ripples.
 const PITCH: f64 = 1.15;
 /// Half axes of the ellipse of the lobes, in standard deviations of the spot.
 const REACH_SIGMAS: f64 = 2.8;
-/// Most lobes: with more, they are larger.
-const MAX_LOBES: f64 = 100.0;
+/// Most lobes.
+const MAX_LOBES: f64 = 120.0;
 /// Lobes with a smaller share are left out.
 const MIN_SHARE: f64 = 3e-4;
 /// Standard deviations of the lobes that wings have, over that of the spot.
 const WINGS: [f64; 2] = [2.0, 4.0];
-
-/// What a PSF is taken for before the stars tell.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Expected {
-    /// A Gaussian.
-    Gaussian,
-    /// A uniform disc or ellipse: a star out of focus.
-    Disc,
-}
 
 /// The lobes that a PSF may have.
 #[derive(Debug, Clone)]
@@ -52,10 +45,10 @@ impl LobeGrid {
         let elongation = typical[1].hypot(typical[2]);
         let minor_px = (typical[0] - 0.5 * elongation).exp();
         let ratio = elongation.exp();
-        let area = std::f64::consts::PI * REACH_SIGMAS.powi(2) * ratio;
-        let count = area / (LOBE_SIZE * PITCH).powi(2);
-        let lobe_size = LOBE_SIZE * (count / MAX_LOBES).max(1.0).sqrt();
-        let sigma_px = lobe_size.min(MAX_LOBE_SIZE) * minor_px;
+        let area_px2 = std::f64::consts::PI * REACH_SIGMAS.powi(2) * ratio * minor_px.powi(2);
+        let wanted_px = (LOBE_SIZE * minor_px).min(MAX_LOBE_PX);
+        let least_px = (area_px2 / MAX_LOBES).sqrt() / PITCH;
+        let sigma_px = wanted_px.max(least_px).min(MAX_LOBE_SIZE * minor_px);
         let pitch_px = PITCH * sigma_px;
         let total = covariance(typical);
         let outline = inverse(total);
@@ -127,12 +120,9 @@ impl LobeGrid {
         }
     }
 
-    /// The shares that are expected; they add up to one.
-    fn expected_shares(&self, expected: Expected) -> Vec<f64> {
-        let share = |sigmas: &f64| match expected {
-            Expected::Gaussian => (-0.5 * sigmas * sigmas).exp(),
-            Expected::Disc => disc_share(*sigmas),
-        };
+    /// The shares of a Gaussian, which are expected before the stars tell.
+    fn expected_shares(&self) -> Vec<f64> {
+        let share = |sigmas: &f64| (-0.5 * sigmas * sigmas).exp();
         let mut shares: Vec<f64> = self.distances.iter().map(share).collect();
         let sum: f64 = shares.iter().sum();
         shares.iter_mut().for_each(|share| *share /= sum);
@@ -141,7 +131,7 @@ impl LobeGrid {
 
     /// The lobes of a Gaussian.
     pub fn gaussian(&self) -> Vec<FieldLobe> {
-        let shares = self.expected_shares(Expected::Gaussian);
+        let shares = self.expected_shares();
         self.with_shares(&[&shares, &shares])
     }
 
@@ -192,8 +182,8 @@ impl LobeGrid {
     }
 
     /// The lobes that fit best.
-    pub fn solve(&self, sums: &LobeSums, form: FieldForm, expected: Expected) -> Vec<FieldLobe> {
-        let shares = sums.solve(&self.expected_shares(expected), &self.classes(form));
+    pub fn solve(&self, sums: &LobeSums, form: FieldForm) -> Vec<FieldLobe> {
+        let shares = sums.solve(&self.expected_shares(), &self.classes(form));
         let corner = shares.chunks(self.lobes.len()).last().unwrap_or_default();
         self.with_shares(&[&shares[..self.lobes.len()], corner])
     }
@@ -335,7 +325,7 @@ impl LobeSums {
         /// Descent ends when no share changes by more.
         const MIN_CHANGE: f64 = 1e-5;
         /// Uncertainty of what is expected: of the share, and of the largest share.
-        const UNCERTAIN: [f64; 2] = [0.5, 0.3];
+        const UNCERTAIN: [f64; 2] = [1.0, 0.5];
         let largest = expected.iter().copied().fold(0.0, f64::max);
         let expected = |number: usize| expected[number % expected.len()];
         let mut names = classes.to_vec();
@@ -387,13 +377,4 @@ fn dot(a: &[PixelGroup], b: &[PixelGroup]) -> f64 {
         }
     }
     sum.iter().copied().map(f64::from).sum()
-}
-
-/// The share of a lobe at a distance from the centre of a uniform disc, in standard deviations: the
-/// radius is twice the standard deviation along an axis, and the edge as wide as the lobes are
-/// apart.
-fn disc_share(sigmas: f64) -> f64 {
-    const RADIUS_SIGMAS: f64 = 2.0;
-    const EDGE_SIGMAS: f64 = 0.5;
-    (0.5 + (RADIUS_SIGMAS - sigmas) / EDGE_SIGMAS).clamp(0.0, 1.0)
 }

@@ -19,7 +19,7 @@ use super::psf::MAX_WINDOW_PX;
 use super::star_model::{StarModel, noise_of};
 use crate::base::statistics::median;
 use field::moments_over_field;
-use mixture::{Expected, LobeGrid, LobeSums};
+use mixture::{LobeGrid, LobeSums};
 use stars::{PsfStar, StarFitter};
 
 /// Fewer stars than this do not tell the PSF.
@@ -74,7 +74,7 @@ pub(crate) fn measure_psf(
             (psf.moments, is_varied) = moments_over_field(frame, &stars);
         }
         let [even, odd] = sums.insert(grid.sums(&psf, &stars, &mut fitter));
-        psf.lobes = grid.solve(&even.plus(odd), psf.form, Expected::Gaussian);
+        psf.lobes = grid.solve(&even.plus(odd), psf.form);
         for _ in 0..STEPS {
             fitter.step(&mut stars, &psf, false);
         }
@@ -86,6 +86,14 @@ pub(crate) fn measure_psf(
     let is_better = variance(noise) < MAX_VARIANCE_RATIO * variance(round);
     let is_elongated = typical[1].hypot(typical[2]) > MIN_ELONGATION;
     if std::env::var("SP_DEBUG").is_ok() {
+        eprintln!(
+            "shot {:.3} eps {:.3} round {:.3} {:.3} light {:.1}",
+            noise.shot_adu,
+            noise.model_error2.sqrt(),
+            round.shot_adu,
+            round.model_error2.sqrt(),
+            light
+        );
         eprintln!(
             "form {:?} ratio {:.3} varied {} e {:.2} lobes {}",
             best.psf.form,
@@ -115,12 +123,12 @@ impl Candidate {
         grid: &LobeGrid,
         psf: &EffectivePsf,
         [even, odd]: &[LobeSums; 2],
-        (form, expected): (FieldForm, Expected),
+        form: FieldForm,
         stars: &[PsfStar],
         fitter: &mut StarFitter,
     ) -> Self {
         let with = |sums: &LobeSums| EffectivePsf {
-            lobes: grid.solve(sums, form, expected),
+            lobes: grid.solve(sums, form),
             form,
             ..psf.clone()
         };
@@ -143,30 +151,39 @@ fn best_of(
     stars: &[PsfStar],
     fitter: &mut StarFitter,
 ) -> Candidate {
-    const FORMS: [(FieldForm, Expected); 2] = [
-        (FieldForm::Symmetric, Expected::Disc),
-        (FieldForm::Fixed, Expected::Gaussian),
-    ];
-    let first = (FieldForm::Symmetric, Expected::Gaussian);
-    let mut best = Candidate::of(grid, psf, sums, first, stars, fitter);
+    let mut best = Candidate::of(grid, psf, sums, FieldForm::Symmetric, stars, fitter);
     let mut consider = |other: Candidate| {
+        if std::env::var("SP_DEBUG").is_ok() {
+            eprintln!(
+                "cand {:?} {:.1} best {:.1} n {}",
+                other.psf.form,
+                other.chi2,
+                best.chi2,
+                stars.len()
+            );
+        }
         if other.chi2 < best.chi2 - BETTER_CHI2 {
             best = other;
         }
     };
-    for form in FORMS {
-        consider(Candidate::of(grid, psf, sums, form, stars, fitter));
-    }
+    consider(Candidate::of(
+        grid,
+        psf,
+        sums,
+        FieldForm::Fixed,
+        stars,
+        fitter,
+    ));
     if stars.len() >= MIN_STARS_OF_FIELD {
-        let form = (FieldForm::Radial, Expected::Gaussian);
+        let form = FieldForm::Radial;
         let mut stars = stars.to_vec();
         let mut radial = EffectivePsf {
-            form: FieldForm::Radial,
+            form,
             ..psf.clone()
         };
         // Its lobes are placed from the axis outward: those so far are round enough to begin with.
         let [even, odd] = grid.sums(&radial, &stars, fitter);
-        radial.lobes = grid.solve(&even.plus(&odd), form.0, form.1);
+        radial.lobes = grid.solve(&even.plus(&odd), form);
         for _ in 0..STEPS {
             fitter.step(&mut stars, &radial, false);
         }

@@ -11,7 +11,7 @@ use crate::detect::star_model::isolated_peaks;
 use multiversion::multiversion;
 
 /// Most stars that are used.
-const MAX_STARS: usize = 60;
+const MAX_STARS: usize = 48;
 /// Peaks below this signal-to-noise ratio tell little about the form of a spot.
 const MIN_SNR: f32 = 15.0;
 /// Error of the PSF while it is measured, as a part of the light, squared: the brightest stars must
