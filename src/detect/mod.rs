@@ -144,9 +144,6 @@ pub fn detect_into(
     } else {
         None
     };
-    if std::env::var("SP_DEBUG").is_ok() {
-        eprintln!("departure {} psf {}", stars.is_departure, psf.is_some());
-    }
     maps.psf = psf.as_ref();
     let measurement = Measurement {
         maps,

@@ -32,10 +32,12 @@ const ROUNDS: usize = 2;
 const STEPS: usize = 2;
 /// A form is better than a simpler one where it lowers chi² by this.
 const BETTER_CHI2: f64 = 20.0;
-/// Spots are no round Gaussians from this elongation on,
-const MIN_ELONGATION: f64 = 0.06;
+/// Spots are no round Gaussians from this elongation on, or where they change over the field,
+const MIN_ELONGATION: f64 = 0.15;
 /// or where the PSF lowers the variance by light to this part.
 const MAX_VARIANCE_RATIO: f64 = 0.8;
+/// Sources whose residuals have a larger chi² for each pixel are not alike: no stars.
+const MAX_CHI2: f64 = 3.0;
 
 /// Measures the effective PSF, and sets the noise model to that of its residuals. `None` where a
 /// round Gaussian does as well, or too few stars tell.
@@ -83,27 +85,17 @@ pub(crate) fn measure_psf(
     let noise = noise_of_psf(&best, &stars, buffers);
     let light = typical_light(&stars, maps);
     let variance = |noise: NoiseModel| light * (noise.shot_adu + noise.model_error2 * light);
-    let is_better = variance(noise) < MAX_VARIANCE_RATIO * variance(round);
+    let ratio = variance(noise) / variance(round);
     let is_elongated = typical[1].hypot(typical[2]) > MIN_ELONGATION;
-    if std::env::var("SP_DEBUG").is_ok() {
-        eprintln!(
-            "shot {:.3} eps {:.3} round {:.3} {:.3} light {:.1}",
-            noise.shot_adu,
-            noise.model_error2.sqrt(),
-            round.shot_adu,
-            round.model_error2.sqrt(),
-            light
-        );
-        eprintln!(
-            "form {:?} ratio {:.3} varied {} e {:.2} lobes {}",
-            best.psf.form,
-            variance(noise) / variance(round),
-            is_varied,
-            is_elongated,
-            best.psf.lobes.len()
-        );
-    }
-    (is_better || is_varied || is_elongated).then(|| {
+    let is_other_form = is_varied || is_elongated;
+    let is_needed = ratio
+        < if is_other_form {
+            1.0
+        } else {
+            MAX_VARIANCE_RATIO
+        };
+    let are_stars = best.chi2 < MAX_CHI2 * (stars.len() * (2 * radius_px + 1).pow(2)) as f64;
+    (is_needed && are_stars).then(|| {
         model.noise = noise;
         best.psf
     })
@@ -153,15 +145,6 @@ fn best_of(
 ) -> Candidate {
     let mut best = Candidate::of(grid, psf, sums, FieldForm::Symmetric, stars, fitter);
     let mut consider = |other: Candidate| {
-        if std::env::var("SP_DEBUG").is_ok() {
-            eprintln!(
-                "cand {:?} {:.1} best {:.1} n {}",
-                other.psf.form,
-                other.chi2,
-                best.chi2,
-                stars.len()
-            );
-        }
         if other.chi2 < best.chi2 - BETTER_CHI2 {
             best = other;
         }

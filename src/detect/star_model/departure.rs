@@ -5,11 +5,15 @@ use super::spot_size::{MODE_WIDTH, weighted_size};
 use crate::detect::fit::{Fit, GaussianLight, NoiseModel, WindowPixels};
 use crate::detect::psf::GROUP_PX;
 
-/// Smaller elongations do not matter, as the logarithm of the ratio of the axes.
+/// Smaller elongations are of no account, as the logarithm of the ratio of the axes.
 const MIN_ELONGATION: f64 = 0.06;
-/// Nor do smaller errors of the spot model, relative to the light.
+/// The form of sharper spots is lost in the pixels, in pixels,
+const MIN_SPOT_PX: f64 = 0.65;
+/// unless they are elongated by more than this.
+const MIN_ELONGATION_OF_SHARP: f64 = 0.3;
+/// Smaller errors of the spot model are of no account, relative to the light.
 const MIN_MODEL_ERROR: f64 = 0.015;
-/// Nor a smaller scatter of the sizes, relative to the size.
+/// Nor is a smaller scatter of the sizes, relative to the size.
 const MIN_SIZE_SCATTER: f64 = 0.04;
 /// A departure below this many standard errors is chance.
 const SIGNIFICANT_SIGMA: f64 = 5.0;
@@ -57,12 +61,12 @@ impl CommonElongation {
         }
     }
 
-    /// Whether it is large and certain.
-    fn is_significant(&self) -> bool {
+    /// Whether it is certain, and above a limit.
+    fn exceeds(&self, limit: f64) -> bool {
         let [e1, e2] = self.sums.map(|[score, information]| score / information);
         let information = self.sums[0][1].min(self.sums[1][1]);
         let e = e1.hypot(e2);
-        e > MIN_ELONGATION && e > SIGNIFICANT_SIGMA / information.sqrt()
+        e > limit && e > SIGNIFICANT_SIGMA / information.sqrt()
     }
 }
 
@@ -73,8 +77,14 @@ pub(super) fn is_departure(
     stars: &[Fit],
     spot_px: f64,
 ) -> bool {
+    if elongation.exceeds(MIN_ELONGATION_OF_SHARP) {
+        return true;
+    }
     let is_misfitted = noise.model_error2 > MIN_MODEL_ERROR * MIN_MODEL_ERROR;
-    is_misfitted || elongation.is_significant() || have_scattered_sizes(stars, spot_px)
+    let has_form = || {
+        is_misfitted || elongation.exceeds(MIN_ELONGATION) || have_scattered_sizes(stars, spot_px)
+    };
+    spot_px > MIN_SPOT_PX && has_form()
 }
 
 /// Whether the sizes of stars differ by more than their errors.
