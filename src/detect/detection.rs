@@ -70,8 +70,23 @@ pub struct Detections {
     pub noise_adu: f64,
     /// Standard deviation of the Gaussian spot before pixel integration, in pixels.
     pub spot_sigma_px: f64,
+    /// The spots where they are not round Gaussians of that size.
+    pub psf: Option<MeasuredPsf>,
     /// Why the rate of false detections asked for is held less well than in independent noise.
     pub noise_tail: Option<NoiseTail>,
+}
+
+/// The point spread function measured on the stars of a frame, where they are not round Gaussians of
+/// one size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredPsf {
+    /// Largest ratio of the axes of a star's spot.
+    pub axis_ratio: f64,
+    /// Smallest and largest standard deviation of the spots over the frame, in pixels: of round ones
+    /// of the same area.
+    pub sigma_range_px: [f64; 2],
+    /// Whether the spots are lopsided along the line from the centre of the frame: coma.
+    pub is_comatic: bool,
 }
 
 /// What makes large values of the filtered noise more frequent than in independent noise.

@@ -5,6 +5,7 @@
 //! Anderson & King 2000, PASP 112, 1360, doi 10.1086/316632, for the effective PSF and its change
 //! over the field.
 
+use super::detection::MeasuredPsf;
 use super::psf::MAX_WINDOW_PX;
 
 /// Size and elongation of a spot: `[ln σ, e₁, e₂]`. Its covariance is `σ² exp(e₁ K + e₂ L)` with the
@@ -170,6 +171,28 @@ impl EffectivePsf {
             spot_px,
             radius_px,
         }
+    }
+
+    /// What the spots of a frame of this width and height are like.
+    pub fn summary(&self, (width, height): (usize, usize)) -> MeasuredPsf {
+        /// Places along each side at which the spot is computed.
+        const PLACES: usize = 9;
+        let at = |side: usize, place: usize| (side - 1) as f64 * place as f64 / (PLACES - 1) as f64;
+        let rows = (0..PLACES).flat_map(|y| (0..PLACES).map(move |x| (x, y)));
+        let everywhere = rows.map(|(x, y)| self.moments.at(at(width, x), at(height, y)));
+        let start = MeasuredPsf {
+            axis_ratio: 1.0,
+            sigma_range_px: [f64::INFINITY, 0.0],
+            is_comatic: self.form == FieldForm::Radial,
+        };
+        everywhere.fold(start, |psf, [ln_sigma, e1, e2]| {
+            let ([least, largest], sigma_px) = (psf.sigma_range_px, ln_sigma.exp());
+            MeasuredPsf {
+                axis_ratio: psf.axis_ratio.max(e1.hypot(e2).exp()),
+                sigma_range_px: [least.min(sigma_px), largest.max(sigma_px)],
+                ..psf
+            }
+        })
     }
 
     /// The spot at a pixel, its centre of light at its place.

@@ -12,15 +12,18 @@
 //!    photons, coarse steps, a black level that cuts off half of the noise.
 //! 4. `candidates`: connected regions above the threshold, their peaks, and which of those are
 //!    sources of their own.
-//! 5. `fit`, `measure`: a fit of each source, together with those that it touches, or a
+//! 5. `psf_fit`: where the stars are not round Gaussians of one size (motion, defocus, aberrations),
+//!    an effective PSF is measured on the bright ones.
+//! 6. `fit`, `measure`: a fit of each source, together with those that it touches, or a
 //!    grey-weighted centroid; flags for what is no star, or no whole one.
 //!
 //! `search` runs steps 2 to 4, up to three times, until the filter fits the stars that it finds.
 //! Steps 1 to 3 process the pixels in rows of cells, each by itself, so that threads can share them
 //! ([`Workspace::on_threads`]) and the filtered frame is never in memory as a whole.
 //!
-//! Caveats: one spot size for the whole frame; a frame with fewer than three bright stars gets a
-//! default one. Stars fainter than about 2 % of a bright neighbour, within some five spot sizes of
+//! Caveats: the filter has one round spot for the whole frame; a frame with fewer than three bright
+//! stars gets a default one. The form of undersampled spots (σ below 0.65 px) is not measured unless
+//! they are elongated. Stars fainter than about 2 % of a bright neighbour, within some five spot sizes of
 //! it, are counted as its halo. Standard errors of stars whose light is not proportional to the
 //! grey level (JPEG's gamma) are indicative.
 //!
@@ -50,7 +53,7 @@ mod workspace;
 
 pub use background_map::BackgroundMap;
 pub use config::{CentroidMethod, DetectConfig};
-pub use detection::{Detection, DetectionFlags, Detections, NoiseTail};
+pub use detection::{Detection, DetectionFlags, Detections, MeasuredPsf, NoiseTail};
 pub use error::DetectError;
 pub use filter_model::FilterModel;
 pub use workspace::Workspace;
@@ -158,6 +161,7 @@ pub fn detect_into(
     found.background_adu = background.median_adu;
     found.noise_adu = background.median_sigma_adu;
     found.spot_sigma_px = stars.spot_px;
+    found.psf = psf.map(|psf| psf.summary((view.width, view.height)));
     found.noise_tail = pass.noise_tail;
     Ok(())
 }
@@ -168,5 +172,6 @@ fn describe_darkness(frame: &Frame, config: &DetectConfig, found: &mut Detection
     found.background_adu = f64::from(level.unwrap_or(0.0));
     found.noise_adu = f64::from(background::rounding_sigma_adu(frame.step_adu));
     found.spot_sigma_px = config.spot_sigma_px.unwrap_or(star_model::DEFAULT_SPOT_PX);
+    found.psf = None;
     found.noise_tail = None;
 }

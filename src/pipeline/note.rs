@@ -6,7 +6,7 @@ use super::outcome::Outcome;
 use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;
-use crate::detect::NoiseTail;
+use crate::detect::{MeasuredPsf, NoiseTail};
 use crate::frame::IgnoredValue;
 use crate::identify::{Identification, Priors, ScalePrior, ScaleSource};
 use crate::photometry::FramePhotometry;
@@ -52,6 +52,8 @@ pub enum Note {
     },
     /// The noise is not independent: the rate of false detections asked for holds less well.
     FalseDetections(NoiseTail),
+    /// The spots are no round Gaussians of one size: their form was measured.
+    Spots(MeasuredPsf),
     /// The dark has another exposure than the frame.
     DarkExposure(ExposureMismatch),
     /// The Moon or a planet is in the frame.
@@ -81,6 +83,7 @@ impl Note {
             Self::Camera(contradiction) => contradiction.code(),
             Self::NotLinear { .. } => "not_linear",
             Self::FalseDetections(_) => "false_detections",
+            Self::Spots(_) => "spots_not_round",
             Self::BodyInFrame(_) => "body_in_frame",
             Self::DarkExposure(_) => "dark_exposure_differs",
             Self::BrightStarsNotNamed(_) => "bright_stars_not_named",
@@ -206,6 +209,7 @@ impl fmt::Display for Note {
                 slope.value, slope.sigma
             ),
             Self::FalseDetections(tail) => write_noise_tail(f, *tail),
+            Self::Spots(psf) => write_spots(f, psf),
             Self::DarkExposure(mismatch) => mismatch.fmt(f),
             Self::BodyInFrame(seen) => write_body(f, seen),
             Self::BrightStarsNotNamed(stars) => {
@@ -252,6 +256,19 @@ fn write_body(f: &mut fmt::Formatter<'_>, seen: &BodyInFrame) -> fmt::Result {
             seen.uncertainty_px
         ),
     }
+}
+
+fn write_spots(f: &mut fmt::Formatter<'_>, psf: &MeasuredPsf) -> fmt::Result {
+    let [least_px, largest_px] = psf.sigma_range_px;
+    write!(
+        f,
+        "the spots are not round Gaussians of one size (standard deviation {least_px:.2} to {largest_px:.2} px, ratio of the axes up to {:.1}): the stars are fitted with the form that they have",
+        psf.axis_ratio
+    )?;
+    if psf.is_comatic {
+        f.write_str("; they have coma, and the focal length and the lens model may be off by more than their stated errors")?;
+    }
+    Ok(())
 }
 
 fn write_noise_tail(f: &mut fmt::Formatter<'_>, tail: NoiseTail) -> fmt::Result {

@@ -113,6 +113,7 @@ impl Solved<'_> {
             .chain(Note::of_camera(camera, comparison))
             .chain(Note::of_photometry(self.photometry.as_ref()))
             .chain(self.detections.noise_tail.map(Note::FalseDetections))
+            .chain(self.detections.psf.map(Note::Spots))
             .chain(Note::of_bodies(
                 &self.bodies,
                 outcome,

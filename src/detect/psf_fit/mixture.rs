@@ -21,7 +21,7 @@ const REACH_SIGMAS: f64 = 2.8;
 /// Most lobes.
 const MAX_LOBES: f64 = 120.0;
 /// Lobes with a smaller share are left out.
-const MIN_SHARE: f64 = 3e-4;
+const MIN_SHARE: f64 = 1.5e-3;
 /// Standard deviations of the lobes that wings have, over that of the spot.
 const WINGS: [f64; 2] = [2.0, 4.0];
 

@@ -23,6 +23,7 @@
 
 mod aberrations;
 mod camera;
+mod equivalent_spot;
 mod image;
 mod motion;
 mod pattern;

@@ -1,6 +1,7 @@
 //! Simulates frames of one camera, sky and scene.
 
 use super::camera::{Pointing, camera_of};
+use super::equivalent_spot::make_gaussian;
 use super::image::ElectronImage;
 use super::motion::Motion;
 use super::pattern::Pattern;
@@ -84,7 +85,8 @@ impl<'a> Simulator<'a> {
     }
 
     /// The scenario without structure that is most similar to what is simulated: with the mean
-    /// brightness of its sky and the typical motion of its stars. The predictions of the
+    /// brightness of its sky, the typical motion of its stars, and the Gaussian spot that is as
+    /// detectable as its spots. The predictions of the
     /// sensitivity model refer to it.
     pub fn uniform_scenario(&self) -> Scenario {
         let mut uniform = self.scenario.clone();
@@ -103,6 +105,7 @@ impl<'a> Simulator<'a> {
         Sky::new(&self.scenario, &none, &self.camera, &mut random).expose(&mut image, 1.0);
         let sky_mag = conditions.sky.mag_arcsec2() - 2.5 * mean(image.pixels()).log10();
         conditions.sky = SkyBrightness::MagArcsec2(sky_mag);
+        make_gaussian(&mut uniform.camera);
         uniform
     }
 
