@@ -401,6 +401,7 @@ mod tests {
             saturation_adu: f32::INFINITY,
             spot_px: SPOT_PX,
             matched_gain: 0.3,
+            psf: None,
         };
         for free_size in [false, true] {
             let config = FitConfig {

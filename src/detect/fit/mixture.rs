@@ -56,6 +56,10 @@ impl MixtureImage {
 }
 
 /// Adds a lobe to the rows of `width` groups.
+#[allow(
+    clippy::needless_range_loop,
+    reason = "lanes of several arrays read best as indices"
+)]
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn add_lobe(
     (share, by_spot): (f32, [f32; 3]),

@@ -22,15 +22,12 @@ const REACH_SIGMAS: f64 = 2.8;
 const MAX_LOBES: f64 = 120.0;
 /// Lobes with a smaller share are left out.
 const MIN_SHARE: f64 = 1.5e-3;
-/// Standard deviations of the lobes that wings have, over that of the spot.
-const WINGS: [f64; 2] = [2.0, 4.0];
-
 /// The lobes that a PSF may have.
 #[derive(Debug, Clone)]
 pub(super) struct LobeGrid {
     lobes: Vec<Lobe>,
     /// Distance of each from the centre in standard deviations of the spot without the lobes' own
-    /// width; infinite for those of wings.
+    /// width.
     distances: Vec<f64>,
     /// Lobes of the same number have the same share: where the PSF is the same turned by 180
     /// degrees; where it is the same reflected at the x axis; and where it is both.
@@ -40,8 +37,8 @@ pub(super) struct LobeGrid {
 }
 
 impl LobeGrid {
-    /// For spots of these moments, with wings or without.
-    pub fn of(typical: SpotMoments, has_wings: bool) -> Self {
+    /// For spots of these moments.
+    pub fn of(typical: SpotMoments) -> Self {
         let elongation = typical[1].hypot(typical[2]);
         let minor_px = (typical[0] - 0.5 * elongation).exp();
         let ratio = elongation.exp();
@@ -63,7 +60,7 @@ impl LobeGrid {
         let places = (-steps..=steps).flat_map(|row| {
             (-steps..=steps).map(move |column| [column, row].map(|i| f64::from(i) * pitch_px))
         });
-        let mut lobes: Vec<Lobe> = places
+        let lobes: Vec<Lobe> = places
             .filter(|&place| square(outline, place) <= REACH_SIGMAS.powi(2))
             .map(|offset_px| Lobe {
                 offset_px,
@@ -72,15 +69,7 @@ impl LobeGrid {
             })
             .collect();
         let distance = |lobe: &Lobe| square(density, lobe.offset_px).sqrt();
-        let mut distances: Vec<f64> = lobes.iter().map(distance).collect();
-        if has_wings {
-            distances.extend(WINGS.map(|_| f64::INFINITY));
-            lobes.extend(WINGS.map(|factor| Lobe {
-                offset_px: [0.0; 2],
-                sigma_px: factor * typical[0].exp(),
-                share: 1.0,
-            }));
-        }
+        let distances: Vec<f64> = lobes.iter().map(distance).collect();
         let class_of = |image: fn([f64; 2]) -> [f64; 2]| -> Vec<usize> {
             let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) < 0.1 * pitch_px;
             let class = |(number, lobe): (usize, &Lobe)| {

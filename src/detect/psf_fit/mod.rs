@@ -26,8 +26,6 @@ use stars::{PsfStar, StarFitter};
 const MIN_STARS: usize = 5;
 /// Fewer do not tell how its form changes over the field.
 const MIN_STARS_OF_FIELD: usize = 12;
-/// Rounds of moments over the field and weights of the mixture.
-const ROUNDS: usize = 2;
 /// Steps of the stars' fits in each round.
 const STEPS: usize = 2;
 /// A form is better than a simpler one where it lowers chi² by this.
@@ -57,48 +55,76 @@ pub(crate) fn measure_psf(
         return None;
     }
     let round = noise_of_round(maps, &stars, buffers);
-    let frame = FieldFrame::of((maps.view.width, maps.view.height));
     let typical = typical_moments(&stars);
-    let grid = LobeGrid::of(typical, false);
-    let (moments, mut is_varied) = moments_over_field(frame, &stars);
-    let mut psf = EffectivePsf {
-        lobes: grid.gaussian(),
-        form: FieldForm::Symmetric,
-        typical,
-        moments,
-        spot_px: maps.spot_px,
-        radius_px,
-    };
-    let mut sums = None;
-    for _ in 0..ROUNDS {
-        for _ in 0..STEPS {
-            fitter.step(&mut stars, &psf, true);
-            (psf.moments, is_varied) = moments_over_field(frame, &stars);
-        }
-        let [even, odd] = sums.insert(grid.sums(&psf, &stars, &mut fitter));
-        psf.lobes = grid.solve(&even.plus(odd), psf.form);
-        for _ in 0..STEPS {
-            fitter.step(&mut stars, &psf, false);
-        }
-    }
-    let best = best_of(&grid, &psf, &sums?, &stars, &mut fitter);
+    let grid = LobeGrid::of(typical);
+    let settled = Settled::of(&grid, maps, &mut stars, &mut fitter);
+    let best = best_of(&grid, &settled, &stars, &mut fitter);
     let noise = noise_of_psf(&best, &stars, buffers);
     let light = typical_light(&stars, maps);
     let variance = |noise: NoiseModel| light * (noise.shot_adu + noise.model_error2 * light);
     let ratio = variance(noise) / variance(round);
     let is_elongated = typical[1].hypot(typical[2]) > MIN_ELONGATION;
-    let is_other_form = is_varied || is_elongated;
+    let is_other_form = settled.is_varied || is_elongated;
     let is_needed = ratio
         < if is_other_form {
             1.0
         } else {
             MAX_VARIANCE_RATIO
         };
-    let are_stars = best.chi2 < MAX_CHI2 * (stars.len() * (2 * radius_px + 1).pow(2)) as f64;
+    let pixels = stars.len() * (2 * radius_px + 1).pow(2);
+    let are_stars = best.chi2 < MAX_CHI2 * pixels as f64;
     (is_needed && are_stars).then(|| {
         model.noise = noise;
         best.psf
     })
+}
+
+/// A point-symmetric PSF with its moments over the field.
+struct Settled {
+    psf: EffectivePsf,
+    sums: [LobeSums; 2],
+    /// Whether size or elongation differ from place to place.
+    is_varied: bool,
+}
+
+impl Settled {
+    /// Moves the stars to where they are with it.
+    fn of(
+        grid: &LobeGrid,
+        maps: &FrameMaps<'_>,
+        stars: &mut [PsfStar],
+        fitter: &mut StarFitter,
+    ) -> Self {
+        let frame = FieldFrame::of((maps.view.width, maps.view.height));
+        let (moments, mut is_varied) = moments_over_field(frame, stars);
+        let mut psf = EffectivePsf {
+            lobes: grid.gaussian(),
+            form: FieldForm::Symmetric,
+            typical: typical_moments(stars),
+            moments,
+            spot_px: maps.spot_px,
+            radius_px: radius_px(maps),
+        };
+        let mut round = |psf: &mut EffectivePsf| {
+            for _ in 0..STEPS {
+                fitter.step(stars, psf, true);
+                (psf.moments, is_varied) = moments_over_field(frame, stars);
+            }
+            let [even, odd] = grid.sums(psf, stars, fitter);
+            psf.lobes = grid.solve(&even.plus(&odd), psf.form);
+            for _ in 0..STEPS {
+                fitter.step(stars, psf, false);
+            }
+            [even, odd]
+        };
+        round(&mut psf);
+        let sums = round(&mut psf);
+        Self {
+            psf,
+            sums,
+            is_varied,
+        }
+    }
 }
 
 /// A PSF, and those of each half of the stars.
@@ -115,13 +141,11 @@ impl Candidate {
         grid: &LobeGrid,
         psf: &EffectivePsf,
         [even, odd]: &[LobeSums; 2],
-        form: FieldForm,
         stars: &[PsfStar],
         fitter: &mut StarFitter,
     ) -> Self {
         let with = |sums: &LobeSums| EffectivePsf {
-            lobes: grid.solve(sums, form),
-            form,
+            lobes: grid.solve(sums, psf.form),
             ..psf.clone()
         };
         let of_halves = [with(odd), with(even)];
@@ -138,40 +162,34 @@ impl Candidate {
 /// The best form of the PSF, the simplest of those that are as good.
 fn best_of(
     grid: &LobeGrid,
-    psf: &EffectivePsf,
-    sums: &[LobeSums; 2],
+    settled: &Settled,
     stars: &[PsfStar],
     fitter: &mut StarFitter,
 ) -> Candidate {
-    let mut best = Candidate::of(grid, psf, sums, FieldForm::Symmetric, stars, fitter);
+    let Settled { psf, sums, .. } = settled;
+    let of_form = |form: FieldForm| EffectivePsf {
+        form,
+        ..psf.clone()
+    };
+    let mut best = Candidate::of(grid, psf, sums, stars, fitter);
     let mut consider = |other: Candidate| {
         if other.chi2 < best.chi2 - BETTER_CHI2 {
             best = other;
         }
     };
-    consider(Candidate::of(
-        grid,
-        psf,
-        sums,
-        FieldForm::Fixed,
-        stars,
-        fitter,
-    ));
+    let fixed = of_form(FieldForm::Fixed);
+    consider(Candidate::of(grid, &fixed, sums, stars, fitter));
     if stars.len() >= MIN_STARS_OF_FIELD {
-        let form = FieldForm::Radial;
         let mut stars = stars.to_vec();
-        let mut radial = EffectivePsf {
-            form,
-            ..psf.clone()
-        };
-        // Its lobes are placed from the axis outward: those so far are round enough to begin with.
+        let mut radial = of_form(FieldForm::Radial);
+        // The stars move to the centres of light of such spots.
         let [even, odd] = grid.sums(&radial, &stars, fitter);
-        radial.lobes = grid.solve(&even.plus(&odd), form);
+        radial.lobes = grid.solve(&even.plus(&odd), radial.form);
         for _ in 0..STEPS {
             fitter.step(&mut stars, &radial, false);
         }
         let sums = grid.sums(&radial, &stars, fitter);
-        consider(Candidate::of(grid, &radial, &sums, form, &stars, fitter));
+        consider(Candidate::of(grid, &radial, &sums, &stars, fitter));
     }
     best
 }

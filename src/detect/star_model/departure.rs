@@ -28,6 +28,10 @@ pub(super) struct CommonElongation {
 
 impl CommonElongation {
     /// Adds the pixels of a star.
+    #[allow(
+        clippy::needless_range_loop,
+        reason = "lanes of several arrays read best as indices"
+    )]
     pub fn add(&mut self, light: &GaussianLight<'_>, spot_px: f64, pixels: &WindowPixels<'_>) {
         let [across, down] = light.axes;
         let mut sums = [[0.0f32; 2]; 2];
