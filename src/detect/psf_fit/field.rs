@@ -107,10 +107,10 @@ pub(super) fn moments_over_field(frame: FieldFrame, stars: &[PsfStar]) -> (Field
     let predicted = || samples.iter().map(|sample| sample.predicted(&coefficients));
     let range = std::array::from_fn(|i| {
         let values = || predicted().map(|moments| moments[i]);
-        [
-            values().fold(f64::INFINITY, f64::min),
-            values().fold(f64::NEG_INFINITY, f64::max),
-        ]
+        let low = values().fold(f64::INFINITY, f64::min);
+        let high = values().fold(f64::NEG_INFINITY, f64::max);
+        // Without stars that tell, the moments are 0.
+        if low <= high { [low, high] } else { [0.0; 2] }
     });
     let moments = FieldMoments {
         frame,

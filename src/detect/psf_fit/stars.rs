@@ -70,7 +70,8 @@ impl StarFitter {
             let change = self.step_one(star, psf, parameters);
             if free {
                 let here = psf.moments.at(star.spot.x, star.spot.y);
-                let change = change.unwrap_or_default();
+                let is_finite = |change: &SpotMoments| change.iter().all(|c| c.is_finite());
+                let change = change.filter(is_finite).unwrap_or_default();
                 star.moments = std::array::from_fn(|i| here[i] + change[i].clamp(-0.5, 0.5));
             }
         }
@@ -285,6 +286,8 @@ fn first_fit(
     fitter: &mut StarFitter,
 ) -> Option<PsfStar> {
     const STEPS: usize = 6;
+    /// Largest elongation of a star, as in [`SpotMoments`]: axes in a ratio of 4.5.
+    const MAX_ELONGATION: f64 = 1.5;
     /// A fit has converged when its last step is shorter, in pixels and in ln σ.
     const MAX_LAST_STEP: f64 = 0.05;
     let spot = maps.initial_guess(peak);
@@ -313,12 +316,14 @@ fn first_fit(
             EffectivePsf::gaussian(FieldMoments::constant(frame, size), maps.spot_px, radius_px);
         let [by_size, e1, e2] = fitter.step_one(&mut star, &psf, PARAMETERS)?;
         let by_size = by_size.clamp(-0.3, 0.3);
+        let [e1, e2] = [e1, e2].map(|e| e.clamp(-MAX_ELONGATION, MAX_ELONGATION));
         star.moments = [star.moments[0] + by_size, e1, e2];
         let distance = (star.spot.x - before.x).hypot(star.spot.y - before.y);
         moved = distance.max(by_size.abs());
     }
     let is_near = (star.spot.x - spot.x).hypot(star.spot.y - spot.y) < 1.0 + maps.spot_px;
-    let is_star = moved < MAX_LAST_STEP && is_near && star.spot.flux > 0.0;
+    let is_finite = star.moments.iter().all(|moment| moment.is_finite());
+    let is_star = moved < MAX_LAST_STEP && is_near && is_finite && star.spot.flux > 0.0;
     is_star.then_some(star)
 }
 
