@@ -10,7 +10,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use starpipe::base::coords::PixelPoint;
 use starpipe::camera::data_sheet::{DataSheet, Preset};
-use starpipe::detect::{DetectConfig, Detections, Workspace, detect};
+use starpipe::detect::{DetectConfig, Detection, Detections, Workspace, detect};
 use starpipe::model::sensitivity::{Scenario, StarLight};
 use starpipe::model::simulate::star_field;
 
@@ -27,7 +27,7 @@ struct Pulls {
     split: usize,
 }
 
-/// The camera of docs/validation with another spot.
+/// A small detector with another spot.
 fn scenario(change: fn(&mut DataSheet), motion_px: f64) -> Scenario {
     let mut scenario = Scenario::of(Preset::Experiment1);
     let camera = &mut scenario.camera;
@@ -60,10 +60,7 @@ fn detected(scenario: &Scenario, seed: u64) -> (Detections, Pulls) {
     let found = detect(&frame, &DetectConfig::default(), &mut Workspace::new()).unwrap();
     let mut pulls = Pulls::default();
     for (place, v_mag) in &stars {
-        let near = |source: &&_| {
-            let source: &starpipe::detect::Detection = source;
-            source.position.distance_to(place) < MATCH_PX
-        };
+        let near = |source: &&Detection| source.position.distance_to(place) < MATCH_PX;
         let near: Vec<_> = found.sources.iter().filter(near).collect();
         pulls.split += usize::from(near.len() > 1);
         let Some(source) = near.first() else {

@@ -112,13 +112,18 @@ impl FieldMoments {
 
     /// The moments at a pixel.
     pub fn at(&self, x_px: f64, y_px: f64) -> SpotMoments {
-        let terms = self.frame.terms(x_px, y_px);
-        std::array::from_fn(|i| {
-            let terms = self.coefficients[i].iter().zip(&terms);
-            let value: f64 = terms.map(|(c, t)| c * t).sum();
-            value.clamp(self.range[i][0], self.range[i][1])
-        })
+        let moments = polynomials(&self.coefficients, &self.frame.terms(x_px, y_px));
+        std::array::from_fn(|i| moments[i].clamp(self.range[i][0], self.range[i][1]))
     }
+}
+
+/// Values of the polynomials with these coefficients.
+pub(crate) fn polynomials(
+    coefficients: &[[f64; FIELD_TERMS]; 3],
+    terms: &[f64; FIELD_TERMS],
+) -> SpotMoments {
+    let value = |row: &[f64; FIELD_TERMS]| row.iter().zip(terms).map(|(c, t)| c * t).sum();
+    coefficients.each_ref().map(value)
 }
 
 /// How the spots change over the field, apart from their moments.

@@ -1,7 +1,7 @@
 //! Size and elongation of the spots over the field: the simplest polynomial that the stars allow.
 
 use super::stars::PsfStar;
-use crate::detect::effective_psf::{FIELD_TERMS, FieldFrame, FieldMoments};
+use crate::detect::effective_psf::{FIELD_TERMS, FieldFrame, FieldMoments, polynomials};
 use nalgebra::{DMatrix, DVector, SVector};
 
 /// Scatter of the stars' own moments beyond their errors: their colours, their neighbours.
@@ -75,9 +75,7 @@ impl Sample {
 
     /// The moments that coefficients give.
     fn predicted(&self, coefficients: &Basis) -> Moments {
-        let of_moment =
-            |row: &[f64; FIELD_TERMS]| row.iter().zip(&self.terms).map(|(c, t)| c * t).sum();
-        Moments::from(coefficients.each_ref().map(of_moment))
+        Moments::from(polynomials(coefficients, &self.terms))
     }
 }
 

@@ -22,9 +22,13 @@ const REACH_SIGMAS: f64 = 2.8;
 const MAX_LOBES: f64 = 120.0;
 /// Lobes with a smaller share are left out.
 const MIN_SHARE: f64 = 1.5e-3;
+
 /// The lobes that a PSF may have.
 #[derive(Debug, Clone)]
 pub(super) struct LobeGrid {
+    /// Moments of the spots that it is for.
+    pub typical: SpotMoments,
+    /// With shares of one.
     lobes: Vec<Lobe>,
     /// Distance of each from the centre in standard deviations of the spot without the lobes' own
     /// width.
@@ -74,8 +78,7 @@ impl LobeGrid {
             let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) < 0.1 * pitch_px;
             let class = |(number, lobe): (usize, &Lobe)| {
                 let at = image(lobe.offset_px);
-                let is_same =
-                    |other: &Lobe| other.sigma_px == lobe.sigma_px && near(other.offset_px, at);
+                let is_same = |other: &Lobe| near(other.offset_px, at);
                 lobes
                     .iter()
                     .position(is_same)
@@ -85,9 +88,9 @@ impl LobeGrid {
         };
         let turned = class_of(|[x, y]| [-x, -y]);
         let reflected = class_of(|[x, y]| [x, -y]);
-        // The class of the class: the image of an image.
         let both = class_of(|[x, y]| [-x.abs(), -y.abs()]);
         Self {
+            typical,
             lobes,
             distances,
             turned,
@@ -152,8 +155,8 @@ impl LobeGrid {
         let mut local = LocalPsf::default();
         let mut pixels = Vec::new();
         let every_lobe = self.lobes.iter().map(|&lobe| FieldLobe {
-            lobe: Lobe { share: 1.0, ..lobe },
-            corner_share: 1.0,
+            lobe,
+            corner_share: lobe.share,
         });
         let all = EffectivePsf {
             lobes: every_lobe.collect(),

@@ -55,22 +55,16 @@ pub(crate) fn measure_psf(
         return None;
     }
     let round = noise_of_round(maps, &stars, buffers);
-    let typical = typical_moments(&stars);
-    let grid = LobeGrid::of(typical);
+    let grid = LobeGrid::of(typical_moments(&stars));
     let settled = Settled::of(&grid, maps, &mut stars, &mut fitter);
     let best = best_of(&grid, &settled, &stars, &mut fitter);
     let noise = noise_of_psf(&best, &stars, buffers);
     let light = typical_light(&stars, maps);
     let variance = |noise: NoiseModel| light * (noise.shot_adu + noise.model_error2 * light);
     let ratio = variance(noise) / variance(round);
-    let is_elongated = typical[1].hypot(typical[2]) > MIN_ELONGATION;
-    let is_other_form = settled.is_varied || is_elongated;
-    let is_needed = ratio
-        < if is_other_form {
-            1.0
-        } else {
-            MAX_VARIANCE_RATIO
-        };
+    let [_, e1, e2] = grid.typical;
+    let is_other_form = settled.is_varied || e1.hypot(e2) > MIN_ELONGATION;
+    let is_needed = ratio < MAX_VARIANCE_RATIO || (is_other_form && ratio < 1.0);
     let pixels = stars.len() * (2 * radius_px + 1).pow(2);
     let are_stars = best.chi2 < MAX_CHI2 * pixels as f64;
     (is_needed && are_stars).then(|| {
@@ -100,7 +94,7 @@ impl Settled {
         let mut psf = EffectivePsf {
             lobes: grid.gaussian(),
             form: FieldForm::Symmetric,
-            typical: typical_moments(stars),
+            typical: grid.typical,
             moments,
             spot_px: maps.spot_px,
             radius_px: radius_px(maps),

@@ -1,10 +1,9 @@
 //! Whether a frame's stars depart from round Gaussians of one size: cheap tests that decide whether
 //! their PSF is measured.
 
-use super::spot_size::{MAX_STARS, MODE_WIDTH, weighted_size};
+use super::spot_size::{MODE_WIDTH, weighted_size};
 use crate::detect::fit::{Fit, GaussianLight, NoiseModel, WindowPixels};
 use crate::detect::psf::GROUP_PX;
-use arrayvec::ArrayVec;
 
 /// Smaller elongations are of no account, as the logarithm of the ratio of the axes.
 const MIN_ELONGATION: f64 = 0.06;
@@ -97,12 +96,12 @@ fn have_scattered_sizes(stars: &[Fit], spot_px: f64) -> bool {
     /// Sizes beyond this factor of the frame's are not of stars.
     const MAX_FACTOR: f64 = MODE_WIDTH * MODE_WIDTH;
     let is_star = |fit: &&Fit| (fit.spot_px / spot_px).ln().abs() < MAX_FACTOR.ln();
-    let stars: ArrayVec<&Fit, MAX_STARS> = stars.iter().filter(is_star).collect();
+    let stars = stars.iter().filter(is_star);
     let scatter = MIN_SIZE_SCATTER * spot_px;
-    let Some(mean_px) = weighted_size(&stars) else {
+    let Some(mean_px) = weighted_size(stars.clone()) else {
         return false;
     };
-    let squares = stars.iter().map(|fit| {
+    let squares = stars.map(|fit| {
         let variance = fit.sigma_spot_px.powi(2) + scatter * scatter;
         (fit.spot_px - mean_px).powi(2) / variance
     });

@@ -55,7 +55,7 @@ pub(crate) fn star_model(
     };
     let mut elongation = CommonElongation::default();
     // Each round weights the squared residuals by the variance from the round before.
-    for _ in 0..NOISE_ROUNDS {
+    for round in 1..=NOISE_ROUNDS {
         let mut sums = Moments::default();
         let config = FitConfig {
             spot_px: stars.iter().map(|s| s.spot_px).fold(0.0, f64::max),
@@ -70,21 +70,19 @@ pub(crate) fn star_model(
         };
         let starts: ArrayVec<_, MAX_STARS> = stars.iter().enumerate().map(of_star).collect();
         let starts = starts.into_iter();
-        elongation = CommonElongation::default();
         batch.fit(maps, starts, &config, |i, fit, window| {
             if let Some(fit) = fit {
                 buffers.window.copy_from(window);
-                sums.add_star(buffers, &fit, &config, &mut elongation);
+                let is_last = round == NOISE_ROUNDS;
+                sums.add_star(buffers, &fit, &config, is_last.then_some(&mut elongation));
                 stars[i] = fit;
             }
         });
         buffers.batch = batch;
         model = sums.solve();
-        model.model_error2 = model.model_error2.min(MAX_MODEL_ERROR * MAX_MODEL_ERROR);
     }
-    let all: ArrayVec<&Fit, MAX_STARS> = stars.iter().collect();
     StarModel {
-        spot_px: weighted_size(&all).unwrap_or(maps.spot_px),
+        spot_px: weighted_size(stars.iter()).unwrap_or(maps.spot_px),
         noise: model,
         is_departure: is_departure(&elongation, &model, &of_all_sizes, maps.spot_px),
     }
@@ -113,11 +111,10 @@ pub(crate) fn noise_of(
             let fit = buffers.fitter.fit(window, &[*spot], &config);
             if fit.converged {
                 *spot = fit.spots[0];
-                sums.add_star(buffers, &fit, &config, &mut CommonElongation::default());
+                sums.add_star(buffers, &fit, &config, None);
             }
         }
         model = sums.solve();
-        model.model_error2 = model.model_error2.min(MAX_MODEL_ERROR * MAX_MODEL_ERROR);
     }
     model
 }
@@ -137,13 +134,14 @@ struct Moments {
 }
 
 impl Moments {
-    /// Adds the pixels of one star in which its light is significant.
+    /// Adds the pixels of one star in which its light is significant, and all of them to
+    /// `elongation`.
     fn add_star(
         &mut self,
         buffers: &mut FitBuffers,
         fit: &Fit,
         config: &FitConfig,
-        elongation: &mut CommonElongation,
+        elongation: Option<&mut CommonElongation>,
     ) {
         let FitBuffers { fitter, window, .. } = buffers;
         let Some((factor, spot, pixels)) = fitter.factorised(window, fit, config) else {
@@ -152,7 +150,9 @@ impl Moments {
         let per_noise = pixels.per_noise;
         let [a, b, c, p, q] = match spot {
             AnyLight::Gaussian(spot) => {
-                elongation.add(&spot, fit.spot_px, &pixels);
+                if let Some(elongation) = elongation {
+                    elongation.add(&spot, fit.spot_px, &pixels);
+                }
                 sums_of(&factor, &spot, &pixels)
             }
             AnyLight::Mixture(spot) => sums_of(&factor, &spot, &pixels),
@@ -164,14 +164,15 @@ impl Moments {
         self.right[1] += q;
     }
 
-    /// The non-negative solution; the error of the spot model is 0 where chance explains it.
+    /// The non-negative solution; the error of the spot model is 0 where chance explains it, and at
+    /// most [`MAX_MODEL_ERROR`].
     fn solve(&self) -> NoiseModel {
         let [a, b, c] = self.matrix;
         let [p, q] = self.right;
         let finite = |v: f64| if v.is_finite() { v.max(0.0) } else { 0.0 };
         let noise_model = |shot: f64, error2: f64| NoiseModel {
             shot_adu: finite(shot),
-            model_error2: finite(error2),
+            model_error2: finite(error2).min(MAX_MODEL_ERROR * MAX_MODEL_ERROR),
         };
         let determinant = a * c - b * b;
         if determinant <= 1e-9 * a * c || !determinant.is_finite() {

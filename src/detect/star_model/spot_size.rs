@@ -83,10 +83,10 @@ fn half_sample_mode(sorted: &[f64]) -> f64 {
 /// # Reference
 /// DerSimonian & Laird 1986, Control. Clin. Trials 7, 177, doi 10.1016/0197-2456(86)90046-2, for
 /// the scatter.
-pub(crate) fn weighted_size(stars: &[&Fit]) -> Option<f64> {
-    let is_known = |fit: &&&Fit| fit.sigma_spot_px > 0.0 && fit.sigma_spot_px.is_finite();
+pub(crate) fn weighted_size<'a>(stars: impl Iterator<Item = &'a Fit> + Clone) -> Option<f64> {
+    let is_known = |fit: &&Fit| fit.sigma_spot_px > 0.0 && fit.sigma_spot_px.is_finite();
     let sizes = || {
-        let known = stars.iter().filter(is_known);
+        let known = stars.clone().filter(is_known);
         known.map(|fit| (fit.spot_px, fit.sigma_spot_px.powi(2)))
     };
     let mean = |scatter2: f64| {

@@ -3,7 +3,7 @@
 use crate::camera::data_sheet::{Imperfections, SpotForm};
 use std::f64::consts::PI;
 
-/// Radius of these spots, in standard deviations of a Gaussian as wide: 0.01 % of the light of
+/// Radius of these spots, in standard deviations of a Gaussian as wide: 0.06 % of the light of
 /// Moffat's with an exponent of 2.5 lies beyond, and 2 % of Airy's.
 pub(super) const PROFILE_SIGMAS: f64 = 25.0;
 /// Full width at half maximum of a Gaussian, in standard deviations.
