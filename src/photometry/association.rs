@@ -19,6 +19,8 @@ pub(super) struct FrameStar {
     pub detection: Option<usize>,
     /// Whether it is single and well inside the frame.
     pub is_clear: bool,
+    /// Light of undetected neighbours in its flux, over its own.
+    pub neighbours_light: f64,
 }
 
 /// Catalog stars and their detections.
@@ -35,6 +37,20 @@ pub(crate) fn resolved_px(spot_sigma_px: f64) -> f64 {
     (6.0 * spot_sigma_px).max(4.0)
 }
 
+/// The other stars around a star.
+struct Surroundings {
+    /// Whether none of them is bright enough to crowd it.
+    is_single: bool,
+    /// Light, in the star's flux and over its own, of those without a detection of their own.
+    undetected_light: f64,
+}
+
+/// Part of the light of a neighbour at this distance that is in the flux of a star: the
+/// autocorrelation of a Gaussian spot.
+fn filter_response(distance_sigmas: f64) -> f64 {
+    (-0.25 * distance_sigmas.powi(2)).exp()
+}
+
 /// Associates the stars `predicted`, brightest first, with the detections of `frame`.
 pub(super) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) -> Association {
     let matches = &frame.identification.matches;
@@ -48,25 +64,42 @@ pub(super) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) ->
         place.ok().map(|place| named[place].1)
     };
     let tree = PointTree::new(predicted.iter().map(|star| star.pixel));
-    let resolved_px = resolved_px(frame.detections.spot_sigma_px);
-    let is_single = |index: usize, star: &PredictedStar| {
-        let mut is_single = true;
+    let spot_sigma_px = frame.detections.spot_sigma_px;
+    let resolved_px = resolved_px(spot_sigma_px);
+    let surroundings = |index: usize, star: &PredictedStar| {
+        let mut around = Surroundings {
+            is_single: true,
+            undetected_light: 0.0,
+        };
         tree.for_each_within(&star.pixel, resolved_px, |near| {
-            let is_bright = predicted[near.index].v_mag < star.v_mag + CROWDING_MAG;
-            is_single &= near.index == index || !is_bright;
+            if near.index == index {
+                return;
+            }
+            let neighbour = &predicted[near.index];
+            let fainter_mag = neighbour.v_mag - star.v_mag;
+            around.is_single &= fainter_mag >= CROWDING_MAG;
+            if detection_of(neighbour.star).is_none() {
+                let light = 10f64.powf(-0.4 * f64::from(fainter_mag));
+                around.undetected_light +=
+                    light * filter_response(near.distance_px / spot_sigma_px);
+            }
         });
-        is_single
+        around
     };
     let camera = &frame.identification.camera;
     let inside = predicted
         .iter()
         .enumerate()
         .filter(|(_, star)| camera.contains(&star.pixel));
-    let stars = inside.map(|(index, star)| FrameStar {
-        star: star.star,
-        v_mag: f64::from(star.v_mag),
-        detection: detection_of(star.star),
-        is_clear: camera.nearly_contains(&star.pixel, -resolved_px) && is_single(index, star),
+    let stars = inside.map(|(index, star)| {
+        let around = surroundings(index, star);
+        FrameStar {
+            star: star.star,
+            v_mag: f64::from(star.v_mag),
+            detection: detection_of(star.star),
+            is_clear: camera.nearly_contains(&star.pixel, -resolved_px) && around.is_single,
+            neighbours_light: around.undetected_light,
+        }
     });
     let by_chance: f64 = matches.iter().map(|found| found.p_chance).sum();
     Association {
@@ -143,8 +176,10 @@ mod tests {
     fn a_brighter_star_crowds_a_fainter_one() {
         let stars = [star(100.0, 100.0, 5.0), star(101.0, 100.0, 7.0)];
         let found = associated(&stars, &[]);
-        // A companion two magnitudes fainter does not crowd the brighter star.
+        // A companion two magnitudes fainter does not crowd the brighter star, but adds its light.
         assert!(found.stars[0].is_clear && !found.stars[1].is_clear);
+        let light = 10f64.powf(-0.8) * (-0.25f64).exp();
+        assert!((found.stars[0].neighbours_light - light).abs() < 1e-6);
     }
 
     #[test]

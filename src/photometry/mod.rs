@@ -25,6 +25,7 @@ pub(crate) use association::resolved_px;
 pub use identified_frame::IdentifiedFrame;
 
 use crate::base::statistics::median;
+use crate::camera::CameraModel;
 use crate::detect::Detection;
 use crate::identify::{IndexedCatalog, View};
 use crate::sky::catalog::{Star, StarFlags, StarIndex};
@@ -32,14 +33,15 @@ use association::{Association, FrameStar, associate};
 use completeness::{Completeness, CountedStar};
 use zero_point::{StandardStar, ZeroPoint};
 
+/// B−V of a star like the Sun, for which limits hold.
+const SUN_BV_MAG: f64 = 0.64;
+
 /// Photometry of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FramePhotometry {
     /// V magnitude of a star that gives 1 ADU, or 1 ADU/s where the exposure is known; `None` with
     /// too few stars.
     pub zero_point: Option<ZeroPoint>,
-    /// B−V of the stars of the zero point, where known.
-    pub zero_point_colors_mag: Vec<f64>,
     /// The exposure by which fluxes were divided, in seconds.
     pub exposure_s: Option<f64>,
     /// The share of stars that is detected, by magnitude.
@@ -55,20 +57,31 @@ pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry
     };
     let predicted = view.stars_to(sky, depth_v_mag(frame, sky));
     let Association { stars, chance } = associate(frame, &predicted);
-    let clear = || stars.iter().filter(|star| star.is_clear);
-    let counted: Vec<CountedStar> = clear()
-        .map(|star| CountedStar {
-            v_mag: star.v_mag,
+    let clear: Vec<&FrameStar> = stars.iter().filter(|star| star.is_clear).collect();
+    let counted = |v_mag: &dyn Fn(&FrameStar) -> f64| {
+        let counted = clear.iter().map(|star| CountedStar {
+            v_mag: v_mag(star),
             detected: star.detection.is_some(),
-        })
+        });
+        completeness::measure(&counted.collect::<Vec<_>>(), chance)
+    };
+    let by_v = counted(&|star| star.v_mag);
+    let standards: Vec<StandardStar> = clear
+        .iter()
+        .filter_map(|star| standard_star(star, &by_v, frame, sky))
         .collect();
-    let completeness = completeness::measure(&counted, chance);
-    let standards: Vec<StandardStar> = clear()
-        .filter_map(|star| standard_star(star, &completeness, frame, sky))
-        .collect();
+    let zero_point = zero_point::measure(&standards);
+    let color_term = zero_point.as_ref().and_then(|zero| zero.color_term);
+    let completeness = match color_term {
+        None => by_v,
+        Some(term) => counted(&|star| {
+            let bv_mag = sky.catalog().star(star.star).bv_mag.map(f64::from);
+            let redder_mag = bv_mag.map_or(0.0, |bv| bv - SUN_BV_MAG);
+            star.v_mag - term.value * redder_mag
+        }),
+    };
     FramePhotometry {
-        zero_point: zero_point::measure(&standards),
-        zero_point_colors_mag: standards.iter().filter_map(|star| star.bv_mag).collect(),
+        zero_point,
         exposure_s: frame.exposure_s,
         completeness,
     }
@@ -86,6 +99,8 @@ fn standard_star(
     const COMPLETE_WIDTHS: f64 = 2.0;
     /// Smallest signal-to-noise ratio where there is no limit.
     const MIN_SNR: f64 = 10.0;
+    /// Largest light of undetected neighbours, which is subtracted, over the star's own.
+    const MAX_NEIGHBOURS_LIGHT: f64 = 0.1;
     /// Magnitudes per relative error: 2.5 / ln 10.
     const MAG_PER_RELATIVE: f64 = 1.085_736_204_758_13;
     let detection = &frame.detections.sources[star.detection?];
@@ -94,13 +109,23 @@ fn standard_star(
         Err(_) => detection.snr >= MIN_SNR,
     };
     let known = sky.catalog().star(star.star);
-    let is_fit = is_bright && has_clean_flux(detection) && is_constant_and_single(known);
+    let is_alone = star.neighbours_light < MAX_NEIGHBOURS_LIGHT;
+    let is_fit =
+        is_bright && is_alone && has_clean_flux(detection) && is_constant_and_single(known);
+    let flux_adu = detection.flux_adu / (1.0 + star.neighbours_light);
     is_fit.then(|| StandardStar {
         v_mag: star.v_mag,
         bv_mag: known.bv_mag.map(f64::from),
-        instrumental_mag: instrumental_mag(detection.flux_adu / frame.exposure_s.unwrap_or(1.0)),
+        instrumental_mag: instrumental_mag(flux_adu / frame.exposure_s.unwrap_or(1.0)),
         sigma_mag: MAG_PER_RELATIVE / detection.snr,
+        off_centre_sq: off_centre_sq(detection, &frame.identification.camera),
     })
+}
+
+/// Distance from the frame's centre over that of the corner, squared.
+fn off_centre_sq(detection: &Detection, camera: &CameraModel) -> f64 {
+    let [u, v] = camera.offset_of(&detection.position);
+    (u * u + v * v) / camera.radius_px().powi(2)
 }
 
 /// −2.5 log10(`flux`): the magnitude without zero point.

@@ -171,7 +171,8 @@ impl Note {
 
     /// Grey levels that are not proportional to light.
     pub(super) fn of_photometry(photometry: Option<&FramePhotometry>) -> Option<Self> {
-        let zero_point = photometry?.zero_point.filter(|zero| zero.is_nonlinear)?;
+        let zero_point = photometry?.zero_point.as_ref()?;
+        let zero_point = Some(zero_point).filter(|zero| zero.is_nonlinear)?;
         Some(Self::NotLinear {
             slope: zero_point.linearity?,
             mean_v_mag: zero_point.mean_v_mag,

@@ -59,8 +59,7 @@ impl Solved<'_> {
                 value: zero.v_mag,
                 sigma: zero.sigma_mag,
             }),
-            zero_point_colors_mag: photometry
-                .map_or(&[], |measured| &measured.zero_point_colors_mag),
+            zero_point_colors: zero_point.map_or(&[], |zero| &zero.colors),
             has_color_term: zero_point.is_some_and(|zero| zero.color_term.is_some()),
             limit_vmag: limit.map(|limit| Estimate {
                 value: limit.v_mag,

@@ -4,6 +4,7 @@ use crate::base::statistics::Estimate;
 use crate::camera::data_sheet::DataSheet;
 use crate::detect::DetectConfig;
 use crate::model::sensitivity::Extinction;
+use crate::photometry::zero_point::WeightedColor;
 
 /// The camera with which a frame was taken, as stated by the user.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,8 +42,8 @@ pub struct FrameMeasurement<'a> {
     pub header_zenith_distance_deg: Option<f64>,
     /// V magnitude of a star that gives 1 ADU/s.
     pub zero_point_vmag: Option<Estimate>,
-    /// B−V of the stars of the zero point, where known.
-    pub zero_point_colors_mag: &'a [f64],
+    /// The colours of the stars of the zero point.
+    pub zero_point_colors: &'a [WeightedColor],
     /// Whether the zero point has a colour term and holds for
     /// [`REFERENCE_BV_MAG`](crate::photometry::zero_point::REFERENCE_BV_MAG), instead of for the
     /// mean of its stars.

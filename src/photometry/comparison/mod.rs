@@ -19,7 +19,7 @@ mod measurement;
 pub use contradiction::Contradiction;
 pub use measurement::{FrameMeasurement, StatedCamera};
 
-use super::zero_point::REFERENCE_BV_MAG;
+use super::zero_point::{REFERENCE_BV_MAG, WeightedColor};
 use crate::base::statistics::Estimate;
 use crate::model::sensitivity::{
     Budget, Detector, Faintest, Rule, Scenario, SkyBrightness, StarLight,
@@ -69,7 +69,7 @@ pub fn compare(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Compar
     let budget = Budget::new(&scenario);
     let detector = Detector::matched_filter(&frame.detect, &scenario, &budget);
     let peak = Detector::new(Rule::PeakPixel, &scenario, &budget);
-    let colors = frame.zero_point_colors_mag;
+    let colors = frame.zero_point_colors;
     let zero_point_vmag = expected_zero_point_vmag(&scenario, colors, frame.has_color_term);
     let limit_vmag = detector.vmag_at(0.5);
     let faintest = Faintest::among(frame.field_vmag.iter().copied(), &detector);
@@ -130,24 +130,30 @@ fn scenario(stated: &StatedCamera, frame: &FrameMeasurement, exposure_s: f64) ->
 }
 
 /// Predicted V magnitude of a star that gives 1 ADU/s, by the same fit as the measured one: `colors`
-/// are B−V of the stars of the zero point, and `has_color_term` is whether it holds for
-/// [`REFERENCE_BV_MAG`] instead of for their mean.
-pub fn expected_zero_point_vmag(scenario: &Scenario, colors: &[f64], has_color_term: bool) -> f64 {
+/// and weights are those of the stars of the zero point, and `has_color_term` is whether it holds
+/// for [`REFERENCE_BV_MAG`] instead of for their mean.
+pub fn expected_zero_point_vmag(
+    scenario: &Scenario,
+    colors: &[WeightedColor],
+    has_color_term: bool,
+) -> f64 {
     let gain_e_per_adu = scenario.camera.gain_e_per_adu;
     let light = StarLight::new(scenario);
     let sun_like_vmag = light.budget().vmag_of(gain_e_per_adu, 1.0);
-    let zero_point = |bv_mag: &f64| sun_like_vmag + light.color_effect_mag(*bv_mag);
-    let mean = |value: &dyn Fn(&f64) -> f64| {
-        colors.iter().map(value).sum::<f64>() / colors.len().max(1) as f64
+    let zero_point = |bv_mag: f64| sun_like_vmag + light.color_effect_mag(bv_mag);
+    let weight: f64 = colors.iter().map(|color| color.weight).sum();
+    let mean = |value: &dyn Fn(f64) -> f64| {
+        let weighted = colors.iter().map(|c| c.weight * value(c.bv_mag));
+        weighted.sum::<f64>() / weight
     };
-    if colors.is_empty() {
+    if weight <= 0.0 {
         return sun_like_vmag;
     }
-    let (mean_bv_mag, mean_vmag) = (mean(&|bv| *bv), mean(&zero_point));
+    let (mean_bv_mag, mean_vmag) = (mean(&|bv| bv), mean(&zero_point));
     if !has_color_term {
         return mean_vmag;
     }
-    let deviation = |bv: &f64| bv - mean_bv_mag;
+    let deviation = |bv: f64| bv - mean_bv_mag;
     let variance = mean(&|bv| deviation(bv).powi(2));
     let slope = mean(&|bv| deviation(bv) * zero_point(bv)) / variance.max(f64::MIN_POSITIVE);
     mean_vmag + slope * (REFERENCE_BV_MAG - mean_bv_mag)

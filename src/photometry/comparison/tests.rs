@@ -30,7 +30,7 @@ fn measured(sky_mag_arcsec2: f64) -> FrameMeasurement<'static> {
         zenith_distance_deg: None,
         header_zenith_distance_deg: None,
         zero_point_vmag: None,
-        zero_point_colors_mag: &[],
+        zero_point_colors: &[],
         has_color_term: false,
         limit_vmag: None,
         faintest_vmag: None,
@@ -83,7 +83,14 @@ fn differences_compare_like_with_like() {
 fn the_zero_point_is_that_of_stars_of_the_same_color() {
     let zero_point = |colors: &[f64], has_color_term| {
         let mut frame = measured(16.0);
-        frame.zero_point_colors_mag = colors;
+        let colors: Vec<WeightedColor> = colors
+            .iter()
+            .map(|&bv_mag| WeightedColor {
+                bv_mag,
+                weight: 2.0,
+            })
+            .collect();
+        frame.zero_point_colors = &colors;
         frame.has_color_term = has_color_term;
         compare(&stated(), &frame).unwrap().zero_point_vmag
     };

@@ -313,7 +313,7 @@ impl<'a> Evaluation<'a> {
         let photometry = self.solution.photometry.as_ref()?;
         let measured = photometry.zero_point.as_ref()?;
         let scenario = &self.validator.protocol.setup.scenario;
-        let colors = &photometry.zero_point_colors_mag;
+        let colors = &measured.colors;
         let of_a_second = expected_zero_point_vmag(scenario, colors, measured.color_term.is_some());
         let expected = of_a_second + 2.5 * scenario.conditions.exposure_s.log10();
         Some((measured.v_mag - expected, measured.sigma_mag))

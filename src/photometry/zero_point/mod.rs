@@ -1,0 +1,133 @@
+//! The zero point of a frame's fluxes, and whether they are proportional to light.
+//!
+//! V and instrumental magnitudes m = −2.5 log10(flux) of single stars → [`ZeroPoint`]
+//!
+//! ```text
+//! V = ZP + m + k (B−V − 0.6) − a ρ² − b ρ⁴ + s (V − V̄)
+//! ```
+//!
+//! 1. The variance of a star is that of its flux, plus a scatter (catalogue, colour, pixels) that
+//!    is estimated from the residuals.
+//! 2. Outliers, mostly unresolved companions and variables on one side, are down-weighted with
+//!    Tukey's biweight, to zero from 4.7 standard deviations on.
+//! 3. The terms k (colour), a and b (vignetting; ρ is the distance from the frame's centre, 1 in
+//!    the corner) and s (grey levels not proportional to light) are used only where they are
+//!    significant.
+//!
+//! With the colour term, the zero point is that of a star of B−V = 0.6; without it, that of the
+//! mean star, whose B−V is given. With vignetting, it is that of the frame's centre. With s, it
+//! holds only for stars of the mean magnitude V̄; one magnitude in V is then 1 − s instrumental ones.
+//!
+//! The stars must be chosen by V and not by flux, which would prefer stars that noise or colour
+//! makes brighter.
+
+mod relation;
+mod weights;
+
+use crate::base::statistics::Estimate;
+use relation::{Relation, Term};
+
+/// Reference B−V of the zero point where there is a colour term: about that of the Sun and of many
+/// field stars.
+pub const REFERENCE_BV_MAG: f64 = 0.6;
+/// Minimum number of stars for a zero point.
+pub const MIN_STARS: usize = 5;
+/// A colour term is tried where at least this share of the stars has a colour.
+const MIN_COLORED_SHARE: f64 = 0.5;
+
+/// A star of known V magnitude with its measured flux.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StandardStar {
+    /// V magnitude from the catalogue.
+    pub v_mag: f64,
+    /// B−V, where known.
+    pub bv_mag: Option<f64>,
+    /// −2.5 log10(flux).
+    pub instrumental_mag: f64,
+    /// Its standard error from the flux alone.
+    pub sigma_mag: f64,
+    /// Distance from the frame's centre over that of the corner, squared.
+    pub off_centre_sq: f64,
+}
+
+/// The conversion from instrumental to V magnitudes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ZeroPoint {
+    /// V magnitude of a star with a flux of 1.
+    pub v_mag: f64,
+    /// Its standard error.
+    pub sigma_mag: f64,
+    /// Robust standard deviation of a star about the relation, flux noise included.
+    pub scatter_mag: f64,
+    /// Number of stars.
+    pub stars: usize,
+    /// The B−V for which it holds; `None` where no star has one.
+    pub bv_mag: Option<f64>,
+    /// The colours of its stars, where known.
+    pub colors: Vec<WeightedColor>,
+    /// k, in magnitudes per magnitude of B−V, where it is significant.
+    pub color_term: Option<Estimate>,
+    /// Magnitudes by which stars in the corner are dimmer than in the centre, where it is
+    /// significant.
+    pub corner_loss_mag: Option<Estimate>,
+    /// Instrumental magnitudes per magnitude of V: 1 where grey levels are proportional to light.
+    /// `None` with too few stars.
+    pub linearity: Option<Estimate>,
+    /// Mean V magnitude of the stars, at which the zero point of a nonlinear frame holds.
+    pub mean_v_mag: f64,
+    /// Whether [`Self::linearity`] differs significantly from 1.
+    pub is_nonlinear: bool,
+}
+
+/// The colour of a star of the zero point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WeightedColor {
+    /// B−V.
+    pub bv_mag: f64,
+    /// The star's weight in the fit.
+    pub weight: f64,
+}
+
+/// Measures the zero point of `stars`; `None` if they are too few.
+pub fn measure(stars: &[StandardStar]) -> Option<ZeroPoint> {
+    if stars.len() < MIN_STARS {
+        return None;
+    }
+    let with_color = |star: &&StandardStar| star.bv_mag.is_some();
+    let colored: Vec<StandardStar> = stars.iter().filter(with_color).copied().collect();
+    let has_colors = colored.len() as f64 >= MIN_COLORED_SHARE * stars.len() as f64;
+    let with_term = has_colors
+        .then(|| Relation::fit_significant(&colored, &[Term::Color]))
+        .flatten();
+    let (stars, mut relation) = match with_term {
+        Some(relation) => (&colored[..], relation),
+        None => (stars, Relation::fit(stars, &[])?),
+    };
+    for term in [Term::Vignetting, Term::VignettingOfFourthOrder] {
+        let terms = relation.terms_and(&[term]);
+        match Relation::fit_significant(stars, &terms) {
+            Some(further) => relation = further,
+            None => break,
+        }
+    }
+    let sloping = slope(stars, &relation);
+    let linearity = sloping.as_ref().map(Relation::linearity);
+    match sloping {
+        Some(fit) if fit.needs_last_term() => Some(fit.zero_point(stars, linearity, true)),
+        _ => Some(relation.zero_point(stars, linearity, false)),
+    }
+}
+
+/// `relation` with a slope. Faint stars have other colours than bright ones, so that a colour term
+/// that is bent would look like a slope.
+fn slope(stars: &[StandardStar], relation: &Relation) -> Option<Relation> {
+    let further: &[Term] = match relation.has(Term::Color) {
+        true => &[Term::ColorOfSecondOrder, Term::Slope],
+        false => &[Term::Slope],
+    };
+    Relation::fit(stars, &relation.terms_and(further))
+        .or_else(|| Relation::fit(stars, &relation.terms_and(&[Term::Slope])))
+}
+
+#[cfg(test)]
+mod tests;
