@@ -16,7 +16,7 @@ const PREDICTED_EXTRA: usize = 5;
 /// observed stars exceed (a few outliers do not count), …
 const FAINT_SHARE: f64 = 0.95;
 /// … and this much deeper, for colours and for luck at the threshold.
-const FAINT_ROOM_MAG: f64 = 1.0;
+const FAINT_ROOM_MAG: f64 = 1.5;
 
 /// A camera and an attitude that may be the true ones.
 #[derive(Debug, Clone, Copy, PartialEq)]

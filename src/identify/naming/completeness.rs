@@ -50,6 +50,21 @@ impl Completeness {
         self.odds[predicted]
     }
 
+    /// The odds that a predicted star is detected where it appears as bright as another one: noise
+    /// brings stars above the limit that are fainter.
+    pub fn odds_as(&self, predicted: usize, as_bright_as: usize) -> f64 {
+        let (Some(own), Some(share)) = (self.shares.get(predicted), self.shares.get(as_bright_as))
+        else {
+            return self.odds[predicted];
+        };
+        if share <= own {
+            return self.odds[predicted];
+        }
+        let visibility = self.visibility[predicted];
+        let [own, share] = [own, share].map(|share| (share * visibility).min(1.0 - LEAST_LOST));
+        share / (1.0 - own)
+    }
+
     /// Measures how visible stars are at the place of each one of `predicted`, by the probability of
     /// each that it is observed. The share by brightness must have been measured.
     pub fn measure_visibility(

@@ -62,6 +62,15 @@ pub struct MagnitudeRelation {
     scatter_mag: f64,
 }
 
+/// Densities of a magnitude difference, per magnitude; their sum is that of all true pairs.
+#[derive(Debug, Clone, Copy)]
+pub struct MagnitudeDensities {
+    /// Of pairs that differ by the frame's scatter.
+    pub by_scatter: f64,
+    /// Of those that differ by more: variable stars, unusual colours, blends, saturated stars.
+    pub otherwise: f64,
+}
+
 impl MagnitudeRelation {
     /// Before it is measured.
     pub fn new(zero_point_mag: f64, photometry: Photometry) -> Self {
@@ -78,23 +87,33 @@ impl MagnitudeRelation {
 
     /// Catalogue magnitude minus that which is expected of the observed star.
     fn difference(&self, star: &ObservedStar, v_mag: f64) -> f64 {
-        v_mag - (self.v_mag + self.slope * (star.mag - self.at_mag))
+        v_mag - self.expected_v_mag(star)
     }
 
-    /// Density of the magnitude difference of a true pair, per magnitude.
-    pub fn density(&self, star: &ObservedStar, v_mag: f64) -> f64 {
+    /// The catalogue's magnitude that is expected of the observed star.
+    pub fn expected_v_mag(&self, star: &ObservedStar) -> f64 {
+        self.v_mag + self.slope * (star.mag - self.at_mag)
+    }
+
+    /// Densities of the magnitude difference of a true pair, per magnitude.
+    pub fn densities(&self, star: &ObservedStar, v_mag: f64) -> MagnitudeDensities {
         let difference = self.difference(star, v_mag);
         let density = |share: f64, sigma: f64| {
             share * (-0.5 * (difference / sigma).powi(2)).exp() / ((2.0 * PI).sqrt() * sigma)
         };
-        let plain = density(1.0 - OUTLIER_SHARE, self.scatter_mag)
-            + density(OUTLIER_SHARE, OUTLIER_SCATTER * self.scatter_mag);
+        let plain = MagnitudeDensities {
+            by_scatter: density(1.0 - OUTLIER_SHARE, self.scatter_mag),
+            otherwise: density(OUTLIER_SHARE, OUTLIER_SCATTER * self.scatter_mag),
+        };
         if !star.is_saturated {
             return plain;
         }
         let is_brighter = (-BRIGHTER_MAG..0.0).contains(&difference);
         let brighter = f64::from(u8::from(is_brighter)) / BRIGHTER_MAG;
-        (1.0 - BRIGHTER_SHARE) * plain + BRIGHTER_SHARE * brighter
+        MagnitudeDensities {
+            by_scatter: (1.0 - BRIGHTER_SHARE) * plain.by_scatter,
+            otherwise: (1.0 - BRIGHTER_SHARE) * plain.otherwise + BRIGHTER_SHARE * brighter,
+        }
     }
 
     /// The line through the candidates that are likely true.

@@ -147,8 +147,12 @@ impl Naming {
         for candidate in &mut self.candidates {
             let (i, j) = (candidate.observed, candidate.predicted);
             let star = &field.stars[i];
-            let like = candidate.position_density * self.magnitudes.density(star, candidate.v_mag);
-            candidate.odds = self.completeness.odds(j) * like / self.unrelated.density(i);
+            let densities = self.magnitudes.densities(star, candidate.v_mag);
+            let expected_v_mag = self.magnitudes.expected_v_mag(star);
+            let as_bright = predicted.partition_point(|p| f64::from(p.v_mag) < expected_v_mag);
+            let like = self.completeness.odds_as(j, as_bright) * densities.by_scatter
+                + self.completeness.odds(j) * densities.otherwise;
+            candidate.odds = candidate.position_density * like / self.unrelated.density(i);
             self.odds_of_observed[i] += candidate.odds;
             self.odds_of_predicted[j] += candidate.odds;
         }
