@@ -66,6 +66,11 @@ impl Calibration {
         })
     }
 
+    /// Whether frames are divided by a flat.
+    pub fn has_flat(&self) -> bool {
+        self.flat.is_some()
+    }
+
     /// Names of the files used.
     pub fn applied(&self) -> Applied {
         let name = |master: &Option<Master>| master.as_ref().map(|master| master.name.clone());

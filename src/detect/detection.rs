@@ -70,6 +70,9 @@ pub struct Detections {
     pub noise_adu: f64,
     /// Standard deviation of the Gaussian spot before pixel integration, in pixels.
     pub spot_sigma_px: f64,
+    /// Median threshold for a peak of the filtered frame, in standard deviations that white noise of
+    /// `noise_adu` has after the filter.
+    pub threshold_sigma: f64,
     /// The spots where they are not round Gaussians of that size.
     pub psf: Option<MeasuredPsf>,
     /// Why the rate of false detections asked for is held less well than in independent noise.

@@ -162,6 +162,7 @@ pub fn detect_into(
     found.noise_adu = background.median_sigma_adu;
     found.spot_sigma_px = stars.spot_px;
     found.psf = psf.map(|psf| psf.summary((view.width, view.height)));
+    found.threshold_sigma = pass.threshold_level;
     found.noise_tail = pass.noise_tail;
     Ok(())
 }
@@ -172,6 +173,7 @@ fn describe_darkness(frame: &Frame, config: &DetectConfig, found: &mut Detection
     found.background_adu = f64::from(level.unwrap_or(0.0));
     found.noise_adu = f64::from(background::rounding_sigma_adu(frame.step_adu));
     found.spot_sigma_px = config.spot_sigma_px.unwrap_or(star_model::DEFAULT_SPOT_PX);
+    found.threshold_sigma = config.threshold_sigma.unwrap_or(0.0);
     found.psf = None;
     found.noise_tail = None;
 }

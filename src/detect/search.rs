@@ -4,7 +4,7 @@
 //! the unfiltered frame; where there are too few of these, the frame is filtered with a guessed
 //! size, and again until the size of the stars found settles.
 
-use super::background::{FrameBackground, Mesh};
+use super::background::{FrameBackground, Mesh, median};
 use super::candidates::{FilteredFrame, PeakSearch, RawPeakFinder, SearchConfig};
 use super::config::DetectConfig;
 use super::detection::NoiseTail;
@@ -91,6 +91,9 @@ pub(crate) struct Pass {
     pub matched_gain: f64,
     /// The threshold, in standard deviations of the filtered noise.
     pub threshold: f64,
+    /// The median level that it is over the frame, in standard deviations of filtered white noise:
+    /// the light of faint stars raises both mean and noise of the filtered frame.
+    pub threshold_level: f64,
     /// Why the threshold holds less well than in independent noise.
     pub noise_tail: Option<NoiseTail>,
 }
@@ -111,6 +114,7 @@ pub(crate) struct FrameSearch {
     /// Peaks and regions above the threshold.
     pub found: PeakSearch,
     raw_peaks: RawPeakFinder,
+    sorted: Vec<f32>,
     noise: NoiseBuffers,
     extrema: Extrema,
     /// Buffers of fits.
@@ -212,6 +216,7 @@ impl FrameSearch {
         let Self {
             filtered,
             found,
+            sorted,
             noise,
             extrema,
             ..
@@ -258,9 +263,12 @@ impl FrameSearch {
             max_peaks: config.max_detections,
         };
         found.run(&filtered.candidates, &filtered.mesh, view, &search_config);
+        let mean = median(&filtered.mesh.background, sorted);
+        let sigma = median(&filtered.mesh.sigma, sorted);
         Pass {
             matched_gain: kernel.matched_gain(),
             threshold,
+            threshold_level: mean + threshold * sigma,
             noise_tail,
         }
     }

@@ -158,6 +158,7 @@ mod tests {
             identification: &identification,
             years_since_j2000: 0.0,
             exposure_s: None,
+            vignetting: 0.0,
         };
         associate(&frame, stars)
     }

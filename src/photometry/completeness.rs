@@ -192,9 +192,10 @@ impl Curve {
         const MAX_ROUNDS: usize = 60;
         /// Converged where a step is below a hundredth of the standard errors (squared).
         const CONVERGED: f64 = 1e-4;
-        let lost = PRIOR_LOST / (PRIOR_LOST + PRIOR_KEPT);
+        let (v_mag, lost) = best_step(stars)?;
+        let lost = lost.clamp(PRIOR_LOST / (PRIOR_LOST + PRIOR_KEPT), 0.9);
         let mut curve = Self {
-            v_mag: best_step(stars)?,
+            v_mag,
             ln_width: TYPICAL_WIDTH_MAG.ln(),
             logit_lost: (lost / (1.0 - lost)).ln(),
             chance: chance.clamp(1e-6, 0.25),
@@ -306,24 +307,33 @@ impl Curve {
     }
 }
 
-/// The magnitude that best separates detected stars from missed ones; `stars` are sorted, brightest
-/// first.
-fn best_step(stars: &[CountedStar]) -> Option<f64> {
-    // Misplaced stars for a step before the first star: all detected ones.
-    let mut misplaced = stars.iter().filter(|star| star.detected).count();
-    let mut best = (misplaced, stars.first()?.v_mag);
-    for (i, star) in stars.iter().enumerate() {
-        if star.detected {
-            misplaced -= 1;
-        } else {
-            misplaced += 1;
-        }
-        if misplaced < best.0 {
-            let next = stars.get(i + 1).map_or(star.v_mag, |next| next.v_mag);
-            best = (misplaced, 0.5 * (star.v_mag + next));
-        }
-    }
-    Some(best.1)
+/// The magnitude that best separates stars of which many are detected from those of which few are,
+/// and the share that is lost of the brighter ones; `stars` are sorted, brightest first.
+fn best_step(stars: &[CountedStar]) -> Option<(f64, f64)> {
+    // The logarithm of the likelihood of stars that are all detected with the same probability.
+    let log_likelihood = |stars: usize, detected: usize| {
+        let part = |count: usize| match count {
+            0 => 0.0,
+            _ => count as f64 * (count as f64 / stars as f64).ln(),
+        };
+        part(detected) + part(stars - detected)
+    };
+    let all = stars.iter().filter(|star| star.detected).count();
+    let first = (f64::NEG_INFINITY, (stars.first()?.v_mag, 0.0));
+    let mut detected = 0;
+    let steps = stars.iter().enumerate().map(|(i, star)| {
+        detected += usize::from(star.detected);
+        let (brighter, fainter) = (i + 1, stars.len() - i - 1);
+        // Fainter stars are not detected more often.
+        let falls = detected * fainter >= (all - detected) * brighter;
+        let log = log_likelihood(brighter, detected) + log_likelihood(fainter, all - detected);
+        let next = stars.get(i + 1).map_or(star.v_mag, |next| next.v_mag);
+        let lost = 1.0 - detected as f64 / brighter as f64;
+        let log = if falls { log } else { f64::NEG_INFINITY };
+        (log, (0.5 * (star.v_mag + next), lost))
+    });
+    let better = |best: (f64, _), step: (f64, _)| if step.0 > best.0 { step } else { best };
+    Some(steps.fold(first, better).1)
 }
 
 #[cfg(test)]

@@ -14,4 +14,6 @@ pub struct IdentifiedFrame<'a> {
     pub years_since_j2000: f64,
     /// Exposure in seconds, where known.
     pub exposure_s: Option<f64>,
+    /// Share of the light lost in the corners, as far as it is known.
+    pub vignetting: f64,
 }

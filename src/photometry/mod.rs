@@ -26,6 +26,7 @@ pub use identified_frame::IdentifiedFrame;
 
 use crate::base::statistics::median;
 use crate::camera::CameraModel;
+use crate::camera::data_sheet::lens_transmission;
 use crate::detect::Detection;
 use crate::identify::{IndexedCatalog, View};
 use crate::sky::catalog::{Star, StarFlags, StarIndex};
@@ -34,7 +35,7 @@ use completeness::{Completeness, CountedStar};
 use zero_point::{StandardStar, ZeroPoint};
 
 /// B−V of a star like the Sun, for which limits hold.
-const SUN_BV_MAG: f64 = 0.64;
+pub const SUN_BV_MAG: f64 = 0.64;
 
 /// Photometry of a frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,13 +113,16 @@ fn standard_star(
     let is_alone = star.neighbours_light < MAX_NEIGHBOURS_LIGHT;
     let is_fit =
         is_bright && is_alone && has_clean_flux(detection) && is_constant_and_single(known);
-    let flux_adu = detection.flux_adu / (1.0 + star.neighbours_light);
+    let off_centre_sq = off_centre_sq(detection, &frame.identification.camera);
+    let flux_adu = detection.flux_adu
+        / (1.0 + star.neighbours_light)
+        / lens_transmission(frame.vignetting, off_centre_sq);
     is_fit.then(|| StandardStar {
         v_mag: star.v_mag,
         bv_mag: known.bv_mag.map(f64::from),
         instrumental_mag: instrumental_mag(flux_adu / frame.exposure_s.unwrap_or(1.0)),
         sigma_mag: MAG_PER_RELATIVE / detection.snr,
-        off_centre_sq: off_centre_sq(detection, &frame.identification.camera),
+        off_centre_sq,
     })
 }
 

@@ -50,6 +50,8 @@ pub enum Note {
         /// V magnitude near which the zero point holds.
         mean_v_mag: f64,
     },
+    /// The light falls off towards the corners: by this many magnitudes, beyond what is stated.
+    Vignetting(Estimate),
     /// The noise is not independent: the rate of false detections asked for holds less well.
     FalseDetections(NoiseTail),
     /// The spots are no round Gaussians of one size: their form was measured.
@@ -82,6 +84,7 @@ impl Note {
             Self::NoExposure => "exposure_unknown",
             Self::Camera(contradiction) => contradiction.code(),
             Self::NotLinear { .. } => "not_linear",
+            Self::Vignetting(_) => "vignetting",
             Self::FalseDetections(_) => "false_detections",
             Self::Spots(_) => "spots_not_round",
             Self::BodyInFrame(_) => "body_in_frame",
@@ -169,14 +172,20 @@ impl Note {
         })
     }
 
-    /// Grey levels that are not proportional to light.
-    pub(super) fn of_photometry(photometry: Option<&FramePhotometry>) -> Option<Self> {
-        let zero_point = photometry?.zero_point.as_ref()?;
-        let zero_point = Some(zero_point).filter(|zero| zero.is_nonlinear)?;
-        Some(Self::NotLinear {
-            slope: zero_point.linearity?,
-            mean_v_mag: zero_point.mean_v_mag,
-        })
+    /// Grey levels that are not proportional to light, and vignetting.
+    pub(super) fn of_photometry(
+        photometry: Option<&FramePhotometry>,
+    ) -> impl Iterator<Item = Self> {
+        let zero_point = photometry.and_then(|measured| measured.zero_point.as_ref());
+        let nonlinear = zero_point.filter(|zero| zero.is_nonlinear);
+        let slope = nonlinear.and_then(|zero| {
+            Some(Self::NotLinear {
+                slope: zero.linearity?,
+                mean_v_mag: zero.mean_v_mag,
+            })
+        });
+        let loss = zero_point.and_then(|zero| zero.corner_loss_mag);
+        slope.into_iter().chain(loss.map(Self::Vignetting))
     }
 }
 
@@ -208,6 +217,11 @@ impl fmt::Display for Note {
                 f,
                 "the grey levels are not proportional to light: a magnitude is {:.2} ± {:.2} in this frame, and its zero point holds near V {mean_v_mag:.1} only",
                 slope.value, slope.sigma
+            ),
+            Self::Vignetting(loss) => write!(
+                f,
+                "stars in the corners are {:.2} ± {:.2} mag dimmer than in the centre, for which the zero point holds",
+                loss.value, loss.sigma
             ),
             Self::FalseDetections(tail) => write_noise_tail(f, *tail),
             Self::Spots(psf) => write_spots(f, psf),

@@ -4,15 +4,13 @@ use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
 use super::error::Error;
 use super::identification::{identify_stars, observation};
-use super::outcome::Outcome;
 use super::solution::{Solution, Source};
 use super::solved::Solved;
 use super::stopwatch::{Stage, Stopwatch};
 use crate::calibration::Calibration;
-use crate::detect::{self, DetectError, Detections};
+use crate::detect::{self, DetectError};
 use crate::frame::{self, Frame, FrameError};
-use crate::identify::{IndexedCatalog, Priors};
-use crate::photometry::{self, FramePhotometry, IdentifiedFrame};
+
 use std::num::NonZeroUsize;
 use std::path::Path;
 
@@ -117,8 +115,7 @@ fn solve(
     let bodies = find_bodies(&mut outcome, &sources, &priors, context.indexed.catalog());
     clock.lap(Stage::Identify);
 
-    let photometry = measure_photometry(&detections, &outcome, &priors, context.indexed);
-    let solved = Solved {
+    let mut solved = Solved {
         context,
         frame,
         calibration: input.calibration,
@@ -129,25 +126,10 @@ fn solve(
         outcome,
         bodies,
         dropped_scale,
-        photometry,
+        photometry: None,
     };
+    solved.measure_photometry();
     let comparison = solved.compare_with_camera();
     clock.lap(Stage::Photometry);
     Ok(solved.into_solution(comparison, clock.timing()))
-}
-
-/// Photometry of an identified frame.
-fn measure_photometry(
-    detections: &Detections,
-    outcome: &Outcome,
-    priors: &Priors,
-    indexed: &IndexedCatalog,
-) -> Option<FramePhotometry> {
-    let frame = IdentifiedFrame {
-        detections,
-        identification: outcome.identification()?,
-        years_since_j2000: priors.years_since_j2000(),
-        exposure_s: priors.exposure_s,
-    };
-    Some(photometry::measure(&frame, indexed))
 }

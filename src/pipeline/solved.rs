@@ -12,9 +12,9 @@ use crate::base::units::DEG_PER_RAD;
 use crate::calibration::Calibration;
 use crate::detect::Detections;
 use crate::frame::Frame;
-use crate::identify::{Identification, Priors, ScalePrior, SourceIndex, View};
-use crate::photometry::FramePhotometry;
-use crate::photometry::comparison::{Comparison, FrameMeasurement, compare};
+use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SourceIndex, View};
+use crate::photometry::comparison::{Comparison, FieldStar, FrameMeasurement, compare};
+use crate::photometry::{self, FramePhotometry, IdentifiedFrame};
 use crate::sky::observer::Observation;
 use std::collections::HashSet;
 
@@ -37,6 +37,28 @@ pub(super) struct Solved<'a> {
 }
 
 impl Solved<'_> {
+    /// Measures the photometry of an identified frame.
+    pub(super) fn measure_photometry(&mut self) {
+        let Some(identification) = self.outcome.identification() else {
+            return;
+        };
+        let frame = IdentifiedFrame {
+            detections: &self.detections,
+            identification,
+            years_since_j2000: self.priors.years_since_j2000(),
+            exposure_s: self.priors.exposure_s,
+            vignetting: self.stated_vignetting(),
+        };
+        self.photometry = Some(photometry::measure(&frame, self.context.indexed));
+    }
+
+    /// Share of the light lost in the corners, by the camera's description; a flat removes it.
+    fn stated_vignetting(&self) -> f64 {
+        let camera = self.context.camera.as_ref();
+        let camera = camera.filter(|_| !self.calibration.is_some_and(Calibration::has_flat));
+        camera.map_or(0.0, |camera| camera.sheet.imperfections.vignetting)
+    }
+
     /// The comparison with the stated camera; `None` without a camera or an exposure.
     pub(super) fn compare_with_camera(&self) -> Option<Comparison> {
         let camera = self.context.camera.as_ref()?;
@@ -44,13 +66,15 @@ impl Solved<'_> {
         let zero_point = photometry.and_then(|measured| measured.zero_point.as_ref());
         let limit = photometry.and_then(|measured| measured.completeness.limit.as_ref().ok());
         let found = self.outcome.identification();
-        let field_vmag = found.map_or(Vec::new(), |found| self.field_vmag(found));
+        let field = found.map_or(Vec::new(), |found| self.field(found));
         let frame = FrameMeasurement {
             detect: self.context.detect.clone(),
             size_px: [self.frame.width, self.frame.height],
             exposure_s: self.priors.exposure_s,
             background_adu: self.detections.background_adu,
             noise_adu: self.detections.noise_adu,
+            threshold_sigma: self.detections.threshold_sigma,
+            vignetting: self.stated_vignetting(),
             spot_sigma_px: found.map(|_| self.detections.spot_sigma_px),
             pixel_scale_rad: found.map(|found| 1.0 / found.camera.focal_length_px),
             zenith_distance_deg: self.observation.as_ref().map(zenith_distance_deg),
@@ -66,7 +90,7 @@ impl Solved<'_> {
                 sigma: limit.sigma_mag,
             }),
             faintest_vmag: found.and_then(|found| self.faintest_vmag(found)),
-            field_vmag: &field_vmag,
+            field: &field,
         };
         compare(camera, &frame)
     }
@@ -147,8 +171,8 @@ impl Solved<'_> {
         v_mag.map(f64::from).reduce(f64::max)
     }
 
-    /// V magnitudes of all catalogue stars in the frame.
-    fn field_vmag(&self, found: &Identification) -> Vec<f64> {
+    /// All catalogue stars in the frame.
+    fn field(&self, found: &Identification) -> Vec<FieldStar> {
         let view = View {
             camera: &found.camera,
             icrs_to_camera: &found.icrs_to_camera,
@@ -159,7 +183,12 @@ impl Solved<'_> {
         let inside = stars
             .iter()
             .filter(|star| found.camera.contains(&star.pixel));
-        inside.map(|star| f64::from(star.v_mag)).collect()
+        let catalog = indexed.catalog();
+        let star = |star: &PredictedStar| FieldStar {
+            v_mag: f64::from(star.v_mag),
+            bv_mag: catalog.star(star.star).bv_mag.map(f64::from),
+        };
+        inside.map(star).collect()
     }
 }
 

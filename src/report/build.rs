@@ -204,6 +204,7 @@ fn faintest(identification: &Identification, catalog: &Catalog) -> Option<Magnit
 fn photometry(measured: &FramePhotometry) -> PhotometryReport {
     let zero_point = measured.zero_point.as_ref();
     let color = zero_point.and_then(|zero| zero.color_term);
+    let corner_loss = zero_point.and_then(|zero| zero.corner_loss_mag);
     let linearity = zero_point.and_then(|zero| zero.linearity);
     let limit = measured.completeness.limit;
     let fitted = limit.as_ref().ok();
@@ -223,6 +224,8 @@ fn photometry(measured: &FramePhotometry) -> PhotometryReport {
         zero_point_bv_mag: zero_point.and_then(|zero| zero.bv_mag).and_then(mag),
         color_term: color.and_then(|term| mag(term.value)),
         color_term_sigma: color.and_then(|term| mag(term.sigma)),
+        corner_loss_mag: corner_loss.and_then(|loss| mag(loss.value)),
+        corner_loss_sigma_mag: corner_loss.and_then(|loss| mag(loss.sigma)),
         linearity: linearity.and_then(|slope| mag(slope.value)),
         linearity_sigma: linearity.and_then(|slope| mag(slope.sigma)),
         limit50_vmag: fitted.and_then(|limit| mag(limit.v_mag)),

@@ -245,11 +245,17 @@ pub struct PhotometryReport {
     pub color_term: Option<f64>,
     /// Its standard error.
     pub color_term_sigma: Option<f64>,
+    /// Magnitudes by which stars in the corners are dimmer than in the centre, for which the zero
+    /// point then holds; `None` where it is not significant.
+    pub corner_loss_mag: Option<f64>,
+    /// Its standard error.
+    pub corner_loss_sigma_mag: Option<f64>,
     /// Instrumental magnitudes per magnitude of V: 1 where grey levels are proportional to light.
     pub linearity: Option<f64>,
     /// Its standard error.
     pub linearity_sigma: Option<f64>,
-    /// V magnitude at which half of the catalogue's stars are detected.
+    /// V magnitude at which half of the catalogue's stars are detected; with a colour term, of stars
+    /// of the Sun's colour.
     pub limit50_vmag: Option<f64>,
     /// Its standard error.
     pub limit50_sigma_mag: Option<f64>,

@@ -106,6 +106,8 @@ fn photometry() -> PhotometryReport {
         zero_point_bv_mag: Some(0.6),
         color_term: Some(0.2456),
         color_term_sigma: Some(0.0609),
+        corner_loss_mag: Some(0.31),
+        corner_loss_sigma_mag: Some(0.052),
         linearity: Some(1.045),
         linearity_sigma: Some(0.0632),
         limit50_vmag: Some(8.4989),

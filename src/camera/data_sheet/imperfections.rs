@@ -57,8 +57,14 @@ impl SpotForm {
     }
 }
 
-/// Properties of a camera that affect simulated frames, but not the limiting magnitude. The default
-/// has none of them.
+/// Part of the light of the centre that reaches a place whose distance from the centre, over that of
+/// the corner, has this square; `vignetting` is the share that is lost in the corners.
+pub fn lens_transmission(vignetting: f64, off_centre_sq: f64) -> f64 {
+    (1.0 - vignetting * off_centre_sq).max(0.0)
+}
+
+/// Properties of a camera that affect simulated frames, but not the limiting magnitude of its
+/// centre. The default has none of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Imperfections {
     /// Share of the light lost in the corners; it grows with the square of the distance from the

@@ -7,8 +7,8 @@
 //! - [`Preset`] lists the built-in cameras.
 //! - [`Response`] is a transmission or an efficiency: a number, or a CSV file with wavelength in
 //!   nanometres and value, which is interpolated.
-//! - [`Imperfections`] affect simulated frames, but not the limiting magnitude: vignetting,
-//!   distortion, differences between pixels.
+//! - [`Imperfections`] affect simulated frames, but not the limiting magnitude of the centre:
+//!   vignetting, distortion, differences between pixels.
 //!
 //! Caveats: one spot for the whole field; no stray light.
 
@@ -22,7 +22,7 @@ mod sheet;
 mod template;
 
 pub use file::DataSheetError;
-pub use imperfections::{Imperfections, SpotForm};
+pub use imperfections::{Imperfections, SpotForm, lens_transmission};
 pub(crate) use key::key;
 pub use key::{Key, Limits, nearest_name};
 pub use keys::{IMPERFECTION_KEYS, KEYS, is_curve};

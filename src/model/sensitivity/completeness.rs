@@ -99,10 +99,49 @@ impl Detector {
         let electrons = budget.background_e + budget.dark_e;
         let skewness = electrons / budget.background_noise_e.powi(3);
         let model = FilterModel::new(config, size, spot.round_sigma_px(), skewness);
+        Self::filtering(model, budget.background_noise_e, config, scenario, budget)
+    }
+
+    /// The matched filter on a frame, where threshold and noise were measured: the threshold in
+    /// standard deviations that white noise of `noise_e` electrons a pixel has after the filter.
+    pub fn on_frame(
+        (threshold_sigma, noise_e): (f64, f64),
+        config: &DetectConfig,
+        scenario: &Scenario,
+        budget: &Budget,
+    ) -> Self {
+        let size = (scenario.camera.width_px, scenario.camera.height_px);
+        let spot_px = SmearedSpot::of(scenario).round_sigma_px();
+        let model = FilterModel {
+            threshold_sigma,
+            ..FilterModel::new(config, size, spot_px, 0.0)
+        };
+        Self::filtering(model, noise_e, config, scenario, budget)
+    }
+
+    /// The detector on average over places whose limits differ by `differences_mag`.
+    pub fn over(mut self, differences_mag: &[f64]) -> Self {
+        // Sorted as they are, the draws are shared evenly among the places.
+        let places = differences_mag.iter().cycle();
+        for (critical, difference_mag) in self.critical_vmag.iter_mut().zip(places) {
+            *critical += difference_mag;
+        }
+        self.critical_vmag.sort_by(|a, b| b.total_cmp(a));
+        self
+    }
+
+    fn filtering(
+        model: FilterModel,
+        noise_e: f64,
+        config: &DetectConfig,
+        scenario: &Scenario,
+        budget: &Budget,
+    ) -> Self {
+        let spot = SmearedSpot::of(scenario);
         let filter = Filter {
             half_kernel: model.half_kernel,
-            threshold_e: model.threshold_sigma * budget.background_noise_e,
-            noise_e: budget.background_noise_e,
+            threshold_e: model.threshold_sigma * noise_e,
+            noise_e,
             // Filtered noise moves the maximum by a fraction of the spot.
             reach_px: (1.2 * spot.sigma_px).ceil() as usize,
         };

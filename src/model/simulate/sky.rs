@@ -4,6 +4,7 @@ use super::image::ElectronImage;
 use super::scene::Scene;
 use crate::base::coords::{Camera, PixelPoint, UnitVector};
 use crate::camera::CameraModel;
+use crate::camera::data_sheet::lens_transmission;
 use crate::model::sensitivity::{REFERENCE_NM, Scenario};
 use crate::sky::observer::airmass::airmass_krisciunas_schaefer;
 use nalgebra::Vector3;
@@ -93,7 +94,7 @@ impl<'a> Sky<'a> {
     fn lens(&self, place: &PixelPoint) -> f64 {
         let [u, v] = self.camera.offset_of(place);
         let radius_px = self.camera.radius_px();
-        (1.0 - self.vignetting * (u * u + v * v) / (radius_px * radius_px)).max(0.0)
+        lens_transmission(self.vignetting, (u * u + v * v) / (radius_px * radius_px))
     }
 }
 

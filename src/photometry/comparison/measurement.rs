@@ -31,6 +31,11 @@ pub struct FrameMeasurement<'a> {
     pub background_adu: f64,
     /// Background noise of one pixel (standard deviation), in ADU.
     pub noise_adu: f64,
+    /// Median threshold of the detection, in standard deviations of filtered white noise of
+    /// `noise_adu`.
+    pub threshold_sigma: f64,
+    /// Share of the light lost in the corners.
+    pub vignetting: f64,
     /// Standard deviation of a star's spot, in pixels.
     pub spot_sigma_px: Option<f64>,
     /// Pixel scale, in radians.
@@ -52,7 +57,15 @@ pub struct FrameMeasurement<'a> {
     pub limit_vmag: Option<Estimate>,
     /// V magnitude of the faintest identified star.
     pub faintest_vmag: Option<f64>,
-    /// V magnitudes of all catalogue stars in the field, also of those fainter than the frame
-    /// shows.
-    pub field_vmag: &'a [f64],
+    /// All catalogue stars in the field, also those fainter than the frame shows.
+    pub field: &'a [FieldStar],
+}
+
+/// A catalogue star in the field.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FieldStar {
+    /// V magnitude.
+    pub v_mag: f64,
+    /// B−V, where known.
+    pub bv_mag: Option<f64>,
 }

@@ -17,10 +17,12 @@ mod contradiction;
 mod measurement;
 
 pub use contradiction::Contradiction;
-pub use measurement::{FrameMeasurement, StatedCamera};
+pub use measurement::{FieldStar, FrameMeasurement, StatedCamera};
 
+use super::SUN_BV_MAG;
 use super::zero_point::{REFERENCE_BV_MAG, WeightedColor};
-use crate::base::statistics::Estimate;
+use crate::base::statistics::{Estimate, median};
+use crate::camera::data_sheet::lens_transmission;
 use crate::model::sensitivity::{
     Budget, Detector, Faintest, Rule, Scenario, SkyBrightness, StarLight,
 };
@@ -37,7 +39,8 @@ pub struct Comparison {
     /// V magnitude at which the brightest pixel of half of the stars reaches the required
     /// signal-to-noise ratio.
     pub peak_limit_vmag: f64,
-    /// V magnitude at which this detector finds half of the stars.
+    /// V magnitude at which this detector finds half of the stars of the colour for which the fitted
+    /// limit holds.
     pub limit_vmag: f64,
     /// V magnitude at which it finds 90 % of the stars.
     pub limit90_vmag: f64,
@@ -67,12 +70,19 @@ const NO_SKY_MAG: f64 = 35.0;
 pub fn compare(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Comparison> {
     let (scenario, zenith_is_known) = scenario(stated, frame, frame.exposure_s?);
     let budget = Budget::new(&scenario);
-    let detector = Detector::matched_filter(&frame.detect, &scenario, &budget);
+    let detector = detector(frame, &scenario, &budget);
     let peak = Detector::new(Rule::PeakPixel, &scenario, &budget);
     let colors = frame.zero_point_colors;
     let zero_point_vmag = expected_zero_point_vmag(&scenario, colors, frame.has_color_term);
-    let limit_vmag = detector.vmag_at(0.5);
-    let faintest = Faintest::among(frame.field_vmag.iter().copied(), &detector);
+    let light = StarLight::new(&scenario);
+    let at_bv_mag = frame.has_color_term.then_some(SUN_BV_MAG);
+    let color_mag = fitted_color_effect_mag(&light, colors, at_bv_mag);
+    let limit_vmag = detector.vmag_at(0.5) + color_mag;
+    let found = |star: &FieldStar| {
+        let color_mag = star.bv_mag.map_or(0.0, |bv| light.color_effect_mag(bv));
+        (star.v_mag, detector.probability(star.v_mag - color_mag))
+    };
+    let faintest = Faintest::of(frame.field.iter().map(found));
     let minus = |measured: Option<Estimate>, predicted: f64| {
         measured.map(|Estimate { value, sigma }| Estimate {
             value: value - predicted,
@@ -86,7 +96,7 @@ pub fn compare(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Compar
         zenith_is_known,
         peak_limit_vmag: peak.vmag_at(0.5),
         limit_vmag,
-        limit90_vmag: detector.vmag_at(0.9),
+        limit90_vmag: detector.vmag_at(0.9) + color_mag,
         zero_point_vmag,
         sky_camera_mag_arcsec2,
         // The difference of the zero points is one of throughput, which applies to the sky as well.
@@ -124,9 +134,51 @@ fn scenario(stated: &StatedCamera, frame: &FrameMeasurement, exposure_s: f64) ->
     conditions.exposure_s = exposure_s;
     conditions.zenith_distance_deg = zenith_deg.filter(is_above_horizon).unwrap_or(0.0);
     conditions.extinction = stated.extinction.unwrap_or(conditions.extinction);
+    // Stars are found with the spots that they have, whatever smears them.
+    let sheet = &mut scenario.camera;
+    sheet.spot_sigma_px = frame.spot_sigma_px.unwrap_or(sheet.spot_sigma_px);
     scenario.conditions.sky = SkyBrightness::MagArcsec2(sky_mag_arcsec2(&scenario, frame));
     [scenario.camera.width_px, scenario.camera.height_px] = frame.size_px;
     (scenario, zenith_deg.is_some())
+}
+
+/// The detector with the frame's own threshold and noise, on average over the field.
+fn detector(frame: &FrameMeasurement, scenario: &Scenario, budget: &Budget) -> Detector {
+    let noise_e = frame.noise_adu * scenario.camera.gain_e_per_adu;
+    let threshold = (frame.threshold_sigma, noise_e);
+    let detector = Detector::on_frame(threshold, &frame.detect, scenario, budget);
+    if frame.vignetting == 0.0 {
+        return detector;
+    }
+    // Where less light arrives, the sky's noise is smaller, too.
+    let noise_where = |transmission: f64| {
+        let sky_variance_e2 = transmission * budget.background_e;
+        (budget.sensor_noise_e.powi(2) + sky_variance_e2).sqrt()
+    };
+    let transmissions = transmissions(frame);
+    let typical_noise_e = noise_where(median(&mut transmissions.clone()));
+    let difference_mag = |&part: &f64| {
+        2.5 * (part * typical_noise_e / noise_where(part))
+            .max(1e-6)
+            .log10()
+    };
+    detector.over(&transmissions.iter().map(difference_mag).collect::<Vec<_>>())
+}
+
+/// Part of the centre's light that arrives, at places all over the frame.
+fn transmissions(frame: &FrameMeasurement) -> Vec<f64> {
+    /// Places along each side. With an odd number squared, draws in their order meet all places.
+    const PLACES: usize = 15;
+    let [width, height] = frame.size_px.map(|side| side as f64);
+    let offset = |place: usize| (place as f64 + 0.5) / PLACES as f64 - 0.5;
+    let places = (0..PLACES).flat_map(|y| (0..PLACES).map(move |x| (offset(x), offset(y))));
+    let off_centre_sq = |(x, y): (f64, f64)| {
+        let radius_sq = (width * width + height * height) / 4.0;
+        ((x * width).powi(2) + (y * height).powi(2)) / radius_sq
+    };
+    places
+        .map(|place| lens_transmission(frame.vignetting, off_centre_sq(place)))
+        .collect()
 }
 
 /// Predicted V magnitude of a star that gives 1 ADU/s, by the same fit as the measured one: `colors`
@@ -137,26 +189,37 @@ pub fn expected_zero_point_vmag(
     colors: &[WeightedColor],
     has_color_term: bool,
 ) -> f64 {
-    let gain_e_per_adu = scenario.camera.gain_e_per_adu;
     let light = StarLight::new(scenario);
-    let sun_like_vmag = light.budget().vmag_of(gain_e_per_adu, 1.0);
-    let zero_point = |bv_mag: f64| sun_like_vmag + light.color_effect_mag(bv_mag);
+    let at_bv_mag = has_color_term.then_some(REFERENCE_BV_MAG);
+    light.budget().vmag_of(scenario.camera.gain_e_per_adu, 1.0)
+        + fitted_color_effect_mag(&light, colors, at_bv_mag)
+}
+
+/// By how much fainter stars are as bright as one of the scenario's temperature, according to the
+/// fit of the zero point: at a colour on the line through the colours of its stars, or on their
+/// average.
+pub fn fitted_color_effect_mag(
+    light: &StarLight,
+    colors: &[WeightedColor],
+    at_bv_mag: Option<f64>,
+) -> f64 {
+    let effect_mag = |bv_mag: f64| light.color_effect_mag(bv_mag);
     let weight: f64 = colors.iter().map(|color| color.weight).sum();
     let mean = |value: &dyn Fn(f64) -> f64| {
         let weighted = colors.iter().map(|c| c.weight * value(c.bv_mag));
         weighted.sum::<f64>() / weight
     };
     if weight <= 0.0 {
-        return sun_like_vmag;
+        return 0.0;
     }
-    let (mean_bv_mag, mean_vmag) = (mean(&|bv| bv), mean(&zero_point));
-    if !has_color_term {
-        return mean_vmag;
-    }
+    let (mean_bv_mag, mean_mag) = (mean(&|bv| bv), mean(&effect_mag));
+    let Some(at_bv_mag) = at_bv_mag else {
+        return mean_mag;
+    };
     let deviation = |bv: f64| bv - mean_bv_mag;
     let variance = mean(&|bv| deviation(bv).powi(2));
-    let slope = mean(&|bv| deviation(bv) * zero_point(bv)) / variance.max(f64::MIN_POSITIVE);
-    mean_vmag + slope * (REFERENCE_BV_MAG - mean_bv_mag)
+    let slope = mean(&|bv| deviation(bv) * effect_mag(bv)) / variance.max(f64::MIN_POSITIVE);
+    mean_mag + slope * (at_bv_mag - mean_bv_mag)
 }
 
 /// Sky brightness from the frame's background, else from its noise.
@@ -169,9 +232,12 @@ fn sky_mag_arcsec2(scenario: &Scenario, frame: &FrameMeasurement) -> f64 {
         (frame.background_adu - sheet.bias_adu) * sheet.gain_e_per_adu - of_mag_0.dark_e;
     let noise_e = frame.noise_adu * sheet.gain_e_per_adu;
     let by_noise_e = noise_e.powi(2) - of_mag_0.sensor_noise_e.powi(2);
+    // Both are medians over the frame; the sky is that of its centre.
+    let typical = median(&mut transmissions(frame));
     [by_background_e, by_noise_e]
         .into_iter()
-        .find(|sky_e| *sky_e > 0.0)
+        .map(|sky_e| sky_e / typical)
+        .find(|sky_e| *sky_e > 0.0 && sky_e.is_finite())
         .map_or(NO_SKY_MAG, |sky_e| {
             2.5 * (of_mag_0.background_e / sky_e).log10()
         })

@@ -25,7 +25,9 @@ fn measured(sky_mag_arcsec2: f64) -> FrameMeasurement<'static> {
         exposure_s: Some(0.04),
         background_adu: sheet.bias_adu + budget.background_e / sheet.gain_e_per_adu,
         noise_adu: budget.background_noise_e / sheet.gain_e_per_adu,
-        spot_sigma_px: Some(1.2),
+        threshold_sigma: 5.0,
+        vignetting: 0.0,
+        spot_sigma_px: Some(1.16),
         pixel_scale_rad: Some(sheet.pixel_scale_rad()),
         zenith_distance_deg: None,
         header_zenith_distance_deg: None,
@@ -34,7 +36,7 @@ fn measured(sky_mag_arcsec2: f64) -> FrameMeasurement<'static> {
         has_color_term: false,
         limit_vmag: None,
         faintest_vmag: None,
-        field_vmag: &[],
+        field: &[],
     }
 }
 
@@ -64,9 +66,13 @@ fn without_an_exposure_there_is_no_prediction() {
 fn differences_compare_like_with_like() {
     let mut frame = measured(18.0);
     let plain = compare(&stated(), &frame).unwrap();
-    let field: Vec<f64> = (0..60).map(|i| 6.0 + 0.1 * f64::from(i)).collect();
+    let star = |i: i32| FieldStar {
+        v_mag: 6.0 + 0.1 * f64::from(i),
+        bv_mag: None,
+    };
+    let field: Vec<FieldStar> = (0..60).map(star).collect();
     let at = |value| Some(Estimate { value, sigma: 0.04 });
-    frame.field_vmag = &field;
+    frame.field = &field;
     frame.limit_vmag = at(plain.limit_vmag + 0.1);
     frame.zero_point_vmag = at(plain.zero_point_vmag - 0.2);
     frame.faintest_vmag = Some(plain.limit_vmag + 0.3);

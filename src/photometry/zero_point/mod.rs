@@ -105,7 +105,9 @@ pub fn measure(stars: &[StandardStar]) -> Option<ZeroPoint> {
     };
     for term in [Term::Vignetting, Term::VignettingOfFourthOrder] {
         let terms = relation.terms_and(&[term]);
-        match Relation::fit_significant(stars, &terms) {
+        let further = Relation::fit_significant(stars, &terms);
+        // No lens transmits more in the corners.
+        match further.filter(Relation::loses_light_in_the_corners) {
             Some(further) => relation = further,
             None => break,
         }

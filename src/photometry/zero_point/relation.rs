@@ -11,9 +11,12 @@ const MIN_STARS_PER_TERM: usize = 10;
 /// Significance of colour terms, as a normal deviate: one frame in a hundred by chance. A spurious
 /// term costs little precision; a missing one makes zero points of frames with other stars differ.
 const COLOR_SIGMAS: f64 = 2.575_8;
-/// Significance of slope and vignetting, one frame in a thousand by chance: they are reported as
-/// faults of the frame.
-const FAULT_SIGMAS: f64 = 3.290_5;
+/// Significance of vignetting, which every lens has: one frame in forty by chance, as it has only
+/// one sign. Where it is missed, the zero point is the mean over the frame.
+const VIGNETTING_SIGMAS: f64 = 1.960;
+/// Significance of a slope, one frame in a thousand by chance: it is reported as a fault of the
+/// frame.
+const SLOPE_SIGMAS: f64 = 3.290_5;
 
 /// An optional term of the relation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -122,8 +125,9 @@ impl Relation {
         let last = self.estimate(self.terms.len());
         let degrees_of_freedom = self.weights.len() as f64 - self.coefficients.len() as f64;
         let sigmas = match self.terms.last() {
-            Some(Term::Color | Term::ColorOfSecondOrder) => COLOR_SIGMAS,
-            _ => FAULT_SIGMAS,
+            Some(Term::Slope) => SLOPE_SIGMAS,
+            Some(Term::Vignetting | Term::VignettingOfFourthOrder) => VIGNETTING_SIGMAS,
+            _ => COLOR_SIGMAS,
         };
         last.value.abs() > student_quantile(sigmas, degrees_of_freedom) * last.sigma
     }
@@ -178,6 +182,10 @@ impl Relation {
         colors.collect()
     }
 
+    pub(super) fn loses_light_in_the_corners(&self) -> bool {
+        self.corner_loss_mag().is_some_and(|loss| loss.value > 0.0)
+    }
+
     /// The sum of the terms of vignetting in the corner.
     fn corner_loss_mag(&self) -> Option<Estimate> {
         let first = self.column(Term::Vignetting)?;
@@ -227,9 +235,9 @@ mod tests {
     fn quantiles_of_student_are_those_of_the_tables() {
         // Two-sided 0.1 %, and 1 %.
         for (degrees_of_freedom, sigmas, expected) in [
-            (10.0, FAULT_SIGMAS, 4.587),
-            (20.0, FAULT_SIGMAS, 3.850),
-            (60.0, FAULT_SIGMAS, 3.460),
+            (10.0, SLOPE_SIGMAS, 4.587),
+            (20.0, SLOPE_SIGMAS, 3.850),
+            (60.0, SLOPE_SIGMAS, 3.460),
             (10.0, COLOR_SIGMAS, 3.169),
             (30.0, COLOR_SIGMAS, 2.750),
         ] {

@@ -121,7 +121,7 @@ fn terms_are_not_kept_where_chance_alone_makes_them() {
         println!("{count} stars: {colored} color terms, {sloping} slopes in {FRAMES} frames");
         // The median absolute deviation of few stars is uncertain, which raises the rates.
         assert!(colored as f64 <= 0.025 * FRAMES as f64, "{colored}");
-        assert!(vignetted as f64 <= 0.006 * FRAMES as f64, "{vignetted}");
+        assert!(vignetted as f64 <= 0.045 * FRAMES as f64, "{vignetted}");
         assert!(sloping as f64 <= 0.006 * FRAMES as f64, "{sloping}");
     }
 }

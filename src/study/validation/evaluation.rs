@@ -8,7 +8,8 @@ use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::identify::{Identification, SourceIndex};
 use crate::model::sensitivity::{CramerRao, Faintest};
 use crate::model::simulate::TrueStar;
-use crate::photometry::comparison::expected_zero_point_vmag;
+use crate::photometry::SUN_BV_MAG;
+use crate::photometry::comparison::{expected_zero_point_vmag, fitted_color_effect_mag};
 use crate::pipeline::{Note, Outcome, Solution, Source};
 use crate::sky::catalog::StarIndex;
 use crate::study::robustness::Answer;
@@ -283,11 +284,12 @@ impl<'a> Evaluation<'a> {
         let level_adu = sheet.bias_adu + truth.background_e / sheet.gain_e_per_adu;
         let noise_adu = validator.budget.background_noise_e / sheet.gain_e_per_adu;
         let zero_point = self.zero_point_mag();
+        let linearity = photometry.and_then(|p| p.zero_point.as_ref()?.linearity);
         FrameRecord {
             faintest_vmag: faintest.map(|v_mag| to_decimals(v_mag, 3)),
             expected_faintest_vmag: expected.map(|e| to_decimals(e.mean_vmag, 4)),
             expected_faintest_sigma_mag: expected.map(|e| to_decimals(e.sigma_mag, 4)),
-            predicted_limit_vmag: to_decimals(validator.limit_vmag(), 4),
+            predicted_limit_vmag: to_decimals(validator.limit_vmag() + self.limit_color_mag(), 4),
             measured_limit_vmag: limit.map(|limit| to_decimals(limit.v_mag, 4)),
             measured_limit_sigma_mag: limit.map(|limit| to_decimals(limit.sigma_mag, 4)),
             background_adu: background.map(|b| significant(b.level_adu)),
@@ -296,6 +298,8 @@ impl<'a> Evaluation<'a> {
             true_noise_adu: significant(noise_adu),
             zero_point_error_mag: zero_point.map(|(error_mag, _)| to_decimals(error_mag, 5)),
             zero_point_sigma_mag: zero_point.map(|(_, sigma_mag)| to_decimals(sigma_mag, 5)),
+            linearity: linearity.map(|slope| to_decimals(slope.value, 5)),
+            linearity_sigma: linearity.map(|slope| to_decimals(slope.sigma, 5)),
             ..self.attitude_fields().unwrap_or_default()
         }
     }
@@ -306,6 +310,17 @@ impl<'a> Evaluation<'a> {
         let said = notes.filter(|note| !matches!(note, Note::NoExposure));
         let codes: Vec<&str> = said.map(Note::code).collect();
         (!codes.is_empty()).then(|| codes.join(" "))
+    }
+
+    /// By how much fainter the predicted limit is for the colour for which the measured one holds.
+    fn limit_color_mag(&self) -> f64 {
+        let photometry = self.solution.photometry.as_ref();
+        let zero_point = photometry.and_then(|measured| measured.zero_point.as_ref());
+        zero_point.map_or(0.0, |zero| {
+            let light = self.validator.simulator.light();
+            let at_bv_mag = zero.color_term.map(|_| SUN_BV_MAG);
+            fitted_color_effect_mag(light, &zero.colors, at_bv_mag)
+        })
     }
 
     /// Measured minus true zero point of the frame's exposure, and its stated standard error.

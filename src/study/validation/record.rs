@@ -74,7 +74,8 @@ pub struct FrameRecord {
     pub expected_faintest_vmag: Option<f64>,
     /// Standard deviation of that magnitude by chance.
     pub expected_faintest_sigma_mag: Option<f64>,
-    /// V magnitude of predicted 50 % completeness.
+    /// V magnitude of predicted 50 % completeness, for stars of the colour for which the measured one
+    /// holds.
     pub predicted_limit_vmag: f64,
     /// V magnitude of 50 % completeness measured on this frame.
     pub measured_limit_vmag: Option<f64>,
@@ -94,6 +95,10 @@ pub struct FrameRecord {
     pub zero_point_error_mag: Option<f64>,
     /// Stated standard error of the zero point.
     pub zero_point_sigma_mag: Option<f64>,
+    /// Measured instrumental magnitudes per magnitude of V; 1 is true.
+    pub linearity: Option<f64>,
+    /// Its stated standard error.
+    pub linearity_sigma: Option<f64>,
     /// Codes of the frame's notes, separated by spaces.
     pub notes: Option<String>,
 }

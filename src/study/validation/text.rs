@@ -156,7 +156,7 @@ impl Summary {
             "0.00 %"
         );
         let p = &self.pulls;
-        let lines: [(&str, &Pull); 8] = [
+        let lines: [(&str, &Pull); 10] = [
             ("star's x", &p.x),
             ("star's y", &p.y),
             ("star's light", &p.flux),
@@ -165,6 +165,8 @@ impl Summary {
             ("roll", &p.roll),
             ("focal length", &p.focal_length),
             ("zero point", &p.zero_point),
+            ("linearity", &p.linearity),
+            ("frame's limit", &p.frame_limit),
         ];
         for (name, pull) in lines {
             let _ = writeln!(

@@ -122,7 +122,8 @@ row!(FrameRecord, "frames":
     misnamed_companions false_detections blends star_rows error_x_arcsec error_y_arcsec error_roll_arcsec sigma_x_arcsec sigma_y_arcsec
     sigma_roll_arcsec nees focal_error_px focal_sigma_px rms_px faintest_vmag expected_faintest_vmag
     expected_faintest_sigma_mag predicted_limit_vmag measured_limit_vmag measured_limit_sigma_mag background_adu
-    true_background_adu noise_adu true_noise_adu split zero_point_error_mag zero_point_sigma_mag notes);
+    true_background_adu noise_adu true_noise_adu split zero_point_error_mag zero_point_sigma_mag
+    linearity linearity_sigma notes);
 
 row!(StarRecord, "stars":
     frame kind id vmag bv_mag true_x_px true_y_px true_flux_e isolated saturated probability snr bound_x_px bound_y_px

@@ -45,6 +45,8 @@ pub(super) fn frame_row(frame: u64) -> FrameRecord {
         split: 1,
         zero_point_error_mag: Some(0.01),
         zero_point_sigma_mag: Some(0.02),
+        linearity: Some(1.01),
+        linearity_sigma: Some(0.03),
         notes: Some("not_linear large_residuals".to_owned()),
     }
 }

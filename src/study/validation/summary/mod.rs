@@ -183,7 +183,7 @@ pub struct Accumulator {
     centroids: Centroids,
     /// Pulls of x, y and flux; of the rotations about x, y and the boresight; of the focal length;
     /// of the zero point.
-    pulls: [RunningStatistics; 8],
+    pulls: [RunningStatistics; 10],
     boresight_arcsec: Vec<f64>,
     roll_arcsec: Vec<f64>,
     squares_arcsec2: [f64; 3],
@@ -256,17 +256,25 @@ impl Accumulator {
             *self.notes.entry(code.to_owned()).or_default() += 1;
         }
         if row.status == Answer::Right {
-            self.add_zero_point(row);
+            self.add_photometry(row);
         }
         self.add_attitude(row);
     }
 
-    fn add_zero_point(&mut self, row: &FrameRecord) {
-        let (error, sigma) = (row.zero_point_error_mag, row.zero_point_sigma_mag);
-        if let Some(error) = error {
+    fn add_photometry(&mut self, row: &FrameRecord) {
+        let zero_point_error_mag = row.zero_point_error_mag;
+        if let Some(error) = zero_point_error_mag {
             self.zero_point.add(error);
         }
-        if let Some(pull) = self.pulls.last_mut() {
+        let limit_error_mag = row
+            .measured_limit_vmag
+            .map(|limit| limit - row.predicted_limit_vmag);
+        let errors = [
+            (zero_point_error_mag, row.zero_point_sigma_mag),
+            (row.linearity.map(|slope| slope - 1.0), row.linearity_sigma),
+            (limit_error_mag, row.measured_limit_sigma_mag),
+        ];
+        for (pull, (error, sigma)) in self.pulls[7..].iter_mut().zip(errors) {
             pull.add_pull(error, sigma);
         }
     }
@@ -341,6 +349,8 @@ impl Accumulator {
             roll,
             focal_length,
             zero_point,
+            linearity,
+            frame_limit,
         ] = pulls;
         let faintest_sigma = self.faintest.count().max(1) as f64;
         let expected_sigma = (self.faintest_variance_sum / faintest_sigma).sqrt();
@@ -360,6 +370,8 @@ impl Accumulator {
                 roll,
                 focal_length,
                 zero_point,
+                linearity,
+                frame_limit,
             },
             attitude,
             faintest: self.faintest.difference(Some(expected_sigma)),

@@ -23,6 +23,10 @@ pub struct PullSummary {
     pub focal_length: Pull,
     /// Of the photometric zero point.
     pub zero_point: Pull,
+    /// Of the proportionality of grey levels and light.
+    pub linearity: Pull,
+    /// Of the limit measured on a frame, against the predicted one.
+    pub frame_limit: Pull,
 }
 
 /// Statistics of one pull.
