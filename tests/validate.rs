@@ -252,7 +252,7 @@ fn a_modified_table_is_reported_with_the_position() {
             with_line(5, &bad_word),
             "line 5: unknown variant `rihgt`, expected one of `right`",
         ),
-        (with_line(5, "3,1"), "line 5: 2 fields, expected 40"),
+        (with_line(5, "3,1"), "line 5: 2 fields, expected 42"),
         (with_line(5, rows[5]), "line 5: frame 4 with the seed"),
         (
             with_line(1, "a,b"),

@@ -75,6 +75,8 @@ pub struct Detections {
     pub threshold_sigma: f64,
     /// The spots where they are not round Gaussians of that size.
     pub psf: Option<MeasuredPsf>,
+    /// Light beyond the fitted spots, which is in the fluxes; `None` where it is not significant.
+    pub wings: Option<Wings>,
     /// Why the rate of false detections asked for is held less well than in independent noise.
     pub noise_tail: Option<NoiseTail>,
 }
@@ -90,6 +92,15 @@ pub struct MeasuredPsf {
     pub sigma_range_px: [f64; 2],
     /// Whether the spots are lopsided along the line from the centre of the frame: coma.
     pub is_comatic: bool,
+}
+
+/// Light of the stars beyond the spots that are fitted to them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wings {
+    /// That light over that of the fitted spots.
+    pub share: f64,
+    /// Its standard error.
+    pub sigma: f64,
 }
 
 /// What makes large values of the filtered noise more frequent than in independent noise.

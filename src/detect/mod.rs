@@ -16,6 +16,7 @@
 //!    an effective PSF is measured on the bright ones.
 //! 6. `fit`, `measure`: a fit of each source, together with those that it touches, or a
 //!    grey-weighted centroid; flags for what is no star, or no whole one.
+//! 7. `wings`: light of the stars beyond the spots that are fitted, which is added to the fluxes.
 //!
 //! `search` runs steps 2 to 4, up to three times, until the filter fits the stars that it finds.
 //! Steps 1 to 3 process the pixels in rows of cells, each by itself, so that threads can share them
@@ -49,21 +50,25 @@ mod search;
 mod star_model;
 mod threads;
 mod threshold;
+mod wings;
 mod workspace;
 
 pub use background_map::BackgroundMap;
 pub use config::{CentroidMethod, DetectConfig};
-pub use detection::{Detection, DetectionFlags, Detections, MeasuredPsf, NoiseTail};
+pub use detection::{Detection, DetectionFlags, Detections, MeasuredPsf, NoiseTail, Wings};
 pub use error::DetectError;
 pub use filter_model::FilterModel;
 pub use workspace::Workspace;
 
 use crate::frame::{Frame, MIN_SIDE_PX};
+use background::Mesh;
 use candidates::PeakSearch;
 use measure::{Measurement, StarShape};
 use pixels::View;
+use psf::PIXEL_VARIANCE_PX2;
 use psf_fit::measure_psf;
 use search::{FrameSearch, SearchInput};
+use wings::measure_wings;
 
 /// Finds the stars of `frame`, and other sources, brightest first.
 ///
@@ -163,8 +168,23 @@ pub fn detect_into(
     found.spot_sigma_px = stars.spot_px;
     found.psf = psf.map(|psf| psf.summary((view.width, view.height)));
     found.threshold_sigma = pass.threshold_level;
+    add_wings(&view, &background.mesh, found);
     found.noise_tail = pass.noise_tail;
     Ok(())
+}
+
+/// Measures the light of the stars beyond their fitted spots, and adds it to the fluxes.
+fn add_wings(view: &View<'_>, background: &Mesh, found: &mut Detections) {
+    let widest = found
+        .psf
+        .map_or(found.spot_sigma_px, |psf| psf.sigma_range_px[1]);
+    let width_px = (widest.powi(2) + PIXEL_VARIANCE_PX2).sqrt();
+    found.wings = measure_wings(view, background, &found.sources, width_px);
+    if let Some(wings) = found.wings {
+        for source in found.sources.iter_mut() {
+            source.flux_adu *= 1.0 + wings.share;
+        }
+    }
 }
 
 /// The result for a frame without light.
@@ -175,5 +195,6 @@ fn describe_darkness(frame: &Frame, config: &DetectConfig, found: &mut Detection
     found.spot_sigma_px = config.spot_sigma_px.unwrap_or(star_model::DEFAULT_SPOT_PX);
     found.threshold_sigma = config.threshold_sigma.unwrap_or(0.0);
     found.psf = None;
+    found.wings = None;
     found.noise_tail = None;
 }

@@ -37,6 +37,9 @@ use zero_point::{StandardStar, ZeroPoint};
 /// B−V of a star like the Sun, for which limits hold.
 pub const SUN_BV_MAG: f64 = 0.64;
 
+/// Magnitudes per relative error: 2.5 / ln 10.
+const MAG_PER_RELATIVE: f64 = 1.085_736_204_758_13;
+
 /// Photometry of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FramePhotometry {
@@ -71,7 +74,11 @@ pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry
         .iter()
         .filter_map(|star| standard_star(star, &by_v, frame, sky))
         .collect();
-    let zero_point = zero_point::measure(&standards);
+    let mut zero_point = zero_point::measure(&standards);
+    if let (Some(zero_point), Some(wings)) = (&mut zero_point, frame.detections.wings) {
+        let common_sigma_mag = MAG_PER_RELATIVE * wings.sigma / (1.0 + wings.share);
+        zero_point.sigma_mag = zero_point.sigma_mag.hypot(common_sigma_mag);
+    }
     let color_term = zero_point.as_ref().and_then(|zero| zero.color_term);
     let completeness = match color_term {
         None => by_v,
@@ -102,8 +109,6 @@ fn standard_star(
     const MIN_SNR: f64 = 10.0;
     /// Largest light of undetected neighbours, which is subtracted, over the star's own.
     const MAX_NEIGHBOURS_LIGHT: f64 = 0.1;
-    /// Magnitudes per relative error: 2.5 / ln 10.
-    const MAG_PER_RELATIVE: f64 = 1.085_736_204_758_13;
     let detection = &frame.detections.sources[star.detection?];
     let is_bright = match &completeness.limit {
         Ok(limit) => star.v_mag < limit.v_mag - COMPLETE_WIDTHS * limit.width_mag,

@@ -6,7 +6,7 @@ use super::outcome::Outcome;
 use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;
-use crate::detect::{MeasuredPsf, NoiseTail};
+use crate::detect::{MeasuredPsf, NoiseTail, Wings};
 use crate::frame::IgnoredValue;
 use crate::identify::{Identification, Priors, ScalePrior, ScaleSource};
 use crate::photometry::FramePhotometry;
@@ -18,6 +18,8 @@ use std::fmt;
 
 /// An error of the lens model, or of spots, that deserves a note, in pixels.
 const LARGE_EXCESS_PX: f64 = 1.0;
+/// Vignetting that deserves a note, in magnitudes in the corner.
+const NOTABLE_CORNER_LOSS_MAG: f64 = 0.1;
 /// Most stars or detections that a note lists.
 const MOST_LISTED: usize = 5;
 
@@ -56,6 +58,8 @@ pub enum Note {
     FalseDetections(NoiseTail),
     /// The spots are no round Gaussians of one size: their form was measured.
     Spots(MeasuredPsf),
+    /// The stars have light beyond the spots that are fitted to them.
+    Wings(Wings),
     /// The dark has another exposure than the frame.
     DarkExposure(ExposureMismatch),
     /// The Moon or a planet is in the frame.
@@ -87,6 +91,7 @@ impl Note {
             Self::Vignetting(_) => "vignetting",
             Self::FalseDetections(_) => "false_detections",
             Self::Spots(_) => "spots_not_round",
+            Self::Wings(_) => "wings",
             Self::BodyInFrame(_) => "body_in_frame",
             Self::DarkExposure(_) => "dark_exposure_differs",
             Self::BrightStarsNotNamed(_) => "bright_stars_not_named",
@@ -185,6 +190,7 @@ impl Note {
             })
         });
         let loss = zero_point.and_then(|zero| zero.corner_loss_mag);
+        let loss = loss.filter(|loss| loss.value > NOTABLE_CORNER_LOSS_MAG);
         slope.into_iter().chain(loss.map(Self::Vignetting))
     }
 }
@@ -225,6 +231,12 @@ impl fmt::Display for Note {
             ),
             Self::FalseDetections(tail) => write_noise_tail(f, *tail),
             Self::Spots(psf) => write_spots(f, psf),
+            Self::Wings(Wings { share, sigma }) => write!(
+                f,
+                "the stars have wings: {:.1} ± {:.1} % of the light of their fitted spots lies farther out, and is added to the fluxes",
+                100.0 * share,
+                100.0 * sigma
+            ),
             Self::DarkExposure(mismatch) => mismatch.fmt(f),
             Self::BodyInFrame(seen) => write_body(f, seen),
             Self::BrightStarsNotNamed(stars) => {

@@ -75,6 +75,7 @@ impl Solved<'_> {
             noise_adu: self.detections.noise_adu,
             threshold_sigma: self.detections.threshold_sigma,
             vignetting: self.stated_vignetting(),
+            wings: self.detections.wings.map_or(0.0, |wings| wings.share),
             spot_sigma_px: found.map(|_| self.detections.spot_sigma_px),
             pixel_scale_rad: found.map(|found| 1.0 / found.camera.focal_length_px),
             zenith_distance_deg: self.observation.as_ref().map(zenith_distance_deg),
@@ -137,6 +138,7 @@ impl Solved<'_> {
             .chain(Note::of_photometry(self.photometry.as_ref()))
             .chain(self.detections.noise_tail.map(Note::FalseDetections))
             .chain(self.detections.psf.map(Note::Spots))
+            .chain(self.detections.wings.map(Note::Wings))
             .chain(Note::of_bodies(
                 &self.bodies,
                 outcome,

@@ -43,6 +43,8 @@ impl Completeness {
     pub fn start(&mut self, stars: usize) {
         self.odds.clear();
         self.odds.resize(stars, 1.0);
+        self.shares.clear();
+        self.visibility.clear();
     }
 
     /// The odds that a predicted star is detected.

@@ -36,6 +36,8 @@ pub struct FrameMeasurement<'a> {
     pub threshold_sigma: f64,
     /// Share of the light lost in the corners.
     pub vignetting: f64,
+    /// Light beyond the spots, over that of the spots.
+    pub wings: f64,
     /// Standard deviation of a star's spot, in pixels.
     pub spot_sigma_px: Option<f64>,
     /// Pixel scale, in radians.

@@ -147,8 +147,10 @@ fn detector(frame: &FrameMeasurement, scenario: &Scenario, budget: &Budget) -> D
     let noise_e = frame.noise_adu * scenario.camera.gain_e_per_adu;
     let threshold = (frame.threshold_sigma, noise_e);
     let detector = Detector::on_frame(threshold, &frame.detect, scenario, budget);
+    // The filter sees the spots alone.
+    let wings_mag = -2.5 * (1.0 + frame.wings).log10();
     if frame.vignetting == 0.0 {
-        return detector;
+        return detector.over(&[wings_mag]);
     }
     // Where less light arrives, the sky's noise is smaller, too.
     let noise_where = |transmission: f64| {
@@ -158,9 +160,8 @@ fn detector(frame: &FrameMeasurement, scenario: &Scenario, budget: &Budget) -> D
     let transmissions = transmissions(frame);
     let typical_noise_e = noise_where(median(&mut transmissions.clone()));
     let difference_mag = |&part: &f64| {
-        2.5 * (part * typical_noise_e / noise_where(part))
-            .max(1e-6)
-            .log10()
+        let signal_to_noise = part * typical_noise_e / noise_where(part);
+        wings_mag + 2.5 * signal_to_noise.max(1e-6).log10()
     };
     detector.over(&transmissions.iter().map(difference_mag).collect::<Vec<_>>())
 }

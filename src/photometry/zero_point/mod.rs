@@ -22,71 +22,15 @@
 //! makes brighter.
 
 mod relation;
+mod standard;
 mod weights;
 
-use crate::base::statistics::Estimate;
+pub use standard::{MIN_STARS, REFERENCE_BV_MAG, StandardStar, WeightedColor, ZeroPoint};
+
 use relation::{Relation, Term};
 
-/// Reference B−V of the zero point where there is a colour term: about that of the Sun and of many
-/// field stars.
-pub const REFERENCE_BV_MAG: f64 = 0.6;
-/// Minimum number of stars for a zero point.
-pub const MIN_STARS: usize = 5;
 /// A colour term is tried where at least this share of the stars has a colour.
 const MIN_COLORED_SHARE: f64 = 0.5;
-
-/// A star of known V magnitude with its measured flux.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StandardStar {
-    /// V magnitude from the catalogue.
-    pub v_mag: f64,
-    /// B−V, where known.
-    pub bv_mag: Option<f64>,
-    /// −2.5 log10(flux).
-    pub instrumental_mag: f64,
-    /// Its standard error from the flux alone.
-    pub sigma_mag: f64,
-    /// Distance from the frame's centre over that of the corner, squared.
-    pub off_centre_sq: f64,
-}
-
-/// The conversion from instrumental to V magnitudes.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ZeroPoint {
-    /// V magnitude of a star with a flux of 1.
-    pub v_mag: f64,
-    /// Its standard error.
-    pub sigma_mag: f64,
-    /// Robust standard deviation of a star about the relation, flux noise included.
-    pub scatter_mag: f64,
-    /// Number of stars.
-    pub stars: usize,
-    /// The B−V for which it holds; `None` where no star has one.
-    pub bv_mag: Option<f64>,
-    /// The colours of its stars, where known.
-    pub colors: Vec<WeightedColor>,
-    /// k, in magnitudes per magnitude of B−V, where it is significant.
-    pub color_term: Option<Estimate>,
-    /// Magnitudes by which stars in the corner are dimmer than in the centre, where it is
-    /// significant.
-    pub corner_loss_mag: Option<Estimate>,
-    /// Instrumental magnitudes per magnitude of V: 1 where grey levels are proportional to light.
-    /// `None` with too few stars.
-    pub linearity: Option<Estimate>,
-    /// Mean V magnitude of the stars, at which the zero point of a nonlinear frame holds.
-    pub mean_v_mag: f64,
-    /// Whether [`Self::linearity`] differs significantly from 1.
-    pub is_nonlinear: bool,
-}
-
-/// The colour of a star of the zero point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WeightedColor {
-    /// B−V.
-    pub bv_mag: f64,
-    /// The star's weight in the fit.
-    pub weight: f64,
-}
 
 /// Measures the zero point of `stars`; `None` if they are too few.
 pub fn measure(stars: &[StandardStar]) -> Option<ZeroPoint> {

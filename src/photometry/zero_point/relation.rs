@@ -1,7 +1,7 @@
 //! The linear model of the zero point, and its robust fit.
 
+use super::standard::{MIN_STARS, REFERENCE_BV_MAG, StandardStar, WeightedColor, ZeroPoint};
 use super::weights::RobustWeights;
-use super::{MIN_STARS, REFERENCE_BV_MAG, StandardStar, WeightedColor, ZeroPoint};
 use crate::base::statistics::{Estimate, median};
 use nalgebra::{DMatrix, DVector};
 

@@ -1,6 +1,7 @@
 //! Tests of the zero point.
 
 use super::*;
+use crate::base::statistics::Estimate;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};

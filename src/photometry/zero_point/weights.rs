@@ -1,6 +1,6 @@
 //! The weight of each star in the fit of the zero point.
 
-use super::StandardStar;
+use super::standard::StandardStar;
 use crate::base::statistics::median;
 use nalgebra::{DMatrix, DVector};
 

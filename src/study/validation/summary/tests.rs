@@ -55,6 +55,8 @@ fn frame(number: u64, status: Answer, errors: [f64; 3]) -> FrameRecord {
         split: 1,
         zero_point_error_mag: of_right(0.03),
         zero_point_sigma_mag: of_right(0.02),
+        linearity: of_right(0.98),
+        linearity_sigma: of_right(0.02),
         notes: (number > 0).then(|| "not_linear large_residuals".to_owned()),
     }
 }
