@@ -126,6 +126,12 @@ pub struct Imperfections {
     pub moffat_beta: f64,
     /// Diameter of the central obstruction of the pupil, over that of the pupil.
     pub obstruction: f64,
+    /// Quality of the JPEG that a colour camera writes; 0: it writes raw frames.
+    pub jpeg_quality: f64,
+    /// Exponent of the tone curve of that JPEG; 1: none.
+    pub tone_gamma: f64,
+    /// Standard deviation of the smoothing against noise before that JPEG, in pixels.
+    pub denoise_px: f64,
     /// The form of a star's spot.
     pub spot_form: SpotForm,
     /// Whether the image is reversed left to right.
@@ -177,6 +183,9 @@ impl Default for Imperfections {
             field_curvature_px: 0.0,
             moffat_beta: 2.5,
             obstruction: 0.0,
+            jpeg_quality: 0.0,
+            tone_gamma: 1.0,
+            denoise_px: 0.0,
             spot_form: SpotForm::default(),
             mirrored: false,
         }

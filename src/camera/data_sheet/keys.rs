@@ -173,6 +173,18 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
         Limits::FromTo(0.0, 0.95),
         "diameter of the central obstruction over that of the pupil, for spots of Airy's pattern"
     ),
+    key!(jpeg_quality in imperfections,
+        Limits::FromTo(0.0, 100.0),
+        "quality of the JPEG of a colour camera: mosaic, demosaicing, eight bits; 0: no JPEG"
+    ),
+    key!(tone_gamma in imperfections,
+        Limits::FromTo(1.0, 5.0),
+        "exponent of the tone curve of that JPEG"
+    ),
+    key!(denoise_px in imperfections,
+        Limits::FromTo(0.0, 5.0),
+        "standard deviation of the smoothing before that JPEG, in pixels"
+    ),
     key!(response_sigma in imperfections,
         SHARE,
         "standard deviation of the pixels' response, relative to its mean (PRNU)"

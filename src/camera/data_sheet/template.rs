@@ -32,7 +32,9 @@ pub fn template(preset: Preset) -> String {
 
 /// The optional keys, commented out, with their default values.
 fn imperfections(sheet: &DataSheet) -> String {
-    let mut text = "\n# Optional properties, which affect simulated frames only:\n".to_owned();
+    let mut text =
+        "\n# Optional properties, which affect simulated frames (vignetting predictions, too):\n"
+            .to_owned();
     let forms = SpotForm::ALL.map(|form| format!("{:?}", form.name()));
     let imperfections = &sheet.imperfections;
     let _ = writeln!(

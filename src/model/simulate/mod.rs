@@ -23,6 +23,7 @@
 
 mod aberrations;
 mod camera;
+mod colour_camera;
 mod equivalent_spot;
 mod image;
 mod motion;
@@ -40,6 +41,7 @@ mod strays;
 mod truth;
 
 pub use camera::{Pointing, camera_of};
+pub(crate) use colour_camera::{colour, decoded_jpeg, demosaiced};
 pub use scene::{SCENE_KEYS, Scene};
 pub use setup::{Setup, SetupParameter};
 pub use simulator::{Simulator, star_field};

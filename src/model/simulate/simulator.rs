@@ -1,6 +1,7 @@
 //! Simulates frames of one camera, sky and scene.
 
 use super::camera::{Pointing, camera_of};
+use super::colour_camera::ColourCamera;
 use super::equivalent_spot::make_gaussian;
 use super::image::ElectronImage;
 use super::motion::Motion;
@@ -273,7 +274,16 @@ impl<'a> Simulator<'a> {
         let readout = Readout::of(sheet);
         let pixels = readout.grey_levels(image.pixels_mut(), &self.pattern, &mut random);
         let frame = Frame::new(sheet.width_px, sheet.height_px, pixels)?;
-        Ok(frame.with_levels(1.0, Some(sheet.saturation_adu() as f32)))
+        let white_adu = sheet.saturation_adu();
+        let frame = frame.with_levels(1.0, Some(white_adu as f32));
+        let budget = self.light.budget();
+        let level_adu =
+            sheet.bias_adu + (budget.background_e + budget.dark_e) / sheet.gain_e_per_adu;
+        let noise_adu = budget.background_noise_e / sheet.gain_e_per_adu;
+        match ColourCamera::of(&sheet.imperfections, (level_adu, noise_adu), white_adu) {
+            Some(camera) => camera.record(&frame),
+            None => Ok(frame),
+        }
     }
 
     /// Applies the pixel response and adds the dark current.

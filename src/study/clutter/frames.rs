@@ -2,7 +2,7 @@
 
 use super::canvas::Canvas;
 use super::kind::Kind;
-use super::recording::{self, RecordingError};
+use super::recording;
 use super::{no_sky, scenery};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::frame::{Frame, FrameError, FrameMetadata};
@@ -20,12 +20,9 @@ pub enum ClutterError {
     /// The scenario is invalid.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    /// A frame cannot be simulated.
+    /// A frame cannot be simulated or recorded.
     #[error("simulating a frame")]
     Simulate(#[from] FrameError),
-    /// A frame cannot be recorded.
-    #[error(transparent)]
-    Record(#[from] RecordingError),
     /// A frame cannot be processed.
     #[error("detecting stars in a simulated frame")]
     Detect(#[from] crate::detect::DetectError),

@@ -31,7 +31,6 @@ mod table;
 pub use evaluation::FrameResult;
 pub use frames::{ClutterError, ClutteredFrame, FrameMaker, TrueSky};
 pub use kind::Kind;
-pub use recording::RecordingError;
 pub use table::KindResult;
 
 use crate::detect::DetectConfig;

@@ -3,10 +3,11 @@
 use super::canvas::Canvas;
 use super::chance::{log_uniform, normal, place};
 use super::kind::Kind;
-use super::recording::{RecordingError, decoded_jpeg};
+use super::recording::JPEG_QUALITY;
 use super::scenery;
 use crate::base::coords::PixelPoint;
-use crate::frame::Frame;
+use crate::frame::{Frame, FrameError};
+use crate::model::simulate::decoded_jpeg;
 use image::ExtendedColorType;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -17,7 +18,7 @@ const HEIGHT: usize = 768;
 const WHITE: f64 = 255.0;
 
 /// A picture of a kind that shows no sky; every second one is a JPEG.
-pub(super) fn picture(kind: Kind, random: &mut ChaCha8Rng) -> Result<Frame, RecordingError> {
+pub(super) fn picture(kind: Kind, random: &mut ChaCha8Rng) -> Result<Frame, FrameError> {
     let mut canvas = Canvas::new(WIDTH, HEIGHT);
     let ground = Ground::of(kind, random);
     match kind {
@@ -42,7 +43,12 @@ pub(super) fn picture(kind: Kind, random: &mut ChaCha8Rng) -> Result<Frame, Reco
         levels.push((level + noise).round().clamp(0.0, WHITE) as u8);
     }
     if random.random_bool(0.5) {
-        return decoded_jpeg(&levels, [WIDTH, HEIGHT], ExtendedColorType::L8);
+        return decoded_jpeg(
+            &levels,
+            [WIDTH, HEIGHT],
+            ExtendedColorType::L8,
+            JPEG_QUALITY,
+        );
     }
     let pixels = levels.into_iter().map(f32::from).collect();
     let frame = Frame::new(WIDTH, HEIGHT, pixels)?;

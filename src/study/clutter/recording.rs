@@ -2,27 +2,16 @@
 
 use super::canvas::Canvas;
 use super::chance::{log_uniform, normal};
-use crate::frame::{self, Frame, FrameError};
-use image::codecs::jpeg::JpegEncoder;
-use image::{ExtendedColorType, ImageError};
+use crate::frame::{Frame, FrameError};
+use crate::model::simulate::{colour, decoded_jpeg, demosaiced};
+use image::ExtendedColorType;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 /// The quality of JPEGs.
-const JPEG_QUALITY: u8 = 70;
+pub(super) const JPEG_QUALITY: u8 = 70;
 /// The largest level of eight bits.
 const WHITE: f64 = 255.0;
-
-/// Why a frame cannot be recorded.
-#[derive(Debug, thiserror::Error)]
-pub enum RecordingError {
-    /// The JPEG cannot be written.
-    #[error("writing a JPEG")]
-    Encode(#[from] ImageError),
-    /// It cannot be read.
-    #[error("reading a recorded frame")]
-    Decode(#[from] FrameError),
-}
 
 /// The sky of a frame.
 #[derive(Debug, Clone, Copy)]
@@ -124,7 +113,7 @@ pub(super) fn cut_off(mut frame: Frame, random: &mut ChaCha8Rng) -> Frame {
 }
 
 /// `frame` as a phone records it: a mosaic of colours, demosaiced, a tone curve, JPEG.
-pub(super) fn as_jpeg(frame: &Frame, random: &mut ChaCha8Rng) -> Result<Frame, RecordingError> {
+pub(super) fn as_jpeg(frame: &Frame, random: &mut ChaCha8Rng) -> Result<Frame, FrameError> {
     /// Response of red, green and blue pixels to the light of a grey surface.
     const RESPONSE: [f64; 3] = [0.5, 1.0, 0.6];
     let sky = Sky::of(frame);
@@ -145,52 +134,8 @@ pub(super) fn as_jpeg(frame: &Frame, random: &mut ChaCha8Rng) -> Result<Frame, R
     let gamma = 1.0 / random.random_range(1.8..2.4);
     let tone = |linear: f64| (WHITE * libm::pow(linear.clamp(0.0, 1.0), gamma)).round() as u8;
     let bytes: Vec<u8> = colours.into_iter().flatten().map(tone).collect();
-    decoded_jpeg(&bytes, [frame.width, frame.height], ExtendedColorType::Rgb8)
-}
-
-/// The colour of a pixel of the mosaic: RGGB.
-const fn colour(x: usize, y: usize) -> usize {
-    match (x % 2, y % 2) {
-        (0, 0) => 0,
-        (1, 1) => 2,
-        _ => 1,
-    }
-}
-
-/// Bilinear interpolation: each colour is the mean of the pixels with it among the 3 × 3 around.
-fn demosaiced(mosaic: &[f64], width: usize, height: usize) -> Vec<[f64; 3]> {
-    let mut colours = Vec::with_capacity(mosaic.len());
-    for y in 0..height {
-        for x in 0..width {
-            let mut sums = [(0.0, 0.0); 3];
-            for row in y.saturating_sub(1)..(y + 2).min(height) {
-                for column in x.saturating_sub(1)..(x + 2).min(width) {
-                    // Of four neighbours with one colour all count alike; a pixel's own colour is
-                    // its own value.
-                    let is_own = row == y && column == x;
-                    let (sum, count) = &mut sums[colour(column, row)];
-                    if is_own || colour(column, row) != colour(x, y) {
-                        *sum += mosaic[row * width + column];
-                        *count += 1.0;
-                    }
-                }
-            }
-            colours.push(sums.map(|(sum, count): (f64, f64)| sum / count.max(1.0)));
-        }
-    }
-    colours
-}
-
-/// The frame that is read from the JPEG of these samples.
-pub(super) fn decoded_jpeg(
-    samples: &[u8],
-    [width, height]: [usize; 2],
-    form: ExtendedColorType,
-) -> Result<Frame, RecordingError> {
-    let mut bytes = Vec::new();
-    let mut encoder = JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY);
-    encoder.encode(samples, width as u32, height as u32, form)?;
-    Ok(frame::decode(&bytes)?)
+    let size = [frame.width, frame.height];
+    decoded_jpeg(&bytes, size, ExtendedColorType::Rgb8, JPEG_QUALITY)
 }
 
 #[cfg(test)]
@@ -245,13 +190,6 @@ mod tests {
         assert_eq!(frame.saturation_adu, Some(255.0));
         let whole = |pixel: &f32| pixel.fract() == 0.0 && (0.0..=255.0).contains(pixel);
         assert!(frame.pixels.iter().all(whole));
-    }
-
-    #[test]
-    fn an_even_mosaic_has_even_colours() {
-        let colours = demosaiced(&[0.25; 9 * 8], 9, 8);
-        let is_even = |colour: &[f64; 3]| colour.iter().all(|c| (c - 0.25).abs() < 1e-12);
-        assert!(colours.len() == 72 && colours.iter().all(is_even));
     }
 
     #[test]

@@ -28,7 +28,7 @@ impl HardCase {
 }
 
 /// The cases. Displacements by lenses are in thousandths of half of the diagonal.
-pub const HARD_SUITE: [HardCase; 18] = [
+pub const HARD_SUITE: [HardCase; 19] = [
     HardCase {
         name: "ideal",
         what: "as the camera is described",
@@ -133,6 +133,14 @@ pub const HARD_SUITE: [HardCase; 18] = [
         name: "vignetting",
         what: "60 % of the light lost in the corners",
         change: |setup| setup.scenario.camera.imperfections.vignetting = 0.6,
+    },
+    HardCase {
+        name: "colour-jpeg",
+        what: "JPEG of a colour camera: demosaiced, smoothed, with a tone curve",
+        change: |setup| {
+            let made = &mut setup.scenario.camera.imperfections;
+            (made.jpeg_quality, made.tone_gamma, made.denoise_px) = (90.0, 2.2, 0.7);
+        },
     },
     HardCase {
         name: "response",
