@@ -35,7 +35,13 @@ struct Night {
 
 impl Night {
     fn new() -> Self {
+        Self::with_vignetting(0.0)
+    }
+
+    /// The same, of a lens that loses this share of the light in the corners.
+    fn with_vignetting(vignetting: f64) -> Self {
         let mut scenario = Scenario::of(CAMERA);
+        scenario.camera.imperfections.vignetting = vignetting;
         scenario.conditions.exposure_s = EXPOSURE_S.parse().unwrap();
         scenario.conditions.sky = SkyBrightness::MagArcsec2(SKY_MAG_ARCSEC2);
         let boresight = UnitVector::from_ra_dec(300f64.to_radians(), 35f64.to_radians());
@@ -98,6 +104,31 @@ fn notes(report: &Value) -> String {
     notes
         .map(|note| note["text"].as_str().unwrap().to_owned() + "\n")
         .collect()
+}
+
+#[test]
+fn vignetting_is_removed_where_it_is_stated_and_else_measured() {
+    let night = Night::with_vignetting(0.6);
+    let zero_point_off = |report: &Value| {
+        let off = number(report, "/prediction/zero_point_difference_mag");
+        let sigma = number(report, "/prediction/zero_point_difference_sigma_mag");
+        assert!(off.abs() < ZERO_POINT_TOLERANCE_MAG + 3.0 * sigma, "{off}");
+    };
+    let unstated = night.report(&["--exposure", EXPOSURE_S]);
+    zero_point_off(&unstated);
+    assert_eq!(unstated["notes"][0]["code"], "vignetting");
+    let loss = number(&unstated, "/photometry/corner_loss_mag");
+    let sigma = number(&unstated, "/photometry/corner_loss_sigma_mag");
+    let expected = -2.5 * 0.4f64.log10();
+    assert!((loss - expected).abs() < 0.1 + 3.0 * sigma, "{loss}");
+
+    night.describe(|text| {
+        with(&text, "# vignetting", "0").replace("# vignetting = 0", "vignetting = 0.6")
+    });
+    let stated = night.report(&["--exposure", EXPOSURE_S]);
+    zero_point_off(&stated);
+    assert_eq!(notes(&stated), "");
+    assert_limit_as_predicted(&stated);
 }
 
 #[test]
