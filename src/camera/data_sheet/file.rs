@@ -5,11 +5,13 @@ use super::key::{Key, Limits, nearest_name};
 use super::keys::{IMPERFECTION_KEYS, KEYS, is_curve};
 use super::response::{Response, ResponseError};
 use super::sheet::DataSheet;
+use super::spot_image::{SpotImage, SpotImageError};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read as _;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use toml::Spanned;
 
 /// Error of reading a data sheet.
@@ -90,6 +92,16 @@ pub enum DataSheetError {
         /// The error in the curve.
         source: Box<ResponseError>,
     },
+    /// An invalid picture of a spot.
+    #[error("{}, line {line}: spot_file", path.display())]
+    Spot {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// The error in the picture.
+        source: Box<SpotImageError>,
+    },
     /// Values that contradict each other.
     #[error("{}: {what}", path.display())]
     Contradiction {
@@ -168,6 +180,9 @@ impl DataSheet {
         if let Some(uncovered) = self.uncovered(from, to) {
             return Some(format!("{uncovered} (band_from_nm, band_to_nm)"));
         }
+        if self.imperfections.spot_form == SpotForm::File && self.spot_image.is_none() {
+            return Some("spot_form is \"file\", and there is no spot_file".to_owned());
+        }
         (self.bias_adu >= self.full_scale_adu()).then(|| {
             let (bias, bits) = (self.bias_adu, self.bits);
             format!("bias_adu is {bias}, beyond the full scale of {bits} bits")
@@ -221,6 +236,7 @@ impl CameraFile<'_> {
             bias_adu: 0.0,
             spot_sigma_px: 0.0,
             peak_share: None,
+            spot_image: self.spot_image()?,
             imperfections: Imperfections {
                 spot_form: self.spot_form()?,
                 mirrored: self.mirrored()?,
@@ -245,7 +261,7 @@ impl CameraFile<'_> {
     fn check_names(&self) -> Result<(), DataSheetError> {
         let numbers = || KEYS.iter().chain(IMPERFECTION_KEYS).map(|key| key.name);
         let names = || {
-            ["name", "spot_form", "mirrored"]
+            ["name", "spot_form", "spot_file", "mirrored"]
                 .into_iter()
                 .chain(numbers())
         };
@@ -298,13 +314,36 @@ impl CameraFile<'_> {
 
     fn spot_form(&self) -> Result<SpotForm, DataSheetError> {
         let Some(value) = self.get("spot_form") else {
-            return Ok(SpotForm::default());
+            let has_file = self.get("spot_file").is_some();
+            return Ok(if has_file {
+                SpotForm::File
+            } else {
+                SpotForm::default()
+            });
         };
         let form = value.get_ref().as_str().and_then(SpotForm::named);
         form.ok_or_else(|| {
             let names = SpotForm::ALL.map(|form| format!("\"{}\"", form.name()));
             self.invalid("spot_form", value, format!("one of {}", names.join(", ")))
         })
+    }
+
+    fn spot_image(&self) -> Result<Option<Arc<SpotImage>>, DataSheetError> {
+        const KEY: &str = "spot_file";
+        let Some(value) = self.get(KEY) else {
+            return Ok(None);
+        };
+        let Some(file) = value.get_ref().as_str() else {
+            return Err(self.invalid(KEY, value, "the name of a CSV file".to_owned()));
+        };
+        let directory = self.path.parent().unwrap_or(Path::new(""));
+        let image = SpotImage::read(&directory.join(file));
+        let image = image.map_err(|source| DataSheetError::Spot {
+            path: self.path.to_owned(),
+            line: line_of(self.text, Some(value.span())),
+            source: Box::new(source),
+        })?;
+        Ok(Some(Arc::new(image)))
     }
 
     fn mirrored(&self) -> Result<bool, DataSheetError> {

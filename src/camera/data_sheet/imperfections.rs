@@ -28,16 +28,19 @@ pub enum SpotForm {
     /// Airy's pattern of a pupil with a central [`Imperfections::obstruction`]. Without obstruction
     /// its full width at half maximum is that of a Gaussian of the spot's standard deviation.
     Airy,
+    /// A picture, integrated over each pixel: [`DataSheet::spot_image`](super::DataSheet::spot_image).
+    File,
 }
 
 impl SpotForm {
     /// All forms.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Gaussian,
         Self::SampledGaussian,
         Self::Disc,
         Self::Moffat,
         Self::Airy,
+        Self::File,
     ];
 
     /// Name in files and options.
@@ -48,6 +51,7 @@ impl SpotForm {
             Self::Disc => "disc",
             Self::Moffat => "moffat",
             Self::Airy => "airy",
+            Self::File => "file",
         }
     }
 
@@ -126,6 +130,8 @@ pub struct Imperfections {
     pub moffat_beta: f64,
     /// Diameter of the central obstruction of the pupil, over that of the pupil.
     pub obstruction: f64,
+    /// Distance of the samples of a spot from a file, in pixels.
+    pub spot_step_px: f64,
     /// Quality of the JPEG that a colour camera writes; 0: it writes raw frames.
     pub jpeg_quality: f64,
     /// Exponent of the tone curve of that JPEG; 1: none.
@@ -183,6 +189,7 @@ impl Default for Imperfections {
             field_curvature_px: 0.0,
             moffat_beta: 2.5,
             obstruction: 0.0,
+            spot_step_px: 0.2,
             jpeg_quality: 0.0,
             tone_gamma: 1.0,
             denoise_px: 0.0,

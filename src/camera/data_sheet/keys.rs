@@ -173,6 +173,10 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
         Limits::FromTo(0.0, 0.95),
         "diameter of the central obstruction over that of the pupil, for spots of Airy's pattern"
     ),
+    key!(spot_step_px in imperfections,
+        Limits::FromTo(0.01, 5.0),
+        "distance of the samples of a spot from a file, in pixels"
+    ),
     key!(jpeg_quality in imperfections,
         Limits::FromTo(0.0, 100.0),
         "quality of the JPEG of a colour camera: mosaic, demosaicing, eight bits; 0: no JPEG"

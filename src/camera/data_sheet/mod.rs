@@ -19,6 +19,7 @@ mod keys;
 mod preset;
 mod response;
 mod sheet;
+mod spot_image;
 mod template;
 
 pub use file::DataSheetError;
@@ -29,4 +30,5 @@ pub use keys::{IMPERFECTION_KEYS, KEYS, is_curve};
 pub use preset::Preset;
 pub use response::{Response, ResponseError};
 pub use sheet::DataSheet;
+pub use spot_image::{SpotImage, SpotImageError};
 pub use template::template;

@@ -115,6 +115,7 @@ fn paper_camera() -> DataSheet {
         bias_adu: 128.0,
         spot_sigma_px: 1.16,
         peak_share: Some(1.0 / 9.0),
+        spot_image: None,
         imperfections: Imperfections::default(),
     }
 }
@@ -162,6 +163,7 @@ fn nanosat_tracker() -> DataSheet {
         bias_adu: 42.0,
         spot_sigma_px: 1.5,
         peak_share: None,
+        spot_image: None,
         imperfections: Imperfections::default(),
     }
 }
@@ -212,6 +214,7 @@ fn imx174() -> DataSheet {
         bias_adu: 10.0,
         spot_sigma_px: 0.7,
         peak_share: None,
+        spot_image: None,
         imperfections: Imperfections::default(),
     }
 }
@@ -271,6 +274,7 @@ fn asi183() -> DataSheet {
         bias_adu: 10.0,
         spot_sigma_px: 1.2,
         peak_share: None,
+        spot_image: None,
         imperfections: Imperfections::default(),
     }
 }

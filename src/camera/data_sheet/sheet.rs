@@ -2,7 +2,9 @@
 
 use super::imperfections::Imperfections;
 use super::response::Response;
+use super::spot_image::SpotImage;
 use std::f64::consts::SQRT_2;
+use std::sync::Arc;
 
 /// Data sheet of a camera, lens and detector.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,7 +48,9 @@ pub struct DataSheet {
     /// Share of a star's light on its brightest pixel; if `None`, it follows from
     /// [`Self::spot_sigma_px`].
     pub peak_share: Option<f64>,
-    /// Properties that affect simulated frames, but not the limiting magnitude.
+    /// The picture of a star's spot, for spots of the form [`SpotForm::File`](super::SpotForm::File).
+    pub spot_image: Option<Arc<SpotImage>>,
+    /// Properties that affect simulated frames, but not the limiting magnitude of the centre.
     pub imperfections: Imperfections,
 }
 

@@ -28,7 +28,9 @@ impl RadialProfile {
         let step_px = sigma_px / STEPS;
         let half_width_px = GAUSSIAN_FWHM / 2.0 * sigma_px;
         let density: Box<dyn Fn(f64) -> f64> = match made.spot_form {
-            SpotForm::Gaussian | SpotForm::SampledGaussian | SpotForm::Disc => return None,
+            SpotForm::Gaussian | SpotForm::SampledGaussian | SpotForm::Disc | SpotForm::File => {
+                return None;
+            }
             SpotForm::Moffat => Box::new(moffat(half_width_px, made.moffat_beta)),
             SpotForm::Airy => Box::new(airy(half_width_px, made.obstruction)),
         };

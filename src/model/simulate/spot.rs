@@ -5,9 +5,10 @@ use super::image::ElectronImage;
 use super::radial_profile::{PROFILE_SIGMAS, RadialProfile};
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::{normal_cdf, normal_density};
-use crate::camera::data_sheet::{DataSheet, SpotForm};
+use crate::camera::data_sheet::{DataSheet, SpotForm, SpotImage};
 use std::f64::consts::PI;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Radius of a Gaussian spot, in standard deviations: less than 10⁻¹⁴ of its light lies beyond.
 const REACH_SIGMAS: f64 = 8.0;
@@ -19,8 +20,10 @@ const DISC_RADIUS: f64 = 2.0;
 pub(super) struct SpotRenderer {
     form: SpotForm,
     aberrations: Aberrations,
-    /// Of forms that are not a Gaussian or a disc.
+    /// Of forms that are a function of the distance, but no Gaussian or disc.
     profile: Option<RadialProfile>,
+    /// Of a spot from a file, and the distance of its samples in pixels.
+    picture: Option<(Arc<SpotImage>, f64)>,
     /// Buffers: the rays of one star, and the fractions of a ray's light in columns and rows.
     rays: Vec<Ray>,
     columns: Vec<f64>,
@@ -34,6 +37,7 @@ impl SpotRenderer {
         Self {
             form,
             profile: RadialProfile::of(&sheet.imperfections, aberrations.ray_sigma_px()),
+            picture: picture(sheet),
             aberrations,
             rays: Vec::new(),
             columns: Vec::new(),
@@ -53,8 +57,11 @@ impl SpotRenderer {
 
     /// Radius of the spot of one ray, in pixels.
     fn ray_reach_px(&self) -> f64 {
+        if let Some((picture, step_px)) = &self.picture {
+            return picture.reach() * step_px;
+        }
         let sigmas = match self.form {
-            SpotForm::Gaussian | SpotForm::SampledGaussian => REACH_SIGMAS,
+            SpotForm::Gaussian | SpotForm::SampledGaussian | SpotForm::File => REACH_SIGMAS,
             SpotForm::Disc => DISC_RADIUS,
             SpotForm::Moffat | SpotForm::Airy => PROFILE_SIGMAS,
         };
@@ -83,6 +90,10 @@ impl SpotRenderer {
             let share = |x, y| profile.share(x, y);
             return add_pixels(image, position, electrons, (columns, rows), share);
         }
+        if let Some((picture, step_px)) = &self.picture {
+            let share = |x, y| picture.share(x, y, *step_px);
+            return add_pixels(image, position, electrons, (columns, rows), share);
+        }
         if self.form == SpotForm::Disc {
             let share = |x, y| disc_share(x, y, reach_px);
             return add_pixels(image, position, electrons, (columns, rows), share);
@@ -102,6 +113,12 @@ impl SpotRenderer {
             }
         }
     }
+}
+
+fn picture(sheet: &DataSheet) -> Option<(Arc<SpotImage>, f64)> {
+    let picture = sheet.spot_image.clone()?;
+    let made = &sheet.imperfections;
+    (made.spot_form == SpotForm::File).then_some((picture, made.spot_step_px))
 }
 
 /// Adds light of which `share` is the fraction in a pixel at a distance along x and y.
@@ -218,6 +235,32 @@ mod tests {
             let mean = sum(&|x| x);
             (mean, sum(&|x| (x - mean).powi(2)))
         })
+    }
+
+    #[test]
+    fn a_gaussian_from_a_file_is_drawn_as_a_gaussian() {
+        const STEP_PX: f64 = 0.05;
+        let density = |i: i32, j: i32| {
+            let distance = f64::from(i).hypot(f64::from(j)) * STEP_PX;
+            normal_density(distance / 1.2)
+        };
+        let row = |j: i32| {
+            let samples: Vec<String> = (-120..=120).map(|i| density(i, j).to_string()).collect();
+            samples.join(",") + "\n"
+        };
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("psf.csv");
+        std::fs::write(&path, (-120..=120).map(row).collect::<String>()).unwrap();
+        let mut sheet = Preset::Experiment1.data_sheet();
+        sheet.spot_image = Some(Arc::new(SpotImage::read(&path).unwrap()));
+        sheet.imperfections.spot_step_px = STEP_PX;
+        sheet.imperfections.spot_form = SpotForm::File;
+        let mut image = ElectronImage::new(SIDE, SIDE, 0.0);
+        SpotRenderer::new(&sheet).add(&mut image, &PixelPoint::new(31.3, 30.8), 1.0);
+        let expected = drawn(SpotForm::Gaussian, 1.2, (31.3, 30.8));
+        for (found, expected) in image.into_pixels().iter().zip(&expected) {
+            assert!((found - expected).abs() < 3e-5, "{found} {expected}");
+        }
     }
 
     #[test]
