@@ -225,6 +225,7 @@ fn camera(
         bias_adu: 100.0,
         spot_sigma_px,
         peak_share: None,
+        spot_image: None,
         imperfections: Imperfections::default(),
     }
 }

@@ -435,6 +435,19 @@ mod tests {
     }
 
     #[test]
+    fn most_stars_may_be_hidden_at_all_magnitudes() {
+        let sky = TYPICAL.with(|sky| (sky.stars, sky.lost) = (40_000, 0.65));
+        for seed in 0..20 {
+            let limit = measure(&sky.draw(seed), sky.chance).limit.unwrap();
+            let off = (limit.v_mag - sky.limit) / limit.sigma_mag;
+            assert!(
+                off.abs() < 4.0 && (limit.lost - 0.65).abs() < 0.05,
+                "{limit:?}"
+            );
+        }
+    }
+
+    #[test]
     fn one_bright_star_that_is_lost_moves_nothing() {
         let mut stars = TYPICAL.draw(7);
         let before = measure(&stars, TYPICAL.chance).limit.unwrap();

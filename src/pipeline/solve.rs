@@ -10,7 +10,6 @@ use super::stopwatch::{Stage, Stopwatch};
 use crate::calibration::Calibration;
 use crate::detect::{self, DetectError};
 use crate::frame::{self, Frame, FrameError};
-
 use std::num::NonZeroUsize;
 use std::path::Path;
 

@@ -37,6 +37,7 @@ pub fn data_sheet(side_px: usize, spot_sigma_px: f64) -> DataSheet {
         bias_adu: 100.0,
         spot_sigma_px,
         peak_share: None,
+        spot_image: None,
         imperfections: Imperfections::default(),
     }
 }

@@ -145,8 +145,14 @@ fn scenario(stated: &StatedCamera, frame: &FrameMeasurement, exposure_s: f64) ->
 /// The detector with the frame's own threshold and noise, on average over the field.
 fn detector(frame: &FrameMeasurement, scenario: &Scenario, budget: &Budget) -> Detector {
     let noise_e = frame.noise_adu * scenario.camera.gain_e_per_adu;
-    let threshold = (frame.threshold_sigma, noise_e);
-    let detector = Detector::on_frame(threshold, &frame.detect, scenario, budget);
+    // A frame without light has no threshold.
+    let detector = match frame.threshold_sigma > 0.0 {
+        true => {
+            let threshold = (frame.threshold_sigma, noise_e);
+            Detector::on_frame(threshold, &frame.detect, scenario, budget)
+        }
+        false => Detector::matched_filter(&frame.detect, scenario, budget),
+    };
     // The filter sees the spots alone.
     let wings_mag = -2.5 * (1.0 + frame.wings).log10();
     if frame.vignetting == 0.0 {
