@@ -16,9 +16,9 @@ const APERTURE_SIGMAS: f64 = 8.0;
 /// … and the distance of other sources from its edge.
 const MARGIN_SIGMAS: f64 = 3.0;
 /// Signal-to-noise ratio of stars that count, and the largest number of them.
-const MIN_SNR: f64 = 15.0;
+const MIN_SNR: f64 = 10.0;
 const MAX_STARS: usize = 60;
-const MIN_STARS: usize = 4;
+const MIN_STARS: usize = 3;
 /// Smallest share of the light that is corrected: below, the spot is as good as its model.
 const MIN_SHARE: f64 = 0.02;
 /// Its significance, as a normal deviate.

@@ -2,11 +2,14 @@
 //! their PSF is measured.
 
 use super::spot_size::{MODE_WIDTH, weighted_size};
+use crate::detect::effective_psf::FieldFrame;
 use crate::detect::fit::{Fit, GaussianLight, NoiseModel, WindowPixels};
 use crate::detect::psf::GROUP_PX;
 
 /// Smaller elongations are of no account, as the logarithm of the ratio of the axes.
 const MIN_ELONGATION: f64 = 0.06;
+/// Nor are smaller ones that there are in the corners alone.
+const MIN_ELONGATION_IN_CORNER: f64 = 2.0 * MIN_ELONGATION;
 /// The form of sharper spots is lost in the pixels, in pixels,
 const MIN_SPOT_PX: f64 = 0.65;
 /// unless they are elongated by more than this.
@@ -18,24 +21,38 @@ const MIN_SIZE_SCATTER: f64 = 0.04;
 /// A departure below this many standard errors is chance.
 const SIGNIFICANT_SIGMA: f64 = 5.0;
 
-/// The elongation that most stars share, from the residuals of fits of round spots: a score test.
-#[derive(Debug, Clone, Copy, Default)]
+/// The elongation that most stars share, and that which grows with the square of the distance from
+/// the centre, radially or across (astigmatism), from the residuals of fits of round spots: score
+/// tests.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct CommonElongation {
+    field: FieldFrame,
     /// Of `[e₁, e₂]` as in [`SpotMoments`](crate::detect::effective_psf::SpotMoments): sums of
     /// residual times derivative, and of the squares of the derivatives, over the variance.
     sums: [[f64; 2]; 2],
+    /// The same of the radial elongation in the corner.
+    radial: [f64; 2],
 }
 
 impl CommonElongation {
-    /// Adds the pixels of a star.
+    /// Nothing is known of the stars in a frame of this width and height, in pixels.
+    pub fn of(size: (usize, usize)) -> Self {
+        Self {
+            field: FieldFrame::of(size),
+            sums: [[0.0; 2]; 2],
+            radial: [0.0; 2],
+        }
+    }
+
+    /// Adds the pixels of a star, whose fit is given.
     #[allow(
         clippy::needless_range_loop,
         reason = "lanes of several arrays read best as indices"
     )]
-    pub fn add(&mut self, light: &GaussianLight<'_>, spot_px: f64, pixels: &WindowPixels<'_>) {
+    pub fn add(&mut self, light: &GaussianLight<'_>, fit: &Fit, pixels: &WindowPixels<'_>) {
         let [across, down] = light.axes;
         let mut sums = [[0.0f32; 2]; 2];
-        let sigma = spot_px as f32;
+        let sigma = fit.spot_px as f32;
         for group in 0..pixels.groups {
             let across = across.group(group);
             for (row, data) in pixels.column_of_groups(group).enumerate() {
@@ -58,6 +75,11 @@ impl CommonElongation {
                 }
             }
         }
+        let [_, x, y, ..] = self.field.terms(fit.spots[0].x, fit.spots[0].y);
+        for (part, [score, information]) in [x * x - y * y, 2.0 * x * y].into_iter().zip(sums) {
+            self.radial[0] += part * f64::from(score);
+            self.radial[1] += part * part * f64::from(information);
+        }
         for (sums, of_star) in self.sums.iter_mut().zip(sums) {
             for (sum, of_star) in sums.iter_mut().zip(of_star) {
                 *sum += f64::from(of_star);
@@ -71,6 +93,13 @@ impl CommonElongation {
         let information = self.sums[0][1].min(self.sums[1][1]);
         let e = e1.hypot(e2);
         e > limit && e > SIGNIFICANT_SIGMA / information.sqrt()
+    }
+
+    /// Whether it grows from the centre, for certain.
+    fn grows(&self) -> bool {
+        let [score, information] = self.radial;
+        let in_corner = (score / information).abs();
+        in_corner > MIN_ELONGATION_IN_CORNER && in_corner > SIGNIFICANT_SIGMA / information.sqrt()
     }
 }
 
@@ -86,7 +115,10 @@ pub(super) fn is_departure(
     }
     let is_misfitted = noise.model_error2 > MIN_MODEL_ERROR * MIN_MODEL_ERROR;
     let has_form = || {
-        is_misfitted || elongation.exceeds(MIN_ELONGATION) || have_scattered_sizes(stars, spot_px)
+        is_misfitted
+            || elongation.exceeds(MIN_ELONGATION)
+            || elongation.grows()
+            || have_scattered_sizes(stars, spot_px)
     };
     spot_px > MIN_SPOT_PX && has_form()
 }

@@ -53,7 +53,7 @@ pub(crate) fn star_model(
         shot_adu: brightest.map_or(0.0, |spot| maps.noise_at(spot.x, spot.y)),
         model_error2: 0.0,
     };
-    let mut elongation = CommonElongation::default();
+    let mut elongation = CommonElongation::of((maps.view.width, maps.view.height));
     // Each round weights the squared residuals by the variance from the round before.
     for round in 1..=NOISE_ROUNDS {
         let mut sums = Moments::default();
@@ -151,7 +151,7 @@ impl Moments {
         let [a, b, c, p, q] = match spot {
             AnyLight::Gaussian(spot) => {
                 if let Some(elongation) = elongation {
-                    elongation.add(&spot, fit.spot_px, &pixels);
+                    elongation.add(&spot, fit, &pixels);
                 }
                 sums_of(&factor, &spot, &pixels)
             }
