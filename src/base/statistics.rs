@@ -92,6 +92,9 @@ impl LnProduct {
     }
 }
 
+/// Standard deviation per median absolute deviation, for a normal distribution.
+pub const SIGMA_PER_MAD: f64 = 1.482_6;
+
 /// The median of `values`: the upper one if their number is even, 0 if there are none.
 ///
 /// Reorders `values`.

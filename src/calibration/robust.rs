@@ -1,9 +1,7 @@
 //! Mean and standard deviation of many values without outliers.
 
-use crate::base::statistics::median;
+use crate::base::statistics::{SIGMA_PER_MAD, median};
 
-/// Ratio of standard deviation to median absolute deviation of a normal distribution.
-const SIGMA_PER_MAD: f64 = 1.4826;
 /// Values beyond this number of standard deviations are outliers. A normal distribution has 6 in
 /// ten million there; clipping them lowers its standard deviation by less than 10⁻⁵ of it.
 const CLIP_SIGMA: f64 = 5.0;

@@ -46,6 +46,12 @@ impl CameraModel {
         libm::hypot(self.width_px, self.height_px) / 2.0
     }
 
+    /// Distance of `pixel` from the centre over that of the corner, squared.
+    pub fn off_centre_sq(&self, pixel: &PixelPoint) -> f64 {
+        let [u, v] = self.offset_of(pixel);
+        (u * u + v * v) / self.radius_px().powi(2)
+    }
+
     /// Observed offset of `pixel` from the centre along the camera's x and y axes, in pixels.
     pub fn offset_of(&self, pixel: &PixelPoint) -> [f64; 2] {
         let centre = self.centre();

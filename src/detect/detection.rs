@@ -57,6 +57,11 @@ impl DetectionFlags {
     pub fn is_star_like(&self) -> bool {
         !(self.hot_pixel || self.trail || self.extended)
     }
+
+    /// Whether the flux is complete and without light of other stars.
+    pub fn has_clean_flux(&self) -> bool {
+        !(self.saturated || self.blended || self.border)
+    }
 }
 
 /// All sources of a frame.

@@ -10,6 +10,7 @@
 use super::background::Mesh;
 use super::detection::{Detection, Wings};
 use super::pixels::View;
+use crate::base::statistics::SIGMA_PER_MAD;
 
 /// Radius of the aperture, in standard deviations of the spot, …
 const APERTURE_SIGMAS: f64 = 8.0;
@@ -25,8 +26,6 @@ const MIN_SHARE: f64 = 0.02;
 const SIGNIFICANT_SIGMAS: f64 = 5.0;
 /// Stars farther than this many standard errors from the median do not count.
 const CLIP_SIGMAS: f64 = 3.0;
-/// Standard deviation per median absolute deviation, for a normal distribution.
-const SIGMA_PER_MAD: f64 = 1.482_6;
 
 /// The share of a star's light that its fit lacks, and its standard error.
 #[derive(Debug, Clone, Copy, Default)]
@@ -62,10 +61,10 @@ pub(crate) fn measure_wings(
     is_large.then_some(wings)
 }
 
+/// Whether it is bright and whole.
 fn is_clean(source: &Detection) -> bool {
     let flags = &source.flags;
-    let is_whole = !(flags.saturated || flags.blended || flags.border);
-    is_whole && flags.is_star_like() && source.snr >= MIN_SNR
+    flags.has_clean_flux() && flags.is_star_like() && source.snr >= MIN_SNR
 }
 
 fn is_alone(source: &Detection, sources: &[Detection], apart_px: f64) -> bool {

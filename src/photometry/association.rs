@@ -47,7 +47,7 @@ struct Surroundings {
 
 /// Part of the light of a neighbour at this distance that is in the flux of a star: the
 /// autocorrelation of a Gaussian spot.
-fn filter_response(distance_sigmas: f64) -> f64 {
+pub(crate) fn filter_response(distance_sigmas: f64) -> f64 {
     (-0.25 * distance_sigmas.powi(2)).exp()
 }
 

@@ -21,11 +21,10 @@ pub mod completeness;
 mod identified_frame;
 pub mod zero_point;
 
-pub(crate) use association::resolved_px;
+pub(crate) use association::{filter_response, resolved_px};
 pub use identified_frame::IdentifiedFrame;
 
 use crate::base::statistics::median;
-use crate::camera::CameraModel;
 use crate::camera::data_sheet::lens_transmission;
 use crate::detect::Detection;
 use crate::identify::{IndexedCatalog, View};
@@ -117,8 +116,11 @@ fn standard_star(
     let known = sky.catalog().star(star.star);
     let is_alone = star.neighbours_light < MAX_NEIGHBOURS_LIGHT;
     let is_fit =
-        is_bright && is_alone && has_clean_flux(detection) && is_constant_and_single(known);
-    let off_centre_sq = off_centre_sq(detection, &frame.identification.camera);
+        is_bright && is_alone && detection.flags.has_clean_flux() && is_constant_and_single(known);
+    let off_centre_sq = frame
+        .identification
+        .camera
+        .off_centre_sq(&detection.position);
     let flux_adu = detection.flux_adu
         / (1.0 + star.neighbours_light)
         / lens_transmission(frame.vignetting, off_centre_sq);
@@ -129,12 +131,6 @@ fn standard_star(
         sigma_mag: MAG_PER_RELATIVE / detection.snr,
         off_centre_sq,
     })
-}
-
-/// Distance from the frame's centre over that of the corner, squared.
-fn off_centre_sq(detection: &Detection, camera: &CameraModel) -> f64 {
-    let [u, v] = camera.offset_of(&detection.position);
-    (u * u + v * v) / camera.radius_px().powi(2)
 }
 
 /// −2.5 log10(`flux`): the magnitude without zero point.
@@ -162,12 +158,6 @@ fn depth_v_mag(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> f64 {
         .fold(f64::MIN, f64::max);
     let by_flux = median(&mut offsets) + faintest_star;
     faintest.fold(by_flux, f64::max) + MARGIN_MAG
-}
-
-/// Whether the flux is complete and without light of other stars.
-fn has_clean_flux(detection: &Detection) -> bool {
-    let flags = &detection.flags;
-    !(flags.saturated || flags.blended || flags.border)
 }
 
 fn is_constant_and_single(star: &Star) -> bool {

@@ -92,9 +92,7 @@ impl<'a> Sky<'a> {
 
     /// Transmission of the lens relative to the centre.
     fn lens(&self, place: &PixelPoint) -> f64 {
-        let [u, v] = self.camera.offset_of(place);
-        let radius_px = self.camera.radius_px();
-        lens_transmission(self.vignetting, (u * u + v * v) / (radius_px * radius_px))
+        lens_transmission(self.vignetting, self.camera.off_centre_sq(place))
     }
 }
 

@@ -68,9 +68,12 @@ const NO_SKY_MAG: f64 = 35.0;
 
 /// Compares a frame with the prediction for the stated camera; `None` if the exposure is unknown.
 pub fn compare(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Comparison> {
-    let (scenario, zenith_is_known) = scenario(stated, frame, frame.exposure_s?);
+    let exposure_s = frame.exposure_s?;
+    let transmissions = transmissions(frame);
+    let typical = median(&mut transmissions.clone());
+    let (scenario, zenith_is_known) = scenario(stated, frame, (exposure_s, typical));
     let budget = Budget::new(&scenario);
-    let detector = detector(frame, &scenario, &budget);
+    let detector = detector(frame, &scenario, &budget, (&transmissions, typical));
     let peak = Detector::new(Rule::PeakPixel, &scenario, &budget);
     let colors = frame.zero_point_colors;
     let zero_point_vmag = expected_zero_point_vmag(&scenario, colors, frame.has_color_term);
@@ -121,8 +124,13 @@ pub fn compare(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Compar
     })
 }
 
-/// The scenario of the frame, and whether its zenith distance is known.
-fn scenario(stated: &StatedCamera, frame: &FrameMeasurement, exposure_s: f64) -> (Scenario, bool) {
+/// The scenario of the frame, and whether its zenith distance is known. `typical` is the median part
+/// of the centre's light that arrives.
+fn scenario(
+    stated: &StatedCamera,
+    frame: &FrameMeasurement,
+    (exposure_s, typical): (f64, f64),
+) -> (Scenario, bool) {
     let mut scenario = Scenario::new(stated.sheet.clone());
     let is_above_horizon = |zenith_deg: &f64| *zenith_deg < 90.0;
     let by_site_deg = frame.zenith_distance_deg.filter(is_above_horizon);
@@ -137,13 +145,19 @@ fn scenario(stated: &StatedCamera, frame: &FrameMeasurement, exposure_s: f64) ->
     // Stars are found with the spots that they have, whatever smears them.
     let sheet = &mut scenario.camera;
     sheet.spot_sigma_px = frame.spot_sigma_px.unwrap_or(sheet.spot_sigma_px);
-    scenario.conditions.sky = SkyBrightness::MagArcsec2(sky_mag_arcsec2(&scenario, frame));
+    scenario.conditions.sky = SkyBrightness::MagArcsec2(sky_mag_arcsec2(&scenario, frame, typical));
     [scenario.camera.width_px, scenario.camera.height_px] = frame.size_px;
     (scenario, zenith_deg.is_some())
 }
 
-/// The detector with the frame's own threshold and noise, on average over the field.
-fn detector(frame: &FrameMeasurement, scenario: &Scenario, budget: &Budget) -> Detector {
+/// The detector with the frame's own threshold and noise, on average over the field, with the parts
+/// of the centre's light that arrive there and their median.
+fn detector(
+    frame: &FrameMeasurement,
+    scenario: &Scenario,
+    budget: &Budget,
+    (transmissions, typical): (&[f64], f64),
+) -> Detector {
     let noise_e = frame.noise_adu * scenario.camera.gain_e_per_adu;
     // A frame without light has no threshold.
     let detector = match frame.threshold_sigma > 0.0 {
@@ -155,16 +169,12 @@ fn detector(frame: &FrameMeasurement, scenario: &Scenario, budget: &Budget) -> D
     };
     // The filter sees the spots alone.
     let wings_mag = -2.5 * (1.0 + frame.wings).log10();
-    if frame.vignetting == 0.0 {
-        return detector.over(&[wings_mag]);
-    }
     // Where less light arrives, the sky's noise is smaller, too.
     let noise_where = |transmission: f64| {
         let sky_variance_e2 = transmission * budget.background_e;
         (budget.sensor_noise_e.powi(2) + sky_variance_e2).sqrt()
     };
-    let transmissions = transmissions(frame);
-    let typical_noise_e = noise_where(median(&mut transmissions.clone()));
+    let typical_noise_e = noise_where(typical);
     let difference_mag = |&part: &f64| {
         let signal_to_noise = part * typical_noise_e / noise_where(part);
         wings_mag + 2.5 * signal_to_noise.max(1e-6).log10()
@@ -229,8 +239,9 @@ pub fn fitted_color_effect_mag(
     mean_mag + slope * (at_bv_mag - mean_bv_mag)
 }
 
-/// Sky brightness from the frame's background, else from its noise.
-fn sky_mag_arcsec2(scenario: &Scenario, frame: &FrameMeasurement) -> f64 {
+/// Sky brightness of the frame's centre from its background, else from its noise; `typical` is the
+/// median part of the centre's light that arrives.
+fn sky_mag_arcsec2(scenario: &Scenario, frame: &FrameMeasurement, typical: f64) -> f64 {
     let sheet = &scenario.camera;
     let mut standard = scenario.clone();
     standard.conditions.sky = SkyBrightness::MagArcsec2(0.0);
@@ -240,7 +251,6 @@ fn sky_mag_arcsec2(scenario: &Scenario, frame: &FrameMeasurement) -> f64 {
     let noise_e = frame.noise_adu * sheet.gain_e_per_adu;
     let by_noise_e = noise_e.powi(2) - of_mag_0.sensor_noise_e.powi(2);
     // Both are medians over the frame; the sky is that of its centre.
-    let typical = median(&mut transmissions(frame));
     [by_background_e, by_noise_e]
         .into_iter()
         .map(|sky_e| sky_e / typical)

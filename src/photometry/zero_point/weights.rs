@@ -1,7 +1,7 @@
 //! The weight of each star in the fit of the zero point.
 
 use super::standard::StandardStar;
-use crate::base::statistics::median;
+use crate::base::statistics::{SIGMA_PER_MAD, median};
 use nalgebra::{DMatrix, DVector};
 
 /// Residual from which on a star does not count, in standard deviations: 95 % efficient without
@@ -9,8 +9,6 @@ use nalgebra::{DMatrix, DVector};
 const BIWEIGHT_SIGMAS: f64 = 4.685;
 /// Smallest scatter, in magnitudes.
 const MIN_SCATTER_MAG: f64 = 0.003;
-/// Standard deviation per median absolute deviation, for a normal distribution.
-const SIGMA_PER_MAD: f64 = 1.482_6;
 
 /// The weight of each star, from the residuals so far.
 pub(super) struct RobustWeights {

@@ -8,8 +8,8 @@ use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::identify::{Identification, SourceIndex};
 use crate::model::sensitivity::{CramerRao, Faintest};
 use crate::model::simulate::TrueStar;
-use crate::photometry::SUN_BV_MAG;
 use crate::photometry::comparison::{expected_zero_point_vmag, fitted_color_effect_mag};
+use crate::photometry::{SUN_BV_MAG, filter_response};
 use crate::pipeline::{Note, Outcome, Solution, Source};
 use crate::sky::catalog::StarIndex;
 use crate::study::robustness::Answer;
@@ -192,9 +192,8 @@ impl<'a> Evaluation<'a> {
             if other.v_mag <= bright_vmag {
                 return false;
             }
-            // Response of a matched filter at the star's position.
             let off = other.position.distance_to(&star.position) / sigma_px;
-            light_e += other.electrons * (-0.25 * off * off).exp();
+            light_e += other.electrons * filter_response(off);
         }
         light_e < ALONE_PART * own_error_e.unwrap_or_else(|| star.electrons.sqrt())
     }
