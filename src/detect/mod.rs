@@ -63,7 +63,7 @@ pub use workspace::Workspace;
 use crate::frame::{Frame, MIN_SIDE_PX};
 use background::Mesh;
 use candidates::PeakSearch;
-use measure::{Measurement, StarShape};
+use measure::{Measurement, Ring, StarShape};
 use pixels::View;
 use psf::PIXEL_VARIANCE_PX2;
 use psf_fit::measure_psf;
@@ -160,6 +160,7 @@ pub fn detect_into(
         method: config.centroid,
         regions,
         threshold: pass.threshold,
+        ring: Ring::around(maps.width_px()),
     };
     measurement.run(peaks, measure, &mut found.sources);
     found.sources.sort_unstable_by(Detection::by_brightness);

@@ -68,7 +68,11 @@ fn is_clean(source: &Detection) -> bool {
 }
 
 fn is_alone(source: &Detection, sources: &[Detection], apart_px: f64) -> bool {
-    let near = |other: &&Detection| other.position.distance_to(&source.position) < apart_px;
+    let at = source.position;
+    let near = |other: &&Detection| {
+        let (dx, dy) = (other.position.x - at.x, other.position.y - at.y);
+        dx * dx + dy * dy < apart_px * apart_px
+    };
     // The source itself is one of them.
     sources.iter().filter(near).nth(1).is_none()
 }
@@ -95,7 +99,8 @@ fn star_wings(
     let (mut light, mut pixels) = (0.0, 0_u32);
     for y in first(at.y) as usize..=last(at.y) as usize {
         for x in first(at.x) as usize..=last(at.x) as usize {
-            if (x as f64 - at.x).hypot(y as f64 - at.y) <= radius_px {
+            let (dx, dy) = (x as f64 - at.x, y as f64 - at.y);
+            if dx * dx + dy * dy <= radius_px * radius_px {
                 light += f64::from(view.at(x, y) - level);
                 pixels += 1;
             }

@@ -128,6 +128,7 @@ impl Mesh {
 
     /// Background and noise at column `x`, row `y`. Beyond the outermost nodes the background is
     /// extrapolated linearly and the noise is constant.
+    #[inline]
     pub fn at(&self, x: f32, y: f32) -> (f32, f32) {
         let (row, fy) = Self::node(y, self.rows_per_px, self.grid.rows);
         let (column, fx) = Self::node(x, self.columns_per_px, self.grid.columns);

@@ -4,8 +4,9 @@ use super::core::Core;
 use super::estimate::{brightest_within, detection_of};
 use super::known_spots::{KnownSpots, PeakSurroundings};
 use super::pairs::{PairFitter, may_be_pair};
+use super::ring::Ring;
 use super::star_shape::StarShape;
-use super::{centroid, ring, shape};
+use super::{centroid, shape};
 use crate::base::coords::PixelPoint;
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::config::CentroidMethod;
@@ -57,6 +58,8 @@ pub(crate) struct Measurement<'a> {
     pub regions: &'a [Region],
     /// Threshold of the search, in units of the local noise.
     pub threshold: f64,
+    /// The ring around a source.
+    pub ring: Ring,
 }
 
 impl Measurement<'_> {
@@ -208,7 +211,7 @@ impl Measurement<'_> {
         }
         detection.flags.blended = fit.spots.len() > 1;
         let may_be_edge = fit.spots.len() == 1 && !peak.saturated;
-        detection.flags.extended |= may_be_edge && ring::is_bright(&self.maps, peak);
+        detection.flags.extended |= may_be_edge && self.ring.is_bright(&self.maps, peak);
         self.flag_trail(peak, region, &mut detection);
         if self.is_misfitted() && fit.spots.len() == 1 {
             self.center_elongated(&fit, peak, &mut detection, buffers);

@@ -13,4 +13,5 @@ mod shape;
 mod star_shape;
 
 pub(crate) use measurement::{MeasureBuffers, Measurement};
+pub(crate) use ring::Ring;
 pub(crate) use star_shape::StarShape;

@@ -26,23 +26,36 @@ const NOISE_SIGMAS: f32 = 2.5;
 /// angle has 4, a line and two neighbours of the same brightness at most 3.
 const BRIGHT_PIXELS: usize = 5;
 
-/// Whether a large part of the ring is as bright as the source.
-pub(super) fn is_bright(maps: &FrameMaps<'_>, peak: &Peak) -> bool {
-    let view = &maps.view;
-    let (background, sigma) = maps.background.at(peak.x as f32, peak.y as f32);
-    let height = view.at(peak.x, peak.y) - background;
-    let bright = background + (BRIGHT * height).max(NOISE_SIGMAS * sigma);
-    let radius_px = (RADIUS_SIGMAS * maps.width_px()).max(MIN_RADIUS_PX);
-    let (x, y) = (peak.x as f64, peak.y as f64);
-    let is_bright = |[along, up]: &[f64; 2]| {
-        let (x, y) = (
-            (x + radius_px * along).round(),
-            (y + radius_px * up).round(),
-        );
-        let is_inside = x >= 0.0 && y >= 0.0 && x < view.width as f64 && y < view.height as f64;
-        is_inside && view.at(x as usize, y as usize) >= bright
-    };
-    let quadrants = |&[c, s]: &[f64; 2]| [[c, s], [-s, c], [-c, -s], [s, -c]];
-    let directions = QUADRANT.iter().flat_map(quadrants);
-    directions.filter(is_bright).count() >= BRIGHT_PIXELS
+/// The pixels of the ring, as columns and rows from the source.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ring {
+    offsets: [[isize; 2]; 16],
+}
+
+impl Ring {
+    /// The ring around a spot with this standard deviation, pixel included, in pixels.
+    pub fn around(width_px: f64) -> Self {
+        let radius_px = (RADIUS_SIGMAS * width_px).max(MIN_RADIUS_PX);
+        let nearest = |direction: f64| (radius_px * direction + 0.5).floor() as isize;
+        let quadrant = |[c, s]: [f64; 2]| [[c, s], [-s, c], [-c, -s], [s, -c]];
+        let quadrants = QUADRANT.map(quadrant);
+        Self {
+            offsets: std::array::from_fn(|i| quadrants[i / 4][i % 4].map(nearest)),
+        }
+    }
+
+    /// Whether a large part of the ring around `peak` is as bright as the peak.
+    pub fn is_bright(&self, maps: &FrameMaps<'_>, peak: &Peak) -> bool {
+        let view = &maps.view;
+        let (background, sigma) = maps.background.at(peak.x as f32, peak.y as f32);
+        let height = view.at(peak.x, peak.y) - background;
+        let bright = background + (BRIGHT * height).max(NOISE_SIGMAS * sigma);
+        let is_bright = |&&[across, down]: &&[isize; 2]| {
+            let x = peak.x.checked_add_signed(across);
+            let y = peak.y.checked_add_signed(down);
+            let inside = x.zip(y).filter(|&(x, y)| x < view.width && y < view.height);
+            inside.is_some_and(|(x, y)| view.at(x, y) >= bright)
+        };
+        self.offsets.iter().filter(is_bright).count() >= BRIGHT_PIXELS
+    }
 }
