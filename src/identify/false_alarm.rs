@@ -101,20 +101,21 @@ struct Tested<'a> {
 
 impl FalseAlarm {
     /// log10 of the expected number of hypotheses as good as this one, among `hypotheses`, by
-    /// chance: the false-alarm probability where it is small.
+    /// chance: the false-alarm probability where it is small. The brightest `stars` are tested, at
+    /// most [`TESTED_STARS`].
     ///
     /// Agreement is tested within several radii and magnitude differences, and the least likely
     /// result counts, as exact positions and magnitudes say more than rough ones. The number of
     /// tests is corrected for.
     pub fn log10(
         &mut self,
-        hypothesis: &Hypothesis,
+        (hypothesis, hypotheses): (&Hypothesis, u64),
         problem: Problem,
+        stars: usize,
         around: &mut Surroundings,
-        hypotheses: u64,
     ) -> f64 {
         let field = problem.field;
-        let observed = field.brightest(TESTED_STARS);
+        let observed = field.brightest(stars);
         hypothesis.predict(problem, observed, around, &mut self.predicted);
         self.set_radii(field);
         self.tests.clear();

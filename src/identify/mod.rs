@@ -48,4 +48,4 @@ pub use indexed_catalog::IndexedCatalog;
 pub use predict::{PredictedStar, View};
 pub use priors::{DateSource, FrameDate, Priors, Scale, ScalePrior, ScaleSource, SkyRegion};
 pub use search::LOG10_FALSE_ALARM_LIMIT;
-pub use workspace::{NAME_ODDS, Workspace, identify};
+pub use workspace::{NAME_ODDS, Pointing, Workspace, identify};

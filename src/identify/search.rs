@@ -98,6 +98,11 @@ pub const LOG10_FALSE_ALARM_LIMIT: f64 = -8.0;
 /// truth.
 const LOG10_SURE: f64 = -14.0;
 
+/// Number of stars, the brightest, with which a hypothesis is tested first. It ends the search where
+/// these make it sure. That adds 10⁻¹⁴ to the false-alarm probability at most, to the 10⁻⁸ of the
+/// test with [`TESTED_STARS`] that follows where they do not.
+const FIRST_TESTED_STARS: usize = 25;
+
 /// Buffers of the search, reused from field to field.
 #[derive(Debug, Default)]
 pub struct Buffers {
@@ -125,6 +130,7 @@ pub struct Search<'a> {
     most_hypotheses: u64,
     candidates: u64,
     best_log10: Option<f64>,
+    tested_stars: usize,
     /// The best hypothesis that passes the limit but does not end the search.
     provisional: Option<Refined>,
 }
@@ -204,16 +210,22 @@ impl<'a> Search<'a> {
             most_hypotheses,
             candidates: 0,
             best_log10: None,
+            tested_stars: FIRST_TESTED_STARS,
             provisional: None,
         }
     }
 
-    /// The same, as the second search: chance has twice the opportunity.
-    pub fn again(self) -> Self {
+    /// A second search, of another choice of stars: chance has twice the opportunity.
+    pub fn again(self, problem: Problem<'a>, priors: &Priors) -> Self {
         Self {
             searches_log10: std::f64::consts::LOG10_2,
-            ..self
+            ..Self::new(problem, priors, self.buffers)
         }
+    }
+
+    /// Number of stars, the brightest, with which the hypothesis that was found was tested.
+    pub fn tested_stars(&self) -> usize {
+        self.tested_stars
     }
 
     /// The refiner of hypotheses, with the stars that agreed with the last one.
@@ -470,18 +482,17 @@ impl<'a> Search<'a> {
         ratio > TAKE_AT_END
     }
 
-    /// Fits the hypothesis to all the stars that agree and computes its false-alarm probability.
-    /// Returns it if it ends the search.
+    /// Fits the hypothesis to the stars that agree and computes its false-alarm probability. Returns
+    /// it if it ends the search.
+    ///
+    /// The brightest stars are asked first: mostly they alone are enough.
     fn decide(&mut self, hypothesis: &Hypothesis, triangle: &ObservedTriangle) -> Option<Refined> {
-        let start = Start {
-            hypothesis,
-            radius_px: triangle.confirming_px,
-            sceptical: true,
-            stars: TESTED_STARS,
-            richest: DistortionModel::Radial,
-        };
-        let refined = self.buffers.refiner.refine(self.problem(), &start)?;
-        let log10 = self.log10_false_alarm(&refined.hypothesis())?;
+        if let Some((refined, log10)) = self.tested(hypothesis, triangle, FIRST_TESTED_STARS)
+            && log10 <= LOG10_SURE
+        {
+            return Some(refined);
+        }
+        let (refined, log10) = self.tested(hypothesis, triangle, TESTED_STARS)?;
         let is_best = self.best_log10.is_none_or(|best| log10 < best);
         if is_best {
             self.best_log10 = Some(log10);
@@ -495,7 +506,28 @@ impl<'a> Search<'a> {
         None
     }
 
-    fn problem(&self) -> Problem<'a> {
+    /// The hypothesis, fitted to the brightest `stars`, and log10 of its false-alarm probability.
+    fn tested(
+        &mut self,
+        hypothesis: &Hypothesis,
+        triangle: &ObservedTriangle,
+        stars: usize,
+    ) -> Option<(Refined, f64)> {
+        self.tested_stars = stars;
+        let start = Start {
+            hypothesis,
+            radius_px: triangle.confirming_px,
+            sceptical: true,
+            stars,
+            richest: DistortionModel::Radial,
+        };
+        let refined = self.buffers.refiner.refine(self.problem(), &start)?;
+        let log10 = self.log10_with(&refined.hypothesis(), stars)?;
+        Some((refined, log10))
+    }
+
+    /// The stars that are searched, and the catalogue.
+    pub fn problem(&self) -> Problem<'a> {
         Problem {
             field: self.field,
             sky: self.sky,
@@ -505,6 +537,11 @@ impl<'a> Search<'a> {
     /// log10 of the false-alarm probability of `hypothesis`; `None` where it contradicts the
     /// priors.
     pub fn log10_false_alarm(&mut self, hypothesis: &Hypothesis) -> Option<f64> {
+        self.log10_with(hypothesis, TESTED_STARS)
+    }
+
+    /// The same, by the brightest `stars`.
+    fn log10_with(&mut self, hypothesis: &Hypothesis, stars: usize) -> Option<f64> {
         let focal_px = hypothesis.camera.focal_length_px;
         let slack = 1.0 + 2.0 * PASSES[1].tolerance;
         if focal_px < self.focal_px.0 / slack || focal_px > self.focal_px.1 * slack {
@@ -522,7 +559,12 @@ impl<'a> Search<'a> {
             false_alarm,
             ..
         } = self.buffers;
-        let log10 = false_alarm.log10(hypothesis, problem, &mut refiner.around, hypotheses);
+        let log10 = false_alarm.log10(
+            (hypothesis, hypotheses),
+            problem,
+            stars,
+            &mut refiner.around,
+        );
         Some((log10 + self.searches_log10).min(0.0))
     }
 }
