@@ -18,6 +18,7 @@ use super::hypothesis::{Hypothesis, Problem};
 use super::predict::{PredictedStar, Surroundings};
 use crate::base::statistics::{LnProduct, log10_poisson_binomial_tail};
 use std::f64::consts::{LN_10, PI};
+use std::sync::LazyLock;
 
 /// Most hypotheses that a search tries, so that a frame in which there is nothing to find takes
 /// well under a second. Most fields that can be identified take a few; those with as many false
@@ -355,9 +356,11 @@ impl Hits {
     }
 }
 
-/// Natural logarithm of the binomial coefficient.
+/// Natural logarithm of the binomial coefficient, of at most [`TESTED_STARS`].
 fn ln_binomial(all: usize, some: usize) -> f64 {
-    let ln_factorial = |n: usize| libm::lgamma(n as f64 + 1.0);
+    static LN_FACTORIALS: LazyLock<[f64; TESTED_STARS + 1]> =
+        LazyLock::new(|| std::array::from_fn(|n| libm::lgamma(n as f64 + 1.0)));
+    let ln_factorial = |n: usize| LN_FACTORIALS[n];
     ln_factorial(all) - ln_factorial(some) - ln_factorial(all - some)
 }
 

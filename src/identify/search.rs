@@ -86,6 +86,8 @@ const CONFIRMING_SIGMAS: f64 = 3.5;
 const HYPOTHESES_PER_TRIANGLE: u64 = 250;
 /// Minimum number of hypotheses, however few the triangles.
 const LEAST_HYPOTHESES: u64 = 30_000;
+/// From this number of hypotheses on, a search is worth the time of sorting the catalogue for it.
+const LONG_SEARCH: u64 = 2_000;
 /// Maximum number of catalogue triangles of the right shape. Most of them fail at once, by size or
 /// brightness.
 const MAX_CANDIDATES: u64 = 20_000_000;
@@ -130,9 +132,19 @@ pub struct Search<'a> {
     most_hypotheses: u64,
     candidates: u64,
     best_log10: Option<f64>,
-    tested_stars: usize,
     /// The best hypothesis that passes the limit but does not end the search.
-    provisional: Option<Refined>,
+    provisional: Option<Found>,
+}
+
+/// A hypothesis that passed.
+#[derive(Debug, Clone, Copy)]
+pub struct Found {
+    /// The hypothesis, fitted.
+    pub refined: Refined,
+    /// log10 of its false-alarm probability.
+    pub log10_false_alarm: f64,
+    /// Number of stars, the brightest, with which it was fitted and tested.
+    pub stars: usize,
 }
 
 /// A triangle of observed stars.
@@ -210,7 +222,6 @@ impl<'a> Search<'a> {
             most_hypotheses,
             candidates: 0,
             best_log10: None,
-            tested_stars: FIRST_TESTED_STARS,
             provisional: None,
         }
     }
@@ -221,11 +232,6 @@ impl<'a> Search<'a> {
             searches_log10: std::f64::consts::LOG10_2,
             ..Self::new(problem, priors, self.buffers)
         }
-    }
-
-    /// Number of stars, the brightest, with which the hypothesis that was found was tested.
-    pub fn tested_stars(&self) -> usize {
-        self.tested_stars
     }
 
     /// The refiner of hypotheses, with the stars that agreed with the last one.
@@ -249,14 +255,14 @@ impl<'a> Search<'a> {
     }
 
     /// Tries triangles until a hypothesis passes. Returns it, fitted to the brightest stars.
-    pub fn run(&mut self) -> Option<Refined> {
+    pub fn run(&mut self) -> Option<Found> {
         PASSES
             .iter()
             .find_map(|pass| self.sweep(pass).or_else(|| self.provisional.take()))
     }
 
     /// Tries the triangles of one pass in the order of their faintest star, then of the second.
-    fn sweep(&mut self, pass: &Pass) -> Option<Refined> {
+    fn sweep(&mut self, pass: &Pass) -> Option<Found> {
         let stars = pass.stars.min(self.buffers.offsets.len());
         for faintest in pass.from..stars {
             for middle in 1..faintest {
@@ -309,11 +315,11 @@ impl<'a> Search<'a> {
         })
     }
 
-    fn try_triangle(&mut self, triangle: &ObservedTriangle) -> Option<Refined> {
+    fn try_triangle(&mut self, triangle: &ObservedTriangle) -> Option<Found> {
         (0..self.sky.triangles.classes.len()).find_map(|class| self.try_class(triangle, class))
     }
 
-    fn try_class(&mut self, triangle: &ObservedTriangle, number: usize) -> Option<Refined> {
+    fn try_class(&mut self, triangle: &ObservedTriangle, number: usize) -> Option<Found> {
         let class = &self.sky.triangles.classes[number];
         let low_px = self
             .focal_of_chord(triangle, class.high)?
@@ -365,7 +371,7 @@ impl<'a> Search<'a> {
         triangle: &ObservedTriangle,
         class: usize,
         range_px: (f64, f64),
-    ) -> Option<Refined> {
+    ) -> Option<Found> {
         let middle_px = (range_px.0 * range_px.1).sqrt();
         let vectors = self.vectors(triangle, middle_px);
         let shape = TriangleShape::new([&vectors[0], &vectors[1], &vectors[2]])?;
@@ -390,7 +396,7 @@ impl<'a> Search<'a> {
     }
 
     /// Tests one hypothesis: the three observed stars are these three of the catalogue.
-    fn try_hypothesis(&mut self, query: &Query, corners: &[u32; 3]) -> Option<Refined> {
+    fn try_hypothesis(&mut self, query: &Query, corners: &[u32; 3]) -> Option<Found> {
         let triangle = &query.triangle;
         let stars = corners.map(|c| self.sky.grid.star(c));
         let zero_point = self.zero_point(std::array::from_fn(|i| {
@@ -456,6 +462,7 @@ impl<'a> Search<'a> {
         let radius_rad = triangle.confirming_px / pose.focal_px;
         let chord = chord_of(radius_rad);
         let tolerance_mag = self.field.photometry.tolerance_mag();
+        let faces = (self.hypotheses > LONG_SEARCH).then(|| self.sky.faces());
         let mut ratio = 1.0;
         for (index, offset) in self.buffers.offsets.iter().enumerate() {
             if triangle.stars.contains(&index) {
@@ -465,7 +472,9 @@ impl<'a> Search<'a> {
             let v_mag = self.field.stars[index].mag + zero_point;
             let (bright, faint) = (v_mag - tolerance_mag, v_mag + tolerance_mag);
             let magnitudes = bright as f32..=faint as f32;
-            let is_confirming = self.sky.grid.is_any_within(&direction, chord, magnitudes);
+            let is_confirming = faces
+                .and_then(|faces| faces.is_any_within(direction.as_vector(), chord, &magnitudes))
+                .unwrap_or_else(|| self.sky.grid.is_any_within(&direction, chord, magnitudes));
             let chance = self
                 .sky
                 .chance_within(radius_rad, bright, faint)
@@ -486,34 +495,34 @@ impl<'a> Search<'a> {
     /// it if it ends the search.
     ///
     /// The brightest stars are asked first: mostly they alone are enough.
-    fn decide(&mut self, hypothesis: &Hypothesis, triangle: &ObservedTriangle) -> Option<Refined> {
-        if let Some((refined, log10)) = self.tested(hypothesis, triangle, FIRST_TESTED_STARS)
-            && log10 <= LOG10_SURE
+    fn decide(&mut self, hypothesis: &Hypothesis, triangle: &ObservedTriangle) -> Option<Found> {
+        if let Some(found) = self.tested(hypothesis, triangle, FIRST_TESTED_STARS)
+            && found.log10_false_alarm <= LOG10_SURE
         {
-            return Some(refined);
+            return Some(found);
         }
-        let (refined, log10) = self.tested(hypothesis, triangle, TESTED_STARS)?;
+        let found = self.tested(hypothesis, triangle, TESTED_STARS)?;
+        let log10 = found.log10_false_alarm;
         let is_best = self.best_log10.is_none_or(|best| log10 < best);
         if is_best {
             self.best_log10 = Some(log10);
         }
         if log10 <= LOG10_SURE {
-            return Some(refined);
+            return Some(found);
         }
         if is_best && log10 <= LOG10_FALSE_ALARM_LIMIT {
-            self.provisional = Some(refined);
+            self.provisional = Some(found);
         }
         None
     }
 
-    /// The hypothesis, fitted to the brightest `stars`, and log10 of its false-alarm probability.
+    /// The hypothesis, fitted to the brightest `stars`, and its false-alarm probability.
     fn tested(
         &mut self,
         hypothesis: &Hypothesis,
         triangle: &ObservedTriangle,
         stars: usize,
-    ) -> Option<(Refined, f64)> {
-        self.tested_stars = stars;
+    ) -> Option<Found> {
         let start = Start {
             hypothesis,
             radius_px: triangle.confirming_px,
@@ -522,8 +531,11 @@ impl<'a> Search<'a> {
             richest: DistortionModel::Radial,
         };
         let refined = self.buffers.refiner.refine(self.problem(), &start)?;
-        let log10 = self.log10_with(&refined.hypothesis(), stars)?;
-        Some((refined, log10))
+        Some(Found {
+            log10_false_alarm: self.log10_with(&refined.hypothesis(), stars)?,
+            refined,
+            stars,
+        })
     }
 
     /// The stars that are searched, and the catalogue.

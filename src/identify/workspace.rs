@@ -7,8 +7,8 @@ use super::identification::{Identification, MIN_STARS, SearchFailure, StarMatch}
 use super::indexed_catalog::IndexedCatalog;
 use super::pairing::Pair;
 use super::priors::Priors;
-use super::refine::{Refined, Start};
-use super::search::{Buffers, LOG10_FALSE_ALARM_LIMIT, Search};
+use super::refine::{NamingStart, Refined, Start};
+use super::search::{Buffers, Found, LOG10_FALSE_ALARM_LIMIT, Search};
 use super::thinning::Thinning;
 use crate::camera::DistortionModel;
 use std::f64::consts::PI;
@@ -167,7 +167,7 @@ pub struct Pointing<'w, 'a> {
     most_chance: f64,
     problem: Problem<'a>,
     search: Search<'a>,
-    found: Refined,
+    found: Found,
     /// What to say where the stars do not confirm the pointing after all.
     failure: SearchFailure,
     bright: &'w mut Brightest,
@@ -190,15 +190,16 @@ impl<'w> Pointing<'w, '_> {
             answer,
             ..
         } = self;
-        let named = with_names(problem, &mut search, (&found, most_chance));
+        let named = with_names(problem, &mut search, (&found.refined, most_chance));
         let (refined, log10) = named.ok_or(failure)?;
         let pairs = &search.refiner().pairs;
         Ok(answered(answer, (&refined, log10), problem.field, pairs))
     }
 
     /// Attitude and optics from the brightest stars alone: those that the pointing was found with.
-    /// They are named and fitted as [`name_stars`](Self::name_stars) does it with all, so the stated
-    /// errors mean the same; with fewer stars they are larger.
+    /// They are named and fitted as [`name_stars`](Self::name_stars) does it with all. So few stars
+    /// cannot show that a lens is ideal, so its first term is always fitted: the stated errors are
+    /// larger, and hold for real lenses.
     ///
     /// # Errors
     /// The [`SearchFailure`] where too few stars have a sure name.
@@ -212,15 +213,21 @@ impl<'w> Pointing<'w, '_> {
             answer,
             ..
         } = self;
-        let (searched, stars) = (search.problem(), search.tested_stars());
+        let searched = search.problem();
         let problem = Problem {
-            field: bright.of(searched.field, stars),
+            field: bright.of(searched.field, found.stars),
             ..searched
         };
-        let named = with_names(problem, &mut search, (&found, most_chance));
-        let (refined, log10) = named.ok_or(failure)?;
-        let pairs = &search.refiner().pairs;
-        Ok(answered(answer, (&refined, log10), problem.field, pairs))
+        let of_few = NamingStart {
+            most_chance,
+            least: Some(DistortionModel::Radial),
+        };
+        let refiner = search.refiner();
+        let refined = refiner.with_names(problem, &found.refined, &of_few);
+        let refined = refined.filter(|_| refiner.pairs.len() >= MIN_STARS);
+        let refined = refined.ok_or(failure)?;
+        let fitted = (&refined, found.log10_false_alarm);
+        Ok(answered(answer, fitted, problem.field, &refiner.pairs))
     }
 }
 
@@ -320,7 +327,11 @@ fn name(
     most_chance: f64,
 ) -> Option<Named> {
     let refiner = search.refiner();
-    let refined = refiner.with_names(problem, settled, most_chance)?;
+    let of_all = NamingStart {
+        most_chance,
+        least: None,
+    };
+    let refined = refiner.with_names(problem, settled, &of_all)?;
     let names = refiner.pairs.len();
     let log10 = search.log10_false_alarm(&refined.hypothesis())?;
     let is_sure = names >= MIN_STARS && log10 <= LOG10_FALSE_ALARM_LIMIT;

@@ -144,12 +144,17 @@ impl Naming {
         self.unrelated.measure(field, &self.has_name);
         clear(&mut self.odds_of_observed, field.stars.len());
         clear(&mut self.odds_of_predicted, predicted.len());
+        // Candidates of the same star follow each other.
+        let (mut last, mut as_bright) = (usize::MAX, 0);
         for candidate in &mut self.candidates {
             let (i, j) = (candidate.observed, candidate.predicted);
             let star = &field.stars[i];
             let densities = self.magnitudes.densities(star, candidate.v_mag);
-            let expected_v_mag = self.magnitudes.expected_v_mag(star);
-            let as_bright = predicted.partition_point(|p| f64::from(p.v_mag) < expected_v_mag);
+            if i != last {
+                let expected_v_mag = self.magnitudes.expected_v_mag(star);
+                as_bright = predicted.partition_point(|p| f64::from(p.v_mag) < expected_v_mag);
+                last = i;
+            }
             let like = self.completeness.odds_as(j, as_bright) * densities.by_scatter
                 + self.completeness.odds(j) * densities.otherwise;
             candidate.odds = candidate.position_density * like / self.unrelated.density(i);
