@@ -20,6 +20,7 @@ mod blends;
 mod cache;
 mod cache_directory;
 mod cells;
+mod confirmation;
 pub mod diagnosis;
 mod false_alarm;
 mod field;

@@ -93,6 +93,8 @@ pub struct Start<'a> {
 pub struct NamingStart {
     /// The largest probability of a name that it is chance.
     pub most_chance: f64,
+    /// Whether to look at how stars and other detections are spread over the frame.
+    pub by_place: bool,
     /// The simplest distortion model to fit, where the stars can afford it.
     pub least: Option<DistortionModel>,
 }
@@ -205,7 +207,8 @@ impl Refiner {
             field: problem.field,
             predicted: &self.predicted,
         };
-        self.naming.start(stars, hypothesis.zero_point_mag);
+        self.naming
+            .start(stars, hypothesis.zero_point_mag, wanted.by_place);
         let mut model = hypothesis.camera.distortion_model().max(wanted.least);
         let mut current = *settled;
         for round in 0..NAMING_ROUNDS {

@@ -220,6 +220,7 @@ impl<'w> Pointing<'w, '_> {
         };
         let of_few = NamingStart {
             most_chance,
+            by_place: false,
             least: Some(DistortionModel::Radial),
         };
         let refiner = search.refiner();
@@ -329,6 +330,7 @@ fn name(
     let refiner = search.refiner();
     let of_all = NamingStart {
         most_chance,
+        by_place: true,
         least: None,
     };
     let refined = refiner.with_names(problem, settled, &of_all)?;

@@ -47,6 +47,7 @@ impl Completeness {
         self.odds.resize(stars, 1.0);
         self.shares.clear();
         self.visibility.clear();
+        self.visibility.resize(stars, 1.0);
     }
 
     /// The odds that a predicted star is detected.

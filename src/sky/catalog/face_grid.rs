@@ -81,6 +81,44 @@ fn step_of(v_mag: f32) -> u8 {
     steps.clamp(0.0, f32::from(NO_STAR - 1)) as u8
 }
 
+/// A small disc on the sky, as the cells that it touches.
+#[derive(Debug, Clone, Copy)]
+pub struct Disc {
+    chord: f64,
+    /// First and last row, counted over all faces, and column.
+    rows: [u16; 2],
+    columns: [u16; 2],
+}
+
+impl Disc {
+    /// The disc within `chord` of the unit vector `centre`; `None` where it is too large, or on the
+    /// edge of a face.
+    #[inline]
+    pub fn of(centre: &Vector3<f64>, chord: f64) -> Option<Self> {
+        let Place { face, u, v } = Place::of(centre);
+        let outermost = u.abs().max(v.abs());
+        // How much u and v change at most with the direction: by the gradient of the projection.
+        let gradient_sq = (1.0 + outermost * outermost) * (1.0 + u * u + v * v);
+        let reach = MARGIN * chord * gradient_sq.sqrt();
+        if chord > LONGEST_CHORD || outermost + reach >= 1.0 {
+            return None;
+        }
+        let row = |u: f64| (face * CELLS + cell_along(u)) as u16;
+        let column = |v: f64| cell_along(v) as u16;
+        Some(Self {
+            chord,
+            rows: [row(u - reach), row(u + reach)],
+            columns: [column(v - reach), column(v + reach)],
+        })
+    }
+
+    /// The first cell that it touches.
+    #[inline]
+    pub fn first_cell(&self) -> usize {
+        self.rows[0] as usize * CELLS + self.columns[0] as usize
+    }
+}
+
 impl FaceGrid {
     /// Sorts `stars`, which must be ordered brightest first, into cells.
     pub fn new(stars: &[Star]) -> Self {
@@ -118,36 +156,41 @@ impl FaceGrid {
         }
     }
 
-    /// As [`SkyGrid::is_any_within`](super::sky_grid::SkyGrid::is_any_within); `None` where the disc
-    /// is too large, or on the edge of a face.
+    /// Whether a cell may hold a star of a magnitude or a brighter one.
+    #[inline]
+    pub fn may_hold(&self, cell: usize, faintest_v_mag: f32) -> bool {
+        self.brightest[cell] <= step_of(faintest_v_mag)
+    }
+
+    /// The stars of a cell: the first, and the end.
+    #[inline]
+    pub fn range(&self, cell: usize) -> (u32, u32) {
+        (self.starts[cell], self.starts[cell + 1])
+    }
+
+    /// V magnitude of a star of the grid.
+    #[inline]
+    pub fn v_mag(&self, star: u32) -> f32 {
+        self.stars[star as usize].v_mag
+    }
+
+    /// As [`SkyGrid::is_any_within`](super::sky_grid::SkyGrid::is_any_within); `centre` is that of the
+    /// disc.
     #[inline]
     pub fn is_any_within(
         &self,
+        disc: &Disc,
         centre: &Vector3<f64>,
-        chord: f64,
         magnitudes: &RangeInclusive<f32>,
-    ) -> Option<bool> {
-        let Place { face, u, v } = Place::of(centre);
-        // How much u and v change at most with the direction: by the gradient of the projection.
-        let reach =
-            MARGIN * chord * ((1.0 + u.abs().max(v.abs()).powi(2)) * (1.0 + u * u + v * v)).sqrt();
-        if chord > LONGEST_CHORD || u.abs().max(v.abs()) + reach >= 1.0 {
-            return None;
-        }
-        let faintest = step_of(*magnitudes.end());
-        let rows = cell_along(u - reach)..=cell_along(u + reach);
-        let (first, last) = (cell_along(v - reach), cell_along(v + reach));
-        for row in rows {
-            let row = (face * CELLS + row) * CELLS;
-            for cell in row + first..=row + last {
-                if self.brightest[cell] <= faintest
-                    && self.is_any_in(cell, centre, chord, magnitudes)
-                {
-                    return Some(true);
-                }
-            }
-        }
-        Some(false)
+    ) -> bool {
+        let [first, last] = disc.columns;
+        (disc.rows[0]..=disc.rows[1]).any(|row| {
+            let row = row as usize * CELLS;
+            (row + first as usize..=row + last as usize).any(|cell| {
+                self.may_hold(cell, *magnitudes.end())
+                    && self.is_any_in(cell, centre, disc.chord, magnitudes)
+            })
+        })
     }
 
     fn is_any_in(
@@ -199,9 +242,10 @@ mod tests {
             let centre = UnitVector::from_vector(vector);
             let faint = random.random_range(1.0..12.0);
             let magnitudes = faint - 5.0..=faint;
-            let Some(answer) = faces.is_any_within(centre.as_vector(), chord, &magnitudes) else {
+            let Some(disc) = Disc::of(centre.as_vector(), chord) else {
                 continue;
             };
+            let answer = faces.is_any_within(&disc, centre.as_vector(), &magnitudes);
             assert_eq!(answer, sky.is_any_within(&centre, chord, magnitudes));
             asked += 1;
             found += usize::from(answer);
