@@ -84,6 +84,8 @@ const HYPOTHESES_PER_TRIANGLE: u64 = 250;
 const LEAST_HYPOTHESES: u64 = 30_000;
 /// From this number of hypotheses on, a search is long: several are tested together.
 const LONG_SEARCH: u64 = 2_000;
+/// Margin on the sizes of a triangle that decide which classes of the index can hold it.
+const CLASS_SLACK: f64 = 1.01;
 /// Most catalogue triangles that are looked up together.
 const WEIGHED: usize = 64;
 /// Most hypotheses that wait for their test.
@@ -314,7 +316,18 @@ impl<'a> Search<'a> {
     }
 
     fn try_triangle(&mut self, triangle: &ObservedTriangle) -> Option<Found> {
-        (0..self.sky.triangles.classes.len())
+        // Its size at the longest and the shortest focal length.
+        let (smallest, largest) = (
+            self.longest_side(triangle, self.focal_px.1) / CLASS_SLACK,
+            self.longest_side(triangle, self.focal_px.0) * CLASS_SLACK,
+        );
+        let classes = &self.sky.triangles.classes;
+        let is_of_size = |number: &usize| {
+            let class = &classes[*number];
+            class.high >= smallest && class.low <= largest
+        };
+        (0..classes.len())
+            .filter(is_of_size)
             .find_map(|class| self.try_class(triangle, class))
             .or_else(|| self.try_waiting(triangle))
     }
@@ -349,15 +362,17 @@ impl<'a> Search<'a> {
         })
     }
 
+    /// The triangle's longest side at this focal length, as a chord.
+    fn longest_side(&self, triangle: &ObservedTriangle, focal_px: f64) -> f64 {
+        let [a, b, c] = self.vectors(triangle, focal_px);
+        (a - b).norm().max((b - c).norm()).max((c - a).norm())
+    }
+
     /// The focal length at which the triangle's longest side is `chord`.
     fn focal_of_chord(&self, triangle: &ObservedTriangle, chord: f64) -> Option<f64> {
-        let longest = |focal_px: f64| {
-            let [a, b, c] = self.vectors(triangle, focal_px);
-            (a - b).norm().max((b - c).norm()).max((c - a).norm())
-        };
         let mut focal_px = self.diagonal_px;
         for _ in 0..8 {
-            let ratio = longest(focal_px) / chord;
+            let ratio = self.longest_side(triangle, focal_px) / chord;
             focal_px *= ratio;
             if (ratio - 1.0).abs() < 1e-3 {
                 break;
