@@ -97,13 +97,19 @@ impl Bench<'_> {
                 let (ms, found) = self.solve(is_known, false);
                 Ok(to_json(ms, found))
             }
-            "point" => {
+            "pointing" => {
                 let (pointing_ms, found) = self.brightest(is_known);
                 Ok(to_json(pointing_ms, found.as_ref()))
             }
-            "name" => {
+            "naming" => {
                 let (naming_ms, found) = self.naming(is_known);
                 Ok(to_json(naming_ms, found.as_ref()))
+            }
+            "stars" => {
+                let field = star_field(&self.frame, &self.known, 0.0);
+                let stars = field.brightest(MOST).iter();
+                let stars = stars.map(|s| [s.position.x, s.position.y, 10f64.powf(-0.4 * s.mag)]);
+                Ok(json!({"stars": stars.collect::<Vec<_>>()}))
             }
             "whole" => {
                 let extract_ms = self.extract()?;
