@@ -152,6 +152,10 @@ pub struct Found {
     pub log10_false_alarm: f64,
     /// Number of stars, the brightest, with which it was fitted and tested.
     pub stars: usize,
+    /// The hypothesis as the triangle gave it.
+    first: Hypothesis,
+    /// Largest distance of true pairs under it, in pixels.
+    radius_px: f64,
 }
 
 /// A triangle of observed stars.
@@ -591,19 +595,37 @@ impl<'a> Search<'a> {
         triangle: &ObservedTriangle,
         stars: usize,
     ) -> Option<Found> {
-        let start = Start {
-            hypothesis,
-            radius_px: triangle.confirming_px,
-            sceptical: true,
-            stars,
-            richest: DistortionModel::Radial,
-        };
-        let refined = self.buffers.refiner.refine(self.problem(), &start)?;
+        let radius_px = triangle.confirming_px;
+        let refined = self.refined((hypothesis, radius_px), stars)?;
         Some(Found {
             log10_false_alarm: self.log10_with(&refined.hypothesis(), stars)?,
             refined,
             stars,
+            first: *hypothesis,
+            radius_px,
         })
+    }
+
+    fn refined(
+        &mut self,
+        (hypothesis, radius_px): (&Hypothesis, f64),
+        stars: usize,
+    ) -> Option<Refined> {
+        let start = Start {
+            hypothesis,
+            radius_px,
+            sceptical: true,
+            stars,
+            richest: DistortionModel::Radial,
+        };
+        self.buffers.refiner.refine(self.problem(), &start)
+    }
+
+    /// What was found, fitted to all [`TESTED_STARS`], for the fit to all stars to start from.
+    pub fn with_more_stars(&mut self, found: &Found) -> Refined {
+        let more = (found.stars < TESTED_STARS)
+            .then(|| self.refined((&found.first, found.radius_px), TESTED_STARS));
+        more.flatten().unwrap_or(found.refined)
     }
 
     /// The stars that are searched, and the catalogue.

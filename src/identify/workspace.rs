@@ -190,7 +190,8 @@ impl<'w> Pointing<'w, '_> {
             answer,
             ..
         } = self;
-        let named = with_names(problem, &mut search, (&found.refined, most_chance));
+        let start = search.with_more_stars(&found);
+        let named = with_names(problem, &mut search, (&start, most_chance));
         let (refined, log10) = named.ok_or(failure)?;
         let pairs = &search.refiner().pairs;
         Ok(answered(answer, (&refined, log10), problem.field, pairs))
