@@ -1,9 +1,10 @@
-//! Time of identification with nothing known and with the field of view known to a factor of two,
-//! of reading, and of a whole frame (detection and identification), on the real 16-bit frames in
+//! Time of identification, whole and in its two parts, with nothing known and with the field of view
+//! known to a factor of two, of reading, and of a whole frame (detection and identification), on the real 16-bit frames in
 //! `../shared/frames` if present; and of the start of a new process. One thread; buffers are
 //! reused, as in a long run over many frames.
 
-use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use criterion::measurement::WallTime;
+use criterion::{BatchSize, BenchmarkGroup, Criterion, criterion_group, criterion_main};
 use starpipe::detect::{self, DetectConfig, detect};
 use starpipe::frame::{self, Frame};
 use starpipe::identify::{self, IndexedCatalog, Priors, ScalePrior, StarField, identify};
@@ -13,6 +14,7 @@ use starpipe::sky::catalog::sky_grid::SkyGrid;
 use std::f64::consts::SQRT_2;
 use std::hint::black_box;
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 /// The frame, its stars, and a prior of its scale with a total range of a factor of two.
 fn prepare(path: &Path, indexed: &IndexedCatalog) -> Option<(Frame, StarField, Priors)> {
@@ -31,6 +33,38 @@ fn prepare(path: &Path, indexed: &IndexedCatalog) -> Option<(Frame, StarField, P
         ..Priors::default()
     };
     Some((frame, field, priors))
+}
+
+/// Pointing alone, with its attitude, and naming after pointing.
+fn bench_parts(
+    group: &mut BenchmarkGroup<WallTime>,
+    name: &str,
+    field: &StarField,
+    priors: &Priors,
+    indexed: &IndexedCatalog,
+) {
+    let mut workspace = identify::Workspace::new();
+    group.bench_function(format!("{name}, attitude only"), |bencher| {
+        bencher.iter(|| {
+            black_box(
+                workspace
+                    .attitude(black_box(field), priors, indexed)
+                    .is_ok(),
+            )
+        });
+    });
+    group.bench_function(format!("{name}, naming"), |bencher| {
+        bencher.iter_custom(|rounds| {
+            let mut taken = Duration::ZERO;
+            for _ in 0..rounds {
+                let pointing = workspace.point(black_box(field), priors, indexed);
+                let start = Instant::now();
+                black_box(pointing.and_then(identify::Pointing::name_stars).is_ok());
+                taken += start.elapsed();
+            }
+            taken
+        });
+    });
 }
 
 fn bench_frames(criterion: &mut Criterion, cache: &Path) {
@@ -58,6 +92,13 @@ fn bench_frames(criterion: &mut Criterion, cache: &Path) {
                     black_box(found.is_ok())
                 });
             });
+            bench_parts(
+                &mut group,
+                &format!("{name}, {known}"),
+                field,
+                priors,
+                &indexed,
+            );
         }
     }
     let mut buffers = frame::Buffers::new();

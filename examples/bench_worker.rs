@@ -14,6 +14,8 @@ use std::io::{BufRead, Write};
 use std::path::Path;
 use std::time::Instant;
 
+/// The solvers are given at most this many stars, the brightest, where pointing alone is timed.
+const MOST: usize = 60;
 const ARCSEC_PER_RAD: f64 = 206_264.806;
 
 /// The stages that are timed, and their buffers.
@@ -63,6 +65,26 @@ impl Bench<'_> {
         (milliseconds(start), answer.ok())
     }
 
+    /// Attitude from the brightest stars, of as many as the other programs are given.
+    fn brightest(&mut self, is_known: bool) -> (f64, Option<Identification>) {
+        let priors = self.priors(is_known);
+        let mut field = star_field(&self.frame, &self.known, 0.0);
+        field.stars.truncate(MOST);
+        let start = Instant::now();
+        let found = self.identify.attitude(&field, &priors, &self.indexed);
+        (milliseconds(start), found.ok().cloned())
+    }
+
+    /// Time of naming all stars of the loaded frame, after pointing.
+    fn naming(&mut self, is_known: bool) -> (f64, Option<Identification>) {
+        let priors = self.priors(is_known);
+        let field = star_field(&self.frame, &self.known, 0.0);
+        let pointing = self.identify.point(&field, &priors, &self.indexed);
+        let start = Instant::now();
+        let found = pointing.and_then(identify::Pointing::name_stars);
+        (milliseconds(start), found.ok().cloned())
+    }
+
     fn answer(&mut self, order: &Value) -> Result<Value, Box<dyn Error>> {
         let is_known = order["known"] == true;
         match order["do"].as_str().unwrap_or_default() {
@@ -74,6 +96,20 @@ impl Bench<'_> {
             "solve" => {
                 let (ms, found) = self.solve(is_known, false);
                 Ok(to_json(ms, found))
+            }
+            "pointing" => {
+                let (pointing_ms, found) = self.brightest(is_known);
+                Ok(to_json(pointing_ms, found.as_ref()))
+            }
+            "naming" => {
+                let (naming_ms, found) = self.naming(is_known);
+                Ok(to_json(naming_ms, found.as_ref()))
+            }
+            "stars" => {
+                let field = star_field(&self.frame, &self.known, 0.0);
+                let stars = field.brightest(MOST).iter();
+                let stars = stars.map(|s| [s.position.x, s.position.y, 10f64.powf(-0.4 * s.mag)]);
+                Ok(json!({"stars": stars.collect::<Vec<_>>()}))
             }
             "whole" => {
                 let extract_ms = self.extract()?;

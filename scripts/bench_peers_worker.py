@@ -54,6 +54,12 @@ class Tetra3rs:
             image_shape=self.image.shape,
         )
 
+    def as_centroids(self, stars):
+        """Stars [x, y, flux] in pixels from the top-left one; tetra3rs counts from the centre."""
+        height, width = self.image.shape
+        centre = (width - 1) / 2, (height - 1) / 2
+        return [self.tetra3rs.Centroid(x - centre[0], y - centre[1], flux) for x, y, flux in stars]
+
     def of_sep(self):
         background = self.sep.Background(self.floats)
         return self.sep.extract(self.floats - background.back(), SEP_SIGMA, err=background.globalrms)
@@ -69,8 +75,12 @@ class Tetra3rs:
         if what == "extract":
             ms, found = clocked(self.extract)
             return {"ms": ms, "found": len(found.centroids)}
-        if what == "solve":
-            ms, solution = clocked(lambda: self.solve(self.centroids))
+        if what == "give":
+            self.given = self.as_centroids(order["stars"])
+            return {}
+        if what in ("solve", "pointing"):
+            centroids = self.centroids if what == "solve" else self.given
+            ms, solution = clocked(lambda: self.solve(centroids))
         else:
             ms, solution = clocked(lambda: self.solve(self.extract().centroids))
         matches = getattr(solution, "num_matches", None)

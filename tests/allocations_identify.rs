@@ -114,4 +114,12 @@ fn a_field_in_steady_state_allocates_nothing() {
         assert_eq!(found, expected);
         assert_eq!(count, 0);
     }
+    let priors = Priors::default();
+    for field in &fields[..4] {
+        let mut attitude = || workspace.attitude(field, &priors, &sky).is_ok();
+        assert!(attitude());
+        let mut is_found = false;
+        assert_eq!(allocations(|| is_found = attitude()), 0);
+        assert!(is_found);
+    }
 }

@@ -205,6 +205,8 @@ fn json_has_the_fields_of_schema_2() {
         "/timing_ms/read",
         "/timing_ms/detect",
         "/timing_ms/identify",
+        "/timing_ms/pointing",
+        "/timing_ms/naming",
         "/timing_ms/total",
     ] {
         number(report, pointer);

@@ -18,6 +18,7 @@ use super::hypothesis::{Hypothesis, Problem};
 use super::predict::{PredictedStar, Surroundings};
 use crate::base::statistics::{LnProduct, log10_poisson_binomial_tail};
 use std::f64::consts::{LN_10, PI};
+use std::sync::LazyLock;
 
 /// Most hypotheses that a search tries, so that a frame in which there is nothing to find takes
 /// well under a second. Most fields that can be identified take a few; those with as many false
@@ -101,20 +102,21 @@ struct Tested<'a> {
 
 impl FalseAlarm {
     /// log10 of the expected number of hypotheses as good as this one, among `hypotheses`, by
-    /// chance: the false-alarm probability where it is small.
+    /// chance: the false-alarm probability where it is small. The brightest `stars` are tested, at
+    /// most [`TESTED_STARS`].
     ///
     /// Agreement is tested within several radii and magnitude differences, and the least likely
     /// result counts, as exact positions and magnitudes say more than rough ones. The number of
     /// tests is corrected for.
     pub fn log10(
         &mut self,
-        hypothesis: &Hypothesis,
+        (hypothesis, hypotheses): (&Hypothesis, u64),
         problem: Problem,
+        stars: usize,
         around: &mut Surroundings,
-        hypotheses: u64,
     ) -> f64 {
         let field = problem.field;
-        let observed = field.brightest(TESTED_STARS);
+        let observed = field.brightest(stars);
         hypothesis.predict(problem, observed, around, &mut self.predicted);
         self.set_radii(field);
         self.tests.clear();
@@ -354,9 +356,11 @@ impl Hits {
     }
 }
 
-/// Natural logarithm of the binomial coefficient.
+/// Natural logarithm of the binomial coefficient, of at most [`TESTED_STARS`].
 fn ln_binomial(all: usize, some: usize) -> f64 {
-    let ln_factorial = |n: usize| libm::lgamma(n as f64 + 1.0);
+    static LN_FACTORIALS: LazyLock<[f64; TESTED_STARS + 1]> =
+        LazyLock::new(|| std::array::from_fn(|n| libm::lgamma(n as f64 + 1.0)));
+    let ln_factorial = |n: usize| LN_FACTORIALS[n];
     ln_factorial(all) - ln_factorial(some) - ln_factorial(all - some)
 }
 

@@ -4,9 +4,11 @@ use super::cache::{self, CacheError};
 use super::cache_directory::cache_directory;
 use super::index::TriangleIndex;
 use crate::base::units::RAD_PER_DEG;
+use crate::sky::catalog::face_grid::FaceGrid;
 use crate::sky::catalog::sky_grid::SkyGrid;
 use crate::sky::catalog::{Catalog, Star};
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// Width of the narrowest field over the smallest longest side listed: narrower fields hold too few
 /// of the triangles.
@@ -25,6 +27,7 @@ pub struct IndexedCatalog<'a> {
     catalog: &'a Catalog,
     /// The stars by position.
     pub grid: SkyGrid,
+    faces: OnceLock<FaceGrid>,
     /// The triangles.
     pub triangles: TriangleIndex,
     counts: MagnitudeCounts,
@@ -83,6 +86,7 @@ impl<'a> IndexedCatalog<'a> {
         Self {
             catalog,
             grid: SkyGrid::new(catalog.stars()),
+            faces: OnceLock::new(),
             triangles,
             counts: MagnitudeCounts::new(catalog.stars()),
         }
@@ -104,6 +108,12 @@ impl<'a> IndexedCatalog<'a> {
     ) {
         self.triangles
             .for_each_similar(self.stars(), similar, visit);
+    }
+
+    /// The stars in small cells. They are sorted when they are first asked for: few searches last so
+    /// long that it is worth it.
+    pub(super) fn faces(&self) -> &FaceGrid {
+        self.faces.get_or_init(|| FaceGrid::new(self.stars()))
     }
 
     /// The narrowest and the widest horizontal field of view that can be identified, in radians.

@@ -5,7 +5,7 @@ use super::predict::PredictedStar;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::sky::catalog::StarIndex;
 
-/// Strips that a frame's predicted stars are sorted into.
+/// Most strips that a frame's predicted stars are sorted into: one for each star, if they are fewer.
 const STRIPS: usize = 512;
 
 /// An observed star and the catalogue star that it may be.
@@ -126,7 +126,7 @@ impl Pairing {
     /// Counting sort of the predicted stars by strip.
     fn sort_into(&mut self, strips: &Strips, predicted: &[PredictedStar]) {
         self.starts.clear();
-        self.starts.resize(STRIPS + 1, 0);
+        self.starts.resize(strips.count + 1, 0);
         for star in predicted {
             self.starts[strips.of(star.pixel.x)] += 1;
         }
@@ -180,6 +180,7 @@ impl Pairing {
 
 /// Strips of equal width between the smallest and the largest x of some stars.
 struct Strips {
+    count: usize,
     from_px: f64,
     per_px: f64,
 }
@@ -188,14 +189,16 @@ impl Strips {
     fn over(predicted: &[PredictedStar]) -> Self {
         let x = || predicted.iter().map(|star| star.pixel.x);
         let (low, high) = (x().fold(f64::MAX, f64::min), x().fold(f64::MIN, f64::max));
+        let count = predicted.len().clamp(1, STRIPS);
         Self {
+            count,
             from_px: low,
-            per_px: STRIPS as f64 / (high - low).max(1.0),
+            per_px: count as f64 / (high - low).max(1.0),
         }
     }
 
     fn of(&self, x: f64) -> usize {
-        (((x - self.from_px) * self.per_px).max(0.0) as usize).min(STRIPS - 1)
+        (((x - self.from_px) * self.per_px).max(0.0) as usize).min(self.count - 1)
     }
 }
 

@@ -88,6 +88,17 @@ pub struct Start<'a> {
     pub richest: DistortionModel,
 }
 
+/// How stars are named.
+#[derive(Debug, Clone, Copy)]
+pub struct NamingStart {
+    /// The largest probability of a name that it is chance.
+    pub most_chance: f64,
+    /// Whether to look at how stars and other detections are spread over the frame.
+    pub by_place: bool,
+    /// The simplest distortion model to fit, where the stars can afford it.
+    pub least: Option<DistortionModel>,
+}
+
 /// A hypothesis, and the distortion model to fit from there.
 #[derive(Clone, Copy)]
 struct Guess<'a> {
@@ -182,13 +193,13 @@ impl Refiner {
     }
 
     /// Names all stars, the faint ones, too, and fits camera and attitude to those with a name that
-    /// is chance with at most the probability `most_chance`; [`Self::pairs`] are then these. `None`
-    /// if they do not determine the camera.
+    /// is chance with at most the `wanted` probability; [`Self::pairs`] are then these. `None` if they
+    /// do not determine the camera.
     pub fn with_names(
         &mut self,
         problem: Problem,
         settled: &Refined,
-        most_chance: f64,
+        wanted: &NamingStart,
     ) -> Option<Refined> {
         let hypothesis = settled.hypothesis();
         hypothesis.predict_all(problem, &mut self.around, &mut self.predicted);
@@ -196,8 +207,9 @@ impl Refiner {
             field: problem.field,
             predicted: &self.predicted,
         };
-        self.naming.start(stars, hypothesis.zero_point_mag);
-        let mut model = hypothesis.camera.distortion_model();
+        self.naming
+            .start(stars, hypothesis.zero_point_mag, wanted.by_place);
+        let mut model = hypothesis.camera.distortion_model().max(wanted.least);
         let mut current = *settled;
         for round in 0..NAMING_ROUNDS {
             let hypothesis = current.hypothesis();
@@ -205,7 +217,7 @@ impl Refiner {
                 hypothesis.predict_again(&mut self.predicted);
             }
             self.name(problem, &current, round == 0);
-            self.take_names(most_chance);
+            self.take_names(wanted.most_chance);
             let settled = self.are_pairs_the_same();
             let mut guess = Guess {
                 hypothesis: &hypothesis,
@@ -216,6 +228,7 @@ impl Refiner {
             // The names are more stars than those that the model was chosen for.
             if round == 0 || (!settled && self.are_residuals_unexplained(problem, &current)) {
                 let chosen = self.choose_model(problem, &current, DistortionModel::Quintic);
+                let chosen = chosen.max(wanted.least);
                 if chosen != model {
                     model = chosen;
                     guess.model = chosen;

@@ -7,6 +7,7 @@
 //! triangle depends on the focal length (gnomonic projection), so the range is divided into steps
 //! within which it does not change noticeably.
 
+use super::confirmation::{Batch, Pose, Trial, Witnesses};
 use super::false_alarm::{FalseAlarm, MAX_HYPOTHESES, TESTED_STARS};
 use super::field::{Photometry, StarField};
 use super::hypothesis::{Hypothesis, Problem};
@@ -15,10 +16,11 @@ use super::pairing::Pair;
 use super::priors::{Priors, SkyRegion};
 use super::refine::{Refined, Refiner, Start};
 use super::triangle::TriangleShape;
-use crate::base::coords::{Icrs, Rotation, UnitVector};
+use crate::base::coords::Rotation;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px, frame_centre};
 use crate::identify::attitude::POSE_PARAMETERS;
-use crate::sky::catalog::sky_grid::{GridStar, chord_of};
+use crate::sky::catalog::sky_grid::GridStar;
+use arrayvec::ArrayVec;
 use nalgebra::{Matrix3, Vector3};
 
 /// Margin on the fields of view that the index allows, so that a field of exactly that width is
@@ -71,12 +73,6 @@ const PASSES: [Pass; 4] = [
 const CENTROID_SIGMAS: f64 = 2.0;
 /// Smallest longest side of a triangle, in units of the frame's diagonal.
 const MIN_TRIANGLE_SHARE: f64 = 0.12;
-/// Likelihood ratio below which the other stars refute a hypothesis (e to the −3.5), ...
-const DROP_BELOW: f64 = 0.030_197_383_422_318_5;
-/// ... above which they confirm it (e to the 7), ...
-const TAKE_ABOVE: f64 = 1_096.633_158_428_458_6;
-/// ... and above which they confirm it when all stars were tested (e).
-const TAKE_AT_END: f64 = std::f64::consts::E;
 /// Largest distance of a confirming star from its catalogue star: in distortion tolerances times
 /// the frame's diagonal, and in centroid errors extrapolated from the triangle.
 const CONFIRMING_TOLERANCES: f64 = 1.5;
@@ -86,6 +82,14 @@ const CONFIRMING_SIGMAS: f64 = 3.5;
 const HYPOTHESES_PER_TRIANGLE: u64 = 250;
 /// Minimum number of hypotheses, however few the triangles.
 const LEAST_HYPOTHESES: u64 = 30_000;
+/// From this number of hypotheses on, a search is long: several are tested together.
+const LONG_SEARCH: u64 = 2_000;
+/// Margin on the sizes of a triangle that decide which classes of the index can hold it.
+const CLASS_SLACK: f64 = 1.01;
+/// Most catalogue triangles that are looked up together.
+const WEIGHED: usize = 64;
+/// Most hypotheses that wait for their test.
+const WAITING: usize = 128;
 /// Maximum number of catalogue triangles of the right shape. Most of them fail at once, by size or
 /// brightness.
 const MAX_CANDIDATES: u64 = 20_000_000;
@@ -98,6 +102,11 @@ pub const LOG10_FALSE_ALARM_LIMIT: f64 = -8.0;
 /// truth.
 const LOG10_SURE: f64 = -14.0;
 
+/// Number of stars, the brightest, with which a hypothesis is tested first. It ends the search where
+/// these make it sure. That adds 10⁻¹⁴ to the false-alarm probability at most, to the 10⁻⁸ of the
+/// test with [`TESTED_STARS`] that follows where they do not.
+const FIRST_TESTED_STARS: usize = 25;
+
 /// Buffers of the search, reused from field to field.
 #[derive(Debug, Default)]
 pub struct Buffers {
@@ -108,6 +117,11 @@ pub struct Buffers {
     false_alarm: FalseAlarm,
     /// The stars of the best fit so far, while others are tried.
     best: Vec<Pair>,
+    /// Catalogue triangles of the shape of an observed one.
+    similar: Vec<[u32; 3]>,
+    /// Hypotheses from one triangle that wait for their test.
+    waiting: Vec<Trial>,
+    batch: Batch,
 }
 
 /// The search over one field.
@@ -126,7 +140,22 @@ pub struct Search<'a> {
     candidates: u64,
     best_log10: Option<f64>,
     /// The best hypothesis that passes the limit but does not end the search.
-    provisional: Option<Refined>,
+    provisional: Option<Found>,
+}
+
+/// A hypothesis that passed.
+#[derive(Debug, Clone, Copy)]
+pub struct Found {
+    /// The hypothesis, fitted.
+    pub refined: Refined,
+    /// log10 of its false-alarm probability.
+    pub log10_false_alarm: f64,
+    /// Number of stars, the brightest, with which it was fitted and tested.
+    pub stars: usize,
+    /// The hypothesis as the triangle gave it.
+    first: Hypothesis,
+    /// Largest distance of true pairs under it, in pixels.
+    radius_px: f64,
 }
 
 /// A triangle of observed stars.
@@ -153,20 +182,13 @@ struct Query {
     range_px: (f64, f64),
 }
 
-/// First estimate of camera and attitude.
-struct Pose {
-    sky_to_camera: Matrix3<f64>,
+/// A catalogue triangle beside an observed one.
+#[derive(Clone, Copy)]
+struct Weighed {
+    /// Johnson V minus observed magnitude; `None` where the corners disagree.
+    zero_point_mag: Option<f64>,
+    /// The focal length at which both are of the same size.
     focal_px: f64,
-    mirrored: bool,
-}
-
-impl Pose {
-    /// Direction on the sky of the pixel at this offset from the frame's centre.
-    fn direction_of(&self, [u, v]: &[f64; 2]) -> UnitVector<Icrs> {
-        let u = if self.mirrored { -u } else { *u };
-        let camera = Vector3::new(u, *v, self.focal_px).normalize();
-        UnitVector::from_unit(self.sky_to_camera.tr_mul(&camera))
-    }
 }
 
 impl<'a> Search<'a> {
@@ -208,11 +230,11 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The same, as the second search: chance has twice the opportunity.
-    pub fn again(self) -> Self {
+    /// A second search, of another choice of stars: chance has twice the opportunity.
+    pub fn again(self, problem: Problem<'a>, priors: &Priors) -> Self {
         Self {
             searches_log10: std::f64::consts::LOG10_2,
-            ..self
+            ..Self::new(problem, priors, self.buffers)
         }
     }
 
@@ -237,14 +259,14 @@ impl<'a> Search<'a> {
     }
 
     /// Tries triangles until a hypothesis passes. Returns it, fitted to the brightest stars.
-    pub fn run(&mut self) -> Option<Refined> {
+    pub fn run(&mut self) -> Option<Found> {
         PASSES
             .iter()
             .find_map(|pass| self.sweep(pass).or_else(|| self.provisional.take()))
     }
 
     /// Tries the triangles of one pass in the order of their faintest star, then of the second.
-    fn sweep(&mut self, pass: &Pass) -> Option<Refined> {
+    fn sweep(&mut self, pass: &Pass) -> Option<Found> {
         let stars = pass.stars.min(self.buffers.offsets.len());
         for faintest in pass.from..stars {
             for middle in 1..faintest {
@@ -297,11 +319,24 @@ impl<'a> Search<'a> {
         })
     }
 
-    fn try_triangle(&mut self, triangle: &ObservedTriangle) -> Option<Refined> {
-        (0..self.sky.triangles.classes.len()).find_map(|class| self.try_class(triangle, class))
+    fn try_triangle(&mut self, triangle: &ObservedTriangle) -> Option<Found> {
+        // Its size at the longest and the shortest focal length.
+        let (smallest, largest) = (
+            self.longest_side(triangle, self.focal_px.1) / CLASS_SLACK,
+            self.longest_side(triangle, self.focal_px.0) * CLASS_SLACK,
+        );
+        let classes = &self.sky.triangles.classes;
+        let is_of_size = |number: &usize| {
+            let class = &classes[*number];
+            class.high >= smallest && class.low <= largest
+        };
+        (0..classes.len())
+            .filter(is_of_size)
+            .find_map(|class| self.try_class(triangle, class))
+            .or_else(|| self.try_waiting(triangle))
     }
 
-    fn try_class(&mut self, triangle: &ObservedTriangle, number: usize) -> Option<Refined> {
+    fn try_class(&mut self, triangle: &ObservedTriangle, number: usize) -> Option<Found> {
         let class = &self.sky.triangles.classes[number];
         let low_px = self
             .focal_of_chord(triangle, class.high)?
@@ -331,15 +366,17 @@ impl<'a> Search<'a> {
         })
     }
 
+    /// The triangle's longest side at this focal length, as a chord.
+    fn longest_side(&self, triangle: &ObservedTriangle, focal_px: f64) -> f64 {
+        let [a, b, c] = self.vectors(triangle, focal_px);
+        (a - b).norm().max((b - c).norm()).max((c - a).norm())
+    }
+
     /// The focal length at which the triangle's longest side is `chord`.
     fn focal_of_chord(&self, triangle: &ObservedTriangle, chord: f64) -> Option<f64> {
-        let longest = |focal_px: f64| {
-            let [a, b, c] = self.vectors(triangle, focal_px);
-            (a - b).norm().max((b - c).norm()).max((c - a).norm())
-        };
         let mut focal_px = self.diagonal_px;
         for _ in 0..8 {
-            let ratio = longest(focal_px) / chord;
+            let ratio = self.longest_side(triangle, focal_px) / chord;
             focal_px *= ratio;
             if (ratio - 1.0).abs() < 1e-3 {
                 break;
@@ -353,7 +390,7 @@ impl<'a> Search<'a> {
         triangle: &ObservedTriangle,
         class: usize,
         range_px: (f64, f64),
-    ) -> Option<Refined> {
+    ) -> Option<Found> {
         let middle_px = (range_px.0 * range_px.1).sqrt();
         let vectors = self.vectors(triangle, middle_px);
         let shape = TriangleShape::new([&vectors[0], &vectors[1], &vectors[2]])?;
@@ -366,30 +403,65 @@ impl<'a> Search<'a> {
             middle_px,
             range_px,
         };
-        let mut found = None;
-        let sky = self.sky;
-        sky.for_each_similar((class, shape.ratios, triangle.tolerance), |corners| {
-            self.candidates += 1;
-            if found.is_none() && !self.is_exhausted() {
-                found = self.try_hypothesis(&query, corners);
-            }
-        });
+        let mut similar = std::mem::take(&mut self.buffers.similar);
+        similar.clear();
+        let shape = (class, shape.ratios, triangle.tolerance);
+        self.sky
+            .for_each_similar(shape, |corners| similar.push(*corners));
+        let found = similar
+            .chunks(WEIGHED)
+            .find_map(|corners| self.try_similar(&query, corners));
+        self.buffers.similar = similar;
         found
     }
 
-    /// Tests one hypothesis: the three observed stars are these three of the catalogue.
-    fn try_hypothesis(&mut self, query: &Query, corners: &[u32; 3]) -> Option<Refined> {
-        let triangle = &query.triangle;
+    /// Tries catalogue triangles in turn. Size and brightness of several are looked up first, so that
+    /// the processor fetches for all of them at once.
+    fn try_similar(&mut self, query: &Query, similar: &[[u32; 3]]) -> Option<Found> {
+        if self.is_exhausted() {
+            return None;
+        }
+        let weighed: ArrayVec<Weighed, WEIGHED> = similar
+            .iter()
+            .map(|corners| self.weigh(query, corners))
+            .collect();
+        similar.iter().zip(weighed).find_map(|(corners, weighed)| {
+            self.candidates += 1;
+            if self.is_exhausted() {
+                return None;
+            }
+            self.try_hypothesis(query, corners, &weighed)
+        })
+    }
+
+    /// Size and brightness of a catalogue triangle beside those of the observed one.
+    #[inline]
+    fn weigh(&self, query: &Query, corners: &[u32; 3]) -> Weighed {
         let stars = corners.map(|c| self.sky.grid.star(c));
-        let zero_point = self.zero_point(std::array::from_fn(|i| {
-            f64::from(stars[i].v_mag) - self.field.stars[triangle.stars[i]].mag
-        }))?;
-        let sky = stars.map(GridStar::vector);
-        let focal_px = query.middle_px * query.longest / (sky[0] - sky[1]).norm();
+        let difference =
+            |i: usize| f64::from(stars[i].v_mag) - self.field.stars[query.triangle.stars[i]].mag;
+        let longest = (stars[0].vector() - stars[1].vector()).norm();
+        Weighed {
+            zero_point_mag: self.zero_point([0, 1, 2].map(difference)),
+            focal_px: query.middle_px * query.longest / longest,
+        }
+    }
+
+    /// Tests one hypothesis: the three observed stars are these three of the catalogue.
+    fn try_hypothesis(
+        &mut self,
+        query: &Query,
+        corners: &[u32; 3],
+        weighed: &Weighed,
+    ) -> Option<Found> {
+        let triangle = &query.triangle;
+        let zero_point = weighed.zero_point_mag?;
+        let focal_px = weighed.focal_px;
         let slack = 1.0 + 2.0 * triangle.tolerance;
         if focal_px < query.range_px.0 / slack || focal_px > query.range_px.1 * slack {
             return None;
         }
+        let sky = corners.map(|c| self.sky.grid.star(c)).map(GridStar::vector);
         let mut observed = self.vectors(triangle, focal_px);
         if let Some(SkyRegion { centre, radius_rad }) = &self.near {
             let reach_rad = (self.diagonal_px / focal_px).atan() + radius_rad;
@@ -407,17 +479,20 @@ impl<'a> Search<'a> {
             mirrored,
         };
         self.hypotheses += 1;
-        if !self.is_confirmed(triangle, &pose, zero_point) {
+        let mut trial = Trial::new(pose, zero_point, self.hypotheses, triangle.confirming_px);
+        if self.hypotheses > LONG_SEARCH {
+            self.buffers.waiting.push(trial);
+            return if self.buffers.waiting.len() < WAITING {
+                None
+            } else {
+                self.try_waiting(triangle)
+            };
+        }
+        self.witnesses(triangle).test(&mut trial);
+        if !trial.is_confirmed() {
             return None;
         }
-        let (width_px, height_px) = (self.field.width_px, self.field.height_px);
-        let hypothesis = Hypothesis {
-            camera: CameraModel::pinhole(width_px, height_px, focal_px, mirrored),
-            icrs_to_camera: Rotation::from_matrix(pose.sky_to_camera),
-            parameters: POSE_PARAMETERS,
-            zero_point_mag: zero_point,
-        };
-        self.decide(&hypothesis, triangle)
+        self.decide_trial(&trial, triangle)
     }
 
     /// The median zero point of the triangle's stars, if all three agree.
@@ -436,66 +511,125 @@ impl<'a> Search<'a> {
         consistent.then_some(zero_point)
     }
 
-    /// Whether other observed stars confirm the hypothesis: the brightest ones are compared one by
-    /// one with the catalogue stars of about their brightness at their place, until the likelihood
-    /// ratio is decisive (Wald 1945, Ann. Math. Stat. 16, 117: the sequential probability ratio
-    /// test).
-    fn is_confirmed(&self, triangle: &ObservedTriangle, pose: &Pose, zero_point: f64) -> bool {
-        let radius_rad = triangle.confirming_px / pose.focal_px;
-        let chord = chord_of(radius_rad);
-        let tolerance_mag = self.field.photometry.tolerance_mag();
-        let mut ratio = 1.0;
-        for (index, offset) in self.buffers.offsets.iter().enumerate() {
-            if triangle.stars.contains(&index) {
-                continue;
-            }
-            let direction = pose.direction_of(offset);
-            let v_mag = self.field.stars[index].mag + zero_point;
-            let (bright, faint) = (v_mag - tolerance_mag, v_mag + tolerance_mag);
-            let magnitudes = bright as f32..=faint as f32;
-            let is_confirming = self.sky.grid.is_any_within(&direction, chord, magnitudes);
-            let chance = self
-                .sky
-                .chance_within(radius_rad, bright, faint)
-                .min(triangle.true_confirmation);
-            ratio *= if is_confirming {
-                triangle.true_confirmation / chance
-            } else {
-                (1.0 - triangle.true_confirmation) / (1.0 - chance)
-            };
-            if !(DROP_BELOW..TAKE_ABOVE).contains(&ratio) {
-                return ratio > 1.0;
-            }
+    /// Those who confirm or refute hypotheses from a triangle.
+    fn witnesses(&self, triangle: &ObservedTriangle) -> Witnesses<'_> {
+        Witnesses {
+            field: self.field,
+            sky: self.sky,
+            offsets: &self.buffers.offsets,
+            triangle: triangle.stars,
+            true_confirmation: triangle.true_confirmation,
         }
-        ratio > TAKE_AT_END
     }
 
-    /// Fits the hypothesis to all the stars that agree and computes its false-alarm probability.
-    /// Returns it if it ends the search.
-    fn decide(&mut self, hypothesis: &Hypothesis, triangle: &ObservedTriangle) -> Option<Refined> {
-        let start = Start {
-            hypothesis,
-            radius_px: triangle.confirming_px,
-            sceptical: true,
-            stars: TESTED_STARS,
-            richest: DistortionModel::Radial,
+    /// Tests the hypotheses that wait, all from this triangle, and decides on those that are
+    /// confirmed, in their order. The result is that of testing each when it came.
+    fn try_waiting(&mut self, triangle: &ObservedTriangle) -> Option<Found> {
+        if self.buffers.waiting.is_empty() {
+            return None;
+        }
+        let mut waiting = std::mem::take(&mut self.buffers.waiting);
+        let mut batch = std::mem::take(&mut self.buffers.batch);
+        self.witnesses(triangle).test_all(&mut waiting, &mut batch);
+        let last = self.hypotheses;
+        let found = waiting
+            .iter()
+            .filter(|trial| trial.is_confirmed())
+            .find_map(|trial| {
+                self.hypotheses = trial.number;
+                self.decide_trial(trial, triangle)
+            });
+        if found.is_none() {
+            self.hypotheses = last;
+        }
+        waiting.clear();
+        (self.buffers.waiting, self.buffers.batch) = (waiting, batch);
+        found
+    }
+
+    fn decide_trial(&mut self, trial: &Trial, triangle: &ObservedTriangle) -> Option<Found> {
+        let (width_px, height_px) = (self.field.width_px, self.field.height_px);
+        let Pose {
+            sky_to_camera,
+            focal_px,
+            mirrored,
+        } = trial.pose;
+        let hypothesis = Hypothesis {
+            camera: CameraModel::pinhole(width_px, height_px, focal_px, mirrored),
+            icrs_to_camera: Rotation::from_matrix(sky_to_camera),
+            parameters: POSE_PARAMETERS,
+            zero_point_mag: trial.zero_point_mag,
         };
-        let refined = self.buffers.refiner.refine(self.problem(), &start)?;
-        let log10 = self.log10_false_alarm(&refined.hypothesis())?;
+        self.decide(&hypothesis, triangle)
+    }
+
+    /// Fits the hypothesis to the stars that agree and computes its false-alarm probability. Returns
+    /// it if it ends the search.
+    ///
+    /// The brightest stars are asked first: mostly they alone are enough.
+    fn decide(&mut self, hypothesis: &Hypothesis, triangle: &ObservedTriangle) -> Option<Found> {
+        if let Some(found) = self.tested(hypothesis, triangle, FIRST_TESTED_STARS)
+            && found.log10_false_alarm <= LOG10_SURE
+        {
+            return Some(found);
+        }
+        let found = self.tested(hypothesis, triangle, TESTED_STARS)?;
+        let log10 = found.log10_false_alarm;
         let is_best = self.best_log10.is_none_or(|best| log10 < best);
         if is_best {
             self.best_log10 = Some(log10);
         }
         if log10 <= LOG10_SURE {
-            return Some(refined);
+            return Some(found);
         }
         if is_best && log10 <= LOG10_FALSE_ALARM_LIMIT {
-            self.provisional = Some(refined);
+            self.provisional = Some(found);
         }
         None
     }
 
-    fn problem(&self) -> Problem<'a> {
+    /// The hypothesis, fitted to the brightest `stars`, and its false-alarm probability.
+    fn tested(
+        &mut self,
+        hypothesis: &Hypothesis,
+        triangle: &ObservedTriangle,
+        stars: usize,
+    ) -> Option<Found> {
+        let radius_px = triangle.confirming_px;
+        let refined = self.refined((hypothesis, radius_px), stars)?;
+        Some(Found {
+            log10_false_alarm: self.log10_with(&refined.hypothesis(), stars)?,
+            refined,
+            stars,
+            first: *hypothesis,
+            radius_px,
+        })
+    }
+
+    fn refined(
+        &mut self,
+        (hypothesis, radius_px): (&Hypothesis, f64),
+        stars: usize,
+    ) -> Option<Refined> {
+        let start = Start {
+            hypothesis,
+            radius_px,
+            sceptical: true,
+            stars,
+            richest: DistortionModel::Radial,
+        };
+        self.buffers.refiner.refine(self.problem(), &start)
+    }
+
+    /// What was found, fitted to all [`TESTED_STARS`], for the fit to all stars to start from.
+    pub fn with_more_stars(&mut self, found: &Found) -> Refined {
+        let more = (found.stars < TESTED_STARS)
+            .then(|| self.refined((&found.first, found.radius_px), TESTED_STARS));
+        more.flatten().unwrap_or(found.refined)
+    }
+
+    /// The stars that are searched, and the catalogue.
+    pub fn problem(&self) -> Problem<'a> {
         Problem {
             field: self.field,
             sky: self.sky,
@@ -505,6 +639,11 @@ impl<'a> Search<'a> {
     /// log10 of the false-alarm probability of `hypothesis`; `None` where it contradicts the
     /// priors.
     pub fn log10_false_alarm(&mut self, hypothesis: &Hypothesis) -> Option<f64> {
+        self.log10_with(hypothesis, TESTED_STARS)
+    }
+
+    /// The same, by the brightest `stars`.
+    fn log10_with(&mut self, hypothesis: &Hypothesis, stars: usize) -> Option<f64> {
         let focal_px = hypothesis.camera.focal_length_px;
         let slack = 1.0 + 2.0 * PASSES[1].tolerance;
         if focal_px < self.focal_px.0 / slack || focal_px > self.focal_px.1 * slack {
@@ -522,7 +661,12 @@ impl<'a> Search<'a> {
             false_alarm,
             ..
         } = self.buffers;
-        let log10 = false_alarm.log10(hypothesis, problem, &mut refiner.around, hypotheses);
+        let log10 = false_alarm.log10(
+            (hypothesis, hypotheses),
+            problem,
+            stars,
+            &mut refiner.around,
+        );
         Some((log10 + self.searches_log10).min(0.0))
     }
 }

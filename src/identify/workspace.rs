@@ -1,4 +1,5 @@
-//! Identification of one star field: search, then the final fit with all the stars.
+//! Identification of one star field in two parts: where the camera points, then which star is
+//! which, with the final fit to all of them.
 
 use super::field::StarField;
 use super::hypothesis::Problem;
@@ -6,8 +7,8 @@ use super::identification::{Identification, MIN_STARS, SearchFailure, StarMatch}
 use super::indexed_catalog::IndexedCatalog;
 use super::pairing::Pair;
 use super::priors::Priors;
-use super::refine::{Refined, Start};
-use super::search::{Buffers, LOG10_FALSE_ALARM_LIMIT, Search};
+use super::refine::{NamingStart, Refined, Start};
+use super::search::{Buffers, Found, LOG10_FALSE_ALARM_LIMIT, Search};
 use super::thinning::Thinning;
 use crate::camera::DistortionModel;
 use std::f64::consts::PI;
@@ -47,6 +48,7 @@ pub struct Workspace {
     name_odds: f64,
     buffers: Buffers,
     thinning: Thinning,
+    bright: Brightest,
     answer: Option<Identification>,
 }
 
@@ -63,6 +65,7 @@ impl Workspace {
             name_odds: NAME_ODDS,
             buffers: Buffers::default(),
             thinning: Thinning::default(),
+            bright: Brightest::default(),
             answer: None,
         }
     }
@@ -77,7 +80,8 @@ impl Workspace {
         }
     }
 
-    /// Identifies the stars of `field`. The answer is kept in the workspace.
+    /// Identifies the stars of `field`: [`point`](Self::point), then
+    /// [`name_stars`](Pointing::name_stars). The answer is kept in the workspace.
     ///
     /// # Errors
     /// The [`SearchFailure`] where they are not identified.
@@ -87,46 +91,172 @@ impl Workspace {
         priors: &Priors,
         sky: &IndexedCatalog,
     ) -> Result<&Identification, SearchFailure> {
+        self.point(field, priors, sky)?.name_stars()
+    }
+
+    /// Attitude and optics alone, from the brightest stars of `field`: [`point`](Self::point), then
+    /// [`attitude`](Pointing::attitude). The answer is kept in the workspace.
+    ///
+    /// # Errors
+    /// The [`SearchFailure`] where the pointing is not found.
+    pub fn attitude(
+        &mut self,
+        field: &StarField,
+        priors: &Priors,
+        sky: &IndexedCatalog,
+    ) -> Result<&Identification, SearchFailure> {
+        self.point(field, priors, sky)?.attitude()
+    }
+
+    /// Finds out where the camera points, from the brightest stars of `field`, and no more.
+    ///
+    /// # Errors
+    /// The [`SearchFailure`] where the pointing is not found.
+    pub fn point<'w: 'a, 'a>(
+        &'w mut self,
+        field: &'a StarField,
+        priors: &Priors,
+        sky: &'a IndexedCatalog<'a>,
+    ) -> Result<Pointing<'w, 'a>, SearchFailure> {
         if field.stars.len() < MIN_STARS {
             return Err(SearchFailure::TooFewStars {
                 found: field.stars.len(),
                 needed: MIN_STARS,
             });
         }
-        let problem = Problem { field, sky };
-        let mut search = Search::new(problem, priors, &mut self.buffers);
+        let Self {
+            name_odds,
+            buffers,
+            thinning,
+            bright,
+            answer,
+        } = self;
+        let mut search = Search::new(Problem { field, sky }, priors, buffers);
         let mut found = search.run();
         let mut best_log10 = search.best_log10_false_alarm();
         if found.is_none()
-            && let Some(thinned) = self.thinning.thin(field)
+            && let Some(thinned) = thinning.thin(field)
         {
             let problem = Problem {
                 field: thinned,
                 sky,
             };
-            search = Search::new(problem, priors, &mut self.buffers).again();
+            search = search.again(problem, priors);
             found = search.run();
             let second = search.best_log10_false_alarm();
             best_log10 = [best_log10, second].into_iter().flatten().reduce(f64::min);
         }
-        let Some(found) = found else {
-            return Err(SearchFailure::NoMatch {
-                best_log10_false_alarm: best_log10,
-            });
+        let failure = SearchFailure::NoMatch {
+            best_log10_false_alarm: best_log10,
         };
-        let most_chance = 1.0 / (1.0 + self.name_odds);
-        let named = with_names(problem, &mut search, (&found, most_chance));
-        let Some((refined, log10)) = named else {
-            return Err(SearchFailure::NoMatch {
-                best_log10_false_alarm: best_log10,
-            });
-        };
-        let pairs = &self.buffers.refiner.pairs;
-        let mut matches = self.answer.take().map_or_else(Vec::new, |old| old.matches);
-        matches.clear();
-        matches.extend(pairs.iter().map(|pair| star_match(pair, field)));
-        Ok(self.answer.insert(identification(&refined, log10, matches)))
+        Ok(Pointing {
+            most_chance: 1.0 / (1.0 + *name_odds),
+            problem: Problem { field, sky },
+            found: found.ok_or(failure)?,
+            search,
+            failure,
+            bright,
+            answer,
+        })
     }
+}
+
+/// A field whose pointing is found, and whose stars have no names yet.
+pub struct Pointing<'w, 'a> {
+    /// The largest probability of a name that it is chance.
+    most_chance: f64,
+    problem: Problem<'a>,
+    search: Search<'a>,
+    found: Found,
+    /// What to say where the stars do not confirm the pointing after all.
+    failure: SearchFailure,
+    bright: &'w mut Brightest,
+    answer: &'w mut Option<Identification>,
+}
+
+impl<'w> Pointing<'w, '_> {
+    /// Names every star that can be named with the odds of the workspace, and fits attitude and
+    /// optics to all of these.
+    ///
+    /// # Errors
+    /// The [`SearchFailure`] where too few stars have a sure name.
+    pub fn name_stars(self) -> Result<&'w Identification, SearchFailure> {
+        let Self {
+            most_chance,
+            problem,
+            mut search,
+            found,
+            failure,
+            answer,
+            ..
+        } = self;
+        let start = search.with_more_stars(&found);
+        let named = with_names(problem, &mut search, (&start, most_chance));
+        let (refined, log10) = named.ok_or(failure)?;
+        let pairs = &search.refiner().pairs;
+        Ok(answered(answer, (&refined, log10), problem.field, pairs))
+    }
+
+    /// Attitude and optics from the brightest stars alone: those that the pointing was found with.
+    /// They are named and fitted as [`name_stars`](Self::name_stars) does it with all. So few stars
+    /// cannot show that a lens is ideal, so its first term is always fitted: the stated errors are
+    /// larger, and hold for real lenses.
+    ///
+    /// # Errors
+    /// The [`SearchFailure`] where too few stars have a sure name.
+    pub fn attitude(self) -> Result<&'w Identification, SearchFailure> {
+        let Self {
+            most_chance,
+            mut search,
+            found,
+            failure,
+            bright,
+            answer,
+            ..
+        } = self;
+        let searched = search.problem();
+        let problem = Problem {
+            field: bright.of(searched.field, found.stars),
+            ..searched
+        };
+        let of_few = NamingStart {
+            most_chance,
+            by_place: false,
+            least: Some(DistortionModel::Radial),
+        };
+        let refiner = search.refiner();
+        let refined = refiner.with_names(problem, &found.refined, &of_few);
+        let refined = refined.filter(|_| refiner.pairs.len() >= MIN_STARS);
+        let refined = refined.ok_or(failure)?;
+        let fitted = (&refined, found.log10_false_alarm);
+        Ok(answered(answer, fitted, problem.field, &refiner.pairs))
+    }
+}
+
+/// The brightest stars of a field, as a field. Its buffer is reused.
+#[derive(Debug, Default)]
+struct Brightest(Option<StarField>);
+
+impl Brightest {
+    fn of(&mut self, field: &StarField, count: usize) -> &StarField {
+        let mut stars = self.0.take().map_or_else(Vec::new, |old| old.stars);
+        stars.clear();
+        stars.extend_from_slice(field.brightest(count));
+        self.0.insert(StarField { stars, ..*field })
+    }
+}
+
+/// Puts the fit into `answer`, whose buffer is reused.
+fn answered<'a>(
+    answer: &'a mut Option<Identification>,
+    (refined, log10): (&Refined, f64),
+    field: &StarField,
+    pairs: &[Pair],
+) -> &'a Identification {
+    let mut matches = answer.take().map_or_else(Vec::new, |old| old.matches);
+    matches.clear();
+    matches.extend(pairs.iter().map(|pair| star_match(pair, field)));
+    answer.insert(identification(refined, log10, matches))
 }
 
 /// The final fit, to all stars with a sure name, with as much distortion as they support; the
@@ -199,7 +329,12 @@ fn name(
     most_chance: f64,
 ) -> Option<Named> {
     let refiner = search.refiner();
-    let refined = refiner.with_names(problem, settled, most_chance)?;
+    let of_all = NamingStart {
+        most_chance,
+        by_place: true,
+        least: None,
+    };
+    let refined = refiner.with_names(problem, settled, &of_all)?;
     let names = refiner.pairs.len();
     let log10 = search.log10_false_alarm(&refined.hypothesis())?;
     let is_sure = names >= MIN_STARS && log10 <= LOG10_FALSE_ALARM_LIMIT;

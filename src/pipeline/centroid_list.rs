@@ -2,7 +2,7 @@
 
 use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
-use super::identification::{identified, observation};
+use super::identification::{attempt, identified, observation};
 use super::note::Note;
 use super::solution::{Solution, Source};
 use super::stopwatch::{Stage, Stopwatch};
@@ -89,8 +89,8 @@ pub fn solve_centroids(
     let mut list = list.clone();
     list.centroids.sort_by(|a, b| a.mag.total_cmp(&b.mag));
     let field = list.star_field(priors.years_since_j2000());
-    let found = workspace.identify.identify(&field, priors, context.indexed);
-    let found = found.cloned();
+    let buffers = (&mut workspace.identify, &mut clock);
+    let found = attempt(&field, priors, context, buffers);
     let mut outcome = identified(found, None, &field, priors, context.indexed);
     let observation = observation(&outcome, priors);
     let source = |centroid: &ListedCentroid| Source {
@@ -105,6 +105,7 @@ pub fn solve_centroids(
     let note = Note::of_observation(observation.as_ref(), priors, &outcome);
     let notes = note.into_iter();
     let notes = notes.chain(Note::of_bodies(&bodies, &outcome, catalog));
+    let notes = notes.chain(Note::of_pointing(context.attitude_only, &outcome));
     Solution {
         width: list.width,
         height: list.height,
@@ -115,6 +116,7 @@ pub fn solve_centroids(
         exposure_s: priors.exposure_s,
         sources,
         background: None,
+        attitude_only: context.attitude_only,
         outcome,
         bodies,
         photometry: None,

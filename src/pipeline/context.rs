@@ -21,6 +21,9 @@ pub struct Context<'a> {
     pub camera: Option<StatedCamera>,
     /// The calibration of frames that are read from files.
     pub calibration: Option<&'a Calibration>,
+    /// Whether to stop at attitude and optics, from the brightest stars: no other star is named, and
+    /// nothing is measured that needs the names.
+    pub attitude_only: bool,
 }
 
 impl<'a> Context<'a> {
@@ -32,6 +35,7 @@ impl<'a> Context<'a> {
             priors: Priors::default(),
             camera: None,
             calibration: None,
+            attitude_only: false,
         }
     }
 

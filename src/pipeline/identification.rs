@@ -1,7 +1,8 @@
 //! Identification of a frame's stars, with priors that may be wrong, and the reason where it fails.
 
-use super::context::Workspace;
+use super::context::{Context, Workspace};
 use super::outcome::{Outcome, Reason};
+use super::stopwatch::{Stage, Stopwatch};
 use crate::detect::Detections;
 use crate::frame::Frame;
 use crate::identify;
@@ -44,13 +45,14 @@ pub(super) fn identify_stars(
     frame: &Frame,
     detections: &Detections,
     priors: &Priors,
-    indexed: &IndexedCatalog,
-    workspace: &mut Workspace,
+    context: &Context,
+    (workspace, clock): (&mut Workspace, &mut Stopwatch),
 ) -> (Outcome, Option<ScalePrior>) {
     let field = star_field(frame, detections, priors.years_since_j2000());
-    let (found, dropped_scale) = search(&field, priors, indexed, &mut workspace.identify);
+    let workspace = (&mut workspace.identify, clock);
+    let (found, dropped_scale) = search(&field, priors, context, workspace);
     let image = Some((frame, detections));
-    let outcome = identified(found, image, &field, &priors.binding(), indexed);
+    let outcome = identified(found, image, &field, &priors.binding(), context.indexed);
     (outcome, dropped_scale)
 }
 
@@ -62,22 +64,39 @@ type Searched = (Result<Identification, SearchFailure>, Option<ScalePrior>);
 fn search(
     field: &StarField,
     priors: &Priors,
-    indexed: &IndexedCatalog,
-    workspace: &mut identify::Workspace,
+    context: &Context,
+    (workspace, clock): (&mut identify::Workspace, &mut Stopwatch),
 ) -> Searched {
-    let first = workspace.identify(field, priors, indexed).cloned();
+    let first = attempt(field, priors, context, (workspace, clock));
     let tentative = priors.scale.filter(|scale| !scale.is_binding());
     let (Err(failure), Some(scale)) = (&first, tentative) else {
         return (first, None);
     };
-    let second = workspace
-        .identify(field, &priors.binding(), indexed)
-        .cloned();
+    let second = attempt(field, &priors.binding(), context, (workspace, clock));
     match second.map(at_second_attempt) {
         Ok(Some(found)) => (Ok(found), Some(scale)),
         Ok(None) => (Err(*failure), None),
         Err(failure) => (Err(failure), None),
     }
+}
+
+/// Pointing, then names, each timed; the pointing alone where no more is wanted.
+pub(super) fn attempt(
+    field: &StarField,
+    priors: &Priors,
+    context: &Context,
+    (workspace, clock): (&mut identify::Workspace, &mut Stopwatch),
+) -> Result<Identification, SearchFailure> {
+    if context.attitude_only {
+        let found = workspace.attitude(field, priors, context.indexed);
+        clock.lap(Stage::Pointing);
+        return found.cloned();
+    }
+    let pointing = workspace.point(field, priors, context.indexed);
+    clock.lap(Stage::Pointing);
+    let found = pointing?.name_stars();
+    clock.lap(Stage::Naming);
+    found.cloned()
 }
 
 /// An identification at the second attempt, where it is still sure. Chance had at most twice the

@@ -68,6 +68,8 @@ pub enum Note {
     BrightStarsNotNamed(Vec<MissingStar>),
     /// Positions of bright detections that have no sure name.
     BrightDetectionsNotNamed(Vec<[f64; 2]>),
+    /// Attitude and optics alone were wanted: the names are those of the brightest stars.
+    AttitudeOnly,
     /// The residuals are larger than the centroid errors.
     LargeResiduals {
         /// Root mean square of the residuals, in pixels.
@@ -96,6 +98,7 @@ impl Note {
             Self::DarkExposure(_) => "dark_exposure_differs",
             Self::BrightStarsNotNamed(_) => "bright_stars_not_named",
             Self::BrightDetectionsNotNamed(_) => "bright_detections_not_named",
+            Self::AttitudeOnly => "attitude_only",
             Self::LargeResiduals { .. } => "large_residuals",
         }
     }
@@ -109,6 +112,12 @@ impl Note {
         is_wrong.then_some(Self::WrongHeaderScale {
             pixel_scale_rad: (low_rad, high_rad),
         })
+    }
+
+    /// What the names of an identified frame are where attitude and optics alone were wanted.
+    pub(super) fn of_pointing(attitude_only: bool, outcome: &Outcome) -> Option<Self> {
+        let is_found = outcome.identification().is_some();
+        (attitude_only && is_found).then_some(Self::AttitudeOnly)
     }
 
     /// A contradiction between site, date and attitude, or what an observation lacks.
@@ -214,6 +223,10 @@ impl fmt::Display for Note {
             ),
             Self::NoTimeOfDay => f.write_str(
                 "the time of day is not known, and so the site gives no zenith distance",
+            ),
+            Self::AttitudeOnly => f.write_str(
+                "attitude and optics are from the brightest stars; no other star was looked up, and no \
+                 magnitude was measured",
             ),
             Self::NoExposure => {
                 f.write_str("the exposure is not known, and so nothing is predicted of the camera")

@@ -35,6 +35,8 @@ pub struct Solution {
     pub sources: Vec<Source>,
     /// The sky background; a list of centroids has none.
     pub background: Option<Background>,
+    /// Whether only attitude and optics were wanted, from the brightest stars.
+    pub attitude_only: bool,
     /// The stars and the attitude, or why they were not found.
     pub outcome: Outcome,
     /// The Moon and the planets in an identified frame whose date is known.

@@ -108,8 +108,9 @@ fn solve(
     let detections = detect::detect(frame, &config, &mut workspace.detect)?;
     clock.lap(Stage::Detect);
 
+    let buffers = (workspace, &mut clock);
     let (mut outcome, dropped_scale) =
-        identify_stars(frame, &detections, &priors, context.indexed, workspace);
+        identify_stars(frame, &detections, &priors, context, buffers);
     let sources: Vec<Source> = detections.sources.iter().map(Source::from).collect();
     let bodies = find_bodies(&mut outcome, &sources, &priors, context.indexed.catalog());
     clock.lap(Stage::Identify);
@@ -127,8 +128,11 @@ fn solve(
         dropped_scale,
         photometry: None,
     };
-    solved.measure_photometry();
-    let comparison = solved.compare_with_camera();
+    let mut comparison = None;
+    if !context.attitude_only {
+        solved.measure_photometry();
+        comparison = solved.compare_with_camera();
+    }
     clock.lap(Stage::Photometry);
     Ok(solved.into_solution(comparison, clock.timing()))
 }

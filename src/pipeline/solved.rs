@@ -112,6 +112,7 @@ impl Solved<'_> {
                 noise_adu: self.detections.noise_adu,
             }),
             observation: self.observation,
+            attitude_only: self.context.attitude_only,
             outcome: self.outcome,
             bodies: self.bodies,
             photometry: self.photometry,
@@ -129,7 +130,9 @@ impl Solved<'_> {
             .calibration
             .and_then(|calibration| calibration.exposure_mismatch(priors.exposure_s));
         let observation = self.observation.as_ref();
-        let camera = self.context.camera.as_ref();
+        // What needs the names of all stars.
+        let is_named = !self.context.attitude_only;
+        let camera = self.context.camera.as_ref().filter(|_| is_named);
         ignored
             .map(Note::IgnoredHeader)
             .chain(Note::of_scale(self.dropped_scale, outcome))
@@ -146,12 +149,14 @@ impl Solved<'_> {
             ))
             .chain(mismatch.map(Note::DarkExposure))
             .chain(Note::of_residuals(outcome.identification()))
+            .chain(Note::of_pointing(!is_named, outcome))
             .chain(self.notes_of_bright_stars())
             .collect()
     }
 
     fn notes_of_bright_stars(&self) -> Vec<Note> {
-        let Some(identification) = self.outcome.identification() else {
+        let identification = self.outcome.identification();
+        let Some(identification) = identification.filter(|_| !self.context.attitude_only) else {
             return Vec::new();
         };
         let frame = NamedFrame {

@@ -9,8 +9,12 @@ pub struct Timing {
     pub read_ms: f64,
     /// Detecting and measuring the sources.
     pub detect_ms: f64,
-    /// Identifying the stars.
+    /// Identifying the stars: pointing, naming, and what follows from the names.
     pub identify_ms: f64,
+    /// Of these, finding out where the camera points.
+    pub pointing_ms: f64,
+    /// Of these, which star is which, and the fit to all of them; 0 where it was not wanted.
+    pub naming_ms: f64,
     /// Photometry, and comparison with the stated camera.
     pub photometry_ms: f64,
     /// All of it.
@@ -22,6 +26,8 @@ pub struct Timing {
 pub(super) enum Stage {
     Read,
     Detect,
+    Pointing,
+    Naming,
     Identify,
     Photometry,
 }
@@ -44,16 +50,22 @@ impl Stopwatch {
         }
     }
 
-    /// Ends a stage; the next one begins.
+    /// Ends a stage; the next one begins. The times of a stage that comes again are added up. Pointing
+    /// and naming are parts of identifying.
     pub(super) fn lap(&mut self, stage: Stage) {
         let now = Instant::now();
         let lap_ms = milliseconds(self.lap_start, now);
         self.lap_start = now;
         match stage {
-            Stage::Read => self.timing.read_ms = lap_ms,
-            Stage::Detect => self.timing.detect_ms = lap_ms,
-            Stage::Identify => self.timing.identify_ms = lap_ms,
-            Stage::Photometry => self.timing.photometry_ms = lap_ms,
+            Stage::Read => self.timing.read_ms += lap_ms,
+            Stage::Detect => self.timing.detect_ms += lap_ms,
+            Stage::Pointing => self.timing.pointing_ms += lap_ms,
+            Stage::Naming => self.timing.naming_ms += lap_ms,
+            Stage::Identify => {}
+            Stage::Photometry => self.timing.photometry_ms += lap_ms,
+        }
+        if matches!(stage, Stage::Pointing | Stage::Naming | Stage::Identify) {
+            self.timing.identify_ms += lap_ms;
         }
     }
 

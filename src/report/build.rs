@@ -63,6 +63,8 @@ impl FrameReport {
             Outcome::Identified(identification) => {
                 let years = solution.date.map_or(0.0, |d| d.date.years_since_j2000());
                 report.add_identification(identification, catalog, years);
+                // The faintest of the brightest stars says nothing.
+                report.magnitude = report.magnitude.take().filter(|_| !solution.attitude_only);
                 bodies::add_to(&mut report, &solution.bodies, identification);
             }
         }
@@ -249,6 +251,8 @@ fn timing(measured: &Timing) -> TimingReport {
         read: to_decimals(measured.read_ms, 3),
         detect: to_decimals(measured.detect_ms, 3),
         identify: to_decimals(measured.identify_ms, 3),
+        pointing: to_decimals(measured.pointing_ms, 3),
+        naming: to_decimals(measured.naming_ms, 3),
         photometry: to_decimals(measured.photometry_ms, 3),
         total: to_decimals(measured.total_ms, 3),
     }

@@ -410,6 +410,10 @@ pub struct TimingReport {
     pub detect: f64,
     /// Identifying them.
     pub identify: f64,
+    /// Of this, finding out where the camera points.
+    pub pointing: f64,
+    /// Of this, naming the stars and fitting to all of them.
+    pub naming: f64,
     /// Zero point and completeness.
     pub photometry: f64,
     /// All stages.

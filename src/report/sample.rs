@@ -18,6 +18,7 @@ pub(super) fn solution(width: usize, height: usize, outcome: Outcome) -> Solutio
         exposure_s: None,
         notes: Vec::new(),
         background: None,
+        attitude_only: false,
         outcome,
         bodies: Vec::new(),
         timing: Timing::default(),

@@ -66,6 +66,8 @@ fn unidentified() -> FrameReport {
             read: 1.25,
             detect: 3.5,
             identify: 0.25,
+            pointing: 0.0625,
+            naming: 0.125,
             photometry: 0.125,
             total: 5.0,
         },

@@ -28,6 +28,8 @@ struct Kind {
     limit_vmag: f64,
     sky_mag_arcsec2: f64,
     exposure_s: f64,
+    /// Third and fifth order of the lens, in pixels in the corner.
+    distortion_px: [f64; 2],
 }
 
 impl Kind {
@@ -37,6 +39,10 @@ impl Kind {
         sheet.gain_e_per_adu = 2.0;
         sheet.bits = 12;
         sheet.full_well_e = 10_000.0;
+        [
+            sheet.imperfections.distortion_px,
+            sheet.imperfections.distortion5_px,
+        ] = self.distortion_px;
         let half_rad = self.fov_deg.to_radians() / 2.0;
         sheet.focal_length_mm = self.side_px as f64 / 2.0 / half_rad.tan() * sheet.pitch_x_um / 1e3;
         let mut scenario = Scenario::new(sheet);
@@ -146,6 +152,7 @@ fn kinds() -> Vec<Kind> {
         limit_vmag: 7.0,
         sky_mag_arcsec2: 21.0,
         exposure_s: 0.1,
+        distortion_px: [0.0; 2],
     };
     vec![
         Kind { ..common },
@@ -176,6 +183,19 @@ fn kinds() -> Vec<Kind> {
             name: "12 deg, sky 17, 1 s",
             sky_mag_arcsec2: 17.0,
             exposure_s: 1.0,
+            ..common
+        },
+        Kind {
+            name: "8 deg, r³ 1 px",
+            fov_deg: 8.0,
+            limit_vmag: 8.0,
+            exposure_s: 1.0,
+            distortion_px: [1.0, 0.0],
+            ..common
+        },
+        Kind {
+            name: "12 deg, r³ 3, r⁵ -1 px",
+            distortion_px: [3.0, -1.0],
             ..common
         },
     ]
@@ -228,51 +248,79 @@ fn summary(context: &Context, kind: &Kind, frames: u64) -> Summary {
 #[test]
 #[ignore = "a quarter of an hour of frames; prints the table"]
 fn table_of_attitudes() {
-    const FRAMES: u64 = 5000;
+    with_context(|context| print_table(context, 5000));
+}
+
+#[test]
+#[ignore = "minutes of frames; prints the table"]
+fn table_of_attitudes_from_the_brightest_stars() {
+    with_context(|context| {
+        let context = Context {
+            attitude_only: true,
+            ..context.clone()
+        };
+        print_table(&context, 1000);
+    });
+}
+
+fn print_table(context: &Context, frames: u64) {
     println!(
         "frames  identified  stars  distorted  NEES ±  pulls x, y, roll ±  median sigma arcsec  pulls of centroids x, y and of flux"
     );
-    with_context(|context| {
-        for kind in kinds() {
-            let mut s = summary(context, &kind, FRAMES);
-            let [x, y, roll] = s.pulls.map(|pull| pull.sigma());
-            let [sx, sy, sr] = s.sigma_arcsec.each_mut().map(|all| median(all));
-            let [cx, cy, cf] = s.centroids.map(|pull| pull.sigma());
-            println!(
-                "{:<20} {FRAMES} {} {:.0} {}  {:.3} ± {:.3}  {x:.3} {y:.3} {roll:.3} ± {:.3}  {sx:.2} {sy:.2} {sr:.2}  {cx:.3} {cy:.3} {cf:.3}",
-                kind.name,
-                s.nees.count,
-                s.matches.mean(),
-                s.distorted,
-                s.nees.mean(),
-                s.nees.mean_error(),
-                s.pulls[0].sigma_error()
-            );
-        }
-    });
+    for kind in kinds() {
+        let mut s = summary(context, &kind, frames);
+        let [x, y, roll] = s.pulls.map(|pull| pull.sigma());
+        let [sx, sy, sr] = s.sigma_arcsec.each_mut().map(|all| median(all));
+        let [cx, cy, cf] = s.centroids.map(|pull| pull.sigma());
+        println!(
+            "{:<20} {frames} {} {:.0} {}  {:.3} ± {:.3}  {x:.3} {y:.3} {roll:.3} ± {:.3}  {sx:.2} {sy:.2} {sr:.2}  {cx:.3} {cy:.3} {cf:.3}",
+            kind.name,
+            s.nees.count,
+            s.matches.mean(),
+            s.distorted,
+            s.nees.mean(),
+            s.nees.mean_error(),
+            s.pulls[0].sigma_error()
+        );
+    }
 }
 
 #[test]
 fn attitude_errors_match_their_stated_errors() {
+    with_context(|context| assert_errors_are_as_stated(context, &kinds()[0]));
+}
+
+#[test]
+fn so_do_those_from_the_brightest_stars_alone_also_with_a_lens_that_distorts() {
+    with_context(|context| {
+        let context = Context {
+            attitude_only: true,
+            ..context.clone()
+        };
+        for kind in [0, kinds().len() - 2] {
+            assert_errors_are_as_stated(&context, &kinds()[kind]);
+        }
+    });
+}
+
+fn assert_errors_are_as_stated(context: &Context, kind: &Kind) {
     const FRAMES: u64 = 120;
     const NEES: f64 = 3.0;
     const NEES_TOLERANCE: f64 = 0.1;
     const PULL_TOLERANCE: f64 = 0.05;
     /// Seeds are fixed, so the result is reproducible.
     const SIGMAS: f64 = 3.0;
-    with_context(|context| {
-        let s = summary(context, &kinds()[0], FRAMES);
-        assert_eq!(s.nees.count, FRAMES as f64);
-        // NEES is distributed as χ² with three degrees of freedom, whose variance is six.
-        let tolerance = NEES_TOLERANCE + SIGMAS * (6.0 / FRAMES as f64).sqrt();
-        assert!(
-            (s.nees.mean() - NEES).abs() < tolerance,
-            "{}",
-            s.nees.mean()
-        );
-        for pull in s.pulls.iter().chain(&s.centroids) {
-            let tolerance = PULL_TOLERANCE + SIGMAS * pull.sigma_error();
-            assert!((pull.sigma() - 1.0).abs() < tolerance, "{pull:?}");
-        }
-    });
+    let s = summary(context, kind, FRAMES);
+    assert_eq!(s.nees.count, FRAMES as f64);
+    // NEES is distributed as χ² with three degrees of freedom, whose variance is six.
+    let tolerance = NEES_TOLERANCE + SIGMAS * (6.0 / FRAMES as f64).sqrt();
+    assert!(
+        (s.nees.mean() - NEES).abs() < tolerance,
+        "{}",
+        s.nees.mean()
+    );
+    for pull in s.pulls.iter().chain(&s.centroids) {
+        let tolerance = PULL_TOLERANCE + SIGMAS * pull.sigma_error();
+        assert!((pull.sigma() - 1.0).abs() < tolerance, "{pull:?}");
+    }
 }

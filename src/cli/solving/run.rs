@@ -29,8 +29,9 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    fn context<'a>(&'a self, indexed: &'a IndexedCatalog<'a>) -> Context<'a> {
+    fn context<'a>(&'a self, indexed: &'a IndexedCatalog<'a>, attitude_only: bool) -> Context<'a> {
         Context {
+            attitude_only,
             detect: self.detect.clone(),
             priors: self.priors,
             camera: self.camera.clone(),
@@ -53,6 +54,7 @@ pub(crate) fn solve_all(
         output,
         catalog,
         name_odds,
+        attitude_only,
         ..
     } = options;
     if let Some(directory) = &output.out {
@@ -64,7 +66,7 @@ pub(crate) fn solve_all(
         return Ok(run.exit());
     }
     catalog.with_index(|pool, indexed| {
-        let context = plan.context(indexed);
+        let context = plan.context(indexed, attitude_only);
         // The threads that solve also draw and write files; this one only prints.
         let work = |input: &PathBuf, workspace: &mut Workspace| {
             let solved = solve(&context, input, workspace)?;

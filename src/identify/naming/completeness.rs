@@ -18,6 +18,8 @@ const LEAST_LOST: f64 = 0.1;
 const PRIOR_STARS: f64 = 1.0;
 /// Cells along the frame's longer side, scale by scale.
 const CELLS: [usize; 2] = [12, 36];
+/// Stars are few if a grid has more than this many cells for each.
+const FEW: usize = 6;
 /// Expected stars around a place that count as much as what the larger scale says.
 const PRIOR_AROUND: f64 = 1.0;
 
@@ -45,6 +47,7 @@ impl Completeness {
         self.odds.resize(stars, 1.0);
         self.shares.clear();
         self.visibility.clear();
+        self.visibility.resize(stars, 1.0);
     }
 
     /// The odds that a predicted star is detected.
@@ -125,14 +128,25 @@ impl Completeness {
             self.observed[cell] += observed.min(1.0);
             self.expected[cell] += share;
         }
-        for cells in [&mut self.observed, &mut self.expected] {
-            grid.sum_with_neighbours(cells, &mut self.scratch);
+        // Few stars look around themselves; for many, the sums of all cells are made at once.
+        let are_few = predicted.len() * FEW < grid.cells();
+        if !are_few {
+            for cells in [&mut self.observed, &mut self.expected] {
+                grid.sum_with_neighbours(cells, &mut self.scratch);
+            }
         }
         for ((star, (observed, share)), visibility) in stars().zip(&mut self.visibility) {
-            let cell = grid.cell_of(star.pixel.x, star.pixel.y);
+            let [all_observed, all_expected] = [&self.observed, &self.expected].map(|cells| {
+                let (x, y) = (star.pixel.x, star.pixel.y);
+                if are_few {
+                    grid.around(x, y, cells).0
+                } else {
+                    cells[grid.cell_of(x, y)]
+                }
+            });
             // Without the star itself: it must not vouch for its own name.
-            let observed = (self.observed[cell] - observed.min(1.0)).max(0.0);
-            let expected = (self.expected[cell] - share).max(0.0);
+            let observed = (all_observed - observed.min(1.0)).max(0.0);
+            let expected = (all_expected - share).max(0.0);
             *visibility = (observed + PRIOR_AROUND * *visibility) / (expected + PRIOR_AROUND);
         }
     }

@@ -26,6 +26,8 @@ const BRIGHTER_MAG: f64 = 6.0;
 /// Standard deviation of the slope of catalogue over observed magnitudes about 1, before it is
 /// measured: tone curves of JPEGs compress light.
 const SLOPE_SIGMA: f64 = 0.3;
+/// √(2π).
+const ROOT_TAU: f64 = 2.506_628_274_631_000_5;
 /// Candidates that are at least this sure measure zero point and scatter.
 const MEASURING_CHANCE: f64 = 0.5;
 /// Pseudo-stars with the first scatter.
@@ -40,15 +42,16 @@ pub fn position_density(candidate: &Candidate, distance_px: f64, is_saturated: b
     };
     let distance_sq = distance_px.powi(2);
     let sigma_sq = candidate.sigma_px.powi(2);
-    let density = |share: f64, variance: f64| {
-        share * (-distance_sq / (2.0 * variance)).exp() / (2.0 * PI * variance)
-    };
-    density(1.0 - WIDE_SHARE - far_share, sigma_sq)
-        + density(WIDE_SHARE, sigma_sq * WIDE_SIGMAS.powi(2))
-        + density(
-            far_share,
-            (FAR_SIGMA * candidate.gate_px).powi(2).max(sigma_sq),
-        )
+    let density = |share: f64, variance: f64, falloff: f64| share * falloff / (2.0 * PI * variance);
+    let falloff = |variance: f64| (-distance_sq / (2.0 * variance)).exp();
+    let wide_sq = sigma_sq * WIDE_SIGMAS.powi(2);
+    let far_sq = (FAR_SIGMA * candidate.gate_px).powi(2).max(sigma_sq);
+    let wide = falloff(wide_sq);
+    // Of four times the width: the exponential is the sixteenth root.
+    let narrow = wide.powi(16);
+    density(1.0 - WIDE_SHARE - far_share, sigma_sq, narrow)
+        + density(WIDE_SHARE, wide_sq, wide)
+        + density(far_share, far_sq, falloff(far_sq))
 }
 
 /// The catalogue's magnitude of a star of a certain observed magnitude: a line, and the scatter
@@ -98,12 +101,13 @@ impl MagnitudeRelation {
     /// Densities of the magnitude difference of a true pair, per magnitude.
     pub fn densities(&self, star: &ObservedStar, v_mag: f64) -> MagnitudeDensities {
         let difference = self.difference(star, v_mag);
-        let density = |share: f64, sigma: f64| {
-            share * (-0.5 * (difference / sigma).powi(2)).exp() / ((2.0 * PI).sqrt() * sigma)
-        };
+        let density = |share: f64, sigma: f64, falloff: f64| share * falloff / (ROOT_TAU * sigma);
+        let outlying = OUTLIER_SCATTER * self.scatter_mag;
+        let of_outliers = (-0.5 * (difference / outlying).powi(2)).exp();
+        // Of three times the scatter: the exponential is the ninth root.
         let plain = MagnitudeDensities {
-            by_scatter: density(1.0 - OUTLIER_SHARE, self.scatter_mag),
-            otherwise: density(OUTLIER_SHARE, OUTLIER_SCATTER * self.scatter_mag),
+            by_scatter: density(1.0 - OUTLIER_SHARE, self.scatter_mag, of_outliers.powi(9)),
+            otherwise: density(OUTLIER_SHARE, outlying, of_outliers),
         };
         if !star.is_saturated {
             return plain;

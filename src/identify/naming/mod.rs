@@ -63,6 +63,7 @@ pub struct Naming {
     /// it has a name.
     is_observed: Vec<f64>,
     has_name: Vec<f64>,
+    by_place: bool,
     completeness: Completeness,
     unrelated: Unrelated,
     magnitudes: MagnitudeRelation,
@@ -79,7 +80,12 @@ pub struct Stars<'a> {
 
 impl Naming {
     /// Starts with a new field and a first estimate of its zero point.
-    pub fn start(&mut self, stars: Stars, zero_point_mag: f64) {
+    ///
+    /// With `by_place`, the density of unrelated detections and the share of the stars that are
+    /// detected are measured from place to place, for which few stars say too little.
+    pub fn start(&mut self, stars: Stars, zero_point_mag: f64, by_place: bool) {
+        self.by_place = by_place;
+        self.unrelated.start(stars.field.stars.len());
         self.magnitudes = MagnitudeRelation::new(zero_point_mag, stars.field.photometry);
         self.has_name.clear();
         self.has_name.resize(stars.field.stars.len(), 0.5);
@@ -127,7 +133,7 @@ impl Naming {
         };
         for round in 0..rounds {
             // What depends on place changes little from round to round.
-            let is_by_place = round == 0 || (is_first && round + 1 == rounds);
+            let is_by_place = self.by_place && (round == 0 || (is_first && round + 1 == rounds));
             if is_by_place {
                 let (field, has_name) = (stars.field, &self.has_name);
                 self.unrelated.measure_crowding(field, has_name);
@@ -144,12 +150,17 @@ impl Naming {
         self.unrelated.measure(field, &self.has_name);
         clear(&mut self.odds_of_observed, field.stars.len());
         clear(&mut self.odds_of_predicted, predicted.len());
+        // Candidates of the same star follow each other.
+        let (mut last, mut as_bright) = (usize::MAX, 0);
         for candidate in &mut self.candidates {
             let (i, j) = (candidate.observed, candidate.predicted);
             let star = &field.stars[i];
             let densities = self.magnitudes.densities(star, candidate.v_mag);
-            let expected_v_mag = self.magnitudes.expected_v_mag(star);
-            let as_bright = predicted.partition_point(|p| f64::from(p.v_mag) < expected_v_mag);
+            if i != last {
+                let expected_v_mag = self.magnitudes.expected_v_mag(star);
+                as_bright = predicted.partition_point(|p| f64::from(p.v_mag) < expected_v_mag);
+                last = i;
+            }
             let like = self.completeness.odds_as(j, as_bright) * densities.by_scatter
                 + self.completeness.odds(j) * densities.otherwise;
             candidate.odds = candidate.position_density * like / self.unrelated.density(i);

@@ -37,6 +37,12 @@ impl Unrelated {
         self.densities[observed]
     }
 
+    /// Nothing is known of the places of `stars` observed stars.
+    pub fn start(&mut self, stars: usize) {
+        self.crowding.clear();
+        self.crowding.resize(stars, 1.0);
+    }
+
     /// Measures how crowded the surroundings of each observed star are, by the probability of each
     /// that it is a catalogue star.
     pub fn measure_crowding(&mut self, field: &StarField, has_name: &[f64]) {

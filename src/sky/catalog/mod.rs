@@ -46,6 +46,7 @@
 mod compact;
 mod contents;
 mod error;
+pub mod face_grid;
 mod id;
 mod import;
 mod position;

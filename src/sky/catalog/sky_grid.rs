@@ -26,7 +26,7 @@ pub struct GridStar {
 }
 
 impl GridStar {
-    fn new(index: usize, star: &Star) -> Self {
+    pub(super) fn new(index: usize, star: &Star) -> Self {
         let v = star.direction.as_vector();
         Self {
             direction: [v.x as f32, v.y as f32, v.z as f32],

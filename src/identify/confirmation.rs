@@ -1,0 +1,220 @@
+//! Whether other observed stars confirm a hypothesis: the brightest ones are compared one by one
+//! with the catalogue stars of about their brightness at their place, until the likelihood ratio is
+//! decisive.
+//!
+//! Long searches ask about a million hypotheses. What they wait for is memory, as each question is
+//! about another part of the sky. So many hypotheses are asked about together, star by star: the
+//! processor then fetches for many of them at once.
+//!
+//! # Reference
+//! Wald 1945, Ann. Math. Stat. 16, 117: the sequential probability ratio test.
+
+use super::field::StarField;
+use super::indexed_catalog::IndexedCatalog;
+use crate::base::coords::{Icrs, UnitVector};
+use crate::sky::catalog::face_grid::Disc;
+use crate::sky::catalog::sky_grid::chord_of;
+use nalgebra::{Matrix3, Vector3};
+use std::ops::RangeInclusive;
+
+/// Likelihood ratio below which the other stars refute a hypothesis (e to the −3.5), ...
+const DROP_BELOW: f64 = 0.030_197_383_422_318_5;
+/// ... above which they confirm it (e to the 7), ...
+const TAKE_ABOVE: f64 = 1_096.633_158_428_458_6;
+/// ... and above which they confirm it when all stars were tested (e).
+const TAKE_AT_END: f64 = std::f64::consts::E;
+
+/// First estimate of camera and attitude.
+#[derive(Debug, Clone, Copy)]
+pub struct Pose {
+    /// The rotation.
+    pub sky_to_camera: Matrix3<f64>,
+    /// Focal length, in pixels.
+    pub focal_px: f64,
+    /// Whether the x axis is reversed.
+    pub mirrored: bool,
+}
+
+impl Pose {
+    /// Direction on the sky of the pixel at this offset from the frame's centre.
+    fn direction_of(&self, [u, v]: &[f64; 2]) -> UnitVector<Icrs> {
+        let u = if self.mirrored { -u } else { *u };
+        let camera = Vector3::new(u, *v, self.focal_px).normalize();
+        UnitVector::from_unit(self.sky_to_camera.tr_mul(&camera))
+    }
+}
+
+/// The stars that confirm or refute.
+pub struct Witnesses<'a> {
+    /// The field.
+    pub field: &'a StarField,
+    /// The catalogue.
+    pub sky: &'a IndexedCatalog<'a>,
+    /// Offsets of its brightest stars from the frame's centre, in pixels.
+    pub offsets: &'a [[f64; 2]],
+    /// The stars that made the hypothesis.
+    pub triangle: [usize; 3],
+    /// Probability that another star confirms a true hypothesis.
+    pub true_confirmation: f64,
+}
+
+/// A hypothesis that waits for its test, or has its answer.
+#[derive(Debug, Clone, Copy)]
+pub struct Trial {
+    /// Camera and attitude.
+    pub pose: Pose,
+    /// Johnson V minus observed magnitude.
+    pub zero_point_mag: f64,
+    /// Its number in the search.
+    pub number: u64,
+    /// Radius within which a star confirms, and its chord.
+    radius_rad: f64,
+    chord: f64,
+    ratio: f64,
+    answer: Option<bool>,
+}
+
+impl Trial {
+    /// A hypothesis before its test; stars within `confirming_px` confirm it.
+    pub fn new(pose: Pose, zero_point_mag: f64, number: u64, confirming_px: f64) -> Self {
+        let radius_rad = confirming_px / pose.focal_px;
+        Self {
+            radius_rad,
+            chord: chord_of(radius_rad),
+            pose,
+            zero_point_mag,
+            number,
+            ratio: 1.0,
+            answer: None,
+        }
+    }
+
+    /// Whether it is confirmed.
+    pub fn is_confirmed(&self) -> bool {
+        self.answer.unwrap_or(self.ratio > TAKE_AT_END)
+    }
+
+    fn add(&mut self, factor: f64) {
+        self.ratio *= factor;
+        if !(DROP_BELOW..TAKE_ABOVE).contains(&self.ratio) {
+            self.answer = Some(self.ratio > 1.0);
+        }
+    }
+}
+
+/// A place where a star is looked for.
+#[derive(Debug, Clone, Copy)]
+struct Lookup {
+    trial: u32,
+    direction: UnitVector<Icrs>,
+    /// `None` where the disc is on the edge of a face.
+    disc: Option<Disc>,
+    /// Of the disc's first cell: what was fetched so far.
+    is_bright: bool,
+    stars: (u32, u32),
+}
+
+/// Buffers for many trials.
+#[derive(Debug, Default)]
+pub struct Batch {
+    lookups: Vec<Lookup>,
+}
+
+impl Witnesses<'_> {
+    /// Magnitudes of a catalogue star that confirms, if it is at the place of this one.
+    fn magnitudes(&self, star: usize, zero_point_mag: f64) -> (f64, f64) {
+        let tolerance_mag = self.field.photometry.tolerance_mag();
+        let v_mag = self.field.stars[star].mag + zero_point_mag;
+        (v_mag - tolerance_mag, v_mag + tolerance_mag)
+    }
+
+    /// The likelihood ratio of one star's answer.
+    fn factor(&self, is_confirming: bool, radius_rad: f64, (bright, faint): (f64, f64)) -> f64 {
+        let chance = self.sky.chance_within(radius_rad, bright, faint);
+        let chance = chance.min(self.true_confirmation);
+        if is_confirming {
+            self.true_confirmation / chance
+        } else {
+            (1.0 - self.true_confirmation) / (1.0 - chance)
+        }
+    }
+
+    /// The other stars, brightest first.
+    fn others(&self) -> impl Iterator<Item = (usize, &[f64; 2])> {
+        let stars = self.offsets.iter().enumerate();
+        stars.filter(|(index, _)| !self.triangle.contains(index))
+    }
+
+    /// Tests one hypothesis.
+    pub fn test(&self, trial: &mut Trial) {
+        for (index, offset) in self.others() {
+            let direction = trial.pose.direction_of(offset);
+            let magnitudes = self.magnitudes(index, trial.zero_point_mag);
+            let wanted = in_single_precision(magnitudes);
+            let is_confirming = self.sky.grid.is_any_within(&direction, trial.chord, wanted);
+            trial.add(self.factor(is_confirming, trial.radius_rad, magnitudes));
+            if trial.answer.is_some() {
+                break;
+            }
+        }
+    }
+
+    /// Tests many hypotheses: the answers are those of [`test`](Self::test).
+    pub fn test_all(&self, trials: &mut [Trial], batch: &mut Batch) {
+        let faces = self.sky.faces();
+        let lookups = &mut batch.lookups;
+        for (index, offset) in self.others() {
+            lookups.clear();
+            let waiting = trials
+                .iter()
+                .enumerate()
+                .filter(|(_, t)| t.answer.is_none());
+            lookups.extend(waiting.map(|(number, trial)| {
+                let direction = trial.pose.direction_of(offset);
+                Lookup {
+                    trial: number as u32,
+                    direction,
+                    disc: Disc::of(direction.as_vector(), trial.chord),
+                    is_bright: false,
+                    stars: (0, 0),
+                }
+            }));
+            if lookups.is_empty() {
+                return;
+            }
+            // Each of these loops only fetches, so that many fetches overlap.
+            for lookup in lookups.iter_mut() {
+                let (_, faint) =
+                    self.magnitudes(index, trials[lookup.trial as usize].zero_point_mag);
+                let is_bright = |disc: &Disc| faces.may_hold(disc.first_cell(), faint as f32);
+                lookup.is_bright = lookup.disc.as_ref().is_some_and(is_bright);
+            }
+            for lookup in lookups.iter_mut().filter(|lookup| lookup.is_bright) {
+                let first = lookup.disc.as_ref().map_or(0, Disc::first_cell);
+                lookup.stars = faces.range(first);
+            }
+            let mut brightest = 0.0;
+            for lookup in lookups.iter().filter(|lookup| lookup.is_bright) {
+                brightest += faces.v_mag(lookup.stars.0);
+            }
+            std::hint::black_box(brightest);
+            for lookup in lookups.iter() {
+                let trial = &mut trials[lookup.trial as usize];
+                let magnitudes = self.magnitudes(index, trial.zero_point_mag);
+                let wanted = in_single_precision(magnitudes);
+                let is_confirming = match &lookup.disc {
+                    Some(disc) => faces.is_any_within(disc, lookup.direction.as_vector(), &wanted),
+                    None => {
+                        let (grid, direction) = (&self.sky.grid, &lookup.direction);
+                        grid.is_any_within(direction, trial.chord, wanted)
+                    }
+                };
+                trial.add(self.factor(is_confirming, trial.radius_rad, magnitudes));
+            }
+        }
+    }
+}
+
+fn in_single_precision((bright, faint): (f64, f64)) -> RangeInclusive<f32> {
+    bright as f32..=faint as f32
+}
