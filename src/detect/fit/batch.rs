@@ -81,6 +81,20 @@ impl BatchFitter {
     pub fn fit(
         &mut self,
         maps: &FrameMaps<'_>,
+        starts: impl Iterator<Item = BatchStart>,
+        config: &FitConfig,
+        on_fit: impl FnMut(usize, Option<Fit>, &Window),
+    ) {
+        let cut = |start: &BatchStart, window: &mut Window| {
+            maps.cut_out(&[start.spot], window_radius(start.spot_px), window);
+        };
+        self.fit_cut(cut, starts, config, on_fit);
+    }
+
+    /// [`Self::fit`] in windows that `cut` fills for each initial guess.
+    pub fn fit_cut(
+        &mut self,
+        mut cut: impl FnMut(&BatchStart, &mut Window),
         mut starts: impl Iterator<Item = BatchStart>,
         config: &FitConfig,
         mut on_fit: impl FnMut(usize, Option<Fit>, &Window),
@@ -89,7 +103,7 @@ impl BatchFitter {
         self.data.clear();
         self.data.resize(self.side * self.side, [f32::NAN; BATCH]);
         for lane in 0..BATCH {
-            self.begin(lane, starts.next(), maps);
+            self.begin(lane, starts.next(), &mut cut);
         }
         while self.lanes.iter().any(Option::is_some) {
             self.fill_axes();
@@ -116,25 +130,30 @@ impl BatchFitter {
                 fit.spots[0].noise_flux = flux_noise(lane, &sums, window);
                 let converged = (outcome == StepOutcome::Converged).then(|| fit.clone());
                 on_fit(start.number, converged, window);
-                self.begin(lane, starts.next(), maps);
+                self.begin(lane, starts.next(), &mut cut);
             }
         }
     }
 
     /// Starts the fit of a star in a lane, or leaves the lane empty.
-    fn begin(&mut self, lane: usize, start: Option<BatchStart>, maps: &FrameMaps<'_>) {
+    fn begin(
+        &mut self,
+        lane: usize,
+        start: Option<BatchStart>,
+        cut: &mut impl FnMut(&BatchStart, &mut Window),
+    ) {
         self.lanes[lane] = start.map(|start| ActiveFit { start, steps: 0 });
-        let Some(BatchStart { spot, spot_px, .. }) = start else {
+        let Some(start) = start else {
             return;
         };
         let fit = &mut self.fits[lane];
         *fit = Fit {
-            spot_px,
+            spot_px: start.spot_px,
             ..Fit::default()
         };
-        fit.spots.push(spot);
+        fit.spots.push(start.spot);
         let window = &mut self.windows[lane];
-        maps.cut_out(&[spot], window_radius(spot_px), window);
+        cut(&start, window);
         let groups = window.groups().max(1);
         // NaN beyond the window, where it is smaller than the others.
         for (y, to) in self.data.chunks_mut(self.side).enumerate() {

@@ -34,4 +34,4 @@ pub(crate) use parameters::{
     Fit, FitConfig, MAX_SPOTS, NoiseModel, ONE_SPOT, SPOT_RANGE_PX, SpotEstimate, SpotGroup,
 };
 pub(crate) use sums::{WindowPixels, sum_of};
-pub(crate) use window::Window;
+pub(crate) use window::{Window, window_radius};
