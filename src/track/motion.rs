@@ -21,7 +21,7 @@ type Covariance = SMatrix<f64, 6, 6>;
 const UNKNOWN_RATE_RAD: f64 = 100.0;
 /// How fast the acceleration follows the innovations: the change of its logarithm where a squared
 /// innovation is twice its expectation.
-const ADAPTATION: f64 = 0.1;
+const ADAPTATION: f64 = 0.2;
 /// Squared innovations count at most this many times their expectation, …
 const MAX_RATIO: f64 = 9.0;
 /// … and from here on the acceleration is at once raised to what explains them.

@@ -80,7 +80,7 @@ impl PoseFitter {
             attitude = Some(found);
             std::mem::swap(&mut self.is_used, &mut self.before);
             self.set_residuals(&pinhole, &start);
-            self.choose(|star| (CLIP_SIGMAS * star.sigma_px).max(MIN_CLIP_PX));
+            self.choose(clip_px);
             if self.is_used == self.before {
                 break;
             }
@@ -91,6 +91,11 @@ impl PoseFitter {
     /// Number of stars of the last fit.
     pub fn used(&self) -> usize {
         self.is_used.iter().filter(|used| **used).count()
+    }
+
+    /// The largest residual within which a star of the last fit agreed with it, in pixels.
+    pub fn agreeing_px(&self) -> f64 {
+        self.ideal.iter().map(clip_px).fold(0.0, f64::max)
     }
 
     /// The squared error on each axis that the stated ones (with the excess of the prior) lack to
@@ -186,6 +191,11 @@ impl PoseFitter {
         self.is_used
             .extend(stars.map(|(star, [x, y])| x.hypot(*y) <= within_px(star)));
     }
+}
+
+/// Largest residual of a star that belongs to the fit, in pixels.
+fn clip_px(star: &MeasuredStar) -> f64 {
+    (CLIP_SIGMAS * star.sigma_px).max(MIN_CLIP_PX)
 }
 
 /// The attitude of a fit with a free focal length, which is known better: both are combined.

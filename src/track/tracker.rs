@@ -1,6 +1,6 @@
 //! From frame to frame: windows around predicted stars, or a full solution.
 
-use super::agreement::Agreement;
+use super::agreement::{Agreement, density_px2};
 use super::guides::{GuideStar, Guides, Wanted};
 use super::lens::LensRefiner;
 use super::motion::{Motion, Prediction};
@@ -238,8 +238,9 @@ impl<'a> Tracker<'a> {
         };
         let attitude = self.pose.fit(&buffers.stars, &prior);
         let agreeing = attitude.map_or(0, |_| self.pose.used());
-        let density = (self.detector.surplus(), known.light.density_px2);
-        let log10 = self.agreement.log10(&buffers.expected, agreeing, density);
+        let density_px2 = density_px2(self.detector.surplus(), known.light.density_px2);
+        let agreed = (agreeing, self.pose.agreeing_px());
+        let log10 = self.agreement.log10(&buffers.expected, agreed, density_px2);
         let lost = Loss::NoAgreement {
             predicted,
             agreeing,

@@ -9,6 +9,11 @@ use multiversion::multiversion;
 /// above it.
 pub(super) const MIN_SNR: f32 = 5.0;
 
+/// Pixels beyond the last row that the lanes may read.
+pub(super) const PADDING: usize = LANES;
+/// Pixels that are filtered together.
+const LANES: usize = 8;
+
 /// A peak of the matched filter.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WindowPeak {
@@ -58,7 +63,7 @@ impl MatchedFilter {
     }
 
     /// The peaks within `radius_px` of a place in `square`, which is as large as the radius, that of
-    /// the filter, and one pixel.
+    /// the filter, and one pixel. Its pixels are followed by at least [`PADDING`] others.
     pub fn peaks(
         &mut self,
         (square, pixels): (&Square, &[f32]),
@@ -71,7 +76,7 @@ impl MatchedFilter {
         let Some(first) = middle.checked_sub(reach + taps) else {
             return Peaks::default();
         };
-        self.filter(square, pixels, (first, side));
+        let stride = self.filter(square, pixels, (first, side));
         let filtered = &self.filtered;
         let corner = middle - reach;
         let per_noise = 1.0 / (square.noise_adu * self.norm);
@@ -79,9 +84,9 @@ impl MatchedFilter {
         let mut peaks = Peaks::default();
         for y in 1..side - 1 {
             for x in 1..side - 1 {
-                let value = filtered[y * side + x];
+                let value = filtered[y * stride + x];
                 let snr = value * per_noise;
-                if snr < MIN_SNR || !is_peak(filtered, side, [x, y]) {
+                if snr < MIN_SNR || !is_peak(filtered, stride, [x, y]) {
                     continue;
                 }
                 let dx = (corner + x) as f64 - offset[0];
@@ -93,13 +98,13 @@ impl MatchedFilter {
                 peaks.others += usize::from(peaks.highest.is_some());
                 if is_highest {
                     let vertex = |step: usize| {
-                        let at = y * side + x;
+                        let at = y * stride + x;
                         vertex(filtered[at - step], value, filtered[at + step])
                     };
                     peaks.highest = Some(WindowPeak {
                         at: [
                             (corner + x) as f64 + vertex(1),
-                            (corner + y) as f64 + vertex(side),
+                            (corner + y) as f64 + vertex(stride),
                         ],
                         snr,
                         flux: snr / self.norm,
@@ -110,25 +115,72 @@ impl MatchedFilter {
         peaks
     }
 
-    /// Filters the part of the square from `first` on so that `side` columns and rows result.
-    fn filter(&mut self, square: &Square, pixels: &[f32], (first, side): (usize, usize)) {
+    /// Filters the part of the square from `first` on so that `side` columns and rows result, and
+    /// some more columns that are not used, to fill the lanes. Returns the number of columns.
+    fn filter(&mut self, square: &Square, pixels: &[f32], (first, side): (usize, usize)) -> usize {
         let Self {
             taps,
             rows,
             filtered,
             ..
         } = self;
-        let count = side + taps.len() - 1;
+        let stride = side.next_multiple_of(LANES);
+        let start = square.start + first * square.side + first;
+        let source = Source {
+            pixels: pixels.get(start..).unwrap_or_default(),
+            row_px: square.side,
+            background_adu: square.background_adu,
+        };
         rows.clear();
-        rows.resize(count * side, 0.0);
-        let source = square.pixels(pixels).chunks_exact(square.side).skip(first);
-        for (to, from) in rows.chunks_exact_mut(side).zip(source) {
-            across(taps, &from[first..], square.background_adu, to);
-        }
+        rows.resize((side + taps.len() - 1) * stride, 0.0);
         filtered.clear();
-        filtered.resize(side * side, 0.0);
-        for (y, to) in filtered.chunks_exact_mut(side).enumerate() {
-            down(taps, &rows[y * side..], to);
+        filtered.resize(side * stride, 0.0);
+        convolve(taps, &source, stride, (rows, filtered));
+        stride
+    }
+}
+
+/// Pixels that are filtered, from the first on.
+struct Source<'a> {
+    pixels: &'a [f32],
+    /// Pixels from a row to the next.
+    row_px: usize,
+    background_adu: f32,
+}
+
+/// Filters along the rows to `rows`, and along the columns to `filtered`, both `stride` wide;
+/// pixels without a value count as background.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn convolve(
+    taps: &[f32],
+    source: &Source,
+    stride: usize,
+    (rows, filtered): (&mut [f32], &mut [f32]),
+) {
+    for (y, to) in rows.chunks_exact_mut(stride).enumerate() {
+        let from = source.pixels.get(y * source.row_px..).unwrap_or_default();
+        for (chunk, to) in to.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+            for (i, tap) in taps.iter().enumerate() {
+                let pixels = from.get(chunk * LANES + i..).unwrap_or_default();
+                if let Some(pixels) = pixels.first_chunk::<LANES>() {
+                    for lane in 0..LANES {
+                        let above = pixels[lane] - source.background_adu;
+                        to[lane] += tap * if above.is_nan() { 0.0 } else { above };
+                    }
+                }
+            }
+        }
+    }
+    for (y, to) in filtered.chunks_exact_mut(stride).enumerate() {
+        for (chunk, to) in to.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+            for (i, tap) in taps.iter().enumerate() {
+                let row = &rows[(y + i) * stride + chunk * LANES..];
+                if let Some(row) = row.first_chunk::<LANES>() {
+                    for lane in 0..LANES {
+                        to[lane] += tap * row[lane];
+                    }
+                }
+            }
         }
     }
 }
@@ -138,33 +190,12 @@ fn filter_radius(spot_px: f64) -> usize {
     ((2.0 * spot_px + 0.5).ceil() as usize).clamp(1, MAX_TAPS - 1)
 }
 
-/// Adds the weighted sums along a row to `to`; pixels without a value count as background.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn across(taps: &[f32], from: &[f32], background: f32, to: &mut [f32]) {
-    for (i, tap) in taps.iter().enumerate() {
-        for (to, &pixel) in to.iter_mut().zip(&from[i..]) {
-            let above = pixel - background;
-            *to += tap * if above.is_nan() { 0.0 } else { above };
-        }
-    }
-}
-
-/// Adds the weighted sums of rows as long as `to` to it.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn down(taps: &[f32], rows: &[f32], to: &mut [f32]) {
-    for (tap, row) in taps.iter().zip(rows.chunks_exact(to.len())) {
-        for (to, value) in to.iter_mut().zip(row) {
-            *to += tap * value;
-        }
-    }
-}
-
 /// Whether a pixel is higher than its eight neighbours; of equal ones the first is.
-fn is_peak(filtered: &[f32], side: usize, [x, y]: [usize; 2]) -> bool {
-    let at = y * side + x;
+fn is_peak(filtered: &[f32], stride: usize, [x, y]: [usize; 2]) -> bool {
+    let at = y * stride + x;
     let value = filtered[at];
-    let before = [at - side - 1, at - side, at - side + 1, at - 1];
-    let after = [at + 1, at + side - 1, at + side, at + side + 1];
+    let before = [at - stride - 1, at - stride, at - stride + 1, at - 1];
+    let after = [at + 1, at + stride - 1, at + stride, at + stride + 1];
     before.iter().all(|&other| filtered[other] < value)
         && after.iter().all(|&other| filtered[other] <= value)
 }

@@ -8,14 +8,14 @@ use multiversion::multiversion;
 
 /// Width of the ring in which background and noise are measured, in pixels.
 const RING_PX: usize = 2;
-/// Parts of the ring whose medians are where clipping starts: a star in the ring spoils one or two.
-const PARTS: usize = 16;
+/// Parts of the ring whose medians are where clipping starts: a star in the ring spoils a few.
+const PARTS: usize = 9;
 /// Values beyond this many standard deviations are clipped, …
 const CLIP_SIGMAS: f32 = 3.0;
 /// … and the variance of a Gaussian that is cut off there.
 const CLIPPED_VARIANCE: f32 = 0.973_3;
 /// Rounds of clipping.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 2;
 /// Precision of the pixels' numbers: no noise is smaller.
 const RELATIVE_PRECISION: f32 = 1e-6;
 
@@ -59,14 +59,12 @@ impl Square {
         copy_pixels(frame, self, pixels);
         let own = &pixels[self.start..];
         ring.clear();
-        for (y, row) in own.chunks_exact(self.side).enumerate() {
-            if y < RING_PX || y + RING_PX >= self.side {
-                ring.extend_from_slice(row);
-            } else {
-                ring.extend_from_slice(&row[..RING_PX]);
-                ring.extend_from_slice(&row[self.side - RING_PX..]);
-            }
+        let (across, side) = (RING_PX * self.side, self.side);
+        ring.extend_from_slice(&own[..across]);
+        for row in own[across..own.len() - across].chunks_exact(side) {
+            ring.extend([row[0], row[1], row[side - 2], row[side - 1]]);
         }
+        ring.extend_from_slice(&own[own.len() - across..]);
         let [background, sigma, count] = clipped(ring);
         let floor = rounding_sigma_adu(frame.step_adu)
             .max(RELATIVE_PRECISION * background.abs())
@@ -137,8 +135,12 @@ fn clipped(values: &[f32]) -> [f32; 3] {
     let mut parts = 0;
     for part in values.chunks(values.len().div_ceil(PARTS).max(2)) {
         let first = part.first().copied().unwrap_or_default();
-        let [count, sum, squares] = moments(part, first, f32::INFINITY);
-        if count >= 2.0 {
+        let [count, sum, squares] = part.iter().fold([0.0f32; 3], |[n, s, q], value| {
+            let off = value - first;
+            [n + 1.0, s + off, q + off * off]
+        });
+        // A part with a pixel without a value does not count.
+        if count >= 2.0 && squares.is_finite() {
             let mean = sum / count;
             means[parts] = first + mean;
             variances[parts] = (squares - sum * mean) / (count - 1.0);

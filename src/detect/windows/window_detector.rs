@@ -1,6 +1,6 @@
 //! Measures stars at expected places.
 
-use super::peak::{MatchedFilter, WindowPeak};
+use super::peak::{MatchedFilter, PADDING, WindowPeak};
 use super::spot_model::{SpotModel, smear_variance_px2, without_smear};
 use super::square::Square;
 use crate::base::coords::PixelPoint;
@@ -17,10 +17,10 @@ use arrayvec::ArrayVec;
 const RING_PX: usize = 2;
 /// Share of a star's variance from which on its smear is not round, and has a spot of its own.
 const MIN_SMEAR_SHARE: f64 = 0.05;
-/// Distance of the Gaussians along a path, in standard deviations of the spot.
-const LOBE_STEP_SIGMAS: f64 = 1.0;
-/// Most Gaussians along a path.
-const MAX_LOBES: usize = 24;
+/// Longest part of a path that two Gaussians stand for, in standard deviations of the spot.
+const PART_SIGMAS: f64 = 2.0;
+/// Most parts of a path.
+const MAX_PARTS: usize = 12;
 /// Error of the local background over the peak of the star: its halo is not in the ring.
 const HALO_ERROR: f64 = 0.01;
 /// A local noise is taken where it differs from the others' by more standard errors.
@@ -143,6 +143,7 @@ impl WindowDetector {
             }
             squares.push(square);
         }
+        pixels.resize(pixels.len() + PADDING, 0.0);
         // The noise of one ring is uncertain by some percents: where chance explains that it
         // differs, all windows have the same.
         let middle = noises.len() / 2;
@@ -359,20 +360,24 @@ fn is_elongated(model: &SpotModel, star: &ExpectedStar) -> bool {
     2.0 * smear_variance_px2(star.smear_px) > MIN_SMEAR_SHARE * width2
 }
 
-/// The spot of a star that moves: Gaussians along its path.
+/// The spot of a star that moves: Gaussians along its path, by Gauss-Legendre quadrature with two
+/// points in each part of the path.
 fn set_smear(spot_px: f64, [x, y]: [f64; 2], psf: &mut LocalPsf) {
     psf.spot_px = spot_px;
     psf.lobes.clear();
     let length_px = x.hypot(y);
-    let count = (length_px / (LOBE_STEP_SIGMAS * spot_px)).ceil() as usize + 1;
-    let count = count.clamp(1, MAX_LOBES);
-    for lobe in 0..count {
-        let along = (lobe as f64 + 0.5) / count as f64 - 0.5;
-        psf.lobes.push(Lobe {
-            offset_px: [along * x, along * y],
-            sigma_px: spot_px,
-            share: 1.0 / count as f64,
-        });
+    let parts = (length_px / (PART_SIGMAS * spot_px)).ceil();
+    let parts = (parts as usize).clamp(1, MAX_PARTS);
+    for part in 0..parts {
+        for point in [-1.0, 1.0] {
+            let within = 0.5 + 0.5 * point / 3f64.sqrt();
+            let along = (part as f64 + within) / parts as f64 - 0.5;
+            psf.lobes.push(Lobe {
+                offset_px: [along * x, along * y],
+                sigma_px: spot_px,
+                share: 0.5 / parts as f64,
+            });
+        }
     }
 }
 
