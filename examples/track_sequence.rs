@@ -1,7 +1,8 @@
 //! Tracks simulated sequences, and compares every attitude with the truth:
-//! `cargo run --release --example track_sequence -- ship|satellite [FRAMES] [SEED] [STRESS]`
+//! `cargo run --release --example track_sequence -- tripod|ship|satellite [FRAMES] [SEED] [STRESS]`
 //!
-//! A camera of 640 × 480 pixels and 20° takes ten frames a second. The ship rolls by 5° in 10 s,
+//! A camera of 640 × 480 pixels and 20° takes ten frames a second. On the tripod it turns with the
+//! Earth; the ship rolls by 5° in 10 s,
 //! pitches by 2° in 8 s, and changes its heading; the satellite turns by 1° in a second about an
 //! axis that turns, too. With STRESS (a number of frames), five frames without light follow every so
 //! many frames, and half-way between the camera jumps elsewhere.
@@ -36,6 +37,7 @@ type Attitude = Rotation<Icrs, Camera>;
 /// The sequences.
 #[derive(Clone, Copy, PartialEq)]
 enum Carrier {
+    Tripod,
     Ship,
     Satellite,
 }
@@ -44,7 +46,7 @@ impl Carrier {
     fn exposure_s(self) -> f64 {
         match self {
             Self::Ship => 0.02,
-            Self::Satellite => 0.05,
+            Self::Tripod | Self::Satellite => 0.05,
         }
     }
 
@@ -55,6 +57,7 @@ impl Carrier {
             amplitude_deg * rate * (rate * time_s + phase).cos()
         };
         match self {
+            Self::Tripod => Vector3::new(0.002, 0.003, -0.002),
             Self::Ship => Vector3::new(
                 swing(2.0, 8.0, 1.0),
                 swing(5.0, 10.0, 0.0),
@@ -268,9 +271,10 @@ impl Plan {
         let number = |at: usize| arguments.get(at).map(|text| text.parse::<u64>()).transpose();
         Ok(Self {
             carrier: match arguments.first().map(String::as_str) {
+                Some("tripod") => Carrier::Tripod,
                 Some("ship") => Carrier::Ship,
                 Some("satellite") => Carrier::Satellite,
-                _ => return Err("usage: track_sequence ship|satellite [FRAMES] [SEED] [STRESS]".into()),
+                _ => return Err("usage: track_sequence tripod|ship|satellite [FRAMES] [SEED] [STRESS]".into()),
             },
             frames: number(1)?.unwrap_or(10_000),
             seed: number(2)?.unwrap_or(1),

@@ -166,7 +166,7 @@ impl PoseFitter {
             *y -= shift[1];
         }
         self.scratch.clear();
-        let lengths = self.residuals_px.iter().map(|[x, y]| x.hypot(*y));
+        let lengths = self.residuals_px.iter().map(|[x, y]| (x * x + y * y).sqrt());
         self.scratch.extend(lengths);
         let within_px = (FIRST_CLIP * median(&mut self.scratch)).max(FIRST_CLIP_PX);
         self.choose(|_| within_px);
@@ -189,7 +189,7 @@ impl PoseFitter {
         self.is_used.clear();
         let stars = self.ideal.iter().zip(&self.residuals_px);
         self.is_used
-            .extend(stars.map(|(star, [x, y])| x.hypot(*y) <= within_px(star)));
+            .extend(stars.map(|(star, [x, y])| x * x + y * y <= within_px(star).powi(2)));
     }
 }
 

@@ -27,7 +27,7 @@ pub const DEFAULT_STARS: usize = 30;
 /// Search radius in predicted errors, …
 const RADIUS_SIGMAS: f64 = 4.0;
 /// … to which this is added, in pixels: the peak is not the centroid.
-const LEAST_RADIUS_PX: f64 = 2.0;
+const LEAST_RADIUS_PX: f64 = 1.5;
 /// Stars are not searched for within a larger radius, in pixels: a full solution is more certain.
 const MAX_RADIUS_PX: f64 = 16.0;
 /// An error of the prediction that an unknown acceleration may cause, in pixels.

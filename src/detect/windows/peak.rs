@@ -185,9 +185,10 @@ fn convolve(
     }
 }
 
-/// Radius of the filter for spots of this standard deviation: two of them, pixel included.
+/// Radius of the filter for spots of this standard deviation: beyond it there is 2 % of the light
+/// along an axis.
 fn filter_radius(spot_px: f64) -> usize {
-    ((2.0 * spot_px + 0.5).ceil() as usize).clamp(1, MAX_TAPS - 1)
+    ((1.5 * spot_px + 0.5).ceil() as usize).clamp(1, MAX_TAPS - 1)
 }
 
 /// Whether a pixel is higher than its eight neighbours; of equal ones the first is.

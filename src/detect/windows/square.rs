@@ -40,10 +40,7 @@ pub(super) struct Square {
 impl Square {
     /// The square around a pixel; `None` where it is not all within the frame.
     pub fn around([x, y]: [f64; 2], half: usize, frame: &Frame) -> Option<Self> {
-        let first = |at: f64| {
-            let first = at.round() - half as f64;
-            (first >= 0.0).then_some(first as usize)
-        };
+        let first = |at: f64| nearest(at)?.checked_sub(half);
         let (x0, y0, side) = (first(x)?, first(y)?, 2 * half + 1);
         (x0 + side <= frame.width && y0 + side <= frame.height).then_some(Self {
             x0,
@@ -94,7 +91,7 @@ impl Square {
         window: &mut Window,
     ) {
         let span = |center: f64, first: usize| {
-            let center = (center.round() - first as f64).max(0.0) as usize;
+            let center = nearest(center).unwrap_or(0).saturating_sub(first);
             let from = center.saturating_sub(radius);
             (from, (center + radius + 1).min(self.side).max(from) - from)
         };
@@ -119,6 +116,12 @@ impl Square {
             }
         }
     }
+}
+
+/// The pixel nearest to a place; `None` before the first one.
+pub(super) fn nearest(at_px: f64) -> Option<usize> {
+    // A cast cuts off, and needs no call.
+    (at_px >= -0.5).then_some((at_px + 0.5) as usize)
 }
 
 /// Appends the pixels of `square` to `pixels`: the one place that reads the frame.

@@ -2,11 +2,12 @@
 
 use super::peak::{MatchedFilter, PADDING, WindowPeak};
 use super::spot_model::{SpotModel, smear_variance_px2, without_smear};
-use super::square::Square;
+use super::square::{Square, nearest};
 use crate::base::coords::PixelPoint;
 use crate::detect::effective_psf::{Lobe, LocalPsf};
 use crate::detect::fit::{
-    BatchStart, Fit, FitBuffers, FitConfig, NoiseModel, SpotEstimate, Window, window_radius,
+    BatchStart, Fit, FitBuffers, FitConfig, MAX_BATCH_LOBES, NoiseModel, SpotEstimate, Window,
+    window_radius,
 };
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
 use crate::detect::star_model::{BrightStars, MAX_STARS, noise_of, spot_size, weighted_size};
@@ -108,11 +109,11 @@ impl WindowDetector {
         found.resize(expected.len(), None);
         self.read_squares(frame, model, expected);
         self.find_peaks(model, expected);
-        let is_smeared = expected.iter().any(|star| is_elongated(model, star));
-        if is_smeared {
-            self.fit_smeared(model, saturation_adu, expected, found);
+        let longest = expected.iter().map(|star| lobes_of(model, star.smear_px)).max();
+        if longest.unwrap_or(0) <= MAX_BATCH_LOBES {
+            self.fit_together(model, saturation_adu, expected, found);
         } else {
-            self.fit_round(model, saturation_adu, expected, found);
+            self.fit_one_by_one(model, saturation_adu, expected, found);
         }
         for (star, square) in found.iter_mut().zip(&self.squares) {
             if let (Some(star), Some(square)) = (star, square) {
@@ -181,8 +182,8 @@ impl WindowDetector {
         }
     }
 
-    /// Fits round spots, many at the same time.
-    fn fit_round(
+    /// Fits many spots at the same time.
+    fn fit_together(
         &mut self,
         model: &SpotModel,
         saturation_adu: f32,
@@ -202,7 +203,8 @@ impl WindowDetector {
             noise: model.noise(),
         };
         let cut = |start: &BatchStart, window: &mut Window| {
-            window.psf.lobes.clear();
+            let star = &expected[start.number];
+            set_smear(model, star.smear_px, &mut window.psf);
             cut_out(squares, pixels, start, saturation_adu, window);
         };
         let starts = starts.iter().copied();
@@ -211,8 +213,8 @@ impl WindowDetector {
         });
     }
 
-    /// Fits smeared spots, one by one.
-    fn fit_smeared(
+    /// Fits spots with long paths.
+    fn fit_one_by_one(
         &mut self,
         model: &SpotModel,
         saturation_adu: f32,
@@ -230,7 +232,7 @@ impl WindowDetector {
         for start in starts.iter() {
             let star = &expected[start.number];
             cut_out(squares, pixels, start, saturation_adu, window);
-            set_smear(model.spot_sigma_px, star.smear_px, &mut window.psf);
+            set_smear(model, star.smear_px, &mut window.psf);
             let config = FitConfig {
                 spot_px: window.psf.spot_px,
                 free_size: false,
@@ -278,7 +280,7 @@ impl WindowDetector {
             let mut window = Window::default();
             cut_out(&self.squares, &self.pixels, start, saturation_adu, &mut window);
             let smear_px = stars[start.number].1;
-            set_smear(model.spot_sigma_px, smear_px, &mut window.psf);
+            set_smear(&model, smear_px, &mut window.psf);
             windows.push((window, start.spot));
         }
         let noise = noise_of(&mut windows, model.spot_sigma_px, &mut self.fits);
@@ -355,27 +357,31 @@ fn filter_size_px(spot_px: f64) -> f64 {
     (spot_px / STEP_PX).round().max(1.0) * STEP_PX
 }
 
-fn is_elongated(model: &SpotModel, star: &ExpectedStar) -> bool {
+/// Number of Gaussians along the path of a star; 0 where its spot is round.
+fn lobes_of(model: &SpotModel, smear_px: [f64; 2]) -> usize {
     let width2 = model.spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2;
-    2.0 * smear_variance_px2(star.smear_px) > MIN_SMEAR_SHARE * width2
+    if 2.0 * smear_variance_px2(smear_px) <= MIN_SMEAR_SHARE * width2 {
+        return 0;
+    }
+    let length_px = smear_px[0].hypot(smear_px[1]);
+    let parts = (length_px / (PART_SIGMAS * model.spot_sigma_px)).ceil() as usize;
+    2 * parts.clamp(1, MAX_PARTS)
 }
 
 /// The spot of a star that moves: Gaussians along its path, by Gauss-Legendre quadrature with two
 /// points in each part of the path.
-fn set_smear(spot_px: f64, [x, y]: [f64; 2], psf: &mut LocalPsf) {
-    psf.spot_px = spot_px;
+fn set_smear(model: &SpotModel, smear_px: [f64; 2], psf: &mut LocalPsf) {
+    psf.spot_px = model.spot_sigma_px;
     psf.lobes.clear();
-    let length_px = x.hypot(y);
-    let parts = (length_px / (PART_SIGMAS * spot_px)).ceil();
-    let parts = (parts as usize).clamp(1, MAX_PARTS);
-    for part in 0..parts {
+    let lobes = lobes_of(model, smear_px);
+    for part in 0..lobes / 2 {
         for point in [-1.0, 1.0] {
             let within = 0.5 + 0.5 * point / 3f64.sqrt();
-            let along = (part as f64 + within) / parts as f64 - 0.5;
+            let along = 2.0 * (part as f64 + within) / lobes as f64 - 0.5;
             psf.lobes.push(Lobe {
-                offset_px: [along * x, along * y],
-                sigma_px: spot_px,
-                share: 0.5 / parts as f64,
+                offset_px: smear_px.map(|path_px| along * path_px),
+                sigma_px: model.spot_sigma_px,
+                share: 1.0 / lobes as f64,
             });
         }
     }
@@ -441,7 +447,7 @@ fn star_of(fit: &Fit, expected: &ExpectedStar) -> Option<FoundStar> {
 
 /// Whether a pixel next to the centre of a star is saturated.
 fn is_saturated(square: &Square, pixels: &[f32], star: &FoundStar, saturation_adu: f32) -> bool {
-    let at = |center: f64, first: usize| (center.round() - first as f64).max(0.0) as usize;
+    let at = |center: f64, first: usize| nearest(center).unwrap_or(0).saturating_sub(first);
     let (x, y) = (
         at(star.position.x, square.x0),
         at(star.position.y, square.y0),
