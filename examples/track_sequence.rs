@@ -148,7 +148,9 @@ impl Tally {
         };
         let error = turn_between(truth, &attitude.icrs_to_camera);
         let sigma = attitude.covariance_rad2.diagonal().map(f64::sqrt);
-        let focal_px = track.camera.map_or(1.0, |(camera, _)| camera.focal_length_px);
+        let focal_px = track
+            .camera
+            .map_or(1.0, |(camera, _)| camera.focal_length_px);
         let off = attitude.icrs_to_camera.angle_to(truth);
         self.wrong += u64::from(off * focal_px > 1.0 && error.component_div(&sigma).amax() > 5.0);
         self.beyond_5_sigma += u64::from(error.component_div(&sigma).amax() > 5.0);
@@ -268,13 +270,23 @@ struct Plan {
 impl Plan {
     fn of_arguments() -> Result<Self, Box<dyn Error>> {
         let arguments: Vec<String> = std::env::args().skip(1).collect();
-        let number = |at: usize| arguments.get(at).map(|text| text.parse::<u64>()).transpose();
+        let number = |at: usize| {
+            arguments
+                .get(at)
+                .map(|text| text.parse::<u64>())
+                .transpose()
+        };
         Ok(Self {
             carrier: match arguments.first().map(String::as_str) {
                 Some("tripod") => Carrier::Tripod,
                 Some("ship") => Carrier::Ship,
                 Some("satellite") => Carrier::Satellite,
-                _ => return Err("usage: track_sequence tripod|ship|satellite [FRAMES] [SEED] [STRESS]".into()),
+                _ => {
+                    return Err(
+                        "usage: track_sequence tripod|ship|satellite [FRAMES] [SEED] [STRESS]"
+                            .into(),
+                    );
+                }
             },
             frames: number(1)?.unwrap_or(10_000),
             seed: number(2)?.unwrap_or(1),
@@ -351,8 +363,10 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let at = (&camera, &attitude.icrs_to_camera);
                 if let Some(other) = full.attitude(&frame, &tracker, at) {
                     tally.compared += 1;
-                    for (sum, found) in
-                        tally.squares.iter_mut().zip([attitude.icrs_to_camera, other])
+                    for (sum, found) in tally
+                        .squares
+                        .iter_mut()
+                        .zip([attitude.icrs_to_camera, other])
                     {
                         *sum += turn_between(&truth, &found).map(|off| off * off);
                     }

@@ -47,7 +47,10 @@ fn a_sequence_is_tracked_and_a_frame_without_light_is_lost() {
     let ran = Ran::new(starpipe().args(options).arg(directory.path()));
     assert_eq!(ran.status, 3, "{}", ran.stderr);
     let reports = ran.reports();
-    let modes: Vec<_> = reports.iter().map(|r| r["mode"].as_str().unwrap()).collect();
+    let modes: Vec<_> = reports
+        .iter()
+        .map(|r| r["mode"].as_str().unwrap())
+        .collect();
     assert_eq!(modes[..2], ["acquired", "acquired"]);
     assert_eq!(modes[2..5], ["tracked"; 3]);
     assert_eq!(modes[5], "lost");
@@ -55,7 +58,10 @@ fn a_sequence_is_tracked_and_a_frame_without_light_is_lost() {
     assert_eq!(modes[8], "tracked");
     for (index, report) in reports.iter().enumerate() {
         assert_eq!(report["frame"], paths[index].display().to_string());
-        assert_eq!(number(report, "/time_s"), (index as f64 * 1e5).round() / 1e6);
+        assert_eq!(
+            number(report, "/time_s"),
+            (index as f64 * 1e5).round() / 1e6
+        );
     }
     assert_eq!(reports[0]["not_tracked"]["code"], "no_attitude");
     assert_eq!(reports[1]["not_tracked"]["code"], "no_rate");
@@ -69,7 +75,10 @@ fn a_sequence_is_tracked_and_a_frame_without_light_is_lost() {
     for (axis, rate) in [("x", 0.4), ("y", -0.9), ("z", 0.6)] {
         let sigma = number(last, &format!("/rate_sigma_deg_s/{axis}"));
         let off = number(last, &format!("/rate_deg_s/{axis}")) - rate;
-        assert!(off.abs() < 5.0 * sigma && sigma < 0.1, "{axis}: {off} {sigma}");
+        assert!(
+            off.abs() < 5.0 * sigma && sigma < 0.1,
+            "{axis}: {off} {sigma}"
+        );
     }
     // The quaternion is the attitude, within its error.
     let truth = attitude(RATE_DEG_S, 8).to_quaternion();
@@ -91,7 +100,9 @@ fn a_list_on_standard_input_is_as_the_files_and_what_cannot_be_read_is_reported(
     paths.insert(3, directory.path().join("none.tif"));
     let list: String = paths.iter().map(|p| format!("{}\n", p.display())).collect();
     let mut command = starpipe();
-    command.args(["track", "--format", "text", "-"]).write_stdin(list);
+    command
+        .args(["track", "--format", "text", "-"])
+        .write_stdin(list);
     let output = command.output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     let (stdout, stderr) = (
@@ -99,8 +110,14 @@ fn a_list_on_standard_input_is_as_the_files_and_what_cannot_be_read_is_reported(
         String::from_utf8(output.stderr).unwrap(),
     );
     assert_eq!(stdout.lines().count(), 4, "{stdout}");
-    assert!(stdout.contains("acquired") && stdout.contains("°/frame"), "{stdout}");
-    assert!(stderr.contains("none.tif") && stderr.lines().count() == 1, "{stderr}");
+    assert!(
+        stdout.contains("acquired") && stdout.contains("°/frame"),
+        "{stdout}"
+    );
+    assert!(
+        stderr.contains("none.tif") && stderr.lines().count() == 1,
+        "{stderr}"
+    );
 }
 
 #[test]
@@ -109,7 +126,10 @@ fn contradictory_options_are_refused() {
         (&["-", "-"][..], "given twice"),
         (&["--stars", "3", "a.tif"], "3 is not in 4..=1000"),
         (&["--interval", "0", "a.tif"], "--interval"),
-        (&["--fov", "20", "--pixel-scale", "100", "a.tif"], "cannot be used with"),
+        (
+            &["--fov", "20", "--pixel-scale", "100", "a.tif"],
+            "cannot be used with",
+        ),
         (&["--near", "1,2", "a.tif"], "--radius"),
         (&["--scale-error", "5", "a.tif"], "--scale-error"),
     ] {
@@ -158,7 +178,9 @@ fn frames_of_another_size_and_times_that_stand_still_are_solved_in_full() {
     let indexed = IndexedCatalog::built_in();
     let mut tracker = Tracker::new(Context::new(&indexed)).with_stars(12);
     let still = Vector3::zeros();
-    let frames: Vec<Frame> = (0..4).map(|i| frame(attitude(still, i), still, u64::from(i))).collect();
+    let frames: Vec<Frame> = (0..4)
+        .map(|i| frame(attitude(still, i), still, u64::from(i)))
+        .collect();
     for frame in &frames[..3] {
         let track = tracker.next(frame, None).unwrap();
         assert!(track.attitude.is_some() && track.time_s.is_none());
@@ -166,7 +188,10 @@ fn frames_of_another_size_and_times_that_stand_still_are_solved_in_full() {
     }
     let cropped = Frame::new(640, 470, frames[3].pixels[..640 * 470].to_vec()).unwrap();
     let track = tracker.next(&cropped, None).unwrap();
-    assert_eq!((track.mode, track.loss), (Mode::Acquired, Some(Loss::OtherSize)));
+    assert_eq!(
+        (track.mode, track.loss),
+        (Mode::Acquired, Some(Loss::OtherSize))
+    );
     let mut at = |frame: &Frame, time_s: f64| tracker.next(frame, Some(time_s)).unwrap().loss;
     assert_eq!(at(&frames[0], 1.0), Some(Loss::OtherSize));
     assert_eq!(at(&frames[1], 2.0), Some(Loss::NoRate));

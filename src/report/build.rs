@@ -158,9 +158,7 @@ pub(super) fn attitude(
         ra_deg: turn_deg(ra_rad * DEG_PER_RAD, DIRECTION_DECIMALS),
         dec_deg: to_decimals(dec_rad * DEG_PER_RAD, DIRECTION_DECIMALS),
         up_pa_deg: half_turn_deg(up_pa_rad * DEG_PER_RAD, DIRECTION_DECIMALS),
-        quaternion: icrs_to_camera
-            .to_quaternion()
-            .map(|q| to_decimals(q, 10)),
+        quaternion: icrs_to_camera.to_quaternion().map(|q| to_decimals(q, 10)),
         sigma_arcsec: AttitudeSigma { x, y, roll },
     }
 }

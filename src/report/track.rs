@@ -115,7 +115,9 @@ impl TrackReport {
         let (reason, reason_code) = reason.unzip();
         let rate = |is_per_frame: bool| {
             let rate = track.rate.filter(|rate| rate.is_per_frame == is_per_frame);
-            rate.map(|rate: AngularRate| (axes(&rate.rad, rate_digits), axes(&rate.sigma_rad, sigma)))
+            rate.map(|rate: AngularRate| {
+                (axes(&rate.rad, rate_digits), axes(&rate.sigma_rad, sigma))
+            })
         };
         let (rate_deg_s, rate_sigma_deg_s) = rate(false).unzip();
         let (rate_deg_frame, rate_sigma_deg_frame) = rate(true).unzip();
@@ -189,9 +191,7 @@ fn not_tracked(loss: &Loss) -> NotTrackedReport {
         Loss::NoAttitude => "there is no attitude before this frame".to_owned(),
         Loss::NoRate => "there is one attitude before this frame, and so no rate".to_owned(),
         Loss::OtherSize => "the frame is not as large as the one before it".to_owned(),
-        Loss::NotLater => {
-            "the time of the frame is not after that of the one before it".to_owned()
-        }
+        Loss::NotLater => "the time of the frame is not after that of the one before it".to_owned(),
         Loss::TooUncertain { radius_px } => {
             format!("the stars may be {radius_px:.0} px from their predicted places")
         }
@@ -215,7 +215,8 @@ fn not_tracked(loss: &Loss) -> NotTrackedReport {
 
 fn attitude(found: &Attitude) -> TrackAttitudeReport {
     let covariance = found.covariance_rad2 * (ARCSEC_PER_RAD * ARCSEC_PER_RAD);
-    let element = |row: usize, column: usize| to_significant(covariance[(row, column)], SIGMA_DIGITS);
+    let element =
+        |row: usize, column: usize| to_significant(covariance[(row, column)], SIGMA_DIGITS);
     TrackAttitudeReport {
         attitude: build::attitude(&found.icrs_to_camera, &found.covariance_rad2),
         covariance_arcsec2: [0, 1, 2].map(|row| [0, 1, 2].map(|column| element(row, column))),

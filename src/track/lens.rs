@@ -131,17 +131,13 @@ impl LensRefiner {
         let count = self.step.len();
         self.information *= 1.0 - 1.0 / MEMORY;
         for i in 0..count {
-            let coupling: Vector3<f64> = self
-                .normal
-                .fixed_view::<3, 1>(0, ATTITUDE + i)
-                .into_owned();
+            let coupling: Vector3<f64> =
+                self.normal.fixed_view::<3, 1>(0, ATTITUDE + i).into_owned();
             let taken = inverse * coupling;
             self.step[i] = self.right[ATTITUDE + i] - taken.dot(&of_attitude);
             for j in 0..count {
-                let other: Vector3<f64> = self
-                    .normal
-                    .fixed_view::<3, 1>(0, ATTITUDE + j)
-                    .into_owned();
+                let other: Vector3<f64> =
+                    self.normal.fixed_view::<3, 1>(0, ATTITUDE + j).into_owned();
                 self.information[(i, j)] +=
                     self.normal[(ATTITUDE + i, ATTITUDE + j)] - taken.dot(&other);
             }
@@ -164,8 +160,10 @@ impl LensRefiner {
             if let Some(distortion) = self.camera.distortion {
                 let mut coefficients_px = [0.0; crate::camera::DistortionModel::Quintic.terms()];
                 let known = distortion.coefficients_px();
-                for ((new, old), step) in
-                    coefficients_px.iter_mut().zip(known).zip(self.step.iter().skip(1))
+                for ((new, old), step) in coefficients_px
+                    .iter_mut()
+                    .zip(known)
+                    .zip(self.step.iter().skip(1))
                 {
                     *new = old + step;
                 }
@@ -247,7 +245,10 @@ mod tests {
             let corner = PixelPoint::new(630.0, 470.0);
             let found = lens.camera().ideal_offset_of(&corner);
             let expected = truth.ideal_offset_of(&corner);
-            assert!((found[0] - expected[0]).abs() < 0.3, "{found:?} {expected:?}");
+            assert!(
+                (found[0] - expected[0]).abs() < 0.3,
+                "{found:?} {expected:?}"
+            );
         }
         assert!(last_sigma_px < 0.15, "{last_sigma_px}");
         // The standard error of the mean square of forty is 0.22.

@@ -183,9 +183,7 @@ fn pad(gain: &SMatrix<f64, 6, 3>) -> Covariance {
 }
 
 fn set_block(matrix: &mut Covariance, row: usize, column: usize, block: &Matrix3<f64>) {
-    matrix
-        .fixed_view_mut::<3, 3>(row, column)
-        .copy_from(block);
+    matrix.fixed_view_mut::<3, 3>(row, column).copy_from(block);
 }
 
 /// The small rotation about the camera's axes that turns one attitude into another.
@@ -278,6 +276,9 @@ mod tests {
         // An acceleration of any size would explain it: the jump is one that no rate has.
         motion.update(&prediction, &measured(&elsewhere, &mut rng), 1e-4);
         let rate = motion.rate(false);
-        assert!(rate.is_none_or(|rate| rate.sigma_rad.max() > 0.05), "{rate:?}");
+        assert!(
+            rate.is_none_or(|rate| rate.sigma_rad.max() > 0.05),
+            "{rate:?}"
+        );
     }
 }

@@ -115,7 +115,10 @@ impl PoseFitter {
                 let variance = star.sigma_px.powi(2);
                 let weight = 1.0 / variance;
                 let over = (x * x + y * y) - 2.0 * free * variance;
-                [excess + weight * weight * over, weights + 2.0 * weight * weight]
+                [
+                    excess + weight * weight * over,
+                    weights + 2.0 * weight * weight,
+                ]
             },
         );
         if weights > 0.0 { excess / weights } else { 0.0 }
@@ -166,7 +169,10 @@ impl PoseFitter {
             *y -= shift[1];
         }
         self.scratch.clear();
-        let lengths = self.residuals_px.iter().map(|[x, y]| (x * x + y * y).sqrt());
+        let lengths = self
+            .residuals_px
+            .iter()
+            .map(|[x, y]| (x * x + y * y).sqrt());
         self.scratch.extend(lengths);
         let within_px = (FIRST_CLIP * median(&mut self.scratch)).max(FIRST_CLIP_PX);
         self.choose(|_| within_px);

@@ -306,7 +306,12 @@ impl<'a> Tracker<'a> {
     ) -> Known {
         let years = solution.date.map_or(0.0, |d| d.date.years_since_j2000());
         let saturation_adu = self.context.detect_config(frame).saturation_adu(frame);
-        let light = Light::of(solution, found, self.context.indexed.catalog(), saturation_adu);
+        let light = Light::of(
+            solution,
+            found,
+            self.context.indexed.catalog(),
+            saturation_adu,
+        );
         let before = self.known.take().filter(|known| known.is_of(found));
         let is_same_clock = |known: &Known| known.clock.is_counted == clock.is_counted;
         let motion = before.as_ref().filter(|known| is_same_clock(known));
@@ -487,7 +492,13 @@ impl Light {
         noises.sort_by(|a, b| a.0.total_cmp(&b.0));
         let fainter = noises.len().div_ceil(2);
         let mut of_faint: Vec<f64> = noises[..fainter].iter().map(|noise| noise.1).collect();
-        let middle = |values: &mut [f64]| if values.is_empty() { 0.0 } else { median(values) };
+        let middle = |values: &mut [f64]| {
+            if values.is_empty() {
+                0.0
+            } else {
+                median(values)
+            }
+        };
         let area_px2 = (solution.width * solution.height) as f64;
         Self {
             zero_point_mag: middle(&mut zero_points),

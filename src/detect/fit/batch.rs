@@ -322,7 +322,13 @@ fn sums_over<const LOBES: usize>(
     let mut shapes = [[0.0f32; BATCH]; 3];
     let side = lobes[0].across.len();
     let lobes: [(&[ProfilePart<PerStar>], &[ProfilePart<PerStar>], PerStar); LOBES] =
-        std::array::from_fn(|i| (&lobes[i].across[..side], &lobes[i].down[..side], lobes[i].share));
+        std::array::from_fn(|i| {
+            (
+                &lobes[i].across[..side],
+                &lobes[i].down[..side],
+                lobes[i].share,
+            )
+        });
     let model = *model;
     for (y, row) in data.chunks_exact(side.max(1)).enumerate().take(side) {
         // Copied so that the compiler need not assume aliasing.

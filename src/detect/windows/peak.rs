@@ -160,27 +160,27 @@ fn convolve(
     for (y, to) in rows.chunks_exact_mut(stride).enumerate() {
         let from = source.pixels.get(y * source.row_px..).unwrap_or_default();
         for (chunk, to) in to.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
-            for (i, tap) in taps.iter().enumerate() {
-                let pixels = from.get(chunk * LANES + i..).unwrap_or_default();
-                if let Some(pixels) = pixels.first_chunk::<LANES>() {
-                    for lane in 0..LANES {
-                        let above = pixels[lane] - source.background_adu;
-                        to[lane] += tap * if above.is_nan() { 0.0 } else { above };
-                    }
+            let from = from.get(chunk * LANES..).unwrap_or_default();
+            let mut sums = [0.0f32; LANES];
+            for (tap, pixels) in taps.iter().zip(from.windows(LANES)) {
+                for (sum, pixel) in sums.iter_mut().zip(pixels) {
+                    let above = pixel - source.background_adu;
+                    *sum += tap * if above.is_nan() { 0.0 } else { above };
                 }
             }
+            *to = sums;
         }
     }
     for (y, to) in filtered.chunks_exact_mut(stride).enumerate() {
         for (chunk, to) in to.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+            let mut sums = [0.0f32; LANES];
             for (i, tap) in taps.iter().enumerate() {
-                let row = &rows[(y + i) * stride + chunk * LANES..];
-                if let Some(row) = row.first_chunk::<LANES>() {
-                    for lane in 0..LANES {
-                        to[lane] += tap * row[lane];
-                    }
+                let row = &rows[(y + i) * stride + chunk * LANES..][..LANES];
+                for (sum, value) in sums.iter_mut().zip(row) {
+                    *sum += tap * value;
                 }
             }
+            *to = sums;
         }
     }
 }

@@ -8,8 +8,8 @@ use multiversion::multiversion;
 
 /// Width of the ring in which background and noise are measured, in pixels.
 const RING_PX: usize = 2;
-/// Parts of the ring whose medians are where clipping starts: a star in the ring spoils a few.
-const PARTS: usize = 9;
+/// Parts of the ring whose medians are where clipping starts: a star in the ring spoils one or two.
+const PARTS: usize = 5;
 /// Values beyond this many standard deviations are clipped, …
 const CLIP_SIGMAS: f32 = 3.0;
 /// … and the variance of a Gaussian that is cut off there.

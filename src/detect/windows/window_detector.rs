@@ -109,7 +109,10 @@ impl WindowDetector {
         found.resize(expected.len(), None);
         self.read_squares(frame, model, expected);
         self.find_peaks(model, expected);
-        let longest = expected.iter().map(|star| lobes_of(model, star.smear_px)).max();
+        let longest = expected
+            .iter()
+            .map(|star| lobes_of(model, star.smear_px))
+            .max();
         if longest.unwrap_or(0) <= MAX_BATCH_LOBES {
             self.fit_together(model, saturation_adu, expected, found);
         } else {
@@ -278,7 +281,13 @@ impl WindowDetector {
         let mut windows: ArrayVec<(Window, SpotEstimate), MAX_STARS> = ArrayVec::new();
         for start in &self.starts {
             let mut window = Window::default();
-            cut_out(&self.squares, &self.pixels, start, saturation_adu, &mut window);
+            cut_out(
+                &self.squares,
+                &self.pixels,
+                start,
+                saturation_adu,
+                &mut window,
+            );
             let smear_px = stars[start.number].1;
             set_smear(&model, smear_px, &mut window.psf);
             windows.push((window, start.spot));
@@ -522,7 +531,10 @@ mod tests {
         let (first, stars) = frame(spot_px, smear_px, 1);
         let model = detector.learn((&first, f32::INFINITY), &known(&stars, smear_px));
         let model = model.unwrap();
-        assert!((model.spot_sigma_px / spot_px - 1.0).abs() < 0.1, "{model:?}");
+        assert!(
+            (model.spot_sigma_px / spot_px - 1.0).abs() < 0.1,
+            "{model:?}"
+        );
         let (mut squares, mut count) = (0.0, 0.0);
         for seed in 2..12 {
             let (frame, stars) = frame(spot_px, smear_px, seed);
@@ -550,7 +562,10 @@ mod tests {
             // Nearly all stars are found, and the standard error of the mean square is 5 %.
             assert!(count > 690.0, "{count}");
             let mean = squares / count;
-            assert!((0.8..1.25).contains(&mean), "{spot_px} {smear_px:?}: {mean}");
+            assert!(
+                (0.8..1.25).contains(&mean),
+                "{spot_px} {smear_px:?}: {mean}"
+            );
         }
     }
 
@@ -565,7 +580,12 @@ mod tests {
         let expected: Vec<_> = stars.iter().map(between).collect();
         let mut found = Vec::new();
         let mut detector = WindowDetector::default();
-        detector.measure((&frame, f32::INFINITY), &model_of(0.9), &expected, &mut found);
+        detector.measure(
+            (&frame, f32::INFINITY),
+            &model_of(0.9),
+            &expected,
+            &mut found,
+        );
         assert!(found.iter().all(Option::is_none), "{found:?}");
         assert!(detector.surplus().searched_px2 > 1000.0);
     }
