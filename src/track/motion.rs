@@ -20,8 +20,12 @@ type Covariance = SMatrix<f64, 6, 6>;
 /// Standard error of a rate of which nothing is known, in radians per unit of time.
 const UNKNOWN_RATE_RAD: f64 = 100.0;
 /// How fast the acceleration follows the innovations: the change of its logarithm where a squared
-/// innovation is twice its expectation.
+/// innovation is twice its expectation. The first innovations count more, this over their number, as
+/// nothing is known before them.
 const ADAPTATION: f64 = 0.2;
+const FIRST_ADAPTATION: f64 = 2.0;
+/// Largest change of its logarithm in a frame.
+const MAX_ADAPTATION: f64 = 2.0;
 /// Squared innovations count at most this many times their expectation, …
 const MAX_RATIO: f64 = 9.0;
 /// … and from here on the acceleration is at once raised to what explains them.
@@ -29,8 +33,9 @@ const SURPRISE_RATIO: f64 = 16.0;
 /// The acceleration of an interval moves a star by no less than this, relative to the error of the
 /// attitude: less, and the rate would forget nothing.
 const LEAST_ACCELERATION: f64 = 0.03;
-/// An innovation that has a squared length above this, in units of its covariance, is a jump.
-const JUMP_CHI2: f64 = 60.0;
+/// Surprising innovations that are longer than this are jumps, in typical errors: no window is as
+/// large.
+const JUMP_TYPICALS: f64 = 8.0;
 
 /// The attitude of a frame as the frames before it predict it.
 #[derive(Debug, Clone, Copy)]
@@ -57,7 +62,8 @@ pub(super) struct Motion {
     /// Density of the angular acceleration along each axis; `None` before the first interval.
     acceleration: Option<Vector3<f64>>,
     time: f64,
-    has_rate: bool,
+    /// Innovations so far.
+    updates: u32,
 }
 
 impl Motion {
@@ -71,14 +77,14 @@ impl Motion {
             covariance,
             acceleration: None,
             time,
-            has_rate: false,
+            updates: 0,
         }
     }
 
     /// The rate; `None` where there was one attitude only.
     pub fn rate(&self, is_per_frame: bool) -> Option<AngularRate> {
         let variance = self.covariance.diagonal().fixed_rows::<3>(3).into_owned();
-        self.has_rate.then(|| AngularRate {
+        (self.updates > 0).then(|| AngularRate {
             rad: self.rate_rad,
             sigma_rad: variance.map(f64::sqrt),
             is_per_frame,
@@ -135,14 +141,18 @@ impl Motion {
         };
         let mut prediction = *prediction;
         if (0..3).any(|axis| ratio(&prediction, axis) > SURPRISE_RATIO) {
+            if innovation.norm() > JUMP_TYPICALS * typical_rad {
+                return *self = Self::start(measured, time);
+            }
             for axis in 0..3 {
                 acceleration[axis] *= ratio(&prediction, axis).max(1.0);
             }
             prediction = self.predicted(interval, &acceleration);
-        } else {
+        } else if self.updates > 0 {
+            let adaptation = ADAPTATION.max(FIRST_ADAPTATION / f64::from(self.updates));
             for axis in 0..3 {
-                let ratio = ratio(&prediction, axis).min(MAX_RATIO);
-                acceleration[axis] *= (ADAPTATION * (ratio - 1.0)).exp();
+                let excess = ratio(&prediction, axis).min(MAX_RATIO) - 1.0;
+                acceleration[axis] *= (adaptation * excess).min(MAX_ADAPTATION).exp();
             }
         }
         for axis in 0..3 {
@@ -153,9 +163,6 @@ impl Motion {
         let Some(inverse) = spread.try_inverse() else {
             return *self = Self::start(measured, time);
         };
-        if (innovation.transpose() * inverse * innovation)[0] > JUMP_CHI2 {
-            return *self = Self::start(measured, time);
-        }
         let gain = prediction.covariance.fixed_view::<6, 3>(0, 0) * inverse;
         let correction = gain * innovation;
         let kept = Covariance::identity() - pad(&gain);
@@ -170,7 +177,7 @@ impl Motion {
             covariance,
             acceleration: Some(acceleration),
             time,
-            has_rate: true,
+            updates: self.updates.saturating_add(1),
         };
     }
 }
