@@ -20,6 +20,8 @@ const BATCH: usize = 16;
 pub(crate) const MAX_BATCH_LOBES: usize = 8;
 /// A value for each of them.
 type PerStar = [f32; BATCH];
+/// A profile of each of them along an axis.
+type Profile<'a> = &'a [ProfilePart<PerStar>];
 
 /// Initial guess of a fit.
 #[derive(Debug, Clone, Copy)]
@@ -321,27 +323,22 @@ fn sums_over<const LOBES: usize>(
     let [mut chi2, mut pixels] = [[0.0f32; BATCH]; 2];
     let mut shapes = [[0.0f32; BATCH]; 3];
     let side = lobes[0].across.len();
-    let lobes: [(&[ProfilePart<PerStar>], &[ProfilePart<PerStar>], PerStar); LOBES] =
-        std::array::from_fn(|i| {
-            (
-                &lobes[i].across[..side],
-                &lobes[i].down[..side],
-                lobes[i].share,
-            )
-        });
+    let shares: [PerStar; LOBES] = std::array::from_fn(|i| lobes[i].share);
+    let across: [Profile; LOBES] = std::array::from_fn(|i| &lobes[i].across[..side]);
+    let down: [Profile; LOBES] = std::array::from_fn(|i| &lobes[i].down[..side]);
     let model = *model;
     for (y, row) in data.chunks_exact(side.max(1)).enumerate().take(side) {
         // Copied so that the compiler need not assume aliasing.
-        let downs: [ProfilePart<PerStar>; LOBES] = std::array::from_fn(|i| lobes[i].1[y]);
+        let downs: [ProfilePart<PerStar>; LOBES] = std::array::from_fn(|i| down[i][y]);
         for (x, data) in row.iter().enumerate() {
             let data = *data;
-            let acrosses: [ProfilePart<PerStar>; LOBES] = std::array::from_fn(|i| lobes[i].0[x]);
+            let acrosses: [ProfilePart<PerStar>; LOBES] = std::array::from_fn(|i| across[i][x]);
             let mut gradient = [[1.0f32; BATCH]; ONE_SPOT];
             let [mut weight, mut residual] = [[0.0f32; BATCH]; 2];
             for lane in 0..BATCH {
                 let flux = model.flux[lane];
                 let mut parts = [0.0f32; 4];
-                for ((across, down), (_, _, share)) in acrosses.iter().zip(&downs).zip(&lobes) {
+                for ((across, down), share) in acrosses.iter().zip(&downs).zip(&shares) {
                     let of_lobe = spot_gradient(flux, &across.lane(lane), &down.lane(lane));
                     if LOBES == 1 {
                         parts = of_lobe;
