@@ -2,9 +2,9 @@
 //! camera pointed, and says how certain each of these is.
 //!
 //! It is for frames of star sensors and cameras with fields from about 1.5° to 80°: lost in space,
-//! with nothing known beforehand, or with priors. Around that it predicts what a camera should see,
-//! simulates frames, and validates cameras and itself on them. It is not a tool for fisheye lenses,
-//! for galaxies and nebulae, or for spectra, and it does not track an attitude from frame to frame.
+//! with nothing known beforehand, or with priors, or tracked from frame to frame. Around that it
+//! predicts what a camera should see, simulates frames, and validates cameras and itself on them. It
+//! is not a tool for fisheye lenses, for galaxies and nebulae, or for spectra.
 //!
 //! # The way of a frame
 //!
@@ -49,6 +49,7 @@
 //! | [`model`] | what should be seen: sensitivity, defocus, simulated frames |
 //! | [`photometry`] | how bright, how faint: zero point, completeness, comparison with the prediction |
 //! | [`pipeline`] | what does a frame show: the stages in order |
+//! | [`mod@track`] | where does the camera point now: from frame to frame |
 //! | [`report`] | how to present it: JSON, text, tables, overlays, world coordinates |
 //! | [`study`] | is it good enough: validation, robustness, defocus, the papers' experiments |
 //!
@@ -66,6 +67,7 @@ pub mod pipeline;
 pub mod report;
 pub mod sky;
 pub mod study;
+pub mod track;
 
 pub use base::coords::{PixelPoint, UnitVector};
 pub use base::epoch::ObservationDate;
@@ -83,6 +85,7 @@ pub use pipeline::{
 pub use report::{FrameReport, TextOptions};
 pub use sky::catalog::{Catalog, Star};
 pub use sky::observer::Site;
+pub use track::{Track, Tracker};
 
 #[doc = include_str!("../docs/conventions.md")]
 pub mod conventions {}

@@ -103,6 +103,14 @@ impl ObservationDate {
         self.time.is_some()
     }
 
+    /// Seconds since J2000.0, exact to a microsecond, and whether the date has fractions of a
+    /// second; `None` where the time is not known.
+    pub fn seconds_since_j2000(&self) -> Option<(f64, bool)> {
+        let time = self.time?;
+        let seconds = self.utc().duration_since(J2000).as_secs_f64();
+        Some((seconds, time.subsec_nanosecond() != 0))
+    }
+
     /// Julian years of 365.25 days since J2000.0; midday is assumed where the time is not known.
     pub fn years_since_j2000(&self) -> f64 {
         self.utc().duration_since(J2000).as_secs_f64() / SECONDS_PER_JULIAN_YEAR
@@ -247,6 +255,9 @@ mod tests {
     fn years_are_julian_and_counted_from_noon() {
         assert_eq!(parsed("2000-01-01T12:00:00Z").years_since_j2000(), 0.0);
         assert_eq!(parsed("2000-01-01").years_since_j2000(), 0.0);
+        assert_eq!(parsed("2000-01-01").seconds_since_j2000(), None);
+        let later = parsed("2000-01-01T12:00:10.25Z").seconds_since_j2000();
+        assert_eq!(later, Some((10.25, true)));
         // By Julian dates: noon of that day is 2458694, J2000.0 is 2451545, and 1899-12-31 is
         // 2415020.
         let night = parsed("2019-07-29T20:47:26Z").julian_epoch();

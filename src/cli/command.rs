@@ -12,6 +12,7 @@ use super::limit::LimitArgs;
 use super::process::ProcessArgs;
 use super::robustness::RobustnessArgs;
 use super::simulate::SimulateArgs;
+use super::track::TrackArgs;
 use super::validate::ValidateArgs;
 use clap::{Parser, Subcommand};
 
@@ -41,6 +42,8 @@ pub(crate) enum Command {
     Process(ProcessArgs),
     /// Identify the stars in lists of centroids (CSV)
     Identify(IdentifyArgs),
+    /// Follow the attitude of a camera from frame to frame
+    Track(Box<TrackArgs>),
     /// Convert star catalogues
     Catalog(CatalogArgs),
     /// Measure how often identification is right, wrong or fails, on simulated lists of centroids

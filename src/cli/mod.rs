@@ -3,8 +3,8 @@
 //! - Each command is one file or folder: its arguments, and a function that returns an
 //!   [`exit::Outcome`].
 //! - `options`, `input`, `output`, `batch`, `progress` and `plot` hold what several commands share.
-//! - Only `run` and the reports of `solving`, which appear frame by frame, write to standard
-//!   output.
+//! - Only `run` and the reports of `solving` and `track`, which appear frame by frame, write to
+//!   standard output.
 
 mod batch;
 mod camera;
@@ -27,6 +27,7 @@ mod progress;
 mod robustness;
 mod simulate;
 mod solving;
+mod track;
 mod validate;
 
 use clap::{ArgMatches, CommandFactory, FromArgMatches, error::ErrorKind};
@@ -62,6 +63,7 @@ fn run_command(command: Command) -> Result<Outcome, CommandError> {
     match command {
         Command::Process(arguments) => process::process(arguments),
         Command::Identify(arguments) => identify::identify(arguments),
+        Command::Track(arguments) => track::track(&arguments),
         Command::Catalog(arguments) => catalog::catalog(arguments),
         Command::Robustness(arguments) => robustness::robustness(&arguments),
         Command::Clutter(arguments) => clutter::clutter(&arguments),

@@ -47,7 +47,7 @@ pub(crate) struct ProcessArgs {
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Calibration")]
-struct CalibrationOptions {
+pub(crate) struct CalibrationOptions {
     /// Frame taken without light, or the mean of many, which is subtracted; see `starpipe darks`
     #[arg(long, value_name = "FILE")]
     dark: Option<PathBuf>,
@@ -142,7 +142,7 @@ impl ProcessArgs {
 
 impl CalibrationOptions {
     /// Reads the calibration, if any is given. Without a dark, the bias is that of `sheet`.
-    fn read(&self, sheet: Option<&DataSheet>) -> anyhow::Result<Option<Calibration>> {
+    pub(crate) fn read(&self, sheet: Option<&DataSheet>) -> anyhow::Result<Option<Calibration>> {
         if self.dark.is_none() && self.flat.is_none() && self.hot_pixels.is_none() {
             return Ok(None);
         }

@@ -50,6 +50,7 @@ mod search;
 mod star_model;
 mod threads;
 mod threshold;
+pub mod windows;
 mod wings;
 mod workspace;
 

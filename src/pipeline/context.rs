@@ -64,7 +64,7 @@ impl<'a> Context<'a> {
     }
 
     /// How to detect stars in one frame: pixels at the stated camera's full well are saturated.
-    pub(super) fn detect_config(&self, frame: &Frame) -> DetectConfig {
+    pub(crate) fn detect_config(&self, frame: &Frame) -> DetectConfig {
         let camera = self.camera.as_ref();
         DetectConfig {
             saturation_adu: camera

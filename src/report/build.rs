@@ -12,6 +12,7 @@ use super::frame_report::{
 };
 use super::reason;
 use super::stars::{self, Pointing};
+use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::format::{
     finite, half_turn_deg, significant, to_decimals, to_significant, turn_deg,
 };
@@ -24,6 +25,7 @@ use crate::photometry::completeness::MagnitudeBin;
 use crate::pipeline::{Background, Note, Outcome, Solution, Timing};
 use crate::sky::catalog::Catalog;
 use crate::sky::observer::Observation;
+use nalgebra::Matrix3;
 
 impl FrameReport {
     /// The report of `solution`, whose stars are those of `catalog`; `frame` is its name.
@@ -86,7 +88,10 @@ impl FrameReport {
         years: f64,
     ) {
         self.status = Status::Identified;
-        self.attitude = Some(attitude(identification));
+        self.attitude = Some(attitude(
+            &identification.icrs_to_camera,
+            &identification.attitude_covariance_rad2,
+        ));
         self.optics = Some(optics(identification));
         self.matched = Some(match_quality(identification, self.stars.len()));
         self.magnitude = faintest(identification, catalog);
@@ -139,20 +144,23 @@ fn observation(seen: &Observation) -> ObservationReport {
     }
 }
 
-fn attitude(identification: &Identification) -> AttitudeReport {
-    let (boresight, up_pa_rad) = identification.icrs_to_camera.boresight_and_up();
+/// The report of an attitude with the covariance of its small rotations.
+pub(super) fn attitude(
+    icrs_to_camera: &Rotation<Icrs, Camera>,
+    covariance_rad2: &Matrix3<f64>,
+) -> AttitudeReport {
+    let (boresight, up_pa_rad) = icrs_to_camera.boresight_and_up();
     let (ra_rad, dec_rad) = boresight.to_ra_dec();
-    let [x, y, roll] = identification
-        .attitude_sigma_rad()
-        .map(|sigma_rad| to_significant(sigma_rad * ARCSEC_PER_RAD, SIGMA_DIGITS));
+    let sigma = |axis: usize| {
+        let sigma_rad = covariance_rad2[(axis, axis)].sqrt();
+        to_significant(sigma_rad * ARCSEC_PER_RAD, SIGMA_DIGITS)
+    };
+    let [x, y, roll] = [0, 1, 2].map(sigma);
     AttitudeReport {
         ra_deg: turn_deg(ra_rad * DEG_PER_RAD, DIRECTION_DECIMALS),
         dec_deg: to_decimals(dec_rad * DEG_PER_RAD, DIRECTION_DECIMALS),
         up_pa_deg: half_turn_deg(up_pa_rad * DEG_PER_RAD, DIRECTION_DECIMALS),
-        quaternion: identification
-            .icrs_to_camera
-            .to_quaternion()
-            .map(|q| to_decimals(q, 10)),
+        quaternion: icrs_to_camera.to_quaternion().map(|q| to_decimals(q, 10)),
         sigma_arcsec: AttitudeSigma { x, y, roll },
     }
 }
@@ -169,7 +177,7 @@ fn optics(identification: &Identification) -> OpticsReport {
     }
 }
 
-fn distortion(distortion: &Distortion) -> DistortionReport {
+pub(super) fn distortion(distortion: &Distortion) -> DistortionReport {
     let coefficients = distortion.coefficients_px().iter();
     DistortionReport {
         model: distortion.model().name(),

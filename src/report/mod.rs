@@ -2,6 +2,8 @@
 //!
 //! [`Solution`](crate::pipeline::Solution) → [`FrameReport`] → JSON line, CSV rows or text
 //!
+//! [`Track`](crate::track::Track) → [`TrackReport`] → JSON line or text
+//!
 //! [`overlay`] draws the frame with its stars; [`wcs`] writes its coordinates as a FITS header.
 //!
 //! Conventions: [`crate::conventions`]. Numbers are rounded to their significant digits. A number
@@ -23,6 +25,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 mod text;
+mod track;
 pub mod wcs;
 
 pub use frame_report::{
@@ -33,3 +36,7 @@ pub use frame_report::{
 };
 pub use table::{TABLE_COLUMNS, write_table_header};
 pub use text::{STARS_SHOWN, TextOptions};
+pub use track::{
+    AxesReport, NotTrackedReport, TrackAttitudeReport, TrackOpticsReport, TrackReport,
+    TrackTimingReport,
+};

@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "each test program uses its own part of this")]
 
 pub mod drawing;
+pub mod sequence;
 
 use assert_cmd::Command;
 use serde_json::Value;

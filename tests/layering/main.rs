@@ -36,6 +36,19 @@ const ROOMS: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "track",
+        &[
+            "base",
+            "sky",
+            "frame",
+            "camera",
+            "detect",
+            "identify",
+            "photometry",
+            "pipeline",
+        ],
+    ),
+    (
         "report",
         &[
             "base",
@@ -47,6 +60,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "identify",
             "photometry",
             "pipeline",
+            "track",
         ],
     ),
     (

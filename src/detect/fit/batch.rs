@@ -16,8 +16,12 @@ use multiversion::multiversion;
 
 /// Stars fitted at the same time.
 const BATCH: usize = 16;
+/// Most lobes of a spot that is fitted in a batch.
+pub(crate) const MAX_BATCH_LOBES: usize = 8;
 /// A value for each of them.
 type PerStar = [f32; BATCH];
+/// A profile of each of them along an axis.
+type Profile<'a> = &'a [ProfilePart<PerStar>];
 
 /// Initial guess of a fit.
 #[derive(Debug, Clone, Copy)]
@@ -48,8 +52,19 @@ pub(crate) struct BatchFitter {
     side: usize,
     /// Row by row: the pixels above the background map, in units of the noise; NaN where left out.
     data: Vec<PerStar>,
-    /// Profiles of the spots along x and y.
-    axes: [Vec<ProfilePart<PerStar>>; 2],
+    /// Lobes of the spot with most of them; 1 where all are single Gaussians.
+    lobes: usize,
+    /// Profiles of the first lobe of each spot along x and y, of the second, …
+    axes: [Axes; MAX_BATCH_LOBES],
+}
+
+/// Profiles of a lobe of each spot along x and y.
+#[derive(Debug, Clone, Default)]
+struct Axes {
+    across: Vec<ProfilePart<PerStar>>,
+    down: Vec<ProfilePart<PerStar>>,
+    /// Shares of the light.
+    share: PerStar,
 }
 
 /// The model of a pixel, in units of the noise.
@@ -81,6 +96,21 @@ impl BatchFitter {
     pub fn fit(
         &mut self,
         maps: &FrameMaps<'_>,
+        starts: impl Iterator<Item = BatchStart>,
+        config: &FitConfig,
+        on_fit: impl FnMut(usize, Option<Fit>, &Window),
+    ) {
+        let cut = |start: &BatchStart, window: &mut Window| {
+            maps.cut_out(&[start.spot], window_radius(start.spot_px), window);
+        };
+        self.fit_cut(cut, starts, config, on_fit);
+    }
+
+    /// [`Self::fit`] in windows that `cut` fills for each initial guess. Spots may have up to
+    /// [`MAX_BATCH_LOBES`] lobes; their size is then held.
+    pub fn fit_cut(
+        &mut self,
+        mut cut: impl FnMut(&BatchStart, &mut Window),
         mut starts: impl Iterator<Item = BatchStart>,
         config: &FitConfig,
         mut on_fit: impl FnMut(usize, Option<Fit>, &Window),
@@ -89,11 +119,17 @@ impl BatchFitter {
         self.data.clear();
         self.data.resize(self.side * self.side, [f32::NAN; BATCH]);
         for lane in 0..BATCH {
-            self.begin(lane, starts.next(), maps);
+            self.begin(lane, starts.next(), &mut cut);
         }
         while self.lanes.iter().any(Option::is_some) {
             self.fill_axes();
-            let sums = sums_over(&self.data, &self.axes, &self.model(config));
+            let (data, model) = (&self.data, self.model(config));
+            let sums = match self.lobes {
+                1 => sums_over::<1>(data, &self.axes, &model),
+                2 => sums_over::<2>(data, &self.axes, &model),
+                3 | 4 => sums_over::<4>(data, &self.axes, &model),
+                _ => sums_over::<MAX_BATCH_LOBES>(data, &self.axes, &model),
+            };
             for lane in 0..BATCH {
                 let Some(ActiveFit { start, steps }) = self.lanes[lane] else {
                     continue;
@@ -116,25 +152,30 @@ impl BatchFitter {
                 fit.spots[0].noise_flux = flux_noise(lane, &sums, window);
                 let converged = (outcome == StepOutcome::Converged).then(|| fit.clone());
                 on_fit(start.number, converged, window);
-                self.begin(lane, starts.next(), maps);
+                self.begin(lane, starts.next(), &mut cut);
             }
         }
     }
 
     /// Starts the fit of a star in a lane, or leaves the lane empty.
-    fn begin(&mut self, lane: usize, start: Option<BatchStart>, maps: &FrameMaps<'_>) {
+    fn begin(
+        &mut self,
+        lane: usize,
+        start: Option<BatchStart>,
+        cut: &mut impl FnMut(&BatchStart, &mut Window),
+    ) {
         self.lanes[lane] = start.map(|start| ActiveFit { start, steps: 0 });
-        let Some(BatchStart { spot, spot_px, .. }) = start else {
+        let Some(start) = start else {
             return;
         };
         let fit = &mut self.fits[lane];
         *fit = Fit {
-            spot_px,
+            spot_px: start.spot_px,
             ..Fit::default()
         };
-        fit.spots.push(spot);
+        fit.spots.push(start.spot);
         let window = &mut self.windows[lane];
-        maps.cut_out(&[spot], window_radius(spot_px), window);
+        cut(&start, window);
         let groups = window.groups().max(1);
         // NaN beyond the window, where it is smaller than the others.
         for (y, to) in self.data.chunks_mut(self.side).enumerate() {
@@ -151,19 +192,37 @@ impl BatchFitter {
 
     /// Computes the spots' profiles along both sides of their windows.
     fn fill_axes(&mut self) {
-        let mut centers_px = [[0.0f64; BATCH]; 2];
-        let mut cumulative = [Cumulative::of_spot(1.0); BATCH];
-        for (lane, (fit, window)) in self.fits.iter().zip(&self.windows).enumerate() {
-            let Some(spot) = fit.spots.first() else {
-                continue;
-            };
-            centers_px[0][lane] = spot.x - window.x0 as f64;
-            centers_px[1][lane] = spot.y - window.y0 as f64;
-            cumulative[lane] = Cumulative::of_spot(fit.spot_px);
-        }
-        for (axis, center_px) in self.axes.iter_mut().zip(&centers_px) {
-            axis.resize(self.side, ProfilePart::default());
-            fill(axis, center_px, &cumulative);
+        let active = self.windows.iter().zip(&self.lanes);
+        let active = active.filter(|(_, lane)| lane.is_some());
+        let counts = active.map(|(window, _)| window.psf.lobes.len());
+        self.lobes = counts.max().unwrap_or(0).clamp(1, MAX_BATCH_LOBES);
+        for (number, axes) in self.axes.iter_mut().enumerate() {
+            // As many as are summed over.
+            if number >= self.lobes.next_power_of_two() {
+                break;
+            }
+            let mut centers_px = [[0.0f64; BATCH]; 2];
+            let mut cumulative = [Cumulative::of_spot(1.0); BATCH];
+            axes.share = [0.0; BATCH];
+            for (lane, (fit, window)) in self.fits.iter().zip(&self.windows).enumerate() {
+                let Some(spot) = fit.spots.first() else {
+                    continue;
+                };
+                let lobe = window.psf.lobes.get(number);
+                let is_single = window.psf.is_gaussian() && number == 0;
+                let [dx, dy] = lobe.map_or([0.0; 2], |lobe| lobe.offset_px);
+                let share = lobe.map_or(0.0, |lobe| lobe.share);
+                axes.share[lane] = if is_single { 1.0 } else { share as f32 };
+                centers_px[0][lane] = spot.x - window.x0 as f64 + dx;
+                centers_px[1][lane] = spot.y - window.y0 as f64 + dy;
+                let sigma_px = lobe.map_or(fit.spot_px, |lobe| lobe.sigma_px);
+                cumulative[lane] = Cumulative::of_spot(sigma_px);
+            }
+            let Axes { across, down, .. } = axes;
+            for (axis, center_px) in [across, down].into_iter().zip(&centers_px) {
+                axis.resize(self.side, ProfilePart::default());
+                fill(axis, center_px, &cumulative);
+            }
         }
     }
 
@@ -254,28 +313,42 @@ fn fill(
 
 /// Sums over the pixels of all stars.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn sums_over(
+fn sums_over<const LOBES: usize>(
     data: &[PerStar],
-    axes: &[Vec<ProfilePart<PerStar>>; 2],
+    lobes: &[Axes; MAX_BATCH_LOBES],
     model: &BatchModel,
 ) -> BatchSums {
     let mut matrix = [[[0.0f32; BATCH]; ONE_SPOT]; ONE_SPOT];
     let mut right = [[0.0f32; BATCH]; ONE_SPOT];
     let [mut chi2, mut pixels] = [[0.0f32; BATCH]; 2];
     let mut shapes = [[0.0f32; BATCH]; 3];
-    let [across, down] = axes;
+    let side = lobes[0].across.len();
+    let shares: [PerStar; LOBES] = std::array::from_fn(|i| lobes[i].share);
+    let across: [Profile; LOBES] = std::array::from_fn(|i| &lobes[i].across[..side]);
+    let down: [Profile; LOBES] = std::array::from_fn(|i| &lobes[i].down[..side]);
     let model = *model;
-    for (down, row) in down.iter().zip(data.chunks_exact(across.len().max(1))) {
-        let down = *down;
-        for (across, data) in across.iter().zip(row) {
-            // Copied so that the compiler need not assume aliasing.
-            let (across, data) = (*across, *data);
+    for (y, row) in data.chunks_exact(side.max(1)).enumerate().take(side) {
+        // Copied so that the compiler need not assume aliasing.
+        let downs: [ProfilePart<PerStar>; LOBES] = std::array::from_fn(|i| down[i][y]);
+        for (x, data) in row.iter().enumerate() {
+            let data = *data;
+            let acrosses: [ProfilePart<PerStar>; LOBES] = std::array::from_fn(|i| across[i][x]);
             let mut gradient = [[1.0f32; BATCH]; ONE_SPOT];
             let [mut weight, mut residual] = [[0.0f32; BATCH]; 2];
             for lane in 0..BATCH {
                 let flux = model.flux[lane];
-                let (a, d) = (across.lane(lane), down.lane(lane));
-                let [shape, by_x, by_y, by_size] = spot_gradient(flux, &a, &d);
+                let mut parts = [0.0f32; 4];
+                for ((across, down), share) in acrosses.iter().zip(&downs).zip(&shares) {
+                    let of_lobe = spot_gradient(flux, &across.lane(lane), &down.lane(lane));
+                    if LOBES == 1 {
+                        parts = of_lobe;
+                    } else {
+                        for (part, of_lobe) in parts.iter_mut().zip(of_lobe) {
+                            *part += share[lane] * of_lobe;
+                        }
+                    }
+                }
+                let [shape, by_x, by_y, by_size] = parts;
                 gradient[0][lane] = by_x;
                 gradient[1][lane] = by_y;
                 gradient[2][lane] = shape;

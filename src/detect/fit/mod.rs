@@ -24,7 +24,7 @@ mod parameters;
 mod sums;
 mod window;
 
-pub(crate) use batch::BatchStart;
+pub(crate) use batch::{BatchStart, MAX_BATCH_LOBES};
 pub(crate) use buffers::FitBuffers;
 pub(crate) use fitter::AnyLight;
 pub(crate) use frame_maps::FrameMaps;
@@ -34,4 +34,4 @@ pub(crate) use parameters::{
     Fit, FitConfig, MAX_SPOTS, NoiseModel, ONE_SPOT, SPOT_RANGE_PX, SpotEstimate, SpotGroup,
 };
 pub(crate) use sums::{WindowPixels, sum_of};
-pub(crate) use window::Window;
+pub(crate) use window::{Window, window_radius};

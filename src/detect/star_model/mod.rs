@@ -11,4 +11,6 @@ mod spot_size;
 
 pub(crate) use bright_stars::{fit_bright_stars, isolated_peaks};
 pub(crate) use noise_model::{StarModel, noise_of, star_model};
-pub(crate) use spot_size::{DEFAULT_SPOT_PX, SpotSize, spot_size};
+pub(crate) use spot_size::{
+    BrightStars, DEFAULT_SPOT_PX, MAX_STARS, SpotSize, spot_size, weighted_size,
+};
