@@ -8,7 +8,7 @@ use super::solving::options::{FRAME_RESULTS, SolvingOptions};
 use super::solving::result_files::Solved;
 use super::solving::{Plan, solve_all};
 use anyhow::Context as _;
-use clap::{Args, ValueEnum};
+use clap::{Args, ValueEnum, value_parser};
 use starpipe::calibration::{Calibration, read_hot_pixels};
 use starpipe::camera::data_sheet::DataSheet;
 use starpipe::detect::{CentroidMethod, DetectConfig};
@@ -70,6 +70,11 @@ struct DetectionOptions {
     /// Accepted false detections in a million pixels of noise [default: 0.1]
     #[arg(long, value_name = "NUMBER", value_parser = values::positive, allow_hyphen_values = true)]
     false_alarms: Option<f64>,
+    /// Most stars that are measured, the brightest: a star tracker needs some twenty. The frame's
+    /// limiting magnitude is then not measured
+    #[arg(long, value_name = "NUMBER", value_parser = value_parser!(u64).range(4..),
+          allow_hyphen_values = true)]
+    max_stars: Option<u64>,
     /// How to measure the position of a star
     #[arg(long, value_name = "METHOD", value_enum)]
     centroid: Option<Centroid>,
@@ -166,6 +171,9 @@ impl DetectionOptions {
         DetectConfig {
             threshold_sigma: self.sigma,
             false_alarms_per_mpx: self.false_alarms.unwrap_or(default.false_alarms_per_mpx),
+            max_detections: self
+                .max_stars
+                .map_or(default.max_detections, |stars| stars as usize),
             centroid: self.centroid.map_or(default.centroid, CentroidMethod::from),
             ..default
         }

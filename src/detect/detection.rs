@@ -84,6 +84,9 @@ pub struct Detections {
     pub wings: Option<Wings>,
     /// Why the rate of false detections asked for is held less well than in independent noise.
     pub noise_tail: Option<NoiseTail>,
+    /// Whether fainter sources were left out, since there are more than
+    /// [`DetectConfig::max_detections`](super::DetectConfig::max_detections).
+    pub are_more: bool,
 }
 
 /// The point spread function measured on the stars of a frame, where they are not round Gaussians of

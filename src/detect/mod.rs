@@ -139,6 +139,7 @@ pub fn detect_into(
     };
     let searched = search.run(&input);
     let (mut stars, pass) = (searched.stars, searched.pass);
+    let are_more = search.found.is_full();
     let FrameSearch {
         filtered,
         found: PeakSearch { peaks, regions, .. },
@@ -165,6 +166,9 @@ pub fn detect_into(
     };
     measurement.run(peaks, measure, &mut found.sources);
     found.sources.sort_unstable_by(Detection::by_brightness);
+    // The second star of a pair may be one too many.
+    let are_more = are_more || found.sources.len() > config.max_detections;
+    found.sources.truncate(config.max_detections);
     found.background_adu = background.median_adu;
     found.noise_adu = background.median_sigma_adu;
     found.spot_sigma_px = stars.spot_px;
@@ -172,6 +176,7 @@ pub fn detect_into(
     found.threshold_sigma = pass.threshold_level;
     add_wings(&view, &background.mesh, found);
     found.noise_tail = pass.noise_tail;
+    found.are_more = are_more;
     Ok(())
 }
 
@@ -199,4 +204,5 @@ fn describe_darkness(frame: &Frame, config: &DetectConfig, found: &mut Detection
     found.psf = None;
     found.wings = None;
     found.noise_tail = None;
+    found.are_more = false;
 }

@@ -30,7 +30,7 @@ use crate::detect::Detection;
 use crate::identify::{IndexedCatalog, View};
 use crate::sky::catalog::{Star, StarFlags, StarIndex};
 use association::{Association, FrameStar, associate};
-use completeness::{Completeness, CountedStar};
+use completeness::{Completeness, CountedStar, NoLimit};
 use zero_point::{StandardStar, ZeroPoint};
 
 /// B−V of a star like the Sun, for which limits hold.
@@ -79,7 +79,7 @@ pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry
         zero_point.sigma_mag = zero_point.sigma_mag.hypot(common_sigma_mag);
     }
     let color_term = zero_point.as_ref().and_then(|zero| zero.color_term);
-    let completeness = match color_term {
+    let mut completeness = match color_term {
         None => by_v,
         Some(term) => counted(&|star| {
             let bv_mag = sky.catalog().star(star.star).bv_mag.map(f64::from);
@@ -87,6 +87,9 @@ pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry
             star.v_mag - term.value * redder_mag
         }),
     };
+    if frame.detections.are_more {
+        completeness.limit = Err(NoLimit::StarsLeftOut);
+    }
     FramePhotometry {
         zero_point,
         exposure_s: frame.exposure_s,

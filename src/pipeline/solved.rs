@@ -67,6 +67,8 @@ impl Solved<'_> {
         let limit = photometry.and_then(|measured| measured.completeness.limit.as_ref().ok());
         let found = self.outcome.identification();
         let field = found.map_or(Vec::new(), |found| self.field(found));
+        // Of the brightest stars alone the faintest says nothing.
+        let of_all = found.filter(|_| !self.detections.are_more);
         let frame = FrameMeasurement {
             detect: self.context.detect.clone(),
             size_px: [self.frame.width, self.frame.height],
@@ -90,7 +92,7 @@ impl Solved<'_> {
                 value: limit.v_mag,
                 sigma: limit.sigma_mag,
             }),
-            faintest_vmag: found.and_then(|found| self.faintest_vmag(found)),
+            faintest_vmag: of_all.and_then(|found| self.faintest_vmag(found)),
             field: &field,
         };
         compare(camera, &frame)

@@ -101,6 +101,11 @@ impl PeakSearch {
         }
     }
 
+    /// Whether there were more peaks than the last search might keep.
+    pub fn is_full(&self) -> bool {
+        self.selection.is_full
+    }
+
     /// Sets the prominences where a region has several peaks; a single peak keeps its height, and
     /// so does the highest: on a plateau, the highest pixel in units of the local noise may be
     /// next to it.

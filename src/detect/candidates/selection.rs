@@ -44,6 +44,8 @@ pub(super) struct Selection {
     by_height: Vec<u64>,
     kept: Vec<Peak>,
     cells: WingCells,
+    /// Whether there were more peaks than the last call might keep.
+    pub is_full: bool,
 }
 
 impl Selection {
@@ -56,6 +58,7 @@ impl Selection {
             .extend(keys.map(|(index, p)| u64::from(!p.snr.to_bits()) << 32 | index));
         self.by_height.sort_unstable();
         self.kept.clear();
+        self.is_full = false;
         self.cells.prepare(peaks);
         for &key in &self.by_height {
             let peak = &peaks[key as u32 as usize];
@@ -66,11 +69,12 @@ impl Selection {
             if self.cells.explain(peak, &self.kept, config) {
                 continue;
             }
-            self.cells.add(peak);
-            self.kept.push(*peak);
             if self.kept.len() >= config.max_peaks {
+                self.is_full = true;
                 break;
             }
+            self.cells.add(peak);
+            self.kept.push(*peak);
         }
         std::mem::swap(peaks, &mut self.kept);
     }

@@ -1,4 +1,5 @@
-//! `--attitude-only`: the pointing, its errors and the optics, from the brightest stars alone.
+//! The brightest stars alone: `--attitude-only`, the pointing, its errors and the optics from them, and
+//! `--max-stars`, their measurement.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -115,4 +116,51 @@ fn lists_of_centroids_have_the_mode_too() {
     assert!(named(&bright).len() <= named(&all).len());
     let [a, b] = [&all, &bright].map(|report| number(report, "/attitude/dec_deg"));
     assert!((a - b).abs() < 0.01, "{a} {b}");
+}
+
+#[test]
+fn only_as_many_stars_are_measured_as_are_wanted() {
+    let (all, bright) = (
+        report("cygnus/cygnus.tif", &[]),
+        report("cygnus/cygnus.tif", &["--max-stars", "30"]),
+    );
+    let stars = |report: &Value| report["stars"].as_array().unwrap().clone();
+    let (all_stars, brightest) = (stars(&all), stars(&bright));
+    assert!(all_stars.len() > 100 && brightest.len() == 30);
+    // The strongest by signal-to-noise ratio; of equal ones, either.
+    let least = |stars: &[Value]| {
+        let snr = stars.iter().map(|star| number(star, "/snr"));
+        snr.fold(f64::INFINITY, f64::min)
+    };
+    let stronger = all_stars.iter().map(|star| number(star, "/snr"));
+    assert!(
+        stronger
+            .filter(|snr| *snr > 1.1 * least(&brightest))
+            .count()
+            <= 30
+    );
+    for star in &brightest {
+        let place = |star: &Value| [number(star, "/x"), number(star, "/y")];
+        let [x, y] = place(star);
+        let is_same = |other: &Value| {
+            let [u, v] = place(other);
+            (x - u).hypot(y - v) < 0.1
+        };
+        assert!(all_stars.iter().any(is_same), "{star}");
+    }
+    // The limit of a frame is not that of the brightest stars.
+    assert!(all["photometry"]["limit50_vmag"].is_number());
+    assert!(bright["photometry"]["limit50_vmag"].is_null());
+    let reason = bright["photometry"]["limit50_reason"].as_str().unwrap();
+    assert!(reason.contains("brightest"), "{reason}");
+    assert!(bright["photometry"]["zero_point_vmag"].is_number());
+}
+
+#[test]
+fn too_few_wanted_stars_are_refused() {
+    let mut command = starpipe();
+    command.args(["process", "--max-stars", "3"]);
+    let ran = Ran::new(command.arg(fixture("orion/orion.png")));
+    assert_eq!(ran.status, 2);
+    assert!(ran.stderr.contains("--max-stars"), "{}", ran.stderr);
 }
