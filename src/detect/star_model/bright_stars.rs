@@ -5,8 +5,12 @@
 
 use super::spot_size::{BrightStars, MAX_STARS, spot_size};
 use crate::detect::candidates::{Peak, RawPeak};
-use crate::detect::fit::{Fit, FitBuffers, FrameMaps, NoiseModel, SpotEstimate};
+use crate::detect::fit::{
+    BatchStart, Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate,
+};
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
+use arrayvec::ArrayVec;
+use std::mem;
 
 /// Peaks below this signal-to-noise ratio say little about the size.
 const MIN_SNR: f32 = 12.0;
@@ -134,11 +138,24 @@ fn fit_peaks<'a, P: BrightPeak + 'a>(
     (bright, peaks): (impl Iterator<Item = &'a P>, &[P]),
     buffers: &mut FitBuffers,
 ) -> BrightStars {
-    isolated_peaks(maps, bright.take(MAX_PEAKS), peaks)
-        .filter_map(|(peak, size_px)| fit_star(maps, peak.start(maps), size_px, buffers))
-        .take(MAX_STARS)
-        .collect()
+    let mut alone = isolated_peaks(maps, bright.take(MAX_PEAKS), peaks);
+    let mut stars = BrightStars::new();
+    loop {
+        let wanted = stars.remaining_capacity();
+        let tried = alone.by_ref().take(wanted);
+        let tried: Starts = tried
+            .map(|(peak, size_px)| (peak.start(maps), size_px))
+            .collect();
+        if tried.is_empty() {
+            return stars;
+        }
+        let fits = fit_stars(maps, &tried, buffers);
+        stars.extend(fits.into_iter().flatten());
+    }
 }
+
+/// Where fits start, each with the size of the spot in pixels.
+type Starts = ArrayVec<(SpotEstimate, f64), MAX_STARS>;
 
 /// Those of `bright` that are not saturated, and that no other of all `peaks` disturbs, with their
 /// sizes by the peaks' curvature in pixels.
@@ -202,16 +219,47 @@ fn is_near(a: (usize, usize), b: (usize, usize), reach_px: f32) -> bool {
     (dx != 0.0 || dy != 0.0) && dx * dx + dy * dy <= reach_px * reach_px
 }
 
-/// Fits a star with a free size; `None` where it is none, or not alone.
-fn fit_star(
+/// Fits stars with free sizes; `None` where one is none, or not alone.
+fn fit_stars(
     maps: &FrameMaps<'_>,
-    start: SpotEstimate,
-    size_px: f64,
+    starts: &Starts,
     buffers: &mut FitBuffers,
-) -> Option<Fit> {
-    let fit = buffers.fit_free_size(maps, start, &[], (size_px, NoiseModel::default()));
-    let is_star = fit.converged && fit.spots[0].flux > 0.0 && is_alone(&fit, buffers);
-    is_star.then_some(fit)
+) -> ArrayVec<Option<Fit>, MAX_STARS> {
+    let mut fits: ArrayVec<Option<Fit>, MAX_STARS> = starts.iter().map(|_| None).collect();
+    let config = FitConfig {
+        spot_px: starts
+            .iter()
+            .map(|(_, size_px)| *size_px)
+            .fold(0.0, f64::max),
+        free_size: true,
+        noise: NoiseModel::default(),
+    };
+    let batch_starts = starts
+        .iter()
+        .enumerate()
+        .map(|(number, (spot, size_px))| BatchStart {
+            number,
+            spot: *spot,
+            spot_px: *size_px,
+        });
+    let mut batch = mem::take(&mut buffers.batch);
+    batch.fit(maps, batch_starts, &config, |number, fit, window| {
+        let (spot, size_px) = starts[number];
+        let fit = match fit {
+            // A window that is too small for the star is widened.
+            Some(fit) if maps.window_radius(fit.spot_px) > maps.window_radius(size_px) => {
+                let fit = buffers.fit_free_size(maps, spot, &[], (size_px, config.noise));
+                fit.converged.then_some(fit)
+            }
+            fit => {
+                buffers.window.copy_from(window);
+                fit
+            }
+        };
+        fits[number] = fit.filter(|fit| fit.spots[0].flux > 0.0 && is_alone(fit, buffers));
+    });
+    buffers.batch = batch;
+    fits
 }
 
 /// Whether the fit's window, which is still in `buffers`, holds no light of another star: no pixel
