@@ -45,7 +45,7 @@ impl Pose {
 }
 
 /// The stars that confirm or refute.
-pub struct Witnesses<'a> {
+pub struct ConfirmingStars<'a> {
     /// The field.
     pub field: &'a StarField,
     /// The catalogue.
@@ -60,7 +60,7 @@ pub struct Witnesses<'a> {
 
 /// A hypothesis that waits for its test, or has its answer.
 #[derive(Debug, Clone, Copy)]
-pub struct Trial {
+pub struct PendingHypothesis {
     /// Camera and attitude.
     pub pose: Pose,
     /// Johnson V minus observed magnitude.
@@ -74,7 +74,7 @@ pub struct Trial {
     answer: Option<bool>,
 }
 
-impl Trial {
+impl PendingHypothesis {
     /// A hypothesis before its test; stars within `confirming_px` confirm it.
     pub fn new(pose: Pose, zero_point_mag: f64, number: u64, confirming_px: f64) -> Self {
         let radius_rad = confirming_px / pose.focal_px;
@@ -105,7 +105,7 @@ impl Trial {
 /// A place where a star is looked for.
 #[derive(Debug, Clone, Copy)]
 struct Lookup {
-    trial: u32,
+    hypothesis: u32,
     direction: UnitVector<Icrs>,
     /// `None` where the disc is on the edge of a face.
     disc: Option<Disc>,
@@ -114,13 +114,13 @@ struct Lookup {
     stars: (u32, u32),
 }
 
-/// Buffers for many trials.
+/// Buffers for many hypotheses.
 #[derive(Debug, Default)]
 pub struct Batch {
     lookups: Vec<Lookup>,
 }
 
-impl Witnesses<'_> {
+impl ConfirmingStars<'_> {
     /// Magnitudes of a catalogue star that confirms, if it is at the place of this one.
     fn magnitudes(&self, star: usize, zero_point_mag: f64) -> (f64, f64) {
         let tolerance_mag = self.field.photometry.tolerance_mag();
@@ -146,35 +146,38 @@ impl Witnesses<'_> {
     }
 
     /// Tests one hypothesis.
-    pub fn test(&self, trial: &mut Trial) {
+    pub fn test(&self, hypothesis: &mut PendingHypothesis) {
         for (index, offset) in self.others() {
-            let direction = trial.pose.direction_of(offset);
-            let magnitudes = self.magnitudes(index, trial.zero_point_mag);
+            let direction = hypothesis.pose.direction_of(offset);
+            let magnitudes = self.magnitudes(index, hypothesis.zero_point_mag);
             let wanted = in_single_precision(magnitudes);
-            let is_confirming = self.sky.grid.is_any_within(&direction, trial.chord, wanted);
-            trial.add(self.factor(is_confirming, trial.radius_rad, magnitudes));
-            if trial.answer.is_some() {
+            let is_confirming = self
+                .sky
+                .grid
+                .is_any_within(&direction, hypothesis.chord, wanted);
+            hypothesis.add(self.factor(is_confirming, hypothesis.radius_rad, magnitudes));
+            if hypothesis.answer.is_some() {
                 break;
             }
         }
     }
 
     /// Tests many hypotheses: the answers are those of [`test`](Self::test).
-    pub fn test_all(&self, trials: &mut [Trial], batch: &mut Batch) {
+    pub fn test_all(&self, pending: &mut [PendingHypothesis], batch: &mut Batch) {
         let faces = self.sky.faces();
         let lookups = &mut batch.lookups;
         for (index, offset) in self.others() {
             lookups.clear();
-            let waiting = trials
+            let waiting = pending
                 .iter()
                 .enumerate()
                 .filter(|(_, t)| t.answer.is_none());
-            lookups.extend(waiting.map(|(number, trial)| {
-                let direction = trial.pose.direction_of(offset);
+            lookups.extend(waiting.map(|(number, hypothesis)| {
+                let direction = hypothesis.pose.direction_of(offset);
                 Lookup {
-                    trial: number as u32,
+                    hypothesis: number as u32,
                     direction,
-                    disc: Disc::of(direction.as_vector(), trial.chord),
+                    disc: Disc::of(direction.as_vector(), hypothesis.chord),
                     is_bright: false,
                     stars: (0, 0),
                 }
@@ -185,7 +188,7 @@ impl Witnesses<'_> {
             // Each of these loops only fetches, so that many fetches overlap.
             for lookup in lookups.iter_mut() {
                 let (_, faint) =
-                    self.magnitudes(index, trials[lookup.trial as usize].zero_point_mag);
+                    self.magnitudes(index, pending[lookup.hypothesis as usize].zero_point_mag);
                 let is_bright = |disc: &Disc| faces.may_hold(disc.first_cell(), faint as f32);
                 lookup.is_bright = lookup.disc.as_ref().is_some_and(is_bright);
             }
@@ -199,17 +202,17 @@ impl Witnesses<'_> {
             }
             std::hint::black_box(brightest);
             for lookup in lookups.iter() {
-                let trial = &mut trials[lookup.trial as usize];
-                let magnitudes = self.magnitudes(index, trial.zero_point_mag);
+                let hypothesis = &mut pending[lookup.hypothesis as usize];
+                let magnitudes = self.magnitudes(index, hypothesis.zero_point_mag);
                 let wanted = in_single_precision(magnitudes);
                 let is_confirming = match &lookup.disc {
                     Some(disc) => faces.is_any_within(disc, lookup.direction.as_vector(), &wanted),
                     None => {
                         let (grid, direction) = (&self.sky.grid, &lookup.direction);
-                        grid.is_any_within(direction, trial.chord, wanted)
+                        grid.is_any_within(direction, hypothesis.chord, wanted)
                     }
                 };
-                trial.add(self.factor(is_confirming, trial.radius_rad, magnitudes));
+                hypothesis.add(self.factor(is_confirming, hypothesis.radius_rad, magnitudes));
             }
         }
     }

@@ -7,7 +7,7 @@
 //! triangle depends on the focal length (gnomonic projection), so the range is divided into steps
 //! within which it does not change noticeably.
 
-use super::confirmation::{Batch, Pose, Trial, Witnesses};
+use super::confirmation::{Batch, ConfirmingStars, PendingHypothesis, Pose};
 use super::false_alarm::{FalseAlarm, MAX_HYPOTHESES, TESTED_STARS};
 use super::field::{Photometry, StarField};
 use super::hypothesis::{Hypothesis, Problem};
@@ -120,7 +120,7 @@ pub struct Buffers {
     /// Catalogue triangles of the shape of an observed one.
     similar: Vec<[u32; 3]>,
     /// Hypotheses from one triangle that wait for their test.
-    waiting: Vec<Trial>,
+    waiting: Vec<PendingHypothesis>,
     batch: Batch,
 }
 
@@ -479,20 +479,21 @@ impl<'a> Search<'a> {
             mirrored,
         };
         self.hypotheses += 1;
-        let mut trial = Trial::new(pose, zero_point, self.hypotheses, triangle.confirming_px);
+        let mut pending =
+            PendingHypothesis::new(pose, zero_point, self.hypotheses, triangle.confirming_px);
         if self.hypotheses > LONG_SEARCH {
-            self.buffers.waiting.push(trial);
+            self.buffers.waiting.push(pending);
             return if self.buffers.waiting.len() < WAITING {
                 None
             } else {
                 self.try_waiting(triangle)
             };
         }
-        self.witnesses(triangle).test(&mut trial);
-        if !trial.is_confirmed() {
+        self.confirming_stars(triangle).test(&mut pending);
+        if !pending.is_confirmed() {
             return None;
         }
-        self.decide_trial(&trial, triangle)
+        self.decide_pending(&pending, triangle)
     }
 
     /// The median zero point of the triangle's stars, if all three agree.
@@ -512,8 +513,8 @@ impl<'a> Search<'a> {
     }
 
     /// Those who confirm or refute hypotheses from a triangle.
-    fn witnesses(&self, triangle: &ObservedTriangle) -> Witnesses<'_> {
-        Witnesses {
+    fn confirming_stars(&self, triangle: &ObservedTriangle) -> ConfirmingStars<'_> {
+        ConfirmingStars {
             field: self.field,
             sky: self.sky,
             offsets: &self.buffers.offsets,
@@ -530,14 +531,15 @@ impl<'a> Search<'a> {
         }
         let mut waiting = std::mem::take(&mut self.buffers.waiting);
         let mut batch = std::mem::take(&mut self.buffers.batch);
-        self.witnesses(triangle).test_all(&mut waiting, &mut batch);
+        self.confirming_stars(triangle)
+            .test_all(&mut waiting, &mut batch);
         let last = self.hypotheses;
         let found = waiting
             .iter()
-            .filter(|trial| trial.is_confirmed())
-            .find_map(|trial| {
-                self.hypotheses = trial.number;
-                self.decide_trial(trial, triangle)
+            .filter(|pending| pending.is_confirmed())
+            .find_map(|pending| {
+                self.hypotheses = pending.number;
+                self.decide_pending(pending, triangle)
             });
         if found.is_none() {
             self.hypotheses = last;
@@ -547,18 +549,22 @@ impl<'a> Search<'a> {
         found
     }
 
-    fn decide_trial(&mut self, trial: &Trial, triangle: &ObservedTriangle) -> Option<Found> {
+    fn decide_pending(
+        &mut self,
+        pending: &PendingHypothesis,
+        triangle: &ObservedTriangle,
+    ) -> Option<Found> {
         let (width_px, height_px) = (self.field.width_px, self.field.height_px);
         let Pose {
             sky_to_camera,
             focal_px,
             mirrored,
-        } = trial.pose;
+        } = pending.pose;
         let hypothesis = Hypothesis {
             camera: CameraModel::pinhole(width_px, height_px, focal_px, mirrored),
             icrs_to_camera: Rotation::from_matrix(sky_to_camera),
             parameters: POSE_PARAMETERS,
-            zero_point_mag: trial.zero_point_mag,
+            zero_point_mag: pending.zero_point_mag,
         };
         self.decide(&hypothesis, triangle)
     }
