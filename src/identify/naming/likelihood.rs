@@ -47,8 +47,8 @@ pub fn position_density(candidate: &Candidate, distance_px: f64, is_saturated: b
     let wide_sq = sigma_sq * WIDE_SIGMAS.powi(2);
     let far_sq = (FAR_SIGMA * candidate.gate_px).powi(2).max(sigma_sq);
     let wide = falloff(wide_sq);
-    // Of four times the width: the exponential is the sixteenth root.
-    let narrow = wide.powi(16);
+    // Of so many times the width, the exponential is the root of the square of that number.
+    let narrow = wide.powi((WIDE_SIGMAS * WIDE_SIGMAS) as i32);
     density(1.0 - WIDE_SHARE - far_share, sigma_sq, narrow)
         + density(WIDE_SHARE, wide_sq, wide)
         + density(far_share, far_sq, falloff(far_sq))
