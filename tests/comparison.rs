@@ -52,7 +52,7 @@ impl Night {
         let stars = Catalog::built_in().stars();
         let simulator = Simulator::new(&scenario, &Scene::default(), stars).unwrap();
         let (frame, _) = simulator.frame(&pointing, 5).unwrap();
-        let levels = frame.pixels.iter().map(|level| *level as u16).collect();
+        let levels = frame.values().iter().map(|level| *level as u16).collect();
         let picture: ImageBuffer<Luma<u16>, Vec<u16>> =
             ImageBuffer::from_raw(frame.width as u32, frame.height as u32, levels).unwrap();
         let directory = tempfile::tempdir().unwrap();

@@ -120,7 +120,7 @@ fn peak_stands_out(
         .flat_map(|y| around(position.x).map(move |x| (x, y)))
         .filter(|&(x, y)| PixelPoint::new(x as f64, y as f64).distance_to(position) <= MATCH_PX)
         .any(|(x, y)| {
-            let level_adu = f64::from(frame.pixels[y * frame.width + x]) - sheet.bias_adu;
+            let level_adu = f64::from(frame.pixels.value(y * frame.width + x)) - sheet.bias_adu;
             let signal_e = level_adu * sheet.gain_e_per_adu - level_e;
             signal_e / (signal_e.max(0.0) + floor_e2).sqrt() >= scenario.conditions.snr
         })

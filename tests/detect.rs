@@ -367,7 +367,7 @@ fn vignetting_glow_and_dead_borders_hide_no_stars_and_make_none() {
     let bare = sky.expose(1);
     let mut padded = vec![0.0f32; 700 * 600];
     for y in 0..384 {
-        padded[(y + 100) * 700 + 90..][..512].copy_from_slice(&bare.pixels[y * 512..][..512]);
+        padded[(y + 100) * 700 + 90..][..512].copy_from_slice(&bare.values()[y * 512..][..512]);
     }
     let frame = Frame::new(700, 600, padded)
         .unwrap()
@@ -392,7 +392,7 @@ fn hot_pixels_are_flagged_and_stars_are_not() {
         })
         .collect();
     for &(x, y) in &hot {
-        frame.pixels[y * 512 + x] += 600.0;
+        frame.values_mut()[y * 512 + x] += 600.0;
     }
     let found = found_in(&frame, &DetectConfig::default());
     let flagged = hot
@@ -576,7 +576,10 @@ fn a_saturated_star_is_one_source_at_its_position() {
         sky.add_star(20.0 + 20.1 * f64::from(i), 30.2, 4000.0, 1.3);
     }
     let mut frame = sky.expose(5);
-    frame.pixels.iter_mut().for_each(|p| *p = p.min(4095.0));
+    frame
+        .values_mut()
+        .iter_mut()
+        .for_each(|p| *p = p.min(4095.0));
     let frame = frame.with_levels(1.0, Some(4095.0));
     let found = found_in(&frame, &DetectConfig::default());
     let star = &found.sources[0];
@@ -616,7 +619,10 @@ fn a_saturated_star_with_coma_is_where_the_faint_ones_would_be() {
     let saturated = bright.map(|(x, y)| (x, y, 300_000.0));
     let stars: Vec<_> = faint.chain(saturated).collect();
     let mut frame = lopsided(400, &stars, 3.0).expose(3);
-    frame.pixels.iter_mut().for_each(|p| *p = p.min(FULL_SCALE));
+    frame
+        .values_mut()
+        .iter_mut()
+        .for_each(|p| *p = p.min(FULL_SCALE));
     let frame = frame.with_levels(1.0, Some(FULL_SCALE));
     let found = found_in(&frame, &DetectConfig::default());
     for (x, y) in bright {
@@ -661,8 +667,8 @@ fn stars_drawn_out_alike_are_stars_and_one_drawn_out_across_is_a_trail() {
     let mut frame = drawn_out(SIDE, &stars, 9.0, 4);
     // A satellite, across the direction of the stars.
     for i in 0..30 {
-        frame.pixels[(60 + i) * SIDE + 74 - i] += 400.0;
-        frame.pixels[(61 + i) * SIDE + 74 - i] += 400.0;
+        frame.values_mut()[(60 + i) * SIDE + 74 - i] += 400.0;
+        frame.values_mut()[(61 + i) * SIDE + 74 - i] += 400.0;
     }
     let found = found_in(&frame, &DetectConfig::default());
     let mut pulls = 0.0;
@@ -698,7 +704,7 @@ fn a_plateau_brighter_than_all_else_is_one_source() {
         sky.add_star(at(i % 5), at(i / 5), 3000.0, 1.0);
     }
     let mut frame = sky.expose(6);
-    for (i, pixel) in frame.pixels.iter_mut().enumerate() {
+    for (i, pixel) in frame.values_mut().iter_mut().enumerate() {
         let (x, y) = ((i % SIDE) as f32 - 125.4, (i / SIDE) as f32 - 124.8);
         // A tilted plateau: the background of a phone's picture is uneven.
         let blob = (4000.0 + 0.5 * x) / (1.0 + ((x * x + y * y) / 90.0).powi(4));
@@ -848,7 +854,7 @@ fn missing_pixels_do_not_disturb_others() {
     let (sky, truth) = star_field(11);
     let mut frame = sky.expose(7);
     for i in (0..frame.pixels.len()).step_by(97) {
-        frame.pixels[i] = f32::NAN;
+        frame.values_mut()[i] = f32::NAN;
     }
     let found = found_in(&frame, &DetectConfig::default());
     assert!(count_found(&found, &truth) >= 58);
@@ -900,7 +906,7 @@ proptest! {
                 _ => scale * rng.random::<f32>().powi(5),
             })
             .collect();
-        let frame = Frame { width, height, pixels, step_adu: 1.0, saturation_adu: Some(250.0), metadata: FrameMetadata::default() };
+        let frame = Frame { width, height, pixels: pixels.into(), step_adu: 1.0, saturation_adu: Some(250.0), metadata: FrameMetadata::default() };
         let _ = detect(&frame, &DetectConfig::default(), &mut Workspace::new());
     }
 }

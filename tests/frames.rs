@@ -141,7 +141,7 @@ fn assert_all_alike(named: &[(&str, Vec<u8>)]) {
 
 fn cygnus() -> ((u32, u32), Vec<u16>) {
     let frame = frame::read(fixture("cygnus/cygnus.tif")).unwrap();
-    let levels = frame.pixels.iter().map(|p| *p as u16).collect();
+    let levels = frame.values().iter().map(|p| *p as u16).collect();
     ((frame.width as u32, frame.height as u32), levels)
 }
 
@@ -255,7 +255,7 @@ fn files_of_other_programs_are_read_to_the_last_bit() {
     ] {
         let frame = frame::read(fixture("formats").join(name)).unwrap();
         assert_eq!((frame.width, frame.height), (32, 24));
-        for (i, pixel) in frame.pixels.iter().enumerate() {
+        for (i, pixel) in frame.values().iter().enumerate() {
             let (x, y) = (i % 32, i / 32);
             assert_eq!(*pixel, level(x, row(y)), "{name}: ({x}, {y})");
         }

@@ -23,7 +23,7 @@ fn scenario() -> Scenario {
 fn electrons(frame: &Frame, scenario: &Scenario) -> Vec<f64> {
     let sheet = &scenario.camera;
     let electrons = |&adu: &f32| (f64::from(adu) - sheet.bias_adu) * sheet.gain_e_per_adu;
-    frame.pixels.iter().map(electrons).collect()
+    frame.values().iter().map(electrons).collect()
 }
 
 fn mean_and_variance(values: &[f64]) -> (f64, f64) {
@@ -97,14 +97,18 @@ fn levels_are_whole_and_limited_by_the_detector() {
     let scenario = scenario();
     let stars = [(PixelPoint::new(300.0, 200.0), -3.0)];
     let frame = star_field(&scenario, &stars, 2).unwrap();
-    let most = frame.pixels.iter().copied().fold(0.0, f32::max);
-    assert!(frame.pixels.iter().all(|level| level.fract() == 0.0));
+    let most = frame.values().iter().copied().fold(0.0, f32::max);
+    assert!(frame.values().iter().all(|level| level.fract() == 0.0));
     // 12 bits end below the full well.
     assert_eq!(
         (most, frame.saturation_adu, frame.step_adu),
         (4095.0, Some(4095.0), 1.0)
     );
-    let full = frame.pixels.iter().filter(|level| **level == most).count();
+    let full = frame
+        .values()
+        .iter()
+        .filter(|level| **level == most)
+        .count();
     assert!((9..200).contains(&full), "{full}");
 }
 

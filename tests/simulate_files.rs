@@ -118,7 +118,7 @@ fn the_table_has_stars_trails_and_rays_at_their_positions() {
         assert!(kind(name) > 0, "{name}");
     }
     let value = |row: &Row, name: &str| row[name].parse::<f64>().unwrap();
-    let mut sorted = frame.pixels.clone();
+    let mut sorted = frame.values().into_owned();
     sorted.sort_by(f32::total_cmp);
     let median = sorted[sorted.len() / 2];
     let bright = rows.iter().filter(|row| row["kind"] == "star").take(20);
@@ -127,7 +127,7 @@ fn the_table_has_stars_trails_and_rays_at_their_positions() {
             value(row, "x").round() as usize,
             value(row, "y").round() as usize,
         );
-        let level = frame.pixels[y.min(479) * 640 + x.min(639)];
+        let level = frame.pixels.value(y.min(479) * 640 + x.min(639));
         assert!(level > median + 20.0, "{row:?}");
         assert!(!row["id"].is_empty() && value(row, "vmag") < 7.0);
     }
@@ -193,7 +193,7 @@ fn stars_of_a_list_are_drawn_where_it_says() {
     assert_eq!(rows.len(), 2);
     assert_eq!((&*rows[0]["x"], &*rows[0]["y"]), ("100.25", "200.5"));
     let frame = frame::read(&out).unwrap();
-    let level = |x: usize, y: usize| frame.pixels[y * 640 + x];
+    let level = |x: usize, y: usize| frame.pixels.value(y * 640 + x);
     assert!(level(100, 200) > level(400, 91) && level(400, 91) > level(300, 300) + 100.0);
     // Instrumental magnitudes cannot be drawn.
     fs::write(&list, "x,y,flux\n1,2,3\n").unwrap();
@@ -219,7 +219,8 @@ fn darks_and_flats_have_no_table_and_no_sky() {
     ];
     assert_eq!(names(&out), expected);
     let mean = |name: &str| {
-        let pixels = frame::read(out.join(name)).unwrap().pixels;
+        let pixels = frame::read(out.join(name)).unwrap();
+        let pixels = pixels.values();
         pixels.iter().map(|level| f64::from(*level)).sum::<f64>() / pixels.len() as f64
     };
     // 42 of bias; 2 e of dark current and 2000 of light at 1.58 e / ADU.

@@ -186,7 +186,7 @@ fn frames_of_another_size_and_times_that_stand_still_are_solved_in_full() {
         assert!(track.attitude.is_some() && track.time_s.is_none());
         assert!(track.stars_used <= 12 || track.mode == Mode::Acquired);
     }
-    let cropped = Frame::new(640, 470, frames[3].pixels[..640 * 470].to_vec()).unwrap();
+    let cropped = Frame::new(640, 470, frames[3].values()[..640 * 470].to_vec()).unwrap();
     let track = tracker.next(&cropped, None).unwrap();
     assert_eq!(
         (track.mode, track.loss),

@@ -99,10 +99,11 @@ impl Calibration {
         self.correct_pixels(frame);
         if let Some(list) = &self.hot_pixels {
             for (x, y) in list.pixels() {
-                frame.pixels[y * frame.width + x] = f32::NAN;
+                let index = y * frame.width + x;
+                frame.values_mut()[index] = f32::NAN;
             }
         }
-        if frame.pixels.iter().all(|pixel| pixel.is_nan()) {
+        if frame.values().iter().all(|pixel| pixel.is_nan()) {
             return Err(CalibrationError::NothingLeft);
         }
         Ok(())
@@ -113,15 +114,17 @@ impl Calibration {
         let full_adu = frame.saturation_adu.unwrap_or(f32::INFINITY);
         let mut highest = full_adu;
         let saturated = |pixel: f32| pixel >= full_adu;
-        let saturated_before: Vec<usize> = (0..frame.pixels.len())
-            .filter(|&i| saturated(frame.pixels[i]))
+        let pixels = frame.values_mut();
+        let saturated_before: Vec<usize> = (0..pixels.len())
+            .filter(|&i| saturated(pixels[i]))
             .collect();
-        for (i, pixel) in frame.pixels.iter_mut().enumerate() {
-            let dark = self
-                .dark
-                .as_ref()
-                .map_or(self.level_adu, |dark| dark.frame.pixels[i]);
-            let response = self.flat.as_ref().map_or(1.0, |flat| flat.frame.pixels[i]);
+        for (i, pixel) in pixels.iter_mut().enumerate() {
+            let of = |master: &Option<Master>| {
+                let master = master.as_ref();
+                master.map(|master| master.frame.pixels.value(i))
+            };
+            let dark = of(&self.dark).unwrap_or(self.level_adu);
+            let response = of(&self.flat).unwrap_or(1.0);
             let is_saturated = saturated(*pixel);
             *pixel = self.level_adu + (*pixel - dark) / response;
             if !is_saturated && *pixel >= highest {
@@ -130,8 +133,8 @@ impl Calibration {
         }
         // Saturated pixels stay saturated, unless the dark or the flat has no value there.
         for i in saturated_before {
-            if !frame.pixels[i].is_nan() {
-                frame.pixels[i] = highest;
+            if !pixels[i].is_nan() {
+                pixels[i] = highest;
             }
         }
         frame.saturation_adu = frame.saturation_adu.map(|_| highest);
@@ -175,9 +178,10 @@ impl fmt::Display for ExposureMismatch {
 
 /// The median level of a dark, in ADU.
 fn median_level(dark: &Master) -> Result<f32, CalibrationError> {
-    let valid = dark.frame.pixels.iter().filter(|p| !p.is_nan());
+    let pixels = dark.frame.values();
+    let valid = pixels.iter().filter(|p| !p.is_nan());
     let mut levels: Vec<f64> = valid.map(|&p| f64::from(p)).collect();
-    let bad = dark.frame.pixels.len() - levels.len();
+    let bad = pixels.len() - levels.len();
     check_bad("the dark", &dark.name, bad, &dark.frame, "without a value")?;
     Ok(median(&mut levels) as f32)
 }
@@ -186,7 +190,7 @@ fn median_level(dark: &Master) -> Result<f32, CalibrationError> {
 fn normalized(mut flat: Master) -> Result<Master, CalibrationError> {
     /// Minimum response of a usable pixel, relative to the mean.
     const MIN_RESPONSE: f32 = 0.01;
-    let pixels = &mut flat.frame.pixels;
+    let pixels = flat.frame.values_mut();
     let positive = pixels.iter().filter(|p| **p > 0.0);
     let (count, sum) = positive.fold((0_u64, 0.0), |(n, sum), &p| (n + 1, sum + f64::from(p)));
     let mean = (sum / count.max(1) as f64) as f32;

@@ -28,7 +28,7 @@ impl BackgroundMap {
             map.size = [0, 0];
             return map;
         }
-        let config = MeshConfig::of_pixels(cell_px, sigma_floor(&view, 0.0));
+        let config = MeshConfig::of_pixels(cell_px, sigma_floor(&view, 0.0, &mut Vec::new()));
         map.mesh.measure(&view, &config);
         map
     }

@@ -3,7 +3,9 @@
 use super::error::FrameError;
 use super::limits::{MAX_PIXELS, MIN_SIDE_PX};
 use super::metadata::FrameMetadata;
+use super::pixels::Pixels;
 use super::row_order::RowOrder;
+use std::borrow::Cow;
 
 /// One image of light intensities.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,7 +16,7 @@ pub struct Frame {
     pub height: usize,
     /// Pixel values in the file's own units (ADU), row-major, `height * width`; colour is converted
     /// to luminance. NaN marks a pixel without a value.
-    pub pixels: Vec<f32>,
+    pub pixels: Pixels,
     /// Difference between neighbouring grey levels, in ADU: 1 for integers, 0 for floats.
     pub step_adu: f32,
     /// Level at and above which a pixel is saturated, in ADU, if the format has one.
@@ -52,16 +54,51 @@ impl Frame {
         Ok(Self::from_checked(width, height, pixels))
     }
 
+    /// Makes a frame of whole numbers, row-major, `height * width`, in steps of 1 ADU, without
+    /// saturation.
+    ///
+    /// # Errors
+    /// [`FrameError::WrongLength`], [`FrameError::TooSmall`], [`FrameError::TooLarge`] for sizes
+    /// that do not fit.
+    pub fn from_words(width: usize, height: usize, pixels: Vec<u16>) -> Result<Self, FrameError> {
+        check_size(width, height)?;
+        if pixels.len() != width * height {
+            return Err(FrameError::WrongLength {
+                expected: width * height,
+                found: pixels.len(),
+            });
+        }
+        Ok(Self::from_checked(width, height, pixels).with_levels(1.0, None))
+    }
+
     /// Makes a frame from `height * width` pixels that are neither infinite nor all NaN.
-    pub(super) fn from_checked(width: usize, height: usize, pixels: Vec<f32>) -> Self {
+    pub(super) fn from_checked(width: usize, height: usize, pixels: impl Into<Pixels>) -> Self {
         Self {
             width,
             height,
-            pixels,
+            pixels: pixels.into(),
             step_adu: 0.0,
             saturation_adu: None,
             metadata: FrameMetadata::default(),
         }
+    }
+
+    /// The value of the pixel in column `x`, row `y`, in ADU.
+    ///
+    /// # Panics
+    /// If there is no such pixel.
+    pub fn at(&self, x: usize, y: usize) -> f32 {
+        self.pixels.value(y * self.width + x)
+    }
+
+    /// All values in ADU, row-major; whole numbers are converted to floats each time.
+    pub fn values(&self) -> Cow<'_, [f32]> {
+        self.pixels.to_f32()
+    }
+
+    /// The values in ADU, to be changed: from then on the frame holds floats.
+    pub fn values_mut(&mut self) -> &mut Vec<f32> {
+        self.pixels.as_f32_mut()
     }
 
     /// Sets the step between grey levels and the saturation level, in ADU.
@@ -82,11 +119,7 @@ impl Frame {
     /// Puts the top row first, for rows in the order of the file.
     pub(super) fn upright(mut self) -> Self {
         if self.metadata.row_order == RowOrder::BottomUp {
-            let (upper, lower) = self.pixels.split_at_mut(self.height / 2 * self.width);
-            let from_bottom = lower.rchunks_exact_mut(self.width);
-            for (above, below) in upper.chunks_exact_mut(self.width).zip(from_bottom) {
-                above.swap_with_slice(below);
-            }
+            self.pixels.reverse_rows(self.width);
         }
         self
     }

@@ -2,6 +2,7 @@
 
 use super::error::FrameError;
 use super::image::{Frame, check_size};
+use super::pixels::Pixels;
 use multiversion::multiversion;
 
 /// Weights of red, green and blue in luminance: ITU-R BT.601, as in JPEG.
@@ -39,12 +40,13 @@ pub(super) fn frame_from_integers<T: Copy + Into<i64>>(
     let level = |v: T| -> f32 { v.into() as f32 };
     let full = level(full_scale);
     let pixels = match samples.channels {
-        1 => values.iter().map(|&v| level(v)).collect(),
-        2 => values.chunks_exact(2).map(|c| level(c[0])).collect(),
-        channels => values
-            .chunks_exact(channels)
-            .map(|c| luminance([level(c[0]), level(c[1]), level(c[2])], full))
-            .collect(),
+        1 => grey(values.iter().copied(), full_scale),
+        2 => grey(values.chunks_exact(2).map(|c| c[0]), full_scale),
+        channels => {
+            let colours = values.chunks_exact(channels);
+            let luminance = |c: &[T]| luminance([level(c[0]), level(c[1]), level(c[2])], full);
+            Pixels::F32(colours.map(luminance).collect())
+        }
     };
     let step = if samples.channels <= 2 {
         level_step(values, |&v| v.into(), full_scale.into())
@@ -55,12 +57,24 @@ pub(super) fn frame_from_integers<T: Copy + Into<i64>>(
     Ok(with_step(frame, step, full_scale.into()))
 }
 
+/// Grey levels in the smallest samples that hold all of the format.
+fn grey<T: Into<i64>>(levels: impl Iterator<Item = T>, full_scale: T) -> Pixels {
+    let levels = levels.map(Into::into);
+    match full_scale.into() {
+        // Of signed types, which hold values below 0.
+        0x7f | 0x7fff => Pixels::F32(levels.map(|level: i64| level as f32).collect()),
+        0..=0xff => Pixels::U8(levels.map(|level: i64| level as u8).collect()),
+        0x100..=0xffff => Pixels::U16(levels.map(|level: i64| level as u16).collect()),
+        _ => Pixels::F32(levels.map(|level: i64| level as f32).collect()),
+    }
+}
+
 /// Makes a frame from `height * width` words of 16 bits; its pixels are stored in `buffer`.
 pub(super) fn frame_from_words(
     (width, height): (usize, usize),
     words: &[[u8; 2]],
     is_big_endian: bool,
-    mut buffer: Vec<f32>,
+    mut buffer: Vec<u16>,
 ) -> Result<Frame, FrameError> {
     check_size(width, height)?;
     let expected = width * height;
@@ -69,7 +83,7 @@ pub(super) fn frame_from_words(
         found: words.len(),
     })?;
     // Clears only what is new: all of it is overwritten.
-    buffer.resize(expected, 0.0);
+    buffer.resize(expected, 0);
     let bits = numbers_of(words, is_big_endian, &mut buffer);
     let step = step_of(bits.into(), u16::MAX.into());
     let frame = Frame::from_checked(width, height, buffer);
@@ -79,7 +93,7 @@ pub(super) fn frame_from_words(
 /// Writes the values of `words` into `pixels`. Returns the union of the bits of all values below
 /// full scale.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn numbers_of(words: &[[u8; 2]], is_big_endian: bool, pixels: &mut [f32]) -> u16 {
+fn numbers_of(words: &[[u8; 2]], is_big_endian: bool, pixels: &mut [u16]) -> u16 {
     let mut bits = 0;
     for (pixel, &word) in pixels.iter_mut().zip(words) {
         let value = if is_big_endian {
@@ -88,7 +102,7 @@ fn numbers_of(words: &[[u8; 2]], is_big_endian: bool, pixels: &mut [f32]) -> u16
             u16::from_le_bytes(word)
         };
         bits |= if value == u16::MAX { 0 } else { value };
-        *pixel = f32::from(value);
+        *pixel = value;
     }
     bits
 }

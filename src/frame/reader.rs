@@ -4,6 +4,7 @@ use super::error::FrameError;
 use super::format::{FrameFormat, first_bytes};
 use super::image::Frame;
 use super::limits::{HEAD_BYTES, MAX_FILE_BYTES};
+use super::pixels::Pixels;
 use super::{fits, foreign, gzip, raster, tiff};
 use std::io::{self, Read};
 use std::num::NonZeroUsize;
@@ -15,8 +16,8 @@ use std::path::Path;
 pub struct Buffers {
     /// Content of the file.
     bytes: Vec<u8>,
-    /// Pixels of a discarded frame.
-    pixels: Vec<f32>,
+    /// 16-bit pixels of a discarded frame.
+    pixels: Vec<u16>,
 }
 
 impl Buffers {
@@ -27,7 +28,9 @@ impl Buffers {
 
     /// Reuses the pixels of a frame that is no longer needed.
     pub fn recycle(&mut self, frame: Frame) {
-        self.pixels = frame.pixels;
+        if let Pixels::U16(pixels) = frame.pixels {
+            self.pixels = pixels;
+        }
     }
 }
 
@@ -131,7 +134,7 @@ pub fn decode_page(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame, Fr
 fn decode_with(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
-    buffer: &mut Vec<f32>,
+    buffer: &mut Vec<u16>,
 ) -> Result<Frame, FrameError> {
     match FrameFormat::of(bytes) {
         Some(FrameFormat::Gzip) => decode_image(&gzip::unpack(bytes)?, page, buffer),
@@ -143,7 +146,7 @@ fn decode_with(
 fn decode_image(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
-    buffer: &mut Vec<f32>,
+    buffer: &mut Vec<u16>,
 ) -> Result<Frame, FrameError> {
     let single = |read: fn(&[u8]) -> Result<Frame, FrameError>| match page {
         Some(page) if page.get() > 1 => Err(FrameError::NoSuchPage { page, pages: 1 }),

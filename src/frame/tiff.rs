@@ -28,7 +28,7 @@ const SUPPORTED: &str = "grey or colour of 1 to 64 bits per sample, uncompressed
 pub(super) fn decode(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
-    buffer: &mut Vec<f32>,
+    buffer: &mut Vec<u16>,
 ) -> Result<Frame, FrameError> {
     let fail = |e: TiffError| error_of(e, bytes.len());
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(fail)?;

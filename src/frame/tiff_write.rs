@@ -49,11 +49,11 @@ pub fn write_tiff(
     let whole = |pixel: &f32| pixel.round();
     match options.samples {
         TiffSamples::Unsigned8 => {
-            let levels: Vec<u8> = frame.pixels.iter().map(|p| whole(p) as u8).collect();
+            let levels: Vec<u8> = frame.values().iter().map(|p| whole(p) as u8).collect();
             write_image::<colortype::Gray8, _, _>(encoder, frame, options, exif, &levels)
         }
         TiffSamples::Unsigned16 => {
-            let levels: Vec<u16> = frame.pixels.iter().map(|p| whole(p) as u16).collect();
+            let levels: Vec<u16> = frame.values().iter().map(|p| whole(p) as u16).collect();
             write_image::<colortype::Gray16, _, _>(encoder, frame, options, exif, &levels)
         }
         TiffSamples::Float32 => write_image::<colortype::Gray32Float, _, _>(
@@ -61,7 +61,7 @@ pub fn write_tiff(
             frame,
             options,
             exif,
-            &frame.pixels,
+            &frame.values(),
         ),
     }
 }
@@ -203,7 +203,7 @@ mod tests {
         };
         write_tiff(&mut file, &frame, &options).unwrap();
         let back = decode(file.get_ref()).unwrap();
-        assert_eq!(back.pixels[..4], [0.0, 300.0, 65535.0, 13.0]);
+        assert_eq!(back.values()[..4], [0.0, 300.0, 65535.0, 13.0]);
     }
 
     #[test]

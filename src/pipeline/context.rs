@@ -80,8 +80,8 @@ impl<'a> Context<'a> {
 fn saturation_adu(camera: &StatedCamera, frame: &Frame) -> Option<f64> {
     let sheet = &camera.sheet;
     let full_scale_adu = sheet.full_scale_adu() as f32;
-    let is_beyond = |pixel: &f32| *pixel > full_scale_adu;
-    (!frame.pixels.iter().any(is_beyond)).then(|| sheet.saturation_adu())
+    let is_within = frame.pixels.highest() <= full_scale_adu;
+    is_within.then(|| sheet.saturation_adu())
 }
 
 /// Buffers of the stages, reused from frame to frame. One for each thread.

@@ -118,7 +118,7 @@ fn ideal_filter(field: &Field, frame: &Frame) -> Vec<f64> {
     let norm: f64 = half[0].powi(2) + 2.0 * half[1..].iter().map(|p| p * p).sum::<f64>();
     let level_e = field.background_e() + sheet.bias_adu;
     let data: Vec<f64> = frame
-        .pixels
+        .values()
         .iter()
         .map(|p| (f64::from(*p) - level_e) / field.pixel_noise_e())
         .collect();

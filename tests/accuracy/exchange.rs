@@ -34,7 +34,7 @@ fn frames_for_peers() {
 }
 
 fn write_frame(path: &Path, frame: &Frame) {
-    let pixels: Vec<u16> = frame.pixels.iter().map(|&level| level as u16).collect();
+    let pixels: Vec<u16> = frame.values().iter().map(|&level| level as u16).collect();
     let mut encoder = TiffEncoder::new(fs::File::create(path).unwrap()).unwrap();
     let (width, height) = (frame.width as u32, frame.height as u32);
     encoder

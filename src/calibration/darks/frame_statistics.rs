@@ -33,7 +33,8 @@ impl FrameStatistics {
     #[doc(alias = "E_i")]
     #[doc(alias = "sigma_gi")]
     pub fn of(name: &str, frame: &Frame, exposure_s: Option<f64>) -> Self {
-        let values = frame.pixels.iter().filter(|p| !p.is_nan());
+        let pixels = frame.values();
+        let values = pixels.iter().filter(|p| !p.is_nan());
         let moments = Moments::of(values.clone().map(|&p| f64::from(p)));
         let full_adu = frame.saturation_adu.unwrap_or(f32::INFINITY);
         let maxima = Maxima::of(frame);
@@ -82,12 +83,13 @@ impl Maxima {
         const NEIGHBOURS_SHARE: f64 = 0.15;
         let mut maxima = Self::default();
         let floor = f64::from(frame.step_adu) / 2.0;
-        let Some(moments) = Moments::clipped(&frame.pixels, floor) else {
+        let pixels = frame.values();
+        let Some(moments) = Moments::clipped(&pixels, floor) else {
             return maxima;
         };
         let sigma = moments.sigma.max(floor);
         let width = frame.width;
-        let above = |i: usize| f64::from(frame.pixels[i]) - moments.mean;
+        let above = |i: usize| f64::from(pixels[i]) - moments.mean;
         for y in 1..frame.height - 1 {
             for i in y * width + 1..(y + 1) * width - 1 {
                 let peak = above(i);

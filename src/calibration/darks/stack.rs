@@ -37,7 +37,7 @@ impl DarkStack {
             check_same_size(first, &statistics)?;
         }
         let stack = self.stack_for(&statistics, frame.pixels.len())?;
-        stack.add(frame.pixels.iter().copied());
+        stack.add(frame.values().iter().copied());
         self.step_adu = Some(
             self.step_adu
                 .map_or(frame.step_adu, |s| s.min(frame.step_adu)),

@@ -112,15 +112,15 @@ impl FlatStack {
     fn above_dark(&self, frame: &Frame) -> Vec<f32> {
         let full_adu = frame.saturation_adu.unwrap_or(f32::INFINITY);
         let bias_adu = self.config.bias_adu as f32;
-        let dark = self.config.dark.as_ref().map(|(_, dark)| &dark.pixels);
+        let dark = self.config.dark.as_ref().map(|(_, dark)| dark.values());
         let above = |(i, &pixel): (usize, &f32)| {
             if pixel >= full_adu {
                 f32::NAN
             } else {
-                pixel - dark.map_or(bias_adu, |dark| dark[i])
+                pixel - dark.as_ref().map_or(bias_adu, |dark| dark[i])
             }
         };
-        frame.pixels.iter().enumerate().map(above).collect()
+        frame.values().iter().enumerate().map(above).collect()
     }
 
     fn check_size(&mut self, name: &str, frame: &Frame) -> Result<(), FlatsError> {
@@ -192,7 +192,7 @@ impl FlatStack {
 /// The number of saturated pixels of `frame`, which must be at most [`MAX_SATURATED_SHARE`].
 fn saturated_pixels(name: &str, frame: &Frame) -> Result<usize, FlatsError> {
     let full_adu = frame.saturation_adu.unwrap_or(f32::INFINITY);
-    let saturated = frame.pixels.iter().filter(|p| **p >= full_adu).count();
+    let saturated = frame.values().iter().filter(|p| **p >= full_adu).count();
     let share = saturated as f64 / frame.pixels.len() as f64;
     if share > MAX_SATURATED_SHARE {
         return Err(FlatsError::Overexposed {

@@ -49,6 +49,7 @@ pub(crate) struct CutOff {
     lowest_adu: f32,
     cells: Vec<Option<CutCell>>,
     above: Vec<f32>,
+    row: Vec<f32>,
     sorted: Vec<f32>,
 }
 
@@ -84,7 +85,8 @@ impl CutOff {
         for (cell, (&background, &sigma)) in mesh.background.iter().zip(&mesh.sigma).enumerate() {
             let reaches = background - lowest_adu < REACH_SIGMA * sigma.max(coarse_adu);
             let cut = if reaches {
-                measure_cell(view, &grid, cell, lowest_adu, &mut self.above)
+                let buffers = (&mut self.above, &mut self.row);
+                measure_cell(view, &grid, cell, lowest_adu, buffers)
             } else {
                 None
             };
@@ -157,12 +159,13 @@ fn measure_cell(
     grid: &CellGrid,
     cell: usize,
     lowest: f32,
-    above: &mut Vec<f32>,
+    (above, buffer): (&mut Vec<f32>, &mut Vec<f32>),
 ) -> Option<CutCell> {
     let rows = grid.rows_of(cell / grid.columns);
     let columns = grid.columns_of(cell % grid.columns);
     let (mut total, mut at_lowest) = (0, 0);
-    for row in rows.clone().map(|y| &view.row(y)[columns.clone()]) {
+    for y in rows.clone() {
+        let row = view.row(y).span(columns.clone()).as_floats(buffer);
         total += row.iter().filter(|v| !v.is_nan()).count();
         at_lowest += row.iter().filter(|&&v| v == lowest).count();
     }
@@ -173,7 +176,7 @@ fn measure_cell(
     (total, at_lowest) = (0, 0);
     above.clear();
     for y in rows {
-        let row = view.row(y);
+        let row = view.row(y).as_floats(buffer);
         for x in columns.start.max(ASIDE_PX)..columns.end.min(view.width - ASIDE_PX) {
             let aside = [row[x - ASIDE_PX], row[x + ASIDE_PX]];
             let value = row[x];
@@ -260,7 +263,7 @@ mod tests {
                 .collect();
             let view = View::new(&pixels, SIDE, SIDE);
             let Some(CutCell::Known { depth, sigma, edge }) =
-                measure_cell(&view, &grid, 0, 0.0, &mut Vec::new())
+                measure_cell(&view, &grid, 0, 0.0, (&mut Vec::new(), &mut Vec::new()))
             else {
                 panic!("{background} is cut off");
             };

@@ -31,31 +31,40 @@ pub(crate) struct FrameBackground {
     /// The lowest sampled pixel of each row of cells, in ADU.
     lowest_adu: Vec<f32>,
     /// One for each thread.
-    workers: Vec<CellMeasurer>,
+    workers: Vec<BackgroundWorker>,
     sorted: Vec<f32>,
+    row: Vec<f32>,
+}
+
+/// The buffers of one thread.
+#[derive(Debug, Clone, Default)]
+struct BackgroundWorker {
+    measurer: CellMeasurer,
+    sampled: Vec<f32>,
 }
 
 impl FrameBackground {
     /// Shares the rows of cells among `threads` threads.
     pub fn set_threads(&mut self, threads: usize) {
-        self.workers.resize_with(threads, CellMeasurer::default);
+        self.workers.resize_with(threads, BackgroundWorker::default);
     }
 
     /// Measures background and noise in cells of about `cell_px` pixels a side.
     pub fn measure(&mut self, view: &View<'_>, step_adu: f32, cell_px: usize) {
-        let config = MeshConfig::of_pixels(cell_px, sigma_floor(view, step_adu));
+        let config = MeshConfig::of_pixels(cell_px, sigma_floor(view, step_adu, &mut self.row));
         self.mesh.prepare((view.width, view.height), &config);
         let grid = self.mesh.grid;
         self.lowest_adu.resize(grid.rows, 0.0);
         let mut no_maxima = BlockMaxima::default();
         let cell_rows = CellRows::of(&mut self.mesh, &mut no_maxima, &mut self.lowest_adu);
         cell_rows.share(&mut self.workers, &|worker, cells| {
-            let rows = view.rows(cells.rows).step_by(grid.row_stride());
+            let BackgroundWorker { measurer, sampled } = worker;
+            let rows = view.sampled(cells.rows, grid.row_stride(), sampled);
             // This also brings the rows from memory in one go, and not cell by cell.
             let minimum = |m, y| lowest_in_row(m, rows.row(y));
             *cells.output = (0..rows.height).fold(f32::INFINITY, minimum);
             let output = (cells.background, cells.sigma);
-            worker.measure_row(&grid, rows, &config, output);
+            measurer.measure_row(&grid, rows, &config, output);
         });
         let coarse_adu = COARSE * self.mesh.sigma_floor;
         let lowest_adu = self.lowest_adu();
@@ -82,10 +91,12 @@ pub(crate) fn rounding_sigma_adu(step_adu: f32) -> f32 {
 
 /// A noise that is certainly below that of the frame, in ADU: that of rounding, or the precision of
 /// the pixels' numbers.
-pub(crate) fn sigma_floor(view: &View<'_>, step_adu: f32) -> f32 {
+pub(crate) fn sigma_floor(view: &View<'_>, step_adu: f32, row: &mut Vec<f32>) -> f32 {
     const SAMPLED_ROWS: usize = 16;
     let rows = (0..view.height).step_by((view.height / SAMPLED_ROWS).max(1));
-    let largest = rows.fold(0.0, |m, y| largest_magnitude_in_row(m, view.row(y)));
+    let largest = rows.fold(0.0, |m, y| {
+        largest_magnitude_in_row(m, view.row(y).as_floats(row))
+    });
     let precision = (largest * RELATIVE_PRECISION).max(f32::MIN_POSITIVE * 1e6);
     rounding_sigma_adu(step_adu).max(precision)
 }

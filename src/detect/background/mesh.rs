@@ -56,10 +56,11 @@ impl Mesh {
         self.prepare((view.width, view.height), config);
         let grid = self.grid;
         let mut measurer = CellMeasurer::default();
+        let mut sampled = Vec::new();
         let backgrounds = self.background.chunks_mut(grid.columns);
         let sigmas = self.sigma.chunks_mut(grid.columns);
         for (row, output) in backgrounds.zip(sigmas).enumerate() {
-            let pixels = view.rows(grid.rows_of(row)).step_by(grid.row_stride());
+            let pixels = view.sampled(grid.rows_of(row), grid.row_stride(), &mut sampled);
             measurer.measure_row(&grid, pixels, config, output);
         }
         self.finish();
@@ -302,7 +303,7 @@ mod tests {
             let square = noise_frame(width, NOISE, truth);
             let mut mesh = Mesh::default();
             mesh.measure(
-                &View::new(&square[..width * height], width, height),
+                &View::new(&square[..width * height].to_vec(), width, height),
                 &CONFIG,
             );
             for (x, y) in [0, 320, width - 1]

@@ -73,7 +73,7 @@ impl FilteredFrame {
             let rows = row.rows;
             let filtered = with_neighbours(&rows, view.height);
             band.filter(view, background, kernel, filtered);
-            let sampled = band.rows(rows.clone()).step_by(grid.row_stride());
+            let sampled = band.sampled(rows.clone(), grid.row_stride());
             cells.measure_row(&grid, sampled, &config, (row.background, row.sigma));
             let cut = candidate_cut(row.background, row.sigma, threshold as f32);
             row.output.gather(band, rows, cut, row.maxima);

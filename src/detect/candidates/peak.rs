@@ -44,10 +44,9 @@ pub(super) fn parabola_vertex(value: f32, [left, right, above, below]: [f32; 4])
 
 /// Whether a pixel within one pixel of (x, y) is saturated.
 pub(super) fn is_saturated(frame: &View<'_>, x: usize, y: usize, saturation_adu: f32) -> bool {
-    let columns = x.saturating_sub(1)..(x + 2).min(frame.width);
-    (y.saturating_sub(1)..(y + 2).min(frame.height)).any(|r| {
-        frame.row(r)[columns.clone()]
-            .iter()
-            .any(|&p| p >= saturation_adu)
+    let mut rows = y.saturating_sub(1)..(y + 2).min(frame.height);
+    rows.any(|row| {
+        let mut columns = x.saturating_sub(1)..(x + 2).min(frame.width);
+        columns.any(|column| frame.at(column, row) >= saturation_adu)
     })
 }

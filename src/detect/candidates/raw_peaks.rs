@@ -2,7 +2,7 @@
 //! filtered. Such stars stand out in single pixels, unless they are far out of focus.
 
 use crate::detect::background::Mesh;
-use crate::detect::pixels::{BLOCK_PX, ReachedBlock, View, find_reaching};
+use crate::detect::pixels::{BLOCK_PX, ReachedBlock, Samples, View, find_reaching};
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
 use crate::detect::threads::for_each_worker;
 use std::cmp::Ordering;
@@ -115,8 +115,11 @@ impl BandWorker {
         } = self;
         block_thresholds(view, background, top, thresholds);
         for y in top.max(1)..(top + BAND_PX).min(view.height - 1) {
-            let row = view.row(y);
-            find_reaching(row, thresholds, blocks);
+            match view.row(y) {
+                Samples::U8(row) => find_reaching(row, thresholds, blocks),
+                Samples::U16(row) => find_reaching(row, thresholds, blocks),
+                Samples::F32(row) => find_reaching(row, thresholds, blocks),
+            }
             for block in blocks.iter() {
                 for x in block.columns().filter(|&x| x > 0 && x + 1 < view.width) {
                     found.extend(peak_at(view, background, x, y, saturation_adu));
@@ -187,17 +190,17 @@ fn is_highest(view: &View<'_>, x: usize, y: usize) -> bool {
     let value = view.at(x, y);
     let columns = x.saturating_sub(PEAK_REACH_PX)..(x + PEAK_REACH_PX + 1).min(view.width);
     let rows = y.saturating_sub(PEAK_REACH_PX)..(y + PEAK_REACH_PX + 1).min(view.height);
+    let is_lower = |x, y| {
+        let other = view.at(x, y);
+        other < value || other.is_nan()
+    };
+    let is_no_higher = |x, y| is_lower(x, y) || view.at(x, y) == value;
     rows.into_iter().all(|row| {
-        let here = view.row(row);
-        let is_lower = |v: &f32| *v < value || v.is_nan();
-        let is_no_higher = |v: &f32| *v <= value || v.is_nan();
-        match row.cmp(&y) {
-            Ordering::Less => here[columns.clone()].iter().all(is_lower),
-            Ordering::Greater => here[columns.clone()].iter().all(is_no_higher),
-            Ordering::Equal => {
-                here[columns.start..x].iter().all(is_lower)
-                    && here[x..columns.end].iter().all(is_no_higher)
-            }
-        }
+        let mut columns = columns.clone();
+        columns.all(|column| match (row, column).cmp(&(y, x)) {
+            Ordering::Less => is_lower(column, row),
+            Ordering::Greater => is_no_higher(column, row),
+            Ordering::Equal => true,
+        })
     })
 }

@@ -124,13 +124,13 @@ impl FilteredBand {
         sum_along_columns(kernel.half(), &pairs, factor, out);
     }
 
-    /// Some of the rows of the filtered frame that the band holds.
-    pub fn rows(&self, rows: Range<usize>) -> PixelRows<'_> {
+    /// Every `step`th of some rows of the filtered frame that the band holds.
+    pub fn sampled(&self, rows: Range<usize>, step: usize) -> PixelRows<'_> {
         PixelRows {
             values: &self.values[rows.start.saturating_sub(self.rows.start) * self.stride..],
-            stride: self.stride,
+            stride: step * self.stride,
             width: self.width,
-            height: rows.len(),
+            height: rows.len().div_ceil(step),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Inner loops of the matched filter: normalisation, and sums along rows and columns.
 
 use crate::detect::background::Piece;
+use crate::detect::pixels::Samples;
 use crate::detect::psf::MAX_TAPS;
 use multiversion::multiversion;
 
@@ -10,8 +11,16 @@ pub(super) const VECTOR_PX: usize = 32;
 type Vector = [f32; VECTOR_PX];
 
 /// `target = (row − background) / sigma` along the pieces of a row; 0 where the pixel is NaN.
+pub(crate) fn normalise(row: Samples<'_>, pieces: &[Piece], target: &mut [f32]) {
+    match row {
+        Samples::U8(row) => normalise_of(row, pieces, target),
+        Samples::U16(row) => normalise_of(row, pieces, target),
+        Samples::F32(row) => normalise_of(row, pieces, target),
+    }
+}
+
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(crate) fn normalise(row: &[f32], pieces: &[Piece], target: &mut [f32]) {
+fn normalise_of<T: Copy + Into<f32>>(row: &[T], pieces: &[Piece], target: &mut [f32]) {
     for piece in pieces {
         let (row, target) = (
             &row[piece.start..piece.end],
@@ -20,7 +29,7 @@ pub(crate) fn normalise(row: &[f32], pieces: &[Piece], target: &mut [f32]) {
         let piece = *piece;
         for (i, (out, &pixel)) in target.iter_mut().zip(row).enumerate() {
             let t = i as i32 as f32;
-            let value = (pixel - (piece.background + t * piece.background_slope))
+            let value = (pixel.into() - (piece.background + t * piece.background_slope))
                 * (piece.inverse_sigma + t * piece.inverse_sigma_slope);
             *out = if value.is_nan() { 0.0 } else { value };
         }

@@ -145,12 +145,11 @@ fn copy_above(view: &View, plane: BackgroundPlane, saturation_adu: f32, window: 
         let first = group * GROUP_PX;
         let columns = (window.width - first).min(GROUP_PX);
         for row in 0..window.height {
-            let pixels = &view.row(window.y0 + row)[window.x0 + first..];
-            let pixels = pixels.first_chunk().copied().unwrap_or_else(|| {
-                let mut part = [f32::NAN; GROUP_PX];
-                part[..columns].copy_from_slice(&pixels[..columns]);
-                part
-            });
+            let in_row = view.row(window.y0 + row);
+            let mut pixels = [0.0; GROUP_PX];
+            in_row
+                .span(window.x0 + first..view.width)
+                .copy_group(&mut pixels);
             let start = plane.corner + row as f32 * plane.down + first as f32 * plane.across;
             let above = &mut window.data[row * groups + group];
             for lane in 0..GROUP_PX {

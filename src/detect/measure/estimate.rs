@@ -139,6 +139,6 @@ fn clamp_to_frame(spot: &mut SpotEstimate, width: usize, height: usize) {
 pub(super) fn brightest_within(reach: usize, peak: &Peak, view: &View<'_>) -> f64 {
     let columns = peak.x.saturating_sub(reach)..(peak.x + reach + 1).min(view.width);
     let rows = peak.y.saturating_sub(reach)..(peak.y + reach + 1).min(view.height);
-    rows.flat_map(|y| &view.row(y)[columns.clone()])
-        .fold(f64::NEG_INFINITY, |highest, &p| highest.max(f64::from(p)))
+    let pixels = rows.flat_map(|y| columns.clone().map(move |x| view.at(x, y)));
+    pixels.fold(f64::NEG_INFINITY, |highest, p| highest.max(f64::from(p)))
 }

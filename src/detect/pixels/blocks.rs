@@ -60,19 +60,62 @@ impl ReachedBlock {
     }
 }
 
+/// A value of a pixel that can be compared with a threshold.
+pub(crate) trait Level: Copy + PartialOrd {
+    /// The least value that reaches the threshold; `None` if no value does.
+    fn reaching(threshold: f32) -> Option<Self>;
+}
+
+/// The least whole number from `threshold` on; `None` for NaN.
+#[inline(always)]
+fn whole_from(threshold: f32) -> Option<u32> {
+    let below = threshold as u32;
+    let above = u32::from((below as f32) < threshold);
+    (!threshold.is_nan()).then(|| below.saturating_add(above))
+}
+
+impl Level for u8 {
+    #[inline(always)]
+    fn reaching(threshold: f32) -> Option<Self> {
+        whole_from(threshold).and_then(|level| Self::try_from(level).ok())
+    }
+}
+
+impl Level for u16 {
+    #[inline(always)]
+    fn reaching(threshold: f32) -> Option<Self> {
+        whole_from(threshold).and_then(|level| Self::try_from(level).ok())
+    }
+}
+
+impl Level for f32 {
+    #[inline(always)]
+    fn reaching(threshold: f32) -> Option<Self> {
+        Some(threshold)
+    }
+}
+
 /// Finds the blocks of `row` with pixels of at least the threshold of their block; NaN is below
 /// any.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(crate) fn find_reaching(row: &[f32], thresholds: &[f32], found: &mut Vec<ReachedBlock>) {
+pub(crate) fn find_reaching<T: Level>(
+    row: &[T],
+    thresholds: &[f32],
+    found: &mut Vec<ReachedBlock>,
+) {
     found.clear();
     let (blocks, rest) = row.as_chunks::<BLOCK_PX>();
     for (block, (values, &threshold)) in blocks.iter().zip(thresholds).enumerate() {
+        let Some(threshold) = T::reaching(threshold) else {
+            continue;
+        };
         if values.iter().fold(false, |any, &v| any | (v >= threshold)) {
             let bits = bits_of(values, threshold);
             found.push(ReachedBlock { block, bits });
         }
     }
-    if let Some(&threshold) = thresholds.get(blocks.len()) {
+    let threshold = thresholds.get(blocks.len()).copied();
+    if let Some(threshold) = threshold.and_then(T::reaching) {
         let bits = bits_of(rest, threshold);
         if bits != 0 {
             let block = blocks.len();
@@ -83,9 +126,25 @@ pub(crate) fn find_reaching(row: &[f32], thresholds: &[f32], found: &mut Vec<Rea
 
 /// A bit for each of at most 64 values, set from the threshold on.
 #[inline(always)]
-fn bits_of(values: &[f32], threshold: f32) -> u64 {
-    let bits = values.iter().enumerate();
-    bits.fold(0, |bits, (i, &v)| bits | (u64::from(v >= threshold) << i))
+fn bits_of<T: Copy + PartialOrd>(values: &[T], threshold: T) -> u64 {
+    let mut reaches = [0u8; BLOCK_PX];
+    for (reaches, &value) in reaches.iter_mut().zip(values) {
+        *reaches = u8::from(value >= threshold);
+    }
+    packed(&reaches)
+}
+
+/// The lowest bits of 64 bytes, of which the other bits are 0.
+#[inline(always)]
+fn packed(bytes: &[u8; BLOCK_PX]) -> u64 {
+    /// Moves the lowest bit of byte i to bit i of the highest byte.
+    const TO_HIGHEST: u64 = 0x0102_0408_1020_4080;
+    let (eights, _) = bytes.as_chunks::<8>();
+    let bits = eights.iter().enumerate().map(|(i, eight)| {
+        let bits = u64::from_le_bytes(*eight).wrapping_mul(TO_HIGHEST) >> 56;
+        bits << (8 * i)
+    });
+    bits.fold(0, |all, bits| all | bits)
 }
 
 #[cfg(test)]
@@ -101,11 +160,11 @@ mod tests {
         }
         (row[3], row[100]) = (f32::NAN, 4.0);
         let mut found = Vec::new();
-        find_reaching(&row, &[5.0; 3], &mut found);
+        find_reaching(row.as_slice(), &[5.0; 3], &mut found);
         let columns: Vec<usize> = found.iter().flat_map(ReachedBlock::columns).collect();
         assert_eq!(columns, high);
         assert_eq!(found.iter().map(|f| f.block).collect::<Vec<_>>(), [0, 1, 2]);
-        find_reaching(&row, &[6.0, 3.0, f32::NAN], &mut found);
+        find_reaching(row.as_slice(), &[6.0, 3.0, f32::NAN], &mut found);
         let columns: Vec<usize> = found.iter().flat_map(ReachedBlock::columns).collect();
         assert_eq!(columns, [64 + 20, 100]);
     }

@@ -1,12 +1,13 @@
 //! The part of a frame that holds light: its pixels without the dead borders.
 
+use super::samples::Samples;
 use crate::frame::Frame;
 use std::ops::Range;
 
 /// A rectangle of an image. All coordinates inside `detect` are relative to it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct View<'a> {
-    pixels: &'a [f32],
+    pixels: Samples<'a>,
     stride: usize,
     /// Column of the frame that is column 0 here.
     pub x0: usize,
@@ -14,21 +15,16 @@ pub(crate) struct View<'a> {
     pub y0: usize,
     /// Columns.
     pub width: usize,
-    /// PixelRows.
+    /// Rows.
     pub height: usize,
 }
 
 impl<'a> View<'a> {
     /// The whole of an image.
-    pub fn new(pixels: &'a [f32], width: usize, height: usize) -> Self {
-        Self::with_stride(pixels, width, width, height)
-    }
-
-    /// An image of `width` columns whose rows are stored `stride` apart.
-    pub fn with_stride(pixels: &'a [f32], stride: usize, width: usize, height: usize) -> Self {
+    pub fn new(pixels: impl Into<Samples<'a>>, width: usize, height: usize) -> Self {
         Self {
-            pixels,
-            stride,
+            pixels: pixels.into(),
+            stride: width,
             x0: 0,
             y0: 0,
             width,
@@ -44,49 +40,69 @@ impl<'a> View<'a> {
             let mut values = values.filter(|v| !v.is_nan());
             values.next().is_none_or(|first| values.all(|v| v == first))
         };
-        while view.height > 0 && is_flat(&mut view.row(0).iter().copied()) {
+        let is_flat_row = |view: &Self, y| is_flat(&mut (0..view.width).map(|x| view.at(x, y)));
+        let is_flat_column = |view: &Self, x| is_flat(&mut (0..view.height).map(|y| view.at(x, y)));
+        while view.height > 0 && is_flat_row(&view, 0) {
             view.y0 += 1;
             view.height -= 1;
         }
-        while view.height > 0 && is_flat(&mut view.row(view.height - 1).iter().copied()) {
+        while view.height > 0 && is_flat_row(&view, view.height - 1) {
             view.height -= 1;
         }
-        while view.width > 0 && is_flat(&mut (0..view.height).map(|y| view.row(y)[0])) {
+        while view.width > 0 && is_flat_column(&view, 0) {
             view.x0 += 1;
             view.width -= 1;
         }
-        while view.width > 0 && is_flat(&mut (0..view.height).map(|y| view.row(y)[view.width - 1]))
-        {
+        while view.width > 0 && is_flat_column(&view, view.width - 1) {
             view.width -= 1;
         }
         view
     }
 
     /// Row `y`.
-    #[inline]
-    pub fn row(&self, y: usize) -> &'a [f32] {
+    #[inline(always)]
+    pub fn row(&self, y: usize) -> Samples<'a> {
         let start = (self.y0 + y) * self.stride + self.x0;
-        &self.pixels[start..start + self.width]
+        self.pixels.span(start..start + self.width)
     }
 
-    /// A range of rows.
-    pub fn rows(&self, rows: Range<usize>) -> PixelRows<'a> {
-        PixelRows {
-            values: &self.pixels[(self.y0 + rows.start) * self.stride + self.x0..],
-            stride: self.stride,
+    /// Every `step`th of some rows, as floats, in `buffer` if they are none.
+    pub fn sampled<'b>(
+        &self,
+        rows: Range<usize>,
+        step: usize,
+        buffer: &'b mut Vec<f32>,
+    ) -> PixelRows<'b>
+    where
+        'a: 'b,
+    {
+        let height = rows.len().div_ceil(step);
+        let sampled = |values, stride| PixelRows {
+            values,
+            stride,
             width: self.width,
-            height: rows.len(),
+            height,
+        };
+        if let Samples::F32(values) = self.pixels {
+            let start = (self.y0 + rows.start) * self.stride + self.x0;
+            return sampled(&values[start..], step * self.stride);
         }
+        buffer.resize(height * self.width, 0.0);
+        let targets = buffer.chunks_exact_mut(self.width);
+        for (y, target) in rows.step_by(step).zip(targets) {
+            self.row(y).copy_to(target);
+        }
+        sampled(buffer, self.width)
     }
 
     /// The pixel in column `x`, row `y`.
-    #[inline]
+    #[inline(always)]
     pub fn at(&self, x: usize, y: usize) -> f32 {
-        self.row(y)[x]
+        self.pixels.at((self.y0 + y) * self.stride + self.x0 + x)
     }
 }
 
-/// PixelRows of pixels, `stride` apart in memory.
+/// Rows of pixels, `stride` apart in memory.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PixelRows<'a> {
     /// From the first pixel of the first row on.
@@ -95,7 +111,7 @@ pub(crate) struct PixelRows<'a> {
     pub stride: usize,
     /// Columns.
     pub width: usize,
-    /// PixelRows.
+    /// Rows.
     pub height: usize,
 }
 
@@ -103,15 +119,6 @@ impl<'a> PixelRows<'a> {
     /// Row `y`.
     pub fn row(&self, y: usize) -> &'a [f32] {
         &self.values[y * self.stride..][..self.width]
-    }
-
-    /// Every `step`th row.
-    pub fn step_by(self, step: usize) -> Self {
-        Self {
-            stride: step * self.stride,
-            height: self.height.div_ceil(step),
-            ..self
-        }
     }
 
     /// A range of columns.

@@ -89,7 +89,7 @@ impl FrameNoise<'_> {
         let of_filtered = median(&self.filtered_mesh.sigma, &mut buffers.sorted);
         let sigma_adu = self.background.median_sigma_adu as f32;
         !INDEPENDENT.contains(&of_filtered)
-            && correlation_of_neighbours(self.view, sigma_adu) > LEAST_CORRELATION
+            && correlation_of_neighbours(self.view, sigma_adu, &mut buffers.row) > LEAST_CORRELATION
     }
 
     /// The threshold `u` raised for noise that is coarse or cut off, by the distribution of the
@@ -139,7 +139,7 @@ impl FrameNoise<'_> {
 /// The correlation of the noise of pixels that are next to each other in a row, less that of
 /// pixels three columns apart, which a structured background has as well: from the mean absolute
 /// differences, in a sample of rows. `sigma` is the noise.
-fn correlation_of_neighbours(view: &View<'_>, sigma: f32) -> f64 {
+fn correlation_of_neighbours(view: &View<'_>, sigma: f32, row: &mut Vec<f32>) -> f64 {
     const SAMPLED_ROWS: usize = 32;
     const FAR_PX: usize = 3;
     /// Larger differences are those of stars and edges.
@@ -147,7 +147,7 @@ fn correlation_of_neighbours(view: &View<'_>, sigma: f32) -> f64 {
     let largest = LARGEST_SIGMAS * sigma;
     let (mut near, mut far) = (0.0, 0.0);
     for y in (0..view.height).step_by((view.height / SAMPLED_ROWS).max(1)) {
-        for pixels in view.row(y).windows(FAR_PX + 1) {
+        for pixels in view.row(y).as_floats(row).windows(FAR_PX + 1) {
             let to_next = (pixels[1] - pixels[0]).abs();
             let to_far = (pixels[FAR_PX] - pixels[0]).abs();
             if to_next < largest && to_far < largest {

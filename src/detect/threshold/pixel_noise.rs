@@ -48,6 +48,7 @@ impl PixelNoise {
         let mut histogram = [0u32; BINS + 1];
         let NoiseBuffers {
             bins,
+            row,
             pieces,
             nodes,
             ..
@@ -56,7 +57,7 @@ impl PixelNoise {
         let step = (view.width * view.height / SAMPLES).max(1);
         for y in (step / 2..view.height).step_by(step) {
             mesh.row_pieces(y, pieces);
-            let row = view.row(y);
+            let row = view.row(y).as_floats(row);
             for piece in pieces.iter() {
                 let span = piece.start..piece.end;
                 bins_of(&row[span.clone()], piece, &mut bins[span]);

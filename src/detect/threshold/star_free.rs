@@ -18,6 +18,8 @@ pub(crate) const MIN_SAMPLES: f64 = 2000.0;
 pub(crate) struct NoiseBuffers {
     /// The histogram bin of each pixel of a row.
     pub bins: Vec<u16>,
+    /// The pixels of a row.
+    pub row: Vec<f32>,
     /// A row in units of its noise.
     pub standardised: Vec<f32>,
     /// Background and noise along a row.

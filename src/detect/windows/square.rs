@@ -2,6 +2,7 @@
 
 use crate::detect::background::rounding_sigma_adu;
 use crate::detect::fit::Window;
+use crate::detect::pixels::Samples;
 use crate::detect::psf::GROUP_PX;
 use crate::frame::Frame;
 use multiversion::multiversion;
@@ -128,7 +129,10 @@ pub(super) fn nearest(at_px: f64) -> Option<usize> {
 fn copy_pixels(frame: &Frame, square: &Square, pixels: &mut Vec<f32>) {
     for y in square.y0..square.y0 + square.side {
         let first = y * frame.width + square.x0;
-        pixels.extend_from_slice(&frame.pixels[first..first + square.side]);
+        let row = Samples::from(&frame.pixels).span(first..first + square.side);
+        let start = pixels.len();
+        pixels.resize(start + square.side, 0.0);
+        row.copy_to(&mut pixels[start..]);
     }
 }
 

@@ -593,7 +593,10 @@ mod tests {
     #[test]
     fn saturated_stars_are_flagged() {
         let (mut frame, stars) = frame(0.9, [0.0; 2], 3);
-        frame.pixels.iter_mut().for_each(|p| *p = p.min(1500.0));
+        frame
+            .values_mut()
+            .iter_mut()
+            .for_each(|p| *p = p.min(1500.0));
         let at = |star: &PixelPoint| ExpectedStar {
             position: *star,
             radius_px: 2.0,

@@ -117,7 +117,7 @@ impl Image {
             return Ok(frame);
         };
         let blank = blank.saturating_add(self.zero as i64);
-        let mut pixels = frame.pixels;
+        let mut pixels = frame.values().into_owned();
         for (pixel, levels) in pixels.iter_mut().zip(values.chunks_exact(self.channels)) {
             if levels.iter().any(|level| (*level).into() == blank) {
                 *pixel = f32::NAN;

@@ -90,7 +90,7 @@ pub fn write_fits(
     writer.write_all(&cards.to_bytes())?;
     let mut length = 0;
     let mut bytes = Vec::with_capacity(frame.width * 4);
-    for row in frame.pixels.chunks(frame.width) {
+    for row in frame.values().chunks(frame.width) {
         bytes.clear();
         for &pixel in row {
             match samples {
@@ -131,12 +131,12 @@ fn mandatory(frame: &Frame, samples: FitsSamples) -> FitsHeader {
 fn check_levels(frame: &Frame) -> Result<(), FitsWriteError> {
     const LARGEST: f32 = u16::MAX as f32;
     let fits = |&pixel: &f32| (0.0..=LARGEST).contains(&pixel) && pixel.fract() == 0.0;
-    match frame.pixels.iter().position(|pixel| !fits(pixel)) {
+    match frame.values().iter().position(|pixel| !fits(pixel)) {
         None => Ok(()),
         Some(at) => Err(FitsWriteError::NoLevel {
             x: at % frame.width,
             y: at / frame.width,
-            found: frame.pixels[at],
+            found: frame.pixels.value(at),
         }),
     }
 }
@@ -248,7 +248,7 @@ mod tests {
             let bytes = written(&whole, FitsSamples::Unsigned16, &FitsHeader::default()).unwrap();
             prop_assert_eq!(bytes.len() % BLOCK_BYTES, 0);
             prop_assert_eq!(crate::frame::decode(&bytes).unwrap().pixels, whole.pixels);
-            let bits = |frame: &Frame| frame.pixels.iter().map(|p| p.to_bits()).collect::<Vec<_>>();
+            let bits = |frame: &Frame| frame.values().iter().map(|p| p.to_bits()).collect::<Vec<_>>();
             let any = words.iter().map(|w| f32::from_bits(*w)).collect();
             // Infinities become NaN, and all NaN count as equal.
             let mut any: Vec<f32> = any;

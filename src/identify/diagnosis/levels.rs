@@ -10,7 +10,8 @@ const FULL_SCALE_STEPS: f32 = 32.0;
 
 /// Whether the frame is empty or overexposed.
 pub(super) fn diagnose(frame: &Frame) -> Option<Diagnosis> {
-    let values = || frame.pixels.iter().copied().filter(|p| !p.is_nan());
+    let pixels = frame.values();
+    let values = || pixels.iter().copied().filter(|p| !p.is_nan());
     let lowest = values().fold(f32::INFINITY, f32::min);
     let highest = values().fold(f32::NEG_INFINITY, f32::max);
     let is_full = frame.saturation_adu.is_some_and(|full| highest >= full);

@@ -75,7 +75,7 @@ pub(super) fn diagnose(frame: &Frame, detections: &Detections) -> Option<Diagnos
 
 fn above_background(frame: &Frame) -> Vec<f32> {
     let background = BackgroundMap::measure(frame, CELL_PX);
-    let mut above = frame.pixels.clone();
+    let mut above = frame.values().into_owned();
     let mut levels = vec![0.0; frame.width];
     for (y, row) in above.chunks_mut(frame.width).enumerate() {
         background.row(y, &mut levels);

@@ -159,7 +159,7 @@ impl EnergyStudy {
             for y in -half..=half {
                 for x in -half..=half {
                     let at = (row + y) * frame.width as i64 + column + x;
-                    let grey = f64::from(frame.pixels[at as usize]) - level_adu;
+                    let grey = f64::from(frame.pixels.value(at as usize)) - level_adu;
                     sum += grey;
                     sum_x += x as f64 * grey;
                     sum_y += y as f64 * grey;

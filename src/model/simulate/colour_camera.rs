@@ -45,7 +45,7 @@ impl ColourCamera {
     pub fn record(&self, frame: &Frame) -> Result<Frame, FrameError> {
         let range_adu = self.white_adu - self.black_adu;
         let linear = |pixel: &f32| (f64::from(*pixel) - self.black_adu) / range_adu;
-        let mosaic: Vec<f64> = frame.pixels.iter().map(linear).collect();
+        let mosaic: Vec<f64> = frame.values().iter().map(linear).collect();
         let mut colours = demosaiced(&mosaic, frame.width, frame.height);
         if self.denoise_px > 0.0 {
             smooth(&mut colours, frame.width, self.denoise_px);
@@ -179,6 +179,6 @@ mod tests {
         assert_eq!((recorded.width, recorded.height), (64, 48));
         // A quarter of the range.
         let expected = 255.0 * 0.25f32.powf(1.0 / 2.2);
-        assert!(recorded.pixels.iter().all(|p| (p - expected).abs() < 1.5));
+        assert!(recorded.values().iter().all(|p| (p - expected).abs() < 1.5));
     }
 }

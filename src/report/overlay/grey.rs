@@ -79,13 +79,14 @@ fn light(frame: &Frame, side: usize, [width, height]: [usize; 2]) -> Vec<f32> {
     const MIN_CELL_PX: usize = 64;
     let cell_px = (frame.width.max(frame.height) / CELLS).max(MIN_CELL_PX);
     let background = BackgroundMap::measure(frame, cell_px);
+    let pixels = frame.values();
     let mut levels = vec![0.0; frame.width];
     let mut light = Vec::with_capacity(width * height);
     for rows in 0..height {
         let mut sums = vec![(0.0_f32, 0_u32); width];
         for y in rows * side..((rows + 1) * side).min(frame.height) {
             background.row(y, &mut levels);
-            let row = &frame.pixels[y * frame.width..(y + 1) * frame.width];
+            let row = &pixels[y * frame.width..(y + 1) * frame.width];
             for (x, (pixel, level)) in row.iter().zip(&levels).enumerate() {
                 if !pixel.is_nan() {
                     let sum = &mut sums[x / side];

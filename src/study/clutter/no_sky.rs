@@ -267,8 +267,8 @@ mod tests {
             let (one, other) = (make(1), make(2));
             assert_eq!(one.pixels, make(1).pixels);
             assert_ne!(one.pixels, other.pixels, "{kind:?}");
-            let first = one.pixels[0];
-            assert!(one.pixels.iter().any(|pixel| *pixel != first), "{kind:?}");
+            let first = one.pixels.value(0);
+            assert!(one.values().iter().any(|pixel| *pixel != first), "{kind:?}");
         }
     }
 }

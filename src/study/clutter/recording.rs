@@ -27,9 +27,10 @@ impl Sky {
         /// Standard deviation over the median absolute difference of two neighbours.
         const NOISE_OF_DIFFERENCE: f64 = 1.482_602_218_505_602 * std::f64::consts::FRAC_1_SQRT_2;
         const STRIDE: usize = 7;
-        let pairs = frame.pixels.windows(2).step_by(STRIDE);
+        let pixels = frame.values();
+        let pairs = pixels.windows(2).step_by(STRIDE);
         let mut differences: Vec<f32> = pairs.map(|pair| (pair[1] - pair[0]).abs()).collect();
-        let mut levels: Vec<f32> = frame.pixels.iter().step_by(STRIDE).copied().collect();
+        let mut levels: Vec<f32> = pixels.iter().step_by(STRIDE).copied().collect();
         let noise = NOISE_OF_DIFFERENCE * f64::from(middle(&mut differences));
         Self {
             level: f64::from(middle(&mut levels)),
@@ -49,7 +50,7 @@ pub(super) fn behind(mut frame: Frame, canvas: &Canvas, random: &mut ChaCha8Rng)
     let sky = Sky::of(&frame);
     let most = frame.saturation_adu.unwrap_or(f32::MAX);
     let layers = canvas.opacity.iter().zip(&canvas.light).zip(&canvas.glow);
-    for (pixel, ((opacity, light), glow)) in frame.pixels.iter_mut().zip(layers) {
+    for (pixel, ((opacity, light), glow)) in frame.values_mut().iter_mut().zip(layers) {
         if *opacity == 0.0 && *glow == 0.0 {
             continue;
         }
@@ -76,7 +77,8 @@ pub(super) fn mirrored_in_window(mut frame: Frame, random: &mut ChaCha8Rng) -> F
     let share = random.random_range(0.1..0.6);
     let most = frame.saturation_adu.unwrap_or(f32::MAX);
     let shift: usize = random.random_range(0..frame.width);
-    for row in frame.pixels.chunks_exact_mut(frame.width) {
+    let width = frame.width;
+    for row in frame.values_mut().chunks_exact_mut(width) {
         let original = row.to_vec();
         for (x, pixel) in row.iter_mut().enumerate() {
             let mirrored =
@@ -102,9 +104,10 @@ pub(super) fn cut_off(mut frame: Frame, random: &mut ChaCha8Rng) -> Frame {
     let above = random.random_range(0.2..0.8);
     let (sin, cos) = libm::sincos(random.random_range(0.0..std::f64::consts::TAU));
     let (width, height) = (frame.width as f64, frame.height as f64);
-    for (index, pixel) in frame.pixels.iter_mut().enumerate() {
-        let x = (index % frame.width) as f64 / width - 0.5;
-        let y = (index / frame.width) as f64 / height - 0.5;
+    let columns = frame.width;
+    for (index, pixel) in frame.values_mut().iter_mut().enumerate() {
+        let x = (index % columns) as f64 / width - 0.5;
+        let y = (index / columns) as f64 / height - 0.5;
         let along = x * cos + y * sin + above - 0.5;
         let shifted = f64::from(*pixel) - sky.level + gradient_sigmas * sky.noise * along;
         *pixel = (gain * shifted).round().clamp(0.0, WHITE) as f32;
@@ -120,7 +123,7 @@ pub(super) fn as_jpeg(frame: &Frame, random: &mut ChaCha8Rng) -> Result<Frame, F
     let black = sky.level - sky.noise * random.random_range(2.0..8.0);
     let white = sky.level + sky.noise * log_uniform(random, 60.0, 1000.0);
     let mosaic: Vec<f64> = frame
-        .pixels
+        .values()
         .iter()
         .enumerate()
         .map(|(index, pixel)| {
@@ -173,7 +176,7 @@ mod tests {
             &mut ChaCha8Rng::seed_from_u64(2),
         );
         let mean = |rows: std::ops::Range<usize>| {
-            let part = &frame.pixels[rows.start * 200..rows.end * 200];
+            let part = &frame.values()[rows.start * 200..rows.end * 200];
             f64::from(part.iter().sum::<f32>()) / part.len() as f64
         };
         assert!((mean(0..79) - 300.0).abs() < 1.0);
@@ -184,19 +187,19 @@ mod tests {
     #[test]
     fn parts_of_a_cut_off_frame_are_black() {
         let frame = cut_off(noisy(300.0, 12.0), &mut ChaCha8Rng::seed_from_u64(3));
-        let black = frame.pixels.iter().filter(|pixel| **pixel == 0.0).count();
+        let black = frame.values().iter().filter(|pixel| **pixel == 0.0).count();
         let share = black as f64 / frame.pixels.len() as f64;
         assert!((0.1..0.9).contains(&share), "{share}");
         assert_eq!(frame.saturation_adu, Some(255.0));
         let whole = |pixel: &f32| pixel.fract() == 0.0 && (0.0..=255.0).contains(pixel);
-        assert!(frame.pixels.iter().all(whole));
+        assert!(frame.values().iter().all(whole));
     }
 
     #[test]
     fn a_jpeg_is_read_as_a_frame_of_eight_bits() {
         let frame = as_jpeg(&noisy(300.0, 12.0), &mut ChaCha8Rng::seed_from_u64(4)).unwrap();
         assert_eq!((frame.width, frame.height), (200, 160));
-        let most = frame.pixels.iter().copied().fold(0.0, f32::max);
+        let most = frame.values().iter().copied().fold(0.0, f32::max);
         assert!((1.0..=255.0).contains(&most));
     }
 }

@@ -77,7 +77,7 @@ fn a_star_is_true_where_its_place_is_on_the_frame_and_drawn_where_its_light_is()
     let found = &truth.stars[0];
     assert_eq!((found.catalog, found.v_mag), (Some(StarIndex::new(1)), 2.0));
     assert!(found.position.distance_to(&PixelPoint::new(100.25, 200.75)) < 1e-6);
-    assert!(frame.pixels[300 * frame.width] > 2.0 * frame.pixels[100 * frame.width]);
+    assert!(frame.at(0, 300) > 2.0 * frame.at(0, 100));
 }
 
 #[test]
@@ -98,7 +98,8 @@ fn a_frame_depends_on_its_seed_and_the_pattern_on_the_cameras() {
     };
     assert_eq!(dark(&scenario, 1), dark(&scenario, 1));
     assert_ne!(dark(&scenario, 1), dark(&scenario, 2));
-    let hot = |pixels: Vec<f32>| -> Vec<usize> {
+    let hot = |pixels: crate::frame::Pixels| -> Vec<usize> {
+        let pixels = pixels.to_f32();
         let mut order: Vec<usize> = (0..pixels.len()).collect();
         order.sort_by(|a, b| pixels[*b].total_cmp(&pixels[*a]));
         order.truncate(20);
@@ -156,9 +157,9 @@ fn a_turning_camera_smears_its_stars_and_keeps_their_light() {
         let (frame, truth) = simulator.frame(&pointing(), 1).unwrap();
         let empty = Simulator::new(&scenario, &scene, &[]).unwrap();
         let (sky, _) = empty.frame(&pointing(), 1).unwrap();
-        let sum = |frame: &Frame| frame.pixels.iter().map(|p| f64::from(*p)).sum::<f64>();
+        let sum = |frame: &Frame| frame.values().iter().map(|p| f64::from(*p)).sum::<f64>();
         let electrons = (sum(&frame) - sum(&sky)) * 0.01;
-        let peak = frame.pixels.iter().copied().fold(0.0, f32::max);
+        let peak = frame.values().iter().copied().fold(0.0, f32::max);
         (electrons / truth.stars[0].electrons, peak)
     };
     let (still, peak) = light(Scene::default());
@@ -190,12 +191,12 @@ fn cosmic_rays_and_trails_are_where_the_truth_says() {
         (!truth.trails.is_empty() && !truth.cosmic_rays.is_empty()).then_some((frame, truth))
     });
     let (frame, truth) = lit.unwrap();
-    let mut sorted = frame.pixels.clone();
+    let mut sorted = frame.values().into_owned();
     sorted.sort_by(f32::total_cmp);
     let median = sorted[sorted.len() / 2];
     let level = |place: PixelPoint| {
         let (x, y) = (place.x.round() as usize, place.y.round() as usize);
-        frame.pixels[y.min(199) * 300 + x.min(299)]
+        frame.at(x.min(299), y.min(199))
     };
     assert!(level(truth.cosmic_rays[0].from) > median + 20.0);
     assert!(level(truth.trails[0].at(0.5)) > median + 5.0);

@@ -1,0 +1,125 @@
+//! The pixels of a frame, in the samples of its file.
+
+use std::borrow::Cow;
+
+/// Pixel values, row-major. Whole numbers of few bits stay what they are: they take less memory, and
+/// less time to look through.
+#[derive(Debug, Clone)]
+pub enum Pixels {
+    /// Whole numbers from 0 to 255.
+    U8(Vec<u8>),
+    /// Whole numbers from 0 to 65535.
+    U16(Vec<u16>),
+    /// Any numbers; NaN marks a pixel without a value.
+    F32(Vec<f32>),
+}
+
+impl Pixels {
+    /// The number of pixels.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::U8(values) => values.len(),
+            Self::U16(values) => values.len(),
+            Self::F32(values) => values.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The value of the pixel at `index`.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn value(&self, index: usize) -> f32 {
+        match self {
+            Self::U8(values) => f32::from(values[index]),
+            Self::U16(values) => f32::from(values[index]),
+            Self::F32(values) => values[index],
+        }
+    }
+
+    /// The highest value; NaN is left out.
+    pub fn highest(&self) -> f32 {
+        match self {
+            Self::U8(values) => f32::from(values.iter().copied().max().unwrap_or(0)),
+            Self::U16(values) => f32::from(values.iter().copied().max().unwrap_or(0)),
+            Self::F32(values) => values.iter().copied().fold(f32::NEG_INFINITY, f32::max),
+        }
+    }
+
+    /// All values as floats; whole numbers are converted each time.
+    pub fn to_f32(&self) -> Cow<'_, [f32]> {
+        match self {
+            Self::U8(values) => values.iter().map(|&v| f32::from(v)).collect(),
+            Self::U16(values) => values.iter().map(|&v| f32::from(v)).collect(),
+            Self::F32(values) => Cow::Borrowed(values),
+        }
+    }
+
+    /// The values as floats that can be changed: whole numbers become floats for good.
+    pub fn as_f32_mut(&mut self) -> &mut Vec<f32> {
+        let floats = match self {
+            Self::F32(values) => std::mem::take(values),
+            _ => self.to_f32().into_owned(),
+        };
+        *self = Self::F32(Vec::new());
+        match self {
+            Self::F32(values) => {
+                *values = floats;
+                values
+            }
+            // Never: it was set above.
+            Self::U8(_) | Self::U16(_) => self.as_f32_mut(),
+        }
+    }
+
+    /// Reverses the order of the rows of `width` pixels.
+    pub(super) fn reverse_rows(&mut self, width: usize) {
+        match self {
+            Self::U8(values) => reverse_rows(values, width),
+            Self::U16(values) => reverse_rows(values, width),
+            Self::F32(values) => reverse_rows(values, width),
+        }
+    }
+}
+
+fn reverse_rows<T>(values: &mut [T], width: usize) {
+    let height = values.len() / width;
+    let (upper, lower) = values.split_at_mut(height / 2 * width);
+    let from_bottom = lower.rchunks_exact_mut(width);
+    for (above, below) in upper.chunks_exact_mut(width).zip(from_bottom) {
+        above.swap_with_slice(below);
+    }
+}
+
+/// Compares values, in whatever samples they are.
+impl PartialEq for Pixels {
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::U8(a), Self::U8(b)) => a == b,
+            (Self::U16(a), Self::U16(b)) => a == b,
+            _ => self.to_f32() == other.to_f32(),
+        }
+    }
+}
+
+impl From<Vec<f32>> for Pixels {
+    fn from(values: Vec<f32>) -> Self {
+        Self::F32(values)
+    }
+}
+
+impl From<Vec<u16>> for Pixels {
+    fn from(values: Vec<u16>) -> Self {
+        Self::U16(values)
+    }
+}
+
+impl From<Vec<u8>> for Pixels {
+    fn from(values: Vec<u8>) -> Self {
+        Self::U8(values)
+    }
+}
