@@ -77,10 +77,8 @@ pub(super) fn for_each_from(
             .filter(|&(x, y)| maps.view.at(x, y) >= level)
     };
     // Each pixel is new once: there is room for all.
-    let mut open: ArrayVec<(usize, usize), { MAX_WINDOW_PX * MAX_WINDOW_PX }> =
-        around(peak.x, peak.y)
-            .filter(|&(x, y)| is_new(x, y))
-            .collect();
+    let mut open = ArrayVec::<(usize, usize), { MAX_WINDOW_PX * MAX_WINDOW_PX }>::new();
+    open.extend(around(peak.x, peak.y).filter(|&(x, y)| is_new(x, y)));
     while let Some((column, row)) = open.pop() {
         open.extend(around(column, row).filter(|&(x, y)| is_new(x, y)));
         visit(column, row);
