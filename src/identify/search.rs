@@ -9,7 +9,7 @@
 
 use super::confirmation::{Batch, ConfirmingStars, PendingHypothesis, Pose};
 use super::false_alarm::{FalseAlarm, MAX_HYPOTHESES, TESTED_STARS};
-use super::field::{Photometry, StarField};
+use super::field::{ObservedStar, Photometry, StarField};
 use super::hypothesis::{Hypothesis, Problem};
 use super::indexed_catalog::IndexedCatalog;
 use super::pairing::Pair;
@@ -82,6 +82,9 @@ const CONFIRMING_SIGMAS: f64 = 3.5;
 const HYPOTHESES_PER_TRIANGLE: u64 = 250;
 /// Minimum number of hypotheses, however few the triangles.
 const LEAST_HYPOTHESES: u64 = 30_000;
+/// A second search does not try the triangles of the brightest stars that both searches share, if
+/// they are at least so many: these alone decided on almost every hypothesis.
+const LEAST_SHARED: usize = 16;
 /// From this number of hypotheses on, a search is long: several are tested together.
 const LONG_SEARCH: u64 = 2_000;
 /// Margin on the sizes of a triangle that decide which classes of the index can hold it.
@@ -122,6 +125,8 @@ pub struct Buffers {
     /// Hypotheses from one triangle that wait for their test.
     waiting: Vec<PendingHypothesis>,
     batch: Batch,
+    /// Number of hypotheses from triangles of which this star is the faintest.
+    hypotheses_of: Vec<u64>,
 }
 
 /// The search over one field.
@@ -135,6 +140,10 @@ pub struct Search<'a> {
     diagonal_px: f64,
     /// log10 of the number of searches over the field.
     searches_log10: f64,
+    /// Brightest stars whose triangles were tried by a search before.
+    shared: usize,
+    /// Brightest stars of which all triangles were tried.
+    tried: usize,
     hypotheses: u64,
     most_hypotheses: u64,
     candidates: u64,
@@ -203,6 +212,8 @@ impl<'a> Search<'a> {
             .offsets
             .extend(brightest.map(|s| [s.position.x - centre.x, s.position.y - centre.y]));
         buffers.refiner.around.forget();
+        buffers.hypotheses_of.clear();
+        buffers.hypotheses_of.resize(most, 0);
         let (narrowest_rad, widest_rad) = sky.fov_range_rad();
         let wide = focal_length_px(field.width_px, widest_rad * FOV_SLACK);
         let narrow = focal_length_px(field.width_px, narrowest_rad / FOV_SLACK);
@@ -222,6 +233,8 @@ impl<'a> Search<'a> {
             focal_px,
             diagonal_px: field.width_px.hypot(field.height_px),
             searches_log10: 0.0,
+            shared: 0,
+            tried: most,
             hypotheses: 0,
             most_hypotheses,
             candidates: 0,
@@ -230,11 +243,18 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// A second search, of another choice of stars: chance has twice the opportunity.
+    /// A second search, of another choice of stars: chance has twice the opportunity. Triangles of
+    /// the stars that both share are not tried again, and count as tried.
     pub fn again(self, problem: Problem<'a>, priors: &Priors) -> Self {
+        let shared = shared_stars(&self.field.stars, &problem.field.stars).min(self.tried);
+        let shared = if shared < LEAST_SHARED { 0 } else { shared };
+        let before: u64 = self.buffers.hypotheses_of.iter().take(shared).sum();
+        let second = Self::new(problem, priors, self.buffers);
         Self {
             searches_log10: std::f64::consts::LOG10_2,
-            ..Self::new(problem, priors, self.buffers)
+            shared,
+            most_hypotheses: second.most_hypotheses.saturating_sub(before),
+            ..second
         }
     }
 
@@ -268,10 +288,12 @@ impl<'a> Search<'a> {
     /// Tries the triangles of one pass in the order of their faintest star, then of the second.
     fn sweep(&mut self, pass: &Pass) -> Option<Found> {
         let stars = pass.stars.min(self.buffers.offsets.len());
-        for faintest in pass.from..stars {
+        for faintest in pass.from.max(self.shared)..stars {
+            let before = self.hypotheses;
             for middle in 1..faintest {
                 for brightest in 0..middle {
                     if self.is_exhausted() {
+                        self.tried = self.tried.min(faintest);
                         return None;
                     }
                     let triangle = self.triangle([brightest, middle, faintest], pass);
@@ -281,6 +303,7 @@ impl<'a> Search<'a> {
                     }
                 }
             }
+            self.buffers.hypotheses_of[faintest] += self.hypotheses - before;
         }
         None
     }
@@ -675,6 +698,12 @@ impl<'a> Search<'a> {
         );
         Some((log10 + self.searches_log10).min(0.0))
     }
+}
+
+/// Number of the brightest stars that both lists begin with.
+fn shared_stars(first: &[ObservedStar], second: &[ObservedStar]) -> usize {
+    let pairs = first.iter().zip(second);
+    pairs.take_while(|(a, b)| a.source == b.source).count()
 }
 
 fn triple([a, b, c]: &[Vector3<f64>; 3]) -> f64 {
