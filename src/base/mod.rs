@@ -3,6 +3,7 @@
 pub mod angle;
 pub mod coords;
 pub mod epoch;
+pub(crate) mod exponential;
 pub mod files;
 pub mod format;
 pub(crate) mod neighbors;

@@ -1,7 +1,8 @@
-//! Neighbour search among points on a frame, with a k-d tree.
+//! Neighbour search among points on a frame: with a k-d tree, or for short distances with cells.
 
 use super::coords::PixelPoint;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use std::ops::RangeInclusive;
 
 /// A k-d tree of points on a frame.
 pub(crate) struct PointTree(ImmutableKdTree<f64, 2>);
@@ -54,6 +55,124 @@ impl PointTree {
     }
 }
 
+/// Most rows and columns of cells of a [`PointGrid`]. If the points are few, there are about as many
+/// cells as points.
+const MOST_ALONG: usize = 128;
+
+/// Points on a frame, sorted into cells: searches within short distances are faster than with a
+/// [`PointTree`]. Its buffers are reused.
+#[derive(Debug, Default)]
+pub(crate) struct PointGrid {
+    x: Division,
+    y: Division,
+    /// Row by row, and the start of each cell.
+    by_cell: Vec<(PixelPoint, u32)>,
+    starts: Vec<u32>,
+    /// The cell of each point.
+    cells: Vec<u32>,
+}
+
+impl PointGrid {
+    /// Replaces the points, of which there are `count`.
+    pub fn fill(&mut self, count: usize, points: impl Iterator<Item = PixelPoint> + Clone) {
+        let along = ((count as f64).sqrt() as usize).clamp(1, MOST_ALONG);
+        self.x = Division::over(points.clone().map(|point| point.x), along);
+        self.y = Division::over(points.clone().map(|point| point.y), along);
+        self.starts.clear();
+        self.starts.resize(along * along + 1, 0);
+        self.cells.clear();
+        let (x, y) = (self.x, self.y);
+        let cells = points
+            .clone()
+            .map(|point| y.of(point.y) * along + x.of(point.x));
+        self.cells.extend(cells.map(|cell| cell as u32));
+        for &cell in &self.cells {
+            self.starts[cell as usize] += 1;
+        }
+        let mut end = 0;
+        for start in &mut self.starts {
+            end += *start;
+            *start = end;
+        }
+        self.by_cell.clear();
+        self.by_cell.resize(count, (PixelPoint::new(0.0, 0.0), 0));
+        for ((index, point), &cell) in points.enumerate().zip(&self.cells) {
+            let start = &mut self.starts[cell as usize];
+            *start -= 1;
+            self.by_cell[*start as usize] = (point, index as u32);
+        }
+    }
+
+    /// Calls `visit` for every point within `radius_px` of `center`, in no particular order.
+    #[inline]
+    pub fn for_each_within(
+        &self,
+        center: &PixelPoint,
+        radius_px: f64,
+        mut visit: impl FnMut(Neighbor),
+    ) {
+        let columns = self.x.near(center.x, radius_px);
+        for row in self.y.near(center.y, radius_px) {
+            let [first, last] = [columns.start(), columns.end()].map(|c| row * self.x.parts + c);
+            let near = self.starts[first] as usize..self.starts[last + 1] as usize;
+            for &(point, index) in &self.by_cell[near] {
+                let distance_px = point.distance_to(center);
+                if distance_px <= radius_px {
+                    visit(Neighbor {
+                        index: index as usize,
+                        distance_px,
+                    });
+                }
+            }
+        }
+    }
+
+    /// Strips along x, from the leftmost point to the rightmost one.
+    pub fn strips(&self, parts: usize) -> Division {
+        Division {
+            parts,
+            per_px: parts as f64 / self.x.extent_px,
+            ..self.x
+        }
+    }
+}
+
+/// A division of a range of coordinates into equal parts.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Division {
+    parts: usize,
+    from_px: f64,
+    extent_px: f64,
+    per_px: f64,
+}
+
+impl Division {
+    fn over(coordinates: impl Iterator<Item = f64>, parts: usize) -> Self {
+        let (low, high) = coordinates.fold((f64::MAX, f64::MIN), |(low, high), at| {
+            (
+                if at < low { at } else { low },
+                if at > high { at } else { high },
+            )
+        });
+        let extent_px = (high - low).max(1.0);
+        Self {
+            parts,
+            from_px: low,
+            extent_px,
+            per_px: parts as f64 / extent_px,
+        }
+    }
+
+    /// The part in which a coordinate lies; outside the range, the nearest.
+    pub fn of(&self, at: f64) -> usize {
+        (((at - self.from_px) * self.per_px).max(0.0) as u32 as usize).min(self.parts - 1)
+    }
+
+    fn near(&self, at: f64, radius_px: f64) -> RangeInclusive<usize> {
+        self.of(at - radius_px)..=self.of(at + radius_px)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -77,6 +196,13 @@ mod tests {
                 .collect();
             // A stable sort.
             expected.sort_by(|a, b| a.distance_px.total_cmp(&b.distance_px));
+            let mut grid = PointGrid::default();
+            grid.fill(points.len(), points.iter().copied());
+            let mut near = Vec::new();
+            grid.for_each_within(&center, radius_px, |found| near.push(found));
+            near.sort_unstable_by_key(|found| found.index);
+            near.sort_by(|a, b| a.distance_px.total_cmp(&b.distance_px));
+            prop_assert_eq!(&near, &expected);
             prop_assert_eq!(PointTree::new(points).within(&center, radius_px), expected);
         }
     }

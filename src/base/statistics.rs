@@ -28,6 +28,16 @@ pub fn normal_cdf_and_density(z: f64) -> (f64, f64) {
     const TABLE_STEPS: f64 = 32.0;
     /// The table covers ± this many standard deviations.
     const TABLE_END: f64 = 6.0;
+    /// 1 / n, which is faster than to divide.
+    const RECIPROCALS: [f64; 7] = [
+        1.0,
+        1.0 / 2.0,
+        1.0 / 3.0,
+        1.0 / 4.0,
+        1.0 / 5.0,
+        1.0 / 6.0,
+        1.0 / 7.0,
+    ];
     static TABLE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| {
         let entries = 0..=(2.0 * TABLE_END * TABLE_STEPS) as usize;
         let z = entries.map(|entry| entry as f64 / TABLE_STEPS - TABLE_END);
@@ -53,9 +63,9 @@ pub fn normal_cdf_and_density(z: f64) -> (f64, f64) {
         ((z0_sq - 15.0) * z0_sq + 45.0) * z0_sq - 15.0,
     ];
     let (mut in_cdf, mut in_density, mut power) = (0.0, 0.0, 1.0);
-    for (n, he) in he.into_iter().enumerate() {
+    for (he, one_over_n) in he.into_iter().zip(RECIPROCALS) {
         in_density += he * power;
-        power *= -d / (n + 1) as f64;
+        power *= -d * one_over_n;
         in_cdf -= he * power;
     }
     (cdf + density * in_cdf, density * in_density)

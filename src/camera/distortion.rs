@@ -373,8 +373,9 @@ impl Distortion {
         apply_to_lanes(self, ideal)
     }
 
+    /// [`Self::remove`] for several offsets.
     #[inline(always)]
-    fn remove_from_lanes(&self, observed: &[[f64; LANES]; 2]) -> [[f64; LANES]; 2] {
+    pub(super) fn remove_from_lanes(&self, observed: &[[f64; LANES]; 2]) -> [[f64; LANES]; 2] {
         match self.model {
             DistortionModel::Radial
             | DistortionModel::Radial5

@@ -68,6 +68,15 @@ impl CameraModel {
         }
     }
 
+    /// [`Self::ideal_offset_of`] for the observed offsets of several pixels.
+    #[inline(always)]
+    pub(crate) fn ideal_offsets(&self, observed: &[[f64; LANES]; 2]) -> [[f64; LANES]; 2] {
+        match &self.distortion {
+            Some(distortion) => distortion.remove_from_lanes(observed),
+            None => *observed,
+        }
+    }
+
     /// The direction in which `pixel` looks.
     pub fn direction_of(&self, pixel: &PixelPoint) -> UnitVector<Camera> {
         let [u, v] = self.ideal_offset_of(pixel);

@@ -18,7 +18,7 @@ use super::hypothesis::{Hypothesis, Problem};
 use super::naming::{Candidate, position_density};
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::sky::catalog::StarIndex;
-use crate::sky::catalog::sky_grid::GridStar;
+use crate::sky::catalog::sky_grid::{GridStar, chord_of};
 
 /// Stars fainter than another by more move its centroid by less than a hundredth of the spot.
 const FAINTER_MAG: f32 = 4.5;
@@ -43,14 +43,30 @@ const CONVERGED_PX: f64 = 1e-4;
 /// … or after this many steps.
 const MAX_STEPS: usize = 50;
 
+/// Neighbours are looked up within this many times the reach, as it changes with the focal length.
+const REACH_MARGIN: f64 = 1.1;
+
 /// Finds blends. Its buffers are reused.
 #[derive(Debug, Default)]
 pub struct Blends {
+    /// The stars near each predicted star, where they were looked up.
+    near: Vec<Option<Near>>,
+    neighbours: Vec<GridStar>,
     /// Catalogue stars of other detections, sorted.
     taken: Vec<StarIndex>,
     /// Of the candidates of one observed star.
     blends: Vec<Option<Light>>,
     lights: Vec<(PixelPoint, f64)>,
+}
+
+/// The stars near another one.
+#[derive(Debug, Clone, Copy)]
+struct Near {
+    /// Their first position in the list of neighbours, and that after the last.
+    from: u32,
+    to: u32,
+    /// Chord within which they were looked up.
+    chord: f64,
 }
 
 /// A hypothesis and its PSF.
@@ -59,9 +75,18 @@ struct View<'a> {
     hypothesis: &'a Hypothesis,
     /// Variance of the spot, pixel width included.
     variance_px2: f64,
+    /// Chord within which stars are blended.
+    chord: f64,
 }
 
 impl Blends {
+    /// Starts with `stars` predicted stars.
+    pub fn start(&mut self, stars: usize) {
+        self.neighbours.clear();
+        self.near.clear();
+        self.near.resize(stars, None);
+    }
+
     /// Gives each candidate position and magnitude of the light that its star is part of, where
     /// that agrees better with the observed star than the star's own light; none if the PSF is
     /// unknown. A star in the blend of a brighter one has its own light only.
@@ -78,10 +103,13 @@ impl Blends {
         let Some(spot_sigma_px) = problem.field.spot_sigma_px else {
             return;
         };
+        let variance_px2 = spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2;
+        let reach_px = REACH_SIGMAS * variance_px2.sqrt();
         let view = View {
             problem,
             hypothesis,
-            variance_px2: spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2,
+            variance_px2,
+            chord: chord_of(reach_px / hypothesis.camera.focal_length_px),
         };
         self.taken.clear();
         self.taken.extend(taken);
@@ -91,8 +119,8 @@ impl Blends {
         let mut blends = std::mem::take(&mut self.blends);
         for of_observed in candidates.chunk_by_mut(|a, b| a.observed == b.observed) {
             blends.clear();
-            let stars = of_observed.iter().map(|candidate| candidate.star);
-            blends.extend(stars.map(|star| self.light_around(&view, star)));
+            let stars = of_observed.iter();
+            blends.extend(stars.map(|star| self.light_around(&view, (star.predicted, star.star))));
             let star = &problem.field.stars[of_observed[0].observed];
             for index in 0..of_observed.len() {
                 let is_absorbed = is_absorbed((of_observed, &blends), index, same_px);
@@ -123,22 +151,30 @@ impl Blends {
         self.blends = blends;
     }
 
-    /// The blended light of a star; `None` if it is single.
-    fn light_around(&mut self, view: &View, index: StarIndex) -> Option<Light> {
-        let sky = view.problem.sky;
-        let star = sky.catalog().star(index);
-        let camera = &view.hypothesis.camera;
-        let reach_rad = REACH_SIGMAS * view.variance_px2.sqrt() / camera.focal_length_px;
-        let Self { taken, lights, .. } = self;
+    /// The blended light of a predicted star; `None` if it is single.
+    fn light_around(
+        &mut self,
+        view: &View,
+        (predicted, index): (usize, StarIndex),
+    ) -> Option<Light> {
+        let near = self.near(view, (predicted, index));
+        if near.from == near.to {
+            return None;
+        }
+        let star = view.problem.sky.catalog().star(index);
+        let (centre, chord_sq) = (star.direction.as_vector(), view.chord * view.chord);
+        let Self {
+            taken,
+            lights,
+            neighbours,
+            ..
+        } = self;
         lights.clear();
-        let look = |near: &GridStar| {
-            if near.index != index && taken.binary_search(&near.index).is_err() {
+        for near in &neighbours[near.from as usize..near.to as usize] {
+            if near.is_within(centre, chord_sq) && taken.binary_search(&near.index).is_err() {
                 lights.extend(view.light_of(near.index, star.v_mag));
             }
-        };
-        let faintest_v_mag = star.v_mag + FAINTER_MAG;
-        sky.grid
-            .for_each_within(&star.direction, reach_rad, faintest_v_mag, look);
+        }
         if lights.is_empty() {
             return None;
         }
@@ -152,6 +188,29 @@ impl Blends {
         Some(Light {
             pixel,
             v_mag: f64::from(star.v_mag) - 2.5 * sum.log10(),
+        })
+    }
+}
+
+impl Blends {
+    /// The stars near a predicted star that may be blended with it.
+    fn near(&mut self, view: &View, (predicted, index): (usize, StarIndex)) -> Near {
+        let known = self.near[predicted].filter(|near| near.chord >= view.chord);
+        known.unwrap_or_else(|| {
+            let sky = view.problem.sky;
+            let star = sky.catalog().star(index);
+            let chord = REACH_MARGIN * view.chord;
+            let from = self.neighbours.len() as u32;
+            let keep = |near: &GridStar| {
+                if near.index != index {
+                    self.neighbours.push(*near);
+                }
+            };
+            let faintest_v_mag = star.v_mag + FAINTER_MAG;
+            sky.grid
+                .for_each_within_chord(&star.direction, chord, faintest_v_mag, keep);
+            let to = self.neighbours.len() as u32;
+            *self.near[predicted].insert(Near { from, to, chord })
         })
     }
 }

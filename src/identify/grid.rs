@@ -2,12 +2,14 @@
 
 use super::field::StarField;
 
-/// A division of the frame into square cells.
+/// A division of the frame into square cells. Around it is a border of cells that stay empty, so
+/// that each cell of the frame has eight neighbours.
+#[derive(Debug, Clone, Copy)]
 pub struct Grid {
+    /// Without the border.
     columns: usize,
     rows: usize,
-    /// Side of a cell, in pixels.
-    pub cell_px: f64,
+    cell_px: f64,
     per_px: f64,
 }
 
@@ -26,49 +28,56 @@ impl Grid {
 
     /// Column and row of the cell at a position.
     fn column_and_row(&self, x: f64, y: f64) -> (usize, usize) {
-        let cell = |at: f64, count: usize| ((at * self.per_px).max(0.0) as usize).min(count - 1);
+        let cell =
+            |at: f64, count: usize| ((at * self.per_px).max(0.0) as u32 as usize).min(count - 1);
         (cell(x, self.columns), cell(y, self.rows))
     }
 
-    /// The number of cells.
+    /// Cells from one to that below it.
+    fn stride(&self) -> usize {
+        self.columns + 2
+    }
+
+    /// The number of cells, with the border.
     pub fn cells(&self) -> usize {
-        self.columns * self.rows
+        self.stride() * (self.rows + 2)
     }
 
     /// The cell at a position; outside the frame, the nearest.
     pub fn cell_of(&self, x: f64, y: f64) -> usize {
         let (column, row) = self.column_and_row(x, y);
-        row * self.columns + column
+        (row + 1) * self.stride() + column + 1
     }
 
-    /// Replaces each of `values` by its sum with those of the neighbouring cells. `scratch` is a
-    /// buffer.
-    pub fn sum_with_neighbours(&self, values: &mut [f64], scratch: &mut Vec<f64>) {
-        scratch.clear();
-        for row in values.chunks_exact(self.columns) {
-            let at = |column: usize| row.get(column).copied().unwrap_or(0.0);
-            let sums = (0..self.columns).map(|c| at(c.wrapping_sub(1)) + at(c) + at(c + 1));
-            scratch.extend(sums);
-        }
-        for (cell, value) in values.iter_mut().enumerate() {
-            let at = |cell: usize| scratch.get(cell).copied().unwrap_or(0.0);
-            *value = at(cell.wrapping_sub(self.columns)) + at(cell) + at(cell + self.columns);
-        }
-    }
-
-    /// The sum of `values` of the cell at a position and its neighbours, and how many these are.
-    pub fn around(&self, x: f64, y: f64, values: &[f64]) -> (f64, usize) {
+    /// The area of the cell at a position and of its neighbours in the frame, in square pixels.
+    pub fn area_around_px2(&self, x: f64, y: f64) -> f64 {
         let (column, row) = self.column_and_row(x, y);
-        let columns = column.saturating_sub(1)..(column + 2).min(self.columns);
-        let rows = row.saturating_sub(1)..(row + 2).min(self.rows);
-        let cells = columns.len() * rows.len();
-        let of_row = |row: usize| {
-            let start = row * self.columns;
-            values[start + columns.start..start + columns.end]
-                .iter()
-                .sum::<f64>()
-        };
-        (rows.map(of_row).sum(), cells)
+        let along = |at: usize, count: usize| (at + 2).min(count) - at.saturating_sub(1);
+        let cells = along(column, self.columns) * along(row, self.rows);
+        cells as f64 * self.cell_px.powi(2)
+    }
+
+    /// The sum of `values` of a cell of the frame and its neighbours.
+    pub fn sum_around(&self, cell: usize, values: &[f64]) -> f64 {
+        let of_row = |middle: usize| -> f64 { values[middle - 1..middle + 2].iter().sum() };
+        of_row(cell - self.stride()) + of_row(cell) + of_row(cell + self.stride())
+    }
+
+    /// Replaces each of `values` within the frame by its sum with those of the neighbouring cells;
+    /// those of the border become meaningless. `scratch` is a buffer.
+    pub fn sum_with_neighbours(&self, values: &mut [f64], scratch: &mut Vec<f64>) {
+        let (count, stride) = (self.cells(), self.stride());
+        scratch.clear();
+        scratch.resize(count, 0.0);
+        let of_rows = scratch[1..].iter_mut().zip(values.windows(3));
+        for (sum, near) in of_rows {
+            *sum = near[0] + near[1] + near[2];
+        }
+        let rows = scratch.iter().zip(&scratch[stride..]);
+        let rows = rows.zip(&scratch[2 * stride..]);
+        for (value, ((above, own), below)) in values[stride..].iter_mut().zip(rows) {
+            *value = above + own + below;
+        }
     }
 }
 
@@ -77,8 +86,7 @@ mod tests {
     use super::*;
     use crate::identify::Photometry;
 
-    #[test]
-    fn sums_with_neighbours_are_those_around_each_cell() {
+    fn grid() -> Grid {
         let field = StarField {
             width_px: 700.0,
             height_px: 400.0,
@@ -87,19 +95,45 @@ mod tests {
             spot_sigma_px: None,
             stars: Vec::new(),
         };
-        let grid = Grid::new(&field, 7);
-        let values: Vec<f64> = (0..grid.cells()).map(|i| ((i * 37) % 11) as f64).collect();
+        Grid::new(&field, 7)
+    }
+
+    /// The middles of the cells, as column and row.
+    fn middles() -> impl Iterator<Item = (usize, usize)> + Clone {
+        (0..4).flat_map(|row| (0..7).map(move |column| (column, row)))
+    }
+
+    fn at((column, row): (usize, usize)) -> (f64, f64) {
+        (100.0 * column as f64 + 50.0, 100.0 * row as f64 + 50.0)
+    }
+
+    #[test]
+    fn sums_are_those_of_the_neighbours_in_the_frame() {
+        let grid = grid();
+        let mut values = vec![0.0; grid.cells()];
+        let value = |(column, row): (usize, usize)| ((column * 37 + row * 101) % 11) as f64;
+        for place in middles() {
+            let (x, y) = at(place);
+            values[grid.cell_of(x, y)] = value(place);
+        }
         let mut sums = values.clone();
         grid.sum_with_neighbours(&mut sums, &mut Vec::new());
-        for (x, y) in [
-            (50.0, 50.0),
-            (650.0, 350.0),
-            (350.0, 150.0),
-            (50.0, 350.0),
-            (650.0, 50.0),
-        ] {
-            let around = grid.around(x, y, &values).0;
-            assert_eq!(sums[grid.cell_of(x, y)], around, "{x} {y}");
+        for place in middles() {
+            let (x, y) = at(place);
+            let near = middles()
+                .filter(|near| near.0.abs_diff(place.0) <= 1 && near.1.abs_diff(place.1) <= 1);
+            let expected: f64 = near.clone().map(value).sum();
+            let cell = grid.cell_of(x, y);
+            assert_eq!(grid.sum_around(cell, &values), expected, "{place:?}");
+            assert_eq!(sums[cell], expected, "{place:?}");
+            let area_px2 = near.count() as f64 * 1e4;
+            assert_eq!(grid.area_around_px2(x, y), area_px2, "{place:?}");
         }
+    }
+
+    #[test]
+    fn outside_the_frame_is_the_nearest_cell() {
+        let grid = grid();
+        assert_eq!(grid.cell_of(-30.0, 950.0), grid.cell_of(10.0, 390.0));
     }
 }

@@ -2,10 +2,13 @@
 
 use super::field::ObservedStar;
 use super::predict::PredictedStar;
-use crate::base::coords::{Icrs, PixelPoint, UnitVector};
+use crate::base::coords::{Icrs, UnitVector};
+use crate::base::neighbors::PointGrid;
 use crate::sky::catalog::StarIndex;
+use std::cmp::Reverse;
 
-/// Most strips that a frame's predicted stars are sorted into: one for each star, if they are fewer.
+/// The candidates of a star are in the order of strips along x: one for each predicted star, but at
+/// most so many.
 const STRIPS: usize = 512;
 
 /// An observed star and the catalogue star that it may be.
@@ -28,9 +31,8 @@ pub struct Pair {
 /// Pairs observed and predicted stars. Its buffers are reused.
 #[derive(Debug, Default)]
 pub struct Pairing {
-    /// The predicted stars sorted into strips along x, and the start of each strip.
-    by_strip: Vec<(PixelPoint, usize)>,
-    starts: Vec<usize>,
+    /// The predicted stars.
+    places: PointGrid,
     candidates: Vec<NearPair>,
     of_observed: Vec<Claim>,
     of_predicted: Vec<u32>,
@@ -85,15 +87,17 @@ impl Pairing {
     }
 
     /// All pairs within the `radius_px` of an observed star (given its position in the list) that
-    /// have a `mag_difference`, in the order of the observed stars.
+    /// have a `mag_difference`, in the order of the observed stars; those of each from left to right,
+    /// strip by strip, and within a strip the faintest first.
     pub fn candidates(
         &mut self,
         (observed, predicted): (&[ObservedStar], &[PredictedStar]),
         radius_px: impl Fn(usize, &ObservedStar) -> f64,
         mag_difference: impl Fn(&ObservedStar, &PredictedStar) -> Option<f64>,
     ) -> &[NearPair] {
-        let strips = Strips::over(predicted);
-        self.sort_into(&strips, predicted);
+        let places = predicted.iter().map(|star| star.pixel);
+        self.places.fill(predicted.len(), places);
+        let strips = self.places.strips(predicted.len().clamp(1, STRIPS));
         self.candidates.clear();
         self.of_observed.clear();
         self.of_observed.resize(observed.len(), Claim::default());
@@ -101,48 +105,29 @@ impl Pairing {
         self.of_predicted.resize(predicted.len(), 0);
         for (o, star) in observed.iter().enumerate() {
             let radius_px = radius_px(o, star);
-            let x = star.position.x;
-            let (first, last) = (strips.of(x - radius_px), strips.of(x + radius_px));
-            for &(pixel, p) in &self.by_strip[self.starts[first]..self.starts[last + 1]] {
-                let distance_px = pixel.distance_to(&star.position);
-                if distance_px <= radius_px
-                    && let Some(difference) = mag_difference(star, &predicted[p])
-                {
-                    let apart = distance_px / radius_px;
+            let first = self.candidates.len();
+            self.places
+                .for_each_within(&star.position, radius_px, |near| {
+                    let Some(difference) = mag_difference(star, &predicted[near.index]) else {
+                        return;
+                    };
+                    let apart = near.distance_px / radius_px;
                     self.candidates.push(NearPair {
                         distance: apart * apart + difference * difference,
-                        distance_px,
+                        distance_px: near.distance_px,
                         observed: o,
-                        predicted: p,
+                        predicted: near.index,
                     });
                     self.of_observed[o].candidates += 1;
-                    self.of_predicted[p] += 1;
-                }
-            }
+                    self.of_predicted[near.index] += 1;
+                });
+            let order = |pair: &NearPair| {
+                let strip = strips.of(predicted[pair.predicted].pixel.x);
+                (strip, Reverse(pair.predicted))
+            };
+            self.candidates[first..].sort_unstable_by_key(order);
         }
         &self.candidates
-    }
-
-    /// Counting sort of the predicted stars by strip.
-    fn sort_into(&mut self, strips: &Strips, predicted: &[PredictedStar]) {
-        self.starts.clear();
-        self.starts.resize(strips.count + 1, 0);
-        for star in predicted {
-            self.starts[strips.of(star.pixel.x)] += 1;
-        }
-        let mut end = 0;
-        for start in &mut self.starts {
-            end += *start;
-            *start = end;
-        }
-        self.by_strip.clear();
-        self.by_strip
-            .resize(predicted.len(), (PixelPoint::new(0.0, 0.0), 0));
-        for (p, star) in predicted.iter().enumerate() {
-            let start = &mut self.starts[strips.of(star.pixel.x)];
-            *start -= 1;
-            self.by_strip[*start] = (star.pixel, p);
-        }
     }
 
     /// Pairs the stars that have one candidate only, then the others, closest first.
@@ -178,33 +163,10 @@ impl Pairing {
     }
 }
 
-/// Strips of equal width between the smallest and the largest x of some stars.
-struct Strips {
-    count: usize,
-    from_px: f64,
-    per_px: f64,
-}
-
-impl Strips {
-    fn over(predicted: &[PredictedStar]) -> Self {
-        let x = || predicted.iter().map(|star| star.pixel.x);
-        let (low, high) = (x().fold(f64::MAX, f64::min), x().fold(f64::MIN, f64::max));
-        let count = predicted.len().clamp(1, STRIPS);
-        Self {
-            count,
-            from_px: low,
-            per_px: count as f64 / (high - low).max(1.0),
-        }
-    }
-
-    fn of(&self, x: f64) -> usize {
-        (((x - self.from_px) * self.per_px).max(0.0) as usize).min(self.count - 1)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::coords::PixelPoint;
     use crate::base::neighbors::PointTree;
     use crate::identify::SourceIndex;
     use proptest::prelude::*;

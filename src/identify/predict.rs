@@ -55,6 +55,8 @@ pub struct Depth {
 pub struct Surroundings {
     /// Brightest first.
     stars: Vec<GridStar>,
+    /// Those just found.
+    found: Vec<StarIndex>,
     around: Option<Gathered>,
 }
 
@@ -141,17 +143,23 @@ impl Surroundings {
         if around.faintest_v_mag >= faintest_v_mag {
             return around.faintest_v_mag;
         }
-        let (known, known_to) = (self.stars.len(), around.faintest_v_mag as f32);
+        let known_to = around.faintest_v_mag as f32;
+        self.found.clear();
         let Gathered {
             centre, radius_rad, ..
         } = around;
         sky.grid
             .for_each_within(&centre, radius_rad, faintest_v_mag as f32, |star| {
                 if star.v_mag > known_to {
-                    self.stars.push(*star);
+                    self.found.push(star.index);
                 }
             });
-        self.stars[known..].sort_unstable_by_key(|star| star.index);
+        self.found.sort_unstable();
+        let found = self
+            .found
+            .iter()
+            .map(|index| *sky.grid.star(index.get() as u32));
+        self.stars.extend(found);
         self.around = Some(Gathered {
             faintest_v_mag,
             ..around

@@ -209,6 +209,7 @@ impl Refiner {
         };
         self.naming
             .start(stars, hypothesis.zero_point_mag, wanted.by_place);
+        self.blends.start(self.predicted.len());
         let mut model = hypothesis.camera.distortion_model().max(wanted.least);
         let mut current = *settled;
         for round in 0..NAMING_ROUNDS {

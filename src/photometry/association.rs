@@ -1,8 +1,8 @@
 //! Finds which catalogue stars in a frame were detected: those that a detection has the name of.
 
 use super::IdentifiedFrame;
-use crate::base::neighbors::PointTree;
-use crate::identify::PredictedStar;
+use crate::base::neighbors::PointGrid;
+use crate::identify::{PredictedStar, StarMatch};
 use crate::sky::catalog::StarIndex;
 
 /// A neighbour fainter by more than this does not crowd a star.
@@ -54,16 +54,9 @@ pub(crate) fn filter_response(distance_sigmas: f64) -> f64 {
 /// Associates the stars `predicted`, brightest first, with the detections of `frame`.
 pub(super) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) -> Association {
     let matches = &frame.identification.matches;
-    let mut named: Vec<(StarIndex, usize)> = matches
-        .iter()
-        .map(|found| (found.star, found.source.get()))
-        .collect();
-    named.sort_unstable();
-    let detection_of = |star: StarIndex| {
-        let place = named.binary_search_by_key(&star, |(star, _)| *star);
-        place.ok().map(|place| named[place].1)
-    };
-    let tree = PointTree::new(predicted.iter().map(|star| star.pixel));
+    let detections = detections_of(predicted, matches);
+    let mut places = PointGrid::default();
+    places.fill(predicted.len(), predicted.iter().map(|star| star.pixel));
     let spot_sigma_px = frame.detections.spot_sigma_px;
     let resolved_px = resolved_px(spot_sigma_px);
     let surroundings = |index: usize, star: &PredictedStar| {
@@ -71,14 +64,14 @@ pub(super) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) ->
             is_single: true,
             undetected_light: 0.0,
         };
-        tree.for_each_within(&star.pixel, resolved_px, |near| {
+        places.for_each_within(&star.pixel, resolved_px, |near| {
             if near.index == index {
                 return;
             }
             let neighbour = &predicted[near.index];
             let fainter_mag = neighbour.v_mag - star.v_mag;
             around.is_single &= fainter_mag >= CROWDING_MAG;
-            if detection_of(neighbour.star).is_none() {
+            if detections[near.index].is_none() {
                 let light = 10f64.powf(-0.4 * f64::from(fainter_mag));
                 around.undetected_light +=
                     light * filter_response(near.distance_px / spot_sigma_px);
@@ -96,7 +89,7 @@ pub(super) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) ->
         FrameStar {
             star: star.star,
             v_mag: f64::from(star.v_mag),
-            detection: detection_of(star.star),
+            detection: detections[index],
             is_clear: camera.nearly_contains(&star.pixel, -resolved_px) && around.is_single,
             neighbours_light: around.undetected_light,
         }
@@ -108,13 +101,31 @@ pub(super) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) ->
     }
 }
 
+/// The detection that has the name of each star of `predicted`, brightest first, if there is one.
+fn detections_of(predicted: &[PredictedStar], matches: &[StarMatch]) -> Vec<Option<usize>> {
+    let named = matches.iter().map(|found| (found.star, found.source.get()));
+    let mut named: Vec<(StarIndex, usize)> = named.collect();
+    named.sort_unstable();
+    // Stars are numbered by brightness, so both are in the same order.
+    let mut named = named.into_iter().peekable();
+    let detection = |star: &PredictedStar| {
+        while named
+            .next_if(|(brighter, _)| *brighter < star.star)
+            .is_some()
+        {}
+        let next = named.peek().filter(|(next, _)| *next == star.star);
+        next.map(|(_, detection)| *detection)
+    };
+    predicted.iter().map(detection).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::base::coords::{PixelPoint, Rotation, UnitVector};
     use crate::camera::CameraModel;
     use crate::detect::Detections;
-    use crate::identify::{Identification, SourceIndex, StarMatch};
+    use crate::identify::{Identification, SourceIndex};
     use nalgebra::Matrix3;
 
     const SIDE_PX: f64 = 400.0;

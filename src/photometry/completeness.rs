@@ -327,13 +327,19 @@ fn best_step(stars: &[CountedStar]) -> Option<(f64, f64)> {
     let steps = stars.iter().enumerate().map(|(i, star)| {
         detected += usize::from(star.detected);
         let (brighter, fainter) = (i + 1, stars.len() - i - 1);
+        let next = stars.get(i + 1);
+        // Between stars that are alike, the likelihood is convex: largest at one of the ends.
+        let may_be_best = next.is_none_or(|next| next.detected != star.detected);
         // Fainter stars are not detected more often.
         let falls = detected * fainter >= (all - detected) * brighter;
-        let log = log_likelihood(brighter, detected) + log_likelihood(fainter, all - detected);
-        let next = stars.get(i + 1).map_or(star.v_mag, |next| next.v_mag);
+        let log = if may_be_best && falls {
+            log_likelihood(brighter, detected) + log_likelihood(fainter, all - detected)
+        } else {
+            f64::NEG_INFINITY
+        };
+        let next_v_mag = next.map_or(star.v_mag, |next| next.v_mag);
         let lost = 1.0 - detected as f64 / brighter as f64;
-        let log = if falls { log } else { f64::NEG_INFINITY };
-        (log, (0.5 * (star.v_mag + next), lost))
+        (log, (0.5 * (star.v_mag + next_v_mag), lost))
     });
     let better = |best: (f64, _), step: (f64, _)| if step.0 > best.0 { step } else { best };
     Some(steps.fold(first, better).1)

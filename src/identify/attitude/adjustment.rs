@@ -281,13 +281,47 @@ impl<'a, const P: usize, const K: usize> Adjustment<'a, P, K> {
         Some((size, reduced))
     }
 
-    /// Position by a pinhole minus position by the star's direction.
-    pub fn residual_px(&self, star: &MeasuredStar) -> Option<[f64; 2]> {
+    /// Position by a pinhole minus position by the star's direction, of [`LANES`] stars or fewer.
+    /// `None` if one is behind the camera.
+    #[inline(always)]
+    pub fn residuals_px(&self, stars: &[MeasuredStar]) -> Option<[Lanes; 2]> {
         let f = self.camera.focal_length_px;
-        let [x, y] = self.tangent(star)?;
-        let [u, v] = self.camera.ideal_offset_of(&star.pixel);
-        Some([u - f * x, v - f * y])
+        let (mut observed, mut tangents) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
+        for (lane, star) in stars.iter().enumerate().take(LANES) {
+            let (offset, tangent) = (self.camera.offset_of(&star.pixel), self.tangent(star)?);
+            for axis in 0..2 {
+                observed[axis][lane] = offset[axis];
+                tangents[axis][lane] = tangent[axis];
+            }
+        }
+        let mut residuals_px = self.camera.ideal_offsets(&observed);
+        for axis in 0..2 {
+            add_scaled(&mut residuals_px[axis], -f, &tangents[axis]);
+        }
+        Some(residuals_px)
     }
+}
+
+/// Adds `values` times `factor` to `sums`.
+#[inline(always)]
+pub(super) fn add_scaled(sums: &mut Lanes, factor: f64, values: &Lanes) {
+    for lane in 0..LANES {
+        sums[lane] += factor * values[lane];
+    }
+}
+
+/// Fills `residuals_px` with those of all stars; `None` if one is behind the camera.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+pub(super) fn all_residuals_px<const P: usize, const K: usize>(
+    adjustment: &Adjustment<P, K>,
+    residuals_px: &mut Vec<[f64; 2]>,
+) -> Option<()> {
+    residuals_px.clear();
+    for stars in adjustment.stars.chunks(LANES) {
+        let [x, y] = adjustment.residuals_px(stars)?;
+        residuals_px.extend((0..stars.len()).map(|lane| [x[lane], y[lane]]));
+    }
+    Some(())
 }
 
 /// C (lower triangle), summed over the stars of each lane.

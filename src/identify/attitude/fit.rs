@@ -3,7 +3,9 @@
 //! matched stars + first guess → Gauss-Newton on (turn about x, y, z; ln f; distortion) → camera,
 //! attitude, covariance
 
-use super::adjustment::{Adjustment, LINEAR_TERMS, MeasuredStar, POSE_PARAMETERS, Reduced};
+use super::adjustment::{
+    Adjustment, LINEAR_TERMS, MeasuredStar, POSE_PARAMETERS, Reduced, all_residuals_px,
+};
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::camera::{CUBIC_MONOMIALS, CameraModel, DistortionModel, QUINTIC_MONOMIALS};
 use nalgebra::Matrix4;
@@ -76,10 +78,7 @@ impl<const P: usize, const K: usize> Adjustment<'_, P, K> {
         reduced: &Reduced<P, K>,
         residuals_px: &mut Vec<[f64; 2]>,
     ) -> Option<CameraFit> {
-        residuals_px.clear();
-        for star in self.stars {
-            residuals_px.push(self.residual_px(star)?);
-        }
+        all_residuals_px(&self, residuals_px)?;
         let covariance = reduced.root.inverse();
         Some(CameraFit {
             camera: self.camera,

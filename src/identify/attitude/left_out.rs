@@ -7,6 +7,7 @@
 
 use super::adjustment::{
     Adjustment, LINEAR_TERMS, Lanes, MeasuredStar, POSE_PARAMETERS, Reduced, Rows, add_products,
+    add_scaled,
 };
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::camera::{
@@ -119,11 +120,11 @@ fn left_out_sum<const P: usize, const K: usize>(
     let mut sum = 0.0;
     for stars in adjustment.stars.chunks(LANES) {
         let leverages = leverages(adjustment, &adjustment.rows(stars)?, reduced);
+        let residuals_px = adjustment.residuals_px(stars)?;
         for (lane, star) in stars.iter().enumerate() {
-            let residual_px = adjustment.residual_px(star)?;
             for axis in 0..2 {
                 let freedom = (1.0 - leverages[axis][lane]).max(MIN_FREEDOM);
-                sum += (residual_px[axis] / star.sigma_px / freedom).powi(2);
+                sum += (residuals_px[axis][lane] / star.sigma_px / freedom).powi(2);
             }
         }
     }
@@ -162,13 +163,6 @@ fn leverages<const P: usize, const K: usize>(
         }
         leverage
     })
-}
-
-#[inline(always)]
-fn add_scaled(sums: &mut Lanes, factor: f64, values: &Lanes) {
-    for lane in 0..LANES {
-        sums[lane] += factor * values[lane];
-    }
 }
 
 #[cfg(test)]

@@ -30,11 +30,7 @@ pub struct Candidate {
     pub gate_px: f64,
     /// Probability that a star among such neighbours is measured by this light.
     pub share: f64,
-    /// Density of the distance of a true pair, per square pixel.
-    pub position_density: f64,
-    /// Odds that it is a true pair.
-    pub odds: f64,
-    /// Probability that it is not.
+    /// Probability that it is no true pair.
     pub p_chance: f64,
 }
 
@@ -57,8 +53,6 @@ impl Candidate {
             sigma_px,
             gate_px,
             share: 1.0,
-            position_density: 0.0,
-            odds: 0.0,
             p_chance: 1.0,
         }
     }

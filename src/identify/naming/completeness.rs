@@ -18,135 +18,155 @@ const LEAST_LOST: f64 = 0.1;
 const PRIOR_STARS: f64 = 1.0;
 /// Cells along the frame's longer side, scale by scale.
 const CELLS: [usize; 2] = [12, 36];
-/// Stars are few if a grid has more than this many cells for each.
-const FEW: usize = 6;
 /// Expected stars around a place that count as much as what the larger scale says.
 const PRIOR_AROUND: f64 = 1.0;
 
 /// The probability of each predicted star that it is observed. Its buffers are reused.
 #[derive(Debug, Default)]
 pub struct Completeness {
-    /// By brightness alone, brightest first.
+    /// By brightness alone, brightest first; at the end 0, for stars fainter than all.
     shares: Vec<f64>,
-    /// How much more likely stars are observed at the place of each one than on average.
+    /// How much more likely stars are observed at the place of each one than on average; as many.
     visibility: Vec<f64>,
-    /// The odds of each predicted star that it is detected.
-    odds: Vec<f64>,
-    /// Steps: number of stars, and how many of them are observed.
-    steps: Vec<(usize, f64)>,
-    /// Stars that are observed, and that are expected to be, in the cells of one scale.
+    steps: Vec<Step>,
+    scales: [Scale; CELLS.len()],
+    scratch: Vec<f64>,
+}
+
+/// Stars that are observed with the same probability.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    /// Number of stars, and how many of them are observed.
+    stars: f64,
+    observed: f64,
+}
+
+/// What is counted on one scale.
+#[derive(Debug, Default)]
+struct Scale {
+    /// The cell of each predicted star.
+    places: Vec<u32>,
+    /// Stars that are observed, and that are expected to be, in the cells.
     observed: Vec<f64>,
     expected: Vec<f64>,
-    scratch: Vec<f64>,
+}
+
+/// The odds that a star is detected, where its share by brightness is `own`, and those that it is
+/// detected where it appears as bright as stars of the share `apparent`: noise brings stars above
+/// the limit that are fainter.
+#[inline(always)]
+pub fn odds_of([own, apparent, visibility]: [f64; 3]) -> [f64; 2] {
+    let apparent = if apparent > own { apparent } else { own };
+    let [own, apparent] = [own, apparent].map(|share| (share * visibility).min(1.0 - LEAST_LOST));
+    [own / (1.0 - own), apparent / (1.0 - own)]
 }
 
 impl Completeness {
     /// Nothing is known of `stars` predicted stars.
     pub fn start(&mut self, stars: usize) {
-        self.odds.clear();
-        self.odds.resize(stars, 1.0);
         self.shares.clear();
+        self.shares.resize(stars, 0.5);
+        self.shares.push(0.0);
         self.visibility.clear();
-        self.visibility.resize(stars, 1.0);
+        self.visibility.resize(stars + 1, 1.0);
     }
 
-    /// The odds that a predicted star is detected.
-    pub fn odds(&self, predicted: usize) -> f64 {
-        self.odds[predicted]
+    /// The share by brightness, and the visibility, of each predicted star, and of one fainter than all.
+    pub fn shares_and_visibility(&self) -> (&[f64], &[f64]) {
+        (&self.shares, &self.visibility)
     }
 
-    /// The odds that a predicted star is detected where it appears as bright as another one: noise
-    /// brings stars above the limit that are fainter.
-    pub fn odds_as(&self, predicted: usize, as_bright_as: usize) -> f64 {
-        let (Some(own), Some(share)) = (self.shares.get(predicted), self.shares.get(as_bright_as))
-        else {
-            return self.odds[predicted];
-        };
-        if share <= own {
-            return self.odds[predicted];
-        }
-        let visibility = self.visibility[predicted];
-        let [own, share] = [own, share].map(|share| (share * visibility).min(1.0 - LEAST_LOST));
-        share / (1.0 - own)
-    }
-
-    /// Measures how visible stars are at the place of each one of `predicted`, by the probability of
-    /// each that it is observed. The share by brightness must have been measured.
-    pub fn measure_visibility(
-        &mut self,
-        field: &StarField,
-        predicted: &[PredictedStar],
-        is_observed: &[f64],
-    ) {
-        self.visibility.clear();
-        self.visibility.resize(predicted.len(), 1.0);
-        for cells in CELLS {
-            self.add_scale(&Grid::new(field, cells), predicted, is_observed);
+    /// Finds the places of `predicted`, for the visibility.
+    pub fn place(&mut self, field: &StarField, predicted: &[PredictedStar]) {
+        for (scale, cells) in self.scales.iter_mut().zip(CELLS) {
+            let grid = Grid::new(field, cells);
+            scale.places.clear();
+            let places = predicted
+                .iter()
+                .map(|star| grid.cell_of(star.pixel.x, star.pixel.y) as u32);
+            scale.places.extend(places);
         }
     }
 
-    /// Sets the odds from share and visibility.
-    pub fn set_odds(&mut self) {
-        let share = self.shares.iter().zip(&self.visibility);
-        self.odds.clear();
-        self.odds.extend(share.map(|(share, visibility)| {
-            let share = (share * visibility).min(1.0 - LEAST_LOST);
-            share / (1.0 - share)
-        }));
+    /// Measures how visible stars are at the place of each one, by the probability of each that it is
+    /// observed. The places, and the share by brightness, must be known.
+    pub fn measure_visibility(&mut self, field: &StarField, is_observed: &[f64]) {
+        self.visibility.clear();
+        self.visibility.resize(is_observed.len() + 1, 1.0);
+        for (scale, cells) in self.scales.iter_mut().zip(CELLS) {
+            let grid = Grid::new(field, cells);
+            scale.count(&grid, (is_observed, &self.shares), &mut self.scratch);
+            scale.refine(&mut self.visibility, (is_observed, &self.shares));
+        }
     }
 
     /// Measures the share by brightness, by the probability of each star that it is observed.
     pub fn measure_shares(&mut self, is_observed: &[f64]) {
         self.steps.clear();
         for &observed in is_observed {
-            let mut step = (1, observed.min(1.0));
-            while let Some(&(stars, observed)) = self.steps.last() {
-                if observed * step.0 as f64 > step.1 * stars as f64 {
-                    break;
-                }
-                step = (step.0 + stars, step.1 + observed);
-                self.steps.pop();
+            match self.steps.last_mut() {
+                // Most stars are too faint.
+                Some(last) if observed == 0.0 && last.observed == 0.0 => last.stars += 1.0,
+                _ => self.add_step(observed.min(1.0)),
             }
-            self.steps.push(step);
         }
         self.shares.clear();
-        for &(stars, observed) in &self.steps {
-            let share = (observed + 0.5 * PRIOR_STARS) / (stars as f64 + PRIOR_STARS);
-            self.shares.extend(std::iter::repeat_n(share, stars));
+        for &Step { stars, observed } in &self.steps {
+            let share = (observed + 0.5 * PRIOR_STARS) / (stars + PRIOR_STARS);
+            let end = self.shares.len() + stars as usize;
+            self.shares.resize(end, share);
         }
+        self.shares.push(0.0);
     }
 
-    /// The visibility on a finer scale, where what is known so far is that of the larger one.
-    fn add_scale(&mut self, grid: &Grid, predicted: &[PredictedStar], is_observed: &[f64]) {
+    /// Adds a star, and pools the steps that rise.
+    fn add_step(&mut self, observed: f64) {
+        let mut step = Step {
+            stars: 1.0,
+            observed,
+        };
+        while let Some(last) = self.steps.last() {
+            if last.observed * step.stars > step.observed * last.stars {
+                break;
+            }
+            step = Step {
+                stars: step.stars + last.stars,
+                observed: step.observed + last.observed,
+            };
+            self.steps.pop();
+        }
+        self.steps.push(step);
+    }
+}
+
+impl Scale {
+    /// Counts the stars in each cell and its neighbours.
+    fn count(
+        &mut self,
+        grid: &Grid,
+        (is_observed, shares): (&[f64], &[f64]),
+        scratch: &mut Vec<f64>,
+    ) {
         for cells in [&mut self.observed, &mut self.expected] {
             cells.clear();
             cells.resize(grid.cells(), 0.0);
         }
-        let stars = || predicted.iter().zip(is_observed.iter().zip(&self.shares));
-        for (star, (observed, share)) in stars() {
-            let cell = grid.cell_of(star.pixel.x, star.pixel.y);
-            self.observed[cell] += observed.min(1.0);
-            self.expected[cell] += share;
+        for ((&cell, observed), share) in self.places.iter().zip(is_observed).zip(shares) {
+            self.observed[cell as usize] += observed.min(1.0);
+            self.expected[cell as usize] += share;
         }
-        // Few stars look around themselves; for many, the sums of all cells are made at once.
-        let are_few = predicted.len() * FEW < grid.cells();
-        if !are_few {
-            for cells in [&mut self.observed, &mut self.expected] {
-                grid.sum_with_neighbours(cells, &mut self.scratch);
-            }
+        for cells in [&mut self.observed, &mut self.expected] {
+            grid.sum_with_neighbours(cells, scratch);
         }
-        for ((star, (observed, share)), visibility) in stars().zip(&mut self.visibility) {
-            let [all_observed, all_expected] = [&self.observed, &self.expected].map(|cells| {
-                let (x, y) = (star.pixel.x, star.pixel.y);
-                if are_few {
-                    grid.around(x, y, cells).0
-                } else {
-                    cells[grid.cell_of(x, y)]
-                }
-            });
+    }
+
+    /// The visibility on this scale, where what is known so far is that of the larger one.
+    fn refine(&self, visibility: &mut [f64], (is_observed, shares): (&[f64], &[f64])) {
+        let stars = self.places.iter().zip(is_observed).zip(shares);
+        for (((&cell, observed), share), visibility) in stars.zip(visibility) {
             // Without the star itself: it must not vouch for its own name.
-            let observed = (all_observed - observed.min(1.0)).max(0.0);
-            let expected = (all_expected - share).max(0.0);
+            let observed = (self.observed[cell as usize] - observed.min(1.0)).max(0.0);
+            let expected = (self.expected[cell as usize] - share).max(0.0);
             *visibility = (observed + PRIOR_AROUND * *visibility) / (expected + PRIOR_AROUND);
         }
     }
@@ -215,10 +235,11 @@ mod tests {
             .collect();
         let mut found = Completeness::default();
         found.measure_shares(&observed);
-        found.measure_visibility(&field(), &stars, &observed);
-        found.set_odds();
+        found.place(&field(), &stars);
+        found.measure_visibility(&field(), &observed);
+        let (shares, visibility) = found.shares_and_visibility();
         for (index, star) in stars.iter().enumerate() {
-            let odds = found.odds(index);
+            let [odds, _] = odds_of([shares[index], 0.0, visibility[index]]);
             if star.pixel.x > 900.0 {
                 assert!(odds < 0.05, "{odds}");
             } else if star.pixel.x < 300.0 {

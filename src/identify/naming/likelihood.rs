@@ -1,7 +1,11 @@
 //! How far apart the observed and the predicted star of a true pair lie, in position and magnitude.
 
 use super::candidate::Candidate;
-use crate::identify::field::{ObservedStar, Photometry, StarField};
+use super::packed::{Lanes, Packed};
+use crate::base::exponential::exp_of_negative;
+use crate::camera::LANES;
+use crate::identify::field::Photometry;
+use multiversion::multiversion;
 use std::f64::consts::PI;
 
 /// Position: most true pairs have the stated errors, some have larger ones (unresolved companions,
@@ -35,23 +39,40 @@ const PRIOR_STARS: f64 = 4.0;
 
 /// Density of the distance between the stars of a true pair, per square pixel, at `distance_px`.
 pub fn position_density(candidate: &Candidate, distance_px: f64, is_saturated: bool) -> f64 {
-    let far_share = if is_saturated {
-        FAR_SHARE_SATURATED
-    } else {
-        FAR_SHARE
-    };
-    let distance_sq = distance_px.powi(2);
-    let sigma_sq = candidate.sigma_px.powi(2);
+    let (sigma_px, gate_px) = ([candidate.sigma_px], [candidate.gate_px]);
+    let saturated = [f64::from(u8::from(is_saturated))];
+    position_densities([[distance_px], sigma_px, gate_px, saturated])[0]
+}
+
+/// The same for several pairs, with the errors and gates of the observed stars, and 1 for those that
+/// are saturated.
+#[inline(always)]
+pub fn position_densities<const N: usize>(
+    [distances_px, sigmas_px, gates_px, saturated]: [[f64; N]; 4],
+) -> [f64; N] {
+    /// Of so many times the width, the exponential is the root of the square of that number.
+    const WIDE_ROOT: i32 = (WIDE_SIGMAS * WIDE_SIGMAS) as i32;
+    let (mut of_wide, mut of_far) = ([0.0; N], [0.0; N]);
+    let (mut sigmas_sq, mut far_sq) = ([0.0; N], [0.0; N]);
+    for n in 0..N {
+        let distance_sq = distances_px[n] * distances_px[n];
+        sigmas_sq[n] = sigmas_px[n] * sigmas_px[n];
+        let far_px = FAR_SIGMA * gates_px[n];
+        far_sq[n] = (far_px * far_px).max(sigmas_sq[n]);
+        of_wide[n] = -distance_sq / (2.0 * (sigmas_sq[n] * WIDE_SIGMAS.powi(2)));
+        of_far[n] = -distance_sq / (2.0 * far_sq[n]);
+    }
+    let (wide, far) = (exp_of_negative(of_wide), exp_of_negative(of_far));
     let density = |share: f64, variance: f64, falloff: f64| share * falloff / (2.0 * PI * variance);
-    let falloff = |variance: f64| (-distance_sq / (2.0 * variance)).exp();
-    let wide_sq = sigma_sq * WIDE_SIGMAS.powi(2);
-    let far_sq = (FAR_SIGMA * candidate.gate_px).powi(2).max(sigma_sq);
-    let wide = falloff(wide_sq);
-    // Of so many times the width, the exponential is the root of the square of that number.
-    let narrow = wide.powi((WIDE_SIGMAS * WIDE_SIGMAS) as i32);
-    density(1.0 - WIDE_SHARE - far_share, sigma_sq, narrow)
-        + density(WIDE_SHARE, wide_sq, wide)
-        + density(far_share, far_sq, falloff(far_sq))
+    let mut densities = [0.0; N];
+    for n in 0..N {
+        let far_share = FAR_SHARE + saturated[n] * (FAR_SHARE_SATURATED - FAR_SHARE);
+        let narrow = wide[n].powi(WIDE_ROOT);
+        densities[n] = density(1.0 - WIDE_SHARE - far_share, sigmas_sq[n], narrow)
+            + density(WIDE_SHARE, sigmas_sq[n] * WIDE_SIGMAS.powi(2), wide[n])
+            + density(far_share, far_sq[n], far[n]);
+    }
+    densities
 }
 
 /// The catalogue's magnitude of a star of a certain observed magnitude: a line, and the scatter
@@ -65,13 +86,13 @@ pub struct MagnitudeRelation {
     scatter_mag: f64,
 }
 
-/// Densities of a magnitude difference, per magnitude; their sum is that of all true pairs.
+/// Densities of magnitude differences, per magnitude; their sum is that of all true pairs.
 #[derive(Debug, Clone, Copy)]
 pub struct MagnitudeDensities {
     /// Of pairs that differ by the frame's scatter.
-    pub by_scatter: f64,
+    pub by_scatter: Lanes,
     /// Of those that differ by more: variable stars, unusual colours, blends, saturated stars.
-    pub otherwise: f64,
+    pub otherwise: Lanes,
 }
 
 impl MagnitudeRelation {
@@ -88,86 +109,138 @@ impl MagnitudeRelation {
         }
     }
 
-    /// Catalogue magnitude minus that which is expected of the observed star.
-    fn difference(&self, star: &ObservedStar, v_mag: f64) -> f64 {
-        v_mag - self.expected_v_mag(star)
+    /// The catalogue's magnitude that is expected of an observed star of this magnitude.
+    #[inline(always)]
+    pub fn expected_v_mag(&self, mag: f64) -> f64 {
+        self.v_mag + self.slope * (mag - self.at_mag)
     }
 
-    /// The catalogue's magnitude that is expected of the observed star.
-    pub fn expected_v_mag(&self, star: &ObservedStar) -> f64 {
-        self.v_mag + self.slope * (star.mag - self.at_mag)
+    /// Catalogue magnitudes minus those that are expected of the observed stars.
+    #[inline(always)]
+    fn differences(&self, packed: &Packed) -> Lanes {
+        let mut differences = packed.v_mag;
+        for (difference, mag) in differences.iter_mut().zip(packed.mag) {
+            *difference -= self.expected_v_mag(mag);
+        }
+        differences
     }
 
-    /// Densities of the magnitude difference of a true pair, per magnitude.
-    pub fn densities(&self, star: &ObservedStar, v_mag: f64) -> MagnitudeDensities {
-        let difference = self.difference(star, v_mag);
-        let density = |share: f64, sigma: f64, falloff: f64| share * falloff / (ROOT_TAU * sigma);
+    /// Densities of the magnitude differences of true pairs, per magnitude.
+    #[inline(always)]
+    pub fn densities(&self, packed: &Packed) -> MagnitudeDensities {
+        let differences = self.differences(packed);
         let outlying = OUTLIER_SCATTER * self.scatter_mag;
-        let of_outliers = (-0.5 * (difference / outlying).powi(2)).exp();
-        // Of three times the scatter: the exponential is the ninth root.
-        let plain = MagnitudeDensities {
-            by_scatter: density(1.0 - OUTLIER_SHARE, self.scatter_mag, of_outliers.powi(9)),
-            otherwise: density(OUTLIER_SHARE, outlying, of_outliers),
-        };
-        if !star.is_saturated {
-            return plain;
+        let mut of_outliers = differences;
+        for exponent in &mut of_outliers {
+            let relative = *exponent / outlying;
+            *exponent = -0.5 * (relative * relative);
         }
-        let is_brighter = (-BRIGHTER_MAG..0.0).contains(&difference);
-        let brighter = f64::from(u8::from(is_brighter)) / BRIGHTER_MAG;
+        let of_outliers = exp_of_negative(of_outliers);
+        let density = |share: f64, sigma: f64, falloff: f64| share * falloff / (ROOT_TAU * sigma);
+        let (mut by_scatter, mut otherwise) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            let as_measured = 1.0 - BRIGHTER_SHARE * packed.saturated[lane];
+            let (outlier, difference) = (of_outliers[lane], differences[lane]);
+            let is_brighter = (-BRIGHTER_MAG..0.0).contains(&difference);
+            let brighter = if is_brighter {
+                BRIGHTER_SHARE / BRIGHTER_MAG
+            } else {
+                0.0
+            };
+            // Of three times the scatter: the exponential is the ninth root.
+            let plain = density(1.0 - OUTLIER_SHARE, self.scatter_mag, outlier.powi(9));
+            by_scatter[lane] = as_measured * plain;
+            otherwise[lane] = as_measured * density(OUTLIER_SHARE, outlying, outlier)
+                + packed.saturated[lane] * brighter;
+        }
         MagnitudeDensities {
-            by_scatter: (1.0 - BRIGHTER_SHARE) * plain.by_scatter,
-            otherwise: (1.0 - BRIGHTER_SHARE) * plain.otherwise + BRIGHTER_SHARE * brighter,
+            by_scatter,
+            otherwise,
         }
+    }
+
+    /// Fits the scatter to the candidates that are likely true, and with `has_line` first the line.
+    pub fn fit(&mut self, candidates: &[Packed], has_line: bool) {
+        fit_in_lanes(self, candidates, has_line);
     }
 
     /// The line through the candidates that are likely true.
-    pub fn fit_zero_point(&mut self, field: &StarField, candidates: &[Candidate]) {
-        let likely = || measuring(field, candidates);
-        let weight: f64 = likely().map(|(_, _, weight)| weight).sum();
+    #[inline(always)]
+    fn fit_line(&mut self, candidates: &[Packed]) {
+        let [weight, mag, v_mag] = sums(candidates, |packed, lane| {
+            let weight = packed.weight(lane);
+            [
+                weight,
+                weight * packed.mag[lane],
+                weight * packed.v_mag[lane],
+            ]
+        });
         if weight < 1.0 {
             return;
         }
-        let mean = |of: &dyn Fn(&ObservedStar, f64) -> f64| {
-            likely().map(|(s, v, w)| w * of(s, v)).sum::<f64>() / weight
-        };
-        let (mag, v_mag) = (mean(&|s, _| s.mag), mean(&|_, v| v));
-        let (mut xx, mut xy) = (0.0, 0.0);
-        for (star, v, w) in likely() {
-            // Of outliers, only the sign and a limit count.
-            let limit = 2.0 * self.scatter_mag;
-            let residual = (v - v_mag - (star.mag - mag)).clamp(-limit, limit);
-            xx += w * (star.mag - mag).powi(2);
-            xy += w * (star.mag - mag) * residual;
-        }
+        let (mag, v_mag) = (mag / weight, v_mag / weight);
+        // Of outliers, only the sign and a limit count.
+        let limit = 2.0 * self.scatter_mag;
+        let [xx, xy] = sums(candidates, |packed, lane| {
+            let x = packed.mag[lane] - mag;
+            let residual = (packed.v_mag[lane] - v_mag - x).max(-limit).min(limit);
+            let weighted = packed.weight(lane) * x;
+            [weighted * x, weighted * residual]
+        });
         let prior = (self.scatter_mag / SLOPE_SIGMA).powi(2);
         (self.at_mag, self.v_mag) = (mag, v_mag);
         self.slope = 1.0 + xy / (xx + prior);
     }
 
     /// The scatter about the line of the candidates that are likely true.
-    pub fn fit_scatter(&mut self, field: &StarField, candidates: &[Candidate]) {
+    #[inline(always)]
+    fn fit_scatter(&mut self, candidates: &[Packed]) {
         let limit_sq = (OUTLIER_SCATTER * self.scatter_mag).powi(2);
-        let mut sum = PRIOR_STARS * FIRST_SCATTER_MAG.powi(2);
-        let mut weights = PRIOR_STARS;
-        for (star, v_mag, weight) in measuring(field, candidates) {
-            sum += weight * self.difference(star, v_mag).powi(2).min(limit_sq);
-            weights += weight;
-        }
-        self.scatter_mag = (sum / weights).sqrt().max(LEAST_SCATTER_MAG);
+        let [squares, weights] = sums(candidates, |packed, lane| {
+            let difference = packed.v_mag[lane] - self.expected_v_mag(packed.mag[lane]);
+            let weight = packed.weight(lane);
+            [weight * (difference * difference).min(limit_sq), weight]
+        });
+        let sum = PRIOR_STARS * FIRST_SCATTER_MAG.powi(2) + squares;
+        self.scatter_mag = (sum / (PRIOR_STARS + weights))
+            .sqrt()
+            .max(LEAST_SCATTER_MAG);
     }
 }
 
-/// The unsaturated observed stars of likely candidates, their V magnitude and probability.
-fn measuring<'a>(
-    field: &'a StarField,
-    candidates: &'a [Candidate],
-) -> impl Iterator<Item = (&'a ObservedStar, f64, f64)> {
-    candidates
-        .iter()
-        .filter(|candidate| candidate.p_chance <= MEASURING_CHANCE)
-        .map(|candidate| {
-            let star = &field.stars[candidate.observed];
-            (star, candidate.v_mag, 1.0 - candidate.p_chance)
-        })
-        .filter(|(star, ..)| !star.is_saturated)
+impl Packed {
+    /// The weight of a candidate where zero point and scatter are measured: its probability, where it
+    /// is likely and the observed star is not saturated.
+    #[inline(always)]
+    fn weight(&self, lane: usize) -> f64 {
+        let p_chance = self.p_chance[lane];
+        let is_measuring = (p_chance <= MEASURING_CHANCE) & (self.saturated[lane] == 0.0);
+        if is_measuring { 1.0 - p_chance } else { 0.0 }
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn fit_in_lanes(relation: &mut MagnitudeRelation, candidates: &[Packed], has_line: bool) {
+    if has_line {
+        relation.fit_line(candidates);
+    }
+    relation.fit_scatter(candidates);
+}
+
+/// Sums of `terms` over all candidates.
+#[inline(always)]
+fn sums<const N: usize>(
+    candidates: &[Packed],
+    terms: impl Fn(&Packed, usize) -> [f64; N],
+) -> [f64; N] {
+    let mut sums = [[0.0; LANES]; N];
+    for packed in candidates {
+        for lane in 0..LANES {
+            let terms = terms(packed, lane);
+            for (sum, term) in sums.iter_mut().zip(terms) {
+                sum[lane] += term;
+            }
+        }
+    }
+    sums.map(|lanes| lanes.iter().sum())
 }

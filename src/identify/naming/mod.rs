@@ -25,6 +25,8 @@
 mod candidate;
 mod completeness;
 mod likelihood;
+mod odds;
+mod packed;
 mod unrelated;
 
 pub use candidate::Candidate;
@@ -36,6 +38,8 @@ use super::pairing::Pairing;
 use super::predict::PredictedStar;
 use completeness::Completeness;
 use likelihood::MagnitudeRelation;
+use odds::{Known, pack, set_chances, set_odds};
+use packed::Packed;
 use std::f64::consts::PI;
 use unrelated::Unrelated;
 
@@ -56,13 +60,18 @@ const RARE_GATE_SHARE: f64 = 0.01;
 pub struct Naming {
     /// The candidates, in the order of the observed stars.
     pub candidates: Vec<Candidate>,
-    /// The sum of odds of each observed star, and of each predicted star.
+    packed: Vec<Packed>,
+    /// The sum of odds of each observed star, and of each predicted star, and of empty lanes.
     odds_of_observed: Vec<f64>,
     odds_of_predicted: Vec<f64>,
     /// The probability of each predicted star that it is observed, and of each observed star that
-    /// it has a name.
+    /// it has a name, and the same for empty lanes.
     is_observed: Vec<f64>,
     has_name: Vec<f64>,
+    /// V magnitudes of the predicted stars.
+    v_mags: Vec<f64>,
+    /// The share by brightness of the predicted stars as bright as each observed one.
+    apparent_shares: Vec<f64>,
     by_place: bool,
     completeness: Completeness,
     unrelated: Unrelated,
@@ -84,12 +93,16 @@ impl Naming {
     /// With `by_place`, the density of unrelated detections and the share of the stars that are
     /// detected are measured from place to place, for which few stars say too little.
     pub fn start(&mut self, stars: Stars, zero_point_mag: f64, by_place: bool) {
+        let Stars { field, predicted } = stars;
         self.by_place = by_place;
-        self.unrelated.start(stars.field.stars.len());
-        self.magnitudes = MagnitudeRelation::new(zero_point_mag, stars.field.photometry);
+        self.unrelated.start(field, by_place);
+        self.magnitudes = MagnitudeRelation::new(zero_point_mag, field.photometry);
         self.has_name.clear();
-        self.has_name.resize(stars.field.stars.len(), 0.5);
-        self.completeness.start(stars.predicted.len());
+        self.has_name.resize(field.stars.len() + 1, 0.5);
+        self.completeness.start(predicted.len());
+        self.v_mags.clear();
+        self.v_mags
+            .extend(predicted.iter().map(|star| f64::from(star.v_mag)));
     }
 
     /// Finds the candidates under `hypothesis`; `excess_sigma_px` is what the stated centroid
@@ -109,7 +122,7 @@ impl Naming {
         self.candidates.clear();
         let candidates = near.iter().map(|near| {
             let star = &field.stars[near.observed];
-            let sigma_px = star.sigma_px.hypot(excess_sigma_px);
+            let sigma_px = gate.sigma_px(star);
             Candidate::new(
                 near,
                 &predicted[near.predicted],
@@ -121,10 +134,10 @@ impl Naming {
 
     /// Computes the probabilities of the candidates.
     pub fn compute(&mut self, stars: Stars, is_first: bool) {
-        for candidate in &mut self.candidates {
-            let star = &stars.field.stars[candidate.observed];
-            let density = position_density(candidate, candidate.distance_px, star.is_saturated);
-            candidate.position_density = candidate.share * density;
+        let frame = (stars.field, stars.predicted.len());
+        pack(&self.candidates, frame, &mut self.packed);
+        if self.by_place {
+            self.completeness.place(stars.field, stars.predicted);
         }
         let rounds = if is_first {
             FIRST_ROUNDS
@@ -135,65 +148,83 @@ impl Naming {
             // What depends on place changes little from round to round.
             let is_by_place = self.by_place && (round == 0 || (is_first && round + 1 == rounds));
             if is_by_place {
-                let (field, has_name) = (stars.field, &self.has_name);
-                self.unrelated.measure_crowding(field, has_name);
+                let has_name = &self.has_name[..stars.field.stars.len()];
+                self.unrelated.measure_crowding(stars.field, has_name);
             }
             self.expect(stars);
             self.maximise(stars, is_by_place);
         }
         self.expect(stars);
+        let chances = self.packed.iter().flat_map(|packed| packed.p_chance);
+        for (candidate, p_chance) in self.candidates.iter_mut().zip(chances) {
+            candidate.p_chance = p_chance;
+        }
     }
 
     /// Probabilities of the candidates from what was measured in the frame.
     fn expect(&mut self, stars: Stars) {
-        let Stars { field, predicted } = stars;
-        self.unrelated.measure(field, &self.has_name);
-        clear(&mut self.odds_of_observed, field.stars.len());
-        clear(&mut self.odds_of_predicted, predicted.len());
-        // Candidates of the same star follow each other.
-        let (mut last, mut as_bright) = (usize::MAX, 0);
-        for candidate in &mut self.candidates {
-            let (i, j) = (candidate.observed, candidate.predicted);
-            let star = &field.stars[i];
-            let densities = self.magnitudes.densities(star, candidate.v_mag);
-            if i != last {
-                let expected_v_mag = self.magnitudes.expected_v_mag(star);
-                as_bright = predicted.partition_point(|p| f64::from(p.v_mag) < expected_v_mag);
-                last = i;
+        let (observed, predicted) = (stars.field.stars.len(), stars.predicted.len());
+        self.unrelated.measure(&self.has_name[..observed]);
+        self.find_apparent_shares(stars.field);
+        let (shares, visibility) = self.completeness.shares_and_visibility();
+        let known = Known {
+            shares,
+            visibility,
+            apparent_shares: &self.apparent_shares,
+            unrelated: self.unrelated.densities(),
+            magnitudes: &self.magnitudes,
+        };
+        set_odds(&mut self.packed, &known);
+        clear(&mut self.odds_of_observed, observed + 1);
+        clear(&mut self.odds_of_predicted, predicted + 1);
+        for packed in &self.packed {
+            for ((i, j), odds) in packed.places().zip(packed.odds) {
+                self.odds_of_observed[i] += odds;
+                self.odds_of_predicted[j] += odds;
             }
-            let like = self.completeness.odds_as(j, as_bright) * densities.by_scatter
-                + self.completeness.odds(j) * densities.otherwise;
-            candidate.odds = candidate.position_density * like / self.unrelated.density(i);
-            self.odds_of_observed[i] += candidate.odds;
-            self.odds_of_predicted[j] += candidate.odds;
         }
-        clear(&mut self.has_name, field.stars.len());
-        clear(&mut self.is_observed, predicted.len());
-        for candidate in &mut self.candidates {
-            let (i, j) = (candidate.observed, candidate.predicted);
-            let all = self.odds_of_observed[i] + self.odds_of_predicted[j];
-            // The candidate's own odds are in both sums.
-            let others = (all - 2.0 * candidate.odds).max(0.0);
-            candidate.p_chance = (1.0 + others) / (1.0 + others + candidate.odds);
-            self.has_name[i] += 1.0 - candidate.p_chance;
-            self.is_observed[j] += 1.0 - candidate.p_chance;
+        let sums = (&self.odds_of_observed[..], &self.odds_of_predicted[..]);
+        set_chances(&mut self.packed, sums);
+        clear(&mut self.has_name, observed + 1);
+        clear(&mut self.is_observed, predicted + 1);
+        for packed in &self.packed {
+            for ((i, j), p_chance) in packed.places().zip(packed.p_chance) {
+                self.has_name[i] += 1.0 - p_chance;
+                self.is_observed[j] += 1.0 - p_chance;
+            }
         }
+    }
+
+    /// Finds the share by brightness of the predicted stars as bright as each observed one.
+    fn find_apparent_shares(&mut self, field: &StarField) {
+        let (shares, _) = self.completeness.shares_and_visibility();
+        let v_mags = &self.v_mags;
+        self.apparent_shares.clear();
+        // Both are sorted, so each search begins where the last one ended.
+        let mut at = 0;
+        self.apparent_shares.extend(field.stars.iter().map(|star| {
+            let expected_v_mag = self.magnitudes.expected_v_mag(star.mag);
+            while at < v_mags.len() && v_mags[at] < expected_v_mag {
+                at += 1;
+            }
+            while at > 0 && v_mags[at - 1] >= expected_v_mag {
+                at -= 1;
+            }
+            shares[at]
+        }));
+        self.apparent_shares.push(0.0);
     }
 
     /// What the frame shows, from the probabilities.
     fn maximise(&mut self, stars: Stars, is_by_place: bool) {
         let Stars { field, predicted } = stars;
-        self.completeness.measure_shares(&self.is_observed);
+        let is_observed = &self.is_observed[..predicted.len()];
+        self.completeness.measure_shares(is_observed);
         if is_by_place {
-            self.completeness
-                .measure_visibility(field, predicted, &self.is_observed);
+            self.completeness.measure_visibility(field, is_observed);
         }
-        self.completeness.set_odds();
-        if stars.field.photometry == Photometry::Instrumental {
-            self.magnitudes
-                .fit_zero_point(stars.field, &self.candidates);
-        }
-        self.magnitudes.fit_scatter(stars.field, &self.candidates);
+        let has_line = field.photometry == Photometry::Instrumental;
+        self.magnitudes.fit(&self.packed, has_line);
     }
 }
 
@@ -215,8 +246,13 @@ impl Gate {
         }
     }
 
+    /// Standard error of a star's position on each axis.
+    fn sigma_px(&self, star: &ObservedStar) -> f64 {
+        (star.sigma_px.powi(2) + self.excess_sigma_px.powi(2)).sqrt()
+    }
+
     fn radius_px(&self, rank: usize, star: &ObservedStar) -> f64 {
-        let by_error_px = GATE_SIGMAS * star.sigma_px.hypot(self.excess_sigma_px);
+        let by_error_px = GATE_SIGMAS * self.sigma_px(star);
         let by_rarity_px = self.rare_px / ((rank + 1) as f64).sqrt();
         let by_error_px = by_error_px.min(ERROR_GATE_SHARE * self.diagonal_px);
         let by_rarity_px = by_rarity_px.min(RARE_GATE_SHARE * self.diagonal_px);

@@ -20,90 +20,135 @@ const LONE_DETECTIONS: f64 = 1.0;
 /// The density of unrelated detections. Its buffers are reused.
 #[derive(Debug, Default)]
 pub struct Unrelated {
-    /// Sums of the weights of all stars before each one.
+    area_px2: f64,
+    /// The stars as bright as each one: from the first to that after the last.
+    alike: Vec<(u32, u32)>,
+    scales: [Scale; CELLS.len()],
+    /// The probability of each star that it is unrelated, and the sums of all before each one.
+    weights: Vec<f64>,
     sums: Vec<f64>,
-    /// Weights in the cells of one scale.
-    cells: Vec<f64>,
     /// Density around each star over the frame's mean, at least 1.
     crowding: Vec<f64>,
-    /// Per square pixel and magnitude, of each observed star.
+    /// Per square pixel and magnitude, of each observed star; at the end 1, for none.
     densities: Vec<f64>,
 }
 
+/// The surroundings of the observed stars on one scale.
+#[derive(Debug, Default)]
+struct Scale {
+    /// The cell of each star, and the area of its surroundings in square pixels.
+    places: Vec<(u32, f64)>,
+    /// Weights in the cells: 0 while they are not used.
+    cells: Vec<f64>,
+}
+
 impl Unrelated {
-    /// Density at the place and brightness of an observed star, without itself, per square pixel
-    /// and magnitude.
-    pub fn density(&self, observed: usize) -> f64 {
-        self.densities[observed]
+    /// Density at the place and brightness of each observed star, without itself, per square pixel
+    /// and magnitude; at the end 1, for none.
+    pub fn densities(&self) -> &[f64] {
+        &self.densities
     }
 
-    /// Nothing is known of the places of `stars` observed stars.
-    pub fn start(&mut self, stars: usize) {
+    /// Starts with a new field. With `by_place`, the crowding can be measured.
+    pub fn start(&mut self, field: &StarField, by_place: bool) {
+        self.area_px2 = field.width_px * field.height_px;
         self.crowding.clear();
-        self.crowding.resize(stars, 1.0);
+        self.crowding.resize(field.stars.len(), 1.0);
+        self.find_alike(field);
+        if by_place {
+            for (scale, cells) in self.scales.iter_mut().zip(CELLS) {
+                scale.start(field, &Grid::new(field, cells));
+            }
+        }
+    }
+
+    /// Finds the stars as bright as each one.
+    fn find_alike(&mut self, field: &StarField) {
+        let stars = &field.stars;
+        let (mut from, mut to) = (0, 0);
+        self.alike.clear();
+        self.alike.extend(stars.iter().map(|star| {
+            while stars[from].mag < star.mag - HALF_RANGE_MAG {
+                from += 1;
+            }
+            while to < stars.len() && stars[to].mag <= star.mag + HALF_RANGE_MAG {
+                to += 1;
+            }
+            (from as u32, to as u32)
+        }));
     }
 
     /// Measures how crowded the surroundings of each observed star are, by the probability of each
     /// that it is a catalogue star.
     pub fn measure_crowding(&mut self, field: &StarField, has_name: &[f64]) {
-        let area_px2 = field.width_px * field.height_px;
-        let sum: f64 = has_name.iter().map(weight).sum();
-        let mean = (sum + PRIOR_DETECTIONS) / area_px2;
+        self.weigh(has_name);
+        let sum: f64 = self.weights.iter().sum();
+        let mean = (sum + PRIOR_DETECTIONS) / self.area_px2;
         self.crowding.clear();
-        self.crowding.resize(field.stars.len(), 1.0);
-        for cells in CELLS {
-            self.add_scale(field, has_name, (cells, mean));
+        self.crowding.resize(self.weights.len(), 1.0);
+        for (scale, cells) in self.scales.iter_mut().zip(CELLS) {
+            let grid = Grid::new(field, cells);
+            scale.raise(&mut self.crowding, &grid, (&self.weights, mean));
         }
     }
 
     /// Measures the density at the brightness of each observed star, and in its surroundings, as
     /// crowded as they are.
-    pub fn measure(&mut self, field: &StarField, has_name: &[f64]) {
-        let count = field.stars.len();
+    pub fn measure(&mut self, has_name: &[f64]) {
+        self.weigh(has_name);
         self.sums.clear();
         self.sums.push(0.0);
         let mut sum = 0.0;
-        for has_name in has_name {
-            sum += weight(has_name);
-            self.sums.push(sum);
-        }
+        self.sums.extend(self.weights.iter().map(|weight| {
+            sum += weight;
+            sum
+        }));
+        let stars = self.alike.iter().zip(&self.weights).zip(&self.crowding);
         self.densities.clear();
-        let area_px2 = field.width_px * field.height_px;
-        let (mut from, mut to) = (0, 0);
-        for (index, star) in field.stars.iter().enumerate() {
-            while field.stars[from].mag < star.mag - HALF_RANGE_MAG {
-                from += 1;
-            }
-            while to < count && field.stars[to].mag <= star.mag + HALF_RANGE_MAG {
-                to += 1;
-            }
-            let alike = self.sums[to] - self.sums[from] - weight(&has_name[index]);
+        let densities = stars.map(|((&(from, to), weight), crowding)| {
+            let alike = self.sums[to as usize] - self.sums[from as usize] - weight;
             let per_mag = (alike.max(0.0) + PRIOR_DETECTIONS) / (2.0 * HALF_RANGE_MAG);
-            self.densities
-                .push(per_mag / area_px2 * self.crowding[index]);
-        }
+            per_mag / self.area_px2 * crowding
+        });
+        self.densities.extend(densities);
+        self.densities.push(1.0);
     }
 
-    /// Raises the crowding where the surroundings on one scale are denser than the frame's `mean`.
-    fn add_scale(&mut self, field: &StarField, has_name: &[f64], (cells, mean): (usize, f64)) {
-        let grid = Grid::new(field, cells);
-        self.cells.clear();
-        self.cells.resize(grid.cells(), 0.0);
-        let stars = || field.stars.iter().zip(has_name);
-        for (star, has_name) in stars() {
-            self.cells[grid.cell_of(star.position.x, star.position.y)] += weight(has_name);
-        }
-        for ((star, has_name), crowding) in stars().zip(&mut self.crowding) {
-            let (sum, cells) = grid.around(star.position.x, star.position.y, &self.cells);
-            let others = sum - weight(has_name) - LONE_DETECTIONS;
-            *crowding = crowding.max(others / (cells as f64 * grid.cell_px.powi(2)) / mean);
-        }
+    /// The probability of each observed star that it is unrelated to the catalogue.
+    fn weigh(&mut self, has_name: &[f64]) {
+        self.weights.clear();
+        let weights = has_name
+            .iter()
+            .map(|has_name| (1.0 - has_name).clamp(0.0, 1.0));
+        self.weights.extend(weights);
     }
 }
 
-/// Probability that an observed star is unrelated to the catalogue.
-fn weight(has_name: &f64) -> f64 {
-    (1.0 - has_name).clamp(0.0, 1.0)
+impl Scale {
+    fn start(&mut self, field: &StarField, grid: &Grid) {
+        self.cells.clear();
+        self.cells.resize(grid.cells(), 0.0);
+        self.places.clear();
+        self.places.extend(field.stars.iter().map(|star| {
+            let (x, y) = (star.position.x, star.position.y);
+            (grid.cell_of(x, y) as u32, grid.area_around_px2(x, y))
+        }));
+    }
+
+    /// Raises the crowding where the surroundings are denser than the frame's `mean`.
+    fn raise(&mut self, crowding: &mut [f64], grid: &Grid, (weights, mean): (&[f64], f64)) {
+        for ((cell, _), weight) in self.places.iter().zip(weights) {
+            self.cells[*cell as usize] += weight;
+        }
+        for ((&(cell, area_px2), weight), crowding) in self.places.iter().zip(weights).zip(crowding)
+        {
+            let others = grid.sum_around(cell as usize, &self.cells) - weight - LONE_DETECTIONS;
+            *crowding = crowding.max(others / area_px2 / mean);
+        }
+        for (cell, _) in &self.places {
+            self.cells[*cell as usize] = 0.0;
+        }
+    }
 }
 
 #[cfg(test)]
@@ -135,9 +180,10 @@ mod tests {
         let field = field(places);
         let mut found = Unrelated::default();
         let has_name = vec![0.0; places.len()];
+        found.start(&field, true);
         found.measure_crowding(&field, &has_name);
-        found.measure(&field, &has_name);
-        found.densities
+        found.measure(&has_name);
+        found.densities()[..places.len()].to_vec()
     }
 
     #[test]

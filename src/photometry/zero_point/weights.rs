@@ -70,18 +70,13 @@ impl RobustWeights {
         columns: &DMatrix<f64>,
         offsets: &DVector<f64>,
     ) -> (DMatrix<f64>, DVector<f64>) {
-        let count = columns.ncols();
-        let (mut matrix, mut vector) = (DMatrix::zeros(count, count), DVector::zeros(count));
-        for (row, weight) in self.weights.iter().enumerate() {
-            for i in 0..count {
-                let weighted = weight * columns[(row, i)];
-                vector[i] += weighted * offsets[row];
-                for j in 0..count {
-                    matrix[(i, j)] += weighted * columns[(row, j)];
-                }
+        let mut weighted = columns.clone();
+        for mut column in weighted.column_iter_mut() {
+            for (value, weight) in column.iter_mut().zip(&self.weights) {
+                *value *= weight;
             }
         }
-        (matrix, vector)
+        (weighted.tr_mul(columns), weighted.tr_mul(offsets))
     }
 
     /// The covariance of the coefficients, estimated from the residuals (sandwich estimator), each

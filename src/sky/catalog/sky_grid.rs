@@ -44,7 +44,9 @@ impl GridStar {
     /// Whether the star is within a chord of the unit vector `centre`, given the chord squared.
     #[inline]
     pub fn is_within(&self, centre: &Vector3<f64>, chord_sq: f64) -> bool {
-        (self.vector() - centre).norm_squared() <= chord_sq
+        let offset = self.vector() - centre;
+        // Most stars are rejected by the first test alone.
+        offset.x * offset.x <= chord_sq && offset.norm_squared() <= chord_sq
     }
 }
 
@@ -126,9 +128,20 @@ impl SkyGrid {
         centre: &UnitVector<Icrs>,
         radius_rad: f64,
         faintest_v_mag: f32,
+        visit: impl FnMut(&GridStar),
+    ) {
+        self.for_each_within_chord(centre, chord_of(radius_rad), faintest_v_mag, visit);
+    }
+
+    /// The same, given the chord of the radius.
+    #[inline]
+    pub fn for_each_within_chord(
+        &self,
+        centre: &UnitVector<Icrs>,
+        chord: f64,
+        faintest_v_mag: f32,
         mut visit: impl FnMut(&GridStar),
     ) {
-        let chord = chord_of(radius_rad);
         let cone = Cone {
             centre: centre.as_vector(),
             chord,

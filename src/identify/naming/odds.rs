@@ -1,0 +1,106 @@
+//! The odds of packed candidates, and their probabilities of chance.
+
+use super::candidate::Candidate;
+use super::completeness::odds_of;
+use super::likelihood::{MagnitudeRelation, position_densities};
+use super::packed::{Lanes, Packed};
+use crate::camera::LANES;
+use crate::identify::field::StarField;
+use multiversion::multiversion;
+
+/// What the odds of the candidates depend on.
+pub struct Known<'a> {
+    /// The share by brightness of each predicted star, and its visibility. Here and below, there is
+    /// one more for empty lanes.
+    pub shares: &'a [f64],
+    pub visibility: &'a [f64],
+    /// The share by brightness of the predicted stars as bright as each observed star, and the
+    /// density of unrelated detections there.
+    pub apparent_shares: &'a [f64],
+    pub unrelated: &'a [f64],
+    pub magnitudes: &'a MagnitudeRelation,
+}
+
+/// Packs `candidates` into `packed`, given the field and the number of predicted stars.
+pub fn pack(
+    candidates: &[Candidate],
+    (field, predicted): (&StarField, usize),
+    packed: &mut Vec<Packed>,
+) {
+    packed.clear();
+    let chunks = candidates.chunks(LANES);
+    packed.extend(chunks.map(|chunk| packed_from(chunk, (field, predicted))));
+}
+
+/// Packs a few candidates.
+fn packed_from(candidates: &[Candidate], (field, predicted): (&StarField, usize)) -> Packed {
+    let mut packed = Packed {
+        observed: [field.stars.len() as u32; LANES],
+        predicted: [predicted as u32; LANES],
+        mag: [0.0; LANES],
+        v_mag: [0.0; LANES],
+        saturated: [0.0; LANES],
+        position_density: [0.0; LANES],
+        odds: [0.0; LANES],
+        p_chance: [1.0; LANES],
+    };
+    let [mut distances_px, mut sigmas_px, mut gates_px] = [[1.0; LANES]; 3];
+    let mut shares = [0.0; LANES];
+    for (lane, candidate) in candidates.iter().enumerate().take(LANES) {
+        let star = &field.stars[candidate.observed];
+        packed.observed[lane] = candidate.observed as u32;
+        packed.predicted[lane] = candidate.predicted as u32;
+        packed.mag[lane] = star.mag;
+        packed.v_mag[lane] = candidate.v_mag;
+        packed.saturated[lane] = f64::from(u8::from(star.is_saturated));
+        distances_px[lane] = candidate.distance_px;
+        (sigmas_px[lane], gates_px[lane]) = (candidate.sigma_px, candidate.gate_px);
+        shares[lane] = candidate.share;
+    }
+    let of_true = in_lanes([distances_px, sigmas_px, gates_px, packed.saturated]);
+    for lane in 0..LANES {
+        packed.position_density[lane] = shares[lane] * of_true[lane];
+    }
+    packed
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn in_lanes(numbers: [Lanes; 4]) -> Lanes {
+    position_densities(numbers)
+}
+
+/// Sets the odds of the candidates.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+pub fn set_odds(candidates: &mut [Packed], known: &Known) {
+    for packed in candidates {
+        let [mut shares, mut apparent, mut visibility, mut unrelated] = [[0.0; LANES]; 4];
+        for (lane, (observed, predicted)) in packed.places().enumerate() {
+            shares[lane] = known.shares[predicted];
+            apparent[lane] = known.apparent_shares[observed];
+            visibility[lane] = known.visibility[predicted];
+            unrelated[lane] = known.unrelated[observed];
+        }
+        let densities = known.magnitudes.densities(packed);
+        for lane in 0..LANES {
+            let [odds, odds_as] = odds_of([shares[lane], apparent[lane], visibility[lane]]);
+            let like = odds_as * densities.by_scatter[lane] + odds * densities.otherwise[lane];
+            packed.odds[lane] = packed.position_density[lane] * like / unrelated[lane];
+        }
+    }
+}
+
+/// Sets the probabilities of chance, from the sums of odds of each observed and each predicted star.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+pub fn set_chances(candidates: &mut [Packed], (of_observed, of_predicted): (&[f64], &[f64])) {
+    for packed in candidates {
+        let mut all = [0.0; LANES];
+        for (lane, (observed, predicted)) in packed.places().enumerate() {
+            all[lane] = of_observed[observed] + of_predicted[predicted];
+        }
+        for ((p_chance, odds), all) in packed.p_chance.iter_mut().zip(packed.odds).zip(all) {
+            // The candidate's own odds are in both sums.
+            let others = (all - 2.0 * odds).max(0.0);
+            *p_chance = (1.0 + others) / (1.0 + others + odds);
+        }
+    }
+}
