@@ -11,6 +11,7 @@
 //! the parts' thresholds holds.
 
 use crate::detect::background::Mesh;
+use multiversion::multiversion;
 
 /// Parts of a frame have at least this many pixels, so that the tail is measured on some ten
 /// extrema.
@@ -35,6 +36,8 @@ pub(crate) struct Extrema {
     /// Parts across, and down.
     parts: usize,
     heights: Vec<Sides>,
+    /// Of each pixel of a row: 1 for a maximum, −1 for a minimum.
+    marks: Vec<i8>,
 }
 
 /// The heights of the extrema of a part, in standard deviations.
@@ -71,24 +74,13 @@ impl Extrema {
         for sides in &mut self.heights[first_part..first_part + self.parts] {
             sides.pixels += width / self.parts;
         }
-        for x in 1..width.saturating_sub(1) {
+        mark_extrema(rows.map(|row| &row[..width]), &mut self.marks);
+        for (x, mark) in self.marks.iter().enumerate() {
+            if *mark == 0 {
+                continue;
+            }
             let here = rows[1][x];
-            let (left, right) = (rows[1][x - 1], rows[1][x + 1]);
-            let is_above = here > left && here >= right;
-            let is_below = here < left && here <= right;
-            if !is_above && !is_below {
-                continue;
-            }
-            let others = [rows[0], rows[2]].map(|row| &row[x - 1..=x + 1]);
-            let mut others = others.into_iter().flatten();
-            let is_extremum = if is_above {
-                others.all(|other| here > *other)
-            } else {
-                others.all(|other| here < *other)
-            };
-            if !is_extremum {
-                continue;
-            }
+            let is_above = *mark > 0;
             let (mean, sigma) = mesh.at(x as f32, y as f32);
             let above = (here - mean) / sigma;
             let sides = &mut self.heights[first_part + x * self.parts / width];
@@ -116,6 +108,33 @@ impl Extrema {
             Some(&middle) if middle > u + error => middle.min(most).max(u),
             _ => u,
         }
+    }
+}
+
+/// Marks the pixels of the middle row that are above, or below, all around them.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn mark_extrema(rows: [&[f32]; 3], marks: &mut Vec<i8>) {
+    let width = rows[1].len();
+    marks.clear();
+    marks.resize(width, 0);
+    let inner = width.saturating_sub(2);
+    if inner == 0 {
+        return;
+    }
+    let [above, middle, below] = rows.map(|row| [0, 1, 2].map(|first| &row[first..first + inner]));
+    let [left, here, right] = middle;
+    let [[a, b, c], [d, e, f]] = [above, below];
+    let marks = &mut marks[1..=inner];
+    for x in 0..inner {
+        let value = here[x];
+        // Of equal neighbours in a row, the first counts.
+        let is_maximum = (value > left[x]) & (value >= right[x]);
+        let is_minimum = (value < left[x]) & (value <= right[x]);
+        let is_over = (value > a[x]) & (value > b[x]) & (value > c[x]);
+        let is_over = is_over & (value > d[x]) & (value > e[x]) & (value > f[x]);
+        let is_under = (value < a[x]) & (value < b[x]) & (value < c[x]);
+        let is_under = is_under & (value < d[x]) & (value < e[x]) & (value < f[x]);
+        marks[x] = i8::from(is_maximum & is_over) - i8::from(is_minimum & is_under);
     }
 }
 
