@@ -7,6 +7,7 @@
 
 use super::detection::MeasuredPsf;
 use super::psf::MAX_WINDOW_PX;
+use super::psf_table::PsfTable;
 
 /// Size and elongation of a spot: `[ln σ, e₁, e₂]`. Its covariance is `σ² exp(e₁ K + e₂ L)` with the
 /// matrices K = diag(1, −1) and L = ((0, 1), (1, 0)): its axes are in a ratio of `exp |e|`.
@@ -43,9 +44,24 @@ pub(crate) struct LocalPsf {
     /// The size, as [`Fit::spot_px`](super::fit::Fit::spot_px), of a spot that is not scaled, in
     /// pixels.
     pub spot_px: f64,
+    /// The spot of that size, where it is tabulated.
+    pub table: PsfTable,
 }
 
 impl LocalPsf {
+    /// Becomes a copy of another spot, without a new allocation where it fits.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.lobes.clone_from(&other.lobes);
+        self.spot_px = other.spot_px;
+        self.table.copy_from(&other.table);
+    }
+
+    /// Becomes a single Gaussian.
+    pub fn clear(&mut self) {
+        self.lobes.clear();
+        self.table.clear();
+    }
+
     /// Whether it is a single Gaussian.
     pub fn is_gaussian(&self) -> bool {
         self.lobes.is_empty()

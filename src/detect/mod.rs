@@ -13,7 +13,7 @@
 //! 4. `candidates`: connected regions above the threshold, their peaks, and which of those are
 //!    sources of their own.
 //! 5. `psf_fit`: where the stars are not round Gaussians of one size (motion, defocus, aberrations),
-//!    an effective PSF is measured on the bright ones.
+//!    an effective PSF is measured on the bright ones, and tabulated (`psf_table`).
 //! 6. `fit`, `measure`: a fit of each source, together with those that it touches, or a
 //!    grey-weighted centroid; flags for what is no star, or no whole one.
 //! 7. `wings`: light of the stars beyond the spots that are fitted, which is added to the fluxes.
@@ -42,10 +42,12 @@ mod error;
 mod filter;
 mod filter_model;
 mod fit;
+mod lanes;
 mod measure;
 mod pixels;
 mod psf;
 mod psf_fit;
+mod psf_table;
 mod search;
 mod star_model;
 mod threads;
@@ -68,6 +70,7 @@ use measure::{Measurement, Ring, StarShape};
 use pixels::View;
 use psf::PIXEL_VARIANCE_PX2;
 use psf_fit::measure_psf;
+use psf_table::FieldTables;
 use search::{FrameSearch, SearchInput};
 use wings::measure_wings;
 
@@ -154,7 +157,10 @@ pub fn detect_into(
     } else {
         None
     };
-    maps.psf = psf.as_ref();
+    let tables = psf
+        .as_ref()
+        .map(|psf| FieldTables::new(psf, (view.width, view.height), peaks.len()));
+    maps.psf = tables.as_ref();
     let measurement = Measurement {
         maps,
         shape,

@@ -7,7 +7,7 @@ use super::normal::{CholeskyFactor, NormalEquations};
 use super::parameters::{
     Fit, FitConfig, MAX_PARAMETERS, MAX_SPOTS, NoiseModel, ONE_SPOT, SpotEstimate, TWO_SPOTS,
 };
-use super::sums::{WindowPixels, add_pixels, flux_variance};
+use super::sums::{SumBuffers, WindowPixels, add_pixels, flux_variance};
 use super::window::Window;
 use crate::detect::psf::{AxisProfile, GROUP_PX, PixelGroup};
 use arrayvec::ArrayVec;
@@ -39,6 +39,7 @@ pub(crate) struct Fitter {
     /// Of each spot, where it is not: its pixels.
     images: Vec<MixtureImage>,
     light: Vec<PixelGroup>,
+    sums: SumBuffers,
 }
 
 impl Fitter {
@@ -276,17 +277,19 @@ impl Fitter {
         self.draw(window, &fit.spots, fit.spot_px);
         let pixels = pixels_of(window, fit, config);
         let spots = fit.spots.iter().enumerate();
+        let mut sums = std::mem::take(&mut self.sums);
         if window.psf.is_gaussian() {
             let lights: ArrayVec<_, MAX_SPOTS> = spots
                 .map(|(i, spot)| self.gaussian_light(i, spot, window))
                 .collect();
-            add_pixels(&mut normal, &lights, &pixels);
+            add_pixels(&mut normal, &lights, &pixels, &mut sums);
         } else {
             let lights: ArrayVec<_, MAX_SPOTS> = spots
                 .map(|(i, spot)| self.mixture_light(i, spot, window))
                 .collect();
-            add_pixels(&mut normal, &lights, &pixels);
+            add_pixels(&mut normal, &lights, &pixels, &mut sums);
         }
+        self.sums = sums;
         add_background_map(&mut normal, window, fit);
         normal
     }

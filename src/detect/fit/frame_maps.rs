@@ -4,9 +4,10 @@ use super::parameters::SpotEstimate;
 use super::window::{Window, window_radius};
 use crate::detect::background::Mesh;
 use crate::detect::candidates::Peak;
-use crate::detect::effective_psf::EffectivePsf;
+use crate::detect::lanes::{each, each_of, plus};
 use crate::detect::pixels::View;
-use crate::detect::psf::{GROUP_PX, MAX_WINDOW_PX, PIXEL_VARIANCE_PX2};
+use crate::detect::psf::{GROUP_PX, MAX_WINDOW_PX, PIXEL_VARIANCE_PX2, PixelGroup};
+use crate::detect::psf_table::FieldTables;
 use multiversion::multiversion;
 
 /// The frame with its maps of background and noise, and its spot.
@@ -25,7 +26,7 @@ pub(crate) struct FrameMaps<'a> {
     /// √ΣP²: the signal-to-noise ratio of a star whose flux equals the noise of a pixel.
     pub matched_gain: f64,
     /// The spot where it is not a round Gaussian of that size.
-    pub psf: Option<&'a EffectivePsf>,
+    pub psf: Option<&'a FieldTables<'a>>,
 }
 
 impl FrameMaps<'_> {
@@ -85,7 +86,7 @@ impl FrameMaps<'_> {
         let cy = window.y0 + window.height / 2;
         match self.psf {
             Some(psf) => psf.at(cx as f64, cy as f64, &mut window.psf),
-            None => window.psf.lobes.clear(),
+            None => window.psf.clear(),
         }
         let noise = self.noise_at(cx as f64, cy as f64);
         window.noise_adu = noise;
@@ -141,9 +142,19 @@ fn copy_above(view: &View, plane: BackgroundPlane, saturation_adu: f32, window: 
     let groups = window.groups();
     window.data.resize(groups * window.height, [0.0; GROUP_PX]);
     let per_noise = (1.0 / window.noise_adu) as f32;
+    let lanes: PixelGroup = std::array::from_fn(|lane| lane as f32);
+    let slopes = each(&lanes, |lane| lane * plane.across);
     for group in 0..groups {
         let first = group * GROUP_PX;
         let columns = (window.width - first).min(GROUP_PX);
+        // No pixel is used beyond the end of the row.
+        let limits = each(&lanes, |lane| {
+            if lane < columns as f32 {
+                saturation_adu
+            } else {
+                f32::NEG_INFINITY
+            }
+        });
         for row in 0..window.height {
             let in_row = view.row(window.y0 + row);
             let mut pixels = [0.0; GROUP_PX];
@@ -151,16 +162,17 @@ fn copy_above(view: &View, plane: BackgroundPlane, saturation_adu: f32, window: 
                 .span(window.x0 + first..view.width)
                 .copy_group(&mut pixels);
             let start = plane.corner + row as f32 * plane.down + first as f32 * plane.across;
-            let above = &mut window.data[row * groups + group];
-            for lane in 0..GROUP_PX {
-                let is_used = lane < columns && pixels[lane] < saturation_adu;
-                let background = start + lane as i32 as f32 * plane.across;
-                above[lane] = if is_used {
-                    (pixels[lane] - background) * per_noise
-                } else {
-                    f32::NAN
-                };
-            }
+            let above = each_of(&pixels, &slopes, |pixel, slope| {
+                (pixel - (start + slope)) * per_noise
+            });
+            let used = each_of(
+                &pixels,
+                &limits,
+                |pixel, limit| {
+                    if pixel < limit { 0.0 } else { f32::NAN }
+                },
+            );
+            window.data[row * groups + group] = plus(&above, &used);
         }
     }
 }

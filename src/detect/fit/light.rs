@@ -1,6 +1,8 @@
 //! The light of spots in a window, and its derivatives with respect to the parameters.
 
-use crate::detect::psf::{AxisProfile, GROUP_PX, PixelGroup, ProfilePart};
+use super::parameters::ONE_SPOT;
+use crate::detect::lanes::{each, plus};
+use crate::detect::psf::{AxisProfile, PixelGroup, ProfilePart};
 use multiversion::multiversion;
 
 /// The light of a spot in a window.
@@ -26,6 +28,9 @@ pub(crate) trait GroupLight: Copy {
     /// The fraction of the spot's light in a pixel, and the derivatives of the light there with
     /// respect to x, y and size.
     fn gradient(&self, lane: usize) -> [f32; 4];
+
+    /// The same in all pixels.
+    fn gradients(&self) -> [PixelGroup; 4];
 }
 
 /// The light of a Gaussian spot.
@@ -66,11 +71,8 @@ impl SpotLight for GaussianLight<'_> {
     #[inline(always)]
     fn shares(&self, group: usize, row: usize) -> PixelGroup {
         let [across, down] = self.axes;
-        let (mut shares, down) = (across.group(group).value, down.pixel(row).value);
-        for share in &mut shares {
-            *share *= down;
-        }
-        shares
+        let down = down.pixel(row).value;
+        each(&across.group(group).value, |share| share * down)
     }
 }
 
@@ -83,6 +85,20 @@ impl GroupLight for GaussianGroup {
     #[inline(always)]
     fn gradient(&self, lane: usize) -> [f32; 4] {
         spot_gradient(self.flux, &self.across.lane(lane), &self.down)
+    }
+
+    #[inline(always)]
+    fn gradients(&self) -> [PixelGroup; 4] {
+        let Self { across, down, flux } = self;
+        let scaled = |values: &PixelGroup, factor: f32| each(values, |value| value * factor);
+        let wider = scaled(&across.by_sigma, flux * down.value);
+        let higher = scaled(&across.value, flux * down.by_sigma);
+        [
+            scaled(&across.value, down.value),
+            scaled(&across.by_center, flux * down.value),
+            scaled(&across.value, flux * down.by_center),
+            plus(&wider, &higher),
+        ]
     }
 }
 
@@ -102,27 +118,12 @@ pub(crate) fn spot_gradient(
     ]
 }
 
-/// The light in a pixel, and the gradient of the model with respect to the parameters of the first
-/// `count` spots, in units of the noise.
+/// The light in a pixel, and the gradient of the model of one spot with respect to its parameters,
+/// in units of the noise.
 #[inline(always)]
-pub(crate) fn linearise<G: GroupLight, const S: usize, const N: usize>(
-    spots: &[G; S],
-    count: usize,
-    lane: usize,
-) -> (f32, [f32; N]) {
-    let background = 3 * count;
-    let mut light = 0.0;
-    let mut gradient = [0.0; N];
-    gradient[background] = 1.0;
-    for (i, spot) in spots.iter().enumerate().take(count) {
-        let [shape, by_x, by_y, by_size] = spot.gradient(lane);
-        light += spot.flux() * shape;
-        gradient[3 * i] = by_x;
-        gradient[3 * i + 1] = by_y;
-        gradient[3 * i + 2] = shape;
-        gradient[background + 1] += by_size;
-    }
-    (light, gradient)
+pub(crate) fn linearise<G: GroupLight>(spot: &G, lane: usize) -> (f32, [f32; ONE_SPOT]) {
+    let [shape, by_x, by_y, by_size] = spot.gradient(lane);
+    (spot.flux() * shape, [by_x, by_y, shape, 1.0, by_size])
 }
 
 /// Adds `sign` times the light of a spot to the pixels of a window.
@@ -131,10 +132,8 @@ pub(crate) fn add_light<L: SpotLight>(spot: &L, sign: f32, groups: usize, data: 
     let flux = sign * spot.flux();
     for group in 0..groups {
         for (row, pixels) in data.iter_mut().skip(group).step_by(groups).enumerate() {
-            let shares = spot.shares(group, row);
-            for lane in 0..GROUP_PX {
-                pixels[lane] += flux * shares[lane];
-            }
+            let light = each(&spot.shares(group, row), |share| flux * share);
+            *pixels = plus(pixels, &light);
         }
     }
 }

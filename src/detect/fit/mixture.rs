@@ -1,13 +1,11 @@
-//! The light of an effective PSF in a window: the sum over its lobes, pixel by pixel.
+//! The light of an effective PSF in a window: from its table, or the sum over its lobes.
 
 use super::light::{GroupLight, SpotLight};
 use super::window::Window;
+use crate::detect::lanes::each;
 use crate::detect::psf::{GROUP_PX, LitPart, NarrowProfiles, PixelGroup};
+use crate::detect::psf_table::ShareGroup;
 use multiversion::multiversion;
-
-/// The fraction of the light in a group of pixels, and its derivatives with respect to x, y and
-/// size, per px.
-pub(super) type ShareGroup = [PixelGroup; 4];
 
 /// The pixels of an effective PSF.
 #[derive(Debug, Clone, Default)]
@@ -15,6 +13,8 @@ pub(super) struct MixtureImage {
     /// Row by row, as the pixels of the window.
     groups: Vec<ShareGroup>,
     profiles: NarrowProfiles,
+    /// Buffer of the table.
+    lines: Vec<f32>,
 }
 
 impl MixtureImage {
@@ -28,6 +28,12 @@ impl MixtureImage {
         let scale = spot_px / psf.spot_px;
         let corner = [window.x0, window.y0].map(|at| at as f64);
         let size = [window.width, window.height];
+        if scale == 1.0 && !psf.table.is_empty() {
+            let place = [x_px - corner[0], y_px - corner[1]];
+            let into = (&mut self.lines, &mut self.groups[..]);
+            psf.table.draw(place, size, spot_px, into);
+            return;
+        }
         for lobe in &psf.lobes {
             let [dx, dy] = lobe.offset_px;
             let place = [x_px - corner[0] + scale * dx, y_px - corner[1] + scale * dy];
@@ -75,17 +81,19 @@ fn add_lobe(
             [down.value, down.by_center, down.by_sigma].map(|part| share * part);
         for group in part.groups[0]..part.groups[1] {
             let across = profiles.across(group, &part);
-            let into = &mut into[row * width + group];
+            // Copied so that the compiler need not assume aliasing.
+            let mut sums = into[row * width + group];
             for lane in 0..GROUP_PX {
                 let here = across.value[lane];
                 let by_x = across.by_center[lane] * value;
                 let by_y = here * slope;
                 let by_lobe = across.by_sigma[lane] * value + here * growth;
-                into[0][lane] += here * value;
-                into[1][lane] += by_x;
-                into[2][lane] += by_y;
-                into[3][lane] += by_x * to_x + by_y * to_y + by_lobe * wider;
+                sums[0][lane] += here * value;
+                sums[1][lane] += by_x;
+                sums[2][lane] += by_y;
+                sums[3][lane] += by_x * to_x + by_y * to_y + by_lobe * wider;
             }
+            into[row * width + group] = sums;
         }
     }
 }
@@ -136,12 +144,14 @@ impl GroupLight for MixtureGroup {
 
     #[inline(always)]
     fn gradient(&self, lane: usize) -> [f32; 4] {
-        let [shape, by_x, by_y, by_size] = self.shares.map(|of_group| of_group[lane]);
-        [
-            shape,
-            self.flux * by_x,
-            self.flux * by_y,
-            self.flux * by_size,
-        ]
+        let by = |number: usize| self.flux * self.shares[number][lane];
+        [self.shares[0][lane], by(1), by(2), by(3)]
+    }
+
+    #[inline(always)]
+    fn gradients(&self) -> [PixelGroup; 4] {
+        let [shape, by_x, by_y, by_size] = &self.shares;
+        let scaled = |by: &PixelGroup| each(by, |by| self.flux * by);
+        [*shape, scaled(by_x), scaled(by_y), scaled(by_size)]
     }
 }

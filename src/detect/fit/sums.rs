@@ -5,9 +5,10 @@
     reason = "rows and columns of matrices read best as indices"
 )]
 
-use super::light::{SpotLight, linearise};
+use super::light::{GroupLight, SpotLight, add_light, linearise};
 use super::normal::NormalEquations;
-use super::parameters::{MAX_PARAMETERS, MAX_SPOTS, ONE_SPOT, TWO_SPOTS};
+use super::parameters::ONE_SPOT;
+use crate::detect::lanes::{each, each_of, plus, times};
 use crate::detect::psf::{GROUP_PX, PixelGroup};
 use multiversion::multiversion;
 
@@ -62,44 +63,34 @@ pub(crate) fn variance_of(light: f32, [linear, square]: [f32; 2]) -> f32 {
 }
 
 /// Adds the pixels of a window to the normal equations of `spots`.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 pub(crate) fn add_pixels<L: SpotLight, const N: usize>(
     normal: &mut NormalEquations<N>,
     spots: &[L],
     pixels: &WindowPixels,
+    buffers: &mut SumBuffers,
 ) {
-    // With a count known at compile time the loops are unrolled.
-    match (N, spots) {
-        (ONE_SPOT, &[spot]) => add_up(normal, &[spot], 1, pixels),
-        (TWO_SPOTS, &[first, second]) => add_up(normal, &[first, second], 2, pixels),
-        (MAX_PARAMETERS, &[first, ..]) => {
-            let mut several = [first; MAX_SPOTS];
-            for (spot, from) in several.iter_mut().zip(spots) {
-                *spot = *from;
-            }
-            add_up(normal, &several, spots.len().min(MAX_SPOTS), pixels);
-        }
-        _ => {}
+    match spots {
+        [] => {}
+        [spot] => add_single(normal, spot, pixels),
+        several => buffers.add_several(normal, several, pixels),
     }
 }
 
-/// [`add_pixels`] for the first `count` spots.
-#[inline(always)]
-fn add_up<L: SpotLight, const S: usize, const N: usize>(
+/// [`add_pixels`] for one spot.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn add_single<L: SpotLight, const N: usize>(
     normal: &mut NormalEquations<N>,
-    spots: &[L; S],
-    count: usize,
-    pixels: &WindowPixels<'_>,
+    spot: &L,
+    pixels: &WindowPixels,
 ) {
-    let parameters = 3 * count + 2;
-    let mut matrix = [[[0.0f32; GROUP_PX]; N]; N];
-    let mut right = [[0.0f32; GROUP_PX]; N];
+    let mut matrix = [[[0.0f32; GROUP_PX]; ONE_SPOT]; ONE_SPOT];
+    let mut right = [[0.0f32; GROUP_PX]; ONE_SPOT];
     let [mut chi2, mut valid] = [[0.0f32; GROUP_PX]; 2];
     for group in 0..pixels.groups {
         for (row, data) in pixels.column_of_groups(group).enumerate() {
-            let lights = spots.map(|spot| spot.in_group(group, row));
+            let light_of_group = spot.in_group(group, row);
             for lane in 0..GROUP_PX {
-                let (light, gradient) = linearise::<L::Group, S, N>(&lights, count, lane);
+                let (light, gradient) = linearise(&light_of_group, lane);
                 let is_valid = !data[lane].is_nan();
                 let weight = 1.0 / pixels.variance(light);
                 let weight = if is_valid { weight } else { 0.0 };
@@ -107,7 +98,7 @@ fn add_up<L: SpotLight, const S: usize, const N: usize>(
                 let residual = if is_valid { residual } else { 0.0 };
                 valid[lane] += if is_valid { 1.0 } else { 0.0 };
                 chi2[lane] += residual * residual * weight;
-                for i in 0..parameters {
+                for i in 0..ONE_SPOT {
                     let weighted = gradient[i] * weight;
                     right[i][lane] += weighted * residual;
                     for j in 0..i + 1 {
@@ -117,15 +108,177 @@ fn add_up<L: SpotLight, const S: usize, const N: usize>(
             }
         }
     }
-    for i in 0..N {
-        let unit = pixels.unit(i, count);
+    for i in 0..ONE_SPOT.min(N) {
+        let unit = pixels.unit(i, 1);
         normal.right[i] += sum_of(right[i]) * unit;
         for j in 0..i + 1 {
-            normal.matrix[i][j] += sum_of(matrix[i][j]) * unit * pixels.unit(j, count);
+            normal.matrix[i][j] += sum_of(matrix[i][j]) * unit * pixels.unit(j, 1);
         }
     }
     normal.chi2 += sum_of(chi2);
     normal.pixels += sum_of(valid) as usize;
+}
+
+/// Rows of a [`Block`].
+pub(crate) const BLOCK: usize = 4;
+/// The same group of pixels in several images, whose products with others are summed together.
+pub(crate) type Block = [PixelGroup; BLOCK];
+
+/// Buffers of the sums over several spots.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SumBuffers {
+    light: Vec<PixelGroup>,
+    /// Square roots of the weights of the pixels.
+    roots: Vec<PixelGroup>,
+    /// Spot by spot, the derivatives with respect to x, y and flux, times these roots.
+    spots: Vec<Block>,
+    /// The same with respect to background and size, and the residuals.
+    common: Vec<Block>,
+}
+
+impl SumBuffers {
+    /// [`add_pixels`] for several spots: products of the pixels of all derivatives.
+    fn add_several<L: SpotLight, const N: usize>(
+        &mut self,
+        normal: &mut NormalEquations<N>,
+        spots: &[L],
+        pixels: &WindowPixels,
+    ) {
+        let count = pixels.data.len();
+        let empty = [0.0; GROUP_PX];
+        self.light.clear();
+        self.light.resize(count, empty);
+        self.roots.resize(count, empty);
+        self.common.resize(count, [empty; BLOCK]);
+        self.spots.resize(spots.len() * count, [empty; BLOCK]);
+        for spot in spots {
+            add_light(spot, 1.0, pixels.groups, &mut self.light);
+        }
+        weigh(pixels, &self.light, &mut self.roots, &mut self.common);
+        for (spot, block) in spots.iter().zip(self.spots.chunks_exact_mut(count)) {
+            fill_block(spot, pixels.groups, &self.roots, (block, &mut self.common));
+        }
+        let blocks = self.spots.chunks_exact(count).chain([&self.common[..]]);
+        for (i, block) in blocks.clone().enumerate() {
+            for (j, other) in blocks.clone().enumerate().take(i + 1) {
+                add_products(
+                    normal,
+                    [i, j],
+                    products_of(block, other),
+                    (spots.len(), pixels),
+                );
+            }
+        }
+        let data = pixels.data.as_flattened().iter();
+        normal.pixels += data.filter(|value| !value.is_nan()).count();
+    }
+}
+
+/// Sets the square roots of the weights of pixels with this light, and in the common block the
+/// derivatives with respect to the background, and the residuals.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn weigh(
+    pixels: &WindowPixels,
+    light: &[PixelGroup],
+    roots: &mut [PixelGroup],
+    common: &mut [Block],
+) {
+    for group in 0..pixels.groups {
+        for (row, data) in pixels.column_of_groups(group).enumerate() {
+            let at = row * pixels.groups + group;
+            let light = light[at];
+            let root = each(&light, |light| (1.0 / pixels.variance(light)).sqrt());
+            let root = each_of(
+                &data,
+                &root,
+                |value, root| {
+                    if value.is_nan() { 0.0 } else { root }
+                },
+            );
+            let residual = each_of(&data, &light, |value, light| {
+                let residual = value - light - pixels.background;
+                if value.is_nan() { 0.0 } else { residual }
+            });
+            roots[at] = root;
+            common[at] = [
+                root,
+                [0.0; GROUP_PX],
+                times(&residual, &root),
+                [0.0; GROUP_PX],
+            ];
+        }
+    }
+}
+
+/// Sets the block of a spot, and adds its derivative with respect to the size to the common one.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn fill_block<L: SpotLight>(
+    spot: &L,
+    groups: usize,
+    roots: &[PixelGroup],
+    (block, common): (&mut [Block], &mut [Block]),
+) {
+    for group in 0..groups {
+        for (row, root) in roots.iter().skip(group).step_by(groups).enumerate() {
+            let at = row * groups + group;
+            let [shape, by_x, by_y, by_size] = spot.in_group(group, row).gradients();
+            block[at] = [
+                times(&by_x, root),
+                times(&by_y, root),
+                times(&shape, root),
+                [0.0; GROUP_PX],
+            ];
+            common[at][1] = plus(&common[at][1], &times(&by_size, root));
+        }
+    }
+}
+
+/// Adds the products of two blocks of `spots` spots to the normal equations.
+fn add_products<const N: usize>(
+    normal: &mut NormalEquations<N>,
+    [i, j]: [usize; 2],
+    products: [[f64; BLOCK]; BLOCK],
+    (spots, pixels): (usize, &WindowPixels),
+) {
+    const RESIDUAL: usize = 2;
+    let parameter = |block: usize, row: usize| {
+        let end = if block < spots { 3 } else { RESIDUAL };
+        (row < end).then_some(3 * block + row)
+    };
+    let is_residual = |block: usize, row: usize| block == spots && row == RESIDUAL;
+    let unit = |parameter: usize| pixels.unit(parameter, spots);
+    for (row, products) in products.iter().enumerate() {
+        for (column, product) in products.iter().enumerate() {
+            match (parameter(i, row), parameter(j, column)) {
+                (Some(a), Some(b)) if a >= b => {
+                    normal.matrix[a][b] += product * unit(a) * unit(b);
+                }
+                (None, Some(b)) if is_residual(i, row) => normal.right[b] += product * unit(b),
+                (None, None) if is_residual(i, row) && is_residual(j, column) => {
+                    normal.chi2 += product;
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// The sums over all pixels of the products of each image of a block with each of another.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+pub(crate) fn products_of(first: &[Block], second: &[Block]) -> [[f64; BLOCK]; BLOCK] {
+    let mut sums = [[[0.0f32; GROUP_PX]; BLOCK]; BLOCK];
+    for (left, right) in first.iter().zip(second) {
+        // Copied so that the compiler need not assume aliasing.
+        let (left, right) = (*left, *right);
+        for lane in 0..GROUP_PX {
+            for i in 0..BLOCK {
+                for j in 0..BLOCK {
+                    sums[i][j][lane] += left[i][lane] * right[j][lane];
+                }
+            }
+        }
+    }
+    sums.map(|sums| sums.map(sum_of))
 }
 
 /// The variance of the flux of one spot, in ADU², fitted together with a background of variance
@@ -248,7 +401,7 @@ mod tests {
                 variance: [0.01, 1e-6],
             };
             let mut found: NormalEquations<ONE_SPOT> = NormalEquations::empty();
-            add_pixels(&mut found, &[spot], &pixels);
+            add_pixels(&mut found, &[spot], &pixels, &mut SumBuffers::default());
             let expected = plain_sums(&spot, &pixels);
             assert_eq!(found.pixels, width * height - 1);
             assert!((found.chi2 / expected.chi2 - 1.0).abs() < 1e-3);

@@ -51,10 +51,9 @@ impl Window {
     /// Becomes a copy of another window, without a new allocation where the pixels fit.
     pub fn copy_from(&mut self, other: &Self) {
         let mut data = std::mem::take(&mut self.data);
-        let mut lobes = std::mem::take(&mut self.psf.lobes);
+        let mut psf = std::mem::take(&mut self.psf);
         data.clone_from(&other.data);
-        lobes.clone_from(&other.psf.lobes);
-        let psf = LocalPsf { lobes, ..other.psf };
+        psf.copy_from(&other.psf);
         *self = Self {
             data,
             psf,

@@ -140,16 +140,28 @@ impl FieldFit {
             coefficients: [[0.0; FIELD_TERMS]; 3],
             chi2: 0.0,
         };
+        // The values of each basis at each star, moment by moment.
+        let rows: Vec<[Vec<f64>; 3]> = samples
+            .iter()
+            .map(|sample| {
+                let values: Vec<Moments> = model.iter().map(|b| sample.predicted(b)).collect();
+                std::array::from_fn(|moment| values.iter().map(|value| value[moment]).collect())
+            })
+            .collect();
         for _ in 0..ROUNDS {
             let mut matrix = DMatrix::<f64>::identity(model.len(), model.len()) * 1e-6;
             let mut right = DVector::<f64>::zeros(model.len());
-            for (sample, weight) in samples.iter().zip(&weights) {
-                let columns: Vec<Moments> = model.iter().map(|b| sample.predicted(b)).collect();
-                for (i, column) in columns.iter().enumerate() {
-                    let weighted = column.component_mul(weight);
-                    right[i] += weighted.dot(&sample.values);
-                    for (j, other) in columns.iter().enumerate() {
-                        matrix[(i, j)] += weighted.dot(other);
+            for ((sample, weight), rows) in samples.iter().zip(&weights).zip(&rows) {
+                for (moment, row) in rows.iter().enumerate() {
+                    // Most bases are of one moment.
+                    for (i, value) in row.iter().enumerate().filter(|(_, value)| **value != 0.0) {
+                        let weighted = value * weight[moment];
+                        right[i] += weighted * sample.values[moment];
+                        // The lower triangle, which is all that the decomposition reads.
+                        let column = matrix.as_mut_slice()[i * model.len()..].iter_mut();
+                        for (sum, other) in column.zip(row).skip(i) {
+                            *sum += weighted * other;
+                        }
                     }
                 }
             }

@@ -4,9 +4,11 @@ use super::stars::{PsfStar, StarFitter};
 use crate::detect::effective_psf::{
     EffectivePsf, FieldForm, FieldLobe, Lobe, LocalPsf, SpotMoments, covariance, inverse,
 };
-use crate::detect::psf::{GROUP_PX, NarrowProfiles, PixelGroup};
+use crate::detect::fit::{BLOCK, Block, products_of};
+use crate::detect::lanes::{each_of, plus};
+use crate::detect::psf::{GROUP_PX, LitPart, NarrowProfiles, PixelGroup};
 use multiversion::multiversion;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// Standard deviation of a lobe over that of the spot along its shorter axis.
 const LOBE_SIZE: f64 = 0.55;
@@ -144,16 +146,17 @@ impl LobeGrid {
 
     /// The normal equations of each half of the stars, those of even and of odd numbers, for a PSF
     /// that changes over the field as `psf` does.
-    pub fn sums(
+    ///
+    /// `classes`: lobes of the same number always have the same share.
+    fn sums(
         &self,
         psf: &EffectivePsf,
-        stars: &[PsfStar],
+        (stars, classes): (&[PsfStar], &[usize]),
         fitter: &mut StarFitter,
     ) -> [LobeSums; 2] {
-        let mut of_halves = [0; 2].map(|_| LobeSums::new(self, psf.form));
+        let mut of_halves = [0; 2].map(|_| LobeSums::new(psf.form, classes));
         let mut images = LobeImages::default();
         let mut local = LocalPsf::default();
-        let mut pixels = Vec::new();
         let every_lobe = self.lobes.iter().map(|&lobe| FieldLobe {
             lobe,
             corner_share: lobe.share,
@@ -164,13 +167,39 @@ impl LobeGrid {
         };
         for (number, star) in stars.iter().enumerate() {
             let (x_px, y_px) = (star.spot.x, star.spot.y);
-            fitter.weigh(star, psf, &mut pixels);
+            fitter.weigh(star, psf, (&mut images.roots, &mut images.values));
             all.place_lobes(x_px, y_px, &mut local);
-            images.draw(star, &local, &pixels);
+            images.draw(star, &local, &of_halves[0].images);
             let outward = psf.moments.frame.distance(x_px, y_px);
             of_halves[number % 2].add(&images, outward);
         }
         of_halves
+    }
+
+    /// [`Self::sums`] for solutions of the form of `psf` alone.
+    pub fn sums_of_form(
+        &self,
+        psf: &EffectivePsf,
+        stars: &[PsfStar],
+        fitter: &mut StarFitter,
+    ) -> [LobeSums; 2] {
+        let all = self.classes(psf.form);
+        // In the corners fewer shares are the same than in the centre.
+        let classes = match psf.form {
+            FieldForm::Symmetric | FieldForm::Fixed => &all,
+            FieldForm::Radial => &self.reflected,
+        };
+        self.sums(psf, (stars, classes), fitter)
+    }
+
+    /// [`Self::sums`] for solutions of [`FieldForm::Symmetric`] and [`FieldForm::Fixed`].
+    pub fn sums_of_fixed(
+        &self,
+        psf: &EffectivePsf,
+        stars: &[PsfStar],
+        fitter: &mut StarFitter,
+    ) -> [LobeSums; 2] {
+        self.sums(psf, (stars, &self.classes(FieldForm::Fixed)), fitter)
     }
 
     /// The lobes that fit best.
@@ -181,16 +210,58 @@ impl LobeGrid {
     }
 }
 
-/// The pixels of one star and the light of each lobe in them, over their noise.
+/// The images of lobes that have the same share, which are summed.
+#[derive(Debug, Clone)]
+struct ImageClasses {
+    /// The image that each lobe is a part of.
+    of_lobes: Vec<usize>,
+    /// The first lobe of each image.
+    first_lobes: Vec<usize>,
+}
+
+impl ImageClasses {
+    /// An image for each class of lobes.
+    fn of(classes: &[usize]) -> Self {
+        let (of_lobes, _) = ranks(classes);
+        let mut first_lobes = Vec::new();
+        for (lobe, image) in of_lobes.iter().enumerate() {
+            if *image == first_lobes.len() {
+                first_lobes.push(lobe);
+            }
+        }
+        Self {
+            of_lobes,
+            first_lobes,
+        }
+    }
+
+    /// Number of images, empty ones included that fill the last block.
+    fn padded_count(&self) -> usize {
+        self.first_lobes.len().next_multiple_of(BLOCK)
+    }
+}
+
+/// The rank of each class among all, and the number of classes.
+fn ranks(classes: &[usize]) -> (Vec<usize>, usize) {
+    let mut names = classes.to_vec();
+    names.sort_unstable();
+    names.dedup();
+    let rank = |class: &usize| names.binary_search(class).unwrap_or_default();
+    (classes.iter().map(rank).collect(), names.len())
+}
+
+/// The pixels of one star and the light of each image in them, over their noise.
 #[derive(Debug, Default)]
 struct LobeImages {
-    /// Lobe by lobe, each in whole groups.
-    light: Vec<PixelGroup>,
-    /// Rows of each lobe that have light.
+    /// Block by block, each row by row; empty images fill the last block.
+    light: Vec<Block>,
+    /// Rows of each image that have light.
     rows: Vec<[usize; 2]>,
     /// Groups in a row.
     width: usize,
-    values: Vec<PixelGroup>,
+    /// The pixels above the background, times the square roots of their weights: the first image of
+    /// a block.
+    values: Vec<Block>,
     /// Square roots of the weights.
     roots: Vec<PixelGroup>,
     profiles: NarrowProfiles,
@@ -198,111 +269,137 @@ struct LobeImages {
 
 impl LobeImages {
     /// Draws lobes with shares of one, for pixels with weights and values.
-    fn draw(&mut self, star: &PsfStar, local: &LocalPsf, pixels: &[[f64; 2]]) {
+    fn draw(&mut self, star: &PsfStar, local: &LocalPsf, classes: &ImageClasses) {
         let PsfStar { window, spot, .. } = star;
-        let width = window.groups();
-        let empty = [0.0; GROUP_PX];
-        for part in [&mut self.values, &mut self.roots] {
-            part.clear();
-            part.resize(width * window.height, empty);
-        }
-        for (number, [weight, value]) in pixels.iter().enumerate() {
-            let (row, column) = (number / window.width, number % window.width);
-            let (group, lane) = (row * width + column / GROUP_PX, column % GROUP_PX);
-            let root = weight.sqrt();
-            self.roots[group][lane] = root as f32;
-            self.values[group][lane] = (root * value) as f32;
-        }
-        self.width = width;
+        let pixels = self.values.len();
+        let count = classes.padded_count();
+        self.width = window.groups();
         self.rows.clear();
+        self.rows.resize(count, [usize::MAX, 0]);
         self.light.clear();
-        self.light
-            .resize(local.lobes.len() * self.values.len(), empty);
-        let images = self.light.chunks_exact_mut(self.values.len());
-        for (lobe, image) in local.lobes.iter().zip(images) {
+        let empty = [[0.0; GROUP_PX]; BLOCK];
+        self.light.resize(count / BLOCK * pixels, empty);
+        let flux = (spot.flux / window.noise_adu) as f32;
+        for (lobe, &image) in local.lobes.iter().zip(&classes.of_lobes) {
             let place = [
                 spot.x + lobe.offset_px[0] - window.x0 as f64,
                 spot.y + lobe.offset_px[1] - window.y0 as f64,
             ];
             let size = [window.width, window.height];
             let part = self.profiles.fill(place, lobe.sigma_px, size);
-            self.rows.push(part.rows);
-            for row in part.rows[0]..part.rows[1] {
-                let of_row = spot.flux as f32 * self.profiles.down(row, &part).value;
-                for group in part.groups[0]..part.groups[1] {
-                    let columns = self.profiles.across(group, &part).value;
-                    let at = row * width + group;
-                    let roots = &self.roots[at];
-                    image[at] = std::array::from_fn(|lane| of_row * columns[lane] * roots[lane]);
-                }
-            }
+            let [first, end] = &mut self.rows[image];
+            (*first, *end) = ((*first).min(part.rows[0]), (*end).max(part.rows[1]));
+            let block = &mut self.light[image / BLOCK * pixels..][..pixels];
+            let of_pixels = (block, &self.roots[..]);
+            let profiles = (&self.profiles, part);
+            add_lobe(flux, profiles, of_pixels, [image % BLOCK, self.width]);
         }
     }
 
-    /// The groups of two images, in the rows in which both lobes have light.
-    fn common(&self, i: usize, j: usize) -> [&[PixelGroup]; 2] {
-        let ([a, b], [c, d]) = (self.rows[i], self.rows[j]);
-        let first = a.max(c);
-        let last = b.min(d).max(first);
-        let count = self.values.len();
-        let rows = first * self.width..last * self.width;
-        [i, j].map(|lobe| &self.light[lobe * count..][rows.clone()])
+    /// The groups of two blocks, in the rows in which both have light.
+    fn common(&self, blocks: [usize; 2]) -> [&[Block]; 2] {
+        let [[a, b], [c, d]] = blocks.map(|block| {
+            let of_block = self.rows[block * BLOCK..][..BLOCK].iter();
+            of_block.fold([usize::MAX, 0], |[first, end], rows| {
+                [first.min(rows[0]), end.max(rows[1])]
+            })
+        });
+        let end = b.min(d);
+        let first = a.max(c).min(end);
+        blocks.map(|block| {
+            let of_block = &self.light[block * self.values.len()..];
+            &of_block[first * self.width..end * self.width]
+        })
+    }
+}
+
+/// Adds a lobe to the image of this number of a block, in rows of `width` groups, times the square
+/// roots of the weights.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn add_lobe(
+    flux: f32,
+    (profiles, part): (&NarrowProfiles, LitPart),
+    (block, roots): (&mut [Block], &[PixelGroup]),
+    [image, width]: [usize; 2],
+) {
+    for row in part.rows[0]..part.rows[1] {
+        let of_row = flux * profiles.down(row, &part).value;
+        for group in part.groups[0]..part.groups[1] {
+            let columns = profiles.across(group, &part).value;
+            let at = row * width + group;
+            let light = each_of(&columns, &roots[at], |column, root| of_row * column * root);
+            let into = &mut block[at][image];
+            *into = plus(into, &light);
+        }
     }
 }
 
 /// Normal equations of the shares: of the centre, and where the PSF changes of the corners.
 #[derive(Debug, Clone)]
 pub(super) struct LobeSums {
-    form: FieldForm,
-    matrix: DMatrix<f64>,
-    right: DVector<f64>,
+    images: ImageClasses,
+    /// Sums of the products of images i ≤ j in row i and column j; where the PSF changes, weighted
+    /// with the product of the parts that two shares have: both of the centre, one, none.
+    products: Vec<DMatrix<f64>>,
+    /// Products of the images and the values, for each set of shares.
+    right: Vec<Vec<f64>>,
 }
 
 impl LobeSums {
-    fn new(grid: &LobeGrid, form: FieldForm) -> Self {
+    fn new(form: FieldForm, classes: &[usize]) -> Self {
         let sets = match form {
             FieldForm::Symmetric | FieldForm::Fixed => 1,
             FieldForm::Radial => 2,
         };
-        let count = sets * grid.lobes.len();
+        let images = ImageClasses::of(classes);
+        let count = images.padded_count();
         Self {
-            form,
-            matrix: DMatrix::zeros(count, count),
-            right: DVector::zeros(count),
+            images,
+            products: vec![DMatrix::zeros(count, count); 2 * sets - 1],
+            right: vec![vec![0.0; count]; sets],
         }
     }
 
     /// The sums over both halves.
     pub fn plus(&self, other: &Self) -> Self {
-        Self {
-            form: self.form,
-            matrix: &self.matrix + &other.matrix,
-            right: &self.right + &other.right,
+        let mut sums = self.clone();
+        for (sum, other) in sums.products.iter_mut().zip(&other.products) {
+            *sum += other;
         }
+        let right = sums.right.iter_mut().flatten();
+        for (sum, other) in right.zip(other.right.iter().flatten()) {
+            *sum += other;
+        }
+        sums
     }
 
     /// Adds the pixels of a star.
     fn add(&mut self, images: &LobeImages, outward: f64) {
-        let parts: &[f64] = match self.form {
-            FieldForm::Symmetric | FieldForm::Fixed => &[1.0],
-            FieldForm::Radial => &[1.0 - outward, outward],
+        let inward = 1.0 - outward;
+        let (of_sets, of_products): (&[f64], &[f64]) = match self.right.len() {
+            1 => (&[1.0], &[1.0]),
+            _ => (
+                &[inward, outward],
+                &[inward * inward, inward * outward, outward * outward],
+            ),
         };
-        let pixels = images.values.len();
-        let count = images.rows.len();
-        for (i, lobe) in images.light.chunks_exact(pixels).enumerate() {
-            let right = dot(lobe, &images.values);
-            for (set, part) in parts.iter().enumerate() {
-                self.right[set * count + i] += part * right;
+        let blocks = images.light.chunks_exact(images.values.len());
+        for (block, light) in blocks.enumerate() {
+            let products = products_of(light, &images.values);
+            for (number, [product, ..]) in products.iter().enumerate() {
+                for (right, part) in self.right.iter_mut().zip(of_sets) {
+                    right[block * BLOCK + number] += part * product;
+                }
             }
-            for j in 0..=i {
-                let [lobe, other] = images.common(i, j);
-                let product = dot(lobe, other);
-                for (a, of_row) in parts.iter().enumerate() {
-                    for (b, of_column) in parts.iter().enumerate() {
-                        let part = of_row * of_column * product;
-                        self.matrix[(a * count + i, b * count + j)] += part;
-                        if i != j {
-                            self.matrix[(a * count + j, b * count + i)] += part;
+        }
+        for column in 0..images.rows.len() / BLOCK {
+            for row in 0..=column {
+                let [of_column, of_row] = images.common([column, row]);
+                let products = products_of(of_column, of_row);
+                for (sums, part) in self.products.iter_mut().zip(of_products) {
+                    for (j, products) in products.iter().enumerate() {
+                        for (i, product) in products.iter().enumerate() {
+                            sums[(row * BLOCK + i, column * BLOCK + j)] += part * product;
                         }
                     }
                 }
@@ -310,63 +407,72 @@ impl LobeSums {
         }
     }
 
-    /// The non-negative shares, by coordinate descent from those of `expected`, which count as
-    /// known to within a part of themselves. Shares of the same class are equal.
+    /// The non-negative shares of the lobes, by coordinate descent from those of `expected`, which
+    /// count as known to within a part of themselves. Shares of the same class are equal.
     fn solve(&self, expected: &[f64], classes: &[usize]) -> Vec<f64> {
-        const SWEEPS: usize = 200;
-        /// Descent ends when no share changes by more.
-        const MIN_CHANGE: f64 = 1e-5;
         /// Uncertainty of what is expected: of the share, and of the largest share.
         const UNCERTAIN: [f64; 2] = [1.0, 0.5];
+        let lobes = expected.len();
         let largest = expected.iter().copied().fold(0.0, f64::max);
-        let expected = |number: usize| expected[number % expected.len()];
-        let mut names = classes.to_vec();
-        names.sort_unstable();
-        names.dedup();
-        // Each share is that of its class.
-        let class = |number: usize| names.binary_search(&classes[number]).unwrap_or_default();
-        let count = names.len();
+        let (class_of, count) = ranks(classes);
         let mut matrix = DMatrix::<f64>::zeros(count, count);
-        let mut right = DVector::<f64>::zeros(count);
+        let mut right = vec![0.0; count];
         let mut shares = vec![0.0; count];
-        for number in 0..classes.len() {
-            let at = class(number);
-            let share = expected(number);
+        for (number, &class) in class_of.iter().enumerate() {
+            let share = expected[number % lobes];
             let weight = (UNCERTAIN[0] * share + UNCERTAIN[1] * largest).powi(-2);
-            shares[at] = share;
-            matrix[(at, at)] += weight;
-            right[at] += self.right[number] + weight * share;
-            for other in 0..classes.len() {
-                matrix[(at, class(other))] += self.matrix[(number, other)];
+            shares[class] = share;
+            matrix[(class, class)] += weight;
+            right[class] += weight * share;
+        }
+        for (set, of_set) in self.right.iter().enumerate() {
+            let class =
+                |set: usize, image: usize| class_of[set * lobes + self.images.first_lobes[image]];
+            for i in 0..self.images.first_lobes.len() {
+                let at = class(set, i);
+                right[at] += of_set[i];
+                for other in 0..self.right.len() {
+                    let products = &self.products[set + other];
+                    for j in 0..self.images.first_lobes.len() {
+                        matrix[(class(other, j), at)] += products[(i.min(j), i.max(j))];
+                    }
+                }
             }
         }
-        for _ in 0..SWEEPS {
-            let mut moved = 0.0f64;
-            for k in 0..count {
-                let column = matrix.column(k);
-                let product: f64 = column.iter().zip(&shares).map(|(a, s)| a * s).sum();
-                let share = (shares[k] + (right[k] - product) / column[k]).max(0.0);
-                moved = moved.max((share - shares[k]).abs());
-                shares[k] = share;
-            }
-            if moved < MIN_CHANGE {
-                break;
-            }
-        }
-        (0..classes.len())
-            .map(|number| shares[class(number)])
-            .collect()
+        descend(matrix.as_slice(), &mut right, &mut shares);
+        class_of.iter().map(|&class| shares[class]).collect()
     }
 }
 
-/// The sum of the products of pixels.
+/// Coordinate descent to the non-negative solution, from the one given; `right` becomes the residual
+/// of the equations. `matrix` is column by column.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn dot(a: &[PixelGroup], b: &[PixelGroup]) -> f64 {
-    let mut sum = [0.0f32; GROUP_PX];
-    for (a, b) in a.iter().zip(b) {
-        for lane in 0..GROUP_PX {
-            sum[lane] += a[lane] * b[lane];
+fn descend(matrix: &[f64], right: &mut [f64], solution: &mut [f64]) {
+    const SWEEPS: usize = 200;
+    /// Descent ends when no value changes by more.
+    const MIN_CHANGE: f64 = 1e-5;
+    let count = solution.len().max(1);
+    for (column, value) in matrix.chunks_exact(count).zip(&*solution) {
+        for (right, factor) in right.iter_mut().zip(column) {
+            *right -= factor * value;
         }
     }
-    sum.iter().copied().map(f64::from).sum()
+    for _ in 0..SWEEPS {
+        let mut moved = 0.0f64;
+        for (number, column) in matrix.chunks_exact(count).enumerate() {
+            let before = solution[number];
+            let after = (before + right[number] / column[number]).max(0.0);
+            let change = after - before;
+            if change != 0.0 {
+                solution[number] = after;
+                moved = moved.max(change.abs());
+                for (right, factor) in right.iter_mut().zip(column) {
+                    *right -= factor * change;
+                }
+            }
+        }
+        if moved < MIN_CHANGE {
+            break;
+        }
+    }
 }

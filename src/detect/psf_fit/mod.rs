@@ -99,20 +99,24 @@ impl Settled {
             spot_px: maps.spot_px,
             radius_px: radius_px(maps),
         };
-        let mut round = |psf: &mut EffectivePsf| {
+        let mut round = |psf: &mut EffectivePsf, is_last: bool| {
             for _ in 0..STEPS {
                 fitter.step(stars, psf, true);
                 (psf.moments, is_varied) = moments_over_field(frame, stars);
             }
-            let [even, odd] = grid.sums(psf, stars, fitter);
+            let [even, odd] = if is_last {
+                grid.sums_of_fixed(psf, stars, fitter)
+            } else {
+                grid.sums_of_form(psf, stars, fitter)
+            };
             psf.lobes = grid.solve(&even.plus(&odd), psf.form);
             for _ in 0..STEPS {
                 fitter.step(stars, psf, false);
             }
             [even, odd]
         };
-        round(&mut psf);
-        let sums = round(&mut psf);
+        round(&mut psf, false);
+        let sums = round(&mut psf, true);
         Self {
             psf,
             sums,
@@ -177,12 +181,12 @@ fn best_of(
         let mut stars = stars.to_vec();
         let mut radial = of_form(FieldForm::Radial);
         // The stars move to the centres of light of such spots.
-        let [even, odd] = grid.sums(&radial, &stars, fitter);
+        let [even, odd] = grid.sums_of_form(&radial, &stars, fitter);
         radial.lobes = grid.solve(&even.plus(&odd), radial.form);
         for _ in 0..STEPS {
             fitter.step(&mut stars, &radial, false);
         }
-        let sums = grid.sums(&radial, &stars, fitter);
+        let sums = grid.sums_of_form(&radial, &stars, fitter);
         consider(Candidate::of(grid, &radial, &sums, &stars, fitter));
     }
     best

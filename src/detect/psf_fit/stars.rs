@@ -5,7 +5,10 @@ use crate::detect::candidates::Peak;
 use crate::detect::effective_psf::{
     EffectivePsf, FieldFrame, FieldMoments, LocalPsf, SpotMoments, covariance_by, stretch_by,
 };
-use crate::detect::fit::{FrameMaps, NoiseModel, NormalEquations, SpotEstimate, Window};
+use crate::detect::fit::{
+    BLOCK, Block, FrameMaps, NoiseModel, NormalEquations, SpotEstimate, Window, WindowPixels,
+    sum_of,
+};
 use crate::detect::psf::{GROUP_PX, LitPart, NarrowProfiles, PixelGroup};
 use crate::detect::star_model::isolated_peaks;
 use multiversion::multiversion;
@@ -66,42 +69,43 @@ impl StarFitter {
     /// `free`.
     pub fn step(&mut self, stars: &mut [PsfStar], psf: &EffectivePsf, free: bool) {
         for star in stars {
-            let parameters = if free { PARAMETERS } else { PLACE };
-            let change = self.step_one(star, psf, parameters);
-            if free {
-                let here = psf.moments.at(star.spot.x, star.spot.y);
-                let is_finite = |change: &SpotMoments| change.iter().all(|c| c.is_finite());
-                let change = change.filter(is_finite).unwrap_or_default();
-                star.moments = std::array::from_fn(|i| here[i] + change[i].clamp(-0.5, 0.5));
+            if !free {
+                self.step_one::<PLACE>(star, psf);
+                continue;
             }
+            let change = self.step_one::<PARAMETERS>(star, psf);
+            let here = psf.moments.at(star.spot.x, star.spot.y);
+            let is_finite = |change: &SpotMoments| change.iter().all(|c| c.is_finite());
+            let change = change.filter(is_finite).unwrap_or_default();
+            star.moments = std::array::from_fn(|i| here[i] + change[i].clamp(-0.5, 0.5));
         }
     }
 
-    /// A step of one star; returns the change of its moments, `None` where there is no solution.
-    fn step_one(
+    /// A step of the first `N` parameters of one star; returns the change of its moments, `None`
+    /// where there is no solution.
+    fn step_one<const N: usize>(
         &mut self,
         star: &mut PsfStar,
         psf: &EffectivePsf,
-        parameters: usize,
     ) -> Option<SpotMoments> {
         /// Longest step, in pixels.
         const MAX_STEP_PX: f64 = 0.5;
-        self.draw(star, psf);
-        let mut normal = self.linearise(star);
+        self.draw::<N>(star, psf);
+        let mut normal = self.linearise::<N>(star);
         star.chi2 = normal.chi2 / (normal.pixels as f64 - PARAMETERS as f64).max(1.0);
-        if normal.factorise(parameters) < parameters {
+        if normal.factorise(N) < N {
             star.variances = [f64::INFINITY; 3];
             return None;
         }
-        let change = normal.solve(parameters);
-        let variances = normal.variances(parameters);
+        let change = normal.solve(N);
         star.spot.x += change[0].clamp(-MAX_STEP_PX, MAX_STEP_PX);
         star.spot.y += change[1].clamp(-MAX_STEP_PX, MAX_STEP_PX);
         star.spot.flux += change[2];
         star.background += change[3];
-        if parameters < PARAMETERS {
+        if N < PARAMETERS {
             return Some([0.0; 3]);
         }
+        let variances = normal.variances(N);
         star.variances = std::array::from_fn(|i| variances[PLACE + i]);
         Some(std::array::from_fn(|i| change[PLACE + i]))
     }
@@ -109,13 +113,14 @@ impl StarFitter {
     /// Chi² of a star a step of its fit to `psf` on.
     pub fn chi2(&mut self, star: &PsfStar, psf: &EffectivePsf) -> f64 {
         let mut star = star.clone();
-        let _ = self.step_one(&mut star, psf, PLACE);
-        self.draw(&star, psf);
-        self.linearise(&star).chi2
+        let _ = self.step_one::<PLACE>(&mut star, psf);
+        self.draw::<PLACE>(&star, psf);
+        self.linearise::<PLACE>(&star).chi2
     }
 
-    /// Computes the shares of the pixels of a star with this PSF.
-    fn draw(&mut self, star: &PsfStar, psf: &EffectivePsf) {
+    /// Computes the shares of the pixels of a star with this PSF; with fewer than all parameters,
+    /// not their derivatives with respect to the moments.
+    fn draw<const N: usize>(&mut self, star: &PsfStar, psf: &EffectivePsf) {
         let Self {
             profiles,
             shares,
@@ -142,71 +147,136 @@ impl StarFitter {
                 spot.y + dy - window.y0 as f64,
             ];
             let part = profiles.fill(place, lobe.sigma_px, [window.width, window.height]);
+            let share = lobe.share as f32;
+            if N < PARAMETERS {
+                add_still_lobe(share, (profiles, part), shares, width);
+                continue;
+            }
             let widening = of_single.unwrap_or_else(|| widening_of(lobe.sigma_px));
             let changes = LobeChanges {
                 per_sigma: (1.0 / lobe.sigma_px) as f32,
                 moves: stretches.map(|rows| rows.map(|[a, b]| (a * dx + b * dy) as f32)),
                 widening: widening.map(|of_moment| of_moment.map(|change| change as f32)),
             };
-            add_lobe(lobe.share as f32, &changes, (profiles, part), shares, width);
+            add_lobe(share, &changes, (profiles, part), shares, width);
         }
     }
 
-    /// The normal equations of a star whose shares were drawn, in ADU.
-    fn linearise(&self, star: &PsfStar) -> NormalEquations<PARAMETERS> {
+    /// The normal equations of the first `N` parameters of a star whose shares were drawn, in ADU.
+    fn linearise<const N: usize>(&self, star: &PsfStar) -> NormalEquations<N> {
         let PsfStar { window, spot, .. } = star;
+        let pixels = self.pixels(star);
         let mut normal = NormalEquations::empty();
-        let flux = spot.flux;
-        for (value, weight, share) in self.pixels(star) {
-            let [part, by_x, by_y, by_size, by_e1, by_e2] = share;
-            let gradient = [
-                flux * by_x,
-                flux * by_y,
-                part,
-                1.0,
-                flux * by_size,
-                flux * by_e1,
-                flux * by_e2,
-            ];
-            let residual = value - flux * part - star.background;
-            for i in 0..PARAMETERS {
-                normal.right[i] += weight * gradient[i] * residual;
-                for j in 0..=i {
-                    normal.matrix[i][j] += weight * gradient[i] * gradient[j];
-                }
-            }
-            normal.chi2 += weight * residual * residual;
-            normal.pixels += 1;
-        }
+        let flux = (spot.flux * pixels.per_noise) as f32;
+        add_pixels(&mut normal, flux, &self.shares, &pixels);
         let weight = window.background_error.powi(-2);
         normal.matrix[3][3] += weight;
         normal.right[3] -= weight * star.background;
         normal
     }
 
-    /// Value above the map in ADU, weight and shares of the pixels.
-    fn pixels<'a>(&'a self, star: &'a PsfStar) -> impl Iterator<Item = (f64, f64, [f64; 6])> {
-        let PsfStar { window, spot, .. } = star;
-        let (noise, flux) = (self.noise, spot.flux);
-        let noise2 = window.noise_adu.powi(2);
-        let groups = window.groups();
-        window.pixels_adu().map(move |(column, row, value)| {
-            let (column, row) = (column as usize, row as usize);
-            let group = &self.shares[row * groups + column / GROUP_PX];
-            let share = group.map(|of_group| f64::from(of_group[column % GROUP_PX]));
-            let light = (flux * share[0]).max(0.0);
-            let variance = noise2 + light * (noise.shot_adu + noise.model_error2 * light);
-            (value, 1.0 / variance, share)
-        })
+    /// The pixels of a star with its background.
+    fn pixels<'a>(&self, star: &'a PsfStar) -> WindowPixels<'a> {
+        let window = &star.window;
+        let per_noise = 1.0 / window.noise_adu;
+        WindowPixels {
+            data: &window.data,
+            groups: window.groups(),
+            per_noise,
+            background: (star.background * per_noise) as f32,
+            variance: [
+                (self.noise.shot_adu * per_noise) as f32,
+                self.noise.model_error2 as f32,
+            ],
+        }
     }
 
-    /// Weight, and value above the background in ADU, of each pixel of a star with this PSF.
-    pub fn weigh(&mut self, star: &PsfStar, psf: &EffectivePsf, into: &mut Vec<[f64; 2]>) {
-        self.draw(star, psf);
-        into.clear();
+    /// Square root of the weight, and as the first of a block the value above the background times
+    /// that root, of each pixel of a star with this PSF, in units of the noise. Those of pixels that
+    /// are left out are 0.
+    pub fn weigh(
+        &mut self,
+        star: &PsfStar,
+        psf: &EffectivePsf,
+        (roots, values): (&mut Vec<PixelGroup>, &mut Vec<Block>),
+    ) {
+        self.draw::<PLACE>(star, psf);
         let pixels = self.pixels(star);
-        into.extend(pixels.map(|(value, weight, _)| [weight, value - star.background]));
+        let flux = (star.spot.flux * pixels.per_noise) as f32;
+        roots.clear();
+        values.clear();
+        for (data, shares) in pixels.data.iter().zip(&self.shares) {
+            let root = |lane: usize| {
+                let root = 1.0 / pixels.variance(flux * shares[0][lane]).sqrt();
+                if data[lane].is_nan() { 0.0 } else { root }
+            };
+            let of_group: PixelGroup = std::array::from_fn(root);
+            let value = |lane: usize| {
+                let above = data[lane] - pixels.background;
+                if above.is_nan() {
+                    0.0
+                } else {
+                    of_group[lane] * above
+                }
+            };
+            let mut block = [[0.0; GROUP_PX]; BLOCK];
+            block[0] = std::array::from_fn(value);
+            values.push(block);
+            roots.push(of_group);
+        }
     }
+}
+
+/// Adds the pixels of a star to the normal equations of its first `N` parameters; `flux` is in units
+/// of the noise.
+#[allow(
+    clippy::needless_range_loop,
+    reason = "rows and columns of matrices read best as indices"
+)]
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn add_pixels<const N: usize>(
+    normal: &mut NormalEquations<N>,
+    flux: f32,
+    shares: &[ShareGroup],
+    pixels: &WindowPixels<'_>,
+) {
+    let mut matrix = [[[0.0f32; GROUP_PX]; N]; N];
+    let mut right = [[0.0f32; GROUP_PX]; N];
+    let [mut chi2, mut valid] = [[0.0f32; GROUP_PX]; 2];
+    for group in 0..pixels.groups {
+        for (row, data) in pixels.column_of_groups(group).enumerate() {
+            let shares = shares[row * pixels.groups + group];
+            for lane in 0..GROUP_PX {
+                let part = shares[0][lane];
+                let by = |number: usize| flux * shares[number][lane];
+                let all = [by(1), by(2), part, 1.0, by(3), by(4), by(5)];
+                let light = flux * part;
+                let is_valid = !data[lane].is_nan();
+                let weight = 1.0 / pixels.variance(light);
+                let weight = if is_valid { weight } else { 0.0 };
+                let residual = data[lane] - light - pixels.background;
+                let residual = if is_valid { residual } else { 0.0 };
+                valid[lane] += if is_valid { 1.0 } else { 0.0 };
+                chi2[lane] += residual * residual * weight;
+                for i in 0..N {
+                    let weighted = all[i] * weight;
+                    right[i][lane] += weighted * residual;
+                    for j in 0..i + 1 {
+                        matrix[i][j][lane] += weighted * all[j];
+                    }
+                }
+            }
+        }
+    }
+    for i in 0..N {
+        let unit = pixels.unit(i, 1);
+        normal.right[i] += sum_of(right[i]) * unit;
+        for j in 0..i + 1 {
+            normal.matrix[i][j] += sum_of(matrix[i][j]) * unit * pixels.unit(j, 1);
+        }
+    }
+    normal.chi2 += sum_of(chi2);
+    normal.pixels += sum_of(valid) as usize;
 }
 
 /// What larger moments change in a lobe.
@@ -238,7 +308,8 @@ fn add_lobe(
             [down.value, down.by_center, down.by_sigma].map(|part| share * part);
         for group in part.groups[0]..part.groups[1] {
             let across = profiles.across(group, &part);
-            let into = &mut into[row * width + group];
+            // Copied so that the compiler need not assume aliasing.
+            let mut sums = into[row * width + group];
             for lane in 0..GROUP_PX {
                 let here = across.value[lane];
                 let by_x = across.by_center[lane] * value;
@@ -248,15 +319,41 @@ fn add_lobe(
                 let xx = 0.5 * across.by_sigma[lane] * value * changes.per_sigma;
                 let yy = 0.5 * here * growth * changes.per_sigma;
                 let xy = across.by_center[lane] * slope;
-                into[0][lane] += here * value;
-                into[1][lane] += by_x;
-                into[2][lane] += by_y;
+                sums[0][lane] += here * value;
+                sums[1][lane] += by_x;
+                sums[2][lane] += by_y;
                 for moment in 0..3 {
                     let [u, v] = changes.moves[moment];
                     let [cxx, cyy, cxy] = changes.widening[moment];
-                    into[3 + moment][lane] += by_x * u + by_y * v + xx * cxx + yy * cyy + xy * cxy;
+                    sums[3 + moment][lane] += by_x * u + by_y * v + xx * cxx + yy * cyy + xy * cxy;
                 }
             }
+            into[row * width + group] = sums;
+        }
+    }
+}
+
+/// Adds a lobe and its derivatives with respect to x and y to the rows of `width` groups.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn add_still_lobe(
+    share: f32,
+    (profiles, part): (&NarrowProfiles, LitPart),
+    into: &mut [ShareGroup],
+    width: usize,
+) {
+    for row in part.rows[0]..part.rows[1] {
+        let down = profiles.down(row, &part);
+        let [value, slope] = [down.value, down.by_center].map(|part| share * part);
+        for group in part.groups[0]..part.groups[1] {
+            let across = profiles.across(group, &part);
+            let into = &mut into[row * width + group];
+            let [mut shares, mut by_x, mut by_y, ..] = *into;
+            for lane in 0..GROUP_PX {
+                shares[lane] += across.value[lane] * value;
+                by_x[lane] += across.by_center[lane] * value;
+                by_y[lane] += across.value[lane] * slope;
+            }
+            (into[0], into[1], into[2]) = (shares, by_x, by_y);
         }
     }
 }
@@ -314,7 +411,7 @@ fn first_fit(
         let size = [star.moments[0], 0.0, 0.0];
         let psf =
             EffectivePsf::gaussian(FieldMoments::constant(frame, size), maps.spot_px, radius_px);
-        let [by_size, e1, e2] = fitter.step_one(&mut star, &psf, PARAMETERS)?;
+        let [by_size, e1, e2] = fitter.step_one::<PARAMETERS>(&mut star, &psf)?;
         let by_size = by_size.clamp(-0.3, 0.3);
         let [e1, e2] = [e1, e2].map(|e| e.clamp(-MAX_ELONGATION, MAX_ELONGATION));
         star.moments = [star.moments[0] + by_size, e1, e2];

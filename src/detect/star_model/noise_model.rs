@@ -201,9 +201,9 @@ fn sums_of<L: SpotLight>(
     let mut sums = [[0.0f32; GROUP_PX]; 5];
     for group in 0..pixels.groups {
         for (row, data) in pixels.column_of_groups(group).enumerate() {
-            let lights = [spot.in_group(group, row)];
+            let light_of_group = spot.in_group(group, row);
             for lane in 0..GROUP_PX {
-                let (light, gradient) = linearise(&lights, 1, lane);
+                let (light, gradient) = linearise(&light_of_group, lane);
                 let m2 = light * light;
                 let variance = pixels.variance(light);
                 let stands_out = light >= 0.0 && m2 >= 0.25 && !data[lane].is_nan();
