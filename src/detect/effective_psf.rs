@@ -6,7 +6,7 @@
 //! over the field.
 
 use super::detection::MeasuredPsf;
-use super::psf::MAX_WINDOW_PX;
+use super::psf::{Lobe, MAX_WINDOW_PX};
 use super::psf_table::PsfTable;
 
 /// Size and elongation of a spot: `[ln σ, e₁, e₂]`. Its covariance is `σ² exp(e₁ K + e₂ L)` with the
@@ -15,17 +15,6 @@ pub(crate) type SpotMoments = [f64; 3];
 
 /// Terms of the polynomials over the field: 1, x, y; x², xy, y²; the last three times r².
 pub(crate) const FIELD_TERMS: usize = 9;
-
-/// Part of a spot: a round Gaussian.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Lobe {
-    /// Position relative to the spot's centre of light, along x and y, in pixels.
-    pub offset_px: [f64; 2],
-    /// Standard deviation, in pixels.
-    pub sigma_px: f64,
-    /// Share of the light.
-    pub share: f64,
-}
 
 /// A part of the spots of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

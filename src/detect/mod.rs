@@ -13,7 +13,7 @@
 //! 4. `candidates`: connected regions above the threshold, their peaks, and which of those are
 //!    sources of their own.
 //! 5. `psf_fit`: where the stars are not round Gaussians of one size (motion, defocus, aberrations),
-//!    an effective PSF is measured on the bright ones, and tabulated (`psf_table`).
+//!    an effective PSF is measured on the bright ones, and tabulated (`field_tables`).
 //! 6. `fit`, `measure`: a fit of each source, together with those that it touches, or a
 //!    grey-weighted centroid; flags for what is no star, or no whole one.
 //! 7. `wings`: light of the stars beyond the spots that are fitted, which is added to the fluxes.
@@ -39,6 +39,7 @@ mod config;
 mod detection;
 mod effective_psf;
 mod error;
+mod field_tables;
 mod filter;
 mod filter_model;
 mod fit;
@@ -66,11 +67,11 @@ pub use workspace::Workspace;
 use crate::frame::{Frame, MIN_SIDE_PX};
 use background::Mesh;
 use candidates::PeakSearch;
+use field_tables::FieldTables;
 use measure::{Measurement, Ring, StarShape};
 use pixels::View;
 use psf::PIXEL_VARIANCE_PX2;
 use psf_fit::measure_psf;
-use psf_table::FieldTables;
 use search::{FrameSearch, SearchInput};
 use wings::measure_wings;
 

@@ -20,6 +20,17 @@ pub(crate) const MAX_WINDOW_PX: usize = 49;
 
 /// Adjacent pixels of a row treated together.
 pub(crate) const GROUP_PX: usize = 8;
+/// Part of a spot: a round Gaussian.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Lobe {
+    /// Position relative to the spot's centre of light, along x and y, in pixels.
+    pub offset_px: [f64; 2],
+    /// Standard deviation, in pixels.
+    pub sigma_px: f64,
+    /// Share of the light.
+    pub share: f64,
+}
+
 /// Values of a group of adjacent pixels.
 pub(crate) type PixelGroup = [f32; GROUP_PX];
 /// Groups in the longest side of a window.

@@ -2,11 +2,11 @@
 
 use super::stars::{PsfStar, StarFitter};
 use crate::detect::effective_psf::{
-    EffectivePsf, FieldForm, FieldLobe, Lobe, LocalPsf, SpotMoments, covariance, inverse,
+    EffectivePsf, FieldForm, FieldLobe, LocalPsf, SpotMoments, covariance, inverse,
 };
 use crate::detect::fit::{BLOCK, Block, products_of};
 use crate::detect::lanes::{each_of, plus};
-use crate::detect::psf::{GROUP_PX, LitPart, NarrowProfiles, PixelGroup};
+use crate::detect::psf::{GROUP_PX, LitPart, Lobe, NarrowProfiles, PixelGroup};
 use multiversion::multiversion;
 use nalgebra::DMatrix;
 
