@@ -5,17 +5,8 @@
 
 mod common;
 
-use common::{Ran, fixture, number, starpipe};
+use common::{Ran, fixture, number, report, starpipe};
 use serde_json::Value;
-
-/// The report of the fixture `name` by `process`.
-fn report(name: &str, options: &[&str]) -> Value {
-    let mut command = starpipe();
-    command.args(["process", "--format", "json"]).args(options);
-    let ran = Ran::new(command.arg(fixture(name)));
-    assert_eq!(ran.status, 0, "{}", ran.stderr);
-    ran.reports().remove(0)
-}
 
 fn named(report: &Value) -> Vec<&Value> {
     let stars = report["stars"].as_array().unwrap().iter();

@@ -4,20 +4,11 @@
 
 mod common;
 
-use common::{Ran, fixture, number, starpipe};
+use common::{Ran, fixture, number, report, starpipe};
 use serde_json::Value;
 
 /// Largest difference between a residual and the distance computed here: the report's digits.
 const SAME_PX: f64 = 2e-4;
-
-/// The report of the fixture `name`.
-fn report(name: &str, options: &[&str]) -> Value {
-    let mut command = starpipe();
-    command.args(["process", "--format", "json"]).args(options);
-    let ran = Ran::new(command.arg(fixture(name)));
-    assert_eq!(ran.status, 0, "{}", ran.stderr);
-    ran.reports().remove(0)
-}
 
 /// The product of two quaternions [w, x, y, z].
 fn product(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {

@@ -171,23 +171,7 @@ mod tests {
     use super::*;
     use crate::detect::effective_psf::{FieldFrame, FieldLobe, FieldMoments};
     use crate::detect::psf::Lobe;
-
-    /// A lopsided spot of lobes of this size.
-    fn lobes(sigma_px: f64) -> Vec<Lobe> {
-        let offsets = [[-1.2, 0.1], [0.3, -0.6], [0.5, 0.4]];
-        let shares = [0.25, 0.35, 0.4];
-        let lobe = |(offset, share): ([f64; 2], f64)| Lobe {
-            offset_px: offset.map(|at| 2.0 * sigma_px * at),
-            sigma_px,
-            share,
-        };
-        let mut lobes: Vec<Lobe> = offsets.into_iter().zip(shares).map(lobe).collect();
-        for axis in 0..2 {
-            let centre: f64 = lobes.iter().map(|l| l.share * l.offset_px[axis]).sum();
-            lobes.iter_mut().for_each(|l| l.offset_px[axis] -= centre);
-        }
-        lobes
-    }
+    use crate::detect::psf_table::tests::lobes;
 
     #[test]
     fn tables_between_nodes_agree_with_the_spot_there() {

@@ -390,7 +390,7 @@ fn add_lobe(layout: Layout, profiles: &[SplineProfile; 2], share: f32, table: &m
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::detect::psf::NarrowProfiles;
 
@@ -402,7 +402,7 @@ mod tests {
     const SIZES: [(f64, f32); 3] = [(0.4, 0.2), (0.65, 0.06), (1.4, 0.03)];
 
     /// A lopsided spot of lobes of this size.
-    fn lobes(sigma_px: f64) -> Vec<Lobe> {
+    pub fn lobes(sigma_px: f64) -> Vec<Lobe> {
         let offsets = [[-1.2, 0.1], [0.3, -0.6], [0.5, 0.4]];
         let shares = [0.25, 0.35, 0.4];
         let lobe = |(offset, share): ([f64; 2], f64)| Lobe {

@@ -190,9 +190,7 @@ impl Blends {
             v_mag: f64::from(star.v_mag) - 2.5 * sum.log10(),
         })
     }
-}
 
-impl Blends {
     /// The stars near a predicted star that may be blended with it.
     fn near(&mut self, view: &View, (predicted, index): (usize, StarIndex)) -> Near {
         let known = self.near[predicted].filter(|near| near.chord >= view.chord);

@@ -129,3 +129,12 @@ impl Truth {
         number(report, "/optics/fov_x_deg") / self.fov_x_deg - 1.0
     }
 }
+
+/// The report of the fixture `name` by `process`.
+pub fn report(name: &str, options: &[&str]) -> Value {
+    let mut command = starpipe();
+    command.args(["process", "--format", "json"]).args(options);
+    let ran = Ran::new(command.arg(fixture(name)));
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    ran.reports().remove(0)
+}

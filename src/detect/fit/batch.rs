@@ -5,11 +5,11 @@
 //! the sum across a vector takes as long as the pixels.
 
 use super::frame_maps::FrameMaps;
-use super::gauss_newton::{MAX_STEPS, StepOutcome, add_background_map, advance, pixels_of};
+use super::gauss_newton::{MAX_STEPS, StepOutcome, add_background_map, advance};
 use super::light::spot_gradient;
 use super::normal::NormalEquations;
 use super::parameters::{Fit, FitConfig, ONE_SPOT, SpotEstimate};
-use super::sums::{flux_variance_of, variance_of};
+use super::sums::{WindowPixels, flux_variance_of, variance_of};
 use super::window::{Window, window_radius};
 use crate::detect::psf::{Cumulative, ProfilePart};
 use multiversion::multiversion;
@@ -237,7 +237,7 @@ impl BatchFitter {
             let Some(spot) = fit.spots.first() else {
                 continue;
             };
-            let pixels = pixels_of(window, fit, config);
+            let pixels = WindowPixels::new(window, fit.background, &config.noise);
             model.flux[lane] = (spot.flux * pixels.per_noise) as f32;
             model.background[lane] = pixels.background;
             for (of_model, of_pixels) in model.variance.iter_mut().zip(pixels.variance) {
@@ -255,7 +255,7 @@ impl BatchFitter {
         config: &FitConfig,
     ) -> NormalEquations<ONE_SPOT> {
         let (fit, window) = (&self.fits[lane], &self.windows[lane]);
-        let pixels = pixels_of(window, fit, config);
+        let pixels = WindowPixels::new(window, fit.background, &config.noise);
         let units: [f64; ONE_SPOT] = std::array::from_fn(|i| pixels.unit(i, 1));
         let mut normal = NormalEquations::empty();
         for i in 0..ONE_SPOT {

@@ -1,6 +1,6 @@
 //! Fits spots to the pixels of a window.
 
-use super::gauss_newton::{MAX_STEPS, StepOutcome, add_background_map, advance, finish, pixels_of};
+use super::gauss_newton::{MAX_STEPS, StepOutcome, add_background_map, advance, finish};
 use super::light::{GaussianLight, add_light};
 use super::mixture::{MixtureImage, MixtureLight};
 use super::normal::{CholeskyFactor, NormalEquations};
@@ -106,7 +106,7 @@ impl Fitter {
         };
         if let [spot] = fit.spots.as_slice() {
             // The light is that before the last step, a fraction of the standard error away.
-            let pixels = pixels_of(window, fit, &noise_only);
+            let pixels = WindowPixels::new(window, fit.background, &noise_only.noise);
             let error2 = window.background_noise * window.background_noise;
             let variance = match self.light_of(0, spot, window) {
                 AnyLight::Gaussian(light) => flux_variance(&light, &pixels, error2),
@@ -251,7 +251,7 @@ impl Fitter {
         if normal.factorise(ONE_SPOT) < ONE_SPOT {
             return None;
         }
-        let pixels = pixels_of(window, fit, config);
+        let pixels = WindowPixels::new(window, fit.background, &config.noise);
         let units = std::array::from_fn(|i| pixels.unit(i, 1));
         Some((normal.factor(units), self.light_of(0, spot, window), pixels))
     }
@@ -275,7 +275,7 @@ impl Fitter {
     ) -> NormalEquations<N> {
         let mut normal = NormalEquations::empty();
         self.draw(window, &fit.spots, fit.spot_px);
-        let pixels = pixels_of(window, fit, config);
+        let pixels = WindowPixels::new(window, fit.background, &config.noise);
         let spots = fit.spots.iter().enumerate();
         let mut sums = std::mem::take(&mut self.sums);
         if window.psf.is_gaussian() {

@@ -2,7 +2,6 @@
 
 use super::normal::NormalEquations;
 use super::parameters::{Fit, FitConfig, SPOT_RANGE_PX, SpotEstimate};
-use super::sums::WindowPixels;
 use super::window::Window;
 
 /// Maximum number of steps of a fit.
@@ -61,21 +60,6 @@ pub(super) fn add_background_map<const N: usize>(
     normal.matrix[b][b] += weight;
     normal.right[b] -= weight * fit.background;
     normal.chi2 += weight * fit.background * fit.background;
-}
-
-/// The pixels of a window with the background and the noise of a fit.
-pub(super) fn pixels_of<'a>(window: &'a Window, fit: &Fit, config: &FitConfig) -> WindowPixels<'a> {
-    let per_noise = 1.0 / window.noise_adu;
-    WindowPixels {
-        data: &window.data,
-        groups: window.groups(),
-        per_noise,
-        background: (fit.background * per_noise) as f32,
-        variance: [
-            (config.noise.shot_adu * per_noise) as f32,
-            config.noise.model_error2 as f32,
-        ],
-    }
 }
 
 /// Solves the equations at `fit` and takes step number `step`; completes the fit if it converged.

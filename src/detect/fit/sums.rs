@@ -7,7 +7,8 @@
 
 use super::light::{GroupLight, SpotLight, add_light, linearise};
 use super::normal::NormalEquations;
-use super::parameters::ONE_SPOT;
+use super::parameters::{NoiseModel, ONE_SPOT};
+use super::window::Window;
 use crate::detect::lanes::{each, each_of, plus, times};
 use crate::detect::psf::{GROUP_PX, PixelGroup};
 use multiversion::multiversion;
@@ -28,7 +29,22 @@ pub(crate) struct WindowPixels<'a> {
     pub variance: [f32; 2],
 }
 
-impl WindowPixels<'_> {
+impl<'a> WindowPixels<'a> {
+    /// The pixels of a window, with a fitted background in ADU.
+    pub fn new(window: &'a Window, background_adu: f64, noise: &NoiseModel) -> Self {
+        let per_noise = 1.0 / window.noise_adu;
+        Self {
+            data: &window.data,
+            groups: window.groups(),
+            per_noise,
+            background: (background_adu * per_noise) as f32,
+            variance: [
+                (noise.shot_adu * per_noise) as f32,
+                noise.model_error2 as f32,
+            ],
+        }
+    }
+
     /// One group of columns, row by row.
     #[inline(always)]
     pub fn column_of_groups(&self, group: usize) -> impl Iterator<Item = PixelGroup> {

@@ -165,7 +165,7 @@ impl StarFitter {
     /// The normal equations of the first `N` parameters of a star whose shares were drawn, in ADU.
     fn linearise<const N: usize>(&self, star: &PsfStar) -> NormalEquations<N> {
         let PsfStar { window, spot, .. } = star;
-        let pixels = self.pixels(star);
+        let pixels = WindowPixels::new(window, star.background, &self.noise);
         let mut normal = NormalEquations::empty();
         let flux = (spot.flux * pixels.per_noise) as f32;
         add_pixels(&mut normal, flux, &self.shares, &pixels);
@@ -173,22 +173,6 @@ impl StarFitter {
         normal.matrix[3][3] += weight;
         normal.right[3] -= weight * star.background;
         normal
-    }
-
-    /// The pixels of a star with its background.
-    fn pixels<'a>(&self, star: &'a PsfStar) -> WindowPixels<'a> {
-        let window = &star.window;
-        let per_noise = 1.0 / window.noise_adu;
-        WindowPixels {
-            data: &window.data,
-            groups: window.groups(),
-            per_noise,
-            background: (star.background * per_noise) as f32,
-            variance: [
-                (self.noise.shot_adu * per_noise) as f32,
-                self.noise.model_error2 as f32,
-            ],
-        }
     }
 
     /// Square root of the weight, and as the first of a block the value above the background times
@@ -201,7 +185,7 @@ impl StarFitter {
         (roots, values): (&mut Vec<PixelGroup>, &mut Vec<Block>),
     ) {
         self.draw::<PLACE>(star, psf);
-        let pixels = self.pixels(star);
+        let pixels = WindowPixels::new(&star.window, star.background, &self.noise);
         let flux = (star.spot.flux * pixels.per_noise) as f32;
         roots.clear();
         values.clear();

@@ -10,7 +10,8 @@
 //! Taylor, Worsley & Gosselin 2007, "Maxima of discretely sampled random fields", Biometrika 94, 1,
 //! doi 10.1093/biomet/asm004, for a field whose correlation is Gaussian in shape.
 
-use crate::detect::psf::{MIN_EXPONENT, erf_and_gauss, exp_of_negative};
+use crate::base::exponential::{MIN_EXPONENT, rough_exp_of_negative};
+use crate::detect::psf::erf_and_gauss;
 use multiversion::multiversion;
 use std::f64::consts::{PI, SQRT_2};
 
@@ -49,7 +50,7 @@ impl BothLower {
         let tail = 1.0 - erf_and_gauss(self.h * z / SQRT_2).0;
         let mut parts = [0.0; PARTS];
         for (part, exponent) in parts.iter_mut().zip(&self.exponents) {
-            *part = exp_of_negative((-exponent * z * z).max(MIN_EXPONENT)) * self.step;
+            *part = rough_exp_of_negative((-exponent * z * z).max(MIN_EXPONENT)) * self.step;
         }
         let both: f64 = parts.iter().sum();
         (1.0 - tail + both / PI).max(0.0)
@@ -64,7 +65,7 @@ fn false_alarm_probability(u: f64, across: &BothLower, down: &BothLower) -> f64 
     const STEPS: usize = 24;
     let step = SPAN / STEPS as f64;
     let density = |z: f64| {
-        let phi = exp_of_negative(-0.5 * z * z) / (2.0 * PI).sqrt();
+        let phi = rough_exp_of_negative(-0.5 * z * z) / (2.0 * PI).sqrt();
         let of_row = across.probability(z);
         let of_column = if across == down {
             of_row
