@@ -157,6 +157,14 @@ fn the_standard_table_is_right_and_the_same_on_any_number_of_threads() {
 }
 
 #[test]
+fn few_and_displaced_stars_do_not_bend_the_lens_out_of_the_frame() {
+    let arguments = "--stars 12 --sweep centroid-error=2:2:1 --trials 1500";
+    let rows = rows(&arguments.split(' ').collect::<Vec<_>>());
+    // One in 20,000 is wrong.
+    assert!(rows[0]["wrong_of_all"].as_u64() <= Some(1), "{}", rows[0]);
+}
+
+#[test]
 fn a_sweep_has_a_row_for_each_value_and_a_panel_in_the_figure() {
     let directory = tempfile::tempdir().unwrap();
     let figure = directory.path().join("figure.svg");

@@ -12,8 +12,8 @@ use super::predict::{PredictedStar, Surroundings};
 use crate::base::statistics::median;
 use crate::camera::DistortionModel;
 use crate::identify::attitude::{
-    CameraFit, MeasuredStar, POSE_PARAMETERS, fit_camera, left_out_by_lens_terms,
-    left_out_of_polynomial,
+    CameraFit, MeasuredStar, POSE_PARAMETERS, Predictions, fit_camera, predictions_by_lens_terms,
+    predictions_by_polynomial,
 };
 use std::f64::consts::PI;
 
@@ -31,6 +31,11 @@ const EQUATIONS_PER_PARAMETER: f64 = 4.0;
 const WORTH_A_TERM: f64 = 3.0;
 /// The same that a polynomial needs, whose many terms go astray where there are no stars.
 const WORTH_A_POLYNOMIAL: f64 = 12.0;
+/// So many times more is needed where the stars do not determine the model as far as the corners:
+/// one in 4000 first terms gains that by chance.
+const WORTH_A_GUESS: f64 = 4.5;
+/// Largest standard error at a corner of a model that the stars determine, in widths of the frame.
+const KNOWN_CORNER: f64 = 1e-3;
 /// With few equations the required gain is larger: the F distribution has heavier tails than χ².
 const TAIL_EQUATIONS: f64 = 8.0;
 /// Residuals exceed the stated errors if their median does so by this many of its standard errors.
@@ -42,8 +47,10 @@ const MEDIAN_ERROR: f64 = 1.0 / std::f64::consts::LN_2;
 const EXCESS_BISECTIONS: usize = 14;
 /// Residual in standard errors beyond which a star pulls no harder.
 const HUBER_SIGMAS: f64 = 2.5;
-/// Maximum rounds of naming and fitting.
+/// Rounds of naming and fitting after which only a new distortion model is a reason for another.
 const NAMING_ROUNDS: usize = 3;
+/// Maximum rounds of naming and fitting.
+const MAX_NAMING_ROUNDS: usize = 8;
 /// Agreement above chance that a sceptical refinement needs, in standard deviations.
 const SCEPTICAL_SIGMAS: f64 = 3.0;
 /// Maximum rounds of pairing and fitting.
@@ -212,7 +219,7 @@ impl Refiner {
         self.blends.start(self.predicted.len());
         let mut model = hypothesis.camera.distortion_model().max(wanted.least);
         let mut current = *settled;
-        for round in 0..NAMING_ROUNDS {
+        for round in 0..MAX_NAMING_ROUNDS {
             let hypothesis = current.hypothesis();
             if round > 0 {
                 hypothesis.predict_again(&mut self.predicted);
@@ -226,6 +233,7 @@ impl Refiner {
                 excess_sigma_px: current.excess_sigma_px,
             };
             current = self.fitted(problem, &guess)?;
+            let model_before = model;
             // The names are more stars than those that the model was chosen for.
             if round == 0 || (!settled && self.are_residuals_unexplained(problem, &current)) {
                 let chosen = self.choose_model(problem, &current, DistortionModel::Quintic);
@@ -236,7 +244,8 @@ impl Refiner {
                     current = self.fitted(problem, &guess)?;
                 }
             }
-            if settled {
+            let is_last = round + 1 >= NAMING_ROUNDS && model == model_before;
+            if settled || is_last {
                 break;
             }
         }
@@ -386,23 +395,33 @@ impl Refiner {
         let heavier_tails = equations / (equations - TAIL_EQUATIONS).max(1.0);
         let is_unexplained = self.are_residuals_unexplained(problem, current);
         let stars = &self.stars;
-        let of_lenses = left_out_by_lens_terms(stars, camera, icrs_to_camera)?;
-        let left_out = |model: DistortionModel| {
+        let of_lenses = predictions_by_lens_terms(stars, camera, icrs_to_camera)?;
+        let predictions = |model: DistortionModel| {
             if model.is_lens() {
                 Some(of_lenses[model.terms()])
             } else {
-                left_out_of_polynomial(stars, camera, icrs_to_camera, model)
+                predictions_by_polynomial(stars, camera, icrs_to_camera, model)
             }
         };
-        let mut best = (None, of_lenses[0]);
+        let known_corner_px = KNOWN_CORNER * camera.width_px;
+        let mut best = (None, of_lenses[0].left_out_chi_sq);
+        let mut is_best_a_guess = false;
         for model in DistortionModel::ALL {
             if model > richest || !is_affordable(model, self.stars.len()) {
                 break;
             }
-            let worth_it = heavier_tails * least_gain(model, best.0);
-            match left_out(model) {
-                Some(chi_sq) if equations * (best.1 / chi_sq).ln() > worth_it => {
-                    best = (Some(model), chi_sq);
+            let is_guess = |found: &Predictions| found.corner_sigma_px > known_corner_px;
+            let is_better = |found: &Predictions| {
+                let of_guess = if is_guess(found) { WORTH_A_GUESS } else { 1.0 };
+                let worth = heavier_tails * of_guess * least_gain(model, best.0);
+                equations * (best.1 / found.left_out_chi_sq).ln() > worth
+            };
+            match predictions(model) {
+                // The simplest guess brings more stars, and these tell whether it is enough.
+                Some(found) if is_best_a_guess && is_guess(&found) => {}
+                Some(found) if is_better(&found) => {
+                    is_best_a_guess = is_guess(&found);
+                    best = (Some(model), found.left_out_chi_sq);
                 }
                 // Slow: not tried where the cubic is no better and little is left to explain.
                 _ if model == DistortionModel::Cubic && !is_unexplained => break,

@@ -6,11 +6,11 @@
 
 mod adjustment;
 mod fit;
-mod left_out;
+mod predictions;
 
 pub use adjustment::{MeasuredStar, POSE_PARAMETERS};
 pub use fit::{CameraFit, fit_camera};
-pub use left_out::{left_out_by_lens_terms, left_out_of_polynomial};
+pub use predictions::{Predictions, predictions_by_lens_terms, predictions_by_polynomial};
 
 use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use nalgebra::{Matrix3, SVD};

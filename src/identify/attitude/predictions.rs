@@ -1,4 +1,5 @@
-//! How well a fit of each lens model predicts a star that is left out of it.
+//! How well a fit of each lens model predicts what is not in it: a star that is left out, and the
+//! corners of the frame.
 //!
 //! The residual of an equation that is left out is its residual over 1 − h, with h its leverage, so
 //! no fit is repeated (Allen 1974, Technometrics 16, 125). The models of lenses are nested: each
@@ -9,29 +10,37 @@ use super::adjustment::{
     Adjustment, LINEAR_TERMS, Lanes, MeasuredStar, POSE_PARAMETERS, Reduced, Rows, add_products,
     add_scaled,
 };
-use crate::base::coords::{Camera, Icrs, Rotation};
+use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation};
 use crate::camera::{
     CUBIC_MONOMIALS, CameraModel, DistortionModel, LANES, LENS_TERMS, QUINTIC_MONOMIALS,
 };
 use multiversion::multiversion;
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 
 /// Smallest freedom of an equation at which its left-out residual is defined.
 const MIN_FREEDOM: f64 = 1e-6;
 /// Parameters of a camera with all terms of a lens.
 const LENS_PARAMETERS: usize = POSE_PARAMETERS + LENS_TERMS;
 
-/// Σ (residual / σ)² with each equation predicted by a fit to the others: for lenses with no terms,
-/// with the first, with the first two and so on, to all of [`DistortionModel::BrownConrady`]. It
-/// grows where a model has too much freedom. `camera` and `icrs_to_camera` must be close to the
-/// best ones.
+/// How well the fit of a model predicts what is not in it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Predictions {
+    /// Σ (residual / σ)² with each equation predicted by a fit to the others. It grows where a
+    /// model has too much freedom.
+    pub left_out_chi_sq: f64,
+    /// Largest standard error of a predicted position at a corner of the frame, in pixels.
+    pub corner_sigma_px: f64,
+}
+
+/// The predictions by lenses with no terms, with the first, with the first two and so on, to all of
+/// [`DistortionModel::BrownConrady`]. `camera` and `icrs_to_camera` must be close to the best ones.
 ///
 /// `None` where the stars do not determine the parameters.
-pub fn left_out_by_lens_terms(
+pub fn predictions_by_lens_terms(
     stars: &[MeasuredStar],
     camera: &CameraModel,
     icrs_to_camera: &Rotation<Icrs, Camera>,
-) -> Option<[f64; LENS_TERMS + 1]> {
+) -> Option<[Predictions; LENS_TERMS + 1]> {
     let model = Some(DistortionModel::BrownConrady);
     let adjustment = Adjustment::<LENS_PARAMETERS, 0>::new(stars, (camera, icrs_to_camera), model)?;
     let reduced = adjustment.reduced()?;
@@ -39,26 +48,26 @@ pub fn left_out_by_lens_terms(
         .root
         .l_dirty()
         .solve_lower_triangular(&reduced.vector)?;
-    nested_sums(&adjustment, &reduced, &shares)
+    nested(&adjustment, &reduced, &shares)
 }
 
 /// The same for the richest models, [`DistortionModel::Cubic`] and [`DistortionModel::Quintic`].
-pub fn left_out_of_polynomial(
+pub fn predictions_by_polynomial(
     stars: &[MeasuredStar],
     camera: &CameraModel,
     icrs_to_camera: &Rotation<Icrs, Camera>,
     model: DistortionModel,
-) -> Option<f64> {
+) -> Option<Predictions> {
     const PARAMETERS: usize = POSE_PARAMETERS + LINEAR_TERMS;
     let at = (camera, icrs_to_camera);
     if model == DistortionModel::Cubic {
-        left_out(Adjustment::<PARAMETERS, CUBIC_MONOMIALS>::new(
+        predictions(Adjustment::<PARAMETERS, CUBIC_MONOMIALS>::new(
             stars,
             at,
             Some(model),
         )?)
     } else {
-        left_out(Adjustment::<PARAMETERS, QUINTIC_MONOMIALS>::new(
+        predictions(Adjustment::<PARAMETERS, QUINTIC_MONOMIALS>::new(
             stars,
             at,
             Some(model),
@@ -66,18 +75,47 @@ pub fn left_out_of_polynomial(
     }
 }
 
-fn left_out<const P: usize, const K: usize>(mut adjustment: Adjustment<P, K>) -> Option<f64> {
+fn predictions<const P: usize, const K: usize>(
+    mut adjustment: Adjustment<P, K>,
+) -> Option<Predictions> {
     let (_, reduced) = adjustment.step()?;
-    left_out_sum(&adjustment, &reduced)
+    let corners = adjustment.rows(&corners(&adjustment))?;
+    let leverages = leverages(&adjustment, &corners, &reduced);
+    Some(Predictions {
+        left_out_chi_sq: left_out_sum(&adjustment, &reduced)?,
+        corner_sigma_px: corner_sigma_px(&leverages),
+    })
 }
 
-/// The sums of [`left_out_by_lens_terms`]; `shares` is L⁻¹ times the right-hand side.
+/// The corners of the frame as stars with an error of 1 px: the leverages of their equations are
+/// the squared errors of their predicted positions.
+fn corners<const P: usize, const K: usize>(adjustment: &Adjustment<P, K>) -> [MeasuredStar; 4] {
+    let camera = &adjustment.camera;
+    let camera_to_icrs = adjustment.icrs_to_camera.inverse();
+    let (right, bottom) = (camera.width_px - 0.5, camera.height_px - 0.5);
+    [(-0.5, -0.5), (right, -0.5), (-0.5, bottom), (right, bottom)].map(|(x, y)| {
+        let pixel = PixelPoint::new(x, y);
+        MeasuredStar {
+            pixel,
+            icrs: camera_to_icrs.apply(&camera.direction_of(&pixel)),
+            sigma_px: 1.0,
+        }
+    })
+}
+
+/// The larger of the errors at the [`corners`], from the leverages of their equations along x and y.
+fn corner_sigma_px([along_x, along_y]: &[Lanes; 2]) -> f64 {
+    let squares = along_x.iter().zip(along_y).map(|(x, y)| x + y);
+    squares.fold(0.0, f64::max).sqrt()
+}
+
+/// The numbers of [`predictions_by_lens_terms`]; `shares` is L⁻¹ times the right-hand side.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn nested_sums(
+fn nested(
     adjustment: &Adjustment<LENS_PARAMETERS, 0>,
     reduced: &Reduced<LENS_PARAMETERS, 0>,
     shares: &SVector<f64, LENS_PARAMETERS>,
-) -> Option<[f64; LENS_TERMS + 1]> {
+) -> Option<[Predictions; LENS_TERMS + 1]> {
     let root = reduced.root.l_dirty();
     let mut sums = [[0.0; LANES]; LENS_TERMS + 1];
     for stars in adjustment.stars.chunks(LANES) {
@@ -86,21 +124,43 @@ fn nested_sums(
             let (mut terms, mut residual) = (rows.common[axis], rows.rhs[axis]);
             let mut leverage = [0.0; LANES];
             for i in 0..LENS_PARAMETERS {
-                let (above, below) = terms.split_at_mut(i);
-                let this = &mut below[0];
-                for (j, above) in above.iter().enumerate() {
-                    add_scaled(this, -root[(i, j)], above);
-                }
-                *this = this.map(|value| value / root[(i, i)]);
-                add_products(&mut leverage, this, this);
-                add_scaled(&mut residual, -shares[i], this);
+                orthogonalise(&mut terms, i, root);
+                add_products(&mut leverage, &terms[i], &terms[i]);
+                add_scaled(&mut residual, -shares[i], &terms[i]);
                 if i + 1 >= POSE_PARAMETERS {
                     add_left_out(&mut sums[i + 1 - POSE_PARAMETERS], &residual, &leverage);
                 }
             }
         }
     }
-    Some(sums.map(|lanes| lanes.iter().sum()))
+    let mut of_corners = [[[0.0; LANES]; 2]; LENS_TERMS + 1];
+    let rows = adjustment.rows(&corners(adjustment))?;
+    for axis in 0..2 {
+        let (mut terms, mut leverage) = (rows.common[axis], [0.0; LANES]);
+        for i in 0..LENS_PARAMETERS {
+            orthogonalise(&mut terms, i, root);
+            add_products(&mut leverage, &terms[i], &terms[i]);
+            if i + 1 >= POSE_PARAMETERS {
+                of_corners[i + 1 - POSE_PARAMETERS][axis] = leverage;
+            }
+        }
+    }
+    Some(std::array::from_fn(|terms| Predictions {
+        left_out_chi_sq: sums[terms].iter().sum(),
+        corner_sigma_px: corner_sigma_px(&of_corners[terms]),
+    }))
+}
+
+/// Makes the parameter `i` of the equations `terms` independent of those before it; `root` is the
+/// triangular root of the normal matrix.
+#[inline(always)]
+fn orthogonalise<const P: usize>(terms: &mut [Lanes; P], i: usize, root: &SMatrix<f64, P, P>) {
+    let (above, below) = terms.split_at_mut(i);
+    let this = &mut below[0];
+    for (j, above) in above.iter().enumerate() {
+        add_scaled(this, -root[(i, j)], above);
+    }
+    *this = this.map(|value| value / root[(i, i)]);
 }
 
 #[inline(always)]
@@ -150,16 +210,11 @@ fn leverages<const P: usize, const K: usize>(
     [0, 1].map(|axis: usize| {
         let (mut rest, mut leverage) = (rows.common[axis], shared);
         for i in 0..P {
-            let (above, below) = rest.split_at_mut(i);
-            let this = &mut below[0];
             for (k, of_monomial) in of_monomials.iter().enumerate() {
-                add_scaled(this, -reduced.coupling[axis][(k, i)], of_monomial);
+                add_scaled(&mut rest[i], -reduced.coupling[axis][(k, i)], of_monomial);
             }
-            for (j, above) in above.iter().enumerate() {
-                add_scaled(this, -root[(i, j)], above);
-            }
-            *this = this.map(|value| value / root[(i, i)]);
-            add_products(&mut leverage, this, this);
+            orthogonalise(&mut rest, i, root);
+            add_products(&mut leverage, &rest[i], &rest[i]);
         }
         leverage
     })
@@ -190,33 +245,36 @@ mod tests {
     #[test]
     fn nested_models_are_as_each_by_itself() {
         let (camera, attitude, stars) = scattered_stars();
-        let nested = left_out_by_lens_terms(&stars, &camera, &attitude).unwrap();
+        let nested = predictions_by_lens_terms(&stars, &camera, &attitude).unwrap();
         let at = (&camera, &attitude);
         let [radial, radial5, radial7, all] = DistortionModel::LENSES.map(Some);
         let alone = [
             (
                 0,
-                left_out(Adjustment::<4, 0>::new(&stars, at, None).unwrap()),
+                predictions(Adjustment::<4, 0>::new(&stars, at, None).unwrap()),
             ),
             (
                 1,
-                left_out(Adjustment::<5, 0>::new(&stars, at, radial).unwrap()),
+                predictions(Adjustment::<5, 0>::new(&stars, at, radial).unwrap()),
             ),
             (
                 2,
-                left_out(Adjustment::<6, 0>::new(&stars, at, radial5).unwrap()),
+                predictions(Adjustment::<6, 0>::new(&stars, at, radial5).unwrap()),
             ),
             (
                 3,
-                left_out(Adjustment::<7, 0>::new(&stars, at, radial7).unwrap()),
+                predictions(Adjustment::<7, 0>::new(&stars, at, radial7).unwrap()),
             ),
             (
                 7,
-                left_out(Adjustment::<11, 0>::new(&stars, at, all).unwrap()),
+                predictions(Adjustment::<11, 0>::new(&stars, at, all).unwrap()),
             ),
         ];
         for (terms, expected) in alone {
-            let ratio = nested[terms] / expected.unwrap();
+            let expected = expected.unwrap();
+            let ratio = nested[terms].left_out_chi_sq / expected.left_out_chi_sq;
+            assert!((ratio - 1.0).abs() < 1e-3, "{terms} {ratio}");
+            let ratio = nested[terms].corner_sigma_px / expected.corner_sigma_px;
             assert!((ratio - 1.0).abs() < 1e-3, "{terms} {ratio}");
         }
     }
@@ -224,8 +282,10 @@ mod tests {
     #[test]
     fn too_much_freedom_shows() {
         let (camera, attitude, stars) = scattered_stars();
-        let lenses = left_out_by_lens_terms(&stars, &camera, &attitude).unwrap();
-        let rich = left_out_of_polynomial(&stars, &camera, &attitude, DistortionModel::Quintic);
-        assert!(rich.unwrap() > lenses[0]);
+        let lenses = predictions_by_lens_terms(&stars, &camera, &attitude).unwrap();
+        let quintic = DistortionModel::Quintic;
+        let rich = predictions_by_polynomial(&stars, &camera, &attitude, quintic).unwrap();
+        assert!(rich.left_out_chi_sq > lenses[0].left_out_chi_sq);
+        assert!(rich.corner_sigma_px > lenses[0].corner_sigma_px);
     }
 }
