@@ -14,7 +14,7 @@ use std::path::Path;
 /// Stars of σ = 1 px, 60 per 1024 x 768 pixels, with peaks from 5.5 times the noise up.
 ///
 /// `bits`: 8 or 16 for whole grey levels, 0 for unrounded ones.
-fn synthetic_frame(width: usize, height: usize, bits: u32) -> Frame {
+fn synthetic_frame(width: usize, height: usize, bits: u32) -> Frame<'static> {
     const STARS: usize = 60;
     const BRIGHTNESSES: i32 = 60;
     let noise = if bits == 8 { 3.0 } else { 11.0 };

@@ -17,7 +17,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// The frame, its stars, and a prior of its scale with a total range of a factor of two.
-fn prepare(path: &Path, indexed: &IndexedCatalog) -> Option<(Frame, StarField, Priors)> {
+fn prepare(path: &Path, indexed: &IndexedCatalog) -> Option<(Frame<'static>, StarField, Priors)> {
     let frame = frame::read(path).ok()?;
     let detections = detect(
         &frame,

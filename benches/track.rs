@@ -32,7 +32,7 @@ fn camera() -> DataSheet {
 
 /// Frames of a camera that swings by `swing_deg` about all of its axes, within as many frames as
 /// there are: their sequence can be repeated without a jump.
-fn sequence(swing_deg: f64, count: u32, indexed: &IndexedCatalog) -> Vec<Frame> {
+fn sequence(swing_deg: f64, count: u32, indexed: &IndexedCatalog) -> Vec<Frame<'static>> {
     let start = Rotation::looking_at(&UnitVector::from_ra_dec(1.4, 0.1), 0.3);
     let axis = Vector3::new(0.6, 0.64, 0.48);
     let mut scenario = Scenario::new(camera());

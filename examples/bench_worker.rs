@@ -22,7 +22,7 @@ const ARCSEC_PER_RAD: f64 = 206_264.806;
 struct Bench<'a> {
     indexed: IndexedCatalog<'a>,
     fields_deg: (f64, f64),
-    frame: Frame,
+    frame: Frame<'static>,
     detect: detect::Workspace,
     identify: identify::Workspace,
     /// Detections of the loaded frame.

@@ -16,7 +16,7 @@ const HEIGHT: usize = 480;
 
 /// A sky with faint and bright, single, touching and saturated stars, a hot pixel, a trail and
 /// pixels without a value.
-fn frame(spot_px: f32, level: f32, noise: f32, seed: u64) -> Frame {
+fn frame(spot_px: f32, level: f32, noise: f32, seed: u64) -> Frame<'static> {
     const FULL: f32 = 4095.0;
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     let mut pixels: Vec<f32> = (0..WIDTH * HEIGHT)

@@ -19,7 +19,7 @@ fn a_tracked_frame_allocates_nothing_in_steady_state() {
     // Round stars, and smeared ones.
     for rate_deg_s in [Vector3::new(0.05, 0.02, 0.1), Vector3::new(0.8, 1.0, 1.5)] {
         let make = |i: u32| frame(attitude(rate_deg_s, i), rate_deg_s, u64::from(i));
-        let frames: Vec<Frame> = (0..FRAMES).map(make).collect();
+        let frames: Vec<Frame<'static>> = (0..FRAMES).map(make).collect();
         let mut context = Context::new(&indexed);
         context.priors.exposure_s = Some(EXPOSURE_S);
         let mut tracker = Tracker::new(context);

@@ -408,7 +408,7 @@ fn frames_that_are_not_dark_are_named() {
 /// Stars of Cygnus on a detector with a pattern and hot pixels, and its darks.
 struct Night {
     place: tempfile::TempDir,
-    clean: Frame,
+    clean: Frame<'static>,
     detector: Detector,
 }
 
@@ -614,7 +614,7 @@ fn a_star_on_or_beside_an_invalid_pixel_keeps_position_and_flux() {
 }
 
 /// Transmission of a lens with vignetting.
-fn lit(level_adu: f64, seed: u64) -> Frame {
+fn lit(level_adu: f64, seed: u64) -> Frame<'static> {
     let (width, height) = SIZE;
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let pixels = (0..width * height).map(|i| {

@@ -71,7 +71,7 @@ impl Sky {
     }
 
     /// The frame with photon and read noise.
-    fn expose(&self, seed: u64) -> Frame {
+    fn expose(&self, seed: u64) -> Frame<'static> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let pixels = self
             .mean
@@ -90,7 +90,7 @@ impl Sky {
     }
 }
 
-fn white_noise(width: usize, height: usize, sigma: f32, seed: u64) -> Frame {
+fn white_noise(width: usize, height: usize, sigma: f32, seed: u64) -> Frame<'static> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let normal = Normal::new(1000.0f32, sigma).unwrap();
     let pixels = (0..width * height)
@@ -637,7 +637,7 @@ fn a_saturated_star_with_coma_is_where_the_faint_ones_would_be() {
 }
 
 /// Stars that the camera's motion drew out alike, along the diagonal, over `length_px`.
-fn drawn_out(side: usize, stars: &[(f64, f64, f64)], length_px: f64, seed: u64) -> Frame {
+fn drawn_out(side: usize, stars: &[(f64, f64, f64)], length_px: f64, seed: u64) -> Frame<'static> {
     const PARTS: usize = 24;
     let mut sky = Sky::flat(side, side, BACKGROUND_E);
     for &(x, y, flux) in stars {
@@ -736,7 +736,7 @@ fn check_is_sound(s: &Detection, width: usize, height: usize) -> Result<(), Stri
 }
 
 /// A frame of zeros with discs at full scale: (x, y, radius).
-fn discs(side: usize, discs: &[(f64, f64, f64)]) -> Frame {
+fn discs(side: usize, discs: &[(f64, f64, f64)]) -> Frame<'static> {
     let mut pixels = vec![0.0f32; side * side];
     for (i, pixel) in pixels.iter_mut().enumerate() {
         let (x, y) = ((i % side) as f64, (i / side) as f64);
@@ -980,7 +980,12 @@ fn mark() -> impl Strategy<Value = Mark> {
 }
 
 /// Draws `marks` over noise of standard deviation `noise`, rounded and clipped at full scale.
-fn marked_frame(marks: &[Mark], (width, height): (usize, usize), noise: f32, seed: u64) -> Frame {
+fn marked_frame(
+    marks: &[Mark],
+    (width, height): (usize, usize),
+    noise: f32,
+    seed: u64,
+) -> Frame<'static> {
     let mut sky = Sky::flat(width, height, 0.0);
     for mark in marks {
         if let &Mark::Star { x, y, flux, sigma } = mark {
@@ -1160,7 +1165,7 @@ fn sky_through_black(side: usize, sigma: f32, (low, high): (f32, f32), seed: u64
 }
 
 /// The 8-bit frame of these grey levels.
-fn eight_bits(side: usize, pixels: impl Iterator<Item = f32>) -> Frame {
+fn eight_bits(side: usize, pixels: impl Iterator<Item = f32>) -> Frame<'static> {
     let pixels = pixels.map(|v| v.round().clamp(0.0, 255.0)).collect();
     let frame = Frame::new(side, side, pixels).unwrap();
     frame.with_levels(1.0, Some(255.0))

@@ -178,7 +178,7 @@ fn frames_of_another_size_and_times_that_stand_still_are_solved_in_full() {
     let indexed = IndexedCatalog::built_in();
     let mut tracker = Tracker::new(Context::new(&indexed)).with_stars(12);
     let still = Vector3::zeros();
-    let frames: Vec<Frame> = (0..4)
+    let frames: Vec<Frame<'static>> = (0..4)
         .map(|i| frame(attitude(still, i), still, u64::from(i)))
         .collect();
     for frame in &frames[..3] {

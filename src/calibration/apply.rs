@@ -12,7 +12,7 @@ pub struct Master {
     /// Name of the file.
     pub name: String,
     /// The frame.
-    pub frame: Frame,
+    pub frame: Frame<'static>,
 }
 
 /// A calibration that can be applied to frames.

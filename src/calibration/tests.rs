@@ -1,7 +1,7 @@
 use super::*;
 use crate::frame::Frame;
 
-fn frame(pixels: &[f32]) -> Frame {
+fn frame(pixels: &[f32]) -> Frame<'static> {
     Frame::new(3, pixels.len() / 3, pixels.to_vec()).unwrap()
 }
 

@@ -86,7 +86,7 @@ pub(crate) fn darks(arguments: DarksArgs) -> Result<Outcome, CommandError> {
     let config = arguments.config()?;
     let pool = arguments.threads.pool()?;
     let mut stack = DarkStack::new();
-    let measure = |path: &Path, frame: Frame| {
+    let measure = |path: &Path, frame: Frame<'static>| {
         let name = path.display().to_string();
         let exposure_s = exposure_of(path, &arguments.exposure);
         let statistics = FrameStatistics::of(&name, &frame, exposure_s);

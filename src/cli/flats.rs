@@ -55,7 +55,7 @@ pub(crate) fn flats(arguments: FlatsArgs) -> Result<Outcome, CommandError> {
     }
     let pool = arguments.threads.pool()?;
     let mut stack = FlatStack::new(arguments.config()?);
-    let named = |path: &Path, frame: Frame| (path.display().to_string(), frame);
+    let named = |path: &Path, frame: Frame<'static>| (path.display().to_string(), frame);
     let take = |(name, frame): (String, Frame)| Ok(stack.add(&name, &frame)?);
     let unread = for_each_frame(&pool, &frames, arguments.frames.page, named, take)?;
     if unread == frames.len() {

@@ -9,14 +9,14 @@ use std::borrow::Cow;
 
 /// One image of light intensities.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Frame {
+pub struct Frame<'p> {
     /// Columns.
     pub width: usize,
     /// Rows.
     pub height: usize,
     /// Pixel values in the file's own units (ADU), row-major, `height * width`; colour is converted
     /// to luminance. NaN marks a pixel without a value.
-    pub pixels: Pixels,
+    pub pixels: Pixels<'p>,
     /// Difference between neighbouring grey levels, in ADU: 1 for integers, 0 for floats.
     pub step_adu: f32,
     /// Level at and above which a pixel is saturated, in ADU, if the format has one.
@@ -25,7 +25,7 @@ pub struct Frame {
     pub metadata: FrameMetadata,
 }
 
-impl Frame {
+impl<'p> Frame<'p> {
     /// Makes a frame from `pixels` in ADU, row-major, `height * width`, without quantization or
     /// saturation.
     ///
@@ -33,46 +33,28 @@ impl Frame {
     /// # Errors
     /// [`FrameError::WrongLength`], [`FrameError::TooSmall`], [`FrameError::TooLarge`] for sizes
     /// that do not fit; [`FrameError::NoValues`] if no pixel has a value.
-    pub fn new(width: usize, height: usize, mut pixels: Vec<f32>) -> Result<Self, FrameError> {
-        check_size(width, height)?;
-        if pixels.len() != width * height {
-            return Err(FrameError::WrongLength {
-                expected: width * height,
-                found: pixels.len(),
-            });
-        }
-        let mut any_value = false;
-        for pixel in &mut pixels {
-            if pixel.is_infinite() {
-                *pixel = f32::NAN;
-            }
-            any_value |= !pixel.is_nan();
-        }
-        if !any_value {
-            return Err(FrameError::NoValues);
-        }
-        Ok(Self::from_checked(width, height, pixels))
+    pub fn new(width: usize, height: usize, pixels: Vec<f32>) -> Result<Self, FrameError> {
+        Self::from_floats(width, height, pixels.into())
     }
 
-    /// Makes a frame of whole numbers, row-major, `height * width`, in steps of 1 ADU, without
-    /// saturation.
-    ///
-    /// # Errors
-    /// [`FrameError::WrongLength`], [`FrameError::TooSmall`], [`FrameError::TooLarge`] for sizes
-    /// that do not fit.
-    pub fn from_words(width: usize, height: usize, pixels: Vec<u16>) -> Result<Self, FrameError> {
-        check_size(width, height)?;
-        if pixels.len() != width * height {
-            return Err(FrameError::WrongLength {
-                expected: width * height,
-                found: pixels.len(),
-            });
+    pub(super) fn from_floats(
+        width: usize,
+        height: usize,
+        mut pixels: Cow<'p, [f32]>,
+    ) -> Result<Self, FrameError> {
+        check_length(width, height, pixels.len())?;
+        if pixels.iter().any(|pixel| pixel.is_infinite()) {
+            let infinite = pixels.to_mut().iter_mut().filter(|v| v.is_infinite());
+            infinite.for_each(|pixel| *pixel = f32::NAN);
         }
-        Ok(Self::from_checked(width, height, pixels).with_levels(1.0, None))
+        if pixels.iter().all(|pixel| pixel.is_nan()) {
+            return Err(FrameError::NoValues);
+        }
+        Ok(Self::from_checked(width, height, Pixels::F32(pixels)))
     }
 
     /// Makes a frame from `height * width` pixels that are neither infinite nor all NaN.
-    pub(super) fn from_checked(width: usize, height: usize, pixels: impl Into<Pixels>) -> Self {
+    pub(super) fn from_checked(width: usize, height: usize, pixels: impl Into<Pixels<'p>>) -> Self {
         Self {
             width,
             height,
@@ -109,6 +91,14 @@ impl Frame {
         self
     }
 
+    /// Sets the step between grey levels, and saturation at the highest of them up to `full_scale`:
+    /// twelve bits in the upper part of sixteen saturate at 65520 instead of 65535.
+    #[must_use]
+    pub(super) fn with_step(self, step: i64, full_scale: i64) -> Self {
+        let saturation = full_scale / step * step;
+        self.with_levels(step as f32, Some(saturation as f32))
+    }
+
     /// Sets the metadata.
     #[must_use]
     pub fn with_metadata(mut self, metadata: FrameMetadata) -> Self {
@@ -122,6 +112,16 @@ impl Frame {
             self.pixels.reverse_rows(self.width);
         }
         self
+    }
+}
+
+pub(super) fn check_length(width: usize, height: usize, found: usize) -> Result<(), FrameError> {
+    check_size(width, height)?;
+    let expected = width * height;
+    if found == expected {
+        Ok(())
+    } else {
+        Err(FrameError::WrongLength { expected, found })
     }
 }
 

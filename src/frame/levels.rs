@@ -1,7 +1,7 @@
 //! From decoded samples to a frame: luminance, saturation and the step between grey levels.
 
 use super::error::FrameError;
-use super::image::{Frame, check_size};
+use super::image::{Frame, check_length, check_size};
 use super::pixels::Pixels;
 use multiversion::multiversion;
 
@@ -22,11 +22,54 @@ pub(super) struct Samples<'a, T> {
     pub channels: usize,
 }
 
+impl<'p> Frame<'p> {
+    /// Makes a frame from samples, row-major, `height * width`, as from a grey image file of them:
+    /// whole numbers have steps and a full scale, floats have neither. Borrowed samples are not
+    /// copied, unless infinities among them become NaN.
+    ///
+    /// # Errors
+    /// As [`Frame::new`].
+    pub fn from_samples(
+        width: usize,
+        height: usize,
+        samples: impl Into<Pixels<'p>>,
+    ) -> Result<Self, FrameError> {
+        let samples = samples.into();
+        check_length(width, height, samples.len())?;
+        let (step, full_scale) = match samples {
+            Pixels::F32(values) => return Self::from_floats(width, height, values),
+            Pixels::U8(ref levels) => (level_step(levels, u8::MAX), u8::MAX.into()),
+            Pixels::U16(ref levels) => (level_step(levels, u16::MAX), u16::MAX.into()),
+        };
+        Ok(Self::from_checked(width, height, samples).with_step(step, full_scale))
+    }
+
+    /// Makes a frame from whole numbers of any type, row-major, `height * width`; `full_scale` is
+    /// the largest number of the format, where pixels are saturated.
+    ///
+    /// # Errors
+    /// As [`Frame::new`].
+    pub fn from_integers<T: Copy + Into<i64>>(
+        width: usize,
+        height: usize,
+        values: &[T],
+        full_scale: T,
+    ) -> Result<Self, FrameError> {
+        let samples = Samples {
+            width,
+            height,
+            values,
+            channels: 1,
+        };
+        frame_from_integers(&samples, full_scale)
+    }
+}
+
 /// Makes a frame from integer samples; `full_scale` is the largest value of the format, in ADU.
 pub(super) fn frame_from_integers<T: Copy + Into<i64>>(
     samples: &Samples<'_, T>,
     full_scale: T,
-) -> Result<Frame, FrameError> {
+) -> Result<Frame<'static>, FrameError> {
     let (width, height) = (samples.width, samples.height);
     check_size(width, height)?;
     let expected = width * height * samples.channels;
@@ -49,16 +92,16 @@ pub(super) fn frame_from_integers<T: Copy + Into<i64>>(
         }
     };
     let step = if samples.channels <= 2 {
-        level_step(values, |&v| v.into(), full_scale.into())
+        level_step(values, full_scale)
     } else {
         1
     };
     let frame = Frame::from_checked(width, height, pixels);
-    Ok(with_step(frame, step, full_scale.into()))
+    Ok(frame.with_step(step, full_scale.into()))
 }
 
 /// Grey levels in the smallest samples that hold all of the format.
-fn grey<T: Into<i64>>(levels: impl Iterator<Item = T>, full_scale: T) -> Pixels {
+fn grey<T: Into<i64>>(levels: impl Iterator<Item = T>, full_scale: T) -> Pixels<'static> {
     let levels = levels.map(Into::into);
     match full_scale.into() {
         // Of signed types, which hold values below 0.
@@ -75,7 +118,7 @@ pub(super) fn frame_from_words(
     words: &[[u8; 2]],
     is_big_endian: bool,
     mut buffer: Vec<u16>,
-) -> Result<Frame, FrameError> {
+) -> Result<Frame<'static>, FrameError> {
     check_size(width, height)?;
     let expected = width * height;
     let words = words.get(..expected).ok_or(FrameError::WrongLength {
@@ -87,7 +130,7 @@ pub(super) fn frame_from_words(
     let bits = numbers_of(words, is_big_endian, &mut buffer);
     let step = step_of(bits.into(), u16::MAX.into());
     let frame = Frame::from_checked(width, height, buffer);
-    Ok(with_step(frame, step, u16::MAX.into()))
+    Ok(frame.with_step(step, u16::MAX.into()))
 }
 
 /// Writes the values of `words` into `pixels`. Returns the union of the bits of all values below
@@ -107,19 +150,13 @@ fn numbers_of(words: &[[u8; 2]], is_big_endian: bool, pixels: &mut [u16]) -> u16
     bits
 }
 
-fn with_step(frame: Frame, step: i64, full_scale: i64) -> Frame {
-    // Twelve bits in the upper part of sixteen saturate at 65520 instead of 65535.
-    let saturation = full_scale / step * step;
-    frame.with_levels(step as f32, Some(saturation as f32))
-}
-
 /// Makes a frame from `height * width * channels` float samples, which have no step and no full
 /// scale.
 pub(super) fn frame_from_floats(
     (width, height): (usize, usize),
     channels: usize,
     values: Vec<f32>,
-) -> Result<Frame, FrameError> {
+) -> Result<Frame<'static>, FrameError> {
     let pixels = match channels {
         1 => values,
         2 => values.chunks_exact(2).map(|c| c[0]).collect(),
@@ -154,12 +191,14 @@ fn luminance(rgb: [f32; 3], full: f32) -> f32 {
 
 /// The largest power of two that divides all levels below full scale: 16 if twelve bits are stored
 /// in the upper part of sixteen.
-fn level_step<S>(samples: &[S], level: impl Fn(&S) -> i64, full_scale: i64) -> i64 {
+pub(super) fn level_step<T: Copy + Into<i64>>(samples: &[T], full_scale: T) -> i64 {
     /// Values between two checks for an early exit; a check at each would prevent vectorization.
     const CHUNK: usize = 1024;
+    let full_scale = full_scale.into();
     let mut bits = MAX_STEP;
     for chunk in samples.chunks(CHUNK) {
-        bits |= chunk.iter().map(&level).fold(0, |bits, value| {
+        let levels = chunk.iter().map(|&level| level.into());
+        bits |= levels.fold(0, |bits, value| {
             bits | if value == full_scale { 0 } else { value }
         });
         if bits & 1 == 1 {
@@ -177,5 +216,38 @@ fn step_of(bits: i64, full_scale: i64) -> i64 {
         1
     } else {
         step
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::borrow::Cow;
+
+    #[test]
+    fn borrowed_samples_are_as_those_of_a_file_and_are_not_copied() {
+        let words: Vec<u16> = (0..12).map(|i| 16 * i).collect();
+        let frame = Frame::from_samples(4, 3, &words[..]).unwrap();
+        assert_eq!(
+            (frame.step_adu, frame.saturation_adu),
+            (16.0, Some(65_520.0))
+        );
+        assert!(matches!(frame.pixels, Pixels::U16(Cow::Borrowed(_))));
+        let wide: Vec<i32> = words.iter().map(|&level| level.into()).collect();
+        let frame = Frame::from_integers(4, 3, &wide, i32::MAX).unwrap();
+        assert_eq!((frame.step_adu, frame.at(1, 2)), (16.0, 144.0));
+    }
+
+    #[test]
+    fn borrowed_floats_are_copied_only_where_infinities_become_nan() {
+        let mut floats = [1.5; 12];
+        let frame = Frame::from_samples(4, 3, &floats[..]).unwrap();
+        assert!(matches!(frame.pixels, Pixels::F32(Cow::Borrowed(_))));
+        floats[5] = f32::INFINITY;
+        let frame = Frame::from_samples(4, 3, &floats[..]).unwrap();
+        assert!(frame.at(1, 1).is_nan() && frame.at(2, 1) == 1.5);
+        let nothing = [f32::NAN; 12];
+        let refused = Frame::from_samples(4, 3, &nothing[..]);
+        assert!(matches!(refused, Err(FrameError::NoValues)));
     }
 }

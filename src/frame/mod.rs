@@ -1,6 +1,6 @@
 //! What does a file hold? The image as the detector recorded it.
 //!
-//! file or bytes → [`Frame`]: pixel values as `f32` at the file's full depth, and
+//! file, bytes or an array in memory → [`Frame`]: pixel values at the file's full depth, and
 //! [`FrameMetadata`], how the image was taken. Pixels are row-major, the top row of the picture
 //! first; (0, 0) is the centre of the top-left pixel.
 //!

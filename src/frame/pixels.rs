@@ -1,20 +1,20 @@
-//! The pixels of a frame, in the samples of its file.
+//! The pixels of a frame, in the samples of its file or of the array that they are borrowed from.
 
 use std::borrow::Cow;
 
 /// Pixel values, row-major. Whole numbers of few bits stay what they are: they take less memory, and
 /// less time to look through.
 #[derive(Debug, Clone)]
-pub enum Pixels {
+pub enum Pixels<'p> {
     /// Whole numbers from 0 to 255.
-    U8(Vec<u8>),
+    U8(Cow<'p, [u8]>),
     /// Whole numbers from 0 to 65535.
-    U16(Vec<u16>),
+    U16(Cow<'p, [u16]>),
     /// Any numbers; NaN marks a pixel without a value.
-    F32(Vec<f32>),
+    F32(Cow<'p, [f32]>),
 }
 
-impl Pixels {
+impl Pixels<'_> {
     /// The number of pixels.
     pub fn len(&self) -> usize {
         match self {
@@ -61,27 +61,21 @@ impl Pixels {
 
     /// The values as floats that can be changed: whole numbers become floats for good.
     pub fn as_f32_mut(&mut self) -> &mut Vec<f32> {
-        let floats = match self {
-            Self::F32(values) => std::mem::take(values),
-            _ => self.to_f32().into_owned(),
-        };
-        *self = Self::F32(Vec::new());
+        if let Self::U8(_) | Self::U16(_) = self {
+            *self = Self::F32(self.to_f32().into_owned().into());
+        }
         match self {
-            Self::F32(values) => {
-                *values = floats;
-                values
-            }
-            // Never: it was set above.
-            Self::U8(_) | Self::U16(_) => self.as_f32_mut(),
+            Self::F32(values) => values.to_mut(),
+            Self::U8(_) | Self::U16(_) => unreachable!("they are floats now"),
         }
     }
 
     /// Reverses the order of the rows of `width` pixels.
     pub(super) fn reverse_rows(&mut self, width: usize) {
         match self {
-            Self::U8(values) => reverse_rows(values, width),
-            Self::U16(values) => reverse_rows(values, width),
-            Self::F32(values) => reverse_rows(values, width),
+            Self::U8(values) => reverse_rows(values.to_mut(), width),
+            Self::U16(values) => reverse_rows(values.to_mut(), width),
+            Self::F32(values) => reverse_rows(values.to_mut(), width),
         }
     }
 }
@@ -96,7 +90,7 @@ fn reverse_rows<T>(values: &mut [T], width: usize) {
 }
 
 /// Compares values, in whatever samples they are.
-impl PartialEq for Pixels {
+impl PartialEq for Pixels<'_> {
     fn eq(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::U8(a), Self::U8(b)) => a == b,
@@ -106,20 +100,38 @@ impl PartialEq for Pixels {
     }
 }
 
-impl From<Vec<f32>> for Pixels {
+impl From<Vec<f32>> for Pixels<'_> {
     fn from(values: Vec<f32>) -> Self {
-        Self::F32(values)
+        Self::F32(values.into())
     }
 }
 
-impl From<Vec<u16>> for Pixels {
+impl<'p> From<&'p [f32]> for Pixels<'p> {
+    fn from(values: &'p [f32]) -> Self {
+        Self::F32(values.into())
+    }
+}
+
+impl From<Vec<u16>> for Pixels<'_> {
     fn from(values: Vec<u16>) -> Self {
-        Self::U16(values)
+        Self::U16(values.into())
     }
 }
 
-impl From<Vec<u8>> for Pixels {
+impl<'p> From<&'p [u16]> for Pixels<'p> {
+    fn from(values: &'p [u16]) -> Self {
+        Self::U16(values.into())
+    }
+}
+
+impl From<Vec<u8>> for Pixels<'_> {
     fn from(values: Vec<u8>) -> Self {
-        Self::U8(values)
+        Self::U8(values.into())
+    }
+}
+
+impl<'p> From<&'p [u8]> for Pixels<'p> {
+    fn from(values: &'p [u8]) -> Self {
+        Self::U8(values.into())
     }
 }

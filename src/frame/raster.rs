@@ -18,7 +18,7 @@ use std::io::{Cursor, ErrorKind};
 /// defines.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_png(bytes: &[u8]) -> Result<Frame, FrameError> {
+pub(super) fn decode_png(bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
     let format = FrameFormat::Png;
     // Checked first, so that the decoder allocates nothing for absurd sizes.
     if let (Some(width), Some(height)) = (word(bytes, 16), word(bytes, 20)) {
@@ -43,7 +43,7 @@ pub(super) fn decode_png(bytes: &[u8]) -> Result<Frame, FrameError> {
 /// Decodes a baseline or progressive JPEG.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_jpeg(bytes: &[u8]) -> Result<Frame, FrameError> {
+pub(super) fn decode_jpeg(bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
     let format = FrameFormat::Jpeg;
     let decoder =
         JpegDecoder::new(Cursor::new(bytes)).map_err(|e| error_of(e, format, bytes.len()))?;
@@ -61,7 +61,7 @@ pub(super) fn decode_jpeg(bytes: &[u8]) -> Result<Frame, FrameError> {
 /// Decodes a Windows bitmap.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_bmp(bytes: &[u8]) -> Result<Frame, FrameError> {
+pub(super) fn decode_bmp(bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
     /// Minimum length of a header that stores width and height in four bytes each.
     const LONG_HEADER: u32 = 16;
     let format = FrameFormat::Bmp;
@@ -82,7 +82,7 @@ pub(super) fn decode_bmp(bytes: &[u8]) -> Result<Frame, FrameError> {
 /// Decodes a portable anymap: PBM, PGM, PPM (plain or binary) or PAM, with the levels of the file.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_pnm(bytes: &[u8]) -> Result<Frame, FrameError> {
+pub(super) fn decode_pnm(bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
     let format = FrameFormat::Pnm;
     let decoder =
         PnmDecoder::new(Cursor::new(bytes)).map_err(|e| error_of(e, format, bytes.len()))?;
@@ -137,7 +137,7 @@ fn decode_with(
     mut decoder: impl ImageDecoder,
     format: FrameFormat,
     found_bytes: usize,
-) -> Result<Frame, FrameError> {
+) -> Result<Frame<'static>, FrameError> {
     let exif = decoder.exif_metadata().ok().flatten();
     let decoded = Decoded::new(decoder, format, found_bytes)?;
     let frame = match decoded.depth {
@@ -197,7 +197,7 @@ impl Decoded {
         &self,
         values: &[T],
         full_scale: T,
-    ) -> Result<Frame, FrameError> {
+    ) -> Result<Frame<'static>, FrameError> {
         let samples = Samples {
             width: self.image.width() as usize,
             height: self.image.height() as usize,

@@ -6,6 +6,7 @@ use super::image::Frame;
 use super::limits::{HEAD_BYTES, MAX_FILE_BYTES};
 use super::pixels::Pixels;
 use super::{fits, foreign, gzip, raster, tiff};
+use std::borrow::Cow;
 use std::io::{self, Read};
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -28,7 +29,7 @@ impl Buffers {
 
     /// Reuses the pixels of a frame that is no longer needed.
     pub fn recycle(&mut self, frame: Frame) {
-        if let Pixels::U16(pixels) = frame.pixels {
+        if let Pixels::U16(Cow::Owned(pixels)) = frame.pixels {
             self.pixels = pixels;
         }
     }
@@ -37,14 +38,17 @@ impl Buffers {
 /// Reads the first image of the file `path`. Its extension does not matter.
 /// # Errors
 /// As [`read_page`].
-pub fn read(path: impl AsRef<Path>) -> Result<Frame, FrameError> {
+pub fn read(path: impl AsRef<Path>) -> Result<Frame<'static>, FrameError> {
     read_page(path, None)
 }
 
 /// Reads image `page` of the file `path`, counted from 1; without `page`, the first.
 /// # Errors
 /// [`FrameError::File`] with the path and the error.
-pub fn read_page(path: impl AsRef<Path>, page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
+pub fn read_page(
+    path: impl AsRef<Path>,
+    page: Option<NonZeroUsize>,
+) -> Result<Frame<'static>, FrameError> {
     read_page_with(path, page, &mut Buffers::new())
 }
 
@@ -55,7 +59,7 @@ pub fn read_page_with(
     path: impl AsRef<Path>,
     page: Option<NonZeroUsize>,
     buffers: &mut Buffers,
-) -> Result<Frame, FrameError> {
+) -> Result<Frame<'static>, FrameError> {
     let path = path.as_ref();
     let Buffers { bytes, pixels } = buffers;
     std::fs::File::open(path)
@@ -73,7 +77,10 @@ pub fn read_page_with(
 /// A stream that does not begin like an image is not read further: it may be endless.
 /// # Errors
 /// As [`decode_page`]; [`FrameError::Io`], [`FrameError::TooManyBytes`].
-pub fn read_stream(stream: impl Read, page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
+pub fn read_stream(
+    stream: impl Read,
+    page: Option<NonZeroUsize>,
+) -> Result<Frame<'static>, FrameError> {
     let mut bytes = Vec::new();
     read_limited(stream, 0, MAX_FILE_BYTES, &mut bytes)?;
     decode_page(&bytes, page)
@@ -120,14 +127,14 @@ fn not_an_image(bytes: &[u8]) -> FrameError {
 /// Decodes the first image in `bytes`.
 /// # Errors
 /// As [`decode_page`].
-pub fn decode(bytes: &[u8]) -> Result<Frame, FrameError> {
+pub fn decode(bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
     decode_page(bytes, None)
 }
 
 /// Decodes image `page` in `bytes`, counted from 1; without `page`, the first.
 /// # Errors
 /// [`FrameError`], never [`FrameError::File`].
-pub fn decode_page(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
+pub fn decode_page(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame<'static>, FrameError> {
     decode_with(bytes, page, &mut Vec::new())
 }
 
@@ -135,7 +142,7 @@ fn decode_with(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
     buffer: &mut Vec<u16>,
-) -> Result<Frame, FrameError> {
+) -> Result<Frame<'static>, FrameError> {
     match FrameFormat::of(bytes) {
         Some(FrameFormat::Gzip) => decode_image(&gzip::unpack(bytes)?, page, buffer),
         _ => decode_image(bytes, page, buffer),
@@ -147,8 +154,8 @@ fn decode_image(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
     buffer: &mut Vec<u16>,
-) -> Result<Frame, FrameError> {
-    let single = |read: fn(&[u8]) -> Result<Frame, FrameError>| match page {
+) -> Result<Frame<'static>, FrameError> {
+    let single = |read: fn(&[u8]) -> Result<Frame<'static>, FrameError>| match page {
         Some(page) if page.get() > 1 => Err(FrameError::NoSuchPage { page, pages: 1 }),
         _ => read(bytes),
     };

@@ -29,7 +29,7 @@ pub(super) fn decode(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
     buffer: &mut Vec<u16>,
-) -> Result<Frame, FrameError> {
+) -> Result<Frame<'static>, FrameError> {
     let fail = |e: TiffError| error_of(e, bytes.len());
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(fail)?;
     if let Some(page) = page {
@@ -152,7 +152,7 @@ impl Layout {
         self.bits == 16 && is_unsigned && self.channels == 1 && self.planes == 1
     }
 
-    fn frame(&self, samples: DecodingResult) -> Result<Frame, FrameError> {
+    fn frame(&self, samples: DecodingResult) -> Result<Frame<'static>, FrameError> {
         // Values of more than 24 bits are rounded.
         let rounded = |values: Vec<f32>| Ok(self.floats(values)?.with_levels(1.0, None));
         match samples {
@@ -178,7 +178,7 @@ impl Layout {
         &self,
         values: Vec<T>,
         full_scale: T,
-    ) -> Result<Frame, FrameError> {
+    ) -> Result<Frame<'static>, FrameError> {
         let samples = Samples {
             width: self.width,
             height: self.height,
@@ -188,7 +188,7 @@ impl Layout {
         frame_from_integers(&samples, full_scale)
     }
 
-    fn floats(&self, values: Vec<f32>) -> Result<Frame, FrameError> {
+    fn floats(&self, values: Vec<f32>) -> Result<Frame<'static>, FrameError> {
         let size = (self.width, self.height);
         frame_from_floats(size, self.channels, self.interleaved(values))
     }

@@ -148,7 +148,7 @@ mod tests {
     use crate::frame::{FrameMetadata, decode};
     use std::io::Cursor;
 
-    fn frame() -> Frame {
+    fn frame() -> Frame<'static> {
         let pixels = (0..12).map(|i| (i * 20) as f32).collect();
         let metadata = FrameMetadata {
             date: "2024-03-05T21:30:15Z".parse().ok(),

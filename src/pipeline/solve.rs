@@ -39,10 +39,10 @@ pub fn solve_file(
 /// As [`solve_file`].
 pub fn solve_read(
     name: &Path,
-    read: impl FnOnce(&mut frame::Buffers) -> Result<Frame, FrameError>,
+    read: impl FnOnce(&mut frame::Buffers) -> Result<Frame<'static>, FrameError>,
     context: &Context,
     workspace: &mut Workspace,
-) -> Result<(Solution, Frame), Error> {
+) -> Result<(Solution, Frame<'static>), Error> {
     let mut clock = Stopwatch::start();
     let mut frame = read(&mut workspace.frames)?;
     let calibration = context.calibration;
@@ -88,7 +88,7 @@ pub fn solve_frame(
 
 /// A frame, and what is known of its origin.
 struct Input<'a> {
-    frame: &'a Frame,
+    frame: &'a Frame<'a>,
     name: Option<&'a Path>,
     /// The calibration that was applied.
     calibration: Option<&'a Calibration>,

@@ -21,7 +21,7 @@ use std::collections::HashSet;
 /// What the stages found in a frame.
 pub(super) struct Solved<'a> {
     pub context: &'a Context<'a>,
-    pub frame: &'a Frame,
+    pub frame: &'a Frame<'a>,
     /// The calibration that was applied.
     pub calibration: Option<&'a Calibration>,
     pub priors: Priors,

@@ -25,7 +25,7 @@ pub fn field(spot_sigma_px: f64) -> Field {
 }
 
 /// Faint stars, the first class, and some bright ones.
-pub fn frame(field: &Field, seed: u64) -> (Vec<Star>, Frame) {
+pub fn frame(field: &Field, seed: u64) -> (Vec<Star>, Frame<'static>) {
     let mut ranges = [FAINT; BRIGHT_EVERY];
     ranges[BRIGHT_EVERY - 1] = BRIGHT;
     field.frame(&ranges, seed)

@@ -107,7 +107,7 @@ impl Field {
     }
 
     /// Stars with signal-to-noise ratios drawn from each of `ranges` in turn, and their frame.
-    pub fn frame(&self, ranges: &[(f64, f64)], seed: u64) -> (Vec<Star>, Frame) {
+    pub fn frame(&self, ranges: &[(f64, f64)], seed: u64) -> (Vec<Star>, Frame<'static>) {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let places = self.places(&mut random);
         let star = |(i, place)| {
@@ -125,7 +125,7 @@ impl Field {
         (stars, frame)
     }
 
-    pub fn draw(&self, stars: &[Star], seed: u64) -> Frame {
+    pub fn draw(&self, stars: &[Star], seed: u64) -> Frame<'static> {
         let exposure_s = self.scenario.conditions.exposure_s;
         let v_mag = |star: &Star| self.budget.vmag_of(star.flux_e, exposure_s);
         let drawn: Vec<_> = stars.iter().map(|star| (star.place, v_mag(star))).collect();

@@ -36,7 +36,7 @@ pub fn attitude(rate_deg_s: Vector3<f64>, number: u32) -> Rotation<Icrs, Camera>
 }
 
 /// A frame at an attitude, of a camera that turns.
-pub fn frame(at: Rotation<Icrs, Camera>, rate_deg_s: Vector3<f64>, seed: u64) -> Frame {
+pub fn frame(at: Rotation<Icrs, Camera>, rate_deg_s: Vector3<f64>, seed: u64) -> Frame<'static> {
     let scene = Scene {
         rate_x_deg_s: rate_deg_s.x,
         rate_y_deg_s: rate_deg_s.y,
@@ -54,7 +54,7 @@ pub fn frame(at: Rotation<Icrs, Camera>, rate_deg_s: Vector3<f64>, seed: u64) ->
 }
 
 /// A frame without light.
-pub fn dark(seed: u64) -> Frame {
+pub fn dark(seed: u64) -> Frame<'static> {
     let simulator = Simulator::new(&scenario(), &Scene::default(), &[]).expect("a valid camera");
     simulator.dark(seed).expect("a frame")
 }

@@ -10,7 +10,7 @@ use crate::frame::Frame;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FlatConfig {
     /// Name and frame of the dark.
-    pub dark: Option<(String, Frame)>,
+    pub dark: Option<(String, Frame<'static>)>,
     /// Bias, in ADU, if there is no dark.
     pub bias_adu: f64,
     /// Read noise of a pixel, in electrons.

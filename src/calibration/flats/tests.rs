@@ -23,7 +23,7 @@ fn response() -> Vec<f64> {
     (0..SIDE * SIDE).map(of).collect()
 }
 
-fn flat(level_adu: f64, seed: u64) -> Frame {
+fn flat(level_adu: f64, seed: u64) -> Frame<'static> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let pixels = response().into_iter().map(|response| {
         let signal = level_adu * response;

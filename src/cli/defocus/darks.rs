@@ -44,7 +44,7 @@ fn measure(
     pool: &rayon::ThreadPool,
 ) -> anyhow::Result<Darks> {
     let mut stack = DarkStack::new();
-    let measure = |path: &Path, frame: Frame| {
+    let measure = |path: &Path, frame: Frame<'static>| {
         let statistics = FrameStatistics::of(&path.display().to_string(), &frame, None);
         (frame, statistics)
     };

@@ -56,7 +56,7 @@ pub(crate) fn read_frame(
     input: &Path,
     page: Option<NonZeroUsize>,
     buffers: &mut Buffers,
-) -> Result<Frame, FrameError> {
+) -> Result<Frame<'static>, FrameError> {
     if !is_stdin(input) {
         return frame::read_page_with(input, page, buffers);
     }
@@ -80,7 +80,7 @@ pub(crate) fn for_each_frame<R: Send>(
     pool: &rayon::ThreadPool,
     paths: &[PathBuf],
     page: Option<NonZeroUsize>,
-    measure: impl Fn(&Path, Frame) -> R + Sync,
+    measure: impl Fn(&Path, Frame<'static>) -> R + Sync,
     mut take: impl FnMut(R) -> anyhow::Result<()>,
 ) -> anyhow::Result<usize> {
     let progress = frames_bar(paths.len() as u64);

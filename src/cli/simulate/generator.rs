@@ -21,7 +21,7 @@ pub(super) struct Generator<'a> {
 
 /// A simulated frame, and what is known of it.
 pub(super) struct Simulated {
-    pub(super) frame: Frame,
+    pub(super) frame: Frame<'static>,
     pub(super) truth: Option<Truth>,
     pub(super) attitude: Option<Rotation<Icrs, Camera>>,
     pub(super) number: u64,

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Solved {
     pub(crate) solution: Solution,
     /// The frame to draw on, if there is one.
-    pub(crate) frame: Option<Frame>,
+    pub(crate) frame: Option<Frame<'static>>,
 }
 
 /// Writes result files into a directory, if one is given.

@@ -15,8 +15,8 @@ pub(crate) enum Samples<'a> {
     F32(&'a [f32]),
 }
 
-impl<'a> From<&'a Pixels> for Samples<'a> {
-    fn from(pixels: &'a Pixels) -> Self {
+impl<'a> From<&'a Pixels<'_>> for Samples<'a> {
+    fn from(pixels: &'a Pixels<'_>) -> Self {
         match pixels {
             Pixels::U8(values) => Self::U8(values),
             Pixels::U16(values) => Self::U16(values),

@@ -483,7 +483,7 @@ mod tests {
     const GAIN: f64 = 0.5;
 
     /// A frame of stars on a grid with random fractions of pixels, and their true positions.
-    fn frame(spot_px: f64, smear_px: [f64; 2], seed: u64) -> (Frame, Vec<PixelPoint>) {
+    fn frame(spot_px: f64, smear_px: [f64; 2], seed: u64) -> (Frame<'static>, Vec<PixelPoint>) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut light = vec![0.0f64; SIDE * SIDE];
         let mut stars = Vec::new();

@@ -59,7 +59,7 @@ impl Image {
     }
 
     /// Decodes the image from `bytes`, the content of the file.
-    pub fn frame(&self, bytes: &[u8]) -> Result<Frame, FrameError> {
+    pub fn frame(&self, bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
         let length = self.width * self.height * self.channels * self.stored.bytes();
         let end = self.offset.saturating_add(length);
         let data = bytes.get(self.offset..end).ok_or_else(|| {
@@ -104,7 +104,7 @@ impl Image {
         data: &[u8],
         level: impl Fn([u8; N]) -> T,
         full_scale: T,
-    ) -> Result<Frame, FrameError> {
+    ) -> Result<Frame<'static>, FrameError> {
         let values = self.interleaved(data.as_chunks().0.iter().map(|b| level(*b)).collect());
         let samples = Samples {
             width: self.width,
@@ -132,7 +132,7 @@ impl Image {
         &self,
         data: &[u8],
         integer: impl Fn([u8; N]) -> i64,
-    ) -> Result<Frame, FrameError> {
+    ) -> Result<Frame<'static>, FrameError> {
         let value = |bytes| match integer(bytes) {
             stored if Some(stored) == self.blank => f64::NAN,
             stored => stored as f64,
@@ -146,7 +146,7 @@ impl Image {
         &self,
         data: &[u8],
         value: impl Fn([u8; N]) -> f64,
-    ) -> Result<Frame, FrameError> {
+    ) -> Result<Frame<'static>, FrameError> {
         let level = |bytes: &[u8; N]| (self.zero + self.scale * value(*bytes)) as f32;
         let values = self.interleaved(data.as_chunks().0.iter().map(level).collect());
         frame_from_floats((self.width, self.height), self.channels, values)

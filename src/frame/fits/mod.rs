@@ -34,7 +34,10 @@ use unit::Units;
 /// Decodes image `page` of a FITS file, counted from 1; without `page`, the first.
 /// # Errors
 /// As [`super::reader::decode_page`].
-pub(super) fn decode(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame, FrameError> {
+pub(super) fn decode(
+    bytes: &[u8],
+    page: Option<NonZeroUsize>,
+) -> Result<Frame<'static>, FrameError> {
     let (mut pages, mut tables) = (0, 0);
     let mut units = Units::new(bytes);
     // The primary header holds the keywords that are common to all units.

@@ -178,7 +178,7 @@ mod tests {
         write_fits(&mut bytes, frame, samples, header).map(|()| bytes)
     }
 
-    fn frame_of(pixels: Vec<f32>) -> Frame {
+    fn frame_of(pixels: Vec<f32>) -> Frame<'static> {
         Frame::new(pixels.len() / 3, 3, pixels).unwrap()
     }
 

@@ -135,8 +135,8 @@ fn nested(
     }
     let mut of_corners = [[[0.0; LANES]; 2]; LENS_TERMS + 1];
     let rows = adjustment.rows(&corners(adjustment))?;
-    for axis in 0..2 {
-        let (mut terms, mut leverage) = (rows.common[axis], [0.0; LANES]);
+    for (axis, &of_axis) in rows.common.iter().enumerate() {
+        let (mut terms, mut leverage) = (of_axis, [0.0; LANES]);
         for i in 0..LENS_PARAMETERS {
             orthogonalise(&mut terms, i, root);
             add_products(&mut leverage, &terms[i], &terms[i]);

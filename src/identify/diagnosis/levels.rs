@@ -41,7 +41,7 @@ pub(super) fn diagnose(frame: &Frame) -> Option<Diagnosis> {
 mod tests {
     use super::*;
 
-    fn frame(pixels: impl Fn(usize) -> f32) -> Frame {
+    fn frame(pixels: impl Fn(usize) -> f32) -> Frame<'static> {
         Frame::new(40, 30, (0..1200).map(pixels).collect())
             .unwrap()
             .with_levels(1.0, Some(255.0))

@@ -31,7 +31,7 @@ use crate::frame::Frame;
 #[derive(Debug, Clone, Copy)]
 pub struct Unidentified<'a> {
     /// The frame and its detections. A list of centroids has neither.
-    pub image: Option<(&'a Frame, &'a Detections)>,
+    pub image: Option<(&'a Frame<'a>, &'a Detections)>,
     /// The observed stars.
     pub field: &'a StarField,
     /// What was known beforehand.

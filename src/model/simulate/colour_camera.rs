@@ -42,7 +42,7 @@ impl ColourCamera {
     ///
     /// # Errors
     /// [`FrameError`] if no JPEG can have its size.
-    pub fn record(&self, frame: &Frame) -> Result<Frame, FrameError> {
+    pub fn record(&self, frame: &Frame) -> Result<Frame<'static>, FrameError> {
         let range_adu = self.white_adu - self.black_adu;
         let linear = |pixel: &f32| (f64::from(*pixel) - self.black_adu) / range_adu;
         let mosaic: Vec<f64> = frame.values().iter().map(linear).collect();
@@ -124,7 +124,7 @@ pub fn decoded_jpeg(
     [width, height]: [usize; 2],
     form: ExtendedColorType,
     quality: u8,
-) -> Result<Frame, FrameError> {
+) -> Result<Frame<'static>, FrameError> {
     let mut bytes = Vec::new();
     let mut encoder = JpegEncoder::new_with_quality(&mut bytes, quality);
     encoder

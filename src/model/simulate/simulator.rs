@@ -119,7 +119,11 @@ impl<'a> Simulator<'a> {
     ///
     /// # Errors
     /// None for a valid simulator.
-    pub fn frame(&self, pointing: &Pointing, seed: u64) -> Result<(Frame, Truth), FrameError> {
+    pub fn frame(
+        &self,
+        pointing: &Pointing,
+        seed: u64,
+    ) -> Result<(Frame<'static>, Truth), FrameError> {
         self.exposed(seed, |sampler, reach_px, random| {
             sampler.on_frame(pointing, self.stars, reach_px, random)
         })
@@ -134,7 +138,7 @@ impl<'a> Simulator<'a> {
         &self,
         stars: &[(PixelPoint, f64)],
         seed: u64,
-    ) -> Result<(Frame, Truth), FrameError> {
+    ) -> Result<(Frame<'static>, Truth), FrameError> {
         self.exposed(seed, |sampler, _, _| {
             let star = |(number, &(position, v_mag)): (usize, &(PixelPoint, f64))| TrueStar {
                 number,
@@ -151,7 +155,7 @@ impl<'a> Simulator<'a> {
     ///
     /// # Errors
     /// As [`Self::frame`].
-    pub fn dark(&self, seed: u64) -> Result<Frame, FrameError> {
+    pub fn dark(&self, seed: u64) -> Result<Frame<'static>, FrameError> {
         self.evenly_lit(0.0, seed)
     }
 
@@ -160,7 +164,7 @@ impl<'a> Simulator<'a> {
     ///
     /// # Errors
     /// As [`Self::frame`].
-    pub fn evenly_lit(&self, electrons: f64, seed: u64) -> Result<Frame, FrameError> {
+    pub fn evenly_lit(&self, electrons: f64, seed: u64) -> Result<Frame<'static>, FrameError> {
         let none = Scene::default();
         let sky = Sky::new(
             &self.scenario,
@@ -184,7 +188,7 @@ impl<'a> Simulator<'a> {
         &self,
         seed: u64,
         seen: impl FnOnce(&StarSampler, f64, &mut ChaCha8Rng) -> Vec<TrueStar>,
-    ) -> Result<(Frame, Truth), FrameError> {
+    ) -> Result<(Frame<'static>, Truth), FrameError> {
         let (sheet, scene) = (&self.scenario.camera, &self.scene);
         let conditions = &self.scenario.conditions;
         let exposure_s = conditions.exposure_s;
@@ -257,7 +261,7 @@ impl<'a> Simulator<'a> {
         mut image: ElectronImage,
         cosmic_rays: &[CosmicRay],
         seed: u64,
-    ) -> Result<Frame, FrameError> {
+    ) -> Result<Frame<'static>, FrameError> {
         let sheet = &self.scenario.camera;
         self.convert(image.pixels_mut());
         let mut random = random(seed, FrameStream::Noise);
@@ -320,7 +324,7 @@ pub fn star_field(
     scenario: &Scenario,
     stars: &[(PixelPoint, f64)],
     seed: u64,
-) -> Result<Frame, FrameError> {
+) -> Result<Frame<'static>, FrameError> {
     let simulator = Simulator::new(scenario, &Scene::default(), &[])?;
     Ok(simulator.star_field(stars, seed)?.0)
 }

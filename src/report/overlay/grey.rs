@@ -175,7 +175,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
-    fn frame(width: usize, height: usize) -> Frame {
+    fn frame(width: usize, height: usize) -> Frame<'static> {
         let noise = |i: usize| 50.0 + ((i * 7919) % 101) as f32 * 0.1;
         Frame::new(width, height, (0..width * height).map(noise).collect()).unwrap()
     }

@@ -15,7 +15,7 @@ use nalgebra::Matrix3;
 const WIDTH: usize = 900;
 const HEIGHT: usize = 700;
 
-fn frame(width: usize, height: usize) -> Frame {
+fn frame(width: usize, height: usize) -> Frame<'static> {
     let noise = |i: usize| 50.0 + ((i * 7919) % 101) as f32 * 0.1;
     Frame::new(width, height, (0..width * height).map(noise).collect()).unwrap()
 }

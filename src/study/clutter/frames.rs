@@ -32,7 +32,7 @@ pub enum ClutterError {
 #[derive(Debug, Clone)]
 pub struct ClutteredFrame {
     /// The frame.
-    pub frame: Frame,
+    pub frame: Frame<'static>,
     /// What is on it; `None` where it shows no sky.
     pub sky: Option<TrueSky>,
 }
@@ -123,10 +123,10 @@ impl<'a> FrameMaker<'a> {
 
     fn with_clutter(
         &self,
-        frame: Frame,
+        frame: Frame<'static>,
         canvas: &mut Canvas,
         random: &mut ChaCha8Rng,
-    ) -> Result<Frame, ClutterError> {
+    ) -> Result<Frame<'static>, ClutterError> {
         match self.kind {
             Kind::Foliage => scenery::foliage(canvas, random),
             Kind::Edges => {

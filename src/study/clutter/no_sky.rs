@@ -18,7 +18,7 @@ const HEIGHT: usize = 768;
 const WHITE: f64 = 255.0;
 
 /// A picture of a kind that shows no sky; every second one is a JPEG.
-pub(super) fn picture(kind: Kind, random: &mut ChaCha8Rng) -> Result<Frame, FrameError> {
+pub(super) fn picture(kind: Kind, random: &mut ChaCha8Rng) -> Result<Frame<'static>, FrameError> {
     let mut canvas = Canvas::new(WIDTH, HEIGHT);
     let ground = Ground::of(kind, random);
     match kind {

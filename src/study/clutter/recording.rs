@@ -46,7 +46,11 @@ fn middle(values: &mut [f32]) -> f32 {
 }
 
 /// `frame` behind `canvas`, which has the sky's noise.
-pub(super) fn behind(mut frame: Frame, canvas: &Canvas, random: &mut ChaCha8Rng) -> Frame {
+pub(super) fn behind(
+    mut frame: Frame<'static>,
+    canvas: &Canvas,
+    random: &mut ChaCha8Rng,
+) -> Frame<'static> {
     let sky = Sky::of(&frame);
     let most = frame.saturation_adu.unwrap_or(f32::MAX);
     let layers = canvas.opacity.iter().zip(&canvas.light).zip(&canvas.glow);
@@ -72,7 +76,10 @@ fn shot_noise(light: f64, random: &mut ChaCha8Rng) -> f64 {
 }
 
 /// The bright part of `frame` mirrored in a window, added to it.
-pub(super) fn mirrored_in_window(mut frame: Frame, random: &mut ChaCha8Rng) -> Frame {
+pub(super) fn mirrored_in_window(
+    mut frame: Frame<'static>,
+    random: &mut ChaCha8Rng,
+) -> Frame<'static> {
     let sky = Sky::of(&frame);
     let share = random.random_range(0.1..0.6);
     let most = frame.saturation_adu.unwrap_or(f32::MAX);
@@ -94,7 +101,7 @@ pub(super) fn mirrored_in_window(mut frame: Frame, random: &mut ChaCha8Rng) -> F
 
 /// `frame` in eight bits, with a black level that is above the sky in parts of it: the sky becomes
 /// brighter across the frame.
-pub(super) fn cut_off(mut frame: Frame, random: &mut ChaCha8Rng) -> Frame {
+pub(super) fn cut_off(mut frame: Frame<'static>, random: &mut ChaCha8Rng) -> Frame<'static> {
     let sky = Sky::of(&frame);
     // Levels in one standard deviation of the noise.
     let levels = random.random_range(0.6..2.5);
@@ -116,7 +123,10 @@ pub(super) fn cut_off(mut frame: Frame, random: &mut ChaCha8Rng) -> Frame {
 }
 
 /// `frame` as a phone records it: a mosaic of colours, demosaiced, a tone curve, JPEG.
-pub(super) fn as_jpeg(frame: &Frame, random: &mut ChaCha8Rng) -> Result<Frame, FrameError> {
+pub(super) fn as_jpeg(
+    frame: &Frame,
+    random: &mut ChaCha8Rng,
+) -> Result<Frame<'static>, FrameError> {
     /// Response of red, green and blue pixels to the light of a grey surface.
     const RESPONSE: [f64; 3] = [0.5, 1.0, 0.6];
     let sky = Sky::of(frame);
@@ -146,7 +156,7 @@ mod tests {
     use super::*;
     use rand::SeedableRng;
 
-    fn noisy(level: f64, noise: f64) -> Frame {
+    fn noisy(level: f64, noise: f64) -> Frame<'static> {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let pixel = |_| (level + noise * normal(&mut random)).round() as f32;
         let pixels = (0..200 * 160).map(pixel).collect();

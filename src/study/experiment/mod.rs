@@ -55,7 +55,7 @@ pub struct Run {
     pub report: ExperimentReport,
     /// The first simulated frame with its solution; `None` where the paper's table was not
     /// identified.
-    pub first: Option<(Frame, Solution)>,
+    pub first: Option<(Frame<'static>, Solution)>,
 }
 
 /// Runs the experiment, its frames on the threads of the current pool; `done` is called after each.

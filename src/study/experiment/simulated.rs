@@ -92,7 +92,7 @@ impl Simulation<'_> {
     }
 
     /// Frame number `number`; its random numbers depend only on the seed and this number.
-    pub(super) fn frame(&self, number: u64) -> Result<(Frame, Truth), ExperimentError> {
+    pub(super) fn frame(&self, number: u64) -> Result<(Frame<'static>, Truth), ExperimentError> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         random.set_stream(number);
         let shift_px = [0, 1].map(|_| random.random_range(-SHIFT_PX..SHIFT_PX));

@@ -55,7 +55,7 @@ pub struct Validator<'a> {
 
 /// A simulated frame, not yet processed.
 pub(super) struct Simulated {
-    pub(super) frame: Frame,
+    pub(super) frame: Frame<'static>,
     pub(super) truth: Truth,
     pub(super) icrs_to_camera: Rotation<Icrs, Camera>,
     pub(super) seed: u64,
