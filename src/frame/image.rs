@@ -83,6 +83,18 @@ impl<'p> Frame<'p> {
         self.pixels.as_f32_mut()
     }
 
+    /// The frame with pixels of its own: borrowed ones are copied.
+    pub fn into_owned(self) -> Frame<'static> {
+        Frame {
+            width: self.width,
+            height: self.height,
+            pixels: self.pixels.into_owned(),
+            step_adu: self.step_adu,
+            saturation_adu: self.saturation_adu,
+            metadata: self.metadata,
+        }
+    }
+
     /// Sets the step between grey levels and the saturation level, in ADU.
     #[must_use]
     pub fn with_levels(mut self, step_adu: f32, saturation_adu: Option<f32>) -> Self {

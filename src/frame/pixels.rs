@@ -70,6 +70,15 @@ impl Pixels<'_> {
         }
     }
 
+    /// The pixels, copied where they are borrowed.
+    pub(super) fn into_owned(self) -> Pixels<'static> {
+        match self {
+            Self::U8(values) => Pixels::U8(values.into_owned().into()),
+            Self::U16(values) => Pixels::U16(values.into_owned().into()),
+            Self::F32(values) => Pixels::F32(values.into_owned().into()),
+        }
+    }
+
     /// Reverses the order of the rows of `width` pixels.
     pub(super) fn reverse_rows(&mut self, width: usize) {
         match self {

@@ -1,0 +1,33 @@
+//! Catalogues, each read and indexed once in a process.
+
+use crate::errors::exception;
+use pyo3::prelude::*;
+use starpipe::identify::{IndexedCatalog, cache_directory};
+use starpipe::sky::catalog::{self, Catalog};
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+
+/// The file of a catalogue, `None` for the built-in one, and the directory of its index.
+type Key = (Option<PathBuf>, Option<PathBuf>);
+
+static CATALOGS: Mutex<Option<HashMap<Key, &'static IndexedCatalog<'static>>>> = Mutex::new(None);
+
+/// The catalogue with its index. It is kept to the end of the process: pipelines, copies and
+/// threads share it.
+pub fn open(key: Key) -> PyResult<&'static IndexedCatalog<'static>> {
+    let mut catalogs = CATALOGS.lock().unwrap_or_else(PoisonError::into_inner);
+    let catalogs = catalogs.get_or_insert_default();
+    if let Some(known) = catalogs.get(&key) {
+        return Ok(known);
+    }
+    let catalog: &'static Catalog = match &key.0 {
+        None => Catalog::built_in(),
+        Some(path) => Box::leak(Box::new(catalog::read(path).map_err(exception)?.catalog)),
+    };
+    let directory = key.1.clone().or_else(cache_directory);
+    let indexed = IndexedCatalog::open(catalog, directory.as_deref(), &|_| ());
+    let indexed: &'static IndexedCatalog = Box::leak(Box::new(indexed));
+    catalogs.insert(key, indexed);
+    Ok(indexed)
+}

@@ -1,0 +1,49 @@
+//! What the user knows of a frame.
+
+use crate::errors::exception;
+use pyo3::prelude::*;
+use starpipe::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
+use starpipe::identify::{DateSource, FrameDate, Scale};
+use starpipe::{Priors, ScalePrior, Site, SkyRegion, UnitVector};
+
+/// How far a stated scale may be off, as a share: the program's default.
+const SCALE_ERROR: f64 = 0.1;
+
+/// What the user knows of a frame, in degrees, arcseconds, seconds and metres.
+#[derive(Debug, Default, FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Hints {
+    fov_deg: Option<f64>,
+    pixel_scale_arcsec: Option<f64>,
+    near_deg: Option<[f64; 3]>,
+    date: Option<String>,
+    site: Option<[f64; 3]>,
+    exposure_s: Option<f64>,
+}
+
+impl Hints {
+    pub fn priors(&self) -> PyResult<Priors> {
+        let fov = self
+            .fov_deg
+            .map(|deg| Scale::FieldOfView(deg * RAD_PER_DEG));
+        let pixel = self.pixel_scale_arcsec;
+        let scale = fov.or(pixel.map(|arcsec| Scale::Pixel(arcsec * RAD_PER_ARCSEC)));
+        let date = self.date.as_deref().map(str::parse).transpose();
+        let site = self
+            .site
+            .map(|[lat_deg, lon_deg, height_m]| Site::new(lat_deg, lon_deg, height_m));
+        Ok(Priors {
+            scale: scale.map(|scale| ScalePrior::by_user(scale, SCALE_ERROR)),
+            near: self.near_deg.map(|[ra, dec, radius]| SkyRegion {
+                centre: UnitVector::from_ra_dec(ra * RAD_PER_DEG, dec * RAD_PER_DEG),
+                radius_rad: radius * RAD_PER_DEG,
+            }),
+            date: date.map_err(exception)?.map(|date| FrameDate {
+                date,
+                source: DateSource::Option,
+            }),
+            site: site.transpose().map_err(exception)?,
+            exposure_s: self.exposure_s,
+        })
+    }
+}

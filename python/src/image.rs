@@ -1,0 +1,106 @@
+//! Images as frames: an array of numpy is borrowed, a file or its bytes are decoded.
+
+use crate::errors::exception;
+use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
+use starpipe::Frame;
+use starpipe::frame::{self, Buffers, FrameError};
+use std::path::{Path, PathBuf};
+
+/// What Python passes as an image. Arrays are C-contiguous, in the byte order of the machine.
+#[derive(FromPyObject)]
+pub enum Image<'py> {
+    Bytes(PyBackedBytes),
+    Path(PathBuf),
+    U8(PyReadonlyArray2<'py, u8>),
+    U16(PyReadonlyArray2<'py, u16>),
+    F32(PyReadonlyArray2<'py, f32>),
+    /// Whole numbers of another type, and the largest of that type.
+    Integers(PyReadonlyArray2<'py, i64>, i64),
+}
+
+/// The same without Python's objects, so that the interpreter is free while it is used.
+pub enum Source<'a> {
+    Bytes(&'a [u8]),
+    Path(&'a Path),
+    Array(Frame<'a>),
+}
+
+impl Image<'_> {
+    /// Borrows the pixels of an array.
+    pub fn source(&self) -> PyResult<Source<'_>> {
+        let frame = match self {
+            Self::Bytes(bytes) => return Ok(Source::Bytes(bytes)),
+            Self::Path(path) => return Ok(Source::Path(path)),
+            Self::U8(array) => samples(array, slice(array)?),
+            Self::U16(array) => samples(array, slice(array)?),
+            Self::F32(array) => samples(array, slice(array)?),
+            Self::Integers(array, full_scale) => {
+                let [height, width] = sides(array);
+                Frame::from_integers(width, height, slice(array)?, *full_scale)
+            }
+        };
+        frame.map(Source::Array).map_err(exception)
+    }
+}
+
+fn slice<'a, T: numpy::Element>(array: &'a PyReadonlyArray2<'_, T>) -> PyResult<&'a [T]> {
+    let contiguous = array.as_slice();
+    contiguous.map_err(|_| PyTypeError::new_err("the array must be C-contiguous"))
+}
+
+fn sides<T: numpy::Element>(array: &PyReadonlyArray2<'_, T>) -> [usize; 2] {
+    [array.shape()[0], array.shape()[1]]
+}
+
+fn samples<'a, T: numpy::Element>(
+    array: &PyReadonlyArray2<'_, T>,
+    samples: &'a [T],
+) -> Result<Frame<'a>, FrameError>
+where
+    frame::Pixels<'a>: From<&'a [T]>,
+{
+    let [height, width] = sides(array);
+    Frame::from_samples(width, height, samples)
+}
+
+impl<'a> Source<'a> {
+    /// Stands for a file's name.
+    pub fn name(&self) -> PathBuf {
+        match self {
+            Self::Bytes(_) => "bytes".into(),
+            Self::Path(path) => path.to_path_buf(),
+            Self::Array(_) => "array".into(),
+        }
+    }
+
+    /// The frame, with its pixels where `bad` is true without a value.
+    pub fn frame(
+        self,
+        bad: Option<&[bool]>,
+        buffers: &mut Buffers,
+    ) -> Result<Frame<'a>, FrameError> {
+        let mut frame = match self {
+            Self::Bytes(bytes) => frame::decode(bytes)?,
+            Self::Path(path) => frame::read_page_with(path, None, buffers)?,
+            Self::Array(frame) => frame,
+        };
+        let Some(bad) = bad else { return Ok(frame) };
+        let expected = frame.width * frame.height;
+        if bad.len() != expected {
+            let found = bad.len();
+            return Err(FrameError::WrongLength { expected, found });
+        }
+        for (pixel, _) in frame
+            .values_mut()
+            .iter_mut()
+            .zip(bad)
+            .filter(|(_, bad)| **bad)
+        {
+            *pixel = f32::NAN;
+        }
+        Ok(frame)
+    }
+}

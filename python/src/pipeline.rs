@@ -1,0 +1,224 @@
+//! The pipeline: catalogue, camera and buffers that solve frames.
+
+use crate::catalogs;
+use crate::errors::exception;
+use crate::hints::Hints;
+use crate::image::{Image, Source};
+use crate::solved::Solved;
+use numpy::PyReadonlyArray2;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use starpipe::calibration::Master;
+use starpipe::camera::data_sheet::{DataSheet, Preset};
+use starpipe::frame::Buffers;
+use starpipe::photometry::comparison::StatedCamera;
+use starpipe::pipeline::{CentroidList, ListedCentroid, solve_centroids, solve_frame, solve_read};
+use starpipe::{
+    Calibration, Context, DetectConfig, IndexedCatalog, PixelPoint, Solution, Workspace,
+};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+/// Solves frames. It may be used by several threads at once.
+#[pyclass(frozen, module = "starpipe._starpipe")]
+pub struct Pipeline {
+    indexed: &'static IndexedCatalog<'static>,
+    camera: Option<DataSheet>,
+    /// Buffers that no thread uses at present.
+    workspaces: Mutex<Vec<Workspace>>,
+}
+
+/// The name of a preset, or the file of a data sheet.
+fn data_sheet(camera: &Path) -> PyResult<DataSheet> {
+    match camera.to_str().and_then(Preset::named) {
+        Some(preset) => Ok(preset.data_sheet()),
+        None => DataSheet::read(camera).map_err(exception),
+    }
+}
+
+/// Threads of one call. None outlives it: a fork after it cannot hang.
+fn pool(threads: usize) -> PyResult<ThreadPool> {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(exception)
+}
+
+#[pymethods]
+impl Pipeline {
+    #[new]
+    #[pyo3(signature = (catalog, camera, cache_dir))]
+    fn new(
+        py: Python<'_>,
+        catalog: Option<PathBuf>,
+        camera: Option<PathBuf>,
+        cache_dir: Option<PathBuf>,
+    ) -> PyResult<Self> {
+        py.detach(|| {
+            let all = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+            Ok(Self {
+                indexed: pool(all)?.install(|| catalogs::open((catalog, cache_dir)))?,
+                camera: camera.as_deref().map(data_sheet).transpose()?,
+                workspaces: Mutex::default(),
+            })
+        })
+    }
+
+    /// Solves an image.
+    #[pyo3(signature = (image, mask, hints, dark, flat, sigma, max_stars, attitude_only, threads))]
+    fn solve(
+        &self,
+        py: Python<'_>,
+        image: Image<'_>,
+        mask: Option<PyReadonlyArray2<'_, bool>>,
+        hints: Hints,
+        dark: Option<Image<'_>>,
+        flat: Option<Image<'_>>,
+        sigma: Option<f64>,
+        max_stars: Option<usize>,
+        attitude_only: bool,
+        threads: NonZeroUsize,
+    ) -> PyResult<Solved> {
+        let source = image.source()?;
+        let bad = mask.as_ref().map(PyReadonlyArray2::as_slice).transpose();
+        let bad = bad.map_err(|_| PyValueError::new_err("the mask must be C-contiguous"))?;
+        let dark = dark.as_ref().map(Image::source).transpose()?;
+        let flat = flat.as_ref().map(Image::source).transpose()?;
+        let context = self.context(&hints, attitude_only)?;
+        let detect = DetectConfig {
+            threshold_sigma: sigma,
+            max_detections: max_stars.unwrap_or(DetectConfig::DEFAULT_MAX_DETECTIONS),
+            ..DetectConfig::default()
+        };
+        py.detach(|| {
+            let calibration = self.calibration(dark, flat)?;
+            let context = Context {
+                detect,
+                calibration: calibration.as_ref(),
+                ..context
+            };
+            self.with_workspace(threads, |workspace| {
+                let name = source.name();
+                let solution = solve(source, bad, &context, workspace)?;
+                Ok(self.solved(&name, solution))
+            })
+        })
+    }
+
+    /// Identifies centroids: rows of x, y, magnitude and standard error in pixels (or NaN).
+    fn identify(
+        &self,
+        py: Python<'_>,
+        centroids: PyReadonlyArray2<'_, f64>,
+        shape: [usize; 2],
+        hints: Hints,
+        attitude_only: bool,
+    ) -> PyResult<Solved> {
+        let rows = centroids.as_slice().map_err(exception)?.as_chunks::<4>().0;
+        let [height, width] = shape;
+        let list = CentroidList {
+            width,
+            height,
+            photometry: starpipe::identify::Photometry::Instrumental,
+            centroids: rows
+                .iter()
+                .map(|&[x, y, mag, sigma_px]| ListedCentroid {
+                    sigma_px: Some(sigma_px).filter(|sigma| sigma.is_finite()),
+                    ..ListedCentroid::new(PixelPoint::new(x, y), mag)
+                })
+                .collect(),
+        };
+        let context = self.context(&hints, attitude_only)?;
+        py.detach(|| {
+            self.with_workspace(NonZeroUsize::MIN, |workspace| {
+                let solution = solve_centroids(&list, &context, workspace);
+                Ok(self.solved(Path::new("centroids"), solution))
+            })
+        })
+    }
+}
+
+impl Pipeline {
+    fn context(&self, hints: &Hints, attitude_only: bool) -> PyResult<Context<'static>> {
+        Ok(Context {
+            priors: hints.priors()?,
+            camera: self.camera.clone().map(|sheet| StatedCamera {
+                sheet,
+                zenith_distance_deg: None,
+                extinction: None,
+            }),
+            attitude_only,
+            ..Context::new(self.indexed)
+        })
+    }
+
+    fn calibration(
+        &self,
+        dark: Option<Source>,
+        flat: Option<Source>,
+    ) -> PyResult<Option<Calibration>> {
+        if dark.is_none() && flat.is_none() {
+            return Ok(None);
+        }
+        let master = |source: Source| {
+            let name = source.name().display().to_string();
+            let frame = source.frame(None, &mut Buffers::new()).map_err(exception)?;
+            let frame = frame.into_owned();
+            Ok::<_, PyErr>(Master { name, frame })
+        };
+        let (dark, flat) = (dark.map(master).transpose()?, flat.map(master).transpose()?);
+        let bias_adu = self.camera.as_ref().map_or(0.0, |sheet| sheet.bias_adu);
+        let calibration = Calibration::new(dark, flat, None, bias_adu);
+        calibration.map(Some).map_err(exception)
+    }
+
+    /// Works with buffers that are kept for later frames.
+    fn with_workspace<R: Send>(
+        &self,
+        threads: NonZeroUsize,
+        work: impl FnOnce(&mut Workspace) -> PyResult<R> + Send,
+    ) -> PyResult<R> {
+        // In a child process the lock may be held by a thread that does not exist there.
+        let mut workspace = match self.workspaces.try_lock() {
+            Ok(mut kept) => kept.pop().unwrap_or_default(),
+            Err(_) => Workspace::new(),
+        };
+        workspace.detect = workspace.detect.on_threads(threads);
+        let result = if threads == NonZeroUsize::MIN {
+            work(&mut workspace)
+        } else {
+            pool(threads.get())?.install(|| work(&mut workspace))
+        };
+        if let Ok(mut kept) = self.workspaces.try_lock() {
+            kept.push(workspace);
+        }
+        result
+    }
+
+    fn solved(&self, name: &Path, solution: Solution) -> Solved {
+        Solved {
+            name: name.display().to_string(),
+            solution,
+            indexed: self.indexed,
+        }
+    }
+}
+
+fn solve(
+    source: Source,
+    bad: Option<&[bool]>,
+    context: &Context,
+    workspace: &mut Workspace,
+) -> PyResult<Solution> {
+    let name = source.name();
+    if matches!(source, Source::Array(_)) && context.calibration.is_none() {
+        let frame = source
+            .frame(bad, &mut workspace.frames)
+            .map_err(exception)?;
+        return solve_frame(&frame, context, workspace).map_err(exception);
+    }
+    let read = |buffers: &mut Buffers| Ok(source.frame(bad, buffers)?.into_owned());
+    let (solution, frame) = solve_read(&name, read, context, workspace).map_err(exception)?;
+    workspace.frames.recycle(frame);
+    Ok(solution)
+}

@@ -1,0 +1,106 @@
+"""What the user knows of a frame: plain numbers and astropy's objects."""
+
+from __future__ import annotations
+
+import datetime
+from typing import Any
+
+import numpy as np
+
+
+def number(value: Any, unit: str, name: str) -> float | None:
+    """Return `value` in `unit`: a plain number is in it already, a Quantity is converted."""
+    if value is None:
+        return None
+    if hasattr(value, "to_value") and hasattr(value, "unit"):
+        try:
+            value = value.to_value(unit)
+        except Exception as error:
+            raise ValueError(f"{name} must be convertible to {unit}: {error}") from error
+    try:
+        number = float(value)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} must be a number or a Quantity in {unit}: {error}") from error
+    if not np.isfinite(number):
+        raise ValueError(f"{name} must be a finite number, not {number}")
+    return number
+
+
+def positive(value: Any, unit: str, name: str, below: float = np.inf) -> float | None:
+    """Return `value` in `unit`, where it is positive and less than `below`."""
+    found = number(value, unit, name)
+    if found is not None and not 0.0 < found < below:
+        limit = f" and less than {below:g}" if np.isfinite(below) else ""
+        raise ValueError(f"{name} must be more than 0{limit} {unit}, not {found:g}")
+    return found
+
+
+def direction(near: Any, radius: Any) -> tuple[float, float, float] | None:
+    """Return right ascension, declination and radius in degrees."""
+    if (near is None) != (radius is None):
+        raise ValueError("near and radius belong together: give both")
+    if near is None:
+        return None
+    if hasattr(near, "icrs"):
+        near = near.icrs
+        near = near.ra.deg, near.dec.deg
+    try:
+        ra, dec = near
+    except (TypeError, ValueError) as error:
+        raise ValueError("near must be a SkyCoord or (ra, dec) in degrees") from error
+    ra_deg, dec_deg = number(ra, "deg", "near"), number(dec, "deg", "near")
+    radius_deg = positive(radius, "deg", "radius", 180.000001)
+    assert ra_deg is not None and dec_deg is not None and radius_deg is not None
+    if not -90.0 <= dec_deg <= 90.0:
+        raise ValueError(f"the declination of near must be from -90 to 90 degrees, not {dec_deg:g}")
+    return ra_deg, dec_deg, radius_deg
+
+
+def iso_date(date: Any) -> str | None:
+    """Return a date as ISO 8601 in UTC."""
+    if date is None or isinstance(date, str):
+        return date
+    if hasattr(date, "utc") and hasattr(date.utc, "isot"):
+        return str(date.utc.isot)
+    if isinstance(date, np.datetime64):
+        return str(np.datetime_as_string(date, unit="ms"))
+    if isinstance(date, (datetime.datetime, datetime.date)):
+        return date.isoformat()
+    raise ValueError(f"date must be ISO 8601, a Time or a datetime, not {type(date).__name__}")
+
+
+def site(location: Any) -> tuple[float, float, float] | None:
+    """Return latitude and longitude in degrees, and height in metres."""
+    if location is None:
+        return None
+    if hasattr(location, "geodetic"):
+        place = location.geodetic
+        return float(place.lat.deg), float(place.lon.deg), float(place.height.to_value("m"))
+    values = tuple(location)
+    if len(values) not in (2, 3):
+        raise ValueError("location must be an EarthLocation or (latitude, longitude[, height])")
+    units = (("deg", "latitude"), ("deg", "longitude"), ("m", "height"))
+    found = [number(value, *unit) for value, unit in zip(values, units, strict=False)]
+    lat, lon, height = [*found, 0.0][:3]
+    assert lat is not None and lon is not None and height is not None
+    return lat, lon, height
+
+
+def hints(header: Any, **known: Any) -> dict[str, Any]:
+    """Return what the compiled part takes; a header completes what is not known."""
+    fov, pixel_scale = known["fov"], known["pixel_scale"]
+    if fov is not None and pixel_scale is not None:
+        raise ValueError("fov and pixel_scale say the same: give one")
+    date, exposure = known["date"], known["exposure"]
+    if date is None:
+        date = header.get("DATE-OBS")
+    if exposure is None:
+        exposure = header.get("EXPTIME", header.get("EXPOSURE"))
+    return {
+        "fov_deg": positive(fov, "deg", "fov", 179.0),
+        "pixel_scale_arcsec": positive(pixel_scale, "arcsec", "pixel_scale"),
+        "near_deg": direction(known["near"], known["radius"]),
+        "date": iso_date(date),
+        "site": site(known["location"]),
+        "exposure_s": positive(exposure, "s", "exposure"),
+    }

@@ -1,0 +1,271 @@
+"""The pipeline."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _starpipe
+from ._hints import hints
+from ._images import Image, ImageLike, mask_of
+from ._result import Result
+
+PathLike = str | os.PathLike[str]
+
+
+class Pipeline:
+    """Find and name the stars of frames, and determine where the camera pointed.
+
+    A pipeline may be used by several threads at once, and can be pickled. Its catalogue is read
+    once in a process.
+
+    Parameters
+    ----------
+    catalog : path, optional
+        A star catalogue in place of the built-in one: SKY2000, Tycho-2, a table, or a file written
+        by ``starpipe catalog import``.
+    camera : path or str, optional
+        A description of the camera (TOML), or the name of a preset. It gives the scale where no
+        argument does, and a predicted limiting magnitude.
+    cache_dir : path, optional
+        Where the index of the catalogue is kept. The user's cache directory by default.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read.
+    ValueError
+        If there is no catalogue or no camera in it.
+    """
+
+    def __init__(
+        self,
+        catalog: PathLike | None = None,
+        camera: PathLike | None = None,
+        cache_dir: PathLike | None = None,
+    ) -> None:
+        self._arguments = (catalog, camera, cache_dir)
+        self._pipeline = _starpipe.Pipeline(catalog, camera, cache_dir)
+
+    def __reduce__(self) -> tuple[type[Pipeline], tuple[PathLike | None, ...]]:
+        return type(self), self._arguments
+
+    def __repr__(self) -> str:
+        names = ("catalog", "camera", "cache_dir")
+        given = zip(names, self._arguments, strict=True)
+        return f"Pipeline({', '.join(f'{k}={str(v)!r}' for k, v in given if v is not None)})"
+
+    def solve(
+        self,
+        image: ImageLike,
+        mask: ArrayLike | None = None,
+        *,
+        fov: Any = None,
+        pixel_scale: Any = None,
+        near: Any = None,
+        radius: Any = None,
+        date: Any = None,
+        location: Any = None,
+        exposure: Any = None,
+        dark: ImageLike | None = None,
+        flat: ImageLike | None = None,
+        sigma: float | None = None,
+        max_stars: int | None = None,
+        attitude_only: bool = False,
+        threads: int = 1,
+    ) -> Result:
+        """Solve one frame.
+
+        Parameters
+        ----------
+        image : path, bytes, array, CCDData, NDData or HDU
+            The frame. An array is (rows, columns), of real numbers. Arrays of uint8, uint16 and
+            float32 that are contiguous are not copied. Mask and header of an object are used.
+        mask : array of bool, optional
+            True where a pixel is to be left out.
+        fov, pixel_scale : Quantity or float, optional
+            Horizontal field of view (degrees), or the angle of a pixel (arcseconds); they may be
+            10 % off.
+        near, radius : SkyCoord or (ra, dec), and Angle or float, optional
+            Where the centre of the frame lies, in degrees.
+        date : Time, datetime or str, optional
+            When the frame was taken, in UTC. By default of the header or the file's name.
+        location : EarthLocation or (latitude, longitude[, height]), optional
+            Where it was taken, in degrees and metres.
+        exposure : Quantity or float, optional
+            Exposure in seconds.
+        dark, flat : image, optional
+            What to subtract, and by what to divide.
+        sigma : float, optional
+            Threshold of detection in standard deviations.
+        max_stars : int, optional
+            Measure the strongest stars alone.
+        attitude_only : bool
+            Stop at the attitude: no star beyond the brightest is named.
+        threads : int
+            Threads for this frame.
+
+        Returns
+        -------
+        Result
+            False in a condition where the stars are not identified.
+
+        Raises
+        ------
+        OSError
+            If a file cannot be read.
+        ValueError
+            If there is no image in it, or an argument is out of range.
+        """
+        taken = Image(image)
+        solved = self._pipeline.solve(
+            taken.pixels,
+            mask_of(taken, mask),
+            hints(
+                taken.header,
+                fov=fov,
+                pixel_scale=pixel_scale,
+                near=near,
+                radius=radius,
+                date=date,
+                location=location,
+                exposure=exposure,
+            ),
+            None if dark is None else Image(dark, "dark").pixels,
+            None if flat is None else Image(flat, "flat").pixels,
+            _positive(sigma, "sigma"),
+            _count(max_stars, "max_stars", 4),
+            bool(attitude_only),
+            _count(threads, "threads", 1),
+        )
+        return Result._of(solved)
+
+    def identify(
+        self,
+        x: ArrayLike,
+        y: ArrayLike,
+        *,
+        shape: tuple[int, int],
+        flux: ArrayLike | None = None,
+        mag: ArrayLike | None = None,
+        error: ArrayLike | None = None,
+        fov: Any = None,
+        pixel_scale: Any = None,
+        near: Any = None,
+        radius: Any = None,
+        date: Any = None,
+        location: Any = None,
+        attitude_only: bool = False,
+    ) -> Result:
+        """Identify the stars of a list of centroids.
+
+        Parameters
+        ----------
+        x, y : array
+            Positions in pixels: (0, 0) is the centre of the first pixel.
+        shape : (int, int)
+            Rows and columns of the frame.
+        flux, mag : array
+            Brightness, linear or in magnitudes: one of them.
+        error : array or float, optional
+            Standard error on each axis, in pixels; 0.5 by default.
+        fov, pixel_scale, near, radius, date, location, attitude_only
+            As for `solve`.
+
+        Returns
+        -------
+        Result
+            False in a condition where the stars are not identified.
+
+        Raises
+        ------
+        ValueError
+            If arrays do not match, or an argument is out of range.
+        """
+        if (flux is None) == (mag is None):
+            raise ValueError("give the brightness as flux or as mag")
+        if mag is None:
+            flux = np.asarray(flux, dtype=np.float64)
+            if not np.all(flux > 0.0):
+                raise ValueError("flux must be positive")
+            mag = -2.5 * np.log10(flux)
+        sigma = np.nan if error is None else error
+        columns = [np.asarray(column, dtype=np.float64) for column in (x, y, mag, sigma)]
+        if columns[3].ndim == 0:
+            columns[3] = np.full_like(columns[0], columns[3])
+        shapes = {column.shape for column in columns}
+        if len(shapes) > 1 or columns[0].ndim != 1:
+            found = ", ".join(str(column.shape) for column in columns)
+            raise ValueError(f"x, y, brightness and error must be lists of one length, not {found}")
+        table = np.stack(columns, axis=-1)
+        if not np.all(np.isfinite(table[:, :3])):
+            raise ValueError("x, y and brightness must be finite")
+        rows, width = (_count(side, "shape", 3) for side in shape)
+        assert rows is not None and width is not None
+        known = hints(
+            {},
+            fov=fov,
+            pixel_scale=pixel_scale,
+            near=near,
+            radius=radius,
+            date=date,
+            location=location,
+            exposure=None,
+        )
+        solved = self._pipeline.identify(table, (rows, width), known, bool(attitude_only))
+        return Result._of(solved)
+
+    def solve_many(
+        self, images: Iterable[ImageLike], *, threads: int = 1, **known: Any
+    ) -> Iterator[Result]:
+        """Solve many frames on several threads; results come in the order of the images.
+
+        Images are taken as results are used: at most twice as many as threads are in work.
+
+        Parameters
+        ----------
+        images : iterable
+            Images as `solve` takes them, best paths.
+        threads : int
+            Frames that are solved at once.
+        **known
+            What else `solve` takes, for all frames.
+
+        Yields
+        ------
+        Result
+            As of `solve`. What it raises for an image is raised in its place.
+        """
+        count = _count(threads, "threads", 1)
+        assert count is not None
+        waiting: deque[Future[Result]] = deque()
+        pool = ThreadPoolExecutor(count, thread_name_prefix="starpipe")
+        try:
+            for image in images:
+                waiting.append(pool.submit(self.solve, image, **known))
+                if len(waiting) >= 2 * count:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _positive(value: float | None, name: str) -> float | None:
+    if value is not None and not 0.0 < float(value) < np.inf:
+        raise ValueError(f"{name} must be positive, not {value}")
+    return value if value is None else float(value)
+
+
+def _count(value: Any, name: str, least: int) -> Any:
+    if value is None:
+        return None
+    if int(value) != value or value < least:
+        raise ValueError(f"{name} must be a whole number from {least} on, not {value}")
+    return int(value)

@@ -1,0 +1,250 @@
+"""What was found in a frame."""
+
+from __future__ import annotations
+
+import html
+import json
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _starpipe
+
+
+class Result:
+    """What was found in a frame. In a condition it is true where the stars are identified.
+
+    The numbers are those of the program's JSON, see `to_dict`. Positions in pixels are 0-based:
+    (0, 0) is the centre of the first pixel, x runs along a row.
+    """
+
+    def __init__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+
+    @classmethod
+    def _of(cls, solved: _starpipe.Solved) -> Result:
+        return cls({"_solved": solved})
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what was computed so far and all that the compiled part holds."""
+        return {
+            "_report": self._report,
+            "_wcs_headers": self._wcs_headers,
+            "attitude_covariance": self.attitude_covariance,
+        }
+
+    @cached_property
+    def _report(self) -> dict[str, Any]:
+        report: dict[str, Any] = json.loads(self.__dict__["_solved"].json())
+        return report
+
+    @cached_property
+    def _wcs_headers(self) -> tuple[bytes | None, bytes | None]:
+        """In the order of the rows of the stars, and in that of the file."""
+        solved: _starpipe.Solved = self.__dict__["_solved"]
+        return solved.wcs_header(True), solved.wcs_header(False)
+
+    @cached_property
+    def attitude_covariance(self) -> NDArray[np.float64] | None:
+        """Covariance of small rotations about the camera's x, y and z axes, in rad²."""
+        solved: _starpipe.Solved = self.__dict__["_solved"]
+        covariance = solved.attitude_covariance_rad2()
+        return None if covariance is None else np.array(covariance)
+
+    def __bool__(self) -> bool:
+        return self.identified
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Result):
+            return NotImplemented
+        apart = "timing_ms"
+        mine, others = ({k: v for k, v in r._report.items() if k != apart} for r in (self, other))
+        return mine == others
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        report = self._report
+        name = report["frame"]
+        if not self:
+            return f"<Result {name}: not identified ({self.reason_code})>"
+        attitude, match = report["attitude"], report["match"]
+        return (
+            f"<Result {name}: {match['matched']} of {match['detected']} stars, "
+            f"ra {attitude['ra_deg']:.4f}° dec {attitude['dec_deg']:+.4f}°, "
+            f"field {report['optics']['fov_x_deg']:.2f}°>"
+        )
+
+    def _repr_html_(self) -> str:
+        report = self._report
+        rows = [("frame", report["frame"])]
+        if self:
+            attitude, optics, match = report["attitude"], report["optics"], report["match"]
+            rows += [
+                ("centre", f"{attitude['ra_deg']:.5f}°, {attitude['dec_deg']:+.5f}°"),
+                ("field", f"{optics['fov_x_deg']:.3f}° by {optics['fov_y_deg']:.3f}°"),
+                ("stars", f"{match['matched']} of {match['detected']} named"),
+                ("false alarm", f"10^{match['log10_false_alarm']:.0f}"),
+            ]
+        else:
+            rows += [("not identified", str(self.reason))]
+        rows += [("note", note) for note in self.notes]
+        cells = "".join(
+            f"<tr><th>{html.escape(name)}</th><td>{html.escape(value)}</td></tr>"
+            for name, value in rows
+        )
+        return f"<table>{cells}</table>"
+
+    @property
+    def identified(self) -> bool:
+        """Whether the stars are identified."""
+        if "_report" in self.__dict__:
+            return bool(self._report["status"] == "identified")
+        return bool(self.__dict__["_solved"].identified)
+
+    @property
+    def reason(self) -> str | None:
+        """Why the stars are not identified, and what may help."""
+        return self._report["reason"]  # type: ignore[no-any-return]
+
+    @property
+    def reason_code(self) -> str | None:
+        """Code of the reason."""
+        return self._report["reason_code"]  # type: ignore[no-any-return]
+
+    @property
+    def notes(self) -> list[str]:
+        """What is odd about the frame."""
+        return [note["text"] for note in self._report["notes"]]
+
+    @property
+    def photometry(self) -> dict[str, Any] | None:
+        """Zero point and limiting magnitude."""
+        return self._report["photometry"]  # type: ignore[no-any-return]
+
+    @property
+    def prediction(self) -> dict[str, Any] | None:
+        """What the camera should see, where one is stated."""
+        return self._report["prediction"]  # type: ignore[no-any-return]
+
+    @property
+    def timing(self) -> dict[str, float]:
+        """Run time of each stage, in milliseconds."""
+        return self._report["timing_ms"]  # type: ignore[no-any-return]
+
+    @property
+    def quaternion(self) -> NDArray[np.float64] | None:
+        """Rotation of ICRS vectors into camera axes: [w, x, y, z], w ≥ 0."""
+        attitude = self._report["attitude"]
+        return None if attitude is None else np.array(attitude["quaternion"])
+
+    @property
+    def rotation(self) -> Any:
+        """The same as a ``scipy.spatial.transform.Rotation``."""
+        from scipy.spatial.transform import Rotation
+
+        quaternion = self.quaternion
+        return None if quaternion is None else Rotation.from_quat(np.roll(quaternion, -1))
+
+    @property
+    def center(self) -> Any:
+        """Centre of the frame as a ``SkyCoord``."""
+        from astropy.coordinates import SkyCoord
+
+        attitude = self._report["attitude"]
+        if attitude is None:
+            return None
+        return SkyCoord(attitude["ra_deg"], attitude["dec_deg"], unit="deg", frame="icrs")
+
+    @property
+    def wcs(self) -> Any:
+        """World coordinates of the pixels of `stars` as an ``astropy.wcs.WCS``.
+
+        Rows count from the top of the picture. For the rows of a FITS file in the file's own order
+        take ``WCS(result.to_header())``.
+        """
+        from astropy.wcs import WCS
+
+        cards = self._wcs_headers[0]
+        if cards is None:
+            return None
+        header = _header(cards)
+        # It describes an image, and has none: astropy would warn.
+        del header["NAXIS"]
+        wcs = WCS(header, fix=False)
+        wcs.pixel_shape = self._report["width"], self._report["height"]
+        return wcs
+
+    def to_header(self) -> Any:
+        """Return world coordinates of the rows in the order of the file, as a FITS header."""
+        header = self._wcs_headers[1]
+        return None if header is None else _header(header)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all numbers as the program's JSON has them."""
+        copy: dict[str, Any] = json.loads(json.dumps(self._report))
+        return copy
+
+    @property
+    def star_columns(self) -> dict[str, NDArray[Any]]:
+        """Every detection, brightest first, as arrays; NaN and "" where there is no value."""
+        stars = self._report["stars"]
+
+        def numbers(key: str) -> NDArray[np.float64]:
+            return np.array([star[key] for star in stars], dtype=np.float64)
+
+        def texts(key: str) -> NDArray[np.str_]:
+            return np.array([star[key] or "" for star in stars], dtype=np.str_)
+
+        flux, snr = numbers("flux"), numbers("snr")
+        return {
+            "id": texts("id"),
+            "name": texts("name"),
+            "x_centroid": numbers("x"),
+            "y_centroid": numbers("y"),
+            "x_centroid_err": numbers("sigma_x"),
+            "y_centroid_err": numbers("sigma_y"),
+            "flux": flux,
+            "flux_err": flux / snr,
+            "peak": numbers("peak"),
+            "snr": snr,
+            "flags": np.array([",".join(star["flags"]) for star in stars], dtype=np.str_),
+            "ra": numbers("ra_deg"),
+            "dec": numbers("dec_deg"),
+            "vmag": numbers("vmag"),
+            "residual": numbers("residual_px"),
+            "p_chance": numbers("p_chance"),
+        }
+
+    @property
+    def stars(self) -> Any:
+        """Every detection, brightest first, as a ``QTable``; without astropy `star_columns`."""
+        columns: dict[str, Any] = self.star_columns
+        try:
+            from astropy import units as u
+            from astropy.coordinates import SkyCoord
+            from astropy.table import QTable
+        except ImportError:
+            return columns
+        ra, dec = columns.pop("ra"), columns.pop("dec")
+        table = QTable(columns)
+        for name in ("x_centroid", "y_centroid", "x_centroid_err", "y_centroid_err", "residual"):
+            table[name].unit = u.pix
+        table["vmag"].unit = u.mag
+        if self:
+            sky = SkyCoord(ra, dec, unit="deg", frame="icrs")
+            table.add_column(sky, name="sky_centroid", index=table.colnames.index("vmag"))
+        table.meta["frame"] = self._report["frame"]
+        return table
+
+    def write(self, path: Any, **options: Any) -> None:
+        """Write `stars` as ``QTable.write`` does: ECSV, VOTable, Parquet and more."""
+        self.stars.write(path, **options)
+
+
+def _header(cards: bytes) -> Any:
+    from astropy.io.fits import Header
+
+    return Header.fromstring(cards)

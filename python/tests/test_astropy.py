@@ -1,0 +1,105 @@
+"""The answer as astropy's objects."""
+
+import numpy as np
+import pytest
+from astropy import units as u
+from astropy.coordinates import EarthLocation, SkyCoord
+from astropy.nddata import CCDData
+from astropy.table import QTable
+from astropy.time import Time
+
+
+def named(result):
+    stars = result.stars
+    return stars[stars["id"] != ""]
+
+
+def check_wcs(result, tolerance_px):
+    wcs, stars = result.wcs, result.stars
+    x, y = stars["x_centroid"].value, stars["y_centroid"].value
+    sky = wcs.pixel_to_world(x, y)
+    back = wcs.world_to_pixel(sky)
+    assert np.hypot(back[0] - x, back[1] - y).max() < tolerance_px
+    unnamed = stars["id"] == ""
+    # Where no star is named, the table has the direction of the detection itself.
+    assert sky[unnamed].separation(stars["sky_centroid"][unnamed]).arcsec.max(initial=0) < 0.5
+    rotated = result.rotation.apply(sky.cartesian.xyz.value.T)
+    centre = result.rotation.apply(result.center.cartesian.xyz.value)
+    np.testing.assert_allclose(centre, [0, 0, 1], atol=1e-6)
+    assert (rotated[:, 2] > 0).all()
+
+
+def test_world_coordinates_go_there_and_back(result):
+    check_wcs(result, 0.02)
+    shape = result.to_dict()["height"], result.to_dict()["width"]
+    assert result.wcs.array_shape == shape
+    assert result.to_header()["CTYPE1"].startswith("RA---TAN")
+
+
+def test_world_coordinates_of_real_frames_go_there_and_back(pipeline, real_frames):
+    for frame in real_frames:
+        check_wcs(pipeline.solve(frame), 0.02)
+
+
+def test_world_coordinates_of_a_distorted_frame_go_there_and_back(pipeline, frame):
+    distorted = frame.parents[1] / "regression" / "distorted.tif"
+    result = pipeline.solve(distorted)
+    assert result.wcs.sip is not None
+    check_wcs(result, 0.02)
+
+
+def test_the_covariance_is_that_of_the_stated_errors(result):
+    sigma = result.to_dict()["attitude"]["sigma_arcsec"]
+    stated = [sigma["x"], sigma["y"], sigma["roll"]] * u.arcsec
+    found = np.sqrt(np.diag(result.attitude_covariance)) * u.rad
+    np.testing.assert_allclose(found.to_value("arcsec"), stated.value, rtol=6e-3)
+    np.testing.assert_allclose(result.attitude_covariance, result.attitude_covariance.T)
+
+
+@pytest.mark.parametrize("format", ["ascii.ecsv", "votable"])
+def test_the_table_survives_a_file(result, tmp_path, format):
+    path = tmp_path / "stars"
+    stars = result.stars
+    if format == "votable":
+        sky = stars["sky_centroid"]
+        stars.remove_column("sky_centroid")
+        stars["ra"], stars["dec"] = sky.ra, sky.dec
+        stars.write(path, format=format)
+    else:
+        result.write(path, format=format)
+    read = QTable.read(path, format=format)
+    for name in ("x_centroid", "y_centroid_err", "flux", "residual"):
+        np.testing.assert_array_equal(read[name].value, stars[name].value)
+    # astropy reads empty texts as masked.
+    assert list(np.ma.filled(read["id"], "")) == list(stars["id"])
+    if format == "ascii.ecsv":
+        assert read["sky_centroid"].separation(stars["sky_centroid"]).max() < 1e-9 * u.arcsec
+
+
+def test_astropys_objects_are_hints(pipeline, pixels, result):
+    found = pipeline.solve(
+        pixels,
+        fov=result.to_dict()["optics"]["fov_x_deg"] * 60 * u.arcmin,
+        near=result.center.galactic,
+        radius=120 * u.arcmin,
+        date=Time("2020-03-01T20:00:00"),
+        location=EarthLocation.from_geodetic(10 * u.deg, 50 * u.deg, 300 * u.m),
+        exposure=200 * u.ms,
+    )
+    report = found.to_dict()
+    assert found and report["exposure_s"] == 0.2
+    assert report["date"]["iso"].startswith("2020-03-01T20:00:00")
+    assert abs(report["observation"]["site"]["lon_deg"] - 10.0) < 1e-9
+    assert found.center.separation(result.center) < 30 * u.arcsec
+
+
+def test_an_image_with_a_header_brings_date_exposure_and_mask(pipeline, pixels, result):
+    mask = np.zeros(pixels.shape, dtype=bool)
+    mask[:50] = True
+    header = {"DATE-OBS": "2021-04-05T06:07:08", "EXPTIME": 0.5}
+    image = CCDData(pixels, unit=u.adu, mask=mask, meta=header)
+    found = pipeline.solve(image)
+    report = found.to_dict()
+    assert report["exposure_s"] == 0.5 and report["date"]["iso"].startswith("2021-04-05T06:07:08")
+    assert found.star_columns["y_centroid"].min() > 47
+    assert isinstance(found.center, SkyCoord)

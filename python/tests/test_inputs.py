@@ -1,0 +1,79 @@
+"""What cannot be solved is refused with a message that says why."""
+
+import numpy as np
+import pytest
+from astropy import units as u
+
+import starpipe as sp
+
+
+@pytest.mark.parametrize(
+    ("image", "message"),
+    [
+        (np.zeros((20, 20), dtype=complex), "real numbers, not complex128"),
+        (np.full((20, 20), None), "real numbers, not object"),
+        (np.full((20, 20), "a"), "real numbers, not <U1"),
+        (np.zeros((20, 20, 3)), "2 dimensions .* not 3; a colour image"),
+        (np.zeros(20), "2 dimensions .* not 1"),
+        (np.zeros((0, 20)), "20 x 0|too small|at least"),
+        (np.full((20, 20), np.nan), "value"),
+        (b"", "empty"),
+        (b"no image", "format|image"),
+    ],
+)
+def test_what_is_no_frame_is_refused(pipeline, image, message):
+    with pytest.raises(ValueError, match=message):
+        pipeline.solve(image)
+
+
+def test_files_that_cannot_be_read_are_named(pipeline, tmp_path):
+    with pytest.raises(OSError, match=r"missing\.tif"):
+        pipeline.solve(tmp_path / "missing.tif")
+    with pytest.raises(OSError, match=str(tmp_path)):
+        pipeline.solve(tmp_path)
+    with pytest.raises(OSError, match=r"none\.csv"):
+        sp.Pipeline(catalog=tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize(
+    ("known", "message"),
+    [
+        ({"fov": 3 * u.kg}, "fov must be convertible to deg"),
+        ({"fov": -1}, "fov must be more than 0"),
+        ({"fov": "wide"}, "fov must be a number"),
+        ({"fov": np.nan}, "fov must be a finite number"),
+        ({"fov": 10, "pixel_scale": 30}, "say the same"),
+        ({"near": (10, 20)}, "near and radius belong together"),
+        ({"near": (10, 95), "radius": 5}, "declination"),
+        ({"near": 10, "radius": 5}, "SkyCoord or"),
+        ({"date": "yesterday"}, "yesterday"),
+        ({"date": 5}, "date must be ISO 8601"),
+        ({"location": (95, 0)}, "latitude"),
+        ({"location": (5,)}, "EarthLocation or"),
+        ({"exposure": 3 * u.m}, "exposure must be convertible to s"),
+        ({"threads": 0}, "threads must be a whole number from 1"),
+        ({"max_stars": 2}, "max_stars must be a whole number from 4"),
+        ({"sigma": -3}, "sigma must be positive"),
+        ({"mask": np.zeros((3, 3), dtype=bool)}, "mask is"),
+        ({"mask": np.zeros((3, 3))}, "array of bool"),
+    ],
+)
+def test_wrong_arguments_are_refused(pipeline, pixels, known, message):
+    with pytest.raises(ValueError, match=message):
+        pipeline.solve(pixels, **known)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"x": [1.0, 2.0], "y": [1.0]}, "of one length, not"),
+        ({"x": [1.0], "y": [1.0], "flux": [-1.0]}, "flux must be positive"),
+        ({"x": [np.nan], "y": [1.0]}, "finite"),
+        ({"x": [[1.0]], "y": [[1.0]]}, "of one length, not"),
+        ({"x": [1.0], "y": [1.0], "mag": [1.0]}, "flux or as mag"),
+    ],
+)
+def test_wrong_lists_are_refused(pipeline, arguments, message):
+    arguments = {"flux": np.ones(len(arguments["x"])), "shape": (100, 100)} | arguments
+    with pytest.raises(ValueError, match=message):
+        pipeline.identify(**arguments)

@@ -1,0 +1,117 @@
+"""Frames are solved, however they are passed."""
+
+import json
+import os
+import subprocess
+
+import numpy as np
+import pytest
+
+import starpipe as sp
+
+
+def without_times(report):
+    return {key: value for key, value in report.items() if key not in ("timing_ms", "frame")}
+
+
+def test_an_array_gives_what_the_file_gives(pipeline, frame, pixels):
+    of_file = pipeline.solve(frame)
+    of_bytes = pipeline.solve(frame.read_bytes())
+    of_array = pipeline.solve(pixels, exposure=of_file.to_dict()["exposure_s"])
+    assert of_file and of_file == pipeline.solve(str(frame))
+    stars = of_file.to_dict()["stars"]
+    assert of_bytes.to_dict()["stars"] == stars
+    assert of_array.to_dict()["stars"] == stars
+    assert of_array.to_dict()["attitude"] == of_file.to_dict()["attitude"]
+
+
+def test_the_numbers_are_those_of_the_program(pipeline, frame, real_frames):
+    program = os.environ.get("STARPIPE_PROGRAM")
+    if program is None:
+        pytest.skip("STARPIPE_PROGRAM does not name the program")
+    for path in [frame, *real_frames]:
+        command = [program, "process", str(path), "--format", "json"]
+        printed = subprocess.run(command, capture_output=True, check=True).stdout
+        assert without_times(pipeline.solve(path).to_dict()) == without_times(json.loads(printed))
+
+
+@pytest.mark.parametrize(
+    "dtype", [np.int32, np.uint32, np.float32, np.float64, ">u2", ">f4", ">i4"]
+)
+def test_any_real_type_and_byte_order_gives_the_same_pointing(pipeline, pixels, result, dtype):
+    found = pipeline.solve(pixels.astype(dtype))
+    assert found
+    np.testing.assert_allclose(found.quaternion, result.quaternion, atol=2e-7)
+
+
+def test_an_array_with_gaps_or_read_only_is_solved_as_its_copy(pipeline, pixels, result):
+    spread = np.zeros((2 * pixels.shape[0], 2 * pixels.shape[1]), dtype=np.uint16)
+    spread[::2, ::2] = pixels
+    assert pipeline.solve(spread[::2, ::2]) == result
+    assert pipeline.solve(np.asfortranarray(pixels)) == result
+    fixed = pixels.copy()
+    fixed.flags.writeable = False
+    assert pipeline.solve(fixed) == result
+
+
+def test_masked_pixels_hold_no_stars(pipeline, pixels, result):
+    mask = np.zeros(pixels.shape, dtype=bool)
+    mask[:, : pixels.shape[1] // 3] = True
+    for found in (
+        pipeline.solve(pixels, mask),
+        pipeline.solve(np.ma.MaskedArray(pixels, mask)),
+    ):
+        assert 0 < len(found.stars) < len(result.stars)
+        assert found.star_columns["x_centroid"].min() > pixels.shape[1] // 3 - 3
+    assert not mask[:, -1].any() and (pixels == pixels.copy()).all()
+
+
+def test_no_star_is_no_exception(pipeline):
+    noise = np.random.default_rng(1).normal(500.0, 5.0, (300, 400)).astype(np.float32)
+    found = pipeline.solve(noise)
+    assert not found and found.reason_code and found.reason
+    assert found.wcs is None and found.center is None and found.quaternion is None
+    assert found.attitude_covariance is None and "not identified" in repr(found)
+
+
+def test_threads_and_hints_do_not_move_the_answer(pipeline, pixels, result):
+    assert pipeline.solve(pixels, threads=3) == result
+    near = result.to_dict()["attitude"]
+    fov = result.to_dict()["optics"]["fov_x_deg"]
+    found = pipeline.solve(pixels, fov=fov, near=(near["ra_deg"], near["dec_deg"]), radius=5)
+    np.testing.assert_allclose(found.quaternion, result.quaternion, atol=2e-7)
+    elsewhere = pipeline.solve(pixels, near=(near["ra_deg"] + 180.0, 0.0), radius=5)
+    assert not elsewhere
+
+
+def test_centroids_are_identified(pipeline, pixels, result):
+    stars = result.star_columns
+    known = {"flux": stars["flux"], "error": stars["x_centroid_err"], "shape": pixels.shape}
+    found = pipeline.identify(stars["x_centroid"], stars["y_centroid"], **known)
+    assert found
+    np.testing.assert_allclose(found.quaternion, result.quaternion, atol=2e-5)
+
+
+def test_many_frames_come_in_order_and_errors_in_their_place(pipeline, pixels, result, tmp_path):
+    found = pipeline.solve_many([pixels, pixels[:, ::-1], pixels] * 3, threads=2)
+    for number, one in enumerate(found):
+        assert (one == result) == (number % 3 != 1)
+    results = pipeline.solve_many([pixels, tmp_path / "missing.tif", pixels])
+    assert next(results)
+    with pytest.raises(OSError, match=r"missing\.tif"):
+        next(results)
+
+
+def test_attitude_only_names_few(pipeline, pixels, result):
+    brief = pipeline.solve(pixels, attitude_only=True)
+    assert brief
+    named = [sum(star["id"] is not None for star in r.to_dict()["stars"]) for r in (brief, result)]
+    assert 4 <= named[0] <= named[1]
+
+
+def test_a_camera_predicts_the_limit(frame):
+    camera = frame.parent / "camera.toml"
+    pipeline = sp.Pipeline(camera=camera)
+    found = pipeline.solve(frame, exposure=0.2)
+    assert 3.0 < found.prediction["limit50_vmag"] < 12.0
+    assert repr(pipeline) == f"Pipeline(camera={str(camera)!r})"
