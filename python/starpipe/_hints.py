@@ -86,16 +86,30 @@ def site(location: Any) -> tuple[float, float, float] | None:
     return lat, lon, height
 
 
+def _header_date(header: Any) -> str | None:
+    """Return the date of a header; one that is none is not used, as when a file is read."""
+    text = str(header.get("DATE-OBS", "")).strip()
+    try:
+        return None if np.isnat(np.datetime64(text.removesuffix("Z"))) else text
+    except ValueError:
+        return None
+
+
+def _header_exposure(header: Any) -> float | None:
+    """Return the exposure of a header in seconds, where it is positive."""
+    value = header.get("EXPTIME", header.get("EXPOSURE"))
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return float(value) if is_number and 0.0 < value < np.inf else None
+
+
 def hints(header: Any, **known: Any) -> dict[str, Any]:
     """Return what the compiled part takes; a header completes what is not known."""
     fov, pixel_scale = known["fov"], known["pixel_scale"]
     if fov is not None and pixel_scale is not None:
         raise ValueError("fov and pixel_scale say the same: give one")
     date, exposure = known["date"], known["exposure"]
-    if date is None:
-        date = header.get("DATE-OBS")
-    if exposure is None:
-        exposure = header.get("EXPTIME", header.get("EXPOSURE"))
+    date = _header_date(header) if date is None else date
+    exposure = _header_exposure(header) if exposure is None else exposure
     return {
         "fov_deg": positive(fov, "deg", "fov", 179.0),
         "pixel_scale_arcsec": positive(pixel_scale, "arcsec", "pixel_scale"),

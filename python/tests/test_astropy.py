@@ -103,3 +103,8 @@ def test_an_image_with_a_header_brings_date_exposure_and_mask(pipeline, pixels, 
     assert report["exposure_s"] == 0.5 and report["date"]["iso"].startswith("2021-04-05T06:07:08")
     assert found.star_columns["y_centroid"].min() > 47
     assert isinstance(found.center, SkyCoord)
+
+
+def test_what_a_header_has_wrong_is_not_used(pipeline, pixels, result):
+    header = {"DATE-OBS": "tonight", "EXPTIME": 0}
+    assert pipeline.solve(CCDData(pixels, unit=u.adu, meta=header)) == result

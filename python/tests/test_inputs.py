@@ -1,5 +1,7 @@
 """What cannot be solved is refused with a message that says why."""
 
+import re
+
 import numpy as np
 import pytest
 from astropy import units as u
@@ -29,7 +31,7 @@ def test_what_is_no_frame_is_refused(pipeline, image, message):
 def test_files_that_cannot_be_read_are_named(pipeline, tmp_path):
     with pytest.raises(OSError, match=r"missing\.tif"):
         pipeline.solve(tmp_path / "missing.tif")
-    with pytest.raises(OSError, match=str(tmp_path)):
+    with pytest.raises(OSError, match=re.escape(tmp_path.name)):
         pipeline.solve(tmp_path)
     with pytest.raises(OSError, match=r"none\.csv"):
         sp.Pipeline(catalog=tmp_path / "none.csv")

@@ -2,10 +2,14 @@
 
 import multiprocessing
 import pickle
+import sys
 import threading
 import time
 
+import numpy as np
 import pytest
+
+import starpipe as sp
 
 
 def test_results_and_pipelines_are_pickled(pipeline, pixels, result):
@@ -16,7 +20,7 @@ def test_results_and_pipelines_are_pickled(pipeline, pixels, result):
     assert pickle.loads(pickle.dumps(pipeline)).solve(pixels) == result
 
 
-@pytest.mark.parametrize("method", ["fork", "spawn"])
+@pytest.mark.parametrize("method", multiprocessing.get_all_start_methods())
 def test_other_processes_solve(pipeline, pixels, result, method):
     context = multiprocessing.get_context(method)
     with context.Pool(2) as pool:
@@ -46,3 +50,29 @@ def test_a_card_for_notebooks(result):
     card = result._repr_html_()
     assert card.startswith("<table>") and "named" in card
     assert "\n" not in repr(result)
+
+
+def test_a_frame_of_16_bits_is_not_copied():
+    pytest.importorskip("resource")
+    growth_mb = []
+    for dtype in ("=u2", ">u2" if sys.byteorder == "little" else "<u2"):
+        with multiprocessing.get_context("spawn").Pool(1) as pool:
+            growth_mb.append(pool.apply(memory_of_a_frame, [dtype]))
+    # The frame has 76 MB. In the other byte order it is copied.
+    assert growth_mb[0] + 60 < growth_mb[1], growth_mb
+
+
+def memory_of_a_frame(dtype):
+    """Return by how many MB the process grows while a frame is solved."""
+    import resource
+
+    pipeline = sp.Pipeline()
+    noise = np.random.default_rng(1)
+    pipeline.solve(noise.integers(400, 500, (512, 512), dtype=np.uint16))
+    pixels = np.zeros((5000, 8000), dtype=dtype)
+    for row in pixels:
+        row[:] = noise.integers(400, 500, len(row), dtype=np.uint16)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    pipeline.solve(pixels)
+    after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return (after - before) / (2**20 if sys.platform == "darwin" else 2**10)
