@@ -239,6 +239,51 @@ class Result:
         table.meta["frame"] = self._report["frame"]
         return table
 
+    def to_arrow(self) -> Any:
+        """Return `star_columns` as a ``pyarrow.Table``."""
+        import pyarrow
+
+        return pyarrow.table(self.star_columns)
+
+    def plot(self, image: Any = None, *, ax: Any = None, names: int = 20) -> Any:
+        """Draw the detections as rings, with matplotlib.
+
+        Parameters
+        ----------
+        image : array, optional
+            What to draw them on, its first row on top.
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; new axes by default.
+        names : int
+            How many of the brightest named stars get their name.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        from matplotlib import pyplot
+
+        if ax is None:
+            ax = pyplot.subplots()[1]
+        ax.set_facecolor("0.15")
+        if image is not None:
+            low, high = np.nanpercentile(image, [1.0, 99.8])
+            ax.imshow(image, cmap="gray", vmin=low, vmax=high)
+        stars = self.star_columns
+        is_named = stars["id"] != ""
+        for group, color in ((is_named, "limegreen"), (~is_named, "orange")):
+            x, y = stars["x_centroid"][group], stars["y_centroid"][group]
+            ax.scatter(x, y, s=60, facecolors="none", edgecolors=color)
+        for index in np.flatnonzero(is_named & (stars["name"] != ""))[:names]:
+            place = stars["x_centroid"][index], stars["y_centroid"][index]
+            offset = {"xytext": (6, 6), "textcoords": "offset points"}
+            ax.annotate(str(stars["name"][index]), place, color="gold", fontsize=8, **offset)
+        ax.set_xlim(-0.5, self._report["width"] - 0.5)
+        ax.set_ylim(self._report["height"] - 0.5, -0.5)
+        ax.set_aspect("equal")
+        ax.set_title(repr(self).strip("<>").removeprefix("Result "), fontsize=8)
+        return ax
+
     def write(self, path: Any, **options: Any) -> None:
         """Write `stars` as ``QTable.write`` does: ECSV, VOTable, Parquet and more."""
         self.stars.write(path, **options)

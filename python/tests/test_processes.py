@@ -46,12 +46,6 @@ def test_ctrl_c_ends_a_run_of_many_frames(pipeline, pixels):
     assert time.perf_counter() - started < 5.0
 
 
-def test_a_card_for_notebooks(result):
-    card = result._repr_html_()
-    assert card.startswith("<table>") and "named" in card
-    assert "\n" not in repr(result)
-
-
 def test_a_frame_of_16_bits_is_not_copied():
     pytest.importorskip("resource")
     growth_mb = []

@@ -1,0 +1,30 @@
+"""Results as pictures and tables."""
+
+import numpy as np
+
+
+def test_a_plot_has_a_ring_for_each_detection_and_the_top_row_on_top(result, pixels):
+    import matplotlib
+
+    matplotlib.use("agg")
+    axes = result.plot(pixels, names=5)
+    rings = sum(len(group.get_offsets()) for group in axes.collections)
+    assert rings == len(result.stars)
+    assert len(axes.texts) <= 5
+    low, high = axes.get_ylim()
+    assert low > high and axes.get_xlim()[1] == pixels.shape[1] - 0.5
+    axes.figure.canvas.draw()
+
+
+def test_arrow_has_the_same_columns(result):
+    table = result.to_arrow()
+    columns = result.star_columns
+    assert table.column_names == list(columns)
+    np.testing.assert_array_equal(table["flux"].to_numpy(), columns["flux"])
+    assert table["id"].to_pylist() == list(columns["id"])
+
+
+def test_a_card_for_notebooks(result):
+    card = result._repr_html_()
+    assert card.startswith("<table>") and "named" in card
+    assert "\n" not in repr(result)
