@@ -78,10 +78,10 @@ def _pixels(image: Any, name: str) -> _starpipe._Image:
             f"the {name} must be an array of 2 dimensions (rows, columns), not {array.ndim}{hint}"
         )
     kind, size = array.dtype.kind, array.dtype.itemsize
-    if kind == "b":
+    if kind == "b" or (kind == "u" and size == 1):
         return np.ascontiguousarray(array, dtype=np.uint8)
-    if kind == "u" and size <= 2:
-        return np.ascontiguousarray(array, dtype=np.uint8 if size == 1 else np.uint16)
+    if kind == "u" and size == 2:
+        return np.ascontiguousarray(array, dtype=np.uint16)
     if size == 8 or kind == "f":
         with np.errstate(over="ignore"):
             return np.ascontiguousarray(array, dtype=np.float32)
