@@ -102,19 +102,27 @@ def _header_exposure(header: Any) -> float | None:
     return float(value) if is_number and 0.0 < value < np.inf else None
 
 
-def hints(header: Any, **known: Any) -> dict[str, Any]:
+def hints(
+    header: Any,
+    *,
+    fov: Any,
+    pixel_scale: Any,
+    near: Any,
+    radius: Any,
+    date: Any,
+    location: Any,
+    exposure: Any = None,
+) -> dict[str, Any]:
     """Return what the compiled part takes; a header completes what is not known."""
-    fov, pixel_scale = known["fov"], known["pixel_scale"]
     if fov is not None and pixel_scale is not None:
         raise ValueError("fov and pixel_scale say the same: give one")
-    date, exposure = known["date"], known["exposure"]
     date = _header_date(header) if date is None else date
     exposure = _header_exposure(header) if exposure is None else exposure
     return {
         "fov_deg": positive(fov, "deg", "fov", 179.0),
         "pixel_scale_arcsec": positive(pixel_scale, "arcsec", "pixel_scale"),
-        "near_deg": direction(known["near"], known["radius"]),
+        "near_deg": direction(near, radius),
         "date": iso_date(date),
-        "site": site(known["location"]),
+        "site": site(location),
         "exposure_s": positive(exposure, "s", "exposure"),
     }

@@ -140,7 +140,7 @@ class Pipeline:
             None if dark is None else Image(dark, "dark").pixels,
             None if flat is None else Image(flat, "flat").pixels,
             _positive(sigma, "sigma"),
-            _count(max_stars, "max_stars", 4),
+            None if max_stars is None else _count(max_stars, "max_stars", 4),
             bool(attitude_only),
             _count(threads, "threads", 1),
         )
@@ -207,7 +207,6 @@ class Pipeline:
         if not np.all(np.isfinite(table[:, :3])):
             raise ValueError("x, y and brightness must be finite")
         rows, width = (_count(side, "shape", 3) for side in shape)
-        assert rows is not None and width is not None
         known = hints(
             {},
             fov=fov,
@@ -216,7 +215,6 @@ class Pipeline:
             radius=radius,
             date=date,
             location=location,
-            exposure=None,
         )
         solved = self._pipeline.identify(table, (rows, width), known, bool(attitude_only))
         return Result._of(solved)
@@ -243,7 +241,6 @@ class Pipeline:
             As of `solve`. What it raises for an image is raised in its place.
         """
         count = _count(threads, "threads", 1)
-        assert count is not None
         waiting: deque[Future[Result]] = deque()
         pool = ThreadPoolExecutor(count, thread_name_prefix="starpipe")
         try:
@@ -263,9 +260,7 @@ def _positive(value: float | None, name: str) -> float | None:
     return value if value is None else float(value)
 
 
-def _count(value: Any, name: str, least: int) -> Any:
-    if value is None:
-        return None
+def _count(value: Any, name: str, least: int) -> int:
     if int(value) != value or value < least:
         raise ValueError(f"{name} must be a whole number from {least} on, not {value}")
     return int(value)

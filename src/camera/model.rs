@@ -160,16 +160,18 @@ impl CameraModel {
         )
     }
 
-    /// Largest angle between the boresight and a corner of the frame, in radians.
-    pub fn radius_rad(&self) -> f64 {
+    /// The corners of the frame.
+    pub fn corners(&self) -> [PixelPoint; 4] {
         let (right, bottom) = (self.width_px - 0.5, self.height_px - 0.5);
         [(-0.5, -0.5), (right, -0.5), (-0.5, bottom), (right, bottom)]
-            .into_iter()
-            .map(|(x, y)| {
-                let corner = self.direction_of(&PixelPoint::new(x, y));
-                corner.angle_to(&UnitVector::BORESIGHT)
-            })
-            .fold(0.0, f64::max)
+            .map(|(x, y)| PixelPoint::new(x, y))
+    }
+
+    /// Largest angle between the boresight and a corner of the frame, in radians.
+    pub fn radius_rad(&self) -> f64 {
+        let corners = self.corners().map(|corner| self.direction_of(&corner));
+        let angles_rad = corners.iter().map(|c| c.angle_to(&UnitVector::BORESIGHT));
+        angles_rad.fold(0.0, f64::max)
     }
 
     fn angle_between(&self, a: &PixelPoint, b: &PixelPoint) -> f64 {

@@ -10,7 +10,7 @@ use super::adjustment::{
     Adjustment, LINEAR_TERMS, Lanes, MeasuredStar, POSE_PARAMETERS, Reduced, Rows, add_products,
     add_scaled,
 };
-use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation};
+use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::camera::{
     CUBIC_MONOMIALS, CameraModel, DistortionModel, LANES, LENS_TERMS, QUINTIC_MONOMIALS,
 };
@@ -92,14 +92,10 @@ fn predictions<const P: usize, const K: usize>(
 fn corners<const P: usize, const K: usize>(adjustment: &Adjustment<P, K>) -> [MeasuredStar; 4] {
     let camera = &adjustment.camera;
     let camera_to_icrs = adjustment.icrs_to_camera.inverse();
-    let (right, bottom) = (camera.width_px - 0.5, camera.height_px - 0.5);
-    [(-0.5, -0.5), (right, -0.5), (-0.5, bottom), (right, bottom)].map(|(x, y)| {
-        let pixel = PixelPoint::new(x, y);
-        MeasuredStar {
-            pixel,
-            icrs: camera_to_icrs.apply(&camera.direction_of(&pixel)),
-            sigma_px: 1.0,
-        }
+    camera.corners().map(|pixel| MeasuredStar {
+        pixel,
+        icrs: camera_to_icrs.apply(&camera.direction_of(&pixel)),
+        sigma_px: 1.0,
     })
 }
 

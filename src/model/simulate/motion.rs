@@ -27,10 +27,8 @@ impl<'a> Motion<'a> {
 
     /// Longest path of any star on the frame, in pixels.
     pub(super) fn longest_px(&self) -> f64 {
-        let (right, bottom) = (self.camera.width_px - 0.5, self.camera.height_px - 0.5);
-        let corners = [(-0.5, -0.5), (right, -0.5), (-0.5, bottom), (right, bottom)];
-        let corners = corners.map(|(x, y)| PixelPoint::new(x, y));
-        let places = corners.into_iter().chain([self.camera.centre()]);
+        let corners = self.camera.corners().into_iter();
+        let places = corners.chain([self.camera.centre()]);
         places
             .map(|place| self.length_px(&place))
             .fold(0.0, f64::max)
