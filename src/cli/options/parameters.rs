@@ -6,18 +6,6 @@ use starpipe::camera::data_sheet::{Limits, Response, ResponseError, is_curve};
 use starpipe::model::sensitivity::{Conditions, Parameter, Scenario};
 use std::path::PathBuf;
 
-/// Parameters that exclude each other: they set the same quantity.
-const EXCLUSIVE: &[&[&str]] = &[
-    &[
-        "sky_mag_arcsec2",
-        "sky_luminance_cd_m2",
-        "sky_illuminance_lx",
-    ],
-    &["zenith_transmission", "extinction_mag_per_airmass"],
-    &["pixel_area_um2", "pitch_x_um"],
-    &["pixel_area_um2", "pitch_y_um"],
-];
-
 /// The parameters given, in the order in which they have to be set.
 #[derive(Debug, Clone)]
 pub(crate) struct ParameterOptions(Vec<(Parameter, Given)>);
@@ -80,8 +68,7 @@ impl FromArgMatches for ParameterOptions {
             Some((parameter, given.clone()))
         };
         let mut all: Vec<_> = Parameter::all().filter_map(given).collect();
-        // The pixel size first: other values are in pixels of that size.
-        all.sort_by_key(|(parameter, _)| parameter.name() != "pixel_area_um2");
+        all.sort_by_key(|(parameter, _)| parameter.order());
         Ok(Self(all))
     }
 
@@ -93,8 +80,6 @@ impl FromArgMatches for ParameterOptions {
 
 fn option(parameter: Parameter) -> Arg {
     let name = parameter.name();
-    let others = EXCLUSIVE.iter().filter(|group| group.contains(&name));
-    let others = others.flat_map(|group| group.iter().filter(|other| **other != name));
     let (heading, default) = match parameter {
         Parameter::Camera(_) => ("Camera", None),
         Parameter::Conditions(key) => ("Conditions", (key.get)(&Conditions::default())),
@@ -104,7 +89,7 @@ fn option(parameter: Parameter) -> Arg {
     });
     let arg = number_option(name, parameter.about(), parameter.limits(), &default)
         .help_heading(heading)
-        .conflicts_with_all(others.copied())
+        .conflicts_with_all(parameter.alternatives())
         .value_parser(move |text: &str| given(parameter, text));
     match name {
         // The name of the option of `process`.

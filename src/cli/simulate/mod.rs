@@ -6,7 +6,6 @@ mod generator;
 mod header;
 mod record;
 mod subject;
-mod table;
 
 pub(crate) use args::SimulateArgs;
 
@@ -14,7 +13,7 @@ use super::batch::for_each_ordered;
 use super::exit::{CommandError, Outcome};
 use super::options::format::PageFormat;
 use super::output::files::write_whole;
-use super::output::rows::json_lines;
+use super::output::rows::{csv_table, json_lines};
 use super::progress::frames_bar_with_speed;
 use anyhow::Context;
 use files::FrameFiles;
@@ -22,7 +21,7 @@ use generator::Generator;
 use header::Description;
 use record::FrameRecord;
 use starpipe::model::sensitivity::{Budget, Detector, Rule};
-use starpipe::model::simulate::Simulator;
+use starpipe::model::simulate::{Simulator, truth_table};
 use std::ops::ControlFlow;
 use subject::Subject;
 
@@ -101,8 +100,9 @@ fn write(generator: &Generator, files: &FrameFiles, number: u64) -> anyhow::Resu
     let record = FrameRecord::new(generator, &simulated, &path, truth_path.as_deref());
     let mut contents = vec![(path, image)];
     if let (Some(truth), Some(path)) = (&simulated.truth, truth_path) {
-        let table = table::truth_table(truth, generator, simulated.attitude.as_ref())?;
-        contents.push((path, table.into_bytes()));
+        let (camera, attitude) = (generator.simulator.camera(), simulated.attitude.as_ref());
+        let rows = truth_table(truth, camera, generator.catalog, attitude);
+        contents.push((path, csv_table(rows.into_iter())?.into_bytes()));
     }
     write_whole(&contents)?;
     Ok(record)

@@ -144,6 +144,18 @@ pub enum Parameter {
     Conditions(&'static Key<Conditions>),
 }
 
+/// Parameters that exclude each other: they set the same quantity.
+const EXCLUSIVE: &[&[&str]] = &[
+    &[
+        "sky_mag_arcsec2",
+        "sky_luminance_cd_m2",
+        "sky_illuminance_lx",
+    ],
+    &["zenith_transmission", "extinction_mag_per_airmass"],
+    &["pixel_area_um2", "pitch_x_um"],
+    &["pixel_area_um2", "pitch_y_um"],
+];
+
 /// There is no parameter of this name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("'{name}' is no parameter{}", match .nearest { Some(known) => format!("; did you mean '{known}'?"), None => String::new() })]
@@ -225,6 +237,19 @@ impl Parameter {
             Self::Camera(key) => (key.get)(&scenario.camera),
             Self::Conditions(key) => (key.get)(&scenario.conditions),
         }
+    }
+
+    /// Names of the parameters that set the same quantity: only one of them may be given.
+    pub fn alternatives(self) -> impl Iterator<Item = &'static str> {
+        let name = self.name();
+        let groups = EXCLUSIVE.iter().filter(move |group| group.contains(&name));
+        groups.flat_map(move |group| group.iter().copied().filter(move |other| *other != name))
+    }
+
+    /// Of several parameters those of lower order are set first.
+    pub fn order(self) -> u8 {
+        // Other values are in pixels of that size.
+        u8::from(self.name() != "pixel_area_um2")
     }
 
     /// Sets a value, which must be within the limits.

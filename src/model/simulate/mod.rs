@@ -39,6 +39,7 @@ mod spot;
 mod stars;
 mod strays;
 mod truth;
+mod truth_table;
 
 pub use camera::{Pointing, camera_of};
 pub(crate) use colour_camera::{colour, decoded_jpeg, demosaiced};
@@ -47,3 +48,4 @@ pub use setup::{Setup, SetupParameter};
 pub use simulator::{Simulator, star_field};
 pub use strays::{CosmicRay, Trail};
 pub use truth::{TrueStar, Truth};
+pub use truth_table::{TruthRow, truth_table};

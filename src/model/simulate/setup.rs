@@ -32,6 +32,37 @@ impl Setup {
         }
     }
 
+    /// Sets parameters. The result is not checked as a whole.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Contradiction`] for two values of one quantity, [`ScenarioError::Value`] for
+    /// one outside its limits; nothing is set then.
+    pub fn set_all(&mut self, values: &[(SetupParameter, f64)]) -> Result<(), ScenarioError> {
+        for (number, &(parameter, found)) in values.iter().enumerate() {
+            let name = parameter.name();
+            let others = values[..number].iter().map(|(other, _)| other.name());
+            let is_same = |other: &str| parameter.alternatives().any(|name| name == other);
+            if let Some(other) = others.into_iter().find(|&other| is_same(other)) {
+                let what = format!("{other} and {name} set the same quantity: give one");
+                return Err(ScenarioError::Contradiction(what));
+            }
+            if !parameter.limits().accept(found) {
+                let expected = parameter.limits().to_string();
+                return Err(ScenarioError::Value {
+                    name,
+                    found,
+                    expected,
+                });
+            }
+        }
+        let mut in_order = values.to_vec();
+        in_order.sort_by_key(|(parameter, _)| parameter.order());
+        for (parameter, value) in in_order {
+            parameter.set(self, value);
+        }
+        Ok(())
+    }
+
     /// The terms of the lens are steepest in the corner: the gradients there are as many times the
     /// displacement as the term's order.
     fn folded_image(&self) -> Option<String> {
@@ -117,6 +148,23 @@ impl SetupParameter {
         found.ok_or_else(|| UnknownParameter::among(name, Self::all().map(Self::name)))
     }
 
+    /// See [`sensitivity::Parameter::alternatives`].
+    fn alternatives(self) -> impl Iterator<Item = &'static str> {
+        let of_scenario = match self {
+            Self::Scenario(parameter) => Some(parameter.alternatives()),
+            Self::Scene(_) => None,
+        };
+        of_scenario.into_iter().flatten()
+    }
+
+    /// See [`sensitivity::Parameter::order`].
+    fn order(self) -> u8 {
+        match self {
+            Self::Scenario(parameter) => parameter.order(),
+            Self::Scene(_) => u8::MAX,
+        }
+    }
+
     /// Title of its axis.
     pub fn title(self) -> String {
         title_of(self.name())
@@ -166,6 +214,27 @@ impl SetupParameter {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn values_are_set_all_or_none() {
+        let named = |name| SetupParameter::named(name).unwrap();
+        let before = Setup {
+            scenario: Scenario::new(Preset::Experiment1.data_sheet()),
+            scene: Scene::default(),
+        };
+        let mut setup = before.clone();
+        let twice = [(named("pitch_x_um"), 5.0), (named("pixel_area_um2"), 9.0)];
+        let error = setup.set_all(&twice).unwrap_err().to_string();
+        assert!(
+            error.starts_with("pitch_x_um and pixel_area_um2 set the same"),
+            "{error}"
+        );
+        let outside = [(named("exposure_s"), 2.0), (named("read_noise_e"), -1.0)];
+        assert!(setup.set_all(&outside).is_err());
+        assert_eq!(setup, before);
+        setup.set_all(&[(named("exposure_s"), 2.0)]).unwrap();
+        assert_eq!(setup.scenario.conditions.exposure_s, 2.0);
+    }
     use crate::camera::data_sheet::Preset;
 
     #[test]

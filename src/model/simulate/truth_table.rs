@@ -1,55 +1,64 @@
-//! The table of what is on a frame.
+//! The table of what is on a simulated frame.
 
-use super::generator::Generator;
-use crate::cli::output::rows::csv_table;
+use super::truth::{TrueStar, Truth};
+use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation};
+use crate::base::units::DEG_PER_RAD;
+use crate::camera::CameraModel;
+use crate::sky::catalog::Catalog;
 use serde::Serialize;
-use starpipe::base::coords::{Camera, Icrs, PixelPoint, Rotation};
-use starpipe::base::units::DEG_PER_RAD;
-use starpipe::model::simulate::{TrueStar, Truth};
 
-/// A row of the table.
+/// A star, a trail or a cosmic ray.
 #[derive(Debug, Serialize)]
-struct TruthRow {
-    /// star, false_star, trail or cosmic_ray
-    kind: &'static str,
-    id: Option<String>,
-    vmag: Option<f64>,
-    bv_mag: Option<f64>,
-    ra_deg: Option<f64>,
-    dec_deg: Option<f64>,
-    x: f64,
-    y: f64,
-    /// The other end of a trail.
-    x_end: Option<f64>,
-    y_end: Option<f64>,
-    electrons: Option<f64>,
-    on_frame: bool,
+pub struct TruthRow {
+    /// `star`, `false_star`, `trail` or `cosmic_ray`.
+    pub kind: &'static str,
+    /// The catalogue's identifier.
+    pub id: Option<String>,
+    /// Johnson V.
+    pub vmag: Option<f64>,
+    /// B−V.
+    pub bv_mag: Option<f64>,
+    /// Right ascension at the frame's date.
+    pub ra_deg: Option<f64>,
+    /// Declination at the frame's date.
+    pub dec_deg: Option<f64>,
+    /// Position in pixels; of a trail or a cosmic ray, one end.
+    pub x: f64,
+    /// Position in pixels.
+    pub y: f64,
+    /// The other end.
+    pub x_end: Option<f64>,
+    /// The other end.
+    pub y_end: Option<f64>,
+    /// Electrons on all its pixels.
+    pub electrons: Option<f64>,
+    /// Whether its position is on the frame.
+    pub on_frame: bool,
 }
 
-/// The table of what is on a frame, brightest stars first.
-pub(super) fn truth_table(
+/// What is on a frame of `camera`, brightest stars first. Without attitude the stars are those of a
+/// list, and `catalog` is not used.
+pub fn truth_table(
     truth: &Truth,
-    generator: &Generator,
+    camera: &CameraModel,
+    catalog: &Catalog,
     attitude: Option<&Rotation<Icrs, Camera>>,
-) -> anyhow::Result<String> {
-    let camera = generator.simulator.camera();
+) -> Vec<TruthRow> {
     let star = |star: &TrueStar| {
-        let known = star.catalog.map(|index| generator.catalog.star(index));
+        let known = star.catalog.map(|index| catalog.star(index));
         let sky = attitude.map(|icrs_to_camera| {
             let direction = camera.direction_of(&star.position);
             let (ra_rad, dec_rad) = icrs_to_camera.inverse().apply(&direction).to_ra_dec();
             [ra_rad, dec_rad].map(|rad| decimals(rad * DEG_PER_RAD, 8))
         });
         TruthRow {
-            // Without attitude the stars are those of a given list, none of them false.
+            // Of a list, no star is false.
             kind: if known.is_some() || attitude.is_none() {
                 "star"
             } else {
                 "false_star"
             },
-            id: star
-                .catalog
-                .map(|index| generator.catalog.designation(index)),
+            id: star.catalog.map(|index| catalog.designation(index)),
             vmag: Some(decimals(star.v_mag, 4)),
             bv_mag: known
                 .and_then(|known| known.bv_mag)
@@ -74,8 +83,12 @@ pub(super) fn truth_table(
         electrons: Some(ray.electrons),
         ..row("cosmic_ray", ray.from, Some(ray.to), true)
     });
-    let rows = stars.into_iter().map(star).chain(trails).chain(rays);
-    csv_table(rows)
+    stars
+        .into_iter()
+        .map(star)
+        .chain(trails)
+        .chain(rays)
+        .collect()
 }
 
 fn row(kind: &'static str, from: PixelPoint, to: Option<PixelPoint>, on_frame: bool) -> TruthRow {
