@@ -31,3 +31,11 @@ pub fn open(key: Key) -> PyResult<&'static IndexedCatalog<'static>> {
     catalogs.insert(key, indexed);
     Ok(indexed)
 }
+
+/// The catalogue in a file, or the built-in one.
+pub fn read(path: Option<PathBuf>) -> PyResult<&'static Catalog> {
+    match path {
+        None => Ok(Catalog::built_in()),
+        path => Ok(open((path, None))?.catalog()),
+    }
+}

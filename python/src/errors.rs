@@ -2,6 +2,7 @@
 
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
+use serde::Serialize;
 use std::error::Error;
 use std::io;
 
@@ -31,4 +32,9 @@ pub fn exception(error: impl Error + 'static) -> PyErr {
     } else {
         PyValueError::new_err(message(&error))
     }
+}
+
+/// A report as JSON.
+pub fn json(report: &impl Serialize) -> PyResult<String> {
+    serde_json::to_string(report).map_err(exception)
 }

@@ -46,6 +46,13 @@ impl Image<'_> {
     }
 }
 
+/// A mask: true where a pixel is to be left out.
+pub fn bad_pixels<'a>(
+    mask: Option<&'a PyReadonlyArray2<'_, bool>>,
+) -> PyResult<Option<&'a [bool]>> {
+    mask.map(slice).transpose()
+}
+
 fn slice<'a, T: numpy::Element>(array: &'a PyReadonlyArray2<'_, T>) -> PyResult<&'a [T]> {
     let contiguous = array.as_slice();
     contiguous.map_err(|_| PyTypeError::new_err("the array must be C-contiguous"))

@@ -3,12 +3,17 @@
 
 #![allow(clippy::too_many_arguments, reason = "keywords of Python functions")]
 
+mod camera;
 mod catalogs;
+mod darks;
+mod detect;
 mod errors;
 mod hints;
 mod image;
 mod pipeline;
+mod simulate;
 mod solved;
+mod studies;
 
 use pyo3::prelude::*;
 
@@ -16,7 +21,15 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _starpipe {
     #[pymodule_export]
+    use super::darks::{DarkFrames, Darks};
+    #[pymodule_export]
+    use super::detect::detect;
+    #[pymodule_export]
     use super::pipeline::Pipeline;
     #[pymodule_export]
+    use super::simulate::{Simulated, simulate};
+    #[pymodule_export]
     use super::solved::Solved;
+    #[pymodule_export]
+    use super::studies::{defocus, limit, robustness, validate};
 }

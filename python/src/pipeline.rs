@@ -1,16 +1,16 @@
 //! The pipeline: catalogue, camera and buffers that solve frames.
 
+use crate::camera::data_sheet;
 use crate::catalogs;
 use crate::errors::exception;
 use crate::hints::Hints;
-use crate::image::{Image, Source};
+use crate::image::{Image, Source, bad_pixels};
 use crate::solved::Solved;
 use numpy::PyReadonlyArray2;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use starpipe::calibration::Master;
-use starpipe::camera::data_sheet::{DataSheet, Preset};
+use starpipe::camera::data_sheet::DataSheet;
 use starpipe::frame::Buffers;
 use starpipe::photometry::comparison::StatedCamera;
 use starpipe::pipeline::{CentroidList, ListedCentroid, solve_centroids, solve_frame, solve_read};
@@ -30,16 +30,8 @@ pub struct Pipeline {
     workspaces: Mutex<Vec<Workspace>>,
 }
 
-/// The name of a preset, or the file of a data sheet.
-fn data_sheet(camera: &Path) -> PyResult<DataSheet> {
-    match camera.to_str().and_then(Preset::named) {
-        Some(preset) => Ok(preset.data_sheet()),
-        None => DataSheet::read(camera).map_err(exception),
-    }
-}
-
 /// Threads of one call. None outlives it: a fork after it cannot hang.
-fn pool(threads: usize) -> PyResult<ThreadPool> {
+pub fn pool(threads: usize) -> PyResult<ThreadPool> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
     pool.map_err(exception)
 }
@@ -80,16 +72,11 @@ impl Pipeline {
         threads: NonZeroUsize,
     ) -> PyResult<Solved> {
         let source = image.source()?;
-        let bad = mask.as_ref().map(PyReadonlyArray2::as_slice).transpose();
-        let bad = bad.map_err(|_| PyValueError::new_err("the mask must be C-contiguous"))?;
+        let bad = bad_pixels(mask.as_ref())?;
         let dark = dark.as_ref().map(Image::source).transpose()?;
         let flat = flat.as_ref().map(Image::source).transpose()?;
         let context = self.context(&hints, attitude_only)?;
-        let detect = DetectConfig {
-            threshold_sigma: sigma,
-            max_detections: max_stars.unwrap_or(DetectConfig::DEFAULT_MAX_DETECTIONS),
-            ..DetectConfig::default()
-        };
+        let detect = detect_config(sigma, max_stars);
         py.detach(|| {
             let calibration = self.calibration(dark, flat)?;
             let context = Context {
@@ -201,6 +188,15 @@ impl Pipeline {
             solution,
             indexed: self.indexed,
         }
+    }
+}
+
+/// The library's defaults with what is given.
+pub fn detect_config(sigma: Option<f64>, max_stars: Option<usize>) -> DetectConfig {
+    DetectConfig {
+        threshold_sigma: sigma,
+        max_detections: max_stars.unwrap_or(DetectConfig::DEFAULT_MAX_DETECTIONS),
+        ..DetectConfig::default()
     }
 }
 

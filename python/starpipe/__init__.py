@@ -8,8 +8,26 @@
 
 from importlib.metadata import version as _version
 
+from ._darks import Darks, darks
+from ._detect import Detections, detect
 from ._pipeline import Pipeline
 from ._result import Result
+from ._simulate import Simulation, simulate
+from ._studies import Validation, defocus, limit, robustness, validate
 
-__all__ = ["Pipeline", "Result"]
+__all__ = [
+    "Darks",
+    "Detections",
+    "Pipeline",
+    "Result",
+    "Simulation",
+    "Validation",
+    "darks",
+    "defocus",
+    "detect",
+    "limit",
+    "robustness",
+    "simulate",
+    "validate",
+]
 __version__ = _version("starpipe")

@@ -16,11 +16,13 @@ def number(value: Any, unit: str, name: str) -> float | None:
         try:
             value = value.to_value(unit)
         except Exception as error:
-            raise ValueError(f"{name} must be convertible to {unit}: {error}") from error
+            wanted = f"convertible to {unit}" if unit else "a plain number"
+            raise ValueError(f"{name} must be {wanted}: {error}") from error
     try:
         number = float(value)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} must be a number or a Quantity in {unit}: {error}") from error
+        quantity = f" or a Quantity in {unit}" if unit else ""
+        raise ValueError(f"{name} must be a number{quantity}: {error}") from error
     if not np.isfinite(number):
         raise ValueError(f"{name} must be a finite number, not {number}")
     return number
@@ -31,8 +33,16 @@ def positive(value: Any, unit: str, name: str, below: float = np.inf) -> float |
     found = number(value, unit, name)
     if found is not None and not 0.0 < found < below:
         limit = f" and less than {below:g}" if np.isfinite(below) else ""
-        raise ValueError(f"{name} must be more than 0{limit} {unit}, not {found:g}")
+        kind = f"{limit} {unit}" if unit else limit
+        raise ValueError(f"{name} must be more than 0{kind}, not {found:g}")
     return found
+
+
+def count(value: Any, name: str, least: int) -> int:
+    """Return a whole number that is not less than `least`."""
+    if int(value) != value or value < least:
+        raise ValueError(f"{name} must be a whole number from {least} on, not {value}")
+    return int(value)
 
 
 def direction(near: Any, radius: Any) -> tuple[float, float, float] | None:
@@ -95,7 +105,7 @@ def _header_date(header: Any) -> str | None:
         return None
 
 
-def _header_exposure(header: Any) -> float | None:
+def header_exposure(header: Any) -> float | None:
     """Return the exposure of a header in seconds, where it is positive."""
     value = header.get("EXPTIME", header.get("EXPOSURE"))
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
@@ -117,7 +127,7 @@ def hints(
     if fov is not None and pixel_scale is not None:
         raise ValueError("fov and pixel_scale say the same: give one")
     date = _header_date(header) if date is None else date
-    exposure = _header_exposure(header) if exposure is None else exposure
+    exposure = header_exposure(header) if exposure is None else exposure
     return {
         "fov_deg": positive(fov, "deg", "fov", 179.0),
         "pixel_scale_arcsec": positive(pixel_scale, "arcsec", "pixel_scale"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -12,11 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _starpipe
-from ._hints import hints
+from ._camera import PathLike
+from ._hints import count, hints, positive
 from ._images import Image, ImageLike, mask_of
 from ._result import Result
-
-PathLike = str | os.PathLike[str]
 
 
 class Pipeline:
@@ -139,10 +137,10 @@ class Pipeline:
             ),
             None if dark is None else Image(dark, "dark").pixels,
             None if flat is None else Image(flat, "flat").pixels,
-            _positive(sigma, "sigma"),
-            None if max_stars is None else _count(max_stars, "max_stars", 4),
+            positive(sigma, "", "sigma"),
+            None if max_stars is None else count(max_stars, "max_stars", 4),
             bool(attitude_only),
-            _count(threads, "threads", 1),
+            count(threads, "threads", 1),
         )
         return Result._of(solved)
 
@@ -206,7 +204,7 @@ class Pipeline:
         table = np.stack(columns, axis=-1)
         if not np.all(np.isfinite(table[:, :3])):
             raise ValueError("x, y and brightness must be finite")
-        rows, width = (_count(side, "shape", 3) for side in shape)
+        rows, width = (count(side, "shape", 3) for side in shape)
         known = hints(
             {},
             fov=fov,
@@ -240,27 +238,15 @@ class Pipeline:
         Result
             As of `solve`. What it raises for an image is raised in its place.
         """
-        count = _count(threads, "threads", 1)
+        workers = count(threads, "threads", 1)
         waiting: deque[Future[Result]] = deque()
-        pool = ThreadPoolExecutor(count, thread_name_prefix="starpipe")
+        pool = ThreadPoolExecutor(workers, thread_name_prefix="starpipe")
         try:
             for image in images:
                 waiting.append(pool.submit(self.solve, image, **known))
-                if len(waiting) >= 2 * count:
+                if len(waiting) >= 2 * workers:
                     yield waiting.popleft().result()
             while waiting:
                 yield waiting.popleft().result()
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _positive(value: float | None, name: str) -> float | None:
-    if value is not None and not 0.0 < float(value) < np.inf:
-        raise ValueError(f"{name} must be positive, not {value}")
-    return value if value is None else float(value)
-
-
-def _count(value: Any, name: str, least: int) -> int:
-    if int(value) != value or value < least:
-        raise ValueError(f"{name} must be a whole number from {least} on, not {value}")
-    return int(value)

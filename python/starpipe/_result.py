@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _starpipe
+from . import _starpipe, _tables
 
 
 class Result:
@@ -165,17 +165,9 @@ class Result:
         Rows count from the top of the picture. For the rows of a FITS file in the file's own order
         take ``WCS(result.to_header())``.
         """
-        from astropy.wcs import WCS
-
         cards = self._wcs_headers[0]
-        if cards is None:
-            return None
-        header = _header(cards)
-        # It describes an image, and has none: astropy would warn.
-        del header["NAXIS"]
-        wcs = WCS(header, fix=False)
-        wcs.pixel_shape = self._report["width"], self._report["height"]
-        return wcs
+        shape = self._report["height"], self._report["width"]
+        return None if cards is None else wcs_of(cards, shape)
 
     def to_header(self) -> Any:
         """Return world coordinates of the rows in the order of the file, as a FITS header."""
@@ -188,35 +180,9 @@ class Result:
         return copy
 
     @property
-    def star_columns(self) -> dict[str, NDArray[Any]]:
+    def star_columns(self) -> _tables.Columns:
         """Every detection, brightest first, as arrays; NaN and "" where there is no value."""
-        stars = self._report["stars"]
-
-        def numbers(key: str) -> NDArray[np.float64]:
-            return np.array([star[key] for star in stars], dtype=np.float64)
-
-        def texts(key: str) -> NDArray[np.str_]:
-            return np.array([star[key] or "" for star in stars], dtype=np.str_)
-
-        flux, snr = numbers("flux"), numbers("snr")
-        return {
-            "id": texts("id"),
-            "name": texts("name"),
-            "x_centroid": numbers("x"),
-            "y_centroid": numbers("y"),
-            "x_centroid_err": numbers("sigma_x"),
-            "y_centroid_err": numbers("sigma_y"),
-            "flux": flux,
-            "flux_err": flux / snr,
-            "peak": numbers("peak"),
-            "snr": snr,
-            "flags": np.array([",".join(star["flags"]) for star in stars], dtype=np.str_),
-            "ra": numbers("ra_deg"),
-            "dec": numbers("dec_deg"),
-            "vmag": numbers("vmag"),
-            "residual": numbers("residual_px"),
-            "p_chance": numbers("p_chance"),
-        }
+        return _tables.star_columns(self._report["stars"])
 
     @property
     def stars(self) -> Any:
@@ -287,6 +253,18 @@ class Result:
     def write(self, path: Any, **options: Any) -> None:
         """Write `stars` as ``QTable.write`` does: ECSV, VOTable, Parquet and more."""
         self.stars.write(path, **options)
+
+
+def wcs_of(cards: bytes, shape: tuple[int, int]) -> Any:
+    """Return the world coordinates in the cards of a header, of an image of `shape`."""
+    from astropy.wcs import WCS
+
+    header = _header(cards)
+    # It describes an image, and has none: astropy would warn.
+    header.remove("NAXIS", ignore_missing=True)
+    wcs = WCS(header, fix=False)
+    wcs.pixel_shape = shape[::-1]
+    return wcs
 
 
 def _header(cards: bytes) -> Any:

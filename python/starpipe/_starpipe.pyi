@@ -4,7 +4,21 @@ from typing import Any, TypeAlias, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Pipeline", "Solved"]
+__all__ = [
+    "DarkFrames",
+    "Darks",
+    "Pipeline",
+    "Simulated",
+    "Solved",
+    "defocus",
+    "detect",
+    "limit",
+    "robustness",
+    "simulate",
+    "validate",
+]
+
+_Path: TypeAlias = str | PathLike[str]
 
 _Image: TypeAlias = (
     bytes
@@ -20,9 +34,9 @@ _Image: TypeAlias = (
 class Pipeline:
     def __new__(
         cls,
-        catalog: str | PathLike[str] | None,
-        camera: str | PathLike[str] | None,
-        cache_dir: str | PathLike[str] | None,
+        catalog: _Path | None,
+        camera: _Path | None,
+        cache_dir: _Path | None,
     ) -> Pipeline: ...
     def solve(
         self,
@@ -51,3 +65,74 @@ class Solved:
     def json(self) -> str: ...
     def wcs_header(self, top_down: bool) -> bytes | None: ...
     def attitude_covariance_rad2(self) -> list[list[float]] | None: ...
+
+@final
+class Simulated:
+    @property
+    def shape(self) -> tuple[int, int]: ...
+    @property
+    def bits(self) -> int: ...
+    @property
+    def pixels(self) -> NDArray[np.float32]: ...
+    @property
+    def truth(self) -> str | None: ...
+    @property
+    def quaternion(self) -> list[float] | None: ...
+    @property
+    def wcs_header(self) -> bytes | None: ...
+    @property
+    def limit_vmag(self) -> float | None: ...
+    @property
+    def exposure_s(self) -> float: ...
+
+@final
+class DarkFrames:
+    def __new__(cls) -> DarkFrames: ...
+    def add(self, image: _Image, exposure_s: float | None) -> None: ...
+    def measure(self, bits: int | None, gain_e_per_adu: float | None) -> Darks: ...
+
+@final
+class Darks:
+    @property
+    def shape(self) -> tuple[int, int]: ...
+    def json(self) -> str: ...
+    def masters(self) -> list[tuple[float | None, NDArray[np.float32]]]: ...
+    def noise_adu(self) -> NDArray[np.float32] | None: ...
+    def hot_pixels(self) -> str: ...
+
+def detect(
+    image: _Image,
+    mask: NDArray[np.bool_] | None,
+    sigma: float | None,
+    max_stars: int | None,
+    threads: int,
+) -> str: ...
+def limit(stated: dict[str, Any]) -> str: ...
+def simulate(
+    stated: dict[str, Any],
+    subject: tuple[float, float, float] | float | str,
+    catalog: _Path | None,
+    date: str | None,
+    seed: int,
+    number: int,
+) -> Simulated: ...
+def validate(
+    stated: dict[str, Any],
+    catalog: _Path | None,
+    frames: int,
+    seed: int,
+    scale_known: bool,
+    threads: int,
+) -> str: ...
+def robustness(
+    lists: dict[str, Any], catalog: _Path | None, trials: int, seed: int, threads: int
+) -> str: ...
+def defocus(
+    stated: dict[str, Any] | None,
+    darks: Darks | None,
+    vmag: list[float],
+    required_error_px: list[float],
+    trials: int | None,
+    seed: int,
+    threads: int,
+) -> str: ...

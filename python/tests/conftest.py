@@ -10,7 +10,7 @@ from PIL import Image
 import starpipe as sp
 
 REPOSITORY = Path(__file__).parents[2]
-SHARED = REPOSITORY.parent / "shared" / "frames"
+SHARED = REPOSITORY.parent / "shared"
 
 
 @pytest.fixture(scope="session")
@@ -35,10 +35,29 @@ def result(pipeline, pixels):
 
 
 @pytest.fixture
-def real_frames():
-    frames = sorted(SHARED.glob("*.tiff"))
-    if not frames:
+def program():
+    """Return the program, whose numbers the package's are compared with."""
+    program = os.environ.get("STARPIPE_PROGRAM")
+    if program is None:
+        pytest.skip("STARPIPE_PROGRAM does not name the program")
+    return program
+
+
+def _shared(pattern):
+    found = sorted(SHARED.glob(pattern))
+    if not found:
         if os.environ.get("STARPIPE_REQUIRE_SHARED") == "1":
-            pytest.fail(f"no frames in {SHARED}")
-        pytest.skip(f"no frames in {SHARED}")
-    return frames
+            pytest.fail(f"no {pattern} in {SHARED}")
+        pytest.skip(f"no {pattern} in {SHARED}")
+    return found
+
+
+@pytest.fixture
+def sky2000():
+    """Return the whole catalogue as it was distributed."""
+    return _shared("sky2000/SKYMAP_SKY2000_V5R4.gz")[0]
+
+
+@pytest.fixture
+def real_frames():
+    return _shared("frames/*.tiff")

@@ -1,5 +1,7 @@
 """The answer as astropy's objects."""
 
+import gzip
+
 import numpy as np
 import pytest
 from astropy import units as u
@@ -7,6 +9,8 @@ from astropy.coordinates import EarthLocation, SkyCoord
 from astropy.nddata import CCDData
 from astropy.table import QTable
 from astropy.time import Time
+
+import starpipe as sp
 
 
 def named(result):
@@ -108,3 +112,46 @@ def test_an_image_with_a_header_brings_date_exposure_and_mask(pipeline, pixels, 
 def test_what_a_header_has_wrong_is_not_used(pipeline, pixels, result):
     header = {"DATE-OBS": "tonight", "EXPTIME": 0}
     assert pipeline.solve(CCDData(pixels, unit=u.adu, meta=header)) == result
+
+
+def _at_date(record, date):
+    """Return Skymap number and position of a record of SKY2000, moved by astropy."""
+
+    def field(first, last):
+        return float(record[first - 1 : last] or 0.0)
+
+    hours = field(119, 120) + field(121, 122) / 60 + field(123, 129) / 3600
+    degrees = field(131, 132) + field(133, 134) / 60 + field(135, 140) / 3600
+    dec = (-degrees if record[129:130] == b"-" else degrees) * u.deg
+    motion = [record[first:last].strip() for first, last in ((149, 157), (157, 165))]
+    # Seconds of time a year, which are 15 arcseconds at the equator.
+    pm_ra, pm_dec = (float(text.replace(b" ", b"") or 0.0) for text in motion)
+    star = SkyCoord(
+        hours * u.hourangle,
+        dec,
+        pm_ra_cosdec=15.0 * pm_ra * np.cos(dec) * u.arcsec / u.yr,
+        pm_dec=pm_dec * u.arcsec / u.yr,
+        distance=1.0 * u.kpc,
+        obstime=Time("J2000"),
+    )
+    return star.apply_space_motion(new_obstime=date).icrs
+
+
+def test_named_stars_are_where_astropy_moves_them(sky2000, real_frames):
+    pipeline = sp.Pipeline(catalog=sky2000)
+    named = {}
+    date = Time("2019-07-29T20:47:26")
+    for frame in real_frames:
+        stars = pipeline.solve(frame, date=date).stars
+        for star in stars[stars["id"] != ""]:
+            named[int(star["id"].removeprefix("SKYMAP "))] = star["sky_centroid"]
+    assert len(named) > 500
+    compared = 0
+    with gzip.open(sky2000) as records:
+        for record in records:
+            number = record[27:35].strip()
+            if number.isdigit() and int(number) in named:
+                expected = _at_date(record, date)
+                assert named[int(number)].separation(expected) < 0.1 * u.arcsec, number
+                compared += 1
+    assert compared == len(named)

@@ -55,7 +55,7 @@ def test_files_that_cannot_be_read_are_named(pipeline, tmp_path):
         ({"exposure": 3 * u.m}, "exposure must be convertible to s"),
         ({"threads": 0}, "threads must be a whole number from 1"),
         ({"max_stars": 2}, "max_stars must be a whole number from 4"),
-        ({"sigma": -3}, "sigma must be positive"),
+        ({"sigma": -3}, "sigma must be more than 0, not -3"),
         ({"mask": np.zeros((3, 3), dtype=bool)}, "mask is"),
         ({"mask": np.zeros((3, 3))}, "array of bool"),
     ],

@@ -1,7 +1,6 @@
 """Frames are solved, however they are passed."""
 
 import json
-import os
 import subprocess
 
 import numpy as np
@@ -25,12 +24,9 @@ def test_an_array_gives_what_the_file_gives(pipeline, frame, pixels):
     assert of_array.to_dict()["attitude"] == of_file.to_dict()["attitude"]
 
 
-def test_the_numbers_are_those_of_the_program(pipeline, frame, real_frames):
-    program = os.environ.get("STARPIPE_PROGRAM")
-    if program is None:
-        pytest.skip("STARPIPE_PROGRAM does not name the program")
+def test_the_numbers_are_those_of_the_program(pipeline, program, frame, real_frames):
     for path in [frame, *real_frames]:
-        command = [program, "process", str(path), "--format", "json"]
+        command = [program, "process", path, "--format", "json"]
         printed = subprocess.run(command, capture_output=True, check=True).stdout
         assert without_times(pipeline.solve(path).to_dict()) == without_times(json.loads(printed))
 

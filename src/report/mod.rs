@@ -34,6 +34,7 @@ pub use frame_report::{
     NoteReport, ObservationReport, OpticsReport, PhotometryReport, PredictionReport, SCHEMA,
     SiteReport, StarReport, Status, TimingReport,
 };
+pub use stars::detections;
 pub use table::{TABLE_COLUMNS, write_table_header};
 pub use text::{STARS_SHOWN, TextOptions};
 pub use track::{

@@ -5,7 +5,7 @@ use super::frame_report::StarReport;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::base::format::{finite, significant, to_decimals, turn_deg};
 use crate::base::units::DEG_PER_RAD;
-use crate::detect::DetectionFlags;
+use crate::detect::{DetectionFlags, Detections};
 use crate::identify::{Identification, StarMatch};
 use crate::pipeline::Source;
 use crate::sky::catalog::Catalog;
@@ -24,6 +24,12 @@ pub(super) fn detection(source: &Source) -> StarReport {
         flags: measured.map(|m| flag_names(m.flags)).unwrap_or_default(),
         ..StarReport::default()
     }
+}
+
+/// The reports of detections, in their order.
+pub fn detections(found: &Detections) -> Vec<StarReport> {
+    let sources = found.sources.iter().map(Source::from);
+    sources.map(|source| detection(&source)).collect()
 }
 
 /// Where an identified frame points, and when.

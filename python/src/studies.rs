@@ -1,0 +1,243 @@
+//! Predictions and studies. Their results are the program's JSON.
+
+use crate::camera::Stated;
+use crate::catalogs;
+use crate::darks::Darks;
+use crate::errors::{exception, json};
+use crate::pipeline::pool;
+use pyo3::prelude::*;
+use rayon::prelude::*;
+use serde::Serialize;
+use starpipe::identify::Photometry;
+use starpipe::model::defocus::{EnergyStudy, Grid, Lens, PeakStudy};
+use starpipe::model::sensitivity::PredictionRow;
+use starpipe::study::defocus::{DarkNoise, DefocusReport, Noise, Plan, StarModel, default_v_mag};
+use starpipe::study::robustness::{
+    Case, CaseResult, Mirrored, Protocol, TrialResult, TrialResults, run_one, standard_cases,
+};
+use starpipe::study::validation::{self, Accumulator, FrameRecord, StarRecord, Validator};
+use starpipe::{Catalog, Workspace};
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+/// Work between two looks for signals, for each thread: some tenths of a second of frames.
+const FRAMES_AT_ONCE: usize = 4;
+const TRIALS_AT_ONCE: usize = 50;
+
+/// The limiting magnitude of a camera.
+#[pyfunction]
+pub fn limit(py: Python<'_>, stated: Stated) -> PyResult<String> {
+    let scenario = stated.scenario()?;
+    let row = py.detach(|| PredictionRow::new(&scenario, stated.preset(), Catalog::built_in()));
+    json(&row.map_err(exception)?)
+}
+
+/// The tables and the summary of a validation, as JSON.
+#[derive(Serialize)]
+struct Validation {
+    summary: validation::Summary,
+    frames: Vec<FrameRecord>,
+    stars: Vec<StarRecord>,
+}
+
+/// Simulates frames at random attitudes, solves them, and compares them with the truth.
+#[pyfunction]
+#[pyo3(signature = (stated, catalog, frames, seed, scale_known, threads))]
+pub fn validate(
+    py: Python<'_>,
+    stated: Stated,
+    catalog: Option<PathBuf>,
+    frames: u64,
+    seed: u64,
+    scale_known: bool,
+    threads: NonZeroUsize,
+) -> PyResult<String> {
+    let protocol = validation::Protocol {
+        setup: stated.setup()?,
+        scale_known,
+        seed,
+    };
+    let pool = pool(threads.get())?;
+    let indexed = py.detach(|| pool.install(|| catalogs::open((catalog, None))))?;
+    let validator = Validator::new(indexed, &protocol).map_err(exception)?;
+    let mut all = Accumulator::new(validator.facts(), validator.limit_vmag());
+    let (mut frame_rows, mut star_rows) = (Vec::new(), Vec::new());
+    let step = threads.get() * FRAMES_AT_ONCE;
+    for first in (0..frames).step_by(step) {
+        py.check_signals()?;
+        let numbers = first..frames.min(first + step as u64);
+        let solve = |workspace: &mut Workspace, number| validator.run_one(number, workspace);
+        let solved = py.detach(|| {
+            let numbers = || numbers.into_par_iter();
+            pool.install(|| {
+                let solved = numbers().map_init(Workspace::new, solve);
+                solved.collect::<Result<Vec<_>, _>>()
+            })
+        });
+        for solved in solved.map_err(exception)? {
+            all.add_frame(&solved.frame);
+            solved.stars.iter().for_each(|star| all.add_star(star));
+            frame_rows.push(solved.frame);
+            star_rows.extend(solved.stars);
+        }
+    }
+    json(&Validation {
+        summary: all.finish(),
+        frames: frame_rows,
+        stars: star_rows,
+    })
+}
+
+/// The lists of a robustness study.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Lists {
+    fov_deg: Option<f64>,
+    stars: f64,
+    centroid_error_px: f64,
+    mag_error: f64,
+    missing: f64,
+    false_stars: f64,
+    scale_error: Option<f64>,
+    shape: [usize; 2],
+}
+
+/// Identifies simulated lists of centroids: the standard table, or one row where a field of view is
+/// given.
+#[pyfunction]
+#[pyo3(signature = (lists, catalog, trials, seed, threads))]
+pub fn robustness(
+    py: Python<'_>,
+    lists: Lists,
+    catalog: Option<PathBuf>,
+    trials: u64,
+    seed: u64,
+    threads: NonZeroUsize,
+) -> PyResult<String> {
+    const LEAST_TRUE_STARS: usize = 8;
+    let [height_px, width_px] = lists.shape;
+    let base = Protocol {
+        fov_deg: lists.fov_deg.unwrap_or_default(),
+        width_px,
+        height_px,
+        mean_stars: lists.stars,
+        centroid_sigma_px: lists.centroid_error_px,
+        mag_sigma: lists.mag_error,
+        missing: lists.missing,
+        false_stars: lists.false_stars,
+        scale_error: lists.scale_error,
+        mirrored: Mirrored::Half,
+        photometry: Photometry::Instrumental,
+    };
+    let cases = match lists.fov_deg {
+        None => standard_cases(&base),
+        Some(fov_deg) => vec![Case {
+            label: format!("{fov_deg}° field"),
+            protocol: base,
+        }],
+    };
+    let pool = pool(threads.get())?;
+    let indexed = py.detach(|| pool.install(|| catalogs::open((catalog, None))))?;
+    let step = threads.get() * TRIALS_AT_ONCE;
+    let mut rows = Vec::new();
+    for case in &cases {
+        let mut results: Vec<TrialResult> = Vec::new();
+        for first in (0..trials).step_by(step) {
+            py.check_signals()?;
+            let numbers = first..trials.min(first + step as u64);
+            let trial = |number| run_one(indexed, &case.protocol, seed, number);
+            results.extend(py.detach(|| {
+                let numbers = numbers.into_par_iter();
+                pool.install(|| numbers.map(trial).collect::<Vec<_>>())
+            }));
+        }
+        let results = TrialResults::new(results);
+        rows.push(CaseResult::new(case, &results, LEAST_TRUE_STARS));
+    }
+    json(&rows)
+}
+
+/// The error of centroids over the radius of the spot: of a camera, or of the paper's experiment.
+#[pyfunction]
+#[pyo3(signature = (stated, darks, vmag, required_error_px, trials, seed, threads))]
+pub fn defocus(
+    py: Python<'_>,
+    stated: Option<Stated>,
+    darks: Option<PyRef<'_, Darks>>,
+    vmag: Vec<f64>,
+    required_error_px: Vec<f64>,
+    trials: Option<usize>,
+    seed: u64,
+    threads: NonZeroUsize,
+) -> PyResult<String> {
+    let noise = |exposure_s| {
+        let darks = darks.as_ref();
+        darks.map(|darks| DarkNoise::at_exposure(&darks.measured, exposure_s))
+    };
+    let plan = match stated {
+        Some(stated) => of_camera(stated, noise, &vmag, trials)?,
+        None => of_paper(noise(None), trials)?,
+    };
+    let plan = Plan {
+        required_px: required_error_px,
+        seed,
+        ..plan
+    };
+    let pool = pool(threads.get())?;
+    let studies = py.detach(|| pool.install(|| plan.run(&|| ())));
+    json(&DefocusReport::new(&plan, &studies.map_err(exception)?))
+}
+
+fn of_camera(
+    stated: Stated,
+    noise: impl Fn(Option<f64>) -> Option<DarkNoise>,
+    vmag: &[f64],
+    trials: Option<usize>,
+) -> PyResult<Plan> {
+    let scenario = stated.scenario()?;
+    let noise = match noise(Some(scenario.conditions.exposure_s)) {
+        Some(darks) => Noise::of_good_pixels(darks, &scenario),
+        None => Noise::of_camera(&scenario),
+    };
+    let noise = noise.map_err(exception)?;
+    let scenario = noise.replacing_in(scenario);
+    let vmag = match vmag {
+        [] => vec![default_v_mag(&scenario).map_err(exception)?],
+        given => given.to_vec(),
+    };
+    let star = |&v_mag: &f64| {
+        let mut star = EnergyStudy::new(scenario.clone(), v_mag);
+        star.trials = trials.unwrap_or(star.trials);
+        StarModel::Energy(Box::new(star))
+    };
+    Ok(Plan {
+        stars: vmag.iter().map(star).collect(),
+        grid: Grid::around(noise.value()),
+        lens: Some(Lens::of(&scenario.camera, 0.0)),
+        present_px: Some(scenario.camera.spot_sigma_px),
+        noise,
+        required_px: Vec::new(),
+        seed: 0,
+    })
+}
+
+fn of_paper(darks: Option<DarkNoise>, trials: Option<usize>) -> PyResult<Plan> {
+    let default = PeakStudy::default();
+    let star = PeakStudy {
+        trials: trials.unwrap_or(default.trials),
+        ..default
+    };
+    let noise = match darks {
+        Some(darks) => Noise::of_all_pixels(darks).map_err(exception)?,
+        None => Noise::of_paper(),
+    };
+    Ok(Plan {
+        stars: vec![StarModel::Peak(star)],
+        grid: Grid::of_paper(),
+        noise,
+        lens: None,
+        present_px: None,
+        required_px: Vec::new(),
+        seed: 0,
+    })
+}

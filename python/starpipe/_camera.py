@@ -1,0 +1,32 @@
+"""Cameras, conditions and scenes as the compiled part takes them."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from ._hints import number, positive
+
+PathLike = str | os.PathLike[str]
+
+UNITS = ("mm", "um", "nm", "s", "deg")
+"""Units at the end of a parameter's name, in which it takes a Quantity."""
+
+
+def stated(
+    camera: PathLike, exposure: Any, reading: str | None, parameters: dict[str, Any]
+) -> dict[str, Any]:
+    """Return a camera, its conditions and a scene."""
+    readings = {None: None, "paper": True, "physical": False}
+    if reading not in readings:
+        raise ValueError(f"reading must be 'paper' or 'physical', not {reading!r}")
+    values: list[tuple[str, float]] = []
+    for name, value in parameters.items():
+        unit = name.rpartition("_")[2]
+        found = number(value, unit if unit in UNITS else "", name)
+        if found is not None:
+            values.append((name, found))
+    exposure_s = positive(exposure, "s", "exposure")
+    if exposure_s is not None:
+        values.append(("exposure_s", exposure_s))
+    return {"camera": camera, "is_paper": readings[reading], "values": values}

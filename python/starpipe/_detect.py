@@ -1,0 +1,109 @@
+"""Detection alone."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _starpipe, _tables
+from ._hints import count, positive
+from ._images import Image, ImageLike, mask_of
+
+
+class Detections:
+    """The stars of an image, brightest first, and its background.
+
+    Attributes
+    ----------
+    background, noise : float
+        Median of the background, and of its standard deviation.
+    spot_sigma_px : float
+        Standard deviation of a star's spot.
+    threshold_sigma : float
+        Threshold in standard deviations of the filtered background.
+    """
+
+    def __init__(self, report: dict[str, Any]) -> None:
+        self._stars = report["stars"]
+        self.background: float = report["background"]
+        self.noise: float = report["noise"]
+        self.spot_sigma_px: float = report["spot_sigma_px"]
+        self.threshold_sigma: float = report["threshold_sigma"]
+
+    def __len__(self) -> int:
+        return len(self._stars)
+
+    def __repr__(self) -> str:
+        level, noise = self.background, self.noise
+        return f"<Detections: {len(self)} stars, background {level:.4g}, noise {noise:.3g}>"
+
+    @property
+    def columns(self) -> _tables.Columns:
+        """The stars as arrays."""
+        of_sky = ("id", "name", "ra", "dec", "vmag", "residual", "p_chance")
+        found = _tables.star_columns(self._stars)
+        return {name: column for name, column in found.items() if name not in of_sky}
+
+    @property
+    def stars(self) -> Any:
+        """The stars as a ``QTable``; without astropy `columns`."""
+        names = ("x_centroid", "y_centroid", "x_centroid_err", "y_centroid_err")
+        return _tables.table(self.columns, dict.fromkeys(names, "pix"))
+
+    @property
+    def x(self) -> NDArray[np.float64]:
+        """Centroids along the rows, in pixels."""
+        return self.columns["x_centroid"]
+
+    @property
+    def y(self) -> NDArray[np.float64]:
+        """Centroids along the columns, in pixels."""
+        return self.columns["y_centroid"]
+
+    @property
+    def flux(self) -> NDArray[np.float64]:
+        """Fluxes above the background."""
+        return self.columns["flux"]
+
+    @property
+    def error(self) -> NDArray[np.float64]:
+        """Standard error of a centroid on each axis, in pixels, as `Pipeline.identify` takes it."""
+        x, y = self.columns["x_centroid_err"], self.columns["y_centroid_err"]
+        error: NDArray[np.float64] = np.hypot(x, y) / np.sqrt(2.0)
+        return error
+
+
+def detect(
+    image: ImageLike,
+    mask: ArrayLike | None = None,
+    *,
+    sigma: float | None = None,
+    max_stars: int | None = None,
+    threads: int = 1,
+) -> Detections:
+    """Detect the stars of an image and measure their centroids.
+
+    Parameters
+    ----------
+    image, mask, sigma, max_stars, threads
+        As for `Pipeline.solve`.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read.
+    ValueError
+        If there is no image in it, or an argument is out of range.
+    """
+    taken = Image(image)
+    report = _starpipe.detect(
+        taken.pixels,
+        mask_of(taken, mask),
+        positive(sigma, "", "sigma"),
+        None if max_stars is None else count(max_stars, "max_stars", 4),
+        count(threads, "threads", 1),
+    )
+    return Detections(json.loads(report))

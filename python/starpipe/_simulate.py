@@ -1,0 +1,142 @@
+"""Simulated frames."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _starpipe, _tables
+from ._camera import PathLike, stated
+from ._hints import count, direction, iso_date, number
+from ._result import wcs_of
+
+
+class Simulation:
+    """A simulated frame with its truth.
+
+    Attributes
+    ----------
+    image : ndarray
+        Grey levels, of the smallest type that has the camera's bits.
+    quaternion : ndarray or None
+        Rotation of ICRS vectors into camera axes: [w, x, y, z].
+    limit_vmag : float or None
+        V magnitude at which half of the stars should be found.
+    exposure_s : float
+        Exposure in seconds.
+    """
+
+    def __init__(self, simulated: _starpipe.Simulated) -> None:
+        levels = simulated.pixels.reshape(simulated.shape)
+        bits = simulated.bits
+        self.image: NDArray[Any] = levels
+        if bits <= 16:
+            self.image = levels.astype(np.uint8 if bits <= 8 else np.uint16)
+        self._truth = simulated.truth
+        self._wcs_header = simulated.wcs_header
+        quaternion = simulated.quaternion
+        self.quaternion = None if quaternion is None else np.array(quaternion)
+        self.limit_vmag = simulated.limit_vmag
+        self.exposure_s = simulated.exposure_s
+
+    def __repr__(self) -> str:
+        rows, columns = self.image.shape
+        what = f"{len(self.stars)} stars" if self._truth else "no stars"
+        return f"<Simulation {columns} x {rows}: {what}>"
+
+    @property
+    def wcs(self) -> Any:
+        """True world coordinates as an ``astropy.wcs.WCS``; distortion is not in them."""
+        shape = self.image.shape
+        return None if self._wcs_header is None else wcs_of(self._wcs_header, shape)
+
+    @property
+    def columns(self) -> _tables.Columns:
+        """What is on the frame, as arrays: stars, false stars, trails and cosmic rays."""
+        return _tables.columns(json.loads(self._truth or "[]"))
+
+    @property
+    def stars(self) -> Any:
+        """What is on the frame as a ``QTable``; without astropy `columns`."""
+        units = {"vmag": "mag", "bv_mag": "mag", "ra_deg": "deg", "dec_deg": "deg"}
+        places = dict.fromkeys(("x", "y", "x_end", "y_end"), "pix")
+        return _tables.table(self.columns, units | places | {"electrons": "electron"})
+
+
+def simulate(
+    camera: PathLike,
+    *,
+    ra: Any = None,
+    dec: Any = None,
+    roll: Any = 0.0,
+    dark: bool = False,
+    flat: float | None = None,
+    date: Any = None,
+    seed: int = 1,
+    frame: int = 0,
+    exposure: Any = None,
+    catalog: PathLike | None = None,
+    **parameters: float,
+) -> Simulation:
+    """Simulate a frame.
+
+    Parameters
+    ----------
+    camera : path or str
+        A description of the camera (TOML), or the name of a preset.
+    ra, dec, roll : Angle or float, optional
+        Centre of the frame and position angle of the image's up direction, in degrees. Without
+        them the pointing is drawn from all rotations.
+    dark : bool
+        Keep the shutter closed.
+    flat : float, optional
+        The same light on each pixel in place of the sky, in electrons.
+    date : Time, datetime or str, optional
+        Date for proper motion; 2000 by default.
+    seed, frame : int
+        Seed of the random numbers, and number of the frame: ``starpipe simulate`` makes the same
+        frame of the same two.
+    exposure : Quantity or float, optional
+        Exposure in seconds.
+    catalog : path, optional
+        Stars in place of the built-in ones.
+    **parameters
+        Other numbers of camera, conditions and scene, by the names of the program's options, as
+        ``read_noise_e`` or ``satellite_trails``.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read.
+    ValueError
+        If an argument is out of range or unknown.
+    """
+    subject: tuple[float, float, float] | float | str
+    if dark or flat is not None:
+        if ra is not None or dec is not None or (dark and flat is not None):
+            raise ValueError("a frame shows the sky at ra and dec, or it is dark, or a flat field")
+        light = number(flat, "electron", "flat")
+        if light is not None and light < 0.0:
+            raise ValueError(f"flat must not be negative, not {light:g}")
+        subject = "dark" if light is None else light
+    elif ra is None and dec is None:
+        subject = "random"
+    else:
+        if ra is None or dec is None:
+            raise ValueError("ra and dec belong together: give both")
+        pointing = direction((ra, dec), 1.0)
+        angle = number(roll, "deg", "roll")
+        assert pointing is not None and angle is not None
+        subject = pointing[0], pointing[1], angle
+    simulated = _starpipe.simulate(
+        stated(camera, exposure, None, parameters),
+        subject,
+        catalog,
+        iso_date(date),
+        count(seed, "seed", 0),
+        count(frame, "frame", 0),
+    )
+    return Simulation(simulated)

@@ -1,0 +1,232 @@
+"""Predictions and studies: their results are the program's JSON."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _starpipe, _tables
+from ._camera import PathLike, stated
+from ._darks import Darks
+from ._hints import count, number, positive
+
+
+def limit(
+    camera: PathLike, *, exposure: Any = None, reading: str | None = None, **parameters: float
+) -> dict[str, Any]:
+    """Predict the limiting magnitude of a camera.
+
+    Parameters
+    ----------
+    camera : path or str
+        A description of the camera (TOML), or the name of a preset.
+    exposure : Quantity or float, optional
+        Exposure in seconds.
+    reading : {'paper', 'physical'}, optional
+        The equations: those of the paper, or the same with corrected physics.
+    **parameters
+        Other numbers of camera and conditions, by the names of the program's options, as
+        ``aperture_mm`` or ``sky_mag_arcsec2``.
+
+    Returns
+    -------
+    dict
+        As the JSON of ``starpipe limit``: ``limit_vmag``, ``snr``, ``detector``, ...
+    """
+    found: dict[str, Any] = json.loads(
+        _starpipe.limit(stated(camera, exposure, reading, parameters))
+    )
+    return found
+
+
+class Validation:
+    """Simulated frames, solved and compared with the truth.
+
+    Attributes
+    ----------
+    summary : dict
+        As ``summary.json`` of ``starpipe validate``.
+    """
+
+    def __init__(self, report: dict[str, Any]) -> None:
+        self.summary: dict[str, Any] = report["summary"]
+        self._frames = report["frames"]
+        self._stars = report["stars"]
+
+    def __repr__(self) -> str:
+        found = self.summary["identification"]
+        return (
+            f"<Validation: {found['frames']} frames, {found['right']} right, "
+            f"{found['wrong']} wrong, {found['none']} not identified>"
+        )
+
+    @property
+    def frames(self) -> Any:
+        """A row for each frame, as a ``QTable`` or a dict of arrays."""
+        return _tables.table(_tables.columns(self._frames), {})
+
+    @property
+    def stars(self) -> Any:
+        """A row for each true star and each other detection, as a ``QTable`` or a dict."""
+        return _tables.table(_tables.columns(self._stars), {})
+
+
+def validate(
+    camera: PathLike,
+    *,
+    frames: int = 100,
+    seed: int = 1,
+    scale_known: bool = True,
+    threads: int = 1,
+    exposure: Any = None,
+    catalog: PathLike | None = None,
+    **parameters: float,
+) -> Validation:
+    """Simulate frames at random attitudes, solve them, and compare them with the truth.
+
+    All rows are kept in memory; ``starpipe validate`` writes them to files, and goes on where it
+    was interrupted.
+
+    Parameters
+    ----------
+    camera, exposure, catalog, **parameters
+        As for `simulate`.
+    frames, seed : int
+        How many frames, and the seed of their random numbers.
+    scale_known : bool
+        Whether the pipeline is given the camera.
+    threads : int
+        Threads; results do not depend on it.
+    """
+    report = _starpipe.validate(
+        stated(camera, exposure, None, parameters),
+        catalog,
+        count(frames, "frames", 1),
+        count(seed, "seed", 0),
+        bool(scale_known),
+        count(threads, "threads", 1),
+    )
+    return Validation(json.loads(report))
+
+
+def robustness(
+    *,
+    fov: Any = None,
+    trials: int = 2000,
+    seed: int = 1,
+    threads: int = 1,
+    stars: float = 30.0,
+    centroid_error: float = 0.3,
+    mag_error: float = 0.2,
+    missing: float = 0.15,
+    false: float = 0.15,
+    scale_error: float | None = 0.1,
+    shape: tuple[int, int] = (1024, 1024),
+    catalog: PathLike | None = None,
+) -> list[dict[str, Any]]:
+    """Measure how often identification is right, on simulated lists of centroids.
+
+    Parameters
+    ----------
+    fov : Quantity or float, optional
+        Horizontal field of view in degrees: one row. Without it, the standard table: five fields,
+        then one worse condition at a time.
+    trials, seed, threads : int
+        Trials of each row, seed of the random numbers, and threads.
+    stars : float
+        Mean number of catalogue stars on a frame.
+    centroid_error, mag_error : float
+        Standard deviations, in pixels and magnitudes.
+    missing, false : float
+        Shares of stars that are missing, and of false stars.
+    scale_error : float or None
+        Largest error of the stated field of view, as a share; None states none.
+    shape : (int, int)
+        Rows and columns of the frame.
+    catalog : path, optional
+        Stars in place of the built-in ones.
+
+    Returns
+    -------
+    list of dict
+        As the JSON of ``starpipe robustness``.
+    """
+    lists = {
+        "fov_deg": positive(fov, "deg", "fov", 179.0),
+        "stars": positive(stars, "", "stars"),
+        "centroid_error_px": _share(centroid_error, "centroid_error", np.inf),
+        "mag_error": _share(mag_error, "mag_error", np.inf),
+        "missing": _share(missing, "missing", 1.0),
+        "false_stars": _share(false, "false", 100.0),
+        "scale_error": positive(scale_error, "", "scale_error", 1.0),
+        "shape": tuple(count(side, "shape", 3) for side in shape),
+    }
+    rows: list[dict[str, Any]] = json.loads(
+        _starpipe.robustness(
+            lists,
+            catalog,
+            count(trials, "trials", 1),
+            count(seed, "seed", 0),
+            count(threads, "threads", 1),
+        )
+    )
+    return rows
+
+
+def defocus(
+    camera: PathLike | None = None,
+    *,
+    vmag: ArrayLike = (),
+    required_error: ArrayLike = (),
+    darks: Darks | None = None,
+    trials: int | None = None,
+    seed: int = 1,
+    threads: int = 1,
+    exposure: Any = None,
+    **parameters: float,
+) -> dict[str, Any]:
+    """Measure the error of centroids over the radius of the spot, and the radius to set.
+
+    Parameters
+    ----------
+    camera : path or str, optional
+        A camera; without it the experiment of the paper.
+    vmag : float or list
+        V magnitudes of the stars; 1.5 brighter than the camera's limit by default.
+    required_error : float or list
+        Errors in pixels: the radii that meet them are reported.
+    darks : Darks, optional
+        Frames whose noise is taken.
+    trials, seed, threads : int
+        Stars at each point, seed of the random numbers, and threads.
+    exposure, **parameters
+        As for `limit`.
+
+    Returns
+    -------
+    dict
+        As the JSON of ``starpipe defocus``.
+    """
+    if camera is None and (exposure is not None or parameters or np.size(vmag)):
+        raise ValueError("vmag, exposure and other numbers are of a camera: give one")
+    report = _starpipe.defocus(
+        None if camera is None else stated(camera, exposure, None, parameters),
+        None if darks is None else darks._darks,
+        [float(value) for value in np.ravel(vmag)],
+        [_share(value, "required_error", np.inf) for value in np.ravel(required_error)],
+        None if trials is None else count(trials, "trials", 1),
+        count(seed, "seed", 0),
+        count(threads, "threads", 1),
+    )
+    found: dict[str, Any] = json.loads(report)
+    return found
+
+
+def _share(value: Any, name: str, most: float) -> float:
+    found = number(value, "", name)
+    if found is None or not 0.0 <= found <= most:
+        raise ValueError(f"{name} must be from 0 to {most:g}, not {value}")
+    return found
