@@ -1,6 +1,6 @@
 //! Catalogues, each read and indexed once in a process.
 
-use crate::errors::exception;
+use crate::errors::{exception, message, warn};
 use pyo3::prelude::*;
 use starpipe::identify::{IndexedCatalog, cache_directory};
 use starpipe::sky::catalog::{self, Catalog};
@@ -23,10 +23,27 @@ pub fn open(key: Key) -> PyResult<&'static IndexedCatalog<'static>> {
     }
     let catalog: &'static Catalog = match &key.0 {
         None => Catalog::built_in(),
-        Some(path) => Box::leak(Box::new(catalog::read(path).map_err(exception)?.catalog)),
+        Some(path) => {
+            let reading = catalog::read(path).map_err(exception)?;
+            for file in &reading.files {
+                if let Some(reasons) = file.summary.left_out() {
+                    let (path, records) = (file.path.display(), file.summary.records);
+                    warn(&format!(
+                        "{path}: not all of its {records} records are stars: {reasons}"
+                    ));
+                }
+            }
+            Box::leak(Box::new(reading.catalog))
+        }
     };
     let directory = key.1.clone().or_else(cache_directory);
     let indexed = IndexedCatalog::open(catalog, directory.as_deref(), &|_| ());
+    for error in indexed.take_cache_errors() {
+        warn(&format!(
+            "{}; results are unaffected, but take longer",
+            message(&error)
+        ));
+    }
     let indexed: &'static IndexedCatalog = Box::leak(Box::new(indexed));
     catalogs.insert(key, indexed);
     Ok(indexed)

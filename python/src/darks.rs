@@ -1,6 +1,6 @@
 //! Frames taken without light.
 
-use crate::errors::{exception, json};
+use crate::errors::{detached, exception, json};
 use crate::image::Image;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -27,7 +27,7 @@ impl DarkFrames {
     fn add(&mut self, py: Python<'_>, image: Image<'_>, exposure_s: Option<f64>) -> PyResult<()> {
         let source = image.source()?;
         let stack = &mut self.stack;
-        py.detach(|| {
+        detached(py, || {
             let name = source.name().display().to_string();
             let frame = source.frame(None, &mut Buffers::new()).map_err(exception)?;
             let statistics = FrameStatistics::of(&name, &frame, exposure_s);
@@ -48,7 +48,7 @@ impl DarkFrames {
             ..DarkConfig::default()
         };
         let stack = std::mem::take(&mut self.stack);
-        let measured = py.detach(|| stack.measure(&config)).map_err(exception)?;
+        let measured = detached(py, || stack.measure(&config).map_err(exception))?;
         Ok(Darks { measured })
     }
 }

@@ -1,6 +1,6 @@
 //! Detection alone.
 
-use crate::errors::{exception, json};
+use crate::errors::{detached, exception, json};
 use crate::image::{Image, bad_pixels};
 use crate::pipeline::{detect_config, pool};
 use numpy::PyReadonlyArray2;
@@ -35,7 +35,7 @@ pub fn detect(
     let source = image.source()?;
     let bad = bad_pixels(mask.as_ref())?;
     let config = detect_config(sigma, max_stars);
-    py.detach(|| {
+    detached(py, || {
         let frame = source.frame(bad, &mut Buffers::new()).map_err(exception)?;
         let mut workspace = Workspace::new().on_threads(threads);
         let found = pool(threads.get())?

@@ -6,11 +6,8 @@ use starpipe::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
 use starpipe::identify::{DateSource, FrameDate, Scale};
 use starpipe::{Priors, ScalePrior, Site, SkyRegion, UnitVector};
 
-/// How far a stated scale may be off, as a share: the program's default.
-const SCALE_ERROR: f64 = 0.1;
-
 /// What the user knows of a frame, in degrees, arcseconds, seconds and metres.
-#[derive(Debug, Default, FromPyObject)]
+#[derive(Debug, FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Hints {
     fov_deg: Option<f64>,
@@ -19,6 +16,10 @@ pub struct Hints {
     date: Option<String>,
     site: Option<[f64; 3]>,
     exposure_s: Option<f64>,
+    scale_error: f64,
+    pub zenith_distance_deg: Option<f64>,
+    pub extinction: Option<f64>,
+    pub name_odds: f64,
 }
 
 impl Hints {
@@ -33,7 +34,7 @@ impl Hints {
             .site
             .map(|[lat_deg, lon_deg, height_m]| Site::new(lat_deg, lon_deg, height_m));
         Ok(Priors {
-            scale: scale.map(|scale| ScalePrior::by_user(scale, SCALE_ERROR)),
+            scale: scale.map(|scale| ScalePrior::by_user(scale, self.scale_error)),
             near: self.near_deg.map(|[ra, dec, radius]| SkyRegion {
                 centre: UnitVector::from_ra_dec(ra * RAD_PER_DEG, dec * RAD_PER_DEG),
                 radius_rad: radius * RAD_PER_DEG,

@@ -2,7 +2,7 @@
 
 use crate::camera::data_sheet;
 use crate::catalogs;
-use crate::errors::exception;
+use crate::errors::{detached, exception};
 use crate::hints::Hints;
 use crate::image::{Image, Source, bad_pixels};
 use crate::solved::Solved;
@@ -12,6 +12,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use starpipe::calibration::Master;
 use starpipe::camera::data_sheet::DataSheet;
 use starpipe::frame::Buffers;
+use starpipe::model::sensitivity::Extinction;
 use starpipe::photometry::comparison::StatedCamera;
 use starpipe::pipeline::{CentroidList, ListedCentroid, solve_centroids, solve_frame, solve_read};
 use starpipe::{
@@ -46,7 +47,7 @@ impl Pipeline {
         camera: Option<PathBuf>,
         cache_dir: Option<PathBuf>,
     ) -> PyResult<Self> {
-        py.detach(|| {
+        detached(py, || {
             let all = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
             Ok(Self {
                 indexed: pool(all)?.install(|| catalogs::open((catalog, cache_dir)))?,
@@ -77,14 +78,14 @@ impl Pipeline {
         let flat = flat.as_ref().map(Image::source).transpose()?;
         let context = self.context(&hints, attitude_only)?;
         let detect = detect_config(sigma, max_stars);
-        py.detach(|| {
+        detached(py, || {
             let calibration = self.calibration(dark, flat)?;
             let context = Context {
                 detect,
                 calibration: calibration.as_ref(),
                 ..context
             };
-            self.with_workspace(threads, |workspace| {
+            self.with_workspace(threads, hints.name_odds, |workspace| {
                 let name = source.name();
                 let solution = solve(source, bad, &context, workspace)?;
                 Ok(self.solved(&name, solution))
@@ -116,8 +117,8 @@ impl Pipeline {
                 .collect(),
         };
         let context = self.context(&hints, attitude_only)?;
-        py.detach(|| {
-            self.with_workspace(NonZeroUsize::MIN, |workspace| {
+        detached(py, || {
+            self.with_workspace(NonZeroUsize::MIN, hints.name_odds, |workspace| {
                 let solution = solve_centroids(&list, &context, workspace);
                 Ok(self.solved(Path::new("centroids"), solution))
             })
@@ -131,8 +132,8 @@ impl Pipeline {
             priors: hints.priors()?,
             camera: self.camera.clone().map(|sheet| StatedCamera {
                 sheet,
-                zenith_distance_deg: None,
-                extinction: None,
+                zenith_distance_deg: hints.zenith_distance_deg,
+                extinction: hints.extinction.map(Extinction::MagPerAirmass),
             }),
             attitude_only,
             ..Context::new(self.indexed)
@@ -163,6 +164,7 @@ impl Pipeline {
     fn with_workspace<R: Send>(
         &self,
         threads: NonZeroUsize,
+        name_odds: f64,
         work: impl FnOnce(&mut Workspace) -> PyResult<R> + Send,
     ) -> PyResult<R> {
         // In a child process the lock may be held by a thread that does not exist there.
@@ -171,6 +173,7 @@ impl Pipeline {
             Err(_) => Workspace::new(),
         };
         workspace.detect = workspace.detect.on_threads(threads);
+        workspace.identify = workspace.identify.with_name_odds(name_odds);
         let result = if threads == NonZeroUsize::MIN {
             work(&mut workspace)
         } else {

@@ -2,7 +2,7 @@
 
 use crate::camera::Stated;
 use crate::catalogs;
-use crate::errors::{exception, json};
+use crate::errors::{detached, exception, json};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use starpipe::base::coords::{Camera, Icrs, Rotation};
@@ -57,7 +57,7 @@ pub fn simulate(
     let setup = stated.setup()?;
     let date = date.as_deref().map(str::parse::<ObservationDate>);
     let date = date.transpose().map_err(exception)?;
-    let simulated = py.detach(|| {
+    let simulated = detached(py, || {
         let catalog = catalogs::read(catalog)?;
         let simulator = Simulator::new(&setup.scenario, &setup.scene, catalog.stars());
         let simulator = simulator.map_err(exception)?;
@@ -86,7 +86,7 @@ pub fn simulate(
             wcs_header: header.to_bytes(),
             limit_vmag: limit_vmag(&simulator),
         };
-        Ok::<_, PyErr>((frame, Some(sky)))
+        Ok((frame, Some(sky)))
     })?;
     let (frame, sky) = simulated;
     let shape = [frame.height, frame.width];

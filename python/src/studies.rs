@@ -3,7 +3,7 @@
 use crate::camera::Stated;
 use crate::catalogs;
 use crate::darks::Darks;
-use crate::errors::{exception, json};
+use crate::errors::{detached, exception, json};
 use crate::pipeline::pool;
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -28,8 +28,10 @@ const TRIALS_AT_ONCE: usize = 50;
 #[pyfunction]
 pub fn limit(py: Python<'_>, stated: Stated) -> PyResult<String> {
     let scenario = stated.scenario()?;
-    let row = py.detach(|| PredictionRow::new(&scenario, stated.preset(), Catalog::built_in()));
-    json(&row.map_err(exception)?)
+    detached(py, || {
+        let row = PredictionRow::new(&scenario, stated.preset(), Catalog::built_in());
+        json(&row.map_err(exception)?)
+    })
 }
 
 /// The tables and the summary of a validation, as JSON.
@@ -58,7 +60,7 @@ pub fn validate(
         seed,
     };
     let pool = pool(threads.get())?;
-    let indexed = py.detach(|| pool.install(|| catalogs::open((catalog, None))))?;
+    let indexed = detached(py, || pool.install(|| catalogs::open((catalog, None))))?;
     let validator = Validator::new(indexed, &protocol).map_err(exception)?;
     let mut all = Accumulator::new(validator.facts(), validator.limit_vmag());
     let (mut frame_rows, mut star_rows) = (Vec::new(), Vec::new());
@@ -67,14 +69,13 @@ pub fn validate(
         py.check_signals()?;
         let numbers = first..frames.min(first + step as u64);
         let solve = |workspace: &mut Workspace, number| validator.run_one(number, workspace);
-        let solved = py.detach(|| {
-            let numbers = || numbers.into_par_iter();
+        let solved = detached(py, || {
             pool.install(|| {
-                let solved = numbers().map_init(Workspace::new, solve);
-                solved.collect::<Result<Vec<_>, _>>()
+                let solved = numbers.into_par_iter().map_init(Workspace::new, solve);
+                solved.collect::<Result<Vec<_>, _>>().map_err(exception)
             })
-        });
-        for solved in solved.map_err(exception)? {
+        })?;
+        for solved in solved {
             all.add_frame(&solved.frame);
             solved.stars.iter().for_each(|star| all.add_star(star));
             frame_rows.push(solved.frame);
@@ -137,7 +138,7 @@ pub fn robustness(
         }],
     };
     let pool = pool(threads.get())?;
-    let indexed = py.detach(|| pool.install(|| catalogs::open((catalog, None))))?;
+    let indexed = detached(py, || pool.install(|| catalogs::open((catalog, None))))?;
     let step = threads.get() * TRIALS_AT_ONCE;
     let mut rows = Vec::new();
     for case in &cases {
@@ -146,10 +147,10 @@ pub fn robustness(
             py.check_signals()?;
             let numbers = first..trials.min(first + step as u64);
             let trial = |number| run_one(indexed, &case.protocol, seed, number);
-            results.extend(py.detach(|| {
+            results.extend(detached(py, || {
                 let numbers = numbers.into_par_iter();
-                pool.install(|| numbers.map(trial).collect::<Vec<_>>())
-            }));
+                Ok(pool.install(|| numbers.map(trial).collect::<Vec<_>>()))
+            })?);
         }
         let results = TrialResults::new(results);
         rows.push(CaseResult::new(case, &results, LEAST_TRUE_STARS));
@@ -184,8 +185,10 @@ pub fn defocus(
         ..plan
     };
     let pool = pool(threads.get())?;
-    let studies = py.detach(|| pool.install(|| plan.run(&|| ())));
-    json(&DefocusReport::new(&plan, &studies.map_err(exception)?))
+    detached(py, || {
+        let studies = pool.install(|| plan.run(&|| ())).map_err(exception)?;
+        json(&DefocusReport::new(&plan, &studies))
+    })
 }
 
 fn of_camera(

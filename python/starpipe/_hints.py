@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 
+NAME_ODDS = 100.0
+"""A star is named where the odds are at least this many to 1 that the name is right."""
+
 
 def number(value: Any, unit: str, name: str) -> float | None:
     """Return `value` in `unit`: a plain number is in it already, a Quantity is converted."""
@@ -35,6 +38,15 @@ def positive(value: Any, unit: str, name: str, below: float = np.inf) -> float |
         limit = f" and less than {below:g}" if np.isfinite(below) else ""
         kind = f"{limit} {unit}" if unit else limit
         raise ValueError(f"{name} must be more than 0{kind}, not {found:g}")
+    return found
+
+
+def within(value: Any, unit: str, name: str, least: float, most: float = np.inf) -> float | None:
+    """Return `value` in `unit`, where it is from `least` to `most`."""
+    found = number(value, unit, name)
+    if found is not None and not least <= found <= most:
+        limits = f"at least {least:g}" if most == np.inf else f"from {least:g} to {most:g}"
+        raise ValueError(f"{name} must be {limits} {unit}".rstrip() + f", not {found:g}")
     return found
 
 
@@ -122,6 +134,10 @@ def hints(
     date: Any,
     location: Any,
     exposure: Any = None,
+    scale_error: float = 0.1,
+    zenith_distance: Any = None,
+    extinction: Any = None,
+    name_odds: float = NAME_ODDS,
 ) -> dict[str, Any]:
     """Return what the compiled part takes; a header completes what is not known."""
     if fov is not None and pixel_scale is not None:
@@ -135,4 +151,8 @@ def hints(
         "date": iso_date(date),
         "site": site(location),
         "exposure_s": positive(exposure, "s", "exposure"),
+        "scale_error": positive(scale_error, "", "scale_error", 1.0),
+        "zenith_distance_deg": within(zenith_distance, "deg", "zenith_distance", 0.0, 89.999),
+        "extinction": within(extinction, "mag", "extinction", 0.0, 10.0),
+        "name_odds": within(name_odds, "", "name_odds", 1.0),
     }

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from . import _starpipe
 from ._camera import PathLike
-from ._hints import count, hints, positive
+from ._hints import NAME_ODDS, count, hints, positive
 from ._images import Image, ImageLike, mask_of
 from ._result import Result
 
@@ -77,6 +77,10 @@ class Pipeline:
         max_stars: int | None = None,
         attitude_only: bool = False,
         threads: int = 1,
+        scale_error: float = 0.1,
+        zenith_distance: Any = None,
+        extinction: Any = None,
+        name_odds: float = NAME_ODDS,
     ) -> Result:
         """Solve one frame.
 
@@ -88,8 +92,8 @@ class Pipeline:
         mask : array of bool, optional
             True where a pixel is to be left out.
         fov, pixel_scale : Quantity or float, optional
-            Horizontal field of view (degrees), or the angle of a pixel (arcseconds); they may be
-            10 % off.
+            Horizontal field of view (degrees), or the angle of a pixel (arcseconds); see
+            `scale_error`.
         near, radius : SkyCoord or (ra, dec), and Angle or float, optional
             Where the centre of the frame lies, in degrees.
         date : Time, datetime or str, optional
@@ -108,6 +112,14 @@ class Pipeline:
             Stop at the attitude: no star beyond the brightest is named.
         threads : int
             Threads for this frame.
+        scale_error : float
+            How far `fov` or `pixel_scale` may be off, as a share.
+        zenith_distance : Angle or float, optional
+            Zenith distance of the frame's centre in degrees, for the prediction of a camera.
+        extinction : Quantity or float, optional
+            Extinction in magnitudes per airmass, for the same.
+        name_odds : float
+            A star is named where the odds are at least this many to 1 that the name is right.
 
         Returns
         -------
@@ -134,6 +146,10 @@ class Pipeline:
                 date=date,
                 location=location,
                 exposure=exposure,
+                scale_error=scale_error,
+                zenith_distance=zenith_distance,
+                extinction=extinction,
+                name_odds=name_odds,
             ),
             None if dark is None else Image(dark, "dark").pixels,
             None if flat is None else Image(flat, "flat").pixels,
@@ -160,6 +176,8 @@ class Pipeline:
         date: Any = None,
         location: Any = None,
         attitude_only: bool = False,
+        scale_error: float = 0.1,
+        name_odds: float = NAME_ODDS,
     ) -> Result:
         """Identify the stars of a list of centroids.
 
@@ -173,7 +191,7 @@ class Pipeline:
             Brightness, linear or in magnitudes: one of them.
         error : array or float, optional
             Standard error on each axis, in pixels; 0.5 by default.
-        fov, pixel_scale, near, radius, date, location, attitude_only
+        fov, pixel_scale, near, radius, date, location, attitude_only, scale_error, name_odds
             As for `solve`.
 
         Returns
@@ -213,6 +231,8 @@ class Pipeline:
             radius=radius,
             date=date,
             location=location,
+            scale_error=scale_error,
+            name_odds=name_odds,
         )
         solved = self._pipeline.identify(table, (rows, width), known, bool(attitude_only))
         return Result._of(solved)

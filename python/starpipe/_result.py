@@ -95,7 +95,31 @@ class Result:
             f"<tr><th>{html.escape(name)}</th><td>{html.escape(value)}</td></tr>"
             for name, value in rows
         )
-        return f"<table>{cells}</table>"
+        return f"<div>{self._overlay()}<table>{cells}</table></div>"
+
+    def _overlay(self) -> str:
+        """Return the detections as rings on a small picture (SVG), the brightest largest."""
+        width, height = self._report["width"], self._report["height"]
+        # Sizes on the picture, which is 360 wide.
+        pixel = width / 360.0
+        stars = self._report["stars"]
+        brightest = max((star["flux"] or 0.0 for star in stars), default=1.0)
+        marks, labels = [], []
+        for star in reversed(stars[:400]):
+            share = max((star["flux"] or 0.0) / brightest, 1e-4)
+            radius = pixel * (1.5 + 5.0 * share**0.25)
+            color = "limegreen" if star["id"] else "orange"
+            place = f'cx="{star["x"]:.1f}" cy="{star["y"]:.1f}" r="{radius:.1f}"'
+            marks.append(f'<circle {place} fill="none" stroke="{color}"/>')
+        for star in [star for star in stars if star["name"]][:8]:
+            place = f'x="{star["x"] + 8 * pixel:.1f}" y="{star["y"]:.1f}"'
+            labels.append(f"<text {place}>{html.escape(star['name'])}</text>")
+        return (
+            f'<svg xmlns="http://www.w3.org/2000/svg" width="360" viewBox="0 0 {width} {height}" '
+            f'stroke-width="{pixel:.2f}"><rect width="100%" height="100%" fill="#222"/>'
+            f"{''.join(marks)}"
+            f'<g fill="gold" font-size="{9 * pixel:.1f}">{"".join(labels)}</g></svg>'
+        )
 
     @property
     def identified(self) -> bool:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from . import _starpipe, _tables
 from ._camera import PathLike, stated
-from ._hints import count, direction, iso_date, number
+from ._hints import count, direction, iso_date, number, within
 from ._result import wcs_of
 
 
@@ -118,9 +118,7 @@ def simulate(
     if dark or flat is not None:
         if ra is not None or dec is not None or (dark and flat is not None):
             raise ValueError("a frame shows the sky at ra and dec, or it is dark, or a flat field")
-        light = number(flat, "electron", "flat")
-        if light is not None and light < 0.0:
-            raise ValueError(f"flat must not be negative, not {light:g}")
+        light = within(flat, "electron", "flat", 0.0)
         subject = "dark" if light is None else light
     elif ra is None and dec is None:
         subject = "random"

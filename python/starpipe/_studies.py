@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from . import _starpipe, _tables
 from ._camera import PathLike, stated
 from ._darks import Darks
-from ._hints import count, number, positive
+from ._hints import count, positive, within
 
 
 def limit(
@@ -157,10 +157,10 @@ def robustness(
     lists = {
         "fov_deg": positive(fov, "deg", "fov", 179.0),
         "stars": positive(stars, "", "stars"),
-        "centroid_error_px": _share(centroid_error, "centroid_error", np.inf),
-        "mag_error": _share(mag_error, "mag_error", np.inf),
-        "missing": _share(missing, "missing", 1.0),
-        "false_stars": _share(false, "false", 100.0),
+        "centroid_error_px": within(centroid_error, "", "centroid_error", 0.0),
+        "mag_error": within(mag_error, "", "mag_error", 0.0),
+        "missing": within(missing, "", "missing", 0.0, 1.0),
+        "false_stars": within(false, "", "false", 0.0, 100.0),
         "scale_error": positive(scale_error, "", "scale_error", 1.0),
         "shape": tuple(count(side, "shape", 3) for side in shape),
     }
@@ -216,17 +216,10 @@ def defocus(
         None if camera is None else stated(camera, exposure, None, parameters),
         None if darks is None else darks._darks,
         [float(value) for value in np.ravel(vmag)],
-        [_share(value, "required_error", np.inf) for value in np.ravel(required_error)],
+        [float(value) for value in np.ravel(required_error)],
         None if trials is None else count(trials, "trials", 1),
         count(seed, "seed", 0),
         count(threads, "threads", 1),
     )
     found: dict[str, Any] = json.loads(report)
-    return found
-
-
-def _share(value: Any, name: str, most: float) -> float:
-    found = number(value, "", name)
-    if found is None or not 0.0 <= found <= most:
-        raise ValueError(f"{name} must be from 0 to {most:g}, not {value}")
     return found

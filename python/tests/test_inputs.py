@@ -79,3 +79,13 @@ def test_wrong_lists_are_refused(pipeline, arguments, message):
     arguments = {"flux": np.ones(len(arguments["x"])), "shape": (100, 100)} | arguments
     with pytest.raises(ValueError, match=message):
         pipeline.identify(**arguments)
+
+
+def test_what_is_odd_about_a_catalogue_goes_to_the_logger(frame, tmp_path, caplog):
+    stars = ["id,ra_deg,dec_deg,vmag", *(f"{n},{3.6 * n},{n - 50},3.0" for n in range(100))]
+    catalog = tmp_path / "stars.csv"
+    catalog.write_text("\n".join([*stars, "100,not a number,2.0,3.0"]) + "\n")
+    sp.Pipeline(catalog=catalog, cache_dir=tmp_path)
+    (record,) = caplog.records
+    assert record.name == "starpipe" and record.levelname == "WARNING"
+    assert str(catalog) in record.message

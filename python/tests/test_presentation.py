@@ -1,5 +1,7 @@
 """Results as pictures and tables."""
 
+from xml.etree import ElementTree
+
 import numpy as np
 
 
@@ -26,5 +28,8 @@ def test_arrow_has_the_same_columns(result):
 
 def test_a_card_for_notebooks(result):
     card = result._repr_html_()
-    assert card.startswith("<table>") and "named" in card
+    picture, table = ElementTree.fromstring(card)
+    circles = [mark for mark in picture if mark.tag.endswith("circle")]
+    assert len(circles) == len(result.stars) and "Deneb" in card
+    assert "160 of 162 named" in [row[1].text for row in table]
     assert "\n" not in repr(result)

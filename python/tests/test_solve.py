@@ -111,3 +111,26 @@ def test_a_camera_predicts_the_limit(frame):
     found = pipeline.solve(frame, exposure=0.2)
     assert 3.0 < found.prediction["limit50_vmag"] < 12.0
     assert repr(pipeline) == f"Pipeline(camera={str(camera)!r})"
+
+
+def test_a_scale_may_be_as_far_off_as_stated(pipeline, pixels, result):
+    assert not pipeline.solve(pixels, fov=9.0)
+    found = pipeline.solve(pixels, fov=9.0, scale_error=0.4)
+    assert found and found.quaternion == pytest.approx(result.quaternion, abs=1e-4)
+
+
+def test_surer_names_are_fewer(pipeline, pixels, result):
+    surest = pipeline.solve(pixels, name_odds=1e6)
+    assert 0 < (surest.star_columns["id"] != "").sum() < (result.star_columns["id"] != "").sum()
+    assert np.nanmax(surest.star_columns["p_chance"]) <= 1e-6
+
+
+def test_air_makes_the_predicted_limit_brighter(frame):
+    pipeline = sp.Pipeline(camera=frame.parent / "camera.toml")
+    limits = [
+        pipeline.solve(frame, exposure=0.2, zenith_distance=angle, extinction=0.5).prediction
+        for angle in (0.0, 60.0)
+    ]
+    assert limits[0]["zero_point_vmag"] == pytest.approx(
+        limits[1]["zero_point_vmag"] + 0.5, abs=0.1
+    )
