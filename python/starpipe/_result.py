@@ -103,11 +103,9 @@ class Result:
         # Sizes on the picture, which is 360 wide.
         pixel = width / 360.0
         stars = self._report["stars"]
-        brightest = max((star["flux"] or 0.0 for star in stars), default=1.0)
         marks, labels = [], []
-        for star in reversed(stars[:400]):
-            share = max((star["flux"] or 0.0) / brightest, 1e-4)
-            radius = pixel * (1.5 + 5.0 * share**0.25)
+        for rank, star in enumerate(stars[:400]):
+            radius = pixel * (2.0 + 5.0 / (1.0 + rank / 10.0))
             color = "limegreen" if star["id"] else "orange"
             place = f'cx="{star["x"]:.1f}" cy="{star["y"]:.1f}" r="{radius:.1f}"'
             marks.append(f'<circle {place} fill="none" stroke="{color}"/>')
@@ -266,7 +264,7 @@ class Result:
             ax.scatter(x, y, s=60, facecolors="none", edgecolors=color)
         for index in np.flatnonzero(is_named & (stars["name"] != ""))[:names]:
             place = stars["x_centroid"][index], stars["y_centroid"][index]
-            offset = {"xytext": (6, 6), "textcoords": "offset points"}
+            offset = {"xytext": (6, 6), "textcoords": "offset points", "clip_on": True}
             ax.annotate(str(stars["name"][index]), place, color="gold", fontsize=8, **offset)
         ax.set_xlim(-0.5, self._report["width"] - 0.5)
         ax.set_ylim(self._report["height"] - 0.5, -0.5)

@@ -33,3 +33,11 @@ def test_a_card_for_notebooks(result):
     assert len(circles) == len(result.stars) and "Deneb" in card
     assert "160 of 162 named" in [row[1].text for row in table]
     assert "\n" not in repr(result)
+
+
+def test_a_card_of_centroids(pipeline, result):
+    stars = result.star_columns
+    found = pipeline.identify(
+        stars["x_centroid"], stars["y_centroid"], flux=stars["flux"], shape=(384, 512)
+    )
+    assert found._repr_html_().count("<circle") == len(stars["x_centroid"])

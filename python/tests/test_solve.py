@@ -125,7 +125,7 @@ def test_surer_names_are_fewer(pipeline, pixels, result):
     assert np.nanmax(surest.star_columns["p_chance"]) <= 1e-6
 
 
-def test_air_makes_the_predicted_limit_brighter(frame):
+def test_air_dims_the_stars_of_a_stated_camera(frame):
     pipeline = sp.Pipeline(camera=frame.parent / "camera.toml")
     limits = [
         pipeline.solve(frame, exposure=0.2, zenith_distance=angle, extinction=0.5).prediction
