@@ -269,4 +269,5 @@ class Pipeline:
             while waiting:
                 yield waiting.popleft().result()
         finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+            # Ctrl-C does not wait for the frames in work.
+            pool.shutdown(wait=False, cancel_futures=True)
