@@ -57,7 +57,7 @@ pub fn simulate(
     let setup = stated.setup()?;
     let date = date.as_deref().map(str::parse::<ObservationDate>);
     let date = date.transpose().map_err(exception)?;
-    let simulated = detached(py, || {
+    let (mut frame, sky) = detached(py, || {
         let catalog = catalogs::read(catalog)?;
         let simulator = Simulator::new(&setup.scenario, &setup.scene, catalog.stars());
         let simulator = simulator.map_err(exception)?;
@@ -88,11 +88,8 @@ pub fn simulate(
         };
         Ok((frame, Some(sky)))
     })?;
-    let (frame, sky) = simulated;
     let shape = [frame.height, frame.width];
-    let mut frame = frame;
     let pixels = std::mem::take(frame.values_mut());
-    let conditions = &setup.scenario.conditions;
     let (truth, quaternion, wcs_header, limit_vmag) = match sky {
         Some(sky) => (
             Some(sky.truth),
@@ -110,7 +107,7 @@ pub fn simulate(
         quaternion,
         wcs_header,
         limit_vmag,
-        exposure_s: conditions.exposure_s,
+        exposure_s: setup.scenario.conditions.exposure_s,
     })
 }
 
