@@ -6,6 +6,7 @@ pub mod epoch;
 pub(crate) mod exponential;
 pub mod files;
 pub mod format;
+pub mod interrupt;
 pub(crate) mod neighbors;
 pub mod statistics;
 pub mod units;

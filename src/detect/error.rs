@@ -1,6 +1,7 @@
 //! Errors of detection.
 
 use super::config::DetectConfig;
+use crate::base::interrupt::Interrupted;
 use crate::frame::{Frame, MIN_SIDE_PX};
 
 /// Errors of [`detect`](super::detect).
@@ -25,6 +26,9 @@ pub enum DetectError {
         /// The number of pixels.
         found: usize,
     },
+    /// The work was ended early.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
     /// An option is out of range.
     #[error("{name} is {found}, expected {expected}")]
     Config {

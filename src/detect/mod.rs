@@ -83,7 +83,8 @@ use wings::measure_wings;
 ///
 /// # Errors
 /// [`DetectError::FrameTooSmall`], [`DetectError::WrongLength`] for frames of impossible size,
-/// [`DetectError::Config`] for options out of range.
+/// [`DetectError::Config`] for options out of range, [`DetectError::Interrupted`] where the workspace
+/// has an interrupt ([`Workspace::until`]).
 ///
 /// # Example
 /// ```
@@ -115,7 +116,7 @@ pub fn detect(
 /// The same as [`detect`], into `found`: for further frames of the same kind, nothing is allocated.
 ///
 /// # Errors
-/// As [`detect`]; `found` is left as it was.
+/// As [`detect`].
 pub fn detect_into(
     frame: &Frame,
     config: &DetectConfig,
@@ -124,24 +125,25 @@ pub fn detect_into(
 ) -> Result<(), DetectError> {
     error::check(frame, config)?;
     found.sources.clear();
-    let view = View::of_live_pixels(frame);
-    if view.width < MIN_SIDE_PX || view.height < MIN_SIDE_PX {
-        describe_darkness(frame, config, found);
-        return Ok(());
-    }
     let Workspace {
         background,
         search,
         measure,
+        interrupt,
     } = workspace;
-    background.measure(&view, frame.step_adu, config.cell_px);
+    let view = View::of_live_pixels(frame).until(interrupt);
+    if view.width < MIN_SIDE_PX || view.height < MIN_SIDE_PX {
+        describe_darkness(frame, config, found);
+        return Ok(());
+    }
+    background.measure(&view, frame.step_adu, config.cell_px)?;
     let input = SearchInput {
         view: &view,
         background,
         saturation_adu: config.saturation_adu(frame),
         config,
     };
-    let searched = search.run(&input);
+    let searched = search.run(&input)?;
     let (mut stars, pass) = (searched.stars, searched.pass);
     let are_more = search.found.is_full();
     let FrameSearch {
@@ -171,7 +173,7 @@ pub fn detect_into(
         threshold: pass.threshold,
         ring: Ring::around(maps.width_px()),
     };
-    measurement.run(peaks, measure, &mut found.sources);
+    measurement.run(peaks, measure, &mut found.sources)?;
     found.sources.sort_unstable_by(Detection::by_brightness);
     // The second star of a pair may be one too many.
     let are_more = are_more || found.sources.len() > config.max_detections;

@@ -18,6 +18,7 @@ use super::star_model::{
 use super::threshold::{
     Extrema, FilterWeights, FrameNoise, NoiseBuffers, gaussian_threshold, raise_filtered_noise,
 };
+use crate::base::interrupt::Interrupted;
 
 /// A guessed spot size must be right within this factor; else the frame is filtered again.
 const SPOT_GUESS_TOLERANCE: f64 = 1.15;
@@ -129,32 +130,35 @@ impl FrameSearch {
     }
 
     /// Searches the frame with a filter of the size that its own stars have.
-    pub fn run(&mut self, input: &SearchInput<'_>) -> Searched {
-        let mut spot_px = match self.measure_unfiltered(input) {
+    ///
+    /// # Errors
+    /// [`Interrupted`].
+    pub fn run(&mut self, input: &SearchInput<'_>) -> Result<Searched, Interrupted> {
+        let mut spot_px = match self.measure_unfiltered(input)? {
             StarEstimate::Settled(stars) => {
-                let pass = self.find_peaks(input, stars.spot_px);
-                return Searched { stars, pass };
+                let pass = self.find_peaks(input, stars.spot_px)?;
+                return Ok(Searched { stars, pass });
             }
             StarEstimate::Guess(spot_px) => spot_px,
         };
         let mut rounds_left = MAX_FILTER_ROUNDS;
         loop {
-            let pass = self.find_peaks(input, spot_px);
+            let pass = self.find_peaks(input, spot_px)?;
             rounds_left -= 1;
             match self.measure_filtered(input, spot_px, &pass, rounds_left == 0) {
-                StarEstimate::Settled(stars) => return Searched { stars, pass },
+                StarEstimate::Settled(stars) => return Ok(Searched { stars, pass }),
                 StarEstimate::Guess(better_px) => spot_px = better_px,
             }
         }
     }
 
     /// Measures the stars that stand out without a filter.
-    fn measure_unfiltered(&mut self, input: &SearchInput<'_>) -> StarEstimate {
+    fn measure_unfiltered(&mut self, input: &SearchInput<'_>) -> Result<StarEstimate, Interrupted> {
         let SearchInput { view, config, .. } = *input;
         let Self {
             raw_peaks, fits, ..
         } = self;
-        raw_peaks.find(view, &input.background.mesh, input.saturation_adu);
+        raw_peaks.find(view, &input.background.mesh, input.saturation_adu)?;
         let start_px = config.spot_sigma_px.unwrap_or(DEFAULT_SPOT_PX);
         let matched_gain = Kernel::for_spot(start_px).matched_gain();
         let mut maps = input.maps(None, start_px, matched_gain);
@@ -165,12 +169,12 @@ impl FrameSearch {
         }
         let is_enough =
             |size: SpotSize| size.stars >= ENOUGH_RAW_STARS && size.spot_px < SHARP_SPOT_PX;
-        if measured.is_some_and(is_enough) {
+        Ok(if measured.is_some_and(is_enough) {
             let model = star_model(&maps, stars, fits);
             StarEstimate::Settled(input.with_stated_size(model))
         } else {
             StarEstimate::Guess(maps.spot_px)
-        }
+        })
     }
 
     /// Measures the stars among the peaks of a pass with a filter for `spot_px`; the last pass
@@ -206,7 +210,7 @@ impl FrameSearch {
     }
 
     /// Filters the frame for spots of `spot_px`, sets the threshold, and finds regions and peaks.
-    fn find_peaks(&mut self, input: &SearchInput<'_>, spot_px: f64) -> Pass {
+    fn find_peaks(&mut self, input: &SearchInput<'_>, spot_px: f64) -> Result<Pass, Interrupted> {
         let SearchInput {
             view,
             background,
@@ -227,7 +231,7 @@ impl FrameSearch {
         let gaussian = config
             .threshold_sigma
             .unwrap_or_else(|| gaussian_threshold(config, size, spot_px, &kernel));
-        filtered.filter(view, mesh, &kernel, (config.cell_px, gaussian));
+        filtered.filter(view, mesh, &kernel, (config.cell_px, gaussian))?;
         let filter = FilterWeights::for_spot(spot_px, kernel.radius(), size);
         raise_filtered_noise(&background.cut_off, &mut filtered.mesh, gaussian, &filter);
         let measured = || {
@@ -241,20 +245,20 @@ impl FrameSearch {
             let noise_tail = frame_noise.tail(noise);
             let most = match noise_tail {
                 // The negative of noise that is cut off has no tail.
-                None | Some(NoiseTail::CutOff) => return (threshold, noise_tail),
+                None | Some(NoiseTail::CutOff) => return Ok((threshold, noise_tail)),
                 Some(NoiseTail::Correlated) => MAX_RAISE * threshold,
                 Some(NoiseTail::Coarse) => MAX_RAISE_OF_COARSE * threshold,
             };
             extrema.prepare(size);
             filtered.for_sampled_rows(view, mesh, &kernel, |rows, y, filtered_mesh| {
                 extrema.add_row(rows, y, filtered_mesh);
-            });
+            })?;
             let raised = extrema.raised(threshold, config.false_alarms_per_mpx, most);
-            (raised, noise_tail.filter(|_| raised > threshold))
+            Ok((raised, noise_tail.filter(|_| raised > threshold)))
         };
-        let stated = config.threshold_sigma.map(|stated| (stated, None));
-        let (threshold, noise_tail) = stated.unwrap_or_else(measured);
-        filtered.gather_missed(view, mesh, &kernel, threshold as f32);
+        let stated = config.threshold_sigma.map(|stated| Ok((stated, None)));
+        let (threshold, noise_tail) = stated.unwrap_or_else(measured)?;
+        filtered.gather_missed(view, mesh, &kernel, threshold as f32)?;
         let spot_width_px = (spot_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt();
         let search_config = SearchConfig {
             threshold: threshold as f32,
@@ -262,14 +266,15 @@ impl FrameSearch {
             saturation_adu,
             max_peaks: config.max_detections,
         };
+        view.check()?;
         found.run(&filtered.candidates, &filtered.mesh, view, &search_config);
         let mean = median(&filtered.mesh.background, sorted);
         let sigma = median(&filtered.mesh.sigma, sorted);
-        Pass {
+        Ok(Pass {
             matched_gain: kernel.matched_gain(),
             threshold,
             threshold_level: mean + threshold * sigma,
             noise_tail,
-        }
+        })
     }
 }

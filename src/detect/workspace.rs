@@ -3,6 +3,7 @@
 use super::background::FrameBackground;
 use super::measure::MeasureBuffers;
 use super::search::FrameSearch;
+use crate::base::interrupt::Interrupt;
 use std::num::NonZeroUsize;
 
 /// Buffers that are reused from frame to frame. Results do not depend on their contents.
@@ -11,6 +12,7 @@ pub struct Workspace {
     pub(crate) background: FrameBackground,
     pub(crate) search: FrameSearch,
     pub(crate) measure: MeasureBuffers,
+    pub(crate) interrupt: Interrupt,
 }
 
 impl Workspace {
@@ -20,6 +22,7 @@ impl Workspace {
             background: FrameBackground::default(),
             search: FrameSearch::default(),
             measure: MeasureBuffers::default(),
+            interrupt: Interrupt::default(),
         };
         empty.on_threads(NonZeroUsize::MIN)
     }
@@ -34,6 +37,13 @@ impl Workspace {
         self.search.set_threads(threads);
         self.measure.set_threads(threads);
         self
+    }
+
+    /// Detection ends with [`DetectError::Interrupted`](super::DetectError::Interrupted) when
+    /// `interrupt` is due.
+    #[must_use]
+    pub fn until(self, interrupt: Interrupt) -> Self {
+        Self { interrupt, ..self }
     }
 }
 

@@ -77,6 +77,8 @@ pub enum SearchFailure {
         /// log10 of the false-alarm probability of the best hypothesis, if there was one.
         best_log10_false_alarm: Option<f64>,
     },
+    /// The search was ended early ([`Workspace::until`](super::Workspace::until)).
+    Interrupted,
 }
 
 impl SearchFailure {
@@ -85,6 +87,7 @@ impl SearchFailure {
         match self {
             Self::TooFewStars { .. } => "too_few_stars",
             Self::NoMatch { .. } => "no_match",
+            Self::Interrupted => "interrupted",
         }
     }
 }

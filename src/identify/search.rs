@@ -17,6 +17,7 @@ use super::priors::{Priors, SkyRegion};
 use super::refine::{Refined, Refiner, Start};
 use super::triangle::TriangleShape;
 use crate::base::coords::Rotation;
+use crate::base::interrupt::Interrupt;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px, frame_centre};
 use crate::identify::attitude::POSE_PARAMETERS;
 use crate::sky::catalog::sky_grid::GridStar;
@@ -127,6 +128,8 @@ pub struct Buffers {
     batch: Batch,
     /// Number of hypotheses from triangles of which this star is the faintest.
     hypotheses_of: Vec<u64>,
+    /// Ends searches early.
+    pub interrupt: Interrupt,
 }
 
 /// The search over one field.
@@ -292,7 +295,7 @@ impl<'a> Search<'a> {
             let before = self.hypotheses;
             for middle in 1..faintest {
                 for brightest in 0..middle {
-                    if self.is_exhausted() {
+                    if self.is_exhausted() || self.is_interrupted() {
                         self.tried = self.tried.min(faintest);
                         return None;
                     }
@@ -306,6 +309,11 @@ impl<'a> Search<'a> {
             self.buffers.hypotheses_of[faintest] += self.hypotheses - before;
         }
         None
+    }
+
+    /// Whether the search is to end without a result.
+    pub fn is_interrupted(&self) -> bool {
+        self.buffers.interrupt.is_due()
     }
 
     fn is_exhausted(&self) -> bool {

@@ -10,6 +10,7 @@ use super::priors::Priors;
 use super::refine::{NamingStart, Refined, Start};
 use super::search::{Buffers, Found, LOG10_FALSE_ALARM_LIMIT, Search};
 use super::thinning::Thinning;
+use crate::base::interrupt::Interrupt;
 use crate::camera::DistortionModel;
 use std::f64::consts::PI;
 
@@ -80,6 +81,13 @@ impl Workspace {
         }
     }
 
+    /// Searches end with [`SearchFailure::Interrupted`] when `interrupt` is due.
+    #[must_use]
+    pub fn until(mut self, interrupt: Interrupt) -> Self {
+        self.buffers.interrupt = interrupt;
+        self
+    }
+
     /// Identifies the stars of `field`: [`point`](Self::point), then
     /// [`name_stars`](Pointing::name_stars). The answer is kept in the workspace.
     ///
@@ -146,8 +154,12 @@ impl Workspace {
             let second = search.best_log10_false_alarm();
             best_log10 = [best_log10, second].into_iter().flatten().reduce(f64::min);
         }
-        let failure = SearchFailure::NoMatch {
-            best_log10_false_alarm: best_log10,
+        let failure = if search.is_interrupted() {
+            SearchFailure::Interrupted
+        } else {
+            SearchFailure::NoMatch {
+                best_log10_false_alarm: best_log10,
+            }
         };
         Ok(Pointing {
             most_chance: 1.0 / (1.0 + *name_odds),

@@ -1,6 +1,7 @@
 //! What the stages need and what does not change from frame to frame.
 
 use crate::base::epoch::ObservationDate;
+use crate::base::interrupt::Interrupt;
 use crate::calibration::Calibration;
 use crate::detect::{self, DetectConfig};
 use crate::frame::{self, Frame};
@@ -99,6 +100,17 @@ impl Workspace {
     /// Empty buffers.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// Work on a frame ends early when `interrupt` is due: while stars are detected, with an error;
+    /// later, with the frame not identified.
+    #[must_use]
+    pub fn until(self, interrupt: &Interrupt) -> Self {
+        Self {
+            detect: self.detect.until(interrupt.clone()),
+            identify: self.identify.until(interrupt.clone()),
+            ..self
+        }
     }
 }
 

@@ -20,6 +20,7 @@ fn failure_text(failure: &SearchFailure, solution: &Solution) -> String {
         SearchFailure::NoMatch {
             best_log10_false_alarm,
         } => no_match(*best_log10_false_alarm, solution),
+        SearchFailure::Interrupted => "the search was ended before it was done".to_owned(),
     }
 }
 

@@ -5,6 +5,7 @@ use super::cells::CellMeasurer;
 use super::cut_off::CutOff;
 use super::mesh::Mesh;
 use super::mesh_config::MeshConfig;
+use crate::base::interrupt::Interrupted;
 use crate::detect::pixels::{BlockMaxima, View, largest_magnitude_in_row, lower, lowest_in_row};
 
 /// Noise below this multiple of that of rounding, about half a step, is coarse: a few isolated
@@ -50,7 +51,15 @@ impl FrameBackground {
     }
 
     /// Measures background and noise in cells of about `cell_px` pixels a side.
-    pub fn measure(&mut self, view: &View<'_>, step_adu: f32, cell_px: usize) {
+    ///
+    /// # Errors
+    /// [`Interrupted`].
+    pub fn measure(
+        &mut self,
+        view: &View<'_>,
+        step_adu: f32,
+        cell_px: usize,
+    ) -> Result<(), Interrupted> {
         let config = MeshConfig::of_pixels(cell_px, sigma_floor(view, step_adu, &mut self.row));
         self.mesh.prepare((view.width, view.height), &config);
         let grid = self.mesh.grid;
@@ -58,6 +67,9 @@ impl FrameBackground {
         let mut no_maxima = BlockMaxima::default();
         let cell_rows = CellRows::of(&mut self.mesh, &mut no_maxima, &mut self.lowest_adu);
         cell_rows.share(&mut self.workers, &|worker, cells| {
+            if view.is_interrupted() {
+                return;
+            }
             let BackgroundWorker { measurer, sampled } = worker;
             let rows = view.sampled(cells.rows, grid.row_stride(), sampled);
             // This also brings the rows from memory in one go, and not cell by cell.
@@ -66,6 +78,7 @@ impl FrameBackground {
             let output = (cells.background, cells.sigma);
             measurer.measure_row(&grid, rows, &config, output);
         });
+        view.check()?;
         let coarse_adu = COARSE * self.mesh.sigma_floor;
         let lowest_adu = self.lowest_adu();
         self.cut_off
@@ -76,6 +89,7 @@ impl FrameBackground {
         self.cut_off.apply(&mut self.mesh);
         self.median_adu = median(&self.mesh.background, &mut self.sorted);
         self.median_sigma_adu = median(&self.mesh.sigma, &mut self.sorted);
+        Ok(())
     }
 
     /// The lowest sampled pixel, in ADU.

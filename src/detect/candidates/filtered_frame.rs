@@ -4,6 +4,7 @@
 //! candidates are gathered, so the filtered frame is never in memory as a whole.
 
 use super::candidate_pixels::Candidates;
+use crate::base::interrupt::Interrupted;
 use crate::detect::background::{CellMeasurer, CellRows, Mesh, MeshConfig};
 use crate::detect::filter::{FilteredBand, Kernel};
 use crate::detect::pixels::{BlockMaxima, View};
@@ -46,13 +47,16 @@ impl FilteredFrame {
 
     /// Filters the frame, measures mean and noise in cells of about `cell_px` pixels a side, and
     /// gathers the pixels that may be above `threshold` standard deviations.
+    ///
+    /// # Errors
+    /// [`Interrupted`].
     pub fn filter(
         &mut self,
         view: &View<'_>,
         background: &Mesh,
         kernel: &Kernel,
         (cell_px, threshold): (usize, f64),
-    ) {
+    ) -> Result<(), Interrupted> {
         let Self {
             mesh,
             maxima,
@@ -69,6 +73,9 @@ impl FilteredFrame {
             worker.band.prepare(view.width, kernel);
         }
         CellRows::of(mesh, maxima, candidates).share(workers, &|worker, row| {
+            if view.is_interrupted() {
+                return;
+            }
             let FilterWorker { cells, band } = worker;
             let rows = row.rows;
             let filtered = with_neighbours(&rows, view.height);
@@ -78,24 +85,30 @@ impl FilteredFrame {
             let cut = candidate_cut(row.background, row.sigma, threshold as f32);
             row.output.gather(band, rows, cut, row.maxima);
         });
+        view.check()?;
         mesh.finish();
+        Ok(())
     }
 
     /// Gathers candidates again in the rows of cells where `threshold` is lower than the cut so
     /// far.
+    ///
+    /// # Errors
+    /// [`Interrupted`].
     pub fn gather_missed(
         &mut self,
         view: &View<'_>,
         background: &Mesh,
         kernel: &Kernel,
         threshold: f32,
-    ) {
+    ) -> Result<(), Interrupted> {
         let Some(FilterWorker { band, .. }) = self.workers.first_mut() else {
-            return;
+            return Ok(());
         };
         for (row, candidates) in self.candidates.iter_mut().enumerate() {
             let lowest = self.mesh.lowest_about_row(row, threshold);
             if !candidates.reach_down_to(lowest) {
+                view.check()?;
                 let rows = self.mesh.grid.rows_of(row);
                 let filtered = with_neighbours(&rows, view.height);
                 band.filter(view, background, kernel, filtered);
@@ -103,23 +116,28 @@ impl FilteredFrame {
                 candidates.gather(band, rows, lowest, maxima);
             }
         }
+        Ok(())
     }
 
     /// Filters rows of cells spread over the frame again, and calls `each` with every row in them
     /// that has two neighbours, with these and its number.
+    ///
+    /// # Errors
+    /// [`Interrupted`].
     pub fn for_sampled_rows(
         &mut self,
         view: &View<'_>,
         background: &Mesh,
         kernel: &Kernel,
         mut each: impl FnMut([&[f32]; 3], usize, &Mesh),
-    ) {
+    ) -> Result<(), Interrupted> {
         let Self { mesh, workers, .. } = self;
         let Some(FilterWorker { band, .. }) = workers.first_mut() else {
-            return;
+            return Ok(());
         };
         let stride = (view.width * view.height / SAMPLED_PX).max(1);
         for row in (0..mesh.grid.rows).step_by(stride) {
+            view.check()?;
             let rows = mesh.grid.rows_of(row);
             band.filter(
                 view,
@@ -135,6 +153,7 @@ impl FilteredFrame {
                 }
             }
         }
+        Ok(())
     }
 }
 

@@ -1,6 +1,7 @@
 //! Bright peaks of the unfiltered frame, on which the spot size is measured before the frame is
 //! filtered. Such stars stand out in single pixels, unless they are far out of focus.
 
+use crate::base::interrupt::Interrupted;
 use crate::detect::background::Mesh;
 use crate::detect::pixels::{BLOCK_PX, ReachedBlock, Samples, View, find_reaching};
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
@@ -74,7 +75,15 @@ impl RawPeakFinder {
     }
 
     /// Finds the peaks of `view`; those in its outermost rows and columns are left out.
-    pub fn find(&mut self, view: &View<'_>, background: &Mesh, saturation_adu: f32) {
+    ///
+    /// # Errors
+    /// [`Interrupted`].
+    pub fn find(
+        &mut self,
+        view: &View<'_>,
+        background: &Mesh,
+        saturation_adu: f32,
+    ) -> Result<(), Interrupted> {
         let Self { peaks, workers } = self;
         peaks.clear();
         let bands = view.height.div_ceil(BAND_PX);
@@ -85,9 +94,13 @@ impl RawPeakFinder {
                 let of_thread = (round..bands).step_by(rounds).skip(thread);
                 worker.found.clear();
                 for band in of_thread.step_by(threads) {
+                    if view.is_interrupted() {
+                        return;
+                    }
                     worker.find_in_band(view, background, band * BAND_PX, saturation_adu);
                 }
             });
+            view.check()?;
             for worker in workers.iter_mut() {
                 peaks.append(&mut worker.found);
             }
@@ -96,6 +109,7 @@ impl RawPeakFinder {
             }
         }
         peaks.sort_unstable_by(|a, b| b.snr.total_cmp(&a.snr).then((a.y, a.x).cmp(&(b.y, b.x))));
+        Ok(())
     }
 }
 

@@ -8,6 +8,7 @@ use super::ring::Ring;
 use super::star_shape::StarShape;
 use super::{centroid, shape};
 use crate::base::coords::PixelPoint;
+use crate::base::interrupt::Interrupted;
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::config::CentroidMethod;
 use crate::detect::detection::Detection;
@@ -64,12 +65,15 @@ pub(crate) struct Measurement<'a> {
 
 impl Measurement<'_> {
     /// Measures all peaks, which come strongest first.
+    ///
+    /// # Errors
+    /// [`Interrupted`].
     pub fn run(
         &self,
         peaks: &[Peak],
         buffers: &mut MeasureBuffers,
         detections: &mut Vec<Detection>,
-    ) {
+    ) -> Result<(), Interrupted> {
         let MeasureBuffers { workers, known } = buffers;
         known.begin(peaks, &self.maps, self.reach_px());
         let threads = workers.len();
@@ -82,19 +86,22 @@ impl Measurement<'_> {
             let indices = of_thread.map(|&index| index as usize);
             self.measure_isolated(peaks, indices, spots, worker);
         });
+        self.maps.view.check()?;
         for worker in workers.iter_mut() {
             detections.append(&mut worker.detections);
         }
         let Some(MeasureWorker { fits, .. }) = workers.first_mut() else {
-            return;
+            return Ok(());
         };
         for i in 0..known.crowded.len() {
+            self.maps.view.check()?;
             let index = known.crowded[i] as usize;
             let surroundings = known.around(index, peaks, self.touching_px());
             if let Some(spot) = self.measure(&surroundings, None, fits, detections) {
                 known.set(index, spot);
             }
         }
+        Ok(())
     }
 
     /// Measures peaks without others within reach.
@@ -115,6 +122,7 @@ impl Measurement<'_> {
         };
         // Only Gaussian spots are fitted in batches.
         let is_single = |i: &usize| peaks[*i].saturated || self.maps.psf.is_some();
+        let indices = indices.take_while(|_| !self.maps.view.is_interrupted());
         let singly = indices.clone().filter(is_single);
         let in_batches = indices.filter(|i| !is_single(i));
         for index in singly {

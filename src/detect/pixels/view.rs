@@ -1,6 +1,7 @@
 //! The part of a frame that holds light: its pixels without the dead borders.
 
 use super::samples::Samples;
+use crate::base::interrupt::{Interrupt, Interrupted};
 use crate::frame::Frame;
 use std::ops::Range;
 
@@ -17,6 +18,8 @@ pub(crate) struct View<'a> {
     pub width: usize,
     /// Rows.
     pub height: usize,
+    /// Whether anyone still waits for what is in it.
+    interrupt: Option<&'a Interrupt>,
 }
 
 impl<'a> View<'a> {
@@ -29,7 +32,26 @@ impl<'a> View<'a> {
             y0: 0,
             width,
             height,
+            interrupt: None,
         }
+    }
+
+    /// The same; work on it ends early when `interrupt` is due.
+    pub fn until(self, interrupt: &'a Interrupt) -> Self {
+        Self {
+            interrupt: Some(interrupt),
+            ..self
+        }
+    }
+
+    /// Whether work on it is to end now.
+    pub fn is_interrupted(&self) -> bool {
+        self.interrupt.is_some_and(Interrupt::is_due)
+    }
+
+    /// Ends work on it with `?`.
+    pub fn check(&self) -> Result<(), Interrupted> {
+        self.interrupt.map_or(Ok(()), Interrupt::check)
     }
 
     /// The frame without the outer rows and columns that hold a single value each, such as zero

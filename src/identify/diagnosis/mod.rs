@@ -42,6 +42,9 @@ pub struct Unidentified<'a> {
 
 /// The cause why the stars were not identified; `None` where the search's own failure says it best.
 pub fn diagnose(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diagnosis> {
+    if case.failure == SearchFailure::Interrupted {
+        return None;
+    }
     let image = case.image;
     let has_stars = matches!(case.failure, SearchFailure::NoMatch { .. });
     image
