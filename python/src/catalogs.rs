@@ -2,6 +2,7 @@
 
 use crate::errors::{exception, message, warn};
 use pyo3::prelude::*;
+use starpipe::Interrupt;
 use starpipe::identify::{IndexedCatalog, cache_directory};
 use starpipe::sky::catalog::{self, Catalog};
 use std::collections::HashMap;
@@ -15,7 +16,7 @@ static CATALOGS: Mutex<Option<HashMap<Key, &'static IndexedCatalog<'static>>>> =
 
 /// The catalogue with its index. It is kept to the end of the process: pipelines, copies and
 /// threads share it.
-pub fn open(key: Key) -> PyResult<&'static IndexedCatalog<'static>> {
+pub fn open(key: Key, interrupt: &Interrupt) -> PyResult<&'static IndexedCatalog<'static>> {
     let mut catalogs = CATALOGS.lock().unwrap_or_else(PoisonError::into_inner);
     let catalogs = catalogs.get_or_insert_default();
     if let Some(known) = catalogs.get(&key) {
@@ -37,7 +38,8 @@ pub fn open(key: Key) -> PyResult<&'static IndexedCatalog<'static>> {
         }
     };
     let directory = key.1.clone().or_else(cache_directory);
-    let indexed = IndexedCatalog::open(catalog, directory.as_deref(), &|_| ());
+    let indexed = IndexedCatalog::open_until(catalog, directory.as_deref(), &|_| (), interrupt);
+    let indexed = indexed.map_err(exception)?;
     for error in indexed.take_cache_errors() {
         warn(&format!(
             "{}; results are unaffected, but take longer",
@@ -50,9 +52,9 @@ pub fn open(key: Key) -> PyResult<&'static IndexedCatalog<'static>> {
 }
 
 /// The catalogue in a file, or the built-in one.
-pub fn read(path: Option<PathBuf>) -> PyResult<&'static Catalog> {
+pub fn read(path: Option<PathBuf>, interrupt: &Interrupt) -> PyResult<&'static Catalog> {
     match path {
         None => Ok(Catalog::built_in()),
-        path => Ok(open((path, None))?.catalog()),
+        path => Ok(open((path, None), interrupt)?.catalog()),
     }
 }

@@ -1,8 +1,9 @@
 //! Detection alone.
 
-use crate::errors::{detached, exception, json};
+use crate::errors::{exception, json};
 use crate::image::{Image, bad_pixels};
-use crate::pipeline::{detect_config, pool};
+use crate::interrupt::on_threads;
+use crate::pipeline::detect_config;
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 use serde::Serialize;
@@ -35,12 +36,11 @@ pub fn detect(
     let source = image.source()?;
     let bad = bad_pixels(mask.as_ref())?;
     let config = detect_config(sigma, max_stars);
-    detached(py, || {
+    on_threads(py, threads, |interrupt| {
         let frame = source.frame(bad, &mut Buffers::new()).map_err(exception)?;
-        let mut workspace = Workspace::new().on_threads(threads);
-        let found = pool(threads.get())?
-            .install(|| starpipe::detect(&frame, &config, &mut workspace))
-            .map_err(exception)?;
+        let workspace = Workspace::new().on_threads(threads);
+        let mut workspace = workspace.until(interrupt.clone());
+        let found = starpipe::detect(&frame, &config, &mut workspace).map_err(exception)?;
         json(&Detected {
             stars: detections(&found),
             background: found.background_adu,

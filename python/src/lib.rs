@@ -10,6 +10,7 @@ mod detect;
 mod errors;
 mod hints;
 mod image;
+mod interrupt;
 mod pipeline;
 mod simulate;
 mod solved;

@@ -2,13 +2,13 @@
 
 use crate::camera::data_sheet;
 use crate::catalogs;
-use crate::errors::{detached, exception};
+use crate::errors::exception;
 use crate::hints::Hints;
 use crate::image::{Image, Source, bad_pixels};
+use crate::interrupt::{on_this_thread, on_threads};
 use crate::solved::Solved;
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 use starpipe::calibration::Master;
 use starpipe::camera::data_sheet::DataSheet;
 use starpipe::frame::Buffers;
@@ -16,7 +16,7 @@ use starpipe::model::sensitivity::Extinction;
 use starpipe::photometry::comparison::StatedCamera;
 use starpipe::pipeline::{CentroidList, ListedCentroid, solve_centroids, solve_frame, solve_read};
 use starpipe::{
-    Calibration, Context, DetectConfig, IndexedCatalog, PixelPoint, Solution, Workspace,
+    Calibration, Context, DetectConfig, IndexedCatalog, Interrupt, PixelPoint, Solution, Workspace,
 };
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -31,12 +31,6 @@ pub struct Pipeline {
     workspaces: Mutex<Vec<Workspace>>,
 }
 
-/// Threads of one call. None outlives it: a fork after it cannot hang.
-pub fn pool(threads: usize) -> PyResult<ThreadPool> {
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map_err(exception)
-}
-
 #[pymethods]
 impl Pipeline {
     #[new]
@@ -47,10 +41,10 @@ impl Pipeline {
         camera: Option<PathBuf>,
         cache_dir: Option<PathBuf>,
     ) -> PyResult<Self> {
-        detached(py, || {
-            let all = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        let all = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+        on_threads(py, all, |interrupt| {
             Ok(Self {
-                indexed: pool(all)?.install(|| catalogs::open((catalog, cache_dir)))?,
+                indexed: catalogs::open((catalog, cache_dir), interrupt)?,
                 camera: camera.as_deref().map(data_sheet).transpose()?,
                 workspaces: Mutex::default(),
             })
@@ -78,19 +72,24 @@ impl Pipeline {
         let flat = flat.as_ref().map(Image::source).transpose()?;
         let context = self.context(&hints, attitude_only)?;
         let detect = detect_config(sigma, max_stars);
-        detached(py, || {
+        let work = |interrupt: &Interrupt| {
             let calibration = self.calibration(dark, flat)?;
             let context = Context {
                 detect,
                 calibration: calibration.as_ref(),
                 ..context
             };
-            self.with_workspace(threads, hints.name_odds, |workspace| {
-                let name = source.name();
-                let solution = solve(source, bad, &context, workspace)?;
-                Ok(self.solved(&name, solution))
-            })
-        })
+            let name = source.name();
+            let mut workspace = self.workspace(threads, hints.name_odds, interrupt);
+            let solution = solve(source, bad, &context, &mut workspace);
+            self.keep(workspace);
+            Ok(self.solved(&name, solution?))
+        };
+        if threads == NonZeroUsize::MIN {
+            on_this_thread(py, work)
+        } else {
+            on_threads(py, threads, work)
+        }
     }
 
     /// Identifies centroids: rows of x, y, magnitude and standard error in pixels (or NaN).
@@ -117,11 +116,11 @@ impl Pipeline {
                 .collect(),
         };
         let context = self.context(&hints, attitude_only)?;
-        detached(py, || {
-            self.with_workspace(NonZeroUsize::MIN, hints.name_odds, |workspace| {
-                let solution = solve_centroids(&list, &context, workspace);
-                Ok(self.solved(Path::new("centroids"), solution))
-            })
+        on_this_thread(py, |interrupt| {
+            let mut workspace = self.workspace(NonZeroUsize::MIN, hints.name_odds, interrupt);
+            let solution = solve_centroids(&list, &context, &mut workspace);
+            self.keep(workspace);
+            Ok(self.solved(Path::new("centroids"), solution))
         })
     }
 }
@@ -160,29 +159,23 @@ impl Pipeline {
         calibration.map(Some).map_err(exception)
     }
 
-    /// Works with buffers that are kept for later frames.
-    fn with_workspace<R: Send>(
-        &self,
-        threads: NonZeroUsize,
-        name_odds: f64,
-        work: impl FnOnce(&mut Workspace) -> PyResult<R> + Send,
-    ) -> PyResult<R> {
+    /// Buffers of an earlier frame where there are any.
+    fn workspace(&self, threads: NonZeroUsize, name_odds: f64, interrupt: &Interrupt) -> Workspace {
         // In a child process the lock may be held by a thread that does not exist there.
-        let mut workspace = match self.workspaces.try_lock() {
-            Ok(mut kept) => kept.pop().unwrap_or_default(),
-            Err(_) => Workspace::new(),
-        };
-        workspace.detect = workspace.detect.on_threads(threads);
-        workspace.identify = workspace.identify.with_name_odds(name_odds);
-        let result = if threads == NonZeroUsize::MIN {
-            work(&mut workspace)
-        } else {
-            pool(threads.get())?.install(|| work(&mut workspace))
-        };
+        let kept = self.workspaces.try_lock();
+        let kept = kept.ok().and_then(|mut kept| kept.pop());
+        let workspace = kept.unwrap_or_default().until(interrupt);
+        Workspace {
+            detect: workspace.detect.on_threads(threads),
+            identify: workspace.identify.with_name_odds(name_odds),
+            ..workspace
+        }
+    }
+
+    fn keep(&self, workspace: Workspace) {
         if let Ok(mut kept) = self.workspaces.try_lock() {
             kept.push(workspace);
         }
-        result
     }
 
     fn solved(&self, name: &Path, solution: Solution) -> Solved {

@@ -2,7 +2,8 @@
 
 use crate::camera::Stated;
 use crate::catalogs;
-use crate::errors::{detached, exception, json};
+use crate::errors::{exception, json};
+use crate::interrupt::on_threads;
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use starpipe::base::coords::{Camera, Icrs, Rotation};
@@ -13,6 +14,7 @@ use starpipe::model::simulate::{Pointing, Simulator, truth_table};
 use starpipe::report::wcs;
 use starpipe::study::validation::draw;
 use starpipe::{ObservationDate, UnitVector};
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 /// What a simulated frame shows.
@@ -57,8 +59,8 @@ pub fn simulate(
     let setup = stated.setup()?;
     let date = date.as_deref().map(str::parse::<ObservationDate>);
     let date = date.transpose().map_err(exception)?;
-    let (mut frame, sky) = detached(py, || {
-        let catalog = catalogs::read(catalog)?;
+    let (mut frame, sky) = on_threads(py, NonZeroUsize::MIN, |interrupt| {
+        let catalog = catalogs::read(catalog, interrupt)?;
         let simulator = Simulator::new(&setup.scenario, &setup.scene, catalog.stars());
         let simulator = simulator.map_err(exception)?;
         let (seed, drawn) = draw(seed, number);

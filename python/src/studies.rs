@@ -4,7 +4,7 @@ use crate::camera::Stated;
 use crate::catalogs;
 use crate::darks::Darks;
 use crate::errors::{detached, exception, json};
-use crate::pipeline::pool;
+use crate::interrupt::on_threads;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -13,16 +13,12 @@ use starpipe::model::defocus::{EnergyStudy, Grid, Lens, PeakStudy};
 use starpipe::model::sensitivity::PredictionRow;
 use starpipe::study::defocus::{DarkNoise, DefocusReport, Noise, Plan, StarModel, default_v_mag};
 use starpipe::study::robustness::{
-    Case, CaseResult, Mirrored, Protocol, TrialResult, TrialResults, run_one, standard_cases,
+    Case, CaseResult, Mirrored, Protocol, TrialResults, run_one, standard_cases,
 };
 use starpipe::study::validation::{self, Accumulator, FrameRecord, StarRecord, Validator};
-use starpipe::{Catalog, Workspace};
+use starpipe::{Catalog, Interrupted, Workspace};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
-
-/// Work between two looks for signals, for each thread: some tenths of a second of frames.
-const FRAMES_AT_ONCE: usize = 4;
-const TRIALS_AT_ONCE: usize = 50;
 
 /// The limiting magnitude of a camera.
 #[pyfunction]
@@ -59,33 +55,30 @@ pub fn validate(
         scale_known,
         seed,
     };
-    let pool = pool(threads.get())?;
-    let indexed = detached(py, || pool.install(|| catalogs::open((catalog, None))))?;
-    let validator = Validator::new(indexed, &protocol).map_err(exception)?;
-    let mut all = Accumulator::new(validator.facts(), validator.limit_vmag());
-    let (mut frame_rows, mut star_rows) = (Vec::new(), Vec::new());
-    let step = threads.get() * FRAMES_AT_ONCE;
-    for first in (0..frames).step_by(step) {
-        py.check_signals()?;
-        let numbers = first..frames.min(first + step as u64);
-        let solve = |workspace: &mut Workspace, number| validator.run_one(number, workspace);
-        let solved = detached(py, || {
-            pool.install(|| {
-                let solved = numbers.into_par_iter().map_init(Workspace::new, solve);
-                solved.collect::<Result<Vec<_>, _>>().map_err(exception)
-            })
-        })?;
+    on_threads(py, threads, |interrupt| {
+        let indexed = catalogs::open((catalog, None), interrupt)?;
+        let validator = Validator::new(indexed, &protocol).map_err(exception)?;
+        let mut all = Accumulator::new(validator.facts(), validator.limit_vmag());
+        let (mut frame_rows, mut star_rows) = (Vec::new(), Vec::new());
+        let solve = |workspace: &mut Workspace, number| {
+            interrupt.check().map_err(exception)?;
+            validator.run_one(number, workspace).map_err(exception)
+        };
+        let solved = (0..frames)
+            .into_par_iter()
+            .map_init(|| Workspace::new().until(interrupt), solve)
+            .collect::<PyResult<Vec<_>>>()?;
         for solved in solved {
             all.add_frame(&solved.frame);
             solved.stars.iter().for_each(|star| all.add_star(star));
             frame_rows.push(solved.frame);
             star_rows.extend(solved.stars);
         }
-    }
-    json(&Validation {
-        summary: all.finish(),
-        frames: frame_rows,
-        stars: star_rows,
+        json(&Validation {
+            summary: all.finish(),
+            frames: frame_rows,
+            stars: star_rows,
+        })
     })
 }
 
@@ -137,25 +130,23 @@ pub fn robustness(
             protocol: base,
         }],
     };
-    let pool = pool(threads.get())?;
-    let indexed = detached(py, || pool.install(|| catalogs::open((catalog, None))))?;
-    let step = threads.get() * TRIALS_AT_ONCE;
-    let mut rows = Vec::new();
-    for case in &cases {
-        let mut results: Vec<TrialResult> = Vec::new();
-        for first in (0..trials).step_by(step) {
-            py.check_signals()?;
-            let numbers = first..trials.min(first + step as u64);
-            let trial = |number| run_one(indexed, &case.protocol, seed, number);
-            results.extend(detached(py, || {
-                let numbers = numbers.into_par_iter();
-                Ok(pool.install(|| numbers.map(trial).collect::<Vec<_>>()))
-            })?);
+    on_threads(py, threads, |interrupt| {
+        let indexed = catalogs::open((catalog, None), interrupt)?;
+        let mut rows = Vec::new();
+        for case in &cases {
+            let trial = |number| {
+                interrupt.check()?;
+                Ok(run_one(indexed, &case.protocol, seed, number))
+            };
+            let results = (0..trials).into_par_iter().map(trial);
+            let results = results
+                .collect::<Result<Vec<_>, Interrupted>>()
+                .map_err(exception)?;
+            let results = TrialResults::new(results);
+            rows.push(CaseResult::new(case, &results, LEAST_TRUE_STARS));
         }
-        let results = TrialResults::new(results);
-        rows.push(CaseResult::new(case, &results, LEAST_TRUE_STARS));
-    }
-    json(&rows)
+        json(&rows)
+    })
 }
 
 /// The error of centroids over the radius of the spot: of a camera, or of the paper's experiment.
@@ -184,9 +175,8 @@ pub fn defocus(
         seed,
         ..plan
     };
-    let pool = pool(threads.get())?;
-    detached(py, || {
-        let studies = pool.install(|| plan.run(&|| ())).map_err(exception)?;
+    on_threads(py, threads, |interrupt| {
+        let studies = plan.run(&|| interrupt.check()).map_err(exception)?;
         json(&DefocusReport::new(&plan, &studies))
     })
 }

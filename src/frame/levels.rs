@@ -4,6 +4,7 @@ use super::error::FrameError;
 use super::image::{Frame, check_length, check_size};
 use super::pixels::Pixels;
 use multiversion::multiversion;
+use std::ops::BitOr;
 
 /// Weights of red, green and blue in luminance: ITU-R BT.601, as in JPEG.
 pub const LUMINANCE_WEIGHTS: [f32; 3] = [0.299, 0.587, 0.114];
@@ -11,6 +12,11 @@ pub const LUMINANCE_WEIGHTS: [f32; 3] = [0.299, 0.587, 0.114];
 /// Largest step between grey levels that is recognized in files that store few bits in wide words:
 /// 2¹².
 const MAX_STEP: i64 = 1 << 12;
+
+/// A sample that is a whole number.
+pub trait WholeNumber: Copy + Default + PartialEq + BitOr<Output = Self> + Into<i64> {}
+
+impl<T: Copy + Default + PartialEq + BitOr<Output = Self> + Into<i64>> WholeNumber for T {}
 
 /// Decoded samples of one frame.
 pub(super) struct Samples<'a, T> {
@@ -49,7 +55,7 @@ impl<'p> Frame<'p> {
     ///
     /// # Errors
     /// As [`Frame::new`].
-    pub fn from_integers<T: Copy + Into<i64>>(
+    pub fn from_integers<T: WholeNumber>(
         width: usize,
         height: usize,
         values: &[T],
@@ -66,7 +72,7 @@ impl<'p> Frame<'p> {
 }
 
 /// Makes a frame from integer samples; `full_scale` is the largest value of the format, in ADU.
-pub(super) fn frame_from_integers<T: Copy + Into<i64>>(
+pub(super) fn frame_from_integers<T: WholeNumber>(
     samples: &Samples<'_, T>,
     full_scale: T,
 ) -> Result<Frame<'static>, FrameError> {
@@ -191,21 +197,26 @@ fn luminance(rgb: [f32; 3], full: f32) -> f32 {
 
 /// The largest power of two that divides all levels below full scale: 16 if twelve bits are stored
 /// in the upper part of sixteen.
-pub(super) fn level_step<T: Copy + Into<i64>>(samples: &[T], full_scale: T) -> i64 {
+pub(super) fn level_step<T: WholeNumber>(samples: &[T], full_scale: T) -> i64 {
     /// Values between two checks for an early exit; a check at each would prevent vectorization.
-    const CHUNK: usize = 1024;
-    let full_scale = full_scale.into();
-    let mut bits = MAX_STEP;
+    const CHUNK: usize = 4096;
+    let below = |level: T| {
+        if level == full_scale {
+            T::default()
+        } else {
+            level
+        }
+    };
+    let mut bits = 0;
     for chunk in samples.chunks(CHUNK) {
-        let levels = chunk.iter().map(|&level| level.into());
-        bits |= levels.fold(0, |bits, value| {
-            bits | if value == full_scale { 0 } else { value }
-        });
+        // In samples as wide as they are, the most of them go through a register at once.
+        let union = chunk.iter().fold(T::default(), |bits, &level| bits | below(level));
+        bits |= union.into();
         if bits & 1 == 1 {
             return 1;
         }
     }
-    step_of(bits, full_scale)
+    step_of(bits, full_scale.into())
 }
 
 /// The step between levels in which only `bits` occur.

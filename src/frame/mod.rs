@@ -49,7 +49,7 @@ pub use fits::{FitsHeader, FitsSamples, FitsWriteError, write_fits};
 pub use format::FrameFormat;
 pub use image::Frame;
 pub(crate) use image::check_size;
-pub use levels::LUMINANCE_WEIGHTS;
+pub use levels::{LUMINANCE_WEIGHTS, WholeNumber};
 pub use limits::{MAX_PIXELS, MIN_SIDE_PX};
 pub use metadata::{FrameMetadata, IgnoredValue};
 pub use pixels::Pixels;

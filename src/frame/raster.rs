@@ -4,7 +4,7 @@ use super::error::FrameError;
 use super::exif;
 use super::format::FrameFormat;
 use super::image::{Frame, check_size};
-use super::levels::{Samples, frame_from_integers};
+use super::levels::{Samples, WholeNumber, frame_from_integers};
 use super::limits::MAX_PIXELS;
 use image::codecs::bmp::BmpDecoder;
 use image::codecs::jpeg::JpegDecoder;
@@ -193,7 +193,7 @@ impl Decoded {
         pairs.map(|p| u16::from_ne_bytes([p[0], p[1]])).collect()
     }
 
-    fn integers<T: Copy + PartialEq + Into<i64>>(
+    fn integers<T: WholeNumber>(
         &self,
         values: &[T],
         full_scale: T,

@@ -8,7 +8,7 @@ use super::exif;
 use super::format::FrameFormat;
 use super::image::{Frame, check_size};
 use super::levels::{
-    Samples, frame_from_floats, frame_from_integers, frame_from_words, interleaved,
+    Samples, WholeNumber, frame_from_floats, frame_from_integers, frame_from_words, interleaved,
 };
 use super::limits::MAX_PIXELS;
 use std::io::Cursor;
@@ -174,7 +174,7 @@ impl Layout {
         }
     }
 
-    fn integers<T: Copy + Into<i64>>(
+    fn integers<T: WholeNumber>(
         &self,
         values: Vec<T>,
         full_scale: T,

@@ -10,6 +10,7 @@
 use super::cache::{CacheError, IndexFile};
 use super::listing::{ListedStar, class_limits_rad, list_class};
 use super::table::{SizeClass, Triangle};
+use crate::base::interrupt::{Interrupt, Interrupted};
 use crate::sky::catalog::Star;
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
@@ -27,15 +28,22 @@ pub struct TriangleIndex {
 
 impl TriangleIndex {
     /// Lists the triangles of `stars`, brightest first; calls `progress` with the share done.
-    pub fn build(stars: &[Star], progress: &(dyn Fn(f64) + Sync)) -> Self {
+    ///
+    /// # Errors
+    /// [`Interrupted`] when `interrupt` is due.
+    pub fn build(
+        stars: &[Star],
+        progress: &(dyn Fn(f64) + Sync),
+        interrupt: &Interrupt,
+    ) -> Result<Self, Interrupted> {
         let limits = class_limits_rad(stars.len());
         let stars = ListedStar::all(stars);
         let mut classes = Vec::with_capacity(limits.len());
         for limits_rad in &limits {
-            classes.push(list_class(&stars, *limits_rad));
+            classes.push(list_class(&stars, *limits_rad, interrupt)?);
             progress(classes.len() as f64 / limits.len() as f64);
         }
-        Self::new(classes, None)
+        Ok(Self::new(classes, None))
     }
 
     /// The index of `classes`; chunks that are not in memory are read from `file`.
@@ -93,7 +101,9 @@ impl TriangleIndex {
     fn list_again(&self, stars: &[Star], class: usize, chunk: usize) -> Box<[Triangle]> {
         let relisted = self.relisted[class].get_or_init(|| {
             let limits_rad = class_limits_rad(stars.len());
-            list_class(&ListedStar::all(stars), limits_rad[class])
+            let stars = ListedStar::all(stars);
+            list_class(&stars, limits_rad[class], &Interrupt::default())
+                .expect("nothing interrupts it")
         });
         relisted.chunks[chunk].get().cloned().unwrap_or_default()
     }
@@ -126,7 +136,7 @@ mod tests {
     #[test]
     fn a_search_finds_what_going_through_all_triangles_finds() {
         let stars = &Catalog::built_in().stars()[..3000];
-        let index = TriangleIndex::build(stars, &|_| ());
+        let index = TriangleIndex::build(stars, &|_| (), &Interrupt::default()).unwrap();
         let mut compared = 0;
         for (number, class) in index.classes.iter().enumerate() {
             for (wanted, tolerance) in [
@@ -164,7 +174,7 @@ mod tests {
     #[test]
     fn the_brightest_stars_of_a_field_make_listed_triangles() {
         let stars = &Catalog::built_in().stars()[..9000];
-        let index = TriangleIndex::build(stars, &|_| ());
+        let index = TriangleIndex::build(stars, &|_| (), &Interrupt::default()).unwrap();
         let listed = index.classes.iter().flat_map(listed);
         let listed: HashSet<[u32; 3]> = listed.map(|triangle| sorted(triangle.corners)).collect();
         for (ra_rad, dec_rad) in [(0.3, 0.2), (2.0, -1.2), (4.0, 1.5), (5.5, -0.5)] {
@@ -185,7 +195,7 @@ mod tests {
     #[test]
     fn a_class_of_which_a_chunk_is_damaged_is_listed_again() {
         let stars = &Catalog::built_in().stars()[..100];
-        let built = TriangleIndex::build(stars, &|_| ());
+        let built = TriangleIndex::build(stars, &|_| (), &Interrupt::default()).unwrap();
         let directory = tempfile::tempdir().unwrap();
         let path = cache::index_path(directory.path(), 7);
         cache::store(&path, 7, &built.classes).unwrap();

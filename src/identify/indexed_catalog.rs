@@ -3,6 +3,7 @@
 use super::cache::{self, CacheError};
 use super::cache_directory::cache_directory;
 use super::index::TriangleIndex;
+use crate::base::interrupt::{Interrupt, Interrupted};
 use crate::base::units::RAD_PER_DEG;
 use crate::sky::catalog::face_grid::FaceGrid;
 use crate::sky::catalog::sky_grid::SkyGrid;
@@ -56,8 +57,26 @@ impl<'a> IndexedCatalog<'a> {
         cache_directory: Option<&Path>,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Self {
+        Self::open_until(catalog, cache_directory, progress, &Interrupt::default())
+            .expect("nothing interrupts it")
+    }
+
+    /// As [`open`](Self::open); ends early when `interrupt` is due, and then stores nothing.
+    ///
+    /// # Errors
+    /// [`Interrupted`].
+    pub fn open_until(
+        catalog: &'a Catalog,
+        cache_directory: Option<&Path>,
+        progress: &(dyn Fn(f64) + Sync),
+        interrupt: &Interrupt,
+    ) -> Result<Self, Interrupted> {
+        let build = || {
+            let triangles = TriangleIndex::build(catalog.stars(), progress, interrupt)?;
+            Ok(Self::with_index(catalog, triangles))
+        };
         let Some(directory) = cache_directory else {
-            return Self::build(catalog, progress);
+            return build();
         };
         let checksum = catalog.checksum();
         let path = cache::index_path(directory, checksum);
@@ -68,18 +87,18 @@ impl<'a> IndexedCatalog<'a> {
             }
             not_loaded => {
                 errors.extend(not_loaded.err());
-                let built = Self::build(catalog, progress);
+                let built = build()?;
                 errors.extend(cache::store(&path, checksum, &built.triangles.classes).err());
                 built
             }
         };
         indexed.triangles.cache_errors().extend(errors);
-        indexed
+        Ok(indexed)
     }
 
     /// Builds the index of `catalog` without a cache; calls `progress` with the share done.
     pub fn build(catalog: &'a Catalog, progress: &(dyn Fn(f64) + Sync)) -> Self {
-        Self::with_index(catalog, TriangleIndex::build(catalog.stars(), progress))
+        Self::open(catalog, None, progress)
     }
 
     fn with_index(catalog: &'a Catalog, triangles: TriangleIndex) -> Self {

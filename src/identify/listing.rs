@@ -12,6 +12,7 @@
 use super::cells::{SkyCells, Zone};
 use super::table::{SizeClass, Triangle};
 use super::triangle::TriangleShape;
+use crate::base::interrupt::{Interrupt, Interrupted};
 use crate::base::units::RAD_PER_DEG;
 use crate::sky::catalog::Star;
 use crate::sky::catalog::sky_grid::chord_of;
@@ -80,14 +81,25 @@ pub fn class_limits_rad(stars: usize) -> Vec<(f64, f64)> {
 
 /// Lists the class whose longest sides are within `limits_rad`. `stars` are all stars of
 /// the catalog, brightest first.
-pub fn list_class(stars: &[ListedStar], limits_rad: (f64, f64)) -> SizeClass {
+///
+/// # Errors
+/// [`Interrupted`] when `interrupt` is due.
+pub fn list_class(
+    stars: &[ListedStar],
+    limits_rad: (f64, f64),
+    interrupt: &Interrupt,
+) -> Result<SizeClass, Interrupted> {
     let (class, cells) = Class::new(stars, limits_rad);
-    let triangles: Vec<Vec<Triangle>> = stars_by_zone(stars, &cells)
+    let triangles = stars_by_zone(stars, &cells)
         .into_par_iter()
         .enumerate()
-        .map(|(zone, near)| class.triangles_of(&cells.zone(zone), &near))
-        .collect();
-    SizeClass::new((class.low, class.high), &triangles.concat())
+        .map(|(zone, near)| {
+            interrupt.check()?;
+            Ok(class.triangles_of(&cells.zone(zone), &near))
+        })
+        .collect::<Result<Vec<_>, Interrupted>>()?;
+    let limits = (class.low, class.high);
+    Ok(SizeClass::new(limits, &triangles.concat()))
 }
 
 fn stars_per_cell(low_rad: f64) -> usize {

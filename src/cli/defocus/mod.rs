@@ -46,7 +46,12 @@ fn run(plan: &Plan, pool: &rayon::ThreadPool) -> anyhow::Result<Vec<StarStudy>> 
         plan.point_count() as u64,
         "radii and noises {wide_bar} {pos}/{len} {eta}",
     );
-    let studies = pool.install(|| plan.run(&|| progress.inc(1)));
+    let studies = pool.install(|| {
+        plan.run(&|| {
+            progress.inc(1);
+            Ok(())
+        })
+    });
     progress.finish_and_clear();
     Ok(studies?)
 }

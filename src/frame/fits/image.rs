@@ -2,7 +2,7 @@
 
 use super::error::{truncated, unsupported};
 use super::unit::{StoredType, Unit};
-use crate::frame::levels::{Samples, frame_from_floats, frame_from_integers, interleaved};
+use crate::frame::levels::{Samples, WholeNumber, frame_from_floats, frame_from_integers, interleaved};
 use crate::frame::{Frame, FrameError, check_size};
 
 /// Location and scaling of one image in a file.
@@ -99,7 +99,7 @@ impl Image {
     }
 
     /// Decodes unscaled integers; `full_scale` is the largest value of the type.
-    fn integers<const N: usize, T: Copy + PartialEq + Into<i64>>(
+    fn integers<const N: usize, T: WholeNumber>(
         &self,
         data: &[u8],
         level: impl Fn([u8; N]) -> T,

@@ -1,5 +1,6 @@
 //! Why a defocus study has no result.
 
+use crate::base::interrupt::Interrupted;
 use crate::frame::FrameError;
 use crate::model::sensitivity::ScenarioError;
 
@@ -16,6 +17,9 @@ pub enum DefocusError {
     /// A frame could not be simulated.
     #[error(transparent)]
     Simulate(#[from] FrameError),
+    /// The study was ended early.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
     /// The star is too faint.
     #[error(
         "a star of V {v_mag} is found too seldom at these radii to measure it: half of the stars are found at V {limit_vmag:.2} at best"

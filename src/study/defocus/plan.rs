@@ -3,6 +3,7 @@
 use super::error::DefocusError;
 use super::noise::Noise;
 use super::star::{RadiusPoint, StarModel, StarStudy};
+use crate::base::interrupt::Interrupted;
 use crate::model::defocus::{
     ErrorCurve, ErrorGrid, Expected, Grid, IsoLine, Lens, PeakStudy, SpotInWindow, Surface,
 };
@@ -35,11 +36,15 @@ impl Plan {
         self.stars.len() * self.grid.spots_px.len() * (self.grid.noises.len() + 1)
     }
 
-    /// Studies all stars on the threads of the current pool; `done` is called after each point.
+    /// Studies all stars on the threads of the current pool; `done` is called after each point,
+    /// and may end the study.
     ///
     /// # Errors
-    /// [`DefocusError::TooFaint`], [`DefocusError::Simulate`].
-    pub fn run(&self, done: &(impl Fn() + Sync)) -> Result<Vec<StarStudy>, DefocusError> {
+    /// [`DefocusError::TooFaint`], [`DefocusError::Simulate`], [`DefocusError::Interrupted`].
+    pub fn run(
+        &self,
+        done: &(impl Fn() -> Result<(), Interrupted> + Sync),
+    ) -> Result<Vec<StarStudy>, DefocusError> {
         let stars = self.stars.iter();
         stars.map(|star| self.study(star, done)).collect()
     }
@@ -47,7 +52,7 @@ impl Plan {
     fn study(
         &self,
         star: &StarModel,
-        done: &(impl Fn() + Sync),
+        done: &(impl Fn() -> Result<(), Interrupted> + Sync),
     ) -> Result<StarStudy, DefocusError> {
         let points = self.points(star, done)?;
         let curve = ErrorCurve::through(points.iter().map(|at| (at.spot_px, &at.point)))
@@ -79,7 +84,7 @@ impl Plan {
     fn points(
         &self,
         star: &StarModel,
-        done: &(impl Fn() + Sync),
+        done: &(impl Fn() -> Result<(), Interrupted> + Sync),
     ) -> Result<Vec<RadiusPoint>, DefocusError> {
         let noise = self.noise.value();
         let grid = Grid {

@@ -1,13 +1,12 @@
 //! What is measured of one star.
 
 use super::error::DefocusError;
-use crate::frame::FrameError;
+use crate::base::interrupt::Interrupted;
 use crate::model::defocus::{
     EnergyStudy, ErrorCurve, ErrorGrid, ErrorPoint, Expected, Grid, IsoLine, PeakStudy, Reach,
     Surface, SurfaceError,
 };
 use crate::model::sensitivity::{Budget, Detector, Rule, Scenario};
-use std::convert::Infallible;
 
 /// A star and how its centroid is measured.
 #[derive(Debug, Clone)]
@@ -41,20 +40,18 @@ impl StarModel {
         &self,
         grid: Grid,
         seed: u64,
-        done: impl Fn() + Sync,
-    ) -> Result<ErrorGrid, FrameError> {
+        done: impl Fn() -> Result<(), Interrupted> + Sync,
+    ) -> Result<ErrorGrid, DefocusError> {
         match self {
             Self::Peak(study) => {
-                let measure = |spot: f64, noise: f64, random: &mut _| {
-                    Ok::<_, Infallible>(study.measure(spot, noise, random))
-                };
-                Ok(ErrorGrid::measure(grid, seed, measure, done)
-                    .unwrap_or_else(|never| match never {}))
+                let measure =
+                    |spot: f64, noise: f64, random: &mut _| Ok(study.measure(spot, noise, random));
+                Ok(ErrorGrid::measure(grid, seed, measure, done)?)
             }
             Self::Energy(study) => {
                 let measure =
-                    |spot: f64, noise: f64, random: &mut _| study.measure(spot, noise, random);
-                ErrorGrid::measure(grid, seed, measure, done)
+                    |spot: f64, noise: f64, random: &mut _| Ok(study.measure(spot, noise, random)?);
+                ErrorGrid::measure(grid, seed, measure, || Ok(done()?))
             }
         }
     }
