@@ -9,6 +9,7 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use starpipe::Interrupt;
 use starpipe::camera::data_sheet::Preset;
 use starpipe::model::defocus::{Centroiding, EnergyStudy, PeakStudy};
 use starpipe::model::sensitivity::Scenario;
@@ -34,7 +35,11 @@ fn points(criterion: &mut Criterion) {
     };
     group.throughput(Throughput::Elements(energy.trials as u64));
     group.bench_function("energy", |b| {
-        b.iter(|| energy.measure(black_box(1.0), 5.0, &mut random).unwrap());
+        b.iter(|| {
+            energy
+                .measure(black_box(1.0), 5.0, &mut random, &Interrupt::default())
+                .unwrap()
+        });
     });
     group.finish();
 }

@@ -11,7 +11,9 @@ use serde::Serialize;
 use starpipe::identify::Photometry;
 use starpipe::model::defocus::{EnergyStudy, Grid, Lens, PeakStudy};
 use starpipe::model::sensitivity::PredictionRow;
-use starpipe::study::defocus::{DarkNoise, DefocusReport, Noise, Plan, StarModel, default_v_mag};
+use starpipe::study::defocus::{
+    Caller, DarkNoise, DefocusReport, Noise, Plan, StarModel, default_v_mag,
+};
 use starpipe::study::robustness::{
     Case, CaseResult, Mirrored, Protocol, TrialResults, run_one, standard_cases,
 };
@@ -176,7 +178,11 @@ pub fn defocus(
         ..plan
     };
     on_threads(py, threads, |interrupt| {
-        let studies = plan.run(&|| interrupt.check()).map_err(exception)?;
+        let caller = Caller {
+            done: &|| (),
+            interrupt,
+        };
+        let studies = plan.run(&caller).map_err(exception)?;
         json(&DefocusReport::new(&plan, &studies))
     })
 }

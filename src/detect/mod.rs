@@ -155,6 +155,7 @@ pub fn detect_into(
     let mut maps = input.maps(Some(&filtered.mesh), stars.spot_px, pass.matched_gain);
     let shape = StarShape::measure(&maps, peaks);
     shape.merge_peaks(peaks, regions);
+    view.check()?;
     let psf = if stars.is_departure {
         measure_psf(&maps, peaks, &mut stars, fits)
     } else {

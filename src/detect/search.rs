@@ -267,7 +267,7 @@ impl FrameSearch {
             max_peaks: config.max_detections,
         };
         view.check()?;
-        found.run(&filtered.candidates, &filtered.mesh, view, &search_config);
+        found.run(&filtered.candidates, &filtered.mesh, view, &search_config)?;
         let mean = median(&filtered.mesh.background, sorted);
         let sigma = median(&filtered.mesh.sigma, sorted);
         Ok(Pass {

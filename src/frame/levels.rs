@@ -210,7 +210,9 @@ pub(super) fn level_step<T: WholeNumber>(samples: &[T], full_scale: T) -> i64 {
     let mut bits = 0;
     for chunk in samples.chunks(CHUNK) {
         // In samples as wide as they are, the most of them go through a register at once.
-        let union = chunk.iter().fold(T::default(), |bits, &level| bits | below(level));
+        let union = chunk
+            .iter()
+            .fold(T::default(), |bits, &level| bits | below(level));
         bits |= union.into();
         if bits & 1 == 1 {
             return 1;

@@ -13,8 +13,9 @@ use super::output::files::write_into;
 use super::output::messages::report_warning;
 use super::output::rows::{csv_table, json_indented, json_line};
 use super::progress::bar;
+use starpipe::Interrupt;
 use starpipe::model::defocus::Lens;
-use starpipe::study::defocus::{DefocusReport, GridRow, Plan, StarStudy};
+use starpipe::study::defocus::{Caller, DefocusReport, GridRow, Plan, StarStudy};
 use std::path::Path;
 
 /// `starpipe defocus`
@@ -46,12 +47,11 @@ fn run(plan: &Plan, pool: &rayon::ThreadPool) -> anyhow::Result<Vec<StarStudy>> 
         plan.point_count() as u64,
         "radii and noises {wide_bar} {pos}/{len} {eta}",
     );
-    let studies = pool.install(|| {
-        plan.run(&|| {
-            progress.inc(1);
-            Ok(())
-        })
-    });
+    let caller = Caller {
+        done: &|| progress.inc(1),
+        interrupt: &Interrupt::default(),
+    };
+    let studies = pool.install(|| plan.run(&caller));
     progress.finish_and_clear();
     Ok(studies?)
 }

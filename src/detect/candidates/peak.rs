@@ -50,3 +50,9 @@ pub(super) fn is_saturated(frame: &View<'_>, x: usize, y: usize, saturation_adu:
         columns.any(|column| frame.at(column, row) >= saturation_adu)
     })
 }
+
+/// Sorts by height in ascending order of this key, highest first; of equal heights, which are
+/// positive, the lower `index` comes first.
+pub(super) fn highest_first(snr: f32, index: usize) -> u64 {
+    u64::from(!snr.to_bits()) << 32 | index as u64
+}

@@ -8,11 +8,18 @@
 
 use super::disjoint_sets::{self, join, root_of};
 use super::labelling::Labelling;
-use super::peak::Peak;
+use super::peak::{Peak, highest_first};
+use crate::base::interrupt::Interrupted;
+use crate::detect::pixels::View;
+
+/// Pixels between two looks for an interrupt: some milliseconds.
+const PIXELS_AT_ONCE: usize = 1 << 16;
 
 /// Buffers of the flooding.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Flooding {
+    /// Heights of the pixels of one region, inverted, and their indices: highest first when sorted.
+    by_height: Vec<u64>,
     /// Indices of the pixels of one region, highest first.
     members: Vec<u32>,
     /// Disjoint sets of the members' ranks: one for each flood.
@@ -24,22 +31,29 @@ pub(super) struct Flooding {
 impl Flooding {
     /// Sets the prominences of a region's peaks; `peak_pixels` holds the pixel of each of all
     /// peaks, in ascending order, and its run.
+    ///
+    /// # Errors
+    /// [`Interrupted`] of work on `view`.
     pub fn set_prominences(
         &mut self,
-        region: usize,
+        (region, view): (usize, &View<'_>),
         labelling: &Labelling,
         peak_pixels: &[[u32; 2]],
         peaks: &mut [Peak],
-    ) {
+    ) -> Result<(), Interrupted> {
         self.sort_members(region, labelling);
         let Self {
             members,
             floods,
             ranks,
+            ..
         } = self;
         // The root of a flood is its highest pixel, since the lowest rank represents a set.
         disjoint_sets::reset(floods, members.len());
         for (r, &index) in members.iter().enumerate() {
+            if r % PIXELS_AT_ONCE == 0 {
+                view.check()?;
+            }
             let snr = labelling.pixels[index as usize].snr;
             for other in labelling.neighbours(index as usize) {
                 let other = ranks[other];
@@ -57,18 +71,24 @@ impl Flooding {
                 }
             }
         }
+        Ok(())
     }
 
     /// Sorts the pixels of a region by height, and ranks them.
     fn sort_members(&mut self, region: usize, labelling: &Labelling) {
-        let Self { members, ranks, .. } = self;
+        let Self {
+            by_height,
+            members,
+            ranks,
+            ..
+        } = self;
         let pixels = &labelling.pixels;
+        by_height.clear();
+        let indices = labelling.pixels_of_region(region);
+        by_height.extend(indices.map(|i| highest_first(pixels[i].snr, i)));
+        by_height.sort_unstable();
         members.clear();
-        members.extend(labelling.pixels_of_region(region).map(|i| i as u32));
-        members.sort_unstable_by(|&a, &b| {
-            let height = |index: u32| pixels[index as usize].snr;
-            height(b).total_cmp(&height(a)).then(a.cmp(&b))
-        });
+        members.extend(by_height.iter().map(|&key| key as u32));
         ranks.resize(pixels.len().max(ranks.len()), 0);
         for (rank, &index) in members.iter().enumerate() {
             ranks[index as usize] = rank as u32;

@@ -17,6 +17,7 @@ use super::region::Region;
 use super::search_config::SearchConfig;
 use super::selection::Selection;
 use super::streaks::Streaks;
+use crate::base::interrupt::Interrupted;
 use crate::detect::background::Mesh;
 use crate::detect::pixels::View;
 
@@ -42,21 +43,25 @@ pub(crate) struct PeakSearch {
 impl PeakSearch {
     /// Finds regions and peaks in the candidates of all rows of cells of the filtered frame, whose
     /// mean and noise are in `mesh`.
+    ///
+    /// # Errors
+    /// [`Interrupted`].
     pub fn run(
         &mut self,
         candidates: &[Candidates],
         mesh: &Mesh,
         frame: &View<'_>,
         config: &SearchConfig,
-    ) {
+    ) -> Result<(), Interrupted> {
         self.collect(candidates, mesh, frame, config);
+        frame.check()?;
         self.labelling.connect(frame.height);
         self.labelling.measure_regions(&mut self.regions);
         for (peak, &[_, run]) in self.peaks.iter_mut().zip(&self.peak_pixels) {
             peak.region = self.labelling.region_of_run(run);
         }
         self.count_peaks();
-        self.set_prominences();
+        self.set_prominences(frame)?;
         self.selection.apply(&mut self.peaks, config);
         self.count_peaks();
         self.streaks
@@ -64,6 +69,7 @@ impl PeakSearch {
         self.count_peaks();
         self.streaks
             .join_dashes(&mut self.peaks, &mut self.regions, config.spot_width_px);
+        frame.check()
     }
 
     /// Collects the pixels above the threshold, and the peaks among them.
@@ -109,17 +115,17 @@ impl PeakSearch {
     /// Sets the prominences where a region has several peaks; a single peak keeps its height, and
     /// so does the highest: on a plateau, the highest pixel in units of the local noise may be
     /// next to it.
-    fn set_prominences(&mut self) {
+    fn set_prominences(&mut self, frame: &View<'_>) -> Result<(), Interrupted> {
         self.highest.clear();
         self.highest.resize(self.regions.len(), None);
         for region in 0..self.regions.len() {
             if self.regions[region].peaks >= 2 {
                 self.flooding.set_prominences(
-                    region,
+                    (region, frame),
                     &self.labelling,
                     &self.peak_pixels,
                     &mut self.peaks,
-                );
+                )?;
             }
         }
         for (index, peak) in self.peaks.iter().enumerate() {
@@ -131,6 +137,7 @@ impl PeakSearch {
         for &index in self.highest.iter().flatten() {
             self.peaks[index].prominence = self.peaks[index].snr;
         }
+        Ok(())
     }
 
     fn count_peaks(&mut self) {

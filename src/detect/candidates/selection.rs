@@ -1,6 +1,6 @@
 //! Keeps the peaks that neither noise on a flank nor the wing of a brighter star explains.
 
-use super::peak::Peak;
+use super::peak::{Peak, highest_first};
 use super::search_config::SearchConfig;
 
 /// Minimum prominence of a peak that is not the highest of its region.
@@ -52,10 +52,10 @@ impl Selection {
     /// Keeps the well-founded peaks, at most `config.max_peaks`; sorts them, highest first.
     pub fn apply(&mut self, peaks: &mut Vec<Peak>, config: &SearchConfig) {
         // Of equal peaks the first in reading order comes first, by its lower index.
-        let keys = (0u64..).zip(&*peaks);
+        let keys = peaks.iter().enumerate();
         self.by_height.clear();
         self.by_height
-            .extend(keys.map(|(index, p)| u64::from(!p.snr.to_bits()) << 32 | index));
+            .extend(keys.map(|(index, peak)| highest_first(peak.snr, index)));
         self.by_height.sort_unstable();
         self.kept.clear();
         self.is_full = false;

@@ -2,7 +2,9 @@
 
 use super::error::{truncated, unsupported};
 use super::unit::{StoredType, Unit};
-use crate::frame::levels::{Samples, WholeNumber, frame_from_floats, frame_from_integers, interleaved};
+use crate::frame::levels::{
+    Samples, WholeNumber, frame_from_floats, frame_from_integers, interleaved,
+};
 use crate::frame::{Frame, FrameError, check_size};
 
 /// Location and scaling of one image in a file.

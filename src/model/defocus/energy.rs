@@ -7,6 +7,7 @@
 
 use super::ErrorPoint;
 use crate::base::coords::PixelPoint;
+use crate::base::interrupt::{Interrupt, Interrupted};
 use crate::detect::{CentroidMethod, DetectConfig, Detection, Workspace, detect};
 use crate::frame::{Frame, FrameError};
 use crate::model::sensitivity::{Budget, CramerRao, Detector, Rule, Scenario};
@@ -41,6 +42,17 @@ pub struct EnergyStudy {
     pub half_window_px: usize,
     /// Number of stars at each point of the grid.
     pub trials: usize,
+}
+
+/// Why an error could not be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum MeasureError {
+    /// There is no memory for a frame.
+    #[error(transparent)]
+    Simulate(#[from] FrameError),
+    /// The work was ended early.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
 }
 
 /// Other consequences of the spot's size.
@@ -81,13 +93,14 @@ impl EnergyStudy {
     /// Measures the error at a radius in pixels and a read noise in electrons.
     ///
     /// # Errors
-    /// [`FrameError`] if there is no memory for a frame.
+    /// [`MeasureError`].
     pub fn measure(
         &self,
         spot_px: f64,
         noise_e: f64,
         random: &mut ChaCha8Rng,
-    ) -> Result<ErrorPoint, FrameError> {
+        interrupt: &Interrupt,
+    ) -> Result<ErrorPoint, MeasureError> {
         /// Largest number of stars along a side of a frame.
         const MOST_ABREAST: usize = 32;
         let mut scenario = self.scenario_of(spot_px, noise_e);
@@ -95,6 +108,7 @@ impl EnergyStudy {
         let mut squares = Vec::with_capacity(self.trials);
         let mut left = self.trials;
         while left > 0 {
+            interrupt.check()?;
             let abreast = ((left as f64).sqrt().ceil() as usize).min(MOST_ABREAST);
             let cells = StarCells::new(spot_px, abreast, left.min(abreast * abreast), random);
             (scenario.camera.width_px, scenario.camera.height_px) = (cells.side_px, cells.side_px);
@@ -134,7 +148,8 @@ impl EnergyStudy {
             centroid,
             ..DetectConfig::default()
         };
-        // The frame is large enough and the options are valid: `detect` does not fail.
+        // The frame is large enough, the options are valid, and nothing interrupts: `detect` does
+        // not fail.
         let found = detect(frame, &config, workspace).map_or_else(|_| Vec::new(), |d| d.sources);
         let star_like = found
             .into_iter()
@@ -271,7 +286,9 @@ mod tests {
     fn rms_px(study: &EnergyStudy, spot_px: f64) -> f64 {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let noise_e = study.scenario.camera.read_noise_e;
-        let point = study.measure(spot_px, noise_e, &mut random).unwrap();
+        let point = study
+            .measure(spot_px, noise_e, &mut random, &Interrupt::default())
+            .unwrap();
         assert!(point.found > 290, "{point:?}");
         point.rms_px
     }
@@ -302,7 +319,12 @@ mod tests {
     fn a_star_beyond_the_limit_is_not_found() {
         let study = study(12.0, Centroiding::GaussianFit);
         let point = study
-            .measure(1.0, 10.0, &mut ChaCha8Rng::seed_from_u64(1))
+            .measure(
+                1.0,
+                10.0,
+                &mut ChaCha8Rng::seed_from_u64(1),
+                &Interrupt::default(),
+            )
             .unwrap();
         assert!(!point.is_sound() && point.trials == 300, "{point:?}");
     }

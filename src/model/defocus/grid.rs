@@ -90,18 +90,17 @@ pub struct ErrorGrid {
 }
 
 impl ErrorGrid {
-    /// Measures all points on the threads of the current pool and calls `done` after each; an error of
-    /// `done` ends the measurement.
+    /// Measures all points on the threads of the current pool and calls `done` after each.
     ///
     /// The random numbers of a point depend only on `seed` and its index.
     ///
     /// # Errors
-    /// The first error of `measure` or `done`.
+    /// The first error of `measure`.
     pub fn measure<E: Send>(
         grid: Grid,
         seed: u64,
         measure: impl Fn(f64, f64, &mut ChaCha8Rng) -> Result<ErrorPoint, E> + Sync,
-        done: impl Fn() -> Result<(), E> + Sync,
+        done: impl Fn() + Sync,
     ) -> Result<Self, E> {
         let noises = grid.noises.len();
         let points = (0..grid.spots_px.len() * noises)
@@ -112,7 +111,7 @@ impl ErrorGrid {
                 let (spot_px, noise) =
                     (grid.spots_px[number / noises], grid.noises[number % noises]);
                 let point = measure(spot_px, noise, &mut random);
-                done()?;
+                done();
                 point
             })
             .collect::<Result<_, E>>()?;
@@ -175,7 +174,7 @@ mod tests {
             grid,
             1,
             |spot, noise, _| Ok::<_, ()>(ErrorPoint::of_squares(1, &[(spot + noise).powi(2)])),
-            || Ok(()),
+            || (),
         )
         .unwrap();
         for (spot, noise, point) in measured.rows() {

@@ -33,7 +33,7 @@ mod peak;
 mod surface;
 
 pub use curve::{ErrorCurve, Optimum};
-pub use energy::{Centroiding, EnergyStudy, Reach};
+pub use energy::{Centroiding, EnergyStudy, MeasureError, Reach};
 pub use grid::{ErrorGrid, ErrorPoint, Grid};
 pub use isoline::{IsoLine, IsoPoint, Parabola};
 pub use lens::Lens;

@@ -1,7 +1,6 @@
 //! Why a defocus study has no result.
 
-use crate::base::interrupt::Interrupted;
-use crate::frame::FrameError;
+use crate::model::defocus::MeasureError;
 use crate::model::sensitivity::ScenarioError;
 
 /// Why there is no study of a star.
@@ -14,12 +13,9 @@ pub enum DefocusError {
     /// The camera has no limiting magnitude.
     #[error("the camera has no limit from which a magnitude follows")]
     NoLimit,
-    /// A frame could not be simulated.
+    /// An error could not be measured.
     #[error(transparent)]
-    Simulate(#[from] FrameError),
-    /// The study was ended early.
-    #[error(transparent)]
-    Interrupted(#[from] Interrupted),
+    Measure(#[from] MeasureError),
     /// The star is too faint.
     #[error(
         "a star of V {v_mag} is found too seldom at these radii to measure it: half of the stars are found at V {limit_vmag:.2} at best"

@@ -21,7 +21,7 @@ mod text;
 
 pub use error::{DefocusError, NoiseError};
 pub use noise::{DarkNoise, Noise};
-pub use plan::Plan;
+pub use plan::{Caller, Plan};
 pub use report::{
     BestAtNoise, BestRadius, CurveRow, DefocusReport, GridRow, RequiredError, SpotRadius,
     StarReport,

@@ -3,7 +3,7 @@
 use super::error::DefocusError;
 use super::noise::Noise;
 use super::star::{RadiusPoint, StarModel, StarStudy};
-use crate::base::interrupt::Interrupted;
+use crate::base::interrupt::Interrupt;
 use crate::model::defocus::{
     ErrorCurve, ErrorGrid, Expected, Grid, IsoLine, Lens, PeakStudy, SpotInWindow, Surface,
 };
@@ -30,34 +30,34 @@ pub struct Plan {
     pub seed: u64,
 }
 
+/// Who waits for a study.
+pub struct Caller<'a> {
+    /// Called after each point.
+    pub done: &'a (dyn Fn() + Sync),
+    /// Ends the study early.
+    pub interrupt: &'a Interrupt,
+}
+
 impl Plan {
-    /// Number of points that are measured: how often [`Self::run`] calls `done`.
+    /// Number of points that are measured: how often [`Self::run`] calls [`Caller::done`].
     pub fn point_count(&self) -> usize {
         self.stars.len() * self.grid.spots_px.len() * (self.grid.noises.len() + 1)
     }
 
-    /// Studies all stars on the threads of the current pool; `done` is called after each point,
-    /// and may end the study.
+    /// Studies all stars on the threads of the current pool.
     ///
     /// # Errors
-    /// [`DefocusError::TooFaint`], [`DefocusError::Simulate`], [`DefocusError::Interrupted`].
-    pub fn run(
-        &self,
-        done: &(impl Fn() -> Result<(), Interrupted> + Sync),
-    ) -> Result<Vec<StarStudy>, DefocusError> {
+    /// [`DefocusError::TooFaint`], [`DefocusError::Measure`].
+    pub fn run(&self, caller: &Caller<'_>) -> Result<Vec<StarStudy>, DefocusError> {
         let stars = self.stars.iter();
-        stars.map(|star| self.study(star, done)).collect()
+        stars.map(|star| self.study(star, caller)).collect()
     }
 
-    fn study(
-        &self,
-        star: &StarModel,
-        done: &(impl Fn() -> Result<(), Interrupted> + Sync),
-    ) -> Result<StarStudy, DefocusError> {
-        let points = self.points(star, done)?;
+    fn study(&self, star: &StarModel, caller: &Caller<'_>) -> Result<StarStudy, DefocusError> {
+        let points = self.points(star, caller)?;
         let curve = ErrorCurve::through(points.iter().map(|at| (at.spot_px, &at.point)))
             .ok_or_else(|| self.too_faint(star))?;
-        let errors = star.measure(self.grid.clone(), self.seed, done)?;
+        let errors = star.measure(self.grid.clone(), self.seed, caller)?;
         let noises = (0..self.grid.noises.len()).into_par_iter();
         let curves: Vec<_> = noises
             .map(|number| ErrorCurve::through(errors.at_noise(number)))
@@ -84,7 +84,7 @@ impl Plan {
     fn points(
         &self,
         star: &StarModel,
-        done: &(impl Fn() -> Result<(), Interrupted> + Sync),
+        caller: &Caller<'_>,
     ) -> Result<Vec<RadiusPoint>, DefocusError> {
         let noise = self.noise.value();
         let grid = Grid {
@@ -93,7 +93,7 @@ impl Plan {
         };
         let precise = star.with_trials(star.trials().max(LEAST_TRIALS));
         // Another seed: these random numbers are not those of the grid.
-        let errors = precise.measure(grid, !self.seed, done)?;
+        let errors = precise.measure(grid, !self.seed, caller)?;
         let points = errors.grid.spots_px.par_iter().zip(&errors.points);
         let points = points.map(|(&spot_px, &point)| RadiusPoint {
             spot_px,

@@ -1,10 +1,10 @@
 //! What is measured of one star.
 
 use super::error::DefocusError;
-use crate::base::interrupt::Interrupted;
+use super::plan::Caller;
 use crate::model::defocus::{
-    EnergyStudy, ErrorCurve, ErrorGrid, ErrorPoint, Expected, Grid, IsoLine, PeakStudy, Reach,
-    Surface, SurfaceError,
+    EnergyStudy, ErrorCurve, ErrorGrid, ErrorPoint, Expected, Grid, IsoLine, MeasureError,
+    PeakStudy, Reach, Surface, SurfaceError,
 };
 use crate::model::sensitivity::{Budget, Detector, Rule, Scenario};
 
@@ -40,18 +40,22 @@ impl StarModel {
         &self,
         grid: Grid,
         seed: u64,
-        done: impl Fn() -> Result<(), Interrupted> + Sync,
-    ) -> Result<ErrorGrid, DefocusError> {
+        caller: &Caller<'_>,
+    ) -> Result<ErrorGrid, MeasureError> {
+        let interrupt = caller.interrupt;
         match self {
             Self::Peak(study) => {
-                let measure =
-                    |spot: f64, noise: f64, random: &mut _| Ok(study.measure(spot, noise, random));
-                Ok(ErrorGrid::measure(grid, seed, measure, done)?)
+                let measure = |spot: f64, noise: f64, random: &mut _| {
+                    interrupt.check()?;
+                    Ok(study.measure(spot, noise, random))
+                };
+                ErrorGrid::measure(grid, seed, measure, caller.done)
             }
             Self::Energy(study) => {
-                let measure =
-                    |spot: f64, noise: f64, random: &mut _| Ok(study.measure(spot, noise, random)?);
-                ErrorGrid::measure(grid, seed, measure, || Ok(done()?))
+                let measure = |spot: f64, noise: f64, random: &mut _| {
+                    study.measure(spot, noise, random, interrupt)
+                };
+                ErrorGrid::measure(grid, seed, measure, caller.done)
             }
         }
     }
