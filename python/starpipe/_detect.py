@@ -50,8 +50,7 @@ class Detections:
     @property
     def stars(self) -> Any:
         """The stars as a ``QTable``; without astropy `columns`."""
-        names = ("x_centroid", "y_centroid", "x_centroid_err", "y_centroid_err")
-        return _tables.table(self.columns, dict.fromkeys(names, "pix"))
+        return _tables.star_table(self.columns)
 
     @property
     def x(self) -> NDArray[np.float64]:

@@ -209,21 +209,17 @@ class Result:
     @property
     def stars(self) -> Any:
         """Every detection, brightest first, as a ``QTable``; without astropy `star_columns`."""
-        columns: dict[str, Any] = self.star_columns
-        try:
-            from astropy import units as u
-            from astropy.coordinates import SkyCoord
-            from astropy.table import QTable
-        except ImportError:
+        columns = self.star_columns
+        table = _tables.star_table(columns)
+        if table is columns:
             return columns
-        ra, dec = columns.pop("ra"), columns.pop("dec")
-        table = QTable(columns)
-        for name in ("x_centroid", "y_centroid", "x_centroid_err", "y_centroid_err", "residual"):
-            table[name].unit = u.pix
-        table["vmag"].unit = u.mag
         if self:
-            sky = SkyCoord(ra, dec, unit="deg", frame="icrs")
-            table.add_column(sky, name="sky_centroid", index=table.colnames.index("vmag"))
+            from astropy.coordinates import SkyCoord
+
+            sky = SkyCoord(table["ra"], table["dec"], frame="icrs")
+            sky.info.description = "position at the frame's date"
+            table.add_column(sky, name="sky_centroid", index=table.colnames.index("ra"))
+        table.remove_columns(["ra", "dec"])
         table.meta["frame"] = self._report["frame"]
         return table
 
@@ -272,9 +268,25 @@ class Result:
         ax.set_title(repr(self).strip("<>").removeprefix("Result "), fontsize=8)
         return ax
 
-    def write(self, path: Any, **options: Any) -> None:
-        """Write `stars` as ``QTable.write`` does: ECSV, VOTable, Parquet and more."""
-        self.stars.write(path, **options)
+    def write(self, path: Any, *, format: str | None = None, **options: Any) -> None:
+        """Write `stars` as ``QTable.write`` does: ECSV, VOTable, Parquet and more.
+
+        In VOTables, and in Parquet with their metadata (``format="parquet.votable"``), right
+        ascension and declination are columns of their own.
+        """
+        stars = self.stars
+        if format is None and str(path).endswith((".vot", ".votable")):
+            format = "votable"
+        if format in ("votable", "parquet.votable"):
+            stars = _tables.flat(stars)
+        if format == "parquet.votable":
+            # Descriptions are taken from the table.
+            known = {name: _tables.STAR_COLUMNS[name] for name in stars.colnames}
+            metadata = {
+                name: {"unit": unit or None, "ucd": ucd} for name, (unit, ucd, _) in known.items()
+            }
+            options = {"metadata": metadata} | options
+        stars.write(path, format=format, **options)
 
 
 def wcs_of(cards: bytes, shape: tuple[int, int]) -> Any:

@@ -10,6 +10,26 @@ from numpy.typing import NDArray
 
 Columns = dict[str, NDArray[Any]]
 
+STAR_COLUMNS = {
+    "id": ("", "meta.id;meta.main", "identifier in the catalogue"),
+    "name": ("", "meta.id", "proper name and designation"),
+    "x_centroid": ("pix", "pos.cartesian.x;instr.det", "centroid along the rows, from 0"),
+    "y_centroid": ("pix", "pos.cartesian.y;instr.det", "centroid along the columns, from 0"),
+    "x_centroid_err": ("pix", "stat.error;pos.cartesian.x", "standard error of x_centroid"),
+    "y_centroid_err": ("pix", "stat.error;pos.cartesian.y", "standard error of y_centroid"),
+    "flux": ("", "phot.flux", "flux above the background, in units of the frame"),
+    "flux_err": ("", "stat.error;phot.flux", "standard error of flux"),
+    "peak": ("", "phot.flux;stat.max", "brightest pixel above the background"),
+    "snr": ("", "stat.snr", "flux over its standard error"),
+    "flags": ("", "meta.code.qual", "what is odd about the detection"),
+    "ra": ("deg", "pos.eq.ra;meta.main", "right ascension at the frame's date (ICRS)"),
+    "dec": ("deg", "pos.eq.dec;meta.main", "declination at the frame's date (ICRS)"),
+    "vmag": ("mag", "phot.mag;em.opt.V", "Johnson V of the named star"),
+    "residual": ("pix", "stat.fit.residual", "distance from the named star"),
+    "p_chance": ("", "stat.probability", "probability that the name is chance"),
+}
+"""Unit, UCD and description of each column of stars."""
+
 
 def star_columns(stars: list[dict[str, Any]]) -> Columns:
     """Return the reports of stars as arrays; NaN and "" where there is no value."""
@@ -41,6 +61,38 @@ def star_columns(stars: list[dict[str, Any]]) -> Columns:
     }
 
 
+def star_table(named: Columns) -> Any:
+    """Return columns of stars as a ``QTable`` with units, UCDs and descriptions.
+
+    Without astropy they are returned as they are.
+    """
+    found = table(named, {name: STAR_COLUMNS[name][0] for name in named})
+    if found is not named:
+        for name in found.colnames:
+            _, ucd, found[name].info.description = STAR_COLUMNS[name]
+            found[name].info.meta = {"ucd": ucd}
+    return found
+
+
+def flat(stars: Any) -> Any:
+    """Return a table of stars with right ascension and declination as columns of their own."""
+    from astropy.table import Table
+
+    found = Table(stars, copy=False)
+    for name in ("dec", "ra"):
+        if "sky_centroid" in found.colnames:
+            angle = getattr(stars["sky_centroid"], name).deg
+            _, ucd, description = STAR_COLUMNS[name]
+            place = found.colnames.index("sky_centroid") + 1
+            found.add_column(angle, name=name, index=place)
+            found[name].info.unit = "deg"
+            found[name].info.description = description
+            found[name].info.meta = {"ucd": ucd}
+    if "sky_centroid" in found.colnames:
+        found.remove_column("sky_centroid")
+    return found
+
+
 def columns(rows: list[dict[str, Any]]) -> Columns:
     """Return rows of equal keys as arrays; NaN and "" where there is no value."""
     names: Iterable[str] = rows[0] if rows else ()
@@ -63,6 +115,6 @@ def table(named: Columns, units: dict[str, str]) -> Any:
         return named
     found = QTable(named)
     for name, unit in units.items():
-        if name in found.colnames:
+        if unit and name in found.colnames:
             found[name].unit = unit
     return found

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from astropy import units as u
 from astropy.coordinates import EarthLocation, SkyCoord
+from astropy.io.votable.ucd import parse_ucd
 from astropy.nddata import CCDData
 from astropy.table import QTable
 from astropy.time import Time
 
 import starpipe as sp
+from starpipe._tables import STAR_COLUMNS
 
 
 def named(result):
@@ -60,24 +62,36 @@ def test_the_covariance_is_that_of_the_stated_errors(result):
     np.testing.assert_allclose(result.attitude_covariance, result.attitude_covariance.T)
 
 
-@pytest.mark.parametrize("format", ["ascii.ecsv", "votable"])
+@pytest.mark.parametrize("format", ["ascii.ecsv", "votable", "parquet.votable", "fits"])
 def test_the_table_survives_a_file(result, tmp_path, format):
     path = tmp_path / "stars"
     stars = result.stars
-    if format == "votable":
-        sky = stars["sky_centroid"]
-        stars.remove_column("sky_centroid")
-        stars["ra"], stars["dec"] = sky.ra, sky.dec
-        stars.write(path, format=format)
-    else:
-        result.write(path, format=format)
+    result.write(path, format=format)
     read = QTable.read(path, format=format)
     for name in ("x_centroid", "y_centroid_err", "flux", "residual"):
         np.testing.assert_array_equal(read[name].value, stars[name].value)
+    assert read["residual"].unit == u.pix
     # astropy reads empty texts as masked.
-    assert list(np.ma.filled(read["id"], "")) == list(stars["id"])
-    if format == "ascii.ecsv":
-        assert read["sky_centroid"].separation(stars["sky_centroid"]).max() < 1e-9 * u.arcsec
+    assert list(np.ma.filled(read["id"].astype(str), "")) == list(stars["id"])
+    has_sky = "sky_centroid" in read.colnames
+    assert has_sky == (format in ("ascii.ecsv", "fits"))
+    sky = read["sky_centroid"] if has_sky else SkyCoord(read["ra"], read["dec"])
+    assert sky.separation(stars["sky_centroid"]).max() < 1e-9 * u.arcsec
+    if not has_sky:
+        assert read["ra"].info.meta["ucd"] == "pos.eq.ra;meta.main"
+
+
+def test_a_file_named_as_a_votable_is_one(result, tmp_path):
+    result.write(tmp_path / "stars.vot")
+    assert len(QTable.read(tmp_path / "stars.vot")) == len(result.stars)
+
+
+def test_each_column_of_stars_has_a_unit_a_ucd_and_a_description(result):
+    assert list(STAR_COLUMNS) == list(result.star_columns)
+    for unit, ucd, description in STAR_COLUMNS.values():
+        u.Unit(unit)
+        parse_ucd(ucd, check_controlled_vocabulary=True)
+        assert description
 
 
 def test_astropys_objects_are_hints(pipeline, pixels, result):

@@ -2,11 +2,20 @@
 
 import re
 import shutil
+import subprocess
+import sys
 
 import pytest
 from conftest import REPOSITORY
 
-PAGES = sorted((REPOSITORY / "docs" / "python").glob("*.md"))
+PAGES = [*sorted((REPOSITORY / "docs" / "python").glob("*.md")), REPOSITORY / "python/README.md"]
+
+
+def code_of(page):
+    """Return the code of all blocks of a page."""
+    blocks = re.findall(r"^```python\n(.*?)^```$", page.read_text(), re.DOTALL | re.MULTILINE)
+    assert blocks
+    return "\n".join(blocks)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
@@ -16,7 +25,14 @@ def test_the_code_of_a_page_runs(page, frame, tmp_path, monkeypatch):
     for night in range(3):
         shutil.copy(frame, tmp_path / "nights" / f"{night}.tif")
     monkeypatch.chdir(tmp_path)
-    blocks = re.findall(r"^```python\n(.*?)^```$", page.read_text(), re.DOTALL | re.MULTILINE)
-    assert blocks
-    code = "\n".join(blocks)
-    exec(compile(code, str(page), "exec"), {})
+    exec(compile(code_of(page), str(page), "exec"), {})
+
+
+def test_the_code_of_the_pages_has_the_right_types(tmp_path):
+    pytest.importorskip("mypy")
+    for page in PAGES:
+        (tmp_path / f"{page.stem.replace('-', '_')}.py").write_text(code_of(page))
+    settings = ["--config-file", str(REPOSITORY / "python" / "pyproject.toml"), "--strict"]
+    command = [sys.executable, "-m", "mypy", *settings, *map(str, tmp_path.glob("*.py"))]
+    checked = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert checked.returncode == 0, checked.stdout + checked.stderr

@@ -71,6 +71,66 @@ def test_ctrl_c_ends_a_run_of_many_frames():
     assert told == "interrupted" and float(when) - signalled < 2.0
 
 
+def _false_stars():
+    """Return random places, among which no stars are found: the search takes long."""
+    places = np.random.default_rng(1).uniform(0.0, 1000.0, (2, 150))
+    return {"x": places[0], "y": places[1], "flux": 1.0 + places[0], "shape": (1000, 1000)}
+
+
+def _picture_of(x, y, flux, shape):
+    picture = np.random.default_rng(2).normal(500.0, 5.0, shape)
+    columns, rows = np.meshgrid(np.arange(-4, 5), np.arange(-4, 5))
+    spot = np.exp(-(columns**2 + rows**2) / 2.0)
+    for column, row, light in zip(x.astype(int), y.astype(int), flux, strict=True):
+        if 4 <= column < shape[1] - 4 and 4 <= row < shape[0] - 4:
+            picture[row - 4 : row + 5, column - 4 : column + 5] += light * spot
+    return picture
+
+
+LONG_WORK = {
+    "solve": lambda pipeline, _: pipeline.solve(_picture_of(**_false_stars())),
+    "solve on two threads": lambda pipeline, _: pipeline.solve(
+        _picture_of(**_false_stars()), threads=2
+    ),
+    "identify": lambda pipeline, _: pipeline.identify(**_false_stars()),
+    "the index of a catalogue": lambda _, directory: sp.Pipeline(cache_dir=directory),
+    "defocus": lambda *_: sp.defocus("nanosat-tracker", trials=20, threads=2),
+    "validate": lambda *_: sp.validate("nanosat-tracker", frames=20, threads=2),
+    "robustness": lambda *_: sp.robustness(fov=10, trials=1500, threads=2),
+}
+
+
+class StoppedError(Exception):
+    """Raised by a handler of a signal."""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no timer that sends signals")
+@pytest.mark.parametrize("work", LONG_WORK)
+def test_a_signal_ends_long_work(pipeline, tmp_path, work):
+    def stop(*_):
+        raise StoppedError
+
+    def seconds(directory):
+        started = time.perf_counter()
+        try:
+            LONG_WORK[work](pipeline, tmp_path / directory)
+        except StoppedError:
+            return True, time.perf_counter() - started
+        return False, time.perf_counter() - started
+
+    is_stopped, whole = seconds("whole")
+    assert not is_stopped
+    before = signal.signal(signal.SIGALRM, stop)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, whole / 4)
+        is_stopped, stopped = seconds("stopped")
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    # Python runs a handler when the call is over at the latest.
+    assert is_stopped and stopped < 0.8 * whole, (stopped, whole)
+
+
 def test_a_frame_of_16_bits_is_not_copied():
     if not STATUS.exists():
         pytest.skip(f"{STATUS} does not tell the memory of a process")
