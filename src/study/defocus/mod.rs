@@ -11,6 +11,7 @@
 //!
 //! [`crate::model::defocus`] defines radius, error and noise, and the two kinds of stars.
 
+mod caller;
 mod error;
 mod noise;
 mod plan;
@@ -19,9 +20,10 @@ mod star;
 mod surface;
 mod text;
 
+pub use caller::Caller;
 pub use error::{DefocusError, NoiseError};
 pub use noise::{DarkNoise, Noise};
-pub use plan::{Caller, Plan};
+pub use plan::Plan;
 pub use report::{
     BestAtNoise, BestRadius, CurveRow, DefocusReport, GridRow, RequiredError, SpotRadius,
     StarReport,

@@ -1,9 +1,9 @@
 //! What is studied, and how.
 
+use super::caller::Caller;
 use super::error::DefocusError;
 use super::noise::Noise;
 use super::star::{RadiusPoint, StarModel, StarStudy};
-use crate::base::interrupt::Interrupt;
 use crate::model::defocus::{
     ErrorCurve, ErrorGrid, Expected, Grid, IsoLine, Lens, PeakStudy, SpotInWindow, Surface,
 };
@@ -28,14 +28,6 @@ pub struct Plan {
     pub required_px: Vec<f64>,
     /// Seed of the random numbers.
     pub seed: u64,
-}
-
-/// Who waits for a study.
-pub struct Caller<'a> {
-    /// Called after each point.
-    pub done: &'a (dyn Fn() + Sync),
-    /// Ends the study early.
-    pub interrupt: &'a Interrupt,
 }
 
 impl Plan {

@@ -1,7 +1,7 @@
 //! What is measured of one star.
 
+use super::caller::Caller;
 use super::error::DefocusError;
-use super::plan::Caller;
 use crate::model::defocus::{
     EnergyStudy, ErrorCurve, ErrorGrid, ErrorPoint, Expected, Grid, IsoLine, MeasureError,
     PeakStudy, Reach, Surface, SurfaceError,
