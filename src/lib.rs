@@ -51,10 +51,13 @@
 //! | [`pipeline`] | what does a frame show: the stages in order |
 //! | [`mod@track`] | where does the camera point now: from frame to frame |
 //! | [`report`] | how to present it: JSON, text, tables, overlays, world coordinates |
+//! | `archive` | what do many frames show: tables in Parquet, made in parts (feature `archive`) |
 //! | [`study`] | is it good enough: validation, robustness, defocus, the papers' experiments |
 //!
 //! Pixels, angles and coordinate systems: [`conventions`].
 
+#[cfg(feature = "archive")]
+pub mod archive;
 pub mod base;
 pub mod calibration;
 pub mod camera;

@@ -103,6 +103,14 @@ impl ObservationDate {
         self.time.is_some()
     }
 
+    /// The Modified Julian Date in UTC; `None` where the time is not known.
+    pub fn modified_julian_date(&self) -> Option<f64> {
+        /// That of J2000.0.
+        const J2000_MJD: f64 = 51_544.5;
+        let (seconds, _) = self.seconds_since_j2000()?;
+        Some(J2000_MJD + seconds / 86_400.0)
+    }
+
     /// Seconds since J2000.0, exact to a microsecond, and whether the date has fractions of a
     /// second; `None` where the time is not known.
     pub fn seconds_since_j2000(&self) -> Option<(f64, bool)> {

@@ -32,6 +32,14 @@ pub fn beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
 pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = beside(path)?;
     file.write_all(bytes)?;
+    finish(file, path)
+}
+
+/// Names a file that [`beside`] has made and that is written.
+///
+/// # Errors
+/// I/O errors.
+pub fn finish(file: tempfile::NamedTempFile, path: &Path) -> io::Result<()> {
     file.as_file().sync_all()?;
     file.persist(path).map_err(|refused| refused.error)?;
     Ok(())

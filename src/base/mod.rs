@@ -2,6 +2,7 @@
 
 pub mod angle;
 pub mod coords;
+pub(crate) mod differences;
 pub mod epoch;
 pub(crate) mod exponential;
 pub mod files;
@@ -9,4 +10,5 @@ pub mod format;
 pub mod interrupt;
 pub(crate) mod neighbors;
 pub mod statistics;
+pub mod table;
 pub mod units;

@@ -1,5 +1,6 @@
 //! The list of commands.
 
+use super::archive::ArchiveArgs;
 use super::camera::CameraArgs;
 use super::catalog::CatalogArgs;
 use super::clutter::ClutterArgs;
@@ -40,6 +41,8 @@ pub(crate) struct Arguments {
 pub(crate) enum Command {
     /// Find and identify the stars in frames (FITS, TIFF, PNG, JPEG, BMP, PGM)
     Process(ProcessArgs),
+    /// Tell how far process --out-parquet is, merge its tables, and report night by night
+    Archive(ArchiveArgs),
     /// Identify the stars in lists of centroids (CSV)
     Identify(IdentifyArgs),
     /// Follow the attitude of a camera from frame to frame

@@ -6,6 +6,7 @@
 //! - Only `run` and the reports of `solving` and `track`, which appear frame by frame, write to
 //!   standard output.
 
+mod archive;
 mod batch;
 mod camera;
 mod catalog;
@@ -63,6 +64,7 @@ fn run_command(command: Command) -> Result<Outcome, CommandError> {
     match command {
         Command::Process(arguments) => process::process(arguments),
         Command::Identify(arguments) => identify::identify(arguments),
+        Command::Archive(arguments) => archive::archive(&arguments),
         Command::Track(arguments) => track::track(&arguments),
         Command::Catalog(arguments) => catalog::catalog(arguments),
         Command::Robustness(arguments) => robustness::robustness(&arguments),

@@ -113,6 +113,7 @@ pub fn solve_centroids(
         date: priors.date,
         notes: notes.collect(),
         observation,
+        site: priors.site,
         exposure_s: priors.exposure_s,
         sources,
         background: None,

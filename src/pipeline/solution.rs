@@ -11,7 +11,7 @@ use crate::frame::RowOrder;
 use crate::identify::{FrameDate, SourceIndex};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::Comparison;
-use crate::sky::observer::Observation;
+use crate::sky::observer::{Observation, Site};
 
 /// What was found in one frame, or in one list of centroids.
 #[derive(Debug, Clone)]
@@ -27,6 +27,8 @@ pub struct Solution {
     /// The frame's centre in the observer's sky, where the frame is identified, and site and time
     /// of day are known.
     pub observation: Option<Observation>,
+    /// Where the frame was taken, if known.
+    pub site: Option<Site>,
     /// Exposure time, in seconds, if known.
     pub exposure_s: Option<f64>,
     /// What is odd about the frame, its header, or the priors.

@@ -114,6 +114,7 @@ impl Solved<'_> {
                 noise_adu: self.detections.noise_adu,
             }),
             observation: self.observation,
+            site: self.priors.site,
             attitude_only: self.context.attitude_only,
             outcome: self.outcome,
             bodies: self.bodies,

@@ -11,6 +11,7 @@ pub(super) fn solution(width: usize, height: usize, outcome: Outcome) -> Solutio
         date: None,
         sources: Vec::new(),
         observation: None,
+        site: None,
         photometry: None,
         comparison: None,
         gain_e_per_adu: None,

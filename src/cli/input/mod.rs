@@ -2,4 +2,5 @@
 
 pub(crate) mod centroid_list;
 pub(crate) mod frames;
+pub(crate) mod names;
 pub(crate) mod stdin;

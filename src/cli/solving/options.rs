@@ -15,15 +15,15 @@ pub(crate) struct SolvingOptions {
     /// Give a star a name only where the odds are at least this many to 1 that it is right
     #[arg(long, value_name = "NUMBER", value_parser = values::odds, allow_hyphen_values = true,
           default_value_t = NAME_ODDS, help_heading = "Identification")]
-    pub(super) name_odds: f64,
+    pub(crate) name_odds: f64,
     /// Stop at attitude and optics, from the brightest stars: no other star is named, and no zero
     /// point or limiting magnitude is measured
     #[arg(long, help_heading = "Identification")]
-    pub(super) attitude_only: bool,
+    pub(crate) attitude_only: bool,
     #[command(flatten)]
     pub(super) output: OutputOptions,
     #[command(flatten)]
-    pub(super) catalog: CatalogOptions,
+    pub(crate) catalog: CatalogOptions,
 }
 
 #[derive(Debug, Args)]

@@ -29,7 +29,11 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    fn context<'a>(&'a self, indexed: &'a IndexedCatalog<'a>, attitude_only: bool) -> Context<'a> {
+    pub(crate) fn context<'a>(
+        &'a self,
+        indexed: &'a IndexedCatalog<'a>,
+        attitude_only: bool,
+    ) -> Context<'a> {
         Context {
             attitude_only,
             detect: self.detect.clone(),
@@ -82,7 +86,7 @@ pub(crate) fn solve_all(
 }
 
 /// A workspace of one thread. A single input is solved on all threads.
-fn workspace(pool: &rayon::ThreadPool, inputs: usize, name_odds: f64) -> Workspace {
+pub(crate) fn workspace(pool: &rayon::ThreadPool, inputs: usize, name_odds: f64) -> Workspace {
     let mut workspace = Workspace::new();
     workspace.identify = workspace.identify.with_name_odds(name_odds);
     if let (1, Some(threads)) = (inputs, NonZeroUsize::new(pool.current_num_threads())) {

@@ -2,22 +2,11 @@
 
 use crate::cli::output::files::remove_outdated;
 use anyhow::Context;
-use parquet::basic::Compression;
-use parquet::column::writer::ColumnWriter;
-use parquet::data_type::ByteArray;
-use parquet::file::properties::WriterProperties;
-use parquet::file::writer::SerializedFileWriter;
-use parquet::schema::parser::parse_message_type;
-use starpipe::study::validation::store::{Column, FieldValue, RunTables, StoreError, TableRow};
+use starpipe::archive::TableWriter;
+use starpipe::study::validation::store::{RunTables, StoreError, TableRow};
 use starpipe::study::validation::{FrameRecord, StarRecord};
-use std::fmt::Write as _;
 use std::fs::File;
-use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-
-/// Rows in memory at once.
-const ROWS_PER_GROUP: usize = 1 << 16;
 
 /// The parts in a run's directory.
 pub(super) struct Parts<'a> {
@@ -82,7 +71,11 @@ fn write_part<R: TableRow>(
     // Always the same name, so that the next run overwrites what a killed one has left.
     let beside = path.with_extension("tmp");
     let write = || -> anyhow::Result<()> {
-        write_table(File::create(&beside)?, rows)?;
+        let mut table = TableWriter::new(File::create(&beside)?, R::TABLE, R::columns())?;
+        for row in rows {
+            table.add(row?)?;
+        }
+        table.finish()?;
         Ok(std::fs::rename(&beside, &path)?)
     };
     write().with_context(|| format!("writing {}", path.display()))
@@ -97,127 +90,6 @@ fn remove_parts<R: TableRow>(directory: &Path, from: u64) -> anyhow::Result<()> 
         }
     }
     Ok(())
-}
-
-fn write_table<R: TableRow, W: Write + Send>(
-    target: W,
-    rows: impl Iterator<Item = Result<R, StoreError>>,
-) -> anyhow::Result<()> {
-    let columns = R::columns();
-    let schema = Arc::new(parse_message_type(&schema(&columns))?);
-    let properties = WriterProperties::builder()
-        .set_compression(Compression::SNAPPY)
-        .build();
-    let mut writer = SerializedFileWriter::new(target, schema, Arc::new(properties))?;
-    let mut rows = rows.peekable();
-    while rows.peek().is_some() {
-        let group: Vec<R> = rows
-            .by_ref()
-            .take(ROWS_PER_GROUP)
-            .collect::<Result<_, _>>()?;
-        let mut group_writer = writer.next_row_group()?;
-        for column in &columns {
-            let mut column_writer = group_writer
-                .next_column()?
-                .context("a column of the schema has no writer")?;
-            write_column(column_writer.untyped(), column, &group)?;
-            column_writer.close()?;
-        }
-        group_writer.close()?;
-    }
-    writer.close()?;
-    Ok(())
-}
-
-/// The schema in Parquet's own notation.
-fn schema<R: TableRow>(columns: &[Column<R>]) -> String {
-    let mut text = format!("message {} {{\n", R::TABLE);
-    for column in columns {
-        let presence = if column.is_optional {
-            "optional"
-        } else {
-            "required"
-        };
-        let (kind, logical) = match (&column.empty, column.name) {
-            (FieldValue::Integer(_), "seed") => ("int64", " (INTEGER(64, false))"),
-            (FieldValue::Integer(_), _) => ("int64", ""),
-            (FieldValue::Number(_), _) => ("double", ""),
-            (FieldValue::Bool(_), _) => ("boolean", ""),
-            (FieldValue::Text(_), _) => ("binary", " (UTF8)"),
-        };
-        let _ = writeln!(text, "  {presence} {kind} {}{logical};", column.name);
-    }
-    text + "}\n"
-}
-
-fn write_column<R>(
-    writer: &mut ColumnWriter<'_>,
-    column: &Column<R>,
-    rows: &[R],
-) -> anyhow::Result<()> {
-    let fields = || rows.iter().map(column.value);
-    let level = |field: FieldValue| i16::from(!is_empty(&field));
-    // Definition levels: 1 for a value, 0 for an empty field.
-    let levels: Option<Vec<i16>> = column.is_optional.then(|| fields().map(level).collect());
-    let levels = levels.as_deref();
-    match writer {
-        ColumnWriter::Int64ColumnWriter(typed) => {
-            let values: Vec<i64> = fields().filter_map(integer).collect();
-            typed.write_batch(&values, levels, None)?;
-        }
-        ColumnWriter::DoubleColumnWriter(typed) => {
-            let values: Vec<f64> = fields().filter_map(number).collect();
-            typed.write_batch(&values, levels, None)?;
-        }
-        ColumnWriter::BoolColumnWriter(typed) => {
-            let values: Vec<bool> = fields().filter_map(boolean).collect();
-            typed.write_batch(&values, levels, None)?;
-        }
-        ColumnWriter::ByteArrayColumnWriter(typed) => {
-            let values: Vec<ByteArray> = fields().filter_map(text).collect();
-            typed.write_batch(&values, levels, None)?;
-        }
-        _ => anyhow::bail!("column {} has a type that is not supported", column.name),
-    }
-    Ok(())
-}
-
-fn is_empty(field: &FieldValue) -> bool {
-    matches!(
-        field,
-        FieldValue::Integer(None)
-            | FieldValue::Number(None)
-            | FieldValue::Bool(None)
-            | FieldValue::Text(None)
-    )
-}
-
-fn integer(field: FieldValue) -> Option<i64> {
-    match field {
-        FieldValue::Integer(value) => value,
-        _ => None,
-    }
-}
-
-fn number(field: FieldValue) -> Option<f64> {
-    match field {
-        FieldValue::Number(value) => value,
-        _ => None,
-    }
-}
-
-fn boolean(field: FieldValue) -> Option<bool> {
-    match field {
-        FieldValue::Bool(value) => value,
-        _ => None,
-    }
-}
-
-fn text(field: FieldValue) -> Option<ByteArray> {
-    match field {
-        FieldValue::Text(value) => value.map(|text| text.into_bytes().into()),
-        _ => None,
-    }
 }
 
 #[cfg(test)]

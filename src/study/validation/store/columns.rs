@@ -1,33 +1,9 @@
 //! The columns of the tables, in their order: name, type and value.
 
+use crate::base::table::{Column, Meaning, column, field};
 use crate::study::robustness::Answer;
 use crate::study::validation::record::{FrameRecord, Named, RowKind, StarRecord};
 use serde::{Serialize, de::DeserializeOwned};
-
-/// The value of a field of a row; none if the field is empty.
-#[derive(Debug, Clone, PartialEq)]
-pub enum FieldValue {
-    /// A whole number. Of unsigned ones the bits.
-    Integer(Option<i64>),
-    /// A number.
-    Number(Option<f64>),
-    /// Yes or no.
-    Bool(Option<bool>),
-    /// Words.
-    Text(Option<String>),
-}
-
-/// A column of a table with rows `R`.
-pub struct Column<R> {
-    /// Its name.
-    pub name: &'static str,
-    /// The value in a row.
-    pub value: fn(&R) -> FieldValue,
-    /// An empty value of the column's type.
-    pub empty: FieldValue,
-    /// Whether some values may be empty.
-    pub is_optional: bool,
-}
 
 /// A row of a table.
 pub trait TableRow: Sized + Serialize + DeserializeOwned {
@@ -38,33 +14,7 @@ pub trait TableRow: Sized + Serialize + DeserializeOwned {
     fn columns() -> Vec<Column<Self>>;
 }
 
-/// A type of the fields of records.
-trait Field {
-    const OPTIONAL: bool = false;
-    fn value(&self) -> FieldValue;
-    fn empty() -> FieldValue;
-}
-
-macro_rules! field {
-    ($($type:ty => $kind:ident, |$value:ident| $made:expr;)*) => {$(
-        impl Field for $type {
-            fn value(&self) -> FieldValue {
-                let $value = self;
-                FieldValue::$kind(Some($made))
-            }
-            fn empty() -> FieldValue {
-                FieldValue::$kind(None)
-            }
-        }
-    )*};
-}
-
 field! {
-    // Keeps the bits: a seed may have all 64 of them.
-    u64 => Integer, |value| value.cast_signed();
-    f64 => Number, |value| *value;
-    bool => Bool, |value| *value;
-    String => Text, |value| value.clone();
     Answer => Text, |value| match value {
         Answer::Right => "right",
         Answer::Wrong => "wrong",
@@ -82,36 +32,13 @@ field! {
     }.to_owned();
 }
 
-impl<T: Field> Field for Option<T> {
-    const OPTIONAL: bool = true;
-    fn value(&self) -> FieldValue {
-        self.as_ref().map_or_else(T::empty, Field::value)
-    }
-    fn empty() -> FieldValue {
-        T::empty()
-    }
-}
-
-/// An empty value of a field's type, and whether the field is optional.
-fn type_of<R, F: Field>(_: fn(&R) -> &F) -> (FieldValue, bool) {
-    (F::empty(), F::OPTIONAL)
-}
-
 macro_rules! row {
     ($record:ty, $table:literal: $($field:ident)*) => {
         impl TableRow for $record {
             const TABLE: &'static str = $table;
 
             fn columns() -> Vec<Column<Self>> {
-                vec![$({
-                    let (empty, is_optional) = type_of(|row: &Self| &row.$field);
-                    Column {
-                        name: stringify!($field),
-                        value: |row| row.$field.value(),
-                        empty,
-                        is_optional,
-                    }
-                }),*]
+                vec![$(column!(Self, $field, Meaning::default())),*]
             }
         }
     };

@@ -1,6 +1,7 @@
 //! `run.json`: which run a directory holds, by all that its tables depend on.
 
 use super::error::StoreError;
+use crate::base::differences::differences;
 use crate::base::files;
 use crate::camera::data_sheet::Response;
 use crate::model::sensitivity::Reading;
@@ -68,8 +69,7 @@ pub fn claim_directory(
         read => read.map_err(StoreError::file("reading", &path))?,
     };
     let found: Value = serde_json::from_str(&text).map_err(json_error)?;
-    let mut differences = Vec::new();
-    compare("", &found, &wanted, &mut differences);
+    let differences = differences(&found, &wanted);
     if differences.is_empty() {
         return Ok(());
     }
@@ -130,23 +130,6 @@ fn refuse_unknown_tables(directory: &Path) -> Result<(), StoreError> {
             name,
         }),
         None => Ok(()),
-    }
-}
-
-/// Lists where two objects differ.
-fn compare(name: &str, found: &Value, wanted: &Value, into: &mut Vec<String>) {
-    let (Value::Object(found), Value::Object(wanted)) = (found, wanted) else {
-        if found != wanted {
-            into.push(format!("{name} is {found} there and {wanted} here"));
-        }
-        return;
-    };
-    let mut keys: Vec<&String> = found.keys().chain(wanted.keys()).collect();
-    keys.sort();
-    keys.dedup();
-    for key in keys {
-        let of = |object: &Map<String, Value>| object.get(key).cloned().unwrap_or(Value::Null);
-        compare(key, &of(found), &of(wanted), into);
     }
 }
 

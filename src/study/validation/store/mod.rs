@@ -18,7 +18,7 @@ mod tables;
 #[cfg(test)]
 mod tests;
 
-pub use columns::{Column, FieldValue, TableRow};
+pub use columns::TableRow;
 pub use error::StoreError;
 pub use identity::claim_directory;
 pub use rows::Rows;

@@ -1,5 +1,8 @@
 //! `process`: finds and identifies the stars in frames.
 
+mod configuration;
+mod parts;
+
 use super::exit::{CommandError, Exit, Outcome};
 use super::input::frames::{FrameList, read_frame, read_master};
 use super::options::frames::FrameOptions;
@@ -9,6 +12,7 @@ use super::solving::result_files::Solved;
 use super::solving::{Plan, solve_all};
 use anyhow::Context as _;
 use clap::{Args, ValueEnum, value_parser};
+use parts::{PartOptions, process_parts};
 use starpipe::calibration::{Calibration, read_hot_pixels};
 use starpipe::camera::data_sheet::DataSheet;
 use starpipe::detect::{CentroidMethod, DetectConfig};
@@ -27,7 +31,8 @@ use std::path::{Path, PathBuf};
     starpipe process --format json --out results night/ > night.jsonl\n  \
     starpipe process --page 2 night.fits\n  \
     starpipe process --dark master-dark.fits --flat master-flat.fits --hot-pixels hot-pixels.csv night.fits\n  \
-    funpack -S night.fits.fz | starpipe process -\n\n\
+    funpack -S night.fits.fz | starpipe process -\n  \
+    starpipe process 'nights/*/*.fits' --out-parquet results --shard 3/100\n\n\
     The format of a file is recognized from its content; any may be compressed with gzip. Date, exposure,\n\
     pixel size and focal length are taken from FITS keywords or Exif unless an option gives them.\n\n\
     --out results writes results/night.json, night.csv, night.wcs and night.png for night.tif, and\n\
@@ -43,6 +48,8 @@ pub(crate) struct ProcessArgs {
     exposure: ExposureOptions,
     #[command(flatten)]
     solving: SolvingOptions,
+    #[command(flatten)]
+    parts: PartOptions,
 }
 
 #[derive(Debug, Args)]
@@ -109,6 +116,9 @@ struct ExposureOptions {
 
 /// `starpipe process`
 pub(crate) fn process(arguments: ProcessArgs) -> Result<Outcome, CommandError> {
+    if let Some(directory) = &arguments.parts.out_parquet {
+        return process_parts(&arguments, directory);
+    }
     let plan = arguments.plan()?;
     let page = arguments.frames.page;
     let (frames, failed) = FrameList::of(arguments.frames.frames)?.reported();

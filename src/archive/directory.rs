@@ -1,0 +1,263 @@
+//! The directory of an archive: whose it is, and its parts.
+
+use super::error::ArchiveError;
+use super::frame_row::FrameRow;
+use super::plan::{Part, Plan};
+use super::star_row::StarRow;
+use super::write::TableWriter;
+use crate::base::differences::differences;
+use crate::base::files;
+use crate::base::table::Column;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::fs;
+use std::io::{ErrorKind, Write};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// Version of the tables.
+pub const SCHEMA: u32 = 1;
+/// Says whose the directory is.
+const IDENTITY: &str = "archive.json";
+/// The names of all frames, one a line.
+const INPUTS: &str = "inputs.txt";
+/// Directories of the parts of each table.
+const FRAMES: &str = "frames.parquet";
+const STARS: &str = "stars.parquet";
+
+/// All that the tables depend on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Identity {
+    schema: u32,
+    version: String,
+    frames_per_part: NonZeroUsize,
+    frames: usize,
+    /// Hash of the frames' names.
+    names: String,
+    configuration: Value,
+}
+
+/// The directory of an archive.
+#[derive(Debug)]
+pub struct Archive {
+    directory: PathBuf,
+    plan: Plan,
+    /// The identity as text, which is part of each name.
+    identity: String,
+}
+
+impl Archive {
+    /// Takes `directory` for these frames and this configuration, or goes on in it.
+    ///
+    /// # Errors
+    /// [`ArchiveError::OtherRun`] if it belongs to another run, [`ArchiveError::Foreign`] if it has
+    /// tables of another kind, [`ArchiveError::File`], [`ArchiveError::Json`].
+    pub fn claim(directory: &Path, plan: Plan, configuration: Value) -> Result<Self, ArchiveError> {
+        for table in [FRAMES, STARS] {
+            let path = directory.join(table);
+            let made = fs::create_dir_all(directory);
+            made.map_err(ArchiveError::file("making the directory", directory))?;
+            if path.exists() && !directory.join(IDENTITY).exists() {
+                return Err(ArchiveError::Foreign {
+                    directory: directory.to_owned(),
+                    name: table,
+                });
+            }
+        }
+        let path = directory.join(IDENTITY);
+        let wanted = Identity {
+            schema: SCHEMA,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            frames_per_part: plan.frames_per_part(),
+            frames: plan.names().len(),
+            names: format!("{:016x}", plan.hash()),
+            configuration,
+        };
+        let wanted = serde_json::to_value(&wanted).map_err(ArchiveError::json(&path))?;
+        let identity = format!("{wanted:#}\n");
+        if !is_claimed(&path, &identity)? {
+            // Another worker may have been faster.
+            check_same(directory, &path, &wanted)?;
+        }
+        let archive = Self {
+            directory: directory.to_owned(),
+            plan,
+            identity,
+        };
+        archive.write_inputs()?;
+        Ok(archive)
+    }
+
+    /// The archive in `directory`.
+    ///
+    /// # Errors
+    /// [`ArchiveError::NoArchive`], [`ArchiveError::File`], [`ArchiveError::Json`].
+    pub fn open(directory: &Path) -> Result<Self, ArchiveError> {
+        let (path, inputs) = (directory.join(IDENTITY), directory.join(INPUTS));
+        let identity = match fs::read_to_string(&path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => {
+                return Err(ArchiveError::NoArchive(directory.to_owned()));
+            }
+            read => read.map_err(ArchiveError::file("reading", &path))?,
+        };
+        let known: Identity = serde_json::from_str(&identity).map_err(ArchiveError::json(&path))?;
+        let names = fs::read_to_string(&inputs).map_err(ArchiveError::file("reading", &inputs))?;
+        let names = names.lines().map(str::to_owned).collect();
+        Ok(Self {
+            directory: directory.to_owned(),
+            plan: Plan::new(names, known.frames_per_part)?,
+            identity,
+        })
+    }
+
+    /// The directory.
+    pub fn directory(&self) -> &Path {
+        &self.directory
+    }
+
+    /// Its frames and parts.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The file of a part of the table of frames.
+    pub fn frames_of(&self, part: &Part<'_>) -> PathBuf {
+        self.table_of(FRAMES, part)
+    }
+
+    /// The file of a part of the table of stars.
+    pub fn stars_of(&self, part: &Part<'_>) -> PathBuf {
+        self.table_of(STARS, part)
+    }
+
+    fn table_of(&self, table: &str, part: &Part<'_>) -> PathBuf {
+        self.directory
+            .join(table)
+            .join(part.file_name(&self.identity))
+    }
+
+    /// Whether a part is written.
+    pub fn has(&self, part: &Part<'_>) -> bool {
+        // The table of frames is written last.
+        self.frames_of(part).exists()
+    }
+
+    /// Begins to write a part.
+    ///
+    /// # Errors
+    /// [`ArchiveError::File`], [`ArchiveError::Table`].
+    pub fn write(&self, part: &Part<'_>) -> Result<PartWriter, ArchiveError> {
+        Ok(PartWriter {
+            frames: open_table(self.frames_of(part), "frames", FrameRow::columns())?,
+            stars: open_table(self.stars_of(part), "stars", StarRow::columns())?,
+        })
+    }
+
+    fn write_inputs(&self) -> Result<(), ArchiveError> {
+        let path = self.directory.join(INPUTS);
+        if path.exists() {
+            return Ok(());
+        }
+        let names = self.plan.names().join("\n") + "\n";
+        files::write(&path, names.as_bytes()).map_err(ArchiveError::file("writing", &path))
+    }
+}
+
+/// A table that takes its name when it is finished.
+struct OpenTable<R> {
+    path: PathBuf,
+    writer: TableWriter<R, NamedTempFile>,
+}
+
+/// Writes the rows of a part. It is there when it is finished, and not before.
+pub struct PartWriter {
+    frames: OpenTable<FrameRow>,
+    stars: OpenTable<StarRow>,
+}
+
+impl PartWriter {
+    /// Adds a frame and its stars.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Table`].
+    pub fn add(
+        &mut self,
+        frame: FrameRow,
+        stars: impl IntoIterator<Item = StarRow>,
+    ) -> Result<(), ArchiveError> {
+        self.frames.add(frame)?;
+        stars.into_iter().try_for_each(|star| self.stars.add(star))
+    }
+
+    /// Finishes the part.
+    ///
+    /// # Errors
+    /// [`ArchiveError::File`], [`ArchiveError::Table`].
+    pub fn finish(self) -> Result<(), ArchiveError> {
+        self.stars.finish()?;
+        self.frames.finish()
+    }
+}
+
+fn open_table<R>(
+    path: PathBuf,
+    table: &str,
+    columns: Vec<Column<R>>,
+) -> Result<OpenTable<R>, ArchiveError> {
+    if let Some(parent) = path.parent() {
+        fs::create_dir_all(parent).map_err(ArchiveError::file("making the directory", parent))?;
+    }
+    let target = files::beside(&path).map_err(ArchiveError::file("writing", &path))?;
+    let writer = TableWriter::new(target, table, columns);
+    let writer = writer.map_err(ArchiveError::table("writing", &path))?;
+    Ok(OpenTable { path, writer })
+}
+
+impl<R> OpenTable<R> {
+    fn add(&mut self, row: R) -> Result<(), ArchiveError> {
+        let added = self.writer.add(row);
+        added.map_err(ArchiveError::table("writing", &self.path))
+    }
+
+    fn finish(self) -> Result<(), ArchiveError> {
+        let Self { path, writer } = self;
+        let written = writer
+            .finish()
+            .map_err(ArchiveError::table("writing", &path))?;
+        files::finish(written, &path).map_err(ArchiveError::file("writing", &path))
+    }
+}
+
+/// Writes the identity unless there is one; says whether it was written.
+fn is_claimed(path: &Path, identity: &str) -> Result<bool, ArchiveError> {
+    let error = ArchiveError::file("writing", path);
+    if path.exists() {
+        return Ok(false);
+    }
+    let claim = || {
+        let mut file = files::beside(path)?;
+        file.write_all(identity.as_bytes())?;
+        file.as_file().sync_all()?;
+        match file.persist_noclobber(path) {
+            Ok(_) => Ok(true),
+            Err(refused) if refused.error.kind() == ErrorKind::AlreadyExists => Ok(false),
+            Err(refused) => Err(refused.error),
+        }
+    };
+    claim().map_err(error)
+}
+
+/// Refuses a directory of another run.
+fn check_same(directory: &Path, path: &Path, wanted: &Value) -> Result<(), ArchiveError> {
+    let text = fs::read_to_string(path).map_err(ArchiveError::file("reading", path))?;
+    let found: Value = serde_json::from_str(&text).map_err(ArchiveError::json(path))?;
+    let differences = differences(&found, wanted);
+    if differences.is_empty() {
+        return Ok(());
+    }
+    Err(ArchiveError::OtherRun {
+        directory: directory.to_owned(),
+        differences: differences.join(", "),
+    })
+}

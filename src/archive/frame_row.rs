@@ -1,0 +1,253 @@
+//! A row of the table of frames.
+
+use crate::base::coords::{Icrs, UnitVector};
+use crate::base::epoch::ObservationDate;
+use crate::base::table::{Column, Meaning, column};
+use crate::base::units::DEG_PER_RAD;
+use crate::pipeline::{Outcome, Solution};
+use crate::report::FrameReport;
+
+/// A frame, as its report has it; names that begin with `s_` and `t_` are those of ObsCore.
+///
+/// There are no run times: the same frames make the same rows.
+///
+/// # Reference
+/// Louys et al. 2017, ObsCore 1.1, IVOA recommendation.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[expect(missing_docs, reason = "`columns` has unit and description of each")]
+pub struct FrameRow {
+    pub frame: String,
+    pub status: String,
+    pub reason_code: Option<String>,
+    pub reason: Option<String>,
+    pub night: Option<String>,
+    pub t_min: Option<f64>,
+    pub t_exptime: Option<f64>,
+    pub instrument_name: Option<String>,
+    pub width: Option<u64>,
+    pub height: Option<u64>,
+    pub s_ra: Option<f64>,
+    pub s_dec: Option<f64>,
+    pub s_fov: Option<f64>,
+    pub s_region: Option<String>,
+    pub up_pa_deg: Option<f64>,
+    pub qw: Option<f64>,
+    pub qx: Option<f64>,
+    pub qy: Option<f64>,
+    pub qz: Option<f64>,
+    pub sigma_x_arcsec: Option<f64>,
+    pub sigma_y_arcsec: Option<f64>,
+    pub sigma_roll_arcsec: Option<f64>,
+    pub fov_x_deg: Option<f64>,
+    pub fov_y_deg: Option<f64>,
+    pub focal_length_px: Option<f64>,
+    pub mirrored: Option<bool>,
+    pub detected: Option<u64>,
+    pub matched: Option<u64>,
+    pub rms_px: Option<f64>,
+    pub log10_false_alarm: Option<f64>,
+    pub background: Option<f64>,
+    pub noise: Option<f64>,
+    pub zero_point_vmag: Option<f64>,
+    pub zero_point_sigma_mag: Option<f64>,
+    pub limit50_vmag: Option<f64>,
+    pub limit50_sigma_mag: Option<f64>,
+    pub predicted_limit50_vmag: Option<f64>,
+    pub limit_difference_mag: Option<f64>,
+    pub faintest_vmag: Option<f64>,
+    pub sky_mag_arcsec2: Option<f64>,
+    pub airmass: Option<f64>,
+    pub notes: String,
+    pub star_rows: u64,
+}
+
+/// Status of a frame that could not be read or searched.
+pub(super) const UNREAD: &str = "unread";
+
+impl FrameRow {
+    /// The row of a solved frame.
+    pub fn new(report: &FrameReport, solution: &Solution) -> Self {
+        let is_identified = report.is_identified();
+        let status = if is_identified {
+            "identified"
+        } else {
+            "not_identified"
+        };
+        let date = solution.date.map(|known| known.date);
+        let notes: Vec<&str> = report.notes.iter().map(|note| note.code).collect();
+        let photometry = report.photometry.as_ref();
+        let prediction = report.prediction.as_ref();
+        let magnitude = report.magnitude.as_ref();
+        Self {
+            frame: report.frame.clone(),
+            status: status.to_owned(),
+            reason_code: report.reason_code.map(str::to_owned),
+            reason: report.reason.clone(),
+            night: date.map(|date| night(date, solution)),
+            t_min: date.and_then(|date| date.modified_julian_date()),
+            t_exptime: report.exposure_s,
+            instrument_name: prediction.map(|prediction| prediction.camera.clone()),
+            width: Some(report.width as u64),
+            height: Some(report.height as u64),
+            background: report.background.level,
+            noise: report.background.noise,
+            detected: Some(report.stars.len() as u64),
+            zero_point_vmag: photometry.and_then(|p| p.zero_point_vmag),
+            zero_point_sigma_mag: photometry.and_then(|p| p.zero_point_sigma_mag),
+            limit50_vmag: photometry.and_then(|p| p.limit50_vmag),
+            limit50_sigma_mag: photometry.and_then(|p| p.limit50_sigma_mag),
+            predicted_limit50_vmag: prediction.and_then(|p| p.limit50_vmag),
+            limit_difference_mag: magnitude.and_then(|m| m.limit_difference_mag),
+            faintest_vmag: magnitude.map(|m| m.faintest_vmag),
+            sky_mag_arcsec2: prediction.and_then(|p| p.sky_mag_arcsec2),
+            airmass: report.observation.as_ref().and_then(|o| o.airmass),
+            notes: notes.join(","),
+            star_rows: report.stars.len() as u64,
+            ..Self::default()
+        }
+        .with_pointing(report)
+        .with_region(solution)
+    }
+
+    /// The row of a frame that could not be read or searched, and why.
+    pub fn unread(frame: &str, reason: String) -> Self {
+        Self {
+            frame: frame.to_owned(),
+            status: UNREAD.to_owned(),
+            reason_code: Some(UNREAD.to_owned()),
+            reason: Some(reason),
+            ..Self::default()
+        }
+    }
+
+    fn with_pointing(self, report: &FrameReport) -> Self {
+        let (Some(attitude), Some(optics), Some(matched)) =
+            (&report.attitude, &report.optics, &report.matched)
+        else {
+            return self;
+        };
+        let [qw, qx, qy, qz] = attitude.quaternion.map(Some);
+        let sigma = &attitude.sigma_arcsec;
+        Self {
+            s_ra: Some(attitude.ra_deg),
+            s_dec: Some(attitude.dec_deg),
+            up_pa_deg: Some(attitude.up_pa_deg),
+            qw,
+            qx,
+            qy,
+            qz,
+            sigma_x_arcsec: Some(sigma.x),
+            sigma_y_arcsec: Some(sigma.y),
+            sigma_roll_arcsec: Some(sigma.roll),
+            fov_x_deg: Some(optics.fov_x_deg),
+            fov_y_deg: Some(optics.fov_y_deg),
+            focal_length_px: Some(optics.focal_length_px),
+            mirrored: Some(optics.mirrored),
+            matched: Some(matched.matched as u64),
+            rms_px: Some(matched.rms_px),
+            log10_false_alarm: Some(matched.log10_false_alarm),
+            ..self
+        }
+    }
+
+    /// Sets the frame's outline on the sky, and the diameter of the circle around it.
+    fn with_region(self, solution: &Solution) -> Self {
+        let Outcome::Identified(found) = &solution.outcome else {
+            return self;
+        };
+        let (camera, sky) = (&found.camera, found.icrs_to_camera.inverse());
+        let [top_left, top_right, bottom_left, bottom_right] = camera.corners();
+        let outline = [top_left, top_right, bottom_right, bottom_left];
+        let corners = outline.map(|pixel| sky.apply(&camera.direction_of(&pixel)));
+        let diameter_deg = 2.0 * camera.radius_rad() * DEG_PER_RAD;
+        Self {
+            s_fov: Some((diameter_deg * 1e5).round() / 1e5),
+            s_region: Some(polygon(&corners)),
+            ..self
+        }
+    }
+
+    /// The columns of the table `frames`.
+    pub fn columns() -> Vec<Column<Self>> {
+        macro_rules! columns {
+            ($($field:ident, $unit:literal, $ucd:literal, $description:literal;)*) => {
+                vec![$(column!(Self, $field, Meaning {
+                    unit: $unit,
+                    ucd: $ucd,
+                    description: $description,
+                })),*]
+            };
+        }
+        columns! {
+            frame, "", "meta.id;meta.main", "name of the frame";
+            status, "", "meta.code.status", "identified, not_identified or unread";
+            reason_code, "", "meta.code", "why it is not identified, as a code";
+            reason, "", "meta.note", "why it is not identified";
+            night, "", "time.epoch", "date of the evening before, in local mean time where the site is known";
+            t_min, "d", "time.start;obs.exposure", "date of the frame as Modified Julian Date (UTC)";
+            t_exptime, "s", "time.duration;obs.exposure", "exposure";
+            instrument_name, "", "meta.id;instr", "the stated camera";
+            width, "pix", "", "columns of the frame";
+            height, "pix", "", "rows of the frame";
+            s_ra, "deg", "pos.eq.ra;meta.main", "right ascension of the centre (ICRS)";
+            s_dec, "deg", "pos.eq.dec;meta.main", "declination of the centre (ICRS)";
+            s_fov, "deg", "phys.angSize;instr.fov", "diameter of the circle around the frame";
+            s_region, "", "pos.outline;obs.field", "outline of the frame (STC-S, ICRS)";
+            up_pa_deg, "deg", "pos.posAng", "position angle of the picture's up direction";
+            qw, "", "", "quaternion that turns ICRS vectors into camera axes, w";
+            qx, "", "", "the same, x";
+            qy, "", "", "the same, y";
+            qz, "", "", "the same, z";
+            sigma_x_arcsec, "arcsec", "stat.error;pos", "standard error of the rotation about the x axis";
+            sigma_y_arcsec, "arcsec", "stat.error;pos", "standard error of the rotation about the y axis";
+            sigma_roll_arcsec, "arcsec", "stat.error;pos.posAng", "standard error of the rotation about the boresight";
+            fov_x_deg, "deg", "phys.angSize;instr.fov", "horizontal field of view";
+            fov_y_deg, "deg", "phys.angSize;instr.fov", "vertical field of view";
+            focal_length_px, "pix", "instr.param", "focal length over pixel pitch";
+            mirrored, "", "meta.code", "whether the optics mirror the sky";
+            detected, "", "meta.number", "detections";
+            matched, "", "meta.number", "detections with the name of a star";
+            rms_px, "pix", "stat.stdev;stat.fit.residual", "RMS residual of the named stars";
+            log10_false_alarm, "", "stat.probability", "log10 of the false-alarm probability";
+            background, "", "instr.background", "median background, in units of the frame";
+            noise, "", "stat.stdev;instr.background", "noise of a pixel, in units of the frame";
+            zero_point_vmag, "mag", "phot.mag;arith.zp", "V magnitude of a star that gives 1 unit, a second where the exposure is known";
+            zero_point_sigma_mag, "mag", "stat.error;phot.mag;arith.zp", "standard error of the zero point";
+            limit50_vmag, "mag", "phot.mag;em.opt.V;stat.max", "V magnitude at which half of the stars are detected";
+            limit50_sigma_mag, "mag", "stat.error;phot.mag;em.opt.V", "standard error of the limit";
+            predicted_limit50_vmag, "mag", "phot.mag;em.opt.V;meta.modelled", "the limit that the stated camera should reach";
+            limit_difference_mag, "mag", "phot.mag;arith.diff", "measured minus predicted limit";
+            faintest_vmag, "mag", "phot.mag;em.opt.V;stat.max", "V magnitude of the faintest named star";
+            sky_mag_arcsec2, "mag/arcsec**2", "phot.mag.sb;em.opt.V", "sky brightness";
+            airmass, "", "obs.airMass", "airmass of the centre";
+            notes, "", "meta.note", "codes of what is odd about the frame";
+            star_rows, "", "meta.number", "rows of the frame in the table of stars";
+        }
+    }
+}
+
+/// An outline in STC-S.
+fn polygon(corners: &[UnitVector<Icrs>]) -> String {
+    let mut text = "POLYGON ICRS".to_owned();
+    for corner in corners {
+        let (ra_rad, dec_rad) = corner.to_ra_dec();
+        for angle_rad in [ra_rad, dec_rad] {
+            text += &format!(" {:.5}", angle_rad * DEG_PER_RAD);
+        }
+    }
+    text
+}
+
+/// The date of the evening before: from noon to noon, in local mean time where the site is known.
+fn night(date: ObservationDate, solution: &Solution) -> String {
+    const HALF_A_DAY: f64 = 0.5;
+    let Some(days) = date.modified_julian_date() else {
+        return date.to_iso();
+    };
+    let lon_deg = solution.site.map_or(0.0, |site| site.lon_deg());
+    let evening = (days + lon_deg / 360.0 - HALF_A_DAY).floor();
+    ObservationDate::from_modified_julian_date(evening).map_or_else(
+        || date.to_iso(),
+        |evening| evening.to_iso()[..10].to_owned(),
+    )
+}

@@ -1,0 +1,96 @@
+//! One file of each table, of all parts.
+
+use super::directory::Archive;
+use super::error::ArchiveError;
+use super::read::open;
+use crate::base::files;
+use parquet::column::writer::ColumnCloseResult;
+use parquet::errors::Result;
+use parquet::file::metadata::{KeyValue, RowGroupMetaData};
+use parquet::file::properties::WriterProperties;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::file::writer::SerializedFileWriter;
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Writes `frames.parquet` and `stars.parquet` with the rows of all parts into the directory `out`.
+/// Rows are in the order of the frames' names; they are copied as they are.
+///
+/// # Errors
+/// [`ArchiveError::Unfinished`] if parts are missing, [`ArchiveError::File`],
+/// [`ArchiveError::Table`].
+pub fn merge(archive: &Archive, out: &Path) -> std::result::Result<[PathBuf; 2], ArchiveError> {
+    let parts: Vec<_> = archive.plan().parts().collect();
+    let missing = parts.iter().filter(|part| !archive.has(part)).count();
+    if missing > 0 {
+        return Err(ArchiveError::Unfinished {
+            directory: archive.directory().to_owned(),
+            missing,
+            parts: parts.len(),
+        });
+    }
+    let targets = ["frames.parquet", "stars.parquet"].map(|name| out.join(name));
+    let frames = parts.iter().map(|part| archive.frames_of(part));
+    concatenate(&frames.collect::<Vec<_>>(), &targets[0])?;
+    let stars = parts.iter().map(|part| archive.stars_of(part));
+    concatenate(&stars.collect::<Vec<_>>(), &targets[1])?;
+    Ok(targets)
+}
+
+fn concatenate(parts: &[PathBuf], target: &Path) -> std::result::Result<(), ArchiveError> {
+    let failed = ArchiveError::table("writing", target);
+    let mut writer = None;
+    for path in parts {
+        let reader = open(path)?;
+        let writer = match &mut writer {
+            Some(writer) => writer,
+            none => {
+                let file = files::beside(target).map_err(ArchiveError::file("writing", target))?;
+                none.insert(begin(file, &reader).map_err(&failed)?)
+            }
+        };
+        let source = File::open(path).map_err(ArchiveError::file("reading", path))?;
+        for group in reader.metadata().row_groups() {
+            copy(&source, group, writer).map_err(&failed)?;
+        }
+    }
+    let Some(writer) = writer else { return Ok(()) };
+    let written = writer.into_inner().map_err(&failed)?;
+    files::finish(written, target).map_err(ArchiveError::file("writing", target))
+}
+
+/// A table with the columns and the metadata of `part`.
+fn begin<W: Write + Send>(
+    target: W,
+    part: &SerializedFileReader<File>,
+) -> Result<SerializedFileWriter<W>> {
+    let metadata = part.metadata().file_metadata();
+    let named: Option<Vec<KeyValue>> = metadata.key_value_metadata().cloned();
+    let properties = WriterProperties::builder().set_key_value_metadata(named);
+    let schema = metadata.schema_descr().root_schema_ptr();
+    SerializedFileWriter::new(target, schema, Arc::new(properties.build()))
+}
+
+/// Copies a group of rows as it is.
+fn copy<W: Write + Send>(
+    source: &File,
+    group: &RowGroupMetaData,
+    writer: &mut SerializedFileWriter<W>,
+) -> Result<()> {
+    let mut copied = writer.next_row_group()?;
+    for column in group.columns() {
+        let result = ColumnCloseResult {
+            bytes_written: column.compressed_size().cast_unsigned(),
+            rows_written: group.num_rows().cast_unsigned(),
+            metadata: column.clone(),
+            bloom_filter: None,
+            column_index: None,
+            offset_index: None,
+        };
+        copied.append_column(source, result)?;
+    }
+    copied.close()?;
+    Ok(())
+}

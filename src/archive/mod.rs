@@ -1,0 +1,36 @@
+//! What do many frames show? Tables of frames and stars in Parquet, made in parts.
+//!
+//! names of frames and a configuration → [`Plan`] → for each [`Part`] its rows → [`Archive`] →
+//! [`status`], [`merge`], [`summary`]
+//!
+//! 1. The names are sorted, and cut into parts of a fixed number of frames. A worker takes every
+//!    n-th part ([`Plan::shard`]), so the parts do not depend on the number of workers.
+//! 2. A part is written whole: its name has a hash of its frames and of the configuration. A part that
+//!    is there is done.
+//! 3. A directory belongs to one list of frames and one configuration ([`Archive::claim`]). Another
+//!    one is refused, and told what differs.
+//!
+//! Both tables have VOTable metadata: unit, UCD and description of every column.
+
+mod directory;
+mod error;
+mod frame_row;
+mod merge;
+mod nights;
+mod plan;
+mod read;
+mod star_row;
+mod status;
+mod votable;
+mod write;
+
+pub use directory::{Archive, PartWriter, SCHEMA};
+pub use error::ArchiveError;
+pub use frame_row::FrameRow;
+pub use merge::merge;
+pub use nights::{NightSummary, summary};
+pub use plan::{DEFAULT_FRAMES_PER_PART, Part, Plan, Shard};
+pub use read::names_in;
+pub use star_row::StarRow;
+pub use status::{Status, UnreadFrame, status};
+pub use write::TableWriter;

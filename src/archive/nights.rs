@@ -1,0 +1,168 @@
+//! How faint did each camera see in each night?
+
+use super::directory::Archive;
+use super::error::ArchiveError;
+use super::frame_row::UNREAD;
+use super::read::{for_each_row, number, text};
+use crate::base::coords::{Icrs, UnitVector};
+use crate::base::statistics::median;
+use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
+use parquet::record::Row;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The columns that the summary needs.
+const COLUMNS: [&str; 14] = [
+    "status",
+    "reason_code",
+    "night",
+    "t_min",
+    "instrument_name",
+    "s_ra",
+    "s_dec",
+    "zero_point_vmag",
+    "limit50_vmag",
+    "predicted_limit50_vmag",
+    "limit_difference_mag",
+    "sky_mag_arcsec2",
+    "noise",
+    "airmass",
+];
+
+/// What one camera saw in one night. Values are medians over its frames.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct NightSummary {
+    /// Date of the evening; `None` for frames without a date.
+    pub night: Option<String>,
+    /// The stated camera.
+    pub instrument_name: Option<String>,
+    /// All frames.
+    pub frames: usize,
+    /// Identified frames.
+    pub identified: usize,
+    /// Frames that could not be read or searched.
+    pub unread: usize,
+    /// Number of frames that are not identified or not read, by the code of the reason.
+    pub reasons: BTreeMap<String, usize>,
+    /// V magnitude at which half of the stars are detected.
+    pub limit50_vmag: Option<f64>,
+    /// The limit that the camera should reach.
+    pub predicted_limit50_vmag: Option<f64>,
+    /// Measured minus predicted limit, of the frames that have both.
+    pub limit_difference_mag: Option<f64>,
+    /// Sky brightness in V.
+    pub sky_mag_arcsec2: Option<f64>,
+    /// Zero point.
+    pub zero_point_vmag: Option<f64>,
+    /// Largest difference of the zero point from that median.
+    pub zero_point_change_mag: Option<f64>,
+    /// Largest angle, in degrees, between the directions of two successive frames in a system that
+    /// turns with the Earth: 0 for a camera that stands still.
+    pub pointing_drift_deg: Option<f64>,
+}
+
+/// One night of one camera: its frames.
+#[derive(Default)]
+struct Night {
+    summary: NightSummary,
+    limits: Vec<f64>,
+    predicted: Vec<f64>,
+    differences: Vec<f64>,
+    skies: Vec<f64>,
+    zero_points: Vec<f64>,
+    /// Date (MJD), and direction in the system that turns with the Earth.
+    pointings: Vec<(f64, UnitVector<Icrs>)>,
+}
+
+/// What each camera saw in each night, by night and camera.
+///
+/// # Errors
+/// [`ArchiveError::File`], [`ArchiveError::Table`].
+pub fn summary(archive: &Archive) -> Result<Vec<NightSummary>, ArchiveError> {
+    let mut nights: BTreeMap<[Option<String>; 2], Night> = BTreeMap::new();
+    for part in archive.plan().parts().filter(|part| archive.has(part)) {
+        for_each_row(&archive.frames_of(&part), &COLUMNS, |row| {
+            let key = ["night", "instrument_name"].map(|name| text(row, name).map(str::to_owned));
+            nights.entry(key).or_default().add(row);
+        })?;
+    }
+    let finished = nights
+        .into_iter()
+        .map(|([night, instrument_name], frames)| NightSummary {
+            night,
+            instrument_name,
+            ..frames.finish()
+        });
+    Ok(finished.collect())
+}
+
+impl Night {
+    fn add(&mut self, row: &Row) {
+        let summary = &mut self.summary;
+        summary.frames += 1;
+        match text(row, "status") {
+            Some("identified") => summary.identified += 1,
+            Some(UNREAD) => summary.unread += 1,
+            _ => {}
+        }
+        if let Some(code) = text(row, "reason_code") {
+            *summary.reasons.entry(code.to_owned()).or_default() += 1;
+        }
+        let values = [
+            (&mut self.limits, "limit50_vmag"),
+            (&mut self.predicted, "predicted_limit50_vmag"),
+            (&mut self.differences, "limit_difference_mag"),
+            (&mut self.skies, "sky_mag_arcsec2"),
+            (&mut self.zero_points, "zero_point_vmag"),
+        ];
+        for (values, column) in values {
+            values.extend(number(row, column));
+        }
+        let [t_min, ra_deg, dec_deg] = ["t_min", "s_ra", "s_dec"].map(|name| number(row, name));
+        if let (Some(t_min), Some(ra_deg), Some(dec_deg)) = (t_min, ra_deg, dec_deg) {
+            let turned_rad = ra_deg * RAD_PER_DEG - earth_rotation_rad(t_min);
+            let direction = UnitVector::from_ra_dec(turned_rad, dec_deg * RAD_PER_DEG);
+            self.pointings.push((t_min, direction));
+        }
+    }
+
+    fn finish(mut self) -> NightSummary {
+        let zero_point_vmag = median_of(&mut self.zero_points);
+        let change = |median: f64| {
+            let changes = self.zero_points.iter().map(|zero| (zero - median).abs());
+            changes.fold(0.0, f64::max)
+        };
+        NightSummary {
+            limit50_vmag: median_of(&mut self.limits),
+            predicted_limit50_vmag: median_of(&mut self.predicted),
+            limit_difference_mag: median_of(&mut self.differences),
+            sky_mag_arcsec2: median_of(&mut self.skies),
+            zero_point_vmag,
+            zero_point_change_mag: zero_point_vmag.map(change),
+            pointing_drift_deg: drift_deg(self.pointings),
+            ..self.summary
+        }
+    }
+}
+
+fn median_of(values: &mut [f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| median(values))
+}
+
+fn drift_deg(mut pointings: Vec<(f64, UnitVector<Icrs>)>) -> Option<f64> {
+    pointings.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    let steps = pointings.windows(2);
+    let steps = steps.map(|pair| pair[0].1.angle_to(&pair[1].1) * DEG_PER_RAD);
+    steps.reduce(f64::max)
+}
+
+/// Rotation of the Earth since a fixed time.
+///
+/// # Reference
+/// Capitaine et al. 2000, A&A 355, 398; UT1 is taken as UTC, 0.004° at most.
+fn earth_rotation_rad(mjd: f64) -> f64 {
+    const TURNS_PER_DAY: f64 = 1.002_737_811_911_354_48;
+    const TURNS_AT_J2000: f64 = 0.779_057_273_264;
+    let turns = TURNS_AT_J2000 + TURNS_PER_DAY * (mjd - 51_544.5);
+    std::f64::consts::TAU * turns.fract()
+}

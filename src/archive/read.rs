@@ -1,0 +1,102 @@
+//! Reads columns of tables.
+
+use super::error::ArchiveError;
+use parquet::basic::{ConvertedType, LogicalType};
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::{Field, Row};
+use parquet::schema::types::Type;
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Calls `each` with every row of a table, of which only these columns are read; columns come in the
+/// order of the table.
+pub(super) fn for_each_row(
+    path: &Path,
+    columns: &[&str],
+    mut each: impl FnMut(&Row),
+) -> Result<(), ArchiveError> {
+    let error = ArchiveError::table("reading", path);
+    let reader = open(path)?;
+    let schema = projected(&reader, columns).map_err(&error)?;
+    let rows = reader.get_row_iter(Some(schema)).map_err(&error)?;
+    for row in rows {
+        each(&row.map_err(&error)?);
+    }
+    Ok(())
+}
+
+/// Opens a table.
+pub(super) fn open(path: &Path) -> Result<SerializedFileReader<File>, ArchiveError> {
+    let file = File::open(path).map_err(ArchiveError::file("reading", path))?;
+    SerializedFileReader::new(file).map_err(ArchiveError::table("reading", path))
+}
+
+/// The schema of the columns with these names.
+fn projected(
+    reader: &SerializedFileReader<File>,
+    columns: &[&str],
+) -> parquet::errors::Result<Type> {
+    let schema = reader.metadata().file_metadata().schema();
+    let wanted: Vec<Arc<Type>> = schema
+        .get_fields()
+        .iter()
+        .filter(|field| columns.contains(&field.name()))
+        .cloned()
+        .collect();
+    Type::group_type_builder(schema.name())
+        .with_fields(wanted)
+        .build()
+}
+
+/// The value of a column, if it is a number.
+pub(super) fn number(row: &Row, column: &str) -> Option<f64> {
+    match field(row, column)? {
+        Field::Double(value) => Some(*value),
+        _ => None,
+    }
+}
+
+/// The value of a column, if it is text.
+pub(super) fn text<'r>(row: &'r Row, column: &str) -> Option<&'r str> {
+    match field(row, column)? {
+        Field::Str(value) => Some(value),
+        _ => None,
+    }
+}
+
+fn field<'r>(row: &'r Row, column: &str) -> Option<&'r Field> {
+    let found = row.get_column_iter().find(|(name, _)| *name == column);
+    found.map(|(_, field)| field)
+}
+
+/// The names in a table: its column `frame`, or its only column of text.
+///
+/// # Errors
+/// [`ArchiveError::NoNames`] if there is no such column, [`ArchiveError::File`],
+/// [`ArchiveError::Table`].
+pub fn names_in(path: &Path) -> Result<Vec<String>, ArchiveError> {
+    let reader = open(path)?;
+    let schema = reader.metadata().file_metadata().schema();
+    let is_text = |field: &&Arc<Type>| {
+        let info = field.get_basic_info();
+        info.converted_type() == ConvertedType::UTF8
+            || info.logical_type_ref() == Some(&LogicalType::String)
+    };
+    let texts: Vec<&str> = schema
+        .get_fields()
+        .iter()
+        .filter(is_text)
+        .map(|field| field.name())
+        .collect();
+    let column = match texts[..] {
+        [only] => only,
+        _ if texts.contains(&"frame") => "frame",
+        _ => return Err(ArchiveError::NoNames(path.to_owned())),
+    };
+    let mut names = Vec::new();
+    for_each_row(path, &[column], |row| {
+        names.extend(text(row, column).map(str::to_owned));
+    })?;
+    Ok(names)
+}

@@ -1,0 +1,80 @@
+//! How far an archive is.
+
+use super::directory::Archive;
+use super::error::ArchiveError;
+use super::frame_row::UNREAD;
+use super::read::{for_each_row, text};
+use serde::Serialize;
+
+/// How far an archive is.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct Status {
+    /// Parts in all.
+    pub parts: usize,
+    /// Parts that are written.
+    pub parts_done: usize,
+    /// Numbers of the parts that are missing, from 0.
+    pub missing_parts: Vec<usize>,
+    /// Frames in all.
+    pub frames: usize,
+    /// Frames in the parts that are written.
+    pub frames_done: usize,
+    /// Identified frames.
+    pub identified: usize,
+    /// Frames that are not identified.
+    pub not_identified: usize,
+    /// Frames that could not be read or searched.
+    pub unread: Vec<UnreadFrame>,
+}
+
+/// A frame that could not be read or searched.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct UnreadFrame {
+    /// Its name.
+    pub frame: String,
+    /// Why.
+    pub reason: String,
+}
+
+impl Status {
+    /// Whether all parts are written.
+    pub fn is_complete(&self) -> bool {
+        self.parts_done == self.parts
+    }
+}
+
+/// How far `archive` is.
+///
+/// # Errors
+/// [`ArchiveError::File`], [`ArchiveError::Table`] for a part that is not what was written.
+pub fn status(archive: &Archive) -> Result<Status, ArchiveError> {
+    let plan = archive.plan();
+    let mut status = Status {
+        parts: plan.parts().len(),
+        frames: plan.names().len(),
+        ..Status::default()
+    };
+    for part in plan.parts() {
+        if !archive.has(&part) {
+            status.missing_parts.push(part.number);
+            continue;
+        }
+        status.parts_done += 1;
+        let columns = ["frame", "status", "reason"];
+        for_each_row(&archive.frames_of(&part), &columns, |row| {
+            status.frames_done += 1;
+            match text(row, "status") {
+                Some("identified") => status.identified += 1,
+                Some(UNREAD) => {
+                    let cell = |name| text(row, name).unwrap_or_default().to_owned();
+                    status.unread.push(UnreadFrame {
+                        frame: cell("frame"),
+                        reason: cell("reason"),
+                    });
+                }
+                _ => status.not_identified += 1,
+            }
+        })?;
+    }
+    Ok(status)
+}

@@ -1,0 +1,176 @@
+//! Writes a table as Parquet, group after group of rows.
+
+use super::votable::{CONTENT_KEY, VERSION, VERSION_KEY, votable};
+use crate::base::table::{Column, FieldValue};
+use parquet::basic::Compression;
+use parquet::column::writer::ColumnWriter;
+use parquet::data_type::ByteArray;
+use parquet::errors::{ParquetError, Result};
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::parser::parse_message_type;
+use std::fmt::Write as _;
+use std::io::Write;
+use std::sync::Arc;
+
+/// Rows in memory at once.
+const ROWS_PER_GROUP: usize = 1 << 16;
+
+/// Writes rows to a file. The same rows make the same bytes.
+pub struct TableWriter<R, W: Write + Send> {
+    columns: Vec<Column<R>>,
+    writer: SerializedFileWriter<W>,
+    /// Rows that are not written yet.
+    rows: Vec<R>,
+}
+
+impl<R, W: Write + Send> TableWriter<R, W> {
+    /// A table of this name with these columns.
+    ///
+    /// # Errors
+    /// [`ParquetError`] if the beginning cannot be written.
+    pub fn new(target: W, table: &str, columns: Vec<Column<R>>) -> Result<Self> {
+        let schema = Arc::new(parse_message_type(&schema(table, &columns))?);
+        let metadata = [
+            (VERSION_KEY, VERSION.to_owned()),
+            (CONTENT_KEY, votable(table, &columns)),
+        ];
+        let metadata = metadata.map(|(key, value)| KeyValue::new(key.to_owned(), value));
+        let properties = WriterProperties::builder()
+            .set_compression(Compression::SNAPPY)
+            .set_key_value_metadata(Some(metadata.to_vec()))
+            .build();
+        Ok(Self {
+            writer: SerializedFileWriter::new(target, schema, Arc::new(properties))?,
+            columns,
+            rows: Vec::new(),
+        })
+    }
+
+    /// Adds a row.
+    ///
+    /// # Errors
+    /// [`ParquetError`] if a group of rows cannot be written.
+    pub fn add(&mut self, row: R) -> Result<()> {
+        self.rows.push(row);
+        if self.rows.len() < ROWS_PER_GROUP {
+            return Ok(());
+        }
+        self.write_group()
+    }
+
+    /// Writes what is left, and returns the target.
+    ///
+    /// # Errors
+    /// [`ParquetError`] if it cannot be written.
+    pub fn finish(mut self) -> Result<W> {
+        if !self.rows.is_empty() {
+            self.write_group()?;
+        }
+        self.writer.into_inner()
+    }
+
+    fn write_group(&mut self) -> Result<()> {
+        let mut group = self.writer.next_row_group()?;
+        for column in &self.columns {
+            let missing = || ParquetError::General(format!("{} has no writer", column.name));
+            let mut writer = group.next_column()?.ok_or_else(missing)?;
+            write_column(writer.untyped(), column, &self.rows)?;
+            writer.close()?;
+        }
+        group.close()?;
+        self.rows.clear();
+        Ok(())
+    }
+}
+
+/// The schema in Parquet's own notation.
+fn schema<R>(table: &str, columns: &[Column<R>]) -> String {
+    let mut text = format!("message {table} {{\n");
+    for column in columns {
+        let presence = if column.is_optional {
+            "optional"
+        } else {
+            "required"
+        };
+        let (kind, logical) = match (&column.empty, column.name) {
+            (FieldValue::Integer(_), "seed") => ("int64", " (INTEGER(64, false))"),
+            (FieldValue::Integer(_), _) => ("int64", ""),
+            (FieldValue::Number(_), _) => ("double", ""),
+            (FieldValue::Bool(_), _) => ("boolean", ""),
+            (FieldValue::Text(_), _) => ("binary", " (UTF8)"),
+        };
+        let _ = writeln!(text, "  {presence} {kind} {}{logical};", column.name);
+    }
+    text + "}\n"
+}
+
+fn write_column<R>(writer: &mut ColumnWriter<'_>, column: &Column<R>, rows: &[R]) -> Result<()> {
+    let fields = || rows.iter().map(column.value);
+    let level = |field: FieldValue| i16::from(!is_empty(&field));
+    // Definition levels: 1 for a value, 0 for an empty field.
+    let levels: Option<Vec<i16>> = column.is_optional.then(|| fields().map(level).collect());
+    let levels = levels.as_deref();
+    match writer {
+        ColumnWriter::Int64ColumnWriter(typed) => {
+            let values: Vec<i64> = fields().filter_map(integer).collect();
+            typed.write_batch(&values, levels, None)?;
+        }
+        ColumnWriter::DoubleColumnWriter(typed) => {
+            let values: Vec<f64> = fields().filter_map(number).collect();
+            typed.write_batch(&values, levels, None)?;
+        }
+        ColumnWriter::BoolColumnWriter(typed) => {
+            let values: Vec<bool> = fields().filter_map(boolean).collect();
+            typed.write_batch(&values, levels, None)?;
+        }
+        ColumnWriter::ByteArrayColumnWriter(typed) => {
+            let values: Vec<ByteArray> = fields().filter_map(text).collect();
+            typed.write_batch(&values, levels, None)?;
+        }
+        _ => {
+            let message = format!("column {} has a type that is not supported", column.name);
+            return Err(ParquetError::General(message));
+        }
+    }
+    Ok(())
+}
+
+fn is_empty(field: &FieldValue) -> bool {
+    matches!(
+        field,
+        FieldValue::Integer(None)
+            | FieldValue::Number(None)
+            | FieldValue::Bool(None)
+            | FieldValue::Text(None)
+    )
+}
+
+fn integer(field: FieldValue) -> Option<i64> {
+    match field {
+        FieldValue::Integer(value) => value,
+        _ => None,
+    }
+}
+
+fn number(field: FieldValue) -> Option<f64> {
+    match field {
+        FieldValue::Number(value) => value,
+        _ => None,
+    }
+}
+
+fn boolean(field: FieldValue) -> Option<bool> {
+    match field {
+        FieldValue::Bool(value) => value,
+        _ => None,
+    }
+}
+
+fn text(field: FieldValue) -> Option<ByteArray> {
+    match field {
+        FieldValue::Text(value) => value.map(|text| text.into_bytes().into()),
+        _ => None,
+    }
+}

@@ -1,0 +1,196 @@
+//! `archive`: how far an archive is, its tables in one file each, and what its nights were like.
+
+use super::exit::{CommandError, Exit, Outcome};
+use super::options::format::Format;
+use super::output::files::make_directory;
+use super::output::rows::{csv_table, json_line, json_lines};
+use clap::{Args, Subcommand};
+use starpipe::archive::{Archive, NightSummary, Status, merge, status, summary};
+use starpipe::base::format::{counted, printable};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    starpipe process 'night/*.fits' --out-parquet results\n  \
+    starpipe archive status results\n  \
+    starpipe archive merge results --out tables\n  \
+    starpipe archive report results")]
+pub(crate) struct ArchiveArgs {
+    #[command(subcommand)]
+    command: ArchiveCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum ArchiveCommand {
+    /// Tell what is done, failed and missing; exit status 3 where parts are missing
+    #[command(after_help = "Example:\n  starpipe archive status results")]
+    Status(StatusArgs),
+    /// Write the parts of each table as one file, rows by the name of the frame
+    #[command(after_help = "Example:\n  starpipe archive merge results --out tables")]
+    Merge(MergeArgs),
+    /// Tell for each night and camera how faint the frames went, and what was predicted
+    #[command(after_help = "Example:\n  starpipe archive report results --format csv > nights.csv")]
+    Report(ReportArgs),
+}
+
+#[derive(Debug, Args)]
+struct StatusArgs {
+    /// Directory that process --out-parquet has written
+    directory: PathBuf,
+    /// What to print
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+#[derive(Debug, Args)]
+struct MergeArgs {
+    /// Directory that process --out-parquet has written
+    directory: PathBuf,
+    /// Directory for frames.parquet and stars.parquet
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+struct ReportArgs {
+    /// Directory that process --out-parquet has written
+    directory: PathBuf,
+    /// What to print
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// `starpipe archive`
+pub(crate) fn archive(arguments: &ArchiveArgs) -> Result<Outcome, CommandError> {
+    match &arguments.command {
+        ArchiveCommand::Status(arguments) => tell_status(arguments),
+        ArchiveCommand::Merge(arguments) => merge_tables(arguments),
+        ArchiveCommand::Report(arguments) => report(arguments),
+    }
+}
+
+fn tell_status(arguments: &StatusArgs) -> Result<Outcome, CommandError> {
+    let status = status(&Archive::open(&arguments.directory)?)?;
+    let text = match arguments.format {
+        Format::Text => status_text(&status),
+        Format::Json => json_line(&status)?,
+        Format::Csv => csv_table(status.unread.iter())?,
+    };
+    let exit = if status.is_complete() {
+        Exit::Success
+    } else {
+        Exit::Unmet
+    };
+    Ok(Outcome { text, exit })
+}
+
+fn status_text(status: &Status) -> String {
+    let mut text = format!(
+        "parts      {} of {}\nframes     {} of {}: {} identified, {} not identified, {} unread\n",
+        status.parts_done,
+        status.parts,
+        status.frames_done,
+        status.frames,
+        status.identified,
+        status.not_identified,
+        status.unread.len()
+    );
+    if !status.is_complete() {
+        let missing: Vec<String> = status.missing_parts.iter().map(usize::to_string).collect();
+        let _ = writeln!(text, "missing    parts {}", missing.join(" "));
+    }
+    for unread in &status.unread {
+        let (frame, reason) = (printable(&unread.frame), printable(&unread.reason));
+        let _ = writeln!(text, "unread     {frame}: {reason}");
+    }
+    text
+}
+
+fn merge_tables(arguments: &MergeArgs) -> Result<Outcome, CommandError> {
+    let archive = Archive::open(&arguments.directory)?;
+    make_directory(&arguments.out)?;
+    let files = merge(&archive, &arguments.out)?;
+    let names = files.map(|path| format!("{}\n", path.display()));
+    Ok(Outcome::success(names.concat()))
+}
+
+fn report(arguments: &ReportArgs) -> Result<Outcome, CommandError> {
+    let nights = summary(&Archive::open(&arguments.directory)?)?;
+    Ok(Outcome::success(match arguments.format {
+        Format::Text => nights_text(&nights),
+        Format::Json => json_lines(nights.iter())?,
+        Format::Csv => csv_table(nights.iter().map(NightLine::of))?,
+    }))
+}
+
+/// A night as a line of CSV: its reasons in one cell.
+#[derive(serde::Serialize)]
+struct NightLine<'a> {
+    night: Option<&'a str>,
+    instrument_name: Option<&'a str>,
+    frames: usize,
+    identified: usize,
+    unread: usize,
+    reasons: String,
+    limit50_vmag: Option<f64>,
+    predicted_limit50_vmag: Option<f64>,
+    limit_difference_mag: Option<f64>,
+    sky_mag_arcsec2: Option<f64>,
+    zero_point_vmag: Option<f64>,
+    zero_point_change_mag: Option<f64>,
+    pointing_drift_deg: Option<f64>,
+}
+
+impl<'a> NightLine<'a> {
+    fn of(night: &'a NightSummary) -> Self {
+        Self {
+            night: night.night.as_deref(),
+            instrument_name: night.instrument_name.as_deref(),
+            frames: night.frames,
+            identified: night.identified,
+            unread: night.unread,
+            reasons: reasons_text(night),
+            limit50_vmag: night.limit50_vmag,
+            predicted_limit50_vmag: night.predicted_limit50_vmag,
+            limit_difference_mag: night.limit_difference_mag,
+            sky_mag_arcsec2: night.sky_mag_arcsec2,
+            zero_point_vmag: night.zero_point_vmag,
+            zero_point_change_mag: night.zero_point_change_mag,
+            pointing_drift_deg: night.pointing_drift_deg,
+        }
+    }
+}
+
+fn reasons_text(night: &NightSummary) -> String {
+    let counted = night.reasons.iter();
+    let counted = counted.map(|(code, frames)| format!("{code} {frames}"));
+    counted.collect::<Vec<_>>().join(", ")
+}
+
+fn nights_text(nights: &[NightSummary]) -> String {
+    let mut text =
+        "night       camera            frames  identified   limit  predicted  difference     \
+                    sky  zero point  drift (deg)  reasons\n"
+            .to_owned();
+    for night in nights {
+        let cell = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.2}"));
+        let _ = writeln!(
+            text,
+            "{:<10}  {:<16}  {:>6}  {:>10}  {:>6}  {:>9}  {:>10}  {:>6}  {:>10}  {:>11}  {}",
+            night.night.as_deref().unwrap_or("no date"),
+            printable(night.instrument_name.as_deref().unwrap_or("-")),
+            night.frames,
+            night.identified,
+            cell(night.limit50_vmag),
+            cell(night.predicted_limit50_vmag),
+            cell(night.limit_difference_mag),
+            cell(night.sky_mag_arcsec2),
+            cell(night.zero_point_vmag),
+            cell(night.pointing_drift_deg),
+            reasons_text(night)
+        );
+    }
+    let frames = nights.iter().map(|night| night.frames).sum();
+    text + &format!("{}\n", counted(frames, "frame"))
+}

@@ -1,0 +1,69 @@
+//! Names of many frames: directories, patterns, lists.
+
+use super::stdin::is_stdin;
+use anyhow::{Context, anyhow, bail};
+use starpipe::archive::names_in;
+use starpipe::frame;
+use std::fs;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+/// Extensions of lists of names, one a line.
+const LISTS: [&str; 2] = ["txt", "lst"];
+
+/// The frames that `inputs` name: frames themselves, directories of them, patterns such as
+/// `night/**/*.fits`, lists, and `-` for a list on standard input.
+pub(crate) fn frame_names(inputs: &[PathBuf]) -> anyhow::Result<Vec<String>> {
+    let mut names = Vec::new();
+    for input in inputs {
+        if is_stdin(input) {
+            let mut text = String::new();
+            let read = io::stdin().lock().read_to_string(&mut text);
+            read.context("reading a list of frames from standard input")?;
+            add_lines(&text, &mut names);
+        } else if input.is_dir() {
+            for path in frame::files_in(input)? {
+                names.push(name_of(&path)?);
+            }
+        } else {
+            add_file(input, &mut names)?;
+        }
+    }
+    if let Some(name) = names.iter().find(|name| name.contains('\n')) {
+        bail!("a line break in the name {name:?}: such a frame cannot be listed");
+    }
+    Ok(names)
+}
+
+fn add_file(input: &Path, names: &mut Vec<String>) -> anyhow::Result<()> {
+    let extension = input.extension().and_then(|extension| extension.to_str());
+    let reading = || format!("reading the list of frames {}", input.display());
+    match extension {
+        Some("parquet") => names.extend(names_in(input)?),
+        Some(extension) if LISTS.contains(&extension) => {
+            add_lines(&fs::read_to_string(input).with_context(reading)?, names);
+        }
+        _ if is_pattern(input) => {
+            for path in glob::glob(&name_of(input)?).with_context(reading)? {
+                names.push(name_of(&path.with_context(reading)?)?);
+            }
+        }
+        _ => names.push(name_of(input)?),
+    }
+    Ok(())
+}
+
+fn is_pattern(input: &Path) -> bool {
+    !input.exists() && input.to_string_lossy().contains(['*', '?', '['])
+}
+
+fn add_lines(text: &str, names: &mut Vec<String>) {
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    names.extend(lines.map(str::to_owned));
+}
+
+fn name_of(path: &Path) -> anyhow::Result<String> {
+    let name = path.to_str();
+    let name = name.ok_or_else(|| anyhow!("the name of {} is not UTF-8", path.display()))?;
+    Ok(name.to_owned())
+}

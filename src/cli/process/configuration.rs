@@ -1,0 +1,78 @@
+//! All that the results depend on, so that results of different options are never mixed.
+
+use super::{CalibrationOptions, DetectionOptions, ExposureOptions, ProcessArgs};
+use crate::cli::options::hints::HintOptions;
+use anyhow::Context;
+use clap::ValueEnum;
+use serde_json::{Value, json};
+use starpipe::sky::catalog::Catalog;
+use std::fs;
+use std::path::PathBuf;
+use xxhash_rust::xxh3::xxh3_64;
+
+/// The options as they are given; of files the hash of what is in them.
+pub(super) fn configuration(arguments: &ProcessArgs, catalog: &Catalog) -> anyhow::Result<Value> {
+    // Named one by one: the compiler then asks for new ones.
+    let HintOptions {
+        fov,
+        pixel_scale,
+        scale_error,
+        near,
+        radius,
+        date,
+        site,
+        camera,
+    } = &arguments.solving.hints;
+    let CalibrationOptions {
+        dark,
+        flat,
+        hot_pixels,
+    } = &arguments.calibration;
+    let DetectionOptions {
+        sigma,
+        false_alarms,
+        max_stars,
+        centroid,
+    } = &arguments.detection;
+    let ExposureOptions {
+        exposure,
+        zenith_distance,
+        extinction,
+    } = &arguments.exposure;
+    let centroid = centroid.and_then(|method| method.to_possible_value());
+    Ok(json!({
+        "catalog": {
+            "title": catalog.title(),
+            "stars": catalog.stars().len(),
+            "checksum": format!("{:016x}", catalog.checksum()),
+        },
+        "fov_deg": fov,
+        "pixel_scale_arcsec": pixel_scale,
+        "scale_error_percent": scale_error,
+        "near_deg": near.map(|near| [near.ra_deg, near.dec_deg]),
+        "radius_deg": radius,
+        "date": date.map(|date| date.to_iso()),
+        "site": site.map(|site| [site.lat_deg(), site.lon_deg(), site.height_m()]),
+        "camera": hash_of(camera)?,
+        "dark": hash_of(dark)?,
+        "flat": hash_of(flat)?,
+        "hot_pixels": hash_of(hot_pixels)?,
+        "sigma": sigma,
+        "false_alarms": false_alarms,
+        "max_stars": max_stars,
+        "centroid": centroid.as_ref().map(|method| method.get_name()),
+        "exposure_s": exposure,
+        "zenith_distance_deg": zenith_distance,
+        "extinction_mag": extinction,
+        "name_odds": arguments.solving.name_odds,
+        "attitude_only": arguments.solving.attitude_only,
+        "page": arguments.frames.page,
+    }))
+}
+
+/// The hash of a file's content.
+fn hash_of(path: &Option<PathBuf>) -> anyhow::Result<Option<String>> {
+    let Some(path) = path else { return Ok(None) };
+    let bytes = fs::read(path).with_context(|| format!("reading {}", path.display()))?;
+    Ok(Some(format!("{:016x}", xxh3_64(&bytes))))
+}

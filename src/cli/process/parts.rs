@@ -1,0 +1,186 @@
+//! `--out-parquet`: the frames of one worker, part by part, as rows of tables.
+
+use super::ProcessArgs;
+use super::configuration::configuration;
+use crate::cli::batch::for_each_ordered;
+use crate::cli::exit::{CommandError, Exit, Outcome};
+use crate::cli::input::frames::read_frame;
+use crate::cli::input::names::frame_names;
+use crate::cli::output::messages::{one_line, report_error};
+use crate::cli::progress::frames_bar;
+use crate::cli::solving::workspace;
+use clap::Args;
+use indicatif::ProgressBar;
+use starpipe::archive::{
+    Archive, ArchiveError, DEFAULT_FRAMES_PER_PART, FrameRow, Part, Plan, Shard, StarRow,
+};
+use starpipe::base::format::counted;
+use starpipe::frame::Buffers;
+use starpipe::identify::IndexedCatalog;
+use starpipe::pipeline::{Context, Workspace, solve_read};
+use starpipe::report::FrameReport;
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Archives")]
+pub(super) struct PartOptions {
+    /// Write tables of frames and stars into this directory, part by part, and print no reports.
+    /// Parts that are there are skipped. FRAME may then also be a pattern ('night/*.fits'), or a list
+    /// of names: .txt (one a line), .parquet, or - for standard input
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "format", "all_stars"])]
+    pub(super) out_parquet: Option<PathBuf>,
+    /// Do the work of worker K of N: every N-th part
+    #[arg(long, value_name = "K/N", requires = "out_parquet")]
+    shard: Option<Shard>,
+    /// Frames of a part
+    #[arg(long, value_name = "NUMBER", default_value_t = DEFAULT_FRAMES_PER_PART,
+          requires = "out_parquet")]
+    frames_per_part: NonZeroUsize,
+}
+
+/// Processes the frames of one worker.
+pub(super) fn process_parts(
+    arguments: &ProcessArgs,
+    directory: &Path,
+) -> Result<Outcome, CommandError> {
+    let options = &arguments.parts;
+    let solving = arguments.plan()?;
+    let names = frame_names(&arguments.frames.frames)?;
+    let plan = Plan::new(names, options.frames_per_part)?;
+    arguments.solving.catalog.with_index(|pool, indexed| {
+        let configuration = configuration(arguments, indexed.catalog())?;
+        let archive = Archive::claim(directory, plan, configuration).map_err(claim_error)?;
+        let worker = Worker {
+            pool,
+            context: solving.context(indexed, arguments.solving.attitude_only),
+            indexed,
+            name_odds: arguments.solving.name_odds,
+            page: arguments.frames.page,
+        };
+        let shard = options.shard.unwrap_or(Shard::ALL);
+        let parts: Vec<Part> = archive.plan().shard(shard).collect();
+        let tally = worker.run(&archive, &parts)?;
+        Ok(tally.outcome())
+    })
+}
+
+/// A directory that holds something else is an error of the command line.
+fn claim_error(error: ArchiveError) -> CommandError {
+    match error {
+        ArchiveError::OtherRun { .. } | ArchiveError::Foreign { .. } => CommandError::Usage(
+            format!("{error}; choose another directory for --out-parquet"),
+        ),
+        other => CommandError::Failed(other.into()),
+    }
+}
+
+/// Solves frames, and makes rows of them.
+struct Worker<'a> {
+    pool: &'a rayon::ThreadPool,
+    context: Context<'a>,
+    indexed: &'a IndexedCatalog<'a>,
+    name_odds: f64,
+    page: Option<NonZeroUsize>,
+}
+
+/// Counts of a run.
+#[derive(Default)]
+struct Tally {
+    parts: usize,
+    skipped: usize,
+    frames: usize,
+    not_identified: usize,
+    unread: usize,
+}
+
+impl Worker<'_> {
+    fn run(&self, archive: &Archive, parts: &[Part]) -> Result<Tally, CommandError> {
+        let frames: usize = parts.iter().map(|part| part.names.len()).sum();
+        let progress = frames_bar(frames as u64);
+        let mut tally = Tally::default();
+        for part in parts {
+            if archive.has(part) {
+                tally.skipped += 1;
+                progress.inc(part.names.len() as u64);
+                progress.reset_eta();
+                continue;
+            }
+            self.write_part(archive, part, &progress, &mut tally)?;
+            tally.parts += 1;
+        }
+        progress.finish_and_clear();
+        Ok(tally)
+    }
+
+    fn write_part(
+        &self,
+        archive: &Archive,
+        part: &Part,
+        progress: &ProgressBar,
+        tally: &mut Tally,
+    ) -> Result<(), ArchiveError> {
+        let mut writer = archive.write(part)?;
+        let mut added = Ok(());
+        let work = |name: &String, workspace: &mut Workspace| self.solve(name, workspace);
+        let buffers = || workspace(self.pool, part.names.len(), self.name_odds);
+        for_each_ordered(self.pool, part.names, buffers, work, |name, solved| {
+            progress.inc(1);
+            tally.frames += 1;
+            let (frame, stars) = solved.unwrap_or_else(|error| {
+                tally.unread += 1;
+                progress.suspend(|| report_error(error.as_ref()));
+                (FrameRow::unread(name, one_line(error.as_ref())), Vec::new())
+            });
+            tally.not_identified += usize::from(frame.status == "not_identified");
+            added = writer.add(frame, stars);
+            if added.is_ok() {
+                ControlFlow::Continue(())
+            } else {
+                ControlFlow::Break(())
+            }
+        });
+        added?;
+        writer.finish()
+    }
+
+    fn solve(
+        &self,
+        name: &str,
+        workspace: &mut Workspace,
+    ) -> anyhow::Result<(FrameRow, Vec<StarRow>)> {
+        let path = Path::new(name);
+        let read = |buffers: &mut Buffers| read_frame(path, self.page, buffers);
+        let (solution, frame) = solve_read(path, read, &self.context, workspace)?;
+        workspace.frames.recycle(frame);
+        let report = FrameReport::new(name, &solution, self.indexed.catalog());
+        let stars = StarRow::of_frame(&report).collect();
+        Ok((FrameRow::new(&report, &solution), stars))
+    }
+}
+
+impl Tally {
+    fn outcome(self) -> Outcome {
+        let identified = self.frames - self.not_identified - self.unread;
+        let mut text = format!(
+            "{}, {}: {identified} identified, {} not identified, {} unread",
+            counted(self.parts, "part"),
+            counted(self.frames, "frame"),
+            self.not_identified,
+            self.unread
+        );
+        if self.skipped > 0 {
+            text += &format!("; {} there already", counted(self.skipped, "part"));
+        }
+        let exit = match (self.unread, self.not_identified) {
+            (0, 0) => Exit::Success,
+            (0, _) => Exit::NotIdentified,
+            _ => Exit::Failure,
+        };
+        Outcome {
+            text: text + "\n",
+            exit,
+        }
+    }
+}
