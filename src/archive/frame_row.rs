@@ -9,7 +9,7 @@ use crate::report::FrameReport;
 
 /// A frame, as its report has it; names that begin with `s_` and `t_` are those of ObsCore.
 ///
-/// There are no run times: the same frames make the same rows.
+/// There are no run times: the same frames make the same rows. A text is empty where there is none.
 ///
 /// # Reference
 /// Louys et al. 2017, ObsCore 1.1, IVOA recommendation.
@@ -18,18 +18,18 @@ use crate::report::FrameReport;
 pub struct FrameRow {
     pub frame: String,
     pub status: String,
-    pub reason_code: Option<String>,
-    pub reason: Option<String>,
-    pub night: Option<String>,
+    pub reason_code: String,
+    pub reason: String,
+    pub night: String,
     pub t_min: Option<f64>,
     pub t_exptime: Option<f64>,
-    pub instrument_name: Option<String>,
+    pub instrument_name: String,
     pub width: Option<u64>,
     pub height: Option<u64>,
     pub s_ra: Option<f64>,
     pub s_dec: Option<f64>,
     pub s_fov: Option<f64>,
-    pub s_region: Option<String>,
+    pub s_region: String,
     pub up_pa_deg: Option<f64>,
     pub qw: Option<f64>,
     pub qx: Option<f64>,
@@ -81,12 +81,12 @@ impl FrameRow {
         Self {
             frame: report.frame.clone(),
             status: status.to_owned(),
-            reason_code: report.reason_code.map(str::to_owned),
-            reason: report.reason.clone(),
-            night: date.map(|date| night(date, solution)),
+            reason_code: report.reason_code.unwrap_or_default().to_owned(),
+            reason: report.reason.clone().unwrap_or_default(),
+            night: date.map_or(String::new(), |date| night(date, solution)),
             t_min: date.and_then(|date| date.modified_julian_date()),
             t_exptime: report.exposure_s,
-            instrument_name: prediction.map(|prediction| prediction.camera.clone()),
+            instrument_name: prediction.map_or(String::new(), |stated| stated.camera.clone()),
             width: Some(report.width as u64),
             height: Some(report.height as u64),
             background: report.background.level,
@@ -114,8 +114,8 @@ impl FrameRow {
         Self {
             frame: frame.to_owned(),
             status: UNREAD.to_owned(),
-            reason_code: Some(UNREAD.to_owned()),
-            reason: Some(reason),
+            reason_code: UNREAD.to_owned(),
+            reason,
             ..Self::default()
         }
     }
@@ -162,7 +162,7 @@ impl FrameRow {
         let diameter_deg = 2.0 * camera.radius_rad() * DEG_PER_RAD;
         Self {
             s_fov: Some((diameter_deg * 1e5).round() / 1e5),
-            s_region: Some(polygon(&corners)),
+            s_region: polygon(&corners),
             ..self
         }
     }

@@ -32,10 +32,10 @@ const COLUMNS: [&str; 14] = [
 /// What one camera saw in one night. Values are medians over its frames.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct NightSummary {
-    /// Date of the evening; `None` for frames without a date.
-    pub night: Option<String>,
-    /// The stated camera.
-    pub instrument_name: Option<String>,
+    /// Date of the evening; empty for frames without a date.
+    pub night: String,
+    /// The stated camera; empty where none is.
+    pub instrument_name: String,
     /// All frames.
     pub frames: usize,
     /// Identified frames.
@@ -79,10 +79,10 @@ struct Night {
 /// # Errors
 /// [`ArchiveError::File`], [`ArchiveError::Table`].
 pub fn summary(archive: &Archive) -> Result<Vec<NightSummary>, ArchiveError> {
-    let mut nights: BTreeMap<[Option<String>; 2], Night> = BTreeMap::new();
+    let mut nights: BTreeMap<[String; 2], Night> = BTreeMap::new();
     for part in archive.plan().parts().filter(|part| archive.has(part)) {
         for_each_row(&archive.frames_of(&part), &COLUMNS, |row| {
-            let key = ["night", "instrument_name"].map(|name| text(row, name).map(str::to_owned));
+            let key = ["night", "instrument_name"].map(|name| text(row, name).to_owned());
             nights.entry(key).or_default().add(row);
         })?;
     }
@@ -101,11 +101,12 @@ impl Night {
         let summary = &mut self.summary;
         summary.frames += 1;
         match text(row, "status") {
-            Some("identified") => summary.identified += 1,
-            Some(UNREAD) => summary.unread += 1,
+            "identified" => summary.identified += 1,
+            UNREAD => summary.unread += 1,
             _ => {}
         }
-        if let Some(code) = text(row, "reason_code") {
+        let code = text(row, "reason_code");
+        if !code.is_empty() {
             *summary.reasons.entry(code.to_owned()).or_default() += 1;
         }
         let values = [

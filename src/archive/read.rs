@@ -57,11 +57,11 @@ pub(super) fn number(row: &Row, column: &str) -> Option<f64> {
     }
 }
 
-/// The value of a column, if it is text.
-pub(super) fn text<'r>(row: &'r Row, column: &str) -> Option<&'r str> {
-    match field(row, column)? {
-        Field::Str(value) => Some(value),
-        _ => None,
+/// The value of a column of text; empty where there is none.
+pub(super) fn text<'r>(row: &'r Row, column: &str) -> &'r str {
+    match field(row, column) {
+        Some(Field::Str(value)) => value,
+        _ => "",
     }
 }
 
@@ -96,7 +96,8 @@ pub fn names_in(path: &Path) -> Result<Vec<String>, ArchiveError> {
     };
     let mut names = Vec::new();
     for_each_row(path, &[column], |row| {
-        names.extend(text(row, column).map(str::to_owned));
+        names.push(text(row, column).to_owned());
     })?;
+    names.retain(|name| !name.is_empty());
     Ok(names)
 }

@@ -8,8 +8,8 @@ use crate::report::{FrameReport, StarReport};
 #[expect(missing_docs, reason = "`columns` has unit and description of each")]
 pub struct StarRow {
     pub frame: String,
-    pub id: Option<String>,
-    pub name: Option<String>,
+    pub id: String,
+    pub name: String,
     pub x_centroid: f64,
     pub y_centroid: f64,
     pub x_centroid_err: Option<f64>,
@@ -36,8 +36,8 @@ impl StarRow {
     fn new(frame: &str, star: &StarReport) -> Self {
         Self {
             frame: frame.to_owned(),
-            id: star.id.clone(),
-            name: star.name.clone(),
+            id: star.id.clone().unwrap_or_default(),
+            name: star.name.clone().unwrap_or_default(),
             x_centroid: star.x,
             y_centroid: star.y,
             x_centroid_err: star.sigma_x,

@@ -64,9 +64,9 @@ pub fn status(archive: &Archive) -> Result<Status, ArchiveError> {
         for_each_row(&archive.frames_of(&part), &columns, |row| {
             status.frames_done += 1;
             match text(row, "status") {
-                Some("identified") => status.identified += 1,
-                Some(UNREAD) => {
-                    let cell = |name| text(row, name).unwrap_or_default().to_owned();
+                "identified" => status.identified += 1,
+                UNREAD => {
+                    let cell = |name| text(row, name).to_owned();
                     status.unread.push(UnreadFrame {
                         frame: cell("frame"),
                         reason: cell("reason"),

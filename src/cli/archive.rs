@@ -127,8 +127,8 @@ fn report(arguments: &ReportArgs) -> Result<Outcome, CommandError> {
 /// A night as a line of CSV: its reasons in one cell.
 #[derive(serde::Serialize)]
 struct NightLine<'a> {
-    night: Option<&'a str>,
-    instrument_name: Option<&'a str>,
+    night: &'a str,
+    instrument_name: &'a str,
     frames: usize,
     identified: usize,
     unread: usize,
@@ -145,8 +145,8 @@ struct NightLine<'a> {
 impl<'a> NightLine<'a> {
     fn of(night: &'a NightSummary) -> Self {
         Self {
-            night: night.night.as_deref(),
-            instrument_name: night.instrument_name.as_deref(),
+            night: &night.night,
+            instrument_name: &night.instrument_name,
             frames: night.frames,
             identified: night.identified,
             unread: night.unread,
@@ -168,6 +168,11 @@ fn reasons_text(night: &NightSummary) -> String {
     counted.collect::<Vec<_>>().join(", ")
 }
 
+/// The text, or what stands for none.
+fn or<'a>(text: &'a str, none: &'a str) -> &'a str {
+    if text.is_empty() { none } else { text }
+}
+
 fn nights_text(nights: &[NightSummary]) -> String {
     let mut text =
         "night       camera            frames  identified   limit  predicted  difference     \
@@ -178,8 +183,8 @@ fn nights_text(nights: &[NightSummary]) -> String {
         let _ = writeln!(
             text,
             "{:<10}  {:<16}  {:>6}  {:>10}  {:>6}  {:>9}  {:>10}  {:>6}  {:>10}  {:>11}  {}",
-            night.night.as_deref().unwrap_or("no date"),
-            printable(night.instrument_name.as_deref().unwrap_or("-")),
+            or(&night.night, "no date"),
+            printable(or(&night.instrument_name, "-")),
             night.frames,
             night.identified,
             cell(night.limit50_vmag),

@@ -1,0 +1,268 @@
+//! `process --out-parquet` and `archive`: parts of tables, for any number of workers.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
+mod common;
+
+use common::{Ran, fixture, starpipe};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// A directory with `frames/`, of which the last file is no image.
+fn night(frames: usize) -> TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    let night = directory.path().join("frames");
+    fs::create_dir(&night).unwrap();
+    for number in 0..frames - 1 {
+        let name = night.join(format!("2020-03-01T2{number}0000.tif"));
+        fs::copy(fixture("cygnus/cygnus.tif"), name).unwrap();
+    }
+    fs::write(night.join("broken.tif"), "no image").unwrap();
+    directory
+}
+
+/// Runs the program in `directory`.
+fn run(directory: &Path, arguments: &[&str]) -> Ran {
+    Ran::new(starpipe().args(arguments).current_dir(directory))
+}
+
+fn process(directory: &Path, out: &str, options: &[&str]) -> Ran {
+    let fixed = ["process", "frames/*.tif", "--out-parquet", out];
+    let parts = ["--frames-per-part", "2"];
+    run(directory, &[&fixed[..], &parts[..], options].concat())
+}
+
+/// All files below a directory, by their path in it.
+fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut left = vec![directory.to_owned()];
+    while let Some(below) = left.pop() {
+        for entry in fs::read_dir(below).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                left.push(path);
+            } else {
+                let name = path.strip_prefix(directory).unwrap().to_owned();
+                found.insert(name, fs::read(path).unwrap());
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn tables_do_not_depend_on_workers_or_threads_and_a_rerun_skips_what_is_there() {
+    let night = night(5);
+    let night = night.path();
+    let whole = process(night, "whole", &[]);
+    assert_eq!(whole.status, 1, "{}", whole.stderr);
+    let told = "3 parts, 5 frames: 4 identified, 0 not identified, 1 unread\n";
+    assert_eq!(whole.stdout, told);
+    assert!(whole.stderr.contains("broken.tif"), "{}", whole.stderr);
+
+    for worker in ["2/2", "1/2"] {
+        process(night, "shards", &["--shard", worker, "--threads", "1"]);
+    }
+    let expected = files(&night.join("whole"));
+    // Two tables of three parts, the list of inputs, and whose it is.
+    assert_eq!(expected.len(), 8);
+    assert!(files(&night.join("shards")) == expected);
+
+    // A worker that was killed has left a part behind that is not finished.
+    let lost = expected
+        .keys()
+        .find(|path| path.starts_with("frames.parquet"));
+    fs::remove_file(night.join("shards").join(lost.unwrap())).unwrap();
+    let missing = run(night, &["archive", "status", "shards"]);
+    assert_eq!(missing.status, 3);
+    assert!(
+        missing.stdout.contains("missing    parts 0\n"),
+        "{}",
+        missing.stdout
+    );
+    let again = process(night, "shards", &[]);
+    assert!(
+        again.stdout.starts_with("1 part, 2 frames"),
+        "{}",
+        again.stdout
+    );
+    assert!(again.stdout.ends_with("; 2 parts there already\n"));
+    assert!(files(&night.join("shards")) == expected);
+}
+
+#[test]
+fn a_directory_is_of_one_configuration_and_of_one_list_of_frames() {
+    let night = night(3);
+    let night = night.path();
+    process(night, "out", &[]);
+    let before = files(&night.join("out"));
+    for (options, difference) in [
+        (&["--sigma", "6"][..], "sigma is null there and 6.0 here"),
+        (
+            &["--max-stars", "20"],
+            "max_stars is null there and 20 here",
+        ),
+        (
+            &["--dark", "frames/2020-03-01T200000.tif"],
+            "dark is null there and \"",
+        ),
+    ] {
+        let refused = process(night, "out", options);
+        assert_eq!(refused.status, 2, "{}", refused.stderr);
+        assert!(refused.stderr.contains(difference), "{}", refused.stderr);
+    }
+    fs::remove_file(night.join("frames/broken.tif")).unwrap();
+    let refused = process(night, "out", &[]);
+    assert_eq!(refused.status, 2);
+    assert!(
+        refused.stderr.contains("frames is 3 there and 2 here"),
+        "{}",
+        refused.stderr
+    );
+    assert!(files(&night.join("out")) == before);
+
+    fs::create_dir_all(night.join("foreign/stars.parquet")).unwrap();
+    let refused = process(night, "foreign", &[]);
+    assert_eq!(refused.status, 2);
+    assert!(
+        refused.stderr.contains("it is no archive"),
+        "{}",
+        refused.stderr
+    );
+}
+
+#[test]
+fn frames_may_be_named_in_lists() {
+    let night = night(3);
+    let night = night.path();
+    process(night, "pattern", &[]);
+    let expected = files(&night.join("pattern"));
+    let names = String::from_utf8(expected[Path::new("inputs.txt")].clone()).unwrap();
+    fs::write(night.join("frames.txt"), format!("\n{names}")).unwrap();
+    let parts = ["--frames-per-part", "2"];
+    for (input, out) in [("frames.txt", "text"), ("-", "stdin")] {
+        let arguments = [&["process", input, "--out-parquet", out][..], &parts].concat();
+        let mut command = starpipe();
+        command
+            .args(arguments)
+            .current_dir(night)
+            .write_stdin(names.as_str());
+        let ran = Ran::new(&mut command);
+        assert!(
+            ran.stdout.starts_with("2 parts, 3 frames"),
+            "{}{}",
+            ran.stdout,
+            ran.stderr
+        );
+        assert!(files(&night.join(out)) == expected);
+    }
+    let merged = run(night, &["archive", "merge", "pattern", "--out", "merged"]);
+    assert_eq!(merged.status, 0, "{}", merged.stderr);
+    let arguments = [
+        &["process", "merged/frames.parquet", "--out-parquet", "table"][..],
+        &parts,
+    ];
+    let ran = run(night, &arguments.concat());
+    assert!(
+        ran.stdout.starts_with("2 parts, 3 frames"),
+        "{}{}",
+        ran.stdout,
+        ran.stderr
+    );
+    assert!(files(&night.join("table")) == expected);
+}
+
+#[test]
+fn a_report_tells_of_each_night() {
+    let night = night(4);
+    let night = night.path();
+    process(night, "out", &["--exposure", "0.2"]);
+    let unfinished = run(night, &["archive", "report", "out", "--format", "json"]);
+    let reports = unfinished.reports();
+    assert_eq!(reports.len(), 2, "{}", unfinished.stdout);
+    // The broken file has no date.
+    assert_eq!(reports[0]["unread"], 1);
+    assert_eq!(reports[0]["reasons"]["unread"], 1);
+    let dated = &reports[1];
+    assert_eq!(dated["night"], "2020-03-01");
+    assert_eq!(dated["identified"], 3);
+    assert!(dated["limit50_vmag"].as_f64().unwrap() > 5.0);
+    assert_eq!(dated["zero_point_change_mag"], 0.0);
+    // The same sky an hour later: the camera has turned with it.
+    let drift_deg = dated["pointing_drift_deg"].as_f64().unwrap();
+    assert!(drift_deg > 5.0 && drift_deg < 15.1, "{drift_deg}");
+    let table = run(night, &["archive", "report", "out", "--format", "csv"]);
+    assert_eq!(table.stdout.lines().count(), 3);
+    let text = run(night, &["archive", "report", "out"]);
+    assert!(text.stdout.contains("2020-03-01"), "{}", text.stdout);
+    let status = run(night, &["archive", "status", "out", "--format", "csv"]);
+    assert!(
+        status
+            .stdout
+            .starts_with("frame,reason\nframes/broken.tif,"),
+        "{}",
+        status.stdout
+    );
+}
+
+#[test]
+fn what_cannot_be_done_is_told() {
+    let night = night(3);
+    let night = night.path();
+    for (arguments, status, message) in [
+        (
+            &["process", "none/*.fits", "--out-parquet", "out"][..],
+            1,
+            "there are no frames",
+        ),
+        (
+            &["process", "none.txt", "--out-parquet", "out"],
+            1,
+            "none.txt",
+        ),
+        (
+            &["process", "none.parquet", "--out-parquet", "out"],
+            1,
+            "none.parquet",
+        ),
+        (
+            &["process", "frames", "--out-parquet", "frames.txt/out"],
+            1,
+            "making the directory",
+        ),
+        (&["process", "frames", "--shard", "1/2"], 2, "--out-parquet"),
+        (
+            &[
+                "process",
+                "frames",
+                "--out-parquet",
+                "out",
+                "--shard",
+                "3/2",
+            ],
+            2,
+            "K from 1 to N",
+        ),
+        (
+            &["process", "frames", "--out-parquet", "out", "--out", "x"],
+            2,
+            "cannot be used with",
+        ),
+        (&["archive", "status", "frames"], 1, "has no archive.json"),
+    ] {
+        fs::write(night.join("frames.txt"), "").unwrap();
+        let ran = run(night, arguments);
+        assert_eq!(ran.status, status, "{arguments:?} {}", ran.stderr);
+        assert!(ran.stderr.contains(message), "{arguments:?} {}", ran.stderr);
+    }
+    process(night, "half", &["--shard", "1/2"]);
+    let refused = run(night, &["archive", "merge", "half", "--out", "merged"]);
+    assert_eq!(refused.status, 1);
+    assert!(
+        refused.stderr.contains("1 of 2 parts are missing"),
+        "{}",
+        refused.stderr
+    );
+}
