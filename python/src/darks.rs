@@ -28,9 +28,10 @@ impl DarkFrames {
         let source = image.source()?;
         let stack = &mut self.stack;
         detached(py, || {
-            let name = source.name().display().to_string();
-            let frame = source.frame(None, &mut Buffers::new()).map_err(exception)?;
-            let statistics = FrameStatistics::of(&name, &frame, exposure_s);
+            let name = source.name();
+            let frame = source.frame(&name, None, &mut Buffers::new());
+            let frame = frame.map_err(exception)?;
+            let statistics = FrameStatistics::of(&name.display().to_string(), &frame, exposure_s);
             stack.add(&frame, statistics).map_err(exception)
         })
     }

@@ -37,7 +37,9 @@ pub fn detect(
     let bad = bad_pixels(mask.as_ref())?;
     let config = detect_config(sigma, max_stars);
     on_threads(py, threads, |interrupt| {
-        let frame = source.frame(bad, &mut Buffers::new()).map_err(exception)?;
+        let name = source.name();
+        let frame = source.frame(&name, bad, &mut Buffers::new());
+        let frame = frame.map_err(exception)?;
         let workspace = Workspace::new().on_threads(threads);
         let mut workspace = workspace.until(interrupt.clone());
         let found = starpipe::detect(&frame, &config, &mut workspace).map_err(exception)?;

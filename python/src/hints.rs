@@ -2,9 +2,10 @@
 
 use crate::errors::exception;
 use pyo3::prelude::*;
+use starpipe::archive::Configuration;
 use starpipe::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
 use starpipe::identify::{DateSource, FrameDate, Scale};
-use starpipe::{Priors, ScalePrior, Site, SkyRegion, UnitVector};
+use starpipe::{ObservationDate, Priors, ScalePrior, Site, SkyRegion, UnitVector};
 
 /// What the user knows of a frame, in degrees, arcseconds, seconds and metres.
 #[derive(Debug, FromPyObject)]
@@ -22,7 +23,32 @@ pub struct Hints {
     pub name_odds: f64,
 }
 
+/// Default of `scale_error`, in percent.
+const DEFAULT_SCALE_ERROR_PERCENT: f64 = 10.0;
+
 impl Hints {
+    /// The same for the identity of an archive, as the program states it.
+    pub fn configuration(&self) -> PyResult<Configuration> {
+        let date = self.date.as_deref().map(str::parse::<ObservationDate>);
+        let date = date.transpose().map_err(exception)?;
+        let scale_error_percent = 100.0 * self.scale_error;
+        Ok(Configuration {
+            fov_deg: self.fov_deg,
+            pixel_scale_arcsec: self.pixel_scale_arcsec,
+            scale_error_percent: Some(scale_error_percent)
+                .filter(|percent| *percent != DEFAULT_SCALE_ERROR_PERCENT),
+            near_deg: self.near_deg.map(|[ra, dec, _]| [ra, dec]),
+            radius_deg: self.near_deg.map(|[_, _, radius]| radius),
+            date: date.map(|date| date.to_iso()),
+            site: self.site,
+            exposure_s: self.exposure_s,
+            zenith_distance_deg: self.zenith_distance_deg,
+            extinction_mag: self.extinction,
+            name_odds: self.name_odds,
+            ..Configuration::default()
+        })
+    }
+
     pub fn priors(&self) -> PyResult<Priors> {
         let fov = self
             .fov_deg

@@ -83,14 +83,15 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The frame, with its pixels where `bad` is true without a value.
+    /// The frame, with its pixels where `bad` is true without a value; errors in bytes have `name`.
     pub fn frame(
         self,
+        name: &Path,
         bad: Option<&[bool]>,
         buffers: &mut Buffers,
     ) -> Result<Frame<'a>, FrameError> {
         let mut frame = match self {
-            Self::Bytes(bytes) => frame::decode(bytes)?,
+            Self::Bytes(bytes) => frame::decode(bytes).map_err(|error| error.in_file(name))?,
             Self::Path(path) => frame::read_page_with(path, None, buffers)?,
             Self::Array(frame) => frame,
         };

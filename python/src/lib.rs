@@ -3,6 +3,7 @@
 
 #![allow(clippy::too_many_arguments, reason = "keywords of Python functions")]
 
+mod archive;
 mod camera;
 mod catalogs;
 mod darks;
@@ -21,6 +22,10 @@ use pyo3::prelude::*;
 /// The module `starpipe._starpipe`.
 #[pymodule]
 mod _starpipe {
+    #[pymodule_export]
+    use super::archive::{
+        ArchivePlan, PartRows, archive_differences, archive_nights, archive_plan,
+    };
     #[pymodule_export]
     use super::darks::{DarkFrames, Darks};
     #[pymodule_export]

@@ -25,7 +25,7 @@ use std::sync::Mutex;
 /// Solves frames. It may be used by several threads at once.
 #[pyclass(frozen, module = "starpipe._starpipe")]
 pub struct Pipeline {
-    indexed: &'static IndexedCatalog<'static>,
+    pub indexed: &'static IndexedCatalog<'static>,
     camera: Option<DataSheet>,
     /// Buffers that no thread uses at present.
     workspaces: Mutex<Vec<Workspace>>,
@@ -51,12 +51,13 @@ impl Pipeline {
         })
     }
 
-    /// Solves an image.
-    #[pyo3(signature = (image, mask, hints, dark, flat, sigma, max_stars, attitude_only, threads))]
+    /// Solves an image; `name` stands for the name of its file.
+    #[pyo3(signature = (image, name, mask, hints, dark, flat, sigma, max_stars, attitude_only, threads))]
     fn solve(
         &self,
         py: Python<'_>,
         image: Image<'_>,
+        name: Option<PathBuf>,
         mask: Option<PyReadonlyArray2<'_, bool>>,
         hints: Hints,
         dark: Option<Image<'_>>,
@@ -79,9 +80,9 @@ impl Pipeline {
                 calibration: calibration.as_ref(),
                 ..context
             };
-            let name = source.name();
+            let name = name.unwrap_or_else(|| source.name());
             let mut workspace = self.workspace(threads, hints.name_odds, interrupt);
-            let solution = solve(source, bad, &context, &mut workspace);
+            let solution = solve(&name, (source, bad), &context, &mut workspace);
             self.keep(workspace);
             Ok(self.solved(&name, solution?))
         };
@@ -148,9 +149,10 @@ impl Pipeline {
             return Ok(None);
         }
         let master = |source: Source| {
-            let name = source.name().display().to_string();
-            let frame = source.frame(None, &mut Buffers::new()).map_err(exception)?;
-            let frame = frame.into_owned();
+            let name = source.name();
+            let frame = source.frame(&name, None, &mut Buffers::new());
+            let frame = frame.map_err(exception)?.into_owned();
+            let name = name.display().to_string();
             Ok::<_, PyErr>(Master { name, frame })
         };
         let (dark, flat) = (dark.map(master).transpose()?, flat.map(master).transpose()?);
@@ -197,20 +199,19 @@ pub fn detect_config(sigma: Option<f64>, max_stars: Option<usize>) -> DetectConf
 }
 
 fn solve(
-    source: Source,
-    bad: Option<&[bool]>,
+    name: &Path,
+    (source, bad): (Source, Option<&[bool]>),
     context: &Context,
     workspace: &mut Workspace,
 ) -> PyResult<Solution> {
-    let name = source.name();
     if matches!(source, Source::Array(_)) && context.calibration.is_none() {
         let frame = source
-            .frame(bad, &mut workspace.frames)
+            .frame(name, bad, &mut workspace.frames)
             .map_err(exception)?;
         return solve_frame(&frame, context, workspace).map_err(exception);
     }
-    let read = |buffers: &mut Buffers| Ok(source.frame(bad, buffers)?.into_owned());
-    let (solution, frame) = solve_read(&name, read, context, workspace).map_err(exception)?;
+    let read = |buffers: &mut Buffers| Ok(source.frame(name, bad, buffers)?.into_owned());
+    let (solution, frame) = solve_read(name, read, context, workspace).map_err(exception)?;
     workspace.frames.recycle(frame);
     Ok(solution)
 }

@@ -64,6 +64,7 @@ class Pipeline:
         image: ImageLike,
         mask: ArrayLike | None = None,
         *,
+        name: PathLike | None = None,
         fov: Any = None,
         pixel_scale: Any = None,
         near: Any = None,
@@ -91,6 +92,8 @@ class Pipeline:
             float32 that are contiguous are not copied. Mask and header of an object are used.
         mask : array of bool, optional
             True where a pixel is to be left out.
+        name : path, optional
+            Name of the frame, if it comes as bytes; a date in it is used.
         fov, pixel_scale : Quantity or float, optional
             Horizontal field of view (degrees), or the angle of a pixel (arcseconds); see
             `scale_error`.
@@ -136,6 +139,7 @@ class Pipeline:
         taken = Image(image)
         solved = self._pipeline.solve(
             taken.pixels,
+            None if name is None else str(name),
             mask_of(taken, mask),
             hints(
                 taken.header,

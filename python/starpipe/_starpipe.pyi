@@ -1,3 +1,4 @@
+from collections.abc import Iterable
 from os import PathLike
 from typing import Any, TypeAlias, final
 
@@ -5,11 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "ArchivePlan",
     "DarkFrames",
     "Darks",
+    "PartRows",
     "Pipeline",
     "Simulated",
     "Solved",
+    "archive_differences",
+    "archive_nights",
+    "archive_plan",
     "defocus",
     "detect",
     "limit",
@@ -41,6 +47,7 @@ class Pipeline:
     def solve(
         self,
         image: _Image,
+        name: _Path | None,
         mask: NDArray[np.bool_] | None,
         hints: dict[str, Any],
         dark: _Image | None,
@@ -84,6 +91,28 @@ class Simulated:
     def limit_vmag(self) -> float | None: ...
     @property
     def exposure_s(self) -> float: ...
+
+@final
+class ArchivePlan:
+    @property
+    def identity(self) -> str: ...
+    @property
+    def names(self) -> list[str]: ...
+    @property
+    def parts(self) -> list[tuple[str, int, int]]: ...
+
+@final
+class PartRows:
+    def __new__(cls) -> PartRows: ...
+    def add(self, solved: Solved) -> str: ...
+    def add_unread(self, name: str, reason: str) -> None: ...
+    def finish(self) -> tuple[bytes, bytes]: ...
+
+def archive_plan(
+    names: list[str], frames_per_part: int, pipeline: Pipeline, stated: dict[str, Any]
+) -> ArchivePlan: ...
+def archive_differences(found: str, wanted: str) -> list[str]: ...
+def archive_nights(parts: Iterable[bytes]) -> str: ...
 
 @final
 class DarkFrames:

@@ -1,23 +1,19 @@
 //! The directory of an archive: whose it is, and its parts.
 
+use super::configuration::Configuration;
 use super::error::ArchiveError;
 use super::frame_row::FrameRow;
+use super::identity::Identity;
 use super::plan::{Part, Plan};
 use super::star_row::StarRow;
 use super::write::TableWriter;
-use crate::base::differences::differences;
 use crate::base::files;
 use crate::base::table::Column;
-use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use std::fs;
 use std::io::{ErrorKind, Write};
-use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
-/// Version of the tables.
-pub const SCHEMA: u32 = 1;
 /// Says whose the directory is.
 const IDENTITY: &str = "archive.json";
 /// The names of all frames, one a line.
@@ -26,25 +22,12 @@ const INPUTS: &str = "inputs.txt";
 const FRAMES: &str = "frames.parquet";
 const STARS: &str = "stars.parquet";
 
-/// All that the tables depend on.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Identity {
-    schema: u32,
-    version: String,
-    frames_per_part: NonZeroUsize,
-    frames: usize,
-    /// Hash of the frames' names.
-    names: String,
-    configuration: Value,
-}
-
 /// The directory of an archive.
 #[derive(Debug)]
 pub struct Archive {
     directory: PathBuf,
     plan: Plan,
-    /// The identity as text, which is part of each name.
-    identity: String,
+    identity: Identity,
 }
 
 impl Archive {
@@ -53,7 +36,11 @@ impl Archive {
     /// # Errors
     /// [`ArchiveError::OtherRun`] if it belongs to another run, [`ArchiveError::Foreign`] if it has
     /// tables of another kind, [`ArchiveError::File`], [`ArchiveError::Json`].
-    pub fn claim(directory: &Path, plan: Plan, configuration: Value) -> Result<Self, ArchiveError> {
+    pub fn claim(
+        directory: &Path,
+        plan: Plan,
+        configuration: &Configuration,
+    ) -> Result<Self, ArchiveError> {
         for table in [FRAMES, STARS] {
             let path = directory.join(table);
             let made = fs::create_dir_all(directory);
@@ -66,19 +53,10 @@ impl Archive {
             }
         }
         let path = directory.join(IDENTITY);
-        let wanted = Identity {
-            schema: SCHEMA,
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            frames_per_part: plan.frames_per_part(),
-            frames: plan.names().len(),
-            names: format!("{:016x}", plan.hash()),
-            configuration,
-        };
-        let wanted = serde_json::to_value(&wanted).map_err(ArchiveError::json(&path))?;
-        let identity = format!("{wanted:#}\n");
-        if !is_claimed(&path, &identity)? {
+        let identity = Identity::new(&plan, configuration).map_err(ArchiveError::json(&path))?;
+        if !is_claimed(&path, identity.text())? {
             // Another worker may have been faster.
-            check_same(directory, &path, &wanted)?;
+            check_same(directory, &path, &identity)?;
         }
         let archive = Self {
             directory: directory.to_owned(),
@@ -95,18 +73,18 @@ impl Archive {
     /// [`ArchiveError::NoArchive`], [`ArchiveError::File`], [`ArchiveError::Json`].
     pub fn open(directory: &Path) -> Result<Self, ArchiveError> {
         let (path, inputs) = (directory.join(IDENTITY), directory.join(INPUTS));
-        let identity = match fs::read_to_string(&path) {
+        let text = match fs::read_to_string(&path) {
             Err(error) if error.kind() == ErrorKind::NotFound => {
                 return Err(ArchiveError::NoArchive(directory.to_owned()));
             }
             read => read.map_err(ArchiveError::file("reading", &path))?,
         };
-        let known: Identity = serde_json::from_str(&identity).map_err(ArchiveError::json(&path))?;
+        let identity = Identity::read(&text).map_err(ArchiveError::json(&path))?;
         let names = fs::read_to_string(&inputs).map_err(ArchiveError::file("reading", &inputs))?;
         let names = names.lines().map(str::to_owned).collect();
         Ok(Self {
             directory: directory.to_owned(),
-            plan: Plan::new(names, known.frames_per_part)?,
+            plan: Plan::new(names, identity.frames_per_part())?,
             identity,
         })
     }
@@ -134,7 +112,7 @@ impl Archive {
     fn table_of(&self, table: &str, part: &Part<'_>) -> PathBuf {
         self.directory
             .join(table)
-            .join(part.file_name(&self.identity))
+            .join(part.file_name(self.identity.text()))
     }
 
     /// Whether a part is written.
@@ -249,10 +227,10 @@ fn is_claimed(path: &Path, identity: &str) -> Result<bool, ArchiveError> {
 }
 
 /// Refuses a directory of another run.
-fn check_same(directory: &Path, path: &Path, wanted: &Value) -> Result<(), ArchiveError> {
+fn check_same(directory: &Path, path: &Path, wanted: &Identity) -> Result<(), ArchiveError> {
     let text = fs::read_to_string(path).map_err(ArchiveError::file("reading", path))?;
-    let found: Value = serde_json::from_str(&text).map_err(ArchiveError::json(path))?;
-    let differences = differences(&found, wanted);
+    let found = Identity::read(&text).map_err(ArchiveError::json(path))?;
+    let differences = found.differences(wanted);
     if differences.is_empty() {
         return Ok(());
     }

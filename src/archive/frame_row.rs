@@ -41,7 +41,7 @@ pub struct FrameRow {
     pub fov_x_deg: Option<f64>,
     pub fov_y_deg: Option<f64>,
     pub focal_length_px: Option<f64>,
-    pub mirrored: Option<bool>,
+    pub mirrored: bool,
     pub detected: Option<u64>,
     pub matched: Option<u64>,
     pub rms_px: Option<f64>,
@@ -142,7 +142,7 @@ impl FrameRow {
             fov_x_deg: Some(optics.fov_x_deg),
             fov_y_deg: Some(optics.fov_y_deg),
             focal_length_px: Some(optics.focal_length_px),
-            mirrored: Some(optics.mirrored),
+            mirrored: optics.mirrored,
             matched: Some(matched.matched as u64),
             rms_px: Some(matched.rms_px),
             log10_false_alarm: Some(matched.log10_false_alarm),
@@ -204,7 +204,7 @@ impl FrameRow {
             fov_x_deg, "deg", "phys.angSize;instr.fov", "horizontal field of view";
             fov_y_deg, "deg", "phys.angSize;instr.fov", "vertical field of view";
             focal_length_px, "pix", "instr.param", "focal length over pixel pitch";
-            mirrored, "", "meta.code", "whether the optics mirror the sky";
+            mirrored, "", "meta.code", "whether an identified frame mirrors the sky";
             detected, "", "meta.number", "detections";
             matched, "", "meta.number", "detections with the name of a star";
             rms_px, "pix", "stat.stdev;stat.fit.residual", "RMS residual of the named stars";

@@ -3,10 +3,12 @@
 use super::directory::Archive;
 use super::error::ArchiveError;
 use super::read::open;
+use super::votable::{CONTENT_KEY, widened};
+use super::write::describe;
 use crate::base::files;
 use parquet::column::writer::ColumnCloseResult;
 use parquet::errors::Result;
-use parquet::file::metadata::{KeyValue, RowGroupMetaData};
+use parquet::file::metadata::RowGroupMetaData;
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
@@ -42,8 +44,17 @@ pub fn merge(archive: &Archive, out: &Path) -> std::result::Result<[PathBuf; 2],
 fn concatenate(parts: &[PathBuf], target: &Path) -> std::result::Result<(), ArchiveError> {
     let failed = ArchiveError::table("writing", target);
     let mut writer = None;
+    let mut votable: Option<String> = None;
     for path in parts {
-        let reader = open(path)?;
+        let source = open(path)?;
+        let reader = SerializedFileReader::new(open(path)?);
+        let reader = reader.map_err(ArchiveError::table("reading", path))?;
+        if let Some(of_part) = votable_of(&reader) {
+            votable = Some(match votable {
+                Some(before) => widened(&before, of_part),
+                None => of_part.to_owned(),
+            });
+        }
         let writer = match &mut writer {
             Some(writer) => writer,
             none => {
@@ -51,26 +62,35 @@ fn concatenate(parts: &[PathBuf], target: &Path) -> std::result::Result<(), Arch
                 none.insert(begin(file, &reader).map_err(&failed)?)
             }
         };
-        let source = File::open(path).map_err(ArchiveError::file("reading", path))?;
         for group in reader.metadata().row_groups() {
             copy(&source, group, writer).map_err(&failed)?;
         }
     }
-    let Some(writer) = writer else { return Ok(()) };
+    let Some(mut writer) = writer else {
+        return Ok(());
+    };
+    if let Some(votable) = votable {
+        describe(&mut writer, votable);
+    }
     let written = writer.into_inner().map_err(&failed)?;
     files::finish(written, target).map_err(ArchiveError::file("writing", target))
 }
 
-/// A table with the columns and the metadata of `part`.
+/// The VOTable in the metadata of a part.
+fn votable_of(part: &SerializedFileReader<File>) -> Option<&str> {
+    let metadata = part.metadata().file_metadata().key_value_metadata()?;
+    let found = metadata.iter().find(|entry| entry.key == CONTENT_KEY);
+    found?.value.as_deref()
+}
+
+/// A table with the columns of `part`.
 fn begin<W: Write + Send>(
     target: W,
     part: &SerializedFileReader<File>,
 ) -> Result<SerializedFileWriter<W>> {
-    let metadata = part.metadata().file_metadata();
-    let named: Option<Vec<KeyValue>> = metadata.key_value_metadata().cloned();
-    let properties = WriterProperties::builder().set_key_value_metadata(named);
-    let schema = metadata.schema_descr().root_schema_ptr();
-    SerializedFileWriter::new(target, schema, Arc::new(properties.build()))
+    let schema = part.metadata().file_metadata().schema_descr();
+    let properties = Arc::new(WriterProperties::default());
+    SerializedFileWriter::new(target, schema.root_schema_ptr(), properties)
 }
 
 /// Copies a group of rows as it is.

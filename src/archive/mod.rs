@@ -12,9 +12,11 @@
 //!
 //! Both tables have VOTable metadata: unit, UCD and description of every column.
 
+mod configuration;
 mod directory;
 mod error;
 mod frame_row;
+mod identity;
 mod merge;
 mod nights;
 mod plan;
@@ -24,11 +26,13 @@ mod status;
 mod votable;
 mod write;
 
-pub use directory::{Archive, PartWriter, SCHEMA};
+pub use configuration::{CatalogIdentity, Configuration, FileHash};
+pub use directory::{Archive, PartWriter};
 pub use error::ArchiveError;
 pub use frame_row::FrameRow;
+pub use identity::{Identity, SCHEMA};
 pub use merge::merge;
-pub use nights::{NightSummary, summary};
+pub use nights::{NightSummary, Nights, summary};
 pub use plan::{DEFAULT_FRAMES_PER_PART, Part, Plan, Shard};
 pub use read::names_in;
 pub use star_row::StarRow;

@@ -3,10 +3,12 @@
 use super::directory::Archive;
 use super::error::ArchiveError;
 use super::frame_row::UNREAD;
-use super::read::{for_each_row, number, text};
+use super::read::{for_each_row, number, open, text};
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::statistics::median;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
+use parquet::errors::ParquetError;
+use parquet::file::reader::ChunkReader;
 use parquet::record::Row;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -74,26 +76,46 @@ struct Night {
     pointings: Vec<(f64, UnitVector<Icrs>)>,
 }
 
+/// Frames by night and camera.
+#[derive(Default)]
+pub struct Nights(BTreeMap<[String; 2], Night>);
+
+impl Nights {
+    /// Adds the frames of a part: the content of its file.
+    ///
+    /// # Errors
+    /// [`ParquetError`] if it is no such table.
+    pub fn add(&mut self, part: impl ChunkReader + 'static) -> Result<(), ParquetError> {
+        for_each_row(part, &COLUMNS, |row| {
+            let key = ["night", "instrument_name"].map(|name| text(row, name).to_owned());
+            self.0.entry(key).or_default().add(row);
+        })
+    }
+
+    /// What each camera saw in each night, by night and camera.
+    pub fn finish(self) -> Vec<NightSummary> {
+        let nights = self.0.into_iter();
+        let finished = nights.map(|([night, instrument_name], frames)| NightSummary {
+            night,
+            instrument_name,
+            ..frames.finish()
+        });
+        finished.collect()
+    }
+}
+
 /// What each camera saw in each night, by night and camera.
 ///
 /// # Errors
 /// [`ArchiveError::File`], [`ArchiveError::Table`].
 pub fn summary(archive: &Archive) -> Result<Vec<NightSummary>, ArchiveError> {
-    let mut nights: BTreeMap<[String; 2], Night> = BTreeMap::new();
+    let mut nights = Nights::default();
     for part in archive.plan().parts().filter(|part| archive.has(part)) {
-        for_each_row(&archive.frames_of(&part), &COLUMNS, |row| {
-            let key = ["night", "instrument_name"].map(|name| text(row, name).to_owned());
-            nights.entry(key).or_default().add(row);
-        })?;
+        let path = archive.frames_of(&part);
+        let added = nights.add(open(&path)?);
+        added.map_err(ArchiveError::table("reading", &path))?;
     }
-    let finished = nights
-        .into_iter()
-        .map(|([night, instrument_name], frames)| NightSummary {
-            night,
-            instrument_name,
-            ..frames.finish()
-        });
-    Ok(finished.collect())
+    Ok(nights.finish())
 }
 
 impl Night {
@@ -139,15 +161,20 @@ impl Night {
             limit_difference_mag: median_of(&mut self.differences),
             sky_mag_arcsec2: median_of(&mut self.skies),
             zero_point_vmag,
-            zero_point_change_mag: zero_point_vmag.map(change),
-            pointing_drift_deg: drift_deg(self.pointings),
+            zero_point_change_mag: zero_point_vmag.map(change).map(rounded),
+            pointing_drift_deg: drift_deg(self.pointings).map(rounded),
             ..self.summary
         }
     }
 }
 
 fn median_of(values: &mut [f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| median(values))
+    (!values.is_empty()).then(|| rounded(median(values)))
+}
+
+/// To the digits that values of frames have.
+fn rounded(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
 }
 
 fn drift_deg(mut pointings: Vec<(f64, UnitVector<Icrs>)>) -> Option<f64> {

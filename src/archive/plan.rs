@@ -109,9 +109,9 @@ impl Plan {
 }
 
 impl Part<'_> {
-    /// Name of the part's files, for a configuration as text.
-    pub(super) fn file_name(&self, configuration: &str) -> String {
-        let both = [hash_of(self.names), xxh3_64(configuration.as_bytes())];
+    /// Name of the part's files; `identity` is the content of `archive.json`.
+    pub fn file_name(&self, identity: &str) -> String {
+        let both = [hash_of(self.names), xxh3_64(identity.as_bytes())];
         let hash = xxh3_64(&both.map(u64::to_le_bytes).concat());
         format!("part-{:06}-{hash:016x}.parquet", self.number)
     }

@@ -2,7 +2,8 @@
 
 use super::error::ArchiveError;
 use parquet::basic::{ConvertedType, LogicalType};
-use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::errors::ParquetError;
+use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
 use parquet::record::{Field, Row};
 use parquet::schema::types::Type;
 use std::fs::File;
@@ -12,31 +13,25 @@ use std::sync::Arc;
 /// Calls `each` with every row of a table, of which only these columns are read; columns come in the
 /// order of the table.
 pub(super) fn for_each_row(
-    path: &Path,
+    table: impl ChunkReader + 'static,
     columns: &[&str],
     mut each: impl FnMut(&Row),
-) -> Result<(), ArchiveError> {
-    let error = ArchiveError::table("reading", path);
-    let reader = open(path)?;
-    let schema = projected(&reader, columns).map_err(&error)?;
-    let rows = reader.get_row_iter(Some(schema)).map_err(&error)?;
-    for row in rows {
-        each(&row.map_err(&error)?);
+) -> Result<(), ParquetError> {
+    let reader = SerializedFileReader::new(table)?;
+    let schema = projected(&reader, columns)?;
+    for row in reader.get_row_iter(Some(schema))? {
+        each(&row?);
     }
     Ok(())
 }
 
-/// Opens a table.
-pub(super) fn open(path: &Path) -> Result<SerializedFileReader<File>, ArchiveError> {
-    let file = File::open(path).map_err(ArchiveError::file("reading", path))?;
-    SerializedFileReader::new(file).map_err(ArchiveError::table("reading", path))
+/// Opens the file of a table.
+pub(super) fn open(path: &Path) -> Result<File, ArchiveError> {
+    File::open(path).map_err(ArchiveError::file("reading", path))
 }
 
 /// The schema of the columns with these names.
-fn projected(
-    reader: &SerializedFileReader<File>,
-    columns: &[&str],
-) -> parquet::errors::Result<Type> {
+fn projected(reader: &impl FileReader, columns: &[&str]) -> Result<Type, ParquetError> {
     let schema = reader.metadata().file_metadata().schema();
     let wanted: Vec<Arc<Type>> = schema
         .get_fields()
@@ -76,7 +71,8 @@ fn field<'r>(row: &'r Row, column: &str) -> Option<&'r Field> {
 /// [`ArchiveError::NoNames`] if there is no such column, [`ArchiveError::File`],
 /// [`ArchiveError::Table`].
 pub fn names_in(path: &Path) -> Result<Vec<String>, ArchiveError> {
-    let reader = open(path)?;
+    let error = ArchiveError::table("reading", path);
+    let reader = SerializedFileReader::new(open(path)?).map_err(&error)?;
     let schema = reader.metadata().file_metadata().schema();
     let is_text = |field: &&Arc<Type>| {
         let info = field.get_basic_info();
@@ -95,9 +91,10 @@ pub fn names_in(path: &Path) -> Result<Vec<String>, ArchiveError> {
         _ => return Err(ArchiveError::NoNames(path.to_owned())),
     };
     let mut names = Vec::new();
-    for_each_row(path, &[column], |row| {
+    let read = for_each_row(open(path)?, &[column], |row| {
         names.push(text(row, column).to_owned());
-    })?;
+    });
+    read.map_err(&error)?;
     names.retain(|name| !name.is_empty());
     Ok(names)
 }

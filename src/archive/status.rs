@@ -3,7 +3,7 @@
 use super::directory::Archive;
 use super::error::ArchiveError;
 use super::frame_row::UNREAD;
-use super::read::{for_each_row, text};
+use super::read::{for_each_row, open, text};
 use serde::Serialize;
 
 /// How far an archive is.
@@ -61,7 +61,8 @@ pub fn status(archive: &Archive) -> Result<Status, ArchiveError> {
         }
         status.parts_done += 1;
         let columns = ["frame", "status", "reason"];
-        for_each_row(&archive.frames_of(&part), &columns, |row| {
+        let path = archive.frames_of(&part);
+        let read = for_each_row(open(&path)?, &columns, |row| {
             status.frames_done += 1;
             match text(row, "status") {
                 "identified" => status.identified += 1,
@@ -74,7 +75,8 @@ pub fn status(archive: &Archive) -> Result<Status, ArchiveError> {
                 }
                 _ => status.not_identified += 1,
             }
-        })?;
+        });
+        read.map_err(ArchiveError::table("reading", &path))?;
     }
     Ok(status)
 }

@@ -19,7 +19,10 @@ const ROWS_PER_GROUP: usize = 1 << 16;
 
 /// Writes rows to a file. The same rows make the same bytes.
 pub struct TableWriter<R, W: Write + Send> {
+    table: String,
     columns: Vec<Column<R>>,
+    /// Characters of the longest text of each column.
+    widths: Vec<usize>,
     writer: SerializedFileWriter<W>,
     /// Rows that are not written yet.
     rows: Vec<R>,
@@ -32,17 +35,13 @@ impl<R, W: Write + Send> TableWriter<R, W> {
     /// [`ParquetError`] if the beginning cannot be written.
     pub fn new(target: W, table: &str, columns: Vec<Column<R>>) -> Result<Self> {
         let schema = Arc::new(parse_message_type(&schema(table, &columns))?);
-        let metadata = [
-            (VERSION_KEY, VERSION.to_owned()),
-            (CONTENT_KEY, votable(table, &columns)),
-        ];
-        let metadata = metadata.map(|(key, value)| KeyValue::new(key.to_owned(), value));
         let properties = WriterProperties::builder()
             .set_compression(Compression::SNAPPY)
-            .set_key_value_metadata(Some(metadata.to_vec()))
             .build();
         Ok(Self {
+            table: table.to_owned(),
             writer: SerializedFileWriter::new(target, schema, Arc::new(properties))?,
+            widths: vec![0; columns.len()],
             columns,
             rows: Vec::new(),
         })
@@ -68,12 +67,17 @@ impl<R, W: Write + Send> TableWriter<R, W> {
         if !self.rows.is_empty() {
             self.write_group()?;
         }
+        let content = votable(&self.table, &self.columns, &self.widths);
+        describe(&mut self.writer, content);
         self.writer.into_inner()
     }
 
     fn write_group(&mut self) -> Result<()> {
         let mut group = self.writer.next_row_group()?;
-        for column in &self.columns {
+        for (column, width) in self.columns.iter().zip(&mut self.widths) {
+            let texts = self.rows.iter().filter_map(|row| text((column.value)(row)));
+            let longest = texts.map(|text| text.chars().count()).max();
+            *width = longest.unwrap_or(0).max(*width);
             let missing = || ParquetError::General(format!("{} has no writer", column.name));
             let mut writer = group.next_column()?.ok_or_else(missing)?;
             write_column(writer.untyped(), column, &self.rows)?;
@@ -82,6 +86,13 @@ impl<R, W: Write + Send> TableWriter<R, W> {
         group.close()?;
         self.rows.clear();
         Ok(())
+    }
+}
+
+/// Adds a VOTable to the metadata of a file.
+pub(super) fn describe<W: Write + Send>(writer: &mut SerializedFileWriter<W>, votable: String) {
+    for (key, value) in [(VERSION_KEY, VERSION.to_owned()), (CONTENT_KEY, votable)] {
+        writer.append_key_value_metadata(KeyValue::new(key.to_owned(), value));
     }
 }
 
@@ -126,7 +137,8 @@ fn write_column<R>(writer: &mut ColumnWriter<'_>, column: &Column<R>, rows: &[R]
             typed.write_batch(&values, levels, None)?;
         }
         ColumnWriter::ByteArrayColumnWriter(typed) => {
-            let values: Vec<ByteArray> = fields().filter_map(text).collect();
+            let texts = fields().filter_map(text);
+            let values: Vec<ByteArray> = texts.map(|text| text.into_bytes().into()).collect();
             typed.write_batch(&values, levels, None)?;
         }
         _ => {
@@ -168,9 +180,9 @@ fn boolean(field: FieldValue) -> Option<bool> {
     }
 }
 
-fn text(field: FieldValue) -> Option<ByteArray> {
+fn text(field: FieldValue) -> Option<String> {
     match field {
-        FieldValue::Text(value) => value.map(|text| text.into_bytes().into()),
+        FieldValue::Text(value) => value,
         _ => None,
     }
 }

@@ -51,7 +51,7 @@ pub(super) fn process_parts(
     let plan = Plan::new(names, options.frames_per_part)?;
     arguments.solving.catalog.with_index(|pool, indexed| {
         let configuration = configuration(arguments, indexed.catalog())?;
-        let archive = Archive::claim(directory, plan, configuration).map_err(claim_error)?;
+        let archive = Archive::claim(directory, plan, &configuration).map_err(claim_error)?;
         let worker = Worker {
             pool,
             context: solving.context(indexed, arguments.solving.attitude_only),

@@ -1,0 +1,151 @@
+//! Tables of many frames: what workers need that write them wherever they are kept.
+
+use crate::errors::{exception, json};
+use crate::hints::Hints;
+use crate::pipeline::Pipeline;
+use crate::solved::Solved;
+use bytes::Bytes;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use starpipe::FrameReport;
+use starpipe::archive::{
+    Configuration, FileHash, FrameRow, Identity, Nights, Plan, StarRow, TableWriter,
+};
+use std::num::NonZeroUsize;
+
+/// What is stated for all frames beside the hints.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Stated {
+    hints: Hints,
+    /// The content of the camera's description.
+    camera: Option<Vec<u8>>,
+    sigma: Option<f64>,
+    max_stars: Option<u64>,
+    attitude_only: bool,
+}
+
+/// The names of an archive's parts, and what each is of.
+#[pyclass(frozen, get_all, module = "starpipe._starpipe")]
+pub struct ArchivePlan {
+    /// The content of `archive.json`.
+    identity: String,
+    /// All names, sorted.
+    names: Vec<String>,
+    /// Name of each part's files, and where its frames begin and end among the names.
+    parts: Vec<(String, usize, usize)>,
+}
+
+/// Cuts the frames with these names into parts.
+#[pyfunction]
+#[pyo3(signature = (names, frames_per_part, pipeline, stated))]
+pub fn archive_plan(
+    names: Vec<String>,
+    frames_per_part: NonZeroUsize,
+    pipeline: &Pipeline,
+    stated: Stated,
+) -> PyResult<ArchivePlan> {
+    let plan = Plan::new(names, frames_per_part).map_err(exception)?;
+    let configuration = Configuration {
+        catalog: pipeline.indexed.catalog().into(),
+        camera: stated.camera.as_deref().map(FileHash::of),
+        sigma: stated.sigma,
+        max_stars: stated.max_stars,
+        attitude_only: stated.attitude_only,
+        ..stated.hints.configuration()?
+    };
+    let identity = Identity::new(&plan, &configuration).map_err(exception)?;
+    let mut first = 0;
+    let parts = plan.parts().map(|part| {
+        let begin = first;
+        first += part.names.len();
+        (part.file_name(identity.text()), begin, first)
+    });
+    Ok(ArchivePlan {
+        parts: parts.collect(),
+        identity: identity.text().to_owned(),
+        names: plan.names().to_vec(),
+    })
+}
+
+/// Where two contents of `archive.json` differ: a text for each value.
+#[pyfunction]
+pub fn archive_differences(found: &str, wanted: &str) -> PyResult<Vec<String>> {
+    let read = |text| Identity::read(text).map_err(exception);
+    Ok(read(found)?.differences(&read(wanted)?))
+}
+
+/// The rows of a part.
+#[pyclass(module = "starpipe._starpipe")]
+pub struct PartRows(Option<Tables>);
+
+struct Tables {
+    frames: TableWriter<FrameRow, Vec<u8>>,
+    stars: TableWriter<StarRow, Vec<u8>>,
+}
+
+#[pymethods]
+impl PartRows {
+    #[new]
+    fn new() -> PyResult<Self> {
+        let frames = TableWriter::new(Vec::new(), "frames", FrameRow::columns());
+        let stars = TableWriter::new(Vec::new(), "stars", StarRow::columns());
+        Ok(Self(Some(Tables {
+            frames: frames.map_err(exception)?,
+            stars: stars.map_err(exception)?,
+        })))
+    }
+
+    /// Adds a solved frame and its stars; returns its status.
+    fn add(&mut self, solved: &Solved) -> PyResult<String> {
+        let catalog = solved.indexed.catalog();
+        let report = FrameReport::new(&solved.name, &solved.solution, catalog);
+        let frame = FrameRow::new(&report, &solved.solution);
+        let status = frame.status.clone();
+        let tables = self.tables()?;
+        tables.frames.add(frame).map_err(exception)?;
+        for star in StarRow::of_frame(&report) {
+            tables.stars.add(star).map_err(exception)?;
+        }
+        Ok(status)
+    }
+
+    /// Adds a frame that could not be read.
+    fn add_unread(&mut self, name: &str, reason: String) -> PyResult<()> {
+        let row = FrameRow::unread(name, reason);
+        self.tables()?.frames.add(row).map_err(exception)
+    }
+
+    /// The files of frames and of stars.
+    fn finish<'py>(
+        &mut self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyBytes>, Bound<'py, PyBytes>)> {
+        let Tables { frames, stars } = self.0.take().ok_or_else(finished)?;
+        let frames = frames.finish().map_err(exception)?;
+        let stars = stars.finish().map_err(exception)?;
+        Ok((PyBytes::new(py, &frames), PyBytes::new(py, &stars)))
+    }
+}
+
+impl PartRows {
+    fn tables(&mut self) -> PyResult<&mut Tables> {
+        self.0.as_mut().ok_or_else(finished)
+    }
+}
+
+fn finished() -> PyErr {
+    PyValueError::new_err("the part is finished")
+}
+
+/// What each camera saw in each night, as JSON; `parts` are the contents of the tables of frames.
+#[pyfunction]
+pub fn archive_nights(parts: &Bound<'_, PyAny>) -> PyResult<String> {
+    let mut nights = Nights::default();
+    for part in parts.try_iter()? {
+        let content: Vec<u8> = part?.extract()?;
+        nights.add(Bytes::from(content)).map_err(exception)?;
+    }
+    json(&nights.finish())
+}
