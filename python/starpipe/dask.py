@@ -81,6 +81,8 @@ class Archive:
     def _table(self, table: str) -> Any:
         from dask import dataframe
 
+        # What was listed while it was written is old.
+        _open(self.out, self._options)[0].invalidate_cache()
         return dataframe.read_parquet(f"{self.out}/{table}", storage_options=self._options)
 
     def summary(self) -> list[dict[str, Any]]:

@@ -132,13 +132,13 @@ def test_killed_workers_lose_nothing(night, alone, tmp_path):
                 if process is not None and process.pid is not None:
                     os.kill(process.pid, signal.SIGKILL)
 
+        # The frames are few: they are read slowly, so that workers are killed at work.
+        frames = [f"slow://{path}" for path in sorted(night.glob("*.tif"))]
+        client.register_plugin(_slow_files_plugin())
+        _slow_files()
         killer = threading.Thread(target=kill)
         killer.start()
         try:
-            # The frames are few: they are read slowly, so that workers are killed at work.
-            frames = [f"slow://{path}" for path in sorted(night.glob("*.tif"))]
-            client.run(_slow_files)
-            client.register_plugin(_SlowFiles())
             out = str(tmp_path / "out")
             archive = sp.dask.process(frames, out, frames_per_part=PER_PART, client=client)
         finally:
@@ -173,14 +173,17 @@ def _slow_files():
     fsspec.register_implementation("slow", Slow, clobber=True)
 
 
-class _SlowFiles:
-    """Registers slow files in each worker that starts."""
+def _slow_files_plugin():
+    """Return a plugin that registers slow files in each worker that starts."""
+    from distributed import WorkerPlugin
 
-    idempotent = True
-    name = "slow files"
+    class SlowFiles(WorkerPlugin):
+        name = "slow files"
 
-    def setup(self, worker):
-        _slow_files()
+        def setup(self, worker):
+            _slow_files()
+
+    return SlowFiles()
 
 
 class Faults:
