@@ -258,7 +258,9 @@ def _run(
     progress: _Progress,
 ) -> None:
     """Do the work on a cluster: only some tasks at a time, so that the scheduler stays small."""
-    from distributed import as_completed
+    import distributed
+
+    as_completed: Any = distributed.as_completed
 
     waiting = deque((part, names, 0) for part, names in work)
     at_once = 2 * max(1, sum(client.nthreads().values()))
@@ -320,8 +322,8 @@ def _process_part(job: _Job, part: str, names: list[str]) -> dict[str, int]:
     filesystem, root = _open(job.out, job.options)
     frames, stars = rows.finish()
     # A part is there when its table of frames is.
-    for table, content in ((TABLES[1], stars), (TABLES[0], frames)):
-        _write(filesystem, f"{root}/{table}/{part}", content)
+    for table, file in ((TABLES[1], stars), (TABLES[0], frames)):
+        _write(filesystem, f"{root}/{table}/{part}", file)
     return dict(counted)
 
 

@@ -189,7 +189,7 @@ fn drift_deg(mut pointings: Vec<(f64, UnitVector<Icrs>)>) -> Option<f64> {
 /// # Reference
 /// Capitaine et al. 2000, A&A 355, 398; UT1 is taken as UTC, 0.004° at most.
 fn earth_rotation_rad(mjd: f64) -> f64 {
-    const TURNS_PER_DAY: f64 = 1.002_737_811_911_354_48;
+    const TURNS_PER_DAY: f64 = 1.002_737_811_911_354_6;
     const TURNS_AT_J2000: f64 = 0.779_057_273_264;
     let turns = TURNS_AT_J2000 + TURNS_PER_DAY * (mjd - 51_544.5);
     std::f64::consts::TAU * turns.fract()

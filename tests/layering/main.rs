@@ -63,6 +63,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "track",
         ],
     ),
+    ("archive", &["base", "sky", "pipeline", "report"]),
     (
         "study",
         &[

@@ -60,6 +60,7 @@ row!(StarRecord, "stars":
 mod tests {
     use super::super::tests::{frame_row, star_row};
     use super::*;
+    use crate::base::table::FieldValue;
 
     /// The fields of a row as they are written.
     fn fields<R: TableRow>(row: &R) -> Vec<(String, String)> {
