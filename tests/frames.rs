@@ -252,6 +252,7 @@ fn files_of_other_programs_are_read_to_the_last_bit() {
         ("astropy.fits.gz", from_bottom as fn(usize) -> usize),
         ("imagemagick.fits", from_top),
         ("cfitsio.fits.gz", from_top),
+        ("fpack.fits.fz", from_top),
     ] {
         let frame = frame::read(fixture("formats").join(name)).unwrap();
         assert_eq!((frame.width, frame.height), (32, 24));
@@ -270,11 +271,6 @@ fn files_of_other_programs_are_read_to_the_last_bit() {
     assert_eq!(
         (metadata.focal_length_mm, metadata.pixel_size_um),
         (Some(35.0), Some(4.65))
-    );
-    let packed = frame::read(fixture("formats/fpack.fits.fz")).unwrap_err();
-    assert!(
-        packed.to_string().contains("unpack it with funpack"),
-        "{packed}"
     );
 }
 
@@ -726,7 +722,7 @@ fn files_without_a_frame_say_what_they_are() {
         (
             "z.fits",
             [empty, table(&["ZIMAGE  = T"])].concat(),
-            "unsupported FITS: found an image compressed tile by tile (ZIMAGE), expected one that is not: unpack it with funpack",
+            "damaged FITS: the header at byte 2880 has no ZBITPIX, expected 8, 16, 32, 64, -32 or -64",
         ),
         (
             "inf.fits",

@@ -116,14 +116,20 @@ impl<'a> Header<'a> {
         value.map(Some).map_err(|_| self.invalid(keyword, expected))
     }
 
+    /// The value as a finite number, `None` if it is missing.
+    pub fn finite(&self, keyword: &str) -> Result<Option<f64>, FrameError> {
+        let Some(text) = self.text(keyword) else {
+            return Ok(None);
+        };
+        let value = parse_number(&text).filter(|value| value.is_finite());
+        value
+            .map(Some)
+            .ok_or_else(|| self.invalid(keyword, "a finite number"))
+    }
+
     /// The value as a finite number, `default` if it is missing.
     pub fn number_or(&self, keyword: &str, default: f64) -> Result<f64, FrameError> {
-        let Some(text) = self.text(keyword) else {
-            return Ok(default);
-        };
-        parse_number(&text)
-            .filter(|value| value.is_finite())
-            .ok_or_else(|| self.invalid(keyword, "a finite number"))
+        Ok(self.finite(keyword)?.unwrap_or(default))
     }
 
     /// The error for a value of `keyword` that is not as `expected`.

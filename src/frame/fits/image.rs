@@ -1,6 +1,7 @@
 //! Decodes one image of a header-data unit.
 
 use super::error::{truncated, unsupported};
+use super::tiles;
 use super::unit::{StoredType, Unit};
 use crate::frame::levels::{
     Samples, WholeNumber, frame_from_floats, frame_from_integers, interleaved,
@@ -13,8 +14,8 @@ pub(super) struct Image {
     height: usize,
     /// 1, or 3 for colour.
     channels: usize,
-    /// Offset in the file.
-    offset: usize,
+    /// Its plane in the header-data unit, from 0.
+    plane: usize,
     stored: StoredType,
     scale: f64,
     zero: f64,
@@ -25,11 +26,6 @@ pub(super) struct Image {
 impl Image {
     /// The image `plane` of `unit`. A cube has several planes, and one must be chosen.
     pub fn new(unit: &Unit, plane: Option<usize>) -> Result<Self, FrameError> {
-        if unit.is_compressed_image() {
-            let found = "an image compressed tile by tile (ZIMAGE)".to_owned();
-            let expected = "one that is not: unpack it with funpack first";
-            return Err(unsupported(found, expected));
-        }
         if plane.is_none() && unit.pages() > 1 {
             let found = format!("a cube of {} planes", unit.planes());
             let expected = "one plane, three of colour, or a page that says which";
@@ -41,34 +37,44 @@ impl Image {
         if scale == 0.0 {
             return Err(unit.header.invalid("BSCALE", "a number other than 0"));
         }
-        let before = (width * height * unit.stored.bytes())
-            .checked_mul(plane.unwrap_or(0))
-            .and_then(|before| before.checked_add(unit.data));
         Ok(Self {
             width,
             height,
             channels: if unit.is_colour() { 3 } else { 1 },
-            offset: before.unwrap_or(usize::MAX),
+            plane: plane.unwrap_or(0),
             stored: unit.stored,
             scale,
             zero: unit.header.number_or("BZERO", 0.0)?,
             blank: if unit.stored.is_float() {
                 None
             } else {
-                unit.header.optional("BLANK", "an integer")?
+                unit.blank()?
             },
         })
     }
 
-    /// Decodes the image from `bytes`, the content of the file.
-    pub fn frame(&self, bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
-        let length = self.width * self.height * self.channels * self.stored.bytes();
-        let end = self.offset.saturating_add(length);
-        let data = bytes.get(self.offset..end).ok_or_else(|| {
+    /// Decodes the image from `unit`, of which it was made, in `bytes`, the content of the file.
+    pub fn frame(&self, unit: &Unit, bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
+        let pixels = self.width * self.height * self.channels;
+        if unit.is_compressed_image() {
+            let first = self.plane.saturating_mul(self.width * self.height);
+            let range = first..first.saturating_add(pixels);
+            return self.frame_of(&tiles::unpack(unit, bytes, range)?);
+        }
+        let plane_bytes = self.width * self.height * self.stored.bytes();
+        let before = plane_bytes.saturating_mul(self.plane);
+        let start = unit.data.saturating_add(before);
+        let end = start.saturating_add(pixels * self.stored.bytes());
+        let data = bytes.get(start..end).ok_or_else(|| {
             let Self { width, height, .. } = self;
             let detail = format!("the image of {width} x {height} pixels ends at byte {end}");
             truncated(bytes.len(), detail)
         })?;
+        self.frame_of(data)
+    }
+
+    /// Decodes the image from its stored values.
+    fn frame_of(&self, data: &[u8]) -> Result<Frame<'static>, FrameError> {
         if self.scale == 1.0 && !self.stored.is_float() {
             const HALF_8: f64 = (1_u8 << 7) as f64;
             const HALF_16: f64 = (1_u16 << 15) as f64;

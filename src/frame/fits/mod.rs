@@ -4,7 +4,8 @@
 //! Levels are BZERO + BSCALE × stored value. Integers that BZERO turns into unsigned ones (32768,
 //! and its equivalents for 8 and 32 bits) are exact and saturate at the largest value. Other scaled
 //! integers have a step of BSCALE and no saturation. BLANK and NaN mark pixels without a value.
-//! Tile-compressed images (ZIMAGE) are refused. Rows are stored bottom-up unless ROWORDER is TOP-DOWN.
+//! Images compressed tile by tile (ZIMAGE) are read as if they were not compressed ([`tiles`]). Rows
+//! are stored bottom-up unless ROWORDER is TOP-DOWN.
 //!
 //! This is a reader of our own. Of the crates under a permissive licence, `fitsrs` 0.4.1 and
 //! `fitsio-pure` 0.25.0 both panic on some damaged headers, and `fitsrs` returns the beginning of a
@@ -18,6 +19,7 @@ mod error;
 mod header;
 mod image;
 mod keywords;
+mod tiles;
 mod unit;
 mod write;
 
@@ -48,7 +50,7 @@ pub(super) fn decode(
             let image = Image::new(&unit, page.map(|_| plane))?;
             let headers = [Some(&unit.header), primary.as_ref()];
             let metadata = keywords::metadata(headers.into_iter().flatten());
-            return Ok(image.frame(bytes)?.with_metadata(metadata).upright());
+            return Ok(image.frame(&unit, bytes)?.with_metadata(metadata).upright());
         }
         pages += unit.pages();
         tables += usize::from(unit.is_table());

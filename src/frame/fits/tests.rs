@@ -247,7 +247,7 @@ fn files_without_an_image_say_what_they_hold() {
         error_of(&tables, None).contains("found no image in it, and 1 table, expected an image")
     );
     let compressed = [empty_primary(&[]), table(&["ZIMAGE  = T"])].concat();
-    assert!(error_of(&compressed, None).contains("unpack it with funpack"));
+    assert!(error_of(&compressed, None).contains("has no ZBITPIX, expected 8, 16"));
 }
 
 #[test]

@@ -37,10 +37,7 @@ impl<'a> Units<'a> {
         }
         let (header, data) = Header::parse(self.bytes, at)?;
         let unit = Unit::new(header, data)?;
-        let end = unit
-            .data_bytes()
-            .and_then(|length| data.checked_add(length));
-        self.end = end.unwrap_or(usize::MAX);
+        self.end = unit.end();
         // Headers and data are padded to whole blocks.
         let next = self.end.checked_next_multiple_of(BLOCK_BYTES);
         self.next = next.unwrap_or(usize::MAX);
@@ -60,16 +57,16 @@ pub(super) enum StoredType {
 }
 
 impl StoredType {
-    fn of(header: &Header) -> Result<Self, FrameError> {
+    fn of(header: &Header, keyword: &str) -> Result<Self, FrameError> {
         const EXPECTED: &str = "8, 16, 32, 64, -32 or -64";
-        Ok(match header.required("BITPIX", EXPECTED)? {
+        Ok(match header.required(keyword, EXPECTED)? {
             8 => Self::U8,
             16 => Self::I16,
             32 => Self::I32,
             64 => Self::I64,
             -32 => Self::F32,
             -64 => Self::F64,
-            _ => return Err(header.invalid("BITPIX", EXPECTED)),
+            _ => return Err(header.invalid(keyword, EXPECTED)),
         })
     }
 
@@ -93,50 +90,43 @@ pub(super) struct Unit<'a> {
     pub header: Header<'a>,
     /// Offset of the data in the file.
     pub data: usize,
+    /// Type of the values of the image, compressed or not.
     pub stored: StoredType,
-    /// NAXIS1, NAXIS2, …
+    /// NAXIS1, NAXIS2, …; of a compressed image ZNAXIS1, ZNAXIS2, …
     pub axes: Vec<usize>,
+    /// The axes of the table that holds a compressed image; none for other units.
+    pub table: Vec<usize>,
+    /// Size of the data without padding, in bytes; `None` on overflow.
+    data_bytes: Option<usize>,
 }
 
 impl<'a> Unit<'a> {
     fn new(header: Header<'a>, data: usize) -> Result<Self, FrameError> {
-        const MAX_AXES: i64 = 999;
-        let stored = StoredType::of(&header)?;
-        let expected = "a number of axes from 0 to 999";
-        let count = header.required("NAXIS", expected)?;
-        if !(0..=MAX_AXES).contains(&count) {
-            return Err(header.invalid("NAXIS", expected));
-        }
-        let axis = |number: i64| {
-            let keyword = format!("NAXIS{number}");
-            let expected = "a length of 0 or more";
-            let length = header.required(&keyword, expected)?;
-            usize::try_from(length).map_err(|_| header.invalid(&keyword, expected))
+        let stored = StoredType::of(&header, "BITPIX")?;
+        let axes = axes(&header, "NAXIS")?;
+        let data_bytes = data_bytes(&header, &axes, stored);
+        let (stored, axes, table) = if header.is_true("ZIMAGE") {
+            let stored = StoredType::of(&header, "ZBITPIX")?;
+            (stored, self::axes(&header, "ZNAXIS")?, axes)
+        } else {
+            (stored, axes, Vec::new())
         };
-        let axes = (1..=count).map(axis).collect::<Result<_, _>>()?;
         Ok(Self {
             header,
             data,
             stored,
             axes,
+            table,
+            data_bytes,
         })
     }
 
-    /// Size of the data without padding, in bytes; `None` on overflow.
-    fn data_bytes(&self) -> Option<usize> {
-        let count = |keyword: &str, default: usize| {
-            let found = self.header.optional(keyword, "a count").ok().flatten();
-            found
-                .and_then(|n| usize::try_from(n).ok())
-                .unwrap_or(default)
-        };
-        if self.axes.is_empty() {
-            return Some(0);
-        }
-        product(&self.axes)?
-            .checked_add(count("PCOUNT", 0))?
-            .checked_mul(count("GCOUNT", 1))?
-            .checked_mul(self.stored.bytes())
+    /// Offset of the end of the data in the file, without padding.
+    pub fn end(&self) -> usize {
+        let end = self
+            .data_bytes
+            .and_then(|length| self.data.checked_add(length));
+        end.unwrap_or(usize::MAX)
     }
 
     pub fn is_table(&self) -> bool {
@@ -147,6 +137,17 @@ impl<'a> Unit<'a> {
     /// Whether the unit is a tile-compressed image, which is stored as a table.
     pub fn is_compressed_image(&self) -> bool {
         self.header.is_true("ZIMAGE")
+    }
+
+    /// The stored integer that marks a pixel without a value: BLANK, in compressed images ZBLANK too.
+    pub fn blank(&self) -> Result<Option<i64>, FrameError> {
+        let expected = "an integer";
+        if self.is_compressed_image()
+            && let Some(blank) = self.header.optional("ZBLANK", expected)?
+        {
+            return Ok(Some(blank));
+        }
+        self.header.optional("BLANK", expected)
     }
 
     /// Number of planes of a cube.
@@ -160,11 +161,8 @@ impl<'a> Unit<'a> {
 
     /// Number of images in it: none, one, or the planes of a cube.
     pub fn pages(&self) -> usize {
-        if self.is_compressed_image() {
-            return 1;
-        }
         let kind = self.header.text("XTENSION");
-        let is_image = kind.is_none_or(|kind| kind == "IMAGE");
+        let is_image = self.is_compressed_image() || kind.is_none_or(|kind| kind == "IMAGE");
         match self.axes[..] {
             [width, height, ..] if is_image && width > 0 && height > 0 => {
                 if self.is_colour() {
@@ -176,6 +174,40 @@ impl<'a> Unit<'a> {
             _ => 0,
         }
     }
+}
+
+/// The lengths of the axes, whose number `keyword` says: NAXIS and NAXIS1, NAXIS2, …
+fn axes(header: &Header, keyword: &str) -> Result<Vec<usize>, FrameError> {
+    const MAX_AXES: i64 = 999;
+    let expected = "a number of axes from 0 to 999";
+    let count = header.required(keyword, expected)?;
+    if !(0..=MAX_AXES).contains(&count) {
+        return Err(header.invalid(keyword, expected));
+    }
+    let axis = |number: i64| {
+        let keyword = format!("{keyword}{number}");
+        let expected = "a length of 0 or more";
+        let length = header.required(&keyword, expected)?;
+        usize::try_from(length).map_err(|_| header.invalid(&keyword, expected))
+    };
+    (1..=count).map(axis).collect()
+}
+
+/// Size of the data without padding, in bytes; `None` on overflow.
+fn data_bytes(header: &Header, axes: &[usize], stored: StoredType) -> Option<usize> {
+    let count = |keyword: &str, default: usize| {
+        let found = header.optional(keyword, "a count").ok().flatten();
+        found
+            .and_then(|n| usize::try_from(n).ok())
+            .unwrap_or(default)
+    };
+    if axes.is_empty() {
+        return Some(0);
+    }
+    product(axes)?
+        .checked_add(count("PCOUNT", 0))?
+        .checked_mul(count("GCOUNT", 1))?
+        .checked_mul(stored.bytes())
 }
 
 fn product(lengths: &[usize]) -> Option<usize> {

@@ -1,0 +1,224 @@
+//! Decodes single tiles of an image.
+
+use super::error::TileError;
+use super::grid::Tile;
+use super::gzip;
+use super::method::{Method, Values};
+use super::quantize::{Dither, Quantized};
+use super::table::{Column, Table};
+use crate::frame::FrameError;
+use crate::frame::fits::error::{malformed, unsupported};
+use crate::frame::fits::unit::{StoredType, Unit};
+
+/// All that the tiles of one image have in common.
+pub(super) struct Decoder<'a> {
+    table: Table<'a>,
+    stored: StoredType,
+    method: Method,
+    compressed: Column,
+    /// For tiles that are compressed without loss beside others that are quantized.
+    gzip: Option<Column>,
+    uncompressed: Option<Column>,
+    /// `None` for whole numbers and for floats that are stored as such.
+    quantization: Option<Quantization>,
+}
+
+/// Where the parameters of quantized tiles are.
+struct Quantization {
+    scale: Source<f64>,
+    zero: Source<f64>,
+    blank: Option<Source<i64>>,
+    dither: Dither,
+}
+
+/// Where a parameter is: in a column, or the same for all tiles.
+#[derive(Clone, Copy)]
+enum Source<T> {
+    Column(Column),
+    All(T),
+}
+
+impl<'a> Decoder<'a> {
+    pub fn new(unit: &Unit, table: Table<'a>) -> Result<Self, FrameError> {
+        let header = &unit.header;
+        let method = Method::of(header, unit.stored)?;
+        let quantization = if unit.stored.is_float() {
+            Quantization::of(unit, &table)?
+        } else {
+            None
+        };
+        if unit.stored.is_float() && quantization.is_none() && !method.keeps_bytes() {
+            let found = "floats in tiles without ZSCALE, compressed as whole numbers".to_owned();
+            return Err(unsupported(
+                found,
+                "ZSCALE, or GZIP_1, GZIP_2 or NOCOMPRESS",
+            ));
+        }
+        if table.column("NULL_PIXEL_MASK").is_some() {
+            let found = "a mask of pixels without a value (NULL_PIXEL_MASK)".to_owned();
+            return Err(unsupported(found, "ZBLANK, BLANK or NaN"));
+        }
+        let heap_column = |name| table.column(name).filter(|column| column.is_descriptor());
+        let compressed = heap_column("COMPRESSED_DATA").ok_or_else(|| {
+            let detail = "an image compressed tile by tile, expected a column COMPRESSED_DATA";
+            malformed(detail.to_owned())
+        })?;
+        let uncompressed = heap_column("UNCOMPRESSED_DATA");
+        let bytes = unit.stored.bytes();
+        if uncompressed.is_some_and(|column| column.element_bytes() != Some(bytes)) {
+            let found = "a column UNCOMPRESSED_DATA of another type than the image".to_owned();
+            return Err(unsupported(found, "the type in ZBITPIX"));
+        }
+        Ok(Self {
+            stored: unit.stored,
+            method,
+            compressed,
+            gzip: heap_column("GZIP_COMPRESSED_DATA"),
+            uncompressed,
+            quantization,
+            table,
+        })
+    }
+
+    /// Whether the data of the tile in `row` are in the file; no data are no error here.
+    pub fn check(&self, row: usize) -> Result<(), TileError> {
+        let columns = [Some(self.compressed), self.gzip, self.uncompressed];
+        let mut columns = columns.into_iter().flatten();
+        columns.try_for_each(|column| self.table.data(column, row).map(|_| ()))
+    }
+
+    /// The pixels of `tile` as an image that is not compressed has them: big-endian, of ZBITPIX.
+    pub fn pixels(&self, tile: &Tile) -> Result<Vec<u8>, TileError> {
+        let count = tile.pixels();
+        let width = self.stored.bytes();
+        let data = |column: Option<Column>| match column {
+            Some(column) => self.table.data(column, tile.row),
+            None => Ok(&[][..]),
+        };
+        let compressed = data(Some(self.compressed))?;
+        if !compressed.is_empty() {
+            return self.decompressed(compressed, tile);
+        }
+        let packed = data(self.gzip)?;
+        if !packed.is_empty() {
+            return exactly(gzip::inflate(packed, count, width)?, count, width);
+        }
+        let plain = data(self.uncompressed)?;
+        if plain.is_empty() {
+            return Err(TileError::Empty);
+        }
+        exactly(plain.to_vec(), count, width)
+    }
+
+    /// Whether pixels are whole numbers of at most 32 bits.
+    fn has_short_integers(&self) -> bool {
+        matches!(
+            self.stored,
+            StoredType::U8 | StoredType::I16 | StoredType::I32
+        )
+    }
+
+    fn decompressed(&self, data: &[u8], tile: &Tile) -> Result<Vec<u8>, TileError> {
+        /// Writers may store narrow numbers in words of four bytes.
+        const WORD_BYTES: usize = 4;
+        let (count, width) = (tile.pixels(), self.stored.bytes());
+        let max_width = match self.quantization {
+            Some(_) => WORD_BYTES,
+            None => width.max(WORD_BYTES),
+        };
+        let values = self.method.decode(data, tile, max_width)?;
+        if let Some(quantization) = &self.quantization {
+            let numbers = values.numbers(count)?;
+            let quantized = quantization.of_tile(&self.table, tile.row);
+            let floats = quantized.floats(&numbers, tile.row);
+            return Ok(match self.stored {
+                StoredType::F64 => floats.flat_map(f64::to_be_bytes).collect(),
+                _ => floats
+                    .flat_map(|float| (float as f32).to_be_bytes())
+                    .collect(),
+            });
+        }
+        match values {
+            Values::Bytes(bytes) if bytes.len() == count * width => Ok(bytes),
+            Values::Bytes(bytes) if !self.has_short_integers() => exactly(bytes, count, width),
+            values => {
+                let numbers = values.numbers(count)?.into_iter();
+                Ok(match self.stored {
+                    // Lossy compression may go beyond the type.
+                    StoredType::U8 => numbers.map(|n| n.clamp(0, 0xff) as u8).collect(),
+                    StoredType::I16 => {
+                        let word = |n: i32| n.clamp(i16::MIN.into(), i16::MAX.into()) as i16;
+                        numbers.flat_map(|n| word(n).to_be_bytes()).collect()
+                    }
+                    _ => numbers.flat_map(i32::to_be_bytes).collect(),
+                })
+            }
+        }
+    }
+}
+
+/// The bytes, if they are those of `count` pixels.
+fn exactly(bytes: Vec<u8>, count: usize, width: usize) -> Result<Vec<u8>, TileError> {
+    match bytes.len() {
+        length if length < count * width => Err(TileError::Short { pixels: count }),
+        length if length > count * width => Err(TileError::Long { pixels: count }),
+        _ => Ok(bytes),
+    }
+}
+
+impl Quantization {
+    /// How the floats of the image were quantized; `None` if they were not.
+    fn of(unit: &Unit, table: &Table) -> Result<Option<Self>, FrameError> {
+        let header = &unit.header;
+        let source = |name| -> Result<Option<Source<f64>>, FrameError> {
+            match table.column(name) {
+                Some(column) => Ok(Some(Source::Column(column))),
+                None => Ok(header.finite(name)?.map(Source::All)),
+            }
+        };
+        let method = header.text("ZQUANTIZ");
+        let seed = || header.optional("ZDITHER0", "an integer");
+        let dither = match method.as_deref() {
+            Some("NONE") => return Ok(None),
+            None | Some("NO_DITHER") => Dither::None,
+            Some(name @ ("SUBTRACTIVE_DITHER_1" | "SUBTRACTIVE_DITHER_2")) => Dither::Subtractive {
+                seed: seed()?.unwrap_or(1),
+                keeps_zero: name == "SUBTRACTIVE_DITHER_2",
+            },
+            Some(_) => {
+                const EXPECTED: &str =
+                    "NONE, NO_DITHER, SUBTRACTIVE_DITHER_1 or SUBTRACTIVE_DITHER_2";
+                return Err(header.invalid("ZQUANTIZ", EXPECTED));
+            }
+        };
+        let Some(scale) = source("ZSCALE")? else {
+            return Ok(None);
+        };
+        let blank = match table.column("ZBLANK") {
+            Some(column) => Some(Source::Column(column)),
+            None => unit.blank()?.map(Source::All),
+        };
+        Ok(Some(Self {
+            scale,
+            zero: source("ZZERO")?.unwrap_or(Source::All(0.0)),
+            blank,
+            dither,
+        }))
+    }
+
+    fn of_tile(&self, table: &Table, row: usize) -> Quantized {
+        let number = |source: Source<f64>| match source {
+            Source::Column(column) => table.number(column, row).unwrap_or(f64::NAN),
+            Source::All(number) => number,
+        };
+        Quantized {
+            scale: number(self.scale),
+            zero: number(self.zero),
+            blank: self.blank.and_then(|source| match source {
+                Source::Column(column) => table.whole_number(column, row),
+                Source::All(blank) => Some(blank),
+            }),
+            dither: self.dither,
+        }
+    }
+}

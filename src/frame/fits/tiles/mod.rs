@@ -1,0 +1,104 @@
+//! Images compressed tile by tile (ZIMAGE), as `fpack` writes them.
+//!
+//! A header-data unit with a table → the pixels of its image as if they were not compressed:
+//! big-endian, of type ZBITPIX, row by row.
+//!
+//! 1. The axes and ZTILEn say which pixels a tile has ([`grid`]); each row of the table is a tile,
+//!    its data are in the heap behind the table ([`table`]).
+//! 2. All data of the tiles must be in the file before memory is allocated.
+//! 3. The compression gives whole numbers or bytes ([`method`]); a tile never decodes to more than
+//!    its pixels.
+//! 4. Quantized floats are made of the numbers ([`quantize`]). Tiles that could not be quantized are
+//!    floats, compressed with gzip or not at all.
+//!
+//! Tiles are decoded in parallel, a few at a time.
+//!
+//! # Reference
+//! FITS Standard 4.0 (2018), sect. 10.
+
+mod decoder;
+mod error;
+mod grid;
+mod gzip;
+mod hcompress;
+mod method;
+mod plio;
+mod quantize;
+mod rice;
+mod table;
+
+use super::error::{malformed, truncated};
+use super::unit::Unit;
+use crate::frame::{FrameError, MAX_PIXELS};
+use decoder::Decoder;
+use error::TileError;
+use grid::{Grid, Tile};
+use rayon::prelude::*;
+use std::ops::Range;
+use table::Table;
+
+/// Most pixels in a tile: three planes of the largest frame.
+const MAX_TILE_PIXELS: usize = 3 * MAX_PIXELS;
+/// Pixels that are decoded at a time, to be copied into the image afterwards.
+const BATCH_PIXELS: usize = 1 << 20;
+
+/// The stored values of these pixels of the compressed image `unit`, big-endian. The pixels are
+/// counted along the first axis first; the axes are not empty.
+/// # Errors
+/// [`FrameError::Malformed`] with the number of the tile, counted from 1, and
+/// [`FrameError::Truncated`], [`FrameError::Unsupported`].
+pub(super) fn unpack(
+    unit: &Unit,
+    bytes: &[u8],
+    pixels: Range<usize>,
+) -> Result<Vec<u8>, FrameError> {
+    let grid = Grid::new(&unit.axes, &unit.header)?;
+    let too_large = || malformed(format!("found tiles of more than {MAX_TILE_PIXELS} pixels"));
+    let tiles = grid.tiles().ok_or_else(too_large)?;
+    let largest = grid
+        .tile_pixels()
+        .filter(|pixels| *pixels <= MAX_TILE_PIXELS);
+    let batch_tiles = BATCH_PIXELS.div_ceil(largest.ok_or_else(too_large)?);
+    let decoder = Decoder::new(unit, Table::new(unit, bytes, tiles)?)?;
+    let touching = || (0..tiles).filter(|&row| grid.may_touch(&grid.tile(row), &pixels));
+    for row in touching() {
+        decoder.check(row).map_err(|error| match error {
+            TileError::OutsideHeap { .. } if unit.end() > bytes.len() => {
+                truncated(bytes.len(), of_tile(row, &error))
+            }
+            _ => malformed(of_tile(row, &error)),
+        })?;
+    }
+    let width = unit.stored.bytes();
+    let mut image = vec![0; pixels.len() * width];
+    let mut rows = touching().peekable();
+    while rows.peek().is_some() {
+        let batch: Vec<Tile> = rows
+            .by_ref()
+            .take(batch_tiles)
+            .map(|row| grid.tile(row))
+            .collect();
+        let decode = |tile: &Tile| {
+            let decoded = decoder.pixels(tile);
+            decoded.map_err(|error| malformed(of_tile(tile.row, &error)))
+        };
+        let decoded: Vec<Result<Vec<u8>, FrameError>> = batch.par_iter().map(decode).collect();
+        for (tile, decoded) in batch.iter().zip(decoded) {
+            let decoded = decoded?;
+            let lines = decoded.chunks_exact(tile.lengths[0] * width);
+            for (place, line) in grid.rows(tile).zip(lines) {
+                // Tiles may have pixels of other planes too.
+                if pixels.contains(&place) {
+                    let start = (place - pixels.start) * width;
+                    image[start..start + line.len()].copy_from_slice(line);
+                }
+            }
+        }
+    }
+    Ok(image)
+}
+
+/// What is wrong with the tile in `row`, counted from 0.
+fn of_tile(row: usize, error: &TileError) -> String {
+    format!("tile {}: {error}", row + 1)
+}

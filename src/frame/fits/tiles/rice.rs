@@ -1,0 +1,234 @@
+//! RICE_1: differences of neighbouring pixels, in blocks that share the number of their low bits.
+//!
+//! A stream begins with a value from which the first difference counts. Each block begins with a
+//! code for its number of low bits: none of its differences is other than 0, or all differences are
+//! stored in full, or each has its high bits as a count of zeros before a one, and then its low
+//! bits. A difference d is stored as 2 d, or as −2 d − 1 below 0.
+//!
+//! # Reference
+//! FITS Standard 4.0 (2018), sect. 10.4.1. R. Rice, P.-S. Yeh and W. Miller 1993, AIAA-93-4541.
+
+use super::error::TileError;
+
+/// Parameters of a stream.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Rice {
+    /// Pixels that share the number of their low bits, at least 1.
+    pub block: usize,
+    /// Size of a pixel.
+    pub width: RiceWidth,
+}
+
+/// Size of a pixel in a stream (BYTEPIX).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum RiceWidth {
+    One,
+    Two,
+    Four,
+}
+
+impl RiceWidth {
+    /// The width of `bytes`, if streams have it.
+    pub fn of(bytes: i64) -> Option<Self> {
+        match bytes {
+            1 => Some(Self::One),
+            2 => Some(Self::Two),
+            4 => Some(Self::Four),
+            _ => None,
+        }
+    }
+
+    /// Bits of a pixel, bits of a block's code, and the code of blocks that are stored in full.
+    fn bits(self) -> (u32, u32, u32) {
+        match self {
+            Self::One => (8, 3, 6),
+            Self::Two => (16, 4, 14),
+            Self::Four => (32, 5, 25),
+        }
+    }
+
+    /// The pixel in the low bits of `value`: single bytes have no sign.
+    fn pixel(self, value: u32) -> i32 {
+        match self {
+            Self::One => (value as u8).into(),
+            Self::Two => (value as i16).into(),
+            Self::Four => value as i32,
+        }
+    }
+}
+
+impl Rice {
+    /// Decodes `count` pixels.
+    pub fn decode(self, data: &[u8], count: usize) -> Result<Vec<i32>, TileError> {
+        self.pixels(&mut Bits::new(data), count)
+            .ok_or(TileError::Short { pixels: count })
+    }
+
+    /// The pixels, `None` if the stream ends early.
+    fn pixels(self, bits: &mut Bits, count: usize) -> Option<Vec<i32>> {
+        let (pixel_bits, code_bits, full) = self.width.bits();
+        let mut pixels = Vec::with_capacity(count);
+        let mut value = bits.take(pixel_bits)?;
+        let mut next = |stored: u32| {
+            let difference = (stored >> 1) ^ (stored & 1).wrapping_neg();
+            value = value.wrapping_add(difference);
+            self.width.pixel(value)
+        };
+        while pixels.len() < count {
+            let block = 0..self.block.min(count - pixels.len());
+            // 0 for differences of 0, otherwise one more than the number of low bits.
+            let code = bits.take(code_bits)?;
+            if code == 0 {
+                pixels.extend(block.map(|_| next(0)));
+            } else if code > full {
+                for _ in block {
+                    pixels.push(next(bits.take(pixel_bits)?));
+                }
+            } else {
+                for _ in block {
+                    pixels.push(next(bits.take_split(code - 1)?));
+                }
+            }
+        }
+        Some(pixels)
+    }
+}
+
+/// The bits of a stream, the highest of each byte first.
+struct Bits<'a> {
+    rest: &'a [u8],
+    /// The next bits, from the highest; zeros after them.
+    buffer: u64,
+    /// How many bits of the buffer are of the stream.
+    held: u32,
+}
+
+impl<'a> Bits<'a> {
+    fn new(data: &'a [u8]) -> Self {
+        Self {
+            rest: data,
+            buffer: 0,
+            held: 0,
+        }
+    }
+
+    /// Fills the buffer to at least 56 bits, or with all that is left.
+    #[inline]
+    fn fill(&mut self) {
+        if let Some((word, _)) = self.rest.split_first_chunk() {
+            self.buffer |= u64::from_be_bytes(*word) >> self.held;
+            let bytes = (63 - self.held) / 8;
+            self.rest = &self.rest[bytes as usize..];
+            self.held += bytes * 8;
+            // Bits beyond those that count as held are of a byte that is read again.
+            self.buffer &= !(u64::MAX >> self.held);
+            return;
+        }
+        while self.held <= 56 {
+            let Some((byte, rest)) = self.rest.split_first() else {
+                return;
+            };
+            self.buffer |= u64::from(*byte) << (56 - self.held);
+            self.held += 8;
+            self.rest = rest;
+        }
+    }
+
+    #[inline]
+    fn drop(&mut self, count: u32) {
+        self.buffer <<= count;
+        self.held -= count;
+    }
+
+    /// The next `count` bits, at most 32, as a number.
+    #[inline]
+    fn take(&mut self, count: u32) -> Option<u32> {
+        if self.held < count {
+            self.fill();
+            if self.held < count {
+                return None;
+            }
+        }
+        // In two steps, because a shift by 64 is none.
+        let number = self.buffer >> 1 >> (63 - count);
+        self.drop(count);
+        Some(number as u32)
+    }
+
+    /// A number whose high bits are a count of zeros before a one, and then `low` bits, at most 24.
+    #[inline]
+    fn take_split(&mut self, low: u32) -> Option<u32> {
+        if self.held < 32 {
+            self.fill();
+        }
+        let mut high = 0_u32;
+        while self.buffer == 0 {
+            high = high.wrapping_add(self.held);
+            self.held = 0;
+            self.fill();
+            if self.held == 0 {
+                return None;
+            }
+        }
+        let zeros = self.buffer.leading_zeros();
+        self.drop(zeros);
+        self.drop(1);
+        high = high.wrapping_add(zeros);
+        let low_bits = self.take(low)?;
+        Some(high << low | low_bits)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const SHORT: Rice = Rice {
+        block: 4,
+        width: RiceWidth::Two,
+    };
+
+    /// Bytes of a string of zeros and ones, filled up with zeros.
+    fn bytes(bits: &str) -> Vec<u8> {
+        let bits: Vec<u8> = bits.bytes().filter(|b| *b != b' ').collect();
+        let byte = |bits: &[u8]| (0..8).fold(0, |n, i| n << 1 | (bits.get(i) == Some(&b'1')) as u8);
+        bits.chunks(8).map(byte).collect()
+    }
+
+    #[test]
+    fn each_kind_of_block_is_decoded() {
+        // From 5: no differences; 0, −1, 1, 3 with one low bit; in full.
+        let stream = "0000000000000101 0000 \
+            0010 1 0 1 1 01 0 0001 0 \
+            1111 0000000000000001 0000000000000010 1111111111111111 0000000000000000";
+        let pixels = SHORT.decode(&bytes(stream), 12).unwrap();
+        assert_eq!(pixels, [5, 5, 5, 5, 5, 4, 5, 8, 7, 8, -32760, -32760]);
+    }
+
+    #[test]
+    fn a_stream_that_ends_early_is_short() {
+        let stream = bytes("0000000000000101 0010 1 0 1 1");
+        assert_eq!(
+            SHORT.decode(&stream, 4),
+            Err(TileError::Short { pixels: 4 })
+        );
+        assert!(SHORT.decode(&[], 4).is_err());
+        // Zeros without a one after them.
+        assert!(SHORT.decode(&[0, 0, 0x30, 0, 0, 0, 0, 0, 0], 4).is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn arbitrary_streams_give_their_pixels_or_an_error(
+            data in proptest::collection::vec(any::<u8>(), 0..200),
+            bytes in 0_i64..5,
+            (block, count) in (1_usize..70, 0_usize..500),
+        ) {
+            if let Some(width) = RiceWidth::of(bytes)
+                && let Ok(pixels) = (Rice { block, width }).decode(&data, count) {
+                prop_assert_eq!(pixels.len(), count);
+            }
+        }
+    }
+}
