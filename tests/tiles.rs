@@ -5,6 +5,7 @@
 mod common;
 
 use common::fixture;
+use proptest::prelude::*;
 use starpipe::frame::{self, Frame, FrameError, Pixels};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -127,4 +128,21 @@ fn a_file_that_ends_early_names_itself_and_the_tile() {
     assert_eq!(*path, short);
     assert!(matches!(**source, FrameError::Truncated { .. }), "{source}");
     assert!(source.to_string().contains("(tile "), "{source}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(500))]
+
+    #[test]
+    fn damaged_files_never_panic(
+        name in proptest::sample::select(common::names(&fixture("tiles"))),
+        changes in proptest::collection::vec((0_usize..9000, any::<u8>()), 1..20),
+    ) {
+        let mut bytes = std::fs::read(path(&name)).unwrap();
+        let length = bytes.len();
+        for (from_end, byte) in changes {
+            bytes[length - 1 - from_end % length] = byte;
+        }
+        let _ = frame::decode(&bytes);
+    }
 }

@@ -31,7 +31,7 @@ use std::path::{Path, PathBuf};
     starpipe process --format json --out results night/ > night.jsonl\n  \
     starpipe process --page 2 night.fits\n  \
     starpipe process --dark master-dark.fits --flat master-flat.fits --hot-pixels hot-pixels.csv night.fits\n  \
-    funpack -S night.fits.fz | starpipe process -\n  \
+    ssh telescope cat night.fits.fz | starpipe process -\n  \
     starpipe process 'nights/*/*.fits' --out-parquet results --shard 3/100\n\n\
     The format of a file is recognized from its content; any may be compressed with gzip. Date, exposure,\n\
     pixel size and focal length are taken from FITS keywords or Exif unless an option gives them.\n\n\

@@ -148,13 +148,22 @@ impl<'a> Decoder<'a> {
                     StoredType::U8 => numbers.map(|n| n.clamp(0, 0xff) as u8).collect(),
                     StoredType::I16 => {
                         let word = |n: i32| n.clamp(i16::MIN.into(), i16::MAX.into()) as i16;
-                        numbers.flat_map(|n| word(n).to_be_bytes()).collect()
+                        bytes_of(count, numbers.map(|n| word(n).to_be_bytes()))
                     }
-                    _ => numbers.flat_map(i32::to_be_bytes).collect(),
+                    _ => bytes_of(count, numbers.map(i32::to_be_bytes)),
                 })
             }
         }
     }
+}
+
+/// The bytes of `count` values, one after the other.
+fn bytes_of<const N: usize>(count: usize, values: impl Iterator<Item = [u8; N]>) -> Vec<u8> {
+    // Faster than to collect a flat map.
+    let mut bytes = vec![0; count * N];
+    let places = bytes.as_chunks_mut().0.iter_mut();
+    places.zip(values).for_each(|(place, value)| *place = value);
+    bytes
 }
 
 /// The bytes, if they are those of `count` pixels.

@@ -102,3 +102,6 @@ pub(super) fn unpack(
 fn of_tile(row: usize, error: &TileError) -> String {
     format!("tile {}: {error}", row + 1)
 }
+
+#[cfg(test)]
+mod tests;

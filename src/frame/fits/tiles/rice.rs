@@ -161,6 +161,22 @@ impl<'a> Bits<'a> {
         if self.held < 32 {
             self.fill();
         }
+        let zeros = self.buffer.leading_zeros();
+        let used = zeros + 1 + low;
+        if used <= self.held {
+            let after = self.buffer << zeros << 1;
+            self.buffer = after << low;
+            self.held -= used;
+            // In two steps, because a shift by 64 is none.
+            let low_bits = after >> 1 >> (63 - low);
+            return Some(zeros << low | low_bits as u32);
+        }
+        self.take_long(low)
+    }
+
+    /// As [`Self::take_split`], for numbers that are longer than what is held.
+    #[cold]
+    fn take_long(&mut self, low: u32) -> Option<u32> {
         let mut high = 0_u32;
         while self.buffer == 0 {
             high = high.wrapping_add(self.held);
