@@ -35,8 +35,8 @@ pub(super) enum Values {
 impl Method {
     /// The compression of the image with this header, whose pixels are `stored`.
     pub fn of(header: &Header, stored: StoredType) -> Result<Self, FrameError> {
-        const EXPECTED: &str = "RICE_1, GZIP_1, GZIP_2, HCOMPRESS_1, PLIO_1 or NOCOMPRESS, the first and the last two of \
-             at most 32 bits";
+        const EXPECTED: &str =
+            "GZIP_1, GZIP_2 or NOCOMPRESS, or RICE_1, HCOMPRESS_1 or PLIO_1 of at most 32 bits";
         let Some(name) = header.text("ZCMPTYPE") else {
             let detail =
                 "an image compressed tile by tile has no ZCMPTYPE, expected RICE_1 or such";

@@ -174,7 +174,7 @@ fn what_is_not_read_is_named() {
     for (card, expected) in [
         (
             "ZCMPTYPE= 'BZIP2_1'",
-            "tiles of 8 bits compressed with BZIP2_1 (ZCMPTYPE), expected RICE_1",
+            "tiles of 8 bits compressed with BZIP2_1 (ZCMPTYPE), expected GZIP_1, GZIP_2",
         ),
         ("ZCMPTYPE= ''", "has no ZCMPTYPE"),
         ("ZBITPIX = 9", "keyword ZBITPIX at byte"),
