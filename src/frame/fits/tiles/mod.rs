@@ -11,8 +11,6 @@
 //! 4. Quantized floats are made of the numbers ([`quantize`]). Tiles that could not be quantized are
 //!    floats, compressed with gzip or not at all.
 //!
-//! Tiles are decoded in parallel, a few at a time.
-//!
 //! # Reference
 //! FITS Standard 4.0 (2018), sect. 10.
 
@@ -32,15 +30,12 @@ use super::unit::Unit;
 use crate::frame::{FrameError, MAX_PIXELS};
 use decoder::Decoder;
 use error::TileError;
-use grid::{Grid, Tile};
-use rayon::prelude::*;
+use grid::Grid;
 use std::ops::Range;
 use table::Table;
 
 /// Most pixels in a tile: three planes of the largest frame.
 const MAX_TILE_PIXELS: usize = 3 * MAX_PIXELS;
-/// Pixels that are decoded at a time, to be copied into the image afterwards.
-const BATCH_PIXELS: usize = 1 << 20;
 
 /// The stored values of these pixels of the compressed image `unit`, big-endian. The pixels are
 /// counted along the first axis first; the axes are not empty.
@@ -55,10 +50,10 @@ pub(super) fn unpack(
     let grid = Grid::new(&unit.axes, &unit.header)?;
     let too_large = || malformed(format!("found tiles of more than {MAX_TILE_PIXELS} pixels"));
     let tiles = grid.tiles().ok_or_else(too_large)?;
-    let largest = grid
-        .tile_pixels()
-        .filter(|pixels| *pixels <= MAX_TILE_PIXELS);
-    let batch_tiles = BATCH_PIXELS.div_ceil(largest.ok_or_else(too_large)?);
+    let largest = grid.tile_pixels();
+    if largest.is_none_or(|pixels| pixels > MAX_TILE_PIXELS) {
+        return Err(too_large());
+    }
     let decoder = Decoder::new(unit, Table::new(unit, bytes, tiles)?)?;
     let touching = || (0..tiles).filter(|&row| grid.may_touch(&grid.tile(row), &pixels));
     for row in touching() {
@@ -71,27 +66,16 @@ pub(super) fn unpack(
     }
     let width = unit.stored.bytes();
     let mut image = vec![0; pixels.len() * width];
-    let mut rows = touching().peekable();
-    while rows.peek().is_some() {
-        let batch: Vec<Tile> = rows
-            .by_ref()
-            .take(batch_tiles)
-            .map(|row| grid.tile(row))
-            .collect();
-        let decode = |tile: &Tile| {
-            let decoded = decoder.pixels(tile);
-            decoded.map_err(|error| malformed(of_tile(tile.row, &error)))
-        };
-        let decoded: Vec<Result<Vec<u8>, FrameError>> = batch.par_iter().map(decode).collect();
-        for (tile, decoded) in batch.iter().zip(decoded) {
-            let decoded = decoded?;
-            let lines = decoded.chunks_exact(tile.lengths[0] * width);
-            for (place, line) in grid.rows(tile).zip(lines) {
-                // Tiles may have pixels of other planes too.
-                if pixels.contains(&place) {
-                    let start = (place - pixels.start) * width;
-                    image[start..start + line.len()].copy_from_slice(line);
-                }
+    for row in touching() {
+        let tile = grid.tile(row);
+        let decoded = decoder.pixels(&tile);
+        let decoded = decoded.map_err(|error| malformed(of_tile(row, &error)))?;
+        let lines = decoded.chunks_exact(tile.lengths[0] * width);
+        for (place, line) in grid.rows(&tile).zip(lines) {
+            // Tiles may have pixels of other planes too.
+            if pixels.contains(&place) {
+                let start = (place - pixels.start) * width;
+                image[start..start + line.len()].copy_from_slice(line);
             }
         }
     }
