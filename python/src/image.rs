@@ -46,6 +46,12 @@ impl Image<'_> {
     }
 }
 
+/// Refuses sizes that no frame has, before anything is copied.
+#[pyfunction]
+pub fn check_size(width: usize, height: usize) -> PyResult<()> {
+    frame::check_size(width, height).map_err(exception)
+}
+
 /// A mask: true where a pixel is to be left out.
 pub fn bad_pixels<'a>(
     mask: Option<&'a PyReadonlyArray2<'_, bool>>,

@@ -31,6 +31,8 @@ mod _starpipe {
     #[pymodule_export]
     use super::detect::detect;
     #[pymodule_export]
+    use super::image::check_size;
+    #[pymodule_export]
     use super::pipeline::Pipeline;
     #[pymodule_export]
     use super::simulate::{Simulated, simulate};

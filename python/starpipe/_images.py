@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from . import _starpipe
+from . import _starpipe
 
 ImageLike: TypeAlias = Any
 """A path, the bytes of a file, an array, or an object with ``data`` (CCDData, NDData, an HDU)."""
@@ -77,6 +76,7 @@ def _pixels(image: Any, name: str) -> _starpipe._Image:
         raise ValueError(
             f"the {name} must be an array of 2 dimensions (rows, columns), not {array.ndim}{hint}"
         )
+    _starpipe.check_size(array.shape[1], array.shape[0])
     kind, size = array.dtype.kind, array.dtype.itemsize
     if kind == "b" or (kind == "u" and size == 1):
         return np.ascontiguousarray(array, dtype=np.uint8)

@@ -16,6 +16,7 @@ __all__ = [
     "archive_differences",
     "archive_nights",
     "archive_plan",
+    "check_size",
     "defocus",
     "detect",
     "limit",
@@ -129,6 +130,7 @@ class Darks:
     def noise_adu(self) -> NDArray[np.float32] | None: ...
     def hot_pixels(self) -> str: ...
 
+def check_size(width: int, height: int) -> None: ...
 def detect(
     image: _Image,
     mask: NDArray[np.bool_] | None,

@@ -18,6 +18,7 @@ import starpipe as sp
         (np.zeros((20, 20, 3)), "2 dimensions .* not 3; a colour image"),
         (np.zeros(20), "2 dimensions .* not 1"),
         (np.zeros((0, 20)), "20 x 0|too small|at least"),
+        (np.broadcast_to(np.uint8(7), (300_000, 300_000)), "300000 x 300000 pixels"),
         (np.full((20, 20), np.nan), "value"),
         (b"", "empty"),
         (b"no image", "format|image"),

@@ -1,7 +1,7 @@
 //! What do many frames show? Tables of frames and stars in Parquet, made in parts.
 //!
 //! names of frames and a configuration → [`Plan`] → for each [`Part`] its rows → [`Archive`] →
-//! [`status`], [`merge`], [`summary`]
+//! [`status()`], [`merge()`], [`summary`]
 //!
 //! 1. The names are sorted, and cut into parts of a fixed number of frames. A worker takes every
 //!    n-th part ([`Plan::shard`]), so the parts do not depend on the number of workers.

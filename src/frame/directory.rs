@@ -1,9 +1,9 @@
 //! The frames in a directory.
 
+use super::compressed::format_inside;
 use super::error::FrameError;
 use super::foreign;
 use super::format::FrameFormat;
-use super::gzip::format_inside;
 use super::limits::HEAD_BYTES;
 use memchr::memmem;
 use std::fs::File;
@@ -80,6 +80,19 @@ pub fn is_calibration_frame(head: &[u8]) -> bool {
         && memmem::find(head, card.as_bytes()).is_some()
 }
 
+/// Whether the name before the last extension is that of an image: `night.fits.bz2`.
+fn is_named_as_an_image(path: &Path) -> bool {
+    const EXTENSIONS: [&str; 11] = [
+        "fits", "fit", "fts", "fz", "tif", "tiff", "png", "jpg", "jpeg", "bmp", "pgm",
+    ];
+    let inner = path.file_stem().map(Path::new).and_then(Path::extension);
+    inner.is_some_and(|inner| {
+        EXTENSIONS
+            .iter()
+            .any(|known| inner.eq_ignore_ascii_case(known))
+    })
+}
+
 fn begins_like_a_frame(path: &Path) -> io::Result<bool> {
     if path.extension().is_some_and(|extension| extension == "wcs") {
         return Ok(false);
@@ -88,7 +101,10 @@ fn begins_like_a_frame(path: &Path) -> io::Result<bool> {
     Ok(match FrameFormat::of(&head) {
         Some(FrameFormat::Png) => !is_overlay(&head),
         Some(FrameFormat::Fits) => !is_calibration_frame(&head),
-        Some(FrameFormat::Gzip) => format_inside(&head).0.is_some(),
+        Some(format) if format.is_compressed() => {
+            let (known, inside) = format_inside(&head, format);
+            known.is_some() || (inside.is_empty() && is_named_as_an_image(path))
+        }
         format => format.is_some(),
     })
 }

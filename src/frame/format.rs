@@ -17,8 +17,10 @@ pub enum FrameFormat {
     Bmp,
     /// Portable anymap: PBM, PGM, PPM or PAM.
     Pnm,
-    /// Any of the other formats, compressed with gzip.
+    /// Any of the formats above, compressed with gzip.
     Gzip,
+    /// The same with bzip2.
+    Bzip2,
 }
 
 impl fmt::Display for FrameFormat {
@@ -31,11 +33,17 @@ impl fmt::Display for FrameFormat {
             Self::Bmp => "BMP",
             Self::Pnm => "PNM",
             Self::Gzip => "gzip",
+            Self::Bzip2 => "bzip2",
         })
     }
 }
 
 impl FrameFormat {
+    /// Whether it is one of the other formats, compressed.
+    pub(super) fn is_compressed(self) -> bool {
+        matches!(self, Self::Gzip | Self::Bzip2)
+    }
+
     /// The format whose signature `bytes` begin with.
     pub(super) fn of(bytes: &[u8]) -> Option<Self> {
         const SIGNATURES: [(&[u8], FrameFormat); 8] = [
@@ -49,6 +57,7 @@ impl FrameFormat {
             (b"\x1f\x8b", FrameFormat::Gzip),
         ];
         match bytes {
+            [b'B', b'Z', b'h', b'1'..=b'9', ..] => Some(Self::Bzip2),
             [b'P', b'1'..=b'7', space, ..] if space.is_ascii_whitespace() => Some(Self::Pnm),
             // "BM" alone is too short a signature: the reserved bytes after the file size must be
             // 0.

@@ -138,7 +138,10 @@ pub(super) fn check_length(width: usize, height: usize, found: usize) -> Result<
 }
 
 /// Refuses sizes outside [`MIN_SIDE_PX`] and [`MAX_PIXELS`], before anything is allocated.
-pub(crate) fn check_size(width: usize, height: usize) -> Result<(), FrameError> {
+///
+/// # Errors
+/// [`FrameError::TooSmall`], [`FrameError::TooLarge`].
+pub fn check_size(width: usize, height: usize) -> Result<(), FrameError> {
     if width < MIN_SIDE_PX || height < MIN_SIDE_PX {
         return Err(FrameError::TooSmall { width, height });
     }

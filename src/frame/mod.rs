@@ -23,13 +23,13 @@
 //! Caveats: transparency is ignored. JPEG's gamma is not undone, so fluxes from JPEG are not
 //! linear. Integers and floats of more than 24 bits are rounded to 24.
 
+mod compressed;
 mod directory;
 mod error;
 mod exif;
 mod fits;
 mod foreign;
 mod format;
-mod gzip;
 mod image;
 mod levels;
 mod limits;
@@ -47,8 +47,7 @@ pub use directory::{CALIBRATION_CREATOR, files_in, is_calibration_frame, is_over
 pub use error::FrameError;
 pub use fits::{FitsHeader, FitsSamples, FitsWriteError, write_fits};
 pub use format::FrameFormat;
-pub use image::Frame;
-pub(crate) use image::check_size;
+pub use image::{Frame, check_size};
 pub use levels::{LUMINANCE_WEIGHTS, WholeNumber};
 pub use limits::{MAX_PIXELS, MIN_SIDE_PX};
 pub use metadata::{FrameMetadata, IgnoredValue};

@@ -5,7 +5,7 @@ use super::format::{FrameFormat, first_bytes};
 use super::image::Frame;
 use super::limits::{HEAD_BYTES, MAX_FILE_BYTES};
 use super::pixels::Pixels;
-use super::{fits, foreign, gzip, raster, tiff};
+use super::{compressed, fits, foreign, raster, tiff};
 use std::borrow::Cow;
 use std::io::{self, Read};
 use std::num::NonZeroUsize;
@@ -144,12 +144,14 @@ fn decode_with(
     buffer: &mut Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
     match FrameFormat::of(bytes) {
-        Some(FrameFormat::Gzip) => decode_image(&gzip::unpack(bytes)?, page, buffer),
+        Some(format) if format.is_compressed() => {
+            decode_image(&compressed::unpack(bytes, format)?, page, buffer)
+        }
         _ => decode_image(bytes, page, buffer),
     }
 }
 
-/// Decodes one image that is not compressed with gzip.
+/// Decodes one image that is not compressed as a file.
 fn decode_image(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
@@ -169,6 +171,6 @@ fn decode_image(
         Some(FrameFormat::Jpeg) => single(raster::decode_jpeg),
         Some(FrameFormat::Bmp) => single(raster::decode_bmp),
         Some(FrameFormat::Pnm) => single(raster::decode_pnm),
-        Some(FrameFormat::Gzip) | None => Err(not_an_image(bytes)),
+        Some(FrameFormat::Gzip | FrameFormat::Bzip2) | None => Err(not_an_image(bytes)),
     }
 }

@@ -439,6 +439,32 @@ fn gzip_is_unpacked_once_and_must_be_whole() {
 }
 
 #[test]
+fn bzip2_is_unpacked_once_and_must_be_whole() {
+    use std::io::Read;
+    let squeezed = |bytes: &[u8]| {
+        let mut packed = Vec::new();
+        let mut encoder = bzip2::read::BzEncoder::new(bytes, bzip2::Compression::best());
+        encoder.read_to_end(&mut packed).unwrap();
+        packed
+    };
+    let packed = squeezed(&sample(1));
+    assert_eq!(decode(&packed).unwrap(), decode(&sample(1)).unwrap());
+    let error = decode(&packed[..packed.len() - 9]).unwrap_err();
+    assert!(
+        error.to_string().starts_with("truncated bzip2: "),
+        "{error}"
+    );
+    let error = decode(&squeezed(&zipped(&sample(1))))
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("inside bzip2"), "{error}");
+    let mut damaged = packed.clone();
+    damaged[packed.len() / 2] ^= 0x55;
+    let error = decode(&damaged).unwrap_err().to_string();
+    assert!(error.contains("bzip2"), "{error}");
+}
+
+#[test]
 fn infinities_have_no_value_and_alone_make_no_frame() {
     use ::tiff::encoder::colortype::Gray32Float;
     let mut data = [1.5_f32; 9];

@@ -33,8 +33,8 @@ use std::path::{Path, PathBuf};
     starpipe process --dark master-dark.fits --flat master-flat.fits --hot-pixels hot-pixels.csv night.fits\n  \
     ssh telescope cat night.fits.fz | starpipe process -\n  \
     starpipe process 'nights/*/*.fits' --out-parquet results --shard 3/100\n\n\
-    The format of a file is recognized from its content; any may be compressed with gzip. Date, exposure,\n\
-    pixel size and focal length are taken from FITS keywords or Exif unless an option gives them.\n\n\
+    The format of a file is recognized from its content; any may be compressed with gzip or bzip2. Date,\n\
+    exposure, pixel size and focal length are taken from FITS keywords or Exif unless an option gives them.\n\n\
     --out results writes results/night.json, night.csv, night.wcs and night.png for night.tif, and\n\
     overwrites only such results. In directories of frames such results are skipped.")]
 pub(crate) struct ProcessArgs {

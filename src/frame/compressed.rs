@@ -1,27 +1,27 @@
-//! Files compressed with gzip.
+//! Files compressed with gzip or bzip2.
 
 use super::error::FrameError;
 use super::format::{FrameFormat, first_bytes};
 use super::limits::MAX_PIXELS;
+use bzip2::read::MultiBzDecoder;
 use flate2::read::MultiGzDecoder;
 use std::io::{ErrorKind, Read};
 
 /// Maximum decompressed size: the largest frame in 64-bit floats, and some headers.
 const MAX_UNPACKED_BYTES: u64 = MAX_PIXELS as u64 * 8 + (1 << 24);
 
-/// Decompresses the image file in `bytes`.
+/// Decompresses the image file in `bytes`, which is of a compressed `format`.
 /// # Errors
 /// [`FrameError::UnknownFormat`] if the content does not begin like an image, before much of it is
 /// decompressed; [`FrameError::Truncated`], [`FrameError::Malformed`].
-pub(super) fn unpack(bytes: &[u8]) -> Result<Vec<u8>, FrameError> {
-    let format = FrameFormat::Gzip;
-    let (known, inside) = format_inside(bytes);
+pub(super) fn unpack(bytes: &[u8], format: FrameFormat) -> Result<Vec<u8>, FrameError> {
+    let (known, inside) = format_inside(bytes, format);
     if known.is_none() && !inside.is_empty() {
-        let found = format!("{} inside gzip", first_bytes(&inside));
+        let found = format!("{} inside {format}", first_bytes(&inside));
         return Err(FrameError::UnknownFormat { found });
     }
     let mut unpacked = Vec::new();
-    let mut reader = MultiGzDecoder::new(bytes).take(MAX_UNPACKED_BYTES);
+    let mut reader = decoder(bytes, format).take(MAX_UNPACKED_BYTES);
     reader.read_to_end(&mut unpacked).map_err(|e| {
         let detail = e.to_string();
         if e.kind() == ErrorKind::UnexpectedEof {
@@ -44,18 +44,24 @@ pub(super) fn unpack(bytes: &[u8]) -> Result<Vec<u8>, FrameError> {
     Ok(unpacked)
 }
 
-/// The format inside the gzip file that begins with `head`, and the first bytes of the content.
-/// Gzip inside gzip counts as no format.
-pub(super) fn format_inside(head: &[u8]) -> (Option<FrameFormat>, Vec<u8>) {
+fn decoder(bytes: &[u8], format: FrameFormat) -> Box<dyn Read + '_> {
+    match format {
+        FrameFormat::Bzip2 => Box::new(MultiBzDecoder::new(bytes)),
+        _ => Box::new(MultiGzDecoder::new(bytes)),
+    }
+}
+
+/// The format inside the compressed file that begins with `head`, and the first bytes of the content:
+/// none of a large bzip2 file, whose blocks are longer. A compressed file inside counts as no format.
+pub(super) fn format_inside(head: &[u8], format: FrameFormat) -> (Option<FrameFormat>, Vec<u8>) {
     const SIGNATURE_BYTES: usize = 16;
-    let inside = unpack_beginning(head, SIGNATURE_BYTES);
-    let format = FrameFormat::of(&inside).filter(|format| *format != FrameFormat::Gzip);
+    let inside = unpack_beginning(decoder(head, format), SIGNATURE_BYTES);
+    let format = FrameFormat::of(&inside).filter(|format| !format.is_compressed());
     (format, inside)
 }
 
-/// The first `wanted` bytes of the content, or as many as `head`, the beginning of the file, holds.
-fn unpack_beginning(head: &[u8], wanted: usize) -> Vec<u8> {
-    let mut reader = MultiGzDecoder::new(head);
+/// The first `wanted` bytes, or as many as there are.
+fn unpack_beginning(mut reader: impl Read, wanted: usize) -> Vec<u8> {
     let mut unpacked = vec![0; wanted];
     let mut filled = 0;
     while let Ok(read @ 1..) = reader.read(&mut unpacked[filled..]) {
