@@ -1,6 +1,6 @@
 //! All that the results depend on, so that results of different options are never mixed.
 
-use super::{CalibrationOptions, DetectionOptions, ExposureOptions, ProcessArgs};
+use super::args::{CalibrationOptions, DetectionOptions, ExposureOptions, ProcessArgs};
 use crate::cli::options::hints::HintOptions;
 use anyhow::Context;
 use clap::ValueEnum;

@@ -1,6 +1,6 @@
 //! `--out-parquet`: the frames of one worker, part by part, as rows of tables.
 
-use super::ProcessArgs;
+use super::args::ProcessArgs;
 use super::configuration::configuration;
 use crate::cli::batch::for_each_ordered;
 use crate::cli::exit::{CommandError, Exit, Outcome};
@@ -9,11 +9,8 @@ use crate::cli::input::names::frame_names;
 use crate::cli::output::messages::{one_line, report_error};
 use crate::cli::progress::frames_bar;
 use crate::cli::solving::workspace;
-use clap::Args;
 use indicatif::ProgressBar;
-use starpipe::archive::{
-    Archive, ArchiveError, DEFAULT_FRAMES_PER_PART, FrameRow, Part, Plan, Shard, StarRow,
-};
+use starpipe::archive::{Archive, ArchiveError, FrameRow, Part, Plan, Shard, StarRow};
 use starpipe::base::format::counted;
 use starpipe::frame::Buffers;
 use starpipe::identify::IndexedCatalog;
@@ -21,24 +18,7 @@ use starpipe::pipeline::{Context, Workspace, solve_read};
 use starpipe::report::FrameReport;
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
-
-#[derive(Debug, Args)]
-#[command(next_help_heading = "Archives")]
-pub(super) struct PartOptions {
-    /// Write tables of frames and stars into this directory, part by part, and print no reports.
-    /// Parts that are there are skipped. FRAME may then also be a pattern ('night/*.fits'), or a list
-    /// of names: .txt (one a line), .parquet, or - for standard input
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "format", "all_stars"])]
-    pub(super) out_parquet: Option<PathBuf>,
-    /// Do the work of worker K of N: every N-th part
-    #[arg(long, value_name = "K/N", requires = "out_parquet")]
-    shard: Option<Shard>,
-    /// Frames of a part
-    #[arg(long, value_name = "NUMBER", default_value_t = DEFAULT_FRAMES_PER_PART,
-          requires = "out_parquet")]
-    frames_per_part: NonZeroUsize,
-}
+use std::path::Path;
 
 /// Processes the frames of one worker.
 pub(super) fn process_parts(

@@ -1,0 +1,198 @@
+//! The arguments of `process`, and what they make of a [`Plan`].
+
+use crate::cli::exit::CommandError;
+use crate::cli::input::frames::read_master;
+use crate::cli::options::frames::FrameOptions;
+use crate::cli::options::values;
+use crate::cli::solving::Plan;
+use crate::cli::solving::options::SolvingOptions;
+use anyhow::Context as _;
+use clap::{Args, ValueEnum, value_parser};
+use starpipe::archive::{DEFAULT_FRAMES_PER_PART, Shard};
+use starpipe::calibration::{Calibration, read_hot_pixels};
+use starpipe::camera::data_sheet::DataSheet;
+use starpipe::detect::{CentroidMethod, DetectConfig};
+use starpipe::identify::Priors;
+use starpipe::model::sensitivity::Extinction;
+use starpipe::photometry::comparison::StatedCamera;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    starpipe process night.tif\n  \
+    starpipe process --fov 11.4 --near 83.8,-1.2 --radius 10 night.tif\n  \
+    starpipe process --date 2019-07-29T22:47+02:00 --site 52.22,4.42 night.tif\n  \
+    starpipe process --format json --out results night/ > night.jsonl\n  \
+    starpipe process --page 2 night.fits\n  \
+    starpipe process --dark master-dark.fits --flat master-flat.fits --hot-pixels hot-pixels.csv night.fits\n  \
+    ssh telescope cat night.fits.fz | starpipe process -\n  \
+    starpipe process 'nights/*/*.fits' --out-parquet results --shard 3/100\n\n\
+    The format of a file is recognized from its content; any may be compressed with gzip or bzip2. Date,\n\
+    exposure, pixel size and focal length are taken from FITS keywords or Exif unless an option gives them.\n\n\
+    --out results writes results/night.json, night.csv, night.wcs and night.png for night.tif, and\n\
+    overwrites only such results. In directories of frames such results are skipped.")]
+pub(crate) struct ProcessArgs {
+    #[command(flatten)]
+    pub(super) frames: FrameOptions,
+    #[command(flatten)]
+    pub(super) calibration: CalibrationOptions,
+    #[command(flatten)]
+    pub(super) detection: DetectionOptions,
+    #[command(flatten)]
+    pub(super) exposure: ExposureOptions,
+    #[command(flatten)]
+    pub(super) solving: SolvingOptions,
+    #[command(flatten)]
+    pub(super) parts: PartOptions,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Calibration")]
+pub(crate) struct CalibrationOptions {
+    /// Frame taken without light, or the mean of many, which is subtracted; see `starpipe darks`
+    #[arg(long, value_name = "FILE")]
+    pub(super) dark: Option<PathBuf>,
+    /// Mean of evenly lit frames: the signal above the dark level is divided by it; see `starpipe
+    /// flats`
+    #[arg(long, value_name = "FILE")]
+    pub(super) flat: Option<PathBuf>,
+    /// Pixels to ignore: a table with the columns x,y; see `starpipe darks`
+    #[arg(long, value_name = "FILE.csv")]
+    pub(super) hot_pixels: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Detection")]
+pub(super) struct DetectionOptions {
+    /// Detection threshold in standard deviations of the background, in place of --false-alarms
+    #[arg(long, value_name = "NUMBER", value_parser = values::positive, allow_hyphen_values = true,
+          conflicts_with = "false_alarms")]
+    pub(super) sigma: Option<f64>,
+    /// Accepted false detections in a million pixels of noise [default: 0.1]
+    #[arg(long, value_name = "NUMBER", value_parser = values::positive, allow_hyphen_values = true)]
+    pub(super) false_alarms: Option<f64>,
+    /// Most stars that are measured, the brightest: a star tracker needs some twenty. The frame's
+    /// limiting magnitude is then not measured
+    #[arg(long, value_name = "NUMBER", value_parser = value_parser!(u64).range(4..),
+          allow_hyphen_values = true)]
+    pub(super) max_stars: Option<u64>,
+    /// How to measure the position of a star
+    #[arg(long, value_name = "METHOD", value_enum)]
+    pub(super) centroid: Option<Centroid>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Centroid {
+    /// Fit of a Gaussian spot: the most accurate
+    GaussianFit,
+    /// Centre of the light above a threshold: the fastest
+    GreyWeighted,
+}
+
+/// Hints that apply to frames, but not to lists of centroids.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "What is known of the frames")]
+pub(super) struct ExposureOptions {
+    /// Exposure of the frames, in seconds [default: the exposure in the file's header]
+    #[arg(long, value_name = "SECONDS", value_parser = values::exposure, allow_hyphen_values = true)]
+    pub(super) exposure: Option<f64>,
+    /// With --camera, zenith distance of the frames' centres in degrees [default: from --site and
+    /// the date, else from the header, else 0]
+    #[arg(long, value_name = "DEG", value_parser = values::zenith_distance, allow_hyphen_values = true,
+          requires = "camera")]
+    pub(super) zenith_distance: Option<f64>,
+    /// With --camera, extinction in magnitudes per airmass [default: the law of the sensitivity
+    /// paper, 0.35 in V]
+    #[arg(long, value_name = "MAG", value_parser = values::extinction, allow_hyphen_values = true,
+          requires = "camera")]
+    pub(super) extinction: Option<f64>,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Archives")]
+pub(super) struct PartOptions {
+    /// Write tables of frames and stars into this directory, part by part, and print no reports.
+    /// Parts that are there are skipped. FRAME may then also be a pattern ('night/*.fits'), or a list
+    /// of names: .txt (one a line), .parquet, or - for standard input
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "format", "all_stars"])]
+    pub(super) out_parquet: Option<PathBuf>,
+    /// Do the work of worker K of N: every N-th part
+    #[arg(long, value_name = "K/N", requires = "out_parquet")]
+    pub(super) shard: Option<Shard>,
+    /// Frames of a part
+    #[arg(long, value_name = "NUMBER", default_value_t = DEFAULT_FRAMES_PER_PART,
+          requires = "out_parquet")]
+    pub(super) frames_per_part: NonZeroUsize,
+}
+
+impl ProcessArgs {
+    pub(super) fn plan(&self) -> Result<Plan, CommandError> {
+        let hints = &self.solving.hints;
+        let sheet = hints.data_sheet()?;
+        Ok(Plan {
+            detect: self.detection.config(),
+            priors: Priors {
+                exposure_s: self.exposure.exposure,
+                ..hints.resolve()?
+            },
+            calibration: self.calibration.read(sheet.as_ref())?,
+            camera: sheet.map(|sheet| self.exposure.stated_camera(sheet)),
+        })
+    }
+}
+
+impl CalibrationOptions {
+    /// Reads the calibration, if any is given. Without a dark, the bias is that of `sheet`.
+    pub(crate) fn read(&self, sheet: Option<&DataSheet>) -> anyhow::Result<Option<Calibration>> {
+        if self.dark.is_none() && self.flat.is_none() && self.hot_pixels.is_none() {
+            return Ok(None);
+        }
+        let master = |path: &Option<PathBuf>| path.as_deref().map(read_master).transpose();
+        let list = self.hot_pixels.as_deref().map(read_hot_pixels).transpose();
+        let bias_adu = sheet.map_or(0.0, |sheet| sheet.bias_adu);
+        let calibration = Calibration::new(
+            master(&self.dark)?,
+            master(&self.flat)?,
+            list.context("reading the hot pixels")?,
+            bias_adu,
+        );
+        Ok(Some(calibration?))
+    }
+}
+
+impl DetectionOptions {
+    /// The library's defaults, with the options given.
+    fn config(&self) -> DetectConfig {
+        let default = DetectConfig::default();
+        DetectConfig {
+            threshold_sigma: self.sigma,
+            false_alarms_per_mpx: self.false_alarms.unwrap_or(default.false_alarms_per_mpx),
+            max_detections: self
+                .max_stars
+                .map_or(default.max_detections, |stars| stars as usize),
+            centroid: self.centroid.map_or(default.centroid, CentroidMethod::from),
+            ..default
+        }
+    }
+}
+
+impl From<Centroid> for CentroidMethod {
+    fn from(centroid: Centroid) -> Self {
+        match centroid {
+            Centroid::GaussianFit => Self::GaussianFit,
+            Centroid::GreyWeighted => Self::GreyWeighted,
+        }
+    }
+}
+
+impl ExposureOptions {
+    /// The camera with its zenith distance and extinction as the user states them.
+    fn stated_camera(&self, sheet: DataSheet) -> StatedCamera {
+        StatedCamera {
+            sheet,
+            zenith_distance_deg: self.zenith_distance,
+            extinction: self.extinction.map(Extinction::MagPerAirmass),
+        }
+    }
+}
