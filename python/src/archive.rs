@@ -139,6 +139,17 @@ fn finished() -> PyErr {
     PyValueError::new_err("the part is finished")
 }
 
+/// Name, unit, UCD and description of each column of stars.
+#[pyfunction]
+pub fn star_columns() -> Vec<(&'static str, &'static str, &'static str, &'static str)> {
+    let columns = StarRow::columns().into_iter();
+    let described = columns.map(|column| {
+        let meaning = column.meaning;
+        (column.name, meaning.unit, meaning.ucd, meaning.description)
+    });
+    described.collect()
+}
+
 /// What each camera saw in each night, as JSON; `parts` are the contents of the tables of frames.
 #[pyfunction]
 pub fn archive_nights(parts: &Bound<'_, PyAny>) -> PyResult<String> {

@@ -24,7 +24,7 @@ use pyo3::prelude::*;
 mod _starpipe {
     #[pymodule_export]
     use super::archive::{
-        ArchivePlan, PartRows, archive_differences, archive_nights, archive_plan,
+        ArchivePlan, PartRows, archive_differences, archive_nights, archive_plan, star_columns,
     };
     #[pymodule_export]
     use super::darks::{DarkFrames, Darks};

@@ -22,6 +22,7 @@ __all__ = [
     "limit",
     "robustness",
     "simulate",
+    "star_columns",
     "validate",
 ]
 
@@ -130,6 +131,7 @@ class Darks:
     def noise_adu(self) -> NDArray[np.float32] | None: ...
     def hot_pixels(self) -> str: ...
 
+def star_columns() -> list[tuple[str, str, str, str]]: ...
 def check_size(width: int, height: int) -> None: ...
 def detect(
     image: _Image,

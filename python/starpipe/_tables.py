@@ -8,26 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _starpipe
+
 Columns = dict[str, NDArray[Any]]
 
-STAR_COLUMNS = {
-    "id": ("", "meta.id;meta.main", "identifier in the catalogue"),
-    "name": ("", "meta.id", "proper name and designation"),
-    "x_centroid": ("pix", "pos.cartesian.x;instr.det", "centroid along the rows, from 0"),
-    "y_centroid": ("pix", "pos.cartesian.y;instr.det", "centroid along the columns, from 0"),
-    "x_centroid_err": ("pix", "stat.error;pos.cartesian.x", "standard error of x_centroid"),
-    "y_centroid_err": ("pix", "stat.error;pos.cartesian.y", "standard error of y_centroid"),
-    "flux": ("", "phot.flux", "flux above the background, in units of the frame"),
-    "flux_err": ("", "stat.error;phot.flux", "standard error of flux"),
-    "peak": ("", "phot.flux;stat.max", "brightest pixel above the background"),
-    "snr": ("", "stat.snr", "flux over its standard error"),
-    "flags": ("", "meta.code.qual", "what is odd about the detection"),
-    "ra": ("deg", "pos.eq.ra;meta.main", "right ascension at the frame's date (ICRS)"),
-    "dec": ("deg", "pos.eq.dec;meta.main", "declination at the frame's date (ICRS)"),
-    "vmag": ("mag", "phot.mag;em.opt.V", "Johnson V of the named star"),
-    "residual": ("pix", "stat.fit.residual", "distance from the named star"),
-    "p_chance": ("", "stat.probability", "probability that the name is chance"),
-}
+STAR_COLUMNS = {name: meaning for name, *meaning in _starpipe.star_columns()}
 """Unit, UCD and description of each column of stars."""
 
 

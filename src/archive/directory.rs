@@ -41,18 +41,16 @@ impl Archive {
         plan: Plan,
         configuration: &Configuration,
     ) -> Result<Self, ArchiveError> {
-        for table in [FRAMES, STARS] {
-            let path = directory.join(table);
-            let made = fs::create_dir_all(directory);
-            made.map_err(ArchiveError::file("making the directory", directory))?;
-            if path.exists() && !directory.join(IDENTITY).exists() {
-                return Err(ArchiveError::Foreign {
-                    directory: directory.to_owned(),
-                    name: table,
-                });
-            }
-        }
+        let made = fs::create_dir_all(directory);
+        made.map_err(ArchiveError::file("making the directory", directory))?;
         let path = directory.join(IDENTITY);
+        let is_foreign = |table: &&str| directory.join(table).exists() && !path.exists();
+        if let Some(name) = [FRAMES, STARS].into_iter().find(is_foreign) {
+            return Err(ArchiveError::Foreign {
+                directory: directory.to_owned(),
+                name,
+            });
+        }
         let identity = Identity::new(&plan, configuration).map_err(ArchiveError::json(&path))?;
         if !is_claimed(&path, identity.text())? {
             // Another worker may have been faster.

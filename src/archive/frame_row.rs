@@ -2,7 +2,7 @@
 
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
-use crate::base::table::{Column, Meaning, column};
+use crate::base::table::{Column, columns};
 use crate::base::units::DEG_PER_RAD;
 use crate::pipeline::{Outcome, Solution};
 use crate::report::FrameReport;
@@ -169,16 +169,8 @@ impl FrameRow {
 
     /// The columns of the table `frames`.
     pub fn columns() -> Vec<Column<Self>> {
-        macro_rules! columns {
-            ($($field:ident, $unit:literal, $ucd:literal, $description:literal;)*) => {
-                vec![$(column!(Self, $field, Meaning {
-                    unit: $unit,
-                    ucd: $ucd,
-                    description: $description,
-                })),*]
-            };
-        }
         columns! {
+            Self:
             frame, "", "meta.id;meta.main", "name of the frame";
             status, "", "meta.code.status", "identified, not_identified or unread";
             reason_code, "", "meta.code", "why it is not identified, as a code";
@@ -207,7 +199,7 @@ impl FrameRow {
             mirrored, "", "meta.code", "whether an identified frame mirrors the sky";
             detected, "", "meta.number", "detections";
             matched, "", "meta.number", "detections with the name of a star";
-            rms_px, "pix", "stat.stdev;stat.fit.residual", "RMS residual of the named stars";
+            rms_px, "pix", "stat.fit.residual", "RMS residual of the named stars";
             log10_false_alarm, "", "stat.probability", "log10 of the false-alarm probability";
             background, "", "instr.background", "median background, in units of the frame";
             noise, "", "stat.stdev;instr.background", "noise of a pixel, in units of the frame";

@@ -1,6 +1,6 @@
 //! A row of the table of stars.
 
-use crate::base::table::{Column, Meaning, column};
+use crate::base::table::{Column, columns};
 use crate::report::{FrameReport, StarReport};
 
 /// A detection, as the report of its frame has it.
@@ -57,16 +57,8 @@ impl StarRow {
 
     /// The columns of the table `stars`.
     pub fn columns() -> Vec<Column<Self>> {
-        macro_rules! columns {
-            ($($field:ident, $unit:literal, $ucd:literal, $description:literal;)*) => {
-                vec![$(column!(Self, $field, Meaning {
-                    unit: $unit,
-                    ucd: $ucd,
-                    description: $description,
-                })),*]
-            };
-        }
         columns! {
+            Self:
             frame, "", "meta.id", "name of the frame";
             id, "", "meta.id;meta.main", "identifier in the catalogue";
             name, "", "meta.id", "proper name and designation";
