@@ -12,6 +12,7 @@
 //!
 //! Both tables have VOTable metadata: unit, UCD and description of every column.
 
+mod columns;
 mod configuration;
 mod directory;
 mod error;

@@ -1,6 +1,7 @@
 //! A row of the table of stars.
 
-use crate::base::table::{Column, columns};
+use super::columns::columns;
+use crate::base::table::Column;
 use crate::report::{FrameReport, StarReport};
 
 /// A detection, as the report of its frame has it.
