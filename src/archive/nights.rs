@@ -14,7 +14,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// The columns that the summary needs.
-const COLUMNS: [&str; 14] = [
+const COLUMNS: [&str; 12] = [
     "status",
     "reason_code",
     "night",
@@ -27,8 +27,6 @@ const COLUMNS: [&str; 14] = [
     "predicted_limit50_vmag",
     "limit_difference_mag",
     "sky_mag_arcsec2",
-    "noise",
-    "airmass",
 ];
 
 /// What one camera saw in one night. Values are medians over its frames.
