@@ -266,3 +266,27 @@ fn what_cannot_be_done_is_told() {
         refused.stderr
     );
 }
+
+#[test]
+fn each_image_of_a_mosaic_is_a_row() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    fs::copy(
+        fixture("tiles/fpack-rice-cube.fits.fz"),
+        directory.join("cube.fits.fz"),
+    )
+    .unwrap();
+    let arguments = ["process", "cube.fits.fz", "--out-parquet", "out"];
+    let ran = run(directory, &[&arguments[..], &["--page", "all"]].concat());
+    assert_eq!(ran.status, 3, "{}", ran.stderr);
+    let told = "1 part, 4 frames: 0 identified, 4 not identified, 0 unread\n";
+    assert_eq!(ran.stdout, told);
+    run(directory, &["archive", "merge", "out", "--out", "tables"]);
+    let names = starpipe::archive::names_in(&directory.join("tables/frames.parquet")).unwrap();
+    let expected: Vec<String> = (1..=4)
+        .map(|page| format!("cube.fits.fz[{page}]"))
+        .collect();
+    assert_eq!(names, expected);
+    // All images and the first are other frames.
+    assert_eq!(run(directory, &arguments).status, 2);
+}

@@ -565,6 +565,73 @@ fn a_page_is_selected_by_its_number() {
     assert_eq!(status("0").0, 2);
 }
 
+/// A mosaic: an image without stars, a table of no axes, the stars of Orion, and an image that
+/// breaks off.
+fn mosaic() -> Vec<u8> {
+    let image = orion();
+    let size = [image.width(), image.height()];
+    let dark = vec![10_u8; image.as_bytes().len()];
+    let extension = "XTENSION= 'IMAGE   '";
+    let whole = [
+        fits_unit("SIMPLE  =                    T", 8, &[], &[], &[]),
+        fits_unit(extension, 8, &size, &[], &dark),
+        fits_unit(extension, 8, &size, &[], image.as_bytes()),
+        fits_unit(extension, 8, &size, &[], image.as_bytes()),
+    ]
+    .concat();
+    whole[..whole.len() - 100_000].to_vec()
+}
+
+#[test]
+fn all_images_of_a_mosaic_are_frames() {
+    let files = Files::new();
+    let path = files.add("mosaic.fits.gz", &zipped(&mosaic()));
+    let out = files.0.path().join("out");
+    let all = |path: &Path| {
+        let arguments: [PathBuf; 5] = [
+            "--page".into(),
+            "all".into(),
+            path.into(),
+            "--out".into(),
+            out.clone(),
+        ];
+        process(arguments)
+    };
+    let ran = all(&path);
+    assert_eq!(ran.status, 1);
+    let name = path.display();
+    let begins = format!("starpipe: reading {name}[3]: truncated FITS");
+    assert!(ran.stderr.starts_with(&begins), "{}", ran.stderr);
+    assert_eq!(ran.stderr.lines().count(), 1);
+    let [dark, orion] = &ran.reports()[..] else {
+        panic!("{}", ran.stdout)
+    };
+    assert_eq!(dark["frame"], format!("{name}[1]"));
+    assert_eq!(dark["status"], "not_identified");
+    assert_eq!(orion["frame"], format!("{name}[2]"));
+    assert_eq!(orion["status"], "identified");
+    let alone = process(["--page".into(), "2".into(), path.clone()]);
+    assert_eq!(orion["attitude"], alone.reports()[0]["attitude"]);
+
+    // Results are overwritten, other files are not.
+    let result = out.join("mosaic.fits-2.json");
+    let saved = fs::read_to_string(&result).unwrap();
+    assert!(saved.contains("mosaic.fits.gz[2]"), "{saved}");
+    assert_eq!(all(&path).stderr, ran.stderr);
+    fs::write(&result, "mine").unwrap();
+    let refused = all(&path).stderr;
+    let expected = "[2] would overwrite a file that starpipe did not write";
+    assert!(refused.contains(expected), "{refused}");
+    assert_eq!(fs::read(&result).unwrap(), b"mine");
+
+    // Any other file is a mosaic of one, if it is an image.
+    let tiff = files.add("orion.png", &fs::read(fixture("orion/orion.png")).unwrap());
+    let ran = all(&tiff);
+    assert_eq!((ran.status, ran.stderr.as_str()), (0, ""));
+    let ran = all(&files.add("notes.txt", b"PSF was poor"));
+    assert!(ran.stderr.contains("not an image"), "{}", ran.stderr);
+}
+
 // ---- Bad files
 
 /// Asserts that each file is refused in one line that begins so, with nothing on standard output.

@@ -4,7 +4,6 @@ use crate::sky::catalog::Catalog;
 use serde::Serialize;
 use std::fs;
 use std::io;
-use std::num::NonZeroUsize;
 use std::path::Path;
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -34,7 +33,7 @@ pub struct Configuration {
     pub extinction_mag: Option<f64>,
     pub name_odds: f64,
     pub attitude_only: bool,
-    pub page: Option<NonZeroUsize>,
+    pub page: Option<String>,
 }
 
 /// Which catalogue was used.

@@ -3,7 +3,7 @@
 use super::exit::{CommandError, Exit, Outcome};
 use super::input::frames::{FrameList, for_each_frame};
 use super::options::format::Format;
-use super::options::frames::FrameOptions;
+use super::options::frames::{FrameOptions, PageOption};
 use super::options::threads::ThreadOptions;
 use super::options::values;
 use super::output::files::write_into;
@@ -32,6 +32,8 @@ use std::str::FromStr;
 pub(crate) struct DarksArgs {
     #[command(flatten)]
     frames: FrameOptions,
+    #[command(flatten)]
+    page: PageOption,
     /// Exposure in seconds, of one file or directory, else of all frames (may be repeated)
     /// [default: the exposure in the file's header]
     #[arg(long, value_name = "SECONDS[:PATH]", allow_hyphen_values = true)]
@@ -93,7 +95,7 @@ pub(crate) fn darks(arguments: DarksArgs) -> Result<Outcome, CommandError> {
         (frame, statistics)
     };
     let take = |(frame, statistics): (Frame, FrameStatistics)| Ok(stack.add(&frame, statistics)?);
-    let unread = for_each_frame(&pool, &frames, arguments.frames.page, measure, take)?;
+    let unread = for_each_frame(&pool, &frames, arguments.page.page, measure, take)?;
     if unread == frames.len() {
         return Ok(Exit::Failure.into());
     }

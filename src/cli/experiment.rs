@@ -91,6 +91,6 @@ fn save_overlay(
     };
     let title = format!("{}, simulated", name.display());
     let picture = overlay::draw(&title, frame, solution, indexed.catalog());
-    let path = output_path(directory, name, "png");
+    let path = output_path(directory, name, None, "png");
     write_whole(&[(path, overlay::to_png(&picture)?)])
 }

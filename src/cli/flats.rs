@@ -3,7 +3,7 @@
 use super::exit::{CommandError, Exit, Outcome};
 use super::input::frames::{FrameList, for_each_frame, read_master};
 use super::options::format::Format;
-use super::options::frames::FrameOptions;
+use super::options::frames::{FrameOptions, PageOption};
 use super::options::threads::ThreadOptions;
 use super::output::files::write_into;
 use super::output::master::{fits_image, header};
@@ -29,6 +29,8 @@ const MASTER: &str = "master-flat.fits";
 pub(crate) struct FlatsArgs {
     #[command(flatten)]
     frames: FrameOptions,
+    #[command(flatten)]
+    page: PageOption,
     /// Frame taken without light, or the mean of many; see `starpipe darks`
     #[arg(long, value_name = "FILE")]
     dark: Option<PathBuf>,
@@ -57,7 +59,7 @@ pub(crate) fn flats(arguments: FlatsArgs) -> Result<Outcome, CommandError> {
     let mut stack = FlatStack::new(arguments.config()?);
     let named = |path: &Path, frame: Frame<'static>| (path.display().to_string(), frame);
     let take = |(name, frame): (String, Frame)| Ok(stack.add(&name, &frame)?);
-    let unread = for_each_frame(&pool, &frames, arguments.frames.page, named, take)?;
+    let unread = for_each_frame(&pool, &frames, arguments.page.page, named, take)?;
     if unread == frames.len() {
         return Ok(Exit::Failure.into());
     }

@@ -5,8 +5,8 @@ use super::input::centroid_list::{self, ListOptions};
 use super::input::stdin;
 use super::options::values::MAX_SIDE_PX;
 use super::solving::options::{LIST_RESULTS, SolvingOptions};
-use super::solving::result_files::Solved;
-use super::solving::{Plan, solve_all};
+use super::solving::result_files::{Image, Solved};
+use super::solving::{Plan, Taker, solve_all};
 use clap::Args;
 use starpipe::pipeline::{Context, Workspace, solve_centroids};
 use std::path::{Path, PathBuf};
@@ -54,12 +54,12 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Outcome, CommandError>
         height,
         frame,
     };
-    let solve = |context: &Context, path: &Path, workspace: &mut Workspace| {
-        let list = centroid_list::read(path, &options)?;
-        Ok(Solved {
+    let solve = |context: &Context, path: &Path, workspace: &mut Workspace, take: Taker| {
+        let solved = centroid_list::read(path, &options).map(|list| Solved {
             solution: solve_centroids(&list, context, workspace),
             frame: None,
-        })
+        });
+        take(Image::of(path), solved);
     };
     Ok(solve_all(&lists, solving, LIST_RESULTS, &plan, solve)?.into())
 }

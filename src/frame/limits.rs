@@ -7,6 +7,9 @@ pub const MAX_PIXELS: usize = 200_000_000;
 /// background.
 pub const MIN_SIDE_PX: usize = 3;
 
+/// Most images of a file of which all are read.
+pub const MAX_PAGES: usize = 10_000;
+
 /// Maximum size of a file: the largest frame in three colours of 64 bits, and some headers.
 pub(super) const MAX_FILE_BYTES: u64 = MAX_PIXELS as u64 * 24 + (1 << 24);
 

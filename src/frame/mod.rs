@@ -14,7 +14,7 @@
 //! 5. Infinities become NaN. NaN marks a pixel without a value.
 //!
 //! A file may hold several images, its pages, counted from 1; the first is read unless another is
-//! chosen. Pages are the images of a TIFF file in file order, and in FITS every image with two axes
+//! chosen, or all are ([`Pages`]). Pages are the images of a TIFF file in file order, and in FITS every image with two axes
 //! in a header-data unit and every plane of a cube. A cube of three planes is one colour image.
 //!
 //! FITS images are stored bottom-up, unless `ROWORDER` is `TOP-DOWN`: their rows are reversed on
@@ -34,6 +34,7 @@ mod image;
 mod levels;
 mod limits;
 mod metadata;
+mod pages;
 mod pixels;
 mod raster;
 mod reader;
@@ -49,8 +50,9 @@ pub use fits::{FitsHeader, FitsSamples, FitsWriteError, write_fits};
 pub use format::FrameFormat;
 pub use image::{Frame, check_size};
 pub use levels::{LUMINANCE_WEIGHTS, WholeNumber};
-pub use limits::{MAX_PIXELS, MIN_SIDE_PX};
+pub use limits::{MAX_PAGES, MAX_PIXELS, MIN_SIDE_PX};
 pub use metadata::{FrameMetadata, IgnoredValue};
+pub use pages::Pages;
 pub use pixels::Pixels;
 pub use reader::{Buffers, decode, decode_page, read, read_page, read_page_with, read_stream};
 pub use row_order::RowOrder;

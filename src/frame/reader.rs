@@ -152,7 +152,7 @@ fn decode_with(
 }
 
 /// Decodes one image that is not compressed as a file.
-fn decode_image(
+pub(super) fn decode_image(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
     buffer: &mut Vec<u16>,

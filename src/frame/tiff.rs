@@ -10,7 +10,7 @@ use super::image::{Frame, check_size};
 use super::levels::{
     Samples, WholeNumber, frame_from_floats, frame_from_integers, frame_from_words, interleaved,
 };
-use super::limits::MAX_PIXELS;
+use super::limits::{MAX_PAGES, MAX_PIXELS};
 use std::io::Cursor;
 use std::num::NonZeroUsize;
 use tiff::decoder::{BufferLayoutPreference, Decoder, DecodingResult, Limits};
@@ -66,6 +66,23 @@ pub(super) fn decode(
         layout.frame(samples)
     };
     Ok(frame?.with_metadata(exif::metadata(bytes, width)))
+}
+
+/// The number of images in a TIFF file, at most [`MAX_PAGES`], and why there may be more that cannot
+/// be found.
+pub(super) fn count_pages(bytes: &[u8]) -> (usize, Option<FrameError>) {
+    let mut decoder = match Decoder::new(Cursor::new(bytes)) {
+        Ok(decoder) => decoder,
+        Err(error) => return (0, Some(error_of(error, bytes.len()))),
+    };
+    let mut pages = 1;
+    while decoder.more_images() && pages < MAX_PAGES {
+        if let Err(error) = decoder.next_image() {
+            return (pages, Some(error_of(error, bytes.len())));
+        }
+        pages += 1;
+    }
+    (pages, None)
 }
 
 /// The 16-bit samples as stored in the file, if they are contiguous, uncompressed, and 0 is black.

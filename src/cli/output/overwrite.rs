@@ -2,6 +2,7 @@
 
 use super::paths::{output_path, result_stem};
 use crate::cli::exit::CommandError;
+use anyhow::bail;
 use starpipe::frame;
 use starpipe::report::wcs;
 use std::collections::{HashMap, HashSet};
@@ -26,7 +27,7 @@ pub(crate) fn check(
         let results = format!("the results of {}", input.display());
         for extension in extensions {
             check_result(
-                &output_path(directory, input, extension),
+                &output_path(directory, input, None, extension),
                 &inputs_found,
                 &results,
             )?;
@@ -43,6 +44,15 @@ pub(crate) fn check_results(inputs: &[PathBuf], results: &[PathBuf]) -> Result<(
         .try_for_each(|result| check_result(result, &inputs_found, "the results"))
 }
 
+/// Refuses to overwrite the file `output` with the results of `input`, unless it is such a result.
+pub(crate) fn check_output(output: &Path, input: &Path) -> anyhow::Result<()> {
+    let results = format!("the results of {}", input.display());
+    match refusal(output, &HashSet::new(), &results) {
+        Some(refusal) => bail!(refusal),
+        None => Ok(()),
+    }
+}
+
 /// The inputs that exist, with links resolved.
 fn found(inputs: &[PathBuf]) -> HashSet<PathBuf> {
     inputs
@@ -56,21 +66,25 @@ fn check_result(
     inputs_found: &HashSet<PathBuf>,
     results: &str,
 ) -> Result<(), CommandError> {
-    let Ok(existing) = output.canonicalize() else {
-        return Ok(());
-    };
+    let refusal = refusal(output, inputs_found, results).map(CommandError::Usage);
+    refusal.map_or(Ok(()), Err)
+}
+
+/// Why `results` may not be written to `output`.
+fn refusal(output: &Path, inputs_found: &HashSet<PathBuf>, results: &str) -> Option<String> {
+    let existing = output.canonicalize().ok()?;
     let extension = output.extension().and_then(OsStr::to_str);
     let what = if inputs_found.contains(&existing) {
         "the input"
     } else if is_result(&existing, extension.unwrap_or_default()) {
-        return Ok(());
+        return None;
     } else {
         "a file that starpipe did not write:"
     };
-    Err(CommandError::Usage(format!(
+    Some(format!(
         "{results} would overwrite {what} {}; choose another directory for --out",
         output.display(),
-    )))
+    ))
 }
 
 fn check_names_differ(inputs: &[PathBuf], directory: &Path) -> Result<(), CommandError> {
@@ -81,7 +95,7 @@ fn check_names_differ(inputs: &[PathBuf], directory: &Path) -> Result<(), Comman
                 "the results of {} and {} would both be written to {}; process them into different directories",
                 other.display(),
                 input.display(),
-                output_path(directory, input, "json").display(),
+                output_path(directory, input, None, "json").display(),
             )));
         }
     }

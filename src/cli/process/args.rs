@@ -2,7 +2,7 @@
 
 use crate::cli::exit::CommandError;
 use crate::cli::input::frames::read_master;
-use crate::cli::options::frames::FrameOptions;
+use crate::cli::options::frames::{FrameOptions, PageChoice};
 use crate::cli::options::values;
 use crate::cli::solving::Plan;
 use crate::cli::solving::options::SolvingOptions;
@@ -24,7 +24,7 @@ use std::path::PathBuf;
     starpipe process --fov 11.4 --near 83.8,-1.2 --radius 10 night.tif\n  \
     starpipe process --date 2019-07-29T22:47+02:00 --site 52.22,4.42 night.tif\n  \
     starpipe process --format json --out results night/ > night.jsonl\n  \
-    starpipe process --page 2 night.fits\n  \
+    starpipe process --page all mosaic.fits\n  \
     starpipe process --dark master-dark.fits --flat master-flat.fits --hot-pixels hot-pixels.csv night.fits\n  \
     ssh telescope cat night.fits.fz | starpipe process -\n  \
     starpipe process 'nights/*/*.fits' --out-parquet results --shard 3/100\n\n\
@@ -35,6 +35,10 @@ use std::path::PathBuf;
 pub(crate) struct ProcessArgs {
     #[command(flatten)]
     pub(super) frames: FrameOptions,
+    /// Which image of a file with several, from 1: a page of a TIFF, an image or plane of a FITS
+    /// file; or all of them, as FRAME[1], FRAME[2] and so on [default: the first]
+    #[arg(long, value_name = "NUMBER|all")]
+    pub(super) page: Option<PageChoice>,
     #[command(flatten)]
     pub(super) calibration: CalibrationOptions,
     #[command(flatten)]

@@ -63,7 +63,7 @@ pub(super) fn configuration(
         extinction_mag: *extinction,
         name_odds: arguments.solving.name_odds,
         attitude_only: arguments.solving.attitude_only,
-        page: arguments.frames.page,
+        page: arguments.page.map(String::from),
     })
 }
 

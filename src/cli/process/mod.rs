@@ -2,18 +2,19 @@
 
 mod args;
 mod configuration;
+mod images;
 mod parts;
 
 pub(crate) use args::{CalibrationOptions, ProcessArgs};
 
 use super::exit::{CommandError, Exit, Outcome};
-use super::input::frames::{FrameList, read_frame};
+use super::input::frames::FrameList;
 use super::solving::options::FRAME_RESULTS;
 use super::solving::result_files::Solved;
-use super::solving::solve_all;
+use super::solving::{Taker, solve_all};
+use images::solve_images;
 use parts::process_parts;
-use starpipe::frame::Buffers;
-use starpipe::pipeline::{Context, Workspace, solve_read};
+use starpipe::pipeline::{Context, Workspace};
 use std::path::Path;
 
 /// `starpipe process`
@@ -22,20 +23,29 @@ pub(crate) fn process(arguments: ProcessArgs) -> Result<Outcome, CommandError> {
         return process_parts(&arguments, directory);
     }
     let plan = arguments.plan()?;
-    let page = arguments.frames.page;
+    let page = arguments.page;
     let (frames, failed) = FrameList::of(arguments.frames.frames)?.reported();
     // Frames are large: one is kept only to be drawn.
     let keep = arguments.solving.writes_files();
-    let solve = |context: &Context, path: &Path, workspace: &mut Workspace| {
-        let read = |buffers: &mut Buffers| read_frame(path, page, buffers);
-        let (solution, frame) = solve_read(path, read, context, workspace)?;
-        let frame = if keep {
-            Some(frame)
-        } else {
-            workspace.frames.recycle(frame);
-            None
-        };
-        Ok(Solved { solution, frame })
+    let solve = |context: &Context, path: &Path, workspace: &mut Workspace, take: Taker| {
+        solve_images(
+            path,
+            page,
+            context,
+            workspace,
+            |image, solved, workspace| {
+                let solved = solved.map(|(solution, frame)| {
+                    let frame = if keep {
+                        Some(frame)
+                    } else {
+                        workspace.frames.recycle(frame);
+                        None
+                    };
+                    Solved { solution, frame }
+                });
+                take(image, solved.map_err(Into::into));
+            },
+        );
     };
     let exit = solve_all(&frames, arguments.solving, FRAME_RESULTS, &plan, solve)?;
     Ok(if failed { Exit::Failure } else { exit }.into())

@@ -2,21 +2,20 @@
 
 use super::args::ProcessArgs;
 use super::configuration::configuration;
+use super::images::solve_images;
 use crate::cli::batch::for_each_ordered;
 use crate::cli::exit::{CommandError, Exit, Outcome};
-use crate::cli::input::frames::read_frame;
 use crate::cli::input::names::frame_names;
+use crate::cli::options::frames::PageChoice;
 use crate::cli::output::messages::{one_line, report_error};
 use crate::cli::progress::frames_bar;
 use crate::cli::solving::workspace;
 use indicatif::ProgressBar;
 use starpipe::archive::{Archive, ArchiveError, FrameRow, Part, Plan, Shard, StarRow};
 use starpipe::base::format::counted;
-use starpipe::frame::Buffers;
 use starpipe::identify::IndexedCatalog;
-use starpipe::pipeline::{Context, Workspace, solve_read};
+use starpipe::pipeline::{Context, Error, Workspace};
 use starpipe::report::FrameReport;
-use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -37,7 +36,7 @@ pub(super) fn process_parts(
             context: solving.context(indexed, arguments.solving.attitude_only),
             indexed,
             name_odds: arguments.solving.name_odds,
-            page: arguments.frames.page,
+            page: arguments.page,
         };
         let shard = options.shard.unwrap_or(Shard::ALL);
         let parts: Vec<Part> = archive.plan().shard(shard).collect();
@@ -56,13 +55,16 @@ fn claim_error(error: ArchiveError) -> CommandError {
     }
 }
 
+/// The rows of a frame and its stars, or why there are none.
+type Rows = Result<(FrameRow, Vec<StarRow>), Error>;
+
 /// Solves frames, and makes rows of them.
 struct Worker<'a> {
     pool: &'a rayon::ThreadPool,
     context: Context<'a>,
     indexed: &'a IndexedCatalog<'a>,
     name_odds: f64,
-    page: Option<NonZeroUsize>,
+    page: Option<PageChoice>,
 }
 
 /// Counts of a run.
@@ -105,16 +107,18 @@ impl Worker<'_> {
         let mut added = Ok(());
         let work = |name: &String, workspace: &mut Workspace| self.solve(name, workspace);
         let buffers = || workspace(self.pool, part.names.len(), self.name_odds);
-        for_each_ordered(self.pool, part.names, buffers, work, |name, solved| {
+        for_each_ordered(self.pool, part.names, buffers, work, |_, images| {
             progress.inc(1);
-            tally.frames += 1;
-            let (frame, stars) = solved.unwrap_or_else(|error| {
-                tally.unread += 1;
-                progress.suspend(|| report_error(error.as_ref()));
-                (FrameRow::unread(name, one_line(error.as_ref())), Vec::new())
+            added = images.into_iter().try_for_each(|(name, solved)| {
+                tally.frames += 1;
+                let (frame, stars) = solved.unwrap_or_else(|error| {
+                    tally.unread += 1;
+                    progress.suspend(|| report_error(&error));
+                    (FrameRow::unread(&name, one_line(&error)), Vec::new())
+                });
+                tally.not_identified += usize::from(frame.status == "not_identified");
+                writer.add(frame, stars)
             });
-            tally.not_identified += usize::from(frame.status == "not_identified");
-            added = writer.add(frame, stars);
             if added.is_ok() {
                 ControlFlow::Continue(())
             } else {
@@ -125,18 +129,27 @@ impl Worker<'_> {
         writer.finish()
     }
 
-    fn solve(
-        &self,
-        name: &str,
-        workspace: &mut Workspace,
-    ) -> anyhow::Result<(FrameRow, Vec<StarRow>)> {
-        let path = Path::new(name);
-        let read = |buffers: &mut Buffers| read_frame(path, self.page, buffers);
-        let (solution, frame) = solve_read(path, read, &self.context, workspace)?;
-        workspace.frames.recycle(frame);
-        let report = FrameReport::new(name, &solution, self.indexed.catalog());
-        let stars = StarRow::of_frame(&report).collect();
-        Ok((FrameRow::new(&report, &solution), stars))
+    /// The rows of each image of a file.
+    fn solve(&self, name: &str, workspace: &mut Workspace) -> Vec<(String, Rows)> {
+        let (path, context) = (Path::new(name), &self.context);
+        let mut rows = Vec::new();
+        solve_images(
+            path,
+            self.page,
+            context,
+            workspace,
+            |image, solved, workspace| {
+                let name = image.name().display().to_string();
+                let solved = solved.map(|(solution, frame)| {
+                    workspace.frames.recycle(frame);
+                    let report = FrameReport::new(&name, &solution, self.indexed.catalog());
+                    let stars = StarRow::of_frame(&report).collect();
+                    (FrameRow::new(&report, &solution), stars)
+                });
+                rows.push((name, solved));
+            },
+        );
+        rows
     }
 }
 

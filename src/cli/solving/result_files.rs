@@ -1,13 +1,41 @@
 //! Result files of an input, which `--out` asks for.
 
 use crate::cli::output::files::{make_directory, remove_outdated, write_whole};
+use crate::cli::output::overwrite;
 use crate::cli::output::paths::output_path;
 use crate::cli::output::rows::finished;
 use starpipe::frame::Frame;
 use starpipe::pipeline::Solution;
 use starpipe::report::{FrameReport, overlay, wcs, write_table_header};
 use starpipe::sky::catalog::Catalog;
+use std::borrow::Cow;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+
+/// An image of an input.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Image<'a> {
+    pub(crate) path: &'a Path,
+    /// Its number from 1, where all images of the input are solved.
+    pub(crate) page: Option<NonZeroUsize>,
+}
+
+impl<'a> Image<'a> {
+    /// The only image of an input that is solved.
+    pub(crate) fn of(path: &'a Path) -> Self {
+        Self { path, page: None }
+    }
+
+    /// `night.fits`, or `night.fits[2]`.
+    pub(crate) fn name(&self) -> Cow<'a, Path> {
+        let Some(page) = self.page else {
+            return Cow::Borrowed(self.path);
+        };
+        let mut name = self.path.as_os_str().to_owned();
+        name.push(format!("[{page}]"));
+        Cow::Owned(name.into())
+    }
+}
 
 /// A solved input.
 pub(crate) struct Solved {
@@ -28,11 +56,11 @@ impl ResultFiles {
         Ok(Self { directory })
     }
 
-    /// Writes the files of `input`, all or none, and removes the FITS header of an earlier run if
+    /// Writes the files of `image`, all or none, and removes the FITS header of an earlier run if
     /// there is none now.
     pub(super) fn save(
         &self,
-        input: &Path,
+        image: Image,
         solved: &Solved,
         report: &FrameReport,
         catalog: &Catalog,
@@ -40,14 +68,15 @@ impl ResultFiles {
         let Some(directory) = &self.directory else {
             return Ok(());
         };
-        let path = |extension: &str| output_path(directory, input, extension);
+        let path = |extension: &str| output_path(directory, image.path, image.page, extension);
         let json = report.to_json_line()? + "\n";
         let mut files = vec![
             (path("json"), json.into_bytes()),
             (path("csv"), table(report, true)?.into_bytes()),
         ];
         if let Some(frame) = &solved.frame {
-            let title = input.file_name().unwrap_or(input.as_os_str());
+            let name = image.name();
+            let title = name.file_name().unwrap_or(name.as_os_str());
             let title = title.to_string_lossy();
             let picture = overlay::draw(&title, frame, &solved.solution, catalog);
             files.push((path("png"), overlay::to_png(&picture)?));
@@ -55,6 +84,12 @@ impl ResultFiles {
         let header = wcs::header(&report.frame, &solved.solution);
         let has_header = header.is_some();
         files.extend(header.map(|header| (path("wcs"), header)));
+        if image.page.is_some() {
+            // How many images an input has was not known when the others were checked.
+            for (path, _) in &files {
+                overwrite::check_output(path, &image.name())?;
+            }
+        }
         write_whole(&files)?;
         if !has_header {
             remove_outdated(&path("wcs"))?;

@@ -2,7 +2,7 @@
 
 use super::options::{OutputOptions, SolvingOptions};
 use super::printer::Printer;
-use super::result_files::{ResultFiles, Solved};
+use super::result_files::{Image, ResultFiles, Solved};
 use crate::cli::batch;
 use crate::cli::exit::{CommandError, Exit};
 use crate::cli::output::messages::report_error;
@@ -45,14 +45,18 @@ impl Plan {
     }
 }
 
+/// Takes the images of an input as they are solved.
+pub(crate) type Taker<'a> = &'a mut dyn FnMut(Image, anyhow::Result<Solved>);
+
 /// Solves every input, prints its report and writes its result files, which have these
-/// `extensions`. Inputs that cannot be read are reported, and the others solved.
+/// `extensions`. `solve` hands each image of an input
+/// to its taker. Inputs that cannot be read are reported, and the others solved.
 pub(crate) fn solve_all(
     inputs: &[PathBuf],
     options: SolvingOptions,
     extensions: &[&str],
     plan: &Plan,
-    solve: impl Fn(&Context, &Path, &mut Workspace) -> anyhow::Result<Solved> + Sync,
+    solve: impl Fn(&Context, &Path, &mut Workspace, Taker) + Sync,
 ) -> Result<Exit, CommandError> {
     let SolvingOptions {
         output,
@@ -72,15 +76,24 @@ pub(crate) fn solve_all(
     catalog.with_index(|pool, indexed| {
         let context = plan.context(indexed, attitude_only);
         // The threads that solve also draw and write files; this one only prints.
-        let work = |input: &PathBuf, workspace: &mut Workspace| {
-            let solved = solve(&context, input, workspace)?;
-            let name = input.display().to_string();
+        let answer = |image: Image, solved: Solved| {
+            let name = image.name().display().to_string();
             let report = FrameReport::new(&name, &solved.solution, indexed.catalog());
-            let saved = files.save(input, &solved, &report, indexed.catalog());
-            Ok(Answer { report, saved })
+            let saved = files.save(image, &solved, &report, indexed.catalog());
+            Answer { report, saved }
+        };
+        let work = |input: &PathBuf, workspace: &mut Workspace| {
+            let mut answers = Vec::new();
+            solve(&context, input, workspace, &mut |image, solved| {
+                answers.push(solved.map(|solved| answer(image, solved)));
+            });
+            answers
         };
         let workspace = || workspace(pool, inputs.len(), name_odds);
-        batch::for_each_ordered(pool, inputs, workspace, work, |_, result| run.take(result));
+        batch::for_each_ordered(pool, inputs, workspace, work, |_, answers| {
+            run.progress.inc(1);
+            answers.into_iter().try_for_each(|answer| run.take(answer))
+        });
         Ok(run.exit())
     })
 }
@@ -124,7 +137,6 @@ impl Run {
 
     /// Prints a report or an error. Breaks if nobody reads the reports any longer.
     fn take(&mut self, result: anyhow::Result<Answer>) -> ControlFlow<()> {
-        self.progress.inc(1);
         let answer = match result {
             Ok(answer) => answer,
             Err(error) => {

@@ -69,5 +69,17 @@ pub(super) fn decode(
     }
 }
 
+/// The number of images in a FITS file, and why there may be more that cannot be found.
+pub(super) fn count_pages(bytes: &[u8]) -> (usize, Option<FrameError>) {
+    let (mut pages, mut units) = (0_usize, Units::new(bytes));
+    loop {
+        match units.next() {
+            Ok(Some(unit)) => pages = pages.saturating_add(unit.pages()),
+            Ok(None) => return (pages, None),
+            Err(error) => return (pages, Some(error)),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests;
