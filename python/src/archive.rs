@@ -24,6 +24,8 @@ pub struct Stated {
     sigma: Option<f64>,
     max_stars: Option<u64>,
     attitude_only: bool,
+    /// A number, or `all`.
+    page: Option<String>,
 }
 
 /// The names of an archive's parts, and what each is of.
@@ -53,6 +55,7 @@ pub fn archive_plan(
         sigma: stated.sigma,
         max_stars: stated.max_stars,
         attitude_only: stated.attitude_only,
+        page: stated.page,
         ..stated.hints.configuration()?
     };
     let identity = Identity::new(&plan, &configuration).map_err(exception)?;

@@ -1,6 +1,7 @@
 //! Images as frames: an array of numpy is borrowed, a file or its bytes are decoded.
 
 use crate::errors::exception;
+use crate::pages::Page;
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -14,6 +15,7 @@ use std::path::{Path, PathBuf};
 pub enum Image<'py> {
     Bytes(PyBackedBytes),
     Path(PathBuf),
+    Page(PyRef<'py, Page>),
     U8(PyReadonlyArray2<'py, u8>),
     U16(PyReadonlyArray2<'py, u16>),
     F32(PyReadonlyArray2<'py, f32>),
@@ -25,6 +27,7 @@ pub enum Image<'py> {
 pub enum Source<'a> {
     Bytes(&'a [u8]),
     Path(&'a Path),
+    Page(&'a Frame<'static>),
     Array(Frame<'a>),
 }
 
@@ -34,6 +37,7 @@ impl Image<'_> {
         let frame = match self {
             Self::Bytes(bytes) => return Ok(Source::Bytes(bytes)),
             Self::Path(path) => return Ok(Source::Path(path)),
+            Self::Page(page) => return Ok(Source::Page(&page.0)),
             Self::U8(array) => samples(array, slice(array)?),
             Self::U16(array) => samples(array, slice(array)?),
             Self::F32(array) => samples(array, slice(array)?),
@@ -85,6 +89,7 @@ impl<'a> Source<'a> {
         match self {
             Self::Bytes(_) => "bytes".into(),
             Self::Path(path) => path.to_path_buf(),
+            Self::Page(_) => "page".into(),
             Self::Array(_) => "array".into(),
         }
     }
@@ -99,6 +104,7 @@ impl<'a> Source<'a> {
         let mut frame = match self {
             Self::Bytes(bytes) => frame::decode(bytes).map_err(|error| error.in_file(name))?,
             Self::Path(path) => frame::read_page_with(path, None, buffers)?,
+            Self::Page(frame) => frame.clone(),
             Self::Array(frame) => frame,
         };
         let Some(bad) = bad else { return Ok(frame) };

@@ -12,6 +12,7 @@ mod errors;
 mod hints;
 mod image;
 mod interrupt;
+mod pages;
 mod pipeline;
 mod simulate;
 mod solved;
@@ -32,6 +33,8 @@ mod _starpipe {
     use super::detect::detect;
     #[pymodule_export]
     use super::image::check_size;
+    #[pymodule_export]
+    use super::pages::{Page, Pages, read_page};
     #[pymodule_export]
     use super::pipeline::Pipeline;
     #[pymodule_export]

@@ -9,6 +9,8 @@ __all__ = [
     "ArchivePlan",
     "DarkFrames",
     "Darks",
+    "Page",
+    "Pages",
     "PartRows",
     "Pipeline",
     "Simulated",
@@ -20,6 +22,7 @@ __all__ = [
     "defocus",
     "detect",
     "limit",
+    "read_page",
     "robustness",
     "simulate",
     "star_columns",
@@ -30,6 +33,7 @@ _Path: TypeAlias = str | PathLike[str]
 
 _Image: TypeAlias = (
     bytes
+    | Page
     | str
     | PathLike[str]
     | NDArray[np.uint8]
@@ -102,6 +106,17 @@ class ArchivePlan:
     def names(self) -> list[str]: ...
     @property
     def parts(self) -> list[tuple[str, int, int]]: ...
+
+@final
+class Page: ...
+
+@final
+class Pages:
+    def __new__(cls, content: bytes, name: str) -> Pages: ...
+    def __iter__(self) -> Pages: ...
+    def __next__(self) -> tuple[str, Page | Exception]: ...
+
+def read_page(content: bytes, name: str, number: int) -> Page: ...
 
 @final
 class PartRows:

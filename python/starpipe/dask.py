@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import fsspec
 
@@ -50,6 +50,7 @@ class _Job:
     max_stars: int | None
     attitude_only: bool
     read_ahead: int
+    page: int | Literal["all"] | None
 
 
 class Archive:
@@ -104,6 +105,7 @@ def process(
     storage_options: dict[str, Any] | None = None,
     read_ahead: int = 4,
     retries: int = 3,
+    page: int | Literal["all"] | None = None,
     sigma: float | None = None,
     max_stars: int | None = None,
     attitude_only: bool = False,
@@ -142,6 +144,9 @@ def process(
         Frames that a task fetches while it solves another.
     retries : int
         How often a part is tried again.
+    page : int or 'all', optional
+        Which image of a file with several, from 1; or all, which are named ``FRAME[1]`` and so on.
+        Without it the first.
     sigma, max_stars, attitude_only, fov, pixel_scale, near, radius, date, location, exposure
         As for `Pipeline.solve`.
     scale_error, zenith_distance, extinction, name_odds
@@ -183,6 +188,7 @@ def process(
         max_stars=None if max_stars is None else count(max_stars, "max_stars", 4),
         attitude_only=bool(attitude_only),
         read_ahead=count(read_ahead, "read_ahead", 1),
+        page=page if page is None or page == "all" else count(page, "page", 1),
     )
     stated = {
         "hints": job.hints,
@@ -190,6 +196,7 @@ def process(
         "sigma": job.sigma,
         "max_stars": job.max_stars,
         "attitude_only": job.attitude_only,
+        "page": None if job.page is None else str(job.page),
     }
     names = _list(frames, job.options)
     plan = _starpipe.archive_plan(
@@ -300,10 +307,12 @@ def _process_part(job: _Job, part: str, names: list[str]) -> dict[str, int]:
     rows = _starpipe.PartRows()
     counted: Counter[str] = Counter()
     with ThreadPoolExecutor(job.read_ahead, thread_name_prefix="starpipe-read") as pool:
-        for name, content in _ahead(pool, names, job):
+        for name, image in _images(_ahead(pool, names, job), job):
             try:
+                if isinstance(image, Exception):
+                    raise image
                 solved = pipeline.solve(
-                    content.result(),
+                    image,
                     name,
                     None,
                     job.hints,
@@ -325,6 +334,22 @@ def _process_part(job: _Job, part: str, names: list[str]) -> dict[str, int]:
     for table, file in ((TABLES[1], stars), (TABLES[0], frames)):
         _write(filesystem, f"{root}/{table}/{part}", file)
     return dict(counted)
+
+
+def _images(
+    contents: Iterator[tuple[str, Future[bytes]]], job: _Job
+) -> Iterator[tuple[str, bytes | _starpipe.Page | Exception]]:
+    """Return the images of the frames, each with its name, or why there is none."""
+    for name, content in contents:
+        try:
+            if job.page is None:
+                yield name, content.result()
+            elif job.page == "all":
+                yield from _starpipe.Pages(content.result(), name)
+            else:
+                yield name, _starpipe.read_page(content.result(), name, job.page)
+        except (*FINAL, ValueError) as error:
+            yield name, error
 
 
 def _ahead(

@@ -253,3 +253,22 @@ def test_frames_and_tables_in_an_object_store_that_fails(night, alone, tmp_path)
         f"s3://archive/night/{path.name}" for path in night.glob("*.tif")
     )
     assert (broken["frames"], dated["identified"]) == (1, FRAMES - 1)
+
+
+def test_all_images_of_a_mosaic_are_frames(program, tmp_path):
+    from astropy.io import fits
+
+    pixels = np.random.default_rng(1).poisson(100, (2, 60, 80)).astype(np.uint16)
+    images = [fits.ImageHDU(plane) for plane in pixels]
+    for image in images:
+        image.header["DATE-OBS"] = "2020-03-01T20:00:00"
+    fits.HDUList([fits.PrimaryHDU(), *images]).writeto(tmp_path / "mosaic.fits")
+    whole = (tmp_path / "mosaic.fits").read_bytes()
+    (tmp_path / "part.fits").write_bytes(whole[:-20000])
+    for page, frames in [("all", 3), (2, 2)]:
+        out, ours = tmp_path / f"program-{page}", tmp_path / f"dask-{page}"
+        command = [program, "process", tmp_path / "*.fits", "--out-parquet", out]
+        subprocess.run([*command, "--page", str(page)], capture_output=True)
+        sp.dask.process(str(tmp_path / "*.fits"), str(ours), page=page)
+        assert tables(ours) == tables(out)
+        assert len(pandas.read_parquet(ours / "frames.parquet")) == frames
