@@ -1,9 +1,8 @@
 //! A row of the table of frames.
 
-use super::columns::columns;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
-use crate::base::table::Column;
+use crate::base::table::{Column, columns};
 use crate::base::units::DEG_PER_RAD;
 use crate::pipeline::{Outcome, Solution};
 use crate::report::FrameReport;

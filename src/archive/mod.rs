@@ -12,7 +12,6 @@
 //!
 //! Both tables have VOTable metadata: unit, UCD and description of every column.
 
-mod columns;
 mod configuration;
 mod directory;
 mod error;

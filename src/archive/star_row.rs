@@ -1,7 +1,6 @@
 //! A row of the table of stars.
 
-use super::columns::columns;
-use crate::base::table::Column;
+use crate::base::table::{Column, columns};
 use crate::report::{FrameReport, StarReport};
 
 /// A detection, as the report of its frame has it.

@@ -101,3 +101,15 @@ macro_rules! column {
     }};
 }
 pub(crate) use column;
+
+/// The columns of the rows `$row`: field, unit, UCD, description.
+macro_rules! columns {
+    ($row:ty: $($field:ident, $unit:literal, $ucd:literal, $description:literal;)*) => {
+        vec![$($crate::base::table::column!($row, $field, $crate::base::table::Meaning {
+            unit: $unit,
+            ucd: $ucd,
+            description: $description,
+        })),*]
+    };
+}
+pub(crate) use columns;

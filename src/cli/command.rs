@@ -40,7 +40,7 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Find and identify the stars in frames (FITS, TIFF, PNG, JPEG, BMP, PGM)
-    Process(ProcessArgs),
+    Process(Box<ProcessArgs>),
     /// Tell how far process --out-parquet is, merge its tables, and report night by night
     Archive(ArchiveArgs),
     /// Identify the stars in lists of centroids (CSV)

@@ -156,7 +156,7 @@ pub struct StarRecord {
     /// Predicted detection probability.
     pub probability: Option<f64>,
     /// Signal-to-noise ratio of the matched filter at its position, without its own shot noise.
-    pub snr: Option<f64>,
+    pub predicted_snr: Option<f64>,
     /// Cramér-Rao bound of the standard error of x.
     pub bound_x_px: Option<f64>,
     /// Cramér-Rao bound of y.
@@ -166,17 +166,17 @@ pub struct StarRecord {
     /// Whether there is a star-like detection to which it contributes more than half of the light.
     pub detected: bool,
     /// Measured x.
-    pub x_px: Option<f64>,
+    pub x_centroid: Option<f64>,
     /// Measured y.
-    pub y_px: Option<f64>,
+    pub y_centroid: Option<f64>,
     /// Stated standard error of x.
-    pub sigma_x_px: Option<f64>,
+    pub x_centroid_err: Option<f64>,
     /// Stated standard error of y.
-    pub sigma_y_px: Option<f64>,
+    pub y_centroid_err: Option<f64>,
     /// Measured flux.
     pub flux_e: Option<f64>,
     /// Stated standard error of the flux.
-    pub sigma_flux_e: Option<f64>,
+    pub flux_e_err: Option<f64>,
     /// Whether it was named correctly.
     pub named: Named,
 }

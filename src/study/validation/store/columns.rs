@@ -1,6 +1,6 @@
 //! The columns of the tables, in their order: name, type and value.
 
-use crate::base::table::{Column, Meaning, column, field};
+use crate::base::table::{Column, columns, field};
 use crate::study::robustness::Answer;
 use crate::study::validation::record::{FrameRecord, Named, RowKind, StarRecord};
 use serde::{Serialize, de::DeserializeOwned};
@@ -32,29 +32,90 @@ field! {
     }.to_owned();
 }
 
-macro_rules! row {
-    ($record:ty, $table:literal: $($field:ident)*) => {
-        impl TableRow for $record {
-            const TABLE: &'static str = $table;
+impl TableRow for FrameRecord {
+    const TABLE: &'static str = "frames";
 
-            fn columns() -> Vec<Column<Self>> {
-                vec![$(column!(Self, $field, Meaning::default())),*]
-            }
+    fn columns() -> Vec<Column<Self>> {
+        columns! {
+            Self:
+            frame, "", "meta.id;meta.main", "number of the frame, from 0";
+            seed, "", "", "seed of the random numbers in its pixels";
+            ra_deg, "deg", "pos.eq.ra;meta.main", "true right ascension of the centre (ICRS)";
+            dec_deg, "deg", "pos.eq.dec;meta.main", "true declination of the centre (ICRS)";
+            up_pa_deg, "deg", "pos.posAng", "true position angle of the picture's up direction";
+            status, "", "meta.code.status", "right, wrong or none";
+            reason, "", "meta.code", "why it is not identified, as a code";
+            stars_above_limit, "", "meta.number", "true stars brighter than the predicted limit";
+            detected, "", "meta.number", "detections that look like stars";
+            rejected, "", "meta.number", "detections rejected as hot pixels, trails or extended light";
+            named, "", "meta.number", "detections with the name of a star";
+            misnamed, "", "meta.number", "named detections that are another star, or none";
+            misnamed_companions, "", "meta.number", "misnamed detections whose name is that of another star at the same position";
+            false_detections, "", "meta.number", "detections without the light of any star";
+            blends, "", "meta.number", "detections with the light of several stars, none of which gives more than half";
+            star_rows, "", "meta.number", "rows of the frame in the table of stars";
+            error_x_arcsec, "arcsec", "stat.error", "rotation about the x axis from the true to the measured attitude";
+            error_y_arcsec, "arcsec", "stat.error", "the same about the y axis";
+            error_roll_arcsec, "arcsec", "stat.error", "the same about the boresight";
+            sigma_x_arcsec, "arcsec", "stat.stdev", "standard error of the rotation about the x axis";
+            sigma_y_arcsec, "arcsec", "stat.stdev", "standard error of the rotation about the y axis";
+            sigma_roll_arcsec, "arcsec", "stat.stdev", "standard error of the rotation about the boresight";
+            nees, "", "stat.fit.chi2", "squared attitude error in units of its covariance, 3 on average if that is right";
+            focal_error_px, "pix", "stat.error", "measured minus true focal length";
+            focal_sigma_px, "pix", "stat.stdev", "standard error of the focal length";
+            rms_px, "pix", "stat.fit.residual", "RMS residual of the named stars";
+            faintest_vmag, "mag", "phot.mag;em.opt.V", "V magnitude of the faintest named star";
+            expected_faintest_vmag, "mag", "phot.mag;em.opt.V", "expected V magnitude of the faintest detected star";
+            expected_faintest_sigma_mag, "mag", "stat.stdev", "standard deviation of that magnitude by chance";
+            predicted_limit_vmag, "mag", "phot.mag;em.opt.V", "predicted V magnitude at which half of the stars are detected";
+            measured_limit_vmag, "mag", "phot.mag;em.opt.V", "the same, measured on the frame";
+            measured_limit_sigma_mag, "mag", "stat.stdev", "standard error of the measured limit";
+            background_adu, "adu", "instr.background", "measured median background";
+            true_background_adu, "adu", "instr.background", "true background";
+            noise_adu, "adu", "instr.det.noise", "measured noise of a pixel";
+            true_noise_adu, "adu", "instr.det.noise", "true noise of a pixel";
+            split, "", "meta.number", "true stars that were detected as several";
+            zero_point_error_mag, "mag", "stat.error", "measured minus true photometric zero point";
+            zero_point_sigma_mag, "mag", "stat.stdev", "standard error of the zero point";
+            linearity, "", "stat.fit.param", "instrumental magnitudes per magnitude of V; 1 is true";
+            linearity_sigma, "", "stat.stdev", "standard error of the linearity";
+            notes, "", "meta.note", "codes of what is odd about the frame";
         }
-    };
+    }
 }
 
-row!(FrameRecord, "frames":
-    frame seed ra_deg dec_deg up_pa_deg status reason stars_above_limit detected rejected named misnamed
-    misnamed_companions false_detections blends star_rows error_x_arcsec error_y_arcsec error_roll_arcsec sigma_x_arcsec sigma_y_arcsec
-    sigma_roll_arcsec nees focal_error_px focal_sigma_px rms_px faintest_vmag expected_faintest_vmag
-    expected_faintest_sigma_mag predicted_limit_vmag measured_limit_vmag measured_limit_sigma_mag background_adu
-    true_background_adu noise_adu true_noise_adu split zero_point_error_mag zero_point_sigma_mag
-    linearity linearity_sigma notes);
+impl TableRow for StarRecord {
+    const TABLE: &'static str = "stars";
 
-row!(StarRecord, "stars":
-    frame kind id vmag bv_mag true_x_px true_y_px true_flux_e isolated saturated probability snr bound_x_px bound_y_px
-    bound_flux_e detected x_px y_px sigma_x_px sigma_y_px flux_e sigma_flux_e named);
+    fn columns() -> Vec<Column<Self>> {
+        columns! {
+            Self:
+            frame, "", "meta.id", "number of the frame";
+            kind, "", "meta.code.class", "star, blend or false";
+            id, "", "meta.id;meta.main", "identifier in the catalogue";
+            vmag, "mag", "phot.mag;em.opt.V", "true Johnson V";
+            bv_mag, "mag", "phot.color;em.opt.B;em.opt.V", "true B-V";
+            true_x_px, "pix", "pos.cartesian.x;instr.det", "true place along the rows, from 0";
+            true_y_px, "pix", "pos.cartesian.y;instr.det", "true place along the columns, from 0";
+            true_flux_e, "electron", "phot.count", "expected electrons";
+            isolated, "", "meta.code", "entirely on the frame, and away from the light of other stars";
+            saturated, "", "meta.code.qual", "the brightest pixel may be saturated";
+            probability, "", "stat.probability", "predicted probability of detection";
+            predicted_snr, "", "stat.snr", "signal-to-noise ratio of the matched filter there, without the star's own shot noise";
+            bound_x_px, "pix", "stat.error;pos.cartesian.x", "Cramer-Rao bound of x_centroid_err";
+            bound_y_px, "pix", "stat.error;pos.cartesian.y", "Cramer-Rao bound of y_centroid_err";
+            bound_flux_e, "electron", "stat.error;phot.count", "Cramer-Rao bound of flux_e_err";
+            detected, "", "meta.code", "a detection has more than half of its light from this star";
+            x_centroid, "pix", "pos.cartesian.x;instr.det", "centroid along the rows, from 0";
+            y_centroid, "pix", "pos.cartesian.y;instr.det", "centroid along the columns, from 0";
+            x_centroid_err, "pix", "stat.error;pos.cartesian.x", "standard error of x_centroid";
+            y_centroid_err, "pix", "stat.error;pos.cartesian.y", "standard error of y_centroid";
+            flux_e, "electron", "phot.count", "measured flux";
+            flux_e_err, "electron", "stat.error;phot.count", "standard error of flux_e";
+            named, "", "meta.code", "right, wrong or no";
+        }
+    }
+}
 
 #[cfg(test)]
 mod tests {

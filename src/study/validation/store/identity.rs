@@ -15,7 +15,7 @@ use std::path::Path;
 
 const FILE: &str = "run.json";
 /// Version of the tables and of `run.json`.
-const SCHEMA: u32 = 2;
+const SCHEMA: u32 = 3;
 /// Files that a run writes.
 const TABLES: [&str; 4] = ["frames.csv", "stars.csv", "frames.parquet", "stars.parquet"];
 

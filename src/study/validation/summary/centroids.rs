@@ -74,7 +74,8 @@ pub(super) struct Centroids {
 impl Centroids {
     /// Adds a star with its errors in x, y and flux.
     pub(super) fn add(&mut self, row: &StarRecord, errors: [Option<f64>; 3], is_sure: bool) {
-        let ([Some(dx), Some(dy), Some(flux_error_e)], Some(snr)) = (errors, row.snr) else {
+        let ([Some(dx), Some(dy), Some(flux_error_e)], Some(snr)) = (errors, row.predicted_snr)
+        else {
             return;
         };
         let bin = ((snr / FIRST_SNR).log2() * BINS_PER_OCTAVE).floor();
@@ -91,7 +92,7 @@ impl Centroids {
         sums.snr += snr;
         sums.errors_px2 += dx * dx + dy * dy;
         sums.bounds_px2 += squared(row.bound_x_px) + squared(row.bound_y_px);
-        sums.stated_px2 += squared(row.sigma_x_px) + squared(row.sigma_y_px);
+        sums.stated_px2 += squared(row.x_centroid_err) + squared(row.y_centroid_err);
         sums.flux_part += 1.0 + flux_error_e / row.true_flux_e.unwrap_or(f64::NAN);
         sums.flux_errors_e2 += flux_error_e * flux_error_e;
         sums.flux_bounds_e2 += squared(row.bound_flux_e);
