@@ -4,6 +4,7 @@
 
 mod common;
 
+use common::disk::SmallDisk;
 use common::{Ran, fixture, starpipe};
 use std::collections::BTreeMap;
 use std::fs;
@@ -289,4 +290,76 @@ fn each_image_of_a_mosaic_is_a_row() {
     assert_eq!(names, expected);
     // All images and the first are other frames.
     assert_eq!(run(directory, &arguments).status, 2);
+}
+
+#[test]
+fn two_runs_at_once_into_one_directory_write_what_one_writes() {
+    let night = night(9);
+    let night = night.path();
+    process(night, "alone", &[]);
+    std::thread::scope(|scope| {
+        for _ in 0..3 {
+            scope.spawn(|| {
+                // Who finds all parts written has read no frame.
+                let ran = process(night, "both", &[]);
+                assert!(ran.status <= 1, "{}", ran.stderr);
+            });
+        }
+    });
+    assert!(files(&night.join("both")) == files(&night.join("alone")));
+}
+
+#[test]
+fn a_full_disk_is_told_and_the_run_goes_on_later() {
+    let Some(disk) = SmallDisk::new("size=60k") else {
+        return;
+    };
+    let night = night(7);
+    let night = night.path();
+    process(night, "alone", &[]);
+    let out = disk.path().join("out");
+    let refused = process(night, out.to_str().unwrap(), &[]);
+    assert_eq!(refused.status, 1, "{}", refused.stderr);
+    let told = refused.stderr.lines().last().unwrap();
+    assert!(told.contains("No space left"), "{told}");
+    disk.enlarge("size=10m");
+    let ran = process(night, out.to_str().unwrap(), &[]);
+    assert_eq!(ran.status, 1, "{}", ran.stderr);
+    assert!(files(&out) == files(&night.join("alone")));
+}
+
+#[test]
+fn status_lists_the_first_of_many_frames_that_could_not_be_read() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let names: Vec<String> = (10..33)
+        .map(|number| format!("none-{number}.tif\n"))
+        .collect();
+    fs::write(directory.join("frames.txt"), names.concat()).unwrap();
+    let list = [
+        "process",
+        "frames.txt",
+        "--out-parquet",
+        "out",
+        "--frames-per-part",
+        "1",
+    ];
+    run(directory, &[&list[..], &["--shard", "1/2"]].concat());
+    let status = run(directory, &["archive", "status", "out"]).stdout;
+    let lines: Vec<&str> = status.lines().collect();
+    assert_eq!(
+        lines[..4],
+        [
+            "parts      12 of 23",
+            "files      12 of 23",
+            "frames     12: 0 identified, 0 not identified, 12 unread",
+            "missing    parts 1 3 5 7 9 11 13 15 17 19 21",
+        ]
+    );
+    assert_eq!(lines.len(), 4 + 10 + 1);
+    assert_eq!(lines[14], "unread     2 more, which --format csv lists");
+    run(directory, &[&list[..], &["--shard", "1/1"]].concat());
+    fs::remove_dir_all(directory.join("out/frames.parquet")).unwrap();
+    let status = run(directory, &["archive", "status", "out"]).stdout;
+    assert!(status.contains("missing    parts 0-22\n"), "{status}");
 }

@@ -4,6 +4,7 @@
 
 mod common;
 
+use common::disk::SmallDisk;
 use common::{Ran, fixture, names, number, shared_dir, starpipe};
 use image::{GrayImage, Luma};
 use std::fs;
@@ -18,40 +19,6 @@ fn process(out: &Path, frame: &Path) -> Ran {
     let mut command = starpipe();
     command.args(["process", "--format", "json", "--out"]);
     Ran::new(command.args([out, frame]))
-}
-
-/// A file system in memory of limited size, unmounted on drop.
-struct SmallDisk {
-    place: tempfile::TempDir,
-}
-
-impl SmallDisk {
-    /// `None`, saying so, where mounting is not allowed.
-    fn new(options: &str) -> Option<Self> {
-        let place = tempfile::tempdir().unwrap();
-        let mut mount = Command::new("mount");
-        mount
-            .args(["-t", "tmpfs", "-o", options, "none"])
-            .arg(place.path());
-        match mount.output() {
-            Ok(done) if done.status.success() => Some(Self { place }),
-            _ => {
-                eprintln!("skipped: no file system can be mounted here");
-                None
-            }
-        }
-    }
-
-    fn path(&self) -> &Path {
-        self.place.path()
-    }
-}
-
-impl Drop for SmallDisk {
-    fn drop(&mut self) {
-        // Best effort: leftovers are in a temporary directory.
-        let _ = Command::new("umount").arg(self.path()).status();
-    }
 }
 
 #[test]

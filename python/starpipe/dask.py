@@ -7,6 +7,7 @@ never done again, so a run that was ended goes on where it was.
 
 from __future__ import annotations
 
+import contextlib
 import glob
 import json
 import os
@@ -33,7 +34,13 @@ TABLES = ("frames.parquet", "stars.parquet")
 TRIES = 5
 """How often an object is fetched or written before a task fails."""
 
-FINAL = (FileNotFoundError, PermissionError, IsADirectoryError, NotImplementedError)
+FINAL = (
+    FileExistsError,
+    FileNotFoundError,
+    PermissionError,
+    IsADirectoryError,
+    NotImplementedError,
+)
 """Errors that another try does not mend."""
 
 
@@ -225,7 +232,11 @@ def _list(frames: str | Iterable[str], options: dict[str, Any]) -> list[str]:
         found = glob.glob(pattern, recursive=True)
         return [name for name in found if not os.path.isdir(name)]
     filesystem, path = fsspec.url_to_fs(pattern, **options)
-    return [filesystem.unstrip_protocol(name) for name in filesystem.glob(path)]
+    found = _again(lambda: filesystem.glob(path))
+    bucket = path.split("/")[0]
+    if not found and bucket and not _again(lambda: filesystem.exists(bucket)):
+        raise FileNotFoundError(f"there is no {filesystem.unstrip_protocol(bucket)}")
+    return [filesystem.unstrip_protocol(name) for name in found]
 
 
 def _claim(job: _Job, plan: _starpipe.ArchivePlan) -> None:
@@ -236,13 +247,15 @@ def _claim(job: _Job, plan: _starpipe.ArchivePlan) -> None:
         for table in TABLES:
             if _again(lambda table=table: filesystem.exists(f"{root}/{table}")):  # type: ignore[misc]
                 raise ValueError(f"{job.out} has {table} and no archive.json: it is no archive")
-        _write(filesystem, f"{root}/inputs.txt", ("\n".join(plan.names) + "\n").encode())
-        _write(filesystem, path, plan.identity.encode())
+        _write(filesystem, path, plan.identity.encode(), is_new=True)
     found = _again(lambda: filesystem.cat_file(path)).decode()
     differences = _starpipe.archive_differences(found, plan.identity)
     if differences:
         told = ", ".join(differences)
         raise ValueError(f"{job.out} holds another run: {told}; choose another output")
+    inputs = f"{root}/inputs.txt"
+    if not _again(lambda: filesystem.exists(inputs)):
+        _write(filesystem, inputs, ("\n".join(plan.names) + "\n").encode())
 
 
 def _written(out: str, options: dict[str, Any]) -> set[str]:
@@ -385,17 +398,25 @@ def _again(work: Callable[[], Any]) -> Any:
             return work()
         except FINAL:
             raise
-        except Exception:
+        except Exception as error:
             if attempt + 1 == TRIES:
-                raise
+                if isinstance(error, OSError):
+                    raise
+                # Stores have exceptions of their own.
+                raise OSError(f"{type(error).__name__}: {error}") from error
             time.sleep(0.1 * 2**attempt)
     raise AssertionError("every try returns or raises")
 
 
-def _write(filesystem: Any, path: str, content: bytes) -> None:
-    """Write a file whole or not at all: object stores do so, elsewhere it is renamed."""
+def _write(filesystem: Any, path: str, content: bytes, is_new: bool = False) -> None:
+    """Write a file whole or not at all: object stores do so, elsewhere it is renamed.
+
+    A file that is to be new is left as it is where another process was faster.
+    """
     if "file" not in filesystem.protocol:
-        _again(lambda: filesystem.pipe_file(path, content))
+        mode = "create" if is_new else "overwrite"
+        with contextlib.suppress(FileExistsError):
+            _again(lambda: filesystem.pipe_file(path, content, mode=mode))
         return
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -406,10 +427,14 @@ def _write(filesystem: Any, path: str, content: bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         os.chmod(temporary, 0o644)
-        os.replace(temporary, target)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+        if is_new:
+            with contextlib.suppress(FileExistsError):
+                os.link(temporary, target)
+        else:
+            os.replace(temporary, target)
+    finally:
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(temporary)
 
 
 _pipelines: dict[tuple[str | None, bytes | None], _starpipe.Pipeline] = {}

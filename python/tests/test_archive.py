@@ -214,10 +214,11 @@ class Faults:
         return response
 
 
-def test_frames_and_tables_in_an_object_store_that_fails(night, alone, tmp_path):
+@pytest.fixture(scope="module")
+def store():
+    """Return options of an object store that fails now and then, and its count of requests."""
     pytest.importorskip("moto")
-    s3fs = pytest.importorskip("s3fs")
-    from distributed import Client
+    pytest.importorskip("s3fs")
     from moto.server import DomainDispatcherApplication, create_backend_app
     from werkzeug.serving import make_server
 
@@ -230,29 +231,101 @@ def test_frames_and_tables_in_an_object_store_that_fails(night, alone, tmp_path)
         "secret": "test",
         "client_kwargs": {"endpoint_url": f"http://127.0.0.1:{server.server_port}"},
     }
-    try:
-        store = s3fs.S3FileSystem(**options)
-        store.mkdir("archive")
-        for path in night.glob("*.tif"):
-            store.pipe_file(f"archive/night/{path.name}", path.read_bytes())
-        with cluster(2) as workers, Client(workers) as client:
-            archive = sp.dask.process(
-                "s3://archive/night/*.tif",
-                "s3://archive/results",
-                frames_per_part=PER_PART,
-                client=client,
-                storage_options=options,
-            )
-            frames = archive.frames().compute()
-        assert faults.requests > 60
-        broken, dated = archive.summary()
-    finally:
-        server.shutdown()
-        thread.join()
+    yield options, faults
+    server.shutdown()
+    thread.join()
+
+
+def test_frames_and_tables_in_an_object_store_that_fails(night, store):
+    import s3fs
+    from distributed import Client
+
+    options, faults = store
+    filesystem = s3fs.S3FileSystem(**options)
+    filesystem.mkdir("archive")
+    for path in night.glob("*.tif"):
+        filesystem.pipe_file(f"archive/night/{path.name}", path.read_bytes())
+    before = faults.requests
+    with cluster(2) as workers, Client(workers) as client:
+        archive = sp.dask.process(
+            "s3://archive/night/*.tif",
+            "s3://archive/results",
+            frames_per_part=PER_PART,
+            client=client,
+            storage_options=options,
+        )
+        frames = archive.frames().compute()
+    assert faults.requests > before + 60
+    broken, dated = archive.summary()
     assert sorted(frames["frame"]) == sorted(
         f"s3://archive/night/{path.name}" for path in night.glob("*.tif")
     )
     assert (broken["frames"], dated["identified"]) == (1, FRAMES - 1)
+
+
+def test_what_a_store_refuses_is_told(night, store, tmp_path, monkeypatch):
+    options, _ = store
+    frames = str(night / "*.tif")
+    with pytest.raises(FileNotFoundError, match="there is no s3://none"):
+        sp.dask.process("s3://none/*.tif", str(tmp_path / "out"), storage_options=options)
+    with pytest.raises(FileNotFoundError, match="bucket does not exist"):
+        sp.dask.process(frames, "s3://none/results", storage_options=options)
+    closed = {"endpoint_url": "http://127.0.0.1:1"}
+    with pytest.raises(OSError, match=r"http://127\.0\.0\.1:1"):
+        sp.dask.process(
+            frames, "s3://archive/other", storage_options=options | {"client_kwargs": closed}
+        )
+    for name in [name for name in os.environ if name.startswith("AWS_")]:
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("AWS_EC2_METADATA_DISABLED", "true")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    nobody = {"client_kwargs": options["client_kwargs"]}
+    with pytest.raises(OSError, match=r"[Cc]redentials"):
+        sp.dask.process("s3://archive/*.tif", str(tmp_path / "out"), storage_options=nobody)
+
+
+def test_an_output_is_of_who_came_first(store, tmp_path):
+    from starpipe.dask import _open, _write
+
+    options, _ = store
+    _open("s3://first", options)[0].mkdir("first")
+    for out, used in [("s3://first", options), (str(tmp_path), {})]:
+        filesystem, root = _open(out, used)
+        for content in (b"first", b"second"):
+            _write(filesystem, f"{root}/archive.json", content, is_new=True)
+        assert filesystem.cat_file(f"{root}/archive.json") == b"first"
+    assert [path.name for path in tmp_path.iterdir()] == ["archive.json"]
+
+
+def test_two_runs_at_once_into_one_output_do_no_harm(night, alone, tmp_path):
+    out = str(tmp_path / "out")
+
+    def run():
+        sp.dask.process(str(night / "*.tif"), out, frames_per_part=PER_PART)
+
+    runs = [threading.Thread(target=run) for _ in range(2)]
+    for each in runs:
+        each.start()
+    for each in runs:
+        each.join()
+    assert tables(tmp_path / "out") == tables(alone)
+
+
+def test_a_full_disk_is_told_and_the_run_goes_on_later(night, alone, tmp_path):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=100k", "none", disk]
+    if not shutil.which("mount") or subprocess.run(mount, capture_output=True).returncode != 0:
+        pytest.skip("no file system can be mounted here")
+    arguments = (str(night / "*.tif"), str(disk / "out"))
+    try:
+        with pytest.raises(OSError, match="No space left"):
+            sp.dask.process(*arguments, frames_per_part=PER_PART)
+        subprocess.run(["mount", "-o", "remount,size=10m", disk], check=True)
+        sp.dask.process(*arguments, frames_per_part=PER_PART)
+        assert tables(disk / "out") == tables(alone)
+    finally:
+        subprocess.run(["umount", disk], check=True)
 
 
 def test_all_images_of_a_mosaic_are_frames(program, tmp_path):

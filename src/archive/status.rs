@@ -15,10 +15,12 @@ pub struct Status {
     pub parts_done: usize,
     /// Numbers of the parts that are missing, from 0.
     pub missing_parts: Vec<usize>,
-    /// Frames in all.
+    /// Files in all.
+    pub files: usize,
+    /// Files in the parts that are written.
+    pub files_done: usize,
+    /// Frames in those parts; a file may have several.
     pub frames: usize,
-    /// Frames in the parts that are written.
-    pub frames_done: usize,
     /// Identified frames.
     pub identified: usize,
     /// Frames that are not identified.
@@ -51,7 +53,7 @@ pub fn status(archive: &Archive) -> Result<Status, ArchiveError> {
     let plan = archive.plan();
     let mut status = Status {
         parts: plan.parts().len(),
-        frames: plan.names().len(),
+        files: plan.names().len(),
         ..Status::default()
     };
     for part in plan.parts() {
@@ -60,10 +62,11 @@ pub fn status(archive: &Archive) -> Result<Status, ArchiveError> {
             continue;
         }
         status.parts_done += 1;
+        status.files_done += part.names.len();
         let columns = ["frame", "status", "reason"];
         let path = archive.frames_of(&part);
         let read = for_each_row(open(&path)?, &columns, |row| {
-            status.frames_done += 1;
+            status.frames += 1;
             match text(row, "status") {
                 "identified" => status.identified += 1,
                 UNREAD => {

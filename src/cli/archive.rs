@@ -61,6 +61,9 @@ struct ReportArgs {
     format: Format,
 }
 
+/// Frames that could not be read of which the text for people tells.
+const UNREAD_SHOWN: usize = 10;
+
 /// `starpipe archive`
 pub(crate) fn archive(arguments: &ArchiveArgs) -> Result<Outcome, CommandError> {
     match &arguments.command {
@@ -87,24 +90,38 @@ fn tell_status(arguments: &StatusArgs) -> Result<Outcome, CommandError> {
 
 fn status_text(status: &Status) -> String {
     let mut text = format!(
-        "parts      {} of {}\nframes     {} of {}: {} identified, {} not identified, {} unread\n",
+        "parts      {} of {}\nfiles      {} of {}\nframes     {}: {} identified, {} not identified, {} unread\n",
         status.parts_done,
         status.parts,
-        status.frames_done,
+        status.files_done,
+        status.files,
         status.frames,
         status.identified,
         status.not_identified,
         status.unread.len()
     );
     if !status.is_complete() {
-        let missing: Vec<String> = status.missing_parts.iter().map(usize::to_string).collect();
-        let _ = writeln!(text, "missing    parts {}", missing.join(" "));
+        let _ = writeln!(text, "missing    parts {}", ranges(&status.missing_parts));
     }
-    for unread in &status.unread {
+    for unread in status.unread.iter().take(UNREAD_SHOWN) {
         let (frame, reason) = (printable(&unread.frame), printable(&unread.reason));
         let _ = writeln!(text, "unread     {frame}: {reason}");
     }
+    if status.unread.len() > UNREAD_SHOWN {
+        let more = status.unread.len() - UNREAD_SHOWN;
+        let _ = writeln!(text, "unread     {more} more, which --format csv lists");
+    }
     text
+}
+
+/// Ascending numbers as `0-4 7`.
+fn ranges(numbers: &[usize]) -> String {
+    let runs = numbers.chunk_by(|one, next| one + 1 == *next);
+    let texts = runs.map(|run| match run {
+        [first, .., last] => format!("{first}-{last}"),
+        _ => run.iter().map(usize::to_string).collect(),
+    });
+    texts.collect::<Vec<_>>().join(" ")
 }
 
 fn merge_tables(arguments: &MergeArgs) -> Result<Outcome, CommandError> {
