@@ -332,3 +332,37 @@ fn concurrent_runs_share_an_empty_cache() {
     }
     assert_eq!(names(cache.path()).len(), 1, "one index, and no rest");
 }
+
+// ---- Limits
+
+#[test]
+fn a_frame_that_takes_too_long_is_told() {
+    let frame = fixture("orion/orion.png");
+    let limited = |command: &str, input: &Path| {
+        Ran::new(
+            starpipe()
+                .args([command, "--format", "json", "--time-limit", "1e-9"])
+                .arg(input),
+        )
+    };
+    let ran = limited("process", &frame);
+    assert_eq!(ran.status, 1);
+    assert!(ran.stderr.contains("time limit"), "{}", ran.stderr);
+
+    let out = tempfile::tempdir().unwrap();
+    let table = starpipe()
+        .args(["process", "--format", "csv"])
+        .arg(&frame)
+        .output()
+        .unwrap();
+    let list = out.path().join("orion.csv");
+    fs::write(&list, table.stdout).unwrap();
+    let ran = limited("identify", &list);
+    assert_eq!((ran.status, ran.stderr.as_str()), (3, ""));
+    let report = &ran.reports()[0];
+    assert_eq!(report["reason_code"], "interrupted");
+    assert!(
+        report["reason"].as_str().unwrap().contains("time limit"),
+        "{report}"
+    );
+}

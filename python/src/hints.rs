@@ -21,6 +21,7 @@ pub struct Hints {
     pub zenith_distance_deg: Option<f64>,
     pub extinction: Option<f64>,
     pub name_odds: f64,
+    pub time_limit_s: Option<f64>,
 }
 
 /// Default of `scale_error`, in percent.
@@ -45,6 +46,7 @@ impl Hints {
             zenith_distance_deg: self.zenith_distance_deg,
             extinction_mag: self.extinction,
             name_odds: self.name_odds,
+            time_limit_s: self.time_limit_s,
             ..Configuration::default()
         })
     }

@@ -21,6 +21,7 @@ use starpipe::{
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
+use std::time::Duration;
 
 /// Solves frames. It may be used by several threads at once.
 #[pyclass(frozen, module = "starpipe._starpipe")]
@@ -136,6 +137,9 @@ impl Pipeline {
                 extinction: hints.extinction.map(Extinction::MagPerAirmass),
             }),
             attitude_only,
+            time_limit: hints
+                .time_limit_s
+                .and_then(|limit| Duration::try_from_secs_f64(limit).ok()),
             ..Context::new(self.indexed)
         })
     }
@@ -166,12 +170,10 @@ impl Pipeline {
         // In a child process the lock may be held by a thread that does not exist there.
         let kept = self.workspaces.try_lock();
         let kept = kept.ok().and_then(|mut kept| kept.pop());
-        let workspace = kept.unwrap_or_default().until(interrupt);
-        Workspace {
-            detect: workspace.detect.on_threads(threads),
-            identify: workspace.identify.with_name_odds(name_odds),
-            ..workspace
-        }
+        let mut workspace = kept.unwrap_or_default();
+        workspace.detect = workspace.detect.on_threads(threads);
+        workspace.identify = workspace.identify.with_name_odds(name_odds);
+        workspace.until(interrupt)
     }
 
     fn keep(&self, workspace: Workspace) {

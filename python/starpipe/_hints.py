@@ -138,6 +138,7 @@ def hints(
     zenith_distance: Any = None,
     extinction: Any = None,
     name_odds: float = NAME_ODDS,
+    time_limit: Any = None,
 ) -> dict[str, Any]:
     """Return what the compiled part takes; a header completes what is not known."""
     if fov is not None and pixel_scale is not None:
@@ -155,4 +156,5 @@ def hints(
         "zenith_distance_deg": within(zenith_distance, "deg", "zenith_distance", 0.0, 89.999),
         "extinction": within(extinction, "mag", "extinction", 0.0, 10.0),
         "name_odds": within(name_odds, "", "name_odds", 1.0),
+        "time_limit_s": positive(time_limit, "s", "time_limit"),
     }

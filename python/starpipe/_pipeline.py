@@ -82,6 +82,7 @@ class Pipeline:
         zenith_distance: Any = None,
         extinction: Any = None,
         name_odds: float = NAME_ODDS,
+        time_limit: Any = None,
     ) -> Result:
         """Solve one frame.
 
@@ -123,6 +124,8 @@ class Pipeline:
             Extinction in magnitudes per airmass, for the same.
         name_odds : float
             A star is named where the odds are at least this many to 1 that the name is right.
+        time_limit : Quantity or float, optional
+            How long the frame may take, in seconds.
 
         Returns
         -------
@@ -154,6 +157,7 @@ class Pipeline:
                 zenith_distance=zenith_distance,
                 extinction=extinction,
                 name_odds=name_odds,
+                time_limit=time_limit,
             ),
             None if dark is None else Image(dark, "dark").pixels,
             None if flat is None else Image(flat, "flat").pixels,

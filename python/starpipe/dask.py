@@ -110,7 +110,7 @@ def process(
     camera: str | None = None,
     frames_per_part: int = 500,
     storage_options: dict[str, Any] | None = None,
-    read_ahead: int = 4,
+    read_ahead: int = 16,
     retries: int = 3,
     page: int | Literal["all"] | None = None,
     sigma: float | None = None,
@@ -127,6 +127,7 @@ def process(
     zenith_distance: Any = None,
     extinction: Any = None,
     name_odds: float = NAME_ODDS,
+    time_limit: Any = 10.0,
 ) -> Archive:
     """Solve the frames of an archive, and write tables of frames and stars.
 
@@ -148,7 +149,7 @@ def process(
     storage_options : dict, optional
         Options of fsspec, for frames and output.
     read_ahead : int
-        Frames that a task fetches while it solves another.
+        Frames that a task fetches while it solves another. An object store takes some 50 ms for each.
     retries : int
         How often a part is tried again.
     page : int or 'all', optional
@@ -156,7 +157,7 @@ def process(
         Without it the first.
     sigma, max_stars, attitude_only, fov, pixel_scale, near, radius, date, location, exposure
         As for `Pipeline.solve`.
-    scale_error, zenith_distance, extinction, name_odds
+    scale_error, zenith_distance, extinction, name_odds, time_limit
         As for `Pipeline.solve`.
 
     Returns
@@ -190,6 +191,7 @@ def process(
             zenith_distance=zenith_distance,
             extinction=extinction,
             name_odds=name_odds,
+            time_limit=time_limit,
         ),
         sigma=positive(sigma, "", "sigma"),
         max_stars=None if max_stars is None else count(max_stars, "max_stars", 4),

@@ -33,6 +33,7 @@ pub struct Configuration {
     pub extinction_mag: Option<f64>,
     pub name_odds: f64,
     pub attitude_only: bool,
+    pub time_limit_s: Option<f64>,
     pub page: Option<String>,
 }
 

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Tells long work whether to end. It is asked every few milliseconds, from any thread.
 #[derive(Clone, Default)]
@@ -16,6 +17,13 @@ impl Interrupt {
     /// Ends the work as soon as `is_due` returns true. It must not return false again.
     pub fn when(is_due: impl Fn() -> bool + Send + Sync + 'static) -> Self {
         Self(Some(Arc::new(is_due)))
+    }
+
+    /// Ends the work at `deadline`, too.
+    #[must_use]
+    pub fn or_at(&self, deadline: Instant) -> Self {
+        let this = self.clone();
+        Self::when(move || this.is_due() || Instant::now() >= deadline)
     }
 
     /// Whether to end now.

@@ -47,6 +47,8 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Outcome, CommandError>
     stdin::check_once(&lists)?;
     let plan = Plan {
         priors: solving.hints.resolve_with_camera()?,
+        attitude_only: solving.attitude_only,
+        time_limit: solving.time_limit(),
         ..Plan::default()
     };
     let options = ListOptions {

@@ -27,7 +27,7 @@ pub enum DetectError {
         found: usize,
     },
     /// The work was ended early.
-    #[error(transparent)]
+    #[error("not done within the time limit of a frame (--time-limit)")]
     Interrupted(#[from] Interrupted),
     /// An option is out of range.
     #[error("{name} is {found}, expected {expected}")]

@@ -12,7 +12,7 @@ pub struct Workspace {
     pub(crate) background: FrameBackground,
     pub(crate) search: FrameSearch,
     pub(crate) measure: MeasureBuffers,
-    pub(crate) interrupt: Interrupt,
+    pub(super) interrupt: Interrupt,
 }
 
 impl Workspace {
@@ -44,6 +44,11 @@ impl Workspace {
     #[must_use]
     pub fn until(self, interrupt: Interrupt) -> Self {
         Self { interrupt, ..self }
+    }
+
+    /// [`until`](Self::until), from the next frame on.
+    pub(crate) fn set_interrupt(&mut self, interrupt: Interrupt) {
+        self.interrupt = interrupt;
     }
 }
 

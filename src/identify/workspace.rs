@@ -84,8 +84,13 @@ impl Workspace {
     /// Searches end with [`SearchFailure::Interrupted`] when `interrupt` is due.
     #[must_use]
     pub fn until(mut self, interrupt: Interrupt) -> Self {
-        self.buffers.interrupt = interrupt;
+        self.set_interrupt(interrupt);
         self
+    }
+
+    /// [`until`](Self::until), from the next field on.
+    pub(crate) fn set_interrupt(&mut self, interrupt: Interrupt) {
+        self.buffers.interrupt = interrupt;
     }
 
     /// Identifies the stars of `field`: [`point`](Self::point), then

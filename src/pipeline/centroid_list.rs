@@ -85,6 +85,7 @@ pub fn solve_centroids(
     workspace: &mut Workspace,
 ) -> Solution {
     let mut clock = Stopwatch::start();
+    workspace.set_deadline(clock.deadline(context.time_limit));
     let priors = &context.priors;
     let mut list = list.clone();
     list.centroids.sort_by(|a, b| a.mag.total_cmp(&b.mag));

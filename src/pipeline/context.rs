@@ -8,6 +8,10 @@ use crate::frame::{self, Frame};
 use crate::identify::{self, DateSource, IndexedCatalog, Priors, ScalePrior};
 use crate::photometry::comparison::StatedCamera;
 use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// How long a frame may take by default where many are solved, in seconds.
+pub const DEFAULT_TIME_LIMIT_S: f64 = 10.0;
 
 /// What the stages need and what does not change from frame to frame.
 #[derive(Clone)]
@@ -25,6 +29,8 @@ pub struct Context<'a> {
     /// Whether to stop at attitude and optics, from the brightest stars: no other star is named, and
     /// nothing is measured that needs the names.
     pub attitude_only: bool,
+    /// How long a frame may take, from where its reading begins.
+    pub time_limit: Option<Duration>,
 }
 
 impl<'a> Context<'a> {
@@ -37,6 +43,7 @@ impl<'a> Context<'a> {
             camera: None,
             calibration: None,
             attitude_only: false,
+            time_limit: None,
         }
     }
 
@@ -94,6 +101,7 @@ pub struct Workspace {
     pub detect: detect::Workspace,
     /// For identification.
     pub identify: identify::Workspace,
+    interrupt: Interrupt,
 }
 
 impl Workspace {
@@ -102,15 +110,26 @@ impl Workspace {
         Self::default()
     }
 
-    /// Work on a frame ends early when `interrupt` is due: while stars are detected, with an error;
-    /// later, with the frame not identified.
+    /// Work on a frame ends early when `interrupt` is due, or [`Context::time_limit`] is reached:
+    /// while stars are detected, with an error; later, with the frame not identified.
     #[must_use]
     pub fn until(self, interrupt: &Interrupt) -> Self {
         Self {
             detect: self.detect.until(interrupt.clone()),
             identify: self.identify.until(interrupt.clone()),
+            interrupt: interrupt.clone(),
             ..self
         }
+    }
+
+    /// Ends the work on one frame at `deadline`, too.
+    pub(super) fn set_deadline(&mut self, deadline: Option<Instant>) {
+        let interrupt = match deadline {
+            Some(deadline) => self.interrupt.or_at(deadline),
+            None => self.interrupt.clone(),
+        };
+        self.detect.set_interrupt(interrupt.clone());
+        self.identify.set_interrupt(interrupt);
     }
 }
 

@@ -27,7 +27,7 @@ mod stopwatch;
 pub use body_in_frame::BodyInFrame;
 pub use bright_stars::MissingStar;
 pub use centroid_list::{CentroidList, LISTED_SIGMA_PX, ListedCentroid, solve_centroids};
-pub use context::{Context, Workspace};
+pub use context::{Context, DEFAULT_TIME_LIMIT_S, Workspace};
 pub use error::Error;
 pub use identification::star_field;
 pub use note::Note;

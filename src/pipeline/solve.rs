@@ -102,6 +102,7 @@ fn solve(
     workspace: &mut Workspace,
 ) -> Result<Solution, DetectError> {
     let (frame, mut clock) = (input.frame, input.clock);
+    workspace.set_deadline(clock.deadline(context.time_limit));
     let priors = context.priors_of(frame, input.name);
 
     let config = context.detect_config(frame);

@@ -1,6 +1,6 @@
 //! Times the stages.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Time that each stage took, in milliseconds; 0 for a stage that was not needed.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -48,6 +48,11 @@ impl Stopwatch {
             lap_start: now,
             timing: Timing::default(),
         }
+    }
+
+    /// When a frame must be done that may take this long; never, if that is too far to tell.
+    pub(super) fn deadline(&self, limit: Option<Duration>) -> Option<Instant> {
+        self.start.checked_add(limit?)
     }
 
     /// Ends a stage; the next one begins. The times of a stage that comes again are added up. Pointing

@@ -20,7 +20,9 @@ fn failure_text(failure: &SearchFailure, solution: &Solution) -> String {
         SearchFailure::NoMatch {
             best_log10_false_alarm,
         } => no_match(*best_log10_false_alarm, solution),
-        SearchFailure::Interrupted => "the search was ended before it was done".to_owned(),
+        SearchFailure::Interrupted => {
+            "there was no answer within the time limit of a frame (--time-limit)".to_owned()
+        }
     }
 }
 

@@ -142,6 +142,8 @@ impl ProcessArgs {
             },
             calibration: self.calibration.read(sheet.as_ref())?,
             camera: sheet.map(|sheet| self.exposure.stated_camera(sheet)),
+            attitude_only: self.solving.attitude_only,
+            time_limit: self.solving.time_limit(),
         })
     }
 }

@@ -63,6 +63,7 @@ pub(super) fn configuration(
         extinction_mag: *extinction,
         name_odds: arguments.solving.name_odds,
         attitude_only: arguments.solving.attitude_only,
+        time_limit_s: Some(arguments.solving.time_limit_s),
         page: arguments.page.map(String::from),
     })
 }

@@ -33,7 +33,7 @@ pub(super) fn process_parts(
         let archive = Archive::claim(directory, plan, &configuration).map_err(claim_error)?;
         let worker = Worker {
             pool,
-            context: solving.context(indexed, arguments.solving.attitude_only),
+            context: solving.context(indexed),
             indexed,
             name_odds: arguments.solving.name_odds,
             page: arguments.page,

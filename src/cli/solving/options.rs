@@ -6,7 +6,9 @@ use crate::cli::options::hints::HintOptions;
 use crate::cli::options::values;
 use clap::Args;
 use starpipe::identify::NAME_ODDS;
+use starpipe::pipeline::DEFAULT_TIME_LIMIT_S;
 use std::path::PathBuf;
+use std::time::Duration;
 
 #[derive(Debug, Args)]
 pub(crate) struct SolvingOptions {
@@ -20,6 +22,10 @@ pub(crate) struct SolvingOptions {
     /// point or limiting magnitude is measured
     #[arg(long, help_heading = "Identification")]
     pub(crate) attitude_only: bool,
+    /// How long a frame may take, in seconds; if there is no answer by then, the reason says so
+    #[arg(long = "time-limit", value_name = "SECONDS", value_parser = values::positive, allow_hyphen_values = true,
+          default_value_t = DEFAULT_TIME_LIMIT_S, help_heading = "Limits")]
+    pub(crate) time_limit_s: f64,
     #[command(flatten)]
     pub(super) output: OutputOptions,
     #[command(flatten)]
@@ -47,6 +53,11 @@ pub(crate) const FRAME_RESULTS: &[&str] = &["json", "csv", "png", "wcs"];
 pub(crate) const LIST_RESULTS: &[&str] = &["json", "csv", "wcs"];
 
 impl SolvingOptions {
+    /// How long a frame may take; `None` if that is longer than any clock runs.
+    pub(crate) fn time_limit(&self) -> Option<Duration> {
+        Duration::try_from_secs_f64(self.time_limit_s).ok()
+    }
+
     /// Whether `--out` is given.
     pub(crate) fn writes_files(&self) -> bool {
         self.output.out.is_some()

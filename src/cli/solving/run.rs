@@ -18,6 +18,7 @@ use starpipe::report::FrameReport;
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// The parts of a [`Context`] that the options give.
 #[derive(Default)]
@@ -26,16 +27,15 @@ pub(crate) struct Plan {
     pub(crate) priors: Priors,
     pub(crate) camera: Option<StatedCamera>,
     pub(crate) calibration: Option<Calibration>,
+    pub(crate) attitude_only: bool,
+    pub(crate) time_limit: Option<Duration>,
 }
 
 impl Plan {
-    pub(crate) fn context<'a>(
-        &'a self,
-        indexed: &'a IndexedCatalog<'a>,
-        attitude_only: bool,
-    ) -> Context<'a> {
+    pub(crate) fn context<'a>(&'a self, indexed: &'a IndexedCatalog<'a>) -> Context<'a> {
         Context {
-            attitude_only,
+            attitude_only: self.attitude_only,
+            time_limit: self.time_limit,
             detect: self.detect.clone(),
             priors: self.priors,
             camera: self.camera.clone(),
@@ -62,7 +62,6 @@ pub(crate) fn solve_all(
         output,
         catalog,
         name_odds,
-        attitude_only,
         ..
     } = options;
     if let Some(directory) = &output.out {
@@ -74,7 +73,7 @@ pub(crate) fn solve_all(
         return Ok(run.exit());
     }
     catalog.with_index(|pool, indexed| {
-        let context = plan.context(indexed, attitude_only);
+        let context = plan.context(indexed);
         // The threads that solve also draw and write files; this one only prints.
         let answer = |image: Image, solved: Solved| {
             let name = image.name().display().to_string();
