@@ -1,8 +1,44 @@
-//! Atomic file writes: a reader finds the old file or the new one, never a part.
+//! Reads of files alone, and atomic writes: a reader finds the old file or the new one, never a part.
 
-use std::fs;
-use std::io::{self, Write};
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Read, Write};
 use std::path::Path;
+
+/// Opens a file for reading. A pipe, a socket or a device is refused: it may never end.
+///
+/// # Errors
+/// I/O errors.
+pub fn open(path: &Path) -> io::Result<File> {
+    let kind = fs::metadata(path)?.file_type();
+    if !kind.is_file() && !kind.is_dir() {
+        return Err(io::Error::other(
+            "it is a pipe, a socket or a device, not a file",
+        ));
+    }
+    File::open(path)
+}
+
+/// Reads a file of at most `limit` bytes.
+///
+/// # Errors
+/// As for [`open`], and the file being larger.
+pub fn read(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?.take(limit + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit {
+        return Err(io::Error::other(format!("it is larger than {limit} bytes")));
+    }
+    Ok(bytes)
+}
+
+/// [`read`] for a text.
+///
+/// # Errors
+/// As for [`read`], and the content not being UTF-8.
+pub fn read_text(path: &Path, limit: u64) -> io::Result<String> {
+    String::from_utf8(read(path, limit)?)
+        .map_err(|error| io::Error::new(ErrorKind::InvalidData, error))
+}
 
 /// Creates a temporary file in the folder of `path`, with the permissions of any new file.
 ///

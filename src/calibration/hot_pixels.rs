@@ -1,8 +1,12 @@
 //! Lists of hot pixels, as `starpipe darks` writes them.
 
 use super::error::{CalibrationError, check_bad};
+use crate::base::files;
 use crate::frame::Frame;
 use std::path::{Path, PathBuf};
+
+/// Largest size of a list: some millions of pixels.
+const MAX_BYTES: u64 = 1 << 26;
 
 /// Hot pixels of a detector, with the file that lists them.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,10 +31,10 @@ pub fn read_hot_pixels(path: &Path) -> Result<HotPixelList, CalibrationError> {
         found: found.to_owned(),
         expected,
     };
+    let bytes = files::read(path, MAX_BYTES).map_err(|error| unreadable(error.into()))?;
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
-        .from_path(path)
-        .map_err(unreadable)?;
+        .from_reader(&bytes[..]);
     let headings = reader.headers().map_err(unreadable)?.clone();
     let column = |name: &str| {
         headings

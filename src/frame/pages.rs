@@ -6,7 +6,7 @@ use super::image::Frame;
 use super::limits::{MAX_FILE_BYTES, MAX_PAGES};
 use super::reader::{decode_image, read_limited};
 use super::{compressed, fits, tiff};
-use std::fs::File;
+use crate::base::files;
 use std::io::Read;
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -29,7 +29,7 @@ impl Pages {
     /// image, or more than [`MAX_PAGES`].
     pub fn open(path: impl AsRef<Path>) -> Result<Self, FrameError> {
         let path = path.as_ref();
-        let open = || Self::read(File::open(path)?);
+        let open = || Self::read(files::open(path)?);
         open().map_err(|error| error.in_file(path))
     }
 

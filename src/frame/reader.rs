@@ -6,6 +6,7 @@ use super::image::Frame;
 use super::limits::{HEAD_BYTES, MAX_FILE_BYTES};
 use super::pixels::Pixels;
 use super::{compressed, fits, foreign, raster, tiff};
+use crate::base::files;
 use std::borrow::Cow;
 use std::io::{self, Read};
 use std::num::NonZeroUsize;
@@ -62,7 +63,7 @@ pub fn read_page_with(
 ) -> Result<Frame<'static>, FrameError> {
     let path = path.as_ref();
     let Buffers { bytes, pixels } = buffers;
-    std::fs::File::open(path)
+    files::open(path)
         .map_err(FrameError::from)
         .and_then(|file| {
             let length = file.metadata().map_or(0, |metadata| metadata.len());

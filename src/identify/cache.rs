@@ -22,6 +22,7 @@
 //! chunk when it is first needed. A file with a damaged chunk is deleted.
 
 use super::table::{CELLS, CHUNKS, SizeClass, Triangle};
+use crate::base::files;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
@@ -187,7 +188,7 @@ pub fn load(
     catalog_checksum: u64,
 ) -> Result<Option<(Vec<SizeClass>, IndexFile)>, CacheError> {
     let (io_error, damaged) = (io_error("reading", path), damaged(path));
-    let mut file = match File::open(path) {
+    let mut file = match files::open(path) {
         Ok(file) => file,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(io_error(error)),

@@ -6,8 +6,8 @@ use super::keys::{IMPERFECTION_KEYS, KEYS, is_curve};
 use super::response::{Response, ResponseError};
 use super::sheet::DataSheet;
 use super::spot_image::{SpotImage, SpotImageError};
+use crate::base::files;
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::Read as _;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -142,7 +142,7 @@ impl DataSheet {
             path: path.to_owned(),
             source,
         };
-        let file = File::open(path).map_err(failed)?;
+        let file = files::open(path).map_err(failed)?;
         let mut text = String::new();
         file.take(MAX_BYTES + 1)
             .read_to_string(&mut text)

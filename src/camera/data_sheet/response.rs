@@ -1,8 +1,8 @@
 //! A transmission or an efficiency as a function of wavelength.
 
+use crate::base::files;
 use csv::ByteRecord;
 use std::borrow::Cow;
-use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
@@ -127,7 +127,7 @@ impl Response {
             source,
         };
         let mut bytes = Vec::new();
-        let file = File::open(path).map_err(read)?;
+        let file = files::open(path).map_err(read)?;
         file.take(MAX_BYTES + 1)
             .read_to_end(&mut bytes)
             .map_err(read)?;

@@ -1,6 +1,6 @@
 //! A star's spot as a picture, for example of a lens's design.
 
-use std::fs;
+use crate::base::files;
 use std::path::{Path, PathBuf};
 
 /// Largest number of samples of a spot.
@@ -51,13 +51,16 @@ pub enum SpotImageError {
     },
 }
 
+/// Largest size of a table.
+const MAX_BYTES: u64 = 1 << 24;
+
 impl SpotImage {
     /// Reads a CSV table without a heading: a number for each sample, a line for each row.
     ///
     /// # Errors
     /// [`SpotImageError`] with the file and the line.
     pub fn read(path: &Path) -> Result<Self, SpotImageError> {
-        let text = fs::read_to_string(path).map_err(|source| SpotImageError::Read {
+        let text = files::read_text(path, MAX_BYTES).map_err(|source| SpotImageError::Read {
             path: path.to_owned(),
             source,
         })?;

@@ -4,11 +4,11 @@ use super::stdin::is_stdin;
 use anyhow::{Context, anyhow, bail};
 use csv::StringRecord;
 use starpipe::base::coords::PixelPoint;
+use starpipe::base::files;
 use starpipe::detect::DetectionFlags;
 use starpipe::identify::Photometry;
 use starpipe::photometry::instrumental_mag;
 use starpipe::pipeline::{CentroidList, ListedCentroid};
-use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -36,7 +36,7 @@ pub(crate) fn read(path: &Path, options: &ListOptions) -> anyhow::Result<Centroi
     let stream: Box<dyn Read> = if is_stdin(path) {
         Box::new(io::stdin().lock())
     } else {
-        Box::new(File::open(path).with_context(reading)?)
+        Box::new(files::open(path).with_context(reading)?)
     };
     let list = limited(stream, MAX_BYTES).and_then(|bytes| parse(&bytes[..], options));
     list.with_context(reading)

@@ -3,10 +3,13 @@
 use super::stdin::is_stdin;
 use anyhow::{Context, anyhow, bail};
 use starpipe::archive::names_in;
+use starpipe::base::files;
 use starpipe::frame;
-use std::fs;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+
+/// Largest size of a list: some ten million names.
+const MAX_BYTES: u64 = 1 << 30;
 
 /// Extensions of lists of names, one a line.
 const LISTS: [&str; 2] = ["txt", "lst"];
@@ -18,7 +21,7 @@ pub(crate) fn frame_names(inputs: &[PathBuf]) -> anyhow::Result<Vec<String>> {
     for input in inputs {
         if is_stdin(input) {
             let mut text = String::new();
-            let read = io::stdin().lock().read_to_string(&mut text);
+            let read = io::stdin().lock().take(MAX_BYTES).read_to_string(&mut text);
             read.context("reading a list of frames from standard input")?;
             add_lines(&text, &mut names);
         } else if input.is_dir() {
@@ -41,7 +44,10 @@ fn add_file(input: &Path, names: &mut Vec<String>) -> anyhow::Result<()> {
     match extension {
         Some("parquet") => names.extend(names_in(input)?),
         Some(extension) if LISTS.contains(&extension) => {
-            add_lines(&fs::read_to_string(input).with_context(reading)?, names);
+            add_lines(
+                &files::read_text(input, MAX_BYTES).with_context(reading)?,
+                names,
+            );
         }
         _ if is_pattern(input) => {
             for path in glob::glob(&name_of(input)?).with_context(reading)? {

@@ -2,11 +2,16 @@
 
 use anyhow::Context;
 use clap::Args;
+use std::{env, thread};
+
+/// Threads that may be started on any machine.
+const MOST_USEFUL: usize = 8;
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Resources")]
 pub(crate) struct ThreadOptions {
-    /// Threads to work with [default: one for each processor]
+    /// Threads to work with; more than 8 and than there are processors are not started [default: one
+    /// for each processor]
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1024))]
     threads: Option<u32>,
 }
@@ -14,10 +19,19 @@ pub(crate) struct ThreadOptions {
 impl ThreadOptions {
     /// Starts the threads.
     pub(crate) fn pool(&self) -> anyhow::Result<rayon::ThreadPool> {
+        let processors = thread::available_parallelism().map_or(1, usize::from);
+        let stated = self.threads.map(|threads| threads as usize);
+        let wanted = stated.or_else(of_environment).unwrap_or(processors);
+        // More only get in each other's way.
         rayon::ThreadPoolBuilder::new()
-            // 0 means one for each processor.
-            .num_threads(self.threads.unwrap_or(0) as usize)
+            .num_threads(wanted.min(processors.max(MOST_USEFUL)))
             .build()
             .context("starting threads")
     }
+}
+
+/// The variable by which other programs on rayon are told.
+fn of_environment() -> Option<usize> {
+    let number = env::var("RAYON_NUM_THREADS").ok()?.parse().ok()?;
+    (number > 0).then_some(number)
 }

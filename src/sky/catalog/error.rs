@@ -72,6 +72,14 @@ pub enum CatalogError {
         /// The headings found.
         found: String,
     },
+    /// More records than any catalogue for this purpose has.
+    #[error("{}: too large: more than {limit} records; keep the brighter stars", .path.display())]
+    TooManyRecords {
+        /// The file.
+        path: PathBuf,
+        /// The most that are read.
+        limit: u64,
+    },
     /// Too many records are unreadable.
     #[error(
         "{}: {}{} of {records} records are unreadable, at most {limit_percent} % are tolerated; the first: {}",

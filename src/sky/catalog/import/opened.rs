@@ -1,12 +1,23 @@
 //! Opens plain and gzip files alike.
 
+use crate::base::files;
 use crate::sky::catalog::CatalogError;
 use flate2::bufread::MultiGzDecoder;
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::Path;
 
 const BUFFER_BYTES: usize = 1 << 16;
+
+/// Largest content that is read as a whole: that of several million stars.
+const MAX_CONTENT_BYTES: u64 = 1 << 28;
+
+fn within_limit(content: &[u8]) -> io::Result<()> {
+    if content.len() as u64 <= MAX_CONTENT_BYTES {
+        return Ok(());
+    }
+    let message = format!("its content is larger than {MAX_CONTENT_BYTES} bytes");
+    Err(io::Error::other(message))
+}
 
 /// A file, decompressed if necessary, with its first bytes.
 pub(in crate::sky::catalog) struct OpenedFile {
@@ -19,19 +30,18 @@ pub(in crate::sky::catalog) struct OpenedFile {
 impl OpenedFile {
     /// Opens the file `path`.
     pub(in crate::sky::catalog) fn open(path: &Path) -> Result<Self, CatalogError> {
-        let file = File::open(path).map_err(CatalogError::open(path))?;
+        let file = files::open(path).map_err(CatalogError::open(path))?;
         let reader = Box::new(BufReader::with_capacity(BUFFER_BYTES, file));
         Self::decompress(reader).map_err(CatalogError::read(path, 0))
     }
 
     /// The whole content of the file, which is `path`.
-    pub(in crate::sky::catalog) fn read_to_end(
-        mut self,
-        path: &Path,
-    ) -> Result<Vec<u8>, CatalogError> {
+    pub(in crate::sky::catalog) fn read_to_end(self, path: &Path) -> Result<Vec<u8>, CatalogError> {
         let mut content = Vec::new();
-        let read = self.reader.read_to_end(&mut content);
-        read.map_err(CatalogError::read(path, 0))?;
+        let mut limited = self.reader.take(MAX_CONTENT_BYTES + 1);
+        let read = limited.read_to_end(&mut content);
+        read.and_then(|_| within_limit(&content))
+            .map_err(CatalogError::read(path, 0))?;
         Ok(content)
     }
 

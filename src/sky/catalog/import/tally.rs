@@ -9,6 +9,9 @@ use std::collections::{HashMap, HashSet};
 use std::io::BufRead;
 use std::path::Path;
 
+/// Most records of a file: twice those of Tycho-2.
+const MAX_RECORDS: u64 = 5_000_000;
+
 /// A file is rejected if more than this share of its records is unreadable, in percent.
 ///
 /// SKY2000 and Tycho-2 have none. A share of 1 % allows for a few damaged lines, but not for a
@@ -97,6 +100,12 @@ impl Tally {
             let tasks = batch.par_chunks(ROWS_PER_TASK);
             let tallies: Vec<Self> = tasks.map(|rows| Self::parse(rows, format)).collect();
             tallies.into_iter().for_each(|part| tally.append(part));
+            if tally.summary.records > MAX_RECORDS {
+                return Err(CatalogError::TooManyRecords {
+                    path: path.to_owned(),
+                    limit: MAX_RECORDS,
+                });
+            }
             if tally.summary.unreadable.len() > UNREADABLE_MAX && tally.exceeds_limit() {
                 break;
             }
