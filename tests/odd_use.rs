@@ -223,7 +223,7 @@ fn errors_with_odd_names_are_one_line_each() {
 #[test]
 fn a_pipe_is_read_like_a_file_and_an_endless_stream_is_refused() {
     let mut shell = Command::new("bash");
-    let script = "\"$0\" process --format json <(cat \"$1\") && \"$0\" process /dev/zero; \"$0\" identify /dev/zero";
+    let script = "\"$0\" process --format json <(cat \"$1\") && \"$0\" process - < /dev/zero; \"$0\" identify - < /dev/zero";
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache");
     shell
         .args(["-c", script, env!("CARGO_BIN_EXE_starpipe")])
@@ -240,10 +240,8 @@ fn a_pipe_is_read_like_a_file_and_an_endless_stream_is_refused() {
     assert!(stdout.contains("\"status\":\"identified\""), "{stderr}");
     assert_eq!(ran.status.code(), Some(1));
     assert!(
-        stderr.starts_with("starpipe: reading /dev/zero: not an image: found the bytes 00 00")
-            && stderr.contains(
-                "starpipe: reading /dev/zero: too large: found more than 268435456 bytes"
-            ),
+        stderr.starts_with("starpipe: reading -: not an image: found the bytes 00 00")
+            && stderr.contains("starpipe: reading -: too large: found more than 268435456 bytes"),
         "{stderr}"
     );
 }

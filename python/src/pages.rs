@@ -3,7 +3,7 @@
 use crate::errors::exception;
 use pyo3::prelude::*;
 use starpipe::Frame;
-use starpipe::frame::{self, FrameError};
+use starpipe::frame::{self, FrameError, MemoryLimit};
 use starpipe::pipeline;
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -40,7 +40,7 @@ pub struct Pages {
 impl Pages {
     #[new]
     fn new(py: Python<'_>, content: &[u8], name: String) -> PyResult<Self> {
-        let opened = py.detach(|| frame::Pages::of(content.to_vec()));
+        let opened = py.detach(|| frame::Pages::of(content.to_vec(), MemoryLimit::DEFAULT));
         let pages = opened.map_err(|error| unread(error, &name))?;
         Ok(Self { name, pages })
     }

@@ -4,13 +4,16 @@ use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::Path;
 
-/// Opens a file for reading. A pipe, a socket or a device is refused: it may never end.
+/// Opens a file for reading. A pipe, a socket or a device is refused: it may never end. Those that the
+/// shell has opened are read like standard input.
 ///
 /// # Errors
 /// I/O errors.
 pub fn open(path: &Path) -> io::Result<File> {
     let kind = fs::metadata(path)?.file_type();
-    if !kind.is_file() && !kind.is_dir() {
+    let is_opened = ["/dev/fd", "/dev/stdin", "/proc/self/fd"];
+    let is_opened = is_opened.iter().any(|parent| path.starts_with(parent));
+    if !kind.is_file() && !kind.is_dir() && !is_opened {
         return Err(io::Error::other(
             "it is a pipe, a socket or a device, not a file",
         ));

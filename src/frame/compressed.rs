@@ -2,26 +2,23 @@
 
 use super::error::FrameError;
 use super::format::{FrameFormat, first_bytes};
-use super::limits::MAX_PIXELS;
 use bzip2::read::MultiBzDecoder;
 use flate2::read::MultiGzDecoder;
 use std::io::{ErrorKind, Read};
 
-/// Maximum decompressed size: the largest frame in 64-bit floats, and some headers.
-const MAX_UNPACKED_BYTES: u64 = MAX_PIXELS as u64 * 8 + (1 << 24);
-
-/// Decompresses the image file in `bytes`, which is of a compressed `format`.
+/// Decompresses the image file in `bytes`, which is of a compressed `format`, to fewer bytes than
+/// `limit`.
 /// # Errors
 /// [`FrameError::UnknownFormat`] if the content does not begin like an image, before much of it is
 /// decompressed; [`FrameError::Truncated`], [`FrameError::Malformed`].
-pub(super) fn unpack(bytes: &[u8], format: FrameFormat) -> Result<Vec<u8>, FrameError> {
+pub(super) fn unpack(bytes: &[u8], format: FrameFormat, limit: u64) -> Result<Vec<u8>, FrameError> {
     let (known, inside) = format_inside(bytes, format);
     if known.is_none() && !inside.is_empty() {
         let found = format!("{} inside {format}", first_bytes(&inside));
         return Err(FrameError::UnknownFormat { found });
     }
     let mut unpacked = Vec::new();
-    let mut reader = decoder(bytes, format).take(MAX_UNPACKED_BYTES);
+    let mut reader = decoder(bytes, format).take(limit);
     reader.read_to_end(&mut unpacked).map_err(|e| {
         let detail = e.to_string();
         if e.kind() == ErrorKind::UnexpectedEof {
@@ -35,11 +32,8 @@ pub(super) fn unpack(bytes: &[u8], format: FrameFormat) -> Result<Vec<u8>, Frame
             FrameError::Malformed { format, detail }
         }
     })?;
-    if unpacked.len() as u64 == MAX_UNPACKED_BYTES {
-        return Err(FrameError::Malformed {
-            format,
-            detail: format!("found {MAX_UNPACKED_BYTES} bytes or more in it, expected fewer"),
-        });
+    if unpacked.len() as u64 == limit {
+        return Err(FrameError::TooManyBytes { limit });
     }
     Ok(unpacked)
 }

@@ -76,6 +76,22 @@ pub enum FrameError {
         /// Rows.
         height: usize,
     },
+    /// An image that needs more memory than a frame may take.
+    #[error(
+        "too large: {width} x {height} pixels of this kind need {} MB of memory, expected at most {} MB \
+         (--max-memory)",
+        .needed_bytes.div_ceil(1_000_000), .limit_bytes / 1_000_000
+    )]
+    TooMuchMemory {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// What it needs.
+        needed_bytes: u64,
+        /// What it may take.
+        limit_bytes: u64,
+    },
     /// More bytes than the largest frame needs.
     #[error("too large: found more than {limit} bytes, expected at most {limit}")]
     TooManyBytes {

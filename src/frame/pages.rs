@@ -4,6 +4,7 @@ use super::error::FrameError;
 use super::format::FrameFormat;
 use super::image::Frame;
 use super::limits::{MAX_FILE_BYTES, MAX_PAGES};
+use super::memory::MemoryLimit;
 use super::reader::{decode_image, read_limited};
 use super::{compressed, fits, tiff};
 use crate::base::files;
@@ -16,6 +17,7 @@ use std::path::Path;
 #[derive(Debug)]
 pub struct Pages {
     bytes: Vec<u8>,
+    memory: MemoryLimit,
     next: usize,
     count: usize,
     /// Why the images after the last that was counted cannot be found.
@@ -23,31 +25,31 @@ pub struct Pages {
 }
 
 impl Pages {
-    /// The images of the file `path`.
+    /// The images of the file `path`; each may take as much memory as `memory`.
     /// # Errors
     /// [`FrameError::File`] with the path and the error: as [`super::read`], and if the file has no
     /// image, or more than [`MAX_PAGES`].
-    pub fn open(path: impl AsRef<Path>) -> Result<Self, FrameError> {
+    pub fn open(path: impl AsRef<Path>, memory: MemoryLimit) -> Result<Self, FrameError> {
         let path = path.as_ref();
-        let open = || Self::read(files::open(path)?);
+        let open = || Self::read(files::open(path)?, memory);
         open().map_err(|error| error.in_file(path))
     }
 
     /// The images of the file that `stream` gives.
     /// # Errors
     /// As [`Self::open`], without the path.
-    pub fn read(stream: impl Read) -> Result<Self, FrameError> {
+    pub fn read(stream: impl Read, memory: MemoryLimit) -> Result<Self, FrameError> {
         let mut bytes = Vec::new();
         read_limited(stream, 0, MAX_FILE_BYTES, &mut bytes)?;
-        Self::of(bytes)
+        Self::of(bytes, memory)
     }
 
     /// The images of the file whose content is `bytes`.
     /// # Errors
     /// As [`Self::open`], without the path.
-    pub fn of(mut bytes: Vec<u8>) -> Result<Self, FrameError> {
+    pub fn of(mut bytes: Vec<u8>, memory: MemoryLimit) -> Result<Self, FrameError> {
         if let Some(format) = FrameFormat::of(&bytes).filter(|format| format.is_compressed()) {
-            bytes = compressed::unpack(&bytes, format)?;
+            bytes = compressed::unpack(&bytes, format, memory.content_bytes())?;
         }
         let format = FrameFormat::of(&bytes);
         let (count, broken) = match format {
@@ -57,7 +59,7 @@ impl Pages {
         };
         match (count, format) {
             // The error that reading the first image gives tells more.
-            (0, _) => decode_image(&bytes, None, &mut Vec::new()).map(|_| ())?,
+            (0, _) => decode_image(&bytes, None, memory, &mut Vec::new()).map(|_| ())?,
             (MAX_PAGES.., Some(format)) => {
                 return Err(FrameError::Unsupported {
                     format,
@@ -69,6 +71,7 @@ impl Pages {
         }
         Ok(Self {
             bytes,
+            memory,
             next: 0,
             count,
             broken,
@@ -85,7 +88,7 @@ impl Iterator for Pages {
         if self.next > self.count {
             return self.broken.take().map(|error| (page, Err(error)));
         }
-        let frame = decode_image(&self.bytes, Some(page), &mut Vec::new());
+        let frame = decode_image(&self.bytes, Some(page), self.memory, &mut Vec::new());
         if self.next == self.count && frame.is_err() {
             // What breaks the last image also hides what comes after it.
             self.broken = None;

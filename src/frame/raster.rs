@@ -4,8 +4,9 @@ use super::error::FrameError;
 use super::exif;
 use super::format::FrameFormat;
 use super::image::{Frame, check_size};
+use super::jpeg_scans::{Scans, has_end};
 use super::levels::{Samples, WholeNumber, frame_from_integers};
-use super::limits::MAX_PIXELS;
+use super::memory::MemoryLimit;
 use image::codecs::bmp::BmpDecoder;
 use image::codecs::jpeg::JpegDecoder;
 use image::codecs::png::PngDecoder;
@@ -18,7 +19,7 @@ use std::io::{Cursor, ErrorKind};
 /// defines.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_png(bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
+pub(super) fn decode_png(bytes: &[u8], memory: MemoryLimit) -> Result<Frame<'static>, FrameError> {
     let format = FrameFormat::Png;
     // Checked first, so that the decoder allocates nothing for absurd sizes.
     if let (Some(width), Some(height)) = (word(bytes, 16), word(bytes, 20)) {
@@ -35,7 +36,7 @@ pub(super) fn decode_png(bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
         ExtendedColorType::L4 => 17.0,
         _ => 1.0,
     };
-    let mut frame = decode_with(decoder, format, bytes.len())?;
+    let mut frame = decode_with(decoder, format, bytes.len(), memory)?;
     frame.step_adu = frame.step_adu.max(step);
     Ok(frame)
 }
@@ -43,25 +44,38 @@ pub(super) fn decode_png(bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
 /// Decodes a baseline or progressive JPEG.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_jpeg(bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
+pub(super) fn decode_jpeg(bytes: &[u8], memory: MemoryLimit) -> Result<Frame<'static>, FrameError> {
     let format = FrameFormat::Jpeg;
     let decoder =
         JpegDecoder::new(Cursor::new(bytes)).map_err(|e| error_of(e, format, bytes.len()))?;
     // The decoder fills missing data with grey and reports no error.
-    if !has_jpeg_end(bytes) {
+    if !has_end(bytes) {
         return Err(FrameError::Truncated {
             format,
             found_bytes: bytes.len(),
             detail: "no end-of-image marker (ff d9) after the last scan".to_string(),
         });
     }
-    decode_with(decoder, format, bytes.len())
+    let (width, height) = decoder.dimensions();
+    let (width, height) = (width as usize, height as usize);
+    check_size(width, height)?;
+    let scans = Scans::of(bytes);
+    scans.check((width, height))?;
+    // A progressive image is decoded to coefficients first.
+    let coefficients = if scans.count > 1 {
+        size_of::<i16>() * usize::from(decoder.color_type().channel_count())
+    } else {
+        0
+    };
+    let bytes_per_pixel = decoder_bytes_per_pixel(&decoder) + coefficients;
+    memory.check(width, height, bytes_per_pixel)?;
+    decode_with(decoder, format, bytes.len(), memory)
 }
 
 /// Decodes a Windows bitmap.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_bmp(bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
+pub(super) fn decode_bmp(bytes: &[u8], memory: MemoryLimit) -> Result<Frame<'static>, FrameError> {
     /// Minimum length of a header that stores width and height in four bytes each.
     const LONG_HEADER: u32 = 16;
     let format = FrameFormat::Bmp;
@@ -76,18 +90,18 @@ pub(super) fn decode_bmp(bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
     }
     let decoder =
         BmpDecoder::new(Cursor::new(bytes)).map_err(|e| error_of(e, format, bytes.len()))?;
-    decode_with(decoder, format, bytes.len())
+    decode_with(decoder, format, bytes.len(), memory)
 }
 
 /// Decodes a portable anymap: PBM, PGM, PPM (plain or binary) or PAM, with the levels of the file.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_pnm(bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
+pub(super) fn decode_pnm(bytes: &[u8], memory: MemoryLimit) -> Result<Frame<'static>, FrameError> {
     let format = FrameFormat::Pnm;
     let decoder =
         PnmDecoder::new(Cursor::new(bytes)).map_err(|e| error_of(e, format, bytes.len()))?;
     let maxval = decoder.header().maximal_sample();
-    let decoded = Decoded::new(decoder, format, bytes.len())?;
+    let decoded = Decoded::new(decoder, format, bytes.len(), memory)?;
     // The decoder scales levels from 0..=maxval to all of 8 or 16 bits, and rounds: this is undone.
     let level = |scaled: u16, full: u16| {
         let level = f64::from(scaled) * f64::from(maxval) / f64::from(full);
@@ -116,20 +130,16 @@ fn word(bytes: &[u8], at: usize) -> Option<[u8; 4]> {
     bytes.get(at..)?.first_chunk().copied()
 }
 
-/// Whether an end-of-image marker follows the last start of a scan; scan data cannot contain
-/// either.
-fn has_jpeg_end(bytes: &[u8]) -> bool {
-    let last = |marker: u8| bytes.windows(2).rposition(|pair| pair == [0xff, marker]);
-    match (last(0xda), last(0xd9)) {
-        (Some(scan), Some(end)) => end > scan,
-        _ => false,
-    }
-}
-
+/// What the PNG decoder may allocate beside the image: colour profiles and texts.
 fn limits() -> Limits {
     let mut limits = Limits::default();
-    limits.max_alloc = Some(MAX_PIXELS as u64 * 8);
+    limits.max_alloc = Some(1 << 26);
     limits
+}
+
+/// Bytes of a decoded pixel.
+fn decoder_bytes_per_pixel(decoder: &impl ImageDecoder) -> usize {
+    usize::from(decoder.color_type().bytes_per_pixel())
 }
 
 /// Checks the size, decodes, converts to luminance and adds the Exif metadata.
@@ -137,12 +147,13 @@ fn decode_with(
     mut decoder: impl ImageDecoder,
     format: FrameFormat,
     found_bytes: usize,
+    memory: MemoryLimit,
 ) -> Result<Frame<'static>, FrameError> {
     let exif = decoder.exif_metadata().ok().flatten();
-    let decoded = Decoded::new(decoder, format, found_bytes)?;
+    let decoded = Decoded::new(decoder, format, found_bytes, memory)?;
     let frame = match decoded.depth {
         Depth::Eight => decoded.integers(decoded.image.as_bytes(), u8::MAX),
-        Depth::Sixteen => decoded.integers(&decoded.words(), u16::MAX),
+        Depth::Sixteen => decoded.integers(decoded.words(), u16::MAX),
     }?;
     let metadata = exif.map(|exif| exif::metadata(&exif, frame.width));
     Ok(frame.with_metadata(metadata.unwrap_or_default()))
@@ -167,9 +178,12 @@ impl Decoded {
         decoder: impl ImageDecoder,
         format: FrameFormat,
         found_bytes: usize,
+        memory: MemoryLimit,
     ) -> Result<Self, FrameError> {
         let (width, height) = decoder.dimensions();
-        check_size(width as usize, height as usize)?;
+        let (width, height) = (width as usize, height as usize);
+        check_size(width, height)?;
+        memory.check(width, height, decoder_bytes_per_pixel(&decoder))?;
         let color = decoder.color_type();
         let depth = match color {
             ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => Depth::Eight,
@@ -187,10 +201,15 @@ impl Decoded {
         })
     }
 
-    /// The samples of a 16-bit image.
-    fn words(&self) -> Vec<u16> {
-        let pairs = self.image.as_bytes().chunks_exact(2);
-        pairs.map(|p| u16::from_ne_bytes([p[0], p[1]])).collect()
+    /// The samples of a 16-bit image; none of any other.
+    fn words(&self) -> &[u16] {
+        match &self.image {
+            DynamicImage::ImageLuma16(image) => image.as_raw(),
+            DynamicImage::ImageLumaA16(image) => image.as_raw(),
+            DynamicImage::ImageRgb16(image) => image.as_raw(),
+            DynamicImage::ImageRgba16(image) => image.as_raw(),
+            _ => &[],
+        }
     }
 
     fn integers<T: WholeNumber>(

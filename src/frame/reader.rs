@@ -4,6 +4,7 @@ use super::error::FrameError;
 use super::format::{FrameFormat, first_bytes};
 use super::image::Frame;
 use super::limits::{HEAD_BYTES, MAX_FILE_BYTES};
+use super::memory::MemoryLimit;
 use super::pixels::Pixels;
 use super::{compressed, fits, foreign, raster, tiff};
 use crate::base::files;
@@ -20,12 +21,23 @@ pub struct Buffers {
     bytes: Vec<u8>,
     /// 16-bit pixels of a discarded frame.
     pixels: Vec<u16>,
+    memory: MemoryLimit,
 }
 
 impl Buffers {
     /// Empty buffers.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// How much memory a frame may take.
+    pub fn memory(&self) -> MemoryLimit {
+        self.memory
+    }
+
+    /// From now on a frame may take as much memory as `memory`.
+    pub fn set_memory(&mut self, memory: MemoryLimit) {
+        self.memory = memory;
     }
 
     /// Reuses the pixels of a frame that is no longer needed.
@@ -62,18 +74,23 @@ pub fn read_page_with(
     buffers: &mut Buffers,
 ) -> Result<Frame<'static>, FrameError> {
     let path = path.as_ref();
-    let Buffers { bytes, pixels } = buffers;
+    let Buffers {
+        bytes,
+        pixels,
+        memory,
+    } = buffers;
     files::open(path)
         .map_err(FrameError::from)
         .and_then(|file| {
             let length = file.metadata().map_or(0, |metadata| metadata.len());
             read_limited(file, length, MAX_FILE_BYTES, bytes)?;
-            decode_with(bytes, page, pixels)
+            decode_with(bytes, page, *memory, pixels)
         })
         .map_err(|error| error.in_file(path))
 }
 
-/// Reads `stream` to its end and decodes image `page`, counted from 1; without `page`, the first.
+/// Reads `stream` to its end and decodes image `page`, counted from 1; without `page`, the first. It
+/// may take as much memory as `memory`.
 ///
 /// A stream that does not begin like an image is not read further: it may be endless.
 /// # Errors
@@ -81,10 +98,11 @@ pub fn read_page_with(
 pub fn read_stream(
     stream: impl Read,
     page: Option<NonZeroUsize>,
+    memory: MemoryLimit,
 ) -> Result<Frame<'static>, FrameError> {
     let mut bytes = Vec::new();
     read_limited(stream, 0, MAX_FILE_BYTES, &mut bytes)?;
-    decode_page(&bytes, page)
+    decode_with(&bytes, page, memory, &mut Vec::new())
 }
 
 /// Reads all of `stream` into `bytes`: about `expected` bytes, at most `limit`.
@@ -136,19 +154,21 @@ pub fn decode(bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
 /// # Errors
 /// [`FrameError`], never [`FrameError::File`].
 pub fn decode_page(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame<'static>, FrameError> {
-    decode_with(bytes, page, &mut Vec::new())
+    decode_with(bytes, page, MemoryLimit::DEFAULT, &mut Vec::new())
 }
 
 fn decode_with(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
+    memory: MemoryLimit,
     buffer: &mut Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
     match FrameFormat::of(bytes) {
         Some(format) if format.is_compressed() => {
-            decode_image(&compressed::unpack(bytes, format)?, page, buffer)
+            let content = compressed::unpack(bytes, format, memory.content_bytes())?;
+            decode_image(&content, page, memory, buffer)
         }
-        _ => decode_image(bytes, page, buffer),
+        _ => decode_image(bytes, page, memory, buffer),
     }
 }
 
@@ -156,17 +176,18 @@ fn decode_with(
 pub(super) fn decode_image(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
+    memory: MemoryLimit,
     buffer: &mut Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
-    let single = |read: fn(&[u8]) -> Result<Frame<'static>, FrameError>| match page {
+    let single = |read: fn(&[u8], MemoryLimit) -> Result<Frame<'static>, FrameError>| match page {
         Some(page) if page.get() > 1 => Err(FrameError::NoSuchPage { page, pages: 1 }),
-        _ => read(bytes),
+        _ => read(bytes, memory),
     };
     match FrameFormat::of(bytes) {
-        Some(FrameFormat::Fits) => fits::decode(bytes, page),
+        Some(FrameFormat::Fits) => fits::decode(bytes, page, memory),
         Some(FrameFormat::Tiff) => match foreign::raw_tiff(bytes) {
             Some(known) => Err(known.into()),
-            None => tiff::decode(bytes, page, buffer),
+            None => tiff::decode(bytes, page, memory, buffer),
         },
         Some(FrameFormat::Png) => single(raster::decode_png),
         Some(FrameFormat::Jpeg) => single(raster::decode_jpeg),

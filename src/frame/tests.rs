@@ -477,9 +477,9 @@ fn infinities_have_no_value_and_alone_make_no_frame() {
 
 #[test]
 fn an_endless_stream_is_refused_if_no_image_or_too_long() {
-    let zeros = read_stream(std::io::repeat(0), None).unwrap_err();
+    let zeros = read_stream(std::io::repeat(0), None, MemoryLimit::DEFAULT).unwrap_err();
     assert!(matches!(zeros, FrameError::UnknownFormat { .. }), "{zeros}");
-    let nothing = read_stream(std::io::empty(), None).unwrap_err();
+    let nothing = read_stream(std::io::empty(), None, MemoryLimit::DEFAULT).unwrap_err();
     assert!(matches!(nothing, FrameError::Empty), "{nothing}");
     let endless = || (&b"P5 3 3 255\n"[..]).chain(std::io::repeat(7));
     let error = read_limited(endless(), 0, 10_000, &mut Vec::new()).unwrap_err();

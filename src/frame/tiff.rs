@@ -10,15 +10,13 @@ use super::image::{Frame, check_size};
 use super::levels::{
     Samples, WholeNumber, frame_from_floats, frame_from_integers, frame_from_words, interleaved,
 };
-use super::limits::{MAX_PAGES, MAX_PIXELS};
+use super::limits::MAX_PAGES;
+use super::memory::MemoryLimit;
 use std::io::Cursor;
 use std::num::NonZeroUsize;
 use tiff::decoder::{BufferLayoutPreference, Decoder, DecodingResult, Limits};
 use tiff::tags::{ByteOrder, SampleFormat, Tag};
 use tiff::{ColorType, TiffError, TiffFormatError};
-
-/// Maximum size of one decoded sample array: four 16-bit channels of the largest frame.
-const MAX_DECODED_BYTES: usize = MAX_PIXELS * 8;
 
 const SUPPORTED: &str = "grey or colour of 1 to 64 bits per sample, uncompressed or with LZW, deflate, PackBits, JPEG or fax";
 
@@ -28,6 +26,7 @@ const SUPPORTED: &str = "grey or colour of 1 to 64 bits per sample, uncompressed
 pub(super) fn decode(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
+    memory: MemoryLimit,
     buffer: &mut Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
     let fail = |e: TiffError| error_of(e, bytes.len());
@@ -39,8 +38,8 @@ pub(super) fn decode(
     let (width, height) = (width as usize, height as usize);
     check_size(width, height)?;
     let mut limits = Limits::default();
-    limits.decoding_buffer_size = MAX_DECODED_BYTES;
-    limits.intermediate_buffer_size = MAX_DECODED_BYTES;
+    limits.decoding_buffer_size = usize::try_from(memory.bytes()).unwrap_or(usize::MAX);
+    limits.intermediate_buffer_size = limits.decoding_buffer_size;
     decoder = decoder.with_limits(limits);
     let color = decoder.colortype().map_err(fail)?;
     let stored = decoder.image_buffer_layout().map_err(fail)?;
@@ -51,6 +50,7 @@ pub(super) fn decode(
         channels: channels_of(color)?,
         planes: stored.planes,
     };
+    memory.check(width, height, layout.decoder_bytes_per_pixel())?;
     let words = if layout.is_grey_words(&stored) {
         plain_words(&mut decoder, bytes)
     } else {
@@ -167,6 +167,15 @@ impl Layout {
     fn is_grey_words(&self, stored: &BufferLayoutPreference) -> bool {
         let is_unsigned = stored.sample_format == SampleFormat::Uint;
         self.bits == 16 && is_unsigned && self.channels == 1 && self.planes == 1
+    }
+
+    /// Decoded samples, which are copied where they are packed or wider than a frame's values.
+    fn decoder_bytes_per_pixel(&self) -> usize {
+        let samples = self.channels * usize::from(self.bits).div_ceil(8);
+        match self.bits {
+            8 | 16 | 32 => samples,
+            _ => samples + self.channels * size_of::<f32>(),
+        }
     }
 
     fn frame(&self, samples: DecodingResult) -> Result<Frame<'static>, FrameError> {

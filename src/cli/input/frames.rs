@@ -51,7 +51,8 @@ impl FrameList {
     }
 }
 
-/// Reads the frame in the file `input`, or in standard input.
+/// Reads the frame in the file `input`, or in standard input. It may take as much memory as the
+/// buffers say.
 pub(crate) fn read_frame(
     input: &Path,
     page: Option<NonZeroUsize>,
@@ -60,7 +61,8 @@ pub(crate) fn read_frame(
     if !is_stdin(input) {
         return frame::read_page_with(input, page, buffers);
     }
-    frame::read_stream(io::stdin().lock(), page).map_err(|error| error.in_file(input))
+    frame::read_stream(io::stdin().lock(), page, buffers.memory())
+        .map_err(|error| error.in_file(input))
 }
 
 /// Reads a master dark or a master flat.

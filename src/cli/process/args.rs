@@ -2,7 +2,7 @@
 
 use crate::cli::exit::CommandError;
 use crate::cli::input::frames::read_master;
-use crate::cli::options::frames::{FrameOptions, PageChoice};
+use crate::cli::options::frames::{FrameOptions, MemoryOption, PageChoice};
 use crate::cli::options::values;
 use crate::cli::solving::Plan;
 use crate::cli::solving::options::SolvingOptions;
@@ -45,6 +45,8 @@ pub(crate) struct ProcessArgs {
     pub(super) detection: DetectionOptions,
     #[command(flatten)]
     pub(super) exposure: ExposureOptions,
+    #[command(flatten)]
+    pub(super) memory: MemoryOption,
     #[command(flatten)]
     pub(super) solving: SolvingOptions,
     #[command(flatten)]
@@ -144,6 +146,7 @@ impl ProcessArgs {
             camera: sheet.map(|sheet| self.exposure.stated_camera(sheet)),
             attitude_only: self.solving.attitude_only,
             time_limit: self.solving.time_limit(),
+            memory: self.memory.limit(),
         })
     }
 }

@@ -4,7 +4,7 @@ use crate::cli::input::frames::read_frame;
 use crate::cli::input::stdin::is_stdin;
 use crate::cli::options::frames::PageChoice;
 use crate::cli::solving::result_files::Image;
-use starpipe::frame::{Buffers, Frame, FrameError, Pages};
+use starpipe::frame::{Buffers, Frame, FrameError, MemoryLimit, Pages};
 use starpipe::pipeline::{Context, Error, Solution, Workspace, solve_read};
 use std::io;
 use std::path::Path;
@@ -36,7 +36,7 @@ fn solve_all_images(
     workspace: &mut Workspace,
     mut take: impl FnMut(Image, SolvedImage, &mut Workspace),
 ) {
-    let pages = match all_pages(path) {
+    let pages = match all_pages(path, workspace.frames.memory()) {
         Ok(pages) => pages,
         Err(error) => return take(Image::of(path), Err(error.into()), workspace),
     };
@@ -52,9 +52,9 @@ fn solve_all_images(
     }
 }
 
-fn all_pages(path: &Path) -> Result<Pages, FrameError> {
+fn all_pages(path: &Path, memory: MemoryLimit) -> Result<Pages, FrameError> {
     if is_stdin(path) {
-        return Pages::read(io::stdin().lock()).map_err(|error| error.in_file(path));
+        return Pages::read(io::stdin().lock(), memory).map_err(|error| error.in_file(path));
     }
-    Pages::open(path)
+    Pages::open(path, memory)
 }

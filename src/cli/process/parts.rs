@@ -13,6 +13,7 @@ use crate::cli::solving::workspace;
 use indicatif::ProgressBar;
 use starpipe::archive::{Archive, ArchiveError, FrameRow, Part, Plan, Shard, StarRow};
 use starpipe::base::format::counted;
+use starpipe::frame::MemoryLimit;
 use starpipe::identify::IndexedCatalog;
 use starpipe::pipeline::{Context, Error, Workspace};
 use starpipe::report::FrameReport;
@@ -36,6 +37,7 @@ pub(super) fn process_parts(
             context: solving.context(indexed),
             indexed,
             name_odds: arguments.solving.name_odds,
+            memory: solving.memory,
             page: arguments.page,
         };
         let shard = options.shard.unwrap_or(Shard::ALL);
@@ -64,6 +66,7 @@ struct Worker<'a> {
     context: Context<'a>,
     indexed: &'a IndexedCatalog<'a>,
     name_odds: f64,
+    memory: MemoryLimit,
     page: Option<PageChoice>,
 }
 
@@ -106,7 +109,7 @@ impl Worker<'_> {
         let mut writer = archive.write(part)?;
         let mut added = Ok(());
         let work = |name: &String, workspace: &mut Workspace| self.solve(name, workspace);
-        let buffers = || workspace(self.pool, part.names.len(), self.name_odds);
+        let buffers = || workspace(self.pool, part.names.len(), self.name_odds, self.memory);
         for_each_ordered(self.pool, part.names, buffers, work, |_, images| {
             progress.inc(1);
             added = images.into_iter().try_for_each(|(name, solved)| {

@@ -11,6 +11,7 @@ use crate::cli::progress::frames_bar;
 use indicatif::ProgressBar;
 use starpipe::calibration::Calibration;
 use starpipe::detect::DetectConfig;
+use starpipe::frame::MemoryLimit;
 use starpipe::identify::{IndexedCatalog, Priors};
 use starpipe::photometry::comparison::StatedCamera;
 use starpipe::pipeline::{Context, Workspace};
@@ -29,6 +30,7 @@ pub(crate) struct Plan {
     pub(crate) calibration: Option<Calibration>,
     pub(crate) attitude_only: bool,
     pub(crate) time_limit: Option<Duration>,
+    pub(crate) memory: MemoryLimit,
 }
 
 impl Plan {
@@ -88,7 +90,7 @@ pub(crate) fn solve_all(
             });
             answers
         };
-        let workspace = || workspace(pool, inputs.len(), name_odds);
+        let workspace = || workspace(pool, inputs.len(), name_odds, plan.memory);
         batch::for_each_ordered(pool, inputs, workspace, work, |_, answers| {
             run.progress.inc(1);
             answers.into_iter().try_for_each(|answer| run.take(answer))
@@ -98,8 +100,14 @@ pub(crate) fn solve_all(
 }
 
 /// A workspace of one thread. A single input is solved on all threads.
-pub(crate) fn workspace(pool: &rayon::ThreadPool, inputs: usize, name_odds: f64) -> Workspace {
+pub(crate) fn workspace(
+    pool: &rayon::ThreadPool,
+    inputs: usize,
+    name_odds: f64,
+    memory: MemoryLimit,
+) -> Workspace {
     let mut workspace = Workspace::new();
+    workspace.frames.set_memory(memory);
     workspace.identify = workspace.identify.with_name_odds(name_odds);
     if let (1, Some(threads)) = (inputs, NonZeroUsize::new(pool.current_num_threads())) {
         workspace.detect = workspace.detect.on_threads(threads);

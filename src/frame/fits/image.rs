@@ -6,7 +6,10 @@ use super::unit::{StoredType, Unit};
 use crate::frame::levels::{
     Samples, WholeNumber, frame_from_floats, frame_from_integers, interleaved,
 };
-use crate::frame::{Frame, FrameError, check_size};
+use crate::frame::{Frame, FrameError, MemoryLimit, check_size};
+
+/// Decoded values of a tile, which may be the whole image.
+const TILE_BYTES_PER_PIXEL: usize = 8;
 
 /// Location and scaling of one image in a file.
 pub(super) struct Image {
@@ -25,7 +28,7 @@ pub(super) struct Image {
 
 impl Image {
     /// The image `plane` of `unit`. A cube has several planes, and one must be chosen.
-    pub fn new(unit: &Unit, plane: Option<usize>) -> Result<Self, FrameError> {
+    pub fn new(unit: &Unit, plane: Option<usize>, memory: MemoryLimit) -> Result<Self, FrameError> {
         if plane.is_none() && unit.pages() > 1 {
             let found = format!("a cube of {} planes", unit.planes());
             let expected = "one plane, three of colour, or a page that says which";
@@ -33,6 +36,13 @@ impl Image {
         }
         let (width, height) = (unit.axes[0], unit.axes[1]);
         check_size(width, height)?;
+        let channels = if unit.is_colour() { 3 } else { 1 };
+        let tiles = if unit.is_compressed_image() {
+            TILE_BYTES_PER_PIXEL
+        } else {
+            0
+        };
+        memory.check(width, height, channels * unit.stored.bytes() + tiles)?;
         let scale = unit.header.number_or("BSCALE", 1.0)?;
         if scale == 0.0 {
             return Err(unit.header.invalid("BSCALE", "a number other than 0"));
@@ -40,7 +50,7 @@ impl Image {
         Ok(Self {
             width,
             height,
-            channels: if unit.is_colour() { 3 } else { 1 },
+            channels,
             plane: plane.unwrap_or(0),
             stored: unit.stored,
             scale,

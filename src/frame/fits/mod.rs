@@ -29,6 +29,7 @@ pub use write::{FitsSamples, FitsWriteError, write_fits};
 use super::error::FrameError;
 use super::format::FrameFormat;
 use super::image::Frame;
+use super::memory::MemoryLimit;
 use image::Image;
 use std::num::NonZeroUsize;
 use unit::Units;
@@ -39,6 +40,7 @@ use unit::Units;
 pub(super) fn decode(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
+    memory: MemoryLimit,
 ) -> Result<Frame<'static>, FrameError> {
     let (mut pages, mut tables) = (0, 0);
     let mut units = Units::new(bytes);
@@ -47,7 +49,7 @@ pub(super) fn decode(
     while let Some(unit) = units.next()? {
         let plane = page.map_or(0, |page| page.get() - 1 - pages);
         if plane < unit.pages() {
-            let image = Image::new(&unit, page.map(|_| plane))?;
+            let image = Image::new(&unit, page.map(|_| plane), memory)?;
             let headers = [Some(&unit.header), primary.as_ref()];
             let metadata = keywords::metadata(headers.into_iter().flatten());
             return Ok(image.frame(&unit, bytes)?.with_metadata(metadata).upright());

@@ -3,6 +3,10 @@ use super::*;
 use crate::frame::RowOrder;
 use proptest::prelude::*;
 
+fn decode(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame<'static>, FrameError> {
+    super::decode(bytes, page, MemoryLimit::DEFAULT)
+}
+
 /// A header-data unit of these cards and data, padded to blocks.
 fn unit(cards: &[&str], data: &[u8]) -> Vec<u8> {
     let mut text: String = cards.iter().map(|card| format!("{card:<80}")).collect();

@@ -1,0 +1,216 @@
+//! Inputs that ask for more memory or time than they should get are refused, and say why.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
+mod common;
+
+use common::{Ran, fixture, starpipe};
+use flate2::Compression;
+use flate2::write::{GzEncoder, ZlibEncoder};
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn orion() -> PathBuf {
+    fixture("orion/orion.png")
+}
+
+fn process(arguments: &[&Path]) -> Ran {
+    Ran::new(starpipe().arg("process").args(arguments))
+}
+
+/// Asserts that the file is refused with a message that contains `expected`.
+fn assert_refused(name: &str, content: &[u8], expected: &str) {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join(name);
+    fs::write(&path, content).unwrap();
+    let ran = process(&[&path]);
+    assert_eq!((ran.status, ran.stdout.as_str()), (1, ""), "{name}");
+    assert!(ran.stderr.contains(expected), "{}", ran.stderr);
+}
+
+/// A chunk of a PNG.
+fn chunk(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
+    let mut checked = flate2::Crc::new();
+    checked.update(kind);
+    checked.update(data);
+    let length = (data.len() as u32).to_be_bytes();
+    let sum = checked.sum().to_be_bytes();
+    [&length[..], kind, data, &sum[..]].concat()
+}
+
+/// Zeros, compressed.
+fn zeros(bytes: usize) -> Vec<u8> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::fast());
+    let block = vec![0; 1 << 20];
+    for _ in 0..bytes >> 20 {
+        encoder.write_all(&block).unwrap();
+    }
+    encoder.finish().unwrap()
+}
+
+/// A PNG of 16 bits in colour with transparency.
+fn png(side: u32, more: &[u8]) -> Vec<u8> {
+    let mut header = [side.to_be_bytes(), side.to_be_bytes()].concat();
+    header.extend([16, 6, 0, 0, 0]);
+    let pixels = zeros(1 << 20);
+    let signature = b"\x89PNG\r\n\x1a\n".to_vec();
+    let end = [chunk(b"IDAT", &pixels), chunk(b"IEND", b"")].concat();
+    [signature, chunk(b"IHDR", &header), more.to_vec(), end].concat()
+}
+
+#[test]
+fn an_image_that_needs_too_much_memory_is_refused_before_it_is_decoded() {
+    let expected = "14142 x 14142 pixels of this kind need 2400 MB of memory, expected at most";
+    assert_refused("large.png", &png(14_142, &[]), expected);
+
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("frame.png");
+    fs::copy(orion(), &path).unwrap();
+    let ran = process(&[Path::new("--max-memory"), Path::new("1"), &path]);
+    assert_eq!(ran.status, 1);
+    let expected =
+        "640 x 480 pixels of this kind need 2 MB of memory, expected at most 1 MB (--max-memory)";
+    assert!(ran.stderr.contains(expected), "{}", ran.stderr);
+}
+
+#[test]
+fn a_colour_profile_that_grows_without_end_is_not_unpacked() {
+    let profile = [b"x\0\0".to_vec(), zeros(1 << 28)].concat();
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("profile.png");
+    fs::write(&path, png(64, &chunk(b"iCCP", &profile))).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_starpipe"));
+    let (_, peak_kb) = measured(command.arg("process").arg(&path));
+    assert!(peak_kb < 300_000, "{peak_kb} kB");
+}
+
+/// Exit status and largest memory in kB of a command.
+fn measured(command: &mut Command) -> (Option<i32>, u64) {
+    let mut child = command
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let status = format!("/proc/{}/status", child.id());
+    let mut peak_kb = 0;
+    loop {
+        // The high-water mark, as long as the process is there.
+        let text = fs::read_to_string(&status).unwrap_or_default();
+        let peak = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let kb = peak.and_then(|peak| peak.trim().strip_suffix("kB")?.trim().parse().ok());
+        peak_kb = peak_kb.max(kb.unwrap_or(0));
+        if let Some(done) = child.try_wait().unwrap() {
+            return (done.code(), peak_kb);
+        }
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn content_behind_an_image_is_unpacked_only_so_far() {
+    let mut header = [
+        "SIMPLE  =                    T",
+        "BITPIX  =                    8",
+        "NAXIS   =                    2",
+        "NAXIS1  =                   64",
+        "NAXIS2  =                   64",
+        "END",
+    ]
+    .map(|card| format!("{card:<80}"))
+    .concat();
+    header += &" ".repeat(2880 - header.len());
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(header.as_bytes()).unwrap();
+    let block = vec![0; 1 << 20];
+    for _ in 0..64 {
+        encoder.write_all(&block).unwrap();
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("behind.fits.gz");
+    fs::write(&path, encoder.finish().unwrap()).unwrap();
+    assert_eq!(process(&[&path]).status, 3);
+    let ran = process(&[Path::new("--max-memory"), Path::new("40"), &path]);
+    assert_eq!(ran.status, 1);
+    let expected = "too large: found more than 30000000 bytes";
+    assert!(ran.stderr.contains(expected), "{}", ran.stderr);
+}
+
+#[test]
+fn a_jpeg_of_very_many_scans_is_refused() {
+    let segment = |marker: u8, data: &[u8]| {
+        let length = (data.len() as u16 + 2).to_be_bytes();
+        [&[0xff, marker], &length[..], data].concat()
+    };
+    let tables = [&[0][..], &[1; 64]].concat();
+    let mut file = [vec![0xff, 0xd8], segment(0xdb, &tables)].concat();
+    // 14000 x 14000 pixels, progressive, grey.
+    file.extend(segment(0xc2, &[8, 0x36, 0xb0, 0x36, 0xb0, 1, 1, 0x11, 0]));
+    for class in [0x00, 0x10] {
+        let mut code = vec![class, 1];
+        code.resize(18, 0);
+        file.extend(segment(0xc4, &code));
+    }
+    for scan in 0..100 {
+        let spectrum = if scan == 0 { [0, 0] } else { [1, 63] };
+        file.extend(segment(0xda, &[1, 1, 0, spectrum[0], spectrum[1], 0]));
+        file.extend([0, 0]);
+    }
+    file.extend([0xff, 0xd9]);
+    let expected = "found 100 scans of 14000 x 14000 pixels, expected fewer";
+    assert_refused("scans.jpg", &file, expected);
+}
+
+#[test]
+fn pipes_and_devices_are_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let pipe = directory.path().join("pipe");
+    assert!(
+        Command::new("mkfifo")
+            .arg(&pipe)
+            .status()
+            .unwrap()
+            .success()
+    );
+    let frame = orion();
+    for path in [pipe.as_path(), Path::new("/dev/zero")] {
+        for option in ["--catalog", "--camera", "--hot-pixels", "--dark"] {
+            let ran = process(&[Path::new(option), path, &frame]);
+            assert_eq!(ran.status, 1, "{option} {}", path.display());
+            let expected = "a pipe, a socket or a device";
+            assert!(ran.stderr.contains(expected), "{option}: {}", ran.stderr);
+        }
+        let ran = process(&[path]);
+        assert_eq!(ran.status, 1);
+        let ran = Ran::new(starpipe().arg("identify").arg(path));
+        assert_eq!(ran.status, 1);
+    }
+}
+
+#[test]
+fn a_catalogue_of_too_many_stars_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("stars.csv.gz");
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(b"id,ra_deg,dec_deg,vmag\n").unwrap();
+    let block = b"1,10.0,20.0,5.0\n".repeat(1 << 16);
+    for _ in 0..100 {
+        encoder.write_all(&block).unwrap();
+    }
+    fs::write(&path, encoder.finish().unwrap()).unwrap();
+    let ran = process(&[Path::new("--catalog"), &path, &orion()]);
+    assert_eq!(ran.status, 1);
+    let expected = "too large: more than 5000000 records";
+    assert!(ran.stderr.contains(expected), "{}", ran.stderr);
+}
+
+#[test]
+fn threads_beyond_those_that_help_are_not_started() {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_starpipe"));
+    command.args(["process", "--threads", "1024"]).arg(orion());
+    let (status, peak_kb) = measured(&mut command);
+    assert_eq!(status, Some(0));
+    assert!(peak_kb < 150_000, "{peak_kb} kB");
+}
