@@ -1,0 +1,90 @@
+//! Readers of images.
+
+use starpipe::Frame;
+use starpipe::calibration::darks::{DarkConfig, DarkStack, FrameStatistics};
+use starpipe::frame::{self, MAX_PAGES, MAX_PIXELS, MIN_SIDE_PX, MemoryLimit, Pages};
+use std::num::NonZeroUsize;
+
+/// A small limit: what asks for more is refused, and each run stays fast.
+const MEMORY: MemoryLimit = MemoryLimit::of_bytes(50_000_000);
+
+/// The first byte is the page, the rest a file in any format.
+pub fn image(data: &[u8]) {
+    let Some((page, bytes)) = data.split_first() else {
+        return;
+    };
+    let page = NonZeroUsize::new(usize::from(*page % 4));
+    let read = || frame::read_stream(bytes, page, MEMORY);
+    match (read(), read()) {
+        (Ok(found), Ok(again)) => {
+            check(&found);
+            assert_eq!(bits(&found), bits(&again));
+        }
+        (Err(found), Err(again)) => assert_eq!(told(&found), told(&again)),
+        _ => panic!("read once, refused once"),
+    }
+}
+
+/// A file in any format, of which each image is read.
+pub fn pages(bytes: &[u8]) {
+    let Ok(pages) = Pages::of(bytes.to_vec(), MEMORY) else {
+        return;
+    };
+    for (page, found) in pages.take(20) {
+        assert!(page.get() <= MAX_PAGES);
+        let alone = frame::read_stream(bytes, Some(page), MEMORY);
+        match (found, alone) {
+            (Ok(found), Ok(alone)) => {
+                check(&found);
+                assert_eq!(bits(&found), bits(&alone));
+            }
+            (Ok(_), Err(error)) => panic!("image {page} is read with the others alone: {error}"),
+            (Err(error), _) => {
+                told(&error);
+            }
+        }
+    }
+}
+
+/// A file in any format as a dark frame: a sequence of exposures of it.
+pub fn darks(bytes: &[u8]) {
+    let Ok(frame) = frame::read_stream(bytes, None, MEMORY) else {
+        return;
+    };
+    let mut stack = DarkStack::new();
+    for exposure_s in [0.1, 1.0, 10.0] {
+        let statistics = FrameStatistics::of("dark", &frame, Some(exposure_s));
+        if stack.add(&frame, statistics).is_err() {
+            return;
+        }
+    }
+    if let Ok(darks) = stack.measure(&DarkConfig::default()) {
+        let json = serde_json::to_string(&darks.report()).expect("a report is JSON");
+        assert!(!json.contains("inf"), "{json}");
+        assert!(!darks.report().to_text().contains("NaN"));
+    }
+}
+
+/// What holds for every frame.
+fn check(frame: &Frame) {
+    let (width, height) = (frame.width, frame.height);
+    assert!(width >= MIN_SIDE_PX && height >= MIN_SIDE_PX);
+    assert!(width * height <= MAX_PIXELS);
+    assert_eq!(frame.pixels.len(), width * height);
+    assert!(frame.values().iter().all(|value| !value.is_infinite()));
+    assert!(frame.step_adu.is_finite());
+    if let Some(exposure_s) = frame.metadata.exposure_s {
+        assert!(exposure_s.is_finite() && exposure_s > 0.0);
+    }
+}
+
+fn bits(frame: &Frame) -> Vec<u32> {
+    frame.values().iter().map(|value| value.to_bits()).collect()
+}
+
+/// The message of an error: some words on one line or more.
+fn told(error: &frame::FrameError) -> String {
+    let text = error.to_string();
+    assert!(!text.is_empty());
+    text
+}

@@ -1,0 +1,45 @@
+//! What holds for any input: the readers and the pipeline end with a result or an error, and results
+//! are numbers that can be.
+//!
+//! Each target is a function of bytes. `cargo fuzz run TARGET` looks for bytes that break it;
+//! `cargo test` replays those in `corpus/` and changes of them.
+
+mod frames;
+mod tables;
+mod pipeline;
+mod scratch;
+
+/// A target.
+pub type Target = fn(&[u8]);
+
+/// All targets, by name.
+pub const TARGETS: &[(&str, Target)] = &[
+    ("tiff", frames::image),
+    ("fits", frames::image),
+    ("png", frames::image),
+    ("jpeg", frames::image),
+    ("bmp", frames::image),
+    ("pnm", frames::image),
+    ("gzip", frames::image),
+    ("pages", frames::pages),
+    ("catalog", tables::catalog),
+    ("compact", tables::compact),
+    ("index", tables::index),
+    ("camera", tables::camera),
+    ("response", tables::response),
+    ("spot_image", tables::spot_image),
+    ("hot_pixels", tables::hot_pixels),
+    ("names", tables::names),
+    ("run", tables::run),
+    ("darks", frames::darks),
+    ("pipeline", pipeline::pipeline),
+];
+
+/// The target of this name.
+///
+/// # Panics
+/// If there is none.
+pub fn target(name: &str) -> Target {
+    let found = TARGETS.iter().find(|(target, _)| *target == name);
+    found.unwrap_or_else(|| panic!("no target {name}")).1
+}
