@@ -422,7 +422,7 @@ def _write(filesystem: Any, path: str, content: bytes, is_new: bool = False) -> 
         return
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
-    beside, temporary = tempfile.mkstemp(dir=target.parent, prefix=".tmp")
+    beside, temporary = tempfile.mkstemp(dir=target.parent, prefix=".starpipe-", suffix=".tmp")
     try:
         with os.fdopen(beside, "wb") as file:
             file.write(content)

@@ -41,8 +41,16 @@ impl Archive {
         plan: Plan,
         configuration: &Configuration,
     ) -> Result<Self, ArchiveError> {
-        let made = fs::create_dir_all(directory);
-        made.map_err(ArchiveError::file("making the directory", directory))?;
+        for place in [
+            directory.to_owned(),
+            directory.join(FRAMES),
+            directory.join(STARS),
+        ] {
+            if place == directory || place.exists() {
+                let made = files::make_directory(&place);
+                made.map_err(ArchiveError::file("making the directory", &place))?;
+            }
+        }
         let path = directory.join(IDENTITY);
         let is_foreign = |table: &&str| directory.join(table).exists() && !path.exists();
         if let Some(name) = [FRAMES, STARS].into_iter().find(is_foreign) {

@@ -3,6 +3,11 @@
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::Path;
+use std::time::Duration;
+
+/// Temporary files begin and end so.
+const PREFIX: &str = ".starpipe-";
+const SUFFIX: &str = ".tmp";
 
 /// Opens a file for reading. A pipe, a socket or a device is refused: it may never end. Those that the
 /// shell has opened are read like standard input.
@@ -55,13 +60,54 @@ pub fn beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
     }
     let parent = path.parent().filter(|parent| *parent != Path::new(""));
     let mut builder = tempfile::Builder::new();
+    builder.prefix(PREFIX).suffix(SUFFIX);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
         // Temporary files are private by default; the process's umask still applies.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(parent.unwrap_or(Path::new(".")))
+    let file = builder.tempfile_in(parent.unwrap_or(Path::new(".")))?;
+    // As long as the file is written, it is not taken for one that was left behind. Not every file
+    // system has locks.
+    let _ = file.as_file().lock();
+    Ok(file)
+}
+
+/// Makes a directory for results, and removes what a process that was killed has left in it.
+///
+/// # Errors
+/// I/O errors on making the directory.
+pub fn make_directory(directory: &Path) -> io::Result<()> {
+    fs::create_dir_all(directory)?;
+    // Best effort: such files do no harm but to the disk.
+    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
+    for path in entries
+        .map(|entry| entry.path())
+        .filter(|path| is_temporary(path))
+    {
+        if is_left_behind(&path).unwrap_or(false) {
+            let _ = fs::remove_file(&path);
+        }
+    }
+    Ok(())
+}
+
+fn is_temporary(path: &Path) -> bool {
+    let name = path
+        .file_name()
+        .and_then(|name| name.to_str())
+        .unwrap_or_default();
+    name.starts_with(PREFIX) && name.ends_with(SUFFIX)
+}
+
+/// Whether nobody writes a temporary file any longer.
+fn is_left_behind(path: &Path) -> io::Result<bool> {
+    // Between making a file and locking it.
+    const NEW: Duration = Duration::from_secs(10);
+    let found = fs::symlink_metadata(path)?;
+    let age = found.modified()?.elapsed().unwrap_or_default();
+    Ok(found.is_file() && age > NEW && File::open(path)?.try_lock().is_ok())
 }
 
 /// Writes `bytes` to `path` atomically.
@@ -82,4 +128,29 @@ pub fn finish(file: tempfile::NamedTempFile, path: &Path) -> io::Result<()> {
     file.as_file().sync_all()?;
     file.persist(path).map_err(|refused| refused.error)?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::SystemTime;
+
+    #[test]
+    fn what_a_killed_process_left_is_removed_and_nothing_else() {
+        let directory = tempfile::tempdir().unwrap();
+        let at = |name: &str| directory.path().join(name);
+        let long_ago = SystemTime::now() - Duration::from_secs(3600);
+        for name in [".starpipe-left.tmp", ".starpipe-notes", "mine.tmp"] {
+            let file = File::create(at(name)).unwrap();
+            file.set_modified(long_ago).unwrap();
+        }
+        let written = beside(&at("result")).unwrap();
+        written.as_file().set_modified(long_ago).unwrap();
+        make_directory(directory.path()).unwrap();
+        assert!(!at(".starpipe-left.tmp").exists());
+        assert!(at(".starpipe-notes").exists() && at("mine.tmp").exists());
+        assert!(written.path().exists());
+        finish(written, &at("result")).unwrap();
+        assert!(at("result").exists());
+    }
 }

@@ -252,8 +252,8 @@ fn classes_of(table: &[u8]) -> (Vec<SizeClass>, Vec<StoredClass>) {
 pub fn store(path: &Path, catalog_checksum: u64, classes: &[SizeClass]) -> Result<(), CacheError> {
     let io_error = io_error("writing", path);
     let directory = path.parent().unwrap_or(Path::new("."));
-    std::fs::create_dir_all(directory).map_err(&io_error)?;
-    let file = tempfile::NamedTempFile::new_in(directory).map_err(&io_error)?;
+    files::make_directory(directory).map_err(&io_error)?;
+    let file = files::beside(path).map_err(&io_error)?;
     let mut out = io::BufWriter::new(file.as_file());
     let (mut table, mut triangles) = (Vec::new(), Vec::new());
     for class in classes {

@@ -45,7 +45,7 @@ pub(crate) fn write_into(
 
 /// Makes `directory` and those above it, if necessary.
 pub(crate) fn make_directory(directory: &Path) -> anyhow::Result<()> {
-    std::fs::create_dir_all(directory)
+    files::make_directory(directory)
         .with_context(|| format!("making the directory {}", directory.display()))
 }
 
