@@ -363,3 +363,21 @@ fn status_lists_the_first_of_many_frames_that_could_not_be_read() {
     let status = run(directory, &["archive", "status", "out"]).stdout;
     assert!(status.contains("missing    parts 0-22\n"), "{status}");
 }
+
+#[test]
+fn a_damaged_table_is_told() {
+    let night = night(3);
+    let night = night.path();
+    process(night, "out", &[]);
+    let part = fs::read_dir(night.join("out/frames.parquet")).unwrap();
+    let part = part.map(|entry| entry.unwrap().path()).next().unwrap();
+    let whole = fs::read(&part).unwrap();
+    for at in (0..whole.len()).step_by(29) {
+        let mut damaged = whole.clone();
+        damaged[at] ^= 0x55;
+        fs::write(&part, &damaged).unwrap();
+        let ran = run(night, &["archive", "report", "out"]);
+        assert!(matches!(ran.status, 0 | 1), "{at}: {}", ran.stderr);
+        assert!(!ran.stderr.contains("panicked"), "{at}: {}", ran.stderr);
+    }
+}

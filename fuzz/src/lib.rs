@@ -5,9 +5,9 @@
 //! `cargo test` replays those in `corpus/` and changes of them.
 
 mod frames;
-mod tables;
 mod pipeline;
 mod scratch;
+mod tables;
 
 /// A target.
 pub type Target = fn(&[u8]);

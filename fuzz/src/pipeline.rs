@@ -1,9 +1,9 @@
 //! The pipeline: any pixels from detection to report and overlay.
 
 use serde_json::Value;
+use starpipe::identify::Photometry;
 use starpipe::pipeline::{CentroidList, ListedCentroid, solve_centroids, solve_frame};
 use starpipe::report::overlay;
-use starpipe::identify::Photometry;
 use starpipe::{
     Context, Frame, FrameReport, IndexedCatalog, PixelPoint, Solution, TextOptions, Workspace,
 };
@@ -35,7 +35,8 @@ pub fn pipeline(data: &[u8]) {
 /// A frame, if the bytes describe one.
 fn frame_of(data: &[u8]) -> Option<Frame<'static>> {
     let ([width, height, kind], values) = data.split_first_chunk()?;
-    let side = |byte: u8| SIDES_PX.start() + usize::from(byte) % (SIDES_PX.end() - SIDES_PX.start() + 1);
+    let side =
+        |byte: u8| SIDES_PX.start() + usize::from(byte) % (SIDES_PX.end() - SIDES_PX.start() + 1);
     let (width, height) = (side(*width), side(*height));
     let count = width * height;
     if values.len() < 4 {
@@ -45,7 +46,10 @@ fn frame_of(data: &[u8]) -> Option<Frame<'static>> {
         // Any float at all.
         0 => {
             let (floats, _) = values.as_chunks();
-            let pixels = floats.iter().cycle().map(|bytes| f32::from_le_bytes(*bytes));
+            let pixels = floats
+                .iter()
+                .cycle()
+                .map(|bytes| f32::from_le_bytes(*bytes));
             Frame::new(width, height, pixels.take(count).collect())
         }
         1 => {
@@ -97,16 +101,29 @@ fn check(report: &FrameReport, solution: &Solution) {
     let (width, height) = (solution.width as f64, solution.height as f64);
     for star in value["stars"].as_array().expect("a list of stars") {
         let number = |name: &str| star[name].as_f64();
-        let (x, y) = (number("x").expect("a number"), number("y").expect("a number"));
-        assert!((-1.0..=width).contains(&x) && (-1.0..=height).contains(&y), "{star}");
+        let (x, y) = (
+            number("x").expect("a number"),
+            number("y").expect("a number"),
+        );
+        assert!(
+            (-1.0..=width).contains(&x) && (-1.0..=height).contains(&y),
+            "{star}"
+        );
         for sigma in ["sigma_x", "sigma_y"] {
             assert!(number(sigma).is_none_or(|sigma| sigma > 0.0), "{star}");
         }
-        assert!(number("p_chance").is_none_or(|p| (0.0..=1.0).contains(&p)), "{star}");
+        assert!(
+            number("p_chance").is_none_or(|p| (0.0..=1.0).contains(&p)),
+            "{star}"
+        );
     }
     if let Some(attitude) = value["attitude"].as_object() {
         let parts = attitude["quaternion"].as_array().expect("four numbers");
-        let squares: f64 = parts.iter().filter_map(Value::as_f64).map(|part| part * part).sum();
+        let squares: f64 = parts
+            .iter()
+            .filter_map(Value::as_f64)
+            .map(|part| part * part)
+            .sum();
         assert!((squares - 1.0).abs() < 1e-6, "{line}");
     }
 }

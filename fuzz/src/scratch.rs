@@ -17,7 +17,9 @@ pub fn directory() -> PathBuf {
     static DIRECTORY: OnceLock<TempDir> = OnceLock::new();
     let made = DIRECTORY.get_or_init(|| {
         let in_memory = tempfile::tempdir_in("/dev/shm");
-        in_memory.or_else(|_| tempfile::tempdir()).expect("a temporary directory can be made")
+        in_memory
+            .or_else(|_| tempfile::tempdir())
+            .expect("a temporary directory can be made")
     });
     made.path().to_owned()
 }

@@ -20,7 +20,10 @@ pub fn catalog(bytes: &[u8]) {
         };
         check_stars(&catalog);
         let again = Catalog::from_compact(&catalog.to_compact());
-        assert_eq!(again.expect("its own form is read").stars(), catalog.stars());
+        assert_eq!(
+            again.expect("its own form is read").stars(),
+            catalog.stars()
+        );
     });
 }
 
@@ -77,7 +80,10 @@ fn indexed() -> &'static (Catalog, String, Vec<u8>) {
     MADE.get_or_init(|| {
         let mut text = "id,ra_deg,dec_deg,vmag\n".to_owned();
         for star in 0..60_u32 {
-            let (ra, dec) = (f64::from(star * 37 % 100) / 8.0, f64::from(star * 61 % 90) / 8.0);
+            let (ra, dec) = (
+                f64::from(star * 37 % 100) / 8.0,
+                f64::from(star * 61 % 90) / 8.0,
+            );
             text += &format!("{star},{ra},{dec},{}\n", 2.0 + f64::from(star) / 20.0);
         }
         let catalog = with_file("stars.csv", text.as_bytes(), Catalog::read);
@@ -87,7 +93,11 @@ fn indexed() -> &'static (Catalog, String, Vec<u8>) {
         IndexedCatalog::open(&catalog, Some(&place), &|_| ());
         let mut files = fs::read_dir(&place).expect("the index is written");
         let path = files.next().expect("a file").expect("a name").path();
-        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        let name = path
+            .file_name()
+            .expect("a name")
+            .to_string_lossy()
+            .into_owned();
         let bytes = fs::read(&path).expect("the index is read");
         (catalog, name, bytes)
     })
@@ -140,7 +150,10 @@ pub fn names(bytes: &[u8]) {
 pub fn run(bytes: &[u8]) {
     let place = directory().join(format!("run-{:?}", std::thread::current().id()));
     fs::create_dir_all(&place).expect("the temporary directory can be written");
-    let middle = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+    let middle = bytes
+        .iter()
+        .position(|byte| *byte == 0)
+        .unwrap_or(bytes.len());
     for (name, content) in [
         ("frames.csv", &bytes[..middle]),
         ("stars.csv", bytes.get(middle + 1..).unwrap_or_default()),

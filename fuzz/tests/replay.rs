@@ -13,7 +13,9 @@ fn changes(target: &str) -> u64 {
 
 /// The inputs of a target, by name.
 fn corpus(target: &str) -> Vec<(PathBuf, Vec<u8>)> {
-    let place = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target);
+    let place = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("corpus")
+        .join(target);
     let files = fs::read_dir(&place).unwrap_or_else(|error| panic!("{}: {error}", place.display()));
     let mut paths: Vec<PathBuf> = files.map(|file| file.expect("a file").path()).collect();
     paths.sort();

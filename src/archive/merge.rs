@@ -2,6 +2,7 @@
 
 use super::directory::Archive;
 use super::error::ArchiveError;
+use super::guard::guarded;
 use super::read::open;
 use super::votable::{CONTENT_KEY, widened};
 use super::write::describe;
@@ -47,7 +48,8 @@ fn concatenate(parts: &[PathBuf], target: &Path) -> std::result::Result<(), Arch
     let mut votable: Option<String> = None;
     for path in parts {
         let source = open(path)?;
-        let reader = SerializedFileReader::new(open(path)?);
+        let file = open(path)?;
+        let reader = guarded(|| SerializedFileReader::new(file));
         let reader = reader.map_err(ArchiveError::table("reading", path))?;
         if let Some(of_part) = votable_of(&reader) {
             votable = Some(match votable {

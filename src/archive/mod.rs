@@ -16,6 +16,7 @@ mod configuration;
 mod directory;
 mod error;
 mod frame_row;
+mod guard;
 mod identity;
 mod merge;
 mod nights;

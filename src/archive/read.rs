@@ -1,6 +1,8 @@
 //! Reads columns of tables.
 
 use super::error::ArchiveError;
+use super::guard::guarded;
+use crate::base::files;
 use parquet::basic::{ConvertedType, LogicalType};
 use parquet::errors::ParquetError;
 use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
@@ -17,17 +19,18 @@ pub(super) fn for_each_row(
     columns: &[&str],
     mut each: impl FnMut(&Row),
 ) -> Result<(), ParquetError> {
-    let reader = SerializedFileReader::new(table)?;
+    let reader = guarded(|| SerializedFileReader::new(table))?;
     let schema = projected(&reader, columns)?;
-    for row in reader.get_row_iter(Some(schema))? {
-        each(&row?);
+    let mut rows = guarded(|| reader.get_row_iter(Some(schema)))?;
+    while let Some(row) = guarded(|| rows.next().transpose())? {
+        each(&row);
     }
     Ok(())
 }
 
 /// Opens the file of a table.
 pub(super) fn open(path: &Path) -> Result<File, ArchiveError> {
-    File::open(path).map_err(ArchiveError::file("reading", path))
+    files::open(path).map_err(ArchiveError::file("reading", path))
 }
 
 /// The schema of the columns with these names.
@@ -72,7 +75,8 @@ fn field<'r>(row: &'r Row, column: &str) -> Option<&'r Field> {
 /// [`ArchiveError::Table`].
 pub fn names_in(path: &Path) -> Result<Vec<String>, ArchiveError> {
     let error = ArchiveError::table("reading", path);
-    let reader = SerializedFileReader::new(open(path)?).map_err(&error)?;
+    let file = open(path)?;
+    let reader = guarded(|| SerializedFileReader::new(file)).map_err(&error)?;
     let schema = reader.metadata().file_metadata().schema();
     let is_text = |field: &&Arc<Type>| {
         let info = field.get_basic_info();
