@@ -199,6 +199,18 @@ fn odd_names_break_no_line_and_reach_no_terminal() {
         .collect();
     named.dedup();
     assert_eq!(named, shown[..2]);
+    // But a terminal that shows it is not cleared.
+    let table = of("csv", &paths[2..3]);
+    assert!(!table.contains(|c: char| c.is_control() && c != '\n'));
+    assert!(table.contains(r"clear\u{1b}[2J\u{9b}31m.png,"), "{table}");
+    let list = out.join("odd.csv");
+    fs::write(&list, table).unwrap();
+    let identify = [
+        "identify", "--format", "json", "--width", "640", "--height", "480", "--frame",
+    ];
+    let mut command = starpipe();
+    command.args(identify).arg(paths[2]).arg(&list);
+    assert_eq!(Ran::new(&mut command).status, 0);
 
     let text = of("text", &paths);
     assert!(!text.contains(|c: char| c.is_control() && c != '\n'));

@@ -5,6 +5,7 @@ use anyhow::{Context, anyhow, bail};
 use csv::StringRecord;
 use starpipe::base::coords::PixelPoint;
 use starpipe::base::files;
+use starpipe::base::format::printable;
 use starpipe::detect::DetectionFlags;
 use starpipe::identify::Photometry;
 use starpipe::photometry::instrumental_mag;
@@ -92,7 +93,9 @@ fn parse(input: impl Read, options: &ListOptions) -> anyhow::Result<CentroidList
         .from_reader(input);
     let columns = Columns::find(reader.headers().map_err(not_a_table)?)?;
     let mut centroids = Vec::new();
-    let mut frames = Frames::new(options.frame.as_deref());
+    // As tables have it.
+    let chosen = options.frame.as_deref().map(printable);
+    let mut frames = Frames::new(chosen.as_deref());
     for record in reader.records() {
         let record = record.map_err(not_a_table)?;
         // Spreadsheets write such lines at the end of a table.

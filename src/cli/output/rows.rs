@@ -2,6 +2,7 @@
 
 use anyhow::Context;
 use serde::Serialize;
+use starpipe::base::format::printable;
 
 /// One JSON object on one line.
 pub(crate) fn json_line(value: &impl Serialize) -> anyhow::Result<String> {
@@ -27,10 +28,13 @@ pub(crate) fn csv_table<R: Serialize>(rows: impl Iterator<Item = R>) -> anyhow::
     finished(writer)
 }
 
-/// The text that `writer` has written.
+/// The text that `writer` has written, which a terminal shows as it is: control characters in names are
+/// escaped but for line breaks, which are quoted.
 pub(crate) fn finished(writer: csv::Writer<Vec<u8>>) -> anyhow::Result<String> {
     let bytes = writer
         .into_inner()
         .map_err(csv::IntoInnerError::into_error)?;
-    Ok(String::from_utf8(bytes)?)
+    let text = String::from_utf8(bytes)?;
+    let lines: Vec<String> = text.split('\n').map(printable).collect();
+    Ok(lines.join("\n"))
 }
