@@ -149,7 +149,8 @@ def process(
     storage_options : dict, optional
         Options of fsspec, for frames and output.
     read_ahead : int
-        Frames that a task fetches while it solves another. An object store takes some 50 ms for each.
+        Frames that a task fetches while it solves another: an object store takes some 50 ms for
+        each.
     retries : int
         How often a part is tried again.
     page : int or 'all', optional
