@@ -31,10 +31,19 @@ pub fn open(path: &Path) -> io::Result<File> {
 /// # Errors
 /// As for [`open`], and the file being larger.
 pub fn read(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
+    read_stream(open(path)?, limit)
+}
+
+/// Reads a stream of at most `limit` bytes to its end.
+///
+/// # Errors
+/// I/O errors, and the stream being longer.
+pub fn read_stream(stream: impl Read, limit: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    open(path)?.take(limit + 1).read_to_end(&mut bytes)?;
+    stream.take(limit + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > limit {
-        return Err(io::Error::other(format!("it is larger than {limit} bytes")));
+        let message = format!("too large: found more than {limit} bytes");
+        return Err(io::Error::other(message));
     }
     Ok(bytes)
 }
@@ -44,8 +53,15 @@ pub fn read(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
 /// # Errors
 /// As for [`read`], and the content not being UTF-8.
 pub fn read_text(path: &Path, limit: u64) -> io::Result<String> {
-    String::from_utf8(read(path, limit)?)
-        .map_err(|error| io::Error::new(ErrorKind::InvalidData, error))
+    text_of(read(path, limit)?)
+}
+
+/// The text that `bytes` are.
+///
+/// # Errors
+/// The content not being UTF-8.
+pub fn text_of(bytes: Vec<u8>) -> io::Result<String> {
+    String::from_utf8(bytes).map_err(|error| io::Error::new(ErrorKind::InvalidData, error))
 }
 
 /// Creates a temporary file in the folder of `path`, with the permissions of any new file.

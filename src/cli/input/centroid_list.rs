@@ -39,18 +39,8 @@ pub(crate) fn read(path: &Path, options: &ListOptions) -> anyhow::Result<Centroi
     } else {
         Box::new(files::open(path).with_context(reading)?)
     };
-    let list = limited(stream, MAX_BYTES).and_then(|bytes| parse(&bytes[..], options));
-    list.with_context(reading)
-}
-
-/// All bytes of `stream`, at most `limit`.
-fn limited(stream: impl Read, limit: u64) -> anyhow::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    stream.take(limit + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > limit {
-        bail!("too large: found more than {limit} bytes");
-    }
-    Ok(bytes)
+    let bytes = files::read_stream(stream, MAX_BYTES).with_context(reading)?;
+    parse(&bytes[..], options).with_context(reading)
 }
 
 /// Meaning of the brightness column.
@@ -517,10 +507,14 @@ mod tests {
 
     #[test]
     fn an_endless_stream_is_refused() {
-        let error = limited(io::repeat(b'1'), 1000).unwrap_err().to_string();
+        let error = files::read_stream(io::repeat(b'1'), 1000)
+            .unwrap_err()
+            .to_string();
         assert!(error.starts_with("too large: found more than 1000 bytes"));
         assert_eq!(
-            limited(io::repeat(b'1').take(1000), 1000).unwrap().len(),
+            files::read_stream(io::repeat(b'1').take(1000), 1000)
+                .unwrap()
+                .len(),
             1000
         );
     }

@@ -5,7 +5,7 @@ use anyhow::{Context, anyhow, bail};
 use starpipe::archive::names_in;
 use starpipe::base::files;
 use starpipe::frame;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Largest size of a list: some ten million names.
@@ -20,9 +20,9 @@ pub(crate) fn frame_names(inputs: &[PathBuf]) -> anyhow::Result<Vec<String>> {
     let mut names = Vec::new();
     for input in inputs {
         if is_stdin(input) {
-            let mut text = String::new();
-            let read = io::stdin().lock().take(MAX_BYTES).read_to_string(&mut text);
-            read.context("reading a list of frames from standard input")?;
+            let bytes = files::read_stream(io::stdin().lock(), MAX_BYTES);
+            let text = bytes.and_then(files::text_of);
+            let text = text.context("reading a list of frames from standard input")?;
             add_lines(&text, &mut names);
         } else if input.is_dir() {
             for path in frame::files_in(input)? {

@@ -11,14 +11,6 @@ const BUFFER_BYTES: usize = 1 << 16;
 /// Largest content that is read as a whole: that of several million stars.
 const MAX_CONTENT_BYTES: u64 = 1 << 28;
 
-fn within_limit(content: &[u8]) -> io::Result<()> {
-    if content.len() as u64 <= MAX_CONTENT_BYTES {
-        return Ok(());
-    }
-    let message = format!("its content is larger than {MAX_CONTENT_BYTES} bytes");
-    Err(io::Error::other(message))
-}
-
 /// A file, decompressed if necessary, with its first bytes.
 pub(in crate::sky::catalog) struct OpenedFile {
     /// The first bytes, which `reader` returns again.
@@ -37,12 +29,8 @@ impl OpenedFile {
 
     /// The whole content of the file, which is `path`.
     pub(in crate::sky::catalog) fn read_to_end(self, path: &Path) -> Result<Vec<u8>, CatalogError> {
-        let mut content = Vec::new();
-        let mut limited = self.reader.take(MAX_CONTENT_BYTES + 1);
-        let read = limited.read_to_end(&mut content);
-        read.and_then(|_| within_limit(&content))
-            .map_err(CatalogError::read(path, 0))?;
-        Ok(content)
+        let content = files::read_stream(self.reader, MAX_CONTENT_BYTES);
+        content.map_err(CatalogError::read(path, 0))
     }
 
     fn decompress(reader: Box<dyn BufRead>) -> io::Result<Self> {
