@@ -41,16 +41,7 @@ impl Archive {
         plan: Plan,
         configuration: &Configuration,
     ) -> Result<Self, ArchiveError> {
-        for place in [
-            directory.to_owned(),
-            directory.join(FRAMES),
-            directory.join(STARS),
-        ] {
-            if place == directory || place.exists() {
-                let made = files::make_directory(&place);
-                made.map_err(ArchiveError::file("making the directory", &place))?;
-            }
-        }
+        make_directory(directory)?;
         let path = directory.join(IDENTITY);
         let is_foreign = |table: &&str| directory.join(table).exists() && !path.exists();
         if let Some(name) = [FRAMES, STARS].into_iter().find(is_foreign) {
@@ -64,6 +55,8 @@ impl Archive {
             // Another worker may have been faster.
             check_same(directory, &path, &identity)?;
         }
+        make_directory(&directory.join(FRAMES))?;
+        make_directory(&directory.join(STARS))?;
         let archive = Self {
             directory: directory.to_owned(),
             plan,
@@ -127,7 +120,7 @@ impl Archive {
         self.frames_of(part).exists()
     }
 
-    /// Begins to write a part.
+    /// Begins to write a part, into a directory that [`claim`](Self::claim) has made.
     ///
     /// # Errors
     /// [`ArchiveError::File`], [`ArchiveError::Table`].
@@ -184,14 +177,15 @@ impl PartWriter {
     }
 }
 
+fn make_directory(directory: &Path) -> Result<(), ArchiveError> {
+    files::make_directory(directory).map_err(ArchiveError::file("making the directory", directory))
+}
+
 fn open_table<R>(
     path: PathBuf,
     table: &str,
     columns: Vec<Column<R>>,
 ) -> Result<OpenTable<R>, ArchiveError> {
-    if let Some(parent) = path.parent() {
-        fs::create_dir_all(parent).map_err(ArchiveError::file("making the directory", parent))?;
-    }
     let target = files::beside(&path).map_err(ArchiveError::file("writing", &path))?;
     let writer = TableWriter::new(target, table, columns);
     let writer = writer.map_err(ArchiveError::table("writing", &path))?;

@@ -35,6 +35,9 @@ pub(crate) fn finished(writer: csv::Writer<Vec<u8>>) -> anyhow::Result<String> {
         .into_inner()
         .map_err(csv::IntoInnerError::into_error)?;
     let text = String::from_utf8(bytes)?;
+    if !text.contains(|c: char| c.is_control() && c != '\n') {
+        return Ok(text);
+    }
     let lines: Vec<String> = text.split('\n').map(printable).collect();
     Ok(lines.join("\n"))
 }
