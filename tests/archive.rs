@@ -5,10 +5,9 @@
 mod common;
 
 use common::disk::SmallDisk;
-use common::{Ran, fixture, starpipe};
-use std::collections::BTreeMap;
+use common::{Ran, files, fixture, starpipe};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use tempfile::TempDir;
 
 /// A directory with `frames/`, of which the last file is no image.
@@ -33,24 +32,6 @@ fn process(directory: &Path, out: &str, options: &[&str]) -> Ran {
     let fixed = ["process", "frames/*.tif", "--out-parquet", out];
     let parts = ["--frames-per-part", "2"];
     run(directory, &[&fixed[..], &parts[..], options].concat())
-}
-
-/// All files below a directory, by their path in it.
-fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    let mut left = vec![directory.to_owned()];
-    while let Some(below) = left.pop() {
-        for entry in fs::read_dir(below).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                left.push(path);
-            } else {
-                let name = path.strip_prefix(directory).unwrap().to_owned();
-                found.insert(name, fs::read(path).unwrap());
-            }
-        }
-    }
-    found
 }
 
 #[test]

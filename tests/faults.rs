@@ -7,7 +7,7 @@
 mod common;
 
 use common::disk::SmallDisk;
-use common::fixture;
+use common::{files, fixture};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -119,7 +119,19 @@ impl Writes {
         fs::create_dir(&out).unwrap();
         let ran = self.writing(work, &out).output().unwrap();
         assert!(ran.status.success(), "{:?} {ran:?}", self.arguments);
-        files(&out)
+        results(&out)
+    }
+
+    /// Asserts that a rerun writes what was expected from the first.
+    fn complete(&self, work: &Path, out: &Path, expected: &BTreeMap<PathBuf, Vec<u8>>) {
+        let mut rerun = self.writing(work, out);
+        if ["simulate", "camera"].contains(&self.name()) {
+            // They refuse to overwrite what is there.
+            rerun.arg("--force");
+        }
+        let ran = rerun.output().unwrap();
+        assert!(ran.status.success(), "{:?} {ran:?}", self.arguments);
+        assert!(results(out) == *expected, "{:?}", self.arguments);
     }
 
     /// The same under limits of the shell's `ulimit`.
@@ -137,20 +149,14 @@ impl Writes {
 }
 
 /// All files below a directory without temporary ones, and without what tells times.
-fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    let mut left = vec![directory.to_owned()];
-    while let Some(below) = left.pop() {
-        for entry in fs::read_dir(below).unwrap() {
-            let path = entry.unwrap().path();
-            let name = path.file_name().unwrap().to_str().unwrap();
-            if path.is_dir() {
-                left.push(path);
-            } else if !(name.starts_with(".starpipe-") || name == "timing.json") {
-                let content = without_times(fs::read(&path).unwrap());
-                found.insert(path.strip_prefix(directory).unwrap().to_owned(), content);
-            }
-        }
+fn results(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = files(directory);
+    found.retain(|path, _| {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        !(name.starts_with(".starpipe-") || name == "timing.json")
+    });
+    for content in found.values_mut() {
+        *content = without_times(std::mem::take(content));
     }
     found
 }
@@ -168,7 +174,7 @@ fn without_times(content: Vec<u8>) -> Vec<u8> {
 
 /// Asserts that each file is as expected; some may be missing. `validate` appends to its tables.
 fn assert_whole(command: &Writes, out: &Path, expected: &BTreeMap<PathBuf, Vec<u8>>) {
-    for (path, content) in files(out) {
+    for (path, content) in results(out) {
         let whole = expected.get(&path);
         let is_growing =
             command.name() == "validate" && path.extension().is_some_and(|e| e == "csv");
@@ -195,14 +201,7 @@ fn killed_at_any_moment_nothing_is_half_written_and_a_rerun_completes_it() {
             child.wait().unwrap();
             assert_whole(&command, &out, &expected);
         }
-        let mut rerun = command.writing(work.path(), &out);
-        if ["simulate", "camera"].contains(&command.name()) {
-            // They refuse to overwrite what is there.
-            rerun.arg("--force");
-        }
-        let ran = rerun.output().unwrap();
-        assert!(ran.status.success(), "{:?} {ran:?}", command.arguments);
-        assert!(files(&out) == expected, "{:?}", command.arguments);
+        command.complete(work.path(), &out, &expected);
     }
 }
 
@@ -229,13 +228,7 @@ fn a_full_or_read_only_disk_is_told_and_loses_nothing() {
             );
         }
         disk.enlarge("size=200m");
-        let mut rerun = command.writing(work.path(), &out);
-        if ["simulate", "camera"].contains(&command.name()) {
-            rerun.arg("--force");
-        }
-        let ran = rerun.output().unwrap();
-        assert!(ran.status.success(), "{:?} {ran:?}", command.arguments);
-        assert!(files(&out) == expected, "{:?}", command.arguments);
+        command.complete(work.path(), &out, &expected);
 
         disk.enlarge("ro");
         let new = disk.path().join("new");
@@ -282,6 +275,6 @@ fn eight_processes_at_once_write_what_one_writes() {
             let ran = process.wait_with_output().unwrap();
             assert!(ran.status.success(), "{:?} {ran:?}", command.arguments);
         }
-        assert!(files(&out) == expected, "{:?}", command.arguments);
+        assert!(results(&out) == expected, "{:?}", command.arguments);
     }
 }

@@ -8,6 +8,7 @@ pub mod sequence;
 
 use assert_cmd::Command;
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
@@ -93,6 +94,24 @@ pub fn names(directory: &Path) -> Vec<String> {
         .collect();
     names.sort();
     names
+}
+
+/// All files below a directory, by their path in it.
+pub fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut left = vec![directory.to_owned()];
+    while let Some(below) = left.pop() {
+        for entry in std::fs::read_dir(below).expect("readable") {
+            let path = entry.expect("readable").path();
+            if path.is_dir() {
+                left.push(path);
+            } else {
+                let name = path.strip_prefix(directory).expect("readable").to_owned();
+                found.insert(name, std::fs::read(path).expect("readable"));
+            }
+        }
+    }
+    found
 }
 
 /// The number at `pointer` in `report`.
