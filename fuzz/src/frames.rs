@@ -25,6 +25,20 @@ pub fn image(data: &[u8]) {
     }
 }
 
+/// Exif attributes, in a small JPEG.
+pub fn exif(attributes: &[u8]) {
+    const JPEG: &[u8] = include_bytes!("../corpus/jpeg/grey.bin");
+    const APP1: [u8; 2] = [0xff, 0xe1];
+    const EXIF: &[u8] = b"Exif\0\0";
+    let Ok(length) = u16::try_from(2 + EXIF.len() + attributes.len()) else {
+        return;
+    };
+    // Of the corpus's input the first byte is the page; then come two that begin each JPEG.
+    let (start, rest) = JPEG.split_at(3);
+    let pieces = [start, &APP1, &length.to_be_bytes(), EXIF, attributes, rest];
+    image(&pieces.concat());
+}
+
 /// A file in any format, of which each image is read.
 pub fn pages(bytes: &[u8]) {
     let Ok(pages) = Pages::of(bytes.to_vec(), MEMORY) else {

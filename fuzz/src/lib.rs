@@ -21,6 +21,7 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("bmp", frames::image),
     ("pnm", frames::image),
     ("gzip", frames::image),
+    ("exif", frames::exif),
     ("pages", frames::pages),
     ("catalog", tables::catalog),
     ("compact", tables::compact),
@@ -32,6 +33,7 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("names", tables::names),
     ("run", tables::run),
     ("darks", frames::darks),
+    ("centroids", pipeline::centroids),
     ("pipeline", pipeline::pipeline),
 ];
 

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 /// Changes of each input: few where one takes long.
 fn changes(target: &str) -> u64 {
     match target {
-        "index" | "pipeline" => 3,
-        _ => 100,
+        "index" | "pipeline" | "centroids" => 100,
+        _ => 1000,
     }
 }
 

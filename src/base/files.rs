@@ -169,4 +169,12 @@ mod tests {
         finish(written, &at("result")).unwrap();
         assert!(at("result").exists());
     }
+
+    #[test]
+    fn an_endless_stream_is_refused() {
+        let ones = || io::repeat(b'1');
+        let error = read_stream(ones(), 1000).unwrap_err().to_string();
+        assert!(error.starts_with("too large: found more than 1000 bytes"));
+        assert_eq!(read_stream(ones().take(1000), 1000).unwrap().len(), 1000);
+    }
 }

@@ -1,13 +1,14 @@
 //! `identify`: identifies the stars in lists of centroids.
 
 use super::exit::{CommandError, Outcome};
-use super::input::centroid_list::{self, ListOptions};
+use super::input::centroid_list;
 use super::input::stdin;
 use super::options::values::MAX_SIDE_PX;
 use super::solving::options::{LIST_RESULTS, SolvingOptions};
 use super::solving::result_files::{Image, Solved};
 use super::solving::{Plan, Taker, solve_all};
 use clap::Args;
+use starpipe::pipeline::CentroidListOptions;
 use starpipe::pipeline::{Context, Workspace, solve_centroids};
 use std::path::{Path, PathBuf};
 
@@ -51,7 +52,7 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Outcome, CommandError>
         time_limit: solving.time_limit(),
         ..Plan::default()
     };
-    let options = ListOptions {
+    let options = CentroidListOptions {
         width,
         height,
         frame,

@@ -2,11 +2,12 @@
 
 use super::args::SimulateArgs;
 use crate::cli::exit::CommandError;
-use crate::cli::input::centroid_list::{self, ListOptions};
+use crate::cli::input::centroid_list;
 use anyhow::anyhow;
 use starpipe::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use starpipe::identify::Photometry;
 use starpipe::model::simulate::{Scene, Setup};
+use starpipe::pipeline::CentroidListOptions;
 use std::path::Path;
 
 /// What the frames show.
@@ -66,10 +67,10 @@ impl Subject {
 fn star_list(path: &Path, setup: &Setup) -> anyhow::Result<Vec<(PixelPoint, f64)>> {
     let sheet = &setup.scenario.camera;
     let side = |pixels: usize| u32::try_from(pixels).ok();
-    let options = ListOptions {
+    let options = CentroidListOptions {
         width: side(sheet.width_px),
         height: side(sheet.height_px),
-        ..ListOptions::default()
+        ..CentroidListOptions::default()
     };
     let list = centroid_list::read(path, &options)?;
     if list.photometry != Photometry::JohnsonV {
