@@ -93,11 +93,8 @@ fn with_workspace<T>(interrupt: &Interrupt, solve: impl FnOnce(&mut Workspace) -
 
 /// When the work on a frame ends.
 fn interrupt_of(header: &Header) -> Interrupt {
-    const ASKED_PER_STEP: u32 = 8;
-    match header.patience {
-        u8::MAX => Interrupt::default(),
-        patience => interrupt_after(ASKED_PER_STEP * (1 + u32::from(patience))),
-    }
+    const ASKED_PER_STEP: u32 = 16;
+    interrupt_after(ASKED_PER_STEP * (1 + u32::from(header.patience)))
 }
 
 /// Ends the work when it has asked so often whether to end, and so at the same place each time.

@@ -167,9 +167,10 @@ fn not_a_table(error: csv::Error) -> CentroidListError {
 impl Columns {
     fn find(headings: &StringRecord) -> Result<Self, String> {
         if headings.iter().all(str::is_empty) {
-            return Err(format!(
+            return Err(
                 "the file is empty; expected a heading with the columns x, y and flux, vmag or mag"
-            ));
+                    .to_owned(),
+            );
         }
         let column = |names: &[&str]| {
             names.iter().find_map(|name| {
@@ -332,18 +333,14 @@ impl<'a> Frames<'a> {
             names += ", …";
         }
         match self.chosen {
-            None if count > 1 => {
-                return Err(format!(
-                    "found the rows of {count} frames ({names}), expected those of one: choose it with --frame"
-                ));
-            }
-            Some(chosen) if count == 0 => {
-                return Err(format!(
-                    "found no column that names a frame, expected rows of {chosen}"
-                ));
-            }
+            None if count > 1 => Err(format!(
+                "found the rows of {count} frames ({names}), expected those of one: choose it with --frame"
+            )),
+            Some(chosen) if count == 0 => Err(format!(
+                "found no column that names a frame, expected rows of {chosen}"
+            )),
             Some(chosen) if !self.found.iter().any(|frame| frame == chosen) => {
-                return Err(format!("found rows of {names}, expected some of {chosen}"));
+                Err(format!("found rows of {names}, expected some of {chosen}"))
             }
             _ => Ok(()),
         }
@@ -361,7 +358,7 @@ fn number(record: &StringRecord, column: &Column) -> Result<f64, String> {
     };
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
-        _ => return Err(format!("column {name}: '{text}' is not a number")),
+        _ => Err(format!("column {name}: '{text}' is not a number")),
     }
 }
 
