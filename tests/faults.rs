@@ -21,6 +21,8 @@ struct Writes {
 
 const OUT: &str = "OUT";
 const KILLS: u32 = 6;
+/// Moments at which a directory vanishes.
+const MOMENTS: u32 = 3;
 
 /// Every command that writes files, with `inputs`, a directory with what they read.
 fn commands(inputs: &Path) -> Vec<Writes> {
@@ -134,7 +136,7 @@ impl Writes {
         assert!(results(out) == *expected, "{:?}", self.arguments);
     }
 
-    /// The same under limits of the shell's `ulimit`.
+    /// The command under limits of the shell's `ulimit`.
     fn limited(&self, limit: &str, work: &Path, out: &Path) -> Command {
         let whole = self.writing(work, out);
         let mut command = Command::new("sh");
@@ -243,7 +245,8 @@ fn under_limits_of_the_system_a_command_ends_with_an_error_or_whole() {
     for command in commands(inputs.path()) {
         let work = tempfile::tempdir().unwrap();
         let expected = command.expected(work.path());
-        for limit in ["-n 8", "-n 14", "-n 20"] {
+        // Descriptors, and memory in kB.
+        for limit in ["-n 8", "-n 14", "-n 20", "-v 300000", "-v 600000"] {
             let out = work.path().join(limit.replace(' ', ""));
             fs::create_dir(&out).unwrap();
             let ran = command.limited(limit, work.path(), &out).output().unwrap();
@@ -254,6 +257,97 @@ fn under_limits_of_the_system_a_command_ends_with_an_error_or_whole() {
             assert!(code == Some(0) || told.contains("starpipe: "), "{told}");
             assert_whole(&command, &out, &expected);
         }
+    }
+}
+
+#[test]
+fn a_file_cut_by_a_limit_is_not_left_behind_and_a_rerun_completes_it() {
+    let inputs = inputs();
+    for command in commands(inputs.path()) {
+        let work = tempfile::tempdir().unwrap();
+        let expected = command.expected(work.path());
+        let out = work.path().join("out");
+        fs::create_dir(&out).unwrap();
+        // Blocks of 512 bytes; with the signal ignored, writing beyond them fails.
+        let mut limited = command.limited("-f 4 && trap '' XFSZ", work.path(), &out);
+        let ran = limited.output().unwrap();
+        let told = String::from_utf8_lossy(&ran.stderr).into_owned();
+        if expected.values().any(|content| content.len() > 2048) {
+            assert_eq!(ran.status.code(), Some(1), "{:?} {told}", command.arguments);
+            assert!(told.contains("File too large"), "{told}");
+        }
+        assert_whole(&command, &out, &expected);
+        command.complete(work.path(), &out, &expected);
+    }
+}
+
+#[test]
+fn a_directory_that_vanishes_meanwhile_is_told_or_made_again() {
+    let inputs = inputs();
+    for command in commands(inputs.path()) {
+        let work = tempfile::tempdir().unwrap();
+        let started = Instant::now();
+        let expected = command.expected(work.path());
+        let duration = started.elapsed();
+        for moment in 1..=MOMENTS {
+            let out = work.path().join("out");
+            fs::create_dir(&out).unwrap();
+            let child = command.writing(work.path(), &out).spawn().unwrap();
+            std::thread::sleep(duration * moment / (MOMENTS + 1));
+            let _ = fs::remove_dir_all(&out);
+            let ran = child.wait_with_output().unwrap();
+            let told = String::from_utf8_lossy(&ran.stderr).into_owned();
+            let code = ran.status.code();
+            assert!(
+                matches!(code, Some(0 | 1)),
+                "{:?} {told}",
+                command.arguments
+            );
+            assert!(code == Some(0) || told.contains("starpipe: "), "{told}");
+            if out.exists() {
+                assert_whole(&command, &out, &expected);
+                fs::remove_dir_all(&out).unwrap();
+            }
+        }
+        let out = work.path().join("out");
+        fs::create_dir(&out).unwrap();
+        command.complete(work.path(), &out, &expected);
+    }
+}
+
+#[test]
+fn a_damaged_index_is_made_anew_and_changes_nothing() {
+    let inputs = inputs();
+    let stars = inputs.path().join("stars.csv");
+    let process = |work: &Path, name: &str| {
+        let out = work.join(name);
+        let mut command = program(work);
+        command
+            .arg("process")
+            .arg(inputs.path().join("frames"))
+            .arg("--catalog");
+        command.arg(&stars).arg("--out").arg(&out);
+        let ran = command.output().unwrap();
+        assert!(matches!(ran.status.code(), Some(0 | 3)), "{ran:?}");
+        results(&out)
+    };
+    let work = tempfile::tempdir().unwrap();
+    let expected = process(work.path(), "expected");
+    let cache = work.path().join("cache");
+    let whole = files(&cache);
+    assert!(!whole.is_empty());
+    type Damage = fn(&[u8]) -> Vec<u8>;
+    let damages: [(&str, Damage); 4] = [
+        ("empty", |_| Vec::new()),
+        ("cut", |bytes| bytes[..bytes.len() / 2].to_vec()),
+        ("zeros", |bytes| vec![0; bytes.len()]),
+        ("flipped", |bytes| bytes.iter().map(|byte| !byte).collect()),
+    ];
+    for (name, damage) in damages {
+        for (path, content) in &whole {
+            fs::write(cache.join(path), damage(content)).unwrap();
+        }
+        assert!(process(work.path(), name) == expected, "{name}");
     }
 }
 

@@ -316,6 +316,27 @@ fn a_full_standard_output_is_a_failure() {
     assert!(stderr.contains("writing to standard output"), "{stderr}");
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_closed_standard_output_is_a_failure_and_dev_null_is_none() {
+    let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache");
+    for (redirection, expected) in [(">&-", 1), ("> /dev/null", 0), ("1<> /dev/null", 0)] {
+        let ran = Command::new("sh")
+            .arg("-c")
+            .arg(format!("exec \"$0\" \"$@\" {redirection}"))
+            .arg(env!("CARGO_BIN_EXE_starpipe"))
+            .arg("process")
+            .arg(orion())
+            .env("STARPIPE_CACHE_DIR", &cache)
+            .output()
+            .unwrap();
+        assert_eq!(ran.status.code(), Some(expected), "{redirection} {ran:?}");
+        let told = String::from_utf8(ran.stderr).unwrap();
+        let is_told = told.contains("writing to standard output: it is closed");
+        assert_eq!(is_told, expected == 1, "{redirection} {told}");
+    }
+}
+
 // ---- The cache
 
 #[test]

@@ -93,7 +93,7 @@ fn with_workspace<T>(interrupt: &Interrupt, solve: impl FnOnce(&mut Workspace) -
 
 /// When the work on a frame ends.
 fn interrupt_of(header: &Header) -> Interrupt {
-    const ASKED_PER_STEP: u32 = 16;
+    const ASKED_PER_STEP: u32 = 2;
     interrupt_after(ASKED_PER_STEP * (1 + u32::from(header.patience)))
 }
 
