@@ -8,7 +8,7 @@ use common::fixture;
 use starpipe::detect::DetectError;
 use starpipe::identify::IndexedCatalog;
 use starpipe::pipeline::{Outcome, Workspace, solve_frame};
-use starpipe::{Context, Interrupt, frame};
+use starpipe::{Context, Frame, Interrupt, frame};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -20,6 +20,32 @@ fn at_question(number: usize) -> (Interrupt, Arc<AtomicUsize>) {
         move || asked.fetch_add(1, Ordering::Relaxed) + 1 >= number
     });
     (interrupt, asked)
+}
+
+/// A small frame of whose inexact triangles each resembles very many of the catalogue's.
+fn few_triangles() -> Frame<'static> {
+    let spots = b"L]name\x16^\"m\x80\xff\xa5>/j\xe98D\x95\xe0L]\x16^\"m~\xd3R7\xc2$\x8f\x1d";
+    let first = [0xff, 0xa5, 0x3e, 0x2f, 0x6a, 0xe9, 0x38, 0x44, 0x95, 0xe0];
+    let values = [&first[..], &[0; 89], spots].concat();
+    let pixels: Vec<u8> = values.into_iter().cycle().take(200 * 49).collect();
+    Frame::from_samples(200, 49, &pixels[..])
+        .unwrap()
+        .into_owned()
+}
+
+#[test]
+fn a_search_of_few_triangles_is_asked_often_too() {
+    let indexed = IndexedCatalog::built_in();
+    let context = Context::new(&indexed);
+    let frame = few_triangles();
+    let (interrupt, asked) = at_question(2000);
+    let mut workspace = Workspace::new().until(&interrupt);
+    let solution = solve_frame(&frame, &context, &mut workspace).unwrap();
+    match solution.outcome {
+        Outcome::NotIdentified(reason) => assert_eq!(reason.code(), "interrupted"),
+        outcome => panic!("{outcome:?}"),
+    }
+    assert!(asked.load(Ordering::Relaxed) < 2010);
 }
 
 #[test]

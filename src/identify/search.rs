@@ -150,6 +150,8 @@ pub struct Search<'a> {
     hypotheses: u64,
     most_hypotheses: u64,
     candidates: u64,
+    /// Whether the caller wanted an end.
+    interrupted: bool,
     best_log10: Option<f64>,
     /// The best hypothesis that passes the limit but does not end the search.
     provisional: Option<Found>,
@@ -241,6 +243,7 @@ impl<'a> Search<'a> {
             hypotheses: 0,
             most_hypotheses,
             candidates: 0,
+            interrupted: false,
             best_log10: None,
             provisional: None,
         }
@@ -295,7 +298,7 @@ impl<'a> Search<'a> {
             let before = self.hypotheses;
             for middle in 1..faintest {
                 for brightest in 0..middle {
-                    if self.is_exhausted() || self.is_interrupted() {
+                    if self.is_to_end() {
                         self.tried = self.tried.min(faintest);
                         return None;
                     }
@@ -311,9 +314,14 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// Whether the search is to end without a result.
-    pub fn is_interrupted(&self) -> bool {
-        self.buffers.interrupt.is_due()
+    /// Whether the search is to end without a result, as its caller wants.
+    pub fn is_interrupted(&mut self) -> bool {
+        self.interrupted = self.interrupted || self.buffers.interrupt.is_due();
+        self.interrupted
+    }
+
+    fn is_to_end(&mut self) -> bool {
+        self.is_exhausted() || self.is_interrupted()
     }
 
     fn is_exhausted(&self) -> bool {
@@ -422,6 +430,9 @@ impl<'a> Search<'a> {
         class: usize,
         range_px: (f64, f64),
     ) -> Option<Found> {
+        if self.is_to_end() {
+            return None;
+        }
         let middle_px = (range_px.0 * range_px.1).sqrt();
         let vectors = self.vectors(triangle, middle_px);
         let shape = TriangleShape::new([&vectors[0], &vectors[1], &vectors[2]])?;
@@ -449,7 +460,8 @@ impl<'a> Search<'a> {
     /// Tries catalogue triangles in turn. Size and brightness of several are looked up first, so that
     /// the processor fetches for all of them at once.
     fn try_similar(&mut self, query: &Query, similar: &[[u32; 3]]) -> Option<Found> {
-        if self.is_exhausted() {
+        // Of a small frame's inexact triangles one alone may resemble millions.
+        if self.is_to_end() {
             return None;
         }
         let weighed: ArrayVec<Weighed, WEIGHED> = similar
