@@ -22,7 +22,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// Sides of a frame.
 const SIDES_PX: std::ops::RangeInclusive<usize> = 3..=200;
 /// How often the search for the stars of a list asks whether to end: some milliseconds.
-const MOST_ASKED: u32 = 400;
+const MOST_ASKED: u32 = 1000;
 /// How far outside the frame a listed centroid may lie: half a pixel of the border's pixel, and 5.
 const LISTED_BORDER_PX: f64 = 5.5;
 /// Stars of the catalogue that are drawn at most.
@@ -93,7 +93,7 @@ fn with_workspace<T>(interrupt: &Interrupt, solve: impl FnOnce(&mut Workspace) -
 
 /// When the work on a frame ends.
 fn interrupt_of(header: &Header) -> Interrupt {
-    const ASKED_PER_STEP: u32 = 2;
+    const ASKED_PER_STEP: u32 = 16;
     interrupt_after(ASKED_PER_STEP * (1 + u32::from(header.patience)))
 }
 
