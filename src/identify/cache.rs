@@ -89,7 +89,7 @@ struct StoredClass {
 }
 
 impl IndexFile {
-    /// Reads a chunk of a class: its triangles `range`.
+    /// Reads a chunk of a class: its triangles `range`, of a catalogue of so many `stars`.
     ///
     /// # Errors
     /// [`CacheError::Io`] if it cannot be read, [`CacheError::Damaged`] if it is not what [`store`]
@@ -99,6 +99,7 @@ impl IndexFile {
         class: usize,
         chunk: usize,
         range: Range<u32>,
+        stars: usize,
     ) -> Result<Box<[Triangle]>, CacheError> {
         let stored = &self.classes[class];
         let mut bytes = vec![0; range.len() * TRIANGLE_BYTES];
@@ -109,7 +110,13 @@ impl IndexFile {
             let what = format!("the checksum of chunk {chunk} of class {class} is wrong");
             return Err(self.delete_after(damaged(&self.path)(what)));
         }
-        Ok(bytes.as_chunks().0.iter().map(triangle).collect())
+        let triangles: Box<[Triangle]> = bytes.as_chunks().0.iter().map(triangle).collect();
+        let corners = triangles.iter().flat_map(|triangle| triangle.corners);
+        if corners.max().is_some_and(|corner| corner as usize >= stars) {
+            let what = format!("chunk {chunk} of class {class} names stars that are not there");
+            return Err(self.delete_after(damaged(&self.path)(what)));
+        }
+        Ok(triangles)
     }
 
     fn read_at(&self, start: u64, bytes: &mut [u8]) -> io::Result<()> {
@@ -210,6 +217,9 @@ pub fn load(
         return Err(damaged("the checksum of its table is wrong".into()));
     }
     let (classes, stored) = classes_of(&table);
+    if !classes.iter().all(SizeClass::is_ordered) {
+        return Err(damaged("the cells of its table overlap".into()));
+    }
     let triangles: u64 = classes.iter().map(|class| class.len() as u64).sum();
     let expected = (HEADER_BYTES + table.len()) as u64 + triangles * TRIANGLE_BYTES as u64;
     if length != expected {
@@ -287,6 +297,8 @@ pub fn store(path: &Path, catalog_checksum: u64, classes: &[SizeClass]) -> Resul
 mod tests {
     use super::*;
 
+    const STARS: usize = 102;
+
     fn classes() -> Vec<SizeClass> {
         let triangle = |i: u32| {
             let share = f64::from(i) / 100.0;
@@ -304,13 +316,50 @@ mod tests {
         let (mut triangles, mut damaged) = (Vec::new(), 0);
         for (number, class) in classes.iter().enumerate() {
             for chunk in 0..CHUNKS {
-                match file.chunk(number, chunk, class.range(chunk)) {
+                match file.chunk(number, chunk, class.range(chunk), STARS) {
                     Ok(read) => triangles.extend(read),
                     Err(_) => damaged += 1,
                 }
             }
         }
         (triangles, damaged)
+    }
+
+    /// The index of [`classes`] with one word of its table changed, and its checksum right.
+    fn changed(path: &Path, at: usize, word: u32) {
+        store(path, 7, &classes()).unwrap();
+        let mut bytes = std::fs::read(path).unwrap();
+        bytes[HEADER_BYTES + at..][..4].copy_from_slice(&word.to_le_bytes());
+        let table = HEADER_BYTES..HEADER_BYTES + 2 * CLASS_BYTES;
+        let header = header(7, &bytes[table]);
+        bytes[..HEADER_BYTES].copy_from_slice(&header);
+        std::fs::write(path, &bytes).unwrap();
+    }
+
+    #[test]
+    fn cells_that_overlap_are_damage_whatever_the_checksum() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = index_path(directory.path(), 7);
+        let first_cell = 16 + 8 * CHUNKS;
+        for (cell, start) in [(0, 1), (CELLS / 2, 41), (CELLS / 2, u32::MAX)] {
+            changed(&path, first_cell + 4 * cell, start);
+            let error = load(&path, 7).unwrap_err().to_string();
+            assert!(error.contains("overlap"), "{error}");
+        }
+    }
+
+    #[test]
+    fn triangles_of_stars_that_are_not_there_are_damage() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = index_path(directory.path(), 7);
+        store(&path, 7, &classes()).unwrap();
+        let (classes, file) = load(&path, 7).unwrap().unwrap();
+        let read = |stars| {
+            let mut chunks = 0..CHUNKS;
+            chunks.all(|chunk| file.chunk(1, chunk, classes[1].range(chunk), stars).is_ok())
+        };
+        assert!(read(STARS));
+        assert!(!read(STARS - 1));
     }
 
     #[test]

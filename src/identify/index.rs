@@ -82,14 +82,14 @@ impl TriangleIndex {
     /// The triangles of a chunk. If it cannot be read, its class is listed again from `stars`.
     pub fn chunk(&self, stars: &[Star], class: usize, chunk: usize) -> &[Triangle] {
         self.classes[class].chunks[chunk].get_or_init(|| {
-            self.read(class, chunk)
+            self.read(class, chunk, stars.len())
                 .unwrap_or_else(|| self.list_again(stars, class, chunk))
         })
     }
 
-    fn read(&self, class: usize, chunk: usize) -> Option<Box<[Triangle]>> {
+    fn read(&self, class: usize, chunk: usize, stars: usize) -> Option<Box<[Triangle]>> {
         let range = self.classes[class].range(chunk);
-        match self.file.as_ref()?.chunk(class, chunk, range) {
+        match self.file.as_ref()?.chunk(class, chunk, range, stars) {
             Ok(triangles) => Some(triangles),
             Err(error) => {
                 self.cache_errors().push(error);

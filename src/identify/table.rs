@@ -113,6 +113,11 @@ impl SizeClass {
         }
     }
 
+    /// Whether its cells follow one another.
+    pub fn is_ordered(&self) -> bool {
+        self.cell_starts.first() == Some(&0) && self.cell_starts.is_sorted()
+    }
+
     /// Number of triangles.
     pub fn len(&self) -> usize {
         self.cell_starts.last().map_or(0, |end| *end as usize)
@@ -150,7 +155,9 @@ impl SizeClass {
                 if from == to {
                     continue;
                 }
-                for triangle in &chunk(number)[from - before..to - before] {
+                // A damaged class may have fewer than it says.
+                let triangles = chunk(number).get(from - before..to - before);
+                for triangle in triangles.unwrap_or_default() {
                     let off = [0, 1].map(|i| f32::from(triangle.ratios[i]) - wanted[i]);
                     if off[0] * off[0] + off[1] * off[1] <= within_sq {
                         visit(&triangle.corners);
