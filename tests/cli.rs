@@ -470,8 +470,9 @@ fn a_damaged_cache_is_rebuilt() {
     let bright = concat!(env!("CARGO_MANIFEST_DIR"), "/catalogs/sky2000-bright.csv");
     let process = || {
         let mut command = starpipe();
-        command.args(["process", "--catalog", bright, "--cache-dir"]);
-        Ran::new(command.arg(cache.path()).arg(orion()))
+        command.args(["process", "--format", "csv", "--catalog", bright]);
+        command.arg("--cache-dir").arg(cache.path());
+        Ran::new(command.arg(orion()))
     };
     let files = || -> Vec<PathBuf> {
         let entries = fs::read_dir(cache.path()).unwrap();
@@ -511,6 +512,7 @@ fn a_damaged_cache_is_rebuilt() {
             "{what}: {}",
             ran.stderr
         );
+        assert_eq!(ran.stdout, first.stdout, "{what}");
         let again = process();
         assert_eq!((again.status, again.stderr.as_str()), (0, ""), "{what}");
     }

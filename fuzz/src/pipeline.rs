@@ -40,6 +40,12 @@ struct Header {
     patience: u8,
 }
 
+impl Header {
+    fn knows(&self, bit: u32) -> bool {
+        self.known >> bit & 1 == 1
+    }
+}
+
 /// Pixels from bytes: sides, kind of pixels, what is known, when the work ends early; then values.
 pub fn pipeline(data: &[u8]) {
     let Some(([width, height, kind, known, patience], values)) = data.split_first_chunk() else {
@@ -76,7 +82,7 @@ pub fn pipeline(data: &[u8]) {
     let text = report.to_text(TextOptions { all_stars: true });
     assert!(!text.contains("NaN") && !text.contains("inf "), "{text}");
     // The slowest part, and the one that depends least on the pixels.
-    if header.known >= 0xe0 {
+    if header.knows(6) && header.knows(7) {
         let picture = overlay::draw("fuzzed", &frame, solution, indexed.catalog());
         assert!(picture.width() > 0);
     }
@@ -105,32 +111,31 @@ fn interrupt_after(most: u32) -> Interrupt {
 
 /// What is known of the frame.
 fn context_of(header: &Header, indexed: &'static IndexedCatalog<'static>) -> Context<'static> {
-    let known = |bit: u32| header.known >> bit & 1 == 1;
     let mut context = Context::new(indexed);
-    context.attitude_only = known(0);
-    if known(1) {
+    context.attitude_only = header.knows(0);
+    if header.knows(1) {
         context.priors.scale = Some(ScalePrior {
             scale: Scale::FieldOfView(fov_deg(header.kind).to_radians()),
             tolerance: 0.1,
             source: ScaleSource::User,
         });
     }
-    if known(2) {
+    if header.knows(2) {
         context.priors.date = "2024-08-12T22:15:00Z".parse().ok().map(|date| FrameDate {
             date,
             source: DateSource::Option,
         });
     }
-    if known(3) {
+    if header.knows(3) {
         context.priors.site = Site::new(45.0, 7.0, 300.0).ok();
     }
-    if known(4) {
+    if header.knows(4) {
         context.priors.exposure_s = Some(0.5);
     }
-    if known(5) {
+    if header.knows(5) {
         context.camera = Some(StatedCamera {
             sheet: Preset::NanosatTracker.data_sheet(),
-            zenith_distance_deg: known(3).then_some(40.0),
+            zenith_distance_deg: header.knows(3).then_some(40.0),
             extinction: None,
         });
     }
@@ -218,7 +223,7 @@ fn draw_stars(pixels: &mut [f32], header: &Header, pointing: [u8; 6]) {
     let attitude = Rotation::looking_at(&boresight, TAU * share(4));
     let (width_px, height_px) = (header.width_px as f64, header.height_px as f64);
     let focal_px = camera::focal_length_px(width_px, fov_deg(header.kind).to_radians());
-    let camera = CameraModel::pinhole(width_px, height_px, focal_px, header.known & 0x40 != 0);
+    let camera = CameraModel::pinhole(width_px, height_px, focal_px, header.knows(6));
     let stars = sky().catalog().stars().iter();
     let mut seen: Vec<(f64, PixelPoint)> = stars
         .filter_map(|star| {
@@ -260,8 +265,7 @@ fn sky() -> &'static IndexedCatalog<'static> {
 
 /// What holds for every report; stars lie at most `border_px` outside the frame.
 fn check(report: &FrameReport, solution: &Solution, border_px: f64) {
-    let line = report.to_json_line().expect("a report is JSON");
-    let value: Value = serde_json::from_str(&line).expect("it is read again");
+    let value = json_of(report);
     let (width, height) = (solution.width as f64, solution.height as f64);
     for star in value["stars"].as_array().expect("a list of stars") {
         let number = |name: &str| star[name].as_f64();
@@ -289,14 +293,18 @@ fn check(report: &FrameReport, solution: &Solution, border_px: f64) {
             .filter_map(Value::as_f64)
             .map(|part| part * part)
             .sum();
-        assert!((squares - 1.0).abs() < 1e-6, "{line}");
+        assert!((squares - 1.0).abs() < 1e-6, "{value}");
     }
+}
+
+fn json_of(report: &FrameReport) -> Value {
+    let line = report.to_json_line().expect("a report is JSON");
+    serde_json::from_str(&line).expect("it is read again")
 }
 
 /// A report without what differs from run to run.
 fn without_times(report: &FrameReport) -> Value {
-    let line = report.to_json_line().expect("a report is JSON");
-    let mut value: Value = serde_json::from_str(&line).expect("it is read again");
+    let mut value = json_of(report);
     value["timing_ms"] = Value::Null;
     value
 }

@@ -8,8 +8,7 @@ use super::solving::options::{LIST_RESULTS, SolvingOptions};
 use super::solving::result_files::{Image, Solved};
 use super::solving::{Plan, Taker, solve_all};
 use clap::Args;
-use starpipe::pipeline::CentroidListOptions;
-use starpipe::pipeline::{Context, Workspace, solve_centroids};
+use starpipe::pipeline::{CentroidListOptions, Context, Workspace, solve_centroids};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]

@@ -150,7 +150,7 @@ pub struct Search<'a> {
     hypotheses: u64,
     most_hypotheses: u64,
     candidates: u64,
-    /// Whether the caller wanted an end.
+    /// Whether the interrupt was due; then it is not asked again.
     interrupted: bool,
     best_log10: Option<f64>,
     /// The best hypothesis that passes the limit but does not end the search.

@@ -12,7 +12,7 @@ use std::fmt;
 /// Why a list of centroids cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub struct CentroidListError {
-    /// The line, from 1, where it is one line's.
+    /// The line, from 1 and with the heading, where it is one line's.
     pub line: Option<u64>,
     /// What was found and expected.
     pub problem: String,
@@ -98,55 +98,50 @@ impl CentroidList {
     /// [`CentroidListError`]: a column is missing, a value is no number or outside the frame, the
     /// list is empty, or has several frames of which none is chosen.
     pub fn parse(csv: &[u8], options: &CentroidListOptions) -> Result<Self, CentroidListError> {
-        parse(csv, options)
-    }
-}
-
-/// Lines in errors are counted from 1, heading included.
-fn parse(input: &[u8], options: &CentroidListOptions) -> Result<CentroidList, CentroidListError> {
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .flexible(true)
-        .comment(Some(b'#'))
-        .from_reader(input);
-    let columns = Columns::find(reader.headers().map_err(not_a_table)?)
-        .map_err(CentroidListError::of_list)?;
-    let mut centroids = Vec::new();
-    // As tables have it.
-    let chosen = options.frame.as_deref().map(printable);
-    let mut frames = Frames::new(chosen.as_deref());
-    for record in reader.records() {
-        let record = record.map_err(not_a_table)?;
-        // Spreadsheets write such lines at the end of a table.
-        if record.iter().all(str::is_empty) {
-            continue;
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .flexible(true)
+            .comment(Some(b'#'))
+            .from_reader(csv);
+        let columns = Columns::find(reader.headers().map_err(not_a_table)?)
+            .map_err(CentroidListError::of_list)?;
+        let mut centroids = Vec::new();
+        // As tables have it.
+        let chosen = options.frame.as_deref().map(printable);
+        let mut frames = Frames::new(chosen.as_deref());
+        for record in reader.records() {
+            let record = record.map_err(not_a_table)?;
+            // Spreadsheets write such lines at the end of a table.
+            if record.iter().all(str::is_empty) {
+                continue;
+            }
+            if !frames.is_wanted(columns.frame_of(&record)) {
+                continue;
+            }
+            let line = record.position().map_or(0, csv::Position::line);
+            let centroid = columns
+                .centroid(&record)
+                .and_then(|centroid| check_inside(&centroid.position, options).map(|()| centroid))
+                .map_err(|problem| CentroidListError::of_line(line, problem))?;
+            centroids.push(centroid);
         }
-        if !frames.is_wanted(columns.frame_of(&record)) {
-            continue;
+        frames.check().map_err(CentroidListError::of_list)?;
+        if centroids.is_empty() {
+            return Err(CentroidListError::of_list(
+                "found a heading without centroids below it",
+            ));
         }
-        let line = record.position().map_or(0, csv::Position::line);
-        let centroid = columns
-            .centroid(&record)
-            .and_then(|centroid| check_inside(&centroid.position, options).map(|()| centroid))
-            .map_err(|problem| CentroidListError::of_line(line, problem))?;
-        centroids.push(centroid);
+        let (width, height) = frame_size(&centroids, options);
+        Ok(Self {
+            width,
+            height,
+            photometry: match columns.kind {
+                Brightness::JohnsonV => Photometry::JohnsonV,
+                Brightness::Mag | Brightness::Flux => Photometry::Instrumental,
+            },
+            centroids,
+        })
     }
-    frames.check().map_err(CentroidListError::of_list)?;
-    if centroids.is_empty() {
-        return Err(CentroidListError::of_list(
-            "found a heading without centroids below it",
-        ));
-    }
-    let (width, height) = frame_size(&centroids, options);
-    Ok(CentroidList {
-        width,
-        height,
-        photometry: match columns.kind {
-            Brightness::JohnsonV => Photometry::JohnsonV,
-            Brightness::Mag | Brightness::Flux => Photometry::Instrumental,
-        },
-        centroids,
-    })
 }
 
 /// Describes an error of the CSV reader with its line.
@@ -401,7 +396,7 @@ mod tests {
     use super::*;
 
     fn parsed(text: &str) -> Result<CentroidList, CentroidListError> {
-        parse(text.as_bytes(), &CentroidListOptions::default())
+        CentroidList::parse(text.as_bytes(), &CentroidListOptions::default())
     }
 
     fn error(text: &str) -> String {
@@ -435,7 +430,7 @@ mod tests {
             frame: Some(frame.to_owned()),
             ..CentroidListOptions::default()
         };
-        parse(TABLE.as_bytes(), &options)
+        CentroidList::parse(TABLE.as_bytes(), &options)
     }
 
     #[test]
@@ -525,9 +520,10 @@ mod tests {
             width: Some(100),
             ..CentroidListOptions::default()
         };
-        let error = parse("x,y,mag\n99.4,2,3\n105,2,3\n".as_bytes(), &size).unwrap_err();
+        let error =
+            CentroidList::parse("x,y,mag\n99.4,2,3\n105,2,3\n".as_bytes(), &size).unwrap_err();
         assert!(format!("{error}").starts_with("line 3: column x: 105 is more than 5 px outside"));
-        let list = parse("x,y,mag\n9,2,3\n".as_bytes(), &size).unwrap();
+        let list = CentroidList::parse("x,y,mag\n9,2,3\n".as_bytes(), &size).unwrap();
         assert_eq!((list.width, list.height), (100, 3));
     }
 
@@ -550,7 +546,7 @@ mod tests {
                 "line 1: found bytes that are not UTF-8",
             ),
         ] {
-            let error = parse(text, &CentroidListOptions::default())
+            let error = CentroidList::parse(text, &CentroidListOptions::default())
                 .unwrap_err()
                 .to_string();
             assert!(error.starts_with(expected), "{error}");

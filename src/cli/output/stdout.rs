@@ -1,7 +1,7 @@
 //! Standard output.
 //!
-//! Where a process begins without standard output, as after `>&-`, Rust's runtime opens `/dev/null` in
-//! its place, and every result would be lost without a word. So it is looked at before that.
+//! Where a process begins without standard output, as after `>&-`, Rust's runtime opens `/dev/null`
+//! in its place, and results would be lost without a message. So a function checks it before that.
 
 use anyhow::Context;
 use std::io::{self, Write};
@@ -35,11 +35,14 @@ mod before_main {
     use std::sync::atomic::Ordering;
 
     // Sound: the loader calls each function of this section once, before `main`, in the only thread
-    // there is. This one takes no arguments and cannot panic; it makes one system call that changes
-    // nothing, sets an atomic, and uses nothing that Rust's runtime prepares. Nothing safe can tell the
-    // runtime's `/dev/null` from one that a caller opened in the same way, as Python's
-    // `subprocess.DEVNULL` is.
-    #[allow(unsafe_code, reason = "the place of a function pointer; see above")]
+    // there is. This one takes no arguments and cannot panic. It makes one system call that changes
+    // nothing, sets an atomic, and uses nothing that Rust's runtime prepares.
+    // Needed: the runtime's `/dev/null` is opened as that of Python's `subprocess.DEVNULL`, so no
+    // later check can tell them apart.
+    #[allow(
+        unsafe_code,
+        reason = "puts a function pointer into a section; see above"
+    )]
     #[used]
     #[unsafe(link_section = ".init_array")]
     static LOOK: extern "C" fn() = {

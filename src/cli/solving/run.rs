@@ -51,7 +51,8 @@ impl Plan {
 pub(crate) type Taker<'a> = &'a mut dyn FnMut(Image, anyhow::Result<Solved>);
 
 /// Solves every input, prints its report and writes its result files, which have these
-/// `extensions`. `solve` hands each image of an input to its taker. Inputs that cannot be read are reported, and the others solved.
+/// `extensions`. `solve` hands each image of an input to its taker. Inputs that cannot be read are
+/// reported, and the others solved.
 pub(crate) fn solve_all(
     inputs: &[PathBuf],
     options: SolvingOptions,
