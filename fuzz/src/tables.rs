@@ -1,12 +1,12 @@
 //! Readers of catalogues, descriptions and tables.
 
 use crate::scratch::{directory, with_file};
-use starpipe::IndexedCatalog;
 use starpipe::archive::names_in;
 use starpipe::calibration::read_hot_pixels;
 use starpipe::camera::data_sheet::{DataSheet, Response, SpotImage};
 use starpipe::sky::catalog::Catalog;
 use starpipe::study::validation::store::RunTables;
+use starpipe::{IndexedCatalog, Interrupt};
 use std::fs;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -48,7 +48,7 @@ fn check_stars(catalog: &Catalog) {
 }
 
 /// Changes of an index: place (four bytes) and value, again and again. The checksum of its table is
-/// made right. Whatever it holds, the catalogue is indexed.
+/// made right. It is used, or found to be damaged; to make it anew would take most of the time.
 pub fn index(changes: &[u8]) {
     const HEADER_BYTES: usize = 48;
     let (catalog, name, whole) = indexed();
@@ -67,9 +67,12 @@ pub fn index(changes: &[u8]) {
     let place = directory().join(format!("index-{:?}", std::thread::current().id()));
     fs::create_dir_all(&place).expect("the temporary directory can be written");
     fs::write(place.join(name), &bytes).expect("the temporary directory can be written");
-    let indexed = IndexedCatalog::open(catalog, Some(&place), &|_| ());
+    let at_once = Interrupt::when(|| true);
+    let Ok(indexed) = IndexedCatalog::open_until(catalog, Some(&place), &|_| (), &at_once) else {
+        return;
+    };
     assert_eq!(indexed.stars().len(), catalog.stars().len());
-    // What is damaged is found when it is used, and made anew.
+    // Damage behind the table is found when it is used, and mended.
     crate::pipeline::identify_some(&indexed);
     let _ = indexed.take_cache_errors();
 }
