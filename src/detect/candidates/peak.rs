@@ -33,7 +33,8 @@ pub(super) fn parabola_vertex(value: f32, [left, right, above, below]: [f32; 4])
     let vertex = |before: f32, after: f32| {
         let curvature = 2.0 * value - before - after;
         let offset = 0.5 * (after - before) / curvature;
-        if curvature > 0.0 {
+        // The filter's sum over the largest floats is infinite.
+        if curvature > 0.0 && !offset.is_nan() {
             offset.clamp(-MAX_OFFSET_PX, MAX_OFFSET_PX)
         } else {
             0.0
@@ -55,4 +56,21 @@ pub(super) fn is_saturated(frame: &View<'_>, x: usize, y: usize, saturation_adu:
 /// positive, the lower `index` comes first.
 pub(super) fn highest_first(snr: f32, index: usize) -> u64 {
     u64::from(!snr.to_bits()) << 32 | index as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_vertex_is_within_the_pixel_whatever_is_beside_it() {
+        assert_eq!(parabola_vertex(2.0, [1.0, 1.0, 0.0, 1.0]), [0.0, 1.0 / 6.0]);
+        let values = [f32::NEG_INFINITY, f32::MIN, -1.0, 1.0];
+        for before in values {
+            for after in values {
+                let [x, y] = parabola_vertex(1.0, [before, after, after, before]);
+                assert!(x.abs() < 0.5 && y.abs() < 0.5, "{before} {after}: {x} {y}");
+            }
+        }
+    }
 }
