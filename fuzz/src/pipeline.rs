@@ -21,8 +21,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Sides of a frame.
 const SIDES_PX: std::ops::RangeInclusive<usize> = 3..=200;
-/// How often the search for the stars of a list asks whether to end: some milliseconds.
-const MOST_ASKED: u32 = 1000;
+/// How often the search for the stars of a list asks whether to end: a millisecond.
+const MOST_ASKED: u32 = 50;
 /// How far outside the frame a listed centroid may lie: half a pixel of the border's pixel, and 5.
 const LISTED_BORDER_PX: f64 = 5.5;
 /// Stars of the catalogue that are drawn at most.

@@ -127,7 +127,7 @@ def process(
     zenith_distance: Any = None,
     extinction: Any = None,
     name_odds: float = NAME_ODDS,
-    time_limit: Any = 10.0,
+    time_limit: Any = 8.0,
 ) -> Archive:
     """Solve the frames of an archive, and write tables of frames and stars.
 

@@ -11,7 +11,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// How long a frame may take by default where many are solved, in seconds.
-pub const DEFAULT_TIME_LIMIT_S: f64 = 10.0;
+pub const DEFAULT_TIME_LIMIT_S: f64 = 8.0;
 
 /// What the stages need and what does not change from frame to frame.
 #[derive(Clone)]
