@@ -5,7 +5,12 @@
 
 use super::disjoint_sets::{self, join, root_of};
 use super::region::Region;
+use crate::base::interrupt::Interrupted;
+use crate::detect::pixels::View;
 use std::ops::Range;
+
+/// Runs between two looks for an interrupt: less than a millisecond.
+const RUNS_AT_ONCE: usize = 1 << 12;
 
 /// A pixel above the threshold.
 #[derive(Debug, Clone, Copy)]
@@ -35,6 +40,43 @@ impl PixelRun {
     fn pixels(&self) -> Range<usize> {
         self.pixel as usize..(self.pixel + (self.end - self.start)) as usize
     }
+
+    /// The index of its pixel in a column.
+    fn pixel_in(&self, column: i64) -> usize {
+        self.pixel as usize + (column - i64::from(self.start)) as usize
+    }
+
+    /// Calls `visit` with each pixel of the run and those of `above`, in the row before, that are
+    /// next to it.
+    fn for_each_adjacent(&self, above: &Self, visit: &mut impl FnMut(usize, usize)) {
+        for offset in -1..=1 {
+            let from = i64::from(self.start).max(i64::from(above.start) - offset);
+            let to = i64::from(self.end).min(i64::from(above.end) - offset);
+            for column in from..to {
+                visit(self.pixel_in(column), above.pixel_in(column + offset));
+            }
+        }
+    }
+}
+
+/// Goes through the runs in reading order, and finds those that touch each.
+#[derive(Default)]
+struct TouchingRuns {
+    /// The first run that may still touch a run of this row or a later one.
+    first: usize,
+}
+
+impl TouchingRuns {
+    /// Indices of the runs in the row before that of run `index` that touch it.
+    fn before(&mut self, runs: &[PixelRun], index: usize) -> impl Iterator<Item = usize> {
+        let run = runs[index];
+        while runs[self.first].y + 1 < run.y
+            || (runs[self.first].y < run.y && runs[self.first].end < run.start)
+        {
+            self.first += 1;
+        }
+        (self.first..index).take_while(move |&i| runs[i].y < run.y && runs[i].start <= run.end)
+    }
 }
 
 /// Placeholder for a region that is not known yet.
@@ -45,8 +87,6 @@ const NO_REGION: u32 = u32::MAX;
 pub(super) struct Labelling {
     /// In reading order.
     pub pixels: Vec<BrightPixel>,
-    /// Index of the first pixel of each row, and the number of pixels.
-    row_starts: Vec<usize>,
     /// In reading order.
     runs: Vec<PixelRun>,
     parents: Vec<u32>,
@@ -60,17 +100,7 @@ impl Labelling {
     /// Removes all pixels.
     pub fn clear(&mut self) {
         self.pixels.clear();
-        self.row_starts.clear();
         self.runs.clear();
-    }
-
-    /// Goes on to row `y`; whether that row is new.
-    pub fn begin_row(&mut self, y: usize) -> bool {
-        let is_new = self.row_starts.len() <= y;
-        if is_new {
-            self.row_starts.resize(y + 1, self.pixels.len());
-        }
-        is_new
     }
 
     /// Adds a pixel to the run of the pixel before it if the two are adjacent, else to a new run.
@@ -92,10 +122,8 @@ impl Labelling {
         [index, self.runs.len() as u32 - 1]
     }
 
-    /// Ends the frame of `height` rows, and joins touching runs into regions, numbered in reading
-    /// order.
-    pub fn connect(&mut self, height: usize) {
-        self.row_starts.resize(height + 1, self.pixels.len());
+    /// Joins touching runs into regions, numbered in reading order.
+    pub fn connect(&mut self) {
         self.join_touching_runs();
         self.number_regions();
         self.sort_runs_by_region();
@@ -104,18 +132,9 @@ impl Labelling {
     fn join_touching_runs(&mut self) {
         let Self { runs, parents, .. } = self;
         disjoint_sets::reset(parents, runs.len());
-        // The first run that may still touch a run of this row or a later one.
-        let mut first = 0;
+        let mut touching = TouchingRuns::default();
         for index in 0..runs.len() {
-            let run = runs[index];
-            while runs[first].y + 1 < run.y
-                || (runs[first].y < run.y && runs[first].end < run.start)
-            {
-                first += 1;
-            }
-            let touching =
-                (first..index).take_while(|&i| runs[i].y < run.y && runs[i].start <= run.end);
-            for other in touching {
+            for other in touching.before(runs, index) {
                 join(parents, index as u32, other as u32);
             }
         }
@@ -184,24 +203,33 @@ impl Labelling {
         }
     }
 
-    /// The neighbours of pixel `index` that lie above the threshold.
-    pub fn neighbours(&self, index: usize) -> impl Iterator<Item = usize> + '_ {
-        let BrightPixel { x, y, .. } = self.pixels[index];
-        let rows = (y as usize).saturating_sub(1)..=y as usize + 1;
-        rows.flat_map(move |row| self.in_row(row, x.saturating_sub(1), x + 1))
-            .filter(move |&other| other != index)
-    }
-
-    /// Indices of the pixels of row `y` with columns in `from..=to`.
-    fn in_row(&self, y: usize, from: u32, to: u32) -> Range<usize> {
-        let (Some(&start), Some(&end)) = (self.row_starts.get(y), self.row_starts.get(y + 1))
-        else {
-            return 0..0;
-        };
-        let row = &self.pixels[start..end];
-        let low = row.partition_point(|p| p.x < from);
-        let high = low + row[low..].iter().take_while(|p| p.x <= to).count();
-        start + low..start + high
+    /// Calls `visit` with each two adjacent pixels of the regions that are wanted, the later in
+    /// reading order first.
+    ///
+    /// # Errors
+    /// [`Interrupted`] of work on `view`.
+    pub fn for_each_adjacent(
+        &self,
+        view: &View<'_>,
+        is_wanted: impl Fn(usize) -> bool,
+        mut visit: impl FnMut(usize, usize),
+    ) -> Result<(), Interrupted> {
+        let mut touching = TouchingRuns::default();
+        for (index, run) in self.runs.iter().enumerate() {
+            if index % RUNS_AT_ONCE == 0 {
+                view.check()?;
+            }
+            if !is_wanted(run.region as usize) {
+                continue;
+            }
+            for pixel in run.pixels().skip(1) {
+                visit(pixel, pixel - 1);
+            }
+            for other in touching.before(&self.runs, index) {
+                run.for_each_adjacent(&self.runs[other], &mut visit);
+            }
+        }
+        Ok(())
     }
 }
 
@@ -216,12 +244,11 @@ mod tests {
     fn labels(mask: &GrayImage) -> Vec<u32> {
         let mut labelling = Labelling::default();
         for (x, y, pixel) in mask.enumerate_pixels() {
-            labelling.begin_row(y as usize);
             if pixel.0 != [0] {
                 labelling.add(BrightPixel { x, y, snr: 9.0 });
             }
         }
-        labelling.connect(mask.height() as usize);
+        labelling.connect();
         let mut labels = vec![0; mask.len()];
         for region in 0..labelling.region_starts.len() - 1 {
             for index in labelling.pixels_of_region(region) {

@@ -1,97 +1,248 @@
 //! The prominence of peaks: height above the highest saddle towards a higher peak of the region.
 //!
-//! Each region is flooded from the top down. Where two floods meet, the lower peak has its saddle.
+//! 1. Each pixel belongs to the top to which the steepest ascent leads.
+//! 2. Where pixels of two tops are adjacent there is a saddle.
+//! 3. From the highest saddle down, each joins what belongs to two tops. The lower top has its saddle
+//!    there.
+//!
+//! All but the last step goes through the pixels in reading order: to flood them from the top down is
+//! the same, and takes ten times as long in large regions, which no cache holds.
 //!
 //! # Reference
 //! Edelsbrunner, Letscher & Zomorodian 2002, doi 10.1007/s00454-002-2885-2, for prominence as
 //! persistence.
 
-use super::disjoint_sets::{self, join, root_of};
-use super::labelling::Labelling;
-use super::peak::{Peak, highest_first};
+use super::disjoint_sets::root_of;
+use super::labelling::{BrightPixel, Labelling};
+use super::peak::Peak;
 use crate::base::interrupt::Interrupted;
 use crate::detect::pixels::View;
 
-/// Pixels between two looks for an interrupt: some milliseconds.
-const PIXELS_AT_ONCE: usize = 1 << 16;
+/// Logarithm to base 2 of the number of saddles that are remembered.
+const RECENT_BITS: u32 = 13;
 
-/// Buffers of the flooding.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Flooding {
-    /// Heights of the pixels of one region, inverted, and their indices: highest first when sorted.
-    by_height: Vec<u64>,
-    /// Indices of the pixels of one region, highest first.
-    members: Vec<u32>,
-    /// Disjoint sets of the members' ranks: one for each flood.
-    floods: Vec<u32>,
-    /// Rank by height of each pixel within its region, where it was needed.
-    ranks: Vec<u32>,
+/// Where pixels of two tops are adjacent.
+#[derive(Debug, Clone, Copy, Default)]
+struct Saddle {
+    /// Indices of the tops, in ascending order; equal where there is no saddle.
+    tops: [u32; 2],
+    /// Height, in units of the local noise.
+    snr: f32,
 }
 
-impl Flooding {
-    /// Sets the prominences of a region's peaks; `peak_pixels` holds the pixel of each of all
-    /// peaks, in ascending order, and its run.
+impl Saddle {
+    /// Its place among the recent ones.
+    fn slot(&self) -> usize {
+        let [a, b] = self.tops;
+        let hash = a.wrapping_mul(0x9e37_79b9) ^ b.wrapping_mul(0x85eb_ca6b);
+        (hash >> (u32::BITS - RECENT_BITS)) as usize
+    }
+}
+
+/// Buffers.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Prominence {
+    /// The top of each pixel, as its index: a pixel without a higher one next to it.
+    tops: Vec<u32>,
+    /// Saddles found last: two tops are adjacent at many pixels, of which the highest counts.
+    recent: Vec<Saddle>,
+    saddles: Vec<Saddle>,
+}
+
+impl Prominence {
+    /// Finds the top of each pixel of the regions that are wanted.
     ///
     /// # Errors
     /// [`Interrupted`] of work on `view`.
-    pub fn set_prominences(
+    pub fn find_tops(
         &mut self,
-        (region, view): (usize, &View<'_>),
         labelling: &Labelling,
-        peak_pixels: &[[u32; 2]],
-        peaks: &mut [Peak],
+        view: &View<'_>,
+        is_wanted: impl Fn(usize) -> bool,
     ) -> Result<(), Interrupted> {
-        self.sort_members(region, labelling);
-        let Self {
-            members,
-            floods,
-            ranks,
-            ..
-        } = self;
-        // The root of a flood is its highest pixel, since the lowest rank represents a set.
-        disjoint_sets::reset(floods, members.len());
-        for (r, &index) in members.iter().enumerate() {
-            if r % PIXELS_AT_ONCE == 0 {
-                view.check()?;
+        let (tops, pixels) = (&mut self.tops, &labelling.pixels);
+        tops.clear();
+        tops.extend(0..pixels.len() as u32);
+        labelling.for_each_adjacent(view, is_wanted, |pixel, before| {
+            let (low, high) = if is_higher(pixels, pixel, before) {
+                (before, pixel)
+            } else {
+                (pixel, before)
+            };
+            if is_higher(pixels, high, tops[low] as usize) {
+                tops[low] = high as u32;
             }
-            let snr = labelling.pixels[index as usize].snr;
-            for other in labelling.neighbours(index as usize) {
-                let other = ranks[other];
-                if other as usize >= r {
-                    continue;
-                }
-                let (a, b) = (root_of(floods, r as u32), root_of(floods, other));
-                if a != b {
-                    let lower = members[a.max(b) as usize];
-                    let peak = peak_pixels.binary_search_by_key(&lower, |&[pixel, _]| pixel);
-                    if let Ok(peak) = peak {
-                        peaks[peak].prominence = labelling.pixels[lower as usize].snr - snr;
-                    }
-                    join(floods, a, b);
-                }
-            }
+        })?;
+        for pixel in 0..pixels.len() {
+            tops[pixel] = root_of(tops, pixel as u32);
         }
         Ok(())
     }
 
-    /// Sorts the pixels of a region by height, and ranks them.
-    fn sort_members(&mut self, region: usize, labelling: &Labelling) {
+    /// Finds the saddles between the tops of the regions that are wanted.
+    ///
+    /// # Errors
+    /// [`Interrupted`] of work on `view`.
+    pub fn find_saddles(
+        &mut self,
+        labelling: &Labelling,
+        view: &View<'_>,
+        is_wanted: impl Fn(usize) -> bool,
+    ) -> Result<(), Interrupted> {
         let Self {
-            by_height,
-            members,
-            ranks,
-            ..
+            tops,
+            recent,
+            saddles,
         } = self;
-        let pixels = &labelling.pixels;
-        by_height.clear();
-        let indices = labelling.pixels_of_region(region);
-        by_height.extend(indices.map(|i| highest_first(pixels[i].snr, i)));
-        by_height.sort_unstable();
-        members.clear();
-        members.extend(by_height.iter().map(|&key| key as u32));
-        ranks.resize(pixels.len().max(ranks.len()), 0);
-        for (rank, &index) in members.iter().enumerate() {
-            ranks[index as usize] = rank as u32;
+        saddles.clear();
+        recent.clear();
+        recent.resize(1 << RECENT_BITS, Saddle::default());
+        labelling.for_each_adjacent(view, is_wanted, |pixel, before| {
+            let [a, b] = [pixel, before].map(|index| tops[index]);
+            if a != b {
+                let [snr, of_before] = [pixel, before].map(|index| labelling.pixels[index].snr);
+                let found = Saddle {
+                    tops: [a.min(b), a.max(b)],
+                    snr: snr.min(of_before),
+                };
+                let last = &mut recent[found.slot()];
+                if last.tops == found.tops {
+                    last.snr = last.snr.max(found.snr);
+                } else {
+                    saddles.push(std::mem::replace(last, found));
+                }
+            }
+        })?;
+        saddles.append(recent);
+        saddles.retain(|saddle| saddle.tops[0] != saddle.tops[1]);
+        Ok(())
+    }
+
+    /// Sets the prominences of the peaks; `peak_pixels` holds the pixel of each, in ascending order,
+    /// and its run.
+    pub fn set(&mut self, pixels: &[BrightPixel], peak_pixels: &[[u32; 2]], peaks: &mut [Peak]) {
+        let Self { tops, saddles, .. } = self;
+        saddles.sort_unstable_by(|a, b| b.snr.total_cmp(&a.snr));
+        for saddle in saddles {
+            let [a, b] = saddle.tops.map(|top| root_of(tops, top) as usize);
+            if a == b {
+                continue;
+            }
+            let (low, high) = if is_higher(pixels, a, b) {
+                (b, a)
+            } else {
+                (a, b)
+            };
+            let peak = peak_pixels.binary_search_by_key(&low, |&[pixel, _]| pixel as usize);
+            if let Ok(peak) = peak {
+                peaks[peak].prominence = pixels[low].snr - saddle.snr;
+            }
+            tops[low] = high as u32;
+        }
+    }
+}
+
+/// Whether pixel `a` is higher than `b`; of equal ones the first in reading order is.
+fn is_higher(pixels: &[BrightPixel], a: usize, b: usize) -> bool {
+    let [of_a, of_b] = [a, b].map(|index| pixels[index].snr);
+    of_a > of_b || (of_a == of_b && a < b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const THRESHOLD: u8 = 3;
+
+    /// The pixels of a frame above the threshold.
+    fn labelling(width: usize, values: &[u8]) -> Labelling {
+        let mut labelling = Labelling::default();
+        for (index, &value) in values.iter().enumerate() {
+            if value >= THRESHOLD {
+                let (x, y) = ((index % width) as u32, (index / width) as u32);
+                let snr = f32::from(value);
+                labelling.add(BrightPixel { x, y, snr });
+            }
+        }
+        labelling.connect();
+        labelling
+    }
+
+    fn are_adjacent(a: &BrightPixel, b: &BrightPixel) -> bool {
+        a.x.abs_diff(b.x) <= 1 && a.y.abs_diff(b.y) <= 1
+    }
+
+    /// Indices of the pixels that are reached from `top` through none below `level`.
+    fn flooded(pixels: &[BrightPixel], top: usize, level: f32) -> Vec<usize> {
+        let mut reached = vec![top];
+        let mut next = 0;
+        while let Some(&from) = reached.get(next) {
+            next += 1;
+            for (index, pixel) in pixels.iter().enumerate() {
+                let is_new = pixel.snr >= level && !reached.contains(&index);
+                if is_new && are_adjacent(pixel, &pixels[from]) {
+                    reached.push(index);
+                }
+            }
+        }
+        reached
+    }
+
+    /// The prominence of a top: down to where its flood reaches a higher pixel, or its height.
+    fn expected(pixels: &[BrightPixel], top: usize) -> f32 {
+        let height = pixels[top].snr;
+        let levels = (THRESHOLD..=height as u8).rev().map(f32::from);
+        let reaches_higher = |level: &f32| {
+            let reached = flooded(pixels, top, *level);
+            reached.iter().any(|&index| is_higher(pixels, index, top))
+        };
+        levels
+            .into_iter()
+            .find(reaches_higher)
+            .map_or(height, |level| height - level)
+    }
+
+    fn peak(pixel: &BrightPixel) -> Peak {
+        Peak {
+            x: pixel.x as usize,
+            y: pixel.y as usize,
+            offset_px: [0.0; 2],
+            values: None,
+            snr: pixel.snr,
+            prominence: pixel.snr,
+            region: 0,
+            saturated: false,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn prominences_are_those_of_a_flood(
+            width in 3..14_usize,
+            values in prop::collection::vec(0..9_u8, 20..150),
+        ) {
+            let labelling = labelling(width, &values);
+            let pixels = &labelling.pixels;
+            let is_top = |&index: &usize| {
+                let higher = |other| is_higher(pixels, other, index);
+                let beside = |other| are_adjacent(&pixels[other], &pixels[index]);
+                !(0..pixels.len()).any(|other| higher(other) && beside(other))
+            };
+            let tops: Vec<usize> = (0..pixels.len()).filter(is_top).collect();
+            let peak_pixels: Vec<[u32; 2]> = tops.iter().map(|&top| [top as u32, 0]).collect();
+            let mut peaks: Vec<Peak> = tops.iter().map(|&top| peak(&pixels[top])).collect();
+
+            let frame = vec![0.0; values.len()];
+            let view = View::new(&frame, width, values.len() / width);
+            let mut prominence = Prominence::default();
+            prominence.find_tops(&labelling, &view, |_| true).unwrap();
+            prominence.find_saddles(&labelling, &view, |_| true).unwrap();
+            prominence.set(pixels, &peak_pixels, &mut peaks);
+
+            for (&top, peak) in tops.iter().zip(&peaks) {
+                prop_assert_eq!(peak.prominence, expected(pixels, top), "{:?}", pixels[top]);
+            }
         }
     }
 }

@@ -12,7 +12,7 @@
 use super::candidate_pixels::{CandidatePixel, Candidates, LocalMaximum};
 use super::labelling::{BrightPixel, Labelling};
 use super::peak::{Peak, is_saturated, parabola_vertex};
-use super::prominence::Flooding;
+use super::prominence::Prominence;
 use super::region::Region;
 use super::search_config::SearchConfig;
 use super::selection::Selection;
@@ -27,7 +27,7 @@ pub(crate) struct PeakSearch {
     labelling: Labelling,
     /// The pixel and the run of each peak while the peaks are in reading order.
     peak_pixels: Vec<[u32; 2]>,
-    flooding: Flooding,
+    prominence: Prominence,
     /// The highest peak of each region.
     highest: Vec<Option<usize>>,
     selection: Selection,
@@ -55,7 +55,7 @@ impl PeakSearch {
     ) -> Result<(), Interrupted> {
         self.collect(candidates, mesh, frame, config);
         frame.check()?;
-        self.labelling.connect(frame.height);
+        self.labelling.connect();
         self.labelling.measure_regions(&mut self.regions);
         for (peak, &[_, run]) in self.peaks.iter_mut().zip(&self.peak_pixels) {
             peak.region = self.labelling.region_of_run(run);
@@ -83,12 +83,13 @@ impl PeakSearch {
         self.labelling.clear();
         self.peaks.clear();
         self.peak_pixels.clear();
+        let mut row = None;
         for of_cells in candidates {
             let mut maxima = of_cells.maxima.iter().peekable();
             for (index, candidate) in (0..).zip(&of_cells.pixels) {
                 let maximum = maxima.next_if(|maximum| maximum.pixel == index);
                 let CandidatePixel { x, y, value } = *candidate;
-                if self.labelling.begin_row(y as usize) {
+                if row.replace(y) != Some(y) {
                     mesh.across_row(y as usize, &mut self.nodes);
                 }
                 let (mean, sigma) = mesh.at_column(&self.nodes, x as f32);
@@ -116,18 +117,18 @@ impl PeakSearch {
     /// so does the highest: on a plateau, the highest pixel in units of the local noise may be
     /// next to it.
     fn set_prominences(&mut self, frame: &View<'_>) -> Result<(), Interrupted> {
+        let regions = &self.regions;
+        let has_several = |region: usize| regions[region].peaks >= 2;
+        if (0..regions.len()).any(has_several) {
+            self.prominence
+                .find_tops(&self.labelling, frame, has_several)?;
+            self.prominence
+                .find_saddles(&self.labelling, frame, has_several)?;
+            self.prominence
+                .set(&self.labelling.pixels, &self.peak_pixels, &mut self.peaks);
+        }
         self.highest.clear();
         self.highest.resize(self.regions.len(), None);
-        for region in 0..self.regions.len() {
-            if self.regions[region].peaks >= 2 {
-                self.flooding.set_prominences(
-                    (region, frame),
-                    &self.labelling,
-                    &self.peak_pixels,
-                    &mut self.peaks,
-                )?;
-            }
-        }
         for (index, peak) in self.peaks.iter().enumerate() {
             let highest = &mut self.highest[peak.region];
             if highest.is_none_or(|other| self.peaks[other].snr < peak.snr) {
