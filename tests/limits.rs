@@ -214,3 +214,32 @@ fn threads_beyond_those_that_help_are_not_started() {
     assert_eq!(status, Some(0));
     assert!(peak_kb < 150_000, "{peak_kb} kB");
 }
+
+/// A picture that is full of spots, each 14 pixels from the next.
+fn crowded_pgm(width: usize, height: usize) -> Vec<u8> {
+    let along = |at: usize| (at % 14) as f64 - 6.5;
+    let pixels = (0..width * height).map(|index| {
+        let (x, y) = (along(index % width), along(index / width));
+        let noise = (index as u32).wrapping_mul(0x9e37_79b9) >> 30;
+        20 + noise as u8 + (100.0 * (-(x * x + y * y) / 3.0).exp()) as u8
+    });
+    let header = format!("P5\n{width} {height}\n255\n");
+    header.into_bytes().into_iter().chain(pixels).collect()
+}
+
+#[test]
+fn a_crowded_picture_takes_no_more_memory_than_it_may() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("crowded.pgm");
+    fs::write(&path, crowded_pgm(2100, 1400)).unwrap();
+    let with_memory = |mb: &str| {
+        let options = ["--fov", "10", "--max-memory", mb].map(Path::new);
+        process(&[&options[..], &[path.as_path()]].concat())
+    };
+    let ran = with_memory("20");
+    assert_eq!(ran.status, 1);
+    let expected = "more than 282400 pixels stand out from the background";
+    assert!(ran.stderr.contains(expected), "{}", ran.stderr);
+    let ran = with_memory("200");
+    assert_eq!(ran.status, 3, "{}", ran.stderr);
+}

@@ -29,6 +29,15 @@ pub enum DetectError {
     /// The work was ended early.
     #[error("not done within the time limit of a frame (--time-limit)")]
     Interrupted(#[from] Interrupted),
+    /// More pixels stand out than fit the memory that the workspace allows.
+    #[error(
+        "more than {most} pixels stand out from the background, for which there is not memory enough: \
+         fewer do with a higher threshold (--sigma), more may with --max-memory"
+    )]
+    TooCrowded {
+        /// How many may stand out.
+        most: usize,
+    },
     /// An option is out of range.
     #[error("{name} is {found}, expected {expected}")]
     Config {

@@ -66,7 +66,7 @@ pub use workspace::Workspace;
 
 use crate::frame::{Frame, MIN_SIDE_PX};
 use background::Mesh;
-use candidates::PeakSearch;
+use candidates::{Gathered, PeakSearch};
 use field_tables::FieldTables;
 use measure::{Measurement, Ring, StarShape};
 use pixels::View;
@@ -84,7 +84,8 @@ use wings::measure_wings;
 /// # Errors
 /// [`DetectError::FrameTooSmall`], [`DetectError::WrongLength`] for frames of impossible size,
 /// [`DetectError::Config`] for options out of range, [`DetectError::Interrupted`] where the workspace
-/// has an interrupt ([`Workspace::until`]).
+/// has an interrupt ([`Workspace::until`]), [`DetectError::TooCrowded`] where more stands out than its
+/// memory holds ([`Workspace::within`]).
 ///
 /// # Example
 /// ```
@@ -123,6 +124,18 @@ pub fn detect_into(
     workspace: &mut Workspace,
     found: &mut Detections,
 ) -> Result<(), DetectError> {
+    let done = run(frame, config, workspace, found);
+    workspace.search.free_large_buffers();
+    done
+}
+
+/// The stages, in order.
+fn run(
+    frame: &Frame,
+    config: &DetectConfig,
+    workspace: &mut Workspace,
+    found: &mut Detections,
+) -> Result<(), DetectError> {
     error::check(frame, config)?;
     found.sources.clear();
     let Workspace {
@@ -130,6 +143,7 @@ pub fn detect_into(
         search,
         measure,
         interrupt,
+        memory,
     } = workspace;
     let view = View::of_live_pixels(frame).until(interrupt);
     if view.width < MIN_SIDE_PX || view.height < MIN_SIDE_PX {
@@ -142,6 +156,7 @@ pub fn detect_into(
         background,
         saturation_adu: config.saturation_adu(frame),
         config,
+        most_candidates: Gathered::most_within(*memory, frame),
     };
     let searched = search.run(&input)?;
     let (mut stars, pass) = (searched.stars, searched.pass);

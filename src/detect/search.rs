@@ -5,9 +5,10 @@
 //! size, and again until the size of the stars found settles.
 
 use super::background::{FrameBackground, Mesh, median};
-use super::candidates::{FilteredFrame, PeakSearch, RawPeakFinder, SearchConfig};
+use super::candidates::{FilteredFrame, Gathered, PeakSearch, RawPeakFinder, SearchConfig};
 use super::config::DetectConfig;
 use super::detection::NoiseTail;
+use super::error::DetectError;
 use super::filter::Kernel;
 use super::fit::{FitBuffers, FrameMaps};
 use super::pixels::View;
@@ -46,6 +47,8 @@ pub(crate) struct SearchInput<'a> {
     pub saturation_adu: f32,
     /// The options.
     pub config: &'a DetectConfig,
+    /// How many pixels may stand out.
+    pub most_candidates: usize,
 }
 
 impl<'a> SearchInput<'a> {
@@ -129,11 +132,21 @@ impl FrameSearch {
         self.raw_peaks.set_threads(threads);
     }
 
+    /// Frees the buffers that a crowded frame has filled: to read the next takes memory, too.
+    pub fn free_large_buffers(&mut self) {
+        /// Candidates whose buffers are kept, 200 MB.
+        const MOST_KEPT: usize = 1 << 22;
+        if self.filtered.candidate_count() > MOST_KEPT {
+            self.filtered.candidates = Vec::new();
+            self.found = PeakSearch::default();
+        }
+    }
+
     /// Searches the frame with a filter of the size that its own stars have.
     ///
     /// # Errors
-    /// [`Interrupted`].
-    pub fn run(&mut self, input: &SearchInput<'_>) -> Result<Searched, Interrupted> {
+    /// [`DetectError::Interrupted`], [`DetectError::TooCrowded`].
+    pub fn run(&mut self, input: &SearchInput<'_>) -> Result<Searched, DetectError> {
         let mut spot_px = match self.measure_unfiltered(input)? {
             StarEstimate::Settled(stars) => {
                 let pass = self.find_peaks(input, stars.spot_px)?;
@@ -210,12 +223,13 @@ impl FrameSearch {
     }
 
     /// Filters the frame for spots of `spot_px`, sets the threshold, and finds regions and peaks.
-    fn find_peaks(&mut self, input: &SearchInput<'_>, spot_px: f64) -> Result<Pass, Interrupted> {
+    fn find_peaks(&mut self, input: &SearchInput<'_>, spot_px: f64) -> Result<Pass, DetectError> {
         let SearchInput {
             view,
             background,
             saturation_adu,
             config,
+            most_candidates: most,
         } = *input;
         let Self {
             filtered,
@@ -231,10 +245,11 @@ impl FrameSearch {
         let gaussian = config
             .threshold_sigma
             .unwrap_or_else(|| gaussian_threshold(config, size, spot_px, &kernel));
-        filtered.filter(view, mesh, &kernel, (config.cell_px, gaussian))?;
+        let above = |threshold| Gathered { threshold, most };
+        filtered.filter(view, mesh, &kernel, config.cell_px, &above(gaussian))?;
         let filter = FilterWeights::for_spot(spot_px, kernel.radius(), size);
         raise_filtered_noise(&background.cut_off, &mut filtered.mesh, gaussian, &filter);
-        let measured = || {
+        let measured = || -> Result<_, DetectError> {
             let frame_noise = FrameNoise {
                 view,
                 background,
@@ -258,7 +273,7 @@ impl FrameSearch {
         };
         let stated = config.threshold_sigma.map(|stated| Ok((stated, None)));
         let (threshold, noise_tail) = stated.unwrap_or_else(measured)?;
-        filtered.gather_missed(view, mesh, &kernel, threshold as f32)?;
+        filtered.gather_missed(view, mesh, &kernel, &above(threshold))?;
         let spot_width_px = (spot_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt();
         let search_config = SearchConfig {
             threshold: threshold as f32,

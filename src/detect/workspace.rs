@@ -4,6 +4,7 @@ use super::background::FrameBackground;
 use super::measure::MeasureBuffers;
 use super::search::FrameSearch;
 use crate::base::interrupt::Interrupt;
+use crate::frame::MemoryLimit;
 use std::num::NonZeroUsize;
 
 /// Buffers that are reused from frame to frame. Results do not depend on their contents.
@@ -13,6 +14,7 @@ pub struct Workspace {
     pub(crate) search: FrameSearch,
     pub(crate) measure: MeasureBuffers,
     pub(super) interrupt: Interrupt,
+    pub(super) memory: MemoryLimit,
 }
 
 impl Workspace {
@@ -23,6 +25,7 @@ impl Workspace {
             search: FrameSearch::default(),
             measure: MeasureBuffers::default(),
             interrupt: Interrupt::default(),
+            memory: MemoryLimit::default(),
         };
         empty.on_threads(NonZeroUsize::MIN)
     }
@@ -44,6 +47,18 @@ impl Workspace {
     #[must_use]
     pub fn until(self, interrupt: Interrupt) -> Self {
         Self { interrupt, ..self }
+    }
+
+    /// A frame and its detection take no more memory than `memory`; without this,
+    /// [`MemoryLimit::DEFAULT`].
+    #[must_use]
+    pub fn within(self, memory: MemoryLimit) -> Self {
+        Self { memory, ..self }
+    }
+
+    /// [`within`](Self::within), from the next frame on.
+    pub(crate) fn set_memory(&mut self, memory: MemoryLimit) {
+        self.memory = memory;
     }
 
     /// [`until`](Self::until), from the next frame on.

@@ -24,6 +24,16 @@ impl Pixels<'_> {
         }
     }
 
+    /// The memory that they take.
+    pub(crate) fn bytes(&self) -> u64 {
+        let bytes = match self {
+            Self::U8(values) => size_of_val(&values[..]),
+            Self::U16(values) => size_of_val(&values[..]),
+            Self::F32(values) => size_of_val(&values[..]),
+        };
+        bytes as u64
+    }
+
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0

@@ -103,6 +103,7 @@ fn solve(
 ) -> Result<Solution, DetectError> {
     let (frame, mut clock) = (input.frame, input.clock);
     workspace.set_deadline(clock.deadline(context.time_limit));
+    workspace.detect.set_memory(workspace.frames.memory());
     let priors = context.priors_of(frame, input.name);
 
     let config = context.detect_config(frame);

@@ -42,14 +42,14 @@ pub(super) struct LocalMaximum {
 
 impl Candidates {
     /// Gathers the pixels at or above `cut` in `rows` of `band`, and raises the `maxima` of the
-    /// blocks that hold any, row by row.
+    /// blocks that hold any, row by row. Ends after the row in which they become more than `most`.
     ///
     /// The band holds one more row on either side, where the frame has it.
     pub fn gather(
         &mut self,
         band: &FilteredBand,
         rows: Range<usize>,
-        cut: f32,
+        (cut, most): (f32, usize),
         maxima: &mut [f32],
     ) {
         self.pixels.clear();
@@ -59,6 +59,9 @@ impl Candidates {
         self.block_cuts.clear();
         self.block_cuts.resize(blocks_per_row, cut);
         for (y, maxima) in rows.zip(maxima.chunks_mut(blocks_per_row)) {
+            if self.pixels.len() > most {
+                break;
+            }
             let Some(row) = band.row(y) else { continue };
             let adjacent_rows = [y.checked_sub(1).and_then(|y| band.row(y)), band.row(y + 1)];
             find_reaching(row, &self.block_cuts, &mut self.blocks);
@@ -80,6 +83,11 @@ impl Candidates {
                 }
             }
         }
+    }
+
+    /// How many were gathered.
+    pub fn len(&self) -> usize {
+        self.pixels.len()
     }
 
     /// Whether all pixels at or above `lowest` were gathered.

@@ -5,10 +5,13 @@
 
 use super::candidate_pixels::Candidates;
 use crate::base::interrupt::Interrupted;
+use crate::detect::DetectError;
 use crate::detect::background::{CellMeasurer, CellRows, Mesh, MeshConfig};
 use crate::detect::filter::{FilteredBand, Kernel};
 use crate::detect::pixels::{BlockMaxima, View};
+use crate::frame::{Frame, MemoryLimit};
 use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Least noise of the filtered frame, as a part of that of independent pixels: a frame that is
 /// smooth below its own rounding is not known better.
@@ -32,6 +35,35 @@ pub(crate) struct FilteredFrame {
     workers: Vec<FilterWorker>,
 }
 
+/// Which pixels are gathered.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Gathered {
+    /// Those that may be above this many standard deviations.
+    pub threshold: f64,
+    /// How many a frame may have.
+    pub most: usize,
+}
+
+impl Gathered {
+    /// How many candidates `frame` may have for its detection to stay within `memory`: the file and
+    /// the frame are there, too. A few always fit in what decoding took.
+    pub fn most_within(memory: MemoryLimit, frame: &Frame) -> usize {
+        /// With its place among the bright pixels, and its part of runs, peaks and saddles.
+        const BYTES_PER_CANDIDATE: u64 = 50;
+        const LEAST_PART: usize = 32;
+        let left_bytes = memory.bytes().saturating_sub(2 * frame.pixels.bytes());
+        let most = usize::try_from(left_bytes / BYTES_PER_CANDIDATE).unwrap_or(usize::MAX);
+        most.max(frame.pixels.len() / LEAST_PART)
+    }
+
+    fn check(&self, total: usize) -> Result<(), DetectError> {
+        if total > self.most {
+            return Err(DetectError::TooCrowded { most: self.most });
+        }
+        Ok(())
+    }
+}
+
 /// The buffers of one thread.
 #[derive(Debug, Clone, Default)]
 struct FilterWorker {
@@ -40,23 +72,29 @@ struct FilterWorker {
 }
 
 impl FilteredFrame {
+    /// The number of candidates.
+    pub fn candidate_count(&self) -> usize {
+        self.candidates.iter().map(Candidates::len).sum()
+    }
+
     /// Shares the rows of cells among `threads` threads.
     pub fn set_threads(&mut self, threads: usize) {
         self.workers.resize_with(threads, FilterWorker::default);
     }
 
     /// Filters the frame, measures mean and noise in cells of about `cell_px` pixels a side, and
-    /// gathers the pixels that may be above `threshold` standard deviations.
+    /// gathers the pixels that may be above the threshold.
     ///
     /// # Errors
-    /// [`Interrupted`].
+    /// [`DetectError::Interrupted`], [`DetectError::TooCrowded`].
     pub fn filter(
         &mut self,
         view: &View<'_>,
         background: &Mesh,
         kernel: &Kernel,
-        (cell_px, threshold): (usize, f64),
-    ) -> Result<(), Interrupted> {
+        cell_px: usize,
+        gathered: &Gathered,
+    ) -> Result<(), DetectError> {
         let Self {
             mesh,
             maxima,
@@ -72,6 +110,7 @@ impl FilteredFrame {
         for worker in workers.iter_mut() {
             worker.band.prepare(view.width, kernel);
         }
+        let total = AtomicUsize::new(0);
         CellRows::of(mesh, maxima, candidates).share(workers, &|worker, row| {
             if view.is_interrupted() {
                 return;
@@ -82,38 +121,46 @@ impl FilteredFrame {
             band.filter(view, background, kernel, filtered);
             let sampled = band.sampled(rows.clone(), grid.row_stride());
             cells.measure_row(&grid, sampled, &config, (row.background, row.sigma));
-            let cut = candidate_cut(row.background, row.sigma, threshold as f32);
-            row.output.gather(band, rows, cut, row.maxima);
+            let cut = candidate_cut(row.background, row.sigma, gathered.threshold as f32);
+            let most = gathered.most.saturating_sub(total.load(Ordering::Relaxed));
+            row.output.gather(band, rows, (cut, most), row.maxima);
+            total.fetch_add(row.output.len(), Ordering::Relaxed);
         });
         view.check()?;
+        gathered.check(total.into_inner())?;
         mesh.finish();
         Ok(())
     }
 
-    /// Gathers candidates again in the rows of cells where `threshold` is lower than the cut so
+    /// Gathers candidates again in the rows of cells where the threshold is lower than the cut so
     /// far.
     ///
     /// # Errors
-    /// [`Interrupted`].
+    /// [`DetectError::Interrupted`], [`DetectError::TooCrowded`].
     pub fn gather_missed(
         &mut self,
         view: &View<'_>,
         background: &Mesh,
         kernel: &Kernel,
-        threshold: f32,
-    ) -> Result<(), Interrupted> {
+        gathered: &Gathered,
+    ) -> Result<(), DetectError> {
+        let mut total = self.candidate_count();
         let Some(FilterWorker { band, .. }) = self.workers.first_mut() else {
             return Ok(());
         };
         for (row, candidates) in self.candidates.iter_mut().enumerate() {
-            let lowest = self.mesh.lowest_about_row(row, threshold);
+            let lowest = self.mesh.lowest_about_row(row, gathered.threshold as f32);
             if !candidates.reach_down_to(lowest) {
                 view.check()?;
                 let rows = self.mesh.grid.rows_of(row);
                 let filtered = with_neighbours(&rows, view.height);
                 band.filter(view, background, kernel, filtered);
                 let maxima = self.maxima.rows_mut(rows.clone());
-                candidates.gather(band, rows, lowest, maxima);
+                total -= candidates.len();
+                let most = gathered.most.saturating_sub(total);
+                candidates.gather(band, rows, (lowest, most), maxima);
+                total += candidates.len();
+                gathered.check(total)?;
             }
         }
         Ok(())

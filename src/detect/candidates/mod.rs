@@ -13,7 +13,7 @@ mod search_config;
 mod selection;
 mod streaks;
 
-pub(crate) use filtered_frame::FilteredFrame;
+pub(crate) use filtered_frame::{FilteredFrame, Gathered};
 pub(crate) use peak::Peak;
 pub(crate) use raw_peaks::{RawPeak, RawPeakFinder};
 pub(crate) use region::Region;
