@@ -66,7 +66,7 @@ pub use workspace::Workspace;
 
 use crate::frame::{Frame, MIN_SIDE_PX};
 use background::Mesh;
-use candidates::{Gathered, PeakSearch};
+use candidates::{CandidateMemory, PeakSearch};
 use field_tables::FieldTables;
 use measure::{Measurement, Ring, StarShape};
 use pixels::View;
@@ -156,7 +156,7 @@ fn run(
         background,
         saturation_adu: config.saturation_adu(frame),
         config,
-        most_candidates: Gathered::most_within(*memory, frame),
+        memory: CandidateMemory::beside(frame, *memory),
     };
     let searched = search.run(&input)?;
     let (mut stars, pass) = (searched.stars, searched.pass);

@@ -5,7 +5,9 @@
 //! size, and again until the size of the stars found settles.
 
 use super::background::{FrameBackground, Mesh, median};
-use super::candidates::{FilteredFrame, Gathered, PeakSearch, RawPeakFinder, SearchConfig};
+use super::candidates::{
+    CandidateMemory, FilteredFrame, Gathered, PeakSearch, RawPeakFinder, SearchConfig,
+};
 use super::config::DetectConfig;
 use super::detection::NoiseTail;
 use super::error::DetectError;
@@ -47,8 +49,8 @@ pub(crate) struct SearchInput<'a> {
     pub saturation_adu: f32,
     /// The options.
     pub config: &'a DetectConfig,
-    /// How many pixels may stand out.
-    pub most_candidates: usize,
+    /// For what stands out in it.
+    pub memory: CandidateMemory,
 }
 
 impl<'a> SearchInput<'a> {
@@ -229,7 +231,7 @@ impl FrameSearch {
             background,
             saturation_adu,
             config,
-            most_candidates: most,
+            memory,
         } = *input;
         let Self {
             filtered,
@@ -245,7 +247,10 @@ impl FrameSearch {
         let gaussian = config
             .threshold_sigma
             .unwrap_or_else(|| gaussian_threshold(config, size, spot_px, &kernel));
-        let above = |threshold| Gathered { threshold, most };
+        let above = |threshold| Gathered {
+            threshold,
+            most: memory.most_candidates(),
+        };
         filtered.filter(view, mesh, &kernel, config.cell_px, &above(gaussian))?;
         let filter = FilterWeights::for_spot(spot_px, kernel.radius(), size);
         raise_filtered_noise(&background.cut_off, &mut filtered.mesh, gaussian, &filter);
@@ -280,6 +285,7 @@ impl FrameSearch {
             spot_width_px: spot_width_px as f32,
             saturation_adu,
             max_peaks: config.max_detections,
+            max_pixels: memory.most_bright_pixels(filtered.candidate_count()),
         };
         view.check()?;
         found.run(&filtered.candidates, &filtered.mesh, view, &search_config)?;

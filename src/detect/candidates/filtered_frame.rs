@@ -4,12 +4,12 @@
 //! candidates are gathered, so the filtered frame is never in memory as a whole.
 
 use super::candidate_pixels::Candidates;
+use super::memory::check_count;
 use crate::base::interrupt::Interrupted;
 use crate::detect::DetectError;
 use crate::detect::background::{CellMeasurer, CellRows, Mesh, MeshConfig};
 use crate::detect::filter::{FilteredBand, Kernel};
 use crate::detect::pixels::{BlockMaxima, View};
-use crate::frame::{Frame, MemoryLimit};
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -42,26 +42,6 @@ pub(crate) struct Gathered {
     pub threshold: f64,
     /// How many a frame may have.
     pub most: usize,
-}
-
-impl Gathered {
-    /// How many candidates `frame` may have for its detection to stay within `memory`: the file and
-    /// the frame are there, too. A few always fit in what decoding took.
-    pub fn most_within(memory: MemoryLimit, frame: &Frame) -> usize {
-        /// With its place among the bright pixels, and its part of runs, peaks and saddles.
-        const BYTES_PER_CANDIDATE: u64 = 50;
-        const LEAST_PART: usize = 32;
-        let left_bytes = memory.bytes().saturating_sub(2 * frame.pixels.bytes());
-        let most = usize::try_from(left_bytes / BYTES_PER_CANDIDATE).unwrap_or(usize::MAX);
-        most.max(frame.pixels.len() / LEAST_PART)
-    }
-
-    fn check(&self, total: usize) -> Result<(), DetectError> {
-        if total > self.most {
-            return Err(DetectError::TooCrowded { most: self.most });
-        }
-        Ok(())
-    }
 }
 
 /// The buffers of one thread.
@@ -127,7 +107,7 @@ impl FilteredFrame {
             total.fetch_add(row.output.len(), Ordering::Relaxed);
         });
         view.check()?;
-        gathered.check(total.into_inner())?;
+        check_count(total.into_inner(), gathered.most)?;
         mesh.finish();
         Ok(())
     }
@@ -160,7 +140,7 @@ impl FilteredFrame {
                 let most = gathered.most.saturating_sub(total);
                 candidates.gather(band, rows, (lowest, most), maxima);
                 total += candidates.len();
-                gathered.check(total)?;
+                check_count(total, gathered.most)?;
             }
         }
         Ok(())

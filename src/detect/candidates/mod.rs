@@ -4,6 +4,7 @@ mod candidate_pixels;
 mod disjoint_sets;
 mod filtered_frame;
 mod labelling;
+mod memory;
 mod peak;
 mod prominence;
 mod raw_peaks;
@@ -14,6 +15,7 @@ mod selection;
 mod streaks;
 
 pub(crate) use filtered_frame::{FilteredFrame, Gathered};
+pub(crate) use memory::CandidateMemory;
 pub(crate) use peak::Peak;
 pub(crate) use raw_peaks::{RawPeak, RawPeakFinder};
 pub(crate) use region::Region;

@@ -11,6 +11,7 @@
 
 use super::candidate_pixels::{CandidatePixel, Candidates, LocalMaximum};
 use super::labelling::{BrightPixel, Labelling};
+use super::memory::check_count;
 use super::peak::{Peak, is_saturated, parabola_vertex};
 use super::prominence::Prominence;
 use super::region::Region;
@@ -18,6 +19,7 @@ use super::search_config::SearchConfig;
 use super::selection::Selection;
 use super::streaks::Streaks;
 use crate::base::interrupt::Interrupted;
+use crate::detect::DetectError;
 use crate::detect::background::Mesh;
 use crate::detect::pixels::View;
 
@@ -45,16 +47,15 @@ impl PeakSearch {
     /// mean and noise are in `mesh`.
     ///
     /// # Errors
-    /// [`Interrupted`].
+    /// [`DetectError::Interrupted`], [`DetectError::TooCrowded`].
     pub fn run(
         &mut self,
         candidates: &[Candidates],
         mesh: &Mesh,
         frame: &View<'_>,
         config: &SearchConfig,
-    ) -> Result<(), Interrupted> {
-        self.collect(candidates, mesh, frame, config);
-        frame.check()?;
+    ) -> Result<(), DetectError> {
+        self.collect(candidates, mesh, frame, config)?;
         self.labelling.connect();
         self.labelling.measure_regions(&mut self.regions);
         for (peak, &[_, run]) in self.peaks.iter_mut().zip(&self.peak_pixels) {
@@ -69,7 +70,7 @@ impl PeakSearch {
         self.count_peaks();
         self.streaks
             .join_dashes(&mut self.peaks, &mut self.regions, config.spot_width_px);
-        frame.check()
+        Ok(frame.check()?)
     }
 
     /// Collects the pixels above the threshold, and the peaks among them.
@@ -79,7 +80,7 @@ impl PeakSearch {
         mesh: &Mesh,
         frame: &View<'_>,
         config: &SearchConfig,
-    ) {
+    ) -> Result<(), DetectError> {
         self.labelling.clear();
         self.peaks.clear();
         self.peak_pixels.clear();
@@ -105,7 +106,10 @@ impl PeakSearch {
                     }
                 }
             }
+            frame.check()?;
+            check_count(self.labelling.pixels.len(), config.max_pixels)?;
         }
+        Ok(())
     }
 
     /// Whether there were more peaks than the last search might keep.

@@ -11,4 +11,6 @@ pub(crate) struct SearchConfig {
     pub saturation_adu: f32,
     /// Maximum number of peaks to keep.
     pub max_peaks: usize,
+    /// Most pixels that may be above the threshold.
+    pub max_pixels: usize,
 }
