@@ -120,8 +120,16 @@ impl Prominence {
 
     /// Sets the prominences of the peaks; `peak_pixels` holds the pixel of each, in ascending order,
     /// and its run.
+    ///
+    /// A peak next to a higher pixel has none: the noise, in units of which heights are, changes from
+    /// pixel to pixel.
     pub fn set(&mut self, pixels: &[BrightPixel], peak_pixels: &[[u32; 2]], peaks: &mut [Peak]) {
         let Self { tops, saddles, .. } = self;
+        for (peak, &[pixel, _]) in peaks.iter_mut().zip(peak_pixels) {
+            if tops[pixel as usize] != pixel {
+                peak.prominence = 0.0;
+            }
+        }
         saddles.sort_unstable_by(|a, b| b.snr.total_cmp(&a.snr));
         for saddle in saddles {
             let [a, b] = saddle.tops.map(|top| root_of(tops, top) as usize);
@@ -173,9 +181,9 @@ mod tests {
         a.x.abs_diff(b.x) <= 1 && a.y.abs_diff(b.y) <= 1
     }
 
-    /// Indices of the pixels that are reached from `top` through none below `level`.
-    fn flooded(pixels: &[BrightPixel], top: usize, level: f32) -> Vec<usize> {
-        let mut reached = vec![top];
+    /// Indices of the pixels that are reached from one through none below `level`.
+    fn flooded(pixels: &[BrightPixel], pixel: usize, level: f32) -> Vec<usize> {
+        let mut reached = vec![pixel];
         let mut next = 0;
         while let Some(&from) = reached.get(next) {
             next += 1;
@@ -189,16 +197,15 @@ mod tests {
         reached
     }
 
-    /// The prominence of a top: down to where its flood reaches a higher pixel, or its height.
-    fn expected(pixels: &[BrightPixel], top: usize) -> f32 {
-        let height = pixels[top].snr;
-        let levels = (THRESHOLD..=height as u8).rev().map(f32::from);
+    /// The prominence of a pixel: down to where its flood reaches a higher one, or its height.
+    fn expected(pixels: &[BrightPixel], pixel: usize) -> f32 {
+        let height = pixels[pixel].snr;
+        let mut levels = (THRESHOLD..=height as u8).rev().map(f32::from);
         let reaches_higher = |level: &f32| {
-            let reached = flooded(pixels, top, *level);
-            reached.iter().any(|&index| is_higher(pixels, index, top))
+            let reached = flooded(pixels, pixel, *level);
+            reached.iter().any(|&index| is_higher(pixels, index, pixel))
         };
         levels
-            .into_iter()
             .find(reaches_higher)
             .map_or(height, |level| height - level)
     }
@@ -224,14 +231,8 @@ mod tests {
         ) {
             let labelling = labelling(width, &values);
             let pixels = &labelling.pixels;
-            let is_top = |&index: &usize| {
-                let higher = |other| is_higher(pixels, other, index);
-                let beside = |other| are_adjacent(&pixels[other], &pixels[index]);
-                !(0..pixels.len()).any(|other| higher(other) && beside(other))
-            };
-            let tops: Vec<usize> = (0..pixels.len()).filter(is_top).collect();
-            let peak_pixels: Vec<[u32; 2]> = tops.iter().map(|&top| [top as u32, 0]).collect();
-            let mut peaks: Vec<Peak> = tops.iter().map(|&top| peak(&pixels[top])).collect();
+            let peak_pixels: Vec<[u32; 2]> = (0..pixels.len() as u32).map(|pixel| [pixel, 0]).collect();
+            let mut peaks: Vec<Peak> = pixels.iter().map(peak).collect();
 
             let frame = vec![0.0; values.len()];
             let view = View::new(&frame, width, values.len() / width);
@@ -240,8 +241,8 @@ mod tests {
             prominence.find_saddles(&labelling, &view, |_| true).unwrap();
             prominence.set(pixels, &peak_pixels, &mut peaks);
 
-            for (&top, peak) in tops.iter().zip(&peaks) {
-                prop_assert_eq!(peak.prominence, expected(pixels, top), "{:?}", pixels[top]);
+            for (pixel, peak) in peaks.iter().enumerate() {
+                prop_assert_eq!(peak.prominence, expected(pixels, pixel), "{:?}", pixels[pixel]);
             }
         }
     }
