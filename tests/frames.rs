@@ -519,6 +519,13 @@ fn a_directory_stands_for_the_frames_in_it() {
     let ran = process([files.0.path().to_owned()]);
     assert_eq!((ran.status, ran.stderr.as_str()), (0, ""));
     assert_eq!(named(&ran), expected);
+    // A file that is named as a frame and is none is told of: a transfer was cut off.
+    let cut = files.add("cut.TIF", b"");
+    let ran = process([files.0.path().to_owned()]);
+    assert_eq!((ran.status, named(&ran)), (1, expected.to_vec()));
+    let told = format!("starpipe: reading {}: ", cut.display());
+    assert!(ran.stderr.starts_with(&told), "{}", ran.stderr);
+    assert_eq!(ran.stderr.lines().count(), 1);
     // A directory without frames is an error; the rest is processed.
     let empty = tempfile::tempdir().unwrap();
     let ran = process([empty.path().to_owned(), expected[1].clone()]);

@@ -13,11 +13,11 @@ use std::path::{Path, PathBuf};
 /// Keyword and value of the PNG text that marks an overlay.
 pub(crate) const OVERLAY_TEXT: (&str, &str) = ("Software", "starpipe overlay");
 
-/// The files in `directory` that begin like an image, sorted by name.
+/// The files in `directory` that begin like an image or are named as one, sorted by name.
 ///
 /// Left out are subdirectories and products of starpipe: overlays ([`is_overlay`]), calibration
 /// frames ([`is_calibration_frame`]) and headers without an image (`.wcs`). A file that cannot be
-/// opened is listed, so that reading it reports the error.
+/// opened or is empty or damaged is listed, so that reading it reports the error.
 /// # Errors
 /// [`FrameError::File`] with the directory and [`FrameError::Io`] or [`FrameError::NoFrames`]; without
 /// frames, with the first file in a format that is not read and [`FrameError::ForeignFormat`].
@@ -80,16 +80,15 @@ pub fn is_calibration_frame(head: &[u8]) -> bool {
         && memmem::find(head, card.as_bytes()).is_some()
 }
 
-/// Whether the name before the last extension is that of an image: `night.fits.bz2`.
+/// Whether a file is named as an image of a format that is read.
 fn is_named_as_an_image(path: &Path) -> bool {
     const EXTENSIONS: [&str; 11] = [
         "fits", "fit", "fts", "fz", "tif", "tiff", "png", "jpg", "jpeg", "bmp", "pgm",
     ];
-    let inner = path.file_stem().map(Path::new).and_then(Path::extension);
-    inner.is_some_and(|inner| {
+    path.extension().is_some_and(|extension| {
         EXTENSIONS
             .iter()
-            .any(|known| inner.eq_ignore_ascii_case(known))
+            .any(|known| extension.eq_ignore_ascii_case(known))
     })
 }
 
@@ -103,8 +102,10 @@ fn begins_like_a_frame(path: &Path) -> io::Result<bool> {
         Some(FrameFormat::Fits) => !is_calibration_frame(&head),
         Some(format) if format.is_compressed() => {
             let (known, inside) = format_inside(&head, format);
-            known.is_some() || (inside.is_empty() && is_named_as_an_image(path))
+            // As in `night.fits.bz2`.
+            let inner = path.file_stem().map(Path::new);
+            known.is_some() || (inside.is_empty() && inner.is_some_and(is_named_as_an_image))
         }
-        format => format.is_some(),
+        format => format.is_some() || is_named_as_an_image(path),
     })
 }
