@@ -30,8 +30,8 @@ impl MemoryLimit {
         self.bytes / 4 * 3
     }
 
-    /// Refuses an image whose decoder needs this many bytes for each pixel. The frame takes 4 more, and
-    /// solving it no more than decoding.
+    /// Refuses an image whose decoder needs this many bytes for each pixel. The frame takes 4 more;
+    /// detection keeps to what is left.
     pub(super) fn check(
         self,
         width: usize,

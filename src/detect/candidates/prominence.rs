@@ -6,7 +6,7 @@
 //!    there.
 //!
 //! All but the last step goes through the pixels in reading order: to flood them from the top down is
-//! the same, and takes ten times as long in large regions, which no cache holds.
+//! the same, and takes many times as long in large regions, which no cache holds.
 //!
 //! # Reference
 //! Edelsbrunner, Letscher & Zomorodian 2002, doi 10.1007/s00454-002-2885-2, for prominence as
@@ -20,6 +20,8 @@ use crate::detect::pixels::View;
 
 /// Logarithm to base 2 of the number of saddles that are remembered.
 const RECENT_BITS: u32 = 13;
+/// Saddles from which on repeated ones are left out.
+const MANY_SADDLES: usize = 1 << 20;
 
 /// Where pixels of two tops are adjacent.
 #[derive(Debug, Clone, Copy, Default)]
@@ -37,6 +39,12 @@ impl Saddle {
         let hash = a.wrapping_mul(0x9e37_79b9) ^ b.wrapping_mul(0x85eb_ca6b);
         (hash >> (u32::BITS - RECENT_BITS)) as usize
     }
+}
+
+/// Leaves out all but the highest saddle between each two tops.
+fn leave_out_repeated(saddles: &mut Vec<Saddle>) {
+    saddles.sort_unstable_by(|a, b| a.tops.cmp(&b.tops).then(b.snr.total_cmp(&a.snr)));
+    saddles.dedup_by_key(|saddle| saddle.tops);
 }
 
 /// Buffers.
@@ -97,6 +105,7 @@ impl Prominence {
         saddles.clear();
         recent.clear();
         recent.resize(1 << RECENT_BITS, Saddle::default());
+        let mut many = MANY_SADDLES;
         labelling.for_each_adjacent(view, is_wanted, |pixel, before| {
             let [a, b] = [pixel, before].map(|index| tops[index]);
             if a != b {
@@ -110,6 +119,10 @@ impl Prominence {
                     last.snr = last.snr.max(found.snr);
                 } else {
                     saddles.push(std::mem::replace(last, found));
+                    if saddles.len() == many {
+                        leave_out_repeated(saddles);
+                        many = MANY_SADDLES.max(2 * saddles.len());
+                    }
                 }
             }
         })?;
