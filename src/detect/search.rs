@@ -251,7 +251,7 @@ impl FrameSearch {
             threshold,
             most: memory.most_candidates(),
         };
-        filtered.filter(view, mesh, &kernel, config.cell_px, &above(gaussian))?;
+        filtered.filter(view, mesh, &kernel, (config.cell_px, &above(gaussian)))?;
         let filter = FilterWeights::for_spot(spot_px, kernel.radius(), size);
         raise_filtered_noise(&background.cut_off, &mut filtered.mesh, gaussian, &filter);
         let measured = || -> Result<_, DetectError> {

@@ -72,8 +72,7 @@ impl FilteredFrame {
         view: &View<'_>,
         background: &Mesh,
         kernel: &Kernel,
-        cell_px: usize,
-        gathered: &Gathered,
+        (cell_px, gathered): (usize, &Gathered),
     ) -> Result<(), DetectError> {
         let Self {
             mesh,
