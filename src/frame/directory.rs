@@ -23,7 +23,7 @@ pub(crate) const OVERLAY_TEXT: (&str, &str) = ("Software", "starpipe overlay");
 /// frames, with the first file in a format that is not read and [`FrameError::ForeignFormat`].
 pub fn files_in(directory: &Path) -> Result<Vec<PathBuf>, FrameError> {
     let files = all_files_in(directory).map_err(|e| FrameError::from(e).in_file(directory))?;
-    let is_frame = |path: &&PathBuf| begins_like_a_frame(path).unwrap_or(true);
+    let is_frame = |path: &&PathBuf| is_listed(path).unwrap_or(true);
     let frames: Vec<PathBuf> = files.iter().filter(is_frame).cloned().collect();
     if !frames.is_empty() {
         return Ok(frames);
@@ -92,7 +92,8 @@ fn is_named_as_an_image(path: &Path) -> bool {
     })
 }
 
-fn begins_like_a_frame(path: &Path) -> io::Result<bool> {
+/// Whether a file begins like a frame or is named as one, and is no product of starpipe.
+fn is_listed(path: &Path) -> io::Result<bool> {
     if path.extension().is_some_and(|extension| extension == "wcs") {
         return Ok(false);
     }

@@ -12,7 +12,7 @@
 //! Edelsbrunner, Letscher & Zomorodian 2002, doi 10.1007/s00454-002-2885-2, for prominence as
 //! persistence.
 
-use super::disjoint_sets::root_of;
+use super::disjoint_sets::{self, root_of};
 use super::labelling::{BrightPixel, Labelling};
 use super::peak::Peak;
 use crate::base::interrupt::Interrupted;
@@ -69,14 +69,9 @@ impl Prominence {
         is_wanted: impl Fn(usize) -> bool,
     ) -> Result<(), Interrupted> {
         let (tops, pixels) = (&mut self.tops, &labelling.pixels);
-        tops.clear();
-        tops.extend(0..pixels.len() as u32);
+        disjoint_sets::reset(tops, pixels.len());
         labelling.for_each_adjacent(view, is_wanted, |pixel, before| {
-            let (low, high) = if is_higher(pixels, pixel, before) {
-                (before, pixel)
-            } else {
-                (pixel, before)
-            };
+            let [low, high] = by_height(pixels, [pixel, before]);
             if is_higher(pixels, high, tops[low] as usize) {
                 tops[low] = high as u32;
             }
@@ -149,17 +144,22 @@ impl Prominence {
             if a == b {
                 continue;
             }
-            let (low, high) = if is_higher(pixels, a, b) {
-                (b, a)
-            } else {
-                (a, b)
-            };
+            let [low, high] = by_height(pixels, [a, b]);
             let peak = peak_pixels.binary_search_by_key(&low, |&[pixel, _]| pixel as usize);
             if let Ok(peak) = peak {
                 peaks[peak].prominence = pixels[low].snr - saddle.snr;
             }
             tops[low] = high as u32;
         }
+    }
+}
+
+/// The lower of two pixels, and the higher.
+fn by_height(pixels: &[BrightPixel], [a, b]: [usize; 2]) -> [usize; 2] {
+    if is_higher(pixels, a, b) {
+        [b, a]
+    } else {
+        [a, b]
     }
 }
 
