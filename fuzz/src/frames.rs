@@ -2,11 +2,17 @@
 
 use starpipe::Frame;
 use starpipe::calibration::darks::{DarkConfig, DarkStack, FrameStatistics};
-use starpipe::frame::{self, MAX_PAGES, MAX_PIXELS, MIN_SIDE_PX, MemoryLimit, Pages};
+use starpipe::frame::{self, Buffers, MAX_PAGES, MAX_PIXELS, MIN_SIDE_PX, MemoryLimit, Pages};
 use std::num::NonZeroUsize;
 
 /// A small limit: what asks for more is refused, and each run stays fast.
 const MEMORY: MemoryLimit = MemoryLimit::of_bytes(50_000_000);
+
+fn buffers() -> Buffers {
+    let mut buffers = Buffers::new();
+    buffers.set_memory(MEMORY);
+    buffers
+}
 
 /// The first byte is the page, the rest a file in any format.
 pub fn image(data: &[u8]) {
@@ -14,7 +20,7 @@ pub fn image(data: &[u8]) {
         return;
     };
     let page = NonZeroUsize::new(usize::from(*page % 4));
-    let read = || frame::read_stream(bytes, page, MEMORY);
+    let read = || frame::read_stream(bytes, page, &mut buffers());
     match (read(), read()) {
         (Ok(found), Ok(again)) => {
             check(&found);
@@ -41,12 +47,14 @@ pub fn exif(attributes: &[u8]) {
 
 /// A file in any format, of which each image is read.
 pub fn pages(bytes: &[u8]) {
-    let Ok(pages) = Pages::of(bytes.to_vec(), MEMORY) else {
+    let Ok(mut pages) = Pages::of(bytes.to_vec(), &mut buffers()) else {
         return;
     };
-    for (page, found) in pages.take(20) {
+    for _ in 0..20 {
+        let Some(page) = pages.advance() else { break };
+        let found = pages.image(&mut buffers());
         assert!(page.get() <= MAX_PAGES);
-        let alone = frame::read_stream(bytes, Some(page), MEMORY);
+        let alone = frame::read_stream(bytes, Some(page), &mut buffers());
         match (found, alone) {
             (Ok(found), Ok(alone)) => {
                 check(&found);
@@ -62,7 +70,7 @@ pub fn pages(bytes: &[u8]) {
 
 /// A file in any format as a dark frame: a sequence of exposures of it.
 pub fn darks(bytes: &[u8]) {
-    let Ok(frame) = frame::read_stream(bytes, None, MEMORY) else {
+    let Ok(frame) = frame::read_stream(bytes, None, &mut buffers()) else {
         return;
     };
     let mut stack = DarkStack::new();

@@ -3,7 +3,7 @@
 use crate::errors::exception;
 use pyo3::prelude::*;
 use starpipe::Frame;
-use starpipe::frame::{self, FrameError, MemoryLimit};
+use starpipe::frame::{self, Buffers, FrameError};
 use starpipe::pipeline;
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -40,7 +40,7 @@ pub struct Pages {
 impl Pages {
     #[new]
     fn new(py: Python<'_>, content: &[u8], name: String) -> PyResult<Self> {
-        let opened = py.detach(|| frame::Pages::of(content.to_vec(), MemoryLimit::DEFAULT));
+        let opened = py.detach(|| frame::Pages::of(content.to_vec(), &mut Buffers::new()));
         let pages = opened.map_err(|error| unread(error, &name))?;
         Ok(Self { name, pages })
     }
@@ -50,9 +50,10 @@ impl Pages {
     }
 
     fn __next__<'py>(&mut self, py: Python<'py>) -> PyResult<Option<(String, Bound<'py, PyAny>)>> {
-        let Some((number, frame)) = py.detach(|| self.pages.next()) else {
+        let Some(number) = self.pages.advance() else {
             return Ok(None);
         };
+        let frame = py.detach(|| self.pages.image(&mut Buffers::new()));
         let name = format!("{}[{number}]", self.name);
         let image = match frame {
             Ok(frame) => Bound::new(py, Page(frame))?.into_any(),

@@ -1,41 +1,57 @@
 //! Files compressed with gzip or bzip2.
 
+use super::account::Account;
 use super::error::FrameError;
 use super::format::{FrameFormat, first_bytes};
+use super::limits::MAX_FILE_BYTES;
 use bzip2::read::MultiBzDecoder;
 use flate2::read::MultiGzDecoder;
-use std::io::{ErrorKind, Read};
+use std::io::{self, ErrorKind, Read};
 
-/// Decompresses the image file in `bytes`, which is of a compressed `format`, to fewer bytes than
-/// `limit`.
+/// Decompresses the image file in `bytes`, which is of a compressed `format`. The content is booked on
+/// `account`.
 /// # Errors
 /// [`FrameError::UnknownFormat`] if the content does not begin like an image, before much of it is
-/// decompressed; [`FrameError::Truncated`], [`FrameError::Malformed`].
-pub(super) fn unpack(bytes: &[u8], format: FrameFormat, limit: u64) -> Result<Vec<u8>, FrameError> {
+/// decompressed; [`FrameError::Truncated`], [`FrameError::Malformed`], [`FrameError::OutOfMemory`],
+/// [`FrameError::Interrupted`].
+pub(super) fn unpack(
+    bytes: &[u8],
+    format: FrameFormat,
+    account: &Account,
+) -> Result<Vec<u8>, FrameError> {
     let (known, inside) = format_inside(bytes, format);
     if known.is_none() && !inside.is_empty() {
         let found = format!("{} inside {format}", first_bytes(&inside));
         return Err(FrameError::UnknownFormat { found });
     }
     let mut unpacked = Vec::new();
-    let mut reader = decoder(bytes, format).take(limit);
-    reader.read_to_end(&mut unpacked).map_err(|e| {
-        let detail = e.to_string();
-        if e.kind() == ErrorKind::UnexpectedEof {
-            let found_bytes = bytes.len();
-            FrameError::Truncated {
-                format,
-                found_bytes,
-                detail,
-            }
-        } else {
-            FrameError::Malformed { format, detail }
-        }
+    let mut reader = account
+        .timed(decoder(bytes, format))
+        .take(MAX_FILE_BYTES + 1);
+    let appended = account.append(&mut reader, &mut unpacked);
+    appended.map_err(|error| match error {
+        FrameError::Io(error) => damaged(&error, format, bytes.len()),
+        other => other,
     })?;
-    if unpacked.len() as u64 == limit {
+    if unpacked.len() as u64 > MAX_FILE_BYTES {
+        let limit = MAX_FILE_BYTES;
         return Err(FrameError::TooManyBytes { limit });
     }
     Ok(unpacked)
+}
+
+/// The error for data that cannot be decompressed.
+fn damaged(error: &io::Error, format: FrameFormat, found_bytes: usize) -> FrameError {
+    let detail = error.to_string();
+    if error.kind() == ErrorKind::UnexpectedEof {
+        FrameError::Truncated {
+            format,
+            found_bytes,
+            detail,
+        }
+    } else {
+        FrameError::Malformed { format, detail }
+    }
 }
 
 fn decoder(bytes: &[u8], format: FrameFormat) -> Box<dyn Read + '_> {

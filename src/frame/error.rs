@@ -2,6 +2,7 @@
 
 use super::format::FrameFormat;
 use super::limits::{MAX_PIXELS, MIN_SIDE_PX};
+use crate::base::interrupt::Interrupted;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -92,6 +93,20 @@ pub enum FrameError {
         /// What it may take.
         limit_bytes: u64,
     },
+    /// A content that needs more memory than a frame may take.
+    #[error(
+        "too large: its content needs {} MB of memory or more, expected at most {} MB (--max-memory)",
+        .needed_bytes.div_ceil(1_000_000), .limit_bytes / 1_000_000
+    )]
+    OutOfMemory {
+        /// What it needs so far.
+        needed_bytes: u64,
+        /// What it may take.
+        limit_bytes: u64,
+    },
+    /// The work was ended early.
+    #[error("not done within the time limit of a frame (--time-limit)")]
+    Interrupted(#[from] Interrupted),
     /// More bytes than the largest frame needs.
     #[error("too large: found more than {limit} bytes, expected at most {limit}")]
     TooManyBytes {

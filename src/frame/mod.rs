@@ -23,6 +23,7 @@
 //! Caveats: transparency is ignored. JPEG's gamma is not undone, so fluxes from JPEG are not
 //! linear. Integers and floats of more than 24 bits are rounded to 24.
 
+mod account;
 mod compressed;
 mod directory;
 mod error;
@@ -57,7 +58,9 @@ pub use memory::MemoryLimit;
 pub use metadata::{FrameMetadata, IgnoredValue};
 pub use pages::Pages;
 pub use pixels::Pixels;
-pub use reader::{Buffers, decode, decode_page, read, read_page, read_page_with, read_stream};
+pub use reader::{
+    Buffers, decode, decode_page, decode_page_with, read, read_page, read_page_with, read_stream,
+};
 pub use row_order::RowOrder;
 pub use tiff_write::{TiffOptions, TiffSamples, write_tiff};
 

@@ -1,11 +1,11 @@
 //! All images of a file.
 
+use super::account::Account;
 use super::error::FrameError;
 use super::format::FrameFormat;
 use super::image::Frame;
-use super::limits::{MAX_FILE_BYTES, MAX_PAGES};
-use super::memory::MemoryLimit;
-use super::reader::{decode_image, read_limited};
+use super::limits::MAX_PAGES;
+use super::reader::{Buffers, decode_image, read_limited};
 use super::{compressed, fits, tiff};
 use crate::base::files;
 use std::io::Read;
@@ -17,7 +17,6 @@ use std::path::Path;
 #[derive(Debug)]
 pub struct Pages {
     bytes: Vec<u8>,
-    memory: MemoryLimit,
     next: usize,
     count: usize,
     /// Why the images after the last that was counted cannot be found.
@@ -25,41 +24,52 @@ pub struct Pages {
 }
 
 impl Pages {
-    /// The images of the file `path`; each may take as much memory as `memory`.
+    /// The images of the file `path`; this and each image may take what the buffers say.
     /// # Errors
     /// [`FrameError::File`] with the path and the error: as [`super::read`], and if the file has no
     /// image, or more than [`MAX_PAGES`].
-    pub fn open(path: impl AsRef<Path>, memory: MemoryLimit) -> Result<Self, FrameError> {
+    pub fn open(path: impl AsRef<Path>, buffers: &mut Buffers) -> Result<Self, FrameError> {
         let path = path.as_ref();
-        let open = || Self::read(files::open(path)?, memory);
-        open().map_err(|error| error.in_file(path))
+        let pages = match files::open(path) {
+            Ok(file) => Self::read(file, buffers),
+            Err(error) => Err(error.into()),
+        };
+        pages.map_err(|error| error.in_file(path))
     }
 
     /// The images of the file that `stream` gives.
     /// # Errors
     /// As [`Self::open`], without the path.
-    pub fn read(stream: impl Read, memory: MemoryLimit) -> Result<Self, FrameError> {
+    pub fn read(stream: impl Read, buffers: &mut Buffers) -> Result<Self, FrameError> {
+        let account = buffers.account(0)?;
         let mut bytes = Vec::new();
-        read_limited(stream, 0, MAX_FILE_BYTES, &mut bytes)?;
-        Self::of(bytes, memory)
+        read_limited(stream, 0, &account, &mut bytes)?;
+        Self::unpacked(bytes, &account)
     }
 
     /// The images of the file whose content is `bytes`.
     /// # Errors
     /// As [`Self::open`], without the path.
-    pub fn of(mut bytes: Vec<u8>, memory: MemoryLimit) -> Result<Self, FrameError> {
+    pub fn of(bytes: Vec<u8>, buffers: &mut Buffers) -> Result<Self, FrameError> {
+        let account = buffers.account(bytes.capacity())?;
+        Self::unpacked(bytes, &account)
+    }
+
+    fn unpacked(mut bytes: Vec<u8>, account: &Account) -> Result<Self, FrameError> {
         if let Some(format) = FrameFormat::of(&bytes).filter(|format| format.is_compressed()) {
-            bytes = compressed::unpack(&bytes, format, memory.content_bytes())?;
+            let packed = std::mem::take(&mut bytes);
+            bytes = compressed::unpack(&packed, format, account)?;
+            account.release(packed.capacity() as u64);
         }
         let format = FrameFormat::of(&bytes);
         let (count, broken) = match format {
-            Some(FrameFormat::Fits) => fits::count_pages(&bytes),
-            Some(FrameFormat::Tiff) => tiff::count_pages(&bytes),
+            Some(FrameFormat::Fits) => fits::count_pages(&bytes, account),
+            Some(FrameFormat::Tiff) => tiff::count_pages(&bytes, account),
             _ => (1, None),
         };
         match (count, format) {
             // The error that reading the first image gives tells more.
-            (0, _) => decode_image(&bytes, None, memory, &mut Vec::new()).map(|_| ())?,
+            (0, _) => decode_image(&bytes, None, account, Vec::new()).map(|_| ())?,
             (MAX_PAGES.., Some(format)) => {
                 return Err(FrameError::Unsupported {
                     format,
@@ -71,28 +81,39 @@ impl Pages {
         }
         Ok(Self {
             bytes,
-            memory,
             next: 0,
             count,
             broken,
         })
     }
-}
 
-impl Iterator for Pages {
-    type Item = (NonZeroUsize, Result<Frame<'static>, FrameError>);
-
-    fn next(&mut self) -> Option<Self::Item> {
+    /// The number of the next image; `None` after the last. Read it with [`Self::image`].
+    pub fn advance(&mut self) -> Option<NonZeroUsize> {
         self.next += 1;
-        let page = NonZeroUsize::new(self.next)?;
-        if self.next > self.count {
-            return self.broken.take().map(|error| (page, Err(error)));
+        let is_there = self.next <= self.count || self.broken.is_some();
+        NonZeroUsize::new(self.next).filter(|_| is_there)
+    }
+
+    /// The image that [`Self::advance`] has told of last; it may take what the buffers say.
+    /// # Errors
+    /// As [`super::decode_page`].
+    pub fn image(&mut self, buffers: &mut Buffers) -> Result<Frame<'static>, FrameError> {
+        if self.next > self.count
+            && let Some(error) = self.broken.take()
+        {
+            return Err(error);
         }
-        let frame = decode_image(&self.bytes, Some(page), self.memory, &mut Vec::new());
+        let account = buffers.account(self.bytes.capacity())?;
+        let frame = decode_image(
+            &self.bytes,
+            NonZeroUsize::new(self.next),
+            &account,
+            Vec::new(),
+        );
         if self.next == self.count && frame.is_err() {
             // What breaks the last image also hides what comes after it.
             self.broken = None;
         }
-        Some((page, frame))
+        frame
     }
 }

@@ -1,12 +1,12 @@
 //! PNG, JPEG, BMP and PNM, decoded by the `image` crate to 8 or 16 bits per sample.
 
+use super::account::Account;
 use super::error::FrameError;
 use super::exif;
 use super::format::FrameFormat;
 use super::image::{Frame, check_size};
 use super::jpeg_scans::{Scans, has_end};
 use super::levels::{Samples, WholeNumber, frame_from_integers};
-use super::memory::MemoryLimit;
 use image::codecs::bmp::BmpDecoder;
 use image::codecs::jpeg::JpegDecoder;
 use image::codecs::png::PngDecoder;
@@ -19,7 +19,7 @@ use std::io::{Cursor, ErrorKind};
 /// defines.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_png(bytes: &[u8], memory: MemoryLimit) -> Result<Frame<'static>, FrameError> {
+pub(super) fn decode_png(bytes: &[u8], account: &Account) -> Result<Frame<'static>, FrameError> {
     let format = FrameFormat::Png;
     // Checked first, so that the decoder allocates nothing for absurd sizes.
     if let (Some(width), Some(height)) = (word(bytes, 16), word(bytes, 20)) {
@@ -28,15 +28,15 @@ pub(super) fn decode_png(bytes: &[u8], memory: MemoryLimit) -> Result<Frame<'sta
             u32::from_be_bytes(height) as usize,
         )?;
     }
-    let decoder = PngDecoder::with_limits(Cursor::new(bytes), limits())
-        .map_err(|e| error_of(e, format, bytes.len()))?;
+    let decoder = PngDecoder::with_limits(account.timed(Cursor::new(bytes)), limits())
+        .map_err(|e| account.why(error_of(e, format, bytes.len())))?;
     let step = match decoder.original_color_type() {
         ExtendedColorType::L1 => 255.0,
         ExtendedColorType::L2 => 85.0,
         ExtendedColorType::L4 => 17.0,
         _ => 1.0,
     };
-    let mut frame = decode_with(decoder, format, bytes.len(), memory)?;
+    let mut frame = decode_with(decoder, format, bytes.len(), account)?;
     frame.step_adu = frame.step_adu.max(step);
     Ok(frame)
 }
@@ -44,10 +44,10 @@ pub(super) fn decode_png(bytes: &[u8], memory: MemoryLimit) -> Result<Frame<'sta
 /// Decodes a baseline or progressive JPEG.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_jpeg(bytes: &[u8], memory: MemoryLimit) -> Result<Frame<'static>, FrameError> {
+pub(super) fn decode_jpeg(bytes: &[u8], account: &Account) -> Result<Frame<'static>, FrameError> {
     let format = FrameFormat::Jpeg;
-    let decoder =
-        JpegDecoder::new(Cursor::new(bytes)).map_err(|e| error_of(e, format, bytes.len()))?;
+    let decoder = JpegDecoder::new(account.timed(Cursor::new(bytes)))
+        .map_err(|e| account.why(error_of(e, format, bytes.len())))?;
     // The decoder fills missing data with grey and reports no error.
     if !has_end(bytes) {
         return Err(FrameError::Truncated {
@@ -68,14 +68,14 @@ pub(super) fn decode_jpeg(bytes: &[u8], memory: MemoryLimit) -> Result<Frame<'st
         0
     };
     let bytes_per_pixel = decoder_bytes_per_pixel(&decoder) + coefficients;
-    memory.check(width, height, bytes_per_pixel)?;
-    decode_with(decoder, format, bytes.len(), memory)
+    account.check_image((width, height), bytes_per_pixel + size_of::<f32>())?;
+    decode_with(decoder, format, bytes.len(), account)
 }
 
 /// Decodes a Windows bitmap.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_bmp(bytes: &[u8], memory: MemoryLimit) -> Result<Frame<'static>, FrameError> {
+pub(super) fn decode_bmp(bytes: &[u8], account: &Account) -> Result<Frame<'static>, FrameError> {
     /// Minimum length of a header that stores width and height in four bytes each.
     const LONG_HEADER: u32 = 16;
     let format = FrameFormat::Bmp;
@@ -88,20 +88,20 @@ pub(super) fn decode_bmp(bytes: &[u8], memory: MemoryLimit) -> Result<Frame<'sta
         let side = |word| i32::from_le_bytes(word).unsigned_abs() as usize;
         check_size(side(width), side(height))?;
     }
-    let decoder =
-        BmpDecoder::new(Cursor::new(bytes)).map_err(|e| error_of(e, format, bytes.len()))?;
-    decode_with(decoder, format, bytes.len(), memory)
+    let decoder = BmpDecoder::new(account.timed(Cursor::new(bytes)))
+        .map_err(|e| account.why(error_of(e, format, bytes.len())))?;
+    decode_with(decoder, format, bytes.len(), account)
 }
 
 /// Decodes a portable anymap: PBM, PGM, PPM (plain or binary) or PAM, with the levels of the file.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_pnm(bytes: &[u8], memory: MemoryLimit) -> Result<Frame<'static>, FrameError> {
+pub(super) fn decode_pnm(bytes: &[u8], account: &Account) -> Result<Frame<'static>, FrameError> {
     let format = FrameFormat::Pnm;
-    let decoder =
-        PnmDecoder::new(Cursor::new(bytes)).map_err(|e| error_of(e, format, bytes.len()))?;
+    let decoder = PnmDecoder::new(account.timed(Cursor::new(bytes)))
+        .map_err(|e| account.why(error_of(e, format, bytes.len())))?;
     let maxval = decoder.header().maximal_sample();
-    let decoded = Decoded::new(decoder, format, bytes.len(), memory)?;
+    let decoded = Decoded::new(decoder, format, bytes.len(), account)?;
     // The decoder scales levels from 0..=maxval to all of 8 or 16 bits, and rounds: this is undone.
     let level = |scaled: u16, full: u16| {
         let level = f64::from(scaled) * f64::from(maxval) / f64::from(full);
@@ -147,10 +147,10 @@ fn decode_with(
     mut decoder: impl ImageDecoder,
     format: FrameFormat,
     found_bytes: usize,
-    memory: MemoryLimit,
+    account: &Account,
 ) -> Result<Frame<'static>, FrameError> {
     let exif = decoder.exif_metadata().ok().flatten();
-    let decoded = Decoded::new(decoder, format, found_bytes, memory)?;
+    let decoded = Decoded::new(decoder, format, found_bytes, account)?;
     let frame = match decoded.depth {
         Depth::Eight => decoded.integers(decoded.image.as_bytes(), u8::MAX),
         Depth::Sixteen => decoded.integers(decoded.words(), u16::MAX),
@@ -178,12 +178,13 @@ impl Decoded {
         decoder: impl ImageDecoder,
         format: FrameFormat,
         found_bytes: usize,
-        memory: MemoryLimit,
+        account: &Account,
     ) -> Result<Self, FrameError> {
         let (width, height) = decoder.dimensions();
         let (width, height) = (width as usize, height as usize);
         check_size(width, height)?;
-        memory.check(width, height, decoder_bytes_per_pixel(&decoder))?;
+        let bytes_per_pixel = decoder_bytes_per_pixel(&decoder) + size_of::<f32>();
+        account.check_image((width, height), bytes_per_pixel)?;
         let color = decoder.color_type();
         let depth = match color {
             ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => Depth::Eight,
@@ -192,8 +193,8 @@ impl Decoded {
             }
             other => return Err(unsupported(format, format!("{other:?}"))),
         };
-        let image =
-            DynamicImage::from_decoder(decoder).map_err(|e| error_of(e, format, found_bytes))?;
+        let image = DynamicImage::from_decoder(decoder)
+            .map_err(|e| account.why(error_of(e, format, found_bytes)))?;
         Ok(Self {
             image,
             channels: usize::from(color.channel_count()),

@@ -1,5 +1,6 @@
 //! Reads files and streams, and decodes them by their format.
 
+use super::account::Account;
 use super::error::FrameError;
 use super::format::{FrameFormat, first_bytes};
 use super::image::Frame;
@@ -8,13 +9,15 @@ use super::memory::MemoryLimit;
 use super::pixels::Pixels;
 use super::{compressed, fits, foreign, raster, tiff};
 use crate::base::files;
+use crate::base::interrupt::Interrupt;
 use std::borrow::Cow;
-use std::io::{self, Read};
+use std::io::Read;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-/// Buffers for reading, reused from frame to frame. Without them, reading spends most of its time
-/// in the operating system, which allocates and clears the memory of each frame.
+/// Buffers for reading, reused from frame to frame, and what a frame may take. Without them, reading
+/// spends most of its time in the operating system, which allocates and clears the memory of each
+/// frame.
 #[derive(Debug, Default)]
 pub struct Buffers {
     /// Content of the file.
@@ -22,6 +25,9 @@ pub struct Buffers {
     /// 16-bit pixels of a discarded frame.
     pixels: Vec<u16>,
     memory: MemoryLimit,
+    interrupt: Interrupt,
+    /// What is held beside the frame that was read last.
+    beside_bytes: u64,
 }
 
 impl Buffers {
@@ -40,11 +46,29 @@ impl Buffers {
         self.memory = memory;
     }
 
+    /// From now on reading ends with [`FrameError::Interrupted`] when `interrupt` is due.
+    pub fn set_interrupt(&mut self, interrupt: Interrupt) {
+        self.interrupt = interrupt;
+    }
+
     /// Reuses the pixels of a frame that is no longer needed.
     pub fn recycle(&mut self, frame: Frame) {
         if let Pixels::U16(Cow::Owned(pixels)) = frame.pixels {
             self.pixels = pixels;
         }
+    }
+
+    /// The memory for the frame that was read last and the work on it.
+    pub(crate) fn memory_of_frame(&self) -> MemoryLimit {
+        MemoryLimit::of_bytes(self.memory.bytes().saturating_sub(self.beside_bytes))
+    }
+
+    /// An account for one frame, whose file is in `bytes`.
+    pub(super) fn account(&mut self, bytes: usize) -> Result<Account, FrameError> {
+        self.beside_bytes = bytes as u64;
+        let account = Account::new(self.memory, self.interrupt.clone());
+        account.hold(self.beside_bytes)?;
+        Ok(account)
     }
 }
 
@@ -74,23 +98,17 @@ pub fn read_page_with(
     buffers: &mut Buffers,
 ) -> Result<Frame<'static>, FrameError> {
     let path = path.as_ref();
-    let Buffers {
-        bytes,
-        pixels,
-        memory,
-    } = buffers;
     files::open(path)
         .map_err(FrameError::from)
         .and_then(|file| {
             let length = file.metadata().map_or(0, |metadata| metadata.len());
-            read_limited(file, length, MAX_FILE_BYTES, bytes)?;
-            decode_with(bytes, page, *memory, pixels)
+            read_expected(file, length, page, buffers)
         })
         .map_err(|error| error.in_file(path))
 }
 
 /// Reads `stream` to its end and decodes image `page`, counted from 1; without `page`, the first. It
-/// may take as much memory as `memory`.
+/// may take what the buffers say.
 ///
 /// A stream that does not begin like an image is not read further: it may be endless.
 /// # Errors
@@ -98,32 +116,61 @@ pub fn read_page_with(
 pub fn read_stream(
     stream: impl Read,
     page: Option<NonZeroUsize>,
-    memory: MemoryLimit,
+    buffers: &mut Buffers,
 ) -> Result<Frame<'static>, FrameError> {
-    let mut bytes = Vec::new();
-    read_limited(stream, 0, MAX_FILE_BYTES, &mut bytes)?;
-    decode_with(&bytes, page, memory, &mut Vec::new())
+    read_expected(stream, 0, page, buffers)
 }
 
-/// Reads all of `stream` into `bytes`: about `expected` bytes, at most `limit`.
-pub(super) fn read_limited(
-    mut stream: impl Read,
+/// Reads a stream of about `expected` bytes, and decodes an image of it.
+fn read_expected(
+    stream: impl Read,
     expected: u64,
-    limit: u64,
+    page: Option<NonZeroUsize>,
+    buffers: &mut Buffers,
+) -> Result<Frame<'static>, FrameError> {
+    // Whatever was read before, this frame has all of the memory.
+    let mut bytes = std::mem::take(&mut buffers.bytes);
+    let mut pixels = std::mem::take(&mut buffers.pixels);
+    bytes.clear();
+    bytes.shrink_to(usize::try_from(expected).unwrap_or(usize::MAX));
+    let account = buffers.account(bytes.capacity())?;
+    if expected > account.left_bytes() / 2 {
+        pixels = Vec::new();
+    } else {
+        pixels.clear();
+        pixels.shrink_to(expected as usize / size_of::<u16>());
+    }
+    read_limited(stream, expected, &account, &mut bytes)?;
+    buffers.beside_bytes = bytes.capacity() as u64;
+    let frame = decode_with(&bytes, page, &account, pixels);
+    buffers.bytes = bytes;
+    frame
+}
+
+/// Reads all of `stream`, about `expected` bytes, into `bytes`, whose capacity is booked.
+pub(super) fn read_limited(
+    stream: impl Read,
+    expected: u64,
+    account: &Account,
     bytes: &mut Vec<u8>,
 ) -> Result<(), FrameError> {
-    bytes.clear();
-    stream.by_ref().take(HEAD_BYTES).read_to_end(bytes)?;
+    let mut stream = account.timed(stream);
+    account.reserve(bytes, HEAD_BYTES as usize)?;
+    stream
+        .by_ref()
+        .take(HEAD_BYTES)
+        .read_to_end(bytes)
+        .map_err(|error| account.why(error.into()))?;
     if FrameFormat::of(bytes).is_none() {
         return Err(not_an_image(bytes));
     }
+    let limit = MAX_FILE_BYTES;
     if expected > limit {
         return Err(FrameError::TooManyBytes { limit });
     }
-    let reserved = bytes.try_reserve(expected as usize);
-    reserved.map_err(|_| io::Error::from(io::ErrorKind::OutOfMemory))?;
+    account.reserve(bytes, expected as usize)?;
     let rest = (limit + 1).saturating_sub(bytes.len() as u64);
-    stream.take(rest).read_to_end(bytes)?;
+    account.append(&mut stream.take(rest), bytes)?;
     if bytes.len() as u64 > limit {
         return Err(FrameError::TooManyBytes { limit });
     }
@@ -154,40 +201,58 @@ pub fn decode(bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
 /// # Errors
 /// [`FrameError`], never [`FrameError::File`].
 pub fn decode_page(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame<'static>, FrameError> {
-    decode_with(bytes, page, MemoryLimit::DEFAULT, &mut Vec::new())
+    decode_page_with(bytes, page, &mut Buffers::new())
+}
+
+/// [`decode_page`] with buffers that say what it may take.
+/// # Errors
+/// As [`decode_page`].
+pub fn decode_page_with(
+    bytes: &[u8],
+    page: Option<NonZeroUsize>,
+    buffers: &mut Buffers,
+) -> Result<Frame<'static>, FrameError> {
+    let account = buffers.account(bytes.len())?;
+    decode_with(bytes, page, &account, std::mem::take(&mut buffers.pixels))
 }
 
 fn decode_with(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
-    memory: MemoryLimit,
-    buffer: &mut Vec<u16>,
+    account: &Account,
+    buffer: Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
     match FrameFormat::of(bytes) {
         Some(format) if format.is_compressed() => {
-            let content = compressed::unpack(bytes, format, memory.content_bytes())?;
-            decode_image(&content, page, memory, buffer)
+            let content = compressed::unpack(bytes, format, account)?;
+            decode_image(&content, page, account, buffer)
         }
-        _ => decode_image(bytes, page, memory, buffer),
+        _ => decode_image(bytes, page, account, buffer),
     }
 }
 
-/// Decodes one image that is not compressed as a file.
+/// Decodes one image that is not compressed as a file; `bytes` are booked. Its 16-bit pixels may be
+/// stored in `buffer`.
 pub(super) fn decode_image(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
-    memory: MemoryLimit,
-    buffer: &mut Vec<u16>,
+    account: &Account,
+    buffer: Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
-    let single = |read: fn(&[u8], MemoryLimit) -> Result<Frame<'static>, FrameError>| match page {
+    let single = |read: fn(&[u8], &Account) -> Result<Frame<'static>, FrameError>| match page {
         Some(page) if page.get() > 1 => Err(FrameError::NoSuchPage { page, pages: 1 }),
-        _ => read(bytes, memory),
+        _ => read(bytes, account),
     };
-    match FrameFormat::of(bytes) {
-        Some(FrameFormat::Fits) => fits::decode(bytes, page, memory),
+    let format = FrameFormat::of(bytes);
+    let buffer = match format {
+        Some(FrameFormat::Tiff) => buffer,
+        _ => Vec::new(),
+    };
+    match format {
+        Some(FrameFormat::Fits) => fits::decode(bytes, page, account),
         Some(FrameFormat::Tiff) => match foreign::raw_tiff(bytes) {
             Some(known) => Err(known.into()),
-            None => tiff::decode(bytes, page, memory, buffer),
+            None => tiff::decode(bytes, page, account, buffer),
         },
         Some(FrameFormat::Png) => single(raster::decode_png),
         Some(FrameFormat::Jpeg) => single(raster::decode_jpeg),

@@ -1,5 +1,7 @@
+use super::account::Account;
 use super::reader::read_limited;
 use super::*;
+use crate::base::interrupt::Interrupt;
 use proptest::prelude::*;
 use std::io::{Cursor, Read, Write};
 use std::num::NonZeroUsize;
@@ -477,19 +479,17 @@ fn infinities_have_no_value_and_alone_make_no_frame() {
 
 #[test]
 fn an_endless_stream_is_refused_if_no_image_or_too_long() {
-    let zeros = read_stream(std::io::repeat(0), None, MemoryLimit::DEFAULT).unwrap_err();
+    let zeros = read_stream(std::io::repeat(0), None, &mut Buffers::new()).unwrap_err();
     assert!(matches!(zeros, FrameError::UnknownFormat { .. }), "{zeros}");
-    let nothing = read_stream(std::io::empty(), None, MemoryLimit::DEFAULT).unwrap_err();
+    let nothing = read_stream(std::io::empty(), None, &mut Buffers::new()).unwrap_err();
     assert!(matches!(nothing, FrameError::Empty), "{nothing}");
     let endless = || (&b"P5 3 3 255\n"[..]).chain(std::io::repeat(7));
-    let error = read_limited(endless(), 0, 10_000, &mut Vec::new()).unwrap_err();
-    assert!(
-        matches!(error, FrameError::TooManyBytes { limit: 10_000 }),
-        "{error}"
-    );
+    let account = || Account::new(MemoryLimit::of_bytes(10_000), Interrupt::default());
+    let error = read_limited(endless(), 0, &account(), &mut Vec::new()).unwrap_err();
+    assert!(matches!(error, FrameError::OutOfMemory { .. }), "{error}");
     for length in [20, 4096, 5000, 10_000] {
         let mut bytes = Vec::new();
-        read_limited(endless().take(length), 99, 10_000, &mut bytes).unwrap();
+        read_limited(endless().take(length), 99, &account(), &mut bytes).unwrap();
         assert_eq!(bytes.len() as u64, length);
     }
 }

@@ -3,6 +3,7 @@
 //! Signed and unsigned integers of 1 to 64 bits, floats of 16 to 64 bits; grey or colour, with or
 //! without alpha; in strips or tiles, interleaved or plane by plane.
 
+use super::account::{Account, Timed};
 use super::error::FrameError;
 use super::exif;
 use super::format::FrameFormat;
@@ -11,7 +12,6 @@ use super::levels::{
     Samples, WholeNumber, frame_from_floats, frame_from_integers, frame_from_words, interleaved,
 };
 use super::limits::MAX_PAGES;
-use super::memory::MemoryLimit;
 use std::io::Cursor;
 use std::num::NonZeroUsize;
 use tiff::decoder::{BufferLayoutPreference, Decoder, DecodingResult, Limits};
@@ -26,11 +26,11 @@ const SUPPORTED: &str = "grey or colour of 1 to 64 bits per sample, uncompressed
 pub(super) fn decode(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
-    memory: MemoryLimit,
-    buffer: &mut Vec<u16>,
+    account: &Account,
+    buffer: Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
-    let fail = |e: TiffError| error_of(e, bytes.len());
-    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(fail)?;
+    let fail = |e: TiffError| account.why(error_of(e, bytes.len()));
+    let mut decoder = Decoder::new(account.timed(Cursor::new(bytes))).map_err(fail)?;
     if let Some(page) = page {
         seek(&mut decoder, page, bytes.len())?;
     }
@@ -38,7 +38,7 @@ pub(super) fn decode(
     let (width, height) = (width as usize, height as usize);
     check_size(width, height)?;
     let mut limits = Limits::default();
-    limits.decoding_buffer_size = usize::try_from(memory.bytes()).unwrap_or(usize::MAX);
+    limits.decoding_buffer_size = usize::try_from(account.left_bytes()).unwrap_or(usize::MAX);
     limits.intermediate_buffer_size = limits.decoding_buffer_size;
     decoder = decoder.with_limits(limits);
     let color = decoder.colortype().map_err(fail)?;
@@ -50,17 +50,17 @@ pub(super) fn decode(
         channels: channels_of(color)?,
         planes: stored.planes,
     };
-    memory.check(width, height, layout.decoder_bytes_per_pixel())?;
+    account.check_image((width, height), layout.bytes_per_pixel())?;
     let words = if layout.is_grey_words(&stored) {
         plain_words(&mut decoder, bytes)
     } else {
         None
     };
     let frame = if let Some(words) = words {
-        let pixels = std::mem::take(buffer);
         let is_big_endian = decoder.byte_order() == ByteOrder::BigEndian;
-        frame_from_words((width, height), words, is_big_endian, pixels)
+        frame_from_words((width, height), words, is_big_endian, buffer)
     } else {
+        drop(buffer);
         let mut samples = DecodingResult::U8(Vec::new());
         decoder.read_image_to_buffer(&mut samples).map_err(fail)?;
         layout.frame(samples)
@@ -70,15 +70,16 @@ pub(super) fn decode(
 
 /// The number of images in a TIFF file, at most [`MAX_PAGES`], and why there may be more that cannot
 /// be found.
-pub(super) fn count_pages(bytes: &[u8]) -> (usize, Option<FrameError>) {
-    let mut decoder = match Decoder::new(Cursor::new(bytes)) {
+pub(super) fn count_pages(bytes: &[u8], account: &Account) -> (usize, Option<FrameError>) {
+    let fail = |e: TiffError| Some(account.why(error_of(e, bytes.len())));
+    let mut decoder = match Decoder::new(account.timed(Cursor::new(bytes))) {
         Ok(decoder) => decoder,
-        Err(error) => return (0, Some(error_of(error, bytes.len()))),
+        Err(error) => return (0, fail(error)),
     };
     let mut pages = 1;
     while decoder.more_images() && pages < MAX_PAGES {
         if let Err(error) = decoder.next_image() {
-            return (pages, Some(error_of(error, bytes.len())));
+            return (pages, fail(error));
         }
         pages += 1;
     }
@@ -86,7 +87,10 @@ pub(super) fn count_pages(bytes: &[u8]) -> (usize, Option<FrameError>) {
 }
 
 /// The 16-bit samples as stored in the file, if they are contiguous, uncompressed, and 0 is black.
-fn plain_words<'a>(decoder: &mut Decoder<Cursor<&[u8]>>, bytes: &'a [u8]) -> Option<&'a [[u8; 2]]> {
+fn plain_words<'a>(
+    decoder: &mut Decoder<Timed<Cursor<&[u8]>>>,
+    bytes: &'a [u8],
+) -> Option<&'a [[u8; 2]]> {
     const UNCOMPRESSED: u16 = 1;
     const BLACK_IS_ZERO: u16 = 1;
     // Tag, its default, and the value required.
@@ -119,7 +123,7 @@ fn plain_words<'a>(decoder: &mut Decoder<Cursor<&[u8]>>, bytes: &'a [u8]) -> Opt
 
 /// Moves the decoder to image `page`, counted from 1.
 fn seek(
-    decoder: &mut Decoder<Cursor<&[u8]>>,
+    decoder: &mut Decoder<Timed<Cursor<&[u8]>>>,
     page: NonZeroUsize,
     found_bytes: usize,
 ) -> Result<(), FrameError> {
@@ -169,13 +173,15 @@ impl Layout {
         self.bits == 16 && is_unsigned && self.channels == 1 && self.planes == 1
     }
 
-    /// Decoded samples, which are copied where they are packed or wider than a frame's values.
-    fn decoder_bytes_per_pixel(&self) -> usize {
+    /// Decoded samples, which are copied where they are packed or wider than a frame's values, and
+    /// the frame.
+    fn bytes_per_pixel(&self) -> usize {
         let samples = self.channels * usize::from(self.bits).div_ceil(8);
-        match self.bits {
-            8 | 16 | 32 => samples,
-            _ => samples + self.channels * size_of::<f32>(),
-        }
+        let copied = match self.bits {
+            8 | 16 | 32 => 0,
+            _ => self.channels * size_of::<f32>(),
+        };
+        samples + copied + size_of::<f32>()
     }
 
     fn frame(&self, samples: DecodingResult) -> Result<Frame<'static>, FrameError> {

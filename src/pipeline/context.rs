@@ -111,15 +111,24 @@ impl Workspace {
     }
 
     /// Work on a frame ends early when `interrupt` is due, or [`Context::time_limit`] is reached:
-    /// while stars are detected, with an error; later, with the frame not identified.
+    /// while it is read and stars are detected, with an error; later, with the frame not identified.
     #[must_use]
     pub fn until(self, interrupt: &Interrupt) -> Self {
-        Self {
-            detect: self.detect.until(interrupt.clone()),
-            identify: self.identify.until(interrupt.clone()),
+        let mut until = Self {
             interrupt: interrupt.clone(),
             ..self
-        }
+        };
+        until.set_deadline(None);
+        until
+    }
+
+    /// Lets the time limit of `context` run from now on, for what is read before
+    /// [`solve_read`](super::solve_read) lets it run anew.
+    pub fn begin(&mut self, context: &Context) {
+        let deadline = context
+            .time_limit
+            .and_then(|limit| Instant::now().checked_add(limit));
+        self.set_deadline(deadline);
     }
 
     /// Ends the work on one frame at `deadline`, too.
@@ -128,6 +137,7 @@ impl Workspace {
             Some(deadline) => self.interrupt.or_at(deadline),
             None => self.interrupt.clone(),
         };
+        self.frames.set_interrupt(interrupt.clone());
         self.detect.set_interrupt(interrupt.clone());
         self.identify.set_interrupt(interrupt);
     }

@@ -9,7 +9,7 @@ use super::solved::Solved;
 use super::stopwatch::{Stage, Stopwatch};
 use crate::calibration::Calibration;
 use crate::detect::{self, DetectError};
-use crate::frame::{self, Frame, FrameError};
+use crate::frame::{self, Frame, FrameError, MemoryLimit};
 use std::num::NonZeroUsize;
 use std::path::Path;
 
@@ -44,6 +44,7 @@ pub fn solve_read(
     workspace: &mut Workspace,
 ) -> Result<(Solution, Frame<'static>), Error> {
     let mut clock = Stopwatch::start();
+    workspace.set_deadline(clock.deadline(context.time_limit));
     let mut frame = read(&mut workspace.frames)?;
     let calibration = context.calibration;
     if let Some(calibration) = calibration {
@@ -59,6 +60,7 @@ pub fn solve_read(
         frame: &frame,
         name: Some(name),
         calibration,
+        memory: workspace.frames.memory_of_frame(),
         clock,
     };
     let solution = solve(input, context, workspace).map_err(|source| Error::Detect {
@@ -77,11 +79,14 @@ pub fn solve_frame(
     context: &Context,
     workspace: &mut Workspace,
 ) -> Result<Solution, DetectError> {
+    let clock = Stopwatch::start();
+    workspace.set_deadline(clock.deadline(context.time_limit));
     let input = Input {
         frame,
         name: None,
         calibration: None,
-        clock: Stopwatch::start(),
+        memory: workspace.frames.memory(),
+        clock,
     };
     solve(input, context, workspace)
 }
@@ -92,6 +97,8 @@ struct Input<'a> {
     name: Option<&'a Path>,
     /// The calibration that was applied.
     calibration: Option<&'a Calibration>,
+    /// For the frame and the work on it.
+    memory: MemoryLimit,
     clock: Stopwatch,
 }
 
@@ -102,8 +109,7 @@ fn solve(
     workspace: &mut Workspace,
 ) -> Result<Solution, DetectError> {
     let (frame, mut clock) = (input.frame, input.clock);
-    workspace.set_deadline(clock.deadline(context.time_limit));
-    workspace.detect.set_memory(workspace.frames.memory());
+    workspace.detect.set_memory(input.memory);
     let priors = context.priors_of(frame, input.name);
 
     let config = context.detect_config(frame);

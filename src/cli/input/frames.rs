@@ -61,8 +61,7 @@ pub(crate) fn read_frame(
     if !is_stdin(input) {
         return frame::read_page_with(input, page, buffers);
     }
-    frame::read_stream(io::stdin().lock(), page, buffers.memory())
-        .map_err(|error| error.in_file(input))
+    frame::read_stream(io::stdin().lock(), page, buffers).map_err(|error| error.in_file(input))
 }
 
 /// Reads a master dark or a master flat.

@@ -4,7 +4,7 @@ use crate::cli::input::frames::read_frame;
 use crate::cli::input::stdin::is_stdin;
 use crate::cli::options::frames::PageChoice;
 use crate::cli::solving::result_files::Image;
-use starpipe::frame::{Buffers, Frame, FrameError, MemoryLimit, Pages};
+use starpipe::frame::{Buffers, Frame, FrameError, Pages};
 use starpipe::pipeline::{Context, Error, Solution, Workspace, solve_read};
 use std::io;
 use std::path::Path;
@@ -36,25 +36,29 @@ fn solve_all_images(
     workspace: &mut Workspace,
     mut take: impl FnMut(Image, SolvedImage, &mut Workspace),
 ) {
-    let pages = match all_pages(path, workspace.frames.memory()) {
+    workspace.begin(context);
+    let mut pages = match all_pages(path, &mut workspace.frames) {
         Ok(pages) => pages,
         Err(error) => return take(Image::of(path), Err(error.into()), workspace),
     };
-    for (page, frame) in pages {
+    while let Some(page) = pages.advance() {
         let image = Image {
             path,
             page: Some(page),
         };
         let name = image.name();
-        let read = |_: &mut Buffers| frame.map_err(|error| error.in_file(&name));
+        let read = |buffers: &mut Buffers| {
+            let frame = pages.image(buffers);
+            frame.map_err(|error| error.in_file(&name))
+        };
         let solved = solve_read(&name, read, context, workspace);
         take(image, solved, workspace);
     }
 }
 
-fn all_pages(path: &Path, memory: MemoryLimit) -> Result<Pages, FrameError> {
+fn all_pages(path: &Path, buffers: &mut Buffers) -> Result<Pages, FrameError> {
     if is_stdin(path) {
-        return Pages::read(io::stdin().lock(), memory).map_err(|error| error.in_file(path));
+        return Pages::read(io::stdin().lock(), buffers).map_err(|error| error.in_file(path));
     }
-    Pages::open(path, memory)
+    Pages::open(path, buffers)
 }

@@ -15,10 +15,10 @@ impl CandidateMemory {
     /// A pixel above the threshold: that and its top, and its part of runs, peaks and saddles.
     const PER_BRIGHT_PIXEL_BYTES: u64 = 30;
 
-    /// What `memory` leaves beside the frame and its file; decoding took enough for every 32nd pixel
+    /// What `memory` leaves beside the frame; decoding took enough for every 32nd pixel
     /// to stand out.
     pub fn beside(frame: &Frame, memory: MemoryLimit) -> Self {
-        let left = memory.bytes().saturating_sub(2 * frame.pixels.bytes());
+        let left = memory.bytes().saturating_sub(frame.pixels.bytes());
         let both = Self::PER_CANDIDATE_BYTES + Self::PER_BRIGHT_PIXEL_BYTES;
         Self {
             bytes: left.max(frame.pixels.len() as u64 / 32 * both),

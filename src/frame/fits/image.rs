@@ -3,10 +3,11 @@
 use super::error::{truncated, unsupported};
 use super::tiles;
 use super::unit::{StoredType, Unit};
+use crate::frame::account::Account;
 use crate::frame::levels::{
     Samples, WholeNumber, frame_from_floats, frame_from_integers, interleaved,
 };
-use crate::frame::{Frame, FrameError, MemoryLimit, check_size};
+use crate::frame::{Frame, FrameError, check_size};
 
 /// Decoded values of a tile, which may be the whole image.
 const TILE_BYTES_PER_PIXEL: usize = 8;
@@ -28,7 +29,7 @@ pub(super) struct Image {
 
 impl Image {
     /// The image `plane` of `unit`. A cube has several planes, and one must be chosen.
-    pub fn new(unit: &Unit, plane: Option<usize>, memory: MemoryLimit) -> Result<Self, FrameError> {
+    pub fn new(unit: &Unit, plane: Option<usize>, account: &Account) -> Result<Self, FrameError> {
         if plane.is_none() && unit.pages() > 1 {
             let found = format!("a cube of {} planes", unit.planes());
             let expected = "one plane, three of colour, or a page that says which";
@@ -42,7 +43,8 @@ impl Image {
         } else {
             0
         };
-        memory.check(width, height, channels * unit.stored.bytes() + tiles)?;
+        let bytes_per_pixel = channels * unit.stored.bytes() + tiles + size_of::<f32>();
+        account.check_image((width, height), bytes_per_pixel)?;
         let scale = unit.header.number_or("BSCALE", 1.0)?;
         if scale == 0.0 {
             return Err(unit.header.invalid("BSCALE", "a number other than 0"));
@@ -64,12 +66,17 @@ impl Image {
     }
 
     /// Decodes the image from `unit`, of which it was made, in `bytes`, the content of the file.
-    pub fn frame(&self, unit: &Unit, bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
+    pub fn frame(
+        &self,
+        unit: &Unit,
+        bytes: &[u8],
+        account: &Account,
+    ) -> Result<Frame<'static>, FrameError> {
         let pixels = self.width * self.height * self.channels;
         if unit.is_compressed_image() {
             let first = self.plane.saturating_mul(self.width * self.height);
             let range = first..first.saturating_add(pixels);
-            return self.frame_of(&tiles::unpack(unit, bytes, range)?);
+            return self.frame_of(&tiles::unpack(unit, bytes, range, account)?);
         }
         let plane_bytes = self.width * self.height * self.stored.bytes();
         let before = plane_bytes.saturating_mul(self.plane);

@@ -26,10 +26,10 @@ mod write;
 pub use cards::FitsHeader;
 pub use write::{FitsSamples, FitsWriteError, write_fits};
 
+use super::account::Account;
 use super::error::FrameError;
 use super::format::FrameFormat;
 use super::image::Frame;
-use super::memory::MemoryLimit;
 use image::Image;
 use std::num::NonZeroUsize;
 use unit::Units;
@@ -40,19 +40,23 @@ use unit::Units;
 pub(super) fn decode(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
-    memory: MemoryLimit,
+    account: &Account,
 ) -> Result<Frame<'static>, FrameError> {
     let (mut pages, mut tables) = (0, 0);
     let mut units = Units::new(bytes);
     // The primary header holds the keywords that are common to all units.
     let mut primary = None;
     while let Some(unit) = units.next()? {
+        account.check_time()?;
         let plane = page.map_or(0, |page| page.get() - 1 - pages);
         if plane < unit.pages() {
-            let image = Image::new(&unit, page.map(|_| plane), memory)?;
+            let image = Image::new(&unit, page.map(|_| plane), account)?;
             let headers = [Some(&unit.header), primary.as_ref()];
             let metadata = keywords::metadata(headers.into_iter().flatten());
-            return Ok(image.frame(&unit, bytes)?.with_metadata(metadata).upright());
+            return Ok(image
+                .frame(&unit, bytes, account)?
+                .with_metadata(metadata)
+                .upright());
         }
         pages += unit.pages();
         tables += usize::from(unit.is_table());
@@ -72,10 +76,11 @@ pub(super) fn decode(
 }
 
 /// The number of images in a FITS file, and why there may be more that cannot be found.
-pub(super) fn count_pages(bytes: &[u8]) -> (usize, Option<FrameError>) {
+pub(super) fn count_pages(bytes: &[u8], account: &Account) -> (usize, Option<FrameError>) {
     let (mut pages, mut units) = (0_usize, Units::new(bytes));
     loop {
-        match units.next() {
+        let unit = account.check_time().and_then(|()| units.next());
+        match unit {
             Ok(Some(unit)) => pages = pages.saturating_add(unit.pages()),
             Ok(None) => return (pages, None),
             Err(error) => return (pages, Some(error)),

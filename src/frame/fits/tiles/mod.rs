@@ -27,6 +27,7 @@ mod table;
 
 use super::error::{malformed, truncated};
 use super::unit::Unit;
+use crate::frame::account::Account;
 use crate::frame::{FrameError, MAX_PIXELS};
 use decoder::Decoder;
 use error::TileError;
@@ -46,6 +47,7 @@ pub(super) fn unpack(
     unit: &Unit,
     bytes: &[u8],
     pixels: Range<usize>,
+    account: &Account,
 ) -> Result<Vec<u8>, FrameError> {
     let grid = Grid::new(&unit.axes, &unit.header)?;
     let too_large = || malformed(format!("found tiles of more than {MAX_TILE_PIXELS} pixels"));
@@ -57,6 +59,7 @@ pub(super) fn unpack(
     let decoder = Decoder::new(unit, Table::new(unit, bytes, tiles)?)?;
     let touching = || (0..tiles).filter(|&row| grid.may_touch(&grid.tile(row), &pixels));
     for row in touching() {
+        account.check_time()?;
         decoder.check(row).map_err(|error| match error {
             TileError::OutsideHeap { .. } if unit.end() > bytes.len() => {
                 truncated(bytes.len(), of_tile(row, &error))
@@ -67,6 +70,7 @@ pub(super) fn unpack(
     let width = unit.stored.bytes();
     let mut image = vec![0; pixels.len() * width];
     for row in touching() {
+        account.check_time()?;
         let tile = grid.tile(row);
         let decoded = decoder.pixels(&tile);
         let decoded = decoded.map_err(|error| malformed(of_tile(row, &error)))?;
