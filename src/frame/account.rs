@@ -2,9 +2,12 @@
 
 use super::error::FrameError;
 use super::memory::MemoryLimit;
-use crate::base::interrupt::Interrupt;
+use crate::base::interrupt::{Interrupt, Interrupted};
 use std::cell::Cell;
 use std::io::{self, BufRead, Read, Seek, SeekFrom};
+
+/// Pixels that are decoded between two looks at the time: in some hundred microseconds.
+pub(super) const PIXELS_BETWEEN_CHECKS: usize = 1 << 16;
 
 /// The account of one frame. Readers and decoders book on it what they hold before they allocate it,
 /// and ask it whether to go on.
@@ -112,6 +115,11 @@ impl Account {
             needed_bytes: needed_bytes.saturating_add(self.held_bytes.get()),
             limit_bytes: self.limit.bytes(),
         })
+    }
+
+    /// [`Self::check_time`] for errors of another type.
+    pub fn check_interrupt(&self) -> Result<(), Interrupted> {
+        self.interrupt.check()
     }
 
     /// Ends the work with `?` if its time is over. Ask every few milliseconds.

@@ -178,8 +178,9 @@ impl<'a> Unit<'a> {
 
 /// The lengths of the axes, whose number `keyword` says: NAXIS and NAXIS1, NAXIS2, …
 fn axes(header: &Header, keyword: &str) -> Result<Vec<usize>, FrameError> {
-    const MAX_AXES: i64 = 999;
-    let expected = "a number of axes from 0 to 999";
+    /// The standard allows 999. NumPy, which most files are written with, has no arrays of more.
+    const MAX_AXES: i64 = 32;
+    let expected = "a number of axes from 0 to 32";
     let count = header.required(keyword, expected)?;
     if !(0..=MAX_AXES).contains(&count) {
         return Err(header.invalid(keyword, expected));

@@ -7,6 +7,7 @@ use super::method::{Method, Values};
 use super::quantize::{Dither, Quantized};
 use super::table::{Column, Table};
 use crate::frame::FrameError;
+use crate::frame::account::{Account, PIXELS_BETWEEN_CHECKS};
 use crate::frame::fits::error::{malformed, unsupported};
 use crate::frame::fits::unit::{StoredType, Unit};
 
@@ -80,15 +81,31 @@ impl<'a> Decoder<'a> {
         })
     }
 
-    /// Whether the data of the tile in `row` are in the file; no data are no error here.
-    pub fn check(&self, row: usize) -> Result<(), TileError> {
+    /// Size of the data of the tile in `row`, which must be in the file; no data are no error here.
+    pub fn data_bytes(&self, row: usize) -> Result<usize, TileError> {
         let columns = [Some(self.compressed), self.gzip, self.uncompressed];
-        let mut columns = columns.into_iter().flatten();
-        columns.try_for_each(|column| self.table.data(column, row).map(|_| ()))
+        let columns = columns.into_iter().flatten();
+        columns
+            .map(|column| Ok(self.table.data(column, row)?.len()))
+            .sum()
+    }
+
+    /// Whether tiles with so many bytes of data can have data of their own.
+    pub fn check_shared(&self, data_bytes: usize) -> Result<(), TileError> {
+        let heap = self.table.heap_bytes();
+        if data_bytes > heap {
+            return Err(TileError::Shared { heap });
+        }
+        Ok(())
+    }
+
+    /// Most memory that decoding a tile takes for each of its pixels.
+    pub fn bytes_per_pixel(&self) -> usize {
+        self.method.bytes_per_pixel(self.stored.bytes())
     }
 
     /// The pixels of `tile` as an image that is not compressed has them: big-endian, of ZBITPIX.
-    pub fn pixels(&self, tile: &Tile) -> Result<Vec<u8>, TileError> {
+    pub fn pixels(&self, tile: &Tile, account: &Account) -> Result<Vec<u8>, TileError> {
         let count = tile.pixels();
         let width = self.stored.bytes();
         let data = |column: Option<Column>| match column {
@@ -97,11 +114,11 @@ impl<'a> Decoder<'a> {
         };
         let compressed = data(Some(self.compressed))?;
         if !compressed.is_empty() {
-            return self.decompressed(compressed, tile);
+            return self.decompressed(compressed, tile, account);
         }
         let packed = data(self.gzip)?;
         if !packed.is_empty() {
-            return exactly(gzip::inflate(packed, count, width)?, count, width);
+            return exactly(gzip::inflate(packed, count, width, account)?, count, width);
         }
         let plain = data(self.uncompressed)?;
         if plain.is_empty() {
@@ -118,7 +135,12 @@ impl<'a> Decoder<'a> {
         )
     }
 
-    fn decompressed(&self, data: &[u8], tile: &Tile) -> Result<Vec<u8>, TileError> {
+    fn decompressed(
+        &self,
+        data: &[u8],
+        tile: &Tile,
+        account: &Account,
+    ) -> Result<Vec<u8>, TileError> {
         /// Writers may store narrow numbers in words of four bytes.
         const WORD_BYTES: usize = 4;
         let (count, width) = (tile.pixels(), self.stored.bytes());
@@ -126,44 +148,54 @@ impl<'a> Decoder<'a> {
             Some(_) => WORD_BYTES,
             None => width.max(WORD_BYTES),
         };
-        let values = self.method.decode(data, tile, max_width)?;
+        let values = self.method.decode(data, tile, max_width, account)?;
         if let Some(quantization) = &self.quantization {
             let numbers = values.numbers(count)?;
             let quantized = quantization.of_tile(&self.table, tile.row);
             let floats = quantized.floats(&numbers, tile.row);
-            return Ok(match self.stored {
-                StoredType::F64 => floats.flat_map(f64::to_be_bytes).collect(),
-                _ => floats
-                    .flat_map(|float| (float as f32).to_be_bytes())
-                    .collect(),
-            });
+            return match self.stored {
+                StoredType::F64 => bytes_of(count, floats.map(f64::to_be_bytes), account),
+                _ => {
+                    let floats = floats.map(|float| (float as f32).to_be_bytes());
+                    bytes_of(count, floats, account)
+                }
+            };
         }
         match values {
             Values::Bytes(bytes) if bytes.len() == count * width => Ok(bytes),
             Values::Bytes(bytes) if !self.has_short_integers() => exactly(bytes, count, width),
             values => {
                 let numbers = values.numbers(count)?.into_iter();
-                Ok(match self.stored {
+                match self.stored {
                     // Lossy compression may go beyond the type.
-                    StoredType::U8 => numbers.map(|n| n.clamp(0, 0xff) as u8).collect(),
+                    StoredType::U8 => {
+                        bytes_of(count, numbers.map(|n| [n.clamp(0, 0xff) as u8]), account)
+                    }
                     StoredType::I16 => {
                         let word = |n: i32| n.clamp(i16::MIN.into(), i16::MAX.into()) as i16;
-                        bytes_of(count, numbers.map(|n| word(n).to_be_bytes()))
+                        bytes_of(count, numbers.map(|n| word(n).to_be_bytes()), account)
                     }
-                    _ => bytes_of(count, numbers.map(i32::to_be_bytes)),
-                })
+                    _ => bytes_of(count, numbers.map(i32::to_be_bytes), account),
+                }
             }
         }
     }
 }
 
 /// The bytes of `count` values, one after the other.
-fn bytes_of<const N: usize>(count: usize, values: impl Iterator<Item = [u8; N]>) -> Vec<u8> {
+fn bytes_of<const N: usize>(
+    count: usize,
+    mut values: impl Iterator<Item = [u8; N]>,
+    account: &Account,
+) -> Result<Vec<u8>, TileError> {
     // Faster than to collect a flat map.
     let mut bytes = vec![0; count * N];
-    let places = bytes.as_chunks_mut().0.iter_mut();
-    places.zip(values).for_each(|(place, value)| *place = value);
-    bytes
+    for places in bytes.as_chunks_mut().0.chunks_mut(PIXELS_BETWEEN_CHECKS) {
+        account.check_interrupt()?;
+        let pairs = places.iter_mut().zip(values.by_ref());
+        pairs.for_each(|(place, value)| *place = value);
+    }
+    Ok(bytes)
 }
 
 /// The bytes, if they are those of `count` pixels.

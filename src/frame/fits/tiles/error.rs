@@ -1,5 +1,7 @@
 //! What can be wrong with one tile.
 
+use crate::base::interrupt::Interrupted;
+
 /// Why the data of a tile cannot be decoded. The caller adds the tile's number.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub(super) enum TileError {
@@ -12,6 +14,14 @@ pub(super) enum TileError {
     /// Its descriptor has a negative number.
     #[error("found a length of {count} and an offset of {offset}, expected no negative number")]
     Negative { count: i64, offset: i64 },
+    /// Tiles share data.
+    #[error(
+        "with it the tiles have more data than the heap of {heap} bytes, expected data of its own for each"
+    )]
+    Shared { heap: usize },
+    /// The time is over.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
     /// The data end too early.
     #[error("its data end before its {pixels} pixels are complete")]
     Short { pixels: usize },

@@ -4,19 +4,28 @@
 //! FITS Standard 4.0 (2018), sect. 10.4.2.
 
 use super::error::TileError;
-use flate2::read::MultiGzDecoder;
+use crate::frame::account::Account;
+use flate2::bufread::MultiGzDecoder;
 use std::io::Read;
 
 /// Decompresses the bytes of `count` pixels of at most `max_width` bytes each. The stream is not
 /// read further than that.
-pub(super) fn inflate(data: &[u8], count: usize, max_width: usize) -> Result<Vec<u8>, TileError> {
+pub(super) fn inflate(
+    data: &[u8],
+    count: usize,
+    max_width: usize,
+    account: &Account,
+) -> Result<Vec<u8>, TileError> {
     let limit = count * max_width;
     let mut bytes = Vec::new();
-    let mut reader = MultiGzDecoder::new(data).take(limit as u64 + 1);
-    reader.read_to_end(&mut bytes).map_err(|error| {
-        let detail = format!("its data cannot be decompressed with gzip ({error})");
-        TileError::Corrupt(detail)
-    })?;
+    let reader = MultiGzDecoder::new(account.timed(data));
+    reader
+        .take(limit as u64 + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|error| {
+            let detail = format!("its data cannot be decompressed with gzip ({error})");
+            TileError::Corrupt(detail)
+        })?;
     if bytes.len() > limit {
         return Err(TileError::Long { pixels: count });
     }
@@ -56,17 +65,20 @@ mod tests {
     #[test]
     fn no_more_than_the_pixels_is_decompressed() {
         let bomb = deflate(&vec![0; 10_000_000]);
-        let refused = inflate(&bomb, 100, 4);
+        let refused = inflate(&bomb, 100, 4, &Account::default());
         assert_eq!(refused, Err(TileError::Long { pixels: 100 }));
-        assert_eq!(inflate(&deflate(&[7; 400]), 100, 4).unwrap(), [7; 400]);
+        assert_eq!(
+            inflate(&deflate(&[7; 400]), 100, 4, &Account::default()).unwrap(),
+            [7; 400]
+        );
     }
 
     #[test]
     fn damage_is_an_error() {
         let mut data = deflate(b"some pixels, and more of them");
-        assert!(inflate(&data[..20], 100, 4).is_err());
+        assert!(inflate(&data[..20], 100, 4, &Account::default()).is_err());
         data[14] ^= 0x55;
-        assert!(inflate(&data, 100, 4).is_err());
+        assert!(inflate(&data, 100, 4, &Account::default()).is_err());
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::hcompress::Hcompress;
 use super::rice::{Rice, RiceWidth};
 use super::{gzip, plio};
 use crate::frame::FrameError;
+use crate::frame::account::Account;
 use crate::frame::fits::error::{malformed, unsupported};
 use crate::frame::fits::header::Header;
 use crate::frame::fits::unit::StoredType;
@@ -73,13 +74,31 @@ impl Method {
         matches!(self, Self::Gzip { .. } | Self::None)
     }
 
+    /// Most memory that decoding takes for each pixel of a tile, which becomes `width` bytes.
+    pub fn bytes_per_pixel(self, width: usize) -> usize {
+        const NUMBER: usize = size_of::<i32>();
+        match self {
+            Self::Rice(_) | Self::Plio { .. } => NUMBER + width,
+            // Words of 64 bits while numbers are made of them.
+            Self::Hcompress(_) => (2 * NUMBER + NUMBER).max(NUMBER + width),
+            // Inflated bytes in a vector that grows by doubling, in their order; then as above.
+            Self::Gzip { .. } | Self::None => 3 * width.max(NUMBER),
+        }
+    }
+
     /// Decodes the data of `tile`, whose pixels have at most `max_width` bytes.
-    pub fn decode(self, data: &[u8], tile: &Tile, max_width: usize) -> Result<Values, TileError> {
+    pub fn decode(
+        self,
+        data: &[u8],
+        tile: &Tile,
+        max_width: usize,
+        account: &Account,
+    ) -> Result<Values, TileError> {
         let count = tile.pixels();
         Ok(match self {
-            Self::Rice(rice) => Values::Numbers(rice.decode(data, count)?),
+            Self::Rice(rice) => Values::Numbers(rice.decode(data, count, account)?),
             Self::Plio { offset } => {
-                let mut numbers = plio::decode(data, count)?;
+                let mut numbers = plio::decode(data, count, account)?;
                 for number in &mut numbers {
                     *number = number.wrapping_sub(offset);
                 }
@@ -93,10 +112,10 @@ impl Method {
                 Values::Numbers(hcompress.decode(data, size)?)
             }
             Self::Gzip { is_shuffled: false } => {
-                Values::Bytes(gzip::inflate(data, count, max_width)?)
+                Values::Bytes(gzip::inflate(data, count, max_width, account)?)
             }
             Self::Gzip { is_shuffled: true } => Values::Bytes(gzip::unshuffle(
-                &gzip::inflate(data, count, max_width)?,
+                &gzip::inflate(data, count, max_width, account)?,
                 count,
             )),
             Self::None if data.len() > count * max_width => {
@@ -137,6 +156,8 @@ impl Values {
 
 /// The parameters of RICE_1.
 fn rice(header: &Header) -> Result<Rice, FrameError> {
+    /// The standard has 16 and 32.
+    const MAX_BLOCK: f64 = 65536.0;
     // The defaults are the standard's.
     let block = parameter(header, "BLOCKSIZE")?.unwrap_or(32.0);
     let bytes = parameter(header, "BYTEPIX")?.unwrap_or(4.0);
@@ -144,8 +165,9 @@ fn rice(header: &Header) -> Result<Rice, FrameError> {
         let found = format!("{bytes} bytes a pixel (BYTEPIX) in tiles compressed with RICE_1");
         unsupported(found, "1, 2 or 4")
     })?;
-    if block < 1.0 {
-        let detail = format!("found blocks of {block} pixels (BLOCKSIZE), expected 1 or more");
+    if !(1.0..=MAX_BLOCK).contains(&block) {
+        let detail =
+            format!("found blocks of {block} pixels (BLOCKSIZE), expected 1 to {MAX_BLOCK}");
         return Err(malformed(detail));
     }
     let block = block as usize;
@@ -154,7 +176,9 @@ fn rice(header: &Header) -> Result<Rice, FrameError> {
 
 /// The parameter `name` of the compression.
 fn parameter(header: &Header, name: &str) -> Result<Option<f64>, FrameError> {
-    for number in 1.. {
+    /// As many as the standard's compressions have, and some.
+    const MAX_PARAMETERS: usize = 20;
+    for number in 1..=MAX_PARAMETERS {
         match header.text(&format!("ZNAME{number}")) {
             Some(found) if found.eq_ignore_ascii_case(name) => {
                 return header.finite(&format!("ZVAL{number}"));

@@ -5,7 +5,8 @@
 //!
 //! 1. The axes and ZTILEn say which pixels a tile has ([`grid`]); each row of the table is a tile,
 //!    its data are in the heap behind the table ([`table`]).
-//! 2. All data of the tiles must be in the file before memory is allocated.
+//! 2. All data of the tiles must be in the file, and those of no two the same, before memory is
+//!    allocated.
 //! 3. The compression gives whole numbers or bytes ([`method`]); a tile never decodes to more than
 //!    its pixels.
 //! 4. Quantized floats are made of the numbers ([`quantize`]). Tiles that could not be quantized are
@@ -38,6 +39,10 @@ use table::Table;
 /// Most pixels in a tile: three planes of the largest frame.
 const MAX_TILE_PIXELS: usize = 3 * MAX_PIXELS;
 
+/// Most tiles of one image: those of 16 x 16 pixels in the largest frame. `fpack` makes a tile of
+/// each row.
+const MAX_TILES: usize = 1_000_000;
+
 /// The stored values of these pixels of the compressed image `unit`, big-endian. The pixels are
 /// counted along the first axis first; the axes are not empty.
 /// # Errors
@@ -57,23 +62,31 @@ pub(super) fn unpack(
         return Err(too_large());
     }
     let decoder = Decoder::new(unit, Table::new(unit, bytes, tiles)?)?;
-    let touching = || (0..tiles).filter(|&row| grid.may_touch(&grid.tile(row), &pixels));
-    for row in touching() {
+    let rows = touching(&grid, tiles, &pixels, account)?;
+    let mut data_bytes = 0;
+    for &row in &rows {
         account.check_time()?;
-        decoder.check(row).map_err(|error| match error {
+        data_bytes += decoder.data_bytes(row).map_err(|error| match error {
             TileError::OutsideHeap { .. } if unit.end() > bytes.len() => {
                 truncated(bytes.len(), of_tile(row, &error))
             }
             _ => malformed(of_tile(row, &error)),
         })?;
+        decoder
+            .check_shared(data_bytes)
+            .map_err(|error| malformed(of_tile(row, &error)))?;
     }
     let width = unit.stored.bytes();
+    let tile_bytes = largest
+        .unwrap_or(0)
+        .saturating_mul(decoder.bytes_per_pixel());
+    account.hold(tile_bytes as u64)?;
     let mut image = vec![0; pixels.len() * width];
-    for row in touching() {
+    for &row in &rows {
         account.check_time()?;
         let tile = grid.tile(row);
-        let decoded = decoder.pixels(&tile);
-        let decoded = decoded.map_err(|error| malformed(of_tile(row, &error)))?;
+        let decoded = decoder.pixels(&tile, account);
+        let decoded = decoded.map_err(|error| account.why(malformed(of_tile(row, &error))))?;
         let lines = decoded.chunks_exact(tile.lengths[0] * width);
         for (place, line) in grid.rows(&tile).zip(lines) {
             // Tiles may have pixels of other planes too.
@@ -83,7 +96,29 @@ pub(super) fn unpack(
             }
         }
     }
+    account.release(tile_bytes as u64);
     Ok(image)
+}
+
+/// The rows of the tiles that may have some of these pixels.
+fn touching(
+    grid: &Grid,
+    tiles: usize,
+    pixels: &Range<usize>,
+    account: &Account,
+) -> Result<Vec<usize>, FrameError> {
+    let mut rows = Vec::new();
+    for row in 0..tiles {
+        account.check_time()?;
+        if grid.may_touch(&grid.tile(row), pixels) {
+            rows.push(row);
+        }
+        if rows.len() > MAX_TILES {
+            let detail = format!("found more than {MAX_TILES} tiles in an image, expected fewer");
+            return Err(malformed(detail));
+        }
+    }
+    Ok(rows)
 }
 
 /// What is wrong with the tile in `row`, counted from 0.

@@ -9,6 +9,7 @@
 //! FITS Standard 4.0 (2018), sect. 10.4.1. R. Rice, P.-S. Yeh and W. Miller 1993, AIAA-93-4541.
 
 use super::error::TileError;
+use crate::frame::account::{Account, PIXELS_BETWEEN_CHECKS};
 
 /// Parameters of a stream.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,16 +60,37 @@ impl RiceWidth {
 
 impl Rice {
     /// Decodes `count` pixels.
-    pub fn decode(self, data: &[u8], count: usize) -> Result<Vec<i32>, TileError> {
-        self.pixels(&mut Bits::new(data), count)
-            .ok_or(TileError::Short { pixels: count })
+    pub fn decode(
+        self,
+        data: &[u8],
+        count: usize,
+        account: &Account,
+    ) -> Result<Vec<i32>, TileError> {
+        let mut bits = Bits::new(data);
+        let short = TileError::Short { pixels: count };
+        let (pixel_bits, ..) = self.width.bits();
+        let mut value = bits.take(pixel_bits).ok_or(short)?;
+        let mut pixels = Vec::with_capacity(count);
+        let blocks = PIXELS_BETWEEN_CHECKS.next_multiple_of(self.block);
+        while pixels.len() < count {
+            account.check_interrupt()?;
+            let end = count.min(pixels.len().saturating_add(blocks));
+            let decoded = self.extend(&mut pixels, end, &mut bits, &mut value);
+            decoded.ok_or(TileError::Short { pixels: count })?;
+        }
+        Ok(pixels)
     }
 
-    /// The pixels, `None` if the stream ends early.
-    fn pixels(self, bits: &mut Bits, count: usize) -> Option<Vec<i32>> {
+    /// Decodes the pixels up to `count`; the last was `value`. `None` if the stream ends early.
+    fn extend(
+        self,
+        pixels: &mut Vec<i32>,
+        count: usize,
+        bits: &mut Bits,
+        last: &mut u32,
+    ) -> Option<()> {
         let (pixel_bits, code_bits, full) = self.width.bits();
-        let mut pixels = Vec::with_capacity(count);
-        let mut value = bits.take(pixel_bits)?;
+        let mut value = *last;
         let mut next = |stored: u32| {
             let difference = (stored >> 1) ^ (stored & 1).wrapping_neg();
             value = value.wrapping_add(difference);
@@ -90,7 +112,8 @@ impl Rice {
                 }
             }
         }
-        Some(pixels)
+        *last = value;
+        Some(())
     }
 }
 
@@ -218,7 +241,9 @@ mod tests {
         let stream = "0000000000000101 0000 \
             0010 1 0 1 1 01 0 0001 0 \
             1111 0000000000000001 0000000000000010 1111111111111111 0000000000000000";
-        let pixels = SHORT.decode(&bytes(stream), 12).unwrap();
+        let pixels = SHORT
+            .decode(&bytes(stream), 12, &Account::default())
+            .unwrap();
         assert_eq!(pixels, [5, 5, 5, 5, 5, 4, 5, 8, 7, 8, -32760, -32760]);
     }
 
@@ -226,12 +251,16 @@ mod tests {
     fn a_stream_that_ends_early_is_short() {
         let stream = bytes("0000000000000101 0010 1 0 1 1");
         assert_eq!(
-            SHORT.decode(&stream, 4),
+            SHORT.decode(&stream, 4, &Account::default()),
             Err(TileError::Short { pixels: 4 })
         );
-        assert!(SHORT.decode(&[], 4).is_err());
+        assert!(SHORT.decode(&[], 4, &Account::default()).is_err());
         // Zeros without a one after them.
-        assert!(SHORT.decode(&[0, 0, 0x30, 0, 0, 0, 0, 0, 0], 4).is_err());
+        assert!(
+            SHORT
+                .decode(&[0, 0, 0x30, 0, 0, 0, 0, 0, 0], 4, &Account::default())
+                .is_err()
+        );
     }
 
     proptest! {
@@ -242,7 +271,7 @@ mod tests {
             (block, count) in (1_usize..70, 0_usize..500),
         ) {
             if let Some(width) = RiceWidth::of(bytes)
-                && let Ok(pixels) = (Rice { block, width }).decode(&data, count) {
+                && let Ok(pixels) = (Rice { block, width }).decode(&data, count, &Account::default()) {
                 prop_assert_eq!(pixels.len(), count);
             }
         }

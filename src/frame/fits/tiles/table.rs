@@ -106,6 +106,11 @@ impl<'a> Table<'a> {
         Ok(&self.heap[start as usize..end as usize])
     }
 
+    /// Size of the heap, in bytes.
+    pub fn heap_bytes(&self) -> usize {
+        self.heap.len()
+    }
+
     /// The number of `row`, from 0.
     pub fn number(&self, column: Column, row: usize) -> Option<f64> {
         match column.kind {
