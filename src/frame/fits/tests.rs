@@ -1,10 +1,10 @@
-use super::header::BLOCK_BYTES;
 use super::*;
 use crate::frame::RowOrder;
+use crate::frame::account::Account;
 use proptest::prelude::*;
 
 fn decode(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame<'static>, FrameError> {
-    super::decode(bytes, page, MemoryLimit::DEFAULT)
+    super::decode(bytes, page, &Account::default())
 }
 
 /// A header-data unit of these cards and data, padded to blocks.
