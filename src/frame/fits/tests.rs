@@ -1,3 +1,4 @@
+use super::header::BLOCK_BYTES;
 use super::*;
 use crate::frame::RowOrder;
 use crate::frame::account::Account;
