@@ -15,6 +15,15 @@ pub struct Master {
     pub frame: Frame<'static>,
 }
 
+impl Master {
+    fn into_stored(self) -> Self {
+        Self {
+            frame: self.frame.into_stored(),
+            ..self
+        }
+    }
+}
+
 /// A calibration that can be applied to frames.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Calibration {
@@ -37,7 +46,8 @@ pub struct Applied {
 }
 
 impl Calibration {
-    /// Makes a calibration. Without a dark, the level L is `bias_adu`.
+    /// Makes a calibration. Without a dark, the level L is `bias_adu`. The masters apply in the rows
+    /// of their files, whatever their `Orientation`.
     /// # Errors
     /// [`CalibrationError::SizesDiffer`], [`CalibrationError::TooManyBad`].
     pub fn new(
@@ -46,6 +56,7 @@ impl Calibration {
         hot_pixels: Option<HotPixelList>,
         bias_adu: f64,
     ) -> Result<Self, CalibrationError> {
+        let [dark, flat] = [dark, flat].map(|master| master.map(Master::into_stored));
         if let (Some(dark), Some(flat)) = (&dark, &flat) {
             check_size(
                 "the flat",
@@ -88,6 +99,11 @@ impl Calibration {
     /// [`CalibrationError::TooManyBad`], which leave the frame unchanged;
     /// [`CalibrationError::NothingLeft`].
     pub fn apply(&self, frame: &mut Frame) -> Result<(), CalibrationError> {
+        frame.with_stored(|frame| self.apply_to_stored(frame))
+    }
+
+    /// Calibrates a frame in the rows of its file, which are the detector's.
+    fn apply_to_stored(&self, frame: &mut Frame) -> Result<(), CalibrationError> {
         for (what, master) in [("the dark", &self.dark), ("the flat", &self.flat)] {
             if let Some(master) = master {
                 check_size(what, master, frame, "the frame")?;

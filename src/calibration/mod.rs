@@ -12,6 +12,8 @@
 //! - Saturated pixels stay saturated: if the division lifts another pixel above full scale, full
 //!   scale is raised.
 //! - The flat is normalized to a mean of 1.
+//! - A frame whose `Orientation` turns or mirrors it is calibrated in the rows of its file, and then
+//!   turned back.
 //!
 //! [`darks`] and [`flats`] measure the detector from dark frames and flats.
 //!

@@ -1,5 +1,5 @@
 use super::*;
-use crate::frame::Frame;
+use crate::frame::{self, Frame};
 
 fn frame(pixels: &[f32]) -> Frame<'static> {
     Frame::new(3, pixels.len() / 3, pixels.to_vec()).unwrap()
@@ -121,4 +121,47 @@ fn a_dark_of_another_exposure_gets_a_note() {
             .to_string()
             .starts_with("the dark master.fits was exposed for 10 s and the frame for 1 s")
     );
+}
+
+#[test]
+fn a_turned_frame_is_calibrated_in_the_rows_of_its_file() {
+    const STORED_ROWS: usize = 4;
+    let mut response = [1.0; 12];
+    response[1] = 0.5;
+    for tag in 1..=8 {
+        let turned = |pixels: &[f32]| {
+            let mut frame = frame(pixels);
+            let orientation = frame::Orientation::of_tag(tag).unwrap();
+            frame.metadata.orientation = orientation;
+            frame.drawn()
+        };
+        // The masters of an upright camera, and the flat of a turned one.
+        let mut flat = master(&response).unwrap();
+        flat.frame = turned(&response);
+        let calibration = Calibration::new(master(&DARK), Some(flat), None, 0.0).unwrap();
+        let sky: Vec<f32> = (0..12).map(|i| i as f32 * response[i] + DARK[i]).collect();
+        let mut sky = turned(&sky);
+        calibration.apply(&mut sky).unwrap();
+        let level: Vec<f32> = (0..12).map(|i| 10.0 + i as f32).collect();
+        let expected = turned(&level);
+        assert_eq!(sky.stored_size(), [3, STORED_ROWS]);
+        // The flat is normalized to a mean of 1.
+        let mean = response.iter().sum::<f32>() / 12.0;
+        for (found, expected) in sky.values().iter().zip(&*expected.values()) {
+            let expected = 10.0 + (expected - 10.0) * mean;
+            assert!(
+                (found - expected).abs() < 1e-4,
+                "{tag}: {found}, {expected}"
+            );
+        }
+        // One of another detector is refused, and the frame stays as it was drawn.
+        let other = Master {
+            name: "other.fits".to_owned(),
+            frame: Frame::new(5, 5, vec![1.0; 25]).unwrap(),
+        };
+        let refused = Calibration::new(Some(other), None, None, 0.0).unwrap();
+        let before = sky.clone();
+        assert!(refused.apply(&mut sky).is_err());
+        assert_eq!(sky, before);
+    }
 }

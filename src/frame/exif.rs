@@ -1,12 +1,13 @@
 //! Exif attributes in TIFF, JPEG and PNG.
 //!
 //! Exif attributes → [`FrameMetadata`], from `DateTimeOriginal`, `ExposureTime`, `FocalLength`,
-//! `FocalPlaneXResolution` and the GPS position. TIFF's own `DateTime` is ignored: it is the time
+//! `FocalPlaneXResolution`, the GPS position and `Orientation`. TIFF's own `DateTime` is ignored: it is the time
 //! at which the file was last changed.
 //!
 //! Caveat: without `OffsetTimeOriginal` the time zone is unknown, and only the day is used.
 
 use super::metadata::{EXPOSURE, FOCAL_LENGTH, FrameMetadata, HeaderNumber, PIXEL_SIZE};
+use super::orientation::Orientation;
 use crate::base::epoch::ObservationDate;
 use crate::sky::observer::Site;
 use exif::{Field, In, Reader, Tag, Value};
@@ -16,6 +17,7 @@ use exif::{Field, In, Reader, Tag, Value};
 pub(super) fn metadata(bytes: &[u8], width: usize) -> FrameMetadata {
     let attributes = Attributes(fields(bytes));
     let mut metadata = FrameMetadata::default();
+    metadata.orientation = attributes.orientation();
     metadata.exposure_s = attributes.number(&mut metadata, &EXPOSURE, Tag::ExposureTime);
     metadata.focal_length_mm = attributes.number(&mut metadata, &FOCAL_LENGTH, Tag::FocalLength);
     metadata.pixel_size_um = attributes.pixel_size_um(&mut metadata, width);
@@ -69,6 +71,12 @@ impl Attributes {
             Value::Double(numbers) => numbers.first().copied(),
             other => other.get_uint(0).map(f64::from),
         }
+    }
+
+    /// How the picture is drawn: as stored if the attribute is absent or has no such value.
+    fn orientation(&self) -> Orientation {
+        let value = self.value(Tag::Orientation).and_then(|v| v.get_uint(0));
+        value.and_then(Orientation::of_tag).unwrap_or_default()
     }
 
     fn number(&self, metadata: &mut FrameMetadata, number: &HeaderNumber, tag: Tag) -> Option<f64> {

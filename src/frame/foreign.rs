@@ -8,6 +8,7 @@
 //! specification for the tags of raw files.
 
 use super::error::FrameError;
+use super::tiff::{TiffFile, has_picture_in_sub_directories};
 
 /// A format that is not read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -154,20 +155,24 @@ fn of_riff(bytes: &[u8]) -> Option<Foreign> {
 
 /// The kind of raw file that this TIFF file is, if it is one.
 pub(super) fn raw_tiff(bytes: &[u8]) -> Option<Foreign> {
-    const CFA: u32 = 32803;
-    const REDUCED_IMAGE: u32 = 1;
-    let first = Directory::first(bytes)?;
+    const CFA: u64 = 32803;
+    const REDUCED_IMAGE: u64 = 1;
+    let first = TiffFile::of(bytes).ok()?.directories().next()?.ok()?;
+    let is = |tag: u16, value: u64| first.first(tag, 0).is_ok_and(|found| found == value);
     if first.has(50706) {
         return Some(raw("a raw file in Adobe's format (DNG)"));
     }
     if bytes.get(8..10) == Some(b"CR") {
         return Some(raw("a raw file of a Canon camera (CR2)"));
     }
-    let is_preview = first.short(254) == Some(REDUCED_IMAGE) && first.has(330);
-    if !is_preview && first.short(262) != Some(CFA) {
+    // A picture may have a preview before it, too.
+    let is_preview = is(254, REDUCED_IMAGE) && first.has(330);
+    let is_raw = is_preview && !has_picture_in_sub_directories(&first);
+    if !is_raw && !is(262, CFA) {
         return None;
     }
-    let make = first.text(271).unwrap_or_default().to_ascii_uppercase();
+    let make = first.bytes_of(271).ok().flatten().unwrap_or_default();
+    let make = make.to_ascii_uppercase();
     Some(raw(if make.starts_with(b"NIKON") {
         "a raw file of a Nikon camera (NEF)"
     } else if make.starts_with(b"SONY") {
@@ -177,76 +182,6 @@ pub(super) fn raw_tiff(bytes: &[u8]) -> Option<Foreign> {
     } else {
         "a camera's raw file"
     }))
-}
-
-/// The first directory of a TIFF file.
-struct Directory<'a> {
-    bytes: &'a [u8],
-    entries: &'a [[u8; 12]],
-    is_little_endian: bool,
-}
-
-impl<'a> Directory<'a> {
-    /// `None` for BigTIFF, which no camera writes, and where the file ends before it.
-    fn first(bytes: &'a [u8]) -> Option<Self> {
-        let is_little_endian = bytes.starts_with(b"II*\0");
-        if !is_little_endian && !bytes.starts_with(b"MM\0*") {
-            return None;
-        }
-        let mut directory = Self {
-            bytes,
-            entries: &[],
-            is_little_endian,
-        };
-        let start = directory.long(bytes.get(4..8)?.first_chunk()?) as usize;
-        let rest = bytes.get(start..)?;
-        let count = directory.word(rest.first_chunk()?) as usize;
-        directory.entries = rest[2..].as_chunks().0.get(..count)?;
-        Some(directory)
-    }
-
-    fn word(&self, bytes: &[u8; 2]) -> u16 {
-        if self.is_little_endian {
-            u16::from_le_bytes(*bytes)
-        } else {
-            u16::from_be_bytes(*bytes)
-        }
-    }
-
-    fn long(&self, bytes: &[u8; 4]) -> u32 {
-        if self.is_little_endian {
-            u32::from_le_bytes(*bytes)
-        } else {
-            u32::from_be_bytes(*bytes)
-        }
-    }
-
-    fn entry(&self, tag: u16) -> Option<&'a [u8; 12]> {
-        let is_it = |entry: &&[u8; 12]| self.word(&[entry[0], entry[1]]) == tag;
-        self.entries.iter().find(is_it)
-    }
-
-    fn has(&self, tag: u16) -> bool {
-        self.entry(tag).is_some()
-    }
-
-    /// The first value of a tag of words or of longs.
-    fn short(&self, tag: u16) -> Option<u32> {
-        const LONG: u16 = 4;
-        let [_, _, k0, k1, _, _, _, _, a, b, c, d] = *self.entry(tag)?;
-        Some(match self.word(&[k0, k1]) {
-            LONG => self.long(&[a, b, c, d]),
-            _ => u32::from(self.word(&[a, b])),
-        })
-    }
-
-    /// The text of a tag that is longer than four bytes, from its beginning.
-    fn text(&self, tag: u16) -> Option<&'a [u8]> {
-        let [_, _, _, _, n0, n1, n2, n3, a, b, c, d] = *self.entry(tag)?;
-        let start = self.long(&[a, b, c, d]) as usize;
-        let length = self.long(&[n0, n1, n2, n3]) as usize;
-        self.bytes.get(start..start.checked_add(length)?)
-    }
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! How a frame was taken, according to its file.
 
+use super::orientation::Orientation;
 use super::row_order::RowOrder;
 use crate::base::epoch::ObservationDate;
 use crate::sky::observer::Site;
@@ -11,6 +12,8 @@ use std::ops::RangeInclusive;
 pub struct FrameMetadata {
     /// Order of the rows in the file.
     pub row_order: RowOrder,
+    /// How the file's rows lie in the picture. They count from the top once it is applied.
+    pub orientation: Orientation,
     /// Date of the exposure.
     pub date: Option<ObservationDate>,
     /// Exposure time, in seconds.
@@ -23,8 +26,42 @@ pub struct FrameMetadata {
     pub site: Option<Site>,
     /// Zenith distance that the mount reported, in degrees.
     pub zenith_distance_deg: Option<f64>,
+    /// Which image of the file it is, where it is not the first.
+    pub choice: Option<ImageChoice>,
     /// Values outside their plausible range. They are not used.
     pub ignored: Vec<IgnoredValue>,
+}
+
+/// The image that was read of a file whose first image is smaller, such as a preview.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ImageChoice {
+    /// Number of images in the file.
+    pub images: usize,
+    /// The page that was read, from 1.
+    pub page: usize,
+    /// Whether it is no page of its own but attached to that page.
+    pub is_attached: bool,
+    /// Its width and height.
+    pub size_px: [usize; 2],
+    /// Width and height of the first image.
+    pub first_px: [usize; 2],
+}
+
+impl fmt::Display for ImageChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ([width, height], [first_width, first_height]) = (self.size_px, self.first_px);
+        let attached = if self.is_attached {
+            "the one attached to "
+        } else {
+            ""
+        };
+        write!(
+            f,
+            "the largest of {} images in the file is the frame: {attached}page {}, of {width} × {height} pixels; \
+             the first has {first_width} × {first_height}",
+            self.images, self.page
+        )
+    }
 }
 
 /// A value in a file's header that is not used because it is implausible.

@@ -13,12 +13,13 @@
 //!    scale.
 //! 5. Infinities become NaN. NaN marks a pixel without a value.
 //!
-//! A file may hold several images, its pages, counted from 1; the first is read unless another is
+//! A file may hold several images, its pages, counted from 1; the largest is read unless another is
 //! chosen, or all are ([`Pages`]). Pages are the images of a TIFF file in file order, and in FITS every image with two axes
 //! in a header-data unit and every plane of a cube. A cube of three planes is one colour image.
 //!
 //! FITS images are stored bottom-up, unless `ROWORDER` is `TOP-DOWN`: their rows are reversed on
-//! reading, so that y = 0 is the top row as FITS viewers draw the picture ([`RowOrder`]).
+//! reading, so that y = 0 is the top row as FITS viewers draw the picture ([`RowOrder`]). Pictures of
+//! other formats are turned as their `Orientation` says ([`Orientation`]).
 //!
 //! Caveats: transparency is ignored. JPEG's gamma is not undone, so fluxes from JPEG are not
 //! linear. Integers and floats of more than 24 bits are rounded to 24.
@@ -32,18 +33,19 @@ mod fits;
 mod foreign;
 mod format;
 mod image;
+mod jpeg_rows;
 mod jpeg_scans;
 mod levels;
 mod limits;
 mod memory;
 mod metadata;
+mod orientation;
 mod pages;
 mod pixels;
 mod raster;
 mod reader;
 mod row_order;
 mod tiff;
-mod tiff_write;
 
 #[cfg(feature = "overlay")]
 pub(crate) use directory::OVERLAY_TEXT;
@@ -55,14 +57,17 @@ pub use image::{Frame, check_size};
 pub use levels::{LUMINANCE_WEIGHTS, WholeNumber};
 pub use limits::{MAX_PAGES, MAX_PIXELS, MIN_SIDE_PX};
 pub use memory::MemoryLimit;
-pub use metadata::{FrameMetadata, IgnoredValue};
+pub use metadata::{FrameMetadata, IgnoredValue, ImageChoice};
+pub use orientation::Orientation;
 pub use pages::Pages;
 pub use pixels::Pixels;
 pub use reader::{
     Buffers, decode, decode_page, decode_page_with, read, read_page, read_page_with, read_stream,
 };
 pub use row_order::RowOrder;
-pub use tiff_write::{TiffOptions, TiffSamples, write_tiff};
+pub use tiff::{TiffOptions, TiffSamples, write_tiff};
 
+#[cfg(test)]
+mod orientation_tests;
 #[cfg(test)]
 mod tests;

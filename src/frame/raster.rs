@@ -5,6 +5,7 @@ use super::error::FrameError;
 use super::exif;
 use super::format::FrameFormat;
 use super::image::{Frame, check_size};
+use super::jpeg_rows::check_rows;
 use super::jpeg_scans::{Scans, has_end};
 use super::levels::{Samples, WholeNumber, frame_from_integers};
 use image::codecs::bmp::BmpDecoder;
@@ -48,7 +49,7 @@ pub(super) fn decode_jpeg(bytes: &[u8], account: &Account) -> Result<Frame<'stat
     let format = FrameFormat::Jpeg;
     let decoder = JpegDecoder::new(account.timed(Cursor::new(bytes)))
         .map_err(|e| account.why(error_of(e, format, bytes.len())))?;
-    // The decoder fills missing data with grey and reports no error.
+    // The decoder fills missing data and reports no error.
     if !has_end(bytes) {
         return Err(FrameError::Truncated {
             format,
@@ -69,6 +70,7 @@ pub(super) fn decode_jpeg(bytes: &[u8], account: &Account) -> Result<Frame<'stat
     };
     let bytes_per_pixel = decoder_bytes_per_pixel(&decoder) + coefficients;
     account.check_image((width, height), bytes_per_pixel + size_of::<f32>())?;
+    check_rows(bytes)?;
     decode_with(decoder, format, bytes.len(), account)
 }
 
@@ -156,7 +158,7 @@ fn decode_with(
         Depth::Sixteen => decoded.integers(decoded.words(), u16::MAX),
     }?;
     let metadata = exif.map(|exif| exif::metadata(&exif, frame.width));
-    Ok(frame.with_metadata(metadata.unwrap_or_default()))
+    Ok(frame.with_metadata(metadata.unwrap_or_default()).drawn())
 }
 
 /// Bits per sample.

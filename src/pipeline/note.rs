@@ -7,7 +7,7 @@ use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;
 use crate::detect::{MeasuredPsf, NoiseTail, Wings};
-use crate::frame::IgnoredValue;
+use crate::frame::{FrameMetadata, IgnoredValue, ImageChoice, Orientation};
 use crate::identify::{Identification, Priors, ScalePrior, ScaleSource};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::{Comparison, Contradiction, StatedCamera};
@@ -29,6 +29,10 @@ const MOST_LISTED: usize = 5;
 pub enum Note {
     /// A value in the header is not used.
     IgnoredHeader(IgnoredValue),
+    /// The largest image of the file is the frame, and it is not the first.
+    LargestImage(ImageChoice),
+    /// The picture is turned or mirrored from the rows of its file.
+    Orientation(Orientation),
     /// The scale in the header is not that of the frame.
     WrongHeaderScale {
         /// Smallest and largest pixel scale that the header allows, in radians.
@@ -84,6 +88,8 @@ impl Note {
     pub const fn code(&self) -> &'static str {
         match self {
             Self::IgnoredHeader(_) => "header_value_ignored",
+            Self::LargestImage(_) => "largest_image",
+            Self::Orientation(_) => "orientation",
             Self::WrongHeaderScale { .. } => "header_scale_wrong",
             Self::BelowHorizon { .. } => "below_horizon",
             Self::NoTimeOfDay => "time_of_day_unknown",
@@ -101,6 +107,17 @@ impl Note {
             Self::AttitudeOnly => "attitude_only",
             Self::LargeResiduals { .. } => "large_residuals",
         }
+    }
+
+    /// What the file says of its picture.
+    pub(super) fn of_file(metadata: &FrameMetadata) -> impl Iterator<Item = Self> {
+        let choice = metadata.choice.clone().map(Self::LargestImage);
+        let orientation = Some(metadata.orientation).filter(|turn| !turn.is_upright());
+        let ignored = metadata.ignored.iter().cloned();
+        choice
+            .into_iter()
+            .chain(orientation.map(Self::Orientation))
+            .chain(ignored.map(Self::IgnoredHeader))
     }
 
     /// A scale from the header that had to be dropped, where it is not the true one.
@@ -208,6 +225,12 @@ impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::IgnoredHeader(value) => value.fmt(f),
+            Self::LargestImage(choice) => choice.fmt(f),
+            Self::Orientation(orientation) => write!(
+                f,
+                "the picture is {orientation} from the rows of the file (Orientation {}); x and y are those of the picture as drawn",
+                orientation.tag()
+            ),
             Self::WrongHeaderScale {
                 pixel_scale_rad: (low_rad, high_rad),
             } => write!(

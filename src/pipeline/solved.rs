@@ -71,7 +71,7 @@ impl Solved<'_> {
         let of_all = found.filter(|_| !self.detections.are_more);
         let frame = FrameMeasurement {
             detect: self.context.detect.clone(),
-            size_px: [self.frame.width, self.frame.height],
+            size_px: self.frame.stored_size(),
             exposure_s: self.priors.exposure_s,
             background_adu: self.detections.background_adu,
             noise_adu: self.detections.noise_adu,
@@ -128,7 +128,6 @@ impl Solved<'_> {
 
     fn notes(&self, comparison: Option<&Comparison>) -> Vec<Note> {
         let (outcome, priors) = (&self.outcome, &self.priors);
-        let ignored = self.frame.metadata.ignored.iter().cloned();
         let mismatch = self
             .calibration
             .and_then(|calibration| calibration.exposure_mismatch(priors.exposure_s));
@@ -136,8 +135,7 @@ impl Solved<'_> {
         // What needs the names of all stars.
         let is_named = !self.context.attitude_only;
         let camera = self.context.camera.as_ref().filter(|_| is_named);
-        ignored
-            .map(Note::IgnoredHeader)
+        Note::of_file(&self.frame.metadata)
             .chain(Note::of_scale(self.dropped_scale, outcome))
             .chain(Note::of_observation(observation, priors, outcome))
             .chain(Note::of_camera(camera, comparison))

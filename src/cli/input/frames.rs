@@ -72,7 +72,7 @@ pub(crate) fn read_master(path: &Path) -> anyhow::Result<Master> {
     })
 }
 
-/// Reads and measures frames on all threads, and hands the results to `take` in input order.
+/// Reads and measures frames of the detector, in the rows of their files, on all threads, and hands the results to `take` in input order.
 /// Returns the number of frames that could not be read, which are reported.
 ///
 /// # Errors
@@ -87,7 +87,7 @@ pub(crate) fn for_each_frame<R: Send>(
     let progress = frames_bar(paths.len() as u64);
     let read = |path: &PathBuf, (): &mut ()| -> anyhow::Result<R> {
         let frame = read_frame(path, page, &mut Buffers::new()).context("reading")?;
-        Ok(measure(path, frame))
+        Ok(measure(path, frame.into_stored()))
     };
     let mut unread = 0;
     let mut refused = None;

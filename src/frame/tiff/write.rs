@@ -1,6 +1,6 @@
 //! Writes a frame as a TIFF file with Exif attributes.
 
-use super::image::Frame;
+use crate::frame::image::Frame;
 use std::io::{Seek, Write};
 use tiff::encoder::{Compression, DeflateLevel, Predictor, Rational, TiffEncoder, colortype};
 use tiff::tags::Tag;

@@ -1,0 +1,152 @@
+//! TIFF: its images, how each is stored, and their samples.
+//!
+//! Grey or colour, with or without alpha; in strips or tiles, interleaved or plane by plane; unsigned
+//! integers of 1 to 32 or 64 bits, signed ones of 8 to 64, floats of 16 to 64. The layout is known
+//! before anything is decoded: what is not read is refused by its name.
+//!
+//! # Reference
+//! TIFF 6.0 (1992); Adobe Photoshop TIFF Technical Notes 2 and 3 (JPEG, floats); BigTIFF as in libtiff.
+
+mod chosen;
+mod decompress;
+mod directory;
+mod layout;
+mod samples;
+mod write;
+
+use super::account::Account;
+use super::error::FrameError;
+use super::exif;
+use super::image::Frame;
+use super::levels::{
+    Samples, WholeNumber, frame_from_floats, frame_from_integers, frame_from_words,
+};
+use super::limits::MAX_PAGES;
+use chosen::Chosen;
+use layout::{Color, Layout, SampleFormat};
+use samples::{Source, float_of_half};
+use std::num::NonZeroUsize;
+
+pub(super) use chosen::has_picture_in_sub_directories;
+pub(super) use directory::TiffFile;
+pub use write::{TiffOptions, TiffSamples, write_tiff};
+
+/// Decodes image `page` of a TIFF file, counted from 1; without `page`, the largest.
+/// # Errors
+/// As [`super::reader::decode_page`].
+pub(super) fn decode(
+    bytes: &[u8],
+    page: Option<NonZeroUsize>,
+    account: &Account,
+    buffer: Vec<u16>,
+) -> Result<Frame<'static>, FrameError> {
+    let file = TiffFile::of(bytes)?;
+    let chosen = match page {
+        Some(page) => Chosen::page(file, page)?,
+        None => Chosen::largest(file, account)?,
+    };
+    let layout = Layout::of(&chosen.directory)?;
+    let size = (layout.width, layout.height);
+    account.check_image(size, layout.bytes_per_pixel())?;
+    let frame = match layout.plain_words() {
+        Some((start, length)) => {
+            let words = file.range(start, length)?.as_chunks().0;
+            frame_from_words(size, words, !file.is_little_endian, buffer)
+        }
+        None => {
+            drop(buffer);
+            layout.frame(Source { file, account })
+        }
+    };
+    let mut metadata = exif::metadata(bytes, layout.width);
+    metadata.orientation = chosen.orientation();
+    metadata.choice = chosen.choice;
+    Ok(frame?.with_metadata(metadata).drawn())
+}
+
+/// The number of images in a TIFF file, at most [`MAX_PAGES`], and why there may be more that cannot
+/// be found.
+pub(super) fn count_pages(bytes: &[u8], account: &Account) -> (usize, Option<FrameError>) {
+    let file = match TiffFile::of(bytes) {
+        Ok(file) => file,
+        Err(error) => return (0, Some(error)),
+    };
+    let mut pages = 0;
+    for directory in file.directories().take(MAX_PAGES) {
+        if let Err(error) = directory.and_then(|_| account.check_time()) {
+            return (pages, Some(error));
+        }
+        pages += 1;
+    }
+    (pages, None)
+}
+
+impl Layout<'_> {
+    fn frame(&self, source: Source) -> Result<Frame<'static>, FrameError> {
+        let full = self.depth.full_scale();
+        // Values of more than 24 bits are rounded.
+        let rounded = |values: Vec<f32>| Ok(self.floats(values)?.with_levels(1.0, None));
+        match (self.depth.format, self.depth.bits) {
+            (SampleFormat::Unsigned, ..=8) => {
+                self.integers(&self.samples::<u8>(source)?, full as u8)
+            }
+            (SampleFormat::Unsigned, ..=16) => {
+                self.integers(&self.samples::<u16>(source)?, full as u16)
+            }
+            (SampleFormat::Unsigned, ..=32) => {
+                self.integers(&self.samples::<u32>(source)?, full as u32)
+            }
+            (SampleFormat::Unsigned, _) => rounded(self.samples_as(source, |v: u64| v as f32)?),
+            (SampleFormat::Signed, ..=8) => {
+                self.integers(&self.samples_as(source, |v: u8| v as i8)?, i8::MAX)
+            }
+            (SampleFormat::Signed, ..=16) => {
+                self.integers(&self.samples_as(source, |v: u16| v as i16)?, i16::MAX)
+            }
+            (SampleFormat::Signed, ..=32) => {
+                self.integers(&self.samples_as(source, |v: u32| v as i32)?, i32::MAX)
+            }
+            (SampleFormat::Signed, _) => {
+                rounded(self.samples_as(source, |v: u64| v as i64 as f32)?)
+            }
+            (SampleFormat::Float, ..=16) => self.floats(self.samples_as(source, float_of_half)?),
+            (SampleFormat::Float, ..=32) => self.floats(self.samples_as(source, f32::from_bits)?),
+            (SampleFormat::Float, _) => {
+                self.floats(self.samples_as(source, |v: u64| f64::from_bits(v) as f32)?)
+            }
+        }
+    }
+
+    /// The samples, each made of its bits by `of`.
+    fn samples_as<T: samples::Word, S>(
+        &self,
+        source: Source,
+        of: impl Fn(T) -> S,
+    ) -> Result<Vec<S>, FrameError> {
+        Ok(self.samples(source)?.into_iter().map(of).collect())
+    }
+
+    fn integers<T: WholeNumber>(
+        &self,
+        values: &[T],
+        full_scale: T,
+    ) -> Result<Frame<'static>, FrameError> {
+        let samples = Samples {
+            width: self.width,
+            height: self.height,
+            values,
+            channels: self.channels,
+        };
+        frame_from_integers(&samples, full_scale)
+    }
+
+    fn floats(&self, mut values: Vec<f32>) -> Result<Frame<'static>, FrameError> {
+        if self.color == Color::WhiteIsZero {
+            values.iter_mut().for_each(|value| *value = 1.0 - *value);
+        }
+        frame_from_floats((self.width, self.height), self.channels, values)
+    }
+}
+
+#[cfg(test)]
+mod tests;
