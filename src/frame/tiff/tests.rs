@@ -421,7 +421,7 @@ fn the_largest_image_is_the_frame_wherever_it_is() {
     assert_eq!(level(&later, 1), (1.0, String::new()), "as chosen");
     assert_eq!(level(&later, 3), (3.0, String::new()));
     let attached = small().with_attached(large(2).with(254, 0));
-    let (found, note) = level(&[attached.clone()], 0);
+    let (found, note) = level(std::slice::from_ref(&attached), 0);
     assert_eq!(found, 2.0);
     assert!(
         note.contains("the one attached to page 1, of 40 × 30"),
