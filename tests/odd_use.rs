@@ -397,3 +397,114 @@ fn a_frame_that_takes_too_long_is_told() {
         "{report}"
     );
 }
+
+// ---- A bug that one frame meets
+
+/// The program, which meets a bug in every frame of `size`. Releases do not have that bug.
+#[cfg(debug_assertions)]
+fn with_a_bug_at(size: &str) -> assert_cmd::Command {
+    let mut command = starpipe();
+    command.env("STARPIPE_PLANTED_PANIC", size);
+    command
+}
+
+#[test]
+#[cfg(debug_assertions)]
+fn a_bug_that_one_frame_meets_ends_that_frame_alone() {
+    let directory = tempfile::tempdir().unwrap();
+    let place = directory.path();
+    for name in ["a.png", "c.png"] {
+        fs::copy(orion(), place.join(name)).unwrap();
+    }
+    fs::copy(fixture("cygnus/cygnus.tif"), place.join("b.tif")).unwrap();
+    let bug = "b.tif: a bug in starpipe, please report it: planted";
+    let run = |arguments: &str| {
+        let mut command = with_a_bug_at("512x384");
+        Ran::new(command.args(arguments.split(' ')).current_dir(place))
+    };
+    for threads in ["1", "3"] {
+        let ran = run(&format!("process . --format json --threads {threads}"));
+        assert_eq!((ran.status, ran.reports().len()), (1, 2), "{}", ran.stderr);
+        assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+        assert!(ran.stderr.contains(bug), "{}", ran.stderr);
+    }
+    // A frame alone is solved on all threads.
+    let alone = run("process b.tif --out results");
+    assert_eq!((alone.status, alone.stdout.as_str()), (1, ""));
+    assert_eq!(alone.stderr.lines().count(), 1, "{}", alone.stderr);
+    assert!(names(&place.join("results")).is_empty());
+
+    let tracked = run("track a.png b.tif c.png a.png");
+    assert_eq!((tracked.status, tracked.reports().len()), (1, 3));
+    assert!(tracked.stderr.contains(bug), "{}", tracked.stderr);
+
+    let part = run("process a.png b.tif c.png --out-parquet archive");
+    assert_eq!(part.status, 1);
+    let told = "1 part, 3 frames: 2 identified, 0 not identified, 1 unread\n";
+    assert_eq!(part.stdout, told);
+    let status = run("archive status archive");
+    assert!(status.stdout.contains(bug), "{}", status.stdout);
+}
+
+#[test]
+#[cfg(debug_assertions)]
+fn a_bug_that_one_list_or_one_image_of_a_file_meets_ends_that_alone() {
+    let directory = tempfile::tempdir().unwrap();
+    let place = directory.path();
+    let stars = "x,y,mag\n3,4,1\n60,20,2\n20,50,3\n70,80,4\n";
+    for (name, last) in [("a.csv", "99,99,5"), ("b.csv", "199,99,5")] {
+        fs::write(place.join(name), format!("{stars}{last}\n")).unwrap();
+    }
+    let mut command = with_a_bug_at("200x100");
+    let lists = ["identify", "--format", "json", "b.csv", "a.csv"];
+    let ran = Ran::new(command.args(lists).current_dir(place));
+    assert_eq!((ran.status, ran.reports().len()), (1, 1), "{}", ran.stderr);
+    assert!(ran.stderr.contains("b.csv: a bug"), "{}", ran.stderr);
+
+    let primary = noise_image("SIMPLE  =                    T", 40, 50);
+    let rest = [(60, 30), (50, 50)]
+        .map(|(width, height)| noise_image("XTENSION= 'IMAGE   '", width, height));
+    let mosaic = place.join("mosaic.fits");
+    fs::write(&mosaic, [primary, rest.concat()].concat()).unwrap();
+    let mut command = with_a_bug_at("60x30");
+    let pages = ["process", "--format", "json", "--page", "all"];
+    let ran = Ran::new(command.args(pages).arg(&mosaic));
+    assert_eq!((ran.status, ran.reports().len()), (1, 2), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("mosaic.fits[2]: a bug"),
+        "{}",
+        ran.stderr
+    );
+}
+
+/// An image of a FITS file: a header that begins with `first`, and noise.
+#[cfg(debug_assertions)]
+fn noise_image(first: &str, width: usize, height: usize) -> Vec<u8> {
+    let mut cards = vec![first.to_owned()];
+    let values = [
+        ("BITPIX", 16),
+        ("NAXIS", 2),
+        ("NAXIS1", width),
+        ("NAXIS2", height),
+    ];
+    cards.extend(values.map(|(name, value)| format!("{name:8}= {value:20}")));
+    if first.starts_with("XTENSION") {
+        cards.extend(
+            [("PCOUNT", 0), ("GCOUNT", 1)].map(|(name, value)| format!("{name:8}= {value:20}")),
+        );
+    }
+    cards.push("END".to_owned());
+    let mut bytes: Vec<u8> = cards
+        .iter()
+        .flat_map(|card| format!("{card:80}").into_bytes())
+        .collect();
+    bytes.resize(bytes.len().next_multiple_of(2880), b' ');
+    // Linear congruential: any noise will do.
+    let mut state = 1_u32;
+    bytes.extend((0..width * height).flat_map(|_| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        [3, (state >> 24) as u8]
+    }));
+    bytes.resize(bytes.len().next_multiple_of(2880), 0);
+    bytes
+}

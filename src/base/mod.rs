@@ -9,6 +9,7 @@ pub mod files;
 pub mod format;
 pub mod interrupt;
 pub(crate) mod neighbors;
+pub mod panics;
 pub mod statistics;
 pub mod table;
 pub mod units;

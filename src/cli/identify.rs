@@ -6,9 +6,9 @@ use super::input::stdin;
 use super::options::values::MAX_SIDE_PX;
 use super::solving::options::{LIST_RESULTS, SolvingOptions};
 use super::solving::result_files::{Image, Solved};
-use super::solving::{Plan, Taker, solve_all};
+use super::solving::{Finish, Plan, solve_all};
 use clap::Args;
-use starpipe::pipeline::{CentroidListOptions, Context, Workspace, solve_centroids};
+use starpipe::pipeline::{CentroidListOptions, Context, Workspace, solve_centroids, solve_guarded};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
@@ -56,12 +56,14 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Outcome, CommandError>
         height,
         frame,
     };
-    let solve = |context: &Context, path: &Path, workspace: &mut Workspace, take: Taker| {
-        let solved = centroid_list::read(path, &options).map(|list| Solved {
-            solution: solve_centroids(&list, context, workspace),
-            frame: None,
+    let solve = |context: &Context, path: &Path, workspace: &mut Workspace, finish: Finish| {
+        let answer = solve_guarded(path, workspace, |workspace| {
+            let list = centroid_list::read(path, &options)?;
+            let solution = solve_centroids(&list, context, workspace);
+            let frame = None;
+            Ok(finish(Image::of(path), Solved { solution, frame }))
         });
-        take(Image::of(path), solved);
+        vec![answer]
     };
     Ok(solve_all(&lists, solving, LIST_RESULTS, &plan, solve)?.into())
 }

@@ -37,13 +37,17 @@ use exit::{CommandError, Exit, Outcome};
 use output::messages::report_error;
 use output::stdout::print;
 use starpipe::base::format::printable;
+use starpipe::base::panics::{caught, silence};
 use std::process::ExitCode;
 
 /// Runs the command that the command line names.
 pub(crate) fn run() -> ExitCode {
     let matches = Arguments::command().get_matches();
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    let exit = run_command(arguments.command).and_then(|outcome| {
+    silence();
+    let done = caught(|| run_command(arguments.command));
+    let exit = done.unwrap_or_else(|panicked| Err(panicked.into()));
+    let exit = exit.and_then(|outcome| {
         // If the reader closed the pipe, nobody waits for the rest.
         let _ = print(&outcome.text)?;
         Ok(outcome.exit)

@@ -13,6 +13,7 @@ use super::process::CalibrationOptions;
 use anyhow::Context as _;
 use clap::Args;
 use starpipe::base::epoch::ObservationDate;
+use starpipe::base::panics::caught;
 use starpipe::calibration::Calibration;
 use starpipe::identify::Priors;
 use starpipe::photometry::comparison::StatedCamera;
@@ -141,7 +142,7 @@ impl Run<'_> {
 
     /// Tracks one frame and prints its line. Breaks if nobody reads the lines any longer.
     fn frame(&mut self, path: &Path) -> ControlFlow<()> {
-        let printed = self.report(path).and_then(|report| {
+        let printed = self.guarded_report(path).and_then(|report| {
             self.has_lost |= !report.has_attitude();
             print(&match self.format {
                 PageFormat::Text => report.to_text(),
@@ -152,6 +153,14 @@ impl Run<'_> {
             self.has_failed = true;
             report_error(error.as_ref());
             ControlFlow::Continue(())
+        })
+    }
+
+    /// [`Self::report`]; a panic in it is an error of this frame, after which the next is solved anew.
+    fn guarded_report(&mut self, path: &Path) -> anyhow::Result<TrackReport> {
+        caught(|| self.report(path)).unwrap_or_else(|panicked| {
+            self.tracker.reset();
+            Err(panicked).with_context(|| format!("tracking {}", path.display()))
         })
     }
 

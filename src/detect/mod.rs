@@ -144,6 +144,7 @@ fn run(
         measure,
         interrupt,
         memory,
+        ..
     } = workspace;
     let view = View::of_live_pixels(frame).until(interrupt);
     if view.width < MIN_SIDE_PX || view.height < MIN_SIDE_PX {

@@ -15,6 +15,7 @@ pub struct Workspace {
     pub(crate) measure: MeasureBuffers,
     pub(super) interrupt: Interrupt,
     pub(super) memory: MemoryLimit,
+    threads: NonZeroUsize,
 }
 
 impl Workspace {
@@ -26,6 +27,7 @@ impl Workspace {
             measure: MeasureBuffers::default(),
             interrupt: Interrupt::default(),
             memory: MemoryLimit::default(),
+            threads: NonZeroUsize::MIN,
         };
         empty.on_threads(NonZeroUsize::MIN)
     }
@@ -35,11 +37,18 @@ impl Workspace {
     /// other frames keep the other threads busy.
     #[must_use]
     pub fn on_threads(mut self, threads: NonZeroUsize) -> Self {
+        self.threads = threads;
         let threads = threads.get();
         self.background.set_threads(threads);
         self.search.set_threads(threads);
         self.measure.set_threads(threads);
         self
+    }
+
+    /// Empty buffers with the same settings.
+    pub(crate) fn emptied(&self) -> Self {
+        let empty = Self::new().on_threads(self.threads);
+        empty.within(self.memory)
     }
 
     /// Detection ends with [`DetectError::Interrupted`](super::DetectError::Interrupted) when

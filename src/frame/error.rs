@@ -3,6 +3,7 @@
 use super::format::FrameFormat;
 use super::limits::{MAX_PIXELS, MIN_SIDE_PX};
 use crate::base::interrupt::Interrupted;
+use crate::base::panics::Panicked;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -142,6 +143,9 @@ pub enum FrameError {
         /// Number of pages in the file.
         pages: usize,
     },
+    /// A decoder has a bug.
+    #[error(transparent)]
+    Panicked(#[from] Panicked),
     /// A directory without frames.
     #[error("a directory without frames: found {} in it, expected {FORMATS}", files_found(*files))]
     NoFrames {

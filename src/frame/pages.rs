@@ -5,7 +5,7 @@ use super::error::FrameError;
 use super::format::FrameFormat;
 use super::image::Frame;
 use super::limits::MAX_PAGES;
-use super::reader::{Buffers, decode_image, read_limited};
+use super::reader::{Buffers, decode_image, no_panic, read_limited};
 use super::{compressed, fits, tiff};
 use crate::base::files;
 use std::io::Read;
@@ -55,7 +55,11 @@ impl Pages {
         Self::unpacked(bytes, &account)
     }
 
-    fn unpacked(mut bytes: Vec<u8>, account: &Account) -> Result<Self, FrameError> {
+    fn unpacked(bytes: Vec<u8>, account: &Account) -> Result<Self, FrameError> {
+        no_panic(|| Self::counted(bytes, account))
+    }
+
+    fn counted(mut bytes: Vec<u8>, account: &Account) -> Result<Self, FrameError> {
         if let Some(format) = FrameFormat::of(&bytes).filter(|format| format.is_compressed()) {
             let packed = std::mem::take(&mut bytes);
             bytes = compressed::unpack(&packed, format, account)?;
@@ -104,12 +108,8 @@ impl Pages {
             return Err(error);
         }
         let account = buffers.account(self.bytes.capacity())?;
-        let frame = decode_image(
-            &self.bytes,
-            NonZeroUsize::new(self.next),
-            &account,
-            Vec::new(),
-        );
+        let page = NonZeroUsize::new(self.next);
+        let frame = no_panic(|| decode_image(&self.bytes, page, &account, Vec::new()));
         if self.next == self.count && frame.is_err() {
             // What breaks the last image also hides what comes after it.
             self.broken = None;

@@ -10,6 +10,7 @@ use super::pixels::Pixels;
 use super::{compressed, fits, foreign, raster, tiff};
 use crate::base::files;
 use crate::base::interrupt::Interrupt;
+use crate::base::panics::caught;
 use std::borrow::Cow;
 use std::io::Read;
 use std::num::NonZeroUsize;
@@ -222,13 +223,18 @@ fn decode_with(
     account: &Account,
     buffer: Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
-    match FrameFormat::of(bytes) {
+    no_panic(|| match FrameFormat::of(bytes) {
         Some(format) if format.is_compressed() => {
             let content = compressed::unpack(bytes, format, account)?;
             decode_image(&content, page, account, buffer)
         }
         _ => decode_image(bytes, page, account, buffer),
-    }
+    })
+}
+
+/// Calls `decode`; a panic in it is an error of the file.
+pub(super) fn no_panic<R>(decode: impl FnOnce() -> Result<R, FrameError>) -> Result<R, FrameError> {
+    caught(decode).unwrap_or_else(|panicked| Err(panicked.into()))
 }
 
 /// Decodes one image that is not compressed as a file; `bytes` are booked. Its 16-bit pixels may be

@@ -32,6 +32,8 @@ mod indexed_catalog;
 mod listing;
 mod naming;
 mod pairing;
+#[cfg(debug_assertions)]
+mod planted;
 mod predict;
 mod priors;
 mod refine;

@@ -81,6 +81,11 @@ impl Workspace {
         }
     }
 
+    /// Empty buffers with the same settings.
+    pub(crate) fn emptied(&self) -> Self {
+        Self::new().with_name_odds(self.name_odds)
+    }
+
     /// Searches end with [`SearchFailure::Interrupted`] when `interrupt` is due.
     #[must_use]
     pub fn until(mut self, interrupt: Interrupt) -> Self {
@@ -131,6 +136,8 @@ impl Workspace {
         priors: &Priors,
         sky: &'a IndexedCatalog<'a>,
     ) -> Result<Pointing<'w, 'a>, SearchFailure> {
+        #[cfg(debug_assertions)]
+        super::planted::panic_if_asked(field);
         if field.stars.len() < MIN_STARS {
             return Err(SearchFailure::TooFewStars {
                 found: field.stars.len(),

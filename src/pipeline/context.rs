@@ -131,6 +131,19 @@ impl Workspace {
         self.set_deadline(deadline);
     }
 
+    /// Empty buffers with the same settings.
+    pub(crate) fn emptied(&self) -> Self {
+        let mut frames = frame::Buffers::new();
+        frames.set_memory(self.frames.memory());
+        let empty = Self {
+            frames,
+            detect: self.detect.emptied(),
+            identify: self.identify.emptied(),
+            ..Self::new()
+        };
+        empty.until(&self.interrupt)
+    }
+
     /// Ends the work on one frame at `deadline`, too.
     pub(super) fn set_deadline(&mut self, deadline: Option<Instant>) {
         let interrupt = match deadline {

@@ -1,5 +1,6 @@
 //! Why the frame in a file could not be examined.
 
+use crate::base::panics::Panicked;
 use crate::calibration::CalibrationError;
 use crate::detect::DetectError;
 use crate::frame::FrameError;
@@ -28,5 +29,13 @@ pub enum Error {
         path: PathBuf,
         /// What does not fit.
         source: CalibrationError,
+    },
+    /// Something that works on the frame has a bug.
+    #[error("solving {}", path.display())]
+    Panicked {
+        /// The file.
+        path: PathBuf,
+        /// What panicked.
+        source: Panicked,
     },
 }

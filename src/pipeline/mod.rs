@@ -35,5 +35,5 @@ pub use identification::star_field;
 pub use note::Note;
 pub use outcome::{Outcome, Reason};
 pub use solution::{Background, Measured, Solution, Source};
-pub use solve::{solve_file, solve_frame, solve_read};
+pub use solve::{solve_file, solve_frame, solve_guarded, solve_read};
 pub use stopwatch::Timing;

@@ -7,6 +7,7 @@ use super::identification::{identify_stars, observation};
 use super::solution::{Solution, Source};
 use super::solved::Solved;
 use super::stopwatch::{Stage, Stopwatch};
+use crate::base::panics::caught;
 use crate::calibration::Calibration;
 use crate::detect::{self, DetectError};
 use crate::frame::{self, Frame, FrameError, MemoryLimit};
@@ -89,6 +90,23 @@ pub fn solve_frame(
         clock,
     };
     solve(input, context, workspace)
+}
+
+/// Calls `work`, which does all that is to be done with one frame. A panic in it becomes this frame's
+/// error, and the workspace is emptied. `name` is the file's name, or stands for one.
+///
+/// # Errors
+/// Those of `work`, and [`Error::Panicked`].
+pub fn solve_guarded<R, E: From<Error>>(
+    name: &Path,
+    workspace: &mut Workspace,
+    work: impl FnOnce(&mut Workspace) -> Result<R, E>,
+) -> Result<R, E> {
+    caught(|| work(workspace)).unwrap_or_else(|source| {
+        *workspace = workspace.emptied();
+        let path = name.to_owned();
+        Err(Error::Panicked { path, source }.into())
+    })
 }
 
 /// A frame, and what is known of its origin.

@@ -125,6 +125,12 @@ impl<'a> Tracker<'a> {
         }
     }
 
+    /// Forgets everything: the next frame is solved in full, in new buffers.
+    pub fn reset(&mut self) {
+        let empty = Self::new(self.context.clone()).with_stars(self.stars);
+        *self = empty.with_workspace(self.workspace.emptied());
+    }
+
     /// The same, with at most this many stars in a frame.
     #[must_use]
     pub fn with_stars(self, stars: usize) -> Self {

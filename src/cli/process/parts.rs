@@ -9,6 +9,7 @@ use crate::cli::input::names::frame_names;
 use crate::cli::options::frames::PageChoice;
 use crate::cli::output::messages::{one_line, report_error};
 use crate::cli::progress::frames_bar;
+use crate::cli::solving::result_files::{Image, Solved};
 use crate::cli::solving::workspace;
 use indicatif::ProgressBar;
 use starpipe::archive::{Archive, ArchiveError, FrameRow, Part, Plan, Shard, StarRow};
@@ -134,25 +135,17 @@ impl Worker<'_> {
 
     /// The rows of each image of a file.
     fn solve(&self, name: &str, workspace: &mut Workspace) -> Vec<(String, Rows)> {
-        let (path, context) = (Path::new(name), &self.context);
-        let mut rows = Vec::new();
-        solve_images(
-            path,
-            self.page,
-            context,
-            workspace,
-            |image, solved, workspace| {
-                let name = image.name().display().to_string();
-                let solved = solved.map(|(solution, frame)| {
-                    workspace.frames.recycle(frame);
-                    let report = FrameReport::new(&name, &solution, self.indexed.catalog());
-                    let stars = StarRow::of_frame(&report).collect();
-                    (FrameRow::new(&report, &solution), stars)
-                });
-                rows.push((name, solved));
-            },
-        );
-        rows
+        let finish = |image: Image, mut solved: Solved, workspace: &mut Workspace| {
+            solved.recycle_frame(workspace);
+            let name = image.name().display().to_string();
+            let report = FrameReport::new(&name, &solved.solution, self.indexed.catalog());
+            let stars = StarRow::of_frame(&report).collect();
+            (FrameRow::new(&report, &solved.solution), stars)
+        };
+        let path = Path::new(name);
+        let images = solve_images(path, self.page, &self.context, workspace, finish).into_iter();
+        let named = images.map(|(image, rows)| (image.name().display().to_string(), rows));
+        named.collect()
     }
 }
 

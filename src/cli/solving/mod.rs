@@ -6,4 +6,4 @@ mod printer;
 pub(crate) mod result_files;
 mod run;
 
-pub(crate) use run::{Plan, Taker, solve_all, workspace};
+pub(crate) use run::{Finish, Plan, solve_all, workspace};

@@ -5,7 +5,7 @@ use crate::cli::output::overwrite;
 use crate::cli::output::paths::output_path;
 use crate::cli::output::rows::finished;
 use starpipe::frame::Frame;
-use starpipe::pipeline::Solution;
+use starpipe::pipeline::{Solution, Workspace};
 use starpipe::report::{FrameReport, overlay, wcs, write_table_header};
 use starpipe::sky::catalog::Catalog;
 use std::borrow::Cow;
@@ -42,6 +42,15 @@ pub(crate) struct Solved {
     pub(crate) solution: Solution,
     /// The frame to draw on, if there is one.
     pub(crate) frame: Option<Frame<'static>>,
+}
+
+impl Solved {
+    /// Reuses the frame's buffers: frames are large.
+    pub(crate) fn recycle_frame(&mut self, workspace: &mut Workspace) {
+        if let Some(frame) = self.frame.take() {
+            workspace.frames.recycle(frame);
+        }
+    }
 }
 
 /// Writes result files into a directory, if one is given.

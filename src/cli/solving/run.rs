@@ -47,18 +47,18 @@ impl Plan {
     }
 }
 
-/// Takes the images of an input as they are solved.
-pub(crate) type Taker<'a> = &'a mut dyn FnMut(Image, anyhow::Result<Solved>);
+/// Makes the report and the result files of a solved image.
+pub(crate) type Finish<'a> = &'a dyn Fn(Image, Solved) -> Answer;
 
 /// Solves every input, prints its report and writes its result files, which have these
-/// `extensions`. `solve` hands each image of an input to its taker. Inputs that cannot be read are
+/// `extensions`. `solve` solves the images of an input, and finishes each. Inputs that cannot be read are
 /// reported, and the others solved.
 pub(crate) fn solve_all(
     inputs: &[PathBuf],
     options: SolvingOptions,
     extensions: &[&str],
     plan: &Plan,
-    solve: impl Fn(&Context, &Path, &mut Workspace, Taker) + Sync,
+    solve: impl Fn(&Context, &Path, &mut Workspace, Finish) -> Vec<anyhow::Result<Answer>> + Sync,
 ) -> Result<Exit, CommandError> {
     let SolvingOptions {
         output,
@@ -77,19 +77,14 @@ pub(crate) fn solve_all(
     catalog.with_index(|pool, indexed| {
         let context = plan.context(indexed);
         // The threads that solve also draw and write files; this one only prints.
-        let answer = |image: Image, solved: Solved| {
+        let finish = |image: Image, solved: Solved| {
             let name = image.name().display().to_string();
             let report = FrameReport::new(&name, &solved.solution, indexed.catalog());
             let saved = files.save(image, &solved, &report, indexed.catalog());
             Answer { report, saved }
         };
-        let work = |input: &PathBuf, workspace: &mut Workspace| {
-            let mut answers = Vec::new();
-            solve(&context, input, workspace, &mut |image, solved| {
-                answers.push(solved.map(|solved| answer(image, solved)));
-            });
-            answers
-        };
+        let work =
+            |input: &PathBuf, workspace: &mut Workspace| solve(&context, input, workspace, &finish);
         let workspace = || workspace(pool, inputs.len(), name_odds, plan.memory);
         batch::for_each_ordered(pool, inputs, workspace, work, |_, answers| {
             run.progress.inc(1);
@@ -116,7 +111,7 @@ pub(crate) fn workspace(
 }
 
 /// The report of an input, and whether its files could be written.
-struct Answer {
+pub(crate) struct Answer {
     report: FrameReport,
     saved: anyhow::Result<()>,
 }
