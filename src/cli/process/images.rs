@@ -7,7 +7,6 @@ use crate::cli::solving::result_files::{Image, Solved};
 use starpipe::frame::{Buffers, Frame, FrameError, Pages};
 use starpipe::pipeline::{Context, Error, Workspace, solve_guarded, solve_read};
 use std::io;
-use std::num::NonZeroUsize;
 use std::path::Path;
 
 /// The images of a file, each with what was made of it.
