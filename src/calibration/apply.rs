@@ -127,6 +127,8 @@ impl Calibration {
 
     /// Applies dark and flat, and raises the saturation level where necessary.
     fn correct_pixels(&self, frame: &mut Frame) {
+        // Pixels that share a level do so no longer once they are calibrated.
+        frame.saturation_adu = frame.saturation_level_adu();
         let full_adu = frame.saturation_adu.unwrap_or(f32::INFINITY);
         let mut highest = full_adu;
         let saturated = |pixel: f32| pixel >= full_adu;

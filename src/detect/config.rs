@@ -1,6 +1,6 @@
 //! Options of detection.
 
-use crate::frame::Frame;
+use crate::frame::{Frame, SaturationFinder};
 
 /// How centroids are measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -28,8 +28,8 @@ pub struct DetectConfig {
     pub cell_px: usize,
     /// Most detections that are kept, the strongest.
     pub max_detections: usize,
-    /// The level from which on a pixel is saturated, in ADU, where it is below that of the frame's
-    /// format.
+    /// The level from which on a pixel is saturated, in ADU, where it is below that of the frame
+    /// ([`Frame::saturation_level_adu`]).
     pub saturation_adu: Option<f64>,
 }
 
@@ -57,10 +57,11 @@ impl Default for DetectConfig {
 }
 
 impl DetectConfig {
-    /// The level from which on a pixel of `frame` is saturated, in ADU; infinite where none is
-    /// known.
-    pub(crate) fn saturation_adu(&self, frame: &Frame) -> f32 {
+    /// The level from which on a pixel of `frame` is saturated, in ADU: the lower of the stated one
+    /// and that of the frame; infinite where none is known.
+    pub(crate) fn saturation_adu(&self, frame: &Frame, finder: &mut SaturationFinder) -> f32 {
         let stated = self.saturation_adu.map_or(f32::INFINITY, |adu| adu as f32);
-        frame.saturation_adu.unwrap_or(f32::INFINITY).min(stated)
+        let of_frame = finder.level_adu(frame);
+        of_frame.unwrap_or(f32::INFINITY).min(stated)
     }
 }

@@ -139,6 +139,7 @@ fn run(
     error::check(frame, config)?;
     found.sources.clear();
     let Workspace {
+        saturation,
         background,
         search,
         measure,
@@ -155,7 +156,7 @@ fn run(
     let input = SearchInput {
         view: &view,
         background,
-        saturation_adu: config.saturation_adu(frame),
+        saturation_adu: config.saturation_adu(frame, saturation),
         config,
         memory: CandidateMemory::beside(frame, *memory),
     };

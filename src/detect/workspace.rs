@@ -4,12 +4,13 @@ use super::background::FrameBackground;
 use super::measure::MeasureBuffers;
 use super::search::FrameSearch;
 use crate::base::interrupt::Interrupt;
-use crate::frame::MemoryLimit;
+use crate::frame::{MemoryLimit, SaturationFinder};
 use std::num::NonZeroUsize;
 
 /// Buffers that are reused from frame to frame. Results do not depend on their contents.
 #[derive(Debug, Clone)]
 pub struct Workspace {
+    pub(super) saturation: SaturationFinder,
     pub(crate) background: FrameBackground,
     pub(crate) search: FrameSearch,
     pub(crate) measure: MeasureBuffers,
@@ -22,6 +23,7 @@ impl Workspace {
     /// Empty buffers, for one thread.
     pub fn new() -> Self {
         let empty = Self {
+            saturation: SaturationFinder::default(),
             background: FrameBackground::default(),
             search: FrameSearch::default(),
             measure: MeasureBuffers::default(),

@@ -95,6 +95,17 @@ impl<'p> Frame<'p> {
         }
     }
 
+    /// The negative of the frame: what is highest becomes lowest. It has no saturation level.
+    pub(crate) fn inverted(&self) -> Frame<'static> {
+        let values = self.values();
+        let values = values.iter().copied();
+        let lowest = values.clone().fold(f32::INFINITY, f32::min);
+        let highest = values.clone().fold(f32::NEG_INFINITY, f32::max);
+        let pixels = values.map(|value| lowest + (highest - value));
+        Frame::from_checked(self.width, self.height, pixels.collect::<Vec<f32>>())
+            .with_levels(self.step_adu, None)
+    }
+
     /// Sets the step between grey levels and the saturation level, in ADU.
     #[must_use]
     pub fn with_levels(mut self, step_adu: f32, saturation_adu: Option<f32>) -> Self {

@@ -11,7 +11,9 @@
 //!    are the inverse of JPEG's colour transform, so a colour JPEG gives the luma that it stores.
 //! 4. A colour pixel is saturated if any channel is. Its luminance is unknown, so it is set to full
 //!    scale.
-//! 5. Infinities become NaN. NaN marks a pixel without a value.
+//! 5. Where neither file nor format state the level from which on pixels are saturated, or no pixel
+//!    reaches it, the level that the highest pixels share is ([`Frame::saturation_level_adu`]).
+//! 6. Infinities become NaN. NaN marks a pixel without a value.
 //!
 //! A file may hold several images, its pages, counted from 1; the largest is read unless another is
 //! chosen, or all are ([`Pages`]). Pages are the images of a TIFF file in file order, and in FITS every image with two axes
@@ -45,6 +47,7 @@ mod pixels;
 mod raster;
 mod reader;
 mod row_order;
+mod saturation;
 mod tiff;
 
 #[cfg(feature = "overlay")]
@@ -65,6 +68,7 @@ pub use reader::{
     Buffers, decode, decode_page, decode_page_with, read, read_page, read_page_with, read_stream,
 };
 pub use row_order::RowOrder;
+pub(crate) use saturation::SaturationFinder;
 pub use tiff::{TiffOptions, TiffSamples, write_tiff};
 
 #[cfg(test)]

@@ -3,10 +3,10 @@
 use super::context::{Context, Workspace};
 use super::outcome::{Outcome, Reason};
 use super::stopwatch::{Stage, Stopwatch};
-use crate::detect::Detections;
+use crate::detect::{self, DetectConfig, Detection, Detections, detect};
 use crate::frame::Frame;
 use crate::identify;
-use crate::identify::diagnosis::{Unidentified, diagnose};
+use crate::identify::diagnosis::{Diagnosis, Unidentified, diagnose};
 use crate::identify::{
     Identification, IndexedCatalog, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Photometry, Priors,
     ScalePrior, SearchFailure, SourceIndex, StarField,
@@ -49,11 +49,61 @@ pub(super) fn identify_stars(
     (workspace, clock): (&mut Workspace, &mut Stopwatch),
 ) -> (Outcome, Option<ScalePrior>) {
     let field = star_field(frame, detections, priors.years_since_j2000());
-    let workspace = (&mut workspace.identify, clock);
+    let Workspace {
+        identify: workspace,
+        detect: detector,
+        ..
+    } = workspace;
+    let workspace = (workspace, clock);
     let (found, dropped_scale) = search(&field, priors, context, workspace);
     let image = Some((frame, detections));
     let outcome = identified(found, image, &field, &priors.binding(), context.indexed);
+    let outcome = match outcome {
+        Outcome::NotIdentified(reason) if may_be_negative(&reason) => {
+            let negative = negative(frame, detections, detector);
+            Outcome::NotIdentified(negative.map_or(reason, Reason::Diagnosis))
+        }
+        outcome => outcome,
+    };
     (outcome, dropped_scale)
+}
+
+/// Whether a negative can end like this: it has few stars, none that match, or a sky at full scale.
+fn may_be_negative(reason: &Reason) -> bool {
+    match reason {
+        Reason::Search(failure) => *failure != SearchFailure::Interrupted,
+        Reason::Diagnosis(cause) => matches!(
+            cause,
+            Diagnosis::Saturated { .. }
+                | Diagnosis::Trails { .. }
+                | Diagnosis::DoubleExposure { .. }
+        ),
+    }
+}
+
+/// Whether `frame` has many more dark stars than bright ones.
+fn negative(
+    frame: &Frame,
+    detections: &Detections,
+    detector: &mut detect::Workspace,
+) -> Option<Diagnosis> {
+    /// Fewer dark spots may be anything.
+    const MIN_SPOTS: usize = 10;
+    /// Dark spots for each bright one, of whatever form.
+    const MIN_RATIO: usize = 4;
+    /// Fainter ones may be noise.
+    const MIN_SNR: f64 = 10.0;
+    let config = DetectConfig {
+        max_detections: 1000,
+        ..DetectConfig::default()
+    };
+    let inverted = detect(&frame.inverted(), &config, detector).ok()?;
+    let stands_out = |source: &&Detection| source.snr >= MIN_SNR;
+    let bright = detections.sources.iter().filter(stands_out).count();
+    let dark = inverted.sources.iter().filter(stands_out);
+    let spots = dark.filter(|source| source.flags.is_star_like()).count();
+    let is_negative = spots >= MIN_SPOTS.max(MIN_RATIO * bright);
+    is_negative.then_some(Diagnosis::Negative { spots })
 }
 
 /// Result of the search, and the scale that was dropped because nothing matched with it.

@@ -31,10 +31,19 @@ fn cause_text(cause: &Diagnosis) -> String {
         Diagnosis::NoVariation { level_adu } => format!(
             "the frame is empty: every pixel has the value {level_adu}; was the lens covered?"
         ),
-        Diagnosis::Saturated { share, level_adu } => format!(
-            "{:.0} % of the pixels are at full scale, {level_adu}; a shorter exposure or less light beside \
-             the stars is needed",
-            share * 100.0
+        Diagnosis::Saturated {
+            share,
+            sky,
+            level_adu,
+        } => format!(
+            "the frame is overexposed: {:.0} % of the pixels are at full scale, {level_adu}, and the sky is \
+             at {:.0} % of it; a shorter exposure or less light beside the stars is needed",
+            share * 100.0,
+            sky * 100.0
+        ),
+        Diagnosis::Negative { spots } => format!(
+            "the frame is a negative: {spots} dark spots in it look like stars; invert it, as with \
+             ImageMagick's `magick negative.png -negate positive.png`"
         ),
         Diagnosis::Trails {
             trails,

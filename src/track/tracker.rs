@@ -11,7 +11,7 @@ use crate::base::statistics::median;
 use crate::camera::CameraModel;
 use crate::detect::DetectError;
 use crate::detect::windows::{ExpectedStar, FoundStar, SpotModel, WindowDetector};
-use crate::frame::Frame;
+use crate::frame::{Frame, SaturationFinder};
 use crate::identify::attitude::MeasuredStar;
 use crate::identify::{
     Identification, LOG10_FALSE_ALARM_LIMIT, MIN_STARS, Scale, ScalePrior, ScaleSource,
@@ -311,7 +311,8 @@ impl<'a> Tracker<'a> {
         attitude: &Attitude,
     ) -> Known {
         let years = solution.date.map_or(0.0, |d| d.date.years_since_j2000());
-        let saturation_adu = self.context.detect_config(frame).saturation_adu(frame);
+        let config = self.context.detect_config(frame);
+        let saturation_adu = config.saturation_adu(frame, &mut SaturationFinder::default());
         let light = Light::of(
             solution,
             found,

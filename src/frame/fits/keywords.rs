@@ -12,6 +12,8 @@
 //!   heights in metres.
 //! - Order of the rows: ROWORDER, `TOP-DOWN` or `BOTTOM-UP`. Without it an image is bottom-up, as FITS
 //!   viewers draw it and as Siril and PixInsight read it.
+//! - Saturation level: SATURATE; else DATAMAX where it is the full scale of 8 to 32 bits, or 1, as
+//!   many programs write the highest value of the image there.
 //! - Zenith distance: CENTALT or OBJCTALT, the altitude in degrees.
 //!
 //! The pointing of the mount (OBJCTRA, RA, CRVAL1) is not used.
@@ -19,10 +21,10 @@
 use super::header::Header;
 use crate::base::angle::Angle;
 use crate::base::epoch::ObservationDate;
-use crate::frame::RowOrder;
 use crate::frame::metadata::{
     ALTITUDE, EXPOSURE, FOCAL_LENGTH, FrameMetadata, HeaderNumber, PIXEL_SIZE,
 };
+use crate::frame::{Frame, RowOrder};
 use crate::sky::observer::Site;
 
 /// Metadata from `headers`; earlier headers have priority.
@@ -46,6 +48,44 @@ pub(super) fn metadata<'a>(headers: impl Iterator<Item = &'a Header<'a>>) -> Fra
     let altitude_deg = keywords.number(&mut metadata, &ALTITUDE, &["CENTALT", "OBJCTALT"]);
     metadata.zenith_distance_deg = altitude_deg.map(|altitude| 90.0 - altitude);
     metadata
+}
+
+/// The level from which on pixels are saturated, as a header states it.
+pub(super) struct StatedSaturation {
+    keyword: &'static str,
+    level_adu: f64,
+}
+
+/// The saturation level from `headers`; earlier headers have priority.
+pub(super) fn saturation<'a>(
+    headers: impl Iterator<Item = &'a Header<'a>>,
+) -> Option<StatedSaturation> {
+    let keywords = Keywords(headers.collect());
+    let number = |keyword| keywords.0.iter().find_map(|header| header.number(keyword));
+    let stated = |keyword, level_adu| StatedSaturation { keyword, level_adu };
+    let saturate = number("SATURATE").map(|level| stated("SATURATE", level));
+    let is_full_scale = |level: &f64| {
+        let of_bits = |bits| [0.0, 1.0].map(|less| f64::powi(2.0, bits) - less);
+        *level == 1.0 || (8..=32).flat_map(of_bits).any(|full| full == *level)
+    };
+    saturate.or_else(|| {
+        let highest = number("DATAMAX").filter(is_full_scale);
+        highest.map(|level| stated("DATAMAX", level))
+    })
+}
+
+impl StatedSaturation {
+    /// Lowers the saturation level of `frame` to this, unless it is implausible.
+    pub fn apply(&self, frame: &mut Frame<'_>, metadata: &mut FrameMetadata) {
+        let level_adu = self.level_adu as f32;
+        if frame.can_saturate_at(level_adu) {
+            let of_format = frame.saturation_adu.unwrap_or(f32::INFINITY);
+            frame.saturation_adu = Some(level_adu.min(of_format));
+        } else {
+            let text = self.level_adu.to_string();
+            metadata.ignore(self.keyword, &text, "a level that the data do not exceed");
+        }
+    }
 }
 
 struct Keywords<'a>(Vec<&'a Header<'a>>);

@@ -3,9 +3,10 @@
 //!
 //! Levels are BZERO + BSCALE × stored value. Integers that BZERO turns into unsigned ones (32768,
 //! and its equivalents for 8 and 32 bits) are exact and saturate at the largest value. Other scaled
-//! integers have a step of BSCALE and no saturation. BLANK and NaN mark pixels without a value.
-//! Images compressed tile by tile (ZIMAGE) are read as if they were not compressed ([`tiles`]). Rows
-//! are stored bottom-up unless ROWORDER is TOP-DOWN.
+//! integers have a step of BSCALE and no saturation. A header may state the saturation level
+//! ([`keywords`]). BLANK and NaN mark pixels without a value. Images compressed tile by tile
+//! (ZIMAGE) are read as if they were not compressed ([`tiles`]). Rows are stored bottom-up unless
+//! ROWORDER is TOP-DOWN.
 //!
 //! This is a reader of our own. Of the crates under a permissive licence, `fitsrs` 0.4.1 and
 //! `fitsio-pure` 0.25.0 both panic on some damaged headers, and `fitsrs` returns the beginning of a
@@ -52,11 +53,13 @@ pub(super) fn decode(
         if plane < unit.pages() {
             let image = Image::new(&unit, page.map(|_| plane), account)?;
             let headers = [Some(&unit.header), primary.as_ref()];
-            let metadata = keywords::metadata(headers.into_iter().flatten());
-            return Ok(image
-                .frame(&unit, bytes, account)?
-                .with_metadata(metadata)
-                .upright());
+            let mut metadata = keywords::metadata(headers.into_iter().flatten());
+            let stated = keywords::saturation(headers.into_iter().flatten());
+            let mut frame = image.frame(&unit, bytes, account)?;
+            if let Some(stated) = stated {
+                stated.apply(&mut frame, &mut metadata);
+            }
+            return Ok(frame.with_metadata(metadata).upright());
         }
         pages += unit.pages();
         tables += usize::from(unit.is_table());

@@ -11,12 +11,19 @@ pub enum Diagnosis {
         /// That value, in ADU.
         level_adu: f64,
     },
-    /// A large fraction of the frame is at full scale.
+    /// A large fraction of the frame is at full scale, or the sky is close to it.
     Saturated {
         /// That fraction, in [0, 1].
         share: f64,
+        /// The frame's median over full scale.
+        sky: f64,
         /// Full scale, in ADU.
         level_adu: f64,
+    },
+    /// The frame is a negative: its stars are dark.
+    Negative {
+        /// Number of dark spots.
+        spots: usize,
     },
     /// The stars are trails: the camera moved, or the stars did.
     Trails {
@@ -68,6 +75,7 @@ impl Diagnosis {
         match self {
             Self::NoVariation { .. } => "no_variation",
             Self::Saturated { .. } => "saturated",
+            Self::Negative { .. } => "negative",
             Self::Trails { .. } => "trails",
             Self::DoubleExposure { .. } => "double_exposure",
             Self::ScaleOutOfRange { .. } => "scale_out_of_range",

@@ -1,10 +1,13 @@
-//! Frames without an image: one value everywhere, or mostly full scale.
+//! Frames without an image: one value everywhere, mostly full scale, or with a sky close to it.
 
 use super::cause::Diagnosis;
+use crate::base::statistics::median;
 use crate::frame::Frame;
 
 /// Fraction of pixels at the highest level from which a frame is overexposed.
 const SATURATED_SHARE: f64 = 0.2;
+/// Median over the highest level from which a frame is overexposed where it reaches full scale.
+const FULL_SKY: f64 = 0.9;
 /// Fewest steps between the lowest and the highest level for the latter to be a full scale.
 const FULL_SCALE_STEPS: f32 = 32.0;
 
@@ -14,7 +17,8 @@ pub(super) fn diagnose(frame: &Frame) -> Option<Diagnosis> {
     let values = || pixels.iter().copied().filter(|p| !p.is_nan());
     let lowest = values().fold(f32::INFINITY, f32::min);
     let highest = values().fold(f32::NEG_INFINITY, f32::max);
-    let is_full = frame.saturation_adu.is_some_and(|full| highest >= full);
+    let saturation_adu = frame.saturation_level_adu();
+    let is_full = saturation_adu.is_some_and(|full| highest >= full);
     if lowest == highest && !is_full {
         return Some(Diagnosis::NoVariation {
             level_adu: f64::from(lowest),
@@ -25,14 +29,17 @@ pub(super) fn diagnose(frame: &Frame) -> Option<Diagnosis> {
     if !is_full && (steps.is_nan() || steps < FULL_SCALE_STEPS) {
         return None;
     }
-    let full = match frame.saturation_adu {
+    let full = match saturation_adu {
         Some(full) if is_full => full,
         _ => highest,
     };
     let at_full = values().filter(|&p| p >= full).count();
     let share = at_full as f64 / values().count() as f64;
-    (share > SATURATED_SHARE).then_some(Diagnosis::Saturated {
+    let sky = median(&mut values().map(f64::from).collect::<Vec<_>>()) / f64::from(full);
+    let is_sky_full = is_full && sky > FULL_SKY;
+    (share > SATURATED_SHARE || is_sky_full).then_some(Diagnosis::Saturated {
         share,
+        sky,
         level_adu: f64::from(full),
     })
 }
@@ -78,6 +85,24 @@ mod tests {
             ),
             "{full:?}"
         );
+    }
+
+    #[test]
+    fn a_sky_close_to_full_scale_is_too_much_light() {
+        // Noise of 60 levels, cut off at 12 bits.
+        let noise = |i: usize| ((i * 7919) % 120) as f32 - 60.0;
+        let sky = |level: f32| {
+            let pixels = (0..1200).map(|i| (level + noise(i)).min(4095.0));
+            Frame::new(40, 30, pixels.collect())
+                .unwrap()
+                .with_levels(1.0, Some(65_535.0))
+        };
+        let over = diagnose(&sky(4046.0));
+        assert!(
+            matches!(over, Some(Diagnosis::Saturated { share, sky, .. }) if share < 0.2 && sky > 0.9),
+            "{over:?}"
+        );
+        assert_eq!(diagnose(&sky(3000.0)), None);
     }
 
     #[test]
