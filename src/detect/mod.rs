@@ -36,6 +36,7 @@ mod background;
 mod background_map;
 mod candidates;
 mod config;
+mod contrast;
 mod detection;
 mod effective_psf;
 mod error;
@@ -68,7 +69,7 @@ use crate::frame::{Frame, MIN_SIDE_PX};
 use background::Mesh;
 use candidates::{CandidateMemory, PeakSearch};
 use field_tables::FieldTables;
-use measure::{Measurement, Ring, StarShape};
+use measure::{Measurement, Ring, StarShape, sharpest_px};
 use pixels::View;
 use psf::PIXEL_VARIANCE_PX2;
 use psf_fit::measure_psf;
@@ -185,6 +186,7 @@ fn run(
     let measurement = Measurement {
         maps,
         shape,
+        sharpest_px: sharpest_px(&maps, &shape),
         noise: stars.noise,
         method: config.centroid,
         regions,

@@ -53,6 +53,8 @@ pub(crate) struct Measurement<'a> {
     pub noise: NoiseModel,
     /// The shape of the stars.
     pub shape: StarShape,
+    /// Size of the sharpest spots that stars have, in pixels.
+    pub sharpest_px: f64,
     /// How positions are measured.
     pub method: CentroidMethod,
     /// The regions that hold the peaks.
@@ -217,6 +219,7 @@ impl Measurement<'_> {
                 buffers,
             );
         }
+        detection.flags.hot_pixel |= self.is_too_sharp(peak);
         detection.flags.blended = fit.spots.len() > 1;
         let may_be_edge = fit.spots.len() == 1 && !peak.saturated;
         detection.flags.extended |= may_be_edge && self.ring.is_bright(&self.maps, peak);
@@ -339,9 +342,16 @@ impl Measurement<'_> {
             let mut companion =
                 detection_of(&self.maps, &self.noise, &second, &companion_peak, region);
             companion.flags.blended = true;
+            companion.flags.hot_pixel = self.is_too_sharp(&companion_peak);
             self.finish(&second, &mut companion, buffers, out);
         }
         pair
+    }
+
+    /// Whether the brightest pixel at a peak is sharper than the optics. Charge that ran along a
+    /// column from a saturated star is sharp in one direction.
+    fn is_too_sharp(&self, peak: &Peak) -> bool {
+        shape::is_too_sharp(&self.maps, &self.noise, peak, self.sharpest_px)
     }
 
     /// The peak of a spot that the filter merged into `peak`.

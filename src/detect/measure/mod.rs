@@ -14,4 +14,5 @@ mod star_shape;
 
 pub(crate) use measurement::{MeasureBuffers, Measurement};
 pub(crate) use ring::Ring;
+pub(crate) use shape::sharpest_px;
 pub(crate) use star_shape::StarShape;

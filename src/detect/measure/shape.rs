@@ -12,6 +12,7 @@
 use super::core::Core;
 use super::star_shape::StarShape;
 use crate::detect::candidates::{Peak, Region};
+use crate::detect::contrast::{Contrast, HOT_PIXEL_PX};
 use crate::detect::detection::Detection;
 use crate::detect::fit::{Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate};
 
@@ -27,6 +28,34 @@ impl StarSize {
     const TESTED_SIGMA: f64 = 1.5;
     /// A difference in size or chi² is significant at this many standard errors.
     const SIGNIFICANT_SIGMA: f64 = 4.0;
+}
+
+/// Whether the brightest pixel at a peak did not get its light through a lens that draws spots of
+/// `sharpest_px` and wider: a hot pixel, a cosmic ray. Charge that ran from a saturated star along a
+/// column is sharp in one direction.
+pub(super) fn is_too_sharp(
+    maps: &FrameMaps<'_>,
+    noise: &NoiseModel,
+    peak: &Peak,
+    sharpest_px: f64,
+) -> bool {
+    let contrast = Contrast::near(&maps.view, maps.background, (peak.x, peak.y));
+    let sigmas = StarSize::SIGNIFICANT_SIGMA * maps.correlation_at(peak.x as f64, peak.y as f64);
+    let directions = contrast.sharp_directions(sharpest_px, sigmas, noise.shot_adu);
+    directions >= if peak.saturated { 2 } else { 1 }
+}
+
+/// Size of the sharpest spots that stars have in a frame, in pixels.
+pub(crate) fn sharpest_px(maps: &FrameMaps<'_>, shape: &StarShape) -> f64 {
+    /// The cores of spots that are no Gaussians, over their size.
+    const CORE: f64 = 0.75;
+    let size = (maps.view.width, maps.view.height);
+    match maps.psf.map(|tables| tables.psf.summary(size)) {
+        Some(psf) => StarSize::MIN * CORE * psf.sigma_range_px[0] / psf.axis_ratio.sqrt(),
+        // The breadth of elongated stars is not known.
+        None if shape.is_elongated() => HOT_PIXEL_PX,
+        None => StarSize::MIN * maps.spot_px,
+    }
 }
 
 /// Sets the flags of sources sharper or wider than the frame's spot; the window of the fit is in

@@ -5,6 +5,7 @@
 
 use super::spot_size::{BrightStars, MAX_STARS, spot_size};
 use crate::detect::candidates::{Peak, RawPeak};
+use crate::detect::contrast::Contrast;
 use crate::detect::fit::{
     BatchStart, Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate,
 };
@@ -36,6 +37,8 @@ pub(crate) trait BrightPeak {
     fn snr(&self) -> f32;
     /// Whether it is saturated.
     fn is_saturated(&self) -> bool;
+    /// Its brightest pixel, and the light beside that.
+    fn contrast(&self, maps: &FrameMaps<'_>) -> Contrast;
     /// Size of the spot by the peak's curvature, in pixels.
     fn size_px(&self, maps: &FrameMaps<'_>) -> f64;
     /// The spot size that decides which neighbours disturb it, given its own, in pixels.
@@ -55,6 +58,10 @@ impl BrightPeak for Peak {
 
     fn is_saturated(&self) -> bool {
         self.saturated
+    }
+
+    fn contrast(&self, maps: &FrameMaps<'_>) -> Contrast {
+        Contrast::near(&maps.view, maps.background, (self.x, self.y))
     }
 
     /// A Gaussian of variance S² = σ² + σ_filter² + 2/12 falls to exp(−1/2S²) at the next pixel.
@@ -89,6 +96,10 @@ impl BrightPeak for RawPeak {
 
     fn is_saturated(&self) -> bool {
         self.saturated
+    }
+
+    fn contrast(&self, maps: &FrameMaps<'_>) -> Contrast {
+        Contrast::of(&maps.view, maps.background, (self.x, self.y))
     }
 
     fn size_px(&self, maps: &FrameMaps<'_>) -> f64 {
@@ -138,7 +149,8 @@ fn fit_peaks<'a, P: BrightPeak + 'a>(
     (bright, peaks): (impl Iterator<Item = &'a P>, &[P]),
     buffers: &mut FitBuffers,
 ) -> BrightStars {
-    let mut alone = isolated_peaks(maps, bright.take(MAX_PEAKS), peaks);
+    let of_light = bright.filter(|peak| !peak.contrast(maps).is_sharper_than_any_spot());
+    let mut alone = isolated_peaks(maps, of_light.take(MAX_PEAKS), peaks);
     let mut stars = BrightStars::new();
     loop {
         let wanted = stars.remaining_capacity();

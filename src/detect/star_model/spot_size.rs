@@ -1,5 +1,6 @@
 //! The spot size of a frame: the mode of the sizes of its bright stars.
 
+use crate::detect::contrast::HOT_PIXEL_PX;
 use crate::detect::fit::{Fit, SPOT_RANGE_PX};
 use arrayvec::ArrayVec;
 
@@ -25,30 +26,27 @@ pub(crate) struct SpotSize {
 
 /// The frame's spot size from its bright stars; `None` where there are too few.
 pub(crate) fn spot_size(stars: &BrightStars) -> Option<SpotSize> {
-    /// Smaller sizes are of single pixels, in pixels.
-    const HOT_PIXEL_PX: f64 = 0.28;
     /// Fewer stars than this have no mode.
     const MIN_STARS: usize = 3;
     /// Rounds of averaging around the mode.
     const ROUNDS: usize = 4;
-    let mut sizes: ArrayVec<f64, MAX_STARS> = stars
-        .iter()
-        .map(|star| star.spot_px)
-        .filter(|&size| size > HOT_PIXEL_PX && size < SPOT_RANGE_PX.1)
-        .collect();
+    let is_spot = |size: f64| size > HOT_PIXEL_PX && size < SPOT_RANGE_PX.1;
+    let weighted = stars.iter().enumerate().map(|(rank, star)| Size {
+        px: star.spot_px,
+        weight: weight_of(rank, stars.len()),
+    });
+    let mut sizes: ArrayVec<Size, MAX_STARS> = weighted.filter(|size| is_spot(size.px)).collect();
     if sizes.len() < MIN_STARS {
         return None;
     }
-    sizes.sort_unstable_by(f64::total_cmp);
-    let mut center = half_sample_mode(&sizes);
+    sizes.sort_unstable_by(|a, b| a.px.total_cmp(&b.px));
+    let mut center = densest_cluster(&sizes);
     let mut members = 0.0;
     // The mode is robust but not precise: move to the mean of the sizes around it.
     for _ in 0..ROUNDS {
-        let near = |size: &&f64| (**size / center).max(center / **size) < MODE_WIDTH;
-        let (sum, count) = sizes
-            .iter()
-            .filter(near)
-            .fold((0.0, 0.0), |(s, n), size| (s + size, n + 1.0));
+        let near = |px: &f64| (px / center).max(center / px) < MODE_WIDTH;
+        let near_sizes = sizes.iter().map(|size| size.px).filter(near);
+        let (sum, count) = near_sizes.fold((0.0, 0.0), |(s, n), px| (s + px, n + 1.0));
         center = sum / count;
         members = count;
     }
@@ -58,23 +56,59 @@ pub(crate) fn spot_size(stars: &BrightStars) -> Option<SpotSize> {
     })
 }
 
-/// The mode of sorted positive values: the densest half by ratio, repeatedly.
+/// A size, and how much it counts.
+#[derive(Debug, Clone, Copy)]
+struct Size {
+    px: f64,
+    weight: f64,
+}
+
+/// How much a star counts that has this rank among so many, brightest first: the brightest are the
+/// least likely to be noise. 1 on average.
+fn weight_of(rank: usize, stars: usize) -> f64 {
+    1.5 - (rank as f64 + 0.5) / stars as f64
+}
+
+/// The mode of sorted sizes: the middle of the densest cluster by ratio, of those of up to
+/// [`MODE_WIDTH`] the one that chance explains least.
 ///
 /// # Reference
-/// Bickel & Frühwirth 2006, doi 10.1016/j.csda.2005.07.011.
-fn half_sample_mode(sorted: &[f64]) -> f64 {
-    let mut values = sorted;
-    while values.len() > 3 {
-        let half = values.len().div_ceil(2);
-        let start = (0..=values.len() - half)
-            .min_by(|&a, &b| {
-                let ratio = |i: usize| values[i + half - 1] / values[i];
-                ratio(a).total_cmp(&ratio(b))
-            })
-            .unwrap_or(0);
-        values = &values[start..start + half];
+/// Kulldorff 1997, Commun. Stat. Theory Methods 26, 1481, doi 10.1080/03610929708831995: the scan
+/// statistic, here along the logarithm of the size.
+fn densest_cluster(sorted: &[Size]) -> f64 {
+    /// Narrower clusters are no denser: sizes have errors, as a ratio.
+    const LEAST_RATIO: f64 = 1.1;
+    let count: f64 = sorted.iter().map(|size| size.weight).sum();
+    let range = (SPOT_RANGE_PX.1 / HOT_PIXEL_PX).ln();
+    // The log likelihood ratio of a cluster in this share of the range.
+    let surplus = |members: f64, share: f64| {
+        let term = |n: f64, share: f64| {
+            if n > 0.0 {
+                n * (n / (count * share)).ln()
+            } else {
+                0.0
+            }
+        };
+        term(members, share) + term(count - members, 1.0 - share)
+    };
+    let (mut most, mut mode) = (f64::NEG_INFINITY, DEFAULT_SPOT_PX);
+    for first in 0..sorted.len() {
+        let mut members = 0.0;
+        for last in first..sorted.len() {
+            members += sorted[last].weight;
+            let ratio = sorted[last].px / sorted[first].px;
+            if ratio > MODE_WIDTH * MODE_WIDTH {
+                break;
+            }
+            let share = ratio.max(LEAST_RATIO).ln() / range;
+            let of_cluster = surplus(members, share);
+            // Fewer than expected are no cluster.
+            if members > count * share && of_cluster > most {
+                (most, mode) = (of_cluster, sorted[usize::midpoint(first, last)].px);
+            }
+        }
     }
-    values[values.len() / 2]
+    mode
 }
 
 /// The mean of the stars' sizes in pixels, weighted by their errors and by their scatter beyond
@@ -108,15 +142,36 @@ pub(crate) fn weighted_size<'a>(stars: impl Iterator<Item = &'a Fit> + Clone) ->
 mod tests {
     use super::*;
 
+    /// The mode of sizes that come brightest first.
+    fn mode(sizes: &[f64]) -> f64 {
+        let ranks = sizes.iter().enumerate();
+        let mut sizes: Vec<Size> = ranks
+            .map(|(rank, &px)| Size {
+                px,
+                weight: weight_of(rank, sizes.len()),
+            })
+            .collect();
+        sizes.sort_unstable_by(|a, b| a.px.total_cmp(&b.px));
+        densest_cluster(&sizes)
+    }
+
     #[test]
     fn the_mode_is_neither_hot_pixels_nor_lamps() {
-        let mut sizes = vec![0.3; 5];
-        sizes.extend((0..20).map(|i| 0.95 + 0.005 * f64::from(i)));
-        sizes.extend((0..12).map(|i| 2.0 + 0.4 * f64::from(i)));
-        let mode = half_sample_mode(&sizes);
-        assert!(
-            (0.9..1.1).contains(&mode) || (mode - 0.3).abs() < 1e-9,
-            "{mode}"
-        );
+        let lamps = (0..12).map(|i| 2.0 + 0.4 * f64::from(i));
+        let stars = (0..20).map(|i| 0.95 + 0.005 * f64::from(i));
+        let sizes: Vec<f64> = lamps.chain([0.3; 5]).chain(stars).collect();
+        let mode = mode(&sizes);
+        assert!((0.95..1.05).contains(&mode), "{mode}");
+    }
+
+    #[test]
+    fn bright_stars_of_one_size_outweigh_more_specks_of_many_sizes() {
+        // Eleven stars, and nineteen specks of noise that are sharper than any star.
+        let stars = [
+            2.03, 1.83, 1.57, 1.74, 1.92, 1.86, 1.64, 1.57, 1.59, 1.53, 1.46,
+        ];
+        let specks = (0..19).map(|i| 0.3 + 0.8 * f64::from(7 * i % 19) / 19.0);
+        let mode = mode(&stars.into_iter().chain(specks).collect::<Vec<_>>());
+        assert!((1.5..2.0).contains(&mode), "{mode}");
     }
 }
