@@ -224,6 +224,40 @@ fn right_priors_help_and_wrong_priors_exclude() {
 }
 
 #[test]
+fn bright_false_stars_do_not_hide_the_stars_below_them() {
+    const FIELDS: usize = 5;
+    // Sixteen kinds of five fields; at least 95 % must be identified.
+    const UNIDENTIFIED_AT_MOST: usize = 4;
+    let mut rng = ChaCha8Rng::seed_from_u64(19);
+    let mut unidentified = 0;
+    for fov_deg in [5.0, 8.0, 15.0, 30.0] {
+        for false_stars in [30, 60, 110, 200] {
+            for _ in 0..FIELDS {
+                let truth = Truth::random(&mut rng, fov_deg);
+                let (limit_mag, places) = truth.places();
+                let places = places.into_iter().filter(|(p, _)| truth.camera.contains(p));
+                let mut stars: Vec<_> = places.map(|(p, mag)| observed(p.x, p.y, mag)).collect();
+                stars.extend((0..false_stars).map(|_| {
+                    let (x, y) = (
+                        rng.random_range(0.0..WIDTH_PX),
+                        rng.random_range(0.0..HEIGHT_PX),
+                    );
+                    observed(x, y, limit_mag - rng.random_range(1.0..6.0))
+                }));
+                match identify(&field(stars), &Priors::default(), sky()) {
+                    Ok(found) => assert!(truth.is_told_by(&found), "wrong: {found:?}"),
+                    Err(_) => unidentified += 1,
+                }
+            }
+        }
+    }
+    assert!(
+        unidentified <= UNIDENTIFIED_AT_MOST,
+        "{unidentified} fields"
+    );
+}
+
+#[test]
 fn a_saturated_star_may_be_brighter_than_measured() {
     let mut rng = ChaCha8Rng::seed_from_u64(17);
     let complete = Truth::random(&mut rng, 12.0).observe(&mut rng);

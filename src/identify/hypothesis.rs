@@ -38,6 +38,20 @@ pub struct Problem<'a> {
     pub field: &'a StarField,
     /// The catalogue.
     pub sky: &'a IndexedCatalog<'a>,
+    /// Number of brighter detections that `field` leaves out. Predictions reach so much deeper, as
+    /// these may be stars.
+    pub brighter: usize,
+}
+
+impl<'a> Problem<'a> {
+    /// All stars that were observed.
+    pub fn new(field: &'a StarField, sky: &'a IndexedCatalog<'a>) -> Self {
+        Self {
+            field,
+            sky,
+            brighter: 0,
+        }
+    }
 }
 
 impl Hypothesis {
@@ -77,7 +91,11 @@ impl Hypothesis {
         limit_v_mag: f64,
         (around, predicted): (&mut Surroundings, &mut Vec<PredictedStar>),
     ) {
-        let Problem { field, sky } = problem;
+        let Problem {
+            field,
+            sky,
+            brighter,
+        } = problem;
         let view = self.view(field);
         match field.photometry {
             Photometry::JohnsonV => {
@@ -86,7 +104,7 @@ impl Hypothesis {
                 around.stars_to(&view, sky, limit.max(limit_v_mag), predicted);
             }
             Photometry::Instrumental => {
-                let count = observed.len() as f64 * PREDICTED_PER_OBSERVED;
+                let count = (observed.len() + brighter) as f64 * PREDICTED_PER_OBSERVED;
                 let count = count.ceil() as usize + PREDICTED_EXTRA;
                 let likely = sky.magnitude_of_density(self.per_sq_deg(count));
                 let least = Depth {

@@ -4,7 +4,9 @@
 //! attitude and scale, or the [`SearchFailure`].
 //!
 //! 1. `search`: triangles of bright observed stars are looked up in an index of catalogue
-//!    triangles. Each similar triangle is a hypothesis, which further stars confirm or refute.
+//!    triangles. Each similar triangle is a hypothesis, which further stars confirm or refute. Where
+//!    none of the brightest agree, those of each part of the frame are tried, and those below a
+//!    number of brighter detections (`thinning`, `tiers`).
 //! 2. `refine`: the hypothesis is fitted to the bright stars that agree, with as much lens
 //!    distortion as they support.
 //! 3. `naming`: each star gets its name and the probability that the name is chance. Camera and
@@ -32,6 +34,7 @@ mod indexed_catalog;
 mod listing;
 mod naming;
 mod pairing;
+mod plan;
 #[cfg(debug_assertions)]
 mod planted;
 mod predict;
@@ -40,6 +43,7 @@ mod refine;
 mod search;
 mod table;
 mod thinning;
+mod tiers;
 pub mod triangle;
 mod workspace;
 

@@ -8,13 +8,14 @@
 //! within which it does not change noticeably.
 
 use super::confirmation::{Batch, ConfirmingStars, PendingHypothesis, Pose};
-use super::false_alarm::{FalseAlarm, MAX_HYPOTHESES, TESTED_STARS};
+use super::false_alarm::{FalseAlarm, TESTED_STARS};
 use super::field::{ObservedStar, Photometry, StarField};
 use super::hypothesis::{Hypothesis, Problem};
-use super::indexed_catalog::IndexedCatalog;
 use super::pairing::Pair;
+use super::plan::{BRIGHTEST, PASSES, Pass, Plan, TIER};
 use super::priors::{Priors, SkyRegion};
 use super::refine::{Refined, Refiner, Start};
+use super::tiers::Tiers;
 use super::triangle::TriangleShape;
 use crate::base::coords::Rotation;
 use crate::base::interrupt::Interrupt;
@@ -27,48 +28,6 @@ use nalgebra::{Matrix3, Vector3};
 /// Margin on the fields of view that the index allows, so that a field of exactly that width is
 /// found.
 const FOV_SLACK: f64 = 1.05;
-
-/// One sweep over the triangles of the brightest stars.
-struct Pass {
-    /// Number of stars that form triangles, the brightest.
-    stars: usize,
-    /// Faintest star of the first triangle; triangles of brighter stars were tried in the pass
-    /// before.
-    from: usize,
-    /// Relative error of a triangle's sides caused by lens distortion.
-    tolerance: f64,
-    /// Probability that another observed star confirms a true hypothesis. Some are false, and some
-    /// are not in the catalogue.
-    true_confirmation: f64,
-}
-
-/// The passes: the usual frame, a distorting lens, many false stars, even more false stars.
-const PASSES: [Pass; 4] = [
-    Pass {
-        stars: 12,
-        from: 2,
-        tolerance: 0.0025,
-        true_confirmation: 0.6,
-    },
-    Pass {
-        stars: 10,
-        from: 2,
-        tolerance: 0.008,
-        true_confirmation: 0.6,
-    },
-    Pass {
-        stars: 22,
-        from: 2,
-        tolerance: 0.0025,
-        true_confirmation: 0.35,
-    },
-    Pass {
-        stars: 40,
-        from: 22,
-        tolerance: 0.0025,
-        true_confirmation: 0.35,
-    },
-];
 
 /// Centroid errors in a triangle's tolerance, in standard errors.
 const CENTROID_SIGMAS: f64 = 2.0;
@@ -94,9 +53,6 @@ const CLASS_SLACK: f64 = 1.01;
 const WEIGHED: usize = 64;
 /// Most hypotheses that wait for their test.
 const WAITING: usize = 128;
-/// Maximum number of catalogue triangles of the right shape. Most of them fail at once, by size or
-/// brightness.
-const MAX_CANDIDATES: u64 = 20_000_000;
 /// Triangles with a larger tolerance of their ratios resemble too many others.
 const MAX_TOLERANCE: f64 = 0.03;
 /// Largest log10 of the false-alarm probability at which a frame counts as identified.
@@ -134,15 +90,15 @@ pub struct Buffers {
 
 /// The search over one field.
 pub struct Search<'a> {
-    field: &'a StarField,
+    problem: Problem<'a>,
+    plan: Plan,
     near: Option<SkyRegion>,
-    sky: &'a IndexedCatalog<'a>,
     buffers: &'a mut Buffers,
     /// Smallest and largest focal length, in pixels.
     focal_px: (f64, f64),
     diagonal_px: f64,
-    /// log10 of the number of searches over the field.
-    searches_log10: f64,
+    /// Position of this search among those over the field, from 1.
+    number: u32,
     /// Brightest stars whose triangles were tried by a search before.
     shared: usize,
     /// Brightest stars of which all triangles were tried.
@@ -208,9 +164,14 @@ struct Weighed {
 impl<'a> Search<'a> {
     /// A search over `field`.
     pub fn new(problem: Problem<'a>, priors: &Priors, buffers: &'a mut Buffers) -> Self {
-        let Problem { field, sky } = problem;
+        let Problem { field, sky, .. } = problem;
+        let plan = if problem.brighter > 0 {
+            TIER
+        } else {
+            BRIGHTEST
+        };
         let centre = frame_centre(field.width_px, field.height_px);
-        let most = PASSES.iter().map(|p| p.stars).max().unwrap_or(0);
+        let most = plan.passes.iter().map(|p| p.stars).max().unwrap_or(0);
         let brightest = field.brightest(most).iter();
         buffers.offsets.clear();
         buffers
@@ -229,15 +190,15 @@ impl<'a> Search<'a> {
         let stars = buffers.offsets.len() as u64;
         let triangles = stars * stars.saturating_sub(1) * stars.saturating_sub(2) / 6;
         let most_hypotheses =
-            (HYPOTHESES_PER_TRIANGLE * triangles).clamp(LEAST_HYPOTHESES, MAX_HYPOTHESES);
+            (HYPOTHESES_PER_TRIANGLE * triangles).clamp(LEAST_HYPOTHESES, plan.max_hypotheses);
         Self {
-            field,
+            problem,
+            plan,
             near: priors.near,
-            sky,
             buffers,
             focal_px,
             diagonal_px: field.width_px.hypot(field.height_px),
-            searches_log10: 0.0,
+            number: 1,
             shared: 0,
             tried: most,
             hypotheses: 0,
@@ -249,18 +210,18 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// A second search, of another choice of stars: chance has twice the opportunity. Triangles of
-    /// the stars that both share are not tried again, and count as tried.
+    /// The next search, of another choice of stars. Triangles of the brightest stars that both share
+    /// are not tried again, and count as tried.
     pub fn again(self, problem: Problem<'a>, priors: &Priors) -> Self {
-        let shared = shared_stars(&self.field.stars, &problem.field.stars).min(self.tried);
+        let shared = shared_stars(&self.problem.field.stars, &problem.field.stars).min(self.tried);
         let shared = if shared < LEAST_SHARED { 0 } else { shared };
         let before: u64 = self.buffers.hypotheses_of.iter().take(shared).sum();
-        let second = Self::new(problem, priors, self.buffers);
+        let next = Self::new(problem, priors, self.buffers);
         Self {
-            searches_log10: std::f64::consts::LOG10_2,
+            number: self.number + 1,
             shared,
-            most_hypotheses: second.most_hypotheses.saturating_sub(before),
-            ..second
+            most_hypotheses: next.most_hypotheses.saturating_sub(before),
+            ..next
         }
     }
 
@@ -286,7 +247,8 @@ impl<'a> Search<'a> {
 
     /// Tries triangles until a hypothesis passes. Returns it, fitted to the brightest stars.
     pub fn run(&mut self) -> Option<Found> {
-        PASSES
+        self.plan
+            .passes
             .iter()
             .find_map(|pass| self.sweep(pass).or_else(|| self.provisional.take()))
     }
@@ -325,19 +287,20 @@ impl<'a> Search<'a> {
     }
 
     fn is_exhausted(&self) -> bool {
-        self.hypotheses > self.most_hypotheses || self.candidates > MAX_CANDIDATES
+        self.hypotheses > self.most_hypotheses || self.candidates > self.plan.max_candidates
     }
 
     fn triangle(&self, stars: [usize; 3], pass: &Pass) -> Option<ObservedTriangle> {
         let [a, b, c] = stars.map(|s| self.buffers.offsets[s]);
         let side = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
         let longest_px = side(a, b).max(side(b, c)).max(side(c, a));
-        if longest_px < MIN_TRIANGLE_SHARE * self.diagonal_px {
+        let shares = MIN_TRIANGLE_SHARE..=pass.largest_share;
+        if !shares.contains(&(longest_px / self.diagonal_px)) {
             return None;
         }
         let sigma_px = stars
             .iter()
-            .map(|&s| self.field.stars[s].sigma_px)
+            .map(|&s| self.problem.field.stars[s].sigma_px)
             .fold(0.0, f64::max);
         let centroid_tolerance = CENTROID_SIGMAS * sigma_px / longest_px;
         let tolerance = pass.tolerance.hypot(centroid_tolerance);
@@ -364,7 +327,7 @@ impl<'a> Search<'a> {
             self.longest_side(triangle, self.focal_px.1) / CLASS_SLACK,
             self.longest_side(triangle, self.focal_px.0) * CLASS_SLACK,
         );
-        let classes = &self.sky.triangles.classes;
+        let classes = &self.problem.sky.triangles.classes;
         let is_of_size = |number: &usize| {
             let class = &classes[*number];
             class.high >= smallest && class.low <= largest
@@ -376,7 +339,7 @@ impl<'a> Search<'a> {
     }
 
     fn try_class(&mut self, triangle: &ObservedTriangle, number: usize) -> Option<Found> {
-        let class = &self.sky.triangles.classes[number];
+        let class = &self.problem.sky.triangles.classes[number];
         let low_px = self
             .focal_of_chord(triangle, class.high)?
             .max(self.focal_px.0);
@@ -448,7 +411,8 @@ impl<'a> Search<'a> {
         let mut similar = std::mem::take(&mut self.buffers.similar);
         similar.clear();
         let shape = (class, shape.ratios, triangle.tolerance);
-        self.sky
+        self.problem
+            .sky
             .for_each_similar(shape, |corners| similar.push(*corners));
         let found = similar
             .chunks(WEIGHED)
@@ -480,9 +444,10 @@ impl<'a> Search<'a> {
     /// Size and brightness of a catalogue triangle beside those of the observed one.
     #[inline]
     fn weigh(&self, query: &Query, corners: &[u32; 3]) -> Weighed {
-        let stars = corners.map(|c| self.sky.grid.star(c));
-        let difference =
-            |i: usize| f64::from(stars[i].v_mag) - self.field.stars[query.triangle.stars[i]].mag;
+        let stars = corners.map(|c| self.problem.sky.grid.star(c));
+        let difference = |i: usize| {
+            f64::from(stars[i].v_mag) - self.problem.field.stars[query.triangle.stars[i]].mag
+        };
         let longest = (stars[0].vector() - stars[1].vector()).norm();
         Weighed {
             zero_point_mag: self.zero_point([0, 1, 2].map(difference)),
@@ -504,7 +469,9 @@ impl<'a> Search<'a> {
         if focal_px < query.range_px.0 / slack || focal_px > query.range_px.1 * slack {
             return None;
         }
-        let sky = corners.map(|c| self.sky.grid.star(c)).map(GridStar::vector);
+        let sky = corners
+            .map(|c| self.problem.sky.grid.star(c))
+            .map(GridStar::vector);
         let mut observed = self.vectors(triangle, focal_px);
         if let Some(SkyRegion { centre, radius_rad }) = &self.near {
             let reach_rad = (self.diagonal_px / focal_px).atan() + radius_rad;
@@ -543,12 +510,12 @@ impl<'a> Search<'a> {
     fn zero_point(&self, of_stars: [f64; 3]) -> Option<f64> {
         let [a, b, c] = of_stars;
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        let spread = self.field.photometry.tolerance_mag();
-        let consistent = match self.field.photometry {
+        let spread = self.problem.field.photometry.tolerance_mag();
+        let consistent = match self.problem.field.photometry {
             Photometry::Instrumental => high - low <= spread,
             Photometry::JohnsonV => low >= -spread && high <= spread,
         };
-        let zero_point = match self.field.photometry {
+        let zero_point = match self.problem.field.photometry {
             Photometry::Instrumental => a + b + c - low - high,
             Photometry::JohnsonV => 0.0,
         };
@@ -558,8 +525,8 @@ impl<'a> Search<'a> {
     /// Those who confirm or refute hypotheses from a triangle.
     fn confirming_stars(&self, triangle: &ObservedTriangle) -> ConfirmingStars<'_> {
         ConfirmingStars {
-            field: self.field,
-            sky: self.sky,
+            field: self.problem.field,
+            sky: self.problem.sky,
             offsets: &self.buffers.offsets,
             triangle: triangle.stars,
             true_confirmation: triangle.true_confirmation,
@@ -597,7 +564,7 @@ impl<'a> Search<'a> {
         pending: &PendingHypothesis,
         triangle: &ObservedTriangle,
     ) -> Option<Found> {
-        let (width_px, height_px) = (self.field.width_px, self.field.height_px);
+        let (width_px, height_px) = (self.problem.field.width_px, self.problem.field.height_px);
         let Pose {
             sky_to_camera,
             focal_px,
@@ -679,20 +646,41 @@ impl<'a> Search<'a> {
 
     /// The stars that are searched, and the catalogue.
     pub fn problem(&self) -> Problem<'a> {
-        Problem {
-            field: self.field,
-            sky: self.sky,
+        self.problem
+    }
+
+    /// log10 of the false-alarm probability of an answer for the whole `field`; `None` where it
+    /// contradicts the priors. Where the stars that were searched do not show it, those below
+    /// brighter detections may.
+    pub fn log10_of_answer(&mut self, field: &StarField, hypothesis: &Hypothesis) -> Option<f64> {
+        /// Searches of other choices of stars, before those of the tiers.
+        const BEFORE_TIERS: u32 = 2;
+        let log10 = self.log10_with(hypothesis, TESTED_STARS)?;
+        if log10 <= LOG10_FALSE_ALARM_LIMIT {
+            return Some(log10);
         }
+        let mut tiers = Tiers::default();
+        let of_tiers = tiers.below(field).iter().zip(BEFORE_TIERS + 1..);
+        let of_tiers = of_tiers.filter_map(|(tier, number)| {
+            let problem = Problem {
+                field: &tier.field,
+                brighter: tier.brighter,
+                ..self.problem
+            };
+            let log10 = self.log10_in(problem, hypothesis, TESTED_STARS)?;
+            Some(log10 + searches_weight(number).log10())
+        });
+        Some(of_tiers.fold(log10, f64::min))
     }
 
-    /// log10 of the false-alarm probability of `hypothesis`; `None` where it contradicts the
-    /// priors.
-    pub fn log10_false_alarm(&mut self, hypothesis: &Hypothesis) -> Option<f64> {
-        self.log10_with(hypothesis, TESTED_STARS)
-    }
-
-    /// The same, by the brightest `stars`.
+    /// log10 of the false-alarm probability of `hypothesis` by the brightest `stars` that are
+    /// searched; `None` where it contradicts the priors.
     fn log10_with(&mut self, hypothesis: &Hypothesis, stars: usize) -> Option<f64> {
+        self.log10_in(self.problem, hypothesis, stars)
+    }
+
+    /// The same, by the stars of `problem`.
+    fn log10_in(&mut self, problem: Problem, hypothesis: &Hypothesis, stars: usize) -> Option<f64> {
         let focal_px = hypothesis.camera.focal_length_px;
         let slack = 1.0 + 2.0 * PASSES[1].tolerance;
         if focal_px < self.focal_px.0 / slack || focal_px > self.focal_px.1 * slack {
@@ -704,7 +692,7 @@ impl<'a> Search<'a> {
                 return None;
             }
         }
-        let (problem, hypotheses) = (self.problem(), self.hypotheses);
+        let hypotheses = self.hypotheses;
         let Buffers {
             refiner,
             false_alarm,
@@ -716,8 +704,17 @@ impl<'a> Search<'a> {
             stars,
             &mut refiner.around,
         );
-        Some((log10 + self.searches_log10).min(0.0))
+        Some((log10 + searches_weight(self.number).log10()).min(0.0))
     }
+}
+
+/// Factor on the probability of a hypothesis of the search with this number over a field.
+///
+/// The inverses of those after the first add up to one: all of them together give chance as much
+/// opportunity as the first.
+fn searches_weight(number: u32) -> f64 {
+    let number = f64::from(number);
+    (number * (number - 1.0)).max(1.0)
 }
 
 /// Number of the brightest stars that both lists begin with.
@@ -743,4 +740,16 @@ fn two_star_rotation(
     };
     let camera = frame(&observed[0], &observed[1])?;
     Some(camera * frame(&sky[0], &sky[1])?.transpose())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_further_searches_together_give_chance_as_much_opportunity_as_the_first() {
+        assert_eq!(searches_weight(1), 1.0);
+        let sum: f64 = (2..1000).map(|n| 1.0 / searches_weight(n)).sum();
+        assert!((0.99..=1.0).contains(&sum), "{sum}");
+    }
 }

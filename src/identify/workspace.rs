@@ -10,6 +10,7 @@ use super::priors::Priors;
 use super::refine::{NamingStart, Refined, Start};
 use super::search::{Buffers, Found, LOG10_FALSE_ALARM_LIMIT, Search};
 use super::thinning::Thinning;
+use super::tiers::Tiers;
 use crate::base::interrupt::Interrupt;
 use crate::camera::DistortionModel;
 use std::f64::consts::PI;
@@ -49,6 +50,7 @@ pub struct Workspace {
     name_odds: f64,
     buffers: Buffers,
     thinning: Thinning,
+    tiers: Tiers,
     bright: Brightest,
     answer: Option<Identification>,
 }
@@ -66,6 +68,7 @@ impl Workspace {
             name_odds: NAME_ODDS,
             buffers: Buffers::default(),
             thinning: Thinning::default(),
+            tiers: Tiers::default(),
             bright: Brightest::default(),
             answer: None,
         }
@@ -148,23 +151,31 @@ impl Workspace {
             name_odds,
             buffers,
             thinning,
+            tiers,
             bright,
             answer,
         } = self;
-        let mut search = Search::new(Problem { field, sky }, priors, buffers);
+        let whole = Problem::new(field, sky);
+        let mut search = Search::new(whole, priors, buffers);
         let mut found = search.run();
         let mut best_log10 = search.best_log10_false_alarm();
-        if found.is_none()
-            && let Some(thinned) = thinning.thin(field)
-        {
-            let problem = Problem {
-                field: thinned,
-                sky,
-            };
-            search = search.again(problem, priors);
-            found = search.run();
-            let second = search.best_log10_false_alarm();
-            best_log10 = [best_log10, second].into_iter().flatten().reduce(f64::min);
+        if found.is_none() {
+            let thinned = thinning.thin(field);
+            let thinned = thinned.map(|field| Problem { field, ..whole });
+            let tiers = tiers.below(field).iter().map(|tier| Problem {
+                field: &tier.field,
+                brighter: tier.brighter,
+                ..whole
+            });
+            for problem in thinned.into_iter().chain(tiers) {
+                search = search.again(problem, priors);
+                found = search.run();
+                let log10 = search.best_log10_false_alarm();
+                best_log10 = [best_log10, log10].into_iter().flatten().reduce(f64::min);
+                if found.is_some() || search.is_interrupted() {
+                    break;
+                }
+            }
         }
         let failure = if search.is_interrupted() {
             SearchFailure::Interrupted
@@ -175,7 +186,7 @@ impl Workspace {
         };
         Ok(Pointing {
             most_chance: 1.0 / (1.0 + *name_odds),
-            problem: Problem { field, sky },
+            problem: whole,
             found: found.ok_or(failure)?,
             search,
             failure,
@@ -360,7 +371,7 @@ fn name(
     };
     let refined = refiner.with_names(problem, settled, &of_all)?;
     let names = refiner.pairs.len();
-    let log10 = search.log10_false_alarm(&refined.hypothesis())?;
+    let log10 = search.log10_of_answer(problem.field, &refined.hypothesis())?;
     let is_sure = names >= MIN_STARS && log10 <= LOG10_FALSE_ALARM_LIMIT;
     is_sure.then_some(Named {
         refined,

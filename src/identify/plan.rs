@@ -1,0 +1,84 @@
+//! Which triangles a search tries, and how many hypotheses.
+
+use super::false_alarm::MAX_HYPOTHESES;
+
+/// One sweep over the triangles of the brightest stars.
+pub struct Pass {
+    /// Number of stars that form triangles, the brightest.
+    pub stars: usize,
+    /// Faintest star of the first triangle; triangles of brighter stars were tried in the pass
+    /// before.
+    pub from: usize,
+    /// Relative error of a triangle's sides caused by lens distortion.
+    pub tolerance: f64,
+    /// Probability that another observed star confirms a true hypothesis. Some are false, and some
+    /// are not in the catalogue.
+    pub true_confirmation: f64,
+    /// Largest longest side of a triangle, in units of the frame's diagonal.
+    pub largest_share: f64,
+}
+
+/// What a search tries.
+#[derive(Clone, Copy)]
+pub struct Plan {
+    /// The passes, one after the other.
+    pub passes: &'static [Pass],
+    /// Maximum number of hypotheses.
+    pub max_hypotheses: u64,
+    /// Maximum number of catalogue triangles of the right shape. Most of them fail at once, by size
+    /// or brightness.
+    pub max_candidates: u64,
+}
+
+/// The plan for the brightest stars, of the frame or of each of its parts.
+pub const BRIGHTEST: Plan = Plan {
+    passes: &PASSES,
+    max_hypotheses: MAX_HYPOTHESES,
+    max_candidates: 20_000_000,
+};
+
+/// The plan for stars below brighter detections. It is short, as there are many such choices. Small
+/// triangles are enough: the index lists them down to fainter stars than large ones.
+pub const TIER: Plan = Plan {
+    passes: &[Pass {
+        stars: 40,
+        from: 2,
+        tolerance: 0.0025,
+        true_confirmation: 0.35,
+        largest_share: 0.35,
+    }],
+    max_hypotheses: 25_000,
+    max_candidates: 1_000_000,
+};
+
+/// The passes: the usual frame, a distorting lens, many false stars, even more false stars.
+pub const PASSES: [Pass; 4] = [
+    Pass {
+        stars: 12,
+        from: 2,
+        tolerance: 0.0025,
+        true_confirmation: 0.6,
+        largest_share: f64::INFINITY,
+    },
+    Pass {
+        stars: 10,
+        from: 2,
+        tolerance: 0.008,
+        true_confirmation: 0.6,
+        largest_share: f64::INFINITY,
+    },
+    Pass {
+        stars: 22,
+        from: 2,
+        tolerance: 0.0025,
+        true_confirmation: 0.35,
+        largest_share: f64::INFINITY,
+    },
+    Pass {
+        stars: 40,
+        from: 22,
+        tolerance: 0.0025,
+        true_confirmation: 0.35,
+        largest_share: f64::INFINITY,
+    },
+];

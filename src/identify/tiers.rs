@@ -1,0 +1,100 @@
+//! Fields without the brightest detections.
+//!
+//! Cosmic rays, hot pixels, satellites and reflections may outshine all stars. They hide them from a
+//! search that begins with the brightest. A tier leaves a number of the brightest detections out.
+//! That number grows from tier to tier by a factor, so that one of a few tiers begins soon after
+//! most of them.
+
+use super::false_alarm::TESTED_STARS;
+use super::field::StarField;
+
+/// Detections that the first tier leaves out.
+const FIRST_LEFT_OUT: usize = 20;
+/// Ratio of the numbers that a tier and the one before it leave out.
+const RATIO: (usize, usize) = (3, 2);
+/// Minimum number of stars in a tier.
+const MIN_STARS: usize = 12;
+/// Maximum number of tiers: the last one leaves some 1700 detections out.
+const MAX_TIERS: usize = 12;
+
+/// Stars below a number of brighter detections.
+#[derive(Debug, Clone)]
+pub struct Tier {
+    /// The stars, as many as a search looks at.
+    pub field: StarField,
+    /// Number of brighter detections that are left out.
+    pub brighter: usize,
+}
+
+/// The tiers of a field.
+#[derive(Debug, Default)]
+pub struct Tiers(Vec<Tier>);
+
+impl Tiers {
+    /// The tiers of `field`, from bright to faint.
+    pub fn below(&mut self, field: &StarField) -> &[Tier] {
+        let left_out = std::iter::successors(Some(FIRST_LEFT_OUT), |left_out| {
+            Some(left_out * RATIO.0 / RATIO.1)
+        });
+        let left_out = left_out
+            .take(MAX_TIERS)
+            .take_while(|left_out| left_out + MIN_STARS <= field.stars.len());
+        self.0.clear();
+        self.0.extend(left_out.map(|brighter| {
+            let stars = &field.stars[brighter..];
+            let stars = stars[..stars.len().min(TESTED_STARS)].to_vec();
+            Tier {
+                field: StarField { stars, ..*field },
+                brighter,
+            }
+        }));
+        &self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::coords::PixelPoint;
+    use crate::identify::{ObservedStar, Photometry, SourceIndex};
+
+    fn field(stars: usize) -> StarField {
+        let star = |index: usize| ObservedStar {
+            source: SourceIndex::new(index),
+            position: PixelPoint::new(index as f64, 10.0),
+            sigma_px: 0.1,
+            mag: index as f64,
+            is_saturated: false,
+        };
+        StarField {
+            width_px: 800.0,
+            height_px: 600.0,
+            photometry: Photometry::Instrumental,
+            years_since_j2000: 0.0,
+            spot_sigma_px: None,
+            stars: (0..stars).map(star).collect(),
+        }
+    }
+
+    #[test]
+    fn each_tier_begins_below_the_brighter_ones_and_has_what_a_search_looks_at() {
+        let field = field(100);
+        let mut tiers = Tiers::default();
+        let found: Vec<(usize, usize, usize)> = tiers
+            .below(&field)
+            .iter()
+            .map(|tier| {
+                let stars = &tier.field.stars;
+                (tier.brighter, stars[0].source.get(), stars.len())
+            })
+            .collect();
+        let expected = [(20, 20, 60), (30, 30, 60), (45, 45, 55), (67, 67, 33)];
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn few_stars_have_no_tiers() {
+        assert!(Tiers::default().below(&field(31)).is_empty());
+        assert_eq!(Tiers::default().below(&field(100_000)).len(), MAX_TIERS);
+    }
+}
