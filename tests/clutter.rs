@@ -24,7 +24,7 @@ fn the_table_has_every_kind_and_is_the_same_on_any_number_of_threads() {
     let table = |threads: &str| rows(&["--frames", "2", "--threads", threads]);
     let rows = table("1");
     assert_eq!(rows, table("3"));
-    assert_eq!(rows.len(), 18);
+    assert_eq!(rows.len(), 21);
     for row in &rows {
         assert_eq!(row["frames"], 2);
         assert_eq!(row["wrong"], 0, "{row}");
@@ -52,17 +52,46 @@ fn clutter_is_detected_where_no_star_is() {
         "--frames",
         "3",
         "--kinds",
-        "clean,foliage,reflections,false-stars",
+        "clean,foliage,reflections,false-stars,hot-pixels,cosmic-rays",
     ]);
     let falsely = |row: &Value| row["false_per_mpx"].as_f64().unwrap();
     let [clean, others @ ..] = &rows[..] else {
         panic!("no rows");
     };
     assert!(falsely(clean) < 1.0, "{clean}");
-    assert_eq!(others.len(), 3);
+    assert_eq!(others.len(), 5);
     for row in others {
         assert!(falsely(row) > 3.0, "{row}");
     }
+}
+
+#[test]
+fn every_built_in_camera_is_simulated_where_none_is_chosen() {
+    let mut command = starpipe();
+    command.args(["clutter", "--kinds", "clean", "--frames", "1"]);
+    command.args([
+        "--width-px",
+        "400",
+        "--height-px",
+        "300",
+        "--format",
+        "json",
+    ]);
+    let rows = Ran::new(&mut command).reports();
+    let cameras: Vec<&str> = rows
+        .iter()
+        .map(|row| row["camera"].as_str().unwrap())
+        .collect();
+    assert_eq!(
+        cameras,
+        [
+            "experiment-1",
+            "experiment-2",
+            "nanosat-tracker",
+            "imx174-35mm",
+            "asi183mm-135mm"
+        ]
+    );
 }
 
 #[test]

@@ -8,13 +8,17 @@ use starpipe::study::clutter::Kind;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
+#[command(mut_group("simulated", |cameras| cameras.required(false)))]
 #[command(after_help = "Examples:\n  \
+    starpipe clutter --kinds blends,trails --frames 20\n  \
     starpipe clutter --preset imx174-35mm\n  \
     starpipe clutter --camera camera.toml --kinds sky --frames 250 --format csv > clutter.csv\n  \
     starpipe clutter --preset imx174-35mm --kinds foliage,jpeg --frames 5 --pictures pictures\n\n\
     Frames are simulated at random attitudes, clutter is drawn before the sky or into it, and they are\n\
     processed with nothing known beforehand. Pictures of no sky are drawn, too: none may be identified.\n\
-    Kinds with sky: clean, foliage, edges, reflections, clouds, trails, false-stars, black-level, jpeg;\n\
+    Without --camera or --preset, every built-in camera is simulated in turn.\n\
+    Kinds with sky: clean, foliage, edges, reflections, clouds, trails, false-stars, black-level, jpeg,\n\
+    blends, hot-pixels, cosmic-rays;\n\
     without: noise, coloured-noise, dots, text, drawings, foliage-alone, windows, snow, bokeh.")]
 pub(crate) struct ClutterArgs {
     /// Frames of each kind
@@ -71,7 +75,7 @@ mod tests {
     #[test]
     fn kinds_are_named_one_by_one_or_together() {
         assert_eq!(kinds("all").unwrap().0, Kind::ALL);
-        assert_eq!(kinds("sky").unwrap().0.len(), 9);
+        assert_eq!(kinds("sky").unwrap().0.len(), 12);
         assert_eq!(kinds("no-sky").unwrap().0.len(), 9);
         let two = kinds("jpeg, foliage").unwrap().0;
         assert_eq!(two, [Kind::Foliage, Kind::Jpeg]);

@@ -9,32 +9,65 @@ use super::exit::{CommandError, Outcome};
 use super::options::format::Format;
 use super::output::rows::{csv_table, json_lines};
 use super::progress::frames_bar_with_speed;
+use starpipe::model::simulate::Setup;
 use starpipe::study::clutter::{KindResult, Protocol, run};
 
 /// `starpipe clutter`
 pub(crate) fn clutter(arguments: &ClutterArgs) -> Result<Outcome, CommandError> {
-    let protocol = Protocol {
-        setup: arguments.setup.setup()?,
-        frames: arguments.frames,
-        seed: arguments.seed,
-    };
     let kinds = &arguments.kinds.0;
-    let rows = arguments.catalog.with_index(|pool, indexed| {
-        if let Some(directory) = &arguments.pictures {
-            pictures::write(directory, kinds, &protocol, indexed)?;
-        }
-        let progress = frames_bar_with_speed(protocol.frames * kinds.len() as u64);
+    let setups = arguments.setup.setups()?;
+    let tables = arguments.catalog.with_index(|pool, indexed| {
+        let progress =
+            frames_bar_with_speed(arguments.frames * (setups.len() * kinds.len()) as u64);
         let done = || progress.inc(1);
-        let row = |kind: &_| pool.install(|| run(*kind, &protocol, indexed, &done));
-        let rows: Result<Vec<KindResult>, _> = kinds.iter().map(row).collect();
+        let table = |(camera, setup): &(String, Setup)| {
+            let protocol = Protocol {
+                setup: setup.clone(),
+                frames: arguments.frames,
+                seed: arguments.seed,
+            };
+            if let Some(directory) = &arguments.pictures {
+                let of_many = (setups.len() > 1).then(|| directory.join(camera));
+                let directory = of_many.as_ref().unwrap_or(directory);
+                pictures::write(directory, kinds, &protocol, indexed)?;
+            }
+            let row = |kind: &_| {
+                let row = pool.install(|| run(*kind, &protocol, indexed, &done))?;
+                let camera = camera.clone();
+                Ok(KindResult { camera, ..row })
+            };
+            let rows: Result<Vec<_>, CommandError> = kinds.iter().map(row).collect();
+            Ok(Table {
+                rows: rows?,
+                protocol,
+            })
+        };
+        let tables: Result<Vec<Table>, CommandError> = setups.iter().map(table).collect();
         progress.finish_and_clear();
-        Ok(rows?)
+        tables
     })?;
+    let rows = || tables.iter().flat_map(|table| &table.rows);
     Ok(Outcome::success(match arguments.format {
-        Format::Text => introduction(&protocol) + &KindResult::to_text(&rows),
-        Format::Json => json_lines(rows.iter())?,
-        Format::Csv => csv_table(rows.iter())?,
+        Format::Text => tables
+            .iter()
+            .map(Table::to_text)
+            .collect::<Vec<_>>()
+            .join("\n"),
+        Format::Json => json_lines(rows())?,
+        Format::Csv => csv_table(rows())?,
     }))
+}
+
+/// The results of one camera.
+struct Table {
+    protocol: Protocol,
+    rows: Vec<KindResult>,
+}
+
+impl Table {
+    fn to_text(&self) -> String {
+        introduction(&self.protocol) + &KindResult::to_text(&self.rows)
+    }
 }
 
 fn introduction(protocol: &Protocol) -> String {

@@ -40,10 +40,31 @@ impl ScenarioOptions {
 
     /// The scenario that the options describe, checked.
     pub(crate) fn scenario(&self) -> Result<Scenario, CommandError> {
-        let mut scenario = match self.camera.as_deref() {
+        let scenario = match self.camera.as_deref() {
             Some(path) => of_camera(path)?,
             None => Scenario::of(self.preset.unwrap_or(Preset::Experiment1)),
         };
+        self.applied_to(scenario)
+    }
+
+    /// As [`scenario`](Self::scenario), of every built-in camera where none is chosen; each with its
+    /// name.
+    pub(crate) fn scenarios(&self) -> Result<Vec<(String, Scenario)>, CommandError> {
+        let of_preset = |preset: Preset| {
+            let scenario = self.applied_to(Scenario::of(preset))?;
+            Ok((preset.name().to_owned(), scenario))
+        };
+        match (&self.camera, self.preset) {
+            (Some(_), _) => {
+                let scenario = self.scenario()?;
+                Ok(vec![(scenario.camera.name.clone(), scenario)])
+            }
+            (None, Some(preset)) => Ok(vec![of_preset(preset)?]),
+            (None, None) => Preset::ALL.into_iter().map(of_preset).collect(),
+        }
+    }
+
+    fn applied_to(&self, mut scenario: Scenario) -> Result<Scenario, CommandError> {
         match self.reading {
             None => (),
             Some(ReadingArg::Paper) => scenario.reading = Reading::Paper,

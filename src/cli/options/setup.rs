@@ -7,7 +7,7 @@ use crate::cli::exit::CommandError;
 use clap::{Arg, ArgAction, ArgGroup, ArgMatches, Args, Command, Error, FromArgMatches};
 use starpipe::base::format::five_digits as number;
 use starpipe::camera::data_sheet::SpotForm;
-use starpipe::model::sensitivity::ScenarioError;
+use starpipe::model::sensitivity::{Scenario, ScenarioError};
 use starpipe::model::simulate::{Scene, Setup, SetupParameter};
 
 #[derive(Debug, Args)]
@@ -22,7 +22,19 @@ pub(crate) struct SetupOptions {
 impl SetupOptions {
     /// The setup that the options describe, checked.
     pub(crate) fn setup(&self) -> Result<Setup, CommandError> {
-        let scenario = self.scenario.scenario()?;
+        self.applied_to(self.scenario.scenario()?)
+    }
+
+    /// As [`setup`](Self::setup), with every built-in camera where none is chosen; each with its
+    /// name.
+    pub(crate) fn setups(&self) -> Result<Vec<(String, Setup)>, CommandError> {
+        let scenarios = self.scenario.scenarios()?.into_iter();
+        scenarios
+            .map(|(name, scenario)| Ok((name, self.applied_to(scenario)?)))
+            .collect()
+    }
+
+    fn applied_to(&self, scenario: Scenario) -> Result<Setup, CommandError> {
         let mut setup = Setup {
             scenario,
             scene: Scene::default(),

@@ -67,17 +67,14 @@ impl<'a> FrameMaker<'a> {
     ) -> Result<Self, ClutterError> {
         setup.check()?;
         let catalog = indexed.catalog();
-        let budget = Budget::checked(&setup.scenario)?;
-        let detector = Detector::new(Rule::MatchedFilter, &setup.scenario, &budget);
-        let limit_vmag = detector.vmag_at(0.5);
         let plain = Simulator::new(&setup.scenario, &setup.scene, catalog.stars())?;
-        let setup = with_clutter(kind, setup, &plain, (limit_vmag, indexed));
+        let setup = with_clutter(kind, setup, &plain, indexed)?;
         setup.check()?;
         Ok(Self {
             kind,
             simulator: Simulator::new(&setup.scenario, &setup.scene, catalog.stars())?,
+            limit_vmag: limit_vmag(&setup.scenario)?,
             scenario: setup.scenario,
-            limit_vmag,
         })
     }
 
@@ -148,15 +145,25 @@ impl<'a> FrameMaker<'a> {
     }
 }
 
+/// V magnitude at which half of the stars are detected.
+fn limit_vmag(scenario: &Scenario) -> Result<f64, ScenarioError> {
+    let budget = Budget::checked(scenario)?;
+    Ok(Detector::new(Rule::MatchedFilter, scenario, &budget).vmag_at(0.5))
+}
+
 /// `setup` with the clutter that the simulator draws itself.
 fn with_clutter(
     kind: Kind,
     setup: &Setup,
     plain: &Simulator,
-    (limit_vmag, indexed): (f64, &IndexedCatalog),
-) -> Setup {
+    indexed: &IndexedCatalog,
+) -> Result<Setup, ScenarioError> {
     /// Extinction and light of the thickest clouds, and their size as a share of the frame.
     const CLOUD: (f64, f64, f64) = (2.5, 3.0, 0.25);
+    /// Cosmic rays on a million pixels, as in an exposure of minutes on the ground or of a second in
+    /// orbit. Their charge is that of their way through the detector.
+    const COSMIC_RAYS_PER_MPX: f64 = 50.0;
+    const CM2_PER_UM2: f64 = 1e-8;
     /// Mean length of trails, in pixels: over all axes of the turn it is π/4 of the longest.
     const TRAIL_PX: f64 = 5.0;
     let mut setup = setup.clone();
@@ -174,13 +181,37 @@ fn with_clutter(
             scene.tumble_deg_s = turn_rad * DEG_PER_RAD / exposure_s;
         }
         Kind::FalseStars => {
+            let limit_vmag = limit_vmag(&setup.scenario)?;
             let stars = indexed.catalog().stars();
             let bright = stars.partition_point(|star| f64::from(star.v_mag) <= limit_vmag);
             let sphere_sq_deg = 4.0 * std::f64::consts::PI / RAD_PER_DEG.powi(2);
             let frame_sq_deg = camera.fov_x_rad() * camera.fov_y_rad() * DEG_PER_RAD.powi(2);
             scene.false_stars += bright as f64 * frame_sq_deg / sphere_sq_deg;
         }
+        Kind::Blends => setup.scenario.camera.focal_length_mm /= 2.0,
+        Kind::HotPixels => add_hot_pixels(&mut setup.scenario)?,
+        Kind::CosmicRays => {
+            let sheet = &setup.scenario.camera;
+            let pixel_cm2 = sheet.pitch_x_um * sheet.pitch_y_um * CM2_PER_UM2;
+            let px_s = 1e6 / COSMIC_RAYS_PER_MPX * setup.scenario.conditions.exposure_s;
+            scene.cosmic_rays_cm2_s += 1.0 / (pixel_cm2 * px_s);
+        }
         _ => (),
     }
-    setup
+    Ok(setup)
+}
+
+/// Adds hot pixels to the camera. Their dark current is exponentially distributed, as in the
+/// simulator, so that many are hidden by the noise and a few are saturated.
+fn add_hot_pixels(scenario: &mut Scenario) -> Result<(), ScenarioError> {
+    /// Hot pixels in a million, as in an uncooled sensor.
+    const PER_MPX: f64 = 300.0;
+    /// Mean charge of a hot pixel in an exposure, in units of a pixel's noise without stars.
+    const MEAN_CHARGE: f64 = 50.0;
+    let noise_e = Budget::checked(scenario)?.background_noise_e;
+    let exposure_s = scenario.conditions.exposure_s;
+    let made = &mut scenario.camera.imperfections;
+    made.hot_pixels_per_mpx += PER_MPX;
+    made.hot_pixel_e_s = MEAN_CHARGE * noise_e / exposure_s;
+    Ok(())
 }

@@ -42,11 +42,17 @@ pub enum Kind {
     Snow,
     /// No sky: lamps out of focus.
     Bokeh,
+    /// Half the focal length: four times the stars, of which many blend.
+    Blends,
+    /// Hot pixels, one in a few thousand.
+    HotPixels,
+    /// Cosmic rays.
+    CosmicRays,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 21] = [
         Self::Clean,
         Self::Foliage,
         Self::Edges,
@@ -56,6 +62,9 @@ impl Kind {
         Self::FalseStars,
         Self::BlackLevel,
         Self::Jpeg,
+        Self::Blends,
+        Self::HotPixels,
+        Self::CosmicRays,
         Self::Noise,
         Self::ColouredNoise,
         Self::Dots,
@@ -88,6 +97,9 @@ impl Kind {
             Self::Windows => "windows",
             Self::Snow => "snow",
             Self::Bokeh => "bokeh",
+            Self::Blends => "blends",
+            Self::HotPixels => "hot-pixels",
+            Self::CosmicRays => "cosmic-rays",
         }
     }
 

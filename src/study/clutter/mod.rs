@@ -79,5 +79,5 @@ pub fn run(
         .into_par_iter()
         .map_init(Workspace::new, result)
         .collect();
-    Ok(KindResult::new(kind, &results?, asked_per_mpx))
+    Ok(KindResult::new(kind, &results?, &protocol.setup.scenario))
 }

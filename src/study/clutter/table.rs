@@ -3,12 +3,15 @@
 use super::evaluation::FrameResult;
 use super::kind::Kind;
 use crate::base::format::{to_decimals, to_significant};
+use crate::model::sensitivity::Scenario;
 use crate::study::robustness::{Answer, Interval};
 use serde::Serialize;
 
 /// The results of all frames of a kind.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KindResult {
+    /// The camera's name.
+    pub camera: String,
     /// The kind.
     pub kind: Kind,
     /// Whether it shows the sky. Where it does not, every identification is wrong.
@@ -42,9 +45,8 @@ pub struct KindResult {
 }
 
 impl KindResult {
-    /// The results of the frames of a kind, which were processed with this rate of false
-    /// detections.
-    pub fn new(kind: Kind, results: &[FrameResult], asked_per_mpx: f64) -> Self {
+    /// The results of the frames of a kind in a study of `scenario`.
+    pub fn new(kind: Kind, results: &[FrameResult], scenario: &Scenario) -> Self {
         let count = |answer| {
             results
                 .iter()
@@ -59,6 +61,7 @@ impl KindResult {
         let share = Interval::of(misnamed, named);
         let percent = |share: f64| to_significant(100.0 * share, 4);
         Self {
+            camera: scenario.camera.name.clone(),
             kind,
             is_sky: kind.is_sky(),
             frames: results.len(),
@@ -68,7 +71,7 @@ impl KindResult {
             detected: sum(|r| r.detected),
             false_detections,
             false_per_mpx: to_significant(false_detections as f64 / megapixels, 4),
-            asked_per_mpx,
+            asked_per_mpx: scenario.conditions.false_alarms_per_mpx,
             named,
             misnamed,
             misnamed_low_percent: percent(share.low),
@@ -149,6 +152,7 @@ fn names(named: usize, misnamed: usize, stated: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::data_sheet::Preset;
 
     fn result(answer: Answer, named: usize, misnamed: usize) -> FrameResult {
         FrameResult {
@@ -169,7 +173,7 @@ mod tests {
             result(Answer::Wrong, 10, 10),
             result(Answer::None, 0, 0),
         ];
-        let row = KindResult::new(Kind::Foliage, &results, 0.1);
+        let row = KindResult::new(Kind::Foliage, &results, &Scenario::of(Preset::Imx174));
         assert_eq!((row.frames, row.right, row.wrong), (3, 1, 1));
         assert_eq!((row.named, row.misnamed), (30, 11));
         assert_eq!(row.stated_misnamed, 0.75);
