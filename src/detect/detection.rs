@@ -19,7 +19,8 @@ pub struct Detection {
     pub peak_adu: f64,
     /// Flux over its noise: that of the background and, where the frame's bright stars allow to
     /// measure it, the shot noise of the star. The error of the spot model is not included (it
-    /// would limit this to about 30); it is included in the standard errors of the centroid.
+    /// would limit this to about 30), unless the star is saturated; it is included in the standard
+    /// errors of the centroid.
     pub snr: f64,
     /// What is unusual about it.
     pub flags: DetectionFlags,

@@ -231,7 +231,8 @@ impl Measurement<'_> {
         fit.converged.then(|| fit.spots[0])
     }
 
-    /// Fits the spots at a peak: a single saturated one with a size of its own.
+    /// Fits the spots at a peak: a single saturated one with a size of its own, as of its light
+    /// only the wings are left.
     fn fit_spots(
         &self,
         start: &SpotGroup,
@@ -245,11 +246,31 @@ impl Measurement<'_> {
         } else {
             buffers.fit_fixed_size(&self.maps, start, beyond, self.noise)
         };
-        let FitBuffers { fitter, window, .. } = buffers;
-        if fit.spots[0].has_position(fit.spot_px) {
+        if peak.saturated {
+            self.judge_saturated(&mut fit);
+        } else if fit.spots[0].has_position(fit.spot_px) {
+            let FitBuffers { fitter, window, .. } = buffers;
             fitter.set_flux_noise(window, &mut fit, &self.fit_config());
         }
         fit
+    }
+
+    /// Raises the errors of a saturated star to what its residuals tell: the form of the wings is
+    /// not measured on the other stars. Nothing is left of a fit to what is too sharp for a star:
+    /// what was fitted are a few dark pixels around the core, and the flux is a guess.
+    fn judge_saturated(&self, fit: &mut Fit) {
+        /// Smallest size of a star over that of the others: optics and focus change over the frame.
+        const MIN_RELATIVE_SIZE: f64 = 0.6;
+        fit.converged &= fit.spot_px >= MIN_RELATIVE_SIZE * self.maps.spot_px;
+        let excess = fit.chi2 / fit.degrees_of_freedom.max(1.0);
+        let factor = excess.max(1.0).sqrt();
+        for spot in &mut fit.spots {
+            for sigma in [&mut spot.sigma_x, &mut spot.sigma_y, &mut spot.sigma_flux] {
+                *sigma *= factor;
+            }
+            // The flux is extrapolated: noise is the least of its error.
+            spot.noise_flux = spot.sigma_flux;
+        }
     }
 
     /// Takes the centre of light for a long star, or an elongated one where the fit is elsewhere: a
