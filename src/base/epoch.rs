@@ -16,6 +16,8 @@ pub const YEARS: RangeInclusive<i16> = 1850..=2100;
 
 /// The epoch J2000.0.
 const J2000: DateTime = jiff::civil::datetime(2000, 1, 1, 12, 0, 0, 0);
+/// Where Modified Julian Dates begin.
+const MJD_ZERO: DateTime = jiff::civil::datetime(1858, 11, 17, 0, 0, 0, 0);
 /// The time assumed where only the day is known.
 const MIDDAY: Time = jiff::civil::time(12, 0, 0, 0);
 const SECONDS_PER_JULIAN_YEAR: f64 = 365.25 * 86_400.0;
@@ -81,10 +83,58 @@ impl ObservationDate {
         (YEARS.contains(&year) && alone).then_some(Self { day, time })
     }
 
+    /// The date of a day, and of the time since its midnight if that is known; `None` outside
+    /// [`YEARS`].
+    pub(crate) fn of_day(day: Date, time: Option<SignedDuration>) -> Option<Self> {
+        let utc = day
+            .to_datetime(Time::midnight())
+            .checked_add(time.unwrap_or_default());
+        let utc = utc.ok().filter(|utc| YEARS.contains(&utc.year()))?;
+        Some(Self {
+            day: utc.date(),
+            time: time.map(|_| utc.time()),
+        })
+    }
+
+    /// The date `duration` earlier, if the time is known; `None` outside [`YEARS`].
+    pub(crate) fn earlier_by(self, duration: SignedDuration) -> Option<Self> {
+        if self.time.is_none() {
+            return Some(self);
+        }
+        let utc = self.utc().checked_sub(duration).ok()?;
+        YEARS.contains(&utc.year()).then_some(Self {
+            day: utc.date(),
+            time: Some(utc.time()),
+        })
+    }
+
+    /// The day in UTC.
+    pub(crate) fn day(&self) -> Date {
+        self.day
+    }
+
+    /// The same day without the time.
+    pub(crate) fn without_time(self) -> Self {
+        Self { time: None, ..self }
+    }
+
+    /// Modified Julian Date of the midnight at which the day begins.
+    pub(crate) fn modified_julian_day(&self) -> i32 {
+        let since = self
+            .day
+            .to_datetime(Time::midnight())
+            .duration_since(MJD_ZERO);
+        (since.as_hours() / 24) as i32
+    }
+
+    /// The time from `other` to this date; midday is assumed where the time is not known.
+    pub(crate) fn since(&self, other: &Self) -> SignedDuration {
+        self.utc().duration_since(other.utc())
+    }
+
     /// The date of a Modified Julian Date, in days since 1858-11-17 00:00 UTC; `None` outside
     /// [`YEARS`].
     pub fn from_modified_julian_date(days: f64) -> Option<Self> {
-        const MJD_ZERO: DateTime = jiff::civil::datetime(1858, 11, 17, 0, 0, 0, 0);
         const SECONDS_PER_DAY: f64 = 86_400.0;
         let since = SignedDuration::try_from_secs_f64((days * SECONDS_PER_DAY).round()).ok()?;
         let utc = MJD_ZERO.checked_add(since).ok()?;

@@ -30,6 +30,47 @@ pub struct FrameMetadata {
     pub choice: Option<ImageChoice>,
     /// Values outside their plausible range. They are not used.
     pub ignored: Vec<IgnoredValue>,
+    /// What the file leaves open, and how it was read.
+    pub assumed: Vec<Assumption>,
+}
+
+/// What a file leaves open, and how it was read. `Display` gives the sentence.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Assumption {
+    /// Four planes were read as red, green, blue and a fourth that is not used.
+    FourPlanes,
+    /// Day and month of a date may be exchanged; the day was taken to come first.
+    DayFirst {
+        /// The keyword.
+        keyword: String,
+        /// The text found there.
+        found: String,
+    },
+}
+
+impl Assumption {
+    /// Code for programs.
+    pub const fn code(&self) -> &'static str {
+        match self {
+            Self::FourPlanes => "four_planes",
+            Self::DayFirst { .. } => "day_before_month",
+        }
+    }
+}
+
+impl fmt::Display for Assumption {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::FourPlanes => f.write_str(
+                "four planes were read as red, green, blue and one that is not used; a page chooses one of them",
+            ),
+            Self::DayFirst { keyword, found } => write!(
+                f,
+                "{keyword} may be read in two ways: found {found}, read as day, month, year"
+            ),
+        }
+    }
 }
 
 /// The image that was read of a file whose first image is smaller, such as a preview.
@@ -172,6 +213,15 @@ impl FrameMetadata {
         text: &str,
         place: Option<(f64, f64, f64)>,
     ) -> Option<Site> {
+        if place.is_some_and(|(lat, lon, _)| lat == 0.0 && lon == 0.0) {
+            // A point in the Gulf of Guinea, and what programs write where no site is set.
+            self.ignore(
+                keywords,
+                text,
+                "a site, and not that at 0, 0, which means that none is set",
+            );
+            return None;
+        }
         let site = place.and_then(|(lat, lon, height)| Site::new(lat, lon, height).ok());
         if site.is_none() {
             self.ignore(

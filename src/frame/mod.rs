@@ -60,7 +60,7 @@ pub use image::{Frame, check_size};
 pub use levels::{LUMINANCE_WEIGHTS, WholeNumber};
 pub use limits::{MAX_PAGES, MAX_PIXELS, MIN_SIDE_PX};
 pub use memory::MemoryLimit;
-pub use metadata::{FrameMetadata, IgnoredValue, ImageChoice};
+pub use metadata::{Assumption, FrameMetadata, IgnoredValue, ImageChoice};
 pub use orientation::Orientation;
 pub use pages::Pages;
 pub use pixels::Pixels;

@@ -7,7 +7,7 @@ use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;
 use crate::detect::{MeasuredPsf, NoiseTail, Wings};
-use crate::frame::{FrameMetadata, IgnoredValue, ImageChoice, Orientation};
+use crate::frame::{Assumption, FrameMetadata, IgnoredValue, ImageChoice, Orientation};
 use crate::identify::{Identification, Priors, ScalePrior, ScaleSource};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::{Comparison, Contradiction, StatedCamera};
@@ -33,6 +33,8 @@ pub enum Note {
     LargestImage(ImageChoice),
     /// The picture is turned or mirrored from the rows of its file.
     Orientation(Orientation),
+    /// The file leaves something open.
+    Assumed(Assumption),
     /// The scale in the header is not that of the frame.
     WrongHeaderScale {
         /// Smallest and largest pixel scale that the header allows, in radians.
@@ -90,6 +92,7 @@ impl Note {
             Self::IgnoredHeader(_) => "header_value_ignored",
             Self::LargestImage(_) => "largest_image",
             Self::Orientation(_) => "orientation",
+            Self::Assumed(assumption) => assumption.code(),
             Self::WrongHeaderScale { .. } => "header_scale_wrong",
             Self::BelowHorizon { .. } => "below_horizon",
             Self::NoTimeOfDay => "time_of_day_unknown",
@@ -114,10 +117,12 @@ impl Note {
         let choice = metadata.choice.clone().map(Self::LargestImage);
         let orientation = Some(metadata.orientation).filter(|turn| !turn.is_upright());
         let ignored = metadata.ignored.iter().cloned();
+        let assumed = metadata.assumed.iter().cloned();
         choice
             .into_iter()
             .chain(orientation.map(Self::Orientation))
             .chain(ignored.map(Self::IgnoredHeader))
+            .chain(assumed.map(Self::Assumed))
     }
 
     /// A scale from the header that had to be dropped, where it is not the true one.
@@ -231,6 +236,7 @@ impl fmt::Display for Note {
                 "the picture is {orientation} from the rows of the file (Orientation {}); x and y are those of the picture as drawn",
                 orientation.tag()
             ),
+            Self::Assumed(assumption) => assumption.fmt(f),
             Self::WrongHeaderScale {
                 pixel_scale_rad: (low_rad, high_rad),
             } => write!(

@@ -85,11 +85,6 @@ impl<'a> Header<'a> {
         (!text.is_empty()).then_some(text)
     }
 
-    /// The value as a number, with or without quotation marks.
-    pub fn number(&self, keyword: &str) -> Option<f64> {
-        parse_number(&self.text(keyword)?)
-    }
-
     /// Whether the value is `T`.
     pub fn is_true(&self, keyword: &str) -> bool {
         self.text(keyword).as_deref() == Some("T")
@@ -143,7 +138,7 @@ impl<'a> Header<'a> {
 }
 
 /// Parses a FITS number, with E or D before the exponent.
-fn parse_number(text: &str) -> Option<f64> {
+pub(super) fn parse_number(text: &str) -> Option<f64> {
     text.replace(['D', 'd'], "E").parse().ok()
 }
 
@@ -201,11 +196,11 @@ mod tests {
             header.text("OBJECT").unwrap(),
             "Barnard's star / no comment"
         );
-        assert_eq!(header.number("EXPTIME"), Some(12.5));
+        assert_eq!(header.finite("EXPTIME").unwrap(), Some(12.5));
         assert_eq!(header.text("EMPTY"), None);
         assert_eq!(header.text("NOVALUE"), None);
         assert_eq!(header.required("NAXIS", "axes").unwrap(), 2);
-        assert_eq!(header.number("QUOTED"), Some(7.5));
+        assert_eq!(header.finite("QUOTED").unwrap(), Some(7.5));
         assert_eq!(header.text("OPEN").unwrap(), "never closed");
         assert_eq!(header.text("ABSENT"), None);
     }

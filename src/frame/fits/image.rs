@@ -1,12 +1,11 @@
 //! Decodes one image of a header-data unit.
 
 use super::error::{truncated, unsupported};
+use super::layout::Layout;
 use super::tiles;
 use super::unit::{StoredType, Unit};
 use crate::frame::account::Account;
-use crate::frame::levels::{
-    Samples, WholeNumber, frame_from_floats, frame_from_integers, interleaved,
-};
+use crate::frame::levels::{Samples, WholeNumber, frame_from_floats, frame_from_integers};
 use crate::frame::{Frame, FrameError, check_size};
 
 /// Decoded values of a tile, which may be the whole image.
@@ -14,10 +13,7 @@ const TILE_BYTES_PER_PIXEL: usize = 8;
 
 /// Location and scaling of one image in a file.
 pub(super) struct Image {
-    width: usize,
-    height: usize,
-    /// 1, or 3 for colour.
-    channels: usize,
+    layout: Layout,
     /// Its plane in the header-data unit, from 0.
     plane: usize,
     stored: StoredType,
@@ -28,16 +24,31 @@ pub(super) struct Image {
 }
 
 impl Image {
-    /// The image `plane` of `unit`. A cube has several planes, and one must be chosen.
-    pub fn new(unit: &Unit, plane: Option<usize>, account: &Account) -> Result<Self, FrameError> {
-        if plane.is_none() && unit.pages() > 1 {
-            let found = format!("a cube of {} planes", unit.planes());
-            let expected = "one plane, three of colour, or a page that says which";
+    /// The image `plane` of `unit`, which has this layout. A cube has several planes, and one must be
+    /// chosen.
+    pub fn new(
+        (unit, layout): (&Unit, Layout),
+        plane: Option<usize>,
+        account: &Account,
+    ) -> Result<Self, FrameError> {
+        if plane.is_none() && layout.is_cube() {
+            let axes: Vec<String> = unit.axes.iter().map(usize::to_string).collect();
+            let found = format!("a cube of {} planes ({})", layout.pages, axes.join(" x "));
+            let expected = "one plane, three or four of colour, or a page that says which";
             return Err(unsupported(found, expected));
         }
-        let (width, height) = (unit.axes[0], unit.axes[1]);
+        let layout = if plane.is_some() && layout.pages > 1 {
+            layout.plane()
+        } else {
+            layout
+        };
+        let Layout {
+            width,
+            height,
+            channels,
+            ..
+        } = layout;
         check_size(width, height)?;
-        let channels = if unit.is_colour() { 3 } else { 1 };
         let tiles = if unit.is_compressed_image() {
             TILE_BYTES_PER_PIXEL
         } else {
@@ -50,18 +61,12 @@ impl Image {
             return Err(unit.header.invalid("BSCALE", "a number other than 0"));
         }
         Ok(Self {
-            width,
-            height,
-            channels,
+            layout,
             plane: plane.unwrap_or(0),
             stored: unit.stored,
             scale,
             zero: unit.header.number_or("BZERO", 0.0)?,
-            blank: if unit.stored.is_float() {
-                None
-            } else {
-                unit.blank()?
-            },
+            blank: unit.blank().filter(|_| !unit.stored.is_float()),
         })
     }
 
@@ -72,18 +77,17 @@ impl Image {
         bytes: &[u8],
         account: &Account,
     ) -> Result<Frame<'static>, FrameError> {
-        let pixels = self.width * self.height * self.channels;
+        let values = self.layout.values();
+        let first = values.saturating_mul(self.plane);
         if unit.is_compressed_image() {
-            let first = self.plane.saturating_mul(self.width * self.height);
-            let range = first..first.saturating_add(pixels);
+            let range = first..first.saturating_add(values);
             return self.frame_of(&tiles::unpack(unit, bytes, range, account)?);
         }
-        let plane_bytes = self.width * self.height * self.stored.bytes();
-        let before = plane_bytes.saturating_mul(self.plane);
+        let before = first.saturating_mul(self.stored.bytes());
         let start = unit.data.saturating_add(before);
-        let end = start.saturating_add(pixels * self.stored.bytes());
+        let end = start.saturating_add(values * self.stored.bytes());
         let data = bytes.get(start..end).ok_or_else(|| {
-            let Self { width, height, .. } = self;
+            let Layout { width, height, .. } = self.layout;
             let detail = format!("the image of {width} x {height} pixels ends at byte {end}");
             truncated(bytes.len(), detail)
         })?;
@@ -117,7 +121,7 @@ impl Image {
             StoredType::U8 => self.scaled(data, |[b]: [u8; 1]| i64::from(b)),
             StoredType::I16 => self.scaled(data, |b| i64::from(i16::from_be_bytes(b))),
             StoredType::I32 => self.scaled(data, |b| i64::from(i32::from_be_bytes(b))),
-            StoredType::I64 => self.scaled(data, i64::from_be_bytes),
+            StoredType::I64 => self.long_integers(data),
             StoredType::F32 => self.floats(data, |b| f64::from(f32::from_be_bytes(b))),
             StoredType::F64 => self.floats(data, f64::from_be_bytes),
         }
@@ -130,12 +134,19 @@ impl Image {
         level: impl Fn([u8; N]) -> T,
         full_scale: T,
     ) -> Result<Frame<'static>, FrameError> {
-        let values = self.interleaved(data.as_chunks().0.iter().map(|b| level(*b)).collect());
+        let Layout {
+            width,
+            height,
+            channels,
+            ..
+        } = self.layout;
+        let levels = data.as_chunks().0.iter().map(|b| level(*b));
+        let values = self.layout.interleaved(levels.collect());
         let samples = Samples {
-            width: self.width,
-            height: self.height,
+            width,
+            height,
             values: &values,
-            channels: self.channels,
+            channels,
         };
         let frame = frame_from_integers(&samples, full_scale)?;
         let Some(blank) = self.blank else {
@@ -143,13 +154,12 @@ impl Image {
         };
         let blank = blank.saturating_add(self.zero as i64);
         let mut pixels = frame.values().into_owned();
-        for (pixel, levels) in pixels.iter_mut().zip(values.chunks_exact(self.channels)) {
+        for (pixel, levels) in pixels.iter_mut().zip(values.chunks_exact(channels)) {
             if levels.iter().any(|level| (*level).into() == blank) {
                 *pixel = f32::NAN;
             }
         }
-        Ok(Frame::new(self.width, self.height, pixels)?
-            .with_levels(frame.step_adu, frame.saturation_adu))
+        Ok(Frame::new(width, height, pixels)?.with_levels(frame.step_adu, frame.saturation_adu))
     }
 
     /// Decodes integers with a scale and an offset.
@@ -166,6 +176,23 @@ impl Image {
         Ok(frame.with_levels(self.scale.abs() as f32, None))
     }
 
+    /// Decodes integers of 64 bits with a scale and an offset.
+    fn long_integers(&self, data: &[u8]) -> Result<Frame<'static>, FrameError> {
+        const HALF: i64 = 1 << 32;
+        let level = |bytes: &[u8; 8]| {
+            let stored = i64::from_be_bytes(*bytes);
+            if Some(stored) == self.blank {
+                return f32::NAN;
+            }
+            // Each half is exact as a float. The upper one comes first: an offset of 2⁶³, which makes
+            // the integers unsigned, leaves a small number to which the lower one is added.
+            let (upper, lower) = ((stored / HALF * HALF) as f64, (stored % HALF) as f64);
+            ((self.zero + self.scale * upper) + self.scale * lower) as f32
+        };
+        let frame = self.frame_of_levels(data.as_chunks().0.iter().map(level).collect())?;
+        Ok(frame.with_levels(self.scale.abs() as f32, None))
+    }
+
     /// Decodes values with a scale and an offset.
     fn floats<const N: usize>(
         &self,
@@ -173,15 +200,16 @@ impl Image {
         value: impl Fn([u8; N]) -> f64,
     ) -> Result<Frame<'static>, FrameError> {
         let level = |bytes: &[u8; N]| (self.zero + self.scale * value(*bytes)) as f32;
-        let values = self.interleaved(data.as_chunks().0.iter().map(level).collect());
-        frame_from_floats((self.width, self.height), self.channels, values)
+        self.frame_of_levels(data.as_chunks().0.iter().map(level).collect())
     }
 
-    /// The values of all channels, interleaved.
-    fn interleaved<T: Copy>(&self, values: Vec<T>) -> Vec<T> {
-        match self.channels {
-            1 => values,
-            channels => interleaved(&values, channels),
-        }
+    fn frame_of_levels(&self, levels: Vec<f32>) -> Result<Frame<'static>, FrameError> {
+        let Layout {
+            width,
+            height,
+            channels,
+            ..
+        } = self.layout;
+        frame_from_floats((width, height), channels, self.layout.interleaved(levels))
     }
 }

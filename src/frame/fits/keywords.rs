@@ -1,13 +1,11 @@
 //! Metadata from FITS headers, in the keywords that programs use in practice.
 //!
-//! - Date: DATE-OBS, if necessary with the time in TIME-OBS, UT, UTC or UTSTART; else DATE-AVG,
-//!   DATE-BEG, DATE-END, MJD-OBS, MJD-AVG or MJD-BEG. The moment within the exposure does not
-//!   matter for star positions.
-//! - Exposure: EXPTIME, EXPOSURE or EXP_TIME, in seconds.
+//! - Date: DATE-OBS and its kin, times of day, Julian Dates ([`dates`](super::dates)).
+//! - Exposure: EXPTIME, EXPOSURE, EXP-TIME or XPOSURE, in seconds, or EXPOINUS, in microseconds.
 //! - Pixel size in micrometres: XPIXSZ, which includes the binning; else PIXSIZE1 or PIXSIZE, which
 //!   do not and are multiplied by XBINNING.
 //! - Focal length: FOCALLEN, FOCAL or FOCLEN, in millimetres.
-//! - Site: SITELAT and SITELONG (height SITEELEV), LAT-OBS and LONG-OBS (ALT-OBS), or OBSGEO-B and
+//! - Site: SITELAT and SITELONG or SITELON (height SITEELEV), LAT-OBS and LONG-OBS (ALT-OBS), or OBSGEO-B and
 //!   OBSGEO-L (OBSGEO-H). Angles in degrees, decimal or sexagesimal, north and east positive;
 //!   heights in metres.
 //! - Order of the rows: ROWORDER, `TOP-DOWN` or `BOTTOM-UP`. Without it an image is bottom-up, as FITS
@@ -16,11 +14,12 @@
 //!   many programs write the highest value of the image there.
 //! - Zenith distance: CENTALT or OBJCTALT, the altitude in degrees.
 //!
+//! In keywords with a dash an underscore may stand for it: DATE_OBS.
+//!
 //! The pointing of the mount (OBJCTRA, RA, CRVAL1) is not used.
 
-use super::header::Header;
+use super::header::{Header, parse_number};
 use crate::base::angle::Angle;
-use crate::base::epoch::ObservationDate;
 use crate::frame::metadata::{
     ALTITUDE, EXPOSURE, FOCAL_LENGTH, FrameMetadata, HeaderNumber, PIXEL_SIZE,
 };
@@ -32,11 +31,7 @@ pub(super) fn metadata<'a>(headers: impl Iterator<Item = &'a Header<'a>>) -> Fra
     let keywords = Keywords(headers.collect());
     let mut metadata = FrameMetadata::default();
     metadata.row_order = keywords.row_order(&mut metadata);
-    metadata.exposure_s = keywords.number(
-        &mut metadata,
-        &EXPOSURE,
-        &["EXPTIME", "EXPOSURE", "EXP_TIME"],
-    );
+    metadata.exposure_s = keywords.exposure_s(&mut metadata);
     metadata.focal_length_mm = keywords.number(
         &mut metadata,
         &FOCAL_LENGTH,
@@ -61,7 +56,7 @@ pub(super) fn saturation<'a>(
     headers: impl Iterator<Item = &'a Header<'a>>,
 ) -> Option<StatedSaturation> {
     let keywords = Keywords(headers.collect());
-    let number = |keyword| keywords.0.iter().find_map(|header| header.number(keyword));
+    let number = |keyword| keywords.number_of(keyword);
     let stated = |keyword, level_adu| StatedSaturation { keyword, level_adu };
     let saturate = number("SATURATE").map(|level| stated("SATURATE", level));
     let is_full_scale = |level: &f64| {
@@ -88,7 +83,7 @@ impl StatedSaturation {
     }
 }
 
-struct Keywords<'a>(Vec<&'a Header<'a>>);
+pub(super) struct Keywords<'a>(Vec<&'a Header<'a>>);
 
 impl Keywords<'_> {
     fn row_order(&self, metadata: &mut FrameMetadata) -> RowOrder {
@@ -102,9 +97,19 @@ impl Keywords<'_> {
         })
     }
 
-    fn text(&self, keyword: &str) -> Option<String> {
-        let found = self.0.iter().find_map(|header| header.text(keyword));
+    /// The value of `keyword`, which may be written with underscores instead of dashes.
+    pub(super) fn text(&self, keyword: &str) -> Option<String> {
+        let of = |keyword: &str| self.0.iter().find_map(|header| header.text(keyword));
+        let found = of(keyword).or_else(|| {
+            let has_dash = keyword.contains('-');
+            has_dash.then(|| of(&keyword.replace('-', "_")))?
+        });
         found.map(|text| text.into_owned())
+    }
+
+    /// The value as a number.
+    pub(super) fn number_of(&self, keyword: &str) -> Option<f64> {
+        parse_number(&self.text(keyword)?)
     }
 
     /// The first plausible value among `keywords`.
@@ -116,8 +121,19 @@ impl Keywords<'_> {
     ) -> Option<f64> {
         keywords.iter().find_map(|keyword| {
             let text = self.text(keyword)?;
-            let value = self.0.iter().find_map(|header| header.number(keyword));
-            metadata.plausible(number, keyword, &text, value)
+            metadata.plausible(number, keyword, &text, parse_number(&text))
+        })
+    }
+
+    fn exposure_s(&self, metadata: &mut FrameMetadata) -> Option<f64> {
+        const SECONDS: [&str; 4] = ["EXPTIME", "EXPOSURE", "EXP-TIME", "XPOSURE"];
+        /// Written by capture programs of ZWO.
+        const MICROSECONDS: &str = "EXPOINUS";
+        let seconds = self.number(metadata, &EXPOSURE, &SECONDS);
+        seconds.or_else(|| {
+            let text = self.text(MICROSECONDS)?;
+            let value = parse_number(&text).map(|microseconds| microseconds / 1e6);
+            metadata.plausible(&EXPOSURE, MICROSECONDS, &text, value)
         })
     }
 
@@ -125,7 +141,7 @@ impl Keywords<'_> {
         let as_stored = self.number(metadata, &PIXEL_SIZE, &["XPIXSZ"]);
         as_stored.or_else(|| {
             let unbinned = self.number(metadata, &PIXEL_SIZE, &["PIXSIZE1", "PIXSIZE"])?;
-            let binning = self.0.iter().find_map(|header| header.number("XBINNING"));
+            let binning = self.number_of("XBINNING");
             Some(unbinned * binning.filter(|b| (1.0..=64.0).contains(b)).unwrap_or(1.0))
         })
     }
@@ -133,6 +149,7 @@ impl Keywords<'_> {
     fn site(&self, metadata: &mut FrameMetadata) -> Option<Site> {
         [
             ("SITELAT", "SITELONG", "SITEELEV"),
+            ("SITELAT", "SITELON", "SITEELEV"),
             ("LAT-OBS", "LONG-OBS", "ALT-OBS"),
             ("OBSGEO-B", "OBSGEO-L", "OBSGEO-H"),
         ]
@@ -140,47 +157,11 @@ impl Keywords<'_> {
         .find_map(|(lat, lon, height)| {
             let texts = self.text(lat).zip(self.text(lon))?;
             let degrees = |text: &str| Angle::parse(text)?.in_degrees();
-            let height_m = self.0.iter().find_map(|header| header.number(height));
+            let height_m = self.number_of(height);
             let place = degrees(&texts.0).zip(degrees(&texts.1));
             let place = place.map(|(lat_deg, lon_deg)| (lat_deg, lon_deg, height_m.unwrap_or(0.0)));
             let (keywords, text) = (format!("{lat}, {lon}"), format!("{}, {}", texts.0, texts.1));
             metadata.plausible_site(&keywords, &text, place)
         })
-    }
-
-    fn date(&self, metadata: &mut FrameMetadata) -> Option<ObservationDate> {
-        let calendar = ["DATE-OBS", "DATE-AVG", "DATE-BEG", "DATE-END"];
-        let from_calendar = calendar.iter().find_map(|keyword| {
-            let text = self.text(keyword)?;
-            let date = self.calendar_date(&text);
-            metadata.plausible_date(keyword, &text, date)
-        });
-        from_calendar.or_else(|| {
-            ["MJD-OBS", "MJD-AVG", "MJD-BEG"]
-                .iter()
-                .find_map(|keyword| {
-                    let text = self.text(keyword)?;
-                    let days = self.0.iter().find_map(|header| header.number(keyword));
-                    let date = days.and_then(ObservationDate::from_modified_julian_date);
-                    metadata.plausible_date(keyword, &text, date)
-                })
-        })
-    }
-
-    /// Parses ISO 8601, or DD/MM/YY as in FITS until 1999.
-    fn calendar_date(&self, text: &str) -> Option<ObservationDate> {
-        let day = match text.split('/').collect::<Vec<_>>()[..] {
-            [day, month, year] if year.len() == 2 => format!("19{year}-{month}-{day}"),
-            _ => text.to_owned(),
-        };
-        if day.contains('T') {
-            return day.parse().ok();
-        }
-        let times = ["TIME-OBS", "UT", "UTC", "UTSTART"];
-        let with_time = times.iter().find_map(|keyword| {
-            let time = self.text(keyword)?;
-            format!("{day}T{time}").parse().ok()
-        });
-        with_time.or_else(|| day.parse().ok())
     }
 }

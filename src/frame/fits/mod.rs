@@ -1,12 +1,13 @@
 //! FITS: images of any BITPIX in the primary header-data unit or an extension, in one plane or in
-//! three of colour.
+//! colour, whichever axis the colours are on ([`layout`]). Of several images the largest is read if
+//! none is chosen ([`choice`]).
 //!
 //! Levels are BZERO + BSCALE × stored value. Integers that BZERO turns into unsigned ones (32768,
-//! and its equivalents for 8 and 32 bits) are exact and saturate at the largest value. Other scaled
-//! integers have a step of BSCALE and no saturation. A header may state the saturation level
-//! ([`keywords`]). BLANK and NaN mark pixels without a value. Images compressed tile by tile
-//! (ZIMAGE) are read as if they were not compressed ([`tiles`]). Rows are stored bottom-up unless
-//! ROWORDER is TOP-DOWN.
+//! and its equivalents for 8 and 32 bits) are exact and saturate at the largest value. Those of 64
+//! bits are exact, too. Other scaled integers have a step of BSCALE and no saturation. A header may
+//! state the saturation level ([`keywords`]). BLANK and NaN mark pixels without a value; a BLANK that
+//! no pixel can have is ignored. Images compressed tile by tile (ZIMAGE) are read as if they were not
+//! compressed ([`tiles`]). Rows are stored bottom-up unless ROWORDER is TOP-DOWN.
 //!
 //! This is a reader of our own. Of the crates under a permissive licence, `fitsrs` 0.4.1 and
 //! `fitsio-pure` 0.25.0 both panic on some damaged headers, and `fitsrs` returns the beginning of a
@@ -15,12 +16,17 @@
 //! # Reference
 //! FITS Standard 4.0 (2018), sections 3 to 5 and 7.1.
 
+mod calendar;
 mod cards;
+mod choice;
+mod dates;
 mod error;
 mod header;
 mod image;
 mod keywords;
+mod layout;
 mod tiles;
+mod time_scale;
 mod unit;
 mod write;
 
@@ -29,13 +35,15 @@ pub use write::{FitsSamples, FitsWriteError, write_fits};
 
 use super::account::Account;
 use super::error::FrameError;
-use super::format::FrameFormat;
 use super::image::Frame;
+use choice::Choice;
+use header::Header;
 use image::Image;
 use std::num::NonZeroUsize;
 use unit::Units;
 
-/// Decodes image `page` of a FITS file, counted from 1; without `page`, the first.
+/// Decodes image `page` of a FITS file, counted from 1; without `page`, the largest, and of several
+/// of that size the first.
 /// # Errors
 /// As [`super::reader::decode_page`].
 pub(super) fn decode(
@@ -43,39 +51,26 @@ pub(super) fn decode(
     page: Option<NonZeroUsize>,
     account: &Account,
 ) -> Result<Frame<'static>, FrameError> {
-    let (mut pages, mut tables) = (0, 0);
-    let mut units = Units::new(bytes);
+    let Choice {
+        unit,
+        layout,
+        plane,
+        image: choice,
+        assumed,
+    } = Choice::of(bytes, page, account)?;
+    let image = Image::new((&unit, layout), plane, account)?;
     // The primary header holds the keywords that are common to all units.
-    let mut primary = None;
-    while let Some(unit) = units.next()? {
-        account.check_time()?;
-        let plane = page.map_or(0, |page| page.get() - 1 - pages);
-        if plane < unit.pages() {
-            let image = Image::new(&unit, page.map(|_| plane), account)?;
-            let headers = [Some(&unit.header), primary.as_ref()];
-            let mut metadata = keywords::metadata(headers.into_iter().flatten());
-            let stated = keywords::saturation(headers.into_iter().flatten());
-            let mut frame = image.frame(&unit, bytes, account)?;
-            if let Some(stated) = stated {
-                stated.apply(&mut frame, &mut metadata);
-            }
-            return Ok(frame.with_metadata(metadata).upright());
-        }
-        pages += unit.pages();
-        tables += usize::from(unit.is_table());
-        primary.get_or_insert(unit.header);
+    let (primary, _) = Header::parse(bytes, 0)?;
+    let headers = [&unit.header, &primary];
+    let mut metadata = keywords::metadata(headers.into_iter());
+    metadata.ignored.extend(unit.ignored_blanks());
+    metadata.choice = choice;
+    metadata.assumed.extend(assumed);
+    let mut frame = image.frame(&unit, bytes, account)?;
+    if let Some(stated) = keywords::saturation(headers.into_iter()) {
+        stated.apply(&mut frame, &mut metadata);
     }
-    match page {
-        Some(page) if pages > 0 => Err(FrameError::NoSuchPage { page, pages }),
-        _ => Err(FrameError::Unsupported {
-            format: FrameFormat::Fits,
-            found: format!(
-                "no image in it, and {tables} table{}",
-                if tables == 1 { "" } else { "s" }
-            ),
-            expected: "an image of two axes in the primary header-data unit or an extension",
-        }),
-    }
+    Ok(frame.with_metadata(metadata).upright())
 }
 
 /// The number of images in a FITS file, and why there may be more that cannot be found.

@@ -2,7 +2,9 @@
 
 use super::error::truncated;
 use super::header::{BLOCK_BYTES, Header};
-use crate::frame::FrameError;
+use super::layout::Layout;
+use crate::frame::{FrameError, IgnoredValue};
+use std::ops::RangeInclusive;
 
 /// Iterates over the header-data units of a file.
 pub(super) struct Units<'a> {
@@ -83,6 +85,16 @@ impl StoredType {
     pub fn is_float(self) -> bool {
         matches!(self, Self::F32 | Self::F64)
     }
+
+    /// The stored whole numbers; quantized floats are stored as numbers of 32 bits.
+    fn range(self) -> RangeInclusive<i64> {
+        match self {
+            Self::U8 => 0..=u8::MAX.into(),
+            Self::I16 => i16::MIN.into()..=i16::MAX.into(),
+            Self::I32 | Self::F32 | Self::F64 => i32::MIN.into()..=i32::MAX.into(),
+            Self::I64 => i64::MIN..=i64::MAX,
+        }
+    }
 }
 
 /// One header-data unit.
@@ -140,39 +152,47 @@ impl<'a> Unit<'a> {
     }
 
     /// The stored integer that marks a pixel without a value: BLANK, in compressed images ZBLANK too.
-    pub fn blank(&self) -> Result<Option<i64>, FrameError> {
-        let expected = "an integer";
-        if self.is_compressed_image()
-            && let Some(blank) = self.header.optional("ZBLANK", expected)?
-        {
-            return Ok(Some(blank));
+    pub fn blank(&self) -> Option<i64> {
+        let mut keywords = self.blank_keywords().iter();
+        keywords.find_map(|keyword| self.blank_of(keyword)?.ok())
+    }
+
+    /// The values of BLANK and ZBLANK that no pixel of this type can have.
+    pub fn ignored_blanks(&self) -> impl Iterator<Item = IgnoredValue> {
+        let is_used = self.is_compressed_image() || !self.stored.is_float();
+        let keywords = self.blank_keywords().iter().filter(move |_| is_used);
+        keywords.filter_map(|keyword| self.blank_of(keyword)?.err())
+    }
+
+    fn blank_keywords(&self) -> &'static [&'static str] {
+        if self.is_compressed_image() {
+            &["ZBLANK", "BLANK"]
+        } else {
+            &["BLANK"]
         }
-        self.header.optional("BLANK", expected)
     }
 
-    /// Number of planes of a cube.
-    pub fn planes(&self) -> usize {
-        product(self.axes.get(2..).unwrap_or_default()).unwrap_or(usize::MAX)
+    fn blank_of(&self, keyword: &str) -> Option<Result<i64, IgnoredValue>> {
+        let found = self.header.text(keyword)?;
+        let range = self.stored.range();
+        let blank = found.parse().ok().filter(|blank| range.contains(blank));
+        Some(blank.ok_or_else(|| IgnoredValue {
+            keyword: keyword.to_owned(),
+            expected: format!("a whole number from {} to {}", range.start(), range.end()),
+            found: found.into_owned(),
+        }))
     }
 
-    pub fn is_colour(&self) -> bool {
-        self.axes.get(2) == Some(&3) && self.planes() == 3
+    /// How the values are arranged; `None` if the unit is no image.
+    pub fn layout(&self) -> Option<Layout> {
+        let kind = self.header.text("XTENSION");
+        let is_image = self.is_compressed_image() || kind.is_none_or(|kind| kind == "IMAGE");
+        Layout::of(&self.axes).filter(|_| is_image)
     }
 
     /// Number of images in it: none, one, or the planes of a cube.
     pub fn pages(&self) -> usize {
-        let kind = self.header.text("XTENSION");
-        let is_image = self.is_compressed_image() || kind.is_none_or(|kind| kind == "IMAGE");
-        match self.axes[..] {
-            [width, height, ..] if is_image && width > 0 && height > 0 => {
-                if self.is_colour() {
-                    1
-                } else {
-                    self.planes()
-                }
-            }
-            _ => 0,
-        }
+        self.layout().map_or(0, |layout| layout.pages)
     }
 }
 

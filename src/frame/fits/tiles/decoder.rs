@@ -237,7 +237,7 @@ impl Quantization {
         };
         let blank = match table.column("ZBLANK") {
             Some(column) => Some(Source::Column(column)),
-            None => unit.blank()?.map(Source::All),
+            None => unit.blank().map(Source::All),
         };
         Ok(Some(Self {
             scale,
