@@ -323,7 +323,7 @@ pub fn centroids(data: &[u8]) {
         return;
     };
     assert!(!list.centroids.is_empty() && list.width > 0 && list.height > 0);
-    for centroid in &list.centroids {
+    for centroid in &list.usable().0.centroids {
         assert!(centroid.position.x.is_finite() && centroid.position.y.is_finite());
         assert!(centroid.mag.is_finite());
         assert!(centroid.sigma_px.is_none_or(|sigma_px| sigma_px > 0.0));
@@ -341,6 +341,7 @@ pub fn identify_some(indexed: &IndexedCatalog) {
         width: 512,
         height: 512,
         photometry: Photometry::Instrumental,
+        has_brightness: true,
         centroids: centroids.collect(),
     };
     identify(&list, indexed);

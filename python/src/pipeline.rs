@@ -14,6 +14,7 @@ use starpipe::camera::data_sheet::DataSheet;
 use starpipe::frame::Buffers;
 use starpipe::model::sensitivity::Extinction;
 use starpipe::photometry::comparison::StatedCamera;
+use starpipe::photometry::instrumental_mag;
 use starpipe::pipeline::{CentroidList, ListedCentroid, solve_centroids, solve_frame, solve_read};
 use starpipe::{
     Calibration, Context, DetectConfig, IndexedCatalog, Interrupt, PixelPoint, Solution, Workspace,
@@ -94,28 +95,39 @@ impl Pipeline {
         }
     }
 
-    /// Identifies centroids: rows of x, y, magnitude and standard error in pixels (or NaN).
+    /// Identifies centroids: rows of x, y, brightness and standard error in pixels. `brightness` says
+    /// what they have: `flux`, `mag`, or none of them.
     fn identify(
         &self,
         py: Python<'_>,
         centroids: PyReadonlyArray2<'_, f64>,
         shape: [usize; 2],
+        brightness: Option<&str>,
+        has_errors: bool,
         hints: Hints,
         attitude_only: bool,
     ) -> PyResult<Solved> {
         let rows = centroids.as_slice().map_err(exception)?.as_chunks::<4>().0;
         let [height, width] = shape;
+        let centroid = |(rank, &[x, y, value, sigma_px]): (usize, &[f64; 4])| {
+            let (mag, flux) = match brightness {
+                Some("flux") => (instrumental_mag(value), Some(value)),
+                Some(_) => (value, None),
+                None => (ListedCentroid::mag_of_rank(rank), None),
+            };
+            ListedCentroid {
+                flux,
+                sigma_px: has_errors.then_some(sigma_px),
+                row: rank as u64 + 1,
+                ..ListedCentroid::new(PixelPoint::new(x, y), mag)
+            }
+        };
         let list = CentroidList {
             width,
             height,
             photometry: starpipe::identify::Photometry::Instrumental,
-            centroids: rows
-                .iter()
-                .map(|&[x, y, mag, sigma_px]| ListedCentroid {
-                    sigma_px: Some(sigma_px).filter(|sigma| sigma.is_finite()),
-                    ..ListedCentroid::new(PixelPoint::new(x, y), mag)
-                })
-                .collect(),
+            has_brightness: brightness.is_some(),
+            centroids: rows.iter().enumerate().map(centroid).collect(),
         };
         let context = self.context(&hints, attitude_only)?;
         on_this_thread(py, |interrupt| {

@@ -195,10 +195,14 @@ class Pipeline:
             Positions in pixels: (0, 0) is the centre of the first pixel.
         shape : (int, int)
             Rows and columns of the frame.
-        flux, mag : array
-            Brightness, linear or in magnitudes: one of them.
+        flux, mag : array, optional
+            Brightness, linear or in magnitudes: one of them. Without it the positions are in order of
+            brightness.
         error : array or float, optional
             Standard error on each axis, in pixels; 0.5 by default.
+
+            Positions with a number that is not finite, a flux or an error of 0 or below, and those
+            that coincide with a brighter one are left out; `notes` tell of them.
         fov, pixel_scale, near, radius, date, location, attitude_only, scale_error, name_odds
             As for `solve`.
 
@@ -212,24 +216,22 @@ class Pipeline:
         ValueError
             If arrays do not match, or an argument is out of range.
         """
-        if (flux is None) == (mag is None):
+        if flux is not None and mag is not None:
             raise ValueError("give the brightness as flux or as mag")
-        if mag is None:
-            flux = np.asarray(flux, dtype=np.float64)
-            if not np.all(flux > 0.0):
-                raise ValueError("flux must be positive")
-            mag = -2.5 * np.log10(flux)
-        sigma = np.nan if error is None else error
-        columns = [np.asarray(column, dtype=np.float64) for column in (x, y, mag, sigma)]
-        if columns[3].ndim == 0:
-            columns[3] = np.full_like(columns[0], columns[3])
+        if error is not None and np.ndim(error) == 0 and not float(error) > 0.0:
+            raise ValueError(f"error must be above 0, not {error}")
+        brightness = "flux" if flux is not None else "mag" if mag is not None else None
+        values = flux if flux is not None else mag
+        given = (x, y, np.nan if values is None else values, np.nan if error is None else error)
+        columns = [np.asarray(column, dtype=np.float64) for column in given]
+        for number in (2, 3):
+            if columns[number].ndim == 0:
+                columns[number] = np.full_like(columns[0], columns[number])
         shapes = {column.shape for column in columns}
         if len(shapes) > 1 or columns[0].ndim != 1:
             found = ", ".join(str(column.shape) for column in columns)
             raise ValueError(f"x, y, brightness and error must be lists of one length, not {found}")
         table = np.stack(columns, axis=-1)
-        if not np.all(np.isfinite(table[:, :3])):
-            raise ValueError("x, y and brightness must be finite")
         rows, width = (count(side, "shape", 3) for side in shape)
         known = hints(
             {},
@@ -242,7 +244,9 @@ class Pipeline:
             scale_error=scale_error,
             name_odds=name_odds,
         )
-        solved = self._pipeline.identify(table, (rows, width), known, bool(attitude_only))
+        solved = self._pipeline.identify(
+            table, (rows, width), brightness, error is not None, known, bool(attitude_only)
+        )
         return Result._of(solved)
 
     def solve_many(

@@ -70,8 +70,7 @@ def test_wrong_arguments_are_refused(pipeline, pixels, known, message):
     ("arguments", "message"),
     [
         ({"x": [1.0, 2.0], "y": [1.0]}, "of one length, not"),
-        ({"x": [1.0], "y": [1.0], "flux": [-1.0]}, "flux must be positive"),
-        ({"x": [np.nan], "y": [1.0]}, "finite"),
+        ({"x": [1.0], "y": [1.0], "error": 0.0}, "error must be above 0"),
         ({"x": [[1.0]], "y": [[1.0]]}, "of one length, not"),
         ({"x": [1.0], "y": [1.0], "mag": [1.0]}, "flux or as mag"),
     ],
@@ -80,6 +79,17 @@ def test_wrong_lists_are_refused(pipeline, arguments, message):
     arguments = {"flux": np.ones(len(arguments["x"])), "shape": (100, 100)} | arguments
     with pytest.raises(ValueError, match=message):
         pipeline.identify(**arguments)
+
+
+def test_positions_that_are_no_stars_are_left_out_and_told(pipeline):
+    x = [1.0, np.nan, 5.0, 8.0, 8.1, 20.0]
+    flux = [5.0, 5.0, -1.0, 2.0, 3.0, 7.0]
+    error = [0.1, 0.1, 0.1, 0.1, 0.1, 0.0]
+    found = pipeline.identify(x, [1.0] * 6, flux=flux, error=error, shape=(100, 100))
+    assert [note.code for note in found.notes] == ["rows_left_out"] * 4
+    assert len(found.stars) == 2
+    ordered = pipeline.identify(x, [1.0] * 6, shape=(100, 100))
+    assert [note.code for note in ordered.notes] == ["rows_left_out"] * 2 + ["brightness_unknown"]
 
 
 def test_what_is_odd_about_a_catalogue_goes_to_the_logger(frame, tmp_path, caplog):

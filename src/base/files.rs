@@ -56,12 +56,32 @@ pub fn read_text(path: &Path, limit: u64) -> io::Result<String> {
     text_of(read(path, limit)?)
 }
 
-/// The text that `bytes` are.
+/// The text that `bytes` are, without a byte order mark.
 ///
 /// # Errors
 /// The content not being UTF-8.
-pub fn text_of(bytes: Vec<u8>) -> io::Result<String> {
+pub fn text_of(mut bytes: Vec<u8>) -> io::Result<String> {
+    let mark = bytes.len() - without_byte_order_mark(&bytes)?.len();
+    bytes.drain(..mark);
     String::from_utf8(bytes).map_err(|error| io::Error::new(ErrorKind::InvalidData, error))
+}
+
+/// The text in `bytes` behind the byte order mark that editors may put before it.
+///
+/// # Errors
+/// The content being UTF-16, by its mark or by the zeros in its first characters.
+pub fn without_byte_order_mark(bytes: &[u8]) -> io::Result<&[u8]> {
+    let is_utf_16 = match bytes {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => true,
+        [0, second, 0, fourth, ..] => *second != 0 && *fourth != 0,
+        [first, 0, third, 0, ..] => *first != 0 && *third != 0,
+        _ => false,
+    };
+    if is_utf_16 {
+        let message = "found UTF-16 text, expected UTF-8: save it as UTF-8";
+        return Err(io::Error::new(ErrorKind::InvalidData, message));
+    }
+    Ok(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes))
 }
 
 /// Creates a temporary file in the folder of `path`, with the permissions of any new file.
@@ -168,6 +188,18 @@ mod tests {
         assert!(written.path().exists());
         finish(written, &at("result")).unwrap();
         assert!(at("result").exists());
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_dropped_and_utf_16_is_refused() {
+        let text = |bytes: &[u8]| text_of(bytes.to_vec()).map_err(|error| error.to_string());
+        assert_eq!(text(b"\xef\xbb\xbfa.fits\r\n").as_deref(), Ok("a.fits\r\n"));
+        assert_eq!(text(b"a").as_deref(), Ok("a"));
+        assert_eq!(text(b"").as_deref(), Ok(""));
+        for bytes in [&b"\xff\xfea\0"[..], b"\xfe\xff\0a", b"a\0b\0", b"\0a\0b"] {
+            assert!(text(bytes).unwrap_err().contains("UTF-16"), "{bytes:?}");
+        }
+        assert!(text(b"\xe9t\xe9").is_err());
     }
 
     #[test]

@@ -7,11 +7,17 @@ use super::note::Note;
 use super::solution::{Solution, Source};
 use super::stopwatch::{Stage, Stopwatch};
 use crate::base::coords::PixelPoint;
+use crate::base::format::counted;
 use crate::detect::DetectionFlags;
 use crate::identify::{ObservedStar, Photometry, SourceIndex, StarField};
+use std::collections::HashMap;
+use std::fmt;
 
 /// Standard error assumed on each axis of a centroid that is listed without one, in pixels.
 pub const LISTED_SIGMA_PX: f64 = 0.5;
+
+/// Centroids closer than this are one star that is listed twice, in pixels: the error assumed.
+const COINCIDENT_PX: f64 = LISTED_SIGMA_PX;
 
 /// A list of centroids.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +28,8 @@ pub struct CentroidList {
     pub height: usize,
     /// What the magnitudes are.
     pub photometry: Photometry,
+    /// Whether the brightnesses are known. If not, the magnitudes give their order alone.
+    pub has_brightness: bool,
     /// The centroids, in any order.
     pub centroids: Vec<ListedCentroid>,
 }
@@ -39,6 +47,8 @@ pub struct ListedCentroid {
     pub sigma_px: Option<f64>,
     /// Flags, if the list gives them. What is no star takes no part in the identification.
     pub flags: DetectionFlags,
+    /// Where it stands in its list, from 1: the line of a file, the place in an array; 0 if unknown.
+    pub row: u64,
 }
 
 impl ListedCentroid {
@@ -50,11 +60,58 @@ impl ListedCentroid {
             flux: None,
             sigma_px: None,
             flags: DetectionFlags::default(),
+            row: 0,
         }
+    }
+
+    /// A magnitude for the star of this rank, from 0, in a list that is in order of brightness.
+    ///
+    /// Stars brighter than m are as many as 10^(m/2) on the sky. The magnitudes span half of that, so
+    /// that a list in another order is not far from the truth either.
+    pub fn mag_of_rank(rank: usize) -> f64 {
+        (rank as f64 + 1.0).log10()
+    }
+
+    /// Why it cannot be used, if it cannot.
+    pub fn problem(&self) -> Option<RowProblem> {
+        let has_place = self.position.x.is_finite() && self.position.y.is_finite();
+        if has_place && self.flux.is_some_and(|flux| flux <= 0.0) {
+            return Some(RowProblem::NoFlux);
+        }
+        if !has_place || !self.mag.is_finite() {
+            return Some(RowProblem::NoNumber);
+        }
+        let is_error = |sigma_px: f64| sigma_px > 0.0 && sigma_px.is_finite();
+        let has_error = self.sigma_px.is_none_or(is_error);
+        (!has_error).then_some(RowProblem::NoError)
     }
 }
 
 impl CentroidList {
+    /// The centroids that can be used, brightest first, and what is left out: rows without a number,
+    /// with a flux or an error of 0 or below, and those that coincide with a brighter one.
+    pub fn usable(&self) -> (Self, Vec<LeftOut>) {
+        let mut problems = Vec::new();
+        let mut usable = Vec::new();
+        for centroid in &self.centroids {
+            match centroid.problem() {
+                Some(problem) => problems.push((problem, centroid.row)),
+                None => usable.push(*centroid),
+            }
+        }
+        usable.sort_by(|a, b| a.mag.total_cmp(&b.mag));
+        let is_kept = without_coincident(&usable);
+        let centroids = usable.into_iter().zip(is_kept);
+        let (kept, coincident): (Vec<_>, Vec<_>) = centroids.partition(|(_, is_kept)| *is_kept);
+        let rows = coincident.iter().map(|(centroid, _)| centroid.row);
+        problems.extend(rows.map(|row| (RowProblem::Coincident, row)));
+        let list = Self {
+            centroids: kept.into_iter().map(|(centroid, _)| centroid).collect(),
+            ..self.clone()
+        };
+        (list, LeftOut::of(&problems))
+    }
+
     /// The star field of a list that is sorted by brightness, observed this many Julian years after
     /// J2000.0.
     pub fn star_field(&self, years_since_j2000: f64) -> StarField {
@@ -78,6 +135,91 @@ impl CentroidList {
     }
 }
 
+/// For each of these centroids, brightest first, whether no brighter one coincides with it.
+fn without_coincident(centroids: &[ListedCentroid]) -> Vec<bool> {
+    // Cells of the size of the distance: what coincides is in the same or a neighbouring cell.
+    let cell = |at: f64| (at / COINCIDENT_PX).floor() as i64;
+    let mut kept: HashMap<[i64; 2], Vec<PixelPoint>> = HashMap::new();
+    let is_kept = |centroid: &ListedCentroid| {
+        let place = centroid.position;
+        let [x, y] = [cell(place.x), cell(place.y)];
+        let near = (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| [x, y]));
+        let mut brighter = near.filter_map(|cell| kept.get(&cell)).flatten();
+        let is_alone =
+            !brighter.any(|other| (other.x - place.x).hypot(other.y - place.y) < COINCIDENT_PX);
+        if is_alone {
+            kept.entry([x, y]).or_default().push(place);
+        }
+        is_alone
+    };
+    centroids.iter().map(is_kept).collect()
+}
+
+/// Why a row of a list cannot be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RowProblem {
+    /// A number is missing, or is none.
+    NoNumber,
+    /// The flux is 0 or below.
+    NoFlux,
+    /// The standard error is 0 or below, or no number.
+    NoError,
+    /// It coincides with a brighter one.
+    Coincident,
+}
+
+/// Rows of a list that are left out for one reason. `Display` gives the sentence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LeftOut {
+    /// The reason.
+    pub problem: RowProblem,
+    /// How many rows.
+    pub count: usize,
+    /// The first of them, from 1; 0 if unknown.
+    pub first_row: u64,
+}
+
+impl LeftOut {
+    fn of(problems: &[(RowProblem, u64)]) -> Vec<Self> {
+        let all = [
+            RowProblem::NoNumber,
+            RowProblem::NoFlux,
+            RowProblem::NoError,
+            RowProblem::Coincident,
+        ];
+        let of_problem = |problem| {
+            let rows = problems.iter().filter(|(found, _)| *found == problem);
+            Some(Self {
+                problem,
+                count: rows.clone().count(),
+                first_row: rows.map(|(_, row)| *row).min()?,
+            })
+        };
+        all.into_iter().filter_map(of_problem).collect()
+    }
+}
+
+impl fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let verb = if self.count == 1 { "is" } else { "are" };
+        let rows = counted(self.count, "row");
+        write!(f, "{rows} of the list {verb} left out")?;
+        match (self.first_row, self.count) {
+            (0, _) => {}
+            (row, 1) => write!(f, ", in line {row}")?,
+            (row, _) => write!(f, ", the first in line {row}")?,
+        }
+        f.write_str(match self.problem {
+            RowProblem::NoNumber => ": a number is missing",
+            RowProblem::NoFlux => ": the flux is not above 0",
+            RowProblem::NoError => ": the standard error is not above 0",
+            RowProblem::Coincident if self.count == 1 => ": it is within 0.5 px of a brighter one",
+            RowProblem::Coincident => ": they are within 0.5 px of a brighter one",
+        })
+    }
+}
+
 /// Identifies the stars of a list of centroids. Every prior is a hard constraint.
 pub fn solve_centroids(
     list: &CentroidList,
@@ -87,8 +229,7 @@ pub fn solve_centroids(
     let mut clock = Stopwatch::start();
     workspace.set_deadline(clock.deadline(context.time_limit));
     let priors = &context.priors;
-    let mut list = list.clone();
-    list.centroids.sort_by(|a, b| a.mag.total_cmp(&b.mag));
+    let (list, left_out) = list.usable();
     let field = list.star_field(priors.years_since_j2000());
     let buffers = (&mut workspace.identify, &mut clock);
     let found = attempt(&field, priors, context, buffers);
@@ -104,7 +245,9 @@ pub fn solve_centroids(
     let bodies = find_bodies(&mut outcome, &sources, priors, catalog);
     clock.lap(Stage::Identify);
     let note = Note::of_observation(observation.as_ref(), priors, &outcome);
-    let notes = note.into_iter();
+    let notes = left_out.into_iter().map(Note::RowsLeftOut);
+    let unknown = (!list.has_brightness).then_some(Note::BrightnessUnknown);
+    let notes = notes.chain(unknown).chain(note);
     let notes = notes.chain(Note::of_bodies(&bodies, &outcome, catalog));
     let notes = notes.chain(Note::of_pointing(context.attitude_only, &outcome));
     Solution {

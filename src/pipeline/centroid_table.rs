@@ -1,12 +1,12 @@
-//! Lists of centroids as CSV.
+//! Lists of centroids as tables.
 
+use super::centroid_columns::{Brightness, Columns};
 use super::centroid_list::{CentroidList, ListedCentroid};
+use super::centroid_text::ListText;
 use crate::base::coords::PixelPoint;
-use crate::base::format::printable;
-use crate::detect::DetectionFlags;
+use crate::base::files;
+use crate::base::format::table_name;
 use crate::identify::Photometry;
-use crate::photometry::instrumental_mag;
-use csv::StringRecord;
 use std::fmt;
 
 /// Why a list of centroids cannot be read.
@@ -59,55 +59,30 @@ const MAX_COORDINATE_PX: f64 = 1e6;
 /// How far outside the frame a centroid may lie, in pixels: stars at the border are cut.
 const BORDER_PX: f64 = 5.0;
 
-/// Meaning of the brightness column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Brightness {
-    JohnsonV,
-    Mag,
-    Flux,
-}
-
-/// Position and name of a column.
-struct Column {
-    position: usize,
-    name: String,
-}
-
-struct Columns {
-    x: Column,
-    y: Column,
-    brightness: Column,
-    kind: Brightness,
-    /// What only a table of `starpipe process` has.
-    measured: Option<MeasuredColumns>,
-}
-
-/// Columns of a table of `starpipe process`. Its magnitudes are the catalogue's, and say nothing
-/// about the frame.
-struct MeasuredColumns {
-    frame: Column,
-    sigmas: [Column; 2],
-    flags: Column,
-}
-
 impl CentroidList {
-    /// Parses CSV with a heading: `x` and `y` (or `x_px`, `y_px`) in pixels, and `vmag`, `mag` or
-    /// `flux`; others are ignored. A table of `starpipe process` gives errors and flags, too.
+    /// Parses a table with a heading: positions in pixels in `x` and `y`, and `vmag`, `mag` or
+    /// `flux`, or the names that photutils, SEP and SExtractor have for them; others are ignored. A
+    /// table of starpipe gives errors and flags, too. Without a brightness the rows are in its order.
+    ///
+    /// A number that is missing or none is NaN: [`usable`](Self::usable) leaves such rows out.
     ///
     /// # Errors
-    /// [`CentroidListError`]: a column is missing, a value is no number or outside the frame, the
-    /// list is empty, or has several frames of which none is chosen.
-    pub fn parse(csv: &[u8], options: &CentroidListOptions) -> Result<Self, CentroidListError> {
-        let mut reader = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
-            .flexible(true)
-            .comment(Some(b'#'))
-            .from_reader(csv);
-        let columns = Columns::find(reader.headers().map_err(not_a_table)?)
-            .map_err(CentroidListError::of_list)?;
+    /// [`CentroidListError`]: a column is missing, a position outside the frame, no row is usable, or
+    /// the list has several frames of which none is chosen.
+    pub fn parse(table: &[u8], options: &CentroidListOptions) -> Result<Self, CentroidListError> {
+        let table = files::without_byte_order_mark(table)
+            .map_err(|error| CentroidListError::of_list(error.to_string()))?;
+        let ListText { text, separator } = ListText::of(table);
+        let mut reader = self::reader(&text, separator);
+        let headings = reader.headers().map_err(not_a_table)?;
+        let rows = || self::reader(&text, separator).into_records().flatten();
+        let columns =
+            Columns::find(headings, separator, rows).map_err(CentroidListError::of_list)?;
         let mut centroids = Vec::new();
+        // The problem of the first row that is not usable, with its line.
+        let mut first_problem = None;
         // As tables have it.
-        let chosen = options.frame.as_deref().map(printable);
+        let chosen = options.frame.as_deref().map(table_name);
         let mut frames = Frames::new(chosen.as_deref());
         for record in reader.records() {
             let record = record.map_err(not_a_table)?;
@@ -119,29 +94,47 @@ impl CentroidList {
                 continue;
             }
             let line = record.position().map_or(0, csv::Position::line);
-            let centroid = columns
-                .centroid(&record)
-                .and_then(|centroid| check_inside(&centroid.position, options).map(|()| centroid))
-                .map_err(|problem| CentroidListError::of_line(line, problem))?;
+            let mut centroid = columns.centroid(&record, centroids.len());
+            centroid.row = line;
+            if centroid.problem().is_none() {
+                check_inside(&centroid.position, options)
+                    .map_err(|problem| CentroidListError::of_line(line, problem))?;
+            } else if first_problem.is_none() {
+                first_problem = columns.problem(&record).map(|problem| (line, problem));
+            }
             centroids.push(centroid);
         }
         frames.check().map_err(CentroidListError::of_list)?;
-        if centroids.is_empty() {
-            return Err(CentroidListError::of_list(
-                "found a heading without centroids below it",
-            ));
+        if centroids
+            .iter()
+            .all(|centroid| centroid.problem().is_some())
+        {
+            return Err(match first_problem {
+                Some((line, problem)) => CentroidListError::of_line(line, problem),
+                None => CentroidListError::of_list("found a heading without centroids below it"),
+            });
         }
         let (width, height) = frame_size(&centroids, options);
         Ok(Self {
             width,
             height,
-            photometry: match columns.kind {
-                Brightness::JohnsonV => Photometry::JohnsonV,
-                Brightness::Mag | Brightness::Flux => Photometry::Instrumental,
+            photometry: match columns.brightness() {
+                Some(Brightness::JohnsonV) => Photometry::JohnsonV,
+                Some(Brightness::Mag | Brightness::Flux) | None => Photometry::Instrumental,
             },
+            has_brightness: columns.brightness().is_some(),
             centroids,
         })
     }
+}
+
+fn reader(text: &[u8], separator: u8) -> csv::Reader<&[u8]> {
+    csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .flexible(true)
+        .comment(Some(b'#'))
+        .delimiter(separator)
+        .from_reader(text)
 }
 
 /// Describes an error of the CSV reader with its line.
@@ -156,137 +149,6 @@ fn not_a_table(error: csv::Error) -> CentroidListError {
             )
         }
         _ => CentroidListError::of_list(error.to_string()),
-    }
-}
-
-impl Columns {
-    fn find(headings: &StringRecord) -> Result<Self, String> {
-        if headings.iter().all(str::is_empty) {
-            return Err(
-                "the file is empty; expected a heading with the columns x, y and flux, vmag or mag"
-                    .to_owned(),
-            );
-        }
-        let column = |names: &[&str]| {
-            names.iter().find_map(|name| {
-                let position = headings
-                    .iter()
-                    // The first heading may begin with a byte order mark.
-                    .position(|h| h.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name))?;
-                let name = (*name).to_owned();
-                Some(Column { position, name })
-            })
-        };
-        let found = || {
-            let named: Vec<&str> = headings.iter().collect();
-            let columns = if named.len() == 1 {
-                "the single column"
-            } else {
-                "the columns"
-            };
-            format!("line 1 has {columns} {}", named.join(", "))
-        };
-        let Some(x) = column(&["x", "x_px"]) else {
-            return Err(format!(
-                "{}; expected x or x_px among them, with commas between",
-                found()
-            ));
-        };
-        let Some(y) = column(&["y", "y_px"]) else {
-            return Err(format!(
-                "{}; expected y or y_px among them, with commas between",
-                found()
-            ));
-        };
-        let measured = MeasuredColumns::find(column);
-        let kinds: &[_] = match measured {
-            Some(_) => &[("flux", Brightness::Flux)],
-            None => &[
-                ("vmag", Brightness::JohnsonV),
-                ("mag", Brightness::Mag),
-                ("flux", Brightness::Flux),
-            ],
-        };
-        let brightness = kinds
-            .iter()
-            .find_map(|&(name, kind)| Some((column(&[name])?, kind)));
-        let Some((brightness, kind)) = brightness else {
-            return Err(format!(
-                "{}; expected flux, vmag or mag among them, with commas between",
-                found()
-            ));
-        };
-        Ok(Self {
-            x,
-            y,
-            brightness,
-            kind,
-            measured,
-        })
-    }
-
-    /// The frame of a row, in a table that names it.
-    fn frame_of<'a>(&self, record: &'a StringRecord) -> Option<&'a str> {
-        record.get(self.measured.as_ref()?.frame.position)
-    }
-
-    fn centroid(&self, record: &StringRecord) -> Result<ListedCentroid, String> {
-        let position = PixelPoint::new(number(record, &self.x)?, number(record, &self.y)?);
-        let value = number(record, &self.brightness)?;
-        let (mag, flux) = match self.kind {
-            Brightness::Flux if value > 0.0 => (instrumental_mag(value), Some(value)),
-            Brightness::Flux => return Err(format!("column flux: {value} is not above 0")),
-            Brightness::JohnsonV | Brightness::Mag => (value, None),
-        };
-        let mut centroid = ListedCentroid {
-            flux,
-            ..ListedCentroid::new(position, mag)
-        };
-        if let Some(measured) = &self.measured {
-            centroid.sigma_px = measured.sigma_px(record)?;
-            centroid.flags = measured.flags(record);
-        }
-        Ok(centroid)
-    }
-}
-
-impl MeasuredColumns {
-    /// `None` unless all of them are there.
-    fn find(column: impl Fn(&[&str]) -> Option<Column>) -> Option<Self> {
-        Some(Self {
-            frame: column(&["frame"])?,
-            sigmas: [column(&["sigma_x"])?, column(&["sigma_y"])?],
-            flags: column(&["flags"])?,
-        })
-    }
-
-    /// The standard error on one axis; `None` where the table has none.
-    fn sigma_px(&self, record: &StringRecord) -> Result<Option<f64>, String> {
-        let mut variance_px2 = 0.0;
-        for column in &self.sigmas {
-            if record.get(column.position).is_none_or(str::is_empty) {
-                return Ok(None);
-            }
-            let sigma_px = number(record, column)?;
-            if sigma_px <= 0.0 {
-                return Err(format!("column {}: {sigma_px} is not above 0", column.name));
-            }
-            variance_px2 += sigma_px.powi(2) / 2.0;
-        }
-        Ok(Some(variance_px2.sqrt()))
-    }
-
-    fn flags(&self, record: &StringRecord) -> DetectionFlags {
-        let text = record.get(self.flags.position).unwrap_or_default();
-        let has = |flag: &str| text.split_whitespace().any(|word| word == flag);
-        DetectionFlags {
-            saturated: has("saturated"),
-            hot_pixel: has("hot_pixel"),
-            trail: has("trail"),
-            extended: has("extended"),
-            blended: has("blended"),
-            border: has("border"),
-        }
     }
 }
 
@@ -342,21 +204,6 @@ impl<'a> Frames<'a> {
     }
 }
 
-fn number(record: &StringRecord, column: &Column) -> Result<f64, String> {
-    let name = &column.name;
-    let Some(text) = record.get(column.position) else {
-        return Err(format!(
-            "column {name} is missing: the line ends after {} of at least {} columns",
-            record.len(),
-            column.position + 1
-        ));
-    };
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        _ => Err(format!("column {name}: '{text}' is not a number")),
-    }
-}
-
 /// Refuses positions outside the frame, which extends half a pixel beyond the centres of its border
 /// pixels.
 fn check_inside(position: &PixelPoint, size: &CentroidListOptions) -> Result<(), String> {
@@ -378,10 +225,8 @@ fn check_inside(position: &PixelPoint, size: &CentroidListOptions) -> Result<(),
 /// Width and height of the frame: as given, else as far as the centroids reach.
 fn frame_size(centroids: &[ListedCentroid], size: &CentroidListOptions) -> (usize, usize) {
     let reach = |coordinate: fn(&PixelPoint) -> f64| {
-        let largest = centroids
-            .iter()
-            .map(|c| coordinate(&c.position))
-            .fold(0.0, f64::max);
+        let usable = centroids.iter().filter(|c| c.problem().is_none());
+        let largest = usable.map(|c| coordinate(&c.position)).fold(0.0, f64::max);
         largest.round() as usize + 1
     };
     let given = |side: Option<u32>| side.map(|side| side as usize);
@@ -394,6 +239,8 @@ fn frame_size(centroids: &[ListedCentroid], size: &CentroidListOptions) -> (usiz
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detect::DetectionFlags;
+    use crate::pipeline::LeftOut;
 
     fn parsed(text: &str) -> Result<CentroidList, CentroidListError> {
         CentroidList::parse(text.as_bytes(), &CentroidListOptions::default())
@@ -478,23 +325,100 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_line_and_column() {
+    fn a_list_without_a_usable_row_names_line_and_column_of_the_first() {
         for (row, expected) in [
-            ("1,NaN,3", "line 3: column y: 'NaN' is not a number"),
-            ("inf,2,3", "line 3: column x: 'inf' is not a number"),
-            ("1,2,", "line 3: column flux: '' is not a number"),
-            ("1,2,-4", "line 3: column flux: -4 is not above 0"),
-            ("1,2,0", "line 3: column flux: 0 is not above 0"),
-            ("1,2", "line 3: column flux is missing"),
+            ("1,NaN,3", "line 2: column y: 'NaN' is not a number"),
+            ("inf,2,3", "line 2: column x: 'inf' is not a number"),
+            ("1,2,", "line 2: column flux: '' is not a number"),
+            ("1,2,-4", "line 2: column flux: -4 is not above 0"),
+            ("1,2,0", "line 2: column flux: 0 is not above 0"),
+            ("1,2", "line 2: column flux is missing"),
             (
                 "-7,2,3",
-                "line 3: column x: -7 is more than 5 px outside the frame",
+                "line 2: column x: -7 is more than 5 px outside the frame",
             ),
-            ("1,1e300,3", "line 3: column y: 1000000"),
+            ("1,1e300,3", "line 2: column y: 1000000"),
         ] {
-            let error = error(&format!("x,y,flux\n5,5,5\n{row}\n"));
+            let error = error(&format!("x,y,flux\n{row}\n"));
             assert!(error.starts_with(expected), "{error}");
         }
+    }
+
+    #[test]
+    fn rows_that_are_no_stars_are_left_out_and_counted() {
+        let list = parsed(
+            "x,y,flux\n5,5,5\nnan,5,3\n5,,3\n1,2\n6,6,0\n7,7,-1\n8,8,1e9\n8,8.2,4\n8,8,1e9\n",
+        )
+        .unwrap();
+        let (usable, left_out) = list.usable();
+        let places: Vec<f64> = usable.centroids.iter().map(|c| c.position.x).collect();
+        assert_eq!(places, [8.0, 5.0]);
+        assert_eq!((list.width, list.height), (9, 9));
+        let texts: Vec<String> = left_out.iter().map(LeftOut::to_string).collect();
+        assert_eq!(
+            texts,
+            [
+                "3 rows of the list are left out, the first in line 3: a number is missing",
+                "2 rows of the list are left out, the first in line 6: the flux is not above 0",
+                "2 rows of the list are left out, the first in line 9: they are within 0.5 px of a brighter one",
+            ]
+        );
+        let measured =
+            "frame,x,y,sigma_x,sigma_y,flux,flags\na,1,2,0,0.4,100,\na,9,2,0.3,0.4,90,\n";
+        let (usable, left_out) = parsed(measured).unwrap().usable();
+        assert_eq!((usable.centroids.len(), left_out.len()), (1, 1));
+    }
+
+    #[test]
+    fn the_columns_of_other_programs_are_understood() {
+        let at = |text: &str| {
+            let list = parsed(text).unwrap();
+            let first = list.centroids[0];
+            (first.position.x, first.position.y, first.flux)
+        };
+        for (text, expected) in [
+            ("x_centroid,y_centroid,flux\n1,2,3\n", (1.0, 2.0, Some(3.0))),
+            (
+                "id xcentroid ycentroid flux\n1 1 2 3\n",
+                (1.0, 2.0, Some(3.0)),
+            ),
+            ("x;y;flux\n1,5;2,5;3\n", (1.5, 2.5, Some(3.0))),
+            ("x\ty\tflux\n1.5\t2.5\t3\n", (1.5, 2.5, Some(3.0))),
+            ("X_IMAGE,Y_IMAGE,FLUX_AUTO\n1,2,3\n", (0.0, 1.0, Some(3.0))),
+            (
+                "# 1 X_IMAGE place\n# 2 Y_IMAGE place\n# 3 FLUX_BEST flux\n 5.5 6.5 7\n",
+                (4.5, 5.5, Some(7.0)),
+            ),
+            ("x,y,mag,flux\n1,2,nan,3\n3,4,,5\n", (1.0, 2.0, Some(3.0))),
+            ("x,y,mag,flux\n1,2,99,3\n", (1.0, 2.0, Some(3.0))),
+        ] {
+            assert_eq!(at(text), expected, "{text}");
+        }
+        let archive = "frame,id,x_centroid,y_centroid,x_centroid_err,y_centroid_err,flux,flags,vmag\n\
+                       a,,1,2,0.3,0.3,100,\"saturated,border\",5\n";
+        let list = parsed(archive).unwrap();
+        assert_eq!(list.photometry, Photometry::Instrumental);
+        assert!(list.centroids[0].flags.saturated && list.centroids[0].flags.border);
+        assert!((list.centroids[0].sigma_px.unwrap() - 0.3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn without_a_brightness_the_rows_are_in_its_order() {
+        let list = parsed("x,y\n1,2\n9,4\n5,8\n").unwrap();
+        assert!(!list.has_brightness);
+        let (usable, _) = list.usable();
+        let places: Vec<f64> = usable.centroids.iter().map(|c| c.position.x).collect();
+        assert_eq!(places, [1.0, 9.0, 5.0]);
+    }
+
+    #[test]
+    fn lists_in_utf_16_are_refused_by_name() {
+        let utf_16: Vec<u8> = "\u{feff}x,y,flux"
+            .encode_utf16()
+            .flat_map(u16::to_le_bytes)
+            .collect();
+        let error = CentroidList::parse(&utf_16, &CentroidListOptions::default()).unwrap_err();
+        assert!(error.to_string().contains("UTF-16"), "{error}");
     }
 
     #[test]
@@ -506,7 +430,6 @@ mod tests {
                 "line 1 has the columns a, b, c; expected x or x_px",
             ),
             ("x,b,c\n1,2,3\n", "expected y or y_px"),
-            ("x,y,c\n1,2,3\n", "expected flux, vmag or mag"),
             ("x,y,mag\n", "a heading without centroids"),
         ] {
             let error = error(heading);

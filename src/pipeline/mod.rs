@@ -13,8 +13,10 @@
 mod bodies;
 mod body_in_frame;
 mod bright_stars;
+mod centroid_columns;
 mod centroid_list;
 mod centroid_table;
+mod centroid_text;
 mod context;
 mod error;
 mod identification;
@@ -27,7 +29,9 @@ mod stopwatch;
 
 pub use body_in_frame::BodyInFrame;
 pub use bright_stars::MissingStar;
-pub use centroid_list::{CentroidList, LISTED_SIGMA_PX, ListedCentroid, solve_centroids};
+pub use centroid_list::{
+    CentroidList, LISTED_SIGMA_PX, LeftOut, ListedCentroid, RowProblem, solve_centroids,
+};
 pub use centroid_table::{CentroidListError, CentroidListOptions};
 pub use context::{Context, DEFAULT_TIME_LIMIT_S, Workspace};
 pub use error::Error;

@@ -2,6 +2,7 @@
 
 use super::body_in_frame::BodyInFrame;
 use super::bright_stars::MissingStar;
+use super::centroid_list::LeftOut;
 use super::outcome::Outcome;
 use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
@@ -35,6 +36,10 @@ pub enum Note {
     Orientation(Orientation),
     /// The file leaves something open.
     Assumed(Assumption),
+    /// Rows of a list are not used.
+    RowsLeftOut(LeftOut),
+    /// A list has no brightnesses; its rows were taken to be in their order.
+    BrightnessUnknown,
     /// The scale in the header is not that of the frame.
     WrongHeaderScale {
         /// Smallest and largest pixel scale that the header allows, in radians.
@@ -93,6 +98,8 @@ impl Note {
             Self::LargestImage(_) => "largest_image",
             Self::Orientation(_) => "orientation",
             Self::Assumed(assumption) => assumption.code(),
+            Self::RowsLeftOut(_) => "rows_left_out",
+            Self::BrightnessUnknown => "brightness_unknown",
             Self::WrongHeaderScale { .. } => "header_scale_wrong",
             Self::BelowHorizon { .. } => "below_horizon",
             Self::NoTimeOfDay => "time_of_day_unknown",
@@ -237,6 +244,10 @@ impl fmt::Display for Note {
                 orientation.tag()
             ),
             Self::Assumed(assumption) => assumption.fmt(f),
+            Self::RowsLeftOut(rows) => rows.fmt(f),
+            Self::BrightnessUnknown => f.write_str(
+                "the list has no flux and no magnitude; its rows were taken to be in order of brightness",
+            ),
             Self::WrongHeaderScale {
                 pixel_scale_rad: (low_rad, high_rad),
             } => write!(

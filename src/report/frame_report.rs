@@ -1,5 +1,6 @@
 //! The report of a frame: its fields, as JSON has them.
 
+use crate::base::format::json_escaped;
 use crate::frame::RowOrder;
 use crate::identify::DateSource;
 use serde::Serialize;
@@ -426,7 +427,7 @@ impl FrameReport {
     /// # Errors
     /// [`serde_json::Error`], which does not occur with these types.
     pub fn to_json_line(&self) -> Result<String, serde_json::Error> {
-        serde_json::to_string(self)
+        serde_json::to_string(self).map(json_escaped)
     }
 
     /// Whether the stars are identified.

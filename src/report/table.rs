@@ -1,6 +1,7 @@
 //! The stars of a frame as a table.
 
 use super::frame_report::{FrameReport, StarReport};
+use crate::base::format::table_name;
 use std::io;
 
 /// The columns, in order. `flags` are separated by blanks; `flux_e` and `peak_e` are filled where a
@@ -50,9 +51,9 @@ impl FrameReport {
 
     fn row(&self, star: &StarReport) -> [String; TABLE_COLUMNS.len()] {
         let number = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
-        let word = |value: &Option<String>| value.clone().unwrap_or_default();
+        let word = |value: &Option<String>| value.as_deref().map(table_name).unwrap_or_default();
         [
-            self.frame.clone(),
+            table_name(&self.frame),
             star.x.to_string(),
             star.y.to_string(),
             number(star.sigma_x),

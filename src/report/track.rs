@@ -4,6 +4,7 @@ use super::build;
 use super::digits::{PIXEL_DECIMALS, SIGMA_DIGITS};
 use super::frame_report::{AttitudeReport, DistortionReport, SCHEMA};
 use super::reason;
+use crate::base::format::json_escaped;
 use crate::base::format::{finite, significant, to_decimals, to_significant};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::camera::CameraModel;
@@ -155,7 +156,7 @@ impl TrackReport {
     /// # Errors
     /// None for reports that [`new`](Self::new) made.
     pub fn to_json_line(&self) -> serde_json::Result<String> {
-        serde_json::to_string(self)
+        serde_json::to_string(self).map(json_escaped)
     }
 
     /// The report as one line for people.

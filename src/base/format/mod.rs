@@ -11,11 +11,12 @@ pub(crate) use rounding::{
 pub(crate) use sexagesimal::{degrees, hours, small};
 
 /// `text` with control characters escaped, as `\n` and `\u{1b}`: file names and headers may contain
-/// terminal escape sequences.
+/// terminal escape sequences. Those that change the order in which characters are drawn, or break the
+/// line, are escaped, too: with them a name looks like another.
 pub fn printable(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for character in text.chars() {
-        if character.is_control() {
+        if character.is_control() || is_deceptive(character) {
             shown.extend(character.escape_default());
         } else {
             shown.push(character);
@@ -24,8 +25,98 @@ pub fn printable(text: &str) -> String {
     shown
 }
 
+/// Whether a character is not drawn itself, but changes how others are: marks, embeddings, overrides
+/// and isolates of the bidirectional algorithm (Unicode Standard Annex 9), and separators of lines and
+/// paragraphs.
+pub const fn is_deceptive(character: char) -> bool {
+    matches!(
+        character,
+        '\u{61c}'
+            | '\u{200e}'
+            | '\u{200f}'
+            | '\u{2028}'..='\u{202e}'
+            | '\u{2066}'..='\u{2069}'
+            | '\u{feff}'
+    )
+}
+
+/// JSON with the characters escaped that change how others are drawn ([`is_deceptive`]). They stand in
+/// strings alone, which are the same to a program.
+pub fn json_escaped(json: String) -> String {
+    if !json.contains(is_deceptive) {
+        return json;
+    }
+    let mut escaped = String::with_capacity(json.len());
+    for character in json.chars() {
+        if is_deceptive(character) {
+            escaped += &format!("\\u{:04x}", u32::from(character));
+        } else {
+            escaped.push(character);
+        }
+    }
+    escaped
+}
+
+/// A name or other text in a cell of a CSV table, on one line, and never a formula to a spreadsheet:
+/// if it begins like one, an apostrophe stands before it.
+pub fn table_name(text: &str) -> String {
+    let shown = printable(text);
+    let is_formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
+    // Minus signs of numbers are none of formulas.
+    if is_formula && text.parse::<f64>().is_err() {
+        return format!("'{shown}");
+    }
+    shown
+}
+
 /// A count with its noun: `1 detection`, `2 detections`.
 pub fn counted(count: usize, noun: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{count} {noun}{plural}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_terminal_would_obey_is_escaped() {
+        for (text, shown) in [
+            ("plain é 星.fits", "plain é 星.fits"),
+            ("a\nb\tc\u{1b}[31m", "a\\nb\\tc\\u{1b}[31m"),
+            ("a\u{202e}stif.b", "a\\u{202e}stif.b"),
+            (
+                "\u{2066}a\u{2028}b\u{feff}",
+                "\\u{2066}a\\u{2028}b\\u{feff}",
+            ),
+        ] {
+            assert_eq!(printable(text), shown);
+        }
+    }
+
+    #[test]
+    fn json_means_the_same_when_it_is_escaped() {
+        let text = "a\u{202e}b\u{2066}é";
+        let json = json_escaped(serde_json::to_string(text).unwrap());
+        assert_eq!(json, "\"a\\u202eb\\u2066é\"");
+        assert_eq!(serde_json::from_str::<String>(&json).unwrap(), text);
+    }
+
+    #[test]
+    fn no_cell_is_a_formula_and_numbers_stay() {
+        for (text, cell) in [
+            ("=1+1.fits", "'=1+1.fits"),
+            ("+a", "'+a"),
+            ("-", "'-"),
+            ("@a", "'@a"),
+            ("\t=a", "'\\t=a"),
+            ("-1.5", "-1.5"),
+            ("+2e-3", "+2e-3"),
+            ("a=b", "a=b"),
+            ("./-a", "./-a"),
+            ("", ""),
+        ] {
+            assert_eq!(table_name(text), cell);
+        }
+    }
 }

@@ -65,7 +65,18 @@ fn is_pattern(input: &Path) -> bool {
 
 fn add_lines(text: &str, names: &mut Vec<String>) {
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
-    names.extend(lines.map(str::to_owned));
+    names.extend(lines.map(unquoted).map(str::to_owned));
+}
+
+/// A name without the quotation marks that file managers copy with it, unless they belong to it.
+fn unquoted(line: &str) -> &str {
+    let inside = ['"', '\'']
+        .into_iter()
+        .find_map(|mark| line.strip_prefix(mark)?.strip_suffix(mark));
+    match inside {
+        Some(name) if !name.is_empty() && !Path::new(line).exists() => name,
+        _ => line,
+    }
 }
 
 fn name_of(path: &Path) -> anyhow::Result<String> {

@@ -2,11 +2,12 @@
 
 use anyhow::Context;
 use serde::Serialize;
-use starpipe::base::format::printable;
+use starpipe::base::format::{is_deceptive, json_escaped, printable};
 
 /// One JSON object on one line.
 pub(crate) fn json_line(value: &impl Serialize) -> anyhow::Result<String> {
-    Ok(serde_json::to_string(value).context("writing JSON")? + "\n")
+    let text = serde_json::to_string(value).context("writing JSON")?;
+    Ok(json_escaped(text) + "\n")
 }
 
 /// JSON Lines: one object for each row.
@@ -16,7 +17,8 @@ pub(crate) fn json_lines<R: Serialize>(rows: impl Iterator<Item = R>) -> anyhow:
 
 /// Indented JSON, for files that people read as well.
 pub(crate) fn json_indented(value: &impl Serialize) -> anyhow::Result<String> {
-    Ok(serde_json::to_string_pretty(value).context("writing JSON")? + "\n")
+    let text = serde_json::to_string_pretty(value).context("writing JSON")?;
+    Ok(json_escaped(text) + "\n")
 }
 
 /// A CSV table with a heading, which is missing if there is no row.
@@ -35,7 +37,7 @@ pub(crate) fn finished(writer: csv::Writer<Vec<u8>>) -> anyhow::Result<String> {
         .into_inner()
         .map_err(csv::IntoInnerError::into_error)?;
     let text = String::from_utf8(bytes)?;
-    if !text.contains(|c: char| c.is_control() && c != '\n') {
+    if !text.contains(|c: char| (c.is_control() && c != '\n') || is_deceptive(c)) {
         return Ok(text);
     }
     let lines: Vec<String> = text.split('\n').map(printable).collect();

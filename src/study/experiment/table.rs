@@ -76,6 +76,7 @@ pub(super) fn centroids(published: &Published, scenario: &Scenario) -> CentroidL
         width: scenario.camera.width_px,
         height: scenario.camera.height_px,
         photometry: Photometry::JohnsonV,
+        has_brightness: true,
         centroids: listed.collect(),
     }
 }

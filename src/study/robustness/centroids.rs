@@ -46,6 +46,7 @@ impl SimulatedCentroids {
                 width: protocol.width_px,
                 height: protocol.height_px,
                 photometry: protocol.photometry,
+                has_brightness: true,
                 centroids: centroids
                     .iter()
                     .map(|centroid| centroid.listed(protocol.photometry))
