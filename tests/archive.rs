@@ -123,8 +123,17 @@ fn frames_may_be_named_in_lists() {
     let expected = files(&night.join("pattern"));
     let names = String::from_utf8(expected[Path::new("inputs.txt")].clone()).unwrap();
     fs::write(night.join("frames.txt"), format!("\n{names}")).unwrap();
+    let quoted: String = names
+        .lines()
+        .map(|name| format!("\"{name}\"  \r\n"))
+        .collect();
+    fs::write(night.join("marked.txt"), format!("\u{feff}{quoted}")).unwrap();
     let parts = ["--frames-per-part", "2"];
-    for (input, out) in [("frames.txt", "text"), ("-", "stdin")] {
+    for (input, out) in [
+        ("frames.txt", "text"),
+        ("marked.txt", "marked"),
+        ("-", "stdin"),
+    ] {
         let arguments = [&["process", input, "--out-parquet", out][..], &parts].concat();
         let mut command = starpipe();
         command
@@ -140,6 +149,14 @@ fn frames_may_be_named_in_lists() {
         );
         assert!(files(&night.join(out)) == expected);
     }
+    let wide = names
+        .encode_utf16()
+        .flat_map(u16::to_le_bytes)
+        .collect::<Vec<_>>();
+    fs::write(night.join("wide.txt"), [&b"\xff\xfe"[..], &wide].concat()).unwrap();
+    let refused = run(night, &["process", "wide.txt", "--out-parquet", "wide"]);
+    assert_eq!(refused.status, 1);
+    assert!(refused.stderr.contains("UTF-16"), "{}", refused.stderr);
     let merged = run(night, &["archive", "merge", "pattern", "--out", "merged"]);
     assert_eq!(merged.status, 0, "{}", merged.stderr);
     let arguments = [

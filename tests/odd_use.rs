@@ -190,7 +190,7 @@ fn odd_names_break_no_line_and_reach_no_terminal() {
         command.args(["process", "--format", format]);
         Ran::new(command.args(paths)).stdout
     };
-    // A table is for programs and has names unchanged.
+    // A table has a line for each row.
     let table = of("csv", &paths[..2]);
     let mut reader = csv::Reader::from_reader(table.as_bytes());
     let mut named: Vec<String> = reader
@@ -198,7 +198,7 @@ fn odd_names_break_no_line_and_reach_no_terminal() {
         .map(|row| row.unwrap()[0].to_owned())
         .collect();
     named.dedup();
-    assert_eq!(named, shown[..2]);
+    assert_eq!(named, [shown[0].replace('\n', r"\n"), shown[1].clone()]);
     // But a terminal that shows it is not cleared.
     let table = of("csv", &paths[2..3]);
     assert!(!table.contains(|c: char| c.is_control() && c != '\n'));
@@ -219,6 +219,51 @@ fn odd_names_break_no_line_and_reach_no_terminal() {
         text.contains("clear\\u{1b}[2J\\u{9b}31m.png  640"),
         "{text}"
     );
+}
+
+#[test]
+fn names_are_no_formulas_and_do_not_look_like_others() {
+    let directory = tempfile::tempdir().unwrap();
+    let place = directory.path();
+    // Right-to-left override: drawn as `agnp.png`.
+    let names = ["=1+1.png", "@sum.png", "a\u{202e}gnp.png"];
+    let run = |arguments: &[&str]| {
+        let mut command = starpipe();
+        Ran::new(command.args(arguments).current_dir(place))
+    };
+    for name in names {
+        fs::copy(orion(), place.join(name)).unwrap();
+    }
+    let table = run(&[&["process", "--format", "csv"][..], &names].concat()).stdout;
+    for shown in ["\n'=1+1.png,", "\n'@sum.png,", "\na\\u{202e}gnp.png,"] {
+        assert!(table.contains(shown), "{shown}");
+    }
+    let cells = table
+        .split([',', '\n'])
+        .filter(|cell| cell.starts_with(['=', '+', '-', '@']));
+    let numbers: Vec<_> = cells.map(str::parse::<f64>).collect();
+    assert!(!numbers.is_empty() && numbers.iter().all(Result::is_ok));
+    fs::write(place.join("stars.csv"), &table).unwrap();
+    for name in names {
+        let size = ["--width", "640", "--height", "480", "--frame", name];
+        let ran = run(&[&["identify", "stars.csv"][..], &size].concat());
+        assert_eq!(ran.status, 0, "{}", ran.stderr);
+    }
+    for format in ["text", "json"] {
+        let shown = run(&[
+            "process",
+            "--format",
+            format,
+            names[2],
+            "missing\u{202e}.png",
+        ]);
+        assert!(
+            !(shown.stdout + &shown.stderr).contains('\u{202e}'),
+            "{format}"
+        );
+    }
+    let json = process(&[&place.join(names[2])]);
+    assert!(frames(&json)[0].ends_with(names[2]));
 }
 
 #[test]

@@ -16,8 +16,9 @@ use std::path::{Path, PathBuf};
     starpipe identify centroids.csv\n  \
     starpipe identify --pixel-scale 10.8 --width 752 --height 480 centroids.csv\n  \
     starpipe process --format csv a.fits b.fits > stars.csv; starpipe identify --frame a.fits stars.csv\n\n\
-    The columns are x,y (or x_px,y_px) and one of vmag (Johnson V), mag (instrumental) or flux;\n\
-    others are ignored. The tables of starpipe process are read with their errors and flags. (0, 0) is the centre of the top-left pixel, y points down.")]
+    The columns are x,y (or x_px,y_px) and one of vmag (Johnson V), mag (instrumental) or flux, or as\n\
+    photutils, SEP and SExtractor name them; others are ignored. The tables of starpipe process are read\n\
+    with their errors and flags. (0, 0) is the centre of the top-left pixel, y points down.")]
 pub(crate) struct IdentifyArgs {
     /// Lists of centroids to identify; - for standard input
     #[arg(value_name = "CENTROIDS.csv", required = true)]

@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use serde::Serialize;
-use starpipe::base::format::{is_deceptive, json_escaped, printable};
+use starpipe::base::format::{json_escaped, table_name};
 
 /// One JSON object on one line.
 pub(crate) fn json_line(value: &impl Serialize) -> anyhow::Result<String> {
@@ -30,16 +30,24 @@ pub(crate) fn csv_table<R: Serialize>(rows: impl Iterator<Item = R>) -> anyhow::
     finished(writer)
 }
 
-/// The text that `writer` has written, which a terminal shows as it is: control characters in names are
-/// escaped but for line breaks, which are quoted.
+/// The table that `writer` has written, with names as terminals and spreadsheets may show them: on one
+/// line, and no formulas ([`table_name`]).
 pub(crate) fn finished(writer: csv::Writer<Vec<u8>>) -> anyhow::Result<String> {
     let bytes = writer
         .into_inner()
         .map_err(csv::IntoInnerError::into_error)?;
-    let text = String::from_utf8(bytes)?;
-    if !text.contains(|c: char| (c.is_control() && c != '\n') || is_deceptive(c)) {
-        return Ok(text);
+    let mut rows = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .from_reader(bytes.as_slice());
+    let mut shown = csv::WriterBuilder::new()
+        .flexible(true)
+        .from_writer(Vec::with_capacity(bytes.len()));
+    for row in rows.records() {
+        shown.write_record(row?.iter().map(table_name))?;
     }
-    let lines: Vec<String> = text.split('\n').map(printable).collect();
-    Ok(lines.join("\n"))
+    let bytes = shown
+        .into_inner()
+        .map_err(csv::IntoInnerError::into_error)?;
+    Ok(String::from_utf8(bytes)?)
 }

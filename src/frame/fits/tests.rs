@@ -550,6 +550,216 @@ fn dates_are_read_as_programs_have_written_them() {
 }
 
 #[test]
+fn a_date_is_put_together_from_all_keywords() {
+    for (cards, expected, ignored) in [
+        // The number is right where a year of two digits cannot be.
+        (
+            &["DATE-OBS= '15/01/20'", "MJD-OBS = 58863.8333333"][..],
+            "2020-01-15T20:00:00Z",
+            1,
+        ),
+        (
+            &["DATE-OBS= '15/01/94'", "MJD-OBS = 58863.8333333"],
+            "2020-01-15T20:00:00Z",
+            1,
+        ),
+        (
+            &["DATE-OBS= '15/01/94'", "MJD-OBS = 49367.8333333"],
+            "1994-01-15T20:00:00Z",
+            0,
+        ),
+        (
+            &["DATE-OBS= '2020-01-15'", "JD      = 2458864.3333333"],
+            "2020-01-15T20:00:00Z",
+            0,
+        ),
+        (
+            &["DATE-OBS= '2020-01-15'", "MJD-OBS = 58000.5"],
+            "2020-01-15",
+            1,
+        ),
+        (
+            &["DATE-OBS= '2020-01-15T20:00:00'", "MJD-OBS = 58863.9"],
+            "2020-01-15T20:00:00Z",
+            1,
+        ),
+        // An exposure of two hours, and the middle of a stack.
+        (
+            &[
+                "DATE-OBS= '2020-01-15T20:00:00'",
+                "MJD-OBS = 58863.9",
+                "EXPTIME = 7200",
+            ],
+            "2020-01-15T20:00:00Z",
+            0,
+        ),
+        (
+            &["DATE-OBS= '2020-01-15T20:00:00'", "MJD-AVG = 58864.0"],
+            "2020-01-15T20:00:00Z",
+            0,
+        ),
+        (
+            &["DATE-OBS= '2020-01-15T20:00:00'", "MJD-OBS = 0.0"],
+            "2020-01-15T20:00:00Z",
+            1,
+        ),
+        (
+            &["DATE_OBS= '2020-01-15T20:00:00'"],
+            "2020-01-15T20:00:00Z",
+            0,
+        ),
+        (&["MJD     = 58863.8333334"], "2020-01-15T20:00:00Z", 0),
+        (&["JD-OBS  = 2458864.3333334"], "2020-01-15T20:00:00Z", 0),
+        (&["JD_UTC  = '2458864.3333334'"], "2020-01-15T20:00:00Z", 0),
+        (&["MJD-OBS = 58863"], "2020-01-15", 0),
+        (
+            &["DATE-OBS= '2020-01-15'", "TIME-OBS= '20 00 00'"],
+            "2020-01-15T20:00:00Z",
+            0,
+        ),
+        (
+            &["DATE-OBS= '2020-01-15'", "UT-START= '20:00:00'"],
+            "2020-01-15T20:00:00Z",
+            0,
+        ),
+        (
+            &["DATE-OBS= '2020-01-15'", "UT      = 20.0"],
+            "2020-01-15T20:00:00Z",
+            0,
+        ),
+        (
+            &["DATE-OBS= '2020-01-15'", "UTC     = 72000.000"],
+            "2020-01-15T20:00:00Z",
+            0,
+        ),
+        (
+            &[
+                "DATE-OBS= '2020-01-15'",
+                "TIME-OBS= 'late'",
+                "UT      = '20:00:00'",
+            ],
+            "2020-01-15T20:00:00Z",
+            1,
+        ),
+        (
+            &["DATE-OBS= '15/01/2020'", "TIME-OBS= '2020-01-15T20:00:00'"],
+            "2020-01-15T20:00:00Z",
+            0,
+        ),
+        (
+            &["DATE-OBS= '2020-01-15T20:01:09.184'", "TIMESYS = 'TT'"],
+            "2020-01-15T20:00:00Z",
+            0,
+        ),
+        (
+            &["MJD-OBS = 58863.8337614", "TIMESYS = 'TAI'"],
+            "2020-01-15T20:00:00Z",
+            0,
+        ),
+        (
+            &["DATE-OBS= '2020-01-15T20:00:37(TAI)'", "TIMESYS = 'UTC'"],
+            "2020-01-15T20:00:00Z",
+            0,
+        ),
+        (
+            &["DATE-OBS= '2020-01-15T20:00:00'", "TIMESYS = 'LOCAL'"],
+            "2020-01-15",
+            1,
+        ),
+        (
+            &["DATE-OBS= 'tonight'", "DATE-BEG= '2020-01-15'"],
+            "2020-01-15",
+            1,
+        ),
+    ] {
+        let metadata = metadata_of(cards);
+        assert_eq!(metadata.date.unwrap().to_iso(), expected, "{cards:?}");
+        assert_eq!(
+            metadata.ignored.len(),
+            ignored,
+            "{cards:?} {:?}",
+            metadata.ignored
+        );
+        assert!(metadata.assumed.is_empty());
+    }
+    let unclear = metadata_of(&["DATE-OBS= '02/03/2020'"]);
+    assert_eq!(unclear.date.unwrap().to_iso(), "2020-03-02");
+    assert_eq!(
+        unclear.assumed[0].to_string(),
+        "DATE-OBS may be read in two ways: found 02/03/2020, read as day, month, year"
+    );
+    for (text, expected) in [
+        (
+            "15/01/20",
+            "DATE-OBS is ignored: found 15/01/20, expected a year of four digits",
+        ),
+        (
+            "1066-10-14",
+            "DATE-OBS is ignored: found 1066-10-14, expected a year from 1850 to 2100",
+        ),
+        (
+            "tonight",
+            "DATE-OBS is ignored: found tonight, expected a date such as 2019-07-29, \
+             2019-07-29T20:47:26 or 29/07/2019",
+        ),
+    ] {
+        let metadata = metadata_of(&[&format!("DATE-OBS= '{text}'")]);
+        assert_eq!(metadata.date, None);
+        assert_eq!(metadata.ignored[0].to_string(), expected);
+    }
+}
+
+#[test]
+fn an_exposure_is_read_in_all_its_keywords() {
+    for card in [
+        "EXPTIME = 1.5",
+        "EXPOSURE= 1.5",
+        "EXP_TIME= 1.5",
+        "EXP-TIME= 1.5",
+        "XPOSURE = 1.5",
+        "EXPOINUS= 1500000",
+    ] {
+        assert_eq!(metadata_of(&[card]).exposure_s, Some(1.5), "{card}");
+    }
+    let both = metadata_of(&["EXPOINUS= 1500000", "EXPTIME = 2"]);
+    assert_eq!(both.exposure_s, Some(2.0));
+}
+
+#[test]
+fn a_site_that_is_not_set_is_none() {
+    for (cards, ignored) in [
+        (&["SITELAT = 0.0", "SITELONG= 0.0"][..], 1),
+        (
+            &[
+                "LAT-OBS = '+00 00 00'",
+                "LONG-OBS= '00 00 00'",
+                "ALT-OBS = 0",
+            ],
+            1,
+        ),
+        (&["SITELAT = '-0.0'", "SITELONG= '0'"], 1),
+        (&["SITELAT = '     '", "SITELONG= ''"], 0),
+        (&["SITELAT =", "SITELONG="], 0),
+    ] {
+        let metadata = metadata_of(cards);
+        assert_eq!(
+            (metadata.site, metadata.ignored.len()),
+            (None, ignored),
+            "{cards:?}"
+        );
+    }
+    let second = metadata_of(&[
+        "SITELAT = 0",
+        "SITELONG= 0",
+        "OBSGEO-B= 52.2",
+        "OBSGEO-L= 4.4",
+    ]);
+    assert!(second.site.is_some());
+    let equator = metadata_of(&["SITELAT = 0", "SITELONG= -78.5"]);
+    assert!(equator.site.is_some());
+}
+
+#[test]
 fn the_site_is_read_in_all_its_keywords() {
     for cards in [
         &[
