@@ -174,16 +174,6 @@ pub(super) fn frame_from_floats(
     Frame::new(width, height, pixels)
 }
 
-/// Interleaves samples that are stored plane by plane.
-pub(super) fn interleaved<T: Copy>(planes: &[T], channels: usize) -> Vec<T> {
-    let mut values = planes.to_vec();
-    for (channel, plane) in planes.chunks_exact(planes.len() / channels).enumerate() {
-        let places = values.iter_mut().skip(channel).step_by(channels);
-        places.zip(plane).for_each(|(value, level)| *value = *level);
-    }
-    values
-}
-
 /// The luminance of one pixel; `full` if a channel is saturated.
 fn luminance(rgb: [f32; 3], full: f32) -> f32 {
     if rgb.iter().any(|&channel| channel >= full) {
