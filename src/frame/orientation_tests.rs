@@ -104,6 +104,21 @@ fn every_format_is_drawn_as_its_orientation_says() {
 }
 
 #[test]
+fn an_orientation_after_the_image_of_a_png_counts_too() {
+    const CHUNK_BYTES: usize = 12;
+    let data = exif(Value::Short(vec![6]), In::PRIMARY, true);
+    let before = png(data.clone(), false);
+    let start = memchr::memmem::find(&before, b"eXIf").unwrap() - 4;
+    let chunk = start..start + CHUNK_BYTES + data.len();
+    let mut after = before.clone();
+    let chunk: Vec<u8> = after.drain(chunk).collect();
+    let end = after.len() - CHUNK_BYTES;
+    after.splice(end..end, chunk);
+    assert_ne!(after, before);
+    assert_eq!(decode(&after).unwrap(), decode(&before).unwrap());
+}
+
+#[test]
 fn values_without_a_meaning_and_those_of_thumbnails_turn_nothing() {
     let upright = Frame::from_samples(WIDTH as usize, HEIGHT as usize, levels()).unwrap();
     for value in [0, 9, 400] {

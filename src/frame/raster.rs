@@ -37,7 +37,8 @@ pub(super) fn decode_png(bytes: &[u8], account: &Account) -> Result<Frame<'stati
         ExtendedColorType::L4 => 17.0,
         _ => 1.0,
     };
-    let mut frame = decode_with(decoder, format, bytes.len(), account)?;
+    let exif = exif_of_png(bytes);
+    let mut frame = decode_with(decoder, exif, format, bytes.len(), account)?;
     frame.step_adu = frame.step_adu.max(step);
     Ok(frame)
 }
@@ -47,7 +48,7 @@ pub(super) fn decode_png(bytes: &[u8], account: &Account) -> Result<Frame<'stati
 /// As [`super::reader::decode`].
 pub(super) fn decode_jpeg(bytes: &[u8], account: &Account) -> Result<Frame<'static>, FrameError> {
     let format = FrameFormat::Jpeg;
-    let decoder = JpegDecoder::new(account.timed(Cursor::new(bytes)))
+    let mut decoder = JpegDecoder::new(account.timed(Cursor::new(bytes)))
         .map_err(|e| account.why(error_of(e, format, bytes.len())))?;
     // The decoder fills missing data and reports no error.
     if !has_end(bytes) {
@@ -71,7 +72,8 @@ pub(super) fn decode_jpeg(bytes: &[u8], account: &Account) -> Result<Frame<'stat
     let bytes_per_pixel = decoder_bytes_per_pixel(&decoder) + coefficients;
     account.check_image((width, height), bytes_per_pixel + size_of::<f32>())?;
     check_rows(bytes)?;
-    decode_with(decoder, format, bytes.len(), account)
+    let exif = decoder.exif_metadata().ok().flatten();
+    decode_with(decoder, exif.as_deref(), format, bytes.len(), account)
 }
 
 /// Decodes a Windows bitmap.
@@ -92,7 +94,7 @@ pub(super) fn decode_bmp(bytes: &[u8], account: &Account) -> Result<Frame<'stati
     }
     let decoder = BmpDecoder::new(account.timed(Cursor::new(bytes)))
         .map_err(|e| account.why(error_of(e, format, bytes.len())))?;
-    decode_with(decoder, format, bytes.len(), account)
+    decode_with(decoder, None, format, bytes.len(), account)
 }
 
 /// Decodes a portable anymap: PBM, PGM, PPM (plain or binary) or PAM, with the levels of the file.
@@ -127,6 +129,26 @@ pub(super) fn decode_pnm(bytes: &[u8], account: &Account) -> Result<Frame<'stati
     }
 }
 
+/// The Exif attributes of a PNG file: the data of its chunk `eXIf`, which the decoder does not find after
+/// those of the image.
+fn exif_of_png(bytes: &[u8]) -> Option<&[u8]> {
+    const SIGNATURE_BYTES: usize = 8;
+    let mut rest = bytes.get(SIGNATURE_BYTES..)?;
+    loop {
+        let (length, chunk) = rest.split_first_chunk()?;
+        let (kind, chunk) = chunk.split_first_chunk()?;
+        let length = u32::from_be_bytes(*length) as usize;
+        let (data, after) = chunk.split_at_checked(length)?;
+        match kind {
+            b"eXIf" => return Some(data),
+            b"IEND" => return None,
+            _ => {}
+        }
+        let (_crc, next) = after.split_first_chunk::<4>()?;
+        rest = next;
+    }
+}
+
 /// The four bytes at `at`.
 fn word(bytes: &[u8], at: usize) -> Option<[u8; 4]> {
     bytes.get(at..)?.first_chunk().copied()
@@ -146,18 +168,18 @@ fn decoder_bytes_per_pixel(decoder: &impl ImageDecoder) -> usize {
 
 /// Checks the size, decodes, converts to luminance and adds the Exif metadata.
 fn decode_with(
-    mut decoder: impl ImageDecoder,
+    decoder: impl ImageDecoder,
+    exif: Option<&[u8]>,
     format: FrameFormat,
     found_bytes: usize,
     account: &Account,
 ) -> Result<Frame<'static>, FrameError> {
-    let exif = decoder.exif_metadata().ok().flatten();
     let decoded = Decoded::new(decoder, format, found_bytes, account)?;
     let frame = match decoded.depth {
         Depth::Eight => decoded.integers(decoded.image.as_bytes(), u8::MAX),
         Depth::Sixteen => decoded.integers(decoded.words(), u16::MAX),
     }?;
-    let metadata = exif.map(|exif| exif::metadata(&exif, frame.width));
+    let metadata = exif.map(|exif| exif::metadata(exif, frame.width));
     Ok(frame.with_metadata(metadata.unwrap_or_default()).drawn())
 }
 
@@ -240,7 +262,9 @@ fn unsupported(format: FrameFormat, found: String) -> FrameError {
 
 /// Sorts the decoder's errors into truncated, unsupported and damaged.
 fn error_of(error: ImageError, format: FrameFormat, found_bytes: usize) -> FrameError {
-    let detail = error.to_string();
+    // Some of the decoders' messages have several lines.
+    let message = error.to_string();
+    let detail = message.split_whitespace().collect::<Vec<_>>().join(" ");
     let truncated = |detail| FrameError::Truncated {
         format,
         found_bytes,

@@ -33,7 +33,8 @@ pub(super) mod tag {
 const DEPTHS: &str = "unsigned integers of 1 to 32 or 64 bits, signed ones of 8, 16, 32 or 64, or floats of 16, 32 or 64, \
                       the same for all channels";
 const COLOURS: &str = "grey or RGB, with or without alpha, or YCbCr in JPEG";
-const COMPRESSIONS: &str = "none, LZW, deflate, PackBits, JPEG (8 bits) or CCITT group 4 (1 bit)";
+const COMPRESSIONS: &str =
+    "none, LZW, deflate, PackBits, JPEG (1 or 3 samples of 8 bits) or CCITT group 4 (1 bit)";
 const PREDICTORS: &str =
     "none, differences of 8, 16, 32 or 64 bits, or differences of floats, in LZW or deflate";
 
@@ -141,12 +142,17 @@ impl<'a> Layout<'a> {
                 )));
             }
         };
+        let chunk_samples = if is_planar { 1 } else { samples };
+        if compression == Compression::Jpeg && !matches!(chunk_samples, 1 | 3) {
+            let found = format!("JPEG of {chunk_samples} samples of a pixel");
+            return Err(unsupported(found, COMPRESSIONS));
+        }
         let mut layout = Self {
             width,
             height,
             depth,
             channels,
-            chunk_samples: if is_planar { 1 } else { samples },
+            chunk_samples,
             color,
             compression,
             predictor,

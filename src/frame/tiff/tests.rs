@@ -371,6 +371,7 @@ fn what_is_not_read_is_named_with_what_is() {
         (grey().with(277, 3), "3 samples of a grey pixel"),
         (grey().with(259, 6), "JPEG of the old kind (compression 6)"),
         (grey().with(259, 7).with(258, 12), "JPEG of 12 bits"),
+        (grey().with(259, 7).with(277, 2), "JPEG of 2 samples"),
         (grey().with(259, 3), "group 3"),
         (grey().with(259, 50_000), "Zstandard"),
         (
