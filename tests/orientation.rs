@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::drawing::{View, bright_stars, save};
+use common::drawing::{Picture, View, bright_stars, save};
 use common::{Ran, number, starpipe};
 use serde_json::Value;
 use std::collections::HashMap;
@@ -115,10 +115,15 @@ impl Solved {
             directory.path(),
             "drawn.png",
         );
-        let out = directory.path().join("out");
+        Self::of_file(view, &path, &[])
+    }
+
+    /// The picture of `view` in the file `path`, solved with more options.
+    fn of_file(view: View, path: &Path, options: &[&str]) -> Self {
+        let out = tempfile::tempdir().unwrap();
         let mut command = starpipe();
-        command.args(["process", "--format", "json", "--out"]);
-        let ran = Ran::new(command.args([&out, &path]));
+        command.args(["process", "--format", "json"]).args(options);
+        let ran = Ran::new(command.arg("--out").args([out.path(), path]));
         let report = ran.reports().remove(0);
         assert_eq!(
             ran.status, 0,
@@ -128,7 +133,7 @@ impl Solved {
         Self {
             view,
             report,
-            header: header(&out.join("drawn.wcs")),
+            header: header(&out.path().join("drawn.wcs")),
         }
     }
 
@@ -298,6 +303,78 @@ fn frames_across_the_line_of_0h_are_where_they_were_drawn() {
     for (ra_deg, dec_deg) in [(0.0, 20.0), (359.99, -10.0), (0.01, 60.0)] {
         Solved::new(view(ra_deg, dec_deg, 12.0, false)).check_all();
     }
+}
+
+/// Writes the rows of a detector as a TIFF file with an `Orientation`.
+fn save_stored(rows: &Picture, orientation: u16, path: &Path) {
+    use tiff::encoder::{TiffEncoder, colortype::Gray16};
+    let mut encoder = TiffEncoder::new(fs::File::create(path).unwrap()).unwrap();
+    let image = encoder.new_image::<Gray16>(rows.width(), rows.height());
+    let mut image = image.unwrap();
+    let tag = tiff::tags::Tag::Orientation;
+    image.encoder().write_tag(tag, orientation).unwrap();
+    image.write_data(rows.as_raw()).unwrap();
+}
+
+#[test]
+fn a_picture_that_its_file_turns_is_where_it_was_drawn() {
+    use image::imageops::{flip_vertical, rotate90, rotate180, rotate270};
+    let portrait = View {
+        width: HEIGHT,
+        height: WIDTH,
+        fov_deg: 20.0,
+        ..view(280.0, -25.0, 75.0, false)
+    };
+    let picture = portrait.picture(&bright_stars());
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("drawn.tif");
+    for (orientation, rows) in [
+        (3, rotate180(&picture)),
+        (6, rotate270(&picture)),
+        (7, flip_vertical(&rotate90(&picture))),
+        (8, rotate90(&picture)),
+    ] {
+        save_stored(&rows, orientation, &path);
+        let solved = Solved::of_file(portrait, &path, &[]);
+        solved.check_all();
+        let notes = solved.report["notes"].to_string();
+        let stated = format!("(Orientation {orientation})");
+        assert!(notes.contains(&stated), "{notes}");
+    }
+}
+
+#[test]
+fn a_turned_picture_is_calibrated_in_the_rows_of_its_file() {
+    const PEDESTAL_ADU: u16 = 100;
+    let portrait = View {
+        width: HEIGHT,
+        height: WIDTH,
+        fov_deg: 20.0,
+        ..view(280.0, -25.0, 75.0, false)
+    };
+    let mut rows = image::imageops::rotate270(&portrait.picture(&bright_stars()));
+    // Bright columns of the detector, which the dark has, too: rows of the picture.
+    let mut dark = Picture::new(rows.width(), rows.height());
+    for (x, _, level) in dark.enumerate_pixels_mut() {
+        let is_bright = x.is_multiple_of(16);
+        level.0[0] = PEDESTAL_ADU + if is_bright { 3000 } else { 0 };
+    }
+    for (level, dark) in rows.pixels_mut().zip(dark.pixels()) {
+        level.0[0] = level.0[0].saturating_add(dark.0[0] - PEDESTAL_ADU);
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("drawn.tif");
+    save_stored(&rows, 6, &path);
+    let master = save(&dark, directory.path(), "dark.png");
+    // The last column and row of the detector.
+    let list = directory.path().join("hot.csv");
+    let (x, y) = (rows.width() - 1, rows.height() - 1);
+    fs::write(&list, format!("x,y\n{x},{y}\n")).unwrap();
+    let text = |path: &Path| path.to_str().unwrap().to_owned();
+    let options = ["--dark", &text(&master), "--hot-pixels", &text(&list)];
+    let solved = Solved::of_file(portrait, &path, &options);
+    solved.check_attitude();
+    solved.check_stars();
 }
 
 #[test]
