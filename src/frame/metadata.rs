@@ -1,5 +1,6 @@
 //! How a frame was taken, according to its file.
 
+use super::mosaic::BayerPattern;
 use super::orientation::Orientation;
 use super::row_order::RowOrder;
 use crate::base::epoch::ObservationDate;
@@ -28,6 +29,8 @@ pub struct FrameMetadata {
     pub zenith_distance_deg: Option<f64>,
     /// Which image of the file it is, where it is not the first.
     pub choice: Option<ImageChoice>,
+    /// The mosaic of colour filters that the file states. Drivers of grey cameras state one, too.
+    pub bayer_pattern: Option<BayerPattern>,
     /// Values outside their plausible range. They are not used.
     pub ignored: Vec<IgnoredValue>,
     /// What the file leaves open, and how it was read.

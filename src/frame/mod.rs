@@ -23,6 +23,8 @@
 //! reading, so that y = 0 is the top row as FITS viewers draw the picture ([`RowOrder`]). Pictures of
 //! other formats are turned as their `Orientation` says ([`Orientation`]).
 //!
+//! Raw frames of colour cameras are read as they are; [`Mosaic`] finds them and makes them grey.
+//!
 //! Caveats: transparency is ignored. JPEG's gamma is not undone, so fluxes from JPEG are not
 //! linear. Integers and floats of more than 24 bits are rounded to 24.
 
@@ -41,6 +43,7 @@ mod levels;
 mod limits;
 mod memory;
 mod metadata;
+mod mosaic;
 mod orientation;
 mod pages;
 mod pixels;
@@ -61,6 +64,7 @@ pub use levels::{LUMINANCE_WEIGHTS, WholeNumber};
 pub use limits::{MAX_PAGES, MAX_PIXELS, MIN_SIDE_PX};
 pub use memory::MemoryLimit;
 pub use metadata::{Assumption, FrameMetadata, IgnoredValue, ImageChoice};
+pub use mosaic::{BayerPattern, Mosaic};
 pub use orientation::Orientation;
 pub use pages::Pages;
 pub use pixels::Pixels;

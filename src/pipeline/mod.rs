@@ -4,7 +4,7 @@
 //!
 //! 1. The frame is read, and calibrated where the context has a calibration.
 //! 2. Its priors are resolved: the context's, then the camera's, the header's and the file name's.
-//! 3. Stars are detected, and identified; where they are not, the cause is sought.
+//! 3. Stars are detected, in a raw colour frame after its mosaic is smoothed to grey, and identified; where they are not, the cause is sought.
 //! 4. The Moon and the planets are found where the date is known.
 //! 5. Photometry: zero point and limiting magnitude.
 //! 6. Where the context has a camera, the frame is compared with it.
@@ -22,6 +22,7 @@ mod error;
 mod identification;
 mod note;
 mod outcome;
+mod raw_colour;
 mod solution;
 mod solve;
 mod solved;
@@ -38,6 +39,7 @@ pub use error::Error;
 pub use identification::star_field;
 pub use note::Note;
 pub use outcome::{Outcome, Reason};
+pub use raw_colour::RawColour;
 pub use solution::{Background, Measured, Solution, Source};
 pub use solve::{solve_file, solve_frame, solve_guarded, solve_read};
 pub use stopwatch::Timing;

@@ -4,6 +4,7 @@ use super::body_in_frame::BodyInFrame;
 use super::bright_stars::MissingStar;
 use super::centroid_list::LeftOut;
 use super::outcome::Outcome;
+use super::raw_colour::RawColour;
 use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;
@@ -40,6 +41,8 @@ pub enum Note {
     RowsLeftOut(LeftOut),
     /// A list has no brightnesses; its rows were taken to be in their order.
     BrightnessUnknown,
+    /// The frame is a raw one of a colour camera: what its pixels and its zero point are of.
+    ColourMosaic(RawColour),
     /// The scale in the header is not that of the frame.
     WrongHeaderScale {
         /// Smallest and largest pixel scale that the header allows, in radians.
@@ -100,6 +103,7 @@ impl Note {
             Self::Assumed(assumption) => assumption.code(),
             Self::RowsLeftOut(_) => "rows_left_out",
             Self::BrightnessUnknown => "brightness_unknown",
+            Self::ColourMosaic(_) => "colour_mosaic",
             Self::WrongHeaderScale { .. } => "header_scale_wrong",
             Self::BelowHorizon { .. } => "below_horizon",
             Self::NoTimeOfDay => "time_of_day_unknown",
@@ -248,6 +252,7 @@ impl fmt::Display for Note {
             Self::BrightnessUnknown => f.write_str(
                 "the list has no flux and no magnitude; its rows were taken to be in order of brightness",
             ),
+            Self::ColourMosaic(mosaic) => write_mosaic(f, mosaic),
             Self::WrongHeaderScale {
                 pixel_scale_rad: (low_rad, high_rad),
             } => write!(
@@ -309,6 +314,23 @@ impl fmt::Display for Note {
                 "the stars lie {rms_px:.1} px (rms) from where they are expected, more than their centroid errors explain: the lens or the spots are not as assumed; the stated errors include {excess_sigma_px:.1} px a star on each axis"
             ),
         }
+    }
+}
+
+fn write_mosaic(f: &mut fmt::Formatter<'_>, mosaic: &RawColour) -> fmt::Result {
+    f.write_str("the frame is a raw colour mosaic")?;
+    if let Some(pattern) = mosaic.pattern {
+        write!(f, " ({pattern})")?;
+    }
+    f.write_str(": stars were measured in the mean of the filters around each pixel; ")?;
+    match mosaic.green_over_mean {
+        Some(ratio) => write!(
+            f,
+            "fluxes and the zero point are those of the green pixels, {ratio:.2} times that mean"
+        ),
+        None => f.write_str(
+            "fluxes and the zero point are those of that mean, a quarter red, half green, a quarter blue",
+        ),
     }
 }
 

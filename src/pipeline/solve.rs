@@ -4,13 +4,14 @@ use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
 use super::error::Error;
 use super::identification::{identify_stars, observation};
+use super::raw_colour::RawColour;
 use super::solution::{Solution, Source};
 use super::solved::Solved;
 use super::stopwatch::{Stage, Stopwatch};
 use crate::base::panics::caught;
 use crate::calibration::Calibration;
 use crate::detect::{self, DetectError};
-use crate::frame::{self, Frame, FrameError, MemoryLimit};
+use crate::frame::{self, Frame, FrameError, MemoryLimit, Mosaic, SaturationFinder};
 use std::num::NonZeroUsize;
 use std::path::Path;
 
@@ -47,6 +48,8 @@ pub fn solve_read(
     let mut clock = Stopwatch::start();
     workspace.set_deadline(clock.deadline(context.time_limit));
     let mut frame = read(&mut workspace.frames)?;
+    // A flat evens out the levels by which a mosaic is found.
+    let mosaic = Mosaic::of(&frame);
     let calibration = context.calibration;
     if let Some(calibration) = calibration {
         calibration
@@ -62,6 +65,7 @@ pub fn solve_read(
         name: Some(name),
         calibration,
         memory: workspace.frames.memory_of_frame(),
+        mosaic,
         clock,
     };
     let solution = solve(input, context, workspace).map_err(|source| Error::Detect {
@@ -87,6 +91,7 @@ pub fn solve_frame(
         name: None,
         calibration: None,
         memory: workspace.frames.memory(),
+        mosaic: Mosaic::of(frame),
         clock,
     };
     solve(input, context, workspace)
@@ -117,6 +122,8 @@ struct Input<'a> {
     calibration: Option<&'a Calibration>,
     /// For the frame and the work on it.
     memory: MemoryLimit,
+    /// The mosaic of a raw colour frame.
+    mosaic: Option<Mosaic>,
     clock: Stopwatch,
 }
 
@@ -126,12 +133,21 @@ fn solve(
     context: &Context,
     workspace: &mut Workspace,
 ) -> Result<Solution, DetectError> {
-    let (frame, mut clock) = (input.frame, input.clock);
+    let (raw, mut clock) = (input.frame, input.clock);
     workspace.detect.set_memory(input.memory);
-    let priors = context.priors_of(frame, input.name);
+    let priors = context.priors_of(raw, input.name);
 
-    let config = context.detect_config(frame);
-    let detections = detect::detect(frame, &config, &mut workspace.detect)?;
+    let config = context.detect_config(raw);
+    let grey = input.mosaic.map(|mosaic| {
+        // Of the raw pixels: smoothing blurs the level.
+        let saturation_adu = config.saturation_adu(raw, &mut SaturationFinder::default());
+        mosaic.grey(raw, saturation_adu)
+    });
+    let frame = grey.as_ref().unwrap_or(raw);
+    let mut detections = detect::detect(frame, &config, &mut workspace.detect)?;
+    let mosaic = input
+        .mosaic
+        .map(|mosaic| RawColour::restore(mosaic, raw, &mut detections));
     clock.lap(Stage::Detect);
 
     let buffers = (workspace, &mut clock);
@@ -145,6 +161,7 @@ fn solve(
         context,
         frame,
         calibration: input.calibration,
+        mosaic,
         observation: observation(&outcome, &priors),
         priors,
         detections,

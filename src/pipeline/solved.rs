@@ -5,6 +5,7 @@ use super::bright_stars::NamedFrame;
 use super::context::Context;
 use super::note::Note;
 use super::outcome::Outcome;
+use super::raw_colour::RawColour;
 use super::solution::{Background, Solution, Source};
 use super::stopwatch::Timing;
 use crate::base::statistics::Estimate;
@@ -24,6 +25,8 @@ pub(super) struct Solved<'a> {
     pub frame: &'a Frame<'a>,
     /// The calibration that was applied.
     pub calibration: Option<&'a Calibration>,
+    /// What follows from the mosaic of a raw colour frame.
+    pub mosaic: Option<RawColour>,
     pub priors: Priors,
     pub detections: Detections,
     /// The detections as sources.
@@ -69,16 +72,24 @@ impl Solved<'_> {
         let field = found.map_or(Vec::new(), |found| self.field(found));
         // Of the brightest stars alone the faintest says nothing.
         let of_all = found.filter(|_| !self.detections.are_more);
+        let detected = (
+            self.detections.spot_sigma_px,
+            self.detections.threshold_sigma,
+        );
+        let (spot_sigma_px, threshold_sigma) = match self.mosaic {
+            Some(_) => RawColour::of_raw_pixels(detected.0, detected.1),
+            None => detected,
+        };
         let frame = FrameMeasurement {
             detect: self.context.detect.clone(),
             size_px: self.frame.stored_size(),
             exposure_s: self.priors.exposure_s,
             background_adu: self.detections.background_adu,
             noise_adu: self.detections.noise_adu,
-            threshold_sigma: self.detections.threshold_sigma,
+            threshold_sigma,
             vignetting: self.stated_vignetting(),
             wings: self.detections.wings.map_or(0.0, |wings| wings.share),
-            spot_sigma_px: found.map(|_| self.detections.spot_sigma_px),
+            spot_sigma_px: found.map(|_| spot_sigma_px),
             pixel_scale_rad: found.map(|found| 1.0 / found.camera.focal_length_px),
             zenith_distance_deg: self.observation.as_ref().map(zenith_distance_deg),
             header_zenith_distance_deg: self.frame.metadata.zenith_distance_deg,
@@ -136,6 +147,7 @@ impl Solved<'_> {
         let is_named = !self.context.attitude_only;
         let camera = self.context.camera.as_ref().filter(|_| is_named);
         Note::of_file(&self.frame.metadata)
+            .chain(self.mosaic.map(Note::ColourMosaic))
             .chain(Note::of_scale(self.dropped_scale, outcome))
             .chain(Note::of_observation(observation, priors, outcome))
             .chain(Note::of_camera(camera, comparison))

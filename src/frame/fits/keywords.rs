@@ -12,6 +12,8 @@
 //!   viewers draw it and as Siril and PixInsight read it.
 //! - Saturation level: SATURATE; else DATAMAX where it is the full scale of 8 to 32 bits, or 1, as
 //!   many programs write the highest value of the image there.
+//! - Filters of a colour camera: BAYERPAT or COLORTYP, `RGGB` and the like, for the first row of the
+//!   picture, and shifted by XBAYROFF columns and YBAYROFF rows.
 //! - Zenith distance: CENTALT or OBJCTALT, the altitude in degrees.
 //!
 //! In keywords with a dash an underscore may stand for it: DATE_OBS.
@@ -23,7 +25,7 @@ use crate::base::angle::Angle;
 use crate::frame::metadata::{
     ALTITUDE, EXPOSURE, FOCAL_LENGTH, FrameMetadata, HeaderNumber, PIXEL_SIZE,
 };
-use crate::frame::{Frame, RowOrder};
+use crate::frame::{BayerPattern, Frame, RowOrder};
 use crate::sky::observer::Site;
 
 /// Metadata from `headers`; earlier headers have priority.
@@ -42,6 +44,7 @@ pub(super) fn metadata<'a>(headers: impl Iterator<Item = &'a Header<'a>>) -> Fra
     metadata.site = keywords.site(&mut metadata);
     let altitude_deg = keywords.number(&mut metadata, &ALTITUDE, &["CENTALT", "OBJCTALT"]);
     metadata.zenith_distance_deg = altitude_deg.map(|altitude| 90.0 - altitude);
+    metadata.bayer_pattern = keywords.bayer_pattern();
     metadata
 }
 
@@ -95,6 +98,15 @@ impl Keywords<'_> {
             metadata.ignore(KEYWORD, &text, "TOP-DOWN or BOTTOM-UP");
             RowOrder::BottomUp
         })
+    }
+
+    /// Programs write other things into these keywords, such as `MONO` or names of other mosaics.
+    fn bayer_pattern(&self) -> Option<BayerPattern> {
+        let texts = ["BAYERPAT", "COLORTYP"].map(|keyword| self.text(keyword));
+        let mut stated = texts.iter().flatten();
+        let pattern = stated.find_map(|text| BayerPattern::of_name(text))?;
+        let offset = |keyword| self.number_of(keyword).map_or(0, |offset| offset as i64);
+        Some(pattern.shifted(offset("XBAYROFF"), offset("YBAYROFF")))
     }
 
     /// The value of `keyword`, which may be written with underscores instead of dashes.

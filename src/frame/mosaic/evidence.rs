@@ -1,0 +1,230 @@
+//! Whether a frame is a mosaic: the backgrounds of its four interleaved frames, in patches all over
+//! it.
+//!
+//! Let a, b; c, d be the levels of 2 × 2 pixels. Readout through two or more amplifiers and noise of
+//! columns or rows make columns or rows differ: then b + c − a − d is 0, as it is in a gradient. A
+//! mosaic has the same filter twice, on a diagonal. Where more light passes there is more shot noise,
+//! as well.
+
+use super::pattern::{BayerPattern, Diagonal};
+use crate::base::statistics::median;
+use crate::frame::Frame;
+
+/// Side of a patch, in pixels: 256 of each filter.
+const PATCH_PX: usize = 32;
+/// Patches along an axis for a first look, which costs a grey frame no time.
+const FIRST_PATCHES: usize = 8;
+/// Most patches along an axis.
+const MOST_PATCHES: usize = 48;
+/// Fewer patches prove nothing.
+const FEWEST_PATCHES: usize = 9;
+/// A contrast below this many standard errors is chance.
+const SIGNIFICANT_SIGMA: f64 = 6.0;
+/// Smaller contrasts of levels, in standard deviations of a pixel, do no harm.
+const LEAST_LEVELS: f64 = 0.1;
+/// Those of a frame whose header states a mosaic.
+const LEAST_OF_STATED: f64 = 0.02;
+/// Two filters are alike where their levels differ by less than this share of the contrast.
+const ALIKE: f64 = 0.25;
+
+/// The diagonal of the filters that are alike, if the frame is a mosaic for certain; less is needed
+/// where its header states a pattern.
+pub(super) fn green_diagonal(frame: &Frame, stated: Option<BayerPattern>) -> Option<Diagonal> {
+    if let Some(pattern) = stated {
+        let found = Contrasts::of(frame, MOST_PATCHES)?;
+        return found
+            .is_any()
+            .then(|| found.alike().unwrap_or(pattern.green()));
+    }
+    if !Contrasts::of(frame, FIRST_PATCHES)?
+        .levels
+        .exceeds(LEAST_LEVELS)
+    {
+        return None;
+    }
+    let found = Contrasts::of(frame, MOST_PATCHES)?;
+    found.is_by_light().then(|| found.green()).flatten()
+}
+
+/// How the interleaved backgrounds of a frame differ.
+struct Contrasts {
+    /// Of the levels of the two diagonals, in standard deviations of a pixel.
+    levels: Mean,
+    /// Of their variances, in parts of the variance.
+    noise: Mean,
+    /// Of the levels on each diagonal.
+    falling: Mean,
+    rising: Mean,
+}
+
+impl Contrasts {
+    /// Those of `frame`, in up to `most` patches along each axis.
+    fn of(frame: &Frame, most: usize) -> Option<Self> {
+        let patches = patches_of(frame, most);
+        if patches.len() < FEWEST_PATCHES {
+            return None;
+        }
+        let of = |value: fn(&Patch) -> f64, patch_error| {
+            Mean::of(patches.iter().map(value).collect(), patch_error)
+        };
+        Some(Self {
+            levels: of(Patch::levels, Patch::LEVEL_ERROR),
+            noise: of(Patch::noise, Patch::NOISE_ERROR),
+            falling: of(Patch::falling, Patch::LEVEL_ERROR),
+            rising: of(Patch::rising, Patch::LEVEL_ERROR),
+        })
+    }
+
+    /// Whether the diagonals differ at all.
+    fn is_any(&self) -> bool {
+        self.levels.exceeds(LEAST_OF_STATED) || self.noise.exceeds(LEAST_OF_STATED)
+    }
+
+    /// Whether they differ in the light that passes: where the level is higher there is more noise.
+    fn is_by_light(&self) -> bool {
+        let has_shot_noise = self.noise.exceeds(0.0) && self.noise.value * self.levels.value > 0.0;
+        self.levels.exceeds(LEAST_LEVELS) && has_shot_noise
+    }
+
+    /// The one diagonal whose filters are alike; `None` if both are, or neither.
+    fn alike(&self) -> Option<Diagonal> {
+        match [&self.falling, &self.rising].map(|on| self.is_small(on)) {
+            [true, false] => Some(Diagonal::Falling),
+            [false, true] => Some(Diagonal::Rising),
+            _ => None,
+        }
+    }
+
+    /// The green diagonal; `None` if no filters are alike.
+    fn green(&self) -> Option<Diagonal> {
+        if self.is_small(&self.falling) && self.is_small(&self.rising) {
+            // Red and blue are alike as well; more light passes green filters.
+            let is_rising = self.levels.value > 0.0;
+            return Some(if is_rising {
+                Diagonal::Rising
+            } else {
+                Diagonal::Falling
+            });
+        }
+        self.alike()
+    }
+
+    fn is_small(&self, difference: &Mean) -> bool {
+        difference.value.abs() < ALIKE * self.levels.value.abs()
+    }
+}
+
+/// The median over the patches, and its standard error.
+struct Mean {
+    value: f64,
+    sigma: f64,
+}
+
+impl Mean {
+    /// `patch_error`: the least standard error of one of `values`.
+    fn of(mut values: Vec<f64>, patch_error: f64) -> Self {
+        /// Standard error of a median over that of a mean, for Gaussian errors.
+        const OF_MEDIAN: f64 = 1.2533;
+        /// Standard deviation over the median of absolute deviations.
+        const OF_DEVIATIONS: f64 = 1.4826;
+        let value = median(&mut values);
+        values.iter_mut().for_each(|v| *v = (*v - value).abs());
+        let scatter = (OF_DEVIATIONS * median(&mut values)).max(patch_error);
+        let sigma = OF_MEDIAN * scatter / (values.len() as f64).sqrt();
+        Self { value, sigma }
+    }
+
+    /// Whether it is certain, and above `least`.
+    fn exceeds(&self, least: f64) -> bool {
+        self.value.abs() > least.max(SIGNIFICANT_SIGMA * self.sigma)
+    }
+}
+
+/// Level and variance of the pixels of each filter in a patch: a, b; c, d.
+struct Patch {
+    levels: [f64; 4],
+    variances: [f64; 4],
+}
+
+impl Patch {
+    /// Standard error of a contrast of levels, in standard deviations of a pixel: of four means of
+    /// 256, halved.
+    const LEVEL_ERROR: f64 = 1.0 / 16.0;
+    /// Standard error of a contrast of variances, in parts of the variance.
+    const NOISE_ERROR: f64 = 0.044;
+
+    fn sigma(&self) -> f64 {
+        (self.variances.iter().sum::<f64>() / 4.0).sqrt()
+    }
+
+    /// How much higher the levels on the rising diagonal are.
+    fn levels(&self) -> f64 {
+        let [a, b, c, d] = self.levels;
+        (b + c - a - d) / (2.0 * self.sigma())
+    }
+
+    /// How much larger the variances there are.
+    fn noise(&self) -> f64 {
+        let [a, b, c, d] = self.variances;
+        (b + c - a - d) / (a + b + c + d)
+    }
+
+    fn falling(&self) -> f64 {
+        (self.levels[3] - self.levels[0]) / self.sigma()
+    }
+
+    fn rising(&self) -> f64 {
+        (self.levels[2] - self.levels[1]) / self.sigma()
+    }
+}
+
+/// Patches all over the frame, without those that have no noise.
+fn patches_of(frame: &Frame, most: usize) -> Vec<Patch> {
+    let starts = |side: usize| {
+        let count = (side / PATCH_PX).min(most);
+        // Even, so that each patch begins with the same filter.
+        (0..count).map(move |i| (side - PATCH_PX) * i / count.max(2).saturating_sub(1) / 2 * 2)
+    };
+    let rows = starts(frame.height);
+    let places = rows.flat_map(|y| starts(frame.width).map(move |x| (x, y)));
+    let mut values = Vec::new();
+    places
+        .filter_map(|at| patch_at(frame, at, &mut values))
+        .collect()
+}
+
+fn patch_at(frame: &Frame, (x0, y0): (usize, usize), values: &mut Vec<f64>) -> Option<Patch> {
+    let mut patch = Patch {
+        levels: [0.0; 4],
+        variances: [0.0; 4],
+    };
+    for filter in 0..4 {
+        values.clear();
+        for y in (y0 + filter / 2..y0 + PATCH_PX).step_by(2) {
+            let row = (x0 + filter % 2..x0 + PATCH_PX).step_by(2);
+            values.extend(row.map(|x| f64::from(frame.at(x, y))));
+        }
+        (patch.levels[filter], patch.variances[filter]) =
+            background_of(values, frame.step_adu.into())?;
+    }
+    (patch.sigma() > 0.0).then_some(patch)
+}
+
+/// Mean and variance of the pixels without stars; `None` where hardly any has a value.
+fn background_of(values: &mut Vec<f64>, step_adu: f64) -> Option<(f64, f64)> {
+    /// Pixels farther from the median than this are those of stars, in standard deviations.
+    const CLIP_SIGMA: f64 = 3.0;
+    const FEWEST: usize = PATCH_PX * PATCH_PX / 8;
+    values.retain(|value| !value.is_nan());
+    if values.len() < FEWEST {
+        return None;
+    }
+    let center = median(values);
+    let mut deviations: Vec<f64> = values.iter().map(|v| (v - center).abs()).collect();
+    let limit = (CLIP_SIGMA * 1.4826 * median(&mut deviations)).max(1.5 * step_adu);
+    values.retain(|value| (value - center).abs() <= limit);
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    Some((mean, squares / count))
+}

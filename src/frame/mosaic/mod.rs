@@ -1,0 +1,73 @@
+//! Raw frames of colour cameras: each pixel lies under one of the filters of a 2 × 2 mosaic.
+//!
+//! raw [`Frame`] → [`Mosaic`], if it is one → a grey frame of the same size ([`Mosaic::grey`]).
+//!
+//! 1. `evidence`: a mosaic shows as four interleaved backgrounds. The header alone is not believed:
+//!    drivers of grey cameras write a pattern, too.
+//! 2. `smoothing`: the binomial kernel [1 2 1] ⊗ [1 2 1] / 16 gives every filter a quarter of the
+//!    weight in every pixel, and lies symmetric around it. The background becomes even, light is
+//!    kept, and the places of stars stay where they are, whatever their colours.
+//!
+//! Differs from superpixels, the means of 2 × 2 pixels: there the centre of the light moves with
+//! the colour of a star, by up to 0.1 px towards the filter that lets more of it pass, and spots of
+//! ordinary cameras become too sharp to be measured.
+//!
+//! # Reference
+//! Alleysson, Süsstrunk & Hérault 2005, IEEE Trans. Image Process. 14, 439,
+//! doi 10.1109/TIP.2004.841200: luminance is the part of low frequencies of a mosaic, colour
+//! that near the highest.
+
+mod evidence;
+mod pattern;
+mod smoothing;
+
+pub use pattern::BayerPattern;
+
+use super::image::Frame;
+use pattern::Diagonal;
+use serde::Serialize;
+
+/// The mosaic of filters over the pixels of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Mosaic {
+    /// The filters, where the header says which.
+    pub pattern: Option<BayerPattern>,
+    /// The diagonal of the upper left 2 × 2 pixels under the two filters that are alike.
+    green: Diagonal,
+}
+
+impl Mosaic {
+    /// Standard deviation of a pixel of the grey frame over that of the raw pixels: √Σk² of the
+    /// kernel.
+    pub const NOISE_RATIO: f64 = 0.375;
+    /// Variance that the kernel adds to a spot on each axis, in px².
+    pub const ADDED_VARIANCE_PX2: f64 = 0.5;
+
+    /// The mosaic of a raw frame; `None` for a grey frame. Colour that is known to be converted
+    /// to luminance is no mosaic.
+    pub fn of(frame: &Frame) -> Option<Self> {
+        let stated = frame.metadata.bayer_pattern;
+        let green = evidence::green_diagonal(frame, stated)?;
+        // Programs differ in the row that the pattern begins with; the pixels know.
+        let pattern = stated.map(|pattern| {
+            if pattern.green() == green {
+                pattern
+            } else {
+                pattern.upside_down()
+            }
+        });
+        Some(Self { pattern, green })
+    }
+
+    /// Whether the pixel in column `x`, row `y` is one of the two in four that are alike: green.
+    pub fn is_green(&self, x: usize, y: usize) -> bool {
+        Diagonal::of(x, y) == self.green
+    }
+
+    /// The grey frame: every pixel has the mean of the filters around it. A pixel is saturated if
+    /// one of those around it is, by `saturation_adu`.
+    #[must_use]
+    pub fn grey(&self, raw: &Frame, saturation_adu: f32) -> Frame<'static> {
+        smoothing::smoothed(raw, saturation_adu)
+    }
+}
