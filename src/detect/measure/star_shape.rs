@@ -3,14 +3,16 @@
 
 use super::core::Core;
 use crate::detect::candidates::{Peak, Region};
+use crate::detect::contrast::Contrast;
 use crate::detect::fit::FrameMaps;
 use arrayvec::ArrayVec;
+use std::collections::HashMap;
 
 /// Peaks below this signal-to-noise ratio have no shape.
 const MIN_SNR: f32 = 15.0;
 /// Cores of fewer pixels have no shape.
 const MIN_AREA_PX: f64 = 9.0;
-/// The brightest peaks are taken.
+/// At most this many peaks are taken.
 const MAX_STARS: usize = 40;
 /// Fewer stars than this do not tell the shape of all.
 const MIN_STARS: usize = 5;
@@ -37,15 +39,9 @@ struct Elongation {
 }
 
 impl StarShape {
-    /// The shape of the brightest of the peaks, which come brightest first.
+    /// The shape of bright ones of the peaks, which come brightest first.
     pub fn measure(maps: &FrameMaps<'_>, peaks: &[Peak]) -> Self {
-        // Bloomed stars are elongated by their charge: they do not count.
-        let bright: ArrayVec<&Peak, MAX_STARS> = peaks
-            .iter()
-            .take_while(|peak| peak.snr >= MIN_SNR)
-            .filter(|peak| !peak.saturated)
-            .take(MAX_STARS)
-            .collect();
+        let bright = bright_peaks(maps, peaks);
         let cores: ArrayVec<Core, MAX_STARS> = bright
             .iter()
             .filter_map(|peak| Core::at(maps, peak))
@@ -136,6 +132,34 @@ impl StarShape {
         }
         *peaks = kept;
     }
+}
+
+/// Peaks of whatever brightness that may be stars: few of each region, as the trails of satellites
+/// that cross are one region of many peaks.
+fn bright_peaks<'a>(maps: &FrameMaps<'_>, peaks: &'a [Peak]) -> ArrayVec<&'a Peak, MAX_STARS> {
+    /// Most peaks of one region.
+    const MAX_OF_REGION: usize = 2;
+    /// More peaks tell no more.
+    const ENOUGH: usize = 10 * MAX_STARS;
+    let mut of_region: HashMap<usize, usize> = HashMap::new();
+    let bright = peaks.iter().take_while(|peak| peak.snr >= MIN_SNR);
+    let is_few = |peak: &&Peak| {
+        let count = of_region.entry(peak.region).or_default();
+        *count += 1;
+        *count <= MAX_OF_REGION
+    };
+    let is_of_light = |peak: &&Peak| {
+        !Contrast::near(&maps.view, maps.background, (peak.x, peak.y)).is_sharper_than_any_spot()
+    };
+    // Bloomed stars are elongated by their charge: they do not count.
+    let stars = bright.filter(|peak| !peak.saturated);
+    let stars: Vec<&Peak> = stars
+        .filter(is_few)
+        .filter(is_of_light)
+        .take(ENOUGH)
+        .collect();
+    let step = stars.len().div_ceil(MAX_STARS).max(1);
+    stars.into_iter().step_by(step).collect()
 }
 
 /// `(xx − yy, 2xy)/(xx + yy)`.
