@@ -65,6 +65,24 @@ fn clutter_is_detected_where_no_star_is() {
     }
 }
 
+/// A quarter of the detector of the camera with the widest spots.
+#[test]
+fn blended_stars_are_seldom_named_wrongly() {
+    let mut command = starpipe();
+    command.args([
+        "clutter",
+        "--preset",
+        "nanosat-tracker",
+        "--kinds",
+        "blends",
+    ]);
+    command.args(["--width-px", "1296", "--height-px", "972", "--frames", "8"]);
+    let row = &Ran::new(command.args(["--format", "json"])).reports()[0];
+    let [named, misnamed] = ["named", "misnamed"].map(|name| row[name].as_u64().unwrap());
+    assert_eq!((&row["right"], &row["wrong"]), (&8.into(), &0.into()));
+    assert!(named > 2000 && 1000 * misnamed <= named, "{row}");
+}
+
 #[test]
 fn every_built_in_camera_is_simulated_where_none_is_chosen() {
     let mut command = starpipe();

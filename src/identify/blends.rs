@@ -34,6 +34,17 @@ const SEPARABLE_SIGMAS: f64 = 1.5;
 /// catalogue are not there, or much fainter. It is small, so that a bright star cannot pull the
 /// attitude to where its own light agrees.
 const MISTAKEN_SHARE: f64 = 0.001;
+/// A star farther from the detection than this, in standard deviations of the spot, is outside the
+/// spot's half width at half maximum: its neighbours may be what was seen.
+const HALF_WIDTH_SIGMAS: f64 = 1.177;
+/// So it is only where it is outside by more than the error of its position, which a fit that is not
+/// yet good makes large.
+const OUTSIDE_SIGMAS: f64 = 3.0;
+/// Stars whose light differs by less than this factor give about as much: catalogues list the
+/// components of some doubles with the magnitude of both.
+const AS_MUCH: f64 = 1.05;
+/// Maximum of the light of other stars over a star's own.
+const MAX_RIVALS: f64 = 1e12;
 /// The variance that a pixel's own width adds to a spot, in px².
 const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
 /// Lights closer than this, in standard deviations of the spot, are the same.
@@ -55,7 +66,7 @@ pub struct Blends {
     /// Catalogue stars of other detections, sorted.
     taken: Vec<StarIndex>,
     /// Of the candidates of one observed star.
-    blends: Vec<Option<Light>>,
+    seen: Vec<Seen>,
     lights: Vec<(PixelPoint, f64)>,
 }
 
@@ -67,6 +78,26 @@ struct Near {
     to: u32,
     /// Chord within which they were looked up.
     chord: f64,
+}
+
+/// The light of a candidate.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    star: StarIndex,
+    /// Position of the star, and its V magnitude.
+    own: PixelPoint,
+    own_v_mag: f32,
+    blend: Option<Blend>,
+}
+
+/// Blended light.
+#[derive(Debug, Clone, Copy)]
+struct Blend {
+    pixel: PixelPoint,
+    /// V magnitude of all of it that a spot at its place takes up.
+    v_mag: f64,
+    /// Light that a spot at the detection takes up of the other stars, over that of the star itself.
+    others: f64,
 }
 
 /// A hypothesis and its PSF.
@@ -89,7 +120,9 @@ impl Blends {
 
     /// Gives each candidate position and magnitude of the light that its star is part of, where
     /// that agrees better with the observed star than the star's own light; none if the PSF is
-    /// unknown. A star in the blend of a brighter one has its own light only.
+    /// unknown. A star in a blend to which another one gives more light has its own light only.
+    ///
+    /// The other stars of a blend are rivals of a name whose star lies outside the detected spot.
     ///
     /// The stars `taken` are those of other detections: each was measured separately, and so is not
     /// part of a blend.
@@ -114,21 +147,29 @@ impl Blends {
         self.taken.clear();
         self.taken.extend(taken);
         self.taken.sort_unstable();
-        let same_px = SAME_LIGHT_SIGMAS * view.variance_px2.sqrt();
         let separable_px = SEPARABLE_SIGMAS * view.variance_px2.sqrt();
-        let mut blends = std::mem::take(&mut self.blends);
+        let half_width_px = HALF_WIDTH_SIGMAS * view.variance_px2.sqrt();
+        let mut seen = std::mem::take(&mut self.seen);
         for of_observed in candidates.chunk_by_mut(|a, b| a.observed == b.observed) {
-            blends.clear();
-            let stars = of_observed.iter();
-            blends.extend(stars.map(|star| self.light_around(&view, (star.predicted, star.star))));
             let star = &problem.field.stars[of_observed[0].observed];
-            for index in 0..of_observed.len() {
-                let is_absorbed = is_absorbed((of_observed, &blends), index, same_px);
-                let candidate = &mut of_observed[index];
-                let Some(blend) = blends[index] else {
+            seen.clear();
+            seen.extend(of_observed.iter().map(|candidate| Seen {
+                star: candidate.star,
+                own: candidate.light,
+                own_v_mag: candidate.own_v_mag,
+                blend: self.blend_of(&view, candidate, &star.position),
+            }));
+            for (index, candidate) in of_observed.iter_mut().enumerate() {
+                let is_absorbed = is_absorbed(&seen, index, view.variance_px2);
+                let Some(blend) = seen[index].blend else {
                     candidate.share = if is_absorbed { 0.0 } else { 1.0 };
                     continue;
                 };
+                // A saturated spot is measured too badly to say where in it a star is.
+                let outside_px = half_width_px.max(OUTSIDE_SIGMAS * candidate.sigma_px);
+                if candidate.distance_px > outside_px && !star.is_saturated {
+                    candidate.rivals = blend.others;
+                }
                 let distance_px = blend.pixel.distance_to(&star.position);
                 let density =
                     |distance_px| position_density(candidate, distance_px, star.is_saturated);
@@ -148,16 +189,18 @@ impl Blends {
                 }
             }
         }
-        self.blends = blends;
+        self.seen = seen;
     }
 
-    /// The blended light of a predicted star; `None` if it is single.
-    fn light_around(
+    /// The blended light of a candidate for the detection at `detected`; `None` if it is single.
+    fn blend_of(
         &mut self,
         view: &View,
-        (predicted, index): (usize, StarIndex),
-    ) -> Option<Light> {
-        let near = self.near(view, (predicted, index));
+        candidate: &Candidate,
+        detected: &PixelPoint,
+    ) -> Option<Blend> {
+        let index = candidate.star;
+        let near = self.near(view, (candidate.predicted, index));
         if near.from == near.to {
             return None;
         }
@@ -179,15 +222,21 @@ impl Blends {
             return None;
         }
         let own = view.light_of(index, star.v_mag)?;
+        let ratio_of =
+            |other: &PixelPoint| weight_ratio(detected, [other, &own.0], view.variance_px2);
+        let others = lights.iter();
+        let others = others.map(|other| other.1 * ratio_of(&other.0));
+        let others: f64 = others.sum();
         lights.push(own);
         let pixel = mode_next_to(own.0, lights, view.variance_px2);
         let sum: f64 = lights
             .iter()
             .map(|(place, light)| light * weight_at(&pixel, place, view.variance_px2))
             .sum();
-        Some(Light {
+        Some(Blend {
             pixel,
             v_mag: f64::from(star.v_mag) - 2.5 * sum.log10(),
+            others: others.min(MAX_RIVALS),
         })
     }
 
@@ -213,29 +262,6 @@ impl Blends {
     }
 }
 
-/// Whether the light of a candidate is that of a brighter star, alone or in its own blend.
-/// Until it is redirected, `light` of a candidate is its own.
-fn is_absorbed(
-    (candidates, blends): (&[Candidate], &[Option<Light>]),
-    index: usize,
-    same_px: f64,
-) -> bool {
-    let light = blends[index].map_or(candidates[index].light, |blend| blend.pixel);
-    let is_at = |place: &PixelPoint| place.distance_to(&light) < same_px;
-    let others = candidates.iter().zip(blends);
-    // Stars are numbered by brightness.
-    let mut brighter = others.filter(|(other, _)| other.star < candidates[index].star);
-    brighter.any(|(other, blend)| is_at(&other.light) || blend.is_some_and(|b| is_at(&b.pixel)))
-}
-
-/// Blended light.
-#[derive(Debug, Clone, Copy)]
-struct Light {
-    pixel: PixelPoint,
-    /// V magnitude of all of it that a spot at its place takes up.
-    v_mag: f64,
-}
-
 impl View<'_> {
     /// A star's position in the frame, and its flux in units of that of a star of `unit_v_mag`.
     fn light_of(&self, index: StarIndex, unit_v_mag: f32) -> Option<(PixelPoint, f64)> {
@@ -250,6 +276,34 @@ impl View<'_> {
         let to_icrs = self.hypothesis.icrs_to_camera.inverse();
         to_icrs.apply(&self.hypothesis.camera.direction_of(pixel))
     }
+}
+
+/// Whether the light of a star, alone or in its blend, is where another one has its light and gives
+/// more of it. Of those that give about as much, the first in the catalogue counts.
+fn is_absorbed(seen: &[Seen], index: usize, variance_px2: f64) -> bool {
+    let star = &seen[index];
+    let light = star.blend.map_or(star.own, |blend| blend.pixel);
+    let same_px = SAME_LIGHT_SIGMAS * variance_px2.sqrt();
+    let is_at = |place: &PixelPoint| place.distance_to(&light) < same_px;
+    let is_there = |other: &Seen| is_at(&other.own) || other.blend.is_some_and(|b| is_at(&b.pixel));
+    let gives_more = |other: &Seen| {
+        let flux = 10f64.powf(0.4 * f64::from(star.own_v_mag - other.own_v_mag));
+        let ratio = flux * weight_ratio(&light, [&other.own, &star.own], variance_px2);
+        if (1.0 / AS_MUCH..AS_MUCH).contains(&ratio) {
+            other.star < star.star
+        } else {
+            ratio > 1.0
+        }
+    };
+    let mut others = seen.iter().filter(|other| other.star != star.star);
+    others.any(|other| is_there(other) && gives_more(other))
+}
+
+/// What a spot at `at` takes up of the light of a star at the first place, over that of an equal
+/// one at the second.
+fn weight_ratio(at: &PixelPoint, [first, second]: [&PixelPoint; 2], variance_px2: f64) -> f64 {
+    let nearer_px2 = at.distance_to(second).powi(2) - at.distance_to(first).powi(2);
+    (nearer_px2 / (4.0 * variance_px2)).exp()
 }
 
 /// What a spot at `at` takes up of the light of a star at `place`.
@@ -281,6 +335,39 @@ fn mode_next_to(start: PixelPoint, lights: &[(PixelPoint, f64)], variance_px2: f
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn seen(star: usize, x: f64, own_v_mag: f32, light_x: f64) -> Seen {
+        Seen {
+            star: StarIndex::new(star),
+            own: PixelPoint::new(x, 0.0),
+            own_v_mag,
+            blend: Some(Blend {
+                pixel: PixelPoint::new(light_x, 0.0),
+                v_mag: 5.0,
+                others: 0.0,
+            }),
+        }
+    }
+
+    fn absorbed(pair: [Seen; 2]) -> [bool; 2] {
+        [0, 1].map(|index| is_absorbed(&pair, index, 1.0))
+    }
+
+    #[test]
+    fn one_of_a_pair_that_makes_one_light_has_it() {
+        // The brighter one, at whose place it is.
+        let close = [seen(7, 0.0, 6.0, 0.3), seen(9, 1.0, 7.0, 0.3)];
+        assert_eq!(absorbed(close), [false, true]);
+        // Not the brighter one, where a third star draws the light to the other.
+        let drawn = [seen(7, 0.0, 6.0, 2.8), seen(9, 3.0, 6.1, 2.9)];
+        assert_eq!(absorbed(drawn), [true, false]);
+        // Listed twice: the first, wherever the mean shift ended.
+        let twice = [seen(9, 0.0, 6.0, 0.019), seen(7, 0.04, 6.0, 0.021)];
+        assert_eq!(absorbed(twice), [true, false]);
+        // Two lights.
+        let apart = [seen(7, 0.0, 6.0, 0.1), seen(9, 4.0, 6.0, 3.9)];
+        assert_eq!(absorbed(apart), [false, false]);
+    }
 
     #[test]
     fn a_close_pair_is_seen_at_its_photocentre_and_a_wide_one_at_its_stars() {

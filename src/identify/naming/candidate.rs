@@ -30,6 +30,8 @@ pub struct Candidate {
     pub gate_px: f64,
     /// Probability that a star among such neighbours is measured by this light.
     pub share: f64,
+    /// Odds that another star of its blend was seen rather than this one.
+    pub rivals: f64,
     /// Probability that it is no true pair.
     pub p_chance: f64,
 }
@@ -53,6 +55,7 @@ impl Candidate {
             sigma_px,
             gate_px,
             share: 1.0,
+            rivals: 0.0,
             p_chance: 1.0,
         }
     }

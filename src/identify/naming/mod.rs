@@ -12,7 +12,8 @@
 //! the densities f and g of the differences in position and magnitude of a true pair
 //! ([`likelihood`]), and the density λ of observed stars of i's magnitude, at its place, that are
 //! not catalogue stars ([`unrelated`]). Other candidates of i and of j compete with it: its
-//! probability is `o / (1 + Σ o)` over all candidates of both.
+//! probability is `o / (1 + Σ o)` over all candidates of both. So do the other stars of an unresolved
+//! blend, where j itself lies outside the detected spot (`blends`).
 //!
 //! C, λ, and the zero point and scatter of the magnitudes are unknown at first. They are measured
 //! in the frame with the probabilities, and the probabilities computed again (expectation

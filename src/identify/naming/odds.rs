@@ -41,6 +41,7 @@ fn packed_from(candidates: &[Candidate], (field, predicted): (&StarField, usize)
         v_mag: [0.0; LANES],
         saturated: [0.0; LANES],
         position_density: [0.0; LANES],
+        rivals: [0.0; LANES],
         odds: [0.0; LANES],
         p_chance: [1.0; LANES],
     };
@@ -56,6 +57,7 @@ fn packed_from(candidates: &[Candidate], (field, predicted): (&StarField, usize)
         distances_px[lane] = candidate.distance_px;
         (sigmas_px[lane], gates_px[lane]) = (candidate.sigma_px, candidate.gate_px);
         shares[lane] = candidate.share;
+        packed.rivals[lane] = candidate.rivals;
     }
     let of_true = in_lanes([distances_px, sigmas_px, gates_px, packed.saturated]);
     for lane in 0..LANES {
@@ -97,10 +99,11 @@ pub fn set_chances(candidates: &mut [Packed], (of_observed, of_predicted): (&[f6
         for (lane, (observed, predicted)) in packed.places().enumerate() {
             all[lane] = of_observed[observed] + of_predicted[predicted];
         }
-        for ((p_chance, odds), all) in packed.p_chance.iter_mut().zip(packed.odds).zip(all) {
+        for (lane, all) in all.into_iter().enumerate() {
+            let odds = packed.odds[lane];
             // The candidate's own odds are in both sums.
-            let others = (all - 2.0 * odds).max(0.0);
-            *p_chance = (1.0 + others) / (1.0 + others + odds);
+            let others = (all - 2.0 * odds).max(0.0) + packed.rivals[lane] * odds;
+            packed.p_chance[lane] = (1.0 + others) / (1.0 + others + odds);
         }
     }
 }

@@ -19,6 +19,8 @@ pub struct Packed {
     pub saturated: Lanes,
     /// Density of the distance of a true pair, per square pixel.
     pub position_density: Lanes,
+    /// Odds that another star of the candidate's blend was seen.
+    pub rivals: Lanes,
     /// Odds that it is a true pair.
     pub odds: Lanes,
     /// Probability that it is not.
