@@ -189,8 +189,9 @@ impl<'a> Search<'a> {
         };
         let stars = buffers.offsets.len() as u64;
         let triangles = stars * stars.saturating_sub(1) * stars.saturating_sub(2) / 6;
-        let most_hypotheses =
-            (HYPOTHESES_PER_TRIANGLE * triangles).clamp(LEAST_HYPOTHESES, plan.max_hypotheses);
+        let most_hypotheses = (HYPOTHESES_PER_TRIANGLE * triangles)
+            .max(LEAST_HYPOTHESES)
+            .min(plan.max_hypotheses);
         Self {
             problem,
             plan,
