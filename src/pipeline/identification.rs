@@ -74,9 +74,7 @@ fn may_be_negative(reason: &Reason) -> bool {
         Reason::Search(failure) => *failure != SearchFailure::Interrupted,
         Reason::Diagnosis(cause) => matches!(
             cause,
-            Diagnosis::Saturated { .. }
-                | Diagnosis::Trails { .. }
-                | Diagnosis::DoubleExposure { .. }
+            Diagnosis::Saturated { .. } | Diagnosis::Trails { .. } | Diagnosis::DoubleExposure(_)
         ),
     }
 }

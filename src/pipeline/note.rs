@@ -10,6 +10,7 @@ use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;
 use crate::detect::{MeasuredPsf, NoiseTail, Wings};
 use crate::frame::{Assumption, FrameMetadata, IgnoredValue, ImageChoice, Orientation};
+use crate::identify::diagnosis::DoubleImage;
 use crate::identify::{Identification, Priors, ScalePrior, ScaleSource};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::{Comparison, Contradiction, StatedCamera};
@@ -74,6 +75,8 @@ pub enum Note {
     Spots(MeasuredPsf),
     /// The stars have light beyond the spots that are fitted to them.
     Wings(Wings),
+    /// Every star occurs twice.
+    DoubleImage(DoubleImage),
     /// The dark has another exposure than the frame.
     DarkExposure(ExposureMismatch),
     /// The Moon or a planet is in the frame.
@@ -114,6 +117,7 @@ impl Note {
             Self::FalseDetections(_) => "false_detections",
             Self::Spots(_) => "spots_not_round",
             Self::Wings(_) => "wings",
+            Self::DoubleImage(_) => "double_image",
             Self::BodyInFrame(_) => "body_in_frame",
             Self::DarkExposure(_) => "dark_exposure_differs",
             Self::BrightStarsNotNamed(_) => "bright_stars_not_named",
@@ -294,6 +298,11 @@ impl fmt::Display for Note {
                 "the stars have wings: {:.1} ± {:.1} % of the light of their fitted spots lies farther out, and is added to the fluxes",
                 100.0 * share,
                 100.0 * sigma
+            ),
+            Self::DoubleImage(double) => write!(
+                f,
+                "every star is there twice: {double}; fluxes, zero point and limit are those of one of the \
+                 two images, and positions and attitude are off by up to that offset"
             ),
             Self::DarkExposure(mismatch) => mismatch.fmt(f),
             Self::BodyInFrame(seen) => write_body(f, seen),

@@ -50,10 +50,8 @@ fn cause_text(cause: &Diagnosis) -> String {
             angle_rad,
             length_px,
         } => trails_text(*trails, *angle_rad, *length_px),
-        Diagnosis::DoubleExposure { pairs, offset_px } => format!(
-            "the same stars are there twice, as in a double exposure: {pairs} pairs of detections have the \
-             offset ({:+.1}, {:+.1}) px; expose once",
-            offset_px[0], offset_px[1]
+        Diagnosis::DoubleExposure(double) => format!(
+            "the same stars are there twice, as in a double exposure: {double}; expose once"
         ),
         Diagnosis::ScaleOutOfRange {
             fov_x_rad,

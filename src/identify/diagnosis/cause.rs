@@ -1,6 +1,7 @@
 //! The causes that diagnosis can name.
 
 use crate::base::coords::{Icrs, UnitVector};
+use std::fmt;
 
 /// Why a frame was not identified, in terms that a person can act on.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,12 +37,7 @@ pub enum Diagnosis {
         length_px: f64,
     },
     /// The same pattern of stars occurs twice.
-    DoubleExposure {
-        /// Pairs of stars with this offset.
-        pairs: usize,
-        /// The offset along x and y, in pixels.
-        offset_px: [f64; 2],
-    },
+    DoubleExposure(DoubleImage),
     /// The stated scale is outside the range that can be identified.
     ScaleOutOfRange {
         /// Stated horizontal field of view, from and to, in radians.
@@ -51,6 +47,26 @@ pub enum Diagnosis {
     },
     /// Without the priors the stars are identified.
     HintsExclude(Box<Excluded>),
+}
+
+/// A pattern of stars that occurs twice. `Display` says how often, and how far apart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DoubleImage {
+    /// Pairs of stars with this offset.
+    pub pairs: usize,
+    /// The offset along x and y, in pixels.
+    pub offset_px: [f64; 2],
+}
+
+impl fmt::Display for DoubleImage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { pairs, offset_px } = self;
+        let [x, y] = offset_px;
+        write!(
+            f,
+            "{pairs} pairs of detections have the offset ({x:+.1}, {y:+.1}) px"
+        )
+    }
 }
 
 /// A solution that the priors exclude.
@@ -77,7 +93,7 @@ impl Diagnosis {
             Self::Saturated { .. } => "saturated",
             Self::Negative { .. } => "negative",
             Self::Trails { .. } => "trails",
-            Self::DoubleExposure { .. } => "double_exposure",
+            Self::DoubleExposure(_) => "double_exposure",
             Self::ScaleOutOfRange { .. } => "scale_out_of_range",
             Self::HintsExclude(_) => "hints_exclude",
         }

@@ -1,7 +1,7 @@
-//! Double exposures: every star occurs twice, as the camera moved between the exposures.
+//! Double images: every star occurs twice, as the camera moved between two exposures or during one.
 
-use super::cause::Diagnosis;
-use crate::identify::StarField;
+use super::cause::DoubleImage;
+use crate::identify::{ObservedStar, StarField};
 
 /// Number of stars examined, the brightest.
 const LOOKED_AT: usize = 80;
@@ -39,8 +39,20 @@ impl Offset {
     }
 }
 
+/// [`find`] for a field in which most stars are named. One star of a pair has no name, so that no
+/// pairs need be formed where nearly all have one.
+pub fn find_unnamed(
+    field: &StarField,
+    is_named: impl Fn(&ObservedStar) -> bool,
+) -> Option<DoubleImage> {
+    let stars = field.brightest(LOOKED_AT);
+    let unnamed = stars.iter().filter(|star| !is_named(star)).count();
+    let is_possible = unnamed >= FEWEST_PAIRS && unnamed as f64 >= LEAST_SHARE * stars.len() as f64;
+    is_possible.then(|| find(field)).flatten()
+}
+
 /// Whether many stars have a companion at the same offset.
-pub(super) fn diagnose(field: &StarField) -> Option<Diagnosis> {
+pub(super) fn find(field: &StarField) -> Option<DoubleImage> {
     let offsets = offsets(field);
     let counts: Vec<usize> = (0..offsets.len())
         .map(|i| pairs(&offsets, i).len())
@@ -63,7 +75,7 @@ pub(super) fn diagnose(field: &StarField) -> Option<Diagnosis> {
         let sum: f64 = agreeing.iter().map(|offset| offset.along[axis]).sum();
         sum / agreeing.len() as f64
     };
-    Some(Diagnosis::DoubleExposure {
+    Some(DoubleImage {
         pairs: count,
         offset_px: [mean(0), mean(1)],
     })
@@ -163,8 +175,8 @@ mod tests {
                 [x + offset[0] + jitter, y + offset[1] - jitter, mag + 0.4]
             });
             let again: Vec<_> = again.collect();
-            let found = diagnose(&field(once.into_iter().chain(again).collect()));
-            let Some(Diagnosis::DoubleExposure { pairs, offset_px }) = found else {
+            let found = find(&field(once.into_iter().chain(again).collect()));
+            let Some(DoubleImage { pairs, offset_px }) = found else {
                 panic!("{offset:?}: {found:?}");
             };
             assert!(pairs >= 25, "{pairs}");
@@ -178,9 +190,9 @@ mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(2);
         for _ in 0..300 {
             let count = random.random_range(4..200);
-            assert_eq!(diagnose(&field(strewn(&mut random, count))), None);
+            assert_eq!(find(&field(strewn(&mut random, count))), None);
         }
         let grid = (0..100).map(|i| [f64::from(i % 10) * 48.0, f64::from(i / 10) * 48.0, -8.0]);
-        assert_eq!(diagnose(&field(grid.collect())), None);
+        assert_eq!(find(&field(grid.collect())), None);
     }
 }

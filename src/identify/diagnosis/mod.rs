@@ -18,7 +18,8 @@ mod doubles;
 mod levels;
 mod trails;
 
-pub use cause::{Diagnosis, Excluded};
+pub use cause::{Diagnosis, DoubleImage, Excluded};
+pub use doubles::find_unnamed as find_double_image;
 
 use super::identification::{Identification, SearchFailure};
 use super::priors::Priors;
@@ -52,7 +53,7 @@ pub fn diagnose(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diagnosis> 
         .or_else(|| has_stars.then(|| excluded(case, sky)).flatten())
         .or_else(|| out_of_range(case, sky))
         .or_else(|| image.and_then(|(frame, detections)| trails::diagnose(frame, detections)))
-        .or_else(|| doubles::diagnose(case.field))
+        .or_else(|| doubles::find(case.field).map(Diagnosis::DoubleExposure))
 }
 
 /// Searches again without the priors.
