@@ -293,6 +293,20 @@ fn nonsensical_options_are_refused() {
 }
 
 #[test]
+fn the_name_of_a_picture_that_is_not_written_is_no_directory() {
+    let directory = tempfile::tempdir().unwrap();
+    for name in ["one.png", "one.JPG", "one.fits.gz"] {
+        let path = directory.path().join(name);
+        let out = format!("--out={}", path.display());
+        let preset = ["simulate", "--preset=nanosat-tracker", &out];
+        let ran = Ran::new(starpipe().args(preset).args(SKY));
+        assert_eq!((ran.status, ran.stdout.as_str()), (2, ""));
+        assert!(ran.stderr.contains("(.tif) or FITS"), "{}", ran.stderr);
+        assert!(ran.stderr.contains(name) && !path.exists());
+    }
+}
+
+#[test]
 fn a_huge_detector_is_refused_before_memory_is_allocated() {
     let directory = tempfile::tempdir().unwrap();
     let out = format!("--out={}", directory.path().join("a.fits").display());

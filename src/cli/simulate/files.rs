@@ -7,6 +7,7 @@ use crate::cli::exit::CommandError;
 use crate::cli::output::files::make_directory;
 use starpipe::camera::data_sheet::DataSheet;
 use starpipe::frame::{FitsSamples, Frame, TiffOptions, TiffSamples, write_fits, write_tiff};
+use std::ffi::OsStr;
 use std::io::Cursor;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -26,6 +27,23 @@ impl ImageFormat {
             _ => None,
         }
     }
+}
+
+/// Endings of files of images that are not written: no name of a directory.
+const OTHER_IMAGES: [&str; 9] = ["bmp", "fz", "gz", "jpeg", "jpg", "pgm", "png", "pnm", "ppm"];
+
+/// Refuses the name of a file in a format that is not written.
+fn check_out(out: &Path) -> Result<(), CommandError> {
+    let ending = out.extension().and_then(OsStr::to_str);
+    let is_other = |ending: &str| OTHER_IMAGES.contains(&ending.to_lowercase().as_str());
+    if out.is_dir() || !ending.is_some_and(is_other) {
+        return Ok(());
+    }
+    Err(CommandError::Usage(format!(
+        "--out {}: found the name of a file in a format that is not written, expected a file in TIFF \
+         (.tif) or FITS (.fits), or a directory",
+        out.display()
+    )))
 }
 
 /// Names and format of the files.
@@ -49,6 +67,7 @@ impl FrameFiles {
         subject: &Subject,
         sheet: &DataSheet,
     ) -> Result<Self, CommandError> {
+        check_out(&arguments.out)?;
         let named_format = ImageFormat::of_name(&arguments.out).filter(|_| !arguments.out.is_dir());
         if named_format.is_some() && arguments.count > 1 {
             return Err(CommandError::Usage(format!(
