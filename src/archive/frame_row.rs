@@ -26,6 +26,7 @@ pub struct FrameRow {
     pub instrument_name: String,
     pub width: Option<u64>,
     pub height: Option<u64>,
+    pub row_order: String,
     pub s_ra: Option<f64>,
     pub s_dec: Option<f64>,
     pub s_fov: Option<f64>,
@@ -89,6 +90,7 @@ impl FrameRow {
             instrument_name: prediction.map_or(String::new(), |stated| stated.camera.clone()),
             width: Some(report.width as u64),
             height: Some(report.height as u64),
+            row_order: report.row_order_word().to_owned(),
             background: report.background.level,
             noise: report.background.noise,
             detected: Some(report.stars.len() as u64),
@@ -181,6 +183,7 @@ impl FrameRow {
             instrument_name, "", "meta.id;instr", "the stated camera";
             width, "pix", "", "columns of the frame";
             height, "pix", "", "rows of the frame";
+            row_order, "", "meta.code", "order of the rows in the file; pixels count from the top of the picture in either";
             s_ra, "deg", "pos.eq.ra;meta.main", "right ascension of the centre (ICRS)";
             s_dec, "deg", "pos.eq.dec;meta.main", "declination of the centre (ICRS)";
             s_fov, "deg", "phys.angSize;instr.fov", "diameter of the circle around the frame";

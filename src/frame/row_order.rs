@@ -14,6 +14,14 @@ pub enum RowOrder {
 }
 
 impl RowOrder {
+    /// The word for it in the JSON and in tables.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::TopDown => "top-down",
+            Self::BottomUp => "bottom-up",
+        }
+    }
+
     /// The value of the FITS keyword ROWORDER.
     pub const fn keyword_value(self) -> &'static str {
         match self {

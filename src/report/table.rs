@@ -2,11 +2,12 @@
 
 use super::frame_report::{FrameReport, StarReport};
 use crate::base::format::table_name;
+use crate::frame::RowOrder;
 use std::io;
 
 /// The columns, in order. `flags` are separated by blanks; `flux_e` and `peak_e` are filled where a
-/// camera is stated.
-pub const TABLE_COLUMNS: [&str; 19] = [
+/// camera is stated. `x` and `y` count from the top of the picture, whichever `row_order` the file has.
+pub const TABLE_COLUMNS: [&str; 20] = [
     "frame",
     "x",
     "y",
@@ -26,6 +27,7 @@ pub const TABLE_COLUMNS: [&str; 19] = [
     "flags",
     "flux_e",
     "peak_e",
+    "row_order",
 ];
 
 /// Writes the row of column names.
@@ -47,6 +49,11 @@ impl FrameReport {
             writer.write_record(self.row(star))?;
         }
         Ok(())
+    }
+
+    /// The order of the rows in the file; empty for a list of centroids.
+    pub(crate) fn row_order_word(&self) -> &'static str {
+        self.row_order.map_or("", RowOrder::word)
     }
 
     fn row(&self, star: &StarReport) -> [String; TABLE_COLUMNS.len()] {
@@ -72,6 +79,7 @@ impl FrameReport {
             star.flags.join(" "),
             number(star.flux_e),
             number(star.peak_e),
+            self.row_order_word().to_owned(),
         ]
     }
 }

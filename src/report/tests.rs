@@ -275,3 +275,16 @@ fn text_keeps_to_a_terminals_width() {
         assert!(widest.is_some_and(|width| width <= 100), "{text}");
     }
 }
+
+#[test]
+fn the_table_says_how_the_file_stores_its_rows() {
+    let mut report = identified();
+    let last = |report: &FrameReport| -> Vec<String> {
+        let last = |line: &str| line.rsplit(',').next().unwrap().to_owned();
+        table(report).lines().skip(1).map(last).collect()
+    };
+    report.row_order = Some(RowOrder::BottomUp);
+    assert_eq!(last(&report), ["bottom-up"; 3]);
+    report.row_order = None;
+    assert_eq!(last(&report), [""; 3]);
+}
