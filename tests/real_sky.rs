@@ -31,6 +31,9 @@ const COMPRESSED_TOLERANCE: f64 = 0.1;
 /// than noise.
 const BRIGHT_SNR: f64 = 20.0;
 
+/// How the first row of the table of docs/results.md begins.
+const FIRST_ROW: &str = "| 2019-07-29T204726_Alt40_Azi-135_Try1.tiff |";
+
 /// Pointing tolerance of a frame drawn without distortion: a small part of a pixel (of 1.4 to
 /// 1.9′).
 const DRAWN_CENTRE_TOLERANCE_DEG: f64 = 0.003;
@@ -57,6 +60,7 @@ fn all_real_frames_are_identified_as_by_others() {
             .args(frames),
     );
     let mut wrong = Vec::new();
+    let mut table = String::new();
     for (row, report) in rows.iter().zip(ran.reports()) {
         let file = &row["file"];
         if report["status"] != "identified" {
@@ -75,9 +79,8 @@ fn all_real_frames_are_identified_as_by_others() {
         let matched = number(&report, "/match/matched");
         let rms_arcsec = number(&report, "/match/rms_arcsec");
         let detected = number(&report, "/match/detected");
-        // A row of the table in docs/results.md.
-        println!(
-            "| {file} | {matched} of {} | {:.1}″ | {:+.2} % | {rms_arcsec:.1}″ | {} | {:.0} |",
+        table += &format!(
+            "| {file} | {matched} of {} | {:.1}″ | {:+.2} % | {rms_arcsec:.1}″ | {} | {:.0} |\n",
             detected,
             centre_deg * 3600.0,
             fov * 100.0,
@@ -99,8 +102,26 @@ fn all_real_frames_are_identified_as_by_others() {
             ));
         }
     }
+    println!("{table}");
     assert!(wrong.is_empty(), "{wrong:#?}");
     assert_eq!(ran.status, 0, "{}", ran.stderr);
+    check_page(&table.replace("| -", "| −"));
+}
+
+/// Compares the rows of `table` with those on the page of results, or writes them there where
+/// STARPIPE_WRITE_RESULTS=1.
+fn check_page(table: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/results.md");
+    let page = fs::read_to_string(&path).unwrap();
+    let start = page.find(FIRST_ROW).unwrap();
+    let end = start + page[start..].find("\n\n").unwrap() + 1;
+    if std::env::var_os("STARPIPE_WRITE_RESULTS").is_some_and(|value| value == "1") {
+        fs::write(&path, [&page[..start], table, &page[end..]].concat()).unwrap();
+    } else {
+        let advice =
+            "docs/results.md is of another program: run this with STARPIPE_WRITE_RESULTS=1";
+        assert!(&page[start..end] == table, "{advice}\n{table}");
+    }
 }
 
 /// Root mean square residual of the identified stars above [`BRIGHT_SNR`], if there are any.
