@@ -1,6 +1,6 @@
 //! Tables of many frames: what workers need that write them wherever they are kept.
 
-use crate::errors::{exception, json};
+use crate::errors::{exception, guarded, json};
 use crate::hints::Hints;
 use crate::pipeline::Pipeline;
 use crate::solved::Solved;
@@ -102,16 +102,7 @@ impl PartRows {
 
     /// Adds a solved frame and its stars; returns its status.
     fn add(&mut self, solved: &Solved) -> PyResult<String> {
-        let catalog = solved.indexed.catalog();
-        let report = FrameReport::new(&solved.name, &solved.solution, catalog);
-        let frame = FrameRow::new(&report, &solved.solution);
-        let status = frame.status.clone();
-        let tables = self.tables()?;
-        tables.frames.add(frame).map_err(exception)?;
-        for star in StarRow::of_frame(&report) {
-            tables.stars.add(star).map_err(exception)?;
-        }
-        Ok(status)
+        guarded(|| self.add_solved(solved))
     }
 
     /// Adds a frame that could not be read.
@@ -133,6 +124,19 @@ impl PartRows {
 }
 
 impl PartRows {
+    fn add_solved(&mut self, solved: &Solved) -> PyResult<String> {
+        let catalog = solved.indexed.catalog();
+        let report = FrameReport::new(&solved.name, &solved.solution, catalog);
+        let frame = FrameRow::new(&report, &solved.solution);
+        let status = frame.status.clone();
+        let tables = self.tables()?;
+        tables.frames.add(frame).map_err(exception)?;
+        for star in StarRow::of_frame(&report) {
+            tables.stars.add(star).map_err(exception)?;
+        }
+        Ok(status)
+    }
+
     fn tables(&mut self) -> PyResult<&mut Tables> {
         self.0.as_mut().ok_or_else(finished)
     }

@@ -30,7 +30,7 @@ impl DarkFrames {
         detached(py, || {
             let name = source.name();
             let frame = source.frame(&name, None, &mut Buffers::new());
-            let frame = frame.map_err(exception)?;
+            let frame = frame.map_err(exception)?.as_stored();
             let statistics = FrameStatistics::of(&name.display().to_string(), &frame, exposure_s);
             stack.add(&frame, statistics).map_err(exception)
         })

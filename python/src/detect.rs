@@ -39,7 +39,7 @@ pub fn detect(
     on_threads(py, threads, |interrupt| {
         let name = source.name();
         let frame = source.frame(&name, bad, &mut Buffers::new());
-        let frame = frame.map_err(exception)?;
+        let frame = frame.map_err(exception)?.as_stored();
         let workspace = Workspace::new().on_threads(threads);
         let mut workspace = workspace.until(interrupt.clone());
         let found = starpipe::detect(&frame, &config, &mut workspace).map_err(exception)?;

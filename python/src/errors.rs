@@ -3,9 +3,9 @@
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use serde::Serialize;
+use starpipe::base::panics::{Panicked, caught};
 use std::error::Error;
 use std::io;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// `error` and its causes.
 fn causes<'a>(error: &'a (dyn Error + 'static)) -> impl Iterator<Item = &'a (dyn Error + 'static)> {
@@ -27,25 +27,46 @@ pub fn message(error: &(dyn Error + 'static)) -> String {
 
 /// The exception for `error`.
 pub fn exception(error: impl Error + 'static) -> PyErr {
-    let is_of_system = causes(&error).any(|cause| cause.is::<io::Error>());
-    if is_of_system {
-        PyOSError::new_err(message(&error))
+    let has = |is_it: fn(&(dyn Error + 'static)) -> bool| causes(&error).any(is_it);
+    let text = in_pythons_words(&message(&error));
+    if has(|cause| cause.is::<Panicked>()) {
+        PyRuntimeError::new_err(text)
+    } else if has(|cause| cause.is::<io::Error>()) {
+        PyOSError::new_err(text)
     } else {
-        PyValueError::new_err(message(&error))
+        PyValueError::new_err(text)
     }
 }
 
-/// Works while Python's other threads run. A panic, which is a fault of starpipe, becomes a
+/// The program's options that have another name in Python.
+const OTHER_NAMES: [(&str, &str); 2] = [("site", "location"), ("frame", "name")];
+
+/// `text` with the program's options as Python's keywords: `--pixel-scale` is `pixel_scale`.
+pub fn in_pythons_words(text: &str) -> String {
+    let mut parts = text.split("--");
+    let mut told = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let end = part.find(|letter: char| !letter.is_ascii_lowercase() && letter != '-');
+        let (option, rest) = part.split_at(end.unwrap_or(part.len()));
+        let other = OTHER_NAMES.iter().find(|(name, _)| *name == option);
+        match other {
+            Some((_, keyword)) => told += keyword,
+            None => told += &option.replace('-', "_"),
+        }
+        told += rest;
+    }
+    told
+}
+
+/// Works while Python's other threads run. A panic, which is a bug in starpipe, becomes a
 /// `RuntimeError`.
 pub fn detached<R: Send>(py: Python<'_>, work: impl FnOnce() -> PyResult<R> + Send) -> PyResult<R> {
-    let done = py.detach(|| catch_unwind(AssertUnwindSafe(work)));
-    done.unwrap_or_else(|panic| {
-        let text = panic.downcast_ref::<String>().map(String::as_str);
-        let text = text.or(panic.downcast_ref::<&str>().copied());
-        let text = text.unwrap_or("no message");
-        let message = format!("starpipe has a fault, please report it: {text}");
-        Err(PyRuntimeError::new_err(message))
-    })
+    py.detach(|| guarded(work))
+}
+
+/// Makes a `RuntimeError` of a panic in `work`.
+pub fn guarded<R>(work: impl FnOnce() -> PyResult<R>) -> PyResult<R> {
+    caught(work).unwrap_or_else(|panicked| Err(exception(panicked)))
 }
 
 /// Tells Python's logger `starpipe` of something that does not end the work.

@@ -2,12 +2,12 @@
 
 use crate::errors::exception;
 use crate::pages::Page;
-use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use starpipe::Frame;
-use starpipe::frame::{self, Buffers, FrameError};
+use starpipe::frame::{self, Buffers, FrameError, RowOrder};
 use std::path::{Path, PathBuf};
 
 /// What Python passes as an image. Arrays are C-contiguous, in the byte order of the machine.
@@ -21,6 +21,15 @@ pub enum Image<'py> {
     F32(PyReadonlyArray2<'py, f32>),
     /// Whole numbers of another type, and the largest of that type.
     Integers(PyReadonlyArray2<'py, i64>, i64),
+    /// Red, green and blue of each pixel.
+    Colours(Colours<'py>),
+}
+
+/// A picture of colours: whole numbers, and the largest of their type, or floats.
+#[derive(FromPyObject)]
+pub enum Colours<'py> {
+    Integers(PyReadonlyArray3<'py, i64>, i64),
+    F32(PyReadonlyArray3<'py, f32>),
 }
 
 /// The same without Python's objects, so that the interpreter is free while it is used.
@@ -45,8 +54,30 @@ impl Image<'_> {
                 let [height, width] = sides(array);
                 Frame::from_integers(width, height, slice(array)?, *full_scale)
             }
+            Self::Colours(colours) => colours.luminance()?,
         };
         frame.map(Source::Array).map_err(exception)
+    }
+}
+
+impl Colours<'_> {
+    fn luminance(&self) -> PyResult<Result<Frame<'static>, FrameError>> {
+        let shape = match self {
+            Self::Integers(array, _) => array.shape(),
+            Self::F32(array) => array.shape(),
+        };
+        let (size, channels) = ((shape[1], shape[0]), shape[2]);
+        let contiguous = |_| PyTypeError::new_err("the array must be C-contiguous");
+        Ok(match self {
+            Self::Integers(array, full_scale) => {
+                let samples = array.as_slice().map_err(contiguous)?;
+                Frame::from_colours(size, channels, samples, *full_scale)
+            }
+            Self::F32(array) => {
+                let samples = array.as_slice().map_err(contiguous)?.to_vec();
+                Frame::from_float_colours(size, channels, samples)
+            }
+        })
     }
 }
 
@@ -94,7 +125,13 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The frame, with its pixels where `bad` is true without a value; errors in bytes have `name`.
+    /// Whether the order of the rows as drawn is known: that of a file is, that of an array is not.
+    pub fn is_file(&self) -> bool {
+        !matches!(self, Self::Array(_))
+    }
+
+    /// The frame as drawn, with its pixels where `bad` is true without a value; the rows of `bad` are
+    /// in the order of the file. Errors in bytes have `name`.
     pub fn frame(
         self,
         name: &Path,
@@ -113,13 +150,15 @@ impl<'a> Source<'a> {
             let found = bad.len();
             return Err(FrameError::WrongLength { expected, found });
         }
-        for (pixel, _) in frame
-            .values_mut()
-            .iter_mut()
-            .zip(bad)
-            .filter(|(_, bad)| **bad)
-        {
-            *pixel = f32::NAN;
+        let width = frame.width;
+        let is_reversed = frame.metadata.row_order == RowOrder::BottomUp;
+        let rows = frame.values_mut().chunks_exact_mut(width).enumerate();
+        for (row, pixels) in rows {
+            let stored = if is_reversed { expected / width - 1 - row } else { row };
+            let bad = &bad[stored * width..][..width];
+            for (pixel, _) in pixels.iter_mut().zip(bad).filter(|(_, bad)| **bad) {
+                *pixel = f32::NAN;
+            }
         }
         Ok(frame)
     }

@@ -43,4 +43,12 @@ mod _starpipe {
     use super::solved::Solved;
     #[pymodule_export]
     use super::studies::{defocus, limit, robustness, validate};
+    use pyo3::prelude::*;
+
+    /// Panics become exceptions, and print nothing.
+    #[pymodule_init]
+    fn init(_: &Bound<'_, PyModule>) -> PyResult<()> {
+        starpipe::base::panics::silence();
+        Ok(())
+    }
 }

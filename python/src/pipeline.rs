@@ -11,11 +11,14 @@ use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 use starpipe::calibration::Master;
 use starpipe::camera::data_sheet::DataSheet;
-use starpipe::frame::Buffers;
+use starpipe::detect::DetectError;
+use starpipe::frame::{Buffers, RowOrder};
 use starpipe::model::sensitivity::Extinction;
 use starpipe::photometry::comparison::StatedCamera;
 use starpipe::photometry::instrumental_mag;
-use starpipe::pipeline::{CentroidList, ListedCentroid, solve_centroids, solve_frame, solve_read};
+use starpipe::pipeline::{
+    self, CentroidList, ListedCentroid, solve_centroids, solve_frame, solve_guarded, solve_read,
+};
 use starpipe::{
     Calibration, Context, DetectConfig, IndexedCatalog, Interrupt, PixelPoint, Solution, Workspace,
 };
@@ -53,8 +56,9 @@ impl Pipeline {
         })
     }
 
-    /// Solves an image; `name` stands for the name of its file.
-    #[pyo3(signature = (image, name, mask, hints, dark, flat, sigma, max_stars, attitude_only, threads))]
+    /// Solves an image; `name` stands for the name of its file. Pixels are those of its rows as stored,
+    /// or of the picture as drawn.
+    #[pyo3(signature = (image, name, mask, hints, dark, flat, sigma, max_stars, attitude_only, threads, as_drawn))]
     fn solve(
         &self,
         py: Python<'_>,
@@ -68,25 +72,27 @@ impl Pipeline {
         max_stars: Option<usize>,
         attitude_only: bool,
         threads: NonZeroUsize,
+        as_drawn: bool,
     ) -> PyResult<Solved> {
         let source = image.source()?;
         let bad = bad_pixels(mask.as_ref())?;
         let dark = dark.as_ref().map(Image::source).transpose()?;
         let flat = flat.as_ref().map(Image::source).transpose()?;
-        let context = self.context(&hints, attitude_only)?;
-        let detect = detect_config(sigma, max_stars);
+        let context = Context {
+            detect: detect_config(sigma, max_stars),
+            as_stored: !as_drawn,
+            ..self.context(&hints, attitude_only)?
+        };
         let work = |interrupt: &Interrupt| {
-            let calibration = self.calibration(dark, flat)?;
-            let context = Context {
-                detect,
-                calibration: calibration.as_ref(),
-                ..context
-            };
             let name = name.unwrap_or_else(|| source.name());
             let mut workspace = self.workspace(threads, hints.name_odds, interrupt);
-            let solution = solve(&name, (source, bad), &context, &mut workspace);
+            let solved = solve_guarded(&name, &mut workspace, |workspace| {
+                let input = Input { source, bad, dark, flat };
+                self.solve_input(&name, input, context, workspace)
+            });
             self.keep(workspace);
-            Ok(self.solved(&name, solution?))
+            let (solution, row_order) = solved.map_err(|Failed(error)| error)?;
+            Ok(self.solved(&name, solution, row_order))
         };
         if threads == NonZeroUsize::MIN {
             on_this_thread(py, work)
@@ -131,10 +137,14 @@ impl Pipeline {
         };
         let context = self.context(&hints, attitude_only)?;
         on_this_thread(py, |interrupt| {
+            let name = Path::new("centroids");
             let mut workspace = self.workspace(NonZeroUsize::MIN, hints.name_odds, interrupt);
-            let solution = solve_centroids(&list, &context, &mut workspace);
+            let solution = solve_guarded(name, &mut workspace, |workspace| {
+                Ok::<_, Failed>(solve_centroids(&list, &context, workspace))
+            });
             self.keep(workspace);
-            Ok(self.solved(Path::new("centroids"), solution))
+            let solution = solution.map_err(|Failed(error)| error)?;
+            Ok(self.solved(name, solution, None))
         })
     }
 }
@@ -156,25 +166,69 @@ impl Pipeline {
         })
     }
 
+    /// Solves an input; returns the order of its rows, too, if it is a file.
+    fn solve_input(
+        &self,
+        name: &Path,
+        input: Input,
+        context: Context,
+        workspace: &mut Workspace,
+    ) -> Result<(Solution, Option<RowOrder>), Failed> {
+        let Input { source, bad, .. } = input;
+        let is_file = source.is_file();
+        if input.dark.is_none() && input.flat.is_none() {
+            if !is_file {
+                let frame = source.frame(name, bad, &mut workspace.frames)?;
+                let solution = solve_frame(&frame, &context, workspace);
+                return Ok((solution.map_err(detect_error(name))?, None));
+            }
+            let mut row_order = None;
+            let read = |buffers: &mut Buffers| {
+                let frame = source.frame(name, bad, buffers)?;
+                row_order = Some(frame.metadata.row_order);
+                Ok(frame.into_owned())
+            };
+            let (solution, frame) = solve_read(name, read, &context, workspace)?;
+            workspace.frames.recycle(frame);
+            return Ok((solution, row_order));
+        }
+        workspace.begin(&context);
+        let frame = source.frame(name, bad, &mut workspace.frames)?.into_owned();
+        let row_order = is_file.then_some(frame.metadata.row_order);
+        let calibration = self.calibration(input.dark, input.flat, row_order);
+        let calibration = calibration.map_err(Failed)?;
+        let context = Context {
+            calibration: Some(&calibration),
+            ..context
+        };
+        let (solution, _) = solve_read(name, |_| Ok(frame), &context, workspace)?;
+        Ok((solution, row_order))
+    }
+
+    /// The calibration of a frame as drawn, whose file has its rows in this order. The masters of an
+    /// array, and arrays as masters, apply row by row.
     fn calibration(
         &self,
         dark: Option<Source>,
         flat: Option<Source>,
-    ) -> PyResult<Option<Calibration>> {
-        if dark.is_none() && flat.is_none() {
-            return Ok(None);
-        }
+        row_order: Option<RowOrder>,
+    ) -> PyResult<Calibration> {
         let master = |source: Source| {
-            let name = source.name();
+            let (name, is_file) = (source.name(), source.is_file());
             let frame = source.frame(&name, None, &mut Buffers::new());
-            let frame = frame.map_err(exception)?.into_owned();
+            let mut frame = frame.map_err(exception)?.into_owned();
+            if !is_file {
+                frame.metadata.row_order = row_order.unwrap_or_default();
+            }
+            if !is_file || row_order.is_none() {
+                frame = frame.as_stored();
+            }
             let name = name.display().to_string();
             Ok::<_, PyErr>(Master { name, frame })
         };
         let (dark, flat) = (dark.map(master).transpose()?, flat.map(master).transpose()?);
         let bias_adu = self.camera.as_ref().map_or(0.0, |sheet| sheet.bias_adu);
-        let calibration = Calibration::new(dark, flat, None, bias_adu);
-        calibration.map(Some).map_err(exception)
+        Calibration::new(dark, flat, None, bias_adu).map_err(exception)
     }
 
     /// Buffers of an earlier frame where there are any.
@@ -194,13 +248,36 @@ impl Pipeline {
         }
     }
 
-    fn solved(&self, name: &Path, solution: Solution) -> Solved {
+    fn solved(&self, name: &Path, solution: Solution, row_order: Option<RowOrder>) -> Solved {
         Solved {
             name: name.display().to_string(),
             solution,
+            row_order,
             indexed: self.indexed,
         }
     }
+}
+
+/// An image, and what is to be done with it.
+struct Input<'a> {
+    source: Source<'a>,
+    bad: Option<&'a [bool]>,
+    dark: Option<Source<'a>>,
+    flat: Option<Source<'a>>,
+}
+
+/// Why there is no solution.
+struct Failed(PyErr);
+
+impl<E: Into<pipeline::Error>> From<E> for Failed {
+    fn from(error: E) -> Self {
+        Self(exception(error.into()))
+    }
+}
+
+fn detect_error(name: &Path) -> impl FnOnce(DetectError) -> pipeline::Error {
+    let path = name.to_owned();
+    |source| pipeline::Error::Detect { path, source }
 }
 
 /// The library's defaults with what is given.
@@ -210,22 +287,4 @@ pub fn detect_config(sigma: Option<f64>, max_stars: Option<usize>) -> DetectConf
         max_detections: max_stars.unwrap_or(DetectConfig::DEFAULT_MAX_DETECTIONS),
         ..DetectConfig::default()
     }
-}
-
-fn solve(
-    name: &Path,
-    (source, bad): (Source, Option<&[bool]>),
-    context: &Context,
-    workspace: &mut Workspace,
-) -> PyResult<Solution> {
-    if matches!(source, Source::Array(_)) && context.calibration.is_none() {
-        let frame = source
-            .frame(name, bad, &mut workspace.frames)
-            .map_err(exception)?;
-        return solve_frame(&frame, context, workspace).map_err(exception);
-    }
-    let read = |buffers: &mut Buffers| Ok(source.frame(name, bad, buffers)?.into_owned());
-    let (solution, frame) = solve_read(name, read, context, workspace).map_err(exception)?;
-    workspace.frames.recycle(frame);
-    Ok(solution)
 }

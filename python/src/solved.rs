@@ -1,6 +1,6 @@
 //! A solved frame.
 
-use crate::errors::exception;
+use crate::errors::{exception, guarded, in_pythons_words};
 use pyo3::prelude::*;
 use starpipe::frame::RowOrder;
 use starpipe::pipeline::Outcome;
@@ -12,6 +12,8 @@ use starpipe::{FrameReport, IndexedCatalog, Solution};
 pub struct Solved {
     pub name: String,
     pub solution: Solution,
+    /// Order of the rows in the file, if it is one.
+    pub row_order: Option<RowOrder>,
     pub indexed: &'static IndexedCatalog<'static>,
 }
 
@@ -25,18 +27,22 @@ impl Solved {
 
     /// The report as the program's JSON.
     fn json(&self) -> PyResult<String> {
-        let report = FrameReport::new(&self.name, &self.solution, self.indexed.catalog());
-        report.to_json_line().map_err(exception)
+        guarded(|| {
+            let report = FrameReport::new(&self.name, &self.solution, self.indexed.catalog());
+            let json = report.to_json_line().map_err(exception)?;
+            Ok(in_pythons_words(&json))
+        })
     }
 
-    /// The world coordinates as a FITS header, or `None`; with `top_down` of the rows in the order
-    /// of the report, else of those in the file.
-    fn wcs_header(&self, top_down: bool) -> Option<Vec<u8>> {
-        let mut solution = self.solution.clone();
-        if top_down {
-            solution.row_order = Some(RowOrder::TopDown);
-        }
-        wcs::header(&self.name, &solution)
+    /// The world coordinates of the rows of the report as a FITS header, or `None`.
+    fn wcs_header(&self) -> PyResult<Option<Vec<u8>>> {
+        guarded(|| Ok(wcs::header(&self.name, &self.solution)))
+    }
+
+    /// ROWORDER of the file, if it is one.
+    #[getter]
+    fn row_order(&self) -> Option<&'static str> {
+        self.row_order.map(RowOrder::keyword_value)
     }
 
     /// The covariance of small rotations about the camera's axes, in rad², row by row.

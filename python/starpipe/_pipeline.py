@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import os
 from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -88,13 +90,15 @@ class Pipeline:
 
         Parameters
         ----------
-        image : path, bytes, array, CCDData, NDData or HDU
-            The frame. An array is (rows, columns), of real numbers. Arrays of uint8, uint16 and
-            float32 that are contiguous are not copied. Mask and header of an object are used.
+        image : path, bytes, file, array, PIL image, HDU, HDUList, CCDData or NDData
+            The frame. An array is (rows, columns), of real numbers, or (rows, columns, 3) of
+            colours. Arrays of uint8, uint16 and float32 that are contiguous are not copied. Of an
+            HDUList that image is taken which is taken of its file. Mask and header of an object are
+            used.
         mask : array of bool, optional
-            True where a pixel is to be left out.
+            True where a pixel is to be left out, in the order of the rows of `image`.
         name : path, optional
-            Name of the frame, if it comes as bytes; a date in it is used.
+            Name of the frame, if it does not come as a path; a date in it is used.
         fov, pixel_scale : Quantity or float, optional
             Horizontal field of view (degrees), or the angle of a pixel (arcseconds); see
             `scale_error`.
@@ -107,7 +111,8 @@ class Pipeline:
         exposure : Quantity or float, optional
             Exposure in seconds.
         dark, flat : image, optional
-            What to subtract, and by what to divide.
+            What to subtract, and by what to divide. They apply to the picture as drawn where frame
+            and master are files, else row by row.
         sigma : float, optional
             Threshold of detection in standard deviations.
         max_stars : int, optional
@@ -138,11 +143,16 @@ class Pipeline:
             If a file cannot be read.
         ValueError
             If there is no image in it, or an argument is out of range.
+        TypeError
+            If an argument is of a wrong type.
+        RuntimeError
+            If starpipe has a bug.
         """
         taken = Image(image)
+        name = taken.file_name if name is None else str(name)
         solved = self._pipeline.solve(
             taken.pixels,
-            None if name is None else str(name),
+            name,
             mask_of(taken, mask),
             hints(
                 taken.header,
@@ -165,6 +175,7 @@ class Pipeline:
             None if max_stars is None else count(max_stars, "max_stars", 4),
             bool(attitude_only),
             count(threads, "threads", 1),
+            False,
         )
         return Result._of(solved)
 
@@ -268,14 +279,26 @@ class Pipeline:
         Yields
         ------
         Result
-            As of `solve`. What it raises for an image is raised in its place.
+            As of `solve`. An image that cannot be read does not end the others: its result is false,
+            and has in `error` what `solve` raises for it.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If an argument is of a wrong type or out of range.
         """
-        workers = count(threads, "threads", 1)
+        inspect.signature(self.solve).bind(None, **known)
+        hints({}, **{name: known.get(name, default) for name, default in _HINTS.items()})
+        return self._solve_in_order(images, count(threads, "threads", 1), known)
+
+    def _solve_in_order(
+        self, images: Iterable[ImageLike], workers: int, known: dict[str, Any]
+    ) -> Iterator[Result]:
         waiting: deque[Future[Result]] = deque()
         pool = ThreadPoolExecutor(workers, thread_name_prefix="starpipe")
         try:
             for image in images:
-                waiting.append(pool.submit(self.solve, image, **known))
+                waiting.append(pool.submit(self._result, image, known))
                 if len(waiting) >= 2 * workers:
                     yield waiting.popleft().result()
             while waiting:
@@ -283,3 +306,20 @@ class Pipeline:
         finally:
             # Ctrl-C does not wait for the frames in work.
             pool.shutdown(wait=False, cancel_futures=True)
+
+    def _result(self, image: ImageLike, known: dict[str, Any]) -> Result:
+        """Return the result of an image; what is wrong with it alone is part of the result."""
+        try:
+            return self.solve(image, **known)
+        except (OSError, ValueError, RuntimeError) as error:
+            is_path = isinstance(image, (str, os.PathLike))
+            name = os.fspath(image) if is_path else type(image).__name__
+            return Result._unread(str(name), error)
+
+
+_HINTS = {
+    name: parameter.default
+    for name, parameter in inspect.signature(Pipeline.solve).parameters.items()
+    if name in inspect.signature(hints).parameters
+}
+"""What `hints` takes of the arguments of `Pipeline.solve`, with their defaults."""

@@ -16,9 +16,17 @@ from . import _starpipe, _tables
 class Result:
     """What was found in a frame. In a condition it is true where the stars are identified.
 
-    The numbers are those of the program's JSON, see `to_dict`. Positions in pixels are 0-based:
-    (0, 0) is the centre of the first pixel, x runs along a row.
+    Pixels are those of the array, or of the array that ``astropy.io.fits.getdata`` reads from the
+    file: (0, 0) is the centre of the first pixel of its first row, x runs along a row, y counts rows.
+    Everything else agrees with that: `wcs`, `quaternion`, whether the frame is mirrored.
+
+    Attributes
+    ----------
+    error : Exception or None
+        What was raised instead of an answer, in results of `Pipeline.solve_many`.
     """
+
+    error: Exception | None = None
 
     def __init__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -27,11 +35,22 @@ class Result:
     def _of(cls, solved: _starpipe.Solved) -> Result:
         return cls({"_solved": solved})
 
+    @classmethod
+    def _unread(cls, name: str, error: Exception) -> Result:
+        """Return what stands for a frame without an answer."""
+        nothing = ("attitude", "optics", "match", "photometry", "prediction", "width", "height")
+        report = {"frame": name, "status": "unread", "reason": str(error), "reason_code": "unread"}
+        report |= dict.fromkeys(nothing) | {"notes": [], "stars": [], "timing_ms": {}}
+        none = dict.fromkeys(("_wcs_header", "_row_order", "attitude_covariance"))
+        return cls({"_report": report, "error": error} | none)
+
     def __getstate__(self) -> dict[str, Any]:
         """Return what was computed so far and all that the compiled part holds."""
         return {
             "_report": self._report,
-            "_wcs_headers": self._wcs_headers,
+            "_wcs_header": self._wcs_header,
+            "_row_order": self._row_order,
+            "error": self.error,
             "attitude_covariance": self.attitude_covariance,
         }
 
@@ -41,10 +60,15 @@ class Result:
         return report
 
     @cached_property
-    def _wcs_headers(self) -> tuple[bytes | None, bytes | None]:
-        """In the order of the rows of the stars, and in that of the file."""
+    def _wcs_header(self) -> bytes | None:
         solved: _starpipe.Solved = self.__dict__["_solved"]
-        return solved.wcs_header(True), solved.wcs_header(False)
+        return solved.wcs_header()
+
+    @cached_property
+    def _row_order(self) -> str | None:
+        """ROWORDER of the file."""
+        solved: _starpipe.Solved = self.__dict__["_solved"]
+        return solved.row_order
 
     @cached_property
     def attitude_covariance(self) -> NDArray[np.float64] | None:
@@ -68,6 +92,8 @@ class Result:
     def __repr__(self) -> str:
         report = self._report
         name = report["frame"]
+        if self.error is not None:
+            return f"<Result {name}: {type(self.error).__name__}: {self.error}>"
         if not self:
             return f"<Result {name}: not identified ({self.reason_code})>"
         attitude, match = report["attitude"], report["match"]
@@ -182,22 +208,24 @@ class Result:
 
     @property
     def wcs(self) -> Any:
-        """World coordinates of the pixels of `stars` as an ``astropy.wcs.WCS``.
-
-        Rows count from the top of the picture. For the rows of a FITS file in the file's own order
-        take ``WCS(result.to_header())``.
-        """
-        cards = self._wcs_headers[0]
+        """World coordinates of the pixels of `stars` as an ``astropy.wcs.WCS``."""
+        cards = self._wcs_header
         shape = self._report["height"], self._report["width"]
         return None if cards is None else wcs_of(cards, shape)
 
     def to_header(self) -> Any:
-        """Return world coordinates of the rows in the order of the file, as a FITS header."""
-        header = self._wcs_headers[1]
-        return None if header is None else _header(header)
+        """Return the same as a FITS header, to be added to that of the file or the array."""
+        if self._wcs_header is None:
+            return None
+        header = _header(self._wcs_header)
+        # How the rows of an array are drawn is not known.
+        header.remove("ROWORDER")
+        if self._row_order is not None:
+            header.set("ROWORDER", self._row_order, "of the image's file", after="IMAGEH")
+        return header
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all numbers as the program's JSON has them."""
+        """Return all numbers as the program's JSON has them, with pixels as in `stars`."""
         copy: dict[str, Any] = json.loads(json.dumps(self._report))
         return copy
 
@@ -235,7 +263,8 @@ class Result:
         Parameters
         ----------
         image : array, optional
-            What to draw them on, its first row on top.
+            What to draw them on, its first row on top: the array that was solved, or that
+            ``astropy.io.fits.getdata`` reads from the file.
         ax : matplotlib.axes.Axes, optional
             Where to draw; new axes by default.
         names : int

@@ -41,6 +41,7 @@ _Image: TypeAlias = (
     | NDArray[np.float32]
     | tuple[NDArray[np.int64], int]
 )
+"""Arrays of 2 dimensions; of float32 and int64 also of 3: the last is that of the colours."""
 
 @final
 class Pipeline:
@@ -62,6 +63,7 @@ class Pipeline:
         max_stars: int | None,
         attitude_only: bool,
         threads: int,
+        as_drawn: bool,
     ) -> Solved: ...
     def identify(
         self,
@@ -76,7 +78,9 @@ class Solved:
     @property
     def identified(self) -> bool: ...
     def json(self) -> str: ...
-    def wcs_header(self, top_down: bool) -> bytes | None: ...
+    def wcs_header(self) -> bytes | None: ...
+    @property
+    def row_order(self) -> str | None: ...
     def attitude_covariance_rad2(self) -> list[list[float]] | None: ...
 
 @final

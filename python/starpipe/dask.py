@@ -338,12 +338,14 @@ def _process_part(job: _Job, part: str, names: list[str]) -> dict[str, int]:
                     job.max_stars,
                     job.attitude_only,
                     1,
+                    True,
                 )
-            except (*FINAL, ValueError) as error:
+                status = rows.add(solved)
+            except (*FINAL, ValueError, RuntimeError) as error:
                 rows.add_unread(name, str(error).replace("\n", " "))
                 counted["unread"] += 1
             else:
-                counted[rows.add(solved)] += 1
+                counted[status] += 1
     filesystem, root = _open(job.out, job.options)
     frames, stars = rows.finish()
     # A part is there when its table of frames is.
@@ -364,7 +366,7 @@ def _images(
                 yield from _starpipe.Pages(content.result(), name)
             else:
                 yield name, _starpipe.read_page(content.result(), name, job.page)
-        except (*FINAL, ValueError) as error:
+        except (*FINAL, ValueError, RuntimeError) as error:
             yield name, error
 
 

@@ -5,8 +5,11 @@ import shutil
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+from astropy.io import fits
 from conftest import REPOSITORY
+from PIL import Image
 
 PAGES = [*sorted((REPOSITORY / "docs" / "python").glob("*.md")), REPOSITORY / "python/README.md"]
 
@@ -21,6 +24,8 @@ def code_of(page):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_the_code_of_a_page_runs(page, frame, tmp_path, monkeypatch):
     shutil.copy(frame, tmp_path / "night.tif")
+    pixels = np.array(Image.open(frame))
+    fits.PrimaryHDU(pixels[::-1].copy()).writeto(tmp_path / "night.fits")
     (tmp_path / "nights").mkdir()
     for night in range(3):
         shutil.copy(frame, tmp_path / "nights" / f"{night}.tif")

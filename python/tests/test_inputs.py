@@ -1,5 +1,6 @@
 """What cannot be solved is refused with a message that says why."""
 
+import io
 import re
 
 import numpy as np
@@ -15,8 +16,8 @@ import starpipe as sp
         (np.zeros((20, 20), dtype=complex), "real numbers, not complex128"),
         (np.full((20, 20), None), "real numbers, not object"),
         (np.full((20, 20), "a"), "real numbers, not <U1"),
-        (np.zeros((20, 20, 3)), "2 dimensions .* not 3; a colour image"),
-        (np.zeros(20), "2 dimensions .* not 1"),
+        (np.zeros((20, 20, 5)), r"\(rows, columns, 3\) of colours, not .*image\[0\]"),
+        (np.zeros(20), r"\(rows, columns\).* not \(20,\)"),
         (np.zeros((0, 20)), "20 x 0|too small|at least"),
         (np.broadcast_to(np.uint8(7), (300_000, 300_000)), "300000 x 300000 pixels"),
         (np.full((20, 20), np.nan), "value"),
@@ -46,6 +47,7 @@ def test_files_that_cannot_be_read_are_named(pipeline, tmp_path):
         ({"fov": "wide"}, "fov must be a number"),
         ({"fov": np.nan}, "fov must be a finite number"),
         ({"fov": 10, "pixel_scale": 30}, "say the same"),
+        ({"time_limit": 1e-9}, r"time limit of a frame \(time_limit\)"),
         ({"near": (10, 20)}, "near and radius belong together"),
         ({"near": (10, 95), "radius": 5}, "declination"),
         ({"near": 10, "radius": 5}, "SkyCoord or"),
@@ -64,6 +66,29 @@ def test_files_that_cannot_be_read_are_named(pipeline, tmp_path):
 def test_wrong_arguments_are_refused(pipeline, pixels, known, message):
     with pytest.raises(ValueError, match=message):
         pipeline.solve(pixels, **known)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((None,), "must be a path, bytes, .*, not NoneType"),
+        (({"a": 1},), "must be a path, bytes, .*, not dict"),
+        ((io.StringIO("text"),), "binary mode"),
+        ((np.zeros((20, 20)), 11.4), r"mask must be an array of bool, not 11\.4; .* fov=20"),
+        ((np.zeros((20, 20)), None, 11.4), "positional"),
+    ],
+)
+def test_what_is_of_a_wrong_type_is_told_in_pythons_words(pipeline, arguments, message):
+    with pytest.raises(TypeError, match=message):
+        pipeline.solve(*arguments)
+
+
+def test_advice_names_keywords(pipeline, pixels, result):
+    report = result.to_dict()["attitude"]
+    ra, dec = report["ra_deg"], report["dec_deg"]
+    found = pipeline.solve(pixels, near=((ra + 180.0) % 360.0, -dec), radius=3, fov=30.0)
+    assert not found and "--" not in found.reason
+    assert "fov or pixel_scale" in pipeline.solve(pixels, fov=100.0).reason
 
 
 @pytest.mark.parametrize(

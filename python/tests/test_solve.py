@@ -1,6 +1,7 @@
 """Frames are solved, however they are passed."""
 
 import json
+import pickle
 import subprocess
 
 import numpy as np
@@ -92,10 +93,43 @@ def test_many_frames_come_in_order_and_errors_in_their_place(pipeline, pixels, r
     found = pipeline.solve_many([pixels, pixels[:, ::-1], pixels] * 3, threads=2)
     for number, one in enumerate(found):
         assert (one == result) == (number % 3 != 1)
-    results = pipeline.solve_many([pixels, tmp_path / "missing.tif", pixels])
-    assert next(results)
-    with pytest.raises(OSError, match=r"missing\.tif"):
-        next(results)
+    broken = tmp_path / "broken.tif"
+    broken.write_bytes(b"no image")
+    images = [pixels, tmp_path / "missing.tif", broken, np.zeros(5), pixels]
+    found = list(pipeline.solve_many(images))
+    assert [bool(one) for one in found] == [True, False, False, False, True]
+    assert found[0] == found[-1] == result and result.error is None
+    kinds = [OSError, ValueError, ValueError]
+    assert all(isinstance(one.error, kind) for one, kind in zip(found[1:4], kinds, strict=True))
+    missing = pickle.loads(pickle.dumps(found[1]))
+    for one in (found[1], missing):
+        assert "missing.tif" in one.reason and one.reason_code == "unread"
+        assert one.to_dict()["status"] == "unread" and "missing.tif" in repr(one)
+        assert one.center is None and one.wcs is None and one.quaternion is None
+        assert one.to_header() is None and len(one.stars) == 0 and one._repr_html_()
+
+
+def test_wrong_arguments_of_many_frames_are_refused_at_once(pipeline, pixels):
+    with pytest.raises(ValueError, match="fov must be more than 0"):
+        pipeline.solve_many([pixels], fov=-1)
+    with pytest.raises(TypeError, match="field"):
+        pipeline.solve_many([pixels], field=10)
+
+
+def test_a_bug_that_one_frame_meets_is_its_error(pipeline, pixels, result, monkeypatch, capfd):
+    rows, columns = pixels.shape
+    monkeypatch.setenv("STARPIPE_PLANTED_PANIC", f"{columns - 1}x{rows}")
+    try:
+        pipeline.solve(pixels[:, 1:])
+    except RuntimeError as error:
+        assert "solving array: a bug in starpipe, please report it: planted" in str(error)
+    else:
+        pytest.skip("a release has no planted bug")
+    found = list(pipeline.solve_many([pixels, pixels[:, 1:], pixels], threads=2))
+    assert found[0] == found[2] == result and isinstance(found[1].error, RuntimeError)
+    with pytest.raises(RuntimeError, match="solving centroids: a bug"):
+        pipeline.identify([1, 2], [3, 4], mag=[1, 2], shape=(rows, columns - 1))
+    assert capfd.readouterr().err == ""
 
 
 def test_attitude_only_names_few(pipeline, pixels, result):

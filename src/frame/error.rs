@@ -144,7 +144,7 @@ pub enum FrameError {
         pages: usize,
     },
     /// A decoder has a bug.
-    #[error(transparent)]
+    #[error("{0}")]
     Panicked(#[from] Panicked),
     /// A directory without frames.
     #[error("a directory without frames: found {} in it, expected {FORMATS}", files_found(*files))]

@@ -129,6 +129,14 @@ impl<'p> Frame<'p> {
         self
     }
 
+    /// The frame with its rows in the order of the file, as if that were the picture's.
+    #[must_use]
+    pub fn as_stored(self) -> Self {
+        let mut stored = self.upright();
+        stored.metadata.row_order = RowOrder::TopDown;
+        stored
+    }
+
     /// Puts the top row first, for rows in the order of the file.
     pub(super) fn upright(mut self) -> Self {
         if self.metadata.row_order == RowOrder::BottomUp {

@@ -69,6 +69,38 @@ impl<'p> Frame<'p> {
         };
         frame_from_integers(&samples, full_scale)
     }
+
+    /// The luminance of a picture of 3 colours, whose samples are whole numbers, as of a file: pixel
+    /// by pixel, and more `channels` than 3 are left out.
+    ///
+    /// # Errors
+    /// As [`Frame::from_integers`].
+    pub fn from_colours<T: WholeNumber>(
+        (width, height): (usize, usize),
+        channels: usize,
+        values: &[T],
+        full_scale: T,
+    ) -> Result<Self, FrameError> {
+        let samples = Samples {
+            width,
+            height,
+            values,
+            channels,
+        };
+        frame_from_integers(&samples, full_scale)
+    }
+
+    /// The same of samples that are floats, which have no step and no full scale.
+    ///
+    /// # Errors
+    /// As [`Frame::new`].
+    pub fn from_float_colours(
+        size: (usize, usize),
+        channels: usize,
+        values: Vec<f32>,
+    ) -> Result<Self, FrameError> {
+        frame_from_floats(size, channels, values)
+    }
 }
 
 /// Makes a frame from integer samples; `full_scale` is the largest value of the format, in ADU.

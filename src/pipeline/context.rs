@@ -29,6 +29,9 @@ pub struct Context<'a> {
     /// Whether to stop at attitude and optics, from the brightest stars: no other star is named, and
     /// nothing is measured that needs the names.
     pub attitude_only: bool,
+    /// Whether a frame is that of the file's rows as they are stored: the first is then row 0 of
+    /// positions, attitude and world coordinates. Without it they are those of the picture as drawn.
+    pub as_stored: bool,
     /// How long a frame may take, from where its reading begins.
     pub time_limit: Option<Duration>,
 }
@@ -43,6 +46,7 @@ impl<'a> Context<'a> {
             camera: None,
             calibration: None,
             attitude_only: false,
+            as_stored: false,
             time_limit: None,
         }
     }

@@ -59,6 +59,9 @@ pub fn solve_read(
                 source,
             })?;
     }
+    if context.as_stored {
+        frame = frame.as_stored();
+    }
     clock.lap(Stage::Read);
     let input = Input {
         frame: &frame,
