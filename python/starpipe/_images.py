@@ -70,7 +70,8 @@ class Image:
         if isinstance(image, np.ma.MaskedArray):
             if image.mask is not np.ma.nomask:
                 mask = np.ma.getmaskarray(image)
-                self.mask = _mask(mask.any(axis=2) if mask.ndim == 3 else mask, name)
+                whole = np.asarray(mask.any(axis=2)) if mask.ndim == 3 else mask
+                self.mask = _mask(whole, name)
             image = image.data
         self.pixels = _pixels(image, name)
 
@@ -165,8 +166,8 @@ def mask_of(image: Image, given: Any, name: str = "image") -> NDArray[np.bool_] 
         return image.mask
     if np.ndim(given) == 0:
         raise TypeError(
-            f"mask must be an array of bool, not {given!r}; what is known of the {name} is given by "
-            "keyword, as fov=20"
+            f"mask must be an array of bool, not {given!r}; what is known of the {name} is "
+            "given by keyword, as fov=20"
         )
     mask = _mask(np.asarray(given), name)
     if image.mask is not None:

@@ -279,8 +279,8 @@ class Pipeline:
         Yields
         ------
         Result
-            As of `solve`. An image that cannot be read does not end the others: its result is false,
-            and has in `error` what `solve` raises for it.
+            As of `solve`. An image that cannot be read does not end the others: its result is
+            false, and has in `error` what `solve` raises for it.
 
         Raises
         ------

@@ -17,8 +17,8 @@ class Result:
     """What was found in a frame. In a condition it is true where the stars are identified.
 
     Pixels are those of the array, or of the array that ``astropy.io.fits.getdata`` reads from the
-    file: (0, 0) is the centre of the first pixel of its first row, x runs along a row, y counts rows.
-    Everything else agrees with that: `wcs`, `quaternion`, whether the frame is mirrored.
+    file: (0, 0) is the centre of the first pixel of its first row, x runs along a row, y counts
+    rows. Everything else agrees with that: `wcs`, `quaternion`, whether the frame is mirrored.
 
     Attributes
     ----------
@@ -39,8 +39,9 @@ class Result:
     def _unread(cls, name: str, error: Exception) -> Result:
         """Return what stands for a frame without an answer."""
         nothing = ("attitude", "optics", "match", "photometry", "prediction", "width", "height")
-        report = {"frame": name, "status": "unread", "reason": str(error), "reason_code": "unread"}
-        report |= dict.fromkeys(nothing) | {"notes": [], "stars": [], "timing_ms": {}}
+        report: dict[str, Any] = dict.fromkeys(nothing)
+        report |= {"frame": name, "notes": [], "stars": [], "timing_ms": {}}
+        report |= {"status": "unread", "reason": str(error), "reason_code": "unread"}
         none = dict.fromkeys(("_wcs_header", "_row_order", "attitude_covariance"))
         return cls({"_report": report, "error": error} | none)
 

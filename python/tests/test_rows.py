@@ -1,4 +1,4 @@
-"""Pixels are those of the array that ``astropy.io.fits.getdata`` reads, however a frame is passed."""
+"""Pixels are those of ``astropy.io.fits.getdata``, however a frame is passed."""
 
 import io
 import warnings
