@@ -47,7 +47,7 @@ mod _starpipe {
 
     /// Panics become exceptions, and print nothing.
     #[pymodule_init]
-    fn init(_: &Bound<'_, PyModule>) -> PyResult<()> {
+    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
         starpipe::base::panics::silence();
         Ok(())
     }
