@@ -6,6 +6,7 @@ mod common;
 
 use common::fixture;
 use starpipe::detect::DetectError;
+use starpipe::frame::{Buffers, FrameError};
 use starpipe::identify::IndexedCatalog;
 use starpipe::pipeline::{Outcome, Workspace, solve_frame};
 use starpipe::{Context, Frame, Interrupt, frame};
@@ -88,4 +89,35 @@ fn a_frame_is_ended_wherever_it_is_and_the_buffers_serve_the_next() {
         in_detection > 0 && in_search > 0,
         "{in_detection} {in_search}"
     );
+}
+
+#[test]
+fn reading_is_ended_wherever_it_is_and_the_buffers_serve_the_next() {
+    let files = ["orion/orion.png", "cygnus/cygnus.tif"];
+    for name in files {
+        let path = fixture(name);
+        let mut buffers = Buffers::new();
+        let (never, asked) = at_question(usize::MAX);
+        buffers.set_interrupt(never);
+        let expected = frame::read_page_with(&path, None, &mut buffers).unwrap();
+        let questions = asked.load(Ordering::Relaxed);
+        assert!(questions > 3, "{name}: asked {questions} times");
+        for number in (1..=questions).step_by(questions.div_ceil(10)) {
+            let (interrupt, _) = at_question(number);
+            buffers.set_interrupt(interrupt);
+            let error = frame::read_page_with(&path, None, &mut buffers).unwrap_err();
+            let FrameError::File { source, .. } = &error else {
+                panic!("{error}");
+            };
+            assert!(
+                matches!(**source, FrameError::Interrupted(_)),
+                "{name}: {error}"
+            );
+        }
+        buffers.set_interrupt(Interrupt::default());
+        assert_eq!(
+            frame::read_page_with(&path, None, &mut buffers).unwrap(),
+            expected
+        );
+    }
 }

@@ -243,3 +243,129 @@ fn a_crowded_picture_takes_no_more_memory_than_it_may() {
     let ran = with_memory("200");
     assert_eq!(ran.status, 3, "{}", ran.stderr);
 }
+
+/// Cards as a header, and blanks to its end.
+fn fits_header(cards: &[String]) -> Vec<u8> {
+    let end = "END".to_owned();
+    let cards = cards.iter().chain([&end]).map(|card| format!("{card:<80}"));
+    let mut header = cards.collect::<String>().into_bytes();
+    header.resize(header.len().next_multiple_of(2880), b' ');
+    header
+}
+
+fn card(keyword: &str, value: &str) -> String {
+    format!("{keyword:<8}= {value:>20}")
+}
+
+/// An image of tiles of one pixel whose data are the same item of the heap.
+fn shared_tiles(side: usize) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(&[0, 7]).unwrap();
+    let item = encoder.finish().unwrap();
+    let (side_text, tiles) = (side.to_string(), (side * side).to_string());
+    let heap = item.len().to_string();
+    let primary = [("SIMPLE", "T"), ("BITPIX", "8"), ("NAXIS", "0")];
+    let table = [
+        ("XTENSION", "'BINTABLE'"),
+        ("BITPIX", "8"),
+        ("NAXIS", "2"),
+        ("NAXIS1", "8"),
+        ("NAXIS2", &tiles),
+        ("PCOUNT", &heap),
+        ("GCOUNT", "1"),
+        ("TFIELDS", "1"),
+        ("TTYPE1", "'COMPRESSED_DATA'"),
+        ("TFORM1", "'1PB'"),
+        ("ZIMAGE", "T"),
+        ("ZCMPTYPE", "'GZIP_1'"),
+        ("ZBITPIX", "16"),
+        ("ZNAXIS", "2"),
+        ("ZNAXIS1", &side_text),
+        ("ZNAXIS2", &side_text),
+        ("ZTILE1", "1"),
+        ("ZTILE2", "1"),
+    ];
+    let of = |cards: &[(&str, &str)]| {
+        let cards: Vec<String> = cards.iter().map(|(k, v)| card(k, v)).collect();
+        fits_header(&cards)
+    };
+    let descriptor = [(item.len() as u32).to_be_bytes(), [0; 4]].concat();
+    [
+        of(&primary),
+        of(&table),
+        descriptor.repeat(side * side),
+        item,
+    ]
+    .concat()
+}
+
+#[test]
+fn tiles_that_share_their_data_are_refused() {
+    let expected = "expected data of its own for each";
+    assert_refused("shared.fits", &shared_tiles(100), expected);
+    let expected = "found more than 1000000 tiles in an image";
+    assert_refused("many.fits", &shared_tiles(1100), expected);
+}
+
+#[test]
+fn a_header_of_very_many_axes_is_refused() {
+    let mut cards = vec![
+        card("SIMPLE", "T"),
+        card("BITPIX", "8"),
+        card("NAXIS", "999"),
+    ];
+    cards.extend((1..=999).map(|axis| card(&format!("NAXIS{axis}"), "1")));
+    let expected = "found 999, expected a number of axes from 0 to 32";
+    assert_refused("axes.fits", &fits_header(&cards), expected);
+}
+
+#[test]
+fn a_catalogue_without_end_is_refused() {
+    let head = b"id,ra_deg,dec_deg,vmag\n\"\n";
+    for (body, expected) in [
+        (b",\n".repeat(10_000_001), "found more than 10000000 lines"),
+        (vec![b'x'; 1 << 20], "found a line of more than 65536 bytes"),
+    ] {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("stars.csv.gz");
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+        encoder.write_all(head).unwrap();
+        encoder.write_all(&body).unwrap();
+        fs::write(&path, encoder.finish().unwrap()).unwrap();
+        let ran = process(&[Path::new("--catalog"), &path, &orion()]);
+        assert_eq!(ran.status, 1);
+        assert!(ran.stderr.contains(expected), "{}", ran.stderr);
+    }
+}
+
+#[test]
+fn a_frame_that_is_not_read_in_time_is_told_of() {
+    let side = 9000;
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    write!(encoder, "P2\n{side} {side}\n9\n").unwrap();
+    let row = b"1 ".repeat(side);
+    for _ in 0..side {
+        encoder.write_all(&row).unwrap();
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("slow.pgm.gz");
+    fs::write(&path, encoder.finish().unwrap()).unwrap();
+    let limited = ["--time-limit", "0.1"].map(Path::new);
+    let ran = process(&[&limited[..], &[&path, &orion()]].concat());
+    assert_eq!(ran.status, 1);
+    let expected = "slow.pgm.gz: not done within the time limit of a frame (--time-limit)";
+    assert!(ran.stderr.contains(expected), "{}", ran.stderr);
+    assert!(ran.stdout.contains("orion.png"), "{}", ran.stdout);
+}
+
+#[test]
+fn devices_by_way_of_those_that_the_shell_opens_are_refused() {
+    for path in ["/dev/fd/../../dev/zero", "/proc/self/fd/../../../dev/zero"] {
+        for option in ["--catalog", "--camera", "--hot-pixels", "--dark"] {
+            let ran = process(&[Path::new(option), Path::new(path), &orion()]);
+            assert_eq!(ran.status, 1, "{option} {path}");
+            let expected = "a pipe, a socket or a device";
+            assert!(ran.stderr.contains(expected), "{option}: {}", ran.stderr);
+        }
+    }
+}

@@ -25,7 +25,7 @@ pub fn open(key: Key, interrupt: &Interrupt) -> PyResult<&'static IndexedCatalog
     let catalog: &'static Catalog = match &key.0 {
         None => Catalog::built_in(),
         Some(path) => {
-            let reading = catalog::read(path).map_err(exception)?;
+            let reading = catalog::read_until(path, interrupt).map_err(exception)?;
             for file in &reading.files {
                 if let Some(reasons) = file.summary.left_out() {
                     let (path, records) = (file.path.display(), file.summary.records);

@@ -2,6 +2,7 @@
 
 use crate::errors::{detached, exception, json};
 use crate::image::Image;
+use crate::interrupt::on_this_thread;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use starpipe::calibration::darks::{
@@ -27,9 +28,11 @@ impl DarkFrames {
     fn add(&mut self, py: Python<'_>, image: Image<'_>, exposure_s: Option<f64>) -> PyResult<()> {
         let source = image.source()?;
         let stack = &mut self.stack;
-        detached(py, || {
+        on_this_thread(py, |interrupt| {
             let name = source.name();
-            let frame = source.frame(&name, None, &mut Buffers::new());
+            let mut buffers = Buffers::new();
+            buffers.set_interrupt(interrupt.clone());
+            let frame = source.frame(&name, None, &mut buffers);
             let frame = frame.map_err(exception)?.as_stored();
             let statistics = FrameStatistics::of(&name.display().to_string(), &frame, exposure_s);
             stack.add(&frame, statistics).map_err(exception)

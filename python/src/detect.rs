@@ -2,7 +2,7 @@
 
 use crate::errors::{exception, json};
 use crate::image::{Image, bad_pixels};
-use crate::interrupt::on_threads;
+use crate::interrupt::{on_threads, useful};
 use crate::pipeline::detect_config;
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
@@ -38,9 +38,11 @@ pub fn detect(
     let config = detect_config(sigma, max_stars);
     on_threads(py, threads, |interrupt| {
         let name = source.name();
-        let frame = source.frame(&name, bad, &mut Buffers::new());
+        let mut buffers = Buffers::new();
+        buffers.set_interrupt(interrupt.clone());
+        let frame = source.frame(&name, bad, &mut buffers);
         let frame = frame.map_err(exception)?.as_stored();
-        let workspace = Workspace::new().on_threads(threads);
+        let workspace = Workspace::new().on_threads(useful(threads));
         let mut workspace = workspace.until(interrupt.clone());
         let found = starpipe::detect(&frame, &config, &mut workspace).map_err(exception)?;
         json(&Detected {

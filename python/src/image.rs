@@ -139,7 +139,8 @@ impl<'a> Source<'a> {
         buffers: &mut Buffers,
     ) -> Result<Frame<'a>, FrameError> {
         let mut frame = match self {
-            Self::Bytes(bytes) => frame::decode(bytes).map_err(|error| error.in_file(name))?,
+            Self::Bytes(bytes) => frame::decode_page_with(bytes, None, buffers)
+                .map_err(|error| error.in_file(name))?,
             Self::Path(path) => frame::read_page_with(path, None, buffers)?,
             Self::Page(frame) => frame.clone(),
             Self::Array(frame) => frame,
@@ -154,7 +155,11 @@ impl<'a> Source<'a> {
         let is_reversed = frame.metadata.row_order == RowOrder::BottomUp;
         let rows = frame.values_mut().chunks_exact_mut(width).enumerate();
         for (row, pixels) in rows {
-            let stored = if is_reversed { expected / width - 1 - row } else { row };
+            let stored = if is_reversed {
+                expected / width - 1 - row
+            } else {
+                row
+            };
             let bad = &bad[stored * width..][..width];
             for (pixel, _) in pixels.iter_mut().zip(bad).filter(|(_, bad)| **bad) {
                 *pixel = f32::NAN;

@@ -14,6 +14,16 @@ use std::time::{Duration, Instant};
 /// Between two looks for signals.
 const PERIOD: Duration = Duration::from_millis(30);
 
+/// Threads that may be started on any machine, as in the program.
+const MOST_USEFUL: NonZeroUsize = NonZeroUsize::new(8).unwrap();
+
+/// The number of threads that are started where so many are wanted: more than 8 and than there are
+/// processors only get in each other's way.
+pub fn useful(wanted: NonZeroUsize) -> NonZeroUsize {
+    let processors = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    wanted.min(processors.max(MOST_USEFUL))
+}
+
 /// Works on the calling thread, which looks for signals when the work asks whether to end.
 pub fn on_this_thread<R: Send>(
     py: Python<'_>,
@@ -50,14 +60,14 @@ pub fn on_threads<R: Send>(
     threads: NonZeroUsize,
     work: impl FnOnce(&Interrupt) -> PyResult<R> + Send,
 ) -> PyResult<R> {
-    let pool = ThreadPoolBuilder::new().num_threads(threads.get()).build();
-    let pool = pool.map_err(exception)?;
     let is_due = Arc::new(AtomicBool::new(false));
     let interrupt = Interrupt::when({
         let is_due = Arc::clone(&is_due);
         move || is_due.load(Ordering::Relaxed)
     });
     detached(py, || {
+        let pool = ThreadPoolBuilder::new().num_threads(useful(threads).get());
+        let pool = pool.build().map_err(exception)?;
         pool.in_place_scope(|scope| {
             let (sender, receiver) = sync_channel(1);
             scope.spawn(move |_| {

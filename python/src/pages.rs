@@ -1,10 +1,11 @@
 //! The images of a file with several.
 
 use crate::errors::exception;
+use crate::interrupt::on_this_thread;
 use pyo3::prelude::*;
-use starpipe::Frame;
 use starpipe::frame::{self, Buffers, FrameError};
 use starpipe::pipeline;
+use starpipe::{Frame, Interrupt};
 use std::num::NonZeroUsize;
 use std::path::Path;
 
@@ -20,8 +21,17 @@ pub fn read_page(
     name: &str,
     number: NonZeroUsize,
 ) -> PyResult<Page> {
-    let decoded = py.detach(|| frame::decode_page(content, Some(number)));
-    decoded.map(Page).map_err(|error| unread(error, name))
+    on_this_thread(py, |interrupt| {
+        let decoded = frame::decode_page_with(content, Some(number), &mut buffers(interrupt));
+        decoded.map(Page).map_err(|error| unread(error, name))
+    })
+}
+
+/// Buffers for a frame that ends with `interrupt`.
+fn buffers(interrupt: &Interrupt) -> Buffers {
+    let mut buffers = Buffers::new();
+    buffers.set_interrupt(interrupt.clone());
+    buffers
 }
 
 fn unread(error: FrameError, name: &str) -> PyErr {
@@ -40,9 +50,11 @@ pub struct Pages {
 impl Pages {
     #[new]
     fn new(py: Python<'_>, content: &[u8], name: String) -> PyResult<Self> {
-        let opened = py.detach(|| frame::Pages::of(content.to_vec(), &mut Buffers::new()));
-        let pages = opened.map_err(|error| unread(error, &name))?;
-        Ok(Self { name, pages })
+        on_this_thread(py, |interrupt| {
+            let opened = frame::Pages::of(content.to_vec(), &mut buffers(interrupt));
+            let pages = opened.map_err(|error| unread(error, &name))?;
+            Ok(Self { name, pages })
+        })
     }
 
     fn __iter__(this: PyRef<'_, Self>) -> PyRef<'_, Self> {
@@ -53,7 +65,8 @@ impl Pages {
         let Some(number) = self.pages.advance() else {
             return Ok(None);
         };
-        let frame = py.detach(|| self.pages.image(&mut Buffers::new()));
+        let pages = &mut self.pages;
+        let frame = on_this_thread(py, |interrupt| Ok(pages.image(&mut buffers(interrupt))))?;
         let name = format!("{}[{number}]", self.name);
         let image = match frame {
             Ok(frame) => Bound::new(py, Page(frame))?.into_any(),

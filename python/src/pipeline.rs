@@ -5,7 +5,7 @@ use crate::catalogs;
 use crate::errors::exception;
 use crate::hints::Hints;
 use crate::image::{Image, Source, bad_pixels};
-use crate::interrupt::{on_this_thread, on_threads};
+use crate::interrupt::{on_this_thread, on_threads, useful};
 use crate::solved::Solved;
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
@@ -87,7 +87,12 @@ impl Pipeline {
             let name = name.unwrap_or_else(|| source.name());
             let mut workspace = self.workspace(threads, hints.name_odds, interrupt);
             let solved = solve_guarded(&name, &mut workspace, |workspace| {
-                let input = Input { source, bad, dark, flat };
+                let input = Input {
+                    source,
+                    bad,
+                    dark,
+                    flat,
+                };
                 self.solve_input(&name, input, context, workspace)
             });
             self.keep(workspace);
@@ -195,7 +200,8 @@ impl Pipeline {
         workspace.begin(&context);
         let frame = source.frame(name, bad, &mut workspace.frames)?.into_owned();
         let row_order = is_file.then_some(frame.metadata.row_order);
-        let calibration = self.calibration(input.dark, input.flat, row_order);
+        let calibration =
+            self.calibration(input.dark, input.flat, row_order, &mut workspace.frames);
         let calibration = calibration.map_err(Failed)?;
         let context = Context {
             calibration: Some(&calibration),
@@ -212,10 +218,11 @@ impl Pipeline {
         dark: Option<Source>,
         flat: Option<Source>,
         row_order: Option<RowOrder>,
+        buffers: &mut Buffers,
     ) -> PyResult<Calibration> {
-        let master = |source: Source| {
+        let mut master = |source: Source| {
             let (name, is_file) = (source.name(), source.is_file());
-            let frame = source.frame(&name, None, &mut Buffers::new());
+            let frame = source.frame(&name, None, buffers);
             let mut frame = frame.map_err(exception)?.into_owned();
             if !is_file {
                 frame.metadata.row_order = row_order.unwrap_or_default();
@@ -226,7 +233,8 @@ impl Pipeline {
             let name = name.display().to_string();
             Ok::<_, PyErr>(Master { name, frame })
         };
-        let (dark, flat) = (dark.map(master).transpose()?, flat.map(master).transpose()?);
+        let dark = dark.map(&mut master).transpose()?;
+        let flat = flat.map(&mut master).transpose()?;
         let bias_adu = self.camera.as_ref().map_or(0.0, |sheet| sheet.bias_adu);
         Calibration::new(dark, flat, None, bias_adu).map_err(exception)
     }
@@ -237,7 +245,7 @@ impl Pipeline {
         let kept = self.workspaces.try_lock();
         let kept = kept.ok().and_then(|mut kept| kept.pop());
         let mut workspace = kept.unwrap_or_default();
-        workspace.detect = workspace.detect.on_threads(threads);
+        workspace.detect = workspace.detect.on_threads(useful(threads));
         workspace.identify = workspace.identify.with_name_odds(name_odds);
         workspace.until(interrupt)
     }

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _starpipe, _tables
-from ._hints import count, positive
+from ._hints import count, positive, thread_count
 from ._images import Image, ImageLike, mask_of
 
 
@@ -103,6 +103,6 @@ def detect(
         mask_of(taken, mask),
         positive(sigma, "", "sigma"),
         None if max_stars is None else count(max_stars, "max_stars", 4),
-        count(threads, "threads", 1),
+        thread_count(threads),
     )
     return Detections(json.loads(report))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import os
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,11 @@ def count(value: Any, name: str, least: int) -> int:
     if int(value) != value or value < least:
         raise ValueError(f"{name} must be a whole number from {least} on, not {value}")
     return int(value)
+
+
+def thread_count(threads: Any) -> int:
+    """Return how many threads to start: more than 8 only where there are more processors."""
+    return min(count(threads, "threads", 1), max(8, os.cpu_count() or 1))
 
 
 def direction(near: Any, radius: Any) -> tuple[float, float, float] | None:

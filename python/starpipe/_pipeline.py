@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from . import _starpipe
 from ._camera import PathLike
-from ._hints import NAME_ODDS, count, hints, positive
+from ._hints import NAME_ODDS, count, hints, positive, thread_count
 from ._images import Image, ImageLike, mask_of
 from ._result import Result
 
@@ -120,7 +120,7 @@ class Pipeline:
         attitude_only : bool
             Stop at the attitude: no star beyond the brightest is named.
         threads : int
-            Threads for this frame.
+            Threads for this frame. More than 8 are started only where there are more processors.
         scale_error : float
             How far `fov` or `pixel_scale` may be off, as a share.
         zenith_distance : Angle or float, optional
@@ -174,7 +174,7 @@ class Pipeline:
             positive(sigma, "", "sigma"),
             None if max_stars is None else count(max_stars, "max_stars", 4),
             bool(attitude_only),
-            count(threads, "threads", 1),
+            thread_count(threads),
             False,
         )
         return Result._of(solved)
@@ -197,6 +197,7 @@ class Pipeline:
         attitude_only: bool = False,
         scale_error: float = 0.1,
         name_odds: float = NAME_ODDS,
+        time_limit: Any = None,
     ) -> Result:
         """Identify the stars of a list of centroids.
 
@@ -216,6 +217,8 @@ class Pipeline:
             that coincide with a brighter one are left out; `notes` tell of them.
         fov, pixel_scale, near, radius, date, location, attitude_only, scale_error, name_odds
             As for `solve`.
+        time_limit : Quantity or float, optional
+            How long this may take, in seconds.
 
         Returns
         -------
@@ -254,6 +257,7 @@ class Pipeline:
             location=location,
             scale_error=scale_error,
             name_odds=name_odds,
+            time_limit=time_limit,
         )
         solved = self._pipeline.identify(
             table, (rows, width), brightness, error is not None, known, bool(attitude_only)
@@ -272,7 +276,8 @@ class Pipeline:
         images : iterable
             Images as `solve` takes them, best paths.
         threads : int
-            Frames that are solved at once.
+            Frames that are solved at once, each within the memory that a frame may take. More than
+            8 are started only where there are more processors.
         **known
             What else `solve` takes, for all frames.
 
@@ -289,7 +294,7 @@ class Pipeline:
         """
         inspect.signature(self.solve).bind(None, **known)
         hints({}, **{name: known.get(name, default) for name, default in _HINTS.items()})
-        return self._solve_in_order(images, count(threads, "threads", 1), known)
+        return self._solve_in_order(images, thread_count(threads), known)
 
     def _solve_in_order(
         self, images: Iterable[ImageLike], workers: int, known: dict[str, Any]

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from . import _starpipe, _tables
 from ._camera import PathLike, stated
 from ._darks import Darks
-from ._hints import count, positive, within
+from ._hints import count, positive, thread_count, within
 
 
 def limit(
@@ -107,7 +107,7 @@ def validate(
         count(frames, "frames", 1),
         count(seed, "seed", 0),
         bool(scale_known),
-        count(threads, "threads", 1),
+        thread_count(threads),
     )
     return Validation(json.loads(report))
 
@@ -170,7 +170,7 @@ def robustness(
             catalog,
             count(trials, "trials", 1),
             count(seed, "seed", 0),
-            count(threads, "threads", 1),
+            thread_count(threads),
         )
     )
     return rows
@@ -219,7 +219,7 @@ def defocus(
         [float(value) for value in np.ravel(required_error)],
         None if trials is None else count(trials, "trials", 1),
         count(seed, "seed", 0),
-        count(threads, "threads", 1),
+        thread_count(threads),
     )
     found: dict[str, Any] = json.loads(report)
     return found

@@ -1,6 +1,7 @@
 """Copies, threads and processes."""
 
 import multiprocessing
+import os
 import pickle
 import signal
 import subprocess
@@ -158,3 +159,21 @@ def memory_of_a_frame(dtype):
 def _peak_mb():
     (line,) = (line for line in STATUS.read_text().splitlines() if line.startswith("VmHWM"))
     return int(line.split()[1]) / 1024
+
+
+def test_more_threads_than_help_are_not_started(pipeline, pixels, result):
+    before = threading.active_count()
+    assert pipeline.solve(pixels, threads=10**9) == result
+    assert len(sp.detect(pixels, threads=10**9)) > 10
+    found = pipeline.solve_many([pixels] * 3, threads=10**9)
+    assert next(found) == result
+    assert threading.active_count() - before <= max(8, os.cpu_count())
+    assert [other == result for other in found] == [True, True]
+
+
+def test_centroids_have_a_time_limit(pipeline):
+    started = time.perf_counter()
+    found = pipeline.identify(**_false_stars(), time_limit=0.05)
+    assert time.perf_counter() - started < 1.0
+    assert not found
+    assert found.to_dict()["reason_code"] == "interrupted"

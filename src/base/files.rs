@@ -1,6 +1,6 @@
 //! Reads of files alone, and atomic writes: a reader finds the old file or the new one, never a part.
 
-use std::fs::{self, File};
+use std::fs::{self, File, Metadata};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::Path;
 use std::time::Duration;
@@ -15,14 +15,47 @@ const SUFFIX: &str = ".tmp";
 /// # Errors
 /// I/O errors.
 pub fn open(path: &Path) -> io::Result<File> {
-    let kind = fs::metadata(path)?.file_type();
-    let is_opened = ["/dev/fd", "/dev/stdin", "/proc/self/fd"];
-    let is_opened = is_opened.iter().any(|parent| path.starts_with(parent));
-    if !kind.is_file() && !kind.is_dir() && !is_opened {
-        return Err(io::Error::other(
-            "it is a pipe, a socket or a device, not a file",
-        ));
+    if is_opened_by_shell(path) {
+        return File::open(path);
     }
+    // Only to open a device may have an effect; and what is opened may be another by then.
+    check_kind(&fs::metadata(path)?)?;
+    let file = open_at_once(path)?;
+    check_kind(&file.metadata()?)?;
+    Ok(file)
+}
+
+/// Whether `path` names a file that the shell has opened for this process, as `<(command)` does. It
+/// may be a pipe. What is reached by way of these directories is not meant.
+fn is_opened_by_shell(path: &Path) -> bool {
+    let Some(path) = path.to_str() else {
+        return false;
+    };
+    let mut parents = ["/dev/fd/", "/proc/self/fd/"].iter();
+    let number = parents.find_map(|parent| path.strip_prefix(parent));
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    path == "/dev/stdin" || number.is_some_and(is_number)
+}
+
+fn check_kind(found: &Metadata) -> io::Result<()> {
+    if found.is_file() || found.is_dir() {
+        return Ok(());
+    }
+    let message = "it is a pipe, a socket or a device, not a file";
+    Err(io::Error::other(message))
+}
+
+/// Opens without waiting for the other end of a pipe.
+#[cfg(unix)]
+fn open_at_once(path: &Path) -> io::Result<File> {
+    use std::os::unix::fs::OpenOptionsExt;
+    let flags = rustix::fs::OFlags::NONBLOCK | rustix::fs::OFlags::NOCTTY;
+    let flags = flags.bits().cast_signed();
+    File::options().read(true).custom_flags(flags).open(path)
+}
+
+#[cfg(not(unix))]
+fn open_at_once(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
@@ -200,6 +233,45 @@ mod tests {
             assert!(text(bytes).unwrap_err().contains("UTF-16"), "{bytes:?}");
         }
         assert!(text(b"\xe9t\xe9").is_err());
+    }
+
+    #[test]
+    fn the_shell_opens_files_by_their_number_alone() {
+        for path in ["/dev/stdin", "/dev/fd/63", "/proc/self/fd/0"] {
+            assert!(is_opened_by_shell(Path::new(path)), "{path}");
+        }
+        let others = [
+            "/dev/fd/../zero",
+            "/dev/fd/3/../../zero",
+            "/dev/stdin/../zero",
+            "/dev/fd",
+            "/dev/fd/",
+            "/dev/fd//dev/zero",
+            "/proc/self/fd/../../../dev/zero",
+            "/dev/fdx/3",
+        ];
+        for path in others {
+            assert!(!is_opened_by_shell(Path::new(path)), "{path}");
+        }
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_pipe_or_device_is_not_opened_by_any_name() {
+        let directory = tempfile::tempdir().unwrap();
+        let link = directory.path().join("link.png");
+        std::os::unix::fs::symlink("/dev/zero", &link).unwrap();
+        let pipe = directory.path().join("pipe");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        assert!(made.unwrap().success());
+        let zero = Path::new("/dev/fd/../../dev/zero");
+        for path in [&*link, &*pipe, zero, Path::new("/dev/null")] {
+            let error = open(path).unwrap_err().to_string();
+            assert!(error.contains("a pipe, a socket or a device"), "{error}");
+        }
+        // Whoever put a pipe in the place of a file does not make it wait.
+        let opened = open_at_once(&pipe).unwrap();
+        assert!(check_kind(&opened.metadata().unwrap()).is_err());
     }
 
     #[test]

@@ -136,8 +136,8 @@ impl FrameSearch {
 
     /// Frees the buffers that a crowded frame has filled: to read the next takes memory, too.
     pub fn free_large_buffers(&mut self) {
-        /// Candidates whose buffers are kept, 200 MB.
-        const MOST_KEPT: usize = 1 << 22;
+        /// Candidates whose buffers are kept, 26 MB.
+        const MOST_KEPT: usize = 1 << 19;
         if self.filtered.candidate_count() > MOST_KEPT {
             self.filtered.candidates = Vec::new();
             self.found = PeakSearch::default();

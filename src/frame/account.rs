@@ -9,6 +9,9 @@ use std::io::{self, BufRead, Read, Seek, SeekFrom};
 /// Pixels that are decoded between two looks at the time: in some hundred microseconds.
 pub(super) const PIXELS_BETWEEN_CHECKS: usize = 1 << 16;
 
+/// What a pixel of a frame of floats takes at least: later on its values are copied once.
+pub(super) const FLOATS_BYTES_PER_PIXEL: usize = 2 * size_of::<f32>();
+
 /// The account of one frame. Readers and decoders book on it what they hold before they allocate it,
 /// and ask it whether to go on.
 #[derive(Debug, Default)]
@@ -54,13 +57,15 @@ impl Account {
     /// [`FrameError::OutOfMemory`].
     pub fn reserve(&self, bytes: &mut Vec<u8>, length: usize) -> Result<(), FrameError> {
         let before = bytes.capacity();
-        let more = length.saturating_sub(before);
-        self.hold(more as u64)?;
-        let reserved = bytes.try_reserve_exact(length.saturating_sub(bytes.len()));
+        if length <= before {
+            return Ok(());
+        }
+        // They may be copied to another place.
+        self.hold(length as u64)?;
+        let reserved = bytes.try_reserve_exact(length - bytes.len());
         reserved.map_err(|_| io::Error::from(io::ErrorKind::OutOfMemory))?;
-        self.release(more as u64);
-        // The allocator may give more.
-        self.hold((bytes.capacity() - before) as u64)
+        self.release(before as u64);
+        Ok(())
     }
 
     /// Appends all that `reader` gives to `bytes`, whose capacity is booked.
@@ -81,11 +86,9 @@ impl Account {
             if reader.take(1).read_to_end(&mut next).map_err(why)? == 0 {
                 return Ok(());
             }
-            let more = (bytes.len() / 2).max(FIRST_BYTES);
-            let more = more
-                .min(usize::try_from(self.left_bytes()).unwrap_or(usize::MAX))
-                .max(1);
-            self.reserve(bytes, bytes.len() + more)?;
+            let grown = bytes.len() + (bytes.len() / 2).max(FIRST_BYTES);
+            let left = usize::try_from(self.left_bytes()).unwrap_or(usize::MAX);
+            self.reserve(bytes, grown.min(left).max(bytes.len() + 1))?;
             bytes.append(&mut next);
         }
     }

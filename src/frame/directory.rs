@@ -5,8 +5,8 @@ use super::error::FrameError;
 use super::foreign;
 use super::format::FrameFormat;
 use super::limits::HEAD_BYTES;
+use crate::base::files;
 use memchr::memmem;
-use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -44,7 +44,7 @@ fn foreign_file(files: &[PathBuf]) -> Option<FrameError> {
 
 fn head_of(path: &Path) -> io::Result<Vec<u8>> {
     let mut head = Vec::new();
-    File::open(path)?.take(HEAD_BYTES).read_to_end(&mut head)?;
+    files::open(path)?.take(HEAD_BYTES).read_to_end(&mut head)?;
     Ok(head)
 }
 

@@ -7,6 +7,7 @@
 //! # Reference
 //! ITU-T T.81 (1992), annexes B, C, F and G.
 
+use super::account::Account;
 use super::error::FrameError;
 use super::format::FrameFormat;
 
@@ -14,24 +15,30 @@ use super::format::FrameFormat;
 const BLOCK: usize = 64;
 /// Bits that are looked up at once; longer codes are rare.
 const LOOKUP_BITS: u32 = 10;
+/// Units of blocks between two looks at the time.
+const UNITS_BETWEEN_CHECKS: usize = 1 << 12;
 /// Length of the longest code.
 const MAX_CODE_BITS: u32 = 16;
 
 /// Refuses an image whose data end, or cannot be decoded any further, before its last row.
 /// # Errors
-/// [`FrameError::Truncated`].
-pub(super) fn check_rows(bytes: &[u8]) -> Result<(), FrameError> {
-    let Some(missing) = Walk::default().missing_rows(bytes) else {
+/// [`FrameError::Truncated`], [`FrameError::Interrupted`].
+pub(super) fn check_rows(bytes: &[u8], account: &Account) -> Result<(), FrameError> {
+    let walk = Walk {
+        account: Some(account),
+        ..Walk::default()
+    };
+    let Some(missing) = walk.missing_rows(bytes) else {
         return Ok(());
     };
-    Err(FrameError::Truncated {
+    Err(account.why(FrameError::Truncated {
         format: FrameFormat::Jpeg,
         found_bytes: bytes.len(),
         detail: format!(
             "the data end or are damaged in row {} of the {} that the header states",
             missing.row, missing.height
         ),
-    })
+    }))
 }
 
 /// Where the data end.
@@ -43,7 +50,8 @@ struct Missing {
 
 /// What the segments before a scan say.
 #[derive(Default)]
-struct Walk {
+struct Walk<'a> {
+    account: Option<&'a Account>,
     is_progressive: bool,
     width: usize,
     height: usize,
@@ -87,7 +95,7 @@ impl Part {
     };
 }
 
-impl Walk {
+impl Walk<'_> {
     /// Where the first scan that lacks rows ends. `None` where there is none, or where a segment is not
     /// understood: the decoder reports it.
     fn missing_rows(mut self, bytes: &[u8]) -> Option<Missing> {
@@ -233,6 +241,10 @@ impl Walk {
         // Blocks without a bit of their own that follow in a progressive scan.
         let mut empty_blocks = 0;
         for unit in 0..units {
+            let is_look = unit.is_multiple_of(UNITS_BETWEEN_CHECKS);
+            if is_look && self.account.is_some_and(|a| a.check_time().is_err()) {
+                return unit;
+            }
             let is_restart =
                 self.restart_interval > 0 && unit > 0 && unit.is_multiple_of(self.restart_interval);
             if is_restart {
@@ -513,7 +525,9 @@ mod tests {
         let mut bytes = jpeg(ExtendedColorType::L8);
         let frame = position(&bytes, 0xc0);
         bytes[frame + 5..frame + 7].copy_from_slice(&100_u16.to_be_bytes());
-        let error = check_rows(&bytes).unwrap_err().to_string();
+        let error = check_rows(&bytes, &Account::default())
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("row 40 of the 100"), "{error}");
     }
 

@@ -9,6 +9,8 @@ const MAX_PIXELS_IN_SCANS: usize = 4_000_000_000;
 
 /// Second byte of the marker that begins a scan.
 const START_OF_SCAN: u8 = 0xda;
+/// Second byte of the marker that begins a progressive image.
+const START_OF_PROGRESSIVE: u8 = 0xc2;
 /// Second byte of the marker that ends the image.
 const END_OF_IMAGE: u8 = 0xd9;
 
@@ -16,12 +18,13 @@ const END_OF_IMAGE: u8 = 0xd9;
 pub(super) struct Scans {
     /// How many there are, without those of thumbnails and of what comes after the image.
     pub count: usize,
+    is_progressive: bool,
 }
 
 impl Scans {
     /// The scans of the image in `bytes`.
     pub fn of(bytes: &[u8]) -> Self {
-        let (mut at, mut count) = (2, 0);
+        let (mut at, mut count, mut is_progressive) = (2, 0, false);
         while let Some((marker, end)) = next_marker(bytes, at) {
             match marker {
                 END_OF_IMAGE => break,
@@ -29,12 +32,21 @@ impl Scans {
                 0x00 | 0xd0..=0xd7 => at = end,
                 _ => {
                     count += usize::from(marker == START_OF_SCAN);
+                    is_progressive |= marker == START_OF_PROGRESSIVE;
                     let length = bytes.get(end..).and_then(<[u8]>::first_chunk);
                     at = end + length.map_or(2, |length| usize::from(u16::from_be_bytes(*length)));
                 }
             }
         }
-        Self { count }
+        Self {
+            count,
+            is_progressive,
+        }
+    }
+
+    /// Whether the decoder must have all of them before it has a pixel.
+    pub fn are_collected(&self) -> bool {
+        self.is_progressive || self.count > 1
     }
 
     /// Refuses more scans of an image of this size than any camera writes: each is a pass over all
@@ -108,7 +120,10 @@ mod tests {
             assert!(Scans::of(&file(2)[..end]).count <= 2);
         }
         let sizes = [(20_000, 10_000), (63_245, 63_245), (63_246, 63_246)];
-        let one = Scans { count: 1 };
+        let one = Scans {
+            count: 1,
+            is_progressive: true,
+        };
         assert_eq!(
             sizes.map(|size| one.check(size).is_ok()),
             [true, true, false]

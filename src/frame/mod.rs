@@ -37,6 +37,7 @@ mod fits;
 mod foreign;
 mod format;
 mod image;
+mod jpeg;
 mod jpeg_rows;
 mod jpeg_scans;
 mod levels;

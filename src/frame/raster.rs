@@ -1,15 +1,12 @@
-//! PNG, JPEG, BMP and PNM, decoded by the `image` crate to 8 or 16 bits per sample.
+//! PNG, BMP and PNM, decoded by the `image` crate to 8 or 16 bits per sample.
 
-use super::account::Account;
+use super::account::{Account, FLOATS_BYTES_PER_PIXEL, PIXELS_BETWEEN_CHECKS};
 use super::error::FrameError;
 use super::exif;
 use super::format::FrameFormat;
 use super::image::{Frame, check_size};
-use super::jpeg_rows::check_rows;
-use super::jpeg_scans::{Scans, has_end};
 use super::levels::{Samples, WholeNumber, frame_from_integers};
 use image::codecs::bmp::BmpDecoder;
-use image::codecs::jpeg::JpegDecoder;
 use image::codecs::png::PngDecoder;
 use image::codecs::pnm::PnmDecoder;
 use image::error::{ImageError, UnsupportedErrorKind};
@@ -43,39 +40,6 @@ pub(super) fn decode_png(bytes: &[u8], account: &Account) -> Result<Frame<'stati
     Ok(frame)
 }
 
-/// Decodes a baseline or progressive JPEG.
-/// # Errors
-/// As [`super::reader::decode`].
-pub(super) fn decode_jpeg(bytes: &[u8], account: &Account) -> Result<Frame<'static>, FrameError> {
-    let format = FrameFormat::Jpeg;
-    let mut decoder = JpegDecoder::new(account.timed(Cursor::new(bytes)))
-        .map_err(|e| account.why(error_of(e, format, bytes.len())))?;
-    // The decoder fills missing data and reports no error.
-    if !has_end(bytes) {
-        return Err(FrameError::Truncated {
-            format,
-            found_bytes: bytes.len(),
-            detail: "no end-of-image marker (ff d9) after the last scan".to_string(),
-        });
-    }
-    let (width, height) = decoder.dimensions();
-    let (width, height) = (width as usize, height as usize);
-    check_size(width, height)?;
-    let scans = Scans::of(bytes);
-    scans.check((width, height))?;
-    // A progressive image is decoded to coefficients first.
-    let coefficients = if scans.count > 1 {
-        size_of::<i16>() * usize::from(decoder.color_type().channel_count())
-    } else {
-        0
-    };
-    let bytes_per_pixel = decoder_bytes_per_pixel(&decoder) + coefficients;
-    account.check_image((width, height), bytes_per_pixel + size_of::<f32>())?;
-    check_rows(bytes)?;
-    let exif = decoder.exif_metadata().ok().flatten();
-    decode_with(decoder, exif.as_deref(), format, bytes.len(), account)
-}
-
 /// Decodes a Windows bitmap.
 /// # Errors
 /// As [`super::reader::decode`].
@@ -105,7 +69,7 @@ pub(super) fn decode_pnm(bytes: &[u8], account: &Account) -> Result<Frame<'stati
     let decoder = PnmDecoder::new(account.timed(Cursor::new(bytes)))
         .map_err(|e| account.why(error_of(e, format, bytes.len())))?;
     let maxval = decoder.header().maximal_sample();
-    let decoded = Decoded::new(decoder, format, bytes.len(), account)?;
+    let mut decoded = Decoded::new(decoder, format, bytes.len(), account)?;
     // The decoder scales levels from 0..=maxval to all of 8 or 16 bits, and rounds: this is undone.
     let level = |scaled: u16, full: u16| {
         let level = f64::from(scaled) * f64::from(maxval) / f64::from(full);
@@ -113,14 +77,19 @@ pub(super) fn decode_pnm(bytes: &[u8], account: &Account) -> Result<Frame<'stati
     };
     match (decoded.depth, u16::try_from(maxval)) {
         (Depth::Eight, Ok(maxval @ 0..=0xff)) => {
-            let scaled = decoded.image.as_bytes().iter();
-            let levels: Vec<u16> = scaled.map(|&v| level(u16::from(v), 0xff)).collect();
-            decoded.integers(&levels, maxval)
+            for levels in decoded.octets_mut().chunks_mut(PIXELS_BETWEEN_CHECKS) {
+                account.check_time()?;
+                let unscaled = |v: &mut u8| *v = level((*v).into(), 0xff) as u8;
+                levels.iter_mut().for_each(unscaled);
+            }
+            decoded.integers(decoded.image.as_bytes(), maxval as u8)
         }
         (Depth::Sixteen, Ok(maxval)) => {
-            let scaled = decoded.words();
-            let levels: Vec<u16> = scaled.iter().map(|&v| level(v, u16::MAX)).collect();
-            decoded.integers(&levels, maxval)
+            for levels in decoded.words_mut().chunks_mut(PIXELS_BETWEEN_CHECKS) {
+                account.check_time()?;
+                levels.iter_mut().for_each(|v| *v = level(*v, u16::MAX));
+            }
+            decoded.integers(decoded.words(), maxval)
         }
         _ => Err(unsupported(
             format,
@@ -161,9 +130,14 @@ fn limits() -> Limits {
     limits
 }
 
-/// Bytes of a decoded pixel.
-fn decoder_bytes_per_pixel(decoder: &impl ImageDecoder) -> usize {
-    usize::from(decoder.color_type().bytes_per_pixel())
+/// Most memory that reading takes for each pixel: the decoded one, and the frame's.
+fn bytes_per_pixel(color: ColorType) -> usize {
+    let both = usize::from(color.bytes_per_pixel()) + size_of::<f32>();
+    if color.has_color() {
+        both.max(FLOATS_BYTES_PER_PIXEL)
+    } else {
+        both
+    }
 }
 
 /// Checks the size, decodes, converts to luminance and adds the Exif metadata.
@@ -179,6 +153,7 @@ fn decode_with(
         Depth::Eight => decoded.integers(decoded.image.as_bytes(), u8::MAX),
         Depth::Sixteen => decoded.integers(decoded.words(), u16::MAX),
     }?;
+    drop(decoded);
     let metadata = exif.map(|exif| exif::metadata(exif, frame.width));
     Ok(frame.with_metadata(metadata.unwrap_or_default()).drawn())
 }
@@ -207,8 +182,7 @@ impl Decoded {
         let (width, height) = decoder.dimensions();
         let (width, height) = (width as usize, height as usize);
         check_size(width, height)?;
-        let bytes_per_pixel = decoder_bytes_per_pixel(&decoder) + size_of::<f32>();
-        account.check_image((width, height), bytes_per_pixel)?;
+        account.check_image((width, height), bytes_per_pixel(decoder.color_type()))?;
         let color = decoder.color_type();
         let depth = match color {
             ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => Depth::Eight,
@@ -237,6 +211,28 @@ impl Decoded {
         }
     }
 
+    /// The same, to be changed.
+    fn words_mut(&mut self) -> &mut [u16] {
+        match &mut self.image {
+            DynamicImage::ImageLuma16(image) => image,
+            DynamicImage::ImageLumaA16(image) => image,
+            DynamicImage::ImageRgb16(image) => image,
+            DynamicImage::ImageRgba16(image) => image,
+            _ => &mut [],
+        }
+    }
+
+    /// The samples of an 8-bit image, to be changed; none of any other.
+    fn octets_mut(&mut self) -> &mut [u8] {
+        match &mut self.image {
+            DynamicImage::ImageLuma8(image) => image,
+            DynamicImage::ImageLumaA8(image) => image,
+            DynamicImage::ImageRgb8(image) => image,
+            DynamicImage::ImageRgba8(image) => image,
+            _ => &mut [],
+        }
+    }
+
     fn integers<T: WholeNumber>(
         &self,
         values: &[T],
@@ -252,7 +248,7 @@ impl Decoded {
     }
 }
 
-fn unsupported(format: FrameFormat, found: String) -> FrameError {
+pub(super) fn unsupported(format: FrameFormat, found: String) -> FrameError {
     FrameError::Unsupported {
         format,
         found,
@@ -265,13 +261,12 @@ fn error_of(error: ImageError, format: FrameFormat, found_bytes: usize) -> Frame
     // Some of the decoders' messages have several lines.
     let message = error.to_string();
     let detail = message.split_whitespace().collect::<Vec<_>>().join(" ");
-    let truncated = |detail| FrameError::Truncated {
-        format,
-        found_bytes,
-        detail,
-    };
     match error {
-        ImageError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => truncated(detail),
+        ImageError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => FrameError::Truncated {
+            format,
+            found_bytes,
+            detail,
+        },
         ImageError::Unsupported(e) => unsupported(
             format,
             match e.kind() {
@@ -279,21 +274,28 @@ fn error_of(error: ImageError, format: FrameFormat, found_bytes: usize) -> Frame
                 _ => detail,
             },
         ),
-        // The decoders have no common error for the end of the data.
-        _ if [
-            "end of file",
-            "eof",
-            "exhausted",
-            "more bytes",
-            "no more",
-            "not enough bytes",
-            "not enough data",
-        ]
-        .iter()
-        .any(|words| detail.to_lowercase().contains(words)) =>
-        {
-            truncated(detail)
-        }
-        _ => FrameError::Malformed { format, detail },
+        _ => damaged(detail, format, found_bytes),
     }
+}
+
+/// The error for data that cannot be decoded. The decoders have no common error for their end.
+pub(super) fn damaged(detail: String, format: FrameFormat, found_bytes: usize) -> FrameError {
+    const OF_THE_END: [&str; 7] = [
+        "end of file",
+        "eof",
+        "exhausted",
+        "more bytes",
+        "no more",
+        "not enough bytes",
+        "not enough data",
+    ];
+    let lower = detail.to_lowercase();
+    if OF_THE_END.iter().any(|words| lower.contains(words)) {
+        return FrameError::Truncated {
+            format,
+            found_bytes,
+            detail,
+        };
+    }
+    FrameError::Malformed { format, detail }
 }

@@ -7,7 +7,7 @@ use super::image::Frame;
 use super::limits::{HEAD_BYTES, MAX_FILE_BYTES};
 use super::memory::MemoryLimit;
 use super::pixels::Pixels;
-use super::{compressed, fits, foreign, raster, tiff};
+use super::{compressed, fits, foreign, jpeg, raster, tiff};
 use crate::base::files;
 use crate::base::interrupt::Interrupt;
 use crate::base::panics::caught;
@@ -62,6 +62,13 @@ impl Buffers {
     /// The memory for the frame that was read last and the work on it.
     pub(crate) fn memory_of_frame(&self) -> MemoryLimit {
         MemoryLimit::of_bytes(self.memory.bytes().saturating_sub(self.beside_bytes))
+    }
+
+    /// Whether there is room for the values of `frame`, which was read last, as floats beside it.
+    pub(crate) fn check_floats(&self, frame: &Frame) -> Result<(), FrameError> {
+        let account = Account::new(self.memory_of_frame(), self.interrupt.clone());
+        account.hold(frame.pixels.bytes())?;
+        account.check_image((frame.width, frame.height), size_of::<f32>())
     }
 
     /// An account for one frame, whose file is in `bytes`.
@@ -261,7 +268,7 @@ pub(super) fn decode_image(
             None => tiff::decode(bytes, page, account, buffer),
         },
         Some(FrameFormat::Png) => single(raster::decode_png),
-        Some(FrameFormat::Jpeg) => single(raster::decode_jpeg),
+        Some(FrameFormat::Jpeg) => single(jpeg::decode),
         Some(FrameFormat::Bmp) => single(raster::decode_bmp),
         Some(FrameFormat::Pnm) => single(raster::decode_pnm),
         Some(FrameFormat::Gzip | FrameFormat::Bzip2) | None => Err(not_an_image(bytes)),

@@ -52,6 +52,8 @@ pub fn solve_read(
     let mosaic = Mosaic::of(&frame);
     let calibration = context.calibration;
     if let Some(calibration) = calibration {
+        let checked = workspace.frames.check_floats(&frame);
+        checked.map_err(|error| error.in_file(name))?;
         calibration
             .apply(&mut frame)
             .map_err(|source| Error::Calibrate {

@@ -3,11 +3,12 @@
 use super::paths::{output_path, result_stem};
 use crate::cli::exit::CommandError;
 use anyhow::bail;
+use starpipe::base::files;
 use starpipe::frame;
 use starpipe::report::wcs;
 use std::collections::{HashMap, HashSet};
 use std::ffi::OsStr;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -113,7 +114,7 @@ pub(crate) fn is_same_file(a: &Path, b: &Path) -> bool {
 fn is_result(path: &Path, extension: &str) -> bool {
     let head = || -> io::Result<Vec<u8>> {
         let mut head = Vec::new();
-        File::open(path)?.take(HEAD_BYTES).read_to_end(&mut head)?;
+        files::open(path)?.take(HEAD_BYTES).read_to_end(&mut head)?;
         Ok(head)
     };
     if !fs::metadata(path).is_ok_and(|found| found.is_file()) {

@@ -3,6 +3,7 @@
 use super::error::{malformed, truncated};
 use crate::frame::FrameError;
 use std::borrow::Cow;
+use std::collections::HashMap;
 
 /// Headers and data are padded to a multiple of this.
 pub(super) const BLOCK_BYTES: usize = 2880;
@@ -11,18 +12,18 @@ const KEYWORD_BYTES: usize = 8;
 /// Maximum number of cards. A longer header is assumed to be damaged.
 const MAX_CARDS: usize = 100_000;
 
-/// A keyword and its value.
+/// The value of a keyword.
 struct Card<'a> {
     /// Offset in the file.
     offset: usize,
-    keyword: &'a [u8],
     /// Everything after `= `, including the comment.
     value: &'a [u8],
 }
 
 /// The keywords of one header.
 pub(super) struct Header<'a> {
-    cards: Vec<Card<'a>>,
+    /// The first card of each keyword.
+    cards: HashMap<&'a [u8], Card<'a>>,
     /// Offset in the file.
     offset: usize,
 }
@@ -30,7 +31,7 @@ pub(super) struct Header<'a> {
 impl<'a> Header<'a> {
     /// Parses the header at `offset`. Also returns the offset of the data.
     pub fn parse(bytes: &'a [u8], offset: usize) -> Result<(Self, usize), FrameError> {
-        let mut cards = Vec::new();
+        let mut cards = HashMap::new();
         let header = bytes.get(offset..).unwrap_or_default();
         let all = header.chunks_exact(CARD_BYTES);
         for (number, card) in all.enumerate().take(MAX_CARDS) {
@@ -44,15 +45,14 @@ impl<'a> Header<'a> {
                 ));
             }
             if let Some(value) = rest.strip_prefix(b"= ") {
-                cards.push(Card {
+                cards.entry(keyword).or_insert(Card {
                     offset: offset + number * CARD_BYTES,
-                    keyword,
                     value,
                 });
             }
         }
-        if cards.len() >= MAX_CARDS {
-            let detail = format!("no END among the first {MAX_CARDS} keywords of a header");
+        if header.len() / CARD_BYTES >= MAX_CARDS {
+            let detail = format!("no END among the first {MAX_CARDS} cards of a header");
             return Err(malformed(detail));
         }
         Err(truncated(
@@ -62,9 +62,7 @@ impl<'a> Header<'a> {
     }
 
     fn card(&self, keyword: &str) -> Option<&Card<'a>> {
-        self.cards
-            .iter()
-            .find(|card| card.keyword == keyword.as_bytes())
+        self.cards.get(keyword.as_bytes())
     }
 
     /// The value of `keyword` without quotation marks, surrounding blanks and comment; `None` if

@@ -4,12 +4,9 @@ use super::error::{truncated, unsupported};
 use super::layout::Layout;
 use super::tiles;
 use super::unit::{StoredType, Unit};
-use crate::frame::account::Account;
+use crate::frame::account::{Account, FLOATS_BYTES_PER_PIXEL};
 use crate::frame::levels::{Samples, WholeNumber, frame_from_floats, frame_from_integers};
 use crate::frame::{Frame, FrameError, check_size};
-
-/// Decoded values of a tile, which may be the whole image.
-const TILE_BYTES_PER_PIXEL: usize = 8;
 
 /// Location and scaling of one image in a file.
 pub(super) struct Image {
@@ -42,32 +39,41 @@ impl Image {
         } else {
             layout
         };
-        let Layout {
-            width,
-            height,
-            channels,
-            ..
-        } = layout;
+        let Layout { width, height, .. } = layout;
         check_size(width, height)?;
-        let tiles = if unit.is_compressed_image() {
-            TILE_BYTES_PER_PIXEL
-        } else {
-            0
-        };
-        let bytes_per_pixel = channels * unit.stored.bytes() + tiles + size_of::<f32>();
-        account.check_image((width, height), bytes_per_pixel)?;
         let scale = unit.header.number_or("BSCALE", 1.0)?;
         if scale == 0.0 {
             return Err(unit.header.invalid("BSCALE", "a number other than 0"));
         }
-        Ok(Self {
+        let image = Self {
             layout,
             plane: plane.unwrap_or(0),
             stored: unit.stored,
             scale,
             zero: unit.header.number_or("BZERO", 0.0)?,
             blank: unit.blank().filter(|_| !unit.stored.is_float()),
-        })
+        };
+        let bytes_per_pixel = image.bytes_per_pixel(unit.is_compressed_image());
+        account.check_image((width, height), bytes_per_pixel)?;
+        Ok(image)
+    }
+
+    /// Most memory that decoding takes for each pixel, without that for single tiles.
+    fn bytes_per_pixel(&self, is_compressed: bool) -> usize {
+        const FRAME: usize = size_of::<f32>();
+        let stored = self.stored.bytes();
+        let unpacked = if is_compressed {
+            self.layout.channels * stored
+        } else {
+            0
+        };
+        let values = match self.layout.channels {
+            1 => stored + FRAME,
+            // As they are interleaved.
+            channels => 2 * channels * stored.max(FRAME),
+        };
+        let blanked = if self.blank.is_some() { FRAME } else { 0 };
+        (unpacked + values + blanked).max(FLOATS_BYTES_PER_PIXEL)
     }
 
     /// Decodes the image from `unit`, of which it was made, in `bytes`, the content of the file.

@@ -5,12 +5,9 @@ use super::layout::{Chunk, Color, Compression, Layout};
 use super::samples::Source;
 use crate::frame::account::Account;
 use crate::frame::error::FrameError;
-use crate::frame::jpeg_rows::check_rows;
-use crate::frame::jpeg_scans::Scans;
-use image::ImageDecoder;
-use image::codecs::jpeg::JpegDecoder;
+use crate::frame::jpeg::Jpeg;
 use std::borrow::Cow;
-use std::io::{Cursor, Read};
+use std::io::Read;
 
 /// Rows of a chunk.
 pub(super) struct Rows<'a> {
@@ -33,14 +30,16 @@ impl Layout<'_> {
         let wanted = row_bytes.saturating_mul(chunk.rows);
         let stored = self.stored(file, chunk, wanted as u64)?;
         if self.compression == Compression::Jpeg {
-            return self.jpeg(&stored, chunk);
+            return self.jpeg(&stored, chunk, account);
         }
         let bytes = match self.compression {
             Compression::None | Compression::Jpeg => stored,
             Compression::Lzw => lzw(&stored, wanted, account)?.into(),
             Compression::Deflate => deflate(&stored, wanted, account)?.into(),
             Compression::PackBits => pack_bits(&stored, wanted).into(),
-            Compression::Group4 => group_4(&stored, self.chunk_size.0, chunk.rows)?.into(),
+            Compression::Group4 => {
+                group_4(&stored, (self.chunk_size.0, chunk.rows), account)?.into()
+            }
         };
         if bytes.len() < wanted {
             let found = bytes.len();
@@ -75,17 +74,20 @@ impl Layout<'_> {
     }
 
     /// A chunk that is a JPEG file of its own, but for the tables that all of them share.
-    fn jpeg(&self, stored: &[u8], chunk: &Chunk) -> Result<Rows<'static>, FrameError> {
-        let fail = |detail: String| malformed(format!("JPEG at byte {}: {detail}", chunk.place));
+    fn jpeg(
+        &self,
+        stored: &[u8],
+        chunk: &Chunk,
+        account: &Account,
+    ) -> Result<Rows<'static>, FrameError> {
+        let fail = |detail: String| {
+            account.why(malformed(format!("JPEG at byte {}: {detail}", chunk.place)))
+        };
         let bytes = self
             .whole_jpeg(stored)
             .ok_or_else(|| fail(format!("{} bytes without a start of image", stored.len())))?;
-        Scans::of(&bytes).check(self.chunk_size)?;
-        check_rows(&bytes)?;
-        let decoder = JpegDecoder::new(Cursor::new(&bytes)).map_err(|e| fail(e.to_string()))?;
-        let (width, height) = decoder.dimensions();
-        let (width, height) = (width as usize, height as usize);
-        let channels = usize::from(decoder.color_type().channel_count());
+        let jpeg = Jpeg::open(&bytes, account).map_err(|e| fail(e.to_string()))?;
+        let (width, height, channels) = (jpeg.width, jpeg.height, jpeg.channels);
         let is_whole = width >= chunk.columns && height >= chunk.rows;
         let is_expected = width <= self.chunk_size.0 && channels == self.chunk_samples;
         if !is_whole || !is_expected || height > self.chunk_size.1 {
@@ -95,9 +97,11 @@ impl Layout<'_> {
                 "{width} x {height} pixels of {channels} samples, expected {columns} x {rows} of {samples}"
             )));
         }
-        let mut pixels = vec![0; width * height * channels];
-        let decoded = decoder.read_image(&mut pixels);
-        decoded.map_err(|e| fail(e.to_string()))?;
+        // Beside the copy of the file and the samples of the image.
+        let held = (width * height * jpeg.bytes_per_pixel() + bytes.len()) as u64;
+        account.hold(held)?;
+        let pixels = jpeg.samples(account)?;
+        account.release(held);
         Ok(Rows {
             bytes: pixels.into(),
             row_bytes: width * channels,
@@ -156,7 +160,7 @@ fn lzw(stored: &[u8], wanted: usize, account: &Account) -> Result<Vec<u8>, Frame
 
 /// At most `wanted` bytes of a zlib stream.
 fn deflate(stored: &[u8], wanted: usize, account: &Account) -> Result<Vec<u8>, FrameError> {
-    let mut bytes = Vec::new();
+    let mut bytes = Vec::with_capacity(wanted);
     let decoder = flate2::read::ZlibDecoder::new(account.timed(stored));
     match decoder.take(wanted as u64).read_to_end(&mut bytes) {
         // What is missing is reported by its length.
@@ -169,7 +173,9 @@ fn deflate(stored: &[u8], wanted: usize, account: &Account) -> Result<Vec<u8>, F
 
 /// At most `wanted` bytes of PackBits (TIFF 6.0, sect. 9).
 fn pack_bits(mut stored: &[u8], wanted: usize) -> Vec<u8> {
-    let mut bytes = Vec::new();
+    /// Longest run.
+    const MAX_RUN: usize = 128;
+    let mut bytes = Vec::with_capacity(wanted + MAX_RUN);
     while let Some((&header, rest)) = stored.split_first()
         && bytes.len() < wanted
     {
@@ -195,15 +201,20 @@ fn pack_bits(mut stored: &[u8], wanted: usize) -> Vec<u8> {
 }
 
 /// Rows of one bit per pixel in CCITT group 4; black is 1, as libtiff has it.
-fn group_4(stored: &[u8], width: usize, rows: usize) -> Result<Vec<u8>, FrameError> {
+fn group_4(
+    stored: &[u8],
+    (width, rows): (usize, usize),
+    account: &Account,
+) -> Result<Vec<u8>, FrameError> {
     use fax::Color::Black;
     use fax::decoder::{DecodeStatus, Group4Decoder, pels};
     let fail = |detail: String| malformed(format!("CCITT group 4: {detail}"));
     let width = u16::try_from(width).map_err(|_| fail(format!("{width} columns")))?;
     let input = stored.iter().map(|byte| std::io::Result::Ok(*byte));
     let mut decoder = Group4Decoder::new(input, width).map_err(|e| fail(e.to_string()))?;
-    let mut bytes = Vec::new();
+    let mut bytes = Vec::with_capacity(rows * usize::from(width).div_ceil(8));
     for _ in 0..rows {
+        account.check_time()?;
         match decoder.advance().map_err(|e| fail(e.to_string()))? {
             DecodeStatus::End => break,
             DecodeStatus::Incomplete => {

@@ -1,6 +1,7 @@
 //! How does a TIFF file store an image? Known before anything is decoded.
 
 use super::directory::{Directory, Numbers, malformed};
+use crate::frame::account::FLOATS_BYTES_PER_PIXEL;
 use crate::frame::error::FrameError;
 use crate::frame::format::FrameFormat;
 use crate::frame::image::check_size;
@@ -281,7 +282,12 @@ impl<'a> Layout<'a> {
             _ => self.row_bytes().saturating_mul(rows),
         };
         let per_pixel = chunk_bytes.div_ceil(self.width * self.height);
-        per_pixel.saturating_add(self.channels * sample_bytes + size_of::<f32>())
+        let samples = self.channels * sample_bytes + size_of::<f32>();
+        let is_whole = self.depth.format == SampleFormat::Unsigned && self.depth.bits <= 16;
+        per_pixel.saturating_add(match self.channels {
+            1 | 2 if is_whole => samples,
+            _ => samples.max(FLOATS_BYTES_PER_PIXEL),
+        })
     }
 }
 

@@ -164,6 +164,14 @@ pub enum CatalogError {
 }
 
 impl CatalogError {
+    /// Whether the file could not be read, whatever is in it.
+    pub(super) fn is_of_system(&self) -> bool {
+        match self {
+            Self::Read { source, .. } => source.kind() != io::ErrorKind::InvalidData,
+            _ => false,
+        }
+    }
+
     /// Converts an I/O error on opening `path`.
     pub(super) fn open(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();

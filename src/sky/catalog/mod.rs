@@ -62,6 +62,6 @@ mod tycho2;
 pub use error::{CatalogError, CompactError, RecordError, RecordLocation};
 pub use id::{HipparcosId, StarId, TychoId};
 pub use import::{ImportSummary, Reading, SourceFile};
-pub use read::{import, read};
+pub use read::{import, read, read_until};
 pub use star::{Star, StarFlags, StarIndex};
 pub use star_catalog::Catalog;

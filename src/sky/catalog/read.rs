@@ -7,6 +7,7 @@ use super::sky2000::FixedWidth;
 use super::table::Table;
 use super::tycho2::Tycho2;
 use super::{Catalog, CatalogError, compact};
+use crate::base::interrupt::Interrupt;
 use rayon::prelude::*;
 use std::fs;
 use std::io;
@@ -29,10 +30,18 @@ impl Catalog {
 /// # Errors
 /// As for [`Catalog::read`].
 pub fn read(path: &Path) -> Result<Reading, CatalogError> {
+    read_until(path, &Interrupt::default())
+}
+
+/// [`read`], which ends with an error when `interrupt` is due.
+///
+/// # Errors
+/// As for [`Catalog::read`]; [`CatalogError::Read`].
+pub fn read_until(path: &Path, interrupt: &Interrupt) -> Result<Reading, CatalogError> {
     if path.is_dir() {
-        return read_directory(path);
+        return read_directory(path, interrupt);
     }
-    let file = OpenedFile::open(path)?;
+    let file = OpenedFile::open(path, interrupt)?;
     if let Kind::Compact = Kind::of(&file.head) {
         let catalog = read_compact(path, file)?;
         let files = Vec::new();
@@ -117,11 +126,11 @@ struct Directory {
 }
 
 impl Directory {
-    fn list(path: &Path) -> Result<Self, CatalogError> {
+    fn list(path: &Path, interrupt: &Interrupt) -> Result<Self, CatalogError> {
         let mut found = Self::default();
         let mut has_supplement_1 = false;
         for path in files_in(path)? {
-            let file = OpenedFile::open(&path)?;
+            let file = OpenedFile::open(&path, interrupt)?;
             match Kind::of(&file.head) {
                 Kind::Tycho2(Tycho2::Supplement2) => found.left_out.push(path),
                 Kind::Tycho2(part) => {
@@ -131,7 +140,7 @@ impl Directory {
                 Kind::Compact | Kind::Sky2000 => found.others.push(path),
                 Kind::Table => match Table::open(&mut Rows::new(file.reader), &path) {
                     Ok(_) => found.others.push(path),
-                    Err(error @ CatalogError::Read { .. }) => return Err(error),
+                    Err(error) if error.is_of_system() => return Err(error),
                     Err(_) => {}
                 },
             }
@@ -145,10 +154,10 @@ impl Directory {
 }
 
 /// Reads the catalogue in a directory: all files of Tycho-2, or the one file of another kind.
-fn read_directory(path: &Path) -> Result<Reading, CatalogError> {
-    let found = Directory::list(path)?;
+fn read_directory(path: &Path, interrupt: &Interrupt) -> Result<Reading, CatalogError> {
+    let found = Directory::list(path, interrupt)?;
     if let ([], [only]) = (&*found.tycho2, &*found.others) {
-        return read(only);
+        return read_until(only, interrupt);
     }
     if found.tycho2.is_empty() || !found.others.is_empty() {
         return Err(CatalogError::Directory {
@@ -160,7 +169,7 @@ fn read_directory(path: &Path) -> Result<Reading, CatalogError> {
     // threads.
     let files = found.tycho2.par_iter();
     let parts: Vec<Result<Part, CatalogError>> = files
-        .map(|file| read_part(file, OpenedFile::open(file)?))
+        .map(|file| read_part(file, OpenedFile::open(file, interrupt)?))
         .collect();
     let parts: Vec<Part> = parts.into_iter().collect::<Result<_, _>>()?;
     let mut reading = combine(path, title(path, &*parts[0].format), parts)?;

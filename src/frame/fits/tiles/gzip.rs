@@ -17,7 +17,7 @@ pub(super) fn inflate(
     account: &Account,
 ) -> Result<Vec<u8>, TileError> {
     let limit = count * max_width;
-    let mut bytes = Vec::new();
+    let mut bytes = Vec::with_capacity(limit + 1);
     let reader = MultiGzDecoder::new(account.timed(data));
     reader
         .take(limit as u64 + 1)

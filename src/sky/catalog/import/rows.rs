@@ -1,11 +1,24 @@
 //! Splits a text file into rows, many at once, so that they can be parsed on all threads.
 
+use super::tally::MAX_RECORDS;
 use memchr::memchr;
-use std::io::{self, BufRead, Read};
+use std::io::{self, BufRead, ErrorKind, Read};
 use std::ops::Range;
 
-/// The part of a file that is in memory at a time; also the longest row.
+/// The part of a file that is in memory at a time.
 const BUFFER_BYTES: usize = 1 << 23;
+
+/// Rows that are parsed at a time.
+const BATCH_ROWS: usize = 1 << 17;
+
+/// The longest row. A record of SKY2000 has 520 bytes, the widest tables of VizieR some thousand.
+const MAX_ROW_BYTES: usize = 1 << 16;
+
+/// Most lines of a file, whatever is in them: twice as many as there may be records.
+const MAX_LINES: u64 = 2 * MAX_RECORDS;
+
+/// Quotes that are looked for in vain. A file with more does not quote its cells.
+const MAX_UNCLOSED: usize = 1000;
 
 /// A row without its line end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,12 +52,12 @@ pub(in crate::sky::catalog) struct Rows<R> {
     next_line: u64,
     /// The reader is at its end.
     ended: bool,
-    /// The rest of an overlong line is still to be skipped.
-    in_long_line: bool,
     /// An error in reading after the rows in the buffer.
     error: Option<io::Error>,
     /// The separator of cells, where quoted cells may contain line ends.
     quoting: Option<u8>,
+    /// Quoted cells so far that have no end.
+    unclosed: usize,
 }
 
 impl<R: BufRead> Rows<R> {
@@ -55,9 +68,9 @@ impl<R: BufRead> Rows<R> {
             next_byte: 0,
             next_line: 1,
             ended: false,
-            in_long_line: false,
             error: None,
             quoting: None,
+            unclosed: 0,
         }
     }
 
@@ -86,10 +99,10 @@ impl<R: BufRead> Rows<R> {
         Ok(Some(self.row(span)))
     }
 
-    /// All rows that are in memory, at least one; none at the end.
+    /// The rows that are in memory, at least one; none at the end.
     pub(in crate::sky::catalog) fn batch(&mut self) -> io::Result<Vec<Row<'_>>> {
         let mut spans: Vec<Span> = self.next_span()?.into_iter().collect();
-        while !spans.is_empty()
+        while (1..BATCH_ROWS).contains(&spans.len())
             && let Some(span) = self.take_span()
         {
             spans.push(span);
@@ -125,15 +138,9 @@ impl<R: BufRead> Rows<R> {
     fn fill(&mut self) {
         self.buffer.drain(..self.next_byte);
         self.next_byte = 0;
-        let reader = &mut self.reader;
-        let read = if std::mem::take(&mut self.in_long_line) {
-            reader.skip_until(b'\n')
-        } else {
-            Ok(0)
-        };
         let wanted = (BUFFER_BYTES - self.buffer.len()) as u64;
-        let read = read.and_then(|_| reader.take(wanted).read_to_end(&mut self.buffer));
-        match read {
+        let mut reader = self.reader.by_ref().take(wanted);
+        match reader.read_to_end(&mut self.buffer) {
             Ok(read) => self.ended = (read as u64) < wanted,
             Err(error) => self.error = Some(error),
         }
@@ -143,17 +150,22 @@ impl<R: BufRead> Rows<R> {
     fn take_span(&mut self) -> Option<Span> {
         const END_OF_FILE_MARK: u8 = 0x1a;
         let start = self.next_byte;
+        let found = self.row_length(start);
         let rest = &self.buffer[start..];
-        let (length, lines) = match self.row_length(rest) {
+        let (length, lines) = match found {
             Some(found) => found,
-            // A last row without a line end, or one as long as the buffer.
+            // A last row without a line end.
             None if self.ended && !rest.is_empty() && rest != [END_OF_FILE_MARK] => (rest.len(), 1),
-            None if rest.len() == BUFFER_BYTES => {
-                self.in_long_line = true;
-                (rest.len(), 1)
-            }
+            None if rest.len() > MAX_ROW_BYTES => (rest.len(), 1),
             None => return None,
         };
+        if length > MAX_ROW_BYTES {
+            let what = format!("a line of more than {MAX_ROW_BYTES} bytes");
+            return self.refuse(&what);
+        }
+        if self.next_line > MAX_LINES {
+            return self.refuse(&format!("more than {MAX_LINES} lines"));
+        }
         let span = Span {
             line: self.next_line,
             range: start..start + length,
@@ -163,44 +175,78 @@ impl<R: BufRead> Rows<R> {
         Some(span)
     }
 
-    /// The number of bytes and lines of the first row of `rest`, if it is complete.
-    fn row_length(&self, rest: &[u8]) -> Option<(usize, u64)> {
+    /// Ends reading with an error.
+    fn refuse(&mut self, found: &str) -> Option<Span> {
+        let message = format!("found {found}, which no catalog has");
+        self.error = Some(io::Error::new(ErrorKind::InvalidData, message));
+        self.ended = true;
+        self.buffer.clear();
+        self.next_byte = 0;
+        None
+    }
+
+    /// The number of bytes and lines of the row that begins at `start`, if it is complete.
+    fn row_length(&mut self, start: usize) -> Option<(usize, u64)> {
         /// A quote that is not closed within this many bytes is an ordinary character.
         const QUOTED_BYTES_MAX: usize = 1 << 14;
+        let rest = &self.buffer[start..];
         let first_end = memchr(b'\n', rest)? + 1;
-        let Some(separator) = self.quoting else {
+        let Some(separator) = self.quoting.filter(|_| self.unclosed < MAX_UNCLOSED) else {
             return Some((first_end, 1));
         };
         let (mut end, mut lines) = (first_end, 1);
-        while ends_in_quotes(&rest[..end], separator) {
+        let mut cells = Cells::new(separator);
+        while cells.end_in_quotes(&rest[..end]) {
             let searched = &rest[end..rest.len().min(QUOTED_BYTES_MAX.max(end))];
             match memchr(b'\n', searched) {
                 Some(more) => (end, lines) = (end + more + 1, lines + 1),
                 // The rest may follow with the next filling of the buffer.
                 None if rest.len() < QUOTED_BYTES_MAX && !self.ended => return None,
-                None => return Some((first_end, 1)),
+                None => {
+                    self.unclosed += 1;
+                    return Some((first_end, 1));
+                }
             }
         }
         Some((end, lines))
     }
 }
 
-/// Whether `text` ends inside a quoted cell.
-fn ends_in_quotes(text: &[u8], separator: u8) -> bool {
-    if memchr(b'"', text).is_none() {
-        return false;
-    }
-    let (mut quoted, mut at_start) = (false, true);
-    for &byte in text {
-        // A doubled quote inside a quoted cell closes and reopens it.
-        if byte == b'"' && (quoted || at_start) {
-            quoted = !quoted;
-            at_start = !quoted;
-        } else {
-            at_start = !quoted && byte == separator;
+/// Cells of a row that is looked through as it grows.
+struct Cells {
+    separator: u8,
+    seen_bytes: usize,
+    is_quoted: bool,
+    is_at_start: bool,
+}
+
+impl Cells {
+    fn new(separator: u8) -> Self {
+        Self {
+            separator,
+            seen_bytes: 0,
+            is_quoted: false,
+            is_at_start: true,
         }
     }
-    quoted
+
+    /// Whether `text`, which begins with what was seen before, ends inside a quoted cell.
+    fn end_in_quotes(&mut self, text: &[u8]) -> bool {
+        if self.seen_bytes == 0 && memchr(b'"', text).is_none() {
+            return false;
+        }
+        for &byte in &text[self.seen_bytes..] {
+            // A doubled quote inside a quoted cell closes and reopens it.
+            if byte == b'"' && (self.is_quoted || self.is_at_start) {
+                self.is_quoted = !self.is_quoted;
+                self.is_at_start = !self.is_quoted;
+            } else {
+                self.is_at_start = !self.is_quoted && byte == self.separator;
+            }
+        }
+        self.seen_bytes = text.len();
+        self.is_quoted
+    }
 }
 
 #[cfg(test)]
@@ -244,12 +290,34 @@ mod tests {
     }
 
     #[test]
-    fn a_line_longer_than_the_buffer_is_one_row_and_the_next_is_whole() {
-        let content = [&vec![b'x'; BUFFER_BYTES + 5][..], b"\nafter\n"].concat();
-        let rows = rows_of(&content, None);
-        assert_eq!(rows.len(), 2);
-        assert_eq!(rows[0].1.len(), BUFFER_BYTES);
-        assert_eq!(rows[1], (2, b"after".to_vec()));
+    fn a_line_that_no_catalogue_has_ends_reading() {
+        let longest = MAX_ROW_BYTES - 1;
+        for (length, is_read) in [(longest, true), (longest + 1, false), (20 * longest, false)] {
+            let content = [b"first\n", &vec![b'x'; length][..], b"\nafter\n"].concat();
+            let mut rows = Rows::new(&content[..]);
+            assert_eq!(rows.next().unwrap().unwrap().bytes, b"first");
+            assert_eq!(rows.next().is_ok(), is_read, "{length} bytes");
+            assert_eq!(rows.next().unwrap().is_some(), is_read);
+        }
+    }
+
+    #[test]
+    fn lines_without_records_are_not_read_without_end() {
+        let lines = io::repeat(b'\n').take(MAX_LINES + 1);
+        let mut rows = Rows::new(io::BufReader::new(lines));
+        let error = loop {
+            match rows.batch() {
+                Ok(batch) => assert!(!batch.is_empty() && batch.len() <= BATCH_ROWS),
+                Err(error) => break error.to_string(),
+            }
+        };
+        assert!(error.contains("more than 10000000 lines"), "{error}");
+    }
+
+    #[test]
+    fn quotes_that_are_never_closed_cost_little() {
+        let content = ",\"\n".repeat(MAX_UNCLOSED) + &"\"\n".repeat(3) + &",x\n".repeat(10_000);
+        assert!(rows_of(content.as_bytes(), Some(b',')).len() > 10_000);
     }
 
     proptest! {

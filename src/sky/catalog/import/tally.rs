@@ -10,7 +10,7 @@ use std::io::BufRead;
 use std::path::Path;
 
 /// Most records of a file: twice those of Tycho-2.
-const MAX_RECORDS: u64 = 5_000_000;
+pub(super) const MAX_RECORDS: u64 = 5_000_000;
 
 /// A file is rejected if more than this share of its records is unreadable, in percent.
 ///

@@ -3,6 +3,7 @@
 use super::columns::{FixedColumn, StarColumn};
 use super::fixed_width::{FixedWidth, MARK, whole_record};
 use crate::base::files;
+use crate::base::interrupt::Interrupt;
 use crate::sky::catalog::CatalogError;
 use crate::sky::catalog::error::quoted;
 use crate::sky::catalog::import::{Format, ImportSummary, OpenedFile, Rows, Tally};
@@ -56,7 +57,7 @@ pub fn write_bright_csv(
     v_mag_limit: f64,
     out: &Path,
 ) -> Result<(ImportSummary, usize), CatalogError> {
-    let file = OpenedFile::open(source)?;
+    let file = OpenedFile::open(source, &Interrupt::default())?;
     if !FixedWidth::is_in(&file.head) {
         return Err(CatalogError::UnknownKind {
             path: source.to_owned(),
