@@ -228,3 +228,88 @@ fn background_of(values: &mut Vec<f64>, step_adu: f64) -> Option<(f64, f64)> {
     let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
     Some((mean, squares / count))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    const SIDE: usize = 320;
+
+    /// A frame of these levels and standard deviations in 2 × 2 pixels, in whole numbers, on a
+    /// gradient.
+    fn frame(levels: [f64; 4], sigmas: [f64; 4], seed: u64) -> Frame<'static> {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let pixels = (0..SIDE * SIDE).map(|i| {
+            let (x, y) = (i % SIDE, i / SIDE);
+            let filter = 2 * (y % 2) + x % 2;
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            let gradient = 0.05 * (x + 2 * y) as f64;
+            (levels[filter] + gradient + sigmas[filter] * noise).round() as u16
+        });
+        Frame::from_samples(SIDE, SIDE, pixels.collect::<Vec<u16>>()).unwrap()
+    }
+
+    /// Levels and noise behind filters that let red, green, green and blue pass, 1 e⁻ per ADU.
+    fn under_filters([red, green, blue]: [f64; 3], read_noise: f64) -> ([f64; 4], [f64; 4]) {
+        let light = [red, green, green, blue];
+        let sigma = |e: f64| (e + read_noise * read_noise).sqrt();
+        (light.map(|e| 200.0 + e), light.map(sigma))
+    }
+
+    #[test]
+    fn four_interleaved_backgrounds_are_a_mosaic_wherever_it_begins() {
+        let skies = [
+            [60.0, 100.0, 50.0],
+            [30.0, 60.0, 60.0],
+            [900.0, 400.0, 300.0],
+        ];
+        for (seed, (sky, read_noise)) in (1..).zip(skies.into_iter().zip([3.0, 1.0, 5.0])) {
+            let ([a, b, c, d], [i, j, k, l]) = under_filters(sky, read_noise);
+            let rising = frame([a, b, c, d], [i, j, k, l], seed);
+            assert_eq!(
+                green_diagonal(&rising, None),
+                Some(Diagonal::Rising),
+                "{sky:?}"
+            );
+            let falling = frame([b, a, d, c], [j, i, l, k], seed + 10);
+            assert_eq!(
+                green_diagonal(&falling, None),
+                Some(Diagonal::Falling),
+                "{sky:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn grey_frames_are_none_with_whatever_pattern_of_columns_and_rows() {
+        for (seed, levels) in (1..).zip([
+            [100.0; 4],
+            [100.0, 130.0, 100.0, 130.0],
+            [100.0, 100.0, 90.0, 90.0],
+            // Four amplifiers.
+            [100.0, 130.0, 120.0, 150.0],
+            [100.0, 140.0, 140.0, 90.0],
+        ]) {
+            let grey = frame(levels, [6.0; 4], seed);
+            assert_eq!(green_diagonal(&grey, None), None, "{levels:?}");
+        }
+        // Noise differs where pixels between others were interpolated; levels do not.
+        let interpolated = frame([100.0; 4], [6.0, 4.2, 4.2, 3.0], 9);
+        assert_eq!(green_diagonal(&interpolated, None), None);
+    }
+
+    #[test]
+    fn a_stated_pattern_needs_less_to_be_believed_but_something() {
+        let stated = Some(BayerPattern::Rggb);
+        let grey = frame([100.0; 4], [6.0; 4], 1);
+        assert_eq!(green_diagonal(&grey, stated), None);
+        let columns = frame([100.0, 104.0, 100.0, 104.0], [6.0; 4], 2);
+        assert_eq!(green_diagonal(&columns, stated), None);
+        let (levels, sigmas) = under_filters([1.0, 3.0, 1.0], 9.0);
+        let dark = frame(levels, sigmas, 3);
+        assert_eq!(green_diagonal(&dark, None), None);
+        assert_eq!(green_diagonal(&dark, stated), Some(Diagonal::Rising));
+    }
+}
