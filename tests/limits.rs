@@ -134,7 +134,7 @@ fn content_behind_an_image_is_unpacked_only_so_far() {
     assert_eq!(process(&[&path]).status, 3);
     let ran = process(&[Path::new("--max-memory"), Path::new("40"), &path]);
     assert_eq!(ran.status, 1);
-    let expected = "too large: found more than 30000000 bytes";
+    let expected = "too large: its content needs";
     assert!(ran.stderr.contains(expected), "{}", ran.stderr);
 }
 
@@ -360,7 +360,7 @@ fn a_frame_that_is_not_read_in_time_is_told_of() {
 
 #[test]
 fn devices_by_way_of_those_that_the_shell_opens_are_refused() {
-    for path in ["/dev/fd/../../dev/zero", "/proc/self/fd/../../../dev/zero"] {
+    for path in ["/dev/fd/../../../dev/zero", "/proc/self/fd/../../../dev/zero"] {
         for option in ["--catalog", "--camera", "--hot-pixels", "--dark"] {
             let ran = process(&[Path::new(option), Path::new(path), &orion()]);
             assert_eq!(ran.status, 1, "{option} {path}");

@@ -180,8 +180,7 @@ impl<R: BufRead> Rows<R> {
         let message = format!("found {found}, which no catalog has");
         self.error = Some(io::Error::new(ErrorKind::InvalidData, message));
         self.ended = true;
-        self.buffer.clear();
-        self.next_byte = 0;
+        self.next_byte = self.buffer.len();
         None
     }
 
