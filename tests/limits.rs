@@ -360,7 +360,10 @@ fn a_frame_that_is_not_read_in_time_is_told_of() {
 
 #[test]
 fn devices_by_way_of_those_that_the_shell_opens_are_refused() {
-    for path in ["/dev/fd/../../../dev/zero", "/proc/self/fd/../../../dev/zero"] {
+    for path in [
+        "/dev/fd/../../../dev/zero",
+        "/proc/self/fd/../../../dev/zero",
+    ] {
         for option in ["--catalog", "--camera", "--hot-pixels", "--dark"] {
             let ran = process(&[Path::new(option), Path::new(path), &orion()]);
             assert_eq!(ran.status, 1, "{option} {path}");

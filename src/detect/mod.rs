@@ -225,7 +225,7 @@ fn add_wings(view: &View<'_>, background: &Mesh, found: &mut Detections) {
 
 /// The result for a frame without light.
 fn describe_darkness(frame: &Frame, config: &DetectConfig, found: &mut Detections) {
-    let level = frame.values().iter().copied().find(|p| !p.is_nan());
+    let level = frame.pixels.values().find(|p| !p.is_nan());
     found.background_adu = f64::from(level.unwrap_or(0.0));
     found.noise_adu = f64::from(background::rounding_sigma_adu(frame.step_adu));
     found.spot_sigma_px = config.spot_sigma_px.unwrap_or(star_model::DEFAULT_SPOT_PX);

@@ -60,6 +60,11 @@ impl Pixels<'_> {
         }
     }
 
+    /// The values one after the other, without a copy of all of them.
+    pub fn values(&self) -> impl Iterator<Item = f32> {
+        (0..self.len()).map(|index| self.value(index))
+    }
+
     /// All values as floats; whole numbers are converted each time.
     pub fn to_f32(&self) -> Cow<'_, [f32]> {
         match self {

@@ -13,8 +13,7 @@ const FULL_SCALE_STEPS: f32 = 32.0;
 
 /// Whether the frame is empty or overexposed.
 pub(super) fn diagnose(frame: &Frame) -> Option<Diagnosis> {
-    let pixels = frame.values();
-    let values = || pixels.iter().copied().filter(|p| !p.is_nan());
+    let values = || frame.pixels.values().filter(|p| !p.is_nan());
     let lowest = values().fold(f32::INFINITY, f32::min);
     let highest = values().fold(f32::NEG_INFINITY, f32::max);
     let saturation_adu = frame.saturation_level_adu();
