@@ -191,3 +191,30 @@ fn a_photograph_with_a_tone_curve_says_so() {
     };
     assert!(notes.iter().any(reported), "{notes:?}");
 }
+
+#[test]
+fn a_raw_colour_frame_is_noted_and_its_zero_point_is_that_of_green_pixels() {
+    /// Electrons from a star of magnitude 0 where all light passes, by the frame's table of stars,
+    /// as a zero point; and 1.5 e⁻ per ADU.
+    const TRUE_ZERO_POINT_VMAG: f64 = 13.62 - 0.44;
+    let Some(shared) = shared_dir() else { return };
+    let frame = shared.join("frames/foreign/d-cfa.tif");
+    if !frame.is_file() {
+        eprintln!("skipped: {} is absent", frame.display());
+        return;
+    }
+    let report = processed(&[], &[frame]).remove(0);
+    let notes = report["notes"].as_array().unwrap();
+    assert!(
+        notes.iter().any(|note| note["code"] == "colour_mosaic"),
+        "{notes:?}"
+    );
+    assert_eq!([&report["width"], &report["height"]], [1024, 768]);
+    let zero_point = number(&report, "/photometry/zero_point_vmag");
+    assert!(
+        (zero_point - TRUE_ZERO_POINT_VMAG).abs() < 0.07,
+        "{zero_point}"
+    );
+    let center = ["ra_deg", "dec_deg"].map(|axis| number(&report, &format!("/attitude/{axis}")));
+    assert!((center[0] - 185.754_26).abs() < 6e-4 && (center[1] + 59.834_54).abs() < 3e-4);
+}

@@ -12,8 +12,8 @@ use crate::frame::Frame;
 
 /// Side of a patch, in pixels: 256 of each filter.
 const PATCH_PX: usize = 32;
-/// Patches along an axis for a first look, which costs a grey frame no time.
-const FIRST_PATCHES: usize = 8;
+/// Squares of 2 × 2 pixels along an axis for a first look, which costs a grey frame hardly any time.
+const FIRST_SQUARES: usize = 64;
 /// Most patches along an axis.
 const MOST_PATCHES: usize = 48;
 /// Fewer patches prove nothing.
@@ -36,14 +36,30 @@ pub(super) fn green_diagonal(frame: &Frame, stated: Option<BayerPattern>) -> Opt
             .is_any()
             .then(|| found.alike().unwrap_or(pattern.green()));
     }
-    if !Contrasts::of(frame, FIRST_PATCHES)?
-        .levels
-        .exceeds(LEAST_LEVELS)
-    {
+    if !may_be_mosaic(frame) {
         return None;
     }
     let found = Contrasts::of(frame, MOST_PATCHES)?;
     found.is_by_light().then(|| found.green()).flatten()
+}
+
+/// Whether the diagonals of a sample of 2 × 2 pixels differ: a first look, which need not be sure.
+fn may_be_mosaic(frame: &Frame) -> bool {
+    let starts = |side: usize| {
+        let step = (side / FIRST_SQUARES).max(2) / 2 * 2;
+        (0..side - 1).step_by(step)
+    };
+    let contrast = |x: usize, y: usize| {
+        let at = |column, row| f64::from(frame.at(x + column, y + row));
+        at(1, 0) + at(0, 1) - at(0, 0) - at(1, 1)
+    };
+    let rows = starts(frame.height);
+    let mut contrasts: Vec<f64> = rows
+        .flat_map(|y| starts(frame.width).map(move |x| contrast(x, y)))
+        .collect();
+    // Both the contrast and its noise are twice those of one pixel.
+    let found = background_of(&mut contrasts, frame.step_adu.into());
+    found.is_some_and(|(mean, variance)| mean.abs() > LEAST_LEVELS * variance.sqrt())
 }
 
 /// How the interleaved backgrounds of a frame differ.
