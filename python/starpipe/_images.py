@@ -16,10 +16,14 @@ ImageLike: TypeAlias = Any
 """What an image may be passed as.
 
 - A path, the bytes of a file, or a file that is open for reading in binary mode.
-- An array (rows, columns), or (rows, columns, 3 or 4) of colours; an image of PIL.
+- An array (rows, columns), or (rows, columns, 3 or 4) or (3 or 4, rows, columns) of colours; an
+  image of PIL.
 - An HDU or ``HDUList`` of astropy, which are read as the file that they would be written to; an
   object with ``data``, such as ``CCDData`` and ``NDData``.
 """
+
+COLOURS = (3, 4)
+"""Numbers of colour channels; a fourth is not used."""
 
 KINDS = (
     "a path, bytes, a file open for reading in binary mode, an array, an image of PIL, "
@@ -39,7 +43,8 @@ class Image:
             self.pixels = image
         elif isinstance(image, (bytes, bytearray, memoryview)):
             self.pixels = bytes(image)
-        elif hasattr(image, "read"):
+        elif hasattr(image, "read") and not hasattr(image, "meta"):
+            # NDData reads files, too.
             self.pixels = _content(image, name)
             self.file_name = _name_of(getattr(image, "name", None))
         elif _is_fits(image):
@@ -69,9 +74,8 @@ class Image:
             image = image.value
         if isinstance(image, np.ma.MaskedArray):
             if image.mask is not np.ma.nomask:
-                mask = np.ma.getmaskarray(image)
-                whole = np.asarray(mask.any(axis=2)) if mask.ndim == 3 else mask
-                self.mask = _mask(whole, name)
+                mask = _layout(np.ma.getmaskarray(image))
+                self.mask = _mask(np.asarray(mask.any(axis=2)) if mask.ndim == 3 else mask, name)
             image = image.data
         self.pixels = _pixels(image, name)
 
@@ -180,6 +184,20 @@ def mask_of(image: Image, given: Any, name: str = "image") -> NDArray[np.bool_] 
     return mask
 
 
+def _layout(array: NDArray[Any]) -> NDArray[Any]:
+    """Return an array without axes of length 1, the one of colours last, as a FITS file is read.
+
+    The only axis of length 3 or 4 is that of the colours, else the first of that length.
+    """
+    longer = [length for length in array.shape if length != 1]
+    if len(longer) >= 2:
+        array = array.reshape(longer)
+    places = [place for place, length in enumerate(array.shape) if length in COLOURS]
+    if array.ndim == 3 and places and (len(places) == 1 or places[0] == 0):
+        array = np.moveaxis(array, places[0], -1)
+    return array
+
+
 def _pixels(image: Any, name: str) -> _starpipe._Image:
     """Return an array that the compiled part can borrow; it is copied only if it must be.
 
@@ -188,18 +206,14 @@ def _pixels(image: Any, name: str) -> _starpipe._Image:
     array = np.asarray(image)
     if array.dtype.kind not in "buif":
         raise ValueError(f"the {name} must hold real numbers, not {array.dtype}")
-    if array.ndim == 3 and array.shape[0] == 1:
-        # A cube of FITS with one plane.
-        array = array[0]
-    is_colour = array.ndim == 3 and array.shape[2] in (1, 3, 4)
-    if array.ndim != 2 and not is_colour:
-        hint = "; pass one of its planes, as image[0]" if array.ndim == 3 else ""
+    array = _layout(array)
+    is_colour = array.ndim == 3
+    if array.ndim != 2 and not (is_colour and array.shape[2] in COLOURS):
+        hint = "; pass one of its planes, as image[0]" if is_colour else ""
         raise ValueError(
             f"the {name} must be an array (rows, columns), or (rows, columns, 3) of colours, "
-            f"not {array.shape}{hint}"
+            f"not {np.shape(image)}{hint}"
         )
-    if is_colour and array.shape[2] == 1:
-        array = array[:, :, 0]
     _starpipe.check_size(array.shape[1], array.shape[0])
     kind, size = array.dtype.kind, array.dtype.itemsize
     if kind == "b":
@@ -207,7 +221,7 @@ def _pixels(image: Any, name: str) -> _starpipe._Image:
     if size == 8 or kind == "f":
         with np.errstate(over="ignore"):
             return np.ascontiguousarray(array, dtype=np.float32)
-    if array.ndim == 2 and kind == "u" and size <= 2:
+    if not is_colour and kind == "u" and size <= 2:
         return np.ascontiguousarray(array, dtype=(np.uint8, np.uint16)[size - 1])
     # Negative levels, levels of more than 16 bits, and colours.
     return np.ascontiguousarray(array, dtype=np.int64), int(np.iinfo(array.dtype).max)

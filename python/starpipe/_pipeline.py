@@ -208,8 +208,8 @@ class Pipeline:
         shape : (int, int)
             Rows and columns of the frame.
         flux, mag : array, optional
-            Brightness, linear or in magnitudes: one of them. Without it the positions are in order of
-            brightness.
+            Brightness, linear or in magnitudes: one of them. Without it the positions are in order
+            of brightness.
         error : array or float, optional
             Standard error on each axis, in pixels; 0.5 by default.
 
@@ -232,7 +232,7 @@ class Pipeline:
         """
         if flux is not None and mag is not None:
             raise ValueError("give the brightness as flux or as mag")
-        if error is not None and np.ndim(error) == 0 and not float(error) > 0.0:
+        if error is not None and np.ndim(error) == 0 and not np.asarray(error) > 0.0:
             raise ValueError(f"error must be above 0, not {error}")
         brightness = "flux" if flux is not None else "mag" if mag is not None else None
         values = flux if flux is not None else mag

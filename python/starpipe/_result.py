@@ -127,6 +127,8 @@ class Result:
     def _overlay(self) -> str:
         """Return the detections as rings on a small picture (SVG), the brightest largest."""
         width, height = self._report["width"], self._report["height"]
+        if width is None:
+            return ""
         # Sizes on the picture, which is 360 wide.
         pixel = width / 360.0
         stars = self._report["stars"]

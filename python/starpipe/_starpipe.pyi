@@ -69,6 +69,8 @@ class Pipeline:
         self,
         centroids: NDArray[np.float64],
         shape: tuple[int, int],
+        brightness: str | None,
+        has_errors: bool,
         hints: dict[str, Any],
         attitude_only: bool,
     ) -> Solved: ...

@@ -161,6 +161,19 @@ def test_colours_are_solved_as_of_a_file(pipeline, pixels, tmp_path):
     assert pipeline.solve(palette)
 
 
+def test_planes_of_colours_are_as_in_their_file(pipeline, pixels, tmp_path):
+    planes = np.stack([pixels[::-1] // 2, pixels[::-1], pixels[::-1] // 3])
+    fits.PrimaryHDU(planes).writeto(tmp_path / "planes.fits")
+    of_file = pipeline.solve(tmp_path / "planes.fits")
+    array = fits.getdata(tmp_path / "planes.fits")
+    assert of_file and array.shape == (3, *pixels.shape)
+    for image in (array, array[None], np.moveaxis(array, 0, -1), np.moveaxis(array, 0, 1)):
+        assert without_times(pipeline.solve(image)) == without_times(of_file)
+    masked = np.ma.MaskedArray(array, np.zeros(array.shape, dtype=bool))
+    masked[1, :150] = np.ma.masked
+    assert pipeline.solve(masked).star_columns["y_centroid"].min() > 147
+
+
 def test_files_of_many_kinds_are_read(pipeline, frame, tmp_path):
     expected = pipeline.solve(frame)
     content = frame.read_bytes()

@@ -133,7 +133,13 @@ impl<'p> Frame<'p> {
     #[must_use]
     pub fn as_stored(self) -> Self {
         let mut stored = self.upright();
-        stored.metadata.row_order = RowOrder::TopDown;
+        let metadata = &mut stored.metadata;
+        if metadata.row_order == RowOrder::BottomUp {
+            let last_row = stored.height as i64 - 1;
+            let pattern = metadata.bayer_pattern;
+            metadata.bayer_pattern = pattern.map(|pattern| pattern.shifted(0, last_row));
+            metadata.row_order = RowOrder::TopDown;
+        }
         stored
     }
 

@@ -1,7 +1,7 @@
 use super::header::BLOCK_BYTES;
 use super::*;
-use crate::frame::RowOrder;
 use crate::frame::account::Account;
+use crate::frame::{BayerPattern, RowOrder};
 use proptest::prelude::*;
 
 fn decode(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame<'static>, FrameError> {
@@ -257,6 +257,22 @@ fn the_top_row_comes_first_whichever_way_the_file_is_stored() {
         assert_eq!(frame.values(), upright, "{card}");
         assert_eq!(frame.metadata.row_order, order, "{card}");
         assert_eq!(frame.metadata.ignored.len(), ignored, "{card}");
+        let stored = frame.as_stored();
+        let values: Vec<f32> = data.iter().copied().map(f32::from).collect();
+        assert_eq!(stored.values(), values, "{card}");
+        assert_eq!(stored.metadata.row_order, RowOrder::TopDown);
+    }
+}
+
+#[test]
+fn the_filters_of_rows_as_stored_are_those_of_the_first_one_there() {
+    let data: Vec<u8> = (0..12).collect();
+    for (height, stored) in [(4, BayerPattern::Gbrg), (3, BayerPattern::Rggb)] {
+        let cards = ["ROWORDER= 'BOTTOM-UP'", "BAYERPAT= 'RGGB'"];
+        let file = image(8, &[3, height], &cards, &data[..3 * height]);
+        let frame = decode(&file, None).unwrap();
+        assert_eq!(frame.metadata.bayer_pattern, Some(BayerPattern::Rggb));
+        assert_eq!(frame.as_stored().metadata.bayer_pattern, Some(stored));
     }
 }
 
