@@ -632,13 +632,13 @@ fn a_bad_list_is_named_with_its_line() {
         ("", "empty"),
         ("a,b\n1,2\n", "line 1"),
         ("x,y,flux\n", "without centroids"),
-        ("x,y,flux\n1,2,3\n1,2,three\n", "line 3: column flux"),
+        ("x,y,flux\n1,2,three\n", "line 2: column flux"),
         ("x,y,flux\n1,2,-3\n", "line 2: column flux"),
         ("x,y,flux\n1,NaN,3\n", "line 2: column y"),
         ("x,y,flux\n1,2\n", "line 2: column flux is missing"),
         (
-            "x;y;flux\n1;2;3\n",
-            "the single column x;y;flux; expected x or x_px among them, with commas",
+            "x|y|flux\n1|2|3\n",
+            "the single column x|y|flux; expected x or x_px among them",
         ),
         (
             "x,y,flux\n1,-7,3\n",

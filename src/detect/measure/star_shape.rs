@@ -6,7 +6,6 @@ use crate::detect::candidates::{Peak, Region};
 use crate::detect::contrast::Contrast;
 use crate::detect::fit::FrameMaps;
 use arrayvec::ArrayVec;
-use std::collections::HashMap;
 
 /// Peaks below this signal-to-noise ratio have no shape.
 const MIN_SNR: f32 = 15.0;
@@ -141,23 +140,21 @@ fn bright_peaks<'a>(maps: &FrameMaps<'_>, peaks: &'a [Peak]) -> ArrayVec<&'a Pea
     const MAX_OF_REGION: usize = 2;
     /// More peaks tell no more.
     const ENOUGH: usize = 10 * MAX_STARS;
-    let mut of_region: HashMap<usize, usize> = HashMap::new();
-    let bright = peaks.iter().take_while(|peak| peak.snr >= MIN_SNR);
-    let is_few = |peak: &&Peak| {
-        let count = of_region.entry(peak.region).or_default();
-        *count += 1;
-        *count <= MAX_OF_REGION
-    };
-    let is_of_light = |peak: &&Peak| {
+    let is_of_light = |peak: &Peak| {
         !Contrast::near(&maps.view, maps.background, (peak.x, peak.y)).is_sharper_than_any_spot()
     };
+    let bright = peaks.iter().take_while(|peak| peak.snr >= MIN_SNR);
+    let mut stars: ArrayVec<&Peak, ENOUGH> = ArrayVec::new();
     // Bloomed stars are elongated by their charge: they do not count.
-    let stars = bright.filter(|peak| !peak.saturated);
-    let stars: Vec<&Peak> = stars
-        .filter(is_few)
-        .filter(is_of_light)
-        .take(ENOUGH)
-        .collect();
+    for peak in bright.filter(|peak| !peak.saturated) {
+        if stars.is_full() {
+            break;
+        }
+        let of_region = stars.iter().filter(|star| star.region == peak.region);
+        if of_region.count() < MAX_OF_REGION && is_of_light(peak) {
+            stars.push(peak);
+        }
+    }
     let step = stars.len().div_ceil(MAX_STARS).max(1);
     stars.into_iter().step_by(step).collect()
 }
