@@ -118,10 +118,10 @@ fn an_overexposed_frame_says_its_share_of_saturated_pixels() {
 #[test]
 fn a_negative_is_named_and_says_what_to_do() {
     // Of a sky that is grey, and of one that is white.
-    for white in [60_000, 65_535 + 2_000] {
+    for white in [60_000_u32, 65_535 + 2_000] {
         let mut picture = ORION.picture(&bright_stars());
         for pixel in picture.pixels_mut() {
-            let inverted = white - u32::from(pixel.0[0]);
+            let inverted = white.saturating_sub(pixel.0[0].into());
             pixel.0[0] = inverted.min(u16::MAX.into()) as u16;
         }
         check(&picture, &[], "negative", &["dark spots", "invert"]);

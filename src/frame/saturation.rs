@@ -26,6 +26,9 @@ const REACH: f32 = 1.0 / 8.0;
 /// A plateau that is not exact (noise of full wells, compression) is at most this part of that
 /// reach thick.
 const MAX_THICKNESS: f32 = 0.25;
+/// It is no thicker than so many times the noise of the background, either: light that falls evenly
+/// on many pixels, as from windows, has more noise the brighter it is.
+const MAX_THICKNESS_SIGMA: f32 = 4.0;
 /// A pixel has light beside it where one next to it has this fraction of its height: a star's has
 /// more, however sharp it is.
 const LIGHT_BESIDE: f32 = 0.1;
@@ -33,6 +36,8 @@ const LIGHT_BESIDE: f32 = 0.1;
 const TIED_BY_SHAPE: usize = 4;
 /// Pixels of the sample in which background and levels are measured.
 const SAMPLE_PX: usize = 4096;
+/// The background less this quantile of the levels, in percent, is its noise.
+const NOISE_QUANTILE: usize = 16;
 /// Pixels near the highest level that are looked at; in frames with more, the first rows
 /// of them.
 const MAX_BRIGHT_PX: usize = 1 << 16;
@@ -89,6 +94,7 @@ impl SaturationFinder {
         let Self { sample, pixels, .. } = self;
         fill_sample(frame, sample);
         let background = *sample.get(sample.len() / 2)?;
+        let noise = background - sample[NOISE_QUANTILE * sample.len() / 100];
         let lowest = |top: f32| top - REACH * (top - background);
         let floor = lowest(highest_pair);
         if floor.partial_cmp(&background) != Some(Ordering::Greater) {
@@ -111,7 +117,7 @@ impl SaturationFinder {
             reach,
             step,
         };
-        heights.plateau()
+        heights.plateau(MAX_THICKNESS_SIGMA * noise)
     }
 
     /// Finds the connected pixels.
@@ -250,13 +256,15 @@ struct Heights<'a> {
 }
 
 impl Heights<'_> {
-    /// The lowest level of the plateau, where there is one.
-    fn plateau(&self) -> Option<f32> {
+    /// The lowest level of the plateau, where there is one. One that is not exact is at most
+    /// `max_thickness` thick.
+    fn plateau(&self, max_thickness: f32) -> Option<f32> {
         if self.log10_chance_of_ties() <= MAX_LOG10_CHANCE {
             return Some(self.top);
         }
         let doublings = std::iter::successors(Some(self.step), |thickness| Some(2.0 * thickness));
-        let thicknesses = doublings.take_while(|t| *t <= MAX_THICKNESS * self.reach);
+        let max_thickness = max_thickness.min(MAX_THICKNESS * self.reach);
+        let thicknesses = doublings.take_while(|t| *t <= max_thickness);
         let chances = thicknesses.map(|t| (self.log10_chance_within(t), t));
         let (chance, thickness) = chances.min_by(|a, b| a.0.total_cmp(&b.0))?;
         // Sources end near the highest of their pixels, which noise spreads as far down.
