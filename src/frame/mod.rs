@@ -53,6 +53,7 @@ mod reader;
 mod row_order;
 mod saturation;
 mod tiff;
+mod turning;
 
 #[cfg(feature = "overlay")]
 pub(crate) use directory::OVERLAY_TEXT;

@@ -3,15 +3,14 @@
 use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
 use super::identification::{attempt, identified, observation};
+use super::left_out::{LeftOut, RowProblem};
 use super::note::Note;
 use super::solution::{Solution, Source};
 use super::stopwatch::{Stage, Stopwatch};
 use crate::base::coords::PixelPoint;
-use crate::base::format::counted;
 use crate::detect::DetectionFlags;
 use crate::identify::{ObservedStar, Photometry, SourceIndex, StarField};
 use std::collections::HashMap;
-use std::fmt;
 
 /// Standard error assumed on each axis of a centroid that is listed without one, in pixels.
 pub const LISTED_SIGMA_PX: f64 = 0.5;
@@ -153,71 +152,6 @@ fn without_coincident(centroids: &[ListedCentroid]) -> Vec<bool> {
         is_alone
     };
     centroids.iter().map(is_kept).collect()
-}
-
-/// Why a row of a list cannot be used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum RowProblem {
-    /// A number is missing, or is none.
-    NoNumber,
-    /// The flux is 0 or below.
-    NoFlux,
-    /// The standard error is 0 or below, or no number.
-    NoError,
-    /// It coincides with a brighter one.
-    Coincident,
-}
-
-/// Rows of a list that are left out for one reason. `Display` gives the sentence.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LeftOut {
-    /// The reason.
-    pub problem: RowProblem,
-    /// How many rows.
-    pub count: usize,
-    /// The first of them, from 1; 0 if unknown.
-    pub first_row: u64,
-}
-
-impl LeftOut {
-    fn of(problems: &[(RowProblem, u64)]) -> Vec<Self> {
-        let all = [
-            RowProblem::NoNumber,
-            RowProblem::NoFlux,
-            RowProblem::NoError,
-            RowProblem::Coincident,
-        ];
-        let of_problem = |problem| {
-            let rows = problems.iter().filter(|(found, _)| *found == problem);
-            Some(Self {
-                problem,
-                count: rows.clone().count(),
-                first_row: rows.map(|(_, row)| *row).min()?,
-            })
-        };
-        all.into_iter().filter_map(of_problem).collect()
-    }
-}
-
-impl fmt::Display for LeftOut {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let verb = if self.count == 1 { "is" } else { "are" };
-        let rows = counted(self.count, "row");
-        write!(f, "{rows} of the list {verb} left out")?;
-        match (self.first_row, self.count) {
-            (0, _) => {}
-            (row, 1) => write!(f, ", in line {row}")?,
-            (row, _) => write!(f, ", the first in line {row}")?,
-        }
-        f.write_str(match self.problem {
-            RowProblem::NoNumber => ": a number is missing",
-            RowProblem::NoFlux => ": the flux is not above 0",
-            RowProblem::NoError => ": the standard error is not above 0",
-            RowProblem::Coincident if self.count == 1 => ": it is within 0.5 px of a brighter one",
-            RowProblem::Coincident => ": they are within 0.5 px of a brighter one",
-        })
-    }
 }
 
 /// Identifies the stars of a list of centroids. Every prior is a hard constraint.

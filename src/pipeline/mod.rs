@@ -20,6 +20,7 @@ mod centroid_text;
 mod context;
 mod error;
 mod identification;
+mod left_out;
 mod note;
 mod outcome;
 mod raw_colour;
@@ -30,13 +31,12 @@ mod stopwatch;
 
 pub use body_in_frame::BodyInFrame;
 pub use bright_stars::MissingStar;
-pub use centroid_list::{
-    CentroidList, LISTED_SIGMA_PX, LeftOut, ListedCentroid, RowProblem, solve_centroids,
-};
+pub use centroid_list::{CentroidList, LISTED_SIGMA_PX, ListedCentroid, solve_centroids};
 pub use centroid_table::{CentroidListError, CentroidListOptions};
 pub use context::{Context, DEFAULT_TIME_LIMIT_S, Workspace};
 pub use error::Error;
 pub use identification::star_field;
+pub use left_out::{LeftOut, RowProblem};
 pub use note::Note;
 pub use outcome::{Outcome, Reason};
 pub use raw_colour::RawColour;

@@ -2,7 +2,7 @@
 
 use super::body_in_frame::BodyInFrame;
 use super::bright_stars::MissingStar;
-use super::centroid_list::LeftOut;
+use super::left_out::LeftOut;
 use super::outcome::Outcome;
 use super::raw_colour::RawColour;
 use crate::base::statistics::Estimate;

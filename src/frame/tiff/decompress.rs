@@ -2,12 +2,18 @@
 
 use super::directory::{TiffFile, malformed, truncated};
 use super::layout::{Chunk, Color, Compression, Layout};
-use super::samples::Source;
 use crate::frame::account::Account;
 use crate::frame::error::FrameError;
 use crate::frame::jpeg::Jpeg;
 use std::borrow::Cow;
 use std::io::Read;
+
+/// Where samples are read from, and what reading them may take.
+#[derive(Clone, Copy)]
+pub(super) struct Source<'a> {
+    pub file: TiffFile<'a>,
+    pub account: &'a Account,
+}
 
 /// Rows of a chunk.
 pub(super) struct Rows<'a> {

@@ -23,8 +23,9 @@ use super::levels::{
 };
 use super::limits::MAX_PAGES;
 use chosen::Chosen;
+use decompress::Source;
 use layout::{Color, Layout, SampleFormat};
-use samples::{Source, float_of_half};
+use samples::float_of_half;
 use std::num::NonZeroUsize;
 
 pub(super) use chosen::has_picture_in_sub_directories;

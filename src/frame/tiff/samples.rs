@@ -1,18 +1,10 @@
 //! From the rows of strips and tiles to the samples of an image.
 
-use super::decompress::Rows;
-use super::directory::TiffFile;
+use super::decompress::{Rows, Source};
 use super::layout::{Chunk, Color, Layout, Predictor, SampleFormat};
-use crate::frame::account::{Account, PIXELS_BETWEEN_CHECKS};
+use crate::frame::account::PIXELS_BETWEEN_CHECKS;
 use crate::frame::error::FrameError;
 use std::ops::BitXor;
-
-/// Where samples are read from, and what reading them may take.
-#[derive(Clone, Copy)]
-pub(super) struct Source<'a> {
-    pub file: TiffFile<'a>,
-    pub account: &'a Account,
-}
 
 /// An unsigned word that samples are unpacked to; signed numbers and floats keep their bits.
 pub(super) trait Word: Copy + Default + BitXor<Output = Self> {

@@ -88,8 +88,8 @@ mod tests {
 
     #[test]
     fn a_sky_close_to_full_scale_is_too_much_light() {
-        // Noise of 60 levels, cut off at 12 bits.
-        let noise = |i: usize| ((i * 7919) % 120) as f32 - 60.0;
+        // Noise of 60 levels of which the highest are rare, cut off at 12 bits.
+        let noise = |i: usize| ((i * 37) % 61 + (i * 29) % 59) as f32 - 59.0;
         let sky = |level: f32| {
             let pixels = (0..1200).map(|i| (level + noise(i)).min(4095.0));
             Frame::new(40, 30, pixels.collect())

@@ -1,6 +1,5 @@
 //! Splits a text file into rows, many at once, so that they can be parsed on all threads.
 
-use super::tally::MAX_RECORDS;
 use memchr::memchr;
 use std::io::{self, BufRead, ErrorKind, Read};
 use std::ops::Range;
@@ -14,6 +13,8 @@ const BATCH_ROWS: usize = 1 << 17;
 /// The longest row. A record of SKY2000 has 520 bytes, the widest tables of VizieR some thousand.
 const MAX_ROW_BYTES: usize = 1 << 16;
 
+/// Most records of a file: twice those of Tycho-2.
+pub(super) const MAX_RECORDS: u64 = 5_000_000;
 /// Most lines of a file, whatever is in them: twice as many as there may be records.
 const MAX_LINES: u64 = 2 * MAX_RECORDS;
 

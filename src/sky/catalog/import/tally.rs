@@ -1,6 +1,6 @@
 //! Parses the rows of one file, and collects stars and rejected records.
 
-use super::rows::{Row, Rows};
+use super::rows::{MAX_RECORDS, Row, Rows};
 use super::summary::ImportSummary;
 use crate::sky::catalog::error::{CatalogError, RecordError, RecordLocation};
 use crate::sky::catalog::{Star, StarId};
@@ -8,9 +8,6 @@ use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::io::BufRead;
 use std::path::Path;
-
-/// Most records of a file: twice those of Tycho-2.
-pub(super) const MAX_RECORDS: u64 = 5_000_000;
 
 /// A file is rejected if more than this share of its records is unreadable, in percent.
 ///
