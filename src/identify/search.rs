@@ -82,6 +82,8 @@ pub struct Buffers {
     /// Hypotheses from one triangle that wait for their test.
     waiting: Vec<PendingHypothesis>,
     batch: Batch,
+    /// To confirm answers.
+    tiers: Tiers,
     /// Number of hypotheses from triangles of which this star is the faintest.
     hypotheses_of: Vec<u64>,
     /// Ends searches early.
@@ -660,7 +662,7 @@ impl<'a> Search<'a> {
         if log10 <= LOG10_FALSE_ALARM_LIMIT {
             return Some(log10);
         }
-        let mut tiers = Tiers::default();
+        let mut tiers = std::mem::take(&mut self.buffers.tiers);
         let of_tiers = tiers.below(field).iter().zip(BEFORE_TIERS + 1..);
         let of_tiers = of_tiers.filter_map(|(tier, number)| {
             let problem = Problem {
@@ -671,7 +673,9 @@ impl<'a> Search<'a> {
             let log10 = self.log10_in(problem, hypothesis, TESTED_STARS)?;
             Some(log10 + searches_weight(number).log10())
         });
-        Some(of_tiers.fold(log10, f64::min))
+        let best_log10 = of_tiers.fold(log10, f64::min);
+        self.buffers.tiers = tiers;
+        Some(best_log10)
     }
 
     /// log10 of the false-alarm probability of `hypothesis` by the brightest `stars` that are

@@ -26,7 +26,7 @@ pub struct Tier {
     pub brighter: usize,
 }
 
-/// The tiers of a field.
+/// The tiers of a field. Its buffers are reused.
 #[derive(Debug, Default)]
 pub struct Tiers(Vec<Tier>);
 
@@ -39,16 +39,25 @@ impl Tiers {
         let left_out = left_out
             .take(MAX_TIERS)
             .take_while(|left_out| left_out + MIN_STARS <= field.stars.len());
-        self.0.clear();
-        self.0.extend(left_out.map(|brighter| {
-            let stars = &field.stars[brighter..];
-            let stars = stars[..stars.len().min(TESTED_STARS)].to_vec();
-            Tier {
+        let mut count = 0;
+        for brighter in left_out {
+            let mut stars = match self.0.get_mut(count) {
+                Some(tier) => std::mem::take(&mut tier.field.stars),
+                None => Vec::with_capacity(TESTED_STARS),
+            };
+            stars.clear();
+            stars.extend(field.stars[brighter..].iter().take(TESTED_STARS));
+            let tier = Tier {
                 field: StarField { stars, ..*field },
                 brighter,
+            };
+            match self.0.get_mut(count) {
+                Some(reused) => *reused = tier,
+                None => self.0.push(tier),
             }
-        }));
-        &self.0
+            count += 1;
+        }
+        &self.0[..count]
     }
 }
 
