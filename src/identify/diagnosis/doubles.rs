@@ -39,8 +39,8 @@ impl Offset {
     }
 }
 
-/// [`find`] for a field in which most stars are named. One star of a pair has no name, so that no
-/// pairs need be formed where nearly all have one.
+/// Whether many stars of a field in which most are named have a companion at the same offset. One star
+/// of a pair has no name, so that no pairs need be formed where nearly all have one.
 pub fn find_unnamed(
     field: &StarField,
     is_named: impl Fn(&ObservedStar) -> bool,
