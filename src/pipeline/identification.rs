@@ -100,7 +100,9 @@ fn negative(
     let bright = detections.sources.iter().filter(stands_out).count();
     let dark = inverted.sources.iter().filter(stands_out);
     let spots = dark.filter(|source| source.flags.is_star_like()).count();
-    let is_negative = spots >= MIN_SPOTS.max(MIN_RATIO * bright);
+    // The sky of a negative is nearer to its highest level than to its lowest.
+    let is_bright_sky = detections.background_adu > inverted.background_adu;
+    let is_negative = is_bright_sky && spots >= MIN_SPOTS.max(MIN_RATIO * bright);
     is_negative.then_some(Diagnosis::Negative { spots })
 }
 
