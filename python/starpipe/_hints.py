@@ -53,9 +53,14 @@ def within(value: Any, unit: str, name: str, least: float, most: float = np.inf)
 
 def count(value: Any, name: str, least: int) -> int:
     """Return a whole number that is not less than `least`."""
-    if int(value) != value or value < least:
+    try:
+        found = int(value)
+        is_one = found == value and found >= least
+    except (TypeError, ValueError, OverflowError):
+        is_one = False
+    if not is_one:
         raise ValueError(f"{name} must be a whole number from {least} on, not {value}")
-    return int(value)
+    return found
 
 
 def thread_count(threads: Any) -> int:
@@ -104,7 +109,7 @@ def site(location: Any) -> tuple[float, float, float] | None:
     if hasattr(location, "geodetic"):
         place = location.geodetic
         return float(place.lat.deg), float(place.lon.deg), float(place.height.to_value("m"))
-    values = tuple(location)
+    values = tuple(location) if np.iterable(location) else ()
     if len(values) not in (2, 3):
         raise ValueError("location must be an EarthLocation or (latitude, longitude[, height])")
     units = (("deg", "latitude"), ("deg", "longitude"), ("m", "height"))

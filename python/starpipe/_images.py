@@ -68,7 +68,7 @@ class Image:
                 self.mask = _mask(mask, name)
             if _has_fits_header(self.header, image):
                 self.pixels = _written(_unit_of(image, self.header), name)
-                self.file_name = "array"
+                self.file_name, self.header = "array", {}
                 return
         if hasattr(image, "unit") and hasattr(image, "value"):
             image = image.value
@@ -204,6 +204,8 @@ def _pixels(image: Any, name: str) -> _starpipe._Image:
     Contiguous arrays of uint8, uint16 and float32 in the machine's byte order are not copied.
     """
     array = np.asarray(image)
+    if array.ndim == 0:
+        raise TypeError(f"the {name} must be {KINDS}, not {type(image).__name__}")
     if array.dtype.kind not in "buif":
         raise ValueError(f"the {name} must hold real numbers, not {array.dtype}")
     array = _layout(array)

@@ -55,6 +55,9 @@ def test_files_that_cannot_be_read_are_named(pipeline, tmp_path):
         ({"date": 5}, "date must be ISO 8601"),
         ({"location": (95, 0)}, "latitude"),
         ({"location": (5,)}, "EarthLocation or"),
+        ({"location": 5}, "EarthLocation or"),
+        ({"threads": "many"}, "threads must be a whole number from 1"),
+        ({"threads": np.nan}, "threads must be a whole number from 1"),
         ({"exposure": 3 * u.m}, "exposure must be convertible to s"),
         ({"threads": 0}, "threads must be a whole number from 1"),
         ({"max_stars": 2}, "max_stars must be a whole number from 4"),
@@ -73,6 +76,7 @@ def test_wrong_arguments_are_refused(pipeline, pixels, known, message):
     [
         ((None,), "must be a path, bytes, .*, not NoneType"),
         (({"a": 1},), "must be a path, bytes, .*, not dict"),
+        ((iter([]),), "must be a path, bytes, .*, not list_iterator"),
         ((io.StringIO("text"),), "binary mode"),
         ((np.zeros((20, 20)), 11.4), r"mask must be an array of bool, not 11\.4; .* fov=20"),
         ((np.zeros((20, 20)), None, 11.4), "positional"),

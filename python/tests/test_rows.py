@@ -23,6 +23,7 @@ def file(request, pixels, tmp_path):
     if request.param:
         unit.header["ROWORDER"] = request.param
     unit.header["EXPTIME"] = 0.2
+    unit.header["DATE-OBS"] = "2021-04-05T06:07:08"
     unit.writeto(tmp_path / "night.fits")
     return tmp_path / "night.fits"
 
@@ -53,11 +54,14 @@ def test_a_file_its_array_its_units_and_its_ccddata_give_the_same(pipeline, file
     assert of_file and rings_are_bright(of_file, array)
     assert not rings_are_bright(pipeline.solve(array), array[::-1])
     expected = without_times(of_file)
-    assert without_times(pipeline.solve(array, exposure=0.2)) == expected
+    known = {"exposure": 0.2, "date": "2021-04-05T06:07:08"}
+    of_array = without_times(pipeline.solve(array, **known))
+    assert of_array.pop("date") == expected["date"] | {"source": "option"}
+    assert of_array == {key: value for key, value in expected.items() if key != "date"}
     assert without_times(pipeline.solve(file.read_bytes())) == expected
     assert without_times(pipeline.solve(CCDData.read(file, unit="adu"))) == expected
-    assert without_times(pipeline.solve(NDData(array), exposure=0.2)) == expected
-    assert without_times(pipeline.solve(array * u.adu, exposure=0.2)) == expected
+    for image in (NDData(array), array * u.adu):
+        assert pipeline.solve(image, **known) == pipeline.solve(array, **known)
     with open(file, "rb") as opened:
         assert pipeline.solve(opened) == of_file
     with fits.open(file) as units:
