@@ -96,7 +96,7 @@ mod tests {
                 .unwrap()
                 .with_levels(1.0, Some(65_535.0))
         };
-        let over = diagnose(&sky(4046.0));
+        let over = diagnose(&sky(4066.0));
         assert!(
             matches!(over, Some(Diagnosis::Saturated { share, sky, .. }) if share < 0.2 && sky > 0.9),
             "{over:?}"
