@@ -3,9 +3,9 @@
 use crate::cli::output::files::remove_outdated;
 use anyhow::Context;
 use starpipe::archive::TableWriter;
+use starpipe::base::files::{beside, finish, make_directory};
 use starpipe::study::validation::store::{RunTables, StoreError, TableRow};
 use starpipe::study::validation::{FrameRecord, StarRecord};
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// The parts in a run's directory.
@@ -64,19 +64,13 @@ fn write_part<R: TableRow>(
     if path.exists() {
         return Ok(());
     }
-    if let Some(parts) = path.parent() {
-        std::fs::create_dir_all(parts)
-            .with_context(|| format!("making the directory {}", parts.display()))?;
-    }
-    // Always the same name, so that the next run overwrites what a killed one has left.
-    let beside = path.with_extension("tmp");
     let write = || -> anyhow::Result<()> {
-        let mut table = TableWriter::new(File::create(&beside)?, R::TABLE, R::columns())?;
+        path.parent().map_or(Ok(()), make_directory)?;
+        let mut table = TableWriter::new(beside(&path)?, R::TABLE, R::columns())?;
         for row in rows {
             table.add(row?)?;
         }
-        table.finish()?;
-        Ok(std::fs::rename(&beside, &path)?)
+        Ok(finish(table.finish()?, &path)?)
     };
     write().with_context(|| format!("writing {}", path.display()))
 }
@@ -97,6 +91,7 @@ mod tests {
     use super::*;
     use parquet::file::reader::{FileReader, SerializedFileReader};
     use parquet::record::RowAccessor;
+    use std::fs::File;
 
     /// A frame of which only what is required is known.
     fn frame_row(frame: u64) -> FrameRecord {
