@@ -1,5 +1,6 @@
 //! The sources of a frame, as detection reports them.
 
+use super::trailed::StarTrails;
 use crate::base::coords::PixelPoint;
 use std::cmp::Ordering;
 
@@ -81,6 +82,8 @@ pub struct Detections {
     pub threshold_sigma: f64,
     /// The spots where they are not round Gaussians of that size.
     pub psf: Option<MeasuredPsf>,
+    /// The trails that the stars are, where they are long ones: `spot_sigma_px` is of their pieces.
+    pub trails: Option<StarTrails>,
     /// Light beyond the fitted spots, which is in the fluxes; `None` where it is not significant.
     pub wings: Option<Wings>,
     /// Why the rate of false detections asked for is held less well than in independent noise.

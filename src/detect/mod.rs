@@ -14,6 +14,7 @@
 //!    sources of their own.
 //! 5. `psf_fit`: where the stars are not round Gaussians of one size (motion, defocus, aberrations),
 //!    an effective PSF is measured on the bright ones, and tabulated (`field_tables`).
+//!    Where the stars are long trails, `trailed` measures these instead of steps 6 and 7.
 //! 6. `fit`, `measure`: a fit of each source, together with those that it touches, or a
 //!    grey-weighted centroid; flags for what is no star, or no whole one.
 //! 7. `wings`: light of the stars beyond the spots that are fitted, which is added to the fluxes.
@@ -54,6 +55,7 @@ mod search;
 mod star_model;
 mod threads;
 mod threshold;
+mod trailed;
 pub mod windows;
 mod wings;
 mod workspace;
@@ -63,6 +65,7 @@ pub use config::{CentroidMethod, DetectConfig};
 pub use detection::{Detection, DetectionFlags, Detections, MeasuredPsf, NoiseTail, Wings};
 pub use error::DetectError;
 pub use filter_model::FilterModel;
+pub use trailed::StarTrails;
 pub use workspace::Workspace;
 
 use crate::frame::{Frame, MIN_SIDE_PX};
@@ -74,6 +77,7 @@ use pixels::View;
 use psf::PIXEL_VARIANCE_PX2;
 use psf_fit::measure_psf;
 use search::{FrameSearch, SearchInput};
+use trailed::{Trails, measure_trailed};
 use wings::measure_wings;
 
 /// Finds the stars of `frame`, and other sources, brightest first.
@@ -171,6 +175,19 @@ fn run(
         ..
     } = search;
     let mut maps = input.maps(Some(&filtered.mesh), stars.spot_px, pass.matched_gain);
+    found.background_adu = background.median_adu;
+    found.noise_adu = background.median_sigma_adu;
+    found.threshold_sigma = pass.threshold_level;
+    found.noise_tail = pass.noise_tail;
+    let trails = Trails::measure(&maps, peaks, regions);
+    found.trails = trails.as_ref().map(Trails::summary);
+    if let Some(trails) = trails {
+        measure_trailed(&maps, &trails, peaks, &mut found.sources)?;
+        found.spot_sigma_px = stars.spot_px;
+        (found.psf, found.wings) = (None, None);
+        keep_brightest(found, config, are_more);
+        return Ok(());
+    }
     let shape = StarShape::measure(&maps, peaks);
     shape.merge_peaks(peaks, regions);
     view.check()?;
@@ -194,19 +211,20 @@ fn run(
         ring: Ring::around(maps.width_px()),
     };
     measurement.run(peaks, measure, &mut found.sources)?;
-    found.sources.sort_unstable_by(Detection::by_brightness);
-    // The second star of a pair may be one too many.
-    let are_more = are_more || found.sources.len() > config.max_detections;
-    found.sources.truncate(config.max_detections);
-    found.background_adu = background.median_adu;
-    found.noise_adu = background.median_sigma_adu;
+    keep_brightest(found, config, are_more);
     found.spot_sigma_px = stars.spot_px;
     found.psf = psf.map(|psf| psf.summary((view.width, view.height)));
-    found.threshold_sigma = pass.threshold_level;
     add_wings(&view, &background.mesh, found);
-    found.noise_tail = pass.noise_tail;
-    found.are_more = are_more;
     Ok(())
+}
+
+/// Sorts the sources, and leaves out the faintest beyond the most that are wanted; `are_more` where
+/// peaks were left out before.
+fn keep_brightest(found: &mut Detections, config: &DetectConfig, are_more: bool) {
+    found.sources.sort_unstable_by(Detection::by_brightness);
+    // The second star of a pair may be one too many.
+    found.are_more = are_more || found.sources.len() > config.max_detections;
+    found.sources.truncate(config.max_detections);
 }
 
 /// Measures the light of the stars beyond their fitted spots, and adds it to the fluxes.
@@ -231,6 +249,7 @@ fn describe_darkness(frame: &Frame, config: &DetectConfig, found: &mut Detection
     found.spot_sigma_px = config.spot_sigma_px.unwrap_or(star_model::DEFAULT_SPOT_PX);
     found.threshold_sigma = config.threshold_sigma.unwrap_or(0.0);
     found.psf = None;
+    found.trails = None;
     found.wings = None;
     found.noise_tail = None;
     found.are_more = false;

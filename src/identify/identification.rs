@@ -35,6 +35,15 @@ pub struct Identification {
 }
 
 impl Identification {
+    /// Adds an error of the positions that all of them share, in pixels on each axis: only the attitude
+    /// follows it.
+    pub fn add_common_error(&mut self, sigma_px: f64) {
+        let sigma_rad = sigma_px / self.camera.focal_length_px;
+        for axis in 0..2 {
+            self.attitude_covariance_rad2[(axis, axis)] += sigma_rad * sigma_rad;
+        }
+    }
+
     /// Standard errors of the attitude about the camera's x, y and z axes, in radians.
     pub fn attitude_sigma_rad(&self) -> [f64; 3] {
         self.attitude_covariance_rad2

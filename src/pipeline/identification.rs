@@ -55,7 +55,10 @@ pub(super) fn identify_stars(
         ..
     } = workspace;
     let workspace = (workspace, clock);
-    let (found, dropped_scale) = search(&field, priors, context, workspace);
+    let (mut found, dropped_scale) = search(&field, priors, context, workspace);
+    if let (Ok(found), Some(trails)) = (&mut found, detections.trails) {
+        found.add_common_error(trails.middle_sigma_px);
+    }
     let image = Some((frame, detections));
     let outcome = identified(found, image, &field, &priors.binding(), context.indexed);
     let outcome = match outcome {

@@ -8,7 +8,7 @@ use super::raw_colour::RawColour;
 use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;
-use crate::detect::{MeasuredPsf, NoiseTail, Wings};
+use crate::detect::{MeasuredPsf, NoiseTail, StarTrails, Wings};
 use crate::frame::{Assumption, FrameMetadata, IgnoredValue, ImageChoice, Orientation};
 use crate::identify::diagnosis::DoubleImage;
 use crate::identify::{Identification, Priors, ScalePrior, ScaleSource};
@@ -73,6 +73,8 @@ pub enum Note {
     FalseDetections(NoiseTail),
     /// The spots are no round Gaussians of one size: their form was measured.
     Spots(MeasuredPsf),
+    /// The stars are trails, and each position is that of the middle of one.
+    StarTrails(StarTrails),
     /// The stars have light beyond the spots that are fitted to them.
     Wings(Wings),
     /// Every star occurs twice.
@@ -116,6 +118,7 @@ impl Note {
             Self::Vignetting(_) => "vignetting",
             Self::FalseDetections(_) => "false_detections",
             Self::Spots(_) => "spots_not_round",
+            Self::StarTrails(_) => "star_trails",
             Self::Wings(_) => "wings",
             Self::DoubleImage(_) => "double_image",
             Self::BodyInFrame(_) => "body_in_frame",
@@ -298,6 +301,17 @@ impl fmt::Display for Note {
                 "the stars have wings: {:.1} ± {:.1} % of the light of their fitted spots lies farther out, and is added to the fluxes",
                 100.0 * share,
                 100.0 * sigma
+            ),
+            Self::StarTrails(StarTrails {
+                angle_rad,
+                length_px,
+                ..
+            }) => write!(
+                f,
+                "the stars are trails of {length_px:.0} px at {:.0}°, in the image, from its x axis: each \
+                 position is the middle of a trail, so attitude and optics are those of the middle of the \
+                 exposure",
+                angle_rad * DEG_PER_RAD
             ),
             Self::DoubleImage(double) => write!(
                 f,

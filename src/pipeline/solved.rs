@@ -156,6 +156,7 @@ impl Solved<'_> {
             .chain(Note::of_photometry(self.photometry.as_ref()))
             .chain(self.detections.noise_tail.map(Note::FalseDetections))
             .chain(self.detections.psf.map(Note::Spots))
+            .chain(self.detections.trails.map(Note::StarTrails))
             .chain(self.detections.wings.map(Note::Wings))
             .chain(self.double_image().map(Note::DoubleImage))
             .chain(Note::of_bodies(

@@ -34,7 +34,10 @@ pub(super) fn diagnose(frame: &Frame) -> Option<Diagnosis> {
     };
     let at_full = values().filter(|&p| p >= full).count();
     let share = at_full as f64 / values().count() as f64;
-    let sky = median(&mut values().map(f64::from).collect::<Vec<_>>()) / f64::from(full);
+    // Of frames with negative levels the lowest is dark.
+    let dark = f64::from(lowest.min(0.0));
+    let sky = median(&mut values().map(f64::from).collect::<Vec<_>>());
+    let sky = (sky - dark) / (f64::from(full) - dark);
     let is_sky_full = is_full && sky > FULL_SKY;
     (share > SATURATED_SHARE || is_sky_full).then_some(Diagnosis::Saturated {
         share,
@@ -102,6 +105,15 @@ mod tests {
             "{over:?}"
         );
         assert_eq!(diagnose(&sky(3000.0)), None);
+    }
+
+    #[test]
+    fn the_sky_is_a_part_of_full_scale_where_that_is_zero_too() {
+        let full = diagnose(&frame(|i| if i % 3 == 0 { 0.0 } else { -300.0 }));
+        assert!(
+            matches!(full, Some(Diagnosis::Saturated { sky: 0.0, .. })),
+            "{full:?}"
+        );
     }
 
     #[test]

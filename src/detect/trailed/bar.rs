@@ -1,0 +1,196 @@
+//! A star that is drawn out evenly along a straight line, fitted to the light along it.
+
+use super::profile::Profile;
+use super::template::Template;
+
+/// Direction, length and breadth that the trails of a frame share.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Shape {
+    /// Cosine and sine of the direction, in coordinates of the view.
+    pub direction: [f64; 2],
+    /// Length, in pixels.
+    pub length_px: f64,
+    /// Pixels within this distance of the line hold the light.
+    pub half_breadth_px: f64,
+}
+
+/// A bar fitted to a profile.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Bar {
+    /// Distance of its middle along the profile, in pixels,
+    pub along_px: f64,
+    /// its standard error,
+    pub sigma_along_px: f64,
+    /// and that across.
+    pub across_px: f64,
+    pub sigma_across_px: f64,
+    /// Light, in ADU, and its standard error.
+    pub flux_adu: f64,
+    pub sigma_flux_adu: f64,
+    /// Half of the decrease of chi² by it.
+    pub gain: f64,
+}
+
+/// Distance between the places that are tried, in pixels.
+const STEP_PX: f64 = 0.25;
+/// Error of the place that even bright trails have, in pixels: the motion is not even.
+const LEAST_ERROR_PX: f64 = 0.1;
+
+impl Bar {
+    /// The bar of this shape that explains the profile best, among those that cover its middle to
+    /// within `margin_px`; its light is that of the template, or even. Its place is the mean over all
+    /// places, each as likely as it explains the light: where an end is not seen, the error tells.
+    pub fn fit(
+        profile: &Profile,
+        shape: &Shape,
+        template: Option<&Template>,
+        margin_px: f64,
+    ) -> Option<Self> {
+        let even = Sums::of(profile);
+        let range_px = 0.5 * shape.length_px + margin_px;
+        let tries = (2.0 * range_px / STEP_PX).floor() as usize;
+        let along_px = |i: usize| -range_px + i as f64 * STEP_PX;
+        let step = |i: usize| along_px(i) + profile.middle as f64;
+        let fitted = |i: usize| match template {
+            Some(template) => template.fitted(profile, step(i)),
+            None => even.bar(step(i), shape.length_px),
+        };
+        let gains: Vec<f64> = (0..=tries).map(|i| fitted(i).gain()).collect();
+        let best = (0..=tries)
+            .max_by(|&i, &j| gains[i].total_cmp(&gains[j]))
+            .filter(|&i| gains[i] > 0.0)?;
+        let top = fitted(best);
+        let excess = match template {
+            Some(template) => template.excess(profile, step(best), top.flux()),
+            None => even.excess(profile, step(best), shape.length_px, top),
+        };
+        let excess = excess.max(1.0);
+        let (mut total, mut mean, mut square) = (0.0, 0.0, 0.0);
+        for i in 0..=tries {
+            let likelihood = ((gains[i] - gains[best]) / excess).exp();
+            total += likelihood;
+            mean += likelihood * along_px(i);
+            square += likelihood * along_px(i) * along_px(i);
+        }
+        let mean = mean / total;
+        let spread = (square / total - mean * mean).max(0.0);
+        let [across_px, sigma_across_px] = across(profile, mean, shape);
+        let least2 = LEAST_ERROR_PX * LEAST_ERROR_PX;
+        Some(Self {
+            along_px: mean,
+            sigma_along_px: (spread + least2).sqrt(),
+            across_px,
+            sigma_across_px: (sigma_across_px * sigma_across_px + least2).sqrt(),
+            flux_adu: top.flux(),
+            sigma_flux_adu: (excess / top.weight).sqrt(),
+            gain: top.gain(),
+        })
+    }
+}
+
+/// Sums over the steps of a profile before each of them.
+struct Sums {
+    /// Of light × weight.
+    light: Vec<f64>,
+    /// Of the weights.
+    weight: Vec<f64>,
+}
+
+/// The flux of a bar that is fitted, times `weight`, and its inverse variance.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Fitted {
+    pub light: f64,
+    pub weight: f64,
+}
+
+impl Fitted {
+    fn flux(&self) -> f64 {
+        self.light / self.weight
+    }
+
+    /// Half of the decrease of chi² by the bar: the logarithm of its likelihood.
+    fn gain(&self) -> f64 {
+        if self.weight <= 0.0 {
+            return 0.0;
+        }
+        let light = self.light.max(0.0);
+        0.5 * light * light / self.weight
+    }
+}
+
+impl Sums {
+    fn of(profile: &Profile) -> Self {
+        let terms = || profile.light.iter().zip(&profile.weight);
+        let before = |term: &dyn Fn(f64, f64) -> f64| {
+            let running = terms().scan(0.0, |sum, (&light, &weight)| {
+                *sum += term(light, weight);
+                Some(*sum)
+            });
+            std::iter::once(0.0).chain(running).collect()
+        };
+        Self {
+            light: before(&|light, weight| light * weight),
+            weight: before(&|_, weight| weight),
+        }
+    }
+
+    /// The bar of this length around a place, counted in steps from the first one's middle.
+    fn bar(&self, middle: f64, length_px: f64) -> Fitted {
+        // Step i is from i − ½ to i + ½.
+        let ends = [
+            middle - 0.5 * length_px + 0.5,
+            middle + 0.5 * length_px + 0.5,
+        ];
+        let between = |sums: &[f64]| Self::at(sums, ends[1]) - Self::at(sums, ends[0]);
+        // Of a flux of 1, each step has an equal part.
+        Fitted {
+            light: between(&self.light) / length_px,
+            weight: between(&self.weight) / (length_px * length_px),
+        }
+    }
+
+    /// The sum up to a place, linear within each step.
+    fn at(sums: &[f64], place: f64) -> f64 {
+        let place = place.clamp(0.0, (sums.len() - 1) as f64);
+        let below = (place as usize).min(sums.len() - 2);
+        sums[below] + (place - below as f64) * (sums[below + 1] - sums[below])
+    }
+
+    /// Chi² over its degrees of freedom under the bar: above 1 where the light is uneven.
+    fn excess(&self, profile: &Profile, middle: f64, length_px: f64, bar: Fitted) -> f64 {
+        let level = bar.flux() / length_px;
+        // The first and the last step are filled in part.
+        let first = (middle - 0.5 * length_px + 1.0).ceil().max(0.0) as usize;
+        let end = (middle + 0.5 * length_px).floor().max(0.0) as usize;
+        let steps = first..end.min(profile.light.len());
+        let terms = steps.filter(|&i| profile.weight[i] > 0.0);
+        let (count, chi2) = terms.fold((0, 0.0), |(count, sum), i| {
+            let rest = profile.light[i] - level;
+            (count + 1, sum + rest * rest * profile.weight[i])
+        });
+        chi2 / f64::from((count - 1).max(1))
+    }
+}
+
+/// Centre of the light across the bar, and its standard error from noise, in pixels.
+fn across(profile: &Profile, along_px: f64, shape: &Shape) -> [f64; 2] {
+    let middle = along_px + profile.middle as f64;
+    let first = (middle - 0.5 * shape.length_px).round().max(0.0) as usize;
+    let end = (middle + 0.5 * shape.length_px).round().max(0.0) as usize + 1;
+    let known = (first..end.min(profile.light.len())).filter(|&i| profile.weight[i] > 0.0);
+    let sums = known.fold([0.0; 3], |[light, moment, variance], i| {
+        [
+            light + profile.light[i],
+            moment + profile.across[i],
+            variance + 1.0 / profile.weight[i],
+        ]
+    });
+    let [light, moment, variance] = sums;
+    // The mean square of the distances in the strip.
+    let distance2 = shape.half_breadth_px * shape.half_breadth_px / 3.0;
+    let limit = shape.half_breadth_px;
+    [
+        (moment / light).clamp(-limit, limit),
+        (variance * distance2).sqrt() / light.abs(),
+    ]
+}

@@ -1,0 +1,227 @@
+//! Direction, length and breadth of the trails that a frame's stars are.
+
+use super::bar::{Bar, Shape};
+use super::largest::{LargeRegion, MOST, largest_regions};
+use super::profile::{Profile, Strip};
+use super::template::{Template, for_each_trail};
+use crate::detect::candidates::{Peak, Region};
+use crate::detect::fit::FrameMaps;
+use arrayvec::ArrayVec;
+
+/// Shorter trails are fitted as elongated spots, in pixels,
+const SHORTEST_PX: f64 = 15.0;
+/// and in breadths.
+const MIN_ELONGATION: f64 = 3.0;
+/// Fewer regions do not tell the shape of all.
+const FEWEST: usize = 5;
+/// Least share of the large regions that are trails in one direction.
+const LEAST_SHARE: f64 = 0.6;
+/// Times that each property is improved with the others.
+const ROUNDS: usize = 3;
+/// Cosine of twice the greatest angle between trails in one direction: 8 degrees.
+const ALIGNED: f64 = 0.96;
+
+/// The trails that all stars of a frame are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StarTrails {
+    /// Their angle to the image's x axis, in radians, in (−π/2, π/2]; positive where they rise to the
+    /// right.
+    pub angle_rad: f64,
+    /// Their length, in pixels.
+    pub length_px: f64,
+    /// Standard error of where their middle is, the same for all stars, in pixels.
+    pub middle_sigma_px: f64,
+}
+
+/// The shape of the trails of a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::detect) struct Trails {
+    pub(super) shape: Shape,
+    /// The light along them; `None` where it has no ends: even light is taken.
+    pub(super) template: Option<Template>,
+}
+
+impl Trails {
+    /// The trails of a frame of whose large regions most are trails in one direction, side by side. A
+    /// satellite's trail that is broken up is one line; other stars are round.
+    pub fn measure(maps: &FrameMaps<'_>, peaks: &[Peak], regions: &[Region]) -> Option<Self> {
+        let largest = largest_regions(maps, peaks, regions);
+        let long: ArrayVec<_, MOST> = largest.iter().filter(|large| is_long(large)).collect();
+        let fewest = FEWEST.max((LEAST_SHARE * largest.len() as f64).ceil() as usize);
+        if long.len() < fewest {
+            return None;
+        }
+        let doubled = mean_doubled(long.iter().map(|large| large.region));
+        let is_aligned = |large: &&&LargeRegion<'_>| {
+            let [cos, sin] = unit(ellipticity(large.region));
+            cos * doubled[0] + sin * doubled[1] > ALIGNED
+        };
+        let aligned: ArrayVec<&LargeRegion<'_>, MOST> =
+            long.iter().filter(is_aligned).copied().collect();
+        // Twice the direction's angle is that of the ellipticity.
+        let half_angle = 0.5 * doubled[1].atan2(doubled[0]);
+        let direction = [half_angle.cos(), half_angle.sin()];
+        if aligned.len() < fewest || lines(&aligned, direction) < FEWEST.max(aligned.len() / 2) {
+            return None;
+        }
+        let mut lengths: ArrayVec<f64, MOST> = aligned
+            .iter()
+            .map(|large| length_px(large.region))
+            .collect();
+        lengths.sort_unstable_by(f64::total_cmp);
+        let shape = Shape {
+            direction,
+            length_px: lengths[lengths.len() / 2],
+            half_breadth_px: 2.0 * maps.width_px(),
+        };
+        if shape.length_px < SHORTEST_PX {
+            return None;
+        }
+        let mut shape = refined(maps, &aligned, shape);
+        let mut template = None;
+        for _ in 0..ROUNDS {
+            let better = Template::measure(maps, &aligned, &shape, template.as_ref());
+            let Some(better) = better else {
+                break;
+            };
+            shape.length_px = better.length_px;
+            template = Some(better);
+        }
+        Some(Self { shape, template })
+    }
+
+    /// As told to others.
+    pub fn summary(&self) -> StarTrails {
+        let [cos, sin] = self.shape.direction;
+        StarTrails {
+            // y points down; angles are counted as seen.
+            angle_rad: (-sin).atan2(cos),
+            length_px: self.shape.length_px,
+            middle_sigma_px: self
+                .template
+                .as_ref()
+                .map_or(0.5 * self.shape.half_breadth_px, |light| {
+                    light.middle_sigma_px
+                }),
+        }
+    }
+}
+
+/// The shape among similar ones with which the stars of the regions stand out most.
+fn refined(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: Shape) -> Shape {
+    let mut profile = Profile::default();
+    // Of logarithms: the brightest star counts no more than others.
+    let mut likelihood = |shape: Shape| -> f64 {
+        let gains = regions.iter().filter_map(|large| {
+            let strip = Strip {
+                x: large.region.x,
+                y: large.region.y,
+                shape,
+                reach_px: 1.5 * shape.length_px,
+            };
+            profile.measure(maps, &strip);
+            Bar::fit(&profile, &shape, None, 0.0).map(|bar| bar.gain.ln())
+        });
+        gains.sum()
+    };
+    let mut best_of = |shape: Shape, others: &mut dyn Iterator<Item = Shape>| {
+        let mut best = (likelihood(shape), shape);
+        for other in others {
+            let with_other = likelihood(other);
+            if with_other > best.0 {
+                best = (with_other, other);
+            }
+        }
+        best.1
+    };
+    let stretched = |shape: Shape, factor: f64| Shape {
+        length_px: shape.length_px * factor,
+        ..shape
+    };
+    let mut shape = shape;
+    for round in 0..ROUNDS {
+        // At first the regions may be pieces, or of several stars.
+        let step = if round == 0 { 0.06 } else { 0.01 };
+        let mut lengths = (-10..=20).map(|i| stretched(shape, (step * f64::from(i)).exp()));
+        shape = best_of(shape, &mut lengths);
+        shape = turned(shape, median_slope(maps, regions, &shape));
+        let mut breadths = (2..=12).map(|step| Shape {
+            half_breadth_px: 0.5 * f64::from(step),
+            ..shape
+        });
+        shape = best_of(shape, &mut breadths);
+    }
+    shape
+}
+
+/// A shape turned by an angle in radians.
+fn turned(shape: Shape, angle: f64) -> Shape {
+    let [cos, sin] = shape.direction;
+    let (s, c) = angle.sin_cos();
+    Shape {
+        direction: [cos * c - sin * s, sin * c + cos * s],
+        ..shape
+    }
+}
+
+/// By what angle the trails in the regions are turned from the shape, in radians: the median of the
+/// slopes of their light.
+fn median_slope(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: &Shape) -> f64 {
+    let mut slopes: ArrayVec<f64, MOST> = ArrayVec::new();
+    for_each_trail(maps, regions, (shape, None), |profile, _| {
+        slopes.push(profile.slope(0.5 * shape.length_px));
+    });
+    slopes.sort_unstable_by(f64::total_cmp);
+    let slope = slopes.get(slopes.len() / 2);
+    slope
+        .filter(|slope| slope.is_finite())
+        .copied()
+        .unwrap_or(0.0)
+}
+
+/// Number of lines on which the regions are.
+fn lines(regions: &[&LargeRegion<'_>], [cos, sin]: [f64; 2]) -> usize {
+    let across = regions
+        .iter()
+        .map(|large| large.region.y * cos - large.region.x * sin);
+    let mut across: ArrayVec<f64, MOST> = across.collect();
+    across.sort_unstable_by(f64::total_cmp);
+    let mut breadths: ArrayVec<f64, MOST> = regions.iter().map(|r| r.region.minor_px).collect();
+    breadths.sort_unstable_by(f64::total_cmp);
+    let apart_px = 3.0 * breadths[breadths.len() / 2];
+    let gaps = across
+        .windows(2)
+        .filter(|pair| pair[1] - pair[0] > apart_px);
+    gaps.count() + 1
+}
+
+fn is_long(large: &LargeRegion<'_>) -> bool {
+    let region = large.region;
+    region.major_px > MIN_ELONGATION * region.minor_px
+}
+
+/// Length of a bar with these moments, in pixels.
+fn length_px(region: &Region) -> f64 {
+    let along2 = region.major_px.powi(2) - region.minor_px.powi(2);
+    (12.0 * along2.max(0.0)).sqrt()
+}
+
+/// Cosine and sine of twice the angle of the longer axis, times the ellipticity.
+fn ellipticity(region: &Region) -> [f64; 2] {
+    let [xx, yy, xy] = region.covariance;
+    [(xx - yy) / (xx + yy), 2.0 * xy / (xx + yy)]
+}
+
+fn unit([x, y]: [f64; 2]) -> [f64; 2] {
+    let length = x.hypot(y).max(f64::MIN_POSITIVE);
+    [x / length, y / length]
+}
+
+/// The mean direction, as cosine and sine of twice its angle.
+fn mean_doubled<'a>(regions: impl Iterator<Item = &'a Region>) -> [f64; 2] {
+    let sum = regions.map(ellipticity).fold([0.0, 0.0], |[x, y], e| {
+        let [cos, sin] = unit(e);
+        [x + cos, y + sin]
+    });
+    unit(sum)
+}
