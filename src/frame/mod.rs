@@ -29,6 +29,7 @@
 //! linear. Integers and floats of more than 24 bits are rounded to 24.
 
 mod account;
+mod columns;
 mod compressed;
 mod directory;
 mod error;
@@ -55,6 +56,7 @@ mod saturation;
 mod tiff;
 mod turning;
 
+pub use columns::DefectiveColumn;
 #[cfg(feature = "overlay")]
 pub(crate) use directory::OVERLAY_TEXT;
 pub use directory::{CALIBRATION_CREATOR, files_in, is_calibration_frame, is_overlay};

@@ -9,7 +9,9 @@ use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;
 use crate::detect::{MeasuredPsf, NoiseTail, StarTrails, Wings};
-use crate::frame::{Assumption, FrameMetadata, IgnoredValue, ImageChoice, Orientation};
+use crate::frame::{
+    Assumption, DefectiveColumn, FrameMetadata, IgnoredValue, ImageChoice, Orientation,
+};
 use crate::identify::diagnosis::DoubleImage;
 use crate::identify::{Identification, Priors, ScalePrior, ScaleSource};
 use crate::photometry::FramePhotometry;
@@ -42,6 +44,8 @@ pub enum Note {
     RowsLeftOut(LeftOut),
     /// A list has no brightnesses; its rows were taken to be in their order.
     BrightnessUnknown,
+    /// Columns hold one value instead of light, and were left out.
+    DefectiveColumns(Vec<usize>),
     /// The frame is a raw one of a colour camera: what its pixels and its zero point are of.
     ColourMosaic(RawColour),
     /// The scale in the header is not that of the frame.
@@ -108,6 +112,7 @@ impl Note {
             Self::Assumed(assumption) => assumption.code(),
             Self::RowsLeftOut(_) => "rows_left_out",
             Self::BrightnessUnknown => "brightness_unknown",
+            Self::DefectiveColumns(_) => "defective_columns",
             Self::ColourMosaic(_) => "colour_mosaic",
             Self::WrongHeaderScale { .. } => "header_scale_wrong",
             Self::BelowHorizon { .. } => "below_horizon",
@@ -141,6 +146,13 @@ impl Note {
             .chain(orientation.map(Self::Orientation))
             .chain(ignored.map(Self::IgnoredHeader))
             .chain(assumed.map(Self::Assumed))
+    }
+
+    /// Columns without light, where there are any.
+    pub(super) fn of_defects(defects: &[DefectiveColumn]) -> Option<Self> {
+        let mut columns: Vec<usize> = defects.iter().map(|defect| defect.x).collect();
+        columns.dedup();
+        (!columns.is_empty()).then_some(Self::DefectiveColumns(columns))
     }
 
     /// A scale from the header that had to be dropped, where it is not the true one.
@@ -258,6 +270,11 @@ impl fmt::Display for Note {
             Self::RowsLeftOut(rows) => rows.fmt(f),
             Self::BrightnessUnknown => f.write_str(
                 "the list has no flux and no magnitude; its rows were taken to be in order of brightness",
+            ),
+            Self::DefectiveColumns(columns) => write!(
+                f,
+                "columns hold one value instead of light, all along or in part, and are left out there: x = {}",
+                listed(columns.iter().map(usize::to_string))
             ),
             Self::ColourMosaic(mosaic) => write_mosaic(f, mosaic),
             Self::WrongHeaderScale {

@@ -142,6 +142,9 @@ fn solve(
     workspace.detect.set_memory(input.memory);
     let priors = context.priors_of(raw, input.name);
 
+    let defects = raw.defective_columns();
+    let masked = (!defects.is_empty()).then(|| raw.without_columns(&defects));
+    let raw = masked.as_ref().unwrap_or(raw);
     let config = context.detect_config(raw);
     let grey = input.mosaic.map(|mosaic| {
         // Of the raw pixels: smoothing blurs the level.
@@ -174,6 +177,7 @@ fn solve(
         outcome,
         bodies,
         dropped_scale,
+        defects,
         photometry: None,
     };
     let mut comparison = None;

@@ -13,7 +13,7 @@ use crate::base::statistics::Estimate;
 use crate::base::units::DEG_PER_RAD;
 use crate::calibration::Calibration;
 use crate::detect::Detections;
-use crate::frame::Frame;
+use crate::frame::{DefectiveColumn, Frame};
 use crate::identify::diagnosis::{DoubleImage, find_double_image};
 use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SourceIndex, View};
 use crate::photometry::comparison::{Comparison, FieldStar, FrameMeasurement, compare};
@@ -37,6 +37,8 @@ pub(super) struct Solved<'a> {
     pub bodies: Vec<BodyInFrame>,
     /// The scale that was dropped because nothing matched with it.
     pub dropped_scale: Option<ScalePrior>,
+    /// Columns that hold no light, and were left out.
+    pub defects: Vec<DefectiveColumn>,
     pub photometry: Option<FramePhotometry>,
     pub observation: Option<Observation>,
 }
@@ -149,6 +151,7 @@ impl Solved<'_> {
         let is_named = !self.context.attitude_only;
         let camera = self.context.camera.as_ref().filter(|_| is_named);
         Note::of_file(&self.frame.metadata)
+            .chain(Note::of_defects(&self.defects))
             .chain(self.mosaic.map(Note::ColourMosaic))
             .chain(Note::of_scale(self.dropped_scale, outcome))
             .chain(Note::of_observation(observation, priors, outcome))
