@@ -60,6 +60,11 @@ impl DetectionFlags {
         !(self.hot_pixel || self.trail || self.extended)
     }
 
+    /// Whether the source may be a star if the frame's spot is not that of its stars.
+    pub(crate) fn may_be_wide_star(&self) -> bool {
+        !(self.hot_pixel || self.trail)
+    }
+
     /// Whether the flux is complete and without light of other stars.
     pub fn has_clean_flux(&self) -> bool {
         !(self.saturated || self.blended || self.border)

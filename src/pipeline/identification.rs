@@ -16,9 +16,20 @@ use crate::sky::observer::Observation;
 
 /// The detections that may be stars, as identification takes them.
 pub fn star_field(frame: &Frame, detections: &Detections, years_since_j2000: f64) -> StarField {
+    let is_star = |source: &Detection| source.flags.is_star_like();
+    field_of(is_star, frame, detections, years_since_j2000)
+}
+
+/// The detections for which `is_star` holds, as identification takes them.
+fn field_of(
+    is_star: impl Fn(&Detection) -> bool,
+    frame: &Frame,
+    detections: &Detections,
+    years_since_j2000: f64,
+) -> StarField {
     let sources = detections.sources.iter().enumerate();
     let stars = sources
-        .filter(|(_, source)| source.flags.is_star_like() && source.flux_adu > 0.0)
+        .filter(|(_, source)| is_star(source) && source.flux_adu > 0.0)
         .map(|(index, source)| {
             let variance_px2 = (source.sigma_x_px.powi(2) + source.sigma_y_px.powi(2)) / 2.0;
             ObservedStar {
@@ -54,8 +65,16 @@ pub(super) fn identify_stars(
         detect: detector,
         ..
     } = workspace;
-    let workspace = (workspace, clock);
-    let (mut found, dropped_scale) = search(&field, priors, context, workspace);
+    let (mut found, dropped_scale) = search(&field, priors, context, (workspace, clock));
+    if found.is_err() && may_be_wide(detections) {
+        let is_star = |source: &Detection| source.flags.may_be_wide_star();
+        let years = priors.years_since_j2000();
+        let wide = field_of(is_star, frame, detections, years);
+        let second = attempt(&wide, &priors.binding(), context, (workspace, clock));
+        if let Some(second) = second.ok().and_then(at_second_attempt) {
+            found = Ok(second);
+        }
+    }
     if let (Ok(found), Some(trails)) = (&mut found, detections.trails) {
         found.add_common_error(trails.middle_sigma_px);
     }
@@ -69,6 +88,17 @@ pub(super) fn identify_stars(
         outcome => outcome,
     };
     (outcome, dropped_scale)
+}
+
+/// Whether most of the brightest detections are wider than the spot: then it may be that of specks,
+/// and these the stars.
+fn may_be_wide(detections: &Detections) -> bool {
+    const BRIGHTEST: usize = 16;
+    let bright = detections.sources.iter().take(BRIGHTEST);
+    let (count, wide) = bright.fold((0, 0), |(count, wide), source| {
+        (count + 1, wide + usize::from(source.flags.extended))
+    });
+    2 * wide > count
 }
 
 /// Whether a negative can end like this: it has few stars, none that match, or a sky at full scale.

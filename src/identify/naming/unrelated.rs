@@ -24,9 +24,11 @@ pub struct Unrelated {
     /// The stars as bright as each one: from the first to that after the last.
     alike: Vec<(u32, u32)>,
     scales: [Scale; CELLS.len()],
-    /// The probability of each star that it is unrelated, and the sums of all before each one.
+    /// The probability of each star that it is unrelated, and the sums of all before each one: of
+    /// those that are not saturated, and of those that are.
     weights: Vec<f64>,
-    sums: Vec<f64>,
+    sums: Vec<[f64; 2]>,
+    is_saturated: Vec<bool>,
     /// Density around each star over the frame's mean, at least 1.
     crowding: Vec<f64>,
     /// Per square pixel and magnitude, of each observed star; at the end 1, for none.
@@ -55,6 +57,9 @@ impl Unrelated {
         self.crowding.clear();
         self.crowding.resize(field.stars.len(), 1.0);
         self.find_alike(field);
+        self.is_saturated.clear();
+        let saturated = field.stars.iter().map(|star| star.is_saturated);
+        self.is_saturated.extend(saturated);
         if by_place {
             for (scale, cells) in self.scales.iter_mut().zip(CELLS) {
                 scale.start(field, &Grid::new(field, cells));
@@ -93,20 +98,24 @@ impl Unrelated {
     }
 
     /// Measures the density at the brightness of each observed star, and in its surroundings, as
-    /// crowded as they are.
+    /// crowded as they are. A saturated star is at least as bright as it was measured: its rivals are
+    /// saturated, too.
     pub fn measure(&mut self, has_name: &[f64]) {
         self.weigh(has_name);
         self.sums.clear();
-        self.sums.push(0.0);
-        let mut sum = 0.0;
-        self.sums.extend(self.weights.iter().map(|weight| {
-            sum += weight;
-            sum
+        let mut sums = [0.0; 2];
+        self.sums.push(sums);
+        let weights = self.weights.iter().zip(&self.is_saturated);
+        self.sums.extend(weights.map(|(weight, is_saturated)| {
+            sums[usize::from(*is_saturated)] += weight;
+            sums
         }));
         let stars = self.alike.iter().zip(&self.weights).zip(&self.crowding);
         self.densities.clear();
-        let densities = stars.map(|((&(from, to), weight), crowding)| {
-            let alike = self.sums[to as usize] - self.sums[from as usize] - weight;
+        let densities = stars.zip(&self.is_saturated).map(|(star, is_saturated)| {
+            let ((&(from, to), weight), crowding) = star;
+            let before = |end: u32| self.sums[end as usize][usize::from(*is_saturated)];
+            let alike = before(to) - before(from) - weight;
             let per_mag = (alike.max(0.0) + PRIOR_DETECTIONS) / (2.0 * HALF_RANGE_MAG);
             per_mag / self.area_px2 * crowding
         });
