@@ -38,6 +38,17 @@ pub enum DetectError {
         /// How many may stand out.
         most: usize,
     },
+    /// The frame and the copies of it that are needed do not fit the memory that is allowed.
+    #[error(
+        "the frame and its copies take {needed_bytes} bytes, more than the {limit_bytes} that a frame may \
+         take (--max-memory)"
+    )]
+    TooMuchMemory {
+        /// What they take.
+        needed_bytes: u64,
+        /// What they may take.
+        limit_bytes: u64,
+    },
     /// An option is out of range.
     #[error("{name} is {found}, expected {expected}")]
     Config {

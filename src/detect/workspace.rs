@@ -4,7 +4,7 @@ use super::background::FrameBackground;
 use super::measure::MeasureBuffers;
 use super::search::FrameSearch;
 use crate::base::interrupt::Interrupt;
-use crate::frame::{MemoryLimit, SaturationFinder};
+use crate::frame::{Frame, MemoryLimit, SaturationFinder};
 use std::num::NonZeroUsize;
 
 /// Buffers that are reused from frame to frame. Results do not depend on their contents.
@@ -70,6 +70,11 @@ impl Workspace {
     /// [`within`](Self::within), from the next frame on.
     pub(crate) fn set_memory(&mut self, memory: MemoryLimit) {
         self.memory = memory;
+    }
+
+    /// Whether so many bytes fit its memory beside `frame`.
+    pub(crate) fn has_room(&self, frame: &Frame<'_>, bytes: u64) -> bool {
+        frame.pixels.bytes() + bytes <= self.memory.bytes()
     }
 
     /// [`until`](Self::until), from the next frame on.

@@ -124,6 +124,11 @@ fn negative(
     const MIN_RATIO: usize = 4;
     /// Fainter ones may be noise.
     const MIN_SNR: f64 = 10.0;
+    /// The negative, and the frame as floats.
+    const BYTES_PER_PIXEL: u64 = 2 * size_of::<f32>() as u64;
+    if !detector.has_room(frame, BYTES_PER_PIXEL * frame.pixels.len() as u64) {
+        return None;
+    }
     let config = DetectConfig {
         max_detections: 1000,
         ..DetectConfig::default()

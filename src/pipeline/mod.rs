@@ -23,6 +23,7 @@ mod identification;
 mod left_out;
 mod note;
 mod outcome;
+mod prepared;
 mod raw_colour;
 mod solution;
 mod solve;

@@ -4,6 +4,7 @@ use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
 use super::error::Error;
 use super::identification::{identify_stars, observation};
+use super::prepared::Prepared;
 use super::raw_colour::RawColour;
 use super::solution::{Solution, Source};
 use super::solved::Solved;
@@ -11,7 +12,7 @@ use super::stopwatch::{Stage, Stopwatch};
 use crate::base::panics::caught;
 use crate::calibration::Calibration;
 use crate::detect::{self, DetectError};
-use crate::frame::{self, Frame, FrameError, MemoryLimit, Mosaic, SaturationFinder};
+use crate::frame::{self, Frame, FrameError, MemoryLimit, Mosaic};
 use std::num::NonZeroUsize;
 use std::path::Path;
 
@@ -139,23 +140,16 @@ fn solve(
     workspace: &mut Workspace,
 ) -> Result<Solution, DetectError> {
     let (raw, mut clock) = (input.frame, input.clock);
-    workspace.detect.set_memory(input.memory);
     let priors = context.priors_of(raw, input.name);
 
-    let defects = raw.defective_columns();
-    let masked = (!defects.is_empty()).then(|| raw.without_columns(&defects));
-    let raw = masked.as_ref().unwrap_or(raw);
     let config = context.detect_config(raw);
-    let grey = input.mosaic.map(|mosaic| {
-        // Of the raw pixels: smoothing blurs the level.
-        let saturation_adu = config.saturation_adu(raw, &mut SaturationFinder::default());
-        mosaic.grey(raw, saturation_adu)
-    });
-    let frame = grey.as_ref().unwrap_or(raw);
+    let prepared = Prepared::new(raw, input.mosaic, &config, input.memory)?;
+    workspace.detect.set_memory(prepared.memory);
+    let frame = prepared.frame();
     let mut detections = detect::detect(frame, &config, &mut workspace.detect)?;
     let mosaic = input
         .mosaic
-        .map(|mosaic| RawColour::restore(mosaic, raw, &mut detections));
+        .map(|mosaic| RawColour::restore(mosaic, prepared.raw(), &mut detections));
     clock.lap(Stage::Detect);
 
     let buffers = (workspace, &mut clock);
@@ -177,7 +171,7 @@ fn solve(
         outcome,
         bodies,
         dropped_scale,
-        defects,
+        defects: &prepared.defects,
         photometry: None,
     };
     let mut comparison = None;

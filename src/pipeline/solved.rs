@@ -38,7 +38,7 @@ pub(super) struct Solved<'a> {
     /// The scale that was dropped because nothing matched with it.
     pub dropped_scale: Option<ScalePrior>,
     /// Columns that hold no light, and were left out.
-    pub defects: Vec<DefectiveColumn>,
+    pub defects: &'a [DefectiveColumn],
     pub photometry: Option<FramePhotometry>,
     pub observation: Option<Observation>,
 }
@@ -151,7 +151,7 @@ impl Solved<'_> {
         let is_named = !self.context.attitude_only;
         let camera = self.context.camera.as_ref().filter(|_| is_named);
         Note::of_file(&self.frame.metadata)
-            .chain(Note::of_defects(&self.defects))
+            .chain(Note::of_defects(self.defects))
             .chain(self.mosaic.map(Note::ColourMosaic))
             .chain(Note::of_scale(self.dropped_scale, outcome))
             .chain(Note::of_observation(observation, priors, outcome))

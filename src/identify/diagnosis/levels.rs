@@ -10,6 +10,8 @@ const SATURATED_SHARE: f64 = 0.2;
 const FULL_SKY: f64 = 0.9;
 /// Fewest steps between the lowest and the highest level for the latter to be a full scale.
 const FULL_SCALE_STEPS: f32 = 32.0;
+/// The median is that of at most so many pixels.
+const MEDIAN_PX: usize = 1 << 20;
 
 /// Whether the frame is empty or overexposed.
 pub(super) fn diagnose(frame: &Frame) -> Option<Diagnosis> {
@@ -36,7 +38,9 @@ pub(super) fn diagnose(frame: &Frame) -> Option<Diagnosis> {
     let share = at_full as f64 / values().count() as f64;
     // Of frames with negative levels the lowest is dark.
     let dark = f64::from(lowest.min(0.0));
-    let sky = median(&mut values().map(f64::from).collect::<Vec<_>>());
+    let step = frame.pixels.len().div_ceil(MEDIAN_PX);
+    let sample = values().step_by(step).map(f64::from);
+    let sky = median(&mut sample.collect::<Vec<_>>());
     let sky = (sky - dark) / (f64::from(full) - dark);
     let is_sky_full = is_full && sky > FULL_SKY;
     (share > SATURATED_SHARE || is_sky_full).then_some(Diagnosis::Saturated {
