@@ -2,7 +2,8 @@
 //! its columns.
 //!
 //! Semicolons and tabs are separators where the heading has them, blanks where it has neither.
-//! SExtractor's lists have their heading in comments: `#   2 X_IMAGE   Object position along x`.
+//! SExtractor's lists have their heading in comments: `#   2 X_IMAGE   Object position along x`; those
+//! of numpy and of Astropy's `commented_header` in one comment: `# x y flux`.
 //! Lines keep their numbers.
 
 use std::borrow::Cow;
@@ -18,6 +19,18 @@ pub(super) struct ListText<'a> {
 impl<'a> ListText<'a> {
     /// The list in `bytes`, which have no byte order mark.
     pub fn of(bytes: &'a [u8]) -> Self {
+        match without_mark_of_heading(bytes) {
+            Some(text) => {
+                let ListText { text, separator } = ListText::of(&text);
+                let text = text.into_owned().into();
+                Self { text, separator }
+            }
+            None => Self::of_plain(bytes),
+        }
+    }
+
+    /// The list in `bytes`, whose heading is no comment, or a numbered one.
+    fn of_plain(bytes: &'a [u8]) -> Self {
         let mut lines = bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
         let heading = lines.find(|line| !line.is_empty() && !line.starts_with(b"#"));
         let heading = heading.unwrap_or_default();
@@ -40,6 +53,38 @@ impl<'a> ListText<'a> {
             },
         }
     }
+}
+
+/// The list in `bytes` with the last comment before its numbers as heading, where it has as many names
+/// as there are numbers.
+fn without_mark_of_heading(bytes: &[u8]) -> Option<Vec<u8>> {
+    let text = std::str::from_utf8(bytes).ok()?;
+    let fields = |line| {
+        let is_between = |c: char| c.is_whitespace() || c == ',' || c == ';';
+        str::split(line, is_between).filter(|field| !field.is_empty())
+    };
+    let mut comment = None;
+    let mut lines = text.split_inclusive('\n').scan(0, |start, line| {
+        let at = *start;
+        *start += line.len();
+        Some((at, line.trim()))
+    });
+    let first = loop {
+        match lines.next()? {
+            (at, line) if line.starts_with('#') => comment = Some((at, line)),
+            (_, "") => {}
+            (_, line) => break line,
+        }
+    };
+    let (at, comment) = comment?;
+    let names = comment.trim_start_matches('#');
+    let is_number = |field: &str| field.parse::<f64>().is_ok();
+    let is_heading = fields(first).all(is_number)
+        && !fields(names).any(is_number)
+        && fields(names).count() == fields(first).count();
+    let mark = at + text[at..].find('#')?;
+    let marks = comment.len() - names.len();
+    is_heading.then(|| [&bytes[..mark], &bytes[mark + marks..]].concat())
 }
 
 /// Lines with blanks between columns as lines with commas.
@@ -107,6 +152,21 @@ mod tests {
             (text.as_str(), separator),
             ("# %ECSV 1.0\nid,x,y\n1,2.5,3", ',')
         );
+    }
+
+    #[test]
+    fn a_heading_may_be_a_comment() {
+        for (list, expected) in [
+            (
+                "# made by a program\n# x y flux\n1.5 2.5 3\n",
+                "# made by a program\nx,y,flux\n1.5,2.5,3",
+            ),
+            ("#x,y,flux\n1.5,2.5,3\n", "x,y,flux\n1.5,2.5,3\n"),
+        ] {
+            assert_eq!(of(list), (expected.to_owned(), ','));
+        }
+        let remark = "# three words here\nx,y,flux\n1,2,3\n";
+        assert_eq!(of(remark).0, remark);
     }
 
     #[test]
