@@ -31,8 +31,10 @@ pub(super) struct Bar {
     pub gain: f64,
 }
 
-/// Distance between the places that are tried, in pixels.
+/// Distance between the places that are tried, in pixels, …
 const STEP_PX: f64 = 0.25;
+/// … and over the length of long bars.
+const STEP_SHARE: f64 = 1.0 / 400.0;
 /// Error of the place that even bright trails have, in pixels: the motion is not even.
 const LEAST_ERROR_PX: f64 = 0.1;
 
@@ -48,8 +50,9 @@ impl Bar {
     ) -> Option<Self> {
         let even = Sums::of(profile);
         let range_px = 0.5 * shape.length_px + margin_px;
-        let tries = (2.0 * range_px / STEP_PX).floor() as usize;
-        let along_px = |i: usize| -range_px + i as f64 * STEP_PX;
+        let step_px = STEP_PX.max(STEP_SHARE * shape.length_px);
+        let tries = (2.0 * range_px / step_px).floor() as usize;
+        let along_px = |i: usize| -range_px + i as f64 * step_px;
         let step = |i: usize| along_px(i) + profile.middle as f64;
         let fitted = |i: usize| match template {
             Some(template) => template.fitted(profile, step(i)),
@@ -186,11 +189,14 @@ fn across(profile: &Profile, along_px: f64, shape: &Shape) -> [f64; 2] {
         ]
     });
     let [light, moment, variance] = sums;
-    // The mean square of the distances in the strip.
-    let distance2 = shape.half_breadth_px * shape.half_breadth_px / 3.0;
     let limit = shape.half_breadth_px;
+    if light <= 0.0 {
+        return [0.0, limit];
+    }
+    // The mean square of the distances in the strip.
+    let distance2 = limit * limit / 3.0;
     [
         (moment / light).clamp(-limit, limit),
-        (variance * distance2).sqrt() / light.abs(),
+        (variance * distance2).sqrt() / light,
     ]
 }

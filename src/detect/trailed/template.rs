@@ -150,6 +150,9 @@ impl MeanProfile {
         let mean = |&[light, weight]: &[f64; 2]| if weight > 0.0 { light / weight } else { 0.0 };
         let mut light: Vec<f64> = steps.iter().map(mean).map(|light| light.max(0.0)).collect();
         let sum: f64 = light.iter().sum();
+        if sum <= 0.0 {
+            return None;
+        }
         light.iter_mut().for_each(|light| *light /= sum);
         Some(Template {
             light,

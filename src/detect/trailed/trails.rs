@@ -8,9 +8,11 @@ use crate::detect::candidates::{Peak, Region};
 use crate::detect::fit::FrameMaps;
 use arrayvec::ArrayVec;
 
-/// Shorter trails are fitted as elongated spots, in pixels,
+/// Shorter trails are fitted as elongated spots, in pixels.
 const SHORTEST_PX: f64 = 15.0;
-/// and in breadths.
+/// Longer ones than this share of the frame's shorter side are no stars.
+const LONGEST_SHARE: f64 = 0.25;
+/// Least ratio of length and breadth.
 const MIN_ELONGATION: f64 = 3.0;
 /// Fewer regions do not tell the shape of all.
 const FEWEST: usize = 5;
@@ -74,10 +76,12 @@ impl Trails {
             length_px: lengths[lengths.len() / 2],
             half_breadth_px: 2.0 * maps.width_px(),
         };
-        if shape.length_px < SHORTEST_PX {
-            return None;
-        }
-        let mut shape = refined(maps, &aligned, shape);
+        let longest_px = LONGEST_SHARE * maps.view.width.min(maps.view.height) as f64;
+        let is_possible = |shape: &Shape| (SHORTEST_PX..longest_px).contains(&shape.length_px);
+        let mut shape = Some(shape)
+            .filter(is_possible)
+            .map(|shape| refined(maps, &aligned, shape))
+            .filter(is_possible)?;
         let mut template = None;
         for _ in 0..ROUNDS {
             let better = Template::measure(maps, &aligned, &shape, template.as_ref());
