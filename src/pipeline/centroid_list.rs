@@ -183,6 +183,7 @@ pub fn solve_centroids(
     let unknown = (!list.has_brightness).then_some(Note::BrightnessUnknown);
     let notes = notes.chain(unknown).chain(note);
     let notes = notes.chain(Note::of_bodies(&bodies, &outcome, catalog));
+    let notes = notes.chain(Note::of_residuals(outcome.identification()));
     let notes = notes.chain(Note::of_pointing(context.attitude_only, &outcome));
     Solution {
         width: list.width,
