@@ -271,11 +271,7 @@ impl fmt::Display for Note {
             Self::BrightnessUnknown => f.write_str(
                 "the list has no flux and no magnitude; its rows were taken to be in order of brightness",
             ),
-            Self::DefectiveColumns(columns) => write!(
-                f,
-                "columns hold one value instead of light, all along or in part, and are left out there: x = {}",
-                listed(columns.iter().map(usize::to_string))
-            ),
+            Self::DefectiveColumns(columns) => write_columns(f, columns),
             Self::ColourMosaic(mosaic) => write_mosaic(f, mosaic),
             Self::WrongHeaderScale {
                 pixel_scale_rad: (low_rad, high_rad),
@@ -313,23 +309,8 @@ impl fmt::Display for Note {
             ),
             Self::FalseDetections(tail) => write_noise_tail(f, *tail),
             Self::Spots(psf) => write_spots(f, psf),
-            Self::Wings(Wings { share, sigma }) => write!(
-                f,
-                "the stars have wings: {:.1} ± {:.1} % of the light of their fitted spots lies farther out, and is added to the fluxes",
-                100.0 * share,
-                100.0 * sigma
-            ),
-            Self::StarTrails(StarTrails {
-                angle_rad,
-                length_px,
-                ..
-            }) => write!(
-                f,
-                "the stars are trails of {length_px:.0} px at {:.0}°, in the image, from its x axis: each \
-                 position is the middle of a trail, so attitude and optics are those of the middle of the \
-                 exposure",
-                angle_rad * DEG_PER_RAD
-            ),
+            Self::Wings(wings) => write_wings(f, wings),
+            Self::StarTrails(trails) => write_trails(f, trails),
             Self::DoubleImage(double) => write!(
                 f,
                 "every star is there twice: {double}; fluxes, zero point and limit are those of one of the \
@@ -355,6 +336,33 @@ impl fmt::Display for Note {
             ),
         }
     }
+}
+
+fn write_columns(f: &mut fmt::Formatter<'_>, columns: &[usize]) -> fmt::Result {
+    let list = listed(columns.iter().map(usize::to_string));
+    write!(
+        f,
+        "columns hold one value instead of light, all along or in part, and are left out there: x = {list}"
+    )
+}
+
+fn write_wings(f: &mut fmt::Formatter<'_>, wings: &Wings) -> fmt::Result {
+    write!(
+        f,
+        "the stars have wings: {:.1} ± {:.1} % of the light of their fitted spots lies farther out, and is added to the fluxes",
+        100.0 * wings.share,
+        100.0 * wings.sigma
+    )
+}
+
+fn write_trails(f: &mut fmt::Formatter<'_>, trails: &StarTrails) -> fmt::Result {
+    write!(
+        f,
+        "the stars are trails of {:.0} px at {:.0}°, in the image, from its x axis: each position is the \
+         middle of a trail, so attitude and optics are those of the middle of the exposure",
+        trails.length_px,
+        trails.angle_rad * DEG_PER_RAD
+    )
 }
 
 fn write_mosaic(f: &mut fmt::Formatter<'_>, mosaic: &RawColour) -> fmt::Result {
