@@ -1,6 +1,5 @@
 //! The sources of a frame, as detection reports them.
 
-use super::trailed::StarTrails;
 use crate::base::coords::PixelPoint;
 use std::cmp::Ordering;
 
@@ -109,6 +108,18 @@ pub struct MeasuredPsf {
     pub sigma_range_px: [f64; 2],
     /// Whether the spots are lopsided along the line from the centre of the frame: coma.
     pub is_comatic: bool,
+}
+
+/// The trails that all stars of a frame are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StarTrails {
+    /// Their angle to the image's x axis, in radians, in (−π/2, π/2]; positive where they rise to the
+    /// right.
+    pub angle_rad: f64,
+    /// Their length, in pixels.
+    pub length_px: f64,
+    /// Standard error of where their middle is, the same for all stars, in pixels.
+    pub middle_sigma_px: f64,
 }
 
 /// Light of the stars beyond the spots that are fitted to them.

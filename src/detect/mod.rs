@@ -62,10 +62,11 @@ mod workspace;
 
 pub use background_map::BackgroundMap;
 pub use config::{CentroidMethod, DetectConfig};
-pub use detection::{Detection, DetectionFlags, Detections, MeasuredPsf, NoiseTail, Wings};
+pub use detection::{
+    Detection, DetectionFlags, Detections, MeasuredPsf, NoiseTail, StarTrails, Wings,
+};
 pub use error::DetectError;
 pub use filter_model::FilterModel;
-pub use trailed::StarTrails;
 pub use workspace::Workspace;
 
 use crate::frame::{Frame, MIN_SIDE_PX};

@@ -123,7 +123,7 @@ fn from_area(
 }
 
 /// Moves a spot beyond the border to the border, and adds the distance to its standard error.
-fn clamp_to_frame(spot: &mut SpotEstimate, width: usize, height: usize) {
+pub(crate) fn clamp_to_frame(spot: &mut SpotEstimate, width: usize, height: usize) {
     let clamp = |at: &mut f64, sigma: &mut f64, side: usize| {
         let inside = at.clamp(-0.5, side as f64 - 0.5);
         if *at != inside {

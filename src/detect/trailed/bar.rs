@@ -1,18 +1,8 @@
 //! A star that is drawn out evenly along a straight line, fitted to the light along it.
 
+use super::light::{Fitted, Template};
 use super::profile::Profile;
-use super::template::Template;
-
-/// Direction, length and breadth that the trails of a frame share.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Shape {
-    /// Cosine and sine of the direction, in coordinates of the view.
-    pub direction: [f64; 2],
-    /// Length, in pixels.
-    pub length_px: f64,
-    /// Pixels within this distance of the line hold the light.
-    pub half_breadth_px: f64,
-}
+use super::shape::Shape;
 
 /// A bar fitted to a profile.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -97,28 +87,6 @@ struct Sums {
     light: Vec<f64>,
     /// Of the weights.
     weight: Vec<f64>,
-}
-
-/// The flux of a bar that is fitted, times `weight`, and its inverse variance.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Fitted {
-    pub light: f64,
-    pub weight: f64,
-}
-
-impl Fitted {
-    fn flux(&self) -> f64 {
-        self.light / self.weight
-    }
-
-    /// Half of the decrease of chi² by the bar: the logarithm of its likelihood.
-    fn gain(&self) -> f64 {
-        if self.weight <= 0.0 {
-            return 0.0;
-        }
-        let light = self.light.max(0.0);
-        0.5 * light * light / self.weight
-    }
 }
 
 impl Sums {

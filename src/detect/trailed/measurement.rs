@@ -1,14 +1,16 @@
 //! From the pieces of trails to detections: one for each star.
 
-use super::bar::{Bar, Shape};
+use super::bar::Bar;
 use super::largest::is_sharp;
 use super::profile::{Profile, Strip};
+use super::shape::Shape;
 use super::trails::Trails;
 use crate::base::coords::PixelPoint;
 use crate::base::interrupt::Interrupted;
 use crate::detect::candidates::Peak;
 use crate::detect::detection::{Detection, DetectionFlags};
-use crate::detect::fit::FrameMaps;
+use crate::detect::fit::{FrameMaps, SpotEstimate};
+use crate::detect::measure::clamp_to_frame;
 
 /// A bar in the frame.
 #[derive(Debug, Clone, Copy)]
@@ -118,10 +120,18 @@ impl PlacedBar {
             |at: f64, reach: f64, side: usize| at < reach || at > side as f64 - 1.0 - reach;
         let border =
             is_outside(x, half_px * cos, view.width) || is_outside(y, half_px * sin, view.height);
+        let mut spot = SpotEstimate {
+            x,
+            y,
+            sigma_x: (bar.sigma_along_px * cos).hypot(bar.sigma_across_px * sin),
+            sigma_y: (bar.sigma_along_px * sin).hypot(bar.sigma_across_px * cos),
+            ..SpotEstimate::default()
+        };
+        clamp_to_frame(&mut spot, view.width, view.height);
         Detection {
-            position: PixelPoint::new(x + view.x0 as f64, y + view.y0 as f64),
-            sigma_x_px: (bar.sigma_along_px * cos).hypot(bar.sigma_across_px * sin),
-            sigma_y_px: (bar.sigma_along_px * sin).hypot(bar.sigma_across_px * cos),
+            position: PixelPoint::new(spot.x + view.x0 as f64, spot.y + view.y0 as f64),
+            sigma_x_px: spot.sigma_x,
+            sigma_y_px: spot.sigma_y,
             flux_adu: bar.flux_adu,
             peak_adu: bar.flux_adu / shape.length_px,
             snr: bar.flux_adu / bar.sigma_flux_adu,

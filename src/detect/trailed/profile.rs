@@ -1,6 +1,6 @@
 //! The light of a trail along it.
 
-use super::bar::Shape;
+use super::shape::Shape;
 use crate::detect::fit::FrameMaps;
 
 /// Light in steps of one pixel along a direction through a point, summed across.

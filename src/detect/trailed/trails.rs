@@ -1,10 +1,13 @@
 //! Direction, length and breadth of the trails that a frame's stars are.
 
-use super::bar::{Bar, Shape};
+use super::bar::Bar;
 use super::largest::{LargeRegion, MOST, largest_regions};
+use super::light::Template;
+use super::mean::{for_each_trail, measure_template};
 use super::profile::{Profile, Strip};
-use super::template::{Template, for_each_trail};
+use super::shape::Shape;
 use crate::detect::candidates::{Peak, Region};
+use crate::detect::detection::StarTrails;
 use crate::detect::fit::FrameMaps;
 use arrayvec::ArrayVec;
 
@@ -22,18 +25,6 @@ const LEAST_SHARE: f64 = 0.6;
 const ROUNDS: usize = 3;
 /// Cosine of twice the greatest angle between trails in one direction: 8 degrees.
 const ALIGNED: f64 = 0.96;
-
-/// The trails that all stars of a frame are.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StarTrails {
-    /// Their angle to the image's x axis, in radians, in (−π/2, π/2]; positive where they rise to the
-    /// right.
-    pub angle_rad: f64,
-    /// Their length, in pixels.
-    pub length_px: f64,
-    /// Standard error of where their middle is, the same for all stars, in pixels.
-    pub middle_sigma_px: f64,
-}
 
 /// The shape of the trails of a frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -84,7 +75,7 @@ impl Trails {
             .filter(is_possible)?;
         let mut template = None;
         for _ in 0..ROUNDS {
-            let better = Template::measure(maps, &aligned, &shape, template.as_ref());
+            let better = measure_template(maps, &aligned, &shape, template.as_ref());
             let Some(better) = better else {
                 break;
             };

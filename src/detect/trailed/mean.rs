@@ -1,11 +1,13 @@
-//! The light along a star's trail: the mean of many.
+//! The mean light along the trails of a frame.
 //!
 //! It begins and ends where it falls to half, which is what fixes the middle: clouds, wind and the
 //! motion itself make it uneven, and a bar of uneven light is not centred on its trail.
 
-use super::bar::{Bar, Fitted, Shape};
+use super::bar::Bar;
 use super::largest::LargeRegion;
+use super::light::Template;
 use super::profile::{Profile, Strip};
+use super::shape::Shape;
 use crate::detect::fit::FrameMaps;
 
 /// Part of the trail at each end whose mean light is the level there,
@@ -20,75 +22,19 @@ const MARGIN_PX: f64 = 4.0;
 /// Brighter trails count no more than this signal-to-noise ratio.
 const MAX_SNR: f64 = 30.0;
 
-/// The light along a trail, in steps of one pixel, with sum 1.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Template {
-    light: Vec<f64>,
-    /// The middle of its ends, counted in steps.
-    middle: f64,
-    /// Distance of its ends, in pixels.
-    pub length_px: f64,
-    /// Standard error of the middle, which all stars share, in pixels.
-    pub middle_sigma_px: f64,
-}
-
-impl Template {
-    /// That of the trails in some regions, of which most have nearly this `shape`; better than
-    /// `template`, if there is one.
-    pub fn measure(
-        maps: &FrameMaps<'_>,
-        regions: &[&LargeRegion<'_>],
-        shape: &Shape,
-        template: Option<&Self>,
-    ) -> Option<Self> {
-        let mut mean = MeanProfile::default();
-        for_each_trail(maps, regions, (shape, template), |profile, bar| {
-            mean.add(profile, bar);
-        });
-        mean.template(shape.length_px)
-    }
-
-    /// The template around a place in a profile, counted in steps: its light per step of the profile,
-    /// at step `i`.
-    fn at(&self, i: usize, place: f64) -> f64 {
-        let step = i as f64 - place + self.middle;
-        if step < 0.0 {
-            return 0.0;
-        }
-        let (below, part) = (step as usize, step.fract());
-        let light = |i: usize| self.light.get(i).copied().unwrap_or(0.0);
-        light(below) + part * (light(below + 1) - light(below))
-    }
-
-    /// The steps of a profile that a template around a place covers.
-    fn steps(&self, profile: &Profile, place: f64) -> std::ops::Range<usize> {
-        let first = (place - self.middle).floor().max(0.0) as usize;
-        let end = (place - self.middle + self.light.len() as f64).max(0.0) as usize + 1;
-        first..end.min(profile.light.len())
-    }
-
-    /// The flux of a star whose trail is around a place.
-    pub fn fitted(&self, profile: &Profile, place: f64) -> Fitted {
-        let mut sums = Fitted::default();
-        for i in self.steps(profile, place) {
-            let weighted = self.at(i, place) * profile.weight[i];
-            sums.light += weighted * profile.light[i];
-            sums.weight += weighted * self.at(i, place);
-        }
-        sums
-    }
-
-    /// Chi² over its degrees of freedom of a star of this flux there.
-    pub fn excess(&self, profile: &Profile, place: f64, flux: f64) -> f64 {
-        let steps = self
-            .steps(profile, place)
-            .filter(|&i| profile.weight[i] > 0.0);
-        let (count, chi2) = steps.fold((0, 0.0), |(count, sum), i| {
-            let rest = profile.light[i] - flux * self.at(i, place);
-            (count + 1, sum + rest * rest * profile.weight[i])
-        });
-        chi2 / f64::from((count - 1).max(1))
-    }
+/// That of the trails in some regions, of which most have nearly this `shape`; better than
+/// `template`, if there is one.
+pub(super) fn measure_template(
+    maps: &FrameMaps<'_>,
+    regions: &[&LargeRegion<'_>],
+    shape: &Shape,
+    template: Option<&Template>,
+) -> Option<Template> {
+    let mut mean = MeanProfile::default();
+    for_each_trail(maps, regions, (shape, template), |profile, bar| {
+        mean.add(profile, bar);
+    });
+    mean.template(shape.length_px)
 }
 
 /// Calls `use_trail` with the profile around the star in each region, and its bar.
