@@ -22,7 +22,7 @@ const MARGIN_PX: f64 = 4.0;
 /// Brighter trails count no more than this signal-to-noise ratio.
 const MAX_SNR: f64 = 30.0;
 
-/// That of the trails in some regions, of which most have nearly this `shape`; better than
+/// The mean light of the trails in some regions, of which most have nearly this `shape`; better than
 /// `template`, if there is one.
 pub(super) fn measure_template(
     maps: &FrameMaps<'_>,
@@ -124,8 +124,9 @@ impl MeanProfile {
         let near = self.mean(side, sharp - END_PX / 2.0, sharp - 1.5)?;
         let before = self.mean(side, sharp - END_PX, sharp - END_PX / 2.0 - 1.0)?;
         let change = near - before;
+        let most = MAX_CHANGE * near.abs();
         let level = if change.abs() > LEAST_CHANGE * near {
-            near + change.clamp(-MAX_CHANGE * near, MAX_CHANGE * near)
+            near + change.clamp(-most, most)
         } else {
             0.5 * (near + before)
         };

@@ -79,6 +79,8 @@ impl Profile {
         }
         let (level, sigma) = maps.background.at(strip.x as f32, strip.y as f32);
         let variance = (f64::from(sigma) * maps.correlation_at(strip.x, strip.y)).powi(2);
+        // Without noise only the unevenness of the light counts.
+        let variance = if variance > 0.0 { variance } else { 1.0 };
         let rows = strip.reach_px + strip.shape.half_breadth_px;
         let first = (strip.y - rows).max(0.0) as usize;
         let end = ((strip.y + rows).max(0.0) as usize + 1).min(view.height);
