@@ -121,14 +121,17 @@ impl<'a> Sky<'a> {
         wings * self.light.sigma_px() + MARGIN_PX + self.half_trail_px
     }
 
-    /// Whether the star that `source` was named after is within its errors, or two pixels.
+    /// Whether the star that `source` was named after is within its errors, two pixels or two standard
+    /// deviations of the spot: noise on a star at the limit moves its peak as far.
     fn is_there(&self, named: &StarMatch, source: &Source) -> bool {
         const LEAST_PX: f64 = 2.0;
+        const SPOT_SIGMAS: f64 = 2.0;
         const SIGMAS: f64 = 3.0;
         let sigma_px = source
             .measured
             .map_or(0.0, |m| m.sigma_px[0].max(m.sigma_px[1]));
-        let tolerance_px = LEAST_PX.max(SIGMAS * sigma_px) + self.half_trail_px;
+        let least_px = LEAST_PX.max(SPOT_SIGMAS * self.light.sigma_px());
+        let tolerance_px = least_px.max(SIGMAS * sigma_px) + self.half_trail_px;
         let mut near = self.light.stars_near(&source.position, tolerance_px);
         near.any(|star| star.catalog == Some(named.star))
     }

@@ -9,8 +9,8 @@
 //!    opaque clutter are not there.
 //! 3. The frame is processed with nothing known beforehand.
 //! 4. Detections and names are compared with the truth. A detection is false where no star bright
-//!    enough has light. A name is wrong where that very star is not within two pixels, or three
-//!    stated standard errors.
+//!    enough has light. A name is wrong where that very star is not within two pixels, two standard
+//!    deviations of the spot, or three stated standard errors.
 //!
 //! Random numbers depend on the seed, the kind and the frame's number only: results are the same on
 //! any number of threads.
