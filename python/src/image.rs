@@ -37,7 +37,7 @@ pub enum Source<'a> {
     Bytes(&'a [u8]),
     Path(&'a Path),
     Page(&'a Frame<'static>),
-    Array(Frame<'a>),
+    Array(Box<Frame<'a>>),
 }
 
 impl Image<'_> {
@@ -56,7 +56,8 @@ impl Image<'_> {
             }
             Self::Colours(colours) => colours.luminance()?,
         };
-        frame.map(Source::Array).map_err(exception)
+        let array = frame.map(|frame| Source::Array(Box::new(frame)));
+        array.map_err(exception)
     }
 }
 
@@ -143,7 +144,7 @@ impl<'a> Source<'a> {
                 .map_err(|error| error.in_file(name))?,
             Self::Path(path) => frame::read_page_with(path, None, buffers)?,
             Self::Page(frame) => frame.clone(),
-            Self::Array(frame) => frame,
+            Self::Array(frame) => *frame,
         };
         let Some(bad) = bad else { return Ok(frame) };
         let expected = frame.width * frame.height;
