@@ -6,11 +6,11 @@ use super::pixels::Pixels;
 use std::ops::Range;
 
 /// Every so manieth row is compared with the last one.
-const ROW_STEP: usize = 4;
+const ROW_STEP: usize = 8;
 /// Every so manieth of those tells how often noise gives the same value twice.
 const SAMPLE_STEP: usize = 16;
 /// Fewest compared rows with the same value, one after the other.
-const MIN_RUN: usize = 16;
+const MIN_RUN: usize = 12;
 /// Natural logarithm of the chance at most that noise makes a run in a frame.
 const MAX_LN_CHANCE: f64 = -14.0;
 /// Fewest rows that are taken for defective: where a defect ends, light by chance has its value.

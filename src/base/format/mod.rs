@@ -43,7 +43,10 @@ pub const fn is_deceptive(character: char) -> bool {
 /// JSON with the characters escaped that change how others are drawn ([`is_deceptive`]). They stand in
 /// strings alone, which are the same to a program.
 pub fn json_escaped(json: String) -> String {
-    if !json.contains(is_deceptive) {
+    // Most have none of the bytes that all of them begin with.
+    let begins = |byte: u8| matches!(byte, 0xd8 | 0xe2 | 0xef);
+    let may_have = json.bytes().fold(false, |any, byte| any | begins(byte));
+    if !may_have || !json.contains(is_deceptive) {
         return json;
     }
     let mut escaped = String::with_capacity(json.len());

@@ -71,13 +71,14 @@ impl Layout<'_> {
             if y.is_multiple_of(rows_between_checks) {
                 source.account.check_time()?;
             }
-            self.unpack_row(line, source.file.is_little_endian, row);
             let start = y * row_samples + chunk.left * self.channels + chunk.plane;
             let out = &mut samples[start..(y + 1) * row_samples];
+            let is_little_endian = source.file.is_little_endian;
             if self.channels == self.chunk_samples {
-                out[..row.len()].copy_from_slice(row);
+                self.unpack_row(line, is_little_endian, &mut out[..row.len()]);
                 continue;
             }
+            self.unpack_row(line, is_little_endian, row);
             let pixels = row.chunks_exact(self.chunk_samples);
             for (place, pixel) in out.chunks_mut(self.channels).zip(pixels) {
                 place[..planes].copy_from_slice(&pixel[..planes]);
