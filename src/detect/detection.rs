@@ -56,7 +56,7 @@ pub struct DetectionFlags {
 impl DetectionFlags {
     /// Whether the source may be a star at the position given.
     pub fn is_star_like(&self) -> bool {
-        !(self.hot_pixel || self.trail || self.extended)
+        self.may_be_wide_star() && !self.extended
     }
 
     /// Whether the source may be a star if the frame's spot is not that of its stars.

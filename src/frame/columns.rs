@@ -5,9 +5,9 @@ use super::image::Frame;
 use super::pixels::Pixels;
 use std::ops::Range;
 
-/// Every so manieth row is compared with the last one.
+/// Of so many rows one is compared with the one compared before.
 const ROW_STEP: usize = 8;
-/// Every so manieth of those tells how often noise gives the same value twice.
+/// Of so many comparisons one tells how often noise gives the same value twice.
 const SAMPLE_STEP: usize = 16;
 /// Fewest compared rows with the same value, one after the other.
 const MIN_RUN: usize = 12;
@@ -40,7 +40,7 @@ impl Frame<'_> {
             Pixels::F32(values) => LongestRuns::of(values, self.width),
         };
         let suspects = runs.suspects();
-        if suspects.len() as f64 > MAX_SHARE * self.width as f64 {
+        if suspects.is_empty() || suspects.len() as f64 > MAX_SHARE * self.width as f64 {
             return Vec::new();
         }
         let highest = self.pixels.highest();
@@ -60,13 +60,14 @@ impl Frame<'_> {
     /// The frame with no values in some columns.
     #[must_use]
     pub fn without_columns(&self, columns: &[DefectiveColumn]) -> Frame<'static> {
-        let mut frame = self.clone().into_owned();
-        let width = frame.width;
-        let values = frame.values_mut();
+        let (width, height) = (self.width, self.height);
+        let mut values = self.values().into_owned();
         for DefectiveColumn { x, rows } in columns {
             rows.clone().for_each(|y| values[y * width + x] = f32::NAN);
         }
-        frame
+        Frame::from_checked(width, height, values)
+            .with_levels(self.step_adu, self.saturation_adu)
+            .with_metadata(self.metadata.clone())
     }
 
     /// The long runs of one value in a column.

@@ -4,6 +4,7 @@ use super::parameters::SpotEstimate;
 use super::window::{Window, window_radius};
 use crate::detect::background::Mesh;
 use crate::detect::candidates::Peak;
+use crate::detect::contrast::Contrast;
 use crate::detect::field_tables::FieldTables;
 use crate::detect::lanes::{each, each_of, plus};
 use crate::detect::pixels::View;
@@ -51,6 +52,11 @@ impl FrameMaps<'_> {
     pub fn correlation_at(&self, x: f64, y: f64) -> f64 {
         self.filtered
             .map_or(1.0, |mesh| f64::from(mesh.at(x as f32, y as f32).1))
+    }
+
+    /// The brightest pixel at a peak, and the light beside it.
+    pub fn contrast_at(&self, peak: &Peak) -> Contrast {
+        Contrast::near(&self.view, self.background, (peak.x, peak.y))
     }
 
     /// The initial guess of a spot at a peak of the filtered frame.

@@ -16,4 +16,4 @@ pub(crate) use estimate::clamp_to_frame;
 pub(crate) use measurement::{MeasureBuffers, Measurement};
 pub(crate) use ring::Ring;
 pub(crate) use shape::sharpest_px;
-pub(crate) use star_shape::StarShape;
+pub(crate) use star_shape::{StarShape, ellipticity_of};

@@ -12,7 +12,7 @@
 use super::core::Core;
 use super::star_shape::StarShape;
 use crate::detect::candidates::{Peak, Region};
-use crate::detect::contrast::{Contrast, HOT_PIXEL_PX};
+use crate::detect::contrast::HOT_PIXEL_PX;
 use crate::detect::detection::Detection;
 use crate::detect::fit::{Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate};
 
@@ -39,7 +39,7 @@ pub(super) fn is_too_sharp(
     peak: &Peak,
     sharpest_px: f64,
 ) -> bool {
-    let contrast = Contrast::near(&maps.view, maps.background, (peak.x, peak.y));
+    let contrast = maps.contrast_at(peak);
     let sigmas = StarSize::SIGNIFICANT_SIGMA * maps.correlation_at(peak.x as f64, peak.y as f64);
     let directions = contrast.sharp_directions(sharpest_px, sigmas, noise.shot_adu);
     directions >= if peak.saturated { 2 } else { 1 }

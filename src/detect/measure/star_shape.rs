@@ -3,7 +3,6 @@
 
 use super::core::Core;
 use crate::detect::candidates::{Peak, Region};
-use crate::detect::contrast::Contrast;
 use crate::detect::fit::FrameMaps;
 use arrayvec::ArrayVec;
 
@@ -140,9 +139,7 @@ fn bright_peaks<'a>(maps: &FrameMaps<'_>, peaks: &'a [Peak]) -> ArrayVec<&'a Pea
     const MAX_OF_REGION: usize = 2;
     /// More peaks tell no more.
     const ENOUGH: usize = 10 * MAX_STARS;
-    let is_of_light = |peak: &Peak| {
-        !Contrast::near(&maps.view, maps.background, (peak.x, peak.y)).is_sharper_than_any_spot()
-    };
+    let is_of_light = |peak: &Peak| !maps.contrast_at(peak).is_sharper_than_any_spot();
     let bright = peaks.iter().take_while(|peak| peak.snr >= MIN_SNR);
     let mut stars: ArrayVec<&Peak, ENOUGH> = ArrayVec::new();
     // Bloomed stars are elongated by their charge: they do not count.
@@ -159,8 +156,9 @@ fn bright_peaks<'a>(maps: &FrameMaps<'_>, peaks: &'a [Peak]) -> ArrayVec<&'a Pea
     stars.into_iter().step_by(step).collect()
 }
 
-/// `(xx − yy, 2xy)/(xx + yy)`.
-fn ellipticity_of([xx, yy, xy]: [f64; 3]) -> [f64; 2] {
+/// `(xx − yy, 2xy)/(xx + yy)` of second moments: cosine and sine of twice the angle of the longer axis,
+/// times the ellipticity.
+pub(crate) fn ellipticity_of([xx, yy, xy]: [f64; 3]) -> [f64; 2] {
     let sum = xx + yy;
     [(xx - yy) / sum, 2.0 * xy / sum]
 }

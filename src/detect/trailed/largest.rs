@@ -1,7 +1,6 @@
 //! The largest regions of a frame that may be stars, each with its brightest peak.
 
 use crate::detect::candidates::{Peak, Region};
-use crate::detect::contrast::Contrast;
 use crate::detect::fit::FrameMaps;
 use arrayvec::ArrayVec;
 
@@ -27,7 +26,10 @@ pub(super) fn largest_regions<'a>(
         let region = &regions[peak.region];
         let rank = largest.partition_point(|other| other.region.area_px >= region.area_px);
         let is_taken = |other: &LargeRegion<'_>| other.peak.region == peak.region;
-        if rank == MOST || largest.iter().any(is_taken) || is_sharp(maps, peak) {
+        if rank == MOST
+            || largest.iter().any(is_taken)
+            || maps.contrast_at(peak).is_sharper_than_any_spot()
+        {
             continue;
         }
         if largest.is_full() {
@@ -36,9 +38,4 @@ pub(super) fn largest_regions<'a>(
         largest.insert(rank, LargeRegion { region, peak });
     }
     largest
-}
-
-/// Whether a peak is sharper than any spot.
-pub(super) fn is_sharp(maps: &FrameMaps<'_>, peak: &Peak) -> bool {
-    Contrast::near(&maps.view, maps.background, (peak.x, peak.y)).is_sharper_than_any_spot()
 }

@@ -1,7 +1,6 @@
 //! From the pieces of trails to detections: one for each star.
 
 use super::bar::Bar;
-use super::largest::is_sharp;
 use super::profile::{Profile, Strip};
 use super::shape::Shape;
 use super::trails::Trails;
@@ -42,7 +41,7 @@ pub(in crate::detect) fn measure_trailed(
         maps.view.check()?;
         if let Some(bar) = bars.iter_mut().find(|bar| bar.covers(&shape, peak)) {
             bar.is_saturated |= peak.saturated;
-        } else if is_sharp(maps, peak) && !peak.saturated {
+        } else if !peak.saturated && maps.contrast_at(peak).is_sharper_than_any_spot() {
             detections.push(hot_pixel(maps, peak));
         } else {
             let placed = PlacedBar::at(maps, trails, peak, &bars, &mut profile);

@@ -9,6 +9,7 @@ use super::shape::Shape;
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::detection::StarTrails;
 use crate::detect::fit::FrameMaps;
+use crate::detect::measure::ellipticity_of;
 use arrayvec::ArrayVec;
 
 /// Shorter trails are fitted as elongated spots, in pixels.
@@ -46,7 +47,7 @@ impl Trails {
         }
         let doubled = mean_doubled(long.iter().map(|large| large.region));
         let is_aligned = |large: &&&LargeRegion<'_>| {
-            let [cos, sin] = unit(ellipticity(large.region));
+            let [cos, sin] = doubled_direction(large.region);
             cos * doubled[0] + sin * doubled[1] > ALIGNED
         };
         let aligned: ArrayVec<&LargeRegion<'_>, MOST> =
@@ -57,14 +58,10 @@ impl Trails {
         if aligned.len() < fewest || lines(&aligned, direction) < FEWEST.max(aligned.len() / 2) {
             return None;
         }
-        let mut lengths: ArrayVec<f64, MOST> = aligned
-            .iter()
-            .map(|large| length_px(large.region))
-            .collect();
-        lengths.sort_unstable_by(f64::total_cmp);
+        let lengths = aligned.iter().map(|large| length_px(large.region));
         let shape = Shape {
             direction,
-            length_px: lengths[lengths.len() / 2],
+            length_px: middle_of(lengths)?,
             half_breadth_px: 2.0 * maps.width_px(),
         };
         let longest_px = LONGEST_SHARE * maps.view.width.min(maps.view.height) as f64;
@@ -166,12 +163,15 @@ fn median_slope(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: &Shap
     for_each_trail(maps, regions, (shape, None), |profile, _| {
         slopes.push(profile.slope(0.5 * shape.length_px));
     });
-    slopes.sort_unstable_by(f64::total_cmp);
-    let slope = slopes.get(slopes.len() / 2);
-    slope
-        .filter(|slope| slope.is_finite())
-        .copied()
-        .unwrap_or(0.0)
+    let slope = middle_of(slopes.into_iter());
+    slope.filter(|slope| slope.is_finite()).unwrap_or(0.0)
+}
+
+/// The median of values of the regions; of an even number the upper one in the middle.
+fn middle_of(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: ArrayVec<f64, MOST> = values.collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
 }
 
 /// Number of lines on which the regions are.
@@ -181,9 +181,8 @@ fn lines(regions: &[&LargeRegion<'_>], [cos, sin]: [f64; 2]) -> usize {
         .map(|large| large.region.y * cos - large.region.x * sin);
     let mut across: ArrayVec<f64, MOST> = across.collect();
     across.sort_unstable_by(f64::total_cmp);
-    let mut breadths: ArrayVec<f64, MOST> = regions.iter().map(|r| r.region.minor_px).collect();
-    breadths.sort_unstable_by(f64::total_cmp);
-    let apart_px = 3.0 * breadths[breadths.len() / 2];
+    let breadth_px = middle_of(regions.iter().map(|large| large.region.minor_px));
+    let apart_px = 3.0 * breadth_px.unwrap_or(0.0);
     let gaps = across
         .windows(2)
         .filter(|pair| pair[1] - pair[0] > apart_px);
@@ -201,10 +200,9 @@ fn length_px(region: &Region) -> f64 {
     (12.0 * along2.max(0.0)).sqrt()
 }
 
-/// Cosine and sine of twice the angle of the longer axis, times the ellipticity.
-fn ellipticity(region: &Region) -> [f64; 2] {
-    let [xx, yy, xy] = region.covariance;
-    [(xx - yy) / (xx + yy), 2.0 * xy / (xx + yy)]
+/// The direction of the longer axis, as cosine and sine of twice its angle.
+fn doubled_direction(region: &Region) -> [f64; 2] {
+    unit(ellipticity_of(region.covariance))
 }
 
 fn unit([x, y]: [f64; 2]) -> [f64; 2] {
@@ -214,9 +212,6 @@ fn unit([x, y]: [f64; 2]) -> [f64; 2] {
 
 /// The mean direction, as cosine and sine of twice its angle.
 fn mean_doubled<'a>(regions: impl Iterator<Item = &'a Region>) -> [f64; 2] {
-    let sum = regions.map(ellipticity).fold([0.0, 0.0], |[x, y], e| {
-        let [cos, sin] = unit(e);
-        [x + cos, y + sin]
-    });
-    unit(sum)
+    let directions = regions.map(doubled_direction);
+    unit(directions.fold([0.0, 0.0], |[x, y], [cos, sin]| [x + cos, y + sin]))
 }
