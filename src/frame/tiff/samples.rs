@@ -35,12 +35,14 @@ impl Layout<'_> {
     /// # Errors
     /// As [`Self::decompress`].
     pub fn samples<T: Word>(&self, source: Source) -> Result<Vec<T>, FrameError> {
-        let mut samples = vec![T::default(); self.width * self.height * self.channels];
+        let count = self.width * self.height * self.channels;
+        let mut samples = Vec::with_capacity(count);
         let mut row = vec![T::default(); self.chunk_size.0.min(self.width) * self.chunk_samples];
         for chunk in self.chunks() {
             let rows = self.decompress(source, &chunk)?;
             self.unpack_chunk((&chunk, &rows), source, &mut row, &mut samples)?;
         }
+        samples.resize(count, T::default());
         if self.color == Color::WhiteIsZero && self.depth.format == SampleFormat::Unsigned {
             let full = T::of(self.depth.full_scale());
             samples
@@ -56,7 +58,7 @@ impl Layout<'_> {
         (chunk, rows): (&Chunk, &Rows),
         source: Source,
         row: &mut [T],
-        samples: &mut [T],
+        samples: &mut Vec<T>,
     ) -> Result<(), FrameError> {
         let row = &mut row[..chunk.columns * self.chunk_samples];
         let planes = if self.chunk_samples == 1 {
@@ -72,7 +74,10 @@ impl Layout<'_> {
                 source.account.check_time()?;
             }
             let start = y * row_samples + chunk.left * self.channels + chunk.plane;
-            let out = &mut samples[start..(y + 1) * row_samples];
+            let end = (y + 1) * row_samples;
+            // Cleared row by row: while they are in the processor's cache.
+            samples.resize(samples.len().max(end), T::default());
+            let out = &mut samples[start..end];
             let is_little_endian = source.file.is_little_endian;
             if self.channels == self.chunk_samples {
                 self.unpack_row(line, is_little_endian, &mut out[..row.len()]);
