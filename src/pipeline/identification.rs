@@ -6,13 +6,16 @@ use super::stopwatch::{Stage, Stopwatch};
 use crate::detect::{self, DetectConfig, Detection, Detections, detect};
 use crate::frame::Frame;
 use crate::identify;
-use crate::identify::diagnosis::{Diagnosis, Unidentified, diagnose};
+use crate::identify::diagnosis::{
+    Diagnosis, DoubleImage, Unidentified, diagnose, find_double_image,
+};
 use crate::identify::{
     Identification, IndexedCatalog, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Photometry, Priors,
     ScalePrior, SearchFailure, SourceIndex, StarField,
 };
 use crate::photometry::instrumental_mag;
 use crate::sky::observer::Observation;
+use std::collections::HashSet;
 
 /// The detections that may be stars, as identification takes them.
 pub fn star_field(frame: &Frame, detections: &Detections, years_since_j2000: f64) -> StarField {
@@ -88,6 +91,19 @@ pub(super) fn identify_stars(
         outcome => outcome,
     };
     (outcome, dropped_scale)
+}
+
+/// Whether every star of an identified frame is there twice. Then the attitude is that of one of the
+/// images, or lies between them, and its error gets half of the way from one to the other.
+pub(super) fn double_image(outcome: &mut Outcome, field: &StarField) -> Option<DoubleImage> {
+    let Outcome::Identified(found) = outcome else {
+        return None;
+    };
+    let named: HashSet<SourceIndex> = found.matches.iter().map(|m| m.source).collect();
+    let double = find_double_image(field, |star| named.contains(&star.source))?;
+    let [x, y] = double.offset_px;
+    found.add_common_error(x.hypot(y) / 2.0);
+    Some(double)
 }
 
 /// Whether most of the brightest detections are wider than the spot: then it may be that of specks,

@@ -3,7 +3,7 @@
 use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
 use super::error::Error;
-use super::identification::{identify_stars, observation};
+use super::identification::{double_image, identify_stars, observation, star_field};
 use super::prepared::Prepared;
 use super::raw_colour::RawColour;
 use super::solution::{Solution, Source};
@@ -157,6 +157,12 @@ fn solve(
         identify_stars(frame, &detections, &priors, context, buffers);
     let sources: Vec<Source> = detections.sources.iter().map(Source::from).collect();
     let bodies = find_bodies(&mut outcome, &sources, &priors, context.indexed.catalog());
+    let double_image = if context.attitude_only {
+        None
+    } else {
+        let field = star_field(frame, &detections, priors.years_since_j2000());
+        double_image(&mut outcome, &field)
+    };
     clock.lap(Stage::Identify);
 
     let mut solved = Solved {
@@ -170,6 +176,7 @@ fn solve(
         sources,
         outcome,
         bodies,
+        double_image,
         dropped_scale,
         defects: &prepared.defects,
         photometry: None,

@@ -3,7 +3,6 @@
 use super::body_in_frame::BodyInFrame;
 use super::bright_stars::NamedFrame;
 use super::context::Context;
-use super::identification::star_field;
 use super::note::Note;
 use super::outcome::Outcome;
 use super::raw_colour::RawColour;
@@ -14,7 +13,7 @@ use crate::base::units::DEG_PER_RAD;
 use crate::calibration::Calibration;
 use crate::detect::Detections;
 use crate::frame::{DefectiveColumn, Frame};
-use crate::identify::diagnosis::{DoubleImage, find_double_image};
+use crate::identify::diagnosis::DoubleImage;
 use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SourceIndex, View};
 use crate::photometry::comparison::{Comparison, FieldStar, FrameMeasurement, compare};
 use crate::photometry::{self, FramePhotometry, IdentifiedFrame};
@@ -35,6 +34,8 @@ pub(super) struct Solved<'a> {
     pub sources: Vec<Source>,
     pub outcome: Outcome,
     pub bodies: Vec<BodyInFrame>,
+    /// The second image of every star.
+    pub double_image: Option<DoubleImage>,
     /// The scale that was dropped because nothing matched with it.
     pub dropped_scale: Option<ScalePrior>,
     /// Columns that hold no light, and were left out.
@@ -161,7 +162,7 @@ impl Solved<'_> {
             .chain(self.detections.psf.map(Note::Spots))
             .chain(self.detections.trails.map(Note::StarTrails))
             .chain(self.detections.wings.map(Note::Wings))
-            .chain(self.double_image().map(Note::DoubleImage))
+            .chain(self.double_image.map(Note::DoubleImage))
             .chain(Note::of_bodies(
                 &self.bodies,
                 outcome,
@@ -172,19 +173,6 @@ impl Solved<'_> {
             .chain(Note::of_pointing(!is_named, outcome))
             .chain(self.notes_of_bright_stars())
             .collect()
-    }
-
-    /// Whether every star of an identified frame is there twice.
-    fn double_image(&self) -> Option<DoubleImage> {
-        let found = self.outcome.identification();
-        let found = found.filter(|_| !self.context.attitude_only)?;
-        let named: HashSet<SourceIndex> = found.matches.iter().map(|m| m.source).collect();
-        let field = star_field(
-            self.frame,
-            &self.detections,
-            self.priors.years_since_j2000(),
-        );
-        find_double_image(&field, |star| named.contains(&star.source))
     }
 
     fn notes_of_bright_stars(&self) -> Vec<Note> {

@@ -34,16 +34,19 @@ impl<'a> LightMap<'a> {
     pub fn owner(&self, place: &PixelPoint) -> Option<&'a TrueStar> {
         /// Radius of a spot, in standard deviations.
         const REACH_SIGMAS: f64 = 8.0;
-        let light = |star: &TrueStar| {
-            let offset = [star.position.x - place.x, star.position.y - place.y];
-            let terms = offset.iter().zip(self.variance_px2);
-            let exponent: f64 = terms.map(|(d, variance)| d * d / variance).sum();
-            star.electrons * (-0.5 * exponent).exp()
-        };
+        let light = |star: &TrueStar| self.light_of(star, place);
         let stars = || self.stars_near(place, REACH_SIGMAS * self.sigma_px());
         let all: f64 = stars().map(light).sum();
         let owner = stars().find(|star| 2.0 * light(star) > all)?;
         (owner.position.distance_to(place) < self.at_place_px()).then_some(owner)
+    }
+
+    /// The light of a star at this position, in electrons of a star that is right there.
+    pub fn light_of(&self, star: &TrueStar, place: &PixelPoint) -> f64 {
+        let offset = [star.position.x - place.x, star.position.y - place.y];
+        let terms = offset.iter().zip(self.variance_px2);
+        let exponent: f64 = terms.map(|(d, variance)| d * d / variance).sum();
+        star.electrons * libm::exp(-0.5 * exponent)
     }
 
     /// The stars that a detection at this position may be.
