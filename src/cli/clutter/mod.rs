@@ -75,7 +75,7 @@ fn introduction(protocol: &Protocol) -> String {
     format!(
         "{} frames of each kind, seed {}; {}, {} × {} px; nothing known beforehand.\n\
          wrong frames: another pointing, or no sky at all. false/Mpx: detections without a star, clutter included.\n\
-         wrong names: that star is not there, or outshone by another; stated: what the stated probabilities add up to.\n\n",
+         wrong names: that star is not there, or a nearer one outshines it; stated: what the stated probabilities add up to.\n\n",
         protocol.frames, protocol.seed, camera.name, camera.width_px, camera.height_px,
     )
 }

@@ -123,20 +123,26 @@ impl<'a> Sky<'a> {
 
     /// Whether `source` was named after a star that is there: it is within the errors, two pixels or
     /// two standard deviations of the spot, as noise on a star at the limit moves its peak as far; and
-    /// no other star there gives more than twice its light.
+    /// no nearer star gives more than twice its light.
     fn is_there(&self, named: &StarMatch, source: &Source) -> bool {
         const LEAST_PX: f64 = 2.0;
         const SPOT_SIGMAS: f64 = 2.0;
         const SIGMAS: f64 = 3.0;
         const LEAST_LIGHT: f64 = 0.5;
+        let place = &source.position;
         let sigma_px = source
             .measured
             .map_or(0.0, |m| m.sigma_px[0].max(m.sigma_px[1]));
         let least_px = LEAST_PX.max(SPOT_SIGMAS * self.light.sigma_px());
         let tolerance_px = least_px.max(SIGMAS * sigma_px) + self.half_trail_px;
-        let near = || self.light.stars_near(&source.position, tolerance_px);
-        let light = |star: &TrueStar| self.light.light_of(star, &source.position);
-        let most = near().map(light).fold(0.0, f64::max);
-        near().any(|star| star.catalog == Some(named.star) && light(star) >= LEAST_LIGHT * most)
+        let light = |star: &TrueStar| self.light.light_of(star, place);
+        let mut most_of_nearer = 0.0_f64;
+        for star in self.light.stars_near(place, tolerance_px) {
+            if star.catalog == Some(named.star) {
+                return light(star) >= LEAST_LIGHT * most_of_nearer;
+            }
+            most_of_nearer = most_of_nearer.max(light(star));
+        }
+        false
     }
 }
