@@ -6,6 +6,9 @@ mod common;
 
 use common::{Ran, fixture, number, report, starpipe};
 use serde_json::Value;
+use starpipe::archive::FrameRow;
+use starpipe::base::table::Column;
+use starpipe::report::StarRow;
 
 /// Largest difference between a residual and the distance computed here: the report's digits.
 const SAME_PX: f64 = 2e-4;
@@ -144,6 +147,24 @@ fn every_code_of_a_note_is_documented() {
     for code in codes {
         assert!(page.contains(&format!("| `{code}` |")), "{code}");
     }
+}
+
+#[test]
+fn every_column_is_documented() {
+    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/archives.md"));
+    let page = page.unwrap();
+    fn rows<R>(columns: Vec<Column<R>>) -> String {
+        let row = |column: Column<R>| {
+            let (name, meaning) = (column.name, column.meaning);
+            format!(
+                "| `{name}` | {} | {} |\n",
+                meaning.unit, meaning.description
+            )
+        };
+        columns.into_iter().map(row).collect()
+    }
+    assert!(page.contains(&rows(FrameRow::columns())));
+    assert!(page.contains(&rows(StarRow::columns())));
 }
 
 #[test]

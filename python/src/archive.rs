@@ -8,10 +8,11 @@ use bytes::Bytes;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use starpipe::FrameReport;
 use starpipe::archive::{
-    Configuration, FileHash, FrameRow, Identity, Nights, Plan, StarRow, TableWriter,
+    Configuration, FileHash, FrameRow, Identity, Nights, Plan, TableWriter,
 };
+use starpipe::base::table::FieldValue;
+use starpipe::report::{FrameReport, StarRow};
 use std::num::NonZeroUsize;
 
 /// What is stated for all frames beside the hints.
@@ -146,13 +147,17 @@ fn finished() -> PyErr {
     PyValueError::new_err("the part is finished")
 }
 
-/// Name, unit, UCD and description of each column of stars.
+/// Name, type, unit, UCD and description of each column of stars.
 #[pyfunction]
-pub fn star_columns() -> Vec<(&'static str, &'static str, &'static str, &'static str)> {
+pub fn star_columns() -> Vec<[&'static str; 5]> {
     let columns = StarRow::columns().into_iter();
     let described = columns.map(|column| {
         let meaning = column.meaning;
-        (column.name, meaning.unit, meaning.ucd, meaning.description)
+        let kind = match column.empty {
+            FieldValue::Text(_) => "text",
+            _ => "number",
+        };
+        [column.name, kind, meaning.unit, meaning.ucd, meaning.description]
     });
     described.collect()
 }

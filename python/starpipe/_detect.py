@@ -43,7 +43,7 @@ class Detections:
     @property
     def columns(self) -> _tables.Columns:
         """The stars as arrays."""
-        of_sky = ("id", "name", "ra", "dec", "vmag", "residual", "p_chance")
+        of_sky = ("id", "name", "vmag", "ra_deg", "dec_deg", "residual_px", "residual_blend_px", "p_chance")
         found = _tables.star_columns(self._stars)
         return {name: column for name, column in found.items() if name not in of_sky}
 
@@ -55,12 +55,12 @@ class Detections:
     @property
     def x(self) -> NDArray[np.float64]:
         """Centroids along the rows, in pixels."""
-        return self.columns["x_centroid"]
+        return self.columns["x"]
 
     @property
     def y(self) -> NDArray[np.float64]:
         """Centroids along the columns, in pixels."""
-        return self.columns["y_centroid"]
+        return self.columns["y"]
 
     @property
     def flux(self) -> NDArray[np.float64]:
@@ -70,7 +70,7 @@ class Detections:
     @property
     def error(self) -> NDArray[np.float64]:
         """Standard error of a centroid on each axis, in pixels, as `Pipeline.identify` takes it."""
-        x, y = self.columns["x_centroid_err"], self.columns["y_centroid_err"]
+        x, y = self.columns["sigma_x"], self.columns["sigma_y"]
         error: NDArray[np.float64] = np.hypot(x, y) / np.sqrt(2.0)
         return error
 

@@ -242,17 +242,19 @@ class Result:
         """Every detection, brightest first, as a ``QTable``; without astropy `star_columns`."""
         columns = self.star_columns
         table = _tables.star_table(columns)
-        if table is columns:
-            return columns
-        if self:
-            from astropy.coordinates import SkyCoord
-
-            sky = SkyCoord(table["ra"], table["dec"], frame="icrs")
-            sky.info.description = "position at the frame's date"
-            table.add_column(sky, name="sky_centroid", index=table.colnames.index("ra"))
-        table.remove_columns(["ra", "dec"])
-        table.meta["frame"] = self._report["frame"]
+        if table is not columns:
+            table.meta["frame"] = self._report["frame"]
         return table
+
+    @property
+    def sky(self) -> Any:
+        """Where `stars` are at the frame's date, as a ``SkyCoord``."""
+        from astropy.coordinates import SkyCoord
+
+        if not self:
+            return None
+        columns = self.star_columns
+        return SkyCoord(columns["ra_deg"], columns["dec_deg"], unit="deg", frame="icrs")
 
     def to_arrow(self) -> Any:
         """Return `star_columns` as a ``pyarrow.Table``."""
@@ -288,10 +290,10 @@ class Result:
         stars = self.star_columns
         is_named = stars["id"] != ""
         for group, color in ((is_named, "limegreen"), (~is_named, "orange")):
-            x, y = stars["x_centroid"][group], stars["y_centroid"][group]
+            x, y = stars["x"][group], stars["y"][group]
             ax.scatter(x, y, s=60, facecolors="none", edgecolors=color)
         for index in np.flatnonzero(is_named & (stars["name"] != ""))[:names]:
-            place = stars["x_centroid"][index], stars["y_centroid"][index]
+            place = stars["x"][index], stars["y"][index]
             offset = {"xytext": (6, 6), "textcoords": "offset points", "clip_on": True}
             ax.annotate(str(stars["name"][index]), place, color="gold", fontsize=8, **offset)
         ax.set_xlim(-0.5, self._report["width"] - 0.5)
@@ -301,21 +303,16 @@ class Result:
         return ax
 
     def write(self, path: Any, *, format: str | None = None, **options: Any) -> None:
-        """Write `stars` as ``QTable.write`` does: ECSV, VOTable, Parquet and more.
-
-        In VOTables, and in Parquet with their metadata (``format="parquet.votable"``), right
-        ascension and declination are columns of their own.
-        """
+        """Write `stars` as ``QTable.write`` does: ECSV, VOTable, Parquet and more."""
         stars = self.stars
         if format is None and str(path).endswith((".vot", ".votable")):
             format = "votable"
-        if format in ("votable", "parquet.votable"):
-            stars = _tables.flat(stars)
         if format == "parquet.votable":
             # Descriptions are taken from the table.
             known = {name: _tables.STAR_COLUMNS[name] for name in stars.colnames}
             metadata = {
-                name: {"unit": unit or None, "ucd": ucd} for name, (unit, ucd, _) in known.items()
+                name: {"unit": unit or None, "ucd": ucd}
+                for name, (_, unit, ucd, _) in known.items()
             }
             options = {"metadata": metadata} | options
         stars.write(path, format=format, **options)

@@ -12,38 +12,25 @@ from . import _starpipe
 
 Columns = dict[str, NDArray[Any]]
 
-STAR_COLUMNS = {name: meaning for name, *meaning in _starpipe.star_columns()}
-"""Unit, UCD and description of each column of stars."""
+OF_FRAME = ("frame", "row_order")
+STAR_COLUMNS = {
+    name: meaning for name, *meaning in _starpipe.star_columns() if name not in OF_FRAME
+}
+"""Type, unit, UCD and description of each column of stars: the fields of a star in JSON."""
 
 
 def star_columns(stars: list[dict[str, Any]]) -> Columns:
     """Return the reports of stars as arrays; NaN and "" where there is no value."""
 
-    def numbers(key: str) -> NDArray[np.float64]:
-        return np.array([star[key] for star in stars], dtype=np.float64)
+    def values(name: str, kind: str) -> NDArray[Any]:
+        found = [star.get(name) for star in stars]
+        if kind == "number":
+            return np.array(found, dtype=np.float64)
+        # Flags are a list.
+        words = [value if isinstance(value, str) else " ".join(value or ()) for value in found]
+        return np.array(words, dtype=np.str_)
 
-    def texts(key: str) -> NDArray[np.str_]:
-        return np.array([star[key] or "" for star in stars], dtype=np.str_)
-
-    flux, snr = numbers("flux"), numbers("snr")
-    return {
-        "id": texts("id"),
-        "name": texts("name"),
-        "x_centroid": numbers("x"),
-        "y_centroid": numbers("y"),
-        "x_centroid_err": numbers("sigma_x"),
-        "y_centroid_err": numbers("sigma_y"),
-        "flux": flux,
-        "flux_err": flux / snr,
-        "peak": numbers("peak"),
-        "snr": snr,
-        "flags": np.array([",".join(star["flags"]) for star in stars], dtype=np.str_),
-        "ra": numbers("ra_deg"),
-        "dec": numbers("dec_deg"),
-        "vmag": numbers("vmag"),
-        "residual": numbers("residual_px"),
-        "p_chance": numbers("p_chance"),
-    }
+    return {name: values(name, kind) for name, (kind, *_) in STAR_COLUMNS.items()}
 
 
 def star_table(named: Columns) -> Any:
@@ -51,30 +38,11 @@ def star_table(named: Columns) -> Any:
 
     Without astropy they are returned as they are.
     """
-    found = table(named, {name: STAR_COLUMNS[name][0] for name in named})
+    found = table(named, {name: STAR_COLUMNS[name][1] for name in named})
     if found is not named:
         for name in found.colnames:
-            _, ucd, found[name].info.description = STAR_COLUMNS[name]
+            _, _, ucd, found[name].info.description = STAR_COLUMNS[name]
             found[name].info.meta = {"ucd": ucd}
-    return found
-
-
-def flat(stars: Any) -> Any:
-    """Return a table of stars with right ascension and declination as columns of their own."""
-    from astropy.table import Table
-
-    found = Table(stars, copy=False)
-    for name in ("dec", "ra"):
-        if "sky_centroid" in found.colnames:
-            angle = getattr(stars["sky_centroid"], name).deg
-            _, ucd, description = STAR_COLUMNS[name]
-            place = found.colnames.index("sky_centroid") + 1
-            found.add_column(angle, name=name, index=place)
-            found[name].info.unit = "deg"
-            found[name].info.description = description
-            found[name].info.meta = {"ucd": ucd}
-    if "sky_centroid" in found.colnames:
-        found.remove_column("sky_centroid")
     return found
 
 

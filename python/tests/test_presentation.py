@@ -39,6 +39,6 @@ def test_a_card_for_notebooks(result):
 def test_a_card_of_centroids(pipeline, result):
     stars = result.star_columns
     found = pipeline.identify(
-        stars["x_centroid"], stars["y_centroid"], flux=stars["flux"], shape=(384, 512)
+        stars["x"], stars["y"], flux=stars["flux"], shape=(384, 512)
     )
-    assert found._repr_html_().count("<circle") == len(stars["x_centroid"])
+    assert found._repr_html_().count("<circle") == len(stars["x"])

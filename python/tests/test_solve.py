@@ -59,7 +59,7 @@ def test_masked_pixels_hold_no_stars(pipeline, pixels, result):
         pipeline.solve(np.ma.MaskedArray(pixels, mask)),
     ):
         assert 0 < len(found.stars) < len(result.stars)
-        assert found.star_columns["x_centroid"].min() > pixels.shape[1] // 3 - 3
+        assert found.star_columns["x"].min() > pixels.shape[1] // 3 - 3
     assert not mask[:, -1].any() and (pixels == pixels.copy()).all()
 
 
@@ -83,8 +83,8 @@ def test_threads_and_hints_do_not_move_the_answer(pipeline, pixels, result):
 
 def test_centroids_are_identified(pipeline, pixels, result):
     stars = result.star_columns
-    known = {"flux": stars["flux"], "error": stars["x_centroid_err"], "shape": pixels.shape}
-    found = pipeline.identify(stars["x_centroid"], stars["y_centroid"], **known)
+    known = {"flux": stars["flux"], "error": stars["sigma_x"], "shape": pixels.shape}
+    found = pipeline.identify(stars["x"], stars["y"], **known)
     assert found
     np.testing.assert_allclose(found.quaternion, result.quaternion, atol=2e-5)
 

@@ -46,7 +46,7 @@ def test_detections_can_be_identified(pipeline):
     )
     whole = pipeline.solve(image)
     assert result.center.separation(whole.center).arcsec < 10
-    assert np.array_equal(found.x, whole.star_columns["x_centroid"])
+    assert np.array_equal(found.x, whole.star_columns["x"])
 
 
 def test_the_limit_is_the_programs(program):

@@ -7,7 +7,7 @@ use crate::base::units::DEG_PER_RAD;
 use crate::pipeline::{Outcome, Solution};
 use crate::report::FrameReport;
 
-/// A frame, as its report has it; names that begin with `s_` and `t_` are those of ObsCore.
+/// A frame, as its report has it; `t_min`, `s_fov` and `s_region` are columns of ObsCore.
 ///
 /// There are no run times: the same frames make the same rows. A text is empty where there is none.
 ///
@@ -22,13 +22,13 @@ pub struct FrameRow {
     pub reason: String,
     pub night: String,
     pub t_min: Option<f64>,
-    pub t_exptime: Option<f64>,
-    pub instrument_name: String,
+    pub exposure_s: Option<f64>,
+    pub camera: String,
     pub width: Option<u64>,
     pub height: Option<u64>,
     pub row_order: String,
-    pub s_ra: Option<f64>,
-    pub s_dec: Option<f64>,
+    pub ra_deg: Option<f64>,
+    pub dec_deg: Option<f64>,
     pub s_fov: Option<f64>,
     pub s_region: String,
     pub up_pa_deg: Option<f64>,
@@ -86,8 +86,8 @@ impl FrameRow {
             reason: report.reason.clone().unwrap_or_default(),
             night: date.map_or(String::new(), |date| night(date, solution)),
             t_min: date.and_then(|date| date.modified_julian_date()),
-            t_exptime: report.exposure_s,
-            instrument_name: prediction.map_or(String::new(), |stated| stated.camera.clone()),
+            exposure_s: report.exposure_s,
+            camera: prediction.map_or(String::new(), |stated| stated.camera.clone()),
             width: Some(report.width as u64),
             height: Some(report.height as u64),
             row_order: report.row_order_word().to_owned(),
@@ -131,8 +131,8 @@ impl FrameRow {
         let [qw, qx, qy, qz] = attitude.quaternion.map(Some);
         let sigma = &attitude.sigma_arcsec;
         Self {
-            s_ra: Some(attitude.ra_deg),
-            s_dec: Some(attitude.dec_deg),
+            ra_deg: Some(attitude.ra_deg),
+            dec_deg: Some(attitude.dec_deg),
             up_pa_deg: Some(attitude.up_pa_deg),
             qw,
             qx,
@@ -179,13 +179,13 @@ impl FrameRow {
             reason, "", "meta.note", "why it is not identified";
             night, "", "time.epoch", "date of the evening before, in local mean time where the site is known";
             t_min, "d", "time.start;obs.exposure", "date of the frame as Modified Julian Date (UTC)";
-            t_exptime, "s", "time.duration;obs.exposure", "exposure";
-            instrument_name, "", "meta.id;instr", "the stated camera";
+            exposure_s, "s", "time.duration;obs.exposure", "exposure";
+            camera, "", "meta.id;instr", "the stated camera";
             width, "pix", "", "columns of the frame";
             height, "pix", "", "rows of the frame";
             row_order, "", "meta.code", "order of the rows in the file; pixels count from the top of the picture in either";
-            s_ra, "deg", "pos.eq.ra;meta.main", "right ascension of the centre (ICRS)";
-            s_dec, "deg", "pos.eq.dec;meta.main", "declination of the centre (ICRS)";
+            ra_deg, "deg", "pos.eq.ra;meta.main", "right ascension of the centre (ICRS)";
+            dec_deg, "deg", "pos.eq.dec;meta.main", "declination of the centre (ICRS)";
             s_fov, "deg", "phys.angSize;instr.fov", "diameter of the circle around the frame";
             s_region, "", "pos.outline;obs.field", "outline of the frame (STC-S, ICRS)";
             up_pa_deg, "deg", "pos.posAng", "position angle of the picture's up direction";

@@ -19,9 +19,9 @@ const COLUMNS: [&str; 12] = [
     "reason_code",
     "night",
     "t_min",
-    "instrument_name",
-    "s_ra",
-    "s_dec",
+    "camera",
+    "ra_deg",
+    "dec_deg",
     "zero_point_vmag",
     "limit50_vmag",
     "predicted_limit50_vmag",
@@ -35,7 +35,7 @@ pub struct NightSummary {
     /// Date of the evening; empty for frames without a date.
     pub night: String,
     /// The stated camera; empty where none is.
-    pub instrument_name: String,
+    pub camera: String,
     /// All frames.
     pub frames: usize,
     /// Identified frames.
@@ -85,7 +85,7 @@ impl Nights {
     /// [`ParquetError`] if it is no such table.
     pub fn add(&mut self, part: impl ChunkReader + 'static) -> Result<(), ParquetError> {
         for_each_row(part, &COLUMNS, |row| {
-            let key = ["night", "instrument_name"].map(|name| text(row, name).to_owned());
+            let key = ["night", "camera"].map(|name| text(row, name).to_owned());
             self.0.entry(key).or_default().add(row);
         })
     }
@@ -93,9 +93,9 @@ impl Nights {
     /// What each camera saw in each night, by night and camera.
     pub fn finish(self) -> Vec<NightSummary> {
         let nights = self.0.into_iter();
-        let finished = nights.map(|([night, instrument_name], frames)| NightSummary {
+        let finished = nights.map(|([night, camera], frames)| NightSummary {
             night,
-            instrument_name,
+            camera,
             ..frames.finish()
         });
         finished.collect()
@@ -139,7 +139,7 @@ impl Night {
         for (values, column) in values {
             values.extend(number(row, column));
         }
-        let [t_min, ra_deg, dec_deg] = ["t_min", "s_ra", "s_dec"].map(|name| number(row, name));
+        let [t_min, ra_deg, dec_deg] = ["t_min", "ra_deg", "dec_deg"].map(|name| number(row, name));
         if let (Some(t_min), Some(ra_deg), Some(dec_deg)) = (t_min, ra_deg, dec_deg) {
             let turned_rad = ra_deg * RAD_PER_DEG - earth_rotation_rad(t_min);
             let direction = UnitVector::from_ra_dec(turned_rad, dec_deg * RAD_PER_DEG);

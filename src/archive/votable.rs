@@ -66,7 +66,7 @@ fn size(text: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::archive::StarRow;
+    use crate::report::StarRow;
 
     #[test]
     fn two_tables_in_one_have_the_longer_texts() {

@@ -1,5 +1,8 @@
 //! Columns of tables: name, type, meaning, and the value in a row.
 
+use super::format::table_name;
+use std::io;
+
 /// The value of a field of a row; none if the field is empty.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FieldValue {
@@ -11,6 +14,39 @@ pub enum FieldValue {
     Bool(Option<bool>),
     /// Words.
     Text(Option<String>),
+}
+
+impl FieldValue {
+    /// The value as CSV has it.
+    fn to_csv(&self) -> String {
+        /// Smaller numbers have an exponent.
+        const LEAST_WITHOUT_EXPONENT: f64 = 1e-4;
+        match self {
+            Self::Integer(value) => value.map(|value| value.to_string()),
+            Self::Number(value) => value.map(|value| {
+                if value != 0.0 && value.abs() < LEAST_WITHOUT_EXPONENT {
+                    format!("{value:e}")
+                } else {
+                    value.to_string()
+                }
+            }),
+            Self::Bool(value) => value.map(|value| value.to_string()),
+            Self::Text(value) => value.as_deref().map(table_name),
+        }
+        .unwrap_or_default()
+    }
+}
+
+/// Writes a row as CSV.
+///
+/// # Errors
+/// Errors of the writer.
+pub fn write_row<R, W: io::Write>(
+    writer: &mut csv::Writer<W>,
+    columns: &[Column<R>],
+    row: &R,
+) -> csv::Result<()> {
+    writer.write_record(columns.iter().map(|column| (column.value)(row).to_csv()))
 }
 
 /// What the values of a column mean.
@@ -42,6 +78,8 @@ pub struct Column<R> {
 pub trait Field {
     /// Whether there may be no value.
     const OPTIONAL: bool = false;
+    /// Whether it is a text, which is empty where there is none.
+    const IS_TEXT: bool = false;
     /// The value of this field.
     fn value(&self) -> FieldValue;
     /// An empty value of this type.
@@ -69,13 +107,27 @@ field! {
     u64 => Integer, |value| value.cast_signed();
     f64 => Number, |value| *value;
     bool => Bool, |value| *value;
-    String => Text, |value| value.clone();
+    Vec<&'static str> => Text, |value| value.join(" ");
+}
+
+impl Field for String {
+    const IS_TEXT: bool = true;
+    fn value(&self) -> FieldValue {
+        FieldValue::Text(Some(self.clone()))
+    }
+    fn empty() -> FieldValue {
+        FieldValue::Text(None)
+    }
 }
 
 impl<T: Field> Field for Option<T> {
-    const OPTIONAL: bool = true;
+    const OPTIONAL: bool = !T::IS_TEXT;
     fn value(&self) -> FieldValue {
-        self.as_ref().map_or_else(T::empty, Field::value)
+        match self {
+            Some(value) => value.value(),
+            None if T::IS_TEXT => FieldValue::Text(Some(String::new())),
+            None => T::empty(),
+        }
     }
     fn empty() -> FieldValue {
         T::empty()
@@ -87,13 +139,24 @@ pub(crate) fn type_of<R, F: Field>(_: fn(&R) -> &F) -> (FieldValue, bool) {
     (F::empty(), F::OPTIONAL)
 }
 
-/// A column of the rows `$row` from a field, with its [`Meaning`].
+/// The last name of a path of fields.
+macro_rules! last_name {
+    ($last:ident) => {
+        stringify!($last)
+    };
+    ($first:ident . $($rest:ident).+) => {
+        $crate::base::table::last_name!($($rest).+)
+    };
+}
+pub(crate) use last_name;
+
+/// A column of the rows `$row` from a field, or a field of it, with its [`Meaning`].
 macro_rules! column {
-    ($row:ty, $field:ident, $meaning:expr) => {{
-        let (empty, is_optional) = $crate::base::table::type_of(|row: &$row| &row.$field);
+    ($row:ty, $($field:ident).+, $meaning:expr) => {{
+        let (empty, is_optional) = $crate::base::table::type_of(|row: &$row| &row.$($field).+);
         $crate::base::table::Column {
-            name: stringify!($field),
-            value: |row: &$row| $crate::base::table::Field::value(&row.$field),
+            name: $crate::base::table::last_name!($($field).+),
+            value: |row: &$row| $crate::base::table::Field::value(&row.$($field).+),
             empty,
             is_optional,
             meaning: $meaning,
@@ -104,8 +167,8 @@ pub(crate) use column;
 
 /// The columns of the rows `$row`: field, unit, UCD, description.
 macro_rules! columns {
-    ($row:ty: $($field:ident, $unit:literal, $ucd:literal, $description:literal;)*) => {
-        vec![$($crate::base::table::column!($row, $field, $crate::base::table::Meaning {
+    ($row:ty: $($($field:ident).+, $unit:literal, $ucd:literal, $description:literal;)*) => {
+        vec![$($crate::base::table::column!($row, $($field).+, $crate::base::table::Meaning {
             unit: $unit,
             ucd: $ucd,
             description: $description,

@@ -145,7 +145,7 @@ fn report(arguments: &ReportArgs) -> Result<Outcome, CommandError> {
 #[derive(serde::Serialize)]
 struct NightLine<'a> {
     night: &'a str,
-    instrument_name: &'a str,
+    camera: &'a str,
     frames: usize,
     identified: usize,
     unread: usize,
@@ -163,7 +163,7 @@ impl<'a> NightLine<'a> {
     fn of(night: &'a NightSummary) -> Self {
         Self {
             night: &night.night,
-            instrument_name: &night.instrument_name,
+            camera: &night.camera,
             frames: night.frames,
             identified: night.identified,
             unread: night.unread,
@@ -201,7 +201,7 @@ fn nights_text(nights: &[NightSummary]) -> String {
             text,
             "{:<10}  {:<16}  {:>6}  {:>10}  {:>6}  {:>9}  {:>10}  {:>6}  {:>10}  {:>11}  {}",
             or(&night.night, "no date"),
-            printable(or(&night.instrument_name, "-")),
+            printable(or(&night.camera, "-")),
             night.frames,
             night.identified,
             cell(night.limit50_vmag),

@@ -370,6 +370,8 @@ pub struct StarReport {
     pub sigma_y: Option<f64>,
     /// Flux above the background, in the frame's own units.
     pub flux: Option<f64>,
+    /// Standard error of `flux`.
+    pub sigma_flux: Option<f64>,
     /// Brightest pixel above the background, in the frame's own units.
     pub peak: Option<f64>,
     /// Flux in electrons, where a camera is stated.
@@ -433,5 +435,10 @@ impl FrameReport {
     /// Whether the stars are identified.
     pub fn is_identified(&self) -> bool {
         self.status == Status::Identified
+    }
+
+    /// The order of the rows in the file; empty for a list of centroids.
+    pub(crate) fn row_order_word(&self) -> &'static str {
+        self.row_order.map_or("", RowOrder::word)
     }
 }

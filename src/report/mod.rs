@@ -20,8 +20,8 @@ mod prediction;
 mod reason;
 #[cfg(test)]
 mod sample;
+mod star_row;
 mod stars;
-mod table;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -34,8 +34,8 @@ pub use frame_report::{
     NoteReport, ObservationReport, OpticsReport, PhotometryReport, PredictionReport, SCHEMA,
     SiteReport, StarReport, Status, TimingReport,
 };
+pub use star_row::{StarRow, write_table_header};
 pub use stars::detections;
-pub use table::{TABLE_COLUMNS, write_table_header};
 pub use text::{STARS_SHOWN, TextOptions};
 pub use track::{
     AxesReport, NotTrackedReport, TrackAttitudeReport, TrackOpticsReport, TrackReport,

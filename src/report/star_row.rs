@@ -1,81 +1,144 @@
-//! A row of the table of stars.
+//! The columns of a star: those of the JSON, in every table.
 
-use crate::base::table::{Column, columns};
-use crate::report::{FrameReport, StarReport};
+use super::frame_report::{FrameReport, StarReport};
+use crate::base::table::{Column, columns, write_row};
+use std::io;
 
-/// A detection, as the report of its frame has it.
+/// A detection, with its frame.
 #[derive(Debug, Clone, PartialEq, Default)]
-#[expect(missing_docs, reason = "`columns` has unit and description of each")]
 pub struct StarRow {
+    /// Name of the frame.
     pub frame: String,
-    pub id: String,
-    pub name: String,
-    pub x_centroid: f64,
-    pub y_centroid: f64,
-    pub x_centroid_err: Option<f64>,
-    pub y_centroid_err: Option<f64>,
-    pub flux: Option<f64>,
-    pub flux_err: Option<f64>,
-    pub peak: Option<f64>,
-    pub snr: Option<f64>,
-    pub flags: String,
-    pub ra: Option<f64>,
-    pub dec: Option<f64>,
-    pub vmag: Option<f64>,
-    pub residual: Option<f64>,
-    pub p_chance: Option<f64>,
+    /// Order of the rows in the file; empty for lists of centroids.
+    pub row_order: String,
+    /// The detection.
+    pub star: StarReport,
 }
 
 impl StarRow {
-    /// The rows of a frame, brightest first.
-    pub fn of_frame(report: &FrameReport) -> impl Iterator<Item = Self> {
-        let stars = report.stars.iter();
-        stars.map(|star| Self::new(&report.frame, star))
-    }
-
-    fn new(frame: &str, star: &StarReport) -> Self {
-        Self {
-            frame: frame.to_owned(),
-            id: star.id.clone().unwrap_or_default(),
-            name: star.name.clone().unwrap_or_default(),
-            x_centroid: star.x,
-            y_centroid: star.y,
-            x_centroid_err: star.sigma_x,
-            y_centroid_err: star.sigma_y,
-            flux: star.flux,
-            flux_err: star.flux.zip(star.snr).map(|(flux, snr)| flux / snr),
-            peak: star.peak,
-            snr: star.snr,
-            flags: star.flags.join(","),
-            ra: star.ra_deg,
-            dec: star.dec_deg,
-            vmag: star.vmag,
-            residual: star.residual_px,
-            p_chance: star.p_chance,
-        }
-    }
-
-    /// The columns of the table `stars`.
+    /// The columns, in their order: the fields of a star in JSON, and those of its frame. Flags are
+    /// separated by blanks; `flux_e` and `peak_e` are filled where a camera is stated. `x` and `y`
+    /// count from the top of the picture, whichever `row_order` the file has.
     pub fn columns() -> Vec<Column<Self>> {
         columns! {
             Self:
             frame, "", "meta.id", "name of the frame";
-            id, "", "meta.id;meta.main", "identifier in the catalogue";
-            name, "", "meta.id", "proper name and designation";
-            x_centroid, "pix", "pos.cartesian.x;instr.det", "centroid along the rows, from 0";
-            y_centroid, "pix", "pos.cartesian.y;instr.det", "centroid along the columns, from 0";
-            x_centroid_err, "pix", "stat.error;pos.cartesian.x", "standard error of x_centroid";
-            y_centroid_err, "pix", "stat.error;pos.cartesian.y", "standard error of y_centroid";
-            flux, "", "phot.flux", "flux above the background, in units of the frame";
-            flux_err, "", "stat.error;phot.flux", "standard error of flux";
-            peak, "", "phot.flux;stat.max", "brightest pixel above the background";
-            snr, "", "stat.snr", "flux over its standard error";
-            flags, "", "meta.code.qual", "what is odd about the detection";
-            ra, "deg", "pos.eq.ra;meta.main", "right ascension at the frame's date (ICRS)";
-            dec, "deg", "pos.eq.dec;meta.main", "declination at the frame's date (ICRS)";
-            vmag, "mag", "phot.mag;em.opt.V", "Johnson V of the named star";
-            residual, "pix", "stat.fit.residual", "distance from the named star";
-            p_chance, "", "stat.probability", "probability that the name is chance";
+            star.x, "pix", "pos.cartesian.x;instr.det", "centroid along the rows, from 0";
+            star.y, "pix", "pos.cartesian.y;instr.det", "centroid along the columns, from 0";
+            star.sigma_x, "pix", "stat.error;pos.cartesian.x", "standard error of x";
+            star.sigma_y, "pix", "stat.error;pos.cartesian.y", "standard error of y";
+            star.flux, "", "phot.flux", "flux above the background, in units of the frame";
+            star.sigma_flux, "", "stat.error;phot.flux", "standard error of flux";
+            star.peak, "", "phot.flux;stat.max", "brightest pixel above the background, in units of the frame";
+            star.snr, "", "stat.snr", "flux over its standard error";
+            star.id, "", "meta.id;meta.main", "identifier in the catalogue";
+            star.name, "", "meta.id", "proper name and designation";
+            star.vmag, "mag", "phot.mag;em.opt.V", "Johnson V of the named star";
+            star.ra_deg, "deg", "pos.eq.ra;meta.main", "right ascension at the frame's date (ICRS)";
+            star.dec_deg, "deg", "pos.eq.dec;meta.main", "declination at the frame's date (ICRS)";
+            star.residual_px, "pix", "stat.fit.residual", "distance from the named star";
+            star.residual_blend_px, "pix", "stat.fit.residual", "distance from the light of the named star and those blended with it";
+            star.p_chance, "", "stat.probability", "probability that the name is chance";
+            star.flags, "", "meta.code.qual", "what is odd about the detection";
+            star.flux_e, "electron", "phot.count", "flux in electrons, where a camera is stated";
+            star.peak_e, "electron", "phot.count;stat.max", "brightest pixel in electrons, where a camera is stated";
+            row_order, "", "meta.code", "order of the rows in the file";
+        }
+    }
+
+    /// The rows of a frame, brightest first.
+    pub fn of_frame(report: &FrameReport) -> impl Iterator<Item = Self> {
+        let stars = report.stars.iter();
+        stars.map(|star| Self {
+            frame: report.frame.clone(),
+            row_order: report.row_order_word().to_owned(),
+            star: star.clone(),
+        })
+    }
+}
+
+/// Writes the row of column names.
+///
+/// # Errors
+/// Errors of the writer.
+pub fn write_table_header<W: io::Write>(writer: &mut csv::Writer<W>) -> csv::Result<()> {
+    writer.write_record(StarRow::columns().iter().map(|column| column.name))
+}
+
+impl FrameReport {
+    /// Writes one row per detection, brightest first, without the row of column names
+    /// ([`write_table_header`]).
+    ///
+    /// # Errors
+    /// Errors of the writer.
+    pub fn write_table_rows<W: io::Write>(&self, writer: &mut csv::Writer<W>) -> csv::Result<()> {
+        let columns = StarRow::columns();
+        StarRow::of_frame(self).try_for_each(|row| write_row(writer, &columns, &row))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::Value;
+    use std::collections::BTreeSet;
+
+    fn named_star() -> StarReport {
+        StarReport {
+            x: 12.5,
+            y: 0.25,
+            sigma_x: Some(0.02),
+            sigma_y: Some(0.03),
+            flux: Some(1234.5),
+            sigma_flux: Some(12.0),
+            peak: Some(300.0),
+            flux_e: Some(2469.0),
+            peak_e: Some(600.0),
+            snr: Some(102.9),
+            id: Some("HIP 32349".to_owned()),
+            name: Some("Sirius".to_owned()),
+            vmag: Some(-1.44),
+            ra_deg: Some(101.287),
+            dec_deg: Some(-16.716),
+            residual_px: Some(0.01),
+            residual_blend_px: Some(0.02),
+            p_chance: Some(1.2e-9),
+            flags: vec!["saturated", "blended"],
+        }
+    }
+
+    #[test]
+    fn a_star_has_the_same_names_and_values_in_json_and_tables() {
+        let row = StarRow {
+            frame: "night.tif".to_owned(),
+            row_order: "top-down".to_owned(),
+            star: named_star(),
+        };
+        let columns = StarRow::columns();
+        let json = serde_json::to_value(&row.star).unwrap();
+        let fields = json.as_object().unwrap();
+        let mut names: BTreeSet<&str> = columns.iter().map(|column| column.name).collect();
+        assert_eq!(names.len(), columns.len());
+        assert!(names.remove("frame") && names.remove("row_order"));
+        assert_eq!(names, fields.keys().map(String::as_str).collect());
+
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        write_table_header(&mut writer).unwrap();
+        write_row(&mut writer, &columns, &row).unwrap();
+        let bytes = writer.into_inner().unwrap();
+        let mut table = csv::Reader::from_reader(&bytes[..]);
+        let heading = table.headers().unwrap().clone();
+        let record = table.records().next().unwrap().unwrap();
+        for (name, text) in heading.iter().zip(&record) {
+            match fields.get(name) {
+                Some(Value::String(value)) => assert_eq!(text, value, "{name}"),
+                Some(Value::Array(flags)) => {
+                    let flags: Vec<_> = flags.iter().filter_map(Value::as_str).collect();
+                    assert_eq!(text, flags.join(" "), "{name}");
+                }
+                Some(value) => assert_eq!(text.parse().ok(), value.as_f64(), "{name}"),
+                None => assert!(["night.tif", "top-down"].contains(&text), "{name}"),
+            }
         }
     }
 }

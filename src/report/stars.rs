@@ -19,6 +19,10 @@ pub(super) fn detection(source: &Source) -> StarReport {
         sigma_x: measured.and_then(|m| significant(m.sigma_px[0], SIGMA_DIGITS)),
         sigma_y: measured.and_then(|m| significant(m.sigma_px[1], SIGMA_DIGITS)),
         flux: source.flux.and_then(|flux| significant(flux, FLUX_DIGITS)),
+        sigma_flux: source
+            .flux
+            .zip(measured)
+            .and_then(|(flux, m)| significant(flux / m.snr, SIGMA_DIGITS)),
         peak: measured.and_then(|m| significant(m.peak, FLUX_DIGITS)),
         snr: measured.and_then(|m| significant(m.snr, SIGMA_DIGITS)),
         flags: measured.map(|m| flag_names(m.flags)).unwrap_or_default(),

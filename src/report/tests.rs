@@ -11,6 +11,7 @@ fn star(x: f64, id: Option<&str>, name: Option<&str>) -> StarReport {
         sigma_x: Some(0.0123),
         sigma_y: Some(0.0131),
         flux: Some(123_456.0),
+        sigma_flux: Some(151.97),
         peak: Some(9_876.5),
         flux_e: None,
         peak_e: None,

@@ -12,12 +12,12 @@ use crate::cli::progress::frames_bar;
 use crate::cli::solving::result_files::{Image, Solved};
 use crate::cli::solving::workspace;
 use indicatif::ProgressBar;
-use starpipe::archive::{Archive, ArchiveError, FrameRow, Part, Plan, Shard, StarRow};
+use starpipe::archive::{Archive, ArchiveError, FrameRow, Part, Plan, Shard};
 use starpipe::base::format::counted;
 use starpipe::frame::MemoryLimit;
 use starpipe::identify::IndexedCatalog;
 use starpipe::pipeline::{Context, Error, Workspace};
-use starpipe::report::FrameReport;
+use starpipe::report::{FrameReport, StarRow};
 use std::ops::ControlFlow;
 use std::path::Path;
 

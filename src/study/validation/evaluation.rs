@@ -210,15 +210,15 @@ impl<'a> Evaluation<'a> {
         let gain = self.validator.protocol.setup.scenario.camera.gain_e_per_adu;
         let flux_e = found.flux.map(|flux| flux * gain);
         let snr = found.measured.map(|m| m.snr);
-        let flux_e_err = flux_e.zip(snr).map(|(flux_e, snr)| flux_e / snr);
+        let sigma_flux_e = flux_e.zip(snr).map(|(flux_e, snr)| flux_e / snr);
         StarRecord {
             detected: star.is_some(),
-            x_centroid: Some(to_decimals(found.position.x, 5)),
-            y_centroid: Some(to_decimals(found.position.y, 5)),
-            x_centroid_err: sigma(0),
-            y_centroid_err: sigma(1),
+            x: Some(to_decimals(found.position.x, 5)),
+            y: Some(to_decimals(found.position.y, 5)),
+            sigma_x: sigma(0),
+            sigma_y: sigma(1),
             flux_e: flux_e.map(significant),
-            flux_e_err: flux_e_err.map(significant),
+            sigma_flux_e: sigma_flux_e.map(significant),
             named: match self.names.get(&source) {
                 None => Named::No,
                 Some(name) if star.is_some_and(|star| star.catalog == Some(*name)) => Named::Right,

@@ -166,17 +166,17 @@ pub struct StarRecord {
     /// Whether there is a star-like detection to which it contributes more than half of the light.
     pub detected: bool,
     /// Measured x.
-    pub x_centroid: Option<f64>,
+    pub x: Option<f64>,
     /// Measured y.
-    pub y_centroid: Option<f64>,
+    pub y: Option<f64>,
     /// Stated standard error of x.
-    pub x_centroid_err: Option<f64>,
+    pub sigma_x: Option<f64>,
     /// Stated standard error of y.
-    pub y_centroid_err: Option<f64>,
+    pub sigma_y: Option<f64>,
     /// Measured flux.
     pub flux_e: Option<f64>,
     /// Stated standard error of the flux.
-    pub flux_e_err: Option<f64>,
+    pub sigma_flux_e: Option<f64>,
     /// Whether it was named correctly.
     pub named: Named,
 }

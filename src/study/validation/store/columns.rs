@@ -102,16 +102,16 @@ impl TableRow for StarRecord {
             saturated, "", "meta.code.qual", "the brightest pixel may be saturated";
             probability, "", "stat.probability", "predicted probability of detection";
             predicted_snr, "", "stat.snr", "signal-to-noise ratio of the matched filter there, without the star's own shot noise";
-            bound_x_px, "pix", "stat.error;pos.cartesian.x", "Cramer-Rao bound of x_centroid_err";
-            bound_y_px, "pix", "stat.error;pos.cartesian.y", "Cramer-Rao bound of y_centroid_err";
-            bound_flux_e, "electron", "stat.error;phot.count", "Cramer-Rao bound of flux_e_err";
+            bound_x_px, "pix", "stat.error;pos.cartesian.x", "Cramer-Rao bound of sigma_x";
+            bound_y_px, "pix", "stat.error;pos.cartesian.y", "Cramer-Rao bound of sigma_y";
+            bound_flux_e, "electron", "stat.error;phot.count", "Cramer-Rao bound of sigma_flux_e";
             detected, "", "meta.code", "a detection has more than half of its light from this star";
-            x_centroid, "pix", "pos.cartesian.x;instr.det", "centroid along the rows, from 0";
-            y_centroid, "pix", "pos.cartesian.y;instr.det", "centroid along the columns, from 0";
-            x_centroid_err, "pix", "stat.error;pos.cartesian.x", "standard error of x_centroid";
-            y_centroid_err, "pix", "stat.error;pos.cartesian.y", "standard error of y_centroid";
+            x, "pix", "pos.cartesian.x;instr.det", "centroid along the rows, from 0";
+            y, "pix", "pos.cartesian.y;instr.det", "centroid along the columns, from 0";
+            sigma_x, "pix", "stat.error;pos.cartesian.x", "standard error of x";
+            sigma_y, "pix", "stat.error;pos.cartesian.y", "standard error of y";
             flux_e, "electron", "phot.count", "measured flux";
-            flux_e_err, "electron", "stat.error;phot.count", "standard error of flux_e";
+            sigma_flux_e, "electron", "stat.error;phot.count", "standard error of flux_e";
             named, "", "meta.code", "right, wrong or no";
         }
     }

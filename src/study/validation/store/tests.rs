@@ -54,12 +54,12 @@ pub(super) fn frame_row(frame: u64) -> FrameRecord {
 /// A false detection.
 pub(super) fn star_row(frame: u64) -> StarRecord {
     StarRecord {
-        x_centroid: Some(1.5),
-        y_centroid: Some(2.5),
-        x_centroid_err: Some(0.1),
-        y_centroid_err: Some(0.1),
+        x: Some(1.5),
+        y: Some(2.5),
+        sigma_x: Some(0.1),
+        sigma_y: Some(0.1),
         flux_e: Some(100.0),
-        flux_e_err: Some(20.0),
+        sigma_flux_e: Some(20.0),
         ..StarRecord::empty(frame, RowKind::False)
     }
 }

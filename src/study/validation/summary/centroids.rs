@@ -92,7 +92,7 @@ impl Centroids {
         sums.snr += snr;
         sums.errors_px2 += dx * dx + dy * dy;
         sums.bounds_px2 += squared(row.bound_x_px) + squared(row.bound_y_px);
-        sums.stated_px2 += squared(row.x_centroid_err) + squared(row.y_centroid_err);
+        sums.stated_px2 += squared(row.sigma_x) + squared(row.sigma_y);
         sums.flux_part += 1.0 + flux_error_e / row.true_flux_e.unwrap_or(f64::NAN);
         sums.flux_errors_e2 += flux_error_e * flux_error_e;
         sums.flux_bounds_e2 += squared(row.bound_flux_e);

@@ -321,13 +321,13 @@ impl Accumulator {
         }
         let minus = |found: Option<f64>, truth: Option<f64>| Some(found? - truth?);
         let errors = [
-            minus(row.x_centroid, row.true_x_px),
-            minus(row.y_centroid, row.true_y_px),
+            minus(row.x, row.true_x_px),
+            minus(row.y, row.true_y_px),
             minus(row.flux_e, row.true_flux_e),
         ];
         self.centroids.add(row, errors, is_sure);
         if is_sure {
-            let sigmas = [row.x_centroid_err, row.y_centroid_err, row.flux_e_err];
+            let sigmas = [row.sigma_x, row.sigma_y, row.sigma_flux_e];
             for (pull, (error, sigma)) in self.pulls.iter_mut().zip(errors.into_iter().zip(sigmas))
             {
                 pull.add_pull(error, sigma);

@@ -81,12 +81,12 @@ fn star(vmag: f64, snr: f64, off: f64) -> StarRecord {
         bound_y_px: Some(0.1),
         bound_flux_e: Some(50.0),
         detected: true,
-        x_centroid: Some(100.0 + 0.1 * off),
-        y_centroid: Some(200.0),
-        x_centroid_err: Some(0.05),
-        y_centroid_err: Some(0.05),
+        x: Some(100.0 + 0.1 * off),
+        y: Some(200.0),
+        sigma_x: Some(0.05),
+        sigma_y: Some(0.05),
         flux_e: Some(1100.0),
-        flux_e_err: Some(50.0),
+        sigma_flux_e: Some(50.0),
         named: Named::Right,
     }
 }
@@ -199,8 +199,8 @@ fn centroids_are_of_isolated_stars_and_pulls_of_sure_ones() {
     left_out.iter().for_each(|row| all.add_star(row));
     let lost = StarRecord {
         detected: false,
-        x_centroid: None,
-        y_centroid: None,
+        x: None,
+        y: None,
         ..faint
     };
     all.add_star(&lost);
