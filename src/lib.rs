@@ -83,8 +83,8 @@ pub use identify::{
     Identification, IndexedCatalog, Priors, ScalePrior, SkyRegion, StarMatch, identify,
 };
 pub use pipeline::{
-    CentroidList, Context, Note, Outcome, Reason, Solution, Source, Workspace, solve_centroids,
-    solve_file, solve_frame,
+    CentroidList, Context, Note, Outcome, Reason, Solution, SolveOptions, Source, Workspace,
+    solve_centroids, solve_file, solve_frame,
 };
 pub use report::{FrameReport, TextOptions};
 pub use sky::catalog::{Catalog, Star};

@@ -84,7 +84,7 @@ fn a_directory_is_of_one_configuration_and_of_one_list_of_frames() {
         (&["--sigma", "6"][..], "sigma is null there and 6.0 here"),
         (
             &["--max-stars", "20"],
-            "max_stars is null there and 20 here",
+            "max_stars is 20000 there and 20 here",
         ),
         (
             &["--dark", "frames/2020-03-01T200000.tif"],

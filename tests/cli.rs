@@ -79,7 +79,7 @@ fn a_wrong_command_line_ends_with_2_and_says_what_is_wrong() {
             &["process", "--fov", "10", "--pixel-scale", "5", "a.png"],
             "--pixel-scale",
         ),
-        (&["process", "--near", "10,20", "a.png"], "--radius"),
+        (&["process", "--near", "5h61m,20", "a.png"], "number"),
         (&["process", "--radius", "20", "a.png"], "--near"),
         (
             &["process", "--near", "400,20", "--radius", "5", "a.png"],

@@ -1,30 +1,25 @@
 //! Tables of many frames: what workers need that write them wherever they are kept.
 
 use crate::errors::{exception, guarded, json};
-use crate::hints::Hints;
+use crate::options::Options;
 use crate::pipeline::Pipeline;
 use crate::solved::Solved;
 use bytes::Bytes;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use starpipe::archive::{
-    Configuration, FileHash, FrameRow, Identity, Nights, Plan, TableWriter,
-};
+use starpipe::archive::{Configuration, FileHash, FrameRow, Identity, Nights, Plan, TableWriter};
 use starpipe::base::table::FieldValue;
 use starpipe::report::{FrameReport, StarRow};
 use std::num::NonZeroUsize;
 
-/// What is stated for all frames beside the hints.
+/// What is stated for all frames.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Stated {
-    hints: Hints,
+    options: Options,
     /// The content of the camera's description.
     camera: Option<Vec<u8>>,
-    sigma: Option<f64>,
-    max_stars: Option<u64>,
-    attitude_only: bool,
     /// A number, or `all`.
     page: Option<String>,
 }
@@ -52,12 +47,10 @@ pub fn archive_plan(
     let plan = Plan::new(names, frames_per_part).map_err(exception)?;
     let configuration = Configuration {
         catalog: pipeline.indexed.catalog().into(),
+        options: stated.options.resolve()?,
         camera: stated.camera.as_deref().map(FileHash::of),
-        sigma: stated.sigma,
-        max_stars: stated.max_stars,
-        attitude_only: stated.attitude_only,
         page: stated.page,
-        ..stated.hints.configuration()?
+        ..Configuration::default()
     };
     let identity = Identity::new(&plan, &configuration).map_err(exception)?;
     let mut first = 0;
@@ -157,7 +150,13 @@ pub fn star_columns() -> Vec<[&'static str; 5]> {
             FieldValue::Text(_) => "text",
             _ => "number",
         };
-        [column.name, kind, meaning.unit, meaning.ucd, meaning.description]
+        [
+            column.name,
+            kind,
+            meaning.unit,
+            meaning.ucd,
+            meaning.description,
+        ]
     });
     described.collect()
 }

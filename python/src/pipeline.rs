@@ -3,9 +3,9 @@
 use crate::camera::data_sheet;
 use crate::catalogs;
 use crate::errors::exception;
-use crate::hints::Hints;
 use crate::image::{Image, Source, bad_pixels};
 use crate::interrupt::{on_this_thread, on_threads, useful};
+use crate::options::Options;
 use crate::solved::Solved;
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
@@ -13,8 +13,6 @@ use starpipe::calibration::Master;
 use starpipe::camera::data_sheet::DataSheet;
 use starpipe::detect::DetectError;
 use starpipe::frame::{Buffers, RowOrder};
-use starpipe::model::sensitivity::Extinction;
-use starpipe::photometry::comparison::StatedCamera;
 use starpipe::photometry::instrumental_mag;
 use starpipe::pipeline::{
     self, CentroidList, ListedCentroid, solve_centroids, solve_frame, solve_guarded, solve_read,
@@ -25,7 +23,6 @@ use starpipe::{
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::time::Duration;
 
 /// Solves frames. It may be used by several threads at once.
 #[pyclass(frozen, module = "starpipe._starpipe")]
@@ -58,19 +55,16 @@ impl Pipeline {
 
     /// Solves an image; `name` stands for the name of its file. Pixels are those of its rows as stored,
     /// or of the picture as drawn.
-    #[pyo3(signature = (image, name, mask, hints, dark, flat, sigma, max_stars, attitude_only, threads, as_drawn))]
+    #[pyo3(signature = (image, name, mask, options, dark, flat, threads, as_drawn))]
     fn solve(
         &self,
         py: Python<'_>,
         image: Image<'_>,
         name: Option<PathBuf>,
         mask: Option<PyReadonlyArray2<'_, bool>>,
-        hints: Hints,
+        options: Options,
         dark: Option<Image<'_>>,
         flat: Option<Image<'_>>,
-        sigma: Option<f64>,
-        max_stars: Option<usize>,
-        attitude_only: bool,
         threads: NonZeroUsize,
         as_drawn: bool,
     ) -> PyResult<Solved> {
@@ -79,13 +73,12 @@ impl Pipeline {
         let dark = dark.as_ref().map(Image::source).transpose()?;
         let flat = flat.as_ref().map(Image::source).transpose()?;
         let context = Context {
-            detect: detect_config(sigma, max_stars),
             as_stored: !as_drawn,
-            ..self.context(&hints, attitude_only)?
+            ..self.context(&options)?
         };
         let work = |interrupt: &Interrupt| {
             let name = name.unwrap_or_else(|| source.name());
-            let mut workspace = self.workspace(threads, hints.name_odds, interrupt);
+            let mut workspace = self.workspace(threads, interrupt);
             let solved = solve_guarded(&name, &mut workspace, |workspace| {
                 let input = Input {
                     source,
@@ -115,8 +108,7 @@ impl Pipeline {
         shape: [usize; 2],
         brightness: Option<&str>,
         has_errors: bool,
-        hints: Hints,
-        attitude_only: bool,
+        options: Options,
     ) -> PyResult<Solved> {
         let rows = centroids.as_slice().map_err(exception)?.as_chunks::<4>().0;
         let [height, width] = shape;
@@ -140,10 +132,10 @@ impl Pipeline {
             has_brightness: brightness.is_some(),
             centroids: rows.iter().enumerate().map(centroid).collect(),
         };
-        let context = self.context(&hints, attitude_only)?;
+        let context = self.context(&options)?;
         on_this_thread(py, |interrupt| {
             let name = Path::new("centroids");
-            let mut workspace = self.workspace(NonZeroUsize::MIN, hints.name_odds, interrupt);
+            let mut workspace = self.workspace(NonZeroUsize::MIN, interrupt);
             let solution = solve_guarded(name, &mut workspace, |workspace| {
                 Ok::<_, Failed>(solve_centroids(&list, &context, workspace))
             });
@@ -155,20 +147,9 @@ impl Pipeline {
 }
 
 impl Pipeline {
-    fn context(&self, hints: &Hints, attitude_only: bool) -> PyResult<Context<'static>> {
-        Ok(Context {
-            priors: hints.priors()?,
-            camera: self.camera.clone().map(|sheet| StatedCamera {
-                sheet,
-                zenith_distance_deg: hints.zenith_distance_deg,
-                extinction: hints.extinction.map(Extinction::MagPerAirmass),
-            }),
-            attitude_only,
-            time_limit: hints
-                .time_limit_s
-                .and_then(|limit| Duration::try_from_secs_f64(limit).ok()),
-            ..Context::new(self.indexed)
-        })
+    fn context(&self, options: &Options) -> PyResult<Context<'static>> {
+        let context = Context::new(self.indexed);
+        Ok(context.with_options(&options.resolve()?, self.camera.clone()))
     }
 
     /// Solves an input; returns the order of its rows, too, if it is a file.
@@ -240,13 +221,12 @@ impl Pipeline {
     }
 
     /// Buffers of an earlier frame where there are any.
-    fn workspace(&self, threads: NonZeroUsize, name_odds: f64, interrupt: &Interrupt) -> Workspace {
+    fn workspace(&self, threads: NonZeroUsize, interrupt: &Interrupt) -> Workspace {
         // In a child process the lock may be held by a thread that does not exist there.
         let kept = self.workspaces.try_lock();
         let kept = kept.ok().and_then(|mut kept| kept.pop());
         let mut workspace = kept.unwrap_or_default();
         workspace.detect = workspace.detect.on_threads(useful(threads));
-        workspace.identify = workspace.identify.with_name_odds(name_odds);
         workspace.until(interrupt)
     }
 

@@ -92,9 +92,9 @@ pub struct Lists {
     stars: f64,
     centroid_error_px: f64,
     mag_error: f64,
-    missing: f64,
-    false_stars: f64,
-    scale_error: Option<f64>,
+    missing_percent: f64,
+    false_stars_percent: f64,
+    scale_error_percent: Option<f64>,
     shape: [usize; 2],
 }
 
@@ -119,9 +119,9 @@ pub fn robustness(
         mean_stars: lists.stars,
         centroid_sigma_px: lists.centroid_error_px,
         mag_sigma: lists.mag_error,
-        missing: lists.missing,
-        false_stars: lists.false_stars,
-        scale_error: lists.scale_error,
+        missing: lists.missing_percent / 100.0,
+        false_stars: lists.false_stars_percent / 100.0,
+        scale_error: lists.scale_error_percent.map(|percent| percent / 100.0),
         mirrored: Mirrored::Half,
         photometry: Photometry::Instrumental,
     };

@@ -10,6 +10,7 @@ from importlib.metadata import version as _version
 
 from ._darks import Darks, darks
 from ._detect import Detections, detect
+from ._options import SolveOptions
 from ._pipeline import Pipeline
 from ._result import Result
 from ._simulate import Simulation, simulate
@@ -21,6 +22,7 @@ __all__ = [
     "Pipeline",
     "Result",
     "Simulation",
+    "SolveOptions",
     "Validation",
     "darks",
     "defocus",

@@ -11,6 +11,9 @@ import numpy as np
 NAME_ODDS = 100.0
 """A star is named where the odds are at least this many to 1 that the name is right."""
 
+RADIUS_DEG = 10.0
+"""How far from `near` the centre of a frame may lie."""
+
 
 def number(value: Any, unit: str, name: str) -> float | None:
     """Return `value` in `unit`: a plain number is in it already, a Quantity is converted."""
@@ -68,10 +71,8 @@ def thread_count(threads: Any) -> int:
     return min(count(threads, "threads", 1), max(8, os.cpu_count() or 1))
 
 
-def direction(near: Any, radius: Any) -> tuple[float, float, float] | None:
-    """Return right ascension, declination and radius in degrees."""
-    if (near is None) != (radius is None):
-        raise ValueError("near and radius belong together: give both")
+def direction(near: Any) -> tuple[float, float] | None:
+    """Return right ascension and declination in degrees."""
     if near is None:
         return None
     if hasattr(near, "icrs"):
@@ -82,11 +83,10 @@ def direction(near: Any, radius: Any) -> tuple[float, float, float] | None:
     except (TypeError, ValueError) as error:
         raise ValueError("near must be a SkyCoord or (ra, dec) in degrees") from error
     ra_deg, dec_deg = number(ra, "deg", "near"), number(dec, "deg", "near")
-    radius_deg = positive(radius, "deg", "radius", 180.000001)
-    assert ra_deg is not None and dec_deg is not None and radius_deg is not None
+    assert ra_deg is not None and dec_deg is not None
     if not -90.0 <= dec_deg <= 90.0:
         raise ValueError(f"the declination of near must be from -90 to 90 degrees, not {dec_deg:g}")
-    return ra_deg, dec_deg, radius_deg
+    return ra_deg, dec_deg
 
 
 def iso_date(date: Any) -> str | None:
@@ -111,7 +111,7 @@ def site(location: Any) -> tuple[float, float, float] | None:
         return float(place.lat.deg), float(place.lon.deg), float(place.height.to_value("m"))
     values = tuple(location) if np.iterable(location) else ()
     if len(values) not in (2, 3):
-        raise ValueError("location must be an EarthLocation or (latitude, longitude[, height])")
+        raise ValueError("site must be an EarthLocation or (latitude, longitude[, height])")
     units = (("deg", "latitude"), ("deg", "longitude"), ("m", "height"))
     found = [number(value, *unit) for value, unit in zip(values, units, strict=False)]
     lat, lon, height = [*found, 0.0][:3]
@@ -119,7 +119,7 @@ def site(location: Any) -> tuple[float, float, float] | None:
     return lat, lon, height
 
 
-def _header_date(header: Any) -> str | None:
+def header_date(header: Any) -> str | None:
     """Return the date of a header; one that is none is not used, as when a file is read."""
     text = str(header.get("DATE-OBS", "")).strip()
     try:
@@ -133,39 +133,3 @@ def header_exposure(header: Any) -> float | None:
     value = header.get("EXPTIME", header.get("EXPOSURE"))
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     return float(value) if is_number and 0.0 < value < np.inf else None
-
-
-def hints(
-    header: Any,
-    *,
-    fov: Any,
-    pixel_scale: Any,
-    near: Any,
-    radius: Any,
-    date: Any,
-    location: Any,
-    exposure: Any = None,
-    scale_error: float = 0.1,
-    zenith_distance: Any = None,
-    extinction: Any = None,
-    name_odds: float = NAME_ODDS,
-    time_limit: Any = None,
-) -> dict[str, Any]:
-    """Return what the compiled part takes; a header completes what is not known."""
-    if fov is not None and pixel_scale is not None:
-        raise ValueError("fov and pixel_scale say the same: give one")
-    date = _header_date(header) if date is None else date
-    exposure = header_exposure(header) if exposure is None else exposure
-    return {
-        "fov_deg": positive(fov, "deg", "fov", 179.0),
-        "pixel_scale_arcsec": positive(pixel_scale, "arcsec", "pixel_scale"),
-        "near_deg": direction(near, radius),
-        "date": iso_date(date),
-        "site": site(location),
-        "exposure_s": positive(exposure, "s", "exposure"),
-        "scale_error": positive(scale_error, "", "scale_error", 1.0),
-        "zenith_distance_deg": within(zenith_distance, "deg", "zenith_distance", 0.0, 89.999),
-        "extinction": within(extinction, "mag", "extinction", 0.0, 10.0),
-        "name_odds": within(name_odds, "", "name_odds", 1.0),
-        "time_limit_s": positive(time_limit, "s", "time_limit"),
-    }

@@ -7,16 +7,20 @@ import os
 from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _starpipe
 from ._camera import PathLike
-from ._hints import NAME_ODDS, count, hints, positive, thread_count
+from ._hints import count, thread_count
 from ._images import Image, ImageLike, mask_of
+from ._options import SolveOptions, solve_options, takes_options
 from ._result import Result
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
 class Pipeline:
@@ -61,30 +65,17 @@ class Pipeline:
         given = zip(names, self._arguments, strict=True)
         return f"Pipeline({', '.join(f'{k}={str(v)!r}' for k, v in given if v is not None)})"
 
+    @takes_options
     def solve(
         self,
         image: ImageLike,
         mask: ArrayLike | None = None,
         *,
         name: PathLike | None = None,
-        fov: Any = None,
-        pixel_scale: Any = None,
-        near: Any = None,
-        radius: Any = None,
-        date: Any = None,
-        location: Any = None,
-        exposure: Any = None,
         dark: ImageLike | None = None,
         flat: ImageLike | None = None,
-        sigma: float | None = None,
-        max_stars: int | None = None,
-        attitude_only: bool = False,
         threads: int = 1,
-        scale_error: float = 0.1,
-        zenith_distance: Any = None,
-        extinction: Any = None,
-        name_odds: float = NAME_ODDS,
-        time_limit: Any = None,
+        **options: Unpack[SolveOptions],
     ) -> Result:
         """Solve one frame.
 
@@ -99,38 +90,13 @@ class Pipeline:
             True where a pixel is to be left out, in the order of the rows of `image`.
         name : path, optional
             Name of the frame, if it does not come as a path; a date in it is used.
-        fov, pixel_scale : Quantity or float, optional
-            Horizontal field of view (degrees), or the angle of a pixel (arcseconds); see
-            `scale_error`.
-        near, radius : SkyCoord or (ra, dec), and Angle or float, optional
-            Where the centre of the frame lies, in degrees.
-        date : Time, datetime or str, optional
-            When the frame was taken, in UTC. By default of the header or the file's name.
-        location : EarthLocation or (latitude, longitude[, height]), optional
-            Where it was taken, in degrees and metres.
-        exposure : Quantity or float, optional
-            Exposure in seconds.
         dark, flat : image, optional
             What to subtract, and by what to divide. They apply to the picture as drawn where frame
             and master are files, else row by row.
-        sigma : float, optional
-            Threshold of detection in standard deviations.
-        max_stars : int, optional
-            Measure the strongest stars alone.
-        attitude_only : bool
-            Stop at the attitude: no star beyond the brightest is named.
         threads : int
             Threads for this frame. More than 8 are started only where there are more processors.
-        scale_error : float
-            How far `fov` or `pixel_scale` may be off, as a share.
-        zenith_distance : Angle or float, optional
-            Zenith distance of the frame's centre in degrees, for the prediction of a camera.
-        extinction : Quantity or float, optional
-            Extinction in magnitudes per airmass, for the same.
-        name_odds : float
-            A star is named where the odds are at least this many to 1 that the name is right.
-        time_limit : Quantity or float, optional
-            How long the frame may take, in seconds.
+        **options
+            What is stated of the frame, see `SolveOptions`.
 
         Returns
         -------
@@ -154,31 +120,15 @@ class Pipeline:
             taken.pixels,
             name,
             mask_of(taken, mask),
-            hints(
-                taken.header,
-                fov=fov,
-                pixel_scale=pixel_scale,
-                near=near,
-                radius=radius,
-                date=date,
-                location=location,
-                exposure=exposure,
-                scale_error=scale_error,
-                zenith_distance=zenith_distance,
-                extinction=extinction,
-                name_odds=name_odds,
-                time_limit=time_limit,
-            ),
+            solve_options(taken.header, **options),
             None if dark is None else Image(dark, "dark").pixels,
             None if flat is None else Image(flat, "flat").pixels,
-            positive(sigma, "", "sigma"),
-            None if max_stars is None else count(max_stars, "max_stars", 4),
-            bool(attitude_only),
             thread_count(threads),
             False,
         )
         return Result._of(solved)
 
+    @takes_options
     def identify(
         self,
         x: ArrayLike,
@@ -188,16 +138,7 @@ class Pipeline:
         flux: ArrayLike | None = None,
         mag: ArrayLike | None = None,
         error: ArrayLike | None = None,
-        fov: Any = None,
-        pixel_scale: Any = None,
-        near: Any = None,
-        radius: Any = None,
-        date: Any = None,
-        location: Any = None,
-        attitude_only: bool = False,
-        scale_error: float = 0.1,
-        name_odds: float = NAME_ODDS,
-        time_limit: Any = None,
+        **options: Unpack[SolveOptions],
     ) -> Result:
         """Identify the stars of a list of centroids.
 
@@ -215,10 +156,8 @@ class Pipeline:
 
             Positions with a number that is not finite, a flux or an error of 0 or below, and those
             that coincide with a brighter one are left out; `notes` tell of them.
-        fov, pixel_scale, near, radius, date, location, attitude_only, scale_error, name_odds
-            As for `solve`.
-        time_limit : Quantity or float, optional
-            How long this may take, in seconds.
+        **options
+            What is stated of the frame, see `SolveOptions`; what is of pixels alone is not used.
 
         Returns
         -------
@@ -247,20 +186,8 @@ class Pipeline:
             raise ValueError(f"x, y, brightness and error must be lists of one length, not {found}")
         table = np.stack(columns, axis=-1)
         rows, width = (count(side, "shape", 3) for side in shape)
-        known = hints(
-            {},
-            fov=fov,
-            pixel_scale=pixel_scale,
-            near=near,
-            radius=radius,
-            date=date,
-            location=location,
-            scale_error=scale_error,
-            name_odds=name_odds,
-            time_limit=time_limit,
-        )
         solved = self._pipeline.identify(
-            table, (rows, width), brightness, error is not None, known, bool(attitude_only)
+            table, (rows, width), brightness, error is not None, solve_options(**options)
         )
         return Result._of(solved)
 
@@ -293,7 +220,8 @@ class Pipeline:
             If an argument is of a wrong type or out of range.
         """
         inspect.signature(self.solve).bind(None, **known)
-        hints({}, **{name: known.get(name, default) for name, default in _HINTS.items()})
+        own = ("mask", "name", "dark", "flat", "threads")
+        solve_options(**{name: value for name, value in known.items() if name not in own})
         return self._solve_in_order(images, thread_count(threads), known)
 
     def _solve_in_order(
@@ -321,10 +249,3 @@ class Pipeline:
             name = os.fspath(image) if is_path else type(image).__name__
             return Result._unread(str(name), error)
 
-
-_HINTS = {
-    name: parameter.default
-    for name, parameter in inspect.signature(Pipeline.solve).parameters.items()
-    if name in inspect.signature(hints).parameters
-}
-"""What `hints` takes of the arguments of `Pipeline.solve`, with their defaults."""

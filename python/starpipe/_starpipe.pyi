@@ -56,12 +56,9 @@ class Pipeline:
         image: _Image,
         name: _Path | None,
         mask: NDArray[np.bool_] | None,
-        hints: dict[str, Any],
+        options: dict[str, Any],
         dark: _Image | None,
         flat: _Image | None,
-        sigma: float | None,
-        max_stars: int | None,
-        attitude_only: bool,
         threads: int,
         as_drawn: bool,
     ) -> Solved: ...
@@ -71,8 +68,7 @@ class Pipeline:
         shape: tuple[int, int],
         brightness: str | None,
         has_errors: bool,
-        hints: dict[str, Any],
-        attitude_only: bool,
+        options: dict[str, Any],
     ) -> Solved: ...
 
 @final

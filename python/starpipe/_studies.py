@@ -121,9 +121,9 @@ def robustness(
     stars: float = 30.0,
     centroid_error: float = 0.3,
     mag_error: float = 0.2,
-    missing: float = 0.15,
-    false: float = 0.15,
-    scale_error: float | None = 0.1,
+    missing: float = 15.0,
+    false: float = 15.0,
+    scale_error: float | None = 10.0,
     shape: tuple[int, int] = (1024, 1024),
     catalog: PathLike | None = None,
 ) -> list[dict[str, Any]]:
@@ -141,9 +141,9 @@ def robustness(
     centroid_error, mag_error : float
         Standard deviations, in pixels and magnitudes.
     missing, false : float
-        Shares of stars that are missing, and of false stars.
+        Stars that are missing, and false stars, in percent of the stars.
     scale_error : float or None
-        Largest error of the stated field of view, as a share; None states none.
+        Largest error of the stated field of view, in percent; None states none.
     shape : (int, int)
         Rows and columns of the frame.
     catalog : path, optional
@@ -159,9 +159,9 @@ def robustness(
         "stars": positive(stars, "", "stars"),
         "centroid_error_px": within(centroid_error, "", "centroid_error", 0.0),
         "mag_error": within(mag_error, "", "mag_error", 0.0),
-        "missing": within(missing, "", "missing", 0.0, 1.0),
-        "false_stars": within(false, "", "false", 0.0, 100.0),
-        "scale_error": positive(scale_error, "", "scale_error", 1.0),
+        "missing_percent": within(missing, "percent", "missing", 0.0, 100.0),
+        "false_stars_percent": within(false, "percent", "false", 0.0, 1e4),
+        "scale_error_percent": positive(scale_error, "percent", "scale_error", 100.0),
         "shape": tuple(count(side, "shape", 3) for side in shape),
     }
     rows: list[dict[str, Any]] = json.loads(

@@ -20,16 +20,23 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import fsspec
 
 from . import _starpipe
-from ._hints import NAME_ODDS, count, hints, positive
+from ._hints import count
+from ._options import SolveOptions, solve_options, takes_options
 from ._pipeline import Pipeline
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 TABLES = ("frames.parquet", "stars.parquet")
 """Directories of the parts of the two tables."""
+
+TIME_LIMIT_S = 8.0
+"""How long a frame may take by default."""
 
 TRIES = 5
 """How often an object is fetched or written before a task fails."""
@@ -52,10 +59,7 @@ class _Job:
     options: dict[str, Any]
     catalog: str | None
     camera: bytes | None
-    hints: dict[str, Any]
-    sigma: float | None
-    max_stars: int | None
-    attitude_only: bool
+    stated: dict[str, Any]
     read_ahead: int
     page: int | Literal["all"] | None
 
@@ -101,6 +105,7 @@ class Archive:
         return nights
 
 
+@takes_options
 def process(
     frames: str | Iterable[str],
     out: str,
@@ -113,21 +118,7 @@ def process(
     read_ahead: int = 16,
     retries: int = 3,
     page: int | Literal["all"] | None = None,
-    sigma: float | None = None,
-    max_stars: int | None = None,
-    attitude_only: bool = False,
-    fov: Any = None,
-    pixel_scale: Any = None,
-    near: Any = None,
-    radius: Any = None,
-    date: Any = None,
-    location: Any = None,
-    exposure: Any = None,
-    scale_error: float = 0.1,
-    zenith_distance: Any = None,
-    extinction: Any = None,
-    name_odds: float = NAME_ODDS,
-    time_limit: Any = 8.0,
+    **options: Unpack[SolveOptions],
 ) -> Archive:
     """Solve the frames of an archive, and write tables of frames and stars.
 
@@ -156,10 +147,8 @@ def process(
     page : int or 'all', optional
         Which image of a file with several, from 1; or all, which are named ``FRAME[1]`` and so on.
         Without it the first.
-    sigma, max_stars, attitude_only, fov, pixel_scale, near, radius, date, location, exposure
-        As for `Pipeline.solve`.
-    scale_error, zenith_distance, extinction, name_odds, time_limit
-        As for `Pipeline.solve`.
+    **options
+        What is stated of all frames, see `SolveOptions`; `time_limit` is 8 seconds by default.
 
     Returns
     -------
@@ -179,33 +168,13 @@ def process(
         options=storage_options or {},
         catalog=None if catalog is None else str(catalog),
         camera=None if camera is None else Path(camera).read_bytes(),
-        hints=hints(
-            {},
-            fov=fov,
-            pixel_scale=pixel_scale,
-            near=near,
-            radius=radius,
-            date=date,
-            location=location,
-            exposure=exposure,
-            scale_error=scale_error,
-            zenith_distance=zenith_distance,
-            extinction=extinction,
-            name_odds=name_odds,
-            time_limit=time_limit,
-        ),
-        sigma=positive(sigma, "", "sigma"),
-        max_stars=None if max_stars is None else count(max_stars, "max_stars", 4),
-        attitude_only=bool(attitude_only),
+        stated=solve_options(**({"time_limit": TIME_LIMIT_S} | options)),
         read_ahead=count(read_ahead, "read_ahead", 1),
         page=page if page is None or page == "all" else count(page, "page", 1),
     )
     stated = {
-        "hints": job.hints,
+        "options": job.stated,
         "camera": job.camera,
-        "sigma": job.sigma,
-        "max_stars": job.max_stars,
-        "attitude_only": job.attitude_only,
         "page": None if job.page is None else str(job.page),
     }
     names = _list(frames, job.options)
@@ -331,12 +300,9 @@ def _process_part(job: _Job, part: str, names: list[str]) -> dict[str, int]:
                     image,
                     name,
                     None,
-                    job.hints,
+                    job.stated,
                     None,
                     None,
-                    job.sigma,
-                    job.max_stars,
-                    job.attitude_only,
                     1,
                     True,
                 )

@@ -99,7 +99,7 @@ def test_astropys_objects_are_hints(pipeline, pixels, result):
         near=result.center.galactic,
         radius=120 * u.arcmin,
         date=Time("2020-03-01T20:00:00"),
-        location=EarthLocation.from_geodetic(10 * u.deg, 50 * u.deg, 300 * u.m),
+        site=EarthLocation.from_geodetic(10 * u.deg, 50 * u.deg, 300 * u.m),
         exposure=200 * u.ms,
     )
     report = found.to_dict()

@@ -149,7 +149,7 @@ def test_a_camera_predicts_the_limit(frame):
 
 def test_a_scale_may_be_as_far_off_as_stated(pipeline, pixels, result):
     assert not pipeline.solve(pixels, fov=9.0)
-    found = pipeline.solve(pixels, fov=9.0, scale_error=0.4)
+    found = pipeline.solve(pixels, fov=9.0, scale_error=40)
     assert found and found.quaternion == pytest.approx(result.quaternion, abs=1e-4)
 
 

@@ -1,5 +1,6 @@
 //! All that the results of a frame depend on beside the frame.
 
+use crate::pipeline::SolveOptions;
 use crate::sky::catalog::Catalog;
 use serde::Serialize;
 use std::fs;
@@ -7,33 +8,17 @@ use std::io;
 use std::path::Path;
 use xxhash_rust::xxh3::xxh3_64;
 
-/// What is stated for all frames of an archive: results of other values are never mixed. `None` stands
-/// for the default.
+/// What the frames of an archive are solved with: results of other values are never mixed.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-#[expect(missing_docs, reason = "named as the options of `process`, with units")]
+#[expect(missing_docs, reason = "named as the options of `process`")]
 pub struct Configuration {
     pub catalog: CatalogIdentity,
-    pub fov_deg: Option<f64>,
-    pub pixel_scale_arcsec: Option<f64>,
-    pub scale_error_percent: Option<f64>,
-    pub near_deg: Option<[f64; 2]>,
-    pub radius_deg: Option<f64>,
-    pub date: Option<String>,
-    pub site: Option<[f64; 3]>,
+    #[serde(flatten)]
+    pub options: SolveOptions,
     pub camera: Option<FileHash>,
     pub dark: Option<FileHash>,
     pub flat: Option<FileHash>,
     pub hot_pixels: Option<FileHash>,
-    pub sigma: Option<f64>,
-    pub false_alarms: Option<f64>,
-    pub max_stars: Option<u64>,
-    pub centroid: Option<String>,
-    pub exposure_s: Option<f64>,
-    pub zenith_distance_deg: Option<f64>,
-    pub extinction_mag: Option<f64>,
-    pub name_odds: f64,
-    pub attitude_only: bool,
-    pub time_limit_s: Option<f64>,
     pub page: Option<String>,
 }
 

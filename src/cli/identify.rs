@@ -47,9 +47,8 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Outcome, CommandError>
     } = arguments;
     stdin::check_once(&lists)?;
     let plan = Plan {
-        priors: solving.hints.resolve_with_camera()?,
-        attitude_only: solving.attitude_only,
-        time_limit: solving.time_limit(),
+        options: solving.options()?,
+        camera: solving.hints.data_sheet()?,
         ..Plan::default()
     };
     let options = CentroidListOptions {

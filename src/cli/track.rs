@@ -15,8 +15,6 @@ use clap::Args;
 use starpipe::base::epoch::ObservationDate;
 use starpipe::base::panics::caught;
 use starpipe::calibration::Calibration;
-use starpipe::identify::Priors;
-use starpipe::photometry::comparison::StatedCamera;
 use starpipe::pipeline::Context;
 use starpipe::report::TrackReport;
 use starpipe::track::{DEFAULT_STARS, Tracker};
@@ -74,18 +72,10 @@ pub(crate) fn track(arguments: &TrackArgs) -> Result<Outcome, CommandError> {
     }
     let sheet = arguments.hints.data_sheet()?;
     let calibration = arguments.calibration.read(sheet.as_ref())?;
-    let priors = Priors {
-        exposure_s: arguments.exposure,
-        ..arguments.hints.resolve()?
-    };
+    let mut options = arguments.hints.options()?;
+    options.exposure_s = arguments.exposure;
     arguments.catalog.with_index(|_, indexed| {
-        let mut context = Context::new(indexed);
-        context.priors = priors;
-        context.camera = sheet.clone().map(|sheet| StatedCamera {
-            sheet,
-            zenith_distance_deg: None,
-            extinction: None,
-        });
+        let context = Context::new(indexed).with_options(&options, sheet.clone());
         let mut run = Run {
             tracker: Tracker::new(context).with_stars(arguments.stars as usize),
             calibration: calibration.as_ref(),

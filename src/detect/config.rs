@@ -1,9 +1,11 @@
 //! Options of detection.
 
 use crate::frame::{Frame, SaturationFinder};
+use serde::Serialize;
 
 /// How centroids are measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum CentroidMethod {
     /// Variance-weighted least-squares fit of a pixel-integrated Gaussian.

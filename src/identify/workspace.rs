@@ -74,19 +74,10 @@ impl Workspace {
         }
     }
 
-    /// The same, but a name is given where the odds that it is right are at least `odds` to 1.
-    /// Names less sure than 1 to 1 are never given: a star would have several.
-    #[must_use]
-    pub fn with_name_odds(self, odds: f64) -> Self {
-        Self {
-            name_odds: odds.max(1.0),
-            ..self
-        }
-    }
-
-    /// Empty buffers with the same settings.
-    pub(crate) fn emptied(&self) -> Self {
-        Self::new().with_name_odds(self.name_odds)
+    /// From the next field on, a name is given where the odds that it is right are at least `odds` to
+    /// 1. Names less sure than 1 to 1 are never given: a star would have several.
+    pub fn set_name_odds(&mut self, odds: f64) {
+        self.name_odds = odds.max(1.0);
     }
 
     /// Searches end with [`SearchFailure::Interrupted`] when `interrupt` is due.

@@ -9,7 +9,9 @@ use super::solution::{Solution, Source};
 use super::stopwatch::{Stage, Stopwatch};
 use crate::base::coords::PixelPoint;
 use crate::detect::DetectionFlags;
-use crate::identify::{ObservedStar, Photometry, SourceIndex, StarField};
+use crate::identify::{
+    ObservedStar, Photometry, Priors, ScalePrior, ScaleSource, SourceIndex, StarField,
+};
 use std::collections::HashMap;
 
 /// Standard error assumed on each axis of a centroid that is listed without one, in pixels.
@@ -162,7 +164,14 @@ pub fn solve_centroids(
 ) -> Solution {
     let mut clock = Stopwatch::start();
     workspace.set_deadline(clock.deadline(context.time_limit));
-    let priors = &context.priors;
+    let of_camera = context.camera.as_ref().map(|camera| ScalePrior {
+        source: ScaleSource::User,
+        ..ScalePrior::of_camera(&camera.sheet)
+    });
+    let priors = &Priors {
+        scale: context.priors.scale.or(of_camera),
+        ..context.priors
+    };
     let (list, left_out) = list.usable();
     let field = list.star_field(priors.years_since_j2000());
     let buffers = (&mut workspace.identify, &mut clock);

@@ -5,7 +5,7 @@ use crate::base::interrupt::Interrupt;
 use crate::calibration::Calibration;
 use crate::detect::{self, DetectConfig};
 use crate::frame::{self, Frame};
-use crate::identify::{self, DateSource, IndexedCatalog, Priors, ScalePrior};
+use crate::identify::{self, DateSource, IndexedCatalog, NAME_ODDS, Priors, ScalePrior};
 use crate::photometry::comparison::StatedCamera;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -29,6 +29,9 @@ pub struct Context<'a> {
     /// Whether to stop at attitude and optics, from the brightest stars: no other star is named, and
     /// nothing is measured that needs the names.
     pub attitude_only: bool,
+    /// A star is named where the odds are at least this many to 1 that the name is right, and at least
+    /// 1 to 1: else a star would have several.
+    pub name_odds: f64,
     /// Whether a frame is that of the file's rows as they are stored: the first is then row 0 of
     /// positions, attitude and world coordinates. Without it they are those of the picture as drawn.
     pub as_stored: bool,
@@ -46,6 +49,7 @@ impl<'a> Context<'a> {
             camera: None,
             calibration: None,
             attitude_only: false,
+            name_odds: NAME_ODDS,
             as_stored: false,
             time_limit: None,
         }
@@ -142,7 +146,6 @@ impl Workspace {
         let empty = Self {
             frames,
             detect: self.detect.emptied(),
-            identify: self.identify.emptied(),
             ..Self::new()
         };
         empty.until(&self.interrupt)

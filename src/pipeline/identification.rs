@@ -191,6 +191,7 @@ pub(super) fn attempt(
     context: &Context,
     (workspace, clock): (&mut identify::Workspace, &mut Stopwatch),
 ) -> Result<Identification, SearchFailure> {
+    workspace.set_name_odds(context.name_odds);
     if context.attitude_only {
         let found = workspace.attitude(field, priors, context.indexed);
         clock.lap(Stage::Pointing);

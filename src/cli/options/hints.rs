@@ -3,13 +3,9 @@
 use super::values;
 use crate::cli::exit::CommandError;
 use clap::Args;
-use starpipe::base::coords::UnitVector;
 use starpipe::base::epoch::ObservationDate;
-use starpipe::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
 use starpipe::camera::data_sheet::DataSheet;
-use starpipe::identify::{
-    DateSource, FrameDate, Priors, Scale, ScalePrior, ScaleSource, SkyRegion,
-};
+use starpipe::pipeline::SolveOptions;
 use starpipe::sky::observer::Site;
 use std::path::PathBuf;
 
@@ -26,11 +22,10 @@ pub(crate) struct HintOptions {
     /// How far --fov or --pixel-scale may be off, in percent [default: 10]
     #[arg(long, value_name = "PERCENT", value_parser = values::percent, allow_hyphen_values = true)]
     pub(crate) scale_error: Option<f64>,
-    /// Approximate direction of the frame's centre, in degrees
-    #[arg(long, value_name = "RA,DEC", value_parser = values::direction, allow_hyphen_values = true,
-          requires = "radius")]
+    /// Approximate direction of the frame's centre, in degrees or as 05h35m17s,-05d23m28s
+    #[arg(long, value_name = "RA,DEC", value_parser = values::direction, allow_hyphen_values = true)]
     pub(crate) near: Option<values::Direction>,
-    /// How far from --near the frame's centre may lie, in degrees
+    /// How far from --near the frame's centre may lie, in degrees [default: 10]
     #[arg(long, value_name = "DEG", value_parser = values::radius, allow_hyphen_values = true,
           requires = "near")]
     pub(crate) radius: Option<f64>,
@@ -48,60 +43,35 @@ pub(crate) struct HintOptions {
     pub(crate) camera: Option<PathBuf>,
 }
 
-/// Default of --scale-error, in percent.
-const DEFAULT_SCALE_ERROR_PERCENT: f64 = 10.0;
-
 impl HintOptions {
-    /// The hints, without the camera's.
-    pub(crate) fn resolve(&self) -> Result<Priors, CommandError> {
-        let fov = self.fov.map(|deg| Scale::FieldOfView(deg * RAD_PER_DEG));
-        let pixel = self
-            .pixel_scale
-            .map(|arcsec| Scale::Pixel(arcsec * RAD_PER_ARCSEC));
-        let scale = fov.or(pixel);
-        if scale.is_none() && self.scale_error.is_some() {
+    /// The defaults with the hints that are given.
+    pub(crate) fn options(&self) -> Result<SolveOptions, CommandError> {
+        if self.scale_error.is_some() && self.fov.or(self.pixel_scale).is_none() {
             return Err(CommandError::usage(
                 "--scale-error is the error of --fov or --pixel-scale; give one of these, too",
             ));
         }
-        let tolerance = self.scale_error.unwrap_or(DEFAULT_SCALE_ERROR_PERCENT) / 100.0;
-        let near = self.near.zip(self.radius).map(|(direction, radius_deg)| {
-            let ra_rad = direction.ra_deg * RAD_PER_DEG;
-            let dec_rad = direction.dec_deg * RAD_PER_DEG;
-            SkyRegion {
-                centre: UnitVector::from_ra_dec(ra_rad, dec_rad),
-                radius_rad: radius_deg * RAD_PER_DEG,
-            }
-        });
-        Ok(Priors {
-            scale: scale.map(|scale| ScalePrior::by_user(scale, tolerance)),
-            near,
-            date: self.date.map(|date| FrameDate {
-                date,
-                source: DateSource::Option,
-            }),
-            site: self.site,
-            exposure_s: None,
-        })
-    }
-
-    /// The hints, with the camera's scale as a hard constraint if no other is given.
-    pub(crate) fn resolve_with_camera(&self) -> Result<Priors, CommandError> {
-        let sheet = self.data_sheet()?;
-        let priors = self.resolve()?;
-        let of_camera = sheet.as_ref().map(|sheet| ScalePrior {
-            source: ScaleSource::User,
-            ..ScalePrior::of_camera(sheet)
-        });
-        Ok(Priors {
-            scale: priors.scale.or(of_camera),
-            ..priors
-        })
+        let mut options = SolveOptions::default();
+        options.fov_deg = self.fov;
+        options.pixel_scale_arcsec = self.pixel_scale;
+        options.near_deg = self.near.map(|near| [near.ra_deg, near.dec_deg]);
+        options.date = self.date;
+        options.site = self.site;
+        set(&mut options.scale_error_percent, self.scale_error);
+        set(&mut options.radius_deg, self.radius);
+        Ok(options)
     }
 
     /// The camera, if one is given.
     pub(crate) fn data_sheet(&self) -> anyhow::Result<Option<DataSheet>> {
         let read = |path: &PathBuf| Ok(DataSheet::read(path)?);
         self.camera.as_ref().map(read).transpose()
+    }
+}
+
+/// Replaces a default by what is given.
+pub(crate) fn set<T>(default: &mut T, given: Option<T>) {
+    if let Some(given) = given {
+        *default = given;
     }
 }

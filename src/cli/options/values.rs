@@ -59,22 +59,59 @@ pub(crate) fn share(text: &str) -> Result<f64, String> {
     )
 }
 
-/// A right ascension in degrees.
+/// A right ascension: degrees, or hours, minutes and seconds. In degrees.
 pub(crate) fn right_ascension(text: &str) -> Result<f64, String> {
-    let limits = "from 0 to 360 degrees";
-    let accepts = |v| (0.0..=360.0).contains(&v);
-    within(text, "the right ascension", accepts, limits)
+    const DEG_PER_HOUR: f64 = 15.0;
+    let hours = sexagesimal(text, 'h').map(|hours| hours * DEG_PER_HOUR);
+    let degrees = hours.or_else(|| sexagesimal(text, 'd'));
+    let value = degrees.map_or_else(|| finite(text), Ok)?;
+    if (0.0..=360.0).contains(&value) {
+        return Ok(value);
+    }
+    Err("the right ascension must be from 0 to 360 degrees, or from 0 to 24 hours".to_owned())
 }
 
-/// A declination in degrees.
+/// A declination: degrees, or degrees, minutes and seconds. In degrees.
 pub(crate) fn declination(text: &str) -> Result<f64, String> {
-    let limits = "from -90 to 90 degrees";
-    within(
-        text,
-        "the declination",
-        |v| (-90.0..=90.0).contains(&v),
-        limits,
-    )
+    let value = sexagesimal(text, 'd').map_or_else(|| finite(text), Ok)?;
+    if (-90.0..=90.0).contains(&value) {
+        return Ok(value);
+    }
+    Err("the declination must be from -90 to 90 degrees".to_owned())
+}
+
+/// A number in sixtieths, as `05h35m17.3s` or `05:35:17.3`, of which the seconds may be missing; `unit`
+/// is the letter after the whole.
+fn sexagesimal(text: &str, unit: char) -> Option<f64> {
+    let text = text.trim();
+    let (sign, digits) = match text.strip_prefix('-') {
+        Some(rest) => (-1.0, rest),
+        None => (1.0, text.strip_prefix('+').unwrap_or(text)),
+    };
+    let parts: Vec<&str> = if digits.contains(':') {
+        digits.split(':').collect()
+    } else {
+        let (whole, rest) = digits.split_once(unit)?;
+        let rest = rest.strip_suffix('s').unwrap_or(rest);
+        let minutes = rest.split('m').filter(|part| !part.is_empty());
+        std::iter::once(whole).chain(minutes).collect()
+    };
+    let is_number = |part: &&&str| {
+        part.bytes()
+            .all(|byte| byte.is_ascii_digit() || byte == b'.')
+    };
+    let numbers: Vec<f64> = parts
+        .iter()
+        .filter(is_number)
+        .map_while(|part| part.parse().ok())
+        .collect();
+    let is_whole = numbers.len() == parts.len() && numbers.len() <= 3;
+    let is_valid = is_whole && numbers.iter().skip(1).all(|part| *part < 60.0);
+    let sum = numbers
+        .iter()
+        .rev()
+        .fold(0.0, |sum, part| sum / 60.0 + part);
+    is_valid.then_some(sign * sum)
 }
 
 /// A mean number of stars.
@@ -167,7 +204,7 @@ pub(crate) fn radius(text: &str) -> Result<f64, String> {
 pub(crate) fn direction(text: &str) -> Result<Direction, String> {
     let (ra, dec) = text
         .split_once(',')
-        .ok_or("expected right ascension and declination in degrees, separated by a comma")?;
+        .ok_or("expected right ascension and declination, separated by a comma")?;
     Ok(Direction {
         ra_deg: right_ascension(ra)?,
         dec_deg: declination(dec)?,
@@ -186,6 +223,41 @@ pub(crate) fn whole(text: &str) -> Result<usize, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn directions_are_read_in_degrees_and_in_sixtieths() {
+        let expected = (83.822_083, -5.391_111);
+        for text in [
+            "83.822083,-5.391111",
+            "05h35m17.3s,-05d23m28s",
+            "5:35:17.3, -5:23:28",
+            "83.822083,-05:23:28",
+        ] {
+            let found = direction(text).unwrap();
+            assert!(
+                (found.ra_deg - expected.0).abs() < 1e-6,
+                "{text}: {found:?}"
+            );
+            assert!(
+                (found.dec_deg - expected.1).abs() < 1e-6,
+                "{text}: {found:?}"
+            );
+        }
+        assert_eq!(declination("-0:30"), Ok(-0.5));
+        assert_eq!(right_ascension("12h"), Ok(180.0));
+        for text in [
+            "5:61,0",
+            "25h,0",
+            "1:2:3:4,0",
+            "5h35x,0",
+            "::,0",
+            "5,91d",
+            "NaN,0",
+            "1e999,0",
+        ] {
+            assert!(direction(text).is_err(), "{text}");
+        }
+    }
 
     #[test]
     fn nan_infinity_and_words_are_refused() {

@@ -3,6 +3,7 @@
 use crate::cli::exit::CommandError;
 use crate::cli::input::frames::read_master;
 use crate::cli::options::frames::{FrameOptions, MemoryOption, PageChoice};
+use crate::cli::options::hints::set;
 use crate::cli::options::values;
 use crate::cli::solving::Plan;
 use crate::cli::solving::options::SolvingOptions;
@@ -11,10 +12,8 @@ use clap::{Args, ValueEnum, value_parser};
 use starpipe::archive::{DEFAULT_FRAMES_PER_PART, Shard};
 use starpipe::calibration::{Calibration, read_hot_pixels};
 use starpipe::camera::data_sheet::DataSheet;
-use starpipe::detect::{CentroidMethod, DetectConfig};
-use starpipe::identify::Priors;
-use starpipe::model::sensitivity::Extinction;
-use starpipe::photometry::comparison::StatedCamera;
+use starpipe::detect::CentroidMethod;
+use starpipe::pipeline::SolveOptions;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -133,19 +132,32 @@ pub(super) struct PartOptions {
 }
 
 impl ProcessArgs {
+    /// All that is stated for the frames.
+    fn options(&self) -> Result<SolveOptions, CommandError> {
+        let mut options = self.solving.options()?;
+        options.exposure_s = self.exposure.exposure;
+        options.zenith_distance_deg = self.exposure.zenith_distance;
+        options.extinction_mag_per_airmass = self.exposure.extinction;
+        let detection = &self.detection;
+        options.sigma = detection.sigma;
+        set(&mut options.false_alarms_per_mpx, detection.false_alarms);
+        set(
+            &mut options.max_stars,
+            detection.max_stars.map(|stars| stars as usize),
+        );
+        set(
+            &mut options.centroid,
+            detection.centroid.map(CentroidMethod::from),
+        );
+        Ok(options)
+    }
+
     pub(super) fn plan(&self) -> Result<Plan, CommandError> {
-        let hints = &self.solving.hints;
-        let sheet = hints.data_sheet()?;
+        let camera = self.solving.hints.data_sheet()?;
         Ok(Plan {
-            detect: self.detection.config(),
-            priors: Priors {
-                exposure_s: self.exposure.exposure,
-                ..hints.resolve()?
-            },
-            calibration: self.calibration.read(sheet.as_ref())?,
-            camera: sheet.map(|sheet| self.exposure.stated_camera(sheet)),
-            attitude_only: self.solving.attitude_only,
-            time_limit: self.solving.time_limit(),
+            options: self.options()?,
+            calibration: self.calibration.read(camera.as_ref())?,
+            camera,
             memory: self.memory.limit(),
         })
     }
@@ -170,38 +182,11 @@ impl CalibrationOptions {
     }
 }
 
-impl DetectionOptions {
-    /// The library's defaults, with the options given.
-    fn config(&self) -> DetectConfig {
-        let default = DetectConfig::default();
-        DetectConfig {
-            threshold_sigma: self.sigma,
-            false_alarms_per_mpx: self.false_alarms.unwrap_or(default.false_alarms_per_mpx),
-            max_detections: self
-                .max_stars
-                .map_or(default.max_detections, |stars| stars as usize),
-            centroid: self.centroid.map_or(default.centroid, CentroidMethod::from),
-            ..default
-        }
-    }
-}
-
 impl From<Centroid> for CentroidMethod {
     fn from(centroid: Centroid) -> Self {
         match centroid {
             Centroid::GaussianFit => Self::GaussianFit,
             Centroid::GreyWeighted => Self::GreyWeighted,
-        }
-    }
-}
-
-impl ExposureOptions {
-    /// The camera with its zenith distance and extinction as the user states them.
-    fn stated_camera(&self, sheet: DataSheet) -> StatedCamera {
-        StatedCamera {
-            sheet,
-            zenith_distance_deg: self.zenith_distance,
-            extinction: self.extinction.map(Extinction::MagPerAirmass),
         }
     }
 }

@@ -31,13 +31,12 @@ pub(super) fn process_parts(
     let names = frame_names(&arguments.frames.frames)?;
     let plan = Plan::new(names, options.frames_per_part)?;
     arguments.solving.catalog.with_index(|pool, indexed| {
-        let configuration = configuration(arguments, indexed.catalog())?;
+        let configuration = configuration(arguments, &solving.options, indexed.catalog())?;
         let archive = Archive::claim(directory, plan, &configuration).map_err(claim_error)?;
         let worker = Worker {
             pool,
             context: solving.context(indexed),
             indexed,
-            name_odds: arguments.solving.name_odds,
             memory: solving.memory,
             page: arguments.page,
         };
@@ -66,7 +65,6 @@ struct Worker<'a> {
     pool: &'a rayon::ThreadPool,
     context: Context<'a>,
     indexed: &'a IndexedCatalog<'a>,
-    name_odds: f64,
     memory: MemoryLimit,
     page: Option<PageChoice>,
 }
@@ -110,7 +108,7 @@ impl Worker<'_> {
         let mut writer = archive.write(part)?;
         let mut added = Ok(());
         let work = |name: &String, workspace: &mut Workspace| self.solve(name, workspace);
-        let buffers = || workspace(self.pool, part.names.len(), self.name_odds, self.memory);
+        let buffers = || workspace(self.pool, part.names.len(), self.memory);
         for_each_ordered(self.pool, part.names, buffers, work, |_, images| {
             progress.inc(1);
             added = images.into_iter().try_for_each(|(name, solved)| {

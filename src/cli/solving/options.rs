@@ -1,14 +1,14 @@
 //! Options of `process` and `identify`.
 
+use crate::cli::exit::CommandError;
 use crate::cli::options::catalog::CatalogOptions;
 use crate::cli::options::format::Format;
 use crate::cli::options::hints::HintOptions;
 use crate::cli::options::values;
 use clap::Args;
 use starpipe::identify::NAME_ODDS;
-use starpipe::pipeline::DEFAULT_TIME_LIMIT_S;
+use starpipe::pipeline::{DEFAULT_TIME_LIMIT_S, SolveOptions};
 use std::path::PathBuf;
-use std::time::Duration;
 
 #[derive(Debug, Args)]
 pub(crate) struct SolvingOptions {
@@ -53,9 +53,13 @@ pub(crate) const FRAME_RESULTS: &[&str] = &["json", "csv", "png", "wcs"];
 pub(crate) const LIST_RESULTS: &[&str] = &["json", "csv", "wcs"];
 
 impl SolvingOptions {
-    /// How long a frame may take; `None` if that is longer than any clock runs.
-    pub(crate) fn time_limit(&self) -> Option<Duration> {
-        Duration::try_from_secs_f64(self.time_limit_s).ok()
+    /// The defaults with what is given.
+    pub(crate) fn options(&self) -> Result<SolveOptions, CommandError> {
+        let mut options = self.hints.options()?;
+        options.name_odds = self.name_odds;
+        options.attitude_only = self.attitude_only;
+        options.time_limit_s = Some(self.time_limit_s);
+        Ok(options)
     }
 
     /// Whether `--out` is given.

@@ -10,39 +10,29 @@ use crate::cli::output::overwrite;
 use crate::cli::progress::frames_bar;
 use indicatif::ProgressBar;
 use starpipe::calibration::Calibration;
-use starpipe::detect::DetectConfig;
+use starpipe::camera::data_sheet::DataSheet;
 use starpipe::frame::MemoryLimit;
-use starpipe::identify::{IndexedCatalog, Priors};
-use starpipe::photometry::comparison::StatedCamera;
-use starpipe::pipeline::{Context, Workspace};
+use starpipe::identify::IndexedCatalog;
+use starpipe::pipeline::{Context, SolveOptions, Workspace};
 use starpipe::report::FrameReport;
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
-/// The parts of a [`Context`] that the options give.
+/// What the inputs are solved with, beside the catalogue.
 #[derive(Default)]
 pub(crate) struct Plan {
-    pub(crate) detect: DetectConfig,
-    pub(crate) priors: Priors,
-    pub(crate) camera: Option<StatedCamera>,
+    pub(crate) options: SolveOptions,
+    pub(crate) camera: Option<DataSheet>,
     pub(crate) calibration: Option<Calibration>,
-    pub(crate) attitude_only: bool,
-    pub(crate) time_limit: Option<Duration>,
     pub(crate) memory: MemoryLimit,
 }
 
 impl Plan {
     pub(crate) fn context<'a>(&'a self, indexed: &'a IndexedCatalog<'a>) -> Context<'a> {
         Context {
-            attitude_only: self.attitude_only,
-            time_limit: self.time_limit,
-            detect: self.detect.clone(),
-            priors: self.priors,
-            camera: self.camera.clone(),
             calibration: self.calibration.as_ref(),
-            ..Context::new(indexed)
+            ..Context::new(indexed).with_options(&self.options, self.camera.clone())
         }
     }
 }
@@ -61,10 +51,7 @@ pub(crate) fn solve_all(
     solve: impl Fn(&Context, &Path, &mut Workspace, Finish) -> Vec<anyhow::Result<Answer>> + Sync,
 ) -> Result<Exit, CommandError> {
     let SolvingOptions {
-        output,
-        catalog,
-        name_odds,
-        ..
+        output, catalog, ..
     } = options;
     if let Some(directory) = &output.out {
         overwrite::check(inputs, directory, extensions)?;
@@ -85,7 +72,7 @@ pub(crate) fn solve_all(
         };
         let work =
             |input: &PathBuf, workspace: &mut Workspace| solve(&context, input, workspace, &finish);
-        let workspace = || workspace(pool, inputs.len(), name_odds, plan.memory);
+        let workspace = || workspace(pool, inputs.len(), plan.memory);
         batch::for_each_ordered(pool, inputs, workspace, work, |_, answers| {
             run.progress.inc(1);
             answers.into_iter().try_for_each(|answer| run.take(answer))
@@ -95,15 +82,9 @@ pub(crate) fn solve_all(
 }
 
 /// A workspace of one thread. A single input is solved on all threads.
-pub(crate) fn workspace(
-    pool: &rayon::ThreadPool,
-    inputs: usize,
-    name_odds: f64,
-    memory: MemoryLimit,
-) -> Workspace {
+pub(crate) fn workspace(pool: &rayon::ThreadPool, inputs: usize, memory: MemoryLimit) -> Workspace {
     let mut workspace = Workspace::new();
     workspace.frames.set_memory(memory);
-    workspace.identify = workspace.identify.with_name_odds(name_odds);
     if let (1, Some(threads)) = (inputs, NonZeroUsize::new(pool.current_num_threads())) {
         workspace.detect = workspace.detect.on_threads(threads);
     }

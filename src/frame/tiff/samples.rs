@@ -37,7 +37,7 @@ impl Layout<'_> {
     pub fn samples<T: Word>(&self, source: Source) -> Result<Vec<T>, FrameError> {
         let count = self.width * self.height * self.channels;
         let mut samples = Vec::with_capacity(count);
-        let mut row = vec![T::default(); self.chunk_size.0.min(self.width) * self.chunk_samples];
+        let mut row = Vec::new();
         for chunk in self.chunks() {
             let rows = self.decompress(source, &chunk)?;
             self.unpack_chunk((&chunk, &rows), source, &mut row, &mut samples)?;
@@ -57,10 +57,11 @@ impl Layout<'_> {
         &self,
         (chunk, rows): (&Chunk, &Rows),
         source: Source,
-        row: &mut [T],
+        row: &mut Vec<T>,
         samples: &mut Vec<T>,
     ) -> Result<(), FrameError> {
-        let row = &mut row[..chunk.columns * self.chunk_samples];
+        // Its bytes are there: a pixel of a damaged file may have any number of samples before that.
+        row.resize(chunk.columns * self.chunk_samples, T::default());
         let planes = if self.chunk_samples == 1 {
             1
         } else {

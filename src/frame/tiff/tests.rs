@@ -487,6 +487,16 @@ fn a_chunk_that_the_file_does_not_have_is_truncated() {
 }
 
 #[test]
+fn samples_of_a_pixel_need_no_memory_before_their_bytes_are_there() {
+    let page = Page::grey(1_000_000, 3, 2).with(262, 2).with(277, 65_535);
+    let read = decode(&tiff(&[page], true));
+    assert!(
+        matches!(read, Err(FrameError::Truncated { .. })),
+        "{read:?}"
+    );
+}
+
+#[test]
 fn numbers_of_a_directory_are_of_the_types_that_hold_them() {
     let bytes = tiff(&[Page::grey(4, 3, 1)], false);
     let file = TiffFile::of(&bytes).unwrap();

@@ -1,0 +1,145 @@
+"""What is stated for frames: one set of options for all that solves them."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar
+
+from ._hints import (
+    NAME_ODDS,
+    RADIUS_DEG,
+    count,
+    direction,
+    header_date,
+    header_exposure,
+    iso_date,
+    positive,
+    within,
+)
+from ._hints import site as geodetic
+
+if TYPE_CHECKING:
+    from astropy.coordinates import Angle, EarthLocation, SkyCoord
+    from astropy.time import Time
+    from astropy.units import Quantity
+
+
+class SolveOptions(TypedDict, total=False):
+    """What is stated for frames. All of it is optional.
+
+    Parameters
+    ----------
+    fov, pixel_scale : Quantity or float
+        Horizontal field of view (degrees), or the angle of a pixel (arcseconds).
+    scale_error : Quantity or float
+        How far `fov` or `pixel_scale` may be off, in percent; 10 by default.
+    near : SkyCoord or (ra, dec)
+        Where the centre of the frame lies, in degrees.
+    radius : Angle or float
+        How far from there it may lie, in degrees; 10 by default.
+    date : Time, datetime or str
+        When the frame was taken, in UTC. By default of the header or the file's name.
+    site : EarthLocation or (latitude, longitude[, height])
+        Where it was taken, in degrees and metres.
+    exposure : Quantity or float
+        Exposure in seconds. By default of the header.
+    zenith_distance : Angle or float
+        Zenith distance of the frame's centre in degrees, for the prediction of a camera.
+    extinction : Quantity or float
+        Extinction in magnitudes per airmass, for the same.
+    sigma : float
+        Threshold of detection in standard deviations, in place of `false_alarms`.
+    false_alarms : float
+        Accepted false detections in a million pixels of noise; 0.1 by default.
+    max_stars : int
+        Measure the brightest stars alone.
+    centroid : {"gaussian-fit", "grey-weighted"}
+        How to measure the position of a star: the first is the most accurate, and the default.
+    name_odds : float
+        A star is named where the odds are at least this many to 1 that the name is right; 100 by
+        default.
+    attitude_only : bool
+        Stop at the attitude: no star beyond the brightest is named.
+    time_limit : Quantity or float
+        How long a frame may take, in seconds. By default as long as it needs.
+    """
+
+    fov: Quantity | float | None
+    pixel_scale: Quantity | float | None
+    scale_error: Quantity | float
+    near: SkyCoord | tuple[float, float] | None
+    radius: Angle | Quantity | float
+    date: Time | str | Any | None
+    site: EarthLocation | tuple[float, ...] | None
+    exposure: Quantity | float | None
+    zenith_distance: Angle | Quantity | float | None
+    extinction: Quantity | float | None
+    sigma: float | None
+    false_alarms: float | None
+    max_stars: int | None
+    centroid: Literal["gaussian-fit", "grey-weighted"] | None
+    name_odds: float
+    attitude_only: bool
+    time_limit: Quantity | float | None
+
+
+def solve_options(
+    header: Any = None,
+    *,
+    fov: Any = None,
+    pixel_scale: Any = None,
+    scale_error: Any = 10.0,
+    near: Any = None,
+    radius: Any = RADIUS_DEG,
+    date: Any = None,
+    site: Any = None,
+    exposure: Any = None,
+    zenith_distance: Any = None,
+    extinction: Any = None,
+    sigma: Any = None,
+    false_alarms: Any = None,
+    max_stars: Any = None,
+    centroid: Any = None,
+    name_odds: Any = NAME_ODDS,
+    attitude_only: bool = False,
+    time_limit: Any = None,
+) -> dict[str, Any]:
+    """Return what the compiled part takes; a header completes what is not known."""
+    if fov is not None and pixel_scale is not None:
+        raise ValueError("fov and pixel_scale say the same: give one")
+    header = {} if header is None else header
+    date = header_date(header) if date is None else date
+    exposure = header_exposure(header) if exposure is None else exposure
+    return {
+        "fov_deg": positive(fov, "deg", "fov", 179.0),
+        "pixel_scale_arcsec": positive(pixel_scale, "arcsec", "pixel_scale"),
+        "scale_error_percent": positive(scale_error, "percent", "scale_error", 100.0),
+        "near_deg": direction(near),
+        "radius_deg": positive(radius, "deg", "radius", 180.000001),
+        "date": iso_date(date),
+        "site": geodetic(site),
+        "exposure_s": positive(exposure, "s", "exposure"),
+        "zenith_distance_deg": within(zenith_distance, "deg", "zenith_distance", 0.0, 89.999),
+        "extinction_mag_per_airmass": within(extinction, "mag", "extinction", 0.0, 10.0),
+        "sigma": positive(sigma, "", "sigma"),
+        "false_alarms_per_mpx": positive(false_alarms, "", "false_alarms"),
+        "max_stars": None if max_stars is None else count(max_stars, "max_stars", 4),
+        "centroid": centroid,
+        "name_odds": within(name_odds, "", "name_odds", 1.0),
+        "attitude_only": bool(attitude_only),
+        "time_limit_s": positive(time_limit, "s", "time_limit"),
+    }
+
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def takes_options(function: _Function) -> _Function:
+    """Give a function whose last parameter is ``**options`` the signature that it has with them."""
+    signature = inspect.signature(function)
+    own = list(signature.parameters.values())[:-1]
+    options = inspect.signature(solve_options).parameters.values()
+    stated = [option for option in options if option.kind is inspect.Parameter.KEYWORD_ONLY]
+    function.__signature__ = signature.replace(parameters=own + stated)  # type: ignore[attr-defined]
+    return function

@@ -1,0 +1,165 @@
+//! What is stated for all frames, as people state it: hints, limits, and what to measure.
+
+use super::context::{Context, DEFAULT_TIME_LIMIT_S};
+use crate::base::coords::UnitVector;
+use crate::base::epoch::ObservationDate;
+use crate::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
+use crate::camera::data_sheet::DataSheet;
+use crate::detect::{CentroidMethod, DetectConfig};
+use crate::identify::{DateSource, FrameDate, NAME_ODDS, Priors, Scale, ScalePrior, SkyRegion};
+use crate::model::sensitivity::Extinction;
+use crate::photometry::comparison::StatedCamera;
+use crate::sky::observer::Site;
+use serde::{Serialize, Serializer};
+use std::time::Duration;
+
+/// What is stated for all frames; `None` stands for what the frame itself or the default says.
+///
+/// The options of `starpipe process` and of `Pipeline.solve` in Python have the names of these fields
+/// without their units.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct SolveOptions {
+    /// Horizontal field of view.
+    pub fov_deg: Option<f64>,
+    /// Angle of a pixel, where no field of view is given.
+    pub pixel_scale_arcsec: Option<f64>,
+    /// How far either of them may be off.
+    pub scale_error_percent: f64,
+    /// Right ascension and declination near which the frame's centre lies.
+    pub near_deg: Option<[f64; 2]>,
+    /// How far from there it may lie.
+    pub radius_deg: f64,
+    /// When the frames were taken.
+    #[serde(serialize_with = "iso")]
+    pub date: Option<ObservationDate>,
+    /// Where they were taken.
+    #[serde(serialize_with = "geodetic")]
+    pub site: Option<Site>,
+    /// Exposure.
+    pub exposure_s: Option<f64>,
+    /// Zenith distance of the frames' centres, where a camera is stated.
+    pub zenith_distance_deg: Option<f64>,
+    /// Extinction, for the same.
+    pub extinction_mag_per_airmass: Option<f64>,
+    /// Detection threshold in standard deviations, in place of `false_alarms_per_mpx`.
+    pub sigma: Option<f64>,
+    /// Accepted false detections in a million pixels of noise.
+    pub false_alarms_per_mpx: f64,
+    /// Largest number of stars that are measured, the brightest.
+    pub max_stars: usize,
+    /// How centroids are measured.
+    pub centroid: CentroidMethod,
+    /// A star is named where the odds are at least this many to 1 that the name is right.
+    pub name_odds: f64,
+    /// Whether to stop at attitude and optics, from the brightest stars.
+    pub attitude_only: bool,
+    /// How long a frame may take.
+    pub time_limit_s: Option<f64>,
+}
+
+impl SolveOptions {
+    /// Default of [`scale_error_percent`](Self::scale_error_percent).
+    pub const DEFAULT_SCALE_ERROR_PERCENT: f64 = 10.0;
+    /// Default of [`radius_deg`](Self::radius_deg).
+    pub const DEFAULT_RADIUS_DEG: f64 = 10.0;
+
+    /// What is known of every frame.
+    pub fn priors(&self) -> Priors {
+        let fov = self
+            .fov_deg
+            .map(|deg| Scale::FieldOfView(deg * RAD_PER_DEG));
+        let pixel = self.pixel_scale_arcsec;
+        let scale = fov.or(pixel.map(|arcsec| Scale::Pixel(arcsec * RAD_PER_ARCSEC)));
+        let tolerance = self.scale_error_percent / 100.0;
+        Priors {
+            scale: scale.map(|scale| ScalePrior::by_user(scale, tolerance)),
+            near: self.near_deg.map(|near_deg| {
+                let [ra_rad, dec_rad] = near_deg.map(|deg| deg * RAD_PER_DEG);
+                SkyRegion {
+                    centre: UnitVector::from_ra_dec(ra_rad, dec_rad),
+                    radius_rad: self.radius_deg * RAD_PER_DEG,
+                }
+            }),
+            date: self.date.map(|date| FrameDate {
+                date,
+                source: DateSource::Option,
+            }),
+            site: self.site,
+            exposure_s: self.exposure_s,
+        }
+    }
+
+    /// How to detect stars.
+    pub fn detect_config(&self) -> DetectConfig {
+        DetectConfig {
+            threshold_sigma: self.sigma,
+            false_alarms_per_mpx: self.false_alarms_per_mpx,
+            max_detections: self.max_stars,
+            centroid: self.centroid,
+            ..DetectConfig::default()
+        }
+    }
+
+    fn stated_camera(&self, sheet: DataSheet) -> StatedCamera {
+        StatedCamera {
+            sheet,
+            zenith_distance_deg: self.zenith_distance_deg,
+            extinction: self
+                .extinction_mag_per_airmass
+                .map(Extinction::MagPerAirmass),
+        }
+    }
+}
+
+impl Default for SolveOptions {
+    fn default() -> Self {
+        let detect = DetectConfig::default();
+        Self {
+            fov_deg: None,
+            pixel_scale_arcsec: None,
+            scale_error_percent: Self::DEFAULT_SCALE_ERROR_PERCENT,
+            near_deg: None,
+            radius_deg: Self::DEFAULT_RADIUS_DEG,
+            date: None,
+            site: None,
+            exposure_s: None,
+            zenith_distance_deg: None,
+            extinction_mag_per_airmass: None,
+            sigma: detect.threshold_sigma,
+            false_alarms_per_mpx: detect.false_alarms_per_mpx,
+            max_stars: detect.max_detections,
+            centroid: detect.centroid,
+            name_odds: NAME_ODDS,
+            attitude_only: false,
+            time_limit_s: Some(DEFAULT_TIME_LIMIT_S),
+        }
+    }
+}
+
+impl<'a> Context<'a> {
+    /// The same with what is stated for all frames, and the camera that took them.
+    #[must_use]
+    pub fn with_options(self, options: &SolveOptions, camera: Option<DataSheet>) -> Self {
+        let limit_s = options.time_limit_s;
+        Self {
+            detect: options.detect_config(),
+            priors: options.priors(),
+            camera: camera.map(|sheet| options.stated_camera(sheet)),
+            name_odds: options.name_odds,
+            attitude_only: options.attitude_only,
+            // A limit that is longer than any clock runs is none.
+            time_limit: limit_s.and_then(|limit_s| Duration::try_from_secs_f64(limit_s).ok()),
+            ..self
+        }
+    }
+}
+
+fn iso<S: Serializer>(date: &Option<ObservationDate>, serializer: S) -> Result<S::Ok, S::Error> {
+    date.map(|date| date.to_iso()).serialize(serializer)
+}
+
+fn geodetic<S: Serializer>(site: &Option<Site>, serializer: S) -> Result<S::Ok, S::Error> {
+    let geodetic = site.map(|site| [site.lat_deg(), site.lon_deg(), site.height_m()]);
+    geodetic.serialize(serializer)
+}
