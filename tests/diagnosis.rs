@@ -77,7 +77,7 @@ fn a_frame_with_too_few_stars_says_how_many_it_takes() {
         &canvas.develop(1),
         &[],
         "too_few_stars",
-        &["no star", "at least 4", "--sigma"],
+        &["no star", "at least 4", "threshold"],
     );
     canvas.spot(100.0, 200.0, flux_adu(3.0));
     canvas.spot(300.0, 150.0, flux_adu(3.0));
@@ -149,14 +149,14 @@ fn a_wrong_hint_is_reported_with_the_solution_without_it() {
     let scale = ["24.0° wide", "36.0° to 44.0° wide, excludes"];
     check(&picture, &["--fov", "40"], "hints_exclude", &scale);
     let elsewhere = ["--near", "103,0", "--radius", "5"];
-    let place = [around, "20.0° from --near", "--radius of 5.00°"];
+    let place = [around, "20.0° from the direction", "radius of 5.00°"];
     check(&picture, &elsewhere, "hints_exclude", &place);
     let both = ["--fov", "40", "--near", "103,0", "--radius", "5"];
     check(
         &picture,
         &both,
         "hints_exclude",
-        &["excludes, and which is 20.0° from --near"],
+        &["excludes, and which is 20.0° from the direction"],
     );
 }
 

@@ -71,8 +71,7 @@ fn an_image_that_needs_too_much_memory_is_refused_before_it_is_decoded() {
     fs::copy(orion(), &path).unwrap();
     let ran = process(&[Path::new("--max-memory"), Path::new("1"), &path]);
     assert_eq!(ran.status, 1);
-    let expected =
-        "640 x 480 pixels of this kind need 2 MB of memory, expected at most 1 MB (--max-memory)";
+    let expected = "640 x 480 pixels of this kind need 2 MB of memory, expected at most 1 MB; see --max-memory";
     assert!(ran.stderr.contains(expected), "{}", ran.stderr);
 }
 
@@ -353,7 +352,8 @@ fn a_frame_that_is_not_read_in_time_is_told_of() {
     let limited = ["--time-limit", "0.1"].map(Path::new);
     let ran = process(&[&limited[..], &[&path, &orion()]].concat());
     assert_eq!(ran.status, 1);
-    let expected = "slow.pgm.gz: not done within the time limit of a frame (--time-limit)";
+    let expected =
+        "slow.pgm.gz: not done within the time limit of a frame: interrupted; see --time-limit";
     assert!(ran.stderr.contains(expected), "{}", ran.stderr);
     assert!(ran.stdout.contains("orion.png"), "{}", ran.stdout);
 }

@@ -421,9 +421,10 @@ fn a_frame_that_takes_too_long_is_told() {
                 .arg(input),
         )
     };
+    // While it is read.
     let ran = limited("process", &frame);
     assert_eq!(ran.status, 1);
-    assert!(ran.stderr.contains("time limit"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("; see --time-limit"), "{}", ran.stderr);
 
     let out = tempfile::tempdir().unwrap();
     let table = starpipe()

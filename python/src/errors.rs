@@ -1,9 +1,15 @@
-//! Errors as Python's exceptions: `OSError` for files, `ValueError` for what is in them.
+//! Errors as Python's exceptions: `OSError` for files, `ValueError` for what is in them, `TimeoutError`
+//! where the time is over.
 
-use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyOSError, PyRuntimeError, PyTimeoutError, PyValueError};
 use pyo3::prelude::*;
 use serde::Serialize;
+use starpipe::Interrupted;
 use starpipe::base::panics::{Panicked, caught};
+use starpipe::base::remedy::{OptionNames, Remedy};
+use starpipe::detect::DetectError;
+use starpipe::frame::FrameError;
+use starpipe::pipeline::remedies_of;
 use std::error::Error;
 use std::io;
 
@@ -28,9 +34,11 @@ pub fn message(error: &(dyn Error + 'static)) -> String {
 /// The exception for `error`.
 pub fn exception(error: impl Error + 'static) -> PyErr {
     let has = |is_it: fn(&(dyn Error + 'static)) -> bool| causes(&error).any(is_it);
-    let text = in_pythons_words(&message(&error));
+    let text = message(&error) + &see(&remedies_of(&error));
     if has(|cause| cause.is::<Panicked>()) {
         PyRuntimeError::new_err(text)
+    } else if has(is_interruption) {
+        PyTimeoutError::new_err(text)
     } else if has(|cause| cause.is::<io::Error>()) {
         PyOSError::new_err(text)
     } else {
@@ -38,24 +46,20 @@ pub fn exception(error: impl Error + 'static) -> PyErr {
     }
 }
 
-/// The program's options that have another name in Python.
-const OTHER_NAMES: [(&str, &str); 2] = [("site", "location"), ("frame", "name")];
+/// Whether a cause is the end of the time.
+fn is_interruption(cause: &(dyn Error + 'static)) -> bool {
+    let in_detection = |error: &DetectError| matches!(error, DetectError::Interrupted(_));
+    let of_file = cause.downcast_ref().is_some_and(FrameError::is_interruption);
+    of_file || cause.is::<Interrupted>() || cause.downcast_ref().is_some_and(in_detection)
+}
 
-/// `text` with the program's options as Python's keywords: `--pixel-scale` is `pixel_scale`.
-pub fn in_pythons_words(text: &str) -> String {
-    let mut parts = text.split("--");
-    let mut told = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        let end = part.find(|letter: char| !letter.is_ascii_lowercase() && letter != '-');
-        let (option, rest) = part.split_at(end.unwrap_or(part.len()));
-        let other = OTHER_NAMES.iter().find(|(name, _)| *name == option);
-        match other {
-            Some((_, keyword)) => told += keyword,
-            None => told += &option.replace('-', "_"),
-        }
-        told += rest;
-    }
-    told
+/// The keywords that may help, after a message. Not all options are keywords of Python's.
+pub fn see(remedies: &[Remedy]) -> String {
+    let is_keyword = |remedy: &&Remedy| {
+        !matches!(remedy, Remedy::AllStars | Remedy::Bits | Remedy::Frame | Remedy::MaxMemory)
+    };
+    let keywords: Vec<Remedy> = remedies.iter().filter(is_keyword).copied().collect();
+    OptionNames::Words.see(&keywords)
 }
 
 /// Works while Python's other threads run. A panic, which is a bug in starpipe, becomes a

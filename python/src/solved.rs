@@ -1,9 +1,10 @@
 //! A solved frame.
 
-use crate::errors::{exception, guarded, in_pythons_words};
+use crate::errors::{exception, guarded, see};
 use pyo3::prelude::*;
 use starpipe::frame::RowOrder;
-use starpipe::pipeline::Outcome;
+use starpipe::identify::SearchFailure;
+use starpipe::pipeline::{Outcome, Reason};
 use starpipe::report::wcs;
 use starpipe::{FrameReport, IndexedCatalog, Solution};
 
@@ -25,12 +26,22 @@ impl Solved {
         matches!(self.solution.outcome, Outcome::Identified(_))
     }
 
+    /// Why there was no answer in time, if so.
+    #[getter]
+    fn timeout(&self) -> Option<String> {
+        let reason = match &self.solution.outcome {
+            Outcome::NotIdentified(reason @ Reason::Search(SearchFailure::Interrupted)) => reason,
+            _ => return None,
+        };
+        let report = FrameReport::new(&self.name, &self.solution, self.indexed.catalog());
+        Some(report.reason.unwrap_or_default() + &see(&reason.remedies()))
+    }
+
     /// The report as the program's JSON.
     fn json(&self) -> PyResult<String> {
         guarded(|| {
             let report = FrameReport::new(&self.name, &self.solution, self.indexed.catalog());
-            let json = report.to_json_line().map_err(exception)?;
-            Ok(in_pythons_words(&json))
+            report.to_json_line().map_err(exception)
         })
     }
 

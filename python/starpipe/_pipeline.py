@@ -111,6 +111,8 @@ class Pipeline:
             If there is no image in it, or an argument is out of range.
         TypeError
             If an argument is of a wrong type.
+        TimeoutError
+            If there is no answer within `time_limit`.
         RuntimeError
             If starpipe has a bug.
         """
@@ -126,7 +128,7 @@ class Pipeline:
             thread_count(threads),
             False,
         )
-        return Result._of(solved)
+        return _in_time(solved)
 
     @takes_options
     def identify(
@@ -168,6 +170,8 @@ class Pipeline:
         ------
         ValueError
             If arrays do not match, or an argument is out of range.
+        TimeoutError
+            If there is no answer within `time_limit`.
         """
         if flux is not None and mag is not None:
             raise ValueError("give the brightness as flux or as mag")
@@ -189,7 +193,7 @@ class Pipeline:
         solved = self._pipeline.identify(
             table, (rows, width), brightness, error is not None, solve_options(**options)
         )
-        return Result._of(solved)
+        return _in_time(solved)
 
     def solve_many(
         self, images: Iterable[ImageLike], *, threads: int = 1, **known: Any
@@ -249,3 +253,9 @@ class Pipeline:
             name = os.fspath(image) if is_path else type(image).__name__
             return Result._unread(str(name), error)
 
+
+def _in_time(solved: _starpipe.Solved) -> Result:
+    """Return the result, unless there was no answer within the time limit."""
+    if solved.timeout is not None:
+        raise TimeoutError(solved.timeout)
+    return Result._of(solved)

@@ -40,7 +40,7 @@ class Result:
         """Return what stands for a frame without an answer."""
         nothing = ("attitude", "optics", "match", "photometry", "prediction", "width", "height")
         report: dict[str, Any] = dict.fromkeys(nothing)
-        report |= {"frame": name, "notes": [], "stars": [], "timing_ms": {}}
+        report |= {"frame": name, "notes": [], "remedies": [], "stars": [], "timing_ms": {}}
         report |= {"status": "unread", "reason": str(error), "reason_code": "unread"}
         none = dict.fromkeys(("_wcs_header", "_row_order", "attitude_covariance"))
         return cls({"_report": report, "error": error} | none)
@@ -164,6 +164,11 @@ class Result:
     def reason_code(self) -> str | None:
         """Code of the reason."""
         return self._report["reason_code"]  # type: ignore[no-any-return]
+
+    @property
+    def remedies(self) -> list[str]:
+        """Names of the options that may help where the stars are not identified."""
+        return self._report["remedies"]  # type: ignore[no-any-return]
 
     @property
     def notes(self) -> list[str]:

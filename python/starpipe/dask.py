@@ -307,7 +307,7 @@ def _process_part(job: _Job, part: str, names: list[str]) -> dict[str, int]:
                     True,
                 )
                 status = rows.add(solved)
-            except (*FINAL, ValueError, RuntimeError) as error:
+            except (*FINAL, TimeoutError, ValueError, RuntimeError) as error:
                 rows.add_unread(name, str(error).replace("\n", " "))
                 counted["unread"] += 1
             else:

@@ -28,7 +28,7 @@ pub enum ArchiveError {
         name: &'static str,
     },
     /// There is no archive in the directory.
-    #[error("{} has no archive.json: no run of process --out-parquet has begun in it", .0.display())]
+    #[error("{} has no archive.json: no archive has begun in it", .0.display())]
     NoArchive(PathBuf),
     /// Parts are missing.
     #[error("{missing} of {parts} parts are missing in {}: see `starpipe archive status`", .directory.display())]

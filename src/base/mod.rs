@@ -10,6 +10,7 @@ pub mod format;
 pub mod interrupt;
 pub(crate) mod neighbors;
 pub mod panics;
+pub mod remedy;
 pub mod statistics;
 pub mod table;
 pub mod units;

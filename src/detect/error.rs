@@ -2,6 +2,7 @@
 
 use super::config::DetectConfig;
 use crate::base::interrupt::Interrupted;
+use crate::base::remedy::Remedy;
 use crate::frame::{Frame, MIN_SIDE_PX};
 
 /// Errors of [`detect`](super::detect).
@@ -27,12 +28,12 @@ pub enum DetectError {
         found: usize,
     },
     /// The work was ended early.
-    #[error("not done within the time limit of a frame (--time-limit)")]
+    #[error("not done within the time limit of a frame")]
     Interrupted(#[from] Interrupted),
     /// More pixels stand out than fit the memory that the workspace allows.
     #[error(
         "more than {most} pixels stand out from the background, for which there is not memory enough: \
-         fewer do with a higher threshold (--sigma), more may with --max-memory"
+         fewer do with a higher threshold"
     )]
     TooCrowded {
         /// How many may stand out.
@@ -40,8 +41,8 @@ pub enum DetectError {
     },
     /// The frame and the copies of it that are needed do not fit the memory that is allowed.
     #[error(
-        "the frame and its copies take {needed_bytes} bytes, more than the {limit_bytes} that a frame may \
-         take (--max-memory)"
+        "the frame and its copies need {} MB of memory, expected at most {} MB",
+        .needed_bytes.div_ceil(1_000_000), .limit_bytes / 1_000_000
     )]
     TooMuchMemory {
         /// What they take.
@@ -59,6 +60,18 @@ pub enum DetectError {
         /// Its range.
         expected: &'static str,
     },
+}
+
+impl DetectError {
+    /// The options that may help.
+    pub const fn remedies(&self) -> &'static [Remedy] {
+        match self {
+            Self::Interrupted(_) => &[Remedy::TimeLimit],
+            Self::TooCrowded { .. } => &[Remedy::Sigma, Remedy::MaxMemory],
+            Self::TooMuchMemory { .. } => &[Remedy::MaxMemory],
+            _ => &[],
+        }
+    }
 }
 
 /// Checks size and length of the frame, and the range of the options.

@@ -4,6 +4,7 @@ use super::format::FrameFormat;
 use super::limits::{MAX_PIXELS, MIN_SIDE_PX};
 use crate::base::interrupt::Interrupted;
 use crate::base::panics::Panicked;
+use crate::base::remedy::Remedy;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -80,8 +81,7 @@ pub enum FrameError {
     },
     /// An image that needs more memory than a frame may take.
     #[error(
-        "too large: {width} x {height} pixels of this kind need {} MB of memory, expected at most {} MB \
-         (--max-memory)",
+        "too large: {width} x {height} pixels of this kind need {} MB of memory, expected at most {} MB",
         .needed_bytes.div_ceil(1_000_000), .limit_bytes / 1_000_000
     )]
     TooMuchMemory {
@@ -96,7 +96,7 @@ pub enum FrameError {
     },
     /// A content that needs more memory than a frame may take.
     #[error(
-        "too large: its content needs {} MB of memory or more, expected at most {} MB (--max-memory)",
+        "too large: its content needs {} MB of memory or more, expected at most {} MB",
         .needed_bytes.div_ceil(1_000_000), .limit_bytes / 1_000_000
     )]
     OutOfMemory {
@@ -106,7 +106,7 @@ pub enum FrameError {
         limit_bytes: u64,
     },
     /// The work was ended early.
-    #[error("not done within the time limit of a frame (--time-limit)")]
+    #[error("not done within the time limit of a frame")]
     Interrupted(#[from] Interrupted),
     /// More bytes than the largest frame needs.
     #[error("too large: found more than {limit} bytes, expected at most {limit}")]
@@ -155,6 +155,25 @@ pub enum FrameError {
 }
 
 impl FrameError {
+    /// Whether the work was ended early.
+    pub fn is_interruption(&self) -> bool {
+        match self {
+            Self::File { source, .. } => source.is_interruption(),
+            Self::Interrupted(_) => true,
+            _ => false,
+        }
+    }
+
+    /// The options that may help.
+    pub fn remedies(&self) -> &'static [Remedy] {
+        match self {
+            Self::File { source, .. } => source.remedies(),
+            Self::TooMuchMemory { .. } | Self::OutOfMemory { .. } => &[Remedy::MaxMemory],
+            Self::Interrupted(_) => &[Remedy::TimeLimit],
+            _ => &[],
+        }
+    }
+
     /// Wraps the error in [`FrameError::File`] with the path of its file.
     pub fn in_file(self, path: &Path) -> Self {
         Self::File {

@@ -6,6 +6,7 @@ use super::centroid_text::ListText;
 use crate::base::coords::PixelPoint;
 use crate::base::files;
 use crate::base::format::table_name;
+use crate::base::remedy::Remedy;
 use crate::identify::Photometry;
 use std::fmt;
 
@@ -16,6 +17,7 @@ pub struct CentroidListError {
     pub line: Option<u64>,
     /// What was found and expected.
     pub problem: String,
+    remedies: &'static [Remedy],
 }
 
 impl fmt::Display for CentroidListError {
@@ -32,6 +34,7 @@ impl CentroidListError {
         Self {
             line: Some(line),
             problem,
+            remedies: &[],
         }
     }
 
@@ -39,7 +42,13 @@ impl CentroidListError {
         Self {
             line: None,
             problem: problem.into(),
+            remedies: &[],
         }
+    }
+
+    /// The options that may help.
+    pub const fn remedies(&self) -> &'static [Remedy] {
+        self.remedies
     }
 }
 
@@ -104,7 +113,7 @@ impl CentroidList {
             }
             centroids.push(centroid);
         }
-        frames.check().map_err(CentroidListError::of_list)?;
+        frames.check()?;
         if centroids
             .iter()
             .all(|centroid| centroid.problem().is_some())
@@ -180,7 +189,7 @@ impl<'a> Frames<'a> {
     }
 
     /// Refuses a table of several frames of which none is chosen, and one without the chosen one.
-    fn check(mut self) -> Result<(), String> {
+    fn check(mut self) -> Result<(), CentroidListError> {
         const MOST_NAMED: usize = 3;
         self.found.sort();
         self.found.dedup();
@@ -190,14 +199,19 @@ impl<'a> Frames<'a> {
             names += ", …";
         }
         match self.chosen {
-            None if count > 1 => Err(format!(
-                "found the rows of {count} frames ({names}), expected those of one: choose it with --frame"
-            )),
-            Some(chosen) if count == 0 => Err(format!(
+            None if count > 1 => Err(CentroidListError {
+                remedies: &[Remedy::Frame],
+                ..CentroidListError::of_list(format!(
+                    "found the rows of {count} frames ({names}), expected those of one"
+                ))
+            }),
+            Some(chosen) if count == 0 => Err(CentroidListError::of_list(format!(
                 "found no column that names a frame, expected rows of {chosen}"
-            )),
+            ))),
             Some(chosen) if !self.found.iter().any(|frame| frame == chosen) => {
-                Err(format!("found rows of {names}, expected some of {chosen}"))
+                Err(CentroidListError::of_list(format!(
+                    "found rows of {names}, expected some of {chosen}"
+                )))
             }
             _ => Ok(()),
         }
@@ -303,7 +317,7 @@ mod tests {
     fn one_frame_of_a_table_must_be_chosen() {
         assert_eq!(
             error(TABLE),
-            "found the rows of 2 frames (a.png, b.png), expected those of one: choose it with --frame"
+            "found the rows of 2 frames (a.png, b.png), expected those of one"
         );
         let missing = of_frame("c.png").unwrap_err().to_string();
         assert_eq!(

@@ -36,7 +36,7 @@ pub use bright_stars::MissingStar;
 pub use centroid_list::{CentroidList, LISTED_SIGMA_PX, ListedCentroid, solve_centroids};
 pub use centroid_table::{CentroidListError, CentroidListOptions};
 pub use context::{Context, DEFAULT_TIME_LIMIT_S, Workspace};
-pub use error::Error;
+pub use error::{Error, remedies_of};
 pub use identification::star_field;
 pub use left_out::{LeftOut, RowProblem};
 pub use note::Note;

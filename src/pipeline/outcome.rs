@@ -1,5 +1,6 @@
 //! Whether a frame was identified, and if not, why.
 
+use crate::base::remedy::Remedy;
 use crate::identify::diagnosis::Diagnosis;
 use crate::identify::{Identification, SearchFailure};
 
@@ -32,6 +33,28 @@ pub enum Reason {
 }
 
 impl Reason {
+    /// The options that may help.
+    pub fn remedies(&self) -> Vec<Remedy> {
+        match self {
+            Self::Search(SearchFailure::TooFewStars { .. }) => vec![Remedy::Sigma],
+            Self::Search(SearchFailure::NoMatch { .. }) => vec![Remedy::Fov, Remedy::Near],
+            Self::Search(SearchFailure::Interrupted) => vec![Remedy::TimeLimit],
+            Self::Diagnosis(Diagnosis::ScaleOutOfRange { .. }) => {
+                vec![Remedy::Fov, Remedy::PixelScale]
+            }
+            Self::Diagnosis(Diagnosis::HintsExclude(excluded)) => {
+                let scale = excluded
+                    .allowed_fov_x_rad
+                    .map(|_| [Remedy::Fov, Remedy::PixelScale]);
+                let region = excluded
+                    .distance_rad
+                    .map(|_| [Remedy::Near, Remedy::Radius]);
+                scale.into_iter().chain(region).flatten().collect()
+            }
+            Self::Diagnosis(_) => Vec::new(),
+        }
+    }
+
     /// Code for programs.
     pub const fn code(&self) -> &'static str {
         match self {

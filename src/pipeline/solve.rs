@@ -4,15 +4,18 @@ use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
 use super::error::Error;
 use super::identification::{double_image, identify_stars, observation, star_field};
+use super::note::Note;
+use super::outcome::{Outcome, Reason};
 use super::prepared::Prepared;
 use super::raw_colour::RawColour;
 use super::solution::{Solution, Source};
 use super::solved::Solved;
-use super::stopwatch::{Stage, Stopwatch};
+use super::stopwatch::{Stage, Stopwatch, Timing};
 use crate::base::panics::caught;
 use crate::calibration::Calibration;
 use crate::detect::{self, DetectError};
 use crate::frame::{self, Frame, FrameError, MemoryLimit, Mosaic};
+use crate::identify::{Priors, SearchFailure};
 use std::num::NonZeroUsize;
 use std::path::Path;
 
@@ -146,7 +149,20 @@ fn solve(
     let prepared = Prepared::new(raw, input.mosaic, &config, input.memory)?;
     workspace.detect.set_memory(prepared.memory);
     let frame = prepared.frame();
-    let mut detections = detect::detect(frame, &config, &mut workspace.detect)?;
+    let mut detections = match detect::detect(frame, &config, &mut workspace.detect) {
+        Err(DetectError::Interrupted(_)) => {
+            clock.lap(Stage::Detect);
+            let calibration = input.calibration;
+            return Ok(not_in_time(
+                raw,
+                calibration,
+                &priors,
+                context,
+                clock.timing(),
+            ));
+        }
+        detected => detected?,
+    };
     let mosaic = input
         .mosaic
         .map(|mosaic| RawColour::restore(mosaic, prepared.raw(), &mut detections));
@@ -188,4 +204,35 @@ fn solve(
     }
     clock.lap(Stage::Photometry);
     Ok(solved.into_solution(comparison, clock.timing()))
+}
+
+/// The solution of a frame whose stars were not detected in time.
+fn not_in_time(
+    frame: &Frame,
+    calibration: Option<&Calibration>,
+    priors: &Priors,
+    context: &Context,
+    timing: Timing,
+) -> Solution {
+    let camera = context.camera.as_ref();
+    Solution {
+        width: frame.width,
+        height: frame.height,
+        row_order: Some(frame.metadata.row_order),
+        date: priors.date,
+        observation: None,
+        site: priors.site,
+        exposure_s: priors.exposure_s,
+        notes: Note::of_file(&frame.metadata).collect(),
+        sources: Vec::new(),
+        background: None,
+        attitude_only: context.attitude_only,
+        outcome: Outcome::NotIdentified(Reason::Search(SearchFailure::Interrupted)),
+        bodies: Vec::new(),
+        photometry: None,
+        comparison: None,
+        gain_e_per_adu: camera.map(|camera| camera.sheet.gain_e_per_adu),
+        calibration: calibration.map(Calibration::applied),
+        timing,
+    }
 }

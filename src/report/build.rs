@@ -45,6 +45,7 @@ impl FrameReport {
             status: Status::NotIdentified,
             reason: None,
             reason_code: None,
+            remedies: Vec::new(),
             attitude: None,
             optics: None,
             matched: None,
@@ -61,6 +62,7 @@ impl FrameReport {
             Outcome::NotIdentified(reason) => {
                 report.reason = Some(reason::text(reason, solution));
                 report.reason_code = Some(reason.code());
+                report.remedies = reason.remedies();
             }
             Outcome::Identified(identification) => {
                 let years = solution.date.map_or(0.0, |d| d.date.years_since_j2000());

@@ -1,6 +1,7 @@
 //! The report of a frame: its fields, as JSON has them.
 
 use crate::base::format::json_escaped;
+use crate::base::remedy::Remedy;
 use crate::frame::RowOrder;
 use crate::identify::DateSource;
 use serde::Serialize;
@@ -36,6 +37,8 @@ pub struct FrameReport {
     pub reason: Option<String>,
     /// Code of the reason, see [`Reason::code`](crate::pipeline::Reason::code).
     pub reason_code: Option<&'static str>,
+    /// Names of the options that may help where they are not identified.
+    pub remedies: Vec<Remedy>,
     /// The attitude of the camera.
     pub attitude: Option<AttitudeReport>,
     /// The fitted camera.

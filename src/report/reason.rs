@@ -21,7 +21,7 @@ fn failure_text(failure: &SearchFailure, solution: &Solution) -> String {
             best_log10_false_alarm,
         } => no_match(*best_log10_false_alarm, solution),
         SearchFailure::Interrupted => {
-            "there was no answer within the time limit of a frame (--time-limit)".to_owned()
+            "there was no answer within the time limit of a frame".to_owned()
         }
     }
 }
@@ -57,7 +57,7 @@ fn cause_text(cause: &Diagnosis) -> String {
             fov_x_rad,
             searched_rad,
         } => format!(
-            "the field of view asked for (--fov or --pixel-scale), {} wide, is outside what can be \
+            "the field of view that was given, {} wide, is outside what can be \
              identified with this catalogue: {}",
             range(*fov_x_rad),
             range(*searched_rad),
@@ -75,11 +75,11 @@ fn too_few(found: usize, needed: usize, solution: &Solution) -> String {
     };
     let others = match others {
         0 => String::new(),
-        1 => " (and 1 detection that has not the shape of a star)".to_owned(),
-        _ => format!(" (and {others} detections that have not the shape of a star)"),
+        1 => " (and 1 detection that does not look like a star)".to_owned(),
+        _ => format!(" (and {others} detections that do not look like stars)"),
     };
     let help = match solution.background {
-        Some(_) => "; a longer exposure or a lower detection threshold (--sigma) shows more",
+        Some(_) => "; a longer exposure or a lower detection threshold shows more",
         None => "",
     };
     format!("{found}{others} and at least {needed} are needed{help}")
@@ -93,7 +93,7 @@ fn no_match(best_log10: Option<f64>, solution: &Solution) -> String {
         .count();
     let tried = match solution.sources.len() {
         all if all == stars => format!("the {all} detections"),
-        all => format!("the {stars} detections of {all} that have the shape of a star"),
+        all => format!("the {stars} detections of {all} that look like stars"),
     };
     match best_log10.filter(|best| best.is_finite()) {
         Some(best) => format!(
@@ -134,14 +134,12 @@ fn excluded_text(excluded: &Excluded) -> String {
     let mut conjunction = ", which";
     if let Some(allowed) = excluded.allowed_fov_x_rad {
         let allowed = range(allowed);
-        text += &format!(
-            "{conjunction} the scale given (--fov or --pixel-scale), {allowed} wide, excludes"
-        );
+        text += &format!("{conjunction} the scale that was given, {allowed} wide, excludes");
         conjunction = ", and which";
     }
     if let Some((distance_rad, radius_rad)) = excluded.distance_rad {
         text += &format!(
-            "{conjunction} is {} from --near, beyond the --radius of {}",
+            "{conjunction} is {} from the direction that was given, beyond the radius of {}",
             degrees(distance_rad),
             degrees(radius_rad)
         );
@@ -194,7 +192,7 @@ mod tests {
         });
         assert_eq!(
             text_of(few, 3),
-            "only 1 star was found (and 2 detections that have not the shape of a star) and at least 4 are needed"
+            "only 1 star was found (and 2 detections that do not look like stars) and at least 4 are needed"
         );
         let no_match = |best_log10_false_alarm| {
             Reason::Search(SearchFailure::NoMatch {
@@ -221,8 +219,8 @@ mod tests {
                 50
             ),
             "the stars match (40 of them) in a field 11.4° wide around RA 10.00°, Dec -5.00°, which the scale \
-             given (--fov or --pixel-scale), 18.0° to 22.0° wide, excludes, and which is 23.0° from --near, \
-             beyond the --radius of 5.00°"
+             that was given, 18.0° to 22.0° wide, excludes, and which is 23.0° from the direction that was given, \
+             beyond the radius of 5.00°"
         );
     }
 

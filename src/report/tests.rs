@@ -1,6 +1,7 @@
 //! The three forms of a report, compared with their snapshots.
 
 use super::*;
+use crate::base::remedy::Remedy;
 use crate::frame::RowOrder;
 use crate::identify::DateSource;
 
@@ -46,6 +47,7 @@ fn unidentified() -> FrameReport {
                 .into(),
         ),
         reason_code: Some("no_match"),
+        remedies: vec![Remedy::Fov, Remedy::Near],
         attitude: None,
         optics: None,
         matched: None,
@@ -158,6 +160,7 @@ fn identified() -> FrameReport {
         status: Status::Identified,
         reason: None,
         reason_code: None,
+        remedies: Vec::new(),
         attitude: Some(AttitudeReport {
             ra_deg: 83.822_083_3,
             dec_deg: -1.212_251_2,
@@ -259,13 +262,13 @@ fn a_long_table_is_cut_unless_all_stars_are_wanted() {
     };
     let cut = report.to_text(TextOptions::default());
     assert_eq!(rows(&cut), STARS_SHOWN);
-    assert!(
-        cut.ends_with("  and 5 fainter; --all-stars lists them\n"),
-        "{cut}"
-    );
-    let whole = report.to_text(TextOptions { all_stars: true });
+    assert!(cut.ends_with("  and 5 fainter; see all_stars\n"), "{cut}");
+    let whole = report.to_text(TextOptions {
+        all_stars: true,
+        ..TextOptions::default()
+    });
     assert_eq!(rows(&whole), STARS_SHOWN + 5);
-    assert!(!whole.contains("--all-stars"));
+    assert!(!whole.contains("all_stars"));
 }
 
 #[test]

@@ -5,6 +5,7 @@ use super::frame_report::{
     ObservationReport, OpticsReport, PhotometryReport, StarReport,
 };
 use crate::base::format::{self, counted, decimals_for, printable};
+use crate::base::remedy::{OptionNames, Remedy};
 use crate::base::units::ARCSEC_PER_RAD;
 use crate::identify::DateSource;
 
@@ -21,6 +22,8 @@ const LABEL_WIDTH: usize = 12;
 pub struct TextOptions {
     /// List every identified star, not only the [`STARS_SHOWN`] brightest.
     pub all_stars: bool,
+    /// How options are called.
+    pub option_names: OptionNames,
 }
 
 impl FrameReport {
@@ -30,7 +33,7 @@ impl FrameReport {
             "{}  {} × {} px",
             self.frame, self.width, self.height
         )];
-        lines.extend(self.outcome_lines());
+        lines.extend(self.outcome_lines(options.option_names));
         lines.extend(self.attitude.iter().flat_map(attitude_lines));
         lines.extend(self.optics.iter().flat_map(optics_lines));
         lines.extend(self.matched.iter().map(residual_line));
@@ -43,7 +46,7 @@ impl FrameReport {
         let magnitude = self.magnitude.as_ref();
         let predicted = self.prediction.iter();
         lines.extend(predicted.flat_map(|prediction| prediction.lines(magnitude)));
-        lines.push(self.date_line());
+        lines.push(self.date_line(options.option_names));
         lines.extend(self.observation.iter().map(observation_line));
         lines.extend(self.calibration.iter().map(calibration_line));
         lines.extend(self.notes.iter().map(|note| labelled("note", &note.text)));
@@ -53,7 +56,7 @@ impl FrameReport {
         lines.iter().map(|line| printable(line) + "\n").collect()
     }
 
-    fn outcome_lines(&self) -> Vec<String> {
+    fn outcome_lines(&self, names: OptionNames) -> Vec<String> {
         let text = match (&self.matched, &self.reason) {
             (Some(matched), _) => format!(
                 "identified: {} of {}; chance alone would do as well {}",
@@ -61,7 +64,9 @@ impl FrameReport {
                 counted(matched.detected, "detection"),
                 odds(matched.log10_false_alarm),
             ),
-            (None, Some(reason)) => format!("not identified: {reason}"),
+            (None, Some(reason)) => {
+                format!("not identified: {reason}{}", names.see(&self.remedies))
+            }
             (None, None) => "not identified".to_owned(),
         };
         wrap(&text, LINE_WIDTH - 2)
@@ -78,7 +83,7 @@ impl FrameReport {
         labelled("faintest", &text)
     }
 
-    fn date_line(&self) -> String {
+    fn date_line(&self, names: OptionNames) -> String {
         let text = match &self.date {
             Some(date) => {
                 let source = match date.source {
@@ -87,9 +92,12 @@ impl FrameReport {
                     DateSource::FileName => "from the file's name",
                 };
                 let utc = date.iso.replace('T', " ").replace('Z', " UTC");
-                format!("{utc}, {source}: stars stand where they then stood")
+                format!("{utc}, {source}: positions for that date")
             }
-            None => "unknown: stars stand where they stood in 2000; --date moves them".to_owned(),
+            None => {
+                let see = names.see(&[Remedy::Date]);
+                format!("no date: positions for J2000.0{see}")
+            }
         };
         labelled("date", &text)
     }
@@ -132,8 +140,9 @@ impl FrameReport {
         lines.extend(star_table(&named[..named.len().min(shown)]));
         if named.len() > shown {
             lines.push(format!(
-                "  and {} fainter; --all-stars lists them",
-                named.len() - shown
+                "  and {} fainter{}",
+                named.len() - shown,
+                options.option_names.see(&[Remedy::AllStars])
             ));
         }
         lines

@@ -7,6 +7,7 @@ mod source;
 
 use source::{Crate, ModulePath};
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms from the ground up, and for each the rooms below that it uses.
@@ -191,4 +192,48 @@ fn the_command_line_uses_the_public_library_only() {
         let own = text.matches("crate::cli").count() + text.matches("$crate::").count();
         assert_eq!(inside, own, "{}", file.display());
     }
+}
+
+/// Flags in the texts of a file, without its comments and tests.
+fn flags_in(source: &str) -> Vec<&str> {
+    let product = source
+        .split("#[cfg(test)]\nmod tests")
+        .next()
+        .unwrap_or(source);
+    let code = product
+        .lines()
+        .filter(|line| !line.trim_start().starts_with("//"));
+    let is_flag = |part: &&str| {
+        let word = part.trim_start_matches(['"', '(', '`']);
+        let name = word.strip_prefix("--");
+        name.is_some_and(|name| name.starts_with(|first: char| first.is_ascii_lowercase()))
+    };
+    code.flat_map(str::split_whitespace)
+        .filter(is_flag)
+        .collect()
+}
+
+#[test]
+fn messages_of_the_library_name_no_flags_of_the_command_line() {
+    assert_eq!(flags_in("    \"see (--fov) or\"\n// --near"), ["(--fov)"]);
+    let mut files = vec![src()];
+    let mut read = 0;
+    while let Some(path) = files.pop() {
+        if path.is_dir() {
+            let entries = fs::read_dir(&path).unwrap();
+            files.extend(entries.map(|entry| entry.unwrap().path()));
+            continue;
+        }
+        let is_other = path.components().any(|part| part.as_os_str() == "cli")
+            || ["main.rs", "tests.rs"]
+                .iter()
+                .any(|name| path.ends_with(name))
+            || path.extension().is_none_or(|extension| extension != "rs");
+        if !is_other {
+            let source = fs::read_to_string(&path).unwrap();
+            assert_eq!(flags_in(&source), [""; 0], "{}", path.display());
+            read += 1;
+        }
+    }
+    assert!(read > 300, "{read}");
 }

@@ -269,13 +269,14 @@ fn missing(
         );
     }
     if full_scale.is_none() {
-        let reason = "the file's levels have no full scale; --bits or --camera gives one";
+        let reason =
+            "the file's levels have no full scale: the detector's bits or the camera give one";
         add("relative", reason.to_owned());
     }
     if config.gain_e_per_adu.is_none() {
         add(
             "electrons",
-            "the gain is not known; --camera gives it".to_owned(),
+            "the gain is not known: the camera's description gives it".to_owned(),
         );
     }
     missing

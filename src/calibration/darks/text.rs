@@ -64,7 +64,7 @@ impl DarksReport {
 
 fn source_text(source: &str) -> &str {
     match source {
-        "option" => "--bits",
+        "option" => "the bits that were given",
         "camera" => "the camera's description",
         _ => "the file's format, which may have more bits than the detector",
     }

@@ -1,12 +1,15 @@
 //! Errors and warnings on standard error, each in one line.
 
 use starpipe::base::format::printable;
+use starpipe::base::remedy::OptionNames;
+use starpipe::pipeline::remedies_of;
 use std::fmt::Display;
 use std::io::{self, Write};
 
 /// Reports an error with its causes.
 pub(crate) fn report_error(error: &(dyn std::error::Error + 'static)) {
-    report(one_line(error));
+    let see = OptionNames::Flags.see(&remedies_of(error));
+    report(one_line(error) + &see);
 }
 
 /// Reports something unexpected that leaves the results valid.

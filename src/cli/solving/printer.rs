@@ -4,6 +4,7 @@ use super::options::OutputOptions;
 use super::result_files::table;
 use crate::cli::options::format::Format;
 use crate::cli::output::stdout::print;
+use starpipe::base::remedy::OptionNames;
 use starpipe::report::{FrameReport, TextOptions};
 use std::ops::ControlFlow;
 
@@ -20,6 +21,7 @@ impl Printer {
             format: options.format,
             text: TextOptions {
                 all_stars: options.all_stars,
+                option_names: OptionNames::Flags,
             },
             reports: 0,
         }
