@@ -59,10 +59,10 @@ impl FrameReport {
     fn outcome_lines(&self, names: OptionNames) -> Vec<String> {
         let text = match (&self.matched, &self.reason) {
             (Some(matched), _) => format!(
-                "identified: {} of {}; chance alone would do as well {}",
+                "identified: {} of {}; false-alarm probability 10^{:.0}",
                 matched.matched,
                 counted(matched.detected, "detection"),
-                odds(matched.log10_false_alarm),
+                matched.log10_false_alarm,
             ),
             (None, Some(reason)) => {
                 format!("not identified: {reason}{}", names.see(&self.remedies))
@@ -218,7 +218,7 @@ fn optics_lines(optics: &OpticsReport) -> Vec<String> {
         ),
     )];
     let distortion = match &optics.distortion {
-        None => "none that the stars show".to_owned(),
+        None => "none measurable".to_owned(),
         Some(lens) => format!(
             "{}, up to {:.2} px in the corners",
             lens.model, lens.largest_px
@@ -307,15 +307,6 @@ fn snr(value: f64) -> String {
 
 fn or_dash(value: Option<f64>, print: impl Fn(f64) -> String) -> String {
     value.map_or_else(|| "–".to_owned(), print)
-}
-
-/// How rare an event of this probability is.
-fn odds(log10_probability: f64) -> String {
-    let power = -log10_probability;
-    if power < 1.0 {
-        return format!("with probability {:.2}", 10_f64.powf(log10_probability));
-    }
-    format!("once in 10^{power:.0} frames")
 }
 
 fn calibration_line(applied: &CalibrationReport) -> String {
