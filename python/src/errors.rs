@@ -49,14 +49,19 @@ pub fn exception(error: impl Error + 'static) -> PyErr {
 /// Whether a cause is the end of the time.
 fn is_interruption(cause: &(dyn Error + 'static)) -> bool {
     let in_detection = |error: &DetectError| matches!(error, DetectError::Interrupted(_));
-    let of_file = cause.downcast_ref().is_some_and(FrameError::is_interruption);
+    let of_file = cause
+        .downcast_ref()
+        .is_some_and(FrameError::is_interruption);
     of_file || cause.is::<Interrupted>() || cause.downcast_ref().is_some_and(in_detection)
 }
 
 /// The keywords that may help, after a message. Not all options are keywords of Python's.
 pub fn see(remedies: &[Remedy]) -> String {
     let is_keyword = |remedy: &&Remedy| {
-        !matches!(remedy, Remedy::AllStars | Remedy::Bits | Remedy::Frame | Remedy::MaxMemory)
+        !matches!(
+            remedy,
+            Remedy::AllStars | Remedy::Bits | Remedy::Frame | Remedy::MaxMemory
+        )
     };
     let keywords: Vec<Remedy> = remedies.iter().filter(is_keyword).copied().collect();
     OptionNames::Words.see(&keywords)

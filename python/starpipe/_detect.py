@@ -43,7 +43,16 @@ class Detections:
     @property
     def columns(self) -> _tables.Columns:
         """The stars as arrays."""
-        of_sky = ("id", "name", "vmag", "ra_deg", "dec_deg", "residual_px", "residual_blend_px", "p_chance")
+        of_sky = (
+            "id",
+            "name",
+            "vmag",
+            "ra_deg",
+            "dec_deg",
+            "residual_px",
+            "residual_blend_px",
+            "p_chance",
+        )
         found = _tables.star_columns(self._stars)
         return {name: column for name, column in found.items() if name not in of_sky}
 

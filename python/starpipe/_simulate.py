@@ -125,7 +125,7 @@ def simulate(
     else:
         if ra is None or dec is None:
             raise ValueError("ra and dec belong together: give both")
-        pointing = direction((ra, dec), 1.0)
+        pointing = direction((ra, dec))
         angle = number(roll, "deg", "roll")
         assert pointing is not None and angle is not None
         subject = pointing[0], pointing[1], angle

@@ -38,7 +38,5 @@ def test_a_card_for_notebooks(result):
 
 def test_a_card_of_centroids(pipeline, result):
     stars = result.star_columns
-    found = pipeline.identify(
-        stars["x"], stars["y"], flux=stars["flux"], shape=(384, 512)
-    )
+    found = pipeline.identify(stars["x"], stars["y"], flux=stars["flux"], shape=(384, 512))
     assert found._repr_html_().count("<circle") == len(stars["x"])
