@@ -15,7 +15,7 @@ use std::path::Path;
 use std::time::Instant;
 
 /// The solvers are given at most this many stars, the brightest, where pointing alone is timed.
-const MOST: usize = 60;
+const MAX: usize = 60;
 const ARCSEC_PER_RAD: f64 = 206_264.806;
 
 /// The stages that are timed, and their buffers.
@@ -69,7 +69,7 @@ impl Bench<'_> {
     fn brightest(&mut self, is_known: bool) -> (f64, Option<Identification>) {
         let priors = self.priors(is_known);
         let mut field = star_field(&self.frame, &self.known, 0.0);
-        field.stars.truncate(MOST);
+        field.stars.truncate(MAX);
         let start = Instant::now();
         let found = self.identify.attitude(&field, &priors, &self.indexed);
         (milliseconds(start), found.ok().cloned())
@@ -107,7 +107,7 @@ impl Bench<'_> {
             }
             "stars" => {
                 let field = star_field(&self.frame, &self.known, 0.0);
-                let stars = field.brightest(MOST).iter();
+                let stars = field.brightest(MAX).iter();
                 let stars = stars.map(|s| [s.position.x, s.position.y, 10f64.powf(-0.4 * s.mag)]);
                 Ok(json!({"stars": stars.collect::<Vec<_>>()}))
             }

@@ -121,10 +121,10 @@ fn octets(levels: &[u16]) -> Vec<u8> {
 /// PNG, JPEG, BMP and PNM.
 fn rasters() -> Vec<File> {
     let (width, height) = SIZE;
-    let colour = octets(&levels(3 * width * height));
+    let color = octets(&levels(3 * width * height));
     let grey = ImageBuffer::from_raw(width, height, levels(width * height)).unwrap();
     let rgb = DynamicImage::from(
-        ImageBuffer::<Rgb<u8>, _>::from_raw(width, height, colour.clone()).unwrap(),
+        ImageBuffer::<Rgb<u8>, _>::from_raw(width, height, color.clone()).unwrap(),
     );
     let images = [
         DynamicImage::ImageLuma16(grey),
@@ -146,7 +146,7 @@ fn rasters() -> Vec<File> {
             }
         }
     }
-    for (magic, samples) in [("P2", &colour[..colour.len() / 3]), ("P3", &colour)] {
+    for (magic, samples) in [("P2", &color[..color.len() / 3]), ("P3", &color)] {
         let mut text = format!("{magic}\n{width} {height}\n255\n");
         for sample in samples {
             write!(text, "{sample} ").unwrap();
@@ -176,14 +176,14 @@ fn tiffs() -> Vec<File> {
     use tiff::encoder::Compression::{Lzw, Packbits, Uncompressed};
     let (width, height) = SIZE;
     let grey = levels(width * height);
-    let colour = levels(3 * width * height);
+    let color = levels(3 * width * height);
     let floats: Vec<f32> = grey.iter().map(|&word| f32::from(word)).collect();
     let doubles: Vec<f64> = grey.iter().map(|&word| f64::from(word)).collect();
     let each = |compression| {
         [
             tiff::<Gray16>("u16", &grey, compression),
-            tiff::<RGB8>("rgb8", &octets(&colour), compression),
-            tiff::<RGB16>("rgb16", &colour, compression),
+            tiff::<RGB8>("rgb8", &octets(&color), compression),
+            tiff::<RGB16>("rgb16", &color, compression),
             tiff::<Gray32Float>("f32", &floats, compression),
             tiff::<Gray64Float>("f64", &doubles, compression),
         ]

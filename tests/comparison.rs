@@ -372,7 +372,7 @@ fn the_cygnus_fixture_has_the_zero_point_and_the_sky_it_was_drawn_with() {
     assert_eq!(ran.status, 0, "{}", ran.stderr);
     let report = &ran.reports()[0];
     assert_eq!(notes(report), "");
-    // V = 0 gives 250,000 electrons, the sky 100. The drawing ignores colours, which shifts the
+    // V = 0 gives 250,000 electrons, the sky 100. The drawing ignores colors, which shifts the
     // prediction by a few hundredths.
     const COLORS_MAG: f64 = 0.05;
     let drawn = 2.5 * 250e3f64.log10();

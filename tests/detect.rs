@@ -538,7 +538,7 @@ fn pairs(spot: f64, separation: f64, ratio: f64) -> [f64; 4] {
 }
 
 #[test]
-fn a_neighbour_four_spot_sizes_away_does_not_bias_a_star() {
+fn a_neighbor_four_spot_sizes_away_does_not_bias_a_star() {
     const MAX_BIAS_PX: f64 = 0.03;
     let mut failures = Vec::new();
     for spot in [1.0, 1.5] {

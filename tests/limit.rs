@@ -466,10 +466,10 @@ fn a_plot_is_an_svg_or_a_png() {
     assert_eq!(svg, plot("b.SVG"));
     let picture = image::load_from_memory(&plot("a.png")).unwrap().to_rgb8();
     // Both curves and the text.
-    for colour in [[0, 114, 178], [213, 94, 0], [0, 0, 0]] {
+    for color in [[0, 114, 178], [213, 94, 0], [0, 0, 0]] {
         assert!(
-            picture.pixels().filter(|pixel| pixel.0 == colour).count() > 100,
-            "{colour:?}"
+            picture.pixels().filter(|pixel| pixel.0 == color).count() > 100,
+            "{color:?}"
         );
     }
     assert_eq!(names(directory.path()), ["a.png", "a.svg", "b.SVG"]);

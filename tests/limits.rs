@@ -51,7 +51,7 @@ fn zeros(bytes: usize) -> Vec<u8> {
     encoder.finish().unwrap()
 }
 
-/// A PNG of 16 bits in colour with transparency.
+/// A PNG of 16 bits in color with transparency.
 fn png(side: u32, more: &[u8]) -> Vec<u8> {
     let mut header = [side.to_be_bytes(), side.to_be_bytes()].concat();
     header.extend([16, 6, 0, 0, 0]);
@@ -76,7 +76,7 @@ fn an_image_that_needs_too_much_memory_is_refused_before_it_is_decoded() {
 }
 
 #[test]
-fn a_colour_profile_that_grows_without_end_is_not_unpacked() {
+fn a_color_profile_that_grows_without_end_is_not_unpacked() {
     let profile = [b"x\0\0".to_vec(), zeros(1 << 28)].concat();
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("profile.png");

@@ -98,7 +98,7 @@ fn lists_of_centroids_have_no_photometry() {
 const NIGHT_SITE: &str = "52.22,4.42";
 /// Largest difference of zero points of one night after correction for extinction.
 const SAME_SKY_MAG: f64 = 0.05;
-/// Largest scatter of SKY2000's stars about a zero point with a colour term; mostly photon noise of
+/// Largest scatter of SKY2000's stars about a zero point with a color term; mostly photon noise of
 /// the faint ones.
 const SCATTER_MAX_MAG: f64 = 0.2;
 
@@ -193,7 +193,7 @@ fn a_photograph_with_a_tone_curve_says_so() {
 }
 
 #[test]
-fn a_raw_colour_frame_is_noted_and_its_zero_point_is_that_of_green_pixels() {
+fn a_raw_color_frame_is_noted_and_its_zero_point_is_that_of_green_pixels() {
     /// Electrons from a star of magnitude 0 where all light passes, by the frame's table of stars,
     /// as a zero point; and 1.5 e⁻ per ADU.
     const TRUE_ZERO_POINT_VMAG: f64 = 13.62 - 0.44;
@@ -206,7 +206,7 @@ fn a_raw_colour_frame_is_noted_and_its_zero_point_is_that_of_green_pixels() {
     let report = processed(&[], &[frame]).remove(0);
     let notes = report["notes"].as_array().unwrap();
     assert!(
-        notes.iter().any(|note| note["code"] == "colour_mosaic"),
+        notes.iter().any(|note| note["code"] == "color_mosaic"),
         "{notes:?}"
     );
     assert_eq!([&report["width"], &report["height"]], [1024, 768]);

@@ -99,8 +99,8 @@ fn planes_of_a_compressed_cube_are_pages() {
     let page = NonZeroUsize::new(5);
     let refused = frame::read_page(path("fpack-rice-cube.fits.fz"), page).unwrap_err();
     assert!(refused.to_string().contains("found 4 pages"), "{refused}");
-    let colour = frame::read(path("fpack-rice-cube.fits.fz")).unwrap();
-    let assumed: Vec<_> = colour.metadata.assumed.iter().map(|a| a.code()).collect();
+    let color = frame::read(path("fpack-rice-cube.fits.fz")).unwrap();
+    let assumed: Vec<_> = color.metadata.assumed.iter().map(|a| a.code()).collect();
     assert_eq!(assumed, ["four_planes"]);
 }
 

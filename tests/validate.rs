@@ -360,7 +360,7 @@ fn a_study_has_a_run_and_a_row_for_each_value() {
 #[test]
 fn the_focal_length_is_right_for_every_lens_of_the_hard_suite() {
     /// Largest error in units of the stated one, root mean square of so few frames.
-    const MOST_SIGMAS: f64 = 2.5;
+    const MAX_SIGMAS: f64 = 2.5;
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("hard");
     let camera = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/validation/camera.toml");
@@ -383,7 +383,7 @@ fn the_focal_length_is_right_for_every_lens_of_the_hard_suite() {
             assert_eq!(row["right"], 8, "{case}");
             let of = |name: &str| row[name].as_f64().unwrap();
             let sigmas = of("pull_focal_length_mean").hypot(of("pull_focal_length_sd"));
-            assert!(sigmas < MOST_SIGMAS, "{case}: {sigmas}");
+            assert!(sigmas < MAX_SIGMAS, "{case}: {sigmas}");
         }
     }
     // A second run reads the existing results.

@@ -22,11 +22,11 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// Sides of a frame.
 const SIDES_PX: std::ops::RangeInclusive<usize> = 3..=200;
 /// How often the search for the stars of a list asks whether to end: a millisecond.
-const MOST_ASKED: u32 = 50;
+const MAX_ASKED: u32 = 50;
 /// How far outside the frame a listed centroid may lie: half a pixel of the border's pixel, and 5.
 const LISTED_BORDER_PX: f64 = 5.5;
 /// Stars of the catalogue that are drawn at most.
-const MOST_DRAWN: usize = 60;
+const MAX_DRAWN: usize = 60;
 
 /// What comes before the values.
 struct Header {
@@ -234,7 +234,7 @@ fn draw_stars(pixels: &mut [f32], header: &Header, pointing: [u8; 6]) {
         })
         .collect();
     seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-    for (v_mag, place) in seen.into_iter().take(MOST_DRAWN) {
+    for (v_mag, place) in seen.into_iter().take(MAX_DRAWN) {
         let peak = 10.0 * 10_f64.powf(0.4 * (8.0 - v_mag));
         let place = [place.x as f32, place.y as f32];
         draw_spot(pixels, header.width_px, place, peak as f32, 0.9);
@@ -349,7 +349,7 @@ pub fn identify_some(indexed: &IndexedCatalog) {
 
 /// Identifies a list, for a while.
 fn identify(list: &CentroidList, indexed: &IndexedCatalog) {
-    let solution = with_workspace(&interrupt_after(MOST_ASKED), |workspace| {
+    let solution = with_workspace(&interrupt_after(MAX_ASKED), |workspace| {
         solve_centroids(list, &Context::new(indexed), workspace)
     });
     let report = FrameReport::new("centroids", &solution, indexed.catalog());

@@ -22,12 +22,12 @@ pub enum Image<'py> {
     /// Whole numbers of another type, and the largest of that type.
     Integers(PyReadonlyArray2<'py, i64>, i64),
     /// Red, green and blue of each pixel.
-    Colours(Colours<'py>),
+    Colors(Colors<'py>),
 }
 
-/// A picture of colours: whole numbers, and the largest of their type, or floats.
+/// A picture of colors: whole numbers, and the largest of their type, or floats.
 #[derive(FromPyObject)]
-pub enum Colours<'py> {
+pub enum Colors<'py> {
     Integers(PyReadonlyArray3<'py, i64>, i64),
     F32(PyReadonlyArray3<'py, f32>),
 }
@@ -54,14 +54,14 @@ impl Image<'_> {
                 let [height, width] = sides(array);
                 Frame::from_integers(width, height, slice(array)?, *full_scale)
             }
-            Self::Colours(colours) => colours.luminance()?,
+            Self::Colors(colors) => colors.luminance()?,
         };
         let array = frame.map(|frame| Source::Array(Box::new(frame)));
         array.map_err(exception)
     }
 }
 
-impl Colours<'_> {
+impl Colors<'_> {
     fn luminance(&self) -> PyResult<Result<Frame<'static>, FrameError>> {
         let shape = match self {
             Self::Integers(array, _) => array.shape(),
@@ -72,11 +72,11 @@ impl Colours<'_> {
         Ok(match self {
             Self::Integers(array, full_scale) => {
                 let samples = array.as_slice().map_err(contiguous)?;
-                Frame::from_colours(size, channels, samples, *full_scale)
+                Frame::from_colors(size, channels, samples, *full_scale)
             }
             Self::F32(array) => {
                 let samples = array.as_slice().map_err(contiguous)?.to_vec();
-                Frame::from_float_colours(size, channels, samples)
+                Frame::from_float_colors(size, channels, samples)
             }
         })
     }

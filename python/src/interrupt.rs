@@ -15,13 +15,13 @@ use std::time::{Duration, Instant};
 const PERIOD: Duration = Duration::from_millis(30);
 
 /// Threads that may be started on any machine, as in the program.
-const MOST_USEFUL: NonZeroUsize = NonZeroUsize::new(8).unwrap();
+const MAX_USEFUL: NonZeroUsize = NonZeroUsize::new(8).unwrap();
 
 /// The number of threads that are started where so many are wanted: more than 8 and than there are
 /// processors only get in each other's way.
 pub fn useful(wanted: NonZeroUsize) -> NonZeroUsize {
     let processors = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-    wanted.min(processors.max(MOST_USEFUL))
+    wanted.min(processors.max(MAX_USEFUL))
 }
 
 /// Works on the calling thread, which looks for signals when the work asks whether to end.

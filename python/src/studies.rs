@@ -110,7 +110,7 @@ pub fn robustness(
     seed: u64,
     threads: NonZeroUsize,
 ) -> PyResult<String> {
-    const LEAST_TRUE_STARS: usize = 8;
+    const MIN_TRUE_STARS: usize = 8;
     let [height_px, width_px] = lists.shape;
     let base = Protocol {
         fov_deg: lists.fov_deg.unwrap_or_default(),
@@ -145,7 +145,7 @@ pub fn robustness(
                 .collect::<Result<Vec<_>, Interrupted>>()
                 .map_err(exception)?;
             let results = TrialResults::new(results);
-            rows.push(CaseResult::new(case, &results, LEAST_TRUE_STARS));
+            rows.push(CaseResult::new(case, &results, MIN_TRUE_STARS));
         }
         json(&rows)
     })

@@ -16,14 +16,14 @@ ImageLike: TypeAlias = Any
 """What an image may be passed as.
 
 - A path, the bytes of a file, or a file that is open for reading in binary mode.
-- An array (rows, columns), or (rows, columns, 3 or 4) or (3 or 4, rows, columns) of colours; an
+- An array (rows, columns), or (rows, columns, 3 or 4) or (3 or 4, rows, columns) of colors; an
   image of PIL.
 - An HDU or ``HDUList`` of astropy, which are read as the file that they would be written to; an
   object with ``data``, such as ``CCDData`` and ``NDData``.
 """
 
-COLOURS = (3, 4)
-"""Numbers of colour channels; a fourth is not used."""
+COLORS = (3, 4)
+"""Numbers of color channels; a fourth is not used."""
 
 KINDS = (
     "a path, bytes, a file open for reading in binary mode, an array, an image of PIL, "
@@ -150,7 +150,7 @@ def _fits_name(image: Any) -> str:
 
 
 def _of_pil(image: Any) -> NDArray[Any]:
-    """Return the pixels of an image of PIL; palettes and other colour spaces become colours."""
+    """Return the pixels of an image of PIL; palettes and other color spaces become colors."""
     if image.mode in ("1", "LA", "La"):
         image = image.convert("L")
     elif image.mode in ("P", "PA", "CMYK", "YCbCr", "LAB", "HSV", "RGBX", "RGBa"):
@@ -185,14 +185,14 @@ def mask_of(image: Image, given: Any, name: str = "image") -> NDArray[np.bool_] 
 
 
 def _layout(array: NDArray[Any]) -> NDArray[Any]:
-    """Return an array without axes of length 1, the one of colours last, as a FITS file is read.
+    """Return an array without axes of length 1, the one of colors last, as a FITS file is read.
 
-    The only axis of length 3 or 4 is that of the colours, else the first of that length.
+    The only axis of length 3 or 4 is that of the colors, else the first of that length.
     """
     longer = [length for length in array.shape if length != 1]
     if len(longer) >= 2:
         array = array.reshape(longer)
-    places = [place for place, length in enumerate(array.shape) if length in COLOURS]
+    places = [place for place, length in enumerate(array.shape) if length in COLORS]
     if array.ndim == 3 and places and (len(places) == 1 or places[0] == 0):
         array = np.moveaxis(array, places[0], -1)
     return array
@@ -209,11 +209,11 @@ def _pixels(image: Any, name: str) -> _starpipe._Image:
     if array.dtype.kind not in "buif":
         raise ValueError(f"the {name} must hold real numbers, not {array.dtype}")
     array = _layout(array)
-    is_colour = array.ndim == 3
-    if array.ndim != 2 and not (is_colour and array.shape[2] in COLOURS):
-        hint = "; pass one of its planes, as image[0]" if is_colour else ""
+    is_color = array.ndim == 3
+    if array.ndim != 2 and not (is_color and array.shape[2] in COLORS):
+        hint = "; pass one of its planes, as image[0]" if is_color else ""
         raise ValueError(
-            f"the {name} must be an array (rows, columns), or (rows, columns, 3) of colours, "
+            f"the {name} must be an array (rows, columns), or (rows, columns, 3) of colors, "
             f"not {np.shape(image)}{hint}"
         )
     _starpipe.check_size(array.shape[1], array.shape[0])
@@ -223,7 +223,7 @@ def _pixels(image: Any, name: str) -> _starpipe._Image:
     if size == 8 or kind == "f":
         with np.errstate(over="ignore"):
             return np.ascontiguousarray(array, dtype=np.float32)
-    if not is_colour and kind == "u" and size <= 2:
+    if not is_color and kind == "u" and size <= 2:
         return np.ascontiguousarray(array, dtype=(np.uint8, np.uint16)[size - 1])
-    # Negative levels, levels of more than 16 bits, and colours.
+    # Negative levels, levels of more than 16 bits, and colors.
     return np.ascontiguousarray(array, dtype=np.int64), int(np.iinfo(array.dtype).max)

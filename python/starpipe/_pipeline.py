@@ -83,7 +83,7 @@ class Pipeline:
         ----------
         image : path, bytes, file, array, PIL image, HDU, HDUList, CCDData or NDData
             The frame. An array is (rows, columns), of real numbers, or (rows, columns, 3) of
-            colours. Arrays of uint8, uint16 and float32 that are contiguous are not copied. Of an
+            colors. Arrays of uint8, uint16 and float32 that are contiguous are not copied. Of an
             HDUList that image is taken which is taken of its file. Mask and header of an object are
             used.
         mask : array of bool, optional

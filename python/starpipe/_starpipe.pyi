@@ -41,7 +41,7 @@ _Image: TypeAlias = (
     | NDArray[np.float32]
     | tuple[NDArray[np.int64], int]
 )
-"""Arrays of 2 dimensions; of float32 and int64 also of 3: the last is that of the colours."""
+"""Arrays of 2 dimensions; of float32 and int64 also of 3: the last is that of the colors."""
 
 @final
 class Pipeline:

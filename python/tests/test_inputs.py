@@ -16,7 +16,7 @@ import starpipe as sp
         (np.zeros((20, 20), dtype=complex), "real numbers, not complex128"),
         (np.full((20, 20), None), "real numbers, not object"),
         (np.full((20, 20), "a"), "real numbers, not <U1"),
-        (np.zeros((20, 20, 5)), r"\(rows, columns, 3\) of colours, not .*image\[0\]"),
+        (np.zeros((20, 20, 5)), r"\(rows, columns, 3\) of colors, not .*image\[0\]"),
         (np.zeros(20), r"\(rows, columns\).* not \(20,\)"),
         (np.zeros((0, 20)), "20 x 0|too small|at least"),
         (np.broadcast_to(np.uint8(7), (300_000, 300_000)), "300000 x 300000 pixels"),

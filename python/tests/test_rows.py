@@ -146,17 +146,17 @@ def test_of_several_units_that_is_taken_which_is_taken_of_the_file(pipeline, pix
         pipeline.solve(fits.HDUList([fits.PrimaryHDU()]))
 
 
-def test_colours_are_solved_as_of_a_file(pipeline, pixels, tmp_path):
+def test_colors_are_solved_as_of_a_file(pipeline, pixels, tmp_path):
     grey = (pixels // 257).astype(np.uint8)
-    colours = np.stack([grey, grey, grey], axis=-1)
-    Image.fromarray(colours).save(tmp_path / "colour.png")
-    of_file = pipeline.solve(tmp_path / "colour.png")
+    colors = np.stack([grey, grey, grey], axis=-1)
+    Image.fromarray(colors).save(tmp_path / "color.png")
+    of_file = pipeline.solve(tmp_path / "color.png")
     assert of_file
-    opaque = np.concatenate([colours, np.full_like(colours[..., :1], 255)], axis=-1)
-    images = [colours, opaque, np.asfortranarray(colours), Image.fromarray(colours)]
-    for image in [*images, Image.fromarray(opaque), Image.open(tmp_path / "colour.png")]:
+    opaque = np.concatenate([colors, np.full_like(colors[..., :1], 255)], axis=-1)
+    images = [colors, opaque, np.asfortranarray(colors), Image.fromarray(colors)]
+    for image in [*images, Image.fromarray(opaque), Image.open(tmp_path / "color.png")]:
         assert without_times(pipeline.solve(image)) == without_times(of_file)
-    for image in (colours.astype(np.float32), colours / 255.0, colours.astype(np.uint16) * 257):
+    for image in (colors.astype(np.float32), colors / 255.0, colors.astype(np.uint16) * 257):
         assert pipeline.solve(image).center.separation(of_file.center) < 10 * u.arcsec
     of_grey = pipeline.solve(grey)
     palette = Image.fromarray(grey).convert("P")
@@ -165,7 +165,7 @@ def test_colours_are_solved_as_of_a_file(pipeline, pixels, tmp_path):
     assert pipeline.solve(palette)
 
 
-def test_planes_of_colours_are_as_in_their_file(pipeline, pixels, tmp_path):
+def test_planes_of_colors_are_as_in_their_file(pipeline, pixels, tmp_path):
     planes = np.stack([pixels[::-1] // 2, pixels[::-1], pixels[::-1] // 3])
     fits.PrimaryHDU(planes).writeto(tmp_path / "planes.fits")
     of_file = pipeline.solve(tmp_path / "planes.fits")

@@ -13,12 +13,12 @@ pub const SCHEMA: u32 = 1;
 /// All that the tables depend on, as `archive.json` has it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identity {
-    known: Known,
+    known: IdentityFields,
     text: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Known {
+struct IdentityFields {
     schema: u32,
     version: String,
     frames_per_part: NonZeroUsize,
@@ -34,7 +34,7 @@ impl Identity {
     /// # Errors
     /// [`serde_json::Error`], which does not occur with these types.
     pub fn new(plan: &Plan, configuration: &Configuration) -> serde_json::Result<Self> {
-        let known = Known {
+        let known = IdentityFields {
             schema: SCHEMA,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             frames_per_part: plan.frames_per_part(),

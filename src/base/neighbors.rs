@@ -1,4 +1,4 @@
-//! Neighbour search among points on a frame: with a k-d tree, or for short distances with cells.
+//! Neighbor search among points on a frame: with a k-d tree, or for short distances with cells.
 
 use super::coords::PixelPoint;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
@@ -57,7 +57,7 @@ impl PointTree {
 
 /// Most rows and columns of cells of a [`PointGrid`]. If the points are few, there are about as many
 /// cells as points.
-const MOST_ALONG: usize = 128;
+const MAX_ALONG: usize = 128;
 
 /// Points on a frame, sorted into cells: searches within short distances are faster than with a
 /// [`PointTree`]. Its buffers are reused.
@@ -75,7 +75,7 @@ pub(crate) struct PointGrid {
 impl PointGrid {
     /// Replaces the points, of which there are `count`.
     pub fn fill(&mut self, count: usize, points: impl Iterator<Item = PixelPoint> + Clone) {
-        let along = ((count as f64).sqrt() as usize).clamp(1, MOST_ALONG);
+        let along = ((count as f64).sqrt() as usize).clamp(1, MAX_ALONG);
         self.x = Division::over(points.clone().map(|point| point.x), along);
         self.y = Division::over(points.clone().map(|point| point.y), along);
         self.starts.clear();

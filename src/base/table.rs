@@ -20,11 +20,11 @@ impl FieldValue {
     /// The value as CSV has it.
     fn to_csv(&self) -> String {
         /// Smaller numbers have an exponent.
-        const LEAST_WITHOUT_EXPONENT: f64 = 1e-4;
+        const MIN_WITHOUT_EXPONENT: f64 = 1e-4;
         match self {
             Self::Integer(value) => value.map(|value| value.to_string()),
             Self::Number(value) => value.map(|value| {
-                if value != 0.0 && value.abs() < LEAST_WITHOUT_EXPONENT {
+                if value != 0.0 && value.abs() < MIN_WITHOUT_EXPONENT {
                     format!("{value:e}")
                 } else {
                     value.to_string()

@@ -94,7 +94,7 @@ pub struct Detections {
     pub noise_tail: Option<NoiseTail>,
     /// Whether fainter sources were left out, since there are more than
     /// [`DetectConfig::max_detections`](super::DetectConfig::max_detections).
-    pub are_more: bool,
+    pub is_truncated: bool,
 }
 
 /// The point spread function measured on the stars of a frame, where they are not round Gaussians of
@@ -134,7 +134,7 @@ pub struct Wings {
 /// What makes large values of the filtered noise more frequent than in independent noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NoiseTail {
-    /// The noise of neighbouring pixels is correlated, as compression and denoising leave it.
+    /// The noise of neighboring pixels is correlated, as compression and denoising leave it.
     Correlated,
     /// The noise is below the steps of the grey levels, and has more large values than that
     /// explains.

@@ -25,7 +25,7 @@
 //!
 //! Caveats: the filter has one round spot for the whole frame; a frame with fewer than three bright
 //! stars gets a default one. The form of undersampled spots (σ below 0.65 px) is not measured unless
-//! they are elongated. Stars fainter than about 2 % of a bright neighbour, within some five spot sizes of
+//! they are elongated. Stars fainter than about 2 % of a bright neighbor, within some five spot sizes of
 //! it, are counted as its halo. Standard errors of stars whose light is not proportional to the
 //! grey level (JPEG's gamma) are indicative.
 //!
@@ -155,7 +155,7 @@ fn run(
     } = workspace;
     let view = View::of_live_pixels(frame).until(interrupt);
     if view.width < MIN_SIDE_PX || view.height < MIN_SIDE_PX {
-        describe_darkness(frame, config, found);
+        set_empty_frame(frame, config, found);
         return Ok(());
     }
     background.measure(&view, frame.step_adu, config.cell_px)?;
@@ -168,7 +168,7 @@ fn run(
     };
     let searched = search.run(&input)?;
     let (mut stars, pass) = (searched.stars, searched.pass);
-    let are_more = search.found.is_full();
+    let is_truncated = search.found.is_full();
     let FrameSearch {
         filtered,
         found: PeakSearch { peaks, regions, .. },
@@ -186,7 +186,7 @@ fn run(
         measure_trailed(&maps, &trails, peaks, &mut found.sources)?;
         found.spot_sigma_px = stars.spot_px;
         (found.psf, found.wings) = (None, None);
-        keep_brightest(found, config, are_more);
+        keep_brightest(found, config, is_truncated);
         return Ok(());
     }
     let shape = StarShape::measure(&maps, peaks);
@@ -212,19 +212,19 @@ fn run(
         ring: Ring::around(maps.width_px()),
     };
     measurement.run(peaks, measure, &mut found.sources)?;
-    keep_brightest(found, config, are_more);
+    keep_brightest(found, config, is_truncated);
     found.spot_sigma_px = stars.spot_px;
     found.psf = psf.map(|psf| psf.summary((view.width, view.height)));
     add_wings(&view, &background.mesh, found);
     Ok(())
 }
 
-/// Sorts the sources, and leaves out the faintest beyond the most that are wanted; `are_more` where
+/// Sorts the sources, and leaves out the faintest beyond the most that are wanted; `is_truncated` where
 /// peaks were left out before.
-fn keep_brightest(found: &mut Detections, config: &DetectConfig, are_more: bool) {
+fn keep_brightest(found: &mut Detections, config: &DetectConfig, is_truncated: bool) {
     found.sources.sort_unstable_by(Detection::by_brightness);
     // The second star of a pair may be one too many.
-    found.are_more = are_more || found.sources.len() > config.max_detections;
+    found.is_truncated = is_truncated || found.sources.len() > config.max_detections;
     found.sources.truncate(config.max_detections);
 }
 
@@ -243,7 +243,7 @@ fn add_wings(view: &View<'_>, background: &Mesh, found: &mut Detections) {
 }
 
 /// The result for a frame without light.
-fn describe_darkness(frame: &Frame, config: &DetectConfig, found: &mut Detections) {
+fn set_empty_frame(frame: &Frame, config: &DetectConfig, found: &mut Detections) {
     let level = frame.pixels.values().find(|p| !p.is_nan());
     found.background_adu = f64::from(level.unwrap_or(0.0));
     found.noise_adu = f64::from(background::rounding_sigma_adu(frame.step_adu));
@@ -253,5 +253,5 @@ fn describe_darkness(frame: &Frame, config: &DetectConfig, found: &mut Detection
     found.trails = None;
     found.wings = None;
     found.noise_tail = None;
-    found.are_more = false;
+    found.is_truncated = false;
 }

@@ -6,7 +6,7 @@
 
 use super::background::{FrameBackground, Mesh, median};
 use super::candidates::{
-    CandidateMemory, FilteredFrame, Gathered, PeakSearch, RawPeakFinder, SearchConfig,
+    CandidateLimits, CandidateMemory, FilteredFrame, PeakSearch, RawPeakFinder, SearchConfig,
 };
 use super::config::DetectConfig;
 use super::detection::NoiseTail;
@@ -28,7 +28,7 @@ const SPOT_GUESS_TOLERANCE: f64 = 1.15;
 /// Most times that the frame is filtered.
 const MAX_FILTER_ROUNDS: usize = 3;
 /// This many stars of one size, found without a filter, settle the spot size; fewer may be chance.
-const ENOUGH_RAW_STARS: usize = 8;
+const MIN_RAW_STARS: usize = 8;
 /// Smaller spots put so much light in one pixel that the brightest pixels are the brightest stars;
 /// wider ones are measured on the filtered frame.
 const SHARP_SPOT_PX: f64 = 0.75;
@@ -137,8 +137,8 @@ impl FrameSearch {
     /// Frees the buffers that a crowded frame has filled: to read the next takes memory, too.
     pub fn free_large_buffers(&mut self) {
         /// Candidates whose buffers are kept, 26 MB.
-        const MOST_KEPT: usize = 1 << 19;
-        if self.filtered.candidate_count() > MOST_KEPT {
+        const MAX_KEPT: usize = 1 << 19;
+        if self.filtered.candidate_count() > MAX_KEPT {
             self.filtered.candidates = Vec::new();
             self.found = PeakSearch::default();
         }
@@ -183,7 +183,7 @@ impl FrameSearch {
             maps.spot_px = size.spot_px;
         }
         let is_enough =
-            |size: SpotSize| size.stars >= ENOUGH_RAW_STARS && size.spot_px < SHARP_SPOT_PX;
+            |size: SpotSize| size.stars >= MIN_RAW_STARS && size.spot_px < SHARP_SPOT_PX;
         Ok(if measured.is_some_and(is_enough) {
             let model = star_model(&maps, stars, fits);
             StarEstimate::Settled(input.with_stated_size(model))
@@ -247,7 +247,7 @@ impl FrameSearch {
         let gaussian = config
             .threshold_sigma
             .unwrap_or_else(|| gaussian_threshold(config, size, spot_px, &kernel));
-        let above = |threshold| Gathered {
+        let above = |threshold| CandidateLimits {
             threshold,
             most: memory.most_candidates(),
         };

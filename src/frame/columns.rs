@@ -19,7 +19,7 @@ const MIN_ROWS: usize = 32;
 const MAX_SHARE: f64 = 0.2;
 /// The nearest column with light is at most so far away, on both sides.
 const REACH: usize = 3;
-/// Share of neighbouring rows with the same value from which on a column has no light.
+/// Share of neighboring rows with the same value from which on a column has no light.
 const MAX_EQUAL_SHARE: f64 = 0.5;
 
 /// Rows of a column that hold one value instead of light.

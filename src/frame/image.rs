@@ -14,10 +14,10 @@ pub struct Frame<'p> {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Pixel values in the file's own units (ADU), row-major, `height * width`; colour is converted
+    /// Pixel values in the file's own units (ADU), row-major, `height * width`; color is converted
     /// to luminance. NaN marks a pixel without a value.
     pub pixels: Pixels<'p>,
-    /// Difference between neighbouring grey levels, in ADU: 1 for integers, 0 for floats.
+    /// Difference between neighboring grey levels, in ADU: 1 for integers, 0 for floats.
     pub step_adu: f32,
     /// Level at and above which a pixel is saturated, in ADU, if the format has one.
     pub saturation_adu: Option<f32>,

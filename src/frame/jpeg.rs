@@ -60,7 +60,7 @@ pub(super) struct Jpeg<'a> {
     bytes: &'a [u8],
     pub width: usize,
     pub height: usize,
-    /// 1: grey; 3: colour.
+    /// 1: grey; 3: color.
     pub channels: usize,
     scans: Scans,
     exif: Option<Vec<u8>>,

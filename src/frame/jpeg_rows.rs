@@ -468,7 +468,7 @@ mod tests {
     const WIDTH: usize = 50;
     const HEIGHT: usize = 40;
 
-    /// A baseline JPEG of grey or colour noise.
+    /// A baseline JPEG of grey or color noise.
     fn jpeg(color: ExtendedColorType) -> Vec<u8> {
         let channels = usize::from(color.channel_count());
         let noise = (0..WIDTH * HEIGHT * channels).map(|i| (i * i * 31 % 251) as u8);

@@ -24,7 +24,7 @@ pub(super) struct Samples<'a, T> {
     pub height: usize,
     /// Interleaved, `height * width * channels`.
     pub values: &'a [T],
-    /// 1: grey; 2: grey and alpha; 3: colour; 4: colour and alpha.
+    /// 1: grey; 2: grey and alpha; 3: color; 4: color and alpha.
     pub channels: usize,
 }
 
@@ -70,12 +70,12 @@ impl<'p> Frame<'p> {
         frame_from_integers(&samples, full_scale)
     }
 
-    /// The luminance of a picture of 3 colours, whose samples are whole numbers, as of a file: pixel
+    /// The luminance of a picture of 3 colors, whose samples are whole numbers, as of a file: pixel
     /// by pixel, and more `channels` than 3 are left out.
     ///
     /// # Errors
     /// As [`Frame::from_integers`].
-    pub fn from_colours<T: WholeNumber>(
+    pub fn from_colors<T: WholeNumber>(
         (width, height): (usize, usize),
         channels: usize,
         values: &[T],
@@ -94,7 +94,7 @@ impl<'p> Frame<'p> {
     ///
     /// # Errors
     /// As [`Frame::new`].
-    pub fn from_float_colours(
+    pub fn from_float_colors(
         size: (usize, usize),
         channels: usize,
         values: Vec<f32>,
@@ -124,9 +124,9 @@ pub(super) fn frame_from_integers<T: WholeNumber>(
         1 => grey(values.iter().copied(), full_scale),
         2 => grey(values.chunks_exact(2).map(|c| c[0]), full_scale),
         channels => {
-            let colours = values.chunks_exact(channels);
+            let colors = values.chunks_exact(channels);
             let luminance = |c: &[T]| luminance([level(c[0]), level(c[1]), level(c[2])], full);
-            Pixels::F32(colours.map(luminance).collect())
+            Pixels::F32(colors.map(luminance).collect())
         }
     };
     let step = if samples.channels <= 2 {

@@ -10,7 +10,7 @@ pub const MIN_SIDE_PX: usize = 3;
 /// Most images of a file of which all are read.
 pub const MAX_PAGES: usize = 10_000;
 
-/// Maximum size of a file: the largest frame in three colours of 64 bits, and some headers.
+/// Maximum size of a file: the largest frame in three colors of 64 bits, and some headers.
 pub(super) const MAX_FILE_BYTES: u64 = MAX_PIXELS as u64 * 24 + (1 << 24);
 
 /// Number of bytes read to recognize a frame. Gzip may store a long file name before its data.

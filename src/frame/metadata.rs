@@ -29,7 +29,7 @@ pub struct FrameMetadata {
     pub zenith_distance_deg: Option<f64>,
     /// Which image of the file it is, where it is not the first.
     pub choice: Option<ImageChoice>,
-    /// The mosaic of colour filters that the file states. Drivers of grey cameras state one, too.
+    /// The mosaic of color filters that the file states. Drivers of grey cameras state one, too.
     pub bayer_pattern: Option<BayerPattern>,
     /// Values outside their plausible range. They are not used.
     pub ignored: Vec<IgnoredValue>,

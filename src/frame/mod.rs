@@ -7,9 +7,9 @@
 //! 1. The first bytes decide the format; the file's name is not used. Gzip is decompressed first.
 //!    Formats of cameras and phones that are not read are named, with what to convert them to.
 //! 2. The size in the header is checked against [`MAX_PIXELS`] before anything is allocated.
-//! 3. Colour is converted to luminance with the ITU-R BT.601 weights ([`LUMINANCE_WEIGHTS`]). They
-//!    are the inverse of JPEG's colour transform, so a colour JPEG gives the luma that it stores.
-//! 4. A colour pixel is saturated if any channel is. Its luminance is unknown, so it is set to full
+//! 3. Color is converted to luminance with the ITU-R BT.601 weights ([`LUMINANCE_WEIGHTS`]). They
+//!    are the inverse of JPEG's color transform, so a color JPEG gives the luma that it stores.
+//! 4. A color pixel is saturated if any channel is. Its luminance is unknown, so it is set to full
 //!    scale.
 //! 5. Where neither file nor format state the level from which on pixels are saturated, or no pixel
 //!    reaches it, the level that the highest pixels share is ([`Frame::saturation_level_adu`]).
@@ -17,13 +17,13 @@
 //!
 //! A file may hold several images, its pages, counted from 1; the largest is read unless another is
 //! chosen, or all are ([`Pages`]). Pages are the images of a TIFF file in file order, and in FITS every image with two axes
-//! in a header-data unit and every plane of a cube. A cube of three planes is one colour image.
+//! in a header-data unit and every plane of a cube. A cube of three planes is one color image.
 //!
 //! FITS images are stored bottom-up, unless `ROWORDER` is `TOP-DOWN`: their rows are reversed on
 //! reading, so that y = 0 is the top row as FITS viewers draw the picture ([`RowOrder`]). Pictures of
 //! other formats are turned as their `Orientation` says ([`Orientation`]).
 //!
-//! Raw frames of colour cameras are read as they are; [`Mosaic`] finds them and makes them grey.
+//! Raw frames of color cameras are read as they are; [`Mosaic`] finds them and makes them grey.
 //!
 //! Caveats: transparency is ignored. JPEG's gamma is not undone, so fluxes from JPEG are not
 //! linear. Integers and floats of more than 24 bits are rounded to 24.

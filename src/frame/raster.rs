@@ -13,7 +13,7 @@ use image::error::{ImageError, UnsupportedErrorKind};
 use image::{ColorType, DynamicImage, ExtendedColorType, ImageDecoder, Limits};
 use std::io::{Cursor, ErrorKind};
 
-/// Decodes a PNG of any colour type and depth. Depths below 8 bits are scaled to 0-255, as PNG
+/// Decodes a PNG of any color type and depth. Depths below 8 bits are scaled to 0-255, as PNG
 /// defines.
 /// # Errors
 /// As [`super::reader::decode`].
@@ -123,7 +123,7 @@ fn word(bytes: &[u8], at: usize) -> Option<[u8; 4]> {
     bytes.get(at..)?.first_chunk().copied()
 }
 
-/// What the PNG decoder may allocate beside the image: colour profiles and texts.
+/// What the PNG decoder may allocate beside the image: color profiles and texts.
 fn limits() -> Limits {
     let mut limits = Limits::default();
     limits.max_alloc = Some(1 << 26);
@@ -252,7 +252,7 @@ pub(super) fn unsupported(format: FrameFormat, found: String) -> FrameError {
     FrameError::Unsupported {
         format,
         found,
-        expected: "8 or 16 bits per sample, grey or colour",
+        expected: "8 or 16 bits per sample, grey or color",
     }
 }
 

@@ -145,9 +145,9 @@ impl SaturationFinder {
                 source.peak = source.peak.max(pixel.value);
                 source.at_top += usize::from(is_top);
                 source.below_top += usize::from(!is_top);
-                for neighbour in neighbours(pixels, pixel) {
-                    if !std::mem::replace(&mut is_seen[neighbour], true) {
-                        open.push(neighbour);
+                for neighbor in neighbors(pixels, pixel) {
+                    if !std::mem::replace(&mut is_seen[neighbor], true) {
+                        open.push(neighbor);
                     }
                 }
             }
@@ -303,7 +303,7 @@ impl Heights<'_> {
 }
 
 /// The indices of the pixels within one pixel of this.
-fn neighbours(pixels: &[BrightPixel], pixel: BrightPixel) -> impl Iterator<Item = usize> {
+fn neighbors(pixels: &[BrightPixel], pixel: BrightPixel) -> impl Iterator<Item = usize> {
     let (left, right) = (pixel.x.saturating_sub(1), pixel.x + 1);
     (pixel.y.saturating_sub(1)..=pixel.y + 1).flat_map(move |y| {
         let from = pixels.partition_point(|p| (p.y, p.x) < (y, left));

@@ -47,7 +47,7 @@ fn twelve_bits_stored_in_sixteen_are_recognized_by_their_levels() {
 }
 
 #[test]
-fn colour_becomes_luminance_and_one_full_channel_saturates_a_pixel() {
+fn color_becomes_luminance_and_one_full_channel_saturates_a_pixel() {
     use ::tiff::encoder::colortype::RGB8;
     let mut data = vec![10u8; 27];
     data[..3].copy_from_slice(&[100, 50, 20]);
@@ -71,7 +71,7 @@ fn nan_pixels_of_a_float_tiff_stay_nan() {
 }
 
 #[test]
-fn png_and_jpeg_are_read_in_grey_and_colour() {
+fn png_and_jpeg_are_read_in_grey_and_color() {
     use ::image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgba};
     let grey16 = DynamicImage::ImageLuma16(ImageBuffer::from_fn(5, 4, |x, _| {
         Luma([1000 * x as u16 + 7])
@@ -198,7 +198,7 @@ fn sample(kind: usize) -> Vec<u8> {
     let words: Vec<u16> = (0..24 * 16).map(|i| i * 150).collect();
     let grey = || DynamicImage::ImageLuma8(ImageBuffer::from_raw(24, 16, bytes.clone()).unwrap());
     let grey16: ImageBuffer<Luma<u16>, _> = ImageBuffer::from_raw(24, 16, words.clone()).unwrap();
-    let colour = DynamicImage::ImageRgb8(ImageBuffer::from_fn(24, 16, |x, y| {
+    let color = DynamicImage::ImageRgb8(ImageBuffer::from_fn(24, 16, |x, y| {
         Rgb([x as u8, y as u8, 7])
     }));
     let compressed = |compression| {
@@ -238,9 +238,9 @@ fn sample(kind: usize) -> Vec<u8> {
         8 => encoded_by_image(&grey(), ImageFormat::Png),
         9 => encoded_by_image(&grey16.into(), ImageFormat::Png),
         10 => encoded_by_image(&grey(), ImageFormat::Jpeg),
-        11 => encoded_by_image(&colour, ImageFormat::Jpeg),
+        11 => encoded_by_image(&color, ImageFormat::Jpeg),
         12 => encoded_by_image(&grey(), ImageFormat::Bmp),
-        13 => encoded_by_image(&colour, ImageFormat::Bmp),
+        13 => encoded_by_image(&color, ImageFormat::Bmp),
         14 => encoded_by_image(&grey(), ImageFormat::Pnm),
         15 => b"P2\n# a remark\n3 3\n4095\n0 1 2 3 4 5 6 7 4095\n".to_vec(),
         16 => [b"P6 8 16 255\n", &bytes[..]].concat(),

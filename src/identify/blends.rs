@@ -7,7 +7,7 @@
 //! F exp(−d² / 4s²)`. Mean shift finds the mode next to the star.
 //!
 //! Caveats: the noise is assumed to be that of the background; with photon noise a bright blend is
-//! measured nearer to its photocentre. Fluxes are those of V magnitudes, whatever the colour. Stars
+//! measured nearer to its photocentre. Fluxes are those of V magnitudes, whatever the color. Stars
 //! that the catalogue lacks do not count.
 //!
 //! # Reference
@@ -25,17 +25,17 @@ const FAINTER_MAG: f32 = 4.5;
 /// So do stars farther away, in standard deviations of the spot, unless they are brighter.
 const REACH_SIGMAS: f64 = 4.5;
 /// The probability that a star is measured by its own light where one spot would take up that of
-/// its neighbours as well: the detector separates some stars that this model does not.
+/// its neighbors as well: the detector separates some stars that this model does not.
 const SEPARATED_SHARE: f64 = 0.05;
 /// The detector does not separate a star whose own light is closer than this to the light of its
 /// blend, in standard deviations of the spot.
 const SEPARABLE_SIGMAS: f64 = 1.5;
-/// The probability that such a star is measured by its own light all the same: its neighbours in the
+/// The probability that such a star is measured by its own light all the same: its neighbors in the
 /// catalogue are not there, or much fainter. It is small, so that a bright star cannot pull the
 /// attitude to where its own light agrees.
 const MISTAKEN_SHARE: f64 = 0.001;
 /// A star farther from the detection than this, in standard deviations of the spot, is outside the
-/// spot's half width at half maximum: its neighbours may be what was seen.
+/// spot's half width at half maximum: its neighbors may be what was seen.
 const HALF_WIDTH_SIGMAS: f64 = 1.177;
 /// So it is only where it is outside by more than the error of its position, which a fit that is not
 /// yet good makes large.
@@ -54,7 +54,7 @@ const CONVERGED_PX: f64 = 1e-4;
 /// … or after this many steps.
 const MAX_STEPS: usize = 50;
 
-/// Neighbours are looked up within this many times the reach, as it changes with the focal length.
+/// Neighbors are looked up within this many times the reach, as it changes with the focal length.
 const REACH_MARGIN: f64 = 1.1;
 
 /// Finds blends. Its buffers are reused.
@@ -62,7 +62,7 @@ const REACH_MARGIN: f64 = 1.1;
 pub struct Blends {
     /// The stars near each predicted star, where they were looked up.
     near: Vec<Option<Near>>,
-    neighbours: Vec<GridStar>,
+    neighbors: Vec<GridStar>,
     /// Catalogue stars of other detections, sorted.
     taken: Vec<StarIndex>,
     /// Of the candidates of one observed star.
@@ -73,7 +73,7 @@ pub struct Blends {
 /// The stars near another one.
 #[derive(Debug, Clone, Copy)]
 struct Near {
-    /// Their first position in the list of neighbours, and that after the last.
+    /// Their first position in the list of neighbors, and that after the last.
     from: u32,
     to: u32,
     /// Chord within which they were looked up.
@@ -113,7 +113,7 @@ struct View<'a> {
 impl Blends {
     /// Starts with `stars` predicted stars.
     pub fn start(&mut self, stars: usize) {
-        self.neighbours.clear();
+        self.neighbors.clear();
         self.near.clear();
         self.near.resize(stars, None);
     }
@@ -209,11 +209,11 @@ impl Blends {
         let Self {
             taken,
             lights,
-            neighbours,
+            neighbors,
             ..
         } = self;
         lights.clear();
-        for near in &neighbours[near.from as usize..near.to as usize] {
+        for near in &neighbors[near.from as usize..near.to as usize] {
             if near.is_within(centre, chord_sq) && taken.binary_search(&near.index).is_err() {
                 lights.extend(view.light_of(near.index, star.v_mag));
             }
@@ -247,16 +247,16 @@ impl Blends {
             let sky = view.problem.sky;
             let star = sky.catalog().star(index);
             let chord = REACH_MARGIN * view.chord;
-            let from = self.neighbours.len() as u32;
+            let from = self.neighbors.len() as u32;
             let keep = |near: &GridStar| {
                 if near.index != index {
-                    self.neighbours.push(*near);
+                    self.neighbors.push(*near);
                 }
             };
             let faintest_v_mag = star.v_mag + FAINTER_MAG;
             sky.grid
                 .for_each_within_chord(&star.direction, chord, faintest_v_mag, keep);
-            let to = self.neighbours.len() as u32;
+            let to = self.neighbors.len() as u32;
             *self.near[predicted].insert(Near { from, to, chord })
         })
     }

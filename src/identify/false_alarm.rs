@@ -33,14 +33,14 @@ const BRIGHTEST: [usize; 3] = [TESTED_STARS, 30, 15];
 const TRIANGLE_STARS: usize = 3;
 /// Radii of agreement tried: from the smallest, in pixels, by this factor, up to this fraction of
 /// the frame's diagonal.
-const SMALLEST_RADIUS_PX: f64 = 0.2;
+const MIN_RADIUS_PX: f64 = 0.2;
 const RADIUS_FACTOR: f64 = 1.5;
-const LARGEST_RADIUS_SHARE: f64 = 0.014;
+const MAX_RADIUS_SHARE: f64 = 0.014;
 /// Magnitude differences tried, besides the largest that is tolerated.
 const MAG_TOLERANCES: [f64; 3] = [0.25, 0.5, 1.0];
-/// Radius of the neighbourhood in which the density of predicted stars is measured, in units of the
+/// Radius of the neighborhood in which the density of predicted stars is measured, in units of the
 /// radius of agreement.
-const NEIGHBOURHOOD: f64 = 8.0;
+const NEIGHBORHOOD: f64 = 8.0;
 /// An observed and a predicted star of similar brightness.
 #[derive(Debug, Clone, Copy)]
 struct NearPair {
@@ -48,7 +48,7 @@ struct NearPair {
     predicted: usize,
     /// Their distance, in pixels.
     apart_px: f64,
-    /// The smallest radius of agreement whose neighbourhood contains it.
+    /// The smallest radius of agreement whose neighborhood contains it.
     radius: usize,
     /// Absolute difference of their magnitudes.
     mag: f64,
@@ -60,13 +60,13 @@ pub struct FalseAlarm {
     predicted: Vec<PredictedStar>,
     /// Radii of agreement, smallest first.
     radii_px: Vec<f64>,
-    /// All pairs in the neighbourhood of the largest radius.
+    /// All pairs in the neighborhood of the largest radius.
     pairs: Vec<NearPair>,
     /// The pairs within the largest radius, closest first.
     close: Vec<NearPair>,
     /// For each observed star, the number of predicted stars of similar brightness, …
     alike: Vec<f64>,
-    /// … and how many of them lie in the neighbourhood, radius by radius.
+    /// … and how many of them lie in the neighborhood, radius by radius.
     near: Vec<f64>,
     observed_taken: Vec<bool>,
     predicted_taken: Vec<bool>,
@@ -149,24 +149,23 @@ impl FalseAlarm {
     }
 
     fn set_radii(&mut self, field: &StarField) {
-        let largest_px = LARGEST_RADIUS_SHARE * field.width_px.hypot(field.height_px);
+        let largest_px = MAX_RADIUS_SHARE * field.width_px.hypot(field.height_px);
         // At least one radius, also in the smallest frame.
-        let largest_px = largest_px.max(SMALLEST_RADIUS_PX);
-        let radii = std::iter::successors(Some(SMALLEST_RADIUS_PX), |radius| {
-            Some(radius * RADIUS_FACTOR)
-        });
+        let largest_px = largest_px.max(MIN_RADIUS_PX);
+        let radii =
+            std::iter::successors(Some(MIN_RADIUS_PX), |radius| Some(radius * RADIUS_FACTOR));
         self.radii_px.clear();
         self.radii_px
             .extend(radii.take_while(|&radius| radius <= largest_px));
     }
 
-    /// Finds all pairs within the neighbourhood of the largest radius and the tolerated magnitude
+    /// Finds all pairs within the neighborhood of the largest radius and the tolerated magnitude
     /// difference.
     fn find_pairs(&mut self, hypothesis: &Hypothesis, observed: &[ObservedStar], largest_mag: f64) {
         let largest_px = self.radii_px.last().copied().unwrap_or(0.0);
         let radii_px = &self.radii_px;
-        let near_px = |radius: usize| NEIGHBOURHOOD * radii_px[radius];
-        let reach_px = NEIGHBOURHOOD * largest_px;
+        let near_px = |radius: usize| NEIGHBORHOOD * radii_px[radius];
+        let reach_px = NEIGHBORHOOD * largest_px;
         self.pairs.clear();
         for (index, star) in observed.iter().enumerate() {
             let alike = hypothesis.alike(star, &self.predicted, largest_mag);
@@ -262,7 +261,7 @@ impl FalseAlarm {
         for (of_star, &alike) in self.near.chunks_exact(radii).zip(&self.alike) {
             // Without the one that may be its match: what counts is how many others chance could
             // put there.
-            let crowd = (of_star[radius] - 1.0) / NEIGHBOURHOOD.powi(2);
+            let crowd = (of_star[radius] - 1.0) / NEIGHBORHOOD.powi(2);
             let strewn = alike * PI * radius_px * radius_px / frame_px;
             let chance = strewn.max(crowd).min(1.0);
             self.chances.push(chance);

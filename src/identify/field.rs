@@ -48,7 +48,7 @@ impl Photometry {
     /// catalogue's.
     pub const fn tolerance_mag(self) -> f64 {
         match self {
-            // Colour, saturation, and the tone curve of a JPEG.
+            // Color, saturation, and the tone curve of a JPEG.
             Self::Instrumental => 2.5,
             Self::JohnsonV => 1.5,
         }

@@ -3,7 +3,7 @@
 use super::field::StarField;
 
 /// A division of the frame into square cells. Around it is a border of cells that stay empty, so
-/// that each cell of the frame has eight neighbours.
+/// that each cell of the frame has eight neighbors.
 #[derive(Debug, Clone, Copy)]
 pub struct Grid {
     /// Without the border.
@@ -49,7 +49,7 @@ impl Grid {
         (row + 1) * self.stride() + column + 1
     }
 
-    /// The area of the cell at a position and of its neighbours in the frame, in square pixels.
+    /// The area of the cell at a position and of its neighbors in the frame, in square pixels.
     pub fn area_around_px2(&self, x: f64, y: f64) -> f64 {
         let (column, row) = self.column_and_row(x, y);
         let along = |at: usize, count: usize| (at + 2).min(count) - at.saturating_sub(1);
@@ -57,15 +57,15 @@ impl Grid {
         cells as f64 * self.cell_px.powi(2)
     }
 
-    /// The sum of `values` of a cell of the frame and its neighbours.
+    /// The sum of `values` of a cell of the frame and its neighbors.
     pub fn sum_around(&self, cell: usize, values: &[f64]) -> f64 {
         let of_row = |middle: usize| -> f64 { values[middle - 1..middle + 2].iter().sum() };
         of_row(cell - self.stride()) + of_row(cell) + of_row(cell + self.stride())
     }
 
-    /// Replaces each of `values` within the frame by its sum with those of the neighbouring cells;
+    /// Replaces each of `values` within the frame by its sum with those of the neighboring cells;
     /// those of the border become meaningless. `scratch` is a buffer.
-    pub fn sum_with_neighbours(&self, values: &mut [f64], scratch: &mut Vec<f64>) {
+    pub fn sum_with_neighbors(&self, values: &mut [f64], scratch: &mut Vec<f64>) {
         let (count, stride) = (self.cells(), self.stride());
         scratch.clear();
         scratch.resize(count, 0.0);
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn sums_are_those_of_the_neighbours_in_the_frame() {
+    fn sums_are_those_of_the_neighbors_in_the_frame() {
         let grid = grid();
         let mut values = vec![0.0; grid.cells()];
         let value = |(column, row): (usize, usize)| ((column * 37 + row * 101) % 11) as f64;
@@ -117,7 +117,7 @@ mod tests {
             values[grid.cell_of(x, y)] = value(place);
         }
         let mut sums = values.clone();
-        grid.sum_with_neighbours(&mut sums, &mut Vec::new());
+        grid.sum_with_neighbors(&mut sums, &mut Vec::new());
         for place in middles() {
             let (x, y) = at(place);
             let near = middles()

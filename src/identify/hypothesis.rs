@@ -15,7 +15,7 @@ const PREDICTED_EXTRA: usize = 5;
 /// Where the zero point is known, the prediction reaches the magnitude that this fraction of the
 /// observed stars exceed (a few outliers do not count), …
 const FAINT_SHARE: f64 = 0.95;
-/// … and this much deeper, for colours and for luck at the threshold.
+/// … and this much deeper, for colors and for luck at the threshold.
 const FAINT_ROOM_MAG: f64 = 1.5;
 
 /// A camera and an attitude that may be the true ones.

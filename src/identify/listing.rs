@@ -21,8 +21,8 @@ use rayon::prelude::*;
 
 /// Longest sides, as angles, of the smallest and the largest triangles listed: what fields 1.5° to
 /// 60° wide hold.
-const SMALLEST_DEG: f64 = 0.4;
-const LARGEST_DEG: f64 = 45.0;
+const MIN_DEG: f64 = 0.4;
+const MAX_DEG: f64 = 45.0;
 /// Smaller classes are added as long as a cell has on average this many stars around it, down to
 /// 0.2°: what fields from 0.75° hold.
 const STARS_AROUND_NARROW_CELL: f64 = 8.0;
@@ -37,11 +37,11 @@ const CELL_RADIUS: f64 = 0.75;
 /// How many of the brightest stars around a cell make triangles, for classes whose smallest longest
 /// side is below the angle in degrees. Wide fields can afford more: there are few of them.
 const STARS_PER_CELL: [(f64, usize); 4] =
-    [(0.9, 6), (3.0, 7), (8.0, 9), (90.0, MOST_STARS_PER_CELL)];
-const MOST_STARS_PER_CELL: usize = 12;
+    [(0.9, 6), (3.0, 7), (8.0, 9), (90.0, MAX_STARS_PER_CELL)];
+const MAX_STARS_PER_CELL: usize = 12;
 
 /// The brightest stars around a cell, brightest first.
-type Around = ArrayVec<u32, MOST_STARS_PER_CELL>;
+type Around = ArrayVec<u32, MAX_STARS_PER_CELL>;
 
 /// A star of the catalog in the form that listing needs.
 #[derive(Debug, Clone, Copy)]
@@ -64,10 +64,10 @@ impl ListedStar {
 
 /// Smallest and largest longest side of each class, in radians, for a catalog of `stars` stars.
 pub fn class_limits_rad(stars: usize) -> Vec<(f64, f64)> {
-    let octaves = (LARGEST_DEG / SMALLEST_DEG).ln() / CLASS_FACTOR.ln();
+    let octaves = (MAX_DEG / MIN_DEG).ln() / CLASS_FACTOR.ln();
     let count = octaves.ceil() as i32;
     let limits = |class: i32| {
-        let low_rad = SMALLEST_DEG * RAD_PER_DEG * CLASS_FACTOR.powi(class);
+        let low_rad = MIN_DEG * RAD_PER_DEG * CLASS_FACTOR.powi(class);
         (low_rad, low_rad * CLASS_FACTOR)
     };
     let is_dense = |class: &i32| {
@@ -269,11 +269,8 @@ mod tests {
     #[test]
     fn a_dense_catalogue_has_narrower_classes() {
         let smallest_deg = |stars: usize| class_limits_rad(stars)[0].0 / RAD_PER_DEG;
-        assert_eq!(smallest_deg(0), SMALLEST_DEG);
-        assert_eq!(
-            smallest_deg(Catalog::built_in().stars().len()),
-            SMALLEST_DEG
-        );
+        assert_eq!(smallest_deg(0), MIN_DEG);
+        assert_eq!(smallest_deg(Catalog::built_in().stars().len()), MIN_DEG);
         assert!((smallest_deg(2_557_501) - 0.2).abs() < 1e-9);
         let limits = class_limits_rad(2_557_501);
         let adjoin = |pair: &[(f64, f64)]| (pair[0].1 / pair[1].0 - 1.0).abs() < 1e-12;

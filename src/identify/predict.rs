@@ -57,12 +57,12 @@ pub struct Surroundings {
     stars: Vec<GridStar>,
     /// Those just found.
     found: Vec<StarIndex>,
-    around: Option<Gathered>,
+    around: Option<GatheredRegion>,
 }
 
 /// The region and depth that were gathered.
 #[derive(Debug, Clone, Copy)]
-struct Gathered {
+struct GatheredRegion {
     centre: UnitVector<Icrs>,
     radius_rad: f64,
     faintest_v_mag: f64,
@@ -130,11 +130,12 @@ impl Surroundings {
     /// Gathers all stars of `view` down to a V magnitude; returns the magnitude reached.
     fn gather(&mut self, view: &View, sky: &IndexedCatalog, faintest_v_mag: f64) -> f64 {
         let (centre, reach_rad) = (view.boresight(), view.reach_rad());
-        let covers =
-            |around: &Gathered| around.centre.angle_to(&centre) + reach_rad <= around.radius_rad;
+        let covers = |around: &GatheredRegion| {
+            around.centre.angle_to(&centre) + reach_rad <= around.radius_rad
+        };
         let around = self.around.filter(covers).unwrap_or_else(|| {
             self.stars.clear();
-            Gathered {
+            GatheredRegion {
                 centre,
                 radius_rad: reach_rad * (1.0 + GATHERED_MARGIN),
                 faintest_v_mag: f64::NEG_INFINITY,
@@ -145,7 +146,7 @@ impl Surroundings {
         }
         let known_to = around.faintest_v_mag as f32;
         self.found.clear();
-        let Gathered {
+        let GatheredRegion {
             centre, radius_rad, ..
         } = around;
         sky.grid
@@ -160,7 +161,7 @@ impl Surroundings {
             .iter()
             .map(|index| *sky.grid.star(index.get() as u32));
         self.stars.extend(found);
-        self.around = Some(Gathered {
+        self.around = Some(GatheredRegion {
             faintest_v_mag,
             ..around
         });

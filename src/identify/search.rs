@@ -41,10 +41,10 @@ const CONFIRMING_SIGMAS: f64 = 3.5;
 /// tries the same ones again, so more hypotheses would hardly find anything.
 const HYPOTHESES_PER_TRIANGLE: u64 = 250;
 /// Minimum number of hypotheses, however few the triangles.
-const LEAST_HYPOTHESES: u64 = 30_000;
+const MIN_HYPOTHESES: u64 = 30_000;
 /// A second search does not try the triangles of the brightest stars that both searches share, if
 /// they are at least so many: these alone decided on almost every hypothesis.
-const LEAST_SHARED: usize = 16;
+const MIN_SHARED: usize = 16;
 /// From this number of hypotheses on, a search is long: several are tested together.
 const LONG_SEARCH: u64 = 2_000;
 /// Margin on the sizes of a triangle that decide which classes of the index can hold it.
@@ -58,7 +58,7 @@ const MAX_TOLERANCE: f64 = 0.03;
 /// Largest log10 of the false-alarm probability at which a frame counts as identified.
 pub const LOG10_FALSE_ALARM_LIMIT: f64 = -8.0;
 /// A hypothesis below this ends the search. One between the two limits waits for the end of its
-/// pass, in case a better one comes: a few inexact stars may also agree with a neighbour of the
+/// pass, in case a better one comes: a few inexact stars may also agree with a neighbor of the
 /// truth.
 const LOG10_SURE: f64 = -14.0;
 
@@ -192,7 +192,7 @@ impl<'a> Search<'a> {
         let stars = buffers.offsets.len() as u64;
         let triangles = stars * stars.saturating_sub(1) * stars.saturating_sub(2) / 6;
         let most_hypotheses = (HYPOTHESES_PER_TRIANGLE * triangles)
-            .max(LEAST_HYPOTHESES)
+            .max(MIN_HYPOTHESES)
             .min(plan.max_hypotheses);
         Self {
             problem,
@@ -217,7 +217,7 @@ impl<'a> Search<'a> {
     /// are not tried again, and count as tried.
     pub fn again(self, problem: Problem<'a>, priors: &Priors) -> Self {
         let shared = shared_stars(&self.problem.field.stars, &problem.field.stars).min(self.tried);
-        let shared = if shared < LEAST_SHARED { 0 } else { shared };
+        let shared = if shared < MIN_SHARED { 0 } else { shared };
         let before: u64 = self.buffers.hypotheses_of.iter().take(shared).sum();
         let next = Self::new(problem, priors, self.buffers);
         Self {

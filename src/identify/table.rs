@@ -7,18 +7,18 @@
 use std::ops::RangeInclusive;
 use std::sync::OnceLock;
 
-/// Rows divide the middle side's ratio from [`LEAST_MIDDLE_RATIO`] to 1, columns the shortest
+/// Rows divide the middle side's ratio from [`MIN_MIDDLE_RATIO`] to 1, columns the shortest
 /// side's from 0 to 1.
 const ROWS: usize = 128;
 const COLUMNS: usize = 256;
-/// A chunk is this many neighbouring cells of a row.
+/// A chunk is this many neighboring cells of a row.
 const CELLS_PER_CHUNK: usize = 32;
 /// Cells of a class.
 pub const CELLS: usize = ROWS * COLUMNS;
 /// Chunks of a class.
 pub const CHUNKS: usize = CELLS / CELLS_PER_CHUNK;
 /// The middle side is at least half of the longest.
-const LEAST_MIDDLE_RATIO: f64 = 0.5;
+const MIN_MIDDLE_RATIO: f64 = 0.5;
 /// Ratios are stored in steps of this: a hundredth of the smallest tolerance.
 const RATIO_STEP: f64 = 1.0 / 65536.0;
 
@@ -55,7 +55,7 @@ fn ratio(steps: u16) -> f64 {
 }
 
 fn row_of(middle: f64) -> usize {
-    let share = (middle - LEAST_MIDDLE_RATIO) / (1.0 - LEAST_MIDDLE_RATIO);
+    let share = (middle - MIN_MIDDLE_RATIO) / (1.0 - MIN_MIDDLE_RATIO);
     ((share.max(0.0) * ROWS as f64) as usize).min(ROWS - 1)
 }
 

@@ -21,7 +21,7 @@ const CALIBRATION_STARS: [usize; 3] = [120, 30, 12];
 /// First pairing radius of the final fit, in units of the frame's diagonal, and the largest for few
 /// stars, …
 const FINAL_RADIUS_SHARE: f64 = 0.005;
-const LARGEST_RADIUS_SHARE: f64 = 0.0125;
+const MAX_RADIUS_SHARE: f64 = 0.0125;
 /// … which chance reaches for this share of the stars.
 const CHANCE_PAIRS: f64 = 0.02;
 /// A fit is good if it names this share of the stars that it began with.
@@ -338,7 +338,7 @@ fn settle(problem: Problem, search: &mut Search, found: &Refined, stars: usize) 
         hypothesis: &hypothesis,
         radius_px: by_chance_px.clamp(
             FINAL_RADIUS_SHARE * diagonal_px,
-            LARGEST_RADIUS_SHARE * diagonal_px,
+            MAX_RADIUS_SHARE * diagonal_px,
         ),
         sceptical: false,
         stars,

@@ -5,7 +5,7 @@ use crate::base::neighbors::PointGrid;
 use crate::identify::{PredictedStar, StarMatch};
 use crate::sky::catalog::StarIndex;
 
-/// A neighbour fainter by more than this does not crowd a star.
+/// A neighbor fainter by more than this does not crowd a star.
 const CROWDING_MAG: f32 = 1.0;
 
 /// A catalogue star in the frame, with its detection.
@@ -19,8 +19,8 @@ pub(super) struct FrameStar {
     pub detection: Option<usize>,
     /// Whether it is single and well inside the frame.
     pub is_clear: bool,
-    /// Light of undetected neighbours in its flux, over its own.
-    pub neighbours_light: f64,
+    /// Light of undetected neighbors in its flux, over its own.
+    pub neighbors_light: f64,
 }
 
 /// Catalog stars and their detections.
@@ -45,7 +45,7 @@ struct Surroundings {
     undetected_light: f64,
 }
 
-/// Part of the light of a neighbour at this distance that is in the flux of a star: the
+/// Part of the light of a neighbor at this distance that is in the flux of a star: the
 /// autocorrelation of a Gaussian spot.
 pub(crate) fn filter_response(distance_sigmas: f64) -> f64 {
     (-0.25 * distance_sigmas.powi(2)).exp()
@@ -68,8 +68,8 @@ pub(super) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) ->
             if near.index == index {
                 return;
             }
-            let neighbour = &predicted[near.index];
-            let fainter_mag = neighbour.v_mag - star.v_mag;
+            let neighbor = &predicted[near.index];
+            let fainter_mag = neighbor.v_mag - star.v_mag;
             around.is_single &= fainter_mag >= CROWDING_MAG;
             if detections[near.index].is_none() {
                 let light = 10f64.powf(-0.4 * f64::from(fainter_mag));
@@ -91,7 +91,7 @@ pub(super) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) ->
             v_mag: f64::from(star.v_mag),
             detection: detections[index],
             is_clear: camera.nearly_contains(&star.pixel, -resolved_px) && around.is_single,
-            neighbours_light: around.undetected_light,
+            neighbors_light: around.undetected_light,
         }
     });
     let by_chance: f64 = matches.iter().map(|found| found.p_chance).sum();
@@ -191,7 +191,7 @@ mod tests {
         // A companion two magnitudes fainter does not crowd the brighter star, but adds its light.
         assert!(found.stars[0].is_clear && !found.stars[1].is_clear);
         let light = 10f64.powf(-0.8) * (-0.25f64).exp();
-        assert!((found.stars[0].neighbours_light - light).abs() < 1e-6);
+        assert!((found.stars[0].neighbors_light - light).abs() < 1e-6);
     }
 
     #[test]

@@ -15,7 +15,7 @@
 //! Fisher scoring, and the standard errors follow from the information matrix.
 //!
 //! Few stars do not determine w and λ, so both have weak priors. ln w is normal about
-//! [`TYPICAL_WIDTH_MAG`], the noise at the detection threshold (1.0857 / SNR) with a little colour
+//! [`TYPICAL_WIDTH_MAG`], the noise at the detection threshold (1.0857 / SNR) with a little color
 //! and vignetting, with a factor of e either way. λ has a beta distribution, as if a quarter of a
 //! star in ten had been lost before. Where bright stars are few (80 in all, or a large w) this
 //! shifts m₅₀ by up to 0.3 of its standard error.

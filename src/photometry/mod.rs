@@ -12,7 +12,7 @@
 //!
 //! Caveats: an incomplete catalogue biases the completeness only if it lacks red stars or close
 //! pairs more than others. The limit is that of the frame's mean transparency, noise and star
-//! colour. The grey levels of a JPEG are not proportional to light, so its zero point holds only
+//! color. The grey levels of a JPEG are not proportional to light, so its zero point holds only
 //! for stars of medium brightness.
 
 mod association;
@@ -87,7 +87,7 @@ pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry
             star.v_mag - term.value * redder_mag
         }),
     };
-    if frame.detections.are_more {
+    if frame.detections.is_truncated {
         completeness.limit = Err(NoLimit::StarsLeftOut);
     }
     FramePhotometry {
@@ -105,19 +105,19 @@ fn standard_star(
     sky: &IndexedCatalog,
 ) -> Option<StandardStar> {
     /// Stars of the zero point are brighter than the limit by this many widths, where at least 98 %
-    /// are detected. A choice by flux would prefer stars that noise or colour makes brighter.
+    /// are detected. A choice by flux would prefer stars that noise or color makes brighter.
     const COMPLETE_WIDTHS: f64 = 2.0;
     /// Smallest signal-to-noise ratio where there is no limit.
     const MIN_SNR: f64 = 10.0;
-    /// Largest light of undetected neighbours, which is subtracted, over the star's own.
-    const MAX_NEIGHBOURS_LIGHT: f64 = 0.1;
+    /// Largest light of undetected neighbors, which is subtracted, over the star's own.
+    const MAX_NEIGHBORS_LIGHT: f64 = 0.1;
     let detection = &frame.detections.sources[star.detection?];
     let is_bright = match &completeness.limit {
         Ok(limit) => star.v_mag < limit.v_mag - COMPLETE_WIDTHS * limit.width_mag,
         Err(_) => detection.snr >= MIN_SNR,
     };
     let known = sky.catalog().star(star.star);
-    let is_alone = star.neighbours_light < MAX_NEIGHBOURS_LIGHT;
+    let is_alone = star.neighbors_light < MAX_NEIGHBORS_LIGHT;
     let is_fit =
         is_bright && is_alone && detection.flags.has_clean_flux() && is_constant_and_single(known);
     let off_centre_sq = frame
@@ -125,7 +125,7 @@ fn standard_star(
         .camera
         .off_centre_sq(&detection.position);
     let flux_adu = detection.flux_adu
-        / (1.0 + star.neighbours_light)
+        / (1.0 + star.neighbors_light)
         / lens_transmission(frame.vignetting, off_centre_sq);
     is_fit.then(|| StandardStar {
         v_mag: star.v_mag,

@@ -88,7 +88,7 @@ impl<'a> Field<'a> {
     /// as bright a one there.
     fn source_of(&self, expected: &BodyInFrame) -> Option<SourceIndex> {
         /// The expected number of other such sources in the gate up to which it is the body's.
-        const MOST_BY_CHANCE: f64 = 0.05;
+        const MAX_BY_CHANCE: f64 = 0.05;
         let gate_px = self.gate_px(expected);
         let indices = (0..self.sources.len()).map(SourceIndex::new);
         let suitable: Vec<SourceIndex> = indices
@@ -104,7 +104,7 @@ impl<'a> Field<'a> {
         let camera = &self.found.camera;
         let gate_share =
             std::f64::consts::PI * gate_px * gate_px / (camera.width_px * camera.height_px);
-        (others * gate_share < MOST_BY_CHANCE).then_some(brightest)
+        (others * gate_share < MAX_BY_CHANCE).then_some(brightest)
     }
 
     /// How far from its expected position a body's source may be.

@@ -138,7 +138,7 @@ impl CentroidList {
 
 /// For each of these centroids, brightest first, whether no brighter one coincides with it.
 fn without_coincident(centroids: &[ListedCentroid]) -> Vec<bool> {
-    // Cells of the size of the distance: what coincides is in the same or a neighbouring cell.
+    // Cells of the size of the distance: what coincides is in the same or a neighboring cell.
     let cell = |at: f64| (at / COINCIDENT_PX).floor() as i64;
     let mut kept: HashMap<[i64; 2], Vec<PixelPoint>> = HashMap::new();
     let is_kept = |centroid: &ListedCentroid| {

@@ -190,12 +190,12 @@ impl<'a> Frames<'a> {
 
     /// Refuses a table of several frames of which none is chosen, and one without the chosen one.
     fn check(mut self) -> Result<(), CentroidListError> {
-        const MOST_NAMED: usize = 3;
+        const MAX_NAMED: usize = 3;
         self.found.sort();
         self.found.dedup();
         let count = self.found.len();
-        let mut names = self.found[..count.min(MOST_NAMED)].join(", ");
-        if count > MOST_NAMED {
+        let mut names = self.found[..count.min(MAX_NAMED)].join(", ");
+        if count > MAX_NAMED {
             names += ", …";
         }
         match self.chosen {

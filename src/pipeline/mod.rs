@@ -4,7 +4,7 @@
 //!
 //! 1. The frame is read, and calibrated where the context has a calibration.
 //! 2. Its priors are resolved: the context's, then the camera's, the header's and the file name's.
-//! 3. Stars are detected, in a raw colour frame after its mosaic is smoothed to grey, and identified; where they are not, the cause is sought.
+//! 3. Stars are detected, in a raw color frame after its mosaic is smoothed to grey, and identified; where they are not, the cause is sought.
 //! 4. The Moon and the planets are found where the date is known.
 //! 5. Photometry: zero point and limiting magnitude.
 //! 6. Where the context has a camera, the frame is compared with it.
@@ -25,7 +25,7 @@ mod note;
 mod options;
 mod outcome;
 mod prepared;
-mod raw_colour;
+mod raw_color;
 mod solution;
 mod solve;
 mod solved;
@@ -42,7 +42,7 @@ pub use left_out::{LeftOut, RowProblem};
 pub use note::Note;
 pub use options::SolveOptions;
 pub use outcome::{Outcome, Reason};
-pub use raw_colour::RawColour;
+pub use raw_color::RawColor;
 pub use solution::{Background, Measured, Solution, Source};
 pub use solve::{solve_file, solve_frame, solve_guarded, solve_read};
 pub use stopwatch::Timing;

@@ -4,7 +4,7 @@ use super::body_in_frame::BodyInFrame;
 use super::bright_stars::MissingStar;
 use super::left_out::LeftOut;
 use super::outcome::Outcome;
-use super::raw_colour::RawColour;
+use super::raw_color::RawColor;
 use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;
@@ -26,7 +26,7 @@ const LARGE_EXCESS_PX: f64 = 1.0;
 /// Vignetting that deserves a note, in magnitudes in the corner.
 const NOTABLE_CORNER_LOSS_MAG: f64 = 0.1;
 /// Most stars or detections that a note lists.
-const MOST_LISTED: usize = 5;
+const MAX_LISTED: usize = 5;
 
 /// One note about a frame. `Display` gives the sentence, [`code`](Self::code) a stable name.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,8 +46,8 @@ pub enum Note {
     BrightnessUnknown,
     /// Columns hold one value instead of light, and were left out.
     DefectiveColumns(Vec<usize>),
-    /// The frame is a raw one of a colour camera: what its pixels and its zero point are of.
-    ColourMosaic(RawColour),
+    /// The frame is a raw one of a color camera: what its pixels and its zero point are of.
+    ColorMosaic(RawColor),
     /// The scale in the header is not that of the frame.
     WrongHeaderScale {
         /// Smallest and largest pixel scale that the header allows, in radians.
@@ -113,7 +113,7 @@ impl Note {
             Self::RowsLeftOut(_) => "rows_left_out",
             Self::BrightnessUnknown => "brightness_unknown",
             Self::DefectiveColumns(_) => "defective_columns",
-            Self::ColourMosaic(_) => "colour_mosaic",
+            Self::ColorMosaic(_) => "color_mosaic",
             Self::WrongHeaderScale { .. } => "header_scale_wrong",
             Self::BelowHorizon { .. } => "below_horizon",
             Self::NoTimeOfDay => "time_of_day_unknown",
@@ -272,7 +272,7 @@ impl fmt::Display for Note {
                 "the list has no flux and no magnitude; its rows were taken to be in order of brightness",
             ),
             Self::DefectiveColumns(columns) => write_columns(f, columns),
-            Self::ColourMosaic(mosaic) => write_mosaic(f, mosaic),
+            Self::ColorMosaic(mosaic) => write_mosaic(f, mosaic),
             Self::WrongHeaderScale {
                 pixel_scale_rad: (low_rad, high_rad),
             } => write!(
@@ -365,8 +365,8 @@ fn write_trails(f: &mut fmt::Formatter<'_>, trails: &StarTrails) -> fmt::Result 
     )
 }
 
-fn write_mosaic(f: &mut fmt::Formatter<'_>, mosaic: &RawColour) -> fmt::Result {
-    f.write_str("the frame is a raw colour mosaic")?;
+fn write_mosaic(f: &mut fmt::Formatter<'_>, mosaic: &RawColor) -> fmt::Result {
+    f.write_str("the frame is a raw color mosaic")?;
     if let Some(pattern) = mosaic.pattern {
         write!(f, " ({pattern})")?;
     }
@@ -435,8 +435,8 @@ fn write_noise_tail(f: &mut fmt::Formatter<'_>, tail: NoiseTail) -> fmt::Result 
 
 /// A list for people; what is beyond its first items is counted.
 fn listed(items: impl ExactSizeIterator<Item = String>) -> String {
-    let more = items.len().saturating_sub(MOST_LISTED);
-    let mut list: Vec<String> = items.take(MOST_LISTED).collect();
+    let more = items.len().saturating_sub(MAX_LISTED);
+    let mut list: Vec<String> = items.take(MAX_LISTED).collect();
     if more > 0 {
         list.push(format!("{more} more"));
     }

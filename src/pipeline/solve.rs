@@ -7,7 +7,7 @@ use super::identification::{double_image, identify_stars, observation, star_fiel
 use super::note::Note;
 use super::outcome::{Outcome, Reason};
 use super::prepared::Prepared;
-use super::raw_colour::RawColour;
+use super::raw_color::RawColor;
 use super::solution::{Solution, Source};
 use super::solved::Solved;
 use super::stopwatch::{Stage, Stopwatch, Timing};
@@ -131,7 +131,7 @@ struct Input<'a> {
     calibration: Option<&'a Calibration>,
     /// For the frame and the work on it.
     memory: MemoryLimit,
-    /// The mosaic of a raw colour frame.
+    /// The mosaic of a raw color frame.
     mosaic: Option<Mosaic>,
     clock: Stopwatch,
 }
@@ -165,7 +165,7 @@ fn solve(
     };
     let mosaic = input
         .mosaic
-        .map(|mosaic| RawColour::restore(mosaic, prepared.raw(), &mut detections));
+        .map(|mosaic| RawColor::restore(mosaic, prepared.raw(), &mut detections));
     clock.lap(Stage::Detect);
 
     let buffers = (workspace, &mut clock);

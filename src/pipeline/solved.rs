@@ -5,7 +5,7 @@ use super::bright_stars::NamedFrame;
 use super::context::Context;
 use super::note::Note;
 use super::outcome::Outcome;
-use super::raw_colour::RawColour;
+use super::raw_color::RawColor;
 use super::solution::{Background, Solution, Source};
 use super::stopwatch::Timing;
 use crate::base::statistics::Estimate;
@@ -26,8 +26,8 @@ pub(super) struct Solved<'a> {
     pub frame: &'a Frame<'a>,
     /// The calibration that was applied.
     pub calibration: Option<&'a Calibration>,
-    /// What follows from the mosaic of a raw colour frame.
-    pub mosaic: Option<RawColour>,
+    /// What follows from the mosaic of a raw color frame.
+    pub mosaic: Option<RawColor>,
     pub priors: Priors,
     pub detections: Detections,
     /// The detections as sources.
@@ -76,13 +76,13 @@ impl Solved<'_> {
         let found = self.outcome.identification();
         let field = found.map_or(Vec::new(), |found| self.field(found));
         // Of the brightest stars alone the faintest says nothing.
-        let of_all = found.filter(|_| !self.detections.are_more);
+        let of_all = found.filter(|_| !self.detections.is_truncated);
         let detected = (
             self.detections.spot_sigma_px,
             self.detections.threshold_sigma,
         );
         let (spot_sigma_px, threshold_sigma) = match self.mosaic {
-            Some(_) => RawColour::of_raw_pixels(detected.0, detected.1),
+            Some(_) => RawColor::of_raw_pixels(detected.0, detected.1),
             None => detected,
         };
         let frame = FrameMeasurement {
@@ -153,7 +153,7 @@ impl Solved<'_> {
         let camera = self.context.camera.as_ref().filter(|_| is_named);
         Note::of_file(&self.frame.metadata)
             .chain(Note::of_defects(self.defects))
-            .chain(self.mosaic.map(Note::ColourMosaic))
+            .chain(self.mosaic.map(Note::ColorMosaic))
             .chain(Note::of_scale(self.dropped_scale, outcome))
             .chain(Note::of_observation(observation, priors, outcome))
             .chain(Note::of_camera(camera, comparison))

@@ -237,7 +237,7 @@ pub struct PhotometryReport {
     pub zero_point_sigma_mag: Option<f64>,
     /// `ADU/s` where the exposure is known, else `ADU`.
     pub flux_unit: &'static str,
-    /// Robust standard deviation of a star about zero point and colour term.
+    /// Robust standard deviation of a star about zero point and color term.
     pub scatter_mag: Option<f64>,
     /// Number of stars of the zero point.
     pub zero_point_stars: usize,
@@ -258,8 +258,8 @@ pub struct PhotometryReport {
     pub linearity: Option<f64>,
     /// Its standard error.
     pub linearity_sigma: Option<f64>,
-    /// V magnitude at which half of the catalogue's stars are detected; with a colour term, of stars
-    /// of the Sun's colour.
+    /// V magnitude at which half of the catalogue's stars are detected; with a color term, of stars
+    /// of the Sun's color.
     pub limit50_vmag: Option<f64>,
     /// Its standard error.
     pub limit50_sigma_mag: Option<f64>,

@@ -9,11 +9,11 @@ use crate::sky::catalog::StarIndex;
 const GATHERED_MARGIN: f64 = 0.25;
 /// Stars up to this much fainter than a star may be mistaken for it, or touch it, in magnitudes.
 const ALIKE_MAG: f64 = 2.5;
-/// Fainter stars move the centroid of their neighbour: by at most this, in widths of the spot. The
+/// Fainter stars move the centroid of their neighbor: by at most this, in widths of the spot. The
 /// best centroids have an error of about as much.
 const MAX_SHIFT_WIDTHS: f64 = 0.02;
 /// Stars this much fainter cannot.
-const FAINTEST_NEIGHBOUR_MAG: f64 = 4.5;
+const FAINTEST_NEIGHBOR_MAG: f64 = 4.5;
 
 /// A catalogue star that can be tracked.
 #[derive(Debug, Clone, Copy)]
@@ -44,18 +44,18 @@ pub(super) struct Wanted {
 pub(super) struct Guides {
     /// Brightest first.
     stars: Vec<GuideStar>,
-    gathered: Option<Gathered>,
+    gathered: Option<GuideRegion>,
     nearby: Vec<(StarIndex, f64)>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Gathered {
+struct GuideRegion {
     centre: UnitVector<Icrs>,
     radius_rad: f64,
     wanted: Wanted,
 }
 
-impl Gathered {
+impl GuideRegion {
     fn covers(&self, centre: &UnitVector<Icrs>, radius_rad: f64, wanted: &Wanted) -> bool {
         // The magnitudes follow the transparency: small changes need no other stars.
         const NEARLY_MAG: f64 = 0.3;
@@ -78,7 +78,7 @@ impl Guides {
         (centre, radius_rad): (&UnitVector<Icrs>, f64),
         wanted: &Wanted,
     ) -> &[GuideStar] {
-        let is_there = |gathered: &Gathered| gathered.covers(centre, radius_rad, wanted);
+        let is_there = |gathered: &GuideRegion| gathered.covers(centre, radius_rad, wanted);
         if !self.gathered.as_ref().is_some_and(is_there) {
             self.gather(sky, centre, radius_rad * (1.0 + GATHERED_MARGIN), wanted);
         }
@@ -114,7 +114,7 @@ impl Guides {
                 stars.push(star);
             }
         }
-        self.gathered = Some(Gathered {
+        self.gathered = Some(GuideRegion {
             centre: *centre,
             radius_rad,
             wanted: *wanted,
@@ -122,11 +122,11 @@ impl Guides {
     }
 }
 
-/// Whether no neighbour can be taken for a star, or moves its centroid. The centroid of a fit is
-/// moved by `q d exp(−d²/4w²)`, for a neighbour at the distance d with the fraction q of the light
+/// Whether no neighbor can be taken for a star, or moves its centroid. The centroid of a fit is
+/// moved by `q d exp(−d²/4w²)`, for a neighbor at the distance d with the fraction q of the light
 /// and spots of the standard deviation w.
 fn is_alone(sky: &IndexedCatalog, index: StarIndex, star: &GuideStar, wanted: &Wanted) -> bool {
-    let faintest = star.v_mag + FAINTEST_NEIGHBOUR_MAG;
+    let faintest = star.v_mag + FAINTEST_NEIGHBOR_MAG;
     let mut is_alone = true;
     let mut shift_widths = 0.0;
     let (centre, reach_rad) = (&star.direction, wanted.clear_rad);

@@ -20,7 +20,7 @@ const UNKNOWN_LN_FOCAL: f64 = 0.1;
 /// Standard error of a coefficient of the distortion of which nothing is known, in pixels.
 const UNKNOWN_PX: f64 = 10.0;
 /// A step of the logarithm of the focal length above this is none of refinement.
-const LARGEST_STEP: f64 = 0.02;
+const MAX_STEP: f64 = 0.02;
 
 /// Refines a camera. Nothing is allocated after its start.
 #[derive(Debug, Clone)]
@@ -155,7 +155,7 @@ impl LensRefiner {
             return;
         };
         root.solve_mut(&mut self.step);
-        if self.step[0].abs() < LARGEST_STEP && self.step.iter().all(|step| step.is_finite()) {
+        if self.step[0].abs() < MAX_STEP && self.step.iter().all(|step| step.is_finite()) {
             self.camera.focal_length_px *= self.step[0].exp();
             if let Some(distortion) = self.camera.distortion {
                 let mut coefficients_px = [0.0; crate::camera::DistortionModel::Quintic.terms()];

@@ -32,7 +32,7 @@ const MAX_RATIO: f64 = 9.0;
 const SURPRISE_RATIO: f64 = 16.0;
 /// The acceleration of an interval moves a star by no less than this, relative to the error of the
 /// attitude: less, and the rate would forget nothing.
-const LEAST_ACCELERATION: f64 = 0.03;
+const MIN_ACCELERATION: f64 = 0.03;
 /// Surprising innovations that are longer than this are jumps, in typical errors: no window is as
 /// large.
 const JUMP_TYPICALS: f64 = 8.0;
@@ -156,7 +156,7 @@ impl Motion {
             }
         }
         for axis in 0..3 {
-            let least = LEAST_ACCELERATION.powi(2) * noise[(axis, axis)] / interval.powi(3);
+            let least = MIN_ACCELERATION.powi(2) * noise[(axis, axis)] / interval.powi(3);
             acceleration[axis] = acceleration[axis].max(least);
         }
         let spread = prediction.attitude_covariance_rad2() + noise;

@@ -103,7 +103,7 @@ impl PoseFitter {
     ///
     /// # Reference
     /// DerSimonian & Laird 1986, Control. Clin. Trials 7, 177, doi 10.1016/0197-2456(86)90046-2.
-    pub fn lacking_px2(&self) -> f64 {
+    pub fn excess_variance_px2(&self) -> f64 {
         /// Parameters of the attitude.
         const PARAMETERS: f64 = 3.0;
         let equations = 2.0 * self.used() as f64;
@@ -279,7 +279,7 @@ mod tests {
             let error = turn_between(&found.icrs_to_camera, &truth);
             let inverse = found.covariance_rad2.try_inverse().unwrap();
             nees += (error.transpose() * inverse * error)[0] / 3.0 / f64::from(TRIALS);
-            lacking += fitter.lacking_px2() / f64::from(TRIALS);
+            lacking += fitter.excess_variance_px2() / f64::from(TRIALS);
         }
         // The standard error of the mean is 5 %.
         assert!((nees - 1.0).abs() < 0.2, "{nees}");

@@ -27,7 +27,7 @@ pub const DEFAULT_STARS: usize = 30;
 /// Search radius in predicted errors, …
 const RADIUS_SIGMAS: f64 = 4.0;
 /// … to which this is added, in pixels: the peak is not the centroid.
-const LEAST_RADIUS_PX: f64 = 1.5;
+const MIN_RADIUS_PX: f64 = 1.5;
 /// Stars are not searched for within a larger radius, in pixels: a full solution is more certain.
 const MAX_RADIUS_PX: f64 = 16.0;
 /// An error of the prediction that an unknown acceleration may cause, in pixels.
@@ -59,28 +59,28 @@ pub struct Tracker<'a> {
     pose: PoseFitter,
     agreement: Agreement,
     buffers: Buffers,
-    known: Option<Known>,
+    known: Option<TrackerState>,
 }
 
 /// What is known after a frame.
-struct Known {
+struct TrackerState {
     motion: Motion,
     lens: LensRefiner,
     spot: Option<SpotModel>,
-    light: Light,
+    light: StarBrightness,
     /// Time of the last attitude or try, in seconds or frames.
     clock: Clock,
     years_since_j2000: f64,
     exposure_s: Option<f64>,
     /// Squared error that the stated ones lack, in px²; negative where they are too large.
-    lacking_px2: f64,
+    excess_variance_px2: f64,
     /// Frames since the camera was refined.
     frames: u64,
 }
 
 /// Brightness of the stars of a camera.
 #[derive(Debug, Clone, Copy)]
-struct Light {
+struct StarBrightness {
     /// V magnitude of a star with a flux of 1 ADU.
     zero_point_mag: f64,
     /// Flux of a star with the least signal-to-noise ratio, in ADU.
@@ -240,7 +240,7 @@ impl<'a> Tracker<'a> {
             camera: &camera,
             focal_sigma_px: known.lens.focal_sigma_px(),
             icrs_to_camera: &prediction.icrs_to_camera,
-            excess_px: known.lacking_px2.max(0.0).sqrt(),
+            excess_px: known.excess_variance_px2.max(0.0).sqrt(),
         };
         let attitude = self.pose.fit(&buffers.stars, &prior);
         let agreeing = attitude.map_or(0, |_| self.pose.used());
@@ -309,18 +309,18 @@ impl<'a> Tracker<'a> {
         clock: Clock,
         (solution, found): (&Solution, &Identification),
         attitude: &Attitude,
-    ) -> Known {
+    ) -> TrackerState {
         let years = solution.date.map_or(0.0, |d| d.date.years_since_j2000());
         let config = self.context.detect_config(frame);
         let saturation_adu = config.saturation_adu(frame, &mut SaturationFinder::default());
-        let light = Light::of(
+        let light = StarBrightness::of(
             solution,
             found,
             self.context.indexed.catalog(),
             saturation_adu,
         );
         let before = self.known.take().filter(|known| known.is_of(found));
-        let is_same_clock = |known: &Known| known.clock.is_counted == clock.is_counted;
+        let is_same_clock = |known: &TrackerState| known.clock.is_counted == clock.is_counted;
         let motion = before.as_ref().filter(|known| is_same_clock(known));
         let motion = motion.and_then(|known| known.continued_motion(clock, attitude));
         let old_spot = before.as_ref().and_then(|known| known.spot);
@@ -330,7 +330,7 @@ impl<'a> Tracker<'a> {
             &found.icrs_to_camera,
             found.excess_sigma_px,
         );
-        let mut known = Known {
+        let mut known = TrackerState {
             motion: motion.unwrap_or_else(|| Motion::start(attitude, clock.time)),
             lens,
             spot: None,
@@ -338,7 +338,7 @@ impl<'a> Tracker<'a> {
             clock,
             years_since_j2000: years,
             exposure_s: solution.exposure_s,
-            lacking_px2: found.excess_sigma_px.powi(2),
+            excess_variance_px2: found.excess_sigma_px.powi(2),
             frames: 0,
         };
         // A smear that is not known widens the spots.
@@ -369,7 +369,7 @@ fn measured_stars<'a>(
     })
 }
 
-impl Known {
+impl TrackerState {
     /// Whether an identification is of the same camera.
     fn is_of(&self, found: &Identification) -> bool {
         let (camera, other) = (self.lens.camera(), &found.camera);
@@ -431,7 +431,7 @@ impl Known {
         let width_px = spot.width_px([0.0; 2]);
         let still = ExpectedStar {
             position: PixelPoint::default(),
-            radius_px: LEAST_RADIUS_PX,
+            radius_px: MIN_RADIUS_PX,
             smear_px: [0.0; 2],
         };
         let clear_px = WindowDetector::reach_px(spot, &still) as f64;
@@ -451,8 +451,9 @@ impl Known {
         attitude: &Attitude,
         excess_px: f64,
     ) {
-        let lacking_px2 = excess_px.powi(2) + pose.lacking_px2();
-        self.lacking_px2 += AVERAGED_SHARE * (lacking_px2 - self.lacking_px2);
+        let excess_variance_px2 = excess_px.powi(2) + pose.excess_variance_px2();
+        self.excess_variance_px2 +=
+            AVERAGED_SHARE * (excess_variance_px2 - self.excess_variance_px2);
         self.frames += 1;
         if self.frames.is_multiple_of(REFINED_EVERY) {
             let used = pose.used_stars(stars);
@@ -476,7 +477,7 @@ impl Known {
     }
 }
 
-impl Light {
+impl StarBrightness {
     fn of(
         solution: &Solution,
         found: &Identification,
@@ -538,7 +539,7 @@ impl PredictedView<'_> {
         };
         let along_x = variance([-x * y, 1.0 + x * x, -y]);
         let along_y = variance([-(1.0 + y * y), x * y, x]);
-        LEAST_RADIUS_PX + RADIUS_SIGMAS * along_x.max(along_y).sqrt()
+        MIN_RADIUS_PX + RADIUS_SIGMAS * along_x.max(along_y).sqrt()
     }
 
     /// Chooses the brightest stars that are well within the frame.

@@ -66,16 +66,16 @@ impl Kind {
 }
 
 /// Fainter centroids are excluded: their stars are detected where noise made them brighter.
-const LEAST_SNR: f64 = 10.0;
+const MIN_SNR: f64 = 10.0;
 
 /// Whether no other star affects the centroid of this one.
 fn is_isolated(star: &TrueStar, truth: &Truth) -> bool {
     const REACH_PX: f64 = 6.0;
-    const LEAST_SHARE: f64 = 0.005;
+    const MIN_SHARE: f64 = 0.005;
     let disturbs = |other: &TrueStar| {
         other.number != star.number
             && other.position.distance_to(&star.position) < REACH_PX
-            && other.electrons > LEAST_SHARE * star.electrons
+            && other.electrons > MIN_SHARE * star.electrons
     };
     !truth.stars.iter().chain(&truth.beyond).any(disturbs)
 }
@@ -123,7 +123,7 @@ fn trial(
             .iter()
             .find(|star| star.catalog == Some(m.star))?;
         let flux = source.flux?;
-        let is_measured = measured.snr >= LEAST_SNR && !measured.flags.saturated;
+        let is_measured = measured.snr >= MIN_SNR && !measured.flags.saturated;
         if !is_measured || !is_isolated(star, &truth) {
             return None;
         }

@@ -178,9 +178,9 @@ fn centroids_reach_the_bound_and_state_their_errors() {
     const CLASSES: [(f64, f64); 4] = [(5.0, 7.0), (10.0, 10.0), (30.0, 30.0), (200.0, 200.0)];
     /// Tolerances: RMS over bound of faint stars and of others; the pulls' departure from 1; the
     /// bias.
-    const MOST: [f64; 2] = [1.20, 1.05];
+    const MAX: [f64; 2] = [1.20, 1.05];
     const PULL_TOLERANCE: f64 = 0.05;
-    const MOST_BIAS_PX: f64 = 0.002;
+    const MAX_BIAS_PX: f64 = 0.002;
     /// For about thirty comparisons with 2 x 450 errors each: one exceeds it in 1 of 300 runs.
     const SIGMAS: f64 = 3.5;
     for spot_px in [0.5, 0.8, 1.5] {
@@ -188,7 +188,7 @@ fn centroids_reach_the_bound_and_state_their_errors() {
         let all = measured(&field, &DetectConfig::default(), &CLASSES, 8);
         for (class, m) in all.iter().enumerate() {
             let chance = SIGMAS * m.errors[0].relative_error();
-            let most = MOST[usize::from(class > 0)] + chance;
+            let most = MAX[usize::from(class > 0)] + chance;
             let name = format!("{spot_px} px, SNR {:?}", CLASSES[class]);
             assert!(m.ratio(0) < most && m.ratio(1) < most, "{name}: {m:?}");
             // Faint stars are detected where noise made them brighter, and their errors are stated
@@ -200,7 +200,7 @@ fn centroids_reach_the_bound_and_state_their_errors() {
         }
         let brightest = &all[CLASSES.len() - 1];
         assert!(
-            brightest.bias_rms_px() < MOST_BIAS_PX,
+            brightest.bias_rms_px() < MAX_BIAS_PX,
             "{spot_px}: {brightest:?}"
         );
     }

@@ -24,7 +24,7 @@ pub struct FrameStatistics {
     pub saturated: usize,
     /// Number of local maxima far above the noise.
     pub bright: usize,
-    /// Number of these that look like stars: their neighbours along both axes are bright, too.
+    /// Number of these that look like stars: their neighbors along both axes are bright, too.
     pub star_like: usize,
 }
 
@@ -77,10 +77,10 @@ impl Maxima {
     fn of(frame: &Frame) -> Self {
         /// Minimum height of a bright pixel, in sigmas.
         const BRIGHT_SIGMA: f64 = 8.0;
-        /// Minimum light of a star on two opposite neighbours of its peak: in sigmas, and as a
+        /// Minimum light of a star on two opposite neighbors of its peak: in sigmas, and as a
         /// share of the peak. A Gaussian spot with a sigma of half a pixel has a third there.
-        const NEIGHBOURS_SIGMA: f64 = 4.0;
-        const NEIGHBOURS_SHARE: f64 = 0.15;
+        const NEIGHBORS_SIGMA: f64 = 4.0;
+        const NEIGHBORS_SHARE: f64 = 0.15;
         let mut maxima = Self::default();
         let floor = f64::from(frame.step_adu) / 2.0;
         let pixels = frame.values();
@@ -100,7 +100,7 @@ impl Maxima {
                 if peak < left.max(up) || peak <= right.max(down) {
                     continue;
                 }
-                let least = (NEIGHBOURS_SIGMA * sigma).max(NEIGHBOURS_SHARE * peak);
+                let least = (NEIGHBORS_SIGMA * sigma).max(NEIGHBORS_SHARE * peak);
                 maxima.bright += 1;
                 maxima.star_like += usize::from(left + right > least && up + down > least);
             }

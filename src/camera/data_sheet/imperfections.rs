@@ -106,7 +106,7 @@ pub struct Imperfections {
     pub offset_sigma_adu: f64,
     /// Standard deviation of the columns' bias, in grey levels.
     pub column_sigma_adu: f64,
-    /// Share of the charge above full well that flows to the neighbours in the column; the rest is
+    /// Share of the charge above full well that flows to the neighbors in the column; the rest is
     /// lost.
     pub blooming: f64,
     /// Depth of the layer that collects charge, in µm. It determines the charge of a cosmic ray.
@@ -132,7 +132,7 @@ pub struct Imperfections {
     pub obstruction: f64,
     /// Distance of the samples of a spot from a file, in pixels.
     pub spot_step_px: f64,
-    /// Quality of the JPEG that a colour camera writes; 0: it writes raw frames.
+    /// Quality of the JPEG that a color camera writes; 0: it writes raw frames.
     pub jpeg_quality: f64,
     /// Exponent of the tone curve of that JPEG; 1: none.
     pub tone_gamma: f64,

@@ -179,7 +179,7 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     ),
     key!(jpeg_quality in imperfections,
         Limits::FromTo(0.0, 100.0),
-        "quality of the JPEG of a colour camera: mosaic, demosaicing, eight bits; 0: no JPEG"
+        "quality of the JPEG of a color camera: mosaic, demosaicing, eight bits; 0: no JPEG"
     ),
     key!(tone_gamma in imperfections,
         Limits::FromTo(1.0, 5.0),

@@ -19,7 +19,7 @@ use std::path::PathBuf;
     Without --camera or --preset, every built-in camera is simulated in turn.\n\
     Kinds with sky: clean, foliage, edges, reflections, clouds, trails, false-stars, black-level, jpeg,\n\
     blends, hot-pixels, cosmic-rays;\n\
-    without: noise, coloured-noise, dots, text, drawings, foliage-alone, windows, snow, bokeh.")]
+    without: noise, colored-noise, dots, text, drawings, foliage-alone, windows, snow, bokeh.")]
 pub(crate) struct ClutterArgs {
     /// Frames of each kind
     #[arg(long, value_name = "NUMBER", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]

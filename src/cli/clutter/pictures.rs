@@ -9,7 +9,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 /// Frames of each kind that are written.
-const MOST_FRAMES: u64 = 20;
+const MAX_FRAMES: u64 = 20;
 
 /// Writes the first frames of each kind into `directory`, as KIND-NUMBER.tif.
 pub(super) fn write(
@@ -20,7 +20,7 @@ pub(super) fn write(
 ) -> Result<(), CommandError> {
     for kind in kinds {
         let maker = FrameMaker::new(*kind, &protocol.setup, indexed)?;
-        for number in 0..protocol.frames.min(MOST_FRAMES) {
+        for number in 0..protocol.frames.min(MAX_FRAMES) {
             let made = maker.frame(protocol.seed, number)?;
             let name = format!("{}-{number:05}.tif", kind.name());
             let is_8_bit = made.frame.saturation_adu.is_some_and(|most| most <= 255.0);

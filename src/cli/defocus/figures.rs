@@ -10,9 +10,9 @@ use starpipe::base::format::five_digits;
 use starpipe::model::defocus::{ErrorCurve, ErrorPoint, Expected, IsoLine, PeakStudy, Surface};
 use starpipe::study::defocus::{DefocusReport, StarModel, StarReport, StarStudy, Theory};
 
-/// Colours of a few lines that everybody can tell apart.
-const COLOURS: [RGBColor; 4] = [BLUE, ORANGE, RGBColor(0, 158, 115), RGBColor(204, 121, 167)];
-/// Colours from the least error to the largest: dark blue to yellow, in even steps of lightness.
+/// Colors of a few lines that everybody can tell apart.
+const COLORS: [RGBColor; 4] = [BLUE, ORANGE, RGBColor(0, 158, 115), RGBColor(204, 121, 167)];
+/// Colors from the least error to the largest: dark blue to yellow, in even steps of lightness.
 const SCALE: [[f64; 3]; 5] = [
     [68.0, 1.0, 84.0],
     [59.0, 82.0, 139.0],
@@ -20,7 +20,7 @@ const SCALE: [[f64; 3]; 5] = [
     [94.0, 201.0, 98.0],
     [253.0, 231.0, 37.0],
 ];
-/// Number of shades; neighbouring cells of one shade are drawn as one.
+/// Number of shades; neighboring cells of one shade are drawn as one.
 const SHADES: f64 = 40.0;
 /// Radii of the paper's figure 1, in pixels.
 const PAPER_SPOTS_PX: [f64; 2] = [0.6, 1.5];
@@ -83,12 +83,12 @@ fn label_of(star: &StarReport) -> String {
         .map_or_else(String::new, |v_mag| format!("V {}", five_digits(v_mag)))
 }
 
-/// Errors as colours, with lines of equal error.
+/// Errors as colors, with lines of equal error.
 fn errors(report: &DefocusReport, study: &StarStudy) -> Panel {
     let lines: Vec<Vec<(f64, f64)>> = study.isolines.iter().map(outline).collect();
     // A third along the outline the lines are farthest apart.
     let labels = line_labels(study, &lines, |line| line.len() / 3);
-    let [least, most] = colour_range_px(study).map(|error| five_digits(two_digits(error)));
+    let [least, most] = color_range_px(study).map(|error| five_digits(two_digits(error)));
     let measured = |_, _, point: &ErrorPoint| point.is_sound().then_some(point.rms_px);
     let mut layers = vec![Layer::unnamed(BLACK, Marks::Cells(cells(study, measured)))];
     if study.star.v_mag().is_none() {
@@ -188,7 +188,7 @@ fn spot(experiment: &PeakStudy, spot_px: f64) -> Panel {
         Cell {
             x: [column - 0.5, column + 0.5],
             y: [row - 0.5, row + 0.5],
-            colour: RGBColor(grey, grey, grey),
+            color: RGBColor(grey, grey, grey),
         }
     };
     let cells = pixels.iter().enumerate().map(cell).collect();
@@ -200,7 +200,7 @@ fn spot(experiment: &PeakStudy, spot_px: f64) -> Panel {
     }
 }
 
-/// A surface in the colours of the errors: the paper's figure 3.
+/// A surface in the colors of the errors: the paper's figure 3.
 fn fitted(report: &DefocusReport, study: &StarStudy, whose: &str, surface: &Surface) -> Panel {
     let value = |spot_px: f64, noise: f64, _: &ErrorPoint| Some(surface.at(spot_px, noise));
     Panel {
@@ -220,10 +220,10 @@ fn sampled(report: &DefocusReport, study: &StarStudy) -> Panel {
         let points = grid.spots_px.iter().zip(column);
         Marks::Line(points.map(|(&spot_px, at)| (spot_px, at.rms_px)).collect())
     };
-    let layers = a_few(count).flat_map(|(noise, colour)| {
+    let layers = a_few(count).flat_map(|(noise, color)| {
         let label = five_digits(two_digits(grid.noises[noise]));
         let integrated = study.expected.as_ref();
-        let integrated = integrated.map(|all| Layer::new(label, colour, line(all, noise)));
+        let integrated = integrated.map(|all| Layer::new(label, color, line(all, noise)));
         let sampled = study.sampled.as_ref();
         let sampled = sampled.map(|all| Layer::guide(line(all, noise)));
         sampled.into_iter().chain(integrated)
@@ -236,8 +236,8 @@ fn sampled(report: &DefocusReport, study: &StarStudy) -> Panel {
     }
 }
 
-/// The 5th and the 95th percentile of the errors: the ends of the colours.
-fn colour_range_px(study: &StarStudy) -> [f64; 2] {
+/// The 5th and the 95th percentile of the errors: the ends of the colors.
+fn color_range_px(study: &StarStudy) -> [f64; 2] {
     let sound = study.errors.points.iter().filter(|point| point.is_sound());
     let mut errors: Vec<f64> = sound.map(|point| point.rms_px).collect();
     errors.sort_by(f64::total_cmp);
@@ -245,11 +245,11 @@ fn colour_range_px(study: &StarStudy) -> [f64; 2] {
     [at(1).unwrap_or(1e-3), at(19).unwrap_or(1.0)]
 }
 
-/// The grid as cells, with the colours of the errors that `error_px` gives; those beside each other
+/// The grid as cells, with the colors of the errors that `error_px` gives; those beside each other
 /// with one shade are one cell.
 fn cells(study: &StarStudy, error_px: impl Fn(f64, f64, &ErrorPoint) -> Option<f64>) -> Vec<Cell> {
     let grid = &study.errors.grid;
-    let [least, most] = colour_range_px(study);
+    let [least, most] = color_range_px(study);
     let (columns, rows) = (edges(&grid.noises), edges(&grid.spots_px));
     let mut cells: Vec<Cell> = Vec::new();
     for (row, points) in study.errors.points.chunks(grid.noises.len()).enumerate() {
@@ -266,7 +266,7 @@ fn cells(study: &StarStudy, error_px: impl Fn(f64, f64, &ErrorPoint) -> Option<f
                 (_, Some(shade)) => cells.push(Cell {
                     x: [columns[column], columns[column + 1]],
                     y: [rows[row], rows[row + 1]],
-                    colour: colour_of(shade / SHADES),
+                    color: color_of(shade / SHADES),
                 }),
                 (_, None) => (),
             }
@@ -287,7 +287,7 @@ fn edges(values: &[f64]) -> Vec<f64> {
 }
 
 /// Interpolates in [`SCALE`].
-fn colour_of(part: f64) -> RGBColor {
+fn color_of(part: f64) -> RGBColor {
     let place = part * (SCALE.len() - 1) as f64;
     let below = (place as usize).min(SCALE.len() - 2);
     let rest = place - below as f64;
@@ -326,7 +326,7 @@ fn sections(report: &DefocusReport, study: &StarStudy) -> [Panel; 2] {
 fn a_few(count: usize) -> impl Iterator<Item = (usize, RGBColor)> {
     let few = SECTION_LINES.min(count);
     let indices = (0..few).map(move |i| (i * (count - 1)) / (few - 1).max(1));
-    indices.zip(COLOURS)
+    indices.zip(COLORS)
 }
 
 /// A curve at a radius within its range.
@@ -337,12 +337,12 @@ fn at(curve: &ErrorCurve, radius: f64) -> Option<f64> {
 
 fn over_radius(study: &StarStudy) -> Vec<Layer> {
     let grid = &study.errors.grid;
-    let section = |(noise, colour): (usize, RGBColor)| {
+    let section = |(noise, color): (usize, RGBColor)| {
         let curve = study.curves[noise].as_ref()?;
         let radii = grid.spots_px.iter();
         let line = radii.filter_map(|&radius| Some((radius, at(curve, radius)?)));
         let label = five_digits(two_digits(grid.noises[noise]));
-        Some(Layer::new(label, colour, Marks::Line(line.collect())))
+        Some(Layer::new(label, color, Marks::Line(line.collect())))
     };
     let mut layers: Vec<Layer> = a_few(grid.noises.len()).filter_map(section).collect();
     let theory = study.points.iter().map(|at| match &at.theory {
@@ -356,20 +356,20 @@ fn over_radius(study: &StarStudy) -> Vec<Layer> {
 
 fn over_noise(study: &StarStudy) -> Vec<Layer> {
     let grid = &study.errors.grid;
-    let section = |(number, colour): (usize, RGBColor)| {
+    let section = |(number, color): (usize, RGBColor)| {
         let radius = grid.spots_px[number];
         let curves = grid.noises.iter().zip(&study.curves);
         let line = curves.filter_map(|(&noise, curve)| Some((noise, at(curve.as_ref()?, radius)?)));
         let label = format!("{} px", five_digits(two_digits(radius)));
-        Layer::new(label, colour, Marks::Line(line.collect()))
+        Layer::new(label, color, Marks::Line(line.collect()))
     };
     a_few(grid.spots_px.len()).map(section).collect()
 }
 
 /// The errors at the noise of the study, few enough to be told apart.
 fn dots(study: &StarStudy) -> Vec<Dot> {
-    const MOST: usize = 50;
-    let step = study.points.len().div_ceil(MOST);
+    const MAX: usize = 50;
+    let step = study.points.len().div_ceil(MAX);
     let points = study.points.iter().step_by(step);
     let sound = points.filter(|at| at.point.is_sound());
     sound
@@ -391,8 +391,8 @@ fn best_of(star: &StarReport) -> Marks {
 
 /// The best radius of each star over the noise.
 fn best_radii(report: &DefocusReport) -> Panel {
-    let stars = report.stars.iter().zip(COLOURS);
-    let layers = stars.map(|(star, colour)| Layer::new(label_of(star), colour, best_of(star)));
+    let stars = report.stars.iter().zip(COLORS);
+    let layers = stars.map(|(star, color)| Layer::new(label_of(star), color, best_of(star)));
     Panel {
         title: "Best radius, and those whose error is at most 5 % larger".to_owned(),
         x: noise_axis(report),
@@ -427,18 +427,18 @@ fn radii_for_errors(report: &DefocusReport, star: &StarReport, study: &StarStudy
 
 /// Error over limiting magnitude as the radius grows: a line for each star, a few radii beside it.
 fn accuracy_and_reach(report: &DefocusReport) -> Panel {
-    let stars = report.stars.iter().zip(COLOURS);
+    let stars = report.stars.iter().zip(COLORS);
     Panel {
         title: "Accuracy against reach; numbers: radius (px), grey: Cramér-Rao bound".to_owned(),
         x: Axis::of("half of the stars are found at V"),
         y: Axis::log("error of the centroid (px)", true),
         layers: stars
-            .flat_map(|(star, colour)| accuracy_of(star, colour))
+            .flat_map(|(star, color)| accuracy_of(star, color))
             .collect(),
     }
 }
 
-fn accuracy_of(star: &StarReport, colour: RGBColor) -> [Layer; 3] {
+fn accuracy_of(star: &StarReport, color: RGBColor) -> [Layer; 3] {
     const LABELLED_PX: [f64; 6] = [0.3, 0.5, 0.7, 1.0, 1.5, 2.0];
     let bound = star
         .curve
@@ -461,7 +461,7 @@ fn accuracy_of(star: &StarReport, colour: RGBColor) -> [Layer; 3] {
     let line = points.iter().map(|(_, point)| *point).collect();
     [
         Layer::guide(Marks::Line(bound.collect())),
-        Layer::new(label_of(star), colour, Marks::Line(line)),
-        Layer::unnamed(colour, labels),
+        Layer::new(label_of(star), color, Marks::Line(line)),
+        Layer::unnamed(color, labels),
     ]
 }

@@ -61,7 +61,7 @@ fn panel(title: String, sweep: &Sweep, curves: Vec<Curve>, scenario: &Scenario) 
         .map(|value| (value, Budget::new(scenario).limit_vmag));
     let curves = curves.into_iter().zip([BLUE, ORANGE]);
     let mut layers: Vec<Layer> = curves
-        .map(|(curve, colour)| Layer::new(curve.label, colour, Marks::Line(curve.points)))
+        .map(|(curve, color)| Layer::new(curve.label, color, Marks::Line(curve.points)))
         .collect();
     layers.push(Layer::unnamed(BLACK, Marks::Points(Vec::from_iter(dot))));
     Panel {

@@ -5,7 +5,7 @@ use clap::Args;
 use std::{env, thread};
 
 /// Threads that may be started on any machine.
-const MOST_USEFUL: usize = 8;
+const MAX_USEFUL: usize = 8;
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Resources")]
@@ -24,7 +24,7 @@ impl ThreadOptions {
         let wanted = stated.or_else(of_environment).unwrap_or(processors);
         // More only get in each other's way.
         rayon::ThreadPoolBuilder::new()
-            .num_threads(wanted.min(processors.max(MOST_USEFUL)))
+            .num_threads(wanted.min(processors.max(MAX_USEFUL)))
             .build()
             .context("starting threads")
     }

@@ -1,14 +1,14 @@
-//! What is drawn in a panel: layers of marks of one kind and colour.
+//! What is drawn in a panel: layers of marks of one kind and color.
 
 use super::style::GREY;
 use plotters::style::RGBColor;
 
-/// Marks of one kind and colour.
+/// Marks of one kind and color.
 #[derive(Clone)]
 pub(crate) struct Layer {
     /// Name in the legend, if it is there.
     pub(crate) label: Option<String>,
-    pub(crate) colour: RGBColor,
+    pub(crate) color: RGBColor,
     pub(crate) marks: Marks,
 }
 
@@ -28,7 +28,7 @@ pub(crate) enum Marks {
     Bars(Vec<([f64; 2], f64)>),
     /// A line from side to side at each y.
     Levels(Vec<f64>),
-    /// Rectangles with colours of their own, from left to right and then upwards.
+    /// Rectangles with colors of their own, from left to right and then upwards.
     Cells(Vec<Cell>),
     /// Text centred on a place.
     Texts(Vec<(f64, f64, String)>),
@@ -39,23 +39,23 @@ pub(crate) enum Marks {
 pub(crate) struct Cell {
     pub(crate) x: [f64; 2],
     pub(crate) y: [f64; 2],
-    pub(crate) colour: RGBColor,
+    pub(crate) color: RGBColor,
 }
 
 impl Layer {
-    pub(crate) fn new(label: impl Into<String>, colour: RGBColor, marks: Marks) -> Self {
+    pub(crate) fn new(label: impl Into<String>, color: RGBColor, marks: Marks) -> Self {
         Self {
             label: Some(label.into()),
-            colour,
+            color,
             marks,
         }
     }
 
     /// Marks that are not in the legend.
-    pub(crate) fn unnamed(colour: RGBColor, marks: Marks) -> Self {
+    pub(crate) fn unnamed(color: RGBColor, marks: Marks) -> Self {
         Self {
             label: None,
-            colour,
+            color,
             marks,
         }
     }

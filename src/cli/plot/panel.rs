@@ -109,16 +109,16 @@ fn draw_legend_mark<B: DrawingBackend>(
     layer: &Layer,
     (x, y): (i32, i32),
 ) -> anyhow::Result<()> {
-    let colour = layer.colour;
+    let color = layer.color;
     match layer.marks {
-        Marks::Dots(_) => area.draw(&Circle::new((x + 8, y), 4, colour.filled())),
+        Marks::Dots(_) => area.draw(&Circle::new((x + 8, y), 4, color.filled())),
         Marks::Bars(_) => {
             let corners = [(x, y - 6), (x + 16, y + 6)];
-            area.draw(&Rectangle::new(corners, colour.mix(PALE).filled()))
+            area.draw(&Rectangle::new(corners, color.mix(PALE).filled()))
         }
         _ => area.draw(&PathElement::new(
             [(x, y), (x + 18, y)],
-            colour.stroke_width(2),
+            color.stroke_width(2),
         )),
     }
     .map_err(plot_error)
@@ -139,18 +139,18 @@ where
     Y: Ranged<ValueType = f64>,
 {
     fn draw(&mut self, layer: &Layer) -> anyhow::Result<()> {
-        let colour = layer.colour;
+        let color = layer.color;
         match &layer.marks {
-            Marks::Line(points) => self.draw_line(points, colour),
+            Marks::Line(points) => self.draw_line(points, color),
             Marks::Lines(lines) => lines
                 .iter()
-                .try_for_each(|line| self.draw_line(line, colour)),
+                .try_for_each(|line| self.draw_line(line, color)),
             Marks::Points(points) => {
-                self.draw_all(points.iter().map(|&at| Circle::new(at, 4, colour.filled())))
+                self.draw_all(points.iter().map(|&at| Circle::new(at, 4, color.filled())))
             }
-            Marks::Dots(dots) => self.draw_dots(dots, colour),
+            Marks::Dots(dots) => self.draw_dots(dots, color),
             Marks::Bars(bars) => {
-                let pale = colour.mix(PALE).filled();
+                let pale = color.mix(PALE).filled();
                 let bar = |&([from, to], y): &([f64; 2], f64)| {
                     Rectangle::new([(from, 0.0), (to, y)], pale)
                 };
@@ -158,12 +158,12 @@ where
             }
             Marks::Levels(levels) => {
                 let [from, to] = self.ends.0;
-                let stroke = colour.stroke_width(2);
+                let stroke = color.stroke_width(2);
                 let line = |&y: &f64| PathElement::new([(from, y), (to, y)], stroke);
                 self.draw_all(levels.iter().map(line))
             }
             Marks::Cells(cells) => self.draw_cells(cells),
-            Marks::Texts(texts) => self.draw_texts(texts, colour),
+            Marks::Texts(texts) => self.draw_texts(texts, color),
         }
     }
 
@@ -177,22 +177,22 @@ where
         drawn.map(drop).map_err(plot_error)
     }
 
-    fn draw_line(&mut self, points: &[(f64, f64)], colour: RGBColor) -> anyhow::Result<()> {
+    fn draw_line(&mut self, points: &[(f64, f64)], color: RGBColor) -> anyhow::Result<()> {
         self.draw_all(LineSeries::new(
             points.iter().copied(),
-            colour.stroke_width(2),
+            color.stroke_width(2),
         ))
     }
 
     /// Draws the intervals within the chart, and the dots above them.
-    fn draw_dots(&mut self, dots: &[Dot], colour: RGBColor) -> anyhow::Result<()> {
+    fn draw_dots(&mut self, dots: &[Dot], color: RGBColor) -> anyhow::Result<()> {
         let [bottom, top] = self.ends.1;
         let interval = |&(x, _, [low, high]): &Dot| {
             let ends = [(x, low.max(bottom)), (x, high.min(top))];
-            PathElement::new(ends, colour.stroke_width(1))
+            PathElement::new(ends, color.stroke_width(1))
         };
         self.draw_all(dots.iter().map(interval))?;
-        let dot = |&(x, y, _): &Dot| Circle::new((x, y), 3, colour.filled());
+        let dot = |&(x, y, _): &Dot| Circle::new((x, y), 3, color.filled());
         self.draw_all(dots.iter().map(dot))
     }
 
@@ -203,16 +203,16 @@ where
         let rectangle = |cell: &Cell| {
             let x = (cell.x[1] + overlap[0]).min(right);
             let y = (cell.y[1] + overlap[1]).min(top);
-            Rectangle::new([(cell.x[0], cell.y[0]), (x, y)], cell.colour.filled())
+            Rectangle::new([(cell.x[0], cell.y[0]), (x, y)], cell.color.filled())
         };
         self.draw_all(cells.iter().map(rectangle))
     }
 
     /// Draws text centred on its place, on a bright background.
-    fn draw_texts(&mut self, texts: &[(f64, f64, String)], colour: RGBColor) -> anyhow::Result<()> {
+    fn draw_texts(&mut self, texts: &[(f64, f64, String)], color: RGBColor) -> anyhow::Result<()> {
         let style = (FONT, LETTERS_PX)
             .into_text_style(self.area)
-            .color(&colour)
+            .color(&color)
             .pos(Pos::new(HPos::Center, VPos::Center));
         for (x, y, text) in texts {
             let size = self.area.estimate_text_size(text, &style);

@@ -1,4 +1,4 @@
-//! Letters, colours and margins of all figures.
+//! Letters, colors and margins of all figures.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -12,7 +12,7 @@ pub(crate) const LETTERS_PX: u32 = 15;
 /// Margin of a chart.
 pub(super) const MARGIN_PX: u32 = 10;
 
-/// With [`ORANGE`], a pair of colours that everybody can tell apart.
+/// With [`ORANGE`], a pair of colors that everybody can tell apart.
 pub(crate) const BLUE: RGBColor = RGBColor(0, 114, 178);
 /// The other of the pair.
 pub(crate) const ORANGE: RGBColor = RGBColor(213, 94, 0);

@@ -40,10 +40,10 @@ fn panel(parameter: Parameter, rows: &[SweptRow]) -> Panel {
         .filter_map(|row| of_parameter(row).map(|(_, value)| (value, &row.row)))
         .collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let line = |label: &str, colour, count: fn(&CaseResult) -> usize| {
+    let line = |label: &str, color, count: fn(&CaseResult) -> usize| {
         let percent = |row: &CaseResult| 100.0 * count(row) as f64 / row.counted.max(1) as f64;
         let line = points.iter().map(|(value, row)| (*value, percent(row)));
-        Layer::new(label, colour, Marks::Line(line.collect()))
+        Layer::new(label, color, Marks::Line(line.collect()))
     };
     let intervals = points.iter().map(|(value, row)| {
         let interval = [row.right_low_percent, row.right_high_percent];

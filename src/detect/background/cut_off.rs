@@ -23,7 +23,7 @@ use crate::detect::pixels::View;
 pub(crate) const REACH_SIGMA: f32 = 2.5;
 /// Of noise that is cut off, at least this part of the pixels has the lowest value: noise that is
 /// not is so low, relative to its background, in under one pixel of a hundred.
-const LEAST_AT_LOWEST: f64 = 0.02;
+const MIN_AT_LOWEST: f64 = 0.02;
 /// Where more pixels than this part have the lowest value, those next to lit ones are left out.
 const MOSTLY_LOWEST: f64 = 0.5;
 /// Distance of the two pixels beside one that must have the lowest value, in columns: most of a
@@ -118,7 +118,7 @@ impl CutOff {
         for (cell, cut) in self.cells.iter().enumerate() {
             (mesh.background[cell], mesh.sigma[cell]) = match *cut {
                 None => continue,
-                // Will get the mean of the neighbours.
+                // Will get the mean of the neighbors.
                 Some(CutCell::Dark) => (f32::NAN, f32::NAN),
                 Some(CutCell::Known {
                     depth, sigma, edge, ..
@@ -169,7 +169,7 @@ fn measure_cell(
         total += row.iter().filter(|v| !v.is_nan()).count();
         at_lowest += row.iter().filter(|&&v| v == lowest).count();
     }
-    if total == 0 || (at_lowest as f64) < LEAST_AT_LOWEST * total as f64 {
+    if total == 0 || (at_lowest as f64) < MIN_AT_LOWEST * total as f64 {
         return None;
     }
     let is_sparse = at_lowest as f64 > MOSTLY_LOWEST * total as f64;

@@ -108,7 +108,7 @@ pub(crate) fn of_squares(rows: [&[f32]; 3], medians: &mut [f32]) {
 /// Replaces backgrounds that are outliers among the 3x3 around them by the median of these; the
 /// rows are two longer than `backgrounds`.
 ///
-/// An outlier deviates from the median by more than three standard deviations of its neighbours, by
+/// An outlier deviates from the median by more than three standard deviations of its neighbors, by
 /// their median deviation, and half the noise of a pixel.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 pub(crate) fn replace_outliers(rows: [&[f32]; 3], sigmas: &[f32], backgrounds: &mut [f32]) {

@@ -362,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cell_without_values_takes_its_neighbours() {
+    fn a_cell_without_values_takes_its_neighbors() {
         let mut pixels = noise_frame(192, 2.0, |_, _| 50.0);
         for y in 64..128 {
             pixels[y * 192 + 64..y * 192 + 128].fill(f32::NAN);

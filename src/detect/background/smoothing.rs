@@ -1,6 +1,6 @@
 //! Gaps and outliers of a mesh.
 //!
-//! Cells without a value take the mean of their neighbours. The noise is smoothed by a median of
+//! Cells without a value take the mean of their neighbors. The noise is smoothed by a median of
 //! 3x3 cells; the background is replaced by it only where it is an outlier. Beyond the border the
 //! background goes on as a plane does.
 
@@ -16,7 +16,7 @@ pub(crate) struct Smoother {
 }
 
 impl Smoother {
-    /// Gives cells without a value the mean of their neighbours that have one, until all have.
+    /// Gives cells without a value the mean of their neighbors that have one, until all have.
     pub fn fill_gaps(&mut self, grid: &CellGrid, background: &mut [f32], sigma: &mut [f32]) {
         if background.iter().all(|v| v.is_nan()) {
             background.fill(0.0);
@@ -32,7 +32,7 @@ impl Smoother {
             for i in (0..background.len()).filter(|&i| measured_background[i].is_nan()) {
                 let known = |j: &usize| !measured_background[*j].is_nan();
                 let [mut count, mut background_sum, mut sigma_sum] = [0.0; 3];
-                for j in neighbours(grid, i).filter(known) {
+                for j in neighbors(grid, i).filter(known) {
                     count += 1.0;
                     background_sum += measured_background[j];
                     sigma_sum += self.measured_sigma[j];
@@ -77,7 +77,7 @@ impl Smoother {
     fn median_at_border(&self, grid: &CellGrid, cell: usize) -> f32 {
         let mut around = [f32::INFINITY; 9];
         let mut count = 0;
-        for (value, other) in around.iter_mut().zip(neighbours(grid, cell)) {
+        for (value, other) in around.iter_mut().zip(neighbors(grid, cell)) {
             *value = self.measured_sigma[other];
             count += 1;
         }
@@ -108,7 +108,7 @@ impl Smoother {
 }
 
 /// The indices of the 3x3 cells around cell `index`, itself among them.
-fn neighbours(grid: &CellGrid, index: usize) -> impl Iterator<Item = usize> + use<> {
+fn neighbors(grid: &CellGrid, index: usize) -> impl Iterator<Item = usize> + use<> {
     let columns = grid.columns;
     let (row, column) = (index / columns, index % columns);
     let rows = row.saturating_sub(1)..(row + 2).min(grid.rows);

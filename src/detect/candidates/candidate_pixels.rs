@@ -96,11 +96,11 @@ impl Candidates {
     }
 }
 
-/// Whether no neighbour is higher; of equal pixels the first in reading order counts.
+/// Whether no neighbor is higher; of equal pixels the first in reading order counts.
 fn is_local_maximum(row: &[f32], [above, below]: [Option<&[f32]>; 2], x: usize) -> bool {
     let value = row[x];
     let columns = x.saturating_sub(1)..(x + 2).min(row.len());
-    // Without early exit: a branch for each neighbour would cost more.
+    // Without early exit: a branch for each neighbor would cost more.
     let are_lower = |values: &[f32]| values.iter().fold(true, |all, v| all & (*v < value));
     let are_no_higher = |values: &[f32]| values.iter().fold(true, |all, v| all & (*v <= value));
     are_lower(&row[columns.start..x])

@@ -37,7 +37,7 @@ pub(crate) struct FilteredFrame {
 
 /// Which pixels are gathered.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Gathered {
+pub(crate) struct CandidateLimits {
     /// Those that may be above this many standard deviations.
     pub threshold: f64,
     /// How many a frame may have.
@@ -72,7 +72,7 @@ impl FilteredFrame {
         view: &View<'_>,
         background: &Mesh,
         kernel: &Kernel,
-        (cell_px, gathered): (usize, &Gathered),
+        (cell_px, gathered): (usize, &CandidateLimits),
     ) -> Result<(), DetectError> {
         let Self {
             mesh,
@@ -96,7 +96,7 @@ impl FilteredFrame {
             }
             let FilterWorker { cells, band } = worker;
             let rows = row.rows;
-            let filtered = with_neighbours(&rows, view.height);
+            let filtered = with_neighbors(&rows, view.height);
             band.filter(view, background, kernel, filtered);
             let sampled = band.sampled(rows.clone(), grid.row_stride());
             cells.measure_row(&grid, sampled, &config, (row.background, row.sigma));
@@ -121,7 +121,7 @@ impl FilteredFrame {
         view: &View<'_>,
         background: &Mesh,
         kernel: &Kernel,
-        gathered: &Gathered,
+        gathered: &CandidateLimits,
     ) -> Result<(), DetectError> {
         let mut total = self.candidate_count();
         let Some(FilterWorker { band, .. }) = self.workers.first_mut() else {
@@ -132,7 +132,7 @@ impl FilteredFrame {
             if !candidates.reach_down_to(lowest) {
                 view.check()?;
                 let rows = self.mesh.grid.rows_of(row);
-                let filtered = with_neighbours(&rows, view.height);
+                let filtered = with_neighbors(&rows, view.height);
                 band.filter(view, background, kernel, filtered);
                 let maxima = self.maxima.rows_mut(rows.clone());
                 total -= candidates.len();
@@ -146,7 +146,7 @@ impl FilteredFrame {
     }
 
     /// Filters rows of cells spread over the frame again, and calls `each` with every row in them
-    /// that has two neighbours, with these and its number.
+    /// that has two neighbors, with these and its number.
     ///
     /// # Errors
     /// [`Interrupted`].
@@ -165,12 +165,7 @@ impl FilteredFrame {
         for row in (0..mesh.grid.rows).step_by(stride) {
             view.check()?;
             let rows = mesh.grid.rows_of(row);
-            band.filter(
-                view,
-                background,
-                kernel,
-                with_neighbours(&rows, view.height),
-            );
+            band.filter(view, background, kernel, with_neighbors(&rows, view.height));
             for y in rows.start.max(1)..rows.end.min(view.height.saturating_sub(1)) {
                 if let (Some(above), Some(here), Some(below)) =
                     (band.row(y - 1), band.row(y), band.row(y + 1))
@@ -187,7 +182,7 @@ impl FilteredFrame {
 fn candidate_cut(background: &[f32], sigma: &[f32], threshold: f32) -> f32 {
     let cells = background.iter().zip(sigma);
     let thresholds = cells.map(|(mean, sigma)| mean + threshold * sigma.max(SIGMA_FLOOR));
-    // A cell without a value (NaN) is ignored: it will get that of its neighbours.
+    // A cell without a value (NaN) is ignored: it will get that of its neighbors.
     let lowest = thresholds.fold(f32::INFINITY, f32::min);
     let lowest = if lowest.is_finite() {
         lowest
@@ -198,6 +193,6 @@ fn candidate_cut(background: &[f32], sigma: &[f32], threshold: f32) -> f32 {
 }
 
 /// The rows, and one on either side within the frame.
-fn with_neighbours(rows: &Range<usize>, height: usize) -> Range<usize> {
+fn with_neighbors(rows: &Range<usize>, height: usize) -> Range<usize> {
     rows.start.saturating_sub(1)..(rows.end + 1).min(height)
 }

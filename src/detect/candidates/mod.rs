@@ -14,7 +14,7 @@ mod search_config;
 mod selection;
 mod streaks;
 
-pub(crate) use filtered_frame::{FilteredFrame, Gathered};
+pub(crate) use filtered_frame::{CandidateLimits, FilteredFrame};
 pub(crate) use memory::CandidateMemory;
 pub(crate) use peak::Peak;
 pub(crate) use raw_peaks::{RawPeak, RawPeakFinder};

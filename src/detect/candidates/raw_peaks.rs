@@ -17,7 +17,7 @@ const BAND_PX: usize = 32;
 /// Pixels of a round: large frames are searched in rounds, each spread over the whole frame.
 const ROUND_PX: usize = 4_000_000;
 /// No further round follows once this many peaks are found: only the brightest few are fitted.
-const ENOUGH_PEAKS: usize = 600;
+const MAX_PEAKS: usize = 600;
 
 /// A local maximum of the frame.
 #[derive(Debug, Clone, Copy)]
@@ -104,7 +104,7 @@ impl RawPeakFinder {
             for worker in workers.iter_mut() {
                 peaks.append(&mut worker.found);
             }
-            if peaks.len() >= ENOUGH_PEAKS {
+            if peaks.len() >= MAX_PEAKS {
                 break;
             }
         }

@@ -1,13 +1,13 @@
 //! The spots of all peaks as far as they are known, and those around each peak.
 
-use super::neighbour_grid::NeighbourGrid;
+use super::neighbor_grid::NeighborGrid;
 use crate::detect::candidates::Peak;
 use crate::detect::fit::{FrameMaps, MAX_SPOTS, SpotEstimate, SpotGroup};
 
 /// The spots of all peaks, as far as they are known.
 #[derive(Debug, Clone, Default)]
 pub(super) struct KnownSpots {
-    neighbours: NeighbourGrid,
+    neighbors: NeighborGrid,
     /// The spot of each peak: fitted once it was measured, before that the initial guess.
     pub(super) spots: Vec<SpotEstimate>,
     /// Whether the spot is reliable: the initial guess of a saturated one is not.
@@ -24,7 +24,7 @@ impl KnownSpots {
     /// Begins with the initial guesses of all peaks, of which those within `reach_px` of each other
     /// are crowded.
     pub(super) fn begin(&mut self, peaks: &[Peak], maps: &FrameMaps<'_>, reach_px: f64) {
-        self.neighbours.sort(peaks, reach_px);
+        self.neighbors.sort(peaks, reach_px);
         self.spots.clear();
         self.spots
             .extend(peaks.iter().map(|p| maps.initial_guess(p)));
@@ -33,8 +33,8 @@ impl KnownSpots {
         self.isolated.clear();
         self.crowded.clear();
         for index in 0..peaks.len() {
-            self.neighbours.find(peaks, index);
-            if self.neighbours.found.is_empty() {
+            self.neighbors.find(peaks, index);
+            if self.neighbors.found.is_empty() {
                 self.isolated.push(index as u32);
             } else {
                 self.crowded.push(index as u32);
@@ -55,10 +55,10 @@ impl KnownSpots {
         peaks: &'a [Peak],
         touching_px: f64,
     ) -> PeakSurroundings<'a> {
-        self.neighbours.find(peaks, index);
+        self.neighbors.find(peaks, index);
         let mut start = SpotGroup::from_iter([self.spots[index]]);
         self.beyond.clear();
-        for other in self.neighbours.found.iter().map(|&found| found as usize) {
+        for other in self.neighbors.found.iter().map(|&found| found as usize) {
             let (a, b) = (&peaks[index], &peaks[other]);
             let (dx, dy) = (a.x as f64 - b.x as f64, a.y as f64 - b.y as f64);
             let is_touching = dx * dx + dy * dy < touching_px * touching_px;
@@ -71,7 +71,7 @@ impl KnownSpots {
         PeakSurroundings {
             peaks,
             index,
-            near: &self.neighbours.found,
+            near: &self.neighbors.found,
             start,
             beyond: &self.beyond,
         }

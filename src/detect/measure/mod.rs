@@ -5,7 +5,7 @@ mod core;
 mod estimate;
 mod known_spots;
 mod measurement;
-mod neighbour_grid;
+mod neighbor_grid;
 mod pairs;
 mod ring;
 mod saturated_area;

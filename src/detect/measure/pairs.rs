@@ -19,7 +19,7 @@ impl PairCriteria {
     /// Fits badly: minimum chi² over the degrees of freedom.
     const MIN_CHI2: f64 = 2.0;
     /// Elongated: minimum ratio of the principal axes of its region. The window of the fit ends
-    /// before a neighbour four spot sizes away.
+    /// before a neighbor four spot sizes away.
     const MIN_ELONGATION: f64 = 1.35;
 }
 

@@ -23,7 +23,7 @@ const BRIGHT: f32 = 0.7;
 /// Pixels below this height are noise, in standard deviations.
 const NOISE_SIGMAS: f32 = 2.5;
 /// At an edge at least this many of the 16 pixels of the ring are as bright: a corner of a right
-/// angle has 4, a line and two neighbours of the same brightness at most 3.
+/// angle has 4, a line and two neighbors of the same brightness at most 3.
 const BRIGHT_PIXELS: usize = 5;
 
 /// The pixels of the ring, as columns and rows from the source.

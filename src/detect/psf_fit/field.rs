@@ -4,7 +4,7 @@ use super::stars::PsfStar;
 use crate::detect::effective_psf::{FIELD_TERMS, FieldFrame, FieldMoments, polynomials};
 use nalgebra::{DMatrix, DVector, SVector};
 
-/// Scatter of the stars' own moments beyond their errors: their colours, their neighbours.
+/// Scatter of the stars' own moments beyond their errors: their colors, their neighbors.
 const SCATTER: f64 = 0.02;
 /// A parameter more must lower chi² by this: that of the Bayesian information criterion for some
 /// hundred values.

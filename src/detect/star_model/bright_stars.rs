@@ -18,13 +18,13 @@ const MIN_SNR: f32 = 12.0;
 /// Peaks that are tried, the brightest.
 const MAX_PEAKS: usize = 4 * MAX_STARS;
 /// Peaks that may disturb others, the brightest.
-const MAX_NEIGHBOURS: usize = 2000;
+const MAX_NEIGHBORS: usize = 2000;
 /// Peaks closer than this many spot sizes disturb each other,
 const ISOLATION_SIGMA: f32 = 6.0;
 /// with this added to the spot size, in pixels.
 const SIZE_MARGIN_PX: f64 = 0.3;
 /// Peaks below this part of a peak do not disturb it.
-const FAINT_NEIGHBOUR: f32 = 0.1;
+const FAINT_NEIGHBOR: f32 = 0.1;
 /// Largest error of the spot model, as a part of the light in a pixel: a source with a larger one
 /// is no star.
 pub(crate) const MAX_MODEL_ERROR: f64 = 0.1;
@@ -41,7 +41,7 @@ pub(crate) trait BrightPeak {
     fn contrast(&self, maps: &FrameMaps<'_>) -> Contrast;
     /// Size of the spot by the peak's curvature, in pixels.
     fn size_px(&self, maps: &FrameMaps<'_>) -> f64;
-    /// The spot size that decides which neighbours disturb it, given its own, in pixels.
+    /// The spot size that decides which neighbors disturb it, given its own, in pixels.
     fn isolation_px(&self, maps: &FrameMaps<'_>, size_px: f64) -> f64;
     /// Where a fit starts.
     fn start(&self, maps: &FrameMaps<'_>) -> SpotEstimate;
@@ -176,14 +176,14 @@ pub(crate) fn isolated_peaks<'a, P: BrightPeak + 'a>(
     bright: impl Iterator<Item = &'a P>,
     peaks: &[P],
 ) -> impl Iterator<Item = (&'a P, f64)> {
-    let neighbours = &peaks[..peaks.len().min(MAX_NEIGHBOURS)];
+    let neighbors = &peaks[..peaks.len().min(MAX_NEIGHBORS)];
     bright
         .filter(|peak| !peak.is_saturated())
         .map(|peak| (peak, peak.size_px(maps)))
         .filter(|(peak, size_px)| {
             let isolation_px = peak.isolation_px(maps, *size_px) as f32;
             let reach_px = ISOLATION_SIGMA * (isolation_px + SIZE_MARGIN_PX as f32);
-            let mut others = neighbours.iter().filter(|o| is_rival(o.snr(), peak.snr()));
+            let mut others = neighbors.iter().filter(|o| is_rival(o.snr(), peak.snr()));
             !others.any(|other| is_near(peak.place(), other.place(), reach_px))
         })
 }
@@ -221,7 +221,7 @@ fn spread<P: BrightPeak>(peaks: &[P], (width, height): (usize, usize)) -> Option
 
 /// Whether a peak is bright enough to disturb another.
 fn is_rival(other_snr: f32, snr: f32) -> bool {
-    other_snr >= FAINT_NEIGHBOUR * snr
+    other_snr >= FAINT_NEIGHBOR * snr
 }
 
 /// Whether two places are within `reach_px` of each other, but not the same.

@@ -18,7 +18,7 @@ use std::mem;
 
 /// An error of the spot model below this many standard errors is chance.
 const SIGNIFICANT_SIGMA: f64 = 2.0;
-/// Squared residuals count as at most this many variances. Those of close neighbours, which no
+/// Squared residuals count as at most this many variances. Those of close neighbors, which no
 /// star's noise explains, would grow with the variance that they cause.
 const MAX_SQUARED_SIGMA: f32 = 4.0;
 /// The mean of squared standard Gaussians that are cut off there.

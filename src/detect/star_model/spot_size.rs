@@ -77,7 +77,7 @@ fn weight_of(rank: usize, stars: usize) -> f64 {
 /// statistic, here along the logarithm of the size.
 fn densest_cluster(sorted: &[Size]) -> f64 {
     /// Narrower clusters are no denser: sizes have errors, as a ratio.
-    const LEAST_RATIO: f64 = 1.1;
+    const MIN_RATIO: f64 = 1.1;
     let count: f64 = sorted.iter().map(|size| size.weight).sum();
     let range = (SPOT_RANGE_PX.1 / HOT_PIXEL_PX).ln();
     // The log likelihood ratio of a cluster in this share of the range.
@@ -100,7 +100,7 @@ fn densest_cluster(sorted: &[Size]) -> f64 {
             if ratio > MODE_WIDTH * MODE_WIDTH {
                 break;
             }
-            let share = ratio.max(LEAST_RATIO).ln() / range;
+            let share = ratio.max(MIN_RATIO).ln() / range;
             let of_cluster = surplus(members, share);
             // Fewer than expected are no cluster.
             if members > count * share && of_cluster > most {

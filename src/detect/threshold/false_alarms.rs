@@ -1,8 +1,8 @@
 //! The threshold that gives a wanted number of false detections in pure noise.
 //!
 //! Noise filtered by a separable kernel is a Gaussian field on a grid, correlated by ρx and ρy
-//! between neighbours in a row and in a column. The chance that a pixel is a local maximum above u
-//! is `∫_u^∞ φ(z) Q(ρx,z) Q(ρy,z) dz`, where Q is the chance that both neighbours on an axis lie
+//! between neighbors in a row and in a column. The chance that a pixel is a local maximum above u
+//! is `∫_u^∞ φ(z) Q(ρx,z) Q(ρy,z) dz`, where Q is the chance that both neighbors on an axis lie
 //! lower: `Q(ρ,z) = 1 − 2Φ̄(hz) + (1/π)∫₀^α exp(−½h²z²/sin²θ) dθ`, `h = √((1−ρ)/(1+ρ))`,
 //! `α = arcsin √((1−ρ²)/2)`.
 //!
@@ -20,7 +20,7 @@ const RANGE: (f64, f64) = (1.0, 12.0);
 /// Steps of the inner integral.
 const PARTS: usize = 8;
 
-/// The probability Q that both neighbours on an axis are lower, for one correlation ρ.
+/// The probability Q that both neighbors on an axis are lower, for one correlation ρ.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct BothLower {
     h: f64,
@@ -89,7 +89,7 @@ pub(crate) fn threshold_for_rate(per_mpx: f64, rho_x: f64, rho_y: f64) -> f64 {
     /// Tolerance of the logarithm of the rate.
     const TOLERANCE: f64 = 1e-4;
     /// The logarithm of the rate falls at least this much with u².
-    const LEAST_SLOPE: f64 = -0.1;
+    const MIN_SLOPE: f64 = -0.1;
     let wanted = (per_mpx * 1e-6).ln();
     let (across, down) = (BothLower::new(rho_x), BothLower::new(rho_y));
     let excess = |u: f64| {
@@ -110,7 +110,7 @@ pub(crate) fn threshold_for_rate(per_mpx: f64, rho_x: f64, rho_y: f64) -> f64 {
             break;
         }
         let at_next = excess(next.sqrt());
-        slope = ((at_next - at) / (next - square)).min(LEAST_SLOPE);
+        slope = ((at_next - at) / (next - square)).min(MIN_SLOPE);
         (square, at) = (next, at_next);
     }
     square.sqrt()
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn independent_pixels_have_the_textbook_rate() {
-        // Four independent neighbours all lower, far in the tail: Φ̄(u).
+        // Four independent neighbors all lower, far in the tail: Φ̄(u).
         let tail = 0.5 * (1.0 - erf_and_gauss(4.0 / SQRT_2).0);
         let rate = rate_above(4.0, 0.0);
         assert!((rate / tail - 1.0).abs() < 0.01, "{rate} vs {tail}");

@@ -85,11 +85,11 @@ impl FrameNoise<'_> {
         /// Noise of the filtered frame, in units of that of independent pixels.
         const INDEPENDENT: std::ops::RangeInclusive<f64> = 0.85..=1.15;
         /// Clouds and crowded stars reach 0.25, JPEGs have 0.3 to 0.8.
-        const LEAST_CORRELATION: f64 = 0.3;
+        const MIN_CORRELATION: f64 = 0.3;
         let of_filtered = median(&self.filtered_mesh.sigma, &mut buffers.sorted);
         let sigma_adu = self.background.median_sigma_adu as f32;
         !INDEPENDENT.contains(&of_filtered)
-            && correlation_of_neighbours(self.view, sigma_adu, &mut buffers.row) > LEAST_CORRELATION
+            && correlation_of_neighbors(self.view, sigma_adu, &mut buffers.row) > MIN_CORRELATION
     }
 
     /// The threshold `u` raised for noise that is coarse or cut off, by the distribution of the
@@ -139,12 +139,12 @@ impl FrameNoise<'_> {
 /// The correlation of the noise of pixels that are next to each other in a row, less that of
 /// pixels three columns apart, which a structured background has as well: from the mean absolute
 /// differences, in a sample of rows. `sigma` is the noise.
-fn correlation_of_neighbours(view: &View<'_>, sigma: f32, row: &mut Vec<f32>) -> f64 {
+fn correlation_of_neighbors(view: &View<'_>, sigma: f32, row: &mut Vec<f32>) -> f64 {
     const SAMPLED_ROWS: usize = 32;
     const FAR_PX: usize = 3;
     /// Larger differences are those of stars and edges.
-    const LARGEST_SIGMAS: f32 = 4.0;
-    let largest = LARGEST_SIGMAS * sigma;
+    const MAX_SIGMAS: f32 = 4.0;
+    let largest = MAX_SIGMAS * sigma;
     let (mut near, mut far) = (0.0, 0.0);
     for y in (0..view.height).step_by((view.height / SAMPLED_ROWS).max(1)) {
         for pixels in view.row(y).as_floats(row).windows(FAR_PX + 1) {

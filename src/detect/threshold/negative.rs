@@ -25,9 +25,9 @@ const SCALE_PER_MPX: f64 = 1000.0;
 const TAIL_PER_MPX: f64 = 50.0;
 /// A threshold is raised by the negative from this much on, in standard deviations: about twice the
 /// error of a threshold that is measured on one part.
-const LEAST_RAISE: f64 = 0.3;
+const MIN_RAISE: f64 = 0.3;
 /// Extrema that are lower than this, in standard deviations, are not kept.
-const LEAST_HEIGHT: f32 = 0.25;
+const MIN_HEIGHT: f32 = 0.25;
 
 /// Local extrema of a filtered frame, by part of the frame.
 #[derive(Debug, Clone, Default)]
@@ -89,7 +89,7 @@ impl Extrema {
             } else {
                 (-above, &mut sides.negative)
             };
-            if height > LEAST_HEIGHT {
+            if height > MIN_HEIGHT {
                 heights.push(height);
             }
         }
@@ -103,7 +103,7 @@ impl Extrema {
             .filter_map(|sides| sides.threshold(per_mpx))
             .collect();
         found.sort_unstable_by(f64::total_cmp);
-        let error = LEAST_RAISE / (self.heights.len() as f64).sqrt();
+        let error = MIN_RAISE / (self.heights.len() as f64).sqrt();
         match found.get(found.len() / 2) {
             Some(&middle) if middle > u + error => middle.min(most).max(u),
             _ => u,
@@ -127,7 +127,7 @@ fn mark_extrema(rows: [&[f32]; 3], marks: &mut Vec<i8>) {
     let marks = &mut marks[1..=inner];
     for x in 0..inner {
         let value = here[x];
-        // Of equal neighbours in a row, the first counts.
+        // Of equal neighbors in a row, the first counts.
         let is_maximum = (value > left[x]) & (value >= right[x]);
         let is_minimum = (value < left[x]) & (value <= right[x]);
         let is_over = (value > a[x]) & (value > b[x]) & (value > c[x]);

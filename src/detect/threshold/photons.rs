@@ -17,7 +17,7 @@ use multiversion::multiversion;
 const CLIP_SIGMA: f32 = 6.0;
 /// Number of pixels that are sampled, about: the standard error of the skewness is then some 0.01.
 const SAMPLES: usize = 75_000;
-/// Noise of neighbours with a higher correlation is not counted photons; faint stars make 0.02.
+/// Noise of neighbors with a higher correlation is not counted photons; faint stars make 0.02.
 const MAX_CORRELATION: f64 = 0.1;
 
 /// The threshold that filtered photon noise, of pixels with this skewness, exceeds as often as
@@ -27,8 +27,8 @@ const MAX_CORRELATION: f64 = 0.1;
 /// Poisson noise of standard deviation 1 and skewness s has `K(t) = (exp(st) − 1 − st)/s²`.
 pub(crate) fn threshold_for_photons(u: f64, skewness: f64, filter: &FilterWeights) -> f64 {
     /// Below this the threshold changes by less than a hundredth of the noise.
-    const LEAST_SKEWNESS: f64 = 1e-3;
-    if skewness <= LEAST_SKEWNESS {
+    const MIN_SKEWNESS: f64 = 1e-3;
+    if skewness <= MIN_SKEWNESS {
         return u;
     }
     let step = CumulantTable::step_for(filter);
@@ -53,11 +53,11 @@ pub(crate) fn threshold_for_photons(u: f64, skewness: f64, filter: &FilterWeight
 }
 
 /// The skewness of the pixels' noise, without that of stars too faint to be detected; `None` for
-/// too few pixels without stars, and where the noise of neighbours is correlated (JPEG,
+/// too few pixels without stars, and where the noise of neighbors is correlated (JPEG,
 /// demosaicing).
 ///
-/// Faint stars skew the pixels, too, but neighbours together. For noise that is independent from
-/// pixel to pixel the cumulant `κ(z, z, z')` of neighbours is 0; for stars it is `ΣP²P'/ΣP³` of
+/// Faint stars skew the pixels, too, but neighbors together. For noise that is independent from
+/// pixel to pixel the cumulant `κ(z, z, z')` of neighbors is 0; for stars it is `ΣP²P'/ΣP³` of
 /// `κ(z, z, z)`.
 pub(crate) fn photon_skewness(
     view: &View<'_>,
@@ -92,16 +92,16 @@ pub(crate) fn photon_skewness(
     let [_, mean, square, cube, product, mixed] = sums.map(|sum| sum / count);
     let variance = square - mean * mean;
     let own = cube - 3.0 * mean * square + 2.0 * mean.powi(3);
-    let of_neighbours = mixed - mean * square - 2.0 * mean * product + 2.0 * mean.powi(3);
-    let skewness = (own - own_per_mixed(spot_px) * of_neighbours) / variance.powf(1.5);
+    let of_neighbors = mixed - mean * square - 2.0 * mean * product + 2.0 * mean.powi(3);
+    let skewness = (own - own_per_mixed(spot_px) * of_neighbors) / variance.powf(1.5);
     let is_independent = product - mean * mean < MAX_CORRELATION * variance;
     (is_independent && skewness.is_finite()).then_some(skewness)
 }
 
-/// The number of pairs of neighbours z, z', and the sums of z, z², z³, zz' and (z²z' + zz'²)/2.
+/// The number of pairs of neighbors z, z', and the sums of z, z², z³, zz' and (z²z' + zz'²)/2.
 const MOMENTS: usize = 6;
 
-/// The moments of the pairs of neighbours in a row; outliers count as background.
+/// The moments of the pairs of neighbors in a row; outliers count as background.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn moments(row: &[f32]) -> [f32; MOMENTS] {
     const LANES: usize = 16;
@@ -182,8 +182,8 @@ mod tests {
     }
 
     #[test]
-    fn stars_skew_neighbours_as_their_own_pixels() {
-        // A spot of one pixel has no neighbours; a wide one has equal ones.
+    fn stars_skew_neighbors_as_their_own_pixels() {
+        // A spot of one pixel has no neighbors; a wide one has equal ones.
         assert!(own_per_mixed(0.2) > 5.0);
         assert!((own_per_mixed(4.0) - 1.0).abs() < 0.05);
         let row: Vec<f32> = (0..33).map(|i| if i == 8 { 2.0 } else { 1.0 }).collect();

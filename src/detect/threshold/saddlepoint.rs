@@ -67,12 +67,12 @@ pub(crate) fn after_clipping(skewness: f64, excess_kurtosis: f64) -> (f64, f64) 
     const MEAN_PER_SKEWNESS: f64 = -0.041;
     const SIGMA_PER_SQUARED_SKEWNESS: f64 = -0.0265;
     /// Below this the series does not hold.
-    const LEAST_CLIPPED_SIGMA: f64 = 0.85;
+    const MIN_CLIPPED_SIGMA: f64 = 0.85;
     let change =
         SIGMA_PER_KURTOSIS * excess_kurtosis + SIGMA_PER_SQUARED_SKEWNESS * skewness.powi(2);
     (
         MEAN_PER_SKEWNESS * skewness,
-        (1.0 + change).max(LEAST_CLIPPED_SIGMA),
+        (1.0 + change).max(MIN_CLIPPED_SIGMA),
     )
 }
 

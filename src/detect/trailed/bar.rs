@@ -26,7 +26,7 @@ const STEP_PX: f64 = 0.25;
 /// … and over the length of long bars.
 const STEP_SHARE: f64 = 1.0 / 400.0;
 /// Error of the place that even bright trails have, in pixels: the motion is not even.
-const LEAST_ERROR_PX: f64 = 0.1;
+const MIN_ERROR_PX: f64 = 0.1;
 
 impl Bar {
     /// The bar of this shape that explains the profile best, among those that cover its middle to
@@ -68,7 +68,7 @@ impl Bar {
         let mean = mean / total;
         let spread = (square / total - mean * mean).max(0.0);
         let [across_px, sigma_across_px] = across(profile, mean, shape);
-        let least2 = LEAST_ERROR_PX * LEAST_ERROR_PX;
+        let least2 = MIN_ERROR_PX * MIN_ERROR_PX;
         Some(Self {
             along_px: mean,
             sigma_along_px: (spread + least2).sqrt(),

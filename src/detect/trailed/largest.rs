@@ -5,7 +5,7 @@ use crate::detect::fit::FrameMaps;
 use arrayvec::ArrayVec;
 
 /// More regions tell no more.
-pub(super) const MOST: usize = 24;
+pub(super) const MAX: usize = 24;
 
 /// A region and its brightest peak.
 #[derive(Debug, Clone, Copy)]
@@ -20,13 +20,13 @@ pub(super) fn largest_regions<'a>(
     maps: &FrameMaps<'_>,
     peaks: &'a [Peak],
     regions: &'a [Region],
-) -> ArrayVec<LargeRegion<'a>, MOST> {
-    let mut largest: ArrayVec<LargeRegion<'a>, MOST> = ArrayVec::new();
+) -> ArrayVec<LargeRegion<'a>, MAX> {
+    let mut largest: ArrayVec<LargeRegion<'a>, MAX> = ArrayVec::new();
     for peak in peaks.iter().filter(|peak| !peak.saturated) {
         let region = &regions[peak.region];
         let rank = largest.partition_point(|other| other.region.area_px >= region.area_px);
         let is_taken = |other: &LargeRegion<'_>| other.peak.region == peak.region;
-        if rank == MOST
+        if rank == MAX
             || largest.iter().any(is_taken)
             || maps.contrast_at(peak).is_sharper_than_any_spot()
         {

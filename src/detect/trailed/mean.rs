@@ -15,7 +15,7 @@ const END_SHARE: f64 = 0.25;
 /// and the pixels before the end that have it, once it is known where that is about.
 const END_PX: f64 = 6.0;
 /// Least and most that the light changes from their middle to the end, over the light there.
-const LEAST_CHANGE: f64 = 0.2;
+const MIN_CHANGE: f64 = 0.2;
 const MAX_CHANGE: f64 = 0.5;
 /// Light farther than this beyond the ends is none, in pixels.
 const MARGIN_PX: f64 = 4.0;
@@ -84,7 +84,7 @@ impl MeanProfile {
     /// The template, of about this length; `None` where the light has no ends.
     fn template(&self, length_px: f64) -> Option<Template> {
         /// Where the light is even, ends are found to within this, in pixels.
-        const LEAST_SIGMA_PX: f64 = 0.06;
+        const MIN_SIGMA_PX: f64 = 0.06;
         let ([sharp_left, left], [sharp_right, right]) =
             (self.end(-1.0, length_px)?, self.end(1.0, length_px)?);
         // How far the middle depends on how ends are told.
@@ -104,7 +104,7 @@ impl MeanProfile {
             light,
             middle: middle + 0.5 * (right - left) - first as f64,
             length_px: left + right,
-            middle_sigma_px: LEAST_SIGMA_PX.hypot(0.5 * moved_px),
+            middle_sigma_px: MIN_SIGMA_PX.hypot(0.5 * moved_px),
         })
     }
 
@@ -125,7 +125,7 @@ impl MeanProfile {
         let before = self.mean(side, sharp - END_PX, sharp - END_PX / 2.0 - 1.0)?;
         let change = near - before;
         let most = MAX_CHANGE * near.abs();
-        let level = if change.abs() > LEAST_CHANGE * near {
+        let level = if change.abs() > MIN_CHANGE * near {
             near + change.clamp(-most, most)
         } else {
             0.5 * (near + before)

@@ -1,7 +1,7 @@
 //! Direction, length and breadth of the trails that a frame's stars are.
 
 use super::bar::Bar;
-use super::largest::{LargeRegion, MOST, largest_regions};
+use super::largest::{LargeRegion, MAX, largest_regions};
 use super::light::Template;
 use super::mean::{for_each_trail, measure_template};
 use super::profile::{Profile, Strip};
@@ -19,9 +19,9 @@ const LONGEST_SHARE: f64 = 0.25;
 /// Least ratio of length and breadth.
 const MIN_ELONGATION: f64 = 3.0;
 /// Fewer regions do not tell the shape of all.
-const FEWEST: usize = 5;
+const MIN: usize = 5;
 /// Least share of the large regions that are trails in one direction.
-const LEAST_SHARE: f64 = 0.6;
+const MIN_SHARE: f64 = 0.6;
 /// Times that each property is improved with the others.
 const ROUNDS: usize = 3;
 /// Cosine of twice the greatest angle between trails in one direction: 8 degrees.
@@ -40,8 +40,8 @@ impl Trails {
     /// satellite's trail that is broken up is one line; other stars are round.
     pub fn measure(maps: &FrameMaps<'_>, peaks: &[Peak], regions: &[Region]) -> Option<Self> {
         let largest = largest_regions(maps, peaks, regions);
-        let long: ArrayVec<_, MOST> = largest.iter().filter(|large| is_long(large)).collect();
-        let fewest = FEWEST.max((LEAST_SHARE * largest.len() as f64).ceil() as usize);
+        let long: ArrayVec<_, MAX> = largest.iter().filter(|large| is_long(large)).collect();
+        let fewest = MIN.max((MIN_SHARE * largest.len() as f64).ceil() as usize);
         if long.len() < fewest {
             return None;
         }
@@ -50,12 +50,12 @@ impl Trails {
             let [cos, sin] = doubled_direction(large.region);
             cos * doubled[0] + sin * doubled[1] > ALIGNED
         };
-        let aligned: ArrayVec<&LargeRegion<'_>, MOST> =
+        let aligned: ArrayVec<&LargeRegion<'_>, MAX> =
             long.iter().filter(is_aligned).copied().collect();
         // Twice the direction's angle is that of the ellipticity.
         let half_angle = 0.5 * doubled[1].atan2(doubled[0]);
         let direction = [half_angle.cos(), half_angle.sin()];
-        if aligned.len() < fewest || lines(&aligned, direction) < FEWEST.max(aligned.len() / 2) {
+        if aligned.len() < fewest || lines(&aligned, direction) < MIN.max(aligned.len() / 2) {
             return None;
         }
         let lengths = aligned.iter().map(|large| length_px(large.region));
@@ -159,7 +159,7 @@ fn turned(shape: Shape, angle: f64) -> Shape {
 /// By what angle the trails in the regions are turned from the shape, in radians: the median of the
 /// slopes of their light.
 fn median_slope(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: &Shape) -> f64 {
-    let mut slopes: ArrayVec<f64, MOST> = ArrayVec::new();
+    let mut slopes: ArrayVec<f64, MAX> = ArrayVec::new();
     for_each_trail(maps, regions, (shape, None), |profile, _| {
         slopes.push(profile.slope(0.5 * shape.length_px));
     });
@@ -169,7 +169,7 @@ fn median_slope(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: &Shap
 
 /// The median of values of the regions; of an even number the upper one in the middle.
 fn middle_of(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: ArrayVec<f64, MOST> = values.collect();
+    let mut values: ArrayVec<f64, MAX> = values.collect();
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
 }
@@ -179,7 +179,7 @@ fn lines(regions: &[&LargeRegion<'_>], [cos, sin]: [f64; 2]) -> usize {
     let across = regions
         .iter()
         .map(|large| large.region.y * cos - large.region.x * sin);
-    let mut across: ArrayVec<f64, MOST> = across.collect();
+    let mut across: ArrayVec<f64, MAX> = across.collect();
     across.sort_unstable_by(f64::total_cmp);
     let breadth_px = middle_of(regions.iter().map(|large| large.region.minor_px));
     let apart_px = 3.0 * breadth_px.unwrap_or(0.0);

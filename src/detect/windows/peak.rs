@@ -191,7 +191,7 @@ fn filter_radius(spot_px: f64) -> usize {
     ((1.5 * spot_px + 0.5).ceil() as usize).clamp(1, MAX_TAPS - 1)
 }
 
-/// Whether a pixel is higher than its eight neighbours; of equal ones the first is.
+/// Whether a pixel is higher than its eight neighbors; of equal ones the first is.
 fn is_peak(filtered: &[f32], stride: usize, [x, y]: [usize; 2]) -> bool {
     let at = y * stride + x;
     let value = filtered[at];

@@ -12,7 +12,7 @@
 //!   viewers draw it and as Siril and PixInsight read it.
 //! - Saturation level: SATURATE; else DATAMAX where it is the full scale of 8 to 32 bits, or 1, as
 //!   many programs write the highest value of the image there.
-//! - Filters of a colour camera: BAYERPAT or COLORTYP, `RGGB` and the like, for the first row of the
+//! - Filters of a color camera: BAYERPAT or COLORTYP, `RGGB` and the like, for the first row of the
 //!   picture, and shifted by XBAYROFF columns and YBAYROFF rows.
 //! - Zenith distance: CENTALT or OBJCTALT, the altitude in degrees.
 //!

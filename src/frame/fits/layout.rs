@@ -1,11 +1,11 @@
-//! Which axes of a header-data unit are columns, rows, colours and planes.
+//! Which axes of a header-data unit are columns, rows, colors and planes.
 //!
 //! Axes of length 1 are skipped. Of three axes that remain, the only one of length 3 or 4 is that of
-//! the colours, wherever it stands: NAXIS3 (plane by plane), NAXIS1 (pixel by pixel, as arrays of
+//! the colors, wherever it stands: NAXIS3 (plane by plane), NAXIS1 (pixel by pixel, as arrays of
 //! pictures are saved) or NAXIS2. All other axes after the second count planes.
 
-/// Number of colour channels, with and without a fourth that is not used.
-const COLOURS: [usize; 2] = [3, 4];
+/// Number of color channels, with and without a fourth that is not used.
+const COLORS: [usize; 2] = [3, 4];
 
 /// The axes of one image, or of several planes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,12 +14,12 @@ pub(super) struct Layout {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// 1, or 3 or 4 for colour.
+    /// 1, or 3 or 4 for color.
     pub channels: usize,
     /// Number of images, of which one is to be chosen. Three planes are one image of three channels;
     /// four are one image if none of them is chosen.
     pub pages: usize,
-    /// Distance in the data between neighbouring columns, rows and channels.
+    /// Distance in the data between neighboring columns, rows and channels.
     strides: [usize; 3],
 }
 
@@ -31,24 +31,24 @@ impl Layout {
         }
         let long: Vec<usize> = axes.iter().copied().filter(|axis| *axis > 1).collect();
         let used = if long.len() < 2 { axes } else { &long };
-        let of_colours = |axis: &usize| COLOURS.contains(axis);
-        let only_one = used.iter().filter(|axis| of_colours(axis)).count() == 1;
+        let of_colors = |axis: &usize| COLORS.contains(axis);
+        let only_one = used.iter().filter(|axis| of_colors(axis)).count() == 1;
         Some(match *used {
-            [channels, width, height] if only_one && of_colours(&channels) => Self {
+            [channels, width, height] if only_one && of_colors(&channels) => Self {
                 width,
                 height,
                 channels,
                 pages: 1,
                 strides: [channels, width.saturating_mul(channels), 1],
             },
-            [width, channels, height] if only_one && of_colours(&channels) => Self {
+            [width, channels, height] if only_one && of_colors(&channels) => Self {
                 width,
                 height,
                 channels,
                 pages: 1,
                 strides: [1, width.saturating_mul(channels), width],
             },
-            [width, height, channels] if of_colours(&channels) => Self {
+            [width, height, channels] if of_colors(&channels) => Self {
                 channels,
                 pages: if channels == 3 { 1 } else { channels },
                 ..Self::planes(width, height, 1)
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn axes_of_one_are_skipped_and_colours_are_found_on_any_axis() {
+    fn axes_of_one_are_skipped_and_colors_are_found_on_any_axis() {
         for (axes, expected) in [
             (&[8, 6][..], (8, 6, 1, 1)),
             (&[8, 6, 1, 1], (8, 6, 1, 1)),
@@ -125,7 +125,7 @@ mod tests {
             (&[4, 8, 6], (8, 6, 4, 1)),
             (&[8, 3, 6], (8, 6, 3, 1)),
             (&[1, 3, 8, 6], (8, 6, 3, 1)),
-            // Two axes may be that of the colours: it is the last, as in most files.
+            // Two axes may be that of the colors: it is the last, as in most files.
             (&[3, 8, 3], (3, 8, 3, 1)),
             (&[8, 6, 5], (8, 6, 1, 5)),
             (&[8, 6, 2], (8, 6, 1, 2)),

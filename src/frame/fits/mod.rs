@@ -1,5 +1,5 @@
 //! FITS: images of any BITPIX in the primary header-data unit or an extension, in one plane or in
-//! colour, whichever axis the colours are on ([`layout`]). Of several images the largest is read if
+//! color, whichever axis the colors are on ([`layout`]). Of several images the largest is read if
 //! none is chosen ([`choice`]).
 //!
 //! Levels are BZERO + BSCALE × stored value. Integers that BZERO turns into unsigned ones (32768,

@@ -329,14 +329,14 @@ fn a_cube_is_refused_unless_a_plane_is_chosen() {
 }
 
 #[test]
-fn colours_are_read_from_any_axis() {
+fn colors_are_read_from_any_axis() {
     const SIZE: usize = 5 * 6;
     let (red, green, blue) = (100.0, 50.0, 20.0);
     let expected = 0.299 * red + 0.587 * green + 0.114 * blue;
     let [r, g, b, a] = [red as u8, green as u8, blue as u8, 255];
-    let planes = |colours: &[u8]| -> Vec<u8> { colours.iter().flat_map(|&c| [c; SIZE]).collect() };
-    let rows = |colours: &[u8]| -> Vec<u8> {
-        let row: Vec<u8> = colours.iter().flat_map(|&c| [c; 5]).collect();
+    let planes = |colors: &[u8]| -> Vec<u8> { colors.iter().flat_map(|&c| [c; SIZE]).collect() };
+    let rows = |colors: &[u8]| -> Vec<u8> {
+        let row: Vec<u8> = colors.iter().flat_map(|&c| [c; 5]).collect();
         row.repeat(6)
     };
     for (axes, data, assumed) in [

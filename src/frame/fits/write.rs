@@ -129,8 +129,8 @@ fn mandatory(frame: &Frame, samples: FitsSamples) -> FitsHeader {
 }
 
 fn check_levels(frame: &Frame) -> Result<(), FitsWriteError> {
-    const LARGEST: f32 = u16::MAX as f32;
-    let fits = |&pixel: &f32| (0.0..=LARGEST).contains(&pixel) && pixel.fract() == 0.0;
+    const MAX: f32 = u16::MAX as f32;
+    let fits = |&pixel: &f32| (0.0..=MAX).contains(&pixel) && pixel.fract() == 0.0;
     match frame.values().iter().position(|pixel| !fits(pixel)) {
         None => Ok(()),
         Some(at) => Err(FitsWriteError::NoLevel {

@@ -15,15 +15,15 @@ const PATCH_PX: usize = 32;
 /// Squares of 2 × 2 pixels along an axis for a first look, which costs a grey frame hardly any time.
 const FIRST_SQUARES: usize = 64;
 /// Most patches along an axis.
-const MOST_PATCHES: usize = 48;
+const MAX_PATCHES: usize = 48;
 /// Fewer patches prove nothing.
-const FEWEST_PATCHES: usize = 9;
+const MIN_PATCHES: usize = 9;
 /// A contrast below this many standard errors is chance.
 const SIGNIFICANT_SIGMA: f64 = 6.0;
 /// Smaller contrasts of levels, in standard deviations of a pixel, do no harm.
-const LEAST_LEVELS: f64 = 0.1;
+const MIN_LEVELS: f64 = 0.1;
 /// Those of a frame whose header states a mosaic.
-const LEAST_OF_STATED: f64 = 0.02;
+const MIN_OF_STATED: f64 = 0.02;
 /// Two filters are alike where their levels differ by less than this share of the contrast.
 const ALIKE: f64 = 0.25;
 
@@ -31,7 +31,7 @@ const ALIKE: f64 = 0.25;
 /// where its header states a pattern.
 pub(super) fn green_diagonal(frame: &Frame, stated: Option<BayerPattern>) -> Option<Diagonal> {
     if let Some(pattern) = stated {
-        let found = Contrasts::of(frame, MOST_PATCHES)?;
+        let found = Contrasts::of(frame, MAX_PATCHES)?;
         return found
             .is_any()
             .then(|| found.alike().unwrap_or(pattern.green()));
@@ -39,7 +39,7 @@ pub(super) fn green_diagonal(frame: &Frame, stated: Option<BayerPattern>) -> Opt
     if !may_be_mosaic(frame) {
         return None;
     }
-    let found = Contrasts::of(frame, MOST_PATCHES)?;
+    let found = Contrasts::of(frame, MAX_PATCHES)?;
     found.is_by_light().then(|| found.green()).flatten()
 }
 
@@ -59,7 +59,7 @@ fn may_be_mosaic(frame: &Frame) -> bool {
         .collect();
     // Both the contrast and its noise are twice those of one pixel.
     let found = background_of(&mut contrasts, frame.step_adu.into());
-    found.is_some_and(|(mean, variance)| mean.abs() > LEAST_LEVELS * variance.sqrt())
+    found.is_some_and(|(mean, variance)| mean.abs() > MIN_LEVELS * variance.sqrt())
 }
 
 /// How the interleaved backgrounds of a frame differ.
@@ -77,7 +77,7 @@ impl Contrasts {
     /// Those of `frame`, in up to `most` patches along each axis.
     fn of(frame: &Frame, most: usize) -> Option<Self> {
         let patches = patches_of(frame, most);
-        if patches.len() < FEWEST_PATCHES {
+        if patches.len() < MIN_PATCHES {
             return None;
         }
         let of = |value: fn(&Patch) -> f64, patch_error| {
@@ -93,13 +93,13 @@ impl Contrasts {
 
     /// Whether the diagonals differ at all.
     fn is_any(&self) -> bool {
-        self.levels.exceeds(LEAST_OF_STATED) || self.noise.exceeds(LEAST_OF_STATED)
+        self.levels.exceeds(MIN_OF_STATED) || self.noise.exceeds(MIN_OF_STATED)
     }
 
     /// Whether they differ in the light that passes: where the level is higher there is more noise.
     fn is_by_light(&self) -> bool {
         let has_shot_noise = self.noise.exceeds(0.0) && self.noise.value * self.levels.value > 0.0;
-        self.levels.exceeds(LEAST_LEVELS) && has_shot_noise
+        self.levels.exceeds(MIN_LEVELS) && has_shot_noise
     }
 
     /// The one diagonal whose filters are alike; `None` if both are, or neither.
@@ -230,9 +230,9 @@ fn patch_at(frame: &Frame, (x0, y0): (usize, usize), values: &mut Vec<f64>) -> O
 fn background_of(values: &mut Vec<f64>, step_adu: f64) -> Option<(f64, f64)> {
     /// Pixels farther from the median than this are those of stars, in standard deviations.
     const CLIP_SIGMA: f64 = 3.0;
-    const FEWEST: usize = PATCH_PX * PATCH_PX / 8;
+    const MIN: usize = PATCH_PX * PATCH_PX / 8;
     values.retain(|value| !value.is_nan());
-    if values.len() < FEWEST {
+    if values.len() < MIN {
         return None;
     }
     let center = median(values);

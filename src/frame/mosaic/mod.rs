@@ -1,4 +1,4 @@
-//! Raw frames of colour cameras: each pixel lies under one of the filters of a 2 × 2 mosaic.
+//! Raw frames of color cameras: each pixel lies under one of the filters of a 2 × 2 mosaic.
 //!
 //! raw [`Frame`] → [`Mosaic`], if it is one → a grey frame of the same size ([`Mosaic::grey`]).
 //!
@@ -6,15 +6,15 @@
 //!    drivers of grey cameras write a pattern, too.
 //! 2. `smoothing`: the binomial kernel [1 2 1] ⊗ [1 2 1] / 16 gives every filter a quarter of the
 //!    weight in every pixel, and lies symmetric around it. The background becomes even, light is
-//!    kept, and the places of stars stay where they are, whatever their colours.
+//!    kept, and the places of stars stay where they are, whatever their colors.
 //!
 //! Differs from superpixels, the means of 2 × 2 pixels: there the centre of the light moves with
-//! the colour of a star, by up to 0.1 px towards the filter that lets more of it pass, and spots of
+//! the color of a star, by up to 0.1 px towards the filter that lets more of it pass, and spots of
 //! ordinary cameras become too sharp to be measured.
 //!
 //! # Reference
 //! Alleysson, Süsstrunk & Hérault 2005, IEEE Trans. Image Process. 14, 439,
-//! doi 10.1109/TIP.2004.841200: luminance is the part of low frequencies of a mosaic, colour
+//! doi 10.1109/TIP.2004.841200: luminance is the part of low frequencies of a mosaic, color
 //! that near the highest.
 
 mod evidence;
@@ -43,7 +43,7 @@ impl Mosaic {
     /// Variance that the kernel adds to a spot on each axis, in px².
     pub const ADDED_VARIANCE_PX2: f64 = 0.5;
 
-    /// The mosaic of a raw frame; `None` for a grey frame. Colour that is known to be converted
+    /// The mosaic of a raw frame; `None` for a grey frame. Color that is known to be converted
     /// to luminance is no mosaic.
     pub fn of(frame: &Frame) -> Option<Self> {
         let stated = frame.metadata.bayer_pattern;

@@ -15,13 +15,13 @@ pub(super) fn smoothed(raw: &Frame, saturation_adu: f32) -> Frame<'static> {
     let mut down = vec![0.0; width];
     let row = |y: usize| &values[y * width..][..width];
     for (y, out) in pixels.chunks_exact_mut(width).enumerate() {
-        let [above, below] = neighbours(y, height);
+        let [above, below] = neighbors(y, height);
         let rows = row(above).iter().zip(row(y)).zip(row(below));
         for (sum, ((above, own), below)) in down.iter_mut().zip(rows) {
             *sum = above + 2.0 * own + below;
         }
         for (x, pixel) in out.iter_mut().enumerate() {
-            let [left, right] = neighbours(x, width);
+            let [left, right] = neighbors(x, width);
             *pixel = (down[left] + 2.0 * down[x] + down[right]) / LEVEL_PARTS;
         }
     }
@@ -33,7 +33,7 @@ pub(super) fn smoothed(raw: &Frame, saturation_adu: f32) -> Frame<'static> {
 }
 
 /// The places before and after `at`, along an axis of `side` pixels.
-fn neighbours(at: usize, side: usize) -> [usize; 2] {
+fn neighbors(at: usize, side: usize) -> [usize; 2] {
     let before = if at == 0 { 1 } else { at - 1 };
     let after = if at + 1 == side { side - 2 } else { at + 1 };
     [before, after]

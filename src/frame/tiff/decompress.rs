@@ -114,7 +114,7 @@ impl Layout<'_> {
         })
     }
 
-    /// A complete JPEG file: shared tables, and a marker that says whether colours are YCbCr, which
+    /// A complete JPEG file: shared tables, and a marker that says whether colors are YCbCr, which
     /// is otherwise guessed.
     fn whole_jpeg(&self, stored: &[u8]) -> Option<Vec<u8>> {
         const START_OF_IMAGE: [u8; 2] = [0xff, 0xd8];

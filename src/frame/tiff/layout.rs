@@ -33,7 +33,7 @@ pub(super) mod tag {
 
 const DEPTHS: &str = "unsigned integers of 1 to 32 or 64 bits, signed ones of 8, 16, 32 or 64, or floats of 16, 32 or 64, \
                       the same for all channels";
-const COLOURS: &str = "grey or RGB, with or without alpha, or YCbCr in JPEG";
+const COLORS: &str = "grey or RGB, with or without alpha, or YCbCr in JPEG";
 const COMPRESSIONS: &str =
     "none, LZW, deflate, PackBits, JPEG (1 or 3 samples of 8 bits) or CCITT group 4 (1 bit)";
 const PREDICTORS: &str =
@@ -44,7 +44,7 @@ pub(super) struct Layout<'a> {
     pub width: usize,
     pub height: usize,
     pub depth: Depth,
-    /// Channels that are read: 1 grey, 3 colours.
+    /// Channels that are read: 1 grey, 3 colors.
     pub channels: usize,
     /// Samples of a pixel in one chunk: all of them, or one where each channel has a plane.
     pub chunk_samples: usize,
@@ -131,7 +131,7 @@ impl<'a> Layout<'a> {
         let compression = Compression::of(directory, depth, color)?;
         if color == Color::WhiteIsZero && depth.format == SampleFormat::Signed {
             let found = "signed integers with white at 0".to_owned();
-            return Err(unsupported(found, COLOURS));
+            return Err(unsupported(found, COLORS));
         }
         let predictor = Predictor::of(directory, depth, compression)?;
         let is_planar = match directory.first(tag::PLANAR_CONFIGURATION, 1)? {
@@ -363,15 +363,15 @@ impl Color {
             1 => return Ok(Self::BlackIsZero),
             2 => return Ok(Self::Rgb),
             6 => return Ok(Self::YCbCr),
-            3 => "a palette of colours".to_owned(),
+            3 => "a palette of colors".to_owned(),
             4 => "a mask of transparency".to_owned(),
-            5 => "colours for print (CMYK)".to_owned(),
-            8..=10 => "colours in CIE Lab".to_owned(),
-            32803 => "a raw mosaic of colours (CFA)".to_owned(),
-            34892 => "raw colours (LinearRaw)".to_owned(),
+            5 => "colors for print (CMYK)".to_owned(),
+            8..=10 => "colors in CIE Lab".to_owned(),
+            32803 => "a raw mosaic of colors (CFA)".to_owned(),
+            34892 => "raw colors (LinearRaw)".to_owned(),
             other => format!("PhotometricInterpretation {other}"),
         };
-        Err(unsupported(found, COLOURS))
+        Err(unsupported(found, COLORS))
     }
 
     /// Channels that are read of so many samples of a pixel.
@@ -380,11 +380,11 @@ impl Color {
             (Self::WhiteIsZero | Self::BlackIsZero, 1 | 2) => Ok(1),
             (Self::Rgb, 3..) | (Self::YCbCr, 3) => Ok(3),
             (Self::Rgb | Self::YCbCr, _) => {
-                Err(malformed(format!("{samples} samples of a colour pixel")))
+                Err(malformed(format!("{samples} samples of a color pixel")))
             }
             _ => Err(unsupported(
                 format!("{samples} samples of a grey pixel"),
-                COLOURS,
+                COLORS,
             )),
         }
     }
@@ -416,7 +416,7 @@ impl Compression {
             }
         };
         if color == Color::YCbCr && found != Self::Jpeg {
-            return Err(unsupported("YCbCr that is not in JPEG".to_owned(), COLOURS));
+            return Err(unsupported("YCbCr that is not in JPEG".to_owned(), COLORS));
         }
         Ok(found)
     }

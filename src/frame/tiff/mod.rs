@@ -1,6 +1,6 @@
 //! TIFF: its images, how each is stored, and their samples.
 //!
-//! Grey or colour, with or without alpha; in strips or tiles, interleaved or plane by plane; unsigned
+//! Grey or color, with or without alpha; in strips or tiles, interleaved or plane by plane; unsigned
 //! integers of 1 to 32 or 64 bits, signed ones of 8 to 64, floats of 16 to 64. The layout is known
 //! before anything is decoded: what is not read is refused by its name.
 //!

@@ -362,7 +362,7 @@ fn what_is_not_read_is_named_with_what_is() {
         (grey().with(258, 24).with(339, 3), "floats of 24 bits"),
         (grey().with(339, 6), "samples of type 6"),
         (mixed, "samples of 5, 6, 5 bits"),
-        (grey().with(262, 3), "a palette of colours"),
+        (grey().with(262, 3), "a palette of colors"),
         (grey().with(262, 5), "CMYK"),
         (
             grey().with(262, 6).with(277, 3),

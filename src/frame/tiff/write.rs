@@ -131,9 +131,9 @@ where
 
 /// The fraction nearest to a number above 0.
 fn rational(value: f64) -> Rational {
-    const LARGEST: f64 = 4e9;
+    const MAX: f64 = 4e9;
     let mut d = 1u32;
-    while value * f64::from(d) < LARGEST / 10.0 && d < 1_000_000_000 {
+    while value * f64::from(d) < MAX / 10.0 && d < 1_000_000_000 {
         d *= 10;
     }
     Rational {

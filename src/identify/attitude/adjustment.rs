@@ -30,7 +30,7 @@ pub const POSE_PARAMETERS: usize = 4;
 /// The linear terms of a polynomial.
 pub(super) const LINEAR_TERMS: usize = 2;
 /// Largest step in radians: beyond it the fit has diverged.
-const LARGEST_STEP: f64 = 0.5;
+const MAX_STEP: f64 = 0.5;
 
 /// A least-squares adjustment of `P` parameters that both equations of a star share, and of `K`
 /// monomial coefficients for each axis.
@@ -254,7 +254,7 @@ impl<'a, const P: usize, const K: usize> Adjustment<'a, P, K> {
         let common = reduced.root.solve(&reduced.vector);
         let turn = Vector3::new(common[0], common[1], common[2]);
         let size = turn.norm().max(common[3].abs());
-        if size.is_nan() || size > LARGEST_STEP {
+        if size.is_nan() || size > MAX_STEP {
             return None;
         }
         let of_monomials = [0, 1].map(|axis: usize| {

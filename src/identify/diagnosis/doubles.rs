@@ -8,13 +8,13 @@ const LOOKED_AT: usize = 80;
 /// Tolerance of an offset on each axis, in pixels.
 const TOLERANCE_PX: f64 = 1.5;
 /// Smallest offset, in pixels: close pairs and split stars have smaller ones.
-const LEAST_OFFSET_PX: f64 = 4.0;
+const MIN_OFFSET_PX: f64 = 4.0;
 /// Tolerance of the magnitude difference: both exposures show the stars in the same order.
 const TOLERANCE_MAG: f64 = 0.7;
 /// Fewest pairs with the offset, …
-const FEWEST_PAIRS: usize = 6;
+const MIN_PAIRS: usize = 6;
 /// … as a fraction of the stars. If all stars occur twice it is a half.
-const LEAST_SHARE: f64 = 0.25;
+const MIN_SHARE: f64 = 0.25;
 /// Largest number of pairs with another offset, over that with the best one: regular patterns have
 /// many offsets.
 const SECOND_SHARE: f64 = 0.6;
@@ -47,7 +47,7 @@ pub fn find_unnamed(
 ) -> Option<DoubleImage> {
     let stars = field.brightest(LOOKED_AT);
     let unnamed = stars.iter().filter(|star| !is_named(star)).count();
-    let is_possible = unnamed >= FEWEST_PAIRS && unnamed as f64 >= LEAST_SHARE * stars.len() as f64;
+    let is_possible = unnamed >= MIN_PAIRS && unnamed as f64 >= MIN_SHARE * stars.len() as f64;
     is_possible.then(|| find(field)).flatten()
 }
 
@@ -60,7 +60,7 @@ pub(super) fn find(field: &StarField) -> Option<DoubleImage> {
     let most = (0..offsets.len()).max_by_key(|&i| counts[i])?;
     let count = counts[most];
     let stars = field.stars.len().min(LOOKED_AT);
-    if count < FEWEST_PAIRS || (count as f64) < LEAST_SHARE * stars as f64 {
+    if count < MIN_PAIRS || (count as f64) < MIN_SHARE * stars as f64 {
         return None;
     }
     let second = (0..offsets.len())
@@ -88,7 +88,7 @@ fn offsets(field: &StarField) -> Vec<Offset> {
     for (i, a) in stars.iter().enumerate() {
         for (j, b) in stars.iter().enumerate().skip(i + 1) {
             let [dx, dy] = [b.position.x - a.position.x, b.position.y - a.position.y];
-            if dx.hypot(dy) < LEAST_OFFSET_PX {
+            if dx.hypot(dy) < MIN_OFFSET_PX {
                 continue;
             }
             // Nearly vertical offsets must all point the same way.

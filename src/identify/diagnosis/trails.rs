@@ -11,16 +11,16 @@ const LOOKED_AT: usize = 80;
 const PEAK_SHARE: f32 = 0.25;
 const NOISE_SIGMA: f32 = 4.0;
 /// Largest region of a star, in pixels.
-const LARGEST_PX: usize = 6000;
+const MAX_PX: usize = 6000;
 /// Smallest region with a defined direction, in pixels.
-const SMALLEST_PX: usize = 6;
+const MIN_PX: usize = 6;
 /// Smallest ratio of length to width of a trail, and its smallest length.
 const ELONGATION: f64 = 2.0;
 const SHORTEST_PX: f64 = 6.0;
 /// Fewest trails, …
-const FEWEST: usize = 5;
+const MIN: usize = 5;
 /// … their smallest fraction of the examined sources, …
-const MOST_OF_ALL: f64 = 0.6;
+const MAX_OF_ALL: f64 = 0.6;
 /// … and their smallest alignment: the mean of unit vectors at twice their angles, 1 if all are
 /// parallel.
 const ALIGNMENT: f64 = 0.9;
@@ -42,7 +42,7 @@ impl Bar {
 
 /// Whether most sources are trails in one direction.
 pub(super) fn diagnose(frame: &Frame, detections: &Detections) -> Option<Diagnosis> {
-    if detections.sources.len() < FEWEST {
+    if detections.sources.len() < MIN {
         return None;
     }
     let above = above_background(frame);
@@ -53,7 +53,7 @@ pub(super) fn diagnose(frame: &Frame, detections: &Detections) -> Option<Diagnos
         .collect();
     let trails: Vec<&Bar> = bars.iter().filter(|bar| bar.is_trail()).collect();
     let count = trails.len();
-    if count < FEWEST || (count as f64) < MOST_OF_ALL * areas.len() as f64 {
+    if count < MIN || (count as f64) < MAX_OF_ALL * areas.len() as f64 {
         return None;
     }
     // Opposite angles are the same direction, so the angle is doubled.
@@ -102,7 +102,7 @@ fn areas(frame: &Frame, above: &[f32], detections: &Detections) -> Vec<Vec<usize
         let threshold = (PEAK_SHARE * above[start]).max(NOISE_SIGMA * noise);
         let area = connected(frame, above, start, threshold);
         taken.extend(area.iter().copied());
-        if area.len() >= SMALLEST_PX {
+        if area.len() >= MIN_PX {
             areas.push(area);
         }
     }
@@ -122,22 +122,22 @@ fn brightest_near(frame: &Frame, above: &[f32], source: &Detection) -> Option<us
         .max_by(|&i, &j| above[i].total_cmp(&above[j]))
 }
 
-/// The connected pixels above `threshold` around `start`, up to [`LARGEST_PX`].
+/// The connected pixels above `threshold` around `start`, up to [`MAX_PX`].
 fn connected(frame: &Frame, above: &[f32], start: usize, threshold: f32) -> Vec<usize> {
     let mut seen = HashSet::from([start]);
     let mut area = Vec::new();
     let mut next = vec![start];
     while let Some(i) = next.pop() {
         area.push(i);
-        if area.len() > LARGEST_PX {
+        if area.len() > MAX_PX {
             break;
         }
         let (x, y) = (i % frame.width, i / frame.width);
         for row in y.saturating_sub(1)..=(y + 1).min(frame.height - 1) {
             for column in x.saturating_sub(1)..=(x + 1).min(frame.width - 1) {
-                let neighbour = row * frame.width + column;
-                if above[neighbour] > threshold && seen.insert(neighbour) {
-                    next.push(neighbour);
+                let neighbor = row * frame.width + column;
+                if above[neighbor] > threshold && seen.insert(neighbor) {
+                    next.push(neighbor);
                 }
             }
         }
@@ -147,7 +147,7 @@ fn connected(frame: &Frame, above: &[f32], start: usize, threshold: f32) -> Vec<
 
 /// The bar with the second moments of the region; `None` if it is too large for a star.
 fn bar(area: &[usize], width: usize) -> Option<Bar> {
-    if area.len() > LARGEST_PX {
+    if area.len() > MAX_PX {
         return None;
     }
     let count = area.len() as f64;

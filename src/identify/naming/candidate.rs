@@ -28,7 +28,7 @@ pub struct Candidate {
     pub sigma_px: f64,
     /// The largest distance of a candidate of this observed star, in pixels.
     pub gate_px: f64,
-    /// Probability that a star among such neighbours is measured by this light.
+    /// Probability that a star among such neighbors is measured by this light.
     pub share: f64,
     /// Odds that another star of its blend was seen rather than this one.
     pub rivals: f64,

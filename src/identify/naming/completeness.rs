@@ -13,7 +13,7 @@ use crate::identify::grid::Grid;
 use crate::identify::predict::PredictedStar;
 
 /// A star's probability is never closer to 1 than this: bright stars are lost, too.
-const LEAST_LOST: f64 = 0.1;
+const MIN_LOST: f64 = 0.1;
 /// Pseudo-stars of each step, of which one half is observed.
 const PRIOR_STARS: f64 = 1.0;
 /// Cells along the frame's longer side, scale by scale.
@@ -57,7 +57,7 @@ struct Scale {
 #[inline(always)]
 pub fn odds_of([own, apparent, visibility]: [f64; 3]) -> [f64; 2] {
     let apparent = if apparent > own { apparent } else { own };
-    let [own, apparent] = [own, apparent].map(|share| (share * visibility).min(1.0 - LEAST_LOST));
+    let [own, apparent] = [own, apparent].map(|share| (share * visibility).min(1.0 - MIN_LOST));
     [own / (1.0 - own), apparent / (1.0 - own)]
 }
 
@@ -140,7 +140,7 @@ impl Completeness {
 }
 
 impl Scale {
-    /// Counts the stars in each cell and its neighbours.
+    /// Counts the stars in each cell and its neighbors.
     fn count(
         &mut self,
         grid: &Grid,
@@ -156,7 +156,7 @@ impl Scale {
             self.expected[cell as usize] += share;
         }
         for cells in [&mut self.observed, &mut self.expected] {
-            grid.sum_with_neighbours(cells, scratch);
+            grid.sum_with_neighbors(cells, scratch);
         }
     }
 

@@ -18,12 +18,12 @@ const FAR_SHARE_SATURATED: f64 = 0.2;
 /// Standard deviation of those on each axis, in units of the gate.
 const FAR_SIGMA: f64 = 0.4;
 /// Magnitude: most true pairs have the frame's scatter, some have this many times it (variable
-/// stars, unusual colours, blends).
+/// stars, unusual colors, blends).
 const OUTLIER_SHARE: f64 = 0.1;
 const OUTLIER_SCATTER: f64 = 3.0;
 /// Scatter of the magnitudes before it is measured, and the smallest.
 const FIRST_SCATTER_MAG: f64 = 0.6;
-const LEAST_SCATTER_MAG: f64 = 0.15;
+const MIN_SCATTER_MAG: f64 = 0.15;
 /// Share of saturated stars that are brighter than measured, by up to this many magnitudes.
 const BRIGHTER_SHARE: f64 = 0.5;
 const BRIGHTER_MAG: f64 = 6.0;
@@ -91,7 +91,7 @@ pub struct MagnitudeRelation {
 pub struct MagnitudeDensities {
     /// Of pairs that differ by the frame's scatter.
     pub by_scatter: Lanes,
-    /// Of those that differ by more: variable stars, unusual colours, blends, saturated stars.
+    /// Of those that differ by more: variable stars, unusual colors, blends, saturated stars.
     pub otherwise: Lanes,
 }
 
@@ -202,9 +202,7 @@ impl MagnitudeRelation {
             [weight * (difference * difference).min(limit_sq), weight]
         });
         let sum = PRIOR_STARS * FIRST_SCATTER_MAG.powi(2) + squares;
-        self.scatter_mag = (sum / (PRIOR_STARS + weights))
-            .sqrt()
-            .max(LEAST_SCATTER_MAG);
+        self.scatter_mag = (sum / (PRIOR_STARS + weights)).sqrt().max(MIN_SCATTER_MAG);
     }
 }
 

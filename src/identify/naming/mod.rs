@@ -39,7 +39,7 @@ use super::pairing::Pairing;
 use super::predict::PredictedStar;
 use completeness::Completeness;
 use likelihood::MagnitudeRelation;
-use odds::{Known, pack, set_chances, set_odds};
+use odds::{OddsInputs, pack, set_chances, set_odds};
 use packed::Packed;
 use std::f64::consts::PI;
 use unrelated::Unrelated;
@@ -168,7 +168,7 @@ impl Naming {
         self.unrelated.measure(&self.has_name[..observed]);
         self.find_apparent_shares(stars.field);
         let (shares, visibility) = self.completeness.shares_and_visibility();
-        let known = Known {
+        let known = OddsInputs {
             shares,
             visibility,
             apparent_shares: &self.apparent_shares,

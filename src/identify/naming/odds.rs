@@ -9,7 +9,7 @@ use crate::identify::field::StarField;
 use multiversion::multiversion;
 
 /// What the odds of the candidates depend on.
-pub struct Known<'a> {
+pub struct OddsInputs<'a> {
     /// The share by brightness of each predicted star, and its visibility. Here and below, there is
     /// one more for empty lanes.
     pub shares: &'a [f64],
@@ -73,7 +73,7 @@ fn in_lanes(numbers: [Lanes; 4]) -> Lanes {
 
 /// Sets the odds of the candidates.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub fn set_odds(candidates: &mut [Packed], known: &Known) {
+pub fn set_odds(candidates: &mut [Packed], known: &OddsInputs) {
     for packed in candidates {
         let [mut shares, mut apparent, mut visibility, mut unrelated] = [[0.0; LANES]; 4];
         for (lane, (observed, predicted)) in packed.places().enumerate() {

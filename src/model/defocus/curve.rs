@@ -74,10 +74,10 @@ impl ErrorCurve {
     /// The error at a radius within the range, both in pixels.
     pub fn at(&self, spot_px: f64) -> f64 {
         /// With fewer points in total no parabola is fitted, as it would pass through all of them.
-        const FEWEST_FOR_PARABOLA: usize = 4;
+        const MIN_FOR_PARABOLA: usize = 4;
         let at = spot_px.ln();
         let log_rms = match self.points.len() {
-            0..FEWEST_FOR_PARABOLA => self.joined_at(at),
+            0..MIN_FOR_PARABOLA => self.joined_at(at),
             _ => self.fitted_at(at),
         };
         log_rms.exp()
@@ -116,10 +116,10 @@ impl ErrorCurve {
         /// Smallest half width of the local regression, as a logarithm of the ratio of radii.
         const REACH: f64 = 0.3;
         /// Smallest number of points in a local fit: two more than a parabola needs.
-        const FEWEST: usize = 5;
+        const MIN: usize = 5;
         let distances = self.points.iter().map(|point| (point.log_spot - at).abs());
         let mut distances: Vec<f64> = distances.collect();
-        let last = distances.len().min(FEWEST) - 1;
+        let last = distances.len().min(MIN) - 1;
         let (_, far, _) = distances.select_nth_unstable_by(last, f64::total_cmp);
         // The farthest point itself has no weight.
         (*far * 1.2).max(REACH)
@@ -166,7 +166,7 @@ impl ErrorCurve {
         self.first_within(rms_px, radii.into_iter().rev())
     }
 
-    /// The first of the radii that meets an error, refined between neighbours.
+    /// The first of the radii that meets an error, refined between neighbors.
     fn first_within(&self, rms_px: f64, radii_px: impl Iterator<Item = f64>) -> Option<f64> {
         let mut before = None;
         for radius in radii_px {

@@ -102,14 +102,14 @@ impl EnergyStudy {
         interrupt: &Interrupt,
     ) -> Result<ErrorPoint, MeasureError> {
         /// Largest number of stars along a side of a frame.
-        const MOST_ABREAST: usize = 32;
+        const MAX_ABREAST: usize = 32;
         let mut scenario = self.scenario_of(spot_px, noise_e);
         let mut workspace = Workspace::new();
         let mut squares = Vec::with_capacity(self.trials);
         let mut left = self.trials;
         while left > 0 {
             interrupt.check()?;
-            let abreast = ((left as f64).sqrt().ceil() as usize).min(MOST_ABREAST);
+            let abreast = ((left as f64).sqrt().ceil() as usize).min(MAX_ABREAST);
             let cells = StarCells::new(spot_px, abreast, left.min(abreast * abreast), random);
             (scenario.camera.width_px, scenario.camera.height_px) = (cells.side_px, cells.side_px);
             let stars: Vec<_> = cells.places.iter().map(|p| (*p, self.v_mag)).collect();
@@ -235,8 +235,8 @@ impl StarCells {
         /// Distance between stars, in standard deviations of the spot, and its minimum in pixels.
         /// At this distance they cover a small part of the background and do not overlap.
         const SPACING_SIGMAS: f64 = 20.0;
-        const LEAST_SPACING_PX: f64 = 40.0;
-        let cell_px = (SPACING_SIGMAS * spot_px).max(LEAST_SPACING_PX).ceil() as usize;
+        const MIN_SPACING_PX: f64 = 40.0;
+        let cell_px = (SPACING_SIGMAS * spot_px).max(MIN_SPACING_PX).ceil() as usize;
         let middle = (cell_px / 2) as f64;
         let mut at = |cell: usize| (cell * cell_px) as f64 + middle + random.random::<f64>() - 0.5;
         let places = (0..stars)

@@ -70,12 +70,12 @@ impl ErrorPoint {
     /// Whether enough stars were detected for an unbiased error.
     pub fn is_sound(&self) -> bool {
         /// Minimum number of detected stars.
-        const FEWEST: usize = 10;
+        const MIN: usize = 10;
         /// Minimum detected fraction; below, noise selects the stars.
-        const LEAST_PART: f64 = 0.5;
-        let fewest = self.trials.min(FEWEST);
+        const MIN_PART: f64 = 0.5;
+        let fewest = self.trials.min(MIN);
         self.found >= fewest
-            && self.found as f64 >= LEAST_PART * self.trials as f64
+            && self.found as f64 >= MIN_PART * self.trials as f64
             && self.rms_px > 0.0
     }
 }

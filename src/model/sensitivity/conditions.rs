@@ -95,7 +95,7 @@ pub struct Conditions {
     pub sky: SkyBrightness,
     /// Atmospheric extinction.
     pub extinction: Extinction,
-    /// Colour temperature of the star, in kelvin; used by
+    /// Color temperature of the star, in kelvin; used by
     /// [`Reading::Physical`](super::Reading::Physical) only.
     pub star_temperature_k: f64,
     /// Motion of a star during the exposure, along the rows, in pixels.

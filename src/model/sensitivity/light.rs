@@ -25,7 +25,7 @@ const LUMINANCE_OF_MAG_0_CD_M2: f64 = 10.8e4;
 /// 231, table A2).
 const PHOTONS_OF_MAG_0: f64 = 1005.0 * 1e4 * 10.0;
 const FLUX_NM: f64 = 550.0;
-/// Colour temperature of the night sky, assumed to be sunlight reflected by the Moon.
+/// Color temperature of the night sky, assumed to be sunlight reflected by the Moon.
 pub(super) const SKY_TEMPERATURE_K: f64 = 5800.0;
 
 /// V magnitudes per square arcsecond of a luminance in cd/m².
@@ -50,7 +50,7 @@ pub(super) fn photons_of_mag_0(wavelength_nm: f64, temperature_k: f64) -> f64 {
     PHOTONS_OF_MAG_0 * photons(wavelength_nm) / photons(FLUX_NM)
 }
 
-/// Range of the colours B−V of stars, in magnitudes.
+/// Range of the colors B−V of stars, in magnitudes.
 pub(super) const BV_RANGE_MAG: (f64, f64) = (-0.35, 2.0);
 
 /// Temperature in kelvin of the black body of this B−V, which is clamped to the range of stars.
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sun_is_as_hot_as_its_colour_says_and_no_colour_is_beyond_the_formula() {
+    fn the_sun_is_as_hot_as_its_color_says_and_no_color_is_beyond_the_formula() {
         // Effective temperatures: the Sun (B−V 0.65), Vega (0.00) and a K5 dwarf (1.15).
         for (bv_mag, expected_k, tolerance_k) in [
             (0.65, 5772.0, 60.0),

@@ -10,7 +10,7 @@
 //! 4. Threshold, false alarms and completeness of two detectors: the peak-pixel rule and the
 //!    matched filter of [`detect`](crate::detect::detect) ([`Detector`]).
 //! 5. Expected magnitude of the faintest detected star of a field ([`Faintest`]).
-//! 6. Electrons of stars by colour ([`StarLight`]).
+//! 6. Electrons of stars by color ([`StarLight`]).
 //! 7. Lower bounds of the errors of position and flux ([`CramerRao`]).
 //!
 //! [`Prediction`] is the result for one scenario, [`Sweep`] and [`curves`] vary one parameter, and

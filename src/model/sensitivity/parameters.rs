@@ -54,7 +54,7 @@ pub const CONDITION_KEYS: &[Key<Conditions>] = &[
     key!(
         star_temperature_k,
         Limits::Positive,
-        "colour temperature of the star, in kelvin (physical reading)"
+        "color temperature of the star, in kelvin (physical reading)"
     ),
     key!(
         motion_px,
@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_unique_and_an_unknown_one_meets_its_neighbour() {
+    fn names_are_unique_and_an_unknown_one_meets_its_neighbor() {
         let mut names: Vec<_> = Parameter::all().map(Parameter::name).collect();
         names.sort_unstable();
         let count = names.len();

@@ -1,33 +1,33 @@
-//! Electrons of stars by magnitude and colour.
+//! Electrons of stars by magnitude and color.
 
 use super::light::{BV_RANGE_MAG, temperature_k_of};
 use super::{Budget, Reading, Scenario};
 
-/// Step of the colour table, in magnitudes: linear interpolation is accurate to 10⁻⁵.
+/// Step of the color table, in magnitudes: linear interpolation is accurate to 10⁻⁵.
 const STEP_MAG: f64 = 0.01;
 
-/// Electrons that stars of any colour leave on a detector.
+/// Electrons that stars of any color leave on a detector.
 #[derive(Debug, Clone)]
 pub struct StarLight {
     budget: Budget,
     exposure_s: f64,
-    /// Light of a star of V = 0 at colours in steps of [`STEP_MAG`], relative to that of the
-    /// scenario's star; empty for [`Reading::Paper`], which has no colours.
+    /// Light of a star of V = 0 at colors in steps of [`STEP_MAG`], relative to that of the
+    /// scenario's star; empty for [`Reading::Paper`], which has no colors.
     relative: Vec<f64>,
 }
 
 impl StarLight {
     /// The light of stars in a scenario that passes [`Scenario::check`]. Only [`Reading::Physical`]
-    /// distinguishes colours.
+    /// distinguishes colors.
     pub fn new(scenario: &Scenario) -> Self {
         let budget = Budget::new(scenario);
         let (bluest, reddest) = BV_RANGE_MAG;
         let steps = ((reddest - bluest) / STEP_MAG).ceil() as usize;
-        let mut coloured = scenario.clone();
+        let mut colored = scenario.clone();
         let mut relative_at = |step: usize| {
             let bv_mag = bluest + STEP_MAG * step as f64;
-            coloured.conditions.star_temperature_k = temperature_k_of(bv_mag);
-            Budget::new(&coloured).mag_0_e_s / budget.mag_0_e_s
+            colored.conditions.star_temperature_k = temperature_k_of(bv_mag);
+            Budget::new(&colored).mag_0_e_s / budget.mag_0_e_s
         };
         let relative = match scenario.reading {
             Reading::Paper => Vec::new(),
@@ -80,7 +80,7 @@ mod tests {
     use crate::camera::data_sheet::Preset;
 
     #[test]
-    fn a_star_of_each_colour_has_the_light_of_its_temperature() {
+    fn a_star_of_each_color_has_the_light_of_its_temperature() {
         let mut scenario = Scenario::of(Preset::NanosatTracker);
         let light = StarLight::new(&scenario);
         for bv_mag in [-0.35, -0.113, 0.0, 0.31, 0.777, 1.5, 1.999, 2.0] {
@@ -93,7 +93,7 @@ mod tests {
                 "{bv_mag}: {found} {expected}"
             );
         }
-        // Colours beyond the range are clamped.
+        // Colors beyond the range are clamped.
         assert_eq!(
             light.electrons(5.0, Some(9.0)),
             light.electrons(5.0, Some(2.0))
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_colour_or_in_the_papers_reading_it_is_the_budgets() {
+    fn without_a_color_or_in_the_papers_reading_it_is_the_budgets() {
         let scenario = Scenario::of(Preset::NanosatTracker);
         let light = StarLight::new(&scenario);
         let budget = Budget::new(&scenario);

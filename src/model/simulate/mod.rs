@@ -5,7 +5,7 @@
 //!
 //! 1. The position of each star on the detector at the date, through the lens with its distortion;
 //!    its expected electrons by the sensitivity model
-//!    ([`StarLight`](crate::model::sensitivity::StarLight): magnitude and colour), reduced by
+//!    ([`StarLight`](crate::model::sensitivity::StarLight): magnitude and color), reduced by
 //!    clouds and vignetting.
 //! 2. The sky in each pixel: uniform, with a gradient, moonlight, clouds.
 //! 3. The spot of each star, integrated over pixels, along its path while the camera turns;
@@ -23,7 +23,7 @@
 
 mod aberrations;
 mod camera;
-mod colour_camera;
+mod color_camera;
 mod equivalent_spot;
 mod image;
 mod motion;
@@ -42,7 +42,7 @@ mod truth;
 mod truth_table;
 
 pub use camera::{Pointing, camera_of};
-pub(crate) use colour_camera::{colour, decoded_jpeg, demosaiced};
+pub(crate) use color_camera::{color, decoded_jpeg, demosaiced};
 pub use scene::{SCENE_KEYS, Scene};
 pub use setup::{Setup, SetupParameter};
 pub use simulator::{Simulator, star_field};

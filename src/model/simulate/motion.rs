@@ -61,9 +61,9 @@ impl<'a> Motion<'a> {
         ];
         /// Paths shorter than this, in standard deviations, are ignored: they change no pixel by
         /// 10⁻⁷ of the light.
-        const LEAST_SIGMAS: f64 = 1e-3;
+        const MIN_SIGMAS: f64 = 1e-3;
         let length_px = self.length_px(middle);
-        if length_px < LEAST_SIGMAS * sigma_px {
+        if length_px < MIN_SIGMAS * sigma_px {
             return put(middle, 1.0);
         }
         let parts = (length_px / (PART_SIGMAS * sigma_px)).ceil().max(1.0);

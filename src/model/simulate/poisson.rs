@@ -6,7 +6,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 /// Largest mean that is tabulated, in electrons.
-const LARGEST_TABLE_E: f64 = 1e6;
+const MAX_TABLE_E: f64 = 1e6;
 /// Number of guide entries into the table: equal parts of the interval from 0 to 1.
 const GUIDES: usize = 1 << 10;
 
@@ -82,7 +82,7 @@ pub(super) struct PoissonTable {
 impl PoissonTable {
     /// The table; none for a mean of 0 or one that is too large.
     pub(super) fn new(mean: f64) -> Option<Self> {
-        if !(mean > 0.0 && mean < LARGEST_TABLE_E) {
+        if !(mean > 0.0 && mean < MAX_TABLE_E) {
             return None;
         }
         // Probabilities beyond are below the resolution of a random number.

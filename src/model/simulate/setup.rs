@@ -68,12 +68,12 @@ impl Setup {
     fn folded_image(&self) -> Option<String> {
         /// Largest gradient of the distortion, in pixels per pixel. At 1 the image folds; up to
         /// this value the mapping can be inverted in a few steps.
-        const MOST_STEEPNESS: f64 = 0.6;
+        const MAX_STEEPNESS: f64 = 0.6;
         let terms_px = self.scenario.camera.imperfections.lens_terms_px();
         let [third, fifth, seventh, x, y, tilt_x, tilt_y] = terms_px;
         let radial_px = 3.0 * third.abs() + 5.0 * fifth.abs() + 7.0 * seventh.abs();
         let found_px = radial_px + 2.0 * (x.hypot(y) + tilt_x.hypot(tilt_y));
-        let most_px = MOST_STEEPNESS * camera_of(&self.scenario.camera).radius_px();
+        let most_px = MAX_STEEPNESS * camera_of(&self.scenario.camera).radius_px();
         (found_px > most_px).then(|| {
             format!(
                 "the image folds: 3, 5 and 7 times the radial distortion of these orders, and twice the decentring and the tilt, \
@@ -85,31 +85,31 @@ impl Setup {
     fn far_turn(&self) -> Option<String> {
         /// Largest turn of the camera or a satellite during an exposure, in degrees: a longer trail
         /// is no longer realistic.
-        const MOST_TURN_DEG: f64 = 90.0;
+        const MAX_TURN_DEG: f64 = 90.0;
         let exposure_s = self.scenario.conditions.exposure_s;
         let camera_deg = self.scene.largest_rate_deg_s() * exposure_s;
         let trail_deg = self.scene.trail_rate_deg_s * exposure_s;
         let has_trails = self.scene.trails > 0.0;
         let fault = |what: &str, found_deg: f64| {
             format!(
-                "{what} turns by up to {found_deg}° during the exposure of {exposure_s} s, expected at most {MOST_TURN_DEG}°"
+                "{what} turns by up to {found_deg}° during the exposure of {exposure_s} s, expected at most {MAX_TURN_DEG}°"
             )
         };
-        if camera_deg > MOST_TURN_DEG {
+        if camera_deg > MAX_TURN_DEG {
             return Some(fault("the camera", camera_deg));
         }
-        (has_trails && trail_deg > MOST_TURN_DEG).then(|| fault("a satellite", trail_deg))
+        (has_trails && trail_deg > MAX_TURN_DEG).then(|| fault("a satellite", trail_deg))
     }
 
     fn many_rays(&self) -> Option<String> {
         /// Largest mean number of cosmic rays on a frame.
-        const MOST_COSMIC_RAYS: f64 = 1e6;
+        const MAX_COSMIC_RAYS: f64 = 1e6;
         let Scenario {
             camera, conditions, ..
         } = &self.scenario;
         let mean = mean_cosmic_rays(&self.scene, camera, conditions.exposure_s);
-        (mean > MOST_COSMIC_RAYS).then(|| {
-            format!("cosmic_rays_cm2_s leaves {mean} cosmic rays on a frame, expected at most {MOST_COSMIC_RAYS}")
+        (mean > MAX_COSMIC_RAYS).then(|| {
+            format!("cosmic_rays_cm2_s leaves {mean} cosmic rays on a frame, expected at most {MAX_COSMIC_RAYS}")
         })
     }
 }

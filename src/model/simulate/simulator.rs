@@ -1,7 +1,7 @@
 //! Simulates frames of one camera, sky and scene.
 
 use super::camera::{Pointing, camera_of};
-use super::colour_camera::ColourCamera;
+use super::color_camera::ColorCamera;
 use super::equivalent_spot::make_gaussian;
 use super::image::ElectronImage;
 use super::motion::Motion;
@@ -284,7 +284,7 @@ impl<'a> Simulator<'a> {
         let level_adu =
             sheet.bias_adu + (budget.background_e + budget.dark_e) / sheet.gain_e_per_adu;
         let noise_adu = budget.background_noise_e / sheet.gain_e_per_adu;
-        match ColourCamera::of(&sheet.imperfections, (level_adu, noise_adu), white_adu) {
+        match ColorCamera::of(&sheet.imperfections, (level_adu, noise_adu), white_adu) {
             Some(camera) => camera.record(&frame),
             None => Ok(frame),
         }

@@ -49,9 +49,9 @@ pub struct FrameMeasurement<'a> {
     pub header_zenith_distance_deg: Option<f64>,
     /// V magnitude of a star that gives 1 ADU/s.
     pub zero_point_vmag: Option<Estimate>,
-    /// The colours of the stars of the zero point.
+    /// The colors of the stars of the zero point.
     pub zero_point_colors: &'a [WeightedColor],
-    /// Whether the zero point has a colour term and holds for
+    /// Whether the zero point has a color term and holds for
     /// [`REFERENCE_BV_MAG`](crate::photometry::zero_point::REFERENCE_BV_MAG), instead of for the
     /// mean of its stars.
     pub has_color_term: bool,

@@ -10,7 +10,7 @@
 //! 4. Differences that noise does not explain are reported as [`Contradiction`]s.
 //!
 //! Caveats: limits are those of stars of 5800 K, B−V 0.64; the predicted zero point is that of
-//! stars of the same colour as the measured one. A sky spectrum other than moonlight shifts the
+//! stars of the same color as the measured one. A sky spectrum other than moonlight shifts the
 //! predicted limit by less than its own error. A wrong bias shows as noise that does not fit.
 
 mod contradiction;
@@ -39,7 +39,7 @@ pub struct Comparison {
     /// V magnitude at which the brightest pixel of half of the stars reaches the required
     /// signal-to-noise ratio.
     pub peak_limit_vmag: f64,
-    /// V magnitude at which this detector finds half of the stars of the colour for which the fitted
+    /// V magnitude at which this detector finds half of the stars of the color for which the fitted
     /// limit holds.
     pub limit_vmag: f64,
     /// V magnitude at which it finds 90 % of the stars.
@@ -50,7 +50,7 @@ pub struct Comparison {
     pub sky_camera_mag_arcsec2: Option<f64>,
     /// The same with the measured zero point, and its standard error.
     pub sky_mag_arcsec2: Option<Estimate>,
-    /// Predicted V magnitude of a star that gives 1 ADU/s, of the colour for which the measured
+    /// Predicted V magnitude of a star that gives 1 ADU/s, of the color for which the measured
     /// zero point holds.
     pub zero_point_vmag: f64,
     /// Measured minus predicted zero point; above 0 the camera is more sensitive than stated.
@@ -213,7 +213,7 @@ pub fn expected_zero_point_vmag(
 }
 
 /// By how much fainter stars are as bright as one of the scenario's temperature, according to the
-/// fit of the zero point: at a colour on the line through the colours of its stars, or on their
+/// fit of the zero point: at a color on the line through the colors of its stars, or on their
 /// average.
 pub fn fitted_color_effect_mag(
     light: &StarLight,

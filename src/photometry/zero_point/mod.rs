@@ -6,19 +6,19 @@
 //! V = ZP + m + k (B−V − 0.6) − a ρ² − b ρ⁴ + s (V − V̄)
 //! ```
 //!
-//! 1. The variance of a star is that of its flux, plus a scatter (catalogue, colour, pixels) that
+//! 1. The variance of a star is that of its flux, plus a scatter (catalogue, color, pixels) that
 //!    is estimated from the residuals.
 //! 2. Outliers, mostly unresolved companions and variables on one side, are down-weighted with
 //!    Tukey's biweight, to zero from 4.7 standard deviations on.
-//! 3. The terms k (colour), a and b (vignetting; ρ is the distance from the frame's centre, 1 in
+//! 3. The terms k (color), a and b (vignetting; ρ is the distance from the frame's centre, 1 in
 //!    the corner) and s (grey levels not proportional to light) are used only where they are
 //!    significant.
 //!
-//! With the colour term, the zero point is that of a star of B−V = 0.6; without it, that of the
+//! With the color term, the zero point is that of a star of B−V = 0.6; without it, that of the
 //! mean star, whose B−V is given. With vignetting, it is that of the frame's centre. With s, it
 //! holds only for stars of the mean magnitude V̄; one magnitude in V is then 1 − s instrumental ones.
 //!
-//! The stars must be chosen by V and not by flux, which would prefer stars that noise or colour
+//! The stars must be chosen by V and not by flux, which would prefer stars that noise or color
 //! makes brighter.
 
 mod relation;
@@ -29,7 +29,7 @@ pub use standard::{MIN_STARS, REFERENCE_BV_MAG, StandardStar, WeightedColor, Zer
 
 use relation::{Relation, Term};
 
-/// A colour term is tried where at least this share of the stars has a colour.
+/// A color term is tried where at least this share of the stars has a color.
 const MIN_COLORED_SHARE: f64 = 0.5;
 
 /// Measures the zero point of `stars`; `None` if they are too few.
@@ -64,7 +64,7 @@ pub fn measure(stars: &[StandardStar]) -> Option<ZeroPoint> {
     }
 }
 
-/// `relation` with a slope. Faint stars have other colours than bright ones, so that a colour term
+/// `relation` with a slope. Faint stars have other colors than bright ones, so that a color term
 /// that is bent would look like a slope.
 fn slope(stars: &[StandardStar], relation: &Relation) -> Option<Relation> {
     let further: &[Term] = match relation.has(Term::Color) {

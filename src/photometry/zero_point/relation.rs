@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 /// Minimum number of stars for further terms: this, and so many for each of them.
 const MIN_STARS_FOR_TERMS: usize = 15;
 const MIN_STARS_PER_TERM: usize = 10;
-/// Significance of colour terms, as a normal deviate: one frame in a hundred by chance. A spurious
+/// Significance of color terms, as a normal deviate: one frame in a hundred by chance. A spurious
 /// term costs little precision; a missing one makes zero points of frames with other stars differ.
 const COLOR_SIGMAS: f64 = 2.575_8;
 /// Significance of vignetting, which every lens has: one frame in forty by chance, as it has only
@@ -168,7 +168,7 @@ impl Relation {
         }
     }
 
-    /// The colours of `stars`, where known.
+    /// The colors of `stars`, where known.
     fn colors(&self, stars: &[StandardStar]) -> Vec<WeightedColor> {
         let colors = stars
             .iter()

@@ -2,7 +2,7 @@
 
 use crate::base::statistics::Estimate;
 
-/// Reference B−V of the zero point where there is a colour term: about that of the Sun and of many
+/// Reference B−V of the zero point where there is a color term: about that of the Sun and of many
 /// field stars.
 pub const REFERENCE_BV_MAG: f64 = 0.6;
 /// Minimum number of stars for a zero point.
@@ -35,7 +35,7 @@ pub struct ZeroPoint {
     pub stars: usize,
     /// The B−V for which it holds; `None` where no star has one.
     pub bv_mag: Option<f64>,
-    /// The colours of its stars, where known.
+    /// The colors of its stars, where known.
     pub colors: Vec<WeightedColor>,
     /// k, in magnitudes per magnitude of B−V, where it is significant.
     pub color_term: Option<Estimate>,
@@ -51,7 +51,7 @@ pub struct ZeroPoint {
     pub is_nonlinear: bool,
 }
 
-/// The colour of a star of the zero point.
+/// The color of a star of the zero point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedColor {
     /// B−V.

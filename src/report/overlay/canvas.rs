@@ -13,7 +13,7 @@ pub static FONT: &[u8] = include_bytes!("../../../assets/DejaVuSans-subset.ttf")
 const HALO: f32 = 3.0;
 const HALO_OPACITY: u8 = 200;
 /// Background of the strip below the frame.
-const BACKDROP: Colour = Colour([16, 18, 24]);
+const BACKDROP: Color = Color([16, 18, 24]);
 
 fn face() -> &'static Face<'static> {
     static FACE: OnceLock<Face> = OnceLock::new();
@@ -22,9 +22,9 @@ fn face() -> &'static Face<'static> {
 
 /// Red, green and blue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Colour(pub(super) [u8; 3]);
+pub(super) struct Color(pub(super) [u8; 3]);
 
-impl Colour {
+impl Color {
     pub(super) const WHITE: Self = Self([240, 240, 240]);
     pub(super) const DIM: Self = Self([175, 180, 190]);
 
@@ -71,14 +71,14 @@ impl Canvas {
     }
 
     /// Draws a circle; `radius` in pixels.
-    pub(super) fn ring(&mut self, [x, y]: [f32; 2], radius: f32, stroke: f32, colour: Colour) {
+    pub(super) fn ring(&mut self, [x, y]: [f32; 2], radius: f32, stroke: f32, color: Color) {
         if let Some(path) = PathBuilder::from_circle(x, y, radius) {
-            self.stroke(&path, stroke * self.unit, colour, 255);
+            self.stroke(&path, stroke * self.unit, color, 255);
         }
     }
 
     /// Draws a line through `points`.
-    pub(super) fn line(&mut self, points: &[[f32; 2]], stroke: f32, colour: Colour) {
+    pub(super) fn line(&mut self, points: &[[f32; 2]], stroke: f32, color: Color) {
         let mut builder = PathBuilder::new();
         for (i, [x, y]) in points.iter().enumerate() {
             if i == 0 {
@@ -88,19 +88,19 @@ impl Canvas {
             }
         }
         if let Some(path) = builder.finish() {
-            self.stroke(&path, stroke * self.unit, colour, 255);
+            self.stroke(&path, stroke * self.unit, color, 255);
         }
     }
 
     /// Draws `text` with a dark border, its baseline beginning at `at`; `size` in units.
-    pub(super) fn text(&mut self, text: &str, at: [f32; 2], size: f32, colour: Colour) {
+    pub(super) fn text(&mut self, text: &str, at: [f32; 2], size: f32, color: Color) {
         let Some(path) = outline(text, at, size * self.unit) else {
             return;
         };
-        self.stroke(&path, HALO * self.unit, Colour([0, 0, 0]), HALO_OPACITY);
+        self.stroke(&path, HALO * self.unit, Color([0, 0, 0]), HALO_OPACITY);
         self.pixmap.fill_path(
             &path,
-            &colour.paint(255),
+            &color.paint(255),
             FillRule::Winding,
             Transform::identity(),
             None,
@@ -117,14 +117,14 @@ impl Canvas {
         RgbImage::from_raw(width, height, opaque.collect()).expect("three bytes a pixel")
     }
 
-    fn stroke(&mut self, path: &Path, width: f32, colour: Colour, opacity: u8) {
+    fn stroke(&mut self, path: &Path, width: f32, color: Color, opacity: u8) {
         let stroke = Stroke {
             width,
             line_cap: LineCap::Round,
             line_join: LineJoin::Round,
             ..Stroke::default()
         };
-        let paint = colour.paint(opacity);
+        let paint = color.paint(opacity);
         self.pixmap
             .stroke_path(path, &paint, &stroke, Transform::identity(), None);
     }

@@ -1,6 +1,6 @@
 //! The strip below the frame: name, field, counts, scale bar and compass.
 
-use super::canvas::{Canvas, Colour, text_width};
+use super::canvas::{Canvas, Color, text_width};
 use super::grey::Grey;
 use super::mark::{Kind, Mark};
 use crate::base::format::{counted, degrees, hours};
@@ -79,10 +79,10 @@ pub(super) fn draw(
     }
     let left = PADDING * canvas.unit;
     let lines = [title.to_owned(), field_line(solution)];
-    for (number, (line, colour)) in lines.iter().zip([Colour::WHITE, Colour::DIM]).enumerate() {
+    for (number, (line, color)) in lines.iter().zip([Color::WHITE, Color::DIM]).enumerate() {
         let at = [left, baseline(canvas, top, number)];
         let text = shortened(line, (right - left) / canvas.unit);
-        canvas.text(&text, at, LETTERS, colour);
+        canvas.text(&text, at, LETTERS, color);
     }
     draw_counts(canvas, [left, baseline(canvas, top, 2)], right, marks);
 }
@@ -107,7 +107,7 @@ fn field_line(solution: &Solution) -> String {
     )
 }
 
-/// Draws the number of detections of each kind, in the colour of its rings.
+/// Draws the number of detections of each kind, in the color of its rings.
 fn draw_counts(canvas: &mut Canvas, [left, y]: [f32; 2], right: f32, marks: &[Mark]) {
     let count = |kind: Kind| marks.iter().filter(|mark| mark.kind == kind).count();
     let kinds = [
@@ -117,7 +117,7 @@ fn draw_counts(canvas: &mut Canvas, [left, y]: [f32; 2], right: f32, marks: &[Ma
     ];
     let mut x = left;
     if marks.is_empty() {
-        canvas.text(&counted(0, "detection"), [left, y], LETTERS, Colour::DIM);
+        canvas.text(&counted(0, "detection"), [left, y], LETTERS, Color::DIM);
     }
     for (kind, word) in kinds.into_iter().filter(|(kind, _)| count(*kind) > 0) {
         let text = format!("{} {word}", count(kind));
@@ -126,8 +126,8 @@ fn draw_counts(canvas: &mut Canvas, [left, y]: [f32; 2], right: f32, marks: &[Ma
         if x + width > right {
             break;
         }
-        canvas.ring([x + ring, y - ring], ring, kind.stroke(), kind.colour());
-        canvas.text(&text, [x + 3.0 * ring, y], LETTERS, kind.colour());
+        canvas.ring([x + ring, y - ring], ring, kind.stroke(), kind.color());
+        canvas.text(&text, [x + 3.0 * ring, y], LETTERS, kind.color());
         x += width + 12.0 * canvas.unit;
     }
 }
@@ -161,11 +161,11 @@ fn draw_scale(
             [right, y + tick],
         ],
         1.5,
-        Colour::WHITE,
+        Color::WHITE,
     );
     let width = text_width(name, LETTERS * canvas.unit);
     let at = [(left + right - width) / 2.0, y - 8.0 * canvas.unit];
-    canvas.text(name, at, LETTERS, Colour::WHITE);
+    canvas.text(name, at, LETTERS, Color::WHITE);
     left.min(at[0])
 }
 
@@ -175,8 +175,8 @@ fn draw_compass(canvas: &mut Canvas, centre: [f32; 2], found: &Identification) {
     const ARROW: f32 = 20.0;
     let arrows = north_and_east(found)
         .into_iter()
-        .zip([("N", 1.0, Colour::WHITE), ("E", 0.75, Colour::DIM)]);
-    for ([dx, dy], (letter, length, colour)) in arrows {
+        .zip([("N", 1.0, Color::WHITE), ("E", 0.75, Color::DIM)]);
+    for ([dx, dy], (letter, length, color)) in arrows {
         let point = |along: f32, aside: f32| {
             let (along, aside) = (along * canvas.unit, aside * canvas.unit);
             [
@@ -192,14 +192,14 @@ fn draw_compass(canvas: &mut Canvas, centre: [f32; 2], found: &Identification) {
             point(tip - 6.0, -3.5),
         ];
         let middle = point(tip + 8.0, 0.0);
-        canvas.line(&arrow, 1.5, colour);
-        canvas.line(&head, 1.5, colour);
+        canvas.line(&arrow, 1.5, color);
+        canvas.line(&head, 1.5, color);
         let size = LETTERS - 2.0;
         let at = [
             middle[0] - text_width(letter, size * canvas.unit) / 2.0,
             middle[1] + 0.36 * size * canvas.unit,
         ];
-        canvas.text(letter, at, size, colour);
+        canvas.text(letter, at, size, color);
     }
 }
 

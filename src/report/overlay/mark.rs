@@ -1,6 +1,6 @@
 //! Detections as they are drawn.
 
-use super::canvas::Colour;
+use super::canvas::Color;
 use super::grey::Grey;
 use super::names;
 use crate::pipeline::{Solution, Source};
@@ -18,12 +18,12 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// The colours also differ in brightness, for colour-blind readers.
-    pub(super) fn colour(self) -> Colour {
+    /// The colors also differ in brightness, for color-blind readers.
+    pub(super) fn color(self) -> Color {
         match self {
-            Self::Identified => Colour([110, 240, 150]),
-            Self::Unidentified => Colour([255, 170, 60]),
-            Self::NotAStar => Colour([205, 85, 95]),
+            Self::Identified => Color([110, 240, 150]),
+            Self::Unidentified => Color([255, 170, 60]),
+            Self::NotAStar => Color([205, 85, 95]),
         }
     }
 

@@ -38,11 +38,11 @@ pub fn draw(title: &str, frame: &Frame, solution: &Solution, catalog: &Catalog) 
     let unit = grey.stroke_unit();
     let mut canvas = Canvas::new(&grey, legend::size(&grey, unit), unit);
     for mark in marks.iter().rev() {
-        let colour = mark.kind.colour();
-        canvas.ring([mark.x, mark.y], mark.radius, mark.kind.stroke(), colour);
+        let color = mark.kind.color();
+        canvas.ring([mark.x, mark.y], mark.radius, mark.kind.stroke(), color);
     }
     let image = [grey.width as f32, grey.height as f32];
-    let letters = Kind::Identified.colour().lighter();
+    let letters = Kind::Identified.color().lighter();
     for label in labels::place(&marks, image, unit) {
         if let Some(line) = label.line {
             canvas.line(&line, 0.8, letters);

@@ -1,6 +1,6 @@
 //! Tests of pictures of drawn frames.
 
-use super::canvas::Colour;
+use super::canvas::Color;
 use super::*;
 use crate::base::coords::{PixelPoint, Rotation, UnitVector};
 use crate::base::units::RAD_PER_DEG;
@@ -82,20 +82,20 @@ fn not_identified() -> Outcome {
     }))
 }
 
-/// Number of pixels of about this colour within a square around (x, y).
-fn count(picture: &RgbImage, colour: Colour, [x, y]: [u32; 2], reach: u32) -> usize {
+/// Number of pixels of about this color within a square around (x, y).
+fn count(picture: &RgbImage, color: Color, [x, y]: [u32; 2], reach: u32) -> usize {
     let columns = x - reach..=x + reach;
     let rows = y - reach..=y + reach;
     rows.flat_map(|row| columns.clone().map(move |column| (column, row)))
         .filter(|&(column, row)| {
             let found = picture.get_pixel(column, row).0;
-            (0..3).all(|i| found[i].abs_diff(colour.0[i]) < 30)
+            (0..3).all(|i| found[i].abs_diff(color.0[i]) < 30)
         })
         .count()
 }
 
 #[test]
-fn every_detection_has_a_ring_of_the_colour_of_its_kind() {
+fn every_detection_has_a_ring_of_the_color_of_its_kind() {
     let frame = frame(WIDTH, HEIGHT);
     let solution = solution(WIDTH, HEIGHT, identified(0.0, false));
     let picture = draw("a.tif", &frame, &solution, Catalog::built_in());
@@ -105,8 +105,8 @@ fn every_detection_has_a_ring_of_the_colour_of_its_kind() {
         (Kind::NotAStar, [700, 100]),
     ] {
         for other in [Kind::Identified, Kind::Unidentified, Kind::NotAStar] {
-            let drawn = count(&picture, other.colour(), center, 8);
-            // A thin ring mixes its colour with the sky's.
+            let drawn = count(&picture, other.color(), center, 8);
+            // A thin ring mixes its color with the sky's.
             assert_eq!(
                 drawn >= 3,
                 other == kind,
@@ -115,7 +115,7 @@ fn every_detection_has_a_ring_of_the_colour_of_its_kind() {
         }
     }
     // Sirius is named to the right of its ring.
-    let letters = Kind::Identified.colour().lighter();
+    let letters = Kind::Identified.color().lighter();
     assert!(count(&picture, letters, [250, 300], 30) > 15);
 }
 
@@ -124,8 +124,8 @@ fn a_frame_that_is_not_identified_is_drawn_as_well() {
     let frame = frame(WIDTH, HEIGHT);
     let solution = solution(WIDTH, HEIGHT, not_identified());
     let picture = draw("a.tif", &frame, &solution, Catalog::built_in());
-    assert!(count(&picture, Kind::Unidentified.colour(), [200, 300], 8) > 3);
-    assert_eq!(count(&picture, Kind::Identified.colour(), [200, 300], 8), 0);
+    assert!(count(&picture, Kind::Unidentified.color(), [200, 300], 8) > 3);
+    assert_eq!(count(&picture, Kind::Identified.color(), [200, 300], 8), 0);
 }
 
 #[test]

@@ -100,8 +100,8 @@ impl<'a> Sky<'a> {
         /// Magnitudes beyond the limit at which a star may still cause a detection.
         const BEYOND_LIMIT_MAG: f64 = 1.5;
         /// The widest wings, of the brightest stars.
-        const MOST_PX: f64 = 20.0;
-        let mut near = self.light.stars_near(place, MOST_PX + self.half_trail_px);
+        const MAX_PX: f64 = 20.0;
+        let mut near = self.light.stars_near(place, MAX_PX + self.half_trail_px);
         near.any(|star| {
             star.v_mag < self.limit_vmag + BEYOND_LIMIT_MAG
                 && star.position.distance_to(place) < self.reach_px(star)
@@ -125,21 +125,21 @@ impl<'a> Sky<'a> {
     /// two standard deviations of the spot, as noise on a star at the limit moves its peak as far; and
     /// no nearer star gives more than twice its light.
     fn is_there(&self, named: &StarMatch, source: &Source) -> bool {
-        const LEAST_PX: f64 = 2.0;
+        const MIN_PX: f64 = 2.0;
         const SPOT_SIGMAS: f64 = 2.0;
         const SIGMAS: f64 = 3.0;
-        const LEAST_LIGHT: f64 = 0.5;
+        const MIN_LIGHT: f64 = 0.5;
         let place = &source.position;
         let sigma_px = source
             .measured
             .map_or(0.0, |m| m.sigma_px[0].max(m.sigma_px[1]));
-        let least_px = LEAST_PX.max(SPOT_SIGMAS * self.light.sigma_px());
+        let least_px = MIN_PX.max(SPOT_SIGMAS * self.light.sigma_px());
         let tolerance_px = least_px.max(SIGMAS * sigma_px) + self.half_trail_px;
         let light = |star: &TrueStar| self.light.light_of(star, place);
         let mut most_of_nearer = 0.0_f64;
         for star in self.light.stars_near(place, tolerance_px) {
             if star.catalog == Some(named.star) {
-                return light(star) >= LEAST_LIGHT * most_of_nearer;
+                return light(star) >= MIN_LIGHT * most_of_nearer;
             }
             most_of_nearer = most_of_nearer.max(light(star));
         }

@@ -22,12 +22,12 @@ pub enum Kind {
     FalseStars,
     /// Eight bits, the black level above the sky in parts of the frame.
     BlackLevel,
-    /// Mosaic of colours, demosaiced, tone curve, JPEG of quality 70.
+    /// Mosaic of colors, demosaiced, tone curve, JPEG of quality 70.
     Jpeg,
     /// No sky: white noise.
     Noise,
     /// No sky: noise with structure of all sizes.
-    ColouredNoise,
+    ColoredNoise,
     /// No sky: star-like spots at random.
     Dots,
     /// No sky: lines of text.
@@ -66,7 +66,7 @@ impl Kind {
         Self::HotPixels,
         Self::CosmicRays,
         Self::Noise,
-        Self::ColouredNoise,
+        Self::ColoredNoise,
         Self::Dots,
         Self::Text,
         Self::Drawings,
@@ -89,7 +89,7 @@ impl Kind {
             Self::BlackLevel => "black-level",
             Self::Jpeg => "jpeg",
             Self::Noise => "noise",
-            Self::ColouredNoise => "coloured-noise",
+            Self::ColoredNoise => "colored-noise",
             Self::Dots => "dots",
             Self::Text => "text",
             Self::Drawings => "drawings",
@@ -113,7 +113,7 @@ impl Kind {
         !matches!(
             self,
             Self::Noise
-                | Self::ColouredNoise
+                | Self::ColoredNoise
                 | Self::Dots
                 | Self::Text
                 | Self::Drawings

@@ -31,7 +31,7 @@ pub(super) fn picture(kind: Kind, random: &mut ChaCha8Rng) -> Result<Frame<'stat
         Kind::Bokeh => bokeh(&mut canvas, random),
         _ => (),
     }
-    let structure = (kind == Kind::ColouredNoise).then(|| structure(random));
+    let structure = (kind == Kind::ColoredNoise).then(|| structure(random));
     let mut levels = Vec::with_capacity(WIDTH * HEIGHT);
     for at in 0..WIDTH * HEIGHT {
         let added = structure.as_ref().map_or(0.0, |structure| structure[at]);

@@ -1,9 +1,9 @@
-//! How a frame is recorded: clutter before the sky, eight bits, a mosaic of colours, JPEG.
+//! How a frame is recorded: clutter before the sky, eight bits, a mosaic of colors, JPEG.
 
 use super::canvas::Canvas;
 use super::chance::{log_uniform, normal};
 use crate::frame::{Frame, FrameError};
-use crate::model::simulate::{colour, decoded_jpeg, demosaiced};
+use crate::model::simulate::{color, decoded_jpeg, demosaiced};
 use image::ExtendedColorType;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -22,9 +22,9 @@ pub(super) struct Sky {
 }
 
 impl Sky {
-    /// The median, and the noise from the differences of neighbours.
+    /// The median, and the noise from the differences of neighbors.
     pub(super) fn of(frame: &Frame) -> Self {
-        /// Standard deviation over the median absolute difference of two neighbours.
+        /// Standard deviation over the median absolute difference of two neighbors.
         const NOISE_OF_DIFFERENCE: f64 = 1.482_602_218_505_602 * std::f64::consts::FRAC_1_SQRT_2;
         const STRIDE: usize = 7;
         let pixels = frame.values();
@@ -122,7 +122,7 @@ pub(super) fn cut_off(mut frame: Frame<'static>, random: &mut ChaCha8Rng) -> Fra
     frame.with_levels(1.0, Some(WHITE as f32))
 }
 
-/// `frame` as a phone records it: a mosaic of colours, demosaiced, a tone curve, JPEG.
+/// `frame` as a phone records it: a mosaic of colors, demosaiced, a tone curve, JPEG.
 pub(super) fn as_jpeg(
     frame: &Frame,
     random: &mut ChaCha8Rng,
@@ -137,16 +137,16 @@ pub(super) fn as_jpeg(
         .iter()
         .enumerate()
         .map(|(index, pixel)| {
-            let response = RESPONSE[colour(index % frame.width, index / frame.width)];
-            // White balance: the noise of weak colours is amplified.
+            let response = RESPONSE[color(index % frame.width, index / frame.width)];
+            // White balance: the noise of weak colors is amplified.
             let extra = (1.0 / response - 1.0).sqrt() * sky.noise * normal(random);
             (f64::from(*pixel) + extra - black) / (white - black)
         })
         .collect();
-    let colours = demosaiced(&mosaic, frame.width, frame.height);
+    let colors = demosaiced(&mosaic, frame.width, frame.height);
     let gamma = 1.0 / random.random_range(1.8..2.4);
     let tone = |linear: f64| (WHITE * libm::pow(linear.clamp(0.0, 1.0), gamma)).round() as u8;
-    let bytes: Vec<u8> = colours.into_iter().flatten().map(tone).collect();
+    let bytes: Vec<u8> = colors.into_iter().flatten().map(tone).collect();
     let size = [frame.width, frame.height];
     decoded_jpeg(&bytes, size, ExtendedColorType::Rgb8, JPEG_QUALITY)
 }

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 /// Branches with leaves that grow from the borders until they hide a part of the frame.
 pub(super) fn foliage(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
     /// Branches after which growth ends.
-    const MOST_BRANCHES: usize = 80;
+    const MAX_BRANCHES: usize = 80;
     let wanted = random.random_range(0.08..0.45);
     // Dark against the sky, or lit by lamps.
     let tone = if random.random_bool(0.5) {
@@ -19,7 +19,7 @@ pub(super) fn foliage(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
         log_uniform(random, 5.0, 150.0)
     };
     let leaf_px = log_uniform(random, 3.0, 14.0);
-    for _ in 0..MOST_BRANCHES {
+    for _ in 0..MAX_BRANCHES {
         if canvas.covered() >= wanted {
             break;
         }

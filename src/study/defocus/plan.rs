@@ -10,7 +10,7 @@ use crate::model::defocus::{
 use rayon::prelude::*;
 
 /// Least number of trials at the noise of the study: the reported radii depend on them.
-const LEAST_TRIALS: usize = 1000;
+const MIN_TRIALS: usize = 1000;
 
 /// Stars, radii and noises of a study.
 pub struct Plan {
@@ -83,7 +83,7 @@ impl Plan {
             spots_px: self.grid.spots_px.clone(),
             noises: vec![noise],
         };
-        let precise = star.with_trials(star.trials().max(LEAST_TRIALS));
+        let precise = star.with_trials(star.trials().max(MIN_TRIALS));
         // Another seed: these random numbers are not those of the grid.
         let errors = precise.measure(grid, !self.seed, caller)?;
         let points = errors.grid.spots_px.par_iter().zip(&errors.points);
@@ -131,7 +131,7 @@ fn isoline_levels_px(errors: &ErrorGrid, required_px: &[f64]) -> Vec<f64> {
     /// Mantissas of round numbers.
     const ROUND: [f64; 3] = [1.0, 2.0, 5.0];
     /// Most round numbers.
-    const MOST: usize = 6;
+    const MAX: usize = 6;
     let sound = errors.points.iter().filter(|point| point.is_sound());
     let mut sorted: Vec<f64> = sound.map(|point| point.rms_px).collect();
     sorted.sort_by(f64::total_cmp);
@@ -144,7 +144,7 @@ fn isoline_levels_px(errors: &ErrorGrid, required_px: &[f64]) -> Vec<f64> {
     let mut levels: Vec<f64> = round
         .filter(|level| (least..most).contains(level))
         .collect();
-    levels.truncate(MOST);
+    levels.truncate(MAX);
     levels.extend(required_px);
     levels.sort_by(f64::total_cmp);
     levels.dedup();

@@ -311,7 +311,7 @@ impl<'a> Evaluation<'a> {
         (!codes.is_empty()).then(|| codes.join(" "))
     }
 
-    /// By how much fainter the predicted limit is for the colour for which the measured one holds.
+    /// By how much fainter the predicted limit is for the color for which the measured one holds.
     fn limit_color_mag(&self) -> f64 {
         let photometry = self.solution.photometry.as_ref();
         let zero_point = photometry.and_then(|measured| measured.zero_point.as_ref());

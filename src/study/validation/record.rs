@@ -74,7 +74,7 @@ pub struct FrameRecord {
     pub expected_faintest_vmag: Option<f64>,
     /// Standard deviation of that magnitude by chance.
     pub expected_faintest_sigma_mag: Option<f64>,
-    /// V magnitude of predicted 50 % completeness, for stars of the colour for which the measured one
+    /// V magnitude of predicted 50 % completeness, for stars of the color for which the measured one
     /// holds.
     pub predicted_limit_vmag: f64,
     /// V magnitude of 50 % completeness measured on this frame.

@@ -135,8 +135,8 @@ pub const HARD_SUITE: [HardCase; 19] = [
         change: |setup| setup.scenario.camera.imperfections.vignetting = 0.6,
     },
     HardCase {
-        name: "colour-jpeg",
-        what: "JPEG of a colour camera: demosaiced, smoothed, with a tone curve",
+        name: "color-jpeg",
+        what: "JPEG of a color camera: demosaiced, smoothed, with a tone curve",
         change: |setup| {
             let made = &mut setup.scenario.camera.imperfections;
             (made.jpeg_quality, made.tone_gamma, made.denoise_px) = (90.0, 2.2, 0.7);

@@ -1,4 +1,4 @@
-//! RICE_1: differences of neighbouring pixels, in blocks that share the number of their low bits.
+//! RICE_1: differences of neighboring pixels, in blocks that share the number of their low bits.
 //!
 //! A stream begins with a value from which the first difference counts. Each block begins with a
 //! code for its number of low bits: none of its differences is other than 0, or all differences are

@@ -32,7 +32,7 @@
 //! Stars are ordered by (V, identifier).
 //!
 //! Caveat: proper motions are rounded to 1 mas a year, 13 mas after 26 years. Positions, magnitudes
-//! and colours of SKY2000 are kept exactly.
+//! and colors of SKY2000 are kept exactly.
 
 mod decode;
 mod encode;

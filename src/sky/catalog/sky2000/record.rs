@@ -140,7 +140,7 @@ impl Sky2000Record<'_> {
         Ok(Some((ra_mas_per_yr as f32, dec_mas_per_yr as f32)))
     }
 
-    /// A magnitude or colour in millimagnitudes.
+    /// A magnitude or color in millimagnitudes.
     fn magnitude(&self, column: StarColumn) -> Parsed<Option<i16>> {
         let expected = "magnitudes from -32 to 32, in 0.001 mag";
         match self.decimal(column, 3, expected)? {

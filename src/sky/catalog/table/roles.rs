@@ -149,7 +149,7 @@ pub(super) enum MagnitudeColumns {
         observed: usize,
         derived: Option<usize>,
     },
-    /// Tycho VT, and BT for the colour.
+    /// Tycho VT, and BT for the color.
     Tycho { bt: Option<usize>, vt: usize },
     /// A magnitude that approximates V.
     Approximate { cell: usize, band: &'static str },

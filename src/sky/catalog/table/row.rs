@@ -35,7 +35,7 @@ impl TableRow<'_> {
         let magnitude = self.magnitude()?;
         let bv_mag = match columns.b_minus_v {
             Some(cell) => {
-                let bv_mag = self.in_range(cell, MAG_LIMIT, "a colour in magnitudes")?;
+                let bv_mag = self.in_range(cell, MAG_LIMIT, "a color in magnitudes")?;
                 bv_mag.map(rounded_mag)
             }
             None => magnitude.and_then(|(_, bv_mag, _)| bv_mag),

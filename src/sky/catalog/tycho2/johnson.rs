@@ -5,7 +5,7 @@ use crate::sky::catalog::star::rounded_mag;
 /// V and B−V in Johnson's system, rounded to 0.001 mag; `None` without any magnitude.
 ///
 /// V = VT − 0.090 (BT − VT) and B−V = 0.850 (BT − VT). VT alone is used as V; BT alone is converted
-/// with the median colour.
+/// with the median color.
 ///
 /// # Reference
 /// Høg et al. 2000, A&A 355, L27 (CDS I/259).

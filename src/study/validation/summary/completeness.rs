@@ -149,7 +149,7 @@ fn fitted_limit(
     /// Valid widths of the transition, in magnitudes.
     const WIDTHS_MAG: std::ops::Range<f64> = 0.01..3.0;
     /// Clamp for probabilities far from the limit.
-    const LEAST_PROBABILITY: f64 = 1e-9;
+    const MIN_PROBABILITY: f64 = 1e-9;
     // Magnitudes are relative to the start, so that a and b are nearly uncorrelated.
     let (mut a, mut b) = (0.0, 1.0 / TYPICAL_WIDTH_MAG);
     for _ in 0..MAX_ROUNDS {
@@ -157,7 +157,7 @@ fn fitted_limit(
         for bin in bins {
             let m = bin.vmag - start_vmag;
             let z = a - b * m;
-            let p = normal_cdf(z).clamp(LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY);
+            let p = normal_cdf(z).clamp(MIN_PROBABILITY, 1.0 - MIN_PROBABILITY);
             let weight = bin.stars as f64 / (p * (1.0 - p));
             let density = normal_density(z);
             let (by_a, by_b) = (density, -density * m);

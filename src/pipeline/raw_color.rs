@@ -1,4 +1,4 @@
-//! Raw frames of colour cameras: stars are detected in the grey frame that the mosaic is smoothed
+//! Raw frames of color cameras: stars are detected in the grey frame that the mosaic is smoothed
 //! to, and what is measured there is told for the raw pixels.
 //!
 //! Fluxes become those of green filters over all pixels, which is the band nearest to V.
@@ -9,16 +9,16 @@ use crate::frame::{BayerPattern, Frame, Mosaic};
 
 /// Variance of light within a pixel on each axis, in px².
 const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
-/// Most stars in which the colours are compared.
-const MOST_STARS: usize = 100;
+/// Most stars in which the colors are compared.
+const MAX_STARS: usize = 100;
 /// Fewer stars do not tell the response of a filter.
-const FEWEST_STARS: usize = 5;
+const MIN_STARS: usize = 5;
 /// Signal-to-noise ratio of such stars.
-const LEAST_SNR: f64 = 30.0;
+const MIN_SNR: f64 = 30.0;
 
-/// A raw colour frame whose stars were detected.
+/// A raw color frame whose stars were detected.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RawColour {
+pub struct RawColor {
     /// The filters, where the header says which.
     pub pattern: Option<BayerPattern>,
     /// Light of the stars behind green filters over the mean behind all; `None` where too few stars
@@ -26,7 +26,7 @@ pub struct RawColour {
     pub green_over_mean: Option<f64>,
 }
 
-impl RawColour {
+impl RawColor {
     /// Turns what was detected in the grey frame of `raw` into what it is in raw pixels: noise,
     /// threshold, standard errors and fluxes. Positions are the same in both.
     pub(super) fn restore(mosaic: Mosaic, raw: &Frame, found: &mut Detections) -> Self {
@@ -74,16 +74,16 @@ fn error_ratio(spot_px: f64) -> f64 {
 /// The light of bright stars in green pixels over that in all: the median of the stars.
 fn green_over_mean(mosaic: Mosaic, raw: &Frame, found: &Detections) -> Option<f64> {
     let is_clean = |source: &&Detection| {
-        source.snr > LEAST_SNR && source.flags.is_star_like() && source.flags.has_clean_flux()
+        source.snr > MIN_SNR && source.flags.is_star_like() && source.flags.has_clean_flux()
     };
-    let stars = found.sources.iter().filter(is_clean).take(MOST_STARS);
+    let stars = found.sources.iter().filter(is_clean).take(MAX_STARS);
     let radius_px = 3.0 * (found.spot_sigma_px + 0.5);
     let of_star = |star: &Detection| {
         let Detection { position, .. } = star;
         green_share(mosaic, raw, [position.x, position.y], radius_px)
     };
     let mut shares: Vec<f64> = stars.filter_map(of_star).collect();
-    let share = (shares.len() >= FEWEST_STARS).then(|| median(&mut shares))?;
+    let share = (shares.len() >= MIN_STARS).then(|| median(&mut shares))?;
     // Half of the pixels are green.
     (share > 0.0).then_some(2.0 * share)
 }

@@ -4,7 +4,7 @@ use crate::detect::candidates::Peak;
 
 /// Peaks sorted into the cells of a grid, for queries of the peaks near one of them.
 #[derive(Debug, Clone, Default)]
-pub(super) struct NeighbourGrid {
+pub(super) struct NeighborGrid {
     reach_px: f64,
     cell_px: f64,
     columns: usize,
@@ -17,7 +17,7 @@ pub(super) struct NeighbourGrid {
     pub found: Vec<u32>,
 }
 
-impl NeighbourGrid {
+impl NeighborGrid {
     /// Maximum number of cells along a side; few peaks far apart need no more.
     const MAX_CELLS: f64 = 512.0;
 
