@@ -66,7 +66,7 @@ class Checks:
         out = self.directory / f"run-{self.runs}"
         command = [self.program, "simulate", "--camera", camera, "--catalog", self.catalog]
         command += ["--image", "fits", "--count", count, "--out", out, *options]
-        made = subprocess.run([str(part) for part in command], capture_output=True)
+        made = subprocess.run([str(part) for part in command], capture_output=True, check=False)
         if made.returncode != 0:
             sys.exit(made.stderr.decode())
         result = []
@@ -84,9 +84,10 @@ class Checks:
     def star(self, number):
         """RA, Dec (degrees), proper motions (mas a year), V and B-V of the star "SKYMAP nnnnnnnn"."""
         if not self.stars:
-            for line in gzip.open(self.catalog, "rt", encoding="latin-1"):
-                if line[27:35].strip():
-                    self.stars[int(line[27:35])] = line
+            with gzip.open(self.catalog, "rt", encoding="latin-1") as lines:
+                for line in lines:
+                    if line[27:35].strip():
+                        self.stars[int(line[27:35])] = line
         line = self.stars[int(number.removeprefix("SKYMAP "))]
         cut = lambda first, last: line[first - 1 : last].strip().replace(" ", "")
         value = lambda first, last: float(cut(first, last) or 0)
@@ -282,7 +283,7 @@ def flux(checks):
             assert len(stars) == 1 and not none, (name, stars)
             _, _, _, _, v, bv = checks.star(stars[0]["id"])
             airmass = kasten_young(z_deg)
-            rate = electrons_of_mag_0(toml, ballesteros_k(bv), lambda nm: zenith(nm) ** airmass)
+            rate = electrons_of_mag_0(toml, ballesteros_k(bv), lambda nm, zenith=zenith, airmass=airmass: zenith(nm) ** airmass)
             x, y = float(stars[0]["x"]), float(stars[0]["y"])
             offset = np.hypot(*(np.array([x, y]) - (lens.size - 1) / 2)) / lens.radius
             expected = rate * 1000 * 10 ** (-0.4 * v) * (1 - vignetting * offset**2)

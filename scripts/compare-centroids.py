@@ -10,7 +10,11 @@ Prints the RMS error over the Cramér-Rao bound by spot size and signal-to-noise
 signal-to-noise ratio at which half of the stars are detected at one false detection per megapixel.
 Thresholds of the peers are tuned to that rate on frames of noise.
 """
-import csv, json, math, subprocess, sys
+import csv
+import json
+import math
+import subprocess
+import sys
 from importlib.metadata import version
 from pathlib import Path
 
@@ -61,7 +65,7 @@ def with_tetra3rs_fast(frame, threshold, spot=None):
 
 def with_starpipe(program, path, *options):
     command = [program, "process", "--format", "json", *options, str(path)]
-    out = subprocess.run(command, capture_output=True, text=True).stdout
+    out = subprocess.run(command, capture_output=True, text=True, check=False).stdout
     return [(star["x"], star["y"]) for star in json.loads(out)["stars"]]
 
 
@@ -73,7 +77,7 @@ def tuned(detector, frames):
         middle = math.sqrt(low * high)
         try:
             count = sum(len(detector(frame, middle)) for frame in frames)
-        except Exception:  # sep refuses frames that are nothing but sources
+        except Exception:  # noqa: BLE001  (sep refuses frames that are nothing but sources)
             count = math.inf
         low, high = (middle, high) if count > wanted else (low, middle)
     return high
@@ -97,7 +101,10 @@ def main(directory, program):
     for spot in SPOTS:
         noise = [pixels(path) for path in sorted(directory.glob(f"noise-{spot}-*.tiff"))]
         thresholds = {name: tuned(detector, noise) for name, detector in peers.items()}
-        rows = {name: lambda path, n=name: peers[n](pixels(path), thresholds[n], float(spot)) for name in peers}
+        rows = {
+            name: lambda path, n=name, s=float(spot), t=thresholds[name]: peers[n](pixels(path), t, s)
+            for name in peers
+        }
         rows["starpipe"] = lambda path: with_starpipe(program, path, "--false-alarms", "1")
         for name, places_in in rows.items():
             errors = {c: [] for c in range(len(CLASSES))}

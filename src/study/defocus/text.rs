@@ -188,7 +188,7 @@ fn normalisation_text(peak: Option<f64>) -> String {
     match peak {
         Some(peak) => format!(
             "normalisation peak: the brightest pixel has {} of full scale at every radius, a wider spot more light.\n\
-             A real star's light does not grow with its spot: that is the normalisation of energy.\n",
+             A real star's light does not grow with its spot: that is normalisation energy.\n",
             five_digits(peak)
         ),
         None => {
