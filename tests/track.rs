@@ -130,7 +130,7 @@ fn contradictory_options_are_refused() {
             &["--fov", "20", "--pixel-scale", "100", "a.tif"],
             "cannot be used with",
         ),
-        (&["--near", "1,2", "a.tif"], "--radius"),
+        (&["--radius", "2", "a.tif"], "--near"),
         (&["--scale-error", "5", "a.tif"], "--scale-error"),
     ] {
         let ran = Ran::new(starpipe().arg("track").args(options));
