@@ -33,7 +33,9 @@ pub(crate) fn grey_weighted(
     unsaturated.cut_out(&fit.spots[..1], radius, window);
     let thresholds = [GREY_THRESHOLD_SIGMA, 0.0].map(|sigma| sigma * window.noise_adu);
     let mut centroids = thresholds.into_iter();
-    if let Some(centroid) = centroids.find_map(|t| GreyCentroid::above(t, window, noise)) {
+    if let Some(centroid) =
+        centroids.find_map(|t| GreyCentroid::above(t, window, noise, radius as f64))
+    {
         let (x, y) = (centroid.x, centroid.y);
         detection.position = PixelPoint::new(x + window.x0 as f64, y + window.y0 as f64);
         detection.sigma_x_px = centroid.sigma_x;
@@ -50,8 +52,9 @@ struct GreyCentroid {
 }
 
 impl GreyCentroid {
-    /// The centroid of the light above `threshold`, in ADU; `None` where there is none.
-    fn above(threshold: f64, window: &Window, noise: &NoiseModel) -> Option<Self> {
+    /// The centroid of the light above `threshold`, in ADU; `None` where there is none. It is somewhere
+    /// in the window, and its error no more than `radius_px` of that.
+    fn above(threshold: f64, window: &Window, noise: &NoiseModel, radius_px: f64) -> Option<Self> {
         /// Standard error of the position within a single pixel: 1/√12.
         const SINGLE_PIXEL_PX: f64 = 0.29;
         let bright = || {
@@ -79,7 +82,7 @@ impl GreyCentroid {
         }
         let error = |variance: f64| {
             let least = if variance > 0.0 { 0.0 } else { SINGLE_PIXEL_PX };
-            (variance.sqrt() / sum).max(least)
+            (variance.sqrt() / sum).min(radius_px).max(least)
         };
         Some(Self {
             x,
