@@ -79,7 +79,11 @@ pub fn pipeline(data: &[u8]) {
     check(&report, solution, 1.0);
     let again = FrameReport::new("fuzzed", again, indexed.catalog());
     assert_eq!(without_times(&report), without_times(&again));
-    let text = report.to_text(TextOptions { all_stars: true });
+    let options = TextOptions {
+        all_stars: true,
+        ..TextOptions::default()
+    };
+    let text = report.to_text(options);
     assert!(!text.contains("NaN") && !text.contains("inf "), "{text}");
     // The slowest part, and the one that depends least on the pixels.
     if header.knows(6) && header.knows(7) {
