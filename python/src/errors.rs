@@ -7,8 +7,6 @@ use serde::Serialize;
 use starpipe::Interrupted;
 use starpipe::base::panics::{Panicked, caught};
 use starpipe::base::remedy::{OptionNames, Remedy};
-use starpipe::detect::DetectError;
-use starpipe::frame::FrameError;
 use starpipe::pipeline::remedies_of;
 use std::error::Error;
 use std::io;
@@ -37,7 +35,7 @@ pub fn exception(error: impl Error + 'static) -> PyErr {
     let text = message(&error) + &see(&remedies_of(&error));
     if has(|cause| cause.is::<Panicked>()) {
         PyRuntimeError::new_err(text)
-    } else if has(is_interruption) {
+    } else if has(|cause| cause.is::<Interrupted>()) {
         PyTimeoutError::new_err(text)
     } else if has(|cause| cause.is::<io::Error>()) {
         PyOSError::new_err(text)
@@ -46,23 +44,10 @@ pub fn exception(error: impl Error + 'static) -> PyErr {
     }
 }
 
-/// Whether a cause is the end of the time.
-fn is_interruption(cause: &(dyn Error + 'static)) -> bool {
-    let in_detection = |error: &DetectError| matches!(error, DetectError::Interrupted(_));
-    let of_file = cause
-        .downcast_ref()
-        .is_some_and(FrameError::is_interruption);
-    of_file || cause.is::<Interrupted>() || cause.downcast_ref().is_some_and(in_detection)
-}
-
 /// The keywords that may help, after a message. Not all options are keywords of Python's.
 pub fn see(remedies: &[Remedy]) -> String {
-    let is_keyword = |remedy: &&Remedy| {
-        !matches!(
-            remedy,
-            Remedy::AllStars | Remedy::Bits | Remedy::Frame | Remedy::MaxMemory
-        )
-    };
+    let is_keyword =
+        |remedy: &&Remedy| !matches!(remedy, Remedy::AllStars | Remedy::Frame | Remedy::MaxMemory);
     let keywords: Vec<Remedy> = remedies.iter().filter(is_keyword).copied().collect();
     OptionNames::Words.see(&keywords)
 }

@@ -224,8 +224,8 @@ class Pipeline:
             If an argument is of a wrong type or out of range.
         """
         inspect.signature(self.solve).bind(None, **known)
-        own = ("mask", "name", "dark", "flat", "threads")
-        solve_options(**{name: value for name, value in known.items() if name not in own})
+        stated = known.keys() & SolveOptions.__annotations__.keys()
+        solve_options(**{name: known[name] for name in stated})
         return self._solve_in_order(images, thread_count(threads), known)
 
     def _solve_in_order(
@@ -256,6 +256,7 @@ class Pipeline:
 
 def _in_time(solved: _starpipe.Solved) -> Result:
     """Return the result, unless there was no answer within the time limit."""
-    if solved.timeout is not None:
-        raise TimeoutError(solved.timeout)
+    reason = solved.timeout
+    if reason is not None:
+        raise TimeoutError(reason)
     return Result._of(solved)

@@ -1,19 +1,14 @@
 //! What may help where something failed or is missing: options, by their names.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// An option that may help. The library has it as a field, the command line as a flag, Python as a
 /// keyword.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Remedy {
     /// Every star is listed.
     AllStars,
-    /// Bits of the detector.
-    Bits,
-    /// The camera's data sheet.
-    Camera,
     /// When the frame was taken.
     Date,
     /// Horizontal field of view.
@@ -39,8 +34,6 @@ impl Remedy {
     pub const fn name(self) -> &'static str {
         match self {
             Self::AllStars => "all_stars",
-            Self::Bits => "bits",
-            Self::Camera => "camera",
             Self::Date => "date",
             Self::Fov => "fov",
             Self::Frame => "frame",
@@ -52,10 +45,11 @@ impl Remedy {
             Self::TimeLimit => "time_limit",
         }
     }
+}
 
-    /// The option of the command line.
-    pub fn flag(self) -> String {
-        format!("--{}", self.name().replace('_', "-"))
+impl Serialize for Remedy {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
     }
 }
 
@@ -71,10 +65,10 @@ pub enum OptionNames {
 
 impl OptionNames {
     /// The name of an option.
-    pub fn of(self, option: Remedy) -> String {
+    fn of(self, option: Remedy) -> String {
         match self {
             Self::Words => option.name().to_owned(),
-            Self::Flags => option.flag(),
+            Self::Flags => format!("--{}", option.name().replace('_', "-")),
         }
     }
 

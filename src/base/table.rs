@@ -22,7 +22,7 @@ impl FieldValue {
         /// Smaller numbers have an exponent.
         const MIN_WITHOUT_EXPONENT: f64 = 1e-4;
         match self {
-            Self::Integer(value) => value.map(|value| value.to_string()),
+            Self::Integer(value) => value.map(|value| value.cast_unsigned().to_string()),
             Self::Number(value) => value.map(|value| {
                 if value != 0.0 && value.abs() < MIN_WITHOUT_EXPONENT {
                     format!("{value:e}")

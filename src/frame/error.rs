@@ -155,15 +155,6 @@ pub enum FrameError {
 }
 
 impl FrameError {
-    /// Whether the work was ended early.
-    pub fn is_interruption(&self) -> bool {
-        match self {
-            Self::File { source, .. } => source.is_interruption(),
-            Self::Interrupted(_) => true,
-            _ => false,
-        }
-    }
-
     /// The options that may help.
     pub fn remedies(&self) -> &'static [Remedy] {
         match self {

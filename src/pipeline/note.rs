@@ -314,7 +314,8 @@ impl fmt::Display for Note {
             Self::DoubleImage(double) => write!(
                 f,
                 "every star is there twice: {double}; fluxes, zero point and limit are those of one of the \
-                 two images, and positions and attitude are off by up to that offset: the stated error of the attitude has half of it"
+                 two images, and positions and attitude are off by up to that offset: the stated error of the \
+                 attitude has half of it"
             ),
             Self::DarkExposure(mismatch) => mismatch.fmt(f),
             Self::BodyInFrame(seen) => write_body(f, seen),

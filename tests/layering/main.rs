@@ -5,8 +5,9 @@
 
 mod source;
 
-use source::{Crate, ModulePath};
+use source::{Crate, ModulePath, rust_files};
 use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -216,24 +217,19 @@ fn flags_in(source: &str) -> Vec<&str> {
 #[test]
 fn messages_of_the_library_name_no_flags_of_the_command_line() {
     assert_eq!(flags_in("    \"see (--fov) or\"\n// --near"), ["(--fov)"]);
-    let mut files = vec![src()];
-    let mut read = 0;
-    while let Some(path) = files.pop() {
-        if path.is_dir() {
-            let entries = fs::read_dir(&path).unwrap();
-            files.extend(entries.map(|entry| entry.unwrap().path()));
-            continue;
-        }
-        let is_other = path.components().any(|part| part.as_os_str() == "cli")
-            || ["main.rs", "tests.rs"]
+    let is_of_library = |path: &&PathBuf| {
+        let is_other = |part: &OsStr| {
+            ["cli", "main.rs", "tests.rs"]
                 .iter()
-                .any(|name| path.ends_with(name))
-            || path.extension().is_none_or(|extension| extension != "rs");
-        if !is_other {
-            let source = fs::read_to_string(&path).unwrap();
-            assert_eq!(flags_in(&source), [""; 0], "{}", path.display());
-            read += 1;
-        }
+                .any(|name| part == *name)
+        };
+        !path.iter().any(is_other)
+    };
+    let files = rust_files(&src());
+    let files: Vec<_> = files.iter().filter(is_of_library).collect();
+    assert!(files.len() > 300, "{}", files.len());
+    for path in files {
+        let source = fs::read_to_string(path).unwrap();
+        assert_eq!(flags_in(&source), [""; 0], "{}", path.display());
     }
-    assert!(read > 300, "{read}");
 }

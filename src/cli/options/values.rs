@@ -1,5 +1,6 @@
 //! Parsers of option values, which refuse values out of range.
 
+use starpipe::base::angle::Angle;
 use std::fmt::Display;
 
 /// Largest side of a frame, in pixels.
@@ -62,9 +63,11 @@ pub(crate) fn share(text: &str) -> Result<f64, String> {
 /// A right ascension: degrees, or hours, minutes and seconds. In degrees.
 pub(crate) fn right_ascension(text: &str) -> Result<f64, String> {
     const DEG_PER_HOUR: f64 = 15.0;
-    let hours = sexagesimal(text, 'h').map(|hours| hours * DEG_PER_HOUR);
-    let degrees = hours.or_else(|| sexagesimal(text, 'd'));
-    let value = degrees.map_or_else(|| finite(text), Ok)?;
+    let value = match Angle::parse(text) {
+        Some(Angle::Hours(hours) | Angle::Sexagesimal(hours)) => hours * DEG_PER_HOUR,
+        Some(Angle::Decimal(degrees) | Angle::Degrees(degrees)) => degrees,
+        None => finite(text)?,
+    };
     if (0.0..=360.0).contains(&value) {
         return Ok(value);
     }
@@ -73,45 +76,12 @@ pub(crate) fn right_ascension(text: &str) -> Result<f64, String> {
 
 /// A declination: degrees, or degrees, minutes and seconds. In degrees.
 pub(crate) fn declination(text: &str) -> Result<f64, String> {
-    let value = sexagesimal(text, 'd').map_or_else(|| finite(text), Ok)?;
+    let angle = Angle::parse(text).and_then(Angle::in_degrees);
+    let value = angle.map_or_else(|| finite(text), Ok)?;
     if (-90.0..=90.0).contains(&value) {
         return Ok(value);
     }
     Err("the declination must be from -90 to 90 degrees".to_owned())
-}
-
-/// A number in sixtieths, as `05h35m17.3s` or `05:35:17.3`, of which the seconds may be missing; `unit`
-/// is the letter after the whole.
-fn sexagesimal(text: &str, unit: char) -> Option<f64> {
-    let text = text.trim();
-    let (sign, digits) = match text.strip_prefix('-') {
-        Some(rest) => (-1.0, rest),
-        None => (1.0, text.strip_prefix('+').unwrap_or(text)),
-    };
-    let parts: Vec<&str> = if digits.contains(':') {
-        digits.split(':').collect()
-    } else {
-        let (whole, rest) = digits.split_once(unit)?;
-        let rest = rest.strip_suffix('s').unwrap_or(rest);
-        let minutes = rest.split('m').filter(|part| !part.is_empty());
-        std::iter::once(whole).chain(minutes).collect()
-    };
-    let is_number = |part: &&&str| {
-        part.bytes()
-            .all(|byte| byte.is_ascii_digit() || byte == b'.')
-    };
-    let numbers: Vec<f64> = parts
-        .iter()
-        .filter(is_number)
-        .map_while(|part| part.parse().ok())
-        .collect();
-    let is_whole = numbers.len() == parts.len() && numbers.len() <= 3;
-    let is_valid = is_whole && numbers.iter().skip(1).all(|part| *part < 60.0);
-    let sum = numbers
-        .iter()
-        .rev()
-        .fold(0.0, |sum, part| sum / 60.0 + part);
-    is_valid.then_some(sign * sum)
 }
 
 /// A mean number of stars.
