@@ -3,9 +3,8 @@
 use crate::pipeline::SolveOptions;
 use crate::sky::catalog::Catalog;
 use serde::Serialize;
-use std::fs;
-use std::io;
 use std::path::Path;
+use std::{fs, io};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// What the frames of an archive are solved with: results of other values are never mixed.

@@ -1,8 +1,7 @@
 //! `identify`: identifies the stars in lists of centroids.
 
 use super::exit::{CommandError, Outcome};
-use super::input::centroid_list;
-use super::input::stdin;
+use super::input::{centroid_list, stdin};
 use super::options::values::MAX_SIDE_PX;
 use super::solving::options::{LIST_RESULTS, SolvingOptions};
 use super::solving::result_files::{Image, Solved};

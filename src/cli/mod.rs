@@ -31,7 +31,8 @@ mod solving;
 mod track;
 mod validate;
 
-use clap::{ArgMatches, CommandFactory, FromArgMatches, error::ErrorKind};
+use clap::error::ErrorKind;
+use clap::{ArgMatches, CommandFactory, FromArgMatches};
 use command::{Arguments, Command};
 use exit::{CommandError, Exit, Outcome};
 use output::messages::report_error;

@@ -63,7 +63,8 @@ fn png(exif: Vec<u8>, is_16_bit: bool) -> Vec<u8> {
 }
 
 fn tiff(tag: u16) -> Vec<u8> {
-    use tiff::encoder::{TiffEncoder, colortype::Gray8};
+    use tiff::encoder::TiffEncoder;
+    use tiff::encoder::colortype::Gray8;
     let mut out = Cursor::new(Vec::new());
     let mut encoder = TiffEncoder::new(&mut out).unwrap();
     let mut image = encoder.new_image::<Gray8>(WIDTH, HEIGHT).unwrap();

@@ -3,7 +3,8 @@
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::base::units::RAD_PER_DEG;
-use crate::camera::{self, data_sheet::DataSheet};
+use crate::camera::data_sheet::DataSheet;
+use crate::camera::{self};
 use crate::sky::observer::Site;
 use serde::Serialize;
 

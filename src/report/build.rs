@@ -1,6 +1,5 @@
 //! Makes a report of a solution.
 
-use super::bodies;
 use super::digits::{
     AIRMASS_DECIMALS, DIRECTION_DECIMALS, FLUX_DIGITS, HORIZON_DECIMALS, MAG_DECIMALS,
     PIXEL_DECIMALS, SIGMA_DIGITS, YEAR_DECIMALS,
@@ -10,8 +9,8 @@ use super::frame_report::{
     DateReport, DistortionReport, FrameReport, MagnitudeReport, MatchReport, NoteReport,
     ObservationReport, OpticsReport, PhotometryReport, SCHEMA, SiteReport, Status, TimingReport,
 };
-use super::reason;
 use super::stars::{self, Pointing};
+use super::{bodies, reason};
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::format::{
     finite, half_turn_deg, significant, to_decimals, to_significant, turn_deg,

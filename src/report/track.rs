@@ -1,11 +1,9 @@
 //! The report of a tracked frame: one line for each.
 
-use super::build;
 use super::digits::{PIXEL_DECIMALS, SIGMA_DIGITS};
 use super::frame_report::{AttitudeReport, DistortionReport, SCHEMA};
-use super::reason;
-use crate::base::format::json_escaped;
-use crate::base::format::{finite, significant, to_decimals, to_significant};
+use super::{build, reason};
+use crate::base::format::{finite, json_escaped, significant, to_decimals, to_significant};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::camera::CameraModel;
 use crate::pipeline::Outcome;

@@ -5,10 +5,10 @@ use super::window::{Window, window_radius};
 use crate::detect::background::Mesh;
 use crate::detect::candidates::Peak;
 use crate::detect::contrast::Contrast;
-use crate::detect::field_tables::FieldTables;
-use crate::detect::lanes::{each, each_of, plus};
 use crate::detect::pixels::View;
-use crate::detect::psf::{GROUP_PX, MAX_WINDOW_PX, PIXEL_VARIANCE_PX2, PixelGroup};
+use crate::detect::psf::{
+    FieldTables, GROUP_PX, MAX_WINDOW_PX, PIXEL_VARIANCE_PX2, PixelGroup, each, each_of, plus,
+};
 use multiversion::multiversion;
 
 /// The frame with its maps of background and noise, and its spot.

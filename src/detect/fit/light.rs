@@ -1,8 +1,7 @@
 //! The light of spots in a window, and its derivatives with respect to the parameters.
 
 use super::parameters::ONE_SPOT;
-use crate::detect::lanes::{each, plus};
-use crate::detect::psf::{AxisProfile, PixelGroup, ProfilePart};
+use crate::detect::psf::{AxisProfile, PixelGroup, ProfilePart, each, plus};
 use multiversion::multiversion;
 
 /// The light of a spot in a window.

@@ -2,9 +2,7 @@
 
 use super::light::{GroupLight, SpotLight};
 use super::window::Window;
-use crate::detect::lanes::each;
-use crate::detect::psf::{GROUP_PX, LitPart, NarrowProfiles, PixelGroup};
-use crate::detect::psf_table::ShareGroup;
+use crate::detect::psf::{GROUP_PX, LitPart, NarrowProfiles, PixelGroup, ShareGroup, each};
 use multiversion::multiversion;
 
 /// The pixels of an effective PSF.

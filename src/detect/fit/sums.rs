@@ -9,8 +9,7 @@ use super::light::{GroupLight, SpotLight, add_light, linearise};
 use super::normal::NormalEquations;
 use super::parameters::{NoiseModel, ONE_SPOT};
 use super::window::Window;
-use crate::detect::lanes::{each, each_of, plus, times};
-use crate::detect::psf::{GROUP_PX, PixelGroup};
+use crate::detect::psf::{GROUP_PX, PixelGroup, each, each_of, plus, times};
 use multiversion::multiversion;
 
 /// The pixels of a window, their background and variance. All are in units of the background noise,

@@ -1,7 +1,6 @@
 //! The pixels of a fit.
 
-use crate::detect::effective_psf::LocalPsf;
-use crate::detect::psf::{GROUP_PX, MAX_WINDOW_PX, PIXEL_VARIANCE_PX2, PixelGroup};
+use crate::detect::psf::{GROUP_PX, LocalPsf, MAX_WINDOW_PX, PIXEL_VARIANCE_PX2, PixelGroup};
 
 /// A rectangle of pixels cut out of the frame.
 #[derive(Debug, Clone, Default)]

@@ -1,7 +1,7 @@
 //! Size and elongation of the spots over the field: the simplest polynomial that the stars allow.
 
 use super::stars::PsfStar;
-use crate::detect::effective_psf::{FIELD_TERMS, FieldFrame, FieldMoments, polynomials};
+use crate::detect::psf::{FIELD_TERMS, FieldFrame, FieldMoments, polynomials};
 use nalgebra::{DMatrix, DVector, SVector};
 
 /// Scatter of the stars' own moments beyond their errors: their colors, their neighbors.

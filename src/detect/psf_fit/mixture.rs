@@ -1,12 +1,11 @@
 //! The weights of the mixture: non-negative least squares over the pixels of all stars.
 
 use super::stars::{PsfStar, StarFitter};
-use crate::detect::effective_psf::{
-    EffectivePsf, FieldForm, FieldLobe, LocalPsf, SpotMoments, covariance, inverse,
-};
 use crate::detect::fit::{BLOCK, Block, products_of};
-use crate::detect::lanes::{each_of, plus};
-use crate::detect::psf::{GROUP_PX, LitPart, Lobe, NarrowProfiles, PixelGroup};
+use crate::detect::psf::{
+    EffectivePsf, FieldForm, FieldLobe, GROUP_PX, LitPart, Lobe, LocalPsf, NarrowProfiles,
+    PixelGroup, SpotMoments, covariance, each_of, inverse, plus,
+};
 use multiversion::multiversion;
 use nalgebra::DMatrix;
 

@@ -13,9 +13,8 @@ mod mixture;
 mod stars;
 
 use super::candidates::Peak;
-use super::effective_psf::{EffectivePsf, FieldForm, FieldFrame, SpotMoments};
 use super::fit::{FitBuffers, FrameMaps, NoiseModel};
-use super::psf::MAX_WINDOW_PX;
+use super::psf::{EffectivePsf, FieldForm, FieldFrame, MAX_WINDOW_PX, SpotMoments};
 use super::star_model::{StarModel, noise_of};
 use crate::base::statistics::median;
 use field::moments_over_field;

@@ -2,14 +2,14 @@
 
 use crate::base::statistics::median;
 use crate::detect::candidates::Peak;
-use crate::detect::effective_psf::{
-    EffectivePsf, FieldFrame, FieldMoments, LocalPsf, SpotMoments, covariance_by, stretch_by,
-};
 use crate::detect::fit::{
     BLOCK, Block, FrameMaps, NoiseModel, NormalEquations, SpotEstimate, Window, WindowPixels,
     sum_of,
 };
-use crate::detect::psf::{GROUP_PX, LitPart, NarrowProfiles, PixelGroup};
+use crate::detect::psf::{
+    EffectivePsf, FieldFrame, FieldMoments, GROUP_PX, LitPart, LocalPsf, NarrowProfiles,
+    PixelGroup, SpotMoments, covariance_by, stretch_by,
+};
 use crate::detect::star_model::isolated_peaks;
 use multiversion::multiversion;
 

@@ -2,9 +2,8 @@
 //! their PSF is measured.
 
 use super::spot_size::{MODE_WIDTH, weighted_size};
-use crate::detect::effective_psf::FieldFrame;
 use crate::detect::fit::{Fit, GaussianLight, NoiseModel, WindowPixels};
-use crate::detect::psf::GROUP_PX;
+use crate::detect::psf::{FieldFrame, GROUP_PX};
 
 /// Smaller elongations are of no account, as the logarithm of the ratio of the axes.
 const MIN_ELONGATION: f64 = 0.06;
@@ -27,7 +26,7 @@ const SIGNIFICANT_SIGMA: f64 = 5.0;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CommonElongation {
     field: FieldFrame,
-    /// Of `[e₁, e₂]` as in [`SpotMoments`](crate::detect::effective_psf::SpotMoments): sums of
+    /// Of `[e₁, e₂]` as in [`SpotMoments`](crate::detect::psf::SpotMoments): sums of
     /// residual times derivative, and of the squares of the derivatives, over the variance.
     sums: [[f64; 2]; 2],
     /// The same of the radial elongation in the corner.

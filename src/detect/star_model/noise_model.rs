@@ -5,8 +5,7 @@
 
 use super::bright_stars::MAX_MODEL_ERROR;
 use super::departure::{CommonElongation, is_departure};
-use super::spot_size::{BrightStars, MAX_STARS};
-use super::spot_size::{MODE_WIDTH, weighted_size};
+use super::spot_size::{BrightStars, MAX_STARS, MODE_WIDTH, weighted_size};
 use crate::detect::fit::{
     AnyLight, BatchStart, CholeskyFactor, Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel,
     ONE_SPOT, SpotEstimate, SpotLight, Window, WindowPixels, linearise, sum_of,

@@ -4,12 +4,11 @@ use super::peak::{MatchedFilter, PADDING, WindowPeak};
 use super::spot_model::{SpotModel, smear_variance_px2, without_smear};
 use super::square::{Square, nearest};
 use crate::base::coords::PixelPoint;
-use crate::detect::effective_psf::LocalPsf;
 use crate::detect::fit::{
     BatchStart, Fit, FitBuffers, FitConfig, MAX_BATCH_LOBES, NoiseModel, SpotEstimate, Window,
     window_radius,
 };
-use crate::detect::psf::{Lobe, PIXEL_VARIANCE_PX2};
+use crate::detect::psf::{Lobe, LocalPsf, PIXEL_VARIANCE_PX2};
 use crate::detect::star_model::{BrightStars, MAX_STARS, noise_of, spot_size, weighted_size};
 use crate::frame::Frame;
 use arrayvec::ArrayVec;

@@ -143,7 +143,8 @@ const BYTES_BETWEEN_CHECKS: usize = 1 << 16;
 
 /// At most `wanted` bytes of LZW.
 fn lzw(stored: &[u8], wanted: usize, account: &Account) -> Result<Vec<u8>, FrameError> {
-    use weezl::{BitOrder, LzwStatus, decode::Configuration};
+    use weezl::decode::Configuration;
+    use weezl::{BitOrder, LzwStatus};
     let configuration = Configuration::with_tiff_size_switch(BitOrder::Msb, 8);
     let mut decoder = configuration.with_yield_on_full_buffer(true).build();
     let mut bytes = vec![0; wanted];

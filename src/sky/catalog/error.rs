@@ -1,9 +1,8 @@
 //! Errors of catalogue files.
 
 use super::StarId;
-use std::fmt;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fmt, io};
 
 /// The readable kinds of files, for messages.
 const KINDS_READ: &str = "a compact catalog of starpipe, SKY2000 records of 520 bytes, the files of \

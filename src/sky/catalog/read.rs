@@ -9,9 +9,8 @@ use super::tycho2::Tycho2;
 use super::{Catalog, CatalogError, compact};
 use crate::base::interrupt::Interrupt;
 use rayon::prelude::*;
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 impl Catalog {
     /// Reads the catalogue in the file or directory `path`, whose [kind](super#kinds) is detected

@@ -144,7 +144,9 @@ impl Date {
 mod tests {
     use super::*;
     use crate::base::units::ARCSEC_PER_RAD;
-    use sofars::{eph::epv00, erst::gst06a, pnp};
+    use sofars::eph::epv00;
+    use sofars::erst::gst06a;
+    use sofars::pnp;
 
     const J2000_JD: f64 = 2_451_545.0;
     /// Terms of fourth order and above are neglected: up to 0.00017″ t⁴, which is 0.014″ after

@@ -2,8 +2,7 @@
 
 use super::canvas::Canvas;
 use super::kind::Kind;
-use super::recording;
-use super::{no_sky, scenery};
+use super::{no_sky, recording, scenery};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::frame::{Frame, FrameError, FrameMetadata};
 use crate::identify::IndexedCatalog;

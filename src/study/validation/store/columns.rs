@@ -3,7 +3,8 @@
 use crate::base::table::{Column, columns, field};
 use crate::study::robustness::Answer;
 use crate::study::validation::record::{FrameRecord, Named, RowKind, StarRecord};
-use serde::{Serialize, de::DeserializeOwned};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 /// A row of a table.
 pub trait TableRow: Sized + Serialize + DeserializeOwned {

@@ -3,8 +3,8 @@
 //! [`EffectivePsf`] → a [`PsfTable`] at each node of a grid over the field → that at a star's place,
 //! mixed from the four nodes around it.
 
-use super::effective_psf::{EffectivePsf, FieldForm, LocalPsf};
-use super::psf_table::{Layout, PsfTable, REACH_SIGMAS};
+use super::effective::{EffectivePsf, FieldForm, LocalPsf};
+use super::table::{Layout, PsfTable, REACH_SIGMAS};
 use multiversion::multiversion;
 use std::sync::OnceLock;
 
@@ -168,10 +168,9 @@ fn mix(parts: [(&[f32], f32); 4], into: &mut [f32]) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::table::tests::lobes;
     use super::*;
-    use crate::detect::effective_psf::{FieldFrame, FieldLobe, FieldMoments};
-    use crate::detect::psf::Lobe;
-    use crate::detect::psf_table::tests::lobes;
+    use crate::detect::psf::{FieldFrame, FieldLobe, FieldMoments, Lobe};
 
     #[test]
     fn tables_between_nodes_agree_with_the_spot_there() {

@@ -3,7 +3,7 @@
 //! The compiler makes one vector instruction of each of these, also inside of larger loops, of which
 //! it may choose the wrong one to vectorise.
 
-use super::psf::PixelGroup;
+use super::gaussian::PixelGroup;
 
 /// `f` of each value.
 #[inline(always)]

@@ -12,10 +12,10 @@
 //! pixels' integration in it; Unser, Aldroubi & Eden 1993, IEEE Trans. Signal Process. 41, 821, doi
 //! 10.1109/78.193220, for interpolation with B-splines.
 
-use super::lanes::each_of;
-use super::psf::{
+use super::gaussian::{
     CumulativeProfile, GROUP_PX, Lobe, MAX_WINDOW_PX, PIXEL_VARIANCE_PX2, PixelGroup,
 };
+use super::lanes::each_of;
 use multiversion::multiversion;
 
 /// Samples that the spline at a point takes along an axis.

@@ -5,9 +5,9 @@
 //! Anderson & King 2000, PASP 112, 1360, doi 10.1086/316632, for the effective PSF and its change
 //! over the field.
 
-use super::detection::MeasuredPsf;
-use super::psf::{Lobe, MAX_WINDOW_PX};
-use super::psf_table::PsfTable;
+use super::gaussian::{Lobe, MAX_WINDOW_PX};
+use super::table::PsfTable;
+use crate::detect::detection::MeasuredPsf;
 
 /// Size and elongation of a spot: `[ln σ, e₁, e₂]`. Its covariance is `σ² exp(e₁ K + e₂ L)` with the
 /// matrices K = diag(1, −1) and L = ((0, 1), (1, 0)): its axes are in a ratio of `exp |e|`.
@@ -30,7 +30,7 @@ pub(crate) struct FieldLobe {
 pub(crate) struct LocalPsf {
     /// Empty for a single Gaussian of the size that is fitted.
     pub lobes: Vec<Lobe>,
-    /// The size, as [`Fit::spot_px`](super::fit::Fit::spot_px), of a spot that is not scaled, in
+    /// The size, as [`Fit::spot_px`](crate::detect::fit::Fit::spot_px), of a spot that is not scaled, in
     /// pixels.
     pub spot_px: f64,
     /// The spot of that size, where it is tabulated.
