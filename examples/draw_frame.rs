@@ -17,7 +17,8 @@ use starpipe::sky::catalog::Catalog;
 use std::error::Error;
 use std::fs::File;
 use std::path::Path;
-use tiff::encoder::{Compression, DeflateLevel, Predictor, TiffEncoder, colortype::Gray16};
+use tiff::encoder::colortype::Gray16;
+use tiff::encoder::{Compression, DeflateLevel, Predictor, TiffEncoder};
 
 /// Standard deviation of a spot before the pixels integrate it.
 const SPOT_SIGMA_PX: f64 = 1.0;

@@ -17,7 +17,7 @@ use starpipe::camera::data_sheet::{DataSheet, Preset};
 use starpipe::detect::{self, DetectConfig, Detections, detect_into};
 use starpipe::frame::Frame;
 use starpipe::identify::IndexedCatalog;
-use starpipe::identify::attitude::{MeasuredStar, fit_camera};
+use starpipe::identify::fit::{MeasuredStar, fit_camera};
 use starpipe::model::sensitivity::Scenario;
 use starpipe::model::simulate::{Pointing, Scene, Simulator};
 use starpipe::pipeline::Context;

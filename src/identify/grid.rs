@@ -1,6 +1,6 @@
 //! Square cells over a frame, for what is counted place by place.
 
-use super::field::StarField;
+use crate::identify::field::StarField;
 
 /// A division of the frame into square cells. Around it is a border of cells that stay empty, so
 /// that each cell of the frame has eight neighbors.

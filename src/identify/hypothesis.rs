@@ -1,11 +1,11 @@
 //! A hypothesis about pointing and scale, and the catalogue stars that it predicts in the frame.
 
-use super::field::{ObservedStar, Photometry, StarField};
-use super::indexed_catalog::IndexedCatalog;
-use super::predict::{Depth, PredictedStar, Surroundings, View};
 use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::{CameraModel, LANES};
+use crate::identify::field::{ObservedStar, Photometry, StarField};
+use crate::identify::index::IndexedCatalog;
+use crate::identify::predict::{Depth, PredictedStar, Surroundings, View};
 use std::ops::Range;
 
 /// Predicted stars for each observed one, where the zero point of the magnitudes is unknown.

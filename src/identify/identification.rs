@@ -1,8 +1,8 @@
 //! The result of identification.
 
-use super::field::SourceIndex;
 use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::camera::CameraModel;
+use crate::identify::field::SourceIndex;
 use crate::sky::catalog::StarIndex;
 use nalgebra::Matrix3;
 

@@ -1,9 +1,9 @@
 //! Pairs observed stars with predicted ones by place and brightness.
 
-use super::field::ObservedStar;
-use super::predict::PredictedStar;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::neighbors::PointGrid;
+use crate::identify::field::ObservedStar;
+use crate::identify::predict::PredictedStar;
 use crate::sky::catalog::StarIndex;
 use std::cmp::Reverse;
 

@@ -1,6 +1,6 @@
 //! A panic that tests ask for, to show what a bug does to the rest of a run. Release builds do not have it.
 
-use super::field::StarField;
+use crate::identify::field::StarField;
 use std::env;
 
 /// Names the size of the frames that meet the bug, as `640x480`.

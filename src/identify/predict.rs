@@ -1,8 +1,8 @@
 //! Predicts the positions of catalogue stars in a frame.
 
-use super::indexed_catalog::IndexedCatalog;
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::camera::{CameraModel, LANES};
+use crate::identify::index::IndexedCatalog;
 use crate::sky::catalog::StarIndex;
 use crate::sky::catalog::sky_grid::{GridStar, chord_of};
 

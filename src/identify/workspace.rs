@@ -1,18 +1,16 @@
 //! Identification of one star field in two parts: where the camera points, then which star is
 //! which, with the final fit to all of them.
 
-use super::field::StarField;
-use super::hypothesis::Problem;
-use super::identification::{Identification, MIN_STARS, SearchFailure, StarMatch};
-use super::indexed_catalog::IndexedCatalog;
-use super::pairing::Pair;
-use super::priors::Priors;
-use super::refine::{NamingStart, Refined, Start};
-use super::search::{Buffers, Found, LOG10_FALSE_ALARM_LIMIT, Search};
-use super::thinning::Thinning;
-use super::tiers::Tiers;
 use crate::base::interrupt::Interrupt;
 use crate::camera::DistortionModel;
+use crate::identify::field::StarField;
+use crate::identify::fit::{NamingStart, Refined, Start};
+use crate::identify::hypothesis::Problem;
+use crate::identify::identification::{Identification, MIN_STARS, SearchFailure, StarMatch};
+use crate::identify::index::IndexedCatalog;
+use crate::identify::pairing::Pair;
+use crate::identify::priors::Priors;
+use crate::identify::search::{Buffers, Found, LOG10_FALSE_ALARM_LIMIT, Search, Thinning, Tiers};
 use std::f64::consts::PI;
 
 /// Numbers of stars, the brightest, that decide how much distortion is fitted. Where most

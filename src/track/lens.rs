@@ -1,14 +1,14 @@
 //! Focal length and distortion, refined from frame to frame.
 //!
 //! The stars of a frame give equations for its attitude and for the camera, those of
-//! `identify::attitude`. The attitude is eliminated; what is left is information about the focal
+//! `identify::fit`. The attitude is eliminated; what is left is information about the focal
 //! length and the coefficients of the distortion, which is summed over the frames: the result is the
 //! mean of all frames weighted by their information. Old frames are forgotten slowly, as a camera
 //! changes with its temperature.
 
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::camera::{CameraModel, Distortion};
-use crate::identify::attitude::MeasuredStar;
+use crate::identify::fit::MeasuredStar;
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 
 /// Parameters of the attitude.

@@ -5,7 +5,7 @@ use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::base::statistics::median;
 use crate::camera::CameraModel;
 use crate::identify::MIN_STARS;
-use crate::identify::attitude::{CameraFit, MeasuredStar, fit_camera};
+use crate::identify::fit::{CameraFit, MeasuredStar, fit_camera};
 use crate::sky::catalog::StarIndex;
 use nalgebra::Vector4;
 

@@ -12,7 +12,7 @@ use crate::camera::CameraModel;
 use crate::detect::DetectError;
 use crate::detect::windows::{ExpectedStar, FoundStar, SpotModel, WindowDetector};
 use crate::frame::{Frame, SaturationFinder};
-use crate::identify::attitude::MeasuredStar;
+use crate::identify::fit::MeasuredStar;
 use crate::identify::{
     Identification, LOG10_FALSE_ALARM_LIMIT, MIN_STARS, Scale, ScalePrior, ScaleSource,
 };

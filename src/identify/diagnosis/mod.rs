@@ -21,12 +21,12 @@ mod trails;
 pub use cause::{Diagnosis, DoubleImage, Excluded};
 pub use doubles::find_unnamed as find_double_image;
 
-use super::identification::{Identification, SearchFailure};
-use super::priors::Priors;
-use super::{IndexedCatalog, StarField, identify};
 use crate::camera::focal_length_px;
 use crate::detect::Detections;
 use crate::frame::Frame;
+use crate::identify::identification::{Identification, SearchFailure};
+use crate::identify::priors::Priors;
+use crate::identify::{IndexedCatalog, StarField, identify};
 
 /// A star field that was not identified.
 #[derive(Debug, Clone, Copy)]

@@ -23,6 +23,7 @@
 //! Sutherland & Saunders 1992, MNRAS 259, 413, for the likelihood ratio and the reliability of a
 //! counterpart; Budavári & Szalay 2008, ApJ 679, 301, for the Bayesian form.
 
+mod blends;
 mod candidate;
 mod completeness;
 mod likelihood;
@@ -30,13 +31,14 @@ mod odds;
 mod packed;
 mod unrelated;
 
+pub use blends::Blends;
 pub use candidate::Candidate;
 pub use likelihood::position_density;
 
-use super::field::{ObservedStar, Photometry, StarField};
-use super::hypothesis::Hypothesis;
-use super::pairing::Pairing;
-use super::predict::PredictedStar;
+use crate::identify::field::{ObservedStar, Photometry, StarField};
+use crate::identify::hypothesis::Hypothesis;
+use crate::identify::pairing::Pairing;
+use crate::identify::predict::PredictedStar;
 use completeness::Completeness;
 use likelihood::MagnitudeRelation;
 use odds::{OddsInputs, pack, set_chances, set_odds};

@@ -118,10 +118,10 @@ impl TriangleIndex {
 
 #[cfg(test)]
 mod tests {
-    use super::super::cache;
     use super::super::triangle::TriangleShape;
     use super::*;
     use crate::base::coords::UnitVector;
+    use crate::identify::index::cache;
     use crate::sky::catalog::Catalog;
     use std::collections::HashSet;
 

@@ -2,7 +2,7 @@
 
 use super::cache::{self, CacheError};
 use super::cache_directory::cache_directory;
-use super::index::TriangleIndex;
+use super::triangle_index::TriangleIndex;
 use crate::base::interrupt::{Interrupt, Interrupted};
 use crate::base::units::RAD_PER_DEG;
 use crate::sky::catalog::face_grid::FaceGrid;
@@ -120,7 +120,7 @@ impl<'a> IndexedCatalog<'a> {
     /// Calls `visit` with the corners of every triangle of a size class whose ratios lie within a
     /// tolerance of those given, in an order that depends on the arguments alone.
     #[inline]
-    pub(super) fn for_each_similar(
+    pub(in crate::identify) fn for_each_similar(
         &self,
         similar: (usize, [f64; 2], f64),
         visit: impl FnMut(&[u32; 3]),
@@ -131,7 +131,7 @@ impl<'a> IndexedCatalog<'a> {
 
     /// The stars in small cells. They are sorted when they are first asked for: few searches last so
     /// long that it is worth it.
-    pub(super) fn faces(&self) -> &FaceGrid {
+    pub(in crate::identify) fn faces(&self) -> &FaceGrid {
         self.faces.get_or_init(|| FaceGrid::new(self.stars()))
     }
 

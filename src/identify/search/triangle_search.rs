@@ -9,18 +9,17 @@
 
 use super::confirmation::{Batch, ConfirmingStars, PendingHypothesis, Pose};
 use super::false_alarm::{FalseAlarm, TESTED_STARS};
-use super::field::{ObservedStar, Photometry, StarField};
-use super::hypothesis::{Hypothesis, Problem};
-use super::pairing::Pair;
 use super::plan::{BRIGHTEST, PASSES, Pass, Plan, TIER};
-use super::priors::{Priors, SkyRegion};
-use super::refine::{Refined, Refiner, Start};
 use super::tiers::Tiers;
-use super::triangle::TriangleShape;
 use crate::base::coords::Rotation;
 use crate::base::interrupt::Interrupt;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px, frame_centre};
-use crate::identify::attitude::POSE_PARAMETERS;
+use crate::identify::field::{ObservedStar, Photometry, StarField};
+use crate::identify::fit::{POSE_PARAMETERS, Refined, Refiner, Start};
+use crate::identify::hypothesis::{Hypothesis, Problem};
+use crate::identify::index::TriangleShape;
+use crate::identify::pairing::Pair;
+use crate::identify::priors::{Priors, SkyRegion};
 use crate::sky::catalog::sky_grid::GridStar;
 use arrayvec::ArrayVec;
 use nalgebra::{Matrix3, Vector3};

@@ -3,18 +3,17 @@
 //! pairing → fit → pairing within a smaller radius → … with as much lens distortion as the stars
 //! support
 
-use super::blends::Blends;
-use super::field::{ObservedStar, Photometry};
-use super::hypothesis::{Hypothesis, Problem};
-use super::naming::{Candidate, Naming, Stars};
-use super::pairing::{Pair, Pairing};
-use super::predict::{PredictedStar, Surroundings};
-use crate::base::statistics::median;
-use crate::camera::DistortionModel;
-use crate::identify::attitude::{
+use super::{
     CameraFit, MeasuredStar, POSE_PARAMETERS, Predictions, fit_camera, predictions_by_lens_terms,
     predictions_by_polynomial,
 };
+use crate::base::statistics::median;
+use crate::camera::DistortionModel;
+use crate::identify::field::{ObservedStar, Photometry};
+use crate::identify::hypothesis::{Hypothesis, Problem};
+use crate::identify::naming::{Blends, Candidate, Naming, Stars};
+use crate::identify::pairing::{Pair, Pairing};
+use crate::identify::predict::{PredictedStar, Surroundings};
 use std::f64::consts::PI;
 
 /// Largest distance of a pair, in typical errors on one axis.

@@ -1,16 +1,4 @@
-//! Attitude with covariance, from directions known on the sky and measured in the camera.
-//!
-//! [`estimate_attitude`] solves Wahba's problem for directions measured with a known camera.
-//! [`fit_camera`] fits attitude, focal length and lens distortion to star positions in pixels, for
-//! an unknown camera.
-
-mod adjustment;
-mod fit;
-mod predictions;
-
-pub use adjustment::{MeasuredStar, POSE_PARAMETERS};
-pub use fit::{CameraFit, fit_camera};
-pub use predictions::{Predictions, predictions_by_lens_terms, predictions_by_polynomial};
+//! Attitude from directions known on the sky and measured with a known camera: Wahba's problem.
 
 use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use nalgebra::{Matrix3, SVD};

@@ -12,11 +12,11 @@
 //! Every two parameters fitted beyond pointing, roll and scale use up another star. The stars used
 //! up are assumed to be those least likely to agree by chance, which is the pessimistic choice.
 
-use super::attitude::POSE_PARAMETERS;
-use super::field::{ObservedStar, StarField};
-use super::hypothesis::{Hypothesis, Problem};
-use super::predict::{PredictedStar, Surroundings};
 use crate::base::statistics::{LnProduct, log10_poisson_binomial_tail};
+use crate::identify::field::{ObservedStar, StarField};
+use crate::identify::fit::POSE_PARAMETERS;
+use crate::identify::hypothesis::{Hypothesis, Problem};
+use crate::identify::predict::{PredictedStar, Surroundings};
 use std::f64::consts::{LN_10, PI};
 use std::sync::LazyLock;
 

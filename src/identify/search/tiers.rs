@@ -6,7 +6,7 @@
 //! most of them.
 
 use super::false_alarm::TESTED_STARS;
-use super::field::StarField;
+use crate::identify::field::StarField;
 
 /// Detections that the first tier leaves out.
 const FIRST_LEFT_OUT: usize = 20;

@@ -6,8 +6,8 @@
 //! # Reference
 //! Lang et al. 2010, AJ 139, 1782, section 2.1, for the same in astrometry.net.
 
-use super::field::StarField;
-use super::grid::Grid;
+use crate::identify::field::StarField;
+use crate::identify::grid::Grid;
 
 /// Cells along the frame's longer side.
 const CELLS: usize = 8;

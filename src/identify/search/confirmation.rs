@@ -9,9 +9,9 @@
 //! # Reference
 //! Wald 1945, Ann. Math. Stat. 16, 117: the sequential probability ratio test.
 
-use super::field::StarField;
-use super::indexed_catalog::IndexedCatalog;
 use crate::base::coords::{Icrs, UnitVector};
+use crate::identify::field::StarField;
+use crate::identify::index::IndexedCatalog;
 use crate::sky::catalog::face_grid::Disc;
 use crate::sky::catalog::sky_grid::chord_of;
 use nalgebra::{Matrix3, Vector3};

@@ -14,9 +14,9 @@
 //! Comaniciu & Meer 2002, IEEE Trans. Pattern Anal. Mach. Intell. 24, 603, doi 10.1109/34.1000236,
 //! for the mean shift.
 
-use super::hypothesis::{Hypothesis, Problem};
-use super::naming::{Candidate, position_density};
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
+use crate::identify::hypothesis::{Hypothesis, Problem};
+use crate::identify::naming::{Candidate, position_density};
 use crate::sky::catalog::StarIndex;
 use crate::sky::catalog::sky_grid::{GridStar, chord_of};
 

@@ -1,0 +1,19 @@
+//! A catalogue prepared for identification: its stars by position, and the triangles they form.
+//!
+//! stars → `cells` of the sky → `listing` of their triangles → `table` of each size class, sorted
+//! by shape (`triangle`) → [`TriangleIndex`], kept in a file (`cache`) → [`IndexedCatalog`].
+
+mod cache;
+mod cache_directory;
+mod cells;
+mod indexed_catalog;
+mod listing;
+mod table;
+mod triangle;
+mod triangle_index;
+
+pub use cache::CacheError;
+pub use cache_directory::cache_directory;
+pub use indexed_catalog::IndexedCatalog;
+pub use triangle::TriangleShape;
+pub use triangle_index::TriangleIndex;

@@ -1,0 +1,15 @@
+//! The search for a hypothesis about pointing, roll and scale.
+//!
+//! `triangle_search` looks triangles up and confirms what they suggest (`confirmation`), as far as a `plan`
+//! goes; `false_alarm` decides. `thinning` and `tiers` leave detections out that hide the stars.
+
+mod confirmation;
+mod false_alarm;
+mod plan;
+mod thinning;
+mod tiers;
+mod triangle_search;
+
+pub use thinning::Thinning;
+pub use tiers::Tiers;
+pub use triangle_search::{Buffers, Found, LOG10_FALSE_ALARM_LIMIT, Search};
