@@ -97,6 +97,18 @@ pub struct Detections {
     pub is_truncated: bool,
 }
 
+impl Detections {
+    /// Removes what was found before; the list keeps its memory.
+    pub(super) fn clear(&mut self) {
+        let mut sources = std::mem::take(&mut self.sources);
+        sources.clear();
+        *self = Self {
+            sources,
+            ..Self::default()
+        };
+    }
+}
+
 /// The point spread function measured on the stars of a frame, where they are not round Gaussians of
 /// one size.
 #[derive(Debug, Clone, Copy, PartialEq)]

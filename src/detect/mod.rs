@@ -66,13 +66,13 @@ pub use filter_model::FilterModel;
 pub use workspace::Workspace;
 
 use crate::frame::{Frame, MIN_SIDE_PX};
-use background::Mesh;
+use background::{FrameBackground, Mesh};
 use candidates::{CandidateMemory, PeakSearch};
-use measure::{Measurement, Ring, StarShape, sharpest_px};
+use measure::{MeasureBuffers, Measurement, Ring, StarShape, sharpest_px};
 use pixels::View;
 use psf::{FieldTables, PIXEL_VARIANCE_PX2};
 use psf_fit::measure_psf;
-use search::{FrameSearch, SearchInput};
+use search::{FrameSearch, SearchInput, Searched};
 use trailed::{Trails, measure_trailed};
 use wings::measure_wings;
 
@@ -138,7 +138,7 @@ fn run(
     found: &mut Detections,
 ) -> Result<(), DetectError> {
     error::check(frame, config)?;
-    found.sources.clear();
+    found.clear();
     let Workspace {
         saturation,
         background,
@@ -162,55 +162,85 @@ fn run(
         memory: CandidateMemory::beside(frame, *memory),
     };
     let searched = search.run(&input)?;
-    let (mut stars, pass) = (searched.stars, searched.pass);
-    let is_truncated = search.found.is_full();
+    set_levels(found, background, &searched);
+    if !measure_trails(&input, search, &searched, found)? {
+        measure_spots(&input, search, searched, measure, found)?;
+    }
+    keep_brightest(found, config, search.found.is_full());
+    if found.trails.is_none() {
+        add_wings(&view, &background.mesh, found);
+    }
+    Ok(())
+}
+
+/// Background, noise and threshold, over the frame.
+fn set_levels(found: &mut Detections, background: &FrameBackground, searched: &Searched) {
+    found.background_adu = background.median_adu;
+    found.noise_adu = background.median_sigma_adu;
+    found.threshold_sigma = searched.pass.threshold_level;
+    found.noise_tail = searched.pass.noise_tail;
+    found.spot_sigma_px = searched.stars.spot_px;
+}
+
+/// Measures the stars if they are long trails; else returns false.
+fn measure_trails(
+    input: &SearchInput<'_>,
+    search: &FrameSearch,
+    searched: &Searched,
+    found: &mut Detections,
+) -> Result<bool, DetectError> {
+    let PeakSearch { peaks, regions, .. } = &search.found;
+    let maps = input.searched_maps(&search.filtered, searched);
+    let Some(trails) = Trails::measure(&maps, peaks, regions) else {
+        return Ok(false);
+    };
+    measure_trailed(&maps, &trails, peaks, &mut found.sources)?;
+    found.trails = Some(trails.summary());
+    Ok(true)
+}
+
+/// Measures stars that are spots: with a round Gaussian, or the effective PSF of the frame.
+fn measure_spots(
+    input: &SearchInput<'_>,
+    search: &mut FrameSearch,
+    searched: Searched,
+    buffers: &mut MeasureBuffers,
+    found: &mut Detections,
+) -> Result<(), DetectError> {
+    let Searched { mut stars, pass } = searched;
     let FrameSearch {
         filtered,
         found: PeakSearch { peaks, regions, .. },
         fits,
         ..
     } = search;
-    let mut maps = input.maps(Some(&filtered.mesh), stars.spot_px, pass.matched_gain);
-    found.background_adu = background.median_adu;
-    found.noise_adu = background.median_sigma_adu;
-    found.threshold_sigma = pass.threshold_level;
-    found.noise_tail = pass.noise_tail;
-    let trails = Trails::measure(&maps, peaks, regions);
-    found.trails = trails.as_ref().map(Trails::summary);
-    if let Some(trails) = trails {
-        measure_trailed(&maps, &trails, peaks, &mut found.sources)?;
-        found.spot_sigma_px = stars.spot_px;
-        (found.psf, found.wings) = (None, None);
-        keep_brightest(found, config, is_truncated);
-        return Ok(());
-    }
+    let mut maps = input.searched_maps(filtered, &searched);
     let shape = StarShape::measure(&maps, peaks);
     shape.merge_peaks(peaks, regions);
-    view.check()?;
+    input.view.check()?;
     let psf = if stars.is_departure {
         measure_psf(&maps, peaks, &mut stars, fits)
     } else {
         None
     };
+    let size = (input.view.width, input.view.height);
     let tables = psf
         .as_ref()
-        .map(|psf| FieldTables::new(psf, (view.width, view.height), peaks.len()));
+        .map(|psf| FieldTables::new(psf, size, peaks.len()));
     maps.psf = tables.as_ref();
     let measurement = Measurement {
         maps,
         shape,
         sharpest_px: sharpest_px(&maps, &shape),
         noise: stars.noise,
-        method: config.centroid,
+        method: input.config.centroid,
         regions,
         threshold: pass.threshold,
         ring: Ring::around(maps.width_px()),
     };
-    measurement.run(peaks, measure, &mut found.sources)?;
-    keep_brightest(found, config, is_truncated);
+    measurement.run(peaks, buffers, &mut found.sources)?;
     found.spot_sigma_px = stars.spot_px;
-    found.psf = psf.map(|psf| psf.summary((view.width, view.height)));
-    add_wings(&view, &background.mesh, found);
+    found.psf = psf.map(|psf| psf.summary(size));
     Ok(())
 }
 
@@ -244,9 +274,4 @@ fn set_empty_frame(frame: &Frame, config: &DetectConfig, found: &mut Detections)
     found.noise_adu = f64::from(background::rounding_sigma_adu(frame.step_adu));
     found.spot_sigma_px = config.spot_sigma_px.unwrap_or(star_model::DEFAULT_SPOT_PX);
     found.threshold_sigma = config.threshold_sigma.unwrap_or(0.0);
-    found.psf = None;
-    found.trails = None;
-    found.wings = None;
-    found.noise_tail = None;
-    found.is_truncated = false;
 }

@@ -72,6 +72,12 @@ impl<'a> SearchInput<'a> {
         }
     }
 
+    /// The frame with its maps after the search.
+    pub fn searched_maps(&self, filtered: &'a FilteredFrame, searched: &Searched) -> FrameMaps<'a> {
+        let Searched { stars, pass } = searched;
+        self.maps(Some(&filtered.mesh), stars.spot_px, pass.matched_gain)
+    }
+
     /// The size that the options state, else that of the stars.
     fn with_stated_size(&self, model: StarModel) -> StarModel {
         StarModel {
