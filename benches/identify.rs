@@ -57,7 +57,7 @@ fn bench_parts(
         bencher.iter_custom(|rounds| {
             let mut taken = Duration::ZERO;
             for _ in 0..rounds {
-                let pointing = workspace.point(black_box(field), priors, indexed);
+                let pointing = workspace.find_pointing(black_box(field), priors, indexed);
                 let start = Instant::now();
                 black_box(pointing.and_then(identify::Pointing::name_stars).is_ok());
                 taken += start.elapsed();

@@ -76,7 +76,7 @@ fn bench(criterion: &mut Criterion) {
         let mut next = |tracker: &mut Tracker, frame: &Frame| {
             number += 1;
             let time_s = INTERVAL_S * f64::from(number);
-            tracker.next(frame, Some(time_s)).expect("a frame")
+            tracker.process_frame(frame, Some(time_s)).expect("a frame")
         };
         group.bench_function(name, |bencher| {
             bencher.iter_custom(|count| {

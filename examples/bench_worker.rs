@@ -79,7 +79,7 @@ impl Bench<'_> {
     fn naming(&mut self, is_known: bool) -> (f64, Option<Identification>) {
         let priors = self.priors(is_known);
         let field = star_field(&self.frame, &self.known, 0.0);
-        let pointing = self.identify.point(&field, &priors, &self.indexed);
+        let pointing = self.identify.find_pointing(&field, &priors, &self.indexed);
         let start = Instant::now();
         let found = pointing.and_then(identify::Pointing::name_stars);
         (milliseconds(start), found.ok().cloned())

@@ -351,7 +351,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             simulator.frame(&pointing, seed)?.0
         };
         let start = Instant::now();
-        let track = tracker.next(&frame, Some(time_s))?;
+        let track = tracker.process_frame(&frame, Some(time_s))?;
         let time_us = start.elapsed().as_secs_f64() * 1e6;
         tally.add(&track, &truth, rate_deg_s.map(f64::to_radians), before);
         before = track.mode;

@@ -33,13 +33,15 @@
 //! }
 //! ```
 //!
+//! The programs in `examples/` go on from here: `solve.rs`, `simulate.rs` and `track.rs`.
+//!
 //! # The rooms
 //!
 //! Each uses only those above it in this table.
 //!
 //! | module | answers |
 //! |---|---|
-//! | [`base`] | what numbers mean: units, directions, dates, statistics |
+//! | `base` | what numbers mean: units, directions, dates, statistics |
 //! | [`sky`] | what is up there, and from where it is seen: catalogue, Moon and planets, observer |
 //! | [`frame`] | what a file holds: readers, writers, metadata |
 //! | [`camera`] | what instrument: geometry, data sheet |
@@ -52,12 +54,20 @@
 //! | [`mod@track`] | where does the camera point now: from frame to frame |
 //! | [`report`] | how to present it: JSON, text, tables, overlays, world coordinates |
 //! | `archive` | what do many frames show: tables in Parquet, made in parts (feature `archive`) |
-//! | [`study`] | is it good enough: validation, robustness, defocus, the papers' experiments |
+//! | `study` | is it good enough: validation, robustness, defocus, the papers' experiments |
 //!
 //! Pixels, angles and coordinate systems: [`conventions`].
+//!
+//! # What is stable
+//!
+//! What these pages show changes only with the version, as semantic versioning has it;
+//! `docs/public-api.txt` lists it. What is public but hidden here serves the program, the Python
+//! package and their tests, and may change at any time.
 
 #[cfg(feature = "archive")]
+#[doc(hidden)]
 pub mod archive;
+#[doc(hidden)]
 pub mod base;
 pub mod calibration;
 pub mod camera;
@@ -69,12 +79,14 @@ pub mod photometry;
 pub mod pipeline;
 pub mod report;
 pub mod sky;
+#[doc(hidden)]
 pub mod study;
 pub mod track;
 
-pub use base::coords::{PixelPoint, UnitVector};
-pub use base::epoch::ObservationDate;
+pub use base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
+pub use base::epoch::{DateError, ObservationDate};
 pub use base::interrupt::{Interrupt, Interrupted};
+pub use base::remedy::{OptionNames, Remedy};
 pub use calibration::Calibration;
 pub use camera::CameraModel;
 pub use detect::{DetectConfig, Detection, Detections, detect};
@@ -82,8 +94,9 @@ pub use frame::Frame;
 pub use identify::{
     Identification, IndexedCatalog, Priors, ScalePrior, SkyRegion, StarMatch, identify,
 };
+pub use nalgebra;
 pub use pipeline::{
-    CentroidList, Context, Note, Outcome, Reason, Solution, SolveOptions, Source, Workspace,
+    CentroidList, Context, Error, Note, Outcome, Reason, Solution, SolveOptions, Source, Workspace,
     solve_centroids, solve_file, solve_frame,
 };
 pub use report::{FrameReport, TextOptions};

@@ -27,7 +27,7 @@ fn a_tracked_frame_allocates_nothing_in_steady_state() {
             let time_s = Some(INTERVAL_S * f64::from(index));
             let mut mode = Mode::Lost;
             let counted = allocation_counter::measure(|| {
-                mode = tracker.next(frame, time_s).unwrap().mode;
+                mode = tracker.process_frame(frame, time_s).unwrap().mode;
             });
             if index == 0 {
                 assert!(counted.count_total > 0, "the counter does not count");

@@ -39,7 +39,7 @@ fn a_search_of_few_triangles_is_asked_often_too() {
     let context = Context::new(&indexed);
     let frame = few_triangles();
     let (interrupt, asked) = at_question(2000);
-    let mut workspace = Workspace::new().until(&interrupt);
+    let mut workspace = Workspace::new().with_interrupt(&interrupt);
     let solution = solve_frame(&frame, &context, &mut workspace).unwrap();
     match solution.outcome {
         Outcome::NotIdentified(reason) => assert_eq!(reason.code(), "interrupted"),
@@ -54,7 +54,7 @@ fn a_frame_is_ended_wherever_it_is_and_the_buffers_serve_the_next() {
     let context = Context::new(&indexed);
     let frame = frame::read(fixture("cygnus/cygnus.tif")).unwrap();
     let (never, asked) = at_question(usize::MAX);
-    let mut workspace = Workspace::new().until(&never);
+    let mut workspace = Workspace::new().with_interrupt(&never);
     let expected = solve_frame(&frame, &context, &mut workspace).unwrap();
     let questions = asked.load(Ordering::Relaxed);
     assert!(questions > 30, "asked {questions} times");
@@ -66,7 +66,7 @@ fn a_frame_is_ended_wherever_it_is_and_the_buffers_serve_the_next() {
         .chain([questions - 1, questions])
     {
         let (interrupt, asked) = at_question(number);
-        workspace = workspace.until(&interrupt);
+        workspace = workspace.with_interrupt(&interrupt);
         let solution = solve_frame(&frame, &context, &mut workspace).unwrap();
         match solution.outcome {
             Outcome::NotIdentified(reason) if reason.code() == "interrupted" => {
@@ -79,7 +79,7 @@ fn a_frame_is_ended_wherever_it_is_and_the_buffers_serve_the_next() {
         let asked = asked.load(Ordering::Relaxed);
         assert!(asked < number + 10, "{number} became {asked}");
 
-        workspace = workspace.until(&Interrupt::default());
+        workspace = workspace.with_interrupt(&Interrupt::default());
         let next = solve_frame(&frame, &context, &mut workspace).unwrap();
         assert_eq!(next.outcome, expected.outcome, "after question {number}");
         assert_eq!(next.sources, expected.sources, "after question {number}");

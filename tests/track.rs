@@ -153,7 +153,7 @@ fn a_jump_is_noticed_and_answered_in_the_same_frame() {
         }
         let frame = frame(truth, RATE_DEG_S, u64::from(index));
         let time_s = INTERVAL_S * f64::from(index);
-        let track = tracker.next(&frame, Some(time_s)).unwrap();
+        let track = tracker.process_frame(&frame, Some(time_s)).unwrap();
         if index == 5 {
             assert!(matches!(track.loss, Some(Loss::NoAgreement { .. })));
         }
@@ -182,17 +182,18 @@ fn frames_of_another_size_and_times_that_stand_still_are_solved_in_full() {
         .map(|i| frame(attitude(still, i), still, u64::from(i)))
         .collect();
     for frame in &frames[..3] {
-        let track = tracker.next(frame, None).unwrap();
+        let track = tracker.process_frame(frame, None).unwrap();
         assert!(track.attitude.is_some() && track.time_s.is_none());
         assert!(track.stars_used <= 12 || track.mode == Mode::Acquired);
     }
     let cropped = Frame::new(640, 470, frames[3].values()[..640 * 470].to_vec()).unwrap();
-    let track = tracker.next(&cropped, None).unwrap();
+    let track = tracker.process_frame(&cropped, None).unwrap();
     assert_eq!(
         (track.mode, track.loss),
         (Mode::Acquired, Some(Loss::OtherSize))
     );
-    let mut at = |frame: &Frame, time_s: f64| tracker.next(frame, Some(time_s)).unwrap().loss;
+    let mut at =
+        |frame: &Frame, time_s: f64| tracker.process_frame(frame, Some(time_s)).unwrap().loss;
     assert_eq!(at(&frames[0], 1.0), Some(Loss::OtherSize));
     assert_eq!(at(&frames[1], 2.0), Some(Loss::NoRate));
     assert_eq!(at(&frames[2], 2.0), Some(Loss::NotLater));

@@ -96,7 +96,7 @@ pub fn pipeline(data: &[u8]) {
 fn with_workspace<T>(interrupt: &Interrupt, solve: impl FnOnce(&mut Workspace) -> T) -> T {
     thread_local!(static USED: RefCell<Workspace> = RefCell::default());
     USED.with_borrow_mut(|used| {
-        *used = mem::take(used).until(interrupt);
+        *used = mem::take(used).with_interrupt(interrupt);
         solve(used)
     })
 }

@@ -43,7 +43,7 @@ pub fn detect(
         let frame = source.frame(&name, bad, &mut buffers);
         let frame = frame.map_err(exception)?.as_stored();
         let workspace = Workspace::new().on_threads(useful(threads));
-        let mut workspace = workspace.until(interrupt.clone());
+        let mut workspace = workspace.with_interrupt(interrupt.clone());
         let found = starpipe::detect(&frame, &config, &mut workspace).map_err(exception)?;
         json(&Detected {
             stars: detections(&found),

@@ -227,7 +227,7 @@ impl Pipeline {
         let kept = kept.ok().and_then(|mut kept| kept.pop());
         let mut workspace = kept.unwrap_or_default();
         workspace.detect = workspace.detect.on_threads(useful(threads));
-        workspace.until(interrupt)
+        workspace.with_interrupt(interrupt)
     }
 
     fn keep(&self, workspace: Workspace) {

@@ -68,7 +68,7 @@ pub fn validate(
         };
         let solved = (0..frames)
             .into_par_iter()
-            .map_init(|| Workspace::new().until(interrupt), solve)
+            .map_init(|| Workspace::new().with_interrupt(interrupt), solve)
             .collect::<PyResult<Vec<_>>>()?;
         for solved in solved {
             all.add_frame(&solved.frame);

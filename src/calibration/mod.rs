@@ -21,16 +21,21 @@
 //! current is wrong, which [`Calibration::exposure_mismatch`] reports.
 
 mod apply;
+#[doc(hidden)]
 pub mod darks;
 mod error;
+#[doc(hidden)]
 pub mod flats;
 mod hot_pixels;
 mod pixel_stack;
 mod robust;
 
 pub use apply::{Applied, Calibration, ExposureMismatch, Master};
-pub use error::{CalibrationError, MAX_BAD_SHARE};
+pub use error::CalibrationError;
+#[doc(hidden)]
+pub use error::MAX_BAD_SHARE;
 pub use hot_pixels::{HotPixelList, read_hot_pixels};
+#[doc(hidden)]
 pub use pixel_stack::{OutOfMemory, PixelStack};
 
 #[cfg(test)]

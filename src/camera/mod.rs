@@ -13,8 +13,12 @@ pub mod data_sheet;
 mod distortion;
 mod model;
 
+pub(crate) use distortion::LENS_TERMS;
 pub(crate) use distortion::{
     CUBIC_MONOMIALS, LANES, QUINTIC_MONOMIALS, lens_terms, monomials_in_lanes,
 };
-pub use distortion::{Distortion, DistortionModel, LENS_TERMS};
-pub use model::{CameraModel, focal_length_px, frame_centre};
+pub use distortion::{Distortion, DistortionModel};
+pub use model::CameraModel;
+#[doc(hidden)]
+pub use model::focal_length_px;
+pub(crate) use model::frame_centre;

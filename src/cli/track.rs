@@ -166,7 +166,7 @@ impl Run<'_> {
         let read_ms = milliseconds(start);
         let time_s = self.clock.time_s(frame.metadata.date.as_ref());
         let start = Instant::now();
-        let track = self.tracker.next(&frame, time_s);
+        let track = self.tracker.process_frame(&frame, time_s);
         let track_ms = milliseconds(start);
         self.tracker.workspace().frames.recycle(frame);
         let track = track.with_context(|| path.display().to_string())?;

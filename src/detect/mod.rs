@@ -52,6 +52,7 @@ mod star_model;
 mod threads;
 mod threshold;
 mod trailed;
+#[doc(hidden)]
 pub mod windows;
 mod wings;
 mod workspace;
@@ -62,6 +63,7 @@ pub use detection::{
     Detection, DetectionFlags, Detections, MeasuredPsf, NoiseTail, StarTrails, Wings,
 };
 pub use error::DetectError;
+#[doc(hidden)]
 pub use filter_model::FilterModel;
 pub use workspace::Workspace;
 
@@ -85,8 +87,8 @@ use wings::measure_wings;
 /// # Errors
 /// [`DetectError::FrameTooSmall`], [`DetectError::WrongLength`] for frames of impossible size,
 /// [`DetectError::Config`] for options out of range, [`DetectError::Interrupted`] where the workspace
-/// has an interrupt ([`Workspace::until`]), [`DetectError::TooCrowded`] where more stands out than its
-/// memory holds ([`Workspace::within`]).
+/// has an interrupt ([`Workspace::with_interrupt`]), [`DetectError::TooCrowded`] where more stands out than its
+/// memory holds ([`Workspace::with_memory_limit`]).
 ///
 /// # Example
 /// ```

@@ -50,24 +50,24 @@ impl Workspace {
     /// Empty buffers with the same settings.
     pub(crate) fn emptied(&self) -> Self {
         let empty = Self::new().on_threads(self.threads);
-        empty.within(self.memory)
+        empty.with_memory_limit(self.memory)
     }
 
     /// Detection ends with [`DetectError::Interrupted`](super::DetectError::Interrupted) when
     /// `interrupt` is due.
     #[must_use]
-    pub fn until(self, interrupt: Interrupt) -> Self {
+    pub fn with_interrupt(self, interrupt: Interrupt) -> Self {
         Self { interrupt, ..self }
     }
 
     /// A frame and its detection take no more memory than `memory`; without this,
     /// [`MemoryLimit::DEFAULT`].
     #[must_use]
-    pub fn within(self, memory: MemoryLimit) -> Self {
+    pub fn with_memory_limit(self, memory: MemoryLimit) -> Self {
         Self { memory, ..self }
     }
 
-    /// [`within`](Self::within), from the next frame on.
+    /// [`with_memory_limit`](Self::with_memory_limit), from the next frame on.
     pub(crate) fn set_memory(&mut self, memory: MemoryLimit) {
         self.memory = memory;
     }
@@ -77,7 +77,7 @@ impl Workspace {
         frame.pixels.bytes() + bytes <= self.memory.bytes()
     }
 
-    /// [`until`](Self::until), from the next frame on.
+    /// [`with_interrupt`](Self::with_interrupt), from the next frame on.
     pub(crate) fn set_interrupt(&mut self, interrupt: Interrupt) {
         self.interrupt = interrupt;
     }

@@ -56,25 +56,32 @@ mod saturation;
 mod tiff;
 mod turning;
 
+#[doc(hidden)]
 pub use columns::DefectiveColumn;
 #[cfg(feature = "overlay")]
 pub(crate) use directory::OVERLAY_TEXT;
+#[doc(hidden)]
 pub use directory::{CALIBRATION_CREATOR, files_in, is_calibration_frame, is_overlay};
 pub use error::FrameError;
 pub use fits::{FitsHeader, FitsSamples, FitsWriteError, write_fits};
 pub use format::FrameFormat;
-pub use image::{Frame, check_size};
+pub use image::Frame;
+#[doc(hidden)]
+pub use image::check_size;
+#[doc(hidden)]
 pub use levels::{LUMINANCE_WEIGHTS, WholeNumber};
+#[doc(hidden)]
 pub use limits::{MAX_PAGES, MAX_PIXELS, MIN_SIDE_PX};
 pub use memory::MemoryLimit;
 pub use metadata::{Assumption, FrameMetadata, IgnoredValue, ImageChoice};
 pub use mosaic::{BayerPattern, Mosaic};
 pub use orientation::Orientation;
+#[doc(hidden)]
 pub use pages::Pages;
 pub use pixels::Pixels;
-pub use reader::{
-    Buffers, decode, decode_page, decode_page_with, read, read_page, read_page_with, read_stream,
-};
+pub use reader::{Buffers, decode, read};
+#[doc(hidden)]
+pub use reader::{decode_page, decode_page_with, read_page, read_page_with, read_stream};
 pub use row_order::RowOrder;
 pub(crate) use saturation::SaturationFinder;
 pub use tiff::{TiffOptions, TiffSamples, write_tiff};

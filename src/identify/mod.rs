@@ -18,11 +18,12 @@
 
 pub mod diagnosis;
 mod field;
+#[doc(hidden)]
 pub mod fit;
 mod grid;
 mod hypothesis;
 mod identification;
-pub mod index;
+mod index;
 mod naming;
 mod pairing;
 #[cfg(debug_assertions)]
@@ -33,9 +34,17 @@ mod search;
 mod workspace;
 
 pub use field::{ObservedStar, Photometry, SourceIndex, StarField};
-pub use identification::{Identification, MIN_STARS, SearchFailure, StarMatch};
-pub use index::{CacheError, IndexedCatalog, cache_directory};
+#[doc(hidden)]
+pub use identification::MIN_STARS;
+pub use identification::{Identification, SearchFailure, StarMatch};
+#[doc(hidden)]
+pub use index::cache_directory;
+pub use index::{CacheError, IndexedCatalog};
+#[doc(hidden)]
 pub use predict::{PredictedStar, View};
 pub use priors::{DateSource, FrameDate, Priors, Scale, ScalePrior, ScaleSource, SkyRegion};
+#[doc(hidden)]
 pub use search::LOG10_FALSE_ALARM_LIMIT;
-pub use workspace::{NAME_ODDS, Pointing, Workspace, identify};
+#[doc(hidden)]
+pub use workspace::{NAME_ODDS, Pointing};
+pub use workspace::{Workspace, identify};

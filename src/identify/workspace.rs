@@ -80,17 +80,17 @@ impl Workspace {
 
     /// Searches end with [`SearchFailure::Interrupted`] when `interrupt` is due.
     #[must_use]
-    pub fn until(mut self, interrupt: Interrupt) -> Self {
+    pub fn with_interrupt(mut self, interrupt: Interrupt) -> Self {
         self.set_interrupt(interrupt);
         self
     }
 
-    /// [`until`](Self::until), from the next field on.
+    /// [`with_interrupt`](Self::with_interrupt), from the next field on.
     pub(crate) fn set_interrupt(&mut self, interrupt: Interrupt) {
         self.buffers.interrupt = interrupt;
     }
 
-    /// Identifies the stars of `field`: [`point`](Self::point), then
+    /// Identifies the stars of `field`: [`find_pointing`](Self::find_pointing), then
     /// [`name_stars`](Pointing::name_stars). The answer is kept in the workspace.
     ///
     /// # Errors
@@ -101,10 +101,10 @@ impl Workspace {
         priors: &Priors,
         sky: &IndexedCatalog,
     ) -> Result<&Identification, SearchFailure> {
-        self.point(field, priors, sky)?.name_stars()
+        self.find_pointing(field, priors, sky)?.name_stars()
     }
 
-    /// Attitude and optics alone, from the brightest stars of `field`: [`point`](Self::point), then
+    /// Attitude and optics alone, from the brightest stars of `field`: [`find_pointing`](Self::find_pointing), then
     /// [`attitude`](Pointing::attitude). The answer is kept in the workspace.
     ///
     /// # Errors
@@ -115,14 +115,14 @@ impl Workspace {
         priors: &Priors,
         sky: &IndexedCatalog,
     ) -> Result<&Identification, SearchFailure> {
-        self.point(field, priors, sky)?.attitude()
+        self.find_pointing(field, priors, sky)?.attitude()
     }
 
     /// Finds out where the camera points, from the brightest stars of `field`, and no more.
     ///
     /// # Errors
     /// The [`SearchFailure`] where the pointing is not found.
-    pub fn point<'w: 'a, 'a>(
+    pub fn find_pointing<'w: 'a, 'a>(
         &'w mut self,
         field: &'a StarField,
         priors: &Priors,

@@ -22,6 +22,7 @@ mod identified_frame;
 pub mod zero_point;
 
 pub(crate) use association::{filter_response, resolved_px};
+#[doc(hidden)]
 pub use identified_frame::IdentifiedFrame;
 
 use crate::base::statistics::median;
@@ -34,6 +35,7 @@ use completeness::{Completeness, CountedStar, NoLimit};
 use zero_point::{StandardStar, ZeroPoint};
 
 /// B−V of a star like the Sun, for which limits hold.
+#[doc(hidden)]
 pub const SUN_BV_MAG: f64 = 0.64;
 
 /// Magnitudes per relative error: 2.5 / ln 10.
@@ -52,6 +54,7 @@ pub struct FramePhotometry {
 }
 
 /// Measures zero point and completeness of `frame` with the stars of `sky`.
+#[doc(hidden)]
 pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry {
     let view = View {
         camera: &frame.identification.camera,
@@ -137,6 +140,7 @@ fn standard_star(
 }
 
 /// −2.5 log10(`flux`): the magnitude without zero point.
+#[doc(hidden)]
 pub fn instrumental_mag(flux: f64) -> f64 {
     -2.5 * flux.log10()
 }

@@ -121,7 +121,7 @@ impl Workspace {
     /// Work on a frame ends early when `interrupt` is due, or [`Context::time_limit`] is reached:
     /// while it is read and stars are detected, with an error; later, with the frame not identified.
     #[must_use]
-    pub fn until(self, interrupt: &Interrupt) -> Self {
+    pub fn with_interrupt(self, interrupt: &Interrupt) -> Self {
         let mut until = Self {
             interrupt: interrupt.clone(),
             ..self
@@ -148,7 +148,7 @@ impl Workspace {
             detect: self.detect.emptied(),
             ..Self::new()
         };
-        empty.until(&self.interrupt)
+        empty.with_interrupt(&self.interrupt)
     }
 
     /// Ends the work on one frame at `deadline`, too.

@@ -197,7 +197,7 @@ pub(super) fn attempt(
         clock.lap(Stage::Pointing);
         return found.cloned();
     }
-    let pointing = workspace.point(field, priors, context.indexed);
+    let pointing = workspace.find_pointing(field, priors, context.indexed);
     clock.lap(Stage::Pointing);
     let found = pointing?.name_stars();
     clock.lap(Stage::Naming);

@@ -33,10 +33,17 @@ mod stopwatch;
 
 pub use body_in_frame::BodyInFrame;
 pub use bright_stars::MissingStar;
-pub use centroid_list::{CentroidList, LISTED_SIGMA_PX, ListedCentroid, solve_centroids};
+#[doc(hidden)]
+pub use centroid_list::LISTED_SIGMA_PX;
+pub use centroid_list::{CentroidList, ListedCentroid, solve_centroids};
 pub use centroid_table::{CentroidListError, CentroidListOptions};
-pub use context::{Context, DEFAULT_TIME_LIMIT_S, Workspace};
-pub use error::{Error, remedies_of};
+#[doc(hidden)]
+pub use context::DEFAULT_TIME_LIMIT_S;
+pub use context::{Context, Workspace};
+pub use error::Error;
+#[doc(hidden)]
+pub use error::remedies_of;
+#[doc(hidden)]
 pub use identification::star_field;
 pub use left_out::{LeftOut, RowProblem};
 pub use note::Note;
@@ -44,5 +51,7 @@ pub use options::SolveOptions;
 pub use outcome::{Outcome, Reason};
 pub use raw_color::RawColor;
 pub use solution::{Background, Measured, Solution, Source};
-pub use solve::{solve_file, solve_frame, solve_guarded, solve_read};
+pub use solve::{solve_file, solve_frame};
+#[doc(hidden)]
+pub use solve::{solve_guarded, solve_read};
 pub use stopwatch::Timing;

@@ -28,16 +28,23 @@ mod text;
 mod track;
 pub mod wcs;
 
+#[doc(hidden)]
 pub use frame_report::{
     AttitudeReport, AttitudeSigma, BackgroundReport, BodyReport, CalibrationReport,
-    CompletenessReport, DateReport, DistortionReport, FrameReport, MagnitudeReport, MatchReport,
-    NoteReport, ObservationReport, OpticsReport, PhotometryReport, PredictionReport, SCHEMA,
-    SiteReport, StarReport, Status, TimingReport,
+    CompletenessReport, DateReport, DistortionReport, MagnitudeReport, MatchReport, NoteReport,
+    ObservationReport, OpticsReport, PhotometryReport, PredictionReport, SiteReport, StarReport,
+    Status, TimingReport,
 };
+pub use frame_report::{FrameReport, SCHEMA};
+#[doc(hidden)]
 pub use star_row::{StarRow, write_table_header};
+#[doc(hidden)]
 pub use stars::detections;
-pub use text::{STARS_SHOWN, TextOptions};
+#[doc(hidden)]
+pub use text::STARS_SHOWN;
+pub use text::TextOptions;
+pub use track::TrackReport;
+#[doc(hidden)]
 pub use track::{
-    AxesReport, NotTrackedReport, TrackAttitudeReport, TrackOpticsReport, TrackReport,
-    TrackTimingReport,
+    AxesReport, NotTrackedReport, TrackAttitudeReport, TrackOpticsReport, TrackTimingReport,
 };

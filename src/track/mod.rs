@@ -29,4 +29,6 @@ mod pose;
 mod tracker;
 
 pub use outcome::{AngularRate, Attitude, Loss, Mode, Track, TrackedStar};
-pub use tracker::{DEFAULT_STARS, Tracker};
+#[doc(hidden)]
+pub use tracker::DEFAULT_STARS;
+pub use tracker::Tracker;

@@ -155,7 +155,11 @@ impl<'a> Tracker<'a> {
     ///
     /// # Errors
     /// [`DetectError`] if stars cannot be detected in it.
-    pub fn next(&mut self, frame: &Frame, time_s: Option<f64>) -> Result<Track, DetectError> {
+    pub fn process_frame(
+        &mut self,
+        frame: &Frame,
+        time_s: Option<f64>,
+    ) -> Result<Track, DetectError> {
         let clock = self.clock(time_s);
         match self.track(frame, clock) {
             Ok(mut track) => {

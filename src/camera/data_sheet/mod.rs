@@ -23,9 +23,13 @@ mod spot_image;
 mod template;
 
 pub use file::DataSheetError;
-pub use imperfections::{Imperfections, SpotForm, lens_transmission};
+#[doc(hidden)]
+pub use imperfections::lens_transmission;
+pub use imperfections::{Imperfections, SpotForm};
 pub(crate) use key::key;
+#[doc(hidden)]
 pub use key::{Key, Limits, nearest_name};
+#[doc(hidden)]
 pub use keys::{IMPERFECTION_KEYS, KEYS, is_curve};
 pub use preset::Preset;
 pub use response::{Response, ResponseError};

@@ -18,7 +18,10 @@ mod doubles;
 mod levels;
 mod trails;
 
-pub use cause::{Diagnosis, DoubleImage, Excluded};
+#[doc(hidden)]
+pub use cause::DoubleImage;
+pub use cause::{Diagnosis, Excluded};
+#[doc(hidden)]
 pub use doubles::find_unnamed as find_double_image;
 
 use crate::camera::focal_length_px;
@@ -30,6 +33,7 @@ use crate::identify::{IndexedCatalog, StarField, identify};
 
 /// A star field that was not identified.
 #[derive(Debug, Clone, Copy)]
+#[doc(hidden)]
 pub struct Unidentified<'a> {
     /// The frame and its detections. A list of centroids has neither.
     pub image: Option<(&'a Frame<'a>, &'a Detections)>,
@@ -42,6 +46,7 @@ pub struct Unidentified<'a> {
 }
 
 /// The cause why the stars were not identified; `None` where the search's own failure says it best.
+#[doc(hidden)]
 pub fn diagnose(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diagnosis> {
     if case.failure == SearchFailure::Interrupted {
         return None;

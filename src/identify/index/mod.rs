@@ -1,7 +1,7 @@
 //! A catalogue prepared for identification: its stars by position, and the triangles they form.
 //!
 //! stars → `cells` of the sky → `listing` of their triangles → `table` of each size class, sorted
-//! by shape (`triangle`) → [`TriangleIndex`], kept in a file (`cache`) → [`IndexedCatalog`].
+//! by shape (`triangle`) → `triangle_index`, kept in a file (`cache`) → [`IndexedCatalog`].
 
 mod cache;
 mod cache_directory;
@@ -16,4 +16,3 @@ pub use cache::CacheError;
 pub use cache_directory::cache_directory;
 pub use indexed_catalog::IndexedCatalog;
 pub use triangle::TriangleShape;
-pub use triangle_index::TriangleIndex;

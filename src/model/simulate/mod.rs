@@ -41,11 +41,20 @@ mod strays;
 mod truth;
 mod truth_table;
 
-pub use camera::{Pointing, camera_of};
+pub use camera::Pointing;
+#[doc(hidden)]
+pub use camera::camera_of;
 pub(crate) use color_camera::{color, decoded_jpeg, demosaiced};
-pub use scene::{SCENE_KEYS, Scene};
-pub use setup::{Setup, SetupParameter};
-pub use simulator::{Simulator, star_field};
+#[doc(hidden)]
+pub use scene::SCENE_KEYS;
+pub use scene::Scene;
+pub use setup::Setup;
+#[doc(hidden)]
+pub use setup::SetupParameter;
+pub use simulator::Simulator;
+#[doc(hidden)]
+pub use simulator::star_field;
 pub use strays::{CosmicRay, Trail};
 pub use truth::{TrueStar, Truth};
+#[doc(hidden)]
 pub use truth_table::{TruthRow, truth_table};

@@ -25,7 +25,9 @@ mod relation;
 mod standard;
 mod weights;
 
-pub use standard::{MIN_STARS, REFERENCE_BV_MAG, StandardStar, WeightedColor, ZeroPoint};
+pub use standard::ZeroPoint;
+#[doc(hidden)]
+pub use standard::{MIN_STARS, REFERENCE_BV_MAG, StandardStar, WeightedColor};
 
 use relation::{Relation, Term};
 
@@ -33,6 +35,7 @@ use relation::{Relation, Term};
 const MIN_COLORED_SHARE: f64 = 0.5;
 
 /// Measures the zero point of `stars`; `None` if they are too few.
+#[doc(hidden)]
 pub fn measure(stars: &[StandardStar]) -> Option<ZeroPoint> {
     if stars.len() < MIN_STARS {
         return None;

@@ -46,13 +46,15 @@
 mod compact;
 mod contents;
 mod error;
-pub mod face_grid;
+pub(crate) mod face_grid;
 mod id;
 mod import;
 mod position;
 mod proper_names;
 mod read;
+#[doc(hidden)]
 pub mod sky2000;
+#[doc(hidden)]
 pub mod sky_grid;
 mod star;
 mod star_catalog;
@@ -62,6 +64,8 @@ mod tycho2;
 pub use error::{CatalogError, CompactError, RecordError, RecordLocation};
 pub use id::{HipparcosId, StarId, TychoId};
 pub use import::{ImportSummary, Reading, SourceFile};
-pub use read::{import, read, read_until};
+#[doc(hidden)]
+pub use read::read_until;
+pub use read::{import, read};
 pub use star::{Star, StarFlags, StarIndex};
 pub use star_catalog::Catalog;

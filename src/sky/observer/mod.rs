@@ -11,7 +11,7 @@
 //! approximations are below 1″ (tested against astropy). Refraction is that of a mean atmosphere at
 //! the site's height.
 
-pub mod airmass;
+pub(crate) mod airmass;
 mod earth;
 
 use crate::base::coords::{Icrs, UnitVector};

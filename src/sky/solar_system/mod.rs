@@ -28,7 +28,9 @@ mod planets;
 mod rough;
 mod terrestrial_time;
 
-pub use body::{Body, BodyKind, TimeError};
+#[doc(hidden)]
+pub use body::TimeError;
+pub use body::{Body, BodyKind};
 
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
@@ -49,12 +51,14 @@ use nalgebra::Vector3;
 /// assert!(apart_rad.to_degrees() < 0.12); // The great conjunction.
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+#[doc(hidden)]
 pub fn bodies_at(date: &ObservationDate, error: TimeError, site: Option<Site>) -> [Body; 8] {
     let time = Time::new(date, error, site);
     BodyKind::ALL.map(|kind| time.body(kind))
 }
 
 /// Those of [`bodies_at`] that are within `radius_rad` of a direction. Faster where few are.
+#[doc(hidden)]
 pub fn bodies_within(
     (date, error, site): (&ObservationDate, TimeError, Option<Site>),
     centre: &UnitVector<Icrs>,
