@@ -3,7 +3,7 @@
 
 Needs numpy, Pillow, sep and tetra3rs. The frames and their truth come from starpipe's tests:
 
-    STARPIPE_PEER_FRAMES=DIR cargo test --release --test accuracy -- --ignored frames_for_peers
+    STARPIPE_PEER_FRAMES=DIR cargo test --release --test it -- --ignored frames_for_peers
     python3 scripts/compare-centroids.py DIR target/release/starpipe
 
 Prints the RMS error over the Cramér-Rao bound by spot size and signal-to-noise ratio, and the

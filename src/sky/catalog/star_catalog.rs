@@ -32,7 +32,7 @@ impl Catalog {
         static BUILT_IN: OnceLock<Catalog> = OnceLock::new();
         BUILT_IN.get_or_init(|| {
             Self::from_compact(include_bytes!("../../../catalogs/sky2000.bin"))
-                .expect("tests/catalog.rs checks the embedded catalogue")
+                .expect("tests/it/catalog.rs checks the embedded catalogue")
         })
     }
 

@@ -1,0 +1,153 @@
+//! The brightest stars alone: `--attitude-only`, the pointing, its errors and the optics from them, and
+//! `--max-stars`, their measurement.
+
+use crate::common::{Ran, fixture, number, report, starpipe};
+use serde_json::Value;
+
+fn named(report: &Value) -> Vec<&Value> {
+    let stars = report["stars"].as_array().unwrap().iter();
+    stars.filter(|star| star["id"].is_string()).collect()
+}
+
+/// The direction of the frame's centre.
+fn boresight(report: &Value) -> [f64; 3] {
+    let [ra, dec] =
+        ["/attitude/ra_deg", "/attitude/dec_deg"].map(|at| number(report, at).to_radians());
+    [dec.cos() * ra.cos(), dec.cos() * ra.sin(), dec.sin()]
+}
+
+#[test]
+fn the_attitude_is_that_of_all_stars_within_its_errors() {
+    // Errors of both, as if they were independent: they are not, so this is generous.
+    const SIGMAS: f64 = 4.0;
+    for name in ["orion/orion.png", "cygnus/cygnus.tif"] {
+        let (all, bright) = (report(name, &[]), report(name, &["--attitude-only"]));
+        let [a, b] = [&all, &bright].map(boresight);
+        let apart_rad = (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
+        let sigma = |axis: &str| {
+            let at = format!("/attitude/sigma_arcsec/{axis}");
+            number(&all, &at).hypot(number(&bright, &at))
+        };
+        let across_arcsec = sigma("x").hypot(sigma("y"));
+        let apart_arcsec = apart_rad.to_degrees() * 3600.0;
+        assert!(
+            apart_arcsec < SIGMAS * across_arcsec,
+            "{name} {apart_arcsec}"
+        );
+        let turn_deg = number(&all, "/attitude/up_pa_deg") - number(&bright, "/attitude/up_pa_deg");
+        assert!(
+            turn_deg.abs() * 3600.0 < SIGMAS * sigma("roll"),
+            "{name} {turn_deg}"
+        );
+    }
+}
+
+#[test]
+fn only_the_brightest_stars_are_named_and_no_magnitude_is_measured() {
+    let (all, bright) = (
+        report("cygnus/cygnus.tif", &[]),
+        report("cygnus/cygnus.tif", &["--attitude-only"]),
+    );
+    assert!(named(&bright).len() < named(&all).len());
+    assert!(named(&bright).len() >= 4);
+    for (star, same) in bright["stars"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(all["stars"].as_array().unwrap())
+    {
+        if star["id"].is_string() {
+            assert_eq!(star["id"], same["id"]);
+            assert!(star["p_chance"].as_f64().unwrap() <= 1.0 / 101.0, "{star}");
+        }
+        assert!(star["ra_deg"].is_f64());
+    }
+    for absent in ["photometry", "magnitude", "prediction"] {
+        assert!(bright[absent].is_null(), "{absent}");
+    }
+    let notes = bright["notes"].as_array().unwrap();
+    assert!(notes.iter().any(|note| note["code"] == "attitude_only"));
+}
+
+#[test]
+fn pointing_and_naming_are_parts_of_the_time_of_identification() {
+    for options in [&[][..], &["--attitude-only"]] {
+        let report = report("orion/orion.png", options);
+        let [all, pointing, naming] = ["identify", "pointing", "naming"]
+            .map(|stage| number(&report, &format!("/timing_ms/{stage}")));
+        assert!(pointing > 0.0);
+        assert_eq!(naming > 0.0, options.is_empty());
+        // Each is rounded to a thousandth.
+        assert!(
+            pointing + naming <= all + 0.002,
+            "{pointing} {naming} {all}"
+        );
+    }
+}
+
+#[test]
+fn lists_of_centroids_have_the_mode_too() {
+    let table = Ran::new(
+        starpipe()
+            .args(["process", "--format", "csv"])
+            .arg(fixture("orion/orion.png")),
+    );
+    let run = |options: &[&str]| {
+        let mut command = starpipe();
+        command.args(["identify", "--format", "json"]).args(options);
+        command.arg("-").write_stdin(table.stdout.clone());
+        Ran::new(&mut command).reports().remove(0)
+    };
+    let (all, bright) = (run(&[]), run(&["--attitude-only"]));
+    assert_eq!(bright["status"], "identified");
+    assert!(named(&bright).len() <= named(&all).len());
+    let [a, b] = [&all, &bright].map(|report| number(report, "/attitude/dec_deg"));
+    assert!((a - b).abs() < 0.01, "{a} {b}");
+}
+
+#[test]
+fn only_as_many_stars_are_measured_as_are_wanted() {
+    let (all, bright) = (
+        report("cygnus/cygnus.tif", &[]),
+        report("cygnus/cygnus.tif", &["--max-stars", "30"]),
+    );
+    let stars = |report: &Value| report["stars"].as_array().unwrap().clone();
+    let (all_stars, brightest) = (stars(&all), stars(&bright));
+    assert!(all_stars.len() > 100 && brightest.len() == 30);
+    // The strongest by signal-to-noise ratio; of equal ones, either.
+    let least = |stars: &[Value]| {
+        let snr = stars.iter().map(|star| number(star, "/snr"));
+        snr.fold(f64::INFINITY, f64::min)
+    };
+    let stronger = all_stars.iter().map(|star| number(star, "/snr"));
+    assert!(
+        stronger
+            .filter(|snr| *snr > 1.1 * least(&brightest))
+            .count()
+            <= 30
+    );
+    for star in &brightest {
+        let place = |star: &Value| [number(star, "/x"), number(star, "/y")];
+        let [x, y] = place(star);
+        let is_same = |other: &Value| {
+            let [u, v] = place(other);
+            (x - u).hypot(y - v) < 0.1
+        };
+        assert!(all_stars.iter().any(is_same), "{star}");
+    }
+    // The limit of a frame is not that of the brightest stars.
+    assert!(all["photometry"]["limit50_vmag"].is_number());
+    assert!(bright["photometry"]["limit50_vmag"].is_null());
+    let reason = bright["photometry"]["limit50_reason"].as_str().unwrap();
+    assert!(reason.contains("brightest"), "{reason}");
+    assert!(bright["photometry"]["zero_point_vmag"].is_number());
+}
+
+#[test]
+fn too_few_wanted_stars_are_refused() {
+    let mut command = starpipe();
+    command.args(["process", "--max-stars", "3"]);
+    let ran = Ran::new(command.arg(fixture("orion/orion.png")));
+    assert_eq!(ran.status, 2);
+    assert!(ran.stderr.contains("--max-stars"), "{}", ran.stderr);
+}
