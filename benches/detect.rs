@@ -112,10 +112,8 @@ fn bench_stages(criterion: &mut Criterion) {
         bencher.iter(|| black_box(BackgroundMap::measure(black_box(&frame), 64)));
     });
     for (name, max_detections) in [("all but the fits", 1), ("all", 20_000)] {
-        let config = DetectConfig {
-            max_detections,
-            ..DetectConfig::default()
-        };
+        let mut config = DetectConfig::default();
+        config.max_detections = max_detections;
         let mut workspace = Workspace::new();
         let mut found = Detections::default();
         group.bench_function(name, |bencher| {
@@ -133,12 +131,10 @@ fn bench_frame(criterion: &mut Criterion, name: &str, frame: &Frame) {
     group.bench_function(name, |bencher| {
         bencher.iter(|| black_box(detect(black_box(frame), &config, &mut workspace)));
     });
-    let known_spot = DetectConfig {
-        spot_sigma_px: detect(frame, &config, &mut workspace)
-            .ok()
-            .map(|d| d.spot_sigma_px),
-        ..config
-    };
+    let mut known_spot = config.clone();
+    known_spot.spot_sigma_px = detect(frame, &config, &mut workspace)
+        .ok()
+        .map(|d| d.spot_sigma_px);
     group.bench_function(format!("{name}, spot known"), |bencher| {
         bencher.iter(|| black_box(detect(black_box(frame), &known_spot, &mut workspace)));
     });

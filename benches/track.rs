@@ -41,13 +41,11 @@ fn sequence(swing_deg: f64, count: u32, indexed: &IndexedCatalog) -> Vec<Frame<'
         let phase = std::f64::consts::TAU * f64::from(number) / f64::from(count);
         let per_s = std::f64::consts::TAU / (f64::from(count) * INTERVAL_S);
         let rate_deg_s = axis * (swing_deg * phase.cos() * per_s);
-        let scene = Scene {
-            rate_x_deg_s: rate_deg_s.x,
-            rate_y_deg_s: rate_deg_s.y,
-            rate_z_deg_s: rate_deg_s.z,
-            faintest_vmag: Some(9.0),
-            ..Scene::default()
-        };
+        let mut scene = Scene::default();
+        scene.rate_x_deg_s = rate_deg_s.x;
+        scene.rate_y_deg_s = rate_deg_s.y;
+        scene.rate_z_deg_s = rate_deg_s.z;
+        scene.faintest_vmag = Some(9.0);
         let simulator = Simulator::new(&scenario, &scene, indexed.stars());
         let turn = -axis * (swing_deg * phase.sin()).to_radians();
         let pointing = Pointing {

@@ -332,13 +332,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             truth = elsewhere();
         }
         let rate_deg_s = plan.carrier.rate_deg_s(time_s);
-        let scene = Scene {
-            rate_x_deg_s: rate_deg_s.x,
-            rate_y_deg_s: rate_deg_s.y,
-            rate_z_deg_s: rate_deg_s.z,
-            faintest_vmag: Some(9.0),
-            ..Scene::default()
-        };
+        let mut scene = Scene::default();
+        scene.rate_x_deg_s = rate_deg_s.x;
+        scene.rate_y_deg_s = rate_deg_s.y;
+        scene.rate_z_deg_s = rate_deg_s.z;
+        scene.faintest_vmag = Some(9.0);
         let simulator = Simulator::new(&scenario, &scene, indexed.stars())?;
         let pointing = Pointing {
             icrs_to_camera: truth,

@@ -4,7 +4,7 @@ use serde_json::Value;
 use starpipe::base::coords::Rotation;
 use starpipe::camera::{self, data_sheet::Preset};
 use starpipe::identify::{DateSource, FrameDate, Photometry, Scale, ScaleSource};
-use starpipe::photometry::comparison::StatedCamera;
+use starpipe::photometry::comparison::ObservingSetup;
 use starpipe::pipeline::{
     CentroidList, CentroidListOptions, ListedCentroid, solve_centroids, solve_frame,
 };
@@ -79,10 +79,8 @@ pub fn pipeline(data: &[u8]) {
     check(&report, solution, 1.0);
     let again = FrameReport::new("fuzzed", again, indexed.catalog());
     assert_eq!(without_times(&report), without_times(&again));
-    let options = TextOptions {
-        all_stars: true,
-        ..TextOptions::default()
-    };
+    let mut options = TextOptions::default();
+    options.all_stars = true;
     let text = report.to_text(options);
     assert!(!text.contains("NaN") && !text.contains("inf "), "{text}");
     // The slowest part, and the one that depends least on the pixels.
@@ -127,7 +125,7 @@ fn context_of(header: &Header, indexed: &'static IndexedCatalog<'static>) -> Con
     if header.knows(2) {
         context.priors.date = "2024-08-12T22:15:00Z".parse().ok().map(|date| FrameDate {
             date,
-            source: DateSource::Option,
+            source: DateSource::User,
         });
     }
     if header.knows(3) {
@@ -137,11 +135,9 @@ fn context_of(header: &Header, indexed: &'static IndexedCatalog<'static>) -> Con
         context.priors.exposure_s = Some(0.5);
     }
     if header.knows(5) {
-        context.camera = Some(StatedCamera {
-            sheet: Preset::NanosatTracker.data_sheet(),
-            zenith_distance_deg: header.knows(3).then_some(40.0),
-            extinction: None,
-        });
+        let mut camera = ObservingSetup::new(Preset::NanosatTracker.data_sheet());
+        camera.zenith_distance_deg = header.knows(3).then_some(40.0);
+        context.camera = Some(camera);
     }
     context
 }
@@ -318,11 +314,10 @@ pub fn centroids(data: &[u8]) {
     let Some((told, csv)) = data.split_first() else {
         return;
     };
-    let options = CentroidListOptions {
-        width: (told & 1 != 0).then_some(640),
-        height: (told & 2 != 0).then_some(480),
-        frame: (told & 4 != 0).then(|| "a.png".to_owned()),
-    };
+    let mut options = CentroidListOptions::default();
+    options.width = (told & 1 != 0).then_some(640);
+    options.height = (told & 2 != 0).then_some(480);
+    options.frame = (told & 4 != 0).then(|| "a.png".to_owned());
     let Ok(list) = CentroidList::parse(csv, &options) else {
         return;
     };

@@ -68,7 +68,8 @@ impl Stated {
         let value = |(name, value): &Value| Ok((named(name)?, *value));
         let values: Result<Vec<_>, E> = self.values.iter().map(value).collect();
         let scene = Scene::default();
-        let mut setup = Setup { scenario, scene };
+        let mut setup = Setup::new(scenario);
+        setup.scene = scene;
         setup
             .set_all(&values.map_err(exception)?)
             .map_err(exception)?;

@@ -72,10 +72,8 @@ impl Pipeline {
         let bad = bad_pixels(mask.as_ref())?;
         let dark = dark.as_ref().map(Image::source).transpose()?;
         let flat = flat.as_ref().map(Image::source).transpose()?;
-        let context = Context {
-            as_stored: !as_drawn,
-            ..self.context(&options)?
-        };
+        let mut context = self.context(&options)?;
+        context.as_stored = !as_drawn;
         let work = |interrupt: &Interrupt| {
             let name = name.unwrap_or_else(|| source.name());
             let mut workspace = self.workspace(threads, interrupt);
@@ -118,12 +116,11 @@ impl Pipeline {
                 Some(_) => (value, None),
                 None => (ListedCentroid::mag_of_rank(rank), None),
             };
-            ListedCentroid {
-                flux,
-                sigma_px: has_errors.then_some(sigma_px),
-                row: rank as u64 + 1,
-                ..ListedCentroid::new(PixelPoint::new(x, y), mag)
-            }
+            let mut listed = ListedCentroid::new(PixelPoint::new(x, y), mag);
+            listed.flux = flux;
+            listed.sigma_px = has_errors.then_some(sigma_px);
+            listed.row = rank as u64 + 1;
+            listed
         };
         let list = CentroidList {
             width,
@@ -184,10 +181,8 @@ impl Pipeline {
         let calibration =
             self.calibration(input.dark, input.flat, row_order, &mut workspace.frames);
         let calibration = calibration.map_err(Failed)?;
-        let context = Context {
-            calibration: Some(&calibration),
-            ..context
-        };
+        let mut context = context;
+        context.calibration = Some(&calibration);
         let (solution, _) = solve_read(name, |_| Ok(frame), &context, workspace)?;
         Ok((solution, row_order))
     }
@@ -270,9 +265,8 @@ fn detect_error(name: &Path) -> impl FnOnce(DetectError) -> pipeline::Error {
 
 /// The library's defaults with what is given.
 pub fn detect_config(sigma: Option<f64>, max_stars: Option<usize>) -> DetectConfig {
-    DetectConfig {
-        threshold_sigma: sigma,
-        max_detections: max_stars.unwrap_or(DetectConfig::DEFAULT_MAX_DETECTIONS),
-        ..DetectConfig::default()
-    }
+    let mut config = DetectConfig::default();
+    config.threshold_sigma = sigma;
+    config.max_detections = max_stars.unwrap_or(DetectConfig::DEFAULT_MAX_DETECTIONS);
+    config
 }

@@ -36,6 +36,7 @@ pub struct Calibration {
 
 /// Names of the files with which a frame was calibrated.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct Applied {
     /// The dark.
     pub dark: Option<String>,
@@ -175,6 +176,7 @@ impl Calibration {
 
 /// A dark whose exposure differs from the frame's, so that its dark current is wrong for the frame.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct ExposureMismatch {
     /// Name of the dark.
     pub dark: String,

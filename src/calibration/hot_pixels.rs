@@ -10,6 +10,7 @@ const MAX_BYTES: u64 = 1 << 26;
 
 /// Hot pixels of a detector, with the file that lists them.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct HotPixelList {
     path: PathBuf,
     /// Line, column, row.

@@ -15,6 +15,7 @@ use multiversion::multiversion;
 /// # Reference
 /// Brown 1971, Photogrammetric Engineering 37, 855 (radial and decentring terms).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
 pub enum DistortionModel {
     /// One radial term, r³.
     Radial,

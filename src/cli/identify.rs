@@ -50,11 +50,10 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Outcome, CommandError>
         camera: solving.hints.data_sheet()?,
         ..Plan::default()
     };
-    let options = CentroidListOptions {
-        width,
-        height,
-        frame,
-    };
+    let mut options = CentroidListOptions::default();
+    options.width = width;
+    options.height = height;
+    options.frame = frame;
     let solve = |context: &Context, path: &Path, workspace: &mut Workspace, finish: Finish| {
         let answer = solve_guarded(path, workspace, |workspace| {
             let list = centroid_list::read(path, &options)?;

@@ -17,6 +17,7 @@ pub enum CentroidMethod {
 
 /// Options of [`detect`](super::detect).
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct DetectConfig {
     /// Wanted number of false detections in a million pixels of pure noise.
     pub false_alarms_per_mpx: f64,

@@ -5,6 +5,7 @@ use std::cmp::Ordering;
 
 /// One detected source, in the frame's own units.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Detection {
     /// The centroid.
     pub position: PixelPoint,
@@ -38,6 +39,7 @@ impl Detection {
 
 /// What is unusual about a detection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct DetectionFlags {
     /// The core reaches the detector's full scale.
     pub saturated: bool,
@@ -72,6 +74,7 @@ impl DetectionFlags {
 
 /// All sources of a frame.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Detections {
     /// Brightest first.
     pub sources: Vec<Detection>,
@@ -112,6 +115,7 @@ impl Detections {
 /// The point spread function measured on the stars of a frame, where they are not round Gaussians of
 /// one size.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct MeasuredPsf {
     /// Largest ratio of the axes of a star's spot.
     pub axis_ratio: f64,
@@ -124,6 +128,7 @@ pub struct MeasuredPsf {
 
 /// The trails that all stars of a frame are.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct StarTrails {
     /// Their angle to the image's x axis, in radians, in (−π/2, π/2]; positive where they rise to the
     /// right.
@@ -136,6 +141,7 @@ pub struct StarTrails {
 
 /// Light of the stars beyond the spots that are fitted to them.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Wings {
     /// That light over that of the fitted spots.
     pub share: f64,
@@ -145,6 +151,7 @@ pub struct Wings {
 
 /// What makes large values of the filtered noise more frequent than in independent noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum NoiseTail {
     /// The noise of neighboring pixels is correlated, as compression and denoising leave it.
     Correlated,

@@ -4,6 +4,7 @@ use std::fmt;
 
 /// A file format that can be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum FrameFormat {
     /// Flexible Image Transport System.
     Fits,

@@ -10,6 +10,7 @@ use std::ops::RangeInclusive;
 
 /// How a frame was taken, according to its file. The values are plausible, not verified.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct FrameMetadata {
     /// Order of the rows in the file.
     pub row_order: RowOrder,
@@ -78,6 +79,7 @@ impl fmt::Display for Assumption {
 
 /// The image that was read of a file whose first image is smaller, such as a preview.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct ImageChoice {
     /// Number of images in the file.
     pub images: usize,
@@ -110,6 +112,7 @@ impl fmt::Display for ImageChoice {
 
 /// A value in a file's header that is not used because it is implausible.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct IgnoredValue {
     /// The keyword or keywords.
     pub keyword: String,

@@ -73,7 +73,9 @@ pub use levels::{LUMINANCE_WEIGHTS, WholeNumber};
 #[doc(hidden)]
 pub use limits::{MAX_PAGES, MAX_PIXELS, MIN_SIDE_PX};
 pub use memory::MemoryLimit;
-pub use metadata::{Assumption, FrameMetadata, IgnoredValue, ImageChoice};
+pub use metadata::{Assumption, FrameMetadata};
+#[doc(hidden)]
+pub use metadata::{IgnoredValue, ImageChoice};
 pub use mosaic::{BayerPattern, Mosaic};
 pub use orientation::Orientation;
 #[doc(hidden)]

@@ -36,6 +36,7 @@ pub struct ObservedStar {
 
 /// What the observed magnitudes mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Photometry {
     /// −2.5 log10(flux) with an unknown zero point.
     Instrumental,

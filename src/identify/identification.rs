@@ -11,6 +11,7 @@ pub const MIN_STARS: usize = 4;
 
 /// An identified star field.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Identification {
     /// The camera's geometry: pixel to direction.
     pub camera: CameraModel,
@@ -55,6 +56,7 @@ impl Identification {
 
 /// An observed star and the catalogue star that it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct StarMatch {
     /// The observed star.
     pub source: SourceIndex,

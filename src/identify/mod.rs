@@ -37,9 +37,9 @@ pub use field::{ObservedStar, Photometry, SourceIndex, StarField};
 #[doc(hidden)]
 pub use identification::MIN_STARS;
 pub use identification::{Identification, SearchFailure, StarMatch};
+pub use index::IndexedCatalog;
 #[doc(hidden)]
-pub use index::cache_directory;
-pub use index::{CacheError, IndexedCatalog};
+pub use index::{CacheError, cache_directory};
 #[doc(hidden)]
 pub use predict::{PredictedStar, View};
 pub use priors::{DateSource, FrameDate, Priors, Scale, ScalePrior, ScaleSource, SkyRegion};

@@ -54,6 +54,7 @@ pub enum Scale {
 
 /// Who states a scale, and so how far it can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ScaleSource {
     /// The user: a hard constraint.
     User,
@@ -74,10 +75,11 @@ pub struct FrameDate {
 
 /// Source of a frame's date.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub enum DateSource {
     /// The user.
     #[serde(rename = "option")]
-    Option,
+    User,
     /// The header of the frame's file.
     #[serde(rename = "file header")]
     FileHeader,

@@ -246,7 +246,7 @@ impl<'w> Pointing<'w, '_> {
         let of_few = NamingStart {
             most_chance,
             by_place: false,
-            least: Some(DistortionModel::Radial),
+            min_distortion: Some(DistortionModel::Radial),
         };
         let refiner = search.refiner();
         let refined = refiner.with_names(problem, &found.refined, &of_few);
@@ -356,7 +356,7 @@ fn name(
     let of_all = NamingStart {
         most_chance,
         by_place: true,
-        least: None,
+        min_distortion: None,
     };
     let refined = refiner.with_names(problem, settled, &of_all)?;
     let names = refiner.pairs.len();

@@ -55,6 +55,7 @@ pub struct CountedStar {
 
 /// The completeness curve, and the limiting magnitude fitted to it.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Completeness {
     /// The curve in bins of [`BIN_MAG`] without gaps, brightest first.
     pub bins: Vec<MagnitudeBin>,
@@ -64,6 +65,7 @@ pub struct Completeness {
 
 /// One bin of the curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct MagnitudeBin {
     /// V magnitude of its centre.
     pub v_mag: f64,
@@ -75,6 +77,7 @@ pub struct MagnitudeBin {
 
 /// The limiting magnitude, where the completeness falls.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Limit {
     /// V magnitude m₅₀ at which half of the stars that are not otherwise lost are detected.
     pub v_mag: f64,

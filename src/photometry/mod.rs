@@ -43,6 +43,7 @@ const MAG_PER_RELATIVE: f64 = 1.085_736_204_758_13;
 
 /// Photometry of a frame.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct FramePhotometry {
     /// V magnitude of a star that gives 1 ADU, or 1 ADU/s where the exposure is known; `None` with
     /// too few stars.

@@ -25,7 +25,7 @@ pub(super) fn find_bodies(
         return Vec::new();
     };
     let time_error = match known.source {
-        DateSource::Option | DateSource::FileHeader => TimeError::None,
+        DateSource::User | DateSource::FileHeader => TimeError::None,
         // Phones and cameras write local time.
         DateSource::FileName => TimeError::Zone,
     };
@@ -200,7 +200,7 @@ mod tests {
         let priors = Priors {
             date: Some(FrameDate {
                 date,
-                source: DateSource::Option,
+                source: DateSource::User,
             }),
             site: Some(site),
             ..Priors::default()

@@ -6,6 +6,7 @@ use crate::sky::solar_system::{Body, BodyKind};
 
 /// The Moon or a planet within a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct BodyInFrame {
     /// Which one, where on the sky, and how bright.
     pub body: Body,

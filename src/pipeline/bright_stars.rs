@@ -20,6 +20,7 @@ const NEAR_SHARE: f64 = 0.01;
 
 /// A bright catalogue star in the frame that no detection has the name of.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct MissingStar {
     /// Its name, or its identifier.
     pub name: String,

@@ -37,6 +37,7 @@ pub struct CentroidList {
 
 /// One line of a list of centroids.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct ListedCentroid {
     /// The position.
     pub position: PixelPoint,

@@ -12,6 +12,7 @@ use std::fmt;
 
 /// Why a list of centroids cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub struct CentroidListError {
     /// The line, from 1 and with the heading, where it is one line's.
     pub line: Option<u64>,
@@ -54,6 +55,7 @@ impl CentroidListError {
 
 /// What is known of a list besides its content.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct CentroidListOptions {
     /// Width of the frame in pixels.
     pub width: Option<u32>,

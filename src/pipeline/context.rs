@@ -6,7 +6,7 @@ use crate::calibration::Calibration;
 use crate::detect::{self, DetectConfig};
 use crate::frame::{self, Frame};
 use crate::identify::{self, DateSource, IndexedCatalog, NAME_ODDS, Priors, ScalePrior};
-use crate::photometry::comparison::StatedCamera;
+use crate::photometry::comparison::ObservingSetup;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -15,6 +15,7 @@ pub const DEFAULT_TIME_LIMIT_S: f64 = 8.0;
 
 /// What the stages need and what does not change from frame to frame.
 #[derive(Clone)]
+#[non_exhaustive]
 pub struct Context<'a> {
     /// The catalogue's stars and their triangles.
     pub indexed: &'a IndexedCatalog<'a>,
@@ -23,7 +24,7 @@ pub struct Context<'a> {
     /// What is known of every frame beforehand.
     pub priors: Priors,
     /// The camera with which frames are compared.
-    pub camera: Option<StatedCamera>,
+    pub camera: Option<ObservingSetup>,
     /// The calibration of frames that are read from files.
     pub calibration: Option<&'a Calibration>,
     /// Whether to stop at attitude and optics, from the brightest stars: no other star is named, and
@@ -93,7 +94,7 @@ impl<'a> Context<'a> {
 
 /// The level from which on the camera's pixels are saturated. `None` where the frame's levels
 /// exceed the camera's full scale: files may hold the levels of few bits multiplied.
-fn saturation_adu(camera: &StatedCamera, frame: &Frame) -> Option<f64> {
+fn saturation_adu(camera: &ObservingSetup, frame: &Frame) -> Option<f64> {
     let sheet = &camera.sheet;
     let full_scale_adu = sheet.full_scale_adu() as f32;
     let is_within = frame.pixels.highest() <= full_scale_adu;
@@ -170,7 +171,7 @@ mod tests {
 
     #[test]
     fn full_well_counts_where_the_levels_can_be_the_cameras() {
-        let camera = StatedCamera {
+        let camera = ObservingSetup {
             sheet: Preset::Experiment1.data_sheet(),
             zenith_distance_deg: None,
             extinction: None,

@@ -19,6 +19,7 @@ pub enum RowProblem {
 
 /// Rows of a list that are left out for one reason. `Display` gives the sentence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct LeftOut {
     /// The reason.
     pub problem: RowProblem,

@@ -15,7 +15,7 @@ use crate::frame::{
 use crate::identify::diagnosis::DoubleImage;
 use crate::identify::{Identification, Priors, ScalePrior, ScaleSource};
 use crate::photometry::FramePhotometry;
-use crate::photometry::comparison::{Comparison, Contradiction, StatedCamera};
+use crate::photometry::comparison::{Comparison, Contradiction, ObservingSetup};
 use crate::sky::catalog::Catalog;
 use crate::sky::observer::Observation;
 use crate::sky::solar_system::BodyKind;
@@ -189,7 +189,7 @@ impl Note {
 
     /// The contradictions with the stated camera, or why it was not compared.
     pub(super) fn of_camera(
-        camera: Option<&StatedCamera>,
+        camera: Option<&ObservingSetup>,
         comparison: Option<&Comparison>,
     ) -> Vec<Self> {
         match (camera, comparison) {

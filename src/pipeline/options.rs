@@ -8,7 +8,7 @@ use crate::camera::data_sheet::DataSheet;
 use crate::detect::{CentroidMethod, DetectConfig};
 use crate::identify::{DateSource, FrameDate, NAME_ODDS, Priors, Scale, ScalePrior, SkyRegion};
 use crate::model::sensitivity::Extinction;
-use crate::photometry::comparison::StatedCamera;
+use crate::photometry::comparison::ObservingSetup;
 use crate::sky::observer::Site;
 use serde::{Serialize, Serializer};
 use std::time::Duration;
@@ -83,7 +83,7 @@ impl SolveOptions {
             }),
             date: self.date.map(|date| FrameDate {
                 date,
-                source: DateSource::Option,
+                source: DateSource::User,
             }),
             site: self.site,
             exposure_s: self.exposure_s,
@@ -101,8 +101,8 @@ impl SolveOptions {
         }
     }
 
-    fn stated_camera(&self, sheet: DataSheet) -> StatedCamera {
-        StatedCamera {
+    fn observing_setup(&self, sheet: DataSheet) -> ObservingSetup {
+        ObservingSetup {
             sheet,
             zenith_distance_deg: self.zenith_distance_deg,
             extinction: self
@@ -145,7 +145,7 @@ impl<'a> Context<'a> {
         Self {
             detect: options.detect_config(),
             priors: options.priors(),
-            camera: camera.map(|sheet| options.stated_camera(sheet)),
+            camera: camera.map(|sheet| options.observing_setup(sheet)),
             name_odds: options.name_odds,
             attitude_only: options.attitude_only,
             // A limit that is longer than any clock runs is none.

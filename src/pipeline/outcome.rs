@@ -25,6 +25,7 @@ impl Outcome {
 
 /// Why a frame was not identified: the cause that diagnosis names, else the failure of the search.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Reason {
     /// The search failed, and nothing else explains it.
     Search(SearchFailure),

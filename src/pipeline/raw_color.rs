@@ -18,6 +18,7 @@ const MIN_SNR: f64 = 30.0;
 
 /// A raw color frame whose stars were detected.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct RawColor {
     /// The filters, where the header says which.
     pub pattern: Option<BayerPattern>,

@@ -15,6 +15,7 @@ use crate::sky::observer::{Observation, Site};
 
 /// What was found in one frame, or in one list of centroids.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Solution {
     /// Columns.
     pub width: usize,
@@ -67,6 +68,7 @@ impl Solution {
 
 /// One source: a detection, or a line of a centroid list.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Source {
     /// Its centroid.
     pub position: PixelPoint,
@@ -78,6 +80,7 @@ pub struct Source {
 
 /// What only a detection has.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Measured {
     /// Standard errors of the centroid in x and y, in pixels.
     pub sigma_px: [f64; 2],
@@ -106,6 +109,7 @@ impl From<&Detection> for Source {
 
 /// The sky background, in the frame's own units.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Background {
     /// Median level.
     pub level_adu: f64,

@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 /// Time that each stage took, in milliseconds; 0 for a stage that was not needed.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Timing {
     /// Reading, decoding and calibrating the frame.
     pub read_ms: f64,

@@ -11,6 +11,7 @@ pub const SCHEMA: u32 = 2;
 
 /// The report of one frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct FrameReport {
     /// [`SCHEMA`].
     pub schema: u32,

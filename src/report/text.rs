@@ -19,6 +19,7 @@ const LABEL_WIDTH: usize = 12;
 
 /// Options of the text report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct TextOptions {
     /// List every identified star, not only the [`STARS_SHOWN`] brightest.
     pub all_stars: bool,
@@ -87,7 +88,7 @@ impl FrameReport {
         let text = match &self.date {
             Some(date) => {
                 let source = match date.source {
-                    DateSource::Option => "as given",
+                    DateSource::User => "as given",
                     DateSource::FileHeader => "from the file's header",
                     DateSource::FileName => "from the file's name",
                 };

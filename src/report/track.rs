@@ -13,6 +13,7 @@ use serde::Serialize;
 
 /// The report of one frame of a sequence.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct TrackReport {
     /// Version of the JSON, that of the other reports.
     pub schema: u32,

@@ -98,6 +98,7 @@ impl Loss {
 
 /// A star that was tracked.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct TrackedStar {
     /// The catalogue star.
     pub star: StarIndex,
@@ -111,6 +112,7 @@ pub struct TrackedStar {
 
 /// What tracking says of one frame.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Track {
     /// How the attitude was found.
     pub mode: Mode,

@@ -61,10 +61,8 @@ fn detection_allocates_nothing_in_steady_state() {
         frame(1.0, 1.0, 0.7, 3),
     ];
     for centroid in [CentroidMethod::GaussianFit, CentroidMethod::GreyWeighted] {
-        let config = DetectConfig {
-            centroid,
-            ..DetectConfig::default()
-        };
+        let mut config = DetectConfig::default();
+        config.centroid = centroid;
         let mut workspace = Workspace::new();
         let mut found = Detections::default();
         let first = allocation_counter::measure(|| {

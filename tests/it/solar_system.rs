@@ -75,7 +75,7 @@ fn solved(
     let mut context = Context::new(sky);
     context.priors.date = known.map(|date| FrameDate {
         date: date.parse().unwrap(),
-        source: DateSource::Option,
+        source: DateSource::User,
     });
     solve_frame(&frame, &context, &mut Workspace::new()).unwrap()
 }

@@ -14,11 +14,7 @@ const RATE_DEG_S: Vector3<f64> = Vector3::new(0.4, -0.9, 0.6);
 
 fn write(directory: &Path, name: &str, frame: &Frame) -> PathBuf {
     let path = directory.join(name);
-    let options = TiffOptions {
-        samples: TiffSamples::Unsigned16,
-        compressed: false,
-        description: "",
-    };
+    let options = TiffOptions::new(TiffSamples::Unsigned16);
     write_tiff(&mut File::create(&path).unwrap(), frame, &options).unwrap();
     path
 }

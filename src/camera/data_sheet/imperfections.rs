@@ -5,6 +5,7 @@ use crate::camera::LENS_TERMS;
 
 /// Form of a star's spot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum SpotForm {
     /// A Gaussian, integrated over each pixel.
     ///
@@ -70,6 +71,7 @@ pub fn lens_transmission(vignetting: f64, off_centre_sq: f64) -> f64 {
 /// Properties of a camera that affect simulated frames, but not the limiting magnitude of its
 /// centre. The default has none of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Imperfections {
     /// Share of the light lost in the corners; it grows with the square of the distance from the
     /// centre.

@@ -32,7 +32,12 @@ pub use key::{Key, Limits, nearest_name};
 #[doc(hidden)]
 pub use keys::{IMPERFECTION_KEYS, KEYS, is_curve};
 pub use preset::Preset;
-pub use response::{Response, ResponseError};
+pub use response::Response;
+#[doc(hidden)]
+pub use response::ResponseError;
 pub use sheet::DataSheet;
-pub use spot_image::{SpotImage, SpotImageError};
+pub use spot_image::SpotImage;
+#[doc(hidden)]
+pub use spot_image::SpotImageError;
+#[doc(hidden)]
 pub use template::template;

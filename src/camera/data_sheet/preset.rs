@@ -6,6 +6,7 @@ use super::sheet::DataSheet;
 
 /// A built-in camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Preset {
     /// The camera of experiment 1 of Tong, Li & Wang 2014.
     Experiment1,

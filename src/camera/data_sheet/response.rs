@@ -11,6 +11,7 @@ const MAX_BYTES: u64 = 1 << 20;
 
 /// A number from 0 to 1 at each wavelength.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Response {
     /// The same at every wavelength.
     Constant(f64),

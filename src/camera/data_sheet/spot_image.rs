@@ -8,6 +8,7 @@ const MAX_SAMPLES: usize = 1 << 22;
 
 /// A star's spot, sampled on a grid. Its place is the centre of its light.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct SpotImage {
     /// Light above and left of each corner of the samples, of 1 in all; row-major.
     light_before: Vec<f64>,

@@ -24,15 +24,13 @@ pub(super) fn write(
             let made = maker.frame(protocol.seed, number)?;
             let name = format!("{}-{number:05}.tif", kind.name());
             let is_8_bit = made.frame.saturation_adu.is_some_and(|most| most <= 255.0);
-            let options = TiffOptions {
-                samples: if is_8_bit {
-                    TiffSamples::Unsigned8
-                } else {
-                    TiffSamples::Unsigned16
-                },
-                compressed: true,
-                description: kind.name(),
-            };
+            let mut options = TiffOptions::new(if is_8_bit {
+                TiffSamples::Unsigned8
+            } else {
+                TiffSamples::Unsigned16
+            });
+            options.compressed = true;
+            options.description = kind.name();
             let mut content = Cursor::new(Vec::new());
             write_tiff(&mut content, &made.frame, &options)?;
             write_into(directory, [(name, content.into_inner())])?;

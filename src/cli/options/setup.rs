@@ -35,10 +35,7 @@ impl SetupOptions {
     }
 
     fn applied_to(&self, scenario: Scenario) -> Result<Setup, CommandError> {
-        let mut setup = Setup {
-            scenario,
-            scene: Scene::default(),
-        };
+        let mut setup = Setup::new(scenario);
         self.scene.apply(&mut setup);
         setup.check().map_err(|error| self.cause(error))?;
         Ok(setup)

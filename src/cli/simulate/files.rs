@@ -163,11 +163,10 @@ impl FrameFiles {
                     _ => TiffSamples::Float32,
                 };
                 let mut content = Cursor::new(Vec::new());
-                let options = TiffOptions {
-                    samples,
-                    compressed: self.compressed,
-                    description: &description.text(),
-                };
+                let description = description.text();
+                let mut options = TiffOptions::new(samples);
+                options.compressed = self.compressed;
+                options.description = &description;
                 write_tiff(&mut content, frame, &options)?;
                 Ok(content.into_inner())
             }

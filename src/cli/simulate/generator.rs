@@ -63,12 +63,11 @@ impl Generator<'_> {
     /// Metadata as a real camera writes them.
     fn metadata(&self) -> FrameMetadata {
         let sheet = &self.setup.scenario.camera;
-        FrameMetadata {
-            date: self.date,
-            exposure_s: Some(self.setup.scenario.conditions.exposure_s),
-            pixel_size_um: Some((sheet.pitch_x_um * sheet.pitch_y_um).sqrt()),
-            focal_length_mm: Some(sheet.focal_length_mm),
-            ..FrameMetadata::default()
-        }
+        let mut metadata = FrameMetadata::default();
+        metadata.date = self.date;
+        metadata.exposure_s = Some(self.setup.scenario.conditions.exposure_s);
+        metadata.pixel_size_um = Some((sheet.pitch_x_um * sheet.pitch_y_um).sqrt());
+        metadata.focal_length_mm = Some(sheet.focal_length_mm);
+        metadata
     }
 }

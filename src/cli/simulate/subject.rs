@@ -67,11 +67,9 @@ impl Subject {
 fn star_list(path: &Path, setup: &Setup) -> anyhow::Result<Vec<(PixelPoint, f64)>> {
     let sheet = &setup.scenario.camera;
     let side = |pixels: usize| u32::try_from(pixels).ok();
-    let options = CentroidListOptions {
-        width: side(sheet.width_px),
-        height: side(sheet.height_px),
-        ..CentroidListOptions::default()
-    };
+    let mut options = CentroidListOptions::default();
+    options.width = side(sheet.width_px);
+    options.height = side(sheet.height_px);
     let list = centroid_list::read(path, &options)?;
     if list.photometry != Photometry::JohnsonV {
         let error = anyhow!("found no column vmag, expected the V magnitudes of the stars");

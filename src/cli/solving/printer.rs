@@ -17,12 +17,12 @@ pub(super) struct Printer {
 
 impl Printer {
     pub(super) fn new(options: &OutputOptions) -> Self {
+        let mut text = TextOptions::default();
+        text.all_stars = options.all_stars;
+        text.option_names = OptionNames::Flags;
         Self {
             format: options.format,
-            text: TextOptions {
-                all_stars: options.all_stars,
-                option_names: OptionNames::Flags,
-            },
+            text,
             reports: 0,
         }
     }

@@ -30,10 +30,9 @@ pub(crate) struct Plan {
 
 impl Plan {
     pub(crate) fn context<'a>(&'a self, indexed: &'a IndexedCatalog<'a>) -> Context<'a> {
-        Context {
-            calibration: self.calibration.as_ref(),
-            ..Context::new(indexed).with_options(&self.options, self.camera.clone())
-        }
+        let mut context = Context::new(indexed).with_options(&self.options, self.camera.clone());
+        context.calibration = self.calibration.as_ref();
+        context
     }
 }
 

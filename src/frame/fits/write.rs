@@ -13,6 +13,7 @@ const RESERVED: [&str; 12] = [
 
 /// How pixels are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum FitsSamples {
     /// Floats of 32 bits (BITPIX −32), unchanged; NaN marks a pixel without a value.
     Float32,

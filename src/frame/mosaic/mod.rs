@@ -29,6 +29,7 @@ use serde::Serialize;
 
 /// The mosaic of filters over the pixels of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Mosaic {
     /// The filters, where the header says which.
     pub pattern: Option<BayerPattern>,

@@ -8,6 +8,7 @@ use tiff::{TiffError, TiffResult};
 
 /// How pixels are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum TiffSamples {
     /// Whole levels from 0 to 255.
     Unsigned8,
@@ -19,6 +20,7 @@ pub enum TiffSamples {
 
 /// How to write a TIFF file.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub struct TiffOptions<'a> {
     /// How pixels are stored.
     pub samples: TiffSamples,
@@ -26,6 +28,17 @@ pub struct TiffOptions<'a> {
     pub compressed: bool,
     /// Text for the attribute `ImageDescription`. Characters outside ASCII become question marks.
     pub description: &'a str,
+}
+
+impl TiffOptions<'_> {
+    /// Pixels of this kind, uncompressed, without a description.
+    pub const fn new(samples: TiffSamples) -> Self {
+        Self {
+            samples,
+            compressed: false,
+            description: "",
+        }
+    }
 }
 
 /// Writes the pixels of `frame`, and of its metadata the date, exposure, focal length and pixel

@@ -71,6 +71,7 @@ impl fmt::Display for DoubleImage {
 
 /// A solution that the priors exclude.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Excluded {
     /// Its horizontal field of view, in radians.
     pub fov_x_rad: f64,

@@ -102,7 +102,7 @@ pub struct NamingStart {
     /// Whether to look at how stars and other detections are spread over the frame.
     pub by_place: bool,
     /// The simplest distortion model to fit, where the stars can afford it.
-    pub least: Option<DistortionModel>,
+    pub min_distortion: Option<DistortionModel>,
 }
 
 /// A hypothesis, and the distortion model to fit from there.
@@ -216,7 +216,10 @@ impl Refiner {
         self.naming
             .start(stars, hypothesis.zero_point_mag, wanted.by_place);
         self.blends.start(self.predicted.len());
-        let mut model = hypothesis.camera.distortion_model().max(wanted.least);
+        let mut model = hypothesis
+            .camera
+            .distortion_model()
+            .max(wanted.min_distortion);
         let mut current = *settled;
         for round in 0..MAX_NAMING_ROUNDS {
             let hypothesis = current.hypothesis();
@@ -236,7 +239,7 @@ impl Refiner {
             // The names are more stars than those that the model was chosen for.
             if round == 0 || (!settled && self.are_residuals_unexplained(problem, &current)) {
                 let chosen = self.choose_model(problem, &current, DistortionModel::Quintic);
-                let chosen = chosen.max(wanted.least);
+                let chosen = chosen.max(wanted.min_distortion);
                 if chosen != model {
                     model = chosen;
                     guess.model = chosen;

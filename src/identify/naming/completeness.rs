@@ -23,6 +23,7 @@ const PRIOR_AROUND: f64 = 1.0;
 
 /// The probability of each predicted star that it is observed. Its buffers are reused.
 #[derive(Debug, Default)]
+#[non_exhaustive]
 pub struct Completeness {
     /// By brightness alone, brightest first; at the end 0, for stars fainter than all.
     shares: Vec<f64>,

@@ -12,6 +12,7 @@ use serde::Serialize;
 
 /// A narrow band of the spectrum.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Band {
     /// Central wavelength.
     pub wavelength_nm: f64,
@@ -39,6 +40,7 @@ impl Band {
 
 /// Every quantity between a star's light and the limiting magnitude.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Budget {
     /// Set of equations.
     pub reading: Reading,

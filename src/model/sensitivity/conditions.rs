@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 
 /// Sky brightness, in one of the usual units.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum SkyBrightness {
     /// V magnitudes per square arcsecond, as seen from the ground.
     MagArcsec2(f64),
@@ -44,6 +45,7 @@ impl SkyBrightness {
 
 /// Atmospheric extinction.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Extinction {
     /// Eq. (3) of the paper, its optical depth multiplied by this factor.
     Law(f64),
@@ -83,6 +85,7 @@ fn law_optical_depth(wavelength_nm: f64) -> f64 {
 
 /// Observing conditions.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Conditions {
     /// Exposure, in seconds.
     #[doc(alias = "T")]

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 /// The faintest star that will be detected.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Faintest {
     /// Expected V magnitude, given that any star is detected.
     pub mean_vmag: f64,

@@ -10,6 +10,7 @@ use serde::{Serialize, Serializer};
 /// Limiting magnitude of a scenario and everything that it follows from. Other programs read the
 /// first fields.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Prediction {
     /// V magnitude of the faintest star with the required SNR in its brightest pixel.
     pub limit_vmag: f64,
@@ -40,6 +41,7 @@ pub struct Prediction {
 
 /// Performance of a detector: limits, threshold, false alarms and completeness.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct DetectorReport {
     /// Detection rule.
     pub rule: Rule,
@@ -57,6 +59,7 @@ pub struct DetectorReport {
 
 /// A point of the completeness curve.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct CompletenessPoint {
     /// V magnitude.
     pub vmag: f64,

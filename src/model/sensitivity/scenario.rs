@@ -16,6 +16,7 @@ pub enum Reading {
 
 /// A camera, its observing conditions, and the equations to use.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Scenario {
     /// The camera.
     pub camera: DataSheet,

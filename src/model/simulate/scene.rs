@@ -9,6 +9,7 @@ use rand_distr::{Distribution, UnitSphere};
 /// What happens during the exposure. The default is a camera at rest under a uniform sky, with
 /// nothing besides stars.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Scene {
     /// Angular rate about the camera's x axis, in degrees per second.
     pub rate_x_deg_s: f64,

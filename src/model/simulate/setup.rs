@@ -10,6 +10,7 @@ use crate::model::sensitivity::{
 
 /// What is simulated: a scenario and a scene.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Setup {
     /// Camera, sky and exposure.
     pub scenario: Scenario,
@@ -18,6 +19,14 @@ pub struct Setup {
 }
 
 impl Setup {
+    /// This scenario with nothing beside it: the default scene.
+    pub fn new(scenario: Scenario) -> Self {
+        Self {
+            scenario,
+            scene: Scene::default(),
+        }
+    }
+
     /// Checks the scenario, and that the scene can be simulated.
     ///
     /// # Errors

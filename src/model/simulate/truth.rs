@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 
 /// The ground truth of a frame.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Truth {
     /// Stars with positions on the frame: those of the catalogue in its order, then false ones.
     pub stars: Vec<TrueStar>,
@@ -26,6 +27,7 @@ pub struct Truth {
 
 /// A star on a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct TrueStar {
     /// Unique number among the stars of the frame.
     pub number: usize,

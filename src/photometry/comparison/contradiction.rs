@@ -1,6 +1,6 @@
 //! Contradictions between a frame and the stated camera.
 
-use super::measurement::{FrameMeasurement, StatedCamera};
+use super::measurement::{FrameMeasurement, ObservingSetup};
 use crate::base::statistics::Estimate;
 use crate::base::units::ARCSEC_PER_RAD;
 use crate::model::sensitivity::Budget;
@@ -8,6 +8,7 @@ use std::fmt;
 
 /// One contradiction between a frame and the stated camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Contradiction {
     /// The frame has another size than the detector.
     Size {
@@ -138,7 +139,7 @@ impl fmt::Display for Contradiction {
 /// Contradictions of `frame` with the stated camera, of which `budget` and the zero point's
 /// difference follow.
 pub(super) fn find(
-    stated: &StatedCamera,
+    stated: &ObservingSetup,
     frame: &FrameMeasurement,
     budget: &Budget,
     zero_point_difference: Option<Estimate>,
@@ -155,7 +156,7 @@ pub(super) fn find(
     all.into_iter().flatten().collect()
 }
 
-fn size(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Contradiction> {
+fn size(stated: &ObservingSetup, frame: &FrameMeasurement) -> Option<Contradiction> {
     let camera_px = [stated.sheet.width_px, stated.sheet.height_px];
     (frame.size_px != camera_px).then_some(Contradiction::Size {
         frame_px: frame.size_px,
@@ -163,7 +164,7 @@ fn size(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Contradiction
     })
 }
 
-fn pixel_scale(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Contradiction> {
+fn pixel_scale(stated: &ObservingSetup, frame: &FrameMeasurement) -> Option<Contradiction> {
     const TOLERANCE: f64 = 0.05;
     let measured_rad = frame.pixel_scale_rad?;
     let camera_rad = stated.sheet.pixel_scale_rad();
@@ -173,7 +174,7 @@ fn pixel_scale(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Contra
     })
 }
 
-fn spot_size(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Contradiction> {
+fn spot_size(stated: &ObservingSetup, frame: &FrameMeasurement) -> Option<Contradiction> {
     const TOLERANCE_FACTOR: f64 = 1.5;
     let measured_px = frame.spot_sigma_px?;
     let camera_px = stated.sheet.spot_sigma_px;
@@ -183,7 +184,7 @@ fn spot_size(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Contradi
     })
 }
 
-fn below_bias(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Contradiction> {
+fn below_bias(stated: &ObservingSetup, frame: &FrameMeasurement) -> Option<Contradiction> {
     let (background_adu, bias_adu) = (frame.background_adu, stated.sheet.bias_adu);
     (background_adu < bias_adu - frame.noise_adu).then_some(Contradiction::BelowBias {
         background_adu,
@@ -192,7 +193,7 @@ fn below_bias(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Contrad
 }
 
 fn noise(
-    stated: &StatedCamera,
+    stated: &ObservingSetup,
     frame: &FrameMeasurement,
     expected_e: f64,
 ) -> Option<Contradiction> {
@@ -215,7 +216,7 @@ fn zero_point(Estimate { value, sigma }: Estimate) -> Option<Contradiction> {
     })
 }
 
-fn zenith_distance(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Contradiction> {
+fn zenith_distance(stated: &ObservingSetup, frame: &FrameMeasurement) -> Option<Contradiction> {
     /// Beyond half the field, which the stated direction may be off the centre.
     const TOLERANCE_DEG: f64 = 1.0;
     let stated_deg = stated

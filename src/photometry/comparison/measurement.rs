@@ -8,7 +8,8 @@ use crate::photometry::zero_point::WeightedColor;
 
 /// The camera with which a frame was taken, as stated by the user.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StatedCamera {
+#[non_exhaustive]
+pub struct ObservingSetup {
     /// Its data sheet.
     pub sheet: DataSheet,
     /// Zenith distance of the frame's centre, in degrees. Default: that of site and date, else that
@@ -16,6 +17,17 @@ pub struct StatedCamera {
     pub zenith_distance_deg: Option<f64>,
     /// Atmospheric extinction; default: that of the model.
     pub extinction: Option<Extinction>,
+}
+
+impl ObservingSetup {
+    /// A camera with this data sheet; nothing else is stated.
+    pub const fn new(sheet: DataSheet) -> Self {
+        Self {
+            sheet,
+            zenith_distance_deg: None,
+            extinction: None,
+        }
+    }
 }
 
 /// What was measured in a frame; `None` where unknown.

@@ -1,6 +1,6 @@
 //! What should the stated camera have seen in a frame, compared with what it saw?
 //!
-//! ([`StatedCamera`], [`FrameMeasurement`]) → [`Comparison`]
+//! ([`ObservingSetup`], [`FrameMeasurement`]) → [`Comparison`]
 //!
 //! 1. The sky brightness comes from the frame itself: its background above the bias, in electrons.
 //! 2. With it, the sensitivity model predicts limiting magnitudes and zero point. The fitted limit
@@ -17,7 +17,7 @@ mod contradiction;
 mod measurement;
 
 pub use contradiction::Contradiction;
-pub use measurement::StatedCamera;
+pub use measurement::ObservingSetup;
 #[doc(hidden)]
 pub use measurement::{FieldStar, FrameMeasurement};
 
@@ -31,6 +31,7 @@ use crate::model::sensitivity::{
 
 /// The prediction for a camera, and its differences from a frame.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Comparison {
     /// The camera, and the conditions as far as known.
     pub scenario: Scenario,
@@ -70,7 +71,7 @@ const NO_SKY_MAG: f64 = 35.0;
 
 /// Compares a frame with the prediction for the stated camera; `None` if the exposure is unknown.
 #[doc(hidden)]
-pub fn compare(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Comparison> {
+pub fn compare(stated: &ObservingSetup, frame: &FrameMeasurement) -> Option<Comparison> {
     let exposure_s = frame.exposure_s?;
     let transmissions = transmissions(frame);
     let typical = median(&mut transmissions.clone());
@@ -130,7 +131,7 @@ pub fn compare(stated: &StatedCamera, frame: &FrameMeasurement) -> Option<Compar
 /// The scenario of the frame, and whether its zenith distance is known. `typical` is the median part
 /// of the centre's light that arrives.
 fn scenario(
-    stated: &StatedCamera,
+    stated: &ObservingSetup,
     frame: &FrameMeasurement,
     (exposure_s, typical): (f64, f64),
 ) -> (Scenario, bool) {

@@ -4,8 +4,8 @@ use super::*;
 use crate::camera::data_sheet::Preset;
 use crate::detect::DetectConfig;
 
-fn stated() -> StatedCamera {
-    StatedCamera {
+fn stated() -> ObservingSetup {
+    ObservingSetup {
         sheet: Preset::Experiment1.data_sheet(),
         zenith_distance_deg: None,
         extinction: None,
@@ -132,7 +132,7 @@ fn a_stated_zenith_distance_has_precedence_and_none_is_below_the_horizon() {
 
 #[test]
 fn each_contradiction_has_its_sentence() {
-    let sentences = |change: &dyn Fn(&mut StatedCamera, &mut FrameMeasurement)| {
+    let sentences = |change: &dyn Fn(&mut ObservingSetup, &mut FrameMeasurement)| {
         let (mut stated, mut frame) = (stated(), measured(16.0));
         change(&mut stated, &mut frame);
         compare(&stated, &frame)
@@ -181,7 +181,7 @@ fn each_contradiction_has_its_sentence() {
 fn the_zenith_distance_is_as_stated_else_by_the_site_else_by_the_header() {
     let mut frame = measured(18.0);
     let mut stated = stated();
-    let zenith_distance = |stated: &StatedCamera, frame: &FrameMeasurement| {
+    let zenith_distance = |stated: &ObservingSetup, frame: &FrameMeasurement| {
         let found = compare(stated, frame).unwrap();
         let zenith_deg = found.scenario.conditions.zenith_distance_deg;
         (zenith_deg, found.zenith_is_known)

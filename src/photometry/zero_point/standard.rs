@@ -24,6 +24,7 @@ pub struct StandardStar {
 
 /// The conversion from instrumental to V magnitudes.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct ZeroPoint {
     /// V magnitude of a star with a flux of 1.
     pub v_mag: f64,

@@ -21,6 +21,7 @@ mod legend;
 mod mark;
 mod names;
 
+#[doc(hidden)]
 pub use canvas::FONT;
 
 use crate::frame::{Frame, OVERLAY_TEXT};

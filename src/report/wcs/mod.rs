@@ -58,11 +58,13 @@ pub fn header(frame: &str, solution: &Solution) -> Option<Vec<u8>> {
 }
 
 /// Whether `file` is a header written by [`header`].
+#[doc(hidden)]
 pub fn is_header(file: &[u8]) -> bool {
     file.starts_with(b"SIMPLE  =") && memmem::find(file, SOLVED_BY.as_bytes()).is_some()
 }
 
 /// Adds the mapping from a file's pixels to the sky, for a `camera` in this attitude.
+#[doc(hidden)]
 pub fn add_projection(
     header: &mut FitsHeader,
     camera: &CameraModel,

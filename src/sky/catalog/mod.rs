@@ -61,11 +61,15 @@ mod star_catalog;
 mod table;
 mod tycho2;
 
-pub use error::{CatalogError, CompactError, RecordError, RecordLocation};
+pub use error::CatalogError;
+#[doc(hidden)]
+pub use error::{CompactError, RecordError, RecordLocation};
 pub use id::{HipparcosId, StarId, TychoId};
+#[doc(hidden)]
 pub use import::{ImportSummary, Reading, SourceFile};
 #[doc(hidden)]
 pub use read::read_until;
+#[doc(hidden)]
 pub use read::{import, read};
 pub use star::{Star, StarFlags, StarIndex};
 pub use star_catalog::Catalog;

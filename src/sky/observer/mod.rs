@@ -159,6 +159,7 @@ impl FromStr for Site {
 
 /// A direction in a site's sky.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Observation {
     /// The site.
     pub site: Site,
@@ -172,6 +173,7 @@ pub struct Observation {
 
 /// How a direction above the horizon appears through the atmosphere.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Apparent {
     /// Apparent (refracted) zenith distance in radians, in [0, π/2].
     pub zenith_distance_rad: f64,

@@ -10,6 +10,7 @@ pub(super) const LIGHT_DAYS_PER_AU: f64 = 499.004_784 / 86_400.0;
 
 /// The Moon, or a planet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum BodyKind {
     /// The Earth's Moon.
     Moon,
@@ -103,6 +104,7 @@ impl TimeError {
 
 /// The Moon or a planet at a date.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Body {
     /// Which one.
     pub kind: BodyKind,

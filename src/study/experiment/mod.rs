@@ -124,7 +124,7 @@ pub fn run(
 fn context<'a>(published: &Published, indexed: &'a IndexedCatalog<'a>) -> Context<'a> {
     let date = FrameDate {
         date: published.date,
-        source: DateSource::Option,
+        source: DateSource::User,
     };
     Context {
         priors: Priors {

@@ -8,7 +8,7 @@ use crate::frame::{Frame, FrameError};
 use crate::identify::IndexedCatalog;
 use crate::model::sensitivity::{Budget, Detector, Rule, ScenarioError};
 use crate::model::simulate::{Pointing, Setup, Simulator, Truth};
-use crate::photometry::comparison::StatedCamera;
+use crate::photometry::comparison::ObservingSetup;
 use crate::pipeline::Context;
 use crate::study::robustness::random_rotation;
 use rand::{Rng, SeedableRng};
@@ -88,7 +88,7 @@ impl<'a> Validator<'a> {
             return Err(ValidationError::NoLimit);
         }
         let sheet = &scenario.camera;
-        let camera = protocol.scale_known.then(|| StatedCamera {
+        let camera = protocol.scale_known.then(|| ObservingSetup {
             sheet: sheet.clone(),
             zenith_distance_deg: None,
             extinction: None,

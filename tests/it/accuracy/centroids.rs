@@ -144,10 +144,8 @@ fn table_of_centroids() {
         println!("{method:?}");
         for spot_px in [0.5, 0.7, 1.0, 1.25, 1.5] {
             let field = Field::new(data_sheet(2048, spot_px), 100.0);
-            let config = DetectConfig {
-                centroid: method,
-                ..DetectConfig::default()
-            };
+            let mut config = DetectConfig::default();
+            config.centroid = method;
             for ((from, to), m) in CLASSES
                 .iter()
                 .zip(measured(&field, &config, &CLASSES, FRAMES))

@@ -88,10 +88,8 @@ fn judged(stars: &[Star], places: &[PixelPoint], is_found: impl Fn(&Star) -> boo
 
 /// Detections in this many frames.
 fn measured(field: &Field, frames: u64) -> Found {
-    let config = DetectConfig {
-        false_alarms_per_mpx: FALSE_PER_MPX,
-        ..DetectConfig::default()
-    };
+    let mut config = DetectConfig::default();
+    config.false_alarms_per_mpx = FALSE_PER_MPX;
     let one = |workspace: &mut Workspace, seed: u64| {
         let (stars, frame) = frame(field, seed);
         let found = detect(&frame, &config, workspace).unwrap();

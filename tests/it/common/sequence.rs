@@ -37,13 +37,11 @@ pub fn attitude(rate_deg_s: Vector3<f64>, number: u32) -> Rotation<Icrs, Camera>
 
 /// A frame at an attitude, of a camera that turns.
 pub fn frame(at: Rotation<Icrs, Camera>, rate_deg_s: Vector3<f64>, seed: u64) -> Frame<'static> {
-    let scene = Scene {
-        rate_x_deg_s: rate_deg_s.x,
-        rate_y_deg_s: rate_deg_s.y,
-        rate_z_deg_s: rate_deg_s.z,
-        faintest_vmag: Some(8.0),
-        ..Scene::default()
-    };
+    let mut scene = Scene::default();
+    scene.rate_x_deg_s = rate_deg_s.x;
+    scene.rate_y_deg_s = rate_deg_s.y;
+    scene.rate_z_deg_s = rate_deg_s.z;
+    scene.faintest_vmag = Some(8.0);
     let stars = Catalog::built_in().stars();
     let simulator = Simulator::new(&scenario(), &scene, stars).expect("a valid camera");
     let pointing = Pointing {

@@ -108,11 +108,10 @@ fn found_in(frame: &Frame, config: &DetectConfig) -> Detections {
 }
 
 fn config_with(spot_sigma_px: f64, false_alarms_per_mpx: f64) -> DetectConfig {
-    DetectConfig {
-        spot_sigma_px: Some(spot_sigma_px),
-        false_alarms_per_mpx,
-        ..DetectConfig::default()
-    }
+    let mut config = DetectConfig::default();
+    config.spot_sigma_px = Some(spot_sigma_px);
+    config.false_alarms_per_mpx = false_alarms_per_mpx;
+    config
 }
 
 /// The detection nearest to a point, within `reach` pixels.

@@ -189,7 +189,8 @@ proptest! {
     ) {
         let frame = marked_frame(&marks, size, noise, seed);
         let centroid = if is_grey { CentroidMethod::GreyWeighted } else { CentroidMethod::GaussianFit };
-        let config = DetectConfig { centroid, ..DetectConfig::default() };
+        let mut config = DetectConfig::default();
+config.centroid = centroid;
         for source in found_in(&frame, &config).sources {
             if let Err(unsound) = check_is_sound(&source, size.0, size.1) {
                 prop_assert!(false, "{}", unsound);

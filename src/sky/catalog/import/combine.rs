@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 /// A source file of a catalogue.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SourceFile {
     /// The file.
     pub path: PathBuf,

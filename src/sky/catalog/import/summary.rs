@@ -5,6 +5,7 @@ use std::fmt;
 
 /// What became of the records of a source file.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct ImportSummary {
     /// Records in the file.
     pub records: u64,
