@@ -61,7 +61,7 @@ const MAX_ALONG: usize = 128;
 
 /// Points on a frame, sorted into cells: searches within short distances are faster than with a
 /// [`PointTree`]. Its buffers are reused.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct PointGrid {
     x: Division,
     y: Division,

@@ -116,6 +116,14 @@ pub fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
+/// Median and standard deviation of normally distributed values with outliers: the latter from the
+/// median absolute deviation. Reorders and changes the values.
+pub(crate) fn median_and_sigma(values: &mut [f64]) -> (f64, f64) {
+    let center = median(values);
+    values.iter_mut().for_each(|v| *v = (*v - center).abs());
+    (center, SIGMA_PER_MAD * median(values))
+}
+
 /// log10 of the probability of `hits` or more successes in `trials` at `chance` each.
 pub fn log10_binomial_tail(trials: usize, hits: usize, chance: f64) -> f64 {
     /// With more hits than this, factorials are taken from the gamma function.

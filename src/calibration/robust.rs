@@ -1,6 +1,6 @@
 //! Mean and standard deviation of many values without outliers.
 
-use crate::base::statistics::{SIGMA_PER_MAD, median};
+use crate::base::statistics::{median, median_and_sigma};
 
 /// Values beyond this number of standard deviations are outliers. A normal distribution has 6 in
 /// ten million there; clipping them lowers its standard deviation by less than 10⁻⁵ of it.
@@ -29,9 +29,8 @@ impl Moments {
         if sorted.is_empty() {
             return None;
         }
-        let mean = median(&mut sorted);
-        sorted.iter_mut().for_each(|v| *v = (*v - mean).abs());
-        let sigma = (SIGMA_PER_MAD * median(&mut sorted)).max(floor);
+        let (mean, sigma) = median_and_sigma(&mut sorted);
+        let sigma = sigma.max(floor);
         let mut current = Self { mean, sigma };
         for _ in 0..MAX_ROUNDS {
             let kept = valid(values).filter(|&value| current.includes(value, floor));

@@ -1,7 +1,7 @@
 //! Finds which catalogue stars in a frame were detected: those that a detection has the name of.
 
 use super::IdentifiedFrame;
-use crate::base::neighbors::PointGrid;
+use crate::base::neighbors::PointTree;
 use crate::identify::{PredictedStar, StarMatch};
 use crate::sky::catalog::StarIndex;
 
@@ -55,8 +55,7 @@ pub(crate) fn filter_response(distance_sigmas: f64) -> f64 {
 pub(super) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) -> Association {
     let matches = &frame.identification.matches;
     let detections = detections_of(predicted, matches);
-    let mut places = PointGrid::default();
-    places.fill(predicted.len(), predicted.iter().map(|star| star.pixel));
+    let places = PointTree::new(predicted.iter().map(|star| star.pixel));
     let spot_sigma_px = frame.detections.spot_sigma_px;
     let resolved_px = resolved_px(spot_sigma_px);
     let surroundings = |index: usize, star: &PredictedStar| {

@@ -1,7 +1,7 @@
 //! Recognises frames that were not taken without light.
 
 use super::frame_statistics::{FrameStatistics, is_same_exposure};
-use crate::base::statistics::median;
+use crate::base::statistics::{median, median_and_sigma};
 use std::fmt;
 
 /// A frame that does not look like a dark frame.
@@ -111,11 +111,7 @@ fn other_level(frame: &FrameStatistics, frames: &[FrameStatistics]) -> Option<No
     if means.len() < MIN_FRAMES {
         return None;
     }
-    let median_adu = median(&mut means);
-    means
-        .iter_mut()
-        .for_each(|mean| *mean = (*mean - median_adu).abs());
-    let scale = 1.4826 * median(&mut means);
+    let (median_adu, scale) = median_and_sigma(&mut means);
     let mut sigmas: Vec<f64> = alike.map(|other| other.sigma_adu).collect();
     let least = (LEVEL_SIGMA * scale).max(LEVEL_NOISE_SHARE * median(&mut sigmas));
     ((frame.mean_adu - median_adu).abs() > least).then_some(NotDarkReason::OtherLevel {

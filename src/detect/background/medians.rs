@@ -5,6 +5,7 @@
     reason = "loops over lanes, which become vectors"
 )]
 
+use crate::base::statistics::SIGMA_PER_MAD;
 use multiversion::multiversion;
 
 /// Cells treated side by side.
@@ -113,7 +114,6 @@ pub(crate) fn of_squares(rows: [&[f32]; 3], medians: &mut [f32]) {
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 pub(crate) fn replace_outliers(rows: [&[f32]; 3], sigmas: &[f32], backgrounds: &mut [f32]) {
     const OUTLIER_SIGMA: f32 = 3.0;
-    const SIGMA_PER_MEDIAN_DEVIATION: f32 = 1.4826;
     const OUTLIER_NOISE: f32 = 0.5;
     let blocks = backgrounds
         .chunks_mut(CELL_LANES)
@@ -127,8 +127,8 @@ pub(crate) fn replace_outliers(rows: [&[f32]; 3], sigmas: &[f32], backgrounds: &
         let deviation = median_of_nine(deviations);
         for (lane, (background, sigma)) in out.iter_mut().zip(sigma).enumerate() {
             // Cells on a plane deviate by its gradient: an outlier exceeds that.
-            let allowed = OUTLIER_SIGMA * SIGMA_PER_MEDIAN_DEVIATION * deviation[lane]
-                + OUTLIER_NOISE * sigma;
+            let allowed =
+                OUTLIER_SIGMA * SIGMA_PER_MAD as f32 * deviation[lane] + OUTLIER_NOISE * sigma;
             if (*background - median[lane]).abs() > allowed {
                 *background = median[lane];
             }

@@ -1,13 +1,18 @@
 //! The spots of all peaks as far as they are known, and those around each peak.
 
-use super::neighbor_grid::NeighborGrid;
+use crate::base::coords::PixelPoint;
+use crate::base::neighbors::PointGrid;
 use crate::detect::candidates::Peak;
 use crate::detect::fit::{FrameMaps, MAX_SPOTS, SpotEstimate, SpotGroup};
 
 /// The spots of all peaks, as far as they are known.
 #[derive(Debug, Clone, Default)]
 pub(super) struct KnownSpots {
-    neighbors: NeighborGrid,
+    places: PointGrid,
+    /// Peaks within this distance of each other are neighbors.
+    reach_px: f64,
+    /// The neighbors of the current peak, strongest first.
+    neighbors: Vec<u32>,
     /// The spot of each peak: fitted once it was measured, before that the initial guess.
     pub(super) spots: Vec<SpotEstimate>,
     /// Whether the spot is reliable: the initial guess of a saturated one is not.
@@ -24,7 +29,8 @@ impl KnownSpots {
     /// Begins with the initial guesses of all peaks, of which those within `reach_px` of each other
     /// are crowded.
     pub(super) fn begin(&mut self, peaks: &[Peak], maps: &FrameMaps<'_>, reach_px: f64) {
-        self.neighbors.sort(peaks, reach_px);
+        self.places.fill(peaks.len(), peaks.iter().map(place_of));
+        self.reach_px = reach_px.max(1.0);
         self.spots.clear();
         self.spots
             .extend(peaks.iter().map(|p| maps.initial_guess(p)));
@@ -33,13 +39,25 @@ impl KnownSpots {
         self.isolated.clear();
         self.crowded.clear();
         for index in 0..peaks.len() {
-            self.neighbors.find(peaks, index);
-            if self.neighbors.found.is_empty() {
+            self.find_neighbors(peaks, index);
+            if self.neighbors.is_empty() {
                 self.isolated.push(index as u32);
             } else {
                 self.crowded.push(index as u32);
             }
         }
+    }
+
+    fn find_neighbors(&mut self, peaks: &[Peak], index: usize) {
+        let neighbors = &mut self.neighbors;
+        neighbors.clear();
+        let place = place_of(&peaks[index]);
+        self.places.for_each_within(&place, self.reach_px, |near| {
+            if near.index != index {
+                neighbors.push(near.index as u32);
+            }
+        });
+        neighbors.sort_unstable();
     }
 
     /// Sets the fitted spot of a peak.
@@ -55,10 +73,10 @@ impl KnownSpots {
         peaks: &'a [Peak],
         touching_px: f64,
     ) -> PeakSurroundings<'a> {
-        self.neighbors.find(peaks, index);
+        self.find_neighbors(peaks, index);
         let mut start = SpotGroup::from_iter([self.spots[index]]);
         self.beyond.clear();
-        for other in self.neighbors.found.iter().map(|&found| found as usize) {
+        for other in self.neighbors.iter().map(|&found| found as usize) {
             let (a, b) = (&peaks[index], &peaks[other]);
             let (dx, dy) = (a.x as f64 - b.x as f64, a.y as f64 - b.y as f64);
             let is_touching = dx * dx + dy * dy < touching_px * touching_px;
@@ -71,11 +89,15 @@ impl KnownSpots {
         PeakSurroundings {
             peaks,
             index,
-            near: &self.neighbors.found,
+            near: &self.neighbors,
             start,
             beyond: &self.beyond,
         }
     }
+}
+
+fn place_of(peak: &Peak) -> PixelPoint {
+    PixelPoint::new(peak.x as f64, peak.y as f64)
 }
 
 /// A peak and the spots around it.

@@ -5,7 +5,6 @@ mod core;
 mod estimate;
 mod known_spots;
 mod measurement;
-mod neighbor_grid;
 mod pairs;
 mod ring;
 mod saturated_area;

@@ -7,7 +7,7 @@
 //! as well.
 
 use super::pattern::{BayerPattern, Diagonal};
-use crate::base::statistics::median;
+use crate::base::statistics::median_and_sigma;
 use crate::frame::Frame;
 
 /// Side of a patch, in pixels: 256 of each filter.
@@ -141,12 +141,8 @@ impl Mean {
     fn of(mut values: Vec<f64>, patch_error: f64) -> Self {
         /// Standard error of a median over that of a mean, for Gaussian errors.
         const OF_MEDIAN: f64 = 1.2533;
-        /// Standard deviation over the median of absolute deviations.
-        const OF_DEVIATIONS: f64 = 1.4826;
-        let value = median(&mut values);
-        values.iter_mut().for_each(|v| *v = (*v - value).abs());
-        let scatter = (OF_DEVIATIONS * median(&mut values)).max(patch_error);
-        let sigma = OF_MEDIAN * scatter / (values.len() as f64).sqrt();
+        let (value, scatter) = median_and_sigma(&mut values);
+        let sigma = OF_MEDIAN * scatter.max(patch_error) / (values.len() as f64).sqrt();
         Self { value, sigma }
     }
 
@@ -235,9 +231,8 @@ fn background_of(values: &mut Vec<f64>, step_adu: f64) -> Option<(f64, f64)> {
     if values.len() < MIN {
         return None;
     }
-    let center = median(values);
-    let mut deviations: Vec<f64> = values.iter().map(|v| (v - center).abs()).collect();
-    let limit = (CLIP_SIGMA * 1.4826 * median(&mut deviations)).max(1.5 * step_adu);
+    let (center, sigma) = median_and_sigma(&mut values.clone());
+    let limit = (CLIP_SIGMA * sigma).max(1.5 * step_adu);
     values.retain(|value| (value - center).abs() <= limit);
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;

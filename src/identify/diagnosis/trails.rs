@@ -3,6 +3,9 @@
 use super::cause::Diagnosis;
 use crate::detect::{BackgroundMap, Detection, Detections};
 use crate::frame::Frame;
+use image::{GrayImage, Luma};
+use imageproc::rect::{Rect, Region};
+use imageproc::region_labelling::{Connectivity, connected_components};
 use std::collections::HashSet;
 
 /// Number of detections examined, the brightest.
@@ -24,6 +27,8 @@ const MAX_OF_ALL: f64 = 0.6;
 /// … and their smallest alignment: the mean of unit vectors at twice their angles, 1 if all are
 /// parallel.
 const ALIGNMENT: f64 = 0.9;
+/// A region is first sought this far around the source, in pixels.
+const FIRST_REACH: u32 = 32;
 /// Cell size of the background mesh, in pixels.
 const CELL_PX: usize = 64;
 
@@ -122,27 +127,37 @@ fn brightest_near(frame: &Frame, above: &[f32], source: &Detection) -> Option<us
         .max_by(|&i, &j| above[i].total_cmp(&above[j]))
 }
 
-/// The connected pixels above `threshold` around `start`, up to [`MAX_PX`].
+/// The 8-connected pixels above `threshold` around `start`, as indices. A region of more than
+/// [`MAX_PX`] may be incomplete.
 fn connected(frame: &Frame, above: &[f32], start: usize, threshold: f32) -> Vec<usize> {
-    let mut seen = HashSet::from([start]);
-    let mut area = Vec::new();
-    let mut next = vec![start];
-    while let Some(i) = next.pop() {
-        area.push(i);
-        if area.len() > MAX_PX {
-            break;
+    let (x, y) = ((start % frame.width) as i32, (start / frame.width) as i32);
+    let whole = Rect::at(0, 0).of_size(frame.width as u32, frame.height as u32);
+    let around = |reach: u32| {
+        let corner = Rect::at(x - reach as i32, y - reach as i32);
+        corner.of_size(2 * reach + 1, 2 * reach + 1)
+    };
+    let mut reach = FIRST_REACH;
+    loop {
+        let window = around(reach)
+            .intersect(whole)
+            .expect("a pixel of the frame");
+        let (left, top) = (window.left() as u32, window.top() as u32);
+        let index = |x: u32, y: u32| (top + y) as usize * frame.width + (left + x) as usize;
+        let mask = GrayImage::from_fn(window.width(), window.height(), |x, y| {
+            Luma([u8::from(above[index(x, y)] > threshold)])
+        });
+        let labels = connected_components(&mask, Connectivity::Eight, Luma([0]));
+        let label = labels.get_pixel(x as u32 - left, y as u32 - top);
+        let region = labels.enumerate_pixels().filter(|(_, _, l)| *l == label);
+        let region: Vec<usize> = region.map(|(x, y, _)| index(x, y)).collect();
+        let inside = around(reach - 1);
+        let is_inside =
+            |&i: &usize| inside.contains((i % frame.width) as i32, (i / frame.width) as i32);
+        if region.len() > MAX_PX || region.iter().all(is_inside) {
+            return region;
         }
-        let (x, y) = (i % frame.width, i / frame.width);
-        for row in y.saturating_sub(1)..=(y + 1).min(frame.height - 1) {
-            for column in x.saturating_sub(1)..=(x + 1).min(frame.width - 1) {
-                let neighbor = row * frame.width + column;
-                if above[neighbor] > threshold && seen.insert(neighbor) {
-                    next.push(neighbor);
-                }
-            }
-        }
+        reach *= 4;
     }
-    area
 }
 
 /// The bar with the second moments of the region; `None` if it is too large for a star.
@@ -177,8 +192,6 @@ fn bar(area: &[usize], width: usize) -> Option<Bar> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::{GrayImage, Luma};
-    use imageproc::region_labelling::{Connectivity, connected_components};
     use proptest::prelude::*;
 
     #[test]

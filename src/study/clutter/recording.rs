@@ -2,6 +2,7 @@
 
 use super::canvas::Canvas;
 use super::chance::{log_uniform, normal};
+use crate::base::statistics::SIGMA_PER_MAD;
 use crate::frame::{Frame, FrameError};
 use crate::model::simulate::{color, decoded_jpeg, demosaiced};
 use image::ExtendedColorType;
@@ -25,7 +26,7 @@ impl Sky {
     /// The median, and the noise from the differences of neighbors.
     pub(super) fn of(frame: &Frame) -> Self {
         /// Standard deviation over the median absolute difference of two neighbors.
-        const NOISE_OF_DIFFERENCE: f64 = 1.482_602_218_505_602 * std::f64::consts::FRAC_1_SQRT_2;
+        const NOISE_OF_DIFFERENCE: f64 = SIGMA_PER_MAD * std::f64::consts::FRAC_1_SQRT_2;
         const STRIDE: usize = 7;
         let pixels = frame.values();
         let pairs = pixels.windows(2).step_by(STRIDE);
