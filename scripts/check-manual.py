@@ -37,8 +37,8 @@ def commands(page):
 def shortened(command):
     """The command with at most `MOST` frames or trials."""
     fewer = lambda found: f"{found[1]} {min(MOST, int(found[2]))}"
-    command = re.sub(r"(--frames|--trials) (\d+)", fewer, command)
-    return command + f" --trials {MOST}" if command == "starpipe robustness" else command
+    command = re.sub(r"(--count) (\d+)", fewer, command)
+    return command + f" --count {MOST}" if command == "starpipe robustness" else command
 
 
 def run(page, program):

@@ -266,9 +266,9 @@ def flux(checks):
     law = lambda nm: np.exp(-(0.009 * (nm * 1e-3) ** -4 + 0.223))
     grey = lambda nm: 10 ** (-0.4 * 0.25)
     for z_deg, options, zenith, vignetting in [
-        (0, ["--extinction-mag-per-airmass", 0], lambda nm: 1.0, 0.0),
+        (0, ["--extinction", 0], lambda nm: 1.0, 0.0),
         (50, [], law, 0.0),
-        (30, ["--extinction-mag-per-airmass", 0.25], grey, 0.6),
+        (30, ["--extinction", 0.25], grey, 0.6),
     ]:
         camera, toml = checks.camera(**CLEAN, vignetting=vignetting)
         lens = Lens(toml)
@@ -276,7 +276,7 @@ def flux(checks):
         for name, ra, dec in pointings:
             # Away from the centre, so that vignetting matters.
             turn = ["--ra", ra, "--dec", dec + (0.7 if vignetting else 0.0), "--roll", 30]
-            deep = [*turn, *DARK_SKY, *options, "--exposure-s", 1000, "--zenith-distance-deg", z_deg]
+            deep = [*turn, *DARK_SKY, *options, "--exposure", 1000, "--zenith-distance", z_deg]
             pixels, header, rows = checks.frame(camera, *deep, "--faintest-vmag", 1.5)
             stars = [row for row in rows if row["kind"] == "star"]
             empty, _, none = checks.frame(camera, *deep, "--faintest-vmag", -5)
@@ -293,7 +293,7 @@ def flux(checks):
             checks.compare("  its electrons in the table", float(stars[0]["electrons"]) / expected, 1.0, FLUX_TOLERANCE)
     camera, toml = checks.camera(**CLEAN)
     pixels, header, _ = checks.frame(
-        camera, "--ra", 0, "--dec", 0, "--faintest-vmag", -5, "--sky-mag-arcsec2", 5, "--exposure-s", 10
+        camera, "--ra", 0, "--dec", 0, "--faintest-vmag", -5, "--sky-mag-arcsec2", 5, "--exposure", 10
     )
     arcsec2 = (np.degrees(toml["pitch_x_um"] / 1e3 / toml["focal_length_mm"]) * 3600) ** 2
     expected = electrons_of_mag_0(toml, 5800.0) * 10 * arcsec2 * 10 ** (-0.4 * 5)
@@ -317,7 +317,7 @@ def dark(checks):
         camera, toml = checks.camera(**keys, bias_adu=100.0)
         gain = toml["gain_e_per_adu"]
         print(f"dark: {exposure} s, {rate} e/s, read noise {read_noise} e")
-        pixels = np.array([frame[0] for frame in checks.frames(camera, "--dark", "--exposure-s", exposure, count=5)])
+        pixels = np.array([frame[0] for frame in checks.frames(camera, "--dark", "--exposure", exposure, count=5)])
         mean = 100 + rate * exposure / gain
         moments(checks, "five frames", pixels, mean, (rate * exposure + read_noise**2) / gain**2 + 1 / 12)
 
@@ -364,7 +364,7 @@ def pattern(checks):
     rate, exposure = 200.0, 2.0
     camera, _ = checks.camera(**size, dark_current_e_s=rate, dark_current_sigma=0.4)
     print("pattern: dark current of pixels 40 %")
-    currents = stack(checks, camera, "--dark", "--exposure-s", exposure)
+    currents = stack(checks, camera, "--dark", "--exposure", exposure)
     # Kurtosis of a log-normal distribution.
     w = 1 + 0.4**2
     kurtosis = w**4 + 2 * w**3 + 3 * w**2 - 3
@@ -377,7 +377,7 @@ def pattern(checks):
     )
     camera, _ = checks.camera(**size, hot_pixels_per_mpx=5000.0, hot_pixel_e_s=800.0)
     print("pattern: 5000 hot pixels in a million, 800 e/s")
-    mean = (stack(checks, camera, "--dark", "--exposure-s", 2).mean(axis=0) - bias) * gain / 2
+    mean = (stack(checks, camera, "--dark", "--exposure", 2).mean(axis=0) - bias) * gain / 2
     hot = mean[mean > 60] - 20
     share = np.exp(-40 / 800)
     checks.compare("those of more than 40 e/s", hot.size, 1000 * share, SIGMAS * np.sqrt(1000 * share))
@@ -408,7 +408,7 @@ def smear(checks):
         ("at rest", {}, (0, 0, 0)),
     ]:
         camera, toml = checks.camera(**CLEAN | {"gain_e_per_adu": 1.0}, **keys)
-        options = ["--ra", ra, "--dec", dec, "--roll", roll, *DARK_SKY, "--exposure-s", exposure]
+        options = ["--ra", ra, "--dec", dec, "--roll", roll, *DARK_SKY, "--exposure", exposure]
         for axis, rate in zip("xyz", rates):
             options += [f"--rate-{axis}-deg-s", rate]
         pixels, _, rows = checks.frame(camera, *options, "--faintest-vmag", 1)
@@ -443,7 +443,7 @@ def smear(checks):
 
 def noise_of_smear(checks):
     camera, toml = checks.camera(width_px=80, height_px=60, full_well_e=1e6, bits=16, gain_e_per_adu=0.5)
-    options = ["--ra", 279.2347, "--dec", 38.7837, "--rate-y-deg-s", 1.0, "--faintest-vmag", 1, "--exposure-s", 0.1]
+    options = ["--ra", 279.2347, "--dec", 38.7837, "--rate-y-deg-s", 1.0, "--faintest-vmag", 1, "--exposure", 0.1]
     options += ["--aperture-mm", 3]
     made = checks.frames(camera, *options, count=400)
     gain = toml["gain_e_per_adu"]
@@ -467,9 +467,9 @@ def strays(checks):
     exposure = 0.5
     camera, toml = checks.camera(**CLEAN | {"gain_e_per_adu": 0.01, "width_px": 800, "height_px": 600})
     lens = Lens(toml)
-    options = ["--ra", 10, "--dec", 10, "--faintest-vmag", -5, *DARK_SKY, "--exposure-s", exposure]
+    options = ["--ra", 10, "--dec", 10, "--faintest-vmag", -5, *DARK_SKY, "--exposure", exposure]
     made = checks.frames(
-        camera, *options, "--trails", 1, "--trail-vmag", 0, "--trail-rate-deg-s", 1, "--extinction-mag-per-airmass", 0, count=60
+        camera, *options, "--trails", 1, "--trail-vmag", 0, "--trail-rate-deg-s", 1, "--extinction", 0, count=60
     )
     lengths, lights, inside = [], [], 0
     for pixels, header, rows in made:
@@ -532,12 +532,12 @@ def krisciunas_schaefer(rho_deg, phase_deg, k, moon_z_deg, z_deg):
 
 
 def sky(checks):
-    empty = ["--ra", 10, "--dec", 10, "--faintest-vmag", -5, "--exposure-s", 1e5]
+    empty = ["--ra", 10, "--dec", 10, "--faintest-vmag", -5, "--exposure", 1e5]
     for mirrored in [False, True]:
         camera, toml = checks.camera(**CLEAN | {"width_px": 640, "height_px": 480, "focal_length_mm": 2.0}, mirrored=mirrored)
-        even = checks.frame(camera, *empty, "--sky-mag-arcsec2", 20, "--extinction-mag-per-airmass", 0.2)[0].mean()
+        even = checks.frame(camera, *empty, "--sky-mag-arcsec2", 20, "--extinction", 0.2)[0].mean()
         moonlit, _, _ = checks.frame(
-            camera, *empty, "--sky-mag-arcsec2", 20, "--extinction-mag-per-airmass", 0.2, "--zenith-distance-deg", 30,
+            camera, *empty, "--sky-mag-arcsec2", 20, "--extinction", 0.2, "--zenith-distance", 30,
             "--moon-distance-deg", 50, "--moon-direction-deg", 70, "--moon-phase-deg", 40, "--moon-zenith-distance-deg", 55,
         )
         print(f"sky: moonlight{', mirrored' if mirrored else ''}")
@@ -564,7 +564,7 @@ def sky(checks):
     stars = checks.directory / "list.csv"
     places = [(x, y) for y in range(20, 300, 40) for x in range(20, 400, 40)]
     stars.write_text("x,y,vmag\n" + "".join(f"{x},{y},3\n" for x, y in places))
-    clouds = ["--cloud-mag", 1.5, "--cloud-size-px", 150, "--exposure-s", 1e5, "--sky-mag-arcsec2", 15, "--seed", 3]
+    clouds = ["--cloud-mag", 1.5, "--cloud-size-px", 150, "--exposure", 1e5, "--sky-mag-arcsec2", 15, "--seed", 3]
     _, _, rows = checks.frame(camera, "--stars", stars, *clouds)
     stars.write_text("x,y,vmag\n1,1,30\n")
     light, _, _ = checks.frame(camera, "--stars", stars, *clouds, "--cloud-light", 1)
@@ -582,7 +582,7 @@ def sky(checks):
 def full(checks):
     well = 6460.0
     keys = CLEAN | {"full_well_e": well, "gain_e_per_adu": 0.5, "bits": 16, "bias_adu": 100.0}
-    options = ["--ra", 279.2347, "--dec", 38.7837, "--faintest-vmag", 1, *DARK_SKY, "--exposure-s", 0.2]
+    options = ["--ra", 279.2347, "--dec", 38.7837, "--faintest-vmag", 1, *DARK_SKY, "--exposure", 0.2]
     camera, _ = checks.camera(**keys)
     plain, header, rows = checks.frame(camera, *options)
     star = float(rows[0]["electrons"])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _starpipe, _tables
-from ._hints import count, header_exposure, positive
+from ._hints import header_exposure, positive, whole_number
 from ._images import Image, ImageLike
 
 
@@ -97,5 +97,5 @@ def darks(
         taken = Image(image)
         stated = header_exposure(taken.header) if seconds is None else seconds
         frames.add(taken.pixels, positive(stated, "s", "exposure"))
-    bits = None if bits is None else count(bits, "bits", 1)
+    bits = None if bits is None else whole_number(bits, "bits", 1)
     return Darks(frames.measure(bits, positive(gain, "electron / adu", "gain")))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _starpipe, _tables
-from ._hints import count, positive, thread_count
+from ._hints import positive, thread_count, whole_number
 from ._images import Image, ImageLike, mask_of
 
 
@@ -111,7 +111,7 @@ def detect(
         taken.pixels,
         mask_of(taken, mask),
         positive(sigma, "", "sigma"),
-        None if max_stars is None else count(max_stars, "max_stars", 4),
+        None if max_stars is None else whole_number(max_stars, "max_stars", 4),
         thread_count(threads),
     )
     return Detections(json.loads(report))

@@ -54,7 +54,7 @@ def within(value: Any, unit: str, name: str, least: float, most: float = np.inf)
     return found
 
 
-def count(value: Any, name: str, least: int) -> int:
+def whole_number(value: Any, name: str, least: int) -> int:
     """Return a whole number that is not less than `least`."""
     try:
         found = int(value)
@@ -68,7 +68,7 @@ def count(value: Any, name: str, least: int) -> int:
 
 def thread_count(threads: Any) -> int:
     """Return how many threads to start: more than 8 only where there are more processors."""
-    return min(count(threads, "threads", 1), max(8, os.cpu_count() or 1))
+    return min(whole_number(threads, "threads", 1), max(8, os.cpu_count() or 1))
 
 
 def direction(near: Any) -> tuple[float, float] | None:

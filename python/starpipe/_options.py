@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar
 from ._hints import (
     NAME_ODDS,
     RADIUS_DEG,
-    count,
     direction,
     header_date,
     header_exposure,
     iso_date,
     positive,
+    whole_number,
     within,
 )
 from ._hints import site as geodetic
@@ -124,7 +124,7 @@ def solve_options(
         "extinction_mag_per_airmass": within(extinction, "mag", "extinction", 0.0, 10.0),
         "sigma": positive(sigma, "", "sigma"),
         "false_alarms_per_mpx": positive(false_alarms, "", "false_alarms"),
-        "max_stars": None if max_stars is None else count(max_stars, "max_stars", 4),
+        "max_stars": None if max_stars is None else whole_number(max_stars, "max_stars", 4),
         "centroid": centroid,
         "name_odds": within(name_odds, "", "name_odds", 1.0),
         "attitude_only": bool(attitude_only),

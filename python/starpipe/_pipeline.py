@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from . import _starpipe
 from ._camera import PathLike
-from ._hints import count, thread_count
+from ._hints import thread_count, whole_number
 from ._images import Image, ImageLike, mask_of
 from ._options import SolveOptions, solve_options, takes_options
 from ._result import Result
@@ -189,7 +189,7 @@ class Pipeline:
             found = ", ".join(str(column.shape) for column in columns)
             raise ValueError(f"x, y, brightness and error must be lists of one length, not {found}")
         table = np.stack(columns, axis=-1)
-        rows, width = (count(side, "shape", 3) for side in shape)
+        rows, width = (whole_number(side, "shape", 3) for side in shape)
         solved = self._pipeline.identify(
             table, (rows, width), brightness, error is not None, solve_options(**options)
         )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from . import _starpipe, _tables
 from ._camera import PathLike, stated
-from ._hints import count, direction, iso_date, number, within
+from ._hints import direction, iso_date, number, whole_number, within
 from ._result import wcs_of
 
 
@@ -134,7 +134,7 @@ def simulate(
         subject,
         catalog,
         iso_date(date),
-        count(seed, "seed", 0),
-        count(frame, "frame", 0),
+        whole_number(seed, "seed", 0),
+        whole_number(frame, "frame", 0),
     )
     return Simulation(simulated)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from . import _starpipe, _tables
 from ._camera import PathLike, stated
 from ._darks import Darks
-from ._hints import count, positive, thread_count, within
+from ._hints import positive, thread_count, whole_number, within
 
 
 def limit(
@@ -77,7 +77,7 @@ class Validation:
 def validate(
     camera: PathLike,
     *,
-    frames: int = 100,
+    count: int = 100,
     seed: int = 1,
     scale_known: bool = True,
     threads: int = 1,
@@ -94,7 +94,7 @@ def validate(
     ----------
     camera, exposure, catalog, **parameters
         As for `simulate`.
-    frames, seed : int
+    count, seed : int
         How many frames, and the seed of their random numbers.
     scale_known : bool
         Whether the pipeline is given the camera.
@@ -104,8 +104,8 @@ def validate(
     report = _starpipe.validate(
         stated(camera, exposure, None, parameters),
         catalog,
-        count(frames, "frames", 1),
-        count(seed, "seed", 0),
+        whole_number(count, "count", 1),
+        whole_number(seed, "seed", 0),
         bool(scale_known),
         thread_count(threads),
     )
@@ -115,7 +115,7 @@ def validate(
 def robustness(
     *,
     fov: Any = None,
-    trials: int = 2000,
+    count: int = 2000,
     seed: int = 1,
     threads: int = 1,
     stars: float = 30.0,
@@ -134,7 +134,7 @@ def robustness(
     fov : Quantity or float, optional
         Horizontal field of view in degrees: one row. Without it, the standard table: five fields,
         then one worse condition at a time.
-    trials, seed, threads : int
+    count, seed, threads : int
         Trials of each row, seed of the random numbers, and threads.
     stars : float
         Mean number of catalogue stars on a frame.
@@ -162,14 +162,14 @@ def robustness(
         "missing_percent": within(missing, "percent", "missing", 0.0, 100.0),
         "false_stars_percent": within(false, "percent", "false", 0.0, 1e4),
         "scale_error_percent": positive(scale_error, "percent", "scale_error", 100.0),
-        "shape": tuple(count(side, "shape", 3) for side in shape),
+        "shape": tuple(whole_number(side, "shape", 3) for side in shape),
     }
     rows: list[dict[str, Any]] = json.loads(
         _starpipe.robustness(
             lists,
             catalog,
-            count(trials, "trials", 1),
-            count(seed, "seed", 0),
+            whole_number(count, "count", 1),
+            whole_number(seed, "seed", 0),
             thread_count(threads),
         )
     )
@@ -182,7 +182,7 @@ def defocus(
     vmag: ArrayLike = (),
     required_error: ArrayLike = (),
     darks: Darks | None = None,
-    trials: int | None = None,
+    count: int | None = None,
     seed: int = 1,
     threads: int = 1,
     exposure: Any = None,
@@ -200,7 +200,7 @@ def defocus(
         Errors in pixels: the radii that meet them are reported.
     darks : Darks, optional
         Frames whose noise is taken.
-    trials, seed, threads : int
+    count, seed, threads : int
         Stars at each point, seed of the random numbers, and threads.
     exposure, **parameters
         As for `limit`.
@@ -217,8 +217,8 @@ def defocus(
         None if darks is None else darks._darks,
         [float(value) for value in np.ravel(vmag)],
         [float(value) for value in np.ravel(required_error)],
-        None if trials is None else count(trials, "trials", 1),
-        count(seed, "seed", 0),
+        None if count is None else whole_number(count, "count", 1),
+        whole_number(seed, "seed", 0),
         thread_count(threads),
     )
     found: dict[str, Any] = json.loads(report)

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import fsspec
 
 from . import _starpipe
-from ._hints import count
+from ._hints import whole_number
 from ._options import SolveOptions, solve_options, takes_options
 from ._pipeline import Pipeline
 
@@ -169,8 +169,8 @@ def process(
         catalog=None if catalog is None else str(catalog),
         camera=None if camera is None else Path(camera).read_bytes(),
         stated=solve_options(**({"time_limit": TIME_LIMIT_S} | options)),
-        read_ahead=count(read_ahead, "read_ahead", 1),
-        page=page if page is None or page == "all" else count(page, "page", 1),
+        read_ahead=whole_number(read_ahead, "read_ahead", 1),
+        page=page if page is None or page == "all" else whole_number(page, "page", 1),
     )
     stated = {
         "options": job.stated,
@@ -179,7 +179,7 @@ def process(
     }
     names = _list(frames, job.options)
     plan = _starpipe.archive_plan(
-        names, count(frames_per_part, "frames_per_part", 1), _pipeline(job), stated
+        names, whole_number(frames_per_part, "frames_per_part", 1), _pipeline(job), stated
     )
     _claim(job, plan)
     done = _written(job.out, job.options)
@@ -190,7 +190,7 @@ def process(
         for part, names in work:
             progress.add(_process_part(job, part, names))
     else:
-        _run(client, job, work, count(retries, "retries", 0), progress)
+        _run(client, job, work, whole_number(retries, "retries", 0), progress)
     progress.finish()
     return Archive(job.out, job.options)
 

@@ -95,9 +95,9 @@ LONG_WORK = {
     ),
     "identify": lambda pipeline, _: pipeline.identify(**_false_stars()),
     "the index of a catalogue": lambda _, directory: sp.Pipeline(cache_dir=directory),
-    "defocus": lambda *_: sp.defocus("nanosat-tracker", trials=20, threads=2),
-    "validate": lambda *_: sp.validate("nanosat-tracker", frames=20, threads=2),
-    "robustness": lambda *_: sp.robustness(fov=10, trials=1500, threads=2),
+    "defocus": lambda *_: sp.defocus("nanosat-tracker", count=20, threads=2),
+    "validate": lambda *_: sp.validate("nanosat-tracker", count=20, threads=2),
+    "robustness": lambda *_: sp.robustness(fov=10, count=1500, threads=2),
 }
 
 

@@ -63,16 +63,16 @@ def test_a_validation_is_the_programs(program, tmp_path):
     subprocess.run(
         [program, "validate", *options, "--out", tmp_path], check=True, capture_output=True
     )
-    found = sp.validate(CAMERA, frames=12, seed=4, threads=2)
+    found = sp.validate(CAMERA, count=12, seed=4, threads=2)
     assert found.summary == json.loads((tmp_path / "summary.json").read_text())
     assert list(found.frames["frame"]) == list(range(12))
     assert len(found.stars) == found.frames["star_rows"].sum()
 
 
 def test_robustness_has_a_row_or_the_standard_table():
-    (row,) = sp.robustness(fov=10 * u.deg, trials=60, threads=2)
+    (row,) = sp.robustness(fov=10 * u.deg, count=60, threads=2)
     assert (row["trials"], row["wrong_of_all"]) == (60, 0)
-    assert len(sp.robustness(trials=2)) == 12
+    assert len(sp.robustness(count=2)) == 12
 
 
 def test_darks_give_master_mask_and_noise(pipeline):
@@ -93,7 +93,7 @@ def test_the_best_radius_is_the_programs(program, camera):
     command += ["--preset", camera] if camera else []
     # Its exit status says whether a radius meets the required error.
     printed = subprocess.run([*command, "--format", "json"], capture_output=True).stdout
-    found = sp.defocus(camera, trials=4, threads=2, required_error=0.05)
+    found = sp.defocus(camera, count=4, threads=2, required_error=0.05)
     assert found == json.loads(printed)
 
 

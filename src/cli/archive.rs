@@ -48,7 +48,7 @@ struct MergeArgs {
     /// Directory that process --out-parquet has written
     directory: PathBuf,
     /// Directory for frames.parquet and stars.parquet
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
 }
 

@@ -52,7 +52,7 @@ pub(crate) struct DarksArgs {
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
     /// Also write the master dark, the noise of each pixel and the hot pixels into this directory
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
     threads: ThreadOptions,

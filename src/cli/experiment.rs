@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     starpipe experiment 1\n  \
-    starpipe experiment 2 --trials 200 --format json > experiment-2.json\n  \
+    starpipe experiment 2 --count 200 --format json > experiment-2.json\n  \
     starpipe experiment 1 --out results\n\n\
     The paper is Tong, Li & Wang, Acta Optica Sinica 34, 1004003 (2014). The frames are simulated \
     with its camera and sky at the pointing of its table of stars, and identified without hints. \
@@ -27,8 +27,8 @@ pub(crate) struct ExperimentArgs {
     #[arg(value_name = "1|2", value_parser = clap::value_parser!(u8).range(1..=2))]
     number: u8,
     /// Frames to simulate
-    #[arg(long, value_name = "NUMBER", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=100_000))]
-    trials: u64,
+    #[arg(long, alias = "trials", value_name = "NUMBER", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    count: u64,
     /// Seed of the random numbers
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     seed: u64,
@@ -37,7 +37,7 @@ pub(crate) struct ExperimentArgs {
     format: PageFormat,
     /// Also write the first simulated frame, its stars marked and named, as experiment-1.png or
     /// -2.png into this directory
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
     catalog: CatalogOptions,
@@ -53,7 +53,7 @@ pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Outcome, CommandE
         make_directory(directory)?;
     }
     let trials = Trials {
-        count: arguments.trials,
+        count: arguments.count,
         seed: arguments.seed,
     };
     let report = arguments.catalog.with_index(|pool, indexed| {

@@ -26,7 +26,7 @@ use std::time::Instant;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     starpipe track --interval 0.1 night/ > track.jsonl\n  \
-    starpipe track --fov 20 --stars 20 --format text night-*.tif\n  \
+    starpipe track --fov 20 --max-stars 20 --format text night-*.tif\n  \
     inotifywait -m -e close_write --format %w%f night | starpipe track --interval 0.1 -\n\n\
     The first two frames are solved in full, and every frame in which the stars are not where they were\n\
     predicted; in others only windows around predicted stars are read. The line of a frame is printed as soon\n\
@@ -43,9 +43,9 @@ pub(crate) struct TrackArgs {
     #[arg(long, value_name = "SECONDS", value_parser = values::positive, allow_hyphen_values = true)]
     interval: Option<f64>,
     /// Most stars that are measured in a frame
-    #[arg(long, value_name = "NUMBER", default_value_t = DEFAULT_STARS as u64,
+    #[arg(long, alias = "stars", value_name = "NUMBER", default_value_t = DEFAULT_STARS as u64,
           value_parser = clap::value_parser!(u64).range(4..=1000))]
-    stars: u64,
+    max_stars: u64,
     /// What to print
     #[arg(long, value_enum, default_value_t = PageFormat::Json)]
     format: PageFormat,
@@ -77,7 +77,7 @@ pub(crate) fn track(arguments: &TrackArgs) -> Result<Outcome, CommandError> {
     arguments.catalog.with_index(|_, indexed| {
         let context = Context::new(indexed).with_options(&options, sheet.clone());
         let mut run = Run {
-            tracker: Tracker::new(context).with_stars(arguments.stars as usize),
+            tracker: Tracker::new(context).with_stars(arguments.max_stars as usize),
             calibration: calibration.as_ref(),
             clock: FrameClock::new(arguments.interval),
             format: arguments.format,

@@ -17,7 +17,7 @@ fn rows(options: &[&str]) -> Vec<Value> {
 
 #[test]
 fn the_table_has_every_kind_and_is_the_same_on_any_number_of_threads() {
-    let table = |threads: &str| rows(&["--frames", "2", "--threads", threads]);
+    let table = |threads: &str| rows(&["--count", "2", "--threads", threads]);
     let rows = table("1");
     assert_eq!(rows, table("3"));
     assert_eq!(rows.len(), 21);
@@ -45,7 +45,7 @@ fn the_table_has_every_kind_and_is_the_same_on_any_number_of_threads() {
 #[test]
 fn clutter_is_detected_where_no_star_is() {
     let rows = rows(&[
-        "--frames",
+        "--count",
         "3",
         "--kinds",
         "clean,foliage,reflections,false-stars",
@@ -72,7 +72,7 @@ fn blended_stars_are_seldom_named_wrongly() {
         "--kinds",
         "blends",
     ]);
-    command.args(["--width-px", "1296", "--height-px", "972", "--frames", "8"]);
+    command.args(["--width-px", "1296", "--height-px", "972", "--count", "8"]);
     let row = &Ran::new(command.args(["--format", "json"])).reports()[0];
     let [named, misnamed] = ["named", "misnamed"].map(|name| row[name].as_u64().unwrap());
     assert_eq!((&row["right"], &row["wrong"]), (&8.into(), &0.into()));
@@ -82,7 +82,7 @@ fn blended_stars_are_seldom_named_wrongly() {
 #[test]
 fn every_built_in_camera_is_simulated_where_none_is_chosen() {
     let mut command = starpipe();
-    command.args(["clutter", "--kinds", "clean", "--frames", "1"]);
+    command.args(["clutter", "--kinds", "clean", "--count", "1"]);
     command.args([
         "--width-px",
         "400",
@@ -112,7 +112,7 @@ fn every_built_in_camera_is_simulated_where_none_is_chosen() {
 fn pictures_are_written_and_unknown_kinds_refused() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().to_str().unwrap();
-    let options = ["--kinds", "jpeg,snow", "--frames", "1", "--pictures", out];
+    let options = ["--kinds", "jpeg,snow", "--count", "1", "--pictures", out];
     let text = ran(&options);
     assert_eq!(text.status, 0, "{}", text.stderr);
     assert!(text.stdout.contains("jpeg") && text.stdout.contains("snow"));

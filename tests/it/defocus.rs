@@ -22,7 +22,7 @@ const SMALL_PEAK: [&str; 6] = [
     "0.4:2.4:12",
     "--noise-relative",
     "2e-4:20e-4:8",
-    "--trials",
+    "--count",
     "20",
 ];
 const SMALL_ENERGY: [&str; 10] = [
@@ -34,13 +34,13 @@ const SMALL_ENERGY: [&str; 10] = [
     "0.3:1.5:7",
     "--noise-e",
     "2:20:5:log",
-    "--trials",
+    "--count",
     "40",
 ];
 
 #[test]
 fn the_papers_surface_is_reproduced_and_errors_follow_the_closed_form() {
-    let answer = json(&["--trials", "100"]);
+    let answer = json(&["--count", "100"]);
     assert_eq!(answer["normalisation"], "peak");
     let surface = "/stars/0/surface";
     let difference = number(&answer, &format!("{surface}/paper/surface_difference_px"));
@@ -246,7 +246,7 @@ fn frames_that_are_not_dark_are_refused() {
 fn nonsensical_options_are_refused_before_any_work() {
     let camera = ["--preset", "nanosat-tracker"];
     let refused: [(&[&str], &str); 18] = [
-        (&["--trials", "0"], "0 is not in 1..="),
+        (&["--count", "0"], "0 is not in 1..="),
         (
             &["--radius-px", "1:1:1"],
             "a sweep of 1 values, expected 2 to 1000",

@@ -15,7 +15,7 @@ fn experiment(arguments: &[&str]) -> Ran {
 #[test]
 fn limits_and_stars_are_the_papers_and_frames_reach_the_expected_limit() {
     for (which, limit, stars, as_bright) in [("1", 8.15, 7, 7), ("2", 9.0, 9, 17)] {
-        let ran = experiment(&[which, "--trials", "12", "--format", "json"]);
+        let ran = experiment(&[which, "--count", "12", "--format", "json"]);
         assert_eq!(ran.status, 0, "{}", ran.stderr);
         let [report] = &ran.reports()[..] else {
             panic!("{}", ran.stdout);
@@ -61,7 +61,7 @@ fn a_page_and_a_picture() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().to_str().unwrap();
     for _ in 0..2 {
-        let ran = experiment(&["1", "--trials", "2", "--out", out]);
+        let ran = experiment(&["1", "--count", "2", "--out", out]);
         assert_eq!(ran.status, 0, "{}", ran.stderr);
         assert!(
             ran.stdout.contains("they contradict each other"),
@@ -83,7 +83,7 @@ fn a_page_and_a_picture() {
 #[test]
 fn the_same_seed_gives_the_same_page_on_any_number_of_threads() {
     let page = |seed: &str, threads: &str| {
-        let arguments = ["1", "--trials", "5", "--seed", seed, "--threads", threads];
+        let arguments = ["1", "--count", "5", "--seed", seed, "--threads", threads];
         experiment(&arguments).stdout
     };
     let first = page("3", "1");
@@ -98,7 +98,7 @@ fn a_foreign_picture_is_not_overwritten() {
     std::fs::write(&path, "my own").unwrap();
     let ran = experiment(&[
         "2",
-        "--trials",
+        "--count",
         "1",
         "--out",
         directory.path().to_str().unwrap(),
@@ -109,7 +109,7 @@ fn a_foreign_picture_is_not_overwritten() {
 
 #[test]
 fn there_is_no_third_experiment() {
-    for arguments in [&["3"][..], &["one"], &[], &["1", "--trials", "0"]] {
+    for arguments in [&["3"][..], &["one"], &[], &["1", "--count", "0"]] {
         let ran = experiment(arguments);
         assert_eq!(ran.status, 2, "{}", ran.stderr);
     }

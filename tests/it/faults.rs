@@ -30,7 +30,7 @@ fn commands(inputs: &Path) -> Vec<Writes> {
         format!("process {frames} --out OUT"),
         format!("process {frames} --out-parquet OUT --frames-per-part 1"),
         "simulate --preset imx174-35mm --random-attitude --count 2 --out OUT".to_owned(),
-        "validate --preset imx174-35mm --frames 3 --out OUT".to_owned(),
+        "validate --preset imx174-35mm --count 3 --out OUT".to_owned(),
         format!("catalog import {stars} --output OUT/stars.cat"),
         "camera new --preset imx174-35mm --output OUT/camera.toml".to_owned(),
         "limit --preset experiment-1 --sweep exposure_s=0.01:1:5 --plot OUT/plot.svg".to_owned(),

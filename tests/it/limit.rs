@@ -75,7 +75,7 @@ fn the_readings_differ_by_what_the_documentation_says() {
             at(preset, &["--sky-illuminance-lx", &brighter]),
             at(
                 preset,
-                &[&exact[..], &["--zenith-distance-deg", zenith_distance_deg]].concat(),
+                &[&exact[..], &["--zenith-distance", zenith_distance_deg]].concat(),
             ),
             at(preset, &exact),
             at(preset, &["--reading", "physical"]),
@@ -179,11 +179,11 @@ fn every_preset_is_predicted_and_its_description_says_the_same() {
         let new = ["camera", "new", "--preset", name, "-o", path];
         assert_eq!(Ran::new(starpipe().args(new)).status, 0);
         let at = [
-            "--exposure-s",
+            "--exposure",
             "0.3",
             "--reading",
             "physical",
-            "--zenith-distance-deg",
+            "--zenith-distance",
             "0",
         ];
         let sky = ["--sky-mag-arcsec2", "20"];
@@ -202,12 +202,7 @@ fn every_preset_is_predicted_and_its_description_says_the_same() {
 
 #[test]
 fn every_parameter_has_an_option_and_can_be_swept() {
-    let report = predicted(&[
-        "--preset",
-        "experiment-2",
-        "--extinction-mag-per-airmass",
-        "0.2",
-    ]);
+    let report = predicted(&["--preset", "experiment-2", "--extinction", "0.2"]);
     let parameters = report["parameters"].as_object().unwrap();
     assert_eq!(parameters.len(), 30, "{parameters:?}");
     for (name, value) in parameters {
@@ -537,11 +532,11 @@ fn nonsensical_options_are_refused() {
         ("--aperture-mm", "-5", "expected a number above 0"),
         ("--aperture-mm", "nan", "expected a number above 0"),
         ("--aperture-mm", "big", "expected a number above 0"),
-        ("--exposure-s", "0", "expected a number above 0"),
+        ("--exposure", "0", "expected a number above 0"),
         ("--quantum-efficiency", "1.5", "above 0 and at most 1"),
-        ("--zenith-distance-deg", "90", "from 0 to below 90"),
+        ("--zenith-distance", "90", "from 0 to below 90"),
         (
-            "--zenith-distance-deg",
+            "--zenith-distance",
             "89.99999",
             "there is no limiting magnitude",
         ),
@@ -575,10 +570,7 @@ fn equivalent_options_exclude_each_other() {
         ["--sky-mag-arcsec2=20", "--sky-illuminance-lx=0.01"],
         ["--sky-luminance-cd-m2=1", "--sky-illuminance-lx=0.01"],
         ["--sky-luminance-cd-m2=1", "--sky-mag-arcsec2=20"],
-        [
-            "--zenith-transmission=0.5",
-            "--extinction-mag-per-airmass=0.1",
-        ],
+        ["--zenith-transmission=0.5", "--extinction=0.1"],
         ["--pixel-area-um2=20", "--pitch-y-um=4"],
     ] {
         is_refused(

@@ -121,7 +121,7 @@ fn a_wrong_pointing_is_a_wrong_answer_and_a_wrong_name_is_counted() {
 #[test]
 fn the_standard_table_is_right_and_the_same_on_any_number_of_threads() {
     let table = |threads: &str| {
-        let mut rows = rows(&["--trials", "60", "--threads", threads]);
+        let mut rows = rows(&["--count", "60", "--threads", threads]);
         for row in &mut rows {
             let row = row.as_object_mut().unwrap();
             row.remove("median_ms").unwrap();
@@ -147,7 +147,7 @@ fn the_standard_table_is_right_and_the_same_on_any_number_of_threads() {
 
 #[test]
 fn few_and_displaced_stars_do_not_bend_the_lens_out_of_the_frame() {
-    let arguments = "--stars 12 --sweep centroid-error=2:2:1 --trials 1500";
+    let arguments = "--stars 12 --sweep centroid-error=2:2:1 --count 1500";
     let rows = rows(&arguments.split(' ').collect::<Vec<_>>());
     // One in 20,000 is wrong.
     assert!(rows[0]["wrong_of_all"].as_u64() <= Some(1), "{}", rows[0]);
@@ -159,7 +159,7 @@ fn a_sweep_has_a_row_for_each_value_and_a_panel_in_the_figure() {
     let figure = directory.path().join("figure.svg");
     let path = figure.to_str().unwrap();
     let rows = rows(&[
-        "--trials",
+        "--count",
         "10",
         "--seed",
         "4",
@@ -188,7 +188,7 @@ fn csv_and_text_name_the_case_and_its_interval() {
     let run = |format: &str| {
         let mut command = starpipe();
         let options = [
-            "--trials",
+            "--count",
             "20",
             "--sweep",
             "missing=0:50:2",
@@ -226,7 +226,7 @@ fn nonsensical_options_are_refused() {
         ("--plot", "a.pdf", ".svg or .png"),
         ("--missing", "101", "0 to 100 percent"),
         ("--stars", "0", "above 0"),
-        ("--trials", "0", "0"),
+        ("--count", "0", "0"),
     ] {
         let mut command = starpipe();
         let ran = Ran::new(command.args(["robustness", option, value]));
@@ -235,7 +235,7 @@ fn nonsensical_options_are_refused() {
     }
     let mut command = starpipe();
     let nowhere = [
-        "--trials",
+        "--count",
         "2",
         "--sweep",
         "fov=10:10:1",

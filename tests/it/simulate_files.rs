@@ -52,11 +52,7 @@ fn rows(path: &Path) -> Vec<Row> {
 fn a_frame_says_how_it_was_made_in_fits_and_in_tiff() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| directory.path().join(name);
-    let more = [
-        "--exposure-s=0.25",
-        "--date=2026-03-04T05:06:07Z",
-        "--seed=9",
-    ];
+    let more = ["--exposure=0.25", "--date=2026-03-04T05:06:07Z", "--seed=9"];
     let all = [SKY, &more].concat();
     made(&at("a.fits"), &all);
     made(&at("a.tif"), &[&all[..], &["--force"]].concat());
@@ -154,7 +150,7 @@ fn a_frame_at_random_is_that_of_validate_with_the_same_number() {
     let out = format!("--out={}", study.display());
     let validated = Ran::new(
         starpipe()
-            .args(["validate", "--frames=2", "--seed=7", &out])
+            .args(["validate", "--count=2", "--seed=7", &out])
             .args(CAMERA),
     );
     assert_eq!(validated.status, 0, "{}", validated.stderr);
@@ -267,7 +263,7 @@ fn nonsensical_options_are_refused() {
     sky(&["--spot-form=square"], "gaussian");
     sky(&["--date=1990-13-01"], "is no date");
     sky(
-        &["--rate-x-deg-s=180", "--exposure-s=1"],
+        &["--rate-x-deg-s=180", "--exposure=1"],
         "turns by up to 180°",
     );
     sky(
@@ -281,7 +277,7 @@ fn nonsensical_options_are_refused() {
     sky(&["--distortion-px=300"], "the image folds");
     sky(&["--distortion-px=-300"], "the image folds");
     sky(
-        &["--cosmic-rays-cm2-s=1e6", "--exposure-s=1e6"],
+        &["--cosmic-rays-cm2-s=1e6", "--exposure=1e6"],
         "cosmic rays on a frame",
     );
     sky(&["--sky-mag-arcsec2=-1e300"], "sky_luminance_cd_m2 is inf");

@@ -118,12 +118,12 @@ fn a_killed_and_continued_run_gives_the_same_files() {
         directory.path().join("whole"),
         directory.path().join("broken"),
     );
-    let frames = &["--frames", "1030", "--threads", "1"];
+    let frames = &["--count", "1030", "--threads", "1"];
     assert_eq!(validate(&whole, frames).status, 0);
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let mut kills = 0;
     loop {
-        let mut child = start(&broken, &["--frames", "1030", "--threads", "2"]);
+        let mut child = start(&broken, &["--count", "1030", "--threads", "2"]);
         let table = broken.join("frames.csv");
         let enough = lines(&table) + random.random_range(1..350);
         let ended = loop {
@@ -154,7 +154,7 @@ fn a_killed_and_continued_run_gives_the_same_files() {
 fn forty_frames() -> (tempfile::TempDir, PathBuf) {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("run");
-    assert_eq!(validate(&out, &["--frames", "40"]).status, 0);
+    assert_eq!(validate(&out, &["--count", "40"]).status, 0);
     (directory, out)
 }
 
@@ -163,14 +163,14 @@ fn tables_truncated_at_any_byte_are_repaired() {
     let (directory, whole) = forty_frames();
     let cut = directory.path().join("cut");
     let mut random = ChaCha8Rng::seed_from_u64(2);
-    assert_eq!(validate(&cut, &["--frames", "40"]).status, 0);
+    assert_eq!(validate(&cut, &["--count", "40"]).status, 0);
     for _ in 0..6 {
         for name in ["frames.csv", "stars.csv"] {
             let file = OpenOptions::new().write(true).open(cut.join(name)).unwrap();
             let length = file.metadata().unwrap().len();
             file.set_len(random.random_range(0..=length)).unwrap();
         }
-        let ran = validate(&cut, &["--frames", "40", "--threads", "2"]);
+        let ran = validate(&cut, &["--count", "40", "--threads", "2"]);
         assert_eq!(ran.status, 0, "{}", ran.stderr);
         assert_same(&whole, &cut);
     }
@@ -179,14 +179,14 @@ fn tables_truncated_at_any_byte_are_repaired() {
 #[test]
 fn an_extended_run_equals_the_longer_run() {
     let (directory, out) = forty_frames();
-    let ran = validate(&out, &["--frames", "50", "--format", "json"]);
+    let ran = validate(&out, &["--count", "50", "--format", "json"]);
     assert_eq!(ran.status, 0, "{}", ran.stderr);
     assert!(ran.stderr.contains("after 40 frames"), "{}", ran.stderr);
     assert_eq!(ran.reports()[0]["frames"], 50);
     let at_once = directory.path().join("at once");
-    assert_eq!(validate(&at_once, &["--frames", "50"]).status, 0);
+    assert_eq!(validate(&at_once, &["--count", "50"]).status, 0);
     assert_same(&at_once, &out);
-    let fewer = validate(&out, &["--frames", "40"]);
+    let fewer = validate(&out, &["--count", "40"]);
     assert_eq!(fewer.status, 2);
     assert!(
         fewer.stderr.contains("already holds 50 frames"),
@@ -201,7 +201,7 @@ fn a_directory_of_another_run_is_refused() {
     for (more, expected) in [
         (&["--seed", "2"][..], "seed is 1 there and 2 here"),
         (
-            &["--exposure-s", "0.3"],
+            &["--exposure", "0.3"],
             "exposure_s is 0.1 there and 0.3 here",
         ),
         (
@@ -209,14 +209,14 @@ fn a_directory_of_another_run_is_refused() {
             "scale_known is true there and false here",
         ),
     ] {
-        let ran = validate(&out, &[&["--frames", "40"], more].concat());
+        let ran = validate(&out, &[&["--count", "40"], more].concat());
         assert_eq!(ran.status, 2, "{}", ran.stderr);
         assert!(ran.stderr.contains(expected), "{}", ran.stderr);
     }
     let foreign = directory.path().join("foreign");
     fs::create_dir(&foreign).unwrap();
     fs::write(foreign.join("frames.csv"), "mine\n").unwrap();
-    let ran = validate(&foreign, &["--frames", "1"]);
+    let ran = validate(&foreign, &["--count", "1"]);
     assert_eq!(ran.status, 2, "{}", ran.stderr);
     assert!(
         ran.stderr.contains("has frames.csv and no run.json"),
@@ -256,7 +256,7 @@ fn a_modified_table_is_reported_with_the_position() {
         ),
     ] {
         fs::write(&path, &text).unwrap();
-        let ran = validate(&out, &["--frames", "50"]);
+        let ran = validate(&out, &["--count", "50"]);
         assert_eq!(ran.status, 1, "{}", ran.stderr);
         assert!(ran.stderr.contains("frames.csv"), "{}", ran.stderr);
         assert!(ran.stderr.contains(expected), "{}", ran.stderr);
@@ -266,7 +266,7 @@ fn a_modified_table_is_reported_with_the_position() {
     let stars = out.join("stars.csv");
     let text = fs::read_to_string(&stars).unwrap();
     fs::write(&stars, text.replacen("\n0,star", "\n7,star", 1)).unwrap();
-    let ran = validate(&out, &["--frames", "50"]);
+    let ran = validate(&out, &["--count", "50"]);
     assert_eq!(ran.status, 1);
     let expected = "line 2: a star of frame 7, expected one of frame 0";
     assert!(ran.stderr.contains(expected), "{}", ran.stderr);
@@ -276,7 +276,7 @@ fn a_modified_table_is_reported_with_the_position() {
 fn results_agree_with_theory() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().to_str().unwrap();
-    let options = ["--frames", "200", "--format", "json", "--figures", "none"];
+    let options = ["--count", "200", "--format", "json", "--figures", "none"];
     let options = [&["validate", "--out", out], LARGE_CAMERA, &options].concat();
     let ran = Ran::new(starpipe().args(options));
     assert_eq!(ran.status, 0, "{}", ran.stderr);
@@ -301,7 +301,7 @@ fn a_study_has_a_run_and_a_row_for_each_value() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("study");
     let study = &[
-        "--frames",
+        "--count",
         "12",
         "--sweep",
         "aperture_mm=9:13:2",
@@ -361,7 +361,7 @@ fn the_focal_length_is_right_for_every_lens_of_the_hard_suite() {
     let out = directory.path().join("hard");
     let camera = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/validation/camera.toml");
     let options = [
-        "--camera", camera, "--frames", "8", "--suite", "hard", "--format", "json",
+        "--camera", camera, "--count", "8", "--suite", "hard", "--format", "json",
     ];
     let run = || {
         let to = ["validate", "--out", out.to_str().unwrap()];
@@ -391,7 +391,7 @@ fn the_focal_length_is_right_for_every_lens_of_the_hard_suite() {
 fn nonsensical_options_are_refused_by_name() {
     let directory = tempfile::tempdir().unwrap();
     for (more, expected) in [
-        (&["--frames", "0"][..], "0 is not in 1..=10000000"),
+        (&["--count", "0"][..], "0 is not in 1..=10000000"),
         (&["--sweep", "apertur=1:2:2"], "did you mean 'aperture_mm'?"),
         (&["--sweep", "fov_deg=100:190:2"], "below 180 degrees"),
         (

@@ -10,10 +10,10 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(mut_group("simulated", |cameras| cameras.required(false)))]
 #[command(after_help = "Examples:\n  \
-    starpipe clutter --kinds blends,trails --frames 20\n  \
+    starpipe clutter --kinds blends,trails --count 20\n  \
     starpipe clutter --preset imx174-35mm\n  \
-    starpipe clutter --camera camera.toml --kinds sky --frames 250 --format csv > clutter.csv\n  \
-    starpipe clutter --preset imx174-35mm --kinds foliage,jpeg --frames 5 --pictures pictures\n\n\
+    starpipe clutter --camera camera.toml --kinds sky --count 250 --format csv > clutter.csv\n  \
+    starpipe clutter --preset imx174-35mm --kinds foliage,jpeg --count 5 --pictures pictures\n\n\
     Frames are simulated at random attitudes, clutter is drawn before the sky or into it, and they are\n\
     processed with nothing known beforehand. Pictures of no sky are drawn, too: none may be identified.\n\
     Without --camera or --preset, every built-in camera is simulated in turn.\n\
@@ -22,8 +22,8 @@ use std::path::PathBuf;
     without: noise, colored-noise, dots, text, drawings, foliage-alone, windows, snow, bokeh.")]
 pub(crate) struct ClutterArgs {
     /// Frames of each kind
-    #[arg(long, value_name = "NUMBER", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
-    pub(super) frames: u64,
+    #[arg(long, alias = "frames", value_name = "NUMBER", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    pub(super) count: u64,
     /// Seed of the random numbers
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub(super) seed: u64,

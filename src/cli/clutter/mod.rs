@@ -17,13 +17,12 @@ pub(crate) fn clutter(arguments: &ClutterArgs) -> Result<Outcome, CommandError> 
     let kinds = &arguments.kinds.0;
     let setups = arguments.setup.setups()?;
     let tables = arguments.catalog.with_index(|pool, indexed| {
-        let progress =
-            frames_bar_with_speed(arguments.frames * (setups.len() * kinds.len()) as u64);
+        let progress = frames_bar_with_speed(arguments.count * (setups.len() * kinds.len()) as u64);
         let done = || progress.inc(1);
         let table = |(camera, setup): &(String, Setup)| {
             let protocol = Protocol {
                 setup: setup.clone(),
-                frames: arguments.frames,
+                frames: arguments.count,
                 seed: arguments.seed,
             };
             if let Some(directory) = &arguments.pictures {

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:\n  \
     starpipe defocus --camera camera.toml --vmag 6 --required-error 0.05 --darks 'darks/*.tif'\n  \
     starpipe defocus --preset nanosat-tracker --vmag 4,5,6 --centroid grey-weighted --out defocus\n  \
-    starpipe defocus --normalisation peak --trials 1000 --out defocus\n\n\
+    starpipe defocus --normalisation peak --count 1000 --out defocus\n\n\
     The radius is the standard deviation of the spot. The error is the root mean square distance \
     between centroid and truth. --normalisation peak repeats the experiment of Wang et al., Laser & \
     Optoelectronics Progress 56, 101101 (2019): all spots have the same brightest pixel. With energy \
@@ -53,8 +53,8 @@ pub(crate) struct DefocusArgs {
     #[arg(long, value_name = "FROM:TO:COUNT[:log]", value_parser = range, allow_hyphen_values = true, conflicts_with = "noise_relative")]
     pub(super) noise_e: Option<Range>,
     /// Stars at each point of the grid [default: 20 for peak, as the paper has it, 400 for energy]
-    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    pub(super) trials: Option<u32>,
+    #[arg(long, alias = "trials", value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(super) count: Option<u32>,
     /// Seed of the random numbers
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub(super) seed: u64,
@@ -74,7 +74,7 @@ pub(crate) struct DefocusArgs {
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub(super) format: Format,
     /// Also write grid.csv, curve.csv, defocus.json, defocus.txt and figures into this directory
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
     /// Format of the figures
     #[arg(long, value_enum, default_value_t = FigureForm::Svg, requires = "out")]

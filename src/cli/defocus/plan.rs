@@ -59,7 +59,7 @@ fn peak(
     let star = PeakStudy {
         peak: arguments.peak.unwrap_or(default.peak),
         half_window_px: arguments.half_window_px.into(),
-        trials: arguments.trials.map_or(default.trials, |n| n as usize),
+        trials: arguments.count.map_or(default.trials, |n| n as usize),
     };
     let default = Grid::of_paper();
     let grid = Grid {
@@ -102,7 +102,7 @@ fn energy(
         star.centroiding = arguments
             .centroid
             .map_or(star.centroiding, Centroiding::from);
-        star.trials = arguments.trials.map_or(star.trials, |n| n as usize);
+        star.trials = arguments.count.map_or(star.trials, |n| n as usize);
         StarModel::Energy(Box::new(star))
     };
     let default = Grid::around(noise.value());

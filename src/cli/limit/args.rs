@@ -12,7 +12,7 @@ use std::str::FromStr;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     starpipe limit --preset experiment-1\n  \
-    starpipe limit --camera camera.toml --exposure-s 0.2 --sky-mag-arcsec2 20 --format json\n  \
+    starpipe limit --camera camera.toml --exposure 0.2 --sky-mag-arcsec2 20 --format json\n  \
     starpipe limit --preset experiment-1 --sweep aperture_mm=5:200:40 --plot aperture.svg --format csv\n  \
     starpipe limit --preset imx174-35mm --sweep exposure_s=0.01:10:31:log\n  \
     starpipe limit --figures figures\n\n\

@@ -91,11 +91,22 @@ fn option(parameter: Parameter) -> Arg {
         .help_heading(heading)
         .conflicts_with_all(parameter.alternatives())
         .value_parser(move |text: &str| given(parameter, text));
-    match name {
-        // The name of the option of `process`.
-        "exposure_s" => arg.visible_alias("exposure"),
-        _ if is_curve(name) => arg.value_name("NUMBER|FILE.csv"),
-        _ => arg,
+    if is_curve(name) {
+        return arg.value_name("NUMBER|FILE.csv");
+    }
+    match name_in_process(name) {
+        Some(option) => arg.long(option).alias(name.replace('_', "-")),
+        None => arg,
+    }
+}
+
+/// The option of `process` for the same, which is the name everywhere.
+fn name_in_process(parameter: &str) -> Option<&'static str> {
+    match parameter {
+        "exposure_s" => Some("exposure"),
+        "zenith_distance_deg" => Some("zenith-distance"),
+        "extinction_mag_per_airmass" => Some("extinction"),
+        _ => None,
     }
 }
 

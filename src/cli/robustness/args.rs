@@ -12,15 +12,15 @@ use starpipe::study::robustness::{Mirrored, Protocol};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     starpipe robustness\n  \
-    starpipe robustness --trials 10000 --stars 20 --format csv > robustness.csv\n  \
+    starpipe robustness --count 10000 --stars 20 --format csv > robustness.csv\n  \
     starpipe robustness --sweep centroid-error=0:5:11 --sweep false=0:200:9 --plot robustness.svg\n\n\
     Lists of centroids are drawn from the catalogue, at attitudes uniform over all rotations, with errors, missing\n\
     and false stars, and identified like those of `starpipe identify`. Without --sweep the table is the\n\
     standard one: five fields of view, then one worse condition at a time in a field of 10 degrees.")]
 pub(crate) struct RobustnessArgs {
     /// Trials in each row of the table
-    #[arg(long, value_name = "NUMBER", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
-    pub(super) trials: u64,
+    #[arg(long, alias = "trials", value_name = "NUMBER", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
+    pub(super) count: u64,
     /// Seed of the random numbers
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub(super) seed: u64,

@@ -15,7 +15,7 @@ pub(super) struct SweptRow {
 /// Runs all trials.
 pub(super) fn run_all(arguments: &RobustnessArgs) -> Result<Vec<SweptRow>, CommandError> {
     let cases = cases(arguments);
-    let (trials, seed) = (arguments.trials, arguments.seed);
+    let (trials, seed) = (arguments.count, arguments.seed);
     arguments.catalog.with_index(|pool, indexed| {
         let progress = bar(
             trials * cases.len() as u64,

@@ -37,7 +37,7 @@ fn introduction(arguments: &RobustnessArgs) -> String {
         "{} trials a row, seed {}; {} × {} px, {} stars on average; unless the row says otherwise centroids {} px and \
          magnitudes {} off, {} % of the stars missing, {} % false, field of view {scale}.\n\
          Rates are of the trials with {} true stars or more, with 95 % intervals; wrong answers and times are of all trials.\n\n",
-        arguments.trials,
+        arguments.count,
         arguments.seed,
         protocol.width,
         protocol.height,

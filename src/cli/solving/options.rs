@@ -43,7 +43,7 @@ pub(super) struct OutputOptions {
     pub(super) all_stars: bool,
     /// Also write into this directory FRAME.json, FRAME.csv (its stars), FRAME.wcs (a FITS header,
     /// if the frame is identified) and, for frames, FRAME.png (the stars marked and named)
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
 }
 

@@ -17,27 +17,27 @@ pub(crate) enum Suite {
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    starpipe validate --camera camera.toml --frames 1000 --seed 1 --out validation\n  \
-    starpipe validate --preset nanosat-tracker --exposure-s 0.2 --scale-unknown --out validation\n  \
-    starpipe validate --camera camera.toml --frames 500 --sweep read_noise_e=1:30:7:log --out study\n  \
+    starpipe validate --camera camera.toml --count 1000 --seed 1 --out validation\n  \
+    starpipe validate --preset nanosat-tracker --exposure 0.2 --scale-unknown --out validation\n  \
+    starpipe validate --camera camera.toml --count 500 --sweep read_noise_e=1:30:7:log --out study\n  \
     starpipe validate --camera camera.toml --sweep fov_deg=4:32:8 --out study\n  \
-    starpipe validate --camera camera.toml --frames 200 --suite hard --out hard\n\n\
+    starpipe validate --camera camera.toml --count 200 --suite hard --out hard\n\n\
     Frames are simulated and processed in memory, at attitudes that are uniform over all rotations. DIR\n\
     gets frames.csv and stars.csv with a row for each frame and each star, the same as Parquet in\n\
     frames.parquet/ and stars.parquet/, a summary in summary.json and summary.txt, and figures. A study\n\
     writes all this for each value into DIR/NAME=VALUE/, and a row for each into study.csv and study.json;\n\
     a suite does so in DIR/CASE/, suite.csv, suite.json and suite.txt.\n\n\
     A run may be stopped at any time, also by Ctrl-C. The same command continues it, and one with more\n\
-    --frames extends it. The results are the same to the last byte on any number of threads.")]
+    --count extends it. The results are the same to the last byte on any number of threads.")]
 pub(crate) struct ValidateArgs {
     /// Frames; in a study, of each value
-    #[arg(long, value_name = "NUMBER", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
-    pub(crate) frames: u64,
+    #[arg(long, alias = "frames", value_name = "NUMBER", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    pub(crate) count: u64,
     /// Seed of the random numbers
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub(crate) seed: u64,
     /// Directory for the results; an interrupted run in it is continued
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Do not give the camera's description to the pipeline: it has no hints, not even the scale
     #[arg(long)]

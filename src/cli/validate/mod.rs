@@ -35,9 +35,9 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Outcome, CommandError
         let shared = Shared {
             indexed,
             pool,
-            frames: arguments.frames,
+            frames: arguments.count,
             figures: arguments.figures,
-            progress: frames_bar_with_speed(arguments.frames * runs),
+            progress: frames_bar_with_speed(arguments.count * runs),
         };
         let text = if arguments.suite.is_some() {
             let rows = suite::run(&arguments.out, &protocol, &shared)?;

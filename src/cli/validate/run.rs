@@ -50,7 +50,7 @@ pub(super) fn run(
     let done = tables.done();
     if done > shared.frames {
         return Err(CommandError::Usage(format!(
-            "{} already holds {done} frames; --frames {} would be fewer",
+            "{} already holds {done} frames; --count {} would be fewer",
             directory.display(),
             shared.frames
         )));
