@@ -3,7 +3,7 @@
 use crate::errors::exception;
 use crate::interrupt::on_this_thread;
 use pyo3::prelude::*;
-use starpipe::frame::{self, Buffers, FrameError};
+use starpipe::frame::{self, Buffers, FrameError, ImageName};
 use starpipe::pipeline;
 use starpipe::{Frame, Interrupt};
 use std::num::NonZeroUsize;
@@ -67,7 +67,9 @@ impl Pages {
         };
         let pages = &mut self.pages;
         let frame = on_this_thread(py, |interrupt| Ok(pages.image(&mut buffers(interrupt))))?;
-        let name = format!("{}[{number}]", self.name);
+        let name = ImageName::of(Path::new(&self.name))
+            .page(number)
+            .to_string();
         let image = match frame {
             Ok(frame) => Bound::new(py, Page(frame))?.into_any(),
             Err(error) => unread(error, &name)

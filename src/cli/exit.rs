@@ -49,6 +49,36 @@ impl Exit {
     }
 }
 
+/// How the frames of a run ended.
+#[derive(Debug, Default)]
+pub(crate) struct Tally {
+    pub(crate) identified: usize,
+    pub(crate) not_identified: usize,
+    /// What could not be read or written.
+    pub(crate) failed: usize,
+}
+
+impl Tally {
+    /// Counts a frame that could be read.
+    pub(crate) fn count(&mut self, is_identified: bool) {
+        let count = if is_identified {
+            &mut self.identified
+        } else {
+            &mut self.not_identified
+        };
+        *count += 1;
+    }
+
+    /// The exit status of the run.
+    pub(crate) fn exit(&self) -> Exit {
+        match (self.failed, self.not_identified) {
+            (0, 0) => Exit::Success,
+            (0, _) => Exit::NotIdentified,
+            _ => Exit::Failure,
+        }
+    }
+}
+
 impl From<Exit> for ExitCode {
     fn from(exit: Exit) -> Self {
         Self::from(match exit {

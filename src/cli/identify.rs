@@ -1,14 +1,13 @@
 //! `identify`: identifies the stars in lists of centroids.
 
 use super::exit::{CommandError, Outcome};
-use super::input::{centroid_list, stdin};
+use super::input::stdin;
 use super::options::values::MAX_SIDE_PX;
-use super::solving::options::{LIST_RESULTS, SolvingOptions};
-use super::solving::result_files::{Image, Solved};
-use super::solving::{Finish, Plan, solve_all};
+use super::solving::options::SolvingOptions;
+use super::solving::{Inputs, Plan, report_all};
 use clap::Args;
-use starpipe::pipeline::{CentroidListOptions, Context, Workspace, solve_centroids, solve_guarded};
-use std::path::{Path, PathBuf};
+use starpipe::pipeline::CentroidListOptions;
+use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
@@ -54,14 +53,5 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Outcome, CommandError>
     options.width = width;
     options.height = height;
     options.frame = frame;
-    let solve = |context: &Context, path: &Path, workspace: &mut Workspace, finish: Finish| {
-        let answer = solve_guarded(path, workspace, |workspace| {
-            let list = centroid_list::read(path, &options)?;
-            let solution = solve_centroids(&list, context, workspace);
-            let frame = None;
-            Ok(finish(Image::of(path), Solved { solution, frame }))
-        });
-        vec![answer]
-    };
-    Ok(solve_all(&lists, solving, LIST_RESULTS, &plan, solve)?.into())
+    Ok(report_all(&Inputs::Lists(options), &lists, solving, &plan)?.into())
 }

@@ -1,6 +1,6 @@
 //! `track`: follows the attitude of a camera from frame to frame.
 
-use super::exit::{CommandError, Exit, Outcome};
+use super::exit::{CommandError, Outcome, Tally};
 use super::input::frames::{FrameList, read_frame};
 use super::input::stdin::is_stdin;
 use super::options::catalog::CatalogOptions;
@@ -81,11 +81,10 @@ pub(crate) fn track(arguments: &TrackArgs) -> Result<Outcome, CommandError> {
             calibration: calibration.as_ref(),
             clock: FrameClock::new(arguments.interval),
             format: arguments.format,
-            has_failed: false,
-            has_lost: false,
+            tally: Tally::default(),
         };
         run.all(&arguments.frames)?;
-        Ok(run.exit().into())
+        Ok(run.tally.exit().into())
     })
 }
 
@@ -95,8 +94,7 @@ struct Run<'a> {
     calibration: Option<&'a Calibration>,
     clock: FrameClock,
     format: PageFormat,
-    has_failed: bool,
-    has_lost: bool,
+    tally: Tally,
 }
 
 impl Run<'_> {
@@ -107,7 +105,7 @@ impl Run<'_> {
                 self.listed()?
             } else {
                 let (paths, failed) = FrameList::of(vec![input.clone()])?.reported();
-                self.has_failed |= failed;
+                self.tally.failed += usize::from(failed);
                 let mut paths = paths.iter();
                 paths.try_for_each(|path| self.frame(path))
             };
@@ -133,14 +131,14 @@ impl Run<'_> {
     /// Tracks one frame and prints its line. Breaks if nobody reads the lines any longer.
     fn frame(&mut self, path: &Path) -> ControlFlow<()> {
         let printed = self.guarded_report(path).and_then(|report| {
-            self.has_lost |= !report.has_attitude();
+            self.tally.count(report.has_attitude());
             print(&match self.format {
                 PageFormat::Text => report.to_text(),
                 PageFormat::Json => report.to_json_line()? + "\n",
             })
         });
         printed.unwrap_or_else(|error| {
-            self.has_failed = true;
+            self.tally.failed += 1;
             report_error(error.as_ref());
             ControlFlow::Continue(())
         })
@@ -172,14 +170,6 @@ impl Run<'_> {
         let track = track.with_context(|| path.display().to_string())?;
         let name = path.display().to_string();
         Ok(TrackReport::new(&name, &track, [read_ms, track_ms]))
-    }
-
-    fn exit(&self) -> Exit {
-        match (self.has_failed, self.has_lost) {
-            (true, _) => Exit::Failure,
-            (false, true) => Exit::NotIdentified,
-            (false, false) => Exit::Success,
-        }
     }
 }
 

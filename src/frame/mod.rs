@@ -79,7 +79,7 @@ pub use metadata::{IgnoredValue, ImageChoice};
 pub use mosaic::{BayerPattern, Mosaic};
 pub use orientation::Orientation;
 #[doc(hidden)]
-pub use pages::Pages;
+pub use pages::{ImageName, PageChoice, Pages};
 pub use pixels::Pixels;
 pub use reader::{Buffers, decode, read};
 #[doc(hidden)]

@@ -8,9 +8,12 @@ use super::limits::MAX_PAGES;
 use super::reader::{Buffers, decode_image, no_panic, read_limited};
 use super::{compressed, fits, tiff};
 use crate::base::files;
+use std::borrow::Cow;
+use std::fmt;
 use std::io::Read;
 use std::num::NonZeroUsize;
 use std::path::Path;
+use std::str::FromStr;
 
 /// The images of a file in order, each with its number from 1. The file is read and decompressed
 /// once. An image that cannot be decoded is an error, and does not end the others.
@@ -115,5 +118,80 @@ impl Pages {
             self.broken = None;
         }
         frame
+    }
+}
+
+/// Which image of a file with several is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum PageChoice {
+    /// The first; of a FITS file, the largest.
+    #[default]
+    Main,
+    /// That with this number, from 1.
+    Number(NonZeroUsize),
+    /// All of them.
+    All,
+}
+
+impl PageChoice {
+    /// The number, where one is chosen.
+    pub const fn number(self) -> Option<NonZeroUsize> {
+        match self {
+            Self::Number(number) => Some(number),
+            Self::Main | Self::All => None,
+        }
+    }
+}
+
+/// As on the command line: a number, or `all`.
+impl FromStr for PageChoice {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        if text == "all" {
+            return Ok(Self::All);
+        }
+        let number = text.parse().map(Self::Number);
+        number.map_err(|_| "expected a number from 1, or all")
+    }
+}
+
+/// The name of an image: that of its file, with the number of a page, as `night.fits[2]`.
+#[derive(Debug, Clone, Copy)]
+pub struct ImageName<'a> {
+    /// The file.
+    pub path: &'a Path,
+    /// The image's number from 1, where all images of the file are meant.
+    pub page: Option<NonZeroUsize>,
+}
+
+impl<'a> ImageName<'a> {
+    /// The only image of `path` that is meant.
+    pub const fn of(path: &'a Path) -> Self {
+        Self { path, page: None }
+    }
+
+    /// Image number `page` of the file.
+    pub const fn page(self, page: NonZeroUsize) -> Self {
+        Self {
+            page: Some(page),
+            ..self
+        }
+    }
+
+    /// The name as a path.
+    pub fn to_path(&self) -> Cow<'a, Path> {
+        let Some(page) = self.page else {
+            return Cow::Borrowed(self.path);
+        };
+        let mut name = self.path.as_os_str().to_owned();
+        name.push(format!("[{page}]"));
+        Cow::Owned(name.into())
+    }
+}
+
+impl fmt::Display for ImageName<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.to_path().display().fmt(formatter)
     }
 }

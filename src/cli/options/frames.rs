@@ -5,7 +5,6 @@ use starpipe::frame::MemoryLimit;
 use std::fs;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
-use std::str::FromStr;
 
 #[derive(Debug, Args)]
 pub(crate) struct FrameOptions {
@@ -53,32 +52,4 @@ fn machine_memory_bytes() -> Option<u64> {
         .find_map(|line| line.strip_prefix("MemTotal:"))?;
     let kib: u64 = total.trim().strip_suffix("kB")?.trim().parse().ok()?;
     kib.checked_mul(1024)
-}
-
-/// Which image of a file, or all of them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum PageChoice {
-    Number(NonZeroUsize),
-    All,
-}
-
-impl FromStr for PageChoice {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        if text == "all" {
-            return Ok(Self::All);
-        }
-        let number = text.parse().map(Self::Number);
-        number.map_err(|_| "expected a number from 1, or all")
-    }
-}
-
-impl From<PageChoice> for String {
-    fn from(choice: PageChoice) -> Self {
-        match choice {
-            PageChoice::Number(number) => number.to_string(),
-            PageChoice::All => "all".to_owned(),
-        }
-    }
 }

@@ -2,7 +2,7 @@
 
 use crate::cli::exit::CommandError;
 use crate::cli::input::frames::read_master;
-use crate::cli::options::frames::{FrameOptions, MemoryOption, PageChoice};
+use crate::cli::options::frames::{FrameOptions, MemoryOption};
 use crate::cli::options::hints::set;
 use crate::cli::options::values;
 use crate::cli::solving::Plan;
@@ -13,6 +13,7 @@ use starpipe::archive::{DEFAULT_FRAMES_PER_PART, Shard};
 use starpipe::calibration::{Calibration, read_hot_pixels};
 use starpipe::camera::data_sheet::DataSheet;
 use starpipe::detect::CentroidMethod;
+use starpipe::frame::PageChoice;
 use starpipe::pipeline::SolveOptions;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;

@@ -3,6 +3,7 @@
 use super::args::{CalibrationOptions, ProcessArgs};
 use anyhow::Context;
 use starpipe::archive::{Configuration, FileHash};
+use starpipe::frame::PageChoice;
 use starpipe::pipeline::SolveOptions;
 use starpipe::sky::catalog::Catalog;
 use std::path::PathBuf;
@@ -25,8 +26,17 @@ pub(super) fn configuration(
         dark: hash_of(dark)?,
         flat: hash_of(flat)?,
         hot_pixels: hash_of(hot_pixels)?,
-        page: arguments.page.map(String::from),
+        page: arguments.page.and_then(text_of),
     })
+}
+
+/// The choice as it is given.
+fn text_of(page: PageChoice) -> Option<String> {
+    match page {
+        PageChoice::Main => None,
+        PageChoice::Number(number) => Some(number.to_string()),
+        PageChoice::All => Some("all".to_owned()),
+    }
 }
 
 /// The hash of a file's content.

@@ -1,9 +1,13 @@
 //! What `process` and `identify` share: each input is solved, its report printed, its result files
 //! written.
 
+mod images;
 pub(crate) mod options;
 mod printer;
-pub(crate) mod result_files;
-mod run;
+mod reports;
+mod result_files;
+mod solver;
 
-pub(crate) use run::{Finish, Plan, solve_all, workspace};
+pub(crate) use images::{Inputs, Solved};
+pub(crate) use reports::{Plan, report_all};
+pub(crate) use solver::{Sink, Solver};

@@ -47,11 +47,6 @@ pub(super) struct OutputOptions {
     pub(super) out: Option<PathBuf>,
 }
 
-/// Extensions of the files that `--out` writes for a frame.
-pub(crate) const FRAME_RESULTS: &[&str] = &["json", "csv", "png", "wcs"];
-/// Extensions of the files that `--out` writes for a list of centroids.
-pub(crate) const LIST_RESULTS: &[&str] = &["json", "csv", "wcs"];
-
 impl SolvingOptions {
     /// The defaults with what is given.
     pub(crate) fn options(&self) -> Result<SolveOptions, CommandError> {
@@ -60,10 +55,5 @@ impl SolvingOptions {
         options.attitude_only = self.attitude_only;
         options.time_limit_s = Some(self.time_limit_s);
         Ok(options)
-    }
-
-    /// Whether `--out` is given.
-    pub(crate) fn writes_files(&self) -> bool {
-        self.output.out.is_some()
     }
 }

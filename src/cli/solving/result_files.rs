@@ -1,57 +1,14 @@
 //! Result files of an input, which `--out` asks for.
 
+use super::images::Solved;
 use crate::cli::output::files::{make_directory, remove_outdated, write_whole};
 use crate::cli::output::overwrite;
 use crate::cli::output::paths::output_path;
 use crate::cli::output::rows::finished;
-use starpipe::frame::Frame;
-use starpipe::pipeline::{Solution, Workspace};
+use starpipe::frame::ImageName;
 use starpipe::report::{FrameReport, overlay, wcs, write_table_header};
 use starpipe::sky::catalog::Catalog;
-use std::borrow::Cow;
-use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
-
-/// An image of an input.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Image<'a> {
-    pub(crate) path: &'a Path,
-    /// Its number from 1, where all images of the input are solved.
-    pub(crate) page: Option<NonZeroUsize>,
-}
-
-impl<'a> Image<'a> {
-    /// The only image of an input that is solved.
-    pub(crate) fn of(path: &'a Path) -> Self {
-        Self { path, page: None }
-    }
-
-    /// `night.fits`, or `night.fits[2]`.
-    pub(crate) fn name(&self) -> Cow<'a, Path> {
-        let Some(page) = self.page else {
-            return Cow::Borrowed(self.path);
-        };
-        let mut name = self.path.as_os_str().to_owned();
-        name.push(format!("[{page}]"));
-        Cow::Owned(name.into())
-    }
-}
-
-/// A solved input.
-pub(crate) struct Solved {
-    pub(crate) solution: Solution,
-    /// The frame to draw on, if there is one.
-    pub(crate) frame: Option<Frame<'static>>,
-}
-
-impl Solved {
-    /// Reuses the frame's buffers: frames are large.
-    pub(crate) fn recycle_frame(&mut self, workspace: &mut Workspace) {
-        if let Some(frame) = self.frame.take() {
-            workspace.frames.recycle(frame);
-        }
-    }
-}
+use std::path::PathBuf;
 
 /// Writes result files into a directory, if one is given.
 pub(super) struct ResultFiles {
@@ -69,7 +26,7 @@ impl ResultFiles {
     /// there is none now.
     pub(super) fn save(
         &self,
-        image: Image,
+        image: &ImageName,
         solved: &Solved,
         report: &FrameReport,
         catalog: &Catalog,
@@ -84,7 +41,7 @@ impl ResultFiles {
             (path("csv"), table(report, true)?.into_bytes()),
         ];
         if let Some(frame) = &solved.frame {
-            let name = image.name();
+            let name = image.to_path();
             let title = name.file_name().unwrap_or(name.as_os_str());
             let title = title.to_string_lossy();
             let picture = overlay::draw(&title, frame, &solved.solution, catalog);
@@ -96,7 +53,7 @@ impl ResultFiles {
         if image.page.is_some() {
             // How many images an input has was not known when the others were checked.
             for (path, _) in &files {
-                overwrite::check_output(path, &image.name())?;
+                overwrite::check_output(path, &image.to_path())?;
             }
         }
         write_whole(&files)?;

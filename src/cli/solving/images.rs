@@ -1,0 +1,142 @@
+//! The inputs of `process` and `identify`, and the images in them.
+
+use crate::cli::input::centroid_list;
+use crate::cli::input::frames::read_frame;
+use crate::cli::input::stdin::is_stdin;
+use starpipe::frame::{Buffers, Frame, FrameError, ImageName, PageChoice, Pages};
+use starpipe::pipeline::{
+    CentroidListOptions, Context, Error, Solution, Workspace, solve_centroids, solve_guarded,
+    solve_read,
+};
+use std::io;
+use std::mem;
+use std::path::Path;
+
+/// What the inputs are.
+pub(crate) enum Inputs {
+    /// Files with frames, of which these images are solved.
+    Frames(PageChoice),
+    /// Lists of centroids.
+    Lists(CentroidListOptions),
+}
+
+impl Inputs {
+    /// Extensions of the result files of an image.
+    pub(super) fn result_extensions(&self) -> &'static [&'static str] {
+        match self {
+            Self::Frames(_) => &["json", "csv", "png", "wcs"],
+            Self::Lists(_) => &["json", "csv", "wcs"],
+        }
+    }
+}
+
+/// A solved image.
+pub(crate) struct Solved {
+    pub(crate) solution: Solution,
+    /// The frame, if there is one.
+    pub(crate) frame: Option<Frame<'static>>,
+}
+
+/// The images of an input, solved one after the other.
+pub(super) struct Images<'a> {
+    inputs: &'a Inputs,
+    path: &'a Path,
+    left: Left,
+}
+
+/// What is left of an input.
+enum Left {
+    All,
+    Pages(Pages),
+    Nothing,
+}
+
+impl<'a> Images<'a> {
+    pub(super) fn of(inputs: &'a Inputs, path: &'a Path) -> Self {
+        Self {
+            inputs,
+            path,
+            left: Left::All,
+        }
+    }
+
+    /// Solves the next image; `None` after the last.
+    pub(super) fn solve_next(
+        &mut self,
+        context: &Context,
+        workspace: &mut Workspace,
+    ) -> Option<(ImageName<'a>, anyhow::Result<Solved>)> {
+        let image = ImageName::of(self.path);
+        match (mem::replace(&mut self.left, Left::Nothing), self.inputs) {
+            (Left::Nothing, _) => None,
+            (Left::Pages(pages), _) => self.solve_page(pages, context, workspace),
+            (Left::All, Inputs::Lists(options)) => {
+                Some((image, solve_list(self.path, options, context, workspace)))
+            }
+            (Left::All, Inputs::Frames(PageChoice::All)) => {
+                workspace.begin(context);
+                match all_pages(self.path, &mut workspace.frames) {
+                    Ok(pages) => self.solve_page(pages, context, workspace),
+                    Err(error) => Some((image, Err(Error::from(error).into()))),
+                }
+            }
+            (Left::All, Inputs::Frames(choice)) => {
+                let read = |buffers: &mut Buffers| read_frame(self.path, choice.number(), buffers);
+                Some((image, solve_frame(&image, read, context, workspace)))
+            }
+        }
+    }
+
+    fn solve_page(
+        &mut self,
+        mut pages: Pages,
+        context: &Context,
+        workspace: &mut Workspace,
+    ) -> Option<(ImageName<'a>, anyhow::Result<Solved>)> {
+        let image = ImageName::of(self.path).page(pages.advance()?);
+        let read = |buffers: &mut Buffers| {
+            let frame = pages.image(buffers);
+            frame.map_err(|error| error.in_file(&image.to_path()))
+        };
+        let solved = solve_frame(&image, read, context, workspace);
+        self.left = Left::Pages(pages);
+        Some((image, solved))
+    }
+}
+
+fn solve_frame(
+    image: &ImageName,
+    read: impl FnOnce(&mut Buffers) -> Result<Frame<'static>, FrameError>,
+    context: &Context,
+    workspace: &mut Workspace,
+) -> anyhow::Result<Solved> {
+    let name = image.to_path();
+    solve_guarded(&name, workspace, |workspace| {
+        let (solution, frame) = solve_read(&name, read, context, workspace)?;
+        let frame = Some(frame);
+        Ok(Solved { solution, frame })
+    })
+}
+
+fn solve_list(
+    path: &Path,
+    options: &CentroidListOptions,
+    context: &Context,
+    workspace: &mut Workspace,
+) -> anyhow::Result<Solved> {
+    solve_guarded(path, workspace, |workspace| {
+        let list = centroid_list::read(path, options)?;
+        let solution = solve_centroids(&list, context, workspace);
+        Ok(Solved {
+            solution,
+            frame: None,
+        })
+    })
+}
+
+fn all_pages(path: &Path, buffers: &mut Buffers) -> Result<Pages, FrameError> {
+    if is_stdin(path) {
+        return Pages::read(io::stdin().lock(), buffers).map_err(|error| error.in_file(path));
+    }
+    Pages::open(path, buffers)
+}

@@ -1,0 +1,142 @@
+//! Reports of many inputs: printed in their order, with result files where these are wanted.
+
+use super::images::{Inputs, Solved};
+use super::options::SolvingOptions;
+use super::printer::Printer;
+use super::result_files::ResultFiles;
+use super::solver::{Sink, Solver};
+use crate::cli::exit::{CommandError, Exit, Tally};
+use crate::cli::output::messages::report_error;
+use crate::cli::output::overwrite;
+use crate::cli::progress::frames_bar;
+use indicatif::ProgressBar;
+use starpipe::calibration::Calibration;
+use starpipe::camera::data_sheet::DataSheet;
+use starpipe::frame::{ImageName, MemoryLimit};
+use starpipe::identify::IndexedCatalog;
+use starpipe::pipeline::{Context, SolveOptions};
+use starpipe::report::FrameReport;
+use starpipe::sky::catalog::Catalog;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+/// What the inputs are solved with, beside the catalogue.
+#[derive(Default)]
+pub(crate) struct Plan {
+    pub(crate) options: SolveOptions,
+    pub(crate) camera: Option<DataSheet>,
+    pub(crate) calibration: Option<Calibration>,
+    pub(crate) memory: MemoryLimit,
+}
+
+impl Plan {
+    pub(crate) fn context<'a>(&'a self, indexed: &'a IndexedCatalog<'a>) -> Context<'a> {
+        let mut context = Context::new(indexed).with_options(&self.options, self.camera.clone());
+        context.calibration = self.calibration.as_ref();
+        context
+    }
+}
+
+/// Solves the inputs `paths`, prints their reports and writes their result files. Inputs that cannot
+/// be read are reported, and the others solved.
+pub(crate) fn report_all(
+    inputs: &Inputs,
+    paths: &[PathBuf],
+    options: SolvingOptions,
+    plan: &Plan,
+) -> Result<Exit, CommandError> {
+    let SolvingOptions {
+        output, catalog, ..
+    } = options;
+    if let Some(directory) = &output.out {
+        overwrite::check(paths, directory, inputs.result_extensions())?;
+    }
+    let mut run = Run {
+        printer: Printer::new(&output),
+        progress: match paths.len() {
+            0 | 1 => ProgressBar::hidden(),
+            count => frames_bar(count as u64),
+        },
+        tally: Tally::default(),
+    };
+    let files = ResultFiles::new(output.out)?;
+    if !paths.is_empty() {
+        catalog.with_index(|pool, indexed| {
+            let solver = Solver {
+                pool,
+                inputs,
+                context: plan.context(indexed),
+                memory: plan.memory,
+                sink: Reports {
+                    files,
+                    catalog: indexed.catalog(),
+                },
+            };
+            solver.solve_all(paths, |images| run.take_all(images));
+            Ok(())
+        })?;
+    }
+    run.progress.finish_and_clear();
+    Ok(run.tally.exit())
+}
+
+/// Makes reports and result files. The threads that solve also draw and write; one only prints.
+struct Reports<'a> {
+    files: ResultFiles,
+    catalog: &'a Catalog,
+}
+
+/// The report of an image, and whether its files could be written.
+struct Report {
+    report: FrameReport,
+    saved: anyhow::Result<()>,
+}
+
+impl Sink for Reports<'_> {
+    type Made = Report;
+
+    fn make(&self, image: &ImageName, solved: &Solved) -> Report {
+        let report = FrameReport::new(&image.to_string(), &solved.solution, self.catalog);
+        let saved = self.files.save(image, solved, &report, self.catalog);
+        Report { report, saved }
+    }
+}
+
+/// State of the inputs so far.
+struct Run {
+    printer: Printer,
+    progress: ProgressBar,
+    tally: Tally,
+}
+
+impl Run {
+    /// Prints the reports of an input. Breaks if nobody reads them any longer.
+    fn take_all(&mut self, images: Vec<(String, anyhow::Result<Report>)>) -> ControlFlow<()> {
+        self.progress.inc(1);
+        images.into_iter().try_for_each(|(_, report)| match report {
+            Ok(report) => self.take(report),
+            Err(error) => {
+                self.fail(&error);
+                ControlFlow::Continue(())
+            }
+        })
+    }
+
+    fn take(&mut self, Report { report, saved }: Report) -> ControlFlow<()> {
+        self.tally.count(report.is_identified());
+        if let Err(error) = saved {
+            self.fail(&error);
+        }
+        // The bar is hidden meanwhile: results may go to the same terminal.
+        let printed = self.progress.suspend(|| self.printer.print(&report));
+        printed.unwrap_or_else(|error| {
+            self.fail(&error);
+            ControlFlow::Continue(())
+        })
+    }
+
+    fn fail(&mut self, error: &anyhow::Error) {
+        self.tally.failed += 1;
+        self.progress.suspend(|| report_error(error.as_ref()));
+    }
+}
