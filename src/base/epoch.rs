@@ -28,7 +28,7 @@ const SECONDS_PER_JULIAN_YEAR: f64 = 365.25 * 86_400.0;
 pub enum DateError {
     /// It is not ISO 8601, or the day or time does not exist.
     #[error(
-        "'{text}' is no date; expected ISO 8601, like 2019-07-29, 2019-07-29T20:47:26Z or \
+        "'{text}' is not a valid date; expected ISO 8601, like 2019-07-29, 2019-07-29T20:47:26Z or \
          2019-07-29T22:47:26+02:00"
     )]
     Malformed {

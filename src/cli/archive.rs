@@ -23,13 +23,13 @@ pub(crate) struct ArchiveArgs {
 
 #[derive(Debug, Subcommand)]
 enum ArchiveCommand {
-    /// Tell what is done, failed and missing; exit status 3 where parts are missing
+    /// Show what is done, failed and missing; the exit status is 3 if parts are missing
     #[command(after_help = "Example:\n  starpipe archive status results")]
     Status(StatusArgs),
-    /// Write the parts of each table as one file, rows by the name of the frame
+    /// Merge the parts of each table into one file, sorted by frame name
     #[command(after_help = "Example:\n  starpipe archive merge results --out tables")]
     Merge(MergeArgs),
-    /// Tell for each night and camera how faint the frames went, and what was predicted
+    /// Report the limiting magnitude of each night and camera, and the predicted one
     #[command(after_help = "Example:\n  starpipe archive report results --format csv > nights.csv")]
     Report(ReportArgs),
 }

@@ -41,7 +41,7 @@ pub(crate) struct Arguments {
 pub(crate) enum Command {
     /// Find and identify the stars in frames (FITS, TIFF, PNG, JPEG, BMP, PGM)
     Process(Box<ProcessArgs>),
-    /// Tell how far process --out-parquet is, merge its tables, and report night by night
+    /// Show the progress of an archive run, merge its tables, and report each night
     Archive(ArchiveArgs),
     /// Identify the stars in lists of centroids (CSV)
     Identify(IdentifyArgs),

@@ -42,7 +42,7 @@ pub(crate) struct TrackArgs {
     /// these have fractions of a second or are 10 s apart; else unknown, and rates are per frame]
     #[arg(long, value_name = "SECONDS", value_parser = values::positive, allow_hyphen_values = true)]
     interval: Option<f64>,
-    /// Most stars that are measured in a frame
+    /// Maximum number of stars to measure in a frame
     #[arg(long, alias = "stars", value_name = "NUMBER", default_value_t = DEFAULT_STARS as u64,
           value_parser = clap::value_parser!(u64).range(4..=1000))]
     max_stars: u64,

@@ -16,7 +16,7 @@
 //!    an effective PSF is measured on the bright ones, and tabulated (`field_tables`).
 //!    Where the stars are long trails, `trailed` measures these instead of steps 6 and 7.
 //! 6. `fit`, `measure`: a fit of each source, together with those that it touches, or a
-//!    grey-weighted centroid; flags for what is no star, or no whole one.
+//!    grey-weighted centroid; flags for non-stellar and truncated sources.
 //! 7. `wings`: light of the stars beyond the spots that are fitted, which is added to the fluxes.
 //!
 //! `search` runs steps 2 to 4, up to three times, until the filter fits the stars that it finds.

@@ -101,7 +101,7 @@ impl Pages {
         NonZeroUsize::new(self.next).filter(|_| is_there)
     }
 
-    /// The image that [`Self::advance`] has told of last; it may take what the buffers say.
+    /// The image that [`Self::advance`] returned last, within the limits of the buffers.
     /// # Errors
     /// As [`super::decode_page`].
     pub fn image(&mut self, buffers: &mut Buffers) -> Result<Frame<'static>, FrameError> {

@@ -1,4 +1,4 @@
-//! The Moon and the planets in a frame: a detection that is one of them is no star.
+//! The Moon and the planets in a frame: a detection that is one of them is not a star.
 
 use super::body_in_frame::BodyInFrame;
 use super::outcome::Outcome;

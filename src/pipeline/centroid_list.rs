@@ -47,7 +47,7 @@ pub struct ListedCentroid {
     pub flux: Option<f64>,
     /// Standard error on one axis in pixels, if the list gives it.
     pub sigma_px: Option<f64>,
-    /// Flags, if the list gives them. What is no star takes no part in the identification.
+    /// Flags, if the list gives them. Sources that are not stars are not used for identification.
     pub flags: DetectionFlags,
     /// Where it stands in its list, from 1: the line of a file, the place in an array; 0 if unknown.
     pub row: u64,

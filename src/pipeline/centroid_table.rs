@@ -305,7 +305,7 @@ mod tests {
         let sigma_px = list.centroids[0].sigma_px.unwrap();
         assert!((sigma_px - 0.125_f64.sqrt()).abs() < 1e-12, "{sigma_px}");
         assert!(list.centroids[0].flags.saturated && list.centroids[0].flags.border);
-        // What is no star stays in the list and out of the star field.
+        // Sources that are not stars stay in the list but not in the star field.
         assert!(list.centroids[1].flags.trail);
         let field = list.star_field(0.0);
         assert_eq!(field.stars.len(), 1);

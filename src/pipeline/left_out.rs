@@ -1,4 +1,4 @@
-//! Rows of a list of centroids that are no stars.
+//! Rows of a list of centroids that are not stars.
 
 use crate::base::format::counted;
 use std::fmt;

@@ -46,7 +46,7 @@ const AVERAGED_SHARE: f64 = 0.05;
 const SCALE_TOLERANCE: f64 = 0.02;
 /// A full solution's focal length that differs by more standard errors is of another camera.
 const OTHER_CAMERA_SIGMAS: f64 = 6.0;
-/// Paths shorter than this, in pixels, are none.
+/// Smears shorter than this, in pixels, count as points.
 const MIN_SMEAR_PX: f64 = 0.3;
 
 /// Follows the attitude of one camera from frame to frame.

@@ -261,7 +261,7 @@ fn nonsensical_options_are_refused() {
     sky(&["--vignetting=2"], "expected a number from 0 to 1");
     sky(&["--depth-um=1e12"], "expected a number from 0.1 to 1000");
     sky(&["--spot-form=square"], "gaussian");
-    sky(&["--date=1990-13-01"], "is no date");
+    sky(&["--date=1990-13-01"], "is not a valid date");
     sky(
         &["--rate-x-deg-s=180", "--exposure=1"],
         "turns by up to 180°",

@@ -19,13 +19,13 @@ pub(crate) struct HintOptions {
     /// Angle of a pixel in arcseconds
     #[arg(long, value_name = "ARCSEC", value_parser = values::pixel_scale, allow_hyphen_values = true)]
     pub(crate) pixel_scale: Option<f64>,
-    /// How far --fov or --pixel-scale may be off, in percent [default: 10]
+    /// Tolerance of --fov or --pixel-scale, in percent [default: 10]
     #[arg(long, value_name = "PERCENT", value_parser = values::percent, allow_hyphen_values = true)]
     pub(crate) scale_error: Option<f64>,
     /// Approximate direction of the frame's centre, in degrees or as 05h35m17s,-05d23m28s
     #[arg(long, value_name = "RA,DEC", value_parser = values::direction, allow_hyphen_values = true)]
     pub(crate) near: Option<values::Direction>,
-    /// How far from --near the frame's centre may lie, in degrees [default: 10]
+    /// Maximum distance of the frame's center from --near, in degrees [default: 10]
     #[arg(long, value_name = "DEG", value_parser = values::radius, allow_hyphen_values = true,
           requires = "near")]
     pub(crate) radius: Option<f64>,

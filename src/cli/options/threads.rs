@@ -10,7 +10,7 @@ const MAX_USEFUL: usize = 8;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Resources")]
 pub(crate) struct ThreadOptions {
-    /// Threads to work with; more than 8 and than there are processors are not started [default: one
+    /// Number of threads, at most 8 or the number of processors, whichever is larger [default: one
     /// for each processor]
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1024))]
     threads: Option<u32>,

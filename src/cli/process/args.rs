@@ -56,11 +56,10 @@ pub(crate) struct ProcessArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Calibration")]
 pub(crate) struct CalibrationOptions {
-    /// Frame taken without light, or the mean of many, which is subtracted; see `starpipe darks`
+    /// Dark frame or master dark to subtract; see `starpipe darks`
     #[arg(long, value_name = "FILE")]
     pub(super) dark: Option<PathBuf>,
-    /// Mean of evenly lit frames: the signal above the dark level is divided by it; see `starpipe
-    /// flats`
+    /// Master flat: the signal above the dark level is divided by it; see `starpipe flats`
     #[arg(long, value_name = "FILE")]
     pub(super) flat: Option<PathBuf>,
     /// Pixels to ignore: a table with the columns x,y; see `starpipe darks`
@@ -78,7 +77,7 @@ pub(super) struct DetectionOptions {
     /// Accepted false detections in a million pixels of noise [default: 0.1]
     #[arg(long, value_name = "NUMBER", value_parser = values::positive, allow_hyphen_values = true)]
     pub(super) false_alarms: Option<f64>,
-    /// Most stars that are measured, the brightest: a star tracker needs some twenty. The frame's
+    /// Maximum number of stars to measure, the brightest; a star tracker needs about 20. The
     /// limiting magnitude is then not measured
     #[arg(long, value_name = "NUMBER", value_parser = value_parser!(u64).range(4..),
           allow_hyphen_values = true)]
@@ -123,10 +122,10 @@ pub(super) struct PartOptions {
     /// of names: .txt (one a line), .parquet, or - for standard input
     #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "format", "all_stars"])]
     pub(super) out_parquet: Option<PathBuf>,
-    /// Do the work of worker K of N: every N-th part
+    /// Process only the parts of worker K of N: every Nth
     #[arg(long, value_name = "K/N", requires = "out_parquet")]
     pub(super) shard: Option<Shard>,
-    /// Frames of a part
+    /// Frames in each part
     #[arg(long, value_name = "NUMBER", default_value_t = DEFAULT_FRAMES_PER_PART,
           requires = "out_parquet")]
     pub(super) frames_per_part: NonZeroUsize,

@@ -18,11 +18,11 @@ pub(crate) struct SolvingOptions {
     #[arg(long, value_name = "NUMBER", value_parser = values::odds, allow_hyphen_values = true,
           default_value_t = NAME_ODDS, help_heading = "Identification")]
     pub(crate) name_odds: f64,
-    /// Stop at attitude and optics, from the brightest stars: no other star is named, and no zero
-    /// point or limiting magnitude is measured
+    /// Determine attitude and optics only, from the brightest stars: no further names, no zero point
+    /// and no limiting magnitude
     #[arg(long, help_heading = "Identification")]
     pub(crate) attitude_only: bool,
-    /// How long a frame may take, in seconds; if there is no answer by then, the reason says so
+    /// Time limit for a frame, in seconds; a frame that exceeds it is reported as not identified
     #[arg(long = "time-limit", value_name = "SECONDS", value_parser = values::positive, allow_hyphen_values = true,
           default_value_t = DEFAULT_TIME_LIMIT_S, help_heading = "Limits")]
     pub(crate) time_limit_s: f64,

@@ -20,7 +20,7 @@ use starpipe::sky::catalog::Catalog;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-/// What the inputs are solved with, beside the catalogue.
+/// What the inputs are solved with, besides the catalog.
 #[derive(Default)]
 pub(crate) struct Plan {
     pub(crate) options: SolveOptions,

@@ -408,7 +408,7 @@ fn first_fit(
     is_star.then_some(star)
 }
 
-/// Drops what is no star: of another size than most, or with far larger residuals.
+/// Drops sources that are not stars: of another size than most, or with far larger residuals.
 fn keep_alike(stars: &mut Vec<PsfStar>) {
     /// Largest factor of the size to that of the median star.
     const SIZE_FACTOR: f64 = 2.0;

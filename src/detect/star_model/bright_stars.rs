@@ -26,7 +26,7 @@ const SIZE_MARGIN_PX: f64 = 0.3;
 /// Peaks below this part of a peak do not disturb it.
 const FAINT_NEIGHBOR: f32 = 0.1;
 /// Largest error of the spot model, as a part of the light in a pixel: a source with a larger one
-/// is no star.
+/// is not a star.
 pub(crate) const MAX_MODEL_ERROR: f64 = 0.1;
 
 /// A peak of the frame or of the filtered frame.

@@ -5,7 +5,7 @@ use super::spot_size::{MODE_WIDTH, weighted_size};
 use crate::detect::fit::{Fit, GaussianLight, NoiseModel, WindowPixels};
 use crate::detect::psf::{FieldFrame, GROUP_PX};
 
-/// Smaller elongations are of no account, as the logarithm of the ratio of the axes.
+/// Smallest log axis ratio that counts as elongated.
 const MIN_ELONGATION: f64 = 0.06;
 /// Nor are smaller ones that there are in the corners alone.
 const MIN_ELONGATION_IN_CORNER: f64 = 2.0 * MIN_ELONGATION;
@@ -13,7 +13,7 @@ const MIN_ELONGATION_IN_CORNER: f64 = 2.0 * MIN_ELONGATION;
 const MIN_SPOT_PX: f64 = 0.65;
 /// unless they are elongated by more than this.
 const MIN_ELONGATION_OF_SHARP: f64 = 0.3;
-/// Smaller errors of the spot model are of no account, relative to the light.
+/// Smallest error of the spot model that counts, relative to the light.
 const MIN_MODEL_ERROR: f64 = 0.015;
 /// Nor is a smaller scatter of the sizes, relative to the size.
 const MIN_SIZE_SCATTER: f64 = 0.04;

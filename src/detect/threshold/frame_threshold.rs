@@ -110,7 +110,7 @@ impl FrameNoise<'_> {
                 n.threshold(u, filter, known_sigma)
             })
         };
-        // The isolated pixels of coarse noise are high, but they are no stars.
+        // The isolated pixels of coarse noise are high, but they are not stars.
         let limit = if self.background.is_coarse {
             2.0 * u
         } else {

@@ -160,7 +160,7 @@ impl Sides {
         Some(tail * self.positive_scale(count, tail).unwrap_or(near))
     }
 
-    /// The height at which `count` maxima that are no stars are higher; the threshold is `tail`
+    /// The height at which `count` maxima that are not stars are higher; the threshold is `tail`
     /// times as high.
     fn positive_scale(&self, count: f64, tail: f64) -> Option<f64> {
         const ROUNDS: usize = 5;

@@ -14,7 +14,7 @@ use arrayvec::ArrayVec;
 
 /// Shorter trails are fitted as elongated spots, in pixels.
 const SHORTEST_PX: f64 = 15.0;
-/// Longer ones than this share of the frame's shorter side are no stars.
+/// Trails longer than this fraction of the frame's shorter side are not stars.
 const LONGEST_SHARE: f64 = 0.25;
 /// Least ratio of length and breadth.
 const MIN_ELONGATION: f64 = 3.0;

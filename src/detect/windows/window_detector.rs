@@ -436,7 +436,7 @@ fn cut_out(
     window.background_error = window.background_noise.hypot(HALO_ERROR * peak);
 }
 
-/// The star of a fit that converged; `None` where it is no star, or not where it is expected.
+/// The star of a fit that converged; `None` if it is not a star, or not where it is expected.
 fn star_of(fit: &Fit, expected: &ExpectedStar) -> Option<FoundStar> {
     let spot = fit.spots.first()?;
     let position = PixelPoint::new(spot.x, spot.y);

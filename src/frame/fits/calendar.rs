@@ -29,7 +29,7 @@ pub(super) struct CalendarDate {
     pub is_century_assumed: bool,
 }
 
-/// Why a text is no date.
+/// Why a text is not a valid date.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum DateProblem {
     /// It has another form, or there is no such day or time.
