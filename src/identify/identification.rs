@@ -88,7 +88,7 @@ pub enum SearchFailure {
         /// log10 of the false-alarm probability of the best hypothesis, if there was one.
         best_log10_false_alarm: Option<f64>,
     },
-    /// The search was ended early ([`Workspace::with_interrupt`](super::Workspace::until)).
+    /// The search was ended early ([`Workspace::with_interrupt`](super::Workspace::with_interrupt)).
     Interrupted,
 }
 

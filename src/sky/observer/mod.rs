@@ -177,7 +177,7 @@ pub struct Observation {
 pub struct Apparent {
     /// Apparent (refracted) zenith distance in radians, in [0, π/2].
     pub zenith_distance_rad: f64,
-    /// The airmass by [`airmass::airmass_kasten_young`].
+    /// The airmass by the formula of Kasten & Young 1989.
     pub airmass: f64,
 }
 
