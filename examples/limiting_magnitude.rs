@@ -1,35 +1,37 @@
 //! The limiting magnitude of a star sensor, and which of its parameters is worth improving:
-//! `cargo run --example limiting_magnitude`
+//! `cargo run --release --no-default-features --example limiting_magnitude`
 
 use starpipe::camera::data_sheet::Preset;
-use starpipe::model::sensitivity::{Budget, Detector, Parameter, Rule, Scenario};
+use starpipe::model::sensitivity::{Extinction, Prediction, Scenario, ScenarioError};
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// What to change of a scenario, and how it is called.
+type Change = (&'static str, fn(&mut Scenario));
+
+const CHANGES: [Change; 4] = [
+    ("twice the aperture", |s| s.camera.aperture_mm *= 2.0),
+    ("twice the exposure", |s| s.conditions.exposure_s *= 2.0),
+    ("half the read noise", |s| s.camera.read_noise_e *= 0.5),
+    ("half the spot size", |s| s.camera.spot_sigma_px *= 0.5),
+];
+
+fn main() -> Result<(), ScenarioError> {
+    // A star tracker in space, where there is no atmosphere.
     let mut scenario = Scenario::of(Preset::NanosatTracker);
-    let space = Parameter::named("extinction_mag_per_airmass")?;
-    space.set(&mut scenario, 0.0);
-    scenario.check()?;
-    let budget = Budget::new(&scenario);
-    let detector = Detector::new(Rule::MatchedFilter, &scenario, &budget);
+    scenario.conditions.extinction = Extinction::MagPerAirmass(0.0);
+    let prediction = Prediction::new(&scenario)?;
     println!(
-        "{}: V {:.2} by its brightest pixel; starpipe finds half of the stars of V {:.2}",
-        scenario.camera.name,
-        budget.limit_vmag,
-        detector.vmag_at(0.5)
+        "{}: V {:.2} by its brightest pixel",
+        prediction.camera, prediction.limit_vmag
     );
-    for (name, factor) in [
-        ("aperture_mm", 2.0),
-        ("exposure_s", 2.0),
-        ("read_noise_e", 0.5),
-        ("spot_sigma_px", 0.5),
-    ] {
-        let mut better = scenario.clone();
-        let parameter = Parameter::named(name)?;
-        let value = parameter.get(&scenario).ok_or("it has a value")?;
-        parameter.set(&mut better, factor * value);
-        better.check()?;
-        let gain = Budget::new(&better).limit_vmag - budget.limit_vmag;
-        println!("  {name} × {factor}: {gain:+.2} mag");
+    // The matched filter sees all pixels of a star, and so goes fainter.
+    if let Some(limit_vmag) = prediction.detector.limit50_vmag {
+        println!("starpipe finds half of the stars of V {limit_vmag:.2}");
+    }
+    for (name, change) in CHANGES {
+        let mut changed = scenario.clone();
+        change(&mut changed);
+        let gain_mag = Prediction::new(&changed)?.limit_vmag - prediction.limit_vmag;
+        println!("  {name}: {gain_mag:+.2} mag");
     }
     Ok(())
 }

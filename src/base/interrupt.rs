@@ -5,6 +5,21 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Tells long work whether to end. It is asked every few milliseconds, from any thread.
+///
+/// # Example
+/// ```
+/// use starpipe::Interrupt;
+/// use std::sync::Arc;
+/// use std::sync::atomic::{AtomicBool, Ordering};
+///
+/// // A flag that another thread, or a signal, sets.
+/// let cancel = Arc::new(AtomicBool::new(false));
+/// let seen = Arc::clone(&cancel);
+/// let interrupt = Interrupt::when(move || seen.load(Ordering::Relaxed));
+/// assert!(interrupt.check().is_ok());
+/// cancel.store(true, Ordering::Relaxed);
+/// assert!(interrupt.check().is_err());
+/// ```
 #[derive(Clone, Default)]
 pub struct Interrupt(Option<Arc<dyn Fn() -> bool + Send + Sync>>);
 

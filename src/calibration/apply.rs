@@ -25,6 +25,27 @@ impl Master {
 }
 
 /// A calibration that can be applied to frames.
+///
+/// # Example
+/// ```
+/// use starpipe::calibration::Master;
+/// use starpipe::{Calibration, Frame};
+///
+/// // The pixel in the middle has much dark current.
+/// let mut levels = vec![100.0; 9];
+/// levels[4] = 350.0;
+/// let dark = Master {
+///     name: "dark.fits".to_owned(),
+///     frame: Frame::new(3, 3, levels.clone())?,
+/// };
+/// let calibration = Calibration::new(Some(dark), None, None, 0.0)?;
+/// // Light of 20 on every pixel.
+/// let lit = levels.iter().map(|level| level + 20.0).collect();
+/// let mut frame = Frame::new(3, 3, lit)?;
+/// calibration.apply(&mut frame)?;
+/// assert!(frame.values().iter().all(|&pixel| pixel == 120.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Calibration {
     dark: Option<Master>,

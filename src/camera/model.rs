@@ -5,6 +5,21 @@ use crate::base::coords::{Camera, PixelPoint, UnitVector};
 use nalgebra::Vector3;
 
 /// A pinhole camera whose axis goes through the frame's centre, with lens distortion.
+///
+/// # Example
+/// ```
+/// use starpipe::{CameraModel, PixelPoint, Rotation, UnitVector};
+///
+/// let camera = CameraModel::pinhole(640.0, 480.0, 1800.0, false);
+/// assert!((camera.fov_x_rad().to_degrees() - 20.16).abs() < 0.01);
+/// // The star in the boresight is at the frame's centre; what is north of it is above.
+/// let boresight = UnitVector::from_ra_dec(1.0, 0.3);
+/// let attitude = Rotation::looking_at(&boresight, 0.0);
+/// let pixel = camera.pixel_of(&attitude.apply(&boresight)).expect("it is in front");
+/// assert!(pixel.distance_to(&PixelPoint::new(319.5, 239.5)) < 1e-9);
+/// let north = attitude.apply(&UnitVector::from_ra_dec(1.0, 0.31));
+/// assert!(camera.pixel_of(&north).expect("it is in front").y < pixel.y);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraModel {
     /// Columns of the frame.

@@ -33,6 +33,20 @@ impl<'p> Frame<'p> {
     /// # Errors
     /// [`FrameError::WrongLength`], [`FrameError::TooSmall`], [`FrameError::TooLarge`] for sizes
     /// that do not fit; [`FrameError::NoValues`] if no pixel has a value.
+    ///
+    /// # Example
+    /// ```
+    /// use starpipe::Frame;
+    ///
+    /// let mut pixels = vec![100.0; 64 * 48];
+    /// pixels[20 * 64 + 30] = 900.0;
+    /// let frame = Frame::new(64, 48, pixels)?;
+    /// assert_eq!(frame.at(30, 20), 900.0);
+    /// // Whole levels of 12 bits.
+    /// let frame = frame.with_levels(1.0, Some(4095.0));
+    /// assert_eq!(frame.saturation_adu, Some(4095.0));
+    /// # Ok::<(), starpipe::frame::FrameError>(())
+    /// ```
     pub fn new(width: usize, height: usize, pixels: Vec<f32>) -> Result<Self, FrameError> {
         Self::from_floats(width, height, pixels.into())
     }

@@ -201,6 +201,17 @@ fn not_an_image(bytes: &[u8]) -> FrameError {
 /// Decodes the first image in `bytes`.
 /// # Errors
 /// As [`decode_page`].
+///
+/// # Example
+/// ```
+/// use starpipe::frame;
+///
+/// let bytes = std::fs::read("fixtures/cygnus/cygnus.tif")?;
+/// let frame = frame::decode(&bytes)?;
+/// assert_eq!((frame.width, frame.height), (512, 384));
+/// assert_eq!(frame.saturation_adu, Some(65535.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn decode(bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
     decode_page(bytes, None)
 }

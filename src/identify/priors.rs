@@ -9,6 +9,24 @@ use crate::sky::observer::Site;
 use serde::Serialize;
 
 /// What is known of a frame beforehand; by default nothing.
+///
+/// # Example
+/// ```
+/// use starpipe::identify::Scale;
+/// use starpipe::{Priors, ScalePrior, SkyRegion, UnitVector};
+///
+/// // A field 20° wide, within 10 %, whose centre is less than 5° from Polaris.
+/// let fov = Scale::FieldOfView(20_f64.to_radians());
+/// let priors = Priors {
+///     scale: Some(ScalePrior::by_user(fov, 0.1)),
+///     near: Some(SkyRegion {
+///         centre: UnitVector::from_ra_dec(37.95_f64.to_radians(), 89.26_f64.to_radians()),
+///         radius_rad: 5_f64.to_radians(),
+///     }),
+///     ..Priors::default()
+/// };
+/// assert!(priors.restrict_search());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Priors {
     /// The camera's scale.

@@ -33,6 +33,37 @@ pub const NAME_ODDS: f64 = 100.0;
 ///
 /// # Errors
 /// The [`SearchFailure`] where they are not identified.
+///
+/// # Example
+/// ```
+/// use starpipe::detect::{self, Detection, DetectConfig, detect};
+/// use starpipe::identify::{ObservedStar, Photometry, SourceIndex, StarField};
+/// use starpipe::{Catalog, IndexedCatalog, Priors, frame, identify};
+///
+/// let frame = frame::read("fixtures/orion/orion.png")?;
+/// let detections = detect(&frame, &DetectConfig::default(), &mut detect::Workspace::new())?;
+/// let observed = |(index, source): (usize, &Detection)| ObservedStar {
+///     source: SourceIndex::new(index),
+///     position: source.position,
+///     sigma_px: source.sigma_x_px.max(source.sigma_y_px),
+///     mag: -2.5 * source.flux_adu.log10(),
+///     is_saturated: source.flags.saturated,
+/// };
+/// let field = StarField {
+///     width_px: frame.width as f64,
+///     height_px: frame.height as f64,
+///     photometry: Photometry::Instrumental,
+///     years_since_j2000: 0.0,
+///     spot_sigma_px: Some(detections.spot_sigma_px),
+///     stars: detections.sources.iter().enumerate().map(observed).collect(),
+/// };
+/// // The stars to V 7 are enough for wide fields, and are indexed in a moment.
+/// let catalog = Catalog::built_in().limited_to(7.0);
+/// let indexed = IndexedCatalog::build(&catalog, &|_| ());
+/// let found = identify(&field, &Priors::default(), &indexed).expect("the stars are identified");
+/// assert!(found.matches.len() > 100 && found.log10_false_alarm < -100.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn identify(
     field: &StarField,
     priors: &Priors,

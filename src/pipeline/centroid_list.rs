@@ -158,6 +158,36 @@ fn without_coincident(centroids: &[ListedCentroid]) -> Vec<bool> {
 }
 
 /// Identifies the stars of a list of centroids. Every prior is a hard constraint.
+///
+/// # Example
+/// ```
+/// use starpipe::identify::Photometry;
+/// use starpipe::pipeline::ListedCentroid;
+/// use starpipe::{CameraModel, Catalog, CentroidList, Context, IndexedCatalog};
+/// use starpipe::{Rotation, UnitVector, Workspace, solve_centroids};
+///
+/// // The stars to V 7 are enough for wide fields, and are indexed in a moment.
+/// let catalog = Catalog::built_in().limited_to(7.0);
+/// let indexed = IndexedCatalog::build(&catalog, &|_| ());
+/// // What a camera of 20° sees of the Southern Cross.
+/// let camera = CameraModel::pinhole(1024.0, 768.0, 2900.0, false);
+/// let attitude = Rotation::looking_at(&UnitVector::from_ra_dec(3.3, -1.1), 0.5);
+/// let centroids = catalog.stars().iter().filter_map(|star| {
+///     let pixel = camera.pixel_of(&attitude.apply(&star.direction))?;
+///     let listed = ListedCentroid::new(pixel, f64::from(star.v_mag));
+///     camera.contains(&pixel).then_some(listed)
+/// });
+/// let list = CentroidList {
+///     width: 1024,
+///     height: 768,
+///     photometry: Photometry::JohnsonV,
+///     has_brightness: true,
+///     centroids: centroids.collect(),
+/// };
+/// let solution = solve_centroids(&list, &Context::new(&indexed), &mut Workspace::new());
+/// let found = solution.outcome.identification().expect("the stars are identified");
+/// assert!(found.icrs_to_camera.angle_to(&attitude) < 1e-5);
+/// ```
 pub fn solve_centroids(
     list: &CentroidList,
     context: &Context,

@@ -121,6 +121,19 @@ impl Workspace {
 
     /// Work on a frame ends early when `interrupt` is due, or [`Context::time_limit`] is reached:
     /// while it is read and stars are detected, with an error; later, with the frame not identified.
+    ///
+    /// # Example
+    /// ```
+    /// use starpipe::{Catalog, Context, IndexedCatalog, Interrupt, Workspace, solve_file};
+    ///
+    /// let catalog = Catalog::built_in().limited_to(5.0);
+    /// let indexed = IndexedCatalog::build(&catalog, &|_| ());
+    /// let context = Context::new(&indexed);
+    /// // One that is due at once.
+    /// let mut workspace = Workspace::new().with_interrupt(&Interrupt::when(|| true));
+    /// let ended = solve_file("fixtures/orion/orion.png", None, &context, &mut workspace);
+    /// assert!(ended.is_err());
+    /// ```
     #[must_use]
     pub fn with_interrupt(self, interrupt: &Interrupt) -> Self {
         let mut until = Self {

@@ -17,6 +17,18 @@ use std::time::Duration;
 ///
 /// The options of `starpipe process` and of `Pipeline.solve` in Python have the names of these fields
 /// without their units.
+///
+/// # Example
+/// ```
+/// use starpipe::SolveOptions;
+///
+/// // The field is 20° wide, or up to 5 % more or less, and is somewhere near Orion's belt.
+/// let mut options = SolveOptions::default();
+/// options.fov_deg = Some(20.0);
+/// options.scale_error_percent = 5.0;
+/// options.near_deg = Some([84.0, -1.0]);
+/// assert!(options.priors().restrict_search());
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct SolveOptions {
@@ -139,6 +151,28 @@ impl Default for SolveOptions {
 
 impl<'a> Context<'a> {
     /// The same with what is stated for all frames, and the camera that took them.
+    ///
+    /// # Example
+    /// ```
+    /// use starpipe::camera::data_sheet::DataSheet;
+    /// use starpipe::{Catalog, Context, IndexedCatalog, SolveOptions, Workspace, solve_file};
+    ///
+    /// // The stars to V 7 are enough for wide fields, and are indexed in a moment.
+    /// let catalog = Catalog::built_in().limited_to(7.0);
+    /// let indexed = IndexedCatalog::build(&catalog, &|_| ());
+    /// let camera = DataSheet::read("fixtures/cygnus/camera.toml".as_ref())?;
+    /// let mut options = SolveOptions::default();
+    /// options.exposure_s = Some(1.0);
+    /// options.extinction_mag_per_airmass = Some(0.0);
+    /// let context = Context::new(&indexed).with_options(&options, Some(camera));
+    /// let file = "fixtures/cygnus/cygnus.tif";
+    /// let solution = solve_file(file, None, &context, &mut Workspace::new())?;
+    /// // The exposure is known, so the frame is compared with what the camera should see.
+    /// let comparison = solution.comparison.expect("the stars are identified");
+    /// let difference = comparison.zero_point_difference_mag.expect("stars have fluxes");
+    /// assert!(difference.value.abs() < 0.1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn with_options(self, options: &SolveOptions, camera: Option<DataSheet>) -> Self {
         let limit_s = options.time_limit_s;

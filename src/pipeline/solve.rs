@@ -24,6 +24,24 @@ use std::path::Path;
 /// # Errors
 /// [`Error::Read`] if there is no frame in the file, [`Error::Calibrate`] if the calibration is of
 /// another camera, [`Error::Detect`] if stars cannot be detected in it.
+///
+/// # Example
+/// ```
+/// use starpipe::{Catalog, Context, IndexedCatalog, Workspace, solve_file};
+///
+/// // The stars to V 7 are enough for wide fields, and are indexed in a moment.
+/// let catalog = Catalog::built_in().limited_to(7.0);
+/// let indexed = IndexedCatalog::build(&catalog, &|_| ());
+/// let context = Context::new(&indexed);
+/// let file = "fixtures/orion/orion.png";
+/// let solution = solve_file(file, None, &context, &mut Workspace::new())?;
+/// let found = solution.outcome.identification().expect("the stars are identified");
+/// let (boresight, _) = found.icrs_to_camera.boresight_and_up();
+/// let (ra_rad, dec_rad) = boresight.to_ra_dec();
+/// assert!((ra_rad.to_degrees() - 83.7).abs() < 0.001);
+/// assert!((dec_rad.to_degrees() - -0.4).abs() < 0.001);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn solve_file(
     path: impl AsRef<Path>,
     page: Option<NonZeroUsize>,
@@ -88,6 +106,26 @@ pub fn solve_read(
 ///
 /// # Errors
 /// [`DetectError`] if stars cannot be detected in it.
+///
+/// # Example
+/// ```
+/// use starpipe::{Catalog, Context, IndexedCatalog, Outcome, Workspace, frame, solve_frame};
+///
+/// // The stars to V 7 are enough for wide fields, and are indexed in a moment.
+/// let catalog = Catalog::built_in().limited_to(7.0);
+/// let indexed = IndexedCatalog::build(&catalog, &|_| ());
+/// let context = Context::new(&indexed);
+/// let mut workspace = Workspace::new();
+/// let frame = frame::read("fixtures/cygnus/cygnus.tif")?;
+/// match solve_frame(&frame, &context, &mut workspace)?.outcome {
+///     Outcome::Identified(found) => {
+///         let mut names = found.matches.iter().filter_map(|m| catalog.proper_name(m.star));
+///         assert!(names.any(|name| name == "Sadr"));
+///     }
+///     Outcome::NotIdentified(reason) => panic!("{}", reason.code()),
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn solve_frame(
     frame: &Frame,
     context: &Context,

@@ -28,6 +28,26 @@ use nalgebra::Matrix3;
 
 impl FrameReport {
     /// The report of `solution`, whose stars are those of `catalog`; `frame` is its name.
+    ///
+    /// # Example
+    /// ```
+    /// use starpipe::{Catalog, Context, FrameReport, IndexedCatalog};
+    /// use starpipe::{TextOptions, Workspace, solve_file};
+    ///
+    /// // The stars to V 7 are enough for wide fields, and are indexed in a moment.
+    /// let catalog = Catalog::built_in().limited_to(7.0);
+    /// let indexed = IndexedCatalog::build(&catalog, &|_| ());
+    /// let context = Context::new(&indexed);
+    /// let file = "fixtures/orion/orion.png";
+    /// let solution = solve_file(file, None, &context, &mut Workspace::new())?;
+    /// let report = FrameReport::new(file, &solution, &catalog);
+    /// assert!(report.is_identified());
+    /// let text = report.to_text(TextOptions::default());
+    /// assert!(text.contains("Rigel (19 bet Ori)"));
+    /// let json = report.to_json_line()?;
+    /// assert!(json.starts_with(r#"{"schema":2,"frame":"fixtures/orion/orion.png","width":640"#));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn new(frame: &str, solution: &Solution, catalog: &Catalog) -> Self {
         let mut report = Self {
             schema: SCHEMA,

@@ -155,6 +155,30 @@ impl<'a> Tracker<'a> {
     ///
     /// # Errors
     /// [`DetectError`] if stars cannot be detected in it.
+    ///
+    /// # Example
+    /// ```
+    /// use starpipe::track::{Mode, Tracker};
+    /// use starpipe::{Catalog, Context, IndexedCatalog, frame};
+    ///
+    /// // The stars to V 7 are enough for wide fields, and are indexed in a moment.
+    /// let catalog = Catalog::built_in().limited_to(7.0);
+    /// let indexed = IndexedCatalog::build(&catalog, &|_| ());
+    /// let mut tracker = Tracker::new(Context::new(&indexed));
+    /// // A camera at rest: the same frame again and again.
+    /// let frame = frame::read("fixtures/cygnus/cygnus.tif")?;
+    /// let mut modes = Vec::new();
+    /// for time_s in [0.0, 0.1, 0.2] {
+    ///     let track = tracker.process_frame(&frame, Some(time_s))?;
+    ///     modes.push(track.mode);
+    ///     if let Some(rate) = track.rate {
+    ///         // In radians per second.
+    ///         assert!(rate.rad.norm() < 1e-3);
+    ///     }
+    /// }
+    /// assert_eq!(modes, [Mode::Acquired, Mode::Acquired, Mode::Tracked]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn process_frame(
         &mut self,
         frame: &Frame,

@@ -4,7 +4,7 @@ use crate::common::{Ran, fixture, number, shared_dir, starpipe};
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// Electrons from a star of magnitude 0, as in `examples/draw_frame.rs`.
+/// Electrons from a star of magnitude 0, as in `tools/draw_frame.rs`.
 const DRAWN_ZERO_MAG_E: f64 = 250e3;
 
 fn processed(arguments: &[&str], frames: &[PathBuf]) -> Vec<Value> {

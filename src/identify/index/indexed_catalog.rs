@@ -24,6 +24,24 @@ const WHOLE_SKY_SQ_DEG: f64 = 41_252.96;
 /// The index depends on the catalog alone. For the built-in catalog, building it takes 8 s of
 /// processor time in programs that are built without optimization, and much less in others; the
 /// file in the cache has 40 MB.
+///
+/// # Example
+/// ```
+/// use starpipe::{Catalog, IndexedCatalog};
+///
+/// // Fewer stars are indexed sooner, and do for wide fields only.
+/// let catalog = Catalog::built_in().limited_to(6.0);
+/// let progress = |share: f64| assert!((0.0..=1.0).contains(&share));
+/// let indexed = IndexedCatalog::build(&catalog, &progress);
+/// assert_eq!(indexed.stars().len(), catalog.brighter_than(6.0));
+///
+/// // Kept in a directory, it is read from there the next time.
+/// let directory = tempfile::tempdir()?;
+/// IndexedCatalog::open(&catalog, Some(directory.path()), &progress);
+/// let again = IndexedCatalog::open(&catalog, Some(directory.path()), &|_| unreachable!());
+/// assert!(again.take_cache_errors().is_empty());
+/// # Ok::<(), std::io::Error>(())
+/// ```
 pub struct IndexedCatalog<'a> {
     catalog: &'a Catalog,
     /// The stars by position.

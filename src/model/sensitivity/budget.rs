@@ -39,6 +39,22 @@ impl Band {
 }
 
 /// Every quantity between a star's light and the limiting magnitude.
+///
+/// # Example
+/// ```
+/// use starpipe::camera::data_sheet::Preset;
+/// use starpipe::model::sensitivity::{Budget, Scenario};
+///
+/// let scenario = Scenario::of(Preset::NanosatTracker);
+/// let budget = Budget::checked(&scenario)?;
+/// // A star at the limit has the required signal-to-noise ratio in its brightest pixel.
+/// assert!((budget.star_e / budget.noise_e - scenario.conditions.snr).abs() < 1e-9);
+/// // What the noise is of: the sensor's part, the sky's, the star's own.
+/// let parts = [budget.sensor_noise_e, budget.sky_noise_e, budget.star_noise_e];
+/// let noise_e = parts.iter().map(|part| part * part).sum::<f64>().sqrt();
+/// assert!((noise_e - budget.noise_e).abs() < 1e-9);
+/// # Ok::<(), starpipe::model::sensitivity::ScenarioError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Budget {

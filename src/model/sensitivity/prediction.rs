@@ -9,6 +9,19 @@ use serde::{Serialize, Serializer};
 
 /// Limiting magnitude of a scenario and everything that it follows from. Other programs read the
 /// first fields.
+///
+/// # Example
+/// ```
+/// use starpipe::camera::data_sheet::Preset;
+/// use starpipe::model::sensitivity::{Prediction, Scenario};
+///
+/// let mut scenario = Scenario::of(Preset::NanosatTracker);
+/// let faint = Prediction::new(&scenario)?.detector.limit50_vmag.expect("there is a limit");
+/// scenario.conditions.exposure_s *= 4.0;
+/// let fainter = Prediction::new(&scenario)?.detector.limit50_vmag.expect("there is a limit");
+/// assert!(fainter > faint + 0.75);
+/// # Ok::<(), starpipe::model::sensitivity::ScenarioError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Prediction {

@@ -36,6 +36,29 @@ fn random(seed: u64, stream: FrameStream) -> ChaCha8Rng {
 }
 
 /// A camera, sky and scene, ready to simulate any number of frames.
+///
+/// # Example
+/// ```
+/// use starpipe::camera::data_sheet::DataSheet;
+/// use starpipe::model::sensitivity::Scenario;
+/// use starpipe::model::simulate::{Pointing, Setup, Simulator};
+/// use starpipe::{Catalog, Rotation, UnitVector};
+///
+/// let camera = DataSheet::read("fixtures/regression/narrow.toml".as_ref())?;
+/// let setup = Setup::new(Scenario::new(camera));
+/// setup.check()?;
+/// let stars = Catalog::built_in().stars();
+/// let simulator = Simulator::new(&setup.scenario, &setup.scene, stars)?;
+/// let pointing = Pointing {
+///     icrs_to_camera: Rotation::looking_at(&UnitVector::from_ra_dec(1.46, -0.02), 0.0),
+///     years_since_j2000: 26.0,
+/// };
+/// let (frame, truth) = simulator.frame(&pointing, 1)?;
+/// assert_eq!((frame.width, frame.height), (320, 240));
+/// // The belt of Orion is in the field.
+/// assert_eq!(truth.stars.iter().filter(|star| star.v_mag < 2.5).count(), 3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Simulator<'a> {
     scenario: Scenario,

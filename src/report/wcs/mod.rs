@@ -28,6 +28,24 @@ use sip::{Polynomial, Sip};
 const SOLVED_BY: &str = "Solved by starpipe";
 
 /// The header of the frame named `frame`; `None` where it is not identified.
+///
+/// # Example
+/// ```
+/// use starpipe::report::wcs;
+/// use starpipe::{Catalog, Context, IndexedCatalog, Workspace, solve_file};
+///
+/// // The stars to V 7 are enough for wide fields, and are indexed in a moment.
+/// let catalog = Catalog::built_in().limited_to(7.0);
+/// let indexed = IndexedCatalog::build(&catalog, &|_| ());
+/// let context = Context::new(&indexed);
+/// let file = "fixtures/orion/orion.png";
+/// let solution = solve_file(file, None, &context, &mut Workspace::new())?;
+/// let header = wcs::header(file, &solution).expect("the stars are identified");
+/// assert_eq!(header.len() % 2880, 0);
+/// let mut cards = header.chunks(80);
+/// assert!(cards.any(|card| card.starts_with(b"CTYPE1  = 'RA---TAN")));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn header(frame: &str, solution: &Solution) -> Option<Vec<u8>> {
     let Outcome::Identified(identification) = &solution.outcome else {
         return None;

@@ -19,6 +19,22 @@ impl Catalog {
     /// # Errors
     /// [`CatalogError`] if it cannot be read, is of another kind, or is damaged. Up to 1 % of the
     /// records may be unreadable; [`read`] reports them.
+    ///
+    /// # Example
+    /// ```
+    /// use starpipe::Catalog;
+    ///
+    /// let file = tempfile::NamedTempFile::new()?;
+    /// let table = "hip,ra,dec,vmag,pmra,pmdec\n\
+    ///              32349,101.287155,-16.716116,-1.44,-546.01,-1223.07\n\
+    ///              91262,279.234735,38.783689,0.03,200.94,286.23\n";
+    /// std::fs::write(&file, table)?;
+    /// let catalog = Catalog::read(file.path())?;
+    /// // The brightest is the first.
+    /// assert_eq!(catalog.stars()[0].id.to_string(), "HIP 32349");
+    /// assert_eq!(catalog.stars().len(), 2);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn read(path: &Path) -> Result<Self, CatalogError> {
         read(path).map(|reading| reading.catalog)
     }
