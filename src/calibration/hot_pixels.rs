@@ -21,7 +21,8 @@ pub struct HotPixelList {
 /// top-left pixel. Other columns are ignored.
 /// # Errors
 /// [`CalibrationError::List`], [`CalibrationError::Malformed`].
-pub fn read_hot_pixels(path: &Path) -> Result<HotPixelList, CalibrationError> {
+pub fn read_hot_pixels(path: impl AsRef<Path>) -> Result<HotPixelList, CalibrationError> {
+    let path = path.as_ref();
     let unreadable = |source| CalibrationError::List {
         path: path.to_owned(),
         source,

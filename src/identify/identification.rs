@@ -73,10 +73,11 @@ pub struct StarMatch {
 }
 
 /// Why the search identified no stars.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SearchFailure {
     /// Fewer stars than identification needs.
+    #[error("{found} stars are too few to identify; {needed} are needed")]
     TooFewStars {
         /// Stars found.
         found: usize,
@@ -84,11 +85,13 @@ pub enum SearchFailure {
         needed: usize,
     },
     /// No hypothesis reached the required false-alarm probability.
+    #[error("no pointing agrees with the stars well enough")]
     NoMatch {
         /// log10 of the false-alarm probability of the best hypothesis, if there was one.
         best_log10_false_alarm: Option<f64>,
     },
     /// The search was ended early ([`Workspace::with_interrupt`](super::Workspace::with_interrupt)).
+    #[error("the search was ended before it was complete")]
     Interrupted,
 }
 

@@ -43,7 +43,6 @@ pub use context::{Context, Workspace};
 pub use error::Error;
 #[doc(hidden)]
 pub use error::remedies_of;
-#[doc(hidden)]
 pub use identification::star_field;
 pub use left_out::{LeftOut, RowProblem};
 pub use note::Note;

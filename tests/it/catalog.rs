@@ -411,7 +411,7 @@ fn line_ends_the_end_of_file_mark_and_gzip_make_no_difference() {
         expected.to_compact(),
         gzip(&expected.to_compact()),
     ] {
-        let read = Catalog::read(&written(&folder, &content)).unwrap();
+        let read = Catalog::read(written(&folder, &content)).unwrap();
         let ids = |catalog: &Catalog| {
             catalog
                 .stars()
@@ -468,7 +468,7 @@ fn more_than_one_percent_unreadable_is_refused_with_the_first_lines() {
     for line in &mut lines[1..] {
         line.insert(200, b' ');
     }
-    let error = Catalog::read(&written(&folder, &lines.join(&b'\n'))).unwrap_err();
+    let error = Catalog::read(written(&folder, &lines.join(&b'\n'))).unwrap_err();
     let message = error.to_string();
     assert!(
         message.contains("99 of 100 records are unreadable"),
@@ -495,7 +495,7 @@ fn a_file_of_unknown_kind_is_refused_with_the_known_kinds() {
         &[0; 5000],
         &gzip(b"SIMPLE  =                    T"),
     ] {
-        let error = Catalog::read(&written(&folder, content)).unwrap_err();
+        let error = Catalog::read(written(&folder, content)).unwrap_err();
         assert!(matches!(error, CatalogError::UnknownKind { .. }), "{error}");
         let message = error.to_string();
         assert!(
@@ -514,7 +514,7 @@ fn a_file_of_unknown_kind_is_refused_with_the_known_kinds() {
 #[test]
 fn errors_of_the_system_name_the_file() {
     let folder = tempfile::tempdir().unwrap();
-    let error = Catalog::read(&folder.path().join("absent.gz")).unwrap_err();
+    let error = Catalog::read(folder.path().join("absent.gz")).unwrap_err();
     assert!(matches!(error, CatalogError::Open { .. }) && error.to_string().contains("absent.gz"));
     let catalog = Catalog::new("none", vec![], vec![]).unwrap();
     let error = catalog
@@ -525,17 +525,17 @@ fn errors_of_the_system_name_the_file() {
     let lines: Vec<Vec<u8>> = (1..=300).map(numbered).collect();
     let mut packed = gzip(&lines.join(&b'\n'));
     packed.truncate(packed.len() - 20);
-    let error = Catalog::read(&written(&folder, &packed)).unwrap_err();
+    let error = Catalog::read(written(&folder, &packed)).unwrap_err();
     assert!(
         matches!(error, CatalogError::Read { .. }),
         "cut short: {error}"
     );
     let mut damaged = catalog.to_compact();
     damaged.pop();
-    let error = Catalog::read(&written(&folder, &damaged)).unwrap_err();
+    let error = Catalog::read(written(&folder, &damaged)).unwrap_err();
     assert!(matches!(error, CatalogError::Compact { .. }), "{error}");
     let only_blank = record(&[(233, "      ")]);
-    let error = Catalog::read(&written(&folder, &only_blank)).unwrap_err();
+    let error = Catalog::read(written(&folder, &only_blank)).unwrap_err();
     assert!(matches!(error, CatalogError::NoStars { .. }), "{error}");
 }
 
@@ -582,7 +582,7 @@ fn tables_are_read_by_their_labels_whatever_separates_them() {
             row(values)
         );
         for text in [plain, vizier.clone(), vizier.replace('\n', "\r\n")] {
-            let read = Catalog::read(&written(&folder, text.as_bytes())).unwrap();
+            let read = Catalog::read(written(&folder, text.as_bytes())).unwrap();
             assert_eq!(read.stars(), expected.stars(), "{text}");
             assert_eq!(read.name_of(StarIndex::new(0)), Some("1 alp UMi"));
         }
@@ -592,7 +592,7 @@ fn tables_are_read_by_their_labels_whatever_separates_them() {
 #[test]
 fn a_table_that_lacks_a_column_or_has_a_bad_row_says_which() {
     let folder = tempfile::tempdir().unwrap();
-    let error = Catalog::read(&written(&folder, b"# x\nID,RAh,RAm,RAs,DE-,DEd,DEs\n")).unwrap_err();
+    let error = Catalog::read(written(&folder, b"# x\nID,RAh,RAm,RAs,DE-,DEd,DEs\n")).unwrap_err();
     let message = error.to_string();
     assert!(
         message.contains("line 2: the table has no column DEm, Vmag"),
@@ -731,11 +731,11 @@ proptest! {
     #[test]
     fn no_content_makes_the_reading_panic(content in prop::collection::vec(any::<u8>(), 0..300)) {
         let folder = tempfile::tempdir().unwrap();
-        let _ = Catalog::read(&written(&folder, &content));
-        let _ = Catalog::read(&written(&folder, &[b"SKY2000 J", &content[..]].concat()));
-        let _ = Catalog::read(&written(&folder, &[b"\x1f\x8b\x08", &content[..]].concat()));
+        let _ = Catalog::read(written(&folder, &content));
+        let _ = Catalog::read(written(&folder, &[b"SKY2000 J", &content[..]].concat()));
+        let _ = Catalog::read(written(&folder, &[b"\x1f\x8b\x08", &content[..]].concat()));
         let headings = b"ID,RAh,RAm,RAs,DE-,DEd,DEm,DEs,Vmag\n";
-        let _ = Catalog::read(&written(&folder, &[headings, &content[..]].concat()));
+        let _ = Catalog::read(written(&folder, &[headings, &content[..]].concat()));
     }
 
     #[test]
@@ -747,6 +747,6 @@ proptest! {
         for (at, byte) in edits {
             line[9..][at.index(sky2000::RECORD_BYTES - 9)] = byte;
         }
-        let _ = Catalog::read(&written(&folder, &line));
+        let _ = Catalog::read(written(&folder, &line));
     }
 }

@@ -410,7 +410,7 @@ fn the_supplement_is_brought_to_j2000_and_read_together_with_the_main_catalogue(
         ran.stdout
     );
 
-    let catalog = Catalog::read(&folder.path().join("out.cat")).unwrap();
+    let catalog = Catalog::read(folder.path().join("out.cat")).unwrap();
     // Sirius, which moves by 1.3″ a year, and SKY2000's position of 2000.
     let sirius = star(&catalog, "TYC 5949-2777-1");
     let sky2000 = star(Catalog::built_in(), "SKYMAP 06450045");
@@ -439,7 +439,7 @@ fn the_supplement_is_brought_to_j2000_and_read_together_with_the_main_catalogue(
         alone.stderr
     );
     let found = star(
-        &Catalog::read(&folder.path().join("out.cat")).unwrap(),
+        &Catalog::read(folder.path().join("out.cat")).unwrap(),
         "TYC 15-1286-1",
     )
     .v_mag;

@@ -137,7 +137,8 @@ impl DataSheet {
     ///
     /// # Errors
     /// [`DataSheetError`] with the file, the line and the key.
-    pub fn read(path: &Path) -> Result<Self, DataSheetError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, DataSheetError> {
+        let path = path.as_ref();
         let failed = |source| DataSheetError::Read {
             path: path.to_owned(),
             source,
@@ -337,7 +338,7 @@ impl CameraFile<'_> {
             return Err(self.invalid(KEY, value, "the name of a CSV file".to_owned()));
         };
         let directory = self.path.parent().unwrap_or(Path::new(""));
-        let image = SpotImage::read(&directory.join(file));
+        let image = SpotImage::read(directory.join(file));
         let image = image.map_err(|source| DataSheetError::Spot {
             path: self.path.to_owned(),
             line: line_of(self.text, Some(value.span())),
@@ -391,7 +392,7 @@ impl CameraFile<'_> {
         match value.get_ref() {
             toml::Value::String(file) => {
                 let directory = self.path.parent().unwrap_or(Path::new(""));
-                Response::read(&directory.join(file)).map_err(table)
+                Response::read(directory.join(file)).map_err(table)
             }
             toml::Value::Array(points) => {
                 let text = csv_of(points).ok_or_else(|| {

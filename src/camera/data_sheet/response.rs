@@ -122,7 +122,8 @@ impl Response {
     ///
     /// # Errors
     /// [`ResponseError`] with the file and the line.
-    pub fn read(path: &Path) -> Result<Self, ResponseError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, ResponseError> {
+        let path = path.as_ref();
         let read = |source| ResponseError::Read {
             path: path.to_owned(),
             source,

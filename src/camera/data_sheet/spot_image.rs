@@ -60,7 +60,8 @@ impl SpotImage {
     ///
     /// # Errors
     /// [`SpotImageError`] with the file and the line.
-    pub fn read(path: &Path) -> Result<Self, SpotImageError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, SpotImageError> {
+        let path = path.as_ref();
         let text = files::read_text(path, MAX_BYTES).map_err(|source| SpotImageError::Read {
             path: path.to_owned(),
             source,

@@ -134,6 +134,7 @@ impl<'a> Simulator<'a> {
     }
 
     /// Electrons of its stars.
+    #[doc(hidden)]
     pub fn light(&self) -> &StarLight {
         &self.light
     }

@@ -35,7 +35,8 @@ impl Catalog {
     /// assert_eq!(catalog.stars().len(), 2);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn read(path: &Path) -> Result<Self, CatalogError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, CatalogError> {
+        let path = path.as_ref();
         read(path).map(|reading| reading.catalog)
     }
 }
