@@ -160,7 +160,7 @@ impl<'a> Context<'a> {
     /// // The stars to V 7 are enough for wide fields, and are indexed in a moment.
     /// let catalog = Catalog::built_in().limited_to(7.0);
     /// let indexed = IndexedCatalog::build(&catalog, &|_| ());
-    /// let camera = DataSheet::read("fixtures/cygnus/camera.toml".as_ref())?;
+    /// let camera = DataSheet::read("fixtures/cygnus/camera.toml")?;
     /// let mut options = SolveOptions::default();
     /// options.exposure_s = Some(1.0);
     /// options.extinction_mag_per_airmass = Some(0.0);

@@ -44,7 +44,7 @@ fn random(seed: u64, stream: FrameStream) -> ChaCha8Rng {
 /// use starpipe::model::simulate::{Pointing, Setup, Simulator};
 /// use starpipe::{Catalog, Rotation, UnitVector};
 ///
-/// let camera = DataSheet::read("fixtures/regression/narrow.toml".as_ref())?;
+/// let camera = DataSheet::read("fixtures/regression/narrow.toml")?;
 /// let setup = Setup::new(Scenario::new(camera));
 /// setup.check()?;
 /// let stars = Catalog::built_in().stars();
