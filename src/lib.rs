@@ -75,6 +75,7 @@ pub mod track;
 pub use base::coords::{PixelPoint, UnitVector};
 pub use base::epoch::ObservationDate;
 pub use base::interrupt::{Interrupt, Interrupted};
+pub use base::size::Size;
 pub use calibration::Calibration;
 pub use camera::CameraModel;
 pub use detect::{DetectConfig, Detection, Detections, detect};
