@@ -87,6 +87,7 @@ pub use base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 pub use base::epoch::{DateError, ObservationDate};
 pub use base::interrupt::{Interrupt, Interrupted};
 pub use base::remedy::{OptionNames, Remedy};
+pub use base::size::Size;
 pub use calibration::Calibration;
 pub use camera::CameraModel;
 pub use detect::{DetectConfig, Detection, Detections, detect};

@@ -1,5 +1,6 @@
 //! Images as frames: an array of numpy is borrowed, a file or its bytes are decoded.
 
+use starpipe::base::size::Size;
 use crate::errors::exception;
 use crate::pages::Page;
 use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -67,7 +68,8 @@ impl Colors<'_> {
             Self::Integers(array, _) => array.shape(),
             Self::F32(array) => array.shape(),
         };
-        let (size, channels) = ((shape[1], shape[0]), shape[2]);
+        let size = Size::new(shape[1], shape[0]);
+        let channels = shape[2];
         let contiguous = |_| PyTypeError::new_err("the array must be C-contiguous");
         Ok(match self {
             Self::Integers(array, full_scale) => {

@@ -11,6 +11,7 @@ pub mod interrupt;
 pub(crate) mod neighbors;
 pub mod panics;
 pub mod remedy;
+pub mod size;
 pub mod statistics;
 pub mod table;
 pub mod units;

@@ -260,7 +260,7 @@ fn check_size(
     of: &str,
 ) -> Result<(), CalibrationError> {
     let Frame { width, height, .. } = master.frame;
-    if (width, height) == (frame.width, frame.height) {
+    if master.frame.size() == frame.size() {
         return Ok(());
     }
     Err(CalibrationError::SizesDiffer {

@@ -1,4 +1,5 @@
 use super::*;
+use crate::base::size::Size;
 use crate::frame::{self, Frame};
 
 fn frame(pixels: &[f32]) -> Frame<'static> {
@@ -144,7 +145,7 @@ fn a_turned_frame_is_calibrated_in_the_rows_of_its_file() {
         calibration.apply(&mut sky).unwrap();
         let level: Vec<f32> = (0..12).map(|i| 10.0 + i as f32).collect();
         let expected = turned(&level);
-        assert_eq!(sky.stored_size(), [3, STORED_ROWS]);
+        assert_eq!(sky.stored_size(), Size::new(3, STORED_ROWS));
         // The flat is normalized to a mean of 1.
         let mean = response.iter().sum::<f32>() / 12.0;
         for (found, expected) in sky.values().iter().zip(&*expected.values()) {

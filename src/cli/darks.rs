@@ -12,6 +12,7 @@ use super::output::messages::report_warning;
 use super::output::overwrite;
 use super::output::rows::{csv_table, finished, json_line};
 use clap::Args;
+use starpipe::base::size::Size;
 use starpipe::calibration::darks::{
     DarkConfig, DarkStack, Darks, ExposureGroup, FrameStatistics, FullScaleSource, HOT_SIGMA,
     HotPixelRow,
@@ -173,7 +174,7 @@ fn files(darks: &Darks) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
         let mut header = header("NOISE", darks.frames.len());
         header.text("BUNIT", "ADU", "");
         header.history("Standard deviation of each pixel over frames of one exposure, pooled over the exposures");
-        let image = fits_image((darks.width, darks.height), noise, &header)?;
+        let image = fits_image(Size::new(darks.width, darks.height), noise, &header)?;
         files.push(("noise.fits".to_owned(), image));
     }
     files.push(("hot-pixels.csv".to_owned(), hot_pixels_table(darks)?));
@@ -194,7 +195,7 @@ fn master_dark(darks: &Darks, group: &ExposureGroup) -> anyhow::Result<Vec<u8>> 
         group.frames,
         env!("CARGO_PKG_VERSION")
     ));
-    fits_image((darks.width, darks.height), &group.means, &header)
+    fits_image(Size::new(darks.width, darks.height), &group.means, &header)
 }
 
 /// The hot pixels as CSV, with a heading even if there are none.

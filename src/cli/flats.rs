@@ -11,6 +11,7 @@ use super::output::messages::report_warning;
 use super::output::overwrite;
 use super::output::rows::{csv_table, json_line};
 use clap::Args;
+use starpipe::base::size::Size;
 use starpipe::calibration::flats::{FlatConfig, FlatStack, Flats};
 use starpipe::camera::data_sheet::DataSheet;
 use starpipe::frame::Frame;
@@ -106,5 +107,5 @@ fn master(flats: &Flats, dark: Option<&Path>) -> anyhow::Result<Vec<u8>> {
         env!("CARGO_PKG_VERSION"),
         dark.map_or("none".to_owned(), |dark| dark.display().to_string())
     ));
-    fits_image((flats.width, flats.height), &flats.master, &header)
+    fits_image(Size::new(flats.width, flats.height), &flats.master, &header)
 }

@@ -3,6 +3,7 @@
 use super::error::FrameError;
 use super::memory::MemoryLimit;
 use crate::base::interrupt::{Interrupt, Interrupted};
+use crate::base::size::Size;
 use std::cell::Cell;
 use std::io::{self, BufRead, Read, Seek, SeekFrom};
 
@@ -102,11 +103,8 @@ impl Account {
     /// pixels at once, the finished frame among them.
     /// # Errors
     /// [`FrameError::TooMuchMemory`].
-    pub fn check_image(
-        &self,
-        (width, height): (usize, usize),
-        bytes_per_pixel: usize,
-    ) -> Result<(), FrameError> {
+    pub fn check_image(&self, size: Size, bytes_per_pixel: usize) -> Result<(), FrameError> {
+        let Size { width, height } = size;
         let pixels = (width as u64).saturating_mul(height as u64);
         let needed_bytes = pixels.saturating_mul(bytes_per_pixel as u64);
         if needed_bytes <= self.left_bytes() {
@@ -208,8 +206,8 @@ mod tests {
     fn what_is_held_counts() {
         let account = Account::new(MemoryLimit::of_bytes(1000), Interrupt::default());
         account.hold(600).unwrap();
-        assert!(account.check_image((10, 10), 4).is_ok());
-        assert!(account.check_image((10, 10), 5).is_err());
+        assert!(account.check_image(Size::new(10, 10), 4).is_ok());
+        assert!(account.check_image(Size::new(10, 10), 5).is_err());
         let error = account.hold(401).unwrap_err();
         assert!(matches!(
             error,

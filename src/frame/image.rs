@@ -5,6 +5,7 @@ use super::limits::{MAX_PIXELS, MIN_SIDE_PX};
 use super::metadata::FrameMetadata;
 use super::pixels::Pixels;
 use super::row_order::RowOrder;
+use crate::base::size::Size;
 use std::borrow::Cow;
 
 /// One image of light intensities.
@@ -77,6 +78,11 @@ impl<'p> Frame<'p> {
             saturation_adu: None,
             metadata: FrameMetadata::default(),
         }
+    }
+
+    /// Its columns and rows.
+    pub fn size(&self) -> Size {
+        Size::new(self.width, self.height)
     }
 
     /// The value of the pixel in column `x`, row `y`, in ADU.

@@ -9,6 +9,7 @@ use super::jpeg_rows::check_rows;
 use super::jpeg_scans::{Scans, has_end};
 use super::levels::{Samples, frame_from_integers};
 use super::raster::{damaged, unsupported};
+use crate::base::size::Size;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::errors::DecodeErrors;
 use zune_jpeg::zune_core::bytestream::ZCursor;
@@ -40,8 +41,8 @@ pub(super) fn decode(bytes: &[u8], account: &Account) -> Result<Frame<'static>, 
         1 => bytes_per_pixel,
         _ => bytes_per_pixel.max(FLOATS_BYTES_PER_PIXEL),
     };
-    let padded = [width, height].map(|side| side.next_multiple_of(BLOCK_PX));
-    account.check_image(padded.into(), bytes_per_pixel)?;
+    let padded = |side: usize| side.next_multiple_of(BLOCK_PX);
+    account.check_image(Size::new(padded(width), padded(height)), bytes_per_pixel)?;
     let values = jpeg.samples(account)?;
     let samples = Samples {
         width,
@@ -100,7 +101,7 @@ impl<'a> Jpeg<'a> {
 
     /// The samples, interleaved. Every row of them is in the file.
     pub fn samples(&self, account: &Account) -> Result<Vec<u8>, FrameError> {
-        self.scans.check((self.width, self.height))?;
+        self.scans.check(Size::new(self.width, self.height))?;
         check_rows(self.bytes, account)?;
         let color = match self.channels {
             1 => ColorSpace::Luma,

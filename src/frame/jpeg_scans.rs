@@ -2,6 +2,7 @@
 
 use super::error::FrameError;
 use super::format::FrameFormat;
+use crate::base::size::Size;
 use memchr::{memchr, memmem};
 
 /// Pixels of all scans together. Cameras write ten scans or fewer.
@@ -51,7 +52,8 @@ impl Scans {
 
     /// Refuses more scans of an image of this size than any camera writes: each is a pass over all
     /// pixels, however few bytes it has.
-    pub fn check(&self, (width, height): (usize, usize)) -> Result<(), FrameError> {
+    pub fn check(&self, size: Size) -> Result<(), FrameError> {
+        let Size { width, height } = size;
         let pixels = width.saturating_mul(height).saturating_mul(self.count);
         if pixels <= MAX_PIXELS_IN_SCANS {
             return Ok(());
@@ -125,7 +127,7 @@ mod tests {
             is_progressive: true,
         };
         assert_eq!(
-            sizes.map(|size| one.check(size).is_ok()),
+            sizes.map(|(width, height)| one.check(Size::new(width, height)).is_ok()),
             [true, true, false]
         );
     }

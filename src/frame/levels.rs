@@ -3,6 +3,7 @@
 use super::error::FrameError;
 use super::image::{Frame, check_length, check_size};
 use super::pixels::Pixels;
+use crate::base::size::Size;
 use multiversion::multiversion;
 use std::ops::BitOr;
 
@@ -76,14 +77,14 @@ impl<'p> Frame<'p> {
     /// # Errors
     /// As [`Frame::from_integers`].
     pub fn from_colors<T: WholeNumber>(
-        (width, height): (usize, usize),
+        size: Size,
         channels: usize,
         values: &[T],
         full_scale: T,
     ) -> Result<Self, FrameError> {
         let samples = Samples {
-            width,
-            height,
+            width: size.width,
+            height: size.height,
             values,
             channels,
         };
@@ -95,7 +96,7 @@ impl<'p> Frame<'p> {
     /// # Errors
     /// As [`Frame::new`].
     pub fn from_float_colors(
-        size: (usize, usize),
+        size: Size,
         channels: usize,
         values: Vec<f32>,
     ) -> Result<Self, FrameError> {
@@ -152,13 +153,13 @@ fn grey<T: Into<i64>>(levels: impl Iterator<Item = T>, full_scale: T) -> Pixels<
 
 /// Makes a frame from `height * width` words of 16 bits; its pixels are stored in `buffer`.
 pub(super) fn frame_from_words(
-    (width, height): (usize, usize),
+    size: Size,
     words: &[[u8; 2]],
     is_big_endian: bool,
     mut buffer: Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
-    check_size(width, height)?;
-    let expected = width * height;
+    check_size(size.width, size.height)?;
+    let expected = size.pixels();
     let words = words.get(..expected).ok_or(FrameError::WrongLength {
         expected,
         found: words.len(),
@@ -167,7 +168,7 @@ pub(super) fn frame_from_words(
     buffer.resize(expected, 0);
     let bits = numbers_of(words, is_big_endian, &mut buffer);
     let step = step_of(bits.into(), u16::MAX.into());
-    let frame = Frame::from_checked(width, height, buffer);
+    let frame = Frame::from_checked(size.width, size.height, buffer);
     Ok(frame.with_step(step, u16::MAX.into()))
 }
 
@@ -191,7 +192,7 @@ fn numbers_of(words: &[[u8; 2]], is_big_endian: bool, pixels: &mut [u16]) -> u16
 /// Makes a frame from `height * width * channels` float samples, which have no step and no full
 /// scale.
 pub(super) fn frame_from_floats(
-    (width, height): (usize, usize),
+    size: Size,
     channels: usize,
     values: Vec<f32>,
 ) -> Result<Frame<'static>, FrameError> {
@@ -203,7 +204,7 @@ pub(super) fn frame_from_floats(
             .map(|c| luminance([c[0], c[1], c[2]], f32::INFINITY))
             .collect(),
     };
-    Frame::new(width, height, pixels)
+    Frame::new(size.width, size.height, pixels)
 }
 
 /// The luminance of one pixel; `full` if a channel is saturated.

@@ -6,6 +6,7 @@ use super::exif;
 use super::format::FrameFormat;
 use super::image::{Frame, check_size};
 use super::levels::{Samples, WholeNumber, frame_from_integers};
+use crate::base::size::Size;
 use image::codecs::bmp::BmpDecoder;
 use image::codecs::png::PngDecoder;
 use image::codecs::pnm::PnmDecoder;
@@ -182,7 +183,10 @@ impl Decoded {
         let (width, height) = decoder.dimensions();
         let (width, height) = (width as usize, height as usize);
         check_size(width, height)?;
-        account.check_image((width, height), bytes_per_pixel(decoder.color_type()))?;
+        account.check_image(
+            Size::new(width, height),
+            bytes_per_pixel(decoder.color_type()),
+        )?;
         let color = decoder.color_type();
         let depth = match color {
             ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => Depth::Eight,

@@ -68,7 +68,7 @@ impl Buffers {
     pub(crate) fn check_floats(&self, frame: &Frame) -> Result<(), FrameError> {
         let account = Account::new(self.memory_of_frame(), self.interrupt.clone());
         account.hold(frame.pixels.bytes())?;
-        account.check_image((frame.width, frame.height), size_of::<f32>())
+        account.check_image(frame.size(), size_of::<f32>())
     }
 
     /// An account for one frame, whose file is in `bytes`.

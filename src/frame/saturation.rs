@@ -345,23 +345,24 @@ fn find_pixels_from(frame: &Frame<'_>, level: f32, found: &mut Vec<BrightPixel>)
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn find_in_bytes(values: &[u8], width: usize, level: f32, found: &mut Vec<BrightPixel>) {
-    find_from((values, u8::MIN), width, level, found);
+    find_from(values, u8::MIN, width, level, found);
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn find_in_words(values: &[u16], width: usize, level: f32, found: &mut Vec<BrightPixel>) {
-    find_from((values, u16::MIN), width, level, found);
+    find_from(values, u16::MIN, width, level, found);
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn find_in_floats(values: &[f32], width: usize, level: f32, found: &mut Vec<BrightPixel>) {
-    find_from((values, f32::NEG_INFINITY), width, level, found);
+    find_from(values, f32::NEG_INFINITY, width, level, found);
 }
 
 /// Finds the values from a level on in rows of `width`.
 #[inline(always)]
 fn find_from<T: Copy + PartialOrd + Into<f32>>(
-    (values, lowest): (&[T], T),
+    values: &[T],
+    lowest: T,
     width: usize,
     level: f32,
     found: &mut Vec<BrightPixel>,
@@ -411,8 +412,9 @@ fn has_light_beside(frame: &Frame<'_>, pixel: &BrightPixel, background: f32) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::size::Size;
 
-    const SIZE: (usize, usize) = (320, 240);
+    const SIZE: Size = Size::new(320, 240);
 
     /// Numbers from 0 to 1 that look random.
     fn random(i: u64) -> f32 {
@@ -429,7 +431,7 @@ mod tests {
 
     /// Light of `stars` with these peaks over a sky of 100, with shot noise of 0.1 for each level.
     fn sky(peaks: &[f32], seed: u64) -> Vec<f32> {
-        let (width, height) = SIZE;
+        let Size { width, height } = SIZE;
         let places: Vec<_> = (0..peaks.len() as u64)
             .map(|k| {
                 let at =
@@ -463,7 +465,7 @@ mod tests {
 
     fn words(levels: &[f32], most: f32) -> Frame<'static> {
         let words: Vec<u16> = levels.iter().map(|l| l.round().min(most) as u16).collect();
-        Frame::from_samples(SIZE.0, SIZE.1, words).unwrap()
+        Frame::from_samples(SIZE.width, SIZE.height, words).unwrap()
     }
 
     #[test]
@@ -473,11 +475,11 @@ mod tests {
             let frame = words(&levels, full);
             assert_eq!(frame.saturation_level_adu(), Some(full), "{full}");
             let scaled: Vec<f32> = frame.values().iter().map(|l| (l - 60.0) / full).collect();
-            let floats = Frame::new(SIZE.0, SIZE.1, scaled).unwrap();
+            let floats = Frame::new(SIZE.width, SIZE.height, scaled).unwrap();
             let found = floats.saturation_level_adu();
             assert_eq!(found, Some((full - 60.0) / full), "floats of {full}");
             let wide: Vec<i32> = frame.values().iter().map(|l| *l as i32 * 5).collect();
-            let wide = Frame::from_integers(SIZE.0, SIZE.1, &wide, i32::MAX).unwrap();
+            let wide = Frame::from_integers(SIZE.width, SIZE.height, &wide, i32::MAX).unwrap();
             assert_eq!(wide.saturation_level_adu(), Some(5.0 * full));
         }
     }
@@ -496,7 +498,7 @@ mod tests {
     fn a_single_column_of_charge_is_enough() {
         let mut levels = sky(&peaks(900.0), 6);
         for y in 40..70 {
-            levels[y * SIZE.0 + 100] = 5000.0;
+            levels[y * SIZE.width + 100] = 5000.0;
         }
         assert_eq!(words(&levels, 4095.0).saturation_level_adu(), Some(4095.0));
     }
@@ -515,8 +517,8 @@ mod tests {
     #[test]
     fn few_grey_levels_hot_pixels_and_noise_are_no_plateau() {
         let bytes = |level: &dyn Fn(usize) -> f32| {
-            let bytes: Vec<u8> = (0..SIZE.0 * SIZE.1).map(|i| level(i) as u8).collect();
-            Frame::from_samples(SIZE.0, SIZE.1, bytes).unwrap()
+            let bytes: Vec<u8> = (0..SIZE.pixels()).map(|i| level(i) as u8).collect();
+            Frame::from_samples(SIZE.width, SIZE.height, bytes).unwrap()
         };
         let levels = sky(&peaks(300.0), 61);
         let few = bytes(&|i| (levels[i] - 90.0).clamp(0.0, 300.0) / 10.0);
@@ -525,7 +527,7 @@ mod tests {
         assert_eq!(grain.saturation_level_adu(), Some(255.0));
         let mut levels = sky(&peaks(900.0), 62);
         for k in 0..200 {
-            levels[(k * 379 + 41) % (SIZE.0 * SIZE.1)] = 4095.0;
+            levels[(k * 379 + 41) % (SIZE.pixels())] = 4095.0;
         }
         let hot = words(&levels, 4095.0).saturation_level_adu();
         assert_eq!(hot, Some(65_535.0));

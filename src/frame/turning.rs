@@ -3,14 +3,15 @@
 use super::image::Frame;
 use super::orientation::Orientation;
 use super::pixels::Pixels;
+use crate::base::size::Size;
 
 impl Frame<'_> {
     /// Width and height of the file's rows.
-    pub fn stored_size(&self) -> [usize; 2] {
+    pub fn stored_size(&self) -> Size {
         if self.metadata.orientation.is_transposed {
-            [self.height, self.width]
+            Size::new(self.height, self.width)
         } else {
-            [self.width, self.height]
+            self.size()
         }
     }
 
@@ -110,7 +111,7 @@ mod tests {
             let orientation = Orientation::of_tag(tag).unwrap();
             let before = stored(width, height, orientation);
             let mut drawn = before.clone().drawn();
-            prop_assert_eq!(drawn.stored_size(), [width, height]);
+            prop_assert_eq!(drawn.stored_size(), Size::new(width, height));
             let seen = drawn.with_stored(|frame| frame.clone());
             prop_assert_eq!(&seen, &before);
             prop_assert_eq!(&drawn, &before.clone().drawn());

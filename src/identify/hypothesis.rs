@@ -64,7 +64,7 @@ impl Hypothesis {
         around: &mut Surroundings,
         predicted: &mut Vec<PredictedStar>,
     ) {
-        self.predict_to(problem, observed, f64::NEG_INFINITY, (around, predicted));
+        self.predict_to(problem, observed, f64::NEG_INFINITY, around, predicted);
     }
 
     /// Fills `predicted` with all catalogue stars that may be observed stars, once the zero point
@@ -80,7 +80,7 @@ impl Hypothesis {
         let limit = observed.get(faint).map_or(f64::NEG_INFINITY, |star| {
             star.mag + self.zero_point_mag + FAINT_ROOM_MAG
         });
-        self.predict_to(problem, observed, limit, (around, predicted));
+        self.predict_to(problem, observed, limit, around, predicted);
     }
 
     /// As [`Self::predict`], and at least down to `limit_v_mag`.
@@ -89,7 +89,8 @@ impl Hypothesis {
         problem: Problem,
         observed: &[ObservedStar],
         limit_v_mag: f64,
-        (around, predicted): (&mut Surroundings, &mut Vec<PredictedStar>),
+        around: &mut Surroundings,
+        predicted: &mut Vec<PredictedStar>,
     ) {
         let Problem {
             field,
@@ -111,7 +112,7 @@ impl Hypothesis {
                     count,
                     v_mag: limit_v_mag,
                 };
-                around.stars_at_least(&view, sky, (least, likely), predicted);
+                around.stars_at_least(&view, sky, least, likely, predicted);
             }
         }
     }

@@ -64,12 +64,13 @@ impl Pairing {
     /// is in the order of the observed stars.
     pub fn pair_up(
         &mut self,
-        (observed, predicted): (&[ObservedStar], &[PredictedStar]),
+        observed: &[ObservedStar],
+        predicted: &[PredictedStar],
         radius_px: f64,
         mag_difference: impl Fn(&ObservedStar, &PredictedStar) -> Option<f64>,
         pairs: &mut Vec<Pair>,
     ) {
-        self.candidates((observed, predicted), |_, _| radius_px, mag_difference);
+        self.candidates(observed, predicted, |_, _| radius_px, mag_difference);
         self.settle();
         pairs.clear();
         let claims = observed.iter().zip(&self.of_observed).enumerate();
@@ -91,7 +92,8 @@ impl Pairing {
     /// strip by strip, and within a strip the faintest first.
     pub fn candidates(
         &mut self,
-        (observed, predicted): (&[ObservedStar], &[PredictedStar]),
+        observed: &[ObservedStar],
+        predicted: &[PredictedStar],
         radius_px: impl Fn(usize, &ObservedStar) -> f64,
         mag_difference: impl Fn(&ObservedStar, &PredictedStar) -> Option<f64>,
     ) -> &[NearPair] {
@@ -195,8 +197,7 @@ mod tests {
         let observed = [(10.0, 10.0), (13.0, 10.0), (50.0, 50.0)].map(observed_at);
         let predicted = [(12.5, 10.0), (10.0, 11.0), (90.0, 50.0)].map(predicted_at);
         let mut pairs = Vec::new();
-        let stars = (&observed[..], &predicted[..]);
-        Pairing::default().pair_up(stars, 4.0, |_, _| Some(0.0), &mut pairs);
+        Pairing::default().pair_up(&observed, &predicted, 4.0, |_, _| Some(0.0), &mut pairs);
         let found: Vec<(usize, usize)> = pairs.iter().map(|p| (p.observed, p.star.get())).collect();
         assert_eq!(found, [(0, 10), (1, 12)]);
     }
@@ -211,8 +212,7 @@ mod tests {
             let observed: Vec<_> = observed.into_iter().map(observed_at).collect();
             let predicted: Vec<_> = predicted.into_iter().map(predicted_at).collect();
             let mut pairing = Pairing::default();
-            let stars = (&observed[..], &predicted[..]);
-            pairing.candidates(stars, |_, _| radius_px, |_, _| Some(0.0));
+            pairing.candidates(&observed, &predicted, |_, _| radius_px, |_, _| Some(0.0));
             let mut found: Vec<_> =
                 pairing.candidates.iter().map(|c| (c.observed, c.predicted)).collect();
             found.sort_unstable();

@@ -104,7 +104,7 @@ impl Surroundings {
             count: usize::MAX,
             v_mag: faintest_v_mag,
         };
-        project(view, (sky, &self.stars[..bright_enough]), &all, predicted);
+        project(view, sky, &self.stars[..bright_enough], &all, predicted);
     }
 
     /// Fills `predicted` with the brightest stars of [`View::stars_to`] to the depth `least`, or
@@ -113,13 +113,14 @@ impl Surroundings {
         &mut self,
         view: &View,
         sky: &IndexedCatalog,
-        (least, likely_v_mag): (Depth, f64),
+        least: Depth,
+        likely_v_mag: f64,
         predicted: &mut Vec<PredictedStar>,
     ) {
         let mut limit = likely_v_mag.max(least.v_mag);
         loop {
             let gathered_to = self.gather(view, sky, limit);
-            project(view, (sky, &self.stars), &least, predicted);
+            project(view, sky, &self.stars, &least, predicted);
             if predicted.len() >= least.count || gathered_to > sky.faintest_v_mag() {
                 return;
             }
@@ -178,7 +179,8 @@ impl Surroundings {
 /// until both the number and the magnitude of `least` are reached.
 fn project(
     view: &View,
-    (sky, stars): (&IndexedCatalog, &[GridStar]),
+    sky: &IndexedCatalog,
+    stars: &[GridStar],
     least: &Depth,
     predicted: &mut Vec<PredictedStar>,
 ) {

@@ -153,7 +153,7 @@ impl ScalePrior {
     }
 
     /// Smallest and largest pixel scale at the centre of a frame of this width, in radians.
-    pub fn pixel_scale_range_rad(&self, width_px: f64) -> (f64, f64) {
+    pub fn pixel_scale_range_rad(&self, width_px: f64) -> [f64; 2] {
         let pixel_rad = |factor: f64| match self.scale {
             Scale::FieldOfView(fov_rad) => {
                 let fov_rad = (fov_rad * factor).min(MAX_FOV_RAD);
@@ -161,10 +161,10 @@ impl ScalePrior {
             }
             Scale::Pixel(pixel_rad) => pixel_rad * factor,
         };
-        (
+        [
             pixel_rad(1.0 - self.tolerance),
             pixel_rad(1.0 + self.tolerance),
-        )
+        ]
     }
 }
 
@@ -186,7 +186,7 @@ impl Priors {
 
     /// Smallest and largest pixel scale at the centre of a frame of this width, in radians, if
     /// known.
-    pub fn pixel_scale_range_rad(&self, width_px: f64) -> Option<(f64, f64)> {
+    pub fn pixel_scale_range_rad(&self, width_px: f64) -> Option<[f64; 2]> {
         Some(self.scale?.pixel_scale_range_rad(width_px))
     }
 
@@ -213,7 +213,7 @@ mod tests {
     fn a_field_of_view_and_its_pixel_scale_are_the_same_prior() {
         let width_px = 1000.0;
         let prior = ScalePrior::by_user(Scale::FieldOfView(10.0 * RAD_PER_DEG), 0.1);
-        let (low, high) = prior.pixel_scale_range_rad(width_px);
+        let [low, high] = prior.pixel_scale_range_rad(width_px);
         let expected = |fov_deg: f64| 2.0 * (fov_deg / 2.0 * RAD_PER_DEG).tan() / width_px;
         assert!((low - expected(9.0)).abs() < 1e-12);
         assert!((high - expected(11.0)).abs() < 1e-12);
@@ -222,21 +222,21 @@ mod tests {
     #[test]
     fn a_pixel_scale_widens_by_its_tolerance() {
         let prior = ScalePrior::by_user(Scale::Pixel(10.0 * RAD_PER_ARCSEC), 0.2);
-        let (low, high) = prior.pixel_scale_range_rad(123.0);
+        let [low, high] = prior.pixel_scale_range_rad(123.0);
         assert!((low / RAD_PER_ARCSEC - 8.0).abs() < 1e-9);
         assert!((high / RAD_PER_ARCSEC - 12.0).abs() < 1e-9);
     }
 
     #[test]
     fn a_range_of_scales_is_kept() {
-        let (low, high) = ScalePrior::between(1e-5, 4e-5).pixel_scale_range_rad(9.0);
+        let [low, high] = ScalePrior::between(1e-5, 4e-5).pixel_scale_range_rad(9.0);
         assert!((low - 1e-5).abs() < 1e-18 && (high - 4e-5).abs() < 1e-18);
     }
 
     #[test]
     fn the_widest_field_of_view_has_a_finite_scale() {
         let prior = ScalePrior::by_user(Scale::FieldOfView(170.0 * RAD_PER_DEG), 0.5);
-        let (low, high) = prior.pixel_scale_range_rad(500.0);
+        let [low, high] = prior.pixel_scale_range_rad(500.0);
         assert!(low > 0.0 && high > low && high.is_finite());
     }
 }

@@ -246,10 +246,10 @@ impl<'w> Pointing<'w, '_> {
             ..
         } = self;
         let start = search.with_more_stars(&found);
-        let named = with_names(problem, &mut search, (&start, most_chance));
+        let named = with_names(problem, &mut search, &start, most_chance);
         let (refined, log10) = named.ok_or(failure)?;
         let pairs = &search.refiner().pairs;
-        Ok(answered(answer, (&refined, log10), problem.field, pairs))
+        Ok(answered(answer, &refined, log10, problem.field, pairs))
     }
 
     /// Attitude and optics from the brightest stars alone: those that the pointing was found with.
@@ -283,8 +283,9 @@ impl<'w> Pointing<'w, '_> {
         let refined = refiner.with_names(problem, &found.refined, &of_few);
         let refined = refined.filter(|_| refiner.pairs.len() >= MIN_STARS);
         let refined = refined.ok_or(failure)?;
-        let fitted = (&refined, found.log10_false_alarm);
-        Ok(answered(answer, fitted, problem.field, &refiner.pairs))
+        let log10 = found.log10_false_alarm;
+        let pairs = &refiner.pairs;
+        Ok(answered(answer, &refined, log10, problem.field, pairs))
     }
 }
 
@@ -304,7 +305,8 @@ impl Brightest {
 /// Puts the fit into `answer`, whose buffer is reused.
 fn answered<'a>(
     answer: &'a mut Option<Identification>,
-    (refined, log10): (&Refined, f64),
+    refined: &Refined,
+    log10: f64,
     field: &StarField,
     pairs: &[Pair],
 ) -> &'a Identification {
@@ -322,7 +324,8 @@ fn answered<'a>(
 fn with_names(
     problem: Problem,
     search: &mut Search,
-    (found, most_chance): (&Refined, f64),
+    found: &Refined,
+    most_chance: f64,
 ) -> Option<(Refined, f64)> {
     let mut best: Option<Named> = None;
     for start in CALIBRATION_STARS.map(Some).into_iter().chain([None]) {

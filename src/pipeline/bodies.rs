@@ -31,8 +31,7 @@ pub(super) fn find_bodies(
     };
     let (centre, _) = found.icrs_to_camera.boresight_and_up();
     let radius_rad = found.camera.radius_rad() + MOON_RADIUS_RAD;
-    let when = (&known.date, time_error, priors.site);
-    let expected = bodies_within(when, &centre, radius_rad)
+    let expected = bodies_within(&known.date, time_error, priors.site, &centre, radius_rad)
         .into_iter()
         .filter_map(|body| BodyInFrame::expected(body, found));
     let expected: Vec<BodyInFrame> = expected.collect();

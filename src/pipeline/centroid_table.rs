@@ -7,6 +7,7 @@ use crate::base::coords::PixelPoint;
 use crate::base::files;
 use crate::base::format::table_name;
 use crate::base::remedy::Remedy;
+use crate::base::size::Size;
 use crate::identify::Photometry;
 use std::fmt;
 
@@ -125,7 +126,7 @@ impl CentroidList {
                 None => CentroidListError::of_list("found a heading without centroids below it"),
             });
         }
-        let (width, height) = frame_size(&centroids, options);
+        let Size { width, height } = frame_size(&centroids, options);
         Ok(Self {
             width,
             height,
@@ -238,15 +239,15 @@ fn check_inside(position: &PixelPoint, size: &CentroidListOptions) -> Result<(),
     Ok(())
 }
 
-/// Width and height of the frame: as given, else as far as the centroids reach.
-fn frame_size(centroids: &[ListedCentroid], size: &CentroidListOptions) -> (usize, usize) {
+/// The size of the frame: as given, else as far as the centroids reach.
+fn frame_size(centroids: &[ListedCentroid], size: &CentroidListOptions) -> Size {
     let reach = |coordinate: fn(&PixelPoint) -> f64| {
         let usable = centroids.iter().filter(|c| c.problem().is_none());
         let largest = usable.map(|c| coordinate(&c.position)).fold(0.0, f64::max);
         largest.round() as usize + 1
     };
     let given = |side: Option<u32>| side.map(|side| side as usize);
-    (
+    Size::new(
         given(size.width).unwrap_or_else(|| reach(|p| p.x)),
         given(size.height).unwrap_or_else(|| reach(|p| p.y)),
     )

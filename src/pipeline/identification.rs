@@ -60,7 +60,8 @@ pub(super) fn identify_stars(
     detections: &Detections,
     priors: &Priors,
     context: &Context,
-    (workspace, clock): (&mut Workspace, &mut Stopwatch),
+    workspace: &mut Workspace,
+    clock: &mut Stopwatch,
 ) -> (Outcome, Option<ScalePrior>) {
     let field = star_field(frame, detections, priors.years_since_j2000());
     let Workspace {
@@ -68,12 +69,12 @@ pub(super) fn identify_stars(
         detect: detector,
         ..
     } = workspace;
-    let (mut found, dropped_scale) = search(&field, priors, context, (workspace, clock));
+    let (mut found, dropped_scale) = search(&field, priors, context, workspace, clock);
     if found.is_err() && may_be_wide(detections) {
         let is_star = |source: &Detection| source.flags.may_be_wide_star();
         let years = priors.years_since_j2000();
         let wide = field_of(is_star, frame, detections, years);
-        let second = attempt(&wide, &priors.binding(), context, (workspace, clock));
+        let second = attempt(&wide, &priors.binding(), context, workspace, clock);
         if let Some(second) = second.ok().and_then(at_second_attempt) {
             found = Ok(second);
         }
@@ -169,14 +170,15 @@ fn search(
     field: &StarField,
     priors: &Priors,
     context: &Context,
-    (workspace, clock): (&mut identify::Workspace, &mut Stopwatch),
+    workspace: &mut identify::Workspace,
+    clock: &mut Stopwatch,
 ) -> Searched {
-    let first = attempt(field, priors, context, (workspace, clock));
+    let first = attempt(field, priors, context, workspace, clock);
     let tentative = priors.scale.filter(|scale| !scale.is_binding());
     let (Err(failure), Some(scale)) = (&first, tentative) else {
         return (first, None);
     };
-    let second = attempt(field, &priors.binding(), context, (workspace, clock));
+    let second = attempt(field, &priors.binding(), context, workspace, clock);
     match second.map(at_second_attempt) {
         Ok(Some(found)) => (Ok(found), Some(scale)),
         Ok(None) => (Err(*failure), None),
@@ -189,7 +191,8 @@ pub(super) fn attempt(
     field: &StarField,
     priors: &Priors,
     context: &Context,
-    (workspace, clock): (&mut identify::Workspace, &mut Stopwatch),
+    workspace: &mut identify::Workspace,
+    clock: &mut Stopwatch,
 ) -> Result<Identification, SearchFailure> {
     workspace.set_name_odds(context.name_odds);
     if context.attitude_only {

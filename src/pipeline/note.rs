@@ -51,7 +51,7 @@ pub enum Note {
     /// The scale in the header is not that of the frame.
     WrongHeaderScale {
         /// Smallest and largest pixel scale that the header allows, in radians.
-        pixel_scale_rad: (f64, f64),
+        pixel_scale_rad: [f64; 2],
     },
     /// Site, date and attitude contradict each other: the centre was below the horizon.
     BelowHorizon {
@@ -159,10 +159,10 @@ impl Note {
     pub(super) fn of_scale(dropped: Option<ScalePrior>, outcome: &Outcome) -> Option<Self> {
         let scale = dropped.filter(|scale| scale.source == ScaleSource::Header)?;
         let found = outcome.identification()?;
-        let (low_rad, high_rad) = scale.pixel_scale_range_rad(found.camera.width_px);
+        let [low_rad, high_rad] = scale.pixel_scale_range_rad(found.camera.width_px);
         let is_wrong = !(low_rad..=high_rad).contains(&(1.0 / found.camera.focal_length_px));
         is_wrong.then_some(Self::WrongHeaderScale {
-            pixel_scale_rad: (low_rad, high_rad),
+            pixel_scale_rad: [low_rad, high_rad],
         })
     }
 
@@ -274,7 +274,7 @@ impl fmt::Display for Note {
             Self::DefectiveColumns(columns) => write_columns(f, columns),
             Self::ColorMosaic(mosaic) => write_mosaic(f, mosaic),
             Self::WrongHeaderScale {
-                pixel_scale_rad: (low_rad, high_rad),
+                pixel_scale_rad: [low_rad, high_rad],
             } => write!(
                 f,
                 "the header's focal length and pixel size are not this frame's: they mean {:.1}″ to {:.1}″ a pixel",

@@ -206,9 +206,8 @@ fn solve(
         .map(|mosaic| RawColor::restore(mosaic, prepared.raw(), &mut detections));
     clock.lap(Stage::Detect);
 
-    let buffers = (workspace, &mut clock);
     let (mut outcome, dropped_scale) =
-        identify_stars(frame, &detections, &priors, context, buffers);
+        identify_stars(frame, &detections, &priors, context, workspace, &mut clock);
     let sources: Vec<Source> = detections.sources.iter().map(Source::from).collect();
     let bodies = find_bodies(&mut outcome, &sources, &priors, context.indexed.catalog());
     let double_image = if context.attitude_only {

@@ -87,7 +87,7 @@ impl Solved<'_> {
         };
         let frame = FrameMeasurement {
             detect: self.context.detect.clone(),
-            size_px: self.frame.stored_size(),
+            size_px: self.frame.stored_size().sides(),
             exposure_s: self.priors.exposure_s,
             background_adu: self.detections.background_adu,
             noise_adu: self.detections.noise_adu,

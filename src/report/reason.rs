@@ -158,7 +158,7 @@ fn degrees(angle_rad: f64) -> String {
     format!("{angle_deg:.decimals$}°")
 }
 
-fn range((low_rad, high_rad): (f64, f64)) -> String {
+fn range([low_rad, high_rad]: [f64; 2]) -> String {
     format!("{} to {}", degrees(low_rad), degrees(high_rad))
 }
 
@@ -210,7 +210,7 @@ mod tests {
             fov_x_rad: 11.427 * RAD_PER_DEG,
             boresight: UnitVector::from_ra_dec(10.0 * RAD_PER_DEG, -5.0 * RAD_PER_DEG),
             stars: 40,
-            allowed_fov_x_rad: Some((18.0 * RAD_PER_DEG, 22.0 * RAD_PER_DEG)),
+            allowed_fov_x_rad: Some([18.0 * RAD_PER_DEG, 22.0 * RAD_PER_DEG]),
             distance_rad: Some((23.0 * RAD_PER_DEG, 5.0 * RAD_PER_DEG)),
         };
         assert_eq!(

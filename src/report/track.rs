@@ -136,7 +136,10 @@ impl TrackReport {
             rate_sigma_deg_frame,
             stars_used: track.stars_used,
             log10_false_alarm: track.log10_false_alarm.and_then(|log10| finite(log10, 2)),
-            optics: track.camera.as_ref().map(optics),
+            optics: track
+                .camera
+                .as_ref()
+                .map(|(camera, sigma_px)| optics(camera, *sigma_px)),
             timing_ms: TrackTimingReport {
                 read: to_decimals(read_ms, 3),
                 track: to_decimals(track_ms, 3),
@@ -223,10 +226,10 @@ fn attitude(found: &Attitude) -> TrackAttitudeReport {
     }
 }
 
-fn optics((camera, focal_sigma_px): &(CameraModel, f64)) -> TrackOpticsReport {
+fn optics(camera: &CameraModel, focal_sigma_px: f64) -> TrackOpticsReport {
     TrackOpticsReport {
         focal_length_px: to_decimals(camera.focal_length_px, PIXEL_DECIMALS),
-        focal_length_sigma_px: finite(*focal_sigma_px, PIXEL_DECIMALS),
+        focal_length_sigma_px: finite(focal_sigma_px, PIXEL_DECIMALS),
         mirrored: camera.mirrored,
         distortion: camera.distortion.as_ref().map(build::distortion),
     }

@@ -30,7 +30,8 @@ impl Agreement {
     pub fn log10(
         &mut self,
         expected: &[ExpectedStar],
-        (agreeing, agreeing_px): (usize, f64),
+        agreeing: usize,
+        agreeing_px: f64,
         density_px2: f64,
     ) -> f64 {
         /// Tests made.
@@ -85,7 +86,7 @@ mod tests {
             searched_px2,
         };
         let density_px2 = density_px2(surplus, 3e-4);
-        Agreement::default().log10(&vec![star; windows], (agreeing, 1.0), density_px2)
+        Agreement::default().log10(&vec![star; windows], agreeing, 1.0, density_px2)
     }
 
     #[test]

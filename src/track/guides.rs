@@ -75,7 +75,8 @@ impl Guides {
     pub fn around(
         &mut self,
         sky: &IndexedCatalog,
-        (centre, radius_rad): (&UnitVector<Icrs>, f64),
+        centre: &UnitVector<Icrs>,
+        radius_rad: f64,
         wanted: &Wanted,
     ) -> &[GuideStar] {
         let is_there = |gathered: &GuideRegion| gathered.covers(centre, radius_rad, wanted);

@@ -252,10 +252,11 @@ impl<'a> Tracker<'a> {
         let boresight = prediction.icrs_to_camera.boresight_and_up().0;
         let wanted = known.wanted(&spot);
         let sky = self.context.indexed;
-        let field = (&boresight, camera.radius_rad());
-        let guides = self.guides.around(sky, field, &wanted);
+        let guides = self
+            .guides
+            .around(sky, &boresight, camera.radius_rad(), &wanted);
         let buffers = &mut self.buffers;
-        view.choose(guides, (stars, &spot), buffers);
+        view.choose(guides, stars, &spot, buffers);
         let predicted = buffers.expected.len();
         if predicted < MIN_STARS {
             return Err(Loss::TooFewStars { predicted });
@@ -273,8 +274,10 @@ impl<'a> Tracker<'a> {
         let attitude = self.pose.fit(&buffers.stars, &prior);
         let agreeing = attitude.map_or(0, |_| self.pose.used());
         let density_px2 = density_px2(self.detector.surplus(), known.light.density_px2);
-        let agreed = (agreeing, self.pose.agreeing_px());
-        let log10 = self.agreement.log10(&buffers.expected, agreed, density_px2);
+        let agreeing_px = self.pose.agreeing_px();
+        let log10 = self
+            .agreement
+            .log10(&buffers.expected, agreeing, agreeing_px, density_px2);
         let lost = Loss::NoAgreement {
             predicted,
             agreeing,
@@ -286,7 +289,7 @@ impl<'a> Tracker<'a> {
         }
         known.motion.update(&prediction, &attitude, typical_rad);
         known.learn_from(&self.pose, &buffers.stars, &attitude, prior.excess_px);
-        Ok(known.track(Mode::Tracked, attitude, (agreeing, log10)))
+        Ok(known.track(Mode::Tracked, attitude, agreeing, log10))
     }
 
     /// The full solution of a frame.
@@ -321,9 +324,9 @@ impl<'a> Tracker<'a> {
             icrs_to_camera: found.icrs_to_camera,
             covariance_rad2: found.attitude_covariance_rad2,
         };
-        let quality = (found.matches.len(), found.log10_false_alarm);
-        let known = self.continued(frame, clock, (&solution, found), &attitude);
-        let mut track = known.track(Mode::Acquired, attitude, quality);
+        let (stars_used, log10) = (found.matches.len(), found.log10_false_alarm);
+        let known = self.continued(frame, clock, &solution, found, &attitude);
+        let mut track = known.track(Mode::Acquired, attitude, stars_used, log10);
         self.known = Some(known);
         track.loss = Some(loss);
         track.solution = Some(Box::new(solution));
@@ -335,7 +338,8 @@ impl<'a> Tracker<'a> {
         &mut self,
         frame: &Frame,
         clock: Clock,
-        (solution, found): (&Solution, &Identification),
+        solution: &Solution,
+        found: &Identification,
         attitude: &Attitude,
     ) -> TrackerState {
         let years = solution.date.map_or(0.0, |d| d.date.years_since_j2000());
@@ -490,7 +494,7 @@ impl TrackerState {
         }
     }
 
-    fn track(&self, mode: Mode, attitude: Attitude, (stars_used, log10): (usize, f64)) -> Track {
+    fn track(&self, mode: Mode, attitude: Attitude, stars_used: usize, log10: f64) -> Track {
         Track {
             mode,
             time_s: None,
@@ -571,12 +575,7 @@ impl PredictedView<'_> {
     }
 
     /// Chooses the brightest stars that are well within the frame.
-    fn choose(
-        &self,
-        guides: &[GuideStar],
-        (stars, spot): (usize, &SpotModel),
-        buffers: &mut Buffers,
-    ) {
+    fn choose(&self, guides: &[GuideStar], stars: usize, spot: &SpotModel, buffers: &mut Buffers) {
         let icrs_to_camera = &self.prediction.icrs_to_camera;
         let cos_reach = self.camera.radius_rad().cos();
         buffers.expected.clear();

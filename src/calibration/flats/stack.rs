@@ -2,6 +2,7 @@
 
 use super::error::{FlatsError, MAX_SATURATED_SHARE};
 use super::transfer::{Gain, PairPoint};
+use crate::base::size::Size;
 use crate::calibration::pixel_stack::{PixelStack, pooled_variances};
 use crate::calibration::robust::{Moments, typical_variance};
 use crate::frame::Frame;
@@ -35,7 +36,7 @@ pub struct FlatFrame {
 pub struct FlatStack {
     config: FlatConfig,
     frames: Vec<FlatFrame>,
-    size: (usize, usize),
+    size: Size,
     stack: Option<PixelStack>,
     /// Level and pixels above the dark of the first frame of a pair.
     first: Option<(f64, Vec<f32>)>,
@@ -71,7 +72,7 @@ impl FlatStack {
         Self {
             config,
             frames: Vec::new(),
-            size: (0, 0),
+            size: Size::default(),
             stack: None,
             first: None,
             pairs: Vec::new(),
@@ -124,12 +125,10 @@ impl FlatStack {
     }
 
     fn check_size(&mut self, name: &str, frame: &Frame) -> Result<(), FlatsError> {
-        let found = (frame.width, frame.height);
+        let found = frame.size();
         let (expected, of) = match (self.frames.first(), &self.config.dark) {
             (Some(first), _) => (self.size, first.frame.clone()),
-            (None, Some((dark, pixels))) => {
-                ((pixels.width, pixels.height), format!("the dark {dark}"))
-            }
+            (None, Some((dark, pixels))) => (pixels.size(), format!("the dark {dark}")),
             (None, None) => (found, String::new()),
         };
         self.size = expected;
@@ -138,10 +137,10 @@ impl FlatStack {
         }
         Err(FlatsError::SizesDiffer {
             frame: name.to_owned(),
-            width: found.0,
-            height: found.1,
-            expected_width: expected.0,
-            expected_height: expected.1,
+            width: found.width,
+            height: found.height,
+            expected_width: expected.width,
+            expected_height: expected.height,
             of,
         })
     }
@@ -170,7 +169,7 @@ impl FlatStack {
         let Some(stack) = &self.stack else {
             return Err(FlatsError::NoFrames);
         };
-        let (width, height) = self.size;
+        let Size { width, height } = self.size;
         let mut master = stack.means();
         let valid = master.iter().filter(|p| !p.is_nan());
         let mean = Moments::of(valid.map(|&p| f64::from(p))).mean;

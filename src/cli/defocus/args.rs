@@ -131,7 +131,7 @@ fn radii(text: &str) -> Result<Range, String> {
 
 fn range(text: &str) -> Result<Range, String> {
     let steps: Steps = text.parse()?;
-    let (first, _) = steps.ends;
+    let [first, _] = steps.ends;
     if first <= 0.0 {
         return Err(format!(
             "found {first} as the first value, expected a number above 0"

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 /// First and last value, their number, and how they are spaced.
 pub(crate) struct Steps {
-    pub(crate) ends: (f64, f64),
+    pub(crate) ends: [f64; 2],
     pub(crate) count: usize,
     pub(crate) spacing: Spacing,
 }
@@ -21,7 +21,7 @@ impl Steps {
             _ => return Err(not_of_form(text, form)),
         };
         Ok(Self {
-            ends: (finite(from)?, finite(to)?),
+            ends: [finite(from)?, finite(to)?],
             count: whole(count)?,
             spacing,
         })

@@ -1,5 +1,6 @@
 //! Master darks and flats as FITS files.
 
+use starpipe::base::size::Size;
 use starpipe::frame::{CALIBRATION_CREATOR, FitsHeader, FitsSamples, Frame, write_fits};
 
 /// The first keywords of every master's header: starpipe recognizes its masters by them.
@@ -13,11 +14,11 @@ pub(crate) fn header(kind: &str, frames: usize) -> FitsHeader {
 
 /// Content of a FITS file with an image of 32-bit floats.
 pub(crate) fn fits_image(
-    (width, height): (usize, usize),
+    size: Size,
     pixels: &[f32],
     header: &FitsHeader,
 ) -> anyhow::Result<Vec<u8>> {
-    let frame = Frame::new(width, height, pixels.to_vec())?;
+    let frame = Frame::new(size.width, size.height, pixels.to_vec())?;
     let mut bytes = Vec::new();
     write_fits(&mut bytes, &frame, FitsSamples::Float32, header)?;
     Ok(bytes)

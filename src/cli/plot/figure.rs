@@ -38,11 +38,11 @@ pub(crate) trait Figure {
                 Ok(drawing.into_bytes())
             }
             Form::Png => {
-                let size = (width * FACTOR, height * FACTOR);
-                let mut pixels = vec![0; size.0 as usize * size.1 as usize * 3];
-                let backend = BitMapBackend::with_buffer(&mut pixels, size);
+                let (width, height) = (width * FACTOR, height * FACTOR);
+                let mut pixels = vec![0; width as usize * height as usize * 3];
+                let backend = BitMapBackend::with_buffer(&mut pixels, (width, height));
                 draw_on(self, Scaled(backend))?;
-                png(&pixels, size)
+                png(&pixels, width, height)
             }
         }
     }
@@ -56,7 +56,7 @@ fn draw_on<B: DrawingBackend>(figure: &impl Figure, backend: B) -> anyhow::Resul
 }
 
 /// Red, green and blue of each pixel as the content of a PNG file.
-fn png(pixels: &[u8], (width, height): (u32, u32)) -> anyhow::Result<Vec<u8>> {
+fn png(pixels: &[u8], width: u32, height: u32) -> anyhow::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);

@@ -7,13 +7,16 @@ use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::element::{CoordMapper, Drawable, PointCollection};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters_backend::BackendCoord;
 use starpipe::base::format::five_digits;
 
 const TITLE_PX: u32 = 17;
 /// Height of title and legend.
 const HEAD_PX: u32 = 50;
-/// Below the x axis, and left of the y axis.
-const AXIS_PX: (u32, u32) = (44, 66);
+/// Room below the x axis.
+const BELOW_PX: u32 = 44;
+/// Room left of the y axis.
+const LEFT_PX: u32 = 66;
 /// Opacity of bars.
 const PALE: f64 = 0.45;
 
@@ -33,13 +36,13 @@ impl Panel {
         let points: Vec<_> = self.layers.iter().flat_map(Layer::points).collect();
         let x = self.x.range(points.iter().map(|point| point.0));
         let y = self.y.range(points.iter().map(|point| point.1));
-        let ends = (x, y);
+        let ends = Ends { x, y };
         let (x, y) = (x[0]..x[1], y[0]..y[1]);
         match (self.x.is_log, self.y.is_log) {
-            (false, false) => self.draw_chart(&body, (x, y), ends),
-            (true, false) => self.draw_chart(&body, (logarithmic(x), y), ends),
-            (false, true) => self.draw_chart(&body, (x, logarithmic(y)), ends),
-            (true, true) => self.draw_chart(&body, (logarithmic(x), logarithmic(y)), ends),
+            (false, false) => self.draw_chart(&body, x, y, ends),
+            (true, false) => self.draw_chart(&body, logarithmic(x), y, ends),
+            (false, true) => self.draw_chart(&body, x, logarithmic(y), ends),
+            (true, true) => self.draw_chart(&body, logarithmic(x), logarithmic(y), ends),
         }
     }
 
@@ -47,7 +50,7 @@ impl Panel {
     fn draw_head<B: DrawingBackend>(&self, area: &Area<B>) -> anyhow::Result<()> {
         const TITLE_Y: i32 = 14;
         const LEGEND_Y: i32 = 38;
-        let left = (MARGIN_PX + AXIS_PX.1) as i32;
+        let left = (MARGIN_PX + LEFT_PX) as i32;
         if !self.title.is_empty() {
             draw_text(area, &self.title, TITLE_PX, (left, TITLE_Y))?;
         }
@@ -68,8 +71,9 @@ impl Panel {
     fn draw_chart<B: DrawingBackend, X, Y>(
         &self,
         area: &Area<B>,
-        (x, y): (X, Y),
-        ends: ([f64; 2], [f64; 2]),
+        x: X,
+        y: Y,
+        ends: Ends,
     ) -> anyhow::Result<()>
     where
         X: AsRangedCoord<Value = f64>,
@@ -77,7 +81,7 @@ impl Panel {
         Y: AsRangedCoord<Value = f64>,
         Y::CoordDescType: ValueFormatter<f64>,
     {
-        let mut builder = chart_on(area, AXIS_PX);
+        let mut builder = chart_on(area, BELOW_PX, LEFT_PX);
         let mut context = builder.build_cartesian_2d(x, y).map_err(plot_error)?;
         context
             .configure_mesh()
@@ -103,12 +107,13 @@ impl Panel {
     }
 }
 
-/// Draws what a layer's marks look like, to the right of `(x, y)`.
+/// Draws what a layer's marks look like, to the right of `place`.
 fn draw_legend_mark<B: DrawingBackend>(
     area: &Area<B>,
     layer: &Layer,
-    (x, y): (i32, i32),
+    place: BackendCoord,
 ) -> anyhow::Result<()> {
+    let (x, y) = place;
     let color = layer.color;
     match layer.marks {
         Marks::Dots(_) => area.draw(&Circle::new((x + 8, y), 4, color.filled())),
@@ -124,12 +129,18 @@ fn draw_legend_mark<B: DrawingBackend>(
     .map_err(plot_error)
 }
 
+/// The first and the last value of both axes.
+#[derive(Clone, Copy)]
+struct Ends {
+    x: [f64; 2],
+    y: [f64; 2],
+}
+
 /// Axes on which layers are drawn.
 struct Chart<'a, B: DrawingBackend, X: Ranged, Y: Ranged> {
     context: ChartContext<'a, B, Cartesian2d<X, Y>>,
     area: &'a Area<B>,
-    /// First and last x, first and last y.
-    ends: ([f64; 2], [f64; 2]),
+    ends: Ends,
 }
 
 impl<B, X, Y> Chart<'_, B, X, Y>
@@ -157,7 +168,7 @@ where
                 self.draw_all(bars.iter().map(bar))
             }
             Marks::Levels(levels) => {
-                let [from, to] = self.ends.0;
+                let [from, to] = self.ends.x;
                 let stroke = color.stroke_width(2);
                 let line = |&y: &f64| PathElement::new([(from, y), (to, y)], stroke);
                 self.draw_all(levels.iter().map(line))
@@ -186,7 +197,7 @@ where
 
     /// Draws the intervals within the chart, and the dots above them.
     fn draw_dots(&mut self, dots: &[Dot], color: RGBColor) -> anyhow::Result<()> {
-        let [bottom, top] = self.ends.1;
+        let [bottom, top] = self.ends.y;
         let interval = |&(x, _, [low, high]): &Dot| {
             let ends = [(x, low.max(bottom)), (x, high.min(top))];
             PathElement::new(ends, color.stroke_width(1))
@@ -197,7 +208,10 @@ where
     }
 
     fn draw_cells(&mut self, cells: &[Cell]) -> anyhow::Result<()> {
-        let ([left, right], [bottom, top]) = self.ends;
+        let Ends {
+            x: [left, right],
+            y: [bottom, top],
+        } = self.ends;
         // Each cell reaches a little under the next ones: white would show through the seams.
         let overlap = [0.003 * (right - left), 0.003 * (top - bottom)];
         let rectangle = |cell: &Cell| {

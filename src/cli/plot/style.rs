@@ -3,6 +3,7 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters_backend::BackendCoord;
 use std::fmt::Display;
 
 /// The family of all letters.
@@ -24,10 +25,11 @@ pub(crate) const BLACK: RGBColor = RGBColor(0, 0, 0);
 /// Part of a figure to draw on.
 pub(crate) type Area<B> = DrawingArea<B, Shift>;
 
-/// A chart with a margin, and with room below the x axis and left of the y axis.
+/// A chart with a margin, and with so much room below the x axis and left of the y axis.
 pub(crate) fn chart_on<'a, 'b, B: DrawingBackend>(
     area: &'a Area<B>,
-    axis_px: (u32, u32),
+    below_px: u32,
+    left_px: u32,
 ) -> ChartBuilder<'a, 'b, B> {
     let mut builder = ChartBuilder::on(area);
     builder
@@ -35,8 +37,8 @@ pub(crate) fn chart_on<'a, 'b, B: DrawingBackend>(
         .margin_top(2)
         // Room for the half of the last number that stands beyond the axis.
         .margin_right(2 * MARGIN_PX)
-        .x_label_area_size(axis_px.0)
-        .y_label_area_size(axis_px.1);
+        .x_label_area_size(below_px)
+        .y_label_area_size(left_px);
     builder
 }
 
@@ -45,7 +47,7 @@ pub(super) fn draw_text<B: DrawingBackend>(
     area: &Area<B>,
     text: &str,
     size_px: u32,
-    place: (i32, i32),
+    place: BackendCoord,
 ) -> anyhow::Result<()> {
     let style = (FONT, size_px)
         .into_text_style(area)

@@ -14,7 +14,8 @@ const ROW_HEIGHT_PX: u32 = 34;
 /// Height above and below the rows of the table.
 const FRAME_HEIGHT_PX: u32 = 110;
 /// Below the x axis, and left of the y axis: the names of the rows.
-const TABLE_AXIS_PX: (u32, u32) = (44, 230);
+const BELOW_PX: u32 = 44;
+const LEFT_PX: u32 = 230;
 const NO_ANSWER: RGBColor = RGBColor(120, 120, 120);
 
 /// A panel for each parameter that is swept; none if none is.
@@ -78,7 +79,7 @@ impl Figure for RateTable<'_> {
         let worst = counted.iter().map(|row| row.right_low_percent);
         let lowest = (worst.fold(99.0, f64::min) - 0.2).max(0.0);
         let last = counted.len() as f64;
-        let mut builder = chart_on(area, TABLE_AXIS_PX);
+        let mut builder = chart_on(area, BELOW_PX, LEFT_PX);
         let mut chart = builder
             .build_cartesian_2d(lowest..100.05, last..0.0)
             .map_err(plot_error)?;

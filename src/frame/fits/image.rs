@@ -4,6 +4,7 @@ use super::error::{truncated, unsupported};
 use super::layout::Layout;
 use super::tiles;
 use super::unit::{StoredType, Unit};
+use crate::base::size::Size;
 use crate::frame::account::{Account, FLOATS_BYTES_PER_PIXEL};
 use crate::frame::levels::{Samples, WholeNumber, frame_from_floats, frame_from_integers};
 use crate::frame::{Frame, FrameError, check_size};
@@ -24,7 +25,8 @@ impl Image {
     /// The image `plane` of `unit`, which has this layout. A cube has several planes, and one must be
     /// chosen.
     pub fn new(
-        (unit, layout): (&Unit, Layout),
+        unit: &Unit,
+        layout: Layout,
         plane: Option<usize>,
         account: &Account,
     ) -> Result<Self, FrameError> {
@@ -54,7 +56,7 @@ impl Image {
             blank: unit.blank().filter(|_| !unit.stored.is_float()),
         };
         let bytes_per_pixel = image.bytes_per_pixel(unit.is_compressed_image());
-        account.check_image((width, height), bytes_per_pixel)?;
+        account.check_image(Size::new(width, height), bytes_per_pixel)?;
         Ok(image)
     }
 
@@ -216,6 +218,7 @@ impl Image {
             channels,
             ..
         } = self.layout;
-        frame_from_floats((width, height), channels, self.layout.interleaved(levels))
+        let values = self.layout.interleaved(levels);
+        frame_from_floats(Size::new(width, height), channels, values)
     }
 }

@@ -58,7 +58,7 @@ pub(super) fn decode(
         image: choice,
         assumed,
     } = Choice::of(bytes, page, account)?;
-    let image = Image::new((&unit, layout), plane, account)?;
+    let image = Image::new(&unit, layout, plane, account)?;
     // The primary header holds the keywords that are common to all units.
     let (primary, _) = Header::parse(bytes, 0)?;
     let headers = [&unit.header, &primary];

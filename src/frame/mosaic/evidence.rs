@@ -201,11 +201,11 @@ fn patches_of(frame: &Frame, most: usize) -> Vec<Patch> {
     let places = rows.flat_map(|y| starts(frame.width).map(move |x| (x, y)));
     let mut values = Vec::new();
     places
-        .filter_map(|at| patch_at(frame, at, &mut values))
+        .filter_map(|(x, y)| patch_at(frame, x, y, &mut values))
         .collect()
 }
 
-fn patch_at(frame: &Frame, (x0, y0): (usize, usize), values: &mut Vec<f64>) -> Option<Patch> {
+fn patch_at(frame: &Frame, x0: usize, y0: usize, values: &mut Vec<f64>) -> Option<Patch> {
     let mut patch = Patch {
         levels: [0.0; 4],
         variances: [0.0; 4],

@@ -1,6 +1,7 @@
 //! From the raw pixels to grey ones: a binomial kernel, in which every filter has a quarter of the
 //! weight wherever it lies.
 
+use crate::base::size::Size;
 use crate::frame::Frame;
 
 /// Fractions of a grey level that the kernel makes of one.
@@ -25,7 +26,7 @@ pub(super) fn smoothed(raw: &Frame, saturation_adu: f32) -> Frame<'static> {
             *pixel = (down[left] + 2.0 * down[x] + down[right]) / LEVEL_PARTS;
         }
     }
-    mark_saturated(&values, (width, height), saturation_adu, &mut pixels);
+    mark_saturated(&values, raw.size(), saturation_adu, &mut pixels);
     let saturation = saturation_adu.is_finite().then_some(saturation_adu);
     Frame::from_checked(width, height, pixels)
         .with_levels(raw.step_adu / LEVEL_PARTS, saturation)
@@ -40,12 +41,8 @@ fn neighbors(at: usize, side: usize) -> [usize; 2] {
 }
 
 /// Saturates the pixels around saturated ones: part of their light is unknown.
-fn mark_saturated(
-    values: &[f32],
-    (width, height): (usize, usize),
-    saturation_adu: f32,
-    pixels: &mut [f32],
-) {
+fn mark_saturated(values: &[f32], size: Size, saturation_adu: f32, pixels: &mut [f32]) {
+    let Size { width, height } = size;
     let saturated = values.iter().enumerate();
     for (i, _) in saturated.filter(|(_, value)| **value >= saturation_adu) {
         let (x, y) = (i % width, i / width);

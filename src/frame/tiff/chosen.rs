@@ -133,8 +133,8 @@ fn sub_directories<'a>(page: &Directory<'a>) -> impl Iterator<Item = Directory<'
 fn picture_size(directory: &Directory) -> Option<[usize; 2]> {
     const MASK_OR_DEPTH: u64 = 4 | 8;
     let kind = directory.first(tag::NEW_SUBFILE_TYPE, 0).ok()?;
-    let (width, height) = stated_size(directory).ok()?;
-    (kind & MASK_OR_DEPTH == 0).then_some([width, height])
+    let size = stated_size(directory).ok()?;
+    (kind & MASK_OR_DEPTH == 0).then_some(size.sides())
 }
 
 /// Whether an image attached to a page is a picture and no raw data of a detector.

@@ -2,6 +2,7 @@
 
 use super::directory::{TiffFile, malformed, truncated};
 use super::layout::{Chunk, Color, Compression, Layout};
+use crate::base::size::Size;
 use crate::frame::account::Account;
 use crate::frame::error::FrameError;
 use crate::frame::jpeg::Jpeg;
@@ -44,7 +45,8 @@ impl Layout<'_> {
             Compression::Deflate => deflate(&stored, wanted, account)?.into(),
             Compression::PackBits => pack_bits(&stored, wanted).into(),
             Compression::Group4 => {
-                group_4(&stored, (self.chunk_size.0, chunk.rows), account)?.into()
+                let size = Size::new(self.chunk_size.width, chunk.rows);
+                group_4(&stored, size, account)?.into()
             }
         };
         if bytes.len() < wanted {
@@ -95,9 +97,12 @@ impl Layout<'_> {
         let jpeg = Jpeg::open(&bytes, account).map_err(|e| fail(e.to_string()))?;
         let (width, height, channels) = (jpeg.width, jpeg.height, jpeg.channels);
         let is_whole = width >= chunk.columns && height >= chunk.rows;
-        let is_expected = width <= self.chunk_size.0 && channels == self.chunk_samples;
-        if !is_whole || !is_expected || height > self.chunk_size.1 {
-            let (columns, rows) = self.chunk_size;
+        let is_expected = width <= self.chunk_size.width && channels == self.chunk_samples;
+        if !is_whole || !is_expected || height > self.chunk_size.height {
+            let Size {
+                width: columns,
+                height: rows,
+            } = self.chunk_size;
             let samples = self.chunk_samples;
             return Err(fail(format!(
                 "{width} x {height} pixels of {channels} samples, expected {columns} x {rows} of {samples}"
@@ -208,14 +213,14 @@ fn pack_bits(mut stored: &[u8], wanted: usize) -> Vec<u8> {
 }
 
 /// Rows of one bit per pixel in CCITT group 4; black is 1, as libtiff has it.
-fn group_4(
-    stored: &[u8],
-    (width, rows): (usize, usize),
-    account: &Account,
-) -> Result<Vec<u8>, FrameError> {
+fn group_4(stored: &[u8], size: Size, account: &Account) -> Result<Vec<u8>, FrameError> {
     use fax::Color::Black;
     use fax::decoder::{DecodeStatus, Group4Decoder, pels};
     let fail = |detail: String| malformed(format!("CCITT group 4: {detail}"));
+    let Size {
+        width,
+        height: rows,
+    } = size;
     let width = u16::try_from(width).map_err(|_| fail(format!("{width} columns")))?;
     let input = stored.iter().map(|byte| std::io::Result::Ok(*byte));
     let mut decoder = Group4Decoder::new(input, width).map_err(|e| fail(e.to_string()))?;

@@ -1,6 +1,7 @@
 //! How does a TIFF file store an image? Known before anything is decoded.
 
 use super::directory::{Directory, Numbers, malformed};
+use crate::base::size::Size;
 use crate::frame::account::FLOATS_BYTES_PER_PIXEL;
 use crate::frame::error::FrameError;
 use crate::frame::format::FrameFormat;
@@ -54,7 +55,7 @@ pub(super) struct Layout<'a> {
     /// Whether the bits of each byte are stored in reverse.
     pub is_bit_reversed: bool,
     /// Columns and rows of a strip or a tile.
-    pub chunk_size: (usize, usize),
+    pub chunk_size: Size,
     /// Place and length of each chunk; a length may be absent.
     places: Numbers<'a>,
     lengths: Numbers<'a>,
@@ -122,7 +123,7 @@ impl<'a> Layout<'a> {
     /// [`FrameError::Unsupported`], [`FrameError::Malformed`], [`FrameError::TooLarge`],
     /// [`FrameError::TooSmall`], [`FrameError::Truncated`].
     pub fn of(directory: &Directory<'a>) -> Result<Self, FrameError> {
-        let (width, height) = stated_size(directory)?;
+        let Size { width, height } = stated_size(directory)?;
         check_size(width, height)?;
         let samples = directory.first(tag::SAMPLES_PER_PIXEL, 1)? as usize;
         let depth = Depth::of(directory)?;
@@ -160,7 +161,7 @@ impl<'a> Layout<'a> {
             // JPEG has an order of its own.
             is_bit_reversed: compression != Compression::Jpeg
                 && directory.first(tag::FILL_ORDER, 1)? == 2,
-            chunk_size: (width, height),
+            chunk_size: Size::new(width, height),
             places: Numbers::default(),
             lengths: Numbers::default(),
             jpeg_tables: directory.bytes_of(tag::JPEG_TABLES)?,
@@ -177,14 +178,14 @@ impl<'a> Layout<'a> {
             }
         };
         let (places, lengths, name) = if directory.has(tag::TILE_OFFSETS) {
-            self.chunk_size = (
+            self.chunk_size = Size::new(
                 side(tag::TILE_WIDTH, 0, "TileWidth")?,
                 side(tag::TILE_LENGTH, 0, "TileLength")?,
             );
             (tag::TILE_OFFSETS, tag::TILE_BYTE_COUNTS, "tiles")
         } else {
             let rows = side(tag::ROWS_PER_STRIP, self.height, "RowsPerStrip")?;
-            self.chunk_size.1 = rows.min(self.height);
+            self.chunk_size.height = rows.min(self.height);
             (tag::STRIP_OFFSETS, tag::STRIP_BYTE_COUNTS, "strips")
         };
         self.places = directory.numbers(places)?;
@@ -201,11 +202,11 @@ impl<'a> Layout<'a> {
     }
 
     fn chunks_across(&self) -> usize {
-        self.width.div_ceil(self.chunk_size.0)
+        self.width.div_ceil(self.chunk_size.width)
     }
 
     fn chunks_per_plane(&self) -> usize {
-        self.chunks_across() * self.height.div_ceil(self.chunk_size.1)
+        self.chunks_across() * self.height.div_ceil(self.chunk_size.height)
     }
 
     fn chunk_count(&self) -> usize {
@@ -220,14 +221,14 @@ impl<'a> Layout<'a> {
         places.map(move |(index, place)| {
             let length = self.lengths.get(index);
             let (plane, index) = (index / per_plane, index % per_plane);
-            let left = index % across * self.chunk_size.0;
-            let top = index / across * self.chunk_size.1;
+            let left = index % across * self.chunk_size.width;
+            let top = index / across * self.chunk_size.height;
             Chunk {
                 plane,
                 left,
                 top,
-                columns: self.chunk_size.0.min(self.width - left),
-                rows: self.chunk_size.1.min(self.height - top),
+                columns: self.chunk_size.width.min(self.width - left),
+                rows: self.chunk_size.height.min(self.height - top),
                 place,
                 length,
             }
@@ -236,7 +237,7 @@ impl<'a> Layout<'a> {
 
     /// Bytes of a row of a chunk: each begins at a byte.
     pub fn row_bytes(&self) -> usize {
-        let samples = self.chunk_size.0.saturating_mul(self.chunk_samples);
+        let samples = self.chunk_size.width.saturating_mul(self.chunk_samples);
         let bits = samples.saturating_mul(self.depth.bits as usize);
         bits.div_ceil(8)
     }
@@ -253,7 +254,7 @@ impl<'a> Layout<'a> {
             && self.chunk_samples == 1
             && self.compression == Compression::None
             && !self.is_bit_reversed
-            && self.chunk_size.0 == self.width;
+            && self.chunk_size.width == self.width;
         if !is_plain {
             return None;
         }
@@ -276,7 +277,7 @@ impl<'a> Layout<'a> {
             // They are copied to floats.
             _ => 8 + size_of::<f32>(),
         };
-        let rows = self.chunk_size.1.min(self.height);
+        let rows = self.chunk_size.height.min(self.height);
         let chunk_bytes = match self.compression {
             Compression::None if !self.is_bit_reversed => 0,
             _ => self.row_bytes().saturating_mul(rows),
@@ -291,15 +292,15 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// Width and height that a directory states.
-pub(super) fn stated_size(directory: &Directory) -> Result<(usize, usize), FrameError> {
+/// The size that a directory states.
+pub(super) fn stated_size(directory: &Directory) -> Result<Size, FrameError> {
     let side = |tag: u16, name: &str| -> Result<usize, FrameError> {
         if !directory.has(tag) {
             return Err(malformed(format!("no {name} (tag {tag})")));
         }
         Ok(usize::try_from(directory.first(tag, 0)?).unwrap_or(usize::MAX))
     };
-    Ok((
+    Ok(Size::new(
         side(tag::IMAGE_WIDTH, "ImageWidth")?,
         side(tag::IMAGE_LENGTH, "ImageLength")?,
     ))

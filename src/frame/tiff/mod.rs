@@ -22,6 +22,7 @@ use super::levels::{
     Samples, WholeNumber, frame_from_floats, frame_from_integers, frame_from_words,
 };
 use super::limits::MAX_PAGES;
+use crate::base::size::Size;
 use chosen::Chosen;
 use decompress::Source;
 use layout::{Color, Layout, SampleFormat};
@@ -47,7 +48,7 @@ pub(super) fn decode(
         None => Chosen::largest(file, account)?,
     };
     let layout = Layout::of(&chosen.directory)?;
-    let size = (layout.width, layout.height);
+    let size = Size::new(layout.width, layout.height);
     account.check_image(size, layout.bytes_per_pixel())?;
     let frame = match layout.plain_words() {
         Some((start, length)) => {
@@ -145,7 +146,8 @@ impl Layout<'_> {
         if self.color == Color::WhiteIsZero {
             values.iter_mut().for_each(|value| *value = 1.0 - *value);
         }
-        frame_from_floats((self.width, self.height), self.channels, values)
+        let size = Size::new(self.width, self.height);
+        frame_from_floats(size, self.channels, values)
     }
 }
 

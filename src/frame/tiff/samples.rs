@@ -40,7 +40,7 @@ impl Layout<'_> {
         let mut row = Vec::new();
         for chunk in self.chunks() {
             let rows = self.decompress(source, &chunk)?;
-            self.unpack_chunk((&chunk, &rows), source, &mut row, &mut samples)?;
+            self.unpack_chunk(&chunk, &rows, source, &mut row, &mut samples)?;
         }
         samples.resize(count, T::default());
         if self.color == Color::WhiteIsZero && self.depth.format == SampleFormat::Unsigned {
@@ -55,7 +55,8 @@ impl Layout<'_> {
     /// Writes the samples of a chunk to their places in the image; `row` is scratch.
     fn unpack_chunk<T: Word>(
         &self,
-        (chunk, rows): (&Chunk, &Rows),
+        chunk: &Chunk,
+        rows: &Rows,
         source: Source,
         row: &mut Vec<T>,
         samples: &mut Vec<T>,

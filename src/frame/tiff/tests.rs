@@ -2,6 +2,7 @@
 
 use super::directory::{Directory, TiffFile};
 use super::has_picture_in_sub_directories;
+use crate::base::size::Size;
 use crate::frame::{Frame, FrameError, decode, decode_page};
 use proptest::prelude::*;
 use std::num::NonZeroUsize;
@@ -147,7 +148,7 @@ struct Storage {
     samples: usize,
     is_planar: bool,
     /// Size of a tile, else the rows of a strip.
-    tile: Option<(usize, usize)>,
+    tile: Option<Size>,
     rows_per_strip: usize,
     is_little_endian: bool,
     is_bit_reversed: bool,
@@ -192,11 +193,13 @@ impl Storage {
     }
 
     /// One chunk: rows of the samples from `first` to `end`, 0 outside the image.
-    fn chunk(&self, (left, top): (usize, usize), samples: std::ops::Range<usize>) -> Vec<u8> {
-        let (columns, rows) = match self.tile {
-            Some(tile) => tile,
-            None => (self.width, self.rows_per_strip.min(self.height - top)),
-        };
+    fn chunk(&self, left: usize, top: usize, samples: std::ops::Range<usize>) -> Vec<u8> {
+        let Size {
+            width: columns,
+            height: rows,
+        } = self
+            .tile
+            .unwrap_or_else(|| Size::new(self.width, self.rows_per_strip.min(self.height - top)));
         let full = u32::MAX >> (32 - self.bits);
         let rows = (top..top + rows).map(|y| {
             let pixels = (left..left + columns).flat_map(|x| {
@@ -214,7 +217,11 @@ impl Storage {
     }
 
     fn page(&self) -> Page {
-        let (columns, rows) = self.tile.unwrap_or((self.width, self.rows_per_strip));
+        let strip = Size::new(self.width, self.rows_per_strip);
+        let Size {
+            width: columns,
+            height: rows,
+        } = self.tile.unwrap_or(strip);
         let planes: Vec<std::ops::Range<usize>> = if self.is_planar {
             (0..self.samples).map(|sample| sample..sample + 1).collect()
         } else {
@@ -224,7 +231,7 @@ impl Storage {
         for plane in planes {
             for top in (0..self.height).step_by(rows) {
                 for left in (0..self.width).step_by(columns) {
-                    chunks.push(self.chunk((left, top), plane.clone()));
+                    chunks.push(self.chunk(left, top, plane.clone()));
                 }
             }
         }
@@ -246,7 +253,7 @@ impl Storage {
         );
         page.tags.push((258, vec![self.bits; self.samples]));
         match self.tile {
-            Some((width, height)) => {
+            Some(Size { width, height }) => {
                 page.is_tiled = true;
                 page = page.with(322, width as u32).with(323, height as u32);
             }
@@ -286,7 +293,7 @@ prop_compose! {
             bits,
             samples,
             is_planar: is_planar && samples > 1,
-            tile,
+            tile: tile.map(|(width, height)| Size::new(width, height)),
             rows_per_strip,
             is_little_endian,
             is_bit_reversed,

@@ -41,9 +41,9 @@ pub enum Diagnosis {
     /// The stated scale is outside the range that can be identified.
     ScaleOutOfRange {
         /// Stated horizontal field of view, from and to, in radians.
-        fov_x_rad: (f64, f64),
+        fov_x_rad: [f64; 2],
         /// Horizontal fields of view that the catalogue allows, in radians.
-        searched_rad: (f64, f64),
+        searched_rad: [f64; 2],
     },
     /// Without the priors the stars are identified.
     HintsExclude(Box<Excluded>),
@@ -80,7 +80,7 @@ pub struct Excluded {
     /// Number of identified stars.
     pub stars: usize,
     /// The stated field of view, from and to, in radians, where it excludes the solution.
-    pub allowed_fov_x_rad: Option<(f64, f64)>,
+    pub allowed_fov_x_rad: Option<[f64; 2]>,
     /// Distance from the stated direction and the stated radius, in radians, where they exclude the
     /// solution.
     pub distance_rad: Option<(f64, f64)>,

@@ -77,7 +77,7 @@ fn contradiction(case: &Unidentified, found: &Identification) -> Excluded {
     let pixel_rad = 1.0 / found.camera.focal_length_px;
     let width_px = case.field.width_px;
     let allowed = case.priors.pixel_scale_range_rad(width_px);
-    let excluding = allowed.filter(|(low, high)| !(*low..=*high).contains(&pixel_rad));
+    let excluding = allowed.filter(|[low, high]| !(*low..=*high).contains(&pixel_rad));
     let distance = case
         .priors
         .near
@@ -92,9 +92,8 @@ fn contradiction(case: &Unidentified, found: &Identification) -> Excluded {
 }
 
 /// Horizontal fields of view, in radians, of frames with these pixel scales at their centre.
-fn fields_of_view((low, high): (f64, f64), width_px: f64) -> (f64, f64) {
-    let fov_rad = |pixel_rad: f64| 2.0 * (width_px * pixel_rad / 2.0).atan();
-    (fov_rad(low), fov_rad(high))
+fn fields_of_view(pixel_scales_rad: [f64; 2], width_px: f64) -> [f64; 2] {
+    pixel_scales_rad.map(|pixel_rad| 2.0 * (width_px * pixel_rad / 2.0).atan())
 }
 
 fn out_of_range(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diagnosis> {
@@ -102,8 +101,8 @@ fn out_of_range(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diagnosis> 
     let scale = case.priors.pixel_scale_range_rad(width_px)?;
     let searched_rad = sky.fov_range_rad();
     let pixel_rad = |fov_rad: f64| 1.0 / focal_length_px(width_px, fov_rad);
-    let (narrowest, widest) = (pixel_rad(searched_rad.0), pixel_rad(searched_rad.1));
-    (scale.1 < narrowest || scale.0 > widest).then(|| Diagnosis::ScaleOutOfRange {
+    let [narrowest, widest] = searched_rad.map(pixel_rad);
+    (scale[1] < narrowest || scale[0] > widest).then(|| Diagnosis::ScaleOutOfRange {
         fov_x_rad: fields_of_view(scale, width_px),
         searched_rad,
     })

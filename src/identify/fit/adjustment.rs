@@ -118,7 +118,8 @@ impl<'a, const P: usize, const K: usize> Adjustment<'a, P, K> {
     /// `None` for fewer equations than parameters.
     pub fn new(
         stars: &'a [MeasuredStar],
-        (camera, icrs_to_camera): (&CameraModel, &Rotation<Icrs, Camera>),
+        camera: &CameraModel,
+        icrs_to_camera: &Rotation<Icrs, Camera>,
         model: Option<DistortionModel>,
     ) -> Option<Self> {
         if 2 * stars.len() < P + 2 * K {

@@ -47,8 +47,8 @@ pub fn fit_camera(
     macro_rules! fit {
         ($shared:expr, $monomials:expr) => {{
             const PARAMETERS: usize = POSE_PARAMETERS + $shared;
-            let at = (camera, icrs_to_camera);
-            Adjustment::<PARAMETERS, { $monomials }>::new(stars, at, model)?.fit(residuals_px)
+            Adjustment::<PARAMETERS, { $monomials }>::new(stars, camera, icrs_to_camera, model)?
+                .fit(residuals_px)
         }};
     }
     match model {

@@ -42,7 +42,7 @@ pub fn predictions_by_lens_terms(
     icrs_to_camera: &Rotation<Icrs, Camera>,
 ) -> Option<[Predictions; LENS_TERMS + 1]> {
     let model = Some(DistortionModel::BrownConrady);
-    let adjustment = Adjustment::<LENS_PARAMETERS, 0>::new(stars, (camera, icrs_to_camera), model)?;
+    let adjustment = Adjustment::<LENS_PARAMETERS, 0>::new(stars, camera, icrs_to_camera, model)?;
     let reduced = adjustment.reduced()?;
     let shares = reduced
         .root
@@ -59,17 +59,18 @@ pub fn predictions_by_polynomial(
     model: DistortionModel,
 ) -> Option<Predictions> {
     const PARAMETERS: usize = POSE_PARAMETERS + LINEAR_TERMS;
-    let at = (camera, icrs_to_camera);
     if model == DistortionModel::Cubic {
         predictions(Adjustment::<PARAMETERS, CUBIC_MONOMIALS>::new(
             stars,
-            at,
+            camera,
+            icrs_to_camera,
             Some(model),
         )?)
     } else {
         predictions(Adjustment::<PARAMETERS, QUINTIC_MONOMIALS>::new(
             stars,
-            at,
+            camera,
+            icrs_to_camera,
             Some(model),
         )?)
     }
@@ -242,28 +243,27 @@ mod tests {
     fn nested_models_are_as_each_by_itself() {
         let (camera, attitude, stars) = scattered_stars();
         let nested = predictions_by_lens_terms(&stars, &camera, &attitude).unwrap();
-        let at = (&camera, &attitude);
         let [radial, radial5, radial7, all] = DistortionModel::LENSES.map(Some);
         let alone = [
             (
                 0,
-                predictions(Adjustment::<4, 0>::new(&stars, at, None).unwrap()),
+                predictions(Adjustment::<4, 0>::new(&stars, &camera, &attitude, None).unwrap()),
             ),
             (
                 1,
-                predictions(Adjustment::<5, 0>::new(&stars, at, radial).unwrap()),
+                predictions(Adjustment::<5, 0>::new(&stars, &camera, &attitude, radial).unwrap()),
             ),
             (
                 2,
-                predictions(Adjustment::<6, 0>::new(&stars, at, radial5).unwrap()),
+                predictions(Adjustment::<6, 0>::new(&stars, &camera, &attitude, radial5).unwrap()),
             ),
             (
                 3,
-                predictions(Adjustment::<7, 0>::new(&stars, at, radial7).unwrap()),
+                predictions(Adjustment::<7, 0>::new(&stars, &camera, &attitude, radial7).unwrap()),
             ),
             (
                 7,
-                predictions(Adjustment::<11, 0>::new(&stars, at, all).unwrap()),
+                predictions(Adjustment::<11, 0>::new(&stars, &camera, &attitude, all).unwrap()),
             ),
         ];
         for (terms, expected) in alone {

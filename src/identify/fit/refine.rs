@@ -261,8 +261,9 @@ impl Refiner {
             field: problem.field,
             predicted: &self.predicted,
         };
-        let at = (&hypothesis, current.excess_sigma_px);
-        self.naming.find_candidates(stars, at, &mut self.pairing);
+        let excess_sigma_px = current.excess_sigma_px;
+        self.naming
+            .find_candidates(stars, &hypothesis, excess_sigma_px, &mut self.pairing);
         let taken = self.pairs.iter().map(|pair| pair.star);
         let candidates = &mut self.naming.candidates;
         self.blends
@@ -296,7 +297,8 @@ impl Refiner {
     ) {
         let photometry = problem.field.photometry;
         self.pairing.pair_up(
-            (observed, &self.predicted),
+            observed,
+            &self.predicted,
             radius_px,
             |o, p| hypothesis.mag_difference(o, p, photometry),
             &mut self.pairs,

@@ -239,10 +239,10 @@ fn classes_of(table: &[u8]) -> (Vec<SizeClass>, Vec<StoredClass>) {
     let class = |bytes: &[u8]| {
         let (words, starts) = bytes.split_at(16 + 8 * CHUNKS);
         let words = words.as_chunks().0;
-        let [low, high] = [words[0], words[1]].map(f64::from_le_bytes);
+        let limits = [words[0], words[1]].map(f64::from_le_bytes);
         let starts = starts.as_chunks().0.iter();
         let starts = starts.map(|start| u32::from_le_bytes(*start)).collect();
-        let class = SizeClass::not_loaded((low, high), starts);
+        let class = SizeClass::not_loaded(limits, starts);
         let checksums = words[2..].iter().map(|sum| u64::from_le_bytes(*sum));
         let stored = StoredClass {
             start,
@@ -306,8 +306,8 @@ mod tests {
         };
         let triangles: Vec<Triangle> = (0..100).map(triangle).collect();
         vec![
-            SizeClass::new((0.1, 0.2), &triangles[..40]),
-            SizeClass::new((0.2, 0.3), &triangles[40..]),
+            SizeClass::new([0.1, 0.2], &triangles[..40]),
+            SizeClass::new([0.2, 0.3], &triangles[40..]),
         ]
     }
 

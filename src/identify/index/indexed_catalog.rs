@@ -135,16 +135,18 @@ impl<'a> IndexedCatalog<'a> {
         std::mem::take(&mut *self.triangles.cache_errors())
     }
 
-    /// Calls `visit` with the corners of every triangle of a size class whose ratios lie within a
-    /// tolerance of those given, in an order that depends on the arguments alone.
+    /// Calls `visit` with the corners of every triangle of a size class whose ratios lie within
+    /// `tolerance` of `ratios`, in an order that depends on the arguments alone.
     #[inline]
     pub(in crate::identify) fn for_each_similar(
         &self,
-        similar: (usize, [f64; 2], f64),
+        class: usize,
+        ratios: [f64; 2],
+        tolerance: f64,
         visit: impl FnMut(&[u32; 3]),
     ) {
         self.triangles
-            .for_each_similar(self.stars(), similar, visit);
+            .for_each_similar(self.stars(), class, ratios, tolerance, visit);
     }
 
     /// The stars in small cells. They are sorted when they are first asked for: few searches last so
@@ -154,13 +156,13 @@ impl<'a> IndexedCatalog<'a> {
     }
 
     /// The narrowest and the widest horizontal field of view that can be identified, in radians.
-    pub fn fov_range_rad(&self) -> (f64, f64) {
+    pub fn fov_range_rad(&self) -> [f64; 2] {
         let smallest = self
             .triangles
             .classes
             .first()
             .map_or(f64::INFINITY, |class| class.low);
-        (FIELD_TO_SMALLEST * smallest, WIDEST_FOV_DEG * RAD_PER_DEG)
+        [FIELD_TO_SMALLEST * smallest, WIDEST_FOV_DEG * RAD_PER_DEG]
     }
 
     /// The stars of the catalog, brightest first.

@@ -63,16 +63,16 @@ impl ListedStar {
 }
 
 /// Smallest and largest longest side of each class, in radians, for a catalog of `stars` stars.
-pub fn class_limits_rad(stars: usize) -> Vec<(f64, f64)> {
+pub fn class_limits_rad(stars: usize) -> Vec<[f64; 2]> {
     let octaves = (MAX_DEG / MIN_DEG).ln() / CLASS_FACTOR.ln();
     let count = octaves.ceil() as i32;
     let limits = |class: i32| {
         let low_rad = MIN_DEG * RAD_PER_DEG * CLASS_FACTOR.powi(class);
-        (low_rad, low_rad * CLASS_FACTOR)
+        [low_rad, low_rad * CLASS_FACTOR]
     };
     let is_dense = |class: &i32| {
         // The share of the sphere around a cell.
-        let radius_rad = limits(*class).1 * CELL_RADIUS;
+        let radius_rad = limits(*class)[1] * CELL_RADIUS;
         stars as f64 * radius_rad * radius_rad / 4.0 >= STARS_AROUND_NARROW_CELL
     };
     let narrowest = (-NARROW_CLASSES_MAX..0).find(is_dense).unwrap_or(0);
@@ -86,7 +86,7 @@ pub fn class_limits_rad(stars: usize) -> Vec<(f64, f64)> {
 /// [`Interrupted`] when `interrupt` is due.
 pub fn list_class(
     stars: &[ListedStar],
-    limits_rad: (f64, f64),
+    limits_rad: [f64; 2],
     interrupt: &Interrupt,
 ) -> Result<SizeClass, Interrupted> {
     let (class, cells) = Class::new(stars, limits_rad);
@@ -98,7 +98,7 @@ pub fn list_class(
             Ok(class.triangles_of(&cells.zone(zone), &near))
         })
         .collect::<Result<Vec<_>, Interrupted>>()?;
-    let limits = (class.low, class.high);
+    let limits = [class.low, class.high];
     Ok(SizeClass::new(limits, &triangles.concat()))
 }
 
@@ -131,7 +131,7 @@ struct Class<'a> {
 }
 
 impl<'a> Class<'a> {
-    fn new(stars: &'a [ListedStar], (low_rad, high_rad): (f64, f64)) -> (Self, SkyCells) {
+    fn new(stars: &'a [ListedStar], [low_rad, high_rad]: [f64; 2]) -> (Self, SkyCells) {
         let radius_rad = high_rad * CELL_RADIUS;
         let class = Self {
             stars,
@@ -149,7 +149,7 @@ impl<'a> Class<'a> {
         let mut triangles = Vec::new();
         for (cell, around) in self.brightest_around(zone, near).iter().enumerate() {
             let first = triangles.len();
-            self.list_cell(zone, (cell, around), &mut triangles);
+            self.list_cell(zone, cell, around, &mut triangles);
             // By the faintest star, then the next: independent of how they were found.
             triangles[first..].sort_unstable_by_key(|triangle| {
                 let mut corners = triangle.corners;
@@ -186,7 +186,7 @@ impl<'a> Class<'a> {
     }
 
     /// Lists the triangles of the stars `around` a cell that belong to that cell.
-    fn list_cell(&self, zone: &Zone, (cell, around): (usize, &[u32]), out: &mut Vec<Triangle>) {
+    fn list_cell(&self, zone: &Zone, cell: usize, around: &[u32], out: &mut Vec<Triangle>) {
         // Nearly: the root decides.
         let least_sq = self.low * self.low * (1.0 - 1e-9);
         let most_sq = self.high * self.high * (1.0 + 1e-9);
@@ -268,12 +268,12 @@ mod tests {
 
     #[test]
     fn a_dense_catalogue_has_narrower_classes() {
-        let smallest_deg = |stars: usize| class_limits_rad(stars)[0].0 / RAD_PER_DEG;
+        let smallest_deg = |stars: usize| class_limits_rad(stars)[0][0] / RAD_PER_DEG;
         assert_eq!(smallest_deg(0), MIN_DEG);
         assert_eq!(smallest_deg(Catalog::built_in().stars().len()), MIN_DEG);
         assert!((smallest_deg(2_557_501) - 0.2).abs() < 1e-9);
         let limits = class_limits_rad(2_557_501);
-        let adjoin = |pair: &[(f64, f64)]| (pair[0].1 / pair[1].0 - 1.0).abs() < 1e-12;
+        let adjoin = |pair: &[[f64; 2]]| (pair[0][1] / pair[1][0] - 1.0).abs() < 1e-12;
         assert!(limits.windows(2).all(adjoin));
     }
 
@@ -290,9 +290,9 @@ mod tests {
     #[test]
     fn the_stars_around_a_cell_are_those_that_a_search_through_all_stars_finds() {
         let stars = ListedStar::all(&Catalog::built_in().stars()[..2000]);
-        for limits_deg in [(2.0, 2.8), (9.0, 13.0), (36.0, 51.0)] {
-            let (low_rad, high_rad) = (limits_deg.0 * RAD_PER_DEG, limits_deg.1 * RAD_PER_DEG);
-            let (class, cells) = Class::new(&stars, (low_rad, high_rad));
+        for limits_deg in [[2.0, 2.8], [9.0, 13.0], [36.0, 51.0]] {
+            let limits_rad = limits_deg.map(|limit_deg| limit_deg * RAD_PER_DEG);
+            let (class, cells) = Class::new(&stars, limits_rad);
             let by_zone = stars_by_zone(&stars, &cells);
             for number in [0, 1, cells.zones / 3, cells.zones / 2, cells.zones - 1] {
                 let zone = cells.zone(number);

@@ -79,7 +79,7 @@ pub struct SizeClass {
 impl SizeClass {
     /// The class of `triangles`, whose longest sides are from `low` to `high` as chords. Triangles
     /// of the same cell keep their order.
-    pub fn new((low, high): (f64, f64), triangles: &[Triangle]) -> Self {
+    pub fn new([low, high]: [f64; 2], triangles: &[Triangle]) -> Self {
         let mut cell_starts = vec![0u32; CELLS + 1];
         for triangle in triangles {
             cell_starts[triangle.cell() + 1] += 1;
@@ -95,7 +95,7 @@ impl SizeClass {
             sorted[*position as usize] = *triangle;
             *position += 1;
         }
-        let class = Self::not_loaded((low, high), cell_starts);
+        let class = Self::not_loaded([low, high], cell_starts);
         for (chunk, slot) in class.chunks.iter().enumerate() {
             let range = class.range(chunk);
             let _ = slot.set(sorted[range.start as usize..range.end as usize].into());
@@ -104,7 +104,7 @@ impl SizeClass {
     }
 
     /// A class without its chunks.
-    pub fn not_loaded((low, high): (f64, f64), cell_starts: Vec<u32>) -> Self {
+    pub fn not_loaded([low, high]: [f64; 2], cell_starts: Vec<u32>) -> Self {
         Self {
             low,
             high,

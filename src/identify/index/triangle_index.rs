@@ -72,7 +72,9 @@ impl TriangleIndex {
     pub fn for_each_similar(
         &self,
         stars: &[Star],
-        (class, ratios, tolerance): (usize, [f64; 2], f64),
+        class: usize,
+        ratios: [f64; 2],
+        tolerance: f64,
         visit: impl FnMut(&[u32; 3]),
     ) {
         let chunk = |chunk| self.chunk(stars, class, chunk);
@@ -146,7 +148,7 @@ mod tests {
                 ([0.98, 0.09], 0.02),
             ] {
                 let mut found = HashSet::new();
-                index.for_each_similar(stars, (number, wanted, tolerance), |corners| {
+                index.for_each_similar(stars, number, wanted, tolerance, |corners| {
                     assert!(found.insert(*corners), "listed twice");
                 });
                 let off = |corners: &[u32; 3]| {

@@ -200,7 +200,7 @@ impl Blends {
         detected: &PixelPoint,
     ) -> Option<Blend> {
         let index = candidate.star;
-        let near = self.near(view, (candidate.predicted, index));
+        let near = self.near(view, candidate.predicted, index);
         if near.from == near.to {
             return None;
         }
@@ -241,7 +241,7 @@ impl Blends {
     }
 
     /// The stars near a predicted star that may be blended with it.
-    fn near(&mut self, view: &View, (predicted, index): (usize, StarIndex)) -> Near {
+    fn near(&mut self, view: &View, predicted: usize, index: StarIndex) -> Near {
         let known = self.near[predicted].filter(|near| near.chord >= view.chord);
         known.unwrap_or_else(|| {
             let sky = view.problem.sky;

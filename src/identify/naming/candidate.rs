@@ -38,11 +38,7 @@ pub struct Candidate {
 
 impl Candidate {
     /// A candidate whose star is single. `sigma_px` and `gate_px` are those of the observed star.
-    pub fn new(
-        near: &NearPair,
-        predicted: &PredictedStar,
-        (sigma_px, gate_px): (f64, f64),
-    ) -> Self {
+    pub fn new(near: &NearPair, predicted: &PredictedStar, sigma_px: f64, gate_px: f64) -> Self {
         Self {
             observed: near.observed,
             predicted: near.predicted,

@@ -96,8 +96,8 @@ impl Completeness {
         self.visibility.resize(is_observed.len() + 1, 1.0);
         for (scale, cells) in self.scales.iter_mut().zip(CELLS) {
             let grid = Grid::new(field, cells);
-            scale.count(&grid, (is_observed, &self.shares), &mut self.scratch);
-            scale.refine(&mut self.visibility, (is_observed, &self.shares));
+            scale.count(&grid, is_observed, &self.shares, &mut self.scratch);
+            scale.refine(&mut self.visibility, is_observed, &self.shares);
         }
     }
 
@@ -142,12 +142,7 @@ impl Completeness {
 
 impl Scale {
     /// Counts the stars in each cell and its neighbors.
-    fn count(
-        &mut self,
-        grid: &Grid,
-        (is_observed, shares): (&[f64], &[f64]),
-        scratch: &mut Vec<f64>,
-    ) {
+    fn count(&mut self, grid: &Grid, is_observed: &[f64], shares: &[f64], scratch: &mut Vec<f64>) {
         for cells in [&mut self.observed, &mut self.expected] {
             cells.clear();
             cells.resize(grid.cells(), 0.0);
@@ -162,7 +157,7 @@ impl Scale {
     }
 
     /// The visibility on this scale, where what is known so far is that of the larger one.
-    fn refine(&self, visibility: &mut [f64], (is_observed, shares): (&[f64], &[f64])) {
+    fn refine(&self, visibility: &mut [f64], is_observed: &[f64], shares: &[f64]) {
         let stars = self.places.iter().zip(is_observed).zip(shares);
         for (((&cell, observed), share), visibility) in stars.zip(visibility) {
             // Without the star itself: it must not vouch for its own name.

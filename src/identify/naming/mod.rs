@@ -113,7 +113,8 @@ impl Naming {
     pub fn find_candidates(
         &mut self,
         stars: Stars,
-        (hypothesis, excess_sigma_px): (&Hypothesis, f64),
+        hypothesis: &Hypothesis,
+        excess_sigma_px: f64,
         pairing: &mut Pairing,
     ) {
         let Stars { field, predicted } = stars;
@@ -121,24 +122,21 @@ impl Naming {
         let radius_px = |index: usize, star: &ObservedStar| gate.radius_px(index, star);
         let difference =
             |o: &ObservedStar, p: &PredictedStar| hypothesis.mag_difference(o, p, field.photometry);
-        let near = pairing.candidates((&field.stars, predicted), radius_px, difference);
+        let near = pairing.candidates(&field.stars, predicted, radius_px, difference);
         self.candidates.clear();
         let candidates = near.iter().map(|near| {
             let star = &field.stars[near.observed];
             let sigma_px = gate.sigma_px(star);
-            Candidate::new(
-                near,
-                &predicted[near.predicted],
-                (sigma_px, gate.radius_px(near.observed, star)),
-            )
+            let gate_px = gate.radius_px(near.observed, star);
+            Candidate::new(near, &predicted[near.predicted], sigma_px, gate_px)
         });
         self.candidates.extend(candidates);
     }
 
     /// Computes the probabilities of the candidates.
     pub fn compute(&mut self, stars: Stars, is_first: bool) {
-        let frame = (stars.field, stars.predicted.len());
-        pack(&self.candidates, frame, &mut self.packed);
+        let Stars { field, predicted } = stars;
+        pack(&self.candidates, field, predicted.len(), &mut self.packed);
         if self.by_place {
             self.completeness.place(stars.field, stars.predicted);
         }
@@ -186,8 +184,8 @@ impl Naming {
                 self.odds_of_predicted[j] += odds;
             }
         }
-        let sums = (&self.odds_of_observed[..], &self.odds_of_predicted[..]);
-        set_chances(&mut self.packed, sums);
+        let (of_observed, of_predicted) = (&self.odds_of_observed, &self.odds_of_predicted);
+        set_chances(&mut self.packed, of_observed, of_predicted);
         clear(&mut self.has_name, observed + 1);
         clear(&mut self.is_observed, predicted + 1);
         for packed in &self.packed {

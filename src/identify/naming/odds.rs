@@ -24,16 +24,17 @@ pub struct OddsInputs<'a> {
 /// Packs `candidates` into `packed`, given the field and the number of predicted stars.
 pub fn pack(
     candidates: &[Candidate],
-    (field, predicted): (&StarField, usize),
+    field: &StarField,
+    predicted: usize,
     packed: &mut Vec<Packed>,
 ) {
     packed.clear();
     let chunks = candidates.chunks(LANES);
-    packed.extend(chunks.map(|chunk| packed_from(chunk, (field, predicted))));
+    packed.extend(chunks.map(|chunk| packed_from(chunk, field, predicted)));
 }
 
 /// Packs a few candidates.
-fn packed_from(candidates: &[Candidate], (field, predicted): (&StarField, usize)) -> Packed {
+fn packed_from(candidates: &[Candidate], field: &StarField, predicted: usize) -> Packed {
     let mut packed = Packed {
         observed: [field.stars.len() as u32; LANES],
         predicted: [predicted as u32; LANES],
@@ -93,7 +94,7 @@ pub fn set_odds(candidates: &mut [Packed], known: &OddsInputs) {
 
 /// Sets the probabilities of chance, from the sums of odds of each observed and each predicted star.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub fn set_chances(candidates: &mut [Packed], (of_observed, of_predicted): (&[f64], &[f64])) {
+pub fn set_chances(candidates: &mut [Packed], of_observed: &[f64], of_predicted: &[f64]) {
     for packed in candidates {
         let mut all = [0.0; LANES];
         for (lane, (observed, predicted)) in packed.places().enumerate() {

@@ -93,7 +93,7 @@ impl Unrelated {
         self.crowding.resize(self.weights.len(), 1.0);
         for (scale, cells) in self.scales.iter_mut().zip(CELLS) {
             let grid = Grid::new(field, cells);
-            scale.raise(&mut self.crowding, &grid, (&self.weights, mean));
+            scale.raise(&mut self.crowding, &grid, &self.weights, mean);
         }
     }
 
@@ -145,7 +145,7 @@ impl Scale {
     }
 
     /// Raises the crowding where the surroundings are denser than the frame's `mean`.
-    fn raise(&mut self, crowding: &mut [f64], grid: &Grid, (weights, mean): (&[f64], f64)) {
+    fn raise(&mut self, crowding: &mut [f64], grid: &Grid, weights: &[f64], mean: f64) {
         for ((cell, _), weight) in self.places.iter().zip(weights) {
             self.cells[*cell as usize] += weight;
         }

@@ -122,14 +122,14 @@ pub struct Batch {
 
 impl ConfirmingStars<'_> {
     /// Magnitudes of a catalogue star that confirms, if it is at the place of this one.
-    fn magnitudes(&self, star: usize, zero_point_mag: f64) -> (f64, f64) {
+    fn magnitudes(&self, star: usize, zero_point_mag: f64) -> [f64; 2] {
         let tolerance_mag = self.field.photometry.tolerance_mag();
         let v_mag = self.field.stars[star].mag + zero_point_mag;
-        (v_mag - tolerance_mag, v_mag + tolerance_mag)
+        [v_mag - tolerance_mag, v_mag + tolerance_mag]
     }
 
     /// The likelihood ratio of one star's answer.
-    fn factor(&self, is_confirming: bool, radius_rad: f64, (bright, faint): (f64, f64)) -> f64 {
+    fn factor(&self, is_confirming: bool, radius_rad: f64, [bright, faint]: [f64; 2]) -> f64 {
         let chance = self.sky.chance_within(radius_rad, bright, faint);
         let chance = chance.min(self.true_confirmation);
         if is_confirming {
@@ -187,7 +187,7 @@ impl ConfirmingStars<'_> {
             }
             // Each of these loops only fetches, so that many fetches overlap.
             for lookup in lookups.iter_mut() {
-                let (_, faint) =
+                let [_, faint] =
                     self.magnitudes(index, pending[lookup.hypothesis as usize].zero_point_mag);
                 let is_bright = |disc: &Disc| faces.may_hold(disc.first_cell(), faint as f32);
                 lookup.is_bright = lookup.disc.as_ref().is_some_and(is_bright);
@@ -218,6 +218,6 @@ impl ConfirmingStars<'_> {
     }
 }
 
-fn in_single_precision((bright, faint): (f64, f64)) -> RangeInclusive<f32> {
+fn in_single_precision([bright, faint]: [f64; 2]) -> RangeInclusive<f32> {
     bright as f32..=faint as f32
 }

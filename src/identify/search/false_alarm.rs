@@ -110,7 +110,8 @@ impl FalseAlarm {
     /// tests is corrected for.
     pub fn log10(
         &mut self,
-        (hypothesis, hypotheses): (&Hypothesis, u64),
+        hypothesis: &Hypothesis,
+        hypotheses: u64,
         problem: Problem,
         stars: usize,
         around: &mut Surroundings,

@@ -96,7 +96,7 @@ pub struct Search<'a> {
     near: Option<SkyRegion>,
     buffers: &'a mut Buffers,
     /// Smallest and largest focal length, in pixels.
-    focal_px: (f64, f64),
+    focal_px: [f64; 2],
     diagonal_px: f64,
     /// Position of this search among those over the field, from 1.
     number: u32,
@@ -150,7 +150,7 @@ struct Query {
     /// Its longest side, as a chord, at the focal length `middle_px`.
     longest: f64,
     middle_px: f64,
-    range_px: (f64, f64),
+    range_px: [f64; 2],
 }
 
 /// A catalogue triangle beside an observed one.
@@ -181,12 +181,12 @@ impl<'a> Search<'a> {
         buffers.refiner.around.forget();
         buffers.hypotheses_of.clear();
         buffers.hypotheses_of.resize(most, 0);
-        let (narrowest_rad, widest_rad) = sky.fov_range_rad();
+        let [narrowest_rad, widest_rad] = sky.fov_range_rad();
         let wide = focal_length_px(field.width_px, widest_rad * FOV_SLACK);
         let narrow = focal_length_px(field.width_px, narrowest_rad / FOV_SLACK);
         let focal_px = match priors.pixel_scale_range_rad(field.width_px) {
-            Some((smallest, largest)) => (1.0 / largest, 1.0 / smallest),
-            None => (wide, narrow),
+            Some([smallest, largest]) => [1.0 / largest, 1.0 / smallest],
+            None => [wide, narrow],
         };
         let stars = buffers.offsets.len() as u64;
         let triangles = stars * stars.saturating_sub(1) * stars.saturating_sub(2) / 6;
@@ -326,8 +326,8 @@ impl<'a> Search<'a> {
     fn try_triangle(&mut self, triangle: &ObservedTriangle) -> Option<Found> {
         // Its size at the longest and the shortest focal length.
         let (smallest, largest) = (
-            self.longest_side(triangle, self.focal_px.1) / CLASS_SLACK,
-            self.longest_side(triangle, self.focal_px.0) * CLASS_SLACK,
+            self.longest_side(triangle, self.focal_px[1]) / CLASS_SLACK,
+            self.longest_side(triangle, self.focal_px[0]) * CLASS_SLACK,
         );
         let classes = &self.problem.sky.triangles.classes;
         let is_of_size = |number: &usize| {
@@ -344,10 +344,10 @@ impl<'a> Search<'a> {
         let class = &self.problem.sky.triangles.classes[number];
         let low_px = self
             .focal_of_chord(triangle, class.high)?
-            .max(self.focal_px.0);
+            .max(self.focal_px[0]);
         let high_px = self
             .focal_of_chord(triangle, class.low)?
-            .min(self.focal_px.1);
+            .min(self.focal_px[1]);
         if low_px >= high_px {
             return None;
         }
@@ -358,7 +358,7 @@ impl<'a> Search<'a> {
         let factor = (high_px / low_px).powf(1.0 / steps);
         (0..steps as i32).find_map(|i| {
             let from_px = low_px * factor.powi(i);
-            self.try_focal(triangle, number, (from_px, from_px * factor))
+            self.try_focal(triangle, number, [from_px, from_px * factor])
         })
     }
 
@@ -393,12 +393,12 @@ impl<'a> Search<'a> {
         &mut self,
         triangle: &ObservedTriangle,
         class: usize,
-        range_px: (f64, f64),
+        range_px: [f64; 2],
     ) -> Option<Found> {
         if self.is_to_end() {
             return None;
         }
-        let middle_px = (range_px.0 * range_px.1).sqrt();
+        let middle_px = (range_px[0] * range_px[1]).sqrt();
         let vectors = self.vectors(triangle, middle_px);
         let shape = TriangleShape::new([&vectors[0], &vectors[1], &vectors[2]])?;
         let query = Query {
@@ -412,10 +412,10 @@ impl<'a> Search<'a> {
         };
         let mut similar = std::mem::take(&mut self.buffers.similar);
         similar.clear();
-        let shape = (class, shape.ratios, triangle.tolerance);
-        self.problem
-            .sky
-            .for_each_similar(shape, |corners| similar.push(*corners));
+        let sky = self.problem.sky;
+        sky.for_each_similar(class, shape.ratios, triangle.tolerance, |corners| {
+            similar.push(*corners);
+        });
         let found = similar
             .chunks(WEIGHED)
             .find_map(|corners| self.try_similar(&query, corners));
@@ -468,7 +468,7 @@ impl<'a> Search<'a> {
         let zero_point = weighed.zero_point_mag?;
         let focal_px = weighed.focal_px;
         let slack = 1.0 + 2.0 * triangle.tolerance;
-        if focal_px < query.range_px.0 / slack || focal_px > query.range_px.1 * slack {
+        if focal_px < query.range_px[0] / slack || focal_px > query.range_px[1] * slack {
             return None;
         }
         let sky = corners
@@ -614,7 +614,7 @@ impl<'a> Search<'a> {
         stars: usize,
     ) -> Option<Found> {
         let radius_px = triangle.confirming_px;
-        let refined = self.refined((hypothesis, radius_px), stars)?;
+        let refined = self.refined(hypothesis, radius_px, stars)?;
         Some(Found {
             log10_false_alarm: self.log10_with(&refined.hypothesis(), stars)?,
             refined,
@@ -626,7 +626,8 @@ impl<'a> Search<'a> {
 
     fn refined(
         &mut self,
-        (hypothesis, radius_px): (&Hypothesis, f64),
+        hypothesis: &Hypothesis,
+        radius_px: f64,
         stars: usize,
     ) -> Option<Refined> {
         let start = Start {
@@ -642,7 +643,7 @@ impl<'a> Search<'a> {
     /// What was found, fitted to all [`TESTED_STARS`], for the fit to all stars to start from.
     pub fn with_more_stars(&mut self, found: &Found) -> Refined {
         let more = (found.stars < TESTED_STARS)
-            .then(|| self.refined((&found.first, found.radius_px), TESTED_STARS));
+            .then(|| self.refined(&found.first, found.radius_px, TESTED_STARS));
         more.flatten().unwrap_or(found.refined)
     }
 
@@ -687,7 +688,7 @@ impl<'a> Search<'a> {
     fn log10_in(&mut self, problem: Problem, hypothesis: &Hypothesis, stars: usize) -> Option<f64> {
         let focal_px = hypothesis.camera.focal_length_px;
         let slack = 1.0 + 2.0 * PASSES[1].tolerance;
-        if focal_px < self.focal_px.0 / slack || focal_px > self.focal_px.1 * slack {
+        if focal_px < self.focal_px[0] / slack || focal_px > self.focal_px[1] * slack {
             return None;
         }
         if let Some(SkyRegion { centre, radius_rad }) = &self.near {
@@ -702,12 +703,7 @@ impl<'a> Search<'a> {
             false_alarm,
             ..
         } = self.buffers;
-        let log10 = false_alarm.log10(
-            (hypothesis, hypotheses),
-            problem,
-            stars,
-            &mut refiner.around,
-        );
+        let log10 = false_alarm.log10(hypothesis, hypotheses, problem, stars, &mut refiner.around);
         Some((log10 + searches_weight(self.number).log10()).min(0.0))
     }
 }

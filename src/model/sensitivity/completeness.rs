@@ -105,7 +105,8 @@ impl Detector {
     /// The matched filter on a frame, where threshold and noise were measured: the threshold in
     /// standard deviations that white noise of `noise_e` electrons a pixel has after the filter.
     pub fn on_frame(
-        (threshold_sigma, noise_e): (f64, f64),
+        threshold_sigma: f64,
+        noise_e: f64,
         config: &DetectConfig,
         scenario: &Scenario,
         budget: &Budget,

@@ -24,7 +24,7 @@ pub struct Figure {
     /// Name of the parameter along the axis.
     pub parameter: &'static str,
     /// First and last value of the parameter.
-    pub range: (f64, f64),
+    pub range: [f64; 2],
     /// Spacing of the values.
     pub spacing: Spacing,
     /// The parameter that differs between the curves.
@@ -34,41 +34,41 @@ pub struct Figure {
 impl Figure {
     /// All eleven figures.
     pub const ALL: [Self; 11] = [
-        Self::over("3a", "Lens transmission", "lens_transmission", (0.1, 1.0)),
-        Self::over("3b", "Aperture", "aperture_mm", (5.0, 200.0)),
-        Self::over("3c", "Focal length", "focal_length_mm", (20.0, 500.0)),
+        Self::over("3a", "Lens transmission", "lens_transmission", [0.1, 1.0]),
+        Self::over("3b", "Aperture", "aperture_mm", [5.0, 200.0]),
+        Self::over("3c", "Focal length", "focal_length_mm", [20.0, 500.0]),
         Self::over(
             "3d",
             "Peak quantum efficiency",
             "quantum_efficiency",
-            (0.1, 1.0),
+            [0.1, 1.0],
         ),
-        Self::over("3e", "Pixel area", "pixel_area_um2", (10.0, 400.0)),
+        Self::over("3e", "Pixel area", "pixel_area_um2", [10.0, 400.0]),
         Self::over(
             "3f",
             "Share of the brightest pixel",
             "peak_share",
-            (0.02, 1.0),
+            [0.02, 1.0],
         ),
-        Self::over("3g", "Dark current", "dark_current_e_s", (0.0, 1e5)),
+        Self::over("3g", "Dark current", "dark_current_e_s", [0.0, 1e5]),
         Self {
             series: Series::PAPER_APERTURES,
-            ..Self::over("3h", "Exposure", "exposure_s", (0.005, 1.0))
+            ..Self::over("3h", "Exposure", "exposure_s", [0.005, 1.0])
         },
         Self::over(
             "4a",
             "Transmission of the air, 555 nm",
             "zenith_transmission",
-            (0.02, 0.95),
+            [0.02, 0.95],
         ),
-        Self::over("4b", "Zenith distance", "zenith_distance_deg", (0.0, 88.0)),
+        Self::over("4b", "Zenith distance", "zenith_distance_deg", [0.0, 88.0]),
         Self {
             spacing: Spacing::Log,
             ..Self::over(
                 "4c",
                 "Illuminance by the sky",
                 "sky_illuminance_lx",
-                (1e-4, 0.1),
+                [1e-4, 0.1],
             )
         },
     ];
@@ -77,7 +77,7 @@ impl Figure {
         id: &'static str,
         title: &'static str,
         parameter: &'static str,
-        range: (f64, f64),
+        range: [f64; 2],
     ) -> Self {
         Self {
             id,

@@ -38,15 +38,12 @@ impl Spacing {
 }
 
 impl Spacing {
-    /// [`Self::values`] with checked arguments.
+    /// [`Self::values`] from the first to the second of `ends`, with checked arguments.
     ///
     /// # Errors
     /// [`SweepError::Count`], [`SweepError::Backwards`], [`SweepError::LogOfNothing`].
-    pub fn checked_values(
-        self,
-        (from, to): (f64, f64),
-        count: usize,
-    ) -> Result<Vec<f64>, SweepError> {
+    pub fn checked_values(self, ends: [f64; 2], count: usize) -> Result<Vec<f64>, SweepError> {
+        let [from, to] = ends;
         if !(2..=Sweep::MAX_VALUES).contains(&count) {
             return Err(SweepError::Count { count });
         }
@@ -122,19 +119,19 @@ impl Sweep {
     /// Largest number of values.
     pub const MAX_VALUES: usize = 1000;
 
-    /// `count` values of the parameter called `name`.
+    /// `count` values of the parameter called `name`, from the first to the second of `ends`.
     ///
     /// # Errors
     /// [`SweepError`] for an unknown name, a value outside the limits, or an invalid range or
     /// count.
     pub fn new(
         name: &str,
-        (from, to): (f64, f64),
+        ends: [f64; 2],
         count: usize,
         spacing: Spacing,
     ) -> Result<Self, SweepError> {
         let parameter = Parameter::named(name)?;
-        let values = spacing.checked_values((from, to), count)?;
+        let values = spacing.checked_values(ends, count)?;
         let limits = parameter.limits();
         match values.iter().find(|value| !limits.accept(**value)) {
             Some(&found) => Err(SweepError::Value {
@@ -246,7 +243,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn sweep(name: &str, from: f64, to: f64, count: usize) -> Result<Sweep, SweepError> {
-        Sweep::new(name, (from, to), count, Spacing::Linear)
+        Sweep::new(name, [from, to], count, Spacing::Linear)
     }
 
     #[test]
@@ -292,7 +289,7 @@ mod tests {
             ),
             (sweep("bits", 8.0, 9.0, 3), "bits would be 8.5"),
             (
-                Sweep::new("dark_current_e_s", (0.0, 9.0), 3, Spacing::Log),
+                Sweep::new("dark_current_e_s", [0.0, 9.0], 3, Spacing::Log),
                 "logarithmic steps from 0",
             ),
         ] {

@@ -1,6 +1,7 @@
 //! A frame as color cameras and phones record it: a mosaic of colors, demosaiced, smoothed against
 //! noise, a tone curve, eight bits, JPEG.
 
+use crate::base::size::Size;
 use crate::camera::data_sheet::Imperfections;
 use crate::frame::{self, Frame, FrameError};
 use image::ExtendedColorType;
@@ -26,7 +27,8 @@ impl ColorCamera {
     /// The camera's processing, if it has any, of frames whose background has this level and noise.
     pub fn of(
         made: &Imperfections,
-        (level_adu, noise_adu): (f64, f64),
+        level_adu: f64,
+        noise_adu: f64,
         white_adu: f64,
     ) -> Option<Self> {
         (made.jpeg_quality > 0.0).then_some(Self {
@@ -53,8 +55,12 @@ impl ColorCamera {
         let exponent = 1.0 / self.tone_gamma;
         let tone = |linear: f64| (WHITE * libm::pow(linear.clamp(0.0, 1.0), exponent)).round();
         let samples: Vec<u8> = colors.iter().flatten().map(|c| tone(*c) as u8).collect();
-        let size = [frame.width, frame.height];
-        decoded_jpeg(&samples, size, ExtendedColorType::Rgb8, self.jpeg_quality)
+        decoded_jpeg(
+            &samples,
+            frame.size(),
+            ExtendedColorType::Rgb8,
+            self.jpeg_quality,
+        )
     }
 }
 
@@ -121,14 +127,14 @@ fn smooth(colors: &mut [[f64; 3]], width: usize, sigma_px: f64) {
 /// [`FrameError`] if no JPEG can have its size.
 pub fn decoded_jpeg(
     samples: &[u8],
-    [width, height]: [usize; 2],
+    size: Size,
     form: ExtendedColorType,
     quality: u8,
 ) -> Result<Frame<'static>, FrameError> {
     let mut bytes = Vec::new();
     let mut encoder = JpegEncoder::new_with_quality(&mut bytes, quality);
     encoder
-        .encode(samples, width as u32, height as u32, form)
+        .encode(samples, size.width as u32, size.height as u32, form)
         .map_err(std::io::Error::other)?;
     frame::decode(&bytes)
 }
@@ -172,8 +178,8 @@ mod tests {
             tone_gamma: 2.2,
             ..Imperfections::default()
         };
-        assert!(ColorCamera::of(&Imperfections::default(), (100.0, 5.0), 4095.0).is_none());
-        let camera = ColorCamera::of(&made, (120.0, 5.0), 1100.0).unwrap();
+        assert!(ColorCamera::of(&Imperfections::default(), 100.0, 5.0, 4095.0).is_none());
+        let camera = ColorCamera::of(&made, 120.0, 5.0, 1100.0).unwrap();
         let frame = Frame::new(64, 48, vec![350.0; 64 * 48]).unwrap();
         let recorded = camera.record(&frame).unwrap();
         assert_eq!((recorded.width, recorded.height), (64, 48));

@@ -44,7 +44,7 @@ pub(super) fn make_gaussian(sheet: &mut DataSheet) {
         let profile = profile(sigma_px);
         let ln_responses = centres
             .iter()
-            .map(|&place| response(&image, place, &profile).ln());
+            .map(|&(x, y)| response(&image, x, y, &profile).ln());
         ln_responses.sum::<f64>() / centres.len() as f64
     };
     let best = sigmas()
@@ -69,7 +69,7 @@ fn profile(sigma_px: f64) -> Vec<f64> {
 }
 
 /// The response at a place to the filter with this profile, for noise of one in each pixel.
-fn response(image: &ElectronImage, (x, y): (usize, usize), profile: &[f64]) -> f64 {
+fn response(image: &ElectronImage, x: usize, y: usize, profile: &[f64]) -> f64 {
     let reach = profile.len() / 2;
     let norm: f64 = profile.iter().map(|p| p * p).sum();
     let row = |(row, of_row): (usize, &f64)| {

@@ -308,7 +308,7 @@ impl<'a> Simulator<'a> {
         let level_adu =
             sheet.bias_adu + (budget.background_e + budget.dark_e) / sheet.gain_e_per_adu;
         let noise_adu = budget.background_noise_e / sheet.gain_e_per_adu;
-        match ColorCamera::of(&sheet.imperfections, (level_adu, noise_adu), white_adu) {
+        match ColorCamera::of(&sheet.imperfections, level_adu, noise_adu, white_adu) {
             Some(camera) => camera.record(&frame),
             None => Ok(frame),
         }

@@ -88,15 +88,15 @@ impl SpotRenderer {
         }
         if let Some(profile) = &self.profile {
             let share = |x, y| profile.share(x, y);
-            return add_pixels(image, position, electrons, (columns, rows), share);
+            return add_pixels(image, position, electrons, columns, rows, share);
         }
         if let Some((picture, step_px)) = &self.picture {
             let share = |x, y| picture.share(x, y, *step_px);
-            return add_pixels(image, position, electrons, (columns, rows), share);
+            return add_pixels(image, position, electrons, columns, rows, share);
         }
         if self.form == SpotForm::Disc {
             let share = |x, y| disc_share(x, y, reach_px);
-            return add_pixels(image, position, electrons, (columns, rows), share);
+            return add_pixels(image, position, electrons, columns, rows, share);
         }
         let sigma_px = self.sigma_px();
         for (pixels, at, into) in [
@@ -126,7 +126,8 @@ fn add_pixels(
     image: &mut ElectronImage,
     position: &PixelPoint,
     electrons: f64,
-    (columns, rows): (Range<usize>, Range<usize>),
+    columns: Range<usize>,
+    rows: Range<usize>,
     share: impl Fn(f64, f64) -> f64,
 ) {
     for y in rows {

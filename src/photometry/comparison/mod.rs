@@ -75,9 +75,9 @@ pub fn compare(stated: &ObservingSetup, frame: &FrameMeasurement) -> Option<Comp
     let exposure_s = frame.exposure_s?;
     let transmissions = transmissions(frame);
     let typical = median(&mut transmissions.clone());
-    let (scenario, zenith_is_known) = scenario(stated, frame, (exposure_s, typical));
+    let (scenario, zenith_is_known) = scenario(stated, frame, exposure_s, typical);
     let budget = Budget::new(&scenario);
-    let detector = detector(frame, &scenario, &budget, (&transmissions, typical));
+    let detector = detector(frame, &scenario, &budget, &transmissions, typical);
     let peak = Detector::new(Rule::PeakPixel, &scenario, &budget);
     let colors = frame.zero_point_colors;
     let zero_point_vmag = expected_zero_point_vmag(&scenario, colors, frame.has_color_term);
@@ -133,7 +133,8 @@ pub fn compare(stated: &ObservingSetup, frame: &FrameMeasurement) -> Option<Comp
 fn scenario(
     stated: &ObservingSetup,
     frame: &FrameMeasurement,
-    (exposure_s, typical): (f64, f64),
+    exposure_s: f64,
+    typical: f64,
 ) -> (Scenario, bool) {
     let mut scenario = Scenario::new(stated.sheet.clone());
     let is_above_horizon = |zenith_deg: &f64| *zenith_deg < 90.0;
@@ -160,14 +161,15 @@ fn detector(
     frame: &FrameMeasurement,
     scenario: &Scenario,
     budget: &Budget,
-    (transmissions, typical): (&[f64], f64),
+    transmissions: &[f64],
+    typical: f64,
 ) -> Detector {
     let noise_e = frame.noise_adu * scenario.camera.gain_e_per_adu;
     // A frame without light has no threshold.
     let detector = match frame.threshold_sigma > 0.0 {
         true => {
-            let threshold = (frame.threshold_sigma, noise_e);
-            Detector::on_frame(threshold, &frame.detect, scenario, budget)
+            let threshold_sigma = frame.threshold_sigma;
+            Detector::on_frame(threshold_sigma, noise_e, &frame.detect, scenario, budget)
         }
         false => Detector::matched_filter(&frame.detect, scenario, budget),
     };

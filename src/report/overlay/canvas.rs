@@ -1,6 +1,7 @@
 //! Draws strokes and letters on a picture.
 
 use super::grey::Grey;
+use crate::base::size::Size;
 use image::RgbImage;
 use std::sync::OnceLock;
 use tiny_skia::{FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Stroke, Transform};
@@ -51,7 +52,8 @@ pub(super) struct Canvas {
 
 impl Canvas {
     /// A canvas of `size` pixels with the frame in its upper left corner.
-    pub(super) fn new(grey: &Grey, [width, height]: [usize; 2], unit: f32) -> Self {
+    pub(super) fn new(grey: &Grey, size: Size, unit: f32) -> Self {
+        let Size { width, height } = size;
         // A picture has at least one pixel, and far fewer than 2^31.
         let mut pixmap = Pixmap::new(width.max(1) as u32, height.max(1) as u32)
             .expect("the size of a picture is above zero and bounded");

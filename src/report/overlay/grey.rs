@@ -1,6 +1,7 @@
 //! The frame as grey levels.
 
 use crate::base::coords::PixelPoint;
+use crate::base::size::Size;
 use crate::detect::BackgroundMap;
 use crate::frame::Frame;
 use crate::pipeline::Background;
@@ -36,7 +37,7 @@ impl Grey {
             frame.width.div_ceil(reduced),
             frame.height.div_ceil(reduced),
         );
-        let light = light(frame, reduced, [width, height]);
+        let light = light(frame, reduced, Size::new(width, height));
         // The mean of n² pixels has 1/n of the noise.
         let noise = background.map_or(0.0, |sky| sky.noise_adu as f32) / reduced as f32;
         let small = greys(&light, noise);
@@ -73,7 +74,7 @@ impl Grey {
 }
 
 /// Light above the background: means over squares of `side` pixels, NaN where there is no value.
-fn light(frame: &Frame, side: usize, [width, height]: [usize; 2]) -> Vec<f32> {
+fn light(frame: &Frame, side: usize, size: Size) -> Vec<f32> {
     /// Background cells along the longer side: wide enough to keep the glow around bright stars.
     const CELLS: usize = 16;
     const MIN_CELL_PX: usize = 64;
@@ -81,9 +82,9 @@ fn light(frame: &Frame, side: usize, [width, height]: [usize; 2]) -> Vec<f32> {
     let background = BackgroundMap::measure(frame, cell_px);
     let pixels = frame.values();
     let mut levels = vec![0.0; frame.width];
-    let mut light = Vec::with_capacity(width * height);
-    for rows in 0..height {
-        let mut sums = vec![(0.0_f32, 0_u32); width];
+    let mut light = Vec::with_capacity(size.pixels());
+    for rows in 0..size.height {
+        let mut sums = vec![(0.0_f32, 0_u32); size.width];
         for y in rows * side..((rows + 1) * side).min(frame.height) {
             background.row(y, &mut levels);
             let row = &pixels[y * frame.width..(y + 1) * frame.width];

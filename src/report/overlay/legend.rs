@@ -4,6 +4,7 @@ use super::canvas::{Canvas, Color, text_width};
 use super::grey::Grey;
 use super::mark::{Kind, Mark};
 use crate::base::format::{counted, degrees, hours};
+use crate::base::size::Size;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::camera::CameraModel;
 use crate::identify::Identification;
@@ -48,12 +49,12 @@ const LENGTHS: [(f64, &str); 20] = [
     (0.1, "0.1″"),
 ];
 
-/// Size of the whole picture, frame and strip, in pixels.
-pub(super) fn size(grey: &Grey, unit: f32) -> [usize; 2] {
-    [
+/// Size of the whole picture, frame and strip.
+pub(super) fn size(grey: &Grey, unit: f32) -> Size {
+    Size::new(
         grey.width.max((MIN_WIDTH * unit) as usize),
         grey.height + (HEIGHT * unit) as usize,
-    ]
+    )
 }
 
 /// Draws the strip.

@@ -60,7 +60,9 @@ pub fn bodies_at(date: &ObservationDate, error: TimeError, site: Option<Site>) -
 /// Those of [`bodies_at`] that are within `radius_rad` of a direction. Faster where few are.
 #[doc(hidden)]
 pub fn bodies_within(
-    (date, error, site): (&ObservationDate, TimeError, Option<Site>),
+    date: &ObservationDate,
+    error: TimeError,
+    site: Option<Site>,
     centre: &UnitVector<Icrs>,
     radius_rad: f64,
 ) -> Vec<Body> {

@@ -171,7 +171,7 @@ fn bodies_near_a_direction_are_those_of_all_that_are_near_it() {
         for radius_rad in [0.001, 0.1, 0.5, 4.0] {
             let near = all.into_iter();
             let near = near.filter(|body| body.direction.angle_to(&centre) < radius_rad);
-            let found = bodies_within((&date, TimeError::Zone, None), &centre, radius_rad);
+            let found = bodies_within(&date, TimeError::Zone, None, &centre, radius_rad);
             assert_eq!(found, near.collect::<Vec<_>>());
         }
     }

@@ -148,7 +148,8 @@ impl Canvas {
         &mut self,
         centre: &PixelPoint,
         radius_px: f64,
-        [soft_px, rim]: [f64; 2],
+        soft_px: f64,
+        rim: f64,
         light: f64,
     ) {
         let [columns, rows] = self.around(centre, radius_px + soft_px);

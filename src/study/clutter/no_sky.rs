@@ -6,6 +6,7 @@ use super::kind::Kind;
 use super::recording::JPEG_QUALITY;
 use super::scenery;
 use crate::base::coords::PixelPoint;
+use crate::base::size::Size;
 use crate::frame::{Frame, FrameError};
 use crate::model::simulate::decoded_jpeg;
 use image::ExtendedColorType;
@@ -45,7 +46,7 @@ pub(super) fn picture(kind: Kind, random: &mut ChaCha8Rng) -> Result<Frame<'stat
     if random.random_bool(0.5) {
         return decoded_jpeg(
             &levels,
-            [WIDTH, HEIGHT],
+            Size::new(WIDTH, HEIGHT),
             ExtendedColorType::L8,
             JPEG_QUALITY,
         );
@@ -124,7 +125,7 @@ fn text(canvas: &mut Canvas, ground: &Ground, random: &mut ChaCha8Rng) {
             // A blank ends a word.
             if random.random_bool(0.83) {
                 let letter = &LETTERS[random.random_range(0..LETTERS.len())];
-                draw_letter(canvas, letter, [x, y, dot_px], light);
+                draw_letter(canvas, letter, &PixelPoint::new(x, y), dot_px, light);
             }
             x += 6.0 * dot_px;
         }
@@ -132,10 +133,13 @@ fn text(canvas: &mut Canvas, ground: &Ground, random: &mut ChaCha8Rng) {
     }
 }
 
-fn draw_letter(canvas: &mut Canvas, letter: &[u8; 7], [x, y, dot_px]: [f64; 3], light: f64) {
+fn draw_letter(canvas: &mut Canvas, letter: &[u8; 7], at: &PixelPoint, dot_px: f64, light: f64) {
     for (row, bits) in letter.iter().enumerate() {
         for column in (0..5).filter(|column| bits >> (4 - column) & 1 == 1) {
-            let low = PixelPoint::new(x + f64::from(column) * dot_px, y + row as f64 * dot_px);
+            let low = PixelPoint::new(
+                at.x + f64::from(column) * dot_px,
+                at.y + row as f64 * dot_px,
+            );
             let high = PixelPoint::new(low.x + dot_px, low.y + dot_px);
             canvas.rectangle(&low, &high, light);
         }
@@ -153,7 +157,8 @@ fn drawings(canvas: &mut Canvas, ground: &Ground, random: &mut ChaCha8Rng) {
                 canvas,
                 &from,
                 random.random_range(4.0..150.0),
-                [width_px, light],
+                width_px,
+                light,
             ),
             2 => {
                 let corners = [
@@ -171,7 +176,7 @@ fn drawings(canvas: &mut Canvas, ground: &Ground, random: &mut ChaCha8Rng) {
     }
 }
 
-fn circle(canvas: &mut Canvas, centre: &PixelPoint, radius: f64, [width_px, light]: [f64; 2]) {
+fn circle(canvas: &mut Canvas, centre: &PixelPoint, radius: f64, width_px: f64, light: f64) {
     const PARTS: u32 = 48;
     let at = |part: u32| {
         let (sin, cos) = libm::sincos(TAU * f64::from(part) / f64::from(PARTS));
@@ -213,7 +218,7 @@ fn snow(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
         if radius_px < 2.0 {
             canvas.spot(&at, radius_px, 3.0 * light);
         } else {
-            canvas.disc_of_light(&at, radius_px, [0.4 * radius_px, 0.0], light);
+            canvas.disc_of_light(&at, radius_px, 0.4 * radius_px, 0.0, light);
         }
     }
 }
@@ -225,7 +230,7 @@ fn bokeh(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
     for _ in 0..log_uniform(random, 8.0, 200.0) as usize {
         let at = place(canvas, random);
         let own_px = radius_px * random.random_range(0.7..1.2);
-        canvas.disc_of_light(&at, own_px, [1.5, rim], log_uniform(random, 3.0, 80.0));
+        canvas.disc_of_light(&at, own_px, 1.5, rim, log_uniform(random, 3.0, 80.0));
     }
 }
 

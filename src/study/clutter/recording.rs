@@ -148,8 +148,7 @@ pub(super) fn as_jpeg(
     let gamma = 1.0 / random.random_range(1.8..2.4);
     let tone = |linear: f64| (WHITE * libm::pow(linear.clamp(0.0, 1.0), gamma)).round() as u8;
     let bytes: Vec<u8> = colors.into_iter().flatten().map(tone).collect();
-    let size = [frame.width, frame.height];
-    decoded_jpeg(&bytes, size, ExtendedColorType::Rgb8, JPEG_QUALITY)
+    decoded_jpeg(&bytes, frame.size(), ExtendedColorType::Rgb8, JPEG_QUALITY)
 }
 
 #[cfg(test)]

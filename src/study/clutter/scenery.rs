@@ -88,7 +88,7 @@ pub(super) fn roofs(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
                 light * (1.0 + texture * course as f64)
             },
         );
-        windows(canvas, [left, right, top + slope * house_px / 2.0], random);
+        windows(canvas, [left, right], top + slope * house_px / 2.0, random);
         mast(canvas, &PixelPoint::new(middle, top), tone, random);
         left = right;
     }
@@ -96,7 +96,7 @@ pub(super) fn roofs(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
 }
 
 /// Some lit windows on a wall between two columns, below a row.
-fn windows(canvas: &mut Canvas, [left, right, top]: [f64; 3], random: &mut ChaCha8Rng) {
+fn windows(canvas: &mut Canvas, [left, right]: [f64; 2], top: f64, random: &mut ChaCha8Rng) {
     let side = log_uniform(random, 3.0, 18.0);
     let lit = random.random_range(0.05..0.5);
     let mut y = top + side;
@@ -156,8 +156,10 @@ pub(super) fn ghosts(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
             centre.y + share * (lamp.y - centre.y),
         );
         let radius_px = log_uniform(random, 2.0, 80.0);
-        let form = [random.random_range(1.0..3.0), random.random_range(0.0..1.5)];
-        canvas.disc_of_light(&at, radius_px, form, log_uniform(random, 1.0, 40.0));
+        let soft_px = random.random_range(1.0..3.0);
+        let rim = random.random_range(0.0..1.5);
+        let light = log_uniform(random, 1.0, 40.0);
+        canvas.disc_of_light(&at, radius_px, soft_px, rim, light);
     }
     let sigma_px = log_uniform(random, 0.6, 1.8);
     for _ in 0..random.random_range(5..80) {

@@ -37,7 +37,7 @@ impl SimulatedCentroids {
         let (width_px, height_px) = (protocol.width_px as f64, protocol.height_px as f64);
         let focal_px = focal_length_px(width_px, protocol.fov_deg * RAD_PER_DEG);
         let camera = CameraModel::pinhole(width_px, height_px, focal_px, mirrored);
-        let stars = observed_stars(protocol, indexed, (&camera, &icrs_to_camera), rng);
+        let stars = observed_stars(protocol, indexed, &camera, &icrs_to_camera, rng);
         let mut centroids = listed_stars(protocol, &stars, rng);
         centroids.extend(false_stars(protocol, &stars, rng));
         centroids.sort_by(|a, b| a.v_mag.total_cmp(&b.v_mag));
@@ -91,7 +91,8 @@ impl Centroid {
 fn observed_stars(
     protocol: &Protocol,
     indexed: &IndexedCatalog,
-    (camera, icrs_to_camera): (&CameraModel, &Rotation<Icrs, Camera>),
+    camera: &CameraModel,
+    icrs_to_camera: &Rotation<Icrs, Camera>,
     rng: &mut ChaCha8Rng,
 ) -> Vec<Centroid> {
     /// Stars fainter than the limit by this many standard deviations may be observed above it.

@@ -2,6 +2,7 @@
 //!
 //! Tiles are counted along the first axis first. Those at the end of an axis may be shorter.
 
+use crate::base::size::Size;
 use crate::frame::FrameError;
 use crate::frame::fits::header::Header;
 use std::ops::Range;
@@ -123,11 +124,11 @@ impl Tile {
     }
 
     /// Its columns and rows, if it has two axes or the others have one pixel.
-    pub fn size(&self) -> Option<(usize, usize)> {
+    pub fn size(&self) -> Option<Size> {
         let mut long = self.lengths.get(2..).unwrap_or_default().iter();
         let height = self.lengths.get(1).copied().unwrap_or(1);
         long.all(|length| *length == 1)
-            .then_some((self.lengths[0], height))
+            .then_some(Size::new(self.lengths[0], height))
     }
 }
 
@@ -162,7 +163,7 @@ mod tests {
     fn tiles_at_the_end_are_shorter() {
         let tile = grid().tile(3);
         assert_eq!((tile.start.as_slice(), tile.pixels()), (&[3, 2, 0][..], 4));
-        assert_eq!(tile.size(), Some((2, 2)));
+        assert_eq!(tile.size(), Some(Size::new(2, 2)));
         assert_eq!(grid().rows(&tile).collect::<Vec<_>>(), [13, 18]);
     }
 

@@ -7,6 +7,7 @@
 //! Digitised Optical Sky Surveys, 167.
 
 use super::error::TileError;
+use crate::base::size::Size;
 use ::hcompress::read::{DecodeError, HCDecoder};
 
 /// Parameters of a stream.
@@ -21,12 +22,8 @@ pub(super) struct Hcompress {
 
 impl Hcompress {
     /// Decodes an image of two axes, `width * height` pixels, row by row.
-    pub fn decode(
-        self,
-        data: &[u8],
-        (width, height): (usize, usize),
-    ) -> Result<Vec<i32>, TileError> {
-        let count = width * height;
+    pub fn decode(self, data: &[u8], size: Size) -> Result<Vec<i32>, TileError> {
+        let count = size.pixels();
         let (found, pixels) = if self.is_wide {
             let mut words = vec![0_i64; count];
             let found = HCDecoder::new().read64(data, self.smooth.into(), &mut words);
@@ -43,11 +40,11 @@ impl Hcompress {
             DecodeError::IncorrectAllocationSize => TileError::Long { pixels: count },
             other => TileError::Corrupt(format!("its HCOMPRESS data are damaged ({other:?})")),
         })?;
-        if (fast, slow) != (width, height) {
+        if Size::new(fast, slow) != size {
             return Err(TileError::OtherSize {
                 width: fast,
                 height: slow,
-                expected: format!("{width} x {height}"),
+                expected: format!("{} x {}", size.width, size.height),
             });
         }
         Ok(pixels)
@@ -89,16 +86,16 @@ mod tests {
     fn both_widths_decode_the_same_image() {
         let pixels: Vec<i32> = (0..35).map(|i| i * i % 41 - 7).collect();
         let data = stream(&pixels, 7, 5);
-        assert_eq!(EXACT.decode(&data, (7, 5)).unwrap(), pixels);
-        assert_eq!(WIDE.decode(&data, (7, 5)).unwrap(), pixels);
+        assert_eq!(EXACT.decode(&data, Size::new(7, 5)).unwrap(), pixels);
+        assert_eq!(WIDE.decode(&data, Size::new(7, 5)).unwrap(), pixels);
     }
 
     #[test]
     fn another_size_is_an_error() {
         let data = stream(&[3; 35], 7, 5);
-        assert!(EXACT.decode(&data, (5, 7)).is_err());
-        assert!(EXACT.decode(&data, (3, 3)).is_err());
-        assert!(WIDE.decode(&data, (9, 9)).is_err());
+        assert!(EXACT.decode(&data, Size::new(5, 7)).is_err());
+        assert!(EXACT.decode(&data, Size::new(3, 3)).is_err());
+        assert!(WIDE.decode(&data, Size::new(9, 9)).is_err());
     }
 
     proptest! {
@@ -112,9 +109,9 @@ mod tests {
                 data[..10].copy_from_slice(&[0xdd, 0x99, 0, 0, 0, height, 0, 0, 0, width]);
             }
             let decoder = Hcompress { smooth, is_wide };
-            let size = (width.into(), height.into());
+            let size = Size::new(width.into(), height.into());
             if let Ok(pixels) = decoder.decode(&data, size) {
-                prop_assert_eq!(pixels.len(), size.0 * size.1);
+                prop_assert_eq!(pixels.len(), size.pixels());
             }
         }
     }

@@ -36,7 +36,8 @@ pub(in crate::sky::catalog) enum Rejection {
 
 /// Both values, or `None` without either; an error where only one is missing.
 pub(in crate::sky::catalog) fn both_or_neither<T>(
-    (first, second): (Option<T>, Option<T>),
+    first: Option<T>,
+    second: Option<T>,
     without_first: impl FnOnce() -> Box<Rejection>,
     without_second: impl FnOnce() -> Box<Rejection>,
 ) -> Parsed<Option<(T, T)>> {

@@ -116,10 +116,8 @@ impl Sky2000Record<'_> {
     /// are blank.
     fn proper_motion(&self, dec_rad: f64) -> Parsed<Option<(f32, f32)>> {
         let motion = both_or_neither(
-            (
-                self.decimal(StarColumn::PmRa, 5, "seconds of time a year, in 0.00001 s")?,
-                self.decimal(StarColumn::PmDec, 4, "arcseconds a year, in 0.0001\"")?,
-            ),
+            self.decimal(StarColumn::PmRa, 5, "seconds of time a year, in 0.00001 s")?,
+            self.decimal(StarColumn::PmDec, 4, "arcseconds a year, in 0.0001\"")?,
             || self.error(StarColumn::PmRa, "a value, as pmDE has one"),
             || self.error(StarColumn::PmDec, "a value, as pmRA has one"),
         )?;

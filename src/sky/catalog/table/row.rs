@@ -119,10 +119,8 @@ impl TableRow<'_> {
         const RA_RANGE_DEG: RangeInclusive<f64> = -180.0..=360.0;
         let PositionColumns { ra, dec } = &self.columns.position;
         let position = both_or_neither(
-            (
-                self.angle(ra, Unit::Hours)?,
-                self.angle(dec, Unit::Degrees)?,
-            ),
+            self.angle(ra, Unit::Hours)?,
+            self.angle(dec, Unit::Degrees)?,
             || self.error(ra.cell, "a right ascension, as there is a declination"),
             || self.error(dec.cell, "a declination, as there is a right ascension"),
         )?;

@@ -123,10 +123,8 @@ impl<'a> Tycho2Record<'a> {
         let expected = "a proper motion in mas a year, or none in both coordinates";
         let limit = f64::from(PM_LIMIT_MAS_PER_YR);
         let motion = both_or_neither(
-            (
-                self.number(PM_RA, expected)?,
-                self.number(PM_DEC, expected)?,
-            ),
+            self.number(PM_RA, expected)?,
+            self.number(PM_DEC, expected)?,
             || self.error(PM_RA, expected),
             || self.error(PM_DEC, expected),
         )?;
@@ -150,10 +148,8 @@ impl<'a> Tycho2Record<'a> {
     fn position(&self, ra: Field, dec: Field) -> Parsed<Position> {
         let expected_ra = "a right ascension from 0 to 360 degrees";
         let (ra_deg, dec_deg) = both_or_neither(
-            (
-                self.number(ra, expected_ra)?,
-                self.number(dec, EXPECTED_DEC)?,
-            ),
+            self.number(ra, expected_ra)?,
+            self.number(dec, EXPECTED_DEC)?,
             || self.error(ra, expected_ra),
             || self.error(dec, EXPECTED_DEC),
         )?
