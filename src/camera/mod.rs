@@ -13,9 +13,8 @@ pub mod data_sheet;
 mod distortion;
 mod model;
 
-pub(crate) use distortion::LENS_TERMS;
 pub(crate) use distortion::{
-    CUBIC_MONOMIALS, LANES, QUINTIC_MONOMIALS, lens_terms, monomials_in_lanes,
+    CUBIC_MONOMIALS, LANES, LENS_TERMS, QUINTIC_MONOMIALS, lens_terms, monomials_in_lanes,
 };
 pub use distortion::{Distortion, DistortionModel};
 pub use model::CameraModel;

@@ -7,7 +7,7 @@ use super::format::FrameFormat;
 use super::image::{Frame, check_size};
 use super::jpeg_rows::check_rows;
 use super::jpeg_scans::{Scans, has_end};
-use super::levels::{Samples, frame_from_integers};
+use super::levels::{LevelSamples, frame_from_integers};
 use super::raster::{damaged, unsupported};
 use crate::base::size::Size;
 use zune_jpeg::JpegDecoder;
@@ -44,7 +44,7 @@ pub(super) fn decode(bytes: &[u8], account: &Account) -> Result<Frame<'static>, 
     let padded = |side: usize| side.next_multiple_of(BLOCK_PX);
     account.check_image(Size::new(padded(width), padded(height)), bytes_per_pixel)?;
     let values = jpeg.samples(account)?;
-    let samples = Samples {
+    let samples = LevelSamples {
         width,
         height,
         values: &values,

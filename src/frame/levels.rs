@@ -20,7 +20,7 @@ pub trait WholeNumber: Copy + Default + PartialEq + BitOr<Output = Self> + Into<
 impl<T: Copy + Default + PartialEq + BitOr<Output = Self> + Into<i64>> WholeNumber for T {}
 
 /// Decoded samples of one frame.
-pub(super) struct Samples<'a, T> {
+pub(super) struct LevelSamples<'a, T> {
     pub width: usize,
     pub height: usize,
     /// Interleaved, `height * width * channels`.
@@ -62,7 +62,7 @@ impl<'p> Frame<'p> {
         values: &[T],
         full_scale: T,
     ) -> Result<Self, FrameError> {
-        let samples = Samples {
+        let samples = LevelSamples {
             width,
             height,
             values,
@@ -82,7 +82,7 @@ impl<'p> Frame<'p> {
         values: &[T],
         full_scale: T,
     ) -> Result<Self, FrameError> {
-        let samples = Samples {
+        let samples = LevelSamples {
             width: size.width,
             height: size.height,
             values,
@@ -106,7 +106,7 @@ impl<'p> Frame<'p> {
 
 /// Makes a frame from integer samples; `full_scale` is the largest value of the format, in ADU.
 pub(super) fn frame_from_integers<T: WholeNumber>(
-    samples: &Samples<'_, T>,
+    samples: &LevelSamples<'_, T>,
     full_scale: T,
 ) -> Result<Frame<'static>, FrameError> {
     let (width, height) = (samples.width, samples.height);

@@ -5,7 +5,7 @@ use super::error::FrameError;
 use super::exif;
 use super::format::FrameFormat;
 use super::image::{Frame, check_size};
-use super::levels::{Samples, WholeNumber, frame_from_integers};
+use super::levels::{LevelSamples, WholeNumber, frame_from_integers};
 use crate::base::size::Size;
 use image::codecs::bmp::BmpDecoder;
 use image::codecs::png::PngDecoder;
@@ -242,7 +242,7 @@ impl Decoded {
         values: &[T],
         full_scale: T,
     ) -> Result<Frame<'static>, FrameError> {
-        let samples = Samples {
+        let samples = LevelSamples {
             width: self.image.width() as usize,
             height: self.image.height() as usize,
             values,

@@ -5,7 +5,7 @@ use crate::identify::field::StarField;
 /// A division of the frame into square cells. Around it is a border of cells that stay empty, so
 /// that each cell of the frame has eight neighbors.
 #[derive(Debug, Clone, Copy)]
-pub struct Grid {
+pub struct FrameGrid {
     /// Without the border.
     columns: usize,
     rows: usize,
@@ -13,7 +13,7 @@ pub struct Grid {
     per_px: f64,
 }
 
-impl Grid {
+impl FrameGrid {
     /// A grid with `cells` along the frame's longer side.
     pub fn new(field: &StarField, cells: usize) -> Self {
         let cell_px = field.width_px.max(field.height_px) / cells as f64;
@@ -86,7 +86,7 @@ mod tests {
     use super::*;
     use crate::identify::Photometry;
 
-    fn grid() -> Grid {
+    fn grid() -> FrameGrid {
         let field = StarField {
             width_px: 700.0,
             height_px: 400.0,
@@ -95,7 +95,7 @@ mod tests {
             spot_sigma_px: None,
             stars: Vec::new(),
         };
-        Grid::new(&field, 7)
+        FrameGrid::new(&field, 7)
     }
 
     /// The middles of the cells, as column and row.

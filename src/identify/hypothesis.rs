@@ -5,7 +5,7 @@ use crate::base::units::RAD_PER_DEG;
 use crate::camera::{CameraModel, LANES};
 use crate::identify::field::{ObservedStar, Photometry, StarField};
 use crate::identify::index::IndexedCatalog;
-use crate::identify::predict::{Depth, PredictedStar, Surroundings, View};
+use crate::identify::predict::{PredictedStar, PredictionDepth, Surroundings, View};
 use std::ops::Range;
 
 /// Predicted stars for each observed one, where the zero point of the magnitudes is unknown.
@@ -108,7 +108,7 @@ impl Hypothesis {
                 let count = (observed.len() + brighter) as f64 * PREDICTED_PER_OBSERVED;
                 let count = count.ceil() as usize + PREDICTED_EXTRA;
                 let likely = sky.magnitude_of_density(self.per_sq_deg(count));
-                let least = Depth {
+                let least = PredictionDepth {
                     count,
                     v_mag: limit_v_mag,
                 };

@@ -43,7 +43,7 @@ pub struct View<'a> {
 
 /// How deep to predict: at least a number of stars, and all to a magnitude.
 #[derive(Debug, Clone, Copy)]
-pub struct Depth {
+pub struct PredictionDepth {
     /// Number of stars.
     pub count: usize,
     /// V magnitude.
@@ -100,7 +100,7 @@ impl Surroundings {
         let bright_enough = self
             .stars
             .partition_point(|star| star.v_mag <= faintest_v_mag as f32);
-        let all = Depth {
+        let all = PredictionDepth {
             count: usize::MAX,
             v_mag: faintest_v_mag,
         };
@@ -113,7 +113,7 @@ impl Surroundings {
         &mut self,
         view: &View,
         sky: &IndexedCatalog,
-        least: Depth,
+        least: PredictionDepth,
         likely_v_mag: f64,
         predicted: &mut Vec<PredictedStar>,
     ) {
@@ -181,7 +181,7 @@ fn project(
     view: &View,
     sky: &IndexedCatalog,
     stars: &[GridStar],
-    least: &Depth,
+    least: &PredictionDepth,
     predicted: &mut Vec<PredictedStar>,
 ) {
     let camera = view.camera;

@@ -10,7 +10,9 @@ use crate::identify::identification::{Identification, MIN_STARS, SearchFailure, 
 use crate::identify::index::IndexedCatalog;
 use crate::identify::pairing::Pair;
 use crate::identify::priors::Priors;
-use crate::identify::search::{Buffers, Found, LOG10_FALSE_ALARM_LIMIT, Search, Thinning, Tiers};
+use crate::identify::search::{
+    Found, LOG10_FALSE_ALARM_LIMIT, Search, SearchBuffers, Thinning, Tiers,
+};
 use std::f64::consts::PI;
 
 /// Numbers of stars, the brightest, that decide how much distortion is fitted. Where most
@@ -77,7 +79,7 @@ pub fn identify(
 #[derive(Debug)]
 pub struct Workspace {
     name_odds: f64,
-    buffers: Buffers,
+    buffers: SearchBuffers,
     thinning: Thinning,
     tiers: Tiers,
     bright: Brightest,
@@ -95,7 +97,7 @@ impl Workspace {
     pub fn new() -> Self {
         Self {
             name_odds: NAME_ODDS,
-            buffers: Buffers::default(),
+            buffers: SearchBuffers::default(),
             thinning: Thinning::default(),
             tiers: Tiers::default(),
             bright: Brightest::default(),

@@ -74,18 +74,18 @@ impl Brightness {
 
 /// Position and name of a column.
 #[derive(Debug, Clone)]
-pub(super) struct Column {
+pub(super) struct CentroidColumn {
     position: usize,
     pub name: String,
 }
 
 /// The columns that are used.
 pub(super) struct Columns {
-    x: Column,
-    y: Column,
+    x: CentroidColumn,
+    y: CentroidColumn,
     /// Position of the centre of the first pixel on both axes.
     first_pixel: f64,
-    brightness: Option<(Column, Brightness)>,
+    brightness: Option<(CentroidColumn, Brightness)>,
     /// What only a table of starpipe has.
     measured: Option<MeasuredColumns>,
     /// Whether a comma in a number is the decimal point.
@@ -95,9 +95,9 @@ pub(super) struct Columns {
 /// Columns of the tables of starpipe. Their magnitudes are the catalogue's, and say nothing about the
 /// frame.
 struct MeasuredColumns {
-    frame: Column,
-    sigmas: [Column; 2],
-    flags: Column,
+    frame: CentroidColumn,
+    sigmas: [CentroidColumn; 2],
+    flags: CentroidColumn,
 }
 
 impl Columns {
@@ -115,7 +115,7 @@ impl Columns {
         let column = |name: &str| {
             let position = headings.iter().position(|h| h.eq_ignore_ascii_case(name))?;
             let name = name.to_owned();
-            Some(Column { position, name })
+            Some(CentroidColumn { position, name })
         };
         let positions = POSITIONS
             .iter()
@@ -137,7 +137,7 @@ impl Columns {
         let magnitudes = of(&V_MAGS, Brightness::JohnsonV).chain(of(&MAGS, Brightness::Mag));
         let magnitudes = magnitudes.filter(|_| !is_catalog);
         let all: Vec<_> = magnitudes.chain(of(&FLUXES, Brightness::Flux)).collect();
-        let has_values = |(column, kind): &&(Column, Brightness)| {
+        let has_values = |(column, kind): &&(CentroidColumn, Brightness)| {
             rows().any(|row| {
                 let value = columns.number(&row, column);
                 value.is_ok_and(|value| kind.is_usable(value))
@@ -176,7 +176,7 @@ impl Columns {
             ..ListedCentroid::new(PixelPoint::new(x, y), mag)
         };
         if let Some(measured) = &self.measured {
-            let is_given = |column: &Column| {
+            let is_given = |column: &CentroidColumn| {
                 record
                     .get(column.position)
                     .is_some_and(|text| !text.is_empty())
@@ -203,7 +203,7 @@ impl Columns {
         wrong.chain(not_positive).next()
     }
 
-    fn number(&self, record: &StringRecord, column: &Column) -> Result<f64, String> {
+    fn number(&self, record: &StringRecord, column: &CentroidColumn) -> Result<f64, String> {
         let name = &column.name;
         let Some(text) = record.get(column.position) else {
             return Err(format!(
@@ -254,7 +254,7 @@ fn no_positions(headings: &StringRecord) -> String {
 
 impl MeasuredColumns {
     /// `None` unless all of them are there.
-    fn find(column: impl Fn(&str) -> Option<Column>) -> Option<Self> {
+    fn find(column: impl Fn(&str) -> Option<CentroidColumn>) -> Option<Self> {
         let either = |names: [&str; 2]| names.into_iter().find_map(&column);
         Some(Self {
             frame: column("frame")?,

@@ -9,7 +9,7 @@ use super::outcome::{Outcome, Reason};
 use super::prepared::Prepared;
 use super::raw_color::RawColor;
 use super::solution::{Solution, Source};
-use super::solved::Solved;
+use super::solved::SolvedFrame;
 use super::stopwatch::{Stage, Stopwatch, Timing};
 use crate::base::panics::caught;
 use crate::calibration::Calibration;
@@ -218,7 +218,7 @@ fn solve(
     };
     clock.lap(Stage::Identify);
 
-    let mut solved = Solved {
+    let mut solved = SolvedFrame {
         context,
         frame,
         calibration: input.calibration,

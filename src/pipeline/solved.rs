@@ -21,7 +21,7 @@ use crate::sky::observer::Observation;
 use std::collections::HashSet;
 
 /// What the stages found in a frame.
-pub(super) struct Solved<'a> {
+pub(super) struct SolvedFrame<'a> {
     pub context: &'a Context<'a>,
     pub frame: &'a Frame<'a>,
     /// The calibration that was applied.
@@ -44,7 +44,7 @@ pub(super) struct Solved<'a> {
     pub observation: Option<Observation>,
 }
 
-impl Solved<'_> {
+impl SolvedFrame<'_> {
     /// Measures the photometry of an identified frame.
     pub(super) fn measure_photometry(&mut self) {
         let Some(identification) = self.outcome.identification() else {

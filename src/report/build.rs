@@ -9,7 +9,7 @@ use super::frame_report::{
     DateReport, DistortionReport, FrameReport, MagnitudeReport, MatchReport, NoteReport,
     ObservationReport, OpticsReport, PhotometryReport, SCHEMA, SiteReport, Status, TimingReport,
 };
-use super::stars::{self, Pointing};
+use super::stars::{self, ReportedPointing};
 use super::{bodies, reason};
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::format::{
@@ -116,7 +116,7 @@ impl FrameReport {
         self.optics = Some(optics(identification));
         self.matched = Some(match_quality(identification, self.stars.len()));
         self.magnitude = faintest(identification, catalog);
-        let pointing = Pointing {
+        let pointing = ReportedPointing {
             identification,
             years_since_j2000: years,
         };

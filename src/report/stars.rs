@@ -37,12 +37,12 @@ pub fn detections(found: &Detections) -> Vec<StarReport> {
 }
 
 /// Where an identified frame points, and when.
-pub(super) struct Pointing<'a> {
+pub(super) struct ReportedPointing<'a> {
     pub identification: &'a Identification,
     pub years_since_j2000: f64,
 }
 
-impl Pointing<'_> {
+impl ReportedPointing<'_> {
     /// Adds right ascension and declination to all detections, and its star to each named one.
     pub(super) fn add_to(&self, stars: &mut [StarReport], catalog: &Catalog) {
         for star in stars.iter_mut() {

@@ -39,14 +39,14 @@ const JUMP_TYPICALS: f64 = 8.0;
 
 /// The attitude of a frame as the frames before it predict it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Prediction {
+pub(super) struct MotionPrediction {
     /// The attitude.
     pub icrs_to_camera: Rotation<Icrs, Camera>,
     covariance: Covariance,
     interval: f64,
 }
 
-impl Prediction {
+impl MotionPrediction {
     /// Covariance of the attitude, in rad².
     pub fn attitude_covariance_rad2(&self) -> Matrix3<f64> {
         self.covariance.fixed_view::<3, 3>(0, 0).into_owned()
@@ -55,7 +55,7 @@ impl Prediction {
 
 /// Attitude and rate at a time.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Motion {
+pub(super) struct AttitudeMotion {
     icrs_to_camera: Rotation<Icrs, Camera>,
     rate_rad: Vector3<f64>,
     covariance: Covariance,
@@ -66,7 +66,7 @@ pub(super) struct Motion {
     updates: u32,
 }
 
-impl Motion {
+impl AttitudeMotion {
     /// Begins with one attitude.
     pub fn start(attitude: &Attitude, time: f64) -> Self {
         let mut covariance = Covariance::identity() * UNKNOWN_RATE_RAD.powi(2);
@@ -93,7 +93,7 @@ impl Motion {
 
     /// The attitude at a later time; `None` where it is not later. `typical_rad` is the error that
     /// an unknown acceleration may cause.
-    pub fn predict(&self, time: f64, typical_rad: f64) -> Option<Prediction> {
+    pub fn predict(&self, time: f64, typical_rad: f64) -> Option<MotionPrediction> {
         let interval = time - self.time;
         if !(interval > 0.0 && interval.is_finite()) {
             return None;
@@ -104,7 +104,7 @@ impl Motion {
         Some(self.predicted(interval, &acceleration))
     }
 
-    fn predicted(&self, interval: f64, acceleration: &Vector3<f64>) -> Prediction {
+    fn predicted(&self, interval: f64, acceleration: &Vector3<f64>) -> MotionPrediction {
         let turn = -self.rate_rad * interval;
         let mut transition = Covariance::identity();
         let rotation = Rotation::<Camera, Camera>::from_matrix(Matrix3::identity()).then_turn(turn);
@@ -119,7 +119,7 @@ impl Motion {
             covariance[(axis + 3, axis)] += shared;
             covariance[(axis + 3, axis + 3)] += density * interval;
         }
-        Prediction {
+        MotionPrediction {
             icrs_to_camera: self.icrs_to_camera.then_turn(turn),
             covariance,
             interval,
@@ -128,14 +128,14 @@ impl Motion {
 
     /// Takes the attitude measured at the time of `prediction`. One that is no continuation of the
     /// motion before begins a new one: the rate is then not known.
-    pub fn update(&mut self, prediction: &Prediction, measured: &Attitude, typical_rad: f64) {
+    pub fn update(&mut self, prediction: &MotionPrediction, measured: &Attitude, typical_rad: f64) {
         let time = self.time + prediction.interval;
         let innovation = turn_between(&prediction.icrs_to_camera, &measured.icrs_to_camera);
         let noise = &measured.covariance_rad2;
         let interval = prediction.interval;
         let first = Vector3::repeat(3.0 * typical_rad.powi(2) / interval.powi(3));
         let mut acceleration = self.acceleration.unwrap_or(first);
-        let ratio = |prediction: &Prediction, axis: usize| {
+        let ratio = |prediction: &MotionPrediction, axis: usize| {
             let expected = prediction.covariance[(axis, axis)] + noise[(axis, axis)];
             innovation[axis].powi(2) / expected
         };
@@ -248,7 +248,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let rate = Vector3::new(0.01, -0.02, 0.03);
         let mut truth = Rotation::looking_at(&UnitVector::from_ra_dec(1.0, 0.4), 0.3);
-        let mut motion = Motion::start(&measured(&truth, &mut rng), 0.0);
+        let mut motion = AttitudeMotion::start(&measured(&truth, &mut rng), 0.0);
         assert!(motion.rate(false).is_none());
         let (mut nees, mut count) = (0.0, 0.0);
         for frame in 1..400 {
@@ -272,7 +272,7 @@ mod tests {
     fn a_jump_begins_a_new_motion() {
         let mut rng = ChaCha8Rng::seed_from_u64(6);
         let truth = Rotation::looking_at(&UnitVector::from_ra_dec(1.0, 0.4), 0.3);
-        let mut motion = Motion::start(&measured(&truth, &mut rng), 0.0);
+        let mut motion = AttitudeMotion::start(&measured(&truth, &mut rng), 0.0);
         for frame in 1..10 {
             let prediction = motion.predict(f64::from(frame), 1e-4).unwrap();
             motion.update(&prediction, &measured(&truth, &mut rng), 1e-4);

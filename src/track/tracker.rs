@@ -3,7 +3,7 @@
 use super::agreement::{Agreement, density_px2};
 use super::guides::{GuideStar, Guides, Wanted};
 use super::lens::LensRefiner;
-use super::motion::{Motion, Prediction};
+use super::motion::{AttitudeMotion, MotionPrediction};
 use super::outcome::{Attitude, Loss, Mode, Track, TrackedStar};
 use super::pose::{PoseFitter, PosePrior, PoseStar};
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
@@ -64,7 +64,7 @@ pub struct Tracker<'a> {
 
 /// What is known after a frame.
 struct TrackerState {
-    motion: Motion,
+    motion: AttitudeMotion,
     lens: LensRefiner,
     spot: Option<SpotModel>,
     light: StarBrightness,
@@ -363,7 +363,7 @@ impl<'a> Tracker<'a> {
             found.excess_sigma_px,
         );
         let mut known = TrackerState {
-            motion: motion.unwrap_or_else(|| Motion::start(attitude, clock.time)),
+            motion: motion.unwrap_or_else(|| AttitudeMotion::start(attitude, clock.time)),
             lens,
             spot: None,
             light,
@@ -417,7 +417,7 @@ impl TrackerState {
             && apart_px < OTHER_CAMERA_SIGMAS * sigma_px + models_px
     }
 
-    fn continued_motion(&self, clock: Clock, attitude: &Attitude) -> Option<Motion> {
+    fn continued_motion(&self, clock: Clock, attitude: &Attitude) -> Option<AttitudeMotion> {
         let typical_rad = TYPICAL_ERROR_PX / self.lens.camera().focal_length_px;
         let mut motion = self.motion;
         let prediction = motion.predict(clock.time, typical_rad)?;
@@ -553,7 +553,7 @@ impl StarBrightness {
 /// The camera at the predicted attitude.
 struct PredictedView<'a> {
     camera: &'a CameraModel,
-    prediction: &'a Prediction,
+    prediction: &'a MotionPrediction,
     /// Turn of the camera during the exposure.
     turn_rad: Vector3<f64>,
 }

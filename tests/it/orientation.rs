@@ -303,7 +303,8 @@ fn frames_across_the_line_of_0h_are_where_they_were_drawn() {
 
 /// Writes the rows of a detector as a TIFF file with an `Orientation`.
 fn save_stored(rows: &Picture, orientation: u16, path: &Path) {
-    use tiff::encoder::{TiffEncoder, colortype::Gray16};
+    use tiff::encoder::TiffEncoder;
+    use tiff::encoder::colortype::Gray16;
     let mut encoder = TiffEncoder::new(fs::File::create(path).unwrap()).unwrap();
     let image = encoder.new_image::<Gray16>(rows.width(), rows.height());
     let mut image = image.unwrap();

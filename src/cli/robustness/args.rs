@@ -1,6 +1,6 @@
 //! The options of `robustness`.
 
-use super::sweep::Sweep;
+use super::sweep::RobustnessSweep;
 use crate::cli::options::catalog::CatalogOptions;
 use crate::cli::options::format::Format;
 use crate::cli::options::values::{self, MAX_SIDE_PX};
@@ -32,7 +32,7 @@ pub(crate) struct RobustnessArgs {
     /// Vary one parameter over COUNT values, in place of the standard table (fov, stars,
     /// centroid-error, mag-error, missing or false; may be repeated)
     #[arg(long, value_name = "NAME=FROM:TO:COUNT")]
-    pub(super) sweep: Vec<Sweep>,
+    pub(super) sweep: Vec<RobustnessSweep>,
     /// What to print
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub(super) format: Format,

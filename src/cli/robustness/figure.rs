@@ -6,7 +6,7 @@ use crate::cli::plot::{
     Panel, Sheet, chart_on, plot_error,
 };
 use plotters::prelude::*;
-use starpipe::study::robustness::{CaseResult, Parameter};
+use starpipe::study::robustness::{CaseResult, VariedParameter};
 
 const PANELS_ABREAST: usize = 2;
 const TABLE_WIDTH_PX: u32 = 900;
@@ -20,7 +20,7 @@ const NO_ANSWER: RGBColor = RGBColor(120, 120, 120);
 
 /// A panel for each parameter that is swept; none if none is.
 pub(super) fn sweeps(rows: &[SweptRow]) -> Option<Sheet> {
-    let mut parameters: Vec<Parameter> = Vec::new();
+    let mut parameters: Vec<VariedParameter> = Vec::new();
     for (parameter, _) in rows.iter().filter_map(|row| row.swept) {
         if !parameters.contains(&parameter) {
             parameters.push(parameter);
@@ -34,7 +34,7 @@ pub(super) fn sweeps(rows: &[SweptRow]) -> Option<Sheet> {
 }
 
 /// The rates over the values of one parameter.
-fn panel(parameter: Parameter, rows: &[SweptRow]) -> Panel {
+fn panel(parameter: VariedParameter, rows: &[SweptRow]) -> Panel {
     let of_parameter = |row: &SweptRow| row.swept.filter(|(swept, _)| *swept == parameter);
     let mut points: Vec<(f64, &CaseResult)> = rows
         .iter()

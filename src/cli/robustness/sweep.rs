@@ -4,7 +4,7 @@ use crate::cli::options::values::{
     field_of_view, multiple, not_negative, not_of_form, part, star_count, whole,
 };
 use starpipe::model::sensitivity::Spacing;
-use starpipe::study::robustness::Parameter;
+use starpipe::study::robustness::VariedParameter;
 use std::str::FromStr;
 
 /// Largest number of values.
@@ -13,12 +13,12 @@ const FORM: &str = "NAME=FROM:TO:COUNT";
 
 /// Evenly spaced values of one parameter.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Sweep {
-    pub(super) parameter: Parameter,
+pub(super) struct RobustnessSweep {
+    pub(super) parameter: VariedParameter,
     pub(super) values: Vec<f64>,
 }
 
-impl FromStr for Sweep {
+impl FromStr for RobustnessSweep {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -41,21 +41,23 @@ impl FromStr for Sweep {
     }
 }
 
-fn named(name: &str) -> Result<Parameter, String> {
-    let known = Parameter::ALL.iter().find(|known| known.name() == name);
+fn named(name: &str) -> Result<VariedParameter, String> {
+    let known = VariedParameter::ALL
+        .iter()
+        .find(|known| known.name() == name);
     known.copied().ok_or_else(|| {
-        let names = Parameter::ALL.map(Parameter::name).join(", ");
+        let names = VariedParameter::ALL.map(VariedParameter::name).join(", ");
         format!("'{name}' is not one of {names}")
     })
 }
 
 /// The parser of the parameter's values, as for its own option.
-fn parser(parameter: Parameter) -> fn(&str) -> Result<f64, String> {
+fn parser(parameter: VariedParameter) -> fn(&str) -> Result<f64, String> {
     match parameter {
-        Parameter::FieldOfView => field_of_view,
-        Parameter::Stars => star_count,
-        Parameter::CentroidError | Parameter::MagError => not_negative,
-        Parameter::Missing => part,
-        Parameter::FalseStars => multiple,
+        VariedParameter::FieldOfView => field_of_view,
+        VariedParameter::Stars => star_count,
+        VariedParameter::CentroidError | VariedParameter::MagError => not_negative,
+        VariedParameter::Missing => part,
+        VariedParameter::FalseStars => multiple,
     }
 }

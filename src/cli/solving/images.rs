@@ -8,9 +8,8 @@ use starpipe::pipeline::{
     CentroidListOptions, Context, Error, Solution, Workspace, solve_centroids, solve_guarded,
     solve_read,
 };
-use std::io;
-use std::mem;
 use std::path::Path;
+use std::{io, mem};
 
 /// What the inputs are.
 pub(crate) enum Inputs {

@@ -1,16 +1,16 @@
 //! Which image of a file is read: the page asked for, or else the largest.
 
 use super::error::unsupported;
-use super::layout::Layout;
-use super::unit::{Unit, Units};
+use super::layout::FitsLayout;
+use super::unit::{FitsUnit, Units};
 use crate::frame::account::Account;
 use crate::frame::{Assumption, FrameError, ImageChoice, MIN_SIDE_PX};
 use std::num::NonZeroUsize;
 
 /// The image that is read.
 pub(super) struct Choice<'a> {
-    pub unit: Unit<'a>,
-    pub layout: Layout,
+    pub unit: FitsUnit<'a>,
+    pub layout: FitsLayout,
     /// Its plane in the unit, if a page was asked for.
     pub plane: Option<usize>,
     /// Which image it is, if no page was asked for and it is not the first.
@@ -60,8 +60,8 @@ impl<'a> Choice<'a> {
 
     fn largest(bytes: &'a [u8], account: &Account) -> Result<Self, FrameError> {
         let mut pages = 0_usize;
-        let mut first: Option<Layout> = None;
-        let mut best: Option<(Unit, Layout, usize)> = None;
+        let mut first: Option<FitsLayout> = None;
+        let mut best: Option<(FitsUnit, FitsLayout, usize)> = None;
         let mut units = Units::new(bytes);
         loop {
             account.check_time()?;
@@ -106,7 +106,7 @@ impl<'a> Choice<'a> {
 }
 
 /// Number of pixels of an image that can be read alone; 0 for a cube, and for what is too small.
-fn size(layout: Layout) -> usize {
+fn size(layout: FitsLayout) -> usize {
     let is_small = layout.width.min(layout.height) < MIN_SIDE_PX;
     if layout.is_cube() || is_small {
         0

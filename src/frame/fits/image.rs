@@ -1,17 +1,17 @@
 //! Decodes one image of a header-data unit.
 
 use super::error::{truncated, unsupported};
-use super::layout::Layout;
+use super::layout::FitsLayout;
 use super::tiles;
-use super::unit::{StoredType, Unit};
+use super::unit::{FitsUnit, StoredType};
 use crate::base::size::Size;
 use crate::frame::account::{Account, FLOATS_BYTES_PER_PIXEL};
-use crate::frame::levels::{Samples, WholeNumber, frame_from_floats, frame_from_integers};
+use crate::frame::levels::{LevelSamples, WholeNumber, frame_from_floats, frame_from_integers};
 use crate::frame::{Frame, FrameError, check_size};
 
 /// Location and scaling of one image in a file.
 pub(super) struct Image {
-    layout: Layout,
+    layout: FitsLayout,
     /// Its plane in the header-data unit, from 0.
     plane: usize,
     stored: StoredType,
@@ -25,8 +25,8 @@ impl Image {
     /// The image `plane` of `unit`, which has this layout. A cube has several planes, and one must be
     /// chosen.
     pub fn new(
-        unit: &Unit,
-        layout: Layout,
+        unit: &FitsUnit,
+        layout: FitsLayout,
         plane: Option<usize>,
         account: &Account,
     ) -> Result<Self, FrameError> {
@@ -41,7 +41,7 @@ impl Image {
         } else {
             layout
         };
-        let Layout { width, height, .. } = layout;
+        let FitsLayout { width, height, .. } = layout;
         check_size(width, height)?;
         let scale = unit.header.number_or("BSCALE", 1.0)?;
         if scale == 0.0 {
@@ -81,7 +81,7 @@ impl Image {
     /// Decodes the image from `unit`, of which it was made, in `bytes`, the content of the file.
     pub fn frame(
         &self,
-        unit: &Unit,
+        unit: &FitsUnit,
         bytes: &[u8],
         account: &Account,
     ) -> Result<Frame<'static>, FrameError> {
@@ -95,7 +95,7 @@ impl Image {
         let start = unit.data.saturating_add(before);
         let end = start.saturating_add(values * self.stored.bytes());
         let data = bytes.get(start..end).ok_or_else(|| {
-            let Layout { width, height, .. } = self.layout;
+            let FitsLayout { width, height, .. } = self.layout;
             let detail = format!("the image of {width} x {height} pixels ends at byte {end}");
             truncated(bytes.len(), detail)
         })?;
@@ -142,7 +142,7 @@ impl Image {
         level: impl Fn([u8; N]) -> T,
         full_scale: T,
     ) -> Result<Frame<'static>, FrameError> {
-        let Layout {
+        let FitsLayout {
             width,
             height,
             channels,
@@ -150,7 +150,7 @@ impl Image {
         } = self.layout;
         let levels = data.as_chunks().0.iter().map(|b| level(*b));
         let values = self.layout.interleaved(levels.collect());
-        let samples = Samples {
+        let samples = LevelSamples {
             width,
             height,
             values: &values,
@@ -212,7 +212,7 @@ impl Image {
     }
 
     fn frame_of_levels(&self, levels: Vec<f32>) -> Result<Frame<'static>, FrameError> {
-        let Layout {
+        let FitsLayout {
             width,
             height,
             channels,

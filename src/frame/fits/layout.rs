@@ -9,7 +9,7 @@ const COLORS: [usize; 2] = [3, 4];
 
 /// The axes of one image, or of several planes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Layout {
+pub(super) struct FitsLayout {
     /// Columns.
     pub width: usize,
     /// Rows.
@@ -23,7 +23,7 @@ pub(super) struct Layout {
     strides: [usize; 3],
 }
 
-impl Layout {
+impl FitsLayout {
     /// The layout of these axes; `None` if there are fewer than two or one is empty.
     pub fn of(axes: &[usize]) -> Option<Self> {
         if axes.len() < 2 || axes.contains(&0) {
@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     fn of(axes: &[usize]) -> (usize, usize, usize, usize) {
-        let layout = Layout::of(axes).unwrap();
+        let layout = FitsLayout::of(axes).unwrap();
         (layout.width, layout.height, layout.channels, layout.pages)
     }
 
@@ -136,7 +136,7 @@ mod tests {
             assert_eq!(of(axes), expected, "{axes:?}");
         }
         for axes in [&[][..], &[8], &[8, 0], &[8, 6, 0]] {
-            assert_eq!(Layout::of(axes), None, "{axes:?}");
+            assert_eq!(FitsLayout::of(axes), None, "{axes:?}");
         }
         let huge = usize::MAX;
         assert_eq!(of(&[3, huge, huge]), (huge, huge, 3, 1));
@@ -155,7 +155,7 @@ mod tests {
                 let [i, j, k] = place(x, y, c);
                 stored[(k * axes[1] + j) * axes[0] + i] = at(x, y, c);
             }
-            Layout::of(&axes).unwrap().interleaved(stored)
+            FitsLayout::of(&axes).unwrap().interleaved(stored)
         };
         assert_eq!(order([8, 6, 3], |x, y, c| [x, y, c]), pixels);
         assert_eq!(order([3, 8, 6], |x, y, c| [c, x, y]), pixels);

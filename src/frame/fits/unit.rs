@@ -2,7 +2,7 @@
 
 use super::error::truncated;
 use super::header::{BLOCK_BYTES, Header};
-use super::layout::Layout;
+use super::layout::FitsLayout;
 use crate::frame::{FrameError, IgnoredValue};
 use std::ops::RangeInclusive;
 
@@ -26,7 +26,7 @@ impl<'a> Units<'a> {
     }
 
     /// The next unit, `None` after the last.
-    pub fn next(&mut self) -> Result<Option<Unit<'a>>, FrameError> {
+    pub fn next(&mut self) -> Result<Option<FitsUnit<'a>>, FrameError> {
         if self.end > self.bytes.len() {
             let detail = format!("the data before the next header end at byte {}", self.end);
             return Err(truncated(self.bytes.len(), detail));
@@ -38,7 +38,7 @@ impl<'a> Units<'a> {
             return Ok(None);
         }
         let (header, data) = Header::parse(self.bytes, at)?;
-        let unit = Unit::new(header, data)?;
+        let unit = FitsUnit::new(header, data)?;
         self.end = unit.end();
         // Headers and data are padded to whole blocks.
         let next = self.end.checked_next_multiple_of(BLOCK_BYTES);
@@ -98,7 +98,7 @@ impl StoredType {
 }
 
 /// One header-data unit.
-pub(super) struct Unit<'a> {
+pub(super) struct FitsUnit<'a> {
     pub header: Header<'a>,
     /// Offset of the data in the file.
     pub data: usize,
@@ -112,7 +112,7 @@ pub(super) struct Unit<'a> {
     data_bytes: Option<usize>,
 }
 
-impl<'a> Unit<'a> {
+impl<'a> FitsUnit<'a> {
     fn new(header: Header<'a>, data: usize) -> Result<Self, FrameError> {
         let stored = StoredType::of(&header, "BITPIX")?;
         let axes = axes(&header, "NAXIS")?;
@@ -184,10 +184,10 @@ impl<'a> Unit<'a> {
     }
 
     /// How the values are arranged; `None` if the unit is no image.
-    pub fn layout(&self) -> Option<Layout> {
+    pub fn layout(&self) -> Option<FitsLayout> {
         let kind = self.header.text("XTENSION");
         let is_image = self.is_compressed_image() || kind.is_none_or(|kind| kind == "IMAGE");
-        Layout::of(&self.axes).filter(|_| is_image)
+        FitsLayout::of(&self.axes).filter(|_| is_image)
     }
 
     /// Number of images in it: none, one, or the planes of a cube.

@@ -11,13 +11,13 @@ use std::io::Read;
 
 /// Where samples are read from, and what reading them may take.
 #[derive(Clone, Copy)]
-pub(super) struct Source<'a> {
+pub(super) struct ChunkSource<'a> {
     pub file: TiffFile<'a>,
     pub account: &'a Account,
 }
 
 /// Rows of a chunk.
-pub(super) struct Rows<'a> {
+pub(super) struct StripRows<'a> {
     pub bytes: Cow<'a, [u8]>,
     pub row_bytes: usize,
 }
@@ -28,10 +28,10 @@ impl Layout<'_> {
     /// [`FrameError::Truncated`], [`FrameError::Malformed`], [`FrameError::Interrupted`].
     pub fn decompress<'a>(
         &self,
-        source: Source<'a>,
+        source: ChunkSource<'a>,
         chunk: &Chunk,
-    ) -> Result<Rows<'a>, FrameError> {
-        let Source { file, account } = source;
+    ) -> Result<StripRows<'a>, FrameError> {
+        let ChunkSource { file, account } = source;
         account.check_time()?;
         let row_bytes = self.row_bytes();
         let wanted = row_bytes.saturating_mul(chunk.rows);
@@ -57,7 +57,7 @@ impl Layout<'_> {
             );
             return Err(truncated(file.bytes, detail));
         }
-        Ok(Rows { bytes, row_bytes })
+        Ok(StripRows { bytes, row_bytes })
     }
 
     /// The bytes of a chunk as they are stored, with the highest bit of each byte first.
@@ -87,7 +87,7 @@ impl Layout<'_> {
         stored: &[u8],
         chunk: &Chunk,
         account: &Account,
-    ) -> Result<Rows<'static>, FrameError> {
+    ) -> Result<StripRows<'static>, FrameError> {
         let fail = |detail: String| {
             account.why(malformed(format!("JPEG at byte {}: {detail}", chunk.place)))
         };
@@ -113,7 +113,7 @@ impl Layout<'_> {
         account.hold(held)?;
         let pixels = jpeg.samples(account)?;
         account.release(held);
-        Ok(Rows {
+        Ok(StripRows {
             bytes: pixels.into(),
             row_bytes: width * channels,
         })

@@ -19,12 +19,12 @@ use super::error::FrameError;
 use super::exif;
 use super::image::Frame;
 use super::levels::{
-    Samples, WholeNumber, frame_from_floats, frame_from_integers, frame_from_words,
+    LevelSamples, WholeNumber, frame_from_floats, frame_from_integers, frame_from_words,
 };
 use super::limits::MAX_PAGES;
 use crate::base::size::Size;
 use chosen::Chosen;
-use decompress::Source;
+use decompress::ChunkSource;
 use layout::{Color, Layout, SampleFormat};
 use samples::float_of_half;
 use std::num::NonZeroUsize;
@@ -57,7 +57,7 @@ pub(super) fn decode(
         }
         None => {
             drop(buffer);
-            layout.frame(Source { file, account })
+            layout.frame(ChunkSource { file, account })
         }
     };
     let mut metadata = exif::metadata(bytes, layout.width);
@@ -84,7 +84,7 @@ pub(super) fn count_pages(bytes: &[u8], account: &Account) -> (usize, Option<Fra
 }
 
 impl Layout<'_> {
-    fn frame(&self, source: Source) -> Result<Frame<'static>, FrameError> {
+    fn frame(&self, source: ChunkSource) -> Result<Frame<'static>, FrameError> {
         let full = self.depth.full_scale();
         // Values of more than 24 bits are rounded.
         let rounded = |values: Vec<f32>| Ok(self.floats(values)?.with_levels(1.0, None));
@@ -122,7 +122,7 @@ impl Layout<'_> {
     /// The samples, each made of its bits by `of`.
     fn samples_as<T: samples::Word, S>(
         &self,
-        source: Source,
+        source: ChunkSource,
         of: impl Fn(T) -> S,
     ) -> Result<Vec<S>, FrameError> {
         Ok(self.samples(source)?.into_iter().map(of).collect())
@@ -133,7 +133,7 @@ impl Layout<'_> {
         values: &[T],
         full_scale: T,
     ) -> Result<Frame<'static>, FrameError> {
-        let samples = Samples {
+        let samples = LevelSamples {
             width: self.width,
             height: self.height,
             values,

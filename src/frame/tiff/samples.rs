@@ -1,6 +1,6 @@
 //! From the rows of strips and tiles to the samples of an image.
 
-use super::decompress::{Rows, Source};
+use super::decompress::{ChunkSource, StripRows};
 use super::layout::{Chunk, Color, Layout, Predictor, SampleFormat};
 use crate::frame::account::PIXELS_BETWEEN_CHECKS;
 use crate::frame::error::FrameError;
@@ -34,7 +34,7 @@ impl Layout<'_> {
     /// The samples of all channels that are read, interleaved.
     /// # Errors
     /// As [`Self::decompress`].
-    pub fn samples<T: Word>(&self, source: Source) -> Result<Vec<T>, FrameError> {
+    pub fn samples<T: Word>(&self, source: ChunkSource) -> Result<Vec<T>, FrameError> {
         let count = self.width * self.height * self.channels;
         let mut samples = Vec::with_capacity(count);
         let mut row = Vec::new();
@@ -56,8 +56,8 @@ impl Layout<'_> {
     fn unpack_chunk<T: Word>(
         &self,
         chunk: &Chunk,
-        rows: &Rows,
-        source: Source,
+        rows: &StripRows,
+        source: ChunkSource,
         row: &mut Vec<T>,
         samples: &mut Vec<T>,
     ) -> Result<(), FrameError> {

@@ -53,7 +53,7 @@ pub(super) struct Adjustment<'a, const P: usize, const K: usize> {
 pub(super) type Lanes = [f64; LANES];
 
 /// The two equations of several stars, divided by their standard errors, without the monomials.
-pub(super) struct Rows<const P: usize, const K: usize> {
+pub(super) struct EquationRows<const P: usize, const K: usize> {
     /// Along x and y.
     pub common: [[Lanes; P]; 2],
     /// The coefficients of the monomials, the same along x and y.
@@ -73,7 +73,7 @@ struct Sums<const P: usize, const K: usize> {
 
 impl<const P: usize, const K: usize> Sums<P, K> {
     #[inline(always)]
-    fn add(&mut self, rows: &Rows<P, K>) {
+    fn add(&mut self, rows: &EquationRows<P, K>) {
         for axis in 0..2 {
             let (common, rhs) = (&rows.common[axis], &rows.rhs[axis]);
             for i in 0..P {
@@ -182,7 +182,7 @@ impl<'a, const P: usize, const K: usize> Adjustment<'a, P, K> {
 
     /// The equations of [`LANES`] stars, or fewer. `None` if one is behind the camera.
     #[inline(always)]
-    pub fn rows(&self, stars: &[MeasuredStar]) -> Option<Rows<P, K>> {
+    pub fn rows(&self, stars: &[MeasuredStar]) -> Option<EquationRows<P, K>> {
         let f = self.camera.focal_length_px;
         let ([u, v], weights) = self.offsets_and_weights(stars);
         let [mut x, mut y] = [[0.0; LANES]; 2];
@@ -214,7 +214,7 @@ impl<'a, const P: usize, const K: usize> Adjustment<'a, P, K> {
                 rhs[axis][lane] = weight * (offset - f * [x, y][axis]);
             }
         }
-        Some(Rows {
+        Some(EquationRows {
             common,
             monomials: self.weighted_monomials([&u, &v], &weights),
             rhs,

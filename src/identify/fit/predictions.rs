@@ -7,8 +7,8 @@
 //! leverages of each model in turn.
 
 use super::adjustment::{
-    Adjustment, LINEAR_TERMS, Lanes, MeasuredStar, POSE_PARAMETERS, Reduced, Rows, add_products,
-    add_scaled,
+    Adjustment, EquationRows, LINEAR_TERMS, Lanes, MeasuredStar, POSE_PARAMETERS, Reduced,
+    add_products, add_scaled,
 };
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::camera::{
@@ -192,7 +192,7 @@ fn left_out_sum<const P: usize, const K: usize>(
 #[inline(always)]
 fn leverages<const P: usize, const K: usize>(
     adjustment: &Adjustment<P, K>,
-    rows: &Rows<P, K>,
+    rows: &EquationRows<P, K>,
     reduced: &Reduced<P, K>,
 ) -> [Lanes; 2] {
     let mut of_monomials = [[0.0; LANES]; K];

@@ -9,7 +9,7 @@
 //! cells, then in smaller ones, where those around have enough stars to say more.
 
 use crate::identify::field::StarField;
-use crate::identify::grid::Grid;
+use crate::identify::grid::FrameGrid;
 use crate::identify::predict::PredictedStar;
 
 /// A star's probability is never closer to 1 than this: bright stars are lost, too.
@@ -24,7 +24,7 @@ const PRIOR_AROUND: f64 = 1.0;
 /// The probability of each predicted star that it is observed. Its buffers are reused.
 #[derive(Debug, Default)]
 #[non_exhaustive]
-pub struct Completeness {
+pub struct DetectionShares {
     /// By brightness alone, brightest first; at the end 0, for stars fainter than all.
     shares: Vec<f64>,
     /// How much more likely stars are observed at the place of each one than on average; as many.
@@ -62,7 +62,7 @@ pub fn odds_of([own, apparent, visibility]: [f64; 3]) -> [f64; 2] {
     [own / (1.0 - own), apparent / (1.0 - own)]
 }
 
-impl Completeness {
+impl DetectionShares {
     /// Nothing is known of `stars` predicted stars.
     pub fn start(&mut self, stars: usize) {
         self.shares.clear();
@@ -80,7 +80,7 @@ impl Completeness {
     /// Finds the places of `predicted`, for the visibility.
     pub fn place(&mut self, field: &StarField, predicted: &[PredictedStar]) {
         for (scale, cells) in self.scales.iter_mut().zip(CELLS) {
-            let grid = Grid::new(field, cells);
+            let grid = FrameGrid::new(field, cells);
             scale.places.clear();
             let places = predicted
                 .iter()
@@ -95,7 +95,7 @@ impl Completeness {
         self.visibility.clear();
         self.visibility.resize(is_observed.len() + 1, 1.0);
         for (scale, cells) in self.scales.iter_mut().zip(CELLS) {
-            let grid = Grid::new(field, cells);
+            let grid = FrameGrid::new(field, cells);
             scale.count(&grid, is_observed, &self.shares, &mut self.scratch);
             scale.refine(&mut self.visibility, is_observed, &self.shares);
         }
@@ -142,7 +142,13 @@ impl Completeness {
 
 impl Scale {
     /// Counts the stars in each cell and its neighbors.
-    fn count(&mut self, grid: &Grid, is_observed: &[f64], shares: &[f64], scratch: &mut Vec<f64>) {
+    fn count(
+        &mut self,
+        grid: &FrameGrid,
+        is_observed: &[f64],
+        shares: &[f64],
+        scratch: &mut Vec<f64>,
+    ) {
         for cells in [&mut self.observed, &mut self.expected] {
             cells.clear();
             cells.resize(grid.cells(), 0.0);
@@ -205,7 +211,7 @@ mod tests {
 
     #[test]
     fn the_share_falls_and_pools_what_rises() {
-        let mut found = Completeness::default();
+        let mut found = DetectionShares::default();
         let observed: Vec<f64> = [[1.0; 40], [0.0; 40]].concat();
         found.measure_shares(&observed);
         assert!(found.shares[0] > 0.95);
@@ -229,7 +235,7 @@ mod tests {
             .iter()
             .map(|s| f64::from(u8::from(!is_behind(s))))
             .collect();
-        let mut found = Completeness::default();
+        let mut found = DetectionShares::default();
         found.measure_shares(&observed);
         found.place(&field(), &stars);
         found.measure_visibility(&field(), &observed);

@@ -39,7 +39,7 @@ use crate::identify::field::{ObservedStar, Photometry, StarField};
 use crate::identify::hypothesis::Hypothesis;
 use crate::identify::pairing::Pairing;
 use crate::identify::predict::PredictedStar;
-use completeness::Completeness;
+use completeness::DetectionShares;
 use likelihood::MagnitudeRelation;
 use odds::{OddsInputs, pack, set_chances, set_odds};
 use packed::Packed;
@@ -76,7 +76,7 @@ pub struct Naming {
     /// The share by brightness of the predicted stars as bright as each observed one.
     apparent_shares: Vec<f64>,
     by_place: bool,
-    completeness: Completeness,
+    completeness: DetectionShares,
     unrelated: Unrelated,
     magnitudes: MagnitudeRelation,
 }

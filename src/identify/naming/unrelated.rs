@@ -5,7 +5,7 @@
 //! densest.
 
 use crate::identify::field::StarField;
-use crate::identify::grid::Grid;
+use crate::identify::grid::FrameGrid;
 
 /// Half the width of the range of magnitudes that counts as the same brightness.
 const HALF_RANGE_MAG: f64 = 0.5;
@@ -62,7 +62,7 @@ impl Unrelated {
         self.is_saturated.extend(saturated);
         if by_place {
             for (scale, cells) in self.scales.iter_mut().zip(CELLS) {
-                scale.start(field, &Grid::new(field, cells));
+                scale.start(field, &FrameGrid::new(field, cells));
             }
         }
     }
@@ -92,7 +92,7 @@ impl Unrelated {
         self.crowding.clear();
         self.crowding.resize(self.weights.len(), 1.0);
         for (scale, cells) in self.scales.iter_mut().zip(CELLS) {
-            let grid = Grid::new(field, cells);
+            let grid = FrameGrid::new(field, cells);
             scale.raise(&mut self.crowding, &grid, &self.weights, mean);
         }
     }
@@ -134,7 +134,7 @@ impl Unrelated {
 }
 
 impl Scale {
-    fn start(&mut self, field: &StarField, grid: &Grid) {
+    fn start(&mut self, field: &StarField, grid: &FrameGrid) {
         self.cells.clear();
         self.cells.resize(grid.cells(), 0.0);
         self.places.clear();
@@ -145,7 +145,7 @@ impl Scale {
     }
 
     /// Raises the crowding where the surroundings are denser than the frame's `mean`.
-    fn raise(&mut self, crowding: &mut [f64], grid: &Grid, weights: &[f64], mean: f64) {
+    fn raise(&mut self, crowding: &mut [f64], grid: &FrameGrid, weights: &[f64], mean: f64) {
         for ((cell, _), weight) in self.places.iter().zip(weights) {
             self.cells[*cell as usize] += weight;
         }

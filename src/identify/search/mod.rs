@@ -12,4 +12,4 @@ mod triangle_search;
 
 pub use thinning::Thinning;
 pub use tiers::Tiers;
-pub use triangle_search::{Buffers, Found, LOG10_FALSE_ALARM_LIMIT, Search};
+pub use triangle_search::{Found, LOG10_FALSE_ALARM_LIMIT, Search, SearchBuffers};

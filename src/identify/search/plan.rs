@@ -3,7 +3,7 @@
 use super::false_alarm::MAX_HYPOTHESES;
 
 /// One sweep over the triangles of the brightest stars.
-pub struct Pass {
+pub struct SearchPass {
     /// Number of stars that form triangles, the brightest.
     pub stars: usize,
     /// Faintest star of the first triangle; triangles of brighter stars were tried in the pass
@@ -20,9 +20,9 @@ pub struct Pass {
 
 /// What a search tries.
 #[derive(Clone, Copy)]
-pub struct Plan {
+pub struct SearchPlan {
     /// The passes, one after the other.
-    pub passes: &'static [Pass],
+    pub passes: &'static [SearchPass],
     /// Maximum number of hypotheses.
     pub max_hypotheses: u64,
     /// Maximum number of catalogue triangles of the right shape. Most of them fail at once, by size
@@ -31,7 +31,7 @@ pub struct Plan {
 }
 
 /// The plan for the brightest stars, of the frame or of each of its parts.
-pub const BRIGHTEST: Plan = Plan {
+pub const BRIGHTEST: SearchPlan = SearchPlan {
     passes: &PASSES,
     max_hypotheses: MAX_HYPOTHESES,
     max_candidates: 20_000_000,
@@ -39,8 +39,8 @@ pub const BRIGHTEST: Plan = Plan {
 
 /// The plan for stars below brighter detections. It is short, as there are many such choices. Small
 /// triangles are enough: the index lists them down to fainter stars than large ones.
-pub const TIER: Plan = Plan {
-    passes: &[Pass {
+pub const TIER: SearchPlan = SearchPlan {
+    passes: &[SearchPass {
         stars: 40,
         from: 2,
         tolerance: 0.0025,
@@ -52,29 +52,29 @@ pub const TIER: Plan = Plan {
 };
 
 /// The passes: the usual frame, a distorting lens, many false stars, even more false stars.
-pub const PASSES: [Pass; 4] = [
-    Pass {
+pub const PASSES: [SearchPass; 4] = [
+    SearchPass {
         stars: 12,
         from: 2,
         tolerance: 0.0025,
         true_confirmation: 0.6,
         largest_share: f64::INFINITY,
     },
-    Pass {
+    SearchPass {
         stars: 10,
         from: 2,
         tolerance: 0.008,
         true_confirmation: 0.6,
         largest_share: f64::INFINITY,
     },
-    Pass {
+    SearchPass {
         stars: 22,
         from: 2,
         tolerance: 0.0025,
         true_confirmation: 0.35,
         largest_share: f64::INFINITY,
     },
-    Pass {
+    SearchPass {
         stars: 40,
         from: 22,
         tolerance: 0.0025,

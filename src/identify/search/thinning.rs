@@ -7,7 +7,7 @@
 //! Lang et al. 2010, AJ 139, 1782, section 2.1, for the same in astrometry.net.
 
 use crate::identify::field::StarField;
-use crate::identify::grid::Grid;
+use crate::identify::grid::FrameGrid;
 
 /// Cells along the frame's longer side.
 const CELLS: usize = 8;
@@ -26,7 +26,7 @@ pub struct Thinning {
 impl Thinning {
     /// `field` with the brightest stars of each cell only; `None` if that hardly changes it.
     pub fn thin(&mut self, field: &StarField) -> Option<&StarField> {
-        let grid = Grid::new(field, CELLS);
+        let grid = FrameGrid::new(field, CELLS);
         self.kept.clear();
         self.kept.resize(grid.cells(), 0);
         let mut stars = self.field.take().map_or_else(Vec::new, |old| old.stars);

@@ -9,7 +9,7 @@
 
 use super::confirmation::{Batch, ConfirmingStars, PendingHypothesis, Pose};
 use super::false_alarm::{FalseAlarm, TESTED_STARS};
-use super::plan::{BRIGHTEST, PASSES, Pass, Plan, TIER};
+use super::plan::{BRIGHTEST, PASSES, SearchPass, SearchPlan, TIER};
 use super::tiers::Tiers;
 use crate::base::coords::Rotation;
 use crate::base::interrupt::Interrupt;
@@ -68,7 +68,7 @@ const FIRST_TESTED_STARS: usize = 25;
 
 /// Buffers of the search, reused from field to field.
 #[derive(Debug, Default)]
-pub struct Buffers {
+pub struct SearchBuffers {
     /// Offsets of the brightest stars from the frame's centre, in pixels.
     offsets: Vec<[f64; 2]>,
     /// Refines hypotheses.
@@ -92,9 +92,9 @@ pub struct Buffers {
 /// The search over one field.
 pub struct Search<'a> {
     problem: Problem<'a>,
-    plan: Plan,
+    plan: SearchPlan,
     near: Option<SkyRegion>,
-    buffers: &'a mut Buffers,
+    buffers: &'a mut SearchBuffers,
     /// Smallest and largest focal length, in pixels.
     focal_px: [f64; 2],
     diagonal_px: f64,
@@ -139,7 +139,7 @@ struct ObservedTriangle {
     tolerance: f64,
     /// Largest distance of a confirming star from its catalogue star, in pixels.
     confirming_px: f64,
-    /// Probability that another star confirms a true hypothesis, see [`Pass`].
+    /// Probability that another star confirms a true hypothesis, see [`SearchPass`].
     true_confirmation: f64,
 }
 
@@ -164,7 +164,7 @@ struct Weighed {
 
 impl<'a> Search<'a> {
     /// A search over `field`.
-    pub fn new(problem: Problem<'a>, priors: &Priors, buffers: &'a mut Buffers) -> Self {
+    pub fn new(problem: Problem<'a>, priors: &Priors, buffers: &'a mut SearchBuffers) -> Self {
         let Problem { field, sky, .. } = problem;
         let plan = if problem.brighter > 0 {
             TIER
@@ -256,7 +256,7 @@ impl<'a> Search<'a> {
     }
 
     /// Tries the triangles of one pass in the order of their faintest star, then of the second.
-    fn sweep(&mut self, pass: &Pass) -> Option<Found> {
+    fn sweep(&mut self, pass: &SearchPass) -> Option<Found> {
         let stars = pass.stars.min(self.buffers.offsets.len());
         for faintest in pass.from.max(self.shared)..stars {
             let before = self.hypotheses;
@@ -292,7 +292,7 @@ impl<'a> Search<'a> {
         self.hypotheses > self.most_hypotheses || self.candidates > self.plan.max_candidates
     }
 
-    fn triangle(&self, stars: [usize; 3], pass: &Pass) -> Option<ObservedTriangle> {
+    fn triangle(&self, stars: [usize; 3], pass: &SearchPass) -> Option<ObservedTriangle> {
         let [a, b, c] = stars.map(|s| self.buffers.offsets[s]);
         let side = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
         let longest_px = side(a, b).max(side(b, c)).max(side(c, a));
@@ -698,7 +698,7 @@ impl<'a> Search<'a> {
             }
         }
         let hypotheses = self.hypotheses;
-        let Buffers {
+        let SearchBuffers {
             refiner,
             false_alarm,
             ..

@@ -1,6 +1,6 @@
 //! From expected electrons to ADU.
 
-use super::pattern::Pattern;
+use super::pattern::DetectorPattern;
 use super::poisson::{PoissonTable, poisson};
 use crate::camera::data_sheet::DataSheet;
 use rand_chacha::ChaCha8Rng;
@@ -50,7 +50,7 @@ impl Readout {
     pub(super) fn grey_levels(
         &self,
         collected_e: &mut [f64],
-        pattern: &Pattern,
+        pattern: &DetectorPattern,
         random: &mut ChaCha8Rng,
     ) -> Vec<f32> {
         self.bloom(collected_e);
@@ -116,7 +116,7 @@ mod tests {
         let readout = Readout::of(sheet);
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let mut collected = electrons.to_vec();
-        let levels = readout.grey_levels(&mut collected, &Pattern::default(), &mut random);
+        let levels = readout.grey_levels(&mut collected, &DetectorPattern::default(), &mut random);
         (sheet.saturation_adu() as f32, levels)
     }
 

@@ -5,7 +5,7 @@ use super::color_camera::ColorCamera;
 use super::equivalent_spot::make_gaussian;
 use super::image::ElectronImage;
 use super::motion::Motion;
-use super::pattern::Pattern;
+use super::pattern::DetectorPattern;
 use super::poisson::PoissonTable;
 use super::readout::{Readout, collect};
 use super::scene::Scene;
@@ -66,7 +66,7 @@ pub struct Simulator<'a> {
     stars: &'a [Star],
     camera: CameraModel,
     light: StarLight,
-    pattern: Pattern,
+    pattern: DetectorPattern,
     /// Distribution of the counts in a pixel with sky and dark current only.
     uniform: Option<PoissonTable>,
 }
@@ -89,7 +89,7 @@ impl<'a> Simulator<'a> {
             scene: *scene,
             stars,
             camera: camera_of(sheet),
-            pattern: Pattern::of(sheet),
+            pattern: DetectorPattern::of(sheet),
             uniform: PoissonTable::new(budget.background_e + budget.dark_e),
             light,
         })

@@ -14,7 +14,7 @@ pub static FONT: &[u8] = include_bytes!("../../../assets/DejaVuSans-subset.ttf")
 const HALO: f32 = 3.0;
 const HALO_OPACITY: u8 = 200;
 /// Background of the strip below the frame.
-const BACKDROP: Color = Color([16, 18, 24]);
+const BACKDROP: Rgb = Rgb([16, 18, 24]);
 
 fn face() -> &'static Face<'static> {
     static FACE: OnceLock<Face> = OnceLock::new();
@@ -23,9 +23,9 @@ fn face() -> &'static Face<'static> {
 
 /// Red, green and blue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Color(pub(super) [u8; 3]);
+pub(super) struct Rgb(pub(super) [u8; 3]);
 
-impl Color {
+impl Rgb {
     pub(super) const WHITE: Self = Self([240, 240, 240]);
     pub(super) const DIM: Self = Self([175, 180, 190]);
 
@@ -73,14 +73,14 @@ impl Canvas {
     }
 
     /// Draws a circle; `radius` in pixels.
-    pub(super) fn ring(&mut self, [x, y]: [f32; 2], radius: f32, stroke: f32, color: Color) {
+    pub(super) fn ring(&mut self, [x, y]: [f32; 2], radius: f32, stroke: f32, color: Rgb) {
         if let Some(path) = PathBuilder::from_circle(x, y, radius) {
             self.stroke(&path, stroke * self.unit, color, 255);
         }
     }
 
     /// Draws a line through `points`.
-    pub(super) fn line(&mut self, points: &[[f32; 2]], stroke: f32, color: Color) {
+    pub(super) fn line(&mut self, points: &[[f32; 2]], stroke: f32, color: Rgb) {
         let mut builder = PathBuilder::new();
         for (i, [x, y]) in points.iter().enumerate() {
             if i == 0 {
@@ -95,11 +95,11 @@ impl Canvas {
     }
 
     /// Draws `text` with a dark border, its baseline beginning at `at`; `size` in units.
-    pub(super) fn text(&mut self, text: &str, at: [f32; 2], size: f32, color: Color) {
+    pub(super) fn text(&mut self, text: &str, at: [f32; 2], size: f32, color: Rgb) {
         let Some(path) = outline(text, at, size * self.unit) else {
             return;
         };
-        self.stroke(&path, HALO * self.unit, Color([0, 0, 0]), HALO_OPACITY);
+        self.stroke(&path, HALO * self.unit, Rgb([0, 0, 0]), HALO_OPACITY);
         self.pixmap.fill_path(
             &path,
             &color.paint(255),
@@ -119,7 +119,7 @@ impl Canvas {
         RgbImage::from_raw(width, height, opaque.collect()).expect("three bytes a pixel")
     }
 
-    fn stroke(&mut self, path: &Path, width: f32, color: Color, opacity: u8) {
+    fn stroke(&mut self, path: &Path, width: f32, color: Rgb, opacity: u8) {
         let stroke = Stroke {
             width,
             line_cap: LineCap::Round,

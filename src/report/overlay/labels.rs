@@ -139,7 +139,7 @@ fn overlap(a: &Rectangle, b: &Rectangle) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::mark::Kind;
+    use super::super::mark::MarkKind;
     use super::*;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -151,7 +151,7 @@ mod tests {
             x,
             y,
             radius: 6.0,
-            kind: Kind::Identified,
+            kind: MarkKind::Identified,
             label: Some((format!("05140095 {v_mag:.1}"), v_mag)),
         }
     }

@@ -1,8 +1,8 @@
 //! The strip below the frame: name, field, counts, scale bar and compass.
 
-use super::canvas::{Canvas, Color, text_width};
+use super::canvas::{Canvas, Rgb, text_width};
 use super::grey::Grey;
-use super::mark::{Kind, Mark};
+use super::mark::{Mark, MarkKind};
 use crate::base::format::{counted, degrees, hours};
 use crate::base::size::Size;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
@@ -80,7 +80,7 @@ pub(super) fn draw(
     }
     let left = PADDING * canvas.unit;
     let lines = [title.to_owned(), field_line(solution)];
-    for (number, (line, color)) in lines.iter().zip([Color::WHITE, Color::DIM]).enumerate() {
+    for (number, (line, color)) in lines.iter().zip([Rgb::WHITE, Rgb::DIM]).enumerate() {
         let at = [left, baseline(canvas, top, number)];
         let text = shortened(line, (right - left) / canvas.unit);
         canvas.text(&text, at, LETTERS, color);
@@ -110,15 +110,15 @@ fn field_line(solution: &Solution) -> String {
 
 /// Draws the number of detections of each kind, in the color of its rings.
 fn draw_counts(canvas: &mut Canvas, [left, y]: [f32; 2], right: f32, marks: &[Mark]) {
-    let count = |kind: Kind| marks.iter().filter(|mark| mark.kind == kind).count();
+    let count = |kind: MarkKind| marks.iter().filter(|mark| mark.kind == kind).count();
     let kinds = [
-        (Kind::Identified, "identified"),
-        (Kind::Unidentified, "not identified"),
-        (Kind::NotAStar, "not a star"),
+        (MarkKind::Identified, "identified"),
+        (MarkKind::Unidentified, "not identified"),
+        (MarkKind::NotAStar, "not a star"),
     ];
     let mut x = left;
     if marks.is_empty() {
-        canvas.text(&counted(0, "detection"), [left, y], LETTERS, Color::DIM);
+        canvas.text(&counted(0, "detection"), [left, y], LETTERS, Rgb::DIM);
     }
     for (kind, word) in kinds.into_iter().filter(|(kind, _)| count(*kind) > 0) {
         let text = format!("{} {word}", count(kind));
@@ -162,11 +162,11 @@ fn draw_scale(
             [right, y + tick],
         ],
         1.5,
-        Color::WHITE,
+        Rgb::WHITE,
     );
     let width = text_width(name, LETTERS * canvas.unit);
     let at = [(left + right - width) / 2.0, y - 8.0 * canvas.unit];
-    canvas.text(name, at, LETTERS, Color::WHITE);
+    canvas.text(name, at, LETTERS, Rgb::WHITE);
     left.min(at[0])
 }
 
@@ -176,7 +176,7 @@ fn draw_compass(canvas: &mut Canvas, centre: [f32; 2], found: &Identification) {
     const ARROW: f32 = 20.0;
     let arrows = north_and_east(found)
         .into_iter()
-        .zip([("N", 1.0, Color::WHITE), ("E", 0.75, Color::DIM)]);
+        .zip([("N", 1.0, Rgb::WHITE), ("E", 0.75, Rgb::DIM)]);
     for ([dx, dy], (letter, length, color)) in arrows {
         let point = |along: f32, aside: f32| {
             let (along, aside) = (along * canvas.unit, aside * canvas.unit);

@@ -1,6 +1,6 @@
 //! Detections as they are drawn.
 
-use super::canvas::Color;
+use super::canvas::Rgb;
 use super::grey::Grey;
 use super::names;
 use crate::pipeline::{Solution, Source};
@@ -11,19 +11,19 @@ const RADIUS: (f32, f32) = (5.0, 15.0);
 
 /// Kind of a detection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum MarkKind {
     Identified,
     Unidentified,
     NotAStar,
 }
 
-impl Kind {
+impl MarkKind {
     /// The colors also differ in brightness, for color-blind readers.
-    pub(super) fn color(self) -> Color {
+    pub(super) fn color(self) -> Rgb {
         match self {
-            Self::Identified => Color([110, 240, 150]),
-            Self::Unidentified => Color([255, 170, 60]),
-            Self::NotAStar => Color([205, 85, 95]),
+            Self::Identified => Rgb([110, 240, 150]),
+            Self::Unidentified => Rgb([255, 170, 60]),
+            Self::NotAStar => Rgb([205, 85, 95]),
         }
     }
 
@@ -42,7 +42,7 @@ pub(super) struct Mark {
     pub(super) x: f32,
     pub(super) y: f32,
     pub(super) radius: f32,
-    pub(super) kind: Kind,
+    pub(super) kind: MarkKind,
     /// Label and V magnitude of an identified star.
     pub(super) label: Option<(String, f32)>,
 }
@@ -76,12 +76,12 @@ pub(super) fn marks(solution: &Solution, catalog: &Catalog, grey: &Grey) -> Vec<
         .collect()
 }
 
-fn kind(source: &Source, identified: bool) -> Kind {
+fn kind(source: &Source, identified: bool) -> MarkKind {
     let star_like = source.measured.is_none_or(|m| m.flags.is_star_like());
     match (identified, star_like) {
-        (true, _) => Kind::Identified,
-        (false, true) => Kind::Unidentified,
-        (false, false) => Kind::NotAStar,
+        (true, _) => MarkKind::Identified,
+        (false, true) => MarkKind::Unidentified,
+        (false, false) => MarkKind::NotAStar,
     }
 }
 

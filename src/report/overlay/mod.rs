@@ -30,7 +30,7 @@ use crate::sky::catalog::Catalog;
 use canvas::Canvas;
 use grey::Grey;
 use image::RgbImage;
-use mark::Kind;
+use mark::MarkKind;
 
 /// Draws `frame` with its detections; `title` is its name.
 pub fn draw(title: &str, frame: &Frame, solution: &Solution, catalog: &Catalog) -> RgbImage {
@@ -43,7 +43,7 @@ pub fn draw(title: &str, frame: &Frame, solution: &Solution, catalog: &Catalog) 
         canvas.ring([mark.x, mark.y], mark.radius, mark.kind.stroke(), color);
     }
     let image = [grey.width as f32, grey.height as f32];
-    let letters = Kind::Identified.color().lighter();
+    let letters = MarkKind::Identified.color().lighter();
     for label in labels::place(&marks, image, unit) {
         if let Some(line) = label.line {
             canvas.line(&line, 0.8, letters);

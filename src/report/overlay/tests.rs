@@ -1,6 +1,6 @@
 //! Tests of pictures of drawn frames.
 
-use super::canvas::Color;
+use super::canvas::Rgb;
 use super::*;
 use crate::base::coords::{PixelPoint, Rotation, UnitVector};
 use crate::base::units::RAD_PER_DEG;
@@ -83,7 +83,7 @@ fn not_identified() -> Outcome {
 }
 
 /// Number of pixels of about this color within a square around (x, y).
-fn count(picture: &RgbImage, color: Color, [x, y]: [u32; 2], reach: u32) -> usize {
+fn count(picture: &RgbImage, color: Rgb, [x, y]: [u32; 2], reach: u32) -> usize {
     let columns = x - reach..=x + reach;
     let rows = y - reach..=y + reach;
     rows.flat_map(|row| columns.clone().map(move |column| (column, row)))
@@ -100,11 +100,15 @@ fn every_detection_has_a_ring_of_the_color_of_its_kind() {
     let solution = solution(WIDTH, HEIGHT, identified(0.0, false));
     let picture = draw("a.tif", &frame, &solution, Catalog::built_in());
     for (kind, center) in [
-        (Kind::Identified, [200, 300]),
-        (Kind::Unidentified, [500, 400]),
-        (Kind::NotAStar, [700, 100]),
+        (MarkKind::Identified, [200, 300]),
+        (MarkKind::Unidentified, [500, 400]),
+        (MarkKind::NotAStar, [700, 100]),
     ] {
-        for other in [Kind::Identified, Kind::Unidentified, Kind::NotAStar] {
+        for other in [
+            MarkKind::Identified,
+            MarkKind::Unidentified,
+            MarkKind::NotAStar,
+        ] {
             let drawn = count(&picture, other.color(), center, 8);
             // A thin ring mixes its color with the sky's.
             assert_eq!(
@@ -115,7 +119,7 @@ fn every_detection_has_a_ring_of_the_color_of_its_kind() {
         }
     }
     // Sirius is named to the right of its ring.
-    let letters = Kind::Identified.color().lighter();
+    let letters = MarkKind::Identified.color().lighter();
     assert!(count(&picture, letters, [250, 300], 30) > 15);
 }
 
@@ -124,8 +128,11 @@ fn a_frame_that_is_not_identified_is_drawn_as_well() {
     let frame = frame(WIDTH, HEIGHT);
     let solution = solution(WIDTH, HEIGHT, not_identified());
     let picture = draw("a.tif", &frame, &solution, Catalog::built_in());
-    assert!(count(&picture, Kind::Unidentified.color(), [200, 300], 8) > 3);
-    assert_eq!(count(&picture, Kind::Identified.color(), [200, 300], 8), 0);
+    assert!(count(&picture, MarkKind::Unidentified.color(), [200, 300], 8) > 3);
+    assert_eq!(
+        count(&picture, MarkKind::Identified.color(), [200, 300], 8),
+        0
+    );
 }
 
 #[test]

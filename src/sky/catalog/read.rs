@@ -1,7 +1,8 @@
 //! Reads a catalogue, a file or a directory, whose kind is detected from its content.
 
 use super::import::{
-    Format, ImportSummary, OpenedFile, Part, Reading, Rows, SourceFile, Tally, combine,
+    CatalogPart, Format, ImportRows, ImportSummary, ImportTally, OpenedFile, Reading, SourceFile,
+    combine,
 };
 use super::sky2000::FixedWidth;
 use super::table::Table;
@@ -115,16 +116,16 @@ fn read_compact(path: &Path, file: OpenedFile) -> Result<Catalog, CatalogError> 
 }
 
 /// Reads the records of a file that is not compact.
-fn read_part(path: &Path, file: OpenedFile) -> Result<Part, CatalogError> {
+fn read_part(path: &Path, file: OpenedFile) -> Result<CatalogPart, CatalogError> {
     let kind = Kind::of(&file.head);
-    let mut rows = Rows::new(file.reader);
+    let mut rows = ImportRows::new(file.reader);
     let format: Box<dyn Format + Send> = match kind {
         Kind::Sky2000 => Box::new(FixedWidth),
         Kind::Tycho2(file) => Box::new(file),
         Kind::Compact | Kind::Table => Box::new(Table::open(&mut rows, path)?),
     };
-    let tally = Tally::read(&mut rows, &*format, path)?;
-    Ok(Part {
+    let tally = ImportTally::read(&mut rows, &*format, path)?;
+    Ok(CatalogPart {
         path: path.to_owned(),
         format,
         tally,
@@ -154,7 +155,7 @@ impl Directory {
                     found.tycho2.push(path);
                 }
                 Kind::Compact | Kind::Sky2000 => found.others.push(path),
-                Kind::Table => match Table::open(&mut Rows::new(file.reader), &path) {
+                Kind::Table => match Table::open(&mut ImportRows::new(file.reader), &path) {
                     Ok(_) => found.others.push(path),
                     Err(error) if error.is_of_system() => return Err(error),
                     Err(_) => {}
@@ -184,10 +185,10 @@ fn read_directory(path: &Path, interrupt: &Interrupt) -> Result<Reading, Catalog
     // Collected before the first error is returned, so that it is the same on any number of
     // threads.
     let files = found.tycho2.par_iter();
-    let parts: Vec<Result<Part, CatalogError>> = files
+    let parts: Vec<Result<CatalogPart, CatalogError>> = files
         .map(|file| read_part(file, OpenedFile::open(file, interrupt)?))
         .collect();
-    let parts: Vec<Part> = parts.into_iter().collect::<Result<_, _>>()?;
+    let parts: Vec<CatalogPart> = parts.into_iter().collect::<Result<_, _>>()?;
     let mut reading = combine(path, title(path, &*parts[0].format), parts)?;
     let left_out = found.left_out.into_iter().map(|path| SourceFile {
         path,

@@ -6,7 +6,7 @@ use crate::base::coords::PixelPoint;
 
 /// A layer of the size of a frame.
 #[derive(Debug, Clone)]
-pub(super) struct Canvas {
+pub(super) struct ClutterCanvas {
     pub width: usize,
     pub height: usize,
     /// How much of the sky each pixel hides, from 0 to 1.
@@ -20,7 +20,7 @@ pub(super) struct Canvas {
 /// Columns and rows from the first to before the last.
 type Bounds = [std::ops::Range<usize>; 2];
 
-impl Canvas {
+impl ClutterCanvas {
     /// An empty layer.
     pub(super) fn new(width: usize, height: usize) -> Self {
         let empty = vec![0.0; width * height];
@@ -205,8 +205,8 @@ mod tests {
     #[test]
     fn shapes_cover_their_areas() {
         let middle = PixelPoint::new(50.0, 40.0);
-        let area = |draw: fn(&mut Canvas, &PixelPoint)| {
-            let mut canvas = Canvas::new(100, 80);
+        let area = |draw: fn(&mut ClutterCanvas, &PixelPoint)| {
+            let mut canvas = ClutterCanvas::new(100, 80);
             draw(&mut canvas, &middle);
             assert!(canvas.share_seen(&PixelPoint::new(51.0, 41.0), 0.2) < 0.1);
             canvas.covered() * 8000.0
@@ -230,7 +230,7 @@ mod tests {
 
     #[test]
     fn what_is_outside_is_not_drawn() {
-        let mut canvas = Canvas::new(50, 40);
+        let mut canvas = ClutterCanvas::new(50, 40);
         canvas.ellipse(&PixelPoint::new(-90.0, 1e9), [20.0, 5.0], 0.0, 1.0);
         canvas.spot(&PixelPoint::new(70.0, -30.0), 2.0, 100.0);
         assert_eq!(canvas.covered(), 0.0);

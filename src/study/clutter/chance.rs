@@ -1,6 +1,6 @@
 //! Random numbers that several drawings need.
 
-use super::canvas::Canvas;
+use super::canvas::ClutterCanvas;
 use crate::base::coords::PixelPoint;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -17,7 +17,7 @@ pub(super) fn normal(random: &mut ChaCha8Rng) -> f64 {
 }
 
 /// A place on the frame.
-pub(super) fn place(canvas: &Canvas, random: &mut ChaCha8Rng) -> PixelPoint {
+pub(super) fn place(canvas: &ClutterCanvas, random: &mut ChaCha8Rng) -> PixelPoint {
     PixelPoint::new(
         random.random_range(0.0..canvas.width as f64),
         random.random_range(0.0..canvas.height as f64),

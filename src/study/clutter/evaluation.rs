@@ -35,7 +35,7 @@ pub(super) fn evaluate(
 ) -> FrameResult {
     let found = solution.outcome.identification();
     let matches = found.map_or(&[][..], |found| &found.matches);
-    let truth = sky.map(|sky| Sky::of(maker, &sky.truth));
+    let truth = sky.map(|sky| ClutterSky::of(maker, &sky.truth));
     let star_like = solution
         .sources
         .iter()
@@ -78,14 +78,14 @@ fn is_star_like(source: &Source) -> bool {
 }
 
 /// The true stars of a frame.
-struct Sky<'a> {
+struct ClutterSky<'a> {
     light: LightMap<'a>,
     limit_vmag: f64,
     /// Half of the length of a trail.
     half_trail_px: f64,
 }
 
-impl<'a> Sky<'a> {
+impl<'a> ClutterSky<'a> {
     fn of(maker: &FrameMaker, truth: &'a Truth) -> Self {
         let [x, y] = truth.motion_px;
         Self {

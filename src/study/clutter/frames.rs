@@ -1,6 +1,6 @@
 //! Makes the frames of a study, each with its truth.
 
-use super::canvas::Canvas;
+use super::canvas::ClutterCanvas;
 use super::kind::Kind;
 use super::{no_sky, recording, scenery};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
@@ -97,7 +97,7 @@ impl<'a> FrameMaker<'a> {
         let (mut frame, mut truth) = self.simulator.frame(&pointing, random.random())?;
         // It would tell the scale.
         frame.metadata = FrameMetadata::default();
-        let mut canvas = Canvas::new(frame.width, frame.height);
+        let mut canvas = ClutterCanvas::new(frame.width, frame.height);
         let frame = self.with_clutter(frame, &mut canvas, &mut random)?;
         truth.stars.retain_mut(|star| self.is_seen(star, &canvas));
         let sky = Some(TrueSky { pointing, truth });
@@ -106,7 +106,7 @@ impl<'a> FrameMaker<'a> {
 
     /// Whether a star may be detected beside what stands before it; dims it to the light that is
     /// left. A bright star is seen through leaves that hide its centre.
-    fn is_seen(&self, star: &mut TrueStar, canvas: &Canvas) -> bool {
+    fn is_seen(&self, star: &mut TrueStar, canvas: &ClutterCanvas) -> bool {
         /// Magnitudes beyond the limit at which a star may still be detected.
         const BEYOND_LIMIT_MAG: f64 = 1.0;
         let sigma_px = self.scenario.camera.spot_sigma_px.max(0.3);
@@ -120,7 +120,7 @@ impl<'a> FrameMaker<'a> {
     fn with_clutter(
         &self,
         frame: Frame<'static>,
-        canvas: &mut Canvas,
+        canvas: &mut ClutterCanvas,
         random: &mut ChaCha8Rng,
     ) -> Result<Frame<'static>, ClutterError> {
         match self.kind {

@@ -1,6 +1,6 @@
 //! Pictures that show no sky, in grey levels of eight bits.
 
-use super::canvas::Canvas;
+use super::canvas::ClutterCanvas;
 use super::chance::{log_uniform, normal, place};
 use super::kind::Kind;
 use super::recording::JPEG_QUALITY;
@@ -20,7 +20,7 @@ const WHITE: f64 = 255.0;
 
 /// A picture of a kind that shows no sky; every second one is a JPEG.
 pub(super) fn picture(kind: Kind, random: &mut ChaCha8Rng) -> Result<Frame<'static>, FrameError> {
-    let mut canvas = Canvas::new(WIDTH, HEIGHT);
+    let mut canvas = ClutterCanvas::new(WIDTH, HEIGHT);
     let ground = Ground::of(kind, random);
     match kind {
         Kind::Dots => dots(&mut canvas, random),
@@ -87,7 +87,7 @@ impl Ground {
 }
 
 /// Star-like spots, few bright and many faint ones.
-fn dots(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
+fn dots(canvas: &mut ClutterCanvas, random: &mut ChaCha8Rng) {
     let sigma_px = log_uniform(random, 0.6, 2.5);
     let slope = random.random_range(0.5..2.0);
     for _ in 0..log_uniform(random, 5.0, 800.0) as usize {
@@ -113,7 +113,7 @@ const LETTERS: [[u8; 7]; 12] = [
     [0x00, 0x04, 0x00, 0x00, 0x00, 0x04, 0x00],
 ];
 
-fn text(canvas: &mut Canvas, ground: &Ground, random: &mut ChaCha8Rng) {
+fn text(canvas: &mut ClutterCanvas, ground: &Ground, random: &mut ChaCha8Rng) {
     let dot_px = log_uniform(random, 0.8, 5.0);
     let light = ground.contrast();
     let margin = random.random_range(10.0..120.0);
@@ -133,7 +133,13 @@ fn text(canvas: &mut Canvas, ground: &Ground, random: &mut ChaCha8Rng) {
     }
 }
 
-fn draw_letter(canvas: &mut Canvas, letter: &[u8; 7], at: &PixelPoint, dot_px: f64, light: f64) {
+fn draw_letter(
+    canvas: &mut ClutterCanvas,
+    letter: &[u8; 7],
+    at: &PixelPoint,
+    dot_px: f64,
+    light: f64,
+) {
     for (row, bits) in letter.iter().enumerate() {
         for column in (0..5).filter(|column| bits >> (4 - column) & 1 == 1) {
             let low = PixelPoint::new(
@@ -146,7 +152,7 @@ fn draw_letter(canvas: &mut Canvas, letter: &[u8; 7], at: &PixelPoint, dot_px: f
     }
 }
 
-fn drawings(canvas: &mut Canvas, ground: &Ground, random: &mut ChaCha8Rng) {
+fn drawings(canvas: &mut ClutterCanvas, ground: &Ground, random: &mut ChaCha8Rng) {
     let light = ground.contrast();
     for _ in 0..random.random_range(3..60) {
         let width_px = log_uniform(random, 0.8, 6.0);
@@ -176,7 +182,7 @@ fn drawings(canvas: &mut Canvas, ground: &Ground, random: &mut ChaCha8Rng) {
     }
 }
 
-fn circle(canvas: &mut Canvas, centre: &PixelPoint, radius: f64, width_px: f64, light: f64) {
+fn circle(canvas: &mut ClutterCanvas, centre: &PixelPoint, radius: f64, width_px: f64, light: f64) {
     const PARTS: u32 = 48;
     let at = |part: u32| {
         let (sin, cos) = libm::sincos(TAU * f64::from(part) / f64::from(PARTS));
@@ -188,7 +194,7 @@ fn circle(canvas: &mut Canvas, centre: &PixelPoint, radius: f64, width_px: f64, 
 }
 
 /// A regular facade with some lit windows.
-fn facade(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
+fn facade(canvas: &mut ClutterCanvas, random: &mut ChaCha8Rng) {
     let side = log_uniform(random, 2.0, 24.0);
     let [across, down] = [0, 1].map(|_| side * random.random_range(1.5..5.0));
     let lit = random.random_range(0.02..0.7);
@@ -209,7 +215,7 @@ fn facade(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
 }
 
 /// Flakes near and far, in and out of focus.
-fn snow(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
+fn snow(canvas: &mut ClutterCanvas, random: &mut ChaCha8Rng) {
     for _ in 0..log_uniform(random, 30.0, 800.0) as usize {
         let at = place(canvas, random);
         let near = random.random::<f64>();
@@ -224,7 +230,7 @@ fn snow(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
 }
 
 /// Lamps as discs of about one size, which overlap.
-fn bokeh(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
+fn bokeh(canvas: &mut ClutterCanvas, random: &mut ChaCha8Rng) {
     let radius_px = log_uniform(random, 4.0, 60.0);
     let rim = random.random_range(0.0..1.5);
     for _ in 0..log_uniform(random, 8.0, 200.0) as usize {

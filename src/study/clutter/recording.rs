@@ -1,6 +1,6 @@
 //! How a frame is recorded: clutter before the sky, eight bits, a mosaic of colors, JPEG.
 
-use super::canvas::Canvas;
+use super::canvas::ClutterCanvas;
 use super::chance::{log_uniform, normal};
 use crate::base::statistics::SIGMA_PER_MAD;
 use crate::frame::{Frame, FrameError};
@@ -16,13 +16,13 @@ const WHITE: f64 = 255.0;
 
 /// The sky of a frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sky {
+pub(super) struct ClutterSky {
     level: f64,
     /// Standard deviation of a pixel.
     noise: f64,
 }
 
-impl Sky {
+impl ClutterSky {
     /// The median, and the noise from the differences of neighbors.
     pub(super) fn of(frame: &Frame) -> Self {
         /// Standard deviation over the median absolute difference of two neighbors.
@@ -49,10 +49,10 @@ fn middle(values: &mut [f32]) -> f32 {
 /// `frame` behind `canvas`, which has the sky's noise.
 pub(super) fn behind(
     mut frame: Frame<'static>,
-    canvas: &Canvas,
+    canvas: &ClutterCanvas,
     random: &mut ChaCha8Rng,
 ) -> Frame<'static> {
-    let sky = Sky::of(&frame);
+    let sky = ClutterSky::of(&frame);
     let most = frame.saturation_adu.unwrap_or(f32::MAX);
     let layers = canvas.opacity.iter().zip(&canvas.light).zip(&canvas.glow);
     for (pixel, ((opacity, light), glow)) in frame.values_mut().iter_mut().zip(layers) {
@@ -81,7 +81,7 @@ pub(super) fn mirrored_in_window(
     mut frame: Frame<'static>,
     random: &mut ChaCha8Rng,
 ) -> Frame<'static> {
-    let sky = Sky::of(&frame);
+    let sky = ClutterSky::of(&frame);
     let share = random.random_range(0.1..0.6);
     let most = frame.saturation_adu.unwrap_or(f32::MAX);
     let shift: usize = random.random_range(0..frame.width);
@@ -103,7 +103,7 @@ pub(super) fn mirrored_in_window(
 /// `frame` in eight bits, with a black level that is above the sky in parts of it: the sky becomes
 /// brighter across the frame.
 pub(super) fn cut_off(mut frame: Frame<'static>, random: &mut ChaCha8Rng) -> Frame<'static> {
-    let sky = Sky::of(&frame);
+    let sky = ClutterSky::of(&frame);
     // Levels in one standard deviation of the noise.
     let levels = random.random_range(0.6..2.5);
     let gain = levels / sky.noise;
@@ -130,7 +130,7 @@ pub(super) fn as_jpeg(
 ) -> Result<Frame<'static>, FrameError> {
     /// Response of red, green and blue pixels to the light of a grey surface.
     const RESPONSE: [f64; 3] = [0.5, 1.0, 0.6];
-    let sky = Sky::of(frame);
+    let sky = ClutterSky::of(frame);
     let black = sky.level - sky.noise * random.random_range(2.0..8.0);
     let white = sky.level + sky.noise * log_uniform(random, 60.0, 1000.0);
     let mosaic: Vec<f64> = frame
@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn level_and_noise_of_a_sky_are_measured() {
         // The median difference of whole levels is a whole number: 12 for 11.4.
-        let sky = Sky::of(&noisy(300.0, 12.0));
+        let sky = ClutterSky::of(&noisy(300.0, 12.0));
         assert!(
             (sky.level - 300.0).abs() < 1.0 && (sky.noise - 12.0).abs() < 0.7,
             "{sky:?}"
@@ -177,9 +177,9 @@ mod tests {
 
     #[test]
     fn an_opaque_shape_replaces_the_sky() {
-        let mut canvas = Canvas::new(200, 160);
+        let mut canvas = ClutterCanvas::new(200, 160);
         canvas.below([0.0, 200.0], |_| 80.0, |_| 10.0);
-        let sky = Sky::of(&noisy(300.0, 12.0));
+        let sky = ClutterSky::of(&noisy(300.0, 12.0));
         let frame = behind(
             noisy(300.0, 12.0),
             &canvas,

@@ -1,6 +1,6 @@
 //! What stands before the sky: foliage, roofs, wires, reflections.
 
-use super::canvas::Canvas;
+use super::canvas::ClutterCanvas;
 use super::chance::{log_uniform, normal, place};
 use crate::base::coords::PixelPoint;
 use rand::Rng;
@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 
 /// Branches with leaves that grow from the borders until they hide a part of the frame.
-pub(super) fn foliage(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
+pub(super) fn foliage(canvas: &mut ClutterCanvas, random: &mut ChaCha8Rng) {
     /// Branches after which growth ends.
     const MAX_BRANCHES: usize = 80;
     let wanted = random.random_range(0.08..0.45);
@@ -27,7 +27,7 @@ pub(super) fn foliage(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
     }
 }
 
-fn branch(canvas: &mut Canvas, leaf_px: f64, tone: f64, random: &mut ChaCha8Rng) {
+fn branch(canvas: &mut ClutterCanvas, leaf_px: f64, tone: f64, random: &mut ChaCha8Rng) {
     const STEP_PX: f64 = 6.0;
     const LEAVES_A_STEP: usize = 3;
     let (width, height) = (canvas.width as f64, canvas.height as f64);
@@ -63,7 +63,7 @@ fn branch(canvas: &mut Canvas, leaf_px: f64, tone: f64, random: &mut ChaCha8Rng)
 }
 
 /// Roofs along a side of the frame, walls with windows, masts and wires.
-pub(super) fn roofs(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
+pub(super) fn roofs(canvas: &mut ClutterCanvas, random: &mut ChaCha8Rng) {
     let (width, height) = (canvas.width as f64, canvas.height as f64);
     let tone = if random.random_bool(0.5) {
         -log_uniform(random, 3.0, 30.0)
@@ -96,7 +96,7 @@ pub(super) fn roofs(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
 }
 
 /// Some lit windows on a wall between two columns, below a row.
-fn windows(canvas: &mut Canvas, [left, right]: [f64; 2], top: f64, random: &mut ChaCha8Rng) {
+fn windows(canvas: &mut ClutterCanvas, [left, right]: [f64; 2], top: f64, random: &mut ChaCha8Rng) {
     let side = log_uniform(random, 3.0, 18.0);
     let lit = random.random_range(0.05..0.5);
     let mut y = top + side;
@@ -114,7 +114,7 @@ fn windows(canvas: &mut Canvas, [left, right]: [f64; 2], top: f64, random: &mut 
     }
 }
 
-fn mast(canvas: &mut Canvas, foot: &PixelPoint, tone: f64, random: &mut ChaCha8Rng) {
+fn mast(canvas: &mut ClutterCanvas, foot: &PixelPoint, tone: f64, random: &mut ChaCha8Rng) {
     let length = random.random_range(10.0..90.0);
     let top = PixelPoint::new(foot.x, foot.y - length);
     canvas.line(foot, &top, random.random_range(0.7..3.0), tone);
@@ -127,7 +127,7 @@ fn mast(canvas: &mut Canvas, foot: &PixelPoint, tone: f64, random: &mut ChaCha8R
 }
 
 /// Wires across the frame that sag a little.
-fn wires(canvas: &mut Canvas, tone: f64, random: &mut ChaCha8Rng) {
+fn wires(canvas: &mut ClutterCanvas, tone: f64, random: &mut ChaCha8Rng) {
     const PARTS: usize = 24;
     let (width, height) = (canvas.width as f64, canvas.height as f64);
     for _ in 0..random.random_range(0..5) {
@@ -146,7 +146,7 @@ fn wires(canvas: &mut Canvas, tone: f64, random: &mut ChaCha8Rng) {
 }
 
 /// Ghosts of lamps in the lens along a line through the centre, and specks of light.
-pub(super) fn ghosts(canvas: &mut Canvas, random: &mut ChaCha8Rng) {
+pub(super) fn ghosts(canvas: &mut ClutterCanvas, random: &mut ChaCha8Rng) {
     let centre = PixelPoint::new(canvas.width as f64 / 2.0, canvas.height as f64 / 2.0);
     let lamp = place(canvas, random);
     for _ in 0..random.random_range(2..12) {

@@ -50,7 +50,7 @@ pub fn standard_cases(base: &Protocol) -> Vec<Case> {
 
 /// A parameter that can be swept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Parameter {
+pub enum VariedParameter {
     /// Horizontal field of view, in degrees.
     FieldOfView,
     /// Mean number of stars.
@@ -65,7 +65,7 @@ pub enum Parameter {
     FalseStars,
 }
 
-impl Parameter {
+impl VariedParameter {
     /// All parameters.
     pub const ALL: [Self; 6] = [
         Self::FieldOfView,

@@ -2,7 +2,7 @@
 
 use super::light::LightMap;
 use super::record::{BEYOND_LIMIT_MAG, FrameRecord, Named, RowKind, StarRecord};
-use super::validator::{Simulated, Validator};
+use super::validator::{SimulatedFrame, Validator};
 use crate::base::format::{to_decimals, to_significant};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::identify::{Identification, SourceIndex};
@@ -19,7 +19,7 @@ use std::collections::{HashMap, HashSet};
 pub(super) struct Evaluation<'a> {
     validator: &'a Validator<'a>,
     number: u64,
-    simulated: &'a Simulated,
+    simulated: &'a SimulatedFrame,
     solution: &'a Solution,
     light: LightMap<'a>,
     found: Option<&'a Identification>,
@@ -45,7 +45,7 @@ impl<'a> Evaluation<'a> {
     pub(super) fn new(
         validator: &'a Validator<'a>,
         number: u64,
-        simulated: &'a Simulated,
+        simulated: &'a SimulatedFrame,
         solution: &'a Solution,
     ) -> Self {
         let found = solution.outcome.identification();

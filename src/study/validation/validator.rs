@@ -54,7 +54,7 @@ pub struct Validator<'a> {
 }
 
 /// A simulated frame, not yet processed.
-pub(super) struct Simulated {
+pub(super) struct SimulatedFrame {
     pub(super) frame: Frame<'static>,
     pub(super) truth: Truth,
     pub(super) icrs_to_camera: Rotation<Icrs, Camera>,
@@ -135,14 +135,14 @@ impl<'a> Validator<'a> {
     }
 
     /// Simulates the frame with this number.
-    pub(super) fn simulate(&self, number: u64) -> Result<Simulated, ValidationError> {
+    pub(super) fn simulate(&self, number: u64) -> Result<SimulatedFrame, ValidationError> {
         let (seed, icrs_to_camera) = self.draw(number);
         let pointing = Pointing {
             icrs_to_camera,
             years_since_j2000: 0.0,
         };
         let (frame, truth) = self.simulator.frame(&pointing, seed)?;
-        Ok(Simulated {
+        Ok(SimulatedFrame {
             frame,
             truth,
             icrs_to_camera,

@@ -6,7 +6,8 @@ use starpipe::frame::Frame;
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
-use tiff::encoder::{TiffEncoder, colortype::Gray16};
+use tiff::encoder::TiffEncoder;
+use tiff::encoder::colortype::Gray16;
 
 /// Frames of each kind and spot size.
 const FRAMES: u64 = 3;

@@ -5,21 +5,21 @@ use super::grid::Tile;
 use super::gzip;
 use super::method::{Method, Values};
 use super::quantize::{Dither, Quantized};
-use super::table::{Column, Table};
+use super::table::{TileColumn, TileTable};
 use crate::frame::FrameError;
 use crate::frame::account::{Account, PIXELS_BETWEEN_CHECKS};
 use crate::frame::fits::error::{malformed, unsupported};
-use crate::frame::fits::unit::{StoredType, Unit};
+use crate::frame::fits::unit::{FitsUnit, StoredType};
 
 /// All that the tiles of one image have in common.
 pub(super) struct Decoder<'a> {
-    table: Table<'a>,
+    table: TileTable<'a>,
     stored: StoredType,
     method: Method,
-    compressed: Column,
+    compressed: TileColumn,
     /// For tiles that are compressed without loss beside others that are quantized.
-    gzip: Option<Column>,
-    uncompressed: Option<Column>,
+    gzip: Option<TileColumn>,
+    uncompressed: Option<TileColumn>,
     /// `None` for whole numbers and for floats that are stored as such.
     quantization: Option<Quantization>,
 }
@@ -35,12 +35,12 @@ struct Quantization {
 /// Where a parameter is: in a column, or the same for all tiles.
 #[derive(Clone, Copy)]
 enum Source<T> {
-    Column(Column),
+    Column(TileColumn),
     All(T),
 }
 
 impl<'a> Decoder<'a> {
-    pub fn new(unit: &Unit, table: Table<'a>) -> Result<Self, FrameError> {
+    pub fn new(unit: &FitsUnit, table: TileTable<'a>) -> Result<Self, FrameError> {
         let header = &unit.header;
         let method = Method::of(header, unit.stored)?;
         let quantization = if unit.stored.is_float() {
@@ -108,7 +108,7 @@ impl<'a> Decoder<'a> {
     pub fn pixels(&self, tile: &Tile, account: &Account) -> Result<Vec<u8>, TileError> {
         let count = tile.pixels();
         let width = self.stored.bytes();
-        let data = |column: Option<Column>| match column {
+        let data = |column: Option<TileColumn>| match column {
             Some(column) => self.table.data(column, tile.row),
             None => Ok(&[][..]),
         };
@@ -209,7 +209,7 @@ fn exactly(bytes: Vec<u8>, count: usize, width: usize) -> Result<Vec<u8>, TileEr
 
 impl Quantization {
     /// How the floats of the image were quantized; `None` if they were not.
-    fn of(unit: &Unit, table: &Table) -> Result<Option<Self>, FrameError> {
+    fn of(unit: &FitsUnit, table: &TileTable) -> Result<Option<Self>, FrameError> {
         let header = &unit.header;
         let source = |name| -> Result<Option<Source<f64>>, FrameError> {
             match table.column(name) {
@@ -247,7 +247,7 @@ impl Quantization {
         }))
     }
 
-    fn of_tile(&self, table: &Table, row: usize) -> Quantized {
+    fn of_tile(&self, table: &TileTable, row: usize) -> Quantized {
         let number = |source: Source<f64>| match source {
             Source::Column(column) => table.number(column, row).unwrap_or(f64::NAN),
             Source::All(number) => number,

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 /// The tiles of an image.
 #[derive(Debug, PartialEq)]
-pub(super) struct Grid {
+pub(super) struct TileGrid {
     /// Pixels along each axis.
     axes: Vec<usize>,
     /// Pixels of a tile along each axis.
@@ -27,7 +27,7 @@ pub(super) struct Tile {
     pub lengths: Vec<usize>,
 }
 
-impl Grid {
+impl TileGrid {
     /// The grid of an image with these axes, none of them empty. Without ZTILEn tiles are rows.
     pub fn new(axes: &[usize], header: &Header) -> Result<Self, FrameError> {
         let length = |(axis, &pixels): (usize, &usize)| {
@@ -136,8 +136,8 @@ impl Tile {
 mod tests {
     use super::*;
 
-    fn grid() -> Grid {
-        Grid {
+    fn grid() -> TileGrid {
+        TileGrid {
             axes: vec![5, 4, 2],
             tile: vec![3, 2, 1],
         }

@@ -27,14 +27,14 @@ mod rice;
 mod table;
 
 use super::error::{malformed, truncated};
-use super::unit::Unit;
+use super::unit::FitsUnit;
 use crate::frame::account::Account;
 use crate::frame::{FrameError, MAX_PIXELS};
 use decoder::Decoder;
 use error::TileError;
-use grid::Grid;
+use grid::TileGrid;
 use std::ops::Range;
-use table::Table;
+use table::TileTable;
 
 /// Most pixels in a tile: three planes of the largest frame.
 const MAX_TILE_PIXELS: usize = 3 * MAX_PIXELS;
@@ -49,19 +49,19 @@ const MAX_TILES: usize = 1_000_000;
 /// [`FrameError::Malformed`] with the number of the tile, counted from 1, and
 /// [`FrameError::Truncated`], [`FrameError::Unsupported`].
 pub(super) fn unpack(
-    unit: &Unit,
+    unit: &FitsUnit,
     bytes: &[u8],
     pixels: Range<usize>,
     account: &Account,
 ) -> Result<Vec<u8>, FrameError> {
-    let grid = Grid::new(&unit.axes, &unit.header)?;
+    let grid = TileGrid::new(&unit.axes, &unit.header)?;
     let too_large = || malformed(format!("found tiles of more than {MAX_TILE_PIXELS} pixels"));
     let tiles = grid.tiles().ok_or_else(too_large)?;
     let largest = grid.tile_pixels();
     if largest.is_none_or(|pixels| pixels > MAX_TILE_PIXELS) {
         return Err(too_large());
     }
-    let decoder = Decoder::new(unit, Table::new(unit, bytes, tiles)?)?;
+    let decoder = Decoder::new(unit, TileTable::new(unit, bytes, tiles)?)?;
     let rows = touching(&grid, tiles, &pixels, account)?;
     let mut data_bytes = 0;
     for &row in &rows {
@@ -102,7 +102,7 @@ pub(super) fn unpack(
 
 /// The rows of the tiles that may have some of these pixels.
 fn touching(
-    grid: &Grid,
+    grid: &TileGrid,
     tiles: usize,
     pixels: &Range<usize>,
     account: &Account,

@@ -7,14 +7,14 @@ use super::error::TileError;
 use crate::frame::FrameError;
 use crate::frame::fits::error::{malformed, truncated};
 use crate::frame::fits::header::Header;
-use crate::frame::fits::unit::Unit;
+use crate::frame::fits::unit::FitsUnit;
 
 /// Largest number of columns (TFIELDS).
 const MAX_COLUMNS: i64 = 999;
 
 /// One column.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Column {
+pub(super) struct TileColumn {
     /// Its place in a row, in bytes.
     offset: usize,
     /// The letter of its type.
@@ -24,16 +24,16 @@ pub(super) struct Column {
 }
 
 /// The rows and the heap.
-pub(super) struct Table<'a> {
-    names: Vec<(String, Column)>,
+pub(super) struct TileTable<'a> {
+    names: Vec<(String, TileColumn)>,
     rows: &'a [u8],
     row_bytes: usize,
     heap: &'a [u8],
 }
 
-impl<'a> Table<'a> {
+impl<'a> TileTable<'a> {
     /// The table of `unit` in `bytes`, the content of a file, with at least `tiles` rows.
-    pub fn new(unit: &Unit, bytes: &'a [u8], tiles: usize) -> Result<Self, FrameError> {
+    pub fn new(unit: &FitsUnit, bytes: &'a [u8], tiles: usize) -> Result<Self, FrameError> {
         let header = &unit.header;
         let [row_bytes, rows] = unit.table[..] else {
             return Err(header.invalid("NAXIS", "2, the axes of a table"));
@@ -68,7 +68,7 @@ impl<'a> Table<'a> {
     }
 
     /// The column of this name, in any case.
-    pub fn column(&self, name: &str) -> Option<Column> {
+    pub fn column(&self, name: &str) -> Option<TileColumn> {
         let found = self
             .names
             .iter()
@@ -77,7 +77,7 @@ impl<'a> Table<'a> {
     }
 
     /// The data in the heap of `row`, from 0; nothing if there are none.
-    pub fn data(&self, column: Column, row: usize) -> Result<&'a [u8], TileError> {
+    pub fn data(&self, column: TileColumn, row: usize) -> Result<&'a [u8], TileError> {
         let (count, offset) = if column.kind == b'Q' {
             (
                 self.integer(column, b'K', row, 0),
@@ -112,7 +112,7 @@ impl<'a> Table<'a> {
     }
 
     /// The number of `row`, from 0.
-    pub fn number(&self, column: Column, row: usize) -> Option<f64> {
+    pub fn number(&self, column: TileColumn, row: usize) -> Option<f64> {
         match column.kind {
             b'E' => Some(f32::from_be_bytes(self.cell(column, row, 0)).into()),
             b'D' => Some(f64::from_be_bytes(self.cell(column, row, 0))),
@@ -121,13 +121,13 @@ impl<'a> Table<'a> {
     }
 
     /// The whole number of `row`, from 0; `None` if the column has none.
-    pub fn whole_number(&self, column: Column, row: usize) -> Option<i64> {
+    pub fn whole_number(&self, column: TileColumn, row: usize) -> Option<i64> {
         let is_whole = matches!(column.kind, b'B' | b'I' | b'J' | b'K');
         is_whole.then(|| self.integer(column, column.kind, row, 0))
     }
 
     /// The integer of type `kind` at `place` in the column.
-    fn integer(&self, column: Column, kind: u8, row: usize, place: usize) -> i64 {
+    fn integer(&self, column: TileColumn, kind: u8, row: usize, place: usize) -> i64 {
         match kind {
             b'B' => u8::from_be_bytes(self.cell(column, row, place)).into(),
             b'I' => i16::from_be_bytes(self.cell(column, row, place)).into(),
@@ -137,14 +137,14 @@ impl<'a> Table<'a> {
     }
 
     /// Bytes at `place` in the column, whose width is known to hold them; zeros after the table.
-    fn cell<const N: usize>(&self, column: Column, row: usize, place: usize) -> [u8; N] {
+    fn cell<const N: usize>(&self, column: TileColumn, row: usize, place: usize) -> [u8; N] {
         let start = row * self.row_bytes + column.offset + place;
         let cell = self.rows.get(start..).and_then(|rest| rest.first_chunk());
         cell.copied().unwrap_or([0; N])
     }
 }
 
-impl Column {
+impl TileColumn {
     /// Whether its cells point to data in the heap.
     pub fn is_descriptor(self) -> bool {
         self.element.is_some()
@@ -169,7 +169,7 @@ fn width_of(kind: u8) -> Option<usize> {
 }
 
 /// The columns that hold something, with their names.
-fn columns(header: &Header, row_bytes: usize) -> Result<Vec<(String, Column)>, FrameError> {
+fn columns(header: &Header, row_bytes: usize) -> Result<Vec<(String, TileColumn)>, FrameError> {
     let expected = "a number of columns from 0 to 999";
     let count = header.required("TFIELDS", expected)?;
     if !(0..=MAX_COLUMNS).contains(&count) {
@@ -197,7 +197,7 @@ fn columns(header: &Header, row_bytes: usize) -> Result<Vec<(String, Column)>, F
 }
 
 /// The column at `offset` with this TFORM, and its width in bytes.
-fn column(form: &str, offset: usize) -> Option<(Column, usize)> {
+fn column(form: &str, offset: usize) -> Option<(TileColumn, usize)> {
     let digits = form.bytes().take_while(u8::is_ascii_digit).count();
     let (repeat, kind) = form.split_at(digits);
     let repeat: usize = if digits == 0 { 1 } else { repeat.parse().ok()? };
@@ -212,7 +212,7 @@ fn column(form: &str, offset: usize) -> Option<(Column, usize)> {
     if is_descriptor && element.and_then(width_of).is_none() {
         return None;
     }
-    let column = Column {
+    let column = TileColumn {
         offset,
         kind,
         element,

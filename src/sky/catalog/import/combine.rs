@@ -1,7 +1,7 @@
 //! Combines the files of a catalogue.
 
 use super::summary::ImportSummary;
-use super::tally::{Format, Tally};
+use super::tally::{Format, ImportTally};
 use crate::sky::catalog::{Catalog, CatalogError, Star, StarId};
 use rayon::prelude::*;
 use std::collections::HashSet;
@@ -29,10 +29,10 @@ pub struct Reading {
 }
 
 /// The records of one file of a catalogue.
-pub(in crate::sky::catalog) struct Part {
+pub(in crate::sky::catalog) struct CatalogPart {
     pub(in crate::sky::catalog) path: PathBuf,
     pub(in crate::sky::catalog) format: Box<dyn Format + Send>,
-    pub(in crate::sky::catalog) tally: Tally,
+    pub(in crate::sky::catalog) tally: ImportTally,
 }
 
 /// The catalogue of all stars in `parts`, which were read from `path`.
@@ -42,7 +42,7 @@ pub(in crate::sky::catalog) struct Part {
 pub(in crate::sky::catalog) fn combine(
     path: &Path,
     title: String,
-    mut parts: Vec<Part>,
+    mut parts: Vec<CatalogPart>,
 ) -> Result<Reading, CatalogError> {
     remove_repeated(&mut parts)?;
     let (mut stars, mut names, mut files) = (Vec::new(), Vec::new(), Vec::new());
@@ -75,7 +75,7 @@ pub(in crate::sky::catalog) fn combine(
 }
 
 /// Removes all but the first record of each identifier, and of each name without an identifier.
-fn remove_repeated(parts: &mut [Part]) -> Result<(), CatalogError> {
+fn remove_repeated(parts: &mut [CatalogPart]) -> Result<(), CatalogError> {
     let stars = parts.iter().map(|part| part.tally.stars.as_slice());
     let mut ids: Vec<(StarId, usize)> = stars.flatten().map(|star| star.id).zip(0..).collect();
     ids.par_sort_unstable();
@@ -98,7 +98,7 @@ fn remove_repeated(parts: &mut [Part]) -> Result<(), CatalogError> {
 }
 
 /// The indices, counted through all parts, of stars that have only a name, and one used before.
-fn repeated_names(parts: &[Part]) -> Vec<usize> {
+fn repeated_names(parts: &[CatalogPart]) -> Vec<usize> {
     let mut repeated = Vec::new();
     let mut first = 0;
     let mut seen = HashSet::new();

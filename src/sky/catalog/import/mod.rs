@@ -1,8 +1,8 @@
 //! What became of the records of the source files? Rows of text → stars, counts, a catalogue.
 //!
 //! 1. [`OpenedFile`] decompresses a file and shows its first bytes, which tell its kind.
-//! 2. [`Rows`] splits its content into rows, many at once.
-//! 3. A [`Format`] parses each row; [`Tally`] collects the stars and counts the other records.
+//! 2. [`ImportRows`] splits its content into rows, many at once.
+//! 3. A [`Format`] parses each row; [`ImportTally`] collects the stars and counts the other records.
 //! 4. [`combine`](fn@combine) makes the catalogue of all files, without repeated identifiers.
 
 mod combine;
@@ -11,9 +11,9 @@ mod rows;
 mod summary;
 mod tally;
 
-pub(super) use combine::{Part, combine};
+pub(super) use combine::{CatalogPart, combine};
 pub use combine::{Reading, SourceFile};
 pub(super) use opened::OpenedFile;
-pub(super) use rows::{Row, Rows};
+pub(super) use rows::{ImportRows, Row};
 pub use summary::ImportSummary;
-pub(super) use tally::{Format, NamedStar, Parsed, Rejection, Tally, both_or_neither};
+pub(super) use tally::{Format, ImportTally, NamedStar, Parsed, Rejection, both_or_neither};

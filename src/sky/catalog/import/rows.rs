@@ -45,7 +45,7 @@ struct Span {
 
 /// Splits what it reads into rows. Lines end with LF or CR LF; a last byte 0x1A (the end-of-file
 /// mark of DOS) is ignored.
-pub(in crate::sky::catalog) struct Rows<R> {
+pub(in crate::sky::catalog) struct ImportRows<R> {
     reader: R,
     buffer: Vec<u8>,
     /// Where the next row begins: its byte in the buffer, and its line.
@@ -61,7 +61,7 @@ pub(in crate::sky::catalog) struct Rows<R> {
     unclosed: usize,
 }
 
-impl<R: BufRead> Rows<R> {
+impl<R: BufRead> ImportRows<R> {
     pub(in crate::sky::catalog) fn new(reader: R) -> Self {
         Self {
             reader,
@@ -255,7 +255,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn rows_of(content: &[u8], quoting: Option<u8>) -> Vec<(u64, Vec<u8>)> {
-        let mut rows = Rows::new(content);
+        let mut rows = ImportRows::new(content);
         rows.quoting = quoting;
         let mut found = Vec::new();
         loop {
@@ -294,7 +294,7 @@ mod tests {
         let longest = MAX_ROW_BYTES - 1;
         for (length, is_read) in [(longest, true), (longest + 1, false), (20 * longest, false)] {
             let content = [b"first\n", &vec![b'x'; length][..], b"\nafter\n"].concat();
-            let mut rows = Rows::new(&content[..]);
+            let mut rows = ImportRows::new(&content[..]);
             assert_eq!(rows.next().unwrap().unwrap().bytes, b"first");
             assert_eq!(rows.next().is_ok(), is_read, "{length} bytes");
             assert_eq!(rows.next().unwrap().is_some(), is_read);
@@ -304,7 +304,7 @@ mod tests {
     #[test]
     fn lines_without_records_are_not_read_without_end() {
         let lines = io::repeat(b'\n').take(MAX_LINES + 1);
-        let mut rows = Rows::new(io::BufReader::new(lines));
+        let mut rows = ImportRows::new(io::BufReader::new(lines));
         let error = loop {
             match rows.batch() {
                 Ok(batch) => assert!(!batch.is_empty() && batch.len() <= BATCH_ROWS),

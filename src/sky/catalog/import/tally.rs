@@ -1,6 +1,6 @@
 //! Parses the rows of one file, and collects stars and rejected records.
 
-use super::rows::{MAX_RECORDS, Row, Rows};
+use super::rows::{ImportRows, MAX_RECORDS, Row};
 use super::summary::ImportSummary;
 use crate::sky::catalog::error::{CatalogError, RecordError, RecordLocation};
 use crate::sky::catalog::{Star, StarId};
@@ -62,7 +62,7 @@ pub(in crate::sky::catalog) trait Format: Sync {
     /// Where in a row the identifier is, and the label of its column.
     fn id_location(&self) -> (RecordLocation, String);
     /// A defect of the file that shows only in all of its records.
-    fn diagnose(&self, tally: &Tally) -> Option<String> {
+    fn diagnose(&self, tally: &ImportTally) -> Option<String> {
         let _ = tally;
         None
     }
@@ -70,7 +70,7 @@ pub(in crate::sky::catalog) trait Format: Sync {
 
 /// The stars of a file, and a summary of its records.
 #[derive(Default)]
-pub(in crate::sky::catalog) struct Tally {
+pub(in crate::sky::catalog) struct ImportTally {
     pub(in crate::sky::catalog) summary: ImportSummary,
     pub(in crate::sky::catalog) stars: Vec<Star>,
     /// The line of each star.
@@ -78,10 +78,10 @@ pub(in crate::sky::catalog) struct Tally {
     pub(super) names: Vec<(StarId, String)>,
 }
 
-impl Tally {
+impl ImportTally {
     /// Parses all rows, on all threads.
     pub(in crate::sky::catalog) fn read<R: BufRead>(
-        rows: &mut Rows<R>,
+        rows: &mut ImportRows<R>,
         format: &dyn Format,
         path: &Path,
     ) -> Result<Self, CatalogError> {

@@ -6,7 +6,7 @@ use crate::base::files;
 use crate::base::interrupt::Interrupt;
 use crate::sky::catalog::CatalogError;
 use crate::sky::catalog::error::quoted;
-use crate::sky::catalog::import::{Format, ImportSummary, OpenedFile, Rows, Tally};
+use crate::sky::catalog::import::{Format, ImportRows, ImportSummary, ImportTally, OpenedFile};
 use std::io;
 use std::path::Path;
 
@@ -66,7 +66,7 @@ pub fn write_bright_csv(
         });
     }
     let content = file.read_to_end(source)?;
-    let mut tally = Tally::read(&mut Rows::new(&content[..]), &FixedWidth, source)?;
+    let mut tally = ImportTally::read(&mut ImportRows::new(&content[..]), &FixedWidth, source)?;
     tally.summary.stars = tally.stars.len() as u64;
     let written = bright_rows(&content, v_mag_limit)
         .and_then(|(rows, count)| files::write(out, &rows).map(|()| count));
@@ -78,7 +78,7 @@ fn bright_rows(content: &[u8], v_mag_limit: f64) -> io::Result<(Vec<u8>, usize)>
     let mut rows = csv::Writer::from_writer(Vec::new());
     let mut count = 0;
     rows.write_record(BRIGHT_COLUMNS.map(|column| column.label))?;
-    let mut lines = Rows::new(content);
+    let mut lines = ImportRows::new(content);
     while let Ok(Some(row)) = lines.next() {
         if let Ok((star, _)) = FixedWidth.parse(row)
             && star.is_brighter_than(v_mag_limit)

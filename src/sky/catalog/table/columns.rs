@@ -1,6 +1,6 @@
 //! The columns of a general table.
 
-use super::headings::{Heading, Unit, find_column};
+use super::headings::{Heading, HeadingUnit, find_column};
 use super::roles::{Epoch, IdColumns, MagnitudeColumns, MotionColumns, PositionColumns};
 use crate::sky::catalog::error::RecordLocation;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -92,6 +92,6 @@ impl GeneralColumns {
     /// Whether all right ascensions are decimal numbers, read as degrees.
     pub(super) fn has_decimal_degrees(&self) -> bool {
         let decimal = !self.sexagesimal_seen.load(Ordering::Relaxed);
-        decimal && matches!(self.position.ra.unit, None | Some(Unit::Degrees))
+        decimal && matches!(self.position.ra.unit, None | Some(HeadingUnit::Degrees))
     }
 }

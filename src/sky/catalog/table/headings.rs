@@ -4,13 +4,13 @@ use super::cells::unquoted;
 
 /// The unit of a decimal number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Unit {
+pub(super) enum HeadingUnit {
     Degrees,
     Hours,
     Radians,
 }
 
-impl Unit {
+impl HeadingUnit {
     /// Parses the name of a unit; `None` for any other text.
     pub(super) fn parse(text: &str) -> Option<Self> {
         match text {

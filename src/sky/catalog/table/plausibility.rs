@@ -2,11 +2,11 @@
 
 use crate::base::units::RAD_PER_DEG;
 use crate::sky::catalog::Star;
-use crate::sky::catalog::import::Tally;
+use crate::sky::catalog::import::ImportTally;
 use crate::sky::catalog::position::EXPECTED_DEC;
 
 /// Whether right ascension and declination are probably swapped.
-pub(super) fn look_swapped(tally: &Tally) -> bool {
+pub(super) fn look_swapped(tally: &ImportTally) -> bool {
     let errors = &tally.summary.unreadable;
     let beyond_pole = errors.iter().filter(|error| error.expected == EXPECTED_DEC);
     let most = beyond_pole.count() * 2 > errors.len();

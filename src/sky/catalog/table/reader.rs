@@ -8,7 +8,9 @@ use super::row::TableRow;
 use super::sky2000::Sky2000Columns;
 use crate::sky::catalog::CatalogError;
 use crate::sky::catalog::error::{RecordError, RecordLocation, quoted};
-use crate::sky::catalog::import::{Format, NamedStar, Parsed, Rejection, Row, Rows, Tally};
+use crate::sky::catalog::import::{
+    Format, ImportRows, ImportTally, NamedStar, Parsed, Rejection, Row,
+};
 use crate::sky::catalog::sky2000::StarColumn;
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -34,7 +36,7 @@ enum Columns {
 impl Table {
     /// Reads the headings.
     pub(in crate::sky::catalog) fn open<R: BufRead>(
-        rows: &mut Rows<R>,
+        rows: &mut ImportRows<R>,
         path: &Path,
     ) -> Result<Self, CatalogError> {
         let mut notes = HashMap::new();
@@ -168,7 +170,7 @@ impl Format for Table {
         })
     }
 
-    fn diagnose(&self, tally: &Tally) -> Option<String> {
+    fn diagnose(&self, tally: &ImportTally) -> Option<String> {
         let Columns::General(columns) = &self.columns else {
             return None;
         };

@@ -1,6 +1,6 @@
 //! The columns of a general table by what they hold, found from the headings.
 
-use super::headings::{Heading, Unit, find_column};
+use super::headings::{Heading, HeadingUnit, find_column};
 use crate::base::angle::decimal;
 use crate::sky::catalog::star::J2000_YEAR;
 use std::ops::RangeInclusive;
@@ -72,7 +72,7 @@ impl IdColumns {
 pub(super) struct AngleColumn {
     pub(super) cell: usize,
     /// `None` if not given.
-    pub(super) unit: Option<Unit>,
+    pub(super) unit: Option<HeadingUnit>,
 }
 
 /// The columns of right ascension and declination.
@@ -103,7 +103,7 @@ impl PositionColumns {
         let coordinate = |wanted: &str| {
             headings.iter().enumerate().find_map(|(cell, heading)| {
                 let unit = heading_unit(&heading.label, wanted)?;
-                let unit = Unit::parse(&heading.unit).or(unit);
+                let unit = HeadingUnit::parse(&heading.unit).or(unit);
                 Some(AngleColumn { cell, unit })
             })
         };
@@ -117,18 +117,18 @@ impl PositionColumns {
 
 /// The unit that the ending of `label` gives, if any; `None` if it is not a label of the coordinate
 /// `wanted`.
-fn heading_unit(label: &str, wanted: &str) -> Option<Option<Unit>> {
+fn heading_unit(label: &str, wanted: &str) -> Option<Option<HeadingUnit>> {
     /// Endings of the headings of coordinates that give a unit.
-    const UNIT_ENDINGS: [(&str, Unit); 9] = [
-        ("degrees", Unit::Degrees),
-        ("degree", Unit::Degrees),
-        ("deg", Unit::Degrees),
-        ("hours", Unit::Hours),
-        ("hour", Unit::Hours),
-        ("_hr", Unit::Hours),
-        ("_h", Unit::Hours),
-        ("_rad", Unit::Radians),
-        ("rad", Unit::Radians),
+    const UNIT_ENDINGS: [(&str, HeadingUnit); 9] = [
+        ("degrees", HeadingUnit::Degrees),
+        ("degree", HeadingUnit::Degrees),
+        ("deg", HeadingUnit::Degrees),
+        ("hours", HeadingUnit::Hours),
+        ("hour", HeadingUnit::Hours),
+        ("_hr", HeadingUnit::Hours),
+        ("_h", HeadingUnit::Hours),
+        ("_rad", HeadingUnit::Radians),
+        ("rad", HeadingUnit::Radians),
     ];
     /// Endings of the headings of coordinates whose cells are sexagesimal.
     const FORM_ENDINGS: [&str; 4] = ["hms", "dms", "sexagesimal", "sex"];

@@ -2,7 +2,7 @@
 
 use super::cells::unquoted;
 use super::columns::GeneralColumns;
-use super::headings::Unit;
+use super::headings::HeadingUnit;
 use super::roles::{
     AngleColumn, EPOCH_YEARS, Epoch, IdColumns, IdKind, MagnitudeColumns, PositionColumns,
 };
@@ -119,8 +119,8 @@ impl TableRow<'_> {
         const RA_RANGE_DEG: RangeInclusive<f64> = -180.0..=360.0;
         let PositionColumns { ra, dec } = &self.columns.position;
         let position = both_or_neither(
-            self.angle(ra, Unit::Hours)?,
-            self.angle(dec, Unit::Degrees)?,
+            self.angle(ra, HeadingUnit::Hours)?,
+            self.angle(dec, HeadingUnit::Degrees)?,
             || self.error(ra.cell, "a right ascension, as there is a declination"),
             || self.error(dec.cell, "a declination, as there is a right ascension"),
         )?;
@@ -137,7 +137,7 @@ impl TableRow<'_> {
     }
 
     /// An angle in degrees; `sexagesimal` is the unit of sexagesimal numbers without one.
-    fn angle(&self, column: &AngleColumn, sexagesimal: Unit) -> Parsed<Option<f64>> {
+    fn angle(&self, column: &AngleColumn, sexagesimal: HeadingUnit) -> Parsed<Option<f64>> {
         let Some(text) = self.value(column.cell) else {
             return Ok(None);
         };
@@ -147,10 +147,13 @@ impl TableRow<'_> {
             seen.fetch_or(angle.is_some(), Ordering::Relaxed);
         }
         let degrees = match angle {
-            Some(Angle::Decimal(value)) => column.unit.unwrap_or(Unit::Degrees).to_degrees(value),
+            Some(Angle::Decimal(value)) => column
+                .unit
+                .unwrap_or(HeadingUnit::Degrees)
+                .to_degrees(value),
             // Also under a heading in degrees, a right ascension like `05:34:48` is in hours.
             Some(Angle::Sexagesimal(value)) => sexagesimal.to_degrees(value),
-            Some(Angle::Hours(value)) if sexagesimal == Unit::Hours => value * 15.0,
+            Some(Angle::Hours(value)) if sexagesimal == HeadingUnit::Hours => value * 15.0,
             Some(Angle::Degrees(value)) => value,
             Some(Angle::Hours(_)) | None => {
                 let expected = "an angle like 83.7, 05:34:48.0 or -00 24 00";

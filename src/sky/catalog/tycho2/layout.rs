@@ -13,37 +13,37 @@ pub(in crate::sky::catalog) enum Tycho2 {
 
 /// A field of a record.
 #[derive(Clone, Copy)]
-pub(super) struct Field {
+pub(super) struct Tycho2Field {
     /// From 0.
     pub(super) index: usize,
     pub(super) label: &'static str,
 }
 
-const fn field(index: usize, label: &'static str) -> Field {
-    Field { index, label }
+const fn field(index: usize, label: &'static str) -> Tycho2Field {
+    Tycho2Field { index, label }
 }
 
 /// The fields that differ between the files.
-pub(super) struct Layout {
+pub(super) struct Tycho2Layout {
     pub(super) field_count: usize,
     pub(super) expected_fields: &'static str,
-    pub(super) ra: Field,
-    pub(super) dec: Field,
-    pub(super) bt: Field,
-    pub(super) vt: Field,
+    pub(super) ra: Tycho2Field,
+    pub(super) dec: Tycho2Field,
+    pub(super) bt: Tycho2Field,
+    pub(super) vt: Tycho2Field,
 }
 
-pub(super) const ID: Field = field(0, "TYC");
-pub(super) const FLAG: Field = field(1, "flag");
-pub(super) const PM_RA: Field = field(4, "pmRA");
-pub(super) const PM_DEC: Field = field(5, "pmDE");
-pub(super) const OBSERVED_RA: Field = field(24, "RAdeg");
-pub(super) const OBSERVED_DEC: Field = field(25, "DEdeg");
-pub(super) const OBSERVED_RA_EPOCH: Field = field(26, "EpRA-1990");
-pub(super) const OBSERVED_DEC_EPOCH: Field = field(27, "EpDE-1990");
-pub(super) const SUPPLEMENT_HIP: Field = field(17, "HIP");
+pub(super) const ID: Tycho2Field = field(0, "TYC");
+pub(super) const FLAG: Tycho2Field = field(1, "flag");
+pub(super) const PM_RA: Tycho2Field = field(4, "pmRA");
+pub(super) const PM_DEC: Tycho2Field = field(5, "pmDE");
+pub(super) const OBSERVED_RA: Tycho2Field = field(24, "RAdeg");
+pub(super) const OBSERVED_DEC: Tycho2Field = field(25, "DEdeg");
+pub(super) const OBSERVED_RA_EPOCH: Tycho2Field = field(26, "EpRA-1990");
+pub(super) const OBSERVED_DEC_EPOCH: Tycho2Field = field(27, "EpDE-1990");
+pub(super) const SUPPLEMENT_HIP: Tycho2Field = field(17, "HIP");
 
-const MAIN: Layout = Layout {
+const MAIN: Tycho2Layout = Tycho2Layout {
     field_count: 32,
     expected_fields: "32 fields between bars",
     ra: field(2, "RAmdeg"),
@@ -51,7 +51,7 @@ const MAIN: Layout = Layout {
     bt: field(17, "BTmag"),
     vt: field(19, "VTmag"),
 };
-const SUPPLEMENT: Layout = Layout {
+const SUPPLEMENT: Tycho2Layout = Tycho2Layout {
     field_count: 18,
     expected_fields: "18 fields between bars",
     ra: field(2, "RAdeg"),
@@ -82,7 +82,7 @@ impl Tycho2 {
         }
     }
 
-    pub(super) fn layout(self) -> &'static Layout {
+    pub(super) fn layout(self) -> &'static Tycho2Layout {
         match self {
             Self::Main => &MAIN,
             Self::Supplement1 | Self::Supplement2 => &SUPPLEMENT,

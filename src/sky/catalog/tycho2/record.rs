@@ -2,8 +2,8 @@
 
 use super::johnson::johnson;
 use super::layout::{
-    FLAG, Field, ID, Layout, OBSERVED_DEC, OBSERVED_DEC_EPOCH, OBSERVED_RA, OBSERVED_RA_EPOCH,
-    PM_DEC, PM_RA, SUPPLEMENT_HIP, Tycho2,
+    FLAG, ID, OBSERVED_DEC, OBSERVED_DEC_EPOCH, OBSERVED_RA, OBSERVED_RA_EPOCH, PM_DEC, PM_RA,
+    SUPPLEMENT_HIP, Tycho2, Tycho2Field, Tycho2Layout,
 };
 use crate::base::angle::decimal;
 use crate::sky::catalog::error::{RecordError, RecordLocation, quoted};
@@ -87,7 +87,7 @@ impl<'a> Tycho2Record<'a> {
         })
     }
 
-    fn text(&self, field: Field) -> &'a [u8] {
+    fn text(&self, field: Tycho2Field) -> &'a [u8] {
         self.fields[field.index].1.trim_ascii()
     }
 
@@ -145,7 +145,7 @@ impl<'a> Tycho2Record<'a> {
         Ok((position, year))
     }
 
-    fn position(&self, ra: Field, dec: Field) -> Parsed<Position> {
+    fn position(&self, ra: Tycho2Field, dec: Tycho2Field) -> Parsed<Position> {
         let expected_ra = "a right ascension from 0 to 360 degrees";
         let (ra_deg, dec_deg) = both_or_neither(
             self.number(ra, expected_ra)?,
@@ -161,7 +161,7 @@ impl<'a> Tycho2Record<'a> {
     }
 
     /// V and B−V.
-    fn photometry(&self, layout: &Layout) -> Parsed<(f32, Option<f32>)> {
+    fn photometry(&self, layout: &Tycho2Layout) -> Parsed<(f32, Option<f32>)> {
         let magnitude = |field| {
             let expected = "a magnitude from -32 to 32";
             match self.number(field, expected)? {
@@ -173,7 +173,7 @@ impl<'a> Tycho2Record<'a> {
         Ok(johnson.ok_or(Rejection::NoMagnitude)?)
     }
 
-    fn number(&self, field: Field, expected: &'static str) -> Parsed<Option<f64>> {
+    fn number(&self, field: Tycho2Field, expected: &'static str) -> Parsed<Option<f64>> {
         let text = self.text(field);
         if text.is_empty() {
             return Ok(None);
@@ -182,7 +182,7 @@ impl<'a> Tycho2Record<'a> {
         number.map(Some).ok_or_else(|| self.error(field, expected))
     }
 
-    fn error(&self, field: Field, expected: &'static str) -> Box<Rejection> {
+    fn error(&self, field: Tycho2Field, expected: &'static str) -> Box<Rejection> {
         let (start, text) = self.fields[field.index];
         Box::new(Rejection::Unreadable(RecordError {
             line: self.line,
