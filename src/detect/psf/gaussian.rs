@@ -7,6 +7,7 @@
 //! Wang et al. 2019, Laser & Optoelectronics Progress 56, 101101, Eqs. (1) and (2).
 
 use crate::base::exponential::{rough_exp_of_negative, rough_exp_of_negative_f32};
+use crate::base::size::Size;
 use arrayvec::ArrayVec;
 use multiversion::multiversion;
 
@@ -88,13 +89,8 @@ pub(crate) struct NarrowProfiles {
 }
 
 impl NarrowProfiles {
-    /// Computes the profiles of a spot at a place in a window of `width` times `height` pixels.
-    pub fn fill(
-        &mut self,
-        [x_px, y_px]: [f64; 2],
-        sigma_px: f64,
-        [width, height]: [usize; 2],
-    ) -> LitPart {
+    /// Computes the profiles of a spot at a place in a window of this size.
+    pub fn fill(&mut self, [x_px, y_px]: [f64; 2], sigma_px: f64, size: Size) -> LitPart {
         /// Less than 10⁻⁵ of the light is beyond this many standard deviations of a pixel's edge.
         const REACH_SIGMAS: f64 = 4.5;
         let reach_px = REACH_SIGMAS * sigma_px + 0.5;
@@ -105,10 +101,10 @@ impl NarrowProfiles {
                 bound((at + reach_px).floor() + 1.0),
             ]
         };
-        let [columns, rows] = [range(x_px, width), range(y_px, height)];
+        let [columns, rows] = [range(x_px, size.width), range(y_px, size.height)];
         let groups = [columns[0] / GROUP_PX, columns[1].div_ceil(GROUP_PX)];
         let first = groups[0] * GROUP_PX;
-        let count = (groups[1] * GROUP_PX).min(width).saturating_sub(first);
+        let count = (groups[1] * GROUP_PX).min(size.width).saturating_sub(first);
         fill_narrow(&mut self.across, x_px - first as f64, sigma_px, count);
         let count = rows[1].saturating_sub(rows[0]);
         fill_narrow(&mut self.down, y_px - rows[0] as f64, sigma_px, count);
