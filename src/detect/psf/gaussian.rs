@@ -289,12 +289,12 @@ pub(crate) struct CumulativeProfile {
 
 impl CumulativeProfile {
     /// Computes `count` values, the first at `first_px` from the centre, each `step_px` farther.
-    pub fn fill(&mut self, [first_px, step_px]: [f64; 2], sigma_px: f64, count: usize) {
+    pub fn fill(&mut self, first_px: f64, step_px: f64, sigma_px: f64, count: usize) {
         let scale = Cumulative::of_spot(sigma_px).scale;
         let groups = count.div_ceil(GROUP_PX);
         self.values.resize(groups, [0.0; GROUP_PX]);
-        let line = [first_px, step_px].map(|px| (px * scale) as f32);
-        fill_cumulative(line, &mut self.values[..groups]);
+        let [first, step] = [first_px, step_px].map(|px| (px * scale) as f32);
+        fill_cumulative(first, step, &mut self.values[..groups]);
     }
 
     /// The values, and perhaps more than were asked for.
@@ -304,7 +304,7 @@ impl CumulativeProfile {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn fill_cumulative([first, step]: [f32; 2], values: &mut [PixelGroup]) {
+fn fill_cumulative(first: f32, step: f32, values: &mut [PixelGroup]) {
     for (group, values) in values.iter_mut().enumerate() {
         let mut at = [0.0; GROUP_PX];
         for (lane, at) in at.iter_mut().enumerate() {

@@ -350,7 +350,7 @@ impl SplineProfile {
         let places = samples + 2 * MARGIN;
         // A pixel has two edges.
         self.cumulative
-            .fill([first_px, step_px], sigma_px, places + per_px);
+            .fill(first_px, step_px, sigma_px, places + per_px);
         self.light.resize(places, 0.0);
         self.coefficients.clear();
         self.coefficients.resize(per_px * layout.stride, 0.0);
