@@ -29,7 +29,7 @@ pub(crate) struct Contrast {
 
 impl Contrast {
     /// That of the pixel in column `x` and row `y`.
-    pub fn of(view: &View<'_>, background: &Mesh, (x, y): (usize, usize)) -> Self {
+    pub fn of(view: &View<'_>, background: &Mesh, x: usize, y: usize) -> Self {
         let (level, noise) = background.at(x as f32, y as f32);
         let above = |x: Option<usize>, y: Option<usize>| match (x, y) {
             (Some(x), Some(y)) if x < view.width && y < view.height => {
@@ -47,7 +47,7 @@ impl Contrast {
     }
 
     /// That of the brightest pixel next to or at (x, y).
-    pub fn near(view: &View<'_>, background: &Mesh, (x, y): (usize, usize)) -> Self {
+    pub fn near(view: &View<'_>, background: &Mesh, x: usize, y: usize) -> Self {
         let columns = x.saturating_sub(1)..(x + 2).min(view.width);
         let rows = y.saturating_sub(1)..(y + 2).min(view.height);
         let pixels = rows.flat_map(|row| columns.clone().map(move |column| (column, row)));
@@ -55,7 +55,8 @@ impl Contrast {
         let brightest = pixels
             .filter(|pixel| !value(pixel).is_nan())
             .max_by(|a, b| value(a).total_cmp(&value(b)));
-        Self::of(view, background, brightest.unwrap_or((x, y)))
+        let (x, y) = brightest.unwrap_or((x, y));
+        Self::of(view, background, x, y)
     }
 
     /// In how many of both directions the light beside the pixel is less than spots of `spot_px`

@@ -1,5 +1,6 @@
 //! The filter and the threshold that a frame would get, to predict detection without a frame.
 
+use crate::base::size::Size;
 use crate::detect::config::DetectConfig;
 use crate::detect::filter::Kernel;
 use crate::detect::threshold::{FilterWeights, gaussian_threshold, threshold_for_photons};
@@ -16,18 +17,13 @@ pub struct FilterModel {
 }
 
 impl FilterModel {
-    /// The model for a frame size and a spot's standard deviation, both in pixels, and the skewness
+    /// The model for a frame size, a spot's standard deviation in pixels, and the skewness
     /// of the noise of a pixel: λ/n³ for λ photoelectrons and a total noise of n electrons.
-    pub fn new(
-        config: &DetectConfig,
-        size_px: (usize, usize),
-        spot_sigma_px: f64,
-        skewness: f64,
-    ) -> Self {
+    pub fn new(config: &DetectConfig, size: Size, spot_sigma_px: f64, skewness: f64) -> Self {
         let kernel = Kernel::for_spot(spot_sigma_px);
         let threshold_sigma = config.threshold_sigma.unwrap_or_else(|| {
-            let u = gaussian_threshold(config, size_px, spot_sigma_px, &kernel);
-            let weights = FilterWeights::for_spot(spot_sigma_px, kernel.radius(), size_px);
+            let u = gaussian_threshold(config, size, spot_sigma_px, &kernel);
+            let weights = FilterWeights::for_spot(spot_sigma_px, kernel.radius(), size);
             threshold_for_photons(u, skewness, &weights)
         });
         Self {

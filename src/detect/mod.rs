@@ -225,7 +225,7 @@ fn measure_spots(
     } else {
         None
     };
-    let size = (input.view.width, input.view.height);
+    let size = input.view.size();
     let tables = psf
         .as_ref()
         .map(|psf| FieldTables::new(psf, size, peaks.len()));

@@ -248,7 +248,7 @@ impl FrameSearch {
             ..
         } = self;
         let kernel = Kernel::for_spot(spot_px);
-        let size = (view.width, view.height);
+        let size = view.size();
         let mesh = &background.mesh;
         let gaussian = config
             .threshold_sigma
@@ -257,7 +257,7 @@ impl FrameSearch {
             threshold,
             most: memory.most_candidates(),
         };
-        filtered.filter(view, mesh, &kernel, (config.cell_px, &above(gaussian)))?;
+        filtered.filter(view, mesh, &kernel, config.cell_px, &above(gaussian))?;
         let filter = FilterWeights::for_spot(spot_px, kernel.radius(), size);
         raise_filtered_noise(&background.cut_off, &mut filtered.mesh, gaussian, &filter);
         let measured = || -> Result<_, DetectError> {

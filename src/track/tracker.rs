@@ -261,9 +261,10 @@ impl<'a> Tracker<'a> {
         if predicted < MIN_STARS {
             return Err(Loss::TooFewStars { predicted });
         }
-        let pixels = (frame, known.light.saturation_adu);
+        let saturation_adu = known.light.saturation_adu;
+        let (expected, found) = (&buffers.expected, &mut buffers.found);
         self.detector
-            .measure(pixels, &spot, &buffers.expected, &mut buffers.found);
+            .measure(frame, saturation_adu, &spot, expected, found);
         buffers.take_found(&mut known.light.zero_point_mag);
         let prior = PosePrior {
             camera: &camera,
@@ -377,7 +378,7 @@ impl<'a> Tracker<'a> {
         let is_smear_known = known.motion.rate(false).is_some();
         known.spot = old_spot.filter(|_| !is_smear_known).or_else(|| {
             let stars = known.bright_stars(solution, found, attitude);
-            self.detector.learn((frame, saturation_adu), &stars)
+            self.detector.learn(frame, saturation_adu, &stars)
         });
         known.spot = known.spot.or(old_spot);
         known

@@ -40,7 +40,8 @@ impl CellMeasurer {
         grid: &CellGrid,
         rows: PixelRows<'_>,
         config: &MeshConfig,
-        (background, sigma): (&mut [f32], &mut [f32]),
+        background: &mut [f32],
+        sigma: &mut [f32],
     ) {
         for first in (0..grid.columns).step_by(CELL_LANES) {
             let cells = first..(first + CELL_LANES).min(grid.columns);

@@ -85,8 +85,8 @@ impl CutOff {
         for (cell, (&background, &sigma)) in mesh.background.iter().zip(&mesh.sigma).enumerate() {
             let reaches = background - lowest_adu < REACH_SIGMA * sigma.max(coarse_adu);
             let cut = if reaches {
-                let buffers = (&mut self.above, &mut self.row);
-                measure_cell(view, &grid, cell, lowest_adu, buffers)
+                let Self { above, row, .. } = &mut *self;
+                measure_cell(view, &grid, cell, lowest_adu, above, row)
             } else {
                 None
             };
@@ -159,7 +159,8 @@ fn measure_cell(
     grid: &CellGrid,
     cell: usize,
     lowest: f32,
-    (above, buffer): (&mut Vec<f32>, &mut Vec<f32>),
+    above: &mut Vec<f32>,
+    buffer: &mut Vec<f32>,
 ) -> Option<CutCell> {
     let rows = grid.rows_of(cell / grid.columns);
     let columns = grid.columns_of(cell % grid.columns);
@@ -194,13 +195,14 @@ fn measure_cell(
     if above.len() < MIN_ABOVE || at_lowest == 0 {
         return (above.len() < MIN_ABOVE).then_some(CutCell::Dark);
     }
-    gaussian_beneath(lowest, (at_lowest, total), above)
+    gaussian_beneath(lowest, at_lowest, total, above)
 }
 
 /// The Gaussian of which `at_lowest` of `total` pixels are cut off; the others are `above`.
 fn gaussian_beneath(
     lowest: f32,
-    (at_lowest, total): (usize, usize),
+    at_lowest: usize,
+    total: usize,
     above: &mut [f32],
 ) -> Option<CutCell> {
     let next = above.iter().copied().fold(f32::INFINITY, f32::min);
@@ -246,6 +248,7 @@ fn normal_quantile(probability: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::size::Size;
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
@@ -253,7 +256,7 @@ mod tests {
     fn the_gaussian_beneath_is_found_from_a_few_to_most_pixels_cut_off() {
         const SIDE: usize = 64;
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
-        let grid = CellGrid::new((SIDE, SIDE), SIDE);
+        let grid = CellGrid::new(Size::new(SIDE, SIDE), SIDE);
         for background in [6.0f32, 3.0, 0.0, -3.0, -4.5] {
             let pixels: Vec<f32> = (0..SIDE * SIDE)
                 .map(|_| {
@@ -263,7 +266,7 @@ mod tests {
                 .collect();
             let view = View::new(&pixels, SIDE, SIDE);
             let Some(CutCell::Known { depth, sigma, edge }) =
-                measure_cell(&view, &grid, 0, 0.0, (&mut Vec::new(), &mut Vec::new()))
+                measure_cell(&view, &grid, 0, 0.0, &mut Vec::new(), &mut Vec::new())
             else {
                 panic!("{background} is cut off");
             };

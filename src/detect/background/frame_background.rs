@@ -61,7 +61,7 @@ impl FrameBackground {
         cell_px: usize,
     ) -> Result<(), Interrupted> {
         let config = MeshConfig::of_pixels(cell_px, sigma_floor(view, step_adu, &mut self.row));
-        self.mesh.prepare((view.width, view.height), &config);
+        self.mesh.prepare(view.size(), &config);
         let grid = self.mesh.grid;
         self.lowest_adu.resize(grid.rows, 0.0);
         let mut no_maxima = BlockMaxima::default();
@@ -75,8 +75,7 @@ impl FrameBackground {
             // This also brings the rows from memory in one go, and not cell by cell.
             let minimum = |m, y| lowest_in_row(m, rows.row(y));
             *cells.output = (0..rows.height).fold(f32::INFINITY, minimum);
-            let output = (cells.background, cells.sigma);
-            measurer.measure_row(&grid, rows, &config, output);
+            measurer.measure_row(&grid, rows, &config, cells.background, cells.sigma);
         });
         view.check()?;
         let coarse_adu = COARSE * self.mesh.sigma_floor;

@@ -1,5 +1,6 @@
 //! The cells of a frame.
 
+use crate::base::size::Size;
 use std::ops::Range;
 
 /// Row sampling stride in large cells.
@@ -21,14 +22,14 @@ pub(crate) struct CellGrid {
 }
 
 impl CellGrid {
-    /// Cells of about `cell_px` pixels a side in a frame of `width_px` times `height_px` pixels.
-    pub fn new((width_px, height_px): (usize, usize), cell_px: usize) -> Self {
+    /// Cells of about `cell_px` pixels a side in a frame of this size.
+    pub fn new(size: Size, cell_px: usize) -> Self {
         let cells = |side: usize| ((side as f32 / cell_px as f32).round() as usize).max(1);
         Self {
-            columns: cells(width_px),
-            rows: cells(height_px),
-            width_px,
-            height_px,
+            columns: cells(size.width),
+            rows: cells(size.height),
+            width_px: size.width,
+            height_px: size.height,
         }
     }
 

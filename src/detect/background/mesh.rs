@@ -6,6 +6,7 @@ use super::cells::CellMeasurer;
 use super::grid::CellGrid;
 use super::mesh_config::MeshConfig;
 use super::smoothing::Smoother;
+use crate::base::size::Size;
 use crate::detect::pixels::View;
 
 /// Background and noise of each cell of a frame, and between the cells' centres (the nodes).
@@ -53,21 +54,22 @@ pub(crate) struct Piece {
 impl Mesh {
     /// Measures `view` cell by cell.
     pub fn measure(&mut self, view: &View<'_>, config: &MeshConfig) {
-        self.prepare((view.width, view.height), config);
+        self.prepare(view.size(), config);
         let grid = self.grid;
         let mut measurer = CellMeasurer::default();
         let mut sampled = Vec::new();
         let backgrounds = self.background.chunks_mut(grid.columns);
         let sigmas = self.sigma.chunks_mut(grid.columns);
         for (row, output) in backgrounds.zip(sigmas).enumerate() {
+            let (background, sigma) = output;
             let pixels = view.sampled(grid.rows_of(row), grid.row_stride(), &mut sampled);
-            measurer.measure_row(&grid, pixels, config, output);
+            measurer.measure_row(&grid, pixels, config, background, sigma);
         }
         self.finish();
     }
 
-    /// Makes room for the cells of a frame of `size` pixels across and down.
-    pub fn prepare(&mut self, size: (usize, usize), config: &MeshConfig) {
+    /// Makes room for the cells of a frame of this size.
+    pub fn prepare(&mut self, size: Size, config: &MeshConfig) {
         let grid = CellGrid::new(size, config.cell_px);
         self.grid = grid;
         self.cell_width_px = grid.width_px as f32 / grid.columns as f32;

@@ -49,7 +49,8 @@ impl Candidates {
         &mut self,
         band: &FilteredBand,
         rows: Range<usize>,
-        (cut, most): (f32, usize),
+        cut: f32,
+        most: usize,
         maxima: &mut [f32],
     ) {
         self.pixels.clear();

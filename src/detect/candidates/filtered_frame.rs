@@ -72,7 +72,8 @@ impl FilteredFrame {
         view: &View<'_>,
         background: &Mesh,
         kernel: &Kernel,
-        (cell_px, gathered): (usize, &CandidateLimits),
+        cell_px: usize,
+        gathered: &CandidateLimits,
     ) -> Result<(), DetectError> {
         let Self {
             mesh,
@@ -81,9 +82,8 @@ impl FilteredFrame {
             workers,
         } = self;
         let config = MeshConfig::of_filtered(cell_px, SIGMA_FLOOR);
-        let size = (view.width, view.height);
-        mesh.prepare(size, &config);
-        maxima.prepare(size);
+        mesh.prepare(view.size(), &config);
+        maxima.prepare(view.size());
         let grid = mesh.grid;
         candidates.resize_with(grid.rows, Candidates::default);
         for worker in workers.iter_mut() {
@@ -99,10 +99,10 @@ impl FilteredFrame {
             let filtered = with_neighbors(&rows, view.height);
             band.filter(view, background, kernel, filtered);
             let sampled = band.sampled(rows.clone(), grid.row_stride());
-            cells.measure_row(&grid, sampled, &config, (row.background, row.sigma));
+            cells.measure_row(&grid, sampled, &config, row.background, row.sigma);
             let cut = candidate_cut(row.background, row.sigma, gathered.threshold as f32);
             let most = gathered.most.saturating_sub(total.load(Ordering::Relaxed));
-            row.output.gather(band, rows, (cut, most), row.maxima);
+            row.output.gather(band, rows, cut, most, row.maxima);
             total.fetch_add(row.output.len(), Ordering::Relaxed);
         });
         view.check()?;
@@ -137,7 +137,7 @@ impl FilteredFrame {
                 let maxima = self.maxima.rows_mut(rows.clone());
                 total -= candidates.len();
                 let most = gathered.most.saturating_sub(total);
-                candidates.gather(band, rows, (lowest, most), maxima);
+                candidates.gather(band, rows, lowest, most, maxima);
                 total += candidates.len();
                 check_count(total, gathered.most)?;
             }

@@ -46,7 +46,8 @@ impl FitBuffers {
         maps: &FrameMaps<'_>,
         start: SpotEstimate,
         beyond: &[SpotEstimate],
-        (spot_px, noise): (f64, NoiseModel),
+        spot_px: f64,
+        noise: NoiseModel,
     ) -> Fit {
         const MAX_WINDOWS: usize = 3;
         let mut config = FitConfig {

@@ -85,7 +85,7 @@ impl Fitter {
             0
         };
         let fitted = config.parameter_count(start.len());
-        finish(&mut fit, &normal, [fitted, known], &[0.0; N]);
+        finish(&mut fit, &normal, fitted, known, &[0.0; N]);
         fit
     }
 

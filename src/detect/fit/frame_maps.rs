@@ -56,7 +56,7 @@ impl FrameMaps<'_> {
 
     /// The brightest pixel at a peak, and the light beside it.
     pub fn contrast_at(&self, peak: &Peak) -> Contrast {
-        Contrast::near(&self.view, self.background, (peak.x, peak.y))
+        Contrast::near(&self.view, self.background, peak.x, peak.y)
     }
 
     /// The initial guess of a spot at a peak of the filtered frame.

@@ -94,7 +94,7 @@ pub(super) fn advance<const N: usize>(
     let is_short = length < Convergence::step_px(information, config);
     if is_short && (step > 0 || is_flux_settled) && !is_rough {
         fit.converged = true;
-        finish(fit, normal, [fitted, known], &change);
+        finish(fit, normal, fitted, known, &change);
         return StepOutcome::Converged;
     }
     StepOutcome::Continue
@@ -137,7 +137,8 @@ fn apply(fit: &mut Fit, change: &[f64], config: &FitConfig) -> f64 {
 pub(super) fn finish<const N: usize>(
     fit: &mut Fit,
     normal: &NormalEquations<N>,
-    [fitted, known]: [usize; 2],
+    fitted: usize,
+    known: usize,
     change: &[f64; N],
 ) {
     let spots = fit.spots.len();

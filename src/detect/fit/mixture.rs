@@ -25,11 +25,11 @@ impl MixtureImage {
             .resize(width * window.height, [[0.0; GROUP_PX]; 4]);
         let scale = spot_px / psf.spot_px;
         let corner = [window.x0, window.y0].map(|at| at as f64);
-        let size = [window.width, window.height];
+        let size = window.size();
         if scale == 1.0 && !psf.table.is_empty() {
             let place = [x_px - corner[0], y_px - corner[1]];
-            let into = (&mut self.lines, &mut self.groups[..]);
-            psf.table.draw(place, size, spot_px, into);
+            psf.table
+                .draw(place, size, spot_px, &mut self.lines, &mut self.groups);
             return;
         }
         for lobe in &psf.lobes {
@@ -40,7 +40,8 @@ impl MixtureImage {
             let by_spot = [dx, dy, lobe.sigma_px].map(|part| (part / psf.spot_px) as f32);
             let share = lobe.share as f32;
             add_lobe(
-                (share, by_spot),
+                share,
+                by_spot,
                 &self.profiles,
                 part,
                 &mut self.groups,
@@ -66,7 +67,8 @@ impl MixtureImage {
 )]
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn add_lobe(
-    (share, by_spot): (f32, [f32; 3]),
+    share: f32,
+    by_spot: [f32; 3],
     profiles: &NarrowProfiles,
     part: LitPart,
     into: &mut [ShareGroup],

@@ -171,7 +171,7 @@ impl SumBuffers {
         }
         weigh(pixels, &self.light, &mut self.roots, &mut self.common);
         for (spot, block) in spots.iter().zip(self.spots.chunks_exact_mut(count)) {
-            fill_block(spot, pixels.groups, &self.roots, (block, &mut self.common));
+            fill_block(spot, pixels.groups, &self.roots, block, &mut self.common);
         }
         let blocks = self.spots.chunks_exact(count).chain([&self.common[..]]);
         for (i, block) in blocks.clone().enumerate() {
@@ -180,7 +180,8 @@ impl SumBuffers {
                     normal,
                     [i, j],
                     products_of(block, other),
-                    (spots.len(), pixels),
+                    spots.len(),
+                    pixels,
                 );
             }
         }
@@ -231,7 +232,8 @@ fn fill_block<L: SpotLight>(
     spot: &L,
     groups: usize,
     roots: &[PixelGroup],
-    (block, common): (&mut [Block], &mut [Block]),
+    block: &mut [Block],
+    common: &mut [Block],
 ) {
     for group in 0..groups {
         for (row, root) in roots.iter().skip(group).step_by(groups).enumerate() {
@@ -253,7 +255,8 @@ fn add_products<const N: usize>(
     normal: &mut NormalEquations<N>,
     [i, j]: [usize; 2],
     products: [[f64; BLOCK]; BLOCK],
-    (spots, pixels): (usize, &WindowPixels),
+    spots: usize,
+    pixels: &WindowPixels,
 ) {
     const RESIDUAL: usize = 2;
     let parameter = |block: usize, row: usize| {

@@ -1,5 +1,6 @@
 //! The pixels of a fit.
 
+use crate::base::size::Size;
 use crate::detect::psf::{GROUP_PX, LocalPsf, MAX_WINDOW_PX, PIXEL_VARIANCE_PX2, PixelGroup};
 
 /// A rectangle of pixels cut out of the frame.
@@ -27,6 +28,11 @@ pub(crate) struct Window {
 }
 
 impl Window {
+    /// Its columns and rows.
+    pub fn size(&self) -> Size {
+        Size::new(self.width, self.height)
+    }
+
     /// Groups of pixels in a row.
     pub fn groups(&self) -> usize {
         self.width.div_ceil(GROUP_PX)

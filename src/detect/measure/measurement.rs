@@ -211,13 +211,7 @@ impl Measurement<'_> {
         }
         let mut detection = detection_of(&self.maps, &self.noise, &fit, peak, region);
         if is_star {
-            shape::flag_size(
-                (&self.maps, &self.shape),
-                peak,
-                &fit,
-                &mut detection,
-                buffers,
-            );
+            shape::flag_size(&self.maps, &self.shape, peak, &fit, &mut detection, buffers);
         }
         detection.flags.hot_pixel |= self.is_too_sharp(peak);
         detection.flags.blended = fit.spots.len() > 1;
@@ -241,8 +235,8 @@ impl Measurement<'_> {
         buffers: &mut FitBuffers,
     ) -> Fit {
         let mut fit = if peak.saturated && start.len() == 1 {
-            let size = (1.5 * self.maps.spot_px, self.noise);
-            buffers.fit_free_size(&self.maps, start[0], beyond, size)
+            let size_px = 1.5 * self.maps.spot_px;
+            buffers.fit_free_size(&self.maps, start[0], beyond, size_px, self.noise)
         } else {
             buffers.fit_fixed_size(&self.maps, start, beyond, self.noise)
         };
@@ -391,7 +385,7 @@ impl Measurement<'_> {
 
     /// Flags a trail. Its position is the centre of its region, with its length as standard error.
     fn flag_trail(&self, peak: &Peak, region: &Region, detection: &mut Detection) {
-        if shape::is_trail((&self.maps, &self.shape), region, peak, self.threshold) {
+        if shape::is_trail(&self.maps, &self.shape, region, peak, self.threshold) {
             detection.flags.trail = true;
             detection.position = PixelPoint::new(region.x, region.y);
             detection.sigma_x_px = region.major_px;

@@ -49,8 +49,7 @@ pub(super) fn is_too_sharp(
 pub(crate) fn sharpest_px(maps: &FrameMaps<'_>, shape: &StarShape) -> f64 {
     /// The cores of spots that are no Gaussians, over their size.
     const CORE: f64 = 0.75;
-    let size = (maps.view.width, maps.view.height);
-    match maps.psf.map(|tables| tables.psf.summary(size)) {
+    match maps.psf.map(|tables| tables.psf.summary(maps.view.size())) {
         Some(psf) => StarSize::MIN * CORE * psf.sigma_range_px[0] / psf.axis_ratio.sqrt(),
         // The breadth of elongated stars is not known.
         None if shape.is_elongated() => HOT_PIXEL_PX,
@@ -61,7 +60,8 @@ pub(crate) fn sharpest_px(maps: &FrameMaps<'_>, shape: &StarShape) -> f64 {
 /// Sets the flags of sources sharper or wider than the frame's spot; the window of the fit is in
 /// `buffers`.
 pub(super) fn flag_size(
-    (maps, shape): (&FrameMaps<'_>, &StarShape),
+    maps: &FrameMaps<'_>,
+    shape: &StarShape,
     peak: &Peak,
     fit: &Fit,
     detection: &mut Detection,
@@ -141,8 +141,7 @@ fn compare_with_one_pixel(star: &Fit, buffers: &mut FitBuffers) -> [f64; 2] {
 /// Whether a much wider spot than the frame's explains the source much better.
 fn is_extended(maps: &FrameMaps<'_>, peak: &Peak, fit: &Fit, buffers: &mut FitBuffers) -> bool {
     let spot = fit.spots[0];
-    let size = (maps.spot_px, NoiseModel::default());
-    let free = buffers.fit_free_size(maps, spot, &[], size);
+    let free = buffers.fit_free_size(maps, spot, &[], maps.spot_px, NoiseModel::default());
     if !free.converged || free.spot_px < StarSize::MAX * maps.spot_px {
         return false;
     }
@@ -161,7 +160,8 @@ fn is_extended(maps: &FrameMaps<'_>, peak: &Peak, fit: &Fit, buffers: &mut FitBu
 /// Whether the region of a peak is longer than a star of its height is wide. The halo of a saturated
 /// star may be so; its core is not.
 pub(super) fn is_trail(
-    (maps, shape): (&FrameMaps<'_>, &StarShape),
+    maps: &FrameMaps<'_>,
+    shape: &StarShape,
     region: &Region,
     peak: &Peak,
     threshold: f64,

@@ -1,5 +1,6 @@
 //! Blocks of columns of a row. Most hold no bright pixel, and are skipped as a whole.
 
+use crate::base::size::Size;
 use multiversion::multiversion;
 use std::ops::Range;
 
@@ -19,11 +20,11 @@ pub(crate) struct BlockMaxima {
 }
 
 impl BlockMaxima {
-    /// Makes room for a frame of `width` times `height` pixels.
-    pub fn prepare(&mut self, (width, height): (usize, usize)) {
-        self.per_row = width.div_ceil(BLOCK_PX);
+    /// Makes room for a frame of this size.
+    pub fn prepare(&mut self, size: Size) {
+        self.per_row = size.width.div_ceil(BLOCK_PX);
         self.values.clear();
-        self.values.resize(self.per_row * height, NO_CANDIDATE);
+        self.values.resize(self.per_row * size.height, NO_CANDIDATE);
     }
 
     /// The maxima of the blocks in `rows`, row by row.

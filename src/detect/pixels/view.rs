@@ -2,6 +2,7 @@
 
 use super::samples::Samples;
 use crate::base::interrupt::{Interrupt, Interrupted};
+use crate::base::size::Size;
 use crate::frame::Frame;
 use std::ops::Range;
 
@@ -42,6 +43,11 @@ impl<'a> View<'a> {
             interrupt: Some(interrupt),
             ..self
         }
+    }
+
+    /// Its columns and rows.
+    pub fn size(&self) -> Size {
+        Size::new(self.width, self.height)
     }
 
     /// Whether work on it is to end now.

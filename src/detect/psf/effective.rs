@@ -7,6 +7,7 @@
 
 use super::gaussian::{Lobe, MAX_WINDOW_PX};
 use super::table::PsfTable;
+use crate::base::size::Size;
 use crate::detect::detection::MeasuredPsf;
 
 /// Size and elongation of a spot: `[ln σ, e₁, e₂]`. Its covariance is `σ² exp(e₁ K + e₂ L)` with the
@@ -65,9 +66,9 @@ pub(crate) struct FieldFrame {
 }
 
 impl FieldFrame {
-    /// Of a frame of this width and height, in pixels.
-    pub fn of((width, height): (usize, usize)) -> Self {
-        let [width, height] = [width, height].map(|side| side as f64);
+    /// Of a frame of this size.
+    pub fn of(size: Size) -> Self {
+        let [width, height] = size.sides().map(|side| side as f64);
         Self {
             centre_px: [0.5 * (width - 1.0), 0.5 * (height - 1.0)],
             radius_px: 0.5 * width.hypot(height),
@@ -183,13 +184,13 @@ impl EffectivePsf {
         }
     }
 
-    /// What the spots of a frame of this width and height are like.
-    pub fn summary(&self, (width, height): (usize, usize)) -> MeasuredPsf {
+    /// What the spots of a frame of this size are like.
+    pub fn summary(&self, size: Size) -> MeasuredPsf {
         /// Places along each side at which the spot is computed.
         const PLACES: usize = 9;
         let at = |side: usize, place: usize| (side - 1) as f64 * place as f64 / (PLACES - 1) as f64;
         let rows = (0..PLACES).flat_map(|y| (0..PLACES).map(move |x| (x, y)));
-        let everywhere = rows.map(|(x, y)| self.moments.at(at(width, x), at(height, y)));
+        let everywhere = rows.map(|(x, y)| self.moments.at(at(size.width, x), at(size.height, y)));
         let start = MeasuredPsf {
             axis_ratio: 1.0,
             sigma_range_px: [f64::INFINITY, 0.0],
@@ -333,7 +334,7 @@ mod tests {
 
     #[test]
     fn the_lobes_are_stretched_to_the_moments_of_the_place() {
-        let frame = FieldFrame::of((101, 101));
+        let frame = FieldFrame::of(Size::new(101, 101));
         let mut moments = FieldMoments::constant(frame, [0.0; 3]);
         moments.range = [[-1.0, 1.0]; 3];
         // Wider and elongated along x to the right.

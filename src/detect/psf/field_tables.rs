@@ -5,6 +5,7 @@
 
 use super::effective::{EffectivePsf, FieldForm, LocalPsf};
 use super::table::{Layout, PsfTable, REACH_SIGMAS};
+use crate::base::size::Size;
 use multiversion::multiversion;
 use std::sync::OnceLock;
 
@@ -25,17 +26,22 @@ pub(crate) struct FieldTables<'a> {
 }
 
 impl<'a> FieldTables<'a> {
-    /// For so many stars in a frame of this width and height.
-    pub fn new(psf: &'a EffectivePsf, (width, height): (usize, usize), stars: usize) -> Self {
-        let diagonal_px = (width as f64).hypot(height as f64);
+    /// For so many stars in a frame of this size.
+    pub fn new(psf: &'a EffectivePsf, size: Size, stars: usize) -> Self {
+        let diagonal_px = size.diagonal_px();
         let along = cells_along_diagonal(psf) as f64;
-        let cells = [width, height].map(|side| (along * side as f64 / diagonal_px).ceil() as usize);
+        let cells = size
+            .sides()
+            .map(|side| (along * side as f64 / diagonal_px).ceil() as usize);
         let spacing = |side: usize, cells: usize| (side - 1) as f64 / cells.max(1) as f64;
         let mut tables = Self {
             psf,
             layout: Layout::default(),
             is_sharp: false,
-            cell_px: [spacing(width, cells[0]), spacing(height, cells[1])],
+            cell_px: [
+                spacing(size.width, cells[0]),
+                spacing(size.height, cells[1]),
+            ],
             cells,
             nodes: Vec::new(),
         };
@@ -174,7 +180,7 @@ mod tests {
 
     #[test]
     fn tables_between_nodes_agree_with_the_spot_there() {
-        let size = (1200, 900);
+        let size = Size::new(1200, 900);
         let mut moments = FieldMoments::constant(FieldFrame::of(size), [0.0; 3]);
         // Twice as wide in the corners, and elongated.
         moments.coefficients[0][3] = 0.69;

@@ -7,6 +7,7 @@
 //! Wang et al. 2019, Laser & Optoelectronics Progress 56, 101101, Eqs. (1) and (2).
 
 use crate::base::exponential::{rough_exp_of_negative, rough_exp_of_negative_f32};
+use crate::base::size::Size;
 use arrayvec::ArrayVec;
 use multiversion::multiversion;
 
@@ -88,13 +89,8 @@ pub(crate) struct NarrowProfiles {
 }
 
 impl NarrowProfiles {
-    /// Computes the profiles of a spot at a place in a window of `width` times `height` pixels.
-    pub fn fill(
-        &mut self,
-        [x_px, y_px]: [f64; 2],
-        sigma_px: f64,
-        [width, height]: [usize; 2],
-    ) -> LitPart {
+    /// Computes the profiles of a spot at a place in a window of this size.
+    pub fn fill(&mut self, [x_px, y_px]: [f64; 2], sigma_px: f64, size: Size) -> LitPart {
         /// Less than 10⁻⁵ of the light is beyond this many standard deviations of a pixel's edge.
         const REACH_SIGMAS: f64 = 4.5;
         let reach_px = REACH_SIGMAS * sigma_px + 0.5;
@@ -105,10 +101,10 @@ impl NarrowProfiles {
                 bound((at + reach_px).floor() + 1.0),
             ]
         };
-        let [columns, rows] = [range(x_px, width), range(y_px, height)];
+        let [columns, rows] = [range(x_px, size.width), range(y_px, size.height)];
         let groups = [columns[0] / GROUP_PX, columns[1].div_ceil(GROUP_PX)];
         let first = groups[0] * GROUP_PX;
-        let count = (groups[1] * GROUP_PX).min(width).saturating_sub(first);
+        let count = (groups[1] * GROUP_PX).min(size.width).saturating_sub(first);
         fill_narrow(&mut self.across, x_px - first as f64, sigma_px, count);
         let count = rows[1].saturating_sub(rows[0]);
         fill_narrow(&mut self.down, y_px - rows[0] as f64, sigma_px, count);
@@ -293,12 +289,12 @@ pub(crate) struct CumulativeProfile {
 
 impl CumulativeProfile {
     /// Computes `count` values, the first at `first_px` from the centre, each `step_px` farther.
-    pub fn fill(&mut self, [first_px, step_px]: [f64; 2], sigma_px: f64, count: usize) {
+    pub fn fill(&mut self, first_px: f64, step_px: f64, sigma_px: f64, count: usize) {
         let scale = Cumulative::of_spot(sigma_px).scale;
         let groups = count.div_ceil(GROUP_PX);
         self.values.resize(groups, [0.0; GROUP_PX]);
-        let line = [first_px, step_px].map(|px| (px * scale) as f32);
-        fill_cumulative(line, &mut self.values[..groups]);
+        let [first, step] = [first_px, step_px].map(|px| (px * scale) as f32);
+        fill_cumulative(first, step, &mut self.values[..groups]);
     }
 
     /// The values, and perhaps more than were asked for.
@@ -308,7 +304,7 @@ impl CumulativeProfile {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn fill_cumulative([first, step]: [f32; 2], values: &mut [PixelGroup]) {
+fn fill_cumulative(first: f32, step: f32, values: &mut [PixelGroup]) {
     for (group, values) in values.iter_mut().enumerate() {
         let mut at = [0.0; GROUP_PX];
         for (lane, at) in at.iter_mut().enumerate() {

@@ -16,6 +16,7 @@ use super::gaussian::{
     CumulativeProfile, GROUP_PX, Lobe, MAX_WINDOW_PX, PIXEL_VARIANCE_PX2, PixelGroup,
 };
 use super::lanes::each_of;
+use crate::base::size::Size;
 use multiversion::multiversion;
 
 /// Samples that the spline at a point takes along an axis.
@@ -111,26 +112,27 @@ impl PsfTable {
         }
     }
 
-    /// Draws a spot at (x, y) in a window of `width` times `height` pixels; `spot_px` is its size.
+    /// Draws a spot at (x, y) in a window of this size; `spot_px` is that of the spot.
     /// `lines` is a buffer.
     pub fn draw(
         &self,
         [x_px, y_px]: [f64; 2],
-        [width, height]: [usize; 2],
+        size: Size,
         spot_px: f64,
-        (lines, into): (&mut Vec<f32>, &mut [ShareGroup]),
+        lines: &mut Vec<f32>,
+        into: &mut [ShareGroup],
     ) {
-        let across = Taps::of(self.layout, x_px, width);
-        let down = Taps::of(self.layout, y_px, height);
+        let across = Taps::of(self.layout, x_px, size.width);
+        let down = Taps::of(self.layout, y_px, size.height);
         let length = line_length(self.layout);
         lines.clear();
         lines.resize(LINES * self.layout.per_px * length, 0.0);
         let window = Drawn {
             centre_px: [x_px as f32, y_px as f32],
             per_spot: (1.0 / spot_px) as f32,
-            groups: width.div_ceil(GROUP_PX),
+            groups: size.width.div_ceil(GROUP_PX),
         };
-        draw_rows(self, [&across, &down], &window, (lines, into));
+        draw_rows(self, [&across, &down], &window, lines, into);
     }
 }
 
@@ -211,7 +213,8 @@ fn draw_rows(
     table: &PsfTable,
     [across, down]: [&Taps; 2],
     window: &Drawn,
-    (lines, into): (&mut [f32], &mut [ShareGroup]),
+    lines: &mut [f32],
+    into: &mut [ShareGroup],
 ) {
     let layout = table.layout;
     let length = line_length(layout);
@@ -233,7 +236,7 @@ fn draw_rows(
         let into = &mut into[row * window.groups..(row + 1) * window.groups];
         for group in groups.clone() {
             let dx = (group * GROUP_PX) as f32 - window.centre_px[0];
-            let parts = combine_columns(across, (lines, length), group);
+            let parts = combine_columns(across, lines, length, group);
             into[group] = shares_of(parts, [dx, dy], window.per_spot);
         }
     }
@@ -265,7 +268,7 @@ fn combine_rows(sources: [&[f32]; TAPS], weights: &[[f32; TAPS]; 3], lines: &mut
 
 /// The light in a group of pixels; its derivatives along x and y, and the second ones.
 #[inline(always)]
-fn combine_columns(taps: &Taps, (lines, length): (&[f32], usize), group: usize) -> [PixelGroup; 5] {
+fn combine_columns(taps: &Taps, lines: &[f32], length: usize, group: usize) -> [PixelGroup; 5] {
     let mut parts = [[0.0f32; GROUP_PX]; 5];
     for tap in 0..TAPS {
         let start = (2 * GROUP_PX + group * GROUP_PX).wrapping_add_signed(taps.shifts[tap]);
@@ -347,7 +350,7 @@ impl SplineProfile {
         let places = samples + 2 * MARGIN;
         // A pixel has two edges.
         self.cumulative
-            .fill([first_px, step_px], sigma_px, places + per_px);
+            .fill(first_px, step_px, sigma_px, places + per_px);
         self.light.resize(places, 0.0);
         self.coefficients.clear();
         self.coefficients.resize(per_px * layout.stride, 0.0);
@@ -424,7 +427,7 @@ pub(super) mod tests {
         let mut sums = [0.0; 4];
         for lobe in lobes {
             let at = [0, 1].map(|axis| place[axis] + lobe.offset_px[axis]);
-            let part = profiles.fill(at, lobe.sigma_px, [side; 2]);
+            let part = profiles.fill(at, lobe.sigma_px, Size::new(side, side));
             let group = x / GROUP_PX;
             let is_lit = (part.rows[0]..part.rows[1]).contains(&y)
                 && (part.groups[0]..part.groups[1]).contains(&group);
@@ -464,7 +467,13 @@ pub(super) mod tests {
             for place in [[10.0, 10.0], [9.63, 10.21], [10.5, 9.5], [2.2, 19.8]] {
                 let groups = SIDE.div_ceil(GROUP_PX);
                 let mut drawn = vec![[[0.0; GROUP_PX]; 4]; groups * SIDE];
-                table.draw(place, [SIDE; 2], 1.0, (&mut Vec::new(), &mut drawn));
+                table.draw(
+                    place,
+                    Size::new(SIDE, SIDE),
+                    1.0,
+                    &mut Vec::new(),
+                    &mut drawn,
+                );
                 let pixels = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| [x, y]));
                 let exact: Vec<_> = pixels
                     .map(|pixel| (pixel, expected(&lobes, place, SIDE, pixel)))

@@ -150,7 +150,8 @@ impl LobeGrid {
     fn sums(
         &self,
         psf: &EffectivePsf,
-        (stars, classes): (&[PsfStar], &[usize]),
+        stars: &[PsfStar],
+        classes: &[usize],
         fitter: &mut StarFitter,
     ) -> [LobeSums; 2] {
         let mut of_halves = [0; 2].map(|_| LobeSums::new(psf.form, classes));
@@ -166,7 +167,7 @@ impl LobeGrid {
         };
         for (number, star) in stars.iter().enumerate() {
             let (x_px, y_px) = (star.spot.x, star.spot.y);
-            fitter.weigh(star, psf, (&mut images.roots, &mut images.values));
+            fitter.weigh(star, psf, &mut images.roots, &mut images.values);
             all.place_lobes(x_px, y_px, &mut local);
             images.draw(star, &local, &of_halves[0].images);
             let outward = psf.moments.frame.distance(x_px, y_px);
@@ -188,7 +189,7 @@ impl LobeGrid {
             FieldForm::Symmetric | FieldForm::Fixed => &all,
             FieldForm::Radial => &self.reflected,
         };
-        self.sums(psf, (stars, classes), fitter)
+        self.sums(psf, stars, classes, fitter)
     }
 
     /// [`Self::sums`] for solutions of [`FieldForm::Symmetric`] and [`FieldForm::Fixed`].
@@ -198,7 +199,7 @@ impl LobeGrid {
         stars: &[PsfStar],
         fitter: &mut StarFitter,
     ) -> [LobeSums; 2] {
-        self.sums(psf, (stars, &self.classes(FieldForm::Fixed)), fitter)
+        self.sums(psf, stars, &self.classes(FieldForm::Fixed), fitter)
     }
 
     /// The lobes that fit best.
@@ -284,14 +285,13 @@ impl LobeImages {
                 spot.x + lobe.offset_px[0] - window.x0 as f64,
                 spot.y + lobe.offset_px[1] - window.y0 as f64,
             ];
-            let size = [window.width, window.height];
-            let part = self.profiles.fill(place, lobe.sigma_px, size);
+            let part = self.profiles.fill(place, lobe.sigma_px, window.size());
             let [first, end] = &mut self.rows[image];
             (*first, *end) = ((*first).min(part.rows[0]), (*end).max(part.rows[1]));
             let block = &mut self.light[image / BLOCK * pixels..][..pixels];
-            let of_pixels = (block, &self.roots[..]);
-            let profiles = (&self.profiles, part);
-            add_lobe(flux, profiles, of_pixels, [image % BLOCK, self.width]);
+            let image = image % BLOCK;
+            let (profiles, roots) = (&self.profiles, &self.roots);
+            add_lobe(flux, profiles, part, block, roots, image, self.width);
         }
     }
 
@@ -317,9 +317,12 @@ impl LobeImages {
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn add_lobe(
     flux: f32,
-    (profiles, part): (&NarrowProfiles, LitPart),
-    (block, roots): (&mut [Block], &[PixelGroup]),
-    [image, width]: [usize; 2],
+    profiles: &NarrowProfiles,
+    part: LitPart,
+    block: &mut [Block],
+    roots: &[PixelGroup],
+    image: usize,
+    width: usize,
 ) {
     for row in part.rows[0]..part.rows[1] {
         let of_row = flux * profiles.down(row, &part).value;

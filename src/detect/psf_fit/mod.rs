@@ -88,7 +88,7 @@ impl Settled {
         stars: &mut [PsfStar],
         fitter: &mut StarFitter,
     ) -> Self {
-        let frame = FieldFrame::of((maps.view.width, maps.view.height));
+        let frame = FieldFrame::of(maps.view.size());
         let (moments, mut is_varied) = moments_over_field(frame, stars);
         let mut psf = EffectivePsf {
             lobes: grid.gaussian(),

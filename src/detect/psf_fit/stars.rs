@@ -146,10 +146,10 @@ impl StarFitter {
                 spot.x + dx - window.x0 as f64,
                 spot.y + dy - window.y0 as f64,
             ];
-            let part = profiles.fill(place, lobe.sigma_px, [window.width, window.height]);
+            let part = profiles.fill(place, lobe.sigma_px, window.size());
             let share = lobe.share as f32;
             if N < PARAMETERS {
-                add_still_lobe(share, (profiles, part), shares, width);
+                add_still_lobe(share, profiles, part, shares, width);
                 continue;
             }
             let widening = of_single.unwrap_or_else(|| widening_of(lobe.sigma_px));
@@ -158,7 +158,7 @@ impl StarFitter {
                 moves: stretches.map(|rows| rows.map(|[a, b]| (a * dx + b * dy) as f32)),
                 widening: widening.map(|of_moment| of_moment.map(|change| change as f32)),
             };
-            add_lobe(share, &changes, (profiles, part), shares, width);
+            add_lobe(share, &changes, profiles, part, shares, width);
         }
     }
 
@@ -182,7 +182,8 @@ impl StarFitter {
         &mut self,
         star: &PsfStar,
         psf: &EffectivePsf,
-        (roots, values): (&mut Vec<PixelGroup>, &mut Vec<Block>),
+        roots: &mut Vec<PixelGroup>,
+        values: &mut Vec<Block>,
     ) {
         self.draw::<PLACE>(star, psf);
         let pixels = WindowPixels::new(&star.window, star.background, &self.noise);
@@ -282,7 +283,8 @@ struct LobeChanges {
 fn add_lobe(
     share: f32,
     changes: &LobeChanges,
-    (profiles, part): (&NarrowProfiles, LitPart),
+    profiles: &NarrowProfiles,
+    part: LitPart,
     into: &mut [ShareGroup],
     width: usize,
 ) {
@@ -321,7 +323,8 @@ fn add_lobe(
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn add_still_lobe(
     share: f32,
-    (profiles, part): (&NarrowProfiles, LitPart),
+    profiles: &NarrowProfiles,
+    part: LitPart,
     into: &mut [ShareGroup],
     width: usize,
 ) {
@@ -388,7 +391,7 @@ fn first_fit(
         variances: [f64::INFINITY; 3],
         chi2: 0.0,
     };
-    let frame = FieldFrame::of((maps.view.width, maps.view.height));
+    let frame = FieldFrame::of(maps.view.size());
     let mut moved = f64::INFINITY;
     for _ in 0..STEPS {
         let before = star.spot;

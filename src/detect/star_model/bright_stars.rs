@@ -4,6 +4,7 @@
 //! rays are sharper than stars, lamps and comets wider, and none of them need be few.
 
 use super::spot_size::{BrightStars, MAX_STARS, spot_size};
+use crate::base::size::Size;
 use crate::detect::candidates::{Peak, RawPeak};
 use crate::detect::contrast::Contrast;
 use crate::detect::fit::{
@@ -32,7 +33,7 @@ pub(crate) const MAX_MODEL_ERROR: f64 = 0.1;
 /// A peak of the frame or of the filtered frame.
 pub(crate) trait BrightPeak {
     /// Column and row.
-    fn place(&self) -> (usize, usize);
+    fn place(&self) -> [usize; 2];
     /// Signal-to-noise ratio.
     fn snr(&self) -> f32;
     /// Whether it is saturated.
@@ -48,8 +49,8 @@ pub(crate) trait BrightPeak {
 }
 
 impl BrightPeak for Peak {
-    fn place(&self) -> (usize, usize) {
-        (self.x, self.y)
+    fn place(&self) -> [usize; 2] {
+        [self.x, self.y]
     }
 
     fn snr(&self) -> f32 {
@@ -61,7 +62,7 @@ impl BrightPeak for Peak {
     }
 
     fn contrast(&self, maps: &FrameMaps<'_>) -> Contrast {
-        Contrast::near(&maps.view, maps.background, (self.x, self.y))
+        Contrast::near(&maps.view, maps.background, self.x, self.y)
     }
 
     /// A Gaussian of variance S² = σ² + σ_filter² + 2/12 falls to exp(−1/2S²) at the next pixel.
@@ -86,8 +87,8 @@ impl BrightPeak for Peak {
 }
 
 impl BrightPeak for RawPeak {
-    fn place(&self) -> (usize, usize) {
-        (self.x, self.y)
+    fn place(&self) -> [usize; 2] {
+        [self.x, self.y]
     }
 
     fn snr(&self) -> f32 {
@@ -99,7 +100,7 @@ impl BrightPeak for RawPeak {
     }
 
     fn contrast(&self, maps: &FrameMaps<'_>) -> Contrast {
-        Contrast::of(&maps.view, maps.background, (self.x, self.y))
+        Contrast::of(&maps.view, maps.background, self.x, self.y)
     }
 
     fn size_px(&self, maps: &FrameMaps<'_>) -> f64 {
@@ -130,12 +131,11 @@ pub(crate) fn fit_bright_stars<P: BrightPeak>(
     buffers: &mut FitBuffers,
 ) -> BrightStars {
     let bright = &peaks[..peaks.partition_point(|peak| peak.snr() >= MIN_SNR)];
-    let brightest = fit_peaks(maps, (bright.iter(), peaks), buffers);
-    let size = (maps.view.width, maps.view.height);
-    let Some(spread) = spread(bright, size) else {
+    let brightest = fit_peaks(maps, bright.iter(), peaks, buffers);
+    let Some(spread) = spread(bright, maps.view.size()) else {
         return brightest;
     };
-    let spread = fit_peaks(maps, (spread.into_iter(), peaks), buffers);
+    let spread = fit_peaks(maps, spread.into_iter(), peaks, buffers);
     let is_sharper = match (spot_size(&spread), spot_size(&brightest)) {
         (Some(a), Some(b)) => a.spot_px < b.spot_px && 2 * a.stars >= b.stars,
         (of_spread, _) => of_spread.is_some(),
@@ -146,7 +146,8 @@ pub(crate) fn fit_bright_stars<P: BrightPeak>(
 /// Fits the first of `bright` that are alone among all `peaks`.
 fn fit_peaks<'a, P: BrightPeak + 'a>(
     maps: &FrameMaps<'_>,
-    (bright, peaks): (impl Iterator<Item = &'a P>, &[P]),
+    bright: impl Iterator<Item = &'a P>,
+    peaks: &[P],
     buffers: &mut FitBuffers,
 ) -> BrightStars {
     let of_light = bright.filter(|peak| !peak.contrast(maps).is_sharper_than_any_spot());
@@ -190,15 +191,15 @@ pub(crate) fn isolated_peaks<'a, P: BrightPeak + 'a>(
 
 /// The peaks, those first that are the brightest of their place; `None` where the brightest peaks
 /// of the frame are not crowded.
-fn spread<P: BrightPeak>(peaks: &[P], (width, height): (usize, usize)) -> Option<Vec<&P>> {
+fn spread<P: BrightPeak>(peaks: &[P], size: Size) -> Option<Vec<&P>> {
     /// Places along each side.
     const CELLS: usize = 6;
     /// The brightest stars of a frame are in 20 of the 36 places on average, with a standard
     /// deviation of 2.
     const CROWDED_CELLS: usize = 12;
     let cell_of = |peak: &P| {
-        let (x, y) = peak.place();
-        y * CELLS / height * CELLS + x * CELLS / width
+        let [x, y] = peak.place();
+        y * CELLS / size.height * CELLS + x * CELLS / size.width
     };
     let mut in_cell = [0usize; CELLS * CELLS];
     for peak in peaks.iter().take(MAX_STARS) {
@@ -225,9 +226,9 @@ fn is_rival(other_snr: f32, snr: f32) -> bool {
 }
 
 /// Whether two places are within `reach_px` of each other, but not the same.
-fn is_near(a: (usize, usize), b: (usize, usize), reach_px: f32) -> bool {
-    let dx = b.0 as f32 - a.0 as f32;
-    let dy = b.1 as f32 - a.1 as f32;
+fn is_near(a: [usize; 2], b: [usize; 2], reach_px: f32) -> bool {
+    let dx = b[0] as f32 - a[0] as f32;
+    let dy = b[1] as f32 - a[1] as f32;
     (dx != 0.0 || dy != 0.0) && dx * dx + dy * dy <= reach_px * reach_px
 }
 
@@ -260,7 +261,7 @@ fn fit_stars(
         let fit = match fit {
             // A window that is too small for the star is widened.
             Some(fit) if maps.window_radius(fit.spot_px) > maps.window_radius(size_px) => {
-                let fit = buffers.fit_free_size(maps, spot, &[], (size_px, config.noise));
+                let fit = buffers.fit_free_size(maps, spot, &[], size_px, config.noise);
                 fit.converged.then_some(fit)
             }
             fit => {
@@ -310,11 +311,11 @@ mod tests {
         let lamps = (0..200).map(|i| (i % 20, 100 + i / 20));
         let stars = (0..30).map(|i| (300 + 20 * i, 37 * i % 600));
         let peaks: Vec<_> = lamps.chain(stars).map(peak).collect();
-        let tried = spread(&peaks, (900, 600)).unwrap();
+        let tried = spread(&peaks, Size::new(900, 600)).unwrap();
         let stars = tried.iter().take(MAX_STARS).filter(|peak| peak.x >= 300);
         assert!(stars.count() > 15);
         let stars = (0..200).map(|i| (i * 377 % 900, i * 239 % 600));
         let peaks: Vec<_> = stars.map(peak).collect();
-        assert!(spread(&peaks, (900, 600)).is_none());
+        assert!(spread(&peaks, Size::new(900, 600)).is_none());
     }
 }

@@ -2,6 +2,7 @@
 //! their PSF is measured.
 
 use super::spot_size::{MODE_WIDTH, weighted_size};
+use crate::base::size::Size;
 use crate::detect::fit::{Fit, GaussianLight, NoiseModel, WindowPixels};
 use crate::detect::psf::{FieldFrame, GROUP_PX};
 
@@ -34,8 +35,8 @@ pub(super) struct CommonElongation {
 }
 
 impl CommonElongation {
-    /// Nothing is known of the stars in a frame of this width and height, in pixels.
-    pub fn of(size: (usize, usize)) -> Self {
+    /// Nothing is known of the stars in a frame of this size.
+    pub fn of(size: Size) -> Self {
         Self {
             field: FieldFrame::of(size),
             sums: [[0.0; 2]; 2],

@@ -52,7 +52,7 @@ pub(crate) fn star_model(
         shot_adu: brightest.map_or(0.0, |spot| maps.noise_at(spot.x, spot.y)),
         model_error2: 0.0,
     };
-    let mut elongation = CommonElongation::of((maps.view.width, maps.view.height));
+    let mut elongation = CommonElongation::of(maps.view.size());
     // Each round weights the squared residuals by the variance from the round before.
     for round in 1..=NOISE_ROUNDS {
         let mut sums = Moments::default();

@@ -1,5 +1,6 @@
 //! The weights with which the matched filter adds up pixels.
 
+use crate::base::size::Size;
 use crate::detect::psf::{MAX_TAPS, centered_profile};
 use arrayvec::ArrayVec;
 
@@ -25,8 +26,8 @@ impl FilterWeights {
     /// Most that the threshold at the border is above that of the interior.
     const MAX_BORDER_RAISE: f64 = 2.0;
 
-    /// The filter for a spot, out to `radius`, on a frame of `width` times `height` pixels.
-    pub fn for_spot(spot_px: f64, radius: usize, (width, height): (usize, usize)) -> Self {
+    /// The filter for a spot, out to `radius`, on a frame of this size.
+    pub fn for_spot(spot_px: f64, radius: usize, size: Size) -> Self {
         let profile = centered_profile(spot_px, radius);
         let axis = |sides: f64| -> ArrayVec<(f64, f64), MAX_TAPS> {
             let times = |i: usize| if i == 0 { 1.0 } else { sides };
@@ -45,7 +46,7 @@ impl FilterWeights {
             largest: half[0].1 * whole[0].1,
             inside: product(&whole, &whole),
             at_border: product(&half, &whole),
-            border_part: 1.0 - inner(width) * inner(height),
+            border_part: 1.0 - inner(size.width) * inner(size.height),
         }
     }
 

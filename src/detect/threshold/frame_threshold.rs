@@ -6,6 +6,7 @@ use super::filter_weights::FilterWeights;
 use super::photons::{photon_skewness, threshold_for_photons};
 use super::pixel_noise::PixelNoise;
 use super::star_free::{NoiseBuffers, StarFree};
+use crate::base::size::Size;
 use crate::detect::background::{FrameBackground, Mesh, median};
 use crate::detect::config::DetectConfig;
 use crate::detect::detection::NoiseTail;
@@ -19,7 +20,7 @@ const REPEAT_AT_RAISE: f64 = 0.2;
 /// The threshold for Gaussian noise that is measured on the frame itself, in standard deviations.
 pub(crate) fn gaussian_threshold(
     config: &DetectConfig,
-    size: (usize, usize),
+    size: Size,
     spot_px: f64,
     kernel: &Kernel,
 ) -> f64 {
@@ -30,11 +31,11 @@ pub(crate) fn gaussian_threshold(
 /// The degrees of freedom of the local noise estimate: the independent samples in a cell (a value
 /// of the filtered frame is correlated with 2πs² pixels), and a gain of 5 from the median of 3x3
 /// cells.
-fn noise_degrees((width, height): (usize, usize), config: &DetectConfig, spot_px: f64) -> f64 {
+fn noise_degrees(size: Size, config: &DetectConfig, spot_px: f64) -> f64 {
     const SMOOTHING_GAIN: f64 = 5.0;
     const EFFICIENCY: f64 = 0.8;
-    let cell = (width.min(config.cell_px) * height.min(config.cell_px)) as f64;
-    let cells = ((width * height) as f64 / cell).max(1.0);
+    let cell = (size.width.min(config.cell_px) * size.height.min(config.cell_px)) as f64;
+    let cells = (size.pixels() as f64 / cell).max(1.0);
     let correlated = std::f64::consts::TAU * (spot_px.powi(2) + PIXEL_VARIANCE_PX2);
     (EFFICIENCY * cell / correlated.max(1.0) * SMOOTHING_GAIN.min(cells)).max(3.0)
 }

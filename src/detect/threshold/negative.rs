@@ -10,6 +10,7 @@
 //! Foliage and roofs have tails of their own: the frame is divided into parts, and the median of
 //! the parts' thresholds holds.
 
+use crate::base::size::Size;
 use crate::detect::background::Mesh;
 use multiversion::multiversion;
 
@@ -32,7 +33,7 @@ const MIN_HEIGHT: f32 = 0.25;
 /// Local extrema of a filtered frame, by part of the frame.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Extrema {
-    size: (usize, usize),
+    size: Size,
     /// Parts across, and down.
     parts: usize,
     heights: Vec<Sides>,
@@ -53,10 +54,10 @@ struct Sides {
 
 impl Extrema {
     /// Clears what was measured, for a frame of this size.
-    pub fn prepare(&mut self, (width, height): (usize, usize)) {
-        let most = ((width * height / MIN_PART_PX) as f64).sqrt() as usize;
+    pub fn prepare(&mut self, size: Size) {
+        let most = ((size.pixels() / MIN_PART_PX) as f64).sqrt() as usize;
         let parts = most.clamp(1, MAX_PARTS);
-        self.size = (width, height);
+        self.size = size;
         self.parts = parts;
         self.heights.resize_with(parts * parts, Sides::default);
         for sides in &mut self.heights {
@@ -69,7 +70,7 @@ impl Extrema {
     /// Adds the extrema of row `y` of the filtered frame, given with the rows above and below; mean
     /// and noise of the filtered frame are in `mesh`.
     pub fn add_row(&mut self, rows: [&[f32]; 3], y: usize, mesh: &Mesh) {
-        let (width, height) = self.size;
+        let Size { width, height } = self.size;
         let first_part = y * self.parts / height * self.parts;
         for sides in &mut self.heights[first_part..first_part + self.parts] {
             sides.pixels += width / self.parts;

@@ -188,6 +188,7 @@ fn bin_center(i: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::size::Size;
     use rand::SeedableRng;
     use rand_distr::{Distribution, Exp1, StandardNormal};
 
@@ -206,7 +207,7 @@ mod tests {
     #[test]
     fn gaussian_noise_raises_nothing_and_exponential_noise_has_the_gamma_tail() {
         let gaussian = noise_of(|rng| StandardNormal.sample(rng));
-        let filter = FilterWeights::for_spot(1.0, 3, (100, 100));
+        let filter = FilterWeights::for_spot(1.0, 3, Size::new(100, 100));
         assert!(gaussian.threshold(4.5, &filter, Some(1.0)) - 4.5 < 0.03);
 
         // Sixteen exponential pixels of equal weight make a Gamma of shape 16: Q(16, x) = 3.4e-6,

@@ -31,7 +31,7 @@ pub(super) fn measure_template(
     template: Option<&Template>,
 ) -> Option<Template> {
     let mut mean = MeanProfile::default();
-    for_each_trail(maps, regions, (shape, template), |profile, bar| {
+    for_each_trail(maps, regions, shape, template, |profile, bar| {
         mean.add(profile, bar);
     });
     mean.template(shape.length_px)
@@ -41,7 +41,8 @@ pub(super) fn measure_template(
 pub(super) fn for_each_trail(
     maps: &FrameMaps<'_>,
     regions: &[&LargeRegion<'_>],
-    (shape, template): (&Shape, Option<&Template>),
+    shape: &Shape,
+    template: Option<&Template>,
     mut use_trail: impl FnMut(&Profile, &Bar),
 ) {
     let mut profile = Profile::default();

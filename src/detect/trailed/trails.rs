@@ -160,7 +160,7 @@ fn turned(shape: Shape, angle: f64) -> Shape {
 /// slopes of their light.
 fn median_slope(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: &Shape) -> f64 {
     let mut slopes: ArrayVec<f64, MAX> = ArrayVec::new();
-    for_each_trail(maps, regions, (shape, None), |profile, _| {
+    for_each_trail(maps, regions, shape, None, |profile, _| {
         slopes.push(profile.slope(0.5 * shape.length_px));
     });
     let slope = middle_of(slopes.into_iter());

@@ -66,7 +66,8 @@ impl MatchedFilter {
     /// the filter, and one pixel. Its pixels are followed by at least [`PADDING`] others.
     pub fn peaks(
         &mut self,
-        (square, pixels): (&Square, &[f32]),
+        square: &Square,
+        pixels: &[f32],
         place: [f64; 2],
         radius_px: f64,
     ) -> Peaks {
@@ -76,7 +77,7 @@ impl MatchedFilter {
         let Some(first) = middle.checked_sub(reach + taps) else {
             return Peaks::default();
         };
-        let stride = self.filter(square, pixels, (first, side));
+        let stride = self.filter(square, pixels, first, side);
         let filtered = &self.filtered;
         let corner = middle - reach;
         let per_noise = 1.0 / (square.noise_adu * self.norm);
@@ -117,7 +118,7 @@ impl MatchedFilter {
 
     /// Filters the part of the square from `first` on so that `side` columns and rows result, and
     /// some more columns that are not used, to fill the lanes. Returns the number of columns.
-    fn filter(&mut self, square: &Square, pixels: &[f32], (first, side): (usize, usize)) -> usize {
+    fn filter(&mut self, square: &Square, pixels: &[f32], first: usize, side: usize) -> usize {
         let Self {
             taps,
             rows,
@@ -135,7 +136,7 @@ impl MatchedFilter {
         rows.resize((side + taps.len() - 1) * stride, 0.0);
         filtered.clear();
         filtered.resize(side * stride, 0.0);
-        convolve(taps, &source, stride, (rows, filtered));
+        convolve(taps, &source, stride, rows, filtered);
         stride
     }
 }
@@ -151,12 +152,7 @@ struct Source<'a> {
 /// Filters along the rows to `rows`, and along the columns to `filtered`, both `stride` wide;
 /// pixels without a value count as background.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn convolve(
-    taps: &[f32],
-    source: &Source,
-    stride: usize,
-    (rows, filtered): (&mut [f32], &mut [f32]),
-) {
+fn convolve(taps: &[f32], source: &Source, stride: usize, rows: &mut [f32], filtered: &mut [f32]) {
     for (y, to) in rows.chunks_exact_mut(stride).enumerate() {
         let from = source.pixels.get(y * source.row_px..).unwrap_or_default();
         for (chunk, to) in to.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {

@@ -87,7 +87,8 @@ impl Square {
     pub fn cut_out(
         &self,
         pixels: &[f32],
-        ([x, y], radius): ([f64; 2], usize),
+        [x, y]: [f64; 2],
+        radius: usize,
         saturation_adu: f32,
         window: &mut Window,
     ) {

@@ -99,7 +99,8 @@ impl WindowDetector {
     /// the noise, what does is sharper than a star, or the square is not all within the frame.
     pub fn measure(
         &mut self,
-        (frame, saturation_adu): (&Frame, f32),
+        frame: &Frame,
+        saturation_adu: f32,
         model: &SpotModel,
         expected: &[ExpectedStar],
         found: &mut Vec<Option<FoundStar>>,
@@ -175,7 +176,7 @@ impl WindowDetector {
             let place = [star.position.x, star.position.y];
             let peaks = self
                 .filter
-                .peaks((square, &self.pixels), place, star.radius_px);
+                .peaks(square, &self.pixels, place, star.radius_px);
             self.surplus.peaks += peaks.others;
             self.surplus.searched_px2 += std::f64::consts::PI * star.radius_px.powi(2);
             if let Some(peak) = peaks.highest {
@@ -253,7 +254,8 @@ impl WindowDetector {
     /// measured.
     pub fn learn(
         &mut self,
-        (frame, saturation_adu): (&Frame, f32),
+        frame: &Frame,
+        saturation_adu: f32,
         stars: &[(PixelPoint, [f64; 2])],
     ) -> Option<SpotModel> {
         let stars = &stars[..stars.len().min(MAX_STARS)];
@@ -428,8 +430,8 @@ fn cut_out(
     let Some(square) = squares[*number] else {
         return;
     };
-    let place = ([spot.x, spot.y], window_radius(*spot_px));
-    square.cut_out(pixels, place, saturation_adu, window);
+    let (place, radius) = ([spot.x, spot.y], window_radius(*spot_px));
+    square.cut_out(pixels, place, radius, saturation_adu, window);
     window.background_noise = square.background_error_adu();
     let width2 = spot_px.powi(2) + PIXEL_VARIANCE_PX2;
     let peak = spot.flux / (std::f64::consts::TAU * width2);
@@ -528,7 +530,7 @@ mod tests {
         let mut detector = WindowDetector::default();
         let mut found = Vec::new();
         let (first, stars) = frame(spot_px, smear_px, 1);
-        let model = detector.learn((&first, f32::INFINITY), &known(&stars, smear_px));
+        let model = detector.learn(&first, f32::INFINITY, &known(&stars, smear_px));
         let model = model.unwrap();
         assert!(
             (model.spot_sigma_px / spot_px - 1.0).abs() < 0.1,
@@ -543,7 +545,7 @@ mod tests {
                 smear_px,
             };
             let expected: Vec<_> = stars.iter().map(off).collect();
-            detector.measure((&frame, f32::INFINITY), &model, &expected, &mut found);
+            detector.measure(&frame, f32::INFINITY, &model, &expected, &mut found);
             for (found, truth) in found.iter().zip(&stars) {
                 let Some(star) = found else { continue };
                 squares += ((star.position.x - truth.x) / star.sigma_px[0]).powi(2);
@@ -579,12 +581,7 @@ mod tests {
         let expected: Vec<_> = stars.iter().map(between).collect();
         let mut found = Vec::new();
         let mut detector = WindowDetector::default();
-        detector.measure(
-            (&frame, f32::INFINITY),
-            &model_of(0.9),
-            &expected,
-            &mut found,
-        );
+        detector.measure(&frame, f32::INFINITY, &model_of(0.9), &expected, &mut found);
         assert!(found.iter().all(Option::is_none), "{found:?}");
         assert!(detector.surplus().searched_px2 > 1000.0);
     }
@@ -604,7 +601,7 @@ mod tests {
         let expected: Vec<_> = stars.iter().map(at).collect();
         let mut found = Vec::new();
         let mut detector = WindowDetector::default();
-        detector.measure((&frame, 1500.0), &model_of(0.9), &expected, &mut found);
+        detector.measure(&frame, 1500.0, &model_of(0.9), &expected, &mut found);
         let saturated = found.iter().map(|f| f.is_some_and(|f| f.saturated));
         let flags: Vec<bool> = saturated.collect();
         assert!(flags[0] && !flags[35], "{flags:?}");

@@ -56,7 +56,7 @@ struct Scale {
 /// detected where it appears as bright as stars of the share `apparent`: noise brings stars above
 /// the limit that are fainter.
 #[inline(always)]
-pub fn odds_of([own, apparent, visibility]: [f64; 3]) -> [f64; 2] {
+pub fn odds_of(own: f64, apparent: f64, visibility: f64) -> [f64; 2] {
     let apparent = if apparent > own { apparent } else { own };
     let [own, apparent] = [own, apparent].map(|share| (share * visibility).min(1.0 - MIN_LOST));
     [own / (1.0 - own), apparent / (1.0 - own)]
@@ -241,7 +241,7 @@ mod tests {
         found.measure_visibility(&field(), &observed);
         let (shares, visibility) = found.shares_and_visibility();
         for (index, star) in stars.iter().enumerate() {
-            let [odds, _] = odds_of([shares[index], 0.0, visibility[index]]);
+            let [odds, _] = odds_of(shares[index], 0.0, visibility[index]);
             if star.pixel.x > 900.0 {
                 assert!(odds < 0.05, "{odds}");
             } else if star.pixel.x < 300.0 {

@@ -41,14 +41,17 @@ const PRIOR_STARS: f64 = 4.0;
 pub fn position_density(candidate: &Candidate, distance_px: f64, is_saturated: bool) -> f64 {
     let (sigma_px, gate_px) = ([candidate.sigma_px], [candidate.gate_px]);
     let saturated = [f64::from(u8::from(is_saturated))];
-    position_densities([[distance_px], sigma_px, gate_px, saturated])[0]
+    position_densities(&[distance_px], &sigma_px, &gate_px, &saturated)[0]
 }
 
 /// The same for several pairs, with the errors and gates of the observed stars, and 1 for those that
 /// are saturated.
 #[inline(always)]
 pub fn position_densities<const N: usize>(
-    [distances_px, sigmas_px, gates_px, saturated]: [[f64; N]; 4],
+    distances_px: &[f64; N],
+    sigmas_px: &[f64; N],
+    gates_px: &[f64; N],
+    saturated: &[f64; N],
 ) -> [f64; N] {
     /// Of so many times the width, the exponential is the root of the square of that number.
     const WIDE_ROOT: i32 = (WIDE_SIGMAS * WIDE_SIGMAS) as i32;

@@ -60,7 +60,7 @@ fn packed_from(candidates: &[Candidate], field: &StarField, predicted: usize) ->
         shares[lane] = candidate.share;
         packed.rivals[lane] = candidate.rivals;
     }
-    let of_true = in_lanes([distances_px, sigmas_px, gates_px, packed.saturated]);
+    let of_true = in_lanes(&distances_px, &sigmas_px, &gates_px, &packed.saturated);
     for lane in 0..LANES {
         packed.position_density[lane] = shares[lane] * of_true[lane];
     }
@@ -68,8 +68,8 @@ fn packed_from(candidates: &[Candidate], field: &StarField, predicted: usize) ->
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn in_lanes(numbers: [Lanes; 4]) -> Lanes {
-    position_densities(numbers)
+fn in_lanes(distances_px: &Lanes, sigmas_px: &Lanes, gates_px: &Lanes, saturated: &Lanes) -> Lanes {
+    position_densities(distances_px, sigmas_px, gates_px, saturated)
 }
 
 /// Sets the odds of the candidates.
@@ -85,7 +85,7 @@ pub fn set_odds(candidates: &mut [Packed], known: &OddsInputs) {
         }
         let densities = known.magnitudes.densities(packed);
         for lane in 0..LANES {
-            let [odds, odds_as] = odds_of([shares[lane], apparent[lane], visibility[lane]]);
+            let [odds, odds_as] = odds_of(shares[lane], apparent[lane], visibility[lane]);
             let like = odds_as * densities.by_scatter[lane] + odds * densities.otherwise[lane];
             packed.odds[lane] = packed.position_density[lane] * like / unrelated[lane];
         }

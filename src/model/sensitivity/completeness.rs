@@ -18,6 +18,7 @@
 
 use super::budget::Budget;
 use super::scenario::Scenario;
+use crate::base::size::Size;
 use crate::base::statistics::normal_cdf;
 use crate::detect::{DetectConfig, FilterModel};
 use rand::SeedableRng;
@@ -95,7 +96,7 @@ impl Detector {
     /// The matched filter with the threshold of `config`; the spot is the scenario's.
     pub fn matched_filter(config: &DetectConfig, scenario: &Scenario, budget: &Budget) -> Self {
         let spot = SmearedSpot::of(scenario);
-        let size = (scenario.camera.width_px, scenario.camera.height_px);
+        let size = Size::new(scenario.camera.width_px, scenario.camera.height_px);
         let electrons = budget.background_e + budget.dark_e;
         let skewness = electrons / budget.background_noise_e.powi(3);
         let model = FilterModel::new(config, size, spot.round_sigma_px(), skewness);
@@ -111,7 +112,7 @@ impl Detector {
         scenario: &Scenario,
         budget: &Budget,
     ) -> Self {
-        let size = (scenario.camera.width_px, scenario.camera.height_px);
+        let size = Size::new(scenario.camera.width_px, scenario.camera.height_px);
         let spot_px = SmearedSpot::of(scenario).round_sigma_px();
         let model = FilterModel {
             threshold_sigma,
