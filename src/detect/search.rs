@@ -93,12 +93,12 @@ pub(crate) struct Searched {
     /// Spot size and noise model of the frame's stars.
     pub stars: StarModel,
     /// Filter and threshold of the last pass.
-    pub pass: Pass,
+    pub pass: FilterPass,
 }
 
 /// A pass of the filter over the frame.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Pass {
+pub(crate) struct FilterPass {
     /// Signal-to-noise ratio of a star whose flux equals the noise of a pixel: √ΣP².
     pub matched_gain: f64,
     /// The threshold, in standard deviations of the filtered noise.
@@ -204,7 +204,7 @@ impl FrameSearch {
         &mut self,
         input: &SearchInput<'_>,
         spot_px: f64,
-        pass: &Pass,
+        pass: &FilterPass,
         is_last: bool,
     ) -> StarEstimate {
         let Self {
@@ -231,7 +231,11 @@ impl FrameSearch {
     }
 
     /// Filters the frame for spots of `spot_px`, sets the threshold, and finds regions and peaks.
-    fn find_peaks(&mut self, input: &SearchInput<'_>, spot_px: f64) -> Result<Pass, DetectError> {
+    fn find_peaks(
+        &mut self,
+        input: &SearchInput<'_>,
+        spot_px: f64,
+    ) -> Result<FilterPass, DetectError> {
         let SearchInput {
             view,
             background,
@@ -297,7 +301,7 @@ impl FrameSearch {
         found.run(&filtered.candidates, &filtered.mesh, view, &search_config)?;
         let mean = median(&filtered.mesh.background, sorted);
         let sigma = median(&filtered.mesh.sigma, sorted);
-        Ok(Pass {
+        Ok(FilterPass {
             matched_gain: kernel.matched_gain(),
             threshold,
             threshold_level: mean + threshold * sigma,

@@ -5,7 +5,7 @@ use crate::base::units::RAD_PER_DEG;
 use crate::camera::{CameraModel, LANES};
 use crate::identify::field::{ObservedStar, Photometry, StarField};
 use crate::identify::index::IndexedCatalog;
-use crate::identify::predict::{PredictedStar, PredictionDepth, Surroundings, View};
+use crate::identify::predict::{PredictedStar, PredictionDepth, SkyView, Surroundings};
 use std::ops::Range;
 
 /// Predicted stars for each observed one, where the zero point of the magnitudes is unknown.
@@ -117,8 +117,8 @@ impl Hypothesis {
         }
     }
 
-    fn view(&self, field: &StarField) -> View<'_> {
-        View {
+    fn view(&self, field: &StarField) -> SkyView<'_> {
+        SkyView {
             camera: &self.camera,
             icrs_to_camera: &self.icrs_to_camera,
             years_since_j2000: field.years_since_j2000,

@@ -41,7 +41,7 @@ pub use index::IndexedCatalog;
 #[doc(hidden)]
 pub use index::{CacheError, cache_directory};
 #[doc(hidden)]
-pub use predict::{PredictedStar, View};
+pub use predict::{PredictedStar, SkyView};
 pub use priors::{DateSource, FrameDate, Priors, Scale, ScalePrior, ScaleSource, SkyRegion};
 #[doc(hidden)]
 pub use search::LOG10_FALSE_ALARM_LIMIT;

@@ -32,7 +32,7 @@ pub struct PredictedStar {
 
 /// A camera, its attitude, and the date.
 #[derive(Debug, Clone, Copy)]
-pub struct View<'a> {
+pub struct SkyView<'a> {
     /// The camera.
     pub camera: &'a CameraModel,
     /// The attitude.
@@ -68,7 +68,7 @@ struct GatheredRegion {
     faintest_v_mag: f64,
 }
 
-impl View<'_> {
+impl SkyView<'_> {
     /// The catalogue stars in the frame, or within 1 % of its diagonal outside it, down to a V
     /// magnitude, brightest first.
     pub fn stars_to(&self, sky: &IndexedCatalog, faintest_v_mag: f64) -> Vec<PredictedStar> {
@@ -88,10 +88,10 @@ impl View<'_> {
 }
 
 impl Surroundings {
-    /// Fills `predicted` with the stars of [`View::stars_to`].
+    /// Fills `predicted` with the stars of [`SkyView::stars_to`].
     pub fn stars_to(
         &mut self,
-        view: &View,
+        view: &SkyView,
         sky: &IndexedCatalog,
         faintest_v_mag: f64,
         predicted: &mut Vec<PredictedStar>,
@@ -107,11 +107,11 @@ impl Surroundings {
         project(view, sky, &self.stars[..bright_enough], &all, predicted);
     }
 
-    /// Fills `predicted` with the brightest stars of [`View::stars_to`] to the depth `least`, or
+    /// Fills `predicted` with the brightest stars of [`SkyView::stars_to`] to the depth `least`, or
     /// with all that the catalogue has. The search starts at `likely_v_mag`.
     pub fn stars_at_least(
         &mut self,
-        view: &View,
+        view: &SkyView,
         sky: &IndexedCatalog,
         least: PredictionDepth,
         likely_v_mag: f64,
@@ -129,7 +129,7 @@ impl Surroundings {
     }
 
     /// Gathers all stars of `view` down to a V magnitude; returns the magnitude reached.
-    fn gather(&mut self, view: &View, sky: &IndexedCatalog, faintest_v_mag: f64) -> f64 {
+    fn gather(&mut self, view: &SkyView, sky: &IndexedCatalog, faintest_v_mag: f64) -> f64 {
         let (centre, reach_rad) = (view.boresight(), view.reach_rad());
         let covers = |around: &GatheredRegion| {
             around.centre.angle_to(&centre) + reach_rad <= around.radius_rad
@@ -178,7 +178,7 @@ impl Surroundings {
 /// Fills `predicted` with those of `stars` (brightest first) that lie in the frame or nearly so,
 /// until both the number and the magnitude of `least` are reached.
 fn project(
-    view: &View,
+    view: &SkyView,
     sky: &IndexedCatalog,
     stars: &[GridStar],
     least: &PredictionDepth,

@@ -28,7 +28,7 @@ pub use identified_frame::IdentifiedFrame;
 use crate::base::statistics::median;
 use crate::camera::data_sheet::lens_transmission;
 use crate::detect::Detection;
-use crate::identify::{IndexedCatalog, View};
+use crate::identify::{IndexedCatalog, SkyView};
 use crate::sky::catalog::{Star, StarFlags, StarIndex};
 use association::{Association, FrameStar, associate};
 use completeness::{Completeness, CountedStar, NoLimit};
@@ -57,7 +57,7 @@ pub struct FramePhotometry {
 /// Measures zero point and completeness of `frame` with the stars of `sky`.
 #[doc(hidden)]
 pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry {
-    let view = View {
+    let view = SkyView {
         camera: &frame.identification.camera,
         icrs_to_camera: &frame.identification.icrs_to_camera,
         years_since_j2000: frame.years_since_j2000,

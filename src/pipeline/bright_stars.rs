@@ -1,7 +1,7 @@
 //! Bright stars without a name, and bright detections that are no star: what a person sees first.
 
 use crate::detect::{Detection, Detections};
-use crate::identify::{Identification, IndexedCatalog, PredictedStar, View};
+use crate::identify::{Identification, IndexedCatalog, PredictedStar, SkyView};
 use crate::photometry::resolved_px;
 use crate::sky::catalog::StarIndex;
 use std::collections::HashSet;
@@ -60,7 +60,7 @@ impl NamedFrame<'_> {
     /// Bright catalogue stars well inside the frame without a name, brightest first.
     pub(super) fn missing_stars(&self) -> Vec<MissingStar> {
         let found = self.identification;
-        let view = View {
+        let view = SkyView {
             camera: &found.camera,
             icrs_to_camera: &found.icrs_to_camera,
             years_since_j2000: self.years_since_j2000,

@@ -14,7 +14,7 @@ use crate::calibration::Calibration;
 use crate::detect::Detections;
 use crate::frame::{DefectiveColumn, Frame};
 use crate::identify::diagnosis::DoubleImage;
-use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SourceIndex, View};
+use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SkyView, SourceIndex};
 use crate::photometry::comparison::{Comparison, FieldStar, FrameMeasurement, compare};
 use crate::photometry::{self, FramePhotometry, IdentifiedFrame};
 use crate::sky::observer::Observation;
@@ -201,7 +201,7 @@ impl SolvedFrame<'_> {
 
     /// All catalogue stars in the frame.
     fn field(&self, found: &Identification) -> Vec<FieldStar> {
-        let view = View {
+        let view = SkyView {
             camera: &found.camera,
             icrs_to_camera: &found.icrs_to_camera,
             years_since_j2000: self.priors.years_since_j2000(),

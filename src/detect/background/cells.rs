@@ -1,7 +1,7 @@
 //! Background and noise of single cells: a clipped mean and standard deviation, started from the
 //! median and the lower quantile of a few samples, for stars are above the median and not below.
 
-use super::clipping::{DIFFERENCE_PX, Gaussian, MIN_SAMPLES, Samples, Tolerance, clipped};
+use super::clipping::{CellSamples, DIFFERENCE_PX, Gaussian, MIN_SAMPLES, Tolerance, clipped};
 use super::grid::CellGrid;
 use super::medians::{self, CELL_LANES, CellLanes};
 use super::mesh_config::{MeshConfig, Sampled};
@@ -72,7 +72,7 @@ fn measure_cell(
     start: Gaussian,
     config: &MeshConfig,
 ) -> Option<Gaussian> {
-    let pixels = Samples {
+    let pixels = CellSamples {
         rows: rows.columns(columns.clone()),
         are_differences: false,
     };
@@ -103,7 +103,7 @@ fn sigma_of_differences(
     if count < MIN_SAMPLES {
         return None;
     }
-    let differences = Samples {
+    let differences = CellSamples {
         rows: rows.columns(columns),
         are_differences: true,
     };

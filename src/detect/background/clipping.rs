@@ -41,7 +41,7 @@ pub(crate) struct Tolerance {
 
 /// Samples of a cell: its pixels, or the differences of pixels [`DIFFERENCE_PX`] columns apart.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Samples<'a> {
+pub(crate) struct CellSamples<'a> {
     /// The pixels.
     pub rows: PixelRows<'a>,
     /// Whether the samples are differences.
@@ -52,7 +52,7 @@ pub(crate) struct Samples<'a> {
 /// NaN is left out. The standard deviation is at least `floor`.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 pub(crate) fn clipped(
-    samples: &Samples,
+    samples: &CellSamples,
     start: Gaussian,
     floor: f32,
     tolerance: Tolerance,
@@ -86,7 +86,7 @@ pub(crate) fn clipped(
 
 /// Number, sum and sum of squares of `sample - center` where it is at most `half_width` in size.
 #[inline(always)]
-fn clipped_moments(samples: &Samples<'_>, center: f32, half_width: f32) -> [f32; 3] {
+fn clipped_moments(samples: &CellSamples<'_>, center: f32, half_width: f32) -> [f32; 3] {
     let [mut count, mut sum, mut squares] = [[0.0f32; LANES]; 3];
     let mut add = |lane: usize, value: f32| {
         let deviation = value - center;
@@ -96,7 +96,7 @@ fn clipped_moments(samples: &Samples<'_>, center: f32, half_width: f32) -> [f32;
         sum[lane] += kept;
         squares[lane] += kept * kept;
     };
-    let Samples {
+    let CellSamples {
         rows,
         are_differences,
     } = *samples;

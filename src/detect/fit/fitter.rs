@@ -2,7 +2,7 @@
 
 use super::gauss_newton::{MAX_STEPS, StepOutcome, add_background_map, advance, finish};
 use super::light::{GaussianLight, add_light};
-use super::mixture::{MixtureImage, MixtureLight};
+use super::mixture_light::{MixtureImage, MixtureLight};
 use super::normal::{CholeskyFactor, NormalEquations};
 use super::parameters::{
     Fit, FitConfig, MAX_PARAMETERS, MAX_SPOTS, NoiseModel, ONE_SPOT, SpotEstimate, TWO_SPOTS,

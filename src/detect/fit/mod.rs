@@ -18,7 +18,7 @@ mod fitter;
 mod frame_maps;
 mod gauss_newton;
 mod light;
-mod mixture;
+mod mixture_light;
 mod normal;
 mod parameters;
 mod sums;

@@ -4,7 +4,7 @@
 //! mixed from the four nodes around it.
 
 use super::effective::{EffectivePsf, FieldForm, LocalPsf};
-use super::table::{Layout, PsfTable, REACH_SIGMAS};
+use super::table::{PsfTable, REACH_SIGMAS, TableLayout};
 use crate::base::size::Size;
 use multiversion::multiversion;
 use std::sync::OnceLock;
@@ -14,7 +14,7 @@ use std::sync::OnceLock;
 pub(crate) struct FieldTables<'a> {
     /// The PSF.
     pub psf: &'a EffectivePsf,
-    layout: Layout,
+    layout: TableLayout,
     /// Whether the lobes are too sharp for a table: they are summed instead.
     is_sharp: bool,
     /// Distance of the nodes along x and y, in pixels.
@@ -36,7 +36,7 @@ impl<'a> FieldTables<'a> {
         let spacing = |side: usize, cells: usize| (side - 1) as f64 / cells.max(1) as f64;
         let mut tables = Self {
             psf,
-            layout: Layout::default(),
+            layout: TableLayout::default(),
             is_sharp: false,
             cell_px: [
                 spacing(size.width, cells[0]),
@@ -136,7 +136,7 @@ impl<'a> FieldTables<'a> {
                 }
             }
         }
-        self.layout = Layout::of(least_px, reach_px);
+        self.layout = TableLayout::of(least_px, reach_px);
         self.is_sharp = least_px < MIN_LOBE_PX;
     }
 }

@@ -30,7 +30,7 @@ pub(crate) type ShareGroup = [PixelGroup; 4];
 
 /// How a table is divided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Layout {
+pub(super) struct TableLayout {
     /// Samples in a pixel along each axis.
     per_px: usize,
     /// Pixels along each side, from one more than the reach of the light on.
@@ -39,7 +39,7 @@ pub(super) struct Layout {
     stride: usize,
 }
 
-impl Layout {
+impl TableLayout {
     /// For lobes of this size that reach this far from the centre, in pixels.
     pub fn of(sigma_px: f64, reach_px: f64) -> Self {
         /// Largest distance of the samples over the width of a lobe, pixel included: the error of
@@ -76,7 +76,7 @@ impl Layout {
 /// The PSF at one place.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct PsfTable {
-    pub(super) layout: Layout,
+    pub(super) layout: TableLayout,
     /// Coefficients of the splines, phase by phase, each row by row; empty without a table.
     pub(super) coefficients: Vec<f32>,
 }
@@ -99,7 +99,7 @@ impl PsfTable {
     }
 
     /// Tabulates lobes.
-    pub(super) fn fill(&mut self, lobes: &[Lobe], layout: Layout) {
+    pub(super) fn fill(&mut self, lobes: &[Lobe], layout: TableLayout) {
         self.layout = layout;
         self.coefficients.clear();
         self.coefficients.resize(layout.len(), 0.0);
@@ -108,7 +108,7 @@ impl PsfTable {
             for (profile, offset_px) in profiles.iter_mut().zip(lobe.offset_px) {
                 profile.fill(layout, offset_px, lobe.sigma_px);
             }
-            add_lobe(layout, &profiles, lobe.share as f32, &mut self.coefficients);
+            add_lobe_samples(layout, &profiles, lobe.share as f32, &mut self.coefficients);
         }
     }
 
@@ -138,7 +138,7 @@ impl PsfTable {
 
 /// Numbers in a row of samples that are combined from the rows of a table: zeros stand on both
 /// sides.
-fn line_length(layout: Layout) -> usize {
+fn line_length(layout: TableLayout) -> usize {
     GROUP_PX + layout.stride + GROUP_PX
 }
 
@@ -171,7 +171,7 @@ struct Taps {
 
 impl Taps {
     /// For a spot at `at_px` in a window of `side` pixels.
-    fn of(layout: Layout, at_px: f64, side: usize) -> Self {
+    fn of(layout: TableLayout, at_px: f64, side: usize) -> Self {
         // Farther away there is no light.
         let far_px = (layout.side + MAX_WINDOW_PX) as f64;
         let per_px = layout.per_px as f64;
@@ -335,7 +335,7 @@ impl SplineProfile {
     ];
 
     /// For a lobe this far from the spot's centre.
-    fn fill(&mut self, layout: Layout, offset_px: f64, sigma_px: f64) {
+    fn fill(&mut self, layout: TableLayout, offset_px: f64, sigma_px: f64) {
         /// Samples on each side that the filter takes.
         const MARGIN: usize = SplineProfile::FILTER.len() / 2;
         let per_px = layout.per_px;
@@ -372,7 +372,12 @@ impl SplineProfile {
     reason = "rows of several arrays read best as indices"
 )]
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn add_lobe(layout: Layout, profiles: &[SplineProfile; 2], share: f32, table: &mut [f32]) {
+fn add_lobe_samples(
+    layout: TableLayout,
+    profiles: &[SplineProfile; 2],
+    share: f32,
+    table: &mut [f32],
+) {
     let [across, down] = profiles;
     let first = across.lit[0] / GROUP_PX * GROUP_PX;
     let end = across.lit[1].next_multiple_of(GROUP_PX);
@@ -462,7 +467,7 @@ pub(super) mod tests {
             let mut table = PsfTable::default();
             table.fill(
                 &lobes,
-                Layout::of(sigma_px, 4.0 * sigma_px + 7.0 * sigma_px),
+                TableLayout::of(sigma_px, 4.0 * sigma_px + 7.0 * sigma_px),
             );
             for place in [[10.0, 10.0], [9.63, 10.21], [10.5, 9.5], [2.2, 19.8]] {
                 let groups = SIDE.div_ceil(GROUP_PX);

@@ -4,12 +4,12 @@
 //! 1. Bright, isolated stars are fitted with a size and an elongation of their own (`stars`).
 //! 2. These are fitted by polynomials over the field (`field`).
 //! 3. The light of all stars, stretched to one size and elongation, gives the weights of a mixture
-//!    of Gaussians (`mixture`).
+//!    of Gaussians (`lobe_shares`).
 //! 4. Each half of the stars is compared with the PSF of the other half. The PSF is used where its
 //!    residuals are well below those of a round Gaussian; they give the noise model.
 
 mod field;
-mod mixture;
+mod lobe_shares;
 mod stars;
 
 use super::candidates::Peak;
@@ -18,7 +18,7 @@ use super::psf::{EffectivePsf, FieldForm, FieldFrame, MAX_WINDOW_PX, SpotMoments
 use super::star_model::{StarModel, noise_of};
 use crate::base::statistics::median;
 use field::moments_over_field;
-use mixture::{LobeGrid, LobeSums};
+use lobe_shares::{LobeGrid, LobeSums};
 use stars::{PsfStar, StarFitter};
 
 /// Fewer stars than this do not tell the PSF.

@@ -45,7 +45,7 @@ pub(super) struct PsfStar {
 
 /// What the pixels of a group hold of a spot: the share of the light, and its derivatives with
 /// respect to x, y, and the moments.
-type ShareGroup = [PixelGroup; 6];
+type MomentShares = [PixelGroup; 6];
 
 /// Fits the stars; holds the buffers.
 #[derive(Debug, Default)]
@@ -53,7 +53,7 @@ pub(super) struct StarFitter {
     noise: NoiseModel,
     profiles: NarrowProfiles,
     /// Row by row, as the pixels of the window.
-    shares: Vec<ShareGroup>,
+    shares: Vec<MomentShares>,
     local: LocalPsf,
 }
 
@@ -158,7 +158,7 @@ impl StarFitter {
                 moves: stretches.map(|rows| rows.map(|[a, b]| (a * dx + b * dy) as f32)),
                 widening: widening.map(|of_moment| of_moment.map(|change| change as f32)),
             };
-            add_lobe(share, &changes, profiles, part, shares, width);
+            add_lobe_with_moments(share, &changes, profiles, part, shares, width);
         }
     }
 
@@ -222,7 +222,7 @@ impl StarFitter {
 fn add_pixels<const N: usize>(
     normal: &mut NormalEquations<N>,
     flux: f32,
-    shares: &[ShareGroup],
+    shares: &[MomentShares],
     pixels: &WindowPixels<'_>,
 ) {
     let mut matrix = [[[0.0f32; GROUP_PX]; N]; N];
@@ -280,12 +280,12 @@ struct LobeChanges {
     reason = "lanes of several arrays read best as indices"
 )]
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn add_lobe(
+fn add_lobe_with_moments(
     share: f32,
     changes: &LobeChanges,
     profiles: &NarrowProfiles,
     part: LitPart,
-    into: &mut [ShareGroup],
+    into: &mut [MomentShares],
     width: usize,
 ) {
     for row in part.rows[0]..part.rows[1] {
@@ -325,7 +325,7 @@ fn add_still_lobe(
     share: f32,
     profiles: &NarrowProfiles,
     part: LitPart,
-    into: &mut [ShareGroup],
+    into: &mut [MomentShares],
     width: usize,
 ) {
     for row in part.rows[0]..part.rows[1] {

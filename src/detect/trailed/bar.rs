@@ -1,6 +1,6 @@
 //! A star that is drawn out evenly along a straight line, fitted to the light along it.
 
-use super::light::{Fitted, Template};
+use super::light::{FittedTrail, Template};
 use super::profile::Profile;
 use super::shape::Shape;
 
@@ -106,7 +106,7 @@ impl Sums {
     }
 
     /// The bar of this length around a place, counted in steps from the first one's middle.
-    fn bar(&self, middle: f64, length_px: f64) -> Fitted {
+    fn bar(&self, middle: f64, length_px: f64) -> FittedTrail {
         // Step i is from i − ½ to i + ½.
         let ends = [
             middle - 0.5 * length_px + 0.5,
@@ -114,7 +114,7 @@ impl Sums {
         ];
         let between = |sums: &[f64]| Self::at(sums, ends[1]) - Self::at(sums, ends[0]);
         // Of a flux of 1, each step has an equal part.
-        Fitted {
+        FittedTrail {
             light: between(&self.light) / length_px,
             weight: between(&self.weight) / (length_px * length_px),
         }
@@ -128,7 +128,7 @@ impl Sums {
     }
 
     /// Chi² over its degrees of freedom under the bar: above 1 where the light is uneven.
-    fn excess(&self, profile: &Profile, middle: f64, length_px: f64, bar: Fitted) -> f64 {
+    fn excess(&self, profile: &Profile, middle: f64, length_px: f64, bar: FittedTrail) -> f64 {
         let level = bar.flux() / length_px;
         // The first and the last step are filled in part.
         let first = (middle - 0.5 * length_px + 1.0).ceil().max(0.0) as usize;

@@ -35,8 +35,8 @@ impl Template {
     }
 
     /// The flux of a star whose trail is around a place.
-    pub fn fitted(&self, profile: &Profile, place: f64) -> Fitted {
-        let mut sums = Fitted::default();
+    pub fn fitted(&self, profile: &Profile, place: f64) -> FittedTrail {
+        let mut sums = FittedTrail::default();
         for i in self.steps(profile, place) {
             let weighted = self.at(i, place) * profile.weight[i];
             sums.light += weighted * profile.light[i];
@@ -60,12 +60,12 @@ impl Template {
 
 /// The flux of a bar that is fitted, times `weight`, and its inverse variance.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Fitted {
+pub(super) struct FittedTrail {
     pub light: f64,
     pub weight: f64,
 }
 
-impl Fitted {
+impl FittedTrail {
     /// The flux.
     pub fn flux(&self) -> f64 {
         self.light / self.weight

@@ -291,7 +291,7 @@ impl LobeImages {
             let block = &mut self.light[image / BLOCK * pixels..][..pixels];
             let image = image % BLOCK;
             let (profiles, roots) = (&self.profiles, &self.roots);
-            add_lobe(flux, profiles, part, block, roots, image, self.width);
+            add_weighted_lobe(flux, profiles, part, block, roots, image, self.width);
         }
     }
 
@@ -315,7 +315,7 @@ impl LobeImages {
 /// Adds a lobe to the image of this number of a block, in rows of `width` groups, times the square
 /// roots of the weights.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn add_lobe(
+fn add_weighted_lobe(
     flux: f32,
     profiles: &NarrowProfiles,
     part: LitPart,
