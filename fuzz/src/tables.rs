@@ -89,7 +89,9 @@ fn indexed() -> &'static (Catalog, String, Vec<u8>) {
             );
             text += &format!("{star},{ra},{dec},{}\n", 2.0 + f64::from(star) / 20.0);
         }
-        let catalog = with_file("stars.csv", text.as_bytes(), |path: &std::path::Path| Catalog::read(path));
+        let catalog = with_file("stars.csv", text.as_bytes(), |path: &std::path::Path| {
+            Catalog::read(path)
+        });
         let catalog = catalog.expect("it is a catalogue");
         let place = directory().join("index");
         fs::create_dir_all(&place).expect("the temporary directory can be written");

@@ -1,6 +1,5 @@
 //! Images as frames: an array of numpy is borrowed, a file or its bytes are decoded.
 
-use starpipe::base::size::Size;
 use crate::errors::exception;
 use crate::pages::Page;
 use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -8,6 +7,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use starpipe::Frame;
+use starpipe::base::size::Size;
 use starpipe::frame::{self, Buffers, FrameError, RowOrder};
 use std::path::{Path, PathBuf};
 
