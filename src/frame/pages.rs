@@ -124,7 +124,7 @@ impl Pages {
 /// Which image of a file with several is meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PageChoice {
-    /// The first; of a FITS file, the largest.
+    /// The largest; of equal ones, the first.
     #[default]
     Main,
     /// That with this number, from 1.

@@ -16,7 +16,7 @@ pub(crate) struct FrameOptions {
 #[derive(Debug, Args)]
 pub(crate) struct PageOption {
     /// Which image of a file with several, from 1: a page of a TIFF, an image or plane of a FITS
-    /// file [default: the first of a TIFF, the largest of a FITS file]
+    /// file [default: the largest]
     #[arg(long, value_name = "NUMBER")]
     pub(crate) page: Option<NonZeroUsize>,
 }

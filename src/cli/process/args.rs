@@ -36,7 +36,7 @@ pub(crate) struct ProcessArgs {
     #[command(flatten)]
     pub(super) frames: FrameOptions,
     /// Which image of a file with several, from 1: a page of a TIFF, an image or plane of a FITS
-    /// file; or all of them, as FRAME[1], FRAME[2] and so on [default: the first, of a FITS file the largest]
+    /// file; or all of them, as FRAME[1], FRAME[2] and so on [default: the largest]
     #[arg(long, value_name = "NUMBER|all")]
     pub(super) page: Option<PageChoice>,
     #[command(flatten)]
