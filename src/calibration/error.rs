@@ -1,6 +1,7 @@
 //! Errors of calibration.
 
 use crate::frame::Frame;
+use std::io;
 use std::path::PathBuf;
 
 /// Maximum share of unusable pixels in a master or a list of hot pixels. With more, the file is
@@ -67,7 +68,7 @@ pub enum CalibrationError {
         /// The list.
         path: PathBuf,
         /// The error.
-        source: csv::Error,
+        source: io::Error,
     },
     /// The list of hot pixels has an invalid line.
     #[error("{}, line {line}: found {found}, expected {expected}", path.display())]

@@ -33,11 +33,14 @@ pub fn read_hot_pixels(path: impl AsRef<Path>) -> Result<HotPixelList, Calibrati
         found: found.to_owned(),
         expected,
     };
-    let bytes = files::read(path, MAX_BYTES).map_err(|error| unreadable(error.into()))?;
+    let bytes = files::read(path, MAX_BYTES).map_err(unreadable)?;
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .from_reader(&bytes[..]);
-    let headings = reader.headers().map_err(unreadable)?.clone();
+    let headings = reader
+        .headers()
+        .map_err(|error| unreadable(error.into()))?
+        .clone();
     let column = |name: &str| {
         headings
             .iter()
@@ -53,7 +56,7 @@ pub fn read_hot_pixels(path: impl AsRef<Path>) -> Result<HotPixelList, Calibrati
     };
     let mut pixels = Vec::new();
     for record in reader.records() {
-        let record = record.map_err(unreadable)?;
+        let record = record.map_err(|error| unreadable(error.into()))?;
         let line = record.position().map_or(0, csv::Position::line);
         let coordinate = |column: usize| {
             let text = record.get(column).unwrap_or_default();

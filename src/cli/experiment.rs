@@ -90,7 +90,7 @@ fn save_overlay(
         return Ok(());
     };
     let title = format!("{}, simulated", name.display());
-    let picture = overlay::draw(&title, frame, solution, indexed.catalog());
+    let picture = overlay::png(&title, frame, solution, indexed.catalog())?;
     let path = output_path(directory, name, None, "png");
-    write_whole(&[(path, overlay::to_png(&picture)?)])
+    write_whole(&[(path, picture)])
 }

@@ -5,6 +5,7 @@ use crate::base::remedy::Remedy;
 use crate::frame::RowOrder;
 use crate::identify::DateSource;
 use serde::Serialize;
+use std::io;
 
 /// Version of the JSON described here.
 pub const SCHEMA: u32 = 2;
@@ -431,9 +432,9 @@ impl FrameReport {
     /// The report as one line of JSON, without the line's end.
     ///
     /// # Errors
-    /// [`serde_json::Error`], which does not occur with these types.
-    pub fn to_json_line(&self) -> Result<String, serde_json::Error> {
-        serde_json::to_string(self).map(json_escaped)
+    /// None for reports that [`new`](Self::new) made.
+    pub fn to_json_line(&self) -> io::Result<String> {
+        Ok(json_escaped(serde_json::to_string(self)?))
     }
 
     /// Whether the stars are identified.

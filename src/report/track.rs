@@ -10,6 +10,7 @@ use crate::pipeline::Outcome;
 use crate::track::{AngularRate, Attitude, Loss, Track};
 use nalgebra::Vector3;
 use serde::Serialize;
+use std::io;
 
 /// The report of one frame of a sequence.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -157,8 +158,8 @@ impl TrackReport {
     ///
     /// # Errors
     /// None for reports that [`new`](Self::new) made.
-    pub fn to_json_line(&self) -> serde_json::Result<String> {
-        serde_json::to_string(self).map(json_escaped)
+    pub fn to_json_line(&self) -> io::Result<String> {
+        Ok(json_escaped(serde_json::to_string(self)?))
     }
 
     /// The report as one line for people.

@@ -44,8 +44,8 @@ impl ResultFiles {
             let name = image.to_path();
             let title = name.file_name().unwrap_or(name.as_os_str());
             let title = title.to_string_lossy();
-            let picture = overlay::draw(&title, frame, &solved.solution, catalog);
-            files.push((path("png"), overlay::to_png(&picture)?));
+            let picture = overlay::png(&title, frame, &solved.solution, catalog)?;
+            files.push((path("png"), picture));
         }
         let header = wcs::header(&report.frame, &solved.solution);
         let has_header = header.is_some();

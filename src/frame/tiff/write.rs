@@ -1,7 +1,7 @@
 //! Writes a frame as a TIFF file with Exif attributes.
 
 use crate::frame::image::Frame;
-use std::io::{Seek, Write};
+use std::io::{self, Seek, Write};
 use tiff::encoder::{Compression, DeflateLevel, Predictor, Rational, TiffEncoder, colortype};
 use tiff::tags::Tag;
 use tiff::{TiffError, TiffResult};
@@ -45,12 +45,19 @@ impl TiffOptions<'_> {
 /// size. A level outside the range of the samples is clipped; a fraction is rounded.
 ///
 /// # Errors
-/// [`TiffError`] where `writer` fails.
+/// Those of `writer`, and of files that would have more than 4 GB.
 pub fn write_tiff(
     writer: impl Write + Seek,
     frame: &Frame,
     options: &TiffOptions,
-) -> Result<(), TiffError> {
+) -> io::Result<()> {
+    encode(writer, frame, options).map_err(|error| match error {
+        TiffError::IoError(error) => error,
+        error => io::Error::other(error),
+    })
+}
+
+fn encode(writer: impl Write + Seek, frame: &Frame, options: &TiffOptions) -> TiffResult<()> {
     let mut encoder = TiffEncoder::new(writer)?;
     if options.compressed {
         encoder = encoder.with_compression(Compression::Deflate(DeflateLevel::Best));

@@ -31,8 +31,24 @@ use canvas::Canvas;
 use grey::Grey;
 use image::RgbImage;
 use mark::MarkKind;
+use std::io;
+
+/// Draws `frame` with its detections, as PNG; `title` is its name. The file is marked as an overlay
+/// ([`is_overlay`](crate::frame::is_overlay)).
+///
+/// # Errors
+/// If the picture cannot be encoded, which does not occur for frames within the limits of their size.
+pub fn png(
+    title: &str,
+    frame: &Frame,
+    solution: &Solution,
+    catalog: &Catalog,
+) -> io::Result<Vec<u8>> {
+    to_png(&draw(title, frame, solution, catalog)).map_err(io::Error::other)
+}
 
 /// Draws `frame` with its detections; `title` is its name.
+#[doc(hidden)]
 pub fn draw(title: &str, frame: &Frame, solution: &Solution, catalog: &Catalog) -> RgbImage {
     let grey = Grey::of(frame, solution.background.as_ref());
     let marks = mark::marks(solution, catalog, &grey);
@@ -54,13 +70,8 @@ pub fn draw(title: &str, frame: &Frame, solution: &Solution, catalog: &Catalog) 
     canvas.into_image()
 }
 
-/// Encodes the picture as PNG, fast rather than small, and marks it as an overlay
-/// ([`is_overlay`](crate::frame::is_overlay)).
-///
-/// # Errors
-/// [`png::EncodingError`] if the picture cannot be encoded, which does not occur with pictures of
-/// [`draw`].
-pub fn to_png(picture: &RgbImage) -> Result<Vec<u8>, png::EncodingError> {
+/// Encodes the picture, fast rather than small.
+fn to_png(picture: &RgbImage) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let (width, height) = picture.dimensions();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
