@@ -9,9 +9,9 @@ not part of the API.
 import difflib
 import os
 import re
-import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -23,13 +23,12 @@ MEMBERS = re.compile(r'id="(structfield|variant|method|tymethod|associatedconsta
 def documentation():
     """Builds the documentation without private items, and returns its directory."""
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-    directory = target / "doc/starpipe"
-    shutil.rmtree(directory, ignore_errors=True)
-    lib = ROOT / "src/lib.rs"
-    # Cargo does not see that the directory is gone.
-    lib.touch()
-    subprocess.run(["cargo", "doc", "--no-deps", "--lib", "--quiet"], cwd=ROOT, check=True)
-    return directory
+    # The directory may hold the documentation of private items. A flag that is new each time makes
+    # rustdoc run, and nothing else.
+    flags = {**os.environ, "RUSTDOCFLAGS": f"--cfg listed_at_{time.time_ns()}"}
+    command = ["cargo", "doc", "--no-deps", "--lib", "--quiet"]
+    subprocess.run(command, cwd=ROOT, check=True, env=flags)
+    return target / "doc/starpipe"
 
 
 def members(page):

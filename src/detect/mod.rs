@@ -87,8 +87,8 @@ use wings::measure_wings;
 /// # Errors
 /// [`DetectError::FrameTooSmall`], [`DetectError::WrongLength`] for frames of impossible size,
 /// [`DetectError::Config`] for options out of range, [`DetectError::Interrupted`] where the workspace
-/// has an interrupt ([`Workspace::with_interrupt`]), [`DetectError::TooCrowded`] where more stands out than its
-/// memory holds ([`Workspace::with_memory_limit`]).
+/// has an interrupt ([`Workspace::with_interrupt`]), [`DetectError::TooCrowded`] where more stands out
+/// than its memory holds ([`Workspace::with_memory_limit`]).
 ///
 /// # Example
 /// ```

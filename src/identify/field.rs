@@ -80,3 +80,26 @@ impl StarField {
         &self.stars[..count.min(self.stars.len())]
     }
 }
+
+#[cfg(test)]
+impl StarField {
+    /// Stars at these places in a frame of this width and height, each a magnitude fainter than the
+    /// one before.
+    pub(super) fn of_places([width_px, height_px]: [f64; 2], places: &[(f64, f64)]) -> Self {
+        let star = |(index, &(x, y)): (usize, &(f64, f64))| ObservedStar {
+            source: SourceIndex::new(index),
+            position: PixelPoint::new(x, y),
+            sigma_px: 0.1,
+            mag: index as f64,
+            is_saturated: false,
+        };
+        Self {
+            width_px,
+            height_px,
+            photometry: Photometry::Instrumental,
+            years_since_j2000: 0.0,
+            spot_sigma_px: None,
+            stars: places.iter().enumerate().map(star).collect(),
+        }
+    }
+}

@@ -84,17 +84,9 @@ impl FrameGrid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::Photometry;
 
     fn grid() -> FrameGrid {
-        let field = StarField {
-            width_px: 700.0,
-            height_px: 400.0,
-            photometry: Photometry::Instrumental,
-            years_since_j2000: 0.0,
-            spot_sigma_px: None,
-            stars: Vec::new(),
-        };
+        let field = StarField::of_places([700.0, 400.0], &[]);
         FrameGrid::new(&field, 7)
     }
 

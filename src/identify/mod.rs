@@ -14,7 +14,8 @@
 //! 4. [`diagnosis`]: where nothing is identified, why.
 //!
 //! Caveats: fields from about 1.5° to 80°, a pinhole camera with the optical axis at the frame's
-//! centre and a distortion up to seventh order (radial) or fifth order (any), at least [`MIN_STARS`] stars of the catalogue.
+//! centre and a distortion up to seventh order (radial) or fifth order (any), at least [`MIN_STARS`]
+//! stars of the catalogue.
 
 pub mod diagnosis;
 mod field;

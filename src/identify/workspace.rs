@@ -137,8 +137,8 @@ impl Workspace {
         self.find_pointing(field, priors, sky)?.name_stars()
     }
 
-    /// Attitude and optics alone, from the brightest stars of `field`: [`find_pointing`](Self::find_pointing), then
-    /// [`attitude`](Pointing::attitude). The answer is kept in the workspace.
+    /// Attitude and optics alone, from the brightest stars of `field`:
+    /// [`find_pointing`](Self::find_pointing), then [`attitude`](Pointing::attitude). The answer is kept in the workspace.
     ///
     /// # Errors
     /// The [`SearchFailure`] where the pointing is not found.

@@ -25,7 +25,8 @@ pub(crate) struct PageOption {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Limits")]
 pub(crate) struct MemoryOption {
-    /// Memory limit for reading and solving a frame, in MB; files that need more are refused [default: 1500, or half of the machine's memory]
+    /// Memory limit for reading and solving a frame, in MB; files that need more are refused
+    /// [default: 1500, or half of the machine's memory]
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     max_memory: Option<u64>,
 }

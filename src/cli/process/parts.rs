@@ -108,15 +108,18 @@ impl Worker<'_> {
         self.0.solve_all(part.names, |images| {
             progress.inc(1);
             added = images.into_iter().try_for_each(|(name, rows)| {
-                let (frame, stars) = rows.unwrap_or_else(|error| {
-                    progress.suspend(|| report_error(error.as_ref()));
-                    let unread = FrameRow::unread(&name, one_line(error.as_ref()));
-                    (unread, Vec::new())
-                });
-                match frame.status.as_str() {
-                    "unread" => counts.frames.failed += 1,
-                    status => counts.frames.count(status == "identified"),
-                }
+                let (frame, stars) = match rows {
+                    Ok((frame, stars)) => {
+                        counts.frames.count(frame.status == "identified");
+                        (frame, stars)
+                    }
+                    Err(error) => {
+                        counts.frames.failed += 1;
+                        progress.suspend(|| report_error(error.as_ref()));
+                        let unread = FrameRow::unread(&name, one_line(error.as_ref()));
+                        (unread, Vec::new())
+                    }
+                };
                 writer.add(frame, stars)
             });
             if added.is_ok() {

@@ -101,7 +101,7 @@ struct Blend {
 }
 
 /// A hypothesis and its PSF.
-struct SkyView<'a> {
+struct BlendView<'a> {
     problem: Problem<'a>,
     hypothesis: &'a Hypothesis,
     /// Variance of the spot, pixel width included.
@@ -138,7 +138,7 @@ impl Blends {
         };
         let variance_px2 = spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2;
         let reach_px = REACH_SIGMAS * variance_px2.sqrt();
-        let view = SkyView {
+        let view = BlendView {
             problem,
             hypothesis,
             variance_px2,
@@ -195,7 +195,7 @@ impl Blends {
     /// The blended light of a candidate for the detection at `detected`; `None` if it is single.
     fn blend_of(
         &mut self,
-        view: &SkyView,
+        view: &BlendView,
         candidate: &Candidate,
         detected: &PixelPoint,
     ) -> Option<Blend> {
@@ -241,7 +241,7 @@ impl Blends {
     }
 
     /// The stars near a predicted star that may be blended with it.
-    fn near(&mut self, view: &SkyView, predicted: usize, index: StarIndex) -> Near {
+    fn near(&mut self, view: &BlendView, predicted: usize, index: StarIndex) -> Near {
         let known = self.near[predicted].filter(|near| near.chord >= view.chord);
         known.unwrap_or_else(|| {
             let sky = view.problem.sky;
@@ -262,7 +262,7 @@ impl Blends {
     }
 }
 
-impl SkyView<'_> {
+impl BlendView<'_> {
     /// A star's position in the frame, and its flux in units of that of a star of `unit_v_mag`.
     fn light_of(&self, index: StarIndex, unit_v_mag: f32) -> Option<(PixelPoint, f64)> {
         let star = self.problem.sky.catalog().star(index);

@@ -23,7 +23,6 @@ const PRIOR_AROUND: f64 = 1.0;
 
 /// The probability of each predicted star that it is observed. Its buffers are reused.
 #[derive(Debug, Default)]
-#[non_exhaustive]
 pub struct DetectionShares {
     /// By brightness alone, brightest first; at the end 0, for stars fainter than all.
     shares: Vec<f64>,
@@ -178,18 +177,11 @@ impl Scale {
 mod tests {
     use super::*;
     use crate::base::coords::{PixelPoint, UnitVector};
-    use crate::identify::Photometry;
+
     use crate::sky::catalog::StarIndex;
 
     fn field() -> StarField {
-        StarField {
-            width_px: 1200.0,
-            height_px: 1200.0,
-            photometry: Photometry::Instrumental,
-            years_since_j2000: 0.0,
-            spot_sigma_px: None,
-            stars: Vec::new(),
-        }
+        StarField::of_places([1200.0, 1200.0], &[])
     }
 
     /// Stars spread evenly over the frame.

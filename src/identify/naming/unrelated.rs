@@ -163,25 +163,12 @@ impl Scale {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::coords::PixelPoint;
-    use crate::identify::{ObservedStar, Photometry, SourceIndex};
 
+    /// Stars of one magnitude.
     fn field(places: &[(f64, f64)]) -> StarField {
-        let star = |(index, &(x, y)): (usize, &(f64, f64))| ObservedStar {
-            source: SourceIndex::new(index),
-            position: PixelPoint::new(x, y),
-            sigma_px: 0.1,
-            mag: 0.0,
-            is_saturated: false,
-        };
-        StarField {
-            width_px: 1200.0,
-            height_px: 900.0,
-            photometry: Photometry::Instrumental,
-            years_since_j2000: 0.0,
-            spot_sigma_px: None,
-            stars: places.iter().enumerate().map(star).collect(),
-        }
+        let mut field = StarField::of_places([1200.0, 900.0], places);
+        field.stars.iter_mut().for_each(|star| star.mag = 0.0);
+        field
     }
 
     /// The density at each star, where none has a name.

@@ -46,25 +46,9 @@ impl Thinning {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::coords::PixelPoint;
-    use crate::identify::{ObservedStar, Photometry, SourceIndex};
 
     fn field(places: &[(f64, f64)]) -> StarField {
-        let star = |(index, &(x, y)): (usize, &(f64, f64))| ObservedStar {
-            source: SourceIndex::new(index),
-            position: PixelPoint::new(x, y),
-            sigma_px: 0.1,
-            mag: index as f64,
-            is_saturated: false,
-        };
-        StarField {
-            width_px: 800.0,
-            height_px: 600.0,
-            photometry: Photometry::Instrumental,
-            years_since_j2000: 0.0,
-            spot_sigma_px: None,
-            stars: places.iter().enumerate().map(star).collect(),
-        }
+        StarField::of_places([800.0, 600.0], places)
     }
 
     #[test]

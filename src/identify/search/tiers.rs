@@ -64,25 +64,10 @@ impl Tiers {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::coords::PixelPoint;
-    use crate::identify::{ObservedStar, Photometry, SourceIndex};
 
     fn field(stars: usize) -> StarField {
-        let star = |index: usize| ObservedStar {
-            source: SourceIndex::new(index),
-            position: PixelPoint::new(index as f64, 10.0),
-            sigma_px: 0.1,
-            mag: index as f64,
-            is_saturated: false,
-        };
-        StarField {
-            width_px: 800.0,
-            height_px: 600.0,
-            photometry: Photometry::Instrumental,
-            years_since_j2000: 0.0,
-            spot_sigma_px: None,
-            stars: (0..stars).map(star).collect(),
-        }
+        let places: Vec<_> = (0..stars).map(|index| (index as f64, 10.0)).collect();
+        StarField::of_places([800.0, 600.0], &places)
     }
 
     #[test]
