@@ -58,7 +58,7 @@ fn identification(found: &IdentificationSummary) -> Sheet {
     let all = &found.all;
     Sheet::of_one(Panel {
         title: format!(
-            "Identified rightly: {} of {} frames; {} not, {} wrongly",
+            "Identified correctly: {} of {} frames; {} not identified, {} wrong",
             all.right, all.frames, all.none, all.wrong
         ),
         x: Axis {
@@ -203,9 +203,9 @@ fn pulls(found: &PullSummary) -> Sheet {
         ],
     };
     let panels = [
-        ("Star's x", &found.x),
-        ("Star's y", &found.y),
-        ("Star's light", &found.flux),
+        ("x", &found.x),
+        ("y", &found.y),
+        ("Flux", &found.flux),
         ("Turn about x", &found.attitude_x),
         ("Turn about y", &found.attitude_y),
         ("Roll", &found.roll),
@@ -278,7 +278,7 @@ fn study(rows: &[StudyRow]) -> Sheet {
     };
     let (rate, rates) = rates(rows);
     let panels = vec![
-        panel("Identified rightly", rate, rates),
+        panel("Identified correctly", rate, rates),
         panel(
             "Half of the stars are found at",
             Axis::of("V"),
