@@ -1,7 +1,7 @@
 //! The search for a hypothesis about pointing, roll and scale.
 //!
 //! `triangle_search` looks triangles up and confirms what they suggest (`confirmation`), as far as a `plan`
-//! goes; `false_alarm` decides. `thinning` and `tiers` leave detections out that hide the stars.
+//! goes, and counts `votes` for poses; `false_alarm` decides. `thinning` and `tiers` leave detections out that hide the stars.
 
 mod confirmation;
 mod false_alarm;
@@ -9,6 +9,7 @@ mod plan;
 mod thinning;
 mod tiers;
 mod triangle_search;
+mod votes;
 
 pub use thinning::Thinning;
 pub use tiers::Tiers;

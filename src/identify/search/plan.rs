@@ -23,6 +23,10 @@ pub struct SearchPass {
 pub struct SearchPlan {
     /// The passes, one after the other.
     pub passes: &'static [SearchPass],
+    /// The pass whose triangles vote, after these.
+    pub vote: Option<&'static SearchPass>,
+    /// Maximum number of votes.
+    pub max_votes: u64,
     /// Maximum number of hypotheses.
     pub max_hypotheses: u64,
     /// Maximum number of catalogue triangles of the right shape. Most of them fail at once, by size
@@ -33,6 +37,8 @@ pub struct SearchPlan {
 /// The plan for the brightest stars, of the frame or of each of its parts.
 pub const BRIGHTEST: SearchPlan = SearchPlan {
     passes: &PASSES,
+    vote: Some(&VOTE),
+    max_votes: 1_000_000,
     max_hypotheses: MAX_HYPOTHESES,
     max_candidates: 20_000_000,
 };
@@ -47,12 +53,14 @@ pub const TIER: SearchPlan = SearchPlan {
         true_confirmation: 0.35,
         largest_share: 0.35,
     }],
+    vote: None,
+    max_votes: 0,
     max_hypotheses: 25_000,
     max_candidates: 1_000_000,
 };
 
-/// The passes: the usual frame, a distorting lens, many false stars, even more false stars.
-pub const PASSES: [SearchPass; 4] = [
+/// The passes: the usual frame, a distorting lens.
+pub const PASSES: [SearchPass; 2] = [
     SearchPass {
         stars: 12,
         from: 2,
@@ -67,18 +75,13 @@ pub const PASSES: [SearchPass; 4] = [
         true_confirmation: 0.6,
         largest_share: f64::INFINITY,
     },
-    SearchPass {
-        stars: 22,
-        from: 2,
-        tolerance: 0.0025,
-        true_confirmation: 0.35,
-        largest_share: f64::INFINITY,
-    },
-    SearchPass {
-        stars: 40,
-        from: 22,
-        tolerance: 0.0025,
-        true_confirmation: 0.35,
-        largest_share: f64::INFINITY,
-    },
 ];
+
+/// The triangles that vote: of many stars, among which many may be false.
+pub const VOTE: SearchPass = SearchPass {
+    stars: 20,
+    from: 2,
+    tolerance: 0.0025,
+    true_confirmation: 0.25,
+    largest_share: f64::INFINITY,
+};

@@ -11,6 +11,7 @@ use super::confirmation::{Batch, ConfirmingStars, PendingHypothesis, Pose};
 use super::false_alarm::{FalseAlarm, TESTED_STARS};
 use super::plan::{BRIGHTEST, PASSES, SearchPass, SearchPlan, TIER};
 use super::tiers::Tiers;
+use super::votes::{Vote, Votes};
 use crate::base::coords::Rotation;
 use crate::base::interrupt::Interrupt;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px, frame_centre};
@@ -81,6 +82,9 @@ pub struct SearchBuffers {
     /// Hypotheses from one triangle that wait for their test.
     waiting: Vec<PendingHypothesis>,
     batch: Batch,
+    votes: Votes,
+    /// The queries of those who voted.
+    queries: Vec<Query>,
     /// To confirm answers.
     tiers: Tiers,
     /// Number of hypotheses from triangles of which this star is the faintest.
@@ -107,6 +111,8 @@ pub struct Search<'a> {
     hypotheses: u64,
     most_hypotheses: u64,
     candidates: u64,
+    /// Number of observed triangles that were asked to vote, where hypotheses are votes.
+    voters: Option<u32>,
     /// Whether the interrupt was due; then it is not asked again.
     interrupted: bool,
     best_log10: Option<f64>,
@@ -130,7 +136,7 @@ pub struct Found {
 }
 
 /// A triangle of observed stars.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 struct ObservedTriangle {
     stars: [usize; 3],
     /// Largest distance of a corner from the frame's centre, in pixels.
@@ -145,6 +151,7 @@ struct ObservedTriangle {
 
 /// A triangle with its corners in the order of its shape, and the focal lengths for which it has
 /// that shape.
+#[derive(Debug, Clone, Copy)]
 struct Query {
     triangle: ObservedTriangle,
     /// Its longest side, as a chord, at the focal length `middle_px`.
@@ -206,6 +213,7 @@ impl<'a> Search<'a> {
             hypotheses: 0,
             most_hypotheses,
             candidates: 0,
+            voters: None,
             interrupted: false,
             best_log10: None,
             provisional: None,
@@ -249,10 +257,48 @@ impl<'a> Search<'a> {
 
     /// Tries triangles until a hypothesis passes. Returns it, fitted to the brightest stars.
     pub fn run(&mut self) -> Option<Found> {
-        self.plan
-            .passes
+        let plan = self.plan;
+        plan.passes
             .iter()
             .find_map(|pass| self.sweep(pass).or_else(|| self.provisional.take()))
+            .or_else(|| plan.vote.and_then(|pass| self.vote(pass)))
+    }
+
+    /// Lets the triangles of a pass vote, and tests the poses with most votes. Every vote counts as a
+    /// hypothesis.
+    fn vote(&mut self, pass: &SearchPass) -> Option<Found> {
+        if self.is_interrupted() {
+            return None;
+        }
+        self.buffers.votes.clear();
+        self.buffers.queries.clear();
+        self.voters = Some(0);
+        self.candidates = 0;
+        self.most_hypotheses = self.hypotheses + self.plan.max_votes;
+        self.sweep(pass);
+        self.voters = None;
+        self.buffers.votes.count();
+        let leaders = 0..self.buffers.votes.leaders();
+        leaders
+            .take_while(|_| !self.interrupted)
+            .flat_map(|rank| self.buffers.votes.votes_for(rank))
+            .collect::<Vec<Vote>>()
+            .iter()
+            .find_map(|vote| self.try_vote(vote))
+            .or_else(|| self.provisional.take())
+    }
+
+    fn try_vote(&mut self, vote: &Vote) -> Option<Found> {
+        let query = self.buffers.queries[vote.query as usize];
+        let weighed = self.weigh(&query, &vote.corners);
+        let pose = self.pose(&query, &vote.corners, weighed.focal_px)?;
+        let pending = PendingHypothesis::new(
+            pose,
+            weighed.zero_point_mag?,
+            self.hypotheses,
+            query.triangle.confirming_px,
+        );
+        self.decide_pending(&pending, &query.triangle)
     }
 
     /// Tries the triangles of one pass in the order of their faintest star, then of the second.
@@ -324,6 +370,9 @@ impl<'a> Search<'a> {
     }
 
     fn try_triangle(&mut self, triangle: &ObservedTriangle) -> Option<Found> {
+        if let Some(voters) = &mut self.voters {
+            *voters += 1;
+        }
         // Its size at the longest and the shortest focal length.
         let (smallest, largest) = (
             self.longest_side(triangle, self.focal_px[1]) / CLASS_SLACK,
@@ -410,6 +459,9 @@ impl<'a> Search<'a> {
             middle_px,
             range_px,
         };
+        if self.voters.is_some() {
+            self.buffers.queries.push(query);
+        }
         let mut similar = std::mem::take(&mut self.buffers.similar);
         similar.clear();
         let sky = self.problem.sky;
@@ -471,26 +523,16 @@ impl<'a> Search<'a> {
         if focal_px < query.range_px[0] / slack || focal_px > query.range_px[1] * slack {
             return None;
         }
-        let sky = corners
-            .map(|c| self.problem.sky.grid.star(c))
-            .map(GridStar::vector);
-        let mut observed = self.vectors(triangle, focal_px);
-        if let Some(SkyRegion { centre, radius_rad }) = &self.near {
-            let reach_rad = (self.diagonal_px / focal_px).atan() + radius_rad;
-            if centre.as_vector().dot(&sky[0]) < reach_rad.min(std::f64::consts::PI).cos() {
-                return None;
-            }
-        }
-        let mirrored = triple(&observed) * triple(&sky) < 0.0;
-        if mirrored {
-            observed.iter_mut().for_each(|v| v.x = -v.x);
-        }
-        let pose = Pose {
-            sky_to_camera: two_star_rotation(&observed, &sky)?,
-            focal_px,
-            mirrored,
-        };
+        let pose = self.pose(query, corners, focal_px)?;
         self.hypotheses += 1;
+        if let Some(voter) = self.voters {
+            let query = self.buffers.queries.len() as u32 - 1;
+            let width_px = self.problem.field.width_px;
+            self.buffers
+                .votes
+                .add(&pose, width_px, voter, query, *corners);
+            return None;
+        }
         let mut pending =
             PendingHypothesis::new(pose, zero_point, self.hypotheses, triangle.confirming_px);
         if self.hypotheses > LONG_SEARCH {
@@ -506,6 +548,30 @@ impl<'a> Search<'a> {
             return None;
         }
         self.decide_pending(&pending, triangle)
+    }
+
+    /// The pose in which the observed triangle is that of the catalogue; `None` where the priors
+    /// exclude it.
+    fn pose(&self, query: &Query, corners: &[u32; 3], focal_px: f64) -> Option<Pose> {
+        let sky = corners
+            .map(|c| self.problem.sky.grid.star(c))
+            .map(GridStar::vector);
+        let mut observed = self.vectors(&query.triangle, focal_px);
+        if let Some(SkyRegion { centre, radius_rad }) = &self.near {
+            let reach_rad = (self.diagonal_px / focal_px).atan() + radius_rad;
+            if centre.as_vector().dot(&sky[0]) < reach_rad.min(std::f64::consts::PI).cos() {
+                return None;
+            }
+        }
+        let mirrored = triple(&observed) * triple(&sky) < 0.0;
+        if mirrored {
+            observed.iter_mut().for_each(|v| v.x = -v.x);
+        }
+        Some(Pose {
+            sky_to_camera: two_star_rotation(&observed, &sky)?,
+            focal_px,
+            mirrored,
+        })
     }
 
     /// The median zero point of the triangle's stars, if all three agree.
