@@ -39,24 +39,33 @@ pub const BRIGHTEST: SearchPlan = SearchPlan {
     passes: &PASSES,
     vote: Some(&VOTE),
     max_votes: 1_000_000,
-    max_hypotheses: MAX_HYPOTHESES,
+    max_hypotheses: 40_000,
     max_candidates: 20_000_000,
 };
 
-/// The plan for stars below brighter detections. It is short, as there are many such choices. Small
-/// triangles are enough: the index lists them down to fainter stars than large ones.
+/// The plan for further choices of the brightest stars: they only vote.
+pub const AGAIN: SearchPlan = SearchPlan {
+    passes: &[],
+    ..BRIGHTEST
+};
+
+/// The plan for stars below brighter detections. Small triangles are enough: the index lists them
+/// down to fainter stars than large ones.
 pub const TIER: SearchPlan = SearchPlan {
-    passes: &[SearchPass {
-        stars: 40,
-        from: 2,
-        tolerance: 0.0025,
-        true_confirmation: 0.35,
-        largest_share: 0.35,
-    }],
-    vote: None,
-    max_votes: 0,
-    max_hypotheses: 25_000,
+    passes: &[],
+    vote: Some(&TIER_VOTE),
+    max_votes: 100_000,
+    max_hypotheses: 0,
     max_candidates: 1_000_000,
+};
+
+/// The triangles of a tier that vote.
+pub const TIER_VOTE: SearchPass = SearchPass {
+    stars: 30,
+    from: 2,
+    tolerance: 0.0025,
+    true_confirmation: 0.35,
+    largest_share: 0.35,
 };
 
 /// The passes: the usual frame, a distorting lens.

@@ -9,7 +9,7 @@
 
 use super::confirmation::{Batch, ConfirmingStars, PendingHypothesis, Pose};
 use super::false_alarm::{FalseAlarm, TESTED_STARS};
-use super::plan::{BRIGHTEST, PASSES, SearchPass, SearchPlan, TIER};
+use super::plan::{AGAIN, BRIGHTEST, PASSES, SearchPass, SearchPlan, TIER};
 use super::tiers::Tiers;
 use super::votes::{Vote, Votes};
 use crate::base::coords::Rotation;
@@ -179,7 +179,8 @@ impl<'a> Search<'a> {
             BRIGHTEST
         };
         let centre = frame_centre(field.width_px, field.height_px);
-        let most = plan.passes.iter().map(|p| p.stars).max().unwrap_or(0);
+        let passes = plan.passes.iter().chain(plan.vote);
+        let most = passes.map(|p| p.stars).max().unwrap_or(0);
         let brightest = field.brightest(most).iter();
         buffers.offsets.clear();
         buffers
@@ -227,9 +228,11 @@ impl<'a> Search<'a> {
         let shared = if shared < MIN_SHARED { 0 } else { shared };
         let before: u64 = self.buffers.hypotheses_of.iter().take(shared).sum();
         let next = Self::new(problem, priors, self.buffers);
+        let plan = if problem.brighter > 0 { TIER } else { AGAIN };
         Self {
             number: self.number + 1,
-            shared,
+            plan,
+            shared: 0,
             most_hypotheses: next.most_hypotheses.saturating_sub(before),
             ..next
         }
@@ -270,6 +273,7 @@ impl<'a> Search<'a> {
         if self.is_interrupted() {
             return None;
         }
+        let start = std::time::Instant::now();
         self.buffers.votes.clear();
         self.buffers.queries.clear();
         self.voters = Some(0);
@@ -277,7 +281,11 @@ impl<'a> Search<'a> {
         self.most_hypotheses = self.hypotheses + self.plan.max_votes;
         self.sweep(pass);
         self.voters = None;
+        let gathered = start.elapsed();
         self.buffers.votes.count();
+        if std::env::var_os("VOTELOG").is_some() {
+            eprintln!("votes {} candidates {} gathered {:.1?} counted {:.1?} leaders {:?}", self.buffers.votes.len(), self.candidates, gathered, start.elapsed(), self.buffers.votes.top());
+        }
         let leaders = 0..self.buffers.votes.leaders();
         leaders
             .take_while(|_| !self.interrupted)
@@ -322,6 +330,10 @@ impl<'a> Search<'a> {
             self.buffers.hypotheses_of[faintest] += self.hypotheses - before;
         }
         None
+    }
+
+    pub fn spent(&self) -> u64 {
+        self.hypotheses
     }
 
     /// Whether the search is to end without a result, as its caller wants.

@@ -143,6 +143,13 @@ impl Votes {
         }
     }
 
+    pub fn len(&self) -> usize {
+        self.votes.len()
+    }
+    pub fn top(&self) -> Vec<u32> {
+        self.leaders.iter().take(6).map(|l| l.triangles).collect()
+    }
+
     /// Number of cells that lead.
     pub fn leaders(&self) -> usize {
         self.leaders.len()
