@@ -23,8 +23,8 @@ pub struct SearchPass {
 pub struct SearchPlan {
     /// The passes, one after the other.
     pub passes: &'static [SearchPass],
-    /// The pass whose triangles vote, after these.
-    pub vote: Option<&'static SearchPass>,
+    /// The passes whose triangles vote, after these: votes add up, and are counted after each.
+    pub votes: &'static [SearchPass],
     /// Maximum number of votes.
     pub max_votes: u64,
     /// Maximum number of hypotheses.
@@ -37,9 +37,9 @@ pub struct SearchPlan {
 /// The plan for the brightest stars, of the frame or of each of its parts.
 pub const BRIGHTEST: SearchPlan = SearchPlan {
     passes: &PASSES,
-    vote: Some(&VOTE),
+    votes: &VOTES,
     max_votes: 1_000_000,
-    max_hypotheses: 40_000,
+    max_hypotheses: 10_000,
     max_candidates: 20_000_000,
 };
 
@@ -53,20 +53,20 @@ pub const AGAIN: SearchPlan = SearchPlan {
 /// down to fainter stars than large ones.
 pub const TIER: SearchPlan = SearchPlan {
     passes: &[],
-    vote: Some(&TIER_VOTE),
-    max_votes: 100_000,
+    votes: &TIER_VOTES,
+    max_votes: 40_000,
     max_hypotheses: 0,
     max_candidates: 1_000_000,
 };
 
 /// The triangles of a tier that vote.
-pub const TIER_VOTE: SearchPass = SearchPass {
-    stars: 30,
+pub const TIER_VOTES: [SearchPass; 1] = [SearchPass {
+    stars: 22,
     from: 2,
     tolerance: 0.0025,
     true_confirmation: 0.35,
     largest_share: 0.35,
-};
+}];
 
 /// The passes: the usual frame, a distorting lens.
 pub const PASSES: [SearchPass; 2] = [
@@ -87,10 +87,19 @@ pub const PASSES: [SearchPass; 2] = [
 ];
 
 /// The triangles that vote: of many stars, among which many may be false.
-pub const VOTE: SearchPass = SearchPass {
-    stars: 20,
-    from: 2,
-    tolerance: 0.0025,
-    true_confirmation: 0.25,
-    largest_share: f64::INFINITY,
-};
+pub const VOTES: [SearchPass; 2] = [
+    SearchPass {
+        stars: 14,
+        from: 2,
+        tolerance: 0.0025,
+        true_confirmation: 0.25,
+        largest_share: f64::INFINITY,
+    },
+    SearchPass {
+        stars: 20,
+        from: 14,
+        tolerance: 0.0025,
+        true_confirmation: 0.25,
+        largest_share: f64::INFINITY,
+    },
+];

@@ -179,7 +179,7 @@ impl<'a> Search<'a> {
             BRIGHTEST
         };
         let centre = frame_centre(field.width_px, field.height_px);
-        let passes = plan.passes.iter().chain(plan.vote);
+        let passes = plan.passes.iter().chain(plan.votes);
         let most = passes.map(|p| p.stars).max().unwrap_or(0);
         let brightest = field.brightest(most).iter();
         buffers.offsets.clear();
@@ -264,36 +264,43 @@ impl<'a> Search<'a> {
         plan.passes
             .iter()
             .find_map(|pass| self.sweep(pass).or_else(|| self.provisional.take()))
-            .or_else(|| plan.vote.and_then(|pass| self.vote(pass)))
+            .or_else(|| self.vote())
     }
 
     /// Lets the triangles of a pass vote, and tests the poses with most votes. Every vote counts as a
     /// hypothesis.
-    fn vote(&mut self, pass: &SearchPass) -> Option<Found> {
-        if self.is_interrupted() {
-            return None;
-        }
-        let start = std::time::Instant::now();
+    fn vote(&mut self) -> Option<Found> {
         self.buffers.votes.clear();
         self.buffers.queries.clear();
-        self.voters = Some(0);
         self.candidates = 0;
         self.most_hypotheses = self.hypotheses + self.plan.max_votes;
-        self.sweep(pass);
-        self.voters = None;
-        let gathered = start.elapsed();
-        self.buffers.votes.count();
-        if std::env::var_os("VOTELOG").is_some() {
-            eprintln!("votes {} candidates {} gathered {:.1?} counted {:.1?} leaders {:?}", self.buffers.votes.len(), self.candidates, gathered, start.elapsed(), self.buffers.votes.top());
-        }
-        let leaders = 0..self.buffers.votes.leaders();
-        leaders
-            .take_while(|_| !self.interrupted)
-            .flat_map(|rank| self.buffers.votes.votes_for(rank))
-            .collect::<Vec<Vote>>()
-            .iter()
-            .find_map(|vote| self.try_vote(vote))
-            .or_else(|| self.provisional.take())
+        let mut voters = 0;
+        self.plan.votes.iter().find_map(|pass| {
+            let start = std::time::Instant::now();
+            self.voters = Some(voters);
+            self.sweep(pass);
+            voters = self.voters.take().unwrap_or(voters);
+            let gathered = start.elapsed();
+            self.buffers.votes.count();
+            if std::env::var_os("VOTELOG").is_some() {
+                eprintln!(
+                    "votes {} candidates {} gathered {:.1?} counted {:.1?} leaders {:?}",
+                    self.buffers.votes.len(),
+                    self.candidates,
+                    gathered,
+                    start.elapsed(),
+                    self.buffers.votes.top()
+                );
+            }
+            let leaders = 0..self.buffers.votes.leaders();
+            leaders
+                .take_while(|_| !self.interrupted)
+                .flat_map(|rank| self.buffers.votes.votes_for(rank))
+                .collect::<Vec<Vote>>()
+                .iter()
+                .find_map(|vote| self.try_vote(vote))
+                .or_else(|| self.provisional.take())
+        })
     }
 
     fn try_vote(&mut self, vote: &Vote) -> Option<Found> {
