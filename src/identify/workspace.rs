@@ -179,9 +179,7 @@ impl Workspace {
         } = self;
         let whole = Problem::new(field, sky);
         let mut search = Search::new(whole, priors, buffers);
-        let start = std::time::Instant::now();
         let mut found = search.run();
-        if std::env::var_os("VOTELOG").is_some() { eprintln!("first search {:.1?} hypotheses {}", start.elapsed(), search.spent()); }
         let mut best_log10 = search.best_log10_false_alarm();
         if found.is_none() {
             let thinned = thinning.thin(field);
@@ -193,9 +191,7 @@ impl Workspace {
             });
             for problem in thinned.into_iter().chain(tiers) {
                 search = search.again(problem, priors);
-                let start = std::time::Instant::now();
                 found = search.run();
-                if std::env::var_os("VOTELOG").is_some() { eprintln!("another search (brighter {}) {:.1?} hypotheses {}", problem.brighter, start.elapsed(), search.spent()); }
                 let log10 = search.best_log10_false_alarm();
                 best_log10 = [best_log10, log10].into_iter().flatten().reduce(f64::min);
                 if found.is_some() || search.is_interrupted() {

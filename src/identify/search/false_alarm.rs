@@ -12,6 +12,7 @@
 //! Every two parameters fitted beyond pointing, roll and scale use up another star. The stars used
 //! up are assumed to be those least likely to agree by chance, which is the pessimistic choice.
 
+use super::plan::MAX_HYPOTHESES;
 use crate::base::statistics::{LnProduct, log10_poisson_binomial_tail};
 use crate::identify::field::{ObservedStar, StarField};
 use crate::identify::fit::POSE_PARAMETERS;
@@ -20,10 +21,6 @@ use crate::identify::predict::{PredictedStar, Surroundings};
 use std::f64::consts::{LN_10, PI};
 use std::sync::LazyLock;
 
-/// Most hypotheses that a search tries, so that a frame in which there is nothing to find takes
-/// well under a second. Most fields that can be identified take a few; those with as many false
-/// sources as stars and half of the catalogue's stars missing take up to all of these.
-pub const MAX_HYPOTHESES: u64 = 400_000;
 /// Number of observed stars that are tested, the brightest.
 pub const TESTED_STARS: usize = 60;
 /// The test is made with these numbers of them: where most detections are none (foliage, clouds),

@@ -1,6 +1,9 @@
 //! Which triangles a search tries, and how many hypotheses.
 
-use super::false_alarm::MAX_HYPOTHESES;
+/// Most hypotheses of a search: those that are tested one by one, and the votes.
+pub const MAX_HYPOTHESES: u64 = MAX_TESTED + MAX_VOTES;
+const MAX_TESTED: u64 = 10_000;
+const MAX_VOTES: u64 = 1_000_000;
 
 /// One sweep over the triangles of the brightest stars.
 pub struct SearchPass {
@@ -38,8 +41,8 @@ pub struct SearchPlan {
 pub const BRIGHTEST: SearchPlan = SearchPlan {
     passes: &PASSES,
     votes: &VOTES,
-    max_votes: 1_000_000,
-    max_hypotheses: 10_000,
+    max_votes: MAX_VOTES,
+    max_hypotheses: MAX_TESTED,
     max_candidates: 20_000_000,
 };
 

@@ -15,7 +15,7 @@ use super::votes::{Vote, Votes};
 use crate::base::coords::Rotation;
 use crate::base::interrupt::Interrupt;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px, frame_centre};
-use crate::identify::field::{ObservedStar, Photometry, StarField};
+use crate::identify::field::{Photometry, StarField};
 use crate::identify::fit::{POSE_PARAMETERS, Refined, Refiner, Start};
 use crate::identify::hypothesis::{Hypothesis, Problem};
 use crate::identify::index::TriangleShape;
@@ -42,9 +42,6 @@ const CONFIRMING_SIGMAS: f64 = 3.5;
 const HYPOTHESES_PER_TRIANGLE: u64 = 250;
 /// Minimum number of hypotheses, however few the triangles.
 const MIN_HYPOTHESES: u64 = 30_000;
-/// A second search does not try the triangles of the brightest stars that both searches share, if
-/// they are at least so many: these alone decided on almost every hypothesis.
-const MIN_SHARED: usize = 16;
 /// From this number of hypotheses on, a search is long: several are tested together.
 const LONG_SEARCH: u64 = 2_000;
 /// Margin on the sizes of a triangle that decide which classes of the index can hold it.
@@ -87,8 +84,6 @@ pub struct SearchBuffers {
     queries: Vec<Query>,
     /// To confirm answers.
     tiers: Tiers,
-    /// Number of hypotheses from triangles of which this star is the faintest.
-    hypotheses_of: Vec<u64>,
     /// Ends searches early.
     pub interrupt: Interrupt,
 }
@@ -104,10 +99,6 @@ pub struct Search<'a> {
     diagonal_px: f64,
     /// Position of this search among those over the field, from 1.
     number: u32,
-    /// Brightest stars whose triangles were tried by a search before.
-    shared: usize,
-    /// Brightest stars of which all triangles were tried.
-    tried: usize,
     hypotheses: u64,
     most_hypotheses: u64,
     candidates: u64,
@@ -115,6 +106,8 @@ pub struct Search<'a> {
     voters: Option<u32>,
     /// Whether the interrupt was due; then it is not asked again.
     interrupted: bool,
+    /// How often it was asked whether the search is to end.
+    asked: u32,
     best_log10: Option<f64>,
     /// The best hypothesis that passes the limit but does not end the search.
     provisional: Option<Found>,
@@ -187,8 +180,6 @@ impl<'a> Search<'a> {
             .offsets
             .extend(brightest.map(|s| [s.position.x - centre.x, s.position.y - centre.y]));
         buffers.refiner.around.forget();
-        buffers.hypotheses_of.clear();
-        buffers.hypotheses_of.resize(most, 0);
         let [narrowest_rad, widest_rad] = sky.fov_range_rad();
         let wide = focal_length_px(field.width_px, widest_rad * FOV_SLACK);
         let narrow = focal_length_px(field.width_px, narrowest_rad / FOV_SLACK);
@@ -209,31 +200,24 @@ impl<'a> Search<'a> {
             focal_px,
             diagonal_px: field.width_px.hypot(field.height_px),
             number: 1,
-            shared: 0,
-            tried: most,
             hypotheses: 0,
             most_hypotheses,
             candidates: 0,
             voters: None,
             interrupted: false,
+            asked: 0,
             best_log10: None,
             provisional: None,
         }
     }
 
-    /// The next search, of another choice of stars. Triangles of the brightest stars that both share
-    /// are not tried again, and count as tried.
+    /// The next search, of another choice of stars, whose triangles only vote.
     pub fn again(self, problem: Problem<'a>, priors: &Priors) -> Self {
-        let shared = shared_stars(&self.problem.field.stars, &problem.field.stars).min(self.tried);
-        let shared = if shared < MIN_SHARED { 0 } else { shared };
-        let before: u64 = self.buffers.hypotheses_of.iter().take(shared).sum();
         let next = Self::new(problem, priors, self.buffers);
         let plan = if problem.brighter > 0 { TIER } else { AGAIN };
         Self {
             number: self.number + 1,
             plan,
-            shared: 0,
-            most_hypotheses: next.most_hypotheses.saturating_sub(before),
             ..next
         }
     }
@@ -276,22 +260,10 @@ impl<'a> Search<'a> {
         self.most_hypotheses = self.hypotheses + self.plan.max_votes;
         let mut voters = 0;
         self.plan.votes.iter().find_map(|pass| {
-            let start = std::time::Instant::now();
             self.voters = Some(voters);
             self.sweep(pass);
             voters = self.voters.take().unwrap_or(voters);
-            let gathered = start.elapsed();
             self.buffers.votes.count();
-            if std::env::var_os("VOTELOG").is_some() {
-                eprintln!(
-                    "votes {} candidates {} gathered {:.1?} counted {:.1?} leaders {:?}",
-                    self.buffers.votes.len(),
-                    self.candidates,
-                    gathered,
-                    start.elapsed(),
-                    self.buffers.votes.top()
-                );
-            }
             let leaders = 0..self.buffers.votes.leaders();
             leaders
                 .take_while(|_| !self.interrupted)
@@ -319,12 +291,10 @@ impl<'a> Search<'a> {
     /// Tries the triangles of one pass in the order of their faintest star, then of the second.
     fn sweep(&mut self, pass: &SearchPass) -> Option<Found> {
         let stars = pass.stars.min(self.buffers.offsets.len());
-        for faintest in pass.from.max(self.shared)..stars {
-            let before = self.hypotheses;
+        for faintest in pass.from..stars {
             for middle in 1..faintest {
                 for brightest in 0..middle {
                     if self.is_to_end() {
-                        self.tried = self.tried.min(faintest);
                         return None;
                     }
                     let triangle = self.triangle([brightest, middle, faintest], pass);
@@ -334,13 +304,8 @@ impl<'a> Search<'a> {
                     }
                 }
             }
-            self.buffers.hypotheses_of[faintest] += self.hypotheses - before;
         }
         None
-    }
-
-    pub fn spent(&self) -> u64 {
-        self.hypotheses
     }
 
     /// Whether the search is to end without a result, as its caller wants.
@@ -349,8 +314,12 @@ impl<'a> Search<'a> {
         self.interrupted
     }
 
+    /// Whether the search ends without a result. To ask the clock takes as long as some candidates.
     fn is_to_end(&mut self) -> bool {
-        self.is_exhausted() || self.is_interrupted()
+        const ASKED_EACH: u32 = 32;
+        self.asked = self.asked.wrapping_add(1);
+        let is_turn = self.asked.is_multiple_of(ASKED_EACH);
+        self.is_exhausted() || self.interrupted || (is_turn && self.is_interrupted())
     }
 
     fn is_exhausted(&self) -> bool {
@@ -800,12 +769,6 @@ impl<'a> Search<'a> {
 fn searches_weight(number: u32) -> f64 {
     let number = f64::from(number);
     (number * (number - 1.0)).max(1.0)
-}
-
-/// Number of the brightest stars that both lists begin with.
-fn shared_stars(first: &[ObservedStar], second: &[ObservedStar]) -> usize {
-    let pairs = first.iter().zip(second);
-    pairs.take_while(|(a, b)| a.source == b.source).count()
 }
 
 fn triple([a, b, c]: &[Vector3<f64>; 3]) -> f64 {

@@ -143,13 +143,6 @@ impl Votes {
         }
     }
 
-    pub fn len(&self) -> usize {
-        self.votes.len()
-    }
-    pub fn top(&self) -> Vec<u32> {
-        self.leaders.iter().take(6).map(|l| l.triangles).collect()
-    }
-
     /// Number of cells that lead.
     pub fn leaders(&self) -> usize {
         self.leaders.len()
@@ -211,9 +204,47 @@ fn sort_by_cell(entries: &mut Vec<Entry>, spare: &mut Vec<Entry>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
     use proptest::prelude::*;
 
+    const WIDTH_PX: f64 = 1000.0;
+
+    fn pose(ra_rad: f64, dec_rad: f64, roll_rad: f64, focal_px: f64) -> Pose {
+        let boresight = UnitVector::from_ra_dec(ra_rad, dec_rad);
+        let rotation = Rotation::<Icrs, Camera>::looking_at(&boresight, roll_rad);
+        Pose {
+            sky_to_camera: *rotation.matrix(),
+            focal_px,
+            mirrored: false,
+        }
+    }
+
     proptest! {
+        #[test]
+        fn the_pose_of_several_triangles_leads(
+            ra in 0.0..6.2_f64, dec in -1.5..1.5_f64, roll in -3.0..3.0_f64, focal in 500.0..5000.0_f64,
+            others in prop::collection::vec((0.0..6.2_f64, -1.5..1.5_f64, -3.0..3.0_f64), 0..200),
+        ) {
+            let mut votes = Votes::default();
+            for (triangle, &(ra, dec, roll)) in (0..).zip(&others) {
+                votes.add(&pose(ra, dec, roll, focal), WIDTH_PX, triangle, 0, [0; 3]);
+            }
+            // Within a quarter of a cell of each other: together in a cell of one grid in most cases,
+            // if not in all coordinates.
+            for triangle in 0..6_u32 {
+                let off = 0.01 * f64::from(triangle % 2) * (WIDTH_PX / focal).atan();
+                let near = pose(ra, dec + off, roll, focal * (1.0 + 0.1 * off));
+                // Each votes twice: that counts once.
+                for _ in 0..2 {
+                    votes.add(&near, WIDTH_PX, 1000 + triangle, 1, [triangle; 3]);
+                }
+            }
+            votes.count();
+            prop_assert!(votes.leaders() > 0);
+            prop_assert!(votes.votes_for(0).all(|vote| vote.query == 1));
+            prop_assert!(votes.leaders[0].triangles <= 6);
+        }
+
         #[test]
         fn entries_are_sorted_as_a_stable_sort_does(
             cells in prop::collection::vec(prop_oneof![0..20_u32, any::<u32>()], 0..300),
