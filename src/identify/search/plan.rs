@@ -57,14 +57,14 @@ pub const AGAIN: SearchPlan = SearchPlan {
 pub const TIER: SearchPlan = SearchPlan {
     passes: &[],
     votes: &TIER_VOTES,
-    max_votes: 40_000,
+    max_votes: 100_000,
     max_hypotheses: 0,
     max_candidates: 1_000_000,
 };
 
 /// The triangles of a tier that vote.
 pub const TIER_VOTES: [SearchPass; 1] = [SearchPass {
-    stars: 22,
+    stars: 30,
     from: 2,
     tolerance: 0.0025,
     true_confirmation: 0.35,

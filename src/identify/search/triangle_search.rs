@@ -316,7 +316,7 @@ impl<'a> Search<'a> {
 
     /// Whether the search ends without a result. To ask the clock takes as long as some candidates.
     fn is_to_end(&mut self) -> bool {
-        const ASKED_EACH: u32 = 32;
+        const ASKED_EACH: u32 = 4;
         self.asked = self.asked.wrapping_add(1);
         let is_turn = self.asked.is_multiple_of(ASKED_EACH);
         self.is_exhausted() || self.interrupted || (is_turn && self.is_interrupted())
