@@ -90,7 +90,7 @@ pub const PASSES: [SearchPass; 2] = [
 ];
 
 /// The triangles that vote: of many stars, among which many may be false.
-pub const VOTES: [SearchPass; 2] = [
+pub const VOTES: [SearchPass; 3] = [
     SearchPass {
         stars: 14,
         from: 2,
@@ -101,6 +101,13 @@ pub const VOTES: [SearchPass; 2] = [
     SearchPass {
         stars: 20,
         from: 14,
+        tolerance: 0.0025,
+        true_confirmation: 0.25,
+        largest_share: f64::INFINITY,
+    },
+    SearchPass {
+        stars: 26,
+        from: 20,
         tolerance: 0.0025,
         true_confirmation: 0.25,
         largest_share: f64::INFINITY,
