@@ -8,7 +8,8 @@
 //! | 8, 8 | format version, checksum of the catalogue, `u64` each |
 //! | 8, 8 | bytes and XXH3-64 of the table that follows, `u64` each |
 //! | … | the table, an entry for each size class (below) |
-//! | … | the triangles, by class and chunk: corners, three `u32`; ratios, two `u16` |
+//! | … | the triangles, by class and chunk: corners, three `u32`; ratios, two `u16`;
+//! size, `u8`; magnitudes, three `u8` |
 //!
 //! An entry of the table:
 //!
@@ -32,9 +33,9 @@ use xxhash_rust::xxh3::xxh3_64;
 
 const MAGIC: [u8; 16] = *b"starpipe index\r\n";
 /// To be raised whenever the same catalog gets another index, or the layout changes.
-const FORMAT_VERSION: u64 = 2;
+const FORMAT_VERSION: u64 = 3;
 const HEADER_BYTES: usize = 48;
-const TRIANGLE_BYTES: usize = 16;
+const TRIANGLE_BYTES: usize = 20;
 /// Size of an entry of the table.
 const CLASS_BYTES: usize = 16 + 8 * CHUNKS + 4 * (CELLS + 1);
 /// Upper limit that guards against a damaged length.
@@ -154,18 +155,22 @@ fn triangle(bytes: &[u8; TRIANGLE_BYTES]) -> Triangle {
     Triangle {
         corners: [corner(0), corner(4), corner(8)],
         ratios: [ratio(12), ratio(14)],
+        size: bytes[16],
+        mags: [bytes[17], bytes[18], bytes[19]],
     }
 }
 
 fn bytes_of(triangles: &[Triangle]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(triangles.len() * TRIANGLE_BYTES);
-    for Triangle { corners, ratios } in triangles {
-        for corner in corners {
+    for triangle in triangles {
+        for corner in triangle.corners {
             bytes.extend_from_slice(&corner.to_le_bytes());
         }
-        for ratio in ratios {
+        for ratio in triangle.ratios {
             bytes.extend_from_slice(&ratio.to_le_bytes());
         }
+        bytes.push(triangle.size);
+        bytes.extend_from_slice(&triangle.mags);
     }
     bytes
 }
@@ -302,7 +307,7 @@ mod tests {
     fn classes() -> Vec<SizeClass> {
         let triangle = |i: u32| {
             let share = f64::from(i) / 100.0;
-            Triangle::new([i, i + 1, i + 2], [0.5 + share / 2.0, share])
+            Triangle::new([i, i + 1, i + 2], [0.5 + share / 2.0, share], share, [i as f32 / 10.0; 3])
         };
         let triangles: Vec<Triangle> = (0..100).map(triangle).collect();
         vec![

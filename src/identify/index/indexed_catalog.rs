@@ -2,6 +2,7 @@
 
 use super::cache::{self, CacheError};
 use super::cache_directory::cache_directory;
+use super::table::Triangle;
 use super::triangle_index::TriangleIndex;
 use crate::base::interrupt::{Interrupt, Interrupted};
 use crate::base::units::RAD_PER_DEG;
@@ -23,7 +24,7 @@ const WHOLE_SKY_SQ_DEG: f64 = 41_252.96;
 ///
 /// The index depends on the catalog alone. For the built-in catalog, building it takes 8 s of
 /// processor time in programs that are built without optimization, and much less in others; the
-/// file in the cache has 40 MB.
+/// file in the cache has 50 MB.
 ///
 /// # Example
 /// ```
@@ -135,7 +136,7 @@ impl<'a> IndexedCatalog<'a> {
         std::mem::take(&mut *self.triangles.cache_errors())
     }
 
-    /// Calls `visit` with the corners of every triangle of a size class whose ratios lie within
+    /// Calls `visit` with every triangle of a size class whose ratios lie within
     /// `tolerance` of `ratios`, in an order that depends on the arguments alone.
     #[inline]
     pub(in crate::identify) fn for_each_similar(
@@ -143,7 +144,7 @@ impl<'a> IndexedCatalog<'a> {
         class: usize,
         ratios: [f64; 2],
         tolerance: f64,
-        visit: impl FnMut(&[u32; 3]),
+        visit: impl FnMut(&Triangle),
     ) {
         self.triangles
             .for_each_similar(self.stars(), class, ratios, tolerance, visit);
@@ -270,9 +271,9 @@ mod tests {
         let catalog = Catalog::built_in();
         let indexed = IndexedCatalog::open(catalog, Some(directory.path()), &|_| ());
         let path = cache::index_path(directory.path(), catalog.checksum());
-        assert!(path.ends_with("triangles-1acb266e7eaec616-v2.bin"));
+        assert!(path.ends_with("triangles-1acb266e7eaec616-v3.bin"));
         let bytes = std::fs::read(&path).unwrap();
-        let (_, triangles) = bytes.split_at(bytes.len() - 16 * indexed.triangles.len());
+        let (_, triangles) = bytes.split_at(bytes.len() - 20 * indexed.triangles.len());
         assert_eq!(xxhash_rust::xxh3::xxh3_64(triangles), 0x415c_ffcc_beeb_138c);
     }
 }

@@ -17,6 +17,7 @@ use crate::base::units::RAD_PER_DEG;
 use crate::sky::catalog::Star;
 use crate::sky::catalog::sky_grid::chord_of;
 use arrayvec::ArrayVec;
+use libm::log;
 use rayon::prelude::*;
 
 /// Longest sides, as angles, of the smallest and the largest triangles listed: what fields 1.5° to
@@ -49,6 +50,7 @@ pub struct ListedStar {
     /// Unit vector.
     direction: [f64; 3],
     ra_rad: f64,
+    v_mag: f32,
 }
 
 impl ListedStar {
@@ -57,6 +59,7 @@ impl ListedStar {
         let listed = |star: &Star| Self {
             direction: (*star.direction.as_vector()).into(),
             ra_rad: star.direction.to_ra_dec().0,
+            v_mag: star.v_mag,
         };
         stars.par_iter().map(listed).collect()
     }
@@ -128,6 +131,8 @@ struct Class<'a> {
     /// Smallest and largest longest side, as chords.
     low: f64,
     high: f64,
+    /// Logarithm of their ratio.
+    ln_range: f64,
 }
 
 impl<'a> Class<'a> {
@@ -139,6 +144,7 @@ impl<'a> Class<'a> {
             chord_sq: chord_of(radius_rad).powi(2),
             low: chord_of(low_rad),
             high: chord_of(high_rad),
+            ln_range: log(chord_of(high_rad) / chord_of(low_rad)),
         };
         (class, SkyCells::new(low_rad * CELL_HEIGHT, radius_rad))
     }
@@ -232,11 +238,10 @@ impl<'a> Class<'a> {
                 && shape.longest < self.high
             {
                 let points = [side[0], side[1], third];
-                let [a, b, c] = shape.order;
-                out.push(Triangle::new(
-                    [points[a], points[b], points[c]],
-                    shape.ratios,
-                ));
+                let corners = shape.order.map(|corner| points[corner]);
+                let share = log(shape.longest / self.low) / self.ln_range;
+                let v_mags = corners.map(|corner| self.stars[corner as usize].v_mag);
+                out.push(Triangle::new(corners, shape.ratios, share, v_mags));
             }
         }
     }

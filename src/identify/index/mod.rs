@@ -15,4 +15,5 @@ mod triangle_index;
 pub use cache::CacheError;
 pub use cache_directory::cache_directory;
 pub use indexed_catalog::IndexedCatalog;
+pub use table::Triangle;
 pub use triangle::TriangleShape;

@@ -22,22 +22,43 @@ const MIN_MIDDLE_RATIO: f64 = 0.5;
 /// Ratios are stored in steps of this: a hundredth of the smallest tolerance.
 const RATIO_STEP: f64 = 1.0 / 65536.0;
 
-/// One triangle.
+/// Brightest magnitude that is stored, and the step of magnitudes.
+const BRIGHTEST_V_MAG: f32 = -2.0;
+const MAG_STEP: f32 = 1.0 / 16.0;
+/// A size class is divided in this many sizes.
+const SIZES: f64 = 256.0;
+
+/// One triangle, with all that decides whether it is like an observed one: a search looks at
+/// hundreds of thousands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Triangle {
     /// Corners A, B, C, as indices into the catalogue's stars.
     pub corners: [u32; 3],
     /// Middle and shortest side over the longest, in [`RATIO_STEP`].
     pub ratios: [u16; 2],
+    /// Where in its class the logarithm of its longest side is, see [`SizeClass::ln_longest`].
+    pub size: u8,
+    /// V magnitudes of the corners, in [`MAG_STEP`] from [`BRIGHTEST_V_MAG`].
+    pub mags: [u8; 3],
 }
 
 impl Triangle {
-    /// The triangle with these corners and ratios; ratios are rounded.
-    pub fn new(corners: [u32; 3], ratios: [f64; 2]) -> Self {
+    /// The triangle with these corners and ratios, whose longest side is `share` of the way from
+    /// the smallest to the largest of its class. Ratios, size and magnitudes are rounded.
+    pub fn new(corners: [u32; 3], ratios: [f64; 2], share: f64, v_mags: [f32; 3]) -> Self {
         Self {
             corners,
             ratios: [steps(ratios[0]), steps(ratios[1])],
+            size: (share * SIZES) as u8,
+            mags: v_mags.map(|v_mag| ((v_mag - BRIGHTEST_V_MAG) / MAG_STEP).round() as u8),
         }
+    }
+
+    /// V magnitudes of the corners.
+    #[inline]
+    pub fn v_mags(&self) -> [f32; 3] {
+        self.mags
+            .map(|mag| BRIGHTEST_V_MAG + MAG_STEP * f32::from(mag))
     }
 
     fn cell(&self) -> usize {
@@ -113,6 +134,17 @@ impl SizeClass {
         }
     }
 
+    /// Logarithm of the ratio of its largest to its smallest longest side.
+    pub fn ln_range(&self) -> f64 {
+        (self.high / self.low).ln()
+    }
+
+    /// Logarithms of the longest sides, as chords, of the triangles of each size.
+    pub fn ln_longest(&self) -> impl Fn(u8) -> f64 + use<> {
+        let (ln_low, step) = (self.low.ln(), self.ln_range() / SIZES);
+        move |size| ln_low + (f64::from(size) + 0.5) * step
+    }
+
     /// Whether its cells follow one another.
     pub fn is_ordered(&self) -> bool {
         self.cell_starts.first() == Some(&0) && self.cell_starts.is_sorted()
@@ -129,7 +161,7 @@ impl SizeClass {
         from..to
     }
 
-    /// Calls `visit` with the corners of every triangle whose ratios lie within `tolerance` of
+    /// Calls `visit` with every triangle whose ratios lie within `tolerance` of
     /// `ratios`, in an order that depends on the arguments alone; `chunk` returns the triangles of
     /// a chunk.
     #[inline]
@@ -138,7 +170,7 @@ impl SizeClass {
         ratios: [f64; 2],
         tolerance: f64,
         chunk: impl Fn(usize) -> &'a [Triangle],
-        mut visit: impl FnMut(&[u32; 3]),
+        mut visit: impl FnMut(&Triangle),
     ) {
         let [middle, shortest] = ratios;
         let columns = span(column_of, shortest, tolerance);
@@ -160,7 +192,7 @@ impl SizeClass {
                 for triangle in triangles.unwrap_or_default() {
                     let off = [0, 1].map(|i| f32::from(triangle.ratios[i]) - wanted[i]);
                     if off[0] * off[0] + off[1] * off[1] <= within_sq {
-                        visit(&triangle.corners);
+                        visit(triangle);
                     }
                 }
             }

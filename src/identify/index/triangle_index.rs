@@ -66,7 +66,7 @@ impl TriangleIndex {
         self.len() == 0
     }
 
-    /// Calls `visit` with the corners of every triangle of a class whose ratios lie within
+    /// Calls `visit` with every triangle of a class whose ratios lie within
     /// `tolerance` of `ratios`. `stars` are those that the index was built from.
     #[inline]
     pub fn for_each_similar(
@@ -75,7 +75,7 @@ impl TriangleIndex {
         class: usize,
         ratios: [f64; 2],
         tolerance: f64,
-        visit: impl FnMut(&[u32; 3]),
+        visit: impl FnMut(&Triangle),
     ) {
         let chunk = |chunk| self.chunk(stars, class, chunk);
         self.classes[class].for_each_similar(ratios, tolerance, chunk, visit);
@@ -148,8 +148,8 @@ mod tests {
                 ([0.98, 0.09], 0.02),
             ] {
                 let mut found = HashSet::new();
-                index.for_each_similar(stars, number, wanted, tolerance, |corners| {
-                    assert!(found.insert(*corners), "listed twice");
+                index.for_each_similar(stars, number, wanted, tolerance, |triangle| {
+                    assert!(found.insert(triangle.corners), "listed twice");
                 });
                 let off = |corners: &[u32; 3]| {
                     let ratios = shape_of(stars, corners).ratios;

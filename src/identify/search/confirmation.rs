@@ -9,14 +9,15 @@
 //! # Reference
 //! Wald 1945, Ann. Math. Stat. 16, 117: the sequential probability ratio test.
 
+use super::queries::ObservedStars;
 use crate::base::coords::{Icrs, UnitVector};
-use crate::identify::field::StarField;
-use crate::identify::index::IndexedCatalog;
 use crate::sky::catalog::face_grid::Disc;
 use crate::sky::catalog::sky_grid::chord_of;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::RangeInclusive;
 
+/// Number of stars that are asked, the brightest.
+const CONFIRMING_STARS: usize = 26;
 /// Likelihood ratio below which the other stars refute a hypothesis (e to the −3.5), ...
 const DROP_BELOW: f64 = 0.030_197_383_422_318_5;
 /// ... above which they confirm it (e to the 7), ...
@@ -46,12 +47,8 @@ impl Pose {
 
 /// The stars that confirm or refute.
 pub struct ConfirmingStars<'a> {
-    /// The field.
-    pub field: &'a StarField,
-    /// The catalogue.
-    pub sky: &'a IndexedCatalog<'a>,
-    /// Offsets of its brightest stars from the frame's centre, in pixels.
-    pub offsets: &'a [[f64; 2]],
+    /// Its stars, by their offsets from the frame's centre.
+    pub stars: &'a ObservedStars<'a>,
     /// The stars that made the hypothesis.
     pub triangle: [usize; 3],
     /// Probability that another star confirms a true hypothesis.
@@ -123,14 +120,14 @@ pub struct Batch {
 impl ConfirmingStars<'_> {
     /// Magnitudes of a catalogue star that confirms, if it is at the place of this one.
     fn magnitudes(&self, star: usize, zero_point_mag: f64) -> [f64; 2] {
-        let tolerance_mag = self.field.photometry.tolerance_mag();
-        let v_mag = self.field.stars[star].mag + zero_point_mag;
+        let tolerance_mag = self.stars.field.photometry.tolerance_mag();
+        let v_mag = self.stars.field.stars[star].mag + zero_point_mag;
         [v_mag - tolerance_mag, v_mag + tolerance_mag]
     }
 
     /// The likelihood ratio of one star's answer.
     fn factor(&self, is_confirming: bool, radius_rad: f64, [bright, faint]: [f64; 2]) -> f64 {
-        let chance = self.sky.chance_within(radius_rad, bright, faint);
+        let chance = self.stars.sky.chance_within(radius_rad, bright, faint);
         let chance = chance.min(self.true_confirmation);
         if is_confirming {
             self.true_confirmation / chance
@@ -140,18 +137,20 @@ impl ConfirmingStars<'_> {
     }
 
     /// The other stars, brightest first.
-    fn others(&self) -> impl Iterator<Item = (usize, &[f64; 2])> {
-        let stars = self.offsets.iter().enumerate();
-        stars.filter(|(index, _)| !self.triangle.contains(index))
+    fn others(&self) -> impl Iterator<Item = (usize, [f64; 2])> {
+        let stars = 0..CONFIRMING_STARS.min(self.stars.field.stars.len());
+        let others = stars.filter(|index| !self.triangle.contains(index));
+        others.map(|index| (index, self.stars.offset(index)))
     }
 
     /// Tests one hypothesis.
     pub fn test(&self, hypothesis: &mut PendingHypothesis) {
         for (index, offset) in self.others() {
-            let direction = hypothesis.pose.direction_of(offset);
+            let direction = hypothesis.pose.direction_of(&offset);
             let magnitudes = self.magnitudes(index, hypothesis.zero_point_mag);
             let wanted = in_single_precision(magnitudes);
             let is_confirming = self
+                .stars
                 .sky
                 .grid
                 .is_any_within(&direction, hypothesis.chord, wanted);
@@ -164,7 +163,7 @@ impl ConfirmingStars<'_> {
 
     /// Tests many hypotheses: the answers are those of [`test`](Self::test).
     pub fn test_all(&self, pending: &mut [PendingHypothesis], batch: &mut Batch) {
-        let faces = self.sky.faces();
+        let faces = self.stars.sky.faces();
         let lookups = &mut batch.lookups;
         for (index, offset) in self.others() {
             lookups.clear();
@@ -173,7 +172,7 @@ impl ConfirmingStars<'_> {
                 .enumerate()
                 .filter(|(_, t)| t.answer.is_none());
             lookups.extend(waiting.map(|(number, hypothesis)| {
-                let direction = hypothesis.pose.direction_of(offset);
+                let direction = hypothesis.pose.direction_of(&offset);
                 Lookup {
                     hypothesis: number as u32,
                     direction,
@@ -208,7 +207,7 @@ impl ConfirmingStars<'_> {
                 let is_confirming = match &lookup.disc {
                     Some(disc) => faces.is_any_within(disc, lookup.direction.as_vector(), &wanted),
                     None => {
-                        let (grid, direction) = (&self.sky.grid, &lookup.direction);
+                        let (grid, direction) = (&self.stars.sky.grid, &lookup.direction);
                         grid.is_any_within(direction, hypothesis.chord, wanted)
                     }
                 };

@@ -6,6 +6,7 @@
 mod confirmation;
 mod false_alarm;
 mod plan;
+mod queries;
 mod thinning;
 mod tiers;
 mod triangle_search;

@@ -4,14 +4,13 @@
 pub const MAX_HYPOTHESES: u64 = MAX_TESTED + MAX_VOTES;
 const MAX_TESTED: u64 = 10_000;
 const MAX_VOTES: u64 = 1_000_000;
+/// A vote takes as long as so many catalogue triangles that are looked at.
+pub const WORK_OF_VOTE: u64 = 3;
 
 /// One sweep over the triangles of the brightest stars.
 pub struct SearchPass {
     /// Number of stars that form triangles, the brightest.
     pub stars: usize,
-    /// Faintest star of the first triangle; triangles of brighter stars were tried in the pass
-    /// before.
-    pub from: usize,
     /// Relative error of a triangle's sides caused by lens distortion.
     pub tolerance: f64,
     /// Probability that another observed star confirms a true hypothesis. Some are false, and some
@@ -28,22 +27,19 @@ pub struct SearchPlan {
     pub passes: &'static [SearchPass],
     /// The passes whose triangles vote, after these: votes add up, and are counted after each.
     pub votes: &'static [SearchPass],
-    /// Maximum number of votes.
-    pub max_votes: u64,
     /// Maximum number of hypotheses.
     pub max_hypotheses: u64,
-    /// Maximum number of catalogue triangles of the right shape. Most of them fail at once, by size
-    /// or brightness.
-    pub max_candidates: u64,
+    /// Maximum work: the number of catalogue triangles of the right shape, and of votes, which count
+    /// [`WORK_OF_VOTE`] each.
+    pub max_work: u64,
 }
 
 /// The plan for the brightest stars, of the frame or of each of its parts.
 pub const BRIGHTEST: SearchPlan = SearchPlan {
     passes: &PASSES,
     votes: &VOTES,
-    max_votes: MAX_VOTES,
     max_hypotheses: MAX_TESTED,
-    max_candidates: 20_000_000,
+    max_work: 1_600_000,
 };
 
 /// The plan for further choices of the brightest stars: they only vote.
@@ -57,15 +53,13 @@ pub const AGAIN: SearchPlan = SearchPlan {
 pub const TIER: SearchPlan = SearchPlan {
     passes: &[],
     votes: &TIER_VOTES,
-    max_votes: 100_000,
     max_hypotheses: 0,
-    max_candidates: 1_000_000,
+    max_work: 500_000,
 };
 
 /// The triangles of a tier that vote.
 pub const TIER_VOTES: [SearchPass; 1] = [SearchPass {
     stars: 30,
-    from: 2,
     tolerance: 0.0025,
     true_confirmation: 0.35,
     largest_share: 0.35,
@@ -75,14 +69,12 @@ pub const TIER_VOTES: [SearchPass; 1] = [SearchPass {
 pub const PASSES: [SearchPass; 2] = [
     SearchPass {
         stars: 12,
-        from: 2,
         tolerance: 0.0025,
         true_confirmation: 0.6,
         largest_share: f64::INFINITY,
     },
     SearchPass {
         stars: 10,
-        from: 2,
         tolerance: 0.008,
         true_confirmation: 0.6,
         largest_share: f64::INFINITY,
@@ -93,21 +85,18 @@ pub const PASSES: [SearchPass; 2] = [
 pub const VOTES: [SearchPass; 3] = [
     SearchPass {
         stars: 14,
-        from: 2,
         tolerance: 0.0025,
         true_confirmation: 0.25,
         largest_share: f64::INFINITY,
     },
     SearchPass {
         stars: 20,
-        from: 14,
         tolerance: 0.0025,
         true_confirmation: 0.25,
         largest_share: f64::INFINITY,
     },
     SearchPass {
         stars: 26,
-        from: 20,
         tolerance: 0.0025,
         true_confirmation: 0.25,
         largest_share: f64::INFINITY,

@@ -9,7 +9,12 @@
 //! # Reference
 //! Ballard 1981, Pattern Recognition 13, 111: the generalized Hough transform.
 
-use super::confirmation::Pose;
+use super::queries::Similar;
+use super::triangle_search::triple;
+use crate::identify::priors::SkyRegion;
+use crate::sky::catalog::sky_grid::SkyGrid;
+use nalgebra::{Matrix3, Vector3};
+use std::f64::consts::PI;
 
 /// Size of a cell: of the optical axis in units of the field's width, …
 const AXIS_STEP: f64 = 0.06;
@@ -28,17 +33,49 @@ const MAX_LEADERS: usize = 100;
 const DIGIT_BITS: u32 = 11;
 const DIGITS: usize = 1 << DIGIT_BITS;
 
+/// Levels of the scale start at a focal length of this logarithm, in pixels, below any.
+const LEVELS_FROM: f64 = -10.0;
+/// Coordinates of cells are counted from this number, so that none is negative.
+const CELLS_FROM: f64 = 1e6;
+/// Beyond the pole of a hint's region by this much of a cell, a triangle's pose may still be right.
+const NEAR_SLACK: f64 = 1.0;
+
 /// A vote for the pose that an observed triangle has if it is one of the catalogue.
 #[derive(Debug, Clone, Copy)]
 pub struct Vote {
-    /// The observed triangle, by its number.
+    /// The first query of the observed triangle: its number.
     triangle: u32,
     /// The query that found the catalogue triangle.
     pub query: u32,
-    /// The stars of the catalogue triangle.
-    pub corners: [u32; 3],
+    /// The catalogue triangle.
+    pub similar: Similar,
     /// The cell in each grid.
     cells: [u32; GRIDS],
+}
+
+/// An observed triangle that votes: an orthonormal frame of it in the camera, not mirrored and
+/// mirrored.
+pub struct Voter {
+    frames: [Matrix3<f64>; 2],
+    triple: f64,
+}
+
+impl Voter {
+    /// The triangle of these unit vectors.
+    pub fn new(vectors: &[Vector3<f64>; 3]) -> Option<Self> {
+        let mirrored = vectors.map(|v| Vector3::new(-v.x, v.y, v.z));
+        Some(Self {
+            frames: [frame_of(vectors)?, frame_of(&mirrored)?],
+            triple: triple(vectors),
+        })
+    }
+}
+
+/// An orthonormal frame of a triangle: the middle of AB, and the normal to AB.
+pub fn frame_of([a, b, _]: &[Vector3<f64>; 3]) -> Option<Matrix3<f64>> {
+    let first = (a + b).try_normalize(1e-12)?;
+    let third = a.cross(b).try_normalize(1e-15)?;
+    Some(Matrix3::from_columns(&[first, third.cross(&first), third]))
 }
 
 /// A cell's number and a vote for it.
@@ -59,9 +96,21 @@ struct Leader {
     count: usize,
 }
 
+/// Cells of one level of the scale.
+#[derive(Debug, Clone, Copy)]
+struct Level {
+    /// Cells of the optical axis in a unit vector's coordinate of 1.
+    axis_cells: f64,
+    /// Least cosine of the optical axis to the middle of the region that a hint allows.
+    min_cos: f64,
+}
+
 /// Collects votes. Its buffers are reused.
 #[derive(Debug, Default)]
 pub struct Votes {
+    near: Option<SkyRegion>,
+    levels: [Vec<Level>; GRIDS],
+    first_level: [i32; GRIDS],
     votes: Vec<Vote>,
     /// Of each grid, sorted by cell, then in the order of the votes.
     entries: [Vec<Entry>; GRIDS],
@@ -70,31 +119,104 @@ pub struct Votes {
 }
 
 impl Votes {
-    /// Removes all votes.
-    pub fn clear(&mut self) {
+    /// Begins with no votes, for poses of a frame of this width whose focal lengths are in a range
+    /// (both in pixels) and whose optical axis is in a region.
+    pub fn begin(&mut self, width_px: f64, focal_px: [f64; 2], near: Option<SkyRegion>) {
         self.votes.clear();
         self.leaders.clear();
+        self.near = near;
+        for grid in 0..GRIDS {
+            let level_of = |focal_px: f64| level(focal_px.ln(), grid);
+            let [first, last] = focal_px.map(level_of);
+            self.first_level[grid] = first - 1;
+            let levels = &mut self.levels[grid];
+            levels.clear();
+            levels.extend((first - 1..=last + 1).map(|level| {
+                let middle = (f64::from(level) + 0.5 - SHIFTS[grid]) * SCALE_STEP + LEVELS_FROM;
+                let step_rad = AXIS_STEP * (width_px / middle.exp()).atan();
+                let min_cos = near.map_or(-1.0, |near| {
+                    (near.radius_rad + NEAR_SLACK * step_rad).min(PI).cos()
+                });
+                Level {
+                    axis_cells: 1.0 / step_rad,
+                    min_cos,
+                }
+            }));
+        }
     }
 
-    /// Adds a vote for `pose` in a frame of this width. Votes of one triangle come one after the
-    /// other.
-    pub fn add(
+    /// The votes of an observed triangle for the poses in which it is one of the `similar` catalogue
+    /// triangles. Votes of one triangle come one after the other.
+    pub fn add_all(
         &mut self,
-        pose: &Pose,
-        width_px: f64,
-        triangle: u32,
-        query: u32,
-        corners: [u32; 3],
+        voter: &Voter,
+        similar: &[Similar],
+        [triangle, query]: [u32; 2],
+        stars: &SkyGrid,
     ) {
-        self.votes.push(Vote {
-            triangle,
-            query,
-            corners,
-            cells: SHIFTS.map(|shift| cell_of(pose, width_px, shift)),
-        });
+        for similar in similar {
+            let sky = similar.corners.map(|corner| stars.star(corner).vector());
+            let mirrored = voter.triple * triple(&sky) < 0.0;
+            let Some(of_sky) = frame_of(&sky) else {
+                continue;
+            };
+            let of_camera = &voter.frames[usize::from(mirrored)];
+            // The rows of the rotation from the sky to the camera.
+            let axis = of_sky * of_camera.row(2).transpose();
+            let side = of_sky * of_camera.row(0).transpose();
+            if let Some(cells) = self.cells(&axis, &side, f64::from(similar.ln_focal), mirrored) {
+                self.votes.push(Vote {
+                    triangle,
+                    query,
+                    similar: *similar,
+                    cells,
+                });
+            }
+        }
     }
 
-    /// Counts the votes: the cells with most triangles lead.
+    /// The cells of a pose; `None` where a hint excludes it.
+    #[inline]
+    fn cells(
+        &self,
+        axis: &Vector3<f64>,
+        side: &Vector3<f64>,
+        ln_focal: f64,
+        mirrored: bool,
+    ) -> Option<[u32; GRIDS]> {
+        let mut cells = [0; GRIDS];
+        for (grid, cell) in cells.iter_mut().enumerate() {
+            let level = level(ln_focal, grid);
+            let of_level = level - self.first_level[grid];
+            let levels = &self.levels[grid];
+            let Level {
+                axis_cells,
+                min_cos,
+            } = levels[(of_level.max(0) as usize).min(levels.len() - 1)];
+            if let Some(near) = &self.near
+                && near.centre.as_vector().dot(axis) < min_cos
+            {
+                return None;
+            }
+            let mut hash = (level as u64) << 1 | u64::from(mirrored);
+            let mut mix = |coordinate: f64| {
+                let number = (coordinate + (CELLS_FROM + SHIFTS[grid])) as u64;
+                hash = (hash ^ number).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+                hash ^= hash >> 29;
+            };
+            axis.iter().for_each(|x| mix(x * axis_cells));
+            side.iter().for_each(|x| mix(x * (1.0 / ROLL_STEP)));
+            *cell = (hash >> 32) as u32;
+        }
+        Some(cells)
+    }
+
+    /// Number of votes.
+    pub fn len(&self) -> usize {
+        self.votes.len()
+    }
+
+    /// Counts the votes: the cells with most observed triangles lead.
     pub fn count(&mut self) {
         self.leaders.clear();
         for grid in 0..GRIDS {
@@ -143,37 +265,22 @@ impl Votes {
         }
     }
 
-    /// Number of cells that lead.
-    pub fn leaders(&self) -> usize {
-        self.leaders.len()
-    }
-
-    /// Votes for the cell of this rank: the middle one, the first and the last.
-    pub fn votes_for(&self, rank: usize) -> impl Iterator<Item = Vote> + use<> {
-        let Leader {
-            grid, first, count, ..
-        } = self.leaders[rank];
-        let of = |place: usize| self.votes[self.entries[grid][first + place].vote as usize];
-        [of(count / 2), of(0), of(count - 1)].into_iter()
+    /// Votes for the cells that lead: of each the middle one, the first and the last.
+    pub fn leaders(&self) -> impl Iterator<Item = Vote> {
+        self.leaders.iter().flat_map(|leader| {
+            let of = |place: usize| {
+                let entry = self.entries[leader.grid][leader.first + place];
+                self.votes[entry.vote as usize]
+            };
+            [of(leader.count / 2), of(0), of(leader.count - 1)]
+        })
     }
 }
 
-/// The number of the cell of a pose, in a frame of this width.
-fn cell_of(pose: &Pose, width_px: f64, shift: f64) -> u32 {
-    let level = (pose.focal_px.ln() / SCALE_STEP + shift).floor();
-    // The same for all poses of the level.
-    let focal_px = ((level + 0.5 - shift) * SCALE_STEP).exp();
-    let axis_step = AXIS_STEP * (width_px / focal_px).atan();
-    let (axis, side) = (pose.sky_to_camera.row(2), pose.sky_to_camera.row(0));
-    let mut hash = (level as i64 as u64) << 1 | u64::from(pose.mirrored);
-    let mut mix = |coordinate: f64| {
-        hash =
-            (hash ^ (coordinate + shift).floor() as i64 as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        hash ^= hash >> 29;
-    };
-    axis.iter().for_each(|x| mix(x / axis_step));
-    side.iter().for_each(|x| mix(x / ROLL_STEP));
-    (hash >> 32) as u32
+/// The level of a focal length, given its logarithm.
+#[inline]
+fn level(ln_focal: f64, grid: usize) -> i32 {
+    ((ln_focal - LEVELS_FROM) * (1.0 / SCALE_STEP) + SHIFTS[grid]) as i32
 }
 
 /// Sorts by cell and keeps the order within a cell: a radix sort.

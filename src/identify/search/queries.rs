@@ -1,0 +1,263 @@
+//! Observed triangles, and what to look up for them.
+//!
+//! A size class of the index corresponds to a range of focal lengths. In wide fields the shape of a
+//! triangle depends on the focal length (gnomonic projection), so the range is divided into steps
+//! within which it does not change noticeably: each is a query.
+
+use super::plan::SearchPass;
+use crate::camera::frame_centre;
+use crate::identify::field::{Photometry, StarField};
+use crate::identify::index::{IndexedCatalog, Triangle, TriangleShape};
+use nalgebra::Vector3;
+
+/// Centroid errors in a triangle's tolerance, in standard errors.
+const CENTROID_SIGMAS: f64 = 2.0;
+/// Smallest longest side of a triangle, in units of the frame's diagonal.
+const MIN_TRIANGLE_SHARE: f64 = 0.12;
+/// Largest distance of a confirming star from its catalogue star: in distortion tolerances times
+/// the frame's diagonal, and in centroid errors extrapolated from the triangle.
+const CONFIRMING_TOLERANCES: f64 = 1.5;
+const CONFIRMING_SIGMAS: f64 = 3.5;
+/// Margin on the sizes of a triangle that decide which classes of the index can hold it.
+const CLASS_SLACK: f64 = 1.01;
+/// Triangles with a larger tolerance of their ratios resemble too many others.
+const MAX_TOLERANCE: f64 = 0.03;
+
+/// A triangle of observed stars.
+#[derive(Debug, Clone, Copy)]
+pub struct ObservedTriangle {
+    /// The stars, by their number in the field.
+    pub stars: [usize; 3],
+    /// Largest distance of a corner from the frame's centre, in pixels.
+    reach_px: f64,
+    /// Tolerance of its ratios.
+    tolerance: f64,
+    /// Largest distance of a confirming star from its catalogue star, in pixels.
+    pub confirming_px: f64,
+    /// Probability that another star confirms a true hypothesis, see [`SearchPass`].
+    pub true_confirmation: f64,
+}
+
+/// A triangle with its corners in the order of its shape, and the focal lengths for which it has
+/// that shape.
+#[derive(Debug, Clone, Copy)]
+pub struct Query {
+    /// The triangle.
+    pub triangle: ObservedTriangle,
+    /// The size class of catalogue triangles.
+    class: usize,
+    /// Middle and shortest side over the longest.
+    ratios: [f64; 2],
+    /// Logarithm of the focal length, in pixels, times the longest side, as a chord.
+    pub ln_size: f64,
+    /// A focal length in the middle, in pixels.
+    pub middle_px: f64,
+    /// Logarithms of the smallest and the largest focal length, with their tolerance.
+    ln_focal: [f64; 2],
+}
+
+impl Query {
+    /// Logarithm of the focal length at which the longest side of this triangle is as long as that
+    /// of a triangle of the catalogue, given the logarithm of the latter; `None` where the query is
+    /// not for it.
+    #[inline]
+    pub fn ln_focal(&self, ln_longest: f64) -> Option<f64> {
+        let ln_focal = self.ln_size - ln_longest;
+        (self.ln_focal[0]..=self.ln_focal[1])
+            .contains(&ln_focal)
+            .then_some(ln_focal)
+    }
+}
+
+/// The observed stars that form triangles.
+#[derive(Clone, Copy)]
+pub struct ObservedStars<'a> {
+    /// The field.
+    pub field: &'a StarField,
+    /// The catalogue.
+    pub sky: &'a IndexedCatalog<'a>,
+    /// Smallest and largest focal length, in pixels.
+    pub focal_px: [f64; 2],
+    /// The frame's diagonal, in pixels.
+    pub diagonal_px: f64,
+}
+
+impl ObservedStars<'_> {
+    /// Offset of a star from the frame's centre, in pixels.
+    #[inline]
+    pub fn offset(&self, star: usize) -> [f64; 2] {
+        let StarField {
+            width_px,
+            height_px,
+            stars,
+            ..
+        } = self.field;
+        let centre = frame_centre(*width_px, *height_px);
+        let position = stars[star].position;
+        [position.x - centre.x, position.y - centre.y]
+    }
+
+    /// The triangle of these stars; `None` if it is too small, too large or too inexact.
+    pub fn triangle(&self, stars: [usize; 3], pass: &SearchPass) -> Option<ObservedTriangle> {
+        let [a, b, c] = stars.map(|star| self.offset(star));
+        let side = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
+        let longest_px = side(a, b).max(side(b, c)).max(side(c, a));
+        let shares = MIN_TRIANGLE_SHARE..=pass.largest_share;
+        if !shares.contains(&(longest_px / self.diagonal_px)) {
+            return None;
+        }
+        let sigma_px = stars
+            .iter()
+            .map(|&s| self.field.stars[s].sigma_px)
+            .fold(0.0, f64::max);
+        let centroid_tolerance = CENTROID_SIGMAS * sigma_px / longest_px;
+        let tolerance = pass.tolerance.hypot(centroid_tolerance);
+        if tolerance > MAX_TOLERANCE {
+            return None;
+        }
+        let leverage = 1.0 + 0.5 * self.diagonal_px / longest_px;
+        let distortion_px = CONFIRMING_TOLERANCES * pass.tolerance * self.diagonal_px;
+        let from_centre = [a, b, c].map(|p| p[0].hypot(p[1]));
+        Some(ObservedTriangle {
+            stars,
+            reach_px: from_centre.into_iter().fold(0.0, f64::max),
+            tolerance,
+            true_confirmation: pass.true_confirmation,
+            confirming_px: distortion_px.hypot(CONFIRMING_SIGMAS * leverage * sigma_px),
+        })
+    }
+
+    /// Adds what to look up for a triangle to `queries`.
+    pub fn add_queries(&self, triangle: &ObservedTriangle, queries: &mut Vec<Query>) {
+        // Its size at the longest and the shortest focal length.
+        let (smallest, largest) = (
+            self.longest_side(triangle, self.focal_px[1]) / CLASS_SLACK,
+            self.longest_side(triangle, self.focal_px[0]) * CLASS_SLACK,
+        );
+        for (number, class) in self.sky.triangles.classes.iter().enumerate() {
+            if class.high >= smallest && class.low <= largest {
+                let limits = [class.high, class.low].map(|side| self.focal_of(triangle, side));
+                if let [Some(low_px), Some(high_px)] = limits {
+                    let low_px = low_px.max(self.focal_px[0]);
+                    let high_px = high_px.min(self.focal_px[1]);
+                    self.add_steps(triangle, number, [low_px, high_px], queries);
+                }
+            }
+        }
+    }
+
+    /// Divides a range of focal lengths.
+    fn add_steps(
+        &self,
+        triangle: &ObservedTriangle,
+        class: usize,
+        [low_px, high_px]: [f64; 2],
+        queries: &mut Vec<Query>,
+    ) {
+        if low_px >= high_px {
+            return;
+        }
+        // Half a step changes the shape by at most half the tolerance.
+        let stretch = (triangle.reach_px / low_px).powi(2);
+        let step = (triangle.tolerance / stretch).max(1e-3);
+        let (ln_low, ln_range) = (low_px.ln(), (high_px / low_px).ln());
+        let steps = (ln_range / step).ceil().max(1.0);
+        let slack = (1.0 + 2.0 * triangle.tolerance).ln();
+        for number in 0..steps as u32 {
+            let [from, middle, to] =
+                [0.0, 0.5, 1.0].map(|at| ln_low + ln_range * (f64::from(number) + at) / steps);
+            let middle_px = middle.exp();
+            let [a, b, c] = &self.vectors(triangle, middle_px);
+            if let Some(shape) = TriangleShape::new([a, b, c]) {
+                queries.push(Query {
+                    triangle: ObservedTriangle {
+                        stars: shape.order.map(|corner| triangle.stars[corner]),
+                        ..*triangle
+                    },
+                    class,
+                    ratios: shape.ratios,
+                    ln_size: middle + shape.longest.ln(),
+                    middle_px,
+                    ln_focal: [from - slack, to + slack],
+                });
+            }
+        }
+    }
+
+    /// Unit vectors of the triangle's stars for this focal length, not mirrored.
+    pub fn vectors(&self, triangle: &ObservedTriangle, focal_px: f64) -> [Vector3<f64>; 3] {
+        triangle.stars.map(|star| {
+            let [u, v] = self.offset(star);
+            Vector3::new(u, v, focal_px).normalize()
+        })
+    }
+
+    /// The triangle's longest side at this focal length, as a chord.
+    fn longest_side(&self, triangle: &ObservedTriangle, focal_px: f64) -> f64 {
+        let [a, b, c] = self.vectors(triangle, focal_px);
+        (a - b).norm().max((b - c).norm()).max((c - a).norm())
+    }
+
+    /// The focal length at which the triangle's longest side is `chord`.
+    fn focal_of(&self, triangle: &ObservedTriangle, chord: f64) -> Option<f64> {
+        let mut focal_px = self.diagonal_px;
+        for _ in 0..8 {
+            let ratio = self.longest_side(triangle, focal_px) / chord;
+            focal_px *= ratio;
+            if (ratio - 1.0).abs() < 1e-3 {
+                break;
+            }
+        }
+        focal_px.is_finite().then_some(focal_px)
+    }
+
+    /// Adds the catalogue triangles that are like that of a query, in shape, size and brightness, to
+    /// `similar`. Returns the number of those that are like it in shape.
+    pub fn add_similar(&self, query: &Query, similar: &mut Vec<Similar>) -> u64 {
+        let class = &self.sky.triangles.classes[query.class];
+        let ln_longest = class.ln_longest();
+        let mags = query.triangle.stars.map(|s| self.field.stars[s].mag as f32);
+        let mut candidates = 0;
+        let Query { class, ratios, .. } = *query;
+        self.sky
+            .for_each_similar(class, ratios, query.triangle.tolerance, |triangle| {
+                candidates += 1;
+                let Some(ln_focal) = query.ln_focal(ln_longest(triangle.size)) else {
+                    return;
+                };
+                if let Some(zero_point_mag) = self.zero_point(triangle, mags) {
+                    similar.push(Similar {
+                        corners: triangle.corners,
+                        zero_point_mag,
+                        ln_focal: ln_focal as f32,
+                    });
+                }
+            });
+        candidates
+    }
+
+    /// The median zero point of the triangle's stars, if all three agree.
+    #[inline]
+    fn zero_point(&self, triangle: &Triangle, mags: [f32; 3]) -> Option<f32> {
+        let v_mags = triangle.v_mags();
+        let [a, b, c] = [0, 1, 2].map(|corner| v_mags[corner] - mags[corner]);
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let spread = self.field.photometry.tolerance_mag() as f32;
+        let (consistent, zero_point) = match self.field.photometry {
+            Photometry::Instrumental => (high - low <= spread, a + b + c - low - high),
+            Photometry::JohnsonV => (low >= -spread && high <= spread, 0.0),
+        };
+        consistent.then_some(zero_point)
+    }
+}
+
+/// A catalogue triangle that is like an observed one.
+#[derive(Debug, Clone, Copy)]
+pub struct Similar {
+    /// Its stars.
+    pub corners: [u32; 3],
+    /// Johnson V minus observed magnitude.
+    pub zero_point_mag: f32,
+    /// Logarithm of the focal length, in pixels, at which both are of the same size.
+    pub ln_focal: f32,
+}
