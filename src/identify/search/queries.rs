@@ -20,6 +20,8 @@ const CONFIRMING_TOLERANCES: f64 = 1.5;
 const CONFIRMING_SIGMAS: f64 = 3.5;
 /// Margin on the sizes of a triangle that decide which classes of the index can hold it.
 const CLASS_SLACK: f64 = 1.01;
+/// Most steps of a range of focal lengths.
+const MAX_STEPS: f64 = 1000.0;
 /// Triangles with a larger tolerance of their ratios resemble too many others.
 const MAX_TOLERANCE: f64 = 0.03;
 
@@ -28,8 +30,8 @@ const MAX_TOLERANCE: f64 = 0.03;
 pub struct ObservedTriangle {
     /// The stars, by their number in the field.
     pub stars: [usize; 3],
-    /// Largest distance of a corner from the frame's centre, in pixels.
-    reach_px: f64,
+    /// Its longest side, in pixels.
+    longest_px: f64,
     /// Tolerance of its ratios.
     tolerance: f64,
     /// Largest distance of a confirming star from its catalogue star, in pixels.
@@ -117,10 +119,9 @@ impl ObservedStars<'_> {
         }
         let leverage = 1.0 + 0.5 * self.diagonal_px / longest_px;
         let distortion_px = CONFIRMING_TOLERANCES * pass.tolerance * self.diagonal_px;
-        let from_centre = [a, b, c].map(|p| p[0].hypot(p[1]));
         Some(ObservedTriangle {
             stars,
-            reach_px: from_centre.into_iter().fold(0.0, f64::max),
+            longest_px,
             tolerance,
             true_confirmation: pass.true_confirmation,
             confirming_px: distortion_px.hypot(CONFIRMING_SIGMAS * leverage * sigma_px),
@@ -134,19 +135,26 @@ impl ObservedStars<'_> {
             self.longest_side(triangle, self.focal_px[1]) / CLASS_SLACK,
             self.longest_side(triangle, self.focal_px[0]) * CLASS_SLACK,
         );
+        let mut high_px = None;
         for (number, class) in self.sky.triangles.classes.iter().enumerate() {
             if class.high >= smallest && class.low <= largest {
-                let limits = [class.high, class.low].map(|side| self.focal_of(triangle, side));
-                if let [Some(low_px), Some(high_px)] = limits {
+                // The classes have no gaps: the longest focal length of one is the shortest of the
+                // class before.
+                let longest_px = high_px.or_else(|| self.focal_of(triangle, class.low));
+                high_px = self.focal_of(triangle, class.high);
+                if let (Some(low_px), Some(longest_px)) = (high_px, longest_px) {
                     let low_px = low_px.max(self.focal_px[0]);
-                    let high_px = high_px.min(self.focal_px[1]);
-                    self.add_steps(triangle, number, [low_px, high_px], queries);
+                    let longest_px = longest_px.min(self.focal_px[1]);
+                    if low_px < longest_px {
+                        self.add_steps(triangle, number, [low_px, longest_px], queries);
+                    }
                 }
             }
         }
     }
 
-    /// Divides a range of focal lengths.
+    /// Divides a range of focal lengths, so that half a step changes the shape by at most half the
+    /// tolerance.
     fn add_steps(
         &self,
         triangle: &ObservedTriangle,
@@ -154,14 +162,15 @@ impl ObservedStars<'_> {
         [low_px, high_px]: [f64; 2],
         queries: &mut Vec<Query>,
     ) {
-        if low_px >= high_px {
-            return;
-        }
-        // Half a step changes the shape by at most half the tolerance.
-        let stretch = (triangle.reach_px / low_px).powi(2);
-        let step = (triangle.tolerance / stretch).max(1e-3);
+        /// Steps are smaller by this factor: the shape changes a little unevenly.
+        const UNEVENNESS: f64 = 1.25;
         let (ln_low, ln_range) = (low_px.ln(), (high_px / low_px).ln());
-        let steps = (ln_range / step).ceil().max(1.0);
+        let [low, middle, high] = [low_px, (low_px * high_px).sqrt(), high_px]
+            .map(|focal_px| self.ratios(triangle, focal_px));
+        let change = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        let most = change(low, middle).max(change(middle, high));
+        let steps = (2.0 * most * UNEVENNESS / triangle.tolerance).ceil();
+        let steps = steps.clamp(1.0, MAX_STEPS);
         let slack = (1.0 + 2.0 * triangle.tolerance).ln();
         for number in 0..steps as u32 {
             let [from, middle, to] =
@@ -184,6 +193,14 @@ impl ObservedStars<'_> {
         }
     }
 
+    /// The triangle's middle and shortest side over the longest at this focal length.
+    fn ratios(&self, triangle: &ObservedTriangle, focal_px: f64) -> [f64; 2] {
+        let [a, b, c] = self.vectors(triangle, focal_px);
+        let mut sides = [(a - b).norm(), (b - c).norm(), (c - a).norm()];
+        sides.sort_unstable_by(f64::total_cmp);
+        [sides[1] / sides[2], sides[0] / sides[2]]
+    }
+
     /// Unit vectors of the triangle's stars for this focal length, not mirrored.
     pub fn vectors(&self, triangle: &ObservedTriangle, focal_px: f64) -> [Vector3<f64>; 3] {
         triangle.stars.map(|star| {
@@ -200,7 +217,7 @@ impl ObservedStars<'_> {
 
     /// The focal length at which the triangle's longest side is `chord`.
     fn focal_of(&self, triangle: &ObservedTriangle, chord: f64) -> Option<f64> {
-        let mut focal_px = self.diagonal_px;
+        let mut focal_px = triangle.longest_px / chord;
         for _ in 0..8 {
             let ratio = self.longest_side(triangle, focal_px) / chord;
             focal_px *= ratio;
