@@ -149,14 +149,14 @@ fn damaged(path: &Path) -> impl Fn(String) -> CacheError {
     }
 }
 
+#[rustfmt::skip]
 fn triangle(bytes: &[u8; TRIANGLE_BYTES]) -> Triangle {
-    let corner = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|i| bytes[at + i]));
-    let ratio = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+    let [a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3, m0, m1, s0, s1, size, a_mag, b_mag, c_mag] = *bytes;
     Triangle {
-        corners: [corner(0), corner(4), corner(8)],
-        ratios: [ratio(12), ratio(14)],
-        size: bytes[16],
-        mags: [bytes[17], bytes[18], bytes[19]],
+        corners: [[a0, a1, a2, a3], [b0, b1, b2, b3], [c0, c1, c2, c3]].map(u32::from_le_bytes),
+        ratios: [[m0, m1], [s0, s1]].map(u16::from_le_bytes),
+        size,
+        mags: [a_mag, b_mag, c_mag],
     }
 }
 

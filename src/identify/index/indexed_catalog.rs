@@ -2,7 +2,7 @@
 
 use super::cache::{self, CacheError};
 use super::cache_directory::cache_directory;
-use super::table::Triangle;
+use super::table::{Place, Triangle};
 use super::triangle_index::TriangleIndex;
 use crate::base::interrupt::{Interrupt, Interrupted};
 use crate::base::units::RAD_PER_DEG;
@@ -136,18 +136,11 @@ impl<'a> IndexedCatalog<'a> {
         std::mem::take(&mut *self.triangles.cache_errors())
     }
 
-    /// Calls `visit` with every triangle of a size class whose ratios lie within
-    /// `tolerance` of `ratios`, in an order that depends on the arguments alone.
+    /// The triangles of a size class at a place.
     #[inline]
-    pub(in crate::identify) fn for_each_similar(
-        &self,
-        class: usize,
-        ratios: [f64; 2],
-        tolerance: f64,
-        visit: impl FnMut(&Triangle),
-    ) {
-        self.triangles
-            .for_each_similar(self.stars(), class, ratios, tolerance, visit);
+    pub(in crate::identify) fn triangles_at(&self, class: usize, place: &Place) -> &[Triangle] {
+        let chunk = place.chunk as usize;
+        place.triangles(self.triangles.chunk(self.stars(), class, chunk))
     }
 
     /// The stars in small cells. They are sorted when they are first asked for: few searches last so

@@ -15,5 +15,5 @@ mod triangle_index;
 pub use cache::CacheError;
 pub use cache_directory::cache_directory;
 pub use indexed_catalog::IndexedCatalog;
-pub use table::Triangle;
+pub use table::{Place, Triangle, WantedShape};
 pub use triangle::TriangleShape;

@@ -57,8 +57,9 @@ impl Triangle {
     /// V magnitudes of the corners.
     #[inline]
     pub fn v_mags(&self) -> [f32; 3] {
-        self.mags
-            .map(|mag| BRIGHTEST_V_MAG + MAG_STEP * f32::from(mag))
+        let [a, b, c] = self.mags;
+        let v_mag = |mag| BRIGHTEST_V_MAG + MAG_STEP * f32::from(mag);
+        [v_mag(a), v_mag(b), v_mag(c)]
     }
 
     fn cell(&self) -> usize {
@@ -161,41 +162,66 @@ impl SizeClass {
         from..to
     }
 
-    /// Calls `visit` with every triangle whose ratios lie within `tolerance` of
-    /// `ratios`, in an order that depends on the arguments alone; `chunk` returns the triangles of
-    /// a chunk.
-    #[inline]
-    pub fn for_each_similar<'a>(
-        &self,
-        ratios: [f64; 2],
-        tolerance: f64,
-        chunk: impl Fn(usize) -> &'a [Triangle],
-        mut visit: impl FnMut(&Triangle),
-    ) {
-        let [middle, shortest] = ratios;
-        let columns = span(column_of, shortest, tolerance);
-        let within = tolerance / RATIO_STEP;
-        let wanted = ratios.map(|ratio| (ratio / RATIO_STEP) as f32);
-        let within_sq = (within * within) as f32;
-        for row in span(row_of, middle, tolerance) {
+    /// Where the triangles of a shape are.
+    pub fn places(&self, shape: &WantedShape) -> impl Iterator<Item = Place> {
+        let [middle, shortest] = shape.ratios;
+        let columns = span(column_of, shortest, shape.tolerance);
+        span(row_of, middle, shape.tolerance).flat_map(move |row| {
             let [first, last] = [columns.start(), columns.end()].map(|c| row * COLUMNS + c);
-            for number in first / CELLS_PER_CHUNK..=last / CELLS_PER_CHUNK {
-                let cells = number * CELLS_PER_CHUNK..(number + 1) * CELLS_PER_CHUNK;
-                let [before, from, to] =
-                    [cells.start, first.max(cells.start), cells.end.min(last + 1)]
-                        .map(|cell| self.cell_starts[cell] as usize);
-                if from == to {
-                    continue;
-                }
-                // A damaged class may have fewer than it says.
-                let triangles = chunk(number).get(from - before..to - before);
-                for triangle in triangles.unwrap_or_default() {
-                    let off = [0, 1].map(|i| f32::from(triangle.ratios[i]) - wanted[i]);
-                    if off[0] * off[0] + off[1] * off[1] <= within_sq {
-                        visit(triangle);
-                    }
-                }
-            }
+            let chunks = first / CELLS_PER_CHUNK..=last / CELLS_PER_CHUNK;
+            chunks.filter_map(move |chunk| {
+                let cells = chunk * CELLS_PER_CHUNK..(chunk + 1) * CELLS_PER_CHUNK;
+                let before = self.cell_starts[cells.start];
+                let from = self.cell_starts[first.max(cells.start)] - before;
+                let to = self.cell_starts[cells.end.min(last + 1)] - before;
+                let place = Place {
+                    chunk: chunk as u32,
+                    from,
+                    to,
+                };
+                (from < to).then_some(place)
+            })
+        })
+    }
+}
+
+/// A part of a chunk of a class: triangles `from..to`.
+#[derive(Debug, Clone, Copy)]
+pub struct Place {
+    /// The chunk.
+    pub chunk: u32,
+    from: u32,
+    to: u32,
+}
+
+impl Place {
+    /// The triangles there. A damaged chunk may have fewer than its table says.
+    #[inline]
+    pub fn triangles<'a>(&self, chunk: &'a [Triangle]) -> &'a [Triangle] {
+        let range = self.from as usize..self.to as usize;
+        chunk.get(range).unwrap_or_default()
+    }
+}
+
+/// A shape, and how exactly triangles are to have it.
+#[derive(Debug, Clone, Copy)]
+pub struct WantedShape {
+    /// Middle and shortest side over the longest.
+    pub ratios: [f64; 2],
+    /// Largest distance from them in their plane.
+    pub tolerance: f64,
+}
+
+impl WantedShape {
+    /// Whether a triangle has it, as far as ratios are stored.
+    pub fn test(&self) -> impl Fn(&Triangle) -> bool + use<> {
+        let [middle, shortest] = self.ratios.map(|ratio| (ratio / RATIO_STEP) as f32);
+        let within = self.tolerance / RATIO_STEP;
+        let within_sq = (within * within) as f32;
+        move |triangle| {
+            let [of_middle, of_shortest] = triangle.ratios;
+            let off = [f32::from(of_middle) - middle, f32::from(of_shortest) - shortest];
+            off[0] * off[0] + off[1] * off[1] <= within_sq
         }
     }
 }

@@ -66,21 +66,6 @@ impl TriangleIndex {
         self.len() == 0
     }
 
-    /// Calls `visit` with every triangle of a class whose ratios lie within
-    /// `tolerance` of `ratios`. `stars` are those that the index was built from.
-    #[inline]
-    pub fn for_each_similar(
-        &self,
-        stars: &[Star],
-        class: usize,
-        ratios: [f64; 2],
-        tolerance: f64,
-        visit: impl FnMut(&Triangle),
-    ) {
-        let chunk = |chunk| self.chunk(stars, class, chunk);
-        self.classes[class].for_each_similar(ratios, tolerance, chunk, visit);
-    }
-
     /// The triangles of a chunk. If it cannot be read, its class is listed again from `stars`.
     pub fn chunk(&self, stars: &[Star], class: usize, chunk: usize) -> &[Triangle] {
         self.classes[class].chunks[chunk].get_or_init(|| {
@@ -120,6 +105,7 @@ impl TriangleIndex {
 
 #[cfg(test)]
 mod tests {
+    use super::super::table::WantedShape;
     use super::super::triangle::TriangleShape;
     use super::*;
     use crate::base::coords::UnitVector;
@@ -148,9 +134,15 @@ mod tests {
                 ([0.98, 0.09], 0.02),
             ] {
                 let mut found = HashSet::new();
-                index.for_each_similar(stars, number, wanted, tolerance, |triangle| {
-                    assert!(found.insert(triangle.corners), "listed twice");
-                });
+                let shape = WantedShape { ratios: wanted, tolerance };
+                let has_shape = shape.test();
+                for place in class.places(&shape) {
+                    let chunk = index.chunk(stars, number, place.chunk as usize);
+                    let similar = place.triangles(chunk).iter().filter(|t| has_shape(t));
+                    for triangle in similar {
+                        assert!(found.insert(triangle.corners), "listed twice");
+                    }
+                }
                 let off = |corners: &[u32; 3]| {
                     let ratios = shape_of(stars, corners).ratios;
                     (ratios[0] - wanted[0]).hypot(ratios[1] - wanted[1])

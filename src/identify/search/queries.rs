@@ -7,7 +7,7 @@
 use super::plan::SearchPass;
 use crate::camera::frame_centre;
 use crate::identify::field::{Photometry, StarField};
-use crate::identify::index::{IndexedCatalog, Triangle, TriangleShape};
+use crate::identify::index::{IndexedCatalog, Place, Triangle, TriangleShape, WantedShape};
 use nalgebra::Vector3;
 
 /// Centroid errors in a triangle's tolerance, in standard errors.
@@ -30,6 +30,8 @@ const MAX_TOLERANCE: f64 = 0.03;
 pub struct ObservedTriangle {
     /// The stars, by their number in the field.
     pub stars: [usize; 3],
+    /// Their offsets from the frame's centre, in pixels.
+    offsets: [[f64; 2]; 3],
     /// Its longest side, in pixels.
     longest_px: f64,
     /// Tolerance of its ratios.
@@ -48,8 +50,8 @@ pub struct Query {
     pub triangle: ObservedTriangle,
     /// The size class of catalogue triangles.
     class: usize,
-    /// Middle and shortest side over the longest.
-    ratios: [f64; 2],
+    /// Their shape.
+    shape: WantedShape,
     /// Logarithm of the focal length, in pixels, times the longest side, as a chord.
     pub ln_size: f64,
     /// A focal length in the middle, in pixels.
@@ -101,7 +103,7 @@ impl ObservedStars<'_> {
 
     /// The triangle of these stars; `None` if it is too small, too large or too inexact.
     pub fn triangle(&self, stars: [usize; 3], pass: &SearchPass) -> Option<ObservedTriangle> {
-        let [a, b, c] = stars.map(|star| self.offset(star));
+        let offsets @ [a, b, c] = stars.map(|star| self.offset(star));
         let side = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
         let longest_px = side(a, b).max(side(b, c)).max(side(c, a));
         let shares = MIN_TRIANGLE_SHARE..=pass.largest_share;
@@ -121,6 +123,7 @@ impl ObservedStars<'_> {
         let distortion_px = CONFIRMING_TOLERANCES * pass.tolerance * self.diagonal_px;
         Some(ObservedTriangle {
             stars,
+            offsets,
             longest_px,
             tolerance,
             true_confirmation: pass.true_confirmation,
@@ -181,10 +184,14 @@ impl ObservedStars<'_> {
                 queries.push(Query {
                     triangle: ObservedTriangle {
                         stars: shape.order.map(|corner| triangle.stars[corner]),
+                        offsets: shape.order.map(|corner| triangle.offsets[corner]),
                         ..*triangle
                     },
                     class,
-                    ratios: shape.ratios,
+                    shape: WantedShape {
+                        ratios: shape.ratios,
+                        tolerance: triangle.tolerance,
+                    },
                     ln_size: middle + shape.longest.ln(),
                     middle_px,
                     ln_focal: [from - slack, to + slack],
@@ -203,10 +210,9 @@ impl ObservedStars<'_> {
 
     /// Unit vectors of the triangle's stars for this focal length, not mirrored.
     pub fn vectors(&self, triangle: &ObservedTriangle, focal_px: f64) -> [Vector3<f64>; 3] {
-        triangle.stars.map(|star| {
-            let [u, v] = self.offset(star);
-            Vector3::new(u, v, focal_px).normalize()
-        })
+        let vector = |[u, v]: [f64; 2]| Vector3::new(u, v, focal_px).normalize();
+        let [a, b, c] = triangle.offsets;
+        [vector(a), vector(b), vector(c)]
     }
 
     /// The triangle's longest side at this focal length, as a chord.
@@ -228,28 +234,63 @@ impl ObservedStars<'_> {
         focal_px.is_finite().then_some(focal_px)
     }
 
-    /// Adds the catalogue triangles that are like that of a query, in shape, size and brightness, to
-    /// `similar`. Returns the number of those that are like it in shape.
-    pub fn add_similar(&self, query: &Query, similar: &mut Vec<Similar>) -> u64 {
-        let class = &self.sky.triangles.classes[query.class];
-        let ln_longest = class.ln_longest();
-        let mags = query.triangle.stars.map(|s| self.field.stars[s].mag as f32);
+    /// Looks up what catalogue triangles are like those of the queries, in shape, size and
+    /// brightness. Returns the number of those that are like them in shape.
+    ///
+    /// What this waits for is memory. So each step is done for all queries, and the processor
+    /// fetches for many of them at once.
+    pub fn look_up(&self, queries: &[Query], found: &mut LookedUp) -> u64 {
+        let LookedUp { places, similar } = found;
+        places.clear();
+        similar.clear();
+        let classes = &self.sky.triangles.classes;
+        for (query, number) in queries.iter().zip(0..) {
+            let at = classes[query.class].places(&query.shape);
+            places.extend(at.map(|place| (number, place)));
+        }
+        let triangles = |&(number, ref place): &(u32, Place)| {
+            let query = &queries[number as usize];
+            self.sky.triangles_at(query.class, place)
+        };
+        let first = places.iter().map(|place| triangles(place).first());
+        let fetched = first.fold(0, |sum, first| sum + first.map_or(0, |t| u32::from(t.size)));
+        std::hint::black_box(fetched);
         let mut candidates = 0;
-        let Query { class, ratios, .. } = *query;
-        self.sky
-            .for_each_similar(class, ratios, query.triangle.tolerance, |triangle| {
-                candidates += 1;
-                let Some(ln_focal) = query.ln_focal(ln_longest(triangle.size)) else {
-                    return;
-                };
-                if let Some(zero_point_mag) = self.zero_point(triangle, mags) {
-                    similar.push(Similar {
-                        corners: triangle.corners,
-                        zero_point_mag,
-                        ln_focal: ln_focal as f32,
-                    });
-                }
-            });
+        for place in places.iter() {
+            candidates += self.add_similar(&queries[place.0 as usize], place.0, triangles(place), similar);
+        }
+        candidates
+    }
+
+    /// Adds those of `triangles` that are like that of a query to `similar`. Returns the number of
+    /// those that are like it in shape.
+    fn add_similar(
+        &self,
+        query: &Query,
+        number: u32,
+        triangles: &[Triangle],
+        similar: &mut Vec<Similar>,
+    ) -> u64 {
+        let ln_longest = self.sky.triangles.classes[query.class].ln_longest();
+        let has_shape = query.shape.test();
+        let [a, b, c] = query.triangle.stars;
+        let mag = |star: usize| self.field.stars[star].mag as f32;
+        let mags = [mag(a), mag(b), mag(c)];
+        let mut candidates = 0;
+        for triangle in triangles.iter().filter(|triangle| has_shape(triangle)) {
+            candidates += 1;
+            let Some(ln_focal) = query.ln_focal(ln_longest(triangle.size)) else {
+                continue;
+            };
+            if let Some(zero_point_mag) = self.zero_point(triangle, mags) {
+                similar.push(Similar {
+                    query: number,
+                    corners: triangle.corners,
+                    zero_point_mag,
+                    ln_focal: ln_focal as f32,
+                });
+            }
+        }
         candidates
     }
 
@@ -257,7 +298,11 @@ impl ObservedStars<'_> {
     #[inline]
     fn zero_point(&self, triangle: &Triangle, mags: [f32; 3]) -> Option<f32> {
         let v_mags = triangle.v_mags();
-        let [a, b, c] = [0, 1, 2].map(|corner| v_mags[corner] - mags[corner]);
+        let [a, b, c] = [
+            v_mags[0] - mags[0],
+            v_mags[1] - mags[1],
+            v_mags[2] - mags[2],
+        ];
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
         let spread = self.field.photometry.tolerance_mag() as f32;
         let (consistent, zero_point) = match self.field.photometry {
@@ -268,9 +313,20 @@ impl ObservedStars<'_> {
     }
 }
 
+/// What was looked up. Its buffers are reused.
+#[derive(Debug, Default)]
+pub struct LookedUp {
+    /// Where triangles of the right shape are, each with the number of its query.
+    places: Vec<(u32, Place)>,
+    /// The catalogue triangles that are like an observed one, in the order of the queries.
+    pub similar: Vec<Similar>,
+}
+
 /// A catalogue triangle that is like an observed one.
 #[derive(Debug, Clone, Copy)]
 pub struct Similar {
+    /// The query that it answers, by its number.
+    pub query: u32,
     /// Its stars.
     pub corners: [u32; 3],
     /// Johnson V minus observed magnitude.

@@ -6,7 +6,7 @@
 use super::confirmation::{Batch, ConfirmingStars, PendingHypothesis, Pose};
 use super::false_alarm::{FalseAlarm, TESTED_STARS};
 use super::plan::{AGAIN, BRIGHTEST, PASSES, SearchPass, SearchPlan, TIER, WORK_OF_VOTE};
-use super::queries::{ObservedStars, ObservedTriangle, Query, Similar};
+use super::queries::{LookedUp, ObservedStars, ObservedTriangle, Query, Similar};
 use super::tiers::Tiers;
 use super::votes::{Vote, Voter, Votes, frame_of};
 use crate::base::coords::Rotation;
@@ -51,11 +51,12 @@ pub struct SearchBuffers {
     /// What is looked up for an observed triangle, for all of them where these vote.
     queries: Vec<Query>,
     /// Catalogue triangles that are like an observed one.
-    similar: Vec<Similar>,
+    looked_up: LookedUp,
     /// Hypotheses from one triangle that wait for their test.
     waiting: Vec<PendingHypothesis>,
     batch: Batch,
     votes: Votes,
+    voters: Vec<Option<Voter>>,
     /// To confirm answers.
     tiers: Tiers,
     /// Ends searches early.
@@ -166,10 +167,12 @@ impl<'a> Search<'a> {
     /// Tries triangles until a hypothesis passes. Returns it, fitted to the brightest stars.
     pub fn run(&mut self) -> Option<Found> {
         let plan = self.plan;
-        plan.passes
+        let t = std::time::Instant::now();
+        let r = plan.passes
             .iter()
-            .find_map(|pass| self.sweep(pass).or_else(|| self.provisional.take()))
-            .or_else(|| self.vote())
+            .find_map(|pass| self.sweep(pass).or_else(|| self.provisional.take()));
+            if std::env::var_os("SEARCHLOG").is_some() { eprintln!("passes {} hypotheses {} candidates {:.1} ms", self.hypotheses, self.candidates, t.elapsed().as_secs_f64()*1e3); }
+            r.or_else(|| self.vote())
     }
 
     /// Lets the triangles of more and more stars vote, and tests the poses with most votes. Every vote
@@ -185,11 +188,16 @@ impl<'a> Search<'a> {
             if self.is_spent() {
                 return None;
             }
+            let t0 = std::time::Instant::now();
             self.gather(pass, from);
+            let t1 = std::time::Instant::now();
             from = pass.stars;
             let votes = &mut self.buffers.votes;
             self.hypotheses = tested + votes.len() as u64;
             votes.count();
+            if std::env::var_os("SEARCHLOG").is_some() { eprintln!("search {} brighter {} stars {} queries {} votes {} candidates {} gather {:.1} count {:.1} ms", self.number, self.problem.brighter, pass.stars, self.buffers.queries.len(), self.buffers.votes.len(), self.candidates, (t1 - t0).as_secs_f64()*1e3, t1.elapsed().as_secs_f64()*1e3); }
+            let _g = G(std::time::Instant::now());
+            let votes = &mut self.buffers.votes;
             let leaders: Vec<Vote> = votes.leaders().collect();
             let found = leaders.iter().find_map(|vote| self.try_vote(vote));
             found.or_else(|| self.provisional.take())
@@ -213,20 +221,21 @@ impl<'a> Search<'a> {
             };
             let SearchBuffers {
                 queries,
-                similar,
+                looked_up,
+                voters,
                 votes,
                 ..
             } = &mut *self.buffers;
             let first = queries.len();
             self.observed.add_queries(&triangle, queries);
-            for (query, number) in queries[first..].iter().zip(first as u32..) {
-                similar.clear();
-                self.candidates += self.observed.add_similar(query, similar);
-                let voter = Voter::new(&self.observed.vectors(&query.triangle, query.middle_px));
-                if let Some(voter) = voter {
-                    votes.add_all(&voter, similar, [first as u32, number], &self.observed.sky.grid);
-                }
-            }
+            let of_triangle = &queries[first..];
+            self.candidates += self.observed.look_up(of_triangle, looked_up);
+            voters.clear();
+            voters.extend(of_triangle.iter().map(|query| {
+                Voter::new(&self.observed.vectors(&query.triangle, query.middle_px))
+            }));
+            let grid = &self.observed.sky.grid;
+            votes.add_all(voters, &looked_up.similar, first as u32, grid);
         }
     }
 
@@ -234,7 +243,7 @@ impl<'a> Search<'a> {
         if self.is_interrupted() {
             return None;
         }
-        let query = self.buffers.queries[vote.query as usize];
+        let query = self.buffers.queries[vote.query()];
         let pending = self.pending(&query, &vote.similar)?;
         self.decide_pending(&pending, &query.triangle)
     }
@@ -267,17 +276,15 @@ impl<'a> Search<'a> {
 
     fn try_triangle(&mut self, triangle: &ObservedTriangle) -> Option<Found> {
         let mut queries = std::mem::take(&mut self.buffers.queries);
-        let mut similar = std::mem::take(&mut self.buffers.similar);
+        let mut looked_up = std::mem::take(&mut self.buffers.looked_up);
         queries.clear();
         self.observed.add_queries(triangle, &mut queries);
-        let found = queries.iter().find_map(|query| {
-            similar.clear();
-            self.candidates += self.observed.add_similar(query, &mut similar);
-            similar
-                .iter()
-                .find_map(|similar| self.try_similar(query, similar))
+        self.candidates += self.observed.look_up(&queries, &mut looked_up);
+        let found = looked_up.similar.iter().find_map(|similar| {
+            let query = &queries[similar.query as usize];
+            self.try_similar(query, similar)
         });
-        (self.buffers.queries, self.buffers.similar) = (queries, similar);
+        (self.buffers.queries, self.buffers.looked_up) = (queries, looked_up);
         found.or_else(|| self.try_waiting(triangle))
     }
 
@@ -561,3 +568,6 @@ mod tests {
         assert!((0.99..=1.0).contains(&sum), "{sum}");
     }
 }
+
+struct G(std::time::Instant);
+impl Drop for G { fn drop(&mut self) { if std::env::var_os("SEARCHLOG").is_some() { eprintln!("  leaders {:.1} ms", self.0.elapsed().as_secs_f64()*1e3); } } }

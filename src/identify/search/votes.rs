@@ -45,16 +45,22 @@ const NEAR_SLACK: f64 = 1.0;
 pub struct Vote {
     /// The first query of the observed triangle: its number.
     triangle: u32,
-    /// The query that found the catalogue triangle.
-    pub query: u32,
     /// The catalogue triangle.
     pub similar: Similar,
     /// The cell in each grid.
     cells: [u32; GRIDS],
 }
 
+impl Vote {
+    /// The number of the query that found the catalogue triangle.
+    pub fn query(&self) -> usize {
+        (self.triangle + self.similar.query) as usize
+    }
+}
+
 /// An observed triangle that votes: an orthonormal frame of it in the camera, not mirrored and
 /// mirrored.
+#[derive(Debug, Clone, Copy)]
 pub struct Voter {
     frames: [Matrix3<f64>; 2],
     triple: f64,
@@ -146,20 +152,31 @@ impl Votes {
     }
 
     /// The votes of an observed triangle for the poses in which it is one of the `similar` catalogue
-    /// triangles. Votes of one triangle come one after the other.
+    /// triangles: of its queries, the first of which is `triangle`, each has a voter. Votes of one
+    /// triangle come one after the other.
     pub fn add_all(
         &mut self,
-        voter: &Voter,
+        voters: &[Option<Voter>],
         similar: &[Similar],
-        [triangle, query]: [u32; 2],
+        triangle: u32,
         stars: &SkyGrid,
     ) {
+        // Only fetches, so that many fetches overlap.
+        let corners = similar.iter().flat_map(|similar| similar.corners);
+        let fetched = corners.fold(0.0, |sum, corner| sum + stars.star(corner).v_mag);
+        std::hint::black_box(fetched);
         for similar in similar {
-            let sky = similar.corners.map(|corner| stars.star(corner).vector());
-            let mirrored = voter.triple * triple(&sky) < 0.0;
-            let Some(of_sky) = frame_of(&sky) else {
+            let [a, b, c] = similar.corners;
+            let sky = [
+                stars.star(a).vector(),
+                stars.star(b).vector(),
+                stars.star(c).vector(),
+            ];
+            let voter = &voters[similar.query as usize];
+            let (Some(voter), Some(of_sky)) = (voter, frame_of(&sky)) else {
                 continue;
             };
+            let mirrored = voter.triple * triple(&sky) < 0.0;
             let of_camera = &voter.frames[usize::from(mirrored)];
             // The rows of the rotation from the sky to the camera.
             let axis = of_sky * of_camera.row(2).transpose();
@@ -167,7 +184,6 @@ impl Votes {
             if let Some(cells) = self.cells(&axis, &side, f64::from(similar.ln_focal), mirrored) {
                 self.votes.push(Vote {
                     triangle,
-                    query,
                     similar: *similar,
                     cells,
                 });

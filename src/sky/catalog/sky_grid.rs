@@ -38,7 +38,8 @@ impl GridStar {
     /// The unit vector, in single precision.
     #[inline]
     pub fn vector(&self) -> Vector3<f64> {
-        Vector3::from(self.direction.map(f64::from))
+        let [x, y, z] = self.direction;
+        Vector3::new(f64::from(x), f64::from(y), f64::from(z))
     }
 
     /// Whether the star is within a chord of the unit vector `centre`, given the chord squared.
