@@ -4,6 +4,7 @@ use crate::errors::exception;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use starpipe::detect::CentroidMethod;
+use starpipe::identify::Effort;
 use starpipe::pipeline::SolveOptions;
 use starpipe::{ObservationDate, Site};
 
@@ -26,6 +27,7 @@ pub struct Options {
     max_stars: Option<usize>,
     centroid: Option<String>,
     name_odds: f64,
+    effort: String,
     attitude_only: bool,
     time_limit_s: Option<f64>,
 }
@@ -50,6 +52,7 @@ impl Options {
         options.extinction_mag_per_airmass = self.extinction_mag_per_airmass;
         options.sigma = self.sigma;
         options.name_odds = self.name_odds;
+        options.effort = effort(&self.effort)?;
         options.attitude_only = self.attitude_only;
         options.time_limit_s = self.time_limit_s;
         if let Some(false_alarms) = self.false_alarms_per_mpx {
@@ -62,6 +65,17 @@ impl Options {
             options.centroid = centroid_method(centroid)?;
         }
         Ok(options)
+    }
+}
+
+fn effort(name: &str) -> PyResult<Effort> {
+    match name {
+        "fast" => Ok(Effort::Fast),
+        "normal" => Ok(Effort::Normal),
+        "thorough" => Ok(Effort::Thorough),
+        other => Err(PyValueError::new_err(format!(
+            "effort must be 'fast', 'normal' or 'thorough', not '{other}'"
+        ))),
     }
 }
 

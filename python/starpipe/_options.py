@@ -59,6 +59,8 @@ class SolveOptions(TypedDict, total=False):
     name_odds : float
         A star is named where the odds are at least this many to 1 that the name is right; 100 by
         default.
+    effort : {"fast", "normal", "thorough"}
+        How much is tried where the brightest stars do not identify a frame at once.
     attitude_only : bool
         Stop at the attitude: no star beyond the brightest is named.
     time_limit : Quantity or float
@@ -80,6 +82,7 @@ class SolveOptions(TypedDict, total=False):
     max_stars: int | None
     centroid: Literal["gaussian-fit", "grey-weighted"] | None
     name_odds: float
+    effort: Literal["fast", "normal", "thorough"]
     attitude_only: bool
     time_limit: Quantity | float | None
 
@@ -102,6 +105,7 @@ def solve_options(
     max_stars: Any = None,
     centroid: Any = None,
     name_odds: Any = NAME_ODDS,
+    effort: Any = "normal",
     attitude_only: bool = False,
     time_limit: Any = None,
 ) -> dict[str, Any]:
@@ -127,6 +131,7 @@ def solve_options(
         "max_stars": None if max_stars is None else whole_number(max_stars, "max_stars", 4),
         "centroid": centroid,
         "name_odds": within(name_odds, "", "name_odds", 1.0),
+        "effort": str(effort),
         "attitude_only": bool(attitude_only),
         "time_limit_s": positive(time_limit, "s", "time_limit"),
     }

@@ -18,6 +18,7 @@
 //! stars of the catalogue.
 
 pub mod diagnosis;
+mod effort;
 mod field;
 #[doc(hidden)]
 pub mod fit;
@@ -34,6 +35,7 @@ mod priors;
 mod search;
 mod workspace;
 
+pub use effort::Effort;
 pub use field::{ObservedStar, Photometry, SourceIndex, StarField};
 #[doc(hidden)]
 pub use identification::MIN_STARS;

@@ -3,6 +3,7 @@
 
 use crate::base::interrupt::Interrupt;
 use crate::camera::DistortionModel;
+use crate::identify::effort::Effort;
 use crate::identify::field::StarField;
 use crate::identify::fit::{NamingStart, Refined, Start};
 use crate::identify::hypothesis::Problem;
@@ -79,6 +80,7 @@ pub fn identify(
 #[derive(Debug)]
 pub struct Workspace {
     name_odds: f64,
+    effort: Effort,
     buffers: SearchBuffers,
     thinning: Thinning,
     tiers: Tiers,
@@ -97,6 +99,7 @@ impl Workspace {
     pub fn new() -> Self {
         Self {
             name_odds: NAME_ODDS,
+            effort: Effort::Normal,
             buffers: SearchBuffers::default(),
             thinning: Thinning::default(),
             tiers: Tiers::default(),
@@ -109,6 +112,11 @@ impl Workspace {
     /// 1. Names less sure than 1 to 1 are never given: a star would have several.
     pub fn set_name_odds(&mut self, odds: f64) {
         self.name_odds = odds.max(1.0);
+    }
+
+    /// From the next field on, searches do as much as `effort` says.
+    pub fn set_effort(&mut self, effort: Effort) {
+        self.effort = effort;
     }
 
     /// Searches end with [`SearchFailure::Interrupted`] when `interrupt` is due.
@@ -171,6 +179,7 @@ impl Workspace {
         }
         let Self {
             name_odds,
+            effort,
             buffers,
             thinning,
             tiers,
@@ -178,13 +187,13 @@ impl Workspace {
             answer,
         } = self;
         let whole = Problem::new(field, sky);
-        let mut search = Search::new(whole, priors, buffers);
+        let mut search = Search::new(whole, priors, *effort, buffers);
         let mut found = search.run();
         let mut best_log10 = search.best_log10_false_alarm();
         if found.is_none() {
             let thinned = thinning.thin(field);
             let thinned = thinned.map(|field| Problem { field, ..whole });
-            let tiers = tiers.below(field).iter().map(|tier| Problem {
+            let tiers = tiers.below(field, effort.tiers()).iter().map(|tier| Problem {
                 field: &tier.field,
                 brighter: tier.brighter,
                 ..whole

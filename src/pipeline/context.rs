@@ -5,13 +5,13 @@ use crate::base::interrupt::Interrupt;
 use crate::calibration::Calibration;
 use crate::detect::{self, DetectConfig};
 use crate::frame::{self, Frame};
-use crate::identify::{self, DateSource, IndexedCatalog, NAME_ODDS, Priors, ScalePrior};
+use crate::identify::{self, DateSource, Effort, IndexedCatalog, NAME_ODDS, Priors, ScalePrior};
 use crate::photometry::comparison::ObservingSetup;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// How long a frame may take by default where many are solved, in seconds.
-pub const DEFAULT_TIME_LIMIT_S: f64 = 8.0;
+pub const DEFAULT_TIME_LIMIT_S: f64 = 60.0;
 
 /// What the stages need and what does not change from frame to frame.
 #[derive(Clone)]
@@ -33,6 +33,8 @@ pub struct Context<'a> {
     /// A star is named where the odds are at least this many to 1 that the name is right, and at least
     /// 1 to 1: else a star would have several.
     pub name_odds: f64,
+    /// How much is tried to identify a frame.
+    pub effort: Effort,
     /// Whether a frame is that of the file's rows as they are stored: the first is then row 0 of
     /// positions, attitude and world coordinates. Without it they are those of the picture as drawn.
     pub as_stored: bool,
@@ -51,6 +53,7 @@ impl<'a> Context<'a> {
             calibration: None,
             attitude_only: false,
             name_odds: NAME_ODDS,
+            effort: Effort::Normal,
             as_stored: false,
             time_limit: None,
         }

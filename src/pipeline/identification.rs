@@ -195,6 +195,7 @@ pub(super) fn attempt(
     clock: &mut Stopwatch,
 ) -> Result<Identification, SearchFailure> {
     workspace.set_name_odds(context.name_odds);
+    workspace.set_effort(context.effort);
     if context.attitude_only {
         let found = workspace.attitude(field, priors, context.indexed);
         clock.lap(Stage::Pointing);

@@ -6,7 +6,7 @@ use crate::base::epoch::ObservationDate;
 use crate::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
 use crate::camera::data_sheet::DataSheet;
 use crate::detect::{CentroidMethod, DetectConfig};
-use crate::identify::{DateSource, FrameDate, NAME_ODDS, Priors, Scale, ScalePrior, SkyRegion};
+use crate::identify::{DateSource, Effort, FrameDate, NAME_ODDS, Priors, Scale, ScalePrior, SkyRegion};
 use crate::model::sensitivity::Extinction;
 use crate::photometry::comparison::ObservingSetup;
 use crate::sky::observer::Site;
@@ -64,6 +64,8 @@ pub struct SolveOptions {
     pub centroid: CentroidMethod,
     /// A star is named where the odds are at least this many to 1 that the name is right.
     pub name_odds: f64,
+    /// How much is tried to identify a frame.
+    pub effort: Effort,
     /// Whether to stop at attitude and optics, from the brightest stars.
     pub attitude_only: bool,
     /// How long a frame may take.
@@ -143,6 +145,7 @@ impl Default for SolveOptions {
             max_stars: detect.max_detections,
             centroid: detect.centroid,
             name_odds: NAME_ODDS,
+            effort: Effort::Normal,
             attitude_only: false,
             time_limit_s: Some(DEFAULT_TIME_LIMIT_S),
         }
@@ -181,6 +184,7 @@ impl<'a> Context<'a> {
             priors: options.priors(),
             camera: camera.map(|sheet| options.observing_setup(sheet)),
             name_odds: options.name_odds,
+            effort: options.effort,
             attitude_only: options.attitude_only,
             // A limit that is longer than any clock runs is none.
             time_limit: limit_s.and_then(|limit_s| Duration::try_from_secs_f64(limit_s).ok()),

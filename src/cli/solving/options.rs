@@ -5,8 +5,8 @@ use crate::cli::options::catalog::CatalogOptions;
 use crate::cli::options::format::Format;
 use crate::cli::options::hints::HintOptions;
 use crate::cli::options::values;
-use clap::Args;
-use starpipe::identify::NAME_ODDS;
+use clap::{Args, ValueEnum};
+use starpipe::identify::{Effort, NAME_ODDS};
 use starpipe::pipeline::{DEFAULT_TIME_LIMIT_S, SolveOptions};
 use std::path::PathBuf;
 
@@ -18,6 +18,9 @@ pub(crate) struct SolvingOptions {
     #[arg(long, value_name = "NUMBER", value_parser = values::odds, allow_hyphen_values = true,
           default_value_t = NAME_ODDS, help_heading = "Identification")]
     pub(crate) name_odds: f64,
+    /// How much is tried where the brightest stars do not identify a frame at once
+    #[arg(long, value_enum, default_value_t = EffortOption::Normal, help_heading = "Identification")]
+    pub(crate) effort: EffortOption,
     /// Determine attitude and optics only, from the brightest stars: no further names, no zero point
     /// and no limiting magnitude
     #[arg(long, help_heading = "Identification")]
@@ -30,6 +33,26 @@ pub(crate) struct SolvingOptions {
     pub(super) output: OutputOptions,
     #[command(flatten)]
     pub(crate) catalog: CatalogOptions,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum EffortOption {
+    /// A quarter of the usual work: few more answers than the first triangles give
+    Fast,
+    /// Finds nearly all that can be found
+    Normal,
+    /// Eight times the usual work, for frames with a hundred false stars and more
+    Thorough,
+}
+
+impl From<EffortOption> for Effort {
+    fn from(effort: EffortOption) -> Self {
+        match effort {
+            EffortOption::Fast => Self::Fast,
+            EffortOption::Normal => Self::Normal,
+            EffortOption::Thorough => Self::Thorough,
+        }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -52,6 +75,7 @@ impl SolvingOptions {
     pub(crate) fn options(&self) -> Result<SolveOptions, CommandError> {
         let mut options = self.hints.options()?;
         options.name_odds = self.name_odds;
+        options.effort = self.effort.into();
         options.attitude_only = self.attitude_only;
         options.time_limit_s = Some(self.time_limit_s);
         Ok(options)

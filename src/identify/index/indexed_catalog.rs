@@ -6,11 +6,9 @@ use super::table::{Place, Triangle};
 use super::triangle_index::TriangleIndex;
 use crate::base::interrupt::{Interrupt, Interrupted};
 use crate::base::units::RAD_PER_DEG;
-use crate::sky::catalog::face_grid::FaceGrid;
 use crate::sky::catalog::sky_grid::SkyGrid;
 use crate::sky::catalog::{Catalog, Star};
 use std::path::Path;
-use std::sync::OnceLock;
 
 /// Width of the narrowest field over the smallest longest side listed: narrower fields hold too few
 /// of the triangles.
@@ -47,7 +45,6 @@ pub struct IndexedCatalog<'a> {
     catalog: &'a Catalog,
     /// The stars by position.
     pub grid: SkyGrid,
-    faces: OnceLock<FaceGrid>,
     /// The triangles.
     pub triangles: TriangleIndex,
     counts: MagnitudeCounts,
@@ -124,7 +121,6 @@ impl<'a> IndexedCatalog<'a> {
         Self {
             catalog,
             grid: SkyGrid::new(catalog.stars()),
-            faces: OnceLock::new(),
             triangles,
             counts: MagnitudeCounts::new(catalog.stars()),
         }
@@ -141,12 +137,6 @@ impl<'a> IndexedCatalog<'a> {
     pub(in crate::identify) fn triangles_at(&self, class: usize, place: &Place) -> &[Triangle] {
         let chunk = place.chunk as usize;
         place.triangles(self.triangles.chunk(self.stars(), class, chunk))
-    }
-
-    /// The stars in small cells. They are sorted when they are first asked for: few searches last so
-    /// long that it is worth it.
-    pub(in crate::identify) fn faces(&self) -> &FaceGrid {
-        self.faces.get_or_init(|| FaceGrid::new(self.stars()))
     }
 
     /// The narrowest and the widest horizontal field of view that can be identified, in radians.

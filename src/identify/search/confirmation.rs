@@ -2,16 +2,11 @@
 //! with the catalogue stars of about their brightness at their place, until the likelihood ratio is
 //! decisive.
 //!
-//! Long searches ask about a million hypotheses. What they wait for is memory, as each question is
-//! about another part of the sky. So many hypotheses are asked about together, star by star: the
-//! processor then fetches for many of them at once.
-//!
 //! # Reference
 //! Wald 1945, Ann. Math. Stat. 16, 117: the sequential probability ratio test.
 
 use super::queries::ObservedStars;
 use crate::base::coords::{Icrs, UnitVector};
-use crate::sky::catalog::face_grid::Disc;
 use crate::sky::catalog::sky_grid::chord_of;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::RangeInclusive;
@@ -62,8 +57,6 @@ pub struct PendingHypothesis {
     pub pose: Pose,
     /// Johnson V minus observed magnitude.
     pub zero_point_mag: f64,
-    /// Its number in the search.
-    pub number: u64,
     /// Radius within which a star confirms, and its chord.
     radius_rad: f64,
     chord: f64,
@@ -73,14 +66,13 @@ pub struct PendingHypothesis {
 
 impl PendingHypothesis {
     /// A hypothesis before its test; stars within `confirming_px` confirm it.
-    pub fn new(pose: Pose, zero_point_mag: f64, number: u64, confirming_px: f64) -> Self {
+    pub fn new(pose: Pose, zero_point_mag: f64, confirming_px: f64) -> Self {
         let radius_rad = confirming_px / pose.focal_px;
         Self {
             radius_rad,
             chord: chord_of(radius_rad),
             pose,
             zero_point_mag,
-            number,
             ratio: 1.0,
             answer: None,
         }
@@ -97,24 +89,6 @@ impl PendingHypothesis {
             self.answer = Some(self.ratio > 1.0);
         }
     }
-}
-
-/// A place where a star is looked for.
-#[derive(Debug, Clone, Copy)]
-struct Lookup {
-    hypothesis: u32,
-    direction: UnitVector<Icrs>,
-    /// `None` where the disc is on the edge of a face.
-    disc: Option<Disc>,
-    /// Of the disc's first cell: what was fetched so far.
-    is_bright: bool,
-    stars: (u32, u32),
-}
-
-/// Buffers for many hypotheses.
-#[derive(Debug, Default)]
-pub struct Batch {
-    lookups: Vec<Lookup>,
 }
 
 impl ConfirmingStars<'_> {
@@ -157,61 +131,6 @@ impl ConfirmingStars<'_> {
             hypothesis.add(self.factor(is_confirming, hypothesis.radius_rad, magnitudes));
             if hypothesis.answer.is_some() {
                 break;
-            }
-        }
-    }
-
-    /// Tests many hypotheses: the answers are those of [`test`](Self::test).
-    pub fn test_all(&self, pending: &mut [PendingHypothesis], batch: &mut Batch) {
-        let faces = self.stars.sky.faces();
-        let lookups = &mut batch.lookups;
-        for (index, offset) in self.others() {
-            lookups.clear();
-            let waiting = pending
-                .iter()
-                .enumerate()
-                .filter(|(_, t)| t.answer.is_none());
-            lookups.extend(waiting.map(|(number, hypothesis)| {
-                let direction = hypothesis.pose.direction_of(&offset);
-                Lookup {
-                    hypothesis: number as u32,
-                    direction,
-                    disc: Disc::of(direction.as_vector(), hypothesis.chord),
-                    is_bright: false,
-                    stars: (0, 0),
-                }
-            }));
-            if lookups.is_empty() {
-                return;
-            }
-            // Each of these loops only fetches, so that many fetches overlap.
-            for lookup in lookups.iter_mut() {
-                let [_, faint] =
-                    self.magnitudes(index, pending[lookup.hypothesis as usize].zero_point_mag);
-                let is_bright = |disc: &Disc| faces.may_hold(disc.first_cell(), faint as f32);
-                lookup.is_bright = lookup.disc.as_ref().is_some_and(is_bright);
-            }
-            for lookup in lookups.iter_mut().filter(|lookup| lookup.is_bright) {
-                let first = lookup.disc.as_ref().map_or(0, Disc::first_cell);
-                lookup.stars = faces.range(first);
-            }
-            let mut brightest = 0.0;
-            for lookup in lookups.iter().filter(|lookup| lookup.is_bright) {
-                brightest += faces.v_mag(lookup.stars.0);
-            }
-            std::hint::black_box(brightest);
-            for lookup in lookups.iter() {
-                let hypothesis = &mut pending[lookup.hypothesis as usize];
-                let magnitudes = self.magnitudes(index, hypothesis.zero_point_mag);
-                let wanted = in_single_precision(magnitudes);
-                let is_confirming = match &lookup.disc {
-                    Some(disc) => faces.is_any_within(disc, lookup.direction.as_vector(), &wanted),
-                    None => {
-                        let (grid, direction) = (&self.stars.sky.grid, &lookup.direction);
-                        grid.is_any_within(direction, hypothesis.chord, wanted)
-                    }
-                };
-                hypothesis.add(self.factor(is_confirming, hypothesis.radius_rad, magnitudes));
             }
         }
     }

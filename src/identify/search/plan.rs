@@ -1,13 +1,22 @@
-//! Which triangles a search tries, and how many hypotheses.
+//! Which triangles a search tries, and how much it does.
+//!
+//! All limits count work, never time: the answer to a frame is the same on every machine.
+
+use crate::identify::Effort;
 
 /// Most hypotheses of a search: those that are tested one by one, and the votes.
-pub const MAX_HYPOTHESES: u64 = MAX_TESTED + MAX_VOTES;
-const MAX_TESTED: u64 = 10_000;
-const MAX_VOTES: u64 = 1_000_000;
+pub const MAX_HYPOTHESES: u64 = MAX_TESTED + Effort::Thorough.work(WORK) / WORK_OF_VOTE + MAX_LAST;
+/// Most hypotheses that are tested one by one.
+const MAX_TESTED: u64 = 2_000;
+/// Votes of the last triangle may come on top.
+const MAX_LAST: u64 = 1_000_000;
 /// A vote takes as long as so many catalogue triangles that are looked at.
 pub const WORK_OF_VOTE: u64 = 3;
+/// Work of a search of the brightest stars, and of a tier.
+const WORK: u64 = 1_000_000;
+const WORK_OF_TIER: u64 = 450_000;
 
-/// One sweep over the triangles of the brightest stars.
+/// Some of the triangles of the brightest stars.
 pub struct SearchPass {
     /// Number of stars that form triangles, the brightest.
     pub stars: usize,
@@ -23,47 +32,46 @@ pub struct SearchPass {
 /// What a search tries.
 #[derive(Clone, Copy)]
 pub struct SearchPlan {
-    /// The passes, one after the other.
+    /// The passes, one after the other, whose triangles are tested.
     pub passes: &'static [SearchPass],
-    /// The passes whose triangles vote, after these: votes add up, and are counted after each.
+    /// The passes whose triangles vote, after these: each with those of the pass before.
     pub votes: &'static [SearchPass],
-    /// Maximum number of hypotheses.
-    pub max_hypotheses: u64,
+    /// Maximum number of hypotheses that are tested one by one.
+    pub max_tested: u64,
     /// Maximum work: the number of catalogue triangles of the right shape, and of votes, which count
     /// [`WORK_OF_VOTE`] each.
     pub max_work: u64,
 }
 
-/// The plan for the brightest stars, of the frame or of each of its parts.
-pub const BRIGHTEST: SearchPlan = SearchPlan {
-    passes: &PASSES,
-    votes: &VOTES,
-    max_hypotheses: MAX_TESTED,
-    max_work: 1_600_000,
-};
+impl SearchPlan {
+    /// The plan for the brightest stars of the frame.
+    pub const fn brightest(effort: Effort) -> Self {
+        Self {
+            passes: &PASSES,
+            ..Self::again(effort)
+        }
+    }
 
-/// The plan for further choices of the brightest stars: they only vote.
-pub const AGAIN: SearchPlan = SearchPlan {
-    passes: &[],
-    ..BRIGHTEST
-};
+    /// The plan for the brightest stars of each part of the frame, which only vote.
+    pub const fn again(effort: Effort) -> Self {
+        Self {
+            passes: &[],
+            votes: &VOTES,
+            max_tested: MAX_TESTED,
+            max_work: effort.work(WORK),
+        }
+    }
 
-/// The plan for stars below brighter detections. Small triangles are enough: the index lists them
-/// down to fainter stars than large ones.
-pub const TIER: SearchPlan = SearchPlan {
-    passes: &[],
-    votes: &TIER_VOTES,
-    max_hypotheses: 0,
-    max_work: 500_000,
-};
-
-/// The triangles of a tier that vote.
-pub const TIER_VOTES: [SearchPass; 1] = [SearchPass {
-    stars: 30,
-    tolerance: 0.0025,
-    true_confirmation: 0.35,
-    largest_share: 0.35,
-}];
+    /// The plan for stars below brighter detections, which only vote. Small triangles are enough: the
+    /// index lists them down to fainter stars than large ones.
+    pub const fn tier(effort: Effort) -> Self {
+        Self {
+            votes: &TIER_VOTES,
+            max_work: effort.work(WORK_OF_TIER),
+            ..Self::again(effort)
+        }
+    }
+}
 
 /// The passes: the usual frame, a distorting lens.
 pub const PASSES: [SearchPass; 2] = [
@@ -81,24 +89,23 @@ pub const PASSES: [SearchPass; 2] = [
     },
 ];
 
-/// The triangles that vote: of many stars, among which many may be false.
-pub const VOTES: [SearchPass; 3] = [
-    SearchPass {
-        stars: 14,
-        tolerance: 0.0025,
-        true_confirmation: 0.25,
-        largest_share: f64::INFINITY,
-    },
-    SearchPass {
-        stars: 20,
-        tolerance: 0.0025,
-        true_confirmation: 0.25,
-        largest_share: f64::INFINITY,
-    },
-    SearchPass {
-        stars: 26,
-        tolerance: 0.0025,
-        true_confirmation: 0.25,
-        largest_share: f64::INFINITY,
-    },
+/// The triangles that vote, of more and more stars: many may be false.
+const VOTES: [SearchPass; 7] = [
+    votes_of(14, f64::INFINITY),
+    votes_of(20, f64::INFINITY),
+    votes_of(26, f64::INFINITY),
+    votes_of(40, f64::INFINITY),
+    votes_of(60, f64::INFINITY),
+    votes_of(100, f64::INFINITY),
+    votes_of(160, f64::INFINITY),
 ];
+const TIER_VOTES: [SearchPass; 2] = [votes_of(30, 0.35), votes_of(60, 0.35)];
+
+const fn votes_of(stars: usize, largest_share: f64) -> SearchPass {
+    SearchPass {
+        stars,
+        tolerance: 0.0025,
+        true_confirmation: 0.25,
+        largest_share,
+    }
+}

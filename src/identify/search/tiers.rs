@@ -14,8 +14,6 @@ const FIRST_LEFT_OUT: usize = 20;
 const RATIO: (usize, usize) = (3, 2);
 /// Minimum number of stars in a tier.
 const MIN_STARS: usize = 12;
-/// Maximum number of tiers: the last one leaves some 1700 detections out.
-const MAX_TIERS: usize = 12;
 
 /// Stars below a number of brighter detections.
 #[derive(Debug, Clone)]
@@ -31,13 +29,13 @@ pub struct Tier {
 pub struct Tiers(Vec<Tier>);
 
 impl Tiers {
-    /// The tiers of `field`, from bright to faint.
-    pub fn below(&mut self, field: &StarField) -> &[Tier] {
+    /// At most so many tiers of `field`, from bright to faint.
+    pub fn below(&mut self, field: &StarField, most: usize) -> &[Tier] {
         let left_out = std::iter::successors(Some(FIRST_LEFT_OUT), |left_out| {
             Some(left_out * RATIO.0 / RATIO.1)
         });
         let left_out = left_out
-            .take(MAX_TIERS)
+            .take(most)
             .take_while(|left_out| left_out + MIN_STARS <= field.stars.len());
         let mut count = 0;
         for brighter in left_out {
@@ -75,7 +73,7 @@ mod tests {
         let field = field(100);
         let mut tiers = Tiers::default();
         let found: Vec<(usize, usize, usize)> = tiers
-            .below(&field)
+            .below(&field, 12)
             .iter()
             .map(|tier| {
                 let stars = &tier.field.stars;
@@ -88,7 +86,7 @@ mod tests {
 
     #[test]
     fn few_stars_have_no_tiers() {
-        assert!(Tiers::default().below(&field(31)).is_empty());
-        assert_eq!(Tiers::default().below(&field(100_000)).len(), MAX_TIERS);
+        assert!(Tiers::default().below(&field(31), 12).is_empty());
+        assert_eq!(Tiers::default().below(&field(100_000), 5).len(), 5);
     }
 }

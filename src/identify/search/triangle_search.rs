@@ -3,15 +3,16 @@
 //! Triangles of bright observed stars → similar catalogue triangles → hypotheses → confirmed by
 //! further stars.
 
-use super::confirmation::{Batch, ConfirmingStars, PendingHypothesis, Pose};
+use super::confirmation::{ConfirmingStars, PendingHypothesis, Pose};
 use super::false_alarm::{FalseAlarm, TESTED_STARS};
-use super::plan::{AGAIN, BRIGHTEST, PASSES, SearchPass, SearchPlan, TIER, WORK_OF_VOTE};
+use super::plan::{PASSES, SearchPass, SearchPlan, WORK_OF_VOTE};
 use super::queries::{LookedUp, ObservedStars, ObservedTriangle, Query, Similar};
 use super::tiers::Tiers;
 use super::votes::{Vote, Voter, Votes, frame_of};
 use crate::base::coords::Rotation;
 use crate::base::interrupt::Interrupt;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px};
+use crate::identify::effort::Effort;
 use crate::identify::field::StarField;
 use crate::identify::fit::{POSE_PARAMETERS, Refined, Refiner, Start};
 use crate::identify::hypothesis::{Hypothesis, Problem};
@@ -24,10 +25,6 @@ use nalgebra::{Matrix3, Vector3};
 /// found.
 const FOV_SLACK: f64 = 1.05;
 
-/// From this number of hypotheses on, a search is long: several are tested together.
-const LONG_SEARCH: u64 = 2_000;
-/// Most hypotheses that wait for their test.
-const WAITING: usize = 128;
 /// Largest log10 of the false-alarm probability at which a frame counts as identified.
 pub const LOG10_FALSE_ALARM_LIMIT: f64 = -8.0;
 /// A hypothesis below this ends the search. One between the two limits waits for the end of its
@@ -52,9 +49,6 @@ pub struct SearchBuffers {
     queries: Vec<Query>,
     /// Catalogue triangles that are like an observed one.
     looked_up: LookedUp,
-    /// Hypotheses from one triangle that wait for their test.
-    waiting: Vec<PendingHypothesis>,
-    batch: Batch,
     votes: Votes,
     voters: Vec<Option<Voter>>,
     /// To confirm answers.
@@ -67,6 +61,7 @@ pub struct SearchBuffers {
 pub struct Search<'a> {
     problem: Problem<'a>,
     plan: SearchPlan,
+    effort: Effort,
     near: Option<SkyRegion>,
     buffers: &'a mut SearchBuffers,
     observed: ObservedStars<'a>,
@@ -98,13 +93,13 @@ pub struct Found {
 
 impl<'a> Search<'a> {
     /// A search over `field`.
-    pub fn new(problem: Problem<'a>, priors: &Priors, buffers: &'a mut SearchBuffers) -> Self {
+    pub fn new(
+        problem: Problem<'a>,
+        priors: &Priors,
+        effort: Effort,
+        buffers: &'a mut SearchBuffers,
+    ) -> Self {
         let Problem { field, sky, .. } = problem;
-        let plan = if problem.brighter > 0 {
-            TIER
-        } else {
-            BRIGHTEST
-        };
         buffers.refiner.around.forget();
         let [narrowest_rad, widest_rad] = sky.fov_range_rad();
         let wide = focal_length_px(field.width_px, widest_rad * FOV_SLACK);
@@ -115,7 +110,8 @@ impl<'a> Search<'a> {
         };
         Self {
             problem,
-            plan,
+            plan: SearchPlan::brightest(effort),
+            effort,
             near: priors.near,
             buffers,
             observed: ObservedStars {
@@ -135,8 +131,12 @@ impl<'a> Search<'a> {
 
     /// The next search, of another choice of stars, whose triangles only vote.
     pub fn again(self, problem: Problem<'a>, priors: &Priors) -> Self {
-        let next = Self::new(problem, priors, self.buffers);
-        let plan = if problem.brighter > 0 { TIER } else { AGAIN };
+        let plan = if problem.brighter > 0 {
+            SearchPlan::tier(self.effort)
+        } else {
+            SearchPlan::again(self.effort)
+        };
+        let next = Self::new(problem, priors, self.effort, self.buffers);
         Self {
             number: self.number + 1,
             plan,
@@ -167,12 +167,10 @@ impl<'a> Search<'a> {
     /// Tries triangles until a hypothesis passes. Returns it, fitted to the brightest stars.
     pub fn run(&mut self) -> Option<Found> {
         let plan = self.plan;
-        let t = std::time::Instant::now();
-        let r = plan.passes
+        plan.passes
             .iter()
-            .find_map(|pass| self.sweep(pass).or_else(|| self.provisional.take()));
-            if std::env::var_os("SEARCHLOG").is_some() { eprintln!("passes {} hypotheses {} candidates {:.1} ms", self.hypotheses, self.candidates, t.elapsed().as_secs_f64()*1e3); }
-            r.or_else(|| self.vote())
+            .find_map(|pass| self.sweep(pass).or_else(|| self.provisional.take()))
+            .or_else(|| self.vote())
     }
 
     /// Lets the triangles of more and more stars vote, and tests the poses with most votes. Every vote
@@ -188,16 +186,11 @@ impl<'a> Search<'a> {
             if self.is_spent() {
                 return None;
             }
-            let t0 = std::time::Instant::now();
             self.gather(pass, from);
-            let t1 = std::time::Instant::now();
             from = pass.stars;
             let votes = &mut self.buffers.votes;
             self.hypotheses = tested + votes.len() as u64;
             votes.count();
-            if std::env::var_os("SEARCHLOG").is_some() { eprintln!("search {} brighter {} stars {} queries {} votes {} candidates {} gather {:.1} count {:.1} ms", self.number, self.problem.brighter, pass.stars, self.buffers.queries.len(), self.buffers.votes.len(), self.candidates, (t1 - t0).as_secs_f64()*1e3, t1.elapsed().as_secs_f64()*1e3); }
-            let _g = G(std::time::Instant::now());
-            let votes = &mut self.buffers.votes;
             let leaders: Vec<Vote> = votes.leaders().collect();
             let found = leaders.iter().find_map(|vote| self.try_vote(vote));
             found.or_else(|| self.provisional.take())
@@ -271,7 +264,7 @@ impl<'a> Search<'a> {
 
     /// Whether no more hypotheses are to be tested.
     fn is_exhausted(&self) -> bool {
-        self.hypotheses > self.plan.max_hypotheses || self.candidates > self.plan.max_work
+        self.hypotheses > self.plan.max_tested || self.candidates > self.plan.max_work
     }
 
     fn try_triangle(&mut self, triangle: &ObservedTriangle) -> Option<Found> {
@@ -285,7 +278,7 @@ impl<'a> Search<'a> {
             self.try_similar(query, similar)
         });
         (self.buffers.queries, self.buffers.looked_up) = (queries, looked_up);
-        found.or_else(|| self.try_waiting(triangle))
+        found
     }
 
     /// Tests one hypothesis: the three observed stars are these three of the catalogue.
@@ -295,16 +288,7 @@ impl<'a> Search<'a> {
         }
         let mut pending = self.pending(query, similar)?;
         self.hypotheses += 1;
-        pending.number = self.hypotheses;
         let triangle = &query.triangle;
-        if self.hypotheses > LONG_SEARCH {
-            self.buffers.waiting.push(pending);
-            return if self.buffers.waiting.len() < WAITING {
-                None
-            } else {
-                self.try_waiting(triangle)
-            };
-        }
         self.confirming_stars(triangle).test(&mut pending);
         if !pending.is_confirmed() {
             return None;
@@ -316,7 +300,7 @@ impl<'a> Search<'a> {
         let pose = self.pose(query, similar)?;
         let zero_point_mag = f64::from(similar.zero_point_mag);
         let confirming_px = query.triangle.confirming_px;
-        Some(PendingHypothesis::new(pose, zero_point_mag, self.hypotheses, confirming_px))
+        Some(PendingHypothesis::new(pose, zero_point_mag, confirming_px))
     }
 
     /// The pose in which the observed triangle is that of the catalogue; `None` where the priors
@@ -353,32 +337,6 @@ impl<'a> Search<'a> {
             triangle: triangle.stars,
             true_confirmation: triangle.true_confirmation,
         }
-    }
-
-    /// Tests the hypotheses that wait, all from this triangle, and decides on those that are
-    /// confirmed, in their order. The result is that of testing each when it came.
-    fn try_waiting(&mut self, triangle: &ObservedTriangle) -> Option<Found> {
-        if self.buffers.waiting.is_empty() {
-            return None;
-        }
-        let mut waiting = std::mem::take(&mut self.buffers.waiting);
-        let mut batch = std::mem::take(&mut self.buffers.batch);
-        self.confirming_stars(triangle)
-            .test_all(&mut waiting, &mut batch);
-        let last = self.hypotheses;
-        let found = waiting
-            .iter()
-            .filter(|pending| pending.is_confirmed())
-            .find_map(|pending| {
-                self.hypotheses = pending.number;
-                self.decide_pending(pending, triangle)
-            });
-        if found.is_none() {
-            self.hypotheses = last;
-        }
-        waiting.clear();
-        (self.buffers.waiting, self.buffers.batch) = (waiting, batch);
-        found
     }
 
     fn decide_pending(
@@ -483,7 +441,7 @@ impl<'a> Search<'a> {
             return Some(log10);
         }
         let mut tiers = std::mem::take(&mut self.buffers.tiers);
-        let of_tiers = tiers.below(field).iter().zip(BEFORE_TIERS + 1..);
+        let of_tiers = tiers.below(field, self.effort.tiers()).iter().zip(BEFORE_TIERS + 1..);
         let of_tiers = of_tiers.filter_map(|(tier, number)| {
             let problem = Problem {
                 field: &tier.field,
@@ -568,6 +526,3 @@ mod tests {
         assert!((0.99..=1.0).contains(&sum), "{sum}");
     }
 }
-
-struct G(std::time::Instant);
-impl Drop for G { fn drop(&mut self) { if std::env::var_os("SEARCHLOG").is_some() { eprintln!("  leaders {:.1} ms", self.0.elapsed().as_secs_f64()*1e3); } } }

@@ -181,10 +181,12 @@ impl Votes {
             // The rows of the rotation from the sky to the camera.
             let axis = of_sky * of_camera.row(2).transpose();
             let side = of_sky * of_camera.row(0).transpose();
-            if let Some(cells) = self.cells(&axis, &side, f64::from(similar.ln_focal), mirrored) {
+            let ln_focal = f64::from(similar.ln_focal);
+            if let Some(cells) = self.cells(&axis, &side, ln_focal, mirrored) {
+                let similar = *similar;
                 self.votes.push(Vote {
                     triangle,
-                    similar: *similar,
+                    similar,
                     cells,
                 });
             }
@@ -332,14 +334,23 @@ mod tests {
 
     const WIDTH_PX: f64 = 1000.0;
 
-    fn pose(ra_rad: f64, dec_rad: f64, roll_rad: f64, focal_px: f64) -> Pose {
+    /// Adds a vote of `triangle` for a pose.
+    fn add(votes: &mut Votes, triangle: u32, [ra_rad, dec_rad, roll_rad]: [f64; 3], focal_px: f64) {
         let boresight = UnitVector::from_ra_dec(ra_rad, dec_rad);
         let rotation = Rotation::<Icrs, Camera>::looking_at(&boresight, roll_rad);
-        Pose {
-            sky_to_camera: *rotation.matrix(),
-            focal_px,
-            mirrored: false,
-        }
+        let [axis, side] = [2, 0].map(|row| rotation.matrix().row(row).transpose());
+        let cells = votes.cells(&axis, &side, focal_px.ln(), false).unwrap();
+        let similar = Similar {
+            query: 0,
+            corners: [triangle; 3],
+            zero_point_mag: 0.0,
+            ln_focal: focal_px.ln() as f32,
+        };
+        votes.votes.push(Vote {
+            triangle,
+            similar,
+            cells,
+        });
     }
 
     proptest! {
@@ -349,23 +360,41 @@ mod tests {
             others in prop::collection::vec((0.0..6.2_f64, -1.5..1.5_f64, -3.0..3.0_f64), 0..200),
         ) {
             let mut votes = Votes::default();
+            votes.begin(WIDTH_PX, [400.0, 6000.0], None);
             for (triangle, &(ra, dec, roll)) in (0..).zip(&others) {
-                votes.add(&pose(ra, dec, roll, focal), WIDTH_PX, triangle, 0, [0; 3]);
+                add(&mut votes, triangle, [ra, dec, roll], focal);
             }
             // Within a quarter of a cell of each other: together in a cell of one grid in most cases,
             // if not in all coordinates.
-            for triangle in 0..6_u32 {
+            for triangle in 1000..1006_u32 {
                 let off = 0.01 * f64::from(triangle % 2) * (WIDTH_PX / focal).atan();
-                let near = pose(ra, dec + off, roll, focal * (1.0 + 0.1 * off));
                 // Each votes twice: that counts once.
                 for _ in 0..2 {
-                    votes.add(&near, WIDTH_PX, 1000 + triangle, 1, [triangle; 3]);
+                    add(&mut votes, triangle, [ra, dec + off, roll], focal * (1.0 + 0.1 * off));
                 }
             }
             votes.count();
-            prop_assert!(votes.leaders() > 0);
-            prop_assert!(votes.votes_for(0).all(|vote| vote.query == 1));
+            prop_assert!(votes.leaders().count() > 0);
+            prop_assert!(votes.leaders().take(3).all(|vote| vote.triangle >= 1000));
             prop_assert!(votes.leaders[0].triangles <= 6);
+        }
+
+        #[test]
+        fn only_poses_that_a_hint_allows_are_voted_for(
+            ra in 0.0..6.2_f64, dec in -1.5..1.5_f64, roll in -3.0..3.0_f64,
+        ) {
+            let centre = UnitVector::from_ra_dec(2.0, 0.5);
+            let near = SkyRegion { centre, radius_rad: 0.4 };
+            let mut votes = Votes::default();
+            votes.begin(WIDTH_PX, [400.0, 6000.0], Some(near));
+            let boresight = UnitVector::from_ra_dec(ra, dec);
+            let rotation = Rotation::<Icrs, Camera>::looking_at(&boresight, roll);
+            let [axis, side] = [2, 0].map(|row| rotation.matrix().row(row).transpose());
+            let apart_rad = boresight.angle_to(&centre);
+            let cells = votes.cells(&axis, &side, 1000_f64.ln(), false);
+            // A cell is 0.06 of the field.
+            prop_assert!(cells.is_some() || apart_rad > 0.4);
+            prop_assert!(cells.is_none() || apart_rad < 0.4 + 0.1);
         }
 
         #[test]

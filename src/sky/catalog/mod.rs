@@ -46,7 +46,6 @@
 mod compact;
 mod contents;
 mod error;
-pub(crate) mod face_grid;
 mod id;
 mod import;
 mod position;
