@@ -117,13 +117,18 @@ impl<'p> Frame<'p> {
 
     /// The negative of the frame: what is highest becomes lowest. It has no saturation level.
     pub(crate) fn inverted(&self) -> Frame<'static> {
-        let values = self.values();
-        let values = values.iter().copied();
-        let lowest = values.clone().fold(f32::INFINITY, f32::min);
-        let highest = values.clone().fold(f32::NEG_INFINITY, f32::max);
-        let pixels = values.map(|value| lowest + (highest - value));
+        let [lowest, highest] = self.range_adu();
+        let pixels = self.pixels.values().map(|value| lowest + (highest - value));
         Frame::from_checked(self.width, self.height, pixels.collect::<Vec<f32>>())
             .with_levels(self.step_adu, None)
+    }
+
+    /// The lowest and the highest value.
+    pub(crate) fn range_adu(&self) -> [f32; 2] {
+        let values = self.pixels.values();
+        values.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], value| {
+            [low.min(value), high.max(value)]
+        })
     }
 
     /// Sets the step between grey levels and the saturation level, in ADU.

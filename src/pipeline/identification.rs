@@ -143,6 +143,11 @@ fn negative(
     const MIN_SNR: f64 = 10.0;
     /// The negative, and the frame as floats.
     const BYTES_PER_PIXEL: u64 = 2 * size_of::<f32>() as u64;
+    // The sky of a negative is nearer to its highest level than to its lowest.
+    let [lowest, highest] = frame.range_adu().map(f64::from);
+    if detections.background_adu <= (lowest + highest) / 2.0 {
+        return None;
+    }
     if !detector.has_room(frame, BYTES_PER_PIXEL * frame.pixels.len() as u64) {
         return None;
     }
@@ -155,10 +160,7 @@ fn negative(
     let bright = detections.sources.iter().filter(stands_out).count();
     let dark = inverted.sources.iter().filter(stands_out);
     let spots = dark.filter(|source| source.flags.is_star_like()).count();
-    // The sky of a negative is nearer to its highest level than to its lowest.
-    let is_bright_sky = detections.background_adu > inverted.background_adu;
-    let is_negative = is_bright_sky && spots >= MIN_SPOTS.max(MIN_RATIO * bright);
-    is_negative.then_some(Diagnosis::Negative { spots })
+    (spots >= MIN_SPOTS.max(MIN_RATIO * bright)).then_some(Diagnosis::Negative { spots })
 }
 
 /// Result of the search, and the scale that was dropped because nothing matched with it.

@@ -16,8 +16,7 @@ const MEDIAN_PX: usize = 1 << 20;
 /// Whether the frame is empty or overexposed.
 pub(super) fn diagnose(frame: &Frame) -> Option<Diagnosis> {
     let values = || frame.pixels.values().filter(|p| !p.is_nan());
-    let lowest = values().fold(f32::INFINITY, f32::min);
-    let highest = values().fold(f32::NEG_INFINITY, f32::max);
+    let [lowest, highest] = frame.range_adu();
     let saturation_adu = frame.saturation_level_adu();
     let is_full = saturation_adu.is_some_and(|full| highest >= full);
     if lowest == highest && !is_full {
