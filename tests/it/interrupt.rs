@@ -34,14 +34,14 @@ fn a_search_of_few_triangles_is_asked_often_too() {
     let indexed = IndexedCatalog::built_in();
     let context = Context::new(&indexed);
     let frame = few_triangles();
-    let (interrupt, asked) = at_question(2000);
+    let (interrupt, asked) = at_question(200);
     let mut workspace = Workspace::new().with_interrupt(&interrupt);
     let solution = solve_frame(&frame, &context, &mut workspace).unwrap();
     match solution.outcome {
         Outcome::NotIdentified(reason) => assert_eq!(reason.code(), "interrupted"),
         outcome => panic!("{outcome:?}"),
     }
-    assert!(asked.load(Ordering::Relaxed) < 2010);
+    assert!(asked.load(Ordering::Relaxed) < 210);
 }
 
 #[test]

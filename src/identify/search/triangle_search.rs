@@ -8,7 +8,7 @@ use super::false_alarm::{FalseAlarm, TESTED_STARS};
 use super::plan::{PASSES, SearchPass, SearchPlan, WORK_OF_VOTE};
 use super::queries::{LookedUp, ObservedStars, ObservedTriangle, Query, Similar};
 use super::tiers::Tiers;
-use super::votes::{Vote, Voter, Votes, frame_of};
+use super::votes::{Vote, Voter, Votes, frame_of, triple};
 use crate::base::coords::Rotation;
 use crate::base::interrupt::Interrupt;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px};
@@ -500,10 +500,6 @@ fn searches_weight(number: u32) -> f64 {
 fn triangles(from: usize, stars: usize) -> impl Iterator<Item = [usize; 3]> {
     let pairs = |faintest| (1..faintest).flat_map(|b| (0..b).map(move |a| [a, b]));
     (from..stars).flat_map(move |c| pairs(c).map(move |[a, b]| [a, b, c]))
-}
-
-pub(super) fn triple([a, b, c]: &[Vector3<f64>; 3]) -> f64 {
-    a.cross(b).dot(c)
 }
 
 /// The rotation from the sky to the camera by two stars (TRIAD, with the middle of AB as the first

@@ -10,7 +10,6 @@
 //! Ballard 1981, Pattern Recognition 13, 111: the generalized Hough transform.
 
 use super::queries::Similar;
-use super::triangle_search::triple;
 use crate::identify::priors::SkyRegion;
 use crate::sky::catalog::sky_grid::SkyGrid;
 use nalgebra::{Matrix3, Vector3};
@@ -37,7 +36,8 @@ const DIGITS: usize = 1 << DIGIT_BITS;
 const LEVELS_FROM: f64 = -10.0;
 /// Coordinates of cells are counted from this number, so that none is negative.
 const CELLS_FROM: f64 = 1e6;
-/// Beyond the pole of a hint's region by this much of a cell, a triangle's pose may still be right.
+/// The pose of a triangle may be outside the region that a hint allows by this part of a cell, and the
+/// true one inside.
 const NEAR_SLACK: f64 = 1.0;
 
 /// A vote for the pose that an observed triangle has if it is one of the catalogue.
@@ -82,6 +82,11 @@ pub fn frame_of([a, b, _]: &[Vector3<f64>; 3]) -> Option<Matrix3<f64>> {
     let first = (a + b).try_normalize(1e-12)?;
     let third = a.cross(b).try_normalize(1e-15)?;
     Some(Matrix3::from_columns(&[first, third.cross(&first), third]))
+}
+
+/// The triple product of three vectors.
+pub fn triple([a, b, c]: &[Vector3<f64>; 3]) -> f64 {
+    a.cross(b).dot(c)
 }
 
 /// A cell's number and a vote for it.
