@@ -193,11 +193,14 @@ impl Workspace {
         if found.is_none() {
             let thinned = thinning.thin(field);
             let thinned = thinned.map(|field| Problem { field, ..whole });
-            let tiers = tiers.below(field, effort.tiers()).iter().map(|tier| Problem {
-                field: &tier.field,
-                brighter: tier.brighter,
-                ..whole
-            });
+            let tiers = tiers
+                .below(field, effort.tiers())
+                .iter()
+                .map(|tier| Problem {
+                    field: &tier.field,
+                    brighter: tier.brighter,
+                    ..whole
+                });
             for problem in thinned.into_iter().chain(tiers) {
                 search = search.again(problem, priors);
                 found = search.run();

@@ -6,7 +6,9 @@ use crate::base::epoch::ObservationDate;
 use crate::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
 use crate::camera::data_sheet::DataSheet;
 use crate::detect::{CentroidMethod, DetectConfig};
-use crate::identify::{DateSource, Effort, FrameDate, NAME_ODDS, Priors, Scale, ScalePrior, SkyRegion};
+use crate::identify::{
+    DateSource, Effort, FrameDate, NAME_ODDS, Priors, Scale, ScalePrior, SkyRegion,
+};
 use crate::model::sensitivity::Extinction;
 use crate::photometry::comparison::ObservingSetup;
 use crate::sky::observer::Site;

@@ -307,7 +307,12 @@ mod tests {
     fn classes() -> Vec<SizeClass> {
         let triangle = |i: u32| {
             let share = f64::from(i) / 100.0;
-            Triangle::new([i, i + 1, i + 2], [0.5 + share / 2.0, share], share, [i as f32 / 10.0; 3])
+            Triangle::new(
+                [i, i + 1, i + 2],
+                [0.5 + share / 2.0, share],
+                share,
+                [i as f32 / 10.0; 3],
+            )
         };
         let triangles: Vec<Triangle> = (0..100).map(triangle).collect();
         vec![

@@ -220,7 +220,10 @@ impl WantedShape {
         let within_sq = (within * within) as f32;
         move |triangle| {
             let [of_middle, of_shortest] = triangle.ratios;
-            let off = [f32::from(of_middle) - middle, f32::from(of_shortest) - shortest];
+            let off = [
+                f32::from(of_middle) - middle,
+                f32::from(of_shortest) - shortest,
+            ];
             off[0] * off[0] + off[1] * off[1] <= within_sq
         }
     }

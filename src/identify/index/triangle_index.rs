@@ -134,7 +134,10 @@ mod tests {
                 ([0.98, 0.09], 0.02),
             ] {
                 let mut found = HashSet::new();
-                let shape = WantedShape { ratios: wanted, tolerance };
+                let shape = WantedShape {
+                    ratios: wanted,
+                    tolerance,
+                };
                 let has_shape = shape.test();
                 for place in class.places(&shape) {
                     let chunk = index.chunk(stars, number, place.chunk as usize);

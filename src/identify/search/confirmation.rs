@@ -123,11 +123,11 @@ impl ConfirmingStars<'_> {
             let direction = hypothesis.pose.direction_of(&offset);
             let magnitudes = self.magnitudes(index, hypothesis.zero_point_mag);
             let wanted = in_single_precision(magnitudes);
-            let is_confirming = self
-                .stars
-                .sky
-                .grid
-                .is_any_within(&direction, hypothesis.chord, wanted);
+            let is_confirming =
+                self.stars
+                    .sky
+                    .grid
+                    .is_any_within(&direction, hypothesis.chord, wanted);
             hypothesis.add(self.factor(is_confirming, hypothesis.radius_rad, magnitudes));
             if hypothesis.answer.is_some() {
                 break;

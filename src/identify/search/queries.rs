@@ -257,7 +257,12 @@ impl ObservedStars<'_> {
         std::hint::black_box(fetched);
         let mut candidates = 0;
         for place in places.iter() {
-            candidates += self.add_similar(&queries[place.0 as usize], place.0, triangles(place), similar);
+            candidates += self.add_similar(
+                &queries[place.0 as usize],
+                place.0,
+                triangles(place),
+                similar,
+            );
         }
         candidates
     }

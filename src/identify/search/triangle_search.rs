@@ -179,8 +179,12 @@ impl<'a> Search<'a> {
         let tested = self.hypotheses;
         self.candidates = 0;
         self.buffers.queries.clear();
-        let ObservedStars { field, focal_px, .. } = self.observed;
-        self.buffers.votes.begin(field.width_px, focal_px, self.near);
+        let ObservedStars {
+            field, focal_px, ..
+        } = self.observed;
+        self.buffers
+            .votes
+            .begin(field.width_px, focal_px, self.near);
         let mut from = 2;
         self.plan.votes.iter().find_map(|pass| {
             if self.is_spent() {
@@ -224,9 +228,11 @@ impl<'a> Search<'a> {
             let of_triangle = &queries[first..];
             self.candidates += self.observed.look_up(of_triangle, looked_up);
             voters.clear();
-            voters.extend(of_triangle.iter().map(|query| {
-                Voter::new(&self.observed.vectors(&query.triangle, query.middle_px))
-            }));
+            voters.extend(
+                of_triangle.iter().map(|query| {
+                    Voter::new(&self.observed.vectors(&query.triangle, query.middle_px))
+                }),
+            );
             let grid = &self.observed.sky.grid;
             votes.add_all(voters, &looked_up.similar, first as u32, grid);
         }
@@ -441,7 +447,10 @@ impl<'a> Search<'a> {
             return Some(log10);
         }
         let mut tiers = std::mem::take(&mut self.buffers.tiers);
-        let of_tiers = tiers.below(field, self.effort.tiers()).iter().zip(BEFORE_TIERS + 1..);
+        let of_tiers = tiers
+            .below(field, self.effort.tiers())
+            .iter()
+            .zip(BEFORE_TIERS + 1..);
         let of_tiers = of_tiers.filter_map(|(tier, number)| {
             let problem = Problem {
                 field: &tier.field,
@@ -466,7 +475,9 @@ impl<'a> Search<'a> {
     fn log10_in(&mut self, problem: Problem, hypothesis: &Hypothesis, stars: usize) -> Option<f64> {
         let focal_px = hypothesis.camera.focal_length_px;
         let slack = 1.0 + 2.0 * PASSES[1].tolerance;
-        if focal_px < self.observed.focal_px[0] / slack || focal_px > self.observed.focal_px[1] * slack {
+        if focal_px < self.observed.focal_px[0] / slack
+            || focal_px > self.observed.focal_px[1] * slack
+        {
             return None;
         }
         if let Some(SkyRegion { centre, radius_rad }) = &self.near {

@@ -136,14 +136,14 @@ impl Votes {
         self.votes.clear();
         self.leaders.clear();
         self.near = near;
-        for grid in 0..GRIDS {
+        for (grid, shift) in SHIFTS.into_iter().enumerate() {
             let level_of = |focal_px: f64| level(focal_px.ln(), grid);
             let [first, last] = focal_px.map(level_of);
             self.first_level[grid] = first - 1;
             let levels = &mut self.levels[grid];
             levels.clear();
             levels.extend((first - 1..=last + 1).map(|level| {
-                let middle = (f64::from(level) + 0.5 - SHIFTS[grid]) * SCALE_STEP + LEVELS_FROM;
+                let middle = (f64::from(level) + 0.5 - shift) * SCALE_STEP + LEVELS_FROM;
                 let step_rad = AXIS_STEP * (width_px / middle.exp()).atan();
                 let min_cos = near.map_or(-1.0, |near| {
                     (near.radius_rad + NEAR_SLACK * step_rad).min(PI).cos()
