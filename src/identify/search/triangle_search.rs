@@ -195,9 +195,7 @@ impl<'a> Search<'a> {
             let votes = &mut self.buffers.votes;
             self.hypotheses = tested + votes.len() as u64;
             votes.count();
-            let leaders: Vec<Vote> = votes.leaders().collect();
-            let found = leaders.iter().find_map(|vote| self.try_vote(vote));
-            found.or_else(|| self.provisional.take())
+            self.try_leading().or_else(|| self.provisional.take())
         })
     }
 
@@ -238,10 +236,21 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn try_vote(&mut self, vote: &Vote) -> Option<Found> {
-        if self.is_interrupted() {
-            return None;
+    /// Tests the poses with most votes.
+    fn try_leading(&mut self) -> Option<Found> {
+        let mut number = 0;
+        while let Some(vote) = self.buffers.votes.leading(number)
+            && !self.is_interrupted()
+        {
+            if let Some(found) = self.try_vote(&vote) {
+                return Some(found);
+            }
+            number += 1;
         }
+        None
+    }
+
+    fn try_vote(&mut self, vote: &Vote) -> Option<Found> {
         let query = self.buffers.queries[vote.query()];
         let pending = self.pending(&query, &vote.similar)?;
         self.decide_pending(&pending, &query.triangle)
