@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 TABLES = ("frames.parquet", "stars.parquet")
 """Directories of the parts of the two tables."""
 
-TIME_LIMIT_S = 8.0
+TIME_LIMIT_S = 60.0
 """How long a frame may take by default."""
 
 TRIES = 5
@@ -148,7 +148,7 @@ def process(
         Which image of a file with several, from 1; or all, which are named ``FRAME[1]`` and so on.
         Without it the first.
     **options
-        What is stated of all frames, see `SolveOptions`; `time_limit` is 8 seconds by default.
+        What is stated of all frames, see `SolveOptions`; `time_limit` is 60 seconds by default.
 
     Returns
     -------
