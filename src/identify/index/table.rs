@@ -92,6 +92,9 @@ pub struct SizeClass {
     pub low: f64,
     /// Largest longest side, as a chord.
     pub high: f64,
+    /// Logarithm of `low`, and from one size to the next.
+    ln_low: f64,
+    ln_step: f64,
     /// `cell_starts[c]..cell_starts[c + 1]` are the triangles of cell `c`; row by row.
     pub cell_starts: Vec<u32>,
     /// The triangles of each chunk, once it is loaded.
@@ -130,20 +133,17 @@ impl SizeClass {
         Self {
             low,
             high,
+            ln_low: low.ln(),
+            ln_step: (high / low).ln() / SIZES,
             cell_starts,
             chunks: (0..CHUNKS).map(|_| OnceLock::new()).collect(),
         }
     }
 
-    /// Logarithm of the ratio of its largest to its smallest longest side.
-    pub fn ln_range(&self) -> f64 {
-        (self.high / self.low).ln()
-    }
-
-    /// Logarithms of the longest sides, as chords, of the triangles of each size.
-    pub fn ln_longest(&self) -> impl Fn(u8) -> f64 + use<> {
-        let (ln_low, step) = (self.low.ln(), self.ln_range() / SIZES);
-        move |size| ln_low + (f64::from(size) + 0.5) * step
+    /// Logarithm of the longest side, as a chord, of the triangles of a size.
+    #[inline]
+    pub fn ln_longest(&self, size: u8) -> f64 {
+        self.ln_low + (f64::from(size) + 0.5) * self.ln_step
     }
 
     /// Whether its cells follow one another.

@@ -1,7 +1,8 @@
 //! The search for a hypothesis about pointing, roll and scale.
 //!
-//! `triangle_search` looks triangles up and confirms what they suggest (`confirmation`), as far as a `plan`
-//! goes, and counts `votes` for poses; `false_alarm` decides. `thinning` and `tiers` leave detections out that hide the stars.
+//! `triangle_search` looks triangles up (`queries`) and confirms what they suggest (`confirmation`), as
+//! far as a `plan` goes, and counts `votes` for poses; `false_alarm` decides. `thinning` and `tiers`
+//! leave detections out that hide the stars.
 
 mod confirmation;
 mod false_alarm;

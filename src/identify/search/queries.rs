@@ -276,7 +276,7 @@ impl ObservedStars<'_> {
         triangles: &[Triangle],
         similar: &mut Vec<Similar>,
     ) -> u64 {
-        let ln_longest = self.sky.triangles.classes[query.class].ln_longest();
+        let class = &self.sky.triangles.classes[query.class];
         let has_shape = query.shape.test();
         let [a, b, c] = query.triangle.stars;
         let mag = |star: usize| self.field.stars[star].mag as f32;
@@ -284,7 +284,7 @@ impl ObservedStars<'_> {
         let mut candidates = 0;
         for triangle in triangles.iter().filter(|triangle| has_shape(triangle)) {
             candidates += 1;
-            let Some(ln_focal) = query.ln_focal(ln_longest(triangle.size)) else {
+            let Some(ln_focal) = query.ln_focal(class.ln_longest(triangle.size)) else {
                 continue;
             };
             if let Some(zero_point_mag) = self.zero_point(triangle, mags) {

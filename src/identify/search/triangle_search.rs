@@ -8,7 +8,7 @@ use super::false_alarm::{FalseAlarm, TESTED_STARS};
 use super::plan::{PASSES, SearchPass, SearchPlan, WORK_OF_VOTE};
 use super::queries::{LookedUp, ObservedStars, ObservedTriangle, Query, Similar};
 use super::tiers::Tiers;
-use super::votes::{Vote, Voter, Votes, frame_of, triple};
+use super::votes::{Aligned, InCamera, Vote, Votes};
 use crate::base::coords::Rotation;
 use crate::base::interrupt::Interrupt;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px};
@@ -19,7 +19,6 @@ use crate::identify::hypothesis::{Hypothesis, Problem};
 use crate::identify::pairing::Pair;
 use crate::identify::priors::{Priors, SkyRegion};
 use crate::sky::catalog::sky_grid::GridStar;
-use nalgebra::{Matrix3, Vector3};
 
 /// Margin on the fields of view that the index allows, so that a field of exactly that width is
 /// found.
@@ -50,7 +49,7 @@ pub struct SearchBuffers {
     /// Catalogue triangles that are like an observed one.
     looked_up: LookedUp,
     votes: Votes,
-    voters: Vec<Option<Voter>>,
+    in_camera: Vec<Option<InCamera>>,
     /// To confirm answers.
     tiers: Tiers,
     /// Ends searches early.
@@ -187,7 +186,9 @@ impl<'a> Search<'a> {
             .begin(field.width_px, focal_px, self.near);
         let mut from = 2;
         self.plan.votes.iter().find_map(|pass| {
-            if self.is_spent() {
+            // All triangles of fewer stars have voted.
+            let has_more = from < self.problem.field.stars.len();
+            if !has_more || self.is_spent() || self.interrupted {
                 return None;
             }
             self.gather(pass, from);
@@ -202,7 +203,6 @@ impl<'a> Search<'a> {
     /// Whether as much was looked up as the plan allows.
     fn is_spent(&self) -> bool {
         self.candidates + WORK_OF_VOTE * self.buffers.votes.len() as u64 > self.plan.max_work
-            || self.interrupted
     }
 
     /// Lets the triangles of a pass vote whose faintest star is not one of the brightest `from`.
@@ -217,7 +217,7 @@ impl<'a> Search<'a> {
             let SearchBuffers {
                 queries,
                 looked_up,
-                voters,
+                in_camera,
                 votes,
                 ..
             } = &mut *self.buffers;
@@ -225,14 +225,12 @@ impl<'a> Search<'a> {
             self.observed.add_queries(&triangle, queries);
             let of_triangle = &queries[first..];
             self.candidates += self.observed.look_up(of_triangle, looked_up);
-            voters.clear();
-            voters.extend(
-                of_triangle.iter().map(|query| {
-                    Voter::new(&self.observed.vectors(&query.triangle, query.middle_px))
-                }),
-            );
+            in_camera.clear();
+            in_camera.extend(of_triangle.iter().map(|query| {
+                InCamera::new(&self.observed.vectors(&query.triangle, query.middle_px))
+            }));
             let grid = &self.observed.sky.grid;
-            votes.add_all(voters, &looked_up.similar, first as u32, grid);
+            votes.add_all(in_camera, &looked_up.similar, first as u32, grid);
         }
     }
 
@@ -327,19 +325,20 @@ impl<'a> Search<'a> {
             .map(GridStar::vector);
         let longest = (sky[0] - sky[1]).norm();
         let focal_px = (query.ln_size - longest.ln()).exp();
-        let mut observed = self.observed.vectors(&query.triangle, focal_px);
         if let Some(SkyRegion { centre, radius_rad }) = &self.near {
             let reach_rad = (self.observed.diagonal_px / focal_px).atan() + radius_rad;
             if centre.as_vector().dot(&sky[0]) < reach_rad.min(std::f64::consts::PI).cos() {
                 return None;
             }
         }
-        let mirrored = triple(&observed) * triple(&sky) < 0.0;
-        if mirrored {
-            observed.iter_mut().for_each(|v| v.x = -v.x);
-        }
+        let in_camera = InCamera::new(&self.observed.vectors(&query.triangle, focal_px))?;
+        let Aligned {
+            mirrored,
+            of_camera,
+            of_sky,
+        } = in_camera.aligned(&sky)?;
         Some(Pose {
-            sky_to_camera: two_star_rotation(&observed, &sky)?,
+            sky_to_camera: of_camera * of_sky.transpose(),
             focal_px,
             mirrored,
         })
@@ -520,15 +519,6 @@ fn searches_weight(number: u32) -> f64 {
 fn triangles(from: usize, stars: usize) -> impl Iterator<Item = [usize; 3]> {
     let pairs = |faintest| (1..faintest).flat_map(|b| (0..b).map(move |a| [a, b]));
     (from..stars).flat_map(move |c| pairs(c).map(move |[a, b]| [a, b, c]))
-}
-
-/// The rotation from the sky to the camera by two stars (TRIAD, with the middle of AB as the first
-/// vector).
-fn two_star_rotation(
-    observed: &[Vector3<f64>; 3],
-    sky: &[Vector3<f64>; 3],
-) -> Option<Matrix3<f64>> {
-    Some(frame_of(observed)? * frame_of(sky)?.transpose())
 }
 
 #[cfg(test)]

@@ -58,15 +58,25 @@ impl Vote {
     }
 }
 
-/// An observed triangle that votes: an orthonormal frame of it in the camera, not mirrored and
-/// mirrored.
+/// An observed triangle beside those of the catalogue: an orthonormal frame of it in the camera, not
+/// mirrored and mirrored.
 #[derive(Debug, Clone, Copy)]
-pub struct Voter {
+pub struct InCamera {
     frames: [Matrix3<f64>; 2],
     triple: f64,
 }
 
-impl Voter {
+/// A frame of a triangle in the camera and the same in the sky: where the camera points (TRIAD).
+pub struct Aligned<'a> {
+    /// Whether the x axis is reversed.
+    pub mirrored: bool,
+    /// The frame in the camera.
+    pub of_camera: &'a Matrix3<f64>,
+    /// The frame in the sky.
+    pub of_sky: Matrix3<f64>,
+}
+
+impl InCamera {
     /// The triangle of these unit vectors.
     pub fn new(vectors: &[Vector3<f64>; 3]) -> Option<Self> {
         let mirrored = vectors.map(|v| Vector3::new(-v.x, v.y, v.z));
@@ -75,17 +85,28 @@ impl Voter {
             triple: triple(vectors),
         })
     }
+
+    /// The triangle aligned with that of the catalogue whose stars have these unit vectors.
+    #[inline]
+    pub fn aligned(&self, sky: &[Vector3<f64>; 3]) -> Option<Aligned<'_>> {
+        let mirrored = self.triple * triple(sky) < 0.0;
+        Some(Aligned {
+            mirrored,
+            of_camera: &self.frames[usize::from(mirrored)],
+            of_sky: frame_of(sky)?,
+        })
+    }
 }
 
 /// An orthonormal frame of a triangle: the middle of AB, and the normal to AB.
-pub fn frame_of([a, b, _]: &[Vector3<f64>; 3]) -> Option<Matrix3<f64>> {
+fn frame_of([a, b, _]: &[Vector3<f64>; 3]) -> Option<Matrix3<f64>> {
     let first = (a + b).try_normalize(1e-12)?;
     let third = a.cross(b).try_normalize(1e-15)?;
     Some(Matrix3::from_columns(&[first, third.cross(&first), third]))
 }
 
 /// The triple product of three vectors.
-pub fn triple([a, b, c]: &[Vector3<f64>; 3]) -> f64 {
+fn triple([a, b, c]: &[Vector3<f64>; 3]) -> f64 {
     a.cross(b).dot(c)
 }
 
@@ -157,11 +178,11 @@ impl Votes {
     }
 
     /// The votes of an observed triangle for the poses in which it is one of the `similar` catalogue
-    /// triangles: of its queries, the first of which is `triangle`, each has a voter. Votes of one
-    /// triangle come one after the other.
+    /// triangles. Each of its queries, the first of which is `triangle`, has it as it is in the camera.
+    /// Votes of one triangle come one after the other.
     pub fn add_all(
         &mut self,
-        voters: &[Option<Voter>],
+        in_camera: &[Option<InCamera>],
         similar: &[Similar],
         triangle: u32,
         stars: &SkyGrid,
@@ -177,12 +198,18 @@ impl Votes {
                 stars.star(b).vector(),
                 stars.star(c).vector(),
             ];
-            let voter = &voters[similar.query as usize];
-            let (Some(voter), Some(of_sky)) = (voter, frame_of(&sky)) else {
+            let in_camera = &in_camera[similar.query as usize];
+            let aligned = in_camera
+                .as_ref()
+                .and_then(|in_camera| in_camera.aligned(&sky));
+            let Some(Aligned {
+                mirrored,
+                of_camera,
+                of_sky,
+            }) = aligned
+            else {
                 continue;
             };
-            let mirrored = voter.triple * triple(&sky) < 0.0;
-            let of_camera = &voter.frames[usize::from(mirrored)];
             // The rows of the rotation from the sky to the camera.
             let axis = of_sky * of_camera.row(2).transpose();
             let side = of_sky * of_camera.row(0).transpose();
@@ -364,8 +391,13 @@ mod tests {
         ) {
             let mut votes = Votes::default();
             votes.begin(WIDTH_PX, [400.0, 6000.0], None);
-            for (triangle, &(ra, dec, roll)) in (0..).zip(&others) {
-                add(&mut votes, triangle, [ra, dec, roll], focal);
+            let boresight = UnitVector::from_ra_dec(ra, dec);
+            for (triangle, &(other_ra, other_dec, roll)) in (0..).zip(&others) {
+                // Another in the same cell would be right to vote for it.
+                if UnitVector::<Icrs>::from_ra_dec(other_ra, other_dec).angle_to(&boresight) < 0.25 {
+                    continue;
+                }
+                add(&mut votes, triangle, [other_ra, other_dec, roll], focal);
             }
             // Within a quarter of a cell of each other: together in a cell of one grid in most cases,
             // if not in all coordinates.
