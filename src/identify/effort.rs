@@ -10,7 +10,7 @@ use serde::Serialize;
 pub enum Effort {
     /// A quarter of the usual work, and few choices of stars.
     Fast,
-    /// What finds most.
+    /// The usual work.
     #[default]
     Normal,
     /// Eight times the usual work, and more choices of stars.

@@ -37,11 +37,11 @@ pub(crate) struct SolvingOptions {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum EffortOption {
-    /// A quarter of the usual work: few more answers than the first triangles give
+    /// A quarter of the usual work
     Fast,
-    /// Finds nearly all that can be found
+    /// The usual work
     Normal,
-    /// Eight times the usual work, for frames with a hundred false stars and more
+    /// Eight times the usual work, and more choices of stars
     Thorough,
 }
 
