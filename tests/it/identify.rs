@@ -8,8 +8,8 @@ use rand_distr::StandardNormal;
 use starpipe::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use starpipe::camera::{CameraModel, Distortion, DistortionModel, focal_length_px};
 use starpipe::identify::{
-    Identification, ObservedStar, Photometry, Priors, ScalePrior, SearchFailure, SkyRegion,
-    SourceIndex, StarField, StarMatch, identify,
+    Effort, Identification, ObservedStar, Photometry, Priors, ScalePrior, SearchFailure, SkyRegion,
+    SourceIndex, StarField, StarMatch, Workspace, identify,
 };
 use std::f64::consts::{PI, TAU};
 
@@ -37,6 +37,21 @@ impl Truth {
             camera: CameraModel::pinhole(WIDTH_PX, HEIGHT_PX, focal_px, rng.random_bool(0.5)),
             attitude: Rotation::looking_at(&centre, rng.random_range(-PI..PI)),
         }
+    }
+
+    /// The stars of the frame, and false ones that are brighter than most of them.
+    fn below_false_stars(&self, rng: &mut ChaCha8Rng, false_stars: usize) -> StarField {
+        let (limit_mag, places) = self.places();
+        let places = places.into_iter().filter(|(p, _)| self.camera.contains(p));
+        let mut stars: Vec<_> = places.map(|(p, mag)| observed(p.x, p.y, mag)).collect();
+        stars.extend((0..false_stars).map(|_| {
+            let (x, y) = (
+                rng.random_range(0.0..WIDTH_PX),
+                rng.random_range(0.0..HEIGHT_PX),
+            );
+            observed(x, y, limit_mag - rng.random_range(1.0..6.0))
+        }));
+        field(stars)
     }
 
     /// The magnitude at which the field has about 25 stars, and the positions of stars down to
@@ -216,6 +231,27 @@ fn right_priors_help_and_wrong_priors_exclude() {
 }
 
 #[test]
+fn more_effort_looks_below_more_false_stars() {
+    let mut rng = ChaCha8Rng::seed_from_u64(23);
+    let truth = Truth::random(&mut rng, 15.0);
+    let stars = truth.below_false_stars(&mut rng, 110);
+    let mut workspace = Workspace::new();
+    let mut with_effort = |effort| {
+        workspace.set_effort(effort);
+        let found = workspace.identify(&stars, &Priors::default(), sky());
+        found.cloned()
+    };
+    assert!(matches!(
+        with_effort(Effort::Fast),
+        Err(SearchFailure::NoMatch { .. })
+    ));
+    for effort in [Effort::Normal, Effort::Thorough] {
+        let found = with_effort(effort).unwrap();
+        assert!(truth.is_told_by(&found), "wrong: {found:?}");
+    }
+}
+
+#[test]
 fn bright_false_stars_do_not_hide_the_stars_below_them() {
     const FIELDS: usize = 5;
     // Sixteen kinds of five fields; at least 95 % must be identified.
@@ -226,17 +262,8 @@ fn bright_false_stars_do_not_hide_the_stars_below_them() {
         for false_stars in [30, 60, 110, 200] {
             for _ in 0..FIELDS {
                 let truth = Truth::random(&mut rng, fov_deg);
-                let (limit_mag, places) = truth.places();
-                let places = places.into_iter().filter(|(p, _)| truth.camera.contains(p));
-                let mut stars: Vec<_> = places.map(|(p, mag)| observed(p.x, p.y, mag)).collect();
-                stars.extend((0..false_stars).map(|_| {
-                    let (x, y) = (
-                        rng.random_range(0.0..WIDTH_PX),
-                        rng.random_range(0.0..HEIGHT_PX),
-                    );
-                    observed(x, y, limit_mag - rng.random_range(1.0..6.0))
-                }));
-                match identify(&field(stars), &Priors::default(), sky()) {
+                let stars = truth.below_false_stars(&mut rng, false_stars);
+                match identify(&stars, &Priors::default(), sky()) {
                     Ok(found) => assert!(truth.is_told_by(&found), "wrong: {found:?}"),
                     Err(_) => unidentified += 1,
                 }
