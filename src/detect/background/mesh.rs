@@ -29,6 +29,8 @@ pub(crate) struct Mesh {
     edges: Vec<usize>,
     /// The distance from its node at which each piece begins, in columns.
     offsets: Vec<f32>,
+    /// The column from which on each node, but for the last one, is the one before.
+    node_starts: Vec<usize>,
     /// The pieces along each row of nodes.
     pieces: Vec<Piece>,
     smoother: Smoother,
@@ -49,6 +51,36 @@ pub(crate) struct Piece {
     pub inverse_sigma: f32,
     /// 1/σ per column.
     pub inverse_sigma_slope: f32,
+}
+
+/// Background and noise between two nodes of a row.
+#[derive(Debug, Clone, Copy)]
+struct NodeLine {
+    /// Number of the first node.
+    column: f32,
+    /// Nodes in a pixel.
+    columns_per_px: f32,
+    /// Background and noise at the first node.
+    from: [f32; 2],
+    /// Background and noise at the second node.
+    to: [f32; 2],
+}
+
+impl NodeLine {
+    /// The heights of adjacent pixels, the first in column `x`, above the background, in units of
+    /// the noise.
+    #[inline(always)]
+    fn heights(self, x: usize, values: &[f32], heights: &mut [f32]) {
+        let Self { from, to, .. } = self;
+        for (i, (height, &value)) in heights.iter_mut().zip(values).enumerate() {
+            let x = (x as i32 + i as i32) as f32;
+            let position = (x + 0.5) * self.columns_per_px - 0.5;
+            let fraction = position - self.column;
+            let background = from[0] + fraction * (to[0] - from[0]);
+            let sigma = from[1] + fraction.clamp(0.0, 1.0) * (to[1] - from[1]);
+            *height = (value - background) / sigma;
+        }
+    }
 }
 
 impl Mesh {
@@ -89,6 +121,13 @@ impl Mesh {
             }
         }
         self.edges.push(grid.width_px);
+        let nodes = grid.columns.saturating_sub(1).max(1);
+        self.node_starts.clear();
+        self.node_starts.resize(nodes, grid.width_px);
+        for x in (0..grid.width_px).rev() {
+            let (column, _) = Self::node(x as f32, self.columns_per_px, grid.columns);
+            self.node_starts[column] = x;
+        }
         self.offsets.clear();
         for (piece, &edge) in self.edges[..self.edges.len() - 1].iter().enumerate() {
             let node = self.center(piece.saturating_sub(1));
@@ -202,28 +241,51 @@ impl Mesh {
         }
     }
 
-    /// A lower bound of `background + sigmas·σ` in a row of cells.
-    pub fn lowest_about_row(&self, row: usize, sigmas: f32) -> f32 {
-        let columns = self.grid.columns;
-        let nodes = row.saturating_sub(1) * columns..(row + 2).min(self.grid.rows) * columns;
-        let (backgrounds, all_sigma) = (&self.background[nodes.clone()], &self.sigma[nodes]);
-        let values = backgrounds
-            .iter()
-            .zip(all_sigma)
-            .map(|(b, s)| b + sigmas * s);
-        let lowest = values.fold(f32::INFINITY, f32::min);
-        // At the borders the background is extrapolated, by at most half a step between cells.
-        let (least, most) = backgrounds
-            .iter()
-            .fold((f32::INFINITY, f32::NEG_INFINITY), |(least, most), &l| {
-                (least.min(l), most.max(l))
-            });
-        lowest - (most - least)
+    /// Lower bounds of `background + sigmas·σ` in the blocks of `block_px` columns of a row of cells.
+    pub fn lowest_in_blocks(
+        &self,
+        row: usize,
+        block_px: usize,
+        sigmas: f32,
+        nodes: &mut Vec<[f32; 2]>,
+        lowest: &mut Vec<f32>,
+    ) {
+        /// What rounding may add or take, relative to the largest term.
+        const ROUNDING: f32 = 1e-5;
+        let width = self.grid.width_px;
+        lowest.clear();
+        lowest.resize(width.div_ceil(block_px), f32::INFINITY);
+        let of_row = self.grid.rows_of(row);
+        let center_y = (row as f32 + 0.5) / self.rows_per_px - 0.5;
+        // Along columns the bound is linear on either side of the nodes, along rows between them.
+        for y in [of_row.start as f32, center_y, (of_row.end - 1) as f32] {
+            self.nodes_at(y, nodes);
+            let level = |(background, sigma): (f32, f32)| {
+                background + sigmas * sigma - ROUNDING * (background.abs() + sigmas * sigma)
+            };
+            for (block, lowest) in lowest.iter_mut().enumerate() {
+                let (first, last) = (block * block_px, ((block + 1) * block_px).min(width) - 1);
+                let ends = [first, last].map(|x| level(self.at_column(nodes, x as f32)));
+                *lowest = lowest.min(ends[0]).min(ends[1]);
+                let (before, _) = Self::node(first as f32, self.columns_per_px, nodes.len());
+                let after_first = nodes.iter().enumerate().skip(before);
+                let inside = after_first
+                    .skip_while(|(node, _)| self.center(*node) < first as f32)
+                    .take_while(|(node, _)| self.center(*node) <= last as f32);
+                for (_, &[background, sigma]) in inside {
+                    *lowest = lowest.min(level((background, sigma)));
+                }
+            }
+        }
     }
 
     /// Background and noise of row `y` at the nodes; between these, both are linear.
-    pub fn across_row<'a>(&'a self, y: usize, nodes: &mut Vec<[f32; 2]>) {
-        let (row, fy) = Self::node(y as f32, self.rows_per_px, self.grid.rows);
+    pub fn across_row(&self, y: usize, nodes: &mut Vec<[f32; 2]>) {
+        self.nodes_at(y as f32, nodes);
+    }
+
+    fn nodes_at<'a>(&'a self, y: f32, nodes: &mut Vec<[f32; 2]>) {
+        let (row, fy) = Self::node(y, self.rows_per_px, self.grid.rows);
         let below = (row + 1).min(self.grid.rows - 1);
         let held = fy.clamp(0.0, 1.0);
         let columns = self.grid.columns;
@@ -239,6 +301,27 @@ impl Mesh {
                 sigma_top + held * (sigma_bottom - sigma_top),
             ]
         }));
+    }
+
+    /// The heights of adjacent pixels, the first in column `x`, above the background of the row whose
+    /// nodes are given, in units of the noise: those of [`Self::at_column`].
+    #[inline(always)]
+    pub fn heights(&self, nodes: &[[f32; 2]], x: usize, values: &[f32], heights: &mut [f32]) {
+        let (mut first, end) = (x, x + values.len());
+        while first < end {
+            let (column, _) = Self::node(first as f32, self.columns_per_px, nodes.len());
+            let next = self.node_starts.get(column + 1);
+            let last = next.map_or(end, |&next| next.min(end));
+            let span = first - x..last - x;
+            let line = NodeLine {
+                column: column as f32,
+                columns_per_px: self.columns_per_px,
+                from: nodes[column],
+                to: nodes[(column + 1).min(nodes.len() - 1)],
+            };
+            line.heights(first, &values[span.clone()], &mut heights[span]);
+            first = last;
+        }
     }
 
     /// Background and noise at column `x` of the row whose nodes are given: the same as
@@ -358,6 +441,61 @@ mod tests {
                     );
                     let inverse = piece.inverse_sigma + t * piece.inverse_sigma_slope;
                     assert!((inverse * sigma - 1.0).abs() < 1e-2);
+                }
+            }
+        }
+    }
+
+    /// A mesh whose background and noise change much from cell to cell.
+    fn uneven_mesh(width: usize, height: usize) -> Mesh {
+        let pixels = noise_frame(width.max(height), 5.0, |x, y| {
+            ((x / 40 * 7 + y / 30 * 5) % 11) as f32 * 60.0 + (x * y % 97) as f32
+        });
+        let mut mesh = Mesh::default();
+        let view = View::new(&pixels, width, height);
+        mesh.measure(&view, &MeshConfig::of_pixels(32, 1e-6));
+        mesh
+    }
+
+    #[test]
+    fn heights_are_those_of_each_pixel_by_itself() {
+        for (width, height) in [(200, 70), (33, 40), (20, 20)] {
+            let mesh = uneven_mesh(width, height);
+            let mut nodes = Vec::new();
+            for y in [0, 13, height - 1] {
+                mesh.across_row(y, &mut nodes);
+                for x in [0, 7, width - 9] {
+                    let values: Vec<f32> = (x..width.min(x + 64)).map(|x| x as f32 * 1.7).collect();
+                    let mut heights = vec![0.0; values.len()];
+                    mesh.heights(&nodes, x, &values, &mut heights);
+                    for ((x, value), height) in (x..).zip(values).zip(heights) {
+                        let (background, sigma) = mesh.at_column(&nodes, x as f32);
+                        assert_eq!(height, (value - background) / sigma, "{x}, {y}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_pixel_is_below_the_lowest_of_its_block_which_is_close() {
+        for (width, height) in [(200, 170), (33, 40), (20, 20)] {
+            let mesh = uneven_mesh(width, height);
+            let (mut nodes, mut lowest) = (Vec::new(), Vec::new());
+            for row in 0..mesh.grid.rows {
+                mesh.lowest_in_blocks(row, 64, 4.0, &mut nodes, &mut lowest);
+                assert_eq!(lowest.len(), width.div_ceil(64));
+                for (block, lowest) in lowest.iter().enumerate() {
+                    let level = |(x, y): (usize, usize)| {
+                        let (background, sigma) = mesh.at(x as f32, y as f32);
+                        background + 4.0 * sigma
+                    };
+                    let columns = block * 64..width.min(block * 64 + 64);
+                    let pixels = columns.flat_map(|x| mesh.grid.rows_of(row).map(move |y| (x, y)));
+                    let expected = pixels.map(level).fold(f32::INFINITY, f32::min);
+                    // Nodes lie between pixels, and the mesh is steep.
+                    let close = expected - 12.0;
+                    assert!((close..=expected).contains(lowest), "{lowest} {expected}");
                 }
             }
         }

@@ -4,119 +4,143 @@
 //! The noise of the filtered frame is not known everywhere until all rows of cells are filtered. So
 //! pixels are gathered down to a lower cut first, and compared with the threshold later.
 
+use super::local_maxima::{Adjacent, adjacent_values, local_maxima};
 use crate::detect::filter::FilteredBand;
-use crate::detect::pixels::{ReachedBlock, find_reaching};
+use crate::detect::pixels::{BLOCK_PX, ReachedBlock, find_reaching, highest_in_columns};
 use std::ops::Range;
 
 /// The pixels of a row of cells that may lie above the threshold.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Candidates {
-    /// All pixels of the filtered frame at or above `cut`, in reading order.
-    pub(super) pixels: Vec<CandidatePixel>,
-    /// The local maxima among them, in reading order.
-    pub(super) maxima: Vec<LocalMaximum>,
-    /// In units of the background noise.
-    cut: f32,
-    /// The cut for each block of columns.
-    block_cuts: Vec<f32>,
+    /// Spans with all pixels of the filtered frame at or above their cuts, in reading order.
+    spans: Vec<CandidateSpan>,
+    /// The pixels of the spans, one after the other.
+    values: Vec<f32>,
+    /// The values next to each local maximum, in reading order.
+    adjacent: Vec<Option<Adjacent>>,
+    /// How many pixels are at or above their cuts.
+    count: usize,
+    /// The cut for each block of columns, in units of the background noise.
+    cuts: Vec<f32>,
     /// The blocks of the current row that reach the cut.
     blocks: Vec<ReachedBlock>,
 }
 
-/// A pixel of the filtered frame.
+/// The pixels of a block of columns from the first to the last candidate.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct CandidatePixel {
-    pub x: u32,
-    pub y: u32,
-    pub value: f32,
+struct CandidateSpan {
+    /// Column of the first pixel.
+    x: u32,
+    /// Row.
+    y: u32,
+    /// Number of pixels.
+    length: u32,
+    /// The local maxima among the candidates: one bit for each pixel, the lowest for the first.
+    maxima: u64,
 }
 
-/// A local maximum of the filtered frame.
+/// A span of pixels, some of them candidates.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct LocalMaximum {
-    /// Index of its pixel among the candidates.
-    pub pixel: u32,
-    /// Values to the left, to the right, above and below; `None` at the border.
-    pub adjacent: Option<[f32; 4]>,
+pub(super) struct Span<'a> {
+    /// Column of the first pixel.
+    pub x: u32,
+    /// Row.
+    pub y: u32,
+    /// The pixels: at most [`BLOCK_PX`].
+    pub values: &'a [f32],
+    /// The local maxima among the candidates: one bit for each pixel, the lowest for the first.
+    pub maxima: u64,
+    /// The values next to each of them.
+    pub adjacent: &'a [Option<Adjacent>],
 }
 
 impl Candidates {
-    /// Gathers the pixels at or above `cut` in `rows` of `band`, and raises the `maxima` of the
-    /// blocks that hold any, row by row. Ends after the row in which they become more than `most`.
+    /// Gathers the pixels of `rows` of `band` at or above the cut of their block of columns; ends
+    /// after the row in which they become more than `most`. Raises the `maxima` of the blocks that
+    /// hold any, row by row, if these are given.
     ///
     /// The band holds one more row on either side, where the frame has it.
     pub fn gather(
         &mut self,
         band: &FilteredBand,
         rows: Range<usize>,
-        cut: f32,
+        cuts: &[f32],
         most: usize,
-        maxima: &mut [f32],
+        maxima: Option<&mut [f32]>,
     ) {
-        self.pixels.clear();
-        self.maxima.clear();
-        self.cut = cut;
-        let blocks_per_row = maxima.len() / rows.len().max(1);
-        self.block_cuts.clear();
-        self.block_cuts.resize(blocks_per_row, cut);
-        for (y, maxima) in rows.zip(maxima.chunks_mut(blocks_per_row)) {
-            if self.pixels.len() > most {
+        self.spans.clear();
+        self.values.clear();
+        self.adjacent.clear();
+        self.count = 0;
+        self.cuts.clear();
+        self.cuts.extend_from_slice(cuts);
+        let mut maxima = maxima.map(|maxima| maxima.chunks_mut(cuts.len().max(1)));
+        for y in rows {
+            let maxima = maxima.as_mut().and_then(Iterator::next);
+            if self.count > most {
                 break;
             }
-            let Some(row) = band.row(y) else { continue };
-            let adjacent_rows = [y.checked_sub(1).and_then(|y| band.row(y)), band.row(y + 1)];
-            find_reaching(row, &self.block_cuts, &mut self.blocks);
-            for block in &self.blocks {
-                let highest = &mut maxima[block.block];
-                for x in block.columns() {
-                    *highest = highest.max(row[x]);
-                    if is_local_maximum(row, adjacent_rows, x) {
-                        self.maxima.push(LocalMaximum {
-                            pixel: self.pixels.len() as u32,
-                            adjacent: adjacent_values(row, adjacent_rows, x),
-                        });
-                    }
-                    self.pixels.push(CandidatePixel {
-                        x: x as u32,
-                        y: y as u32,
-                        value: row[x],
-                    });
-                }
-            }
+            let around = [y.checked_sub(1), Some(y), Some(y + 1)].map(|y| band.row(y?));
+            self.gather_row(around, y, maxima);
         }
+    }
+
+    /// Gathers the candidates in row `y`, given between the rows above and below.
+    fn gather_row(&mut self, rows: [Option<&[f32]>; 3], y: usize, mut maxima: Option<&mut [f32]>) {
+        let Some(row) = rows[1] else { return };
+        find_reaching(row, &self.cuts, &mut self.blocks);
+        for &ReachedBlock { block, bits } in &self.blocks {
+            let first = block * BLOCK_PX;
+            let skipped = bits.trailing_zeros();
+            let span =
+                first + skipped as usize..first + (u64::BITS - bits.leading_zeros()) as usize;
+            let maxima_in_block = bits & local_maxima(rows, first);
+            self.spans.push(CandidateSpan {
+                x: span.start as u32,
+                y: y as u32,
+                length: span.len() as u32,
+                maxima: maxima_in_block >> skipped,
+            });
+            let tops = ReachedBlock {
+                block,
+                bits: maxima_in_block,
+            }
+            .columns();
+            self.adjacent.extend(tops.map(|x| adjacent_values(rows, x)));
+            self.count += bits.count_ones() as usize;
+            if let Some(maxima) = &mut maxima {
+                maxima[block] = highest_in_columns(maxima[block], &row[span.clone()]);
+            }
+            self.values.extend_from_slice(&row[span]);
+        }
+    }
+
+    /// The spans that hold candidates, in reading order.
+    pub(super) fn spans(&self) -> impl Iterator<Item = Span<'_>> {
+        let (mut values, mut adjacent) = (self.values.as_slice(), self.adjacent.as_slice());
+        self.spans.iter().map(move |span| {
+            let (of_span, rest) = values.split_at(span.length as usize);
+            values = rest;
+            let (tops, rest) = adjacent.split_at(span.maxima.count_ones() as usize);
+            adjacent = rest;
+            Span {
+                x: span.x,
+                y: span.y,
+                values: of_span,
+                maxima: span.maxima,
+                adjacent: tops,
+            }
+        })
     }
 
     /// How many were gathered.
     pub fn len(&self) -> usize {
-        self.pixels.len()
+        self.count
     }
 
-    /// Whether all pixels at or above `lowest` were gathered.
-    pub fn reach_down_to(&self, lowest: f32) -> bool {
-        self.cut <= lowest
+    /// Whether all pixels at or above the `lowest` of each block were gathered.
+    pub fn reach_down_to(&self, lowest: &[f32]) -> bool {
+        let mut cuts = self.cuts.iter().zip(lowest);
+        cuts.all(|(cut, lowest)| cut <= lowest)
     }
-}
-
-/// Whether no neighbor is higher; of equal pixels the first in reading order counts.
-fn is_local_maximum(row: &[f32], [above, below]: [Option<&[f32]>; 2], x: usize) -> bool {
-    let value = row[x];
-    let columns = x.saturating_sub(1)..(x + 2).min(row.len());
-    // Without early exit: a branch for each neighbor would cost more.
-    let are_lower = |values: &[f32]| values.iter().fold(true, |all, v| all & (*v < value));
-    let are_no_higher = |values: &[f32]| values.iter().fold(true, |all, v| all & (*v <= value));
-    are_lower(&row[columns.start..x])
-        & are_no_higher(&row[x..columns.end])
-        & above.is_none_or(|row| are_lower(&row[columns.clone()]))
-        & below.is_none_or(|row| are_no_higher(&row[columns.clone()]))
-}
-
-/// The values to the left, to the right, above and below; `None` at the border.
-fn adjacent_values(row: &[f32], [above, below]: [Option<&[f32]>; 2], x: usize) -> Option<[f32; 4]> {
-    let inside = x > 0 && x + 1 < row.len();
-    inside.then_some([
-        row[x.max(1) - 1],
-        row[(x + 1).min(row.len() - 1)],
-        above?[x],
-        below?[x],
-    ])
 }

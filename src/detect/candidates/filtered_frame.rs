@@ -9,7 +9,7 @@ use crate::base::interrupt::Interrupted;
 use crate::detect::DetectError;
 use crate::detect::background::{CellMeasurer, CellRows, Mesh, MeshConfig};
 use crate::detect::filter::{FilteredBand, Kernel};
-use crate::detect::pixels::{BlockMaxima, View};
+use crate::detect::pixels::{BLOCK_PX, BlockMaxima, View};
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -49,6 +49,9 @@ pub(crate) struct CandidateLimits {
 struct FilterWorker {
     cells: CellMeasurer,
     band: FilteredBand,
+    /// The cut for each block of columns.
+    cuts: Vec<f32>,
+    nodes: Vec<[f32; 2]>,
 }
 
 impl FilteredFrame {
@@ -94,7 +97,9 @@ impl FilteredFrame {
             if view.is_interrupted() {
                 return;
             }
-            let FilterWorker { cells, band } = worker;
+            let FilterWorker {
+                cells, band, cuts, ..
+            } = worker;
             let rows = row.rows;
             let filtered = with_neighbors(&rows, view.height);
             band.filter(view, background, kernel, filtered);
@@ -102,7 +107,9 @@ impl FilteredFrame {
             cells.measure_row(&grid, sampled, &config, row.background, row.sigma);
             let cut = candidate_cut(row.background, row.sigma, gathered.threshold as f32);
             let most = gathered.most.saturating_sub(total.load(Ordering::Relaxed));
-            row.output.gather(band, rows, cut, most, row.maxima);
+            cuts.clear();
+            cuts.resize(view.width.div_ceil(BLOCK_PX), cut);
+            row.output.gather(band, rows, cuts, most, Some(row.maxima));
             total.fetch_add(row.output.len(), Ordering::Relaxed);
         });
         view.check()?;
@@ -124,20 +131,24 @@ impl FilteredFrame {
         gathered: &CandidateLimits,
     ) -> Result<(), DetectError> {
         let mut total = self.candidate_count();
-        let Some(FilterWorker { band, .. }) = self.workers.first_mut() else {
+        let Some(worker) = self.workers.first_mut() else {
             return Ok(());
         };
+        let FilterWorker {
+            band, cuts, nodes, ..
+        } = worker;
+        let threshold = gathered.threshold as f32;
         for (row, candidates) in self.candidates.iter_mut().enumerate() {
-            let lowest = self.mesh.lowest_about_row(row, gathered.threshold as f32);
-            if !candidates.reach_down_to(lowest) {
+            self.mesh
+                .lowest_in_blocks(row, BLOCK_PX, threshold, nodes, cuts);
+            if !candidates.reach_down_to(cuts) {
                 view.check()?;
                 let rows = self.mesh.grid.rows_of(row);
                 let filtered = with_neighbors(&rows, view.height);
                 band.filter(view, background, kernel, filtered);
-                let maxima = self.maxima.rows_mut(rows.clone());
                 total -= candidates.len();
                 let most = gathered.most.saturating_sub(total);
-                candidates.gather(band, rows, lowest, most, maxima);
+                candidates.gather(band, rows, cuts, most, None);
                 total += candidates.len();
                 check_count(total, gathered.most)?;
             }

@@ -12,15 +12,6 @@ use std::ops::Range;
 /// Runs between two looks for an interrupt: less than a millisecond.
 const RUNS_AT_ONCE: usize = 1 << 12;
 
-/// A pixel above the threshold.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct BrightPixel {
-    pub x: u32,
-    pub y: u32,
-    /// Filtered value over its local noise.
-    pub snr: f32,
-}
-
 /// Adjacent pixels of a row.
 #[derive(Debug, Clone, Copy)]
 struct PixelRun {
@@ -85,8 +76,8 @@ const NO_REGION: u32 = u32::MAX;
 /// Pixels above the threshold and the regions that they form.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Labelling {
-    /// In reading order.
-    pub pixels: Vec<BrightPixel>,
+    /// The filtered value of each pixel over its local noise, in reading order.
+    pub heights: Vec<f32>,
     /// In reading order.
     runs: Vec<PixelRun>,
     parents: Vec<u32>,
@@ -99,27 +90,27 @@ pub(super) struct Labelling {
 impl Labelling {
     /// Removes all pixels.
     pub fn clear(&mut self) {
-        self.pixels.clear();
+        self.heights.clear();
         self.runs.clear();
     }
 
-    /// Adds a pixel to the run of the pixel before it if the two are adjacent, else to a new run.
-    /// Returns the indices of the pixel and its run.
-    pub fn add(&mut self, pixel: BrightPixel) -> [u32; 2] {
-        let BrightPixel { x, y, .. } = pixel;
-        let index = self.pixels.len() as u32;
+    /// Adds adjacent pixels of row `y` from column `x` on, to the last run if they continue it, else
+    /// as a new one. Returns the indices of the first pixel and of the run.
+    pub fn add(&mut self, x: u32, y: u32, heights: &[f32]) -> [u32; 2] {
+        let first = self.heights.len() as u32;
+        let end = x + heights.len() as u32;
         match self.runs.last_mut() {
-            Some(run) if run.y == y && run.end == x => run.end = x + 1,
+            Some(run) if run.y == y && run.end == x => run.end = end,
             _ => self.runs.push(PixelRun {
                 y,
                 start: x,
-                end: x + 1,
-                pixel: index,
+                end,
+                pixel: first,
                 region: NO_REGION,
             }),
         }
-        self.pixels.push(pixel);
-        [index, self.runs.len() as u32 - 1]
+        self.heights.extend_from_slice(heights);
+        [first, self.runs.len() as u32 - 1]
     }
 
     /// Joins touching runs into regions, numbered in reading order.
@@ -184,22 +175,24 @@ impl Labelling {
         self.runs[run as usize].region as usize
     }
 
-    /// Indices of the pixels of a region, in reading order.
-    pub fn pixels_of_region(&self, region: usize) -> impl Iterator<Item = usize> + '_ {
+    /// The runs of a region, in reading order.
+    fn runs_of_region(&self, region: usize) -> impl Iterator<Item = &PixelRun> {
         let runs = self.region_starts[region] as usize..self.region_starts[region + 1] as usize;
         let runs = &self.runs_by_region[runs];
-        runs.iter()
-            .flat_map(|&run| self.runs[run as usize].pixels())
+        runs.iter().map(|&run| &self.runs[run as usize])
     }
 
     /// Measures each region.
     pub fn measure_regions(&self, regions: &mut Vec<Region>) {
         regions.clear();
         for region in 0..self.region_starts.len() - 1 {
-            let pixels = self.pixels_of_region(region).map(|i| self.pixels[i]);
-            regions.push(Region::of_points(
-                pixels.map(|p| (f64::from(p.x), f64::from(p.y), f64::from(p.snr))),
-            ));
+            let pixels = self.runs_of_region(region).flat_map(|run| {
+                let heights = &self.heights[run.pixels()];
+                (run.start..)
+                    .zip(heights)
+                    .map(|(x, &height)| (f64::from(x), f64::from(run.y), f64::from(height)))
+            });
+            regions.push(Region::of_points(pixels));
         }
     }
 
@@ -245,15 +238,15 @@ mod tests {
         let mut labelling = Labelling::default();
         for (x, y, pixel) in mask.enumerate_pixels() {
             if pixel.0 != [0] {
-                labelling.add(BrightPixel { x, y, snr: 9.0 });
+                labelling.add(x, y, &[9.0]);
             }
         }
         labelling.connect();
         let mut labels = vec![0; mask.len()];
         for region in 0..labelling.region_starts.len() - 1 {
-            for index in labelling.pixels_of_region(region) {
-                let BrightPixel { x, y, .. } = labelling.pixels[index];
-                labels[(y * mask.width() + x) as usize] = region as u32 + 1;
+            for run in labelling.runs_of_region(region) {
+                let start = (run.y * mask.width() + run.start) as usize;
+                labels[start..start + run.pixels().len()].fill(region as u32 + 1);
             }
         }
         labels

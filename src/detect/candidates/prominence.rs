@@ -13,7 +13,7 @@
 //! persistence.
 
 use super::disjoint_sets::{self, root_of};
-use super::labelling::{BrightPixel, Labelling};
+use super::labelling::Labelling;
 use super::peak::Peak;
 use crate::base::interrupt::Interrupted;
 use crate::detect::pixels::View;
@@ -68,15 +68,15 @@ impl Prominence {
         view: &View<'_>,
         is_wanted: impl Fn(usize) -> bool,
     ) -> Result<(), Interrupted> {
-        let (tops, pixels) = (&mut self.tops, &labelling.pixels);
-        disjoint_sets::reset(tops, pixels.len());
+        let (tops, heights) = (&mut self.tops, &labelling.heights);
+        disjoint_sets::reset(tops, heights.len());
         labelling.for_each_adjacent(view, is_wanted, |pixel, before| {
-            let [low, high] = by_height(pixels, [pixel, before]);
-            if is_higher(pixels, high, tops[low] as usize) {
+            let [low, high] = by_height(heights, [pixel, before]);
+            if is_higher(heights, high, tops[low] as usize) {
                 tops[low] = high as u32;
             }
         })?;
-        for pixel in 0..pixels.len() {
+        for pixel in 0..heights.len() {
             tops[pixel] = root_of(tops, pixel as u32);
         }
         Ok(())
@@ -104,7 +104,7 @@ impl Prominence {
         labelling.for_each_adjacent(view, is_wanted, |pixel, before| {
             let [a, b] = [pixel, before].map(|index| tops[index]);
             if a != b {
-                let [snr, of_before] = [pixel, before].map(|index| labelling.pixels[index].snr);
+                let [snr, of_before] = [pixel, before].map(|index| labelling.heights[index]);
                 let found = Saddle {
                     tops: [a.min(b), a.max(b)],
                     snr: snr.min(of_before),
@@ -131,7 +131,7 @@ impl Prominence {
     ///
     /// A peak next to a higher pixel has none: the noise, in units of which heights are, changes from
     /// pixel to pixel.
-    pub fn set(&mut self, pixels: &[BrightPixel], peak_pixels: &[[u32; 2]], peaks: &mut [Peak]) {
+    pub fn set(&mut self, heights: &[f32], peak_pixels: &[[u32; 2]], peaks: &mut [Peak]) {
         let Self { tops, saddles, .. } = self;
         for (peak, &[pixel, _]) in peaks.iter_mut().zip(peak_pixels) {
             if tops[pixel as usize] != pixel {
@@ -144,10 +144,10 @@ impl Prominence {
             if a == b {
                 continue;
             }
-            let [low, high] = by_height(pixels, [a, b]);
+            let [low, high] = by_height(heights, [a, b]);
             let peak = peak_pixels.binary_search_by_key(&low, |&[pixel, _]| pixel as usize);
             if let Ok(peak) = peak {
-                peaks[peak].prominence = pixels[low].snr - saddle.snr;
+                peaks[peak].prominence = heights[low] - saddle.snr;
             }
             tops[low] = high as u32;
         }
@@ -155,8 +155,8 @@ impl Prominence {
 }
 
 /// The lower of two pixels, and the higher.
-fn by_height(pixels: &[BrightPixel], [a, b]: [usize; 2]) -> [usize; 2] {
-    if is_higher(pixels, a, b) {
+fn by_height(heights: &[f32], [a, b]: [usize; 2]) -> [usize; 2] {
+    if is_higher(heights, a, b) {
         [b, a]
     } else {
         [a, b]
@@ -164,8 +164,8 @@ fn by_height(pixels: &[BrightPixel], [a, b]: [usize; 2]) -> [usize; 2] {
 }
 
 /// Whether pixel `a` is higher than `b`; of equal ones the first in reading order is.
-fn is_higher(pixels: &[BrightPixel], a: usize, b: usize) -> bool {
-    let [of_a, of_b] = [a, b].map(|index| pixels[index].snr);
+fn is_higher(heights: &[f32], a: usize, b: usize) -> bool {
+    let [of_a, of_b] = [a, b].map(|index| heights[index]);
     of_a > of_b || (of_a == of_b && a < b)
 }
 
@@ -176,18 +176,28 @@ mod tests {
 
     const THRESHOLD: u8 = 3;
 
+    /// A pixel above the threshold.
+    #[derive(Debug)]
+    struct BrightPixel {
+        x: u32,
+        y: u32,
+        snr: f32,
+    }
+
     /// The pixels of a frame above the threshold.
-    fn labelling(width: usize, values: &[u8]) -> Labelling {
+    fn labelling(width: usize, values: &[u8]) -> (Labelling, Vec<BrightPixel>) {
         let mut labelling = Labelling::default();
+        let mut pixels = Vec::new();
         for (index, &value) in values.iter().enumerate() {
             if value >= THRESHOLD {
                 let (x, y) = ((index % width) as u32, (index / width) as u32);
                 let snr = f32::from(value);
-                labelling.add(BrightPixel { x, y, snr });
+                labelling.add(x, y, &[snr]);
+                pixels.push(BrightPixel { x, y, snr });
             }
         }
         labelling.connect();
-        labelling
+        (labelling, pixels)
     }
 
     fn are_adjacent(a: &BrightPixel, b: &BrightPixel) -> bool {
@@ -216,7 +226,10 @@ mod tests {
         let mut levels = (THRESHOLD..=height as u8).rev().map(f32::from);
         let reaches_higher = |level: &f32| {
             let reached = flooded(pixels, pixel, *level);
-            reached.iter().any(|&index| is_higher(pixels, index, pixel))
+            let heights: Vec<f32> = pixels.iter().map(|pixel| pixel.snr).collect();
+            reached
+                .iter()
+                .any(|&index| is_higher(&heights, index, pixel))
         };
         levels
             .find(reaches_higher)
@@ -242,8 +255,7 @@ mod tests {
             width in 3..14_usize,
             values in prop::collection::vec(0..9_u8, 20..150),
         ) {
-            let labelling = labelling(width, &values);
-            let pixels = &labelling.pixels;
+            let (labelling, pixels) = labelling(width, &values);
             let peak_pixels: Vec<[u32; 2]> = (0..pixels.len() as u32).map(|pixel| [pixel, 0]).collect();
             let mut peaks: Vec<Peak> = pixels.iter().map(peak).collect();
 
@@ -252,10 +264,10 @@ mod tests {
             let mut prominence = Prominence::default();
             prominence.find_tops(&labelling, &view, |_| true).unwrap();
             prominence.find_saddles(&labelling, &view, |_| true).unwrap();
-            prominence.set(pixels, &peak_pixels, &mut peaks);
+            prominence.set(&labelling.heights, &peak_pixels, &mut peaks);
 
             for (pixel, peak) in peaks.iter().enumerate() {
-                prop_assert_eq!(peak.prominence, expected(pixels, pixel), "{:?}", pixels[pixel]);
+                prop_assert_eq!(peak.prominence, expected(&pixels, pixel), "{:?}", pixels[pixel]);
             }
         }
     }

@@ -9,8 +9,9 @@
 //! 4. Peaks that noise or the wing of a brighter star can explain are dropped.
 //! 5. Of the many peaks of a streak one is kept.
 
-use super::candidate_pixels::{CandidatePixel, Candidates, LocalMaximum};
-use super::labelling::{BrightPixel, Labelling};
+use super::candidate_pixels::{Candidates, Span};
+use super::labelling::Labelling;
+use super::local_maxima::Adjacent;
 use super::memory::check_count;
 use super::peak::{Peak, is_saturated, parabola_vertex};
 use super::prominence::Prominence;
@@ -21,7 +22,8 @@ use super::streaks::Streaks;
 use crate::base::interrupt::Interrupted;
 use crate::detect::DetectError;
 use crate::detect::background::Mesh;
-use crate::detect::pixels::View;
+use crate::detect::pixels::{BLOCK_PX, View, bits_of};
+use multiversion::multiversion;
 
 /// Buffers of the search, and its result.
 #[derive(Debug, Clone, Default)]
@@ -86,30 +88,55 @@ impl PeakSearch {
         self.peak_pixels.clear();
         let mut row = None;
         for of_cells in candidates {
-            let mut maxima = of_cells.maxima.iter().peekable();
-            for (index, candidate) in (0..).zip(&of_cells.pixels) {
-                let maximum = maxima.next_if(|maximum| maximum.pixel == index);
-                let CandidatePixel { x, y, value } = *candidate;
-                if row.replace(y) != Some(y) {
-                    mesh.across_row(y as usize, &mut self.nodes);
+            for span in of_cells.spans() {
+                if row.replace(span.y) != Some(span.y) {
+                    mesh.across_row(span.y as usize, &mut self.nodes);
                 }
-                let (mean, sigma) = mesh.at_column(&self.nodes, x as f32);
-                let snr = (value - mean) / sigma;
-                if snr >= config.threshold {
-                    let pixel = BrightPixel { x, y, snr };
-                    let indices = self.labelling.add(pixel);
-                    if let Some(maximum) = maximum {
-                        let (x, y) = (x as usize, y as usize);
-                        let saturated = is_saturated(frame, x, y, config.saturation_adu);
-                        self.peak_pixels.push(indices);
-                        self.peaks.push(new_peak(pixel, value, maximum, saturated));
-                    }
-                }
+                let mut heights = [0.0; BLOCK_PX];
+                let heights = &mut heights[..span.values.len()];
+                let bright = reaching(mesh, &self.nodes, &span, config.threshold, heights);
+                self.add_runs(&span, bright, heights, frame, config.saturation_adu);
             }
             frame.check()?;
-            check_count(self.labelling.pixels.len(), config.max_pixels)?;
+            check_count(self.labelling.heights.len(), config.max_pixels)?;
         }
         Ok(())
+    }
+
+    /// Adds those pixels of a span that are `bright`, as bits, and the peaks among them.
+    fn add_runs(
+        &mut self,
+        span: &Span<'_>,
+        mut bright: u64,
+        heights: &[f32],
+        frame: &View<'_>,
+        saturation_adu: f32,
+    ) {
+        while bright != 0 {
+            let start = bright.trailing_zeros();
+            let length = (bright >> start).trailing_ones();
+            let run = (u64::MAX >> (u64::BITS - length)) << start;
+            bright &= !run;
+            let of_run = &heights[start as usize..(start + length) as usize];
+            let [first, index] = self.labelling.add(span.x + start, span.y, of_run);
+            let mut tops = span.maxima & run;
+            while tops != 0 {
+                let at = tops.trailing_zeros();
+                let rank = (span.maxima & !(u64::MAX << at)).count_ones();
+                tops &= tops - 1;
+                self.peak_pixels.push([first + at - start, index]);
+                let (x, y) = ((span.x + at) as usize, span.y as usize);
+                self.peaks.push(Peak {
+                    saturated: is_saturated(frame, x, y, saturation_adu),
+                    ..new_peak(
+                        [x, y],
+                        span.values[at as usize],
+                        heights[at as usize],
+                        span.adjacent[rank as usize],
+                    )
+                });
+            }
+        }
     }
 
     /// Whether there were more peaks than the last search might keep.
@@ -129,7 +156,7 @@ impl PeakSearch {
             self.prominence
                 .find_saddles(&self.labelling, frame, has_several)?;
             self.prominence
-                .set(&self.labelling.pixels, &self.peak_pixels, &mut self.peaks);
+                .set(&self.labelling.heights, &self.peak_pixels, &mut self.peaks);
         }
         self.highest.clear();
         self.highest.resize(self.regions.len(), None);
@@ -155,17 +182,30 @@ impl PeakSearch {
     }
 }
 
+/// Sets the heights of a span's pixels in units of the noise, given the nodes of the row; returns a
+/// bit for each that reaches the threshold.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn reaching(
+    mesh: &Mesh,
+    nodes: &[[f32; 2]],
+    span: &Span,
+    threshold: f32,
+    heights: &mut [f32],
+) -> u64 {
+    mesh.heights(nodes, span.x as usize, span.values, heights);
+    bits_of(heights, threshold)
+}
+
 /// A peak whose region is not known yet.
-fn new_peak(pixel: BrightPixel, value: f32, maximum: &LocalMaximum, saturated: bool) -> Peak {
-    let adjacent = maximum.adjacent;
+fn new_peak([x, y]: [usize; 2], value: f32, snr: f32, adjacent: Option<Adjacent>) -> Peak {
     Peak {
-        x: pixel.x as usize,
-        y: pixel.y as usize,
+        x,
+        y,
         offset_px: adjacent.map_or([0.0; 2], |adjacent| parabola_vertex(value, adjacent)),
         values: adjacent.map(|adjacent| (value, adjacent)),
-        snr: pixel.snr,
-        prominence: pixel.snr,
+        snr,
+        prominence: snr,
         region: 0,
-        saturated,
+        saturated: false,
     }
 }

@@ -2,7 +2,6 @@
 
 use crate::base::size::Size;
 use multiversion::multiversion;
-use std::ops::Range;
 
 /// Width of a block, in pixels.
 pub(crate) const BLOCK_PX: usize = 64;
@@ -27,11 +26,6 @@ impl BlockMaxima {
         self.values.resize(self.per_row * size.height, NO_CANDIDATE);
     }
 
-    /// The maxima of the blocks in `rows`, row by row.
-    pub fn rows_mut(&mut self, rows: Range<usize>) -> &mut [f32] {
-        &mut self.values[rows.start * self.per_row..rows.end * self.per_row]
-    }
-
     /// The maxima of the blocks in row `y`.
     pub fn row(&self, y: usize) -> &[f32] {
         &self.values[y * self.per_row..(y + 1) * self.per_row]
@@ -44,7 +38,7 @@ pub(crate) struct ReachedBlock {
     /// Number of the block in its row.
     pub block: usize,
     /// One bit for each column, the lowest for the first.
-    bits: u64,
+    pub bits: u64,
 }
 
 impl ReachedBlock {
@@ -127,7 +121,7 @@ pub(crate) fn find_reaching<T: Level>(
 
 /// A bit for each of at most 64 values, set from the threshold on.
 #[inline(always)]
-fn bits_of<T: Copy + PartialOrd>(values: &[T], threshold: T) -> u64 {
+pub(crate) fn bits_of<T: Copy + PartialOrd>(values: &[T], threshold: T) -> u64 {
     let mut reaches = [0u8; BLOCK_PX];
     for (reaches, &value) in reaches.iter_mut().zip(values) {
         *reaches = u8::from(value >= threshold);
@@ -137,7 +131,7 @@ fn bits_of<T: Copy + PartialOrd>(values: &[T], threshold: T) -> u64 {
 
 /// The lowest bits of 64 bytes, of which the other bits are 0.
 #[inline(always)]
-fn packed(bytes: &[u8; BLOCK_PX]) -> u64 {
+pub(crate) fn packed(bytes: &[u8; BLOCK_PX]) -> u64 {
     /// Moves the lowest bit of byte i to bit i of the highest byte.
     const TO_HIGHEST: u64 = 0x0102_0408_1020_4080;
     let (eights, _) = bytes.as_chunks::<8>();

@@ -7,7 +7,9 @@ mod samples;
 mod view;
 
 pub(crate) use aligned::{Aligned, LINE};
-pub(crate) use blocks::{BLOCK_PX, BlockMaxima, ReachedBlock, find_reaching};
-pub(crate) use reduce::{largest_magnitude_in_row, lower, lowest_in_row, pairwise_sum};
+pub(crate) use blocks::{BLOCK_PX, BlockMaxima, ReachedBlock, bits_of, find_reaching, packed};
+pub(crate) use reduce::{
+    highest_in_columns, largest_magnitude_in_row, lower, lowest_in_row, pairwise_sum,
+};
 pub(crate) use samples::Samples;
 pub(crate) use view::{PixelRows, View};

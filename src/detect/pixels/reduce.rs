@@ -12,18 +12,22 @@ pub(crate) fn lower(a: f32, b: f32) -> f32 {
 /// The lowest of `start` and the pixels of a row; NaN pixels are ignored.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 pub(crate) fn lowest_in_row(start: f32, row: &[f32]) -> f32 {
-    fold_row(start, row, lower)
+    fold_row::<32>(start, row, lower)
+}
+
+/// The highest of `start` and the pixels of a few columns; NaN pixels are ignored.
+pub(crate) fn highest_in_columns(start: f32, row: &[f32]) -> f32 {
+    fold_row::<8>(start, row, |m, p| if p > m { p } else { m })
 }
 
 /// The larger of `start` and the absolute values in a row; NaN pixels are ignored.
 pub(crate) fn largest_magnitude_in_row(start: f32, row: &[f32]) -> f32 {
-    fold_row(start, row, |m, p| if p.abs() > m { p.abs() } else { m })
+    fold_row::<32>(start, row, |m, p| if p.abs() > m { p.abs() } else { m })
 }
 
 /// Folds a row into `start`, in any order.
 #[inline(always)]
-fn fold_row(start: f32, row: &[f32], fold: impl Fn(f32, f32) -> f32) -> f32 {
-    const LANES: usize = 32;
+fn fold_row<const LANES: usize>(start: f32, row: &[f32], fold: impl Fn(f32, f32) -> f32) -> f32 {
     let (chunks, rest) = row.as_chunks::<LANES>();
     let mut lanes = [start; LANES];
     for chunk in chunks {
@@ -57,6 +61,7 @@ mod tests {
         (row[3], row[69]) = (f32::NAN, f32::NAN);
         assert_eq!(lowest_in_row(f32::INFINITY, &row), -58.0);
         assert_eq!(lowest_in_row(-60.0, &row), -60.0);
+        assert_eq!(highest_in_columns(f32::MIN, &row), 10.0);
         assert_eq!(largest_magnitude_in_row(0.0, &row), 58.0);
         assert_eq!(pairwise_sum([1.0, 2.0, 3.0, 4.0]), 10.0);
     }
