@@ -367,18 +367,27 @@ fn find_from<T: Copy + PartialOrd + Into<f32>>(
     level: f32,
     found: &mut Vec<BrightPixel>,
 ) {
+    const BLOCK_PX: usize = 64;
     found.clear();
     for (y, row) in values.chunks_exact(width).enumerate() {
         // Most rows have none.
         if highest_in(row, lowest).into() < level {
             continue;
         }
-        let pixels = row.iter().enumerate().map(|(x, &value)| BrightPixel {
-            x,
-            y,
-            value: value.into(),
-        });
-        found.extend(pixels.filter(|pixel| pixel.value >= level));
+        for (block, values) in row.chunks(BLOCK_PX).enumerate() {
+            let is_bright = |value: T| value.into() >= level;
+            // Without early exit: this is a vector comparison, and most blocks have none, too.
+            if values.iter().fold(false, |any, &v| any | is_bright(v)) {
+                let pixels = (block * BLOCK_PX..)
+                    .zip(values)
+                    .map(|(x, &value)| BrightPixel {
+                        x,
+                        y,
+                        value: value.into(),
+                    });
+                found.extend(pixels.filter(|pixel| pixel.value >= level));
+            }
+        }
         if found.len() >= MAX_BRIGHT_PX {
             return;
         }

@@ -4,10 +4,14 @@
 //! The noise of the filtered frame is not known everywhere until all rows of cells are filtered. So
 //! pixels are gathered down to a lower cut first, and compared with the threshold later.
 
-use super::local_maxima::{Adjacent, adjacent_values, local_maxima};
 use crate::detect::filter::FilteredBand;
-use crate::detect::pixels::{BLOCK_PX, ReachedBlock, find_reaching, highest_in_columns};
+use crate::detect::pixels::{
+    BLOCK_PX, ReachedBlock, find_reaching, highest_in_columns, local_maxima,
+};
 use std::ops::Range;
+
+/// The values to the left, to the right, above and below a pixel.
+pub(super) type Adjacent = [f32; 4];
 
 /// The pixels of a row of cells that may lie above the threshold.
 #[derive(Debug, Clone, Default)]
@@ -143,4 +147,10 @@ impl Candidates {
         let mut cuts = self.cuts.iter().zip(lowest);
         cuts.all(|(cut, lowest)| cut <= lowest)
     }
+}
+
+/// The values next to a pixel of the middle row; `None` at the border.
+fn adjacent_values([above, row, below]: [Option<&[f32]>; 3], x: usize) -> Option<Adjacent> {
+    let [left, _, right] = *row?.get(x.checked_sub(1)?..)?.first_chunk()?;
+    Some([left, right, above?[x], below?[x]])
 }

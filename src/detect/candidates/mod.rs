@@ -4,7 +4,6 @@ mod candidate_pixels;
 mod disjoint_sets;
 mod filtered_frame;
 mod labelling;
-mod local_maxima;
 mod memory;
 mod peak;
 mod prominence;

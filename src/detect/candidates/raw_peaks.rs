@@ -3,7 +3,9 @@
 
 use crate::base::interrupt::Interrupted;
 use crate::detect::background::Mesh;
-use crate::detect::pixels::{BLOCK_PX, ReachedBlock, Samples, View, find_reaching};
+use crate::detect::pixels::{
+    BLOCK_PX, Level, ReachedBlock, Samples, View, find_reaching, local_maxima,
+};
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
 use crate::detect::threads::for_each_worker;
 use std::cmp::Ordering;
@@ -129,10 +131,17 @@ impl BandWorker {
         } = self;
         block_thresholds(view, background, top, thresholds);
         for y in top.max(1)..(top + BAND_PX).min(view.height - 1) {
-            match view.row(y) {
-                Samples::U8(row) => find_reaching(row, thresholds, blocks),
-                Samples::U16(row) => find_reaching(row, thresholds, blocks),
-                Samples::F32(row) => find_reaching(row, thresholds, blocks),
+            match [y - 1, y, y + 1].map(|y| view.row(y)) {
+                [Samples::U8(above), Samples::U8(row), Samples::U8(below)] => {
+                    find_maxima([above, row, below], thresholds, blocks);
+                }
+                [Samples::U16(above), Samples::U16(row), Samples::U16(below)] => {
+                    find_maxima([above, row, below], thresholds, blocks);
+                }
+                [Samples::F32(above), Samples::F32(row), Samples::F32(below)] => {
+                    find_maxima([above, row, below], thresholds, blocks);
+                }
+                _ => continue,
             }
             for block in blocks.iter() {
                 for x in block.columns().filter(|&x| x > 0 && x + 1 < view.width) {
@@ -140,6 +149,14 @@ impl BandWorker {
                 }
             }
         }
+    }
+}
+
+/// Finds the pixels of the middle row from the threshold of their block on that no neighbor exceeds.
+fn find_maxima<T: Level>(rows: [&[T]; 3], thresholds: &[f32], found: &mut Vec<ReachedBlock>) {
+    find_reaching(rows[1], thresholds, found);
+    for ReachedBlock { block, bits } in found {
+        *bits &= local_maxima(rows.map(Some), *block * BLOCK_PX);
     }
 }
 
@@ -163,7 +180,7 @@ fn block_thresholds(view: &View<'_>, background: &Mesh, top: usize, thresholds: 
     }
 }
 
-/// The peak at an inner pixel, if it is one.
+/// The peak at an inner pixel that is a local maximum, if it is one.
 fn peak_at(
     view: &View<'_>,
     background: &Mesh,
@@ -172,11 +189,6 @@ fn peak_at(
     saturation_adu: f32,
 ) -> Option<RawPeak> {
     let value = view.at(x, y);
-    // A quick test first: most pixels of a star are no peak.
-    let next_to = [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)];
-    if next_to.iter().any(|&(x, y)| view.at(x, y) > value) {
-        return None;
-    }
     let (background, sigma) = background.at(x as f32, y as f32);
     if value < background + MIN_PIXEL_SIGMA * sigma || !is_highest(view, x, y) {
         return None;

@@ -9,9 +9,8 @@
 //! 4. Peaks that noise or the wing of a brighter star can explain are dropped.
 //! 5. Of the many peaks of a streak one is kept.
 
-use super::candidate_pixels::{Candidates, Span};
+use super::candidate_pixels::{Adjacent, Candidates, Span};
 use super::labelling::Labelling;
-use super::local_maxima::Adjacent;
 use super::memory::check_count;
 use super::peak::{Peak, is_saturated, parabola_vertex};
 use super::prominence::Prominence;

@@ -57,6 +57,8 @@ impl ReachedBlock {
 
 /// A value of a pixel that can be compared with a threshold.
 pub(crate) trait Level: Copy + PartialOrd {
+    /// No value is lower.
+    const LOWEST: Self;
     /// The least value that reaches the threshold; `None` if no value does.
     fn reaching(threshold: f32) -> Option<Self>;
 }
@@ -70,6 +72,8 @@ fn whole_from(threshold: f32) -> Option<u32> {
 }
 
 impl Level for u8 {
+    const LOWEST: Self = 0;
+
     #[inline(always)]
     fn reaching(threshold: f32) -> Option<Self> {
         whole_from(threshold).and_then(|level| Self::try_from(level).ok())
@@ -77,6 +81,8 @@ impl Level for u8 {
 }
 
 impl Level for u16 {
+    const LOWEST: Self = 0;
+
     #[inline(always)]
     fn reaching(threshold: f32) -> Option<Self> {
         whole_from(threshold).and_then(|level| Self::try_from(level).ok())
@@ -84,6 +90,8 @@ impl Level for u16 {
 }
 
 impl Level for f32 {
+    const LOWEST: Self = f32::NEG_INFINITY;
+
     #[inline(always)]
     fn reaching(threshold: f32) -> Option<Self> {
         Some(threshold)

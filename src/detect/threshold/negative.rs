@@ -12,6 +12,7 @@
 
 use crate::base::size::Size;
 use crate::detect::background::Mesh;
+use crate::detect::pixels::{BLOCK_PX, Widened, packed, with_widened};
 use multiversion::multiversion;
 
 /// Parts of a frame have at least this many pixels, so that the tail is measured on some ten
@@ -37,8 +38,10 @@ pub(crate) struct Extrema {
     /// Parts across, and down.
     parts: usize,
     heights: Vec<Sides>,
-    /// Of each pixel of a row: 1 for a maximum, −1 for a minimum.
-    marks: Vec<i8>,
+    /// The mesh interpolated to a row.
+    nodes: Vec<[f32; 2]>,
+    /// A row in standard deviations.
+    row: Vec<f32>,
 }
 
 /// The heights of the extrema of a part, in standard deviations.
@@ -75,23 +78,26 @@ impl Extrema {
         for sides in &mut self.heights[first_part..first_part + self.parts] {
             sides.pixels += width / self.parts;
         }
-        mark_extrema(rows.map(|row| &row[..width]), &mut self.marks);
-        for (x, mark) in self.marks.iter().enumerate() {
-            if *mark == 0 {
-                continue;
-            }
-            let here = rows[1][x];
-            let is_above = *mark > 0;
-            let (mean, sigma) = mesh.at(x as f32, y as f32);
-            let above = (here - mean) / sigma;
-            let sides = &mut self.heights[first_part + x * self.parts / width];
-            let (height, heights) = if is_above {
-                (above, &mut sides.positive)
-            } else {
-                (-above, &mut sides.negative)
-            };
-            if height > MIN_HEIGHT {
-                heights.push(height);
+        mesh.across_row(y, &mut self.nodes);
+        self.row.resize(width, 0.0);
+        mesh.heights(&self.nodes, 0, &rows[1][..width], &mut self.row);
+        for first in (0..width).step_by(BLOCK_PX) {
+            let extrema = with_widened(rows.map(Some), first, |rows| mark_extrema(rows));
+            let [maxima, minima] = extrema.map(|bits| bits & inner_columns(first, width));
+            for (mut bits, is_above) in [(maxima, true), (minima, false)] {
+                while bits != 0 {
+                    let x = first + bits.trailing_zeros() as usize;
+                    bits &= bits - 1;
+                    let sides = &mut self.heights[first_part + x * self.parts / width];
+                    let (height, heights) = if is_above {
+                        (self.row[x], &mut sides.positive)
+                    } else {
+                        (-self.row[x], &mut sides.negative)
+                    };
+                    if height > MIN_HEIGHT {
+                        heights.push(height);
+                    }
+                }
             }
         }
     }
@@ -112,31 +118,35 @@ impl Extrema {
     }
 }
 
-/// Marks the pixels of the middle row that are above, or below, all around them.
+/// A bit for each column of the block that begins with `first` that is not at the border.
+fn inner_columns(first: usize, width: usize) -> u64 {
+    let all = u64::MAX << u32::from(first == 0);
+    let right = width - 1 - first;
+    if right < BLOCK_PX {
+        all & !(u64::MAX << right)
+    } else {
+        all
+    }
+}
+
+/// The pixels of the middle row that are above all around them, and those that are below, as bits.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn mark_extrema(rows: [&[f32]; 3], marks: &mut Vec<i8>) {
-    let width = rows[1].len();
-    marks.clear();
-    marks.resize(width, 0);
-    let inner = width.saturating_sub(2);
-    if inner == 0 {
-        return;
-    }
-    let [above, middle, below] = rows.map(|row| [0, 1, 2].map(|first| &row[first..first + inner]));
-    let [left, here, right] = middle;
-    let [[a, b, c], [d, e, f]] = [above, below];
-    let marks = &mut marks[1..=inner];
-    for x in 0..inner {
-        let value = here[x];
+fn mark_extrema([above, row, below]: [&Widened<f32>; 3]) -> [u64; 2] {
+    let [mut maxima, mut minima] = [[0u8; BLOCK_PX]; 2];
+    let marks = maxima.iter_mut().zip(&mut minima);
+    for (x, (maximum, minimum)) in marks.enumerate() {
+        let value = row[x + 1];
+        let [a, b, c, d] = [above[x], above[x + 1], above[x + 2], row[x]];
+        let [e, f, g, h] = [below[x], below[x + 1], below[x + 2], row[x + 2]];
         // Of equal neighbors in a row, the first counts.
-        let is_maximum = (value > left[x]) & (value >= right[x]);
-        let is_minimum = (value < left[x]) & (value <= right[x]);
-        let is_over = (value > a[x]) & (value > b[x]) & (value > c[x]);
-        let is_over = is_over & (value > d[x]) & (value > e[x]) & (value > f[x]);
-        let is_under = (value < a[x]) & (value < b[x]) & (value < c[x]);
-        let is_under = is_under & (value < d[x]) & (value < e[x]) & (value < f[x]);
-        marks[x] = i8::from(is_maximum & is_over) - i8::from(is_minimum & is_under);
+        let is_over = (value > a) & (value > b) & (value > c) & (value > d);
+        let is_over = is_over & (value > e) & (value > f) & (value > g) & (value >= h);
+        let is_under = (value < a) & (value < b) & (value < c) & (value < d);
+        let is_under = is_under & (value < e) & (value < f) & (value < g) & (value <= h);
+        *maximum = u8::from(is_over);
+        *minimum = u8::from(is_under);
     }
+    [packed(&maxima), packed(&minima)]
 }
 
 impl Sides {
@@ -144,12 +154,10 @@ impl Sides {
     /// deviations; `None` where there are too few extrema to tell.
     fn threshold(&mut self, per_mpx: f64) -> Option<f64> {
         let megapixels = self.pixels as f64 / 1e6;
-        for heights in [&mut self.positive, &mut self.negative] {
-            heights.sort_unstable_by(|a, b| b.total_cmp(a));
-        }
-        let negative_at = |per_mpx: f64| {
-            let height = self.negative.get((per_mpx * megapixels) as usize)?;
-            Some(f64::from(*height))
+        let mut negative_at = |per_mpx: f64| {
+            let rank = (per_mpx * megapixels) as usize;
+            let has_rank = rank < self.negative.len();
+            has_rank.then(|| f64::from(highest(&mut self.negative, rank)[rank]))
         };
         let (near, far) = (negative_at(SCALE_PER_MPX)?, negative_at(TAIL_PER_MPX)?);
         // As a Gaussian has it: the logarithm of the number is linear in the square of the height.
@@ -157,26 +165,50 @@ impl Sides {
         let square = far.powi(2) + slope * (TAIL_PER_MPX / per_mpx).ln();
         let tail = square.max(0.0).sqrt() / near;
         let count = SCALE_PER_MPX * megapixels;
+        // Mostly, few maxima are stars. Else all are sorted, which takes long.
+        let most = 4 * count as usize;
+        let scale = if most < self.positive.len() {
+            positive_scale(highest(&mut self.positive, most), count, tail)
+        } else {
+            None
+        };
+        let of_all = || positive_scale(highest(&mut self.positive, usize::MAX), count, tail);
         // Where stars are not few, both sides are taken to be alike.
-        Some(tail * self.positive_scale(count, tail).unwrap_or(near))
+        Some(tail * scale.or_else(of_all).unwrap_or(near))
     }
+}
 
-    /// The height at which `count` maxima that are not stars are higher; the threshold is `tail`
-    /// times as high.
-    fn positive_scale(&self, count: f64, tail: f64) -> Option<f64> {
-        const ROUNDS: usize = 5;
-        let mut scale = f64::from(*self.positive.get(count as usize)?);
-        for _ in 0..ROUNDS {
-            let threshold = tail * scale;
-            let stars = self.positive.partition_point(|&h| f64::from(h) > threshold) as f64;
-            let is_enough = |(index, &height): (usize, &f32)| {
-                index as f64 - stars * threshold / f64::from(height) >= count
-            };
-            let at = self.positive.iter().enumerate().position(is_enough)?;
-            scale = f64::from(self.positive[at]);
+/// Sorts the highest to the front, highest first: those up to that of the given rank, from 0.
+fn highest(heights: &mut [f32], rank: usize) -> &[f32] {
+    let descending = |a: &f32, b: &f32| b.total_cmp(a);
+    let end = if rank < heights.len() {
+        heights.select_nth_unstable_by(rank, descending);
+        rank + 1
+    } else {
+        heights.len()
+    };
+    heights[..end].sort_unstable_by(descending);
+    &heights[..end]
+}
+
+/// The height at which `count` maxima that are not stars are higher, highest first; the threshold is
+/// `tail` times as high. `None` where there are too few.
+fn positive_scale(heights: &[f32], count: f64, tail: f64) -> Option<f64> {
+    const ROUNDS: usize = 5;
+    let mut scale = f64::from(*heights.get(count as usize)?);
+    for _ in 0..ROUNDS {
+        let threshold = tail * scale;
+        let stars = heights.partition_point(|&h| f64::from(h) > threshold);
+        if stars == heights.len() {
+            return None;
         }
-        Some(scale)
+        let is_enough = |(index, &height): (usize, &f32)| {
+            index as f64 - stars as f64 * threshold / f64::from(height) >= count
+        };
+        let at = heights.iter().enumerate().position(is_enough)?;
+        scale = f64::from(heights[at]);
     }
+    Some(scale)
 }
 
 #[cfg(test)]

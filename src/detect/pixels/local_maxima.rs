@@ -1,54 +1,54 @@
-//! Local maxima of the filtered frame, a block of columns at a time.
+//! Local maxima of a row, a block of columns at a time.
 
-use crate::detect::pixels::{BLOCK_PX, packed};
+use super::blocks::{BLOCK_PX, Level, packed};
 use multiversion::multiversion;
 
-/// The values to the left, to the right, above and below a pixel.
-pub(super) type Adjacent = [f32; 4];
-/// A block of columns, and one on either side.
-type Widened = [f32; BLOCK_PX + 2];
+/// The columns of a block, and one on either side.
+pub(crate) type Widened<T> = [T; BLOCK_PX + 2];
 
 /// The local maxima in the block of columns that begins with `first`, given its row between those
 /// above and below: one bit for each column, the lowest for the first. No neighbor of a maximum is
-/// higher; of equal pixels the first in reading order counts.
-pub(super) fn local_maxima(rows: [Option<&[f32]>; 3], first: usize) -> u64 {
+/// higher; of equal pixels the first in reading order counts. Nothing is beyond the border, and NaN is
+/// no neighbor. The bits of NaN pixels, and of columns beyond the row, mean nothing.
+pub(crate) fn local_maxima<T: Level>(rows: [Option<&[T]>; 3], first: usize) -> u64 {
+    with_widened(rows, first, |rows| mark_maxima(rows))
+}
+
+/// Calls `mark` with the columns of the block that begins with `first`, and one on either side; of
+/// the lowest value where there are none.
+pub(crate) fn with_widened<T: Level, R>(
+    rows: [Option<&[T]>; 3],
+    first: usize,
+    mark: impl Fn([&Widened<T>; 3]) -> R,
+) -> R {
     let widened = rows.map(|row| row?.get(first.checked_sub(1)?..)?.first_chunk());
     if let [Some(above), Some(row), Some(below)] = widened {
-        return mark_maxima([above, row, below]);
+        return mark([above, row, below]);
     }
     let from = first.saturating_sub(1);
     let copies = rows.map(|row| {
-        // Beyond the border all is lower than any pixel.
-        let mut copy: Widened = [f32::NEG_INFINITY; BLOCK_PX + 2];
+        let mut copy: Widened<T> = [T::LOWEST; BLOCK_PX + 2];
         let values = row.and_then(|row| row.get(from..)).unwrap_or_default();
         let target = copy[from + 1 - first..].iter_mut();
         target.zip(values).for_each(|(to, &value)| *to = value);
         copy
     });
-    mark_maxima(copies.each_ref())
+    mark(copies.each_ref())
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn mark_maxima([above, row, below]: [&Widened; 3]) -> u64 {
+fn mark_maxima<T: Level>([above, row, below]: [&Widened<T>; 3]) -> u64 {
     let mut marks = [0u8; BLOCK_PX];
     for (x, mark) in marks.iter_mut().enumerate() {
         let value = row[x + 1];
         // Without early exit: a branch for each neighbor would cost more.
-        let is_over = (above[x] < value) & (above[x + 1] < value) & (above[x + 2] < value);
-        let is_over = is_over & (row[x] < value) & (row[x + 2] <= value);
-        let is_maximum = (below[x] <= value) & (below[x + 1] <= value) & (below[x + 2] <= value);
-        *mark = u8::from(is_over & is_maximum);
+        let is_reached = (above[x] >= value) | (above[x + 1] >= value) | (above[x + 2] >= value);
+        let is_reached = is_reached | (row[x] >= value);
+        let is_lower = (below[x] > value) | (below[x + 1] > value) | (below[x + 2] > value);
+        let is_lower = is_lower | (row[x + 2] > value);
+        *mark = u8::from(!(is_reached | is_lower));
     }
     packed(&marks)
-}
-
-/// The values next to a pixel of the middle row; `None` at the border.
-pub(super) fn adjacent_values(
-    [above, row, below]: [Option<&[f32]>; 3],
-    x: usize,
-) -> Option<Adjacent> {
-    let [left, _, right] = *row?.get(x.checked_sub(1)?..)?.first_chunk()?;
-    Some([left, right, above?[x], below?[x]])
 }
 
 #[cfg(test)]
@@ -67,7 +67,7 @@ mod tests {
         (y.saturating_sub(1)..(y + 2).min(height)).all(|row| {
             (x.saturating_sub(1)..(x + 2).min(width)).all(|column| {
                 let (value, other) = (values[y * width + x], values[row * width + column]);
-                other < value || (other == value && (row, column) >= (y, x))
+                other < value || other.is_nan() || (other == value && (row, column) >= (y, x))
             })
         })
     }
@@ -84,12 +84,11 @@ mod tests {
             let values = &values[..values.len() / width * width];
             for (y, row) in values.chunks_exact(width).enumerate() {
                 let rows = rows_around(values, width, y);
-                for (x, value) in row.iter().enumerate() {
+                let inner = row.iter().enumerate().filter(|(_, value)| !value.is_nan());
+                for (x, value) in inner {
                     let first = x / BLOCK_PX * BLOCK_PX;
                     let found = local_maxima(rows, first) >> (x - first) & 1 == 1;
                     prop_assert_eq!(found, is_maximum(values, width, x, y), "{} {} {}", x, y, value);
-                    let inside = x > 0 && x + 1 < width && rows.iter().all(Option::is_some);
-                    prop_assert_eq!(adjacent_values(rows, x).is_some(), inside);
                 }
             }
         }
