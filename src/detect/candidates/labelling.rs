@@ -32,22 +32,34 @@ impl PixelRun {
         self.pixel as usize..(self.pixel + (self.end - self.start)) as usize
     }
 
-    /// The index of its pixel in a column.
-    fn pixel_in(&self, column: i64) -> usize {
-        self.pixel as usize + (column - i64::from(self.start)) as usize
-    }
-
-    /// Calls `visit` with each pixel of the run and those of `above`, in the row before, that are
-    /// next to it.
-    fn for_each_adjacent(&self, above: &Self, visit: &mut impl FnMut(usize, usize)) {
+    /// Calls `visit` with spans of the run and of `above`, in the row before, whose pixels are next to
+    /// each other, one by one.
+    fn for_each_adjacent(&self, above: &Self, visit: &mut impl FnMut(Adjacent)) {
+        let [start, end, above_start, above_end] =
+            [self.start, self.end, above.start, above.end].map(i64::from);
         for offset in -1..=1 {
-            let from = i64::from(self.start).max(i64::from(above.start) - offset);
-            let to = i64::from(self.end).min(i64::from(above.end) - offset);
-            for column in from..to {
-                visit(self.pixel_in(column), above.pixel_in(column + offset));
+            let from = start.max(above_start - offset);
+            let to = end.min(above_end - offset);
+            if from < to {
+                visit(Adjacent {
+                    pixel: self.pixel as usize + (from - start) as usize,
+                    before: above.pixel as usize + (from + offset - above_start) as usize,
+                    count: (to - from) as usize,
+                });
             }
         }
     }
+}
+
+/// Two spans of pixels of the regions; the first of one is next to the first of the other, and so on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Adjacent {
+    /// Index of the first pixel of the span that is later in reading order.
+    pub pixel: usize,
+    /// Index of the first pixel of the other.
+    pub before: usize,
+    /// Pixels in each.
+    pub count: usize,
 }
 
 /// Goes through the runs in reading order, and finds those that touch each.
@@ -196,8 +208,7 @@ impl Labelling {
         }
     }
 
-    /// Calls `visit` with each two adjacent pixels of the regions that are wanted, the later in
-    /// reading order first.
+    /// Calls `visit` with each two adjacent pixels of the regions that are wanted, as spans.
     ///
     /// # Errors
     /// [`Interrupted`] of work on `view`.
@@ -205,7 +216,7 @@ impl Labelling {
         &self,
         view: &View<'_>,
         is_wanted: impl Fn(usize) -> bool,
-        mut visit: impl FnMut(usize, usize),
+        mut visit: impl FnMut(Adjacent),
     ) -> Result<(), Interrupted> {
         let mut touching = TouchingRuns::default();
         for (index, run) in self.runs.iter().enumerate() {
@@ -215,9 +226,11 @@ impl Labelling {
             if !is_wanted(run.region as usize) {
                 continue;
             }
-            for pixel in run.pixels().skip(1) {
-                visit(pixel, pixel - 1);
-            }
+            visit(Adjacent {
+                pixel: run.pixel as usize + 1,
+                before: run.pixel as usize,
+                count: run.pixels().len() - 1,
+            });
             for other in touching.before(&self.runs, index) {
                 run.for_each_adjacent(&self.runs[other], &mut visit);
             }

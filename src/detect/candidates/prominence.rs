@@ -13,7 +13,7 @@
 //! persistence.
 
 use super::disjoint_sets::{self, root_of};
-use super::labelling::Labelling;
+use super::labelling::{Adjacent, Labelling};
 use super::peak::Peak;
 use crate::base::interrupt::Interrupted;
 use crate::detect::pixels::View;
@@ -52,6 +52,8 @@ fn leave_out_repeated(saddles: &mut Vec<Saddle>) {
 pub(super) struct Prominence {
     /// The top of each pixel, as its index: a pixel without a higher one next to it.
     tops: Vec<u32>,
+    /// The height of the highest pixel next to each, or of itself.
+    steepest: Vec<f32>,
     /// Saddles found last: two tops are adjacent at many pixels, of which the highest counts.
     recent: Vec<Saddle>,
     saddles: Vec<Saddle>,
@@ -68,14 +70,30 @@ impl Prominence {
         view: &View<'_>,
         is_wanted: impl Fn(usize) -> bool,
     ) -> Result<(), Interrupted> {
-        let (tops, heights) = (&mut self.tops, &labelling.heights);
+        let Self { tops, steepest, .. } = self;
+        let heights = &labelling.heights;
         disjoint_sets::reset(tops, heights.len());
-        labelling.for_each_adjacent(view, is_wanted, |pixel, before| {
-            let [low, high] = by_height(heights, [pixel, before]);
-            if is_higher(heights, high, tops[low] as usize) {
-                tops[low] = high as u32;
-            }
-        })?;
+        steepest.clone_from(heights);
+        labelling.for_each_adjacent(
+            view,
+            is_wanted,
+            |Adjacent {
+                 pixel,
+                 before,
+                 count,
+             }| {
+                for [of, next_to] in [[pixel, before], [before, pixel]] {
+                    let steepest = &mut steepest[of..of + count];
+                    let tops = &mut tops[of..of + count];
+                    climb(
+                        steepest,
+                        tops,
+                        &heights[next_to..next_to + count],
+                        next_to as u32,
+                    );
+                }
+            },
+        )?;
         for pixel in 0..heights.len() {
             tops[pixel] = root_of(tops, pixel as u32);
         }
@@ -96,31 +114,44 @@ impl Prominence {
             tops,
             recent,
             saddles,
+            ..
         } = self;
         saddles.clear();
         recent.clear();
         recent.resize(1 << RECENT_BITS, Saddle::default());
         let mut many = MANY_SADDLES;
-        labelling.for_each_adjacent(view, is_wanted, |pixel, before| {
-            let [a, b] = [pixel, before].map(|index| tops[index]);
-            if a != b {
-                let [snr, of_before] = [pixel, before].map(|index| labelling.heights[index]);
-                let found = Saddle {
-                    tops: [a.min(b), a.max(b)],
-                    snr: snr.min(of_before),
-                };
-                let last = &mut recent[found.slot()];
-                if last.tops == found.tops {
-                    last.snr = last.snr.max(found.snr);
-                } else {
-                    saddles.push(std::mem::replace(last, found));
-                    if saddles.len() == many {
-                        leave_out_repeated(saddles);
-                        many = MANY_SADDLES.max(2 * saddles.len());
+        labelling.for_each_adjacent(
+            view,
+            is_wanted,
+            |Adjacent {
+                 pixel,
+                 before,
+                 count,
+             }| {
+                let [tops, of_before] = [pixel, before].map(|first| &tops[first..first + count]);
+                for (index, (&a, &b)) in tops.iter().zip(of_before).enumerate() {
+                    if a == b {
+                        continue;
+                    }
+                    let [snr, of_before] =
+                        [pixel, before].map(|first| labelling.heights[first + index]);
+                    let found = Saddle {
+                        tops: [a.min(b), a.max(b)],
+                        snr: snr.min(of_before),
+                    };
+                    let last = &mut recent[found.slot()];
+                    if last.tops == found.tops {
+                        last.snr = last.snr.max(found.snr);
+                    } else {
+                        saddles.push(std::mem::replace(last, found));
+                        if saddles.len() == many {
+                            leave_out_repeated(saddles);
+                            many = MANY_SADDLES.max(2 * saddles.len());
+                        }
                     }
                 }
-            }
-        })?;
+            },
+        )?;
         saddles.append(recent);
         saddles.retain(|saddle| saddle.tops[0] != saddle.tops[1]);
         Ok(())
@@ -151,6 +182,19 @@ impl Prominence {
             }
             tops[low] = high as u32;
         }
+    }
+}
+
+/// Moves the top of pixels to the pixel next to each if that is higher than the steepest so far, of
+/// equal ones to the first in reading order; `first` is the index of the first of those next to them.
+#[inline(always)]
+fn climb(steepest: &mut [f32], tops: &mut [u32], next_to: &[f32], first: u32) {
+    for (index, ((steepest, top), &height)) in
+        (first..).zip(steepest.iter_mut().zip(tops).zip(next_to))
+    {
+        let is_higher = (height > *steepest) | ((height == *steepest) & (index < *top));
+        *steepest = if is_higher { height } else { *steepest };
+        *top = if is_higher { index } else { *top };
     }
 }
 
