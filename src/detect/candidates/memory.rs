@@ -10,7 +10,7 @@ pub(crate) struct CandidateMemory {
 }
 
 impl CandidateMemory {
-    /// A candidate, in a vector that grows by doubling.
+    /// A candidate and its part of a span, in vectors that grow by doubling.
     const PER_CANDIDATE_BYTES: u64 = 20;
     /// A pixel above the threshold: that and its top, and its part of runs, peaks and saddles.
     const PER_BRIGHT_PIXEL_BYTES: u64 = 30;

@@ -17,6 +17,7 @@ use super::labelling::{Adjacent, Labelling};
 use super::peak::Peak;
 use crate::base::interrupt::Interrupted;
 use crate::detect::pixels::View;
+use multiversion::multiversion;
 
 /// Logarithm to base 2 of the number of saddles that are remembered.
 const RECENT_BITS: u32 = 13;
@@ -187,7 +188,7 @@ impl Prominence {
 
 /// Moves the top of pixels to the pixel next to each if that is higher than the steepest so far, of
 /// equal ones to the first in reading order; `first` is the index of the first of those next to them.
-#[inline(always)]
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn climb(steepest: &mut [f32], tops: &mut [u32], next_to: &[f32], first: u32) {
     for (index, ((steepest, top), &height)) in
         (first..).zip(steepest.iter_mut().zip(tops).zip(next_to))
