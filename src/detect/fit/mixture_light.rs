@@ -2,7 +2,9 @@
 
 use super::light::{GroupLight, SpotLight};
 use super::window::Window;
-use crate::detect::psf::{GROUP_PX, LitPart, NarrowProfiles, PixelGroup, ShareGroup, each};
+use crate::detect::psf::{
+    AxisTaps, GROUP_PX, LitPart, NarrowProfiles, PixelGroup, ShareGroup, each,
+};
 use multiversion::multiversion;
 
 /// The pixels of an effective PSF.
@@ -11,8 +13,8 @@ pub(super) struct MixtureImage {
     /// Row by row, as the pixels of the window.
     groups: Vec<ShareGroup>,
     profiles: NarrowProfiles,
-    /// Buffer of the table.
-    lines: Vec<f32>,
+    /// Buffers of the table.
+    axes: [AxisTaps; 2],
 }
 
 impl MixtureImage {
@@ -26,10 +28,11 @@ impl MixtureImage {
         let scale = spot_px / psf.spot_px;
         let corner = [window.x0, window.y0].map(|at| at as f64);
         let size = window.size();
-        if scale == 1.0 && !psf.table.is_empty() {
+        if !psf.table.is_empty() {
             let place = [x_px - corner[0], y_px - corner[1]];
+            let sizes = [psf.spot_px, scale];
             psf.table
-                .draw(place, size, spot_px, &mut self.lines, &mut self.groups);
+                .draw(place, size, sizes, &mut self.axes, &mut self.groups);
             return;
         }
         for lobe in &psf.lobes {

@@ -138,23 +138,23 @@ fn compare_with_one_pixel(star: &Fit, buffers: &mut FitBuffers) -> [f64; 2] {
     ]
 }
 
-/// Whether a much wider spot than the frame's explains the source much better.
+/// Whether a much wider spot than the frame's explains the source much better: one of the largest
+/// size that a star has is fitted, and would be larger still, which would lower chi² (a score test).
 fn is_extended(maps: &FrameMaps<'_>, peak: &Peak, fit: &Fit, buffers: &mut FitBuffers) -> bool {
     let spot = fit.spots[0];
-    let free = buffers.fit_free_size(maps, spot, &[], maps.spot_px, NoiseModel::default());
-    if !free.converged || free.spot_px < StarSize::MAX * maps.spot_px {
-        return false;
-    }
+    let spot_px = StarSize::MAX * maps.spot_px;
     let config = FitConfig {
-        spot_px: StarSize::MAX * maps.spot_px,
+        spot_px,
         free_size: false,
         noise: NoiseModel::default(),
     };
     let FitBuffers { fitter, window, .. } = buffers;
-    let star = fitter.fit(window, &free.spots, &config);
+    maps.cut_out(&[spot], maps.window_radius(spot_px), window);
+    let star = fitter.fit(window, &[spot], &config);
     let correlation2 = maps.correlation_at(spot.x, spot.y).powi(2);
     let allowed = StarSize::SIGNIFICANT_SIGMA.powi(2) * correlation2;
-    star.chi2 - free.chi2 > allowed + imperfection(maps, peak, &spot)
+    let excess = (star.size_excess_px / star.size_error_px).max(0.0);
+    star.converged && excess * excess > allowed + imperfection(maps, peak, &spot)
 }
 
 /// Whether the region of a peak is longer than a star of its height is wide. The halo of a saturated

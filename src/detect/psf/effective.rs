@@ -6,7 +6,7 @@
 //! over the field.
 
 use super::gaussian::{Lobe, MAX_WINDOW_PX};
-use super::table::PsfTable;
+use super::table::{LobeExtent, PsfTable};
 use crate::base::size::Size;
 use crate::detect::detection::MeasuredPsf;
 
@@ -29,7 +29,7 @@ pub(crate) struct FieldLobe {
 /// The spot at one place: a mixture of Gaussians, or a single one.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct LocalPsf {
-    /// Empty for a single Gaussian of the size that is fitted.
+    /// Empty where it is tabulated, and for a single Gaussian of the size that is fitted.
     pub lobes: Vec<Lobe>,
     /// The size, as [`Fit::spot_px`](crate::detect::fit::Fit::spot_px), of a spot that is not scaled, in
     /// pixels.
@@ -46,6 +46,16 @@ impl LocalPsf {
         self.table.copy_from(&other.table);
     }
 
+    /// Tabulates the lobes, unless they are too sharp.
+    pub fn tabulate(&mut self) {
+        let mut extent = LobeExtent::default();
+        extent.add(&self.lobes);
+        match extent.layout() {
+            Some(layout) => self.table.fill(&self.lobes, layout),
+            None => self.table.clear(),
+        }
+    }
+
     /// Becomes a single Gaussian.
     pub fn clear(&mut self) {
         self.lobes.clear();
@@ -54,7 +64,7 @@ impl LocalPsf {
 
     /// Whether it is a single Gaussian.
     pub fn is_gaussian(&self) -> bool {
-        self.lobes.is_empty()
+        self.lobes.is_empty() && self.table.is_empty()
     }
 }
 
@@ -182,6 +192,12 @@ impl EffectivePsf {
             spot_px,
             radius_px,
         }
+    }
+
+    /// Whether it is the same everywhere.
+    pub fn is_uniform(&self) -> bool {
+        let is_one = |[least, most]: &[f64; 2]| least == most;
+        self.form != FieldForm::Radial && self.moments.range.iter().all(is_one)
     }
 
     /// What the spots of a frame of this size are like.

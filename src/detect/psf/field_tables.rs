@@ -4,7 +4,7 @@
 //! mixed from the four nodes around it.
 
 use super::effective::{EffectivePsf, FieldForm, LocalPsf};
-use super::table::{PsfTable, REACH_SIGMAS, TableLayout};
+use super::table::{LobeExtent, PsfTable, TableLayout};
 use crate::base::size::Size;
 use multiversion::multiversion;
 use std::sync::OnceLock;
@@ -14,9 +14,8 @@ use std::sync::OnceLock;
 pub(crate) struct FieldTables<'a> {
     /// The PSF.
     pub psf: &'a EffectivePsf,
-    layout: TableLayout,
-    /// Whether the lobes are too sharp for a table: they are summed instead.
-    is_sharp: bool,
+    /// `None` where the lobes are too sharp for a table: they are summed instead.
+    layout: Option<TableLayout>,
     /// Distance of the nodes along x and y, in pixels.
     cell_px: [f64; 2],
     /// Cells along x and y: one fewer than nodes.
@@ -36,8 +35,7 @@ impl<'a> FieldTables<'a> {
         let spacing = |side: usize, cells: usize| (side - 1) as f64 / cells.max(1) as f64;
         let mut tables = Self {
             psf,
-            layout: TableLayout::default(),
-            is_sharp: false,
+            layout: None,
             cell_px: [
                 spacing(size.width, cells[0]),
                 spacing(size.height, cells[1]),
@@ -49,7 +47,7 @@ impl<'a> FieldTables<'a> {
         if count <= stars {
             tables.nodes.resize_with(count, OnceLock::new);
         }
-        tables.set_layout();
+        tables.layout = tables.common_layout();
         tables
     }
 
@@ -58,19 +56,22 @@ impl<'a> FieldTables<'a> {
         self.psf.window_radius(spot_px)
     }
 
-    /// The spot at a pixel: its lobes, and their table.
+    /// The spot at a pixel: its table, or its lobes.
     pub fn at(&self, x_px: f64, y_px: f64, local: &mut LocalPsf) {
-        self.psf.at(x_px, y_px, local);
-        let LocalPsf { table, lobes, .. } = local;
-        if self.is_sharp {
-            table.clear();
+        let Some(layout) = self.layout else {
+            self.psf.at(x_px, y_px, local);
+            local.table.clear();
             return;
-        }
+        };
         if self.nodes.is_empty() {
-            table.fill(lobes, self.layout);
+            self.psf.at(x_px, y_px, local);
+            local.table.fill(&local.lobes, layout);
             return;
         }
-        table.layout = self.layout;
+        local.lobes.clear();
+        local.spot_px = self.psf.spot_px;
+        let table = &mut local.table;
+        table.layout = layout;
         let [(column, right), (row, below)] = [(0, x_px), (1, y_px)].map(|(axis, at_px)| {
             let cells = self.cells[axis];
             if cells == 0 {
@@ -91,11 +92,11 @@ impl<'a> FieldTables<'a> {
                 } else {
                     [columns[0].0, rows[0].0]
                 };
-                (&self.node(node).coefficients[..], part as f32)
+                (&self.node(node, layout).coefficients[..], part as f32)
             })
         });
         let [[a, b], [c, d]] = parts;
-        table.coefficients.resize(self.layout.len(), 0.0);
+        table.coefficients.resize(layout.len(), 0.0);
         if a.1 == 1.0 {
             table.coefficients.copy_from_slice(a.0);
         } else {
@@ -104,12 +105,12 @@ impl<'a> FieldTables<'a> {
     }
 
     /// The table at a node.
-    fn node(&self, [column, row]: [usize; 2]) -> &PsfTable {
+    fn node(&self, [column, row]: [usize; 2], layout: TableLayout) -> &PsfTable {
         self.nodes[row * (self.cells[0] + 1) + column].get_or_init(|| {
             let mut local = LocalPsf::default();
             self.lobes_at([column, row], &mut local);
             let mut table = PsfTable::default();
-            table.fill(&local.lobes, self.layout);
+            table.fill(&local.lobes, layout);
             table
         })
     }
@@ -120,32 +121,25 @@ impl<'a> FieldTables<'a> {
         self.psf.at(x, y, local);
     }
 
-    /// Sets the layout that suits the spots at all nodes.
-    fn set_layout(&mut self) {
-        /// Of sharper lobes, in pixels, the derivative by the size is not known well enough.
-        const MIN_LOBE_PX: f64 = 0.4;
+    /// The layout that suits the spots at all nodes; `None` where they are too sharp for a table.
+    fn common_layout(&self) -> Option<TableLayout> {
         let mut local = LocalPsf::default();
-        let (mut least_px, mut reach_px) = (f64::INFINITY, 0.0f64);
+        let mut extent = LobeExtent::default();
         for row in 0..self.cells[1] + 1 {
             for column in 0..self.cells[0] + 1 {
                 self.lobes_at([column, row], &mut local);
-                for lobe in &local.lobes {
-                    let [dx, dy] = lobe.offset_px.map(f64::abs);
-                    least_px = least_px.min(lobe.sigma_px);
-                    reach_px = reach_px.max(dx.max(dy) + REACH_SIGMAS * lobe.sigma_px + 0.5);
-                }
+                extent.add(&local.lobes);
             }
         }
-        self.layout = TableLayout::of(least_px, reach_px);
-        self.is_sharp = least_px < MIN_LOBE_PX;
+        extent.layout()
     }
 }
 
 /// Cells along the diagonal of a frame: so many that the PSF is linear in each.
 fn cells_along_diagonal(psf: &EffectivePsf) -> usize {
     /// Largest change of a moment over a cell: that of the light differs from a linear one by a
-    /// part of an eighth of its square.
-    const MAX_CHANGE: f64 = 0.07;
+    /// part of an eighth of its square, as little as the interpolation in a table.
+    const MAX_CHANGE: f64 = 0.12;
     /// The moments change this much faster at the corners than on average from the centre.
     const FASTEST: f64 = 2.0;
     const MAX_CELLS: f64 = 32.0;

@@ -165,6 +165,7 @@ impl LobeGrid {
             lobes: every_lobe.collect(),
             ..psf.clone()
         };
+        fitter.tabulate(psf);
         for (number, star) in stars.iter().enumerate() {
             let (x_px, y_px) = (star.spot.x, star.spot.y);
             fitter.weigh(star, psf, &mut images.roots, &mut images.values);

@@ -13,7 +13,7 @@ mod lobe_shares;
 mod stars;
 
 use super::candidates::Peak;
-use super::fit::{FitBuffers, FrameMaps, NoiseModel};
+use super::fit::{FitBuffers, FrameMaps, NoiseModel, SpotEstimate, Window};
 use super::psf::{EffectivePsf, FieldForm, FieldFrame, MAX_WINDOW_PX, SpotMoments};
 use super::star_model::{StarModel, noise_of};
 use crate::base::statistics::median;
@@ -53,10 +53,17 @@ pub(crate) fn measure_psf(
     if stars.len() < MIN_STARS {
         return None;
     }
-    let round = noise_of_round(maps, &stars, buffers);
+    let windows = stars.iter().map(|star| (star.window.clone(), star.spot));
+    let mut round: Vec<(Window, SpotEstimate)> = windows.collect();
     let grid = LobeGrid::of(typical_moments(&stars));
     let settled = Settled::of(&grid, maps, &mut stars, &mut fitter);
     let best = best_of(&grid, &settled, &stars, &mut fitter);
+    let pixels = stars.len() * (2 * radius_px + 1).pow(2);
+    if best.chi2 >= MAX_CHI2 * pixels as f64 {
+        return None;
+    }
+    // If the spots were round Gaussians of the frame's size.
+    let round = noise_of(&mut round, maps.spot_px, buffers);
     let noise = noise_of_psf(&best, &stars, buffers);
     let light = typical_light(&stars, maps);
     let variance = |noise: NoiseModel| light * (noise.shot_adu + noise.model_error2 * light);
@@ -64,9 +71,7 @@ pub(crate) fn measure_psf(
     let [_, e1, e2] = grid.typical;
     let is_other_form = settled.is_varied || e1.hypot(e2) > MIN_ELONGATION;
     let is_needed = ratio < MAX_VARIANCE_RATIO || (is_other_form && ratio < 1.0);
-    let pixels = stars.len() * (2 * radius_px + 1).pow(2);
-    let are_stars = best.chi2 < MAX_CHI2 * pixels as f64;
-    (is_needed && are_stars).then(|| {
+    is_needed.then(|| {
         model.noise = noise;
         best.psf
     })
@@ -146,8 +151,11 @@ impl Candidate {
             ..psf.clone()
         };
         let of_halves = [with(odd), with(even)];
-        let chi2 = stars.iter().enumerate();
-        let chi2 = chi2.map(|(number, star)| fitter.chi2(star, &of_halves[number % 2]));
+        let chi2 = of_halves.iter().enumerate().map(|(half, psf)| {
+            fitter.tabulate(psf);
+            let stars = stars.iter().skip(half).step_by(2);
+            stars.map(|star| fitter.chi2(star, psf)).sum::<f64>()
+        });
         Self {
             chi2: chi2.sum(),
             psf: with(&even.plus(odd)),
@@ -213,18 +221,12 @@ fn typical_light(stars: &[PsfStar], maps: &FrameMaps<'_>) -> f64 {
     median(&mut fluxes) * maps.matched_gain
 }
 
-/// The noise model of the stars if their spots were round Gaussians of the frame's size.
-fn noise_of_round(maps: &FrameMaps<'_>, stars: &[PsfStar], buffers: &mut FitBuffers) -> NoiseModel {
-    let windows = stars.iter().map(|star| (star.window.clone(), star.spot));
-    let mut windows: Vec<_> = windows.collect();
-    noise_of(&mut windows, maps.spot_px, buffers)
-}
-
 /// The noise model of the stars, each compared with the PSF from the other half of them.
 fn noise_of_psf(best: &Candidate, stars: &[PsfStar], buffers: &mut FitBuffers) -> NoiseModel {
     let windows = stars.iter().enumerate().map(|(number, star)| {
         let mut window = star.window.clone();
         best.of_halves[number % 2].at(star.spot.x, star.spot.y, &mut window.psf);
+        window.psf.tabulate();
         (window, star.spot)
     });
     let mut windows: Vec<_> = windows.collect();

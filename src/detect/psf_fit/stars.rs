@@ -7,8 +7,8 @@ use crate::detect::fit::{
     sum_of,
 };
 use crate::detect::psf::{
-    EffectivePsf, FieldFrame, FieldMoments, GROUP_PX, LitPart, LocalPsf, NarrowProfiles,
-    PixelGroup, SpotMoments, covariance_by, stretch_by,
+    AxisTaps, EffectivePsf, FieldFrame, FieldMoments, GROUP_PX, LitPart, LocalPsf, NarrowProfiles,
+    PixelGroup, ShareGroup, SpotMoments, covariance_by, stretch_by,
 };
 use crate::detect::star_model::isolated_peaks;
 use multiversion::multiversion;
@@ -55,6 +55,11 @@ pub(super) struct StarFitter {
     /// Row by row, as the pixels of the window.
     shares: Vec<MomentShares>,
     local: LocalPsf,
+    /// The spot of all stars, where they have the same.
+    common: LocalPsf,
+    /// The last spot drawn from its table.
+    drawn: Vec<ShareGroup>,
+    axes: [AxisTaps; 2],
 }
 
 impl StarFitter {
@@ -65,9 +70,20 @@ impl StarFitter {
         }
     }
 
+    /// Tabulates a PSF that is the same everywhere: stars are drawn with it, as long as their moments
+    /// are held. Call it before each other PSF.
+    pub fn tabulate(&mut self, psf: &EffectivePsf) {
+        self.common.clear();
+        if psf.is_uniform() {
+            psf.at(0.0, 0.0, &mut self.common);
+            self.common.tabulate();
+        }
+    }
+
     /// Moves all stars by a step of their fits to `psf`; sets their own moments where these are
     /// `free`.
     pub fn step(&mut self, stars: &mut [PsfStar], psf: &EffectivePsf, free: bool) {
+        self.tabulate(psf);
         for star in stars {
             if !free {
                 self.step_one::<PLACE>(star, psf);
@@ -110,17 +126,29 @@ impl StarFitter {
         Some(std::array::from_fn(|i| change[PLACE + i]))
     }
 
-    /// Chi² of a star a step of its fit to `psf` on.
+    /// Chi² of a star a linear step of its fit to `psf` on.
     pub fn chi2(&mut self, star: &PsfStar, psf: &EffectivePsf) -> f64 {
-        let mut star = star.clone();
-        let _ = self.step_one::<PLACE>(&mut star, psf);
-        self.draw::<PLACE>(&star, psf);
-        self.linearise::<PLACE>(&star).chi2
+        self.draw::<PLACE>(star, psf);
+        let mut normal = self.linearise::<PLACE>(star);
+        if normal.factorise(PLACE) < PLACE {
+            return normal.chi2;
+        }
+        let change = normal.solve(PLACE);
+        normal.chi2
+            - change
+                .iter()
+                .zip(normal.right)
+                .map(|(c, r)| c * r)
+                .sum::<f64>()
     }
 
     /// Computes the shares of the pixels of a star with this PSF; with fewer than all parameters,
     /// not their derivatives with respect to the moments.
     fn draw<const N: usize>(&mut self, star: &PsfStar, psf: &EffectivePsf) {
+        if N < PARAMETERS && !self.common.table.is_empty() {
+            self.draw_common(star);
+            return;
+        }
         let Self {
             profiles,
             shares,
@@ -160,6 +188,23 @@ impl StarFitter {
             };
             add_lobe_with_moments(share, &changes, profiles, part, shares, width);
         }
+    }
+
+    /// [`Self::draw`] from the table of all stars.
+    fn draw_common(&mut self, PsfStar { window, spot, .. }: &PsfStar) {
+        let place = [spot.x - window.x0 as f64, spot.y - window.y0 as f64];
+        let sizes = [self.common.spot_px, 1.0];
+        let empty = [0.0; GROUP_PX];
+        self.drawn.clear();
+        self.drawn.resize(window.data.len(), [empty; 4]);
+        let (axes, drawn) = (&mut self.axes, &mut self.drawn);
+        self.common
+            .table
+            .draw(place, window.size(), sizes, axes, drawn);
+        self.shares.clear();
+        let placed =
+            |[light, by_x, by_y, _]: &ShareGroup| [*light, *by_x, *by_y, empty, empty, empty];
+        self.shares.extend(self.drawn.iter().map(placed));
     }
 
     /// The normal equations of the first `N` parameters of a star whose shares were drawn, in ADU.
