@@ -33,10 +33,20 @@ impl FitBuffers {
             free_size: false,
             noise,
         };
+        self.cut_out(maps, start, beyond);
+        self.fitter.fit(&self.window, start, &config)
+    }
+
+    /// Cuts out the window of spots of the frame's size, and subtracts those `beyond` it.
+    pub fn cut_out(
+        &mut self,
+        maps: &FrameMaps<'_>,
+        spots: &[SpotEstimate],
+        beyond: &[SpotEstimate],
+    ) {
         let Self { fitter, window, .. } = self;
-        maps.cut_out(start, maps.window_radius(maps.spot_px), window);
+        maps.cut_out(spots, maps.window_radius(maps.spot_px), window);
         fitter.subtract(window, beyond, maps.spot_px);
-        fitter.fit(window, start, &config)
     }
 
     /// Fits one spot of free size, initially `spot_px`, in a window that grows with the size, after

@@ -5,7 +5,8 @@ use super::light::{GaussianLight, add_light};
 use super::mixture_light::{MixtureImage, MixtureLight};
 use super::normal::{CholeskyFactor, NormalEquations};
 use super::parameters::{
-    Fit, FitConfig, MAX_PARAMETERS, MAX_SPOTS, NoiseModel, ONE_SPOT, SpotEstimate, TWO_SPOTS,
+    Fit, FitConfig, MAX_PARAMETERS, MAX_SPOTS, NoiseModel, ONE_SPOT, SpotEstimate, SpotGroup,
+    TWO_SPOTS,
 };
 use super::sums::{SumBuffers, WindowPixels, add_pixels, flux_variance};
 use super::window::Window;
@@ -49,19 +50,35 @@ impl Fitter {
     pub fn fit(&mut self, window: &Window, start: &[SpotEstimate], config: &FitConfig) -> Fit {
         let start = &start[..start.len().min(MAX_SPOTS)];
         match start.len() {
-            1 => self.fit_up_to::<ONE_SPOT>(window, start, config),
-            2 => self.fit_up_to::<TWO_SPOTS>(window, start, config),
-            _ => self.fit_up_to::<MAX_PARAMETERS>(window, start, config),
+            1 => self.fit_up_to::<ONE_SPOT>(window, start, config, f64::INFINITY),
+            2 => self.fit_up_to::<TWO_SPOTS>(window, start, config, f64::INFINITY),
+            _ => self.fit_up_to::<MAX_PARAMETERS>(window, start, config, f64::INFINITY),
         }
     }
 
-    /// [`Self::fit`] with at most `N` parameters.
+    /// [`Self::fit`] of two spots that is given up where it does not lead to a chi² below `most_chi2`.
+    pub fn fit_pair_below(
+        &mut self,
+        window: &Window,
+        start: &[SpotEstimate; 2],
+        config: &FitConfig,
+        most_chi2: f64,
+    ) -> Fit {
+        self.fit_up_to::<TWO_SPOTS>(window, start, config, most_chi2)
+    }
+
+    /// [`Self::fit`] with at most `N` parameters, and [`Self::fit_pair_below`].
     fn fit_up_to<const N: usize>(
         &mut self,
         window: &Window,
         start: &[SpotEstimate],
         config: &FitConfig,
+        most_chi2: f64,
     ) -> Fit {
+        /// Steps before the chi² that the linear equations predict tells where a fit leads to,
+        const PATIENCE: usize = 3;
+        /// within this factor.
+        const MISSED: f64 = 1.5;
         let mut fit = Fit {
             spots: start.iter().copied().collect(),
             spot_px: config.spot_px,
@@ -70,6 +87,8 @@ impl Fitter {
         for step in 0..MAX_STEPS {
             let mut normal: NormalEquations<N> = self.linearise(window, &fit, config);
             match advance(&mut fit, start, &mut normal, step, config) {
+                StepOutcome::Continue if step + 1 < PATIENCE => {}
+                StepOutcome::Continue if fit.chi2 > MISSED * most_chi2 => return fit,
                 StepOutcome::Continue => {}
                 StepOutcome::Converged => return fit,
                 StepOutcome::Failed => break,
@@ -85,8 +104,32 @@ impl Fitter {
             0
         };
         let fitted = config.parameter_count(start.len());
-        finish(&mut fit, &normal, fitted, known, &[0.0; N]);
+        fit.chi2 = normal.chi2;
+        finish(&mut fit, &normal, fitted, known);
         fit
+    }
+
+    /// Chi² of a single spot a linear step from `spot`, and the number of pixels.
+    pub fn chi2_near(
+        &mut self,
+        window: &Window,
+        spot: SpotEstimate,
+        config: &FitConfig,
+    ) -> (f64, usize) {
+        let fit = Fit {
+            spots: SpotGroup::from_iter([spot]),
+            spot_px: config.spot_px,
+            ..Fit::default()
+        };
+        let mut normal: NormalEquations<ONE_SPOT> = self.linearise(window, &fit, config);
+        let fitted = config.parameter_count(1);
+        let mut chi2 = normal.chi2;
+        if normal.factorise(fitted) == fitted {
+            let change = normal.solve(fitted);
+            let gain = change.iter().zip(normal.right).map(|(c, r)| c * r);
+            chi2 -= gain.take(fitted).sum::<f64>();
+        }
+        (chi2, normal.pixels)
     }
 
     /// Sets the standard errors of the fluxes from noise alone: the Cramér-Rao bound for a perfect
@@ -298,7 +341,6 @@ impl Fitter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::fit::parameters::SpotGroup;
 
     fn window_with(spots: &[SpotEstimate], sigma: f64, side: usize) -> Window {
         let in_row = |i: usize| if i < side { 0.0 } else { f32::NAN };

@@ -85,6 +85,9 @@ pub(super) fn advance<const N: usize>(
         return StepOutcome::Failed;
     }
     let change = normal.solve(fitted);
+    // The step lowers chi² by its scalar product with the right-hand side.
+    let gain: f64 = (0..fitted).map(|i| change[i] * normal.right[i]).sum();
+    fit.chi2 = normal.chi2 - gain;
     let is_flux_settled = (0..start.len())
         .all(|i| change[3 * i + 2].abs() <= Convergence::FLUX_CHANGE * fit.spots[i].flux.abs());
     let length = apply(fit, &change, config);
@@ -94,7 +97,7 @@ pub(super) fn advance<const N: usize>(
     let is_short = length < Convergence::step_px(information, config);
     if is_short && (step > 0 || is_flux_settled) && !is_rough {
         fit.converged = true;
-        finish(fit, normal, fitted, known, &change);
+        finish(fit, normal, fitted, known);
         return StepOutcome::Converged;
     }
     StepOutcome::Continue
@@ -131,7 +134,7 @@ fn apply(fit: &mut Fit, change: &[f64], config: &FitConfig) -> f64 {
     length
 }
 
-/// Sets standard errors, chi² and the size's excess from the last linearised step.
+/// Sets standard errors and the size's excess from the last linearised step.
 ///
 /// `fitted` parameters were fitted; of these and the size, the first `known` are determined.
 pub(super) fn finish<const N: usize>(
@@ -139,14 +142,10 @@ pub(super) fn finish<const N: usize>(
     normal: &NormalEquations<N>,
     fitted: usize,
     known: usize,
-    change: &[f64; N],
 ) {
     let spots = fit.spots.len();
     let all = 3 * spots + 2;
     fit.degrees_of_freedom = normal.pixels as f64 + 2.0 - all as f64;
-    // The step lowers chi² by its scalar product with the right-hand side.
-    let gain: f64 = (0..fitted).map(|i| change[i] * normal.right[i]).sum();
-    fit.chi2 = normal.chi2 - gain;
     let variances = if known >= fitted {
         normal.variances(fitted)
     } else {

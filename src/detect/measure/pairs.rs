@@ -21,6 +21,9 @@ impl PairCriteria {
     /// Elongated: minimum ratio of the principal axes of its region. The window of the fit ends
     /// before a neighbor four spot sizes away.
     const MIN_ELONGATION: f64 = 1.35;
+    /// It is a pair where two spots have no more chi² than this over the degrees of freedom: more is
+    /// a nebula.
+    const MAX_CHI2: f64 = 3.0;
 }
 
 /// Whether a source may be a close pair, in a frame whose stars are round.
@@ -118,18 +121,23 @@ impl PairFitter<'_> {
         fit: &Fit,
         buffers: &mut FitBuffers,
     ) -> Option<Fit> {
-        let mut two = buffers.fit_fixed_size(self.maps, start, self.beyond, self.noise);
-        if !self.is_well_fitted(&two) {
-            return None;
-        }
+        /// Largest chi² of two spots over that of one.
+        const MAX_CHI2_OF_ONE: f64 = 0.5;
         let config = FitConfig {
             spot_px: self.maps.spot_px,
             free_size: false,
             noise: self.noise,
         };
+        buffers.cut_out(self.maps, start, self.beyond);
         let FitBuffers { fitter, window, .. } = buffers;
+        let (of_one, pixels) = fitter.chi2_near(window, fit.spots[0], &config);
+        let most_chi2 = (MAX_CHI2_OF_ONE * of_one).min(PairCriteria::MAX_CHI2 * pixels as f64);
+        let mut two = fitter.fit_pair_below(window, start, &config, most_chi2);
+        if !self.is_well_fitted(&two) {
+            return None;
+        }
         let one = fitter.fit(window, &fit.spots[..1], &config);
-        if one.chi2 - two.chi2 <= 0.5 * one.chi2 {
+        if two.chi2 >= MAX_CHI2_OF_ONE * one.chi2 {
             return None;
         }
         fitter.set_flux_noise(window, &mut two, &config);
@@ -143,8 +151,6 @@ impl PairFitter<'_> {
     fn is_well_fitted(&self, fit: &Fit) -> bool {
         /// Minimum flux of both spots over its standard error.
         const MIN_FLUX_SIGMA: f64 = 5.0;
-        /// Maximum chi² over the degrees of freedom: more is a nebula.
-        const MAX_CHI2: f64 = 3.0;
         let Some(&[a, b]) = fit.spots.first_chunk::<2>() else {
             return false;
         };
@@ -152,7 +158,7 @@ impl PairFitter<'_> {
             s.flux > MIN_FLUX_SIGMA * s.sigma_flux && s.has_position(self.maps.spot_px)
         };
         let separation_px = (a.x - b.x).hypot(a.y - b.y);
-        let is_good = fit.chi2 < MAX_CHI2 * fit.degrees_of_freedom.max(1.0);
+        let is_good = fit.chi2 < PairCriteria::MAX_CHI2 * fit.degrees_of_freedom.max(1.0);
         let is_apart = separation_px > self.maps.width_px();
         fit.converged && is_real(a) && is_real(b) && is_good && is_apart
     }
