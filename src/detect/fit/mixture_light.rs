@@ -3,7 +3,7 @@
 use super::light::{GroupLight, SpotLight};
 use super::window::Window;
 use crate::detect::psf::{
-    AxisTaps, GROUP_PX, LitPart, NarrowProfiles, PixelGroup, ShareGroup, each,
+    DrawBuffers, GROUP_PX, LitPart, NarrowProfiles, PixelGroup, ShareGroup, each,
 };
 use multiversion::multiversion;
 
@@ -13,8 +13,8 @@ pub(super) struct MixtureImage {
     /// Row by row, as the pixels of the window.
     groups: Vec<ShareGroup>,
     profiles: NarrowProfiles,
-    /// Buffers of the table.
-    axes: [AxisTaps; 2],
+    /// Those of the table.
+    buffers: DrawBuffers,
 }
 
 impl MixtureImage {
@@ -32,7 +32,7 @@ impl MixtureImage {
             let place = [x_px - corner[0], y_px - corner[1]];
             let sizes = [psf.spot_px, scale];
             psf.table
-                .draw(place, size, sizes, &mut self.axes, &mut self.groups);
+                .draw(place, size, sizes, &mut self.buffers, &mut self.groups);
             return;
         }
         for lobe in &psf.lobes {

@@ -7,8 +7,8 @@ use crate::detect::fit::{
     sum_of,
 };
 use crate::detect::psf::{
-    AxisTaps, EffectivePsf, FieldFrame, FieldMoments, GROUP_PX, LitPart, LocalPsf, NarrowProfiles,
-    PixelGroup, ShareGroup, SpotMoments, covariance_by, stretch_by,
+    DrawBuffers, EffectivePsf, FieldFrame, FieldMoments, GROUP_PX, LitPart, LocalPsf,
+    NarrowProfiles, PixelGroup, ShareGroup, SpotMoments, covariance_by, stretch_by,
 };
 use crate::detect::star_model::isolated_peaks;
 use multiversion::multiversion;
@@ -59,7 +59,7 @@ pub(super) struct StarFitter {
     common: LocalPsf,
     /// The last spot drawn from its table.
     drawn: Vec<ShareGroup>,
-    axes: [AxisTaps; 2],
+    buffers: DrawBuffers,
 }
 
 impl StarFitter {
@@ -197,10 +197,10 @@ impl StarFitter {
         let empty = [0.0; GROUP_PX];
         self.drawn.clear();
         self.drawn.resize(window.data.len(), [empty; 4]);
-        let (axes, drawn) = (&mut self.axes, &mut self.drawn);
+        let (buffers, drawn) = (&mut self.buffers, &mut self.drawn);
         self.common
             .table
-            .draw(place, window.size(), sizes, axes, drawn);
+            .draw(place, window.size(), sizes, buffers, drawn);
         self.shares.clear();
         let placed =
             |[light, by_x, by_y, _]: &ShareGroup| [*light, *by_x, *by_y, empty, empty, empty];
