@@ -82,7 +82,7 @@ impl Extrema {
         self.row.resize(width, 0.0);
         mesh.heights(&self.nodes, 0, &rows[1][..width], &mut self.row);
         for first in (0..width).step_by(BLOCK_PX) {
-            let extrema = with_widened(rows.map(Some), first, |rows| mark_extrema(rows));
+            let extrema = with_widened(rows.map(Some), first, mark_extrema);
             let [maxima, minima] = extrema.map(|bits| bits & inner_columns(first, width));
             for (mut bits, is_above) in [(maxima, true), (minima, false)] {
                 while bits != 0 {
