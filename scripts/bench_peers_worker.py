@@ -15,7 +15,9 @@ FROM, TO = (float(degrees) for degrees in sys.argv[1].split(":"))
 # The solvers are given at most this many stars, the brightest.
 MOST = 60
 TETRA3RS_SIGMA = 5.0
-SEP_SIGMA = 1.5
+SEP_SIGMA = {"sep": 1.5, "sep-5-sigma": 5.0}
+# Pixels above the threshold at once: the default is too few for a city.
+SEP_PIXELS = 10_000_000
 
 
 def clocked(work):
@@ -30,6 +32,7 @@ class Tetra3rs:
         import tetra3rs
 
         self.tetra3rs, self.sep = tetra3rs, sep
+        sep.set_extract_pixstack(SEP_PIXELS)
         cache = Path(sys.argv[2]) / f"tetra3rs_{FROM:g}_{TO:g}.bin"
         if cache.exists():
             self.database = tetra3rs.SolverDatabase.load_from_file(str(cache))
@@ -60,14 +63,14 @@ class Tetra3rs:
         centre = (width - 1) / 2, (height - 1) / 2
         return [self.tetra3rs.Centroid(x - centre[0], y - centre[1], flux) for x, y, flux in stars]
 
-    def of_sep(self):
+    def of_sep(self, sigma):
         background = self.sep.Background(self.floats)
-        return self.sep.extract(self.floats - background.back(), SEP_SIGMA, err=background.globalrms)
+        return self.sep.extract(self.floats - background.back(), sigma, err=background.globalrms)
 
     def do(self, order):
         what, program = order["do"], order["program"]
-        if program == "sep":
-            ms, found = clocked(self.of_sep)
+        if program in SEP_SIGMA:
+            ms, found = clocked(lambda: self.of_sep(SEP_SIGMA[program]))
             return {"ms": ms, "found": len(found)}
         if program == "tetra3rs-fast":
             ms, found = clocked(lambda: self.tetra3rs.extract_centroids_fast(self.image))
