@@ -48,6 +48,11 @@ pub enum Note {
     DefectiveColumns(Vec<usize>),
     /// The frame is a raw one of a color camera: what its pixels and its zero point are of.
     ColorMosaic(RawColor),
+    /// The stars that were to be measured did not identify the frame, so all were measured.
+    MoreStars {
+        /// How many were to be.
+        wanted: usize,
+    },
     /// The scale in the header is not that of the frame.
     WrongHeaderScale {
         /// Smallest and largest pixel scale that the header allows, in radians.
@@ -114,6 +119,7 @@ impl Note {
             Self::BrightnessUnknown => "brightness_unknown",
             Self::DefectiveColumns(_) => "defective_columns",
             Self::ColorMosaic(_) => "color_mosaic",
+            Self::MoreStars { .. } => "more_stars",
             Self::WrongHeaderScale { .. } => "header_scale_wrong",
             Self::BelowHorizon { .. } => "below_horizon",
             Self::NoTimeOfDay => "time_of_day_unknown",
@@ -288,6 +294,11 @@ impl fmt::Display for Note {
             ),
             Self::NoTimeOfDay => f.write_str(
                 "the time of day is not known, and so the site gives no zenith distance",
+            ),
+            Self::MoreStars { wanted } => write!(
+                f,
+                "the brightest {wanted} detections, as many as were to be measured, did not identify the \
+                 frame, and so all were measured"
             ),
             Self::AttitudeOnly => f.write_str(
                 "attitude and optics are from the brightest stars; no other star was looked up, and no \

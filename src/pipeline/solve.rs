@@ -13,9 +13,9 @@ use super::solved::SolvedFrame;
 use super::stopwatch::{Stage, Stopwatch, Timing};
 use crate::base::panics::caught;
 use crate::calibration::Calibration;
-use crate::detect::{self, DetectError};
+use crate::detect::{self, DetectConfig, DetectError, Detections};
 use crate::frame::{self, Frame, FrameError, MemoryLimit, Mosaic};
-use crate::identify::{Priors, SearchFailure};
+use crate::identify::{Priors, ScalePrior, SearchFailure};
 use std::num::NonZeroUsize;
 use std::path::Path;
 
@@ -187,27 +187,41 @@ fn solve(
     let prepared = Prepared::new(raw, input.mosaic, &config, input.memory)?;
     workspace.detect.set_memory(prepared.memory);
     let frame = prepared.frame();
-    let mut detections = match detect::detect(frame, &config, &mut workspace.detect) {
-        Err(DetectError::Interrupted(_)) => {
-            clock.lap(Stage::Detect);
-            let calibration = input.calibration;
-            return Ok(not_in_time(
-                raw,
-                calibration,
-                &priors,
-                context,
-                clock.timing(),
-            ));
-        }
-        detected => detected?,
+    let mut stage = StarSearch {
+        prepared: &prepared,
+        mosaic: input.mosaic,
+        priors: &priors,
+        context,
+        workspace,
     };
-    let mosaic = input
-        .mosaic
-        .map(|mosaic| RawColor::restore(mosaic, prepared.raw(), &mut detections));
-    clock.lap(Stage::Detect);
-
-    let (mut outcome, dropped_scale) =
-        identify_stars(frame, &detections, &priors, context, workspace, &mut clock);
+    let Some(mut stars) = stage.run(&config, &mut clock)? else {
+        let timing = clock.timing();
+        return Ok(not_in_time(
+            raw,
+            input.calibration,
+            &priors,
+            context,
+            timing,
+        ));
+    };
+    let mut more_stars = None;
+    if stars.may_lack_stars(&config) {
+        let all = DetectConfig {
+            max_detections: DetectConfig::DEFAULT_MAX_DETECTIONS,
+            ..config.clone()
+        };
+        let more = stage.run(&all, &mut clock)?;
+        if let Some(more) = more.filter(|more| more.outcome.identification().is_some()) {
+            stars = more;
+            more_stars = Some(config.max_detections);
+        }
+    }
+    let FoundStars {
+        detections,
+        mosaic,
+        mut outcome,
+        dropped_scale,
+    } = stars;
     let sources: Vec<Source> = detections.sources.iter().map(Source::from).collect();
     let bodies = find_bodies(&mut outcome, &sources, &priors, context.indexed.catalog());
     let double_image = if context.attitude_only {
@@ -231,6 +245,7 @@ fn solve(
         bodies,
         double_image,
         dropped_scale,
+        more_stars,
         defects: &prepared.defects,
         photometry: None,
     };
@@ -241,6 +256,65 @@ fn solve(
     }
     clock.lap(Stage::Photometry);
     Ok(solved.into_solution(comparison, clock.timing()))
+}
+
+/// The search for the stars of a frame.
+struct StarSearch<'a, 'c> {
+    prepared: &'a Prepared<'a>,
+    mosaic: Option<Mosaic>,
+    priors: &'a Priors,
+    context: &'a Context<'c>,
+    workspace: &'a mut Workspace,
+}
+
+/// The stars of a frame, and which they are.
+struct FoundStars {
+    detections: Detections,
+    mosaic: Option<RawColor>,
+    outcome: Outcome,
+    /// The scale that was dropped because nothing matched with it.
+    dropped_scale: Option<ScalePrior>,
+}
+
+impl StarSearch<'_, '_> {
+    /// Detects the stars and identifies them; `None` if detection was not done in time.
+    fn run(
+        &mut self,
+        config: &DetectConfig,
+        clock: &mut Stopwatch,
+    ) -> Result<Option<FoundStars>, DetectError> {
+        let frame = self.prepared.frame();
+        let detected = detect::detect(frame, config, &mut self.workspace.detect);
+        clock.lap(Stage::Detect);
+        let mut detections = match detected {
+            Err(DetectError::Interrupted(_)) => return Ok(None),
+            detected => detected?,
+        };
+        let raw = self.prepared.raw();
+        let restore = |mosaic| RawColor::restore(mosaic, raw, &mut detections);
+        let mosaic = self.mosaic.map(restore);
+        clock.lap(Stage::Detect);
+        let (priors, context) = (self.priors, self.context);
+        let (outcome, dropped_scale) =
+            identify_stars(frame, &detections, priors, context, self.workspace, clock);
+        Ok(Some(FoundStars {
+            detections,
+            mosaic,
+            outcome,
+            dropped_scale,
+        }))
+    }
+}
+
+impl FoundStars {
+    /// Whether the stars are not identified, and fewer of them were wanted than usual. That may cost
+    /// depth, but never the answer.
+    fn may_lack_stars(&self, config: &DetectConfig) -> bool {
+        let interrupted = Reason::Search(SearchFailure::Interrupted);
+        self.detections.is_truncated
+            && config.max_detections < DetectConfig::DEFAULT_MAX_DETECTIONS
+            && matches!(&self.outcome, Outcome::NotIdentified(reason) if *reason != interrupted)
+    }
 }
 
 /// The solution of a frame whose stars were not detected in time.

@@ -38,6 +38,8 @@ pub(super) struct SolvedFrame<'a> {
     pub double_image: Option<DoubleImage>,
     /// The scale that was dropped because nothing matched with it.
     pub dropped_scale: Option<ScalePrior>,
+    /// The number of stars that were to be measured, where more had to be.
+    pub more_stars: Option<usize>,
     /// Columns that hold no light, and were left out.
     pub defects: &'a [DefectiveColumn],
     pub photometry: Option<FramePhotometry>,
@@ -155,6 +157,7 @@ impl SolvedFrame<'_> {
             .chain(Note::of_defects(self.defects))
             .chain(self.mosaic.map(Note::ColorMosaic))
             .chain(Note::of_scale(self.dropped_scale, outcome))
+            .chain(self.more_stars.map(|wanted| Note::MoreStars { wanted }))
             .chain(Note::of_observation(observation, priors, outcome))
             .chain(Note::of_camera(camera, comparison))
             .chain(Note::of_photometry(self.photometry.as_ref()))

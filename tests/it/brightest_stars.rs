@@ -1,7 +1,7 @@
 //! The brightest stars alone: `--attitude-only`, the pointing, its errors and the optics from them, and
 //! `--max-stars`, their measurement.
 
-use crate::common::{Ran, fixture, number, report, starpipe};
+use crate::common::{Ran, fixture, number, report, shared_dir, starpipe};
 use serde_json::Value;
 
 fn named(report: &Value) -> Vec<&Value> {
@@ -141,6 +141,23 @@ fn only_as_many_stars_are_measured_as_are_wanted() {
     let reason = bright["photometry"]["limit50_reason"].as_str().unwrap();
     assert!(reason.contains("brightest"), "{reason}");
     assert!(bright["photometry"]["zero_point_vmag"].is_number());
+}
+
+#[test]
+fn fewer_stars_never_cost_the_answer() {
+    let Some(shared) = shared_dir() else {
+        return;
+    };
+    let frame = shared.join("frames/hard/orion-phone.jpg");
+    let frame = frame.to_str().unwrap();
+    let of_all = report(frame, &[]);
+    let of_few = report(frame, &["--max-stars", "200"]);
+    assert_eq!(of_few["status"], "identified");
+    for field in ["attitude", "optics", "match"] {
+        assert_eq!(of_few[field], of_all[field]);
+    }
+    let notes = of_few["notes"].as_array().unwrap();
+    assert!(notes.iter().any(|note| note["code"] == "more_stars"));
 }
 
 #[test]
