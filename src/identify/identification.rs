@@ -90,6 +90,12 @@ pub enum SearchFailure {
         /// log10 of the false-alarm probability of the best hypothesis, if there was one.
         best_log10_false_alarm: Option<f64>,
     },
+    /// A pointing was found, but too few stars have a sure name under it.
+    #[error("a pointing agrees with the brightest stars, and too few stars confirm it by name")]
+    NotConfirmed {
+        /// log10 of its false-alarm probability.
+        log10_false_alarm: f64,
+    },
     /// The search was ended early ([`Workspace::with_interrupt`](super::Workspace::with_interrupt)).
     #[error("the search was ended before it was complete")]
     Interrupted,
@@ -101,6 +107,7 @@ impl SearchFailure {
         match self {
             Self::TooFewStars { .. } => "too_few_stars",
             Self::NoMatch { .. } => "no_match",
+            Self::NotConfirmed { .. } => "not_confirmed",
             Self::Interrupted => "interrupted",
         }
     }

@@ -218,12 +218,15 @@ impl Workspace {
                 best_log10_false_alarm: best_log10,
             }
         };
+        let found = found.ok_or(failure)?;
         Ok(Pointing {
             most_chance: 1.0 / (1.0 + *name_odds),
             problem: whole,
-            found: found.ok_or(failure)?,
+            found,
             search,
-            failure,
+            failure: SearchFailure::NotConfirmed {
+                log10_false_alarm: found.log10_false_alarm,
+            },
             bright,
             answer,
         })

@@ -38,7 +38,9 @@ impl Reason {
     pub fn remedies(&self) -> Vec<Remedy> {
         match self {
             Self::Search(SearchFailure::TooFewStars { .. }) => vec![Remedy::Sigma],
-            Self::Search(SearchFailure::NoMatch { .. }) => vec![Remedy::Fov, Remedy::Near],
+            Self::Search(SearchFailure::NoMatch { .. } | SearchFailure::NotConfirmed { .. }) => {
+                vec![Remedy::Fov, Remedy::Near]
+            }
             Self::Search(SearchFailure::Interrupted) => vec![Remedy::TimeLimit],
             Self::Diagnosis(Diagnosis::ScaleOutOfRange { .. }) => {
                 vec![Remedy::Fov, Remedy::PixelScale]

@@ -20,6 +20,11 @@ fn failure_text(failure: &SearchFailure, solution: &Solution) -> String {
         SearchFailure::NoMatch {
             best_log10_false_alarm,
         } => no_match(*best_log10_false_alarm, solution),
+        SearchFailure::NotConfirmed { log10_false_alarm } => format!(
+            "an arrangement of catalogue stars matches the brightest detections (log10 false-alarm \
+             probability {log10_false_alarm:.1}), but not enough of the stars have a sure name in it; the \
+             field of view and the direction, where known, make it easier"
+        ),
         SearchFailure::Interrupted => {
             "there was no answer within the time limit of a frame".to_owned()
         }

@@ -52,7 +52,7 @@ pub fn diagnose(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diagnosis> 
         return None;
     }
     let image = case.image;
-    let has_stars = matches!(case.failure, SearchFailure::NoMatch { .. });
+    let has_stars = !matches!(case.failure, SearchFailure::TooFewStars { .. });
     image
         .and_then(|(frame, _)| levels::diagnose(frame))
         .or_else(|| has_stars.then(|| excluded(case, sky)).flatten())
