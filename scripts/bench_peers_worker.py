@@ -16,8 +16,8 @@ FROM, TO = (float(degrees) for degrees in sys.argv[1].split(":"))
 MOST = 60
 TETRA3RS_SIGMA = 5.0
 SEP_SIGMA = {"sep": 1.5, "sep-5-sigma": 5.0}
-# Pixels above the threshold at once: the default is too few for a city.
-SEP_PIXELS = 10_000_000
+# Pixels above the threshold, and parts of one source: the defaults are too few for a city.
+SEP_PIXELS, SEP_PARTS = 10_000_000, 100_000
 
 
 def clocked(work):
@@ -33,6 +33,7 @@ class Tetra3rs:
 
         self.tetra3rs, self.sep = tetra3rs, sep
         sep.set_extract_pixstack(SEP_PIXELS)
+        sep.set_sub_object_limit(SEP_PARTS)
         cache = Path(sys.argv[2]) / f"tetra3rs_{FROM:g}_{TO:g}.bin"
         if cache.exists():
             self.database = tetra3rs.SolverDatabase.load_from_file(str(cache))
