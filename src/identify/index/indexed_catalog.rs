@@ -2,6 +2,7 @@
 
 use super::cache::{self, CacheError};
 use super::cache_directory::cache_directory;
+use super::packed_vectors::PackedVectors;
 use super::table::{Place, Triangle};
 use super::triangle_index::TriangleIndex;
 use crate::base::interrupt::{Interrupt, Interrupted};
@@ -47,6 +48,8 @@ pub struct IndexedCatalog<'a> {
     pub grid: SkyGrid,
     /// The triangles.
     pub triangles: TriangleIndex,
+    /// The directions of the stars, for triangles.
+    pub vectors: PackedVectors,
     counts: MagnitudeCounts,
 }
 
@@ -122,6 +125,7 @@ impl<'a> IndexedCatalog<'a> {
             catalog,
             grid: SkyGrid::new(catalog.stars()),
             triangles,
+            vectors: PackedVectors::new(catalog.stars()),
             counts: MagnitudeCounts::new(catalog.stars()),
         }
     }

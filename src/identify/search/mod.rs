@@ -1,12 +1,14 @@
 //! The search for a hypothesis about pointing, roll and scale.
 //!
 //! `triangle_search` looks triangles up (`queries`) and confirms what they suggest (`confirmation`), as
-//! far as a `plan` goes, and counts `votes` for poses; `false_alarm` decides. `thinning` and `tiers`
-//! leave detections out that hide the stars.
+//! far as a `plan` goes, and counts `votes` for poses (`aligned`, `pose_cells`); `false_alarm` decides.
+//! `thinning` and `tiers` leave detections out that hide the stars.
 
+mod aligned;
 mod confirmation;
 mod false_alarm;
 mod plan;
+mod pose_cells;
 mod queries;
 mod thinning;
 mod tiers;

@@ -3,12 +3,14 @@
 //! Triangles of bright observed stars → similar catalogue triangles → hypotheses → confirmed by
 //! further stars.
 
+use super::aligned::{Aligned, InCamera};
 use super::confirmation::{ConfirmingStars, PendingHypothesis, Pose};
 use super::false_alarm::{FalseAlarm, TESTED_STARS};
 use super::plan::{PASSES, SearchPass, SearchPlan, WORK_OF_VOTE};
+use super::pose_cells::CameraAxes;
 use super::queries::{LookedUp, ObservedStars, ObservedTriangle, Query, Similar};
 use super::tiers::Tiers;
-use super::votes::{Aligned, InCamera, Vote, Votes};
+use super::votes::{Vote, Votes};
 use crate::base::coords::Rotation;
 use crate::base::interrupt::Interrupt;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px};
@@ -49,7 +51,7 @@ pub struct SearchBuffers {
     /// Catalogue triangles that are like an observed one.
     looked_up: LookedUp,
     votes: Votes,
-    in_camera: Vec<Option<InCamera>>,
+    in_camera: Vec<CameraAxes>,
     /// To confirm answers.
     tiers: Tiers,
     /// Ends searches early.
@@ -227,10 +229,11 @@ impl<'a> Search<'a> {
             self.candidates += self.observed.look_up(of_triangle, looked_up);
             in_camera.clear();
             in_camera.extend(of_triangle.iter().map(|query| {
-                InCamera::new(&self.observed.vectors(&query.triangle, query.middle_px))
+                let vectors = self.observed.vectors(&query.triangle, query.middle_px);
+                CameraAxes::of(InCamera::new(&vectors).as_ref())
             }));
-            let grid = &self.observed.sky.grid;
-            votes.add_all(in_camera, &looked_up.similar, first as u32, grid);
+            let stars = &self.observed.sky.vectors;
+            votes.add_all(in_camera, &looked_up.similar, first as u32, stars);
         }
     }
 

@@ -9,21 +9,11 @@
 //! # Reference
 //! Ballard 1981, Pattern Recognition 13, 111: the generalized Hough transform.
 
+use super::pose_cells::{Alignments, CameraAxes, Cells, GRIDS, LANES, PoseGrids};
 use super::queries::Similar;
+use crate::identify::index::PackedVectors;
 use crate::identify::priors::SkyRegion;
-use crate::sky::catalog::sky_grid::SkyGrid;
-use nalgebra::{Matrix3, Vector3};
-use std::f64::consts::PI;
 
-/// Size of a cell: of the optical axis in units of the field's width, …
-const AXIS_STEP: f64 = 0.06;
-/// … of the direction of the x axis in radians, …
-const ROLL_STEP: f64 = 0.09;
-/// … and of the logarithm of the focal length.
-const SCALE_STEP: f64 = 0.05;
-/// Shifts of the grids, in cells.
-const SHIFTS: [f64; GRIDS] = [0.0, 0.5];
-const GRIDS: usize = 2;
 /// Fewer triangles in a cell agree by chance everywhere.
 const MIN_TRIANGLES: u32 = 3;
 /// Cells that are looked at.
@@ -31,14 +21,6 @@ const MAX_LEADERS: usize = 100;
 /// Bits of a cell's number by which votes are sorted in each pass.
 const DIGIT_BITS: u32 = 11;
 const DIGITS: usize = 1 << DIGIT_BITS;
-
-/// Levels of the scale start at a focal length of this logarithm, in pixels, below any.
-const LEVELS_FROM: f64 = -10.0;
-/// Coordinates of cells are counted from this number, so that none is negative.
-const CELLS_FROM: f64 = 1e6;
-/// The pose of a triangle may be outside the region that a hint allows by this part of a cell, and the
-/// true one inside.
-const NEAR_SLACK: f64 = 1.0;
 
 /// A vote for the pose that an observed triangle has if it is one of the catalogue.
 #[derive(Debug, Clone, Copy)]
@@ -56,58 +38,6 @@ impl Vote {
     pub fn query(&self) -> usize {
         (self.triangle + self.similar.query) as usize
     }
-}
-
-/// An observed triangle beside those of the catalogue: an orthonormal frame of it in the camera, not
-/// mirrored and mirrored.
-#[derive(Debug, Clone, Copy)]
-pub struct InCamera {
-    frames: [Matrix3<f64>; 2],
-    triple: f64,
-}
-
-/// A frame of a triangle in the camera and the same in the sky: where the camera points (TRIAD).
-pub struct Aligned<'a> {
-    /// Whether the x axis is reversed.
-    pub mirrored: bool,
-    /// The frame in the camera.
-    pub of_camera: &'a Matrix3<f64>,
-    /// The frame in the sky.
-    pub of_sky: Matrix3<f64>,
-}
-
-impl InCamera {
-    /// The triangle of these unit vectors.
-    pub fn new(vectors: &[Vector3<f64>; 3]) -> Option<Self> {
-        let mirrored = vectors.map(|v| Vector3::new(-v.x, v.y, v.z));
-        Some(Self {
-            frames: [frame_of(vectors)?, frame_of(&mirrored)?],
-            triple: triple(vectors),
-        })
-    }
-
-    /// The triangle aligned with that of the catalogue whose stars have these unit vectors.
-    #[inline]
-    pub fn aligned(&self, sky: &[Vector3<f64>; 3]) -> Option<Aligned<'_>> {
-        let mirrored = self.triple * triple(sky) < 0.0;
-        Some(Aligned {
-            mirrored,
-            of_camera: &self.frames[usize::from(mirrored)],
-            of_sky: frame_of(sky)?,
-        })
-    }
-}
-
-/// An orthonormal frame of a triangle: the middle of AB, and the normal to AB.
-fn frame_of([a, b, _]: &[Vector3<f64>; 3]) -> Option<Matrix3<f64>> {
-    let first = (a + b).try_normalize(1e-12)?;
-    let third = a.cross(b).try_normalize(1e-15)?;
-    Some(Matrix3::from_columns(&[first, third.cross(&first), third]))
-}
-
-/// The triple product of three vectors.
-fn triple([a, b, c]: &[Vector3<f64>; 3]) -> f64 {
-    a.cross(b).dot(c)
 }
 
 /// A cell's number and a vote for it.
@@ -128,21 +58,12 @@ struct Leader {
     count: usize,
 }
 
-/// Cells of one level of the scale.
-#[derive(Debug, Clone, Copy)]
-struct Level {
-    /// Cells of the optical axis in a unit vector's coordinate of 1.
-    axis_cells: f64,
-    /// Least cosine of the optical axis to the middle of the region that a hint allows.
-    min_cos: f64,
-}
-
 /// Collects votes. Its buffers are reused.
 #[derive(Debug, Default)]
 pub struct Votes {
-    near: Option<SkyRegion>,
-    levels: [Vec<Level>; GRIDS],
-    first_level: [i32; GRIDS],
+    grids: PoseGrids,
+    alignments: Alignments,
+    cells: Cells,
     votes: Vec<Vote>,
     /// Of each grid, sorted by cell, then in the order of the votes.
     entries: [Vec<Entry>; GRIDS],
@@ -156,25 +77,7 @@ impl Votes {
     pub fn begin(&mut self, width_px: f64, focal_px: [f64; 2], near: Option<SkyRegion>) {
         self.votes.clear();
         self.leaders.clear();
-        self.near = near;
-        for (grid, shift) in SHIFTS.into_iter().enumerate() {
-            let level_of = |focal_px: f64| level(focal_px.ln(), grid);
-            let [first, last] = focal_px.map(level_of);
-            self.first_level[grid] = first - 1;
-            let levels = &mut self.levels[grid];
-            levels.clear();
-            levels.extend((first - 1..=last + 1).map(|level| {
-                let middle = (f64::from(level) + 0.5 - shift) * SCALE_STEP + LEVELS_FROM;
-                let step_rad = AXIS_STEP * (width_px / middle.exp()).atan();
-                let min_cos = near.map_or(-1.0, |near| {
-                    (near.radius_rad + NEAR_SLACK * step_rad).min(PI).cos()
-                });
-                Level {
-                    axis_cells: 1.0 / step_rad,
-                    min_cos,
-                }
-            }));
-        }
+        self.grids.set(width_px, focal_px, near);
     }
 
     /// The votes of an observed triangle for the poses in which it is one of the `similar` catalogue
@@ -182,83 +85,37 @@ impl Votes {
     /// Votes of one triangle come one after the other.
     pub fn add_all(
         &mut self,
-        in_camera: &[Option<InCamera>],
+        in_camera: &[CameraAxes],
         similar: &[Similar],
         triangle: u32,
-        stars: &SkyGrid,
+        stars: &PackedVectors,
     ) {
         // Only fetches, so that many fetches overlap.
         let corners = similar.iter().flat_map(|similar| similar.corners);
-        let fetched = corners.fold(0.0, |sum, corner| sum + stars.star(corner).v_mag);
+        let fetched = corners.fold(0, |all, corner| all ^ stars.packed(corner));
         std::hint::black_box(fetched);
-        for similar in similar {
-            let [a, b, c] = similar.corners;
-            let sky = [
-                stars.star(a).vector(),
-                stars.star(b).vector(),
-                stars.star(c).vector(),
-            ];
-            let in_camera = &in_camera[similar.query as usize];
-            let aligned = in_camera
-                .as_ref()
-                .and_then(|in_camera| in_camera.aligned(&sky));
-            let Some(Aligned {
-                mirrored,
-                of_camera,
-                of_sky,
-            }) = aligned
-            else {
-                continue;
-            };
-            // The rows of the rotation from the sky to the camera.
-            let axis = of_sky * of_camera.row(2).transpose();
-            let side = of_sky * of_camera.row(0).transpose();
-            let ln_focal = f64::from(similar.ln_focal);
-            if let Some(cells) = self.cells(&axis, &side, ln_focal, mirrored) {
-                let similar = *similar;
-                self.votes.push(Vote {
-                    triangle,
-                    similar,
-                    cells,
-                });
+        let Self {
+            grids,
+            alignments,
+            cells,
+            votes,
+            ..
+        } = self;
+        for similar in similar.chunks(LANES) {
+            for (lane, similar) in similar.iter().enumerate() {
+                let sky = similar.corners.map(|corner| stars.get(corner));
+                let in_camera = &in_camera[similar.query as usize];
+                alignments.set(lane, sky, in_camera, similar.ln_focal);
             }
+            grids.cells(alignments, cells);
+            let allowed = similar.iter().enumerate();
+            let allowed = allowed.filter(|(lane, _)| cells.allowed[*lane]);
+            votes.extend(allowed.map(|(lane, similar)| Vote {
+                triangle,
+                similar: *similar,
+                cells: cells.cells.map(|cells| cells[lane]),
+            }));
         }
-    }
-
-    /// The cells of a pose; `None` where a hint excludes it.
-    #[inline]
-    fn cells(
-        &self,
-        axis: &Vector3<f64>,
-        side: &Vector3<f64>,
-        ln_focal: f64,
-        mirrored: bool,
-    ) -> Option<[u32; GRIDS]> {
-        let mut cells = [0; GRIDS];
-        for (grid, cell) in cells.iter_mut().enumerate() {
-            let level = level(ln_focal, grid);
-            let of_level = level - self.first_level[grid];
-            let levels = &self.levels[grid];
-            let Level {
-                axis_cells,
-                min_cos,
-            } = levels[(of_level.max(0) as usize).min(levels.len() - 1)];
-            if let Some(near) = &self.near
-                && near.centre.as_vector().dot(axis) < min_cos
-            {
-                return None;
-            }
-            let mut hash = (level as u64) << 1 | u64::from(mirrored);
-            let mut mix = |coordinate: f64| {
-                let number = (coordinate + (CELLS_FROM + SHIFTS[grid])) as u64;
-                hash = (hash ^ number).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-                hash ^= hash >> 29;
-            };
-            axis.iter().for_each(|x| mix(x * axis_cells));
-            side.iter().for_each(|x| mix(x * (1.0 / ROLL_STEP)));
-            *cell = (hash >> 32) as u32;
-        }
-        Some(cells)
     }
 
     /// Number of votes.
@@ -325,12 +182,6 @@ impl Votes {
     }
 }
 
-/// The level of a focal length, given its logarithm.
-#[inline]
-fn level(ln_focal: f64, grid: usize) -> i32 {
-    ((ln_focal - LEVELS_FROM) * (1.0 / SCALE_STEP) + SHIFTS[grid]) as i32
-}
-
 /// Sorts by cell and keeps the order within a cell: a radix sort.
 fn sort_by_cell(entries: &mut Vec<Entry>, spare: &mut Vec<Entry>) {
     spare.clear();
@@ -360,16 +211,31 @@ fn sort_by_cell(entries: &mut Vec<Entry>, spare: &mut Vec<Entry>) {
 mod tests {
     use super::*;
     use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
+    use crate::identify::search::aligned::InCamera;
+    use nalgebra::Vector3;
     use proptest::prelude::*;
 
     const WIDTH_PX: f64 = 1000.0;
 
+    /// The cells of the pose with these angles, in radians: optical axis and position angle.
+    fn cells(votes: &Votes, [ra, dec, roll]: [f64; 3], focal_px: f64) -> Option<[u32; GRIDS]> {
+        let boresight = UnitVector::from_ra_dec(ra, dec);
+        let rotation = Rotation::<Icrs, Camera>::looking_at(&boresight, roll);
+        let camera = [[0.1, 0.2], [-0.2, 0.1], [0.3, -0.1]]
+            .map(|[x, y]| Vector3::new(x, y, 1.0).normalize());
+        let sky = camera.map(|v| rotation.matrix().transpose() * v);
+        let axes = CameraAxes::of(InCamera::new(&camera).as_ref());
+        let mut alignments = Alignments::default();
+        let sky = sky.map(|v| [v.x, v.y, v.z].map(|x| x as f32));
+        alignments.set(0, sky, &axes, focal_px.ln() as f32);
+        let mut cells = Cells::default();
+        votes.grids.cells(&alignments, &mut cells);
+        cells.allowed[0].then(|| cells.cells.map(|cells| cells[0]))
+    }
+
     /// Adds a vote of `triangle` for a pose.
-    fn add(votes: &mut Votes, triangle: u32, [ra_rad, dec_rad, roll_rad]: [f64; 3], focal_px: f64) {
-        let boresight = UnitVector::from_ra_dec(ra_rad, dec_rad);
-        let rotation = Rotation::<Icrs, Camera>::looking_at(&boresight, roll_rad);
-        let [axis, side] = [2, 0].map(|row| rotation.matrix().row(row).transpose());
-        let cells = votes.cells(&axis, &side, focal_px.ln(), false).unwrap();
+    fn add(votes: &mut Votes, triangle: u32, angles_rad: [f64; 3], focal_px: f64) {
+        let cells = cells(votes, angles_rad, focal_px).unwrap();
         let similar = Similar {
             query: 0,
             corners: [triangle; 3],
@@ -422,11 +288,8 @@ mod tests {
             let near = SkyRegion { centre, radius_rad: 0.4 };
             let mut votes = Votes::default();
             votes.begin(WIDTH_PX, [400.0, 6000.0], Some(near));
-            let boresight = UnitVector::from_ra_dec(ra, dec);
-            let rotation = Rotation::<Icrs, Camera>::looking_at(&boresight, roll);
-            let [axis, side] = [2, 0].map(|row| rotation.matrix().row(row).transpose());
-            let apart_rad = boresight.angle_to(&centre);
-            let cells = votes.cells(&axis, &side, 1000_f64.ln(), false);
+            let apart_rad = UnitVector::from_ra_dec(ra, dec).angle_to(&centre);
+            let cells = cells(&votes, [ra, dec, roll], 1000.0);
             // A cell is 0.06 of the field.
             prop_assert!(cells.is_some() || apart_rad > 0.4);
             prop_assert!(cells.is_none() || apart_rad < 0.4 + 0.1);
