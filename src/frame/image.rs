@@ -125,10 +125,7 @@ impl<'p> Frame<'p> {
 
     /// The lowest and the highest value.
     pub(crate) fn range_adu(&self) -> [f32; 2] {
-        let values = self.pixels.values();
-        values.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], value| {
-            [low.min(value), high.max(value)]
-        })
+        [self.pixels.lowest(), self.pixels.highest()]
     }
 
     /// Sets the step between grey levels and the saturation level, in ADU.

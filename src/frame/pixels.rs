@@ -53,10 +53,30 @@ impl Pixels<'_> {
 
     /// The highest value; NaN is left out.
     pub fn highest(&self) -> f32 {
+        let higher = |a: f32, b: f32| if b > a { b } else { a };
         match self {
             Self::U8(values) => f32::from(values.iter().copied().max().unwrap_or(0)),
             Self::U16(values) => f32::from(values.iter().copied().max().unwrap_or(0)),
-            Self::F32(values) => values.iter().copied().fold(f32::NEG_INFINITY, f32::max),
+            Self::F32(values) => reduce(values, f32::NEG_INFINITY, higher),
+        }
+    }
+
+    /// The lowest value; NaN is left out.
+    pub(crate) fn lowest(&self) -> f32 {
+        let lower = |a: f32, b: f32| if b < a { b } else { a };
+        match self {
+            Self::U8(values) => f32::from(values.iter().copied().min().unwrap_or(0)),
+            Self::U16(values) => f32::from(values.iter().copied().min().unwrap_or(0)),
+            Self::F32(values) => reduce(values, f32::INFINITY, lower),
+        }
+    }
+
+    /// The number of pixels for which `is` is true.
+    pub(crate) fn count(&self, is: impl Fn(f32) -> bool) -> usize {
+        match self {
+            Self::U8(values) => values.iter().filter(|&&v| is(v.into())).count(),
+            Self::U16(values) => values.iter().filter(|&&v| is(v.into())).count(),
+            Self::F32(values) => values.iter().filter(|&&v| is(v)).count(),
         }
     }
 
@@ -102,6 +122,19 @@ impl Pixels<'_> {
             Self::F32(values) => reverse_rows(values.to_mut(), width),
         }
     }
+}
+
+/// All `values` and the `first` reduced to one, whatever their order: many at once.
+fn reduce(values: &[f32], first: f32, by: impl Fn(f32, f32) -> f32) -> f32 {
+    const LANES: usize = 32;
+    let (chunks, rest) = values.as_chunks::<LANES>();
+    let mut lanes = [first; LANES];
+    for chunk in chunks {
+        for (lane, &value) in lanes.iter_mut().zip(chunk) {
+            *lane = by(*lane, value);
+        }
+    }
+    lanes.iter().chain(rest).copied().fold(first, by)
 }
 
 fn reverse_rows<T>(values: &mut [T], width: usize) {

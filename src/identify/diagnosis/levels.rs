@@ -15,7 +15,7 @@ const MEDIAN_PX: usize = 1 << 20;
 
 /// Whether the frame is empty or overexposed.
 pub(super) fn diagnose(frame: &Frame) -> Option<Diagnosis> {
-    let values = || frame.pixels.values().filter(|p| !p.is_nan());
+    let pixels = &frame.pixels;
     let [lowest, highest] = frame.range_adu();
     let saturation_adu = frame.saturation_level_adu();
     let is_full = saturation_adu.is_some_and(|full| highest >= full);
@@ -33,12 +33,15 @@ pub(super) fn diagnose(frame: &Frame) -> Option<Diagnosis> {
         Some(full) if is_full => full,
         _ => highest,
     };
-    let at_full = values().filter(|&p| p >= full).count();
-    let share = at_full as f64 / values().count() as f64;
+    let at_full = pixels.count(|p| p >= full);
+    let share = at_full as f64 / pixels.count(|p| !p.is_nan()) as f64;
     // Of frames with negative levels the lowest is dark.
     let dark = f64::from(lowest.min(0.0));
-    let step = frame.pixels.len().div_ceil(MEDIAN_PX);
-    let sample = values().step_by(step).map(f64::from);
+    let step = pixels.len().div_ceil(MEDIAN_PX);
+    let sample = (0..pixels.len())
+        .step_by(step)
+        .map(|index| f64::from(pixels.value(index)));
+    let sample = sample.filter(|p| !p.is_nan());
     let sky = median(&mut sample.collect::<Vec<_>>());
     let sky = (sky - dark) / (f64::from(full) - dark);
     let is_sky_full = is_full && sky > FULL_SKY;

@@ -8,8 +8,8 @@
 //! | 8, 8 | format version, checksum of the catalogue, `u64` each |
 //! | 8, 8 | bytes and XXH3-64 of the table that follows, `u64` each |
 //! | … | the table, an entry for each size class (below) |
-//! | … | the triangles, by class and chunk: corners, three `u32`; ratios, two `u16`;
-//! size, `u8`; magnitudes, three `u8` |
+//! | … | the triangles, by class and chunk: corners, 21 bits of a `u64`
+//! each; ratios, two `u16`; size, `u8`; magnitudes, three `u8` |
 //!
 //! An entry of the table:
 //!
@@ -22,20 +22,19 @@
 //! A file is written under a temporary name and renamed. Its table is read and checked at once, a
 //! chunk when it is first needed. A file with a damaged chunk is deleted.
 
-use super::table::{CELLS, CHUNKS, SizeClass, Triangle};
+use super::table::{CELLS, CHUNKS, SizeClass, TRIANGLE_BYTES, Triangle};
 use crate::base::files;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use xxhash_rust::xxh3::xxh3_64;
+use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 const MAGIC: [u8; 16] = *b"starpipe index\r\n";
 /// To be raised whenever the same catalog gets another index, or the layout changes.
-const FORMAT_VERSION: u64 = 3;
+const FORMAT_VERSION: u64 = 4;
 const HEADER_BYTES: usize = 48;
-const TRIANGLE_BYTES: usize = 20;
 /// Size of an entry of the table.
 const CLASS_BYTES: usize = 16 + 8 * CHUNKS + 4 * (CELLS + 1);
 /// Upper limit that guards against a damaged length.
@@ -103,16 +102,16 @@ impl IndexFile {
         stars: usize,
     ) -> Result<Box<[Triangle]>, CacheError> {
         let stored = &self.classes[class];
-        let mut bytes = vec![0; range.len() * TRIANGLE_BYTES];
         let start = stored.start + u64::from(range.start) * TRIANGLE_BYTES as u64;
-        self.read_at(start, &mut bytes)
+        let mut checksum = Xxh3::new();
+        let triangles = self
+            .read_at(start, range.len(), &mut checksum)
             .map_err(|source| self.delete_after(io_error("reading", &self.path)(source)))?;
-        if xxh3_64(&bytes) != stored.checksums[chunk] {
+        if checksum.digest() != stored.checksums[chunk] {
             let what = format!("the checksum of chunk {chunk} of class {class} is wrong");
             return Err(self.delete_after(damaged(&self.path)(what)));
         }
-        let triangles: Box<[Triangle]> = bytes.as_chunks().0.iter().map(triangle).collect();
-        let corners = triangles.iter().flat_map(|triangle| triangle.corners);
+        let corners = triangles.iter().flat_map(Triangle::corners);
         if corners.max().is_some_and(|corner| corner as usize >= stars) {
             let what = format!("chunk {chunk} of class {class} names stars that are not there");
             return Err(self.delete_after(damaged(&self.path)(what)));
@@ -120,10 +119,27 @@ impl IndexFile {
         Ok(triangles)
     }
 
-    fn read_at(&self, start: u64, bytes: &mut [u8]) -> io::Result<()> {
+    /// Reads so many triangles from a position, block by block: a block stays in the cache until it
+    /// is decoded.
+    fn read_at(
+        &self,
+        start: u64,
+        count: usize,
+        checksum: &mut Xxh3,
+    ) -> io::Result<Box<[Triangle]>> {
+        const BLOCK: usize = 4096;
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         file.seek(SeekFrom::Start(start))?;
-        file.read_exact(bytes)
+        let mut triangles = Vec::with_capacity(count);
+        let mut block = vec![0; BLOCK.min(count) * TRIANGLE_BYTES];
+        while triangles.len() < count {
+            let bytes = &mut block[..BLOCK.min(count - triangles.len()) * TRIANGLE_BYTES];
+            file.read_exact(bytes)?;
+            checksum.update(bytes);
+            let bytes = bytes.as_chunks().0.iter();
+            triangles.extend(bytes.map(|bytes| Triangle::from_bytes(*bytes)));
+        }
+        Ok(triangles.into())
     }
 
     /// Deletes the file, so that the next process writes it again; returns `error`.
@@ -147,32 +163,6 @@ fn damaged(path: &Path) -> impl Fn(String) -> CacheError {
         path: path.to_owned(),
         what,
     }
-}
-
-#[rustfmt::skip]
-fn triangle(bytes: &[u8; TRIANGLE_BYTES]) -> Triangle {
-    let [a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3, m0, m1, s0, s1, size, a_mag, b_mag, c_mag] = *bytes;
-    Triangle {
-        corners: [[a0, a1, a2, a3], [b0, b1, b2, b3], [c0, c1, c2, c3]].map(u32::from_le_bytes),
-        ratios: [[m0, m1], [s0, s1]].map(u16::from_le_bytes),
-        size,
-        mags: [a_mag, b_mag, c_mag],
-    }
-}
-
-fn bytes_of(triangles: &[Triangle]) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(triangles.len() * TRIANGLE_BYTES);
-    for triangle in triangles {
-        for corner in triangle.corners {
-            bytes.extend_from_slice(&corner.to_le_bytes());
-        }
-        for ratio in triangle.ratios {
-            bytes.extend_from_slice(&ratio.to_le_bytes());
-        }
-        bytes.push(triangle.size);
-        bytes.extend_from_slice(&triangle.mags);
-    }
-    bytes
 }
 
 fn header(catalog_checksum: u64, table: &[u8]) -> [u8; HEADER_BYTES] {
@@ -272,11 +262,11 @@ pub fn store(path: &Path, catalog_checksum: u64, classes: &[SizeClass]) -> Resul
     let mut out = io::BufWriter::new(file.as_file());
     let (mut table, mut triangles) = (Vec::new(), Vec::new());
     for class in classes {
-        let bytes = class
-            .chunks
-            .iter()
-            .map(|chunk| bytes_of(chunk.get().map_or(&[], |chunk| chunk)));
-        let chunks: Vec<Vec<u8>> = bytes.collect();
+        let chunks = class.chunks.iter().map(|chunk| {
+            let triangles = chunk.get().into_iter().flatten();
+            triangles.flat_map(|triangle| triangle.to_bytes()).collect()
+        });
+        let chunks: Vec<Vec<u8>> = chunks.collect();
         table.extend(class.low.to_le_bytes());
         table.extend(class.high.to_le_bytes());
         table.extend(chunks.iter().flat_map(|chunk| xxh3_64(chunk).to_le_bytes()));

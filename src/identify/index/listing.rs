@@ -10,7 +10,7 @@
 //! built without optimization.
 
 use super::cells::{SkyCells, Zone};
-use super::table::{SizeClass, Triangle};
+use super::table::{MAX_STARS, SizeClass, Triangle};
 use super::triangle::TriangleShape;
 use crate::base::interrupt::{Interrupt, Interrupted};
 use crate::base::units::RAD_PER_DEG;
@@ -54,13 +54,14 @@ pub struct ListedStar {
 }
 
 impl ListedStar {
-    /// All `stars`.
+    /// The `stars` that may be corners.
     pub fn all(stars: &[Star]) -> Vec<Self> {
         let listed = |star: &Star| Self {
             direction: (*star.direction.as_vector()).into(),
             ra_rad: star.direction.to_ra_dec().0,
             v_mag: star.v_mag,
         };
+        let stars = &stars[..stars.len().min(MAX_STARS)];
         stars.par_iter().map(listed).collect()
     }
 }
@@ -158,7 +159,7 @@ impl<'a> Class<'a> {
             self.list_cell(zone, cell, around, &mut triangles);
             // By the faintest star, then the next: independent of how they were found.
             triangles[first..].sort_unstable_by_key(|triangle| {
-                let mut corners = triangle.corners;
+                let mut corners = triangle.corners();
                 corners.sort_unstable_by(|a, b| b.cmp(a));
                 corners
             });

@@ -22,6 +22,12 @@ const MIN_MIDDLE_RATIO: f64 = 0.5;
 /// Ratios are stored in steps of this: a hundredth of the smallest tolerance.
 const RATIO_STEP: f64 = 1.0 / 65536.0;
 
+/// Bits in which a corner is stored, and so many stars, the brightest, may be corners.
+const CORNER_BITS: u32 = 21;
+pub const MAX_STARS: usize = 1 << CORNER_BITS;
+/// Bytes of a triangle, in memory and in a file.
+pub const TRIANGLE_BYTES: usize = 16;
+
 /// Brightest magnitude that is stored, and the step of magnitudes.
 const BRIGHTEST_V_MAG: f32 = -2.0;
 const MAG_STEP: f32 = 1.0 / 16.0;
@@ -32,8 +38,8 @@ const SIZES: f64 = 256.0;
 /// hundreds of thousands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Triangle {
-    /// Corners A, B, C, as indices into the catalogue's stars.
-    pub corners: [u32; 3],
+    /// Corners A, B, C, in [`CORNER_BITS`] each, A first.
+    corners: u64,
     /// Middle and shortest side over the longest, in [`RATIO_STEP`].
     pub ratios: [u16; 2],
     /// Where in its class the logarithm of its longest side is, see [`SizeClass::ln_longest`].
@@ -47,10 +53,40 @@ impl Triangle {
     /// the smallest to the largest of its class. Ratios, size and magnitudes are rounded.
     pub fn new(corners: [u32; 3], ratios: [f64; 2], share: f64, v_mags: [f32; 3]) -> Self {
         Self {
-            corners,
+            corners: corners
+                .iter()
+                .fold(0, |all, &corner| all << CORNER_BITS | u64::from(corner)),
             ratios: [steps(ratios[0]), steps(ratios[1])],
             size: (share * SIZES) as u8,
             mags: v_mags.map(|v_mag| ((v_mag - BRIGHTEST_V_MAG) / MAG_STEP).round() as u8),
+        }
+    }
+
+    /// Corners A, B, C, as indices into the catalogue's stars.
+    #[inline]
+    pub fn corners(&self) -> [u32; 3] {
+        [2 * CORNER_BITS, CORNER_BITS, 0]
+            .map(|shift| (self.corners >> shift) as u32 % MAX_STARS as u32)
+    }
+
+    /// The triangle as it is in a file: corners, ratios, size, magnitudes, little-endian.
+    pub fn to_bytes(self) -> [u8; TRIANGLE_BYTES] {
+        let ([m0, m1], [s0, s1]) = (self.ratios[0].to_le_bytes(), self.ratios[1].to_le_bytes());
+        let [a_mag, b_mag, c_mag] = self.mags;
+        let like = u64::from_le_bytes([m0, m1, s0, s1, self.size, a_mag, b_mag, c_mag]);
+        (u128::from(like) << 64 | u128::from(self.corners)).to_le_bytes()
+    }
+
+    /// The triangle of which [`to_bytes`](Self::to_bytes) are these.
+    #[inline]
+    pub fn from_bytes(bytes: [u8; TRIANGLE_BYTES]) -> Self {
+        let whole = u128::from_le_bytes(bytes);
+        let [m0, m1, s0, s1, size, mags @ ..] = ((whole >> 64) as u64).to_le_bytes();
+        Self {
+            corners: whole as u64,
+            ratios: [[m0, m1], [s0, s1]].map(u16::from_le_bytes),
+            size,
+            mags,
         }
     }
 

@@ -42,6 +42,21 @@ pub struct ObservedTriangle {
     pub true_confirmation: f64,
 }
 
+impl ObservedTriangle {
+    /// Its sides AB, BC and CA at a focal length in pixels, as chords.
+    fn sides(&self, focal_px: f64) -> [f64; 3] {
+        let [a, b, c] = self.offsets.map(|[x, y]| {
+            let scale = 1.0 / (x * x + y * y + focal_px * focal_px).sqrt();
+            [x * scale, y * scale, focal_px * scale]
+        });
+        let chord = |p: [f64; 3], q: [f64; 3]| {
+            let [x, y, z] = [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
+            (x * x + y * y + z * z).sqrt()
+        };
+        [chord(a, b), chord(b, c), chord(c, a)]
+    }
+}
+
 /// A triangle with its corners in the order of its shape, and the focal lengths for which it has
 /// that shape.
 #[derive(Debug, Clone, Copy)]
@@ -202,10 +217,11 @@ impl ObservedStars<'_> {
 
     /// The triangle's middle and shortest side over the longest at this focal length.
     fn ratios(&self, triangle: &ObservedTriangle, focal_px: f64) -> [f64; 2] {
-        let [a, b, c] = self.vectors(triangle, focal_px);
-        let mut sides = [(a - b).norm(), (b - c).norm(), (c - a).norm()];
-        sides.sort_unstable_by(f64::total_cmp);
-        [sides[1] / sides[2], sides[0] / sides[2]]
+        let [a, b, c] = triangle.sides(focal_px);
+        let (least, most) = (a.min(b), a.max(b));
+        let (shortest, longest) = (least.min(c), most.max(c));
+        let middle = most.min(least.max(c));
+        [middle / longest, shortest / longest]
     }
 
     /// Unit vectors of the triangle's stars for this focal length, not mirrored.
@@ -217,8 +233,8 @@ impl ObservedStars<'_> {
 
     /// The triangle's longest side at this focal length, as a chord.
     fn longest_side(&self, triangle: &ObservedTriangle, focal_px: f64) -> f64 {
-        let [a, b, c] = self.vectors(triangle, focal_px);
-        (a - b).norm().max((b - c).norm()).max((c - a).norm())
+        let [a, b, c] = triangle.sides(focal_px);
+        a.max(b).max(c)
     }
 
     /// The focal length at which the triangle's longest side is `chord`.
@@ -293,7 +309,7 @@ impl ObservedStars<'_> {
             if let Some(zero_point_mag) = self.zero_point(triangle, mags) {
                 similar.push(Similar {
                     query: number,
-                    corners: triangle.corners,
+                    corners: triangle.corners(),
                     zero_point_mag,
                     ln_focal: ln_focal as f32,
                 });
