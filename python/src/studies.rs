@@ -121,6 +121,7 @@ pub fn robustness(
         mag_sigma: lists.mag_error,
         missing: lists.missing_percent / 100.0,
         false_stars: lists.false_stars_percent / 100.0,
+        bright_false_stars: 0,
         scale_error: lists.scale_error_percent.map(|percent| percent / 100.0),
         mirrored: Mirrored::Half,
         photometry: Photometry::Instrumental,

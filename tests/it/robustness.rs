@@ -55,6 +55,19 @@ fn without_errors_every_centroid_is_where_its_star_is() {
 }
 
 #[test]
+fn brighter_false_stars_come_before_all_true_ones() {
+    let protocol = Protocol {
+        bright_false_stars: 40,
+        false_stars: 0.0,
+        ..Protocol::default()
+    };
+    let drawn = draw(&protocol, 5);
+    let first_true = drawn.stars.iter().position(Option::is_some);
+    assert_eq!(first_true, Some(40));
+    assert_eq!(drawn.list.centroids.len(), 40 + drawn.true_stars());
+}
+
+#[test]
 fn errors_missing_and_false_stars_are_as_requested() {
     let protocol = Protocol {
         centroid_sigma_px: 1.5,

@@ -9,6 +9,9 @@ use clap::{Args, ValueEnum};
 use starpipe::identify::Photometry;
 use starpipe::study::robustness::{Mirrored, Protocol};
 
+/// So many centroids a frame has at most.
+const MAX_BRIGHT_FALSE: i64 = 100_000;
+
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     starpipe robustness\n  \
@@ -16,7 +19,8 @@ use starpipe::study::robustness::{Mirrored, Protocol};
     starpipe robustness --sweep centroid-error=0:5:11 --sweep false=0:200:9 --plot robustness.svg\n\n\
     Lists of centroids are drawn from the catalogue, at attitudes uniform over all rotations, with errors, missing\n\
     and false stars, and identified like those of `starpipe identify`. Without --sweep the table is the\n\
-    standard one: five fields of view, then one worse condition at a time in a field of 10 degrees.")]
+    standard one: five fields of view, then one worse condition at a time in a field of 10 degrees,\n\
+    and wide fields of unknown size.")]
 pub(crate) struct RobustnessArgs {
     /// Trials in each row of the table
     #[arg(long, alias = "trials", value_name = "NUMBER", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
@@ -70,6 +74,9 @@ pub(super) struct ProtocolOptions {
     /// False stars, in percent of the true ones
     #[arg(long = "false", value_name = "PERCENT", default_value_t = 15.0, value_parser = values::multiple)]
     pub(super) false_stars: f64,
+    /// Further false stars, brighter than all true ones
+    #[arg(long, value_name = "NUMBER", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=MAX_BRIGHT_FALSE))]
+    pub(super) bright_false: u32,
     /// Largest error of the stated field of view, in percent
     #[arg(long, value_name = "PERCENT", default_value_t = 10.0, value_parser = values::percent, conflicts_with = "scale_unknown")]
     pub(super) scale_error: f64,
@@ -106,6 +113,7 @@ impl ProtocolOptions {
             mag_sigma: self.mag_error,
             missing: self.missing / 100.0,
             false_stars: self.false_stars / 100.0,
+            bright_false_stars: self.bright_false as usize,
             scale_error: (!self.scale_unknown).then_some(self.scale_error / 100.0),
             mirrored: self.mirrored.into(),
             photometry: if self.vmag {

@@ -131,19 +131,33 @@ fn listed_stars(protocol: &Protocol, stars: &[Centroid], rng: &mut ChaCha8Rng) -
     stars.iter().filter_map(listed).collect()
 }
 
-/// False stars, uniform over the frame, each as bright as a random star of this frame.
+/// False stars, uniform over the frame, each as bright as a random star of this frame, and those that
+/// are brighter than all stars.
 fn false_stars(protocol: &Protocol, stars: &[Centroid], rng: &mut ChaCha8Rng) -> Vec<Centroid> {
+    /// Brighter false stars are so much brighter than the brightest star, at most.
+    const MOST_BRIGHTER_MAG: f64 = 2.0;
     let wanted = protocol.false_stars * stars.len() as f64;
     let count = wanted as usize + usize::from(rng.random_bool(wanted.fract()));
-    let mut false_star = || Centroid {
+    let brightest = stars.iter().map(|star| star.v_mag);
+    let brightest = brightest.fold(f64::INFINITY, f64::min);
+    let mut false_star = |number: usize| Centroid {
         position: PixelPoint::new(
             rng.random_range(0.0..protocol.width_px as f64) - 0.5,
             rng.random_range(0.0..protocol.height_px as f64) - 0.5,
         ),
-        v_mag: stars[rng.random_range(0..stars.len())].v_mag,
+        v_mag: if number < count {
+            stars[rng.random_range(0..stars.len())].v_mag
+        } else {
+            brightest - rng.random_range(0.0..MOST_BRIGHTER_MAG)
+        },
         star: None,
     };
-    (0..count).map(|_| false_star()).collect()
+    let all = if stars.is_empty() {
+        0
+    } else {
+        count + protocol.bright_false_stars
+    };
+    (0..all).map(&mut false_star).collect()
 }
 
 /// The magnitude limit that gives the requested mean number of stars on a frame.

@@ -25,6 +25,8 @@ pub struct Protocol {
     pub missing: f64,
     /// False stars, as a share of the true stars before some are removed.
     pub false_stars: f64,
+    /// Further false stars, brighter than all true ones.
+    pub bright_false_stars: usize,
     /// Relative error of the scale prior, in (0, 1); `None` for no prior.
     pub scale_error: Option<f64>,
     /// Which frames are mirrored.
@@ -57,6 +59,7 @@ impl Default for Protocol {
             mag_sigma: 0.2,
             missing: 0.15,
             false_stars: 0.15,
+            bright_false_stars: 0,
             scale_error: Some(0.1),
             mirrored: Mirrored::Half,
             photometry: Photometry::Instrumental,

@@ -39,7 +39,16 @@ pub fn standard_cases(base: &Protocol) -> Vec<Case> {
         case("centroids 2 px off", &|p| p.centroid_sigma_px = 2.0),
         case("magnitudes 0.5 off", &|p| p.mag_sigma = 0.5),
         case("as many false stars as true", &|p| p.false_stars = 1.0),
+        case("50 brighter false stars", &|p| p.bright_false_stars = 50),
+        case("100 brighter false stars", &|p| p.bright_false_stars = 100),
+        case("200 brighter false stars", &|p| p.bright_false_stars = 200),
         case("field of view unknown", &|p| p.scale_error = None),
+        case("60° field, unknown", &|p| {
+            (p.fov_deg, p.scale_error) = (60.0, None)
+        }),
+        case("80° field, unknown", &|p| {
+            (p.fov_deg, p.scale_error) = (80.0, None)
+        }),
         case("half as many stars", &|p| p.mean_stars /= 2.0),
         case("no true star at all", &|p| {
             (p.missing, p.false_stars) = (1.0, 1.0)
@@ -134,6 +143,8 @@ pub struct CaseResult {
     pub missing_percent: f64,
     /// See [`Protocol::false_stars`].
     pub false_percent: f64,
+    /// See [`Protocol::bright_false_stars`].
+    pub bright_false_stars: usize,
     /// See [`Protocol::scale_error`].
     pub scale_error_percent: Option<f64>,
     /// See [`Protocol::mirrored`].
@@ -189,6 +200,7 @@ impl CaseResult {
             mag_error: protocol.mag_sigma,
             missing_percent: percent(protocol.missing),
             false_percent: percent(protocol.false_stars),
+            bright_false_stars: protocol.bright_false_stars,
             scale_error_percent: protocol.scale_error.map(percent),
             mirrored: protocol.mirrored,
             johnson_v: protocol.photometry == Photometry::JohnsonV,
