@@ -83,6 +83,22 @@ impl Hypothesis {
         self.predict_to(problem, observed, limit, around, predicted);
     }
 
+    /// Fills `predicted` with so many of the brightest catalogue stars in the frame, or more.
+    pub fn predict_brightest(
+        &self,
+        Problem { field, sky, .. }: Problem,
+        count: usize,
+        around: &mut Surroundings,
+        predicted: &mut Vec<PredictedStar>,
+    ) {
+        let likely_v_mag = sky.magnitude_of_density(self.per_sq_deg(count));
+        let least = PredictionDepth {
+            count,
+            v_mag: f64::NEG_INFINITY,
+        };
+        around.stars_at_least(&self.view(field), sky, least, likely_v_mag, predicted);
+    }
+
     /// As [`Self::predict`], and at least down to `limit_v_mag`.
     fn predict_to(
         &self,

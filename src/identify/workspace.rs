@@ -279,6 +279,7 @@ impl<'w> Pointing<'w, '_> {
     pub fn attitude(self) -> Result<&'w Identification, SearchFailure> {
         let Self {
             most_chance,
+            problem: whole,
             mut search,
             found,
             failure,
@@ -300,8 +301,12 @@ impl<'w> Pointing<'w, '_> {
         let refined = refiner.with_names(problem, &found.refined, &of_few);
         let refined = refined.filter(|_| refiner.pairs.len() >= MIN_STARS);
         let refined = refined.ok_or(failure)?;
-        let log10 = found.log10_false_alarm;
-        let pairs = &refiner.pairs;
+        let log10_unseen = search.log10_unseen(whole.field, &refined.hypothesis());
+        let log10 = found.log10_false_alarm - log10_unseen;
+        if log10 > LOG10_FALSE_ALARM_LIMIT {
+            return Err(failure);
+        }
+        let pairs = &search.refiner().pairs;
         Ok(answered(answer, &refined, log10, problem.field, pairs))
     }
 }

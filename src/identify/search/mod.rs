@@ -13,6 +13,7 @@ mod queries;
 mod thinning;
 mod tiers;
 mod triangle_search;
+mod unseen;
 mod votes;
 
 pub use thinning::Thinning;

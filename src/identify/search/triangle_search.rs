@@ -10,6 +10,7 @@ use super::plan::{PASSES, SearchPass, SearchPlan, WORK_OF_VOTE};
 use super::pose_cells::CameraAxes;
 use super::queries::{LookedUp, ObservedStars, ObservedTriangle, Query, Similar};
 use super::tiers::Tiers;
+use super::unseen::Unseen;
 use super::votes::{Vote, Votes};
 use crate::base::coords::Rotation;
 use crate::base::interrupt::Interrupt;
@@ -44,6 +45,7 @@ pub struct SearchBuffers {
     /// Refines hypotheses.
     pub refiner: Refiner,
     false_alarm: FalseAlarm,
+    unseen: Unseen,
     /// The stars of the best fit so far, while others are tried.
     best: Vec<Pair>,
     /// What is looked up for an observed triangle, for all of them where these vote.
@@ -447,10 +449,28 @@ impl<'a> Search<'a> {
         self.problem
     }
 
-    /// log10 of the false-alarm probability of an answer for the whole `field`; `None` where it
-    /// contradicts the priors. Where the stars that were searched do not show it, those below
-    /// brighter detections may.
+    /// log10 of the false-alarm probability of an answer for the whole `field`, whose named stars the
+    /// refiner has; `None` where it contradicts the priors. Bright stars that should be seen and are
+    /// not speak against it.
     pub fn log10_of_answer(&mut self, field: &StarField, hypothesis: &Hypothesis) -> Option<f64> {
+        let log10 = self.log10_of_agreement(field, hypothesis)?;
+        Some((log10 - self.log10_unseen(field, hypothesis)).min(0.0))
+    }
+
+    /// log10 of the probability that so few of the brightest stars are seen in `field`, under a right
+    /// hypothesis whose named stars the refiner has.
+    pub fn log10_unseen(&mut self, field: &StarField, hypothesis: &Hypothesis) -> f64 {
+        let SearchBuffers {
+            refiner, unseen, ..
+        } = &mut *self.buffers;
+        let Refiner { around, pairs, .. } = refiner;
+        let whole = Problem::new(field, self.problem.sky);
+        unseen.log10(hypothesis, whole, pairs, around)
+    }
+
+    /// log10 of the probability that as many stars agree by chance. Where the stars that were searched
+    /// do not show it, those below brighter detections may.
+    fn log10_of_agreement(&mut self, field: &StarField, hypothesis: &Hypothesis) -> Option<f64> {
         /// Searches of other choices of stars, before those of the tiers.
         const BEFORE_TIERS: u32 = 2;
         let log10 = self.log10_with(hypothesis, TESTED_STARS)?;
