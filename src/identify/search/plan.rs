@@ -13,8 +13,8 @@ const MAX_LAST: u64 = 1_000_000;
 /// A vote takes as long as so many catalogue triangles that are looked at.
 pub const WORK_OF_VOTE: u64 = 3;
 /// Work of a search of the brightest stars, and of a tier.
-const WORK: u64 = 1_000_000;
-const WORK_OF_TIER: u64 = 450_000;
+const WORK: u64 = 850_000;
+const WORK_OF_TIER: u64 = 400_000;
 
 /// Some of the triangles of the brightest stars.
 pub struct SearchPass {
