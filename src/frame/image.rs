@@ -123,6 +123,19 @@ impl<'p> Frame<'p> {
             .with_levels(self.step_adu, None)
     }
 
+    /// The means of blocks of `factor` × `factor` pixels; values without a number are left out, and so
+    /// are pixels at the right and at the bottom that fill no block.
+    pub(crate) fn binned(&self, factor: usize) -> Frame<'static> {
+        let means = match &self.pixels {
+            Pixels::U8(values) => means_of_blocks(values, self.width, factor),
+            Pixels::U16(values) => means_of_blocks(values, self.width, factor),
+            Pixels::F32(values) => means_of_blocks(values, self.width, factor),
+        };
+        let step_adu = self.step_adu / (factor * factor) as f32;
+        Frame::from_checked(self.width / factor, self.height / factor, means)
+            .with_levels(step_adu, self.saturation_adu)
+    }
+
     /// The lowest and the highest value.
     pub(crate) fn range_adu(&self) -> [f32; 2] {
         [self.pixels.lowest(), self.pixels.highest()]
@@ -196,4 +209,26 @@ pub fn check_size(width: usize, height: usize) -> Result<(), FrameError> {
         Some(count) if count <= MAX_PIXELS => Ok(()),
         _ => Err(FrameError::TooLarge { width, height }),
     }
+}
+/// The means of blocks of pixels, row by row.
+fn means_of_blocks<T: Copy + Into<f32>>(values: &[T], width: usize, factor: usize) -> Vec<f32> {
+    let columns = width / factor;
+    let bands = values.chunks_exact(width * factor);
+    let mut means = Vec::with_capacity(columns * bands.len());
+    let mut sums = vec![[0.0_f32; 2]; columns];
+    for band in bands {
+        sums.fill([0.0; 2]);
+        for row in band.chunks_exact(width) {
+            for ([sum, count], block) in sums.iter_mut().zip(row.chunks_exact(factor)) {
+                for value in block.iter().map(|&value| value.into()) {
+                    if !value.is_nan() {
+                        *sum += value;
+                        *count += 1.0;
+                    }
+                }
+            }
+        }
+        means.extend(sums.iter().map(|[sum, count]| sum / count));
+    }
+    means
 }

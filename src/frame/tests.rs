@@ -543,3 +543,21 @@ fn words_of_either_byte_order_are_read_alike() {
     bytes.extend(levels.iter().flat_map(|level| level.to_be_bytes()));
     assert_eq!(*decode(&bytes).unwrap().values(), levels.map(f32::from));
 }
+
+#[test]
+fn blocks_have_the_mean_of_their_pixels_that_have_a_value() {
+    let pixels: Vec<f32> = (0..7 * 5).map(|i| i as f32).collect();
+    let mut frame = Frame::new(7, 5, pixels).unwrap();
+    let binned = frame.binned(2);
+    assert_eq!((binned.width, binned.height), (3, 2));
+    assert_eq!(
+        binned.pixels.values().collect::<Vec<_>>(),
+        [4.0, 6.0, 8.0, 18.0, 20.0, 22.0]
+    );
+    frame.values_mut()[0] = f32::NAN;
+    assert_eq!(frame.binned(2).pixels.value(0), (1.0 + 7.0 + 8.0) / 3.0);
+    for index in [1, 7, 8] {
+        frame.values_mut()[index] = f32::NAN;
+    }
+    assert!(frame.binned(2).pixels.value(0).is_nan());
+}

@@ -81,6 +81,15 @@ impl StarField {
     }
 }
 
+/// The same frame at lower resolutions.
+pub trait CoarserFields {
+    /// Number of resolutions.
+    fn count(&self) -> usize;
+
+    /// The stars at one of them, in pixels of the whole frame; `None` where there is no such frame.
+    fn field(&self, number: usize) -> Option<&StarField>;
+}
+
 #[cfg(test)]
 impl StarField {
     /// Stars at these places in a frame of this width and height, each a magnitude fainter than the

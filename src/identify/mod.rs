@@ -36,6 +36,7 @@ mod search;
 mod workspace;
 
 pub use effort::Effort;
+pub(crate) use field::CoarserFields;
 pub use field::{ObservedStar, Photometry, SourceIndex, StarField};
 #[doc(hidden)]
 pub use identification::MIN_STARS;

@@ -4,7 +4,7 @@
 use crate::base::interrupt::Interrupt;
 use crate::camera::DistortionModel;
 use crate::identify::effort::Effort;
-use crate::identify::field::StarField;
+use crate::identify::field::{CoarserFields, StarField};
 use crate::identify::fit::{NamingStart, Refined, Start};
 use crate::identify::hypothesis::Problem;
 use crate::identify::identification::{Identification, MIN_STARS, SearchFailure, StarMatch};
@@ -12,7 +12,7 @@ use crate::identify::index::IndexedCatalog;
 use crate::identify::pairing::Pair;
 use crate::identify::priors::Priors;
 use crate::identify::search::{
-    Found, LOG10_FALSE_ALARM_LIMIT, Search, SearchBuffers, Thinning, Tiers,
+    Found, LOG10_FALSE_ALARM_LIMIT, Search, SearchBuffers, SearchPlan, Thinning, Tiers,
 };
 use std::f64::consts::PI;
 
@@ -169,6 +169,17 @@ impl Workspace {
         priors: &Priors,
         sky: &'a IndexedCatalog<'a>,
     ) -> Result<Pointing<'w, 'a>, SearchFailure> {
+        self.find_pointing_with(field, None, priors, sky)
+    }
+
+    /// [`find_pointing`](Self::find_pointing), also from the stars of the frame at lower resolutions.
+    pub(crate) fn find_pointing_with<'w: 'a, 'a>(
+        &'w mut self,
+        field: &'a StarField,
+        coarser: Option<&'a dyn CoarserFields>,
+        priors: &Priors,
+        sky: &'a IndexedCatalog<'a>,
+    ) -> Result<Pointing<'w, 'a>, SearchFailure> {
         #[cfg(debug_assertions)]
         super::planted::panic_if_asked(field);
         if field.stars.len() < MIN_STARS {
@@ -187,22 +198,32 @@ impl Workspace {
             answer,
         } = self;
         let whole = Problem::new(field, sky);
-        let mut search = Search::new(whole, priors, *effort, buffers);
+        let first = match coarser {
+            Some(_) => SearchPlan::quick(*effort),
+            None => SearchPlan::brightest(*effort),
+        };
+        let mut search = Search::new(whole, first, priors, *effort, buffers);
         let mut found = search.run();
         let mut best_log10 = search.best_log10_false_alarm();
         if found.is_none() {
-            let thinned = thinning.thin(field);
-            let thinned = thinned.map(|field| Problem { field, ..whole });
-            let tiers = tiers
-                .below(field, effort.tiers())
-                .iter()
-                .map(|tier| Problem {
-                    field: &tier.field,
+            let of = |field| Problem { field, ..whole };
+            let coarse = coarser.into_iter().flat_map(|coarser| {
+                let fields = (0..coarser.count()).filter_map(|number| coarser.field(number));
+                fields.map(|field| (of(field), SearchPlan::coarse(*effort)))
+            });
+            let votes = SearchPlan::votes(*effort);
+            let of_whole = coarser.map(|_| (whole, votes));
+            let thinned = thinning.thin(field).map(|field| (of(field), votes));
+            let tiers = tiers.below(field, effort.tiers()).iter().map(|tier| {
+                let problem = Problem {
                     brighter: tier.brighter,
-                    ..whole
-                });
-            for problem in thinned.into_iter().chain(tiers) {
-                search = search.again(problem, priors);
+                    ..of(&tier.field)
+                };
+                (problem, SearchPlan::tier(*effort))
+            });
+            let choices = coarse.chain(of_whole).chain(thinned).chain(tiers);
+            for (problem, plan) in choices {
+                search = search.again(problem, plan, priors);
                 found = search.run();
                 let log10 = search.best_log10_false_alarm();
                 best_log10 = [best_log10, log10].into_iter().flatten().reduce(f64::min);

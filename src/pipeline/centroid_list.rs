@@ -205,7 +205,13 @@ pub fn solve_centroids(
     };
     let (list, left_out) = list.usable();
     let field = list.star_field(priors.years_since_j2000());
-    let found = attempt(&field, priors, context, &mut workspace.identify, &mut clock);
+    let found = attempt(
+        (&field, None),
+        priors,
+        context,
+        &mut workspace.identify,
+        &mut clock,
+    );
     let mut outcome = identified(found, None, &field, priors, context.indexed);
     let observation = observation(&outcome, priors);
     let source = |centroid: &ListedCentroid| Source {

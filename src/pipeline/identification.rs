@@ -1,5 +1,6 @@
 //! Identification of a frame's stars, with priors that may be wrong, and the reason where it fails.
 
+use super::coarse_frames::CoarseFrames;
 use super::context::{Context, Workspace};
 use super::outcome::{Outcome, Reason};
 use super::stopwatch::{Stage, Stopwatch};
@@ -10,8 +11,8 @@ use crate::identify::diagnosis::{
     Diagnosis, DoubleImage, Unidentified, diagnose, find_double_image,
 };
 use crate::identify::{
-    Identification, IndexedCatalog, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Photometry, Priors,
-    ScalePrior, SearchFailure, SourceIndex, StarField,
+    CoarserFields, Identification, IndexedCatalog, LOG10_FALSE_ALARM_LIMIT, ObservedStar,
+    Photometry, Priors, ScalePrior, SearchFailure, SourceIndex, StarField,
 };
 use crate::photometry::instrumental_mag;
 use crate::sky::observer::Observation;
@@ -69,12 +70,15 @@ pub(super) fn identify_stars(
         detect: detector,
         ..
     } = workspace;
-    let (mut found, dropped_scale) = search(&field, priors, context, workspace, clock);
+    let (mut found, dropped_scale) = {
+        let coarser = CoarseFrames::new(frame, detector, priors.years_since_j2000());
+        search((&field, &coarser), priors, context, workspace, clock)
+    };
     if found.is_err() && may_be_wide(detections) {
         let is_star = |source: &Detection| source.flags.may_be_wide_star();
         let years = priors.years_since_j2000();
         let wide = field_of(is_star, frame, detections, years);
-        let second = attempt(&wide, &priors.binding(), context, workspace, clock);
+        let second = attempt((&wide, None), &priors.binding(), context, workspace, clock);
         if let Some(second) = second.ok().and_then(at_second_attempt) {
             found = Ok(second);
         }
@@ -169,12 +173,14 @@ type Searched = (Result<Identification, SearchFailure>, Option<ScalePrior>);
 /// Searches for `field`. A scale that is not the user's is tried first and dropped where nothing
 /// matches with it.
 fn search(
-    field: &StarField,
+    (field, coarser): (&StarField, &dyn CoarserFields),
     priors: &Priors,
     context: &Context,
     workspace: &mut identify::Workspace,
     clock: &mut Stopwatch,
 ) -> Searched {
+    // Names are those of detections, and without a whole search there are only those.
+    let field = (field, (!context.attitude_only).then_some(coarser));
     let first = attempt(field, priors, context, workspace, clock);
     let tentative = priors.scale.filter(|scale| !scale.is_binding());
     let (Err(failure), Some(scale)) = (&first, tentative) else {
@@ -190,7 +196,7 @@ fn search(
 
 /// Pointing, then names, each timed; the pointing alone where no more is wanted.
 pub(super) fn attempt(
-    field: &StarField,
+    (field, coarser): (&StarField, Option<&dyn CoarserFields>),
     priors: &Priors,
     context: &Context,
     workspace: &mut identify::Workspace,
@@ -203,7 +209,7 @@ pub(super) fn attempt(
         clock.lap(Stage::Pointing);
         return found.cloned();
     }
-    let pointing = workspace.find_pointing(field, priors, context.indexed);
+    let pointing = workspace.find_pointing_with(field, coarser, priors, context.indexed);
     clock.lap(Stage::Pointing);
     let found = pointing?.name_stars();
     clock.lap(Stage::Naming);

@@ -17,6 +17,7 @@ mod centroid_columns;
 mod centroid_list;
 mod centroid_table;
 mod centroid_text;
+mod coarse_frames;
 mod context;
 mod error;
 mod identification;

@@ -342,12 +342,18 @@ impl fmt::Display for Note {
             Self::LargeResiduals {
                 rms_px,
                 excess_sigma_px,
-            } => write!(
-                f,
-                "the stars lie {rms_px:.1} px (rms) from where they are expected, more than their centroid errors explain: the lens or the spots are not as assumed; the stated errors include {excess_sigma_px:.1} px a star on each axis"
-            ),
+            } => write_residuals(f, *rms_px, *excess_sigma_px),
         }
     }
+}
+
+fn write_residuals(f: &mut fmt::Formatter<'_>, rms_px: f64, excess_sigma_px: f64) -> fmt::Result {
+    write!(
+        f,
+        "the stars lie {rms_px:.1} px (rms) from where they are expected, more than their centroid errors \
+         explain: the lens or the spots are not as assumed; the stated errors include \
+         {excess_sigma_px:.1} px a star on each axis"
+    )
 }
 
 fn write_columns(f: &mut fmt::Formatter<'_>, columns: &[usize]) -> fmt::Result {

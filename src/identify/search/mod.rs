@@ -16,6 +16,7 @@ mod triangle_search;
 mod unseen;
 mod votes;
 
+pub use plan::SearchPlan;
 pub use thinning::Thinning;
 pub use tiers::Tiers;
 pub use triangle_search::{Found, LOG10_FALSE_ALARM_LIMIT, Search, SearchBuffers};

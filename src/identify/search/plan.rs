@@ -48,12 +48,28 @@ impl SearchPlan {
     pub const fn brightest(effort: Effort) -> Self {
         Self {
             passes: &PASSES,
-            ..Self::again(effort)
+            ..Self::votes(effort)
         }
     }
 
-    /// The plan for the brightest stars of each part of the frame, which only vote.
-    pub const fn again(effort: Effort) -> Self {
+    /// The plan for the brightest stars of the frame where others follow: none of them votes.
+    pub const fn quick(effort: Effort) -> Self {
+        Self {
+            votes: &[],
+            ..Self::brightest(effort)
+        }
+    }
+
+    /// The plan for the stars of a coarser frame.
+    pub const fn coarse(effort: Effort) -> Self {
+        Self {
+            max_work: effort.work(WORK_OF_TIER),
+            ..Self::brightest(effort)
+        }
+    }
+
+    /// The plan for stars that only vote: the brightest of each part of the frame.
+    pub const fn votes(effort: Effort) -> Self {
         Self {
             passes: &[],
             votes: &VOTES,
@@ -68,7 +84,7 @@ impl SearchPlan {
         Self {
             votes: &TIER_VOTES,
             max_work: effort.work(WORK_OF_TIER),
-            ..Self::again(effort)
+            ..Self::votes(effort)
         }
     }
 }

@@ -98,6 +98,7 @@ impl<'a> Search<'a> {
     /// A search over `field`.
     pub fn new(
         problem: Problem<'a>,
+        plan: SearchPlan,
         priors: &Priors,
         effort: Effort,
         buffers: &'a mut SearchBuffers,
@@ -113,7 +114,7 @@ impl<'a> Search<'a> {
         };
         Self {
             problem,
-            plan: SearchPlan::brightest(effort),
+            plan,
             effort,
             near: priors.near,
             buffers,
@@ -132,18 +133,11 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The next search, of another choice of stars, whose triangles only vote.
-    pub fn again(self, problem: Problem<'a>, priors: &Priors) -> Self {
-        let plan = if problem.brighter > 0 {
-            SearchPlan::tier(self.effort)
-        } else {
-            SearchPlan::again(self.effort)
-        };
-        let next = Self::new(problem, priors, self.effort, self.buffers);
+    /// The next search, of another choice of stars.
+    pub fn again(self, problem: Problem<'a>, plan: SearchPlan, priors: &Priors) -> Self {
         Self {
             number: self.number + 1,
-            plan,
-            ..next
+            ..Self::new(problem, plan, priors, self.effort, self.buffers)
         }
     }
 
@@ -472,7 +466,7 @@ impl<'a> Search<'a> {
     /// do not show it, those below brighter detections may.
     fn log10_of_agreement(&mut self, field: &StarField, hypothesis: &Hypothesis) -> Option<f64> {
         /// Searches of other choices of stars, before those of the tiers.
-        const BEFORE_TIERS: u32 = 2;
+        const BEFORE_TIERS: u32 = 5;
         let log10 = self.log10_with(hypothesis, TESTED_STARS)?;
         if log10 <= LOG10_FALSE_ALARM_LIMIT {
             return Some(log10);

@@ -1,0 +1,130 @@
+//! The stars of a frame at half and a quarter of its resolution.
+//!
+//! Where structure swamps the stars (city lights, foliage, nebulae, noise of compression), there is
+//! less of it in a coarser frame, and the stars stand out.
+
+use super::identification::star_field;
+use crate::base::coords::PixelPoint;
+use crate::detect::{self, DetectConfig, detect};
+use crate::frame::Frame;
+use crate::identify::{CoarserFields, ObservedStar, StarField};
+use std::cell::{OnceCell, RefCell};
+
+/// Sides of the blocks of pixels that are averaged, the cheapest first.
+const FACTORS: [usize; 2] = [4, 2];
+/// Least side of a coarse frame, in pixels.
+const MIN_SIDE_PX: usize = 64;
+/// Most detections: a search looks at the brightest.
+const MAX_DETECTIONS: usize = 1000;
+
+/// A frame whose stars are detected at a lower resolution, when a search asks for them.
+pub(super) struct CoarseFrames<'a> {
+    frame: &'a Frame<'a>,
+    detector: RefCell<&'a mut detect::Workspace>,
+    years_since_j2000: f64,
+    fields: [OnceCell<Option<StarField>>; FACTORS.len()],
+}
+
+impl<'a> CoarseFrames<'a> {
+    pub fn new(
+        frame: &'a Frame<'a>,
+        detector: &'a mut detect::Workspace,
+        years_since_j2000: f64,
+    ) -> Self {
+        Self {
+            frame,
+            detector: RefCell::new(detector),
+            years_since_j2000,
+            fields: Default::default(),
+        }
+    }
+
+    /// The stars of the frame in blocks of `factor` × `factor` pixels, in pixels of the whole frame.
+    fn detected(&self, factor: usize) -> Option<StarField> {
+        let Self {
+            frame, detector, ..
+        } = self;
+        let mut detector = detector.borrow_mut();
+        let coarse_px = (frame.width / factor) * (frame.height / factor);
+        let bytes = (coarse_px * size_of::<f32>()) as u64;
+        if frame.width.min(frame.height) / factor < MIN_SIDE_PX || !detector.has_room(frame, bytes)
+        {
+            return None;
+        }
+        let coarse = frame.binned(factor);
+        let config = DetectConfig {
+            max_detections: MAX_DETECTIONS,
+            ..DetectConfig::default()
+        };
+        let detections = detect(&coarse, &config, &mut detector).ok()?;
+        let field = star_field(&coarse, &detections, self.years_since_j2000);
+        let scale = factor as f64;
+        // The middle of the first block.
+        let first_px = (scale - 1.0) / 2.0;
+        let enlarged = |star: &ObservedStar| ObservedStar {
+            position: PixelPoint::new(
+                scale * star.position.x + first_px,
+                scale * star.position.y + first_px,
+            ),
+            sigma_px: scale * star.sigma_px,
+            ..*star
+        };
+        Some(StarField {
+            width_px: frame.width as f64,
+            height_px: frame.height as f64,
+            spot_sigma_px: field.spot_sigma_px.map(|sigma_px| scale * sigma_px),
+            stars: field.stars.iter().map(enlarged).collect(),
+            ..field
+        })
+    }
+}
+
+impl CoarserFields for CoarseFrames<'_> {
+    fn count(&self) -> usize {
+        FACTORS.len()
+    }
+
+    fn field(&self, number: usize) -> Option<&StarField> {
+        self.fields[number]
+            .get_or_init(|| self.detected(FACTORS[number]))
+            .as_ref()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stars_of_coarser_frames_are_where_they_are_in_the_frame() {
+        let stars = [[60.3, 210.7], [151.0, 80.0], [250.5, 250.25]];
+        let light = |x: usize, y: usize| {
+            let noise = ((x * 7919 + y * 104_729) % 101) as f64 * 0.1;
+            let of_star = |[sx, sy]: [f64; 2]| {
+                let distance = (x as f64 - sx).hypot(y as f64 - sy);
+                3000.0 * (-distance * distance / 8.0).exp()
+            };
+            (noise + stars.into_iter().map(of_star).sum::<f64>()) as f32
+        };
+        let pixels = (0..300 * 320).map(|i| light(i % 320, i / 320)).collect();
+        let frame = Frame::new(320, 300, pixels).unwrap();
+        let mut detector = detect::Workspace::new();
+        let coarser = CoarseFrames::new(&frame, &mut detector, 0.0);
+        for number in 0..coarser.count() {
+            let field = coarser.field(number).unwrap();
+            assert_eq!((field.width_px, field.height_px), (320.0, 300.0));
+            for [x, y] in stars {
+                let place = PixelPoint::new(x, y);
+                let off = |star: &ObservedStar| star.position.distance_to(&place);
+                assert!(field.stars[..3].iter().any(|star| off(star) < 0.3));
+            }
+        }
+        let small = Frame::new(100, 400, vec![0.0; 40_000]).unwrap();
+        let mut detector = detect::Workspace::new();
+        assert!(
+            CoarseFrames::new(&small, &mut detector, 0.0)
+                .field(0)
+                .is_none()
+        );
+    }
+}
