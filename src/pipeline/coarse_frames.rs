@@ -3,7 +3,7 @@
 //! Where structure swamps the stars (city lights, foliage, nebulae, noise of compression), there is
 //! less of it in a coarser frame, and the stars stand out.
 
-use super::identification::star_field;
+use super::star_field::star_field;
 use crate::base::coords::PixelPoint;
 use crate::detect::{self, DetectConfig, detect};
 use crate::frame::Frame;

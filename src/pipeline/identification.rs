@@ -3,6 +3,7 @@
 use super::coarse_frames::CoarseFrames;
 use super::context::{Context, Workspace};
 use super::outcome::{Outcome, Reason};
+use super::star_field::{field_of, star_field};
 use super::stopwatch::{Stage, Stopwatch};
 use crate::detect::{self, DetectConfig, Detection, Detections, detect};
 use crate::frame::Frame;
@@ -11,48 +12,11 @@ use crate::identify::diagnosis::{
     Diagnosis, DoubleImage, Unidentified, diagnose, find_double_image,
 };
 use crate::identify::{
-    CoarserFields, Identification, IndexedCatalog, LOG10_FALSE_ALARM_LIMIT, ObservedStar,
-    Photometry, Priors, ScalePrior, SearchFailure, SourceIndex, StarField,
+    CoarserFields, Identification, IndexedCatalog, LOG10_FALSE_ALARM_LIMIT, Priors, ScalePrior,
+    SearchFailure, SourceIndex, StarField,
 };
-use crate::photometry::instrumental_mag;
 use crate::sky::observer::Observation;
 use std::collections::HashSet;
-
-/// The detections that may be stars, as identification takes them.
-pub fn star_field(frame: &Frame, detections: &Detections, years_since_j2000: f64) -> StarField {
-    let is_star = |source: &Detection| source.flags.is_star_like();
-    field_of(is_star, frame, detections, years_since_j2000)
-}
-
-/// The detections for which `is_star` holds, as identification takes them.
-fn field_of(
-    is_star: impl Fn(&Detection) -> bool,
-    frame: &Frame,
-    detections: &Detections,
-    years_since_j2000: f64,
-) -> StarField {
-    let sources = detections.sources.iter().enumerate();
-    let stars = sources
-        .filter(|(_, source)| is_star(source) && source.flux_adu > 0.0)
-        .map(|(index, source)| {
-            let variance_px2 = (source.sigma_x_px.powi(2) + source.sigma_y_px.powi(2)) / 2.0;
-            ObservedStar {
-                source: SourceIndex::new(index),
-                position: source.position,
-                sigma_px: variance_px2.sqrt(),
-                mag: instrumental_mag(source.flux_adu),
-                is_saturated: source.flags.saturated,
-            }
-        });
-    StarField {
-        width_px: frame.width as f64,
-        height_px: frame.height as f64,
-        photometry: Photometry::Instrumental,
-        years_since_j2000,
-        spot_sigma_px: Some(detections.spot_sigma_px),
-        stars: stars.collect(),
-    }
-}
 
 /// Identifies the stars of a frame. Also returns the scale that was dropped because nothing matched
 /// with it.

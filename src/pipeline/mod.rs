@@ -30,6 +30,7 @@ mod raw_color;
 mod solution;
 mod solve;
 mod solved;
+mod star_field;
 mod stopwatch;
 
 pub use body_in_frame::BodyInFrame;
@@ -44,7 +45,6 @@ pub use context::{Context, Workspace};
 pub use error::Error;
 #[doc(hidden)]
 pub use error::remedies_of;
-pub use identification::star_field;
 pub use left_out::{LeftOut, RowProblem};
 pub use note::Note;
 pub use options::SolveOptions;
@@ -54,4 +54,5 @@ pub use solution::{Background, Measured, Solution, Source};
 pub use solve::{solve_file, solve_frame};
 #[doc(hidden)]
 pub use solve::{solve_guarded, solve_read};
+pub use star_field::star_field;
 pub use stopwatch::Timing;

@@ -3,13 +3,14 @@
 use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
 use super::error::Error;
-use super::identification::{double_image, identify_stars, observation, star_field};
+use super::identification::{double_image, identify_stars, observation};
 use super::note::Note;
 use super::outcome::{Outcome, Reason};
 use super::prepared::Prepared;
 use super::raw_color::RawColor;
 use super::solution::{Solution, Source};
 use super::solved::SolvedFrame;
+use super::star_field::star_field;
 use super::stopwatch::{Stage, Stopwatch, Timing};
 use crate::base::panics::caught;
 use crate::calibration::Calibration;

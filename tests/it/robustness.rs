@@ -134,7 +134,7 @@ fn a_wrong_pointing_is_a_wrong_answer_and_a_wrong_name_is_counted() {
 #[test]
 fn the_standard_table_is_right_and_the_same_on_any_number_of_threads() {
     let table = |threads: &str| {
-        let mut rows = rows(&["--count", "60", "--threads", threads]);
+        let mut rows = rows(&["--count", "40", "--threads", threads]);
         for row in &mut rows {
             let row = row.as_object_mut().unwrap();
             row.remove("median_ms").unwrap();
@@ -144,17 +144,23 @@ fn the_standard_table_is_right_and_the_same_on_any_number_of_threads() {
     };
     let rows = table("1");
     assert_eq!(rows, table("3"));
-    assert_eq!(rows.len(), 12);
+    assert_eq!(rows.len(), 17);
     for row in &rows {
-        assert_eq!(row["trials"], 60);
+        assert_eq!(row["trials"], 40);
         assert_eq!(row["wrong_of_all"], 0, "{row}");
         let [counted, right, none] =
             ["counted", "right", "no_answer"].map(|name| row[name].as_u64().unwrap());
         assert_eq!(counted, right + none, "{row}");
-        // At a rate of 99.5 %, more than three of sixty trials fail once in five thousand runs.
-        assert!(none <= 3, "{row}");
+        // At a rate of 99.5 %, more than three of forty trials fail once in twenty thousand runs. Below
+        // 200 brighter false stars the rate is three in four.
+        let most = if row["bright_false_stars"] == 200 {
+            25
+        } else {
+            3
+        };
+        assert!(none <= most, "{row}");
         let expects_stars = row["case"] != "no true star at all";
-        assert_eq!(counted > 30, expects_stars, "{row}");
+        assert_eq!(counted > 20, expects_stars, "{row}");
     }
 }
 

@@ -1,0 +1,42 @@
+//! The stars of a frame, as identification takes them.
+
+use crate::detect::{Detection, Detections};
+use crate::frame::Frame;
+use crate::identify::{ObservedStar, Photometry, SourceIndex, StarField};
+use crate::photometry::instrumental_mag;
+
+/// The detections that may be stars, as identification takes them.
+pub fn star_field(frame: &Frame, detections: &Detections, years_since_j2000: f64) -> StarField {
+    let is_star = |source: &Detection| source.flags.is_star_like();
+    field_of(is_star, frame, detections, years_since_j2000)
+}
+
+/// The detections for which `is_star` holds, as identification takes them.
+pub(super) fn field_of(
+    is_star: impl Fn(&Detection) -> bool,
+    frame: &Frame,
+    detections: &Detections,
+    years_since_j2000: f64,
+) -> StarField {
+    let sources = detections.sources.iter().enumerate();
+    let stars = sources
+        .filter(|(_, source)| is_star(source) && source.flux_adu > 0.0)
+        .map(|(index, source)| {
+            let variance_px2 = (source.sigma_x_px.powi(2) + source.sigma_y_px.powi(2)) / 2.0;
+            ObservedStar {
+                source: SourceIndex::new(index),
+                position: source.position,
+                sigma_px: variance_px2.sqrt(),
+                mag: instrumental_mag(source.flux_adu),
+                is_saturated: source.flags.saturated,
+            }
+        });
+    StarField {
+        width_px: frame.width as f64,
+        height_px: frame.height as f64,
+        photometry: Photometry::Instrumental,
+        years_since_j2000,
+        spot_sigma_px: Some(detections.spot_sigma_px),
+        stars: stars.collect(),
+    }
+}
