@@ -2,6 +2,7 @@
 
 use super::peak::{Peak, highest_first};
 use super::search_config::SearchConfig;
+use multiversion::multiversion;
 
 /// Minimum prominence of a peak that is not the highest of its region.
 struct MinProminence;
@@ -33,9 +34,6 @@ const WING_REACH_PX: usize = 64;
 /// Wings lower than this, in units of the noise, are neglected.
 const MIN_WING_SNR: f32 = 0.1;
 
-/// No peak.
-const NONE: u32 = u32::MAX;
-
 /// Buffers of the selection. Bright peaks are sorted into the cells of a grid, so that only those
 /// nearby are considered.
 #[derive(Debug, Clone, Default)]
@@ -66,7 +64,7 @@ impl Selection {
             if !is_highest && peak.prominence < MinProminence::of(peak) {
                 continue;
             }
-            if self.cells.explain(peak, &self.kept, config) {
+            if self.cells.explain(peak, config) {
                 continue;
             }
             if self.kept.len() >= config.max_peaks {
@@ -80,17 +78,28 @@ impl Selection {
     }
 }
 
-/// The kept peaks in the cells of a grid.
+/// The bright ones of the kept peaks, in the cells of a grid.
 #[derive(Debug, Clone, Default)]
 struct WingCells {
     across: usize,
     down: usize,
-    /// The last of the kept peaks in each cell, or [`NONE`].
-    last: Vec<u32>,
+    /// Where the peaks of each cell start in `sources`: there is room for all of them.
+    starts: Vec<u32>,
+    /// Number of peaks in each cell so far.
+    counts: Vec<u32>,
     /// Sum of the heights of the peaks in each cell.
     height: Vec<f32>,
-    /// For each kept peak the one before it in its cell, or [`NONE`].
-    previous: Vec<u32>,
+    /// Cell by cell.
+    sources: Vec<WingSource>,
+}
+
+/// A peak that has a wing.
+#[derive(Debug, Clone, Copy, Default)]
+struct WingSource {
+    x: f32,
+    y: f32,
+    /// Maximum height, in units of the noise.
+    height: f32,
 }
 
 impl WingCells {
@@ -99,11 +108,25 @@ impl WingCells {
         let cells = peaks.iter().map(Self::cell_of);
         (self.across, self.down) =
             cells.fold((1, 1), |(w, h), (x, y)| (w.max(x + 1), h.max(y + 1)));
-        self.previous.clear();
-        self.last.clear();
-        self.last.resize(self.across * self.down, NONE);
+        let cells = self.across * self.down;
+        for numbers in [&mut self.starts, &mut self.counts] {
+            numbers.clear();
+            numbers.resize(cells, 0);
+        }
         self.height.clear();
-        self.height.resize(self.across * self.down, 0.0);
+        self.height.resize(cells, 0.0);
+        let mut end = 0;
+        let bright = || peaks.iter().filter(|peak| has_wing(peak));
+        for peak in bright() {
+            let cell = self.index_of(peak);
+            self.starts[cell] += 1;
+            end += 1;
+        }
+        self.sources.resize(end as usize, WingSource::default());
+        for start in self.starts.iter_mut().rev() {
+            end -= *start;
+            *start = end;
+        }
     }
 
     /// Column and row of the cell of a peak.
@@ -111,10 +134,16 @@ impl WingCells {
         (peak.x / WING_REACH_PX, peak.y / WING_REACH_PX)
     }
 
-    /// Whether the wings of the `kept` peaks may lift noise to the height of `peak`.
-    fn explain(&self, peak: &Peak, kept: &[Peak], config: &SearchConfig) -> bool {
+    /// The cell of a peak, as its index.
+    fn index_of(&self, peak: &Peak) -> usize {
+        let (column, row) = Self::cell_of(peak);
+        row * self.across + column
+    }
+
+    /// Whether the wings of the kept peaks may lift noise to the height of `peak`.
+    fn explain(&self, peak: &Peak, config: &SearchConfig) -> bool {
         let (cx, cy) = Self::cell_of(peak);
-        let near = (cy.saturating_sub(1)..(cy + 2).min(self.down)).flat_map(|row| {
+        let mut near = (cy.saturating_sub(1)..(cy + 2).min(self.down)).flat_map(|row| {
             let columns = cx.saturating_sub(1)..(cx + 2).min(self.across);
             columns.map(move |column| row * self.across + column)
         });
@@ -123,37 +152,58 @@ impl WingCells {
         if peak.snr >= config.threshold + WING_HEIGHT * heights {
             return false;
         }
+        let per_wing_px = 1.0 / (4.0 * config.spot_width_px);
+        let place = [peak.x as f32, peak.y as f32];
         let mut wings = 0.0;
-        for cell in near {
-            let mut other = self.last[cell];
-            while let Some(brighter) = kept.get(other as usize) {
-                wings += wing_of(brighter, peak, config);
-                other = self.previous[other as usize];
-            }
-        }
-        peak.snr < config.threshold + wings
+        near.any(|cell| {
+            let start = self.starts[cell] as usize;
+            let sources = &self.sources[start..start + self.counts[cell] as usize];
+            wings += wings_at(place, sources, per_wing_px);
+            peak.snr < config.threshold + wings
+        })
     }
 
     /// Adds the next kept peak; only bright peaks enter a cell.
     fn add(&mut self, peak: &Peak) {
-        let mut previous = NONE;
-        if peak.snr * WING_HEIGHT > MIN_WING_SNR {
-            let (cx, cy) = Self::cell_of(peak);
-            let cell = cy * self.across + cx;
-            let number = self.previous.len() as u32;
-            previous = std::mem::replace(&mut self.last[cell], number);
-            self.height[cell] += height_of(peak);
+        if !has_wing(peak) {
+            return;
         }
-        self.previous.push(previous);
+        let cell = self.index_of(peak);
+        let height = height_of(peak);
+        self.sources[(self.starts[cell] + self.counts[cell]) as usize] = WingSource {
+            x: peak.x as f32,
+            y: peak.y as f32,
+            height,
+        };
+        self.counts[cell] += 1;
+        self.height[cell] += height;
     }
 }
 
-/// Maximum height of the wing of `bright` at `peak`, in units of the noise.
-fn wing_of(bright: &Peak, peak: &Peak, config: &SearchConfig) -> f32 {
-    let dx = bright.x as f32 - peak.x as f32;
-    let dy = bright.y as f32 - peak.y as f32;
-    let distance = (dx * dx + dy * dy).sqrt() / (4.0 * config.spot_width_px);
-    WING_HEIGHT * height_of(bright) / (1.0 + distance.powi(3))
+/// Whether the wing of a peak may lift noise.
+fn has_wing(peak: &Peak) -> bool {
+    peak.snr * WING_HEIGHT > MIN_WING_SNR
+}
+
+/// Maximum height of the wings of peaks at a place, in units of the noise.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn wings_at([x, y]: [f32; 2], sources: &[WingSource], per_wing_px: f32) -> f32 {
+    /// Peaks treated together.
+    const TOGETHER: usize = 8;
+    let wing_of = |source: &WingSource| {
+        let [dx, dy] = [source.x - x, source.y - y];
+        let distance = (dx * dx + dy * dy).sqrt() * per_wing_px;
+        WING_HEIGHT * source.height / (1.0 + distance * distance * distance)
+    };
+    let (chunks, rest) = sources.as_chunks::<TOGETHER>();
+    let mut sums = [0.0; TOGETHER];
+    for chunk in chunks {
+        for (sum, source) in sums.iter_mut().zip(chunk) {
+            *sum += wing_of(source);
+        }
+    }
+    let of_rest: f32 = rest.iter().map(wing_of).sum();
+    sums.iter().sum::<f32>() + of_rest
 }
 
 /// Maximum height of a peak, in units of the noise: a saturated core hides some of it.

@@ -94,9 +94,27 @@ impl Fitter {
                 StepOutcome::Failed => break,
             }
         }
-        fit.spots = start.iter().copied().collect();
-        fit.background = 0.0;
-        fit.spot_px = config.spot_px;
+        self.unfitted_up_to::<N>(window, start, config)
+    }
+
+    /// The initial guess of a spot that cannot be fitted, with the standard errors for these
+    /// parameters.
+    pub fn unfitted(&mut self, window: &Window, start: SpotEstimate, config: &FitConfig) -> Fit {
+        self.unfitted_up_to::<ONE_SPOT>(window, &[start], config)
+    }
+
+    /// [`Self::unfitted`] of several spots with at most `N` parameters.
+    fn unfitted_up_to<const N: usize>(
+        &mut self,
+        window: &Window,
+        start: &[SpotEstimate],
+        config: &FitConfig,
+    ) -> Fit {
+        let mut fit = Fit {
+            spots: start.iter().copied().collect(),
+            spot_px: config.spot_px,
+            ..Fit::default()
+        };
         let mut normal: NormalEquations<N> = self.linearise(window, &fit, config);
         let known = if normal.pixels > 0 {
             normal.factorise(3 * start.len() + 2)

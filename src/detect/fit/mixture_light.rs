@@ -2,8 +2,9 @@
 
 use super::light::{GroupLight, SpotLight};
 use super::window::Window;
+use crate::base::size::Size;
 use crate::detect::psf::{
-    DrawBuffers, GROUP_PX, LitPart, NarrowProfiles, PixelGroup, ShareGroup, each,
+    DrawBuffers, GROUP_PX, LitPart, LocalPsf, NarrowProfiles, PixelGroup, ShareGroup, each,
 };
 use multiversion::multiversion;
 
@@ -26,30 +27,19 @@ impl MixtureImage {
         self.groups
             .resize(width * window.height, [[0.0; GROUP_PX]; 4]);
         let scale = spot_px / psf.spot_px;
-        let corner = [window.x0, window.y0].map(|at| at as f64);
+        let place_px = [x_px - window.x0 as f64, y_px - window.y0 as f64];
         let size = window.size();
-        if !psf.table.is_empty() {
-            let place = [x_px - corner[0], y_px - corner[1]];
+        if psf.table.is_empty() {
+            let window = LobeWindow {
+                place_px,
+                scale,
+                size,
+            };
+            draw_lobes(psf, &window, &mut self.profiles, &mut self.groups);
+        } else {
             let sizes = [psf.spot_px, scale];
             psf.table
-                .draw(place, size, sizes, &mut self.buffers, &mut self.groups);
-            return;
-        }
-        for lobe in &psf.lobes {
-            let [dx, dy] = lobe.offset_px;
-            let place = [x_px - corner[0] + scale * dx, y_px - corner[1] + scale * dy];
-            let part = self.profiles.fill(place, scale * lobe.sigma_px, size);
-            // What a larger spot moves, and widens, its lobes by.
-            let by_spot = [dx, dy, lobe.sigma_px].map(|part| (part / psf.spot_px) as f32);
-            let share = lobe.share as f32;
-            add_lobe(
-                share,
-                by_spot,
-                &self.profiles,
-                part,
-                &mut self.groups,
-                width,
-            );
+                .draw(place_px, size, sizes, &mut self.buffers, &mut self.groups);
         }
     }
 
@@ -63,12 +53,47 @@ impl MixtureImage {
     }
 }
 
+/// Where a spot is drawn.
+#[derive(Debug, Clone, Copy)]
+struct LobeWindow {
+    /// The spot in the window, in pixels.
+    place_px: [f64; 2],
+    /// Its size over that of the PSF.
+    scale: f64,
+    /// Of the window.
+    size: Size,
+}
+
+/// Adds the lobes of a PSF to the pixels of a window.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn draw_lobes(
+    psf: &LocalPsf,
+    window: &LobeWindow,
+    profiles: &mut NarrowProfiles,
+    into: &mut [ShareGroup],
+) {
+    let LobeWindow {
+        place_px: [x_px, y_px],
+        scale,
+        size,
+    } = *window;
+    let width = size.width.div_ceil(GROUP_PX);
+    for lobe in &psf.lobes {
+        let [dx, dy] = lobe.offset_px;
+        let place = [x_px + scale * dx, y_px + scale * dy];
+        let part = profiles.fill(place, scale * lobe.sigma_px, size);
+        // What a larger spot moves, and widens, its lobes by.
+        let by_spot = [dx, dy, lobe.sigma_px].map(|part| (part / psf.spot_px) as f32);
+        add_lobe(lobe.share as f32, by_spot, profiles, part, into, width);
+    }
+}
+
 /// Adds a lobe to the rows of `width` groups.
 #[allow(
     clippy::needless_range_loop,
     reason = "lanes of several arrays read best as indices"
 )]
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+#[inline(always)]
 fn add_lobe(
     share: f32,
     by_spot: [f32; 3],

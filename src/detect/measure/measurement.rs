@@ -139,7 +139,9 @@ impl Measurement<'_> {
         let config = self.fit_config();
         batch.fit(&self.maps, starts, &config, |index, fit, window| {
             fits.window.copy_from(window);
-            self.measure(&surroundings(index), fit, fits, detections);
+            let unfitted = || fits.fitter.unfitted(window, spots[index], &config);
+            let fit = fit.unwrap_or_else(unfitted);
+            self.measure(&surroundings(index), Some(fit), fits, detections);
         });
         fits.batch = batch;
     }

@@ -90,6 +90,9 @@ pub(crate) struct NarrowProfiles {
 
 impl NarrowProfiles {
     /// Computes the profiles of a spot at a place in a window of this size.
+    ///
+    /// Part of the loop over the lobes, so that the processor computes several at once.
+    #[inline(always)]
     pub fn fill(&mut self, [x_px, y_px]: [f64; 2], sigma_px: f64, size: Size) -> LitPart {
         /// Less than 10⁻⁵ of the light is beyond this many standard deviations of a pixel's edge.
         const REACH_SIGMAS: f64 = 4.5;
@@ -104,10 +107,11 @@ impl NarrowProfiles {
         let [columns, rows] = [range(x_px, size.width), range(y_px, size.height)];
         let groups = [columns[0] / GROUP_PX, columns[1].div_ceil(GROUP_PX)];
         let first = groups[0] * GROUP_PX;
-        let count = (groups[1] * GROUP_PX).min(size.width).saturating_sub(first);
-        fill_narrow(&mut self.across, x_px - first as f64, sigma_px, count);
+        let cumulative = Cumulative::of_spot(sigma_px);
+        let count = columns[1].saturating_sub(first);
+        fill_narrow(&mut self.across, x_px - first as f64, &cumulative, count);
         let count = rows[1].saturating_sub(rows[0]);
-        fill_narrow(&mut self.down, y_px - rows[0] as f64, sigma_px, count);
+        fill_narrow(&mut self.down, y_px - rows[0] as f64, &cumulative, count);
         LitPart { groups, rows }
     }
 
@@ -222,63 +226,53 @@ fn fill(profile: &mut AxisProfile, center_px: f64, sigma_px: f64, count: usize) 
 }
 
 /// The same as [`fill`] in single precision, for the lobes of a mixture: an error of 10⁻⁶ of a lobe's
-/// light.
-fn fill_narrow(profile: &mut AxisProfile, center_px: f64, sigma_px: f64, count: usize) {
-    /// Groups of pixels that nearly all lobes need.
-    const FEW: usize = 2;
-    let cumulative = Cumulative::of_spot(sigma_px);
-    let count = count.min(MAX_WINDOW_PX);
-    if count <= FEW * GROUP_PX {
-        fill_groups::<{ FEW + 1 }>(profile, center_px as f32, &cumulative, count);
-    } else {
-        fill_groups::<{ GROUPS + 1 }>(profile, center_px as f32, &cumulative, count);
+/// light. The pixels that fill the last group are there as well, the last of them roughly.
+#[inline(always)]
+fn fill_narrow(profile: &mut AxisProfile, center_px: f64, cumulative: &Cumulative, count: usize) {
+    /// Beyond the light.
+    const END: [PixelGroup; 3] = [[0.5; GROUP_PX], [0.0; GROUP_PX], [0.0; GROUP_PX]];
+    let mut edges = edges_of_group(cumulative, -0.5 - center_px as f32);
+    for group in 0..count.div_ceil(GROUP_PX).min(GROUPS) {
+        let next = (group + 1) * GROUP_PX;
+        let after = if next <= count {
+            edges_of_group(cumulative, next as f32 - 0.5 - center_px as f32)
+        } else {
+            END
+        };
+        profile.value[group] = between(&edges[0], &after[0]);
+        profile.by_center[group] = between(&edges[1], &after[1]);
+        profile.by_sigma[group] = between(&edges[2], &after[2]);
+        edges = after;
     }
 }
 
-/// [`fill_narrow`] with edges of pixels in at most `N` groups.
-#[allow(
-    clippy::needless_range_loop,
-    reason = "lanes of several arrays read best as indices"
-)]
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn fill_groups<const N: usize>(
-    profile: &mut AxisProfile,
-    center_px: f32,
-    cumulative: &Cumulative,
-    count: usize,
-) {
+/// [`Cumulative::at`] in single precision at edges of pixels, the first of which is at a distance from
+/// the centre in pixels.
+#[inline(always)]
+fn edges_of_group(cumulative: &Cumulative, first_px: f32) -> [PixelGroup; 3] {
     let [scale, density, by_sigma] =
         [cumulative.scale, cumulative.density, cumulative.by_sigma].map(|v| v as f32);
-    let mut edges = [[[0.0f32; GROUP_PX]; N]; 3];
-    let [erfs, densities, moments] = &mut edges;
-    for group in 0..(count / GROUP_PX + 1).min(N) {
-        let start = (group * GROUP_PX) as f32 - 0.5 - center_px;
-        let mut at = [[0.0f32; GROUP_PX]; 3];
-        for lane in 0..GROUP_PX {
-            let distance_px = start + lane as i32 as f32;
-            let (erf, gauss) = erf_and_gauss_single(distance_px * scale);
-            at[0][lane] = 0.5 * erf;
-            at[1][lane] = -gauss * density;
-            at[2][lane] = -distance_px * gauss * by_sigma;
-        }
-        [erfs[group], densities[group], moments[group]] = at;
+    let mut at = [[0.0f32; GROUP_PX]; 3];
+    for lane in 0..GROUP_PX {
+        let distance_px = first_px + lane as i32 as f32;
+        let (erf, gauss) = erf_and_gauss_single(distance_px * scale);
+        at[0][lane] = 0.5 * erf;
+        at[1][lane] = -gauss * density;
+        at[2][lane] = -distance_px * gauss * by_sigma;
     }
-    let results = [
-        &mut profile.value,
-        &mut profile.by_center,
-        &mut profile.by_sigma,
-    ];
-    for (result, edges) in results.into_iter().zip(&edges) {
-        let edges = edges.as_flattened();
-        for group in 0..count.div_ceil(GROUP_PX).min(N - 1) {
-            let edges: [f32; GROUP_PX + 1] = std::array::from_fn(|i| edges[group * GROUP_PX + i]);
-            let mut pixels = [0.0; GROUP_PX];
-            for lane in 0..GROUP_PX {
-                pixels[lane] = edges[lane + 1] - edges[lane];
-            }
-            result[group] = pixels;
-        }
+    at
+}
+
+/// Differences of the values at the edges of a group of pixels, of which the last edge is the first of
+/// those `after`.
+#[inline(always)]
+fn between(edges: &PixelGroup, after: &PixelGroup) -> PixelGroup {
+    let [_, b, c, d, e, f, g, h] = *edges;
+    let mut pixels = [b, c, d, e, f, g, h, after[0]];
+    for (pixel, edge) in pixels.iter_mut().zip(edges) {
+        *pixel -= edge;
     }
+    pixels
 }
 
 /// Cumulative light along an axis at evenly spaced places, less one half, in single precision.

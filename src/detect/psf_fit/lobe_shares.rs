@@ -1,6 +1,7 @@
 //! The weights of the mixture: non-negative least squares over the pixels of all stars.
 
 use super::stars::{PsfStar, StarFitter};
+use crate::base::size::Size;
 use crate::detect::fit::{BLOCK, Block, products_of};
 use crate::detect::psf::{
     EffectivePsf, FieldForm, FieldLobe, GROUP_PX, LitPart, Lobe, LocalPsf, NarrowProfiles,
@@ -281,19 +282,15 @@ impl LobeImages {
         let empty = [[0.0; GROUP_PX]; BLOCK];
         self.light.resize(count / BLOCK * pixels, empty);
         let flux = (spot.flux / window.noise_adu) as f32;
-        for (lobe, &image) in local.lobes.iter().zip(&classes.of_lobes) {
-            let place = [
-                spot.x + lobe.offset_px[0] - window.x0 as f64,
-                spot.y + lobe.offset_px[1] - window.y0 as f64,
-            ];
-            let part = self.profiles.fill(place, lobe.sigma_px, window.size());
-            let [first, end] = &mut self.rows[image];
-            (*first, *end) = ((*first).min(part.rows[0]), (*end).max(part.rows[1]));
-            let block = &mut self.light[image / BLOCK * pixels..][..pixels];
-            let image = image % BLOCK;
-            let (profiles, roots) = (&self.profiles, &self.roots);
-            add_weighted_lobe(flux, profiles, part, block, roots, image, self.width);
-        }
+        let place = [spot.x - window.x0 as f64, spot.y - window.y0 as f64];
+        draw_weighted_lobes(
+            self,
+            flux,
+            &local.lobes,
+            &classes.of_lobes,
+            place,
+            window.size(),
+        );
     }
 
     /// The groups of two blocks, in the rows in which both have light.
@@ -313,9 +310,38 @@ impl LobeImages {
     }
 }
 
+/// Adds lobes to the images that they are a part of, with a spot at this place in a window of this size.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn draw_weighted_lobes(
+    images: &mut LobeImages,
+    flux: f32,
+    lobes: &[Lobe],
+    of_lobes: &[usize],
+    [x_px, y_px]: [f64; 2],
+    size: Size,
+) {
+    let LobeImages {
+        light,
+        rows,
+        width,
+        roots,
+        profiles,
+        ..
+    } = images;
+    let pixels = roots.len();
+    for (lobe, &image) in lobes.iter().zip(of_lobes) {
+        let [dx, dy] = lobe.offset_px;
+        let part = profiles.fill([x_px + dx, y_px + dy], lobe.sigma_px, size);
+        let [first, end] = &mut rows[image];
+        (*first, *end) = ((*first).min(part.rows[0]), (*end).max(part.rows[1]));
+        let block = &mut light[image / BLOCK * pixels..][..pixels];
+        add_weighted_lobe(flux, profiles, part, block, roots, image % BLOCK, *width);
+    }
+}
+
 /// Adds a lobe to the image of this number of a block, in rows of `width` groups, times the square
 /// roots of the weights.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+#[inline(always)]
 fn add_weighted_lobe(
     flux: f32,
     profiles: &NarrowProfiles,

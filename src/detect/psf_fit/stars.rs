@@ -1,5 +1,6 @@
 //! The bright stars that tell the PSF, fitted with a size and an elongation of their own.
 
+use crate::base::size::Size;
 use crate::base::statistics::median;
 use crate::detect::candidates::Peak;
 use crate::detect::fit::{
@@ -7,7 +8,7 @@ use crate::detect::fit::{
     sum_of,
 };
 use crate::detect::psf::{
-    DrawBuffers, EffectivePsf, FieldFrame, FieldMoments, GROUP_PX, LitPart, LocalPsf,
+    DrawBuffers, EffectivePsf, FieldFrame, FieldMoments, GROUP_PX, LitPart, Lobe, LocalPsf,
     NarrowProfiles, PixelGroup, ShareGroup, SpotMoments, covariance_by, stretch_by,
 };
 use crate::detect::star_model::isolated_peaks;
@@ -157,36 +158,14 @@ impl StarFitter {
         } = self;
         let PsfStar { window, spot, .. } = star;
         psf.at(spot.x, spot.y, local);
-        let here = psf.moments.at(spot.x, spot.y);
-        let stretches = stretch_by(here);
-        // A single lobe widens itself; those of a mixture move, and widen with the size only.
-        let widening_of = |sigma_px: f64| {
-            let wider = 2.0 * sigma_px * sigma_px;
-            [[wider, wider, 0.0], [0.0; 3], [0.0; 3]]
-        };
-        let of_single = (local.lobes.len() == 1).then(|| covariance_by(here));
-        let width = window.groups();
         shares.clear();
-        shares.resize(width * window.height, [[0.0; GROUP_PX]; 6]);
-        for lobe in &local.lobes {
-            let [dx, dy] = lobe.offset_px;
-            let place = [
-                spot.x + dx - window.x0 as f64,
-                spot.y + dy - window.y0 as f64,
-            ];
-            let part = profiles.fill(place, lobe.sigma_px, window.size());
-            let share = lobe.share as f32;
-            if N < PARAMETERS {
-                add_still_lobe(share, profiles, part, shares, width);
-                continue;
-            }
-            let widening = of_single.unwrap_or_else(|| widening_of(lobe.sigma_px));
-            let changes = LobeChanges {
-                per_sigma: (1.0 / lobe.sigma_px) as f32,
-                moves: stretches.map(|rows| rows.map(|[a, b]| (a * dx + b * dy) as f32)),
-                widening: widening.map(|of_moment| of_moment.map(|change| change as f32)),
-            };
-            add_lobe_with_moments(share, &changes, profiles, part, shares, width);
+        shares.resize(window.groups() * window.height, [[0.0; GROUP_PX]; 6]);
+        let place = [spot.x - window.x0 as f64, spot.y - window.y0 as f64];
+        if N < PARAMETERS {
+            draw_still_lobes(&local.lobes, place, window.size(), profiles, shares);
+        } else {
+            let here = psf.moments.at(spot.x, spot.y);
+            draw_lobes(&local.lobes, here, place, window.size(), profiles, shares);
         }
     }
 
@@ -319,12 +298,60 @@ struct LobeChanges {
     widening: [[f32; 3]; 3],
 }
 
+/// Adds lobes that have these moments to the pixels of a window, with a spot at this place.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn draw_lobes(
+    lobes: &[Lobe],
+    moments: SpotMoments,
+    [x_px, y_px]: [f64; 2],
+    size: Size,
+    profiles: &mut NarrowProfiles,
+    into: &mut [MomentShares],
+) {
+    let stretches = stretch_by(moments);
+    // A single lobe widens itself; those of a mixture move, and widen with the size only.
+    let widening_of = |sigma_px: f64| {
+        let wider = 2.0 * sigma_px * sigma_px;
+        [[wider, wider, 0.0], [0.0; 3], [0.0; 3]]
+    };
+    let of_single = (lobes.len() == 1).then(|| covariance_by(moments));
+    let width = size.width.div_ceil(GROUP_PX);
+    for lobe in lobes {
+        let [dx, dy] = lobe.offset_px;
+        let part = profiles.fill([x_px + dx, y_px + dy], lobe.sigma_px, size);
+        let widening = of_single.unwrap_or_else(|| widening_of(lobe.sigma_px));
+        let changes = LobeChanges {
+            per_sigma: (1.0 / lobe.sigma_px) as f32,
+            moves: stretches.map(|rows| rows.map(|[a, b]| (a * dx + b * dy) as f32)),
+            widening: widening.map(|of_moment| of_moment.map(|change| change as f32)),
+        };
+        add_lobe_with_moments(lobe.share as f32, &changes, profiles, part, into, width);
+    }
+}
+
+/// The same without the derivatives with respect to the moments.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn draw_still_lobes(
+    lobes: &[Lobe],
+    [x_px, y_px]: [f64; 2],
+    size: Size,
+    profiles: &mut NarrowProfiles,
+    into: &mut [MomentShares],
+) {
+    let width = size.width.div_ceil(GROUP_PX);
+    for lobe in lobes {
+        let [dx, dy] = lobe.offset_px;
+        let part = profiles.fill([x_px + dx, y_px + dy], lobe.sigma_px, size);
+        add_still_lobe(lobe.share as f32, profiles, part, into, width);
+    }
+}
+
 /// Adds a lobe to the rows of `width` groups.
 #[allow(
     clippy::needless_range_loop,
     reason = "lanes of several arrays read best as indices"
 )]
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+#[inline(always)]
 fn add_lobe_with_moments(
     share: f32,
     changes: &LobeChanges,
@@ -365,7 +392,7 @@ fn add_lobe_with_moments(
 }
 
 /// Adds a lobe and its derivatives with respect to x and y to the rows of `width` groups.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+#[inline(always)]
 fn add_still_lobe(
     share: f32,
     profiles: &NarrowProfiles,
