@@ -10,7 +10,7 @@ use super::parameters::{
 };
 use super::sums::{SumBuffers, WindowPixels, add_pixels, flux_variance};
 use super::window::Window;
-use crate::detect::psf::{AxisProfile, GROUP_PX, PixelGroup};
+use crate::detect::psf::{AxisProfile, GROUP_PX, LIGHT, LIGHT_BY_ALL, LIGHT_BY_PLACE, PixelGroup};
 use arrayvec::ArrayVec;
 
 /// The light of a spot of either kind.
@@ -202,8 +202,9 @@ impl Fitter {
         }
     }
 
-    /// Computes the light of the spots of one size in the window.
-    fn draw(&mut self, window: &Window, spots: &[SpotEstimate], spot_px: f64) {
+    /// Computes the light of the spots of one size in the window; of that of an effective PSF only the
+    /// first `PARTS` of its shares.
+    fn draw<const PARTS: usize>(&mut self, window: &Window, spots: &[SpotEstimate], spot_px: f64) {
         let Self {
             profiles, images, ..
         } = self;
@@ -220,7 +221,7 @@ impl Fitter {
                 images.resize_with(spots.len(), Default::default);
             }
             for (spot, image) in spots.iter().zip(images) {
-                image.draw(window, [spot.x, spot.y], spot_px);
+                image.draw::<PARTS>(window, [spot.x, spot.y], spot_px);
             }
         }
     }
@@ -266,7 +267,7 @@ impl Fitter {
         let mut light = std::mem::take(&mut self.light);
         light.clear();
         light.resize(window.data.len(), [0.0; GROUP_PX]);
-        self.draw(window, &fit.spots, fit.spot_px);
+        self.draw::<LIGHT>(window, &fit.spots, fit.spot_px);
         for (i, spot) in fit.spots.iter().enumerate() {
             let of_spot = self.light_of(i, spot, window);
             of_spot.add_to(&mut light, 1.0, window.groups());
@@ -321,7 +322,7 @@ impl Fitter {
     pub fn subtract(&mut self, window: &mut Window, spots: &[SpotEstimate], spot_px: f64) {
         let groups = window.groups();
         for spot in spots {
-            self.draw(window, &[*spot], spot_px);
+            self.draw::<LIGHT>(window, &[*spot], spot_px);
             let light = self.light_of(0, spot, window);
             light.add_to(&mut window.data, -1.0, groups);
         }
@@ -335,7 +336,11 @@ impl Fitter {
         config: &FitConfig,
     ) -> NormalEquations<N> {
         let mut normal = NormalEquations::empty();
-        self.draw(window, &fit.spots, fit.spot_px);
+        match fit.spots.len() {
+            1 => self.draw::<LIGHT_BY_ALL>(window, &fit.spots, fit.spot_px),
+            // The size of several spots is neither fitted nor tested.
+            _ => self.draw::<LIGHT_BY_PLACE>(window, &fit.spots, fit.spot_px),
+        }
         let pixels = WindowPixels::new(window, fit.background, &config.noise);
         let spots = fit.spots.iter().enumerate();
         let mut sums = std::mem::take(&mut self.sums);

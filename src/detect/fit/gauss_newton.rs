@@ -1,13 +1,16 @@
 //! One Gauss-Newton step of a fit: solution of the normal equations, convergence, standard errors.
 
 use super::normal::NormalEquations;
-use super::parameters::{Fit, FitConfig, SPOT_RANGE_PX, SpotEstimate};
+use super::parameters::{Fit, FitConfig, ONE_SPOT, SPOT_RANGE_PX, SpotEstimate};
 use super::window::Window;
 
 /// Maximum number of steps of a fit.
 pub(super) const MAX_STEPS: usize = 15;
 /// Maximum length of a step, in px: the model is not linear beyond it.
 const MAX_STEP_PX: f64 = 0.5;
+/// After so many steps of a fit of spots of known size, one of that length says that it jumps to and
+/// fro, or goes astray.
+const PATIENCE: usize = MAX_STEPS / 2;
 
 /// A fit has converged when its step is short.
 struct Convergence;
@@ -73,11 +76,8 @@ pub(super) fn advance<const N: usize>(
     let fitted = config.parameter_count(start.len());
     // The first step is hardly ever the last: it does not need the size's excess.
     let is_rough = step == 0 && start.len() == 1 && !config.free_size;
-    let all = if is_rough {
-        fitted
-    } else {
-        3 * start.len() + 2
-    };
+    let tests_size = start.len() == 1 && !is_rough;
+    let all = fitted.max(if tests_size { ONE_SPOT } else { 0 });
     let information = (0..start.len()).flat_map(|i| [3 * i, 3 * i + 1]);
     let information = information.map(|i| normal.matrix[i][i]).fold(0.0, f64::max);
     let known = normal.factorise(all);
@@ -91,7 +91,8 @@ pub(super) fn advance<const N: usize>(
     let is_flux_settled = (0..start.len())
         .all(|i| change[3 * i + 2].abs() <= Convergence::FLUX_CHANGE * fit.spots[i].flux.abs());
     let length = apply(fit, &change, config);
-    if has_strayed(fit, start, config) {
+    let is_jumping = !config.free_size && step >= PATIENCE && length >= MAX_STEP_PX;
+    if is_jumping || has_strayed(fit, start, config) {
         return StepOutcome::Failed;
     }
     let is_short = length < Convergence::step_px(information, config);

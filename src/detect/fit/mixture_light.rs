@@ -4,7 +4,8 @@ use super::light::{GroupLight, SpotLight};
 use super::window::Window;
 use crate::base::size::Size;
 use crate::detect::psf::{
-    DrawBuffers, GROUP_PX, LitPart, LocalPsf, NarrowProfiles, PixelGroup, ShareGroup, each,
+    DrawBuffers, GROUP_PX, LIGHT, LIGHT_BY_PLACE, LitPart, LocalPsf, NarrowProfiles, PixelGroup,
+    ShareGroup, each,
 };
 use multiversion::multiversion;
 
@@ -19,8 +20,14 @@ pub(super) struct MixtureImage {
 }
 
 impl MixtureImage {
-    /// Draws the PSF of the window, scaled to `spot_px`, at (x, y) in the frame.
-    pub fn draw(&mut self, window: &Window, [x_px, y_px]: [f64; 2], spot_px: f64) {
+    /// Draws the PSF of the window, scaled to `spot_px`, at (x, y) in the frame; of the shares only the
+    /// first `PARTS`.
+    pub fn draw<const PARTS: usize>(
+        &mut self,
+        window: &Window,
+        [x_px, y_px]: [f64; 2],
+        spot_px: f64,
+    ) {
         let psf = &window.psf;
         let width = window.groups();
         self.groups.clear();
@@ -35,11 +42,11 @@ impl MixtureImage {
                 scale,
                 size,
             };
-            draw_lobes(psf, &window, &mut self.profiles, &mut self.groups);
+            draw_lobes::<PARTS>(psf, &window, &mut self.profiles, &mut self.groups);
         } else {
             let sizes = [psf.spot_px, scale];
             psf.table
-                .draw(place_px, size, sizes, &mut self.buffers, &mut self.groups);
+                .draw::<PARTS>(place_px, size, sizes, &mut self.buffers, &mut self.groups);
         }
     }
 
@@ -66,7 +73,7 @@ struct LobeWindow {
 
 /// Adds the lobes of a PSF to the pixels of a window.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn draw_lobes(
+fn draw_lobes<const PARTS: usize>(
     psf: &LocalPsf,
     window: &LobeWindow,
     profiles: &mut NarrowProfiles,
@@ -84,7 +91,7 @@ fn draw_lobes(
         let part = profiles.fill(place, scale * lobe.sigma_px, size);
         // What a larger spot moves, and widens, its lobes by.
         let by_spot = [dx, dy, lobe.sigma_px].map(|part| (part / psf.spot_px) as f32);
-        add_lobe(lobe.share as f32, by_spot, profiles, part, into, width);
+        add_lobe::<PARTS>(lobe.share as f32, by_spot, profiles, part, into, width);
     }
 }
 
@@ -94,7 +101,7 @@ fn draw_lobes(
     reason = "lanes of several arrays read best as indices"
 )]
 #[inline(always)]
-fn add_lobe(
+fn add_lobe<const PARTS: usize>(
     share: f32,
     by_spot: [f32; 3],
     profiles: &NarrowProfiles,
@@ -115,11 +122,15 @@ fn add_lobe(
                 let here = across.value[lane];
                 let by_x = across.by_center[lane] * value;
                 let by_y = here * slope;
-                let by_lobe = across.by_sigma[lane] * value + here * growth;
                 sums[0][lane] += here * value;
-                sums[1][lane] += by_x;
-                sums[2][lane] += by_y;
-                sums[3][lane] += by_x * to_x + by_y * to_y + by_lobe * wider;
+                if PARTS > LIGHT {
+                    sums[1][lane] += by_x;
+                    sums[2][lane] += by_y;
+                }
+                if PARTS > LIGHT_BY_PLACE {
+                    let by_lobe = across.by_sigma[lane] * value + here * growth;
+                    sums[3][lane] += by_x * to_x + by_y * to_y + by_lobe * wider;
+                }
             }
             into[row * width + group] = sums;
         }

@@ -20,4 +20,4 @@ pub(crate) use gaussian::{
     PIXEL_VARIANCE_PX2, PixelGroup, ProfilePart, centered_profile, erf_and_gauss,
 };
 pub(crate) use lanes::{each, each_of, plus, times};
-pub(crate) use table::{DrawBuffers, ShareGroup};
+pub(crate) use table::{DrawBuffers, LIGHT, LIGHT_BY_ALL, LIGHT_BY_PLACE, ShareGroup};

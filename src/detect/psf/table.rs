@@ -27,6 +27,12 @@ const REACH_SIGMAS: f64 = 4.5;
 /// The fraction of the light in a group of pixels, and its derivatives with respect to x, y and
 /// size, per px.
 pub(crate) type ShareGroup = [PixelGroup; 4];
+/// The first parts of a [`ShareGroup`] that are drawn: the light alone,
+pub(crate) const LIGHT: usize = 1;
+/// that and its derivatives with respect to x and y,
+pub(crate) const LIGHT_BY_PLACE: usize = 3;
+/// or all.
+pub(crate) const LIGHT_BY_ALL: usize = 4;
 
 /// How a table is divided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -151,13 +157,13 @@ impl PsfTable {
     }
 
     /// Draws a spot at (x, y) in a window of this size: that of the table, of the size `spot_px`,
-    /// `scale` times as large.
+    /// `scale` times as large; of the shares only the first `PARTS`.
     ///
     /// The pixels are not scaled with the spot: the light F in scaled ones is corrected by
     /// `(1 − scale²)/24 ∇²F`, to the second order in their width: to three hundredths of the peak of
     /// sharp spots. Its derivatives are those in scaled pixels, which is enough to find the place
     /// where the light fits.
-    pub fn draw(
+    pub fn draw<const PARTS: usize>(
         &self,
         place_px: [f64; 2],
         size: Size,
@@ -191,9 +197,9 @@ impl PsfTable {
             groups: size.width.div_ceil(GROUP_PX),
         };
         if scale == 1.0 {
-            draw_rows::<false>(self, buffers, &window, into);
+            draw_rows::<PARTS, false>(self, buffers, &window, into);
         } else {
-            draw_rows::<true>(self, buffers, &window, into);
+            draw_rows::<PARTS, true>(self, buffers, &window, into);
         }
     }
 }
@@ -290,6 +296,8 @@ struct AxisTaps {
     step: isize,
     /// First pixel with light, and the one after the last.
     lit: [usize; 2],
+    /// Pixels of the table that hold the samples of these: the first, and the one after the last.
+    samples: [usize; 2],
 }
 
 impl AxisTaps {
@@ -319,6 +327,16 @@ impl AxisTaps {
         };
         let end = before(layout.side as isize, 1);
         self.lit = [before(0, 0).min(end), end];
+        let last = self.pixels.get(end.saturating_sub(1));
+        let first = self.pixels.get(self.lit[0]);
+        self.samples = match (first, last) {
+            (Some(first), Some(last)) => {
+                let bound = |pixel: isize| pixel.clamp(0, layout.stride as isize) as usize;
+                let first = bound(first.pixels[0]);
+                [first, bound(last.pixels[1] + 1).max(first)]
+            }
+            _ => [0; 2],
+        };
     }
 
     /// The weights of a pixel, and where its samples are in the table.
@@ -342,7 +360,7 @@ type PixelTaps<'a> = (&'a [[f32; TAPS]; 3], [isize; TAPS]);
 
 /// Draws the rows of a window.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn draw_rows<const IS_SCALED: bool>(
+fn draw_rows<const PARTS: usize, const IS_SCALED: bool>(
     table: &PsfTable,
     DrawBuffers { axes, lines }: &mut DrawBuffers,
     window: &Drawn,
@@ -355,7 +373,7 @@ fn draw_rows<const IS_SCALED: bool>(
     }
     for row in down.lit[0]..down.lit[1] {
         if IS_SCALED {
-            combine_rows(table, down.at(row), lines);
+            combine_rows::<PARTS>(table, down.at(row), across.samples, lines);
         }
         let dy = row as f32 - window.centre_px[1];
         let into = &mut into[row * window.groups..(row + 1) * window.groups];
@@ -365,16 +383,17 @@ fn draw_rows<const IS_SCALED: bool>(
             let mut parts = [[0.0; GROUP_PX]; 5];
             if IS_SCALED {
                 for pixel in start.max(first)..(start + GROUP_PX).min(end) {
-                    let of_pixel = combine_columns(lines, across.at(pixel));
+                    let of_pixel = combine_columns::<PARTS>(lines, across.at(pixel));
                     for (part, of_pixel) in parts.iter_mut().zip(of_pixel) {
                         part[pixel - start] = of_pixel;
                     }
                 }
             } else {
-                parts = combine_samples(&table.coefficients, across.at(start), down.at(row));
+                parts =
+                    combine_samples::<PARTS>(&table.coefficients, across.at(start), down.at(row));
             }
             let dx = start as f32 - window.centre_px[0];
-            *into = shares_of(parts, [dx, dy], window);
+            *into = shares_of::<PARTS, IS_SCALED>(parts, [dx, dy], window);
         }
     }
 }
@@ -382,7 +401,7 @@ fn draw_rows<const IS_SCALED: bool>(
 /// The light in a group of pixels, which are at the same fraction of a pixel of the table; its
 /// derivatives along x and y, and the second ones.
 #[inline(always)]
-fn combine_samples(
+fn combine_samples<const PARTS: usize>(
     table: &[f32],
     (of_columns, columns): PixelTaps<'_>,
     (of_rows, rows): PixelTaps<'_>,
@@ -397,33 +416,51 @@ fn combine_samples(
             let [weight, by_y, by_yy] = of_rows.map(|weights| weights[down]);
             for lane in 0..GROUP_PX {
                 value[lane] += weight * samples[lane];
-                slope[lane] += by_y * samples[lane];
-                curvature[lane] += by_yy * samples[lane];
+                if PARTS > LIGHT {
+                    slope[lane] += by_y * samples[lane];
+                }
+                if PARTS > LIGHT_BY_PLACE {
+                    curvature[lane] += by_yy * samples[lane];
+                }
             }
         }
         let [weight, by_x, by_xx] = of_columns.map(|weights| weights[tap]);
         for lane in 0..GROUP_PX {
             parts[0][lane] += weight * value[lane];
-            parts[1][lane] += by_x * value[lane];
-            parts[2][lane] += weight * slope[lane];
-            parts[3][lane] += by_xx * value[lane];
-            parts[4][lane] += weight * curvature[lane];
+            if PARTS > LIGHT {
+                parts[1][lane] += by_x * value[lane];
+                parts[2][lane] += weight * slope[lane];
+            }
+            if PARTS > LIGHT_BY_PLACE {
+                parts[3][lane] += by_xx * value[lane];
+                parts[4][lane] += weight * curvature[lane];
+            }
         }
     }
     parts
 }
 
-/// The samples of all phases along x in a row of the window: the light and its derivatives along y.
+/// The samples of all phases along x in a row of the window, those in the pixels that are needed: the
+/// light and its derivatives along y.
 #[inline(always)]
-fn combine_rows(table: &PsfTable, (weights, rows): PixelTaps<'_>, lines: &mut [Vec<f32>; 3]) {
+fn combine_rows<const PARTS: usize>(
+    table: &PsfTable,
+    (weights, rows): PixelTaps<'_>,
+    [first, end]: [usize; 2],
+    lines: &mut [Vec<f32>; 3],
+) {
     let TableLayout { per_px, stride, .. } = table.layout;
-    for (line, weights) in lines.iter_mut().zip(weights) {
+    for (number, (line, weights)) in lines.iter_mut().zip(weights).enumerate() {
+        if PARTS == LIGHT && number == 1 {
+            continue;
+        }
         line.resize(per_px * stride, 0.0);
         for (phase, line) in line.chunks_exact_mut(stride).enumerate() {
             let [a, b, c, d] = rows.map(|row| {
                 let start = table.layout.row([phase, 0], 0).wrapping_add_signed(row);
-                &table.coefficients[start..start + stride]
+                &table.coefficients[start + first..start + end]
             });
+            let line = &mut line[first..end];
             let samples = a.iter().zip(b).zip(c.iter().zip(d));
             for (sum, ((a, b), (c, d))) in line.iter_mut().zip(samples) {
                 *sum = weights[0] * a + weights[1] * b + weights[2] * c + weights[3] * d;
@@ -434,18 +471,19 @@ fn combine_rows(table: &PsfTable, (weights, rows): PixelTaps<'_>, lines: &mut [V
 
 /// As [`combine_samples`] in one pixel, from the samples of its row.
 #[inline(always)]
-fn combine_columns(
+fn combine_columns<const PARTS: usize>(
     [values, slopes, curvatures]: &[Vec<f32>; 3],
     (weights, places): PixelTaps<'_>,
 ) -> [f32; 5] {
     let mut sums = [0.0f32; 5];
     for (tap, place) in places.into_iter().enumerate() {
-        let [value, slope, curvature] =
-            [values, slopes, curvatures].map(|line| line[place as usize]);
+        let [value, curvature] = [values, curvatures].map(|line| line[place as usize]);
         let [weight, by_x, by_xx] = weights.map(|weights| weights[tap]);
         sums[0] += weight * value;
-        sums[1] += by_x * value;
-        sums[2] += weight * slope;
+        if PARTS > LIGHT {
+            sums[1] += by_x * value;
+            sums[2] += weight * slopes[place as usize];
+        }
         sums[3] += by_xx * value;
         sums[4] += weight * curvature;
     }
@@ -459,21 +497,31 @@ fn combine_columns(
 /// the pixels, which are not scaled, the light F changes by `−2F − r·∇F − ∇²F/12`, to the second
 /// order in the width of the pixels.
 #[inline(always)]
-fn shares_of(parts: [PixelGroup; 5], from_centre: [f32; 2], window: &Drawn) -> ShareGroup {
+fn shares_of<const PARTS: usize, const IS_SCALED: bool>(
+    parts: [PixelGroup; 5],
+    from_centre: [f32; 2],
+    window: &Drawn,
+) -> ShareGroup {
     let [mut value, along_x, along_y, xx, yy] = parts;
     let (per_spot, of_pixel) = (window.per_spot, window.of_pixel);
     let [first, dy] = from_centre;
-    for lane in 0..GROUP_PX {
-        value[lane] += of_pixel * (xx[lane] + yy[lane]);
+    if IS_SCALED {
+        for lane in 0..GROUP_PX {
+            value[lane] += of_pixel * (xx[lane] + yy[lane]);
+        }
     }
     let mut shares = [value, [0.0; GROUP_PX], [0.0; GROUP_PX], [0.0; GROUP_PX]];
     for lane in 0..GROUP_PX {
-        let dx = first + lane as i32 as f32;
-        let scaled = 2.0 * value[lane] + dx * along_x[lane] + dy * along_y[lane];
-        let of_pixel = (xx[lane] + yy[lane]) * PIXEL_VARIANCE_PX2 as f32;
-        shares[1][lane] = -along_x[lane];
-        shares[2][lane] = -along_y[lane];
-        shares[3][lane] = -(scaled + of_pixel) * per_spot;
+        if PARTS > LIGHT {
+            shares[1][lane] = -along_x[lane];
+            shares[2][lane] = -along_y[lane];
+        }
+        if PARTS > LIGHT_BY_PLACE {
+            let dx = first + lane as i32 as f32;
+            let scaled = 2.0 * value[lane] + dx * along_x[lane] + dy * along_y[lane];
+            let of_pixel = (xx[lane] + yy[lane]) * PIXEL_VARIANCE_PX2 as f32;
+            shares[3][lane] = -(scaled + of_pixel) * per_spot;
+        }
     }
     shares
 }
@@ -686,7 +734,7 @@ pub(super) mod tests {
         for place in [[10.0, 10.0], [9.63, 10.21], [10.5, 9.5], [2.2, 19.8]] {
             let groups = SIDE.div_ceil(GROUP_PX);
             let mut drawn = vec![[[0.0; GROUP_PX]; 4]; groups * SIDE];
-            table.draw(
+            table.draw::<LIGHT_BY_ALL>(
                 place,
                 Size::new(SIDE, SIDE),
                 [1.0, scale],

@@ -8,8 +8,8 @@ use crate::detect::fit::{
     sum_of,
 };
 use crate::detect::psf::{
-    DrawBuffers, EffectivePsf, FieldFrame, FieldMoments, GROUP_PX, LitPart, Lobe, LocalPsf,
-    NarrowProfiles, PixelGroup, ShareGroup, SpotMoments, covariance_by, stretch_by,
+    DrawBuffers, EffectivePsf, FieldFrame, FieldMoments, GROUP_PX, LIGHT_BY_PLACE, LitPart, Lobe,
+    LocalPsf, NarrowProfiles, PixelGroup, ShareGroup, SpotMoments, covariance_by, stretch_by,
 };
 use crate::detect::star_model::isolated_peaks;
 use multiversion::multiversion;
@@ -179,7 +179,7 @@ impl StarFitter {
         let (buffers, drawn) = (&mut self.buffers, &mut self.drawn);
         self.common
             .table
-            .draw(place, window.size(), sizes, buffers, drawn);
+            .draw::<LIGHT_BY_PLACE>(place, window.size(), sizes, buffers, drawn);
         self.shares.clear();
         let placed =
             |[light, by_x, by_y, _]: &ShareGroup| [*light, *by_x, *by_y, empty, empty, empty];
