@@ -5,7 +5,7 @@ use super::window::Window;
 use crate::base::size::Size;
 use crate::detect::psf::{
     DrawBuffers, GROUP_PX, LIGHT, LIGHT_BY_PLACE, LitPart, LocalPsf, NarrowProfiles, PixelGroup,
-    ShareGroup, each,
+    ProfilePart, ShareGroup, each, each_of,
 };
 use multiversion::multiversion;
 
@@ -110,29 +110,34 @@ fn add_lobe<const PARTS: usize>(
     width: usize,
 ) {
     let [to_x, to_y, wider] = by_spot;
-    for row in part.rows[0]..part.rows[1] {
-        let down = profiles.down(row, &part);
-        let [value, slope, growth] =
-            [down.value, down.by_center, down.by_sigma].map(|part| share * part);
-        for group in part.groups[0]..part.groups[1] {
-            let across = profiles.across(group, &part);
+    for group in part.groups[0]..part.groups[1] {
+        let ProfilePart {
+            value,
+            by_center,
+            by_sigma,
+        } = profiles.across(group, &part);
+        let across = each(&value, |value| share * value);
+        let by_x = each(&by_center, |by_center| share * by_center);
+        let by_size = each_of(&by_center, &by_sigma, |by_center, by_sigma| {
+            share * (to_x * by_center + wider * by_sigma)
+        });
+        for row in part.rows[0]..part.rows[1] {
+            let down = profiles.down(row, &part);
+            let size_along_y = to_y * down.by_center + wider * down.by_sigma;
+            let into = &mut into[row * width + group];
             // Copied so that the compiler need not assume aliasing.
-            let mut sums = into[row * width + group];
+            let mut sums = *into;
             for lane in 0..GROUP_PX {
-                let here = across.value[lane];
-                let by_x = across.by_center[lane] * value;
-                let by_y = here * slope;
-                sums[0][lane] += here * value;
+                sums[0][lane] += across[lane] * down.value;
                 if PARTS > LIGHT {
-                    sums[1][lane] += by_x;
-                    sums[2][lane] += by_y;
+                    sums[1][lane] += by_x[lane] * down.value;
+                    sums[2][lane] += across[lane] * down.by_center;
                 }
                 if PARTS > LIGHT_BY_PLACE {
-                    let by_lobe = across.by_sigma[lane] * value + here * growth;
-                    sums[3][lane] += by_x * to_x + by_y * to_y + by_lobe * wider;
+                    sums[3][lane] += by_size[lane] * down.value + across[lane] * size_along_y;
                 }
             }
-            into[row * width + group] = sums;
+            *into = sums;
         }
     }
 }

@@ -179,7 +179,7 @@ impl SumBuffers {
                 add_products(
                     normal,
                     [i, j],
-                    products_of(block, other),
+                    products_of([block, other], count, count),
                     spots.len(),
                     pixels,
                 );
@@ -281,17 +281,25 @@ fn add_products<const N: usize>(
     }
 }
 
-/// The sums over all pixels of the products of each image of a block with each of another.
+/// The sums of the products of each image of a block with each of another, over the first `count`
+/// groups of each `width`.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(crate) fn products_of(first: &[Block], second: &[Block]) -> [[f64; BLOCK]; BLOCK] {
+pub(crate) fn products_of(
+    [first, second]: [&[Block]; 2],
+    count: usize,
+    width: usize,
+) -> [[f64; BLOCK]; BLOCK] {
     let mut sums = [[[0.0f32; GROUP_PX]; BLOCK]; BLOCK];
-    for (left, right) in first.iter().zip(second) {
-        // Copied so that the compiler need not assume aliasing.
-        let (left, right) = (*left, *right);
-        for lane in 0..GROUP_PX {
-            for i in 0..BLOCK {
-                for j in 0..BLOCK {
-                    sums[i][j][lane] += left[i][lane] * right[j][lane];
+    let width = width.max(1);
+    for (first, second) in first.chunks(width).zip(second.chunks(width)) {
+        for (left, right) in first.iter().zip(second).take(count) {
+            // Copied so that the compiler need not assume aliasing.
+            let (left, right) = (*left, *right);
+            for lane in 0..GROUP_PX {
+                for i in 0..BLOCK {
+                    for j in 0..BLOCK {
+                        sums[i][j][lane] += left[i][lane] * right[j][lane];
+                    }
                 }
             }
         }

@@ -181,15 +181,8 @@ impl PsfTable {
             layout.stride
         };
         let steps = [[across, 1], [layout.per_px * of_phase, layout.stride]];
-        for (axis, taps) in buffers.axes.iter_mut().enumerate() {
-            taps.fill(
-                layout,
-                steps[axis],
-                place_px[axis],
-                scale,
-                size.sides()[axis],
-            );
-        }
+        let sides = size.sides();
+        fill_axes(&mut buffers.axes, layout, steps, place_px, scale, sides);
         let window = Drawn {
             centre_px: place_px.map(|at| at as f32),
             per_spot: (1.0 / (scale * spot_px)) as f32,
@@ -231,6 +224,7 @@ struct Taps {
 impl Taps {
     /// For a pixel at a distance from the centre of a spot that is `scale` times that of the table;
     /// `steps` are those of [`AxisTaps::fill`].
+    #[inline(always)]
     fn of(layout: TableLayout, steps: [usize; 2], distance_px: f64, scale: f64) -> Self {
         // Farther away there is no light.
         let far_px = (layout.side + MAX_WINDOW_PX) as f64;
@@ -303,6 +297,7 @@ struct AxisTaps {
 impl AxisTaps {
     /// For a spot at `at_px` in a window of `side` pixels; `steps` are how far the next phase and the
     /// next pixel are in the table.
+    #[inline(always)]
     fn fill(
         &mut self,
         layout: TableLayout,
@@ -357,6 +352,21 @@ impl AxisTaps {
 
 /// The weights of the samples of a pixel along an axis, and where they are.
 type PixelTaps<'a> = (&'a [[f32; TAPS]; 3], [isize; TAPS]);
+
+/// [`AxisTaps::fill`] along both axes.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn fill_axes(
+    axes: &mut [AxisTaps; 2],
+    layout: TableLayout,
+    steps: [[usize; 2]; 2],
+    place_px: [f64; 2],
+    scale: f64,
+    sides: [usize; 2],
+) {
+    for (axis, taps) in axes.iter_mut().enumerate() {
+        taps.fill(layout, steps[axis], place_px[axis], scale, sides[axis]);
+    }
+}
 
 /// Draws the rows of a window.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]

@@ -257,8 +257,8 @@ fn ranks(classes: &[usize]) -> (Vec<usize>, usize) {
 struct LobeImages {
     /// Block by block, each row by row; empty images fill the last block.
     light: Vec<Block>,
-    /// Rows of each image that have light.
-    rows: Vec<[usize; 2]>,
+    /// Rows of each block that have light, and groups in these: the first, and the one after the last.
+    lit: Vec<[[usize; 2]; 2]>,
     /// Groups in a row.
     width: usize,
     /// The pixels above the background, times the square roots of their weights: the first image of
@@ -276,8 +276,8 @@ impl LobeImages {
         let pixels = self.values.len();
         let count = classes.padded_count();
         self.width = window.groups();
-        self.rows.clear();
-        self.rows.resize(count, [usize::MAX, 0]);
+        self.lit.clear();
+        self.lit.resize(count / BLOCK, [[usize::MAX, 0]; 2]);
         self.light.clear();
         let empty = [[0.0; GROUP_PX]; BLOCK];
         self.light.resize(count / BLOCK * pixels, empty);
@@ -293,20 +293,22 @@ impl LobeImages {
         );
     }
 
-    /// The groups of two blocks, in the rows in which both have light.
-    fn common(&self, blocks: [usize; 2]) -> [&[Block]; 2] {
-        let [[a, b], [c, d]] = blocks.map(|block| {
-            let of_block = self.rows[block * BLOCK..][..BLOCK].iter();
-            of_block.fold([usize::MAX, 0], |[first, end], rows| {
-                [first.min(rows[0]), end.max(rows[1])]
-            })
+    /// The sums over all pixels of the products of each image of a block with each of another; `None`
+    /// where no pixel has light of both.
+    fn products(&self, blocks: [usize; 2]) -> Option<[[f64; BLOCK]; BLOCK]> {
+        let [a, b] = blocks.map(|block| self.lit[block]);
+        let [[first_row, end_row], [first, end]] = [0, 1].map(|axis| {
+            let [[a, b], [c, d]] = [a[axis], b[axis]];
+            [a.max(c), b.min(d)]
         });
-        let end = b.min(d);
-        let first = a.max(c).min(end);
-        blocks.map(|block| {
+        if first_row >= end_row || first >= end {
+            return None;
+        }
+        let of_blocks = blocks.map(|block| {
             let of_block = &self.light[block * self.values.len()..];
-            &of_block[first * self.width..end * self.width]
-        })
+            &of_block[first_row * self.width + first..(end_row - 1) * self.width + end]
+        });
+        Some(products_of(of_blocks, end - first, self.width))
     }
 }
 
@@ -322,7 +324,7 @@ fn draw_weighted_lobes(
 ) {
     let LobeImages {
         light,
-        rows,
+        lit,
         width,
         roots,
         profiles,
@@ -332,8 +334,10 @@ fn draw_weighted_lobes(
     for (lobe, &image) in lobes.iter().zip(of_lobes) {
         let [dx, dy] = lobe.offset_px;
         let part = profiles.fill([x_px + dx, y_px + dy], lobe.sigma_px, size);
-        let [first, end] = &mut rows[image];
-        (*first, *end) = ((*first).min(part.rows[0]), (*end).max(part.rows[1]));
+        let of_lobe = [part.rows, part.groups];
+        for ([first, end], [of_first, of_end]) in lit[image / BLOCK].iter_mut().zip(of_lobe) {
+            (*first, *end) = ((*first).min(of_first), (*end).max(of_end));
+        }
         let block = &mut light[image / BLOCK * pixels..][..pixels];
         add_weighted_lobe(flux, profiles, part, block, roots, image % BLOCK, *width);
     }
@@ -414,21 +418,28 @@ impl LobeSums {
         };
         let blocks = images.light.chunks_exact(images.values.len());
         for (block, light) in blocks.enumerate() {
-            let products = products_of(light, &images.values);
+            let count = light.len();
+            let products = products_of([light, &images.values], count, count);
             for (number, [product, ..]) in products.iter().enumerate() {
                 for (right, part) in self.right.iter_mut().zip(of_sets) {
                     right[block * BLOCK + number] += part * product;
                 }
             }
         }
-        for column in 0..images.rows.len() / BLOCK {
+        for column in 0..images.lit.len() {
             for row in 0..=column {
-                let [of_column, of_row] = images.common([column, row]);
-                let products = products_of(of_column, of_row);
+                let Some(products) = images.products([column, row]) else {
+                    continue;
+                };
                 for (sums, part) in self.products.iter_mut().zip(of_products) {
-                    for (j, products) in products.iter().enumerate() {
-                        for (i, product) in products.iter().enumerate() {
-                            sums[(row * BLOCK + i, column * BLOCK + j)] += part * product;
+                    let columns = sums
+                        .as_mut_slice()
+                        .chunks_exact_mut(images.lit.len() * BLOCK);
+                    let columns = columns.skip(column * BLOCK);
+                    for (sums, products) in columns.zip(products) {
+                        let sums = sums[row * BLOCK..].iter_mut();
+                        for (sum, product) in sums.zip(products) {
+                            *sum += part * product;
                         }
                     }
                 }
