@@ -229,19 +229,19 @@ fn fill(profile: &mut AxisProfile, center_px: f64, sigma_px: f64, count: usize) 
 /// light. The pixels that fill the last group are there as well, the last of them roughly.
 #[inline(always)]
 fn fill_narrow(profile: &mut AxisProfile, center_px: f64, cumulative: &Cumulative, count: usize) {
-    /// Beyond the light.
-    const END: [PixelGroup; 3] = [[0.5; GROUP_PX], [0.0; GROUP_PX], [0.0; GROUP_PX]];
-    let mut edges = edges_of_group(cumulative, -0.5 - center_px as f32);
-    for group in 0..count.div_ceil(GROUP_PX).min(GROUPS) {
-        let next = (group + 1) * GROUP_PX;
-        let after = if next <= count {
-            edges_of_group(cumulative, next as f32 - 0.5 - center_px as f32)
-        } else {
-            END
-        };
-        profile.value[group] = between(&edges[0], &after[0]);
-        profile.by_center[group] = between(&edges[1], &after[1]);
-        profile.by_sigma[group] = between(&edges[2], &after[2]);
+    /// Pixels of nearly all lobes: two groups, whose edges take no decisions.
+    const FEW: usize = 2 * GROUP_PX;
+    let first_px = -0.5 - center_px as f32;
+    if count < FEW {
+        let edges = edges_from::<FEW>(cumulative, first_px);
+        set_pixels(profile, 0, &edges, [0.5, 0.0, 0.0]);
+        return;
+    }
+    let mut edges = edges_from::<GROUP_PX>(cumulative, first_px);
+    for start in (0..count.min(MAX_WINDOW_PX)).step_by(GROUP_PX) {
+        let next_px = first_px + (start + GROUP_PX) as f32;
+        let after = edges_from::<GROUP_PX>(cumulative, next_px);
+        set_pixels(profile, start, &edges, after.map(|after| after[0]));
         edges = after;
     }
 }
@@ -249,11 +249,11 @@ fn fill_narrow(profile: &mut AxisProfile, center_px: f64, cumulative: &Cumulativ
 /// [`Cumulative::at`] in single precision at edges of pixels, the first of which is at a distance from
 /// the centre in pixels.
 #[inline(always)]
-fn edges_of_group(cumulative: &Cumulative, first_px: f32) -> [PixelGroup; 3] {
+fn edges_from<const N: usize>(cumulative: &Cumulative, first_px: f32) -> [[f32; N]; 3] {
     let [scale, density, by_sigma] =
         [cumulative.scale, cumulative.density, cumulative.by_sigma].map(|v| v as f32);
-    let mut at = [[0.0f32; GROUP_PX]; 3];
-    for lane in 0..GROUP_PX {
+    let mut at = [[0.0f32; N]; 3];
+    for lane in 0..N {
         let distance_px = first_px + lane as i32 as f32;
         let (erf, gauss) = erf_and_gauss_single(distance_px * scale);
         at[0][lane] = 0.5 * erf;
@@ -263,16 +263,28 @@ fn edges_of_group(cumulative: &Cumulative, first_px: f32) -> [PixelGroup; 3] {
     at
 }
 
-/// Differences of the values at the edges of a group of pixels, of which the last edge is the first of
-/// those `after`.
+/// Sets the pixels between edges from pixel `start` on, which begins a group; `after` are the values at
+/// the edge that follows.
 #[inline(always)]
-fn between(edges: &PixelGroup, after: &PixelGroup) -> PixelGroup {
-    let [_, b, c, d, e, f, g, h] = *edges;
-    let mut pixels = [b, c, d, e, f, g, h, after[0]];
-    for (pixel, edge) in pixels.iter_mut().zip(edges) {
-        *pixel -= edge;
+fn set_pixels<const N: usize>(
+    profile: &mut AxisProfile,
+    start: usize,
+    edges: &[[f32; N]; 3],
+    after: [f32; 3],
+) {
+    let parts = [
+        &mut profile.value,
+        &mut profile.by_center,
+        &mut profile.by_sigma,
+    ];
+    for ((part, edges), after) in parts.into_iter().zip(edges).zip(after) {
+        let mut pixels: [f32; N] =
+            std::array::from_fn(|i| if i + 1 < N { edges[i + 1] } else { after });
+        for (pixel, edge) in pixels.iter_mut().zip(edges) {
+            *pixel -= edge;
+        }
+        part.as_flattened_mut()[start..start + N].copy_from_slice(&pixels);
     }
-    pixels
 }
 
 /// Cumulative light along an axis at evenly spaced places, less one half, in single precision.
