@@ -307,9 +307,13 @@ impl AxisTaps {
         side: usize,
     ) {
         let different = if scale == 1.0 { 1 } else { side };
-        let taps = |pixel: usize| Taps::of(layout, steps, pixel as f64 - at_px, scale);
         self.pixels.clear();
-        self.pixels.extend((0..different).map(taps));
+        // A loop, as what `extend` calls is not compiled for the processor.
+        for pixel in 0..different {
+            let distance_px = pixel as f64 - at_px;
+            self.pixels
+                .push(Taps::of(layout, steps, distance_px, scale));
+        }
         self.step = steps[1] as isize;
         // The samples of the others are not all in the table.
         let before = |bound: isize, tap: usize| {

@@ -14,7 +14,7 @@ mod stars;
 
 use super::candidates::Peak;
 use super::fit::{FitBuffers, FrameMaps, NoiseModel, SpotEstimate, Window};
-use super::psf::{EffectivePsf, FieldForm, FieldFrame, MAX_WINDOW_PX, SpotMoments};
+use super::psf::{EffectivePsf, FieldForm, FieldFrame, LocalPsf, MAX_WINDOW_PX, SpotMoments};
 use super::star_model::{StarModel, noise_of};
 use crate::base::statistics::median;
 use field::moments_over_field;
@@ -223,10 +223,23 @@ fn typical_light(stars: &[PsfStar], maps: &FrameMaps<'_>) -> f64 {
 
 /// The noise model of the stars, each compared with the PSF from the other half of them.
 fn noise_of_psf(best: &Candidate, stars: &[PsfStar], buffers: &mut FitBuffers) -> NoiseModel {
+    let spot_at = |half: usize, x_px: f64, y_px: f64| {
+        let mut spot = LocalPsf::default();
+        best.of_halves[half].at(x_px, y_px, &mut spot);
+        spot.tabulate();
+        spot
+    };
+    let everywhere = best
+        .psf
+        .is_uniform()
+        .then(|| [0, 1].map(|half| spot_at(half, 0.0, 0.0)));
     let windows = stars.iter().enumerate().map(|(number, star)| {
+        let half = number % 2;
         let mut window = star.window.clone();
-        best.of_halves[number % 2].at(star.spot.x, star.spot.y, &mut window.psf);
-        window.psf.tabulate();
+        window.psf = match &everywhere {
+            Some(spots) => spots[half].clone(),
+            None => spot_at(half, star.spot.x, star.spot.y),
+        };
         (window, star.spot)
     });
     let mut windows: Vec<_> = windows.collect();
