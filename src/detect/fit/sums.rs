@@ -304,7 +304,14 @@ pub(crate) fn products_of(
             }
         }
     }
-    sums.map(|sums| sums.map(sum_of))
+    let mut products = [[0.0; BLOCK]; BLOCK];
+    // Loops, as what `map` calls is not compiled for the processor.
+    for (products, sums) in products.iter_mut().zip(sums) {
+        for (product, sum) in products.iter_mut().zip(sums) {
+            *product = sum_of(sum);
+        }
+    }
+    products
 }
 
 /// The variance of the flux of one spot, in ADU², fitted together with a background of variance

@@ -140,12 +140,16 @@ impl FieldFit {
             coefficients: [[0.0; FIELD_TERMS]; 3],
             chi2: 0.0,
         };
-        // The values of each basis at each star, moment by moment.
-        let rows: Vec<[Vec<f64>; 3]> = samples
+        // The values at each star, moment by moment, of the bases that it depends on: most are of one
+        // moment.
+        let rows: Vec<[Vec<(usize, f64)>; 3]> = samples
             .iter()
             .map(|sample| {
                 let values: Vec<Moments> = model.iter().map(|b| sample.predicted(b)).collect();
-                std::array::from_fn(|moment| values.iter().map(|value| value[moment]).collect())
+                std::array::from_fn(|moment| {
+                    let of_moment = values.iter().map(|value| value[moment]).enumerate();
+                    of_moment.filter(|(_, value)| *value != 0.0).collect()
+                })
             })
             .collect();
         for _ in 0..ROUNDS {
@@ -153,14 +157,13 @@ impl FieldFit {
             let mut right = DVector::<f64>::zeros(model.len());
             for ((sample, weight), rows) in samples.iter().zip(&weights).zip(&rows) {
                 for (moment, row) in rows.iter().enumerate() {
-                    // Most bases are of one moment.
-                    for (i, value) in row.iter().enumerate().filter(|(_, value)| **value != 0.0) {
+                    for (number, (i, value)) in row.iter().enumerate() {
                         let weighted = value * weight[moment];
-                        right[i] += weighted * sample.values[moment];
+                        right[*i] += weighted * sample.values[moment];
                         // The lower triangle, which is all that the decomposition reads.
-                        let column = matrix.as_mut_slice()[i * model.len()..].iter_mut();
-                        for (sum, other) in column.zip(row).skip(i) {
-                            *sum += weighted * other;
+                        let column = &mut matrix.as_mut_slice()[i * model.len()..];
+                        for (j, other) in &row[number..] {
+                            column[*j] += weighted * other;
                         }
                     }
                 }
