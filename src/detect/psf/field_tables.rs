@@ -4,7 +4,8 @@
 //! mixed from the four nodes around it.
 
 use super::effective::{EffectivePsf, FieldForm, LocalPsf};
-use super::table::{LobeExtent, PsfTable, TableLayout};
+use super::table::{LobeExtent, PsfTable};
+use super::taps::TableLayout;
 use crate::base::size::Size;
 use multiversion::multiversion;
 use std::sync::OnceLock;

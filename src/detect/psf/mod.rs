@@ -2,13 +2,15 @@
 //!
 //! `gaussian`: a round Gaussian integrated over the pixels, and sums of such. `effective`: the spot
 //! of a frame whose stars are not round, as it changes over the field; `table` and `field_tables`
-//! tabulate it. `lanes`: arithmetic of groups of pixels.
+//! tabulate it, and `taps` finds the samples that a pixel takes. `lanes`: arithmetic of groups of
+//! pixels.
 
 mod effective;
 mod field_tables;
 mod gaussian;
 mod lanes;
 mod table;
+mod taps;
 
 pub(crate) use effective::{
     EffectivePsf, FIELD_TERMS, FieldForm, FieldFrame, FieldLobe, FieldMoments, LocalPsf,
