@@ -248,6 +248,10 @@ fn fill_narrow(profile: &mut AxisProfile, center_px: f64, cumulative: &Cumulativ
 
 /// [`Cumulative::at`] in single precision at edges of pixels, the first of which is at a distance from
 /// the centre in pixels.
+#[allow(
+    clippy::needless_range_loop,
+    reason = "lanes of several arrays read best as indices"
+)]
 #[inline(always)]
 fn edges_from<const N: usize>(cumulative: &Cumulative, first_px: f32) -> [[f32; N]; 3] {
     let [scale, density, by_sigma] =
