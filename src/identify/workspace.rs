@@ -211,9 +211,9 @@ impl Workspace {
                 let fields = (0..coarser.count()).filter_map(|number| coarser.field(number));
                 fields.map(|field| (of(field), SearchPlan::coarse(*effort)))
             });
-            let votes = SearchPlan::votes(*effort);
-            let of_whole = coarser.map(|_| (whole, votes));
-            let thinned = thinning.thin(field).map(|field| (of(field), votes));
+            let of_whole = coarser.map(|_| (whole, SearchPlan::votes(*effort)));
+            let thinned = thinning.thin(field);
+            let thinned = thinned.map(|field| (of(field), SearchPlan::other_stars(*effort)));
             let tiers = tiers.below(field, effort.tiers()).iter().map(|tier| {
                 let problem = Problem {
                     brighter: tier.brighter,

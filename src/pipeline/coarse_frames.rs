@@ -14,6 +14,8 @@ use std::cell::{OnceCell, RefCell};
 const FACTORS: [usize; 2] = [4, 2];
 /// Least side of a coarse frame, in pixels.
 const MIN_SIDE_PX: usize = 64;
+/// Most pixels of a coarse frame: its detection is to cost little beside a search.
+const MAX_PX: usize = 1 << 20;
 /// Most detections: a search looks at the brightest.
 const MAX_DETECTIONS: usize = 1000;
 
@@ -47,8 +49,8 @@ impl<'a> CoarseFrames<'a> {
         let mut detector = detector.borrow_mut();
         let coarse_px = (frame.width / factor) * (frame.height / factor);
         let bytes = (coarse_px * size_of::<f32>()) as u64;
-        if frame.width.min(frame.height) / factor < MIN_SIDE_PX || !detector.has_room(frame, bytes)
-        {
+        let is_small = frame.width.min(frame.height) / factor < MIN_SIDE_PX;
+        if is_small || coarse_px > MAX_PX || !detector.has_room(frame, bytes) {
             return None;
         }
         let coarse = frame.binned(factor);

@@ -12,9 +12,9 @@ const MAX_TESTED: u64 = 2_000;
 const MAX_LAST: u64 = 1_000_000;
 /// A vote takes as long as so many catalogue triangles that are looked at.
 pub const WORK_OF_VOTE: u64 = 3;
-/// Work of a search of the brightest stars, and of a tier.
+/// Work of a search of the brightest stars, and of another choice of stars.
 const WORK: u64 = 850_000;
-const WORK_OF_TIER: u64 = 400_000;
+const WORK_OF_OTHERS: u64 = 400_000;
 
 /// Some of the triangles of the brightest stars.
 pub struct SearchPass {
@@ -60,15 +60,7 @@ impl SearchPlan {
         }
     }
 
-    /// The plan for the stars of a coarser frame.
-    pub const fn coarse(effort: Effort) -> Self {
-        Self {
-            max_work: effort.work(WORK_OF_TIER),
-            ..Self::brightest(effort)
-        }
-    }
-
-    /// The plan for stars that only vote: the brightest of each part of the frame.
+    /// The plan for the brightest stars of the frame, which only vote.
     pub const fn votes(effort: Effort) -> Self {
         Self {
             passes: &[],
@@ -78,13 +70,28 @@ impl SearchPlan {
         }
     }
 
+    /// The plan for another choice of stars, which only vote.
+    pub const fn other_stars(effort: Effort) -> Self {
+        Self {
+            max_work: effort.work(WORK_OF_OTHERS),
+            ..Self::votes(effort)
+        }
+    }
+
+    /// The plan for the stars of a coarser frame.
+    pub const fn coarse(effort: Effort) -> Self {
+        Self {
+            passes: &PASSES,
+            ..Self::other_stars(effort)
+        }
+    }
+
     /// The plan for stars below brighter detections, which only vote. Small triangles are enough: the
     /// index lists them down to fainter stars than large ones.
     pub const fn tier(effort: Effort) -> Self {
         Self {
             votes: &TIER_VOTES,
-            max_work: effort.work(WORK_OF_TIER),
-            ..Self::votes(effort)
+            ..Self::other_stars(effort)
         }
     }
 }
