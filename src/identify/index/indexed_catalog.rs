@@ -49,7 +49,7 @@ pub struct IndexedCatalog<'a> {
     /// The triangles.
     pub triangles: TriangleIndex,
     /// The directions of the stars, for triangles.
-    pub vectors: PackedVectors,
+    pub(in crate::identify) vectors: PackedVectors,
     counts: MagnitudeCounts,
 }
 
