@@ -16,8 +16,9 @@ FROM, TO = (float(degrees) for degrees in sys.argv[1].split(":"))
 MOST = 60
 TETRA3RS_SIGMA = 5.0
 SEP_SIGMA = {"sep": 1.5, "sep-5-sigma": 5.0}
-# Pixels above the threshold, and parts of one source: the defaults are too few for a city.
-SEP_PIXELS, SEP_PARTS = 10_000_000, 100_000
+# Pixels above the threshold, and parts of one source. The defaults are too few for a city, and more
+# than needed take time.
+SEP_PIXELS, SEP_PARTS = (300_000, 10_000_000), (1024, 100_000)
 
 
 def clocked(work):
@@ -32,8 +33,6 @@ class Tetra3rs:
         import tetra3rs
 
         self.tetra3rs, self.sep = tetra3rs, sep
-        sep.set_extract_pixstack(SEP_PIXELS)
-        sep.set_sub_object_limit(SEP_PARTS)
         cache = Path(sys.argv[2]) / f"tetra3rs_{FROM:g}_{TO:g}.bin"
         if cache.exists():
             self.database = tetra3rs.SolverDatabase.load_from_file(str(cache))
@@ -46,6 +45,15 @@ class Tetra3rs:
         self.image = image
         self.floats = image.astype(numpy.float32)
         self.centroids = self.extract().centroids
+        for pixels, parts in zip(SEP_PIXELS, SEP_PARTS):
+            self.sep.set_extract_pixstack(pixels)
+            self.sep.set_sub_object_limit(parts)
+            try:
+                self.of_sep(min(SEP_SIGMA.values()))
+                break
+            except Exception as error:
+                if "overflow" not in str(error) and "full" not in str(error):
+                    raise
 
     def extract(self):
         return self.extractor.extract(self.image, sigma_threshold=TETRA3RS_SIGMA)
