@@ -72,7 +72,7 @@ def test_a_validation_is_the_programs(program, tmp_path):
 def test_robustness_has_a_row_or_the_standard_table():
     (row,) = sp.robustness(fov=10 * u.deg, count=60, threads=2)
     assert (row["trials"], row["wrong_of_all"]) == (60, 0)
-    assert len(sp.robustness(count=2)) == 12
+    assert len(sp.robustness(count=2)) == 17
 
 
 def test_darks_give_master_mask_and_noise(pipeline):
