@@ -135,11 +135,14 @@ impl MeanProfile {
         Some([sharp, end])
     }
 
-    /// The mean light between two distances from the middle on one side.
+    /// The mean light between two distances from the middle on one side; `None` beyond what was measured.
     fn mean(&self, side: f64, from: f64, to: f64) -> Option<f64> {
         let step = |distance: f64| (self.sums.len() / 2) as f64 + side * distance;
         let (from, to) = (step(from).min(step(to)), step(from).max(step(to)));
-        let steps = from.round().max(0.0) as usize..to.round().max(0.0) as usize + 1;
+        if to.round() < 0.0 {
+            return None;
+        }
+        let steps = from.round().max(0.0) as usize..to.round() as usize + 1;
         let steps = self.sums.get(steps.start..steps.end.min(self.sums.len()))?;
         let sums = steps
             .iter()
@@ -161,6 +164,22 @@ impl MeanProfile {
                 return Some(distance - 1.0 + part.clamp(0.0, 1.0));
             }
             before = here;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_that_never_falls_has_no_end_on_either_side() {
+        let mean = MeanProfile {
+            sums: vec![[1.0, 1.0]; 41],
+            ..MeanProfile::default()
+        };
+        for side in [-1.0, 1.0] {
+            assert_eq!(mean.fall(side, 5.0, 0.5, 1.0), None);
         }
     }
 }
