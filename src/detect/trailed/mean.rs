@@ -176,7 +176,6 @@ mod tests {
     fn light_that_never_falls_has_no_end_on_either_side() {
         let mean = MeanProfile {
             sums: vec![[1.0, 1.0]; 41],
-            ..MeanProfile::default()
         };
         for side in [-1.0, 1.0] {
             assert_eq!(mean.fall(side, 5.0, 0.5, 1.0), None);
