@@ -210,6 +210,7 @@ pub fn check_size(width: usize, height: usize) -> Result<(), FrameError> {
         _ => Err(FrameError::TooLarge { width, height }),
     }
 }
+
 /// The means of blocks of pixels, row by row.
 fn means_of_blocks<T: Copy + Into<f32>>(values: &[T], width: usize, factor: usize) -> Vec<f32> {
     let columns = width / factor;

@@ -125,8 +125,9 @@ impl Pixels<'_> {
 }
 
 /// All `values` and the `first` reduced to one, whatever their order: many at once.
-fn reduce(values: &[f32], first: f32, by: impl Fn(f32, f32) -> f32) -> f32 {
-    const LANES: usize = 32;
+#[inline(always)]
+pub(super) fn reduce<T: Copy>(values: &[T], first: T, by: impl Fn(T, T) -> T) -> T {
+    const LANES: usize = 64;
     let (chunks, rest) = values.as_chunks::<LANES>();
     let mut lanes = [first; LANES];
     for chunk in chunks {

@@ -14,7 +14,7 @@
 //! plateau that another program's flat has spread over more than a few per cent is not found.
 
 use super::image::Frame;
-use super::pixels::Pixels;
+use super::pixels::{Pixels, reduce};
 use crate::base::statistics::log10_binomial_tail;
 use multiversion::multiversion;
 use std::cmp::Ordering;
@@ -397,16 +397,7 @@ fn find_from<T: Copy + PartialOrd + Into<f32>>(
 /// The highest of `lowest` and the values of a row; NaN is left out.
 #[inline(always)]
 fn highest_in<T: Copy + PartialOrd>(row: &[T], lowest: T) -> T {
-    const LANES: usize = 64;
-    let higher = |a: T, b: T| if b > a { b } else { a };
-    let (chunks, rest) = row.as_chunks::<LANES>();
-    let mut lanes = [lowest; LANES];
-    for chunk in chunks {
-        for (lane, &value) in lanes.iter_mut().zip(chunk) {
-            *lane = higher(*lane, value);
-        }
-    }
-    lanes.iter().chain(rest).copied().fold(lowest, higher)
+    reduce(row, lowest, |a, b| if b > a { b } else { a })
 }
 
 /// Whether a pixel next to this one has light, too.

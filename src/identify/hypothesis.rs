@@ -83,19 +83,16 @@ impl Hypothesis {
         self.predict_to(problem, observed, limit, around, predicted);
     }
 
-    /// Fills `predicted` with so many of the brightest catalogue stars in the frame, or more.
-    pub fn predict_brightest(
+    /// Fills `predicted` with the catalogue stars in the frame, brightest first, to this depth or
+    /// deeper.
+    pub fn predict_at_least(
         &self,
         Problem { field, sky, .. }: Problem,
-        count: usize,
+        least: PredictionDepth,
         around: &mut Surroundings,
         predicted: &mut Vec<PredictedStar>,
     ) {
-        let likely_v_mag = sky.magnitude_of_density(self.per_sq_deg(count));
-        let least = PredictionDepth {
-            count,
-            v_mag: f64::NEG_INFINITY,
-        };
+        let likely_v_mag = sky.magnitude_of_density(self.per_sq_deg(least.count));
         around.stars_at_least(&self.view(field), sky, least, likely_v_mag, predicted);
     }
 
@@ -113,22 +110,20 @@ impl Hypothesis {
             sky,
             brighter,
         } = problem;
-        let view = self.view(field);
         match field.photometry {
             Photometry::JohnsonV => {
                 let faintest = observed.iter().map(|s| s.mag).fold(f64::MIN, f64::max);
                 let limit = faintest + field.photometry.tolerance_mag();
-                around.stars_to(&view, sky, limit.max(limit_v_mag), predicted);
+                around.stars_to(&self.view(field), sky, limit.max(limit_v_mag), predicted);
             }
             Photometry::Instrumental => {
                 let count = (observed.len() + brighter) as f64 * PREDICTED_PER_OBSERVED;
                 let count = count.ceil() as usize + PREDICTED_EXTRA;
-                let likely = sky.magnitude_of_density(self.per_sq_deg(count));
                 let least = PredictionDepth {
                     count,
                     v_mag: limit_v_mag,
                 };
-                around.stars_at_least(&view, sky, least, likely, predicted);
+                self.predict_at_least(problem, least, around, predicted);
             }
         }
     }

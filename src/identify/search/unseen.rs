@@ -6,7 +6,7 @@
 
 use crate::identify::hypothesis::{Hypothesis, Problem};
 use crate::identify::pairing::Pair;
-use crate::identify::predict::{PredictedStar, Surroundings};
+use crate::identify::predict::{PredictedStar, PredictionDepth, Surroundings};
 
 /// Number of stars that are looked for, the brightest.
 const BRIGHTEST: usize = 40;
@@ -40,7 +40,7 @@ impl Unseen {
             return 0.0;
         }
         let (_, faintest, _) = v_mags.select_nth_unstable_by(middle, f32::total_cmp);
-        hypothesis.predict_brightest(problem, BRIGHTEST, around, predicted);
+        hypothesis.predict_at_least(problem, depth_of(BRIGHTEST), around, predicted);
         let residuals = named.iter().map(|pair| pair.residual_px);
         let radius_px = residuals.fold(MIN_RADIUS_PX, f64::max);
         let field = problem.field;
@@ -65,6 +65,14 @@ impl Unseen {
             seen += usize::from(is_seen(star));
         }
         log10_at_most(seen, expected)
+    }
+}
+
+/// The depth of so many stars.
+fn depth_of(count: usize) -> PredictionDepth {
+    PredictionDepth {
+        count,
+        v_mag: f64::NEG_INFINITY,
     }
 }
 
@@ -102,7 +110,7 @@ mod tests {
         let (mut around, mut predicted) = (Surroundings::default(), Vec::new());
         let empty = StarField::of_places([1000.0; 2], &[]);
         let of_empty = Problem::new(&empty, &sky);
-        hypothesis.predict_brightest(of_empty, 150, &mut around, &mut predicted);
+        hypothesis.predict_at_least(of_empty, depth_of(150), &mut around, &mut predicted);
         predicted.retain(|star| hypothesis.camera.contains(&star.pixel));
         let mut log10_without = |hidden: usize| {
             let seen = &predicted[hidden..];
